@@ -32,15 +32,15 @@ struct Frame {
 /// The header, and the values after it, column by column, the time first.
 fn parts(file: &LogFile) -> Result<(Value, &[[u8; VALUE_BYTES]]), LogError> {
     let bytes = file.bytes().and_then(|bytes| bytes.strip_prefix(MAGIC));
-    let bytes = bytes.ok_or_else(|| file.content(NAME, "it exists in memory only"))?;
+    let bytes = bytes.ok_or_else(|| file.content_error(NAME, "it exists in memory only"))?;
     let end = bytes.iter().position(|byte| *byte == b'\n').unwrap_or(bytes.len());
     let (header, values) = bytes.split_at(end);
-    let header = serde_json::from_slice(header).map_err(|error| file.content(NAME, error.to_string()))?;
+    let header = serde_json::from_slice(header).map_err(|error| file.content_error(NAME, error.to_string()))?;
     Ok((header, values.get(1..).unwrap_or_default().as_chunks().0))
 }
 
 fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
-    options.only(&[]).map_err(|why| file.content(NAME, why))?;
+    options.only(&[]).map_err(|why| file.content_error(NAME, why))?;
     let (header, _) = parts(file)?;
     let names = header["columns"].as_array().into_iter().flatten().filter_map(Value::as_str);
     let column = |name: &str| Column { name: name.to_owned(), header: name.to_owned(), ..Column::default() };

@@ -1,5 +1,4 @@
-//! The complete campaign: the form of the file, and the result with units resolved and defaults filled in. Its
-//! elements are in `elements`, one file each.
+//! The campaign file, and the [`Campaign`] with units resolved and defaults filled in. Its elements are in `elements`.
 
 use crate::elements::evaluation::acceptance::AcceptanceFile;
 use crate::elements::evaluation::drift::DriftFile;
@@ -14,7 +13,7 @@ use crate::elements::points::zero::ZeroFile;
 use crate::elements::rig::backend::backend;
 use crate::elements::rig::boundary::BoundaryFile;
 use crate::elements::rig::calibration::Calibration;
-use crate::elements::rig::guards::{GuardedBy, GuardsFile};
+use crate::elements::rig::guards::{GuardInputs, GuardsFile};
 use crate::elements::rig::limits::LimitsFile;
 use crate::elements::rig::readers::{ReaderFile, readers};
 use crate::elements::rig::safe_state::SafeStateFile;
@@ -25,8 +24,8 @@ use crate::elements::turbocharger::machine::MachineFile;
 use crate::elements::turbocharger::reference::ReferenceFile;
 use mapper_core::{
     AcceptanceCriteria, Channel, EfficiencyDefinition, GuardSet, Limits, ModelTolerances, OnDrift,
-    OperatingPoint, ReferenceState, Repeats, SafeTrajectory, Soak, SpeedControlSettings, SurgeSeek, Timing,
-    VisitOrder,
+    OperatingPoint, ReferenceState, Repeats, SafeTrajectory, Soak, SpeedControlSettings, SurgeSearchSettings,
+    Timing, VisitOrder,
 };
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::follow_outlet::FollowOutlet;
@@ -46,10 +45,10 @@ pub use crate::elements::points::sequence::SequenceSource;
 pub use crate::elements::rig::backend::BackendChoice;
 pub use crate::elements::rig::calibration::{CalibrationRule, Date};
 pub use crate::elements::rig::readers::ReaderChoice;
-pub use crate::elements::rig::several_sensors::SensorDeclaration;
+pub use crate::elements::rig::redundant_sensors::SensorDeclaration;
 pub use crate::elements::turbocharger::machine::{DescriptionSource, Machine, MapSource};
 
-/// Everything that a run needs. All mistakes that can be found in advance have been excluded.
+/// A checked campaign: everything that a run needs, in SI units and rpm.
 ///
 /// Its JSON is canonical (keys in order, SI values): the planner hashes it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -63,14 +62,14 @@ pub struct Campaign {
     /// Boundary conditions. `p3_pa` and `valve_opening_ratio` are not set by the campaign: they are
     /// the turbine outlet pressure (no flow) and 1 until the plan sets them.
     pub boundary: BoundaryConditions,
-    /// Conditions that are held at the compressor's outlet temperature of each point instead.
+    /// Conditions that follow the compressor's outlet temperature of each point instead.
     pub follow_outlet: FollowOutlet,
     /// Declared uncertainty of each channel that has a sensor.
     pub sensors: BTreeMap<Channel, SensorDeclaration>,
     /// Whether every sensor needs a valid calibration.
     #[serde(skip_serializing_if = "CalibrationRule::is_optional")]
     pub calibration: CalibrationRule,
-    /// Criteria by which points are accepted.
+    /// Criteria of the acceptance of points.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub acceptance: Option<AcceptanceCriteria>,
     /// Declared tolerances of the nominal model; the defaults if the file gives none.
@@ -93,7 +92,7 @@ pub struct Campaign {
     /// The soak before the warm-up, for a zero of the sensors, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub zero: Option<Soak>,
-    /// How points are identified.
+    /// Settings of the identification.
     pub identification: Identification,
     /// Order of the points.
     pub order: VisitOrder,
@@ -112,7 +111,7 @@ pub struct Campaign {
     pub speed_control: Option<SpeedControlSettings>,
     /// The search for surge after all other steps, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub surge_search: Option<SurgeSeek>,
+    pub surge_search: Option<SurgeSearchSettings>,
     /// Seed of the search and of simulated rigs.
     pub seed: u64,
     /// Limits of the run.
@@ -136,7 +135,7 @@ pub struct Campaign {
 impl Campaign {
     /// The guards of a run: those declared, or one at each limit.
     pub fn guard_set(&self) -> GuardSet {
-        let by = GuardedBy {
+        let by = GuardInputs {
             limits: &self.limits,
             sensors: &self.sensors,
             dwell_s: self.timing.dwell.fixed_or_usual_s(),
@@ -239,8 +238,8 @@ pub(crate) struct CampaignFile {
 }
 
 impl CampaignFile {
-    /// The campaign of a file without mistakes, and for each of its points the place in the file it came from. Each line
-    /// has only one point so far: the others need the nominal model.
+    /// The campaign of a file without mistakes, and the place in the file of each of its points. Each line has only its first point: the others
+    /// need the nominal model.
     ///
     /// # Errors
     /// Only if the map file or the sequence script can no longer be read.
@@ -257,21 +256,23 @@ impl CampaignFile {
         let mut sensors = self.sensors.declarations();
         for (channel, date) in &self.report.calibration {
             let sensor = sensors.get_mut(channel).filter(|sensor| sensor.calibrations.is_empty());
-            sensor.into_iter().for_each(|sensor| sensor.calibrations = vec![Some(Calibration::on(*date))]);
+            sensor
+                .into_iter()
+                .for_each(|sensor| sensor.calibrations = vec![Some(Calibration::from_date(*date))]);
         }
         let probe_diameter_m = sensors.get(&Channel::T2).map_or(0.0, |sensor| sensor.probe_diameter_m);
         let mut machine = self.machine.machine(probe_diameter_m, origin, files)?;
         let alpha_area_ratio = machine.params.compressor.alpha_area_ratio;
         let speed_control = speed_control(self.speed_control);
         let timing = self.timing.timing();
-        let by = GuardedBy {
+        let by = GuardInputs {
             limits: &limits,
             sensors: &sensors,
             dwell_s: timing.dwell.fixed_or_usual_s(),
             speed_is_held: speed_control.is_some(),
         };
         let guards = self.guards.map(|guards| guards.guards(&by));
-        // The closed form is that of the paper's machine, whose efficiency is eq. 2's; a table has the usual definition.
+        // The closed form is the paper's machine with the efficiency of eq. 2; tables have the usual definition.
         let usual = match machine.map {
             MapSource::ClosedForm => EfficiencyDefinition::KappaOfT1,
             MapSource::Table { .. } => EfficiencyDefinition::default(),
@@ -301,8 +302,8 @@ impl CampaignFile {
             return_to_first: self.return_to_first.unwrap_or(true),
             on_drift: self.drift.map(|drift| drift.on_drift),
             speed_control,
-            surge_search: self.surge_search.map(SurgeSearchFile::seek),
-            seed: self.seed.unwrap_or(USUAL_SEED),
+            surge_search: self.surge_search.map(SurgeSearchFile::settings),
+            seed: self.seed.unwrap_or(DEFAULT_SEED),
             limits,
             guards,
             safe_state: self.safe_state.map(SafeStateFile::trajectory),
@@ -316,5 +317,4 @@ impl CampaignFile {
     }
 }
 
-/// Seed if the file gives none.
-const USUAL_SEED: u64 = 1;
+const DEFAULT_SEED: u64 = 1;

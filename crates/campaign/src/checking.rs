@@ -1,6 +1,6 @@
 //! Access to the file and its findings for the checks of the elements.
 //!
-//! Works on the tree and skips what is missing or unreadable, so that one mistake does not hide another.
+//! Reads the tree and skips missing or invalid values, so that one mistake does not hide another.
 
 use crate::units::{self, Kind};
 use mapper_yaml::{FindingKind, Notes, Step, Tree};
@@ -8,15 +8,15 @@ use serde_json::Value;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// A way to read a file named in a campaign.
+/// Reads a file named in a campaign.
 pub(crate) type Files<'a> = &'a dyn Fn(&Path) -> io::Result<String>;
 
 /// The path of a file named in a campaign: relative ones start from the campaign's own directory.
-pub(crate) fn beside(origin: &Path, file: &str) -> PathBuf {
+pub(crate) fn resolve_path(origin: &Path, file: &str) -> PathBuf {
     origin.parent().unwrap_or(Path::new("")).join(file)
 }
 
-/// A file as far as it could be read, and its list of mistakes.
+/// A campaign file with its list of mistakes.
 pub(crate) struct Check<'a> {
     pub tree: &'a Tree,
     pub files: Files<'a>,
@@ -52,17 +52,17 @@ impl<'a> Check<'a> {
 
     /// The resolved path of a file named in the campaign, and its text.
     pub fn file(&self, name: &str) -> (PathBuf, io::Result<String>) {
-        let path = beside(&self.tree.source().origin, name);
+        let path = resolve_path(&self.tree.source().origin, name);
         let text = (self.files)(&path);
         (path, text)
     }
 
-    /// A mistake at a value.
+    /// Notes a mistake at a value.
     pub fn note(&mut self, kind: FindingKind, steps: &[Step], message: String, remedy: &str) {
         self.notes.push(self.tree.finding(kind, steps, message, remedy));
     }
 
-    /// A mistake at a key, if the key itself is wrong and not its value.
+    /// Notes a mistake at a key whose value is not the mistake.
     pub fn note_key(&mut self, kind: FindingKind, parent: &[Step], key: &str, message: String, remedy: &str) {
         let steps = [parent, &[Step::from(key)]].concat();
         self.notes.push(self.tree.key_finding(kind, &steps, message, remedy));

@@ -1,8 +1,8 @@
-//! Campaign files: YAML text -> a checked [`Campaign`], or all its mistakes, each with its place and remedy.
+//! Reads campaign files: [`load`] returns a checked [`Campaign`], or all mistakes of the file, each with its place and remedy.
 //!
-//! The text becomes a tree that keeps positions. The tree is checked against the JSON schema that
-//! [`json_schema`] also gives to editors, units and ranges included; then for consistency (grid, limits, window,
-//! files). Only a text without mistakes is deserialised, and only then are points checked for reachability.
+//! The text is parsed to a tree with positions and checked against the JSON schema ([`json_schema`], also for editors) with units and
+//! ranges, then for consistency (grid, limits, window, files). A text without mistakes is deserialised, and its points are checked for
+//! reachability.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
@@ -21,9 +21,9 @@ mod testing;
 pub use campaign::Campaign;
 pub use checks::calibration::{CalibrationWarning, forecast_calibration_warnings};
 pub use checks::concern::Concern;
-pub use checks::reachable_points::{Unreachable, nominal_model, unreachable_points};
+pub use checks::reachable_points::{UnreachablePoint, nominal_model, unreachable_points};
 pub use files::load::{
-    CampaignError, FILE_SIZE_LIMIT, MAP_SIZE_LIMIT, backend_mistake, check, check_with, format_mistake, load,
+    CampaignError, MAX_FILE_BYTES, MAX_MAP_BYTES, backend_mistake, check, check_with, format_mistake, load,
     mistakes, read_named_file, read_text, warnings,
 };
 pub use files::nightly::{Nightly, NightlyError, NightlyGroup, load_nightly};

@@ -1,22 +1,21 @@
-//! The sizes of a machine, and how each follows from the compressor's wheel if the campaign does not give it.
+//! The sizes of a machine, and their scaling with the compressor's wheel if the campaign does not give them.
 //!
-//! Machines are geometrically similar: lengths grow with the wheel, areas and flows with its square, masses and volumes with the
-//! cube, the inertia with the fifth power. Materials and the dimensionless Nusselt laws stay. The reference is the machine of Burke et
+//! Machines are assumed to be geometrically similar: lengths scale with the wheel, areas and flows with its square, masses and volumes
+//! with the cube, the inertia with the fifth power. Materials and the dimensionless Nusselt laws are equal. The reference is the machine of Burke et
 //! al., Appendix A, whose wheel has 52 mm.
 
 use mapper_physics::machine::params::Params;
 use mapper_yaml::{Step, Tree};
 use serde::Serialize;
 
-/// Factors by which lengths, areas and masses, and the inertia may differ from those of the reference machine, scaled to the wheel,
-/// before they produce a warning: ten times as much of anything is a mistyped unit.
-const LENGTH_RATIO: f64 = 4.0;
-const AREA_RATIO: f64 = 10.0;
-const MASS_RATIO: f64 = 10.0;
-const INERTIA_RATIO: f64 = 100.0;
+/// Maximum ratios, either way, of a size to the scaled reference machine's without a warning: a factor of ten is a wrong unit.
+const MAX_LENGTH_RATIO: f64 = 4.0;
+const MAX_AREA_RATIO: f64 = 10.0;
+const MAX_MASS_RATIO: f64 = 10.0;
+const MAX_INERTIA_RATIO: f64 = 100.0;
 
-/// Relative uncertainty of an area that is scaled from the wheel, one standard deviation. Judgement: the trims of compressors in catalogues,
-/// 45 to 60, alone change the inlet's area by a seventh about the middle, and volutes differ more.
+/// Relative uncertainty of an area that is scaled from the wheel, one standard deviation. Judgement: trims of
+/// 45 to 60 in catalogues alone change the inlet's area by a seventh about the mean, and volutes differ more.
 const SCALED_AREA_SIGMA_RATIO: f64 = 0.2;
 
 /// Place of the geometry in a campaign.
@@ -27,7 +26,7 @@ const GEOMETRY: [&str; 2] = ["machine", "geometry"];
 pub struct AssumedSize {
     /// Its key below `machine.geometry`, e.g. `compressor.internal_area`.
     pub key: String,
-    /// Its name in words.
+    /// Its name.
     pub name: &'static str,
     /// Its value in `unit`.
     pub value: f64,
@@ -40,9 +39,9 @@ pub(crate) struct Size {
     /// Keys below `machine.geometry`.
     pub path: &'static [&'static str],
     pub name: &'static str,
-    pub of: fn(&mut Params) -> &mut f64,
+    pub field: fn(&mut Params) -> &mut f64,
     pub power: i32,
-    /// Largest usual factor to the scaled reference; `None`: it says nothing about the machine.
+    /// Maximum usual ratio to the scaled reference; `None` if it varies freely between machines.
     pub usual_ratio: Option<f64>,
     /// Factor to the unit shown, and the unit.
     pub unit: (f64, &'static str),
@@ -51,32 +50,32 @@ pub(crate) struct Size {
 const MM: (f64, &str) = (1e3, "mm");
 const M2: (f64, &str) = (1.0, "m^2");
 const KG: (f64, &str) = (1.0, "kg");
-const ONE: (f64, &str) = (1.0, "");
+const DIMENSIONLESS: (f64, &str) = (1.0, "");
 
 #[rustfmt::skip]
 pub(crate) const SIZES: &[Size] = &[
-    Size { path: &["compressor", "internal_area"], name: "internal area of the compressor", of: |p| &mut p.compressor.internal_area_m2, power: 2, usual_ratio: Some(AREA_RATIO), unit: M2 },
-    Size { path: &["compressor", "inlet_diameter"], name: "inlet of the compressor", of: |p| &mut p.compressor.inlet_diameter_m, power: 1, usual_ratio: Some(LENGTH_RATIO), unit: MM },
-    Size { path: &["compressor", "outlet_diameter"], name: "outlet of the compressor", of: |p| &mut p.compressor.outlet_diameter_m, power: 1, usual_ratio: Some(LENGTH_RATIO), unit: MM },
-    Size { path: &["compressor", "housing_mass"], name: "housing of the compressor", of: |p| &mut p.compressor.housing_mass_kg, power: 3, usual_ratio: Some(MASS_RATIO), unit: KG },
-    Size { path: &["compressor", "external_area"], name: "external area of the compressor", of: |p| &mut p.compressor.external_area_m2, power: 2, usual_ratio: Some(AREA_RATIO), unit: M2 },
-    Size { path: &["compressor", "nusselt", "coefficient"], name: "coefficient of the compressor's Nusselt law", of: |p| &mut p.compressor.nusselt_coefficient, power: 0, usual_ratio: None, unit: ONE },
-    Size { path: &["compressor", "nusselt", "exponent"], name: "exponent of the compressor's Nusselt law", of: |p| &mut p.compressor.nusselt_exponent, power: 0, usual_ratio: None, unit: ONE },
-    Size { path: &["turbine", "internal_area"], name: "internal area of the turbine", of: |p| &mut p.turbine.internal_area_m2, power: 2, usual_ratio: Some(AREA_RATIO), unit: M2 },
-    Size { path: &["turbine", "inlet_diameter"], name: "inlet of the turbine", of: |p| &mut p.turbine.inlet_diameter_m, power: 1, usual_ratio: Some(LENGTH_RATIO), unit: MM },
-    Size { path: &["turbine", "wheel_radius"], name: "radius of the turbine's wheel", of: |p| &mut p.turbine.wheel_radius_m, power: 1, usual_ratio: Some(LENGTH_RATIO), unit: MM },
-    Size { path: &["turbine", "housing_mass"], name: "housing of the turbine", of: |p| &mut p.turbine.housing_mass_kg, power: 3, usual_ratio: Some(MASS_RATIO), unit: KG },
-    Size { path: &["turbine", "external_area"], name: "external area of the turbine", of: |p| &mut p.turbine.external_area_m2, power: 2, usual_ratio: Some(AREA_RATIO), unit: M2 },
-    Size { path: &["turbine", "choked_flow"], name: "choked flow of the turbine", of: |p| &mut p.turbine.choked_flow_kg_s, power: 2, usual_ratio: Some(AREA_RATIO), unit: (1.0, "kg/s") },
-    Size { path: &["turbine", "nusselt", "coefficient"], name: "coefficient of the turbine's Nusselt law", of: |p| &mut p.turbine.nusselt_coefficient, power: 0, usual_ratio: None, unit: ONE },
-    Size { path: &["turbine", "nusselt", "exponent"], name: "exponent of the turbine's Nusselt law", of: |p| &mut p.turbine.nusselt_exponent, power: 0, usual_ratio: None, unit: ONE },
-    Size { path: &["bearing", "section_area"], name: "section of the bearing housing", of: |p| &mut p.bearing.section_area_m2, power: 2, usual_ratio: Some(AREA_RATIO), unit: M2 },
-    Size { path: &["bearing", "length"], name: "length of the bearing housing", of: |p| &mut p.bearing.length_m, power: 1, usual_ratio: Some(LENGTH_RATIO), unit: MM },
+    Size { path: &["compressor", "internal_area"], name: "internal area of the compressor", field: |p| &mut p.compressor.internal_area_m2, power: 2, usual_ratio: Some(MAX_AREA_RATIO), unit: M2 },
+    Size { path: &["compressor", "inlet_diameter"], name: "inlet of the compressor", field: |p| &mut p.compressor.inlet_diameter_m, power: 1, usual_ratio: Some(MAX_LENGTH_RATIO), unit: MM },
+    Size { path: &["compressor", "outlet_diameter"], name: "outlet of the compressor", field: |p| &mut p.compressor.outlet_diameter_m, power: 1, usual_ratio: Some(MAX_LENGTH_RATIO), unit: MM },
+    Size { path: &["compressor", "housing_mass"], name: "housing of the compressor", field: |p| &mut p.compressor.housing_mass_kg, power: 3, usual_ratio: Some(MAX_MASS_RATIO), unit: KG },
+    Size { path: &["compressor", "external_area"], name: "external area of the compressor", field: |p| &mut p.compressor.external_area_m2, power: 2, usual_ratio: Some(MAX_AREA_RATIO), unit: M2 },
+    Size { path: &["compressor", "nusselt", "coefficient"], name: "coefficient of the compressor's Nusselt law", field: |p| &mut p.compressor.nusselt_coefficient, power: 0, usual_ratio: None, unit: DIMENSIONLESS },
+    Size { path: &["compressor", "nusselt", "exponent"], name: "exponent of the compressor's Nusselt law", field: |p| &mut p.compressor.nusselt_exponent, power: 0, usual_ratio: None, unit: DIMENSIONLESS },
+    Size { path: &["turbine", "internal_area"], name: "internal area of the turbine", field: |p| &mut p.turbine.internal_area_m2, power: 2, usual_ratio: Some(MAX_AREA_RATIO), unit: M2 },
+    Size { path: &["turbine", "inlet_diameter"], name: "inlet of the turbine", field: |p| &mut p.turbine.inlet_diameter_m, power: 1, usual_ratio: Some(MAX_LENGTH_RATIO), unit: MM },
+    Size { path: &["turbine", "wheel_radius"], name: "radius of the turbine's wheel", field: |p| &mut p.turbine.wheel_radius_m, power: 1, usual_ratio: Some(MAX_LENGTH_RATIO), unit: MM },
+    Size { path: &["turbine", "housing_mass"], name: "housing of the turbine", field: |p| &mut p.turbine.housing_mass_kg, power: 3, usual_ratio: Some(MAX_MASS_RATIO), unit: KG },
+    Size { path: &["turbine", "external_area"], name: "external area of the turbine", field: |p| &mut p.turbine.external_area_m2, power: 2, usual_ratio: Some(MAX_AREA_RATIO), unit: M2 },
+    Size { path: &["turbine", "choked_flow"], name: "choked flow of the turbine", field: |p| &mut p.turbine.choked_flow_kg_s, power: 2, usual_ratio: Some(MAX_AREA_RATIO), unit: (1.0, "kg/s") },
+    Size { path: &["turbine", "nusselt", "coefficient"], name: "coefficient of the turbine's Nusselt law", field: |p| &mut p.turbine.nusselt_coefficient, power: 0, usual_ratio: None, unit: DIMENSIONLESS },
+    Size { path: &["turbine", "nusselt", "exponent"], name: "exponent of the turbine's Nusselt law", field: |p| &mut p.turbine.nusselt_exponent, power: 0, usual_ratio: None, unit: DIMENSIONLESS },
+    Size { path: &["bearing", "section_area"], name: "section of the bearing housing", field: |p| &mut p.bearing.section_area_m2, power: 2, usual_ratio: Some(MAX_AREA_RATIO), unit: M2 },
+    Size { path: &["bearing", "length"], name: "length of the bearing housing", field: |p| &mut p.bearing.length_m, power: 1, usual_ratio: Some(MAX_LENGTH_RATIO), unit: MM },
     // A heat-transfer coefficient times the wetted area.
-    Size { path: &["bearing", "oil_conductance"], name: "conductance to the oil", of: |p| &mut p.bearing.oil_conductance_w_k, power: 2, usual_ratio: None, unit: (1.0, "W/K") },
-    Size { path: &["shaft_inertia"], name: "inertia of shaft and wheels", of: |p| &mut p.shaft_inertia_kgm2, power: 5, usual_ratio: Some(INERTIA_RATIO), unit: (1.0, "kg m^2") },
-    Size { path: &["outlet", "volume"], name: "volume before the valve", of: |p| &mut p.outlet.volume_m3, power: 3, usual_ratio: None, unit: (1.0, "m^3") },
-    Size { path: &["outlet", "valve_area"], name: "area of the valve", of: |p| &mut p.outlet.valve_area_m2, power: 2, usual_ratio: Some(AREA_RATIO), unit: M2 },
+    Size { path: &["bearing", "oil_conductance"], name: "conductance to the oil", field: |p| &mut p.bearing.oil_conductance_w_k, power: 2, usual_ratio: None, unit: (1.0, "W/K") },
+    Size { path: &["shaft_inertia"], name: "inertia of shaft and wheels", field: |p| &mut p.shaft_inertia_kgm2, power: 5, usual_ratio: Some(MAX_INERTIA_RATIO), unit: (1.0, "kg m^2") },
+    Size { path: &["outlet", "volume"], name: "volume before the valve", field: |p| &mut p.outlet.volume_m3, power: 3, usual_ratio: None, unit: (1.0, "m^3") },
+    Size { path: &["outlet", "valve_area"], name: "area of the valve", field: |p| &mut p.outlet.valve_area_m2, power: 2, usual_ratio: Some(MAX_AREA_RATIO), unit: M2 },
 ];
 
 impl Size {
@@ -96,11 +95,11 @@ impl Size {
 
     /// Its value in SI.
     pub fn value(&self, params: &Params) -> f64 {
-        *(self.of)(&mut params.clone())
+        *(self.field)(&mut params.clone())
     }
 }
 
-/// Wheel of a machine over that of the reference machine.
+/// Wheel diameter over that of the reference machine.
 fn wheel_ratio(wheel_diameter_m: f64) -> f64 {
     wheel_diameter_m / Params::default().compressor.wheel_diameter_m
 }
@@ -110,7 +109,7 @@ pub fn similar_machine(wheel_diameter_m: f64) -> Params {
     let ratio = wheel_ratio(wheel_diameter_m);
     let mut params = Params::default();
     for size in SIZES {
-        *(size.of)(&mut params) *= ratio.powi(size.power);
+        *(size.field)(&mut params) *= ratio.powi(size.power);
     }
     params.compressor.wheel_diameter_m = wheel_diameter_m;
     params
@@ -129,7 +128,7 @@ pub fn internal_area_sigma_ratio(assumed: &[AssumedSize]) -> f64 {
 }
 
 /// The sizes that the file does not give.
-pub(crate) fn assumed(tree: &Tree, params: &Params) -> Vec<AssumedSize> {
+pub(crate) fn find_assumed_sizes(tree: &Tree, params: &Params) -> Vec<AssumedSize> {
     let left_out = |size: &&Size| tree.get(&size.steps()).is_none();
     SIZES.iter().filter(left_out).map(|size| size.assumed(params)).collect()
 }

@@ -1,4 +1,4 @@
-//! The nominal map of a campaign, from a file in any layout that map files have.
+//! Reads the nominal map of a campaign from a file in any layout of map files.
 
 use mapper_core::{IdentifiedPoint, ImportError, MapDescription};
 use mapper_maps::table::read_any_text;
@@ -15,12 +15,12 @@ pub enum NominalTableError {
         "the map has no efficiencies, and the nominal model needs them: give a map that has some, or `map: closed_form`"
     )]
     NoEfficiency,
-    /// The numbers are not those of a compressor.
+    /// The values are impossible for a compressor.
     #[error(transparent)]
     Map(#[from] MapError),
 }
 
-/// The nominal map of a text. `given` is what is stated about the file, at least the reference state.
+/// Reads the nominal map. `given` is the map description with at least the reference state.
 ///
 /// # Errors
 /// [`NominalTableError`] with the line of the file.
@@ -35,7 +35,7 @@ pub fn nominal_table(
     if points.is_empty() {
         return Err(NominalTableError::NoEfficiency);
     }
-    // In the order of the file, which messages count by.
+    // In the order of the file, since messages count lines.
     points.sort_by_key(|(point, _)| point.step);
     let row = |(point, efficiency): &(&IdentifiedPoint, f64)| MapRow {
         speed_corrected_rpm: point.speed_corrected_rpm,

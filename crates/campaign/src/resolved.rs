@@ -1,4 +1,4 @@
-//! Speed lines of a campaign: their points on its nominal machine, and their display form.
+//! Resolves the speed lines of a campaign to points on the nominal machine.
 
 use crate::campaign::Campaign;
 use crate::checks::concern::Concern;
@@ -10,7 +10,7 @@ use mapper_physics::simulation::model::Model;
 use mapper_yaml::{Step, steps};
 use serde::Serialize;
 
-/// Puts the points of the lines into the campaign; mistakes are reported at their lines.
+/// Adds the points of the lines to the campaign, or reports mistakes at their lines.
 pub(crate) fn resolve(campaign: &mut Campaign, model: &Model) -> Result<(), Vec<Concern>> {
     let (mut points, mut concerns) = (Vec::new(), Vec::new());
     let limit_rpm = campaign.limits.speed_max_rpm;
@@ -18,7 +18,7 @@ pub(crate) fn resolve(campaign: &mut Campaign, model: &Model) -> Result<(), Vec<
         campaign.lines.iter().map(|line| physical_speed_rpm(line, campaign)).fold(f64::INFINITY, f64::min);
     if campaign.lines.len() > 1 && lowest_rpm > limit_rpm {
         return Err(vec![Concern {
-            grave: true,
+            is_error: true,
             at: steps!["limits", "speed"].to_vec(),
             message: format!(
                 "the limit, {} krpm, is below every line of the grid; the slowest has {:.2} krpm at T1 = {:.2} K",
@@ -35,7 +35,7 @@ pub(crate) fn resolve(campaign: &mut Campaign, model: &Model) -> Result<(), Vec<
         let speed_rpm = physical_speed_rpm(line, campaign);
         if speed_rpm > limit_rpm {
             concerns.push(Concern {
-                grave: true,
+                is_error: true,
                 at: at("speed_corrected"),
                 message: format!(
                     "{krpm} krpm corrected are {:.2} krpm at T1 = {:.2} K, above `limits.speed`, {} krpm",
@@ -50,7 +50,7 @@ pub(crate) fn resolve(campaign: &mut Campaign, model: &Model) -> Result<(), Vec<
         match line_points(model, &campaign.boundary, campaign.follow_outlet, line) {
             Ok(resolved) => points.extend(resolved),
             Err(error) => concerns.push(Concern {
-                grave: true,
+                is_error: true,
                 at: at(match line.spread {
                     Spread::Points(_) => "points",
                     Spread::SpacingKgS(_) => "spacing",
@@ -67,12 +67,12 @@ pub(crate) fn resolve(campaign: &mut Campaign, model: &Model) -> Result<(), Vec<
     Ok(())
 }
 
-/// The physical speed of a line under the campaign's T1, rpm.
+/// The physical speed of a line at the campaign's T1, rpm.
 fn physical_speed_rpm(line: &LineRequest, campaign: &Campaign) -> f64 {
     line.reference.physical_speed_rpm(line.speed_corrected_rpm, campaign.boundary.t1_k)
 }
 
-/// The place of each point in the file: the line that has its speed.
+/// The place of each point in the file: its line.
 pub(crate) fn places(campaign: &Campaign) -> Vec<Vec<Step>> {
     let line_of = |point: &OperatingPoint| {
         campaign.lines.iter().position(|line| physical_speed_rpm(line, campaign) == point.speed_rpm)

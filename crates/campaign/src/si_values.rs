@@ -15,18 +15,18 @@ pub(crate) fn si<'de, D: Dimension, S: Deserializer<'de>>(deserializer: S) -> Re
 ///
 /// # Errors
 /// As [`si`].
-pub(crate) fn si_if_given<'de, D: Dimension, S: Deserializer<'de>>(
+pub(crate) fn optional_si<'de, D: Dimension, S: Deserializer<'de>>(
     deserializer: S,
 ) -> Result<Option<f64>, S::Error> {
     Option::<Quantity<D>>::deserialize(deserializer).map(|quantity| quantity.map(|given| given.inside))
 }
 
 /// The value in SI, or a default.
-pub(crate) fn or<D: Dimension>(quantity: Option<Quantity<D>>, default: f64) -> f64 {
+pub(crate) fn value_or<D: Dimension>(quantity: Option<Quantity<D>>, default: f64) -> f64 {
     quantity.map_or(default, |quantity| quantity.inside)
 }
 
 /// Overrides a default with the value of the file.
 pub(crate) fn set<D: Dimension>(target: &mut f64, quantity: Option<Quantity<D>>) {
-    *target = or(quantity, *target);
+    *target = value_or(quantity, *target);
 }

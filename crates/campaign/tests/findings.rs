@@ -254,10 +254,10 @@ fn several_sensors() {
             "[{noise: 0.1 K}, {noise: 0.1 K, count: 2}]",
             Kind::Conflict,
             "2",
-            "`count` says nothing here",
+            "`count` has no effect here",
             "leave `count` out",
         ),
-        ("{noise: 0.1 K, name: A}", Kind::Conflict, "A", "`name` says nothing here", "write a list"),
+        ("{noise: 0.1 K, name: A}", Kind::Conflict, "A", "`name` has no effect here", "write a list"),
         ("{noise: 0.1 K, count: 17}", Kind::Range, "17", "is too high", "at most 16"),
         ("{noise: 0.1 K, count: 0}", Kind::Range, "0", "is too low", "at least 1"),
         (
@@ -972,7 +972,7 @@ fn lines_that_have_no_points_are_refused_at_their_place() {
             "{speed_corrected: 90 krpm, points: 3}, {speed_corrected: 90000 rpm, points: 4}",
             Kind::Duplicate,
             "90000 rpm",
-            "a second time",
+            "appears twice",
             "remove one",
         ),
         (

@@ -106,7 +106,7 @@ fn the_short_form_gives_the_day_alone() {
 #[test]
 fn a_time_has_a_day_and_zero_has_none() {
     let day_ns = 86_400_000_000_000;
-    let text = |ns: u64| Date::of_ns(ns).map(|date| date.to_string());
+    let text = |ns: u64| Date::from_epoch_ns(ns).map(|date| date.to_string());
     assert_eq!(text(20_784 * day_ns).as_deref(), Some("2026-11-27"));
     assert_eq!(text(20_784 * day_ns - 1_000_000_000).as_deref(), Some("2026-11-26"));
     assert_eq!(text(0), None);

@@ -16,7 +16,7 @@ impl SystemWall {
 
 /// The current day, UTC; `None` before 1970.
 pub fn today() -> Option<Date> {
-    Date::of_ns(u64::try_from(jiff::Timestamp::now().as_nanosecond()).unwrap_or(0))
+    Date::from_epoch_ns(u64::try_from(jiff::Timestamp::now().as_nanosecond()).unwrap_or(0))
 }
 
 impl Wall for SystemWall {

@@ -81,7 +81,7 @@ pub use rig::on_drift::OnDrift;
 pub use rig::run_ending::RunEnding;
 pub use rig::soak::Soak;
 pub use rig::speed_response::{SpeedControlSettings, SpeedResponse};
-pub use rig::surge::{SurgeFoundBy, SurgeMark, SurgeNotFound, SurgeSeek};
+pub use rig::surge::{SurgeFoundBy, SurgeMark, SurgeNotFound, SurgeSearchSettings};
 pub use test_plan::jump::{Jump, Repeats};
 pub use test_plan::operating_point::OperatingPoint;
 pub use test_plan::plan::{Plan, PlanBound, PlanFigures, PlanInputHashes, PlanStep, Predicted, StepKind};

@@ -42,7 +42,6 @@ impl Lease {
         Ok(Lease { last_call: called, _end_thread: held })
     }
 
-    /// Records a call.
     pub(crate) fn record_call(&self) {
         if let Ok(mut called) = self.last_call.lock() {
             *called = Instant::now();

@@ -19,7 +19,6 @@ const LAST_OUTPUT_TIMEOUT: Duration = Duration::from_millis(200);
 /// Size of the stored final error output, bytes.
 const LAST_OUTPUT_BYTES: usize = 2_000;
 
-/// An incoming message.
 type Incoming = Result<Message, DriverError>;
 
 /// Sends from any thread in the driver's own encoding. Before the first message from the driver it uses JSON, which every driver reads.
@@ -64,7 +63,6 @@ pub(crate) struct Link {
 }
 
 impl Link {
-    /// Starts a driver.
     pub(crate) fn start(program: &Path) -> Result<Link, DriverError> {
         let not_started = |source| DriverError::NotStarted { program: program.to_owned(), source };
         let mut command = Command::new(program);
@@ -81,7 +79,6 @@ impl Link {
         Link::from_streams(stdin, stdout, Some(stderr), Peer::Program(child)).map_err(not_started)
     }
 
-    /// Connects to a driver that listens on this socket.
     #[cfg(unix)]
     pub(crate) fn connect(socket: &Path) -> Result<Link, DriverError> {
         let away = |source| DriverError::NotListening { socket: socket.to_owned(), source };

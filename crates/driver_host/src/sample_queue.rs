@@ -8,7 +8,6 @@ use std::collections::VecDeque;
 const MAX_VALUES: usize = 4_000_000;
 /// Tolerance for due samples, s: the requested time is a sum of periods, the sample's time a multiple.
 pub(crate) const ROUNDING_S: f64 = 1e-7;
-/// Maximum number of queued events.
 const MAX_EVENTS: usize = 10_000;
 /// Number of events above which a driver's notes are dropped.
 const MAX_NOTES: usize = 100;

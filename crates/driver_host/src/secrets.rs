@@ -5,7 +5,6 @@ use serde_json::Value;
 
 /// A setting is secret if its key contains one of these.
 const SECRET_KEYS: [&str; 5] = ["password", "passphrase", "secret", "token", "private_key_text"];
-/// Replacement for a secret.
 const PLACEHOLDER: &str = "[secret]";
 /// Shorter secrets are hidden only as whole words, because replacing them inside other words would remove whole sentences.
 const MIN_REPLACED_LENGTH: usize = 6;

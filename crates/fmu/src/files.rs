@@ -17,7 +17,7 @@ pub struct FmuFile {
     pub bytes: Vec<u8>,
 }
 
-/// Every file of the FMU of a machine: the description, then the sources. The GUID is a hash of both: equal machines have equal
+/// Every file of the FMU of a machine: the description, then the sources. The GUID is a hash of both: equal machines give equal
 /// FMUs.
 ///
 /// # Errors

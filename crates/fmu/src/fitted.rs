@@ -4,7 +4,7 @@ use mapper_core::{FittedMap, FittedNode, ReferenceState};
 use mapper_physics::compressor_map::tabulated_map::{MapError, MapRow, TabulatedMap};
 
 /// Lowest efficiency in the map of an FMU. Below it the fit no longer describes a compressor.
-const LOWEST_EFFICIENCY: f64 = 0.05;
+const MIN_EFFICIENCY: f64 = 0.05;
 
 /// The speed lines of a fit, including extrapolated ones, without the far choke end where the gas is not compressed.
 ///
@@ -12,7 +12,7 @@ const LOWEST_EFFICIENCY: f64 = 0.05;
 /// [`MapError`] if the remaining lines cannot be simulated.
 pub fn table_of_fit(fitted: &FittedMap, reference: ReferenceState) -> Result<TabulatedMap, MapError> {
     let compresses =
-        |node: &&FittedNode| node.pressure_ratio > 1.0 && (LOWEST_EFFICIENCY..=1.0).contains(&node.eta);
+        |node: &&FittedNode| node.pressure_ratio > 1.0 && (MIN_EFFICIENCY..=1.0).contains(&node.eta);
     let rows: Vec<MapRow> = fitted
         .lines
         .iter()

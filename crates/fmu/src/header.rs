@@ -1,4 +1,4 @@
-//! `model_data.h`: everything that differs from machine to machine, and the constants that Rust already has.
+//! Writes `model_data.h`: the data of the machine, and constants of the Rust code.
 
 use crate::c_text::{array, identifier, number, numbers};
 use crate::machine::{FmuError, FmuMachine, FmuMap};

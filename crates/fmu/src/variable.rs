@@ -11,7 +11,7 @@ pub enum Causality {
     Output,
 }
 
-/// A real variable. Its place in the list is its value reference.
+/// A real variable. Its index in the list is its value reference.
 #[derive(Debug, Clone, Copy)]
 pub struct Variable {
     /// Name; dots group.
@@ -26,7 +26,7 @@ pub struct Variable {
     pub description: &'static str,
 }
 
-/// A boolean parameter. Its place in the list is its value reference.
+/// A boolean parameter. Its index in the list is its value reference.
 #[derive(Debug, Clone, Copy)]
 pub struct Switch {
     /// Name.

@@ -1,6 +1,6 @@
-//! Points to map.
+//! Assembles a compressor map from identified points.
 
-use crate::grouping::{Group, group};
+use crate::grouping::{Group, group_by_speed};
 use crate::repeats::points_for_map;
 use crate::{AssembleError, Grouping};
 use mapper_core::{
@@ -8,19 +8,18 @@ use mapper_core::{
 };
 use mapper_physics::compressor_map::similarity::at_speed;
 
-/// Makes a map of identified points.
+/// Assembles a map from identified points.
 ///
-/// Each point is brought from its own corrected speed to the mean of its line by similarity; this change is stored in
-/// [`MapPoint::shift`], the measured values in [`MapPoint::identified`].
+/// Similarity moves each point from its own corrected speed to the mean speed of its line. The change is stored in
+/// [`MapPoint::shift`], the measured point in [`MapPoint::identified`].
 ///
 /// Points with a target form a line per target speed; points without one are grouped by gaps in corrected speed
 /// ([`Grouping`]). Lines come in order of mean corrected speed, their points in order of corrected flow (then of
-/// falling pressure ratio, for the vertical part at choke). Steps that were repeats to see drift
-/// are left out, but where the point itself has no efficiency ([`points_for_map`](crate::points_for_map)). A point whose
-/// verdict is unusable keeps flow and pressure ratio and has no `eta`.
+/// falling pressure ratio, for the vertical part at choke). Repeats for the detection of
+/// drift are left out unless the point itself has no efficiency ([`points_for_map`](crate::points_for_map)). An unusable point keeps
+/// flow and pressure ratio, without `eta`.
 ///
-/// `reference` is the state that the points' corrected quantities already refer to; `method` is what all of them
-/// were identified by.
+/// `reference` is the reference state of the points' corrected quantities, `method` the method that identified all of them.
 ///
 /// # Errors
 /// [`AssembleError`]: no points; a point whose corrected flow, corrected speed or pressure ratio is not finite;
@@ -40,8 +39,8 @@ pub fn assemble(
     if points.is_empty() {
         return Err(AssembleError::NoPoints);
     }
-    points.iter().try_for_each(|point| check(point, method))?;
-    let mut lines: Vec<SpeedLine> = group(points, &grouping).iter().map(line).collect();
+    points.iter().try_for_each(|point| check_point(point, method))?;
+    let mut lines: Vec<SpeedLine> = group_by_speed(points, &grouping).iter().map(assemble_line).collect();
     lines.sort_by(|a, b| a.speed_corrected_rpm.total_cmp(&b.speed_corrected_rpm));
     Ok(CompressorMap {
         machine: machine.to_owned(),
@@ -54,7 +53,7 @@ pub fn assemble(
     })
 }
 
-fn check(point: &IdentifiedPoint, method: Method) -> Result<(), AssembleError> {
+fn check_point(point: &IdentifiedPoint, method: Method) -> Result<(), AssembleError> {
     let step = point.step;
     if point.method != method {
         return Err(AssembleError::MixedMethods { step, expected: method, found: point.method });
@@ -71,7 +70,7 @@ fn check(point: &IdentifiedPoint, method: Method) -> Result<(), AssembleError> {
     Ok(())
 }
 
-fn line(group: &Group<'_>) -> SpeedLine {
+fn assemble_line(group: &Group<'_>) -> SpeedLine {
     let speeds_rpm = || group.points.iter().map(|point| point.speed_corrected_rpm);
     let lowest_rpm = speeds_rpm().fold(f64::INFINITY, f64::min);
     let highest_rpm = speeds_rpm().fold(f64::NEG_INFINITY, f64::max);
@@ -93,7 +92,7 @@ fn line(group: &Group<'_>) -> SpeedLine {
 fn map_point(point: &IdentifiedPoint, line_speed_rpm: f64) -> MapPoint {
     let (flow_kg_s, pressure_ratio) = (point.flow_corrected_kg_s, point.pressure_ratio);
     let shift_rpm = line_speed_rpm - point.speed_corrected_rpm;
-    // Similarity holds for small shifts; it is not defined for a shaft at rest.
+    // Similarity is undefined for a shaft at rest.
     let moved = shift_rpm != 0.0 && point.speed_corrected_rpm > 0.0 && pressure_ratio > 0.0;
     let (flow_at_line_kg_s, ratio_at_line) = if moved {
         at_speed(flow_kg_s, pressure_ratio, line_speed_rpm / point.speed_corrected_rpm)

@@ -1,4 +1,4 @@
-//! Differences between two maps, in units and in their uncertainty.
+//! Compares two maps: differences in units, with their standard errors.
 
 use crate::efficiency_definition::convert_efficiency;
 use crate::map_fit::{MapFit, MapFitError, MapFitOptions};
@@ -6,15 +6,14 @@ use mapper_core::{CompressorMap, FittedLine, FittedNode, confidence_interval_95}
 use mapper_numerics::polyline::NearestOnPolyline;
 use serde::Serialize;
 
-/// Nodes compared on each line.
 const NODES: usize = 25;
-/// How far apart the end lines of two maps may be and still count as one speed, ratio: a speed is held within a percent.
+/// Maximum difference of the end lines' speeds that still count as equal, ratio: stands hold a speed within 1 %.
 const END_SLACK: f64 = 0.01;
 
 /// A place of the second map compared with the nearest place of the first at equal corrected speed. Differences: second minus
 /// first.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct ComparedPlace {
+pub struct PlaceComparison {
     /// Corrected flow of the second map, kg/s.
     pub flow_corrected_kg_s: f64,
     /// Pressure ratio of the second map.
@@ -25,49 +24,48 @@ pub struct ComparedPlace {
     pub flow_difference_kg_s: f64,
     /// Difference of pressure ratio across the line.
     pub pressure_ratio_difference: f64,
-    /// Distance across the line, in units of the first line's largest flow and largest PR - 1, positive outwards.
+    /// Distance across the line, in units of the first line's maximum flow and maximum PR - 1, positive outwards.
     pub distance_ratio: f64,
-    /// Standard error of the distance, both maps together and with the gains and offsets that each map's points share, in
-    /// the same units.
+    /// Standard error of the distance from both maps, in the same units; it includes gains and offsets that each map's points share.
     pub distance_standard_error_ratio: f64,
     /// Difference of efficiency, fraction.
     pub eta_difference: f64,
-    /// Standard error of the difference of efficiency, likewise, fraction.
+    /// Standard error of the difference of efficiency from both maps, fraction.
     pub eta_standard_error: f64,
 }
 
-impl ComparedPlace {
-    /// Whether the 95 % interval of the distance leaves 0 out.
+impl PlaceComparison {
+    /// Whether the 95 % interval of the distance excludes 0.
     pub fn line_differs(&self) -> bool {
-        beyond(self.distance_ratio, self.distance_standard_error_ratio)
+        exceeds_interval(self.distance_ratio, self.distance_standard_error_ratio)
     }
 
-    /// Whether the 95 % interval of the difference of efficiency leaves 0 out.
+    /// Whether the 95 % interval of the difference of efficiency excludes 0.
     pub fn eta_differs(&self) -> bool {
-        beyond(self.eta_difference, self.eta_standard_error)
+        exceeds_interval(self.eta_difference, self.eta_standard_error)
     }
 }
 
-fn beyond(difference: f64, standard_error: f64) -> bool {
+fn exceeds_interval(difference: f64, standard_error: f64) -> bool {
     let (low, high) = confidence_interval_95(difference, standard_error);
     low > 0.0 || high < 0.0
 }
 
-/// All places of a speed at which both maps are measured.
+/// Comparison of both maps along one speed line.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ComparedLine {
+pub struct SpeedLineComparison {
     /// Corrected speed, rpm, at the first map's reference state.
     pub speed_corrected_rpm: f64,
     /// Places from the choke side to the surge side; empty if the lines do not overlap.
-    pub places: Vec<ComparedPlace>,
+    pub places: Vec<PlaceComparison>,
 }
 
-/// Two maps side by side.
+/// Comparison of two compressor maps.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MapComparison {
     /// Lines in order of speed.
-    pub lines: Vec<ComparedLine>,
-    /// Speeds of either map that the other does not reach, rpm: not compared.
+    pub lines: Vec<SpeedLineComparison>,
+    /// Speeds of either map outside the other's range, rpm.
     pub not_compared_rpm: Vec<f64>,
     /// Root mean square of the distance over all places, ratio.
     pub distance_rms_ratio: f64,
@@ -81,32 +79,32 @@ pub struct MapComparison {
     pub eta_differs_ratio: f64,
 }
 
-/// Compares two maps, each by its own fit, at every measured speed that lies within both; the second is brought to the
-/// first's reference state and definition of efficiency, if both files name theirs. Extrapolated places are left out.
+/// Compares the fits of two maps at every measured speed that both cover. The second map is converted to the first's reference state and,
+/// if both state one, to its definition of efficiency. Extrapolated places are left out.
 ///
 /// # Errors
 /// [`MapFitError`] if one of the maps cannot be fitted.
 pub fn compare(first: &CompressorMap, second: &CompressorMap) -> Result<MapComparison, MapFitError> {
     let second = second.clone().at_reference(first.reference);
-    // A difference of definitions is none of the machines.
+    // A difference of definitions is not a difference of machines.
     let second = match (second.efficiency, first.efficiency) {
         (Some(from), Some(to)) => convert_efficiency(second, from, to),
         _ => second,
     };
     let fits = [MapFit::new(first)?, MapFit::new(&second)?];
-    let speeds = [speeds_of(first), speeds_of(&second)];
+    let speeds = [corrected_speeds(first), corrected_speeds(&second)];
     let bounds =
         speeds.each_ref().map(|s| (s.first().copied().unwrap_or(0.0), s.last().copied().unwrap_or(0.0)));
     let (low, high) = (bounds[0].0.max(bounds[1].0), bounds[0].1.min(bounds[1].1));
     let within = |speed: &f64| *speed >= low && *speed <= high;
-    // An end line that is a hair beyond the other map's is compared at that map's end.
+    // An end line slightly beyond the other map's is compared at the other map's end.
     let to_common = |speed: &f64| {
         let nearest = speed.max(low).min(high);
         if (speed - nearest).abs() <= END_SLACK * nearest { nearest } else { *speed }
     };
     let mut all: Vec<f64> = speeds.iter().flatten().map(to_common).collect();
     all.sort_by(f64::total_cmp);
-    // Two measured lines less than half a percent apart say the same.
+    // Measured lines less than half a percent apart are one line.
     all.dedup_by(|b, a| *b <= *a * 1.005);
     let (common, not_compared_rpm): (Vec<f64>, Vec<f64>) = all.into_iter().partition(within);
     let options =
@@ -116,51 +114,52 @@ pub fn compare(first: &CompressorMap, second: &CompressorMap) -> Result<MapCompa
         let near = |line: &&FittedLine| (line.speed_corrected_rpm - speed).abs();
         lines.iter().min_by(|a, b| near(a).total_cmp(&near(b))).cloned()
     };
-    let lines: Vec<ComparedLine> = common
+    let lines: Vec<SpeedLineComparison> = common
         .iter()
         .filter_map(|speed| {
             let places =
                 compare_lines(&line_at(&tables[0].lines, *speed)?, &line_at(&tables[1].lines, *speed)?);
-            Some(ComparedLine { speed_corrected_rpm: *speed, places })
+            Some(SpeedLineComparison { speed_corrected_rpm: *speed, places })
         })
         .collect();
-    Ok(summary(lines, not_compared_rpm))
+    Ok(summarise(lines, not_compared_rpm))
 }
 
-fn speeds_of(map: &CompressorMap) -> Vec<f64> {
+fn corrected_speeds(map: &CompressorMap) -> Vec<f64> {
     let mut speeds: Vec<f64> =
         map.lines.iter().map(|line| line.speed_corrected_rpm).filter(|s| s.is_finite() && *s > 0.0).collect();
     speeds.sort_by(f64::total_cmp);
     speeds
 }
 
-fn summary(lines: Vec<ComparedLine>, not_compared_rpm: Vec<f64>) -> MapComparison {
+fn summarise(lines: Vec<SpeedLineComparison>, not_compared_rpm: Vec<f64>) -> MapComparison {
     let places = || lines.iter().flat_map(|line| &line.places);
     let count = places().count().max(1) as f64;
-    let mean = |value: fn(&ComparedPlace) -> f64| places().map(value).sum::<f64>() / count;
-    let share = |differs: fn(&ComparedPlace) -> bool| places().filter(|p| differs(p)).count() as f64 / count;
+    let mean = |value: fn(&PlaceComparison) -> f64| places().map(value).sum::<f64>() / count;
+    let share =
+        |differs: fn(&PlaceComparison) -> bool| places().filter(|p| differs(p)).count() as f64 / count;
     MapComparison {
         distance_rms_ratio: mean(|p| p.distance_ratio.powi(2)).sqrt(),
         eta_difference_rms: mean(|p| p.eta_difference.powi(2)).sqrt(),
         eta_difference_mean: mean(|p| p.eta_difference),
-        line_differs_ratio: share(ComparedPlace::line_differs),
-        eta_differs_ratio: share(ComparedPlace::eta_differs),
+        line_differs_ratio: share(PlaceComparison::line_differs),
+        eta_differs_ratio: share(PlaceComparison::eta_differs),
         lines,
         not_compared_rpm,
     }
 }
 
-fn compare_lines(first: &FittedLine, second: &FittedLine) -> Vec<ComparedPlace> {
+fn compare_lines(first: &FittedLine, second: &FittedLine) -> Vec<PlaceComparison> {
     let known: Vec<&FittedNode> = first.nodes.iter().filter(|n| !n.extrapolated).collect();
     let flow_scale_kg_s = known.iter().map(|n| n.flow_corrected_kg_s).fold(1e-12, f64::max);
     let ratio_scale = known.iter().map(|n| n.pressure_ratio - 1.0).fold(1e-6, f64::max);
-    let known = Known { nodes: &known, flow_scale_kg_s, ratio_scale };
+    let known = ReferenceLine { nodes: &known, flow_scale_kg_s, ratio_scale };
     let nodes = second.nodes.iter().step_by(4).filter(|node| !node.extrapolated);
-    nodes.filter_map(|node| known.compared(node)).collect()
+    nodes.filter_map(|node| known.compare_place(node)).collect()
 }
 
-/// A place of one line nearest to a node of the other.
-struct Nearest<'a> {
+/// Deviation of a node of the second map from the nearest place of the first line.
+struct NearestDeviation<'a> {
     /// Second minus first.
     flow_difference_kg_s: f64,
     pressure_ratio_difference: f64,
@@ -170,16 +169,16 @@ struct Nearest<'a> {
     before: &'a FittedNode,
 }
 
-/// The first line, and the units in which distances from it are measured.
-struct Known<'a> {
+/// The first map's line, with the units of distances from it.
+struct ReferenceLine<'a> {
     nodes: &'a [&'a FittedNode],
     flow_scale_kg_s: f64,
     ratio_scale: f64,
 }
 
-impl Known<'_> {
-    /// None if the nearest place is the line's very end: there the other line goes on alone.
-    fn nearest(&self, node: &FittedNode) -> Option<Nearest<'_>> {
+impl ReferenceLine<'_> {
+    /// `None` if the nearest place is the end of the line: only the other map covers the node.
+    fn nearest(&self, node: &FittedNode) -> Option<NearestDeviation<'_>> {
         let scaled = |n: &FittedNode| {
             (n.flow_corrected_kg_s / self.flow_scale_kg_s, n.pressure_ratio / self.ratio_scale)
         };
@@ -192,17 +191,17 @@ impl Known<'_> {
         let pressure_ratio_difference = node.pressure_ratio - between(|n| n.pressure_ratio);
         let (x, y) =
             (flow_difference_kg_s / self.flow_scale_kg_s, pressure_ratio_difference / self.ratio_scale);
-        Some(Nearest {
+        Some(NearestDeviation {
             flow_difference_kg_s,
             pressure_ratio_difference,
-            // Outwards is where flow and pressure ratio grow.
+            // Outwards: towards larger flow and pressure ratio.
             distance_ratio: x.hypot(y) * (x + y).signum(),
             eta_difference: node.eta - between(|n| n.eta),
             before,
         })
     }
 
-    fn compared(&self, node: &FittedNode) -> Option<ComparedPlace> {
+    fn compare_place(&self, node: &FittedNode) -> Option<PlaceComparison> {
         let found = self.nearest(node)?;
         let across = |n: &FittedNode| {
             (n.flow_standard_error_kg_s / self.flow_scale_kg_s)
@@ -212,7 +211,7 @@ impl Known<'_> {
             across(node).hypot(across(found.before)),
             node.eta_standard_error.hypot(found.before.eta_standard_error),
         );
-        // What a gain or an offset does to all flows or pressure ratios of a map moves the place over the line.
+        // A gain or offset common to all flows or pressure ratios of a map moves the place across the line.
         let flow_kg_s =
             node.flow_common_standard_error_kg_s.hypot(found.before.flow_common_standard_error_kg_s);
         let pressure_ratio = node
@@ -231,7 +230,7 @@ impl Known<'_> {
                 eta = eta.hypot(moved.eta_difference - found.eta_difference);
             }
         }
-        Some(ComparedPlace {
+        Some(PlaceComparison {
             flow_corrected_kg_s: node.flow_corrected_kg_s,
             pressure_ratio: node.pressure_ratio,
             eta: node.eta,

@@ -1,12 +1,11 @@
-//! The same map with its efficiencies by another definition.
+//! Converts the efficiencies of a map to another definition.
 
 use mapper_core::{CompressorMap, EfficiencyDefinition, EstimateUncertainty, MapPoint};
 use mapper_physics::gas::air::Air;
 use mapper_physics::laws::compression::efficiency_by;
 
-/// Converts the efficiencies of a map from the definition `from` to `to`: the temperatures that each of them stands for, in dry air at the
-/// map's reference temperature, stay. Intervals and standard errors keep their ratio to the efficiency. A fitted surface is dropped,
-/// since it belongs to the former efficiencies.
+/// Converts the efficiencies of a map from the definition `from` to `to`, for equal temperatures of dry air at the map's reference
+/// temperature. Intervals and standard errors keep their ratio to the efficiency; a fitted surface is dropped.
 pub fn convert_efficiency(
     mut map: CompressorMap,
     from: EfficiencyDefinition,

@@ -1,15 +1,14 @@
-//! Which points belong to one speed line.
+//! Groups points into speed lines.
 
 use mapper_core::IdentifiedPoint;
 
-/// How points without a target are distinguished.
+/// Rule that assigns points without a target speed to speed lines.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grouping {
-    /// Two points belong to different lines where, in order of corrected speed, the step from one to the next is
-    /// larger than this share of the slower; above 0, below 1.
+    /// Minimum gap between neighbouring lines in order of corrected speed, as a ratio of the slower one; above 0, below 1.
     ///
-    /// Speed lines of maps are 8 % or more apart; a closed-loop speed holds 1 %, and in an open-loop campaign speed
-    /// drifts by some 2 % over a line. 4 % lies between.
+    /// The default of 4 % separates lines of maps, which are at least 8 % apart, from the variation within one: 1 % with speed control, and
+    /// some 2 % without.
     pub speed_gap_ratio: f64,
 }
 
@@ -19,17 +18,17 @@ impl Default for Grouping {
     }
 }
 
-/// Points of one line, as they came, with the target they share.
+/// Points of one line in their original order, with their common target.
 pub(crate) struct Group<'a> {
     pub target_speed_rpm: Option<f64>,
     pub points: Vec<&'a IdentifiedPoint>,
 }
 
-/// Points with a target go by its speed, all others by gaps in corrected speed. Every point lands in one group.
-pub(crate) fn group<'a>(points: &'a [IdentifiedPoint], grouping: &Grouping) -> Vec<Group<'a>> {
+/// Groups points with a target by its speed, and all others by gaps in corrected speed. Every point is in exactly one group.
+pub(crate) fn group_by_speed<'a>(points: &'a [IdentifiedPoint], grouping: &Grouping) -> Vec<Group<'a>> {
     let (mut aimed, mut free): (Vec<_>, Vec<_>) =
         points.iter().partition(|point| target_speed_rpm(point).is_some());
-    // Stable sorts: points that compare equal stay in the order they were measured.
+    // Stable sorts: equal points stay in the order of measurement.
     aimed.sort_by(|a, b| {
         let key = |p: &IdentifiedPoint| target_speed_rpm(p).unwrap_or_default();
         key(a).total_cmp(&key(b))
@@ -37,7 +36,7 @@ pub(crate) fn group<'a>(points: &'a [IdentifiedPoint], grouping: &Grouping) -> V
     free.sort_by(|a, b| a.speed_corrected_rpm.total_cmp(&b.speed_corrected_rpm));
     let mut groups = split(aimed, |a, b| {
         let (a, b) = (target_speed_rpm(a).unwrap_or_default(), target_speed_rpm(b).unwrap_or_default());
-        // Targets are set, not measured: only rounding may differ.
+        // Targets are setpoints: they differ by rounding only.
         b - a > 1e-6 * a.abs()
     });
     for group in &mut groups {

@@ -1,21 +1,21 @@
-//! The ends of the speed lines of a map: where surge and choke were reached.
+//! Detects the ends of the speed lines of a map: surge and choke.
 
 use mapper_core::{CompressorMap, EndEvidence, LineEnd, MapPoint, SpeedLine, Warning};
 use serde::Serialize;
 
 /// Efficiency below which a compressor counts as choked (Garrett, Turbo Tech 103).
-const CHOKE_ETA: f64 = 0.58;
-/// A line is vertical where the flow rises by less than this ratio of it per ratio of the pressure rise that is lost: at the zero-slope
-/// point the value is above 1, in choke it goes to 0. Judgement.
-const VERTICAL: f64 = 0.1;
-/// Part of the pressure rise that has to be lost, so that the scatter of repeated points (0.2 % of it) does not count. Judgement.
-const VERTICAL_LOSS: f64 = 0.05;
-/// Points with flows nearer than this, ratio, are one point that was repeated: twice the usual uncertainty of a flow meter, 0.5 %.
+const MAX_CHOKE_ETA: f64 = 0.58;
+/// Maximum relative rise of flow over the relative loss of pressure rise on the vertical part of a line. It is above 1 at the zero-slope
+/// point and approaches 0 in choke. Judgement.
+const MAX_VERTICAL_SLOPE_RATIO: f64 = 0.1;
+/// Minimum loss of pressure rise, ratio: large compared with the scatter of repeated points, 0.2 %. Judgement.
+const MIN_PRESSURE_LOSS_RATIO: f64 = 0.05;
+/// Maximum relative difference in flow of a repeated point: twice the usual uncertainty of a flow meter, 0.5 %.
 const REPEAT_RATIO: f64 = 0.01;
 
 /// An end of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct FoundEnd {
+pub struct DetectedEnd {
     /// Corrected flow, kg/s.
     pub flow_corrected_kg_s: f64,
     /// Total pressure ratio.
@@ -30,12 +30,12 @@ pub struct LineEnds {
     /// Corrected speed of the line, rpm.
     pub speed_corrected_rpm: f64,
     /// Side of the smallest flow.
-    pub surge: FoundEnd,
+    pub surge: DetectedEnd,
     /// Side of the largest flow.
-    pub choke: FoundEnd,
+    pub choke: DetectedEnd,
 }
 
-/// Finds the ends of every line, and marks those that were reached at their points. `named`: the end that the row of a step names.
+/// Detects the ends of every line, and marks their points. `named` gives the end that a table names for the row of a step.
 pub fn mark_line_ends(map: &mut CompressorMap, named: impl Fn(usize) -> Option<LineEnd>) -> Vec<LineEnds> {
     let mut found = Vec::new();
     for line in &mut map.lines {
@@ -53,7 +53,7 @@ pub fn mark_line_ends(map: &mut CompressorMap, named: impl Fn(usize) -> Option<L
         let end = |at: usize, by: EndEvidence| {
             let point = line.points.get(at)?;
             let (flow_corrected_kg_s, pressure_ratio) = (point.flow_corrected_kg_s, point.pressure_ratio);
-            Some(FoundEnd { flow_corrected_kg_s, pressure_ratio, by })
+            Some(DetectedEnd { flow_corrected_kg_s, pressure_ratio, by })
         };
         let Some((surge, choke)) = end(surge_at, surge_by).zip(end(choke_at, choke_by)) else { continue };
         found.push(LineEnds { speed_corrected_rpm: line.speed_corrected_rpm, surge, choke });
@@ -79,14 +79,15 @@ fn choke_evidence(line: &SpeedLine) -> Option<(usize, EndEvidence)> {
     let top = line.points.iter().map(|point| point.pressure_ratio).fold(1.0, f64::max);
     let peak = line.points.iter().position(|point| point.eta == Some(best)).unwrap_or(0);
     let evidence = |(at, point): (usize, &MapPoint)| {
-        // Heat keeps the apparent efficiency of slow lines below any limit: there only the slope shows choke.
-        if at > peak && best >= CHOKE_ETA && point.eta.is_some_and(|eta| eta < CHOKE_ETA) {
+        // Heat keeps the apparent efficiency of slow lines below the limit everywhere: only the slope indicates choke there.
+        if at > peak && best >= MAX_CHOKE_ETA && point.eta.is_some_and(|eta| eta < MAX_CHOKE_ETA) {
             return Some((at, EndEvidence::Efficiency));
         }
         let lost = |other: &MapPoint| (other.pressure_ratio - point.pressure_ratio) / (top - 1.0);
-        let above = line.points.get(..at)?.iter().rev().find(|other| lost(other) >= VERTICAL_LOSS)?;
+        let above =
+            line.points.get(..at)?.iter().rev().find(|other| lost(other) >= MIN_PRESSURE_LOSS_RATIO)?;
         let more_flow = point.flow_corrected_kg_s / above.flow_corrected_kg_s - 1.0;
-        (more_flow < VERTICAL * lost(above)).then_some((at, EndEvidence::Vertical))
+        (more_flow < MAX_VERTICAL_SLOPE_RATIO * lost(above)).then_some((at, EndEvidence::Vertical))
     };
     line.points.iter().enumerate().find_map(evidence)
 }

@@ -1,27 +1,27 @@
-//! What repeats of one jump say about drift.
+//! Changes of efficiency between repeats of one jump, as evidence of drift.
 
 use mapper_core::{IdentifiedPoint, OperatingPoint, StepKind, StepMarker};
 use serde::Serialize;
 
-/// One jump that was made more than once.
+/// A jump that the run made more than once.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RepeatedJump {
     /// Start of the jump.
     pub from: OperatingPoint,
     /// Target of the jump.
     pub to: OperatingPoint,
-    /// Places of the steps, from 0; files have their numbers, from 1.
+    /// Indices of the steps, from 0; files have their numbers, from 1.
     #[serde(serialize_with = "mapper_core::test_plan::step_number::list::serialize")]
     pub steps: Vec<usize>,
-    /// Efficiency found by each, fraction.
+    /// Efficiency of each step, fraction.
     pub eta: Vec<f64>,
-    /// Last less first efficiency, fraction.
+    /// Last minus first efficiency, fraction.
     pub eta_change: f64,
     /// Standard error of this change from noise, fraction; fixed offsets cancel. `None` if an interval is missing.
     pub eta_change_standard_error: Option<f64>,
 }
 
-/// Jumps that repeats have made, with the efficiency each time; a point that was reached by the same jump counts too.
+/// Finds the repeated jumps, with the efficiency each time; a point that the same jump reached counts too.
 pub fn repeated_jumps(markers: &[StepMarker], points: &[IdentifiedPoint]) -> Vec<RepeatedJump> {
     let mut jumps: Vec<(OperatingPoint, OperatingPoint)> = Vec::new();
     for marker in markers.iter().filter(|marker| marker.kind == StepKind::Repeat) {

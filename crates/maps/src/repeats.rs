@@ -1,13 +1,12 @@
-//! Which visits of a point stand for it on the map: repeats were made to see drift.
+//! Selects the visit of each point that counts for the map: repeats serve the detection of drift.
 
 use mapper_core::{IdentifiedPoint, StepKind, Verdict};
 
-/// The points that belong on the map, in their order: one for each step that was made for it.
+/// Selects the points of the map, in their order: one for each planned point.
 ///
-/// A point without a usable efficiency gives its place to the repeat of the same target with the best verdict and, among
-/// these, the smallest 95 % interval. The first point of a campaign has no jump before it: its efficiency, if it has
-/// one, rests on what the points share (joint method). If it is visited again for its own sake, the better of the two
-/// by the same rule is the point; the visits share offsets and law, so that a mean of both would promise too much.
+/// A point without a usable efficiency is replaced by the repeat of the same target with the best verdict and, among these, the smallest
+/// 95 % interval. The first point of a campaign has no jump before it, so only the joint method gives it an efficiency. If it is visited
+/// again for that reason, the better visit by the same rule counts: a mean would claim too small an interval, since the visits share errors.
 pub fn points_for_map(points: &[IdentifiedPoint]) -> Vec<IdentifiedPoint> {
     let again = || {
         points.iter().filter(|point| point.kind != StepKind::Point && point.target.is_some() && usable(point))

@@ -6,7 +6,7 @@ use mapper_numerics::statistics::mean;
 
 /// One criterion at all steps.
 #[derive(Debug, Clone, PartialEq)]
-pub struct JudgedCriterion {
+pub struct CriterionResult {
     /// The channel whose fluctuation it limits; `None` for the heat balance.
     pub channel: Option<Channel>,
     /// The limit, ratio.
@@ -15,7 +15,7 @@ pub struct JudgedCriterion {
     pub steps: Vec<(usize, f64)>,
 }
 
-impl JudgedCriterion {
+impl CriterionResult {
     /// The steps that do not fulfil it.
     pub fn failed(&self) -> impl Iterator<Item = usize> {
         self.steps.iter().filter(|(_, ratio)| *ratio > self.limit_ratio).map(|(step, _)| *step)
@@ -32,7 +32,7 @@ pub fn judge_acceptance(
     criteria: &AcceptanceCriteria,
     recording: &Recording,
     steps: &[(&StepMarker, EnergyBalance)],
-) -> Vec<JudgedCriterion> {
+) -> Vec<CriterionResult> {
     let fluctuation = |channel: Channel, step: &StepMarker| {
         let start_s = (step.end_s - criteria.window_s).max(step.start_s);
         let values = recording.series.get(&channel)?.slice(start_s, step.end_s).1;
@@ -41,12 +41,12 @@ pub fn judge_acceptance(
         Some((high - low) / mean(finite())?.abs())
     };
     let heat_balance = |balance: &EnergyBalance| Some((balance.losses?.w / balance.turbine?.w).abs());
-    let fluctuations = criteria.fluctuation_ratio.iter().map(|(&channel, &limit_ratio)| JudgedCriterion {
+    let fluctuations = criteria.fluctuation_ratio.iter().map(|(&channel, &limit_ratio)| CriterionResult {
         channel: Some(channel),
         limit_ratio,
         steps: steps.iter().filter_map(|(step, _)| Some((step.index, fluctuation(channel, step)?))).collect(),
     });
-    let balance = criteria.heat_balance_ratio.map(|limit_ratio| JudgedCriterion {
+    let balance = criteria.heat_balance_ratio.map(|limit_ratio| CriterionResult {
         channel: None,
         limit_ratio,
         steps: steps.iter().filter_map(|(step, of)| Some((step.index, heat_balance(of)?))).collect(),

@@ -1,4 +1,4 @@
-//! Declared uncertainty of rig and model: noise, offsets, gains, tolerances. A deviation within it is not a finding.
+//! Declared uncertainty of rig and model: noise, offsets, gains and tolerances.
 
 use mapper_core::{Channel, DeclaredUncertainty, Dimension, ModelTolerances, NoiseColour};
 use mapper_physics::machine::params::BoundaryConditions;

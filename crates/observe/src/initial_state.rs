@@ -6,7 +6,7 @@ use mapper_physics::simulation::model::{State, rad_s_of_rpm};
 
 /// The state given by readings; `read` returns the mean of a channel. Missing readings are replaced by typical values of a turbocharger under
 /// the boundary conditions: good enough for settling, which forgets them.
-pub fn state_as_read(boundary: &BoundaryConditions, read: impl Fn(Channel) -> Option<f64>) -> State {
+pub fn estimate_state(boundary: &BoundaryConditions, read: impl Fn(Channel) -> Option<f64>) -> State {
     let or = |channel: Channel, usual: f64| read(channel).unwrap_or(usual);
     State::new(
         rad_s_of_rpm(or(Channel::ShaftSpeed, 90e3).max(1e3)),

@@ -1,7 +1,7 @@
-//! Compares a recording with the model: channels, time base, noise, model inputs, and permitted differences.
+//! Prepares a recording for comparison with the model: time base, noise, model inputs, and declared uncertainty.
 //!
-//! The diagnosis of the gap and the search for drift both drive the nominal model by a recording and explain the residual. They share this
-//! crate; each keeps its own statistics. Identification takes the plausible readings from here.
+//! Shared by the diagnosis of gaps, which drives the nominal model by a recording and explains the residual, by the search for drift, and
+//! by the identification. A [`Table`](averages::time_table::Table) has all channels at the same times.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

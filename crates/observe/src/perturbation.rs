@@ -6,7 +6,7 @@ use mapper_physics::machine::params::{BoundaryConditions, Params};
 use mapper_physics::simulation::inputs::Inputs;
 use mapper_physics::simulation::model::State;
 
-/// Factor on the standard deviation of a value that carries no information.
+/// Factor on the standard deviation of a value without information.
 pub const UNINFORMATIVE: f64 = 1e4;
 
 /// One quantity of model, inputs or initial state.
@@ -114,14 +114,14 @@ impl Perturbation {
 
 /// Inputs with shifts on some of them.
 #[derive(Debug, Clone, Copy)]
-pub struct Shifted<'a, I> {
+pub struct ShiftedInputs<'a, I> {
     /// As recorded.
     pub inputs: &'a I,
     /// Shift of each, in its unit.
     pub shifts: &'a [(Perturbation, f64)],
 }
 
-impl<I: Inputs> Inputs for Shifted<'_, I> {
+impl<I: Inputs> Inputs for ShiftedInputs<'_, I> {
     fn at(&self, t_s: f64) -> BoundaryConditions {
         let mut boundary = self.inputs.at(t_s);
         for (knob, by) in self.shifts {
@@ -183,7 +183,7 @@ mod tests {
     fn shifted_inputs_differ_by_what_is_added() {
         let recorded = BoundaryConditions::default();
         let shifts = [(Perturbation::Input(Channel::P1), -50.0), (Perturbation::Ambient, 2.0)];
-        let shifted = Shifted { inputs: &recorded, shifts: &shifts }.at(3.0);
+        let shifted = ShiftedInputs { inputs: &recorded, shifts: &shifts }.at(3.0);
         assert_eq!(shifted.p1_pa, recorded.p1_pa - 50.0);
         assert_eq!(shifted.ambient_temperature_k, recorded.ambient_temperature_k + 2.0);
         assert_eq!(shifted.t1_k, recorded.t1_k);

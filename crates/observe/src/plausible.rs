@@ -10,7 +10,7 @@ pub fn is_reading(channel: Channel, value: f64) -> bool {
 /// The median reading of a channel is impossible for a running machine.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
-    "{channel} reads {value:.4} {unit} at the median, which no running machine has ({low} to {high} {unit}). {remedy}",
+    "the median of {channel} is {value:.4} {unit}, which is impossible for a running machine ({low} to {high} {unit}). {remedy}",
     unit = .channel.unit(),
     remedy = remedy(*.channel, *.value),
     low = plausible(*.channel).running.start(),
@@ -53,7 +53,7 @@ fn remedy(channel: Channel, value: f64) -> &'static str {
             "It looks like g/s or kg/h labelled kg/s; correct the unit in the channel map"
         }
         Dimension::MassFlow => "No flow is measured; check unit and sensor",
-        _ => "Check unit and sensor; the channel map says in what unit each field is",
+        _ => "Check unit and sensor; the channel map has the unit of each field",
     }
 }
 

@@ -16,8 +16,8 @@ pub struct OtherMachine {
 
 /// Compares the machine of a recording (keys `machine` and `serial_number`) with the campaign's.
 ///
-/// An absent or empty entry on either side contradicts nothing: recordings by other programs seldom name their machine, and a campaign without
-/// a serial number applies to every machine of its name. Whether two recordings are of one machine follows from their fingerprints instead.
+/// A missing entry is not a contradiction: recordings by other programs seldom name their machine, and a campaign without a serial number
+/// applies to every machine of its name.
 ///
 /// # Errors
 /// [`OtherMachine`] if both sides name a machine or a serial number and the two differ.

@@ -1,7 +1,7 @@
-//! The lumped turbocharger model of Burke et al., and the laws it consists of.
+//! The lumped turbocharger model of Burke et al. for planning, simulated rigs and identification.
 //!
-//! One file per law; [`model`](simulation::model) combines them, [`simulate`](simulation::simulate) integrates them,
-//! [`steady`](simulation::steady) finds steady states.
+//! [`Model`](simulation::model::Model) combines the laws in [`laws`], one file each; [`simulate`](simulation::simulate) integrates it,
+//! [`steady`](simulation::steady) solves for steady states.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

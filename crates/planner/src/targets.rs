@@ -2,7 +2,7 @@
 
 use crate::request::{PlanError, PlanRequest, UnreachablePoint};
 use mapper_core::OperatingPoint;
-use mapper_physics::operating_point::reach::{clause, reach};
+use mapper_physics::operating_point::reach::{describe_obstacles, reach};
 use mapper_physics::simulation::steady::SteadyState;
 
 /// Solves the steady state of each point. The error lists every point that violates a limit, with all violated limits.
@@ -15,7 +15,9 @@ pub(crate) fn solve_steady_states(
     for &point in points {
         match reach(request.model, point, &request.boundary, request.follow_outlet, &request.limits) {
             Ok(target) => targets.push(target),
-            Err(obstacles) => unreachable.push(UnreachablePoint { point, reason: clause(&obstacles) }),
+            Err(obstacles) => {
+                unreachable.push(UnreachablePoint { point, reason: describe_obstacles(&obstacles) })
+            }
         }
     }
     if unreachable.is_empty() { Ok(targets) } else { Err(PlanError::Unreachable(unreachable)) }

@@ -1,5 +1,5 @@
 //! Prints how long it takes to write and read a run of 48 000 samples, all channels and 12 columns of truth:
-//! `cargo run --release -p mapper-recording --example recording_speed -- FILE`. The file is left there.
+//! `cargo run --release -p mapper-recording --example recording_speed -- FILE`. The file is not removed.
 #![allow(clippy::print_stdout)]
 
 use mapper_core::{CHANNELS, ChannelColumn, SampleBatch, TruthColumn};
@@ -9,7 +9,7 @@ use std::time::Instant;
 const SAMPLES: usize = 48_000;
 const BATCH: usize = 10;
 
-/// Digits of a noisy sensor, without a generator of random numbers.
+/// A deterministic value with as many digits as a noisy sensor's.
 fn noisy(index: usize, column: usize) -> f64 {
     let x = (index as f64 * 0.618_033_988 + column as f64 * 0.414_213_562).fract();
     300.0 + 10.0 * (index as f64 * 1e-3).sin() + x

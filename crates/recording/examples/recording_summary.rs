@@ -1,4 +1,4 @@
-//! Prints what a recording holds: `cargo run -p mapper-recording --example recording_summary -- FILE [MAP.yaml]`.
+//! Prints the contents of a recording: `cargo run -p mapper-recording --example recording_summary -- FILE [MAP.yaml]`.
 #![allow(clippy::print_stdout)]
 
 use mapper_recording::{ChannelMap, ReadOptions, read_recording};

@@ -10,8 +10,8 @@ use std::{io, path::PathBuf};
 /// Why a recording could not be written or read.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
-    /// There is a file of this name already.
-    #[error("failed to create the recording `{}`: it exists, and a run never overwrites another; choose another name or move it away", path.display())]
+    /// A file of this name exists.
+    #[error("failed to create the recording `{}`: the file exists, and a run never overwrites another; choose another name, or move the file", path.display())]
     Exists {
         /// The file.
         path: PathBuf,
@@ -24,7 +24,7 @@ pub enum RecordError {
         /// The system's error.
         source: io::Error,
     },
-    /// Writing failed on the way, for example because the disk is full.
+    /// Writing failed during the run, e.g. because the disk is full.
     #[error("failed to write the recording `{}`: {source}; {}; {}", path.display(), saved(*saved_until_s), advice(source))]
     Write {
         /// The file.
@@ -35,12 +35,12 @@ pub enum RecordError {
         source: io::Error,
     },
     /// A batch, event or step that cannot be written: a bug in the program that made it.
-    #[error("failed to record into `{}`: {source}; a fault of the program that made it", path.display())]
+    #[error("failed to record into `{}`: {source}; report this as a bug of the program that made the batch", path.display())]
     BadInput {
         /// The file.
         path: PathBuf,
         /// What is wrong with it.
-        source: BadBatch,
+        source: BatchError,
     },
     /// The file could not be opened or read.
     #[error("failed to read the recording `{}`: {source}", path.display())]
@@ -70,7 +70,7 @@ pub enum RecordError {
         message: String,
     },
     /// A log of another program without a channel map.
-    #[error("`{}` is the log of another program: say which column is which channel with `--channels`; `mapper log inspect {} --write-channels channels.yaml` proposes it", path.display(), path.display())]
+    #[error("failed to read `{}`: it is the log of another program, and no channel map assigns its columns to channels; give one", path.display())]
     LogWithoutMap {
         /// The file.
         path: PathBuf,
@@ -86,15 +86,15 @@ pub enum RecordError {
         /// Its format.
         found: FormatVersion,
     },
-    /// Nothing of it can be read, because its chunks cannot.
-    #[error("failed to read `{}`: {warning}, and nothing else in it is a measurement", path.display())]
+    /// No chunk of the file can be read.
+    #[error("failed to read `{}`: {warning}, and it contains no other measurement", path.display())]
     NothingReadable {
         /// The file.
         path: PathBuf,
         /// The first chunk that was left out.
         warning: ReadWarning,
     },
-    /// There are topics, but none of the mapped measurements.
+    /// The file contains none of the mapped measurements.
     #[error("failed to read `{}`: it contains none of the expected measurements; its topics are {}; give a channel map that names its topics and fields", path.display(), list(topics))]
     NothingMapped {
         /// The file.
@@ -103,7 +103,7 @@ pub enum RecordError {
         topics: Vec<String>,
     },
     /// Neither the map nor the recording gives the unit of a field.
-    #[error("failed to read `{}`: neither the channel map nor the recording gives the unit of {channel} (`{field}` of {topic}); write it in the channel map, e.g. `unit: {}`", path.display(), channel.unit())]
+    #[error("failed to read `{}`: neither the channel map nor the recording gives the unit of {channel} (`{field}` of {topic}); add it to the channel map, e.g. `unit: {}`", path.display(), channel.unit())]
     MissingUnit {
         /// The file.
         path: PathBuf,
@@ -132,8 +132,8 @@ pub enum RecordError {
 
 /// Why data cannot be recorded.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum BadBatch {
-    /// A time that is not a number or leaves the clock's range.
+pub enum BatchError {
+    /// A time that is not a number, or is outside the clock's range.
     #[error("the time {t_s} s cannot be recorded")]
     Time {
         /// The time, s.

@@ -20,15 +20,12 @@ impl std::fmt::Display for FormatVersion {
     }
 }
 
-/// Topic of step markers.
 pub(crate) const STEP_TOPIC: &str = "/step";
-/// Topic of events.
 pub(crate) const EVENT_TOPIC: &str = "/event";
 /// Topic of the single sensors of channels that have several.
 pub(crate) const ELEMENTS_TOPIC: &str = "/rig/elements";
 /// Topic of readings with an unusual quality or source time.
 pub(crate) const PROVENANCE_TOPIC: &str = "/rig/provenance";
-/// Topic of the simulator's truth.
 pub(crate) const TRUTH_TOPIC: &str = "/truth/model";
 /// Everything below this topic is for scoring only.
 pub(crate) const TRUTH_PREFIX: &str = "/truth";
@@ -38,7 +35,5 @@ pub(crate) const METADATA_NAME: &str = "mapper.recording";
 pub(crate) const FORMAT_KEY: &str = "format";
 /// Key of the epoch time of run time 0, in nanoseconds.
 pub(crate) const START_KEY: &str = "start_time_ns";
-/// Name of the attached plan.
 pub(crate) const PLAN_NAME: &str = "plan.json";
-/// Name of the attached campaign.
 pub(crate) const CAMPAIGN_NAME: &str = "campaign.yaml";

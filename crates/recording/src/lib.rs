@@ -1,11 +1,13 @@
-//! Recordings: reading and writing MCAP, and mapping other programs' recordings onto the rig's channels.
+//! Writes and reads recordings of runs: [`RecordingWriter`] for the runner, [`read_recording`] for everything that evaluates a run or a log of
+//! another program.
 //!
-//! A recording is one MCAP file: a message in JSON per device group and sample, units in each channel's metadata and
-//! in its schema, step markers on `/step`, events on `/event`, plan and campaign attached. The simulator's
-//! truth is under `/truth`; [`read_recording`] never returns it, only [`score`] reads it.
+//! A recording is one MCAP file. Each device group has a topic with one JSON message per sample; schema and channel metadata name the
+//! units. Step markers are on `/step`, events on `/event`; plan and campaign are attached. The simulator's truth is under `/truth`:
+//! [`read_recording`] never returns it, only [`score`] reads it. A [`ChannelMap`] assigns the topics or columns of other programs to
+//! the rig's channels.
 //!
-//! All input is untrusted: files may be truncated, damaged, or not MCAP at all. Recoverable data
-//! are returned together with a list of [`ReadWarning`]s.
+//! Every file is untrusted: it may be truncated, damaged, or not MCAP at all. Readers return the recoverable data and a list of
+//! [`ReadWarning`]s.
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod channel_mapping;
@@ -25,7 +27,7 @@ pub use channel_mapping::channel_map::{
     AmbientPressure, Barometer, ChannelMap, ChannelSource, MachineConstants, WindowLimits,
 };
 pub use channel_mapping::channel_map_yaml::ChannelMapError;
-pub use error::{BadBatch, RecordError};
+pub use error::{BatchError, RecordError};
 pub use format::FormatVersion;
 pub use mapper_yaml::Findings;
 pub use mapper_yaml::units::{Kind, Unit, UnitError};

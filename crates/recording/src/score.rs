@@ -51,10 +51,10 @@ pub struct ScoreSummary {
     pub h_worst_error_ratio: Option<f64>,
 }
 
-/// Truths of recordings that another thread reads, so that they are unavailable until requested.
-pub struct AwaitedTruths<'scope>(ScopedJoinHandle<'scope, Result<Vec<Truth>, RecordError>>);
+/// Truths of recordings that another thread is reading.
+pub struct PendingTruths<'scope>(ScopedJoinHandle<'scope, Result<Vec<Truth>, RecordError>>);
 
-impl AwaitedTruths<'_> {
+impl PendingTruths<'_> {
     /// Waits until they are read.
     ///
     /// # Errors
@@ -64,10 +64,10 @@ impl AwaitedTruths<'_> {
     }
 }
 
-/// Does `work` while the truths of the recordings at `paths` are read, in that order.
-pub fn with_truths<T>(paths: &[PathBuf], work: impl FnOnce(AwaitedTruths<'_>) -> T) -> T {
+/// Runs `work` while another thread reads the truths of the recordings at `paths`, in that order.
+pub fn with_truths<T>(paths: &[PathBuf], work: impl FnOnce(PendingTruths<'_>) -> T) -> T {
     std::thread::scope(|scope| {
-        work(AwaitedTruths(scope.spawn(|| paths.iter().map(|path| read_truth(path)).collect())))
+        work(PendingTruths(scope.spawn(|| paths.iter().map(|path| read_truth(path)).collect())))
     })
 }
 
@@ -98,8 +98,8 @@ pub struct ScoredMark {
     pub truth_flow_corrected_kg_s: Option<f64>,
 }
 
-/// Truth is taken this long before the end of the measurement nearest surge, s.
-const MARK_TRUTH_S: f64 = 10.0;
+/// Time of the truth before the end of the measurement nearest surge, s.
+const TRUTH_LEAD_S: f64 = 10.0;
 
 /// Pairs surge marks with the truth of their recording; `approaches` give the inlet's state, which corrects the true flow.
 pub fn score_marks(
@@ -109,7 +109,7 @@ pub fn score_marks(
     marks: Vec<SurgeMark>,
 ) -> Vec<ScoredMark> {
     let scored = |mark: SurgeMark| {
-        let (start_s, end_s) = (mark.closest_end_s - MARK_TRUTH_S, mark.closest_end_s);
+        let (start_s, end_s) = (mark.closest_end_s - TRUTH_LEAD_S, mark.closest_end_s);
         let true_flow_kg_s = || {
             let flows_kg_s = truth.column("surge_flow_kg_s")?;
             let within = truth.t_s.iter().zip(flows_kg_s).filter(|(t_s, _)| (start_s..=end_s).contains(*t_s));

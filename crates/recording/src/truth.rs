@@ -5,7 +5,7 @@ use crate::logs::LogFile;
 use crate::mcap::message::{FieldValue, read_fields};
 use crate::mcap::records::ChannelDefinition;
 use crate::mcap::sink::Sink;
-use crate::reading::log_read::is_mcap;
+use crate::reading::log_reader::is_mcap;
 use crate::reading::recording_reader::open;
 use crate::reading::scan::scan;
 use crate::samples::series_builder::run_time_s;
@@ -37,7 +37,7 @@ impl Truth {
 /// # Errors
 /// As [`read_recording`](crate::read_recording).
 pub fn read_truth(path: &Path) -> Result<Truth, RecordError> {
-    if !is_mcap(&LogFile::of_path(path).head(8)?) {
+    if !is_mcap(&LogFile::from_path(path).head(8)?) {
         return Ok(Truth::default());
     }
     let options = ReadOptions::default();
@@ -103,7 +103,7 @@ impl Sink for TruthSink {
 
     fn attachment(&mut self, _name: String, _data: &[u8]) {}
 
-    fn kept(&self) -> u64 {
+    fn value_count(&self) -> u64 {
         // Columns must finally be as long as the times.
         let width = u64::try_from(self.columns.len()).unwrap_or(u64::MAX).saturating_add(1);
         u64::try_from(self.times_ns.len()).unwrap_or(u64::MAX).saturating_mul(width)

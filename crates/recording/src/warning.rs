@@ -1,4 +1,4 @@
-//! Warnings about a recording that could still be read.
+//! Warnings about recordings that were read despite a fault.
 
 use crate::ChunkError;
 use mapper_core::{Channel, step_number};
@@ -6,8 +6,8 @@ use mapper_core::{Channel, step_number};
 /// A warning for the user of a recording. Each displays as one sentence with values.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ReadWarning {
-    /// The file ends early: the run was killed, or the file was cut.
-    #[error("the file is cut short at byte {offset}: what follows the last flush is lost")]
+    /// The file is truncated: the run was killed, or the copy is incomplete.
+    #[error("the file is truncated at byte {offset}: everything after the last flush is lost")]
     Truncated {
         /// Byte offset of the first incomplete record.
         offset: u64,
@@ -31,7 +31,7 @@ pub enum ReadWarning {
     /// More damage than is listed.
     #[error("{count} more chunks and records were left out: they are damaged as well")]
     MoreDamage {
-        /// How many.
+        /// Number.
         count: u64,
     },
     /// Messages on a mapped topic that are not JSON objects.
@@ -39,13 +39,13 @@ pub enum ReadWarning {
     DamagedMessages {
         /// Topic.
         topic: String,
-        /// How many.
+        /// Number.
         count: u64,
     },
     /// Messages on a topic that the file does not define.
-    #[error("{count} messages were left out: the file does not say what channel they belong to")]
+    #[error("{count} messages were left out: the file does not define their channel")]
     UndefinedChannel {
-        /// How many.
+        /// Number.
         count: u64,
     },
     /// Messages on a mapped topic in an encoding other than JSON.
@@ -61,15 +61,15 @@ pub enum ReadWarning {
     NotANumber {
         /// Channel.
         channel: Channel,
-        /// How many.
+        /// Number.
         count: u64,
     },
     /// The rig itself reports readings as bad.
-    #[error("{count} readings of {channel} are bad by the rig's own word; they count as missing")]
+    #[error("the rig marked {count} readings of {channel} as bad; they count as missing")]
     BadReadings {
         /// Channel.
         channel: Channel,
-        /// How many.
+        /// Number.
         count: u64,
     },
     /// The map names a field that the recording does not contain.
@@ -107,9 +107,7 @@ pub enum ReadWarning {
         repeated: usize,
     },
     /// The clock was set while it recorded.
-    #[error(
-        "the clock was set by {by_s:+.1} s while it recorded: the times after that were moved by as much"
-    )]
+    #[error("the clock was set by {by_s:+.1} s during the recording: the later times were corrected")]
     ClockSet {
         /// By how much, s; positive: forward.
         by_s: f64,
@@ -121,22 +119,22 @@ pub enum ReadWarning {
         limit: u64,
     },
     /// More values than the reader keeps.
-    #[error("only the first {limit} values were read; cut the recording into shorter ones")]
+    #[error("only the first {limit} values were read; split the recording")]
     TooManyValues {
         /// The limit.
         limit: u64,
     },
     /// Rows or samples with impossible times.
     #[error(
-        "{count} rows or samples were left out: their times, the first of them {first_s} s, are none or more than a day from those next to them, or step back"
+        "{count} rows or samples were left out: their times (the first is {first_s} s) are invalid, go back, or are more than a day from their neighbours"
     )]
     StrayTimes {
-        /// How many.
+        /// Number.
         count: u64,
         /// The first of these times, s.
         first_s: f64,
     },
-    /// Something about the log that its reader found while reading.
+    /// A finding of the log's reader.
     #[error("{finding}")]
     Log {
         /// The sentence.
@@ -147,18 +145,18 @@ pub enum ReadWarning {
     Averaged,
     /// The opening of the valve is a measured position.
     #[error(
-        "valve_command turns back in {turns_percent:.0} % of its samples: it is a measured position; each step has the opening that was held at its end"
+        "valve_command reverses in {turns_percent:.0} % of its samples, so it is a measured position; each step has the opening at its end"
     )]
     MeasuredValve {
-        /// Samples in which it turns back, %.
+        /// Samples in which it reverses, %.
         turns_percent: f64,
     },
     /// Steps were found from measured channels.
     #[error(
-        "the recording has neither step marks nor commands that mark steps: {count} steps were found where {channels} jump"
+        "the recording has neither step markers nor commands that change: {count} steps were found at jumps of {channels}"
     )]
     StepsFound {
-        /// How many.
+        /// Number.
         count: usize,
         /// Evaluated channels.
         channels: String,
@@ -177,13 +175,15 @@ pub enum ReadWarning {
     )]
     NoCommands,
     /// Steps were found, but one command is missing; its value is undefined in the steps.
-    #[error("steps were found without {channel}: it is not in the recording, and undefined in the steps")]
+    #[error(
+        "steps were found without {channel}: it is not in the recording, so the steps have no value of it"
+    )]
     MissingCommand {
         /// The command.
         channel: Channel,
     },
     /// The run ended within a step.
-    #[error("step {} has no end: the run was cut short at {end_s} s", step_number(*index))]
+    #[error("step {} has no end: the run ended early, at {end_s} s", step_number(*index))]
     UnfinishedStep {
         /// Index of the step, from 0.
         index: usize,

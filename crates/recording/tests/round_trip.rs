@@ -99,7 +99,7 @@ fn absent_readings_are_left_out_where_that_is_asked_for() {
         };
         column.values.iter_mut().enumerate().for_each(sparse);
     }
-    let mut writer = RecordingWriter::create(&path, &header()).unwrap().leaving_out_absent(true);
+    let mut writer = RecordingWriter::create(&path, &header()).unwrap().omit_absent(true);
     writer.write_batch(&whole).unwrap();
     writer.finish().unwrap();
     let report = read(&path);

@@ -3,7 +3,7 @@
 use crate::request::SequenceRequest;
 use mapper_core::Predicted;
 use mapper_physics::machine::params::BoundaryConditions;
-use mapper_physics::operating_point::forecast::{forecast_step, hold, warmed_up};
+use mapper_physics::operating_point::forecast::{forecast_step, hold, warm_up_state};
 use mapper_physics::simulation::model::State;
 use mapper_physics::simulation::simulate::SimulationError;
 use mapper_physics::simulation::steady::SteadyState;
@@ -34,7 +34,7 @@ impl NominalForecast {
     ) -> Result<Predicted, SimulationError> {
         let state = match self.state {
             Some(state) => state,
-            None => warmed_up(&request.model, target.state, &target.boundary, request.timing.warm_up_s)?,
+            None => warm_up_state(&request.model, target.state, &target.boundary, request.timing.warm_up_s)?,
         };
         self.state = Some(state);
         let step = forecast_step(&request.model, state, &target.boundary, dwell_s)?;

@@ -3,7 +3,7 @@
 use mapper_core::{Limits, OperatingPoint, SettleBands, Timing, WindowRule};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::follow_outlet::FollowOutlet;
-use mapper_physics::operating_point::reach::{clause, reach};
+use mapper_physics::operating_point::reach::{describe_obstacles, reach};
 use mapper_physics::simulation::model::Model;
 use mapper_physics::simulation::steady::SteadyState;
 
@@ -45,7 +45,7 @@ impl SequenceRequest {
         reach(&self.model, point, &self.boundary, self.follow_outlet, &self.limits).map_err(|obstacles| {
             let (krpm, opening) = (point.speed_rpm / 1e3, point.valve_opening_ratio);
             Refusal {
-                message: format!("{krpm} krpm at opening {opening} {}", clause(&obstacles)),
+                message: format!("{krpm} krpm at opening {opening} {}", describe_obstacles(&obstacles)),
                 remedy: obstacles.first().map_or("", |obstacle| obstacle.remedy()).to_owned(),
             }
         })

@@ -1,8 +1,8 @@
-//! Sheets of workbooks of Excel 97 to 2003 (`.xls`), read within limits.
+//! Reads the sheets of Excel 97 to 2003 workbooks (`.xls`, [MS-XLS]) within limits, for logs and maps: [`read_xls`] returns each [`Sheet`].
 //!
 //! `calamine` reads them too, but fills the rectangle around all cells of a sheet (0.4 GB for two cells in opposite corners), follows
-//! chains of sectors without end and panics on short records. Here memory is at most six times the size of the file: a cell of a file takes at
-//! least six bytes there, and 32 here. The records are those of [MS-XLS].
+//! endless chains of sectors and panics on short records. Here memory is at most six times the size of the file, since a cell has at least six
+//! bytes in the file and 32 here.
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 

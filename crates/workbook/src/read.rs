@@ -1,4 +1,4 @@
-//! Sheets with their cells.
+//! Reads sheets with their cells.
 
 use crate::records::{BOF, CONTINUE, EOF, Record, Records};
 use crate::strings::{Bytes, shared};
@@ -6,8 +6,8 @@ use std::collections::HashMap;
 use std::io::{Read, Seek};
 use std::rc::Rc;
 
-/// Maximum size of the stream with the sheets, bytes: 65 536 rows, the most that such a sheet has, of 50 numbers take 59 MB.
-const STREAM_LIMIT: u64 = 64 << 20;
+/// Maximum size of the stream with the sheets, bytes: 65 536 rows, the format's maximum, of 50 numbers take 59 MB.
+const MAX_STREAM_BYTES: u64 = 64 << 20;
 
 /// Days from the first day of 1900 to that of 1904, from which some programs count.
 const DAYS_TO_1904: f64 = 1462.0;
@@ -56,14 +56,14 @@ pub fn read_xls(file: impl Read + Seek) -> Result<Vec<Sheet>, String> {
     let mut bytes = Vec::new();
     let stream = ["/Workbook", "/Book"].iter().find(|name| file.is_stream(name));
     let stream =
-        stream.ok_or("it holds no workbook of Excel 95 to 2003; it may be another Office document")?;
+        stream.ok_or("it contains no workbook of Excel 95 to 2003; it may be another Office document")?;
     let stream = file.open_stream(stream).map_err(|error| error.to_string())?;
-    stream.take(STREAM_LIMIT + 1).read_to_end(&mut bytes).map_err(|error| error.to_string())?;
-    if bytes.len() as u64 > STREAM_LIMIT {
-        return Err(format!("its sheets take more than {} MiB; save it as .xlsx", STREAM_LIMIT >> 20));
+    stream.take(MAX_STREAM_BYTES + 1).read_to_end(&mut bytes).map_err(|error| error.to_string())?;
+    if bytes.len() as u64 > MAX_STREAM_BYTES {
+        return Err(format!("its sheets take more than {} MiB; save it as .xlsx", MAX_STREAM_BYTES >> 20));
     }
     let globals = globals(&bytes)?;
-    // Sheets at the same place would be read as often as they are listed.
+    // Sheets at the same offset would multiply the time.
     let mut places: Vec<usize> = globals.sheets.iter().map(|(at, ..)| *at).collect();
     places.sort_unstable();
     places.dedup();

@@ -4,7 +4,6 @@ pub(crate) const EOF: u16 = 0x000A;
 pub(crate) const CONTINUE: u16 = 0x003C;
 pub(crate) const BOF: u16 = 0x0809;
 
-/// A record.
 #[derive(Clone, Copy)]
 pub(crate) struct Record<'a> {
     pub(crate) kind: u16,

@@ -3,7 +3,7 @@
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::TooManyExtraStates;
 use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 use mapper_physics::rig::instruments::NOMINAL_P3_LAG_S;
 
 effect_parameters! {
@@ -16,7 +16,7 @@ effect_parameters! {
 }
 
 impl EffectKind for ActuatorLag {
-    const ABOUT: About = About {
+    const ABOUT: EffectText = EffectText {
         id: "actuator_lag",
         name: "slow P3 actuator",
         description: "the turbine inlet pressure follows its command more slowly or faster",

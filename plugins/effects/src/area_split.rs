@@ -3,7 +3,7 @@
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::TooManyExtraStates;
 use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 effect_parameters! {
     /// Part of the heat enters the gas before the wheel.
@@ -15,7 +15,7 @@ effect_parameters! {
 }
 
 impl EffectKind for AreaSplit {
-    const ABOUT: About = About {
+    const ABOUT: EffectText = EffectText {
         id: "area_split",
         name: "area before the wheel",
         description: "part of the housing's internal area meets the gas before compression",

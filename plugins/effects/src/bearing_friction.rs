@@ -3,7 +3,7 @@
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::TooManyExtraStates;
 use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 effect_parameters! {
     /// Additional friction power in the bearings.
@@ -15,7 +15,7 @@ effect_parameters! {
 }
 
 impl EffectKind for BearingFriction {
-    const ABOUT: About = About {
+    const ABOUT: EffectText = EffectText {
         id: "bearing_friction",
         name: "bearing friction",
         description: "the bearings take power from the shaft",

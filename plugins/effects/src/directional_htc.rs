@@ -3,7 +3,7 @@
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::TooManyExtraStates;
 use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 effect_parameters! {
     /// Convection depends on the direction of the heat flow.
@@ -15,7 +15,7 @@ effect_parameters! {
 }
 
 impl EffectKind for DirectionalHtc {
-    const ABOUT: About = About {
+    const ABOUT: EffectText = EffectText {
         id: "directional_htc",
         name: "convection that depends on direction",
         description: "convection differs between metal that heats the gas and gas that heats the metal",

@@ -3,7 +3,7 @@
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::TooManyExtraStates;
 use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 effect_parameters! {
     /// The compressor's efficiency is higher or lower.
@@ -15,7 +15,7 @@ effect_parameters! {
 }
 
 impl EffectKind for EfficiencyScale {
-    const ABOUT: About = About {
+    const ABOUT: EffectText = EffectText {
         id: "efficiency_scale",
         name: "compressor efficiency",
         description: "the compressor's efficiency is higher or lower everywhere",

@@ -3,7 +3,7 @@
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::TooManyExtraStates;
 use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 effect_parameters! {
     /// The compressor delivers more or less flow.
@@ -15,7 +15,7 @@ effect_parameters! {
 }
 
 impl EffectKind for FlowMapScale {
-    const ABOUT: About = About {
+    const ABOUT: EffectText = EffectText {
         id: "flow_map_scale",
         name: "compressor flow",
         description: "the compressor delivers more or less flow at equal speed and pressure ratio",

@@ -3,7 +3,7 @@
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::TooManyExtraStates;
 use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 effect_parameters! {
     /// All convection of the compressor housing is stronger or weaker.
@@ -15,7 +15,7 @@ effect_parameters! {
 }
 
 impl EffectKind for HtcScale {
-    const ABOUT: About = About {
+    const ABOUT: EffectText = EffectText {
         id: "htc_scale",
         name: "convection in the compressor",
         description: "convection between gas and compressor housing is stronger or weaker everywhere",

@@ -3,7 +3,7 @@
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::TooManyExtraStates;
 use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 effect_parameters! {
     /// The compressor takes in moist air.
@@ -15,7 +15,7 @@ effect_parameters! {
 }
 
 impl EffectKind for Humidity {
-    const ABOUT: About = About {
+    const ABOUT: EffectText = EffectText {
         id: "humidity",
         name: "moist air",
         description: "the compressor breathes moist air",

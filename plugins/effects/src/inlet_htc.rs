@@ -1,12 +1,12 @@
-//! The heat transfer coefficient before the wheel differs from the one behind it.
+//! The heat transfer coefficient before the wheel differs from the one after it.
 
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::TooManyExtraStates;
 use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 effect_parameters! {
-    /// The heat transfer coefficient before the wheel differs from the one behind it.
+    /// The heat transfer coefficient before the wheel differs from the one after it.
     #[derive(Debug)]
     pub(crate) struct InletHtc {
         /// h before the wheel over that of the nominal model; Appendix A's 40 mm before 35 mm give 0.75.
@@ -15,7 +15,7 @@ effect_parameters! {
 }
 
 impl EffectKind for InletHtc {
-    const ABOUT: About = About {
+    const ABOUT: EffectText = EffectText {
         id: "inlet_htc",
         name: "convection before the wheel",
         description: "convection before the wheel differs from that behind it, as in an inlet of another diameter; shows only where alpha_A is above 0",

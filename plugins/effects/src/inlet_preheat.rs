@@ -3,7 +3,7 @@
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::TooManyExtraStates;
 use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 effect_parameters! {
     /// The gas is heated between its probe and the wheel.
@@ -15,7 +15,7 @@ effect_parameters! {
 }
 
 impl EffectKind for InletPreheat {
-    const ABOUT: About = About {
+    const ABOUT: EffectText = EffectText {
         id: "inlet_preheat",
         name: "gas heated in the inlet",
         description: "the housing heats the gas between the T1 probe and the wheel",

@@ -3,7 +3,7 @@
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::TooManyExtraStates;
 use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 effect_parameters! {
     /// The inner wall of the compressor housing has its own temperature.
@@ -20,7 +20,7 @@ effect_parameters! {
 }
 
 impl EffectKind for InnerNode {
-    const ABOUT: About = About {
+    const ABOUT: EffectText = EffectText {
         id: "inner_node",
         name: "inner wall of the compressor housing",
         description: "the inner wall of the compressor housing has its own temperature",

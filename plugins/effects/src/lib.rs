@@ -1,4 +1,4 @@
-//! The effect library: deviations of a rig from the nominal model, one file each.
+//! The effect library of `mapper`: deviations of a rig from the nominal model, one file each, listed in `effects`.
 //!
 //! To add one, write its file (a struct of its parameters, its description, its changes to the model), and its line below. Faults of sensors
 //! are rows of [`mapper_physics::rig::sensor_fault`].
@@ -25,7 +25,7 @@ macro_rules! effects {
         pub fn catalogue() -> Vec<Arc<dyn Effect>> {
             let mut all = vec![$(effect_of::<$name::$kind>()),*];
             let mut faults = sensor_fault::effects();
-            // Conduction along the probe stands with the probe, the others before the air. Blind cases draw by these places.
+            // The order matters: blind cases draw effects by their index. Conduction along the probe is next to the probe.
             let (probe, air) = (3, all.len() - 2);
             all.splice(air..air, faults.split_off(1));
             all.splice(probe..probe, faults);

@@ -3,7 +3,7 @@
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::TooManyExtraStates;
 use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 effect_parameters! {
     /// The oil removes more or less heat from the bearing housing.
@@ -15,7 +15,7 @@ effect_parameters! {
 }
 
 impl EffectKind for OilScale {
-    const ABOUT: About = About {
+    const ABOUT: EffectText = EffectText {
         id: "oil_scale",
         name: "heat to the oil",
         description: "the oil takes more or less heat from the bearing housing",

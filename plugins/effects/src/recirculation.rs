@@ -3,7 +3,7 @@
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::TooManyExtraStates;
 use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 effect_parameters! {
     /// Part of the gas recirculates through the wheel.
@@ -15,7 +15,7 @@ effect_parameters! {
 }
 
 impl EffectKind for Recirculation {
-    const ABOUT: About = About {
+    const ABOUT: EffectText = EffectText {
         id: "recirculation",
         name: "recirculation",
         description: "part of the flow comes back, hot, from behind the wheel to its inlet",

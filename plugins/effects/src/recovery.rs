@@ -3,7 +3,7 @@
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::TooManyExtraStates;
 use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 effect_parameters! {
     /// The T2 probe does not recover the whole total temperature.
@@ -15,7 +15,7 @@ effect_parameters! {
 }
 
 impl EffectKind for Recovery {
-    const ABOUT: About = About {
+    const ABOUT: EffectText = EffectText {
         id: "recovery",
         name: "recovery of the T2 probe",
         description: "the T2 probe recovers only part of the gas's kinetic energy",

@@ -21,7 +21,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// Longest script, bytes.
-const SCRIPT_LIMIT: usize = 64 << 10;
+const MAX_SCRIPT_BYTES: usize = 64 << 10;
 
 /// An effect defined by a script.
 #[derive(Debug, Clone)]
@@ -40,8 +40,8 @@ impl ScriptEffect {
     /// that defines none of the hooks.
     pub fn new(text: &str, path: &Path) -> Result<Self, ScriptEffectError> {
         let fail = |line: Option<usize>, message: String| ScriptEffectError::new(path, text, line, message);
-        if text.len() > SCRIPT_LIMIT {
-            return Err(fail(None, format!("{} bytes are more than {SCRIPT_LIMIT}", text.len())));
+        if text.len() > MAX_SCRIPT_BYTES {
+            return Err(fail(None, format!("{} bytes are more than {MAX_SCRIPT_BYTES}", text.len())));
         }
         let Header { info, lags } = header::read(text).map_err(|(line, message)| fail(line, message))?;
         let names: Vec<String> = info.parameters.iter().map(|parameter| parameter.name.to_string()).collect();
@@ -64,7 +64,7 @@ impl Effect for ScriptEffect {
         for (channel, name) in &self.lags {
             rig.instruments.path_mut(*channel).lag_s += values.get(name)?;
         }
-        if self.program.takes_no_part() {
+        if self.program.has_no_hook() {
             return Ok(());
         }
         Ok(rig.hook(ScriptHooks::new(self.program.clone(), self.program.numbers(values)?))?)

@@ -3,7 +3,7 @@
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::TooManyExtraStates;
 use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 effect_parameters! {
     /// The tip of the T2 probe has its own thermal mass.
@@ -15,7 +15,7 @@ effect_parameters! {
 }
 
 impl EffectKind for TipDiameter {
-    const ABOUT: About = About {
+    const ABOUT: EffectText = EffectText {
         id: "tip_diameter",
         name: "slow T2 probe",
         description: "the T2 probe's tip has a mass and follows the gas with a lag",

@@ -3,7 +3,7 @@
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::TooManyExtraStates;
 use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 effect_parameters! {
     /// The turbine swallows more or less gas.
@@ -15,7 +15,7 @@ effect_parameters! {
 }
 
 impl EffectKind for TurbineCapacity {
-    const ABOUT: About = About {
+    const ABOUT: EffectText = EffectText {
         id: "turbine_capacity",
         name: "flow capacity of the turbine",
         description: "the turbine swallows more or less gas at every expansion ratio",

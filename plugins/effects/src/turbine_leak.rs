@@ -4,7 +4,7 @@ use mapper_core::Channel;
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::{Hooks, Site, TooManyExtraStates};
 use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 effect_parameters! {
     /// Gas bypasses the turbine wheel.
@@ -16,7 +16,7 @@ effect_parameters! {
 }
 
 impl EffectKind for TurbineLeak {
-    const ABOUT: About = About {
+    const ABOUT: EffectText = EffectText {
         id: "turbine_leak",
         name: "leak past the turbine wheel",
         description: "hot gas flows past the turbine wheel and mixes with the gas behind it",

@@ -3,7 +3,7 @@
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::TooManyExtraStates;
 use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 effect_parameters! {
     /// The back-pressure valve is wider or narrower.
@@ -15,7 +15,7 @@ effect_parameters! {
 }
 
 impl EffectKind for ValveArea {
-    const ABOUT: About = About {
+    const ABOUT: EffectText = EffectText {
         id: "valve_area",
         name: "valve area",
         description: "the back-pressure valve is wider or narrower than its opening says",

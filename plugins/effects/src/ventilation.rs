@@ -3,7 +3,7 @@
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::TooManyExtraStates;
 use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 effect_parameters! {
     /// Air moves in the cell.
@@ -15,7 +15,7 @@ effect_parameters! {
 }
 
 impl EffectKind for Ventilation {
-    const ABOUT: About = About {
+    const ABOUT: EffectText = EffectText {
         id: "ventilation",
         name: "air around the housings",
         description: "air moves around the housings: convection to the cell is stronger or weaker",

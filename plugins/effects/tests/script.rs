@@ -114,7 +114,7 @@ fn mistakes_are_named_with_their_line() {
         (script("//! effect: a\n//! parameter: c 0 .. 1\n"), "suspect.rhai:2: write `//! parameter"),
         (script("//! parameter: c [1] 0 .. 1, neutral 2, step 0.1\n"), "hold the neutral value 2"),
         (script("//! colour: red\n"), "`colour` is not a key"),
-        (with_body(""), "it takes part nowhere"),
+        (with_body(""), "it defines no hook"),
         (with_body("fn flow_kg_s(at) { 1.0 }"), "write flow_kg_s(at, p, value)"),
         (with_body("fn reading_T9(at, p, value) { value }"), "no channel is called `T9`"),
         (with_body("fn flow_kg_s(at, p, value) { value +"), "suspect.rhai:4"),

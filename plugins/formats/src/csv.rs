@@ -1,5 +1,4 @@
-//! CSV: one row per point. Lines that begin with `#` give the reference of the numbers. Tables from other programs are read by the
-//! names of the four columns that a map needs.
+//! CSV: one row per point. Lines that start with `#` give the reference state. Tables of other programs need the four required columns.
 
 mod read;
 mod write;

@@ -65,19 +65,19 @@ pub(crate) fn add_eta(panel: &mut Panel, map: &CompressorMap, fitted: &FittedMap
 }
 
 /// A point on a line's curve: flow, efficiency and its standard error.
-type OnCurve = (f64, f64, f64);
+type CurvePoint = (f64, f64, f64);
 
 /// The curve of a line between its largest and its smallest measured flow, interpolated at its ends, and above its lowest
 /// efficiency: at choke the flow no longer shows the end of the measured range.
-fn between_points(line: &FittedLine, own: &SpeedLine) -> Vec<OnCurve> {
+fn between_points(line: &FittedLine, own: &SpeedLine) -> Vec<CurvePoint> {
     let points = || own.points.iter().filter(|point| point.eta.is_some());
     let flows = || points().map(|point| point.flow_corrected_kg_s);
     let (smallest_kg_s, largest_kg_s) =
         (flows().fold(f64::INFINITY, f64::min), flows().fold(f64::NEG_INFINITY, f64::max));
     let lowest =
         points().filter_map(|point| point.identified.eta_low.or(point.eta)).fold(f64::INFINITY, f64::min);
-    let mut drawn: Vec<OnCurve> = Vec::new();
-    let mut before: Option<OnCurve> = None;
+    let mut drawn: Vec<CurvePoint> = Vec::new();
+    let mut before: Option<CurvePoint> = None;
     // From choke to surge.
     for node in line.nodes.iter().map(|n| (n.flow_corrected_kg_s, n.eta, n.eta_standard_error)) {
         let (flow_kg_s, eta, _) = node;
@@ -101,7 +101,7 @@ fn between_points(line: &FittedLine, own: &SpeedLine) -> Vec<OnCurve> {
 const CHOKED_RATIO: f64 = 1.01;
 
 /// The curve between two nodes, interpolated in flow.
-fn at_flow(a: OnCurve, b: OnCurve, flow_kg_s: f64) -> OnCurve {
+fn at_flow(a: CurvePoint, b: CurvePoint, flow_kg_s: f64) -> CurvePoint {
     let share = (a.0 - flow_kg_s) / (a.0 - b.0);
     let at = |a: f64, b: f64| a + share * (b - a);
     (flow_kg_s, at(a.1, b.1), at(a.2, b.2))

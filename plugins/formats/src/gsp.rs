@@ -17,13 +17,12 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     turbine: TurbineFormat::NONE,
 };
 
-/// Numbers of a line.
-const IN_LINE: usize = 5;
+const NUMBERS_PER_LINE: usize = 5;
 
 fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
     let table = SimulationTable::of(map, FORMAT.name)?;
     let about = heading(map, "99");
-    // The title is one line; what else there is to say follows the tables.
+    // The title has one line; comments follow the tables.
     let (title, about) = about.split_once('\n').unwrap_or((&about, ""));
     let mut text = format!("{title}\nReynolds: RNI=0.100 f=1.000 RNI=1.000 f=1.000\n");
     for (name, values) in [
@@ -55,10 +54,10 @@ fn rows<'a>(text: &mut String, coordinates: &[f64], values: impl IntoIterator<It
     }
 }
 
-/// A number and those behind it, on as many lines as they need.
+/// A number and its values, on as many lines as necessary.
 fn row(text: &mut String, first: String, values: &[f64]) {
     let words: Vec<String> = std::iter::once(first).chain(values.iter().map(f64::to_string)).collect();
-    for line in words.chunks(IN_LINE) {
+    for line in words.chunks(NUMBERS_PER_LINE) {
         let _ = writeln!(text, "  {}", line.join("  "));
     }
 }

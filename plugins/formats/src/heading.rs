@@ -1,7 +1,7 @@
 //! The header of every text format: machine, reference state, definition of the efficiency.
 
 use mapper_core::{CompressorMap, Method, one_line};
-use mapper_maps::table::DEFINITION;
+use mapper_maps::table::DEFINITION_PREFIX;
 use std::fmt::Write;
 
 /// Comment lines that begin with `mark`.
@@ -13,16 +13,15 @@ pub(crate) fn heading(map: &CompressorMap, mark: &str) -> String {
         if map.machine.is_empty() { "unnamed machine".to_owned() } else { one_line(&map.machine) },
     );
     if let Some(definition) = map.efficiency {
-        let _ = writeln!(text, "{mark} {DEFINITION}{definition} ({})", definition.description());
+        let _ = writeln!(text, "{mark} {DEFINITION_PREFIX}{definition} ({})", definition.description());
     }
     text
 }
 
-/// Name of a method's efficiency.
 pub(crate) fn efficiency_name(method: Method) -> &'static str {
     match method {
         Method::Steady => "apparent: heat transfer not removed",
         Method::Dynamic | Method::Joint | Method::Corrected => "adiabatic: heat transfer removed",
-        Method::Imported => "as the map file has it",
+        Method::Imported => "as in the map file",
     }
 }

@@ -3,7 +3,7 @@
 use mapper_core::{
     CompressorMap, ExportError, ImportError, ImportedMap, MapDescription, MapFormat, ReferenceState,
 };
-use mapper_maps::table::{POINT_LIMIT, settle};
+use mapper_maps::table::{MAX_POINTS, resolve_reference};
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -22,7 +22,7 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
 const LAYOUT: u32 = 2;
 
 #[derive(Serialize)]
-struct Written<'a> {
+struct MapDocument<'a> {
     format: u32,
     #[serde(flatten)]
     map: &'a CompressorMap,
@@ -45,7 +45,7 @@ fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
             }
         }
     }
-    let mut bytes = serde_json::to_vec_pretty(&Written { format: LAYOUT, map })
+    let mut bytes = serde_json::to_vec_pretty(&MapDocument { format: LAYOUT, map })
         .map_err(ExportError::failed(FORMAT.name))?;
     bytes.push(b'\n');
     Ok(bytes)
@@ -61,7 +61,7 @@ fn read(bytes: &[u8], given: &MapDescription) -> Result<ImportedMap, ImportError
         None | Some(Value::Null) => None,
         Some(state) => Some(serde_json::from_value(state.clone())?),
     };
-    let settled = settle(found, given.reference)?;
+    let settled = resolve_reference(found, given.reference)?;
     if !settled.is_plausible() {
         return Err(ImportError::Reference { text: settled.to_string() });
     }
@@ -92,8 +92,8 @@ fn check(map: &CompressorMap) -> Result<(), ImportError> {
     if count == 0 {
         return Err(ImportError::Empty);
     }
-    if count > POINT_LIMIT {
-        return Err(ImportError::TooMany { line: 1, limit: POINT_LIMIT });
+    if count > MAX_POINTS {
+        return Err(ImportError::TooMany { line: 1, limit: MAX_POINTS });
     }
     for (l, line) in map.lines.iter().enumerate() {
         for (p, point) in line.points.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! The file formats of compressor maps, one file each: its writer and, if maps can be read from it, its reader.
+//! File formats of compressor maps for `mapper`: [`FORMATS`] lists all of them, one file each with writer, reader or both.
 //!
 //! To add one, write its file with a constant `FORMAT`, and its line below.
 
@@ -13,7 +13,7 @@ mod turbine;
 
 pub use map_picture::map_figure;
 pub use mapper_chart::efficiency_mesh::efficiency_surface;
-pub use mapper_maps::table::{POINT_LIMIT, parse_reference};
+pub use mapper_maps::table::{MAX_POINTS, parse_reference};
 
 use mapper_core::MapFormats;
 

@@ -24,7 +24,7 @@ pub fn map_figure(map: &CompressorMap, units: &MapUnits) -> Figure {
             efficiency_name(map.method),
             map.lines.len(),
             match &map.fitted {
-                None => "contours only between measured points".to_owned(),
+                None => "contours between measured points only".to_owned(),
                 Some(fitted) => format!(
                     "lines and contours are fitted to all of them (scatter {:.1} % of distance, {:.1} points of efficiency)",
                     100.0 * fitted.distance_rms_ratio,

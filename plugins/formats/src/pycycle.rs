@@ -29,7 +29,7 @@ fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
          except ImportError:  # readable without pyCycle\n    class MapData:\n        pass\n\n\
          compressor = MapData()\n",
     );
-    let (speed_index, column) = best(&table);
+    let (speed_index, column) = find_best_efficiency(&table);
     let columns = table.beta.len();
     let rline = |column: usize| 3.0 - 2.0 * table.beta[column];
     let _ = writeln!(
@@ -76,7 +76,7 @@ compressor.output_data = [
 ";
 
 /// Speed and column of the best efficiency, as pyCycle's initial design point.
-fn best(table: &SimulationTable) -> (usize, usize) {
+fn find_best_efficiency(table: &SimulationTable) -> (usize, usize) {
     let mut best = (0, 0);
     for (i, row) in table.eta.iter().enumerate() {
         for (j, eta) in row.iter().enumerate() {

@@ -47,7 +47,7 @@ fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
             .pressure_ratio
             .iter()
             .zip(values)
-            .map(|(line, values)| ratios.iter().map(|ratio| over_ratio(line, values, *ratio)).collect())
+            .map(|(line, values)| ratios.iter().map(|ratio| value_at_ratio(line, values, *ratio)).collect())
             .collect();
         matrix(&mut text, name, &rows);
     }
@@ -63,7 +63,7 @@ fn matrix(text: &mut String, name: &str, rows: &[Vec<f64>]) {
 }
 
 /// A value at a pressure ratio, on the falling side of the line; constant beyond both ends.
-fn over_ratio(ratios: &[f64], values: &[f64], wanted: f64) -> f64 {
+fn value_at_ratio(ratios: &[f64], values: &[f64], wanted: f64) -> f64 {
     let mut last = values[0];
     for i in 1..ratios.len() {
         if ratios[i] <= ratios[i - 1] {

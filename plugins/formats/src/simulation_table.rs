@@ -44,7 +44,7 @@ impl SimulationTable {
             flow_kg_s: table(|line, i| line.nodes[i].flow_corrected_kg_s),
             pressure_ratio: table(|line, i| line.nodes[i].pressure_ratio),
             eta: table(|line, i| line.nodes[i].eta),
-            extrapolated_rpm: beyond(fitted),
+            extrapolated_rpm: extrapolated_speeds(fitted),
             beta,
         })
     }
@@ -80,7 +80,7 @@ fn at(line: &FittedLine, first: usize, beta: f64, value: fn(&FittedLine, usize) 
     value(line, below) + share * (value(line, below + 1) - value(line, below))
 }
 
-fn beyond(fitted: &FittedMap) -> Vec<f64> {
+fn extrapolated_speeds(fitted: &FittedMap) -> Vec<f64> {
     let measured: Vec<f64> =
         fitted.lines.iter().filter(|line| line.measured).map(|line| line.speed_corrected_rpm).collect();
     let (Some(first), Some(last)) = (measured.first(), measured.last()) else { return Vec::new() };

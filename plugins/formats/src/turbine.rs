@@ -85,7 +85,7 @@ fn write_sae(map: &TurbineMap) -> Result<Vec<u8>, ExportError> {
 }
 
 #[derive(Serialize)]
-struct Written<'a> {
+struct MapDocument<'a> {
     kind: &'static str,
     #[serde(flatten)]
     map: &'a TurbineMap,
@@ -93,7 +93,7 @@ struct Written<'a> {
 
 fn write_json(map: &TurbineMap) -> Result<Vec<u8>, ExportError> {
     let mut bytes =
-        serde_json::to_vec_pretty(&Written { kind: KIND, map }).map_err(ExportError::failed("json"))?;
+        serde_json::to_vec_pretty(&MapDocument { kind: KIND, map }).map_err(ExportError::failed("json"))?;
     bytes.push(b'\n');
     Ok(bytes)
 }
@@ -168,7 +168,7 @@ fn row(line: &FittedTurbineLine, value: Value) -> Option<String> {
 }
 
 /// Name of a table at a vane position: the first, the second of several.
-fn named(name: &str, index: usize, count: usize) -> String {
+fn table_name(name: &str, index: usize, count: usize) -> String {
     if count > 1 { format!("{name}_vane_{}", index + 1) } else { name.to_owned() }
 }
 
@@ -180,17 +180,17 @@ fn write_simscape(map: &TurbineMap) -> Result<Vec<u8>, ExportError> {
     for (index, lines) in by_vane(fitted).enumerate() {
         let Some(first) = lines.first() else { continue };
         if let Some(position) = first.vane_position {
-            let _ = writeln!(text, "{} = {position};", named("vane_position", index, count));
+            let _ = writeln!(text, "{} = {position};", table_name("vane_position", index, count));
         }
         let speeds: Vec<String> =
             lines.iter().map(|line| line.speed_parameter_rpm_sqrt_k.to_string()).collect();
-        let _ = writeln!(text, "{} = [{}];", named("speed_parameter", index, count), speeds.join(" "));
+        let _ = writeln!(text, "{} = [{}];", table_name("speed_parameter", index, count), speeds.join(" "));
         let ratios: Vec<String> = first.nodes.iter().map(|node| node.expansion_ratio.to_string()).collect();
-        let _ = writeln!(text, "{} = [{}];", named("expansion_ratio", index, count), ratios.join(" "));
+        let _ = writeln!(text, "{} = [{}];", table_name("expansion_ratio", index, count), ratios.join(" "));
         for (name, value) in TABLES {
             let rows: Option<Vec<String>> = lines.iter().map(|line| row(line, value)).collect();
             if let Some(rows) = rows {
-                let _ = writeln!(text, "{} = [\n  {}\n];", named(name, index, count), rows.join("\n  "));
+                let _ = writeln!(text, "{} = [\n  {}\n];", table_name(name, index, count), rows.join("\n  "));
             }
         }
     }
@@ -213,7 +213,7 @@ fn write_modelica(map: &TurbineMap) -> Result<Vec<u8>, ExportError> {
             let rows: Option<Vec<String>> = lines.iter().map(|line| row(line, value)).collect();
             let Some(rows) = rows else { continue };
             let size = (rows.len() + 1, ratios.len() + 1);
-            let _ = writeln!(text, "double {}({},{})", named(name, index, count), size.0, size.1);
+            let _ = writeln!(text, "double {}({},{})", table_name(name, index, count), size.0, size.1);
             let _ = writeln!(text, "0 {}", ratios.join(" "));
             for (line, row) in lines.iter().zip(rows) {
                 let _ = writeln!(text, "{} {row}", line.speed_parameter_rpm_sqrt_k);

@@ -2,7 +2,7 @@
 
 use mapper_core::{CompressorMap, ImportError, ImportRemark, ImportedMap, MapDescription};
 use mapper_formats::FORMATS;
-use mapper_maps::table::{describe, description_from_yaml, set_key};
+use mapper_maps::table::{description_from_yaml, description_text, set_key};
 use std::path::Path;
 
 fn stated(statements: &[(&str, &str)]) -> MapDescription {
@@ -158,7 +158,7 @@ fn a_written_description_reads_the_same_map() {
         ("x.py", PYCYCLE, vec![SAE, SPEED, ("flow", "lb/s"), ("design_pressure_ratio", "2.5")]),
     ] {
         let found = read(name, text, &given).unwrap();
-        let written = describe(name, &found, &stated(&given));
+        let written = description_text(name, &found, &stated(&given));
         let kept =
             description_from_yaml(&written, Path::new("x.yaml")).unwrap_or_else(|error| panic!("{error}"));
         let extension = name.rsplit('.').next().unwrap();

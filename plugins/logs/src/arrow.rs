@@ -5,7 +5,6 @@ use arrow_ipc::reader::{FileReader, StreamReader};
 use arrow_schema::{ArrowError, Schema};
 use mapper_recording::logs::{Log, LogError, LogFile, LogFormat, LogOptions};
 
-/// The format.
 pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
 
 const NAME: &str = "Arrow";
@@ -22,7 +21,7 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
 }
 
 fn batches(file: &LogFile) -> Result<(Schema, Batches), LogError> {
-    let failed = |error: ArrowError| file.content(NAME, error.to_string());
+    let failed = |error: ArrowError| file.content_error(NAME, error.to_string());
     if file.head(FILE.len())? == FILE {
         let reader = FileReader::try_new_buffered(file.open()?, None).map_err(failed)?;
         return Ok((reader.schema().as_ref().clone(), Box::new(reader)));

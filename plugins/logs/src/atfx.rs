@@ -1,13 +1,13 @@
 //! ASAM ATFX: measurements of an ODS server in XML, their values in the file or in binary files next to it.
 //!
-//! The names of elements and attributes differ between servers; the application model at the start of a file says which of them is which of the
-//! base model. Read as openATFX does (github.com/peak-solution/openatfx), whose examples are ASAM's.
+//! Servers name elements and attributes differently; the application model at the start of a file maps them to the base model. Read as
+//! openATFX does (github.com/peak-solution/openatfx), whose examples are ASAM's.
 
-use crate::columns::table_head::COLUMN_LIMIT;
+use crate::columns::table_head::MAX_COLUMNS;
 use crate::notation::instant::{Instant, parse_instant};
 use crate::tables::column_log::{ColumnTable, column_log};
 use crate::tables::column_rows::Chunk;
-use mapper_recording::logs::limits::UNPACKED_BYTES;
+use mapper_recording::logs::limits::MAX_UNPACKED_BYTES;
 use mapper_recording::logs::{DateOrder, Log, LogError, LogFile, LogFormat, LogOptions};
 use quick_xml::Reader;
 use quick_xml::events::Event;
@@ -15,13 +15,12 @@ use std::collections::HashMap;
 use std::io::BufReader;
 use std::path::Path;
 
-/// The format.
 pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
 
 const NAME: &str = "ATFX";
 
-/// Nesting of elements: values are five levels deep.
-const DEPTH_LIMIT: usize = 32;
+/// Maximum nesting of elements: values are five levels deep.
+const MAX_DEPTH: usize = 32;
 
 /// Size of a value in memory, bytes.
 const VALUE_BYTES: u64 = 8;
@@ -31,7 +30,6 @@ fn recognises(head: &[u8]) -> bool {
     head.trim_start_matches('\u{feff}').starts_with('<') && head.contains("<atfx_file")
 }
 
-/// Values, or where they are.
 #[derive(Clone)]
 enum Values {
     Numbers(Vec<f64>),
@@ -40,7 +38,7 @@ enum Values {
     Component(HashMap<String, String>),
 }
 
-/// What the file says of one thing, by the names of the base model.
+/// An instance of the file, with attributes by the names of the base model.
 #[derive(Default)]
 struct Instance {
     texts: HashMap<String, String>,
@@ -53,12 +51,11 @@ impl Instance {
     }
 }
 
-/// The contents of a file.
 #[derive(Default)]
 struct Contents {
     /// Names of binary files by their identifiers.
     files: HashMap<String, String>,
-    /// For each element of the application model its type, and the base names of its attributes.
+    /// Type and base names of the attributes of each element of the application model.
     elements: HashMap<String, (String, HashMap<String, String>)>,
     columns: Vec<Instance>,
     /// By their identity.
@@ -68,13 +65,13 @@ struct Contents {
 }
 
 fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
-    let wrong = |why: String| file.content(NAME, why);
-    options.only(&["time", "time_unit", "date_order", "rate", "missing"]).map_err(wrong)?;
-    if file.size_bytes()? > UNPACKED_BYTES {
-        return Err(wrong(format!("it has more than {} MiB; export it in parts", UNPACKED_BYTES >> 20)));
+    let wrong = |why: String| file.content_error(NAME, why);
+    options.allow_only(&["time", "time_unit", "date_order", "rate", "missing"]).map_err(wrong)?;
+    if file.size_bytes()? > MAX_UNPACKED_BYTES {
+        return Err(wrong(format!("it has more than {} MiB; export it in parts", MAX_UNPACKED_BYTES >> 20)));
     }
     let contents = contents(file).map_err(wrong)?;
-    let mut binaries = Binaries { file, contents: &contents, read: HashMap::new(), left: UNPACKED_BYTES };
+    let mut binaries = Binaries { file, contents: &contents, read: HashMap::new(), left: MAX_UNPACKED_BYTES };
     let (mut tables, mut problems): (Vec<(String, ColumnTable)>, Vec<String>) = (Vec::new(), Vec::new());
     for column in &contents.columns {
         let quantity = contents.quantities.get(column.text("measurement_quantity"));
@@ -86,7 +83,7 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
         let chunk = match binaries.chunk(column, rows) {
             Ok(chunk) => chunk,
             Err(why) => {
-                problems.push(format!("`{name}` is left out: {why}"));
+                problems.push(format!("`{name}` was left out: {why}"));
                 continue;
             }
         };
@@ -100,7 +97,7 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
                 tables.len() - 1
             }
         };
-        let Some((_, table)) = tables.get_mut(place).filter(|(_, table)| table.columns.len() < COLUMN_LIMIT)
+        let Some((_, table)) = tables.get_mut(place).filter(|(_, table)| table.columns.len() < MAX_COLUMNS)
         else {
             continue;
         };
@@ -109,7 +106,7 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
             Chunk::Instants(values) => values.len(),
             Chunk::Texts(values) => values.len(),
         });
-        // Several may be independent; then the names decide.
+        // If several are independent, the names decide.
         if column.text("independent") == "1" {
             table.clock = if table.clock.is_none() { Some(name.clone()) } else { Some(String::new()) };
         }
@@ -120,7 +117,7 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
         }
         table.columns.push(chunk);
     }
-    // A clock alone is no log.
+    // A clock without data is not a log.
     let tables = tables.into_iter().filter(|(_, table)| table.columns.len() > 1).map(|(_, mut table)| {
         table.clock = table.clock.filter(|name| !name.is_empty());
         table.head.retain(|row| row.iter().any(|text| !text.is_empty()));
@@ -141,8 +138,8 @@ fn contents(file: &LogFile) -> Result<Contents, String> {
             Event::Start(tag) => {
                 path.push(tag.local_name().as_ref().to_owned());
                 text.clear();
-                if path.len() > DEPTH_LIMIT {
-                    return Err(format!("it has more than {DEPTH_LIMIT} elements within each other"));
+                if path.len() > MAX_DEPTH {
+                    return Err(format!("it has more than {MAX_DEPTH} elements within each other"));
                 }
             }
             Event::Text(piece) => text.push_str(&piece),
@@ -164,7 +161,7 @@ fn contents(file: &LogFile) -> Result<Contents, String> {
     }
 }
 
-/// What is being read.
+/// The element that is being read.
 #[derive(Default)]
 struct Element {
     /// Texts of the innermost group, by their tags.
@@ -177,7 +174,7 @@ struct Element {
 }
 
 impl Element {
-    /// Takes what ended: the last of `path`, with its text.
+    /// Processes the end of the last element of `path`, with its text.
     fn end(&mut self, path: &[String], text: &str, found: &mut Contents) {
         let path: Vec<&str> = path.iter().map(String::as_str).collect();
         match path.as_slice() {
@@ -267,7 +264,6 @@ struct Binaries<'a> {
     file: &'a LogFile,
     contents: &'a Contents,
     read: HashMap<String, Vec<u8>>,
-    /// Bytes that may still be read or made of implicit values.
     left: u64,
 }
 
@@ -320,7 +316,7 @@ impl Binaries<'_> {
     fn numbers(&mut self, values: &Values) -> Result<Vec<f64>, String> {
         match values {
             Values::Numbers(values) => Ok(values.clone()),
-            Values::Instants(_) => Err("dates are no numbers".to_owned()),
+            Values::Instants(_) => Err("it has dates instead of numbers".to_owned()),
             Values::Component(tags) => self.component(tags),
         }
     }
@@ -351,16 +347,16 @@ impl Binaries<'_> {
 
     /// The content of a binary file in the folder of the file.
     fn binary(&mut self, identifier: &str) -> Result<&[u8], String> {
-        // Some writers use the name of the file.
+        // Some programs write the file name instead of the identifier.
         let name = self.contents.files.get(identifier).map_or(identifier, String::as_str);
         if !self.read.contains_key(identifier) {
-            // Not a path: a file must not name what is elsewhere on this machine.
+            // A path could name any file of this machine.
             if Path::new(name).file_name().is_none_or(|only| only.to_str() != Some(name)) {
                 return Err(format!("its values are in `{name}`; put that file next to this one"));
             }
             let failed =
                 |error: LogError| format!("its values are in `{name}`, which cannot be read: {error}");
-            let file = LogFile::of_path(&self.file.path().with_file_name(name));
+            let file = LogFile::from_path(&self.file.path().with_file_name(name));
             let size = file.size_bytes().map_err(failed)?;
             self.left = self.left.checked_sub(size).ok_or(format!("`{name}` exceeds the memory of a log"))?;
             let bytes = file.head(usize::try_from(size).unwrap_or(usize::MAX)).map_err(failed)?;
@@ -370,7 +366,7 @@ impl Binaries<'_> {
     }
 }
 
-/// The number that bytes begin with.
+/// The number at the start of the bytes.
 fn decoded(bytes: &[u8], datatype: &str) -> Option<f64> {
     let (kind, is_big) = datatype.strip_suffix("_beo").map_or((datatype, false), |kind| (kind, true));
     let ordered = |size: usize| {

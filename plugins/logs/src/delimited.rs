@@ -1,5 +1,6 @@
-//! CSV and similar: cells with a separator between them.
+//! CSV and similar formats: cells with a separator between them.
 
+use crate::columns::sample::HEAD_ROWS;
 use crate::notation::encoding;
 use crate::notation::separator::{SEPARATORS, decimal, score, typical_length};
 use crate::notation::table_row::Rows;
@@ -10,16 +11,12 @@ use mapper_recording::logs::{Encoding, Layout, Log, LogError, LogFile, LogFormat
 use std::io::Cursor;
 use std::ops::Range;
 
-/// The format.
 pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
 
 const NAME: &str = "CSV";
 
 /// Size of the sample of a file, bytes.
 const HEAD_BYTES: usize = 1 << 18;
-
-/// Maximum number of rows in the sample.
-const HEAD_ROWS: usize = 400;
 
 /// Text of more than one word.
 fn recognises(head: &[u8]) -> bool {
@@ -37,12 +34,12 @@ struct Delimited {
     file: LogFile,
     dialect: Dialect,
     table: Table,
-    /// Of a table in long form.
+    /// Set if the table is in long form.
     long: Option<LongForm>,
 }
 
 fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
-    options.without(&["sheet"]).map_err(|why| file.content(NAME, why))?;
+    options.refuse_keys(&["sheet"]).map_err(|why| file.content_error(NAME, why))?;
     let head = file.head(HEAD_BYTES)?;
     let (found, mark) = encoding::guess(&head);
     let encoding = options.encoding.unwrap_or(found);
@@ -74,34 +71,34 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
         }
     }
     let Some((_, separator, rows)) = best.filter(|(score, ..)| *score > 0.0) else {
-        return Err(file.content(
+        return Err(file.content_error(
             NAME,
             match head.trim_ascii_start().first() {
                 Some(b'{') => "it is JSON; write its values as CSV, e.g. with `pandas.read_json(FILE, lines=True).to_csv(NEW)`",
                 Some(b'<') => "it is XML, but not ATFX; export it as CSV",
-                _ => "it is text, but no table of numbers",
+                _ => "it is text without a table of numbers",
             },
         ));
     };
     let (found_decimal, seen) = decimal(&rows);
     let decimal = options.decimal.and_then(|sign| u8::try_from(sign).ok()).unwrap_or(found_decimal);
-    let mut table =
-        Table::look(&rows, decimal, options, Origin::Rows).map_err(|message| file.content(NAME, message))?;
+    let mut table = Table::analyse(&rows, decimal, options, Origin::Rows)
+        .map_err(|message| file.content_error(NAME, message))?;
     let long = LongForm::find(&rows, &table, decimal);
     if let Some(form) = &long {
-        // The header of the gathered table is in its first row, wherever that of the file is.
+        // The wide table has its header in the first row.
         let gathered = LogOptions { names_row: None, units_row: None, data_row: None, ..options.clone() };
-        table = Table::look(&form.wide(&rows), decimal, &gathered, Origin::Rows)
-            .map_err(|message| file.content(NAME, message))?;
+        table = Table::analyse(&form.wide(&rows), decimal, &gathered, Origin::Rows)
+            .map_err(|message| file.content_error(NAME, message))?;
         table.layout.findings.insert(0, form.words(&rows));
     }
     let dialect = Dialect { encoding, mark, separator, decimal };
-    table.layout.findings.insert(0, dialect_words(dialect, seen || options.decimal.is_some()));
+    table.layout.findings.insert(0, describe_dialect(dialect, seen || options.decimal.is_some()));
     Ok(Box::new(Delimited { file: file.clone(), dialect, table, long }))
 }
 
-/// Names of several words above columns between blanks: single blanks are within a name. If there are not as many names as columns, which
-/// name is whose is not known, and the row is text.
+/// Joins names of several words above columns between blanks: single blanks are within a name. If there are not as many names as columns,
+/// the assignment is unknown and the row is text.
 fn join_names(rows: &mut [Vec<String>], spans: &[Vec<Range<usize>>]) {
     let length = typical_length(rows);
     for (row, spans) in rows.iter_mut().zip(spans) {
@@ -122,7 +119,7 @@ fn join_names(rows: &mut [Vec<String>], spans: &[Vec<Range<usize>>]) {
     }
 }
 
-fn dialect_words(dialect: Dialect, decimal_seen: bool) -> String {
+fn describe_dialect(dialect: Dialect, decimal_seen: bool) -> String {
     let separator = match dialect.separator {
         b'\t' => "tab".to_owned(),
         b' ' => "blanks".to_owned(),
@@ -133,7 +130,7 @@ fn dialect_words(dialect: Dialect, decimal_seen: bool) -> String {
         Encoding::Latin1 => "Latin-1",
         Encoding::Utf16Le | Encoding::Utf16Be => "UTF-16",
     };
-    let decimal = if decimal_seen { "" } else { ", no cell shows it" };
+    let decimal = if decimal_seen { "" } else { ", assumed" };
     let sign = char::from(dialect.decimal);
     format!(
         "text: separator {separator}, decimal sign `{sign}`{decimal}, letters in {encoding} (separator, decimal, encoding)"

@@ -1,4 +1,4 @@
-//! The formats of imported logs, one file each.
+//! Readers of imported logs for `mapper`: [`LOG_FORMATS`] lists all formats, one file each.
 //!
 //! To add one, write its file with a constant `FORMAT`, and its line below. A format with a short signature
 //! comes before one that accepts any text.

@@ -1,26 +1,24 @@
 //! MATLAB data of level 5 (`save`, `save -v7`): vectors of numbers, also in structures. Vectors of equal length form a table.
 //!
-//! Format: MathWorks, MAT-File Format (2005-2024), chapter 1. Matrices become one column for each of theirs; texts, cells, objects and complex or
+//! Format: MathWorks, MAT-File Format (2005-2024), chapter 1. A matrix becomes one column per column of it; texts, cells, objects and complex or
 //! sparse numbers are left out.
 
-use crate::columns::table_head::COLUMN_LIMIT;
+use crate::columns::table_head::MAX_COLUMNS;
 use crate::tables::column_log::{ColumnTable, column_log};
 use crate::tables::column_rows::Chunk;
-use mapper_recording::logs::limits::UNPACKED_BYTES;
+use mapper_recording::logs::limits::MAX_UNPACKED_BYTES;
 use mapper_recording::logs::{Log, LogError, LogFile, LogFormat, LogOptions};
 use std::io::Read;
 
-/// The format.
 pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
 
 const NAME: &str = "MATLAB";
 
-/// Size of the header, bytes; its last two say the order of bytes.
+/// Size of the header, bytes; its last two give the byte order.
 const HEADER: usize = 128;
-/// Nesting of structures: logs of Simulink have three levels.
-const DEPTH_LIMIT: usize = 8;
-/// Elements of one array of structures.
-const ELEMENT_LIMIT: usize = 1000;
+/// Maximum nesting of structures: logs of Simulink have three levels.
+const MAX_DEPTH: usize = 8;
+const MAX_ELEMENTS: usize = 1000;
 /// Types of data elements.
 const MATRIX: u32 = 14;
 const COMPRESSED: u32 = 15;
@@ -35,22 +33,21 @@ fn recognises(head: &[u8]) -> bool {
     head.starts_with(b"MATLAB 5.0 MAT-file")
 }
 
-/// A column and its name.
-type Named = (String, Vec<f64>);
+type NamedColumn = (String, Vec<f64>);
 
 fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
-    let wrong = |why: String| file.content(NAME, why);
-    options.only(&["time", "time_unit", "date_order", "rate", "missing"]).map_err(wrong)?;
-    if file.size_bytes()? > UNPACKED_BYTES {
-        return Err(wrong(format!("it has more than {} MiB; export it in parts", UNPACKED_BYTES >> 20)));
+    let wrong = |why: String| file.content_error(NAME, why);
+    options.allow_only(&["time", "time_unit", "date_order", "rate", "missing"]).map_err(wrong)?;
+    if file.size_bytes()? > MAX_UNPACKED_BYTES {
+        return Err(wrong(format!("it has more than {} MiB; export it in parts", MAX_UNPACKED_BYTES >> 20)));
     }
-    let bytes = file.head(usize::try_from(UNPACKED_BYTES).unwrap_or(usize::MAX))?;
+    let bytes = file.head(usize::try_from(MAX_UNPACKED_BYTES).unwrap_or(usize::MAX))?;
     let mut reader =
-        Reader { is_big: bytes.get(126) == Some(&b'M'), left: UNPACKED_BYTES, ..Reader::default() };
+        Reader { is_big: bytes.get(126) == Some(&b'M'), left: MAX_UNPACKED_BYTES, ..Reader::default() };
     reader
         .elements(bytes.get(HEADER..).unwrap_or_default(), "", 0)
-        .map_err(|why| file.content(NAME, format!("it is damaged: {why}; save it again")))?;
-    let mut tables: Vec<Vec<Named>> = Vec::new();
+        .map_err(|why| file.content_error(NAME, format!("it is damaged: {why}; save it again")))?;
+    let mut tables: Vec<Vec<NamedColumn>> = Vec::new();
     for column in reader.columns {
         match tables.iter_mut().find(|table| table.iter().any(|(_, first)| first.len() == column.1.len())) {
             Some(table) => table.push(column),
@@ -74,7 +71,7 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
 }
 
 /// `log.t`, `log.T2` of one structure are `t` and `T2`.
-fn without_common_prefix(table: &mut [Named]) {
+fn without_common_prefix(table: &mut [NamedColumn]) {
     let prefix = |name: &str| name.rfind('.').map(|at| name[..=at].to_owned());
     let Some(first) = table.first().and_then(|(name, _)| prefix(name)) else { return };
     if table.iter().all(|(name, _)| prefix(name).as_deref() == Some(&first)) {
@@ -82,18 +79,15 @@ fn without_common_prefix(table: &mut [Named]) {
     }
 }
 
-/// Collects the columns of a file.
 #[derive(Default)]
 struct Reader {
     is_big: bool,
-    /// Bytes that may still be unpacked.
     left: u64,
-    columns: Vec<Named>,
+    columns: Vec<NamedColumn>,
     left_out: usize,
 }
 
 impl Reader {
-    /// Reads the elements one after the other.
     fn elements(&mut self, mut bytes: &[u8], prefix: &str, depth: usize) -> Result<(), String> {
         while !bytes.is_empty() {
             let (kind, data, rest) = self.element(bytes)?;
@@ -107,8 +101,8 @@ impl Reader {
                     self.left = self
                         .left
                         .checked_sub(unpacked.len() as u64)
-                        .ok_or_else(|| format!("it unpacks to more than {} MiB", UNPACKED_BYTES >> 20))?;
-                    if depth >= DEPTH_LIMIT {
+                        .ok_or_else(|| format!("it unpacks to more than {} MiB", MAX_UNPACKED_BYTES >> 20))?;
+                    if depth >= MAX_DEPTH {
                         return Err("it is packed several times".to_owned());
                     }
                     self.elements(&unpacked, prefix, depth + 1)?;
@@ -173,7 +167,7 @@ impl Reader {
             }
             [rows, columns] if class == STRUCTURE => {
                 let count = rows.saturating_mul(*columns);
-                if depth >= DEPTH_LIMIT || count > ELEMENT_LIMIT {
+                if depth >= MAX_DEPTH || count > MAX_ELEMENTS {
                     self.left_out += 1;
                     return Ok(());
                 }
@@ -211,8 +205,8 @@ impl Reader {
             self.left_out += 1;
             return Ok(());
         }
-        if self.columns.len() + count > COLUMN_LIMIT {
-            return Err(format!("it has more than {COLUMN_LIMIT} columns"));
+        if self.columns.len() + count > MAX_COLUMNS {
+            return Err(format!("it has more than {MAX_COLUMNS} columns"));
         }
         if count == 1 {
             self.columns.push((name.to_owned(), values));

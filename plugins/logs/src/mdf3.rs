@@ -7,16 +7,14 @@ use mapper_recording::logs::{
 };
 use std::collections::BTreeMap;
 
-/// The format.
 pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
 
 const NAME: &str = "MDF3";
 
-/// Maximum number of channels in a file.
-const CHANNEL_LIMIT: usize = 10_000;
+const MAX_CHANNELS: usize = 10_000;
 
 /// Maximum number of samples of a group: with all its channels it is decoded at once.
-const SAMPLE_LIMIT: u32 = 20_000_000;
+const MAX_SAMPLES: u32 = 20_000_000;
 
 /// The identification block of a version before 4: its text is `3.30` and the like.
 fn recognises(head: &[u8]) -> bool {
@@ -26,28 +24,25 @@ fn recognises(head: &[u8]) -> bool {
     head.starts_with(b"MDF     ") && major.is_some_and(|major| major < 4)
 }
 
-/// Where a column is in the file: data group, channel group, channel.
+/// Indices of a column: data group, channel group, channel.
 type Place = (usize, usize, usize);
 
 struct Mdf3 {
     path: LogFile,
     file: Mdf3File,
     layout: Layout,
-    /// The time channel of each group.
     masters: Vec<Place>,
-    /// The channel of each column.
     channels: Vec<Place>,
-    /// Values that mark a missing sample.
     missing: Vec<f64>,
 }
 
 fn open(path: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
-    let failed = |error: falcon_mdf::error::Mf4Error| path.content(NAME, error.to_string());
-    options.only(&["missing"]).map_err(|why| path.content(NAME, why))?;
+    let failed = |error: falcon_mdf::error::Mf4Error| path.content_error(NAME, error.to_string());
+    options.allow_only(&["missing"]).map_err(|why| path.content_error(NAME, why))?;
     let file = Mdf3File::from_source(MdfSource::open(path, NAME)?).map_err(failed)?;
-    if file.channel_count() > CHANNEL_LIMIT {
-        let message = format!("it has {} channels; at most {CHANNEL_LIMIT} are read", file.channel_count());
-        return Err(path.content(NAME, message));
+    if file.channel_count() > MAX_CHANNELS {
+        let message = format!("it has {} channels; at most {MAX_CHANNELS} are read", file.channel_count());
+        return Err(path.content_error(NAME, message));
     }
     let mut layout = Layout { start_time_ns: file.start_time_ns(), ..Layout::default() };
     let (mut masters, mut channels, mut without_clock) = (Vec::new(), Vec::new(), 0usize);
@@ -61,12 +56,12 @@ fn open(path: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
             if channel_group.cycle_count == 0 || channel_group.channels.len() < 2 {
                 continue;
             }
-            if channel_group.cycle_count > SAMPLE_LIMIT {
+            if channel_group.cycle_count > MAX_SAMPLES {
                 let message = format!(
-                    "a group has {} samples; at most {SAMPLE_LIMIT} are read: cut the file",
+                    "a group has {} samples; at most {MAX_SAMPLES} are read: split the file",
                     channel_group.cycle_count
                 );
-                return Err(path.content(NAME, message));
+                return Err(path.content_error(NAME, message));
             }
             let words = channel_group.channels.get(clock).map_or("", |channel| channel.name.as_str());
             layout.groups.push(Group {
@@ -99,7 +94,7 @@ fn open(path: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
         only.name = String::new();
     }
     if channels.is_empty() {
-        return Err(path.content(NAME, "no group has a time channel and another one with samples"));
+        return Err(path.content_error(NAME, "no group has a time channel and another one with samples"));
     }
     layout.findings.push(format!(
         "version {} of MDF, written by `{}`",
@@ -107,7 +102,7 @@ fn open(path: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
         file.program().trim()
     ));
     if without_clock > 0 {
-        layout.findings.push(format!("{without_clock} channels without a time channel are left out"));
+        layout.findings.push(format!("{without_clock} channels without a time channel were left out"));
     }
     Ok(Box::new(Mdf3 {
         path: path.clone(),
@@ -127,7 +122,9 @@ impl Log for Mdf3 {
     fn rows(&mut self, wanted: &[usize], sink: &mut RowSink<'_>) -> Result<(), LogError> {
         let values_of = |(data, group, channel): Place| {
             let values = self.file.channel_physical(data, group, channel);
-            values.map(|values| values.to_f64()).map_err(|error| self.path.content(NAME, error.to_string()))
+            values
+                .map(|values| values.to_f64())
+                .map_err(|error| self.path.content_error(NAME, error.to_string()))
         };
         for (group, master) in self.masters.iter().enumerate() {
             let of_group = |column: &&usize| {

@@ -2,13 +2,12 @@
 
 use crate::mdf_source::MdfSource;
 use falcon_mdf::{Channel, ChannelGroup, Conversion, Mf4File, OpenOptions, Signal};
-use mapper_recording::logs::limits::{BLOCK_BYTES, unpacked_max};
+use mapper_recording::logs::limits::{MAX_BLOCK_BYTES, max_unpacked_bytes};
 use mapper_recording::logs::{
     Column, Group, Kind, Layout, Log, LogError, LogFile, LogFormat, LogOptions, Row, RowSink,
 };
 use std::collections::BTreeSet;
 
-/// The format.
 pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
 
 const NAME: &str = "MDF4";
@@ -16,8 +15,7 @@ const NAME: &str = "MDF4";
 /// Rows decoded at once.
 const CHUNK: usize = 4096;
 
-/// Maximum number of channels in a file.
-const CHANNEL_LIMIT: usize = 10_000;
+const MAX_CHANNELS: usize = 10_000;
 
 /// Size of a decoded value, bytes.
 const VALUE_BYTES: u64 = 8;
@@ -32,21 +30,19 @@ struct Mdf4 {
     layout: Layout,
     /// The clock of each group, and its unit in seconds.
     masters: Vec<(Channel, f64)>,
-    /// The channel of each column.
     channels: Vec<Channel>,
-    /// Values that mark a missing sample.
     missing: Vec<f64>,
 }
 
 fn open(path: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
-    let failed = |error: falcon_mdf::error::Mf4Error| path.content(NAME, error.to_string());
-    options.only(&["time", "time_unit", "missing"]).map_err(|why| path.content(NAME, why))?;
-    let limits = OpenOptions { max_decompressed: BLOCK_BYTES + 1, ..OpenOptions::default() };
+    let failed = |error: falcon_mdf::error::Mf4Error| path.content_error(NAME, error.to_string());
+    options.allow_only(&["time", "time_unit", "missing"]).map_err(|why| path.content_error(NAME, why))?;
+    let limits = OpenOptions { max_decompressed: MAX_BLOCK_BYTES + 1, ..OpenOptions::default() };
     let file = Mf4File::from_source_with_options(MdfSource::open(path, NAME)?, limits).map_err(failed)?;
-    if file.channel_count() > CHANNEL_LIMIT {
-        return Err(path.content(
+    if file.channel_count() > MAX_CHANNELS {
+        return Err(path.content_error(
             NAME,
-            format!("it has {} channels; at most {CHANNEL_LIMIT} are read", file.channel_count()),
+            format!("it has {} channels; at most {MAX_CHANNELS} are read", file.channel_count()),
         ));
     }
     let mut log = Mdf4 {
@@ -57,8 +53,8 @@ fn open(path: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
         missing: options.missing.clone(),
         file,
     };
-    // A list of blocks may name the same packed block again and again.
-    let samples_max = unpacked_max(path.size_bytes()?) / VALUE_BYTES;
+    // A list of blocks may name the same compressed block many times.
+    let samples_max = max_unpacked_bytes(path.size_bytes()?) / VALUE_BYTES;
     let (mut left_out, mut without_clock, mut has_frames) = (0usize, 0usize, false);
     for (index, group) in log.file.data_groups().iter().flat_map(|data| &data.channel_groups).enumerate() {
         let is_frame = |channel: &Channel| FRAMES.iter().any(|frame| channel.name.starts_with(frame));
@@ -96,10 +92,10 @@ fn open(path: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
                 "a group states {} samples; a file of this size may have {samples_max}",
                 group.sample_count
             );
-            return Err(path.content(NAME, message));
+            return Err(path.content_error(NAME, message));
         }
         let number = log.layout.groups.len();
-        log.layout.groups.push(Group { name: name_of(group, index), clock: clock_words(clock) });
+        log.layout.groups.push(Group { name: name_of(group, index), clock: describe_clock(clock) });
         let mut names: BTreeSet<String> = BTreeSet::new();
         for channel in &columns {
             log.layout.columns.push(Column {
@@ -120,24 +116,24 @@ fn open(path: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
         findings.push(UNDECODED.to_owned());
     }
     if left_out > 0 {
-        findings.push(format!("{left_out} channels are left out: texts, arrays, or not readable"));
+        findings.push(format!("{left_out} channels were left out: texts, arrays, or unreadable"));
     }
     if without_clock > 0 {
         findings.push(format!(
-            "{without_clock} channels are left out: their groups have no clock; name one with `time`"
+            "{without_clock} channels were left out: their groups have no clock; name one with `time`"
         ));
     }
     log.layout.start_time_ns = u64::try_from(log.file.start_time().timestamp_ns).ok().filter(|ns| *ns > 0);
     if log.layout.groups.is_empty() {
-        let without_clock = "it holds no group of numbers with a clock; name the clock's channel with `time`";
-        return Err(path.content(NAME, if has_frames { UNDECODED } else { without_clock }));
+        let without_clock = "it has no group of numbers with a clock; name the clock's channel with `time`";
+        return Err(path.content_error(NAME, if has_frames { UNDECODED } else { without_clock }));
     }
     Ok(Box::new(log))
 }
 
 /// Channels of undecoded frames (ASAM MDF, bus logging): their numbers are identifiers and bytes.
 const FRAMES: [&str; 5] = ["CAN_DataFrame", "CAN_RemoteFrame", "LIN_Frame", "FLX_Frame", "ETH_Frame"];
-const UNDECODED: &str = "it holds frames of a bus (CAN, LIN, FlexRay, Ethernet) that are not decoded and have no signals: decode them with the database \
+const UNDECODED: &str = "it contains frames of a bus (CAN, LIN, FlexRay, Ethernet) that are not decoded and have no signals: decode them with the database \
      of the bus (DBC, ARXML) in the measuring program, or with asammdf (`MDF(FILE).extract_bus_logging({\"CAN\": [(DBC, 0)]}).save(NEW)`)";
 
 fn name_of(group: &ChannelGroup, index: usize) -> String {
@@ -154,7 +150,7 @@ fn unit_s(clock: &Channel) -> Option<f64> {
     Some(Kind::Duration.unit(clock.unit.trim())?.to_inside(1.0))
 }
 
-fn clock_words(clock: &Channel) -> String {
+fn describe_clock(clock: &Channel) -> String {
     let unit = clock.unit.trim();
     if unit.is_empty() { format!("`{}`", clock.name) } else { format!("`{}`, counts {unit}", clock.name) }
 }
@@ -170,7 +166,7 @@ fn distinct(names: &mut BTreeSet<String>, name: &str) -> String {
     distinct
 }
 
-/// Gives groups distinct names; a single group needs none.
+/// Makes the names of groups distinct; a single group has none.
 fn distinct_names(layout: &mut Layout) {
     if let [only] = layout.groups.as_mut_slice() {
         only.name = String::new();
@@ -191,7 +187,7 @@ impl Log for Mdf4 {
     }
 
     fn rows(&mut self, wanted: &[usize], sink: &mut RowSink<'_>) -> Result<(), LogError> {
-        let failed = |error: falcon_mdf::error::Mf4Error| self.path.content(NAME, error.to_string());
+        let failed = |error: falcon_mdf::error::Mf4Error| self.path.content_error(NAME, error.to_string());
         for (group, (master, unit_s)) in self.masters.iter().enumerate() {
             let mut channels: Vec<&Channel> = vec![master];
             let of_group = |column: &&usize| {

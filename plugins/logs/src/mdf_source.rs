@@ -1,10 +1,10 @@
-//! The bytes of an MDF file for a library that trusts them: formulas without towers, and no more unpacked data than a file justifies.
+//! Protects the MDF library from hostile files: limits the nesting of formulas and the unpacked size.
 
 use falcon_mdf::error::{Mf4Error, Result};
 use falcon_mdf::io::memory::MemorySource;
 use falcon_mdf::io::reader::BufferedSource;
 use falcon_mdf::io::{ByteSlice, ByteSource};
-use mapper_recording::logs::limits::{BLOCK_BYTES, is_too_deep, unpacked_max};
+use mapper_recording::logs::limits::{MAX_BLOCK_BYTES, is_too_deep, max_unpacked_bytes};
 use mapper_recording::logs::{LogError, LogFile};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
@@ -20,12 +20,11 @@ const FORMULA: [[u8; 2]; 2] = [[10, 0], [0, 10]];
 /// The file as the library reads it.
 pub(crate) struct MdfSource {
     inner: Box<dyn ByteSource>,
-    /// Unpacked size of each packed block that was read, bytes, by its place.
+    /// Unpacked size of each compressed block that was read, bytes, by its offset.
     unpacked: Mutex<BTreeMap<u64, u64>>,
 }
 
 impl MdfSource {
-    /// Opens a file.
     pub(crate) fn open(
         file: &LogFile,
         name: &'static str,
@@ -33,7 +32,8 @@ impl MdfSource {
         let inner: Box<dyn ByteSource> = match file.bytes() {
             Some(bytes) => Box::new(MemorySource::new(bytes.to_vec())),
             None => Box::new(
-                BufferedSource::open(file.path()).map_err(|error| file.content(name, error.to_string()))?,
+                BufferedSource::open(file.path())
+                    .map_err(|error| file.content_error(name, error.to_string()))?,
             ),
         };
         Ok(Arc::new(MdfSource { inner, unpacked: Mutex::default() }))
@@ -47,14 +47,14 @@ impl MdfSource {
                 limit >> 20
             ))
         };
-        if unpacked_bytes > BLOCK_BYTES {
+        if unpacked_bytes > MAX_BLOCK_BYTES {
             return Err(Mf4Error::Decompression(format!(
                 "a block unpacks to {} MiB; at most {} are read",
                 unpacked_bytes >> 20,
-                BLOCK_BYTES >> 20
+                MAX_BLOCK_BYTES >> 20
             )));
         }
-        let limit = unpacked_max(self.inner.len());
+        let limit = max_unpacked_bytes(self.inner.len());
         let Ok(mut unpacked) = self.unpacked.lock() else { return Err(refused(limit)) };
         unpacked.insert(offset, unpacked_bytes);
         let total = unpacked.values().fold(0u64, |total, bytes| total.saturating_add(*bytes));
@@ -73,7 +73,7 @@ impl ByteSource for MdfSource {
             self.count(offset, size)?;
         }
         match text_start(&bytes) {
-            // Without its text, a conversion is unknown and its channel is left out; a comment is lost.
+            // Without its text a conversion is unknown, so its channel is left out; a comment would just be lost.
             Some(start) if bytes.get(start..).is_some_and(is_too_deep) => {
                 let mut bytes = bytes.into_owned();
                 bytes.iter_mut().skip(start).for_each(|byte| *byte = 0);
@@ -90,7 +90,7 @@ fn packed_size(bytes: &[u8]) -> Option<u64> {
     Some(u64::from_le_bytes(size.try_into().ok()?))
 }
 
-/// Where the text of a block begins that may be a formula.
+/// Start of the text of a block that may contain a formula.
 fn text_start(bytes: &[u8]) -> Option<usize> {
     let is_text = bytes.starts_with(b"##TX") && bytes.len() > HEADER;
     let kind = bytes.get(42..44).filter(|_| bytes.starts_with(b"CC") && bytes.len() > CONVERSION_HEADER);

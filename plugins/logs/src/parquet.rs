@@ -2,13 +2,12 @@
 
 use crate::tables::record_batches::{Batches, open_log};
 use arrow_schema::Schema;
-use mapper_recording::logs::limits::unpacked_max;
+use mapper_recording::logs::limits::max_unpacked_bytes;
 use mapper_recording::logs::{Log, LogError, LogFile, LogFormat, LogOptions};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::errors::ParquetError;
 use std::fs::File;
 
-/// The format.
 pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
 
 const NAME: &str = "Parquet";
@@ -28,14 +27,14 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
 }
 
 fn batches(file: &LogFile) -> Result<(Schema, Batches), LogError> {
-    let most = unpacked_max(file.size_bytes()?);
-    let failed = |error: ParquetError| file.content(NAME, error.to_string());
+    let most = max_unpacked_bytes(file.size_bytes()?);
+    let failed = |error: ParquetError| file.content_error(NAME, error.to_string());
     macro_rules! reader_of {
         ($source:expr) => {{
             let builder = ParquetRecordBatchReaderBuilder::try_new($source).map_err(failed)?;
             let rows = u64::try_from(builder.metadata().file_metadata().num_rows()).unwrap_or(u64::MAX);
             if rows.saturating_mul(VALUE_BYTES) > most {
-                return Err(file.content(
+                return Err(file.content_error(
                     NAME,
                     format!("it states {rows} rows; a file of this size may have {}", most / VALUE_BYTES),
                 ));
@@ -47,6 +46,6 @@ fn batches(file: &LogFile) -> Result<(Schema, Batches), LogError> {
     }
     Ok(match file.bytes() {
         Some(bytes) => reader_of!(bytes::Bytes::copy_from_slice(bytes)),
-        None => reader_of!(File::open(file.path()).map_err(|error| file.error(error))?),
+        None => reader_of!(File::open(file.path()).map_err(|error| file.read_error(error))?),
     })
 }

@@ -1,30 +1,27 @@
 //! TDMS: the files of LabVIEW and of National Instruments' loggers. Each group is a table; waveform channels have their own rate.
 
-use crate::columns::table_head::COLUMN_LIMIT;
+use crate::columns::sample::HEAD_ROWS;
+use crate::columns::table_head::MAX_COLUMNS;
 use crate::notation::instant::Instant;
 use crate::tables::column_rows::{Chunk, Chunks, ColumnRows};
-use crate::tables::several_tables::{Part, side_by_side};
+use crate::tables::joined_tables::{Part, join_tables};
 use crate::tables::table_log::{Origin, Table};
 use mapper_recording::logs::{Layout, Log, LogError, LogFile, LogFormat, LogOptions, ReadSeek, Row, RowSink};
 use std::io::{Seek as _, SeekFrom};
 use tedium::{ChannelPath, PropertyPath, PropertyValue, TdmsError, TdmsFile, TdmsStorageType};
 
-/// The format.
 pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
 
 const NAME: &str = "TDMS";
 
-/// Number of rows of a group in the sample.
-const HEAD_ROWS: usize = 400;
-
 /// Maximum number of values in memory: 32 MiB.
-const VALUES_AT_ONCE: usize = 1 << 22;
+const MAX_BUFFERED_VALUES: usize = 1 << 22;
 
 /// Days from LabVIEW's origin, 1904-01-01, to 1970-01-01.
 const EPOCH_DAYS: i64 = 24_107;
 
-/// Permitted days, which 64 bits hold as nanoseconds: 1970 to 2200.
-const DAYS: std::ops::Range<i64> = 0..84_000;
+/// Valid days, 1970 to 2200, which fit into 64 bits as nanoseconds.
+const VALID_DAYS: std::ops::Range<i64> = 0..84_000;
 
 fn recognises(head: &[u8]) -> bool {
     head.starts_with(b"TDSm")
@@ -33,10 +30,10 @@ fn recognises(head: &[u8]) -> bool {
 /// Date and time of day from the file's form: seconds since 1904 and a fraction of one in 2^-64.
 fn instant((seconds, fraction): (i64, u64)) -> Option<Instant> {
     let day = seconds.div_euclid(86_400).checked_sub(EPOCH_DAYS)?;
-    // The fraction in nanoseconds: smaller parts are lost in every f64 of a date.
+    // Nanoseconds: an f64 of a date has no finer resolution.
     let ns = (u128::from(fraction) * 1_000_000_000) >> 64;
     let ns_of_day = seconds.rem_euclid(86_400) * 1_000_000_000 + i64::try_from(ns).ok()?;
-    DAYS.contains(&day).then_some(Instant { day: Some(day), ns_of_day: Some(ns_of_day) })
+    VALID_DAYS.contains(&day).then_some(Instant { day: Some(day), ns_of_day: Some(ns_of_day) })
 }
 
 type Source = TdmsFile<Box<dyn ReadSeek>>;
@@ -56,7 +53,7 @@ fn numbers<T: TdmsStorageType + Copy + Default>(
     Ok(Chunk::Numbers(values.into_iter().map(number).collect()))
 }
 
-/// One for each supported type, with the bytes of a value.
+/// A reader for each supported type, with the size of a value, bytes.
 const READERS: [(u64, ReadValues); 11] = [
     (8, |s, p, from, n| numbers::<f64>(s, p, from, n, |v| v)),
     (4, |s, p, from, n| numbers::<f32>(s, p, from, n, f64::from)),
@@ -72,7 +69,6 @@ const READERS: [(u64, ReadValues); 11] = [
     (1, |s, p, from, n| numbers::<bool>(s, p, from, n, |v| f64::from(u8::from(v)))),
 ];
 
-/// A supported channel.
 struct Channel {
     path: ChannelPath,
     unit: String,
@@ -94,16 +90,15 @@ struct Tdms {
     layout: Layout,
     source: Source,
     parts: Vec<Part>,
-    /// The channels of each part.
     channels: Vec<Vec<Channel>>,
 }
 
 fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
     options
-        .only(&["time", "time_unit", "date_order", "rate", "missing"])
-        .map_err(|why| file.content(NAME, why))?;
+        .allow_only(&["time", "time_unit", "date_order", "rate", "missing"])
+        .map_err(|why| file.content_error(NAME, why))?;
     let mut bytes = file.open()?;
-    let size = bytes.seek(SeekFrom::End(0)).map_err(|error| file.error(error))?;
+    let size = bytes.seek(SeekFrom::End(0)).map_err(|error| file.read_error(error))?;
     let mut source = TdmsFile::new(bytes).map_err(|error| failed(file, &error))?;
     let names: Vec<String> = source.list_groups().map(plain).collect();
     let (mut found, mut problems, mut channels) = (Vec::new(), Vec::new(), Vec::new());
@@ -111,39 +106,40 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
     for name in &names {
         let paths: Vec<ChannelPath> = source.list_channels_in_group(&PropertyPath::group(name)).collect();
         seen += paths.len();
-        if seen > COLUMN_LIMIT {
-            return Err(file.content(NAME, format!("it has more than {COLUMN_LIMIT} channels")));
+        if seen > MAX_COLUMNS {
+            return Err(file.content_error(NAME, format!("it has more than {MAX_COLUMNS} channels")));
         }
         let mut of_group: Vec<Channel> = Vec::new();
         for path in paths {
             match channel(&mut source, path, size) {
                 Ok(Some(channel)) => of_group.push(channel),
                 Ok(None) => empty += 1,
-                Err(why) => return Err(file.content(NAME, why)),
+                Err(why) => return Err(file.content_error(NAME, why)),
             }
         }
         for channels_of in by_clock(of_group, options) {
             let waveform = channels_of.first().and_then(|channel| channel.waveform);
             let several = found.iter().any(|(other, _): &(String, Table)| other.starts_with(name.as_str()));
             let title = if several { format!("{name} ({})", found.len() + 1) } else { name.clone() };
-            match look(file, &mut source, &channels_of, waveform, options)? {
+            match analyse_table(file, &mut source, &channels_of, waveform, options)? {
                 Ok(table) => {
                     found.push((title, table));
                     channels.push(channels_of);
                 }
-                Err(problem) => problems.push(format!("group `{title}` is passed over: {problem}")),
+                Err(problem) => problems.push(format!("group `{title}` was skipped: {problem}")),
             }
         }
     }
     if empty > 0 {
-        problems.push(format!("{empty} channels are left out: they are empty"));
+        problems.push(format!("{empty} channels were left out: they are empty"));
     }
-    let (layout, parts) = side_by_side("group", found, problems).map_err(|why| file.content(NAME, why))?;
+    let (layout, parts) =
+        join_tables("group", found, problems).map_err(|why| file.content_error(NAME, why))?;
     Ok(Box::new(Tdms { file: file.clone(), layout, source, parts, channels }))
 }
 
 fn failed(file: &LogFile, error: &TdmsError) -> LogError {
-    file.content(NAME, error.to_string())
+    file.content_error(NAME, error.to_string())
 }
 
 /// A name without the file's doubled quotes.
@@ -159,10 +155,10 @@ fn channel(source: &mut Source, path: ChannelPath, file_bytes: u64) -> Result<Op
     else {
         let name = path.channel_name();
         return Err(format!(
-            "channel `{name}` holds no plain numbers (dates, say): leave it out of the file, or export it as CSV or MDF 4"
+            "channel `{name}` does not contain plain numbers (e.g. dates): remove it from the file, or export the file as CSV or MDF 4"
         ));
     };
-    // A damaged file declares more values than it has bytes; missing ones would be read as zeros.
+    // A damaged file may declare more values than it has bytes, and the missing ones would be read as zeros.
     if length > file_bytes / value_bytes {
         return Err(format!(
             "channel `{}` has {length} values in a file of {file_bytes} bytes",
@@ -211,8 +207,7 @@ fn by_clock(channels: Vec<Channel>, options: &LogOptions) -> Vec<Vec<Channel>> {
     groups
 }
 
-/// The table of some channels, or why it cannot be made.
-fn look(
+fn analyse_table(
     file: &LogFile,
     source: &mut Source,
     channels: &[Channel],
@@ -227,7 +222,7 @@ fn look(
     let head = ColumnRows::new(head(channels), GroupChunks::new(file, source, channels, HEAD_ROWS))
         .texts(HEAD_ROWS)?;
     let origin = if waveform.is_some() { Origin::Waveform } else { Origin::Columns };
-    let mut table = match Table::look(&head, b'.', &options, origin) {
+    let mut table = match Table::analyse(&head, b'.', &options, origin) {
         Ok(table) => table,
         Err(problem) => return Ok(Err(problem)),
     };
@@ -261,9 +256,9 @@ impl Log for Tdms {
             if own.is_empty() {
                 continue;
             }
-            let at_once = (VALUES_AT_ONCE / channels.len().max(1)).max(1);
+            let at_once = (MAX_BUFFERED_VALUES / channels.len().max(1)).max(1);
             let chunks = GroupChunks::new(&self.file, &mut self.source, channels, at_once);
-            let mut of_file = |row: Row<'_>| part.give(row, sink);
+            let mut of_file = |row: Row<'_>| part.forward_row(row, sink);
             let mut rows = ColumnRows::new(head(channels), chunks);
             self.layout.add_finding(part.table.rows(&mut rows, &own, &mut of_file)?);
         }

@@ -1,39 +1,36 @@
-//! Excel workbooks: a table on each sheet.
+//! Excel workbooks, with a table on each sheet.
 
 mod check;
 
-use crate::columns::table_head::COLUMN_LIMIT;
+use crate::columns::sample::HEAD_ROWS;
+use crate::columns::table_head::MAX_COLUMNS;
 use crate::notation::instant::{Instant, NS_PER_DAY};
 use crate::notation::number::number_in;
 use crate::notation::separator::decimal;
 use crate::notation::table_row::{Cells, Rows};
 use crate::notation::typed_cell::Value;
-use crate::tables::several_tables::{Part, side_by_side};
+use crate::tables::joined_tables::{Part, join_tables};
 use crate::tables::table_log::{Origin, Table};
 use calamine::{DataRef, DataType, Reader, SheetVisible, Xlsx};
 use mapper_recording::logs::{
     DateOrder, Layout, Log, LogError, LogFile, LogFormat, LogOptions, ReadSeek, Row, RowSink,
 };
 
-/// The format.
 pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
 
 const NAME: &str = "Excel";
 
-/// Number of rows of a sheet in the sample.
-const HEAD_ROWS: usize = 400;
-
-/// Maximum text in its first rows, bytes.
+/// Maximum size of the text in the sample, bytes.
 const HEAD_BYTES: usize = 1 << 24;
 
 /// Maximum stored length of a cell's text, bytes: a name, a unit or a date is shorter.
-const TEXT_LIMIT: usize = 1 << 10;
+const MAX_TEXT_BYTES: usize = 1 << 10;
 
 /// Days from the origin of Excel's dates to 1970-01-01.
 const EXCEL_EPOCH_DAYS: i64 = 25_569;
 
 /// Maximum date of a log in days since Excel's origin: the year 2200.
-const LAST_DAY: f64 = 109_940.0;
+const MAX_DAY: f64 = 109_940.0;
 
 /// A zip file with the parts of a workbook, or a compound file; their contents are checked when it is opened.
 fn recognises(head: &[u8]) -> bool {
@@ -51,11 +48,10 @@ struct Workbook {
     decimals: Vec<u8>,
 }
 
-/// A workbook.
 enum Book {
-    /// Of Excel 2007 and later, read cell by cell.
+    /// Excel 2007 and later, read cell by cell.
     Xlsx(Box<Xlsx<Box<dyn ReadSeek>>>),
-    /// Of Excel 97 to 2003, whose sheets are small enough for the memory.
+    /// Excel 97 to 2003, whose sheets fit into the memory.
     Xls(Vec<mapper_workbook::Sheet>),
 }
 
@@ -65,12 +61,14 @@ type NextCell<'a> = Box<dyn FnMut() -> Result<Option<(u32, usize, Value)>, LogEr
 impl Book {
     fn open(file: &LogFile) -> Result<Book, LogError> {
         if file.head(mapper_workbook::MAGIC.len())? == mapper_workbook::MAGIC {
-            let sheets = mapper_workbook::read_xls(file.open()?).map_err(|why| file.content(NAME, why))?;
+            let sheets =
+                mapper_workbook::read_xls(file.open()?).map_err(|why| file.content_error(NAME, why))?;
             return Ok(Book::Xls(sheets));
         }
         check::check(file)?;
         let book = Xlsx::new(file.open()?);
-        book.map(|book| Book::Xlsx(Box::new(book))).map_err(|error| file.content(NAME, error.to_string()))
+        book.map(|book| Book::Xlsx(Box::new(book)))
+            .map_err(|error| file.content_error(NAME, error.to_string()))
     }
 
     /// Names of all sheets, and whether they are hidden.
@@ -95,7 +93,8 @@ impl Book {
                     if ended {
                         return Ok(None);
                     }
-                    let cell = reader.next_cell().map_err(|error| file.content(NAME, error.to_string()))?;
+                    let cell =
+                        reader.next_cell().map_err(|error| file.content_error(NAME, error.to_string()))?;
                     ended = cell.is_none();
                     Ok(cell.map(|cell| {
                         let (row, column) = cell.get_position();
@@ -121,14 +120,15 @@ impl Book {
 }
 
 fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
-    options.without(&["separator", "decimal", "encoding"]).map_err(|why| file.content(NAME, why))?;
+    options
+        .refuse_keys(&["separator", "decimal", "encoding"])
+        .map_err(|why| file.content_error(NAME, why))?;
     let mut book = Book::open(file)?;
     let sheets = book.sheets();
     let names: Vec<&str> = sheets.iter().map(|(name, _)| name.as_str()).collect();
     if let Some(sheet) = options.sheet.as_ref().filter(|sheet| !names.contains(&sheet.as_str())) {
-        return Err(
-            file.content(NAME, format!("it has no sheet `{sheet}`; its sheets are {}", names.join(", ")))
-        );
+        return Err(file
+            .content_error(NAME, format!("it has no sheet `{sheet}`; its sheets are {}", names.join(", "))));
     }
     let is_wanted = |name: &str, of_hidden: bool, is_hidden: bool| match &options.sheet {
         Some(sheet) => sheet == name,
@@ -138,7 +138,7 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
     let mut problems: Vec<String> = Vec::new();
     let hidden: Vec<&str> =
         sheets.iter().filter(|(_, hidden)| *hidden).map(|(name, _)| name.as_str()).collect();
-    // A hidden sheet may hold an earlier state of the data: it is read if it is named, or if no visible one has a table.
+    // A hidden sheet may have obsolete data: it is read only if it is named, or no visible one has a table.
     for of_hidden in [false, true] {
         if !found.is_empty() {
             break;
@@ -147,7 +147,7 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
             let Some(cells) = book.cells(file, name) else { continue };
             match head_of(SheetRows::new(cells, b'.'), options)? {
                 Some(Ok((table, decimal))) => found.push((name.clone(), table, decimal)),
-                Some(Err(problem)) => problems.push(format!("sheet `{name}` is passed over: {problem}")),
+                Some(Err(problem)) => problems.push(format!("sheet `{name}` was skipped: {problem}")),
                 None => {}
             }
         }
@@ -162,20 +162,21 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
     if let (None, false) = (&options.sheet, hidden.is_empty()) {
         let is_read = found.iter().any(|(name, ..)| hidden.contains(&name.as_str()));
         problems.push(match is_read {
-            true => format!("hidden: {}; read since no visible sheet has a table", hidden.join(", ")),
+            true => format!("hidden: {}; read because no visible sheet has a table", hidden.join(", ")),
             false => format!("hidden, and read only if named by `sheet`: {}", hidden.join(", ")),
         });
     }
     let decimals = found.iter().map(|(.., decimal)| *decimal).collect();
     let found = found.into_iter().map(|(name, table, _)| (name, table)).collect();
-    let (layout, sheets) = side_by_side("sheet", found, problems).map_err(|why| file.content(NAME, why))?;
+    let (layout, sheets) =
+        join_tables("sheet", found, problems).map_err(|why| file.content_error(NAME, why))?;
     Ok(Box::new(Workbook { file: file.clone(), layout, sheets, decimals }))
 }
 
 /// The table of a sheet and the decimal sign of its texts, or why there is none; `None` for an empty sheet.
-type Found = Option<Result<(Table, u8), String>>;
+type SheetHead = Option<Result<(Table, u8), String>>;
 
-fn head_of(mut rows: SheetRows<'_>, options: &LogOptions) -> Result<Found, LogError> {
+fn head_of(mut rows: SheetRows<'_>, options: &LogOptions) -> Result<SheetHead, LogError> {
     let mut cells: Vec<Vec<Value>> = Vec::new();
     let mut bytes = 0;
     while cells.len() < HEAD_ROWS && bytes < HEAD_BYTES && rows.advance()? {
@@ -192,7 +193,7 @@ fn head_of(mut rows: SheetRows<'_>, options: &LogOptions) -> Result<Found, LogEr
     let (decimal, _) = decimal(&cells.iter().map(texts).collect::<Vec<Vec<String>>>());
     let head: Vec<Vec<String>> =
         cells.iter().map(|row| row.iter().map(|cell| cell.text(decimal)).collect()).collect();
-    let table = Table::look(&head, decimal, options, Origin::Rows);
+    let table = Table::analyse(&head, decimal, options, Origin::Rows);
     Ok(Some(table.map(|mut table| {
         note_empty_columns(&mut table, &head);
         (table, decimal)
@@ -212,7 +213,7 @@ impl Log for Workbook {
                 continue;
             }
             let Some(cells) = book.cells(&self.file, &sheet.name) else { continue };
-            let mut of_book = |row: Row<'_>| sheet.give(row, sink);
+            let mut of_book = |row: Row<'_>| sheet.forward_row(row, sink);
             let mut rows = SheetRows::new(cells, *decimal);
             self.layout.add_finding(sheet.table.rows(&mut rows, &own, &mut of_book)?);
         }
@@ -220,7 +221,7 @@ impl Log for Workbook {
     }
 }
 
-/// Remarks columns with a name and no value: formulas that were never calculated.
+/// Adds a remark about columns with a name and no value, i.e. formulas that were never calculated.
 fn note_empty_columns(table: &mut Table, head: &[Vec<String>]) {
     let empty = |column: usize| {
         head.iter().skip(table.data_row()).all(|row| row.get(column).is_none_or(String::is_empty))
@@ -233,13 +234,12 @@ fn note_empty_columns(table: &mut Table, head: &[Vec<String>]) {
     let names: Vec<String> = names.map(|(_, name)| format!("`{name}`")).collect();
     if !names.is_empty() {
         table.layout.findings.push(format!(
-            "{} without a value: formulas have none until a spreadsheet program has calculated and saved them",
+            "{} without a value: formulas have values only after a spreadsheet program has calculated and saved them",
             names.join(", ")
         ));
     }
 }
 
-/// A cell of a sheet.
 fn value_of(data: &DataRef<'_>) -> Value {
     match data {
         DataRef::DateTime(date) => instant(date.as_f64()),
@@ -254,7 +254,7 @@ fn value_of(data: &DataRef<'_>) -> Value {
 /// The stored start of a text.
 fn start(text: &str) -> String {
     let text = text.trim();
-    text.get(..text.floor_char_boundary(TEXT_LIMIT)).unwrap_or_default().to_owned()
+    text.get(..text.floor_char_boundary(MAX_TEXT_BYTES)).unwrap_or_default().to_owned()
 }
 
 fn instant(days: f64) -> Value {
@@ -263,10 +263,10 @@ fn instant(days: f64) -> Value {
 
 /// Excel's days since its origin; a value below one is a time of day.
 fn instant_of(days: f64) -> Option<Instant> {
-    if !(0.0..LAST_DAY).contains(&days) {
+    if !(0.0..MAX_DAY).contains(&days) {
         return None;
     }
-    // To the microsecond: present-day dates have no finer resolution.
+    // To the microsecond, the resolution of an f64 of a present-day date.
     let ns_of_day = ((days.fract() * NS_PER_DAY as f64) / 1e3).round() as i64 * 1000;
     let day = (days >= 1.0).then_some(days.trunc() as i64 - EXCEL_EPOCH_DAYS);
     Some(Instant { day, ns_of_day: Some(ns_of_day) })
@@ -302,7 +302,7 @@ impl Cells for SheetRows<'_> {
     fn number_in(&self, column: usize, unit: &str) -> f64 {
         match self.row.get(column) {
             Some(Value::Text(text)) => number_in(text, self.decimal, unit),
-            // Some cells of such a column may hold the number alone.
+            // Some cells of such a column may have the number without the unit.
             Some(value) => value.number(self.decimal),
             None => f64::NAN,
         }
@@ -322,7 +322,7 @@ impl Rows for SheetRows<'_> {
                 self.next = Some((row, column, value));
                 break;
             }
-            if value.is_empty() || column > COLUMN_LIMIT {
+            if value.is_empty() || column > MAX_COLUMNS {
                 continue;
             }
             current = Some(row);

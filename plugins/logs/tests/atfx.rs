@@ -91,7 +91,7 @@ fn atfx(binary: &str) -> String {
 
 fn open(path: &Path, text: &str) -> Result<Vec<(f64, Vec<f64>)>, LogError> {
     std::fs::write(path, text).unwrap();
-    let (format, mut log) = LOG_FORMATS.open(&LogFile::of_path(path), &LogOptions::default())?;
+    let (format, mut log) = LOG_FORMATS.open(&LogFile::from_path(path), &LogOptions::default())?;
     assert_eq!(format.name, "ATFX");
     let units: Vec<Option<&str>> = log.layout().columns.iter().map(|column| column.unit.as_deref()).collect();
     assert_eq!(units[..2], [Some("kPa"), Some("degC")]);

@@ -70,7 +70,7 @@ fn units_that_contradict_the_log_are_reported_and_gauge_units_need_the_word() {
     assert_eq!(channels, [Channel::T2]);
     let error = read(&log(10), "channels:\n  P1: {field: p1}\n").unwrap_err().to_string();
     let error = error.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(error.contains("over the ambient pressure") && error.contains("gauge: true"), "{error}");
+    assert!(error.contains("a gauge pressure") && error.contains("gauge: true"), "{error}");
 }
 
 #[test]
@@ -124,8 +124,8 @@ fn a_measured_valve_position_keeps_the_steps_and_says_so() {
 fn what_a_pressure_is_measured_from_is_not_overruled_by_its_unit() {
     for (header, source, remedy) in [
         ("p2 [bar rel]", "{field: p2, unit: bar}", "write `gauge: true`"),
-        ("p2 [bar abs]", "{field: p2, unit: bar, gauge: true}", "leave `gauge: true` out"),
-        ("p2 [bar abs]", "{field: p2, gauge: true}", "leave `gauge: true` out"),
+        ("p2 [bar abs]", "{field: p2, unit: bar, gauge: true}", "delete `gauge: true`"),
+        ("p2 [bar abs]", "{field: p2, gauge: true}", "delete `gauge: true`"),
         ("p2 [bar rel]", "{field: p2, unit: bar, gauge: true}", ""),
         ("p2 [bar]", "{field: p2, unit: bar, gauge: true}", ""),
         ("p2 [bar]", "{field: p2, unit: bar}", ""),

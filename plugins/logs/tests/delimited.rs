@@ -11,7 +11,7 @@ type Read = (Layout, Vec<Vec<(f64, Vec<f64>)>>);
 fn read_with(bytes: &[u8], options: &[(&str, &str)]) -> Result<Read, String> {
     let mut by = LogOptions::default();
     options.iter().for_each(|(key, value)| by.set(key, value).unwrap());
-    let file = LogFile::of_bytes(Path::new("log"), bytes);
+    let file = LogFile::from_bytes(Path::new("log"), bytes);
     let (_, mut log) = LOG_FORMATS.open(&file, &by).map_err(|error| error.to_string())?;
     let layout = log.layout().clone();
     let wanted: Vec<usize> = (0..layout.columns.len()).collect();

@@ -362,7 +362,7 @@ fn what_is_called_sure_is_right() {
                 text += &format!(";{:.5}", unit_of(*holds).1(value(*holds, noisy).1));
             }
         }
-        let file = LogFile::of_bytes(Path::new("log"), text.as_bytes());
+        let file = LogFile::from_bytes(Path::new("log"), text.as_bytes());
         let (_, mut log) = LOG_FORMATS.open(&file, &LogOptions::default()).unwrap();
         let survey = survey(log.as_mut()).unwrap();
         let proposal = propose(log.layout(), &survey, None);

@@ -11,7 +11,7 @@ use std::sync::OnceLock;
 
 /// Does everything that `mapper log inspect` does with a file.
 pub(crate) fn look(bytes: &[u8]) {
-    let file = LogFile::of_bytes(Path::new("log"), bytes);
+    let file = LogFile::from_bytes(Path::new("log"), bytes);
     let Ok((_, mut log)) = LOG_FORMATS.open(&file, &LogOptions::default()) else { return };
     let Ok(found) = survey(log.as_mut()) else { return };
     let layout = log.layout().clone();
@@ -148,7 +148,7 @@ fn files() -> &'static [Vec<u8>; 3] {
 #[test]
 fn the_files_themselves_are_read() {
     for (bytes, name) in files().iter().zip(["CSV", "MDF4", "Excel"]) {
-        let file = LogFile::of_bytes(Path::new("log"), bytes);
+        let file = LogFile::from_bytes(Path::new("log"), bytes);
         let (format, mut log) = LOG_FORMATS.open(&file, &LogOptions::default()).unwrap();
         assert_eq!(format.name, name);
         let found = survey(log.as_mut()).unwrap();
@@ -168,7 +168,7 @@ fn every_truncation_ends() {
 
 /// Why a file is refused.
 fn refusal(bytes: &[u8]) -> String {
-    let file = LogFile::of_bytes(Path::new("log"), bytes);
+    let file = LogFile::from_bytes(Path::new("log"), bytes);
     LOG_FORMATS.open(&file, &LogOptions::default()).err().expect("refused").to_string()
 }
 
@@ -179,7 +179,7 @@ fn a_formula_of_a_hundred_thousand_levels_costs_its_channel_alone() {
     let deep = |open: &str, close: &str| format!("{}X{}", open.repeat(100_000), close.repeat(100_000));
     for formula in [deep("(", ")"), deep("-", ""), deep("abs(", ")"), deep("X+", ""), deep("2^", "")] {
         let bytes = with_formula(plain.clone(), "T2", &formula);
-        let file = LogFile::of_bytes(Path::new("log"), &bytes);
+        let file = LogFile::from_bytes(Path::new("log"), &bytes);
         let (_, mut log) = LOG_FORMATS.open(&file, &LogOptions::default()).unwrap();
         let names: Vec<String> = log.layout().columns.iter().map(|column| column.name.clone()).collect();
         assert_eq!(names, ["n_TC"]);
@@ -191,7 +191,7 @@ fn a_formula_of_a_hundred_thousand_levels_costs_its_channel_alone() {
 #[test]
 fn a_usual_formula_is_applied() {
     let bytes = with_formula(mdf4(), "T2", "((2*X+1)*X)^2");
-    let file = LogFile::of_bytes(Path::new("log"), &bytes);
+    let file = LogFile::from_bytes(Path::new("log"), &bytes);
     let (_, mut log) = LOG_FORMATS.open(&file, &LogOptions::default()).unwrap();
     let found = survey(log.as_mut()).unwrap();
     // 4.9 s are the last sample.
@@ -213,7 +213,7 @@ fn bombs_are_refused_before_they_unpack() {
     writer.write(&mut packed).unwrap();
     let block = (0..packed.len()).find(|at| packed[*at..].starts_with(b"##DZ")).unwrap();
     let read = |bytes: &[u8]| -> Result<(), mapper_recording::logs::LogError> {
-        let file = LogFile::of_bytes(Path::new("log"), bytes);
+        let file = LogFile::from_bytes(Path::new("log"), bytes);
         survey(LOG_FORMATS.open(&file, &LogOptions::default())?.1.as_mut()).map(drop)
     };
     read(&packed).unwrap();
@@ -241,7 +241,7 @@ fn a_pipe_in_the_place_of_a_log_is_refused() {
     let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
     assert!(made.success());
     for path in [pipe.as_path(), Path::new("/dev/zero"), folder.path()] {
-        let error = LOG_FORMATS.open(&LogFile::of_path(path), &LogOptions::default()).err().unwrap();
+        let error = LOG_FORMATS.open(&LogFile::from_path(path), &LogOptions::default()).err().unwrap();
         assert!(matches!(error, mapper_recording::logs::LogError::Read { .. }), "{error}");
     }
 }
@@ -259,7 +259,7 @@ fn a_workbook_that_claims_more_strings_than_it_has_room_for_is_refused() {
 fn a_long_shared_string_is_cut_where_it_is_used() {
     let strings = SHARED_STRINGS.replace("T2 [degC]", &format!("T2 [degC] {}", "long ".repeat(1 << 18)));
     let bytes = workbook(&parts(HEADER, &strings));
-    let file = LogFile::of_bytes(Path::new("log"), &bytes);
+    let file = LogFile::from_bytes(Path::new("log"), &bytes);
     let (_, log) = LOG_FORMATS.open(&file, &LogOptions::default()).unwrap();
     let header = &log.layout().columns[0].header;
     assert!(header.starts_with("T2") && header.len() <= 1024, "{} bytes", header.len());
@@ -295,7 +295,7 @@ fn parts_that_share_their_bytes_and_parts_without_end_are_refused() {
 fn a_quote_that_is_never_closed_does_not_swallow_the_file() {
     let mut text = String::from("t [s];T2 [degC]\n0;20\n1;21\n2;\"");
     (3..400_000).for_each(|row| text.push_str(&format!("{row};22\n")));
-    let file = LogFile::of_bytes(Path::new("log"), text.as_bytes());
+    let file = LogFile::from_bytes(Path::new("log"), text.as_bytes());
     let error = match LOG_FORMATS.open(&file, &LogOptions::default()) {
         Err(error) => error.to_string(),
         Ok((_, mut log)) => survey(log.as_mut()).unwrap_err().to_string(),
@@ -306,7 +306,7 @@ fn a_quote_that_is_never_closed_does_not_swallow_the_file() {
 #[test]
 fn a_line_of_cells_alone_is_refused() {
     let many = ["time;".repeat(30_000), "1;".repeat(30_000), "2;".repeat(30_000)].join("\n");
-    let file = LogFile::of_bytes(Path::new("log"), many.as_bytes());
+    let file = LogFile::from_bytes(Path::new("log"), many.as_bytes());
     let error = LOG_FORMATS.open(&file, &LogOptions::default()).err().unwrap().to_string();
     assert!(error.contains("at most 10000"), "{error}");
     // Thousands of names, each a possible clock.
@@ -355,7 +355,7 @@ fn a_hidden_sheet_is_read_only_if_it_is_named() {
             *text = text.replace("</sheets>", second);
         }
     }
-    let file = LogFile::of_bytes(Path::new("log.xlsx"), &workbook(&with_hidden));
+    let file = LogFile::from_bytes(Path::new("log.xlsx"), &workbook(&with_hidden));
     let first = |options: &LogOptions| {
         let (_, mut log) = LOG_FORMATS.open(&file, options).unwrap();
         let (mut values, findings) = (Vec::new(), log.layout().findings.join("; "));
@@ -375,7 +375,7 @@ fn a_hidden_sheet_is_read_only_if_it_is_named() {
     let first_sheet = with_hidden.iter_mut().find(|(name, _)| name.ends_with("sheet1.xml")).unwrap();
     first_sheet.1 =
         first_sheet.1.split("<sheetData>").next().unwrap().to_owned() + "<sheetData/></worksheet>";
-    let file = LogFile::of_bytes(Path::new("log.xlsx"), &workbook(&with_hidden));
+    let file = LogFile::from_bytes(Path::new("log.xlsx"), &workbook(&with_hidden));
     let (_, log) = LOG_FORMATS.open(&file, &LogOptions::default()).unwrap();
     assert!(log.layout().findings.join("; ").contains("Old"));
 }
@@ -417,7 +417,7 @@ fn mat() -> Vec<u8> {
 
 #[test]
 fn matlab_data_are_read() {
-    let file = LogFile::of_bytes(Path::new("log.mat"), &mat());
+    let file = LogFile::from_bytes(Path::new("log.mat"), &mat());
     let (format, mut log) = LOG_FORMATS.open(&file, &LogOptions::default()).unwrap();
     let columns = &log.layout().columns;
     assert_eq!((format.name, columns.len(), columns[0].unit.as_deref()), ("MATLAB", 1, Some("rpm")));

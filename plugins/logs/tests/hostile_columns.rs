@@ -13,7 +13,7 @@ use tedium::{ChannelPath, DataLayout, PropertyPath, PropertyValue, TdmsFile};
 
 /// Opens and reads all of it.
 fn look(bytes: &[u8]) -> Option<u64> {
-    let file = LogFile::of_bytes(Path::new("log"), bytes);
+    let file = LogFile::from_bytes(Path::new("log"), bytes);
     let (_, mut log) = LOG_FORMATS.open(&file, &LogOptions::default()).ok()?;
     survey(log.as_mut()).ok().map(|found| found.groups[0].rows)
 }
@@ -81,7 +81,7 @@ fn files() -> &'static [Vec<u8>; 4] {
 #[test]
 fn the_files_themselves_are_read() {
     for (bytes, name) in files().iter().zip(["TDMS", "Parquet", "Arrow", "Arrow"]) {
-        let file = LogFile::of_bytes(Path::new("log"), bytes);
+        let file = LogFile::from_bytes(Path::new("log"), bytes);
         let (format, log) = LOG_FORMATS.open(&file, &LogOptions::default()).unwrap();
         assert_eq!(format.name, name);
         let t2 = log.layout().columns.iter().find(|column| column.name == "T2").unwrap();

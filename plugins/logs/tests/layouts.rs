@@ -10,7 +10,7 @@ const ROWS: usize = 150;
 
 /// Layout and rows of a text.
 fn read(text: &str) -> (Layout, Vec<(f64, Vec<f64>)>) {
-    let file = LogFile::of_bytes(Path::new("log"), text.as_bytes());
+    let file = LogFile::from_bytes(Path::new("log"), text.as_bytes());
     let (_, mut log) =
         LOG_FORMATS.open(&file, &LogOptions::default()).unwrap_or_else(|why| panic!("{why}\n{text}"));
     let layout = log.layout().clone();
@@ -276,7 +276,7 @@ fn names_of_several_words_between_blanks() {
     let unknown = text("Time  Outlet  Pressure of the compressor  and more\n", |row| {
         format!("{row} {} {}", p2_kpa(row), t2_degc(row))
     });
-    let file = LogFile::of_bytes(Path::new("log"), unknown.as_bytes());
+    let file = LogFile::from_bytes(Path::new("log"), unknown.as_bytes());
     let refused = LOG_FORMATS.open(&file, &LogOptions::default()).err().unwrap().to_string();
     assert!(refused.contains("column 1, column 2, column 3"), "{refused}");
     let named = LogOptions { time: vec!["column 1".to_owned()], ..LogOptions::default() };
@@ -291,7 +291,7 @@ fn a_compressed_log_is_its_content() {
     packer.write_all(plain.as_bytes()).unwrap();
     let packed = packer.finish().unwrap();
     let open = |bytes: &[u8]| {
-        let file = LogFile::of_bytes(Path::new("log.csv.gz"), bytes);
+        let file = LogFile::from_bytes(Path::new("log.csv.gz"), bytes);
         LOG_FORMATS
             .open(&file, &LogOptions::default())
             .map(|(format, log)| (format.name, log.layout().clone()))
@@ -318,7 +318,7 @@ fn the_end_of_daylight_saving_is_remarked() {
     let log =
         |rows: usize| (0..rows).fold("Time;p2 [kPa];T2 [degC]\n".to_owned(), |text, row| text + &line(row));
     let remarks = |text: &str| {
-        let file = LogFile::of_bytes(Path::new("log"), text.as_bytes());
+        let file = LogFile::from_bytes(Path::new("log"), text.as_bytes());
         let (_, mut log) = LOG_FORMATS.open(&file, &LogOptions::default()).unwrap();
         let before = log.layout().findings.len();
         let mut last_s = 0.0;
@@ -336,7 +336,7 @@ fn the_end_of_daylight_saving_is_remarked() {
 /// Written by xlwt: dates over midnight, with the format of a German Excel.
 #[test]
 fn an_old_workbook_has_its_dates() {
-    let file = LogFile::of_bytes(Path::new("dates.xls"), include_bytes!("dates.xls"));
+    let file = LogFile::from_bytes(Path::new("dates.xls"), include_bytes!("dates.xls"));
     let (format, mut log) = LOG_FORMATS.open(&file, &LogOptions::default()).unwrap();
     assert_eq!((format.name, log.layout().columns[2].unit.as_deref()), ("Excel", Some("°C")));
     // 2025-11-18 23:59:50.

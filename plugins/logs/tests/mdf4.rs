@@ -18,7 +18,7 @@ fn file() -> LogFile {
     writer.write_to_file(&path).unwrap();
     let bytes = std::fs::read(&path).unwrap();
     std::fs::remove_file(path).unwrap();
-    LogFile::of_bytes(Path::new("log.mf4"), &bytes)
+    LogFile::from_bytes(Path::new("log.mf4"), &bytes)
 }
 
 fn options(keys: &[(&str, &str)]) -> LogOptions {
@@ -72,7 +72,7 @@ fn undecoded_frames_of_a_bus_are_no_channels() {
         }
         let mut bytes = Vec::new();
         writer.write(&mut bytes).unwrap();
-        let file = LogFile::of_bytes(Path::new("bus.mf4"), &bytes);
+        let file = LogFile::from_bytes(Path::new("bus.mf4"), &bytes);
         LOG_FORMATS.open(&file, &LogOptions::default()).map(|(_, log)| log.layout().clone())
     };
     assert!(open(false).unwrap_err().to_string().contains("asammdf"));

@@ -24,7 +24,7 @@ fn proposal_for(
         let values: Vec<String> = row(load).iter().map(f64::to_string).collect();
         text += &format!("{second},{}\n", values.join(","));
     }
-    let file = LogFile::of_bytes(Path::new("log"), text.as_bytes());
+    let file = LogFile::from_bytes(Path::new("log"), text.as_bytes());
     let (_, mut log) = LOG_FORMATS.open(&file, &LogOptions::default()).unwrap();
     let found = survey(log.as_mut()).unwrap();
     propose(log.layout(), &found, nominal)
@@ -43,7 +43,7 @@ fn stations_of_a_gas_turbine_are_renumbered() {
         vec![98.0, 295.0, 98.0 * ratio, 295.0 + 110.0 * load, 97.0 * ratio, 500.0 + 300.0 * load, 99.0, 450.0]
     });
     assert_eq!(sure(&found), []);
-    let column = |channel: Channel| found.of(channel).map(|found| (found.column, found.certainty));
+    let column = |channel: Channel| found.entry(channel).map(|found| (found.column, found.certainty));
     let likely = |column: usize| Some((column, Certainty::Likely));
     assert_eq!([Channel::P1, Channel::T1, Channel::P2, Channel::T2].map(column), [0, 1, 2, 3].map(likely));
     assert_eq!([Channel::P3, Channel::T3, Channel::P4, Channel::T4].map(column), [4, 5, 6, 7].map(likely));
@@ -67,7 +67,7 @@ fn stations_of_a_gas_turbine_are_renumbered() {
             98.0 + 130.0 * load,
         ]
     });
-    let of = |channel: Channel| found.of(channel).map(|found| found.column);
+    let of = |channel: Channel| found.entry(channel).map(|found| found.column);
     assert_eq!(of(Channel::ShaftSpeed).zip(of(Channel::CompressorFlow)), Some((0, 1)));
     assert_eq!([Channel::T1, Channel::T4, Channel::P2].map(of), [Some(2), Some(5), Some(7)]);
     // The same values under the stations of a turbocharger.
@@ -85,7 +85,7 @@ fn an_engines_speed_and_throttle_are_not_taken() {
         vec![1500.0 + 4200.0 * load, 20.0 + 77.0 * load, 10.0 + 140.0 * load]
     });
     assert!(!sure(&found).contains(&Channel::ShaftSpeed));
-    assert!(found.of(Channel::ValveCommand).is_none());
+    assert!(found.entry(Channel::ValveCommand).is_none());
     let found = proposal("RPM [rpm],Flow [g/s]", |load| vec![15e3 + 100e3 * load, 10.0 + 140.0 * load]);
     assert!(sure(&found).contains(&Channel::ShaftSpeed));
 }
@@ -95,7 +95,7 @@ fn an_engines_speed_and_throttle_are_not_taken() {
 fn american_pressures_are_known() {
     let found =
         proposal("Baro [inHg],Comp Inlet Press [inH2O],T1 [F]", |load| vec![29.12, -7.9 * load, 72.0]);
-    assert!(found.of(Channel::P1).is_some_and(|inlet| inlet.gauge) && found.ambient.is_some());
+    assert!(found.entry(Channel::P1).is_some_and(|inlet| inlet.gauge) && found.ambient.is_some());
 }
 
 /// A flow with its unit is as sure as its name; one without gets the unit that fits the wheel.
@@ -105,7 +105,7 @@ fn a_flow_keeps_its_unit() {
     let found = proposal("n_TC [rpm],m_dot_C [kg/s],p1_C [kPa],p2_C [kPa]", row);
     assert!(sure(&found).contains(&Channel::CompressorFlow));
     let found = proposal("n_TC [rpm],m_dot_C,p1_C [kPa],p2_C [kPa]", row);
-    let flow = found.of(Channel::CompressorFlow).unwrap();
+    let flow = found.entry(Channel::CompressorFlow).unwrap();
     assert_eq!((flow.unit, flow.certainty), (Some("kg/s"), Certainty::Likely));
 }
 
@@ -117,9 +117,9 @@ fn a_temperature_without_a_place_is_judged_by_the_pressure() {
         let found = proposal("n [rpm],p_c [kPa],T1 [degC],T_c [degC]", |load| {
             vec![20e3 + 90e3 * load, 99.0 + 131.0 * load, 22.0, 22.0 + (top_degc - 22.0) * load]
         });
-        assert_eq!(found.of(channel).map(|found| found.column), Some(3), "{top_degc}");
+        assert_eq!(found.entry(channel).map(|found| found.column), Some(3), "{top_degc}");
         assert_eq!(
-            found.of(Channel::P2).map(|found| (found.column, found.certainty)),
+            found.entry(Channel::P2).map(|found| (found.column, found.certainty)),
             Some((1, Certainty::Likely))
         );
         assert!(!sure(&found).contains(&channel));
@@ -133,7 +133,7 @@ fn the_machine_settles_the_unit_of_a_flow() {
     let names = "n_TC [rpm],m_dot_C,p1_C [kPa],p2_C [kPa]";
     let unit = |flows: Option<NominalFlows<'_>>| {
         let found = proposal_for(names, flows, row);
-        let flow = found.of(Channel::CompressorFlow).unwrap();
+        let flow = found.entry(Channel::CompressorFlow).unwrap();
         (flow.certainty, flow.unit)
     };
     assert_eq!(unit(None).0, Certainty::Unsure);
@@ -149,7 +149,7 @@ fn a_machine_before_the_quantity_is_understood() {
     let found = proposal(names, |load| {
         vec![98.0, 98.0 + 130.0 * load, 22.0 + 110.0 * load, 99.0 + 100.0 * load, 400.0]
     });
-    let of = |channel: Channel| found.of(channel).map(|found| found.column);
+    let of = |channel: Channel| found.entry(channel).map(|found| found.column);
     let channels = [Channel::P1, Channel::P2, Channel::T2, Channel::P3, Channel::T4];
     assert_eq!(channels.map(of), [0, 1, 2, 3, 4].map(Some));
 }
@@ -171,7 +171,7 @@ fn imperial_logs_have_imperial_temperatures() {
     let row = |load: f64| vec![1e5 * load, 14.3, 14.3 + 19.0 * load, 72.0 + load, 73.0 + 200.0 * load];
     let found = proposal(names, row);
     for channel in [Channel::T1, Channel::T2] {
-        let proposed = found.of(channel).unwrap();
+        let proposed = found.entry(channel).unwrap();
         assert_eq!((proposed.unit, proposed.certainty), (Some("degF"), Certainty::Likely), "{channel}");
     }
 }

@@ -4,7 +4,7 @@ use mapper_tests::repository;
 use std::path::Path;
 
 /// Crates whose errors the Python package, a live page and the CLI show.
-const LIBRARIES: [&str; 5] = ["core", "fleet", "history", "live", "session"];
+const LIBRARIES: [&str; 7] = ["core", "fleet", "history", "live", "maps", "recording", "session"];
 
 /// The CLI adds the command or option for the remedy, in its `output/remedy.rs`; elsewhere there is none.
 #[test]

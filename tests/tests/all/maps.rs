@@ -189,7 +189,7 @@ fn a_hot_map_is_corrected_in_the_report_and_in_a_file() {
     correct(&sample(), &["--reference", "SAE", "--heat=-1"]).exits(3);
     let joint = made_once(&CampaignFile::shipped_with(SHORT_GRID)).run.join("map.json");
     let refused = correct(&joint, &[]).exits(3);
-    assert!(refused.stderr.contains("free of heat already"), "{}", refused.stderr);
+    assert!(refused.stderr.contains("already exclude heat"), "{}", refused.stderr);
 }
 
 /// The same table with units in a row of their own and decimal commas.

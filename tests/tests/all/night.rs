@@ -80,7 +80,7 @@ fn a_rig_without_its_guards_is_refused() {
     // A guard above the limit is a mistake with its position.
     let campaign = short(&[("seed: 1 ", "guards: {overspeed: {above: 200 krpm}}\nseed: 1 ")]);
     let wrong = done(run_of(&campaign, &[])).exits(3);
-    assert!(wrong.stderr.contains("never looser") && wrong.stderr.contains('^'), "{}", wrong.stderr);
+    assert!(wrong.stderr.contains("must not be looser") && wrong.stderr.contains('^'), "{}", wrong.stderr);
 }
 
 /// A run at fifty times the clock, in its soak of half an hour.

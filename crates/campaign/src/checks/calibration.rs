@@ -35,13 +35,13 @@ impl Campaign {
                 let declared = redundant.map_or(declaration.declared, |element| element.declared);
                 let mut defects = Vec::new();
                 if self.calibration == CalibrationRule::Required {
-                    let missing = missing(calibration).map(str::to_owned);
+                    let missing = first_missing_key(calibration).map(str::to_owned);
                     defects.extend(missing.map(|key| CalibrationDefect::Missing { key }));
                 }
                 defects.extend(
                     calibration
                         .into_iter()
-                        .flat_map(|one| contradictions(channel, one, day, read, &declared)),
+                        .flat_map(|one| find_contradictions(channel, one, day, read, &declared)),
                 );
                 let sensors = [Step::from("sensors"), Step::from(channel.symbol())].into_iter();
                 let at: Vec<Step> =
@@ -57,8 +57,7 @@ impl Campaign {
     }
 }
 
-/// The first required key that a calibration lacks.
-fn missing(calibration: Option<&Calibration>) -> Option<&'static str> {
+fn first_missing_key(calibration: Option<&Calibration>) -> Option<&'static str> {
     let Some(calibration) = calibration else { return Some("calibration") };
     let keys = [
         ("certificate", calibration.certificate.is_some()),
@@ -68,7 +67,7 @@ fn missing(calibration: Option<&Calibration>) -> Option<&'static str> {
     keys.into_iter().find(|(_, has)| !has).map(|(key, _)| key)
 }
 
-fn contradictions(
+fn find_contradictions(
     channel: Channel,
     calibration: &Calibration,
     day: Option<Date>,
@@ -88,7 +87,7 @@ fn contradictions(
         defects.push(CalibrationDefect::Range { reading, min, max });
     }
     if let (Some(expanded), Some((_, high))) = (calibration.uncertainty, read) {
-        // k = 2; a tenth of it is left to rounding.
+        // k = 2, with a tolerance of a tenth for rounding.
         let certified = 0.5 * expanded;
         let zero = if channel.info().dimension == Dimension::Temperature { CALIBRATED_AT_K } else { 0.0 };
         let declared = declared.offset_sigma.hypot(declared.gain_sigma_ratio * (high - zero));

@@ -1,12 +1,12 @@
-//! Concerns about a campaign, with their places.
+//! Concerns about the settings of a campaign, with their places in the file.
 
 use mapper_yaml::Step;
 
-/// An unusual setting in a campaign that prevents the run or calls for a warning.
+/// An unusual or impossible setting of a campaign.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Concern {
-    /// Whether the campaign cannot be run; otherwise this is a warning.
-    pub grave: bool,
+    /// Whether the campaign cannot run; else it is a warning.
+    pub is_error: bool,
     /// The key it refers to.
     pub at: Vec<Step>,
     /// What is wrong, with values and units.
@@ -19,11 +19,11 @@ impl Concern {
     /// A warning at a key, by its path from the top.
     pub fn warning(path: &[&str], message: String, remedy: String) -> Self {
         let at = path.iter().map(|key| Step::from(*key)).collect();
-        Concern { grave: false, at, message, remedy }
+        Concern { is_error: false, at, message, remedy }
     }
 }
 
-/// Millimetres without insignificant digits.
-pub(crate) fn mm(length_m: f64) -> f64 {
+/// A length in mm, rounded to 0.1 um.
+pub(crate) fn to_mm(length_m: f64) -> f64 {
     (1e7 * length_m).round() / 1e4
 }

@@ -1,5 +1,4 @@
-//! Checks beyond the schema: consistency between values of one file, and the files it names. Each element has its
-//! own check; here they are called, in the order in which findings are reported.
+//! Calls the checks of all elements that go beyond the schema, in the order of the report.
 
 use crate::checking::{Check, Files};
 use crate::elements;

@@ -3,5 +3,5 @@
 pub(crate) mod calibration;
 pub(crate) mod concern;
 pub(crate) mod consistency;
-pub(crate) mod prospects;
 pub(crate) mod reachable_points;
+pub(crate) mod unusual_settings;

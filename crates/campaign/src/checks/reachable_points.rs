@@ -5,13 +5,13 @@ use crate::nominal_table::NominalTableError;
 use mapper_core::OperatingPoint;
 use mapper_physics::compressor_map::characteristic::CompressorCharacteristic;
 use mapper_physics::compressor_map::closed_form_map::ClosedFormMap;
-use mapper_physics::operating_point::reach::{clause, reach};
+use mapper_physics::operating_point::reach::{describe_obstacles, reach};
 use mapper_physics::simulation::model::Model;
 use std::sync::Arc;
 
 /// A point that cannot be measured.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Unreachable {
+pub struct UnreachablePoint {
     /// Index in [`Campaign::points`].
     pub point: usize,
     /// Why, with values and units.
@@ -34,14 +34,14 @@ pub fn nominal_model(campaign: &Campaign) -> Result<Model, NominalTableError> {
 }
 
 /// The points that cannot be measured, each with all reasons; see [`mapper_physics::operating_point::reach`].
-pub fn unreachable_points(campaign: &Campaign, model: &Model) -> Vec<Unreachable> {
+pub fn unreachable_points(campaign: &Campaign, model: &Model) -> Vec<UnreachablePoint> {
     let complaint = |(index, point): (usize, &OperatingPoint)| {
         let (boundary, limits) = (&campaign.boundary, &campaign.limits);
         let obstacles = reach(model, *point, boundary, campaign.follow_outlet, limits).err()?;
         let (krpm, opening) = point.shown();
-        Some(Unreachable {
+        Some(UnreachablePoint {
             point: index,
-            reason: format!("{krpm} krpm at opening {opening} {}", clause(&obstacles)),
+            reason: format!("{krpm} krpm at opening {opening} {}", describe_obstacles(&obstacles)),
             remedy: obstacles.first()?.remedy().to_owned(),
         })
     };

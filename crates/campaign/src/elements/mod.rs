@@ -1,8 +1,7 @@
-//! The elements of a campaign, one file each: its form (struct, schema, range, default), its value in SI,
-//! its consistency checks, and the tests of all that.
+//! The elements of a campaign, one file each, with schema, ranges and defaults, conversion to SI, and consistency checks.
 //!
-//! Doc comments of deserialised types become the schema's descriptions, which editors show and messages quote: they
-//! describe what to write. `x-quantity`, `x-min`, `x-max` and `x-above` are explained at [`crate::units::Quantity`].
+//! Doc comments of deserialised types become the schema's descriptions, which editors show and messages quote: they tell the user
+//! what to write. `x-quantity`, `x-min`, `x-max` and `x-above` are explained at [`crate::units::Quantity`].
 //!
 //! If the program's own struct is in `mapper-core`, the element is its `serde` remote: the compiler compares the
 //! fields of both.

@@ -1,10 +1,10 @@
-//! Reads a campaign from a text or a file, or returns all its mistakes.
+//! Reads a campaign from a text or a file, or reports all its mistakes.
 
 use crate::campaign::{Campaign, CampaignFile};
 use crate::checks::concern::Concern;
 use crate::checks::consistency;
-use crate::checks::prospects;
-use crate::checks::reachable_points::{self, Unreachable};
+use crate::checks::reachable_points::{self, UnreachablePoint};
+use crate::checks::unusual_settings;
 use crate::files::schema::SCHEMA;
 use crate::machine_sizes;
 use crate::resolved;
@@ -16,11 +16,11 @@ use std::path::{Path, PathBuf};
 /// Name of a campaign file in messages.
 pub(crate) static DOCUMENT: Document = Document { name: "campaign", example: "campaigns/turbo_a.yaml" };
 
-/// Largest campaign file that is read, bytes.
-pub const FILE_SIZE_LIMIT: usize = 1 << 20;
+/// Maximum size of a campaign file, bytes.
+pub const MAX_FILE_BYTES: usize = 1 << 20;
 
-/// Largest map file that is read, bytes.
-pub const MAP_SIZE_LIMIT: usize = 16 << 20;
+/// Maximum size of a map file, bytes.
+pub const MAX_MAP_BYTES: usize = 16 << 20;
 
 /// Errors of loading a campaign.
 #[derive(Debug, thiserror::Error)]
@@ -44,7 +44,7 @@ pub enum CampaignError {
 /// [`CampaignError::Read`] if the file cannot be read, [`CampaignError::Mistakes`] with all its mistakes.
 pub fn load(path: &Path) -> Result<Campaign, CampaignError> {
     let mistakes = |findings| CampaignError::Mistakes(Box::new(findings));
-    let text = mapper_yaml::open(&DOCUMENT, path, FILE_SIZE_LIMIT)
+    let text = mapper_yaml::open(&DOCUMENT, path, MAX_FILE_BYTES)
         .map_err(|source| CampaignError::Read { path: path.to_owned(), source })?
         .map_err(mistakes)?;
     check(&text, path, &read_named_file).map_err(mistakes)
@@ -63,7 +63,7 @@ pub fn check(
     files: &dyn Fn(&Path) -> io::Result<String>,
 ) -> Result<Campaign, Findings> {
     check_with(text, origin, files, &|campaign| {
-        // A map that cannot be read is a finding already.
+        // An unreadable map is already reported.
         reachable_points::nominal_model(campaign)
             .map(|model| reachable_points::unreachable_points(campaign, &model))
             .unwrap_or_default()
@@ -78,17 +78,16 @@ pub fn check_with(
     text: &str,
     origin: &Path,
     files: &dyn Fn(&Path) -> io::Result<String>,
-    unreachable: &dyn Fn(&Campaign) -> Vec<Unreachable>,
+    unreachable: &dyn Fn(&Campaign) -> Vec<UnreachablePoint>,
 ) -> Result<Campaign, Findings> {
-    if text.len() > FILE_SIZE_LIMIT {
+    if text.len() > MAX_FILE_BYTES {
         let source = Source::new(&DOCUMENT, origin, "");
-        let message =
-            format!("the file has {} bytes, more than the {FILE_SIZE_LIMIT} that are read", text.len());
-        let remedy = "a campaign needs a few thousand; is this the right file?".to_owned();
+        let message = format!("the file has {} bytes, more than the maximum of {MAX_FILE_BYTES}", text.len());
+        let remedy = "a campaign has a few thousand; check that this is the right file".to_owned();
         return Err(Findings::single(source, FindingKind::TooLarge, 0, message, remedy));
     }
     let (tree, mut notes) = read(text, origin)?;
-    if let Some(concern) = other_file(&tree) {
+    if let Some(concern) = find_other_file_kind(&tree) {
         note(&tree, &mut notes, FindingKind::WrongValue, concern);
         return Err(tree.findings(notes));
     }
@@ -96,7 +95,7 @@ pub fn check_with(
     if !notes.is_full() {
         consistency::check(&tree, files, &mut notes);
     }
-    let campaign = notes.is_empty().then(|| finish(&tree, files, unreachable, &mut notes)).flatten();
+    let campaign = notes.is_empty().then(|| deserialise(&tree, files, unreachable, &mut notes)).flatten();
     campaign.ok_or_else(|| tree.findings(notes))
 }
 
@@ -107,7 +106,7 @@ fn read(text: &str, origin: &Path) -> Result<(Tree, Notes), Findings> {
 /// Reports a mistake in the settings of a backend, which only the backend can judge, at its place in the campaign's text.
 ///
 /// `at`: keys down to the backend's name, e.g. `backend.virtual_lab`; `setting`: the path below it, e.g. `machine.alpha_area`. A
-/// path that the text does not have points at its nearest existing parent. A `hidden` value is shown as asterisks: terminals are logged.
+/// missing path is replaced by its nearest existing parent. Asterisks replace a `hidden` value, since terminals are logged.
 pub fn backend_mistake(
     text: &str,
     origin: &Path,
@@ -139,7 +138,7 @@ pub fn format_mistake(text: &str, origin: &Path, format: &str, known: &[&str]) -
     let mut steps = steps!["outputs", "formats"].to_vec();
     let index = tree.items(&steps).iter().position(|written| written == format);
     steps.extend(index.map(Step::from));
-    let message = format!("`{format}` is not a format that a map can be written in");
+    let message = format!("`{format}` is not a format for writing maps");
     let remedy = format!("choose from {}", known.join(", "));
     notes.push(tree.finding(FindingKind::WrongValue, &steps, message, remedy));
     tree.findings(notes)
@@ -155,7 +154,8 @@ pub fn warnings(text: &str, origin: &Path, campaign: &Campaign, more: Vec<Concer
         [] => tree.deserialise().map(|file: CampaignFile| file.grid.points(&[], 0.0).1).unwrap_or_default(),
         _ => resolved::places(campaign),
     };
-    let own = prospects::concerns(campaign, &paths).into_iter().filter(|concern| !concern.grave);
+    let own =
+        unusual_settings::find_concerns(campaign, &paths).into_iter().filter(|concern| !concern.is_error);
     for concern in own.chain(more) {
         note(&tree, &mut notes, FindingKind::Unusual, concern);
     }
@@ -180,18 +180,18 @@ const OTHER_FILES: [(&str, &str, &str); 2] = [
     (
         "channels",
         "this file maps the channels of a log, it is not a campaign",
-        "use `mapper identify LOG --channels FILE`",
+        "use it as the channel map of `mapper identify`",
     ),
 ];
 
-/// A file of another command: one mistake in place of one for each of its keys.
-fn other_file(tree: &Tree) -> Option<Concern> {
+/// Recognises a file of another command, which is one mistake instead of one for each key.
+fn find_other_file_kind(tree: &Tree) -> Option<Concern> {
     if tree.get(&steps!["campaign"]).is_some() {
         return None;
     }
     let (key, message, remedy) = OTHER_FILES.iter().find(|(key, ..)| tree.get(&steps![*key]).is_some())?;
     Some(Concern {
-        grave: true,
+        is_error: true,
         at: vec![Step::from(*key)],
         message: (*message).to_owned(),
         remedy: (*remedy).to_owned(),
@@ -203,18 +203,18 @@ fn note(tree: &Tree, notes: &mut Notes, kind: FindingKind, concern: Concern) {
     notes.push(tree.finding(kind, &at, message, remedy));
 }
 
-/// Deserialises a text without known mistakes. `None` with at least one finding.
-fn finish(
+/// Deserialises a text without known mistakes; `None` if there are findings.
+fn deserialise(
     tree: &Tree,
     files: &dyn Fn(&Path) -> io::Result<String>,
-    unreachable: &dyn Fn(&Campaign) -> Vec<Unreachable>,
+    unreachable: &dyn Fn(&Campaign) -> Vec<UnreachablePoint>,
     notes: &mut Notes,
 ) -> Option<Campaign> {
     let file: CampaignFile = tree.deserialise().map_err(|finding| notes.push(finding)).ok()?;
     let (mut campaign, mut point_paths) = match file.campaign(&tree.source().origin, files) {
         Ok(built) => built,
         Err(error) => {
-            // Both were present a moment ago; the map is the default one.
+            // A file became unreadable after the check: the map if the campaign names one.
             let map = steps!["machine", "map", "file"];
             let sequence = steps!["sequence"];
             let steps: &[Step] = if tree.get(&map).is_some() { &map } else { &sequence };
@@ -224,10 +224,13 @@ fn finish(
             return None;
         }
     };
-    campaign.machine.assumed = machine_sizes::assumed(tree, &campaign.machine.params);
+    campaign.machine.assumed = machine_sizes::find_assumed_sizes(tree, &campaign.machine.params);
     let wheel = steps!["machine", "geometry", "compressor", "wheel_diameter"];
     campaign.machine.wheel_is_declared = tree.get(&wheel).is_some();
-    for concern in prospects::concerns(&campaign, &point_paths).into_iter().filter(|concern| concern.grave) {
+    for concern in unusual_settings::find_concerns(&campaign, &point_paths)
+        .into_iter()
+        .filter(|concern| concern.is_error)
+    {
         note(tree, notes, FindingKind::Implausible, concern);
     }
     if notes.is_empty()
@@ -246,7 +249,7 @@ fn finish(
     if !notes.is_empty() {
         return None;
     }
-    for Unreachable { point, reason, remedy } in unreachable(&campaign) {
+    for UnreachablePoint { point, reason, remedy } in unreachable(&campaign) {
         let steps = point_paths.get(point).map(Vec::as_slice).unwrap_or_default();
         notes.push(tree.finding(FindingKind::Unreachable, steps, reason, remedy));
     }
@@ -258,7 +261,7 @@ fn finish(
 /// # Errors
 /// The system's error; [`io::ErrorKind::InvalidData`] for a file that is neither.
 pub fn read_named_file(path: &Path) -> io::Result<String> {
-    match String::from_utf8(mapper_yaml::read_limited(path, MAP_SIZE_LIMIT)?) {
+    match String::from_utf8(mapper_yaml::read_limited(path, MAX_MAP_BYTES)?) {
         Ok(text) => Ok(text),
         Err(error) => file_text(error.as_bytes())
             .map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error.to_string())),
@@ -271,6 +274,6 @@ pub fn read_named_file(path: &Path) -> io::Result<String> {
 /// The system's error; [`io::ErrorKind::FileTooLarge`] for a file above the size limit, [`io::ErrorKind::InvalidData`] for one that
 /// is not UTF-8.
 pub fn read_text(path: &Path) -> io::Result<String> {
-    String::from_utf8(mapper_yaml::read_limited(path, MAP_SIZE_LIMIT)?)
+    String::from_utf8(mapper_yaml::read_limited(path, MAX_MAP_BYTES)?)
         .map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is not UTF-8"))
 }

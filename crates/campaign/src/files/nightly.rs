@@ -1,6 +1,6 @@
 //! The nightly campaign: campaigns with their methods and seeds, and the history.
 
-use crate::files::load::FILE_SIZE_LIMIT;
+use crate::files::load::MAX_FILE_BYTES;
 use mapper_yaml::{Document, FindingKind, Findings, Schema, Source, Step, steps};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -10,9 +10,7 @@ use std::path::{Path, PathBuf};
 /// Name of the file in messages.
 static DOCUMENT: Document = Document { name: "nightly campaign", example: "campaigns/nightly.yaml" };
 
-/// Maximum number of runs that one nightly campaign may ask for.
-const RUNS_LIMIT: usize = 10_000;
-/// Default number of nights that make a band.
+const MAX_RUNS: usize = 10_000;
 const DEFAULT_NIGHTS: usize = 14;
 
 /// Errors of loading a nightly campaign.
@@ -121,7 +119,7 @@ struct GroupFile {
 /// keys, or requests no run, the same run twice, or more than 10 000.
 pub fn load_nightly(path: &Path) -> Result<Nightly, NightlyError> {
     let mistakes = |findings| NightlyError::Mistakes(Box::new(findings));
-    let text = mapper_yaml::open(&DOCUMENT, path, FILE_SIZE_LIMIT)
+    let text = mapper_yaml::open(&DOCUMENT, path, MAX_FILE_BYTES)
         .map_err(|source| NightlyError::Read { path: path.to_owned(), source })?
         .map_err(mistakes)?;
     check(&text, path).map_err(mistakes)
@@ -185,11 +183,11 @@ fn nightly(file: NightlyFile, folder: &Path) -> Result<Nightly, Vec<Mistake>> {
         })
         .collect();
     let runs = groups.iter().fold(0_usize, |runs, group| runs.saturating_add(group.runs()));
-    if !(1..=RUNS_LIMIT).contains(&runs) {
+    if !(1..=MAX_RUNS).contains(&runs) {
         mistakes.push(Mistake {
             steps: steps!["runs"].to_vec(),
             kind: FindingKind::Range,
-            message: format!("it asks for {runs} runs; 1 to {RUNS_LIMIT} are allowed"),
+            message: format!("it asks for {runs} runs; 1 to {MAX_RUNS} are allowed"),
             remedy: "name at least one campaign, and fewer methods or seeds if there are too many runs",
         });
     }

@@ -3,6 +3,8 @@
 use mapper_core::{ExportError, ImportError};
 use mapper_fleet::FleetError;
 use mapper_history::HistoryError;
+use mapper_maps::HeatCorrectionError as Heat;
+use mapper_recording::RecordError;
 use mapper_session::{FirstMapError, FmuExportError, MapWorkError, SessionError as E};
 
 /// The command or option for the remedy in the error's message; `None` if there is none.
@@ -17,11 +19,21 @@ pub fn command_for(error: &E) -> Option<String> {
             "`--campaign FILE`"
         }
         E::MachineUnknown { channel_map_suffices: true } => "`--campaign FILE`, or `--channels FILE`",
+        E::Record(RecordError::LogWithoutMap { path }) => {
+            let log = path.display();
+            return Some(format!(
+                "`--channels FILE`; `mapper log inspect {log} --write-channels FILE` proposes a channel map"
+            ));
+        }
         E::StalePlan { .. } | E::InvalidPlan { .. } => "`mapper plan CAMPAIGN --out FILE`",
         E::UnknownOutputFormat { .. } => "`--to FORMAT`",
         E::FirstMap(error) if matches!(**error, FirstMapError::NotAMap { .. }) => "`mapper map convert`",
         E::Fmu(FmuExportError::Platform | FmuExportError::Compiler { .. }) => "without `--compile`",
         E::MapWork(MapWorkError::NotMeasured { .. }) => "`mapper map inspect`",
+        E::MapWork(MapWorkError::NotCorrected {
+            source: Heat::TooFew { .. } | Heat::OneSpeed { .. } | Heat::Singular,
+            ..
+        }) => "`--heat WATTS`",
         E::MapWork(MapWorkError::NoDefinition) => "`--efficiency DEFINITION`",
         E::Import { source, .. } => match source {
             ImportError::NoUnit { .. } | ImportError::FlowUnit => "`--with KEY=VALUE`",

@@ -221,7 +221,7 @@ pub enum ImportError {
     },
     /// More flow than an inlet can pass.
     #[error(
-        "line {line}: {flow_corrected_kg_s} kg/s at {speed_corrected_rpm} rpm is more than any compressor passes ({most_kg_s:.2} kg/s); if the \
+        "line {line}: {flow_corrected_kg_s} kg/s at {speed_corrected_rpm} rpm is more than any compressor passes ({limit_kg_s:.2} kg/s); if the \
          flows are in g/s, kg/h or lb/min, write that in the heading (`flow [g/s]`)"
     )]
     Flow {
@@ -232,7 +232,7 @@ pub enum ImportError {
         /// Corrected speed, rpm.
         speed_corrected_rpm: f64,
         /// Largest flow of an inlet, kg/s.
-        most_kg_s: f64,
+        limit_kg_s: f64,
     },
     /// A field that holds something other than a number.
     #[error("line {line}: the {quantity} is `{text}`, not a number")]

@@ -4,15 +4,15 @@ use crate::{Recording, Series, StepKind};
 use serde::{Deserialize, Serialize};
 
 /// The approach to the surge line at the end of a speed line: the valve closes in small steps until the surge flow is
-/// known, or until it is as near as [`SurgeSeek::closest_margin_ratio`].
+/// known, or until it is as near as [`SurgeSearchSettings::closest_margin_ratio`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct SurgeSeek {
+pub struct SurgeSearchSettings {
     /// Smallest surge margin to approach, by the surge flow known by then, ratio, > 0.
     pub closest_margin_ratio: f64,
     /// Largest change of the valve's opening at a step while the line may be near, ratio, > 0.
     pub step_ratio: f64,
-    /// Time at each opening, s; the rig needs its first [`SurgeSeek::SETTLE_S`] to follow.
+    /// Time at each opening, s; the rig needs its first [`SurgeSearchSettings::SETTLE_S`] to follow.
     pub dwell_s: f64,
     /// Standard error of the surge flow at which a line is finished, ratio, > 0, without the flow meter's gain.
     pub wanted_standard_error_ratio: f64,
@@ -20,14 +20,14 @@ pub struct SurgeSeek {
     pub most_steps: usize,
 }
 
-impl SurgeSeek {
+impl SurgeSearchSettings {
     /// Time after a small step until speed and pressures have followed, s.
     pub const SETTLE_S: f64 = 5.0;
 }
 
-impl Default for SurgeSeek {
+impl Default for SurgeSearchSettings {
     fn default() -> Self {
-        SurgeSeek {
+        SurgeSearchSettings {
             closest_margin_ratio: 0.03,
             step_ratio: 0.03,
             dwell_s: 25.0,

@@ -1,7 +1,7 @@
 //! The number of a step: files and texts count from 1, code uses an index from 0.
 //!
 //! The serde adapters write the number and read it back as an index: this module for one step, [`list`] and [`lists`] for several, [`option`] for
-//! an optional one, [`entry`] for plans and step markers, which have another form in older files.
+//! an optional one, [`entry`] for plans and step markers, whose older files have the index.
 
 use serde::de::{Deserialize, Deserializer, Error};
 use serde::ser::{Serialize, Serializer};
@@ -36,12 +36,12 @@ pub mod list {
     use super::{Serialize, Serializer};
     use crate::step_number;
 
-    /// Writes the numbers of the steps at `places`.
+    /// Writes the numbers of the steps at `indices`.
     ///
     /// # Errors
     /// Those of the serializer.
-    pub fn serialize<S: Serializer>(places: &[usize], serializer: S) -> Result<S::Ok, S::Error> {
-        places.iter().copied().map(step_number).collect::<Vec<_>>().serialize(serializer)
+    pub fn serialize<S: Serializer>(indices: &[usize], serializer: S) -> Result<S::Ok, S::Error> {
+        indices.iter().copied().map(step_number).collect::<Vec<_>>().serialize(serializer)
     }
 }
 
@@ -50,13 +50,13 @@ pub mod lists {
     use super::{Serialize, Serializer};
     use crate::step_number;
 
-    /// Writes the numbers of the steps at `places`, group by group.
+    /// Writes the numbers of the steps at `indices`, group by group.
     ///
     /// # Errors
     /// Those of the serializer.
-    pub fn serialize<S: Serializer>(places: &[Vec<usize>], serializer: S) -> Result<S::Ok, S::Error> {
+    pub fn serialize<S: Serializer>(indices: &[Vec<usize>], serializer: S) -> Result<S::Ok, S::Error> {
         let numbers = |group: &Vec<usize>| group.iter().copied().map(step_number).collect::<Vec<_>>();
-        places.iter().map(numbers).collect::<Vec<_>>().serialize(serializer)
+        indices.iter().map(numbers).collect::<Vec<_>>().serialize(serializer)
     }
 }
 
@@ -74,18 +74,18 @@ pub mod option {
     }
 }
 
-/// For a flattened field: `step` from 1. Files of version 0.1.0 have `index` from 0 instead; the name distinguishes them.
+/// For a flattened field: `step` from 1. Files of version 0.1.0 have `index` from 0 instead.
 pub mod entry {
     use super::{Deserialize, Deserializer, Error, Serialize, Serializer, index_of};
     use crate::step_number;
 
     #[derive(serde::Serialize)]
-    struct Written {
+    struct StepField {
         step: usize,
     }
 
     #[derive(serde::Deserialize)]
-    struct Read {
+    struct StepOrIndex {
         step: Option<usize>,
         index: Option<usize>,
     }
@@ -95,7 +95,7 @@ pub mod entry {
     /// # Errors
     /// Those of the serializer.
     pub fn serialize<S: Serializer>(index: &usize, serializer: S) -> Result<S::Ok, S::Error> {
-        Written { step: step_number(*index) }.serialize(serializer)
+        StepField { step: step_number(*index) }.serialize(serializer)
     }
 
     /// Reads `step` or `index`.
@@ -103,7 +103,7 @@ pub mod entry {
     /// # Errors
     /// Those of the deserializer; if neither is present, and if `step` is 0.
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
-        let Read { step, index } = Read::deserialize(deserializer)?;
+        let StepOrIndex { step, index } = StepOrIndex::deserialize(deserializer)?;
         match step {
             Some(step) => index_of(step),
             None => index.ok_or_else(|| D::Error::missing_field("step")),

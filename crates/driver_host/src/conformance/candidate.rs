@@ -38,7 +38,6 @@ impl Candidate<'_> {
     }
 }
 
-/// Requires success.
 pub(crate) fn require_success<T>(call: &str, answer: Result<T, BackendError>) -> Result<T, String> {
     answer.map_err(|error| format!("`{call}` failed: {error}"))
 }

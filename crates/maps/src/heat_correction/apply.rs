@@ -1,7 +1,7 @@
-//! A map with its heat taken off.
+//! Subtracts the heat from the apparent efficiencies of a map.
 
 use super::error::HeatCorrectionError;
-use super::estimate::estimate;
+use super::estimate::estimate_heat;
 use super::work::{air_of, isentropic_work_j_kg, work_points};
 use mapper_core::{
     CompressorMap, EstimateUncertainty, HeatCorrected, MapPoint, Method, Verdict, Warning,
@@ -9,52 +9,52 @@ use mapper_core::{
 };
 use serde::Serialize;
 
-/// Standard error of a heat that the map shows, over the heat: on the virtual lab it is up to twice what slow lines really take up,
-/// if their work grows for other reasons too.
-const HEAT_ERROR_RATIO: f64 = 0.5;
-/// Standard error of every efficiency from the premise that one heat holds for the whole map: on the virtual lab at 500 degC fast
-/// lines lose 1.4 points by heat to the housing, which the method does not see.
-const PREMISE_ERROR: f64 = 0.01;
-/// Above this a corrected efficiency is none.
-const HIGHEST_EFFICIENCY: f64 = 0.95;
+/// Standard error of an estimated heat over the heat: on the virtual lab the estimate is up to twice the true heat of slow lines if their
+/// work grows for other reasons too.
+const HEAT_STANDARD_ERROR_RATIO: f64 = 0.5;
+/// Standard error of every efficiency from the assumption of one heat for the whole map, fraction: on the virtual lab at 500 degC fast
+/// lines lose 1.4 points by heat to the housing, which the method ignores.
+const MODEL_STANDARD_ERROR: f64 = 0.01;
+/// Maximum credible corrected efficiency, fraction.
+const MAX_EFFICIENCY: f64 = 0.95;
 
-/// What the correction did to a line.
+/// Effect of the correction on a line.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CorrectedLine {
     /// Corrected speed, rpm.
     pub speed_corrected_rpm: f64,
-    /// Points with an efficiency before.
+    /// Points with an efficiency before the correction.
     pub points: usize,
-    /// Points without one after it: it would have been above 95 %.
+    /// Points whose corrected efficiency would be above 95 %: they have none.
     pub lost: usize,
-    /// Mean apparent efficiency of the points that kept one, fraction.
+    /// Mean apparent efficiency of the other points, fraction.
     pub eta_apparent: f64,
-    /// Mean corrected efficiency of the same, fraction.
+    /// Mean corrected efficiency of the same points, fraction.
     pub eta: f64,
 }
 
-/// What was done to a map.
+/// Heat correction of a map.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HeatCorrection {
-    /// Heat to the gas that was taken off, at the map's reference state, W.
+    /// Subtracted heat to the gas, at the map's reference state, W.
     pub heat_w: f64,
-    /// What the map shows, W: negative if slow lines take less work than fast ones; `None` if the heat was given.
+    /// Estimated heat, W: negative if slow lines take less work than fast ones; `None` if the heat was given.
     pub heat_shown_w: Option<f64>,
-    /// Standard error of that from the scatter of lines alone, W.
+    /// Standard error of the estimate from the scatter of lines alone, W.
     pub heat_standard_error_w: Option<f64>,
     /// Scatter of the work coefficients about their common curve, ratio.
     pub scatter_ratio: Option<f64>,
-    /// Points that the heat was found from.
+    /// Points that the estimate used.
     pub points_used: usize,
-    /// Line by line.
+    /// Effect on each line.
     pub lines: Vec<CorrectedLine>,
 }
 
-/// Takes the heat that a map shows, or the one that is given (W at the map's reference state), off its apparent efficiencies. What was
-/// fitted through the map before is dropped.
+/// Subtracts the heat that the map shows, or `given_w` (W at the map's reference state), from the apparent efficiencies. A fitted
+/// surface is dropped.
 ///
 /// # Errors
-/// [`HeatCorrectionError`]: the map holds no heat, or too little to find it.
+/// [`HeatCorrectionError`] if the efficiencies contain no heat, or the map is too small to estimate it.
 pub fn correct_for_heat(
     mut map: CompressorMap,
     given_w: Option<f64>,
@@ -68,12 +68,12 @@ pub fn correct_for_heat(
             return Err(HeatCorrectionError::Heat { heat_w });
         }
         Some(_) => None,
-        None => Some(estimate(&used)?),
+        None => Some(estimate_heat(&used)?),
     };
-    // Slow lines that take less work than fast ones have no heat to take off.
+    // A negative estimate means that slow lines take less work than fast ones: there is no heat to subtract.
     let heat_w = given_w.or(found.map(|found| found.heat_w.max(0.0))).unwrap_or(0.0);
     let scatter_w = found.map_or(0.0, |found| found.standard_error_w);
-    let heat_error_w = scatter_w.hypot(HEAT_ERROR_RATIO * heat_w);
+    let heat_error_w = scatter_w.hypot(HEAT_STANDARD_ERROR_RATIO * heat_w);
     let (reference, air) = (map.reference, air_of(&map));
     let shared = map
         .lines
@@ -91,17 +91,17 @@ pub fn correct_for_heat(
             let Some(apparent) = point.eta.filter(|eta| *eta > 0.0 && compresses) else { continue };
             points += 1;
             let work_j_kg = isentropic_work_j_kg(reference, point.pressure_ratio, air);
-            match without_heat(apparent, work_j_kg, heat_w / flow_kg_s) {
+            match efficiency_without_heat(apparent, work_j_kg, heat_w / flow_kg_s) {
                 Some(eta) => {
-                    // d eta/d heat, times the heat's error.
+                    // Derivative of eta by heat, times the heat's error.
                     let change = eta * eta / work_j_kg * heat_error_w / flow_kg_s;
-                    put(point, apparent, eta, change, shared);
+                    set_efficiency(point, apparent, eta, change, shared);
                     before += apparent;
                     after += eta;
                 }
                 None => {
                     lost += 1;
-                    lose(point, heat_w);
+                    drop_efficiency(point, heat_w);
                 }
             }
         }
@@ -128,19 +128,19 @@ pub fn correct_for_heat(
     Ok((map, correction))
 }
 
-/// Efficiency when a specific heat counts as work no more; `None` if it would be none.
-fn without_heat(apparent: f64, isentropic_work_j_kg: f64, heat_j_kg: f64) -> Option<f64> {
+/// Efficiency after a specific heat is subtracted from the work; `None` if it is not credible.
+fn efficiency_without_heat(apparent: f64, isentropic_work_j_kg: f64, heat_j_kg: f64) -> Option<f64> {
     let work_j_kg = isentropic_work_j_kg / apparent - heat_j_kg;
     let eta = isentropic_work_j_kg / work_j_kg;
-    (work_j_kg > 0.0 && eta <= HIGHEST_EFFICIENCY.max(apparent)).then_some(eta)
+    (work_j_kg > 0.0 && eta <= MAX_EFFICIENCY.max(apparent)).then_some(eta)
 }
 
-fn put(point: &mut MapPoint, apparent: f64, eta: f64, heat_change: f64, shared: usize) {
+fn set_efficiency(point: &mut MapPoint, apparent: f64, eta: f64, heat_change: f64, shared: usize) {
     let identified = &mut point.identified;
     let own =
         identified.eta_low.zip(identified.eta_high).map_or(0.0, |(low, high)| standard_error_of(low, high));
     let uncertainty = identified.eta_uncertainty.unwrap_or_default();
-    let added = heat_change.hypot(PREMISE_ERROR);
+    let added = heat_change.hypot(MODEL_STANDARD_ERROR);
     identified.eta_uncertainty = Some(EstimateUncertainty {
         bias_standard_error: uncertainty.bias_standard_error.hypot(added),
         ..uncertainty
@@ -148,7 +148,7 @@ fn put(point: &mut MapPoint, apparent: f64, eta: f64, heat_change: f64, shared: 
     let (low, high) = confidence_interval_95(eta, own.hypot(added));
     // Entry k of every point is error k of the map: the errors shared from here on follow all others.
     identified.common.eta_changes.resize(shared, 0.0);
-    identified.common.eta_changes.extend([heat_change, PREMISE_ERROR]);
+    identified.common.eta_changes.extend([heat_change, MODEL_STANDARD_ERROR]);
     (identified.eta_low, identified.eta_high) = (Some(low), Some(high));
     identified.eta = Some(eta);
     point.eta = Some(eta);
@@ -157,7 +157,7 @@ fn put(point: &mut MapPoint, apparent: f64, eta: f64, heat_change: f64, shared: 
     identified.warnings.push(Warning::HeatCorrected(corrected));
 }
 
-fn lose(point: &mut MapPoint, heat_w: f64) {
+fn drop_efficiency(point: &mut MapPoint, heat_w: f64) {
     let identified = &mut point.identified;
     (identified.eta, identified.eta_low, identified.eta_high, point.eta) = (None, None, None, None);
     identified.eta_uncertainty = None;

@@ -1,20 +1,20 @@
-//! Why a map cannot be corrected.
+//! Errors of the heat correction.
 
 use mapper_core::Method;
 
 /// Why a map cannot be corrected for heat.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum HeatCorrectionError {
-    /// Its efficiencies hold no heat.
-    #[error("the map was identified by the {method} method: its efficiencies are free of heat already")]
+    /// The efficiencies contain no heat.
+    #[error("the map was identified by the {method} method: its efficiencies already exclude heat")]
     Adiabatic {
         /// The method.
         method: Method,
     },
-    /// Too little to see a heat in.
+    /// Too few points or lines.
     #[error(
-        "{points} points on {lines} speed lines have an efficiency and lie outside choke; the heat of a map shows in at least 8 points on 3 lines, \
-         or give it by `--heat`"
+        "{points} points on {lines} speed lines have an efficiency and lie outside choke; estimating the heat takes at least 8 points on 3 lines; measure more, \
+         or state the heat"
     )]
     TooFew {
         /// Points.
@@ -22,21 +22,21 @@ pub enum HeatCorrectionError {
         /// Lines with points.
         lines: usize,
     },
-    /// Lines of nearly one speed.
+    /// Lines of nearly equal speed.
     #[error(
-        "the fastest line turns at {ratio:.2} times the speed of the slowest; below 1.5 the heat cannot be distinguished from the wheel's work; or give it by `--heat`"
+        "the fastest line turns at {ratio:.2} times the speed of the slowest; below 1.5 the heat cannot be distinguished from the wheel's work; state the heat"
     )]
     OneSpeed {
         /// Fastest over slowest.
         ratio: f64,
     },
-    /// Points that determine nothing.
-    #[error("flows and speeds of the map do not separate heat from work; give the heat by `--heat`")]
+    /// Points that do not determine the heat.
+    #[error("flows and speeds of the map do not separate heat from work; state the heat")]
     Singular,
-    /// A heat that is none.
-    #[error("a heat of {heat_w} W cannot be taken off; it must be finite and not negative")]
+    /// A negative heat, or one that is not finite.
+    #[error("a heat of {heat_w} W cannot be subtracted; it must be finite and not negative")]
     Heat {
-        /// What was given, W.
+        /// The heat, W.
         heat_w: f64,
     },
 }

@@ -1,33 +1,33 @@
-//! The one heat that makes all speed lines one curve.
+//! Estimates the heat with which the work coefficients of all speed lines fall on one curve.
 
 use super::error::HeatCorrectionError;
 use super::work::WorkPoint;
 use nalgebra::{DMatrix, DVector};
 
-/// Residuals beyond so many robust standard deviations lose weight (Huber).
-const HUBER: f64 = 1.5;
-/// Rounds of weights.
+/// Robust standard deviations beyond which a residual loses weight (Huber).
+const HUBER_THRESHOLD: f64 = 1.5;
+/// Rounds of reweighting.
 const ROUNDS: usize = 8;
-/// Least points, lines, and ratio of speeds.
+/// Minimum number of points and lines, and minimum ratio of the line speeds.
 const MIN_POINTS: usize = 8;
 const MIN_LINES: usize = 3;
 const MIN_SPEED_RATIO: f64 = 1.5;
-/// Smallest over largest singular value below which nothing is determined.
-const RANK: f64 = 1e-5;
+/// Minimum ratio of smallest to largest singular value of a determined fit.
+const MIN_SINGULAR_VALUE_RATIO: f64 = 1e-5;
 
 /// The heat of a map.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Estimate {
+pub struct HeatEstimate {
     /// Heat to the gas at the reference state, W; negative if slow lines take less work than fast ones.
     pub heat_w: f64,
-    /// Its standard error: leaving each line out in turn, W.
+    /// Its standard error by leaving each line out in turn, W.
     pub standard_error_w: f64,
     /// Robust scatter of the work coefficients about the curve, ratio.
     pub scatter_ratio: f64,
 }
 
-/// Finds it.
-pub fn estimate(points: &[WorkPoint]) -> Result<Estimate, HeatCorrectionError> {
+/// Estimates the heat.
+pub fn estimate_heat(points: &[WorkPoint]) -> Result<HeatEstimate, HeatCorrectionError> {
     let mut lines: Vec<usize> = points.iter().map(|point| point.line).collect();
     lines.dedup();
     if points.len() < MIN_POINTS || lines.len() < MIN_LINES {
@@ -38,11 +38,11 @@ pub fn estimate(points: &[WorkPoint]) -> Result<Estimate, HeatCorrectionError> {
     if ratio < MIN_SPEED_RATIO {
         return Err(HeatCorrectionError::OneSpeed { ratio });
     }
-    let (heat_w, scatter_ratio) = fitted(points).ok_or(HeatCorrectionError::Singular)?;
-    // Errors of a line (its speed, its day) are shared by its points, so whole lines are left out.
+    let (heat_w, scatter_ratio) = fit_heat(points).ok_or(HeatCorrectionError::Singular)?;
+    // Points of a line share errors (speed, day), so whole lines are left out.
     let without = |line: &usize| {
         let others: Vec<WorkPoint> = points.iter().filter(|point| point.line != *line).copied().collect();
-        fitted(&others).map(|(heat_w, _)| heat_w)
+        fit_heat(&others).map(|(heat_w, _)| heat_w)
     };
     let left_out: Vec<f64> = lines.iter().filter_map(without).collect();
     if left_out.len() < MIN_LINES {
@@ -51,11 +51,11 @@ pub fn estimate(points: &[WorkPoint]) -> Result<Estimate, HeatCorrectionError> {
     let count = left_out.len() as f64;
     let mean_w = left_out.iter().sum::<f64>() / count;
     let spread = left_out.iter().map(|heat_w| (heat_w - mean_w).powi(2)).sum::<f64>();
-    Ok(Estimate { heat_w, standard_error_w: ((count - 1.0) / count * spread).sqrt(), scatter_ratio })
+    Ok(HeatEstimate { heat_w, standard_error_w: ((count - 1.0) / count * spread).sqrt(), scatter_ratio })
 }
 
 /// Heat, W, and scatter, ratio.
-fn fitted(points: &[WorkPoint]) -> Option<(f64, f64)> {
+fn fit_heat(points: &[WorkPoint]) -> Option<(f64, f64)> {
     // Relative residuals: every row over its own work coefficient.
     let mut rows = DMatrix::from_fn(points.len(), 4, |row, column| {
         let point = &points[row];
@@ -63,11 +63,11 @@ fn fitted(points: &[WorkPoint]) -> Option<(f64, f64)> {
             0 => 1.0,
             1 => point.exit_flow,
             2 => 1.0 / point.inlet_flow,
-            _ => point.per_watt(),
+            _ => point.work_coefficient_per_watt(),
         };
         value / point.work_coefficient
     });
-    // Columns of one size, so that the rank is judged without units.
+    // Columns are scaled to equal size, so that the rank does not depend on units.
     let sizes: Vec<f64> = (0..4).map(|column| rows.column(column).norm()).collect();
     for (column, size) in sizes.iter().enumerate() {
         if *size <= 0.0 || !size.is_finite() {
@@ -82,7 +82,7 @@ fn fitted(points: &[WorkPoint]) -> Option<(f64, f64)> {
         let weighted = DMatrix::from_fn(points.len(), 4, |row, column| root(row) * rows[(row, column)]);
         let right = DVector::from_fn(points.len(), |row, _| root(row));
         let svd = weighted.svd(true, true);
-        if svd.singular_values.min() < RANK * svd.singular_values.max() {
+        if svd.singular_values.min() < MIN_SINGULAR_VALUE_RATIO * svd.singular_values.max() {
             return None;
         }
         let solution = svd.solve(&right, 0.0).ok()?;
@@ -92,7 +92,7 @@ fn fitted(points: &[WorkPoint]) -> Option<(f64, f64)> {
         // The median of a normal variable's size is 0.6745 standard deviations.
         let scatter = (sizes_of.get(sizes_of.len() / 2)? / 0.6745).max(1e-9);
         for (weight, residual) in weights.iter_mut().zip(residuals.iter()) {
-            *weight = (HUBER * scatter / residual.abs().max(1e-300)).min(1.0);
+            *weight = (HUBER_THRESHOLD * scatter / residual.abs().max(1e-300)).min(1.0);
         }
         found = Some((solution[3] / sizes[3], scatter));
     }

@@ -4,16 +4,16 @@ use mapper_core::{CompressorMap, ReferenceState};
 use mapper_physics::gas::air::{self, Air};
 use mapper_physics::laws::compression::isentropic_rise_ratio;
 
-/// Speed by which coefficients are made: it scales them and drops out, as the wheel's diameter does, rpm.
+/// Unit of the speed ratio, rpm: the estimate does not depend on it, nor on the wheel's diameter.
 const UNIT_SPEED_RPM: f64 = 100_000.0;
-/// Share of the stage's temperature rise that the wheel's exit has: its degree of reaction, as radial wheels have it.
+/// Share of the stage's temperature rise up to the wheel's exit: the degree of reaction of radial wheels.
 const REACTION: f64 = 0.6;
 /// Density over temperature along the wheel: 1/(n - 1) of a polytrope with n = 1.5.
 const DENSITY_EXPONENT: f64 = 2.0;
-/// Points on the choke side of a line's best efficiency count down to this share of it: beyond, the inlet decides.
-const OUTSIDE_CHOKE: f64 = 0.85;
+/// Minimum efficiency of a point on the choke side, over the best of its line: beyond, inlet choking determines the work.
+const MIN_FLOW_OF_BEST_RATIO: f64 = 0.85;
 
-/// A point as the estimate sees it, at the map's reference state.
+/// Work and flow coefficients of a point at the map's reference state.
 #[derive(Debug, Clone, Copy)]
 pub struct WorkPoint {
     /// Speed line of the map.
@@ -24,15 +24,15 @@ pub struct WorkPoint {
     pub flow_kg_s: f64,
     /// Apparent specific work over the square of speed, J/kg.
     pub work_coefficient: f64,
-    /// Flow over speed at the inlet, kg/s.
+    /// Inlet flow over the speed ratio, kg/s.
     pub inlet_flow: f64,
-    /// The same at the wheel's exit, where the gas is denser, kg/s.
+    /// The same with the density at the wheel's exit, kg/s.
     pub exit_flow: f64,
 }
 
 impl WorkPoint {
-    /// What one watt of heat adds to the work coefficient.
-    pub fn per_watt(&self) -> f64 {
+    /// Increase of the work coefficient per watt of heat, J/(kg W).
+    pub fn work_coefficient_per_watt(&self) -> f64 {
         1.0 / (self.flow_kg_s * self.speed_ratio * self.speed_ratio)
     }
 }
@@ -63,7 +63,7 @@ pub fn work_points(map: &CompressorMap) -> Vec<WorkPoint> {
         let Some((best, best_eta)) = best else { continue };
         for (point, eta) in usable() {
             let flow_kg_s = point.flow_corrected_kg_s;
-            if flow_kg_s > best.flow_corrected_kg_s && eta < OUTSIDE_CHOKE * best_eta {
+            if flow_kg_s > best.flow_corrected_kg_s && eta < MIN_FLOW_OF_BEST_RATIO * best_eta {
                 continue;
             }
             let speed_ratio = line.speed_corrected_rpm / UNIT_SPEED_RPM;

@@ -1,15 +1,15 @@
-//! Why a map could not be fitted.
+//! Errors of the map fit.
 
 /// Why a map could not be fitted.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MapFitError {
-    /// Speeds are indistinguishable or there is only one.
+    /// Fewer than two distinguishable speeds.
     #[error("the map has {lines} speed line(s) with points; a fit over speed needs at least 2")]
     TooFewLines {
         /// Lines with usable points.
         lines: usize,
     },
-    /// Too little to determine a line.
+    /// Too few points to determine the lines.
     #[error(
         "the map has {points} points and {with_eta} efficiencies; a fit needs at least 8 and 6, preferably 5 or more on each line"
     )]
@@ -19,7 +19,7 @@ pub enum MapFitError {
         /// Points with an efficiency too.
         with_eta: usize,
     },
-    /// More than any measured map has.
+    /// Too many points or lines.
     #[error(
         "the map has {points} points on {lines} lines; a fit takes at most {most_points} on {most_lines}"
     )]
@@ -41,21 +41,21 @@ pub enum MapFitError {
         /// Corrected speed of the line, rpm.
         speed_corrected_rpm: f64,
     },
-    /// A speed for the table without meaning.
+    /// A speed of the table outside the valid range.
     #[error(
-        "a line at {speed_corrected_rpm} rpm cannot be given; write a speed between {lowest_rpm} and {highest_rpm} rpm"
+        "a line at {speed_corrected_rpm} rpm is outside the range of the fit; give a speed between {lowest_rpm} and {highest_rpm} rpm"
     )]
     Speed {
-        /// What was asked for, rpm.
+        /// Requested speed, rpm.
         speed_corrected_rpm: f64,
-        /// Lowest that is answered, rpm.
+        /// Minimum speed, rpm.
         lowest_rpm: f64,
-        /// Highest that is answered, rpm.
+        /// Maximum speed, rpm.
         highest_rpm: f64,
     },
     /// The equations of the fit became singular.
     #[error(
-        "the fit did not settle: its equations became singular; look for points that lie far off their line, and for lines with equal speeds"
+        "the fit did not converge: its equations became singular; look for points far from their line, and for lines with equal speeds"
     )]
     Singular,
 }

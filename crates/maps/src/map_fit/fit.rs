@@ -1,4 +1,4 @@
-//! The fit of a surface to a map, stiff enough that no lines cross.
+//! Fits a surface to a map, stiff enough that no lines cross.
 
 use super::MapFitError;
 use crate::map_fit::fitted_surface::surface::MapFit;
@@ -6,7 +6,7 @@ use crate::map_fit::fitted_surface::table::{MapFitOptions, table};
 use crate::map_fit::least_squares::observations::Observations;
 use crate::map_fit::least_squares::solution::Solution;
 use crate::map_fit::least_squares::solve::solve;
-use crate::map_fit::speed_lines::crossing::crossings;
+use crate::map_fit::speed_lines::crossing::count_crossings;
 use crate::map_fit::speed_lines::ends::End;
 use mapper_core::{CompressorMap, FittedLine};
 
@@ -19,18 +19,18 @@ impl MapFit {
     /// If lines cross, the fit is made again with stiffer parameters over speed.
     ///
     /// # Errors
-    /// [`MapFitError`] if there is too little, too much or nothing sensible to fit.
+    /// [`MapFitError`] if there are too few or too many points, or they do not determine the fit.
     pub fn new(map: &CompressorMap) -> Result<Self, MapFitError> {
         Ok(MapFit::of(Observations::of(map)?, None)?.widened(&[End::Slow, End::Fast]))
     }
 
-    /// As [`MapFit::new`], with errors beyond the measured speeds as the roughness says. `near`: a fit of nearly the same points,
-    /// from which the search may start.
+    /// As [`MapFit::new`], without widened errors beyond the measured speeds. `near`: a fit of nearly the same points, from which the search
+    /// starts.
     pub(crate) fn of(data: Observations, near: Option<&Solution>) -> Result<Self, MapFitError> {
         let mut best: Option<(usize, MapFit)> = None;
         for stiffness in STIFFNESSES {
             let fit = MapFit { solution: solve(&data, stiffness, near)?, data: data.clone() };
-            let crossings = crossings(&fit.lines_for_check());
+            let crossings = count_crossings(&fit.lines_for_check());
             if best.as_ref().is_none_or(|(least, _)| crossings < *least) {
                 best = Some((crossings, fit));
             }
@@ -41,7 +41,7 @@ impl MapFit {
         best.map(|(_, fit)| fit).ok_or(MapFitError::Singular)
     }
 
-    /// Measured and a few extrapolated lines, coarse: enough to see whether lines cross.
+    /// Measured and a few extrapolated lines with few nodes, for the check for crossings.
     fn lines_for_check(&self) -> Vec<FittedLine> {
         let options = MapFitOptions { further_speeds_rpm: None, nodes: 41, leave_one_out: false };
         table(self, &options).map(|table| table.lines).unwrap_or_default()

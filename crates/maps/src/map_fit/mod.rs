@@ -1,4 +1,4 @@
-//! A smooth surface through all speed lines together.
+//! Fits a smooth surface to all speed lines together.
 
 mod error;
 mod fit;

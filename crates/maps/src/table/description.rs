@@ -1,4 +1,4 @@
-//! Map descriptions: the keys behind `--with`, the YAML file with the same keys, and the description of a map that was read.
+//! Map descriptions: their keys, the YAML file with these keys, and the description of an imported map.
 
 use crate::table::reference::parse_reference;
 use mapper_core::{
@@ -13,8 +13,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-/// Largest map description that is read, bytes.
-const SIZE_LIMIT: usize = 1 << 16;
+/// Maximum size of a map description, bytes.
+const MAX_BYTES: usize = 1 << 16;
 
 static DOCUMENT: Document = Document { name: "map description", example: "docs/reference/files.md" };
 static SCHEMA: LazyLock<Schema> = LazyLock::new(|| Schema::new(schema()));
@@ -22,11 +22,11 @@ static SCHEMA: LazyLock<Schema> = LazyLock::new(|| Schema::new(schema()));
 /// One key of a map description.
 #[derive(Debug, Clone, Copy)]
 pub struct DescriptionKey {
-    /// As written in the file and behind `--with`.
+    /// Name in the file, and in the options of the commands.
     pub name: &'static str,
-    /// One line for people.
+    /// Description in one line.
     pub description: &'static str,
-    /// A value as one would write it.
+    /// Example of a value.
     pub example: &'static str,
     set: Set,
 }
@@ -148,13 +148,13 @@ fn positive(kind: Kind, text: &str) -> Option<f64> {
     parse(kind, text).ok().filter(|value| *value > 0.0)
 }
 
-/// A key or a value that does not exist.
+/// An unknown key, or an invalid value.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum KeyError {
     /// No such key.
     #[error("there is no key `{key}`; the keys are {}", DESCRIPTION_KEYS.map(|key| key.name).join(", "))]
     Key {
-        /// What was written.
+        /// The unknown key.
         key: String,
     },
     /// Not a value of the key.
@@ -162,9 +162,9 @@ pub enum KeyError {
     Value {
         /// The key.
         key: &'static str,
-        /// What was written.
+        /// The invalid value.
         value: String,
-        /// A right one.
+        /// A valid one.
         example: &'static str,
     },
 }
@@ -172,7 +172,7 @@ pub enum KeyError {
 /// Adds a statement to a description.
 ///
 /// # Errors
-/// [`KeyError`] for a key that does not exist and for a value that is none of its.
+/// [`KeyError`] for an unknown key and for a value that is not valid for it.
 pub fn set_key(description: &mut MapDescription, key: &str, value: &str) -> Result<(), KeyError> {
     let row = DESCRIPTION_KEYS.iter().find(|row| row.name == key);
     let row = row.ok_or_else(|| KeyError::Key { key: key.chars().take(60).collect() })?;
@@ -212,7 +212,7 @@ pub enum DescriptionError {
 /// [`DescriptionError`] with all mistakes of the file.
 pub fn read_description(path: &Path) -> Result<MapDescription, DescriptionError> {
     let mistakes = |findings| DescriptionError::Mistakes(Box::new(findings));
-    let text = mapper_yaml::open(&DOCUMENT, path, SIZE_LIMIT)
+    let text = mapper_yaml::open(&DOCUMENT, path, MAX_BYTES)
         .map_err(|source| DescriptionError::Read { path: path.to_owned(), source })?
         .map_err(mistakes)?;
     description_from_yaml(&text, path).map_err(mistakes)
@@ -250,13 +250,13 @@ fn schema() -> Value {
     json!({"type": "object", "minProperties": 1, "properties": properties, "additionalProperties": false})
 }
 
-/// The description of a map that was read: all that was found or assumed, to be kept and corrected.
-pub fn describe(file_name: &str, found: &ImportedMap, given: &MapDescription) -> String {
+/// Map description of an imported map: all detected and assumed properties, for the user to correct.
+pub fn description_text(file_name: &str, found: &ImportedMap, given: &MapDescription) -> String {
     text_of_description(file_name, Some(found.map.reference), &found.columns, &found.remarks, given)
 }
 
-/// The same of a turbine map.
-pub fn describe_turbine(file_name: &str, found: &ImportedTurbine, given: &MapDescription) -> String {
+/// As [`description_text`], for a turbine map.
+pub fn turbine_description_text(file_name: &str, found: &ImportedTurbine, given: &MapDescription) -> String {
     text_of_description(file_name, given.reference, &found.columns, &found.remarks, given)
 }
 
@@ -268,7 +268,7 @@ fn text_of_description(
     given: &MapDescription,
 ) -> String {
     let mut text = format!(
-        "# How `mapper` reads {file_name}. Give this file by `--description FILE`, or in a campaign as\n\
+        "# Map description of {file_name}. Give it to a command as its description, or in a campaign as\n\
          # `map: {{file: {file_name}, description: FILE, reference: ...}}`. Keys and units: docs/reference/files.md.\n"
     );
     let mut line = |key: &str, value: &str| {
@@ -298,13 +298,13 @@ fn text_of_description(
     for column in columns {
         let unit = match column.unit.as_str() {
             "" if column.key == "efficiency" && in_percent => "%",
-            // A speed of a turbine that was taken as reduced from its size stays without a unit.
+            // A turbine speed whose size indicated a reduced speed stays without a unit.
             "" if remarks.contains(&ImportRemark::SpeedParameterAssumed) && column.key == "speed" => "",
             "" => default_unit(column.key),
             unit => unit,
         };
         let has_unit = column.heading.contains(unit) && !column.unit.is_empty();
-        // Lines side by side have the columns of the first line only.
+        // For lines side by side, `columns` has the first line only.
         if column.heading.is_empty() && !has_speed {
             if !unit.is_empty() {
                 line(column.key, unit);
@@ -322,7 +322,7 @@ fn text_of_description(
     text
 }
 
-/// The unit of a column that names none.
+/// The unit of a column without one.
 fn default_unit(key: &str) -> &'static str {
     match key {
         "speed" => "rpm",

@@ -1,4 +1,4 @@
-//! Tables of the points of a map, as engineers have them. The nominal map of a campaign and the map formats are read here alike.
+//! Reads tables of map points in any usual layout, for the nominal map of a campaign and for the map formats.
 
 mod columns;
 mod description;
@@ -12,13 +12,13 @@ mod sheet;
 mod units_row;
 
 pub use description::{
-    DESCRIPTION_KEYS, DescriptionError, DescriptionKey, KeyError, describe, describe_turbine,
-    description_from_yaml, read_description, set_key,
+    DESCRIPTION_KEYS, DescriptionError, DescriptionKey, KeyError, description_from_yaml, description_text,
+    read_description, set_key, turbine_description_text,
 };
-pub use efficiency_comment::{DEFINITION, efficiency_in_comment};
+pub use efficiency_comment::{DEFINITION_PREFIX, efficiency_in_comment};
 pub use read::{read_any_bytes, read_any_text, read_text, read_workbook};
 pub use read_turbine::{read_turbine_text, read_turbine_workbook, reduced_turbine_point};
-pub use reference::{in_comment, parse_reference, settle};
-pub use rows_to_lines::{POINT_LIMIT, Row, line, map_of_rows, room_for_one_more};
-pub use sheet::file_text::{file_text, unpacked};
+pub use reference::{parse_reference, reference_in_comment, resolve_reference};
+pub use rows_to_lines::{MAX_POINTS, Row, check_point_count, line, map_of_rows};
+pub use sheet::file_text::{file_text, unpack};
 pub use sheet::grid::text_of;

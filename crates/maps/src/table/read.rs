@@ -1,8 +1,8 @@
-//! Reads a table of points as engineers have it: headings of several languages in any order, units in the heading or below it, a preamble,
-//! a speed only in the first row of its line, one block per speed or side by side, measured points that are not corrected yet.
+//! Reads a table of map points: headings of several languages in any order, units in or below the heading, a preamble, a speed only in the
+//! first row of its line, one block per speed or side by side, measured points that are not corrected yet.
 
 use crate::table::columns::column::Machine;
-use crate::table::columns::described_columns::Given;
+use crate::table::columns::described_columns::DescribedColumns;
 use crate::table::columns::quantity::Quantity;
 use crate::table::efficiency_comment::efficiency_in_comment;
 use crate::table::gas_turbine::beta_tables::{read_arrays, read_gsp, read_modelica, read_nested};
@@ -56,7 +56,7 @@ pub fn read_any_bytes(bytes: &[u8], given: &MapDescription) -> Result<ImportedMa
     read_any_text(&text_of(bytes)?, given)
 }
 
-/// How every table of an NPSS map begins.
+/// Start of every table of an NPSS map.
 const NPSS_TABLE: &str = "Table TB_";
 
 /// Lines above the tables of GSP and GasTurb: the title, which begins with 99, and the effect of the Reynolds number.
@@ -84,19 +84,19 @@ pub(super) struct Notes {
 }
 
 fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedMap, ImportError> {
-    let given = Given::of(description, Machine::Compressor)?;
-    let (grid, layout) = layout::understood(grid, &given)?;
+    let given = DescribedColumns::of(description, Machine::Compressor)?;
+    let (grid, layout) = layout::detect_layout(grid, &given)?;
     let grid = grid.as_ref();
     if layout.is_turbine_alone() {
         let heading = layout.first_row.checked_sub(1).and_then(|row| grid.rows.get(row));
         let text = heading.map(|row| row.text().chars().take(60).collect()).unwrap_or_default();
         return Err(ImportError::Turbine { line: heading.map_or(1, |row| row.at), text });
     }
-    let notes = notes(grid, layout.first_row);
+    let notes = read_notes(grid, layout.first_row);
     let mut remarks = layout.remarks.clone();
-    let mut reference = reference::settle(notes.reference, description.reference);
+    let mut reference = reference::resolve_reference(notes.reference, description.reference);
     if layout.needs_no_reference() && matches!(reference, Err(ImportError::NoReference)) {
-        // Reduced quantities become corrected ones of any state; this one is the usual.
+        // Reduced quantities can be corrected to any state.
         reference = Ok(ReferenceState::SAE);
         remarks.push(ImportRemark::ReducedQuantities { reference: ReferenceState::SAE });
     }
@@ -121,7 +121,7 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedMap, Import
     for point in &points {
         let mut row = row(point, &layout, reference, in_percent)?;
         if layout.is_measured() {
-            let as_measured = as_measured(point, &row, reference, description)?;
+            let as_measured = measured_point(point, &row, reference, description)?;
             correct(&mut row, &as_measured, reference);
             measured.push(as_measured);
         }
@@ -138,8 +138,8 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedMap, Import
     Ok(ImportedMap { map: CompressorMap { efficiency, ..map }, columns, remarks, measured })
 }
 
-/// A value that a point needs.
-pub(super) fn needed(point: &Point<'_>, quantity: Quantity, value: Option<f64>) -> Result<f64, ImportError> {
+/// A value that a point must have.
+pub(super) fn require(point: &Point<'_>, quantity: Quantity, value: Option<f64>) -> Result<f64, ImportError> {
     value.ok_or_else(|| ImportError::NotANumber {
         line: point.at,
         quantity: quantity.name().to_owned(),
@@ -147,7 +147,7 @@ pub(super) fn needed(point: &Point<'_>, quantity: Quantity, value: Option<f64>) 
     })
 }
 
-/// The four numbers of a point; speed and flow of a measured one are not corrected yet, and its pressure ratio is unknown.
+/// The row of a point. Speed and flow of a measured point are not corrected yet, and its pressure ratio is unknown.
 fn row(
     point: &Point<'_>,
     layout: &Layout,
@@ -161,42 +161,42 @@ fn row(
     let ratio = any(&[Quantity::PressureRatio]);
     Ok(Row {
         at: point.at,
-        speed_corrected_rpm: needed(point, Quantity::Speed, own_speed.or(point.speed))?,
-        flow_corrected_kg_s: needed(point, Quantity::Flow, flow)?,
+        speed_corrected_rpm: require(point, Quantity::Speed, own_speed.or(point.speed))?,
+        flow_corrected_kg_s: require(point, Quantity::Flow, flow)?,
         pressure_ratio: match layout.is_measured() {
             true => f64::NAN,
-            false => needed(point, Quantity::PressureRatio, ratio)?,
+            false => require(point, Quantity::PressureRatio, ratio)?,
         },
         eta: any(&[Quantity::Efficiency]).map(|eta| if in_percent { 0.01 * eta } else { eta }),
     })
 }
 
 /// The measured values of a point, static pressures converted to total ones.
-fn as_measured(
+fn measured_point(
     point: &Point<'_>,
     row: &Row,
     reference: ReferenceState,
     given: &MapDescription,
 ) -> Result<MeasuredPoint, ImportError> {
     let value = |quantity: Quantity| point.value(quantity, reference);
-    let of = |quantity: Quantity| needed(point, quantity, value(quantity));
+    let of = |quantity: Quantity| require(point, quantity, value(quantity));
     let flow_kg_s = row.flow_corrected_kg_s;
     let (t1_k, t2_k) = (of(Quantity::T1)?, value(Quantity::T2));
     let taps = given.static_taps;
-    let pressure = |quantity: Quantity| needed(point, quantity, pressure_pa(point, quantity, given)?);
+    let pressure = |quantity: Quantity| require(point, quantity, pressure_pa(point, quantity, given)?);
     let (mut p1_pa, mut p2_pa) = (pressure(Quantity::P1)?, pressure(Quantity::P2)?);
     if let Some(diameter_m) = taps.inlet_diameter_m {
         p1_pa = static_to_total_pa(p1_pa, flow_kg_s, t1_k, diameter_m);
     }
     if let Some(diameter_m) = taps.outlet_diameter_m {
-        p2_pa = static_to_total_pa(p2_pa, flow_kg_s, needed(point, Quantity::T2, t2_k)?, diameter_m);
+        p2_pa = static_to_total_pa(p2_pa, flow_kg_s, require(point, Quantity::T2, t2_k)?, diameter_m);
     }
     let humidity = point.of(Quantity::Humidity).map(|(column, written)| match column.is_relative() {
         true if column.unit.is_empty() => {
             Air::of_relative_humidity(0.01 * written, t1_k, p1_pa).humidity_kg_kg
         }
-        true => Air::of_relative_humidity(column.plain(written), t1_k, p1_pa).humidity_kg_kg,
-        false => column.plain(written),
+        true => Air::of_relative_humidity(column.as_stated(written), t1_k, p1_pa).humidity_kg_kg,
+        false => column.as_stated(written),
     });
     if let Some(humidity) = humidity.filter(|humidity| !(0.0..=MAX_HUMIDITY_KG_KG).contains(humidity)) {
         return Err(ImportError::Value {
@@ -237,13 +237,13 @@ pub(super) fn pressure_pa(
 ) -> Result<Option<f64>, ImportError> {
     let Some((column, value)) = point.of(quantity) else { return Ok(None) };
     if !column.is_gauge {
-        return Ok(Some(column.plain(value)));
+        return Ok(Some(column.as_stated(value)));
     }
-    let ambient = point.of(Quantity::Ambient).map(|(column, value)| column.plain(value));
+    let ambient = point.of(Quantity::Ambient).map(|(column, value)| column.as_stated(value));
     match ambient.or(given.ambient_pa) {
-        Some(ambient_pa) => Ok(Some(column.plain(value) + ambient_pa)),
+        Some(ambient_pa) => Ok(Some(column.as_stated(value) + ambient_pa)),
         None => {
-            let missing = "ambient pressure, over which a gauge pressure is (or give the `barometer`)";
+            let missing = "ambient pressure, which is added to a gauge pressure (or give the `barometer`)";
             Err(ImportError::NoColumn { line: point.at, missing, found: column.heading.clone() })
         }
     }
@@ -263,16 +263,18 @@ fn correct(row: &mut Row, point: &MeasuredPoint, reference: ReferenceState) {
     row.eta = row.eta.or(t2_k.map(|t2_k| apparent_efficiency(row.pressure_ratio, point.t1_k, t2_k, air)));
 }
 
-/// Looks through the rows outside the table.
-pub(super) fn notes(grid: &Grid, first_row: usize) -> Notes {
+/// Reads the rows outside the table.
+pub(super) fn read_notes(grid: &Grid, first_row: usize) -> Notes {
     let mut notes = Notes::default();
     for (index, row) in grid.rows.iter().enumerate() {
         if index >= first_row && !row.is_comment {
             continue;
         }
         let text = row.text();
-        notes.reference =
-            notes.reference.or_else(|| reference::in_comment(&text)).or_else(|| reference_in(grid, &text));
+        notes.reference = notes
+            .reference
+            .or_else(|| reference::reference_in_comment(&text))
+            .or_else(|| parse_reference_line(grid, &text));
         notes.efficiency = notes.efficiency.or_else(|| efficiency_in_comment(&text));
         if let Some((_, name)) =
             text.split_once("compressor map of ").or_else(|| text.split_once("turbine map of "))
@@ -284,7 +286,7 @@ pub(super) fn notes(grid: &Grid, first_row: usize) -> Notes {
 }
 
 /// "Reference Pressure 100 kPa, Reference Temperature 298 K": a pressure and a temperature in a line that names their purpose.
-fn reference_in(grid: &Grid, text: &str) -> Option<ReferenceState> {
+fn parse_reference_line(grid: &Grid, text: &str) -> Option<ReferenceState> {
     let lower = text.to_lowercase();
     let words =
         ["ref", "corrected to", "conditions", "standard cond", "bezug", "korrigiert auf", "normzustand"];

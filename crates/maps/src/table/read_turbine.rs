@@ -1,9 +1,9 @@
 //! Reads a turbine map from a table of points, in all layouts of compressor maps.
 
 use crate::table::columns::column::{Column, Machine};
-use crate::table::columns::described_columns::Given;
+use crate::table::columns::described_columns::DescribedColumns;
 use crate::table::columns::quantity::Quantity;
-use crate::table::read::{needed, notes, pressure_pa};
+use crate::table::read::{pressure_pa, read_notes, require};
 use crate::table::reference;
 use crate::table::sheet::grid::Grid;
 use crate::table::sheet::layout;
@@ -32,19 +32,19 @@ pub fn read_turbine_workbook(bytes: &[u8], given: &MapDescription) -> Result<Imp
     read(&grid_of_workbook(bytes, given.sheet.as_deref())?, given)
 }
 
-/// Speed parameters are below, corrected speeds above: 200 krpm at 1000 K are 6300 rpm/K^0.5, and no turbocharger's map ends at 10 krpm.
-const LARGEST_SPEED_PARAMETER: f64 = 10_000.0;
+/// Maximum speed parameter; larger values are corrected speeds. 200 krpm at 1000 K is 6300 rpm/K^0.5, and no map ends at 10 krpm.
+const MAX_SPEED_PARAMETER: f64 = 10_000.0;
 
 fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedTurbine, ImportError> {
-    let given = Given::of(description, Machine::Turbine)?;
-    let (grid, layout) = layout::understood(grid, &given)?;
+    let given = DescribedColumns::of(description, Machine::Turbine)?;
+    let (grid, layout) = layout::detect_layout(grid, &given)?;
     let grid = grid.as_ref();
-    let notes = notes(grid, layout.first_row);
+    let notes = read_notes(grid, layout.first_row);
     let mut remarks = layout.remarks.clone();
     let all = || layout.groups.iter().flat_map(|group| &group.columns);
     let line = layout.first_row.checked_sub(1).and_then(|row| grid.rows.get(row)).map_or(1, |row| row.at);
     let without_unit = |quantity: Quantity| all().find(|c| c.quantity == quantity && !c.has_unit());
-    // A factor of a thousand between MPa and kPa, or ten between bar and MPa, is within what turbines have.
+    // Flow parameters of turbines vary by more than the factors between MPa, bar and kPa, so the size does not reveal the unit.
     if let Some(column) = without_unit(Quantity::ReducedFlow).filter(|column| !is_sae(column)) {
         let (heading, key) = (column.heading.clone(), Quantity::ReducedFlow.key());
         return Err(ImportError::NoUnit { line, heading, key, example: "kg/s*K^0.5/kPa" });
@@ -59,14 +59,14 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedTurbine, Im
     };
     let fastest = points.iter().filter_map(speed_of).fold(0.0, f64::max);
     let has_speed_unit = all().any(|column| column.quantity == Quantity::Speed && column.has_unit());
-    let speed_is_reduced = measured.is_empty() && !has_speed_unit && fastest < LARGEST_SPEED_PARAMETER;
+    let speed_is_reduced = measured.is_empty() && !has_speed_unit && fastest < MAX_SPEED_PARAMETER;
     if speed_is_reduced && all().any(|column| column.quantity == Quantity::Speed) {
         remarks.push(ImportRemark::SpeedParameterAssumed);
     }
     let corrected = measured.is_empty()
         && (all().any(|column| is_flow(column.quantity))
             || !speed_is_reduced && all().any(|column| column.quantity == Quantity::Speed));
-    let reference = match reference::settle(notes.reference, description.reference) {
+    let reference = match reference::resolve_reference(notes.reference, description.reference) {
         Err(ImportError::NoReference) if !corrected => None,
         settled => Some(settled?),
     };
@@ -107,7 +107,7 @@ fn is_sae(column: &Column) -> bool {
 /// The speed of a point in the unit of its column, or of its block.
 fn speed_of(point: &Point<'_>) -> Option<f64> {
     let found = [Quantity::Speed, Quantity::ReducedSpeed].into_iter().find_map(|quantity| point.of(quantity));
-    found.map(|(column, value)| column.plain(value)).or(point.speed)
+    found.map(|(column, value)| column.as_stated(value)).or(point.speed)
 }
 
 fn row(
@@ -116,8 +116,8 @@ fn row(
     speed_is_reduced: bool,
     in_percent: bool,
 ) -> Result<TurbineMapPoint, ImportError> {
-    let value = |quantity: Quantity| point.of(quantity).map(|(column, value)| column.plain(value));
-    let needed = |value: Option<f64>, quantity: Quantity| needed(point, quantity, value);
+    let value = |quantity: Quantity| point.of(quantity).map(|(column, value)| column.as_stated(value));
+    let needed = |value: Option<f64>, quantity: Quantity| require(point, quantity, value);
     let root = reference.t_ref_k.sqrt();
     let speed = needed(speed_of(point), Quantity::Speed)?;
     let is_parameter = speed_is_reduced || value(Quantity::ReducedSpeed).is_some();
@@ -143,8 +143,8 @@ fn is_flow(quantity: Quantity) -> bool {
 
 /// The measured values of a point.
 fn as_measured(point: &Point<'_>, given: &MapDescription) -> Result<MeasuredTurbinePoint, ImportError> {
-    let value = |quantity: Quantity| point.of(quantity).map(|(column, value)| column.plain(value));
-    let of = |quantity: Quantity, value: Option<f64>| needed(point, quantity, value);
+    let value = |quantity: Quantity| point.of(quantity).map(|(column, value)| column.as_stated(value));
+    let of = |quantity: Quantity, value: Option<f64>| require(point, quantity, value);
     let pressure = |quantity: Quantity| of(quantity, pressure_pa(point, quantity, given)?);
     let measured = MeasuredTurbinePoint {
         line: point.at,
@@ -180,7 +180,7 @@ pub fn reduced_turbine_point(point: &MeasuredTurbinePoint) -> TurbineMapPoint {
 }
 
 /// # Errors
-/// [`ImportError::Value`] for a value that no turbine has.
+/// [`ImportError::Value`] for a value that is impossible for a turbine.
 fn check(line: usize, row: TurbineMapPoint) -> Result<TurbineMapPoint, ImportError> {
     let flow = row.flow_parameter_kg_sqrt_k_s_kpa;
     let eta = row.efficiency.unwrap_or(0.5);
@@ -188,7 +188,7 @@ fn check(line: usize, row: TurbineMapPoint) -> Result<TurbineMapPoint, ImportErr
         (
             "speed over the root of temperature",
             row.speed_parameter_rpm_sqrt_k,
-            row.speed_parameter_rpm_sqrt_k > 0.0 && row.speed_parameter_rpm_sqrt_k < LARGEST_SPEED_PARAMETER,
+            row.speed_parameter_rpm_sqrt_k > 0.0 && row.speed_parameter_rpm_sqrt_k < MAX_SPEED_PARAMETER,
             "above 0, below 10 000 rpm/K^0.5",
         ),
         // A nozzle of air passes 0.0404 kg K^0.5/(s kPa) through each 10 cm2: 10 would be a throat of 2500 cm2.

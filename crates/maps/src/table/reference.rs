@@ -1,4 +1,4 @@
-//! The reference state: from a keyword, from the user, from a comment of the file.
+//! Parses reference states, and resolves those of the file and of the user.
 
 use mapper_core::{ImportError, ReferenceState};
 
@@ -42,12 +42,12 @@ fn quantity(text: &str, units: Units) -> Option<f64> {
     let unit = text[digits..].trim();
     let (_, factor, offset) = units.iter().find(|(name, ..)| *name == unit)?;
     let value: f64 = text[..digits].trim().parse().ok()?;
-    // Exact without a conversion, so that written values are read back to the bit.
+    // No conversion if the factor is 1, so that written values are read back to the bit.
     Some(if *factor == 1.0 && *offset == 0.0 { value } else { (value + offset) * factor })
 }
 
 /// The reference state in a comment after the word "reference" and a colon.
-pub fn in_comment(comment: &str) -> Option<ReferenceState> {
+pub fn reference_in_comment(comment: &str) -> Option<ReferenceState> {
     let lower = comment.to_ascii_lowercase();
     let at = lower.find("reference")?;
     let (_, behind) = comment.get(at..)?.split_once(':')?;
@@ -58,12 +58,12 @@ pub fn in_comment(comment: &str) -> Option<ReferenceState> {
 ///
 /// # Errors
 /// [`ImportError::NoReference`] and [`ImportError::ReferenceConflict`].
-pub fn settle(
+pub fn resolve_reference(
     found: Option<ReferenceState>,
     given: Option<ReferenceState>,
 ) -> Result<ReferenceState, ImportError> {
     match (found, given) {
-        (Some(found), Some(given)) if !same(found, given) => {
+        (Some(found), Some(given)) if !equal_as_printed(found, given) => {
             Err(ImportError::ReferenceConflict { found, given })
         }
         (Some(found), _) => Ok(found),
@@ -73,7 +73,7 @@ pub fn settle(
 }
 
 /// Equal within the rounding of printed digits.
-fn same(a: ReferenceState, b: ReferenceState) -> bool {
+fn equal_as_printed(a: ReferenceState, b: ReferenceState) -> bool {
     (a.t_ref_k - b.t_ref_k).abs() < 0.05 && (a.p_ref_pa - b.p_ref_pa).abs() < 20.0
 }
 
@@ -87,7 +87,7 @@ mod tests {
         assert_eq!(parse_reference("298 K, 100 kPa").unwrap(), ReferenceState::SAE);
         assert_eq!(parse_reference("298K,1 bar").unwrap(), ReferenceState::SAE);
         let garrett = parse_reference("545 degR, 13.95 psia").unwrap();
-        assert!(same(garrett, ReferenceState::GARRETT));
+        assert!(equal_as_printed(garrett, ReferenceState::GARRETT));
         assert!((parse_reference("25 degC, 100 kPa").unwrap().t_ref_k - 298.15).abs() < 1e-12);
         for wrong in [
             "",
@@ -104,9 +104,9 @@ mod tests {
             assert!(error.contains("Garrett"), "{error}");
         }
         assert_eq!(
-            in_comment("# reference state of corrected flow and speed: 298 K, 100000 Pa"),
+            reference_in_comment("# reference state of corrected flow and speed: 298 K, 100000 Pa"),
             Some(ReferenceState::SAE)
         );
-        assert_eq!(in_comment("# no state here"), None);
+        assert_eq!(reference_in_comment("# no state here"), None);
     }
 }

@@ -1,18 +1,18 @@
-//! Rows to speed lines.
+//! Groups rows of a table into speed lines.
 
 use crate::table::reference;
 use mapper_core::{
     CommonErrors, CompressorMap, IdentifiedPoint, ImportError, MapPoint, Method, ReferenceState, SpeedLine,
     SpeedShift, StepKind, Verdict,
 };
-use mapper_physics::compressor_map::inlet_limit::{SLOWEST_TOP_SPEED_RPM, largest_flow_kg_s};
+use mapper_physics::compressor_map::inlet_limit::{MIN_TOP_SPEED_RPM, max_flow_kg_s};
 use mapper_physics::compressor_map::similarity::at_speed;
 
 /// Maximum number of points.
-pub const POINT_LIMIT: usize = 100_000;
+pub const MAX_POINTS: usize = 100_000;
 
-/// Maximum relative speed difference within a line: lines of maps are 5 % or more apart, speed within a line is steady to 1 %.
-const SAME_LINE_RATIO: f64 = 0.015;
+/// Maximum relative difference of speed within a line: it varies by 1 %, and lines of maps are at least 5 % apart.
+const MAX_LINE_SPEED_DIFFERENCE_RATIO: f64 = 0.015;
 
 /// The four numbers of a row, common to all maps.
 #[derive(Debug, Clone, Copy)]
@@ -31,7 +31,7 @@ pub struct Row {
 
 impl Row {
     /// # Errors
-    /// [`ImportError`] with the value that no map has.
+    /// [`ImportError`] with the impossible value.
     pub fn check(&self) -> Result<(), ImportError> {
         let positive = "a number above 0";
         for (quantity, value, good, needed) in [
@@ -64,19 +64,19 @@ impl Row {
                 return Err(ImportError::Value { line: self.at, quantity, value, needed });
             }
         }
-        let most_kg_s = largest_flow_kg_s(self.speed_corrected_rpm);
-        if self.flow_corrected_kg_s > most_kg_s {
+        let limit_kg_s = max_flow_kg_s(self.speed_corrected_rpm);
+        if self.flow_corrected_kg_s > limit_kg_s {
             return Err(ImportError::Flow {
                 line: self.at,
                 flow_corrected_kg_s: self.flow_corrected_kg_s,
                 speed_corrected_rpm: self.speed_corrected_rpm,
-                most_kg_s,
+                limit_kg_s,
             });
         }
         Ok(())
     }
 
-    /// A point with only the numbers of its row. Physical values are those at the reference state.
+    /// A point with only the values of its row. Physical values are those at the reference state.
     pub fn point(&self, reference: ReferenceState, step: usize) -> IdentifiedPoint {
         IdentifiedPoint {
             step,
@@ -113,26 +113,28 @@ impl Row {
 /// A map of rows with only four numbers.
 ///
 /// # Errors
-/// [`ImportError`] without reference state or points, and for speeds of no turbocharger.
+/// [`ImportError`] without reference state or points, and for impossible speeds.
 pub fn map_of_rows(
     machine: String,
     rows: &[Row],
     found: Option<ReferenceState>,
     given: Option<ReferenceState>,
 ) -> Result<CompressorMap, ImportError> {
-    let reference = reference::settle(found, given)?;
+    let reference = reference::resolve_reference(found, given)?;
     if rows.is_empty() {
         return Err(ImportError::Empty);
     }
     let fastest_rpm = rows.iter().map(|row| row.speed_corrected_rpm).fold(0.0, f64::max);
-    if fastest_rpm < SLOWEST_TOP_SPEED_RPM {
+    if fastest_rpm < MIN_TOP_SPEED_RPM {
         return Err(ImportError::Slow { speed_corrected_rpm: fastest_rpm });
     }
     let mut points: Vec<IdentifiedPoint> =
         rows.iter().enumerate().map(|(step, row)| row.point(reference, step)).collect();
     points.sort_by(|a, b| a.speed_corrected_rpm.total_cmp(&b.speed_corrected_rpm));
     let lines = points
-        .chunk_by(|a, b| b.speed_corrected_rpm <= a.speed_corrected_rpm * (1.0 + SAME_LINE_RATIO))
+        .chunk_by(|a, b| {
+            b.speed_corrected_rpm <= a.speed_corrected_rpm * (1.0 + MAX_LINE_SPEED_DIFFERENCE_RATIO)
+        })
         .map(|members| {
             let speeds = || members.iter().map(|point| point.speed_corrected_rpm);
             let (low, high) = speeds().fold((f64::INFINITY, 0.0f64), |r, v| (r.0.min(v), r.1.max(v)));
@@ -152,7 +154,7 @@ pub fn map_of_rows(
     })
 }
 
-/// A line of points by rising flow.
+/// A speed line with its points in order of flow.
 pub fn line(speed_corrected_rpm: f64, mut points: Vec<MapPoint>) -> SpeedLine {
     let speeds = || points.iter().map(|point| point.identified.speed_corrected_rpm);
     let (low, high) = speeds().fold((f64::INFINITY, 0.0f64), |r, v| (r.0.min(v), r.1.max(v)));
@@ -163,7 +165,7 @@ pub fn line(speed_corrected_rpm: f64, mut points: Vec<MapPoint>) -> SpeedLine {
     SpeedLine { speed_corrected_rpm, speed_spread_rpm: high - low, target_speed_rpm: None, points }
 }
 
-/// A point converted to the speed of its line by similarity.
+/// Converts a point to the speed of its line by similarity.
 fn on_line(point: &IdentifiedPoint, line_speed_rpm: f64) -> MapPoint {
     let shift_rpm = line_speed_rpm - point.speed_corrected_rpm;
     let (flow, ratio) = (point.flow_corrected_kg_s, point.pressure_ratio);
@@ -187,9 +189,9 @@ fn on_line(point: &IdentifiedPoint, line_speed_rpm: f64) -> MapPoint {
 ///
 /// # Errors
 /// [`ImportError::TooMany`].
-pub fn room_for_one_more(count: usize, at: usize) -> Result<(), ImportError> {
-    if count >= POINT_LIMIT {
-        return Err(ImportError::TooMany { line: at, limit: POINT_LIMIT });
+pub fn check_point_count(count: usize, at: usize) -> Result<(), ImportError> {
+    if count >= MAX_POINTS {
+        return Err(ImportError::TooMany { line: at, limit: MAX_POINTS });
     }
     Ok(())
 }

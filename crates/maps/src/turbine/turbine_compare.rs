@@ -1,4 +1,4 @@
-//! Differences between two turbine maps: each measured point of the second against the surface of the first.
+//! Compares two turbine maps: each measured point of the second with the surface of the first.
 
 use crate::turbine::turbine_fit::{TurbineFit, TurbineFitError};
 use mapper_core::{TurbineMap, TurbineMapPoint, confidence_interval_95};
@@ -7,7 +7,7 @@ use serde::Serialize;
 
 /// A point of the second map compared with the first. Differences: second minus first.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct ComparedTurbinePoint {
+pub struct TurbinePointComparison {
     /// The point.
     pub point: TurbineMapPoint,
     /// Difference of flow, fraction of the first's.
@@ -20,12 +20,12 @@ pub struct ComparedTurbinePoint {
     pub efficiency_standard_error: Option<f64>,
 }
 
-/// Two turbine maps side by side.
+/// Comparison of two turbine maps.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TurbineComparison {
     /// Points of the second map within the first.
-    pub points: Vec<ComparedTurbinePoint>,
-    /// Number of points beyond the first map.
+    pub points: Vec<TurbinePointComparison>,
+    /// Number of points outside the first map.
     pub not_compared: usize,
     /// Mean difference of flow, fraction; `None` without common places.
     pub flow_difference_mean_ratio: Option<f64>,
@@ -54,13 +54,13 @@ pub fn compare_turbines(
         (point, fit.at(point.vane_position, point.speed_parameter_rpm_sqrt_k, point.expansion_ratio))
     });
     let (beyond, within): (Vec<_>, Vec<_>) = places.partition(|(_, place)| place.extrapolated);
-    let points: Vec<ComparedTurbinePoint> = within
+    let points: Vec<TurbinePointComparison> = within
         .into_iter()
         .map(|(point, place)| {
-            // The standard error is of a measurement, so the scatter of the second map is in it.
+            // The standard error is that of a measurement, so it includes the scatter of the second map.
             let (flow_standard_error_ratio, efficiency_standard_error) = fit.standard_errors(point);
             let flow = point.flow_parameter_kg_sqrt_k_s_kpa / place.flow_parameter_kg_sqrt_k_s_kpa;
-            ComparedTurbinePoint {
+            TurbinePointComparison {
                 point: *point,
                 flow_difference_ratio: flow - 1.0,
                 flow_standard_error_ratio,

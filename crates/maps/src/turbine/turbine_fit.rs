@@ -1,7 +1,7 @@
 //! The smooth surface through a turbine map, with intervals.
 //!
 //! The flow parameter is a nozzle's, `sqrt(1 - ER^-1.1)`, times a polynomial in the logarithm of the expansion ratio, speed and vane
-//! position. The efficiency is a polynomial in the blade-speed ratio, which a map gives but for a constant factor: the speed parameter
+//! position. The efficiency is a polynomial in the blade-speed ratio, which a map gives up to a constant factor: the speed parameter
 //! over the root of the isentropic drop (Watson and Janota, Turbocharging the Internal Combustion Engine, ch. 5).
 
 use crate::turbine::turbine_surface::{Observation, Place, Surface, Term};
@@ -37,10 +37,10 @@ const EFFICIENCY_TERMS: [Term; 11] = [
     [0, 2, 0],
     [0, 0, 3],
 ];
-/// Inlet temperature of gas stands, 600 degC: the exponent of the gas changes by 4 % between 300 degC and 900 degC.
-const GAS_K: f64 = 873.15;
-/// A constant and its scatter are all that fewer points give.
-const LEAST_POINTS: usize = 4;
+/// Usual inlet temperature of gas stands (600 degC), K: the exponent of the gas changes by only 4 % between 300 degC and 900 degC.
+const USUAL_GAS_K: f64 = 873.15;
+/// Minimum number of points: fewer determine only a constant and its scatter.
+const MIN_POINTS: usize = 4;
 /// Nodes over the expansion ratio.
 const NODES: usize = 21;
 
@@ -50,7 +50,7 @@ pub enum TurbineFitError {
     /// Too few points.
     #[error("the turbine map has {points} points; a fit needs at least 4, on lines of different speed")]
     TooFewPoints {
-        /// Their number.
+        /// Number of points.
         points: usize,
     },
 }
@@ -72,7 +72,7 @@ struct LineEnds {
     highest_ratio: f64,
 }
 
-/// Places beyond the measured ones by less than this share are not called extrapolated: speeds and pressures are held to a percent.
+/// Maximum relative distance outside the measured range that does not count as extrapolated: stands hold speeds and pressures within 1 %.
 const END_SLACK: f64 = 0.01;
 
 fn vane(point: &TurbineMapPoint) -> f64 {
@@ -89,7 +89,7 @@ fn flow_place(vane_position: f64, speed: f64, expansion_ratio: f64) -> Place {
 }
 
 fn efficiency_place(vane_position: f64, speed: f64, expansion_ratio: f64) -> Place {
-    let drop = 1.0 - expansion_ratio.powf(-isentropic_exponent(GAS_K));
+    let drop = 1.0 - expansion_ratio.powf(-isentropic_exponent(USUAL_GAS_K));
     [vane_position, speed, speed / drop.sqrt()]
 }
 
@@ -113,7 +113,7 @@ impl TurbineFit {
             ends.extend(line_ends(points));
         }
         let too_few = TurbineFitError::TooFewPoints { points: flow.len() };
-        if flow.len() < LEAST_POINTS {
+        if flow.len() < MIN_POINTS {
             return Err(too_few);
         }
         Ok(TurbineFit {
@@ -123,7 +123,7 @@ impl TurbineFit {
         })
     }
 
-    /// The map at a place.
+    /// Flow and efficiency at a place, with their intervals.
     pub fn at(&self, vane_position: Option<f64>, speed: f64, expansion_ratio: f64) -> FittedTurbineNode {
         let vane = vane_position.unwrap_or(0.0);
         let place = flow_place(vane, speed, expansion_ratio);
@@ -151,7 +151,7 @@ impl TurbineFit {
         (flow, self.efficiency.as_ref().map(|surface| surface.standard_error(place)))
     }
 
-    /// Whether a place is beyond the measured ones: the ranges of lines at the nearest vane position, linear between their speeds.
+    /// Whether a place is outside the ranges of the lines at the nearest vane position, which are linear between their speeds.
     fn is_beyond(&self, vane_position: f64, speed: f64, expansion_ratio: f64) -> bool {
         let distance = |ends: &LineEnds| (ends.vane_position - vane_position).abs();
         let vanes = || self.ends.iter().map(|ends| ends.vane_position);

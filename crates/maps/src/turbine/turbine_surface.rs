@@ -25,28 +25,28 @@ pub(crate) struct Surface {
     inverse: DMatrix<f64>,
     centre: Place,
     half_range: Place,
-    /// Standard deviation of a value about the surface: of the residuals, or of lines that the fit does not know if these are further off.
+    /// Standard deviation of a value about the surface: of the residuals, or the error at left-out lines if it is larger.
     pub sigma: f64,
     /// Half of a 95 % interval over its standard error.
     quantile: f64,
-    /// Root mean square of the error at lines that the fit does not know.
+    /// Root mean square error at left-out lines.
     pub left_out_rms: f64,
 }
 
-/// Points of a fit for each of its terms, at least: with fewer the residuals say little about the error.
-const POINTS_PER_TERM: usize = 2;
+/// Minimum number of points per term: with fewer the residuals underestimate the error.
+const MIN_POINTS_PER_TERM: usize = 2;
 
 impl Surface {
-    /// Fits the first terms of `candidates`; their number is that with the least error at left-out lines. `None` without enough points.
+    /// Fits the first terms of `candidates`, in the number with the smallest error at left-out lines. `None` without enough points.
     pub fn fit(observations: &[Observation], candidates: &[Term]) -> Option<Surface> {
         let (centre, half_range) = ranges(observations)?;
-        // A power that the places do not determine is left out: two vane positions have no curvature.
+        // Powers that the places do not determine are left out: two vane positions have no curvature.
         let usable: Vec<Term> = candidates
             .iter()
             .filter(|term| (0..3).all(|axis| (term[axis] as usize) < distinct(observations, axis)))
             .copied()
             .collect();
-        let most = usable.len().min(observations.len() / POINTS_PER_TERM);
+        let most = usable.len().min(observations.len() / MIN_POINTS_PER_TERM);
         let fitted = (1..=most).filter_map(|count| {
             let terms = usable.get(..count)?.to_vec();
             Surface::of_terms(observations, terms, centre, half_range)
@@ -76,14 +76,14 @@ impl Surface {
         for line in inner {
             let (left_out, kept): (Vec<Observation>, Vec<Observation>) =
                 observations.iter().partition(|observation| observation.line == line);
-            // Few lines leave nothing to fit: their points are then left out one by one below.
+            // With few lines the rest cannot be fitted: single points are left out below instead.
             if surface.solve(&kept).is_some() {
                 squares.extend(left_out.iter().map(|o| (o.value - surface.value(o.place)).powi(2)));
             }
         }
         surface.solve(observations)?;
         if squares.is_empty() {
-            // Residual of a point that the fit does not know: its residual over 1 minus its leverage.
+            // The residual of a left-out point is its residual over 1 minus its leverage.
             let without = |o: &Observation| {
                 ((o.value - surface.value(o.place)) / (1.0 - surface.leverage(o.place))).powi(2)
             };
@@ -98,7 +98,7 @@ impl Surface {
         surface.left_out_rms.is_finite().then_some(surface)
     }
 
-    /// The coefficients for some of the values; `None` if they do not determine them.
+    /// Solves for the coefficients; `None` if the observations do not determine them.
     fn solve(&mut self, observations: &[Observation]) -> Option<()> {
         if observations.len() < self.terms.len() {
             return None;
@@ -112,7 +112,7 @@ impl Surface {
         }
         let condition = normal.clone().symmetric_eigenvalues();
         // Coordinates are scaled to -1 to 1, so that the eigenvalues of a determined fit are within some decades.
-        if condition.min() < SMALLEST_EIGENVALUE_RATIO * condition.max() {
+        if condition.min() < MIN_EIGENVALUE_RATIO * condition.max() {
             return None;
         }
         let factor = normal.cholesky()?;
@@ -149,8 +149,8 @@ impl Surface {
     }
 }
 
-/// Eigenvalues of a determined fit are closer together: with 1e-10 coefficients keep five of their fifteen digits.
-const SMALLEST_EIGENVALUE_RATIO: f64 = 1e-10;
+/// Minimum ratio of the eigenvalues of a determined fit: at 1e-10 coefficients keep five of fifteen digits.
+const MIN_EIGENVALUE_RATIO: f64 = 1e-10;
 
 fn ranges(observations: &[Observation]) -> Option<(Place, Place)> {
     let mut centre = [0.0; 3];
@@ -169,26 +169,25 @@ fn ranges(observations: &[Observation]) -> Option<(Place, Place)> {
     Some((centre, half_range))
 }
 
-/// The lines that have slower and faster ones: the error of a line that the fit has to reach by extrapolation is another. All if they
-/// are few.
+/// The lines with both slower and faster neighbours, since leaving an outer line out would test extrapolation. All lines if there are few.
 fn inner_lines(observations: &[Observation], lines: usize) -> Vec<usize> {
     let speeds = || observations.iter().map(|observation| observation.place[1]);
     let (low, high) = speeds().fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| (r.0.min(v), r.1.max(v)));
     let is_outermost = |line: &usize| {
         let mut own = observations.iter().filter(|observation| observation.line == *line);
         own.any(|observation| {
-            observation.place[1] <= low * (1.0 + SAME_SPEED)
-                || observation.place[1] >= high * (1.0 - SAME_SPEED)
+            observation.place[1] <= low * (1.0 + MAX_LINE_SPEED_DIFFERENCE_RATIO)
+                || observation.place[1] >= high * (1.0 - MAX_LINE_SPEED_DIFFERENCE_RATIO)
         })
     };
     let inner: Vec<usize> = (0..lines).filter(|line| !is_outermost(line)).collect();
     if inner.len() < 2 { (0..lines).collect() } else { inner }
 }
 
-/// Speeds of a line differ by up to 1.5 %.
-const SAME_SPEED: f64 = 0.015;
+/// Maximum relative difference of speed within a line.
+const MAX_LINE_SPEED_DIFFERENCE_RATIO: f64 = 0.015;
 
-/// Number of places along an axis that are more than 2 % of the largest apart: a held speed is one place.
+/// Number of places along an axis that are more than 2 % of the largest apart: a controlled speed is one place.
 fn distinct(observations: &[Observation], axis: usize) -> usize {
     let mut values: Vec<f64> = observations.iter().map(|observation| observation.place[axis]).collect();
     values.sort_by(f64::total_cmp);

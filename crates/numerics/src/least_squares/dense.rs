@@ -1,9 +1,9 @@
-//! Full normal equations.
+//! Solves dense normal equations.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// The step `x` of `(A + damping diag A) x = b`, with A the normal matrix and b the right side (the negative half gradient);
-/// `None` where that cannot be solved or is not finite.
+/// `None` if the system cannot be solved or the step is not finite.
 pub fn damped_step(normal: &DMatrix<f64>, right: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
     let mut damped = normal.clone();
     for i in 0..damped.nrows() {

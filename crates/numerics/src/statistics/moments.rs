@@ -2,20 +2,20 @@
 
 use std::borrow::Borrow;
 
-/// Arithmetic mean, in the unit of the values; `None` without values, NaN where one of them is NaN.
+/// Arithmetic mean, in the unit of the values; `None` without values, NaN if one of them is NaN.
 pub fn mean<T: Borrow<f64>>(values: impl IntoIterator<Item = T>) -> Option<f64> {
     let (sum, count) =
         values.into_iter().fold((0.0, 0usize), |(sum, count), value| (sum + *value.borrow(), count + 1));
     (count > 0).then(|| sum / count as f64)
 }
 
-/// Root mean square, in the unit of the values; `None` without values, NaN where one of them is NaN.
+/// Root mean square, in the unit of the values; `None` without values, NaN if one of them is NaN.
 pub fn rms<T: Borrow<f64>>(values: impl IntoIterator<Item = T>) -> Option<f64> {
     mean(values.into_iter().map(|value| value.borrow().powi(2))).map(f64::sqrt)
 }
 
 /// Standard deviation of the population from which the values are drawn (sum of squares over `n - 1`), in their unit;
-/// `None` for fewer than two, NaN where one of them is NaN.
+/// `None` for fewer than two, NaN if one of them is NaN.
 pub fn standard_deviation<T: Borrow<f64>>(values: impl IntoIterator<Item = T>) -> Option<f64> {
     let values: Vec<f64> = values.into_iter().map(|value| *value.borrow()).collect();
     let mean = mean(&values)?;

@@ -1,4 +1,4 @@
-//! Segments of a step over which readings are averaged: short while the machine still moves, long when only the metal does.
+//! Segments of a step for averaging readings: short after the jump, long when only the metal's temperature changes.
 
 /// Rule for cutting a step into segments.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,8 +14,8 @@ pub struct Schedule {
 }
 
 impl Schedule {
-    /// Starts and ends of the segments from `start_s` to `end_s`, each at least `interval_s` (the distance of two samples) long. They leave no
-    /// gaps; the list is empty if the step is shorter than the shortest segment.
+    /// Starts and ends of the segments from `start_s` to `end_s`, each at least `interval_s` (the distance of two samples) long. They have
+    /// no gaps; the list is empty if the step is shorter than the shortest segment.
     pub fn stretches(&self, start_s: f64, end_s: f64, interval_s: f64) -> Vec<(f64, f64)> {
         let whole_s = end_s - start_s;
         let mut found = Vec::new();

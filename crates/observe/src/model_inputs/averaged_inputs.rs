@@ -16,7 +16,7 @@ use mapper_physics::simulation::inputs::{Inputs, InputsError, InterpolatedInputs
 const RAW_S: f64 = 3.0;
 /// Largest lag that is attributed to the valve, s: pneumatic and electric actuators of this size need 0.1 to 1 s, flow meters up to several
 /// seconds. Judgement.
-const SLOWEST_VALVE_S: f64 = 1.5;
+const MAX_VALVE_LAG_S: f64 = 1.5;
 /// Averaging times after that. A loop that holds the speed trims P3 by a per cent within ten seconds of the jump, and a mean must not lag
 /// behind that. It is at least the time step of the model, which would otherwise see single means.
 const AFTER_JUMP: Schedule = Schedule {
@@ -94,7 +94,7 @@ impl AveragedInputs {
 fn valve_response(recording: &Recording, nominal: &BoundaryConditions) -> Response {
     let measured =
         Table::new(recording).and_then(|table| measured_valve_response(&table, recording, nominal.p1_pa));
-    measured.filter(|valve| valve.lag_s < SLOWEST_VALVE_S).unwrap_or(Response::lag(0.0))
+    measured.filter(|valve| valve.lag_s < MAX_VALVE_LAG_S).unwrap_or(Response::lag(0.0))
 }
 
 struct Nodes<'a> {

@@ -7,7 +7,7 @@ use mapper_numerics::statistics::median;
 use mapper_physics::laws::orifice;
 
 /// Change of a command below which it counts as constant.
-const HELD_RATIO: f64 = 1e-6;
+const COMMAND_TOLERANCE_RATIO: f64 = 1e-6;
 
 /// A commanded level from a given time on.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -134,7 +134,7 @@ pub(crate) fn levels_of_step(recording: &Recording, step: &StepMarker) -> Vec<Le
     // The first sample may precede the change, and a change is later than the sample before it.
     for (pair_s, value) in t_s.windows(2).zip(values.iter().skip(1)) {
         // The read-back of a constant command varies in its last digits.
-        let moved = p3_pa.is_nan() || !alike(*value, p3_pa);
+        let moved = p3_pa.is_nan() || !is_same_command(*value, p3_pa);
         if moved && value.is_finite() && pair_s[0] > start_s {
             (start_s, p3_pa) = (pair_s[0], *value);
             levels.push(level(start_s, p3_pa));
@@ -144,16 +144,16 @@ pub(crate) fn levels_of_step(recording: &Recording, step: &StepMarker) -> Vec<Le
 }
 
 /// Whether two commands are the same.
-pub(crate) fn alike(value: f64, other: f64) -> bool {
-    (value / other - 1.0).abs() <= HELD_RATIO
+pub(crate) fn is_same_command(value: f64, other: f64) -> bool {
+    (value / other - 1.0).abs() <= COMMAND_TOLERANCE_RATIO
 }
 
-/// Responses tried before the fine search: lags, and rates in jumps of the median size per second.
-const LOOKS: usize = 24;
+/// Number of lags, and rates in median jumps per second, of the coarse search.
+const COARSE_LAGS: usize = 24;
 const RATES: [f64; 9] = [0.2, 0.35, 0.6, 1.0, 1.7, 3.0, 5.0, 9.0, 16.0];
-/// Reduction of the squared residuals, in their mean square, from which a rate limit is accepted: ten standard deviations of white noise, five of
-/// coloured noise over the half second of a ramp. A limit that is not there costs nothing, since fast rates are a lag alone.
-const LIMITED: f64 = 100.0;
+/// Reduction of the squared residuals, in their mean square, above which a rate limit is accepted: ten standard deviations of white noise, five
+/// of coloured noise over the half second of a ramp. Accepting a limit wrongly has no effect, since a fast rate equals a lag alone.
+const MIN_COST_REDUCTION: f64 = 100.0;
 
 /// Time constant of the measured P3 relative to its command, s, and its standard error; `None` without jumps or P3.
 ///
@@ -249,10 +249,10 @@ fn cost_of(table: &Table, values: &[f64], jumps: &[f64], predicted: impl Fn(f64)
 fn best_lag(cost: impl Fn(f64) -> f64) -> Option<(f64, f64)> {
     // Logarithmic, from 1 ms to 60 s. Coarse search first: the cost has a single minimum only for first-order responses.
     let (shortest, longest) = (1e-3f64.ln(), 60f64.ln());
-    let place = |i: usize| shortest + (longest - shortest) * i as f64 / LOOKS as f64;
-    let costs: Vec<f64> = (0..=LOOKS).map(|i| cost(place(i).exp())).collect();
-    let best = (0..=LOOKS).min_by(|a, b| costs[*a].total_cmp(&costs[*b]))?;
-    let (low, high) = (place(best.saturating_sub(1)), place((best + 1).min(LOOKS)));
+    let place = |i: usize| shortest + (longest - shortest) * i as f64 / COARSE_LAGS as f64;
+    let costs: Vec<f64> = (0..=COARSE_LAGS).map(|i| cost(place(i).exp())).collect();
+    let best = (0..=COARSE_LAGS).min_by(|a, b| costs[*a].total_cmp(&costs[*b]))?;
+    let (low, high) = (place(best.saturating_sub(1)), place((best + 1).min(COARSE_LAGS)));
     let lag_s = minimise(low, high, 1e-6, |x| cost(x.exp())).at.exp();
     Some((lag_s, cost(lag_s)))
 }
@@ -277,15 +277,15 @@ fn measured_response<Prediction: Fn(f64) -> f64>(
     let alone = at_rate(f64::INFINITY)?;
     let coarse = RATES.iter().filter_map(|rate| at_rate(rate * size));
     let (_, coarse) = coarse.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    // Jumps that the limit does not touch give the cost a minimum of their own: a sweep comes first.
+    // Jumps that the limit does not affect give the cost a second minimum, so a coarse search comes first.
     let (low, high) = ((coarse.slew_per_s / 1.8).ln(), (coarse.slew_per_s * 1.8).ln());
-    let place = |i: usize| low + (high - low) * i as f64 / LOOKS as f64;
+    let place = |i: usize| low + (high - low) * i as f64 / COARSE_LAGS as f64;
     let cost = |rate: f64| at_rate(rate.exp()).map_or(f64::INFINITY, |(cost, _)| cost);
-    let costs: Vec<f64> = (0..=LOOKS).map(|i| cost(place(i))).collect();
-    let best = (0..=LOOKS).min_by(|a, b| costs[*a].total_cmp(&costs[*b]))?;
-    let (low, high) = (place(best.saturating_sub(1)), place((best + 1).min(LOOKS)));
+    let costs: Vec<f64> = (0..=COARSE_LAGS).map(|i| cost(place(i))).collect();
+    let best = (0..=COARSE_LAGS).min_by(|a, b| costs[*a].total_cmp(&costs[*b]))?;
+    let (low, high) = (place(best.saturating_sub(1)), place((best + 1).min(COARSE_LAGS)));
     let limited = at_rate(minimise(low, high, 1e-4, cost).at.exp());
-    let seen = limited.filter(|(cost, _)| alone.0 - cost > LIMITED * cost / samples);
+    let seen = limited.filter(|(cost, _)| alone.0 - cost > MIN_COST_REDUCTION * cost / samples);
     Some(seen.unwrap_or(alone).1)
 }
 

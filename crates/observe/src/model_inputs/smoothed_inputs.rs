@@ -117,7 +117,7 @@ impl Inputs for SmoothedInputs {
 }
 
 /// Length of the segments before and after a jump that give its height, s.
-const BESIDE_S: f64 = 8.0;
+const LEVEL_WINDOW_S: f64 = 8.0;
 
 /// Change of `values` per pascal of P3, from their jumps at P3's jumps; 0 if they do not follow it. `along` is P3 according to its command.
 fn share_along(
@@ -131,12 +131,12 @@ fn share_along(
         let jump_s = pair[1].start_s;
         let settled_s = jump_s + command.p3_settles_s(pair[0].p3_pa, pair[1].p3_pa);
         // Changes by a speed-holding loop right after a jump are not separate jumps.
-        if pair[0].start_s > jump_s - BESIDE_S {
+        if pair[0].start_s > jump_s - LEVEL_WINDOW_S {
             continue;
         }
         let height = |values: &[f64]| {
-            let before = line_at(table, values, jump_s - BESIDE_S, jump_s, jump_s)?;
-            Some(line_at(table, values, settled_s, settled_s + BESIDE_S, jump_s)? - before)
+            let before = line_at(table, values, jump_s - LEVEL_WINDOW_S, jump_s, jump_s)?;
+            Some(line_at(table, values, settled_s, settled_s + LEVEL_WINDOW_S, jump_s)? - before)
         };
         let (Some(change), Some(height_pa)) = (height(values), height(along)) else { continue };
         pairs.push((height_pa, change));

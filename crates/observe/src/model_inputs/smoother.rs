@@ -1,9 +1,9 @@
-//! Smooths a wandering quantity under noise of known size.
+//! Smooths a varying quantity with noise of known size.
 //!
 //! The model is an integrated random walk with white and first-order noise. Its intensity is chosen by likelihood, and the smoothed time
-//! history comes from the Kalman smoother (Rauch, Tung and Striebel 1965). If nothing wanders, the result is a straight line over the whole
-//! recording, which averages all of it. If something does, its slope may also change at given times, where commands change: a temperature that
-//! follows its command with a lag has a kink there, which must not be rounded.
+//! history comes from the Kalman smoother (Rauch, Tung and Striebel 1965). If nothing varies, the result is a straight line through the whole
+//! recording. Otherwise its slope may also change at given times of command changes: a temperature that follows its command with a lag has a
+//! kink there.
 
 use mapper_core::NoiseColour;
 use mapper_numerics::coloured_noise::{memory, variance_of_mean};
@@ -74,7 +74,7 @@ struct Bin {
 /// Standard deviations of a change of slope that are tried, noise of a sample a second.
 const KINKS_PER_S: [f64; 4] = [0.01, 0.1, 1.0, 10.0];
 /// Gain of the log likelihood from which changes of slope are assumed: that of one more parameter at three standard deviations.
-const KINKED: f64 = 4.5;
+const MIN_LIKELIHOOD_GAIN: f64 = 4.5;
 /// Exponents of the intensity over the variance, in steps of half a decade.
 const EXPONENTS: std::ops::RangeInclusive<i32> = -26..=4;
 
@@ -123,8 +123,8 @@ pub fn smooth(
         best
     };
     let (likelihood, smooth) = likeliest(0.0, EXPONENTS);
-    let mut best = (likelihood + KINKED, smooth, 0.0);
-    // Kinks only reduce the wander, and a constant has none.
+    let mut best = (likelihood + MIN_LIKELIHOOD_GAIN, smooth, 0.0);
+    // Kinks only reduce the variation, and a constant has none.
     if smooth > *EXPONENTS.start() && kinks.contains(&true) {
         for kink_per_s in KINKS_PER_S {
             let variance = (kink_per_s * noise_sigma).powi(2);

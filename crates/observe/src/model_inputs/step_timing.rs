@@ -5,30 +5,30 @@
 //! second after a jump. An equal delay of all jumps belongs to the actuator and stays in its response; different delays belong to the run.
 
 use crate::averages::time_table::Table;
-use crate::model_inputs::lagged_command::{LaggedCommand, Level, Response, alike, levels_of_step};
+use crate::model_inputs::lagged_command::{LaggedCommand, Level, Response, is_same_command, levels_of_step};
 use mapper_core::{Channel, Recording, StepMarker};
 use mapper_numerics::minimise::minimise;
 use mapper_numerics::statistics::{median, robust_sigma};
 use std::ops::Range;
 
 /// Maximum delay of a command behind its step's start, s; a later one belongs to another change.
-const LATE_MAX_S: f64 = 2.0;
+const MAX_COMMAND_DELAY_S: f64 = 2.0;
 /// Maximum sample spacing of a command that still dates its change, s.
-const SEEN_LATE_MAX_S: f64 = 1.0;
+const MAX_COMMAND_SPACING_S: f64 = 1.0;
 /// Time before a jump over which the level of P3 is taken, s.
-const STILL_S: f64 = 3.0;
+const LEVEL_WINDOW_S: f64 = 3.0;
 /// Thresholds for a moved P3: standard deviations of its scatter, and share of the jump.
 const MOVED_SIGMAS: f64 = 6.0;
 const MOVED_RATIO: f64 = 0.02;
 /// Time before and after a jump of P3 that is used to date it, s.
 const AROUND_S: (f64, f64) = (1.0, 3.0);
 /// The jumps are dated separately if they differ by more than these, in errors and in s.
-const APART_ERRORS: f64 = 3.0;
-const APART_S: f64 = 3e-3;
+const MIN_DIFFERENCE_SIGMAS: f64 = 3.0;
+const MIN_DIFFERENCE_S: f64 = 3e-3;
 /// Scatter of the sample times below which it is neglected, s.
-const SCATTER_MIN_S: f64 = 1e-3;
+const MIN_SCATTER_S: f64 = 1e-3;
 /// Minimum rate of P3 for dating samples, in noise sigmas a second.
-const RUNS_PER_S: f64 = 50.0;
+const MIN_RATE_SIGMAS_PER_S: f64 = 50.0;
 
 /// The recording with each step starting at the last sample before its command changed, so that it includes its whole transient.
 pub fn with_command_times(recording: &Recording) -> Recording {
@@ -52,29 +52,30 @@ fn command_s(recording: &Recording, step: &StepMarker) -> f64 {
     let late = |(channel, commanded): (Channel, f64)| {
         let command = recording.series.get(&channel)?;
         let before = command.held(step.start_s)?;
-        let (t_s, values) = command.slice(step.start_s, (step.start_s + LATE_MAX_S).min(step.end_s));
-        let still = values.iter().take_while(|value| alike(**value, before)).count();
+        let (t_s, values) = command.slice(step.start_s, (step.start_s + MAX_COMMAND_DELAY_S).min(step.end_s));
+        let still = values.iter().take_while(|value| is_same_command(**value, before)).count();
         let then = values.get(still)?;
-        (still > 0 && !alike(before, commanded) && alike(*then, commanded)).then(|| t_s[still - 1])
+        (still > 0 && !is_same_command(before, commanded) && is_same_command(*then, commanded))
+            .then(|| t_s[still - 1])
     };
     let late_s = commands.into_iter().find_map(late).map(|late_s| late_s.max(step.start_s));
-    late_s.or_else(|| seen_late_s(recording, step)).unwrap_or(step.start_s)
+    late_s.or_else(|| sampled_delay_s(recording, step)).unwrap_or(step.start_s)
 }
 
 /// If a log has the command only at its samples, a step begins with the first sample of the new command. The rig may have received it at any
 /// time since the sample before. Measured P3 has then moved by that first sample.
-fn seen_late_s(recording: &Recording, step: &StepMarker) -> Option<f64> {
+fn sampled_delay_s(recording: &Recording, step: &StepMarker) -> Option<f64> {
     let (command, p3) = (recording.series.get(&Channel::P3Command)?, recording.series.get(&Channel::P3)?);
     let first = command.t_s.partition_point(|t_s| *t_s < step.start_s);
     let place = first.checked_sub(1)?;
     let (before_s, before_pa) = (command.t_s[place], command.values[place]);
     let after_pa = command.values.get(first).copied().filter(|_| command.t_s[first] == step.start_s)?;
     let jump_pa = after_pa - before_pa;
-    if alike(before_pa, after_pa) || step.start_s - before_s > SEEN_LATE_MAX_S {
+    if is_same_command(before_pa, after_pa) || step.start_s - before_s > MAX_COMMAND_SPACING_S {
         return None;
     }
     // Movement of P3 at a constant command, noise included.
-    let still = p3.slice(step.start_s - STILL_S, before_s + 1e-9).1;
+    let still = p3.slice(step.start_s - LEVEL_WINDOW_S, before_s + 1e-9).1;
     let level_pa = median(still.iter().filter(|value| value.is_finite()))?;
     let scatter_pa = robust_sigma(still.iter().map(|value| value - level_pa))?;
     let seen_pa = p3
@@ -106,7 +107,8 @@ impl Times {
             (found.iter().map(|one| of(one).powi(2)).sum::<f64>() / found.len() as f64).sqrt()
         };
         let apart = mean_square(&|(shift_s, error_s)| (shift_s - common_s) / error_s);
-        if apart > APART_ERRORS && mean_square(&|(shift_s, _)| shift_s - common_s) > APART_S {
+        if apart > MIN_DIFFERENCE_SIGMAS && mean_square(&|(shift_s, _)| shift_s - common_s) > MIN_DIFFERENCE_S
+        {
             for (jump, (shift_s, _)) in jumps.iter().zip(&found) {
                 times.starts_s[jump.step] += shift_s;
             }
@@ -168,7 +170,7 @@ impl Jump {
     }
 
     /// Residual of the measured P3, minus its mean, so that no offset enters.
-    fn rest(&self, table: &Table, values: &[f64], shift_s: f64) -> Vec<f64> {
+    fn residuals(&self, table: &Table, values: &[f64], shift_s: f64) -> Vec<f64> {
         let command = self.command(shift_s);
         let rest: Vec<f64> = self.samples.clone().map(|i| values[i] - command.p3_pa(table.t_s[i])).collect();
         let seen = || rest.iter().filter(|rest| rest.is_finite());
@@ -187,7 +189,7 @@ impl Jump {
     /// Delay of the command relative to its sample, and its error, s.
     fn shift_s(&self, table: &Table, values: &[f64]) -> (f64, f64) {
         let cost = |shift_s: f64| {
-            let rest = self.rest(table, values, shift_s);
+            let rest = self.residuals(table, values, shift_s);
             rest.iter().filter(|rest| rest.is_finite()).map(|rest| rest * rest).sum::<f64>()
         };
         // The command came between two samples, and acts within a sample of that.
@@ -203,10 +205,10 @@ impl Jump {
 fn scatter_s(table: &Table, values: &[f64], jumps: &[Jump], found: &[(f64, f64)]) -> f64 {
     let (mut sum, mut weights, mut chi, mut count) = (0.0, 0.0, 0.0, 0.0);
     for (jump, (shift_s, _)) in jumps.iter().zip(found) {
-        let (rest, slopes) = (jump.rest(table, values, *shift_s), jump.slopes(table, *shift_s));
+        let (rest, slopes) = (jump.residuals(table, values, *shift_s), jump.slopes(table, *shift_s));
         let noise_sigma = jump.noise_sigma;
         for (rest, slopes) in rest.windows(3).zip(slopes.windows(3)) {
-            if slopes.iter().any(|slope| slope.abs() < RUNS_PER_S * noise_sigma) {
+            if slopes.iter().any(|slope| slope.abs() < MIN_RATE_SIGMAS_PER_S * noise_sigma) {
                 continue;
             }
             let late_s = |i: usize| -rest[i] / slopes[i];
@@ -225,7 +227,7 @@ fn scatter_s(table: &Table, values: &[f64], jumps: &[Jump], found: &[(f64, f64)]
     // Neighbours share samples: twice the scatter of independent ones.
     let chance = count + 5.0 * 2.0 * f64::sqrt(2.0 * count);
     let scatter_s = f64::sqrt(f64::max(sum / f64::max(weights, 1e-30), 0.0));
-    if count > 0.0 && chi > chance && scatter_s > SCATTER_MIN_S { scatter_s } else { 0.0 }
+    if count > 0.0 && chi > chance && scatter_s > MIN_SCATTER_S { scatter_s } else { 0.0 }
 }
 
 #[cfg(test)]

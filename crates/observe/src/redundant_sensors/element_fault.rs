@@ -1,4 +1,4 @@
-//! Results for the several sensors of a channel: which are left out and why, as values and as text.
+//! Faults of the redundant sensors of a channel, and the result of their fusion, as values and text.
 
 use mapper_core::{Channel, DeclaredUncertainty, Element};
 use serde::Serialize;
@@ -151,7 +151,7 @@ impl fmt::Display for FusedChannel {
             };
             write!(
                 f,
-                "; {name} {what}, and it is not known which of them is wrong: all are used, and the offset contains them (+/- {} {unit})",
+                "; {name} {what}, and the wrong one cannot be identified: all are used, and the offset covers them (+/- {} {unit})",
                 Short(*widened_by)
             )?;
         }

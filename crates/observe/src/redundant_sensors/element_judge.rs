@@ -1,4 +1,4 @@
-//! Judges which of several sensors of a channel has an offset or a lag, is stuck or gives no data, over a whole recording.
+//! Detects redundant sensors of a channel with an offset or a lag, and stuck or silent ones, over a whole recording.
 //!
 //! Each sensor is compared with the weighted mean of the others in use. The worst one beyond its limit is left out, and the remaining ones are
 //! judged again, as long as more than half remain. With two, the wrong one cannot be identified. A stuck or silent sensor is identified by its
@@ -18,28 +18,28 @@ const PARTS: usize = 4;
 /// Minimum number of blocks for a decision.
 const MIN_BLOCKS: usize = 10;
 /// Share of the recording without a reading above which a sensor is silent, if another one has readings.
-const SILENT_RATIO: f64 = 0.5;
+const MAX_MISSING_RATIO: f64 = 0.5;
 /// Time and number of samples for which a reading repeats to the last digit before it counts as stuck, s.
 const FROZEN_S: f64 = 20.0;
 const FROZEN_SAMPLES: usize = 20;
 /// Share of samples that must differ from the one before for a live sensor: a coarse digit repeats often.
-const ALIVE_RATIO: f64 = 0.2;
+const MIN_CHANGING_RATIO: f64 = 0.2;
 /// Band of block noise within which a reading counts as constant, standard deviations; chance exceeds it in 1e-8 of blocks.
-const STILL_SIGMAS: f64 = 6.0;
+const CONSTANT_BAND_SIGMAS: f64 = 6.0;
 /// Minimum movement of the others meanwhile, in widths of that band, and its duration in blocks (20 s): a slow probe has completed half of the
 /// change by then.
-const MOVED_BANDS: f64 = 4.0;
-const MOVED_BLOCKS: usize = 10;
+const MIN_MOVE_BANDS: f64 = 4.0;
+const MIN_MOVE_BLOCKS: usize = 10;
 /// Difference of lags that is always acceptable, s: at the slopes of a usual window it is smaller than a sensor's offset.
-const LAG_S: f64 = 0.5;
+const LAG_TOLERANCE_S: f64 = 0.5;
 /// Accuracy of a lag computed from the tip diameter, ratio: tips are not spheres, and the flow is unknown here.
-const LAG_RATIO: f64 = 0.5;
+const LAG_TOLERANCE_RATIO: f64 = 0.5;
 /// Standard errors above which a lag is significant.
-const LAG_SIGMAS: f64 = 6.0;
+const MIN_LAG_SIGMAS: f64 = 6.0;
 /// Factor on the regression's standard errors, which assume independent residuals; those of blocks are slightly correlated.
-const DEPENDENT_RESIDUALS: f64 = 2.0;
+const STANDARD_ERROR_FACTOR: f64 = 2.0;
 /// Ratio of slopes to their noise above which a lag can be seen.
-const MOVING_SIGMAS: f64 = 5.0;
+const MIN_SLOPE_SIGMAS: f64 = 5.0;
 /// Typical outlet pipe, flow and temperature: lags of declared diameters are only compared with each other.
 const USUAL_PIPE_M: f64 = 0.035;
 const USUAL_FLOW_KG_S: f64 = 0.05;
@@ -127,7 +127,7 @@ impl Judge<'_> {
         let most = counts.iter().copied().max().unwrap_or(0);
         for (index, count) in counts.iter().enumerate() {
             let missing_ratio = 1.0 - *count as f64 / most.max(1) as f64;
-            if missing_ratio > SILENT_RATIO {
+            if missing_ratio > MAX_MISSING_RATIO {
                 judgement.left_out.push((index, Fault::Silent { missing_ratio }, counts.len() - 1));
             }
         }
@@ -167,7 +167,7 @@ impl Judge<'_> {
         let alive = |other: &usize| {
             let values = self.sensors[*other].map(|series| series.slice(from_s, to_s).1).unwrap_or_default();
             let changes = values.windows(2).filter(|pair| pair[0] != pair[1]).count();
-            changes as f64 > ALIVE_RATIO * values.len() as f64
+            changes as f64 > MIN_CHANGING_RATIO * values.len() as f64
         };
         let long = to_s - from_s >= FROZEN_S && longest.1 - longest.0 >= FROZEN_SAMPLES;
         (long && others.iter().all(alive)).then_some(Fault::Stuck { from_s, reading })
@@ -175,7 +175,7 @@ impl Judge<'_> {
 
     /// A reading that stays within its noise while the others move far and stay there.
     fn unmoved(&self, index: usize, others: &[usize]) -> Option<Fault> {
-        let band = STILL_SIGMAS * self.block_sigma(index).max(f64::MIN_POSITIVE);
+        let band = CONSTANT_BAND_SIGMAS * self.block_sigma(index).max(f64::MIN_POSITIVE);
         let own = &self.blocks.means[index];
         let reference = self.blocks.weighted(&self.declared.weights(|other| others.contains(&other)));
         let mut start: Option<usize> = None;
@@ -186,8 +186,8 @@ impl Judge<'_> {
             }
             match start {
                 Some(first) if (own[block] - own[first]).abs() <= band => {
-                    away += usize::from((reference[block] - reference[first]).abs() > MOVED_BANDS * band);
-                    if away >= MOVED_BLOCKS {
+                    away += usize::from((reference[block] - reference[first]).abs() > MIN_MOVE_BANDS * band);
+                    if away >= MIN_MOVE_BLOCKS {
                         let from_s = self.blocks.start_s + first as f64 * self.blocks.length_s;
                         return Some(Fault::Stuck { from_s, reading: own[first] });
                     }
@@ -237,7 +237,7 @@ impl Judge<'_> {
             product += (slope - mean_slope) * (difference - mean_difference);
         }
         let noise = self.block_sigma(index) * std::f64::consts::FRAC_1_SQRT_2 / self.blocks.length_s;
-        if square <= 0.0 || (square / count).sqrt() < MOVING_SIGMAS * noise {
+        if square <= 0.0 || (square / count).sqrt() < MIN_SLOPE_SIGMAS * noise {
             return None;
         }
         let lag_s = -product / square;
@@ -245,7 +245,7 @@ impl Judge<'_> {
             (difference - mean_difference + lag_s * (slope - mean_slope)).powi(2)
         };
         let variance = rows.iter().map(residual).sum::<f64>() / count;
-        let standard_error_s = DEPENDENT_RESIDUALS * (variance / square).sqrt();
+        let standard_error_s = STANDARD_ERROR_FACTOR * (variance / square).sqrt();
         let declared_s = |index: usize| {
             let diameter_m = self.declared.elements[index].probe_diameter_m;
             thermocouple::time_constant_s(diameter_m, USUAL_PIPE_M, USUAL_FLOW_KG_S, USUAL_T2_K)
@@ -253,8 +253,11 @@ impl Judge<'_> {
         let others_s: f64 =
             weights.iter().enumerate().map(|(other, weight)| weight * declared_s(other)).sum();
         let expected_s = declared_s(index) - others_s;
-        let limit_s = LAG_S + LAG_RATIO * declared_s(index).max(others_s);
-        Some(Lag { lag_s, severity: (lag_s - expected_s).abs() / limit_s.max(LAG_SIGMAS * standard_error_s) })
+        let limit_s = LAG_TOLERANCE_S + LAG_TOLERANCE_RATIO * declared_s(index).max(others_s);
+        Some(Lag {
+            lag_s,
+            severity: (lag_s - expected_s).abs() / limit_s.max(MIN_LAG_SIGMAS * standard_error_s),
+        })
     }
 
     /// Largest difference among the parts of the recording, and the same in its declared standard deviations.

@@ -3,10 +3,10 @@
 //! Each line is described by its two ends and its shape between them over the same coordinate x that the closed form
 //! uses (0 at the choke end, 1 at the surge end), so that lines of different speed can be blended at equal x. Beyond
 //! the outermost lines similarity applies: flow in proportion to speed, isentropic head to its square. That is an
-//! extrapolation, good enough to run a machine up, but not a measurement.
+//! extrapolation for the run-up of a machine, not a measurement.
 
 use crate::compressor_map::characteristic::{CharacteristicPoint, CompressorCharacteristic};
-use crate::compressor_map::inlet_limit::{FASTEST_SPEED_RPM, SLOWEST_TOP_SPEED_RPM, largest_flow_kg_s};
+use crate::compressor_map::inlet_limit::{MAX_SPEED_RPM, MIN_TOP_SPEED_RPM, max_flow_kg_s};
 use crate::compressor_map::similarity::{head_ratio as head, pressure_ratio_of_head};
 use mapper_core::{ReferenceState, with_unit};
 
@@ -73,7 +73,7 @@ pub enum MapError {
     },
     /// All lines slower than any turbocharger's.
     #[error(
-        "the fastest speed line turns at {} only: no turbocharger is that slow; if the table has krpm, say so in its heading (`speed [krpm]`)",
+        "the fastest speed line turns at {} only: no turbocharger is that slow; if the table has krpm, add the unit to its heading (`speed [krpm]`)",
         with_unit(speed_corrected_rpm, "rpm")
     )]
     Slow {
@@ -93,10 +93,10 @@ pub enum MapError {
     },
     /// More flow than an inlet can pass.
     #[error(
-        "row {row} of the map: no compressor passes {} at {} ({} at most); if the table has g/s, kg/h or lb/min, say so in its heading (`flow [g/s]`)",
+        "row {row} of the map: no compressor passes {} at {} ({} at most); if the table has g/s, kg/h or lb/min, add the unit to its heading (`flow [g/s]`)",
         with_unit(flow_corrected_kg_s, "kg/s"),
         with_unit(speed_corrected_rpm, "rpm"),
-        with_unit(format_args!("{most_kg_s:.2}"), "kg/s")
+        with_unit(format_args!("{limit_kg_s:.2}"), "kg/s")
     )]
     Flow {
         /// Row, from 1, header not counted.
@@ -106,7 +106,7 @@ pub enum MapError {
         /// Corrected speed, rpm.
         speed_corrected_rpm: f64,
         /// Largest flow of an inlet, kg/s.
-        most_kg_s: f64,
+        limit_kg_s: f64,
     },
 }
 
@@ -142,10 +142,10 @@ pub struct TabulatedMap {
     fingerprint: String,
 }
 
-/// Lowest efficiency of a blend; the same floor as the closed form's.
-const LOWEST_EFFICIENCY: f64 = 0.2;
-/// Points whose speeds differ by less than this belong to one line.
-const SAME_LINE_RATIO: f64 = 0.01;
+/// Minimum efficiency of a blend, equal to the closed form's.
+const MIN_EFFICIENCY: f64 = 0.2;
+/// Maximum relative difference of speed within a line.
+const MAX_LINE_SPEED_DIFFERENCE_RATIO: f64 = 0.01;
 
 impl TabulatedMap {
     /// Builds a map from rows in any order, at `reference`.
@@ -176,23 +176,23 @@ impl TabulatedMap {
             }
         }
         if let Some((index, row)) =
-            rows.iter().enumerate().find(|(_, row)| row.speed_corrected_rpm > FASTEST_SPEED_RPM)
+            rows.iter().enumerate().find(|(_, row)| row.speed_corrected_rpm > MAX_SPEED_RPM)
         {
             return Err(MapError::Fast { row: index + 1, speed_corrected_rpm: row.speed_corrected_rpm });
         }
         let fastest_rpm = rows.iter().map(|row| row.speed_corrected_rpm).fold(0.0, f64::max);
-        if !rows.is_empty() && fastest_rpm < SLOWEST_TOP_SPEED_RPM {
+        if !rows.is_empty() && fastest_rpm < MIN_TOP_SPEED_RPM {
             return Err(MapError::Slow { speed_corrected_rpm: fastest_rpm });
         }
         for (index, row) in rows.iter().enumerate() {
             let MapRow { flow_corrected_kg_s, speed_corrected_rpm, .. } = *row;
-            let most_kg_s = largest_flow_kg_s(speed_corrected_rpm);
-            if flow_corrected_kg_s > most_kg_s {
+            let limit_kg_s = max_flow_kg_s(speed_corrected_rpm);
+            if flow_corrected_kg_s > limit_kg_s {
                 return Err(MapError::Flow {
                     row: index + 1,
                     flow_corrected_kg_s,
                     speed_corrected_rpm,
-                    most_kg_s,
+                    limit_kg_s,
                 });
             }
         }
@@ -203,7 +203,9 @@ impl TabulatedMap {
                 .then(b.flow_corrected_kg_s.total_cmp(&a.flow_corrected_kg_s))
         });
         let lines: Vec<Line> = sorted
-            .chunk_by(|a, b| b.speed_corrected_rpm <= a.speed_corrected_rpm * (1.0 + SAME_LINE_RATIO))
+            .chunk_by(|a, b| {
+                b.speed_corrected_rpm <= a.speed_corrected_rpm * (1.0 + MAX_LINE_SPEED_DIFFERENCE_RATIO)
+            })
             .map(Line::new)
             .collect::<Result<_, _>>()?;
         if lines.len() < 2 {
@@ -339,7 +341,7 @@ impl CompressorCharacteristic for TabulatedMap {
         let beyond = (x - 1.0).max(0.0);
         CharacteristicPoint {
             flow_corrected_kg_s: node.flow_kg_s * (1.0 - 2.0 * beyond),
-            efficiency: node.efficiency.max(LOWEST_EFFICIENCY),
+            efficiency: node.efficiency.max(MIN_EFFICIENCY),
             surge_position_ratio: x,
         }
     }

@@ -16,7 +16,7 @@ pub struct StandstillState {
 }
 
 /// Longest step of the integration, s: a hundredth of the housings' time constants, which are minutes.
-const LONGEST_STEP_S: f64 = 1.0;
+const MAX_STEP_S: f64 = 1.0;
 
 /// Housing temperatures `duration_s` later.
 ///
@@ -28,7 +28,7 @@ pub fn relax(
     ambient_k: f64,
     duration_s: f64,
 ) -> StandstillState {
-    let steps = (duration_s / LONGEST_STEP_S).ceil().max(1.0);
+    let steps = (duration_s / MAX_STEP_S).ceil().max(1.0);
     let dt_s = duration_s / steps;
     let rates = |[tc_k, tt_k]: [f64; 2]| rates_k_s(params, tc_k, tt_k, oil_k, ambient_k);
     let moved = |y: [f64; 2], k: [f64; 2], share: f64| [y[0] + share * k[0], y[1] + share * k[1]];

@@ -1,7 +1,7 @@
 //! Extension points of the model: named places in the gas path and the metal.
 //!
-//! Numbers of the model are its [parameters](crate::machine::params::Params); hooks are for everything else. Each receives
-//! the model's value and returns the value to use. A model without hooks never looks for them.
+//! [Parameters](crate::machine::params::Params) change the model's numbers; hooks are for everything else. Each receives the model's value
+//! and returns the value to use.
 
 use crate::machine::params::BoundaryConditions;
 use crate::machine::state::{MAX_EXTRA, State};
@@ -42,7 +42,7 @@ pub struct Site<'a> {
 impl<'a> Site<'a> {
     /// A site before the gas path is evaluated.
     #[inline]
-    pub(crate) fn before_the_gas(
+    pub(crate) fn before_gas_path(
         t_s: f64,
         boundary: &'a BoundaryConditions,
         state: &'a State,
@@ -148,12 +148,12 @@ pub trait Hooks: std::fmt::Debug + Send + Sync {
 /// The hooks of a model, each with its index among the hidden temperatures.
 #[derive(Debug, Clone, Default)]
 pub struct HookList {
-    placed: Vec<Placed>,
+    placed: Vec<PositionedHooks>,
     extra_states: usize,
 }
 
 #[derive(Debug, Clone)]
-struct Placed {
+struct PositionedHooks {
     hooks: Arc<dyn Hooks>,
     first_extra: usize,
     extra_states: usize,
@@ -180,7 +180,7 @@ impl HookList {
         if wanted > MAX_EXTRA {
             return Err(TooManyExtraStates { wanted });
         }
-        self.placed.push(Placed { hooks, first_extra: self.extra_states, extra_states });
+        self.placed.push(PositionedHooks { hooks, first_extra: self.extra_states, extra_states });
         self.extra_states = wanted;
         Ok(())
     }
@@ -226,7 +226,7 @@ impl HookList {
     }
 }
 
-impl Placed {
+impl PositionedHooks {
     fn site<'a>(&self, site: &Site<'a>) -> Site<'a> {
         let extra = &site.state.extra_k;
         Site { extra_k: &extra[self.first_extra..self.first_extra + self.extra_states], ..*site }

@@ -8,7 +8,7 @@ use crate::simulation::model::Model;
 use crate::simulation::steady::{self, SteadyError, SteadyState};
 use serde::{Deserialize, Serialize};
 
-/// Temperatures that are held at the compressor's outlet temperature.
+/// Temperatures that follow the compressor's outlet temperature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct FollowOutlet {
     /// Turbine inlet total temperature, T3.
@@ -25,9 +25,9 @@ impl FollowOutlet {
 }
 
 /// Maximum number of rounds until the temperatures agree; each reduces the difference to a few per cent.
-const ROUNDS: usize = 40;
-/// Temperatures agree when they differ by less, K.
-const AGREED_K: f64 = 1e-6;
+const MAX_ROUNDS: usize = 40;
+/// Maximum difference of temperatures after convergence, K.
+const TOLERANCE_K: f64 = 1e-6;
 
 /// Like [`steady::hold_speed`], with the temperatures in `follow` at the outlet temperature of that steady state; the others are as
 /// in `boundary`.
@@ -44,12 +44,12 @@ pub fn hold_speed(
     if follow.is_off() {
         return steady::hold_speed(model, speed_rpm, &boundary);
     }
-    for _ in 0..ROUNDS {
+    for _ in 0..MAX_ROUNDS {
         let held = steady::hold_speed(model, speed_rpm, &boundary)?;
         let outlet_k = held.outputs.t2_k;
         let off_k = |follows: bool, value_k: f64| if follows { (outlet_k - value_k).abs() } else { 0.0 };
         if off_k(follow.turbine_inlet, boundary.t3_k).max(off_k(follow.oil, boundary.oil_temperature_k))
-            < AGREED_K
+            < TOLERANCE_K
         {
             return Ok(held);
         }

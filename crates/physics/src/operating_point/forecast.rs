@@ -9,7 +9,7 @@ use mapper_core::{Predicted, SettleBands, WindowRule};
 /// Interval of a forecast's samples, s.
 const SAMPLE_S: f64 = 0.5;
 /// Maximum number of samples of a forecast; steps of more than 10 000 s are sampled more coarsely.
-const SAMPLE_LIMIT: f64 = 20_000.0;
+const MAX_SAMPLES: f64 = 20_000.0;
 
 /// One instant of a forecast step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,7 +77,7 @@ pub fn hold(
 ///
 /// # Errors
 /// [`SimulationError`] if the simulation fails.
-pub fn warmed_up(
+pub fn warm_up_state(
     model: &Model,
     first: State,
     boundary: &BoundaryConditions,
@@ -101,7 +101,7 @@ pub fn forecast_step(
     let mut rows: Vec<ForecastRow> = Vec::new();
     let mut states: Vec<State> = Vec::new();
     let (mut surge_since_s, mut surges_s) = (None, Vec::new());
-    let interval_s = SAMPLE_S.max(dwell_s / SAMPLE_LIMIT);
+    let interval_s = SAMPLE_S.max(dwell_s / MAX_SAMPLES);
     let count = (dwell_s / interval_s).floor() as usize;
     let times = (0..=count).map(|i| i as f64 * interval_s).filter(|t| *t < dwell_s).chain([dwell_s]);
     simulator.run_to(

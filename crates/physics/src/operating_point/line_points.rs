@@ -19,19 +19,19 @@ use mapper_numerics::root::root_between;
 use serde::Serialize;
 
 /// Maximum number of points of a line.
-pub const POINT_LIMIT: usize = 100;
+pub const MAX_POINTS: usize = 100;
 /// Maximum number of rounds until opening and steady state agree.
-const ROUNDS: usize = 40;
+const MAX_ROUNDS: usize = 40;
 /// Relative tolerance of the flow: far below any flow meter, well above rounding.
-const AGREED_RATIO: f64 = 1e-10;
+const TOLERANCE_RATIO: f64 = 1e-10;
 /// Smallest opening tried for the surge side, relative to the nominal area.
-const NARROWEST_RATIO: f64 = 1e-3;
+const MIN_OPENING_RATIO: f64 = 1e-3;
 
 /// Distribution of a line's points between its ends, both included.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Spread {
-    /// This number of points, evenly spaced in corrected flow, 2 to [`POINT_LIMIT`].
+    /// This number of points, evenly spaced in corrected flow, 2 to [`MAX_POINTS`].
     Points(usize),
     /// From the choke end at this distance in corrected flow, kg/s, > 0; then the surge end. A remainder of less
     /// than half a distance is added to the distance before it.
@@ -87,7 +87,7 @@ pub enum LineError {
     },
     /// The spacing gives more points than a line may have.
     #[error(
-        "a spacing of {:.4} g/s gives {count:.0} points over {:.2} g/s; a line may have at most {POINT_LIMIT}", 1e3 * .spacing_kg_s, 1e3 * .range_kg_s
+        "a spacing of {:.4} g/s gives {count:.0} points over {:.2} g/s; a line may have at most {MAX_POINTS}", 1e3 * .spacing_kg_s, 1e3 * .range_kg_s
     )]
     TooManyPoints {
         /// Requested spacing, kg/s.
@@ -132,7 +132,7 @@ pub fn line_points(
     let map_speed_rpm = model.map.reference().corrected_speed_rpm(speed_rpm, boundary.t1_k);
     let choke_flow_kg_s = choke_end.outputs.flow_corrected_kg_s;
     // Rounding must not put the last point on the wrong side of a limit of the same margin.
-    let margin_ratio = line.surge_margin_ratio + 10.0 * AGREED_RATIO;
+    let margin_ratio = line.surge_margin_ratio + 10.0 * TOLERANCE_RATIO;
     let surge_flow_kg_s = model.map.surge_point(map_speed_rpm).0 * (1.0 + margin_ratio);
     let range_kg_s = choke_flow_kg_s - surge_flow_kg_s;
     if range_kg_s.is_nan() || range_kg_s <= 0.0 {
@@ -145,7 +145,7 @@ pub fn line_points(
     }
     let intervals: Vec<f64> = match line.spread {
         Spread::Points(count) => {
-            let last = count.clamp(2, POINT_LIMIT) - 1;
+            let last = count.clamp(2, MAX_POINTS) - 1;
             (1..=last).map(|index| index as f64 / last as f64).collect()
         }
         Spread::SpacingKgS(spacing_kg_s) => {
@@ -171,7 +171,7 @@ fn spaced(spacing_kg_s: f64, choke_end_kg_s: f64, surge_end_kg_s: f64) -> Result
     }
     let rest_ratio = range_kg_s / spacing_kg_s - whole;
     let inner = if rest_ratio < 0.5 { whole - 1.0 } else { whole };
-    if inner + 2.0 > POINT_LIMIT as f64 {
+    if inner + 2.0 > MAX_POINTS as f64 {
         return Err(LineError::TooManyPoints { spacing_kg_s, count: inner + 2.0, range_kg_s });
     }
     let places = (1..=inner as usize).map(|index| index as f64 * spacing_kg_s / range_kg_s);
@@ -186,12 +186,12 @@ fn hold_flow(
     flow_corrected_kg_s: f64,
 ) -> Result<SteadyState, SteadyError> {
     let mut held = *near;
-    for _ in 0..ROUNDS {
-        if (held.outputs.flow_corrected_kg_s / flow_corrected_kg_s - 1.0).abs() < AGREED_RATIO {
+    for _ in 0..MAX_ROUNDS {
+        if (held.outputs.flow_corrected_kg_s / flow_corrected_kg_s - 1.0).abs() < TOLERANCE_RATIO {
             break;
         }
         let opening = opening_of_flow(model, &held, flow_corrected_kg_s);
-        let Some(opening) = opening.filter(|opening| opening.is_finite() && *opening > NARROWEST_RATIO)
+        let Some(opening) = opening.filter(|opening| opening.is_finite() && *opening > MIN_OPENING_RATIO)
         else {
             return Err(SteadyError::NoFlowBalance {
                 speed_rpm: held.state.shaft_speed_rpm(),

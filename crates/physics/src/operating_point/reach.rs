@@ -10,7 +10,7 @@ use crate::simulation::model::Model;
 use crate::simulation::steady::{SteadyError, SteadyState};
 use mapper_core::{Limits, OperatingPoint, temperature};
 
-/// A reason why a point cannot be reached, in words that follow its name.
+/// A reason why a point cannot be reached; its text continues a sentence that starts with the point's name.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum Obstacle {
     /// The valve cannot be set to this opening.
@@ -30,7 +30,7 @@ pub enum Obstacle {
     },
     /// Beyond the nominal surge line.
     #[error(
-        "lies beyond the surge line of the nominal map, at {:.0} % of the surge flow", 100.0 * (1.0 + .margin_ratio)
+        "is beyond the surge line of the nominal map, at {:.0} % of the surge flow", 100.0 * (1.0 + .margin_ratio)
     )]
     Surge {
         /// Surge margin, below 0.
@@ -94,11 +94,11 @@ impl Obstacle {
     pub fn remedy(&self) -> &'static str {
         match self {
             Obstacle::Opening { .. } => "choose an opening within the range",
-            Obstacle::NoSteadyState(_) => "leave the point out, or change speed or opening",
+            Obstacle::NoSteadyState(_) => "remove the point, or change speed or opening",
             Obstacle::Speed { .. } => {
                 "choose a lower speed, or raise the limit if the machine allows it; the limits hold for scripts as well"
             }
-            Obstacle::Surge { .. } => "leave the point out, or open the valve further",
+            Obstacle::Surge { .. } => "remove the point, or open the valve further",
             Obstacle::SurgeMargin { .. } => {
                 "leave the point out, open the valve further, or lower the limit if the rig allows it"
             }
@@ -171,8 +171,8 @@ fn broken_limits(model: &Model, steady: &SteadyState, limits: &Limits) -> Vec<Ob
     broken
 }
 
-/// All reasons why a point cannot be reached, as one clause that follows its name.
-pub fn clause(obstacles: &[Obstacle]) -> String {
+/// Joins all reasons to one clause that follows the name of a point.
+pub fn describe_obstacles(obstacles: &[Obstacle]) -> String {
     obstacles.iter().map(ToString::to_string).collect::<Vec<_>>().join(", and ")
 }
 

@@ -5,8 +5,7 @@
 //! ([`SettleBands`]) times the mean. An operating point has settled when shaft speed, compressor flow and pressure ratio
 //! all have. Values of a model have no noise; recorded ones are condensed to medians over blocks first.
 //!
-//! Housing and outlet temperature play no part: at a settled operating point they still change, and the
-//! identification needs that change. Bands: Burke et al., section 3.
+//! Housing and outlet temperature do not count: at a settled operating point they still change, which the identification needs. Bands: Burke et al., section 3.
 
 use mapper_core::SettleBands;
 use mapper_numerics::statistics::robust_sigma;

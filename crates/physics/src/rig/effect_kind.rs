@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 /// A row of a table of effects, without the parameters.
 #[derive(Debug, Clone, Copy)]
-pub struct About {
+pub struct EffectText {
     /// Name: lower case, digits and `_`.
     pub id: &'static str,
     /// Its display name, a noun that can be the subject of a sentence.
@@ -40,7 +40,7 @@ pub trait EffectNumbers: Sized {
 /// An effect whose parameters are the fields of `Self`.
 pub trait EffectKind: EffectNumbers + std::fmt::Debug + Send + Sync + 'static {
     /// Its description.
-    const ABOUT: About;
+    const ABOUT: EffectText;
 
     /// Adds it to a rig. At neutral values nothing changes.
     ///
@@ -51,7 +51,7 @@ pub trait EffectKind: EffectNumbers + std::fmt::Debug + Send + Sync + 'static {
 
 /// The effect of a kind, for effect libraries.
 pub fn effect_of<K: EffectKind>() -> Arc<dyn Effect> {
-    let About { id, name, description, equation, source, submodel, also_shows_in } = K::ABOUT;
+    let EffectText { id, name, description, equation, source, submodel, also_shows_in } = K::ABOUT;
     let info = EffectInfo {
         id: Cow::Borrowed(id),
         name: Cow::Borrowed(name),
@@ -62,17 +62,17 @@ pub fn effect_of<K: EffectKind>() -> Arc<dyn Effect> {
         also_shows_in: also_shows_in.to_vec(),
         parameters: K::parameters(),
     };
-    Arc::new(OfKind::<K> { info, kind: PhantomData })
+    Arc::new(KindEffect::<K> { info, kind: PhantomData })
 }
 
 /// A kind with its row of text.
 #[derive(Debug)]
-struct OfKind<K> {
+struct KindEffect<K> {
     info: EffectInfo,
     kind: PhantomData<fn() -> K>,
 }
 
-impl<K: EffectKind> Effect for OfKind<K> {
+impl<K: EffectKind> Effect for KindEffect<K> {
     fn info(&self) -> &EffectInfo {
         &self.info
     }

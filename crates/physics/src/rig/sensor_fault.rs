@@ -39,8 +39,8 @@ pub struct SensorFault {
     pub channels: &'static [Channel],
     /// Form of the error.
     pub kind: FaultKind,
-    /// Prior size of such faults, one standard deviation, in the unit of `kind`. It is some ten times the declared error of calibrated
-    /// sensors, so that an ordinary error does not count as a fault. The odds of a fault depend on it only logarithmically.
+    /// Prior size of such faults, one standard deviation, in the unit of `kind`. It is about ten times the declared error of
+    /// calibrated sensors, so that an ordinary error is not a fault. The evidence for a fault depends on it only logarithmically.
     pub sigma: f64,
     /// Size in a search by runs of the model; empty if there is none.
     sizes: &'static [Size],
@@ -339,7 +339,7 @@ impl SensorFault {
             equation: equation.into(),
             source: source.into(),
             submodel,
-            // A constant error also looks like one of a balance in which the reading stands.
+            // A constant error may also appear in a balance that uses the reading.
             also_shows_in: neighbour.filter(|_| constant).into_iter().collect(),
             parameters: self.sizes.iter().map(parameter).collect(),
         }

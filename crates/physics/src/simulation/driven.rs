@@ -14,16 +14,15 @@ use crate::simulation::rosenbrock::{Integrator, OdeSystem, Step};
 use crate::simulation::simulate::tolerances;
 use nalgebra::{Const, DimMin};
 
-/// Longest steps after a jump: up to a time in seconds, steps of at most a length in seconds.
-/// The first are as short as the outlet volume's own time: when the valve closes, P2 rises along a line that is too curved for one
-/// step without error control.
+/// Maximum steps after a jump, as pairs of a time and a step length, s. The first steps are as short as the outlet volume's time constant,
+/// since P2 changes too quickly when the valve closes.
 const STEPS_S: [(f64, f64); 7] =
     [(0.004, 0.001), (0.02, 0.004), (0.2, 0.02), (3.0, 0.1), (8.0, 0.8), (20.0, 2.0), (f64::INFINITY, 6.0)];
 
 /// Estimated error of a step, relative to the states, above which the grid is too coarse for it: 10 rpm at 100 krpm and 10 Pa at 100 kPa, a
 /// third of the noise of a sample at most. Along the surge line it is exceeded by a hundred times.
 const GRID_TOLERANCE: f64 = 1e-4;
-/// The way to a steady state needs no accuracy, only its end does.
+/// Tolerance on the way to a steady state, of which only the end must be accurate.
 const ANY_ERROR: f64 = 1e6;
 /// Relative tolerance of the integration where the grid's own steps are too coarse: that of the virtual lab. Maximum number of
 /// its steps: surge cycles last a second, and a hundred steps each.

@@ -10,7 +10,7 @@ use crate::machine::hooks::{HookList, Hooks, Site};
 use crate::machine::params::Params;
 use crate::machine::state::MAX_STATES;
 pub use crate::machine::state::{State, rad_s_of_rpm};
-pub use crate::simulation::outputs::{Added, Outputs};
+pub use crate::simulation::outputs::{HookTerms, Outputs};
 use crate::{
     gas::air,
     laws::{housing, inlet_convection, nusselt, orifice, thermocouple},
@@ -18,7 +18,7 @@ use crate::{
 use std::sync::Arc;
 
 /// Flow below which the gas path is not evaluated (it divides by the flow), kg/s.
-const LOWEST_FLOW_KG_S: f64 = 1e-4;
+const MIN_FLOW_KG_S: f64 = 1e-4;
 
 /// A machine: its parameters and its compressor map.
 #[derive(Debug, Clone)]
@@ -159,13 +159,13 @@ impl PreparedModel<'_> {
             state.tt_k,
             boundary.oil_temperature_k,
         );
-        let mut site = Site::before_the_gas(self.t_s, boundary, state, wall_k, pressure_ratio, bearing_k);
+        let mut site = Site::before_gas_path(self.t_s, boundary, state, wall_k, pressure_ratio, bearing_k);
         let mut flow_kg_s = flow_corrected_kg_s * self.flow_correction_ratio;
         let mut efficiency = on_map.efficiency * compressor.efficiency_scale_ratio;
         if HOOKED {
             flow_kg_s = hooks.fold(&site, flow_kg_s, |hook, site, value| hook.flow_kg_s(site, value));
         }
-        flow_kg_s = flow_kg_s.max(LOWEST_FLOW_KG_S);
+        flow_kg_s = flow_kg_s.max(MIN_FLOW_KG_S);
         if HOOKED {
             site.flow_kg_s = flow_kg_s;
             efficiency = hooks.fold(&site, efficiency, |hook, site, value| hook.efficiency(site, value));
@@ -278,7 +278,7 @@ impl PreparedModel<'_> {
                 housing::radiation_w(params.radiation_area_m2, state.tt_k, state.tc_k)
             },
             inner_heat_w: if inner { compressor.inner_conductance_w_k * (wall_k - state.tc_k) } else { 0.0 },
-            added: if HOOKED { self.added(&site) } else { Added::default() },
+            added: if HOOKED { self.added(&site) } else { HookTerms::default() },
             compressor_external_heat_w: external_heat_w(
                 compressor.external_area_m2,
                 compressor.emissivity_ratio,
@@ -306,12 +306,12 @@ impl PreparedModel<'_> {
 
     /// Additions of hooks at a site where the gas path is known.
     #[cold]
-    fn added(&self, site: &Site<'_>) -> Added {
+    fn added(&self, site: &Site<'_>) -> HookTerms {
         let hooks = &self.model.hooks;
         let sum = |ask: fn(&dyn Hooks, &Site<'_>) -> f64| {
             hooks.fold(site, 0.0, |hook, site, sum| sum + ask(hook, site))
         };
-        Added {
+        HookTerms {
             compressor_heat_w: sum(|hook, site| hook.heat_to_compressor_w(site)),
             inner_heat_w: sum(|hook, site| hook.heat_to_inner_w(site)),
             turbine_heat_w: sum(|hook, site| hook.heat_to_turbine_w(site)),
@@ -330,7 +330,7 @@ impl PreparedModel<'_> {
             t1_prime_k: outputs.t1_prime_k,
             t2_prime_k: outputs.t2_prime_k,
             t2_k: outputs.t2_k,
-            ..Site::before_the_gas(
+            ..Site::before_gas_path(
                 self.t_s,
                 &self.boundary,
                 state,

@@ -43,7 +43,7 @@ pub struct Outputs {
     /// Heat from the inner wall to the rest of the compressor housing, W; 0 if the housing is one node.
     pub inner_heat_w: f64,
     /// Additions of hooks.
-    pub added: Added,
+    pub added: HookTerms,
     /// Heat from the compressor housing to the cell, W.
     pub compressor_external_heat_w: f64,
     /// Heat from the turbine housing to the cell, W.
@@ -60,7 +60,7 @@ pub struct Outputs {
 
 /// Heats and power that hooks add; 0 without them.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Added {
+pub struct HookTerms {
     /// Heat to the compressor housing (its outer part), W.
     pub compressor_heat_w: f64,
     /// Heat to the inner wall of the compressor housing, W.

@@ -75,7 +75,7 @@ pub enum SteadyError {
 }
 
 /// Highest pressure tried, relative to P4.
-const HIGHEST_EXPANSION_RATIO: f64 = 20.0;
+const MAX_EXPANSION_RATIO: f64 = 20.0;
 /// Largest residual heat flow of a housing, W: far below 1e-6 of any shaft power.
 const HEAT_TOLERANCE_W: f64 = 1e-9;
 
@@ -99,7 +99,7 @@ pub fn hold_speed(
     let no_heat_balance =
         SteadyError::NoHeatBalance { speed_rpm, valve_opening_ratio: boundary.valve_opening_ratio };
     let balance = |temperatures: Temperatures| {
-        let (boundary, state) = gas_path_at_rest(model, speed_rpm, &boundary, temperatures)?;
+        let (boundary, state) = steady_gas_path(model, speed_rpm, &boundary, temperatures)?;
         Ok((heat_flows_w(model, &boundary, &state), (boundary, state)))
     };
     let (at_rest, mut state) = settle(model, &boundary, no_heat_balance, balance)?;
@@ -204,7 +204,7 @@ fn settle<T, E>(
 }
 
 /// P2 from flow balance and P3 from power balance, at given speed and housing temperatures.
-fn gas_path_at_rest(
+fn steady_gas_path(
     model: &Model,
     speed_rpm: f64,
     boundary: &BoundaryConditions,
@@ -244,7 +244,7 @@ fn shaft_load_w(outputs: &Outputs) -> f64 {
 }
 
 fn turbine_pressures_pa(boundary: &BoundaryConditions) -> (f64, f64) {
-    (boundary.p4_pa * (1.0 + 1e-6), boundary.p4_pa * HIGHEST_EXPANSION_RATIO)
+    (boundary.p4_pa * (1.0 + 1e-6), boundary.p4_pa * MAX_EXPANSION_RATIO)
 }
 
 /// The turbine inlet pressure that holds the speed, Pa.

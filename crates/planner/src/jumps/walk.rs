@@ -5,7 +5,7 @@ use crate::jumps::visits::Visit;
 use crate::request::{PlanError, PlanRequest};
 use crate::thermal_memory::forecast::{Forecast, ParameterError, add_joint_errors, forecast};
 use mapper_core::{OperatingPoint, PlanStep, VisitOrder};
-use mapper_physics::operating_point::forecast::{hold, warmed_up};
+use mapper_physics::operating_point::forecast::{hold, warm_up_state};
 use mapper_physics::simulation::model::State;
 use mapper_physics::simulation::steady::SteadyState;
 
@@ -48,7 +48,7 @@ pub(crate) fn walk(
         let fail = |source| PlanError::Forecast { to, source };
         let state = match now {
             Some((state, _)) => state,
-            None => warmed_up(request.model, target.state, &target.boundary, request.timing.warm_up_s)
+            None => warm_up_state(request.model, target.state, &target.boundary, request.timing.warm_up_s)
                 .map_err(fail)?,
         };
         let dwell_s = match request.order {

@@ -10,7 +10,6 @@ use mapper_numerics::statistics::nearest_rank;
 use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
 
-/// Number of successors of each point.
 const MAX_SUCCESSORS: usize = 10;
 /// Above this many points there are no candidates, because the table of weights grows with the square.
 pub(crate) const MAX_POINTS: usize = 4000;

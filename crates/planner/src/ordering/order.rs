@@ -17,7 +17,6 @@ const MAX_PROVEN_POINTS: usize = 14;
 /// Maximum number of partial orders of a proof: a fraction of a second.
 const PROOF_NODES: u64 = 300_000;
 
-/// An order of points.
 #[derive(Debug, Clone)]
 pub(crate) struct PointOrder {
     pub(crate) order: Vec<usize>,

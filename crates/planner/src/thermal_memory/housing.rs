@@ -10,7 +10,7 @@ use crate::thermal_memory::chain::Chain;
 use crate::thermal_memory::forecast::forecast;
 use mapper_core::OperatingPoint;
 use mapper_numerics::parallel;
-use mapper_physics::operating_point::forecast::warmed_up;
+use mapper_physics::operating_point::forecast::warm_up_state;
 use mapper_physics::simulation::model::State;
 use mapper_physics::simulation::steady::SteadyState;
 use std::collections::HashSet;
@@ -213,7 +213,7 @@ fn simulate_response(
         }
     }
     let first_step_s = request.timing.warm_up_s + dwell_s;
-    let first = scale.scaled(&warmed_up(request.model, target.state, &target.boundary, first_step_s)?);
+    let first = scale.scaled(&warm_up_state(request.model, target.state, &target.boundary, first_step_s)?);
     let settled = scale.scaled(&target.state);
     Ok(Response {
         gradient_k: Surface::fit(gradient_k),

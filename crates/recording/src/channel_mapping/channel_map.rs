@@ -2,6 +2,7 @@
 
 use crate::format::ELEMENTS_TOPIC;
 use crate::logs::LogOptions;
+use crate::logs::plausible::STANDARD_ATMOSPHERE_PA;
 use mapper_core::{
     CHANNELS, Channel, DeclaredUncertainty, Element, Group, MAX_ELEMENTS, NoiseColour, RedundantSensors,
     ReferenceState,
@@ -29,13 +30,13 @@ pub struct ChannelMap {
     pub sensors: BTreeMap<Channel, DeclaredUncertainty>,
     /// Declared uncertainty of each sensor of the channels that have several; `sensors` then has that of the combined reading.
     pub redundant: BTreeMap<Channel, RedundantSensors>,
-    /// How the sensors' noise is correlated in time.
+    /// Correlation of the sensors' noise in time.
     pub noise_colour: Option<NoiseColour>,
-    /// Reference of gauge pressures.
+    /// Ambient pressure that is added to gauge pressures.
     pub ambient_pressure: Option<AmbientPressure>,
     /// Settings for reading a log of another program, if they cannot be detected.
     pub log: LogOptions,
-    /// File and text it was read from, so that messages can point into it.
+    /// File and text of the map, for messages with line and caret.
     pub(crate) text: Option<(PathBuf, String)>,
     pub(crate) native: bool,
 }
@@ -52,27 +53,24 @@ pub enum AmbientPressure {
 /// A constant ambient pressure with its uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Barometer {
-    /// Pa.
+    /// Pressure, Pa.
     pub pressure_pa: f64,
     /// One standard deviation, Pa.
     pub sigma_pa: f64,
 }
 
-/// Word for an unknown ambient pressure.
 pub(crate) const UNKNOWN_WORD: &str = "unknown";
-/// Pressure of the standard atmosphere at sea level, Pa.
-const STANDARD_PA: f64 = 101_325.0;
 /// Uncertainty of a barometer's reading, Pa: the weather changes it by some hectopascal while a test runs.
-const READ_PA: f64 = 100.0;
+const READING_SIGMA_PA: f64 = 100.0;
 /// Uncertainty of the pressure at a known altitude, Pa: the weather of the middle latitudes.
-const WEATHER_PA: f64 = 1e3;
+const ALTITUDE_SIGMA_PA: f64 = 1e3;
 /// Uncertainty of the pressure at an unknown place, Pa: weather, and altitudes of up to some 500 m.
-const UNKNOWN_PA: f64 = 3e3;
+const UNKNOWN_SIGMA_PA: f64 = 3e3;
 
 impl Barometer {
-    /// The reading of a barometer.
-    pub fn read(pressure_pa: f64) -> Self {
-        Barometer { pressure_pa, sigma_pa: READ_PA }
+    /// A barometer's reading, with the uncertainty of the weather during a test.
+    pub fn from_reading(pressure_pa: f64) -> Self {
+        Barometer { pressure_pa, sigma_pa: READING_SIGMA_PA }
     }
 
     /// The standard atmosphere (ISO 2533) at an altitude below 11 km.
@@ -80,12 +78,12 @@ impl Barometer {
         // Temperature at sea level, its gradient, and gravity over the gas constant and the gradient.
         let (sea_level_k, gradient_k_m, exponent) = (288.15, 6.5e-3, 5.255_88);
         let ratio = (1.0 - gradient_k_m * altitude_m / sea_level_k).max(0.0);
-        Barometer { pressure_pa: STANDARD_PA * ratio.powf(exponent), sigma_pa: WEATHER_PA }
+        Barometer { pressure_pa: STANDARD_ATMOSPHERE_PA * ratio.powf(exponent), sigma_pa: ALTITUDE_SIGMA_PA }
     }
 
-    /// Nothing is known.
+    /// The standard atmosphere, for a stand of unknown altitude.
     pub fn unknown() -> Self {
-        Barometer { pressure_pa: STANDARD_PA, sigma_pa: UNKNOWN_PA }
+        Barometer { pressure_pa: STANDARD_ATMOSPHERE_PA, sigma_pa: UNKNOWN_SIGMA_PA }
     }
 }
 
@@ -98,7 +96,7 @@ pub struct ChannelSource {
     pub field: String,
     /// Unit of the field; `None` to take it from the recording.
     pub unit: Option<String>,
-    /// Whether it is a gauge pressure.
+    /// Whether the field is a gauge pressure.
     pub gauge: bool,
 }
 
@@ -156,7 +154,7 @@ impl ChannelMap {
         ChannelMap { channels, elements, native: true, ..ChannelMap::default() }
     }
 
-    /// Whether a channel's pressure is read over the ambient pressure.
+    /// Whether a channel is mapped as a gauge pressure.
     pub fn is_gauge(&self, channel: Channel) -> bool {
         let elements = self.elements.iter().filter(|(element, _)| element.channel == channel);
         let own = self.channels.get(&channel).into_iter();

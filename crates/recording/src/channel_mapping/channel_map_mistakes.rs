@@ -7,21 +7,19 @@ use std::path::Path;
 
 /// Collects mistakes, so that all are reported at once.
 #[derive(Debug, Default)]
-pub(crate) struct Complaints {
+pub(crate) struct MapMistakes {
     list: Vec<(FindingKind, Vec<Step>, String, String)>,
 }
 
-impl Complaints {
+impl MapMistakes {
     /// Adds a mistake at a place of the map, with its remedy.
     pub(crate) fn add(&mut self, kind: FindingKind, place: &[Step], message: String, remedy: String) {
         self.list.push((kind, place.to_owned(), message, remedy));
     }
 
-    /// All mistakes as an error; nothing if there are none.
-    ///
     /// # Errors
-    /// [`RecordError::ChannelMap`] if there is any.
-    pub(crate) fn result(self, map: &ChannelMap) -> Result<(), RecordError> {
+    /// [`RecordError::ChannelMap`] with all mistakes, if there are any.
+    pub(crate) fn into_result(self, map: &ChannelMap) -> Result<(), RecordError> {
         if self.list.is_empty() {
             return Ok(());
         }

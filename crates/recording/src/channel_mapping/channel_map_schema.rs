@@ -18,14 +18,14 @@ fn schema() -> Value {
         json!({
             "topic": text("Topic of the recording, or group of a log; a log with one group needs none.", "/rig/compressor"),
             "field": {
-                "description": "Field of the topic's messages; a list of fields where several sensors measure the channel.",
+                "description": "Field of the topic's messages; a list of fields if several sensors measure the channel.",
                 "examples": ["outlet_temperature"],
                 "anyOf": [
                     {"type": "string", "minLength": 1},
                     {"type": "array", "minItems": 1, "maxItems": MAX_ELEMENTS, "uniqueItems": true, "items": {"type": "string", "minLength": 1}},
                 ],
             },
-            "unit": text("Unit of the field; as the recording says if none is given.", "degC"),
+            "unit": text("Unit of the field; the recording's own if none is given.", "degC"),
             "gauge": {"type": "boolean", "description": "Whether a pressure is read over `ambient_pressure`; absolute if not given.", "examples": [true]},
         }),
     );
@@ -38,18 +38,18 @@ fn schema() -> Value {
             "common_offset": quantity("Offset that several sensors of the channel share and that does not average out; 0 if none is given.", "0.05 K"),
         }),
     );
-    let constant = quantity("Value of a channel that the recording does not hold.", "100 kPa");
+    let constant = quantity("Constant value of a channel that the recording does not contain.", "100 kPa");
     let mut channels = by_channel("Topic, field and unit of each channel, by the channel's symbol.", &source);
     channels.insert("minProperties".to_owned(), json!(1));
     closed(
         &["channels"],
         json!({
             "channels": channels,
-            "constants": by_channel("Channels that stay at a known value, by symbol.", &constant),
+            "constants": by_channel("Channels with a known constant value, by symbol.", &constant),
             "machine": machine(),
             "reference": reference(),
             "window": window(),
-            "sensors": by_channel("Declared uncertainty of the sensors, one standard deviation, by symbol; of several sensors of a channel that of each.", &sensor),
+            "sensors": by_channel("Declared uncertainty of the sensors, one standard deviation, by symbol; if a channel has several sensors, that of each one.", &sensor),
             "noise_colour": noise_colour(),
             "ambient_pressure": ambient_pressure(),
             "log": log(),
@@ -63,7 +63,7 @@ fn ambient_pressure() -> Value {
         json!({
             "topic": text("Group of the log; a log with one group needs none.", "/rig/ambient"),
             "field": text("Column of the log.", "P_amb"),
-            "unit": text("Unit of the column; as the log says if none is given.", "kPa"),
+            "unit": text("Unit of the column; the log's own if none is given.", "kPa"),
         }),
     );
     let uncertainty = || {
@@ -72,13 +72,13 @@ fn ambient_pressure() -> Value {
             "50 Pa",
         )
     };
-    let value = || quantity("What the barometer read.", "99.2 kPa");
+    let value = || quantity("Reading of the barometer.", "99.2 kPa");
     let read = closed(&["value"], json!({"value": value(), "uncertainty": uncertainty()}));
     let altitude = quantity("Altitude of the stand above the sea.", "300 m");
     let place = closed(&["altitude"], json!({"altitude": altitude, "uncertainty": uncertainty()}));
     let unknown = json!({"type": "string", "enum": [UNKNOWN_WORD]});
     json!({
-        "description": "What gauge pressures are added to: the reading of a barometer, the altitude of the stand, the column of a log, or `unknown`, which counts as 101.3 kPa with an uncertainty of 3 kPa.",
+        "description": "Ambient pressure, which is added to gauge pressures: the reading of a barometer, the altitude of the stand, the column of a log, or `unknown`, which counts as 101.3 kPa with an uncertainty of 3 kPa.",
         "examples": ["99.2 kPa"],
         "anyOf": [value(), unknown, source, read, place],
     })

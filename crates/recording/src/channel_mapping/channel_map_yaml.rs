@@ -14,8 +14,8 @@ use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Largest channel map that is read, bytes.
-const SIZE_LIMIT: usize = 1 << 20;
+/// Maximum size of a channel map, bytes.
+const MAX_BYTES: usize = 1 << 20;
 
 /// Name of the file in messages.
 pub(crate) static DOCUMENT: Document =
@@ -44,7 +44,7 @@ impl ChannelMap {
     /// [`ChannelMapError::Read`] if the file cannot be read, [`ChannelMapError::Mistakes`] with all its mistakes.
     pub fn load(path: &Path) -> Result<ChannelMap, ChannelMapError> {
         let mistakes = |findings| ChannelMapError::Mistakes(Box::new(findings));
-        let text = mapper_yaml::open(&DOCUMENT, path, SIZE_LIMIT)
+        let text = mapper_yaml::open(&DOCUMENT, path, MAX_BYTES)
             .map_err(|source| ChannelMapError::Read { path: path.to_owned(), source })?
             .map_err(mistakes)?;
         ChannelMap::from_yaml(&text, path).map_err(mistakes)
@@ -115,8 +115,8 @@ impl<'a> Reader<'a> {
         let ambient_pressure = self.ambient_pressure();
         let gauge = channels.values().chain(elements.values()).any(|source| source.gauge);
         if gauge && !self.has("ambient_pressure") {
-            let message = "a gauge pressure is mapped, and nothing says what it is added to".to_owned();
-            let remedy = "write what the barometer read, e.g. `ambient_pressure: 99.2 kPa`, the altitude of the stand: `ambient_pressure: {altitude: 300 m}`, \
+            let message = "a gauge pressure is mapped without an ambient pressure".to_owned();
+            let remedy = "write the barometer's reading, e.g. `ambient_pressure: 99.2 kPa`, the altitude of the stand: `ambient_pressure: {altitude: 300 m}`, \
                  or the column that holds it: `ambient_pressure: {field: P_amb, unit: kPa}`; `ambient_pressure: unknown` widens the intervals";
             self.note(FindingKind::MissingKey, &steps!["channels"], message, remedy);
         }
@@ -143,7 +143,10 @@ impl<'a> Reader<'a> {
             return Some(AmbientPressure::Constant(Barometer::unknown()));
         }
         if !self.tree.get(&here)?.is_object() {
-            return self.positive(&here, Kind::Pressure).map(Barometer::read).map(AmbientPressure::Constant);
+            return self
+                .positive(&here, Kind::Pressure)
+                .map(Barometer::from_reading)
+                .map(AmbientPressure::Constant);
         }
         if let Some(barometer) = self.barometer() {
             return Some(AmbientPressure::Constant(barometer));
@@ -160,7 +163,7 @@ impl<'a> Reader<'a> {
     fn barometer(&mut self) -> Option<Barometer> {
         let of = |key: &str| steps!["ambient_pressure", key];
         let found = match self.tree.get(&of("value")) {
-            Some(_) => Barometer::read(self.positive(&of("value"), Kind::Pressure)?),
+            Some(_) => Barometer::from_reading(self.positive(&of("value"), Kind::Pressure)?),
             None => Barometer::at_altitude(self.quantity(&of("altitude"), Kind::Length)?),
         };
         let stated = self.tree.get(&of("uncertainty")).is_some();
@@ -189,7 +192,7 @@ impl<'a> Reader<'a> {
         let written = self.tree.text(&of("unit")).map(str::to_owned);
         if topic.starts_with(TRUTH_PREFIX) {
             let message = "topics below /truth are for scoring and cannot be mapped".to_owned();
-            let remedy = "name a topic that the rig itself would have recorded";
+            let remedy = "name a topic of measured values";
             self.note(FindingKind::WrongValue, &of("topic"), message, remedy);
         }
         let kind = kind_of(channel);
@@ -198,14 +201,13 @@ impl<'a> Reader<'a> {
         }
         let gauge = self.tree.get(&of("gauge")) == Some(&Value::Bool(true));
         if gauge && kind != Kind::Pressure {
-            let message =
-                format!("{channel} is not a pressure, and only pressures are read over the ambient pressure");
+            let message = format!("{channel} is not a pressure; only pressures can be gauge readings");
             self.note(FindingKind::Conflict, &of("gauge"), message, "remove `gauge`");
         }
         (topic, written, gauge)
     }
 
-    /// The field of a channel, or the fields of its several sensors.
+    /// The field of a channel, or the fields of its redundant sensors.
     fn fields(&self, channel: Channel) -> Vec<String> {
         let here = steps!["channels", channel.symbol(), "field"];
         let listed = self.tree.items(&here).iter().filter_map(Value::as_str);
@@ -306,7 +308,6 @@ impl<'a> Reader<'a> {
         value.as_str().map(str::to_owned).or_else(|| value.as_f64().map(|number| number.to_string()))
     }
 
-    /// The channels that have an entry below a key.
     fn channels_below(&self, key: &str) -> Vec<Channel> {
         self.tree.keys(&steps![key]).filter_map(|symbol| symbol.parse().ok()).collect()
     }

@@ -10,26 +10,26 @@ use std::path::Path;
 
 /// The quantity of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Reads {
+pub(crate) enum MappedQuantity {
     /// A channel.
     Channel(Channel),
     /// One of several sensors of a channel.
     Element(Element),
 }
 
-impl Reads {
+impl MappedQuantity {
     pub(crate) fn channel(self) -> Channel {
         match self {
-            Reads::Channel(channel) | Reads::Element(Element { channel, .. }) => channel,
+            MappedQuantity::Channel(channel) | MappedQuantity::Element(Element { channel, .. }) => channel,
         }
     }
 }
 
 /// Topic and field of a channel or sensor in the map.
-pub(crate) fn source_of(map: &ChannelMap, reads: Reads) -> Option<&ChannelSource> {
+pub(crate) fn source_of(map: &ChannelMap, reads: MappedQuantity) -> Option<&ChannelSource> {
     match reads {
-        Reads::Channel(channel) => map.channels.get(&channel),
-        Reads::Element(element) => map.elements.get(&element),
+        MappedQuantity::Channel(channel) => map.channels.get(&channel),
+        MappedQuantity::Element(element) => map.elements.get(&element),
     }
 }
 
@@ -40,10 +40,10 @@ pub(crate) struct MappedTopic {
     /// Fields to read, each once.
     pub(crate) fields: Vec<String>,
     /// Index of the field, its quantity, unit of the field.
-    pub(crate) outputs: Vec<(usize, Reads, &'static Unit)>,
+    pub(crate) outputs: Vec<(usize, MappedQuantity, &'static Unit)>,
 }
 
-/// The channels that the map finds on a topic; `None` if there is none.
+/// The mapped channels of a topic; `None` if the map has none on it.
 pub(crate) fn map_topic(
     path: &Path,
     map: &ChannelMap,
@@ -51,13 +51,13 @@ pub(crate) fn map_topic(
     warnings: &mut Vec<ReadWarning>,
 ) -> Result<Option<MappedTopic>, RecordError> {
     let mut mapped = MappedTopic { topic: definition.topic.clone(), fields: Vec::new(), outputs: Vec::new() };
-    let channels = map.channels.iter().map(|(channel, source)| (Reads::Channel(*channel), source));
-    let elements = map.elements.iter().map(|(element, source)| (Reads::Element(*element), source));
+    let channels = map.channels.iter().map(|(channel, source)| (MappedQuantity::Channel(*channel), source));
+    let elements = map.elements.iter().map(|(element, source)| (MappedQuantity::Element(*element), source));
     let sources = channels.chain(elements).filter(|(_, source)| source.topic == definition.topic);
     let schema: Value = serde_json::from_slice(&definition.schema).unwrap_or(Value::Null);
     for (reads, source) in sources {
         if map.is_native() && !definition.metadata.contains_key(&source.field) {
-            // Not measured in this run.
+            // The run did not measure this field.
             continue;
         }
         let channel = reads.channel();
@@ -86,7 +86,7 @@ fn recorded_unit(
         .get(&source.field)
         .map(String::as_str)
         .or_else(|| text("unit"))
-        // A description is prose: it counts only if it consists of a fitting unit.
+        // A description may be any text: it counts only if the whole of it is a unit of the channel.
         .or_else(|| text("description").filter(|description| unit(kind, description).is_ok()))
         .map(str::to_owned)
 }

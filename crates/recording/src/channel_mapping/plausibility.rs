@@ -1,16 +1,16 @@
 //! Checks readings against the units of the channel map, before anything is computed from them.
 
-use crate::channel_mapping::channel_map_mistakes::Complaints;
-use crate::logs::plausible::{AMBIENT_PA, fits, fitting_units, looks_like_gauge};
+use crate::channel_mapping::channel_map_mistakes::MapMistakes;
+use crate::logs::plausible::{
+    AMBIENT_RANGE_PA, TRIMMED_SHARE, fitting_units, is_plausible, looks_like_gauge,
+};
+use crate::logs::proposal::short;
 use crate::logs::units::{kind_of, unit};
 use crate::logs::{Kind, Unit};
 use crate::{AmbientPressure, ChannelSource};
 use mapper_core::{Channel, Series};
 use mapper_numerics::statistics::quantile;
 use mapper_yaml::{FindingKind, steps};
-
-/// Share of the readings left out at each end: spikes do not indicate a wrong unit.
-const OUTER: f64 = 0.02;
 
 /// The readings of a channel.
 pub(crate) struct Readings<'a> {
@@ -25,10 +25,10 @@ pub(crate) struct Readings<'a> {
 
 /// Reports a channel whose readings are impossible in their unit and possible in another one. Readings
 /// that are impossible in every unit indicate a sensor fault, not a mistake of the map.
-pub(crate) fn check(readings: &Readings<'_>, complaints: &mut Complaints) {
+pub(crate) fn check(readings: &Readings<'_>, mistakes: &mut MapMistakes) {
     let Readings { channel, source, unit: unit_used, series, ambient_pa } = *readings;
-    let Some((low, high)) = range(series) else { return };
-    if fits(channel, low, high) {
+    let Some((low, high)) = trimmed_range(series) else { return };
+    if is_plausible(channel, low, high) {
         return;
     }
     // Offset added to the readings.
@@ -37,10 +37,13 @@ pub(crate) fn check(readings: &Readings<'_>, complaints: &mut Complaints) {
     let (written_low, written_high) = (written(low), written(high));
     let mut right: Vec<String> = Vec::new();
     if looks_like_gauge(channel, low, high) && !source.gauge {
-        right.push("as pressures over the ambient pressure they would be plausible: write `gauge: true` and `ambient_pressure`".to_owned());
+        right.push(
+            "as gauge pressures they would be plausible: write `gauge: true` and `ambient_pressure`"
+                .to_owned(),
+        );
     }
-    if source.gauge && fits(channel, low - over_pa, high - over_pa) {
-        right.push("as absolute pressures they would be plausible: leave `gauge: true` out".to_owned());
+    if source.gauge && is_plausible(channel, low - over_pa, high - over_pa) {
+        right.push("as absolute pressures they would be plausible: delete `gauge: true`".to_owned());
     }
     for other in fitting_units(channel, written_low, written_high, over_pa) {
         let shown = shown_unit(kind_of(channel));
@@ -61,7 +64,7 @@ pub(crate) fn check(readings: &Readings<'_>, complaints: &mut Complaints) {
     }
     let has_unit = source.unit.is_some();
     let place = steps!["channels", channel.symbol(), if has_unit { "unit" } else { "field" }];
-    let over = if source.gauge { " over the ambient pressure" } else { "" };
+    let over = if source.gauge { " gauge" } else { "" };
     let message = format!(
         "the readings of `{}` lie between {} and {} {}{over}, which is impossible for {channel}, {}",
         source.field,
@@ -70,8 +73,8 @@ pub(crate) fn check(readings: &Readings<'_>, complaints: &mut Complaints) {
         unit_used.symbol(),
         channel.info().description
     );
-    let remedy = format!("{}; or leave {channel} out", right.join("; "));
-    complaints.add(FindingKind::Implausible, &place, message, remedy);
+    let remedy = format!("{}; or delete the entry of {channel}", right.join("; "));
+    mistakes.add(FindingKind::Implausible, &place, message, remedy);
 }
 
 /// Reports an ambient pressure that occurs nowhere on earth: gauge pressures are added to it.
@@ -79,18 +82,18 @@ pub(crate) fn check_ambient(
     ambient: &AmbientPressure,
     column: Option<&Series>,
     unit_used: Option<&'static Unit>,
-    complaints: &mut Complaints,
+    mistakes: &mut MapMistakes,
 ) {
-    let (least, most) = AMBIENT_PA;
+    let (least, most) = AMBIENT_RANGE_PA;
     let allowed = format!("it lies between {:.0} and {:.0} kPa", least / 1e3, most / 1e3);
-    match (ambient, column.and_then(range)) {
+    match (ambient, column.and_then(trimmed_range)) {
         (AmbientPressure::Constant(barometer), _) if !(least..=most).contains(&barometer.pressure_pa) => {
             let message = format!(
                 "the ambient pressure is {} kPa, which is impossible",
                 short(barometer.pressure_pa / 1e3)
             );
-            let remedy = format!("{allowed}: write what the barometer read");
-            complaints.add(FindingKind::Implausible, &steps!["ambient_pressure"], message, remedy);
+            let remedy = format!("{allowed}: write the barometer's reading");
+            mistakes.add(FindingKind::Implausible, &steps!["ambient_pressure"], message, remedy);
         }
         (AmbientPressure::Source(source), Some((low, high))) if low < least || high > most => {
             let written = |inside: f64| unit_used.map_or(inside, |unit| unit.from_inside(inside));
@@ -112,22 +115,21 @@ pub(crate) fn check_ambient(
                 .collect();
             let or = if right.is_empty() { "" } else { "; or " };
             let remedy = format!(
-                "{allowed}: {}{or}name another column, or write what the barometer read",
+                "{allowed}: {}{or}name another column, or write the barometer's reading",
                 right.join(" or ")
             );
-            complaints.add(FindingKind::Implausible, &steps!["ambient_pressure", "field"], message, remedy);
+            mistakes.add(FindingKind::Implausible, &steps!["ambient_pressure", "field"], message, remedy);
         }
         _ => {}
     }
 }
 
-/// Smallest and largest reading without the outer ones.
-fn range(series: &Series) -> Option<(f64, f64)> {
+/// Smallest and largest reading after [`TRIMMED_SHARE`] is removed at each end.
+fn trimmed_range(series: &Series) -> Option<(f64, f64)> {
     let values: Vec<f64> = series.values.iter().copied().filter(|value| value.is_finite()).collect();
-    Some((quantile(&values, OUTER)?, quantile(&values, 1.0 - OUTER)?))
+    Some((quantile(&values, TRIMMED_SHARE)?, quantile(&values, 1.0 - TRIMMED_SHARE)?))
 }
 
-/// A common unit for such values.
 fn shown_unit(kind: Kind) -> Option<&'static Unit> {
     let symbol = match kind {
         Kind::Temperature => "degC",
@@ -137,8 +139,4 @@ fn shown_unit(kind: Kind) -> Option<&'static Unit> {
         _ => return None,
     };
     unit(kind, symbol).ok()
-}
-
-fn short(value: f64) -> String {
-    if value.abs() >= 100.0 { format!("{value:.0}") } else { format!("{value:.3}") }
 }

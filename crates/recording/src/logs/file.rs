@@ -1,12 +1,12 @@
 //! A log as a file or as bytes in memory.
 
 use crate::logs::LogError;
-use crate::logs::limits::{UNPACKED_BYTES, unpacked_max};
+use crate::logs::limits::{MAX_UNPACKED_BYTES, max_unpacked_bytes};
 use std::io::{self, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// What a format reads from.
+/// Input of a log format.
 pub trait ReadSeek: Read + Seek {}
 
 impl<T: Read + Seek> ReadSeek for T {}
@@ -14,7 +14,7 @@ impl<T: Read + Seek> ReadSeek for T {}
 /// The first bytes of a file compressed by gzip.
 const GZIP: [u8; 2] = [0x1f, 0x8b];
 
-/// A log's bytes, which may be read several times.
+/// A log on disk or in memory, which may be read several times.
 #[derive(Debug, Clone)]
 pub struct LogFile {
     path: PathBuf,
@@ -23,12 +23,12 @@ pub struct LogFile {
 
 impl LogFile {
     /// A file.
-    pub fn of_path(path: &Path) -> Self {
+    pub fn from_path(path: &Path) -> Self {
         LogFile { path: path.to_owned(), bytes: None }
     }
 
     /// Bytes in memory; `name` stands for the file in messages.
-    pub fn of_bytes(name: &Path, bytes: &[u8]) -> Self {
+    pub fn from_bytes(name: &Path, bytes: &[u8]) -> Self {
         LogFile { path: name.to_owned(), bytes: Some(bytes.into()) }
     }
 
@@ -36,19 +36,20 @@ impl LogFile {
     ///
     /// # Errors
     /// [`LogError::Read`] if the file cannot be read or unpacked, or unpacks to more than a file of its size may.
-    pub(crate) fn unpacked(&self) -> Result<Option<LogFile>, LogError> {
+    pub(crate) fn unpack(&self) -> Result<Option<LogFile>, LogError> {
         if self.head(GZIP.len())? != GZIP {
             return Ok(None);
         }
-        let limit = unpacked_max(self.size_bytes()?).min(UNPACKED_BYTES);
+        let limit = max_unpacked_bytes(self.size_bytes()?).min(MAX_UNPACKED_BYTES);
         let mut content = Vec::new();
         flate2::read::MultiGzDecoder::new(self.open()?)
             .take(limit + 1)
             .read_to_end(&mut content)
-            .map_err(|error| self.error(error))?;
+            .map_err(|error| self.read_error(error))?;
         if content.len() as u64 > limit {
-            let why = format!("it unpacks to more than {} MiB; unpack it to a file", limit >> 20);
-            return Err(self.error(io::Error::new(io::ErrorKind::FileTooLarge, why)));
+            let why =
+                format!("it unpacks to more than {} MiB; unpack it and give the unpacked file", limit >> 20);
+            return Err(self.read_error(io::Error::new(io::ErrorKind::FileTooLarge, why)));
         }
         Ok(Some(LogFile { path: self.path.clone(), bytes: Some(content.into()) }))
     }
@@ -70,7 +71,7 @@ impl LogFile {
     pub fn open(&self) -> Result<Box<dyn ReadSeek>, LogError> {
         match &self.bytes {
             Some(bytes) => Ok(Box::new(Cursor::new(bytes.clone()))),
-            None => Ok(Box::new(mapper_yaml::open_file(&self.path).map_err(|error| self.error(error))?)),
+            None => Ok(Box::new(mapper_yaml::open_file(&self.path).map_err(|error| self.read_error(error))?)),
         }
     }
 
@@ -81,7 +82,7 @@ impl LogFile {
     pub fn size_bytes(&self) -> Result<u64, LogError> {
         match &self.bytes {
             Some(bytes) => Ok(bytes.len() as u64),
-            None => Ok(std::fs::metadata(&self.path).map_err(|error| self.error(error))?.len()),
+            None => Ok(std::fs::metadata(&self.path).map_err(|error| self.read_error(error))?.len()),
         }
     }
 
@@ -92,17 +93,17 @@ impl LogFile {
     pub fn head(&self, count: usize) -> Result<Vec<u8>, LogError> {
         let mut head = Vec::new();
         let limit = u64::try_from(count).unwrap_or(u64::MAX);
-        self.open()?.take(limit).read_to_end(&mut head).map_err(|error| self.error(error))?;
+        self.open()?.take(limit).read_to_end(&mut head).map_err(|error| self.read_error(error))?;
         Ok(head)
     }
 
-    /// That the file could not be read.
-    pub fn error(&self, source: io::Error) -> LogError {
+    /// The error for a file that could not be read.
+    pub fn read_error(&self, source: io::Error) -> LogError {
         LogError::Read { path: self.path.clone(), source }
     }
 
-    /// That what is in the file cannot be used.
-    pub fn content(&self, format: &'static str, message: impl Into<String>) -> LogError {
+    /// The error for content that cannot be used.
+    pub fn content_error(&self, format: &'static str, message: impl Into<String>) -> LogError {
         LogError::Content { path: self.path.clone(), format, message: message.into() }
     }
 }

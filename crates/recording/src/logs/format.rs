@@ -1,31 +1,30 @@
-//! The seam of log formats: a format recognises a file, and opens it as groups, columns and rows.
+//! Interface of log formats: a format recognises a file, and opens it as groups, columns and rows.
 
 use crate::logs::{Layout, LogError, LogFile, LogOptions};
 
-/// Rows of one group as they come.
+/// A row of one group.
 #[derive(Debug, Clone, Copy)]
 pub struct Row<'a> {
     /// Index of the group.
     pub group: usize,
     /// Time, s, on the clock that all groups share; any finite number.
     pub t_s: f64,
-    /// Values of those wanted columns that belong to the group, in the order in which they were wanted; NaN if the
-    /// log has none.
+    /// Values of the requested columns of the group, in the order of the request; NaN for an empty cell.
     pub values: &'a [f64],
 }
 
-/// Takes rows; an error ends the reading.
+/// Receives rows; an error ends the reading.
 pub type RowSink<'a> = dyn FnMut(Row<'_>) -> Result<(), LogError> + 'a;
 
 /// An open log.
 pub trait Log {
-    /// What is in it.
+    /// Groups and columns of the log.
     fn layout(&self) -> &Layout;
 
-    /// Gives the rows of the wanted columns (indices of [`Layout::columns`]), each group in the order of the file.
+    /// Passes the rows of the requested columns (indices of [`Layout::columns`]) to `sink`, each group in the order of the file.
     ///
     /// # Errors
-    /// [`LogError`] if the file cannot be read on; what came before was given.
+    /// [`LogError`] if the file cannot be read to its end; rows before the fault were passed on.
     fn rows(&mut self, wanted: &[usize], sink: &mut RowSink<'_>) -> Result<(), LogError>;
 }
 
@@ -35,7 +34,7 @@ pub type OpenLog = fn(&LogFile, &LogOptions) -> Result<Box<dyn Log>, LogError>;
 /// One format of logs.
 #[derive(Debug, Clone, Copy)]
 pub struct LogFormat {
-    /// Name for people, e.g. `CSV`.
+    /// Name in messages, e.g. `CSV`.
     pub name: &'static str,
     /// Whether the first bytes of a file (up to [`LogFormats::HEAD_BYTES`]) are of this format.
     pub recognises: fn(&[u8]) -> bool,
@@ -43,34 +42,34 @@ pub struct LogFormat {
     pub open: OpenLog,
 }
 
-/// The formats that a program knows, in the order in which they are asked.
+/// The log formats of a program, in the order in which they are tried.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct LogFormats(pub &'static [LogFormat]);
 
 impl LogFormats {
-    /// How much of a file formats see to recognise it, bytes.
+    /// Size of the start of a file by which formats recognise it, bytes.
     pub const HEAD_BYTES: usize = 4096;
 
     /// The format of a file that starts with these bytes.
-    pub fn of_head(self, head: &[u8]) -> Option<&'static LogFormat> {
+    pub fn recognise(self, head: &[u8]) -> Option<&'static LogFormat> {
         self.0.iter().find(|format| (format.recognises)(head))
     }
 
     /// Opens a log.
     ///
     /// # Errors
-    /// [`LogError`] if the file cannot be read, is of no known format, or holds nothing that can be used.
+    /// [`LogError`] if the file cannot be read, is of no known format, or contains no usable data.
     pub fn open(
         self,
         file: &LogFile,
         options: &LogOptions,
     ) -> Result<(&'static LogFormat, Box<dyn Log>), LogError> {
-        let unpacked = file.unpacked()?;
+        let unpacked = file.unpack()?;
         let file = unpacked.as_ref().unwrap_or(file);
         let head = file.head(Self::HEAD_BYTES)?;
-        let format = self.of_head(&head).ok_or_else(|| LogError::Unknown {
+        let format = self.recognise(&head).ok_or_else(|| LogError::Unknown {
             path: file.path().to_owned(),
-            found: what_it_is(&head),
+            found: describe_unknown(&head),
             known: self.names(),
         })?;
         Ok((format, (format.open)(file, options)?))
@@ -83,11 +82,11 @@ impl LogFormats {
     }
 }
 
-/// Formats that people have and that are not read, by their first bytes, with what to do.
-const OTHERS: [(&[u8], &str); 7] = [
+/// Common formats that cannot be read, by their first bytes, with a remedy.
+const UNSUPPORTED_FORMATS: [(&[u8], &str); 7] = [
     (
         b"\x89MCAP",
-        "it is an MCAP recording, which `mapper identify` reads; topics and fields are named in a channel map",
+        "it is an MCAP recording, not a log; identify it directly, with a channel map for its topics and fields if another program wrote it",
     ),
     (
         b"TDSm",
@@ -105,15 +104,14 @@ const OTHERS: [(&[u8], &str); 7] = [
     ),
     (b"\x89HDF", "it is HDF5; export it as CSV"),
     (b"MATLAB 7.3", "it is MATLAB data of version 7.3; save it by `save -v7`, or export it as CSV"),
-    (b"PK", "it is a zip archive, and no whole workbook of Excel; unpack it, or save the workbook again"),
+    (b"PK", "it is a zip archive but not a complete Excel workbook; unpack it, or save the workbook again"),
 ];
 
-/// What a file of no known format is.
-fn what_it_is(head: &[u8]) -> String {
+fn describe_unknown(head: &[u8]) -> String {
     if head.is_empty() {
         return "it is empty".to_owned();
     }
-    let other = OTHERS.iter().find(|(magic, _)| head.starts_with(magic));
+    let other = UNSUPPORTED_FORMATS.iter().find(|(magic, _)| head.starts_with(magic));
     let start = || format!("it starts with {:?}", String::from_utf8_lossy(head.get(..8).unwrap_or(head)));
     other.map_or_else(start, |(_, words)| (*words).to_owned())
 }

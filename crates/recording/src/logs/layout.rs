@@ -1,17 +1,17 @@
-//! What a log holds, as found by looking.
+//! Groups and columns of a log, as its reader detected them.
 
 use serde::Serialize;
 
-/// Groups, columns and what was found out about them.
+/// Groups and columns of a log.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Layout {
     /// Columns that share a clock, in the order of the file.
     pub groups: Vec<Group>,
-    /// Columns, clocks left out, in the order of the file.
+    /// Columns without the clocks, in the order of the file.
     pub columns: Vec<Column>,
-    /// What was found by looking, one sentence each, with the key that overrides it.
+    /// Detected properties, one sentence each, with the option that overrides it.
     pub findings: Vec<String>,
-    /// Time 0 of all groups in nanoseconds since 1970-01-01, if the log gives dates; in the zone of the log.
+    /// Time 0 of all groups in nanoseconds since 1970-01-01 in the log's time zone; `None` if the log has no dates.
     pub start_time_ns: Option<u64>,
 }
 
@@ -20,7 +20,7 @@ pub struct Layout {
 pub struct Group {
     /// Name: a sheet, a group of the format, the clock's column; empty if the log has one group without a name.
     pub name: String,
-    /// The clock in words.
+    /// Description of the clock.
     pub clock: String,
 }
 
@@ -29,7 +29,7 @@ pub struct Group {
 pub struct Column {
     /// Name without its unit; distinct within a group.
     pub name: String,
-    /// The cell of the header as written, unit included.
+    /// The header's cell as written, with the unit.
     pub header: String,
     /// Unit as written; `None` if the log gives none.
     pub unit: Option<String>,
@@ -40,7 +40,7 @@ pub struct Column {
 }
 
 impl Layout {
-    /// Adds what was found while the rows were read, once.
+    /// Adds a finding unless it is there already.
     pub fn add_finding(&mut self, finding: Option<&str>) {
         let known = |finding: &&str| self.findings.iter().any(|other| other == finding);
         self.findings.extend(finding.filter(|finding| !known(finding)).map(str::to_owned));

@@ -1,30 +1,29 @@
-//! How much a log may ask of its reader, whatever its format: one place for depth, memory and time.
+//! Limits of nesting, memory and time that hold for all log formats.
 //!
-//! Time is bounded by bytes: what a reader unpacks is bounded by the size of the file, and every byte takes constant time. Limits of
-//! single formats (parts of a workbook, length of a line) are with their readers.
+//! The unpacked size limits the time too, since every byte takes constant time. Limits of single formats (parts of a workbook, length of
+//! a line) are with their readers.
 
-/// Unpacked size that every file may have, bytes: an hour at 1 kHz with 37 channels as doubles.
-pub const UNPACKED_BYTES: u64 = 1 << 30;
+/// Maximum unpacked size of a small file, bytes: an hour at 1 kHz with 37 channels as doubles.
+pub const MAX_UNPACKED_BYTES: u64 = 1 << 30;
 
-/// Unpacked over packed size of a larger file: readings with noise pack to a fifth at best, the text of a sheet to a fifteenth.
-pub const UNPACKED_RATIO: u64 = 20;
+/// Maximum unpacked over packed size of a larger file: noisy readings compress to a fifth at best, the text of a sheet to a fifteenth.
+pub const MAX_UNPACKED_RATIO: u64 = 20;
 
-/// Unpacked size of one block, bytes, of which a reader holds two at a time: the standard of MDF recommends 4 MiB.
-pub const BLOCK_BYTES: u64 = 32 << 20;
+/// Maximum unpacked size of one block, bytes; a reader holds two at a time. The MDF standard recommends 4 MiB.
+pub const MAX_BLOCK_BYTES: u64 = 32 << 20;
 
-/// Nesting of a conversion formula, signs and powers included: the deepest formulas of sensors, polynomials, have some ten levels.
-pub const FORMULA_DEPTH: usize = 64;
+/// Maximum nesting of a conversion formula, with signs and powers: polynomials, the deepest formulas of sensors, have about ten levels.
+pub const MAX_FORMULA_DEPTH: usize = 64;
 
-/// Operators of a conversion formula: each may be a level of its expression tree.
-pub const FORMULA_OPERATORS: usize = 1000;
+/// Maximum number of operators of a conversion formula: each may be a level of its expression tree.
+pub const MAX_FORMULA_OPERATORS: usize = 1000;
 
-/// Unpacked size that a file of this size may have, bytes.
-pub fn unpacked_max(file_bytes: u64) -> u64 {
-    UNPACKED_BYTES.max(UNPACKED_RATIO.saturating_mul(file_bytes))
+/// Maximum unpacked size of a file of this size, bytes.
+pub fn max_unpacked_bytes(file_bytes: u64) -> u64 {
+    MAX_UNPACKED_BYTES.max(MAX_UNPACKED_RATIO.saturating_mul(file_bytes))
 }
 
-/// Whether a text, read as a formula, is nested too deeply for a reader that calls itself at each level. Both the parser and the
-/// evaluation of chains such as `X+X+X` do.
+/// Whether a formula is nested too deeply for recursion. The parser recurses, and so does the evaluation of chains such as `X+X+X`.
 pub fn is_too_deep(text: &[u8]) -> bool {
     let (mut depth, mut deepest, mut signs, mut operators) = (0usize, 0usize, 0usize, 0usize);
     for byte in text {
@@ -34,13 +33,13 @@ pub fn is_too_deep(text: &[u8]) -> bool {
             b'+' | b'-' | b'^' | b'*' | b'/' => (signs, operators) = (signs + 1, operators + 1),
             _ => {}
         }
-        // A power is a level although an operand lies before it; a chain of signs is one level each.
+        // A power is a level although an operand precedes it; each sign of a chain is a level.
         deepest = deepest.max(depth + signs);
         if !matches!(byte, b'+' | b'-' | b'^' | b'*' | b'/' | b'(' | b')') && !byte.is_ascii_whitespace() {
             signs = 0;
         }
     }
-    deepest > FORMULA_DEPTH || operators > FORMULA_OPERATORS
+    deepest > MAX_FORMULA_DEPTH || operators > MAX_FORMULA_OPERATORS
 }
 
 #[cfg(test)]
@@ -60,8 +59,8 @@ mod tests {
 
     #[test]
     fn a_file_may_unpack_to_a_multiple_of_its_size() {
-        assert_eq!(unpacked_max(1000), UNPACKED_BYTES);
-        assert_eq!(unpacked_max(1 << 30), 20 << 30);
-        assert_eq!(unpacked_max(u64::MAX), u64::MAX);
+        assert_eq!(max_unpacked_bytes(1000), MAX_UNPACKED_BYTES);
+        assert_eq!(max_unpacked_bytes(1 << 30), 20 << 30);
+        assert_eq!(max_unpacked_bytes(u64::MAX), u64::MAX);
     }
 }

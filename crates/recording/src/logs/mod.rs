@@ -1,9 +1,7 @@
-//! Logs of other programs: the seam of the formats that read them, what is found in them, and the channel map that they
-//! suggest.
+//! Logs of other programs: the interface of log formats, the survey of a log, and the proposed channel map.
 //!
-//! A format ([`LogFormat`]) recognises a file by its first bytes and opens it as a [`Log`]: a [`Layout`] of groups and
-//! columns with what was found out by looking, and the rows of the columns that are wanted, one after the other. Nothing
-//! of a log is held in memory but what a reader asks for.
+//! A [`LogFormat`] recognises a file by its first bytes and opens it as a [`Log`]: a [`Layout`] of groups and columns, and the rows of
+//! the requested columns, one after the other.
 
 mod error;
 mod file;

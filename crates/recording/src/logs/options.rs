@@ -1,8 +1,8 @@
-//! The user's options for a log, if automatic detection gave the wrong answer.
+//! The user's options for a log, for properties that automatic detection gets wrong.
 
 use mapper_yaml::units::{Kind, parse};
 
-/// How the letters of a text file are stored.
+/// Character encoding of a text file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Encoding {
     /// UTF-8, with or without a byte order mark.
@@ -26,16 +26,16 @@ pub enum DateOrder {
     YearFirst,
 }
 
-/// What is known about a log beforehand; what is not given is found by looking.
+/// Properties of a log that the user states; the reader detects the others.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct LogOptions {
     /// Character between the cells of a line; a blank stands for any number of blanks.
     pub separator: Option<char>,
     /// Decimal sign: `.` or `,`.
     pub decimal: Option<char>,
-    /// How the letters are stored.
+    /// Character encoding.
     pub encoding: Option<Encoding>,
-    /// Row of the names, from 1; rows without any cell do not count, nor does a byte order mark.
+    /// Row of the names, from 1; empty rows do not count.
     pub names_row: Option<usize>,
     /// Row of the units, from 1; 0 if there is none.
     pub units_row: Option<usize>,
@@ -43,7 +43,7 @@ pub struct LogOptions {
     pub data_row: Option<usize>,
     /// Columns of the clock: one, or one with the date and one with the time of day.
     pub time: Vec<String>,
-    /// Unit of a clock that counts, as seconds.
+    /// Unit of a counting clock, s.
     pub time_unit_s: Option<f64>,
     /// Order of the parts of a date.
     pub date_order: Option<DateOrder>,
@@ -51,29 +51,29 @@ pub struct LogOptions {
     pub rate_hz: Option<f64>,
     /// Sheet of a workbook.
     pub sheet: Option<String>,
-    /// Values that stand for none, in the unit of the log.
+    /// Values that mark missing readings, in the log's unit.
     pub missing: Vec<f64>,
 }
 
 /// One key of the options.
 #[derive(Debug, Clone, Copy)]
 pub struct OptionKey {
-    /// As written in a channel map and behind `--with`.
+    /// Name in a channel map, and in the options of the commands.
     pub name: &'static str,
-    /// One line for people.
+    /// Description in one line.
     pub description: &'static str,
-    /// A value as one would write it.
+    /// Example of a value.
     pub example: &'static str,
     set: fn(&mut LogOptions, &str) -> Option<()>,
 }
 
-/// A key or a value that does not exist.
+/// An unknown key, or an invalid value.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum OptionError {
     /// No such key.
-    #[error("there is no key `{key}`; the keys are {}", known())]
+    #[error("there is no key `{key}`; the keys are {}", known_keys())]
     Key {
-        /// What was written.
+        /// The unknown key.
         key: String,
     },
     /// Not a value of the key.
@@ -81,14 +81,14 @@ pub enum OptionError {
     Value {
         /// The key.
         key: &'static str,
-        /// What was written.
+        /// The invalid value.
         value: String,
-        /// A right one.
+        /// A valid one.
         example: &'static str,
     },
 }
 
-fn known() -> String {
+fn known_keys() -> String {
     let names: Vec<&str> = OPTION_KEYS.iter().map(|key| key.name).collect();
     names.join(", ")
 }
@@ -222,7 +222,7 @@ impl LogOptions {
     /// Sets one key.
     ///
     /// # Errors
-    /// [`OptionError`] for a key that does not exist and for a value that is none of its.
+    /// [`OptionError`] for an unknown key and for a value that is not valid for it.
     pub fn set(&mut self, key: &str, value: &str) -> Result<(), OptionError> {
         let row = OPTION_KEYS.iter().find(|row| row.name == key);
         let row = row.ok_or_else(|| OptionError::Key { key: key.to_owned() })?;
@@ -232,11 +232,8 @@ impl LogOptions {
             example: row.example,
         })
     }
-}
 
-impl LogOptions {
-    /// The keys that were given.
-    fn given(&self) -> Vec<&'static str> {
+    fn keys_set(&self) -> Vec<&'static str> {
         [
             ("separator", self.separator.is_some()),
             ("decimal", self.decimal.is_some()),
@@ -256,28 +253,28 @@ impl LogOptions {
         .collect()
     }
 
-    /// That no other key was given than those which a format uses.
+    /// Checks that only keys that a format uses are set.
     ///
     /// # Errors
-    /// What to do about the first other one.
-    pub fn only(&self, used: &[&str]) -> Result<(), String> {
-        match self.given().into_iter().find(|key| !used.contains(key)) {
+    /// The first other key, with a remedy.
+    pub fn allow_only(&self, used: &[&str]) -> Result<(), String> {
+        match self.keys_set().into_iter().find(|key| !used.contains(key)) {
             Some(key) => Err(format!(
-                "`{key}` means nothing in this format: leave it out; its keys are {}",
+                "`{key}` does not apply to this format: delete it; the format's keys are {}",
                 used.join(", ")
             )),
             None => Ok(()),
         }
     }
 
-    /// That no key was given which a format does not use.
+    /// Checks that no key that a format does not use is set.
     ///
     /// # Errors
-    /// As [`LogOptions::only`].
-    pub fn without(&self, unused: &[&str]) -> Result<(), String> {
+    /// As [`LogOptions::allow_only`].
+    pub fn refuse_keys(&self, unused: &[&str]) -> Result<(), String> {
         let used: Vec<&str> =
             OPTION_KEYS.iter().map(|key| key.name).filter(|key| !unused.contains(key)).collect();
-        self.only(&used)
+        self.allow_only(&used)
     }
 }
 
@@ -291,9 +288,10 @@ mod tests {
             let mut options = LogOptions::default();
             options.set(key.name, key.example).unwrap();
             assert!(
-                options.only(&[key.name]).is_ok() && options.only(&["x"]).unwrap_err().contains(key.name)
+                options.allow_only(&[key.name]).is_ok()
+                    && options.allow_only(&["x"]).unwrap_err().contains(key.name)
             );
-            assert!(options.without(&[key.name]).is_err() && options.without(&["x"]).is_ok());
+            assert!(options.refuse_keys(&[key.name]).is_err() && options.refuse_keys(&["x"]).is_ok());
         }
     }
 

@@ -1,10 +1,10 @@
-//! A trace in one line of text.
+//! Sparklines: a trace as one line of text.
 
 /// Eighths of a line's height.
 const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 
-/// A trace of at most `width` characters: each shows the mean of its share of the values between the least and the
-/// largest; a blank if there are none.
+/// A sparkline of at most `width` characters from the minimum to the maximum of `values`; each character shows the mean of its share of
+/// them, a blank if it has none.
 pub fn sparkline(values: &[f64], width: usize) -> String {
     let finite = || values.iter().copied().filter(|value| value.is_finite());
     let low = finite().fold(f64::INFINITY, f64::min);

@@ -1,19 +1,18 @@
-//! What every column of a log holds, in one pass over it.
+//! Surveys all columns of a log in one pass: ranges, gaps and traces.
 
 use crate::logs::trace::Trace;
 use crate::logs::{Log, LogError, Row};
 use serde::Serialize;
 
-/// Intervals from which the typical one is taken.
-const INTERVALS: usize = 4096;
+const MAX_INTERVALS: usize = 4096;
 
-/// A hole in a clock is a step of more than this many typical intervals.
+/// Typical intervals above which a step of the clock is a gap.
 const GAP_INTERVALS: f64 = 5.0;
 
-/// Most gaps that are listed; more are counted.
-const GAP_LIMIT: usize = 100;
+/// Maximum number of listed gaps; further ones are only counted.
+const MAX_LISTED_GAPS: usize = 100;
 
-/// What a log holds.
+/// Contents of a log.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Survey {
     /// By group of the layout.
@@ -33,11 +32,11 @@ pub struct GroupSurvey {
     pub last_s: f64,
     /// Typical interval between rows, s; NaN below two rows.
     pub interval_s: f64,
-    /// Gaps, the first ones of many.
+    /// The first gaps, at most 100.
     pub gaps: Vec<Gap>,
-    /// How many gaps there are.
+    /// Number of gaps.
     pub gap_count: u64,
-    /// Rows whose time is not after that of the row before.
+    /// Rows with a time not after the previous row's.
     pub backward: u64,
     #[serde(skip)]
     intervals: Vec<f64>,
@@ -62,11 +61,11 @@ pub struct ColumnSurvey {
     pub count: u64,
     /// Cells without one.
     pub missing: u64,
-    /// Least value; infinite if there is none.
+    /// Minimum; infinite without values.
     pub min: f64,
-    /// Largest value; minus infinity if there is none.
+    /// Maximum; minus infinity without values.
     pub max: f64,
-    /// The course of it.
+    /// The values over time.
     pub trace: Trace,
 }
 
@@ -83,7 +82,7 @@ impl Default for ColumnSurvey {
 }
 
 impl ColumnSurvey {
-    /// A value that this share of the course stays below; NaN without values.
+    /// The quantile of the trace at a share of 0 to 1; NaN without values.
     pub fn quantile(&self, share: f64) -> f64 {
         let mut values: Vec<f64> = self.trace.means().into_iter().filter(|value| value.is_finite()).collect();
         values.sort_by(f64::total_cmp);
@@ -98,13 +97,13 @@ impl ColumnSurvey {
 }
 
 impl GroupSurvey {
-    fn time(&mut self, t_s: f64) {
+    fn add_time(&mut self, t_s: f64) {
         if self.rows == 0 {
             (self.first_s, self.last_s) = (t_s, t_s);
         } else {
             let step_s = t_s - self.last_s;
             if step_s > 0.0 {
-                self.step(step_s, t_s);
+                self.add_interval(step_s, t_s);
             } else {
                 self.backward += 1;
             }
@@ -114,22 +113,22 @@ impl GroupSurvey {
         self.trace.push(t_s);
     }
 
-    /// Takes a step forward to `t_s`.
-    fn step(&mut self, step_s: f64, t_s: f64) {
-        if self.intervals.len() < INTERVALS {
+    /// Records an interval that ends at `t_s`.
+    fn add_interval(&mut self, step_s: f64, t_s: f64) {
+        if self.intervals.len() < MAX_INTERVALS {
             self.intervals.push(step_s);
         }
         if step_s > GAP_INTERVALS * self.typical_s() {
             self.gap_count += 1;
-            if self.gaps.len() < GAP_LIMIT {
+            if self.gaps.len() < MAX_LISTED_GAPS {
                 self.gaps.push(Gap { from_s: self.last_s, to_s: t_s });
             }
         }
     }
 
-    /// The typical interval so far: settled once enough rows have come.
+    /// The median interval so far; constant after [`MAX_INTERVALS`].
     fn typical_s(&mut self) -> f64 {
-        let settled = self.intervals.len() >= INTERVALS || !self.intervals.len().is_multiple_of(64);
+        let settled = self.intervals.len() >= MAX_INTERVALS || !self.intervals.len().is_multiple_of(64);
         if self.interval_s.is_finite() && settled {
             return self.interval_s;
         }
@@ -146,7 +145,7 @@ impl GroupSurvey {
     }
 }
 
-/// Looks at every column.
+/// Reads a log and surveys every column.
 ///
 /// # Errors
 /// [`LogError`] if the log cannot be read to its end.
@@ -171,7 +170,7 @@ pub fn survey(log: &mut dyn Log) -> Result<Survey, LogError> {
     let members: Vec<Vec<usize>> = (0..layout.groups.len()).map(of_group).collect();
     let mut take = |row: Row<'_>| {
         if let Some(group) = survey.groups.get_mut(row.group).filter(|_| row.t_s.is_finite()) {
-            group.time(row.t_s);
+            group.add_time(row.t_s);
         }
         for (column, value) in members.get(row.group).into_iter().flatten().zip(row.values) {
             let Some(column) = survey.columns.get_mut(*column) else { continue };

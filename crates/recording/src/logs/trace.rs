@@ -1,9 +1,9 @@
-//! A long series in a bounded number of means.
+//! Compresses a long series to a bounded number of means.
 
-/// Most means that are kept; a power of two.
-const BIN_LIMIT: usize = 512;
+/// Maximum number of means; a power of two.
+const MAX_BINS: usize = 512;
 
-/// Means over equal numbers of rows.
+/// A series as means over equal numbers of rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trace {
     bins: Vec<(f64, u32)>,
@@ -20,8 +20,8 @@ impl Default for Trace {
 impl Trace {
     /// Adds the next row; NaN counts as a row without a value.
     pub fn push(&mut self, value: f64) {
-        let bin = usize::try_from(self.rows / self.rows_per_bin).unwrap_or(BIN_LIMIT);
-        if bin >= BIN_LIMIT {
+        let bin = usize::try_from(self.rows / self.rows_per_bin).unwrap_or(MAX_BINS);
+        if bin >= MAX_BINS {
             self.bins = self
                 .bins
                 .chunks(2)
@@ -55,7 +55,7 @@ mod tests {
         let mut trace = Trace::default();
         (0..100_000).for_each(|row| trace.push(f64::from(row)));
         let means = trace.means();
-        assert!((BIN_LIMIT / 4..=BIN_LIMIT).contains(&means.len()), "{}", means.len());
+        assert!((MAX_BINS / 4..=MAX_BINS).contains(&means.len()), "{}", means.len());
         assert!(means.is_sorted());
         let whole: f64 = means.iter().take(means.len() - 1).sum::<f64>() / (means.len() - 1) as f64;
         assert!((whole / 50_000.0 - 1.0).abs() < 0.02, "{whole}");

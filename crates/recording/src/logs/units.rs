@@ -1,9 +1,9 @@
-//! What recordings of other programs spell differently from the table of `mapper-yaml`.
+//! Units of recordings by other programs, in more spellings than `mapper-yaml` accepts.
 
 use mapper_core::{Channel, Dimension};
 use mapper_yaml::units::{BARE_RATIO, Kind, Unit, UnitError, parse_with};
 
-/// What a channel measures.
+/// The kind of quantity that a channel measures.
 pub fn kind_of(channel: Channel) -> Kind {
     match channel.info().dimension {
         Dimension::RotationalSpeed => Kind::Speed,
@@ -23,7 +23,7 @@ pub fn difference(kind: Kind) -> Kind {
     }
 }
 
-/// The unit with that spelling, as the table has it or as other programs write it.
+/// The unit with a spelling of this or another program.
 ///
 /// # Errors
 /// [`UnitError::WrongUnit`] for what is not a unit of the kind.
@@ -32,7 +32,7 @@ pub fn unit(kind: Kind, spelling: &str) -> Result<&'static Unit, UnitError> {
     find(kind, spelling).ok_or_else(|| UnitError::WrongUnit { unit: spelling.to_owned(), kind })
 }
 
-/// A number with its unit, such as `29e-3 m^2`, in the unit used inside. A ratio may stand without a unit.
+/// Parses a number with its unit, such as `29e-3 m^2`, to SI and rpm. A ratio needs no unit.
 ///
 /// # Errors
 /// [`UnitError`] for what is not a finite number, for an unknown unit, and for a missing one.
@@ -43,7 +43,7 @@ pub fn parse_quantity(kind: Kind, text: &str) -> Result<f64, UnitError> {
     })
 }
 
-/// What would be right instead.
+/// The remedy for an error: the units that are valid.
 pub fn remedy(kind: Kind, error: &UnitError) -> String {
     let bare = if kind == Kind::Fraction { "; a ratio may be written with `1`" } else { "" };
     format!("{}{bare}", error.remedy(kind))
@@ -54,9 +54,9 @@ fn find(kind: Kind, spelling: &str) -> Option<&'static Unit> {
         (Kind::Fraction, "1" | "-") => Some(&BARE_RATIO),
         (Kind::Temperature, "C" | "celsius") => kind.unit("degC"),
         (Kind::Temperature, "F") => kind.unit("degF"),
-        // A whole channel is unambiguous: channels hold absolute pressures.
+        // Unambiguous for a channel: channels contain absolute pressures.
         (Kind::Pressure, "psi") => kind.unit("psia"),
-        // An interval is unambiguous too: only its scale counts, and that of degF is degR.
+        // Unambiguous for an interval too: only the scale counts, and degF and degR have the same.
         (Kind::TemperatureDifference, "degC" | "°C") => kind.unit("K"),
         (Kind::TemperatureDifference, "degF" | "°F") => Kind::Temperature.unit("degR"),
         _ => None,

@@ -7,9 +7,9 @@ use crate::mcap::sink::Sink;
 use mapper_numerics::parallel;
 
 /// Maximum total size of a batch, unpacked: enough to share out, and small compared with a recording.
-const BATCH_BYTES: u64 = 4 << 20;
-/// Maximum number of chunks of a batch: with small chunks, more would only add waiting time.
-const BATCH_CHUNKS: usize = 1024;
+const MAX_BATCH_BYTES: u64 = 4 << 20;
+/// Maximum number of chunks of a batch: with small chunks, a larger batch would only delay the first messages.
+const MAX_BATCH_CHUNKS: usize = 1024;
 /// Parts of a batch: more than there are cores, to balance the load.
 const PARTS: usize = 16;
 
@@ -24,13 +24,13 @@ pub(crate) enum Item<T> {
 }
 
 /// A chunk of a batch.
-pub(crate) struct Opened<T> {
+pub(crate) struct UnpackedChunk<T> {
     /// Its offset in the file.
     pub(crate) offset: u64,
     pub(crate) items: Result<Vec<Item<T>>, ChunkError>,
 }
 
-/// Chunks that are to be unpacked together.
+/// Chunks that are unpacked together.
 #[derive(Default)]
 pub(crate) struct Batch {
     chunks: Vec<(u64, Vec<u8>)>,
@@ -39,8 +39,8 @@ pub(crate) struct Batch {
 
 impl Batch {
     /// Whether a chunk may share a batch: reading a large one at once might need many times its size.
-    pub(crate) fn takes(body: &[u8]) -> bool {
-        claimed_bytes(body).is_none_or(|bytes| bytes <= BATCH_BYTES)
+    pub(crate) fn accepts(body: &[u8]) -> bool {
+        claimed_bytes(body).is_none_or(|bytes| bytes <= MAX_BATCH_BYTES)
     }
 
     /// Adds a chunk at `offset` in the file.
@@ -50,7 +50,7 @@ impl Batch {
     }
 
     pub(crate) fn is_full(&self) -> bool {
-        self.bytes >= BATCH_BYTES || self.chunks.len() >= BATCH_CHUNKS
+        self.bytes >= MAX_BATCH_BYTES || self.chunks.len() >= MAX_BATCH_CHUNKS
     }
 
     /// Unpacks the chunks and reads their messages on topics that are `known`; leaves the batch empty.
@@ -59,14 +59,17 @@ impl Batch {
         sink: &S,
         known: impl Fn(u16) -> bool + Sync,
         max_chunk_bytes: u64,
-    ) -> Vec<Opened<S::SinkMessage>> {
+    ) -> Vec<UnpackedChunk<S::SinkMessage>> {
         let Batch { chunks, .. } = std::mem::take(self);
         let parts: Vec<&[(u64, Vec<u8>)]> = chunks.chunks(chunks.len().div_ceil(PARTS).max(1)).collect();
         let open = |part: &&[(u64, Vec<u8>)]| {
             let mut unpacker = Unpacker::new();
             let one = |(offset, body): &(u64, Vec<u8>)| {
                 let content = unpacker.unpack(body, max_chunk_bytes);
-                Opened { offset: *offset, items: content.map(|content| items(content, sink, &known)) }
+                UnpackedChunk {
+                    offset: *offset,
+                    items: content.map(|content| split_items(content, sink, &known)),
+                }
             };
             part.iter().map(one).collect::<Vec<_>>()
         };
@@ -74,7 +77,7 @@ impl Batch {
     }
 }
 
-fn items<S: Sink>(mut rest: &[u8], sink: &S, known: impl Fn(u16) -> bool) -> Vec<Item<S::SinkMessage>> {
+fn split_items<S: Sink>(mut rest: &[u8], sink: &S, known: impl Fn(u16) -> bool) -> Vec<Item<S::SinkMessage>> {
     let mut items = Vec::new();
     while !rest.is_empty() {
         let Some((opcode, body, after)) = split_record(rest) else {

@@ -11,11 +11,11 @@ pub enum ChunkError {
     #[error("its header is incomplete")]
     Header,
     /// Its unpacked size exceeds the limit.
-    #[error("it claims {claimed} bytes, more than the {limit} that are read")]
+    #[error("its header gives {claimed} bytes, and at most {limit} bytes are read")]
     TooLarge {
-        /// Size it claims, bytes.
+        /// Stated size, bytes.
         claimed: u64,
-        /// Largest size read, bytes.
+        /// Maximum size that is read, bytes.
         limit: u64,
     },
     /// Another compression.
@@ -31,7 +31,7 @@ pub enum ChunkError {
         reason: String,
     },
     /// Its unpacked size differs from the stated one.
-    #[error("it holds {found} bytes and claims {claimed}")]
+    #[error("it has {found} bytes, and its header gives {claimed}")]
     Length {
         /// Stated size, bytes.
         claimed: u64,
@@ -39,7 +39,7 @@ pub enum ChunkError {
         found: u64,
     },
     /// Its content was changed.
-    #[error("its checksum is {found:08x} and should be {saved:08x}")]
+    #[error("its checksum is {found:08x}, not {saved:08x} as stored")]
     Checksum {
         /// Stored checksum.
         saved: u32,
@@ -119,5 +119,5 @@ pub(crate) fn claimed_bytes(body: &[u8]) -> Option<u64> {
 fn parse_header(body: &[u8]) -> Option<(u64, u32, &[u8], &[u8])> {
     let mut body = Body(body);
     let (_start, _end) = (body.u64()?, body.u64()?);
-    Some((body.u64()?, body.u32()?, body.counted()?, body.long_counted()?))
+    Some((body.u64()?, body.u32()?, body.u32_prefixed_bytes()?, body.u64_prefixed_bytes()?))
 }

@@ -1,4 +1,4 @@
-//! Numbers of a flat JSON message, exactly, without building a tree.
+//! Reads the numbers of a flat JSON message exactly, without building a tree.
 
 use serde::de::{Deserializer, IgnoredAny, MapAccess, Visitor};
 use serde_json::value::RawValue;

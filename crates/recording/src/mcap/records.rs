@@ -32,23 +32,23 @@ impl<'a> Body<'a> {
     }
 
     /// Bytes after their number in 32 bits.
-    pub(crate) fn counted(&mut self) -> Option<&'a [u8]> {
+    pub(crate) fn u32_prefixed_bytes(&mut self) -> Option<&'a [u8]> {
         let count = self.u32()?;
         self.bytes(usize::try_from(count).ok()?)
     }
 
     /// Bytes after their number in 64 bits.
-    pub(crate) fn long_counted(&mut self) -> Option<&'a [u8]> {
+    pub(crate) fn u64_prefixed_bytes(&mut self) -> Option<&'a [u8]> {
         let count = self.u64()?;
         self.bytes(usize::try_from(count).ok()?)
     }
 
     pub(crate) fn text(&mut self) -> Option<String> {
-        Some(std::str::from_utf8(self.counted()?).ok()?.to_owned())
+        Some(std::str::from_utf8(self.u32_prefixed_bytes()?).ok()?.to_owned())
     }
 
     pub(crate) fn text_map(&mut self) -> Option<BTreeMap<String, String>> {
-        let mut pairs = Body(self.counted()?);
+        let mut pairs = Body(self.u32_prefixed_bytes()?);
         let mut map = BTreeMap::new();
         while !pairs.0.is_empty() {
             map.insert(pairs.text()?, pairs.text()?);
@@ -72,8 +72,8 @@ pub(crate) struct ChannelDefinition {
 pub(crate) fn parse_schema(body: &[u8]) -> Option<(u16, &[u8])> {
     let mut body = Body(body);
     let id = body.u16()?;
-    let (_name, _encoding) = (body.counted()?, body.counted()?);
-    Some((id, body.counted()?))
+    let (_name, _encoding) = (body.u32_prefixed_bytes()?, body.u32_prefixed_bytes()?);
+    Some((id, body.u32_prefixed_bytes()?))
 }
 
 /// A topic and the id of its schema; the schema's content is not filled in.
@@ -101,7 +101,7 @@ pub(crate) fn parse_metadata(body: &[u8]) -> Option<(String, BTreeMap<String, St
 pub(crate) fn parse_attachment(record: &[u8]) -> Option<(String, &[u8])> {
     let mut body = Body(record);
     let (_log_time, _create_time) = (body.u64()?, body.u64()?);
-    let (name, _media_type, data) = (body.text()?, body.counted()?, body.long_counted()?);
+    let (name, _media_type, data) = (body.text()?, body.u32_prefixed_bytes()?, body.u64_prefixed_bytes()?);
     let checked = record.get(..record.len() - body.0.len())?;
     let saved = body.u32()?;
     (saved == 0 || saved == crc32fast::hash(checked)).then_some((name, data))

@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 
 /// Receives the content of a recording.
 pub(crate) trait Sink: Sync {
-    /// The content of a message.
     type SinkMessage: Send;
     /// A topic, before its first message.
     fn define(&mut self, definition: &ChannelDefinition);
@@ -15,8 +14,7 @@ pub(crate) trait Sink: Sync {
     fn take(&mut self, channel_id: u16, log_time_ns: u64, content: Self::SinkMessage);
     /// A metadata record.
     fn metadata(&mut self, name: String, pairs: BTreeMap<String, String>);
-    /// An attachment.
     fn attachment(&mut self, name: String, data: &[u8]);
     /// Number of values kept so far.
-    fn kept(&self) -> u64;
+    fn value_count(&self) -> u64;
 }

@@ -1,19 +1,19 @@
 //! Reads a recording of this or another program.
 
-use crate::channel_mapping::channel_map_mistakes::Complaints;
-use crate::channel_mapping::mapped_topics::{Reads, source_of};
+use crate::channel_mapping::channel_map_mistakes::MapMistakes;
+use crate::channel_mapping::mapped_topics::{MappedQuantity, source_of};
 use crate::channel_mapping::plausibility::Readings;
 use crate::logs::{LogError, LogFile, Unit};
-use crate::reading::log_read::{is_mcap, log_of_path, read_log};
+use crate::reading::log_reader::{is_mcap, log_of_path, read_log};
 use crate::reading::read_options::ReadOptions;
-use crate::reading::scan::{Scanned, scan};
+use crate::reading::scan::{ScanResult, scan};
 use crate::samples::clock_steps::{repair_set_back, repair_set_forward};
 use crate::samples::continuity::repair_gaps;
-use crate::samples::rig_sink::{Placed, RigSink};
+use crate::samples::rig_sink::{PositionedMessage, RigSink};
 use crate::samples::series_builder::{SeriesBuilder, run_time_s};
-use crate::step_detection::measured_valve::{hold, turns_share};
+use crate::step_detection::jump_steps::{can_be_searched, drop_rest_steps, steps_from_jumps};
+use crate::step_detection::measured_valve::{hold_at_step_ends, reversal_share};
 use crate::step_detection::steps::{steps_from_commands, steps_from_markers};
-use crate::step_detection::steps_found::{can_be_searched, steps_from_jumps, without_rest};
 use crate::writing::provenance::OriginMessage;
 use crate::{
     AmbientPressure, ChannelMap, ChannelSource, FormatVersion, ReadWarning, RecordError,
@@ -27,7 +27,7 @@ use std::collections::BTreeMap;
 use std::io::{self, BufReader, Read};
 use std::path::Path;
 
-/// A recording with information on how it was read.
+/// A recording with its warnings, attachments and metadata.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ReadReport {
     /// Samples, steps and events in SI units; no truth.
@@ -96,9 +96,9 @@ pub fn read_recording_from(
     options: &ReadOptions,
 ) -> Result<ReadReport, RecordError> {
     if !options.logs.0.is_empty() && !is_mcap(bytes) {
-        return read_as_log(&LogFile::of_bytes(name, bytes), map, options);
+        return read_as_log(&LogFile::from_bytes(name, bytes), map, options);
     }
-    // The pass needs to own its source; a shared copy costs the size of the file once.
+    // The reader owns its source, so the bytes are copied once.
     let shared: std::sync::Arc<[u8]> = bytes.into();
     read(name, map, options, &|| Ok(Box::new(io::Cursor::new(shared.clone()))))
 }
@@ -109,7 +109,7 @@ pub(crate) fn open(path: &Path) -> io::Result<Box<dyn Read>> {
 
 fn read_as_log(file: &LogFile, map: &ChannelMap, options: &ReadOptions) -> Result<ReadReport, RecordError> {
     if map.is_native() {
-        // The file may be anything: do not ask for a channel map if it cannot be read as a log.
+        // Ask for a channel map only if the file can be read as a log.
         return Err(match options.logs.open(file, &map.log) {
             Ok(_) => RecordError::LogWithoutMap { path: file.path().to_owned() },
             Err(LogError::Content { path, message, .. }) => RecordError::Neither { path, message },
@@ -122,13 +122,13 @@ fn read_as_log(file: &LogFile, map: &ChannelMap, options: &ReadOptions) -> Resul
     if log.averaged {
         warnings.push(ReadWarning::Averaged);
     }
-    warnings.extend(missing(map, &log.builders));
+    warnings.extend(find_missing_fields(map, &log.builders));
     let ambient = log.ambient.map(|builder| builder.build(Channel::P1, log.zero_ns, &mut warnings));
     let mut gathered = gather(map, log.builders, log.zero_ns, ambient.as_ref(), &mut warnings);
     let ambient = ambient.as_ref().zip(log.ambient_unit);
-    complete(map, &mut gathered, &log.units, ambient)?;
-    let steps = steps_without_marks(map, &mut gathered.series, &mut warnings);
-    let Gathered { series, elements, .. } = gathered;
+    add_derived(map, &mut gathered, &log.units, ambient)?;
+    let steps = detect_steps(map, &mut gathered.series, &mut warnings);
+    let RunSeries { series, elements, .. } = gathered;
     Ok(ReadReport {
         recording: Recording { series, elements, steps, ..Recording::default() },
         warnings,
@@ -143,7 +143,7 @@ fn read(
     options: &ReadOptions,
     open: &dyn Fn() -> io::Result<Box<dyn Read>>,
 ) -> Result<ReadReport, RecordError> {
-    fits_mcap(map)?;
+    check_fits_mcap(map)?;
     let (mut sink, scanned) = scan(path, open, options, || RigSink::new(path, map))?;
     if let Some(error) = sink.failure.take() {
         return Err(error);
@@ -151,7 +151,7 @@ fn read(
     let builders = sink.take_builders();
     // A command alone may match a name by chance: a recording without measurements is useless.
     let measured = builders.keys().any(|reads| reads.channel().info().group != Group::Command);
-    let has_rig_topics = sink.topic_names.iter().any(|topic| !is_own(topic));
+    let has_rig_topics = sink.topic_names.iter().any(|topic| !is_own_topic(topic));
     if !measured && sink.format.is_none() && has_rig_topics {
         let damaged = |warning: &ReadWarning| matches!(warning, ReadWarning::DamagedChunk { .. });
         if let Some(warning) = scanned.warnings.into_iter().find(damaged) {
@@ -163,29 +163,26 @@ fn read(
     report(map, sink, builders, scanned)
 }
 
-/// Results that only logs can give.
-fn fits_mcap(map: &ChannelMap) -> Result<(), RecordError> {
-    let mut complaints = Complaints::default();
+/// Refuses settings of a channel map that apply to logs only.
+fn check_fits_mcap(map: &ChannelMap) -> Result<(), RecordError> {
+    let mut mistakes = MapMistakes::default();
     for (reads, source) in sources(map).filter(|(_, source)| source.topic.is_empty()) {
-        let message =
-            format!("`{}` has no `topic`, and the fields of an MCAP recording stand in topics", source.field);
-        let remedy = "write `topic: /name`, as in the recording".to_owned();
-        complaints.add(
-            FindingKind::MissingKey,
-            &steps!["channels", reads.channel().symbol()],
-            message,
-            remedy,
+        let message = format!(
+            "`{}` has no `topic`, and every field of an MCAP recording belongs to a topic",
+            source.field
         );
+        let remedy = "write `topic: /name`, as in the recording".to_owned();
+        mistakes.add(FindingKind::MissingKey, &steps!["channels", reads.channel().symbol()], message, remedy);
     }
     if let Some(AmbientPressure::Source(_)) = &map.ambient_pressure {
-        let message = "columns of the ambient pressure are read from logs alone".to_owned();
-        let remedy = "write the value of the barometer, e.g. `101.3 kPa`".to_owned();
-        complaints.add(FindingKind::Unsupported, &steps!["ambient_pressure"], message, remedy);
+        let message = "only logs can have a column of the ambient pressure".to_owned();
+        let remedy = "write the barometer's reading, e.g. `101.3 kPa`".to_owned();
+        mistakes.add(FindingKind::Unsupported, &steps!["ambient_pressure"], message, remedy);
     }
-    complaints.result(map)
+    mistakes.into_result(map)
 }
 
-fn is_own(topic: &str) -> bool {
+fn is_own_topic(topic: &str) -> bool {
     use crate::format::{EVENT_TOPIC, STEP_TOPIC, TRUTH_PREFIX};
     topic == STEP_TOPIC || topic == EVENT_TOPIC || topic.starts_with(TRUTH_PREFIX)
 }
@@ -193,14 +190,14 @@ fn is_own(topic: &str) -> bool {
 fn report(
     map: &ChannelMap,
     mut sink: RigSink<'_>,
-    mut builders: BTreeMap<Reads, SeriesBuilder>,
-    scanned: Scanned,
+    mut builders: BTreeMap<MappedQuantity, SeriesBuilder>,
+    scanned: ScanResult,
 ) -> Result<ReadReport, RecordError> {
     let mut warnings = scanned.warnings;
     warnings.append(&mut sink.warnings);
     warnings.extend(sink.damaged_messages());
     if !map.is_native() {
-        warnings.extend(missing(map, &builders));
+        warnings.extend(find_missing_fields(map, &builders));
     }
     repair_set_back(&mut builders, &mut sink.steps, &mut sink.events, &mut warnings);
     if let Some(start_time_ns) = sink.start_time_ns {
@@ -217,9 +214,9 @@ fn report(
         warnings.push(ReadWarning::StrayTimes { count, first_s: run_time_s(*first_ns, zero_ns) });
     }
     let mut gathered = gather(map, builders, zero_ns, None, &mut warnings);
-    complete(map, &mut gathered, &sink.units, None)?;
+    add_derived(map, &mut gathered, &sink.units, None)?;
     let steps = if sink.format.is_some() || !sink.steps.is_empty() {
-        let markers = sink.steps.into_iter().map(|Placed { log_time_ns, mut message, .. }| {
+        let markers = sink.steps.into_iter().map(|PositionedMessage { log_time_ns, mut message, .. }| {
             if sink.start_time_ns.is_none() {
                 message.t_s = run_time_s(log_time_ns, zero_ns);
             }
@@ -228,17 +225,18 @@ fn report(
         let last_s = span_s(&gathered.series).map_or(0.0, |(_, last_s)| last_s);
         steps_from_markers(markers, last_s, &mut warnings)
     } else {
-        steps_without_marks(map, &mut gathered.series, &mut warnings)
+        detect_steps(map, &mut gathered.series, &mut warnings)
     };
-    let events = sink.events.into_iter().map(|Placed { log_time_ns, message: mut event, .. }| {
-        if sink.start_time_ns.is_none() {
-            event.t_s = run_time_s(log_time_ns, zero_ns);
-        }
-        event
-    });
-    let Gathered { mut series, elements, .. } = gathered;
+    let events =
+        sink.events.into_iter().map(|PositionedMessage { log_time_ns, message: mut event, .. }| {
+            if sink.start_time_ns.is_none() {
+                event.t_s = run_time_s(log_time_ns, zero_ns);
+            }
+            event
+        });
+    let RunSeries { mut series, elements, .. } = gathered;
     let origins = origins_of(sink.origins, zero_ns);
-    without_bad(&mut series, &origins, &mut warnings);
+    drop_bad_readings(&mut series, &origins, &mut warnings);
     Ok(ReadReport {
         recording: Recording { events: events.collect(), series, elements, origins, steps },
         warnings,
@@ -251,9 +249,12 @@ fn report(
 }
 
 /// Names in the map that the recording does not contain.
-fn missing(map: &ChannelMap, builders: &BTreeMap<Reads, SeriesBuilder>) -> Vec<ReadWarning> {
+fn find_missing_fields(
+    map: &ChannelMap,
+    builders: &BTreeMap<MappedQuantity, SeriesBuilder>,
+) -> Vec<ReadWarning> {
     let absent = sources(map).filter(|(reads, _)| !builders.contains_key(reads));
-    let warning = |(reads, source): (Reads, &ChannelSource)| ReadWarning::MissingChannel {
+    let warning = |(reads, source): (MappedQuantity, &ChannelSource)| ReadWarning::MissingChannel {
         channel: reads.channel(),
         topic: source.topic.clone(),
         field: source.field.clone(),
@@ -261,14 +262,13 @@ fn missing(map: &ChannelMap, builders: &BTreeMap<Reads, SeriesBuilder>) -> Vec<R
     absent.map(warning).collect()
 }
 
-/// Every source in the map.
-fn sources(map: &ChannelMap) -> impl Iterator<Item = (Reads, &ChannelSource)> {
-    let channels = map.channels.iter().map(|(channel, source)| (Reads::Channel(*channel), source));
-    channels.chain(map.elements.iter().map(|(element, source)| (Reads::Element(*element), source)))
+fn sources(map: &ChannelMap) -> impl Iterator<Item = (MappedQuantity, &ChannelSource)> {
+    let channels = map.channels.iter().map(|(channel, source)| (MappedQuantity::Channel(*channel), source));
+    channels.chain(map.elements.iter().map(|(element, source)| (MappedQuantity::Element(*element), source)))
 }
 
 /// The series of a recording.
-struct Gathered {
+struct RunSeries {
     series: BTreeMap<Channel, Series>,
     elements: BTreeMap<Element, Series>,
 }
@@ -276,12 +276,12 @@ struct Gathered {
 /// Series over run time, gauge pressures made absolute.
 fn gather(
     map: &ChannelMap,
-    builders: BTreeMap<Reads, SeriesBuilder>,
+    builders: BTreeMap<MappedQuantity, SeriesBuilder>,
     zero_ns: u64,
     ambient: Option<&Series>,
     warnings: &mut Vec<ReadWarning>,
-) -> Gathered {
-    let mut gathered = Gathered { series: BTreeMap::new(), elements: BTreeMap::new() };
+) -> RunSeries {
+    let mut gathered = RunSeries { series: BTreeMap::new(), elements: BTreeMap::new() };
     let ambient_pa = |t_s: f64| match (&map.ambient_pressure, ambient) {
         (Some(AmbientPressure::Constant(barometer)), _) => Some(barometer.pressure_pa),
         (_, Some(series)) => series.interpolate(t_s),
@@ -302,25 +302,25 @@ fn gather(
             }
         }
         match reads {
-            Reads::Channel(channel) => drop(gathered.series.insert(channel, built)),
-            Reads::Element(element) => drop(gathered.elements.insert(element, built)),
+            MappedQuantity::Channel(channel) => drop(gathered.series.insert(channel, built)),
+            MappedQuantity::Element(element) => drop(gathered.elements.insert(element, built)),
         }
     }
     gathered
 }
 
 /// Checks the readings against what is possible, and adds derived data: channels with several sensors, constants.
-fn complete(
+fn add_derived(
     map: &ChannelMap,
-    gathered: &mut Gathered,
-    units: &BTreeMap<Reads, &'static Unit>,
+    gathered: &mut RunSeries,
+    units: &BTreeMap<MappedQuantity, &'static Unit>,
     ambient: Option<(&Series, &'static Unit)>,
 ) -> Result<(), RecordError> {
     if !map.is_native() {
-        let mut complaints = Complaints::default();
+        let mut mistakes = MapMistakes::default();
         let (column, unit) = ambient.unzip();
         if let Some(pressure) = &map.ambient_pressure {
-            plausibility::check_ambient(pressure, column, unit, &mut complaints);
+            plausibility::check_ambient(pressure, column, unit, &mut mistakes);
         }
         let ambient_pa = match (&map.ambient_pressure, column) {
             (Some(AmbientPressure::Constant(barometer)), _) => Some(barometer.pressure_pa),
@@ -329,21 +329,21 @@ fn complete(
         };
         for (reads, source) in sources(map) {
             let series = match reads {
-                Reads::Channel(channel) => gathered.series.get(&channel),
-                Reads::Element(element) => gathered.elements.get(&element),
+                MappedQuantity::Channel(channel) => gathered.series.get(&channel),
+                MappedQuantity::Element(element) => gathered.elements.get(&element),
             };
             if let (Some(series), Some(unit)) = (series, units.get(&reads)) {
                 let channel = reads.channel();
                 let readings = Readings { channel, source, unit, series, ambient_pa };
-                plausibility::check(&readings, &mut complaints);
+                plausibility::check(&readings, &mut mistakes);
             }
         }
-        complaints.result(map)?;
+        mistakes.into_result(map)?;
     }
-    read_together(map, &mut gathered.series, &gathered.elements);
+    combine_sensors(map, &mut gathered.series, &gathered.elements);
     if let Some((first_s, last_s)) = span_s(&gathered.series) {
         for (channel, value) in &map.constants {
-            gathered.series.entry(*channel).or_insert_with(|| constant(first_s, last_s, *value));
+            gathered.series.entry(*channel).or_insert_with(|| constant_series(first_s, last_s, *value));
         }
     }
     Ok(())
@@ -362,8 +362,7 @@ fn origins_of(found: Vec<(u64, OriginMessage)>, zero_ns: u64) -> BTreeMap<Channe
     origins
 }
 
-/// A bad reading counts as missing, whatever its value.
-fn without_bad(
+fn drop_bad_readings(
     series: &mut BTreeMap<Channel, Series>,
     origins: &BTreeMap<Channel, Vec<ReadingOrigin>>,
     warnings: &mut Vec<ReadWarning>,
@@ -384,32 +383,32 @@ fn without_bad(
 }
 
 /// Steps from commands, or else from jumps of measured channels.
-fn steps_without_marks(
+fn detect_steps(
     map: &ChannelMap,
     series: &mut BTreeMap<Channel, Series>,
     warnings: &mut Vec<ReadWarning>,
 ) -> Vec<StepMarker> {
-    if let Some(share) = series.get(&Channel::ValveCommand).and_then(turns_share) {
+    if let Some(share) = series.get(&Channel::ValveCommand).and_then(reversal_share) {
         warnings.push(ReadWarning::MeasuredValve { turns_percent: 100.0 * share });
         let steps = steps_from_jumps(series, true, warnings);
         if let Some(position) = series.get_mut(&Channel::ValveCommand) {
-            hold(position, &steps);
+            hold_at_step_ends(position, &steps);
         }
-        return without_rest(steps, series);
+        return drop_rest_steps(steps, series);
     }
     let span_s = span_s(series);
-    // A constant command marks no step.
+    // A constant command does not mark steps.
     let moves = |channel: &Channel| series.contains_key(channel) && !map.constants.contains_key(channel);
     let commanded = [Channel::P3Command, Channel::ValveCommand].iter().any(moves);
     if commanded || !can_be_searched(series) {
-        return without_rest(steps_from_commands(series, span_s, warnings), series);
+        return drop_rest_steps(steps_from_commands(series, span_s, warnings), series);
     }
-    without_rest(steps_from_jumps(series, false, warnings), series)
+    drop_rest_steps(steps_from_jumps(series, false, warnings), series)
 }
 
-/// The readings of channels of which the recording contains only single sensors, at the times of the first of them: the
-/// reading that the rig would have shown. Identification checks the sensors and fuses them from scratch.
-fn read_together(
+/// Adds the readings of channels of which the recording has only single sensors, at the times of the first sensor, as the rig would have
+/// shown them. Identification checks and fuses the sensors itself.
+fn combine_sensors(
     map: &ChannelMap,
     series: &mut BTreeMap<Channel, Series>,
     elements: &BTreeMap<Element, Series>,
@@ -446,7 +445,7 @@ fn span_s(series: &BTreeMap<Channel, Series>) -> Option<(f64, f64)> {
 }
 
 /// A constant value over the whole recording.
-fn constant(first_s: f64, last_s: f64, value: f64) -> Series {
+fn constant_series(first_s: f64, last_s: f64, value: f64) -> Series {
     if first_s < last_s {
         Series { t_s: vec![first_s, last_s], values: vec![value; 2] }
     } else {

@@ -1,6 +1,6 @@
 //! One pass over a recording: finds the recoverable data and forwards them.
 
-use crate::mcap::batch::{Batch, Item, Opened};
+use crate::mcap::batch::{Batch, Item, UnpackedChunk};
 use crate::mcap::chunk::{ChunkError, Unpacker};
 use crate::mcap::framing::{Frame, FrameReader, split_record};
 use crate::mcap::records::{
@@ -14,19 +14,19 @@ use std::io::{self, Read};
 use std::path::Path;
 
 /// Larger schemas are skipped, which limits the memory that many of them could take.
-const SCHEMA_LIMIT_BYTES: usize = 1 << 20;
+const MAX_SCHEMA_BYTES: usize = 1 << 20;
 
 /// Maximum total size of topic definitions and schemas; later ones are skipped.
-const DEFINITIONS_LIMIT_BYTES: usize = 64 << 20;
+const MAX_DEFINITIONS_BYTES: usize = 64 << 20;
 
 /// Number of damaged chunks and records that are listed; further ones are only counted.
-const LISTED_DAMAGE: u64 = 100;
+const MAX_LISTED_DAMAGE: u64 = 100;
 
 /// Results of a pass in addition to the forwarded data.
 #[derive(Default)]
-pub(crate) struct Scanned {
+pub(crate) struct ScanResult {
     pub(crate) warnings: Vec<ReadWarning>,
-    /// Every topic the file defines, the index at its end included.
+    /// All topics that the file defines, in chunks or in the index at its end.
     definitions: BTreeMap<u16, ChannelDefinition>,
     schemas: BTreeMap<u16, Vec<u8>>,
     /// Messages that came before a definition of their topic.
@@ -45,7 +45,7 @@ pub(crate) fn scan<S: Sink>(
     open: &dyn Fn() -> io::Result<Box<dyn Read>>,
     options: &ReadOptions,
     new_sink: impl Fn() -> S,
-) -> Result<(S, Scanned), RecordError> {
+) -> Result<(S, ScanResult), RecordError> {
     let mut sink = new_sink();
     let first = pass(path, open, options, &BTreeMap::new(), &mut sink)?;
     if !first.undefined.keys().any(|id| first.definitions.contains_key(id)) {
@@ -62,7 +62,7 @@ fn pass<S: Sink>(
     options: &ReadOptions,
     known: &BTreeMap<u16, ChannelDefinition>,
     sink: &mut S,
-) -> Result<Scanned, RecordError> {
+) -> Result<ScanResult, RecordError> {
     let failed = |source| RecordError::Read { path: path.to_owned(), source };
     let mut source = open().map_err(failed)?;
     let mut magic = Vec::new();
@@ -71,13 +71,13 @@ fn pass<S: Sink>(
         return Err(RecordError::NotMcap { path: path.to_owned(), found: describe(&magic) });
     }
     known.values().for_each(|definition| sink.define(definition));
-    let mut scanned = Scanned { definitions: known.clone(), ..Scanned::default() };
+    let mut scanned = ScanResult { definitions: known.clone(), ..ScanResult::default() };
     let mut frames = FrameReader::new(source, MAGIC.len() as u64);
     let (mut unpacker, mut batch) = (Unpacker::new(), Batch::default());
     let mut end = MAGIC.len() as u64;
     loop {
         let frame = frames.next_frame().map_err(failed)?;
-        let joins = matches!(&frame, Frame::Record { opcode: op::CHUNK, body, .. } if Batch::takes(body));
+        let joins = matches!(&frame, Frame::Record { opcode: op::CHUNK, body, .. } if Batch::accepts(body));
         // A message index follows its chunk; every other record is handled after the chunks before it.
         let index = matches!(&frame, Frame::Record { opcode: op::MESSAGE_INDEX, .. });
         if !(joins || index) || batch.is_full() {
@@ -85,7 +85,7 @@ fn pass<S: Sink>(
         }
         match frame {
             Frame::Record { opcode: op::FOOTER, .. } => break,
-            // No record has opcode 0: the file ends in zeros, as it may after a power failure.
+            // No record has opcode 0: after a power failure a file may end in zeros.
             Frame::Record { offset, opcode: 0, .. } | Frame::Truncated { offset } => {
                 scanned.warnings.push(ReadWarning::Truncated { offset });
                 break;
@@ -111,13 +111,13 @@ fn pass<S: Sink>(
             scanned.warnings.push(ReadWarning::TooManyMessages { limit: options.max_messages });
             break;
         }
-        if sink.kept() > options.max_values {
+        if sink.value_count() > options.max_values {
             scanned.warnings.push(ReadWarning::TooManyValues { limit: options.max_values });
             break;
         }
     }
-    if scanned.damaged > LISTED_DAMAGE {
-        scanned.warnings.push(ReadWarning::MoreDamage { count: scanned.damaged - LISTED_DAMAGE });
+    if scanned.damaged > MAX_LISTED_DAMAGE {
+        scanned.warnings.push(ReadWarning::MoreDamage { count: scanned.damaged - MAX_LISTED_DAMAGE });
     }
     let count = scanned.undefined.values().sum();
     if count > 0 {
@@ -126,10 +126,10 @@ fn pass<S: Sink>(
     Ok(scanned)
 }
 
-impl Scanned {
-    fn damage(&mut self, warning: ReadWarning) {
+impl ScanResult {
+    fn note_damage(&mut self, warning: ReadWarning) {
         self.damaged += 1;
-        if self.damaged <= LISTED_DAMAGE {
+        if self.damaged <= MAX_LISTED_DAMAGE {
             self.warnings.push(warning);
         }
     }
@@ -137,7 +137,7 @@ impl Scanned {
     /// Whether this many bytes of definitions still fit.
     fn has_room(&mut self, bytes: usize) -> bool {
         let together = self.defined_bytes.saturating_add(bytes);
-        let fits = together <= DEFINITIONS_LIMIT_BYTES;
+        let fits = together <= MAX_DEFINITIONS_BYTES;
         if fits {
             self.defined_bytes = together;
         }
@@ -147,10 +147,10 @@ impl Scanned {
     /// Chunks that are read in parallel.
     fn batch<S: Sink>(&mut self, batch: &mut Batch, options: &ReadOptions, sink: &mut S) {
         let known = |channel_id| self.definitions.contains_key(&channel_id);
-        for Opened { offset, items } in batch.open(sink, known, options.max_chunk_bytes) {
+        for UnpackedChunk { offset, items } in batch.open(sink, known, options.max_chunk_bytes) {
             match items {
                 Ok(items) => items.into_iter().for_each(|item| self.item(offset, item, options, sink)),
-                Err(source) => self.damage(ReadWarning::DamagedChunk { offset, source }),
+                Err(source) => self.note_damage(ReadWarning::DamagedChunk { offset, source }),
             }
         }
     }
@@ -164,13 +164,13 @@ impl Scanned {
     ) {
         match item {
             Item::Record { opcode, body } => self.record(offset, opcode, &body, options, sink),
-            Item::Cut if self.goes_on(options, sink) => {
-                self.damage(ReadWarning::DamagedChunk { offset, source: ChunkError::CutRecord });
+            Item::Cut if self.has_capacity(options, sink) => {
+                self.note_damage(ReadWarning::DamagedChunk { offset, source: ChunkError::CutRecord });
             }
             Item::Cut => {}
             Item::Message { channel_id, log_time_ns, message } => {
                 self.records += 1;
-                if let Some(message) = message.filter(|_| self.goes_on(options, sink)) {
+                if let Some(message) = message.filter(|_| self.has_capacity(options, sink)) {
                     sink.take(channel_id, log_time_ns, message);
                 }
             }
@@ -178,8 +178,8 @@ impl Scanned {
     }
 
     /// Whether there is room for more.
-    fn goes_on(&self, options: &ReadOptions, sink: &impl Sink) -> bool {
-        self.records <= options.max_messages && sink.kept() <= options.max_values
+    fn has_capacity(&self, options: &ReadOptions, sink: &impl Sink) -> bool {
+        self.records <= options.max_messages && sink.value_count() <= options.max_values
     }
 
     fn chunk<S: Sink>(
@@ -193,13 +193,13 @@ impl Scanned {
         let mut rest = match unpacker.unpack(body, options.max_chunk_bytes) {
             Ok(content) => content,
             Err(error) => {
-                self.damage(ReadWarning::DamagedChunk { offset, source: error });
+                self.note_damage(ReadWarning::DamagedChunk { offset, source: error });
                 return;
             }
         };
-        while !rest.is_empty() && self.goes_on(options, sink) {
+        while !rest.is_empty() && self.has_capacity(options, sink) {
             let Some((opcode, body, after)) = split_record(rest) else {
-                self.damage(ReadWarning::DamagedChunk { offset, source: ChunkError::CutRecord });
+                self.note_damage(ReadWarning::DamagedChunk { offset, source: ChunkError::CutRecord });
                 return;
             };
             self.record(offset, opcode, body, options, sink);
@@ -209,7 +209,7 @@ impl Scanned {
 
     fn record<S: Sink>(&mut self, offset: u64, opcode: u8, body: &[u8], options: &ReadOptions, sink: &mut S) {
         self.records += 1;
-        if !self.goes_on(options, sink) {
+        if !self.has_capacity(options, sink) {
             return;
         }
         let whole = match opcode {
@@ -223,7 +223,7 @@ impl Scanned {
                 })
             }
             op::SCHEMA => parse_schema(body).map(|(id, data)| {
-                let new = data.len() <= SCHEMA_LIMIT_BYTES && !self.schemas.contains_key(&id);
+                let new = data.len() <= MAX_SCHEMA_BYTES && !self.schemas.contains_key(&id);
                 if new && self.has_room(data.len()) {
                     self.schemas.insert(id, data.to_owned());
                 }
@@ -250,7 +250,7 @@ impl Scanned {
                 op::METADATA => DamagedPart::Metadata,
                 _ => DamagedPart::Attachment,
             };
-            self.damage(ReadWarning::DamagedRecord { offset, part });
+            self.note_damage(ReadWarning::DamagedRecord { offset, part });
         }
     }
 }

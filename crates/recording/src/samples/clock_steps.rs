@@ -1,17 +1,17 @@
-//! Clocks that were set while they recorded. The times after that are moved back to where they belong, so that no two readings of
-//! one channel share a time and no step of the run is lost.
+//! Repairs the times of recordings whose clock was set during the run, so that no two readings of a channel share a time and no step is
+//! lost.
 
 use crate::ReadWarning;
-use crate::channel_mapping::mapped_topics::Reads;
-use crate::samples::rig_sink::Placed;
-use crate::samples::series_builder::{Break, SeriesBuilder};
+use crate::channel_mapping::mapped_topics::MappedQuantity;
+use crate::samples::rig_sink::PositionedMessage;
+use crate::samples::series_builder::{ClockBreak, SeriesBuilder};
 use crate::step_detection::steps::StepMessage;
 use mapper_core::Event;
 use std::collections::BTreeMap;
 
-/// Breaks of several channels belong to one step of the clock if no more messages than this lie between them: the fastest topic sends
-/// as many while the slowest sends one.
-const NEAR: u64 = 1000;
+/// Maximum number of messages between the breaks of several channels that one step of the clock caused: the fastest topic sends as many
+/// while the slowest sends one.
+const MAX_MESSAGES_APART: u64 = 1000;
 
 /// Clocks of channels and markers may differ by this much, ns.
 const TOLERANCE_NS: u64 = 2_000_000_000;
@@ -19,34 +19,35 @@ const TOLERANCE_NS: u64 = 2_000_000_000;
 /// Interval of a channel that has only one sample before the break, ns: the rate of this program's recordings.
 const USUAL_INTERVAL_NS: u64 = 100_000_000;
 
-type Builders = BTreeMap<Reads, SeriesBuilder>;
+type Builders = BTreeMap<MappedQuantity, SeriesBuilder>;
 
-/// Repairs times after a clock was set back: every channel goes back at the same place of the file by the same amount. A topic
-/// that is merely late, or a file with one topic after the other, has no such place.
+/// Repairs times after a clock was set back: every channel goes back at the same place of the file by the same amount. Late topics, and files with
+/// one topic after the other, have no such place.
 pub(crate) fn repair_set_back(
     builders: &mut Builders,
-    steps: &mut [Placed<StepMessage>],
-    events: &mut [Placed<Event>],
+    steps: &mut [PositionedMessage<StepMessage>],
+    events: &mut [PositionedMessage<Event>],
     warnings: &mut Vec<ReadWarning>,
 ) {
     let Some(reference) = builders.values().max_by_key(|builder| builder.len()) else { return };
     for found in reference.breaks().to_vec() {
-        let same = |other: &&Break| {
-            other.position.abs_diff(found.position) <= NEAR
+        let same = |other: &&ClockBreak| {
+            other.position.abs_diff(found.position) <= MAX_MESSAGES_APART
                 && other.back_ns.abs_diff(found.back_ns) <= TOLERANCE_NS
         };
         let on_both_sides = |builder: &&SeriesBuilder| {
             let (first, last) = builder.positions();
             first < found.position && found.position < last
         };
-        let breaks: Vec<Option<Break>> = builders
+        let breaks: Vec<Option<ClockBreak>> = builders
             .values()
             .filter(on_both_sides)
             .map(|builder| {
                 builder.breaks().iter().find(same).filter(|found| builder.goes_on_from(found)).copied()
             })
             .collect();
-        let Some(breaks) = breaks.into_iter().collect::<Option<Vec<Break>>>().filter(|all| !all.is_empty())
+        let Some(breaks) =
+            breaks.into_iter().collect::<Option<Vec<ClockBreak>>>().filter(|all| !all.is_empty())
         else {
             continue;
         };
@@ -62,7 +63,7 @@ pub(crate) fn repair_set_back(
     }
 }
 
-fn move_messages<T>(messages: &mut [Placed<T>], from: u64, shift_ns: u64) {
+fn move_messages<T>(messages: &mut [PositionedMessage<T>], from: u64, shift_ns: u64) {
     for message in messages.iter_mut().filter(|message| message.position >= from) {
         message.log_time_ns = message.log_time_ns.saturating_add(shift_ns);
     }
@@ -71,15 +72,15 @@ fn move_messages<T>(messages: &mut [Placed<T>], from: u64, shift_ns: u64) {
 /// Repairs times after a clock was set forward, in recordings whose step markers have the time of the run as well.
 pub(crate) fn repair_set_forward(
     builders: &mut Builders,
-    steps: &mut [Placed<StepMessage>],
+    steps: &mut [PositionedMessage<StepMessage>],
     start_time_ns: u64,
     warnings: &mut Vec<ReadWarning>,
 ) {
-    let ahead_ns = |step: &Placed<StepMessage>| {
+    let ahead_ns = |step: &PositionedMessage<StepMessage>| {
         let run_ns = (step.message.t_s * 1e9) as i128;
         i64::try_from(i128::from(step.log_time_ns) - i128::from(start_time_ns) - run_ns).unwrap_or(0)
     };
-    let near = |step: &Placed<StepMessage>| ahead_ns(step).unsigned_abs() <= TOLERANCE_NS;
+    let near = |step: &PositionedMessage<StepMessage>| ahead_ns(step).unsigned_abs() <= TOLERANCE_NS;
     if !steps.first().is_some_and(near) {
         return;
     }

@@ -3,18 +3,17 @@
 /// Rate of the means, Hz: that of this program's own recordings. Identification evaluates transients of seconds.
 const RATE_HZ: f64 = 10.0;
 
-/// Up to this rate, Hz, a group is not averaged: blocks would hold one sample, or alternately one and two.
-const LEFT_ALONE_HZ: f64 = 15.0;
+/// Maximum rate of a group that is not averaged, Hz: blocks would have one sample, or alternately one and two.
+const MAX_UNAVERAGED_HZ: f64 = 15.0;
 
-/// Number of rows that determine the initial rate.
-const LOOKED_AT: usize = 256;
+const RATE_ROWS: usize = 256;
 
 /// Number of intervals monitored later: a log may be slow at rest and fast after a trigger.
-const LATER: u32 = u64::BITS;
+const MONITORED_INTERVALS: u32 = u64::BITS;
 
 /// The rows of one group, averaged if their rate is high.
 #[derive(Debug, Default)]
-pub(crate) struct Blocks {
+pub(crate) struct BlockAverager {
     /// Rows that determine the rate.
     first: Vec<(f64, Vec<f64>)>,
     state: State,
@@ -38,13 +37,13 @@ struct Pace {
 
 impl Pace {
     /// Whether most of the intervals have become short.
-    fn quickens(&mut self, t_s: f64) -> bool {
+    fn becomes_fast(&mut self, t_s: f64) -> bool {
         let step_s = t_s - self.last_s;
         if step_s > 0.0 || self.last_s.is_nan() {
-            self.short = self.short << 1 | u64::from(step_s * LEFT_ALONE_HZ < 1.0);
+            self.short = self.short << 1 | u64::from(step_s * MAX_UNAVERAGED_HZ < 1.0);
             self.last_s = t_s;
         }
-        2 * self.short.count_ones() > LATER
+        2 * self.short.count_ones() > MONITORED_INTERVALS
     }
 }
 
@@ -56,14 +55,14 @@ struct Block {
     sums: Vec<(f64, f64)>,
 }
 
-/// Takes time and values; NaN if there is none.
+/// Receives time and values; NaN for an empty cell.
 pub(crate) type TakeRow<'a> = dyn FnMut(f64, &[f64]) + 'a;
 
-impl Blocks {
+impl BlockAverager {
     pub(crate) fn push(&mut self, t_s: f64, values: &[f64], take: &mut TakeRow<'_>) {
         match &mut self.state {
             State::AsItIs(pace) => {
-                if pace.quickens(t_s) {
+                if pace.becomes_fast(t_s) {
                     self.state = State::Averaging(Block::default());
                     return self.push(t_s, values, take);
                 }
@@ -72,7 +71,7 @@ impl Blocks {
             State::Averaging(block) => block.push(t_s, values, take),
             State::Looking => {
                 self.first.push((t_s, values.to_owned()));
-                if self.first.len() >= LOOKED_AT {
+                if self.first.len() >= RATE_ROWS {
                     self.decide(take);
                 }
             }
@@ -89,8 +88,8 @@ impl Blocks {
         }
     }
 
-    /// Whether means are taken.
-    pub(crate) fn averages(&self) -> bool {
+    /// Whether the rows are averaged.
+    pub(crate) fn is_averaging(&self) -> bool {
         matches!(self.state, State::Averaging(_))
     }
 
@@ -99,7 +98,7 @@ impl Blocks {
             self.first.windows(2).map(|pair| pair[1].0 - pair[0].0).filter(|step| *step > 0.0).collect();
         intervals_s.sort_by(f64::total_cmp);
         let typical_s = intervals_s.get(intervals_s.len() / 2).copied().unwrap_or(f64::INFINITY);
-        let fast = typical_s * LEFT_ALONE_HZ < 1.0;
+        let fast = typical_s * MAX_UNAVERAGED_HZ < 1.0;
         let slow = || State::AsItIs(Pace { last_s: f64::NAN, short: 0 });
         self.state = if fast { State::Averaging(Block::default()) } else { slow() };
         for (t_s, values) in std::mem::take(&mut self.first) {
@@ -139,7 +138,7 @@ mod tests {
     use super::*;
 
     fn through(rate_hz: f64, rows: usize) -> Vec<(f64, Vec<f64>)> {
-        let (mut blocks, mut out) = (Blocks::default(), Vec::new());
+        let (mut blocks, mut out) = (BlockAverager::default(), Vec::new());
         let mut take = |t_s: f64, values: &[f64]| out.push((t_s, values.to_owned()));
         for row in 0..rows {
             let t_s = row as f64 / rate_hz;
@@ -163,13 +162,13 @@ mod tests {
 
     #[test]
     fn a_log_that_becomes_fast_is_averaged_from_then_on() {
-        let (mut blocks, mut out) = (Blocks::default(), Vec::new());
+        let (mut blocks, mut out) = (BlockAverager::default(), Vec::new());
         let mut take = |t_s: f64, values: &[f64]| out.push((t_s, values[0]));
         let rest = (0..600).map(f64::from);
         let run = (0..10_000).map(|row| 600.0 + f64::from(row) / 100.0);
         rest.chain(run).for_each(|t_s| blocks.push(t_s, &[5.0 * t_s], &mut take));
         blocks.finish(&mut take);
-        assert!(blocks.averages());
+        assert!(blocks.is_averaging());
         // 600 unchanged rows at rest, 100 s at 10 Hz, and the few rows that showed the change.
         assert!((1600..1640).contains(&out.len()), "{}", out.len());
         assert!(out[..600].iter().enumerate().all(|(row, (t_s, _))| *t_s == row as f64));

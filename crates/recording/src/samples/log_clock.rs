@@ -1,19 +1,18 @@
 //! The clock of a group of rows: isolated wrong times are skipped, and a restarted clock ends the reading.
 
-/// A row whose time differs by more than this from both neighbours has a wrong time, s.
+/// Minimum difference from both neighbours for a wrong time, s.
 pub(crate) const STRAY_S: f64 = 86_400.0;
 
 /// Maximum valid time, s: a century, within the range of a series' clock.
-const LONGEST_S: f64 = 3.2e9;
+const MAX_TIME_S: f64 = 3.2e9;
 
-/// Intervals by which a clock may step back: loggers write some rows out of order.
-pub(crate) const BACK_INTERVALS: f64 = 5.0;
+/// Maximum number of intervals by which a clock may step back: loggers write some rows out of order.
+pub(crate) const MAX_BACK_INTERVALS: f64 = 5.0;
 
-/// A clock may step back by this much in any case, s: it was set by another clock.
-pub(crate) const BACK_S: f64 = 2.0;
+/// Maximum step back that is always allowed, s: another clock synchronised it.
+pub(crate) const MAX_BACK_S: f64 = 2.0;
 
-/// Number of intervals that are kept.
-const REMEMBERED: usize = 15;
+const KEPT_INTERVALS: usize = 15;
 
 /// A clock that goes back.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,7 +27,7 @@ pub(crate) struct Restart {
 #[derive(Debug, Default)]
 pub(crate) struct LogClock {
     rows: u64,
-    held: Option<(f64, Vec<f64>)>,
+    pending: Option<(f64, Vec<f64>)>,
     last_s: Option<f64>,
     intervals_s: Vec<f64>,
     /// Number of skipped rows.
@@ -37,7 +36,7 @@ pub(crate) struct LogClock {
     pub(crate) stray_s: f64,
 }
 
-/// Takes the time and the values of a row.
+/// Receives the time and the values of a row.
 pub(crate) type TakeRow<'a> = dyn FnMut(f64, &[f64]) + 'a;
 
 impl LogClock {
@@ -47,12 +46,12 @@ impl LogClock {
     /// [`Restart`] if the clock starts again.
     pub(crate) fn push(&mut self, t_s: f64, values: &[f64], take: &mut TakeRow<'_>) -> Result<(), Restart> {
         self.rows += 1;
-        if !t_s.is_finite() || t_s.abs() >= LONGEST_S {
+        if !t_s.is_finite() || t_s.abs() >= MAX_TIME_S {
             self.stray(t_s);
             return Ok(());
         }
         let mut place = Vec::new();
-        if let Some((held_s, held)) = self.held.take() {
+        if let Some((held_s, pending)) = self.pending.take() {
             match self.last_s {
                 // The very first row: the next one shows whether it is valid.
                 None if (t_s - held_s).abs() > STRAY_S => self.stray(held_s),
@@ -69,28 +68,28 @@ impl LogClock {
                 {
                     self.stray(held_s);
                 }
-                _ => self.accept(held_s, &held, take),
+                _ => self.accept(held_s, &pending, take),
             }
-            place = held;
+            place = pending;
         }
         place.clear();
         place.extend_from_slice(values);
-        self.held = Some((t_s, place));
+        self.pending = Some((t_s, place));
         Ok(())
     }
 
     /// Forwards the last row.
     pub(crate) fn finish(&mut self, take: &mut TakeRow<'_>) {
-        let Some((held_s, held)) = self.held.take() else { return };
+        let Some((held_s, pending)) = self.pending.take() else { return };
         match self.last_s {
             Some(last_s) if held_s - last_s > STRAY_S || self.goes_back(last_s, held_s) => self.stray(held_s),
-            _ => self.accept(held_s, &held, take),
+            _ => self.accept(held_s, &pending, take),
         }
     }
 
     fn accept(&mut self, t_s: f64, values: &[f64], take: &mut TakeRow<'_>) {
         if let Some(interval_s) = self.last_s.map(|last_s| t_s - last_s).filter(|step| *step > 0.0) {
-            if self.intervals_s.len() >= REMEMBERED {
+            if self.intervals_s.len() >= KEPT_INTERVALS {
                 self.intervals_s.remove(0);
             }
             self.intervals_s.push(interval_s);
@@ -108,11 +107,11 @@ impl LogClock {
 
     fn goes_back(&self, last_s: f64, t_s: f64) -> bool {
         let back_s = last_s - t_s;
-        if back_s <= BACK_S {
+        if back_s <= MAX_BACK_S {
             return false;
         }
         let typical_s = mapper_numerics::statistics::median(&self.intervals_s).unwrap_or(0.0);
-        back_s > BACK_INTERVALS * typical_s
+        back_s > MAX_BACK_INTERVALS * typical_s
     }
 }
 

@@ -1,6 +1,6 @@
-//! Takes samples, steps and events out of a recording, and ignores truth.
+//! Collects samples, steps and events of a recording, and ignores truth.
 
-use crate::channel_mapping::mapped_topics::{MappedTopic, Reads, map_topic};
+use crate::channel_mapping::mapped_topics::{MappedQuantity, MappedTopic, map_topic};
 use crate::format::{
     CAMPAIGN_NAME, EVENT_TOPIC, FORMAT_KEY, METADATA_NAME, PLAN_NAME, PROVENANCE_TOPIC, START_KEY, STEP_TOPIC,
 };
@@ -18,7 +18,7 @@ use std::path::Path;
 
 /// The role of a topic for this reader.
 enum Topic {
-    /// With the index of each of its outputs among the series.
+    /// Readings, with the index of each output's series.
     Mapped(MappedTopic, Vec<usize>),
     Step,
     Event,
@@ -41,7 +41,7 @@ pub(crate) enum SinkMessage {
     /// A value for each output of its topic, in internal units.
     Samples(Vec<FieldValue>),
     Step(StepMessage),
-    /// With the bytes of the message, as below.
+    /// Unusual provenance, with the size of the message in bytes.
     Origins(OriginMessage, usize),
     Event(Event, usize),
     /// Unreadable.
@@ -50,25 +50,25 @@ pub(crate) enum SinkMessage {
 
 /// A message with its place in the file.
 #[derive(Debug)]
-pub(crate) struct Placed<T> {
+pub(crate) struct PositionedMessage<T> {
     /// Number of the message.
     pub(crate) position: u64,
     pub(crate) log_time_ns: u64,
     pub(crate) message: T,
 }
 
-/// See the module.
+/// Collects everything of a recording that [`crate::read_recording`] returns.
 pub(crate) struct RigSink<'a> {
     path: &'a Path,
     map: &'a ChannelMap,
     topics: BTreeMap<u16, Topic>,
     pub(crate) topic_names: BTreeSet<String>,
     /// The topics to read, in the order in which the file defines them.
-    series: Vec<(Reads, SeriesBuilder)>,
+    series: Vec<(MappedQuantity, SeriesBuilder)>,
     /// Unit of each field that was mapped.
-    pub(crate) units: BTreeMap<Reads, &'static Unit>,
-    pub(crate) steps: Vec<Placed<StepMessage>>,
-    pub(crate) events: Vec<Placed<Event>>,
+    pub(crate) units: BTreeMap<MappedQuantity, &'static Unit>,
+    pub(crate) steps: Vec<PositionedMessage<StepMessage>>,
+    pub(crate) events: Vec<PositionedMessage<Event>>,
     pub(crate) origins: Vec<(u64, OriginMessage)>,
     pub(crate) metadata: BTreeMap<String, String>,
     pub(crate) format: Option<FormatVersion>,
@@ -78,8 +78,8 @@ pub(crate) struct RigSink<'a> {
     pub(crate) warnings: Vec<ReadWarning>,
     pub(crate) failure: Option<RecordError>,
     damaged: BTreeMap<String, u64>,
-    kept: u64,
-    /// Messages so far.
+    value_count: u64,
+    /// Number of messages so far.
     position: u64,
 }
 
@@ -103,7 +103,7 @@ impl<'a> RigSink<'a> {
             warnings: Vec::new(),
             failure: None,
             damaged: BTreeMap::new(),
-            kept: 0,
+            value_count: 0,
             position: 0,
         }
     }
@@ -116,12 +116,12 @@ impl<'a> RigSink<'a> {
     }
 
     /// The non-empty series.
-    pub(crate) fn take_builders(&mut self) -> BTreeMap<Reads, SeriesBuilder> {
+    pub(crate) fn take_builders(&mut self) -> BTreeMap<MappedQuantity, SeriesBuilder> {
         std::mem::take(&mut self.series).into_iter().filter(|(_, builder)| !builder.is_empty()).collect()
     }
 
     /// The series that collects the samples of a channel or sensor; several topics may have the same one.
-    fn builder(&mut self, reads: Reads) -> usize {
+    fn builder(&mut self, reads: MappedQuantity) -> usize {
         let known = self.series.iter().position(|(known, _)| *known == reads);
         known.unwrap_or_else(|| {
             self.series.push((reads, SeriesBuilder::default()));
@@ -171,7 +171,9 @@ impl Sink for RigSink<'_> {
             Topic::Mapped(mapped, _) => {
                 let mut values = Vec::new();
                 read_fields(data, &mapped.fields, &mut values).then(|| {
-                    let inside = |(index, _, unit): &(usize, Reads, &'static Unit)| match values.get(*index) {
+                    let inside = |(index, _, unit): &(usize, MappedQuantity, &'static Unit)| match values
+                        .get(*index)
+                    {
                         Some(FieldValue::Number(value)) => FieldValue::Number(unit.to_inside(*value)),
                         Some(other) => *other,
                         None => FieldValue::Absent,
@@ -200,24 +202,24 @@ impl Sink for RigSink<'_> {
                         FieldValue::Number(value) => builder.push_at(position, log_time_ns, *value),
                         FieldValue::Other => {
                             builder.push_at(position, log_time_ns, f64::NAN);
-                            builder.not_numbers += 1;
+                            builder.non_numeric_count += 1;
                         }
                         FieldValue::Absent => continue,
                     }
-                    self.kept += 1;
+                    self.value_count += 1;
                 }
             }
             (SinkMessage::Step(step), _) => {
-                self.kept += values_of(size_of::<StepMessage>());
-                self.steps.push(Placed { position, log_time_ns, message: step });
+                self.value_count += values_of(size_of::<StepMessage>());
+                self.steps.push(PositionedMessage { position, log_time_ns, message: step });
             }
             (SinkMessage::Origins(origins, bytes), _) => {
-                self.kept += values_of(bytes);
+                self.value_count += values_of(bytes);
                 self.origins.push((log_time_ns, origins));
             }
             (SinkMessage::Event(event, bytes), _) => {
-                self.kept += values_of(size_of::<Event>() + bytes);
-                self.events.push(Placed { position, log_time_ns, message: event });
+                self.value_count += values_of(size_of::<Event>() + bytes);
+                self.events.push(PositionedMessage { position, log_time_ns, message: event });
             }
             (SinkMessage::Damaged | SinkMessage::Samples(_), topic) => {
                 *self.damaged.entry(topic.name().to_owned()).or_default() += 1;
@@ -225,8 +227,8 @@ impl Sink for RigSink<'_> {
         }
     }
 
-    fn kept(&self) -> u64 {
-        self.kept
+    fn value_count(&self) -> u64 {
+        self.value_count
     }
 
     fn metadata(&mut self, name: String, mut pairs: BTreeMap<String, String>) {

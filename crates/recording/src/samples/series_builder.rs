@@ -1,21 +1,21 @@
 //! Samples of one channel in the order of the file, and the series made of them.
 
 use crate::ReadWarning;
-use crate::samples::log_clock::{BACK_INTERVALS, BACK_S, STRAY_S};
+use crate::samples::log_clock::{MAX_BACK_INTERVALS, MAX_BACK_S, STRAY_S};
 use mapper_core::{Channel, Series};
 
-/// A clock that goes back by less is late messages, ns: the same limit as for the clocks of logs.
-const BACK_NS: u64 = (BACK_S * 1e9) as u64;
+/// Maximum step back of a clock due to late messages, ns: the same as for logs.
+const MAX_BACK_NS: u64 = (MAX_BACK_S * 1e9) as u64;
 
-/// Maximum number of breaks that are kept: a file whose times go back more often has no clock that was set.
-const BREAK_LIMIT: usize = 100;
+/// Maximum number of breaks: a file whose times go back more often has another fault than a clock that was set.
+const MAX_BREAKS: usize = 100;
 
 /// Samples before a break whose shortest interval is that of the channel.
-const RECENT: usize = 6;
+const RECENT_SAMPLES: usize = 6;
 
 /// A place in the file at which the times of a channel go back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Break {
+pub(crate) struct ClockBreak {
     /// Number of the message in the file.
     pub(crate) position: u64,
     /// Index of the sample.
@@ -34,8 +34,8 @@ pub(crate) type Sides = (Vec<(f64, f64)>, Vec<(f64, f64)>);
 pub(crate) struct SeriesBuilder {
     times_ns: Vec<u64>,
     values: Vec<f64>,
-    pub(crate) not_numbers: u64,
-    breaks: Vec<Break>,
+    pub(crate) non_numeric_count: u64,
+    breaks: Vec<ClockBreak>,
     /// Numbers of the first and the last message.
     positions: (u64, u64),
 }
@@ -46,15 +46,17 @@ impl SeriesBuilder {
         self.values.push(value);
     }
 
-    /// Takes a sample of the message with this number.
+    /// Adds the sample of a message.
     pub(crate) fn push_at(&mut self, position: u64, time_ns: u64, value: f64) {
         if let Some(last_ns) = self.times_ns.last() {
             let back_ns = last_ns.saturating_sub(time_ns);
-            if back_ns > BACK_NS && self.breaks.len() < BREAK_LIMIT {
-                let recent =
-                    self.times_ns.get(self.times_ns.len().saturating_sub(RECENT)..).unwrap_or_default();
+            if back_ns > MAX_BACK_NS && self.breaks.len() < MAX_BREAKS {
+                let recent = self
+                    .times_ns
+                    .get(self.times_ns.len().saturating_sub(RECENT_SAMPLES)..)
+                    .unwrap_or_default();
                 let interval_ns = recent.windows(2).filter_map(|pair| pair[1].checked_sub(pair[0])).min();
-                self.breaks.push(Break { position, index: self.times_ns.len(), back_ns, interval_ns });
+                self.breaks.push(ClockBreak { position, index: self.times_ns.len(), back_ns, interval_ns });
             }
         } else {
             self.positions.0 = position;
@@ -64,16 +66,16 @@ impl SeriesBuilder {
     }
 
     /// Places at which the times go back.
-    pub(crate) fn breaks(&self) -> &[Break] {
+    pub(crate) fn breaks(&self) -> &[ClockBreak] {
         &self.breaks
     }
 
-    /// Whether times go on from a break without a jump forward until they have caught up: a late message or packet jumps.
-    pub(crate) fn goes_on_from(&self, found: &Break) -> bool {
+    /// Whether times continue from a break without a jump forward until they have caught up; after a late message they jump.
+    pub(crate) fn goes_on_from(&self, found: &ClockBreak) -> bool {
         let Some(before_ns) = found.index.checked_sub(1).and_then(|at| self.times_ns.get(at)) else {
             return false;
         };
-        let limit_ns = BACK_NS.max(BACK_INTERVALS as u64 * found.interval_ns.unwrap_or(0));
+        let limit_ns = MAX_BACK_NS.max(MAX_BACK_INTERVALS as u64 * found.interval_ns.unwrap_or(0));
         let after = self.times_ns.get(found.index..).unwrap_or_default();
         let behind = after.iter().take_while(|time_ns| *time_ns < before_ns).count();
         after
@@ -92,7 +94,7 @@ impl SeriesBuilder {
         self.times_ns.len()
     }
 
-    /// Moves the samples from a message on, of which this channel has a break there or its first sample.
+    /// Moves the samples from a message on, at which this channel has a break or its first sample.
     pub(crate) fn move_later(&mut self, position: u64, by_ns: u64) {
         let from = match self.breaks.iter().find(|found| found.position >= position) {
             _ if self.positions.0 >= position => 0,
@@ -183,8 +185,8 @@ impl SeriesBuilder {
 
     /// The series over run time, strictly increasing; of samples at the same time the first one is kept.
     pub(crate) fn build(self, channel: Channel, zero_ns: u64, warnings: &mut Vec<ReadWarning>) -> Series {
-        if self.not_numbers > 0 {
-            warnings.push(ReadWarning::NotANumber { channel, count: self.not_numbers });
+        if self.non_numeric_count > 0 {
+            warnings.push(ReadWarning::NotANumber { channel, count: self.non_numeric_count });
         }
         let (times_ns, values) = if self.times_ns.is_sorted_by(|a, b| a < b) {
             (self.times_ns, self.values)

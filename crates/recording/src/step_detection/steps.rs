@@ -6,19 +6,18 @@ use mapper_numerics::statistics::median;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
-/// Changes of commands no further apart than this belong to one jump, s. Pressure and valve of a jump are set one
-/// after the other, and a ramp is a chain of changes.
-const JUMP_GAP_S: f64 = 1.0;
+/// Maximum time between changes of commands that belong to one jump, s. Pressure and valve change one after the other, and a ramp is a
+/// chain of changes.
+const MAX_JUMP_GAP_S: f64 = 1.0;
 
 /// Relative change below which a command counts as unchanged: the read-back of a constant command varies in its last digits.
 const COMMAND_TOLERANCE_RATIO: f64 = 1e-6;
 
-/// P3 that moves by more than this share within [`JUMP_GAP_S`] is a jump: a speed controller takes longer for less.
-const FAST_RATIO: f64 = 0.01;
+/// Minimum relative change of P3 within [`MAX_JUMP_GAP_S`] that is a jump: a speed controller changes it more slowly.
+const MIN_FAST_RATIO: f64 = 0.01;
 
-/// A chain of slow changes of P3 is a jump by a slow rig if it moves P3 by more than this share. Otherwise a speed
-/// controller made it.
-const SLOW_RATIO: f64 = 0.02;
+/// Minimum relative change of P3 by a chain of slow changes that is a jump of a slow rig. A smaller one is a speed controller's.
+const MIN_SLOW_RATIO: f64 = 0.02;
 
 /// A message on `/step`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -109,7 +108,7 @@ pub(crate) fn steps_from_commands(
 
     // Start of each step, and the time at which its commands have reached their values.
     let mut jumps_s: Vec<(f64, f64)> = vec![(first_s, first_s)];
-    jumps_s.extend(jumps(commands[0].1, commands[1].1));
+    jumps_s.extend(find_jumps(commands[0].1, commands[1].1));
     let ends_s = jumps_s.iter().skip(1).map(|(start_s, _)| last_before_s(series, *start_s)).chain([last_s]);
     jumps_s
         .iter()
@@ -137,12 +136,12 @@ pub(crate) fn steps_from_commands(
 }
 
 /// Start and end of each jump of the commands, s.
-fn jumps(p3: Option<&Series>, valve: Option<&Series>) -> Vec<(f64, f64)> {
-    let p3_changes = p3.map(changes).unwrap_or_default();
-    let valve_changes = valve.map(changes).unwrap_or_default();
+fn find_jumps(p3: Option<&Series>, valve: Option<&Series>) -> Vec<(f64, f64)> {
+    let p3_changes = p3.map(find_changes).unwrap_or_default();
+    let valve_changes = valve.map(find_changes).unwrap_or_default();
     let mut times_s: Vec<f64> = p3_changes.iter().chain(&valve_changes).map(|change| change.t_s).collect();
     times_s.sort_by(f64::total_cmp);
-    let chains = times_s.chunk_by(|before_s, t_s| t_s - before_s <= JUMP_GAP_S);
+    let chains = times_s.chunk_by(|before_s, t_s| t_s - before_s <= MAX_JUMP_GAP_S);
     chains.filter_map(|chain| jump_of_chain(chain, &p3_changes, &valve_changes)).collect()
 }
 
@@ -159,20 +158,21 @@ fn jump_of_chain(chain: &[f64], p3_changes: &[Change], valve_changes: &[Change])
         [only] => (only.after / only.before - 1.0).abs(),
         [] => 0.0,
     };
-    // Only its first moments count, or the trim before a jump would become its start.
-    let fast_over =
-        |from_s: f64, share: f64| moved_ratio(from_s, from_s + share * JUMP_GAP_S) > share * FAST_RATIO;
+    // Without this limit, a controller's trim before a jump would become its start.
+    let fast_over = |from_s: f64, share: f64| {
+        moved_ratio(from_s, from_s + share * MAX_JUMP_GAP_S) > share * MIN_FAST_RATIO
+    };
     let fast = chain.iter().copied().find(|t_s| {
         !within(valve_changes, *t_s, *t_s).is_empty() || fast_over(*t_s, 0.25) && fast_over(*t_s, 1.0)
     });
-    let slow = (moved_ratio(first_s, last_s) > SLOW_RATIO).then_some(first_s);
+    let slow = (moved_ratio(first_s, last_s) > MIN_SLOW_RATIO).then_some(first_s);
     Some((fast.or(slow)?, last_s))
 }
 
 /// Time of the last measured sample before `change_s`, or `change_s` if there is none.
 ///
-/// A command is seen at a sample. The recording does not show whether that sample was taken before or after the change,
-/// so it belongs to neither step's end.
+/// A command appears at a sample. The recording does not show whether the sample is from before or after the change, so it counts for
+/// neither step.
 fn last_before_s(series: &BTreeMap<Channel, Series>, change_s: f64) -> f64 {
     let measured = series.iter().filter(|(channel, _)| channel.info().group != Group::Command);
     let before_s = |series: &Series| {
@@ -190,7 +190,7 @@ struct Change {
     after: f64,
 }
 
-fn changes(command: &Series) -> Vec<Change> {
+fn find_changes(command: &Series) -> Vec<Change> {
     let mut current: Option<f64> = None;
     let mut changes = Vec::new();
     for (t_s, value) in command.t_s.iter().zip(&command.values).filter(|(_, value)| value.is_finite()) {

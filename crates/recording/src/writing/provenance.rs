@@ -8,8 +8,8 @@ use mcap::McapResult;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Times that differ by less are the same, s: the jitter of clocks and threads.
-const SAME_S: f64 = 1e-4;
+/// Times that differ by less are equal, s: the jitter of clocks and threads.
+const TIME_TOLERANCE_S: f64 = 1e-4;
 
 /// Unusual provenance of one reading.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -43,8 +43,8 @@ impl ProvenanceWriter {
                 return None;
             }
             let source_t_s = from.source_t_s.get(index).copied();
-            let source_t_s =
-                source_t_s.filter(|source_s| source_s.is_finite() && (source_s - t_s).abs() > SAME_S);
+            let source_t_s = source_t_s
+                .filter(|source_s| source_s.is_finite() && (source_s - t_s).abs() > TIME_TOLERANCE_S);
             let says = quality.is_some() || source_t_s.is_some();
             says.then_some((from.channel, Origin { source_t_s, quality }))
         };

@@ -73,8 +73,8 @@ pub(crate) fn event_schema() -> (Vec<u8>, BTreeMap<String, String>) {
 pub(crate) fn provenance_schema() -> (Vec<u8>, BTreeMap<String, String>) {
     let of = |row: &ChannelInfo| {
         json!({"type": "object", "description": row.description, "properties": {
-            "source_t_s": {"type": "number", "description": "run time at which the source took the reading, where it is not that of the message", "unit": "s"},
-            "quality": {"type": "string", "description": "uncertain or bad, by the rig's own word; good if it is left out"},
+            "source_t_s": {"type": "number", "description": "run time at which the source took the reading, if it differs from the message's", "unit": "s"},
+            "quality": {"type": "string", "description": "uncertain or bad, as the rig reports; absent if good"},
         }})
     };
     let properties: Map<String, Value> =

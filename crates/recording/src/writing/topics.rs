@@ -13,7 +13,7 @@ pub enum StepPhase {
     Start,
     /// The step is over; the marker's `end_s` counts.
     End,
-    /// The step was cut short, and does not count; the marker's `end_s` counts.
+    /// The step was aborted; the marker's `end_s` counts.
     Abandoned,
 }
 

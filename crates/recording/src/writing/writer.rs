@@ -1,11 +1,11 @@
-//! Writing a recording: messages per device group and sample, flushed each second of the run's clock.
+//! Writes a recording: one message per device group and sample, flushed each second of the run's clock.
 
 use crate::format::{ELEMENTS_TOPIC, TRUTH_TOPIC};
 use crate::writing::provenance::ProvenanceWriter;
 use crate::writing::recording_file::{McapFile, OpenedFile, RecordingHeader, add_channel, io_error, open};
 use crate::writing::schema::{Field, numeric_schema, unit_metadata};
 use crate::writing::topics::{StepPhase, event_message, step_message};
-use crate::{BadBatch, RecordError};
+use crate::{BatchError, RecordError};
 use mapper_core::{Channel, Event, Group, SampleBatch, StepMarker};
 use mcap::McapResult;
 use mcap::records::MessageHeader;
@@ -56,7 +56,7 @@ pub struct RecordingWriter {
     layouts: Vec<Layout>,
     line: Vec<u8>,
     /// Fields without a reading are not written at all.
-    absent_left_out: bool,
+    omit_absent: bool,
     provenance: ProvenanceWriter,
 }
 
@@ -64,8 +64,8 @@ impl RecordingWriter {
     /// Creates the file and writes header, metadata and attachments.
     ///
     /// # Errors
-    /// [`RecordError::Exists`] if the file is there already, [`RecordError::Create`] and [`RecordError::Write`]
-    /// as the system says.
+    /// [`RecordError::Exists`] if the file exists; [`RecordError::Create`] and [`RecordError::Write`] for errors of the
+    /// system.
     pub fn create(path: &Path, header: &RecordingHeader) -> Result<RecordingWriter, RecordError> {
         let file = File::create_new(path).map_err(|source| match source.kind() {
             io::ErrorKind::AlreadyExists => RecordError::Exists { path: path.to_owned() },
@@ -93,14 +93,14 @@ impl RecordingWriter {
             events_written: 0,
             layouts: Vec::new(),
             line: Vec::with_capacity(512),
-            absent_left_out: false,
+            omit_absent: false,
             provenance: ProvenanceWriter::default(),
         })
     }
 
     /// Omits fields without a reading instead of writing null: for channels of several sources, each with its own times.
-    pub fn leaving_out_absent(self, absent_left_out: bool) -> Self {
-        RecordingWriter { absent_left_out, ..self }
+    pub fn omit_absent(self, omit_absent: bool) -> Self {
+        RecordingWriter { omit_absent, ..self }
     }
 
     /// Run time up to which all samples are in the file, s; `None` before the first flush.
@@ -111,11 +111,11 @@ impl RecordingWriter {
     /// Writes the samples, the truth and the events of a batch.
     ///
     /// # Errors
-    /// [`RecordError::BadInput`] for columns that do not fit the batch's times, [`RecordError::Write`] as the system
-    /// says (disk full). After an error everything up to [`saved_until_s`](Self::saved_until_s) is safe.
+    /// [`RecordError::BadInput`] for columns that do not fit the batch's times, [`RecordError::Write`] for errors of
+    /// the system (disk full). After an error everything up to [`saved_until_s`](Self::saved_until_s) is safe.
     pub fn write_batch(&mut self, batch: &SampleBatch) -> Result<(), RecordError> {
-        self.check(batch)?;
-        let tables = self.tables(batch)?;
+        self.check_batch(batch)?;
+        let tables = self.group_by_topic(batch)?;
         let mut events = batch.events.iter().peekable();
         for (index, t_s) in batch.t_s.iter().enumerate() {
             while let Some(event) = events.next_if(|event| event.t_s <= *t_s) {
@@ -130,7 +130,7 @@ impl RecordingWriter {
                 self.line.clear();
                 for (prefix, column) in layout.prefixes.iter().zip(&table.columns) {
                     let value = column.get(index).copied().unwrap_or(f64::NAN);
-                    if self.absent_left_out && !value.is_finite() {
+                    if self.omit_absent && !value.is_finite() {
                         continue;
                     }
                     let at = self.line.len();
@@ -147,7 +147,7 @@ impl RecordingWriter {
             }
             if let Some(message) = self.provenance.message(batch, index) {
                 let channel_id = self.provenance.channel(&mut self.mcap);
-                let channel_id = self.wrote(channel_id)?;
+                let channel_id = self.check_write(channel_id)?;
                 self.line.clear();
                 self.line.extend_from_slice(message.to_string().as_bytes());
                 self.write_line(channel_id, sequence, log_time)?;
@@ -191,11 +191,11 @@ impl RecordingWriter {
     pub fn finish(mut self) -> Result<(), RecordError> {
         self.refuse_after_failure()?;
         let flushed = self.mcap.flush();
-        self.wrote(flushed)?;
+        self.check_write(flushed)?;
         self.saved_until_s = self.last_sample_s;
         // Ends with a flush of the file.
         let finished = self.mcap.finish();
-        self.wrote(finished).map(drop)
+        self.check_write(finished).map(drop)
     }
 
     /// Ends the chunk and hands it to the operating system when the clock enters a new second. Returns `log_time`.
@@ -205,7 +205,7 @@ impl RecordingWriter {
         if self.second.is_some_and(|open| second != open) {
             self.refuse_after_failure()?;
             let flushed = self.mcap.flush();
-            self.wrote(flushed)?;
+            self.check_write(flushed)?;
             self.saved_until_s = self.last_sample_s;
         }
         self.second = Some(second);
@@ -213,11 +213,11 @@ impl RecordingWriter {
     }
 
     fn log_time_ns(&self, t_s: f64) -> Result<u64, RecordError> {
-        // Casting saturates, and 1e9 s keeps sums far from the end of i128.
+        // The cast saturates, and the limit of 1e9 s keeps sums far from the range of i128.
         let since_epoch = self.start_time_ns as i128 + (t_s * 1e9).round() as i128;
         match u64::try_from(since_epoch) {
             Ok(log_time) if t_s.is_finite() => Ok(log_time),
-            _ => Err(self.bad_input(BadBatch::Time { t_s })),
+            _ => Err(self.input_error(BatchError::Time { t_s })),
         }
     }
 
@@ -225,10 +225,10 @@ impl RecordingWriter {
         self.refuse_after_failure()?;
         let header = MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
         let written = self.mcap.write_to_known_channel(&header, &self.line);
-        self.wrote(written)
+        self.check_write(written)
     }
 
-    fn wrote<T>(&mut self, result: McapResult<T>) -> Result<T, RecordError> {
+    fn check_write<T>(&mut self, result: McapResult<T>) -> Result<T, RecordError> {
         result.map_err(|error| {
             self.failed = true;
             RecordError::Write {
@@ -250,43 +250,43 @@ impl RecordingWriter {
         })
     }
 
-    fn bad_input(&self, source: BadBatch) -> RecordError {
+    fn input_error(&self, source: BatchError) -> RecordError {
         RecordError::BadInput { path: self.path.clone(), source }
     }
 
-    fn check(&self, batch: &SampleBatch) -> Result<(), RecordError> {
+    fn check_batch(&self, batch: &SampleBatch) -> Result<(), RecordError> {
         let samples = batch.t_s.len();
         let columns = batch.columns.iter().map(|column| (column.channel.symbol(), column.values.len()));
         let truth = batch.truth.iter().map(|column| (column.name.as_str(), column.values.len()));
         for (name, length) in columns.chain(truth) {
             if length != samples {
-                return Err(self.bad_input(BadBatch::Length { name: name.to_owned(), length, samples }));
+                return Err(self.input_error(BatchError::Length { name: name.to_owned(), length, samples }));
             }
         }
         for (index, column) in batch.elements.iter().enumerate() {
             let (name, length) = (column.element.to_string(), column.values.len());
             if length != samples {
-                return Err(self.bad_input(BadBatch::Length { name, length, samples }));
+                return Err(self.input_error(BatchError::Length { name, length, samples }));
             }
             if batch.elements[..index].iter().any(|earlier| earlier.element == column.element) {
-                return Err(self.bad_input(BadBatch::Twice { name }));
+                return Err(self.input_error(BatchError::Twice { name }));
             }
         }
         for (index, column) in batch.columns.iter().enumerate() {
             if batch.columns[..index].iter().any(|earlier| earlier.channel == column.channel) {
-                return Err(self.bad_input(BadBatch::Twice { name: column.channel.to_string() }));
+                return Err(self.input_error(BatchError::Twice { name: column.channel.to_string() }));
             }
         }
         for (index, column) in batch.truth.iter().enumerate() {
             if batch.truth[..index].iter().any(|earlier| earlier.name == column.name) {
-                return Err(self.bad_input(BadBatch::Twice { name: column.name.clone() }));
+                return Err(self.input_error(BatchError::Twice { name: column.name.clone() }));
             }
         }
         Ok(())
     }
 
     /// The topics of a batch, with their columns.
-    fn tables<'a>(&mut self, batch: &'a SampleBatch) -> Result<Vec<Table<'a>>, RecordError> {
+    fn group_by_topic<'a>(&mut self, batch: &'a SampleBatch) -> Result<Vec<Table<'a>>, RecordError> {
         let mut tables = Vec::with_capacity(Group::ALL.len() + 2);
         if batch.t_s.is_empty() {
             return Ok(tables);
@@ -359,7 +359,7 @@ impl RecordingWriter {
         self.refuse_after_failure()?;
         let schema = numeric_schema(topic, fields);
         let added = add_channel(&mut self.mcap, topic, &schema, &unit_metadata(fields));
-        let channel_id = self.wrote(added)?;
+        let channel_id = self.check_write(added)?;
         let prefixes = fields
             .iter()
             .enumerate()

@@ -61,7 +61,7 @@ fn columns(layout: &Layout, survey: &Survey, proposal: &Proposal) -> TextTable {
         let is_ambient =
             matches!(&proposal.ambient, Some(Ambient::Column { column, .. }) if *column == index);
         let none = if is_ambient { "ambient pressure".to_owned() } else { String::new() };
-        let channel = proposal.of_column(index).map_or(none, |proposed| {
+        let channel = proposal.channel_of_column(index).map_or(none, |proposed| {
             let mark = match proposed.certainty {
                 Certainty::Sure => "",
                 Certainty::Likely => " (likely)",

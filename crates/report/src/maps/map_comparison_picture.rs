@@ -4,7 +4,7 @@ use mapper_chart::{
     Axis, Figure, Line, LineEnd, Marker, Panel, Rule, RuleAt, Scatter, ScatterPoint, palette,
 };
 use mapper_core::{CompressorMap, half_width_95};
-use mapper_maps::{ComparedPlace, MapComparison};
+use mapper_maps::{MapComparison, PlaceComparison};
 use std::path::Path;
 
 /// Number of places per error bar in the second panel.
@@ -63,7 +63,7 @@ fn map_panel(
         let places: Vec<(f64, f64)> =
             line.places.iter().map(|p| (p.flow_corrected_kg_s, p.pressure_ratio)).collect();
         panel.add(Line::new(places, palette::GREY).width_px(1.2).end_label(speed, LineEnd::First));
-        let differs = |p: &ComparedPlace| p.line_differs() || p.eta_differs();
+        let differs = |p: &PlaceComparison| p.line_differs() || p.eta_differs();
         // A place without a difference interrupts the coloured line.
         let coloured: Vec<(f64, f64)> = line
             .places

@@ -3,7 +3,7 @@
 use crate::formatting::number::number;
 use crate::formatting::table;
 use mapper_core::half_width_95;
-use mapper_maps::{ComparedLine, ComparedPlace, MapComparison};
+use mapper_maps::{MapComparison, PlaceComparison, SpeedLineComparison};
 use std::fmt::Write;
 
 /// A row for each line and sentences below.
@@ -22,8 +22,8 @@ pub fn map_comparison_text(comparison: &MapComparison) -> String {
     ];
     let mut table = table::with_heads(&heads);
     for line in &comparison.lines {
-        let mean = |value: fn(&ComparedPlace) -> f64| mean(line, value);
-        let share = |differs: fn(&ComparedPlace) -> bool| {
+        let mean = |value: fn(&PlaceComparison) -> f64| mean(line, value);
+        let share = |differs: fn(&PlaceComparison) -> bool| {
             let count = line.places.iter().filter(|p| differs(p)).count();
             (!line.places.is_empty()).then(|| 100.0 * count as f64 / line.places.len() as f64)
         };
@@ -36,8 +36,8 @@ pub fn map_comparison_text(comparison: &MapComparison) -> String {
             number(mean(|p| 100.0 * half_width_95(p.distance_standard_error_ratio)), 2),
             number(mean(|p| 100.0 * p.eta_difference), 2),
             number(mean(|p| 100.0 * half_width_95(p.eta_standard_error)), 2),
-            number(share(ComparedPlace::line_differs), 0),
-            number(share(ComparedPlace::eta_differs), 0),
+            number(share(PlaceComparison::line_differs), 0),
+            number(share(PlaceComparison::eta_differs), 0),
         ]);
     }
     let mut text = format!(
@@ -60,7 +60,7 @@ pub fn map_comparison_text(comparison: &MapComparison) -> String {
     text
 }
 
-fn mean(line: &ComparedLine, value: fn(&ComparedPlace) -> f64) -> Option<f64> {
+fn mean(line: &SpeedLineComparison, value: fn(&PlaceComparison) -> f64) -> Option<f64> {
     let count = line.places.len();
     (count > 0).then(|| line.places.iter().map(value).sum::<f64>() / count as f64)
 }

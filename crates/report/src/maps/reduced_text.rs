@@ -4,7 +4,7 @@ use crate::formatting::number::number;
 use crate::formatting::table;
 use mapper_core::EndEvidence;
 use mapper_core::{CompressorMap, EstimateUncertainty, MapPoint, PointBudgets, half_width_95};
-use mapper_maps::{FoundEnd, LineEnds};
+use mapper_maps::{DetectedEnd, LineEnds};
 use std::fmt::Write;
 
 /// Lines, ends, sources of uncertainty, and remarks.
@@ -23,7 +23,7 @@ pub fn reduced_text(
         let width = best
             .and_then(|(point, _)| point.identified.eta_uncertainty)
             .map(|error: EstimateUncertainty| 100.0 * half_width_95(error.combined_standard_error()));
-        let flow = |end: &FoundEnd| number(Some(end.flow_corrected_kg_s), 4);
+        let flow = |end: &DetectedEnd| number(Some(end.flow_corrected_kg_s), 4);
         lines.add_row(vec![
             format!("{:.0}", line.speed_corrected_rpm),
             line.points.len().to_string(),

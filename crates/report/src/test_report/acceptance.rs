@@ -4,7 +4,7 @@ use crate::formatting::markdown::{self, Align};
 use crate::point_results::end_readings::END_S;
 use mapper_campaign::Campaign;
 use mapper_core::{Channel, DeclaredUncertainty, Recording, StepMarker, half_width_95, step_number};
-use mapper_observe::acceptance::{JudgedCriterion, judge_acceptance};
+use mapper_observe::acceptance::{CriterionResult, judge_acceptance};
 use mapper_observe::energy_balance::{EnergyBalance, Power, energy_balance};
 use mapper_physics::gas::air::Air;
 use mapper_recording::score::ScoredPoint;
@@ -72,7 +72,7 @@ pub fn balance_rows(report: JudgedPoints<'_>) -> Vec<[String; 6]> {
 pub fn acceptance_rows(report: JudgedPoints<'_>) -> Vec<[String; 5]> {
     let criteria = report.campaign.and_then(|campaign| campaign.acceptance.as_ref());
     let Some(criteria) = criteria else { return Vec::new() };
-    let row = |judged: JudgedCriterion| {
+    let row = |judged: CriterionResult| {
         let failed: Vec<String> = judged.failed().map(|step| step_number(step).to_string()).collect();
         let result = match (judged.largest_ratio(), failed.len()) {
             (None, _) => "not measured".to_owned(),

@@ -28,17 +28,17 @@ const LAMBDA_GROWTH: f64 = 0.4;
 /// After a jump the loop waits for this number of machine time constants, plus the time that P3 needs at the rig's rate.
 const TRANSIENT_TIME_CONSTANTS: f64 = 5.0;
 /// Minimum wait, s.
-const TRANSIENT_MIN_S: f64 = 2.0;
+const MIN_TRANSIENT_S: f64 = 2.0;
 /// Maximum wait for the speed to settle, s: after that, the loop also controls a machine that never settles.
-const TRANSIENT_MAX_S: f64 = 15.0;
+const MAX_TRANSIENT_S: f64 = 15.0;
 /// The transient is over when the relative change of speed per second falls below this.
-const AT_REST_RATIO: f64 = 1e-3;
+const MAX_SETTLED_CHANGE_RATIO: f64 = 1e-3;
 /// Smallest change of the command that is sent, as a share of the speed band: it saves valve wear.
 const MIN_CHANGE_SHARE: f64 = 0.05;
 /// Largest deficit in either direction: a larger one indicates another fault, most likely of the speed sensor.
-const DEFICIT_MAX: f64 = 0.4;
+const MAX_DEFICIT: f64 = 0.4;
 /// Minimum weight of a step's own deficit in the running average, which averages out the effect of the housings.
-const LEARNING_MIN_RATIO: f64 = 0.3;
+const MIN_LEARNING_RATIO: f64 = 0.3;
 /// Time at the end of a step over which its speed is judged, s.
 const AVERAGING_S: f64 = 10.0;
 /// Consecutive seconds beyond the band after which the loop restarts with its fast time constant.
@@ -72,7 +72,7 @@ pub struct SpeedControl<'a> {
     averaged_steps: usize,
     hold: Option<Hold>,
     /// The last command, Pa.
-    sent_pa: Option<f64>,
+    last_sent_pa: Option<f64>,
 }
 
 /// The operating point under control.
@@ -83,15 +83,15 @@ struct Hold {
     response: SpeedResponse,
     start_s: f64,
     /// Earliest end of the transient, s.
-    not_before_s: f64,
+    earliest_end_s: f64,
     /// Command of the loop, Pa; it differs from the last command by changes too small to be sent.
-    wanted_pa: f64,
+    setpoint_pa: f64,
     /// Time at which the loop was closed or restarted, s.
     closed_s: Option<f64>,
     /// Time and speed error of the previous second.
     before: Option<(f64, f64)>,
     /// Consecutive seconds beyond the band.
-    off: usize,
+    seconds_off: usize,
     /// Time and speed of the last seconds.
     recent: VecDeque<(f64, f64)>,
     /// Start of saturation at a limit, and whether it was reported.
@@ -128,7 +128,7 @@ impl<'a> SpeedControl<'a> {
             deficit: 0.0,
             averaged_steps: 0,
             hold: None,
-            sent_pa: None,
+            last_sent_pa: None,
         }
     }
 
@@ -145,11 +145,11 @@ impl<'a> SpeedControl<'a> {
         {
             hold.recent.clear();
             hold.saturated = None;
-            return self.sent_pa.unwrap_or(hold.wanted_pa);
+            return self.last_sent_pa.unwrap_or(hold.setpoint_pa);
         }
         let Some(response) = (self.response_at)(step) else {
             self.hold = None;
-            self.sent_pa = Some(step.p3_pa);
+            self.last_sent_pa = Some(step.p3_pa);
             return step.p3_pa;
         };
         let mut hold = Hold {
@@ -157,28 +157,28 @@ impl<'a> SpeedControl<'a> {
             plan_pa: step.p3_pa,
             response,
             start_s: t_s,
-            not_before_s: 0.0,
-            wanted_pa: step.p3_pa,
+            earliest_end_s: 0.0,
+            setpoint_pa: step.p3_pa,
             closed_s: None,
             before: None,
-            off: 0,
+            seconds_off: 0,
             recent: VecDeque::new(),
             saturated: None,
         };
         // A deficit learnt at other points must not drive the nominal machine beyond the speed limit.
         let room_pa = (self.limits.speed_max_rpm - step.to.speed_rpm).max(0.0) / response.rpm_per_pa;
-        hold.wanted_pa = self.allowed(hold.p3_pa(self.deficit).min(step.p3_pa + room_pa), &hold);
-        let from_pa = self.sent_pa.unwrap_or(hold.wanted_pa);
+        hold.setpoint_pa = self.clamp_to_limits(hold.p3_pa(self.deficit).min(step.p3_pa + room_pa), &hold);
+        let from_pa = self.last_sent_pa.unwrap_or(hold.setpoint_pa);
         let ramp_s = self
             .limits
             .p3_slew_max_pa_s
-            .map_or(0.0, |slew_pa_s| (hold.wanted_pa - from_pa).abs() / slew_pa_s);
-        hold.not_before_s = t_s
+            .map_or(0.0, |slew_pa_s| (hold.setpoint_pa - from_pa).abs() / slew_pa_s);
+        hold.earliest_end_s = t_s
             + ramp_s
-            + (TRANSIENT_TIME_CONSTANTS * response.time_constant_s).clamp(TRANSIENT_MIN_S, TRANSIENT_MAX_S);
-        let p3_pa = hold.wanted_pa;
+            + (TRANSIENT_TIME_CONSTANTS * response.time_constant_s).clamp(MIN_TRANSIENT_S, MAX_TRANSIENT_S);
+        let p3_pa = hold.setpoint_pa;
         self.hold = Some(hold);
-        self.sent_pa = Some(p3_pa);
+        self.last_sent_pa = Some(p3_pa);
         p3_pa
     }
 
@@ -188,10 +188,12 @@ impl<'a> SpeedControl<'a> {
         let event = self.advance(&mut hold, batch);
         let smallest_pa =
             MIN_CHANGE_SHARE * self.settings.band_ratio * hold.target.speed_rpm / hold.response.rpm_per_pa;
-        let send = self.sent_pa.is_none_or(|sent_pa| (hold.wanted_pa - sent_pa).abs() > smallest_pa);
-        let next = send.then_some(hold.wanted_pa);
+        let send = self
+            .last_sent_pa
+            .is_none_or(|last_sent_pa| (hold.setpoint_pa - last_sent_pa).abs() > smallest_pa);
+        let next = send.then_some(hold.setpoint_pa);
         if send {
-            self.sent_pa = next;
+            self.last_sent_pa = next;
         }
         self.hold = Some(hold);
         (next, event)
@@ -214,16 +216,17 @@ impl<'a> SpeedControl<'a> {
             return None;
         }
         if hold.closed_s.is_none() {
-            let moves = (error_rpm - error_before_rpm).abs() > AT_REST_RATIO * hold.target.speed_rpm * dt_s;
-            let patience = now_s - hold.start_s < hold.not_before_s - hold.start_s + TRANSIENT_MAX_S;
-            if now_s < hold.not_before_s || (moves && patience) {
+            let moves = (error_rpm - error_before_rpm).abs()
+                > MAX_SETTLED_CHANGE_RATIO * hold.target.speed_rpm * dt_s;
+            let is_waiting = now_s - hold.start_s < hold.earliest_end_s - hold.start_s + MAX_TRANSIENT_S;
+            if now_s < hold.earliest_end_s || (moves && is_waiting) {
                 return None;
             }
             hold.closed_s = Some(now_s - dt_s);
         }
         let beyond = error_rpm.abs() > self.settings.band_ratio * hold.target.speed_rpm;
-        hold.off = if beyond { hold.off + 1 } else { 0 };
-        if hold.off == MAX_SECONDS_OFF {
+        hold.seconds_off = if beyond { hold.seconds_off + 1 } else { 0 };
+        if hold.seconds_off == MAX_SECONDS_OFF {
             hold.closed_s = Some(now_s - dt_s);
         }
         let closed_for_s = now_s - hold.closed_s.unwrap_or(now_s);
@@ -233,17 +236,17 @@ impl<'a> SpeedControl<'a> {
         let counted_s = dt_s.min(0.5 * lambda_s);
         let change_pa = (response.time_constant_s * (error_rpm - error_before_rpm) + error_rpm * counted_s)
             / (lambda_s * response.rpm_per_pa);
-        let asked_pa = hold.wanted_pa + change_pa;
+        let requested_pa = hold.setpoint_pa + change_pa;
         let slew_pa = self.limits.p3_slew_max_pa_s.map_or(f64::INFINITY, |slew_pa_s| slew_pa_s * dt_s);
-        let rated_pa = asked_pa.clamp(hold.wanted_pa - slew_pa, hold.wanted_pa + slew_pa);
-        let allowed_pa = self.allowed(rated_pa, hold);
-        hold.wanted_pa = allowed_pa;
-        self.saturation(hold, now_s, rated_pa)
+        let rated_pa = requested_pa.clamp(hold.setpoint_pa - slew_pa, hold.setpoint_pa + slew_pa);
+        let allowed_pa = self.clamp_to_limits(rated_pa, hold);
+        hold.setpoint_pa = allowed_pa;
+        self.report_saturation(hold, now_s, rated_pa)
     }
 
     /// P3 within the rig's limits and within the largest deficit from the plan, Pa.
-    fn allowed(&self, p3_pa: f64, hold: &Hold) -> f64 {
-        let (low_pa, high_pa) = (hold.p3_pa(-DEFICIT_MAX), hold.p3_pa(DEFICIT_MAX));
+    fn clamp_to_limits(&self, p3_pa: f64, hold: &Hold) -> f64 {
+        let (low_pa, high_pa) = (hold.p3_pa(-MAX_DEFICIT), hold.p3_pa(MAX_DEFICIT));
         p3_pa
             .clamp(low_pa, high_pa)
             .max(self.limits.p3_min_pa.min(hold.plan_pa))
@@ -251,9 +254,9 @@ impl<'a> SpeedControl<'a> {
     }
 
     /// Reports saturation once per step, after some seconds, so that a brief contact with the limit is ignored.
-    fn saturation(&self, hold: &mut Hold, now_s: f64, asked_pa: f64) -> Option<Event> {
+    fn report_saturation(&self, hold: &mut Hold, now_s: f64, requested_pa: f64) -> Option<Event> {
         let speed_rpm = hold.reached_rpm()?;
-        if asked_pa == hold.wanted_pa {
+        if requested_pa == hold.setpoint_pa {
             hold.saturated = hold.saturated.filter(|(_, reported)| *reported);
             return None;
         }
@@ -265,8 +268,8 @@ impl<'a> SpeedControl<'a> {
             kind: EventKind::Note,
             message: format!(
                 "speed control: P3 stays at {:.1} kPa, {}; the speed is {:.2} krpm instead of {:.2} krpm",
-                hold.wanted_pa / 1e3,
-                self.describe_limit(hold.wanted_pa),
+                hold.setpoint_pa / 1e3,
+                self.describe_limit(hold.setpoint_pa),
                 speed_rpm / 1e3,
                 hold.target.speed_rpm / 1e3
             ),
@@ -281,7 +284,7 @@ impl<'a> SpeedControl<'a> {
         } else {
             format!(
                 "the largest correction of turbine power ({:.0} %); check the speed sensor",
-                100.0 * DEFICIT_MAX.exp_m1()
+                100.0 * MAX_DEFICIT.exp_m1()
             )
         }
     }
@@ -290,19 +293,19 @@ impl<'a> SpeedControl<'a> {
     pub fn end(&mut self, t_s: f64) -> Option<Event> {
         let hold = self.hold.as_ref()?;
         if hold.closed_s.is_some() {
-            let own = hold.deficit(hold.wanted_pa);
+            let own = hold.deficit(hold.setpoint_pa);
             self.averaged_steps += 1;
-            let weight = (1.0 / self.averaged_steps as f64).max(LEARNING_MIN_RATIO);
+            let weight = (1.0 / self.averaged_steps as f64).max(MIN_LEARNING_RATIO);
             self.deficit += weight * (own - self.deficit);
         }
-        let (asked_rpm, reached_rpm) = (hold.target.speed_rpm, hold.reached_rpm()?);
-        let off_ratio = reached_rpm / asked_rpm - 1.0;
+        let (requested_rpm, reached_rpm) = (hold.target.speed_rpm, hold.reached_rpm()?);
+        let off_ratio = reached_rpm / requested_rpm - 1.0;
         (off_ratio.abs() > self.settings.band_ratio).then(|| Event {
             t_s,
             kind: EventKind::SpeedNotReached,
             message: format!(
                 "the speed was not reached: {:.2} krpm requested, {:.2} krpm in the last {AVERAGING_S:.0} s ({:+.2} %, band {:.2} %)",
-                asked_rpm / 1e3,
+                requested_rpm / 1e3,
                 reached_rpm / 1e3,
                 100.0 * off_ratio,
                 100.0 * self.settings.band_ratio

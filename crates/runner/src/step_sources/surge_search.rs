@@ -5,7 +5,7 @@ use crate::step_sources::step_source::{StepSource, StepSourceError};
 use crate::surge::{LineEnd, Move, SurgeEstimate, SurgeReading, choose_next_move};
 use mapper_core::{
     Channel, EventKind, OperatingPoint, PlanStep, Predicted, Recording, ReferenceState, SampleBatch,
-    StepKind, StepMarker, SurgeSeek,
+    StepKind, StepMarker, SurgeSearchSettings,
 };
 
 /// Time at the end of a line before the first reading, s: the machine comes from elsewhere on the map.
@@ -40,7 +40,7 @@ pub type HoldConditionsAt<'a> = &'a dyn Fn(OperatingPoint) -> Option<HoldConditi
 /// The steps of another source, followed by the approaches to surge: one for each speed, slowest first.
 pub struct SurgeSearch<'a> {
     inner: &'a mut dyn StepSource,
-    seek: SurgeSeek,
+    seek: SurgeSearchSettings,
     reference: ReferenceState,
     hold: HoldConditionsAt<'a>,
     /// The step nearest surge at each speed, from the inner source.
@@ -86,7 +86,7 @@ impl<'a> SurgeSearch<'a> {
     /// The steps of `inner`, then the approaches. `reference` is the reference state of corrected values.
     pub fn new(
         inner: &'a mut dyn StepSource,
-        seek: SurgeSeek,
+        seek: SurgeSearchSettings,
         reference: ReferenceState,
         hold: HoldConditionsAt<'a>,
     ) -> Self {
@@ -166,7 +166,7 @@ impl Approach {
     }
 
     /// The step of the current stage, without index, start time and origin.
-    fn step(&mut self, seek: &SurgeSeek, hold: HoldConditionsAt<'_>) -> Option<PlanStep> {
+    fn step(&mut self, seek: &SurgeSearchSettings, hold: HoldConditionsAt<'_>) -> Option<PlanStep> {
         let safe = self.end.to.valve_opening_ratio;
         let (opening, dwell_s) = match self.stage {
             Stage::Arrive => (safe, ARRIVE_S),
@@ -223,7 +223,7 @@ impl Approach {
     fn decide_next_stage(
         &mut self,
         marker: &StepMarker,
-        seek: &SurgeSeek,
+        seek: &SurgeSearchSettings,
         reference: ReferenceState,
     ) -> Option<String> {
         let line = || format!("surge search: {:.0} rpm", self.end.to.speed_rpm);

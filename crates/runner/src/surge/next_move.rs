@@ -2,7 +2,7 @@
 
 use crate::surge::estimate::SurgeEstimate;
 use crate::surge::surge_reading::SurgeReading;
-use mapper_core::SurgeSeek;
+use mapper_core::SurgeSearchSettings;
 
 /// Decision after a reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,11 +37,10 @@ const MAX_EXTRAPOLATION: f64 = 1.4;
 const MIN_DISTANCE_RATIO: f64 = 0.005;
 /// Minimum useful step, ratio.
 const MIN_STEP_RATIO: f64 = 0.004;
-/// Maximum number of readings at one opening.
 const MAX_READINGS_AT_OPENING: usize = 3;
 
 /// Expected number of readings of a line on a machine like the nominal one, from a surge margin on.
-pub fn expected_readings(margin_ratio: f64, seek: &SurgeSeek) -> usize {
+pub fn expected_readings(margin_ratio: f64, seek: &SurgeSearchSettings) -> usize {
     let (mut flow, mut readings) = (1.0 + margin_ratio, 1);
     while flow > 1.0 + 1.3 * seek.closest_margin_ratio && readings < seek.most_steps {
         let far = flow - 1.0 > FAR_MARGIN_RATIO;
@@ -56,7 +55,7 @@ pub fn expected_readings(margin_ratio: f64, seek: &SurgeSeek) -> usize {
 /// at the last opening; `None` if unknown.
 pub fn choose_next_move(
     readings: &[SurgeReading],
-    seek: &SurgeSeek,
+    seek: &SurgeSearchSettings,
     nominal_margin_ratio: Option<f64>,
 ) -> Move {
     let Some(last) = readings.last() else { return Move::Done(LineEnd::MaxSteps) };

@@ -1,7 +1,7 @@
 //! The readings at one opening of the valve during an approach to surge.
 
 use crate::surge::variation::Variation;
-use mapper_core::{Channel, Recording, ReferenceState, StepMarker, SurgeSeek};
+use mapper_core::{Channel, Recording, ReferenceState, StepMarker, SurgeSearchSettings};
 use mapper_numerics::statistics::mean;
 
 /// Channels whose variation indicates surge.
@@ -29,12 +29,12 @@ pub struct SurgeReading {
 }
 
 impl SurgeReading {
-    /// The reading of a step, from [`SurgeSeek::SETTLE_S`] after its start on. `None` if a mean or every variation is unknown:
+    /// The reading of a step, from [`SurgeSearchSettings::SETTLE_S`] after its start on. `None` if a mean or every variation is unknown:
     /// the step was too short, or a channel is missing.
     pub fn of(recording: &Recording, step: &StepMarker, reference: ReferenceState) -> Option<Self> {
         let samples = |channel: Channel| -> Option<(Vec<f64>, Vec<f64>)> {
             let series = recording.series.get(&channel)?;
-            let (t_s, values) = series.slice(step.start_s + SurgeSeek::SETTLE_S, step.end_s);
+            let (t_s, values) = series.slice(step.start_s + SurgeSearchSettings::SETTLE_S, step.end_s);
             Some(t_s.iter().zip(values).filter(|(_, value)| value.is_finite()).unzip())
         };
         let level = |channel: Channel| mean(&samples(channel)?.1).filter(|level| *level > 0.0);

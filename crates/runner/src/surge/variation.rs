@@ -3,11 +3,9 @@
 /// Length of the segments that are detrended by a straight line, s. Drift is not due to surge, and slow sampling may fold fast
 /// oscillations to low frequencies.
 const SEGMENT_S: f64 = 5.0;
-/// Minimum number of samples in a segment.
 const MIN_SAMPLES: usize = 10;
 /// Maximum lag of the autocorrelation, in samples; smaller than a segment.
-const LAGS: usize = 6;
-/// Minimum number of segments.
+const MAX_LAG_SAMPLES: usize = 6;
 const MIN_SEGMENTS: usize = 1;
 
 /// A variance with its degrees of freedom.
@@ -47,7 +45,7 @@ impl Variation {
         // Bartlett: correlated samples add less information about the variance. Chance alone makes the square of a
         // correlation 1/n.
         let memory: f64 =
-            (1..=LAGS).map(|lag| ((lagged(lag) / square).powi(2) - 1.0 / samples).max(0.0)).sum();
+            (1..=MAX_LAG_SAMPLES).map(|lag| ((lagged(lag) / square).powi(2) - 1.0 / samples).max(0.0)).sum();
         (square > 0.0).then_some(Variation {
             variance: square / freedom,
             degrees_of_freedom: freedom / (1.0 + 2.0 * memory),

@@ -20,7 +20,7 @@ use mapper_identify::{
 use mapper_maps::{RepeatedJump, repeated_jumps};
 use mapper_observe::FusedChannel;
 use mapper_recording::score::{
-    AwaitedTruths, ScoreSummary, ScoredMark, ScoredPoint, Truth, score, score_marks, with_truths,
+    PendingTruths, ScoreSummary, ScoredMark, ScoredPoint, Truth, score, score_marks, with_truths,
 };
 use mapper_recording::{AmbientPressure, Barometer, ChannelMap};
 use mapper_report::{result_remark_text, with_messages};
@@ -150,7 +150,7 @@ impl Session<'_> {
         recorded: Vec<Recorded>,
         map: &ChannelMap,
         method: Option<Method>,
-        truths: AwaitedTruths<'_>,
+        truths: PendingTruths<'_>,
     ) -> Result<Identified, SessionError> {
         let campaign = same_campaign(&recorded)?.cloned();
         check_all_distinct(&recorded)?;
@@ -172,7 +172,7 @@ impl Session<'_> {
             method
         });
         remarks.extend(unknown_barometer(map));
-        let day = recorded.first().and_then(|first| Date::of_ns(first.read.start_time_ns));
+        let day = recorded.first().and_then(|first| Date::from_epoch_ns(first.read.start_time_ns));
         let soak = campaign.and_then(|campaign| campaign.zero);
         let (mut recordings, mut sources) = (Vec::new(), Vec::new());
         for one in recorded {

@@ -7,7 +7,7 @@ use mapper_campaign::Campaign;
 use mapper_core::{
     CompressorMap, ExportError, ImportedMap, ImportedTurbine, MAP_FILE_SIZE_LIMIT, MapDescription, MapFormat,
 };
-use mapper_maps::table::{read_description, set_key, unpacked};
+use mapper_maps::table::{read_description, set_key, unpack};
 use mapper_maps::{MapFitOptions, fit_map};
 use std::io::Read;
 use std::path::Path;
@@ -74,7 +74,7 @@ impl Registry {
         mapper_yaml::open_file(path)
             .and_then(|file| file.take(limit).read_to_end(&mut bytes))
             .map_err(SessionError::file("read", path))?;
-        let bytes = unpacked(&bytes)
+        let bytes = unpack(&bytes)
             .map(std::borrow::Cow::into_owned)
             .map_err(|source| SessionError::Import { path: path.to_owned(), source })?;
         Ok((format, bytes))

@@ -8,7 +8,7 @@ use mapper_core::{
     EfficiencyDefinition, ExportError, ImportError, ImportRemark, ImportedMap, ImportedTurbine,
     MapDescription, MapFormat, ReferenceState, TurbineMap,
 };
-use mapper_maps::table::{describe, describe_turbine};
+use mapper_maps::table::{description_text, turbine_description_text};
 use mapper_maps::{
     MapFitOptions, compare, compare_turbines, convert_efficiency, correct_for_heat, fit_map, fit_turbine,
 };
@@ -99,7 +99,7 @@ impl Registry {
                     "remarks": found.remarks,
                     "lines": lines.collect::<Vec<_>>(),
                 });
-                (describe(&name, &found, given), imported_map_text(&found), json)
+                (description_text(&name, &found, given), imported_map_text(&found), json)
             }
             MapFile::Turbine(found) => {
                 let lines = found.map.lines().map(|line| {
@@ -115,7 +115,7 @@ impl Registry {
                     "remarks": found.remarks,
                     "lines": lines.collect::<Vec<_>>(),
                 });
-                (describe_turbine(&name, &found, given), imported_turbine_text(&found), json)
+                (turbine_description_text(&name, &found, given), imported_turbine_text(&found), json)
             }
         };
         if let Some((file, existing)) = description {

@@ -12,7 +12,7 @@ use std::path::Path;
 pub(crate) fn calibration_concerns(campaign: &Campaign, model: &Model, day: Option<Date>) -> Vec<Concern> {
     let warnings = forecast_calibration_warnings(campaign, model, day).into_iter();
     let concern = warnings.map(|one| Concern {
-        grave: campaign.calibration == CalibrationRule::Required,
+        is_error: campaign.calibration == CalibrationRule::Required,
         message: warning_text(&one.warning),
         remedy: remedy(&one.warning).to_owned(),
         at: one.at,

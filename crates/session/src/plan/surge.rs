@@ -2,7 +2,7 @@
 
 use crate::recording::identification_config::declared;
 use mapper_campaign::Campaign;
-use mapper_core::{OperatingPoint, Plan, PlanRemark, Predicted, Recording, SurgeSeek};
+use mapper_core::{OperatingPoint, Plan, PlanRemark, Predicted, Recording, SurgeSearchSettings};
 use mapper_identify::IdentifyConfig;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::follow_outlet::hold_speed;
@@ -65,7 +65,7 @@ pub fn surge_forecast(campaign: &Campaign, model: &Model, plan: &Plan) -> Option
 
 impl SurgeForecast {
     /// The remark of a plan.
-    fn remark(&self, seek: &SurgeSeek) -> PlanRemark {
+    fn remark(&self, seek: &SurgeSearchSettings) -> PlanRemark {
         PlanRemark::SurgeSearch {
             lines: self.lines,
             closest_margin_ratio: seek.closest_margin_ratio,

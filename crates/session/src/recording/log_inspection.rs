@@ -39,7 +39,7 @@ pub fn inspect_log(
     for (key, value) in &options {
         read_by.set(key, value)?;
     }
-    let (format, mut log) = registry.logs.open(&LogFile::of_path(path), &read_by)?;
+    let (format, mut log) = registry.logs.open(&LogFile::from_path(path), &read_by)?;
     let survey = survey(log.as_mut())?;
     let layout = log.layout().clone();
     let model = match machine {

@@ -217,7 +217,7 @@ impl PreparedRun<'_> {
         })?;
         // With several sources, each has its own sample times.
         let writer = RecordingWriter::create(&recording, &self.header(plan_json))?
-            .leaving_out_absent(!self.sources.read.is_empty());
+            .omit_absent(!self.sources.read.is_empty());
         let identity = Identity::of(campaign, &self.plan, &rig)?;
         journal
             .write(&Entry::Part { identity, recording: name })

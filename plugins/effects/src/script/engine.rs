@@ -15,14 +15,13 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Maximum operations of one call: a hook is called some million times in a run.
-const OPERATION_LIMIT: u64 = 10_000;
-const CALL_DEPTH_LIMIT: usize = 8;
-const EXPRESSION_DEPTH_LIMIT: usize = 64;
-const STRING_LIMIT: usize = 256;
-const VARIABLE_LIMIT: usize = 64;
-const FUNCTION_LIMIT: usize = 64;
-/// Maximum number of engines in a thread's cache.
-const KEPT_ENGINES: usize = 32;
+const MAX_OPERATIONS: u64 = 10_000;
+const MAX_CALL_DEPTH: usize = 8;
+const MAX_EXPRESSION_DEPTH: usize = 64;
+const MAX_STRING_CHARS: usize = 256;
+const MAX_VARIABLES: usize = 64;
+const MAX_FUNCTIONS: usize = 64;
+const MAX_CACHED_ENGINES: usize = 32;
 
 /// The machine's values for a script: `at.tc_k` and so on.
 #[derive(Debug, Clone, Copy)]
@@ -76,7 +75,6 @@ pub(super) struct Program {
     id: u64,
     text: String,
     parameters: Vec<String>,
-    /// Hooks it defines.
     defined: BTreeSet<String>,
 }
 
@@ -92,8 +90,8 @@ thread_local! {
 
 impl Program {
     /// Compiles a script to check it.
-    /// `takes_part`: whether it must define at least one hook.
-    pub(super) fn new(text: &str, parameters: Vec<String>, takes_part: bool) -> Result<Self, Mistake> {
+    /// `needs_hook`: whether it must define at least one hook.
+    pub(super) fn new(text: &str, parameters: Vec<String>, needs_hook: bool) -> Result<Self, Mistake> {
         static NEXT: AtomicU64 = AtomicU64::new(0);
         let Compiled { ast, .. } = compile(text, &parameters)?;
         let mut defined = BTreeSet::new();
@@ -116,10 +114,10 @@ impl Program {
             }
             defined.insert(name.to_owned());
         }
-        if defined.is_empty() && takes_part {
+        if defined.is_empty() && needs_hook {
             let names: Vec<&str> = HOOK_NAMES.iter().map(|(name, _)| *name).collect();
             let message = format!(
-                "it takes part nowhere: define one of {}, reading_T2 (or another channel)",
+                "it defines no hook: define one of {}, or reading_T2 (or that of another channel)",
                 names.join(", ")
             );
             return Err((None, message));
@@ -134,7 +132,7 @@ impl Program {
     }
 
     /// Whether it defines no hook.
-    pub(super) fn takes_no_part(&self) -> bool {
+    pub(super) fn has_no_hook(&self) -> bool {
         self.defined.is_empty()
     }
 
@@ -171,7 +169,7 @@ impl Program {
             if let Some(compiled) = kept.get(&self.id) {
                 return Ok(compiled.clone());
             }
-            if kept.len() >= KEPT_ENGINES {
+            if kept.len() >= MAX_CACHED_ENGINES {
                 kept.clear();
             }
             let compiled = Rc::new(compile(&self.text, &self.parameters).map_err(|(_, message)| message)?);
@@ -202,12 +200,12 @@ fn engine(parameters: &[String]) -> Engine {
         engine.disable_symbol(symbol);
     }
     engine
-        .set_max_operations(OPERATION_LIMIT)
-        .set_max_call_levels(CALL_DEPTH_LIMIT)
-        .set_max_expr_depths(EXPRESSION_DEPTH_LIMIT, EXPRESSION_DEPTH_LIMIT)
-        .set_max_string_size(STRING_LIMIT)
-        .set_max_variables(VARIABLE_LIMIT)
-        .set_max_functions(FUNCTION_LIMIT)
+        .set_max_operations(MAX_OPERATIONS)
+        .set_max_call_levels(MAX_CALL_DEPTH)
+        .set_max_expr_depths(MAX_EXPRESSION_DEPTH, MAX_EXPRESSION_DEPTH)
+        .set_max_string_size(MAX_STRING_CHARS)
+        .set_max_variables(MAX_VARIABLES)
+        .set_max_functions(MAX_FUNCTIONS)
         .set_strict_variables(true);
     engine.register_type_with_name::<At>("machine").register_type_with_name::<Numbers>("parameters");
     for (index, (name, _)) in FIELDS.iter().enumerate() {

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// Maximum length of a shown line or message, characters.
-const SHOWN_LIMIT: usize = 200;
+const MAX_SHOWN_CHARS: usize = 200;
 
 /// A script that is not an effect.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -22,7 +22,7 @@ pub struct ScriptEffectError {
 impl ScriptEffectError {
     pub(super) fn new(path: &Path, text: &str, line: Option<usize>, message: String) -> Self {
         let source_line = line.and_then(|line| text.lines().nth(line.checked_sub(1)?)).unwrap_or_default();
-        let clean = |text: &str| text.chars().filter(|c| !c.is_control()).take(SHOWN_LIMIT).collect();
+        let clean = |text: &str| text.chars().filter(|c| !c.is_control()).take(MAX_SHOWN_CHARS).collect();
         ScriptEffectError {
             path: path.to_owned(),
             line,

@@ -8,9 +8,8 @@ use std::borrow::Cow;
 pub(super) type Mistake = (Option<usize>, String);
 
 /// Maximum number of parameters of a script: each is a dimension of the fit.
-const PARAMETER_LIMIT: usize = 4;
+const MAX_PARAMETERS: usize = 4;
 
-/// Notation of a lag.
 const LAG_FORM: &str = "//! lag: CHANNEL PARAMETER";
 
 /// Notation of a parameter.
@@ -18,7 +17,6 @@ const PARAMETER_FORM: &str = "//! parameter: NAME [UNIT] LOW .. HIGH, neutral VA
 
 /// The contents of a header.
 pub(super) struct Header {
-    /// Of the effect.
     pub info: EffectInfo,
     /// Sensor lags, each with the parameter that holds its time constant.
     pub lags: Vec<(Channel, String)>,
@@ -134,11 +132,11 @@ fn check(parameter: &EffectParameter, others: &[EffectParameter]) -> Result<(), 
     if others.iter().any(|other| other.name == *name) {
         return Err(format!("there are two parameters `{name}`"));
     }
-    if others.len() >= PARAMETER_LIMIT {
-        return Err(format!("more than {PARAMETER_LIMIT} parameters cannot be distinguished"));
+    if others.len() >= MAX_PARAMETERS {
+        return Err(format!("more than {MAX_PARAMETERS} parameters cannot be distinguished"));
     }
     if !(low < high && (low..=high).contains(&neutral)) {
-        return Err(format!("{low} .. {high} must rise and hold the neutral value {neutral}"));
+        return Err(format!("{low} .. {high} must increase and contain the neutral value {neutral}"));
     }
     if *typical_step == 0.0 || !(*low..=*high).contains(&(neutral + typical_step)) {
         return Err(format!(

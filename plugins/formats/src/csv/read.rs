@@ -6,22 +6,21 @@ use mapper_core::{
     Method, ReferenceState, SpeedShift, Verdict, Warning,
 };
 use mapper_maps::table::{
-    Row, efficiency_in_comment, in_comment, line, read_text, room_for_one_more, settle, text_of,
+    Row, check_point_count, efficiency_in_comment, line, read_text, reference_in_comment, resolve_reference,
+    text_of,
 };
 
-/// Names of the four columns.
-const FOUR: [&str; 4] = ["speed_corrected_rpm", "flow_corrected_kg_s", "pressure_ratio", "eta"];
+const REQUIRED_COLUMNS: [&str; 4] = ["speed_corrected_rpm", "flow_corrected_kg_s", "pressure_ratio", "eta"];
 
 /// Maximum number of common errors of a point; `mapper` writes up to 13.
-const MAX_COMMON: usize = 64;
+const MAX_COMMON_ERRORS: usize = 64;
 
-/// The `#` lines and the column names.
 struct Head {
     reference: Option<ReferenceState>,
     machine: String,
     method: Option<Method>,
     efficiency: Option<EfficiencyDefinition>,
-    /// First step number: files of version 0.1.0 do not give it, and start at 0.
+    /// First step number: 0 for files of version 0.1.0, which do not contain it.
     first_step: f64,
     columns: Columns,
 }
@@ -41,7 +40,7 @@ fn read_own(text: &str, given: Option<ReferenceState>) -> Result<CompressorMap, 
     let (mut reference, mut machine, mut method, mut first_step) = (None, String::new(), None, 0.0);
     let mut efficiency = None;
     for comment in text.lines().filter_map(|line| line.trim_start().strip_prefix('#')) {
-        reference = reference.or_else(|| in_comment(comment));
+        reference = reference.or_else(|| reference_in_comment(comment));
         efficiency = efficiency.or_else(|| efficiency_in_comment(comment));
         if let Some((_, name)) = comment.split_once("compressor map of ") {
             machine = name.trim().chars().take(200).collect();
@@ -61,7 +60,7 @@ fn read_own(text: &str, given: Option<ReferenceState>) -> Result<CompressorMap, 
         .from_reader(text.as_bytes());
     let mut records = reader.records();
     let first = records.next().ok_or(ImportError::Empty)?;
-    let columns = named(&record(first)?)?;
+    let columns = find_columns(&record(first)?)?;
     let head = Head { reference, machine, method, efficiency, first_step, columns };
     let mut rows: Vec<(Row, StringRecord)> = Vec::new();
     for next in records {
@@ -69,10 +68,10 @@ fn read_own(text: &str, given: Option<ReferenceState>) -> Result<CompressorMap, 
         if next.iter().all(str::is_empty) {
             continue;
         }
-        room_for_one_more(rows.len(), at(&next))?;
+        check_point_count(rows.len(), at(&next))?;
         rows.push((row(&next, &head.columns)?, next));
     }
-    own(&head, &rows, given)
+    read_own_rows(&head, &rows, given)
 }
 
 /// The column that only files of `mapper` have.
@@ -95,10 +94,10 @@ fn at(record: &StringRecord) -> usize {
     record.position().map_or(1, |position| position.line() as usize)
 }
 
-fn named(record: &StringRecord) -> Result<Columns, ImportError> {
+fn find_columns(record: &StringRecord) -> Result<Columns, ImportError> {
     let names: Vec<String> = record.iter().map(str::to_owned).collect();
     let mut four = [0; 4];
-    for (place, name) in four.iter_mut().zip(FOUR) {
+    for (place, name) in four.iter_mut().zip(REQUIRED_COLUMNS) {
         *place = names.iter().position(|known| known == name).ok_or_else(|| ImportError::NoColumn {
             line: at(record),
             missing: name,
@@ -120,7 +119,7 @@ impl Columns {
     /// Numbers separated by semicolons; empty if the column is missing or the field is empty.
     fn list(&self, record: &StringRecord, name: &str) -> Result<Vec<f64>, ImportError> {
         let Some(text) = self.text(record, name) else { return Ok(Vec::new()) };
-        text.split(';').take(MAX_COMMON).map(|part| finite(part, record, name)).collect()
+        text.split(';').take(MAX_COMMON_ERRORS).map(|part| finite(part, record, name)).collect()
     }
 
     fn number(&self, record: &StringRecord, name: &str) -> Result<Option<f64>, ImportError> {
@@ -161,12 +160,12 @@ fn row(record: &StringRecord, columns: &Columns) -> Result<Row, ImportError> {
 }
 
 /// A file of `mapper`: lines and all columns as written.
-fn own(
+fn read_own_rows(
     head: &Head,
     rows: &[(Row, StringRecord)],
     given: Option<ReferenceState>,
 ) -> Result<CompressorMap, ImportError> {
-    let reference = settle(head.reference, given)?;
+    let reference = resolve_reference(head.reference, given)?;
     if rows.is_empty() {
         return Err(ImportError::Empty);
     }

@@ -1,4 +1,4 @@
-//! The time of a row.
+//! The clock of a table: the time of each row.
 
 use crate::notation::instant::NS_PER_DAY;
 use crate::notation::table_row::Cells;
@@ -9,8 +9,8 @@ use mapper_recording::logs::DateOrder;
 pub(crate) enum Clock {
     /// A counter.
     Count { column: usize, unit_s: f64 },
-    /// Date and time of day, in one column or in two. A reading without a date begins again after `period_ns`: a day, or an hour
-    /// where the hours are not written.
+    /// Date and time of day, in one column or in two. A reading without a date restarts after `period_ns`: a day, or an hour
+    /// if the hours are not written.
     Instant { date: Option<usize>, time: usize, order: DateOrder, period_ns: i64 },
     /// No clock: rows have a fixed rate.
     Rate { interval_s: f64 },
@@ -24,9 +24,9 @@ pub(crate) struct GroupClock {
     pub(crate) zero_s: f64,
     /// The same for dates, ns.
     pub(crate) zero_ns: i64,
-    /// If several rows share one reading.
+    /// Set if several rows share one reading.
     pub(crate) spread: Option<Spread>,
-    /// Whether rows are out of order and are to be sorted by time.
+    /// Whether rows are out of order and must be sorted by time.
     pub(crate) disordered: bool,
 }
 
@@ -37,7 +37,7 @@ pub(crate) struct Spread {
     pub(crate) interval_s: f64,
     /// Their number.
     pub(crate) rows: usize,
-    /// How many of those that share the first reading are missing: the log began within it.
+    /// Number of rows missing at the first reading, since the log began within it.
     pub(crate) missing_at_start: usize,
 }
 
@@ -72,7 +72,7 @@ impl Clock {
     }
 }
 
-/// Milliseconds are divided, so that 100 ms are 0.1 s to the last digit.
+/// Divides milliseconds, so that 100 ms is exactly the f64 0.1 s.
 fn scaled(value: f64, unit_s: f64) -> f64 {
     if unit_s < 1.0 { value / (1.0 / unit_s).round() } else { value * unit_s }
 }
@@ -82,7 +82,7 @@ fn scaled(value: f64, unit_s: f64) -> f64 {
 pub(crate) struct ClockHand {
     clock: GroupClock,
     rows: u64,
-    /// Time added since the start because the readings began again.
+    /// Offset because the readings restarted, ns.
     added_ns: i64,
     last_ns: Option<i64>,
     last_s: f64,
@@ -100,7 +100,7 @@ impl ClockHand {
     /// A remark if local time went back at the end of daylight saving.
     pub(crate) fn remark(&self) -> Option<&'static str> {
         self.hour_back.then_some(
-            "clock: a date goes back by an hour, as where daylight saving ends; the rows after it are taken as an hour later \
+            "clock: a date goes back by an hour, as at the end of daylight saving; the rows after it are taken as an hour later \
              (name a clock without daylight saving by `time` if that is wrong)",
         )
     }
@@ -116,8 +116,8 @@ impl ClockHand {
             Clock::Instant { period_ns, .. } => {
                 let ns = self.clock.clock.instant_ns(cells)?;
                 let last_ns = self.last_ns.replace(ns);
-                let added_ns = last_ns.map_or(0, |last| begun_again_ns(last, ns, *period_ns));
-                self.hour_back |= added_ns > 0 && ns >= DATED_FROM_NS;
+                let added_ns = last_ns.map_or(0, |last| restart_offset_ns(last, ns, *period_ns));
+                self.hour_back |= added_ns > 0 && ns >= MIN_DATED_NS;
                 self.added_ns = self.added_ns.saturating_add(added_ns);
                 ns.saturating_add(self.added_ns).saturating_sub(self.clock.zero_ns) as f64 / 1e9
             }
@@ -132,24 +132,24 @@ impl ClockHand {
     }
 }
 
-/// An hour, ns: by so much local time goes back when daylight saving ends.
+/// An hour, ns: local time goes back by this at the end of daylight saving.
 pub(crate) const NS_PER_HOUR: i64 = NS_PER_DAY / 24;
 
-/// What has to be added from here on because a clock's readings began again, ns: a period where the reading has no date, an hour
-/// where local time goes back by one at the end of daylight saving; else 0.
-pub(crate) fn begun_again_ns(last_ns: i64, ns: i64, period_ns: i64) -> i64 {
-    let dated = ns >= DATED_FROM_NS;
+/// Offset to add from here on because a clock's readings restarted, ns: a period if they have no date, an hour if local time goes back at
+/// the end of daylight saving, else 0.
+pub(crate) fn restart_offset_ns(last_ns: i64, ns: i64, period_ns: i64) -> i64 {
+    let dated = ns >= MIN_DATED_NS;
     let back_ns = last_ns.saturating_sub(ns);
     match dated {
         false if back_ns > period_ns / 2 => period_ns,
-        // Less than an hour by the time between two rows.
+        // The step is an hour minus the time between two rows.
         true if (NS_PER_HOUR - NS_PER_MINUTE..NS_PER_HOUR).contains(&back_ns) => NS_PER_HOUR,
         _ => 0,
     }
 }
 
-/// A reading from here on has a date, ns: days of the year and durations are below.
-const DATED_FROM_NS: i64 = 367 * NS_PER_DAY;
+/// Minimum reading with a date, ns: days of the year and durations are smaller.
+const MIN_DATED_NS: i64 = 367 * NS_PER_DAY;
 
-/// A minute, ns: logs that are sampled less often have no transients.
+/// A minute, ns: logs with longer intervals have no transients.
 const NS_PER_MINUTE: i64 = NS_PER_HOUR / 60;

@@ -1,7 +1,7 @@
 //! Finds the clocks of a table, selects the ones to read, and assigns columns to them.
 
-use crate::columns::clock::{Clock, GroupClock, NS_PER_HOUR, Spread, begun_again_ns};
-use crate::columns::counter::{count_unit_s, is_clock_name, unit_words};
+use crate::columns::clock::{Clock, GroupClock, NS_PER_HOUR, Spread, restart_offset_ns};
+use crate::columns::counter::{count_unit_s, describe_unit, is_clock_name};
 use crate::columns::sample::{Sample, SampleRow, cells};
 use crate::columns::table_head::HeadColumn;
 use crate::notation::instant::{NS_PER_DAY, guess_order, minutes_and_seconds, parse_instant};
@@ -19,14 +19,14 @@ pub(crate) struct Clocks {
     pub(crate) start_time_ns: Option<u64>,
 }
 
-/// Counters above this since some epoch are actually dates, s: eleven days.
-const LONGEST_COUNT_S: f64 = 1e6;
+/// Maximum count of a counter, s (eleven days); larger ones are dates since some epoch.
+const MAX_COUNT_S: f64 = 1e6;
 
-/// One row in so many may go back without more ado: a recording that was restarted.
-const BACK_SHARE: usize = 20;
+/// Minimum number of rows per step back: a recording may have been restarted.
+const MIN_ROWS_PER_RESTART: usize = 20;
 
 /// Maximum number of clocks in a table; further columns with clock names are data.
-const CLOCK_LIMIT: usize = 100;
+const MAX_CLOCKS: usize = 100;
 
 /// A candidate clock, and its readings in the first rows, s.
 #[derive(Debug, Clone)]
@@ -52,24 +52,24 @@ impl Candidate {
         readings.len()
     }
 
-    /// Whether it hardly ever decreases and does increase, or runs once its rows are sorted.
+    /// Whether the readings increase, except for a few restarts, or would do so in order of time.
     fn runs(&self) -> bool {
         let readings: Vec<f64> = self.present().collect();
         // A clock with a resolution of seconds may be constant over these rows; a constant number is not a clock.
         let moves = readings.len() < 2 || readings.first() < readings.last();
-        let runs = BACK_SHARE * self.back() <= readings.len()
+        let runs = MIN_ROWS_PER_RESTART * self.reversal_count() <= readings.len()
             && (moves || matches!(self.clock, Clock::Instant { .. }));
         runs || self.is_disordered()
     }
 
-    /// How many readings are below the one before.
-    fn back(&self) -> usize {
+    /// Number of readings below the previous one.
+    fn reversal_count(&self) -> usize {
         let readings: Vec<f64> = self.present().collect();
         readings.windows(2).filter(|pair| pair[1] < pair[0]).count()
     }
 
-    /// Whether the rows of a clock are out of order: readings go back, no two are equal, and yet each quarter of the rows is later
-    /// than the one before it, give or take the rows at its ends.
+    /// Whether the rows are out of order: readings go back and are all different, but each quarter of the rows is later than the previous one,
+    /// except near its ends.
     fn is_disordered(&self) -> bool {
         let readings: Vec<f64> = self.present().collect();
         let mut distinct = readings.clone();
@@ -83,12 +83,11 @@ impl Candidate {
         };
         let middles: Vec<f64> = readings.chunks(quarter.max(1)).take(4).map(middle).collect();
         quarter >= 2
-            && BACK_SHARE * self.back() > readings.len()
+            && MIN_ROWS_PER_RESTART * self.reversal_count() > readings.len()
             && distinct.len() == readings.len()
             && middles.windows(2).all(|pair| pair[0] < pair[1])
     }
 
-    /// Minimum step between two readings, s.
     fn resolution_s(&self) -> f64 {
         let readings: Vec<f64> = self.present().collect();
         readings
@@ -122,8 +121,8 @@ pub(crate) fn choose(sample: &Sample<'_>, options: &LogOptions) -> Result<Clocks
             ));
             return Ok(clocks);
         }
-        ([], None) => found(sample, options, &mut clocks.findings),
-        (names, _) => vec![named(names, sample, options)?],
+        ([], None) => find_candidates(sample, options, &mut clocks.findings),
+        (names, _) => vec![named_clock(names, sample, options)?],
     };
     let Some(first) = candidates.first() else {
         let names: Vec<&str> = sample.columns.iter().map(|column| column.name.as_str()).take(40).collect();
@@ -133,7 +132,7 @@ pub(crate) fn choose(sample: &Sample<'_>, options: &LogOptions) -> Result<Clocks
             names.join(", ")
         ));
     };
-    // Clocks with the same pace belong together; another pace begins another group.
+    // Clocks with the same pace belong to one group.
     let mut groups: Vec<Vec<&Candidate>> = vec![vec![first]];
     for candidate in &candidates[1..] {
         match groups.iter_mut().find(|group| group[0].runs_with(candidate)) {
@@ -148,9 +147,9 @@ pub(crate) fn choose(sample: &Sample<'_>, options: &LogOptions) -> Result<Clocks
     for clock in candidates.iter().flat_map(|candidate| candidate.clock.columns()) {
         clocks.group_of[clock] = None;
     }
-    let chosen: Vec<&Candidate> = groups.iter().map(|group| finest(group)).collect();
+    let chosen: Vec<&Candidate> = groups.iter().map(|group| finest_clock(group)).collect();
     // Groups with clocks of different epochs are aligned at their first rows.
-    let is_epoch = |candidate: &Candidate| candidate.first_s().abs() > LONGEST_COUNT_S || candidate.dated;
+    let is_epoch = |candidate: &Candidate| candidate.first_s().abs() > MAX_COUNT_S || candidate.dated;
     let mixed = chosen.iter().any(|candidate| is_epoch(candidate) != is_epoch(chosen[0]));
     let common_s = chosen.iter().map(|candidate| candidate.first_s()).fold(f64::INFINITY, f64::min);
     let dated = groups
@@ -169,17 +168,17 @@ pub(crate) fn choose(sample: &Sample<'_>, options: &LogOptions) -> Result<Clocks
         let name = if groups.len() == 1 { String::new() } else { name_of(candidate) };
         let mut words = format!("`{}`", name_of(candidate));
         if let Clock::Count { unit_s, .. } = candidate.clock {
-            words.push_str(&format!(", counts {}", unit_words(unit_s)));
+            words.push_str(&format!(", counts {}", describe_unit(unit_s)));
         }
         let spread = spread(candidate);
         if let Some(Spread { interval_s, rows, .. }) = spread {
             words.push_str(&format!(
-                ", {rows} rows share each reading and are spread {interval_s:.3} s apart"
+                ", {rows} rows share each reading and are placed {interval_s:.3} s apart"
             ));
         }
         let disordered = candidate.is_disordered();
         if disordered {
-            words.push_str(", rows are out of order and are sorted by it");
+            words.push_str(", rows are out of order and were sorted by it");
         }
         let others: Vec<String> = group
             .iter()
@@ -234,7 +233,7 @@ fn exact_zero_ns(candidate: &Candidate, sample: &Sample<'_>, near_ns: f64) -> i6
 }
 
 /// The clock with the most distinct readings; among equals a counter, then the first.
-fn finest<'a>(group: &[&'a Candidate]) -> &'a Candidate {
+fn finest_clock<'a>(group: &[&'a Candidate]) -> &'a Candidate {
     let rank = |candidate: &Candidate| (candidate.distinct(), matches!(candidate.clock, Clock::Count { .. }));
     let mut best = group[0];
     for candidate in &group[1..] {
@@ -249,7 +248,7 @@ fn finest<'a>(group: &[&'a Candidate]) -> &'a Candidate {
 fn spread(candidate: &Candidate) -> Option<Spread> {
     let readings: Vec<f64> = candidate.present().collect();
     let runs: Vec<&[f64]> = readings.chunk_by(|a, b| a == b).collect();
-    // The first and the last may be truncated.
+    // The first and the last group may be incomplete.
     let whole = runs.get(1..runs.len().saturating_sub(1)).unwrap_or_default();
     let mut lengths: Vec<usize> = whole.iter().map(|run| run.len()).collect();
     lengths.sort_unstable();
@@ -269,30 +268,29 @@ fn candidate(clock: Clock, at: usize, sample: &Sample<'_>, dated: bool) -> Candi
     };
     let mut readings_s: Vec<Option<f64>> = rows.map(reading).collect();
     if let Clock::Instant { period_ns, .. } = clock {
-        count_on(&mut readings_s, period_ns);
+        add_restart_offsets(&mut readings_s, period_ns);
     }
     Candidate { clock, at, readings_s, dated }
 }
 
-/// Adds what [`begun_again_ns`] asks for.
-fn count_on(readings_s: &mut [Option<f64>], period_ns: i64) {
+/// Adds the offsets of [`restart_offset_ns`].
+fn add_restart_offsets(readings_s: &mut [Option<f64>], period_ns: i64) {
     let (mut added_ns, mut last_ns) = (0, None);
     for reading in readings_s.iter_mut().flatten() {
         let ns = (*reading * 1e9) as i64;
-        added_ns += last_ns.map_or(0, |last| begun_again_ns(last, ns, period_ns));
+        added_ns += last_ns.map_or(0, |last| restart_offset_ns(last, ns, period_ns));
         last_ns = Some(ns);
         *reading += added_ns as f64 / 1e9;
     }
 }
 
-/// An hour where no cell of a column shows one, else a day, ns.
+/// The period of a column, ns: an hour if no cell contains the hour, else a day.
 fn period_ns(column: usize, sample: &Sample<'_>) -> i64 {
     let hourless = cells(column, sample).all(|cell| minutes_and_seconds(cell).is_some());
     if hourless { NS_PER_HOUR } else { NS_PER_DAY }
 }
 
-/// The clock named by the user.
-fn named(names: &[String], sample: &Sample<'_>, options: &LogOptions) -> Result<Candidate, String> {
+fn named_clock(names: &[String], sample: &Sample<'_>, options: &LogOptions) -> Result<Candidate, String> {
     let find = |name: &String| {
         let is = |column: &HeadColumn| column.name == *name || column.header == *name;
         sample
@@ -305,7 +303,8 @@ fn named(names: &[String], sample: &Sample<'_>, options: &LogOptions) -> Result<
     let order = options.date_order.unwrap_or_else(|| order_of(columns[0], sample).0);
     let made = match columns.as_slice() {
         [date, time] => {
-            let (date, time) = if shows(*time, sample, order).0 { (*time, *date) } else { (*date, *time) };
+            let (date, time) =
+                if date_and_time_in(*time, sample, order).0 { (*time, *date) } else { (*date, *time) };
             candidate(
                 Clock::Instant { date: Some(date), time, order, period_ns: NS_PER_DAY },
                 date.min(time),
@@ -317,7 +316,7 @@ fn named(names: &[String], sample: &Sample<'_>, options: &LogOptions) -> Result<
             Clock::Instant { date: None, time: *column, order, period_ns: period_ns(*column, sample) },
             *column,
             sample,
-            shows(*column, sample, order).0,
+            date_and_time_in(*column, sample, order).0,
         ),
         [column] => {
             let unit_s = options.time_unit_s.unwrap_or_else(|| count_unit_s(*column, sample));
@@ -326,22 +325,25 @@ fn named(names: &[String], sample: &Sample<'_>, options: &LogOptions) -> Result<
         _ => return Err("`time` names one column, or a date and a time of day".to_owned()),
     };
     if made.present().next().is_none() {
-        return Err(format!("`{}`, which `time` names, holds neither numbers nor times", names.join(" + ")));
+        return Err(format!(
+            "`{}`, which `time` names, contains neither numbers nor times",
+            names.join(" + ")
+        ));
     }
     Ok(made)
 }
 
-fn found(sample: &Sample<'_>, options: &LogOptions, findings: &mut Vec<String>) -> Vec<Candidate> {
+fn find_candidates(sample: &Sample<'_>, options: &LogOptions, findings: &mut Vec<String>) -> Vec<Candidate> {
     let mut candidates: Vec<Candidate> = Vec::new();
     let mut dates: Vec<usize> = Vec::new();
     for (at, column) in sample.columns.iter().enumerate() {
         let (guessed, sure) = order_of(at, sample);
         let order = options.date_order.unwrap_or(guessed);
         if share(at, sample, order) > 0.8 {
-            let (has_date, has_time) = shows(at, sample, order);
+            let (has_date, has_time) = date_and_time_in(at, sample, order);
             if has_date && !sure && options.date_order.is_none() {
                 findings.push(format!(
-                    "date: `{}` may be read in two ways; the month is taken to stand first (date_order)",
+                    "date: `{}` is ambiguous; the month is assumed to be first (date_order)",
                     column.name
                 ));
             }
@@ -366,7 +368,7 @@ fn found(sample: &Sample<'_>, options: &LogOptions, findings: &mut Vec<String>) 
         }
     }
     candidates.retain(Candidate::runs);
-    candidates.truncate(CLOCK_LIMIT);
+    candidates.truncate(MAX_CLOCKS);
     candidates
 }
 
@@ -387,7 +389,7 @@ fn share(column: usize, sample: &Sample<'_>, order: DateOrder) -> f64 {
 }
 
 /// Whether its cells contain a date, and a time of day.
-fn shows(column: usize, sample: &Sample<'_>, order: DateOrder) -> (bool, bool) {
+fn date_and_time_in(column: usize, sample: &Sample<'_>, order: DateOrder) -> (bool, bool) {
     let first = cells(column, sample).find_map(|cell| parse_instant(cell, order)).unwrap_or_default();
     (first.day.is_some(), first.ns_of_day.is_some())
 }

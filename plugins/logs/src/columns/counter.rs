@@ -1,4 +1,4 @@
-//! Columns that count time: their names, and the seconds of a count.
+//! Recognises columns that count time, with the seconds per count.
 
 use crate::columns::sample::{Sample, cells};
 use crate::columns::table_head::HeadColumn;
@@ -80,8 +80,7 @@ const SECONDS_PER_DAY: f64 = 86_400.0;
 /// Day numbers of 1970 to 2100 in spreadsheets (day 1 is 1 January 1900) and in MATLAB (day 1 is 1 January of year 0).
 const DAY_NUMBERS: [std::ops::Range<f64>; 2] = [25_569.0..73_051.0, 719_529.0..767_011.0];
 
-/// Whether a counter has the size of a day number and moves as one: were it seconds, rows would be less than a millisecond apart,
-/// which no temperature is recorded at.
+/// Whether a counter has the size and the steps of a day number: as seconds, its rows would be less than a millisecond apart.
 fn is_day_number(column: usize, sample: &Sample<'_>, first: f64) -> bool {
     let readings: Vec<f64> =
         cells(column, sample).filter_map(|cell| read_number(cell, sample.decimal)).collect();
@@ -92,8 +91,8 @@ fn is_day_number(column: usize, sample: &Sample<'_>, first: f64) -> bool {
     DAY_NUMBERS.iter().any(|range| range.contains(&first)) && typical < 1e-3
 }
 
-/// The unit of a counter in words.
-pub(crate) fn unit_words(unit_s: f64) -> String {
+/// Describes the unit of a counter.
+pub(crate) fn describe_unit(unit_s: f64) -> String {
     match unit_s {
         1.0 => "seconds".to_owned(),
         0.001 => "milliseconds".to_owned(),

@@ -6,6 +6,9 @@ use crate::notation::number::{number_in, read_number};
 use crate::notation::table_row::Cells;
 use mapper_recording::logs::DateOrder;
 
+/// Maximum number of rows of a table in its sample.
+pub(crate) const HEAD_ROWS: usize = 400;
+
 /// The first rows of data.
 pub(crate) struct Sample<'a> {
     pub(crate) columns: &'a [HeadColumn],
@@ -13,7 +16,6 @@ pub(crate) struct Sample<'a> {
     pub(crate) decimal: u8,
 }
 
-/// One of them.
 pub(crate) struct SampleRow<'a>(pub(crate) &'a [String], pub(crate) u8);
 
 impl Cells for SampleRow<'_> {

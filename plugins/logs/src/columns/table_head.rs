@@ -6,23 +6,20 @@ use crate::notation::separator::typical_length;
 use mapper_recording::logs::{DateOrder, LogOptions, header_unit, split_unit};
 use std::collections::BTreeMap;
 
-/// Maximum number of columns in a table.
-pub(crate) const COLUMN_LIMIT: usize = 10_000;
+pub(crate) const MAX_COLUMNS: usize = 10_000;
 
-/// The head of a table.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct TableHead {
     pub(crate) columns: Vec<HeadColumn>,
     /// Index of the first row of data.
     pub(crate) data_row: usize,
-    /// Unit behind each number of a column, where cells have one.
+    /// Unit after each number of a column, if the cells have one.
     pub(crate) cell_units: BTreeMap<usize, String>,
-    /// The rows of the head, in words.
+    /// Description of the rows of the head.
     pub(crate) head: String,
     pub(crate) findings: Vec<String>,
 }
 
-/// One column of it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct HeadColumn {
     pub(crate) name: String,
@@ -31,13 +28,16 @@ pub(crate) struct HeadColumn {
     pub(crate) description: String,
 }
 
-/// Analyses the first rows of a table.
-pub(crate) fn look(rows: &[Vec<String>], decimal: u8, options: &LogOptions) -> Result<TableHead, String> {
+pub(crate) fn analyse_head(
+    rows: &[Vec<String>],
+    decimal: u8,
+    options: &LogOptions,
+) -> Result<TableHead, String> {
     let length = typical_length(rows);
     let given_row = options.data_row.map(|row| row - 1);
     let data_row = given_row
         .or_else(|| first_data_row(rows, length, decimal))
-        .ok_or("no rows of numbers were found; say where they begin (`data_row`)")?;
+        .ok_or("no rows of numbers were found; state the first one (`data_row`)")?;
     let rows = &without_comment_signs(rows, data_row, length);
     let header: Vec<usize> = header_rows(rows, data_row, length);
     let units_row = match options.units_row {
@@ -49,20 +49,20 @@ pub(crate) fn look(rows: &[Vec<String>], decimal: u8, options: &LogOptions) -> R
             .find(|row| is_units_row(&rows[*row])),
     };
     let group_row = group_row(rows, &header, length);
-    // Names have letters, unless no row has.
+    // Names have letters, unless no row has any.
     let named = header.iter().any(|row| Some(*row) != units_row && has_words(&rows[*row]));
     let others =
         || header.iter().copied().filter(|row| Some(*row) != units_row && (!named || has_words(&rows[*row])));
     let filled = |row: &usize| distinct(rows.get(*row));
-    // The first of the rows with the most names: rows after it hold long names.
+    // The first of the rows with the most names; later ones have long names.
     let most = others().map(|row| filled(&row)).max().unwrap_or(0);
     let names_row = options
         .names_row
         .map(|row| row - 1)
         .or_else(|| others().find(|row| 10 * filled(row) >= 8 * most && most > 0));
     let width = rows.get(data_row..).unwrap_or_default().iter().map(Vec::len).max().unwrap_or(0).max(length);
-    if width > COLUMN_LIMIT {
-        return Err(format!("it has {width} columns; at most {COLUMN_LIMIT} are read"));
+    if width > MAX_COLUMNS {
+        return Err(format!("it has {width} columns; at most {MAX_COLUMNS} are read"));
     }
     let cell = |row: Option<usize>, column: usize| {
         row.and_then(|row| rows.get(row)).and_then(|row| row.get(column)).map_or("", String::as_str)
@@ -121,7 +121,7 @@ pub(crate) fn look(rows: &[Vec<String>], decimal: u8, options: &LogOptions) -> R
             .collect();
         columns.push(HeadColumn { header, name, unit, description: description.join(", ") });
     }
-    // Columns without a name and without a cell come from separators at the ends of lines.
+    // Separators at the ends of lines make columns without name and cells.
     let empty = |column: usize| {
         rows.get(data_row..)
             .unwrap_or_default()
@@ -131,14 +131,14 @@ pub(crate) fn look(rows: &[Vec<String>], decimal: u8, options: &LogOptions) -> R
     while columns.last().is_some_and(|column| column.header.is_empty()) && empty(columns.len() - 1) {
         columns.pop();
     }
-    let found = Found { names_row, units_row, distant_units, group_row, header: &header, data_row, repeated };
-    let head = head_words(&found, &columns);
+    let found =
+        HeadRows { names_row, units_row, distant_units, group_row, header: &header, data_row, repeated };
+    let head = describe_head(&found, &columns);
     let findings = findings(&found, &columns, cell_units.len());
     Ok(TableHead { columns, data_row, cell_units, head, findings })
 }
 
-/// The rows of a head.
-struct Found<'a> {
+struct HeadRows<'a> {
     names_row: Option<usize>,
     units_row: Option<usize>,
     /// Row of units that is not next to the names.
@@ -146,12 +146,11 @@ struct Found<'a> {
     group_row: Option<usize>,
     header: &'a [usize],
     data_row: usize,
-    /// How many names are repeated.
+    /// Number of repeated names.
     repeated: usize,
 }
 
-/// The rows of the head, in words.
-fn head_words(found: &Found<'_>, columns: &[HeadColumn]) -> String {
+fn describe_head(found: &HeadRows<'_>, columns: &[HeadColumn]) -> String {
     let row_number = |row: Option<usize>| row.map_or("none".to_owned(), |row| (row + 1).to_string());
     let in_names = found.units_row.is_none() && columns.iter().any(|column| column.unit.is_some());
     let units = if in_names { "in the names".to_owned() } else { row_number(found.units_row) };
@@ -164,18 +163,18 @@ fn head_words(found: &Found<'_>, columns: &[HeadColumn]) -> String {
     )
 }
 
-/// Everything else about the head, in words.
-fn findings(found: &Found<'_>, columns: &[HeadColumn], cell_units: usize) -> Vec<String> {
+/// Further findings about the head.
+fn findings(found: &HeadRows<'_>, columns: &[HeadColumn], cell_units: usize) -> Vec<String> {
     let mut findings = Vec::new();
     if let Some(row) = found.distant_units.filter(|_| columns.iter().any(|column| column.unit.is_some())) {
         findings.push(format!("units of columns without one are in row {}", row + 1));
     }
     if cell_units > 0 {
-        findings.push(format!("{} columns have their unit behind each number", cell_units));
+        findings.push(format!("{} columns have their unit after each number", cell_units));
     }
     let before = found.group_row.or(found.header.first().copied()).unwrap_or(found.data_row);
     if before > 0 {
-        findings.push(format!("{before} rows before the header are passed over"));
+        findings.push(format!("{before} rows before the header were skipped"));
     }
     if found.repeated > 0 {
         findings
@@ -184,7 +183,7 @@ fn findings(found: &Found<'_>, columns: &[HeadColumn], cell_units: usize) -> Vec
     findings
 }
 
-/// The long name that a list of channels above the table gives: the cell behind the one that holds the name.
+/// The long name in a list of channels above the table: the cell after the name.
 fn listed_name<'a>(preamble: &'a [Vec<String>], name: &str) -> Option<&'a str> {
     let row =
         preamble.iter().find(|row| !name.is_empty() && row.first().is_some_and(|first| first == name))?;
@@ -195,7 +194,7 @@ fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Rows whose header is without the signs by which programs mark it as a comment: `# time, p2`, `% t`, `// t`.
+/// The rows without the comment sign at the start of the header: `# time, p2`, `% t`, `// t`.
 fn without_comment_signs(rows: &[Vec<String>], data_row: usize, length: usize) -> Vec<Vec<String>> {
     let mut rows = rows.to_vec();
     for row in rows.iter_mut().take(data_row) {
@@ -219,7 +218,7 @@ fn group_row(rows: &[Vec<String>], header: &[usize], length: usize) -> Option<us
     let cells = rows.get(row)?;
     let filled: Vec<usize> = (0..cells.len()).filter(|column| !cells[*column].is_empty()).collect();
     let apart = filled.windows(2).all(|pair| pair[1] > pair[0] + 1);
-    // A row of the preamble has a name, and its value next to it.
+    // A row of the preamble has a name with its value next to it.
     let groups = filled.len() > 1 && apart;
     let words = filled.iter().all(|column| cells[*column].chars().any(char::is_alphabetic));
     (groups && words && cells.len() <= length && 2 * filled.len() < length).then_some(row)
@@ -234,7 +233,7 @@ fn distant_units_row(rows: &[Vec<String>], before: usize, length: usize) -> Opti
     })
 }
 
-/// The unit behind the numbers of a column; `None` where cells have none or several.
+/// The unit after the numbers of a column; `None` if there is none, or more than one.
 fn unit_in_cells(rows: &[Vec<String>], column: usize, decimal: u8) -> Option<String> {
     let cells = rows.iter().filter_map(|row| row.get(column)).filter(|cell| !is_missing(cell.as_bytes()));
     let (mut unit, mut with, mut all) = (None, 0usize, 0usize);
@@ -283,7 +282,7 @@ fn header_rows(rows: &[Vec<String>], data_row: usize, length: usize) -> Vec<usiz
         // A row of the preamble has a name and a value.
         cells.len() + 2 >= length && (filled > 2 || filled + 1 >= length)
     };
-    // Something may stand between the header and the data, as the title of a section.
+    // A row such as a section title may be between the header and the data.
     let is_header = |row: &usize| like_a_header(row) && has_words(&rows[*row]);
     let end = (0..data_row.min(rows.len())).rev().find(is_header).map_or(0, |last| last + 1);
     let mut header: Vec<usize> = (0..end).rev().take_while(like_a_header).take(6).collect();
@@ -297,7 +296,7 @@ fn has_words(row: &[String]) -> bool {
 
 fn first_data_row(rows: &[Vec<String>], length: usize, decimal: u8) -> Option<usize> {
     let mut data: Vec<bool> = rows.iter().map(|row| is_data(row, length, decimal)).collect();
-    // Rows of a preamble may hold numbers behind a name, where the table's own rows have a number or a time in that place.
+    // Rows of a preamble may have numbers after a name, but the table's rows start with a number or a time.
     let valued: Vec<bool> = (0..length).map(|column| holds_values(rows, &data, column, decimal)).collect();
     for (row, is) in rows.iter().zip(&mut data) {
         let word = |(column, cell): (usize, &String)| {

@@ -20,15 +20,13 @@ pub(crate) fn guess(head: &[u8]) -> (Encoding, usize) {
     }
 }
 
-/// Whether the bytes are UTF-16 without a byte order mark: in most letters the high byte, the first or the second, is 0 and the
-/// other is not.
+/// Whether the bytes are UTF-16 without a byte order mark: in most letters only the high byte (at offset `high`) is 0.
 fn looks_like_utf16(head: &[u8], high: usize) -> bool {
     let pairs = head.len() / 2;
     let latin = head.chunks_exact(2).filter(|pair| pair[high] == 0 && pair[1 - high] != 0).count();
     pairs >= 8 && latin * 10 >= pairs * 9
 }
 
-/// A cell as text.
 pub(crate) fn text(cell: &[u8], encoding: Encoding) -> String {
     match encoding {
         Encoding::Latin1 => cell.iter().map(|byte| char::from(*byte)).collect(),
@@ -65,7 +63,7 @@ impl<R: Read> Utf16Reader<R> {
             }))
             .collect();
         self.half.drain(..whole);
-        // The first half of a pair waits for the second, unless the input has ended.
+        // A high surrogate waits for its low surrogate, unless the input has ended.
         let waits = count > 0 && units.last().is_some_and(|unit| (0xD800..0xDC00).contains(unit));
         self.surrogate = units.last().copied().filter(|_| waits);
         let ready = units.len() - usize::from(waits);

@@ -7,9 +7,9 @@ use mapper_recording::logs::DateOrder;
 const YEARS: std::ops::RangeInclusive<i64> = 1970..=2200;
 
 /// Maximum length of a date with its time and zone, bytes.
-const MAX_LENGTH: usize = 40;
+const MAX_TEXT_BYTES: usize = 40;
 
-/// Days in [`YEARS`], which bounds durations as well.
+/// Number of days in [`YEARS`], the maximum of durations too.
 const MAX_DAYS: i64 = 84_371;
 
 const NS_PER_S: i64 = 1_000_000_000;
@@ -38,7 +38,7 @@ impl Instant {
 /// time codes), and days before it (`0 days 00:00:10`).
 pub(crate) fn parse_instant(text: &str, order: DateOrder) -> Option<Instant> {
     let text = text.trim();
-    if text.len() > MAX_LENGTH {
+    if text.len() > MAX_TEXT_BYTES {
         return None;
     }
     if let Some(instant) = named_month(text) {
@@ -63,7 +63,7 @@ pub(crate) fn parse_instant(text: &str, order: DateOrder) -> Option<Instant> {
     }
 }
 
-/// The first three letters of the months in English, German, French and Spanish; `jui` begins two of the French ones.
+/// The first three letters of the months in English, German, French and Spanish; `jui` is the start of two French ones.
 const MONTHS: [&[&str]; 12] = [
     &["jan", "ene"],
     &["feb", "fev"],
@@ -79,7 +79,7 @@ const MONTHS: [&[&str]; 12] = [
     &["dec", "dez", "dic"],
 ];
 
-/// `18-Nov-2025`, `Nov 18, 2025` or `2025 Nov 18`, with or without a time of day behind it.
+/// `18-Nov-2025`, `Nov 18, 2025` or `2025 Nov 18`, with or without a time of day after it.
 fn named_month(text: &str) -> Option<Instant> {
     let (first, rest) = split_word(text)?;
     let (second, rest) = split_word(rest)?;
@@ -99,7 +99,7 @@ fn named_month(text: &str) -> Option<Instant> {
     Some(Instant { day: Some(date), ns_of_day })
 }
 
-/// The digits or the letters that a text begins with, and what follows after separators.
+/// The digits or letters at the start of a text, and the rest after separators.
 fn split_word(text: &str) -> Option<(&str, &str)> {
     let digits = text.starts_with(|c: char| c.is_ascii_digit());
     let ends = |c: char| if digits { !c.is_ascii_digit() } else { !c.is_alphabetic() };
@@ -145,7 +145,7 @@ fn day_of_year(text: &str) -> Option<Instant> {
         Some(year) => {
             Instant { day: Some(civil_day(i64::from(year), 1, 1)? + day - 1), ns_of_day: Some(ns_of_day) }
         }
-        // Without a year it is not a date: the days count on.
+        // Without a year it is a count of days, not a date.
         None => Instant { day: None, ns_of_day: Some(day * NS_PER_DAY + ns_of_day) },
     })
 }

@@ -3,17 +3,17 @@
 use mapper_recording::logs::header_unit;
 
 /// Maximum length of a number's text, bytes.
-const LIMIT: usize = 48;
+const MAX_NUMBER_BYTES: usize = 48;
 
 /// Digits before the first thousands separator.
-const FIRST_GROUP: std::ops::RangeInclusive<usize> = 1..=3;
+const FIRST_GROUP_DIGITS: std::ops::RangeInclusive<usize> = 1..=3;
 
-/// From here on a value stands for none: instruments write 9.9e37 for an overload and 9.91e37 for no reading (SCPI-99,
+/// Minimum value that marks a missing reading: instruments write 9.9e37 for an overload and 9.91e37 for no reading (SCPI-99,
 /// section 7.2.1.4 and 7.2.1.5), others 1e30 or the largest number of single precision.
 pub(crate) const NO_READING: f64 = 1e30;
 
-/// The number in a cell; `None` for anything else, including words for infinity and not-a-number and the numbers by which
-/// instruments say that there is none.
+/// The number in a cell; `None` for anything else, including words for infinity and not-a-number, and the
+/// numbers with which instruments mark missing readings.
 ///
 /// Blanks may follow the sign (`+   98.61`), and a Fortran `D` may mark the exponent.
 pub(crate) fn parse_number(cell: &[u8], decimal: u8) -> Option<f64> {
@@ -30,7 +30,7 @@ pub(crate) fn parse_number(cell: &[u8], decimal: u8) -> Option<f64> {
 /// A number without a sign.
 fn parse_digits(cell: &[u8], decimal: u8) -> Option<f64> {
     let starts = cell.first()?;
-    if !(starts.is_ascii_digit() || *starts == decimal) || cell.len() > LIMIT {
+    if !(starts.is_ascii_digit() || *starts == decimal) || cell.len() > MAX_NUMBER_BYTES {
         return None;
     }
     let plain = |bytes: &[u8]| {
@@ -41,9 +41,9 @@ fn parse_digits(cell: &[u8], decimal: u8) -> Option<f64> {
     if decimal == b'.' && !cell.contains(&b',') {
         return plain(cell);
     }
-    // The other of the two separates thousands.
+    // The other sign separates thousands.
     let thousands = if decimal == b',' { b'.' } else { b',' };
-    let mut text = [0u8; LIMIT];
+    let mut text = [0u8; MAX_NUMBER_BYTES];
     let mut length = 0;
     let mut digits_in_group = None;
     let mut fraction = false;
@@ -83,7 +83,7 @@ fn fortran(text: &str) -> Option<f64> {
     format!("{mantissa}e{exponent}").parse().ok()
 }
 
-/// A number with its unit behind it, as in `98.75 kPa`.
+/// A number followed by its unit, as in `98.75 kPa`.
 pub(crate) fn number_with_unit(cell: &str, decimal: u8) -> Option<(f64, &str)> {
     let cell = cell.trim();
     // `1/min` begins with a digit.
@@ -104,20 +104,22 @@ pub(crate) fn number_with_unit(cell: &str, decimal: u8) -> Option<(f64, &str)> {
     Some((parse_number(number.as_bytes(), decimal)?, unit))
 }
 
-/// The number in a cell, with or without a unit behind it.
+/// The number in a cell, with or without a unit after it.
 pub(crate) fn read_number(cell: &str, decimal: u8) -> Option<f64> {
     parse_number(cell.as_bytes(), decimal)
         .or_else(|| number_with_unit(cell, decimal).map(|(number, _)| number))
 }
 
-/// The number in front of this unit; NaN for anything else.
+/// The number before a unit; NaN for anything else.
 pub(crate) fn number_in(cell: &str, decimal: u8, unit: &str) -> f64 {
     number_with_unit(cell, decimal).filter(|(_, found)| *found == unit).map_or(f64::NAN, |(number, _)| number)
 }
 
 /// Whether the text before the first thousands separator is one to three digits of a number that is not 0.
 fn starts_as_thousands(text: &[u8]) -> bool {
-    FIRST_GROUP.contains(&text.len()) && text.iter().all(u8::is_ascii_digit) && text.first() != Some(&b'0')
+    FIRST_GROUP_DIGITS.contains(&text.len())
+        && text.iter().all(u8::is_ascii_digit)
+        && text.first() != Some(&b'0')
 }
 
 /// Whether a cell marks a missing value.

@@ -1,4 +1,4 @@
-//! Separator and decimal sign of a text, found by trial.
+//! Determines separator and decimal sign of a text by trial.
 
 use crate::notation::instant::parse_instant;
 use crate::notation::number::{is_missing, read_number};

@@ -8,7 +8,7 @@ pub(crate) trait Cells {
     /// The number in a cell; NaN without a number.
     fn number(&self, column: usize) -> f64;
 
-    /// The number in a cell that has its unit behind it; NaN without a number and with another unit.
+    /// The number of a cell with this unit after it; NaN without a number, or with another unit.
     fn number_in(&self, column: usize, unit: &str) -> f64;
 
     /// The date or time of day in a cell.
@@ -17,7 +17,7 @@ pub(crate) trait Cells {
 
 /// Rows one after the other.
 pub(crate) trait Rows: Cells {
-    /// Goes to the next row; `false` after the last one.
+    /// Advances to the next row; `false` after the last one.
     ///
     /// # Errors
     /// [`LogError`] if the file cannot be read further.

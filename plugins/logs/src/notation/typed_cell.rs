@@ -24,7 +24,7 @@ impl Value {
         }
     }
 
-    /// The number in it; NaN without a number, and for those that stand for none.
+    /// The number in it; NaN without a number, and for marks of missing values.
     pub(crate) fn number(&self, decimal: u8) -> f64 {
         match self {
             Value::Number(value) if value.abs() < NO_READING => *value,
@@ -33,7 +33,7 @@ impl Value {
         }
     }
 
-    /// Memory that its text takes, bytes.
+    /// Size of its text, bytes.
     pub(crate) fn size(&self) -> usize {
         size_of::<Value>() + if let Value::Text(text) = self { text.len() } else { 0 }
     }

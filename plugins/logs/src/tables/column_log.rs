@@ -1,22 +1,20 @@
 //! A log whose columns are in memory, in one or several tables.
 
+use crate::columns::sample::HEAD_ROWS;
 use crate::tables::column_rows::{Chunk, Chunks, ColumnRows};
-use crate::tables::several_tables::{Part, side_by_side};
+use crate::tables::joined_tables::{Part, join_tables};
 use crate::tables::table_log::{Origin, Table};
 use mapper_recording::logs::{Layout, Log, LogError, LogFile, LogOptions, Row, RowSink};
 
-/// Rows of a table in the sample.
-const HEAD_ROWS: usize = 400;
-
 /// Columns of equal length.
 pub(crate) struct ColumnTable {
-    /// For people.
+    /// Title in messages.
     pub(crate) title: String,
     /// Names, and units if any is known.
     pub(crate) head: Vec<Vec<String>>,
     pub(crate) rows: usize,
     pub(crate) columns: Vec<Chunk>,
-    /// The column that the file calls the independent one.
+    /// The column that the file marks as independent.
     pub(crate) clock: Option<String>,
 }
 
@@ -29,11 +27,10 @@ impl ColumnTable {
 struct ColumnLog {
     layout: Layout,
     parts: Vec<Part>,
-    /// The table of each part.
     tables: Vec<ColumnTable>,
 }
 
-/// The log of tables; `word` is the format's term for a table, `problems` says what else is in the file.
+/// The log of tables. `word` is the format's term for a table; `problems` lists unread parts of the file.
 ///
 /// # Errors
 /// [`LogError`] if no table has a clock.
@@ -49,15 +46,15 @@ pub(crate) fn column_log(
         let head = table.rows().texts(HEAD_ROWS)?;
         let own = LogOptions { time: table.clock.iter().cloned().collect(), ..options.clone() };
         let options = if options.time.is_empty() { &own } else { options };
-        match Table::look(&head, b'.', options, Origin::Columns) {
+        match Table::analyse(&head, b'.', options, Origin::Columns) {
             Ok(looked) => {
                 found.push((table.title.clone(), looked));
                 kept.push(table);
             }
-            Err(problem) => problems.push(format!("{word} `{}` is passed over: {problem}", table.title)),
+            Err(problem) => problems.push(format!("{word} `{}` was skipped: {problem}", table.title)),
         }
     }
-    let (layout, parts) = side_by_side(word, found, problems).map_err(|why| file.content(name, why))?;
+    let (layout, parts) = join_tables(word, found, problems).map_err(|why| file.content_error(name, why))?;
     Ok(Box::new(ColumnLog { layout, parts, tables: kept }))
 }
 
@@ -72,7 +69,7 @@ impl Log for ColumnLog {
             if own.is_empty() {
                 continue;
             }
-            let mut of_file = |row: Row<'_>| part.give(row, sink);
+            let mut of_file = |row: Row<'_>| part.forward_row(row, sink);
             self.layout.add_finding(part.table.rows(&mut table.rows(), &own, &mut of_file)?);
         }
         Ok(())

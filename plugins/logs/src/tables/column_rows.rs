@@ -6,7 +6,7 @@ use crate::notation::table_row::{Cells, Rows};
 use crate::notation::typed_cell::Value;
 use mapper_recording::logs::{DateOrder, LogError};
 
-/// Some rows of a column. Rows after its end are empty.
+/// Rows of a column; rows after its end are empty.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(not(feature = "parquet"), allow(dead_code, reason = "MATLAB data have numbers only"))]
 pub(crate) enum Chunk {
@@ -37,7 +37,7 @@ pub(crate) trait Chunks {
     fn next_chunk(&mut self) -> Result<Option<(usize, Vec<Chunk>)>, LogError>;
 }
 
-/// See the module. The header comes first, as rows of text.
+/// Presents columns as rows of a table, after the header as rows of text.
 pub(crate) struct ColumnRows<C> {
     chunks: C,
     head: Vec<Vec<String>>,
@@ -50,7 +50,7 @@ pub(crate) struct ColumnRows<C> {
 }
 
 impl<C: Chunks> ColumnRows<C> {
-    /// Names, and units if any is known, above the columns.
+    /// `head`: names above the columns, and units if any is known.
     pub(crate) fn new(head: Vec<Vec<String>>, chunks: C) -> Self {
         ColumnRows { chunks, head, head_at: 0, chunk: Vec::new(), count: 0, at: 0 }
     }

@@ -1,4 +1,4 @@
-//! Tables in long form: each row has a time, the name of a quantity, and its value. They are read as if each quantity had a column.
+//! Tables in long form, whose rows have a time, the name of a quantity and its value: read as if each quantity had a column.
 
 use crate::notation::instant::{Instant, parse_instant};
 use crate::notation::number::{is_missing, number_in, read_number};
@@ -8,18 +8,16 @@ use crate::tables::table_log::Table;
 use mapper_recording::logs::{DateOrder, LogError, header_unit};
 use std::collections::BTreeSet;
 
-/// Maximum number of quantities.
-const NAME_LIMIT: usize = 1000;
+const MAX_NAMES: usize = 1000;
 
-/// Minimum rows of the sample per quantity; with fewer the column does not contain names.
-const REPEATS: usize = 3;
+/// Minimum number of rows per name in the sample; with fewer the column does not contain names.
+const MIN_ROWS_PER_NAME: usize = 3;
 
-/// Where a column names the quantity, the name changes from row to row in at least this share of the rows. A column with the state
-/// of a stand keeps its word for many rows.
-const CHANGES: f64 = 0.5;
+/// Minimum share of rows in which the name differs from the previous row's. The state of a stand is constant over many rows.
+const MIN_CHANGE_SHARE: f64 = 0.5;
 
 /// Maximum further numbers in a row, such as a quality, in addition to time, name and value.
-const FURTHER_NUMBERS: usize = 2;
+const MAX_FURTHER_NUMBERS: usize = 2;
 
 /// Columns of a table in long form.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,7 +35,7 @@ pub(crate) struct LongForm {
 }
 
 impl LongForm {
-    /// Recognises a table in long form; `table` is what the sample gives when it is read unchanged.
+    /// Recognises a table in long form; `table` is the analysis of the unchanged sample.
     pub(crate) fn find(rows: &[Vec<String>], table: &Table, decimal: u8) -> Option<LongForm> {
         let data_row = table.data_row();
         let data = rows.get(data_row..)?;
@@ -61,11 +59,11 @@ impl LongForm {
         let count = distinct(name);
         let names_of_rows: Vec<&String> = column(name).collect();
         let changes = names_of_rows.windows(2).filter(|pair| pair[0] != pair[1]).count() as f64;
-        if changes < CHANGES * names_of_rows.len() as f64
-            || numbers.len() > 1 + FURTHER_NUMBERS
+        if changes < MIN_CHANGE_SHARE * names_of_rows.len() as f64
+            || numbers.len() > 1 + MAX_FURTHER_NUMBERS
             || clock.is_empty()
-            || !(2..=NAME_LIMIT).contains(&count)
-            || REPEATS * count > data.len()
+            || !(2..=MAX_NAMES).contains(&count)
+            || MIN_ROWS_PER_NAME * count > data.len()
         {
             return None;
         }
@@ -84,7 +82,7 @@ impl LongForm {
         Some(LongForm { clock, name, value, data_row, header: heads, names })
     }
 
-    /// In words, for what was found.
+    /// Describes the form, for the findings.
     pub(crate) fn words(&self, rows: &[Vec<String>]) -> String {
         let cell = |at: usize| {
             let header = self.data_row.checked_sub(1).and_then(|row| rows.get(row));
@@ -100,7 +98,7 @@ impl LongForm {
 
     /// The sample with a column for each quantity.
     pub(crate) fn wide(&self, rows: &[Vec<String>]) -> Vec<Vec<String>> {
-        let mut gathered = Gathered::new(self);
+        let mut gathered = WideRow::new(self);
         let mut wide = vec![self.header.clone()];
         for row in rows.get(self.data_row..).unwrap_or_default() {
             wide.extend(gathered.take(self, row));
@@ -110,18 +108,18 @@ impl LongForm {
     }
 }
 
-/// The row that is being gathered: the time, then the values.
-struct Gathered {
+/// A row of the wide table that is being collected: the time, then the values.
+struct WideRow {
     row: Vec<String>,
     filled: bool,
 }
 
-impl Gathered {
+impl WideRow {
     fn new(form: &LongForm) -> Self {
-        Gathered { row: vec![String::new(); form.names.len() + 1], filled: false }
+        WideRow { row: vec![String::new(); form.names.len() + 1], filled: false }
     }
 
-    /// Takes a row of the file; returns the gathered row if a new one begins.
+    /// Adds a row of the file; returns the finished row if a new one begins.
     fn take(&mut self, form: &LongForm, row: &[String]) -> Option<Vec<String>> {
         let cell = |at: usize| row.get(at).map_or("", String::as_str);
         let at = form.names.iter().position(|name| name == cell(form.name))? + 1;
@@ -139,7 +137,7 @@ impl Gathered {
         done
     }
 
-    /// The gathered row, if there is any.
+    /// The last row, if there is any.
     fn rest(&mut self) -> Option<Vec<String>> {
         let empty = vec![String::new(); self.row.len()];
         let row = std::mem::replace(&mut self.row, empty);
@@ -147,21 +145,21 @@ impl Gathered {
     }
 }
 
-/// The rows of a file in long form, gathered.
+/// Rows of the wide table of a file in long form.
 pub(crate) struct LongRows {
     stream: RowStream,
     form: LongForm,
     decimal: u8,
-    gathered: Gathered,
+    gathered: WideRow,
     row: Vec<String>,
-    /// Rows of the file before its data that are still to be passed over; `None` before the header was returned.
+    /// Rows of the file to skip before its data; `None` before the header was returned.
     before: Option<usize>,
     ended: bool,
 }
 
 impl LongRows {
     pub(crate) fn new(stream: RowStream, form: LongForm, decimal: u8) -> Self {
-        let gathered = Gathered::new(&form);
+        let gathered = WideRow::new(&form);
         LongRows { stream, gathered, row: Vec::new(), before: None, ended: false, form, decimal }
     }
 

@@ -2,10 +2,10 @@
 
 pub(crate) mod column_log;
 pub(crate) mod column_rows;
+pub(crate) mod joined_tables;
 pub(crate) mod long_table;
 #[cfg(feature = "parquet")]
 pub(crate) mod record_batches;
 pub(crate) mod row_sorter;
 pub(crate) mod row_stream;
-pub(crate) mod several_tables;
 pub(crate) mod table_log;

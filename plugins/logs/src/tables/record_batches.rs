@@ -1,6 +1,7 @@
 //! Record batches of Arrow and Parquet, as the rows of one table.
 
-use crate::columns::table_head::COLUMN_LIMIT;
+use crate::columns::sample::HEAD_ROWS;
+use crate::columns::table_head::MAX_COLUMNS;
 use crate::notation::instant::{Instant, NS_PER_DAY};
 use crate::tables::column_rows::{Chunk, Chunks, ColumnRows};
 use crate::tables::table_log::{Origin, Table};
@@ -18,10 +19,6 @@ use arrow_schema::{ArrowError, DataType, Field, Schema, TimeUnit};
 use mapper_recording::logs::{Layout, Log, LogError, LogFile, LogOptions, RowSink};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Number of rows in the sample.
-const HEAD_ROWS: usize = 400;
-
-/// The batches of a file.
 pub(crate) type Batches = Box<dyn Iterator<Item = Result<RecordBatch, ArrowError>>>;
 
 /// Opens a file from its start: its schema and its batches.
@@ -34,7 +31,6 @@ struct BatchLog {
     table: Table,
 }
 
-/// A file of batches as a log.
 pub(crate) fn open_log(
     name: &'static str,
     file: &LogFile,
@@ -42,22 +38,24 @@ pub(crate) fn open_log(
     open: OpenBatches,
 ) -> Result<Box<dyn Log>, LogError> {
     options
-        .only(&["time", "time_unit", "date_order", "rate", "missing"])
-        .map_err(|why| file.content(name, why))?;
-    let (schema, batches) = contained(name, file, || open(file))?;
+        .allow_only(&["time", "time_unit", "date_order", "rate", "missing"])
+        .map_err(|why| file.content_error(name, why))?;
+    let (schema, batches) = catch_panic(name, file, || open(file))?;
     let columns = schema.fields().len();
-    if columns > COLUMN_LIMIT {
-        return Err(file.content(name, format!("it has {columns} columns; at most {COLUMN_LIMIT} are read")));
+    if columns > MAX_COLUMNS {
+        return Err(
+            file.content_error(name, format!("it has {columns} columns; at most {MAX_COLUMNS} are read"))
+        );
     }
     let chunks = BatchChunks { file, name, batches };
     let rows = ColumnRows::new(head(&schema), chunks).texts(HEAD_ROWS)?;
     let mut table =
-        Table::look(&rows, b'.', options, Origin::Columns).map_err(|why| file.content(name, why))?;
+        Table::analyse(&rows, b'.', options, Origin::Columns).map_err(|why| file.content_error(name, why))?;
     let unread = schema.fields().iter().filter(|field| !is_read(field.data_type())).count();
     if unread > 0 {
         let findings = &mut table.layout.findings;
         findings
-            .push(format!("{unread} columns are left out: lists, structures, or of a type that is not read"));
+            .push(format!("{unread} columns were left out: lists, structures, or of an unsupported type"));
     }
     Ok(Box::new(BatchLog { file: file.clone(), name, open, table }))
 }
@@ -76,7 +74,7 @@ impl Log for BatchLog {
     }
 
     fn rows(&mut self, wanted: &[usize], sink: &mut RowSink<'_>) -> Result<(), LogError> {
-        let (schema, batches) = contained(self.name, &self.file, || (self.open)(&self.file))?;
+        let (schema, batches) = catch_panic(self.name, &self.file, || (self.open)(&self.file))?;
         let chunks = BatchChunks { file: &self.file, name: self.name, batches };
         let remark = self.table.rows(&mut ColumnRows::new(head(&schema), chunks), wanted, sink)?;
         self.table.layout.add_finding(remark);
@@ -93,9 +91,9 @@ struct BatchChunks<'a> {
 impl Chunks for BatchChunks<'_> {
     fn next_chunk(&mut self) -> Result<Option<(usize, Vec<Chunk>)>, LogError> {
         let BatchChunks { file, name, batches } = self;
-        contained(name, file, || {
+        catch_panic(name, file, || {
             let Some(batch) = batches.next() else { return Ok(None) };
-            let batch = batch.map_err(|error| file.content(name, error.to_string()))?;
+            let batch = batch.map_err(|error| file.content_error(name, error.to_string()))?;
             Ok(Some((
                 batch.num_rows(),
                 batch.columns().iter().map(|column| chunk(column.as_ref())).collect(),
@@ -104,15 +102,15 @@ impl Chunks for BatchChunks<'_> {
     }
 }
 
-/// Arrow's libraries check sizes and offsets by panicking (one damaged file in a hundred, found by flipping bytes). A panic is
-/// reported as an error of the file. Its intermediate state is dropped, never reused.
-fn contained<T>(
+/// Reports a panic as an error of the file: Arrow's libraries panic on wrong sizes and offsets (one in a hundred files with flipped bytes).
+/// The intermediate state is dropped, never reused.
+fn catch_panic<T>(
     name: &'static str,
     file: &LogFile,
     reading: impl FnOnce() -> Result<T, LogError>,
 ) -> Result<T, LogError> {
     let damaged =
-        || file.content(name, "it is damaged: a size or an offset in it cannot be; export it again");
+        || file.content_error(name, "it is damaged: a size or an offset in it is invalid; export it again");
     catch_unwind(AssertUnwindSafe(reading)).unwrap_or_else(|_| Err(damaged()))
 }
 
@@ -137,7 +135,7 @@ fn chunk(array: &dyn Array) -> Chunk {
         T::Int8 => numbers::<Int8Type>(array, f64::from),
         T::Int16 => numbers::<Int16Type>(array, f64::from),
         T::Int32 => numbers::<Int32Type>(array, f64::from),
-        // Counts beyond 2^53 lose their last digit, as everywhere.
+        // Counts above 2^53 lose their last digit.
         T::Int64 => numbers::<Int64Type>(array, |value| value as f64),
         T::UInt8 => numbers::<UInt8Type>(array, f64::from),
         T::UInt16 => numbers::<UInt16Type>(array, f64::from),
@@ -186,7 +184,7 @@ where
     let instant = |value: T::Native| {
         let ns = i64::from(value).checked_mul(unit_ns)?;
         let day = dated.then(|| ns.div_euclid(NS_PER_DAY));
-        // Logs from before 1970 do not exist.
+        // Dates before 1970 are invalid.
         (ns >= 0).then_some(Instant { day, ns_of_day: Some(ns.rem_euclid(NS_PER_DAY)) })
     };
     Chunk::Instants(array.as_primitive::<T>().iter().map(|value| value.and_then(instant)).collect())

@@ -1,4 +1,4 @@
-//! The lines of a delimited file, one after the other.
+//! Reads the lines of a delimited file one after the other.
 
 use crate::notation::encoding::{self, Utf16Reader};
 use crate::notation::instant::{Instant, parse_instant};
@@ -11,7 +11,7 @@ use std::ops::Range;
 use std::rc::Rc;
 
 /// Maximum length of a line, bytes: an unclosed quote would otherwise extend to the end of the file.
-const LINE_LIMIT: usize = 1 << 20;
+const MAX_LINE_BYTES: usize = 1 << 20;
 
 /// Notation of a delimited file.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,23 +24,23 @@ pub(crate) struct Dialect {
 }
 
 /// Counts bytes since the last complete line.
-struct Limited<R> {
+struct LineLimiter<R> {
     inner: R,
     left: Rc<Cell<usize>>,
 }
 
-impl<R: Read> Read for Limited<R> {
+impl<R: Read> Read for LineLimiter<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let count = self.inner.read(buffer)?;
         let left = self.left.get().checked_sub(count);
-        self.left.set(
-            left.ok_or_else(|| io::Error::other("a line is longer than 1 MiB; is a quote never closed?"))?,
-        );
+        self.left.set(left.ok_or_else(|| {
+            io::Error::other("a line is longer than 1 MiB; look for a quote without an end")
+        })?);
         Ok(count)
     }
 }
 
-/// See the module.
+/// The rows of a delimited file.
 pub(crate) struct RowStream {
     file: LogFile,
     reader: csv::Reader<Box<dyn Read>>,
@@ -58,16 +58,16 @@ impl RowStream {
 
     /// The rows in a range of the file.
     pub(crate) fn over(file: &LogFile, mut bytes: Box<dyn Read>, dialect: Dialect) -> Self {
-        let left = Rc::new(Cell::new(LINE_LIMIT));
+        let left = Rc::new(Cell::new(MAX_LINE_BYTES));
         let mark = u64::try_from(dialect.mark).unwrap_or(0);
-        // An error in the mark shows at the first line.
+        // An error in the mark appears at the first line.
         drop(io::copy(&mut bytes.by_ref().take(mark), &mut io::sink()));
         let text: Box<dyn Read> = match dialect.encoding {
             Encoding::Utf16Le => Box::new(Utf16Reader::new(bytes, false)),
             Encoding::Utf16Be => Box::new(Utf16Reader::new(bytes, true)),
             Encoding::Utf8 | Encoding::Latin1 => bytes,
         };
-        let limited: Box<dyn Read> = Box::new(Limited { inner: text, left: left.clone() });
+        let limited: Box<dyn Read> = Box::new(LineLimiter { inner: text, left: left.clone() });
         let reader = csv::ReaderBuilder::new()
             .delimiter(dialect.separator)
             .has_headers(false)
@@ -89,7 +89,7 @@ impl RowStream {
         at.and_then(|at| self.record.get(at)).unwrap_or_default()
     }
 
-    /// Where each cell of a row between blanks begins and ends, bytes of the line.
+    /// Start and end of each cell of a row between blanks, bytes from the start of the line.
     pub(crate) fn spans(&self) -> Vec<Range<usize>> {
         let mut start = 0;
         let mut spans = Vec::new();
@@ -124,7 +124,7 @@ impl Cells for RowStream {
     fn instant(&self, column: usize, order: DateOrder) -> Option<Instant> {
         match std::str::from_utf8(self.cell(column)) {
             Ok(text) => parse_instant(text, order),
-            // Names of months in Latin-1.
+            // Names of months may be in Latin-1.
             Err(_) => parse_instant(&encoding::text(self.cell(column), self.dialect.encoding), order),
         }
     }
@@ -134,9 +134,9 @@ impl Rows for RowStream {
     /// Skips rows without any cell.
     fn advance(&mut self) -> Result<bool, LogError> {
         loop {
-            self.left.set(LINE_LIMIT);
+            self.left.set(MAX_LINE_BYTES);
             let more = self.reader.read_byte_record(&mut self.record).map_err(|error| {
-                self.file.error(match error.into_kind() {
+                self.file.read_error(match error.into_kind() {
                     csv::ErrorKind::Io(error) => error,
                     other => io::Error::other(format!("{other:?}")),
                 })

@@ -3,30 +3,28 @@
 use crate::columns::clock::ClockHand;
 use crate::columns::clock_choice::{Clocks, choose};
 use crate::columns::sample::Sample;
-use crate::columns::table_head::{TableHead, look};
+use crate::columns::table_head::{TableHead, analyse_head};
 use crate::notation::instant::Instant;
 use crate::notation::table_row::{Cells, Rows};
 use crate::tables::row_sorter::RowSorter;
 use mapper_recording::logs::{Column, DateOrder, Layout, LogError, LogOptions, Row, RowSink};
 use std::collections::BTreeMap;
 
-/// A group while its rows are read.
-struct Rolling {
+struct GroupReader {
     group: usize,
     hand: ClockHand,
-    /// Of a group whose rows are out of order.
     sorter: Option<RowSorter>,
     sources: Vec<usize>,
     values: Vec<f64>,
 }
 
-/// A row some of whose columns have their unit behind each number.
-struct InUnits<'a> {
+/// A row with columns that have their unit after each number.
+struct CellsWithUnits<'a> {
     row: &'a dyn Rows,
     units: &'a BTreeMap<usize, String>,
 }
 
-impl Cells for InUnits<'_> {
+impl Cells for CellsWithUnits<'_> {
     fn number(&self, column: usize) -> f64 {
         match self.units.get(&column) {
             None => self.row.number(column),
@@ -52,31 +50,31 @@ pub(crate) struct Table {
     sources: Vec<usize>,
     data_row: usize,
     missing: Vec<f64>,
-    /// Unit behind each number of a column, where cells have one.
+    /// Unit after each number of a column, if the cells have one.
     cell_units: BTreeMap<usize, String>,
 }
 
-/// Where a table comes from.
+/// Source of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Origin {
     /// A text or a sheet: its head is in rows.
     Rows,
     /// A file of columns, which has no rows of a head.
     Columns,
-    /// As `Columns`; the file gives the interval of the samples too.
+    /// As `Columns`, with the interval of the samples from the file.
     #[cfg_attr(not(feature = "tdms"), allow(dead_code, reason = "only TDMS has waveforms"))]
     Waveform,
 }
 
 impl Table {
-    /// Analyses the first rows of a table.
-    pub(crate) fn look(
+    pub(crate) fn analyse(
         rows: &[Vec<String>],
         decimal: u8,
         options: &LogOptions,
         origin: Origin,
     ) -> Result<Table, String> {
-        let TableHead { columns, data_row, cell_units, head, mut findings } = look(rows, decimal, options)?;
+        let TableHead { columns, data_row, cell_units, head, mut findings } =
+            analyse_head(rows, decimal, options)?;
         if origin == Origin::Rows {
             findings.insert(0, head);
         }
@@ -122,7 +120,7 @@ impl Table {
         self.sources.iter().copied().zip(self.layout.columns.iter().map(|column| column.name.as_str()))
     }
 
-    /// Gives the rows of the wanted columns, and returns a remark on their clock; `rows` must be before the first row of the table.
+    /// Forwards the rows of the requested columns, and returns a remark on their clock; `rows` must be before the table's first row.
     pub(crate) fn rows(
         &self,
         rows: &mut dyn Rows,
@@ -134,7 +132,7 @@ impl Table {
                 return Ok(None);
             }
         }
-        let mut groups: Vec<Rolling> = Vec::new();
+        let mut groups: Vec<GroupReader> = Vec::new();
         for (index, (_, clock)) in self.clocks.groups.iter().enumerate() {
             let of_group = |column: &&usize| {
                 self.layout.columns.get(**column).is_some_and(|column| column.group == index)
@@ -145,7 +143,7 @@ impl Table {
                 .filter_map(|column| self.sources.get(*column).copied())
                 .collect();
             if !sources.is_empty() {
-                groups.push(Rolling {
+                groups.push(GroupReader {
                     group: index,
                     sorter: clock.disordered.then(RowSorter::default),
                     hand: ClockHand::new(clock.clone()),
@@ -155,7 +153,7 @@ impl Table {
             }
         }
         while rows.advance()? {
-            let row = InUnits { row: &*rows, units: &self.cell_units };
+            let row = CellsWithUnits { row: &*rows, units: &self.cell_units };
             for rolling in &mut groups {
                 let Some(t_s) = rolling.hand.time_s(&row) else { continue };
                 rolling.values.clear();

@@ -1,7 +1,7 @@
 //! Checks the unpacked size of a workbook, since the library unpacks it without limits.
 
 use super::NAME;
-use mapper_recording::logs::limits::unpacked_max;
+use mapper_recording::logs::limits::max_unpacked_bytes;
 use mapper_recording::logs::{LogError, LogFile};
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
@@ -10,22 +10,21 @@ use std::io::{self, BufReader, Read};
 use std::rc::Rc;
 
 /// Maximum unpacked size of a part other than a sheet, bytes: the library holds all of it in memory.
-const PART_LIMIT: u64 = 128 << 20;
+const MAX_PART_BYTES: u64 = 128 << 20;
 
 /// Maximum unpacked size of the part with cell formats, bytes: each format copies its strings.
-const STYLES_LIMIT: u64 = 8 << 20;
+const MAX_STYLES_BYTES: u64 = 8 << 20;
 
-/// Maximum number of parts.
-const PART_COUNT_LIMIT: usize = 10_000;
+const MAX_PARTS: usize = 10_000;
 
 /// Maximum length of a tag, of a piece between two tags and of a cell, bytes: Excel's own limit of a cell is 32 767 letters.
-const PIECE_LIMIT: u64 = 1 << 20;
+const MAX_PIECE_BYTES: u64 = 1 << 20;
 
 /// Maximum length of a tag among the formats of cells, bytes: Excel's own limit of a number format is 255 letters.
-const STYLE_PIECE_LIMIT: u64 = 1 << 12;
+const MAX_STYLE_PIECE_BYTES: u64 = 1 << 12;
 
 /// Maximum nesting of elements: a cell of rich text has ten levels.
-const DEPTH_LIMIT: usize = 64;
+const MAX_DEPTH: usize = 64;
 
 /// Minimum size of a shared string in bytes, `<si/>`.
 const SHARED_STRING_BYTES: u64 = 5;
@@ -53,24 +52,24 @@ impl Kind {
     fn limit(self) -> u64 {
         match self {
             Kind::Sheet => u64::MAX,
-            Kind::Styles => STYLES_LIMIT,
-            Kind::SharedStrings | Kind::Other => PART_LIMIT,
+            Kind::Styles => MAX_STYLES_BYTES,
+            Kind::SharedStrings | Kind::Other => MAX_PART_BYTES,
         }
     }
 }
 
 /// Refuses a workbook that would exceed the memory when unpacked.
 pub(super) fn check(file: &LogFile) -> Result<(), LogError> {
-    let refused = |message: String| file.content(NAME, message);
+    let refused = |message: String| file.content_error(NAME, message);
     let wrong = |error: zip::result::ZipError| refused(error.to_string());
     let mut archive = zip::ZipArchive::new(file.open()?).map_err(wrong)?;
-    if archive.len() > PART_COUNT_LIMIT {
-        return Err(refused(format!("it has {} parts; at most {PART_COUNT_LIMIT} are read", archive.len())));
+    if archive.len() > MAX_PARTS {
+        return Err(refused(format!("it has {} parts; at most {MAX_PARTS} are read", archive.len())));
     }
     if archive.has_overlapping_files().map_err(wrong)? {
         return Err(refused("its parts overlap: the same bytes are unpacked several times".to_owned()));
     }
-    let whole = unpacked_max(file.size_bytes()?);
+    let whole = max_unpacked_bytes(file.size_bytes()?);
     let mut left = whole;
     for index in 0..archive.len() {
         let part = archive.by_index(index).map_err(wrong)?;
@@ -96,13 +95,13 @@ fn check_part(part: impl Read, kind: Kind, left: u64) -> Result<u64, String> {
     let read = Rc::new(Cell::new(0));
     let piece = Rc::new(Cell::new(0));
     let mut counted =
-        Counted { inner: part.take(limit.saturating_add(1)), read: read.clone(), piece: piece.clone() };
+        LimitedReader { inner: part.take(limit.saturating_add(1)), read: read.clone(), piece: piece.clone() };
     if kind == Kind::Other {
         io::copy(&mut counted, &mut io::sink()).map_err(|error| error.to_string())?;
     } else {
-        // Bytes read ahead by the buffer belong to no piece.
+        // Bytes that the buffer read ahead do not belong to a piece.
         let buffer = 1 << 13;
-        let pieces = Pieces { kind, read: read.clone(), piece, buffer: buffer as u64 };
+        let pieces = PieceChecker { kind, read: read.clone(), piece, buffer: buffer as u64 };
         let found = pieces.check(Reader::from_reader(BufReader::with_capacity(buffer, counted)));
         if read.get() <= limit {
             found?;
@@ -112,14 +111,14 @@ fn check_part(part: impl Read, kind: Kind, left: u64) -> Result<u64, String> {
 }
 
 /// Counts bytes, and stops reading if one piece is too long.
-struct Counted<R> {
+struct LimitedReader<R> {
     inner: R,
     read: Rc<Cell<u64>>,
     /// Maximum end of the current piece, bytes from the start; 0 for no limit.
     piece: Rc<Cell<u64>>,
 }
 
-impl<R: Read> Read for Counted<R> {
+impl<R: Read> Read for LimitedReader<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         if self.piece.get() > 0 && self.read.get() > self.piece.get() {
             return Err(io::Error::other("has a cell, a text or a tag that is too long"));
@@ -130,20 +129,20 @@ impl<R: Read> Read for Counted<R> {
     }
 }
 
-struct Pieces {
+struct PieceChecker {
     kind: Kind,
     read: Rc<Cell<u64>>,
     piece: Rc<Cell<u64>>,
     buffer: u64,
 }
 
-impl Pieces {
+impl PieceChecker {
     fn check<R: io::BufRead>(&self, mut xml: Reader<R>) -> Result<(), String> {
         let piece_limit = match self.kind {
-            Kind::Sheet => PIECE_LIMIT,
-            Kind::Styles => STYLE_PIECE_LIMIT,
+            Kind::Sheet => MAX_PIECE_BYTES,
+            Kind::Styles => MAX_STYLE_PIECE_BYTES,
             // Shared strings are truncated where they are used.
-            Kind::SharedStrings | Kind::Other => PART_LIMIT,
+            Kind::SharedStrings | Kind::Other => MAX_PART_BYTES,
         };
         let (mut buffer, mut depth) = (Vec::new(), 0usize);
         // Depth of the current cell: texts of several pieces are joined there.
@@ -174,8 +173,8 @@ impl Pieces {
                 Event::Eof => break,
                 _ => {}
             }
-            if depth > DEPTH_LIMIT {
-                return Err(format!("has more than {DEPTH_LIMIT} elements within each other"));
+            if depth > MAX_DEPTH {
+                return Err(format!("has more than {MAX_DEPTH} elements within each other"));
             }
         }
         if strings > self.read.get() / SHARED_STRING_BYTES {
@@ -184,7 +183,7 @@ impl Pieces {
         Ok(())
     }
 
-    /// The maximum declared number of shared strings, which the library reserves memory for.
+    /// The declared number of shared strings, for which the library reserves memory.
     fn declared_strings(&self, tag: &BytesStart<'_>, before: u64) -> Result<u64, String> {
         if self.kind != Kind::SharedStrings || tag.local_name().as_ref() != "sst" {
             return Ok(before);

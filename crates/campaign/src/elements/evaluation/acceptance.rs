@@ -1,7 +1,7 @@
 //! `acceptance:`
 
 use crate::elements::output::report::SensorSymbol;
-use crate::si_values::or;
+use crate::si_values::value_or;
 use crate::units::{Duration, Fraction, Quantity};
 use mapper_core::{ACCEPTANCE_WINDOW_S, AcceptanceCriteria, Channel};
 use schemars::JsonSchema;
@@ -58,7 +58,7 @@ impl From<AcceptanceFile> for AcceptanceCriteria {
             AcceptanceFile::Own(own) => AcceptanceCriteria {
                 name: own.name,
                 source: own.source,
-                window_s: or(own.window, ACCEPTANCE_WINDOW_S),
+                window_s: value_or(own.window, ACCEPTANCE_WINDOW_S),
                 fluctuation_ratio: own
                     .fluctuation
                     .into_iter()

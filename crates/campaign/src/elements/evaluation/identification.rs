@@ -6,7 +6,7 @@ use mapper_core::{ALPHA_AREA_SIGMA_RATIO, JointSettings, Method, SettleBands, Wi
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How points are identified.
+/// Settings of the identification.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Identification {
     /// Method.
@@ -51,7 +51,7 @@ pub(crate) struct IdentificationFile {
 /// The methods that a campaign may choose.
 #[derive(JsonSchema)]
 #[serde(rename_all = "snake_case")]
-#[expect(dead_code, reason = "stands for its schema alone: a map that was read has a method more")]
+#[expect(dead_code, reason = "only its schema is used: `Method` has a further variant for imported maps")]
 enum MethodName {
     Dynamic,
     Joint,

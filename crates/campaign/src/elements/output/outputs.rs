@@ -3,10 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Parent of the run directories if the file gives none.
-const USUAL_DIRECTORY: &str = "runs";
-/// Output formats if the file gives none.
-const USUAL_FORMATS: [&str; 4] = ["csv", "json", "svg", "fitted"];
+const DEFAULT_DIRECTORY: &str = "runs";
+const DEFAULT_FORMATS: [&str; 4] = ["csv", "json", "svg", "fitted"];
 
 /// Formats and directory of the results.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -20,8 +18,7 @@ pub struct Outputs {
     pub formats: Vec<FormatName>,
 }
 
-/// A format of the map by its name, e.g. `csv`. The owner of the table of formats knows the valid names;
-/// [`crate::format_mistake`] reports any other name.
+/// Name of a map format, e.g. `csv`. The caller knows the valid names; [`crate::format_mistake`] reports any other one.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]
 #[schemars(inline)]
@@ -43,8 +40,8 @@ impl std::fmt::Display for FormatName {
 impl Default for Outputs {
     fn default() -> Self {
         Outputs {
-            directory: USUAL_DIRECTORY.to_owned(),
-            formats: USUAL_FORMATS.map(|name| FormatName(name.to_owned())).to_vec(),
+            directory: DEFAULT_DIRECTORY.to_owned(),
+            formats: DEFAULT_FORMATS.map(|name| FormatName(name.to_owned())).to_vec(),
         }
     }
 }

@@ -3,7 +3,7 @@
 use crate::checking::Check;
 use crate::elements::rig::calibration::{Date, check_date};
 use crate::elements::rig::sensors::CALIBRATED;
-use crate::si_values::si_if_given;
+use crate::si_values::optional_si;
 use crate::units::{Fraction, Pressure, Quantity, Temperature};
 use mapper_core::Channel;
 use mapper_physics::gas::air::Air;
@@ -34,18 +34,18 @@ pub struct Report {
     #[schemars(with = "BTreeMap<SensorSymbol, Date>")]
     pub calibration: BTreeMap<Channel, Date>,
     /// Barometric pressure in the cell.
-    #[serde(rename(deserialize = "barometer"), default, deserialize_with = "si_if_given::<Pressure, _>")]
+    #[serde(rename(deserialize = "barometer"), default, deserialize_with = "optional_si::<Pressure, _>")]
     #[schemars(with = "Option<Quantity<Pressure>>", extend("x-min" = "50 kPa", "x-max" = "120 kPa"))]
     pub barometer_pa: Option<f64>,
     /// Relative humidity in the cell, whose air the compressor takes in. The air is dry if none is given.
-    #[serde(rename(deserialize = "humidity"), default, deserialize_with = "si_if_given::<Fraction, _>")]
+    #[serde(rename(deserialize = "humidity"), default, deserialize_with = "optional_si::<Fraction, _>")]
     #[schemars(with = "Option<Quantity<Fraction>>", extend("x-min" = "0 %", "x-max" = "100 %"), example = &"50 %")]
     pub humidity_ratio: Option<f64>,
     /// Temperature in the cell, if it differs from `boundary.ambient_temperature`.
     #[serde(
         rename(deserialize = "cell_temperature"),
         default,
-        deserialize_with = "si_if_given::<Temperature, _>"
+        deserialize_with = "optional_si::<Temperature, _>"
     )]
     #[schemars(with = "Option<Quantity<Temperature>>", extend("x-min" = "200 K", "x-max" = "400 K"))]
     pub cell_temperature_k: Option<f64>,
@@ -59,22 +59,23 @@ impl Report {
         Air::of_relative_humidity(relative_ratio, temperature_k, pressure_pa)
     }
 
-    /// The air that the compressor takes in: from the humidity in the cell, dry if none is given.
+    /// The inlet air with the humidity of the cell; dry if none is given.
     pub(crate) fn air(&self, boundary: &BoundaryConditions) -> Air {
         self.humidity_ratio.map_or(Air::DRY, |ratio| self.air_of(ratio, boundary))
     }
 
-    /// One standard deviation of its humidity, kg/kg. If no humidity is given, it lies anywhere between dry and saturated.
+    /// One standard deviation of the humidity, kg/kg; without a humidity, that of a uniform distribution from dry to saturated.
     pub fn humidity_sigma_kg_kg(&self, boundary: &BoundaryConditions) -> f64 {
         let saturated_kg_kg = self.air_of(1.0, boundary).humidity_kg_kg;
-        saturated_kg_kg * if self.humidity_ratio.is_some() { HYGROMETER_RATIO } else { ANYWHERE_RATIO }
+        saturated_kg_kg
+            * if self.humidity_ratio.is_some() { HYGROMETER_SIGMA_RATIO } else { UNIFORM_RMS_RATIO }
     }
 }
 
-/// Standard uncertainty of a relative humidity read off a hygrometer. Judgement: capacitive ones are sold with 2 to 3 %.
-const HYGROMETER_RATIO: f64 = 0.03;
+/// Standard uncertainty of a hygrometer's relative humidity. Judgement: capacitive sensors are specified with 2 to 3 %.
+const HYGROMETER_SIGMA_RATIO: f64 = 0.03;
 /// Root mean square of a humidity that is uniform between 0 and saturation, over saturation.
-const ANYWHERE_RATIO: f64 = 0.577_350_269_189_625_8;
+const UNIFORM_RMS_RATIO: f64 = 0.577_350_269_189_625_8;
 
 /// A channel that has a sensor, by its symbol.
 pub(crate) struct SensorSymbol;

@@ -12,9 +12,9 @@ use serde::Deserialize;
 use serde_json::Value;
 use std::collections::HashSet;
 
-/// Maximum number of points a grid may have: three days of two-minute steps. The planner holds several numbers for every pair of points: 32 MB
-/// each for 2000 points (11 s of processor time), gigabytes each for 20 000.
-const POINT_LIMIT: usize = 2_000;
+/// Maximum number of points: three days of two-minute steps. The planner stores several numbers for every pair of points: 32 MB each for
+/// 2000 points (11 s of processor time), gigabytes each for 20 000.
+const MAX_POINTS: usize = 2_000;
 /// Forms of a grid.
 const FORMS: &str = "write `speeds` and `openings`, or `points`, a list of `{speed: 50 krpm, opening: 0.5}`, or `lines`, \
                      a list of `{speed_corrected: 50 krpm, points: 6}`";
@@ -68,13 +68,13 @@ impl From<PointFile> for OperatingPoint {
 }
 
 impl GridFile {
-    /// The lines in SI; none in another form.
+    /// The lines in SI; none if the grid has another form.
     pub(crate) fn lines(&self, reference: ReferenceState, limits: &Limits) -> Vec<LineRequest> {
         let defaults = LineDefaults { surge_margin: self.surge_margin, widest_opening: self.widest_opening };
         self.lines.iter().flatten().map(|line| line.request(defaults, reference, limits)).collect()
     }
 
-    /// The points and the place of each in the file: its entry in `points`, or its speed in `speeds`.
+    /// The points, and the place of each in the file: its entry in `points`, or its speed in `speeds`.
     ///
     /// Returns only the first point of each of `lines`, since their openings are not known yet.
     pub(crate) fn points(&self, lines: &[LineRequest], t1_k: f64) -> (Vec<OperatingPoint>, Vec<Vec<Step>>) {
@@ -92,7 +92,7 @@ impl GridFile {
             };
             return listed.iter().enumerate().map(entry).unzip();
         }
-        let key = |point: &OperatingPoint| rounded(point.speed_rpm, point.valve_opening_ratio);
+        let key = |point: &OperatingPoint| point_key(point.speed_rpm, point.valve_opening_ratio);
         let skipped: HashSet<_> = self.skip.iter().flatten().map(|point| key(&(*point).into())).collect();
         let speeds = self.speeds.as_deref().unwrap_or_default();
         self.openings
@@ -109,8 +109,8 @@ impl GridFile {
     }
 }
 
-/// A point as a key: speeds closer than 1e-3 rpm and openings closer than 1e-6 are the same on any rig.
-fn rounded(rpm: f64, opening: f64) -> (i64, i64) {
+/// Key of a point for the search for duplicates: no rig distinguishes 1e-3 rpm, or openings by 1e-6.
+fn point_key(rpm: f64, opening: f64) -> (i64, i64) {
     ((rpm * 1e3).round() as i64, (opening * 1e6).round() as i64)
 }
 
@@ -166,12 +166,12 @@ pub(crate) fn check(check: &mut Check<'_>) {
         }
         _ => {}
     }
-    grid_speeds(check);
-    grid_openings(check);
-    grid_points(check, "points");
-    grid_points(check, "skip");
+    check_speeds(check);
+    check_openings(check);
+    check_points(check, "points");
+    check_points(check, "skip");
     if points && skip {
-        let message = "`skip` has nothing to skip in a list of points".to_owned();
+        let message = "`skip` has no effect on a list of points".to_owned();
         check.note(
             FindingKind::Conflict,
             &steps!["grid", "skip"],
@@ -179,81 +179,82 @@ pub(crate) fn check(check: &mut Check<'_>) {
             "remove `skip`, or the points themselves",
         );
     } else if speeds && openings {
-        product(check);
+        check_product(check);
     }
 }
 
-fn grid_speeds(check: &mut Check<'_>) {
+fn check_speeds(check: &mut Check<'_>) {
     let mut seen = HashSet::new();
     for index in 0..check.count(&steps!["grid", "speeds"]) {
         let steps = steps!["grid", "speeds", index];
         let Some((rpm, text)) = check.quantity(Kind::Speed, &steps) else { continue };
-        below_speed_limit(check, &steps, rpm, text);
-        if !seen.insert(rounded(rpm, 0.0)) {
-            let message = format!("the speed `{text}` appears here a second time");
+        check_speed_limit(check, &steps, rpm, text);
+        if !seen.insert(point_key(rpm, 0.0)) {
+            let message = format!("the speed `{text}` appears twice");
             check.note(FindingKind::Duplicate, &steps, message, "remove one of the two");
         }
     }
 }
 
-fn grid_openings(check: &mut Check<'_>) {
+fn check_openings(check: &mut Check<'_>) {
     let mut seen = HashSet::new();
     for index in 0..check.count(&steps!["grid", "openings"]) {
         let steps = steps!["grid", "openings", index];
         let Some(opening) = check.number(&steps) else { continue };
-        if !seen.insert(rounded(0.0, opening)) {
-            let message = format!("the opening {opening} appears here a second time");
+        if !seen.insert(point_key(0.0, opening)) {
+            let message = format!("the opening {opening} appears twice");
             check.note(FindingKind::Duplicate, &steps, message, "remove one of the two");
         }
     }
 }
 
 /// Duplicates and speeds of `points` or `skip`.
-fn grid_points(check: &mut Check<'_>, list: &str) {
+fn check_points(check: &mut Check<'_>, list: &str) {
     let mut seen = HashSet::new();
     for (index, (rpm, opening)) in points(check, list) {
         let steps = steps!["grid", list, index];
         let speed_path = steps!["grid", list, index, "speed"];
         let text = check.text(&speed_path).unwrap_or_default();
         if list == "points" {
-            below_speed_limit(check, &speed_path, rpm, text);
+            check_speed_limit(check, &speed_path, rpm, text);
         }
-        if !seen.insert(rounded(rpm, opening)) {
-            let message = format!("the point {text} at opening {opening} appears here a second time");
+        if !seen.insert(point_key(rpm, opening)) {
+            let message = format!("the point {text} at opening {opening} appears twice");
             check.note(FindingKind::Duplicate, &steps, message, "remove one of the two");
         }
     }
 }
 
-fn product(check: &mut Check<'_>) {
+fn check_product(check: &mut Check<'_>) {
     let speeds: HashSet<(i64, i64)> = (0..check.count(&steps!["grid", "speeds"]))
         .filter_map(|i| check.quantity(Kind::Speed, &steps!["grid", "speeds", i]))
-        .map(|(rpm, _)| rounded(rpm, 0.0))
+        .map(|(rpm, _)| point_key(rpm, 0.0))
         .collect();
     let openings: HashSet<(i64, i64)> = (0..check.count(&steps!["grid", "openings"]))
         .filter_map(|i| check.number(&steps!["grid", "openings", i]))
-        .map(|opening| rounded(0.0, opening))
+        .map(|opening| point_key(0.0, opening))
         .collect();
     let count = speeds.len().saturating_mul(openings.len());
     let here = steps!["grid"];
-    if count > POINT_LIMIT {
+    if count > MAX_POINTS {
         let dwell = check.quantity(Kind::Duration, &steps!["timing", "dwell"]);
         let days = dwell.map(|(dwell_s, _)| count as f64 * dwell_s / 86_400.0);
         let lasts = days.map_or_else(String::new, |days| format!(", which take {days:.1} days on the rig"));
-        let pairs = (count as f64 / POINT_LIMIT as f64).powi(2);
-        let message =
-            format!("the grid has {count} points{lasts}, and {pairs:.0} times as many pairs as are planned");
-        let remedy = format!("a grid may have at most {POINT_LIMIT}; divide it into several campaigns");
+        let pairs = (count as f64 / MAX_POINTS as f64).powi(2);
+        let message = format!(
+            "the grid has {count} points{lasts}, and {pairs:.0} times as many pairs as the planner allows"
+        );
+        let remedy = format!("a grid may have at most {MAX_POINTS}; divide it into several campaigns");
         check.note(FindingKind::TooLarge, &here, message, &remedy);
         return;
     }
     let mut skipped = HashSet::new();
     for (index, (rpm, opening)) in points(check, "skip") {
-        let known = speeds.contains(&rounded(rpm, 0.0)) && openings.contains(&rounded(0.0, opening));
+        let known = speeds.contains(&point_key(rpm, 0.0)) && openings.contains(&point_key(0.0, opening));
         if known {
-            skipped.insert(rounded(rpm, opening));
+            skipped.insert(point_key(rpm, opening));
         } else {
-            let message = "no point of `speeds` and `openings` is the one to skip".to_owned();
+            let message = "`speeds` and `openings` do not contain the point to skip".to_owned();
             let remedy = "name a speed and an opening of the grid, or remove the entry";
             check.note(FindingKind::Conflict, &steps!["grid", "skip", index], message, remedy);
         }
@@ -283,11 +284,11 @@ fn lowest_speed_rpm(check: &Check<'_>) -> f64 {
     listed.chain(of_points).fold(f64::INFINITY, f64::min)
 }
 
-fn below_speed_limit(check: &mut Check<'_>, steps: &[Step], rpm: f64, text: &str) {
+fn check_speed_limit(check: &mut Check<'_>, steps: &[Step], rpm: f64, text: &str) {
     if let Some((limit_rpm, limit)) = check.quantity(Kind::Speed, &steps!["limits", "speed"])
         && rpm > limit_rpm
     {
-        // A limit below every speed is one mistake, at the limit.
+        // A limit below every speed is reported once, at the limit.
         let lowest_rpm = lowest_speed_rpm(check);
         if lowest_rpm > limit_rpm {
             if rpm == lowest_rpm {

@@ -11,8 +11,7 @@ use serde::Deserialize;
 use serde_json::Value;
 use std::collections::HashSet;
 
-/// Surge margin of a line's last point if the file gives none.
-const USUAL_SURGE_MARGIN_RATIO: f64 = 0.1;
+const DEFAULT_SURGE_MARGIN_RATIO: f64 = 0.1;
 /// Keys of a line.
 const FORM: &str = "write `{speed_corrected: 50 krpm, points: 6}`, or `spacing: 8 g/s` in place of `points`";
 
@@ -61,7 +60,7 @@ impl LineFile {
                 (count, _) => Spread::Points(count.unwrap_or(2)),
             },
             surge_margin_ratio: margin
-                .unwrap_or_else(|| USUAL_SURGE_MARGIN_RATIO.max(limits.surge_margin_floor_ratio())),
+                .unwrap_or_else(|| DEFAULT_SURGE_MARGIN_RATIO.max(limits.surge_margin_floor_ratio())),
             widest_opening_ratio: self
                 .widest_opening
                 .or(defaults.widest_opening)
@@ -79,7 +78,7 @@ pub(crate) fn check(check: &mut Check<'_>) {
         match (has("points"), has("spacing")) {
             (true, true) => {
                 let message = "the line has both `points` and `spacing`".to_owned();
-                let remedy = "give the number of its points, or their distance";
+                let remedy = "give either the number of its points, or their distance";
                 check.note_key(FindingKind::Conflict, &here, "spacing", message, remedy);
             }
             (false, false)
@@ -93,7 +92,7 @@ pub(crate) fn check(check: &mut Check<'_>) {
         let speed = steps!["grid", "lines", index, "speed_corrected"];
         let Some((rpm, text)) = check.quantity(Kind::Speed, &speed) else { continue };
         if !seen.insert((rpm * 1e3).round() as i64) {
-            let message = format!("the line `{text}` appears here a second time");
+            let message = format!("the line `{text}` appears twice");
             check.note(FindingKind::Duplicate, &speed, message, "remove one of the two");
         }
     }

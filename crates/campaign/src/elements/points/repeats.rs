@@ -9,10 +9,8 @@ use mapper_yaml::steps;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// Default number of steps between two repeats.
-const USUAL_SPACING_STEPS: usize = 12;
-/// Default number of repeats.
-const USUAL_COUNT: usize = 2;
+const DEFAULT_SPACING_STEPS: usize = 12;
+const DEFAULT_COUNT: usize = 2;
 
 // Untagged: the form of the YAML node shows which variant it is, and the schema was checked before.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
@@ -61,8 +59,8 @@ pub(crate) fn repeats(file: Option<RepeatsFile>) -> Option<Repeats> {
     };
     Some(Repeats {
         jump: file.jump.map(|jump| Jump { from: jump.from.into(), to: jump.to.into() }),
-        every_steps: file.every.unwrap_or(USUAL_SPACING_STEPS),
-        at_least: file.at_least.unwrap_or(USUAL_COUNT),
+        every_steps: file.every.unwrap_or(DEFAULT_SPACING_STEPS),
+        at_least: file.at_least.unwrap_or(DEFAULT_COUNT),
     })
 }
 
@@ -76,7 +74,7 @@ pub(crate) fn check(check: &mut Check<'_>) {
     if let (Some(from), Some(to)) = (point("from"), point("to"))
         && from == to
     {
-        let message = "the repeated jump ends where it starts: nothing moves".to_owned();
+        let message = "the repeated jump ends where it starts, so it has no transient".to_owned();
         let remedy = "let it lead to another speed, e.g. from the slowest to the fastest";
         check.note(FindingKind::Conflict, &steps!["repeats", "jump", "to"], message, remedy);
     }

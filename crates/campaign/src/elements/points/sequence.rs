@@ -1,6 +1,6 @@
 //! `sequence:`, a script in place of an order.
 
-use crate::checking::{Check, beside};
+use crate::checking::{Check, resolve_path};
 use mapper_yaml::FindingKind;
 use mapper_yaml::steps;
 use serde::Serialize;
@@ -20,7 +20,7 @@ pub struct SequenceSource {
     pub text: String,
 }
 
-/// The script that a campaign names.
+/// Reads the script that a campaign names.
 ///
 /// # Errors
 /// If it can no longer be read.
@@ -30,7 +30,7 @@ pub(crate) fn sequence(
     files: &dyn Fn(&Path) -> io::Result<String>,
 ) -> io::Result<Option<SequenceSource>> {
     let source = |name: &str| {
-        let path = beside(origin, name);
+        let path = resolve_path(origin, name);
         let text = files(&path)?;
         Ok(SequenceSource { named: name.to_owned(), path, text })
     };
@@ -43,7 +43,7 @@ pub(crate) fn check(check: &mut Check<'_>) {
     let Some(name) = check.text(&steps).filter(|name| name.ends_with(".rhai")) else { return };
     if let (path, Err(error)) = check.file(name) {
         let message = format!("the sequence script `{}` cannot be read: {error}", path.display());
-        let remedy = "write its path relative to the campaign file, or leave `sequence` out";
+        let remedy = "write its path relative to the campaign file, or remove `sequence`";
         check.note(FindingKind::MissingFile, &steps, message, remedy);
     }
 }

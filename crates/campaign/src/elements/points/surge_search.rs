@@ -1,8 +1,8 @@
 //! `surge_search:`
 
-use crate::si_values::or;
+use crate::si_values::value_or;
 use crate::units::{Duration, Fraction, Quantity};
-use mapper_core::SurgeSeek;
+use mapper_core::SurgeSearchSettings;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -29,13 +29,13 @@ pub(crate) struct SurgeSearchFile {
 
 impl SurgeSearchFile {
     /// The search, with defaults filled in.
-    pub(crate) fn seek(self) -> SurgeSeek {
-        let usual = SurgeSeek::default();
-        SurgeSeek {
-            closest_margin_ratio: or(self.closest, usual.closest_margin_ratio),
-            step_ratio: or(self.step, usual.step_ratio),
-            dwell_s: or(self.dwell, usual.dwell_s),
-            wanted_standard_error_ratio: or(self.standard_error, usual.wanted_standard_error_ratio),
+    pub(crate) fn settings(self) -> SurgeSearchSettings {
+        let usual = SurgeSearchSettings::default();
+        SurgeSearchSettings {
+            closest_margin_ratio: value_or(self.closest, usual.closest_margin_ratio),
+            step_ratio: value_or(self.step, usual.step_ratio),
+            dwell_s: value_or(self.dwell, usual.dwell_s),
+            wanted_standard_error_ratio: value_or(self.standard_error, usual.wanted_standard_error_ratio),
             most_steps: self.most_steps.unwrap_or(usual.most_steps),
         }
     }
@@ -47,9 +47,13 @@ mod tests {
 
     #[test]
     fn what_is_left_out_has_its_default() {
-        let read = |text| crate::testing::any::<SurgeSearchFile>(text).unwrap().seek();
-        assert_eq!(read("{}"), SurgeSeek::default());
-        let written = SurgeSeek { closest_margin_ratio: 0.05, dwell_s: 60.0, ..SurgeSeek::default() };
+        let read = |text| crate::testing::any::<SurgeSearchFile>(text).unwrap().settings();
+        assert_eq!(read("{}"), SurgeSearchSettings::default());
+        let written = SurgeSearchSettings {
+            closest_margin_ratio: 0.05,
+            dwell_s: 60.0,
+            ..SurgeSearchSettings::default()
+        };
         assert_eq!(read("{closest: 5 %, dwell: 1 min}"), written);
     }
 }

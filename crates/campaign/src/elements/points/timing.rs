@@ -56,7 +56,7 @@ pub(crate) fn check(check: &mut Check<'_>) {
     let given: Vec<&str> = ways.into_iter().filter(|way| check.get(&path_of(way)).is_some()).collect();
     match given.as_slice() {
         [] => {
-            let message = "`timing` does not say how long the steps last".to_owned();
+            let message = "`timing` does not set the duration of the steps".to_owned();
             let remedy = "add `dwell: 40 s`, or `time_budget: 45 min`, or `required_sigma_eta: 0.3 %`";
             check.note(FindingKind::MissingKey, &timing, message, remedy);
         }

@@ -1,6 +1,6 @@
 //! `zero:`
 
-use crate::si_values::or;
+use crate::si_values::value_or;
 use crate::units::{Duration, PressureDifference, Quantity, Temperature, TemperatureDifference};
 use mapper_core::Soak;
 use schemars::JsonSchema;
@@ -29,9 +29,9 @@ impl ZeroFile {
     pub(crate) fn soak(self, inlet_temperature_k: f64) -> Soak {
         Soak {
             duration_s: self.soak.inside,
-            oil_temperature_k: or(self.oil_temperature, inlet_temperature_k),
-            temperature_sigma_k: or(self.evenness, Soak::TEMPERATURE_SIGMA_K),
-            pressure_sigma_pa: or(self.pressure_evenness, Soak::PRESSURE_SIGMA_PA),
+            oil_temperature_k: value_or(self.oil_temperature, inlet_temperature_k),
+            temperature_sigma_k: value_or(self.evenness, Soak::TEMPERATURE_SIGMA_K),
+            pressure_sigma_pa: value_or(self.pressure_evenness, Soak::PRESSURE_SIGMA_PA),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! `boundary:`
 
-use crate::si_values::or;
+use crate::si_values::value_or;
 use crate::units::{Pressure, Quantity, Temperature};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::follow_outlet::FollowOutlet;
@@ -53,7 +53,7 @@ impl BoundaryFile {
             t3_k: self.turbine_inlet_temperature.inside,
             p4_pa: self.turbine_outlet_pressure.inside,
             oil_temperature_k: self.oil_temperature.inside,
-            ambient_temperature_k: or(self.ambient_temperature, self.inlet_temperature.inside),
+            ambient_temperature_k: value_or(self.ambient_temperature, self.inlet_temperature.inside),
             valve_opening_ratio: 1.0,
         }
     }

@@ -30,7 +30,7 @@ pub struct Date(jiff::civil::Date);
 
 impl Date {
     /// The day in UTC of a time in nanoseconds since 1970; `None` for 0, which is no date: simulated time starts there.
-    pub fn of_ns(ns: u64) -> Option<Date> {
+    pub fn from_epoch_ns(ns: u64) -> Option<Date> {
         let seconds = i64::try_from(ns / 1_000_000_000).ok().filter(|seconds| *seconds > 0)?;
         let instant = jiff::Timestamp::from_second(seconds).ok()?;
         Some(Date(instant.to_zoned(jiff::tz::TimeZone::UTC).date()))
@@ -112,13 +112,13 @@ pub struct Calibration {
 
 impl Calibration {
     /// A calibration of which only the day is known.
-    pub(crate) fn on(date: Date) -> Self {
+    pub(crate) fn from_date(date: Date) -> Self {
         Calibration { certificate: None, laboratory: None, date, due: None, range: None, uncertainty: None }
     }
 
     /// Whether more than its day is known.
     pub fn is_certified(&self) -> bool {
-        *self != Calibration::on(self.date)
+        *self != Calibration::from_date(self.date)
     }
 }
 

@@ -1,8 +1,8 @@
 //! `guards:`
 
 use crate::checking::Check;
-use crate::elements::rig::several_sensors::SensorDeclaration;
-use crate::si_values::or;
+use crate::elements::rig::redundant_sensors::SensorDeclaration;
+use crate::si_values::value_or;
 use crate::units::{
     Duration, Fraction, Kind, Pressure, PressureDifference, Quantity, Speed, Temperature,
     TemperatureDifference,
@@ -186,30 +186,30 @@ struct SignalsFile {
 }
 
 /// Inputs of the guards in addition to their own keys.
-pub(crate) struct GuardedBy<'a> {
+pub(crate) struct GuardInputs<'a> {
     pub(crate) limits: &'a Limits,
     pub(crate) sensors: &'a BTreeMap<Channel, SensorDeclaration>,
     pub(crate) dwell_s: f64,
     pub(crate) speed_is_held: bool,
 }
 
-/// One noisy sample at 10 Hz must not trip; three in a row do.
-const DWELL_S: f64 = 0.2;
-const AGE_S: f64 = 3.0;
-const FROZEN_S: f64 = 20.0;
-const OIL_DWELL_S: f64 = 1.0;
-const CHANGE_WITHIN_S: f64 = 10.0;
-const SURGE_FLOW_RATIO: f64 = 0.05;
-const SURGE_PRESSURE_RATIO: f64 = 0.01;
-const SPEED_BAND_RATIO: f64 = 0.05;
-const OPEN_LOOP_BAND_RATIO: f64 = 0.25;
+/// Default time above a limit before a trip: one noisy sample at 10 Hz does not trip, three in a row do.
+const DEFAULT_DWELL_S: f64 = 0.2;
+const DEFAULT_MAX_AGE_S: f64 = 3.0;
+const DEFAULT_FROZEN_S: f64 = 20.0;
+const DEFAULT_OIL_DWELL_S: f64 = 1.0;
+const DEFAULT_CHANGE_WITHIN_S: f64 = 10.0;
+const DEFAULT_SURGE_FLOW_RATIO: f64 = 0.05;
+const DEFAULT_SURGE_PRESSURE_RATIO: f64 = 0.01;
+const DEFAULT_SPEED_BAND_RATIO: f64 = 0.05;
+const DEFAULT_OPEN_LOOP_BAND_RATIO: f64 = 0.25;
 
 impl GuardsFile {
     /// All guards of a campaign, with defaults filled in.
-    pub(crate) fn guards(self, by: &GuardedBy<'_>) -> GuardSet {
-        let GuardedBy { limits, sensors, dwell_s, speed_is_held } = *by;
-        let age_s = or(self.signals.age, AGE_S);
-        let frozen_s = or(self.signals.frozen, FROZEN_S);
+    pub(crate) fn guards(self, by: &GuardInputs<'_>) -> GuardSet {
+        let GuardInputs { limits, sensors, dwell_s, speed_is_held } = *by;
+        let age_s = value_or(self.signals.age, DEFAULT_MAX_AGE_S);
+        let frozen_s = value_or(self.signals.frozen, DEFAULT_FROZEN_S);
         let noisy = |channel| {
             sensors.get(&channel).is_some_and(|sensor: &SensorDeclaration| sensor.declared.noise_sigma > 0.0)
         };
@@ -220,7 +220,7 @@ impl GuardsFile {
             below: None,
             change: None,
             hysteresis: 0.0,
-            dwell_s: DWELL_S,
+            dwell_s: DEFAULT_DWELL_S,
             age_s,
             frozen_s: [Channel::ShaftSpeed, Channel::P2, Channel::T2]
                 .contains(&channel)
@@ -230,16 +230,16 @@ impl GuardsFile {
         };
         let overspeed = self.overspeed;
         let mut signals = vec![SignalGuard {
-            above: Some(or(overspeed.above, limits.speed_max_rpm)),
-            hysteresis: or(overspeed.hysteresis, 0.0),
-            dwell_s: or(overspeed.dwell, DWELL_S),
+            above: Some(value_or(overspeed.above, limits.speed_max_rpm)),
+            hysteresis: value_or(overspeed.hysteresis, 0.0),
+            dwell_s: value_or(overspeed.dwell, DEFAULT_DWELL_S),
             ..guard(GuardName::Overspeed, Channel::ShaftSpeed, overspeed.reaction.unwrap_or(Reaction::Latch))
         }];
         let p3 = self.turbine_inlet_pressure;
         signals.push(SignalGuard {
-            above: Some(or(p3.above, limits.p3_max_pa)),
-            hysteresis: or(p3.hysteresis, 0.0),
-            dwell_s: or(p3.dwell, DWELL_S),
+            above: Some(value_or(p3.above, limits.p3_max_pa)),
+            hysteresis: value_or(p3.hysteresis, 0.0),
+            dwell_s: value_or(p3.dwell, DEFAULT_DWELL_S),
             ..guard(GuardName::TurbineInletPressure, Channel::P3, p3.reaction.unwrap_or(Reaction::Safe))
         });
         for (name, channel, file, limit_k) in [
@@ -259,51 +259,51 @@ impl GuardsFile {
             let above = file.above.map(|above| above.inside).or(limit_k);
             let change = file.change.map(|change| LargestChange {
                 change: change.inside,
-                within_s: or(file.within, CHANGE_WITHIN_S),
+                within_s: value_or(file.within, DEFAULT_CHANGE_WITHIN_S),
             });
-            // T2 must be monitored in any case.
+            // T2 is monitored for valid readings even without a limit.
             if above.is_some() || change.is_some() || channel == Channel::T2 {
                 signals.push(SignalGuard {
                     above,
                     change,
-                    hysteresis: or(file.hysteresis, 0.0),
-                    dwell_s: or(file.dwell, DWELL_S),
+                    hysteresis: value_or(file.hysteresis, 0.0),
+                    dwell_s: value_or(file.dwell, DEFAULT_DWELL_S),
                     ..guard(name, channel, file.reaction.unwrap_or(Reaction::Safe))
                 });
             }
         }
-        // The third monitored channel: without it surge would go unnoticed.
+        // P2 is monitored too, since the surge guard needs it.
         signals.push(guard(GuardName::Signals, Channel::P2, Reaction::Safe));
         if let Some(oil) = self.oil_temperature {
             signals.push(SignalGuard {
                 above: oil.above.map(|above| above.inside),
                 below: oil.below.map(|below| below.inside),
-                hysteresis: or(oil.hysteresis, 0.0),
-                dwell_s: or(oil.dwell, OIL_DWELL_S),
+                hysteresis: value_or(oil.hysteresis, 0.0),
+                dwell_s: value_or(oil.dwell, DEFAULT_OIL_DWELL_S),
                 ..guard(GuardName::OilTemperature, Channel::TOil, oil.reaction.unwrap_or(Reaction::Safe))
             });
         }
         let housing = self.housing_gradient;
         let change_k = housing.map(|file| file.change.inside).or(limits.housing_gradient_max_k);
         if let Some(change) = change_k {
-            let within_s = or(housing.and_then(|file| file.within), dwell_s);
+            let within_s = value_or(housing.and_then(|file| file.within), dwell_s);
             let reaction = housing.and_then(|file| file.reaction).unwrap_or(Reaction::Note);
             signals.push(SignalGuard {
                 change: Some(LargestChange { change, within_s }),
                 ..guard(GuardName::HousingGradient, Channel::Tc, reaction)
             });
         }
-        let band = if speed_is_held { SPEED_BAND_RATIO } else { OPEN_LOOP_BAND_RATIO };
+        let band = if speed_is_held { DEFAULT_SPEED_BAND_RATIO } else { DEFAULT_OPEN_LOOP_BAND_RATIO };
         GuardSet {
             signals,
             surge: Some(SurgeVariation {
-                flow_ratio: or(self.surge.flow, SURGE_FLOW_RATIO),
-                pressure_ratio: or(self.surge.pressure, SURGE_PRESSURE_RATIO),
-                dwell_s: or(self.surge.dwell, SURGE_ALLOWED_S),
+                flow_ratio: value_or(self.surge.flow, DEFAULT_SURGE_FLOW_RATIO),
+                pressure_ratio: value_or(self.surge.pressure, DEFAULT_SURGE_PRESSURE_RATIO),
+                dwell_s: value_or(self.surge.dwell, SURGE_ALLOWED_S),
                 reaction: self.surge.reaction.unwrap_or(Reaction::Safe),
             }),
             speed: Some(SpeedBand {
-                band_ratio: or(self.speed.band, band),
+                band_ratio: value_or(self.speed.band, band),
                 reaction: self.speed.reaction.unwrap_or(Reaction::Safe),
             }),
         }
@@ -327,7 +327,7 @@ pub(crate) fn check(check: &mut Check<'_>) {
             && guarded_si > limit_si
         {
             let message = format!("`{guarded}` is above `{}`, `{limit}`", limit_path.join("."));
-            let remedy = "lower it: a guard may be tighter than its limit, never looser";
+            let remedy = "lower it: a guard must not be looser than its limit";
             check.note(FindingKind::Conflict, &guard_path, message, remedy);
         }
     }
@@ -358,7 +358,7 @@ mod tests {
             housing_gradient_max_k: None,
         };
         let by =
-            GuardedBy { limits: &limits, sensors: &BTreeMap::new(), dwell_s: 120.0, speed_is_held: true };
+            GuardInputs { limits: &limits, sensors: &BTreeMap::new(), dwell_s: 120.0, speed_is_held: true };
         crate::testing::any::<GuardsFile>(text).unwrap().guards(&by)
     }
 

@@ -6,7 +6,7 @@ pub(crate) mod calibration;
 pub(crate) mod guards;
 pub(crate) mod limits;
 pub(crate) mod readers;
+pub(crate) mod redundant_sensors;
 pub(crate) mod safe_state;
 pub(crate) mod sensors;
-pub(crate) mod several_sensors;
 pub(crate) mod speed_control;

@@ -63,7 +63,7 @@ pub(crate) fn check(check: &mut Check<'_>) {
                 let remedy = "write the symbol of a measured quantity, e.g. `m_c`";
                 check.note(FindingKind::WrongValue, &place, error.to_string(), remedy);
             } else if let Some(other) = taken.insert(symbol.clone(), name.to_owned()) {
-                let message = format!("{symbol} is taken from `{other}` already");
+                let message = format!("{symbol} is already taken from `{other}`");
                 check.note(FindingKind::Conflict, &place, message, "take each channel from one reader");
             }
         }

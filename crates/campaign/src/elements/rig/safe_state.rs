@@ -27,7 +27,7 @@ impl SafeStateFile {
         SafeTrajectory {
             p3_slew_pa_s: Some(self.pressure_slew.inside),
             valve_opening_ratio: self.opening.unwrap_or(usual.valve_opening_ratio),
-            within_s: crate::si_values::or(self.within, usual.within_s),
+            within_s: crate::si_values::value_or(self.within, usual.within_s),
         }
     }
 }

@@ -2,10 +2,11 @@
 
 use crate::checking::Check;
 use crate::elements::rig::calibration::{self, CalibrationFile};
-use crate::elements::rig::several_sensors::{
-    DeclaredSensors, Sensor, SensorDeclaration, Sensors, Several, check_several, each_place,
+use crate::elements::rig::redundant_sensors::{
+    DeclaredSensors, Sensor, SensorDeclaration, Sensors, SharedSettings, check_redundant_sensors,
+    sensor_places,
 };
-use crate::si_values::or;
+use crate::si_values::value_or;
 use crate::units::{
     Dimension, Fraction, Length, MassFlow, Pressure, PressureDifference, Quantity, Speed, Temperature,
     TemperatureDifference,
@@ -91,8 +92,8 @@ fn declaration<D: Dimension>(
     SensorDeclaration {
         declared: DeclaredUncertainty {
             noise_sigma: noise.inside,
-            offset_sigma: or(offset, 0.0),
-            gain_sigma_ratio: or(gain, 0.0),
+            offset_sigma: value_or(offset, 0.0),
+            gain_sigma_ratio: value_or(gain, 0.0),
         },
         gain_is_declared: gain.is_some(),
         static_tap_pipe_diameter_m: None,
@@ -103,7 +104,7 @@ fn declaration<D: Dimension>(
 }
 
 /// Declares a kind of sensor: the dimensions of its readings and of their differences, the `schemars` attributes of its noise, its offset
-/// and its common offset, the text on its gain, keys of its own, and what they add to the declaration.
+/// and its common offset, the description of its gain, further keys, and their effect on the declaration.
 macro_rules! sensor {
     (
         $(#[$doc:meta])* $sensor:ident: $reading:ty, $dimension:ty,
@@ -145,11 +146,11 @@ macro_rules! sensor {
                 own(self, SensorDeclaration { calibrations, ..common })
             }
 
-            fn several(&self) -> Several<'_> {
-                Several {
+            fn shared_settings(&self) -> SharedSettings<'_> {
+                SharedSettings {
                     count: self.count.unwrap_or(1),
                     name: self.name.as_deref(),
-                    common_offset: or(self.common_offset, 0.0),
+                    common_offset: value_or(self.common_offset, 0.0),
                 }
             }
         }
@@ -226,25 +227,25 @@ sensor! {
         #[schemars(extend("x-min" = "0 mm", "x-max" = "20 mm"), example = &"1.5 mm")]
         probe_diameter: Option<Quantity<Length>>,
     }
-    |sensor, declaration| SensorDeclaration { probe_diameter_m: or(sensor.probe_diameter, 0.0), ..declaration }
+    |sensor, declaration| SensorDeclaration { probe_diameter_m: value_or(sensor.probe_diameter, 0.0), ..declaration }
 }
 
 /// Checks that a static tap has the diameter of its pipe.
 pub(crate) fn check(check: &mut Check<'_>) {
     for symbol in ["P1", "P2", "P3", "P4"] {
-        for sensor in each_place(check, symbol) {
+        for sensor in sensor_places(check, symbol) {
             let of = |key: &str| [sensor.as_slice(), &steps![key]].concat();
             let has_diameter = check.get(&of("pipe_diameter")).is_some();
             if check.text(&of("tap")) == Some("static") && !has_diameter {
                 let message =
-                    "a static tap needs the pipe's inner diameter to become a total pressure".to_owned();
+                    "converting a static pressure to a total one needs the pipe's inner diameter".to_owned();
                 check.note(FindingKind::MissingKey, &of("tap"), message, "add e.g. `pipe_diameter: 40 mm`");
             }
         }
     }
     for symbol in CALIBRATED {
-        check_several(check, symbol);
-        for sensor in each_place(check, symbol) {
+        check_redundant_sensors(check, symbol);
+        for sensor in sensor_places(check, symbol) {
             calibration::check(check, &[&sensor[..], &steps!["calibration"]].concat());
         }
     }

@@ -1,6 +1,6 @@
 //! `speed_control:`
 
-use crate::si_values::or;
+use crate::si_values::value_or;
 use crate::units::{Fraction, Quantity};
 use mapper_core::SpeedControlSettings;
 use schemars::JsonSchema;
@@ -34,7 +34,7 @@ pub(crate) fn speed_control(file: Option<SpeedControlFile>) -> Option<SpeedContr
     match file {
         Some(SpeedControlFile::Named(NamedSpeedControl::Off)) => None,
         Some(SpeedControlFile::Settings(file)) => {
-            Some(SpeedControlSettings { band_ratio: or(file.band, SpeedControlSettings::BAND_RATIO) })
+            Some(SpeedControlSettings { band_ratio: value_or(file.band, SpeedControlSettings::BAND_RATIO) })
         }
         None => Some(SpeedControlSettings::default()),
     }

@@ -1,6 +1,6 @@
 //! `machine:`
 
-use crate::checking::{Check, beside};
+use crate::checking::{Check, resolve_path};
 use crate::elements::turbocharger::geometry::GeometryFile;
 use crate::elements::turbocharger::reference::ReferenceFile;
 use crate::machine_sizes::AssumedSize;
@@ -52,9 +52,9 @@ pub enum MapSource {
         named: String,
         /// The file's text, which [`crate::nominal_model`] reads.
         text: String,
-        /// State to which its corrected quantities refer.
+        /// Reference state of its corrected quantities.
         reference: ReferenceState,
-        /// How to read the file, if the campaign names a map description.
+        /// The map description, if the campaign names one.
         #[serde(skip_serializing_if = "Option::is_none")]
         description: Option<DescriptionSource>,
     },
@@ -79,7 +79,7 @@ impl MapSource {
         let MapSource::Table { text, reference, description, .. } = self else { return None };
         let given =
             description.as_ref().map(|file| description_from_yaml(&file.text, Path::new(&file.named)));
-        // The check of the campaign has read the description.
+        // The check of the campaign has excluded mistakes of the description.
         let given = given.and_then(Result::ok).unwrap_or_default();
         Some(nominal_table(text, MapDescription { reference: Some(*reference), ..given }))
     }
@@ -145,10 +145,13 @@ impl MachineFile {
         let map = match self.map {
             MapFile::Named(NamedMap::ClosedForm) => MapSource::ClosedForm,
             MapFile::Table(table) => {
-                let path = beside(origin, &table.file);
+                let path = resolve_path(origin, &table.file);
                 let text = files(&path)?;
                 let described = |named: String| {
-                    Ok::<_, io::Error>(DescriptionSource { text: files(&beside(origin, &named))?, named })
+                    Ok::<_, io::Error>(DescriptionSource {
+                        text: files(&resolve_path(origin, &named))?,
+                        named,
+                    })
                 };
                 let description = table.description.map(described).transpose()?;
                 MapSource::Table {
@@ -186,11 +189,11 @@ pub(crate) fn check(check: &mut Check<'_>) {
     let given = MapDescription { reference: Some(reference.unwrap_or(ReferenceState::SAE)), ..given };
     match nominal_table(&text, given) {
         Ok(_) => {}
-        // The campaign's own state may still be missing.
+        // The reference state of the campaign may be missing.
         Err(NominalTableError::Import(ImportError::ReferenceConflict { .. })) if reference.is_none() => {}
         Err(error) => {
             let message = format!("the map file `{}` is not a map: {error}", path.display());
-            let remedy = "look at it with `mapper map inspect`; what the file leaves open goes into a map description (`map: {file, reference, description}`)";
+            let remedy = "inspect it with `mapper map inspect`; add missing information in a map description (`map: {file, reference, description}`)";
             check.note(FindingKind::WrongValue, &steps, message, remedy);
         }
     }
@@ -209,11 +212,11 @@ fn description(check: &mut Check<'_>) -> Option<MapDescription> {
         Err(error) => (FindingKind::MissingFile, format!("it cannot be read: {error}")),
     };
     let message = format!("the map description `{}` has a mistake: {problem}", path.display());
-    check.note(kind, &steps, message, "`mapper map inspect FILE --write-description FILE` writes one");
+    check.note(kind, &steps, message, "correct it; `mapper map inspect` can write one");
     None
 }
 
-/// The state of the table's corrected quantities, if it is given and right.
+/// The reference state of the table, if it is given and valid.
 fn reference(check: &Check<'_>) -> Option<ReferenceState> {
     let here = steps!["machine", "map", "reference"];
     if let Some(name) = check.text(&here) {

@@ -10,9 +10,9 @@ use mapper_core::{Channel, Recording};
 use mapper_numerics::parallel;
 use mapper_observe::averages::mean_reading::{BEFORE_S, mean_between};
 use mapper_observe::channels::OUTPUTS;
-use mapper_observe::initial_state::state_as_read;
+use mapper_observe::initial_state::estimate_state;
 use mapper_observe::model_inputs::averaged_inputs::AveragedInputs;
-use mapper_observe::perturbation::{Perturbation, Shifted};
+use mapper_observe::perturbation::{Perturbation, ShiftedInputs};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::rig::instruments::true_value;
 use mapper_physics::simulation::driven::{DriveError, FrozenGrid, drive, settle};
@@ -114,7 +114,7 @@ impl<'a> Drive<'a> {
             }
             let offset_s = stretch.step.offset_s;
             let inputs = Undrifted {
-                inputs: Shifted { inputs: &self.inputs, shifts: turned.as_slice() },
+                inputs: ShiftedInputs { inputs: &self.inputs, shifts: turned.as_slice() },
                 planted,
                 offset_s,
             };
@@ -209,7 +209,7 @@ fn start_state(
     let first = |channel| mean_between(recording, channel, start_s, start_s + BEFORE_START_S + BEFORE_S, 5);
     let read = |channel| before(channel).or_else(|| first(channel));
     let boundary = inputs.at(start_s);
-    let guess = state_as_read(&boundary, read);
+    let guess = estimate_state(&boundary, read);
     if before(Channel::ShaftSpeed).is_some() && before(Channel::P2).is_some() {
         return Ok(guess);
     }
@@ -221,7 +221,7 @@ fn start_state(
 
 /// Inputs with the drift of a sensor subtracted.
 struct Undrifted<'a> {
-    inputs: Shifted<'a, AveragedInputs>,
+    inputs: ShiftedInputs<'a, AveragedInputs>,
     planted: &'a [Planted],
     /// Offset from run time to campaign time, s.
     offset_s: f64,

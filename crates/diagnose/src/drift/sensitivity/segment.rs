@@ -4,7 +4,7 @@ use crate::drift::causes::planted::Planted;
 use crate::drift::runs::time_axis::CampaignStep;
 use mapper_core::{Channel, Recording};
 use mapper_observe::averages::mean_reading::{BEFORE_S, mean_between};
-use mapper_observe::initial_state::state_as_read;
+use mapper_observe::initial_state::estimate_state;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::model::State;
 
@@ -95,7 +95,7 @@ pub(crate) fn read_state(recording: &Recording, boundary: &BoundaryConditions, t
     let read = |channel| mean_between(recording, channel, t_s - 0.5, t_s + 0.5 + BEFORE_S, 1);
     let all = [Channel::ShaftSpeed, Channel::P2, Channel::Tc, Channel::Tt, Channel::T2];
     let complete = all.iter().all(|channel| read(*channel).is_some_and(|value| value > 0.0));
-    complete.then(|| state_as_read(boundary, read))
+    complete.then(|| estimate_state(boundary, read))
 }
 
 /// The measured state at a later time; the metal uses the change of its readings, without the offsets of its sensors.

@@ -14,7 +14,7 @@ use mapper_observe::averages::schedule::Schedule;
 use mapper_observe::averages::time_table::Table;
 use mapper_observe::channels::DRIVERS;
 use mapper_observe::declared::Declared;
-use mapper_observe::initial_state::state_as_read;
+use mapper_observe::initial_state::estimate_state;
 use mapper_observe::model_inputs::lagged_command::{LaggedCommand, Response};
 use mapper_observe::model_inputs::smoothed_inputs::SmoothedInputs;
 use mapper_observe::model_inputs::step_timing::{Times, with_command_times};
@@ -473,7 +473,7 @@ impl Study {
             let column = &self.table.column(channel)?[self.table.range(start_s, f64::INFINITY)];
             mean_reading(&column.iter().copied().filter(|v| v.is_finite()).take(20).collect::<Vec<_>>())
         };
-        let guess = state_as_read(&boundary, read);
+        let guess = estimate_state(&boundary, read);
         let held = (!self.rested).then(|| with_metal_held(&rig.model));
         let mut start = settle(held.as_ref().unwrap_or(&rig.model), &boundary, guess)?;
         for (knob, by) in &circumstances.knobs {

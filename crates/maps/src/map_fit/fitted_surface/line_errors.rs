@@ -14,7 +14,7 @@ pub(crate) struct PlaceError {
     pub flow_part_ratio: f64,
     /// The part of it along the axis of pressure ratio, not negative.
     pub pressure_part_ratio: f64,
-    /// Of efficiency at the foot, fraction.
+    /// Of efficiency at the nearest place, fraction.
     pub eta: f64,
 }
 
@@ -53,7 +53,7 @@ impl LineErrors {
         let (mut across, mut eta) = (DVector::zeros(PARAMETERS), DVector::zeros(PARAMETERS));
         for q in 0..PARAMETERS {
             if q >= WORK {
-                // Work moves nothing but efficiency.
+                // The work parameters affect efficiency only.
                 eta[q] = -here[2] * work_terms[q - WORK];
                 continue;
             }
@@ -62,7 +62,7 @@ impl LineErrors {
             let there = at(&LineShape::new(&moved, self.frame), angle_rad);
             let d: [f64; 3] = std::array::from_fn(|i| (there[i] - here[i]) / STEP);
             across[q] = d[0] * nx + d[1] * ny;
-            // The foot moves along the line as the line moves.
+            // The nearest place moves along the line as the line moves.
             eta[q] = d[2] - slope[2] * (d[0] * slope[0] + d[1] * slope[1]) / length;
         }
         let error = |gradient: &DVector<f64>| gradient.dot(&(&self.covariance * gradient)).max(0.0).sqrt();

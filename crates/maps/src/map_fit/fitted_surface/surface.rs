@@ -1,4 +1,4 @@
-//! The fitted surface, and what it says at a place.
+//! The fitted surface and its values.
 
 use crate::map_fit::fitted_surface::line_errors::LineErrors;
 use crate::map_fit::least_squares::observations::Observations;
@@ -6,8 +6,8 @@ use crate::map_fit::least_squares::solution::Solution;
 use crate::map_fit::speed_lines::line_shape::LineShape;
 use crate::map_fit::speed_lines::nearest::{Scales, nearest};
 
-/// Lowest and highest speed that a fit answers for, over the slowest and the fastest measured speed.
-pub(crate) const SPEED_REACH: (f64, f64) = (0.1, 1.3);
+/// Minimum and maximum speed of a fit, over the slowest and the fastest measured speed.
+pub(crate) const SPEED_RANGE_RATIO: (f64, f64) = (0.1, 1.3);
 
 /// A fitted surface.
 #[derive(Debug, Clone)]
@@ -16,16 +16,16 @@ pub struct MapFit {
     pub(crate) solution: Solution,
 }
 
-/// How far a point lies from a fitted line, and what the line says there.
+/// The place on a fitted line nearest to a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NearestPlace {
-    /// Distance in units of the line's scales (flow, pressure ratio less 1), not negative.
+    /// Distance in units of the line's scales (flow, pressure ratio minus 1), not negative.
     pub distance_ratio: f64,
     /// Efficiency of the line at the nearest place, fraction.
     pub eta: f64,
     /// One standard error of the line there, across it, in units of the line's scales.
     pub distance_standard_error_ratio: f64,
-    /// One standard error of the efficiency, without what all points share, fraction.
+    /// One standard error of the efficiency without the errors common to all points, fraction.
     pub eta_standard_error: f64,
 }
 
@@ -51,7 +51,7 @@ impl MapFit {
         let error = LineErrors::new(&self.solution, speed_ratio).at(foot.angle_rad, scales);
         NearestPlace {
             distance_ratio: x.hypot(y),
-            eta: self.believed(foot.place.eta, self.outside(speed_ratio)),
+            eta: self.limit_efficiency(foot.place.eta, self.outside(speed_ratio)),
             distance_standard_error_ratio: error.distance_ratio,
             eta_standard_error: error.eta,
         }
@@ -65,18 +65,21 @@ impl MapFit {
         self.solution.shape(self.speed_ratio(speed_corrected_rpm))
     }
 
-    /// Whether a speed lies beyond the slowest or the fastest measured one.
+    /// Whether a speed is outside the measured range.
     pub(crate) fn outside(&self, speed_ratio: f64) -> bool {
         self.solution.splines.shape.outside(speed_ratio) > 1e-9
     }
 
-    /// Efficiency as it is answered: where nothing was measured, no better than the best that was.
-    pub(crate) fn believed(&self, eta: f64, extrapolated: bool) -> f64 {
+    /// The efficiency; in extrapolation at most the best measured one.
+    pub(crate) fn limit_efficiency(&self, eta: f64, extrapolated: bool) -> f64 {
         if extrapolated { eta.min(self.solution.best_eta) } else { eta }
     }
 
     pub(crate) fn speed_bounds_rpm(&self) -> (f64, f64) {
         let (first, last) = (self.data.lines_rpm.first(), self.data.lines_rpm.last());
-        (SPEED_REACH.0 * first.copied().unwrap_or(1.0), SPEED_REACH.1 * last.copied().unwrap_or(1.0))
+        (
+            SPEED_RANGE_RATIO.0 * first.copied().unwrap_or(1.0),
+            SPEED_RANGE_RATIO.1 * last.copied().unwrap_or(1.0),
+        )
     }
 }

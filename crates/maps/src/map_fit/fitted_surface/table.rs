@@ -1,30 +1,30 @@
-//! The fit as a rectangular table with errors and marks of extrapolation.
+//! Tabulates a fit, with errors and marks of extrapolation.
 
 use crate::map_fit::MapFitError;
 use crate::map_fit::fitted_surface::line_errors::LineErrors;
-use crate::map_fit::fitted_surface::surface::{MapFit, SPEED_REACH};
-use crate::map_fit::speed_lines::crossing::crossings;
-use crate::map_fit::speed_lines::line_shape::{ANGLE_RANGE, LOWEST_ANGLE, LineShape};
+use crate::map_fit::fitted_surface::surface::{MapFit, SPEED_RANGE_RATIO};
+use crate::map_fit::speed_lines::crossing::count_crossings;
+use crate::map_fit::speed_lines::line_shape::{ANGLE_RANGE_RAD, LineShape, MIN_ANGLE_RAD};
 use crate::map_fit::speed_lines::nearest::Scales;
 use crate::map_fit::speed_lines::speed_spline::SpeedSpline;
 use mapper_core::{FittedLine, FittedMap, FittedNode};
 use mapper_numerics::root::bisect;
 use nalgebra::{DMatrix, DVector};
 
-/// Steps of the walk along a line from which nodes at equal distances are taken.
-const WALK: usize = 240;
-/// Speeds beyond the measured ones that a table gets unasked, over the slowest (two) and the fastest.
-const UNASKED: (f64, f64, f64) = (0.4, 0.7, 1.05);
+/// Steps along a line for the placement of nodes at equal distances.
+const WALK_STEPS: usize = 240;
+/// Default further speeds of a table: two over the slowest measured speed, one over the fastest.
+const DEFAULT_SPEED_RATIOS: (f64, f64, f64) = (0.4, 0.7, 1.05);
 
-/// What a table of the fit holds.
+/// Contents of a table of the fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MapFitOptions {
-    /// Corrected speeds of further lines, rpm; the measured lines are always there. `None` adds two below and one
-    /// above, all extrapolated.
+    /// Corrected speeds of further lines, rpm; the measured lines are always included. `None` adds two below
+    /// and one above, all extrapolated.
     pub further_speeds_rpm: Option<Vec<f64>>,
     /// Nodes on each line, 5 to 400.
     pub nodes: usize,
-    /// Whether each line is left out in turn to see the error at a line that was not measured.
+    /// Whether to estimate the error at unmeasured lines by leaving each line out in turn.
     pub leave_one_out: bool,
 }
 
@@ -34,14 +34,18 @@ impl Default for MapFitOptions {
     }
 }
 
-/// The table, without what leaving lines out would show.
+/// The table without the errors at left-out lines.
 pub(crate) fn table(fit: &MapFit, options: &MapFitOptions) -> Result<FittedMap, MapFitError> {
     let (lowest_rpm, highest_rpm) = fit.speed_bounds_rpm();
     let measured = &fit.data.lines_rpm;
-    let (first, last) = (lowest_rpm / SPEED_REACH.0, highest_rpm / SPEED_REACH.1);
+    let (first, last) = (lowest_rpm / SPEED_RANGE_RATIO.0, highest_rpm / SPEED_RANGE_RATIO.1);
     let further = match &options.further_speeds_rpm {
         Some(speeds) => speeds.clone(),
-        None => vec![UNASKED.0 * first, UNASKED.1 * first, UNASKED.2 * last],
+        None => vec![
+            DEFAULT_SPEED_RATIOS.0 * first,
+            DEFAULT_SPEED_RATIOS.1 * first,
+            DEFAULT_SPEED_RATIOS.2 * last,
+        ],
     };
     for speed in &further {
         if !(*speed >= lowest_rpm && *speed <= highest_rpm) {
@@ -51,21 +55,21 @@ pub(crate) fn table(fit: &MapFit, options: &MapFitOptions) -> Result<FittedMap, 
     let mut speeds: Vec<(f64, bool)> = measured.iter().map(|speed| (*speed, true)).collect();
     speeds.extend(further.iter().map(|speed| (*speed, false)));
     speeds.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
-    // A further speed that is a measured one stays that; lines of one speed are one.
+    // A further speed equal to a measured one counts as measured, and equal lines are merged.
     speeds.dedup_by(|b, a| b.0 <= a.0 * (1.0 + 1e-9));
     let nodes = options.nodes.clamp(5, 400);
-    let ends = Ends::new(fit);
+    let ends = LineEndAngles::new(fit);
     let lines: Vec<FittedLine> = speeds
         .into_iter()
         .map(|(speed_corrected_rpm, measured)| FittedLine {
             speed_corrected_rpm,
             measured,
-            nodes: line(fit, &ends, speed_corrected_rpm, nodes),
+            nodes: line_nodes(fit, &ends, speed_corrected_rpm, nodes),
         })
         .collect();
     Ok(FittedMap {
         beta_ratio: (0..nodes).map(|i| i as f64 / (nodes - 1) as f64).collect(),
-        crossings: crossings(&lines),
+        crossings: count_crossings(&lines),
         lines,
         distance_rms_ratio: fit.solution.rms[0],
         eta_rms: fit.solution.rms[1],
@@ -74,8 +78,8 @@ pub(crate) fn table(fit: &MapFit, options: &MapFitOptions) -> Result<FittedMap, 
     })
 }
 
-/// Ends of the lines, as angles over speed.
-struct Ends {
+/// End angles of the lines, as angles over speed.
+struct LineEndAngles {
     /// Smooth surge-side end.
     spline: SpeedSpline,
     surge: DVector<f64>,
@@ -83,7 +87,7 @@ struct Ends {
     measured: Vec<MeasuredEnds>,
 }
 
-/// Ends of a measured line.
+/// End angles of a measured line.
 struct MeasuredEnds {
     speed_ratio: f64,
     /// Smallest and largest angle with a measured point.
@@ -95,7 +99,7 @@ struct MeasuredEnds {
 /// Smoothing of the surge-side ends: variance of an end over that of its roughness.
 const END_SMOOTHING: f64 = 0.004;
 
-impl Ends {
+impl LineEndAngles {
     fn new(fit: &MapFit) -> Self {
         let mut measured: Vec<MeasuredEnds> = fit
             .data
@@ -126,30 +130,30 @@ impl Ends {
             .cholesky()
             .map(|factor| factor.solve(&basis.tr_mul(&ends.add_scalar(-mean))))
             .unwrap_or_else(|| DVector::zeros(spline.len()));
-        Ends { spline, surge: deviation.add_scalar(mean), measured }
+        LineEndAngles { spline, surge: deviation.add_scalar(mean), measured }
     }
 
-    /// Surge-side end: smooth over speed, so that a line without points there ends where its neighbours do, but never
-    /// before the last point that was measured.
+    /// Surge-side end: smooth over speed, so that a line without points there ends like its neighbours, and never before the last
+    /// measured point.
     fn surge_rad(&self, speed_ratio: f64) -> f64 {
         let smooth = |speed: f64| self.spline.row(speed).dot(&self.surge);
         let (Some(first), Some(last)) = (self.measured.first(), self.measured.last()) else {
-            return smooth(speed_ratio).clamp(0.2, ANGLE_RANGE.1);
+            return smooth(speed_ratio).clamp(0.2, ANGLE_RANGE_RAD.1);
         };
-        // Beyond the measured speeds as far over the smooth end as at the outermost line.
+        // Beyond the measured speeds the end keeps the distance from the smooth end that it has at the outermost line.
         let at = speed_ratio.clamp(first.speed_ratio, last.speed_ratio);
         let measured = self.between(at, |line| line.surge).unwrap_or(f64::NEG_INFINITY);
         let over = (measured - smooth(at)).max(0.0);
-        (smooth(speed_ratio) + over).clamp(0.2, ANGLE_RANGE.1)
+        (smooth(speed_ratio) + over).clamp(0.2, ANGLE_RANGE_RAD.1)
     }
 
-    /// Smallest and largest angle that points support; `None` outside the measured speeds.
+    /// Range of angles with measured points; `None` outside the measured speeds.
     fn supported(&self, speed_ratio: f64) -> Option<(f64, f64)> {
         let low = self.between(speed_ratio, |line| line.points.0)?;
         Some((low, self.between(speed_ratio, |line| line.points.1)?))
     }
 
-    /// What the measured lines have, straight between neighbours; `None` outside the measured speeds.
+    /// A value of the measured lines, linear between neighbours; `None` outside the measured speeds.
     fn between(&self, speed_ratio: f64, value: impl Fn(&MeasuredEnds) -> f64) -> Option<f64> {
         let slack = 1e-9;
         let after = self.measured.partition_point(|line| line.speed_ratio < speed_ratio - slack);
@@ -163,17 +167,18 @@ impl Ends {
     }
 }
 
-/// Lowest pressure ratio of a line: some way below 1, in proportion to what the line reaches.
-fn bottom_ratio(highest_ratio: f64) -> f64 {
+/// Lowest pressure ratio of a line: below 1 by a share of the line's pressure rise.
+fn lowest_pressure_ratio(highest_ratio: f64) -> f64 {
     (1.0 - 0.15 * (highest_ratio - 1.0)).clamp(0.9, 1.0)
 }
 
-fn line(fit: &MapFit, ends: &Ends, speed_corrected_rpm: f64, count: usize) -> Vec<FittedNode> {
+fn line_nodes(fit: &MapFit, ends: &LineEndAngles, speed_corrected_rpm: f64, count: usize) -> Vec<FittedNode> {
     let speed_ratio = fit.speed_ratio(speed_corrected_rpm);
     let shape = fit.solution.shape(speed_ratio);
     let surge = ends.surge_rad(speed_ratio);
     let bottom = choke_end(&shape, speed_ratio, surge);
-    let walk: Vec<f64> = (0..=WALK).map(|i| bottom + (surge - bottom) * i as f64 / WALK as f64).collect();
+    let walk: Vec<f64> =
+        (0..=WALK_STEPS).map(|i| bottom + (surge - bottom) * i as f64 / WALK_STEPS as f64).collect();
     let places: Vec<(f64, f64)> = walk
         .iter()
         .map(|angle| {
@@ -188,21 +193,21 @@ fn line(fit: &MapFit, ends: &Ends, speed_corrected_rpm: f64, count: usize) -> Ve
         let step = ((pair[1].0 - pair[0].0) / scales.flow_kg_s).hypot((pair[1].1 - pair[0].1) / scales.ratio);
         length.push(length[length.len() - 1] + step);
     }
-    let total = length[WALK];
+    let total = length[WALK_STEPS];
     let errors = LineErrors::new(&fit.solution, speed_ratio);
     let supported = ends.supported(speed_ratio);
     (0..count)
         .map(|i| {
             let wanted = total * i as f64 / (count - 1) as f64;
-            let after = length.partition_point(|l| *l < wanted).clamp(1, WALK);
+            let after = length.partition_point(|l| *l < wanted).clamp(1, WALK_STEPS);
             let gap = length[after] - length[after - 1];
             let share = if gap > 0.0 { ((wanted - length[after - 1]) / gap).clamp(0.0, 1.0) } else { 0.0 };
             let angle = walk[after - 1] + share * (walk[after] - walk[after - 1]);
             let place = shape.physical(angle, speed_ratio);
             let error = errors.at(angle, scales);
-            // A hair's breadth beyond the last point is not an extrapolation.
+            // A rounding error beyond the last point is not an extrapolation.
             let extrapolated = supported.is_none_or(|(low, high)| angle < low - 0.02 || angle > high + 0.02);
-            let eta = fit.believed(place.eta, extrapolated);
+            let eta = fit.limit_efficiency(place.eta, extrapolated);
             let common = fit.data.common.at(speed_ratio, place.flow_kg_s / scales.flow_kg_s);
             let work = shape.at(angle).work * speed_ratio * speed_ratio;
             FittedNode {
@@ -222,13 +227,13 @@ fn line(fit: &MapFit, ends: &Ends, speed_corrected_rpm: f64, count: usize) -> Ve
         .collect()
 }
 
-/// Angle at which the line has fallen to its lowest pressure ratio.
+/// Angle of the lowest pressure ratio of the line.
 fn choke_end(shape: &LineShape, speed_ratio: f64, surge_rad: f64) -> f64 {
     let ratio = |angle: f64| shape.physical(angle, speed_ratio).pressure_ratio;
     let top = ratio(surge_rad.min(std::f64::consts::FRAC_PI_2)).max(ratio(surge_rad));
-    let wanted = bottom_ratio(top);
-    if ratio(LOWEST_ANGLE) > wanted {
-        return LOWEST_ANGLE;
+    let wanted = lowest_pressure_ratio(top);
+    if ratio(MIN_ANGLE_RAD) > wanted {
+        return MIN_ANGLE_RAD;
     }
-    bisect(LOWEST_ANGLE, surge_rad.min(std::f64::consts::FRAC_PI_2), 0.0, |angle| ratio(angle) < wanted).1
+    bisect(MIN_ANGLE_RAD, surge_rad.min(std::f64::consts::FRAC_PI_2), 0.0, |angle| ratio(angle) < wanted).1
 }

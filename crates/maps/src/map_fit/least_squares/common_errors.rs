@@ -1,14 +1,14 @@
-//! What the errors that all points share do at a place of the fit.
+//! Effect of errors common to all points at a place of the fit.
 //!
-//! Such an error is as smooth over the map as its cause, and a fit through points follows it: the scatter of the points
-//! about the fit says nothing of it. So it is carried to a place from the points around.
+//! A fit follows such an error, so the scatter of the points about the fit does not show it. Its effect at a place is therefore a weighted
+//! mean of its effect at the surrounding points.
 
 use mapper_core::{CommonErrors, MapPoint};
 
-/// Distance at which a point has half the weight of one at the place, in units of speed and of the line's largest flow.
-const REACH: f64 = 0.1;
+/// Distance of half weight, in units of the nominal speed and of the line's maximum flow.
+const HALF_WEIGHT_DISTANCE_RATIO: f64 = 0.1;
 
-/// Common errors of the points, and where these lie.
+/// Common errors of the points, with their positions.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct CommonErrorField {
     points: Vec<Entry>,
@@ -23,17 +23,16 @@ struct Entry {
 
 /// Common standard errors at a place.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct CommonAt {
+pub(crate) struct PlaceCommonErrors {
     /// Of efficiency, fraction.
     pub eta_standard_error: f64,
     /// Of corrected flow, ratio.
     pub flow_standard_error_ratio: f64,
-    /// Of the pressure ratio.
     pub pressure_ratio_standard_error: f64,
 }
 
 impl CommonErrorField {
-    /// Takes a point's errors in; `flow_ratio`: its flow over the line's largest.
+    /// Adds a point's errors; `flow_ratio` is its flow over the line's maximum.
     pub(crate) fn add(&mut self, speed_ratio: f64, flow_ratio: f64, point: &MapPoint) {
         let common = point.identified.common.clone();
         if common != CommonErrors::default() {
@@ -41,14 +40,15 @@ impl CommonErrorField {
         }
     }
 
-    /// Errors at a place, by the points around with weights that fall with the square of the distance.
-    pub(crate) fn at(&self, speed_ratio: f64, flow_ratio: f64) -> CommonAt {
+    /// Errors at a place: mean over the points with weights that fall with the square of the distance.
+    pub(crate) fn at(&self, speed_ratio: f64, flow_ratio: f64) -> PlaceCommonErrors {
         let most = self.points.iter().map(|point| point.common.eta_changes.len()).max().unwrap_or(0);
         let mut eta = vec![0.0; most];
         let (mut all, mut with_eta) = (0.0, 0.0);
-        let mut found = CommonAt::default();
+        let mut found = PlaceCommonErrors::default();
         for Entry { speed_ratio: speed, flow_ratio: flow, common } in &self.points {
-            let square = ((speed_ratio - speed).powi(2) + (flow_ratio - flow).powi(2)) / (REACH * REACH);
+            let square = ((speed_ratio - speed).powi(2) + (flow_ratio - flow).powi(2))
+                / (HALF_WEIGHT_DISTANCE_RATIO * HALF_WEIGHT_DISTANCE_RATIO);
             let weight = 1.0 / (1.0 + square * square);
             all += weight;
             found.flow_standard_error_ratio += weight * common.flow_corrected_standard_error_ratio;

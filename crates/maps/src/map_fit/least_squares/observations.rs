@@ -1,15 +1,15 @@
-//! What a map says to a fit: its points as measured, each at its own speed.
+//! Observations of a map fit: the measured points, each at its own speed.
 
 use crate::map_fit::MapFitError;
 use crate::map_fit::least_squares::common_errors::CommonErrorField;
 use mapper_core::{CompressorMap, MapPoint, SurgeMark, Verdict};
 use mapper_physics::compressor_map::similarity::head_ratio;
 
-/// Maximum number of points and lines that a fit takes: several times what the largest measured maps have.
+/// Maximum number of points and lines of a fit: several times those of the largest measured maps.
 const MAX_POINTS: usize = 2000;
 const MAX_LINES: usize = 60;
-/// A surge mark belongs to a line whose speed is as near as this, ratio.
-const MARK_SPEED_RATIO: f64 = 0.03;
+/// Maximum relative difference between the speeds of a surge mark and its line.
+const MAX_MARK_SPEED_DIFFERENCE_RATIO: f64 = 0.03;
 
 /// One point.
 #[derive(Debug, Clone, Copy)]
@@ -21,11 +21,11 @@ pub(crate) struct Observation {
     pub flow_kg_s: f64,
     pub pressure_ratio: f64,
     pub eta: Option<f64>,
-    /// Standard error of the efficiency that no other point shares, fraction; 0 if none is known.
+    /// Independent standard error of the efficiency, fraction; 0 if unknown.
     pub eta_error: f64,
-    /// Whether it is a surge mark: it says where the line ends, nothing of efficiency.
+    /// Whether it is a surge mark, which gives the end of the line without an efficiency.
     pub is_mark: bool,
-    /// The line's largest flow, kg/s, and largest pressure ratio less 1: units of the distance.
+    /// Units of the distance: the line's maximum flow, kg/s, and maximum pressure ratio minus 1.
     pub flow_scale_kg_s: f64,
     pub ratio_scale: f64,
 }
@@ -45,12 +45,12 @@ impl Observation {
 /// All points of a map.
 #[derive(Debug, Clone)]
 pub(crate) struct Observations {
-    /// Speed that counts as 1, rpm.
+    /// Unit of speed ratios, rpm.
     pub nominal_speed_rpm: f64,
     /// Corrected speeds of the lines, rpm, rising.
     pub lines_rpm: Vec<f64>,
     pub points: Vec<Observation>,
-    /// What the points have in common that the fit cannot see.
+    /// Errors common to all points, which the fit cannot show.
     pub common: CommonErrorField,
 }
 
@@ -95,7 +95,7 @@ impl Observations {
                 points.push(own);
             }
             let on_line = |mark: &&SurgeMark| {
-                (mark.speed_corrected_rpm / speed_corrected_rpm - 1.0).abs() < MARK_SPEED_RATIO
+                (mark.speed_corrected_rpm / speed_corrected_rpm - 1.0).abs() < MAX_MARK_SPEED_DIFFERENCE_RATIO
                     && mark.flow_corrected_kg_s > 0.0
                     && mark.pressure_ratio > 1.0
             };
@@ -113,12 +113,12 @@ impl Observations {
         }
         let lines_rpm = lines.iter().map(|line| line.0).collect();
         let all = Observations { nominal_speed_rpm, lines_rpm, points, common };
-        all.enough()?;
+        all.check_sufficient()?;
         Ok(all)
     }
 
-    /// All but one line.
-    pub(crate) fn without(&self, line: usize) -> Result<Self, MapFitError> {
+    /// The observations without one line.
+    pub(crate) fn without_line(&self, line: usize) -> Result<Self, MapFitError> {
         let mut lines_rpm = self.lines_rpm.clone();
         lines_rpm.remove(line);
         let points = self
@@ -132,11 +132,11 @@ impl Observations {
             points: points.collect(),
             common: self.common.clone(),
         };
-        rest.enough()?;
+        rest.check_sufficient()?;
         Ok(rest)
     }
 
-    fn enough(&self) -> Result<(), MapFitError> {
+    fn check_sufficient(&self) -> Result<(), MapFitError> {
         // Lines at one speed are one line to a fit over speed.
         let distinct = 1 + self.lines_rpm.windows(2).filter(|w| w[1] > w[0] * (1.0 + 1e-3)).count();
         if self.lines_rpm.len() < 2 || distinct < 2 {

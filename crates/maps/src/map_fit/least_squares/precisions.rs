@@ -1,13 +1,13 @@
-//! Relative weights of the parts of a fit.
+//! Variance components of a fit, as precisions.
 
 use crate::map_fit::speed_lines::line_shape::Parameters;
 
 /// Standard errors beyond which a residual loses weight.
-pub(crate) const ROBUST: f64 = 3.0;
+pub(crate) const ROBUST_SIGMAS: f64 = 3.0;
 
-/// Least and most of a roughness' precision, over where its estimation starts. Twenty times stiffer is a straight line to the
-/// eye; more would only make errors too sure beyond the measured lines.
-pub(crate) const ROUGHNESS_REACH: [f64; 2] = [0.03, 20.0];
+/// Range of the precision of a roughness over its starting value. Twenty times stiffer is visually straight; a stiffer one would make
+/// errors beyond the measured lines too small.
+pub(crate) const ROUGHNESS_PRECISION_RANGE: [f64; 2] = [0.03, 20.0];
 
 /// Variance components, as precisions.
 pub(crate) struct Precisions {

@@ -1,12 +1,11 @@
-//! The penalised least-squares problem: residuals at the feet of the points, their derivatives, and the penalty.
+//! The penalised least-squares problem: residuals at the nearest places of the line, their derivatives, and the penalty.
 //!
-//! Unknown are the line parameters at knots over speed, and for every line an offset of flow, head and work (errors of
-//! speed and of the day that a whole line shares). Residuals are orthogonal distance and efficiency, weighted down where
-//! they are large (Cauchy weights at three standard errors).
+//! The unknowns are the line parameters at knots over speed, and for every line an offset of flow, head and work (errors of speed and of
+//! the day that a whole line shares). The residuals are orthogonal distance and efficiency, with Cauchy weights at three standard errors.
 
 use crate::map_fit::MapFitError;
 use crate::map_fit::least_squares::observations::{Observation, Observations};
-use crate::map_fit::least_squares::precisions::{Precisions, ROBUST};
+use crate::map_fit::least_squares::precisions::{Precisions, ROBUST_SIGMAS};
 use crate::map_fit::speed_lines::line_shape::{
     CHOKE_FLOW, EXPONENTS, FlowFrame, LineShape, PARAMETERS, Parameters, WORK, ZERO_SLOPE_HEAD,
 };
@@ -15,15 +14,14 @@ use crate::map_fit::speed_lines::splines::{Rows, Splines};
 use mapper_numerics::statistics::{mean, median, quantile};
 use nalgebra::{DMatrix, DVector};
 
-/// Parameters that an offset of a whole line moves together: flow; head with work, as an error of speed does, which
-/// leaves efficiency alone; work alone, which is efficiency.
+/// Parameters that an offset of a whole line changes: flow; head with work (an error of speed, without effect on efficiency); work alone
+/// (efficiency).
 pub(crate) const LINE_OFFSETS: [&[usize]; 3] = [&[CHOKE_FLOW], &[ZERO_SLOPE_HEAD, WORK], &[WORK]];
-/// Maximum number of knots over speed.
 const MAX_KNOTS: usize = 10;
-/// Standard deviations of the level of each parameter about its starting value: wide for what points determine.
+/// Prior standard deviations of each parameter's level about its starting value: wide if points determine the parameter.
 const LEVEL_SD: Parameters = [2.0, 2.0, 0.7, 0.25, 0.4, 0.4, 0.03, 0.03, 2.0, 1.0, 1.0, 0.5, 0.5, 0.5];
 
-/// What a round of the fit works on.
+/// Data and basis of a fit.
 pub(crate) struct Problem<'a> {
     pub(crate) data: &'a Observations,
     pub(crate) frame: FlowFrame,
@@ -40,12 +38,12 @@ pub(crate) struct Unknowns {
 }
 
 impl<'a> Problem<'a> {
-    /// `frame`: that of another fit, so that its parameters mean the same here; `None` for one of its own.
+    /// `frame`: that of another fit, so that parameters are comparable; `None` for the data's own.
     pub(crate) fn new(data: &'a Observations, frame: Option<FlowFrame>) -> Self {
         let mut ratios: Vec<f64> =
             data.lines_rpm.iter().map(|speed| speed / data.nominal_speed_rpm).collect();
         ratios.dedup_by(|b, a| *b < *a * 1.02);
-        let splines = Splines::new(&if ratios.len() <= MAX_KNOTS { ratios } else { thinned(&ratios) });
+        let splines = Splines::new(&if ratios.len() <= MAX_KNOTS { ratios } else { select_knots(&ratios) });
         let rows = data.points.iter().map(|p| splines.rows(p.speed_ratio)).collect();
         let frame = frame.unwrap_or_else(|| frame_of(data));
         let mut problem = Problem { data, frame, splines, rows, start: [0.0; PARAMETERS] };
@@ -53,7 +51,7 @@ impl<'a> Problem<'a> {
         problem
     }
 
-    /// Largest value of a line's points, for each line.
+    /// Maximum of a value over the points of each line.
     pub(crate) fn line_maxima(&self, value: impl Fn(&Observation) -> f64) -> Vec<f64> {
         let mut largest = vec![f64::MIN; self.data.lines_rpm.len()];
         for point in &self.data.points {
@@ -143,7 +141,9 @@ impl<'a> Problem<'a> {
     pub(crate) fn weights(&self, residuals: &[[f64; 2]], scale: &[f64; 2]) -> Vec<[f64; 2]> {
         let weight = |(p, r): (&Observation, &[f64; 2])| {
             let variance = [scale[0] * scale[0], scale[1] * scale[1] + p.eta_error * p.eta_error];
-            let cauchy = |i: usize| 1.0 / (1.0 + r[i] * r[i] / variance[i] / (ROBUST * ROBUST)) / variance[i];
+            let cauchy = |i: usize| {
+                1.0 / (1.0 + r[i] * r[i] / variance[i] / (ROBUST_SIGMAS * ROBUST_SIGMAS)) / variance[i]
+            };
             [cauchy(0), if p.eta.is_some() { cauchy(1) } else { 0.0 }]
         };
         self.data.points.iter().zip(residuals).map(weight).collect()
@@ -168,7 +168,7 @@ impl<'a> Problem<'a> {
             let work_terms = shape.work_terms(here.flow_at_nominal_kg_s, here.head);
             for q in 0..PARAMETERS {
                 let (x, y, eta) = if q >= WORK {
-                    // Work moves nothing but efficiency.
+                    // The work parameters affect efficiency only.
                     (0.0, 0.0, -foot.place.eta * work_terms[q - WORK])
                 } else {
                     let mut moved = parameters;
@@ -180,7 +180,7 @@ impl<'a> Problem<'a> {
                         (place.eta - foot.place.eta) / STEP,
                     )
                 };
-                // The foot moves along the line as the line moves.
+                // The nearest place moves along the line as the line moves.
                 let along = (x * foot.slope[0] + y * foot.slope[1]) / length;
                 let derivative = [-(x * nx + y * ny), -(eta - foot.slope[2] * along)];
                 for c in 0..2 {
@@ -249,7 +249,7 @@ impl<'a> Problem<'a> {
     pub(crate) fn stepped(&self, unknowns: &Unknowns, step: &DVector<f64>) -> Unknowns {
         let (knots, lines) = (self.splines.len(), self.data.lines_rpm.len());
         let mut next = unknowns.clone();
-        // Half a logarithm at a time: beyond, the linearisation says nothing.
+        // At most half a logarithm per step: the linearisation is not valid beyond.
         let limited = |at: usize| step[at].clamp(-0.5, 0.5);
         for q in 0..PARAMETERS {
             for k in 0..knots {
@@ -283,8 +283,8 @@ fn scales(point: &Observation) -> Scales {
     Scales { flow_kg_s: point.flow_scale_kg_s, ratio: point.ratio_scale }
 }
 
-/// [`MAX_KNOTS`] of the speeds, spread over their ranks.
-fn thinned(ratios: &[f64]) -> Vec<f64> {
+/// Selects [`MAX_KNOTS`] of the speeds, spread over their ranks.
+fn select_knots(ratios: &[f64]) -> Vec<f64> {
     let last = (ratios.len() - 1) as f64;
     (0..MAX_KNOTS)
         .map(|i| {

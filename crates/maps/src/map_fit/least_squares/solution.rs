@@ -1,7 +1,7 @@
-//! What a fit gives: parameters at any speed, with their covariance.
+//! Solution of a fit: parameters at any speed, with their covariance.
 
 use crate::map_fit::least_squares::problem::LINE_OFFSETS;
-use crate::map_fit::speed_lines::ends::{Beyond, BothEnds, End, PLAIN};
+use crate::map_fit::speed_lines::ends::{End, EndWidenings, NO_WIDENING, Widening};
 use crate::map_fit::speed_lines::line_shape::{FlowFrame, LineShape, PARAMETERS, Parameters, WORK};
 use crate::map_fit::speed_lines::splines::Splines;
 use mapper_numerics::statistics::{NORMAL_975, student_quantile};
@@ -18,16 +18,16 @@ pub(crate) struct Solution {
     pub(crate) covariance: DMatrix<f64>,
     /// One over the penalty: variance of the roughness.
     pub(crate) roughness_variance: Parameters,
-    /// How much wider what is drawn on beyond the measured speeds is than its roughness says.
-    pub(crate) beyond: BothEnds,
+    /// Widening of the errors beyond the measured speeds.
+    pub(crate) widening: EndWidenings,
     /// Standard deviations of the line offsets, logarithms.
     pub line_scatter: [f64; 3],
-    /// Scales of distance and efficiency that the residuals were weighted by.
+    /// Scales of distance and efficiency that weight the residuals.
     pub(crate) scales: [f64; 2],
     /// Root mean squares of distance and efficiency.
     pub rms: [f64; 2],
-    /// Minus twice the logarithm of the marginal likelihood by Laplace's approximation, but for a constant of the data.
-    pub(crate) improbability: f64,
+    /// Minus twice the logarithm of the marginal likelihood by Laplace's approximation, up to a constant of the data.
+    pub(crate) deviance: f64,
     /// Highest efficiency of the fit at the points, fraction.
     pub best_eta: f64,
     /// Angles of the feet, in the order of the points.
@@ -45,27 +45,30 @@ impl Solution {
         LineShape::new(&self.parameters(speed_ratio), self.frame)
     }
 
-    /// Factors at a speed: those of the end beyond which it lies.
-    fn beyond_at(&self, speed_ratio: f64) -> Beyond {
-        match self.splines.shape.end_beyond(speed_ratio) {
-            None => PLAIN,
-            Some(End::Slow) => self.beyond.slow,
-            Some(End::Fast) => self.beyond.fast,
+    /// Widening at a speed: that of the end beyond which it lies.
+    fn widening_at(&self, speed_ratio: f64) -> Widening {
+        match self.splines.shape.nearest_end(speed_ratio) {
+            None => NO_WIDENING,
+            Some(End::Slow) => self.widening.slow,
+            Some(End::Fast) => self.widening.fast,
         }
     }
 
-    /// Covariance of the parameters at a speed: of the surface, of a line about it, and of what may happen between the
-    /// knots and beyond them. There a trend may die away, as the surface's does, or go straight on, or anything between: a third
-    /// of the square of the difference, as of any value that is equally likely between two.
+    /// Covariance of the parameters at a speed: of the surface, of a line about it, and of the prior between and beyond the knots.
+    /// Beyond them a trend may fade like the surface's, continue straight, or anything between with equal probability: the mean square
+    /// deviation from the surface is a third of the squared difference.
     pub(crate) fn covariance(&self, speed_ratio: f64) -> DMatrix<f64> {
         let (rows, knots) = (self.splines.rows(speed_ratio), self.splines.len());
-        // The roughness was estimated on this many second differences: Student's quantile over the normal one, squared.
+        // Student's quantile over the normal one, squared, for the number of second differences that estimated the roughness.
         let freedom = knots.saturating_sub(2).max(1) as f64;
         let few = student_quantile(0.975, freedom).map_or(1.0, |quantile| (quantile / NORMAL_975).powi(2));
         let open =
-            (self.splines.shape.open_variance(speed_ratio), self.splines.work.open_variance(speed_ratio));
-        let beyond = self.beyond_at(speed_ratio);
-        let trends = [self.splines.shape.died_away(speed_ratio), self.splines.work.died_away(speed_ratio)];
+            (self.splines.shape.prior_variance(speed_ratio), self.splines.work.prior_variance(speed_ratio));
+        let beyond = self.widening_at(speed_ratio);
+        let trends = [
+            self.splines.shape.straight_minus_damped(speed_ratio),
+            self.splines.work.straight_minus_damped(speed_ratio),
+        ];
         let mut out = DMatrix::zeros(PARAMETERS, PARAMETERS);
         for a in 0..PARAMETERS {
             for b in 0..PARAMETERS {

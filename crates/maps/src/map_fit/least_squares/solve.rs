@@ -1,30 +1,29 @@
-//! The rounds of a fit: steps of Levenberg and Marquardt, and between them the variances.
+//! Solves a fit: Levenberg-Marquardt steps in turn with updates of the variances.
 
 use crate::map_fit::MapFitError;
 use crate::map_fit::least_squares::observations::Observations;
-use crate::map_fit::least_squares::precisions::{Precisions, ROUGHNESS_REACH};
+use crate::map_fit::least_squares::precisions::{Precisions, ROUGHNESS_PRECISION_RANGE};
 use crate::map_fit::least_squares::problem::{LINE_OFFSETS, Problem, Unknowns};
 use crate::map_fit::least_squares::solution::Solution;
-use crate::map_fit::speed_lines::ends::BothEnds;
+use crate::map_fit::speed_lines::ends::EndWidenings;
 use crate::map_fit::speed_lines::line_shape::{FlowFrame, Parameters, WORK};
 use mapper_numerics::least_squares::{Damping, DampingRule, damped_step, inverse};
 use nalgebra::{DMatrix, DVector};
 
-/// Rounds with everything fixed but the parameters, rounds that estimate the variances, and rounds to settle.
+/// Rounds with fixed variances, rounds that estimate the variances, and final rounds with the last variances.
 const ROUNDS: [usize; 3] = [8, 22, 15];
-/// Largest relative change of a variance component at which the estimation has settled.
-const SETTLED: f64 = 0.05;
-/// Scatter of whole lines where the estimation starts: small, since on a map of few lines what begins as scatter is never
-/// found to be shape.
-const SCATTER: f64 = 0.005;
-/// Scales of the residuals where the estimation starts: the first always, the others where it ends [`FAR`] off.
+/// Maximum relative change of a variance component after convergence.
+const MAX_RELATIVE_CHANGE: f64 = 0.05;
+/// Starting scatter of whole lines: small, since on a map of few lines a large one would absorb the shape.
+const START_LINE_SCATTER: f64 = 0.005;
+/// Starting scales of the residuals: the first always, the others if the result is above [`MAX_RMS`].
 const START_SCALES: [f64; 3] = [0.01, 0.003, 0.02];
-/// Root mean square of distance or efficiency beyond which a fit is tried from other scales.
-const FAR: f64 = 0.006;
-/// Roughness of each parameter over speed where the estimation starts.
-const ROUGHNESS: Parameters = [0.5, 0.5, 3.0, 1.0, 1.5, 1.5, 0.15, 0.15, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5];
+/// Root mean square of distance or efficiency above which the fit is repeated from other scales.
+const MAX_RMS: f64 = 0.006;
+/// Starting roughness of each parameter over speed.
+const START_ROUGHNESS: Parameters = [0.5, 0.5, 3.0, 1.0, 1.5, 1.5, 0.15, 0.15, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5];
 
-/// Of the search for a step: careful, since feet jump and weights change from round to round.
+/// Damping of the steps: strong, since nearest places and weights change between rounds.
 const DAMPING: DampingRule = DampingRule {
     start: 1e-2,
     growth: 5.0,
@@ -44,22 +43,22 @@ enum Start<'a> {
     Near(&'a Solution),
 }
 
-/// What a round of the fit is for.
+/// Phase of the fit.
 enum Phase {
-    /// The parameters come near, the variances stand.
+    /// Parameters with fixed starting variances.
     Free,
-    /// The variances are estimated.
+    /// Estimation of the variances.
     Estimate,
-    /// The parameters follow the last variances.
+    /// Parameters with the estimated variances.
     Settle,
 }
 
-/// Fits. `stiffness` (1 or more) is the factor on the smallest penalty that the estimation may choose.
+/// Solves the fit. `stiffness` (at least 1) multiplies the smallest penalty that the estimation may choose.
 ///
-/// If the points end far from their lines, the estimation may have settled on scatter where there is shape, or on
-/// outliers where there are none: then it is made again from other scales, and the most probable is kept.
+/// If the residuals stay large, the estimation may have taken shape for scatter or points for outliers. It is then repeated from other
+/// scales, and the most probable result counts.
 ///
-/// `near`: a fit of nearly the same points, from which the search may start.
+/// `near`: a fit of nearly the same points, from which the search starts.
 pub(crate) fn solve(
     data: &Observations,
     stiffness: f64,
@@ -69,10 +68,10 @@ pub(crate) fn solve(
     let from = |start: Start<'_>| solve_from(data, stiffness, frame, start);
     let [first, others @ ..] = START_SCALES.map(Start::Scale);
     let mut best = from(near.map_or(first, Start::Near))?;
-    if best.rms[0] > FAR || best.rms[1] > FAR {
+    if best.rms[0] > MAX_RMS || best.rms[1] > MAX_RMS {
         for start in near.map(|_| first).into_iter().chain(others) {
             if let Ok(other) = from(start)
-                && other.improbability < best.improbability
+                && other.deviance < best.deviance
             {
                 best = other;
             }
@@ -88,19 +87,21 @@ fn solve_from(
     start: Start<'_>,
 ) -> Result<Solution, MapFitError> {
     let mut problem = Problem::new(data, frame);
-    let start_rough: Parameters = ROUGHNESS.map(|r| stiffness / (r * r));
+    let start_rough: Parameters = START_ROUGHNESS.map(|r| stiffness / (r * r));
     let mut unknowns = problem.initial()?;
     problem.start =
         std::array::from_fn(|q| if q < WORK { problem.start[q] } else { unknowns.values[(q, 0)] });
     let mut precisions = match start {
-        Start::Scale(scale) => {
-            Precisions { rough: start_rough, lines: [1.0 / SCATTER.powi(2); 3], scales: [scale; 2] }
-        }
+        Start::Scale(scale) => Precisions {
+            rough: start_rough,
+            lines: [1.0 / START_LINE_SCATTER.powi(2); 3],
+            scales: [scale; 2],
+        },
         Start::Near(near) => {
             unknowns.values = problem.splines.values(|speed_ratio| near.parameters(speed_ratio));
             Precisions {
                 rough: std::array::from_fn(|q| {
-                    let [least, most] = ROUGHNESS_REACH.map(|ratio| ratio * start_rough[q]);
+                    let [least, most] = ROUGHNESS_PRECISION_RANGE.map(|ratio| ratio * start_rough[q]);
                     (1.0 / near.roughness_variance[q]).clamp(least, most)
                 }),
                 lines: near.line_scatter.map(|sigma| 1.0 / (sigma * sigma)),
@@ -123,7 +124,7 @@ fn solve_from(
         );
         let transposed = jacobian.transpose();
         let gradient = &transposed * scaled + gradient;
-        // Not tr_mul: a product of two matrices goes through matrixmultiply's kernels.
+        // Not tr_mul: the product of two matrices uses the faster kernels of matrixmultiply.
         let normal_matrix = transposed * &jacobian + &penalty;
         let cost = problem.cost(&residuals, &weights) + problem.penalty_value(&unknowns, &precisions);
         let right = -gradient;
@@ -145,8 +146,8 @@ fn solve_from(
                 let residuals = problem.residuals(&feet);
                 let change =
                     problem.update(&mut precisions, &unknowns, &inverse, &jacobian, &residuals, &start_rough);
-                if round + 1 >= free + estimate || (change < SETTLED && gain < 1e-3 * cost) {
-                    // A foot may have been caught on a wrong part of the line: look at the whole line once more.
+                if round + 1 >= free + estimate || (change < MAX_RELATIVE_CHANGE && gain < 1e-3 * cost) {
+                    // A nearest place may be a local minimum on a wrong part of the line: search the whole line again.
                     feet = problem.feet(&unknowns, None);
                     phase = Phase::Settle;
                 }
@@ -159,17 +160,17 @@ fn solve_from(
     let jacobian = problem.jacobian(&unknowns, &feet, &problem.weights(&residuals, &precisions.scales));
     let information = jacobian.transpose() * &jacobian + problem.penalty(&unknowns, &precisions).0;
     let factor = information.cholesky().ok_or(MapFitError::Singular)?;
-    let improbability = problem.improbability(&unknowns, &precisions, &residuals)
+    let deviance = problem.deviance(&unknowns, &precisions, &residuals)
         + 2.0 * factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
     let covariance = inverse(&factor);
-    // As a user meets the map: points against the smooth surface, without the lines' own offsets.
+    // Residuals of the smooth surface without line offsets, since users evaluate that surface.
     let smooth =
         Unknowns { offsets: DMatrix::zeros(LINE_OFFSETS.len(), data.lines_rpm.len()), ..unknowns.clone() };
     let smooth_feet = problem.feet(&smooth, Some(&feet));
     Ok(Solution {
-        beyond: BothEnds::PLAIN,
+        widening: EndWidenings::NONE,
         rms: problem.rms(&problem.residuals(&smooth_feet)),
-        improbability,
+        deviance,
         best_eta: smooth_feet.iter().map(|foot| foot.place.eta).fold(0.0, f64::max),
         angles_rad: smooth_feet.iter().map(|foot| foot.angle_rad).collect(),
         splines: problem.splines,

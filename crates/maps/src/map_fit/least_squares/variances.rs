@@ -1,18 +1,18 @@
-//! The variance components of a fit, and how probable they make what was measured.
+//! Estimates the variance components of a fit by marginal likelihood.
 //!
 //! The penalty of each parameter over speed, the scatter of the lines and the two residual scales are estimated together
 //! with the fit by the update of S. N. Wood and M. Fasiolo ("A generalized Fellner-Schall method for smoothing parameter
-//! optimization", Biometrics 73 (2017) 1071-1081). No number is tuned to a machine: what a map has enough lines to show is
-//! followed, the rest stays straight over speed.
+//! optimization", Biometrics 73 (2017) 1071-1081). The number of lines thereby determines the
+//! detail over speed: parameters that a map does not determine stay straight.
 
-use crate::map_fit::least_squares::precisions::{Precisions, ROBUST, ROUGHNESS_REACH};
+use crate::map_fit::least_squares::precisions::{Precisions, ROBUST_SIGMAS, ROUGHNESS_PRECISION_RANGE};
 use crate::map_fit::least_squares::problem::{Problem, Unknowns};
 use crate::map_fit::speed_lines::line_shape::{PARAMETERS, Parameters};
 use nalgebra::DMatrix;
 
 impl Problem<'_> {
     /// [`Solution::improbability`] without the determinant of the information.
-    pub(crate) fn improbability(
+    pub(crate) fn deviance(
         &self,
         unknowns: &Unknowns,
         precisions: &Precisions,
@@ -22,7 +22,10 @@ impl Problem<'_> {
         for (p, r) in self.data.points.iter().zip(residuals) {
             let scales = precisions.scales.map(|s| s * s);
             let loss = |variance: f64, r: f64| {
-                variance.ln() + ROBUST * ROBUST * (r * r / variance / (ROBUST * ROBUST)).ln_1p()
+                variance.ln()
+                    + ROBUST_SIGMAS
+                        * ROBUST_SIGMAS
+                        * (r * r / variance / (ROBUST_SIGMAS * ROBUST_SIGMAS)).ln_1p()
             };
             sum += loss(scales[0], r[0]);
             if p.eta.is_some() {
@@ -57,7 +60,7 @@ impl Problem<'_> {
             let free = (knots.saturating_sub(2) as f64 - used).max(1e-2);
             let wanted = free / (values.dot(&(&self.splines.of(q).penalty * &values)) + 1e-9);
             let step = (wanted / precisions.rough[q]).clamp(0.3, 3.0);
-            let [least, most] = ROUGHNESS_REACH.map(|ratio| ratio * start);
+            let [least, most] = ROUGHNESS_PRECISION_RANGE.map(|ratio| ratio * start);
             let next = (precisions.rough[q] * step).clamp(least, most);
             set(&mut precisions.rough[q], next);
         }
@@ -66,7 +69,7 @@ impl Problem<'_> {
             let trace: f64 = (first..first + lines).map(|i| inverse[(i, i)]).sum();
             let wanted = (lines as f64 - *precision * trace).max(0.01)
                 / (unknowns.offsets.row(index).norm_squared() + 1e-9);
-            // Between 0.05 % and 3 %: less is not an error of speed, more is another machine.
+            // Between 0.05 % and 3 %: a smaller scatter is not an error of speed, a larger one would be another machine.
             let next = (*precision * (wanted / *precision).clamp(0.5, 2.0)).clamp(1.0 / 9e-4, 4e6);
             set(precision, next);
         }
@@ -79,8 +82,8 @@ impl Problem<'_> {
                 }
                 let own = if c == 1 { p.eta_error.powi(2) } else { 0.0 };
                 let variance = precisions.scales[c].powi(2) + own;
-                let robust = 1.0 / (1.0 + r[c] * r[c] / variance / (ROBUST * ROBUST));
-                // What a point declares of itself is not scatter of the fit's.
+                let robust = 1.0 / (1.0 + r[c] * r[c] / variance / (ROBUST_SIGMAS * ROBUST_SIGMAS));
+                // A point's declared error is not scatter of the fit.
                 let share = precisions.scales[c].powi(2) / variance;
                 let leverage = projected.row(2 * i + c).dot(&jacobian.row(2 * i + c));
                 sum[0] += robust * share * share * (r[c] * r[c] - own).max(0.0);

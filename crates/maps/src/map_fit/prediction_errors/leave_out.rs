@@ -1,17 +1,17 @@
-//! How well a line is predicted by the others.
+//! Prediction errors of left-out lines.
 
 use crate::map_fit::fitted_surface::surface::MapFit;
-use crate::map_fit::prediction_errors::miss::Off;
+use crate::map_fit::prediction_errors::deviation::Deviation;
 use crate::map_fit::speed_lines::ends::End;
 use mapper_core::LeftOutLine;
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::{NORMAL_975, median};
 
-/// Leaves each line out in turn, fits the others again, and measures the line's points against what that fit says at its
-/// speed. Lines without which too little is left are passed over.
+/// Leaves each line out in turn, fits the others, and compares the line's points with that fit. Lines without which the rest cannot be
+/// fitted are skipped.
 ///
-/// Each search starts from the fit of all lines, parameters and variances: it ends close to where one from the beginning
-/// does (docs/validation/maps.md says how close), in a third of the rounds.
+/// Each search starts from the fit of all lines, which takes a third of the rounds; docs/validation/maps.md compares its result with that of
+/// a search from scratch.
 pub fn leave_out(fit: &MapFit) -> Vec<LeftOutLine> {
     let count = fit.data.lines_rpm.len();
     let one = |line: usize| {
@@ -24,13 +24,13 @@ pub fn leave_out(fit: &MapFit) -> Vec<LeftOutLine> {
 
 fn left_out(all: &MapFit, line: usize, end: Option<End>) -> Option<LeftOutLine> {
     let data = &all.data;
-    let rest = MapFit::of(data.without(line).ok()?, Some(&all.solution)).ok()?;
+    let rest = MapFit::of(data.without_line(line).ok()?, Some(&all.solution)).ok()?;
     let rest = rest.widened(end.as_slice());
     let (mut distances, mut errors) = (Vec::new(), Vec::new());
     let (mut distances_held, mut errors_held) = (0usize, 0usize);
-    let held = |off: Off| usize::from(off.by <= NORMAL_975 * off.standard_error);
+    let held = |off: Deviation| usize::from(off.by <= NORMAL_975 * off.standard_error);
     for point in data.points.iter().filter(|point| point.line == line) {
-        let miss = rest.miss(point);
+        let miss = rest.deviations(point);
         distances.push(miss.distance.by);
         distances_held += held(miss.distance);
         if let Some(off) = miss.eta {

@@ -1,5 +1,5 @@
-//! Prediction errors of a map fit: deviations at points, omitted lines, and extrapolation beyond the measured speeds.
+//! Prediction errors of a map fit: deviations at points, left-out lines, and extrapolation beyond the measured speeds.
 
-pub(crate) mod beyond;
+pub(crate) mod deviation;
+pub(crate) mod extrapolation;
 pub(crate) mod leave_out;
-pub(crate) mod miss;

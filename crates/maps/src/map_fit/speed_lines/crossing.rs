@@ -1,13 +1,13 @@
-//! Whether speed lines cross.
+//! Counts crossing speed lines.
 
 use mapper_core::FittedLine;
 
-/// Pairs of neighbouring lines of which a segment of one meets a segment of the other.
-pub(crate) fn crossings(lines: &[FittedLine]) -> usize {
-    lines.windows(2).filter(|pair| cross(&pair[0], &pair[1])).count()
+/// Number of pairs of neighbouring lines with intersecting segments.
+pub(crate) fn count_crossings(lines: &[FittedLine]) -> usize {
+    lines.windows(2).filter(|pair| lines_cross(&pair[0], &pair[1])).count()
 }
 
-fn cross(a: &FittedLine, b: &FittedLine) -> bool {
+fn lines_cross(a: &FittedLine, b: &FittedLine) -> bool {
     let points = |line: &FittedLine| -> Vec<(f64, f64)> {
         line.nodes.iter().map(|n| (n.flow_corrected_kg_s, n.pressure_ratio)).collect()
     };

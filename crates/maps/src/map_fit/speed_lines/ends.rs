@@ -1,16 +1,15 @@
-//! The two ends of the measured speeds, and how much wider than its roughness says a fit's errors are beyond each.
+//! The two ends of the measured speeds, with the widening of a fit's errors beyond each.
 
-/// Factors on the variance of what is drawn on beyond one end; 1 if the roughness says enough.
+/// Factors on the variance beyond one end; 1 if the roughness explains the deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Beyond {
+pub(crate) struct Widening {
     /// Of the shape of lines.
     pub shape: f64,
     /// Of work, and so of efficiency.
     pub work: f64,
 }
 
-/// As the roughness says.
-pub(crate) const PLAIN: Beyond = Beyond { shape: 1.0, work: 1.0 };
+pub(crate) const NO_WIDENING: Widening = Widening { shape: 1.0, work: 1.0 };
 
 /// An end of the measured speeds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,17 +18,17 @@ pub(crate) enum End {
     Fast,
 }
 
-/// Factors of both ends.
+/// Widenings of both ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct BothEnds {
-    pub slow: Beyond,
-    pub fast: Beyond,
+pub(crate) struct EndWidenings {
+    pub slow: Widening,
+    pub fast: Widening,
 }
 
-impl BothEnds {
-    pub(crate) const PLAIN: BothEnds = BothEnds { slow: PLAIN, fast: PLAIN };
+impl EndWidenings {
+    pub(crate) const NONE: EndWidenings = EndWidenings { slow: NO_WIDENING, fast: NO_WIDENING };
 
-    pub(crate) fn both(factors: Beyond) -> BothEnds {
-        BothEnds { slow: factors, fast: factors }
+    pub(crate) fn both(factors: Widening) -> EndWidenings {
+        EndWidenings { slow: factors, fast: factors }
     }
 }

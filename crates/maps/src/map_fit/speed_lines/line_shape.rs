@@ -2,13 +2,13 @@
 //!
 //! Ellipse family of O. Leufven and L. Eriksson ("A surge and choke capable compressor flow model", Control
 //! Engineering Practice 21 (2013) 1871-1883; LiU CPgui): a zero-slope point, a choke point and two exponents,
-//! `((flow - flow_zs)/(flow_ch - flow_zs))^n + ((head - head_ch)/(head_zs - head_ch))^k = 1`. Here it is walked by the
-//! angle around the ellipse's centre, so that the flat part at surge, the vertical part at choke and what lies on the
-//! surge side of the zero-slope point are one smooth curve; the radius takes a small harmonic correction.
+//! `((flow - flow_zs)/(flow_ch - flow_zs))^n + ((head - head_ch)/(head_zs - head_ch))^k = 1`. The angle around
+//! the ellipse's centre parametrises it, so that the flat part at surge, the vertical part at choke and the surge side of the zero-slope
+//! point are one smooth curve. The radius has a small harmonic correction.
 //!
-//! Efficiency is isentropic head over actual work. The logarithm of the work coefficient (Euler work less slip, plus
-//! friction and recirculation) is a cubic of the flow coefficient with two terms for the drop towards choke; it changes
-//! little with speed, which is what lets efficiency be carried to speeds that were not measured.
+//! Efficiency is isentropic head over actual work. The logarithm of the work coefficient (Euler work minus slip, plus
+//! friction and recirculation) is a cubic of the flow coefficient with two terms for the drop towards choke; it
+//! changes little with speed, so efficiency can be extrapolated over speed.
 
 use mapper_physics::compressor_map::similarity::pressure_ratio_of_signed_head;
 
@@ -27,7 +27,7 @@ pub(crate) const ZERO_SLOPE_HEAD: usize = 1;
 pub(crate) const ZERO_SLOPE_FLOW: usize = 2;
 /// Parameter: head at choke over head at zero slope, softly limited.
 pub(crate) const CHOKE_HEAD: usize = 3;
-/// Parameters: logarithms of the exponents less [`MIN_EXPONENT`].
+/// Parameters: logarithms of the exponents minus [`MIN_EXPONENT`].
 pub(crate) const EXPONENTS: [usize; 2] = [4, 5];
 /// First parameter of the correction.
 pub(crate) const HARMONIC: usize = 6;
@@ -37,19 +37,19 @@ pub(crate) const WORK: usize = 6 + HARMONICS;
 /// Parameters of a line, see the constants.
 pub(crate) type Parameters = [f64; PARAMETERS];
 
-/// Exponents stay above this: at 1 the line would have corners.
+/// Minimum exponent: at 1 the line would have corners.
 const MIN_EXPONENT: f64 = 1.05;
-/// Largest size of the choke head over that at zero slope.
-const CHOKE_HEAD_LIMIT: f64 = 0.7;
-/// Lowest angle at all, rad: low enough for a pressure ratio below 1 on every line ([`CHOKE_HEAD_LIMIT`]).
-pub(crate) const LOWEST_ANGLE: f64 = -3.0;
-/// Bounds of the angle where points are looked for, rad: 0 is choke, pi/2 zero slope; below 0 the line falls vertically.
-pub(crate) const ANGLE_RANGE: (f64, f64) = (-0.6, 0.8 * std::f64::consts::PI);
+/// Maximum absolute choke head over the head at zero slope.
+const MAX_CHOKE_HEAD_RATIO: f64 = 0.7;
+/// Minimum angle, rad: low enough for a pressure ratio below 1 on every line ([`MAX_CHOKE_HEAD_RATIO`]).
+pub(crate) const MIN_ANGLE_RAD: f64 = -3.0;
+/// Range of the angle for the nearest place, rad: 0 is choke, pi/2 zero slope; below 0 the line is vertical.
+pub(crate) const ANGLE_RANGE_RAD: (f64, f64) = (-0.6, 0.8 * std::f64::consts::PI);
 
-/// Location and scale of the flow coefficients: makes the work coefficient's terms of order 1.
+/// Location and scale of the flow coefficients, so that the terms of the work coefficient are of order 1.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FlowFrame {
-    /// Middle of all measured flows over the speed ratio, kg/s.
+    /// Centre of the measured flows over the speed ratio, kg/s.
     pub middle_kg_s: f64,
     /// Half their range, kg/s.
     pub half_range_kg_s: f64,
@@ -74,7 +74,7 @@ pub(crate) struct PhysicalPlace {
     pub eta: f64,
 }
 
-/// A line ready to be walked.
+/// A line as a curve over the angle.
 #[derive(Debug, Clone)]
 pub(crate) struct LineShape {
     choke_flow: f64,
@@ -98,7 +98,9 @@ impl LineShape {
         LineShape {
             choke_flow,
             zero_slope_flow: choke_flow / (1.0 + (-p[ZERO_SLOPE_FLOW]).exp()),
-            choke_head: zero_slope_head * CHOKE_HEAD_LIMIT * (p[CHOKE_HEAD] / CHOKE_HEAD_LIMIT).tanh(),
+            choke_head: zero_slope_head
+                * MAX_CHOKE_HEAD_RATIO
+                * (p[CHOKE_HEAD] / MAX_CHOKE_HEAD_RATIO).tanh(),
             zero_slope_head,
             exponents: EXPONENTS.map(|i| MIN_EXPONENT + p[i].clamp(-4.0, 2.2).exp()),
             harmonics,
@@ -110,7 +112,7 @@ impl LineShape {
     /// The place at an angle, rad.
     pub(crate) fn at(&self, angle_rad: f64) -> Place {
         let (x, y) = if angle_rad <= 0.0 {
-            // Choked: the flow stays, the head falls at will.
+            // Choked: the flow is constant while the head falls.
             (1.0, angle_rad)
         } else {
             let (sin, cos) = angle_rad.sin_cos();
@@ -150,7 +152,7 @@ impl LineShape {
             }
         }
         let r = log_r.exp();
-        // None at choke, nor its slope: there the line must not lean over.
+        // The correction and its slope are zero at choke, so that the line stays vertical there.
         let correction: f64 = sin
             * sin
             * self

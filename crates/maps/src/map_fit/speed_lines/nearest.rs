@@ -1,6 +1,6 @@
-//! The place on a line nearest to a point, distances in the line's own units.
+//! Finds the place on a line nearest to a point, with distances in the line's units.
 
-use crate::map_fit::speed_lines::line_shape::{ANGLE_RANGE, LineShape, PhysicalPlace};
+use crate::map_fit::speed_lines::line_shape::{ANGLE_RANGE_RAD, LineShape, PhysicalPlace};
 
 /// Units of distance of a line.
 #[derive(Debug, Clone, Copy)]
@@ -9,7 +9,7 @@ pub(crate) struct Scales {
     pub ratio: f64,
 }
 
-/// Nearest place, with the line's direction there.
+/// Nearest place to a point (foot of the perpendicular), with the line's direction.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Foot {
     pub angle_rad: f64,
@@ -20,12 +20,12 @@ pub(crate) struct Foot {
     pub distance: f64,
 }
 
-/// How far a foot may move along its line at once, rad.
-const REACH: f64 = 0.12;
+/// Maximum step along the line, rad.
+const MAX_STEP_RAD: f64 = 0.12;
 /// Half step of the difference quotients by angle, rad.
-const STEP: f64 = 1e-5;
+const DIFFERENCE_STEP_RAD: f64 = 1e-5;
 
-/// The nearest place; starts at `guess_rad` if one is given, else tries the whole line.
+/// Finds the nearest place, from `guess_rad` if it is given, else on the whole line.
 pub(crate) fn nearest(
     shape: &LineShape,
     speed_ratio: f64,
@@ -45,10 +45,10 @@ pub(crate) fn nearest(
         x * x + y * y
     };
     let (start, low, high) = match guess_rad {
-        Some(guess) => (guess, guess - REACH, guess + REACH),
-        None => best_of_net(&squared),
+        Some(guess) => (guess, guess - MAX_STEP_RAD, guess + MAX_STEP_RAD),
+        None => search_grid(&squared),
     };
-    // Gauss-Newton in one variable from there, halved if it does not come nearer.
+    // Gauss-Newton in one variable; a step that does not reduce the distance is halved.
     let mut foot = describe(shape, speed_ratio, start, offset, scales);
     let mut least = squared(start);
     for _ in 0..8 {
@@ -76,11 +76,11 @@ pub(crate) fn nearest(
     foot
 }
 
-/// The best of nets of falling mesh over the whole line, and the last mesh's bounds about it.
-fn best_of_net(squared: &impl Fn(f64) -> f64) -> (f64, f64, f64) {
-    let (mut low, mut high) = ANGLE_RANGE;
+/// The best angle of ever finer grids over the whole line, with its neighbours on the last grid.
+fn search_grid(squared: &impl Fn(f64) -> f64) -> (f64, f64, f64) {
+    let (mut low, mut high) = ANGLE_RANGE_RAD;
     let mut best = low;
-    // The first is fine enough to distinguish the flat from the steep part.
+    // The first grid distinguishes the flat from the steep part.
     for mesh in [48, 10] {
         let step = (high - low) / f64::from(mesh);
         let mut least = f64::INFINITY;
@@ -104,12 +104,14 @@ fn describe(
     scales: Scales,
 ) -> Foot {
     let place = shape.physical(angle_rad, speed_ratio);
-    let (before, after) =
-        (shape.physical(angle_rad - STEP, speed_ratio), shape.physical(angle_rad + STEP, speed_ratio));
+    let (before, after) = (
+        shape.physical(angle_rad - DIFFERENCE_STEP_RAD, speed_ratio),
+        shape.physical(angle_rad + DIFFERENCE_STEP_RAD, speed_ratio),
+    );
     let slope = [
-        (after.flow_kg_s - before.flow_kg_s) / scales.flow_kg_s / (2.0 * STEP),
-        (after.pressure_ratio - before.pressure_ratio) / scales.ratio / (2.0 * STEP),
-        (after.eta - before.eta) / (2.0 * STEP),
+        (after.flow_kg_s - before.flow_kg_s) / scales.flow_kg_s / (2.0 * DIFFERENCE_STEP_RAD),
+        (after.pressure_ratio - before.pressure_ratio) / scales.ratio / (2.0 * DIFFERENCE_STEP_RAD),
+        (after.eta - before.eta) / (2.0 * DIFFERENCE_STEP_RAD),
     ];
     let (x, y) = offset(angle_rad);
     let (nx, ny) = normal(&slope);

@@ -1,4 +1,4 @@
-//! A natural cubic spline over a coordinate of speed, with the penalty that makes it smooth.
+//! A natural cubic spline over a coordinate of speed, with a roughness penalty.
 //!
 //! Source: P. J. Green, B. W. Silverman, Nonparametric Regression and Generalized Linear Models (1994), ch. 2: values
 //! at the knots as parameters, `g'' = R^-1 Q' g`, integral of `g''^2` equal to `g' K g` with `K = Q R^-1 Q'`.
@@ -6,13 +6,12 @@
 use crate::map_fit::speed_lines::ends::End;
 use nalgebra::{DMatrix, DVector};
 
-/// Length over which the slope beyond the outermost knots dies away, as a share of the nominal speed (or its inverse),
-/// and at most half of what the knots cover: far outside, similarity holds, and what is a trend inside must not run away.
-const DAMPING: f64 = 0.5;
+/// Decay length of the slope beyond the outermost knots, as a share of the nominal speed (or its inverse); at most half the range of the
+/// knots. Similarity holds far outside, so a trend must not continue.
+const DAMPING_LENGTH_RATIO: f64 = 0.5;
 
-/// The coordinate of a parameter, of speed over the nominal speed: flow and head change with the Mach number, in
-/// proportion to speed; what work there is besides Euler's (friction at small Reynolds numbers, heat) fades with its
-/// inverse. Between measured lines this matters little, beyond them much.
+/// Coordinate of a parameter as a function of speed over the nominal speed: flow and head change with the Mach number, in proportion to
+/// speed; work other than Euler's (friction, heat) with the inverse. It matters beyond the measured lines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Coordinate {
     Speed,
@@ -23,13 +22,13 @@ impl Coordinate {
     pub(crate) fn of(self, speed_ratio: f64) -> f64 {
         match self {
             Coordinate::Speed => speed_ratio,
-            // Rising with speed, as the other.
+            // Increases with speed, like the other.
             Coordinate::Slowness => -1.0 / speed_ratio,
         }
     }
 }
 
-/// The spline's knots and what follows from them.
+/// A spline by its knots.
 #[derive(Debug, Clone)]
 pub(crate) struct SpeedSpline {
     coordinate: Coordinate,
@@ -62,7 +61,7 @@ impl SpeedSpline {
                     r[(j + 1, j)] = h[j + 1] / 6.0;
                 }
             }
-            // R is diagonally dominant: it has a Cholesky factor for any rising knots.
+            // R is diagonally dominant, so it has a Cholesky factor for any increasing knots.
             if let Some(factor) = r.cholesky() {
                 let inner = factor.solve(&q.transpose());
                 second.view_mut((1, 0), (n - 2, n)).copy_from(&inner);
@@ -76,7 +75,7 @@ impl SpeedSpline {
         self.knots.len()
     }
 
-    /// Weights of the knot values that give the value at a speed.
+    /// Weights of the knot values in the value at a speed.
     pub(crate) fn row(&self, speed_ratio: f64) -> DVector<f64> {
         let at = self.coordinate.of(speed_ratio);
         let (n, x) = (self.knots.len(), &self.knots);
@@ -103,17 +102,16 @@ impl SpeedSpline {
         row
     }
 
-    /// How far the slope at the end goes on beyond the knots before it has died away, and how much further the speed lies, both in
-    /// the coordinate.
+    /// Effective length of the decaying end slope at a speed beyond the knots, and the rest of the distance, both in the coordinate.
     fn reach(&self, speed_ratio: f64) -> (f64, f64) {
         let (outside, x) = (self.outside(speed_ratio), &self.knots);
-        let damping = DAMPING.min(0.5 * (x[x.len() - 1] - x[0]));
+        let damping = DAMPING_LENGTH_RATIO.min(0.5 * (x[x.len() - 1] - x[0]));
         let reach = if damping > 0.0 { damping * (1.0 - (-outside / damping).exp()) } else { 0.0 };
         (reach, outside - reach)
     }
 
-    /// Weights of the knot values that give the slope at the end nearest to a place outside, outwards: the secant's, corrected by
-    /// the curvature at the inner knot. At least two knots.
+    /// Weights of the knot values in the outward slope at the end nearest to a place outside: the secant, corrected by the curvature at the
+    /// inner knot. Needs two knots.
     fn end_slope(&self, at: f64) -> DVector<f64> {
         let (n, x) = (self.knots.len(), &self.knots);
         let (end, inner) = if at < x[0] { (0, 1) } else { (n - 1, n - 2) };
@@ -124,19 +122,17 @@ impl SpeedSpline {
         row
     }
 
-    /// Weights of the knot values that give by how much more the value would change beyond the knots if the slope at the end
-    /// went straight on instead of dying away; zeros inside.
-    pub(crate) fn died_away(&self, speed_ratio: f64) -> DVector<f64> {
+    /// Weights of the knot values in the difference between a constant and a decaying slope beyond the knots; zeros inside.
+    pub(crate) fn straight_minus_damped(&self, speed_ratio: f64) -> DVector<f64> {
         if self.knots.len() < 2 || self.outside(speed_ratio) == 0.0 {
             return DVector::zeros(self.knots.len());
         }
         self.end_slope(self.coordinate.of(speed_ratio)) * self.reach(speed_ratio).1
     }
 
-    /// Variance of the value at a speed where all knot values are known, for roughness (the variance that the penalty
-    /// is one over of) 1: with that prior the spline is an integrated random walk, and what it does between its knots and
-    /// beyond them is open. 0 at a knot.
-    pub(crate) fn open_variance(&self, speed_ratio: f64) -> f64 {
+    /// Prior variance of the value at a speed given all knot values, for a roughness variance of 1 (an integrated random walk); 0 at a
+    /// knot.
+    pub(crate) fn prior_variance(&self, speed_ratio: f64) -> f64 {
         let at = self.coordinate.of(speed_ratio);
         let place = self.knots.partition_point(|knot| *knot < at);
         let near = |knot: &f64| (knot - at).abs() < 1e-6 * (1.0 + at.abs());
@@ -150,13 +146,13 @@ impl SpeedSpline {
         if precision > 0.0 { 1.0 / precision } else { 0.0 }
     }
 
-    /// Beyond which end of the knots a speed lies; `None` inside.
-    pub(crate) fn end_beyond(&self, speed_ratio: f64) -> Option<End> {
+    /// The end of the knots beyond which a speed lies; `None` inside.
+    pub(crate) fn nearest_end(&self, speed_ratio: f64) -> Option<End> {
         let slow = self.coordinate.of(speed_ratio) < self.knots[0];
         (self.outside(speed_ratio) > 0.0).then_some(if slow { End::Slow } else { End::Fast })
     }
 
-    /// How far a speed lies outside the knots, in the coordinate; 0 inside.
+    /// Distance of a speed from the knots in the coordinate; 0 inside.
     pub(crate) fn outside(&self, speed_ratio: f64) -> f64 {
         let at = self.coordinate.of(speed_ratio);
         let (first, last) = (self.knots[0], self.knots[self.knots.len() - 1]);
@@ -182,13 +178,13 @@ mod tests {
             let inside = t * at;
             prop_assert!((spline.row(inside).dot(&values) - (0.3 + slope * inside)).abs() < 1e-9);
             prop_assert!((values.transpose() * &spline.penalty * &values)[(0, 0)].abs() < 1e-9);
-            // Outside the slope goes on at first and then dies away.
+            // Outside the slope continues and then decays.
             let near = spline.row(at + 1e-6).dot(&values);
             prop_assert!((near - (0.3 + slope * (at + 1e-6))).abs() < 1e-9);
             let far = spline.row(at + 50.0).dot(&values);
-            prop_assert!((far - (0.3 + slope * (at + DAMPING.min(0.5 * at)))).abs() < 1e-9);
-            // What has died away is the rest of the straight line.
-            let straight = far + spline.died_away(at + 50.0).dot(&values);
+            prop_assert!((far - (0.3 + slope * (at + DAMPING_LENGTH_RATIO.min(0.5 * at)))).abs() < 1e-9);
+            // The difference to the straight line is the decayed part.
+            let straight = far + spline.straight_minus_damped(at + 50.0).dot(&values);
             prop_assert!((straight - (0.3 + slope * (at + 50.0))).abs() < 1e-9);
         }
 
@@ -198,9 +194,9 @@ mod tests {
         fn what_lies_between_two_knots_is_open(h in 0.05..2.0f64) {
             let spline = SpeedSpline::new(Coordinate::Speed, &[0.0, 2.0 * h]);
             let exact = h.powi(3) / 6.0;
-            prop_assert!((spline.open_variance(h) / exact - 1.0).abs() < 1e-9);
-            prop_assert!(spline.open_variance(2.0 * h) == 0.0);
-            prop_assert!(spline.open_variance(3.0 * h) > spline.open_variance(2.5 * h));
+            prop_assert!((spline.prior_variance(h) / exact - 1.0).abs() < 1e-9);
+            prop_assert!(spline.prior_variance(2.0 * h) == 0.0);
+            prop_assert!(spline.prior_variance(3.0 * h) > spline.prior_variance(2.5 * h));
         }
 
         #[test]

@@ -1,4 +1,4 @@
-//! The splines over speed that all parameters share, and their weights at a speed.
+//! Splines over speed that all parameters share, with their weights at a speed.
 
 use crate::map_fit::speed_lines::line_shape::{PARAMETERS, Parameters, WORK};
 use crate::map_fit::speed_lines::speed_spline::{Coordinate, SpeedSpline};
@@ -7,11 +7,8 @@ use nalgebra::{DMatrix, DVector};
 /// Splines over speed with equal knots.
 #[derive(Debug, Clone)]
 pub(crate) struct Splines {
-    /// Of the line's shape.
     pub shape: SpeedSpline,
-    /// Of the work coefficient.
     pub work: SpeedSpline,
-    /// Of the knots.
     speed_ratios: Vec<f64>,
 }
 
@@ -32,7 +29,7 @@ impl Splines {
         Rows { shape: self.shape.row(speed_ratio), work: self.work.row(speed_ratio) }
     }
 
-    /// Knot values, one row per parameter, of parameters that are known at any speed.
+    /// Knot values, one row per parameter, of parameters given as a function of speed.
     pub(crate) fn values(&self, at: impl Fn(f64) -> Parameters) -> DMatrix<f64> {
         let mut values = DMatrix::zeros(PARAMETERS, self.len());
         for (k, speed_ratio) in self.speed_ratios.iter().enumerate() {

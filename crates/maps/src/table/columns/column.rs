@@ -1,4 +1,4 @@
-//! What a column of a map's table holds, from its heading.
+//! Quantity and unit of a table column, from its heading.
 
 use crate::table::columns::quantity::Quantity;
 use crate::table::columns::quantity_name::{is_turbine, quantity_of_name, quantity_of_turbine};
@@ -11,16 +11,14 @@ use mapper_yaml::units::{Kind, Reference, Unit, header_unit, split_unit, volume_
 pub(crate) struct Column {
     pub(crate) index: usize,
     pub(crate) quantity: Quantity,
-    /// Its heading.
     pub(crate) heading: String,
-    /// Its unit as written; empty if it names none.
+    /// Unit as written; empty if the heading has none.
     pub(crate) unit: String,
-    /// Whether it is a pressure over the ambient one.
     pub(crate) is_gauge: bool,
     scale: Scale,
 }
 
-/// How a value becomes SI.
+/// Conversion of a value to SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Scale {
     Unit(&'static Unit),
@@ -43,7 +41,7 @@ impl Column {
     /// A column with the unit of its heading, if there is one.
     ///
     /// # Errors
-    /// [`ColumnError::Unit`] if it is none of the quantity.
+    /// [`ColumnError::Unit`] if the unit does not fit the quantity.
     pub(crate) fn with_unit(
         index: usize,
         quantity: Quantity,
@@ -51,7 +49,7 @@ impl Column {
         unit: Option<&str>,
     ) -> Result<Column, ColumnError> {
         let heading: String = heading.chars().take(60).collect();
-        let Some(text) = unit.filter(|unit| !says_nothing(unit)) else {
+        let Some(text) = unit.filter(|unit| !is_dimensionless(unit)) else {
             return Ok(Column { heading, ..Column::bare(index, quantity) });
         };
         let is_measured = matches!(quantity, Quantity::P1 | Quantity::P2 | Quantity::P3 | Quantity::P4);
@@ -69,7 +67,7 @@ impl Column {
     }
 
     /// A value in SI and rpm; reduced ones in rpm/K^0.5 and kg K^0.5/(s kPa).
-    pub(crate) fn plain(&self, value: f64) -> f64 {
+    pub(crate) fn as_stated(&self, value: f64) -> f64 {
         match self.scale {
             Scale::Unit(unit) => unit.to_inside(value),
             Scale::Factor(factor) => factor * value,
@@ -77,8 +75,8 @@ impl Column {
     }
 
     /// A value in SI and rpm. Volume flows count at the density of the reference state, reduced quantities become corrected ones.
-    pub(crate) fn inside(&self, value: f64, reference: ReferenceState) -> f64 {
-        let value = self.plain(value);
+    pub(crate) fn to_corrected_si(&self, value: f64, reference: ReferenceState) -> f64 {
+        let value = self.as_stated(value);
         let (t_ref_k, p_ref_pa) = (reference.t_ref_k, reference.p_ref_pa);
         match self.quantity {
             Quantity::ReducedSpeed => value * t_ref_k.sqrt(),
@@ -99,7 +97,7 @@ impl Column {
     }
 }
 
-/// Why a heading is not understood.
+/// Why a heading is not recognised.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub(crate) enum ColumnError {
     #[error(
@@ -118,7 +116,7 @@ pub(crate) enum Machine {
     Turbine,
 }
 
-/// The column of a heading; `None` if it holds none of the quantities.
+/// The column of a heading; `None` if it is none of the quantities.
 pub(crate) fn column(index: usize, heading: &str, machine: Machine) -> Result<Option<Column>, ColumnError> {
     let (name, unit) = parts(heading);
     let plain: String =
@@ -150,15 +148,15 @@ pub(crate) fn parts(heading: &str) -> (String, Option<String>) {
         return (String::new(), Some(heading.to_owned()));
     }
     if let Some((name, inside)) = last_bracket(heading)
-        && !in_name(name, inside)
+        && !bracket_is_in_name(name, inside)
     {
-        return (name.to_owned(), (!is_kind(inside)).then(|| inside.to_owned()));
+        return (name.to_owned(), (!is_ratio_kind(inside)).then(|| inside.to_owned()));
     }
     // `MASSc-kg/s`, `Flow kg/s`, `m / kg/h`, `flow_kg_s`.
     let known = |unit: &str| quantity_of_unit(unit).is_some();
     if let (name, Some(unit)) = split_unit(heading)
         && known(&unit)
-        && !says_nothing(&unit)
+        && !is_dimensionless(&unit)
     {
         return (name, Some(unit));
     }
@@ -173,7 +171,7 @@ pub(crate) fn parts(heading: &str) -> (String, Option<String>) {
     (heading.to_owned(), None)
 }
 
-/// What is before the bracket that ends a heading, and what is inside. Name and unit may hold brackets of their own.
+/// Text before the final bracket of a heading, and the text inside it. Name and unit may contain brackets of their own.
 fn last_bracket(heading: &str) -> Option<(&str, &str)> {
     let inside = heading.strip_suffix([']', ')'])?;
     let mut depth = 1;
@@ -191,13 +189,13 @@ fn last_bracket(heading: &str) -> Option<(&str, &str)> {
 }
 
 /// `sqrt(T)`: the bracket belongs to the name.
-fn in_name(name: &str, inside: &str) -> bool {
+fn bracket_is_in_name(name: &str, inside: &str) -> bool {
     let root = name.to_lowercase();
     (root.ends_with("sqrt") || root.ends_with('√')) && inside.len() <= 4
 }
 
-/// Total or static ratios, and words that stand in brackets without being a unit.
-fn is_kind(inside: &str) -> bool {
+/// Whether a bracket has words other than a unit, such as total or static.
+fn is_ratio_kind(inside: &str) -> bool {
     let plain: String = inside.to_lowercase().chars().filter(|c| c.is_alphanumeric()).collect();
     matches!(
         plain.as_str(),
@@ -214,10 +212,9 @@ fn is_kind(inside: &str) -> bool {
             | "korr"
             | "t"
             | "s"
-    ) || says_nothing(inside)
+    ) || is_dimensionless(inside)
 }
 
-/// Whether a text is a unit of a quantity.
 pub(crate) fn is_unit(quantity: Quantity, text: &str) -> bool {
     scale(quantity, text).is_some()
 }
@@ -227,7 +224,7 @@ pub fn flow_unit_kg_s(text: &str) -> Option<f64> {
     Some(unit_of(Kind::MassFlow, text)?.to_inside(1.0))
 }
 
-pub(crate) fn says_nothing(unit: &str) -> bool {
+pub(crate) fn is_dimensionless(unit: &str) -> bool {
     matches!(
         unit.to_lowercase().as_str(),
         "" | "-" | "--" | "1" | "ratio" | "fraction" | "frac" | "dimensionless" | "dec" | "nd"
@@ -239,7 +236,6 @@ pub(crate) fn is_known_unit(unit: &str) -> bool {
     header_unit(unit).is_some() || quantity_of_unit(unit).is_some() || is_unit(Quantity::Humidity, unit)
 }
 
-/// What a unit measures.
 fn quantity_of_unit(unit: &str) -> Option<Quantity> {
     let lower = unit.trim().to_lowercase();
     if volume_flow_m3_s(unit).is_some() {
@@ -280,24 +276,24 @@ fn scale(quantity: Quantity, unit: &str) -> Option<Scale> {
             Some(Scale::Factor(unit_of(Kind::Speed, speed)?.to_inside(1.0)))
         }
         Quantity::ReducedFlow => {
-            // `kg/s*K^0.5/kPa`, `kg-sqrt(K)/s-kPa`, `kg*sqrt(K)/(s*kPa)`: the mass is first, the pressure last.
+            // `kg/s*K^0.5/kPa`, `kg-sqrt(K)/s-kPa`, `kg*sqrt(K)/(s*kPa)`: mass first, pressure last.
             let mass = unit.split(['*', '-', ' ']).next()?;
             let mass = if mass.contains('/') { mass.to_owned() } else { format!("{mass}/s") };
             let pressure = unit.trim_end_matches([')', ' ']).rsplit(['/', '*', '-', ' ', '(']).next()?;
             let kg_s = unit_of(Kind::MassFlow, &mass)?.to_inside(1.0);
             Some(Scale::Factor(kg_s * (1000.0 / unit_of(Kind::Pressure, pressure)?.to_inside(1.0))))
         }
-        // Positions are only compared with each other.
+        // Positions are compared with each other only.
         Quantity::Vane if matches!(lower.as_str(), "deg" | "°" | "mm") => Some(Scale::Factor(1.0)),
         Quantity::Humidity if lower == "g/kg" => Some(Scale::Factor(1e-3)),
         Quantity::Humidity if lower == "kg/kg" => Some(Scale::Factor(1.0)),
-        // Speeds over that of the design point.
+        // Relative to the design speed.
         Quantity::Speed if lower == "%" => Some(Scale::Factor(0.01)),
         _ => unit_of(quantity.kind(), unit).map(Scale::Unit),
     }
 }
 
-/// The unit of a kind under any spelling that headings use. A map has absolute pressures.
+/// The unit of a kind in any spelling of headings. A map has absolute pressures.
 fn unit_of(kind: Kind, text: &str) -> Option<&'static Unit> {
     let named =
         || header_unit(text).filter(|found| found.kind == kind && found.reference != Reference::Gauge);

@@ -8,32 +8,35 @@ use mapper_core::{ImportError, MapDescription};
 #[derive(Debug, Clone, PartialEq)]
 struct Statement {
     quantity: Quantity,
-    place: Place,
+    place: ColumnPlace,
     unit: Option<String>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-enum Place {
-    /// Below this heading, with or without its unit.
+enum ColumnPlace {
+    /// Column with this heading, with or without its unit.
     Heading { whole: String, name: String },
     /// Position, from 0.
     Number(usize),
-    /// Wherever the reader finds it.
+    /// Any column that the reader recognises.
     Anywhere,
 }
 
 /// The columns of a map description.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Given {
+pub(crate) struct DescribedColumns {
     statements: Vec<Statement>,
     /// The machine of the map.
     pub(crate) machine: Machine,
 }
 
-impl Given {
+impl DescribedColumns {
     /// # Errors
-    /// [`ImportError::Description`] for a column number that is none, or a unit of another quantity.
-    pub(crate) fn of(description: &MapDescription, machine: Machine) -> Result<Given, ImportError> {
+    /// [`ImportError::Description`] for an invalid column number, or a unit of another quantity.
+    pub(crate) fn of(
+        description: &MapDescription,
+        machine: Machine,
+    ) -> Result<DescribedColumns, ImportError> {
         let mut statements = Vec::new();
         for column in &description.columns {
             let wrong = |problem: String| ImportError::Description {
@@ -44,7 +47,7 @@ impl Given {
             let Some(quantity) = Quantity::of_key(column.quantity) else { continue };
             let text = column.text.trim();
             let (place, unit) = if is_unit(quantity, text) {
-                (Place::Anywhere, Some(text.to_owned()))
+                (ColumnPlace::Anywhere, Some(text.to_owned()))
             } else if let Some(numbered) = text.strip_prefix('#') {
                 let end = numbered.find(|c: char| !c.is_ascii_digit()).unwrap_or(numbered.len());
                 let number: Option<usize> = numbered[..end].parse().ok().filter(|number| *number > 0);
@@ -52,46 +55,45 @@ impl Given {
                     wrong("is not the number of a column; write e.g. `#2 [kg/s]`".to_owned())
                 })?;
                 let unit = numbered[end..].trim().trim_matches(['[', ']', '(', ')']).to_owned();
-                (Place::Number(number - 1), (!unit.is_empty()).then_some(unit))
+                (ColumnPlace::Number(number - 1), (!unit.is_empty()).then_some(unit))
             } else {
                 let (name, unit) = parts(text);
-                (Place::Heading { whole: plain(text), name: plain(&name) }, unit)
+                (ColumnPlace::Heading { whole: plain(text), name: plain(&name) }, unit)
             };
             if let Some(unit) = unit.as_ref().filter(|unit| !is_unit(quantity, unit)) {
                 return Err(wrong(format!(
-                    "has the unit `{unit}`, which is none of a {}; write one of {}",
+                    "has the unit `{unit}`, which is not a unit of {}; write one of {}",
                     quantity.name(),
                     quantity.unit_list()
                 )));
             }
             statements.push(Statement { quantity, place, unit });
         }
-        Ok(Given { statements, machine })
+        Ok(DescribedColumns { statements, machine })
     }
 
     /// The column of a heading: as described, or as its name suggests.
     pub(crate) fn column(&self, index: usize, heading: &str) -> Result<Option<Column>, ColumnError> {
         let heading_plain = plain(heading);
         let described = self.statements.iter().find(|statement| match &statement.place {
-            Place::Heading { whole, name } => {
+            ColumnPlace::Heading { whole, name } => {
                 heading_plain == *whole || heading_plain == *name || plain(&parts(heading).0) == *whole
             }
-            Place::Number(number) => *number == index,
-            Place::Anywhere => false,
+            ColumnPlace::Number(number) => *number == index,
+            ColumnPlace::Anywhere => false,
         });
         if let Some(statement) = described {
             let unit = statement.unit.clone().or_else(|| parts(heading).1);
             return Column::with_unit(index, statement.quantity, heading, unit.as_deref()).map(Some);
         }
-        let found =
-            column(index, heading, self.machine)?.filter(|found| !self.names_place_of(found.quantity));
+        let found = column(index, heading, self.machine)?.filter(|found| !self.has_place_for(found.quantity));
         found.map(|found| self.with_unit(found)).transpose()
     }
 
     /// A column without a unit has the described one.
     pub(crate) fn with_unit(&self, column: Column) -> Result<Column, ColumnError> {
         let stated = self.statements.iter().find(|statement| {
-            statement.place == Place::Anywhere && statement.quantity.is_like(column.quantity)
+            statement.place == ColumnPlace::Anywhere && statement.quantity.is_same_quantity(column.quantity)
         });
         match stated {
             Some(Statement { quantity, unit: Some(unit), .. }) if !column.has_unit() => {
@@ -101,10 +103,10 @@ impl Given {
         }
     }
 
-    fn names_place_of(&self, quantity: Quantity) -> bool {
-        self.statements
-            .iter()
-            .any(|statement| statement.place != Place::Anywhere && statement.quantity.is_like(quantity))
+    fn has_place_for(&self, quantity: Quantity) -> bool {
+        self.statements.iter().any(|statement| {
+            statement.place != ColumnPlace::Anywhere && statement.quantity.is_same_quantity(quantity)
+        })
     }
 
     /// The columns that are described by their numbers.
@@ -113,7 +115,7 @@ impl Given {
     /// [`ColumnError`] for a wrong unit.
     pub(crate) fn numbered(&self) -> Result<Vec<Column>, ColumnError> {
         let numbered = self.statements.iter().filter_map(|statement| match statement.place {
-            Place::Number(index) => Some((index, statement)),
+            ColumnPlace::Number(index) => Some((index, statement)),
             _ => None,
         });
         numbered
@@ -124,7 +126,7 @@ impl Given {
     }
 }
 
-/// In lower case without blanks, so that a heading may be copied by hand.
+/// The heading in lower case without blanks, so that copies by hand match.
 fn plain(heading: &str) -> String {
     heading.to_lowercase().split_whitespace().collect()
 }

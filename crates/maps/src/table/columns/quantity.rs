@@ -33,7 +33,7 @@ pub enum Quantity {
     Tc,
     /// Humidity of the air: water per dry air, or relative.
     Humidity,
-    /// Ambient pressure, over which gauge pressures are.
+    /// Ambient pressure, the reference of gauge pressures.
     Ambient,
     /// Measured turbine inlet pressure.
     P3,
@@ -107,8 +107,8 @@ impl Quantity {
         Quantity::ALL.into_iter().find(|quantity| quantity.key() == key)
     }
 
-    /// Whether a point does not need it: a cell without a number is empty.
-    pub(crate) fn is_extra(self) -> bool {
+    /// Whether a point may be without it.
+    pub(crate) fn is_optional(self) -> bool {
         matches!(
             self,
             Quantity::Tc
@@ -123,8 +123,8 @@ impl Quantity {
         )
     }
 
-    /// Whether two are forms of the same quantity.
-    pub(crate) fn is_like(self, other: Quantity) -> bool {
+    /// Whether both are forms of one physical quantity.
+    pub(crate) fn is_same_quantity(self, other: Quantity) -> bool {
         let form = |quantity| match quantity {
             Quantity::ReducedSpeed => Quantity::Speed,
             Quantity::VolumeFlow | Quantity::ReducedFlow => Quantity::Flow,
@@ -170,7 +170,7 @@ impl Quantity {
         }
     }
 
-    /// What it measures.
+    /// Kind of its units.
     pub(crate) fn kind(self) -> Kind {
         match self {
             Quantity::Speed | Quantity::ReducedSpeed => Kind::Speed,

@@ -1,4 +1,4 @@
-//! What the name of a column means.
+//! Recognises the quantity of a column by its name.
 
 use crate::table::columns::quantity::Quantity;
 
@@ -10,7 +10,7 @@ pub(crate) fn is_turbine(plain: &str) -> bool {
             && ["t3", "t4", "p3", "tt3", "t03"].iter().any(|inlet| plain.contains(inlet))
 }
 
-/// Quantities that only a turbine map has, or that it names in its own way.
+/// The quantity of a name that only turbine maps use.
 pub(crate) fn quantity_of_turbine(plain: &str, by_unit: Option<Quantity>) -> Option<Quantity> {
     let has = |words: &[&str]| words.iter().any(|word| plain.contains(word));
     let is = |words: &[&str]| words.contains(&plain);
@@ -97,7 +97,7 @@ fn quantity_of_place(plain: &str) -> Option<Quantity> {
     }
 }
 
-/// What a name means: lower case, letters, digits, `/`, `√` and `η` alone. The unit decides between volume and mass.
+/// The quantity of a name in lower case with only letters, digits, `/`, `√` and `η`. The unit decides between volume and mass flow.
 pub(crate) fn quantity_of_name(plain: &str, by_unit: Option<Quantity>) -> Option<Quantity> {
     let has = |words: &[&str]| words.iter().any(|word| plain.contains(word));
     let is = |words: &[&str]| words.contains(&plain);

@@ -1,11 +1,11 @@
-//! What a script says about its tables besides the numbers: the design point and the unit of the flow.
+//! Design point and flow unit in a script of beta tables.
 
 use crate::table::columns::column::flow_unit_kg_s;
 use crate::table::gas_turbine::design_point::MapDesign;
 use mapper_core::{DesignPoint, ImportError, MapDescription};
 
-/// The places of a name that is not part of a longer one, each with the text behind its quotes and brackets.
-fn behind<'a>(code: &'a str, name: &'a str) -> impl Iterator<Item = &'a str> {
+/// Occurrences of a name as a whole word, each with the text after its quotes and brackets.
+fn occurrences<'a>(code: &'a str, name: &'a str) -> impl Iterator<Item = &'a str> {
     let is_name = |c: char| c.is_alphanumeric() || c == '_';
     code.match_indices(name).filter_map(move |(at, _)| {
         let rest = &code[at + name.len()..];
@@ -14,23 +14,23 @@ fn behind<'a>(code: &'a str, name: &'a str) -> impl Iterator<Item = &'a str> {
     })
 }
 
-/// The number behind one of the names: `NcMapDes = 1.0`, `defaults["NcMap"] = 1.0`, `'NcMap': 1.0`.
+/// The number after one of the names: `NcMapDes = 1.0`, `defaults["NcMap"] = 1.0`, `'NcMap': 1.0`.
 fn number(code: &str, names: &[&str]) -> Option<f64> {
     let number = |text: &str| {
         let value = text.strip_prefix(['=', ':'])?.trim_start();
         let end = value.find(|c: char| !(c.is_ascii_digit() || "+-.eE".contains(c))).unwrap_or(value.len());
         value[..end].parse::<f64>().ok().filter(|value| value.is_finite())
     };
-    names.iter().find_map(|name| behind(code, name).find_map(number))
+    names.iter().find_map(|name| occurrences(code, name).find_map(number))
 }
 
-/// The unit in quotes behind one of the names: `'WcMap': 'lbm/s'`.
+/// The unit in quotes after one of the names: `'WcMap': 'lbm/s'`.
 fn flow_unit_in(code: &str) -> Option<f64> {
     let unit = |text: &str| {
         let quoted = text.strip_prefix(['=', ':'])?.trim_start().strip_prefix(['\'', '"'])?;
         flow_unit_kg_s(&quoted.split(['\'', '"']).next()?.replace("lbm", "lb"))
     };
-    ["WcMap", "WcArray", "Wc"].iter().find_map(|name| behind(code, name).find_map(unit))
+    ["WcMap", "WcArray", "Wc"].iter().find_map(|name| occurrences(code, name).find_map(unit))
 }
 
 /// The design point of the tables, without its values.
@@ -48,7 +48,7 @@ pub(crate) fn design_of(code: &str) -> MapDesign {
 /// The unit of flow, kg/s: as described, or as the file gives it.
 ///
 /// # Errors
-/// [`ImportError::Description`] for a unit that is none.
+/// [`ImportError::Description`] for an unknown unit.
 pub(crate) fn flow_unit(code: &str, given: &MapDescription) -> Result<Option<f64>, ImportError> {
     let Some(column) = given.columns.iter().find(|column| column.quantity == "flow") else {
         return Ok(flow_unit_in(code));
@@ -56,15 +56,15 @@ pub(crate) fn flow_unit(code: &str, given: &MapDescription) -> Result<Option<f64
     let wrong = || ImportError::Description {
         key: column.quantity,
         text: column.text.chars().take(60).collect(),
-        problem: "is not a unit of mass flow; write e.g. `--with flow=lb/s`".to_owned(),
+        problem: "is not a unit of mass flow; write e.g. `flow: lb/s`".to_owned(),
     };
     flow_unit_kg_s(&column.text).map(Some).ok_or_else(wrong)
 }
 
-/// A table over speed and an auxiliary coordinate at a place between its values, linear in both; `None` outside.
-pub(crate) fn between(speeds: &[f64], beta: &[f64], values: &[f64], design: MapDesign) -> Option<f64> {
-    let (line, line_share) = place(speeds, design.speed)?;
-    let (column, column_share) = place(beta, design.rline)?;
+/// Interpolates a table over speed and an auxiliary coordinate, linear in both; `None` outside.
+pub(crate) fn interpolate(speeds: &[f64], beta: &[f64], values: &[f64], design: MapDesign) -> Option<f64> {
+    let (line, line_share) = locate(speeds, design.speed)?;
+    let (column, column_share) = locate(beta, design.rline)?;
     let at = |line: usize, column: usize| values.get(line * beta.len() + column).copied();
     let on_line = |line: usize| {
         let (low, high) = (at(line, column)?, at(line, (column + 1).min(beta.len() - 1))?);
@@ -74,8 +74,8 @@ pub(crate) fn between(speeds: &[f64], beta: &[f64], values: &[f64], design: MapD
     Some(low + line_share * (high - low))
 }
 
-/// Index below a value and the share of the next one.
-fn place(rising: &[f64], wanted: f64) -> Option<(usize, f64)> {
+/// Index below a value, and the weight of the next one.
+fn locate(rising: &[f64], wanted: f64) -> Option<(usize, f64)> {
     if let Some(index) = rising.iter().position(|value| *value == wanted) {
         return Some((index, 0.0));
     }
@@ -83,7 +83,7 @@ fn place(rising: &[f64], wanted: f64) -> Option<(usize, f64)> {
     Some((index, (wanted - rising[index]) / (rising[index + 1] - rising[index])))
 }
 
-/// Whether the flow of the design point is stated: the unit of the tables then does not matter.
+/// Whether the flow of the design point is stated, so that the flow unit of the tables does not matter.
 pub(crate) fn scales_flow(design: DesignPoint) -> bool {
     design.flow_corrected_kg_s.is_some()
 }

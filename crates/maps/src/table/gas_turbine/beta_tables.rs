@@ -2,13 +2,13 @@
 //! Python, nested tables of NPSS.
 
 use crate::table::efficiency_comment::efficiency_in_comment;
-use crate::table::gas_turbine::beta_design::{between, design_of, flow_unit, scales_flow};
+use crate::table::gas_turbine::beta_design::{design_of, flow_unit, interpolate, scales_flow};
 use crate::table::gas_turbine::design_point::{MapDesign, scale_to_design};
-use crate::table::reference::in_comment;
-use crate::table::rows_to_lines::{Row, map_of_rows, room_for_one_more};
+use crate::table::reference::reference_in_comment;
+use crate::table::rows_to_lines::{Row, check_point_count, map_of_rows};
 use mapper_core::{CompressorMap, ImportError, ImportRemark, ImportedMap, MapDescription};
 
-/// Numbers of the quantities, speed by speed.
+/// Values of the quantities, speed by speed.
 #[derive(Debug, Default)]
 struct BetaTables {
     speeds: Vec<f64>,
@@ -19,8 +19,7 @@ struct BetaTables {
     efficiency: Vec<f64>,
 }
 
-/// Maximum number of numbers in a file.
-const NUMBER_LIMIT: usize = 4 * crate::table::rows_to_lines::POINT_LIMIT;
+const MAX_NUMBERS: usize = 4 * crate::table::rows_to_lines::MAX_POINTS;
 
 /// The map of a script with arrays: `name = [1 2; 3 4]` or `name = np.array([[1, 2], [3, 4]])`.
 pub(crate) fn read_arrays(text: &str, given: &MapDescription) -> Result<ImportedMap, ImportError> {
@@ -37,10 +36,10 @@ pub(crate) fn read_arrays(text: &str, given: &MapDescription) -> Result<Imported
         let value =
             value.strip_prefix("np.array(").or_else(|| value.strip_prefix("numpy.array(")).unwrap_or(value);
         if value.starts_with('[')
-            && let Some(place) = tables.place(name)
+            && let Some(place) = tables.array_of(name)
             && place.is_empty()
         {
-            *place = bracketed(value, ('[', ']'), line_of(&code, at))?;
+            *place = bracketed_numbers(value, ('[', ']'), line_of(&code, at))?;
         }
     }
     tables.map(text, &code, given)
@@ -55,7 +54,7 @@ pub(crate) fn read_nested(text: &str, given: &MapDescription) -> Result<Imported
     let starts: Vec<usize> = code.match_indices("Table ").map(|(at, _)| at).collect();
     for (index, start) in starts.iter().enumerate() {
         let part = &code[*start..starts.get(index + 1).copied().unwrap_or(code.len())];
-        // Of several vane angles the first counts.
+        // Only the first vane angle counts.
         let angles: Vec<usize> = part
             .match_indices("alphaMap")
             .map(|(at, _)| at)
@@ -71,17 +70,17 @@ pub(crate) fn read_nested(text: &str, given: &MapDescription) -> Result<Imported
             let value = part[at + 1..].trim_start();
             let (is_speed, is_list) = (name.to_lowercase().starts_with("nc"), value.starts_with('{'));
             if is_speed && is_list {
-                // Each value of beta has a list over all speeds.
+                // Each value of beta has one list over all speeds.
                 by_beta = true;
                 if of_table.is_empty() {
-                    of_table = bracketed(value, ('{', '}'), line)?;
+                    of_table = bracketed_numbers(value, ('{', '}'), line)?;
                 }
             } else if is_speed {
                 let end =
                     value.find(|c: char| !(c.is_ascii_digit() || "+-.eE".contains(c))).unwrap_or(value.len());
                 of_table.extend(value[..end].parse::<f64>().ok());
-            } else if is_list && let Some(place) = tables.place(name) {
-                let numbers = bracketed(value, ('{', '}'), line)?;
+            } else if is_list && let Some(place) = tables.array_of(name) {
+                let numbers = bracketed_numbers(value, ('{', '}'), line)?;
                 // The coordinate of the columns is repeated at every speed.
                 if name.to_lowercase().starts_with("rline") {
                     *place = numbers;
@@ -97,12 +96,12 @@ pub(crate) fn read_nested(text: &str, given: &MapDescription) -> Result<Imported
     }
     tables.speeds = speeds;
     if by_beta {
-        tables.turn();
+        tables.transpose();
     }
     tables.map(text, &code, given)
 }
 
-/// The map of text tables of Modelica: `double name(rows, columns)`, the first row the auxiliary coordinate behind one unused number, the
+/// The map of text tables of Modelica: `double name(rows, columns)`, the first row the auxiliary coordinate after one unused number, the
 /// first column the speeds.
 pub(crate) fn read_modelica(text: &str, given: &MapDescription) -> Result<ImportedMap, ImportError> {
     let code: String =
@@ -115,9 +114,9 @@ pub(crate) fn read_modelica(text: &str, given: &MapDescription) -> Result<Import
         let Some((name, size)) = head.trim_start_matches("double ").split_once('(') else { continue };
         let columns = size.split(',').nth(1).and_then(|columns| columns.trim().parse::<usize>().ok());
         let Some(columns) = columns.filter(|columns| *columns > 1) else { continue };
-        let numbers = bracketed(body, ('[', ']'), line_of(&code, *start))?;
+        let numbers = bracketed_numbers(body, ('[', ']'), line_of(&code, *start))?;
         let rows: Vec<&[f64]> = numbers.chunks(columns).collect();
-        let Some(place) = tables.place(name.trim()) else { continue };
+        let Some(place) = tables.array_of(name.trim()) else { continue };
         let (beta, lines) = rows.split_first().map_or((&[][..], &[][..]), |(first, rest)| (*first, rest));
         *place = lines.iter().flat_map(|line| line.iter().skip(1)).copied().collect();
         tables.beta = beta.iter().skip(1).copied().collect();
@@ -136,14 +135,14 @@ pub(crate) fn read_gsp(text: &str, given: &MapDescription) -> Result<ImportedMap
         if name.starts_with(|c: char| c.is_alphabetic()) {
             sections.push((name, index + 1, Vec::new()));
         } else if let Some((.., numbers)) = sections.last_mut() {
-            numbers.extend(bracketed(line, ('[', ']'), index + 1)?);
+            numbers.extend(bracketed_numbers(line, ('[', ']'), index + 1)?);
         }
     }
     for (name, line, numbers) in sections {
-        let Some(place) = tables.place(&name.to_lowercase().replace(' ', "_")) else { continue };
+        let Some(place) = tables.array_of(&name.to_lowercase().replace(' ', "_")) else { continue };
         let Some((size, numbers)) = numbers.split_first() else { continue };
         let (rows, columns) = (size.floor() as usize, (1000.0 * size.fract()).round() as usize);
-        // The first number stands for the corner of the table.
+        // The first number is the corner of the table.
         if rows < 2 || columns < 2 || numbers.len() + 1 != rows * columns {
             let form = "a table of GSP: rows.columns (10.021), the coordinates, then a speed and its values in each row";
             return Err(ImportError::RowForm { line, text: name.to_owned(), form });
@@ -156,13 +155,13 @@ pub(crate) fn read_gsp(text: &str, given: &MapDescription) -> Result<ImportedMap
     tables.map(text, text, given)
 }
 
-/// Line of a place in a text, from 1.
+/// Line of a position in a text, from 1.
 fn line_of(text: &str, at: usize) -> usize {
     1 + text[..at].matches('\n').count()
 }
 
-/// The numbers between a bracket and its partner, in order. `line`: the line of the file at which they begin.
-fn bracketed(text: &str, (open, close): (char, char), line: usize) -> Result<Vec<f64>, ImportError> {
+/// The numbers between a bracket and its partner, in order. `line`: line of the file at which they start.
+fn bracketed_numbers(text: &str, (open, close): (char, char), line: usize) -> Result<Vec<f64>, ImportError> {
     let mut depth = 0usize;
     let mut end = text.len();
     for (at, c) in text.char_indices() {
@@ -178,8 +177,8 @@ fn bracketed(text: &str, (open, close): (char, char), line: usize) -> Result<Vec
     let mut numbers = Vec::new();
     let words = text[..end].split(|c: char| c.is_whitespace() || ",;[]{}()".contains(c));
     for word in words.filter(|word| !word.is_empty() && *word != "...") {
-        if numbers.len() >= NUMBER_LIMIT {
-            return Err(ImportError::TooMany { line, limit: NUMBER_LIMIT });
+        if numbers.len() >= MAX_NUMBERS {
+            return Err(ImportError::TooMany { line, limit: MAX_NUMBERS });
         }
         numbers.push(word.parse().map_err(|_| ImportError::NotANumber {
             line,
@@ -191,8 +190,8 @@ fn bracketed(text: &str, (open, close): (char, char), line: usize) -> Result<Vec
 }
 
 impl BetaTables {
-    /// The quantity of an array, by the names in use: T-MATS, pyCycle, NPSS, and those that `mapper` writes.
-    fn place(&mut self, name: &str) -> Option<&mut Vec<f64>> {
+    /// The array of a name, by the names of T-MATS, pyCycle, NPSS and `mapper`.
+    fn array_of(&mut self, name: &str) -> Option<&mut Vec<f64>> {
         let name = name.rsplit('.').next().unwrap_or_default().to_lowercase();
         match name.as_str() {
             "ncvec"
@@ -220,8 +219,8 @@ impl BetaTables {
         }
     }
 
-    /// From beta by beta to speed by speed.
-    fn turn(&mut self) {
+    /// Reorders the arrays from beta by beta to speed by speed.
+    fn transpose(&mut self) {
         let speeds = self.speeds.len().max(1);
         for values in [&mut self.flow, &mut self.pressure_ratio, &mut self.efficiency] {
             *values =
@@ -237,7 +236,7 @@ impl BetaTables {
             row.flow_corrected_kg_s *= unit_kg_s.unwrap_or(1.0);
         }
         let mut design: MapDesign = design_of(code);
-        let at_design = |values: &[f64]| between(&self.speeds, &self.beta, values, design);
+        let at_design = |values: &[f64]| interpolate(&self.speeds, &self.beta, values, design);
         design.values =
             match [&self.flow, &self.pressure_ratio, &self.efficiency].map(|values| at_design(values)) {
                 [Some(flow), Some(ratio), Some(eta)] => Some([unit_kg_s.unwrap_or(1.0) * flow, ratio, eta]),
@@ -253,7 +252,7 @@ impl BetaTables {
             remarks.push(ImportRemark::FlowUnitAssumed);
         }
         rows.iter().try_for_each(Row::check)?;
-        let found = text.lines().find_map(in_comment);
+        let found = text.lines().find_map(reference_in_comment);
         let machine = machine.map(|(_, name)| name.trim().chars().take(200).collect());
         let efficiency = text.lines().find_map(efficiency_in_comment);
         let map = map_of_rows(machine.unwrap_or_default(), &rows, found, given.reference)?;
@@ -292,7 +291,7 @@ impl BetaTables {
         let mut rows = Vec::with_capacity(lines * columns);
         for (line, speed_corrected_rpm) in self.speeds.iter().enumerate() {
             for place in line * columns..(line + 1) * columns {
-                room_for_one_more(rows.len(), place + 1)?;
+                check_point_count(rows.len(), place + 1)?;
                 let value = |values: &[f64]| values.get(place).copied().unwrap_or(f64::NAN);
                 rows.push(Row {
                     at: place + 1,

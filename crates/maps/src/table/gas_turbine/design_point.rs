@@ -21,8 +21,8 @@ impl Default for MapDesign {
     }
 }
 
-/// Speeds below are relative: no shaft turns at 10 rpm.
-const RELATIVE_BELOW: f64 = 10.0;
+/// Maximum relative speed: larger ones are in rpm.
+const MAX_RELATIVE_SPEED: f64 = 10.0;
 
 /// Scales rows with relative speeds to the stated design point, by the rule of NPSS and pyCycle: speed, flow and efficiency in proportion,
 /// pressure ratio minus 1 in proportion. Returns whether the speeds are relative.
@@ -37,7 +37,7 @@ pub fn scale_to_design(
     remarks: &mut Vec<ImportRemark>,
 ) -> Result<bool, ImportError> {
     let fastest = rows.iter().map(|row| row.speed_corrected_rpm).fold(0.0, f64::max);
-    let is_relative = fastest < RELATIVE_BELOW && !rows.is_empty();
+    let is_relative = fastest < MAX_RELATIVE_SPEED && !rows.is_empty();
     let speed_factor = match design.speed_corrected_rpm {
         None if is_relative => return Err(ImportError::RelativeSpeed { fastest }),
         None => 1.0,

@@ -1,4 +1,4 @@
-//! The text of a map file that is packed: a workbook's sheet, a compressed file.
+//! Text of a map file that may be compressed or a workbook.
 
 use crate::table::sheet::grid::text_of;
 use crate::table::sheet::workbook::grid_of_workbook;
@@ -6,21 +6,21 @@ use mapper_core::{ImportError, MAP_FILE_SIZE_LIMIT};
 use std::borrow::Cow;
 use std::io::Read;
 
-/// The text of a map file, of a workbook as CSV of its sheet with numbers.
+/// The text of a map file; of a workbook, its sheet with numbers as CSV.
 ///
 /// # Errors
 /// [`ImportError`] if it is neither text nor a workbook.
 pub fn file_text(bytes: &[u8]) -> Result<String, ImportError> {
-    let bytes = unpacked(bytes)?;
+    let bytes = unpack(bytes)?;
     let is_workbook = bytes.starts_with(b"PK") || bytes.starts_with(&mapper_workbook::MAGIC);
     if is_workbook { Ok(grid_of_workbook(&bytes, None)?.csv()) } else { text_of(&bytes) }
 }
 
-/// The content of a file compressed by gzip; any other as it is.
+/// Unpacks a gzip file; returns any other content unchanged.
 ///
 /// # Errors
 /// [`ImportError`] if it is broken or unpacks to more than a map needs.
-pub fn unpacked(bytes: &[u8]) -> Result<Cow<'_, [u8]>, ImportError> {
+pub fn unpack(bytes: &[u8]) -> Result<Cow<'_, [u8]>, ImportError> {
     if !bytes.starts_with(&[0x1f, 0x8b]) {
         return Ok(Cow::Borrowed(bytes));
     }
@@ -46,7 +46,7 @@ mod tests {
         writer.write_all(b"speed,flow\n").unwrap();
         let packed = writer.finish().unwrap();
         assert_eq!(file_text(&packed).unwrap(), "speed,flow\n");
-        assert!(matches!(unpacked(&packed[..12]), Err(ImportError::Packed { .. })));
-        assert_eq!(*unpacked(b"plain").unwrap(), *b"plain");
+        assert!(matches!(unpack(&packed[..12]), Err(ImportError::Packed { .. })));
+        assert_eq!(*unpack(b"plain").unwrap(), *b"plain");
     }
 }

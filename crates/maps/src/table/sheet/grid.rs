@@ -1,4 +1,4 @@
-//! The cells of a table: text of any encoding, separator and decimal sign, or a sheet of Excel.
+//! Cells of a table, from text of any encoding, separator and decimal sign, or from a sheet of a workbook.
 
 use mapper_core::ImportError;
 
@@ -26,20 +26,20 @@ pub(crate) struct Grid {
     pub(crate) rows: Vec<GridRow>,
     /// Whether numbers have a decimal comma.
     pub(crate) decimal_comma: bool,
-    /// Whether blanks separate the cells: then none can be empty.
+    /// Whether blanks separate the cells, so that no cell can be empty.
     pub(crate) by_blanks: bool,
-    /// The mark that may be between thousands. Numbers of a workbook have none, and its texts may have another decimal sign.
+    /// Thousands separator; `None` for a workbook, since its texts may have another decimal sign.
     thousands: Option<char>,
 }
 
 /// Maximum number of rows, as of points.
-pub(crate) const ROW_LIMIT: usize = crate::table::rows_to_lines::POINT_LIMIT;
+pub(crate) const MAX_ROWS: usize = crate::table::rows_to_lines::MAX_POINTS;
 /// Maximum number of cells of a row: Excel's own limit.
-pub(crate) const CELL_LIMIT: usize = 16_384;
+pub(crate) const MAX_CELLS: usize = 16_384;
 
-/// Maximum length of a line, bytes, 16 for a cell, and number of lines that show the separator. They bound the time for any text.
-const LINE_LIMIT: usize = 16 * CELL_LIMIT;
-const SHOWS_SEPARATOR: usize = 10_000;
+/// Maximum length of a line, bytes (16 for a cell), and number of lines that determine the separator. They limit the time for any text.
+const MAX_LINE_BYTES: usize = 16 * MAX_CELLS;
+const SEPARATOR_LINES: usize = 10_000;
 
 /// Text in UTF-8, in UTF-16 with a byte order mark, or in Latin 1.
 ///
@@ -50,7 +50,7 @@ pub fn text_of(bytes: &[u8]) -> Result<String, ImportError> {
         [0xff, 0xfe, rest @ ..] if rest.len() % 2 == 0 => utf16(rest, u16::from_le_bytes),
         [0xfe, 0xff, rest @ ..] if rest.len() % 2 == 0 => utf16(rest, u16::from_be_bytes),
         _ => match std::str::from_utf8(bytes) {
-            // Spreadsheets begin their files with a byte order mark.
+            // Spreadsheet programs write a byte order mark.
             Ok(text) => text.strip_prefix('\u{feff}').unwrap_or(text).to_owned(),
             Err(_) => bytes.iter().map(|byte| char::from(*byte)).collect(),
         },
@@ -77,43 +77,45 @@ impl Grid {
     /// # Errors
     /// [`ImportError::TooMany`] if it has more rows than any map.
     pub(crate) fn of_text(text: &str) -> Result<Grid, ImportError> {
-        let cut = |line: &'_ str| line.floor_char_boundary(LINE_LIMIT);
+        let cut = |line: &'_ str| line.floor_char_boundary(MAX_LINE_BYTES);
         let lines = || text.lines().enumerate().map(|(index, line)| (index + 1, &line[..cut(line)]));
-        if lines().nth(4 * ROW_LIMIT).is_some() {
-            return Err(ImportError::TooMany { line: 4 * ROW_LIMIT, limit: ROW_LIMIT });
+        if lines().nth(4 * MAX_ROWS).is_some() {
+            return Err(ImportError::TooMany { line: 4 * MAX_ROWS, limit: MAX_ROWS });
         }
         let count = |separator: char| {
             lines()
-                .take(SHOWS_SEPARATOR)
-                .filter(|(_, line)| numbers(&split(uncommented(line).0, separator), separator != ',') >= 3)
+                .take(SEPARATOR_LINES)
+                .filter(|(_, line)| {
+                    count_numbers(&split(split_comment(line).0, separator), separator != ',') >= 3
+                })
                 .count()
         };
         let separators = ['\t', ';', ',', ' '];
         let best = |count: &dyn Fn(char) -> usize| {
             let counts = separators.into_iter().map(|separator| (count(separator), separator));
-            // The first of equal ones.
+            // The first of equals.
             counts.rev().max_by_key(|(rows, _)| *rows).filter(|(rows, _)| *rows > 0)
         };
-        // A column of text leaves no row of numbers alone; between blanks it could be anything.
+        // A column of text does not exclude a separator, except blanks, which occur in any text.
         let with_text = |separator: char| {
             let is_point = |line: &str| {
                 separator != ' '
-                    && some_numbers(&split(uncommented(line).0, separator), separator != ',') >= 3
+                    && count_number_cells(&split(split_comment(line).0, separator), separator != ',') >= 3
             };
-            lines().take(SHOWS_SEPARATOR).filter(|(_, line)| is_point(line)).count()
+            lines().take(SEPARATOR_LINES).filter(|(_, line)| is_point(line)).count()
         };
         let separator = best(&count).or_else(|| best(&with_text)).map_or(' ', |(_, separator)| separator);
         let mut rows = Vec::new();
         let mut decimal = [0, 0];
         for (at, line) in lines() {
-            let (content, comment) = uncommented(line);
+            let (content, comment) = split_comment(line);
             for (text, is_comment) in [(content, false), (comment, true)] {
                 let cells = split(text, separator);
                 if cells.iter().all(|cell| !cell.contains(char::is_alphanumeric)) {
                     continue;
                 }
-                if rows.len() >= 2 * ROW_LIMIT {
-                    return Err(ImportError::TooMany { line: at, limit: ROW_LIMIT });
+                if rows.len() >= 2 * MAX_ROWS {
+                    return Err(ImportError::TooMany { line: at, limit: MAX_ROWS });
                 }
                 for cell in &cells {
                     decimal[0] += usize::from(plain_number(cell).is_some() && cell.contains('.'));
@@ -127,11 +129,11 @@ impl Grid {
         Ok(Grid { rows, decimal_comma, by_blanks: separator == ' ', thousands })
     }
 
-    /// The cells with rows and columns exchanged; `None` of a table with more rows than quantities.
-    pub(crate) fn turned(&self) -> Option<Grid> {
-        const MOST_QUANTITIES: usize = 100;
+    /// The cells with rows and columns exchanged; `None` for a table with more rows than quantities.
+    pub(crate) fn transposed(&self) -> Option<Grid> {
+        const MAX_QUANTITIES: usize = 100;
         let rows: Vec<&GridRow> = self.rows.iter().filter(|row| !row.is_comment).collect();
-        let width = rows.iter().map(|row| row.cells.len()).max().filter(|_| rows.len() <= MOST_QUANTITIES)?;
+        let width = rows.iter().map(|row| row.cells.len()).max().filter(|_| rows.len() <= MAX_QUANTITIES)?;
         let cell = |row: &&GridRow, column: usize| row.cells.get(column).cloned().unwrap_or_default();
         let turned = |column: usize| GridRow {
             at: column + 1,
@@ -144,7 +146,7 @@ impl Grid {
     /// The cells as CSV.
     pub(crate) fn csv(&self) -> String {
         let cell = |cell: &String| {
-            // A text with a decimal comma would have thousands in a file with decimal points.
+            // In a file with decimal points, the comma of such a text would separate thousands.
             let number = self.number(cell).filter(|_| cell.contains(',') && !cell.contains('%'));
             let plain =
                 number.map_or_else(|| cell.replace(['"', '\n', '\r'], " "), |number| number.to_string());
@@ -154,7 +156,7 @@ impl Grid {
         self.rows.iter().map(line).collect()
     }
 
-    /// The number in a cell: with a percent sign as a fraction, with a blank behind its sign. `None` for an empty one and for text.
+    /// The number in a cell, which may have a blank after its sign; one with a percent sign as a fraction. `None` for empty cells and text.
     pub(crate) fn number(&self, cell: &str) -> Option<f64> {
         let cell = cell.replace('\u{2212}', "-").replace("- ", "-");
         let (text, factor) = match cell.strip_suffix('%') {
@@ -172,10 +174,9 @@ impl Grid {
     }
 }
 
-/// Content and comment of a line.
-fn uncommented(line: &str) -> (&str, &str) {
+fn split_comment(line: &str) -> (&str, &str) {
     let line = line.trim();
-    // A row of units may begin with that of an efficiency.
+    // In a row of units `%` may be the unit of an efficiency.
     let is_unit = line.strip_prefix('%').is_some_and(|rest| rest.starts_with([',', ';', '\t']));
     let marks = ["!", "%", "//", "#"];
     if let Some(comment) = marks.iter().find_map(|mark| line.strip_prefix(mark)).filter(|_| !is_unit) {
@@ -184,7 +185,7 @@ fn uncommented(line: &str) -> (&str, &str) {
     line.split_once('#').unwrap_or((line, ""))
 }
 
-/// Cells between separators; between blanks if the separator is one: then a unit in brackets belongs to the name before it.
+/// Cells between separators. Between blanks, a unit in brackets belongs to the name before it.
 fn split(line: &str, separator: char) -> Vec<String> {
     if separator != ' ' {
         let cell = |text: &str| text.trim().trim_matches('"').trim().to_owned();
@@ -192,7 +193,7 @@ fn split(line: &str, separator: char) -> Vec<String> {
         let mut quoted = false;
         for c in line.chars() {
             quoted ^= c == '"';
-            let is_new = c == separator && !quoted && cells.len() < CELL_LIMIT;
+            let is_new = c == separator && !quoted && cells.len() < MAX_CELLS;
             match cells.last_mut() {
                 Some(last) if !is_new => last.push(c),
                 _ => cells.push(String::new()),
@@ -214,14 +215,13 @@ fn split(line: &str, separator: char) -> Vec<String> {
     if comma.iter().filter(|word| comma_number(word).is_some()).count() >= 2 { comma } else { cells }
 }
 
-/// How many cells are numbers, among others.
-pub(crate) fn some_numbers(cells: &[String], decimal_comma: bool) -> usize {
-    let is_number = |cell: &&String| numbers(std::slice::from_ref(*cell), decimal_comma) == 1;
+pub(crate) fn count_number_cells(cells: &[String], decimal_comma: bool) -> usize {
+    let is_number = |cell: &&String| count_numbers(std::slice::from_ref(*cell), decimal_comma) == 1;
     cells.iter().filter(is_number).count()
 }
 
-/// How many cells are numbers; 0 if one of them is text.
-fn numbers(cells: &[String], decimal_comma: bool) -> usize {
+/// Number of cells that are numbers; 0 if any cell is text.
+fn count_numbers(cells: &[String], decimal_comma: bool) -> usize {
     let bare = |cell: &str| cell.trim_end_matches('%').trim_end().to_owned();
     let number =
         |cell: &str| plain_number(cell).or_else(|| decimal_comma.then(|| comma_number(cell)).flatten());
@@ -233,7 +233,7 @@ fn plain_number(text: &str) -> Option<f64> {
     text.parse().ok().filter(|value: &f64| value.is_finite())
 }
 
-/// A number without the marks between its thousands: `60.000` in a file with decimal commas, `60,000` in one with decimal points.
+/// Removes thousands separators: `60.000` in a file with decimal commas, `60,000` in one with decimal points.
 fn without_thousands(text: &str, mark: char) -> Option<String> {
     let decimal = if mark == '.' { ',' } else { '.' };
     let whole = text.split(decimal).next()?;
@@ -247,13 +247,12 @@ fn without_thousands(text: &str, mark: char) -> Option<String> {
         .then(|| text.replace(mark, ""))
 }
 
-/// A number with a decimal comma.
 fn comma_number(text: &str) -> Option<f64> {
     let comma = text.matches(',').count() == 1 && !text.contains('.');
     comma.then(|| plain_number(&text.replacen(',', ".", 1))).flatten()
 }
 
-/// Whether a cell stands for no value.
+/// Whether a cell marks a missing value.
 pub(crate) fn is_missing(cell: &str) -> bool {
     matches!(
         cell.to_ascii_lowercase().as_str(),

@@ -1,15 +1,15 @@
-//! The place of a table's headings, and whether its speed lines are below each other or side by side.
+//! Detects the layout of a table: its headings, and whether speed lines are below each other or side by side.
 
 use crate::table::columns::column::{Column, ColumnError, Machine, column};
-use crate::table::columns::described_columns::Given;
+use crate::table::columns::described_columns::DescribedColumns;
 use crate::table::columns::quantity::Quantity;
 use crate::table::sheet::grid::{Grid, GridRow, is_missing};
 use crate::table::sheet::speed_heading::{speed_in, without_speed};
-use crate::table::units_row::with_units_row;
+use crate::table::units_row::merge_units_row;
 use mapper_core::{ImportError, ImportRemark};
 use std::borrow::Cow;
 
-/// Columns that belong together: all of a table, or those of one speed line of a table with its lines side by side.
+/// Columns of one block: all of a table, or those of one speed line if lines are side by side.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Group {
     pub(crate) columns: Vec<Column>,
@@ -17,7 +17,7 @@ pub(crate) struct Group {
     pub(crate) shared: usize,
     /// Speed above the columns, rpm.
     pub(crate) speed_rpm: Option<f64>,
-    /// Cells of every row of a table without headings; 0 if there are headings.
+    /// Number of cells of every row if the table has no headings; else 0.
     pub(crate) bare_cells: usize,
 }
 
@@ -63,7 +63,7 @@ impl Group {
     }
 }
 
-/// The form of a table.
+/// Layout of a table.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Layout {
     pub(crate) groups: Vec<Group>,
@@ -73,7 +73,7 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
-    /// Whether the points are as measured, not corrected.
+    /// Whether the points are measured values that are not corrected.
     pub(crate) fn is_measured(&self) -> bool {
         self.groups.iter().any(Group::is_measured)
     }
@@ -97,16 +97,19 @@ impl Layout {
     }
 }
 
-/// The layout of a table, and its cells with the columns as rows if the headings are in its first column.
+/// Detects the layout of a table; the cells are transposed if the headings are in the first column.
 ///
 /// # Errors
 /// As [`layout`], and [`ImportError::Empty`].
-pub(crate) fn understood<'a>(grid: &'a Grid, given: &Given) -> Result<(Cow<'a, Grid>, Layout), ImportError> {
+pub(crate) fn detect_layout<'a>(
+    grid: &'a Grid,
+    given: &DescribedColumns,
+) -> Result<(Cow<'a, Grid>, Layout), ImportError> {
     let found = layout(grid, given);
     if let Ok(Some(layout)) = found {
         return Ok((Cow::Borrowed(grid), layout));
     }
-    if let Some(turned) = grid.turned()
+    if let Some(turned) = grid.transposed()
         && let Ok(Some(layout)) = layout(&turned, given)
         && layout.groups.iter().all(|group| group.bare_cells == 0)
     {
@@ -118,8 +121,8 @@ pub(crate) fn understood<'a>(grid: &'a Grid, given: &Given) -> Result<(Cow<'a, G
 /// The layout of a table; `None` if it has no rows of numbers.
 ///
 /// # Errors
-/// [`ImportError`] if the headings do not name flow and pressure ratio, or a unit is unknown, or the map is a turbine's.
-fn layout(grid: &Grid, given: &Given) -> Result<Option<Layout>, ImportError> {
+/// [`ImportError`] if flow or pressure ratio has no heading, a unit is unknown, or the map is a turbine's.
+fn layout(grid: &Grid, given: &DescribedColumns) -> Result<Option<Layout>, ImportError> {
     if let Some(layout) = numbered(grid, given)? {
         return Ok(Some(layout));
     }
@@ -136,7 +139,7 @@ fn layout(grid: &Grid, given: &Given) -> Result<Option<Layout>, ImportError> {
         }
         let known = match columns(given, &row.cells) {
             Ok(known) => known,
-            // A unit is only wrong in a row of headings.
+            // Only a row of headings can have a wrong unit.
             Err(error) if is_reported(given, row, &error) => return Err(wrong(row, error)),
             Err(_) => continue,
         };
@@ -162,8 +165,12 @@ fn layout(grid: &Grid, given: &Given) -> Result<Option<Layout>, ImportError> {
     bare(grid, given)
 }
 
-/// A heading that names the first columns of the usual order only, above rows of four numbers: its units count.
-fn heading_in_usual_order(grid: &Grid, given: &Given, near: Option<(usize, usize)>) -> Option<Layout> {
+/// A heading above rows of four numbers that names only the first columns of the usual order.
+fn heading_in_usual_order(
+    grid: &Grid,
+    given: &DescribedColumns,
+    near: Option<(usize, usize)>,
+) -> Option<Layout> {
     let mut layout = bare(grid, given).ok().flatten()?;
     let (_, index) = near?;
     let group = layout.groups.first_mut()?;
@@ -181,8 +188,8 @@ fn heading_in_usual_order(grid: &Grid, given: &Given, near: Option<(usize, usize
     Some(layout)
 }
 
-/// Whether a mistake in a row is one of the table: a comment may hold any words.
-fn is_reported(given: &Given, row: &GridRow, error: &ColumnError) -> bool {
+/// Whether to report a mistake in a row: a comment may contain any words.
+fn is_reported(given: &DescribedColumns, row: &GridRow, error: &ColumnError) -> bool {
     let of_turbine = matches!(error, ColumnError::Turbine { .. });
     match row.is_comment {
         true => of_turbine && is_heading(given, row),
@@ -197,7 +204,7 @@ fn wrong(row: &GridRow, error: ColumnError) -> ImportError {
     }
 }
 
-/// A title names a turbine, and no compressor.
+/// Whether a title names a turbine and no compressor.
 fn is_turbine_title(row: &GridRow) -> bool {
     let text = row.text().to_lowercase();
     let numbers = row.cells.iter().filter(|cell| cell.parse::<f64>().is_ok()).count();
@@ -209,8 +216,8 @@ fn is_turbine_title(row: &GridRow) -> bool {
         && !text.contains("compressor")
 }
 
-/// The columns whose headings are understood; of two with the same quantity the first.
-fn columns(given: &Given, cells: &[String]) -> Result<Vec<Column>, ColumnError> {
+/// The columns with recognised headings; the first of two with the same quantity.
+fn columns(given: &DescribedColumns, cells: &[String]) -> Result<Vec<Column>, ColumnError> {
     let mut columns: Vec<Column> = Vec::new();
     for (index, cell) in
         cells.iter().enumerate().filter(|(_, cell)| cell.contains(char::is_alphabetic) || cell.contains('%'))
@@ -225,7 +232,7 @@ fn columns(given: &Given, cells: &[String]) -> Result<Vec<Column>, ColumnError> 
 }
 
 /// Whether a row names columns.
-pub(crate) fn is_heading(given: &Given, row: &GridRow) -> bool {
+pub(crate) fn is_heading(given: &DescribedColumns, row: &GridRow) -> bool {
     let named = |cell: &&String| {
         cell.contains(char::is_alphabetic) && !matches!(column(0, cell, given.machine), Ok(None))
     };
@@ -234,7 +241,7 @@ pub(crate) fn is_heading(given: &Given, row: &GridRow) -> bool {
     !has_number && row.cells.iter().filter(named).count() >= 2
 }
 
-fn missing(given: &Given, row: &GridRow) -> &'static str {
+fn missing(given: &DescribedColumns, row: &GridRow) -> &'static str {
     let known = columns(given, &row.cells).unwrap_or_default();
     let group = Group { columns: known, ..Group::default() };
     if group.has_flow() { "pressure ratio (or P1, P2 and T1)" } else { "flow" }
@@ -252,7 +259,7 @@ impl Headings {
         fn texts(row: &GridRow) -> Vec<&str> {
             row.cells.iter().map(String::as_str).collect()
         }
-        let joined = grid.rows.get(index + 1).and_then(|below| with_units_row(&texts(row), &texts(below)));
+        let joined = grid.rows.get(index + 1).and_then(|below| merge_units_row(&texts(row), &texts(below)));
         let first_row = index + 1 + usize::from(joined.is_some());
         Headings { cells: joined.unwrap_or_else(|| row.cells.clone()), first_row }
     }
@@ -261,7 +268,7 @@ impl Headings {
 /// The layout below a heading: its units may be in a row of their own; without a speed column each block has its speed in a title.
 fn with_heading(
     grid: &Grid,
-    given: &Given,
+    given: &DescribedColumns,
     index: usize,
     row: &GridRow,
     mut group: Group,
@@ -290,8 +297,13 @@ fn with_heading(
     Ok(Layout { groups: vec![group], first_row, remarks: Vec::new() })
 }
 
-/// Lines side by side: pairs of flow and pressure ratio (or X and Y, as digitisers write them), each with its speed above.
-fn side_by_side(grid: &Grid, given: &Given, index: usize, headings: &[String]) -> Option<Vec<Group>> {
+/// Lines side by side: pairs of flow and pressure ratio (X and Y in files of digitisers), each with its speed above.
+fn side_by_side(
+    grid: &Grid,
+    given: &DescribedColumns,
+    index: usize,
+    headings: &[String],
+) -> Option<Vec<Group>> {
     let letters = |cell: &String| matches!(cell.to_lowercase().as_str(), "x" | "y");
     let filled: Vec<(usize, &String)> =
         headings.iter().enumerate().filter(|(_, cell)| !cell.is_empty()).collect();
@@ -330,7 +342,7 @@ fn side_by_side(grid: &Grid, given: &Given, index: usize, headings: &[String]) -
 }
 
 /// One group of columns for each speed, which the headings or the row above them hold; columns without a speed belong to all.
-fn by_speed(grid: &Grid, given: &Given, index: usize, headings: &[String]) -> Option<Vec<Group>> {
+fn by_speed(grid: &Grid, given: &DescribedColumns, index: usize, headings: &[String]) -> Option<Vec<Group>> {
     let above = index.checked_sub(1).and_then(|above| grid.rows.get(above));
     let (mut shared, mut groups, mut carried) = (Vec::new(), Vec::<Group>::new(), None);
     for (place, heading) in headings.iter().enumerate() {
@@ -371,7 +383,7 @@ fn by_speed(grid: &Grid, given: &Given, index: usize, headings: &[String]) -> Op
     (groups.len() > 1 && groups.iter().all(is_line)).then_some(groups)
 }
 
-fn names_pressure_ratio(grid: &Grid, given: &Given, index: usize) -> bool {
+fn names_pressure_ratio(grid: &Grid, given: &DescribedColumns, index: usize) -> bool {
     let above = grid.rows.iter().take(index).rev().take(10);
     above.flat_map(|row| &row.cells).any(|cell| {
         matches!(given.column(0, cell), Ok(Some(column)) if column.quantity == Quantity::PressureRatio)
@@ -379,7 +391,12 @@ fn names_pressure_ratio(grid: &Grid, given: &Given, index: usize) -> bool {
 }
 
 /// The speed in the title of a block, rpm: `N = 60000 rpm`, `60 krpm`, or a number alone.
-pub(crate) fn speed_of_title(grid: &Grid, given: &Given, row: &GridRow, group: &Group) -> Option<f64> {
+pub(crate) fn speed_of_title(
+    grid: &Grid,
+    given: &DescribedColumns,
+    row: &GridRow,
+    group: &Group,
+) -> Option<f64> {
     if group.speed_column().is_some() || is_heading(given, row) || vane_of_title(grid, given, row).is_some() {
         return None;
     }
@@ -389,7 +406,7 @@ pub(crate) fn speed_of_title(grid: &Grid, given: &Given, row: &GridRow, group: &
 }
 
 /// The vane position in the title of a block of a turbine map: `VGT position 40 %`.
-pub(crate) fn vane_of_title(grid: &Grid, given: &Given, row: &GridRow) -> Option<f64> {
+pub(crate) fn vane_of_title(grid: &Grid, given: &DescribedColumns, row: &GridRow) -> Option<f64> {
     if given.machine == Machine::Compressor || is_heading(given, row) {
         return None;
     }
@@ -407,7 +424,7 @@ pub(crate) fn vane_of_title(grid: &Grid, given: &Given, row: &GridRow) -> Option
 }
 
 /// The layout of a table whose columns are described by their numbers.
-fn numbered(grid: &Grid, given: &Given) -> Result<Option<Layout>, ImportError> {
+fn numbered(grid: &Grid, given: &DescribedColumns) -> Result<Option<Layout>, ImportError> {
     let columns = given.numbered().map_err(|error| ImportError::Row { line: 1, source: Box::new(error) })?;
     let group = Group { columns, ..Group::default() };
     if !group.is_complete() || group.speed_column().is_none() {
@@ -422,11 +439,11 @@ fn numbered(grid: &Grid, given: &Given) -> Result<Option<Layout>, ImportError> {
     Ok(first_row.map(|first_row| Layout { groups: vec![group], first_row, remarks: Vec::new() }))
 }
 
-/// SAE text may have a temperature or a vane position behind the efficiency; more columns are another table.
+/// Maximum number of cells: SAE text may have a temperature or a vane position after the efficiency; a wider row is another table.
 const MAX_BARE_CELLS: usize = 6;
 
 /// The layout without headings: corrected rpm, corrected kg/s, pressure ratio, and the efficiency if there is a fourth column.
-fn bare(grid: &Grid, given: &Given) -> Result<Option<Layout>, ImportError> {
+fn bare(grid: &Grid, given: &DescribedColumns) -> Result<Option<Layout>, ImportError> {
     let numbers = |row: &GridRow| row.cells.iter().filter(|cell| grid.number(cell).is_some()).count();
     let first = grid
         .rows

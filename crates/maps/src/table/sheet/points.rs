@@ -1,9 +1,9 @@
-//! The points of a table, as written.
+//! Reads the points of a table as written.
 
 use crate::table::columns::column::Column;
-use crate::table::columns::described_columns::Given;
+use crate::table::columns::described_columns::DescribedColumns;
 use crate::table::columns::quantity::Quantity;
-use crate::table::rows_to_lines::room_for_one_more;
+use crate::table::rows_to_lines::check_point_count;
 use crate::table::sheet::grid::{Grid, GridRow, is_missing};
 use crate::table::sheet::layout::{self, Layout};
 use mapper_core::{ImportError, ImportRemark, ImportedColumn, LineEnd, ReferenceState};
@@ -18,12 +18,11 @@ pub(crate) struct Point<'a> {
     /// Vane position from the title of the block.
     pub(crate) vane: Option<f64>,
     values: Vec<Option<f64>>,
-    /// End of its line that a cell of its row names.
+    /// End of the speed line, if a cell of the row names it.
     pub(crate) end: Option<LineEnd>,
 }
 
 impl Point<'_> {
-    /// A value and its column.
     pub(crate) fn of(&self, quantity: Quantity) -> Option<(&Column, f64)> {
         let position = self.group.columns.iter().position(|column| column.quantity == quantity)?;
         Some((self.group.columns.get(position)?, self.values.get(position).copied().flatten()?))
@@ -32,11 +31,11 @@ impl Point<'_> {
     /// A value in SI and rpm, corrected to a reference state.
     pub(crate) fn value(&self, quantity: Quantity, reference: ReferenceState) -> Option<f64> {
         let (column, value) = self.of(quantity)?;
-        Some(column.inside(value, reference))
+        Some(column.to_corrected_si(value, reference))
     }
 }
 
-/// How the format `fitted` marks a node beyond the measured points.
+/// Mark of the format `fitted` for a node beyond the measured points.
 const EXTRAPOLATED: &str = "extrapolated";
 
 /// The points of a table.
@@ -45,7 +44,7 @@ const EXTRAPOLATED: &str = "extrapolated";
 /// [`ImportError`] with the line of a cell that is not a number, or of a row that is cut short.
 pub(crate) fn points<'a>(
     grid: &Grid,
-    given: &Given,
+    given: &DescribedColumns,
     layout: &'a Layout,
     remarks: &mut Vec<ImportRemark>,
 ) -> Result<Vec<Point<'a>>, ImportError> {
@@ -68,7 +67,7 @@ pub(crate) fn points<'a>(
                 vane = Some(position);
                 continue;
             }
-            // One number far from the table is none of its points.
+            // A single number far from the table is not a point.
             if is_empty && group.speed_column().is_some() {
                 continue;
             }
@@ -85,7 +84,7 @@ pub(crate) fn points<'a>(
                 extrapolated += 1;
                 continue;
             }
-            room_for_one_more(points.len(), row.at)?;
+            check_point_count(points.len(), row.at)?;
             let mut values = values(grid, row, group)?;
             if let Some(place) = group.speed_column().and_then(|position| values.get_mut(position)) {
                 match place {
@@ -114,7 +113,7 @@ fn values(grid: &Grid, row: &GridRow, group: &layout::Group) -> Result<Vec<Optio
     for column in &group.columns {
         let text = row.cells.get(column.index).map_or("", String::as_str);
         let value = grid.number(text);
-        if value.is_none() && !is_missing(text) && !column.quantity.is_extra() {
+        if value.is_none() && !is_missing(text) && !column.quantity.is_optional() {
             return Err(ImportError::NotANumber {
                 line: row.at,
                 quantity: column.quantity.name().to_owned(),
@@ -124,7 +123,7 @@ fn values(grid: &Grid, row: &GridRow, group: &layout::Group) -> Result<Vec<Optio
         values.push(value);
     }
     let filled = row.cells.iter().filter(|cell| !cell.is_empty()).count();
-    // A row without headings has no column to spare, and one between blanks no empty cell: what is cut short is a mistake.
+    // Without headings all columns are required, and between blanks no cell can be empty: a shorter row is a mistake.
     let needed = group.columns.iter().map(|column| column.index + 1).max().unwrap_or(0);
     if group.bare_cells > 0 && filled != group.bare_cells || grid.by_blanks && filled < needed {
         let text = row.text().chars().take(60).collect();
@@ -133,7 +132,7 @@ fn values(grid: &Grid, row: &GridRow, group: &layout::Group) -> Result<Vec<Optio
     Ok(values)
 }
 
-/// The end of a speed line that a cell names, in the words of several languages.
+/// The end of a speed line that a cell names, in several languages.
 fn end_of_line(row: &GridRow) -> Option<LineEnd> {
     let named = |words: &[&str]| {
         let has = |cell: &String| words.iter().any(|word| cell.to_lowercase().contains(word));
@@ -145,7 +144,6 @@ fn end_of_line(row: &GridRow) -> Option<LineEnd> {
     named(&["choke", "stopf", "schluck", "blocage", "gavage", "bloqueo"]).then_some(LineEnd::Choke)
 }
 
-/// The form of a row without headings.
 const ROW_FORM: &str = "a row of corrected rpm, corrected kg/s, pressure ratio and efficiency";
 
 /// Whether efficiencies without a unit are percentages: their median is far above 1.
@@ -159,12 +157,12 @@ pub(crate) fn efficiency_in_percent(layout: &Layout, points: &[Point<'_>]) -> bo
     let mut etas: Vec<f64> =
         points.iter().filter_map(|point| point.value(Quantity::Efficiency, ReferenceState::SAE)).collect();
     etas.sort_by(f64::total_cmp);
-    // No efficiency is above 1, and none of a usable point below 1 %.
+    // Efficiencies are at most 1, and those of usable points at least 1 %.
     etas.get(etas.len() / 2).is_some_and(|median| *median > 1.5)
         && etas.last().is_some_and(|last| *last <= 100.0)
 }
 
-/// The columns with the range of their values; without reference state reduced values stay what they are.
+/// The columns with the range of their values; without a reference state reduced values are not converted.
 pub(crate) fn columns(
     layout: &Layout,
     points: &[Point<'_>],
@@ -174,7 +172,10 @@ pub(crate) fn columns(
     for column in layout.groups.first().iter().flat_map(|group| &group.columns) {
         let value = |point: &Point<'_>| {
             let (column, value) = point.of(column.quantity)?;
-            Some(reference.map_or_else(|| column.plain(value), |reference| column.inside(value, reference)))
+            Some(reference.map_or_else(
+                || column.as_stated(value),
+                |reference| column.to_corrected_si(value, reference),
+            ))
         };
         let values = points.iter().filter_map(value);
         let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| (r.0.min(v), r.1.max(v)));

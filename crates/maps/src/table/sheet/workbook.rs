@@ -1,31 +1,31 @@
-//! Sheets of workbooks of Excel.
+//! Reads sheets of Excel workbooks.
 
-use crate::table::sheet::grid::{CELL_LIMIT, Grid, GridRow, ROW_LIMIT, some_numbers};
+use crate::table::sheet::grid::{Grid, GridRow, MAX_CELLS, MAX_ROWS, count_number_cells};
 use crate::table::sheet::speed_heading::without_speed;
 use mapper_core::ImportError;
 use std::io::{Cursor, Read};
 
-/// The cells of the first visible sheet with a table of numbers, or of the named one; of the hidden one, if no other has a table.
+/// The cells of the named sheet, else of the first visible sheet with a table of numbers, else of a hidden one.
 ///
 /// # Errors
 /// [`ImportError::Workbook`] if it is not a workbook, unpacks to more than a map needs, or has no such sheet.
 pub(crate) fn grid_of_workbook(bytes: &[u8], sheet: Option<&str>) -> Result<Grid, ImportError> {
     let mut sheets = sheets_of(bytes)?;
-    let has_table = |known: &&mut KnownSheet| {
-        known.rows.iter().filter(|row| some_numbers(&row.cells, true) >= 3).count() >= 2
+    let has_table = |known: &&mut Sheet| {
+        known.rows.iter().filter(|row| count_number_cells(&row.cells, true) >= 3).count() >= 2
     };
-    let grid = |known: &mut KnownSheet| Grid::of_rows(std::mem::take(&mut known.rows));
-    let is_read = |known: &&mut KnownSheet| match sheet {
+    let grid = |known: &mut Sheet| Grid::of_rows(std::mem::take(&mut known.rows));
+    let is_read = |known: &&mut Sheet| match sheet {
         Some(name) => known.name == name,
         None => !known.is_hidden,
     };
     // A sheet for each speed line, named after its speed.
-    let speed_rpm = |known: &KnownSheet| {
+    let speed_rpm = |known: &Sheet| {
         let (rest, speed_rpm) = without_speed(&Grid::of_rows(Vec::new()), &known.name)?;
         (rest.is_empty() || known.name.to_lowercase().contains("rpm")).then_some(speed_rpm)
     };
     let visible = sheets.iter_mut().filter(|known| !known.is_hidden).filter(has_table);
-    let mut lines: Vec<(f64, &mut KnownSheet)> =
+    let mut lines: Vec<(f64, &mut Sheet)> =
         visible.filter_map(|known| Some((speed_rpm(known)?, known))).collect();
     if sheet.is_none() && lines.len() > 1 {
         let title = |rpm: f64| GridRow { at: 1, cells: vec![format!("{rpm} rpm")], is_comment: false };
@@ -37,8 +37,8 @@ pub(crate) fn grid_of_workbook(bytes: &[u8], sheet: Option<&str>) -> Result<Grid
     if let Some(known) = sheets.iter_mut().filter(is_read).find(has_table) {
         return Ok(grid(known));
     }
-    // People hide what they do not want to be used: a hidden sheet counts if it is named, or holds the only table.
-    let mut hidden: Vec<&mut KnownSheet> =
+    // Hidden sheets usually have obsolete data: one counts only if it is named, or has the only table.
+    let mut hidden: Vec<&mut Sheet> =
         sheets.iter_mut().filter(|known| known.is_hidden).filter(has_table).collect();
     if let (None, [only]) = (sheet, hidden.as_mut_slice()) {
         return Ok(grid(only));
@@ -46,35 +46,34 @@ pub(crate) fn grid_of_workbook(bytes: &[u8], sheet: Option<&str>) -> Result<Grid
     let hidden: Vec<String> = hidden.iter().map(|known| known.name.clone()).collect();
     let list: Vec<&str> = sheets.iter().map(|known| known.name.as_str()).collect();
     let which = sheet.map_or("no visible sheet".to_owned(), |name| format!("no sheet `{name}`"));
-    let mut problem = format!("{which} holds rows of three numbers and more; sheets: {}", list.join(", "));
+    let mut problem = format!("{which} has rows of at least three numbers; sheets: {}", list.join(", "));
     if !hidden.is_empty() {
-        problem +=
-            &format!("; hidden ones with such rows: {} (name one by `--with sheet=...`)", hidden.join(", "));
+        problem += &format!("; hidden ones with such rows: {} (name one with `sheet`)", hidden.join(", "));
     }
     Err(ImportError::Workbook { problem })
 }
 
 /// A sheet with its rows that are not blank.
-struct KnownSheet {
+struct Sheet {
     name: String,
     is_hidden: bool,
     rows: Vec<GridRow>,
 }
 
 /// Maximum number of cells between the first and the last of each row of a sheet, empty ones included: 100 000 points with 40 columns.
-const SHEET_LIMIT: usize = 40 * ROW_LIMIT;
+const MAX_SHEET_CELLS: usize = 40 * MAX_ROWS;
 
 /// All sheets of a workbook.
-fn sheets_of(bytes: &[u8]) -> Result<Vec<KnownSheet>, ImportError> {
+fn sheets_of(bytes: &[u8]) -> Result<Vec<Sheet>, ImportError> {
     let failed = |problem: String| ImportError::Workbook { problem };
     let mut known = Vec::new();
-    let mut add = |name: String, is_hidden: bool, cells: Vec<Placed>| {
+    let mut add = |name: String, is_hidden: bool, cells: Vec<PositionedCell>| {
         let rows = rows_of_cells(cells).map_err(|why| failed(format!("sheet `{name}` {why}")))?;
-        known.push(KnownSheet { name, is_hidden, rows });
+        known.push(Sheet { name, is_hidden, rows });
         Ok::<(), ImportError>(())
     };
-    // Many cells may share one long text.
-    let mut left = UNPACKED_LIMIT as usize;
+    // Limits the memory: many cells may share one long text.
+    let mut left = MAX_UNPACKED_BYTES as usize;
     let mut kept = |text: &str| {
         let text = text.trim();
         left = left.checked_sub(text.len()).ok_or_else(|| failed(too_large()))?;
@@ -100,7 +99,7 @@ fn sheets_of(bytes: &[u8]) -> Result<Vec<KnownSheet>, ImportError> {
     let book = calamine::Reader::new(Cursor::new(bytes));
     let mut book: calamine::Xlsx<_> = book.map_err(|error: calamine::XlsxError| failed(error.to_string()))?;
     for sheet in calamine::Reader::sheets_metadata(&book).to_vec() {
-        // Not `worksheet_range`, which fills the rectangle around all cells. Charts have no cells.
+        // `worksheet_range` would allocate the rectangle around all cells. Charts have no cells.
         let Ok(mut reader) = book.worksheet_cells_reader(&sheet.name) else { continue };
         let mut cells = Vec::new();
         while let Some(cell) = reader.next_cell().map_err(|error| failed(error.to_string()))? {
@@ -117,45 +116,45 @@ fn sheets_of(bytes: &[u8]) -> Result<Vec<KnownSheet>, ImportError> {
 }
 
 /// A cell with its row and column from 0.
-type Placed = (u32, usize, String);
+type PositionedCell = (u32, usize, String);
 
 /// The rows of cells that are not blank, from the first column with a cell.
-fn rows_of_cells(mut cells: Vec<Placed>) -> Result<Vec<GridRow>, String> {
+fn rows_of_cells(mut cells: Vec<PositionedCell>) -> Result<Vec<GridRow>, String> {
     cells.sort_by_key(|(row, column, _)| (*row, *column));
     let first = cells.iter().map(|(_, column, _)| *column).min().unwrap_or_default();
     let mut rows = Vec::new();
-    let mut left = SHEET_LIMIT;
+    let mut left = MAX_SHEET_CELLS;
     for row in cells.chunk_by(|(row, ..), (next, ..)| row == next) {
         let mut texts = Vec::new();
         for (_, column, text) in
-            row.iter().filter(|(_, column, text)| !text.is_empty() && *column < CELL_LIMIT)
+            row.iter().filter(|(_, column, text)| !text.is_empty() && *column < MAX_CELLS)
         {
             texts.resize(column - first, String::new());
             texts.push(text.clone());
         }
-        let too_many = || format!("has more than {SHEET_LIMIT} cells; no map needs that");
+        let too_many = || format!("has more than {MAX_SHEET_CELLS} cells; no map needs that");
         left = left.checked_sub(texts.len()).ok_or_else(too_many)?;
         let at = row.first().map_or(0, |(row, ..)| *row as usize + 1);
         let row = GridRow { at, cells: texts, is_comment: false };
-        if rows.len() < 2 * ROW_LIMIT && row.cells.iter().any(|cell| cell.contains(char::is_alphanumeric)) {
+        if rows.len() < 2 * MAX_ROWS && row.cells.iter().any(|cell| cell.contains(char::is_alphanumeric)) {
             rows.push(row);
         }
     }
     Ok(rows)
 }
 
-/// Largest size of everything in a workbook, bytes: 100 000 points with 20 columns of 30 bytes.
-const UNPACKED_LIMIT: u64 = 64 << 20;
+/// Maximum unpacked size of a workbook, bytes: 100 000 points with 20 columns of 30 bytes.
+const MAX_UNPACKED_BYTES: u64 = 64 << 20;
 
 fn too_large() -> String {
-    format!("it unpacks to more than {} MB; no map needs that", UNPACKED_LIMIT >> 20)
+    format!("it unpacks to more than {} MB; no map needs that", MAX_UNPACKED_BYTES >> 20)
 }
 
-/// The library unpacks a workbook without a limit of its own, so the whole is unpacked once here and thrown away.
+/// Unpacks a workbook once within a limit, since the library has none.
 fn check_size(bytes: &[u8]) -> Result<(), ImportError> {
     let failed = |problem: String| ImportError::Workbook { problem };
     let mut parts = zip::ZipArchive::new(Cursor::new(bytes)).map_err(|error| failed(error.to_string()))?;
-    let mut left = UNPACKED_LIMIT;
+    let mut left = MAX_UNPACKED_BYTES;
     for index in 0..parts.len() {
         let part = parts.by_index(index).map_err(|error| failed(error.to_string()))?;
         let read = std::io::copy(&mut part.take(left + 1), &mut std::io::sink());

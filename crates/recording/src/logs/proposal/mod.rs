@@ -1,12 +1,13 @@
-//! The channel map that a log suggests: by names, units, ranges and physics, with what is sure of it and what is not.
+//! Proposal of a channel map for a log, from names, units, ranges and physics, with the certainty of each entry.
 
-mod choose;
+mod channel_proposal;
 mod names;
 mod physics;
-mod proposed;
+mod propose;
 mod shared_units;
 mod yaml;
 
-pub use choose::propose;
-pub use proposed::{Ambient, Certainty, NominalFlows, Proposal, ProposedChannel};
+pub use channel_proposal::{Ambient, Certainty, NominalFlows, Proposal, ProposedChannel};
+pub use propose::propose;
+pub(crate) use propose::short;
 pub use yaml::channel_map_text;

@@ -9,52 +9,52 @@ use std::sync::LazyLock;
 /// How well a name fits a channel; larger is better.
 pub(crate) type Weight = u32;
 
-/// Letters of a name that are looked at.
-const LONGEST: usize = 120;
+/// Maximum number of letters of a name that are evaluated.
+const MAX_NAME_LETTERS: usize = 120;
 
-/// A name in small letters, umlauts written out, accents left out, with `_` for all that is neither letter nor digit, and between the words of
+/// The name in lower case, umlauts spelled out, without accents, with `_` for everything but letters and digits and between the words of
 /// `compInletTemp`.
-pub(crate) fn plain(text: &str) -> String {
-    let mut plain = String::new();
-    let mut letters = text.chars().take(LONGEST).peekable();
+pub(crate) fn normalise(text: &str) -> String {
+    let mut normalised = String::new();
+    let mut letters = text.chars().take(MAX_NAME_LETTERS).peekable();
     let mut was_small = false;
     while let Some(letter) = letters.next() {
         if was_small && letter.is_uppercase() && letters.peek().is_some_and(|next| next.is_lowercase()) {
-            plain.push('_');
+            normalised.push('_');
         }
         was_small = letter.is_lowercase();
         for letter in letter.to_lowercase() {
-            push_plain(&mut plain, letter);
+            push_normalised(&mut normalised, letter);
         }
     }
     // German compounds: `Eintrittsdruck`.
-    plain.trim_matches('_').replace("eintritts", "eintritt_").replace("austritts", "austritt_")
+    normalised.trim_matches('_').replace("eintritts", "eintritt_").replace("austritts", "austritt_")
 }
 
-fn push_plain(plain: &mut String, letter: char) {
+fn push_normalised(normalised: &mut String, letter: char) {
     match letter {
-        'ä' => plain.push_str("ae"),
-        'ö' => plain.push_str("oe"),
-        'ü' => plain.push_str("ue"),
-        'ß' => plain.push_str("ss"),
-        'à' | 'á' | 'â' | 'ã' | 'å' => plain.push('a'),
-        'è' | 'é' | 'ê' => plain.push('e'),
-        'ì' | 'í' | 'î' => plain.push('i'),
-        'ò' | 'ó' | 'ô' | 'õ' => plain.push('o'),
-        'ù' | 'ú' | 'û' => plain.push('u'),
-        'ç' => plain.push('c'),
-        'ñ' => plain.push('n'),
-        letter if letter.is_ascii_alphanumeric() => plain.push(letter),
-        _ if plain.ends_with('_') => {}
-        _ => plain.push('_'),
+        'ä' => normalised.push_str("ae"),
+        'ö' => normalised.push_str("oe"),
+        'ü' => normalised.push_str("ue"),
+        'ß' => normalised.push_str("ss"),
+        'à' | 'á' | 'â' | 'ã' | 'å' => normalised.push('a'),
+        'è' | 'é' | 'ê' => normalised.push('e'),
+        'ì' | 'í' | 'î' => normalised.push('i'),
+        'ò' | 'ó' | 'ô' | 'õ' => normalised.push('o'),
+        'ù' | 'ú' | 'û' => normalised.push('u'),
+        'ç' => normalised.push('c'),
+        'ñ' => normalised.push('n'),
+        letter if letter.is_ascii_alphanumeric() => normalised.push(letter),
+        _ if normalised.ends_with('_') => {}
+        _ => normalised.push('_'),
     }
 }
 
-/// Patterns of one place: `{q}` stands for the letters of the quantity.
+/// Patterns of one station: `{q}` stands for the letters of the quantity.
 struct Place {
     temperature: Option<Channel>,
     pressure: Option<Channel>,
-    /// Each with its weight.
+    /// Each pattern with its weight.
     patterns: &'static [(Weight, &'static str)],
 }
 
@@ -75,9 +75,9 @@ fn words(alternatives: &str) -> String {
     format!("({})", all.filter(|word| word.len() > 1).collect::<Vec<_>>().join("|"))
 }
 
-/// What may stand between a place and a machine.
+/// Optional words between a place and a machine.
 const OF: &str = "(dem_|der_|of_|of_the_|du_|de_|de_la_|de_l_|del_|do_|da_|della_)?";
-/// What may stand behind a station number: the machine, or that a value is total or static.
+/// Optional suffix of a station number: the machine, or total or static.
 const KIND: &str = "(c|v|l|tot|total|stat|static|st)?";
 
 // Capital letters in braces are words or letters, small ones words alone: `compressore` is not `compressor` and `e`.
@@ -107,7 +107,7 @@ const PLACES: &[Place] = &[
         (6, "(^|_){o}_{D}{t}(_|$)"), (6, "(^|_){T}_{q}_{O}(_|$)"), (4, "(^|_)to{s}(_|$)"), (3, "(^|_){q}_?41(_|$)"),
         (6, "(^|_){t}_{a}(_|$)"), (3, "(^|_){q}_t_?2(_|$)"),
     ]},
-    // `p_c` and `p_t` say neither before nor after: mostly the pressure that the machine makes, and the one that drives it.
+    // `p_c` and `p_t` name no side: usually they are the compressor's outlet and the turbine's inlet pressure.
     Place { temperature: None, pressure: Some(Channel::P2), patterns: &[(2, "^{q}_?c$")]},
     Place { temperature: None, pressure: Some(Channel::P3), patterns: &[(2, "^{q}_?t$")]},
     Place { temperature: Some(Channel::Tc), pressure: None, patterns: &[
@@ -138,7 +138,7 @@ static ROWS: LazyLock<Vec<Row>> = LazyLock::new(rows);
 fn rows() -> Vec<Row> {
     let mut rows = Vec::new();
     let mut add = |channel: Channel, weight: Weight, pattern: &str| {
-        // The patterns stand in this file, and a test compiles them all.
+        // A test compiles all patterns of this file.
         rows.extend(Regex::new(pattern).ok().map(|pattern| Row { channel, weight, pattern }));
     };
     for place in PLACES {
@@ -225,23 +225,23 @@ static OTHER: LazyLock<Option<Regex>> = LazyLock::new(|| {
     Regex::new("fuel|kraftstoff|egr|agr|cooler|kuehler|wasser|crankcase|burner|brenner|orifice|blende|venturi|bearing_(housing|temp)|bypass|leak|(intake|inlet)_manifold|saugrohr|(^|_)(engine|eng|motor|crank|erpm|torque|drehmoment|cool\\w*|kuehl\\w*|water|vgt|vtg|cac|llk|dpf|scr|doc)(_|$)|(^|_)p_?b").ok()
 });
 
-fn says(pattern: &LazyLock<Option<Regex>>, text: &str) -> bool {
+fn matches(pattern: &LazyLock<Option<Regex>>, text: &str) -> bool {
     pattern.as_ref().is_some_and(|pattern| pattern.is_match(text))
 }
 
-/// Whether a name speaks of what was asked for, not of what was measured.
+/// Whether a name is that of a setpoint.
 pub(crate) fn is_set_value(name: &str) -> bool {
-    says(&SET, name)
+    matches(&SET, name)
 }
 
-/// Whether a name speaks of what was computed from others.
+/// Whether a name is that of a computed value.
 pub(crate) fn is_derived(name: &str) -> bool {
-    says(&DERIVED, name)
+    matches(&DERIVED, name)
 }
 
-/// Whether a name speaks of something else on an engine.
+/// Whether a name belongs to another part of an engine.
 fn is_other(name: &str) -> bool {
-    says(&OTHER, name)
+    matches(&OTHER, name)
 }
 
 /// Whether a name speaks of an engine.
@@ -249,7 +249,7 @@ pub(crate) fn speaks_of_engine(name: &str) -> bool {
     name.split('_').any(|word| matches!(word, "engine" | "eng" | "motor" | "moteur" | "erpm"))
 }
 
-/// Whether a name speaks of the ambient pressure.
+/// Whether a name is that of the ambient pressure.
 pub(crate) fn is_ambient(name: &str) -> bool {
     ["amb", "baro", "umg", "atm", "luftdruck"].iter().any(|word| name.contains(word))
 }
@@ -264,7 +264,7 @@ static OF_KIND: LazyLock<Vec<(Kind, Regex)>> = LazyLock::new(|| {
     patterns.into_iter().filter_map(|(kind, pattern)| Some((kind, Regex::new(pattern).ok()?))).collect()
 });
 
-/// The one kind of quantity that a name speaks of, or begins with; `None` without one and with several.
+/// The one kind of quantity in a name, or at its start; `None` if there is none, or several.
 fn kind_of_name(name: &str) -> Option<Kind> {
     let found = || OF_KIND.iter().filter_map(|(kind, pattern)| Some((*kind, pattern.find(name)?.start())));
     // The letter in front is the quantity: `T_L_n_Verd` is behind the compressor.
@@ -276,15 +276,15 @@ fn kind_of_name(name: &str) -> Option<Kind> {
     }
 }
 
-/// The channels that a column may be, by its name, its group and its further description, with their weights.
+/// Channels that a column may be, by its name, group and description, with their weights.
 pub(crate) fn channels_of(
     name: &str,
     group: &str,
     about: &str,
     kind: Option<Kind>,
 ) -> Vec<(Channel, Weight)> {
-    let (name, group) = (plain(name), plain(group));
-    let about = plain(&format!("{group} {about} {name}"));
+    let (name, group) = (normalise(name), normalise(group));
+    let about = normalise(&format!("{group} {about} {name}"));
     if is_other(&name) {
         return Vec::new();
     }
@@ -313,7 +313,7 @@ pub(crate) fn channels_of(
     found
 }
 
-/// The command of a measured channel.
+/// The command channel of a measured channel.
 fn commanded(channel: Channel) -> Option<Channel> {
     let symbol = format!("{}_command", channel.symbol());
     let row = CHANNELS.iter().find(|row| row.symbol == symbol);

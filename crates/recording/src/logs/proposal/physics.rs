@@ -1,44 +1,44 @@
-//! What the proposed channels say of each other: a compressor raises pressure and temperature, and flow follows speed.
+//! Checks the proposed channels against each other: a compressor raises pressure and temperature, and flow increases with speed.
 
-use super::names::{plain, speaks_of_engine};
-use super::proposed::{Ambient, Certainty, Proposal, ProposedChannel};
+use super::channel_proposal::{Ambient, Certainty, Proposal, ProposedChannel};
+use super::names::{normalise, speaks_of_engine};
 use crate::logs::plausible::STANDARD_ATMOSPHERE_PA;
 use crate::logs::units::{kind_of, unit};
 use crate::logs::{Layout, Survey};
 use mapper_core::Channel;
 
-/// Share of the samples that must agree.
-const AGREEMENT: f64 = 0.9;
+/// Minimum share of samples that agree.
+const MIN_AGREEMENT_SHARE: f64 = 0.9;
 
-/// Correlation below which flow does not follow speed. Along a line of constant speed flow moves alone.
-const FOLLOWS: f64 = 0.3;
+/// Minimum correlation of flow and speed. It is low since flow varies alone along a speed line.
+const MIN_CORRELATION: f64 = 0.3;
 
-/// Speed that engines of road vehicles hardly exceed, rpm; the largest turbochargers, on ships, reach some 9000.
-const FASTEST_ENGINE_RPM: f64 = 8e3;
+/// Maximum speed of road vehicle engines, rpm. The largest turbochargers, on ships, reach about 9000 rpm.
+const MAX_ENGINE_RPM: f64 = 8e3;
 
-/// Channels whose names are station numbers in most logs.
+/// Channels that most logs name by station numbers.
 const NUMBERED: [Channel; 6] = [Channel::P2, Channel::T2, Channel::P3, Channel::T3, Channel::P4, Channel::T4];
 
 /// Gas turbines and some engine programs number the compressor 2 and 3, the turbine 4 and 5.
-const ENGINE_NUMBERS: &str = "its stations may be numbered as in a gas turbine: 2 before and 3 behind the compressor, 4 before and 5 behind the turbine";
+const ENGINE_NUMBERS: &str = "its stations may be numbered as in a gas turbine: 2 before and 3 after the compressor, 4 before and 5 after the turbine";
 
 /// Results of the checks.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Agreement {
     /// Number of pairs of channels that agree.
-    pub(super) for_it: usize,
+    pub(super) agreeing: usize,
     /// Number of pairs that contradict.
-    pub(super) against: usize,
-    /// Whether the stations may be numbered otherwise.
-    pub(super) doubts_stations: bool,
+    pub(super) contradicting: usize,
+    /// Whether the log may number its stations differently.
+    pub(super) suspects_numbering: bool,
 }
 
-/// Judges the proposal and remarks what it found.
+/// Checks the proposal and adds remarks.
 pub(super) fn judge(proposal: &mut Proposal, layout: &Layout, survey: &Survey) -> Agreement {
     let mut agreement = Agreement::default();
-    settle_bare_housing(proposal, layout, survey);
-    let course = |proposal: &Proposal, channel: Channel| Course::of(proposal, channel, layout, survey);
-    let running: Option<Course> = course(proposal, Channel::ShaftSpeed);
+    decide_bare_housing(proposal, layout, survey);
+    let course = |proposal: &Proposal, channel: Channel| Readings::of(proposal, channel, layout, survey);
+    let running: Option<Readings> = course(proposal, Channel::ShaftSpeed);
     let raised = [
         (Channel::P2, Channel::P1, "P2 is above P1"),
         (Channel::T2, Channel::T1, "T2 is above T1"),
@@ -58,24 +58,24 @@ pub(super) fn judge(proposal: &mut Proposal, layout: &Layout, survey: &Survey) -
             continue;
         }
         let share = pairs.iter().filter(|(high, low)| high >= low).count() as f64 / pairs.len() as f64;
-        if share >= AGREEMENT {
-            agreement.for_it += 1;
+        if share >= MIN_AGREEMENT_SHARE {
+            agreement.agreeing += 1;
             proposal.remarks.push(format!(
-                "{words} in {:.0} % of the time that the shaft turns, as it must be",
+                "{words} in {:.0} % of the time that the shaft turns, as expected",
                 100.0 * share
             ));
         } else {
             let message = format!("{words} in only {:.0} % of the time that the shaft turns", 100.0 * share);
             doubt(proposal, &[higher, lower], &message);
-            agreement.against += 1;
+            agreement.contradicting += 1;
             if higher == Channel::T3 {
-                agreement.doubts_stations = true;
+                agreement.suspects_numbering = true;
                 doubt(proposal, &NUMBERED, ENGINE_NUMBERS);
             }
         }
     }
     doubt_bare_housings(proposal, layout);
-    if layout.columns.iter().any(|column| speaks_of_engine(&plain(&column.name))) {
+    if layout.columns.iter().any(|column| speaks_of_engine(&normalise(&column.name))) {
         doubt(
             proposal,
             &[Channel::ValveCommand],
@@ -83,19 +83,19 @@ pub(super) fn judge(proposal: &mut Proposal, layout: &Layout, survey: &Survey) -
         );
     }
     let fastest_rpm = running.as_ref().map(|speed| speed.samples().map(|(_, rpm)| rpm).fold(0.0, f64::max));
-    if let Some(rpm) = fastest_rpm.filter(|rpm| *rpm < FASTEST_ENGINE_RPM) {
-        let message = format!("at most {rpm:.0} rpm: this may be the speed of the engine");
+    if let Some(rpm) = fastest_rpm.filter(|rpm| *rpm < MAX_ENGINE_RPM) {
+        let message = format!("maximum {rpm:.0} rpm: this may be the engine speed");
         doubt(proposal, &[Channel::ShaftSpeed], &message);
     }
     if let (Some(speed), Some(flow)) = (running, course(proposal, Channel::CompressorFlow)) {
         let pairs: Vec<(f64, f64)> =
             speed.samples().filter_map(|(t_s, rpm)| Some((rpm, flow.at(t_s)?))).collect();
         match correlation(&pairs) {
-            Some(r) if r >= FOLLOWS => {
-                proposal.remarks.push(format!("flow follows speed (correlation {r:.2})"))
+            Some(r) if r >= MIN_CORRELATION => {
+                proposal.remarks.push(format!("flow correlates with speed (r = {r:.2})"))
             }
             Some(r) => {
-                let message = format!("flow does not follow speed (correlation {r:.2})");
+                let message = format!("flow does not correlate with speed (r = {r:.2})");
                 for proposed in proposal
                     .channels
                     .iter_mut()
@@ -117,9 +117,10 @@ pub(super) fn remark_stations(proposal: &mut Proposal, layout: &Layout) {
         let name = layout.columns.get(proposed.column).map_or("", |column| column.name.as_str());
         if name.contains(char::is_numeric) && proposed.channel != Channel::ShaftSpeed {
             proposed.certainty = proposed.certainty.min(Certainty::Likely);
-            proposed
-                .remarks
-                .push("stations are numbered 2 to 5 as in a gas turbine: only so T3 is above T4".to_owned());
+            proposed.remarks.push(
+                "stations are numbered 2 to 5 as in a gas turbine: with other numbers T3 would be below T4"
+                    .to_owned(),
+            );
         }
     }
 }
@@ -127,19 +128,19 @@ pub(super) fn remark_stations(proposal: &mut Proposal, layout: &Layout) {
 /// (gamma - 1) / gamma of air.
 const EXPONENT: f64 = 0.2857;
 
-/// Pressure ratio from which the gas is 38 K or more above the inlet: a housing is far below it, unless the turbine heats it.
-const TELLING_RATIO: f64 = 1.5;
+/// Minimum pressure ratio: from here the gas is at least 38 K above the inlet, and an unheated housing is far below it.
+const MIN_PRESSURE_RATIO: f64 = 1.5;
 
-/// Inlet of a compressor without a column for it, K: test cells are hardly warmer than 40 degC.
-const WARM_ROOM_K: f64 = 313.15;
+/// Maximum inlet temperature if the log has no column for it, K: test cells rarely exceed 40 degC.
+const MAX_INLET_K: f64 = 313.15;
 
-/// `T_c` without another column for the gas: what is hotter than an ideal compression makes the gas may be the gas, what is cooler cannot.
-fn settle_bare_housing(proposal: &mut Proposal, layout: &Layout, survey: &Survey) {
+/// Decides whether `T_c` is gas or housing if no other column is the gas: gas cannot be cooler than after an ideal compression.
+fn decide_bare_housing(proposal: &mut Proposal, layout: &Layout, survey: &Survey) {
     let certain = |proposal: &Proposal, channel: Channel| {
-        proposal.of(channel).is_some_and(|found| found.certainty > Certainty::Unsure)
+        proposal.entry(channel).is_some_and(|found| found.certainty > Certainty::Unsure)
     };
     let range = |proposal: &Proposal, channel: Channel| {
-        let course = Course::of(proposal, channel, layout, survey)?;
+        let course = Readings::of(proposal, channel, layout, survey)?;
         let values = || course.samples().map(|(_, value)| value);
         Some((values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max)))
     };
@@ -152,10 +153,10 @@ fn settle_bare_housing(proposal: &mut Proposal, layout: &Layout, survey: &Survey
         return;
     };
     let inlet_pa = range(proposal, Channel::P1).map_or(STANDARD_ATMOSPHERE_PA, |(low, _)| low);
-    let inlet_k = range(proposal, Channel::T1).map_or(WARM_ROOM_K, |(_, high)| high);
+    let inlet_k = range(proposal, Channel::T1).map_or(MAX_INLET_K, |(_, high)| high);
     let ideal_k = inlet_k * (outlet_pa / inlet_pa).max(1.0).powf(EXPONENT);
     let bare = |proposed: &&mut ProposedChannel| proposed.channel == Channel::Tc && is_bare(proposed, layout);
-    if outlet_pa < TELLING_RATIO * inlet_pa || hottest_k < ideal_k {
+    if outlet_pa < MIN_PRESSURE_RATIO * inlet_pa || hottest_k < ideal_k {
         return;
     }
     if let Some(proposed) = proposal.channels.iter_mut().find(bare) {
@@ -169,20 +170,24 @@ fn settle_bare_housing(proposal: &mut Proposal, layout: &Layout, survey: &Survey
     }
 }
 
-/// Whether a name is `T_c` or `T_t` and no more.
+/// Whether a name is just `T_c` or `T_t`.
 fn is_bare(proposed: &ProposedChannel, layout: &Layout) -> bool {
     let column = layout.columns.get(proposed.column);
-    column.is_some_and(|column| column.description.is_empty() && plain(&column.name).len() <= "temp_c".len())
+    column.is_some_and(|column| {
+        column.description.is_empty() && normalise(&column.name).len() <= "temp_c".len()
+    })
 }
 
-/// `T_c` and `T_t` are housings here, and gas behind compressor and turbine elsewhere: without a column for the gas they may be it.
+/// Marks `T_c` and `T_t` as unsure without a column for the gas: here they are housings, elsewhere the gas after compressor and turbine.
 fn doubt_bare_housings(proposal: &mut Proposal, layout: &Layout) {
     for (housing, gas, place) in
         [(Channel::Tc, Channel::T2, "compressor"), (Channel::Tt, Channel::T4, "turbine")]
     {
-        let gas_is_known = proposal.of(gas).is_some_and(|gas| gas.certainty > Certainty::Unsure);
-        if !gas_is_known && proposal.of(housing).is_some_and(|proposed| is_bare(proposed, layout)) {
-            let message = format!("it may be the gas behind the {place}, for which there is no other column");
+        let gas_is_known = proposal.entry(gas).is_some_and(|gas| gas.certainty > Certainty::Unsure);
+        if !gas_is_known && proposal.entry(housing).is_some_and(|proposed| is_bare(proposed, layout)) {
+            let message = format!(
+                "it may be the gas temperature after the {place}, for which the log has no other column"
+            );
             doubt(proposal, &[housing], &message);
         }
     }
@@ -195,15 +200,15 @@ fn doubt(proposal: &mut Proposal, channels: &[Channel], message: &str) {
     }
 }
 
-/// The course of a channel in the unit used inside, absolute.
-struct Course {
+/// Readings of a channel, SI and absolute.
+struct Readings {
     t_s: Vec<f64>,
     values: Vec<f64>,
 }
 
-impl Course {
-    fn of(proposal: &Proposal, channel: Channel, layout: &Layout, survey: &Survey) -> Option<Course> {
-        let proposed = proposal.of(channel)?;
+impl Readings {
+    fn of(proposal: &Proposal, channel: Channel, layout: &Layout, survey: &Survey) -> Option<Readings> {
+        let proposed = proposal.entry(channel)?;
         let unit = unit(kind_of(channel), proposed.unit?).ok()?;
         let data = survey.columns.get(proposed.column)?;
         let group = survey.groups.get(layout.columns.get(proposed.column)?.group)?;
@@ -217,7 +222,7 @@ impl Course {
             }
         };
         let values = data.trace.means().into_iter().map(|value| unit.to_inside(value) + ambient_pa).collect();
-        Some(Course { t_s: group.trace.means(), values })
+        Some(Readings { t_s: group.trace.means(), values })
     }
 
     fn samples(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
@@ -228,7 +233,7 @@ impl Course {
             .filter(|(t_s, value)| t_s.is_finite() && value.is_finite())
     }
 
-    /// The mean around a time.
+    /// Mean reading around a time.
     fn at(&self, t_s: f64) -> Option<f64> {
         let after = self.t_s.partition_point(|t| *t < t_s).min(self.t_s.len().checked_sub(1)?);
         self.values.get(after).copied().filter(|value| value.is_finite())

@@ -1,19 +1,18 @@
-//! Units of a log that gives none: columns of one kind share a unit, and physics settles the rest.
+//! Infers the units of a log without units: columns of one kind share a unit, and physics excludes the others.
 
-use super::proposed::{Certainty, NominalFlows, Proposal, ProposedChannel};
-use crate::logs::plausible::{OUTER, STANDARD_ATMOSPHERE_PA, fitting_units};
+use super::channel_proposal::{Certainty, NominalFlows, Proposal, ProposedChannel};
+use crate::logs::plausible::{STANDARD_ATMOSPHERE_PA, TRIMMED_SHARE, fitting_units};
 use crate::logs::units::kind_of;
 use crate::logs::{Layout, Survey};
 use mapper_core::Channel;
 use mapper_yaml::units::{Kind, Unit, header_unit};
 use std::f64::consts::PI;
 
-/// Largest ratio of pressures: one stage of a turbocharger reaches 6, where the tip speed of aluminium wheels ends; a third more is margin for
-/// an inlet below the atmosphere.
-const LARGEST_RATIO: f64 = 8.0;
+/// Maximum pressure ratio: one stage reaches 6 at the tip speed limit of aluminium wheels; a third more is margin for a throttled inlet.
+const MAX_PRESSURE_RATIO: f64 = 8.0;
 
-/// Looks for one unit that fits all channels of a kind without a unit.
-pub(super) fn settle(proposal: &mut Proposal, layout: &Layout, survey: &Survey) {
+/// Looks for one unit that fits all channels of a kind that have none.
+pub(super) fn infer_units(proposal: &mut Proposal, layout: &Layout, survey: &Survey) {
     for kind in [Kind::Temperature, Kind::Pressure, Kind::Speed] {
         let bare = |proposed: &ProposedChannel| {
             kind_of(proposed.channel) == kind
@@ -25,17 +24,18 @@ pub(super) fn settle(proposal: &mut Proposal, layout: &Layout, survey: &Survey) 
             .filter(|proposed| bare(proposed))
             .filter_map(|proposed| {
                 let data = survey.columns.get(proposed.column)?;
-                Some((proposed.channel, data.quantile(OUTER), data.quantile(1.0 - OUTER)))
+                Some((proposed.channel, data.quantile(TRIMMED_SHARE), data.quantile(1.0 - TRIMMED_SHARE)))
             })
             .collect();
-        // Where another column of the kind has a unit, that is the stand's.
+        // If another column of the kind has a unit, the stand uses that one.
         let written = proposal.channels.iter().filter(|other| kind_of(other.channel) == kind && !bare(other));
         let written: Vec<&str> = written.filter_map(|other| other.unit).collect();
         let fits_all = |unit: &&'static Unit| {
-            let fits = |(channel, low, high): &(Channel, f64, f64)| {
+            let is_plausible = |(channel, low, high): &(Channel, f64, f64)| {
                 fitting_units(*channel, *low, *high, 0.0).iter().any(|other| other.symbol() == unit.symbol())
             };
-            channels.iter().all(fits) && (kind != Kind::Pressure || ratios_are_possible(&channels, unit))
+            channels.iter().all(is_plausible)
+                && (kind != Kind::Pressure || ratios_are_possible(&channels, unit))
         };
         let mut common: Vec<&'static Unit> = kind.units().iter().filter(fits_all).collect();
         if common.iter().any(|unit| written.contains(&unit.symbol())) {
@@ -54,9 +54,9 @@ pub(super) fn settle(proposal: &mut Proposal, layout: &Layout, survey: &Survey) 
                 _ if unit.symbol() == "degF" => {
                     "the log gives no unit; other units are imperial, and in degC the inlet would be warmer than a room".to_owned()
                 }
-                1 => format!("the log gives no unit; {} is the one that is plausible", unit.symbol()),
+                1 => format!("the log gives no unit; only {} is plausible", unit.symbol()),
                 _ => format!(
-                    "the log gives no unit; {} is the one in which all {count} columns of the kind are plausible",
+                    "the log gives no unit; only in {} all {count} columns of the kind are plausible",
                     unit.symbol()
                 ),
             });
@@ -86,41 +86,40 @@ fn inlet_is_too_warm(channels: &[(Channel, f64, f64)], common: &[&'static Unit])
     unit.symbol() == "degC" && channels.iter().any(is_warm)
 }
 
-/// Isentropic head over the square of the tip speed: radial wheels take up 0.6 to 0.9 of it by slip and backsweep, and turn 0.5 to
-/// 0.8 of that into head.
+/// Isentropic head over the square of the tip speed. Slip and backsweep leave 0.6 to 0.9 of it as work, of which 0.5 to 0.8 is head.
 const HEAD_COEFFICIENT: f64 = 0.45;
 /// Flow over density, tip speed and disc area: wheels from 0.01 to 0.15 are radial.
 const FLOW_COEFFICIENT: f64 = 0.06;
 
-/// A flow may be this many times as large or small: both ranges together, from 0.1 to 4 times the middle, and a margin. If units that
-/// differ by less (g/s and kg/h: 3.6) are plausible too, nothing is settled.
+/// Maximum ratio, either way, of a flow to that of the mean coefficients: both ranges together give 0.1 to 4. Units that differ by less
+/// (g/s and kg/h: 3.6) cannot be distinguished.
 const FLOW_FACTOR: f64 = 8.0;
 
-/// Dry air at room temperature: specific heat at constant pressure, J/(kg K), (gamma - 1) / gamma, and density at the inlet, kg/m3,
-/// each within some per cent, which the factor above makes little of.
-const CP: f64 = 1005.0;
+/// Dry air at room temperature, within a few per cent: small compared with [`FLOW_FACTOR`].
+const CP_J_KGK: f64 = 1005.0;
 const EXPONENT: f64 = 0.2857;
-const DENSITY: f64 = 1.15;
+const DENSITY_KG_M3: f64 = 1.15;
 const INLET_K: f64 = 298.0;
 
-/// By so much the flow may lie outside those at surge and choke: correction to the inlet, and lines between the nominal ones.
+/// Maximum ratio by which the flow may lie outside surge and choke: for the correction to the inlet, and for lines between nominal ones.
 const NOMINAL_FACTOR: f64 = 1.3;
 
-/// Looks for the unit of a flow without one: in that of the machine, if it is known; else pressure ratio and speed give the size of the
-/// wheel, and that the flow.
-pub(super) fn settle_flow(
+/// Infers the unit of a flow from the machine's flow range if it is known, else from the wheel size that pressure ratio and speed give.
+pub(super) fn infer_flow_unit(
     proposal: &mut Proposal,
     layout: &Layout,
     survey: &Survey,
     nominal: Option<NominalFlows<'_>>,
 ) {
     let top = |channel: Channel, share: f64| -> Option<f64> {
-        let proposed = proposal.of(channel).filter(|proposed| proposed.certainty > Certainty::Unsure)?;
+        let proposed = proposal.entry(channel).filter(|proposed| proposed.certainty > Certainty::Unsure)?;
         let unit = crate::logs::units::unit(kind_of(channel), proposed.unit?).ok()?;
         let over_pa = if proposed.gauge { STANDARD_ATMOSPHERE_PA } else { 0.0 };
         Some(unit.to_inside(survey.columns.get(proposed.column)?.quantile(share)) + over_pa)
     };
-    let Some(speed_rpm) = top(Channel::ShaftSpeed, 1.0 - OUTER).filter(|rpm| *rpm > 0.0) else { return };
+    let Some(speed_rpm) = top(Channel::ShaftSpeed, 1.0 - TRIMMED_SHARE).filter(|rpm| *rpm > 0.0) else {
+        return;
+    };
     let (low_kg_s, high_kg_s, why) = match nominal {
         Some(flows) => {
             let (surge_kg_s, choke_kg_s) = flows(speed_rpm);
@@ -129,12 +128,12 @@ pub(super) fn settle_flow(
             (surge_kg_s / NOMINAL_FACTOR, choke_kg_s * NOMINAL_FACTOR, why)
         }
         None => {
-            let Some(outlet_pa) = top(Channel::P2, 1.0 - OUTER) else { return };
-            let ratio = outlet_pa / top(Channel::P1, OUTER).unwrap_or(STANDARD_ATMOSPHERE_PA);
-            let head_j_kg = CP * INLET_K * (ratio.max(1.0).powf(EXPONENT) - 1.0);
+            let Some(outlet_pa) = top(Channel::P2, 1.0 - TRIMMED_SHARE) else { return };
+            let ratio = outlet_pa / top(Channel::P1, TRIMMED_SHARE).unwrap_or(STANDARD_ATMOSPHERE_PA);
+            let head_j_kg = CP_J_KGK * INLET_K * (ratio.max(1.0).powf(EXPONENT) - 1.0);
             let tip_m_s = (head_j_kg / HEAD_COEFFICIENT).sqrt();
             let diameter_m = 60.0 * tip_m_s / (PI * speed_rpm);
-            let flow_kg_s = FLOW_COEFFICIENT * DENSITY * tip_m_s * PI / 4.0 * diameter_m * diameter_m;
+            let flow_kg_s = FLOW_COEFFICIENT * DENSITY_KG_M3 * tip_m_s * PI / 4.0 * diameter_m * diameter_m;
             let why = format!("fits speed and pressure ratio (a wheel of about {:.0} mm)", 1e3 * diameter_m);
             (flow_kg_s / FLOW_FACTOR, flow_kg_s * FLOW_FACTOR, why)
         }
@@ -145,7 +144,7 @@ pub(super) fn settle_flow(
         };
         let bare = layout.columns.get(proposed.column).is_some_and(|column| column.unit.is_none());
         let Some(data) = survey.columns.get(proposed.column).filter(|_| bare) else { continue };
-        let (low, high) = (data.quantile(OUTER), data.quantile(1.0 - OUTER));
+        let (low, high) = (data.quantile(TRIMMED_SHARE), data.quantile(1.0 - TRIMMED_SHARE));
         let fitting = fitting_units(channel, low, high, 0.0);
         if !fitting.iter().any(|unit| Some(unit.symbol()) == proposed.unit) || fitting.len() < 2 {
             continue;
@@ -160,9 +159,9 @@ pub(super) fn settle_flow(
     }
 }
 
-/// Whether no pressure exceeds the inlet's by more than a compressor can make of it.
+/// Whether all pressure ratios are possible for a compressor.
 fn ratios_are_possible(channels: &[(Channel, f64, f64)], unit: &Unit) -> bool {
     let inlet = channels.iter().find(|(channel, ..)| *channel == Channel::P1);
     let inlet_pa = inlet.map_or(STANDARD_ATMOSPHERE_PA, |(_, low, _)| unit.to_inside(*low));
-    channels.iter().all(|(_, _, high)| unit.to_inside(*high) <= LARGEST_RATIO * inlet_pa)
+    channels.iter().all(|(_, _, high)| unit.to_inside(*high) <= MAX_PRESSURE_RATIO * inlet_pa)
 }

@@ -1,12 +1,12 @@
-//! A proposal as the text of a channel map.
+//! Writes a proposal as the text of a channel map.
 
-use super::proposed::{Ambient, Certainty, Proposal, ProposedChannel};
+use super::channel_proposal::{Ambient, Certainty, Proposal, ProposedChannel};
 use crate::logs::Layout;
 use serde_json::Value;
 use std::fmt::Write;
 
-/// The text of a channel map: what is sure and what is likely as entries, what is not as comments. `options` are the keys and
-/// values with which the log was read.
+/// The text of a channel map: certain and likely channels as entries, unsure ones as comments. `options` are the keys and values with
+/// which the log was read.
 pub fn channel_map_text(
     name: &str,
     layout: &Layout,
@@ -14,14 +14,14 @@ pub fn channel_map_text(
     options: &[(String, String)],
 ) -> String {
     let mut text = format!(
-        "# Channel map of {}, proposed by `mapper log inspect`. Lines that end in a remark had to be guessed:\n\
+        "# Proposed channel map of {}. Entries with a remark are guesses:\n\
          # look at them. Lines that are comments are doubtful and count only without the `#`.\nchannels:\n",
         remark(name)
     );
     let kept = |proposed: &&ProposedChannel| proposed.certainty > Certainty::Unsure;
     if !proposal.channels.iter().any(|proposed| kept(&proposed)) {
         text.push_str(
-            "  # nothing was recognised; write e.g.\n  # T2: {field: \"name of the column\", unit: degC}\n",
+            "  # no channel was recognised; write e.g.\n  # T2: {field: \"name of the column\", unit: degC}\n",
         );
     }
     for proposed in &proposal.channels {
@@ -37,20 +37,20 @@ pub fn channel_map_text(
         Some(Ambient::Column { column, unit }) => {
             let _ = writeln!(
                 text,
-                "\n# What gauge pressures are added to.\nambient_pressure: {{{}, unit: {unit}}}",
+                "\n# Added to gauge pressures.\nambient_pressure: {{{}, unit: {unit}}}",
                 place(layout, *column)
             );
         }
         Some(Ambient::Assumed) => {
             text.push_str(
-                "\n# What gauge pressures are added to. The log does not hold it: write what the barometer read, e.g. 99.2 kPa, or\n\
+                "\n# Added to gauge pressures. The log does not contain it: write the barometer's reading, e.g. 99.2 kPa, or\n\
                  # {altitude: 300 m}. `unknown` is 101.3 kPa with an uncertainty of 3 kPa.\n\
                  ambient_pressure: unknown\n",
             );
         }
     }
     if !options.is_empty() {
-        text.push_str("\n# How the log is to be read.\nlog:\n");
+        text.push_str("\n# Options for reading the log.\nlog:\n");
         for (key, value) in options {
             let _ = writeln!(text, "  {key}: {}", quoted(value));
         }
@@ -77,13 +77,13 @@ fn source(layout: &Layout, proposed: &ProposedChannel) -> String {
     text
 }
 
-/// Topic, if there are several groups, and field.
+/// Topic (if the log has several groups) and field.
 fn place(layout: &Layout, column: usize) -> String {
     let name = layout.columns.get(column).map_or("", |column| column.name.as_str());
     format!("{}field: {}", topic(layout, column), scalar(name))
 }
 
-/// The topic of a column, if there are several groups.
+/// The topic of a column, if the log has several groups.
 fn topic(layout: &Layout, column: usize) -> String {
     let group = layout.columns.get(column).and_then(|column| layout.groups.get(column.group));
     match group {
@@ -92,29 +92,29 @@ fn topic(layout: &Layout, column: usize) -> String {
     }
 }
 
-/// A text that needs no quotes if it is a plain word, and one with them otherwise.
+/// The text as a YAML scalar, in quotes unless it is a plain word.
 fn scalar(text: &str) -> String {
     const WORDS: [&str; 9] = ["y", "n", "yes", "no", "on", "off", "true", "false", "null"];
     let mut letters = text.chars();
-    let plain = letters.next().is_some_and(|first| first.is_ascii_alphabetic())
+    let normalise = letters.next().is_some_and(|first| first.is_ascii_alphabetic())
         && letters.all(|letter| letter.is_ascii_alphanumeric() || ['_', '/', '.', '^'].contains(&letter))
         && !WORDS.contains(&text.to_lowercase().as_str());
-    if plain { text.to_owned() } else { quoted(text) }
+    if normalise { text.to_owned() } else { quoted(text) }
 }
 
-/// In quotes as JSON has them, which YAML reads too. YAML reads fewer characters without an escape.
+/// The text in JSON's quotes, which YAML reads too; YAML needs more characters escaped.
 fn quoted(text: &str) -> String {
     let json = Value::from(text).to_string();
     let escaped = |c| if is_plain(c) { c.to_string() } else { format!("\\u{:04x}", u32::from(c)) };
     json.chars().map(escaped).collect()
 }
 
-/// A text for a comment.
+/// The text as a comment on one line.
 fn remark(text: &str) -> String {
     text.chars().map(|c| if is_plain(c) { c } else { ' ' }).collect()
 }
 
-/// Whether every YAML reader takes a character as it is, and as part of its line.
+/// Whether every YAML reader accepts a character unescaped within a line.
 fn is_plain(c: char) -> bool {
     !c.is_control() && !matches!(c, '\u{2028}' | '\u{2029}' | '\u{feff}' | '\u{fffe}' | '\u{ffff}')
 }

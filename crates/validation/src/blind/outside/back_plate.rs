@@ -5,7 +5,7 @@ use mapper_physics::effect_parameters;
 use mapper_physics::gas::air;
 use mapper_physics::machine::hooks::{Hooks, Site, TooManyExtraStates};
 use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 effect_parameters! {
     /// Heat goes from the bearing housing through the back plate into the compressed gas.
@@ -17,7 +17,7 @@ effect_parameters! {
 }
 
 impl EffectKind for BackPlate {
-    const ABOUT: About = About {
+    const ABOUT: EffectText = EffectText {
         id: "X_back_plate",
         name: "heat through the back plate",
         description: "heat from the bearing side through the back plate into the gas behind the wheel",

@@ -4,7 +4,7 @@ use super::WITHHELD;
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::{Hooks, Site, TooManyExtraStates};
 use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 effect_parameters! {
     /// The clearance over the wheel grows with the housing's temperature.
@@ -16,7 +16,7 @@ effect_parameters! {
 }
 
 impl EffectKind for Clearance {
-    const ABOUT: About = About {
+    const ABOUT: EffectText = EffectText {
         id: "X_clearance",
         name: "clearance that grows with heat",
         description: "a clearance that grows as the compressor housing gets hotter than 320 K",

@@ -4,7 +4,7 @@ use super::WITHHELD;
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::{Hooks, Site, TooManyExtraStates};
 use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 /// Temperature of the water, K.
 const WATER_K: f64 = 358.15;
@@ -19,7 +19,7 @@ effect_parameters! {
 }
 
 impl EffectKind for CoolantPassage {
-    const ABOUT: About = About {
+    const ABOUT: EffectText = EffectText {
         id: "X_coolant_passage",
         name: "coolant passage in the compressor housing",
         description: "a coolant passage from the compressor housing to water at 85 degC",

@@ -4,7 +4,7 @@ use super::WITHHELD;
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::{Hooks, Site, TooManyExtraStates};
 use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 effect_parameters! {
     /// The shaft rubs with a torque that does not depend on speed.
@@ -16,7 +16,7 @@ effect_parameters! {
 }
 
 impl EffectKind for CoulombFriction {
-    const ABOUT: About = About {
+    const ABOUT: EffectText = EffectText {
         id: "X_coulomb_friction",
         name: "rubbing shaft",
         description: "the shaft rubs with a constant torque",

@@ -4,7 +4,7 @@ use super::WITHHELD;
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::{Hooks, Site, TooManyExtraStates};
 use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 effect_parameters! {
     /// Convection depends on flow otherwise than in the correlation.
@@ -16,7 +16,7 @@ effect_parameters! {
 }
 
 impl EffectKind for FlowDependentHtc {
-    const ABOUT: About = About {
+    const ABOUT: EffectText = EffectText {
         id: "X_flow_dependent_htc",
         name: "other exponent of convection",
         description: "the exponent of the flow in the convection is other than the correlation's",

@@ -4,7 +4,7 @@ use super::WITHHELD;
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::{Hooks, Site, TooManyExtraStates};
 use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 effect_parameters! {
     /// The compressor housing is attached to a cold mount.
@@ -16,7 +16,7 @@ effect_parameters! {
 }
 
 impl EffectKind for MountConduction {
-    const ABOUT: About = About {
+    const ABOUT: EffectText = EffectText {
         id: "X_mount_conduction",
         name: "conduction to the mount",
         description: "the compressor housing conducts to a mount at 20 degC",

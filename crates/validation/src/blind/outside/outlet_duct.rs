@@ -5,7 +5,7 @@ use mapper_physics::effect_parameters;
 use mapper_physics::gas::air;
 use mapper_physics::machine::hooks::{Hooks, Site, TooManyExtraStates};
 use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 /// Heat capacity of the duct, J/K.
 const DUCT_J_K: f64 = 250.0;
@@ -22,7 +22,7 @@ effect_parameters! {
 }
 
 impl EffectKind for OutletDuct {
-    const ABOUT: About = About {
+    const ABOUT: EffectText = EffectText {
         id: "X_outlet_duct",
         name: "outlet duct with its own mass",
         description: "an outlet duct with a mass of its own before the T2 probe",

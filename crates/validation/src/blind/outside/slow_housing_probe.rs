@@ -5,7 +5,7 @@ use mapper_core::Channel;
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::TooManyExtraStates;
 use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 effect_parameters! {
     /// The probe in the housing is slow.
@@ -17,7 +17,7 @@ effect_parameters! {
 }
 
 impl EffectKind for SlowHousingProbe {
-    const ABOUT: About = About {
+    const ABOUT: EffectText = EffectText {
         id: "X_slow_housing_probe",
         name: "slow housing probe",
         description: "a slow probe in the compressor housing",

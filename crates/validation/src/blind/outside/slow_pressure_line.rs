@@ -5,7 +5,7 @@ use mapper_core::Channel;
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::TooManyExtraStates;
 use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 effect_parameters! {
     /// A long thin line delays the P2 sensor.
@@ -17,7 +17,7 @@ effect_parameters! {
 }
 
 impl EffectKind for SlowPressureLine {
-    const ABOUT: About = About {
+    const ABOUT: EffectText = EffectText {
         id: "X_slow_pressure_line",
         name: "slow pressure line",
         description: "a slow pressure line to the P2 sensor",

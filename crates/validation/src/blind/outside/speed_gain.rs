@@ -5,7 +5,7 @@ use mapper_core::Channel;
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::{Hooks, Site, TooManyExtraStates};
 use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 effect_parameters! {
     /// The speed pick-up reads high or low.
@@ -17,7 +17,7 @@ effect_parameters! {
 }
 
 impl EffectKind for SpeedGain {
-    const ABOUT: About = About {
+    const ABOUT: EffectText = EffectText {
         id: "X_speed_gain",
         name: "speed sensor reads in proportion",
         description: "the speed sensor reads high or low in proportion",

@@ -1,10 +1,10 @@
-//! Reading a log of another program by a channel map.
+//! Reads a log of another program with a channel map.
 
-use crate::channel_mapping::channel_map_mistakes::Complaints;
-use crate::channel_mapping::mapped_topics::{Reads, source_of};
+use crate::channel_mapping::channel_map_mistakes::MapMistakes;
+use crate::channel_mapping::mapped_topics::{MappedQuantity, source_of};
 use crate::logs::units::{kind_of, remedy, unit};
 use crate::logs::{Kind, Layout, LogFile, Reference, Row, Unit, header_unit};
-use crate::samples::log_blocks::Blocks;
+use crate::samples::log_blocks::BlockAverager;
 use crate::samples::log_clock::{LogClock, Restart};
 use crate::samples::series_builder::SeriesBuilder;
 use crate::{AmbientPressure, ChannelMap, ChannelSource, ReadOptions, ReadWarning, RecordError};
@@ -13,34 +13,34 @@ use mapper_yaml::{FindingKind, Step, closest, steps};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Time 0 of a log on the clock of [`SeriesBuilder`]: logs may begin before it.
-const ZERO_NS: u64 = 1 << 62;
+/// Time 0 of a log on the clock of [`SeriesBuilder`]; it leaves room for negative times.
+const LOG_ZERO_NS: u64 = 1 << 62;
 
 /// Result of reading a log.
 #[derive(Debug, Default)]
-pub(crate) struct ReadLog {
-    pub(crate) builders: BTreeMap<Reads, SeriesBuilder>,
+pub(crate) struct LogContent {
+    pub(crate) builders: BTreeMap<MappedQuantity, SeriesBuilder>,
     /// Ambient pressure, Pa.
     pub(crate) ambient: Option<SeriesBuilder>,
     pub(crate) ambient_unit: Option<&'static Unit>,
-    pub(crate) units: BTreeMap<Reads, &'static Unit>,
+    pub(crate) units: BTreeMap<MappedQuantity, &'static Unit>,
     pub(crate) zero_ns: u64,
     /// Time 0 in nanoseconds since 1970, if the log gives it.
     pub(crate) start_time_ns: Option<u64>,
     pub(crate) warnings: Vec<ReadWarning>,
     pub(crate) averaged: bool,
-    /// Values that are kept.
+    /// Number of stored values.
     kept: u64,
 }
 
-/// Use of a wanted column.
+/// Use of a mapped column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Target {
-    Reads(Reads),
+    MappedQuantity(MappedQuantity),
     Ambient,
 }
 
-struct Wanted {
+struct WantedColumn {
     target: Target,
     column: usize,
     unit: &'static Unit,
@@ -51,10 +51,10 @@ pub(crate) fn read_log(
     file: &LogFile,
     map: &ChannelMap,
     options: &ReadOptions,
-) -> Result<ReadLog, RecordError> {
+) -> Result<LogContent, RecordError> {
     let (format, mut log) = options.logs.open(file, &map.log)?;
     let layout = log.layout().clone();
-    let wanted = wanted(map, &layout)?;
+    let wanted = resolve_columns(map, &layout)?;
     // Each column once, in the order of the layout: several channels may read one.
     let mut columns: Vec<usize> = wanted.iter().map(|wanted| wanted.column).collect();
     columns.sort_unstable();
@@ -71,48 +71,49 @@ pub(crate) fn read_log(
     let places: Vec<Vec<(usize, Target, &'static Unit)>> = members
         .iter()
         .map(|members| {
-            let place = |wanted: &Wanted| {
+            let place = |wanted: &WantedColumn| {
                 let at = members.iter().position(|column| *column == wanted.column)?;
                 Some((at, wanted.target, wanted.unit))
             };
             wanted.iter().filter_map(place).collect()
         })
         .collect();
-    let mut read = ReadLog {
-        zero_ns: ZERO_NS,
+    let mut read = LogContent {
+        zero_ns: LOG_ZERO_NS,
         start_time_ns: layout.start_time_ns,
-        warnings: contradictions(map, &layout, &wanted),
+        warnings: find_unit_conflicts(map, &layout, &wanted),
         ambient_unit: wanted.iter().find(|wanted| wanted.target == Target::Ambient).map(|found| found.unit),
         units: wanted
             .iter()
             .filter_map(|wanted| match wanted.target {
-                Target::Reads(reads) => Some((reads, wanted.unit)),
+                Target::MappedQuantity(reads) => Some((reads, wanted.unit)),
                 Target::Ambient => None,
             })
             .collect(),
-        ..ReadLog::default()
+        ..LogContent::default()
     };
-    let mut blocks: Vec<Blocks> = members.iter().map(|_| Blocks::default()).collect();
+    let mut blocks: Vec<BlockAverager> = members.iter().map(|_| BlockAverager::default()).collect();
     let mut clocks: Vec<LogClock> = members.iter().map(|_| LogClock::default()).collect();
     let mut rows = 0u64;
     let mut take_row = |row: Row<'_>| {
         rows += 1;
         if rows > options.max_messages {
-            let message = format!("it has more than {} rows; cut it into shorter logs", options.max_messages);
-            return Err(file.content(format.name, message));
+            let message =
+                format!("it has more than {} rows; split it into shorter logs", options.max_messages);
+            return Err(file.content_error(format.name, message));
         }
         if read.kept > options.max_values {
             let message = format!(
-                "its mapped columns hold more than {} values; map fewer columns, or cut it into shorter logs",
+                "its mapped columns hold more than {} values; map fewer columns, or split it into shorter logs",
                 options.max_values
             );
-            return Err(file.content(format.name, message));
+            return Err(file.content_error(format.name, message));
         }
         let of_group = (clocks.get_mut(row.group), blocks.get_mut(row.group), places.get(row.group));
         let (Some(clock), Some(blocks), Some(places)) = of_group else { return Ok(()) };
         let mut keep = |t_s: f64, values: &[f64]| read.take(places, t_s, values);
         let took = clock.push(row.t_s, row.values, &mut |t_s, values| blocks.push(t_s, values, &mut keep));
-        took.map_err(|restart| file.content(format.name, restart_words(restart, &layout, row.group)))
+        took.map_err(|restart| file.content_error(format.name, describe_restart(restart, &layout, row.group)))
     };
     log.rows(&columns, &mut take_row)?;
     let found_later = log.layout().findings.iter().filter(|finding| !layout.findings.contains(finding));
@@ -124,19 +125,19 @@ pub(crate) fn read_log(
             read.warnings.push(ReadWarning::StrayTimes { count: clock.strays, first_s: clock.stray_s });
         }
         blocks.finish(&mut |t_s, values| read.take(places, t_s, values));
-        read.averaged |= blocks.averages();
+        read.averaged |= blocks.is_averaging();
     }
     Ok(read)
 }
 
-impl ReadLog {
+impl LogContent {
     fn take(&mut self, places: &[(usize, Target, &'static Unit)], t_s: f64, values: &[f64]) {
-        let time_ns = ZERO_NS.saturating_add_signed((t_s * 1e9).round() as i64);
+        let time_ns = LOG_ZERO_NS.saturating_add_signed((t_s * 1e9).round() as i64);
         for (at, target, unit) in places {
-            // An empty cell is not a sample: slow columns share rows with fast ones.
+            // An empty cell is not a sample: slow and fast columns share rows.
             let Some(value) = values.get(*at).copied().filter(|value| value.is_finite()) else { continue };
             let builder = match target {
-                Target::Reads(reads) => self.builders.entry(*reads).or_default(),
+                Target::MappedQuantity(reads) => self.builders.entry(*reads).or_default(),
                 Target::Ambient => self.ambient.get_or_insert_default(),
             };
             builder.push(time_ns, unit.to_inside(value));
@@ -146,44 +147,48 @@ impl ReadLog {
 }
 
 /// The remedy for a clock that starts again.
-fn restart_words(restart: Restart, layout: &Layout, group: usize) -> String {
+fn describe_restart(restart: Restart, layout: &Layout, group: usize) -> String {
     let Restart { row, from_s, to_s } = restart;
     let group = layout.groups.get(group).filter(|group| !group.name.is_empty());
     let of = group.map_or_else(String::new, |group| format!(" of `{}`", group.name));
     format!(
-        "the clock{of} goes back from {from_s} s to {to_s} s in row {row} of the data, as where two runs stand in one file: cut it \
+        "the clock{of} goes back from {from_s} s to {to_s} s in row {row} of the data, as if the file had two runs: split it \
          there and give the parts as logs of their own, or name another clock with `time`"
     )
 }
 
 /// The columns that the map names, with their units; or all mistakes of the map for this log.
-fn wanted(map: &ChannelMap, layout: &Layout) -> Result<Vec<Wanted>, RecordError> {
-    let mut complaints = Complaints::default();
+fn resolve_columns(map: &ChannelMap, layout: &Layout) -> Result<Vec<WantedColumn>, RecordError> {
+    let mut mistakes = MapMistakes::default();
     let mut list = Vec::new();
-    let channels = map.channels.iter().map(|(channel, source)| (Reads::Channel(*channel), source));
-    let elements = map.elements.iter().map(|(element, source)| (Reads::Element(*element), source));
+    let channels = map.channels.iter().map(|(channel, source)| (MappedQuantity::Channel(*channel), source));
+    let elements = map.elements.iter().map(|(element, source)| (MappedQuantity::Element(*element), source));
     for (reads, source) in channels.chain(elements) {
         let channel = reads.channel();
         let at = |key: &str| steps!["channels", channel.symbol(), key].to_vec();
-        let found = column_of(layout, source, &at, &mut complaints).and_then(|column| {
-            Some((column, unit_of(layout, column, source, Some(channel), &at, &mut complaints)?))
+        let found = column_of(layout, source, &at, &mut mistakes).and_then(|column| {
+            Some((column, unit_of(layout, column, source, Some(channel), &at, &mut mistakes)?))
         });
-        list.extend(found.map(|(column, unit)| Wanted { target: Target::Reads(reads), column, unit }));
+        list.extend(found.map(|(column, unit)| WantedColumn {
+            target: Target::MappedQuantity(reads),
+            column,
+            unit,
+        }));
     }
     if let Some(AmbientPressure::Source(source)) = &map.ambient_pressure {
         let at = |key: &str| steps!["ambient_pressure", key].to_vec();
-        let found = column_of(layout, source, &at, &mut complaints)
-            .and_then(|column| Some((column, unit_of(layout, column, source, None, &at, &mut complaints)?)));
-        list.extend(found.map(|(column, unit)| Wanted { target: Target::Ambient, column, unit }));
+        let found = column_of(layout, source, &at, &mut mistakes)
+            .and_then(|column| Some((column, unit_of(layout, column, source, None, &at, &mut mistakes)?)));
+        list.extend(found.map(|(column, unit)| WantedColumn { target: Target::Ambient, column, unit }));
     }
-    complaints.result(map)?;
+    mistakes.into_result(map)?;
     Ok(list)
 }
 
 /// Contradictions between the units of the map and the log.
-fn contradictions(map: &ChannelMap, layout: &Layout, wanted: &[Wanted]) -> Vec<ReadWarning> {
-    let contradiction = |wanted: &Wanted| {
-        let Target::Reads(reads) = wanted.target else { return None };
+fn find_unit_conflicts(map: &ChannelMap, layout: &Layout, wanted: &[WantedColumn]) -> Vec<ReadWarning> {
+    let contradiction = |wanted: &WantedColumn| {
+        let Target::MappedQuantity(reads) = wanted.target else { return None };
         let recorded = layout.columns.get(wanted.column)?.unit.clone()?;
         let known = header_unit(&recorded);
         let agrees = known.is_some_and(|known| known.unit.converts_like(wanted.unit));
@@ -197,7 +202,7 @@ fn column_of(
     layout: &Layout,
     source: &ChannelSource,
     at: &dyn Fn(&str) -> Vec<Step>,
-    complaints: &mut Complaints,
+    mistakes: &mut MapMistakes,
 ) -> Option<usize> {
     let columns = layout.find(&source.topic, &source.field);
     if let [column] = columns.as_slice() {
@@ -211,7 +216,7 @@ fn column_of(
         } else {
             format!("its groups are {}", names.join(", "))
         };
-        complaints.add(
+        mistakes.add(
             FindingKind::WrongValue,
             &at("topic"),
             format!("the log has no group `{}`", source.topic),
@@ -241,7 +246,7 @@ fn column_of(
         message = format!("the log has `{}` in several groups", source.field);
         remedy = format!("name one with `topic`: {}", groups.join(", "));
     }
-    complaints.add(FindingKind::WrongValue, &at("field"), message, remedy);
+    mistakes.add(FindingKind::WrongValue, &at("field"), message, remedy);
     None
 }
 
@@ -252,13 +257,15 @@ fn unit_of(
     source: &ChannelSource,
     channel: Option<Channel>,
     at: &dyn Fn(&str) -> Vec<Step>,
-    complaints: &mut Complaints,
+    mistakes: &mut MapMistakes,
 ) -> Option<&'static Unit> {
     let kind = channel.map_or(Kind::Pressure, kind_of);
     let name = channel.map_or("the ambient pressure", Channel::symbol);
     let recorded = layout.columns.get(column).and_then(|column| column.unit.as_deref());
-    if let Some((message, remedy)) = recorded.and_then(|text| wrong_reference(name, text, source, channel)) {
-        complaints.add(FindingKind::Unit, &at("field"), message, remedy);
+    if let Some((message, remedy)) =
+        recorded.and_then(|text| describe_reference_conflict(name, text, source, channel))
+    {
+        mistakes.add(FindingKind::Unit, &at("field"), message, remedy);
         return None;
     }
     // The values of the map were checked when it was read.
@@ -268,7 +275,7 @@ fn unit_of(
     let Some(recorded) = recorded else {
         let message = format!("neither the channel map nor the log gives the unit of {name}");
         let example = channel.map_or("kPa", |channel| channel.unit());
-        complaints.add(FindingKind::Unit, &at("field"), message, format!("add e.g. `unit: {example}`"));
+        mistakes.add(FindingKind::Unit, &at("field"), message, format!("add e.g. `unit: {example}`"));
         return None;
     };
     let known = header_unit(recorded);
@@ -279,7 +286,7 @@ fn unit_of(
             Err(error) => {
                 let message =
                     format!("the log gives {name} in `{recorded}`, which is not a unit of {}", kind.name());
-                complaints.add(
+                mistakes.add(
                     FindingKind::Unit,
                     &at("field"),
                     message,
@@ -292,25 +299,24 @@ fn unit_of(
 }
 
 /// If the log and the map give different references of a pressure: a message and the remedy.
-fn wrong_reference(
+fn describe_reference_conflict(
     name: &str,
     recorded: &str,
     source: &ChannelSource,
     channel: Option<Channel>,
 ) -> Option<(String, String)> {
     let known = header_unit(recorded).filter(|known| known.kind == Kind::Pressure)?;
-    let (over, remedy) = match (known.reference, source.gauge, channel) {
-        (Reference::Gauge, _, None) => (
-            "over the ambient pressure",
-            "name a column of the absolute ambient pressure, or write its value",
-        ),
-        (Reference::Gauge, false, Some(_)) => {
-            ("over the ambient pressure", "write `gauge: true`, and `ambient_pressure`")
+    let (reference, remedy) = match (known.reference, source.gauge, channel) {
+        (Reference::Gauge, _, None) => {
+            ("a gauge pressure", "name a column of the absolute ambient pressure, or write its value")
         }
-        (Reference::Absolute, true, _) => ("over vacuum", "leave `gauge: true` out"),
+        (Reference::Gauge, false, Some(_)) => {
+            ("a gauge pressure", "write `gauge: true`, and `ambient_pressure`")
+        }
+        (Reference::Absolute, true, _) => ("an absolute pressure", "delete `gauge: true`"),
         _ => return None,
     };
-    Some((format!("the log gives {name} in {recorded}, a pressure {over}"), remedy.to_owned()))
+    Some((format!("the log gives {name} in {recorded}, {reference}"), remedy.to_owned()))
 }
 
 /// Whether a file that starts with these bytes is MCAP, or too short to be anything else; an empty file is neither.
@@ -323,6 +329,6 @@ pub(crate) fn log_of_path(path: &Path, options: &ReadOptions) -> Result<Option<L
     if options.logs.0.is_empty() {
         return Ok(None);
     }
-    let file = LogFile::of_path(path);
+    let file = LogFile::from_path(path);
     Ok((!is_mcap(&file.head(8)?)).then_some(file))
 }

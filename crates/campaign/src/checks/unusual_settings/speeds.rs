@@ -1,21 +1,21 @@
 //! Checks speeds against the strength of the wheel and the range of the nominal map.
 
 use crate::campaign::{Campaign, MapSource};
-use crate::checks::concern::{Concern, mm};
+use crate::checks::concern::{Concern, to_mm};
 use mapper_core::OperatingPoint;
 use mapper_yaml::{Step, steps};
 use std::f64::consts::PI;
 
-/// Tip speed above which no wheel of any material holds together, m/s.
-const BURST_M_S: f64 = 700.0;
-/// Tip speed that milled aluminium reaches, m/s; titanium wheels reach some 600.
-const USUAL_M_S: f64 = 600.0;
-/// Extrapolation of a map beyond its outermost speed lines that only produces a warning, as a share of their speed.
-const BEYOND_RATIO: f64 = 0.1;
-/// Extrapolation without a warning: corrected speeds of a map's lines are rounded, and ambient temperature varies.
+/// Maximum tip speed of wheels of any material, m/s.
+const MAX_TIP_SPEED_M_S: f64 = 700.0;
+/// Maximum usual tip speed, m/s: that of titanium wheels.
+const MAX_USUAL_TIP_SPEED_M_S: f64 = 600.0;
+/// Maximum extrapolation of a map beyond its outermost speed lines that is only a warning, as a ratio of their speed.
+const MAX_EXTRAPOLATION_RATIO: f64 = 0.1;
+/// Maximum extrapolation without a warning, ratio: corrected speeds of maps are rounded, and the inlet temperature varies.
 const ROUNDING_RATIO: f64 = 0.01;
 
-pub(crate) fn concerns(campaign: &Campaign, places: &[Vec<Step>]) -> Vec<Concern> {
+pub(crate) fn find_concerns(campaign: &Campaign, places: &[Vec<Step>]) -> Vec<Concern> {
     let by_speed =
         |a: &(usize, &OperatingPoint), b: &(usize, &OperatingPoint)| a.1.speed_rpm.total_cmp(&b.1.speed_rpm);
     let points = || campaign.points.iter().enumerate();
@@ -23,9 +23,9 @@ pub(crate) fn concerns(campaign: &Campaign, places: &[Vec<Step>]) -> Vec<Concern
         return Vec::new();
     };
     let place = |index: usize| places.get(index).cloned().unwrap_or_else(|| steps!["grid"].to_vec());
-    let mut concerns = tips(campaign, fastest.1.speed_rpm);
-    if concerns.iter().all(|concern| !concern.grave) {
-        concerns.extend(table(
+    let mut concerns = check_tip_speed(campaign, fastest.1.speed_rpm);
+    if concerns.iter().all(|concern| !concern.is_error) {
+        concerns.extend(check_table_range(
             campaign,
             [(slowest.1.speed_rpm, place(slowest.0)), (fastest.1.speed_rpm, place(fastest.0))],
         ));
@@ -33,7 +33,7 @@ pub(crate) fn concerns(campaign: &Campaign, places: &[Vec<Step>]) -> Vec<Concern
     concerns
 }
 
-fn tips(campaign: &Campaign, speed_rpm: f64) -> Vec<Concern> {
+fn check_tip_speed(campaign: &Campaign, speed_rpm: f64) -> Vec<Concern> {
     let params = &campaign.machine.params;
     let wheels = [
         ("compressor", "wheel_diameter", params.compressor.wheel_diameter_m),
@@ -41,19 +41,19 @@ fn tips(campaign: &Campaign, speed_rpm: f64) -> Vec<Concern> {
     ];
     let one = |(side, key, diameter_m): (&'static str, &'static str, f64)| {
         let tip_m_s = PI * diameter_m * speed_rpm / 60.0;
-        // A wheel that is scaled from the other one repeats its mistake.
+        // A wheel scaled from the other one would repeat its mistake.
         let is_assumed = campaign.machine.assumed.iter().any(|size| size.key == format!("{side}.{key}"));
-        (tip_m_s > USUAL_M_S && !is_assumed).then(|| Concern {
-            grave: tip_m_s > BURST_M_S,
+        (tip_m_s > MAX_USUAL_TIP_SPEED_M_S && !is_assumed).then(|| Concern {
+            is_error: tip_m_s > MAX_TIP_SPEED_M_S,
             at: steps!["machine", "geometry", side, key].to_vec(),
             message: format!(
                 "the {side}'s wheel of {} mm has a tip speed of {tip_m_s:.0} m/s at the grid's highest speed, {:.1} krpm; {}",
-                mm(diameter_m),
+                to_mm(diameter_m),
                 speed_rpm / 1e3,
-                if tip_m_s > BURST_M_S {
-                    format!("wheels of any material burst before {BURST_M_S:.0} m/s")
+                if tip_m_s > MAX_TIP_SPEED_M_S {
+                    format!("wheels of any material burst before {MAX_TIP_SPEED_M_S:.0} m/s")
                 } else {
-                    format!("few wheels stand more than {USUAL_M_S:.0} m/s")
+                    format!("few wheels endure more than {MAX_USUAL_TIP_SPEED_M_S:.0} m/s")
                 }
             ),
             remedy: "correct the wheel's size, or lower the highest speed of the grid".to_owned(),
@@ -63,7 +63,7 @@ fn tips(campaign: &Campaign, speed_rpm: f64) -> Vec<Concern> {
 }
 
 /// The grid's speeds and those of the nominal table.
-fn table(campaign: &Campaign, [slowest, fastest]: [(f64, Vec<Step>); 2]) -> Vec<Concern> {
+fn check_table_range(campaign: &Campaign, [slowest, fastest]: [(f64, Vec<Step>); 2]) -> Vec<Concern> {
     let MapSource::Table { named, reference, .. } = &campaign.machine.map else { return Vec::new() };
     let Some(Ok(map)) = campaign.machine.map.table() else { return Vec::new() };
     let lines_rpm = map.speeds_corrected_rpm();
@@ -72,17 +72,17 @@ fn table(campaign: &Campaign, [slowest, fastest]: [(f64, Vec<Step>); 2]) -> Vec<
     let one = |(rpm, at): (f64, Vec<Step>), edge_rpm: f64, verb: &str, beyond: f64| {
         let corrected_rpm = rpm * correction;
         (beyond > ROUNDING_RATIO).then(|| Concern {
-            // The ends of `lines` are taken from the map itself.
-            grave: beyond > BEYOND_RATIO || !campaign.lines.is_empty(),
+            // `lines` need the map's surge and choke, which cannot be extrapolated.
+            is_error: beyond > MAX_EXTRAPOLATION_RATIO || !campaign.lines.is_empty(),
             at,
             message: format!(
                 "the grid goes to {:.1} krpm ({:.1} krpm corrected), the nominal map `{named}` {verb} at {:.1} krpm: \
-                 forecast and plan would rest on nothing there",
+                 forecast and plan would be unreliable there",
                 rpm / 1e3,
                 corrected_rpm / 1e3,
                 edge_rpm / 1e3
             ),
-            remedy: "leave such speeds out, or give a map that holds them (`map: closed_form` where there is none)"
+            remedy: "remove these speeds, or give a map that contains them (`map: closed_form` if there is none)"
                 .to_owned(),
         })
     };

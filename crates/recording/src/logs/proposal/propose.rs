@@ -1,9 +1,11 @@
-//! Which column is which channel.
+//! Assigns the columns of a log to channels.
 
-use super::names::{Weight, channels_of, is_ambient, is_derived, plain};
-use super::proposed::{Ambient, Certainty, NominalFlows, Proposal, ProposedChannel};
+use super::channel_proposal::{Ambient, Certainty, NominalFlows, Proposal, ProposedChannel};
+use super::names::{Weight, channels_of, is_ambient, is_derived, normalise};
 use super::{physics, shared_units};
-use crate::logs::plausible::{AMBIENT_PA, OUTER, fits, fitting_units, looks_like_gauge};
+use crate::logs::plausible::{
+    AMBIENT_RANGE_PA, TRIMMED_SHARE, fitting_units, is_plausible, looks_like_gauge,
+};
 use crate::logs::units::kind_of;
 use crate::logs::{Column, ColumnSurvey, Layout, Survey};
 use mapper_core::{CHANNELS, Channel, plausible};
@@ -13,16 +15,17 @@ use mapper_yaml::units::{HeaderUnit, Kind, Reference, Unit, header_unit, volume_
 struct Candidate {
     column: usize,
     weight: Weight,
-    fits: bool,
+    is_plausible: bool,
 }
 
-/// Suggests a channel map; `nominal` is what is known of the machine.
+/// Proposes a channel map; `nominal` gives the machine's flows, if it is known.
 pub fn propose(layout: &Layout, survey: &Survey, nominal: Option<NominalFlows<'_>>) -> Proposal {
-    let (proposal, agreement) = attempt(layout, survey, nominal, Numbers::Usual);
-    if agreement.doubts_stations {
-        let (mut renumbered, agreement) = attempt(layout, survey, nominal, Numbers::GasTurbine);
-        let has_fifth = [Channel::P4, Channel::T4].iter().any(|channel| renumbered.of(*channel).is_some());
-        if has_fifth && agreement.against == 0 && agreement.for_it >= 2 {
+    let (proposal, agreement) = propose_with_numbering(layout, survey, nominal, StationNumbering::Usual);
+    if agreement.suspects_numbering {
+        let (mut renumbered, agreement) =
+            propose_with_numbering(layout, survey, nominal, StationNumbering::GasTurbine);
+        let has_fifth = [Channel::P4, Channel::T4].iter().any(|channel| renumbered.entry(*channel).is_some());
+        if has_fifth && agreement.contradicting == 0 && agreement.agreeing >= 2 {
             physics::remark_stations(&mut renumbered, layout);
             return renumbered;
         }
@@ -30,23 +33,23 @@ pub fn propose(layout: &Layout, survey: &Survey, nominal: Option<NominalFlows<'_
     proposal
 }
 
-/// How the names of a log number the stations.
+/// Station numbers in the names of a log.
 #[derive(Clone, Copy, PartialEq)]
-enum Numbers {
+enum StationNumbering {
     /// Compressor 1 and 2, turbine 3 and 4.
     Usual,
     /// Compressor 2 and 3, turbine 4 and 5.
     GasTurbine,
 }
 
-impl Numbers {
-    /// A name with its station as it is usual: its first digit, if it is a number by itself, less one.
-    fn usual(self, name: &str) -> String {
+impl StationNumbering {
+    /// The name with this program's station number: its first digit minus 1, if the digit is a number by itself.
+    fn renumber(self, name: &str) -> String {
         let digits: Vec<(usize, char)> =
             name.char_indices().filter(|(_, letter)| letter.is_ascii_digit()).collect();
         let alone = digits.first().filter(|(at, _)| digits.get(1).is_none_or(|(next, _)| *next > at + 1));
         match alone.and_then(|(at, digit)| Some((*at, digit.to_digit(10)?.checked_sub(1)?))) {
-            Some((at, lower)) if self == Numbers::GasTurbine => {
+            Some((at, lower)) if self == StationNumbering::GasTurbine => {
                 format!("{}{lower}{}", &name[..at], &name[at + 1..])
             }
             _ => name.to_owned(),
@@ -54,40 +57,40 @@ impl Numbers {
     }
 }
 
-fn attempt(
+fn propose_with_numbering(
     layout: &Layout,
     survey: &Survey,
     nominal: Option<NominalFlows<'_>>,
-    numbers: Numbers,
+    numbers: StationNumbering,
 ) -> (Proposal, physics::Agreement) {
     let units: Vec<Option<HeaderUnit>> =
         layout.columns.iter().map(|column| column.unit.as_deref().and_then(header_unit)).collect();
     let mut proposal = Proposal::default();
     let mut taken = vec![false; layout.columns.len()];
-    // The surest first, so that a column that fits two channels goes to the one that it fits best.
+    // Best matches first, so that a column that fits two channels goes to the better one.
     let named: Vec<Vec<(Channel, Weight)>> =
-        (0..layout.columns.len()).map(|column| names_of(column, layout, &units, numbers)).collect();
+        (0..layout.columns.len()).map(|column| channels_by_name(column, layout, &units, numbers)).collect();
     let mut wishes: Vec<(Channel, Vec<Candidate>)> = CHANNELS
         .iter()
-        .map(|row| (row.channel, candidates(row.channel, &named, layout, survey, &units)))
+        .map(|row| (row.channel, rank_candidates(row.channel, &named, layout, survey, &units)))
         .collect();
     wishes.sort_by_key(|(_, list)| std::cmp::Reverse(list.first().map_or(0, |best| best.weight)));
     for (channel, list) in wishes {
         let free: Vec<&Candidate> = list.iter().filter(|candidate| !taken[candidate.column]).collect();
         let Some((best, others)) = free.split_first() else { continue };
         taken[best.column] = true;
-        let sensors = same_place(best.column, others, layout, survey, &units);
+        let sensors = find_redundant_columns(best.column, others, layout, survey, &units);
         for sensor in &sensors {
             taken[*sensor] = true;
         }
         let rivals: Vec<&str> = others
             .iter()
-            .filter(|other| other.fits == best.fits && other.weight + 10 > best.weight)
+            .filter(|other| other.is_plausible == best.is_plausible && other.weight + 10 > best.weight)
             .filter(|other| !sensors.contains(&other.column))
             .map(|other| layout.columns[other.column].name.as_str())
             .take(3)
             .collect();
-        let mut proposed = entry(channel, best, layout, survey, &units);
+        let mut proposed = propose_channel(channel, best, layout, survey, &units);
         if !rivals.is_empty() {
             proposed.certainty = proposed.certainty.min(Certainty::Likely);
             proposed.remarks.push(format!("it could also be {}", rivals.join(" or ")));
@@ -97,19 +100,19 @@ fn attempt(
     }
     note_unknown_units(&mut proposal, &taken, layout, &units);
     proposal.channels.sort_by_key(|proposed| proposed.channel);
-    shared_units::settle(&mut proposal, layout, survey);
-    settle_gauge(&mut proposal, layout, survey, &units);
-    shared_units::settle_flow(&mut proposal, layout, survey, nominal);
+    shared_units::infer_units(&mut proposal, layout, survey);
+    decide_gauge(&mut proposal, layout, survey, &units);
+    shared_units::infer_flow_unit(&mut proposal, layout, survey, nominal);
     let agreement = physics::judge(&mut proposal, layout, survey);
     (proposal, agreement)
 }
 
-/// The channels that a column may be by its description.
-fn names_of(
+/// Channels that a column may be, by its name and description.
+fn channels_by_name(
     index: usize,
     layout: &Layout,
     units: &[Option<HeaderUnit>],
-    numbers: Numbers,
+    numbers: StationNumbering,
 ) -> Vec<(Channel, Weight)> {
     let Some(column) = layout.columns.get(index) else { return Vec::new() };
     let unit = units.get(index).copied().flatten();
@@ -118,12 +121,12 @@ fn names_of(
     }
     let group = layout.groups.get(column.group).map_or("", |group| group.name.as_str());
     let kind = unit.map(|unit| unit.kind).filter(|kind| *kind != Kind::Frequency);
-    // A shaft has a number too.
-    let numbers = if kind == Some(Kind::Speed) { Numbers::Usual } else { numbers };
-    channels_of(&numbers.usual(without_number(column, layout)), group, &column.description, kind)
+    // A shaft may have a number too.
+    let numbers = if kind == Some(Kind::Speed) { StationNumbering::Usual } else { numbers };
+    channels_of(&numbers.renumber(without_number(column, layout)), group, &column.description, kind)
 }
 
-/// A name without the number by which readers distinguish equal names: `Pressure (2)` is not a pressure at station 2.
+/// The name without the number that a reader adds to equal names: `Pressure (2)` is not a pressure at station 2.
 fn without_number<'a>(column: &'a Column, layout: &Layout) -> &'a str {
     let by = |mark: &str| {
         column
@@ -138,12 +141,11 @@ fn without_number<'a>(column: &'a Column, layout: &Layout) -> &'a str {
     of_reader.or_else(|| by(".").filter(is_column)).unwrap_or(&column.name)
 }
 
-/// By so much two sensors at one place may differ in the middle, as a share: wakes and stratification make some per cent.
-const SAME_PLACE: f64 = 0.1;
+/// Maximum difference between the medians of two sensors at one place, as a ratio: wakes and stratification make a few per cent.
+const MAX_SAME_PLACE_DIFFERENCE_RATIO: f64 = 0.1;
 
-/// The candidates that measure what `best` measures with another sensor: their names differ by the number at the end alone, and
-/// their readings agree.
-fn same_place(
+/// Candidates that are further sensors at the place of `best`: their names differ only in the final number, and their readings agree.
+fn find_redundant_columns(
     best: usize,
     others: &[&Candidate],
     layout: &Layout,
@@ -160,7 +162,9 @@ fn same_place(
         let value = survey.columns.get(column).map_or(f64::NAN, |data| data.quantile(0.5));
         units.get(column).copied().flatten().map_or(value, |unit| unit.unit.to_inside(value))
     };
-    let agrees = |column: usize| (middle(column) - middle(best)).abs() <= SAME_PLACE * middle(best).abs();
+    let agrees = |column: usize| {
+        (middle(column) - middle(best)).abs() <= MAX_SAME_PLACE_DIFFERENCE_RATIO * middle(best).abs()
+    };
     let same = others.iter().map(|other| other.column).filter(|column| {
         stem(*column).is_some_and(|(stem, _)| stem == own)
             && units.get(*column).map(|unit| unit.map(|unit| unit.unit.symbol()))
@@ -170,7 +174,7 @@ fn same_place(
     same.take(mapper_core::MAX_ELEMENTS - 1).collect()
 }
 
-/// Remarks columns that would be channels, had they a unit that is known.
+/// Adds remarks about columns that have a channel's name and an unknown unit.
 fn note_unknown_units(
     proposal: &mut Proposal,
     taken: &[bool],
@@ -182,20 +186,20 @@ fn note_unknown_units(
         let group = layout.groups.get(column.group).map_or("", |group| group.name.as_str());
         let named = channels_of(without_number(column, layout), group, &column.description, None);
         let kind = volume_flow_m3_s(spelling).map(|_| Kind::MassFlow);
-        let fits = |channel: Channel| kind.is_none_or(|kind| kind == kind_of(channel));
-        let Some((channel, _)) = named.iter().find(|(channel, _)| fits(*channel)) else { continue };
-        if proposal.of(*channel).is_some() {
+        let is_plausible = |channel: Channel| kind.is_none_or(|kind| kind == kind_of(channel));
+        let Some((channel, _)) = named.iter().find(|(channel, _)| is_plausible(*channel)) else { continue };
+        if proposal.entry(*channel).is_some() {
             continue;
         }
         let why = match volume_flow_m3_s(spelling) {
             Some(None) => format!(
-                "`{spelling}` is a flow at a standard temperature that differs between makers: write the unit as one of {}",
+                "`{spelling}` is a flow at a standard temperature, which differs between manufacturers: write the unit as one of {}",
                 standard_flows()
             ),
-            Some(Some(_)) => format!(
-                "`{spelling}` is a volume flow, which is a mass flow only with the density where it was measured: compute it first"
-            ),
-            None => format!("the unit `{spelling}` is not known: write one that is"),
+            Some(Some(_)) => {
+                format!("`{spelling}` is a volume flow: multiply it by the density at the flow meter first")
+            }
+            None => format!("the unit `{spelling}` is unknown: write a known one"),
         };
         proposal.remarks.push(format!("{channel} may be `{}`, but {why}", column.name));
     }
@@ -208,8 +212,8 @@ fn standard_flows() -> String {
     symbols.join(", ")
 }
 
-/// The columns that may be a channel, best first; `named` has the channels of each column's name.
-fn candidates(
+/// Candidate columns of a channel, best first; `named` has the channels of each column's name.
+fn rank_candidates(
     channel: Channel,
     named: &[Vec<(Channel, Weight)>],
     layout: &Layout,
@@ -223,24 +227,24 @@ fn candidates(
         if data.is_empty() {
             continue;
         }
-        let (low, high) = (data.quantile(OUTER), data.quantile(1.0 - OUTER));
-        let fits = match units[index] {
+        let (low, high) = (data.quantile(TRIMMED_SHARE), data.quantile(1.0 - TRIMMED_SHARE));
+        let is_plausible = match units[index] {
             Some(unit) => {
                 let (low, high) = (unit.unit.to_inside(low), unit.unit.to_inside(high));
-                fits(channel, low, high) || looks_like_gauge(channel, low, high)
+                is_plausible(channel, low, high) || looks_like_gauge(channel, low, high)
             }
             None => !fitting_units(channel, low, high, 0.0).is_empty(),
         };
-        let weight = weight + if fits { 20 } else { 0 };
-        // What was computed by the stand counts after all that was measured: no weight of a name is below ten.
-        let weight = if is_derived(&plain(&column.name)) { weight / 10 } else { weight };
-        list.push(Candidate { column: index, weight, fits });
+        let weight = weight + if is_plausible { 20 } else { 0 };
+        // Values that the stand computed rank after all measured ones: no weight of a name is below ten.
+        let weight = if is_derived(&normalise(&column.name)) { weight / 10 } else { weight };
+        list.push(Candidate { column: index, weight, is_plausible });
     }
     list.sort_by_key(|candidate| std::cmp::Reverse(candidate.weight));
     list
 }
 
-fn entry(
+fn propose_channel(
     channel: Channel,
     best: &Candidate,
     layout: &Layout,
@@ -257,7 +261,7 @@ fn entry(
         remarks: Vec::new(),
     };
     let data = &survey.columns[best.column];
-    let (low, high) = (data.quantile(OUTER), data.quantile(1.0 - OUTER));
+    let (low, high) = (data.quantile(TRIMMED_SHARE), data.quantile(1.0 - TRIMMED_SHARE));
     let fitting = fitting_units(channel, low, high, 0.0);
     let symbols =
         |units: &[&'static Unit]| units.iter().map(|unit| unit.symbol()).collect::<Vec<_>>().join(" or ");
@@ -265,7 +269,7 @@ fn entry(
         (Some(unit), _) => {
             proposed.unit = Some(unit.unit.symbol());
             proposed.gauge = unit.reference == Reference::Gauge;
-            if !best.fits {
+            if !best.is_plausible {
                 proposed.certainty = Certainty::Unsure;
                 let instead = if fitting.is_empty() {
                     String::new()
@@ -283,12 +287,12 @@ fn entry(
         (None, [only]) => {
             proposed.unit = Some(only.symbol());
             proposed.certainty = Certainty::Likely;
-            proposed.remarks.push(format!("the log gives no unit; by its range it is {}", only.symbol()));
+            proposed.remarks.push(format!("the log gives no unit; the range fits only {}", only.symbol()));
         }
         (None, []) => {
             proposed.certainty = Certainty::Unsure;
             proposed.remarks.push(format!(
-                "the log gives no unit, and {} to {} fits none",
+                "the log gives no unit, and the range {} to {} fits none",
                 short(data.min),
                 short(data.max)
             ));
@@ -299,27 +303,31 @@ fn entry(
             proposed.remarks.push(format!("the log gives no unit; its range fits {}", symbols(several)));
         }
     }
-    if let Some(remark) = impossible(channel, data, proposed.unit) {
+    if let Some(remark) = describe_impossible_readings(channel, data, proposed.unit) {
         proposed.certainty = proposed.certainty.min(Certainty::Likely);
         proposed.remarks.push(remark);
     }
-    if is_derived(&plain(&layout.columns[best.column].name)) {
+    if is_derived(&normalise(&layout.columns[best.column].name)) {
         proposed.certainty = Certainty::Unsure;
-        proposed.remarks.push("by its name it was computed, not measured".to_owned());
+        proposed.remarks.push("its name indicates a computed value".to_owned());
     }
     if best.weight < 60 && proposed.certainty == Certainty::Sure {
         proposed.certainty = Certainty::Likely;
-        proposed.remarks.push("the name says little".to_owned());
+        proposed.remarks.push("the name is ambiguous".to_owned());
     }
     proposed
 }
 
-/// Readings that no sensor of a channel has: marks of missing values, or faults.
-fn impossible(channel: Channel, data: &ColumnSurvey, unit: Option<&'static str>) -> Option<String> {
+/// A remark about readings that no sensor of the channel can have: marks of missing values, or faults.
+fn describe_impossible_readings(
+    channel: Channel,
+    data: &ColumnSurvey,
+    unit: Option<&'static str>,
+) -> Option<String> {
     let unit = crate::logs::units::unit(kind_of(channel), unit?).ok()?;
     let range = plausible(channel);
     let (low, high) = (unit.to_inside(data.min), unit.to_inside(data.max));
-    // Gauge pressures go below zero.
+    // Gauge pressures may be negative.
     let below = kind_of(channel) == Kind::Temperature && low < *range.any.start();
     let value = if below {
         data.min
@@ -329,24 +337,27 @@ fn impossible(channel: Channel, data: &ColumnSurvey, unit: Option<&'static str>)
         return None;
     };
     Some(format!(
-        "some readings are {} {}, which cannot be: if they mark missing ones, name them (`--with missing={value}`)",
+        "some readings are {} {}, which is impossible: if they mark missing readings, set `missing: {value}`",
         short(value),
         unit.symbol()
     ))
 }
 
-/// Which pressures are gauge pressures, and where the ambient pressure is.
-fn settle_gauge(proposal: &mut Proposal, layout: &Layout, survey: &Survey, units: &[Option<HeaderUnit>]) {
+/// Decides which pressures are gauge pressures, and finds the ambient pressure.
+fn decide_gauge(proposal: &mut Proposal, layout: &Layout, survey: &Survey, units: &[Option<HeaderUnit>]) {
     let in_pa = |proposed: &ProposedChannel| -> Option<(f64, f64)> {
         let unit = crate::logs::units::unit(Kind::Pressure, proposed.unit?).ok()?;
         let data: &ColumnSurvey = survey.columns.get(proposed.column)?;
-        Some((unit.to_inside(data.quantile(OUTER)), unit.to_inside(data.quantile(1.0 - OUTER))))
+        Some((
+            unit.to_inside(data.quantile(TRIMMED_SHARE)),
+            unit.to_inside(data.quantile(1.0 - TRIMMED_SHARE)),
+        ))
     };
     let unstated = |proposed: &ProposedChannel| {
         kind_of(proposed.channel) == Kind::Pressure
             && !units[proposed.column].is_some_and(|unit| unit.reference != Reference::Unstated)
     };
-    let inlet_is_gauge = proposal.of(Channel::P1).is_some_and(|inlet| {
+    let inlet_is_gauge = proposal.entry(Channel::P1).is_some_and(|inlet| {
         inlet.gauge || in_pa(inlet).is_some_and(|(low, high)| looks_like_gauge(Channel::P1, low, high))
     });
     for proposed in proposal.channels.iter_mut().filter(|proposed| unstated(proposed)) {
@@ -361,9 +372,7 @@ fn settle_gauge(proposal: &mut Proposal, layout: &Layout, survey: &Survey, units
         } else if inlet_is_gauge && low < 1.6e5 {
             proposed.gauge = true;
             proposed.certainty = proposed.certainty.min(Certainty::Likely);
-            proposed
-                .remarks
-                .push("the log does not say whether it is absolute; taken as gauge, as P1 is".to_owned());
+            proposed.remarks.push("the log does not give its reference; taken as gauge like P1".to_owned());
         }
     }
     if !proposal.channels.iter().any(|proposed| proposed.gauge) {
@@ -372,16 +381,16 @@ fn settle_gauge(proposal: &mut Proposal, layout: &Layout, survey: &Survey, units
     let ambient = layout.columns.iter().enumerate().find_map(|(index, column)| {
         let unit =
             units[index].filter(|unit| unit.kind == Kind::Pressure && unit.reference != Reference::Gauge)?;
-        let named = is_ambient(&plain(&column.name)) || is_ambient(&plain(&column.description));
+        let named = is_ambient(&normalise(&column.name)) || is_ambient(&normalise(&column.description));
         let median_pa = unit.unit.to_inside(survey.columns[index].quantile(0.5));
-        let (least, most) = AMBIENT_PA;
+        let (least, most) = AMBIENT_RANGE_PA;
         (named && (least..=most).contains(&median_pa))
             .then_some(Ambient::Column { column: index, unit: unit.unit.symbol() })
     });
     proposal.ambient = Some(ambient.unwrap_or(Ambient::Assumed));
 }
 
-/// A number for people.
+/// A number with three to five significant digits, for messages.
 pub(crate) fn short(value: f64) -> String {
     match value.abs() {
         _ if !value.is_finite() => "-".to_owned(),

@@ -7,20 +7,20 @@ use std::collections::BTreeMap;
 /// Time over which means are compared before and after, s.
 const WINDOW_S: f64 = 3.0;
 
-/// The later mean begins this long after the earlier one ends, s: a jump is over by then, a drift has hardly begun.
-const APART_S: f64 = 2.0;
+/// Time between the two windows, s: long compared with a jump, short compared with a drift.
+const SEPARATION_S: f64 = 2.0;
 
 /// Shortest interval of the search grid for jumps, s.
 const GRID_S: f64 = 0.2;
 
 /// Maximum number of points of that grid: a day at its shortest interval.
-const GRID_LIMIT: f64 = 5e5;
+const MAX_GRID_POINTS: f64 = 5e5;
 
 /// Multiple of the noise of a mean over the grid's interval that a jump must exceed.
 const NOISE_MULTIPLE: f64 = 6.0;
 
 /// Share of a jump that marks its start.
-const BEGUN_SHARE: f64 = 0.1;
+const START_SHARE: f64 = 0.1;
 
 /// Share of the smallest jump per window below which a signal counts as settled again.
 const CALM_SHARE: f64 = 0.3;
@@ -32,7 +32,7 @@ const SETTLING_S: f64 = 15.0;
 const SETTLING_SHARE: f64 = 0.2;
 
 /// Shaft speed below which the machine is at rest, rpm: far below any idle, far above any sensor's noise.
-const AT_REST_RPM: f64 = 1000.0;
+const MAX_REST_RPM: f64 = 1000.0;
 
 /// The valve opening, if it was measured.
 const MEASURED_VALVE: (Channel, f64) = (Channel::ValveCommand, VALVE_JUMP_RATIO);
@@ -75,15 +75,15 @@ pub(crate) fn steps_from_jumps(
         })
         .collect();
     let channels: Vec<&str> = grid.signals.iter().map(|signal| signal.channel.symbol()).collect();
-    let turning = without_rest(steps.clone(), series).len();
+    let turning = drop_rest_steps(steps.clone(), series).len();
     warnings.push(ReadWarning::StepsFound { count: turning, channels: channels.join(", ") });
     steps
 }
 
 /// Removes the steps in which the shaft is at rest: a soak before the first point, the end of a run. Renumbers the others.
-pub(crate) fn without_rest(steps: Vec<StepMarker>, series: &BTreeMap<Channel, Series>) -> Vec<StepMarker> {
+pub(crate) fn drop_rest_steps(steps: Vec<StepMarker>, series: &BTreeMap<Channel, Series>) -> Vec<StepMarker> {
     let Some(speed) = series.get(&Channel::ShaftSpeed) else { return steps };
-    let rests = |step: &StepMarker| median(speed, step.start_s, step.end_s) < AT_REST_RPM;
+    let rests = |step: &StepMarker| median(speed, step.start_s, step.end_s) < MAX_REST_RPM;
     if steps.iter().all(rests) {
         // A dead sensor, or a file without a run: neither shows when the machine is at rest.
         return steps;
@@ -112,7 +112,7 @@ struct Signal {
     sums: Vec<f64>,
     /// Noise of a value.
     sigma: f64,
-    least_ratio: f64,
+    min_jump_ratio: f64,
     /// Level below which a relative change has no meaning.
     floor: f64,
 }
@@ -135,7 +135,7 @@ impl Grid {
         let last_s =
             found.iter().filter_map(|(.., s)| s.t_s.last().copied()).fold(f64::NEG_INFINITY, f64::max);
         let slowest_s = found.iter().map(|(.., s)| typical_s(s)).fold(GRID_S, f64::max);
-        let interval_s = slowest_s.max((last_s - first_s) / GRID_LIMIT);
+        let interval_s = slowest_s.max((last_s - first_s) / MAX_GRID_POINTS);
         let mut bins: BTreeMap<i64, Vec<(f64, f64)>> = BTreeMap::new();
         for (index, (.., series)) in found.iter().enumerate() {
             for (t_s, value) in series.t_s.iter().zip(&series.values).filter(|(_, value)| value.is_finite()) {
@@ -167,13 +167,13 @@ impl Grid {
     }
 
     /// Number of grid points in a time, at least two.
-    fn places(&self, time_s: f64) -> usize {
+    fn point_count(&self, time_s: f64) -> usize {
         ((time_s / self.interval_s).round() as usize).max(2)
     }
 
-    /// Beginning of each jump, s.
+    /// Start of each jump, s.
     fn jumps_s(&self) -> Vec<f64> {
-        let (window, apart) = (self.places(WINDOW_S), self.places(APART_S));
+        let (window, apart) = (self.point_count(WINDOW_S), self.point_count(SEPARATION_S));
         let mut jumps_s = Vec::new();
         let mut last: Option<(usize, Vec<f64>)> = None;
         let mut at = window;
@@ -181,7 +181,7 @@ impl Grid {
             let jumped = |signal: &Signal| {
                 let (before, after) =
                     (signal.mean(at - window, at), signal.mean(at + apart, at + apart + window));
-                (after - before).abs() > signal.least(before, after)
+                (after - before).abs() > signal.min_jump(before, after)
             };
             let moved: Vec<&Signal> = self.signals.iter().filter(|signal| jumped(signal)).collect();
             if moved.is_empty() {
@@ -200,7 +200,7 @@ impl Grid {
             let settles = last.as_ref().is_some_and(|(last, whole): &(usize, Vec<f64>)| {
                 let sizes =
                     self.signals.iter().zip(&sizes).zip(whole).filter(|((signal, _), _)| jumped(signal));
-                start - last < self.places(SETTLING_S)
+                start - last < self.point_count(SETTLING_S)
                     && sizes.into_iter().all(|((_, size), whole)| size.abs() < SETTLING_SHARE * whole.abs())
             });
             if !settles {
@@ -208,7 +208,7 @@ impl Grid {
                 last = Some((start, sizes));
             }
             at = start + window;
-            // The rest of a slow jump is not another jump.
+            // The end of a slow jump is not another jump.
             while at + window <= self.t_s.len()
                 && !self.signals.iter().all(|signal| signal.is_calm(at - window, at, window))
             {
@@ -220,7 +220,7 @@ impl Grid {
 }
 
 impl Signal {
-    fn of(channel: Channel, least_ratio: f64, values: Vec<f64>) -> Signal {
+    fn of(channel: Channel, min_jump_ratio: f64, values: Vec<f64>) -> Signal {
         let sums = std::iter::once(0.0)
             .chain(values.iter().scan(0.0, |sum, value| {
                 *sum += value;
@@ -237,7 +237,7 @@ impl Signal {
         // Of a normal distribution the median of the absolute values is 0.6745 standard deviations; a difference has twice the
         // variance.
         let sigma = steps.get(steps.len() / 2).copied().unwrap_or(0.0) / 0.6745 / std::f64::consts::SQRT_2;
-        Signal { channel, values, sums, sigma, least_ratio, floor }
+        Signal { channel, values, sums, sigma, min_jump_ratio, floor }
     }
 
     fn mean(&self, from: usize, to: usize) -> f64 {
@@ -246,15 +246,15 @@ impl Signal {
     }
 
     /// The smallest difference of two means that is a jump.
-    fn least(&self, before: f64, after: f64) -> f64 {
-        (self.least_ratio * before.abs().max(after.abs()).max(self.floor)).max(NOISE_MULTIPLE * self.sigma)
+    fn min_jump(&self, before: f64, after: f64) -> f64 {
+        (self.min_jump_ratio * before.abs().max(after.abs()).max(self.floor)).max(NOISE_MULTIPLE * self.sigma)
     }
 
     /// Whether the jump between two means has begun at a grid point, and continues at the next one.
     fn has_begun(&self, place: usize, from: usize, to: usize, after_from: usize, window: usize) -> bool {
         let (before, after) = (self.mean(from, to), self.mean(after_from, after_from + window));
         let jump = after - before;
-        let enough = (BEGUN_SHARE * jump.abs()).max(4.0 * self.sigma).min(0.5 * jump.abs());
+        let enough = (START_SHARE * jump.abs()).max(4.0 * self.sigma).min(0.5 * jump.abs());
         let off = |place: usize| {
             self.values.get(place).is_some_and(|value| (value - before) * jump.signum() > enough)
         };
@@ -263,7 +263,7 @@ impl Signal {
 
     fn is_calm(&self, from: usize, at: usize, window: usize) -> bool {
         let (before, after) = (self.mean(from, at), self.mean(at, at + window));
-        let calm = CALM_SHARE * self.least_ratio * before.abs().max(after.abs()).max(self.floor);
+        let calm = CALM_SHARE * self.min_jump_ratio * before.abs().max(after.abs()).max(self.floor);
         (after - before).abs() <= calm.max(NOISE_MULTIPLE * self.sigma)
     }
 }
@@ -286,7 +286,7 @@ mod tests {
     }
 
     fn starts(series: &BTreeMap<Channel, Series>) -> Vec<f64> {
-        let steps = without_rest(steps_from_jumps(series, false, &mut Vec::new()), series);
+        let steps = drop_rest_steps(steps_from_jumps(series, false, &mut Vec::new()), series);
         assert!(
             steps.iter().enumerate().all(|(index, step)| step.index == index && step.end_s > step.start_s)
         );

@@ -1,4 +1,4 @@
-//! Several tables of one file as one log: the sheets of a workbook, the groups of a measurement.
+//! Joins several tables of one file to one log: sheets of a workbook, groups of a measurement.
 
 use crate::tables::table_log::Table;
 use mapper_recording::logs::{Layout, LogError, Row, RowSink};
@@ -10,12 +10,12 @@ pub(crate) struct Part {
     pub(crate) table: Table,
     first_group: usize,
     first_column: usize,
-    /// Delay of its time 0 after the earliest table, s.
+    /// Time 0 minus that of the earliest table, s.
     later_s: f64,
 }
 
 impl Part {
-    /// The table's columns among the wanted columns of the log, as indices of the table.
+    /// The table's columns among the requested columns of the log, as indices of the table.
     pub(crate) fn own(&self, wanted: &[usize]) -> Vec<usize> {
         let columns = self.first_column..self.first_column + self.table.layout.columns.len();
         wanted
@@ -25,15 +25,14 @@ impl Part {
             .collect()
     }
 
-    /// Passes a row of the table on as a row of the log.
-    pub(crate) fn give(&self, row: Row<'_>, sink: &mut RowSink<'_>) -> Result<(), LogError> {
+    pub(crate) fn forward_row(&self, row: Row<'_>, sink: &mut RowSink<'_>) -> Result<(), LogError> {
         sink(Row { group: row.group + self.first_group, t_s: row.t_s + self.later_s, ..row })
     }
 }
 
-/// Puts tables side by side; `word` is the format's term for a table. Returns the layout of the log and its parts, the tables in their
-/// original order, or the errors if no table is left.
-pub(crate) fn side_by_side(
+/// Joins tables; `word` is the format's term for a table. Returns the layout of the log and its parts, with the tables in their original
+/// order, or the errors if no table can be read.
+pub(crate) fn join_tables(
     word: &str,
     found: Vec<(String, Table)>,
     problems: Vec<String>,
@@ -64,7 +63,7 @@ pub(crate) fn side_by_side(
         }));
         let findings = table.layout.findings.drain(..);
         layout.findings.extend(findings.map(|finding| format!("{word} `{name}`: {finding}")));
-        // If one table has no date, all are assumed to begin together.
+        // If one table has no date, all are assumed to start together.
         let start = starts.as_ref().and_then(|starts| starts.get(index)).copied();
         let later_s = start.zip(layout.start_time_ns).map_or(0.0, |(own, first)| (own - first) as f64 / 1e9);
         parts.push(Part { name, table, first_group, first_column, later_s });

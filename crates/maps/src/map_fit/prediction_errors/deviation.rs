@@ -1,25 +1,25 @@
-//! How far a fit misses a point, and by how much it may.
+//! Deviations of points from a fit, with their standard errors.
 
 use crate::map_fit::fitted_surface::surface::MapFit;
 use crate::map_fit::least_squares::observations::Observation;
 
 /// A deviation and its standard error: of the line, of a point about it, and of the point itself.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Off {
+pub(crate) struct Deviation {
     pub by: f64,
     pub standard_error: f64,
 }
 
-/// How far a point lies from the line at its speed.
-pub(crate) struct Miss {
+/// Deviations of a point from the line at its speed.
+pub(crate) struct Deviations {
     /// In units of the line's scales.
-    pub distance: Off,
+    pub distance: Deviation,
     /// Of efficiency, fraction; `None` if the point has none.
-    pub eta: Option<Off>,
+    pub eta: Option<Deviation>,
 }
 
 impl MapFit {
-    pub(crate) fn miss(&self, point: &Observation) -> Miss {
+    pub(crate) fn deviations(&self, point: &Observation) -> Deviations {
         let [distance_rms, eta_rms] = self.solution.rms;
         let place = self.nearest(
             point.speed_ratio * self.data.nominal_speed_rpm,
@@ -28,12 +28,12 @@ impl MapFit {
             point.flow_scale_kg_s,
             point.ratio_scale,
         );
-        Miss {
-            distance: Off {
+        Deviations {
+            distance: Deviation {
                 by: place.distance_ratio,
                 standard_error: place.distance_standard_error_ratio.hypot(distance_rms),
             },
-            eta: point.eta.map(|eta| Off {
+            eta: point.eta.map(|eta| Deviation {
                 by: (eta - place.eta).abs(),
                 standard_error: place.eta_standard_error.hypot(eta_rms).hypot(point.eta_error),
             }),

@@ -1,4 +1,4 @@
-//! Several sensors of one channel below `sensors:`: identical ones by their `count`, or a list.
+//! Redundant sensors of one channel below `sensors:`: identical ones by their `count`, or a list.
 
 use crate::checking::Check;
 use crate::elements::rig::calibration::Calibration;
@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 pub struct SensorDeclaration {
     /// Noise, offset left after calibration, gain; those of the combined reading if there are several sensors.
     pub declared: DeclaredUncertainty,
-    /// Whether a gain is declared, be it 0.
+    /// Whether a gain is declared, which may be 0.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub gain_is_declared: bool,
     /// Inner diameter of the pipe at a static tap, m; `None` if the total value is measured.
@@ -59,12 +59,11 @@ pub(crate) trait Sensor {
     /// The properties of the sensor itself.
     fn declaration(&self) -> SensorDeclaration;
 
-    /// The statements about the other sensors of its channel.
-    fn several(&self) -> Several<'_>;
+    fn shared_settings(&self) -> SharedSettings<'_>;
 }
 
-/// Statements of an entry about several sensors.
-pub(crate) struct Several<'a> {
+/// Settings of an entry about the redundant sensors of its channel.
+pub(crate) struct SharedSettings<'a> {
     /// Number of identical sensors.
     pub count: usize,
     /// Display name.
@@ -77,15 +76,15 @@ impl<S: Sensor> Sensors<S> {
     /// The declared properties of the channel.
     pub(crate) fn declaration(&self, channel: Channel) -> SensorDeclaration {
         let members: Vec<&S> = match self {
-            Sensors::Alike(sensor) => vec![sensor; sensor.several().count],
+            Sensors::Alike(sensor) => vec![sensor; sensor.shared_settings().count],
             Sensors::Each(sensors) => sensors.iter().collect(),
         };
         let common_offset_sigma =
-            members.iter().map(|sensor| sensor.several().common_offset).fold(0.0, f64::max);
+            members.iter().map(|sensor| sensor.shared_settings().common_offset).fold(0.0, f64::max);
         let element = |(index, sensor): (usize, &&S)| {
             let SensorDeclaration { declared, probe_diameter_m, .. } = sensor.declaration();
             let usual = || Element { channel, number: index + 1 }.to_string();
-            let name = sensor.several().name.map_or_else(usual, str::to_owned);
+            let name = sensor.shared_settings().name.map_or_else(usual, str::to_owned);
             DeclaredElement { name, declared, probe_diameter_m }
         };
         let redundant = RedundantSensors {
@@ -139,7 +138,7 @@ impl<S: Sensor> DeclaredSensors for Option<Sensors<S>> {
 }
 
 /// The places of a channel's sensors in the file.
-pub(crate) fn each_place(check: &Check<'_>, symbol: &str) -> Vec<Vec<Step>> {
+pub(crate) fn sensor_places(check: &Check<'_>, symbol: &str) -> Vec<Vec<Step>> {
     let channel = steps!["sensors", symbol];
     match check.count(&channel) {
         0 => vec![channel.to_vec()],
@@ -148,8 +147,8 @@ pub(crate) fn each_place(check: &Check<'_>, symbol: &str) -> Vec<Vec<Step>> {
 }
 
 /// Checks for contradictions between the sensors of one channel.
-pub(crate) fn check_several(check: &mut Check<'_>, symbol: &str) {
-    let places = each_place(check, symbol);
+pub(crate) fn check_redundant_sensors(check: &mut Check<'_>, symbol: &str) {
+    let places = sensor_places(check, symbol);
     let is_list = check.count(&steps!["sensors", symbol]) > 0;
     let at = |place: &[Step], key: &str| [place, &steps![key]].concat();
     let (misplaced, remedy) = if is_list {
@@ -160,11 +159,11 @@ pub(crate) fn check_several(check: &mut Check<'_>, symbol: &str) {
     for place in &places {
         let path = at(place, misplaced);
         if check.get(&path).is_some() {
-            let message = format!("`{misplaced}` says nothing here");
+            let message = format!("`{misplaced}` has no effect here");
             check.note(FindingKind::Conflict, &path, message, remedy);
         }
     }
-    // One place in the flow and one calibration bath have one value each.
+    // The common offset comes from one place in the flow and one calibration bath, so all sensors have the same one.
     for key in ["common_offset", "tap", "pipe_diameter"] {
         let text_of = |check: &Check<'_>, place: &[Step]| check.text(&at(place, key)).map(str::to_owned);
         let first = places.iter().find_map(|place| text_of(check, place));
@@ -172,8 +171,9 @@ pub(crate) fn check_several(check: &mut Check<'_>, symbol: &str) {
             .iter()
             .find(|place| text_of(check, place).is_some_and(|text| Some(&text) != first.as_ref()));
         if let (Some(first), Some(other)) = (first, other) {
-            let message =
-                format!("`{key}` is {first} for another sensor of {symbol}, and holds for all of them");
+            let message = format!(
+                "`{key}` is {first} for another sensor of {symbol}, and must be equal for all of them"
+            );
             check.note(
                 FindingKind::Conflict,
                 &at(other, key),

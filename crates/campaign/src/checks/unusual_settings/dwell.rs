@@ -5,27 +5,27 @@ use crate::checks::concern::Concern;
 use mapper_core::{Method, WindowRule};
 use mapper_yaml::steps;
 
-pub(crate) fn concerns(campaign: &Campaign) -> Vec<Concern> {
+pub(crate) fn find_concerns(campaign: &Campaign) -> Vec<Concern> {
     let identification = &campaign.identification;
     if !matches!(identification.method, Method::Dynamic | Method::Joint) {
         return Vec::new();
     }
-    // A dwell that the planner chooses is long enough for the window.
+    // The planner only chooses dwells that are long enough for the window.
     let Some(dwell_s) = campaign.timing.dwell.fixed_s() else { return Vec::new() };
     let (earliest_s, shortest_s) = (WindowRule::EARLIEST_S, WindowRule::SHORTEST_S);
     let needed_s = earliest_s + shortest_s;
-    // A method that evaluates a step from its jump on needs no settled window.
+    // Methods that evaluate the transient need no settled window.
     if identification.method == Method::Joint && dwell_s > earliest_s {
         return Vec::new();
     }
     match identification.window {
         WindowRule::Auto if dwell_s < needed_s => {
-            // A script may stay elsewhere for any time.
+            // A script may choose any dwell.
             let none = dwell_s <= earliest_s;
             let outcome =
                 if none { "no point would have an efficiency" } else { "every point would be doubtful" };
             vec![Concern {
-                grave: none && campaign.sequence.is_none(),
+                is_error: none && campaign.sequence.is_none(),
                 at: steps!["timing", "dwell"].to_vec(),
                 message: format!(
                     "a dwell of {dwell_s} s is shorter than the {needed_s} s that `window: auto` needs (from {earliest_s} s \
@@ -35,7 +35,7 @@ pub(crate) fn concerns(campaign: &Campaign) -> Vec<Concern> {
             }]
         }
         WindowRule::Fixed { start_s, end_s } if end_s - start_s < shortest_s => vec![Concern {
-            grave: false,
+            is_error: false,
             at: steps!["identification", "window", "end"].to_vec(),
             message: format!(
                 "the window is {} s long, shorter than the {shortest_s} s from which efficiency and heat transfer are distinguishable",

@@ -1,40 +1,40 @@
 //! Checks sizes and masses against those of the reference machine scaled to the wheel.
 
 use crate::campaign::{Campaign, MapSource};
-use crate::checks::concern::{Concern, mm};
+use crate::checks::concern::{Concern, to_mm};
 use crate::machine_sizes::{SIZES, Size, similar_machine};
 use mapper_physics::compressor_map::characteristic::CompressorCharacteristic;
 use mapper_physics::compressor_map::closed_form_map::ClosedFormMap;
 use mapper_yaml::{Step, steps};
 
-/// Range of compressor wheels, m: 20 mm in the smallest passenger cars, 200 mm in locomotives. Ships have larger ones, but
-/// no gas stand of this kind is known for them.
-const USUAL_WHEELS_M: (f64, f64) = (0.02, 0.2);
-/// Range beyond which a wheel is a mistyped unit, m: a tenth of the smallest, and ten times the largest.
-const POSSIBLE_WHEELS_M: (f64, f64) = (0.002, 2.0);
-/// Factor by which the choke flow of a compressor may differ from that of the reference machine at equal tip speed, scaled to the
-/// wheel. The units that are confused are further apart: lb/min and kg/s by 132, g/s and kg/s by 1000.
-const FLOW_RATIO: f64 = 10.0;
-/// The best turbines of turbochargers reach 0.8 (Baines, Fundamentals of Turbocharging, ch. 5); above this a value was mistyped.
-const TURBINE_EFFICIENCY: f64 = 0.85;
+/// Usual diameters of compressor wheels, m: 20 mm in the smallest passenger cars, 200 mm in locomotives. Ships have larger ones, which are
+/// not tested on such gas stands.
+const USUAL_WHEEL_DIAMETERS_M: (f64, f64) = (0.02, 0.2);
+/// Possible diameters of compressor wheels, m: outside, a tenth of the smallest to ten times the largest usual one, the unit is wrong.
+const POSSIBLE_WHEEL_DIAMETERS_M: (f64, f64) = (0.002, 2.0);
+/// Maximum ratio, either way, of a compressor's choke flow to the scaled reference machine's at equal tip speed. Confused units differ by
+/// more: lb/min and kg/s by 132, g/s and kg/s by 1000.
+const MAX_FLOW_RATIO: f64 = 10.0;
+/// Maximum efficiency of a turbine: the best ones reach 0.8 (Baines, Fundamentals of Turbocharging, ch. 5).
+const MAX_TURBINE_EFFICIENCY: f64 = 0.85;
 
-pub(crate) fn concerns(campaign: &Campaign) -> Vec<Concern> {
+pub(crate) fn find_concerns(campaign: &Campaign) -> Vec<Concern> {
     let params = &campaign.machine.params;
     let mut concerns = Vec::new();
     let wheel_m = params.compressor.wheel_diameter_m;
-    if !(USUAL_WHEELS_M.0..=USUAL_WHEELS_M.1).contains(&wheel_m) {
+    if !(USUAL_WHEEL_DIAMETERS_M.0..=USUAL_WHEEL_DIAMETERS_M.1).contains(&wheel_m) {
         concerns.push(Concern {
-            grave: !(POSSIBLE_WHEELS_M.0..=POSSIBLE_WHEELS_M.1).contains(&wheel_m),
+            is_error: !(POSSIBLE_WHEEL_DIAMETERS_M.0..=POSSIBLE_WHEEL_DIAMETERS_M.1).contains(&wheel_m),
             at: steps!["machine", "geometry", "compressor", "wheel_diameter"].to_vec(),
             message: format!(
                 "a compressor wheel of {} mm is not a turbocharger's: they have {:.0} to {:.0} mm",
-                mm(wheel_m),
-                1e3 * USUAL_WHEELS_M.0,
-                1e3 * USUAL_WHEELS_M.1
+                to_mm(wheel_m),
+                1e3 * USUAL_WHEEL_DIAMETERS_M.0,
+                1e3 * USUAL_WHEEL_DIAMETERS_M.1
             ),
             remedy: "write its diameter at the exit, with its unit".to_owned(),
         });
-        // Such a wheel cannot serve as a reference for the other sizes.
+        // An impossible wheel is no reference for the other sizes.
         return concerns;
     }
     let reference = similar_machine(wheel_m);
@@ -43,27 +43,27 @@ pub(crate) fn concerns(campaign: &Campaign) -> Vec<Concern> {
         let (value, usual) = (size.value(params), size.value(&reference));
         let ((low, high), (by, unit)) = ((usual / usual_ratio, usual * usual_ratio), size.unit);
         (!(low..=high).contains(&value)).then(|| Concern {
-            grave: false,
+            is_error: false,
             at: size.steps(),
             message: format!(
                 "the {} is {} {unit}; with a compressor wheel of {} mm {} to {} {unit} would be usual",
                 size.name,
-                short(by * value),
-                mm(wheel_m),
-                short(by * low),
-                short(by * high)
+                two_digits(by * value),
+                to_mm(wheel_m),
+                two_digits(by * low),
+                two_digits(by * high)
             ),
             remedy: "check the value and its unit, and the wheel's diameter".to_owned(),
         })
     };
     concerns.extend(SIZES.iter().filter_map(judged));
-    concerns.extend(map_flow(campaign));
-    if params.turbine.peak_efficiency > TURBINE_EFFICIENCY {
+    concerns.extend(check_map_flow(campaign));
+    if params.turbine.peak_efficiency > MAX_TURBINE_EFFICIENCY {
         concerns.push(Concern {
-            grave: false,
+            is_error: false,
             at: steps!["machine", "geometry", "turbine", "peak_efficiency"].to_vec(),
             message: format!(
-                "a peak efficiency of {} is more than any turbocharger's turbine has; {TURBINE_EFFICIENCY} would be the best",
+                "a peak efficiency of {} is more than any turbocharger's turbine has; the best have {MAX_TURBINE_EFFICIENCY}",
                 params.turbine.peak_efficiency
             ),
             remedy: "write the turbine's own peak, total to static, e.g. 0.75".to_owned(),
@@ -72,8 +72,8 @@ pub(crate) fn concerns(campaign: &Campaign) -> Vec<Concern> {
     concerns
 }
 
-/// A nominal map with a flow that no compressor of this wheel has: its unit is not the assumed one, and no point would be reached.
-fn map_flow(campaign: &Campaign) -> Option<Concern> {
+/// Checks the flow of the nominal map: one that is impossible for the wheel has another unit than assumed.
+fn check_map_flow(campaign: &Campaign) -> Option<Concern> {
     let MapSource::Table { named, .. } = &campaign.machine.map else { return None };
     let map = campaign.machine.map.table()?.ok()?;
     let speed_rpm = *map.speeds_corrected_rpm().last()?;
@@ -84,19 +84,19 @@ fn map_flow(campaign: &Campaign) -> Option<Concern> {
     );
     let ratio = found_kg_s / usual_kg_s;
     let (factor, direction) = if ratio > 1.0 { (ratio, "large") } else { (1.0 / ratio, "small") };
-    (factor > FLOW_RATIO).then(|| {
+    (factor > MAX_FLOW_RATIO).then(|| {
         let at: &[Step] = &steps!["machine", "map", "file"];
         Concern {
-            grave: true,
+            is_error: true,
             at: at.to_vec(),
             message: format!(
                 "the flow of the map `{named}` is about {} times too {direction} for a wheel of {} mm: it is read as {} kg/s at choke and \
                  {:.1} krpm, where {} kg/s would be usual",
-                leading(factor),
-                mm(wheel_diameter_m),
-                short(found_kg_s),
+                one_digit(factor),
+                to_mm(wheel_diameter_m),
+                two_digits(found_kg_s),
                 speed_rpm / 1e3,
-                short(usual_kg_s)
+                two_digits(usual_kg_s)
             ),
             remedy: "name the unit in the heading of the flow's column, e.g. `flow [lb/min]`; or correct \
                      `machine.geometry.compressor.wheel_diameter`"
@@ -106,13 +106,12 @@ fn map_flow(campaign: &Campaign) -> Option<Concern> {
 }
 
 /// One significant digit.
-fn leading(value: f64) -> f64 {
+fn one_digit(value: f64) -> f64 {
     let unit = 10f64.powi(value.log10().floor() as i32);
     (value / unit).round() * unit
 }
 
-/// Two significant digits.
-fn short(value: f64) -> String {
+fn two_digits(value: f64) -> String {
     let digits = (1.0 - value.abs().log10().floor()).max(0.0);
     if digits > 4.0 { format!("{value:.1e}") } else { format!("{value:.*}", digits as usize) }
 }

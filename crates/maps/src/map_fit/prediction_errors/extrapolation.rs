@@ -1,0 +1,77 @@
+//! Widens the errors of a fit beyond the measured speeds.
+//!
+//! Between lines the roughness of each parameter limits the shape of a line that was not measured. Beyond them that is
+//! not enough: choke flow at low speed and work at high Mach numbers bend towards one end, and are smooth in the middle, which determines the
+//! roughness. The outermost line is therefore left out, and the variance beyond the other lines is increased until it explains the deviation
+//! of that line. It is never decreased: one line does not justify smaller errors.
+
+use crate::map_fit::fitted_surface::surface::MapFit;
+use crate::map_fit::least_squares::observations::Observation;
+use crate::map_fit::prediction_errors::deviation::Deviation;
+use crate::map_fit::speed_lines::ends::{End, EndWidenings, Widening};
+
+impl MapFit {
+    /// The fit with errors beyond its ends that explain the outermost lines.
+    pub(crate) fn widened(mut self, ends: &[End]) -> MapFit {
+        for end in ends {
+            let line = match end {
+                End::Slow => 0,
+                End::Fast => self.data.lines_rpm.len() - 1,
+            };
+            let rest = self
+                .data
+                .without_line(line)
+                .ok()
+                .and_then(|data| MapFit::of(data, Some(&self.solution)).ok());
+            let Some(rest) = rest else { continue };
+            let factors = estimate_widening(rest, self.data.points.iter().filter(|point| point.line == line));
+            match end {
+                End::Slow => self.solution.widening.slow = factors,
+                End::Fast => self.solution.widening.fast = factors,
+            }
+        }
+        self
+    }
+}
+
+/// The widening with which a fit's errors explain the deviations of a line's points, on average.
+fn estimate_widening<'a>(
+    mut rest: MapFit,
+    points: impl Iterator<Item = &'a Observation> + Clone,
+) -> Widening {
+    // Squares of the deviations, and of their standard errors with these factors.
+    let mut sums = |shape: f64, work: f64| {
+        rest.solution.widening = EndWidenings::both(Widening { shape, work });
+        let [mut distance, mut eta] = [Sums::default(); 2];
+        for point in points.clone() {
+            let miss = rest.deviations(point);
+            distance.take(miss.distance);
+            miss.eta.into_iter().for_each(|off| eta.take(off));
+        }
+        (distance, eta)
+    };
+    let shape = factor(sums(0.0, 0.0).0, sums(1.0, 0.0).0);
+    let work = factor(sums(shape, 0.0).1, sums(shape, 1.0).1);
+    Widening { shape, work }
+}
+
+/// Sums of squares over the points of a line.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    off: f64,
+    explained: f64,
+}
+
+impl Sums {
+    fn take(&mut self, off: Deviation) {
+        self.off += off.by * off.by;
+        self.explained += off.standard_error * off.standard_error;
+    }
+}
+
+/// Factor, at least 1, on the part of the variance beyond the ends, that explains the deviations.
+fn factor(without: Sums, with: Sums) -> f64 {
+    let beyond = with.explained - without.explained;
+    let factor = (with.off - without.explained) / beyond;
+    if factor.is_finite() { factor.max(1.0) } else { 1.0 }
+}

@@ -54,6 +54,8 @@ pub struct Question<'a> {
     pub experiments: Vec<Experiment>,
     /// Numbers behind the probabilities.
     pub calibration: Calibration,
+    /// The recording without effects linearised at the nominal model, if that is known.
+    pub linearised: Option<Linearised>,
     /// Receives the share done and the name of the next stage.
     pub progress: &'a (dyn Fn(f64, &str) + Sync),
 }
@@ -105,6 +107,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         tolerances_declared,
         experiments,
         calibration,
+        linearised,
         progress,
     } = question;
     progress(0.0, "reading");
@@ -126,7 +129,10 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         warnings.push(GapWarning::UncertainTimes { scatter_s: study.scatter_s });
     }
     progress(0.02, "tolerances");
-    let linearised = Linearised::new(&study)?;
+    let linearised = match linearised.filter(|_| since.is_none()) {
+        Some(linearised) => linearised,
+        None => Linearised::new(&study)?,
+    };
     another_machine(&study, &linearised.base.values)?;
     // Hold-outs are chosen by place, before anything is fitted.
     let folds = Folds::of(&study);

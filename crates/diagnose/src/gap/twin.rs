@@ -7,7 +7,7 @@ use crate::gap::findings::report::Verdict;
 use crate::gap::next_experiment::outlook::{Alike, COARSE_S, imagined_steps};
 use crate::gap::residuals::nuisance::{OFFSET_PREFIX, OUTPUTS};
 use crate::gap::residuals::study::{Hypothesis, Study};
-use crate::gap::residuals::whiten::{Linearised, dot};
+use crate::gap::residuals::whiten::{Linearised, dot, nuisance_changes};
 use mapper_core::{Channel, StepMarker, half_width_95};
 use mapper_inference::descent::FINE;
 use nalgebra::{DMatrix, DVector};
@@ -263,16 +263,7 @@ pub fn forecast_steps(
 fn forecast(study: &Study, found: &Found) -> Result<Vec<Expected>, TwinError> {
     let (hypothesis, covariance) = found.hypothesis(study)?;
     let here = study.predict(&hypothesis)?;
-    let mut columns: Vec<Vec<f64>> = Vec::new();
-    let changed = |moved: &Hypothesis, by: f64| -> Vec<f64> {
-        let Ok(there) = study.predict(moved) else { return vec![0.0; here.values.len()] };
-        there.values.iter().zip(&here.values).map(|(t, h)| (t - h) / by).collect()
-    };
-    for i in 0..hypothesis.nuisances.len() {
-        let mut moved = hypothesis.clone();
-        moved.nuisances[i] += 1.0;
-        columns.push(changed(&moved, 1.0));
-    }
+    let mut columns = nuisance_changes(study, &hypothesis, &here);
     let at = coordinates(&study.effects, &hypothesis);
     columns.extend(changes_near(study, &hypothesis, &here, &at, FINE));
     let mut expected: Vec<Expected> =

@@ -98,7 +98,7 @@ fn complaint(clean: &Study, nominal: &Linearised, index: usize, effect: &dyn Eff
     rivals.retain(|rival| rival.effect != index);
     rivals.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let better = rivals.into_iter().take(RIVALS).find_map(|rival| {
-        let fitted = fit_of(rival.start.effects);
+        let fitted = fit_of(rival.start.hypothesis.effects);
         (fitted.cost < own.cost - CHANCE).then(|| (name(rival.effect), own.cost - fitted.cost))
     });
     better.map(|(rival, by)| format!("{rival} explains it better by {by:.1}"))

@@ -88,6 +88,7 @@ fn ask_with(recording: &Recording, more: Option<Arc<dyn Effect>>) -> Result<Diag
         model: Model::nominal(),
         effects,
         calibration: Calibration::shipped().unwrap(),
+        linearised: None,
         progress: &|_, _| {},
     })
 }
@@ -351,6 +352,7 @@ fn convection_before_the_wheel_is_never_ruled_out_for_its_area() {
         model,
         effects: effects(ids),
         calibration: Calibration::shipped().unwrap(),
+        linearised: None,
         progress: &|_, _| {},
     };
     let recording = record_of(&rig, 12);

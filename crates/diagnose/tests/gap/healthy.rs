@@ -30,6 +30,7 @@ fn ask(recording: &Recording, healthy: Option<&Recording>) -> Result<Diagnosed, 
         model: Model::nominal(),
         effects: candidates.iter().map(|id| mapper_effects::find(id).unwrap()).collect(),
         calibration: Calibration::shipped().unwrap(),
+        linearised: None,
         progress: &|_, _| {},
     })
 }

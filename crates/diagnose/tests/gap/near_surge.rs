@@ -116,7 +116,7 @@ fn an_exact_recording_near_surge_has_no_cause() {
     let left = adequacy(&study, &linearised, &null, most.gain);
     assert!(null.cost < 10.0, "{} of {} values", null.cost, study.measured.len());
     // The best of 26 effects on noise alone has a gain of some units.
-    assert!(most.gain < 1.0, "{:?} {}", most.start.effects, most.gain);
+    assert!(most.gain < 1.0, "{:?} {}", most.start.hypothesis.effects, most.gain);
     let outside = Calibration::shipped().unwrap().outside(left.features());
     assert!(outside < 0.05, "{outside} {left:?}");
 }

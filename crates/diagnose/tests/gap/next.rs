@@ -42,6 +42,7 @@ fn ask(truth: (&str, f64), candidates: &[&str]) -> Diagnosed {
         model: Model::nominal(),
         effects,
         calibration: Calibration::shipped().unwrap(),
+        linearised: None,
         progress: &|_, _| {},
     })
     .unwrap()

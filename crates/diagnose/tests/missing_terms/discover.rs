@@ -43,6 +43,7 @@ fn ask(rig: &Rig, seed: u64) -> Diagnosed {
         model: Model::nominal(),
         effects: candidates.iter().map(|id| mapper_effects::find(id).unwrap()).collect(),
         calibration: Calibration::shipped().unwrap(),
+        linearised: None,
         progress: &|_, _| {},
     })
     .unwrap()

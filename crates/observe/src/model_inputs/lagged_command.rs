@@ -94,6 +94,11 @@ impl LaggedCommand {
         LaggedCommand::new(levels.collect(), p3, valve)
     }
 
+    /// The same commands with other responses.
+    fn with(&self, p3: Response, valve: Response) -> LaggedCommand {
+        LaggedCommand::new(self.levels.clone(), p3, valve)
+    }
+
     /// The level commanded at `t_s`.
     pub fn level(&self, t_s: f64) -> usize {
         self.levels.partition_point(|level| level.start_s <= t_s).saturating_sub(1)
@@ -154,6 +159,8 @@ const RATES: [f64; 9] = [0.2, 0.35, 0.6, 1.0, 1.7, 3.0, 5.0, 9.0, 16.0];
 /// Reduction of the squared residuals, in their mean square, above which a rate limit is accepted: ten standard deviations of white noise, five
 /// of coloured noise over the half second of a ramp. Accepting a limit wrongly has no effect, since a fast rate equals a lag alone.
 const MIN_COST_REDUCTION: f64 = 100.0;
+/// The same of the best of [`RATES`], for a fine search: half of the distance between two rates costs less than nine tenths of a limit.
+const MIN_COARSE_REDUCTION: f64 = 0.1 * MIN_COST_REDUCTION;
 
 /// Time constant of the measured P3 relative to its command, s, and its standard error; `None` without jumps or P3.
 ///
@@ -161,9 +168,9 @@ const MIN_COST_REDUCTION: f64 = 100.0;
 pub fn measured_lag_s(table: &Table, recording: &Recording, noise_sigma: f64) -> Option<(f64, f64)> {
     let values = table.column(Channel::P3)?;
     let jumps = p3_jumps(recording, noise_sigma);
+    let commanded = LaggedCommand::of_recording(recording, Response::lag(0.0), Response::lag(0.0));
     let cost = |lag_s: f64| {
-        let at_once = Response::lag(0.0);
-        let command = LaggedCommand::of_recording(recording, Response::lag(lag_s), at_once);
+        let command = commanded.with(Response::lag(lag_s), Response::lag(0.0));
         cost_of(table, values, &jumps, |t_s| command.p3_pa(t_s)) / (noise_sigma * noise_sigma).max(1e-9)
     };
     if jumps.is_empty() {
@@ -182,8 +189,9 @@ pub fn measured_p3_response(table: &Table, recording: &Recording, noise_sigma: f
     let values = table.column(Channel::P3)?;
     let jumps = p3_jumps(recording, noise_sigma);
     let sizes = recording.steps.windows(2).map(|pair| (pair[1].p3_pa - pair[0].p3_pa).abs());
+    let commanded = LaggedCommand::of_recording(recording, Response::lag(0.0), Response::lag(0.0));
     measured_response(table, values, &jumps, sizes.collect(), |response| {
-        let command = LaggedCommand::of_recording(recording, response, Response::lag(0.0));
+        let command = commanded.with(response, Response::lag(0.0));
         move |t_s| command.p3_pa(t_s)
     })
 }
@@ -217,8 +225,9 @@ pub fn measured_valve_response(table: &Table, recording: &Recording, nominal_p1_
     let area_m2 = *areas.get(areas.len() / 2)?;
     let openings: Vec<f64> = openings.iter().map(|x| x / area_m2).collect();
     let sizes = recording.steps.windows(2).map(moved).filter(|size| *size > 0.02);
+    let commanded = LaggedCommand::of_recording(recording, Response::lag(0.0), Response::lag(0.0));
     measured_response(table, &openings, &jumps, sizes.collect(), |response| {
-        let command = LaggedCommand::of_recording(recording, Response::lag(0.0), response);
+        let command = commanded.with(Response::lag(0.0), response);
         move |t_s| command.valve_opening_ratio(t_s)
     })
 }
@@ -276,7 +285,11 @@ fn measured_response<Prediction: Fn(f64) -> f64>(
     };
     let alone = at_rate(f64::INFINITY)?;
     let coarse = RATES.iter().filter_map(|rate| at_rate(rate * size));
-    let (_, coarse) = coarse.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let (coarse_cost, coarse) = coarse.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let limits = |cost: f64, least: f64| alone.0 - cost > least * cost / samples;
+    if !limits(coarse_cost, MIN_COARSE_REDUCTION) {
+        return Some(alone.1);
+    }
     // Jumps that the limit does not affect give the cost a second minimum, so a coarse search comes first.
     let (low, high) = ((coarse.slew_per_s / 1.8).ln(), (coarse.slew_per_s * 1.8).ln());
     let place = |i: usize| low + (high - low) * i as f64 / COARSE_LAGS as f64;
@@ -285,8 +298,7 @@ fn measured_response<Prediction: Fn(f64) -> f64>(
     let best = (0..=COARSE_LAGS).min_by(|a, b| costs[*a].total_cmp(&costs[*b]))?;
     let (low, high) = (place(best.saturating_sub(1)), place((best + 1).min(COARSE_LAGS)));
     let limited = at_rate(minimise(low, high, 1e-4, cost).at.exp());
-    let seen = limited.filter(|(cost, _)| alone.0 - cost > MIN_COST_REDUCTION * cost / samples);
-    Some(seen.unwrap_or(alone).1)
+    Some(limited.filter(|(cost, _)| limits(*cost, MIN_COST_REDUCTION)).unwrap_or(alone).1)
 }
 
 #[cfg(test)]

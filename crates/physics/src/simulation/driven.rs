@@ -235,12 +235,12 @@ struct DrivenSystem<'a, I: Inputs> {
 }
 
 impl<I: Inputs> DrivenSystem<'_, I> {
-    fn surge_position<const N: usize>(&self, y: &[f64; N]) -> f64 {
-        self.prepared.evaluate(&State::from_array(y)).surge_position_ratio
+    fn surge_position<const N: usize>(&mut self, y: &[f64; N]) -> f64 {
+        self.on_map(&State::from_array(y)).surge_position_ratio
     }
 
     /// Whether a step from this place on the speed line crosses the surge line.
-    fn crosses_corner<const N: usize>(&self, surge_before: f64, after: &[f64; N]) -> bool {
+    fn crosses_corner<const N: usize>(&mut self, surge_before: f64, after: &[f64; N]) -> bool {
         (surge_before < 1.0) != (self.surge_position(after) < 1.0)
     }
 

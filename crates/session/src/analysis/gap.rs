@@ -104,7 +104,7 @@ impl Session<'_> {
             self.send(SessionEvent::Progress { done_ratio, what: what.to_owned() });
         };
         progress(0.0, "drift");
-        let Prepared { recording, declared, model, drift, doubted, sensors, zero, off_at_rest } =
+        let Prepared { recording, declared, model, linearised, drift, doubted, sensors, zero, off_at_rest } =
             self.prepared_for_gap(recorded, campaign, map)?;
         let before = healthy.map(|healthy| self.prepared_for_gap(healthy, campaign, map)).transpose()?;
         let between = |from: f64, to: f64| {
@@ -126,6 +126,7 @@ impl Session<'_> {
             model,
             effects,
             calibration: calibration.clone(),
+            linearised,
             progress: &in_catalogue,
         })?;
         let found = discover(&diagnosed, &calibration, &beyond);
@@ -192,13 +193,15 @@ impl Session<'_> {
             Zeroed { recording, declared, zero, off_at_rest }
         };
         let as_it_is = ready(None);
+        let linearised =
+            drift.as_ref().and_then(|_| leaves_noise(&as_it_is, campaign, &model).ok().flatten());
         let (zeroed, drift, doubted) = match drift {
-            Some(drift) if leaves_noise(&as_it_is, campaign, &model) => (as_it_is, None, Some(drift.reason)),
+            Some(drift) if linearised.is_some() => (as_it_is, None, Some(drift.reason)),
             Some(drift) => (ready(Some(&drift)), Some(drift), None),
             None => (as_it_is, None, None),
         };
         let Zeroed { recording, declared, zero, off_at_rest } = zeroed;
-        Ok(Prepared { recording, declared, model, drift, doubted, sensors, zero, off_at_rest })
+        Ok(Prepared { recording, declared, model, linearised, drift, doubted, sensors, zero, off_at_rest })
     }
 
     /// Validates the machine found by a diagnosis against an independent recording. Nothing is fitted.
@@ -273,18 +276,15 @@ fn study_of(
     Ok(Study::with_actuators(recording, table, declared, model, effects, actuators))
 }
 
-/// Whether tolerances alone explain the recording down to noise. In that case apparent drift in repeats is not subtracted, because the diagnosis
-/// is much more sensitive.
-fn leaves_noise(zeroed: &Zeroed, campaign: &Campaign, model: &Model) -> bool {
-    let look = || -> Result<bool, GapError> {
-        let study =
-            study_of(&zeroed.recording, campaign, zeroed.declared.clone(), model.clone(), Vec::new())?;
-        let linearised = Linearised::new(&study)?;
-        let null = fit(&study, &linearised, &study.nothing(), &Selection::all(&study), Effort::default())?;
-        let left = adequacy(&study, &linearised, &null, 0.0);
-        Ok(Calibration::shipped().is_ok_and(|calibration| calibration.outside(left.features()) < 0.5))
-    };
-    look().unwrap_or(false)
+/// The linearised recording if tolerances alone explain it down to noise. In that case apparent drift in repeats is not subtracted, because the
+/// diagnosis is much more sensitive.
+fn leaves_noise(zeroed: &Zeroed, campaign: &Campaign, model: &Model) -> Result<Option<Linearised>, GapError> {
+    let study = study_of(&zeroed.recording, campaign, zeroed.declared.clone(), model.clone(), Vec::new())?;
+    let linearised = Linearised::new(&study)?;
+    let null = fit(&study, &linearised, &study.nothing(), &Selection::all(&study), Effort::default())?;
+    let left = adequacy(&study, &linearised, &null, 0.0);
+    let noise = Calibration::shipped().is_ok_and(|calibration| calibration.outside(left.features()) < 0.5);
+    Ok(noise.then_some(linearised))
 }
 
 /// A recording with its zero subtracted.
@@ -300,6 +300,8 @@ struct Prepared {
     recording: Recording,
     declared: Declared,
     model: Model,
+    /// The recording linearised at the nominal model, if that is known.
+    linearised: Option<Linearised>,
     drift: Option<DriftReport>,
     /// A detected drift that was rejected.
     doubted: Option<String>,

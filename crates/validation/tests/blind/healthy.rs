@@ -53,6 +53,7 @@ fn a_healthy_recording_separates_a_cause_from_structure() {
                 tolerances_declared: true,
                 experiments: Vec::new(),
                 calibration: Calibration::shipped().unwrap(),
+                linearised: None,
                 progress: &|_, _| {},
             };
             diagnose(question).unwrap().diagnosis

@@ -1,8 +1,8 @@
 //! The best fit of a hypothesis, nuisances and their priors included, and how well it is supported.
 //!
-//! Gauss-Newton on the whitened residuals. What effects do is taken again from runs of the model in each iteration
-//! (they are strong, and bend); what nuisances do is taken once, where nothing is off (they are small), but the
-//! residual is always that of the model itself.
+//! Gauss-Newton on the whitened residuals. The derivatives of effects are taken by runs of the model in each iteration, because effects are
+//! strong and nonlinear; known ones are corrected along each step. Those of nuisances are taken once, because nuisances are small. The residual
+//! is always that of the model itself.
 
 use crate::gap::best_fit::coordinate::{Coordinate, coordinates, parameters, set_parameter};
 use crate::gap::best_fit::normal::{PRIOR_STEPS, normal_matrix, nuisance_products};
@@ -54,10 +54,31 @@ impl Default for Effort {
     }
 }
 
-/// Fits nuisances and effects, starting at `start`.
+/// Start of a fit.
+#[derive(Debug, Clone)]
+pub struct Start {
+    /// Nuisances and effects.
+    pub hypothesis: Hypothesis,
+    /// Their prediction; `None` if the model has not been run there.
+    pub prediction: Option<Prediction>,
+    /// Whitened change for a unit of each effect's search coordinate, which steps correct; empty if each iteration takes it by runs.
+    pub columns: Vec<Vec<f64>>,
+}
+
+impl From<&Fit> for Start {
+    fn from(fit: &Fit) -> Start {
+        Start {
+            hypothesis: fit.hypothesis.clone(),
+            prediction: Some(fit.prediction.clone()),
+            columns: fit.effect_columns.clone(),
+        }
+    }
+}
+
+/// Fits nuisances and effects, starting at a hypothesis.
 ///
 /// # Errors
-/// [`PredictError`] where the model cannot follow at the start itself.
+/// [`PredictError`] if the model cannot follow at the start itself.
 pub fn fit(
     study: &Study,
     linearised: &Linearised,
@@ -65,6 +86,22 @@ pub fn fit(
     selection: &Selection,
     effort: Effort,
 ) -> Result<Fit, PredictError> {
+    let start = Start { hypothesis: start.clone(), prediction: None, columns: Vec::new() };
+    fit_from(study, linearised, &start, selection, effort)
+}
+
+/// Fits nuisances and effects with everything that is known of the start.
+///
+/// # Errors
+/// As [`fit`].
+pub fn fit_from(
+    study: &Study,
+    linearised: &Linearised,
+    start: &Start,
+    selection: &Selection,
+    effort: Effort,
+) -> Result<Fit, PredictError> {
+    let Start { hypothesis: start, prediction, columns } = start;
     let coordinates = coordinates(&study.effects, start);
     let at = coordinates.iter().zip(parameters(start)).map(|(coordinate, value)| coordinate.of(value));
     let unknowns = DVector::from_iterator(
@@ -79,10 +116,15 @@ pub fn fit(
         nuisance_products: nuisance_products(study, linearised, selection),
         coordinates,
         most_sigmas: effort.most_sigmas,
-        effect_columns: Vec::new(),
+        columns_known: !columns.is_empty(),
+        effect_columns: columns.clone(),
+        last: None,
     };
     let until = Until { iterations: effort.iterations, enough: effort.enough };
-    let point = fitted.at_hypothesis(start.clone())?;
+    let point = match prediction {
+        Some(prediction) => fitted.at_prediction(start.clone(), prediction.clone()),
+        None => fitted.at_hypothesis(start.clone())?,
+    };
     let End { unknowns, point, normal, promised } = descend(&mut fitted, unknowns, point, until);
     let Point { hypothesis, prediction, residual } = point;
     let cost = cost_of(&fitted.rows, &residual, &hypothesis);
@@ -115,8 +157,12 @@ struct Fitted<'a> {
     nuisance_products: DMatrix<f64>,
     coordinates: Vec<Coordinate>,
     most_sigmas: f64,
-    /// At the last point at which slopes were taken.
+    /// Whitened changes for a unit of each effect's coordinate.
     effect_columns: Vec<Vec<f64>>,
+    /// Whether they were known at the start, and are only corrected since.
+    columns_known: bool,
+    /// Unknowns and residual of the last point.
+    last: Option<(DVector<f64>, Vec<f64>)>,
 }
 
 struct Point {
@@ -128,10 +174,37 @@ struct Point {
 impl Fitted<'_> {
     fn at_hypothesis(&self, hypothesis: Hypothesis) -> Result<Point, PredictError> {
         let prediction = self.study.predict(&hypothesis)?;
+        Ok(self.at_prediction(hypothesis, prediction))
+    }
+
+    fn at_prediction(&self, hypothesis: Hypothesis, prediction: Prediction) -> Point {
         let residual = self.linearised.residual(self.study, &prediction);
-        Ok(Point { hypothesis, prediction, residual })
+        Point { hypothesis, prediction, residual }
+    }
+
+    /// Corrects the effects' columns along the last step, so that they give the residual that it led to (Broyden 1965). The nuisances'
+    /// columns stay.
+    fn correct_columns(&mut self, unknowns: &DVector<f64>, residual: &[f64]) {
+        let Some((before, residual_before)) = &self.last else { return };
+        let step = unknowns - before;
+        let nuisances = self.linearised.columns.len();
+        let moved = step.rows(nuisances, step.len() - nuisances).norm_squared();
+        let by_nuisances = SHORT * SHORT * (1.0 + step.rows(0, nuisances).norm_squared());
+        let columns = self.linearised.columns.iter().chain(&self.effect_columns);
+        let mut missing: Vec<f64> = residual_before.iter().zip(residual).map(|(b, r)| b - r).collect();
+        for (column, by) in columns.zip(step.iter()).filter(|(_, by)| **by != 0.0) {
+            missing.iter_mut().zip(column).for_each(|(m, c)| *m -= by * c);
+        }
+        for (column, by) in self.effect_columns.iter_mut().zip(step.iter().skip(nuisances)) {
+            let share = by / (moved + by_nuisances);
+            column.iter_mut().zip(&missing).for_each(|(c, m)| *c += share * m);
+        }
     }
 }
+
+/// Step of an effect's coordinate that is as nonlinear as a nuisance's of one sigma: after a short one, most of the change that a line does not
+/// predict is due to the nuisances. Judgement: typical steps are some ten tolerances.
+const SHORT: f64 = 0.1;
 
 impl Model for Fitted<'_> {
     type Point = Point;
@@ -152,17 +225,23 @@ impl Model for Fitted<'_> {
         cost_of(&self.rows, &point.residual, &point.hypothesis)
     }
 
-    fn normal(&mut self, _: &DVector<f64>, point: &Point, reach: Reach) -> Normal {
+    fn normal(&mut self, unknowns: &DVector<f64>, point: &Point, reach: Reach) -> Normal {
         let Point { hypothesis, prediction, residual } = point;
-        let Fitted { study, linearised, coordinates, rows, .. } = self;
         // Near surge the cost has small steps: a slope taken over more of the way sees past them.
-        let mut columns = changes_near(study, hypothesis, prediction, coordinates, reach.distance());
-        columns.iter_mut().for_each(|column| linearised.whiten(study, column));
-        let matrix = normal_matrix(rows, linearised, &self.nuisance_products, &columns);
+        if reach == Reach::Coarse || !self.columns_known {
+            let Fitted { study, linearised, coordinates, .. } = self;
+            let mut columns = changes_near(study, hypothesis, prediction, coordinates, reach.distance());
+            columns.iter_mut().for_each(|column| linearised.whiten(study, column));
+            self.effect_columns = columns;
+        } else {
+            self.correct_columns(unknowns, residual);
+        }
+        self.last = Some((unknowns.clone(), residual.clone()));
+        let Fitted { linearised, rows, effect_columns, .. } = self;
+        let matrix = normal_matrix(rows, linearised, &self.nuisance_products, effect_columns);
         let ask = |column: &Vec<f64>| dot_over(rows, column, residual);
         let pulled = linearised.columns.iter().zip(&hypothesis.nuisances).map(|(c, sigmas)| ask(c) - sigmas);
-        let pull = DVector::from_iterator(matrix.nrows(), pulled.chain(columns.iter().map(ask)));
-        self.effect_columns = columns;
+        let pull = DVector::from_iterator(matrix.nrows(), pulled.chain(effect_columns.iter().map(ask)));
         Normal { matrix, pull }
     }
 
@@ -212,7 +291,7 @@ pub(crate) fn changes_near(
             let (next, step) = coordinate.next_to(*value, distance);
             let mut moved = hypothesis.clone();
             set_parameter(&mut moved, place, next);
-            match study.predict(&moved) {
+            match study.predict_near(&moved, here) {
                 Ok(there) if step != 0.0 => {
                     there.values.iter().zip(&here.values).map(|(t, h)| (t - h) / step).collect()
                 }

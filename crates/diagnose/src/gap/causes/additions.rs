@@ -1,15 +1,16 @@
 //! Closed-form effect of adding one more effect to a fit.
 
 use crate::gap::best_fit::coordinate::Coordinate;
-use crate::gap::best_fit::fit::Fit;
+use crate::gap::best_fit::fit::{Fit, Start};
 use crate::gap::best_fit::projector::Projector;
 use crate::gap::best_fit::selection::Selection;
-use crate::gap::residuals::study::{Hypothesis, Study, members};
+use crate::gap::residuals::study::{Study, members};
 use crate::gap::residuals::whiten::{Linearised, rows_of_step};
 use mapper_numerics::parallel;
 use mapper_physics::rig::effect::EffectParameter;
 use nalgebra::DVector;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Result of adding one more effect to a fit.
 #[derive(Debug)]
@@ -19,7 +20,7 @@ pub struct Addition {
     /// Linear estimate of the cost reduction.
     pub gain: f64,
     /// Start of a fit.
-    pub start: Hypothesis,
+    pub start: Start,
 }
 
 /// Maximum trusted linear step, as a multiple of the step taken; effects are nonlinear.
@@ -82,19 +83,25 @@ struct FitNeighbourhood<'a> {
 }
 
 impl FitNeighbourhood<'_> {
-    fn with(&self, effect: usize, values: Vec<f64>) -> Hypothesis {
-        let mut start = self.base.hypothesis.clone();
-        start.effects.push((effect, values));
+    fn with(&self, effect: usize, values: Vec<f64>) -> Start {
+        let mut hypothesis = self.base.hypothesis.clone();
+        hypothesis.effects.push((effect, values));
+        Start { hypothesis, prediction: None, columns: Vec::new() }
+    }
+
+    /// The same with one value and its known change, by which the parameter's coordinate moves by `by`.
+    fn with_change(&self, effect: usize, value: f64, change: &[f64], by: f64) -> Start {
+        let mut start = self.with(effect, vec![value]);
+        if by != 0.0 && by.is_finite() {
+            start.columns = self.base.effect_columns.clone();
+            start.columns.push(change.iter().map(|c| c / by).collect());
+        }
         start
     }
 
     /// Whitened change due to an effect's values.
-    fn change(&self, effect: usize, values: Vec<f64>) -> Option<Vec<f64>> {
-        let there = self.study.predict(&self.with(effect, values)).ok()?;
-        let mut change: Vec<f64> =
-            there.values.iter().zip(&self.base.prediction.values).map(|(t, b)| t - b).collect();
-        self.linearised.whiten(self.study, &mut change);
-        Some(change)
+    fn change(&self, effect: usize, values: Vec<f64>) -> Option<Arc<Vec<f64>>> {
+        self.linearised.change(self.study, effect, values)
     }
 
     /// Squared length of a change and its product with the residual, with nuisances free.
@@ -106,15 +113,15 @@ impl FitNeighbourhood<'_> {
 
     /// An effect with several parameters, from one of their values.
     fn at(&self, effect: usize, values: Vec<f64>) -> Option<Addition> {
-        let (own, seen) = self.products(&self.change(effect, values.clone())?);
+        let (own, seen) = self.products(self.change(effect, values.clone())?.as_slice());
         let gain = if own > 1e-9 && seen > 0.0 { seen * seen / own } else { 0.0 };
         Some(Addition { effect, gain, start: self.with(effect, values) })
     }
 
     /// An effect with one parameter.
     fn at_one(&self, effect: usize, parameter: &EffectParameter) -> Option<Addition> {
-        let (step, _, products) = self.line(effect, parameter)?;
-        Some(self.along(effect, parameter, step, products))
+        let (step, change, products) = self.line(effect, parameter)?;
+        Some(self.along(effect, parameter, step, &change, products))
     }
 
     /// The same effect from each onset.
@@ -133,14 +140,14 @@ impl FitNeighbourhood<'_> {
             }
             let products = self.products(&masked);
             if products.0 > 1.0 {
-                found.push(self.along(late, parameter, step, products));
+                found.push(self.along(late, parameter, step, &masked, products));
             }
         }
         found
     }
 
     /// A step of the parameter to the side that the data suggest, with its change and products.
-    fn line(&self, effect: usize, parameter: &EffectParameter) -> Option<(f64, Vec<f64>, (f64, f64))> {
+    fn line(&self, effect: usize, parameter: &EffectParameter) -> Option<Line> {
         let step_to =
             |by: f64| (parameter.neutral + by).clamp(parameter.low, parameter.high) - parameter.neutral;
         let step = step_to(parameter.typical_step);
@@ -165,6 +172,7 @@ impl FitNeighbourhood<'_> {
         effect: usize,
         parameter: &EffectParameter,
         step: f64,
+        change: &[f64],
         (own, seen): (f64, f64),
     ) -> Addition {
         let at = |share: f64| (parameter.neutral + share * step).clamp(parameter.low, parameter.high);
@@ -173,13 +181,18 @@ impl FitNeighbourhood<'_> {
         let gain = 2.0 * share * seen - share * share * own;
         let off = if wanted < 0.0 { wanted.min(-OFF_NEUTRAL) } else { wanted.max(OFF_NEUTRAL) };
         let off = if at(off) == parameter.neutral { OFF_NEUTRAL } else { off };
-        Addition {
-            effect,
-            gain: if step == 0.0 { 0.0 } else { gain },
-            start: self.with(effect, vec![at(off)]),
-        }
+        let coordinate = Coordinate::new(parameter);
+        let by = coordinate.of(parameter.neutral + step) - coordinate.of(parameter.neutral);
+        // A weak effect starts at neutral, where the prediction is known.
+        let weak = wanted.abs() <= 1.0 && !coordinate.is_logarithmic();
+        let mut start = self.with_change(effect, if weak { parameter.neutral } else { at(off) }, change, by);
+        start.prediction = weak.then(|| self.base.prediction.clone());
+        Addition { effect, gain: if step == 0.0 { 0.0 } else { gain }, start }
     }
 }
+
+/// A step of a parameter, its whitened change, and the products of [`FitNeighbourhood::products`].
+type Line = (f64, Arc<Vec<f64>>, (f64, f64));
 
 /// Search starts for an effect of several parameters: the corners of the inner part of their ranges.
 fn corners(parameters: &[EffectParameter]) -> Vec<Vec<f64>> {

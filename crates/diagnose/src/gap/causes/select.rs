@@ -1,12 +1,12 @@
 //! Which effects explain a recording best: the causes of [`mapper_inference::search`], fitted by runs of the model.
 
 use crate::gap::best_fit::coordinate::Coordinate;
-use crate::gap::best_fit::fit::{Effort, Fit, fit};
+use crate::gap::best_fit::fit::{Effort, Fit, Start, fit, fit_from};
 use crate::gap::best_fit::selection::Selection;
 use crate::gap::causes::additions::{Addition, additions, onset_additions};
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::weigh::{prior, weight};
-use crate::gap::residuals::study::{Hypothesis, PredictError, Study, members};
+use crate::gap::residuals::study::{PredictError, Study, members};
 use crate::gap::residuals::whiten::Linearised;
 use mapper_core::half_width_95;
 use mapper_inference::hypotheses::MAX_MEMBERS;
@@ -82,7 +82,7 @@ pub fn search(search: Search<'_>, progress: &dyn Fn(f64, &str)) -> Result<Search
     let untouched = fit(study, linearised, &study.nothing(), selection, Effort { iterations: 1, ..QUICK })?;
     let mut singles = additions(study, linearised, selection, &untouched);
     singles.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    let singles: Vec<Start> = singles.into_iter().take(SINGLES).map(|a| (a.start, QUICK)).collect();
+    let singles: Vec<(Start, Effort)> = singles.into_iter().take(SINGLES).map(|a| (a.start, QUICK)).collect();
     let mut known = Known::default();
     known.keep(&search, null.clone());
     known.fit_all(&search, &singles);
@@ -115,15 +115,16 @@ pub fn search_onsets(search: Search<'_>, null: &Fit, fits: &mut Vec<Fit>) {
 
 /// Fits the best few again, more thoroughly.
 fn again(search: &Search<'_>, known: &mut Known<Fit>, count: usize, effort: Effort) {
-    let best: Vec<Start> =
-        known.ranked(search).into_iter().take(count).map(|fit| (fit.hypothesis, effort)).collect();
+    let best: Vec<(Start, Effort)> =
+        known.ranked(search).iter().take(count).map(|fit| (Start::from(fit), effort)).collect();
     known.fit_all(search, &best);
 }
 
 /// Fits of these hypotheses again, most probable first; of the same effects the more probable one.
 pub fn refit(search: &Search<'_>, fits: &[&Fit], effort: Effort) -> Vec<Fit> {
     let mut known = Known::default();
-    let starts: Vec<Start> = fits.iter().map(|fit| (fit.hypothesis.clone(), effort)).collect();
+    let afresh = |fit: &&Fit| Start { columns: Vec::new(), ..Start::from(*fit) };
+    let starts: Vec<(Start, Effort)> = fits.iter().map(|fit| (afresh(fit), effort)).collect();
     known.fit_all(search, &starts);
     known.ranked(search)
 }
@@ -135,12 +136,9 @@ pub fn ranked<'a>(search: &Search<'_>, fits: impl Iterator<Item = &'a Fit>) -> V
     known.ranked(search)
 }
 
-/// A hypothesis, and how thoroughly it is fitted.
-type Start = (Hypothesis, Effort);
-
 impl Causes for Search<'_> {
     type Fit = Fit;
-    type Start = Start;
+    type Start = (Start, Effort);
 
     fn members(&self, fit: &Fit) -> Vec<usize> {
         members(&fit.hypothesis)
@@ -154,10 +152,10 @@ impl Causes for Search<'_> {
         weight(self.calibration, self.study, fit)
     }
 
-    fn offers(&self, base: &Fit) -> Vec<Offer<Start>> {
+    fn offers(&self, base: &Fit) -> Vec<Offer<Self::Start>> {
         let before = prior(self.calibration, self.study, &base.hypothesis);
         let offer = |addition: Addition| {
-            let prior = prior(self.calibration, self.study, &addition.start);
+            let prior = prior(self.calibration, self.study, &addition.start.hypothesis);
             Offer {
                 cause: addition.effect,
                 ln_gain: 0.5 * addition.gain + prior - before,
@@ -168,14 +166,22 @@ impl Causes for Search<'_> {
         look(self.study, self.linearised, self.selection, base).into_iter().map(offer).collect()
     }
 
-    fn without(&self, fit: &Fit, cause: usize) -> Start {
-        let mut start = fit.hypothesis.clone();
-        start.effects.retain(|(index, _)| *index != cause);
+    fn without(&self, fit: &Fit, cause: usize) -> (Start, Effort) {
+        let mut start = Start { prediction: None, ..Start::from(fit) };
+        let mut place = 0;
+        for (index, values) in &fit.hypothesis.effects {
+            if *index == cause {
+                start.columns.drain(place..place + values.len());
+            } else {
+                place += values.len();
+            }
+        }
+        start.hypothesis.effects.retain(|(index, _)| *index != cause);
         (start, EFFORT)
     }
 
-    fn fit(&self, (start, effort): &Start) -> Option<Fit> {
-        let fitted = fit(self.study, self.linearised, start, self.selection, *effort).ok()?;
+    fn fit(&self, (start, effort): &(Start, Effort)) -> Option<Fit> {
+        let fitted = fit_from(self.study, self.linearised, start, self.selection, *effort).ok()?;
         does_something(self.study, &fitted).then_some(fitted)
     }
 
@@ -198,8 +204,9 @@ pub fn supported(search: &Search<'_>, fits: Vec<Fit>) -> Vec<Fit> {
         }
         let onset =
             fit.hypothesis.effects.iter().position(|(index, _)| study.courses[*index].onset().is_some());
-        let mut start = fit.hypothesis.clone();
-        start.effects[onset?].0 = study.family(start.effects[onset?].0);
+        let mut hypothesis = fit.hypothesis.clone();
+        hypothesis.effects[onset?].0 = study.family(hypothesis.effects[onset?].0);
+        let start = Start { hypothesis, prediction: None, columns: Vec::new() };
         let throughout = search.fit(&(start, EFFORT))?;
         (search.ln_odds(fit) - search.ln_odds(&throughout) < search.calibration.threshold)
             .then_some(throughout)

@@ -14,9 +14,9 @@ use mapper_numerics::parallel;
 use mapper_numerics::statistics::NORMAL_95;
 use mapper_physics::rig::effect::{EffectInfo, EffectParameter};
 
-/// Maximum number of runs to find a size, and the tolerance in the logarithm of the length.
+/// Maximum number of runs to find a size, and the tolerance in the logarithm of the length: a tenth of a size is no reason to plan otherwise.
 const LOOKS: usize = 6;
-const NEAR: f64 = 0.05;
+const NEAR: f64 = 0.1;
 /// Length of a signature, in sigmas, that is none: rounding.
 pub const NO_LENGTH: f64 = 1e-6;
 
@@ -109,12 +109,7 @@ pub fn smallest_seen(study: &Study, linearised: &Linearised, calibration: &Calib
         let smallest = smallest_size(parameter, against, |value| {
             // With several parameters, the others are a typical step from neutral.
             let typical = others.iter().map(|p| (p.neutral + p.typical_step).clamp(p.low, p.high));
-            let mut there = study.nothing();
-            there.effects = vec![(*index, typical.chain([value]).collect())];
-            let there = study.predict(&there).ok()?;
-            let mut change: Vec<f64> =
-                there.values.iter().zip(&linearised.base.values).map(|(t, b)| t - b).collect();
-            linearised.whiten(study, &mut change);
+            let change = linearised.change(study, *index, typical.chain([value]).collect())?;
             let right = projector.right(&change);
             Some(projector.product(&change, &right, &change, &right).max(0.0).sqrt())
         })?;

@@ -2,7 +2,7 @@
 
 use crate::gap::best_fit::adequacy::misfit_of_steps;
 use crate::gap::best_fit::first_step::with_start_read;
-use crate::gap::best_fit::fit::{Effort, Fit, fit};
+use crate::gap::best_fit::fit::{Effort, Fit, Start, fit_from};
 use crate::gap::best_fit::selection::{Selection, dot_over};
 use crate::gap::findings::report::{ChannelGap, Gap, PointGap};
 use crate::gap::gap_reduction::folds::Folds;
@@ -105,7 +105,7 @@ fn unseen(compared: Compared<'_>, folds: &Folds) -> (Unseen, Unseen) {
             Some(cause) => (at_best, causes[cause]),
         };
         // If a fold cannot be fitted, it keeps the fit to all steps.
-        let fitted = fit(study, linearised, &whole.hypothesis, &selection, EFFORT);
+        let fitted = fit_from(study, linearised, &Start::from(whole), &selection, EFFORT);
         let fitted = fitted.unwrap_or_else(|_| whole.clone());
         if selection.steps[0] { fitted } else { with_start_read(study, linearised, fitted) }
     });

@@ -1,7 +1,7 @@
 //! Tolerances that end outside their prior.
 
 use crate::gap::best_fit::first_step::is_start;
-use crate::gap::best_fit::fit::{Effort, Fit, MAX_SIGMAS, fit};
+use crate::gap::best_fit::fit::{Effort, Fit, MAX_SIGMAS, fit_from};
 use crate::gap::best_fit::selection::Selection;
 use crate::gap::findings::report::Strained;
 use crate::gap::residuals::nuisance::NuisanceKind;
@@ -18,7 +18,7 @@ const UNLIMITED: Effort = Effort { iterations: 8, enough: 0.5, most_sigmas: 1e3 
 pub fn beyond_prior(study: &Study, linearised: &Linearised, fitted: &Fit) -> Vec<Strained> {
     let limited = fitted.hypothesis.nuisances.iter().any(|sigmas| sigmas.abs() > 0.999 * MAX_SIGMAS);
     let freed = limited
-        .then(|| fit(study, linearised, &fitted.hypothesis, &Selection::all(study), UNLIMITED).ok())
+        .then(|| fit_from(study, linearised, &fitted.into(), &Selection::all(study), UNLIMITED).ok())
         .flatten();
     let nuisances = &freed.as_ref().unwrap_or(fitted).hypothesis.nuisances;
     let mut beyond: Vec<Strained> = study

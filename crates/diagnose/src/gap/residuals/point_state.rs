@@ -43,7 +43,7 @@ impl Study {
     /// Walls and flows along the recording, as measured, or as the nominal machine has them; empty if that cannot follow.
     fn surroundings_course(&self) -> SurroundingsCourse {
         let mut course = SurroundingsCourse { t_s: self.times_s.clone(), rows: Vec::new() };
-        let drive = self.drive(&self.nothing(), &self.times_s, |_, _, _, state, outputs| {
+        let drive = self.drive(&self.nothing(), &self.times_s, |_, _, state, outputs| {
             course.rows.push([state.tc_k, outputs.flow_kg_s, state.tt_k, outputs.turbine_flow_kg_s]);
         });
         if drive.is_err() {
@@ -69,7 +69,7 @@ impl Study {
         hypothesis: &Hypothesis,
     ) -> Result<Vec<Vec<(f64, f64)>>, PredictError> {
         let mut positions = vec![Vec::new(); self.steps.len()];
-        self.drive(hypothesis, &self.times_s, |index, _, _, _, outputs| {
+        self.drive(hypothesis, &self.times_s, |index, _, _, outputs| {
             if let Some((step, block)) = self.places[index] {
                 let since_s = self.steps[step].blocks[block].since_jump_s;
                 positions[step].push((since_s, outputs.surge_position_ratio));
@@ -107,7 +107,7 @@ impl Study {
             rigs.push(of_step?);
         }
         let mut points = vec![(PointState::default(), Vec::new()); times_s.len()];
-        self.drive(hypothesis, &times_s, |index, _, prepared, state, outputs| {
+        self.drive(hypothesis, &times_s, |index, prepared, state, outputs| {
             let other_point = |(rig, _): &(Rig, Circumstances)| {
                 let outputs = rig.model.prepare(prepared.boundary()).evaluate(state);
                 PointState::of(state, &outputs)

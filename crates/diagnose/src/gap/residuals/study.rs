@@ -3,26 +3,22 @@
 use crate::gap::residuals::actuators::Actuators;
 use crate::gap::residuals::effect_timing::Course;
 pub use crate::gap::residuals::hypothesis::{EffectValues, Hypothesis, members};
-use crate::gap::residuals::initial_state::{rested, with_metal_held};
+use crate::gap::residuals::initial_state::rested;
+use crate::gap::residuals::machine_run::{MachineRun, acts_on_machine};
 use crate::gap::residuals::nuisance::{Circumstances, Nuisance, OUTPUTS, apply, nuisances};
 use crate::gap::residuals::shape::{SHAPES, ShapedMap};
 use crate::gap::residuals::true_inputs::SurroundingsCourse;
 use mapper_core::{Channel, Recording, StepMarker};
 use mapper_observe::averages::block::{Block, block_mean, blocks};
-use mapper_observe::averages::mean_reading::mean_reading;
 use mapper_observe::averages::schedule::Schedule;
 use mapper_observe::averages::time_table::Table;
 use mapper_observe::channels::DRIVERS;
 use mapper_observe::declared::Declared;
-use mapper_observe::initial_state::estimate_state;
-use mapper_observe::model_inputs::lagged_command::{LaggedCommand, Response};
 use mapper_observe::model_inputs::smoothed_inputs::SmoothedInputs;
 use mapper_observe::model_inputs::step_timing::{Times, with_command_times};
 use mapper_physics::rig::effect::{Effect, EffectError, EffectParameter, Rig, add};
-use mapper_physics::rig::instruments::ChannelFollower;
-use mapper_physics::simulation::driven::{DriveError, FrozenGrid, drive, settle};
-use mapper_physics::simulation::inputs::Inputs;
-use mapper_physics::simulation::model::{Model, Outputs, PreparedModel, State};
+use mapper_physics::simulation::driven::{DriveError, FrozenGrid};
+use mapper_physics::simulation::model::Model;
 use nalgebra::DMatrix;
 use std::sync::{Arc, OnceLock};
 
@@ -57,6 +53,8 @@ pub struct Prediction {
     pub values: Vec<f64>,
     /// Their slopes, unit/s.
     pub slopes: Vec<f64>,
+    /// The machine's run behind it.
+    pub(crate) run: Arc<MachineRun>,
 }
 
 /// Errors that prevent a prediction.
@@ -85,6 +83,8 @@ pub struct Study {
     pub effects: Vec<Arc<dyn Effect>>,
     /// When each effect acts.
     pub courses: Vec<Course>,
+    /// Whether each effect changes the machine or its inputs, and not only sensors of its outputs.
+    pub(crate) on_machine: Vec<bool>,
     /// Number of library effects; they are followed by candidates that begin with a step.
     pub catalogue: usize,
     /// Nuisance parameters.
@@ -100,8 +100,8 @@ pub struct Study {
     /// Scatter of the sample times, s: it adds uncertainty to moving quantities.
     pub scatter_s: f64,
     /// Whether the metal had settled when the recording began.
-    rested: bool,
-    grid: FrozenGrid,
+    pub(crate) rested: bool,
+    pub(crate) grid: FrozenGrid,
     /// Times at which the model is evaluated: two per block, and one at each jump.
     pub(crate) times_s: Vec<f64>,
     /// Step and block of each time; `None` at a jump.
@@ -232,6 +232,7 @@ impl Study {
         Study {
             nuisances: nuisances(&declared),
             courses: vec![Course::Throughout; effects.len()],
+            on_machine: effects.iter().map(|effect| acts_on_machine(&nominal, effect.as_ref())).collect(),
             catalogue: effects.len(),
             actuators,
             scatter_s: times.scatter_s,
@@ -300,149 +301,8 @@ impl Study {
         Some(self.rig(hypothesis, last).ok()?.0.instruments.path(channel).offset)
     }
 
-    /// Segments of steps with a constant rig under a hypothesis: the first step of each.
-    fn stretches(&self, hypothesis: &Hypothesis) -> Vec<usize> {
-        let shares = |step: usize| {
-            hypothesis
-                .effects
-                .iter()
-                .map(move |(index, _)| self.courses[*index].share(step, self.steps.len()))
-        };
-        let steady = hypothesis.effects.iter().all(|(index, _)| self.courses[*index] == Course::Throughout);
-        let last = if steady { 1 } else { self.steps.len().max(1) };
-        (0..last).filter(|step| *step == 0 || !shares(*step).eq(shares(step - 1))).collect()
-    }
-
-    /// Drives the model of a hypothesis through the recording. `on_sample` receives the index of each of `times_s`, the rig, its
-    /// circumstances, and the model state.
-    pub(crate) fn drive(
-        &self,
-        hypothesis: &Hypothesis,
-        times_s: &[f64],
-        on_sample: impl FnMut(usize, &(Rig, Circumstances), &PreparedModel<'_>, &State, &Outputs),
-    ) -> Result<(), PredictError> {
-        self.drive_rigs(hypothesis, |step| self.rig(hypothesis, step), times_s, on_sample)
-    }
-
-    /// The same for a rig that differs from that of the hypothesis and changes where it does.
-    fn drive_rigs(
-        &self,
-        hypothesis: &Hypothesis,
-        rig_in: impl Fn(usize) -> Result<(Rig, Circumstances), EffectError>,
-        times_s: &[f64],
-        mut on_sample: impl FnMut(usize, &(Rig, Circumstances), &PreparedModel<'_>, &State, &Outputs),
-    ) -> Result<(), PredictError> {
-        let stretches = self.stretches(hypothesis);
-        let mut state: Option<State> = None;
-        let mut done = 0;
-        for (place, first) in stretches.iter().enumerate() {
-            let there = rig_in(*first)?;
-            let (rig, circumstances) = &there;
-            let inputs = self.true_inputs(circumstances);
-            let start = match state {
-                None => self.start(rig, &inputs, circumstances)?,
-                Some(state) => state,
-            };
-            let sample = |index: usize, prepared: &PreparedModel<'_>, state: &State, outputs: &Outputs| {
-                on_sample(done + index, &there, prepared, state, outputs);
-            };
-            let Some(next) = stretches.get(place + 1) else {
-                if stretches.len() == 1 {
-                    drive(&rig.model, &inputs, start, &self.grid, times_s, sample)?;
-                } else {
-                    let grid = self.grid.part(self.steps[*first].marker.start_s, f64::INFINITY);
-                    drive(&rig.model, &inputs, start, &grid, &times_s[done..], sample)?;
-                }
-                break;
-            };
-            let end_s = self.steps[*next].marker.start_s;
-            let from_s = if place == 0 { f64::NEG_INFINITY } else { self.steps[*first].marker.start_s };
-            let until = times_s.partition_point(|t| *t <= end_s);
-            let grid = self.grid.part(from_s, end_s);
-            let mut ended = drive(&rig.model, &inputs, start, &grid, &times_s[done..until], sample)?;
-            done = until;
-            // An instantaneous probe has no state until a slow probe replaces it.
-            if rig.model.params.t2_probe_diameter_m == 0.0 {
-                let boundary = inputs.at(end_s - 1e-6);
-                ended.t2_tip_k = rig.model.prepare(&boundary).evaluate(&ended).t2_k;
-            }
-            state = Some(ended);
-        }
-        Ok(())
-    }
-
-    /// Readings of the outputs of these rigs at `times_s`; `on_reading` receives the index of the time, of the output, and the reading.
-    pub(crate) fn read(
-        &self,
-        hypothesis: &Hypothesis,
-        rig_in: impl Fn(usize) -> Result<(Rig, Circumstances), EffectError>,
-        times_s: &[f64],
-        mut on_reading: impl FnMut(usize, usize, f64, &Circumstances),
-    ) -> Result<(), PredictError> {
-        let mut followers =
-            OUTPUTS.map(|channel| ChannelFollower::new(*self.nominal.instruments.path(channel)));
-        let mut command: Option<LaggedCommand> = None;
-        self.drive_rigs(
-            hypothesis,
-            rig_in,
-            times_s,
-            |index, (rig, circumstances), prepared, state, outputs| {
-                let t_s = times_s[index];
-                if command.as_ref().is_none_or(|command| command.p3.lag_s != rig.instruments.p3_lag_s) {
-                    let p3 = Response { lag_s: rig.instruments.p3_lag_s, ..self.actuators.p3 };
-                    let levels = self.inputs.command.levels().to_vec();
-                    command = Some(LaggedCommand::new(levels, p3, self.actuators.valve));
-                }
-                for (output, channel) in OUTPUTS.iter().enumerate() {
-                    let seen = match &command {
-                        Some(command) if *channel == Channel::P3 => command.p3_pa(t_s),
-                        _ => {
-                            rig.instruments.at_sensor(*channel, prepared, state, outputs).unwrap_or(f64::NAN)
-                        }
-                    };
-                    // T4 is T3' minus a temperature drop that is known only to a few per cent.
-                    let seen = if *channel == Channel::T4 {
-                        seen - circumstances.t4_drop_ratio
-                            * (outputs.turbine.t3_prime_k - outputs.turbine.t4_k)
-                    } else {
-                        seen
-                    };
-                    followers[output].turn_to(*rig.instruments.path(*channel));
-                    on_reading(index, output, followers[output].read(t_s, seen), circumstances);
-                }
-            },
-        )
-    }
-
-    /// Predicts the recording.
-    ///
-    /// # Errors
-    /// [`PredictError`] if a value is out of its range or the model cannot follow.
-    pub fn predict(&self, hypothesis: &Hypothesis) -> Result<Prediction, PredictError> {
-        let mut values = vec![0.0; self.measured.len()];
-        let mut delay_s = [0.0; OUTPUTS.len()];
-        let rig_in = |step| self.rig(hypothesis, step);
-        self.read(hypothesis, rig_in, &self.times_s, |index, output, reading, circumstances| {
-            delay_s = circumstances.delay_s;
-            let Some((step, block)) = self.places[index] else { return };
-            let Some(row) = self.rows[step][block][output] else { return };
-            let single = self.steps[step].blocks[block].spread_s == 0.0;
-            values[row as usize] += if single { reading } else { 0.5 * reading };
-        })?;
-        let slopes = self.slopes(&values);
-        for group in &self.groups {
-            let delay_s = delay_s[group.output];
-            if delay_s != 0.0 {
-                for row in group.rows.clone() {
-                    values[row] -= delay_s * slopes[row];
-                }
-            }
-        }
-        Ok(Prediction { values, slopes })
-    }
-
     /// Slopes of predicted values, from block to block.
-    fn slopes(&self, values: &[f64]) -> Vec<f64> {
+    pub(crate) fn slopes(&self, values: &[f64]) -> Vec<f64> {
         let mut slopes = vec![0.0; values.len()];
         for group in &self.groups {
             let time = |i: usize| self.steps[group.step].blocks[group.blocks[i]].mean_s;
@@ -456,29 +316,5 @@ impl Study {
             }
         }
         slopes
-    }
-
-    /// Settled state under the first inputs, shifted by the circumstances. If the metal had not settled when the recording began, its
-    /// measured temperature is kept.
-    fn start(
-        &self,
-        rig: &Rig,
-        inputs: &impl Inputs,
-        circumstances: &Circumstances,
-    ) -> Result<State, DriveError> {
-        let start_s = self.grid.nodes_s().first().copied().unwrap_or(0.0);
-        let boundary = inputs.at(start_s);
-        // Not from the very start of the recording, where the machine may still be at standstill.
-        let read = |channel: Channel| {
-            let column = &self.table.column(channel)?[self.table.range(start_s, f64::INFINITY)];
-            mean_reading(&column.iter().copied().filter(|v| v.is_finite()).take(20).collect::<Vec<_>>())
-        };
-        let guess = estimate_state(&boundary, read);
-        let held = (!self.rested).then(|| with_metal_held(&rig.model));
-        let mut start = settle(held.as_ref().unwrap_or(&rig.model), &boundary, guess)?;
-        for (knob, by) in &circumstances.knobs {
-            knob.start(&mut start, *by);
-        }
-        Ok(start)
     }
 }

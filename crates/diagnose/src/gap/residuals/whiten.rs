@@ -10,12 +10,14 @@ use mapper_observe::model_inputs::smoothed_inputs::InputNoise;
 use mapper_observe::perturbation::UNINFORMATIVE;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
-/// The study linearised at the nominal model: predictions, whitening, and nuisance derivatives.
+/// The study linearised at a hypothesis: prediction, whitening, derivatives of nuisances, and changes due to effects.
 #[derive(Debug)]
 pub struct Linearised {
-    /// Prediction of the nominal model.
+    /// Where.
+    hypothesis: Hypothesis,
+    /// Prediction there.
     pub base: Prediction,
     /// Noise model.
     noise: Noise,
@@ -23,7 +25,12 @@ pub struct Linearised {
     pub columns: Vec<Vec<f64>>,
     /// Products of the columns, for each step.
     pub products: Vec<DMatrix<f64>>,
+    /// Whitened changes due to further effects, as far as they were requested: by effect and bits of its values.
+    further: Mutex<BTreeMap<(usize, Vec<u64>), Change>>,
 }
+
+/// A whitened change; `None` if the model cannot follow.
+type Change = Option<Arc<Vec<f64>>>;
 
 /// Noise of the values of each group.
 #[derive(Debug, Clone)]
@@ -54,9 +61,9 @@ impl Linearised {
     pub fn new(study: &Study) -> Result<Linearised, PredictError> {
         let nothing = study.nothing();
         let base = study.predict(&nothing)?;
-        let changes = changes(study, &nothing, &base);
+        let changes = nuisance_changes(study, &nothing, &base);
         let noise = Noise::new(covariances(study, &nothing, &base, &changes));
-        Ok(Linearised::with(study, base, changes, noise))
+        Ok(Linearised::with(study, nothing, base, changes, noise))
     }
 
     /// Whitening by the noise of the outputs alone, without derivatives.
@@ -67,7 +74,7 @@ impl Linearised {
         let nothing = study.nothing();
         let base = study.predict(&nothing)?;
         let noise = Noise::new(covariances(study, &nothing, &base, &[]));
-        Ok(Linearised { base, noise, columns: Vec::new(), products: Vec::new() })
+        Ok(Linearised::without_columns(nothing, base, noise))
     }
 
     /// Linearises at a hypothesis and keeps the whitening.
@@ -76,12 +83,23 @@ impl Linearised {
     /// [`PredictError`] if the model cannot follow there.
     pub fn at(&self, study: &Study, hypothesis: &Hypothesis) -> Result<Linearised, PredictError> {
         let base = study.predict(hypothesis)?;
-        let changes = changes(study, hypothesis, &base);
-        Ok(Linearised::with(study, base, changes, self.noise.clone()))
+        let changes = nuisance_changes(study, hypothesis, &base);
+        Ok(Linearised::with(study, hypothesis.clone(), base, changes, self.noise.clone()))
     }
 
-    fn with(study: &Study, base: Prediction, mut columns: Vec<Vec<f64>>, noise: Noise) -> Linearised {
-        let mut linearised = Linearised { base, noise, columns: Vec::new(), products: Vec::new() };
+    fn without_columns(hypothesis: Hypothesis, base: Prediction, noise: Noise) -> Linearised {
+        let (columns, products) = (Vec::new(), Vec::new());
+        Linearised { hypothesis, base, noise, columns, products, further: Mutex::default() }
+    }
+
+    fn with(
+        study: &Study,
+        hypothesis: Hypothesis,
+        base: Prediction,
+        mut columns: Vec<Vec<f64>>,
+        noise: Noise,
+    ) -> Linearised {
+        let mut linearised = Linearised::without_columns(hypothesis, base, noise);
         for column in &mut columns {
             linearised.whiten(study, column);
         }
@@ -89,6 +107,30 @@ impl Linearised {
             (0..study.steps.len()).map(|step| products_of_step(study, &columns, step)).collect();
         linearised.columns = columns;
         linearised
+    }
+
+    /// Whitened change due to one effect more, instead of one of the same family. It is computed once: near the hypothesis, effects change
+    /// each other's changes by little.
+    pub(crate) fn change(&self, study: &Study, effect: usize, values: Vec<f64>) -> Change {
+        let key = (effect, values.iter().map(|value| value.to_bits()).collect());
+        let known = || self.further.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(change) = known().get(&key) {
+            return change.clone();
+        }
+        let mut base = self.hypothesis.clone();
+        base.effects.retain(|(index, _)| study.family(*index) != effect);
+        let mut with = base.clone();
+        with.effects.push((effect, values));
+        let change = || {
+            let base = study.predict_near(&base, &self.base).ok()?;
+            let with = study.predict_near(&with, &base).ok()?;
+            let mut change: Vec<f64> = with.values.iter().zip(&base.values).map(|(w, b)| w - b).collect();
+            self.whiten(study, &mut change);
+            Some(Arc::new(change))
+        };
+        let change = change();
+        known().insert(key, change.clone());
+        change
     }
 
     /// Whitens a vector in the residuals' layout, in place.
@@ -126,7 +168,7 @@ impl Linearised {
 }
 
 /// Change per sigma of each nuisance at a hypothesis, computed in parallel.
-fn changes(study: &Study, here: &Hypothesis, base: &Prediction) -> Vec<Vec<f64>> {
+pub(crate) fn nuisance_changes(study: &Study, here: &Hypothesis, base: &Prediction) -> Vec<Vec<f64>> {
     let indices: Vec<usize> = (0..study.nuisances.len()).collect();
     parallel::map(&indices, |index| {
         let nuisance = study.nuisances[*index];
@@ -143,7 +185,7 @@ fn changes(study: &Study, here: &Hypothesis, base: &Prediction) -> Vec<Vec<f64>>
         // Step towards the centre, so that a nuisance at its limit stays within it.
         let step = if here.nuisances[*index] > 0.0 { -1.0 } else { 1.0 };
         moved.nuisances[*index] += step;
-        match study.predict(&moved) {
+        match study.predict_near(&moved, base) {
             Ok(there) => {
                 there.values.iter().zip(&base.values).map(|(there, here)| (there - here) / step).collect()
             }

@@ -1,6 +1,6 @@
 //! A law as a hypothesis: its coefficients are fitted by model runs, together with tolerances and any other effects.
 
-use crate::gap::best_fit::fit::{Effort, Fit, fit};
+use crate::gap::best_fit::fit::{Effort, Fit, fit, fit_from};
 use crate::gap::best_fit::selection::Selection;
 use crate::gap::residuals::study::{Hypothesis, Study};
 use crate::gap::residuals::whiten::Linearised;
@@ -88,7 +88,7 @@ impl Bench {
         effort: Effort,
     ) -> Vec<Candidate> {
         let fitted = parallel::map(candidates, |candidate| {
-            let fit = fit(&self.study, linearised, &candidate.fit.hypothesis, selection, effort).ok()?;
+            let fit = fit_from(&self.study, linearised, &(&candidate.fit).into(), selection, effort).ok()?;
             Some(Candidate { fit, ..candidate.clone() })
         });
         let mut found: Vec<Candidate> = fitted.into_iter().flatten().collect();

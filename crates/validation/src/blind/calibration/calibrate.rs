@@ -156,6 +156,7 @@ impl<'a> Calibrated<'a> {
             model: self.nominal.clone(),
             effects: self.catalogue.to_vec(),
             calibration: self.before.clone(),
+            linearised: None,
             progress: &|_, _| {},
         });
         Ok(diagnosed.ok().map(|diagnosed| observe(case, &self.before, &diagnosed)))

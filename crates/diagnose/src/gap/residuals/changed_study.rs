@@ -1,13 +1,16 @@
-//! Effects added to a study during a diagnosis: laws, and effects that begin with a step.
+//! A study with further effects (laws, and effects that begin with a step), or with some of its values.
 
 use crate::gap::residuals::effect_timing::Course;
-use crate::gap::residuals::study::Study;
+use crate::gap::residuals::machine_run::acts_on_machine;
+use crate::gap::residuals::nuisance::OUTPUTS;
+use crate::gap::residuals::study::{Group, Study};
 use mapper_physics::rig::effect::Effect;
 use std::sync::Arc;
 
 impl Study {
     /// Adds an effect that is not in the library and acts throughout. Returns its index.
     pub fn add(&mut self, effect: Arc<dyn Effect>) -> usize {
+        self.on_machine.push(acts_on_machine(&self.nominal, effect.as_ref()));
         self.effects.push(effect);
         self.courses.push(Course::Throughout);
         self.effects.len() - 1
@@ -22,6 +25,7 @@ impl Study {
                 (1..=last).map(Course::From).chain((1..last).map(Course::Growing)).collect::<Vec<_>>();
             for course in courses {
                 self.effects.push(self.effects[effect].clone());
+                self.on_machine.push(self.on_machine[effect]);
                 self.courses.push(course);
             }
         }
@@ -40,5 +44,27 @@ impl Study {
     pub(crate) fn family(&self, index: usize) -> usize {
         let same = |known: &usize| Arc::ptr_eq(&self.effects[*known], &self.effects[index]);
         (0..self.catalogue).find(same).unwrap_or(index)
+    }
+
+    /// Keeps only these rows; `keep` uses the layout of the residuals.
+    pub(crate) fn with_rows(mut self, keep: &[bool]) -> Study {
+        let (mut groups, mut measured) = (Vec::new(), Vec::new());
+        for of_step in &mut self.rows {
+            of_step.fill([None; OUTPUTS.len()]);
+        }
+        for group in &self.groups {
+            let start = measured.len();
+            let mut blocks = Vec::new();
+            for (row, block) in group.rows.clone().zip(&group.blocks).filter(|(row, _)| keep[*row]) {
+                self.rows[group.step][*block][group.output] = Some(measured.len() as u32);
+                measured.push(self.measured[row]);
+                blocks.push(*block);
+            }
+            if !blocks.is_empty() {
+                groups.push(Group { rows: start..measured.len(), blocks, ..*group });
+            }
+        }
+        (self.groups, self.measured) = (groups, measured);
+        self
     }
 }

@@ -1,0 +1,248 @@
+//! Runs of the model through the recording, and the readings that they predict.
+
+use crate::gap::residuals::hypothesis::Hypothesis;
+use crate::gap::residuals::initial_state::with_metal_held;
+use crate::gap::residuals::machine_run::{MachineRun, Sample};
+use crate::gap::residuals::nuisance::{Circumstances, OUTPUTS};
+use crate::gap::residuals::study::{PredictError, Prediction, Study};
+use mapper_core::Channel;
+use mapper_observe::averages::mean_reading::mean_reading;
+use mapper_observe::initial_state::estimate_state;
+use mapper_observe::model_inputs::lagged_command::{LaggedCommand, Response};
+use mapper_physics::rig::effect::{EffectError, Rig};
+use mapper_physics::rig::instruments::ChannelFollower;
+use mapper_physics::simulation::driven::{DriveError, drive, settle};
+use mapper_physics::simulation::inputs::Inputs;
+use mapper_physics::simulation::model::{Outputs, PreparedModel, State};
+use std::sync::Arc;
+
+impl Study {
+    /// A hypothesis without the sensors of outputs.
+    fn machine(&self, hypothesis: &Hypothesis) -> Hypothesis {
+        let mut machine = hypothesis.clone();
+        machine.effects.retain(|(index, _)| self.on_machine[*index]);
+        for (sigmas, nuisance) in machine.nuisances.iter_mut().zip(&self.nuisances) {
+            // One with another centre acts at its neutral value too.
+            if !nuisance.kind.is_on_machine() {
+                *sigmas = 0.0;
+            }
+        }
+        machine
+    }
+
+    /// Segments of steps with a constant rig under a hypothesis: the first step of each.
+    fn segments(&self, hypothesis: &Hypothesis) -> Vec<usize> {
+        let shares = |step: usize| {
+            let effects = hypothesis.effects.iter();
+            effects.map(move |(index, _)| self.courses[*index].share(step, self.steps.len()))
+        };
+        (0..self.steps.len().max(1))
+            .filter(|step| *step == 0 || !shares(*step).eq(shares(step - 1)))
+            .collect()
+    }
+
+    fn segment_end_s(&self, segments: &[usize], place: usize) -> f64 {
+        segments.get(place + 1).map_or(f64::INFINITY, |next| self.steps[*next].marker.start_s)
+    }
+
+    /// Drives the model of a hypothesis through the recording. `on_sample` receives the index of each of `times_s` and the model's state.
+    pub(crate) fn drive(
+        &self,
+        hypothesis: &Hypothesis,
+        times_s: &[f64],
+        on_sample: impl FnMut(usize, &PreparedModel<'_>, &State, &Outputs),
+    ) -> Result<(), PredictError> {
+        self.drive_rigs(hypothesis, |step| self.rig(hypothesis, step), times_s, on_sample)
+    }
+
+    /// The same for a rig that differs from that of the hypothesis and changes with it.
+    fn drive_rigs(
+        &self,
+        hypothesis: &Hypothesis,
+        rig_in: impl Fn(usize) -> Result<(Rig, Circumstances), EffectError>,
+        times_s: &[f64],
+        mut on_sample: impl FnMut(usize, &PreparedModel<'_>, &State, &Outputs),
+    ) -> Result<(), PredictError> {
+        let segments = self.segments(hypothesis);
+        let mut state: Option<State> = None;
+        let mut done = 0;
+        for (place, first) in segments.iter().enumerate() {
+            let (rig, circumstances) = &rig_in(*first)?;
+            let inputs = self.true_inputs(circumstances);
+            let start = match state {
+                None => self.start(rig, &inputs, circumstances)?,
+                Some(state) => state,
+            };
+            let sample = |index: usize, prepared: &PreparedModel<'_>, state: &State, outputs: &Outputs| {
+                on_sample(done + index, prepared, state, outputs);
+            };
+            let from_s = if place == 0 { f64::NEG_INFINITY } else { self.steps[*first].marker.start_s };
+            let end_s = self.segment_end_s(&segments, place);
+            let until = times_s.partition_point(|t| *t <= end_s);
+            let grid = self.grid.part(from_s, end_s);
+            let mut ended = drive(&rig.model, &inputs, start, &grid, &times_s[done..until], sample)?;
+            done = until;
+            // An instantaneous probe has no state until a slow probe replaces it.
+            if rig.model.params.t2_probe_diameter_m == 0.0 && end_s.is_finite() {
+                let boundary = inputs.at(end_s - 1e-6);
+                ended.t2_tip_k = rig.model.prepare(&boundary).evaluate(&ended).t2_k;
+            }
+            state = Some(ended);
+        }
+        Ok(())
+    }
+
+    /// Readings of the outputs of these rigs at `times_s`; `on_reading` receives the index of the time, of the output, and the reading.
+    pub(crate) fn read(
+        &self,
+        hypothesis: &Hypothesis,
+        rig_in: impl Fn(usize) -> Result<(Rig, Circumstances), EffectError>,
+        times_s: &[f64],
+        on_reading: impl FnMut(usize, usize, f64, &Circumstances),
+    ) -> Result<(), PredictError> {
+        let samples = self.samples(hypothesis, &rig_in, times_s)?;
+        self.sense(&samples, hypothesis, rig_in, times_s, on_reading)
+    }
+
+    fn samples(
+        &self,
+        hypothesis: &Hypothesis,
+        rig_in: impl Fn(usize) -> Result<(Rig, Circumstances), EffectError>,
+        times_s: &[f64],
+    ) -> Result<Vec<Sample>, PredictError> {
+        let mut samples = Vec::with_capacity(times_s.len());
+        self.drive_rigs(hypothesis, rig_in, times_s, |_, prepared, state, outputs| {
+            samples.push(Sample::of(prepared, state, outputs));
+        })?;
+        Ok(samples)
+    }
+
+    /// Readings of the sensors of these rigs from a run of the machine.
+    fn sense(
+        &self,
+        samples: &[Sample],
+        hypothesis: &Hypothesis,
+        rig_in: impl Fn(usize) -> Result<(Rig, Circumstances), EffectError>,
+        times_s: &[f64],
+        mut on_reading: impl FnMut(usize, usize, f64, &Circumstances),
+    ) -> Result<(), PredictError> {
+        let mut followers =
+            OUTPUTS.map(|channel| ChannelFollower::new(*self.nominal.instruments.path(channel)));
+        let segments = self.segments(hypothesis);
+        let mut done = 0;
+        for (place, first) in segments.iter().enumerate() {
+            let (rig, circumstances) = &rig_in(*first)?;
+            let p3 = Response { lag_s: rig.instruments.p3_lag_s, ..self.actuators.p3 };
+            let command = LaggedCommand::new(self.inputs.command.levels().to_vec(), p3, self.actuators.valve);
+            let paths = OUTPUTS.map(|channel| *rig.instruments.path(channel));
+            followers.iter_mut().zip(paths).for_each(|(follower, path)| follower.turn_to(path));
+            let end_s =
+                segments.get(place + 1).map_or(f64::INFINITY, |next| self.steps[*next].marker.start_s);
+            let until = times_s.partition_point(|t| *t <= end_s);
+            for index in done..until {
+                // No sample lies behind the end of the followed part.
+                let Some(sample) = samples.get(index) else { break };
+                let t_s = times_s[index];
+                for (output, channel) in OUTPUTS.into_iter().enumerate() {
+                    let seen = if channel == Channel::P3 {
+                        command.p3_pa(t_s)
+                    } else {
+                        paths[output].at_sensor(sample.values[output], sample.surroundings(channel))
+                    };
+                    // T4 is T3' minus a temperature drop that is known only to a few per cent.
+                    let seen = if channel == Channel::T4 {
+                        seen - circumstances.t4_drop_ratio * sample.turbine_drop_k
+                    } else {
+                        seen
+                    };
+                    on_reading(index, output, followers[output].read(t_s, seen), circumstances);
+                }
+            }
+            done = until;
+        }
+        Ok(())
+    }
+
+    /// Predicts the recording.
+    ///
+    /// # Errors
+    /// [`PredictError`] if a value is out of its range or the model cannot follow.
+    pub fn predict(&self, hypothesis: &Hypothesis) -> Result<Prediction, PredictError> {
+        let machine = self.machine(hypothesis);
+        let samples = self.samples(&machine, |step| self.rig(&machine, step), &self.times_s)?;
+        self.predict_from(hypothesis, Arc::new(MachineRun { machine, samples }))
+    }
+
+    /// The same, with the run of another prediction if both have the same machine.
+    ///
+    /// # Errors
+    /// As [`Study::predict`].
+    pub fn predict_near(
+        &self,
+        hypothesis: &Hypothesis,
+        other: &Prediction,
+    ) -> Result<Prediction, PredictError> {
+        if self.machine(hypothesis) == other.run.machine {
+            self.predict_from(hypothesis, other.run.clone())
+        } else {
+            self.predict(hypothesis)
+        }
+    }
+
+    fn predict_from(
+        &self,
+        hypothesis: &Hypothesis,
+        run: Arc<MachineRun>,
+    ) -> Result<Prediction, PredictError> {
+        let mut values = vec![0.0; self.measured.len()];
+        let mut delay_s = [0.0; OUTPUTS.len()];
+        let rig_in = |step| self.rig(hypothesis, step);
+        self.sense(
+            &run.samples,
+            hypothesis,
+            rig_in,
+            &self.times_s,
+            |index, output, reading, circumstances| {
+                delay_s = circumstances.delay_s;
+                let Some((step, block)) = self.places[index] else { return };
+                let Some(row) = self.rows[step][block][output] else { return };
+                let single = self.steps[step].blocks[block].spread_s == 0.0;
+                values[row as usize] += if single { reading } else { 0.5 * reading };
+            },
+        )?;
+        let slopes = self.slopes(&values);
+        for group in &self.groups {
+            let delay_s = delay_s[group.output];
+            if delay_s != 0.0 {
+                for row in group.rows.clone() {
+                    values[row] -= delay_s * slopes[row];
+                }
+            }
+        }
+        Ok(Prediction { values, slopes, run })
+    }
+
+    /// Settled state under the first inputs, shifted by the circumstances. If the metal had not settled when the recording began, its
+    /// measured temperature is kept.
+    fn start(
+        &self,
+        rig: &Rig,
+        inputs: &impl Inputs,
+        circumstances: &Circumstances,
+    ) -> Result<State, DriveError> {
+        let start_s = self.grid.nodes_s().first().copied().unwrap_or(0.0);
+        let boundary = inputs.at(start_s);
+        // Not from the very start of the recording, where the machine may still be at standstill.
+        let read = |channel: Channel| {
+            let column = &self.table.column(channel)?[self.table.range(start_s, f64::INFINITY)];
+            mean_reading(&column.iter().copied().filter(|v| v.is_finite()).take(20).collect::<Vec<_>>())
+        };
+        let guess = estimate_state(&boundary, read);
+        let held = (!self.rested).then(|| with_metal_held(&rig.model));
+        let mut start = settle(held.as_ref().unwrap_or(&rig.model), &boundary, guess)?;
+        for (knob, by) in &circumstances.knobs {
+            knob.start(&mut start, *by);
+        }
+        Ok(start)
+    }
+}

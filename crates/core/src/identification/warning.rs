@@ -212,10 +212,6 @@ kinds! {
         Scatter { scatter_ratio: f64 },
         /// Points with an impossible efficiency.
         Eta { points: usize, max_eta: f64 },
-        /// The efficiencies bend towards low speed; by offsets of so many times the declared ones.
-        Bend { offset_ratio: f64 },
-        /// Steps with rising and with falling T2 disagree.
-        Directions { parameter: String, rising: f64, falling: f64, sigmas: f64 },
     }
 }
 

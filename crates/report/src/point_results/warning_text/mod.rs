@@ -158,7 +158,7 @@ mod tests {
         {"code": "left_out", "kind": "readings"},
         {"code": "left_out", "kind": "region", "region": "choke", "sigmas": 7, "doubts": [{"kind": "scatter", "scatter_ratio": 0.1}]},
         {"code": "off_the_law", "h_deviation_ratio": 0.1},
-        {"code": "model_doubted", "kind": "directions", "parameter": "alpha_A", "rising": 0.1, "falling": 0.3, "sigmas": 8}
+        {"code": "model_doubted", "kind": "slow_residual", "residual_ratio": 3}
     ]"#;
 
     #[test]

@@ -128,16 +128,5 @@ pub(crate) fn model_doubt(doubt: &ModelDoubt) -> Sentence {
             number(*max_eta, 2),
             *points
         ),
-        ModelEvidence::Bend { offset_ratio } => sentence!(
-            "the efficiencies bend towards low speed more than in any map; attributed to offsets, these are {} times the declared ones",
-            number(*offset_ratio, 1)
-        ),
-        ModelEvidence::Directions { parameter, rising, falling, sigmas } => sentence!(
-            "steps with rising T2 and steps with falling T2 disagree on the {}: {} and {}, {} standard errors apart",
-            parameter.clone(),
-            number(*rising, 3),
-            number(*falling, 3),
-            number(*sigmas, 1)
-        ),
     }
 }

@@ -35,7 +35,8 @@ fn parts(file: &LogFile) -> Result<(Value, &[[u8; VALUE_BYTES]]), LogError> {
     let bytes = bytes.ok_or_else(|| file.content_error(NAME, "it exists in memory only"))?;
     let end = bytes.iter().position(|byte| *byte == b'\n').unwrap_or(bytes.len());
     let (header, values) = bytes.split_at(end);
-    let header = serde_json::from_slice(header).map_err(|error| file.content_error(NAME, error.to_string()))?;
+    let header =
+        serde_json::from_slice(header).map_err(|error| file.content_error(NAME, error.to_string()))?;
     Ok((header, values.get(1..).unwrap_or_default().as_chunks().0))
 }
 

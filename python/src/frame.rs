@@ -41,7 +41,7 @@ fn parts(file: &LogFile) -> Result<(Value, &[[u8; VALUE_BYTES]]), LogError> {
 }
 
 fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
-    options.only(&[]).map_err(|why| file.content_error(NAME, why))?;
+    options.allow_only(&[]).map_err(|why| file.content_error(NAME, why))?;
     let (header, _) = parts(file)?;
     let names = header["columns"].as_array().into_iter().flatten().filter_map(Value::as_str);
     let column = |name: &str| Column { name: name.to_owned(), header: name.to_owned(), ..Column::default() };

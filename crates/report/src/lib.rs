@@ -24,6 +24,7 @@ pub use diagnosis::gap_text::{NOTHING, OUTSIDE, doubt_text, gap_text, headline, 
 pub use diagnosis::prediction_check_text::held_text;
 pub use diagnosis::recordings_text::recordings_text;
 pub use diagnosis::stand_actions::{next_measurement, stand_actions};
+pub use formatting::bar_text::{progress_text, short_duration};
 pub use formatting::display::Display;
 pub use formatting::duration::duration;
 pub use formatting::number::{four_figures, number, percent};

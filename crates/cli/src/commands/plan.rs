@@ -98,12 +98,9 @@ impl Plan {
             self.replace.write(path, plan_svg(&campaign, &model, &plan, speed_lines.as_ref()).as_bytes())?;
         }
         if self.json {
-            let mut value = serde_json::to_value(&plan).map_err(SessionError::from)?;
+            let mut value = plan_json(&campaign, &plan)?;
             if let Some(others) = &others {
                 value["comparison"] = comparison_json(&plan, others);
-            }
-            if let Some(zero) = campaign.zero {
-                value["soak_s"] = zero.duration_s.into();
             }
             return standard_output::print_json(&value);
         }
@@ -125,12 +122,9 @@ impl Plan {
         let Rehearsal { plan, notes } = rehearse(&session, campaign, model, source)?;
         self.store(&plan)?;
         if self.json {
-            let mut value = serde_json::to_value(&plan).map_err(SessionError::from)?;
+            let mut value = plan_json(campaign, &plan)?;
             value["forecast"] = true.into();
             value["notes"] = notes.into();
-            if let Some(zero) = campaign.zero {
-                value["soak_s"] = zero.duration_s.into();
-            }
             return standard_output::print_json(&value);
         }
         let notes: String = notes.iter().map(|note| format!("note: {note}\n")).collect();
@@ -146,4 +140,12 @@ impl Plan {
         let Some(path) = &self.out else { return Ok(()) };
         Ok(self.replace.write(path, json_text(plan)?.as_bytes())?)
     }
+}
+
+fn plan_json(campaign: &Campaign, plan: &StepPlan) -> Result<serde_json::Value, Failure> {
+    let mut value = serde_json::to_value(plan).map_err(SessionError::from)?;
+    if let Some(zero) = campaign.zero {
+        value["soak_s"] = zero.duration_s.into();
+    }
+    Ok(value)
 }

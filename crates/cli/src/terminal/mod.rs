@@ -3,7 +3,6 @@
 //! Progress goes to standard error and never into results: a bar on a terminal, a line per step in a pipe, JSON lines for
 //! a program.
 
-mod bar_text;
 mod colour;
 mod progress;
 mod results_text;

@@ -1,9 +1,8 @@
 //! Progress on standard error: a bar, lines, or JSON.
 
-use crate::terminal::bar_text::{progress_text, short};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use mapper_core::{StepMarker, terminal_text};
-use mapper_report::{with_messages, wrapped};
+use mapper_report::{progress_text, short_duration, with_messages, wrapped};
 use mapper_session::SessionEvent;
 use serde_json::json;
 use std::io::Write;
@@ -207,7 +206,7 @@ impl ProgressDisplay {
                 self.bar.set_prefix(format!(
                     "{}, {} at this point",
                     place(marker),
-                    short(marker.end_s - marker.start_s)
+                    short_duration(marker.end_s - marker.start_s)
                 ));
             }
             SessionEvent::Reported(event) => {
@@ -226,7 +225,7 @@ impl ProgressDisplay {
                 self.look(state, PIECES_BAR, Some(*of as u64));
                 self.bar.set_position(*done as u64);
                 if *done > 0 {
-                    self.bar.set_message(format!(", {} left", short(self.bar.eta().as_secs_f64())));
+                    self.bar.set_message(format!(", {} left", short_duration(self.bar.eta().as_secs_f64())));
                 }
             }
             SessionEvent::StepEnded(_)
@@ -273,7 +272,7 @@ fn say_lines(event: &SessionEvent, state: &mut State) {
     let line = match event {
         SessionEvent::RunStarted { steps, duration_s, .. } => {
             (state.steps, state.duration_s) = (*steps, *duration_s);
-            format!("{steps} steps in {} of rig time", short(*duration_s))
+            format!("{steps} steps in {} of rig time", short_duration(*duration_s))
         }
         SessionEvent::StepStarted(marker) => format!(
             "{:8.1} s  {}, {}, for {}, {} left",
@@ -283,8 +282,8 @@ fn say_lines(event: &SessionEvent, state: &mut State) {
                 |number| format!("step {number} of {}", state.steps.max(number))
             ),
             place(marker),
-            short(marker.end_s - marker.start_s),
-            short(state.duration_s - marker.start_s)
+            short_duration(marker.end_s - marker.start_s),
+            short_duration(state.duration_s - marker.start_s)
         ),
         SessionEvent::Reported(event) => event_line(event.t_s, &event.message),
         SessionEvent::Progress { what, done_ratio } if *what != state.last_line => {
@@ -320,7 +319,7 @@ fn progress_line(what: &str, done_ratio: f64, elapsed_s: f64) -> String {
         return what.to_owned();
     }
     let left_s = elapsed_s * (1.0 - done_ratio) / done_ratio;
-    format!("{:3.0} %  {what}, {} left", 100.0 * done_ratio, short(left_s))
+    format!("{:3.0} %  {what}, {} left", 100.0 * done_ratio, short_duration(left_s))
 }
 
 /// Number of finished pieces, elapsed time, and the estimated time remaining.
@@ -329,9 +328,9 @@ fn pieces_line(done: usize, of: usize, elapsed_s: f64) -> String {
         0 => format!("0 of {of} done"),
         _ if done < of => {
             let left_s = elapsed_s * (of - done) as f64 / done as f64;
-            format!("{done} of {of} done in {}, {} left", short(elapsed_s), short(left_s))
+            format!("{done} of {of} done in {}, {} left", short_duration(elapsed_s), short_duration(left_s))
         }
-        _ => format!("{done} of {of} done in {}", short(elapsed_s)),
+        _ => format!("{done} of {of} done in {}", short_duration(elapsed_s)),
     }
 }
 

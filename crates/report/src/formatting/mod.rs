@@ -1,5 +1,6 @@
 //! Numbers, durations, tables and sentences as text for terminals and Markdown, shared by all reports.
 
+pub(crate) mod bar_text;
 pub(crate) mod display;
 pub(crate) mod duration;
 pub mod markdown;

@@ -7,7 +7,7 @@ use crate::gap::causes::calibration::Calibration;
 use crate::gap::findings::in_words;
 use crate::gap::findings::report::{Candidate, Estimate, Onset};
 use crate::gap::next_experiment::best_experiment::{Rivals, SETTLED};
-use crate::gap::residuals::effect_timing::Course;
+use crate::gap::residuals::hypothesis::Course;
 use crate::gap::residuals::study::{EffectValues, Hypothesis, Study};
 use mapper_core::half_width_95;
 use mapper_physics::rig::effect::{Effect, EffectInfo, EffectParameter};

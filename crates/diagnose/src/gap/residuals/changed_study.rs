@@ -1,6 +1,6 @@
 //! A study with further effects (laws, and effects that begin with a step), or with some of its values.
 
-use crate::gap::residuals::effect_timing::Course;
+use crate::gap::residuals::hypothesis::Course;
 use crate::gap::residuals::machine_run::acts_on_machine;
 use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::study::{Group, Study};

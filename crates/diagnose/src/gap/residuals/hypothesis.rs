@@ -1,4 +1,4 @@
-//! A hypothesis: values of all nuisances and effects.
+//! A hypothesis: values of all nuisances and effects, and the onset and growth of an effect.
 
 /// Effects with their values: indices of the candidates, and one value per parameter.
 pub type EffectValues = Vec<(usize, Vec<f64>)>;
@@ -17,4 +17,48 @@ pub fn members(hypothesis: &Hypothesis) -> Vec<usize> {
     let mut members: Vec<usize> = hypothesis.effects.iter().map(|(index, _)| *index).collect();
     members.sort_unstable();
     members
+}
+
+/// Onset and growth of an effect within a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Course {
+    /// Present throughout.
+    Throughout,
+    /// From the step with this index on.
+    From(usize),
+    /// Grows evenly from step to step: absent before the step with this index, at full size in the last step.
+    Growing(usize),
+}
+
+impl Course {
+    /// Share of the full size in a step of a recording with `steps` steps, 0..1.
+    pub fn share(self, step: usize, steps: usize) -> f64 {
+        match self {
+            Course::Throughout => 1.0,
+            Course::From(first) => f64::from(u8::from(step >= first)),
+            Course::Growing(first) if step < first || steps <= first => 0.0,
+            Course::Growing(first) => (step - first + 1) as f64 / (steps - first) as f64,
+        }
+    }
+
+    /// The step with which it begins; `None` if it is always present.
+    pub fn onset(self) -> Option<usize> {
+        match self {
+            Course::Throughout => None,
+            Course::From(first) | Course::Growing(first) => Some(first),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_grows_begins_with_its_step_and_is_whole_in_the_last() {
+        let shares = |course: Course| (0..5).map(|step| course.share(step, 5)).collect::<Vec<f64>>();
+        assert_eq!(shares(Course::Throughout), [1.0; 5]);
+        assert_eq!(shares(Course::From(3)), [0.0, 0.0, 0.0, 1.0, 1.0]);
+        assert_eq!(shares(Course::Growing(1)), [0.0, 0.25, 0.5, 0.75, 1.0]);
+    }
 }

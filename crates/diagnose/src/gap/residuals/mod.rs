@@ -2,7 +2,6 @@
 
 pub mod actuators;
 pub(crate) mod changed_study;
-pub mod effect_timing;
 pub mod hypothesis;
 pub(crate) mod initial_state;
 pub(crate) mod machine_run;

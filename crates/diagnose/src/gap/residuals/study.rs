@@ -1,7 +1,7 @@
 //! One prepared recording: residual layout, whitening, and model predictions for any hypothesis.
 
 use crate::gap::residuals::actuators::Actuators;
-use crate::gap::residuals::effect_timing::Course;
+use crate::gap::residuals::hypothesis::Course;
 pub use crate::gap::residuals::hypothesis::{EffectValues, Hypothesis, members};
 use crate::gap::residuals::initial_state::rested;
 use crate::gap::residuals::machine_run::{MachineRun, acts_on_machine};

@@ -1,18 +1,23 @@
 //! The text next to a progress bar.
 
 /// Progress of a run: `step` counts from 1 and is 0 before the first step.
-pub(crate) fn progress_text(step: usize, steps: usize, t_s: f64, duration_s: f64, left_s: f64) -> String {
+pub fn progress_text(step: usize, steps: usize, t_s: f64, duration_s: f64, left_s: f64) -> String {
     let place = match step {
         0 => "before step 1".to_owned(),
         step => format!("step {step} of {}", steps.max(step)),
     };
     // Inserted steps make a run longer than planned.
     let whole_s = duration_s.max(t_s);
-    format!("{place}, {} of {} of rig time, {} left", short(t_s), short(whole_s), short(left_s))
+    format!(
+        "{place}, {} of {} of rig time, {} left",
+        short_duration(t_s),
+        short_duration(whole_s),
+        short_duration(left_s)
+    )
 }
 
 /// A short form of a duration: 1.4 s, 43 s, 22 min, 2 h 04 min.
-pub(crate) fn short(duration_s: f64) -> String {
+pub fn short_duration(duration_s: f64) -> String {
     let duration_s = duration_s.max(0.0);
     let minutes = (duration_s / 60.0).round() as u64;
     match duration_s {
@@ -39,7 +44,7 @@ mod tests {
         let longest = progress_text(999, 999, 99.0 * 3600.0, 99.9 * 3600.0, 99.9 * 3600.0);
         assert!(longest.len() <= 78, "{longest}");
         assert_eq!(
-            [9.94, 9.96, 99.4, 99.6, 3599.0].map(short),
+            [9.94, 9.96, 99.4, 99.6, 3599.0].map(short_duration),
             ["9.9 s", "10 s", "99 s", "2 min", "1 h 00 min"]
         );
     }

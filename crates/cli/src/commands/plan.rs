@@ -11,9 +11,7 @@ use mapper_campaign::units::{Kind, parse};
 use mapper_core::{Jump, OperatingPoint, Plan as StepPlan, VisitOrder};
 use mapper_physics::simulation::model::Model;
 use mapper_planner::{PlanRequest, make_plan, plan_other_orders};
-use mapper_report::{
-    comparison_json, comparison_text, jump_json, jump_text, plan_svg, plan_text,
-};
+use mapper_report::{comparison_json, comparison_text, jump_json, jump_text, plan_svg, plan_text};
 use mapper_session::{
     PlanInputs, Rehearsal, Session, SessionError, json_text, nominal_model, plan_of, rehearse,
 };

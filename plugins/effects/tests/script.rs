@@ -112,7 +112,7 @@ fn mistakes_are_named_with_their_line() {
         (script("//! effect: Bad Name\n"), "suspect.rhai:1: `Bad Name` is not a valid name"),
         (script("//! effect: a\n//! submodel: engine\n"), "suspect.rhai:2: `engine` is not a submodel"),
         (script("//! effect: a\n//! parameter: c 0 .. 1\n"), "suspect.rhai:2: write `//! parameter"),
-        (script("//! parameter: c [1] 0 .. 1, neutral 2, step 0.1\n"), "hold the neutral value 2"),
+        (script("//! parameter: c [1] 0 .. 1, neutral 2, step 0.1\n"), "contain the neutral value 2"),
         (script("//! colour: red\n"), "`colour` is not a key"),
         (with_body(""), "it defines no hook"),
         (with_body("fn flow_kg_s(at) { 1.0 }"), "write flow_kg_s(at, p, value)"),

@@ -108,7 +108,7 @@ fn every_log_format_gives_identical_points() {
     }
     // Its library would read what lies behind a date at the wrong places.
     let refused = mapper(["log".as_ref(), "inspect".as_ref(), dated.as_os_str()]).exits(6);
-    assert!(refused.stderr.contains("`time` holds no plain numbers"), "{}", refused.stderr);
+    assert!(refused.stderr.contains("`time` does not contain plain numbers"), "{}", refused.stderr);
     // Excel's files keep 15 to 16 of the 17 digits of a number.
     for (found, expected) in points(&xlsx).as_array().unwrap().iter().zip(expected.as_array().unwrap()) {
         for key in ["speed_rpm", "flow_kg_s", "pressure_ratio", "eta", "h_w_m2k"] {

@@ -395,7 +395,7 @@ pub(crate) fn short(value: f64) -> String {
     match value.abs() {
         _ if !value.is_finite() => "-".to_owned(),
         0.0 => "0".to_owned(),
-        size if size >= 1e5 => format!("{value:.0}"),
+        size if size >= 1e4 => format!("{value:.0}"),
         size if size >= 100.0 => format!("{value:.1}"),
         size if size >= 1.0 => format!("{value:.2}"),
         size if size >= 1e-3 => format!("{value:.4}"),

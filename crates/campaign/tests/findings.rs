@@ -107,7 +107,14 @@ fn the_short_campaign_is_right() {
 #[test]
 fn one_key_sets_the_dwell() {
     let timing = "timing: {dwell: 120 s}";
-    one(timing, "timing: {warm_up: 2 min}", Kind::MissingKey, "timing", "how long", "`time_budget: 45 min`");
+    one(
+        timing,
+        "timing: {warm_up: 2 min}",
+        Kind::MissingKey,
+        "timing",
+        "set the duration",
+        "`time_budget: 45 min`",
+    );
     let both = "timing: {dwell: 120 s, time_budget: 45 min}";
     one(timing, both, Kind::Conflict, "45 min", "both set the time", "keep one");
     let script = "timing: {time_budget: 45 min}\norder: conventional";
@@ -520,10 +527,10 @@ fn what_must_fit_together() {
         "[90 krpm, 90000 rpm]",
         Kind::Duplicate,
         "90000 rpm",
-        "second time",
+        "appears twice",
         "remove one",
     );
-    one("[0.7, 1.0]", "[0.7, 0.70]", Kind::Duplicate, "0.70", "second time", "remove one");
+    one("[0.7, 1.0]", "[0.7, 0.70]", Kind::Duplicate, "0.70", "appears twice", "remove one");
     one("  openings: [0.7, 1.0]", "  openings: []", Kind::Range, "openings", "empty", "0.5");
     one(
         "[90 krpm, 110 krpm]",
@@ -538,7 +545,7 @@ fn what_must_fit_together() {
         "  openings: [0.7, 1.0]\n  skip: [{speed: 91 krpm, opening: 0.7}]\n",
         Kind::Conflict,
         "{speed",
-        "no point",
+        "do not contain the point",
         "name a speed",
     );
     one(
@@ -554,7 +561,7 @@ fn what_must_fit_together() {
         "  points:\n    - {speed: 90 krpm, opening: 1}\n    - {speed: 90000 rpm, opening: 1.0}\n",
         Kind::Duplicate,
         "{speed",
-        "second time",
+        "appears twice",
         "remove one",
     );
     one(

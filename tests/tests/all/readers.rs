@@ -77,7 +77,7 @@ fn mistakes_in_readers_are_reported_with_their_lines() {
             format!(
                 "  a: {{backend: {replay}, channels: [T2]}}\n  b: {{backend: {replay}, channels: [T2]}}\n"
             ),
-            "is taken from `a` already",
+            "already taken from `a`",
         ),
         (format!("  bench: {{backend: {replay}, channel: [T2]}}\n"), "channels"),
         ("  be nch: {backend: {replay: {}}}\n".to_owned(), "cannot be the name of a reader"),

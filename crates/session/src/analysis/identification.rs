@@ -235,9 +235,9 @@ impl Session<'_> {
 fn unknown_barometer(map: &ChannelMap) -> Option<ResultRemark> {
     let unknown = Barometer::unknown();
     let used = [Channel::P1, Channel::P2].into_iter().any(|channel| map.is_gauge(channel));
-    (used && map.ambient_pressure == Some(AmbientPressure::Constant(unknown))).then(|| {
-        ResultRemark::UnknownAmbientPressure { pressure_pa: unknown.pressure_pa, sigma_pa: unknown.sigma_pa }
-    })
+    (used && map.ambient_pressure == Some(AmbientPressure::Constant(unknown))).then_some(
+        ResultRemark::UnknownAmbientPressure { pressure_pa: unknown.pressure_pa, sigma_pa: unknown.sigma_pa },
+    )
 }
 
 /// Remark that a recording has a soak long enough for a zero, but no zero was requested.

@@ -139,10 +139,10 @@ impl Study {
             let end_s =
                 segments.get(place + 1).map_or(f64::INFINITY, |next| self.steps[*next].marker.start_s);
             let until = times_s.partition_point(|t| *t <= end_s);
-            for index in done..until {
-                // No sample lies behind the end of the followed part.
-                let Some(sample) = samples.get(index) else { break };
-                let t_s = times_s[index];
+            // No sample lies behind the end of the followed part.
+            let followed = times_s.iter().zip(samples).enumerate().take(until).skip(done);
+            for (index, (t_s, sample)) in followed {
+                let t_s = *t_s;
                 for (output, channel) in OUTPUTS.into_iter().enumerate() {
                     let seen = if channel == Channel::P3 {
                         command.p3_pa(t_s)

@@ -13,7 +13,7 @@ pub(crate) const STANDARD_ATMOSPHERE_PA: f64 = 101_325.0;
 /// Range of an ambient pressure, Pa.
 pub const AMBIENT_RANGE_PA: (f64, f64) = (5e4, 1.1e5);
 
-/// Whether readings between `low` and `high` (SI, without [`TRIMMED_SHARE`] at each end) are possible for a channel.
+/// Whether readings between `low` and `high` (SI, without the trimmed share at each end) are possible for a channel.
 pub fn is_plausible(channel: Channel, low: f64, high: f64) -> bool {
     let running = plausible(channel).running;
     let (least, most) = (*running.start(), *running.end());

@@ -320,7 +320,7 @@ mod tests {
         assert!((one.mean().unwrap() - other.mean().unwrap()).norm() < 1e-12);
     }
 
-    /// An estimate within the model's error is no evidence; one far beyond it is certain.
+    /// An estimate within the model's error proves nothing; one far beyond it is certain.
     #[test]
     fn the_error_of_the_model_counts_in_the_evidence() {
         let off = |found: f64, model_error: f64| {

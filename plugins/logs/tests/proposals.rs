@@ -154,7 +154,7 @@ fn a_machine_before_the_quantity_is_understood() {
     assert_eq!(channels.map(of), [0, 1, 2, 3, 4].map(Some));
 }
 
-/// pandas numbers the second of two equal names: it is no station.
+/// pandas numbers the second of two equal names; the number is not a station.
 #[test]
 fn a_number_behind_a_point_is_no_station() {
     let found = proposal("Pressure [kPa],Temp [degC],Pressure.1 [kPa],Temp.1 [degC]", |load| {

@@ -6,7 +6,7 @@
 use crate::gas::air;
 
 /// Maximum tip speed of a wheel, m/s: forged titanium; series wheels reach 560 m/s.
-const MAX_TIP_SPEED_M_S: f64 = 700.0;
+pub const MAX_TIP_SPEED_M_S: f64 = 700.0;
 /// State at which the pipe chokes: a reference state's temperature and pressure (SAE).
 const T_K: f64 = 298.0;
 const P_PA: f64 = 100e3;

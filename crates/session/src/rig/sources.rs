@@ -1,8 +1,8 @@
 //! The data sources of a campaign: the rig and auxiliary instruments.
 
 use crate::{Registry, SessionError};
-use mapper_campaign::Campaign;
 use mapper_campaign::campaign::ReaderChoice;
+use mapper_campaign::{Campaign, DEFAULT_MAX_AGE_S};
 use mapper_core::{Backend, BackendError, Channel, RigDescription};
 use mapper_physics::simulation::model::Model;
 use mapper_runner::{AuxiliaryInstrument, InstrumentChannel, RigWithInstruments};
@@ -12,8 +12,6 @@ use std::time::Duration;
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(11);
 /// An instrument counts as silent after this number of missed samples, if its data are also older than the allowed signal age.
 const MAX_MISSED_SAMPLES: f64 = 3.0;
-/// Maximum signal age if no guard sets one, s.
-const DEFAULT_MAX_AGE_S: f64 = 3.0;
 
 /// Why a source cannot serve as an auxiliary instrument.
 #[derive(Debug, thiserror::Error)]

@@ -34,7 +34,7 @@ pub(crate) fn find_concerns(campaign: &Campaign) -> Vec<Concern> {
             ),
             remedy: "write its diameter at the exit, with its unit".to_owned(),
         });
-        // An impossible wheel is no reference for the other sizes.
+        // The other sizes cannot be compared with an impossible wheel.
         return concerns;
     }
     let reference = similar_machine(wheel_m);

@@ -3,14 +3,14 @@
 use crate::campaign::{Campaign, MapSource};
 use crate::checks::concern::{Concern, to_mm};
 use mapper_core::OperatingPoint;
+use mapper_physics::compressor_map::inlet_limit::MAX_TIP_SPEED_M_S;
 use mapper_yaml::{Step, steps};
 use std::f64::consts::PI;
 
-/// Maximum tip speed of wheels of any material, m/s.
-const MAX_TIP_SPEED_M_S: f64 = 700.0;
-/// Maximum usual tip speed, m/s: that of titanium wheels.
+/// Usual maximum tip speed, m/s: series wheels reach 560 m/s (see [`MAX_TIP_SPEED_M_S`]), and a warning has to leave them some room.
 const MAX_USUAL_TIP_SPEED_M_S: f64 = 600.0;
-/// Maximum extrapolation of a map beyond its outermost speed lines that is only a warning, as a ratio of their speed.
+/// Extrapolation of a map beyond its outermost speed lines that is only a warning, as a ratio of their speed. Judgement: not much more
+/// than the distance between two lines.
 const MAX_EXTRAPOLATION_RATIO: f64 = 0.1;
 /// Maximum extrapolation without a warning, ratio: corrected speeds of maps are rounded, and the inlet temperature varies.
 const ROUNDING_RATIO: f64 = 0.01;

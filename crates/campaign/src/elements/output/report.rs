@@ -74,7 +74,7 @@ impl Report {
 
 /// Standard uncertainty of a hygrometer's relative humidity. Judgement: capacitive sensors are specified with 2 to 3 %.
 const HYGROMETER_SIGMA_RATIO: f64 = 0.03;
-/// Root mean square of a humidity that is uniform between 0 and saturation, over saturation.
+/// Root mean square of a humidity that is uniform between 0 and saturation, over saturation: 1/sqrt(3).
 const UNIFORM_RMS_RATIO: f64 = 0.577_350_269_189_625_8;
 
 /// A channel that has a sensor, by its symbol.

@@ -11,6 +11,7 @@ use serde::Deserialize;
 use serde_json::Value;
 use std::collections::HashSet;
 
+/// Surge margin of the last point of a line if none is given. Judgement: room for the overshoot of a jump.
 const DEFAULT_SURGE_MARGIN_RATIO: f64 = 0.1;
 /// Keys of a line.
 const FORM: &str = "write `{speed_corrected: 50 krpm, points: 6}`, or `spacing: 8 g/s` in place of `points`";

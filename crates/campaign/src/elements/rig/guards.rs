@@ -195,8 +195,11 @@ pub(crate) struct GuardInputs<'a> {
 
 /// Default time above a limit before a trip: one noisy sample at 10 Hz does not trip, three in a row do.
 const DEFAULT_DWELL_S: f64 = 0.2;
-const DEFAULT_MAX_AGE_S: f64 = 3.0;
+/// Default age of a reading before a trip, s. Judgement: a few samples of an instrument that reads once a second.
+pub const DEFAULT_MAX_AGE_S: f64 = 3.0;
+/// Default time without any change before a channel counts as frozen, s: 200 samples at 10 Hz, none of which has noise.
 const DEFAULT_FROZEN_S: f64 = 20.0;
+/// Default time beyond an oil limit before a trip, s. Judgement: ten samples at 10 Hz.
 const DEFAULT_OIL_DWELL_S: f64 = 1.0;
 const DEFAULT_CHANGE_WITHIN_S: f64 = 10.0;
 const DEFAULT_SURGE_FLOW_RATIO: f64 = 0.05;

@@ -14,7 +14,7 @@ use mapper_numerics::parallel;
 use mapper_numerics::statistics::NORMAL_95;
 use mapper_physics::rig::effect::{EffectInfo, EffectParameter};
 
-/// Maximum number of runs to find a size, and the tolerance in the logarithm of the length: a tenth of a size is no reason to plan otherwise.
+/// Maximum number of runs to find a size, and the tolerance in the logarithm of the length: a tenth of a size does not change a plan.
 const LOOKS: usize = 6;
 const NEAR: f64 = 0.1;
 /// Length of a signature, in sigmas, that is none: rounding.

@@ -46,7 +46,7 @@ pub(crate) fn without_speed(grid: &Grid, heading: &str) -> Option<(String, f64)>
         let (speed_rpm, rest) = match speed_unit(unit) {
             Some(unit) => (unit.to_inside(value), rest),
             None if unit == "k" => (1000.0 * value, rest),
-            // A number with another unit, as of a pressure, is no speed.
+            // A number with another unit, for example of a pressure, is not a speed.
             None if !BARE_RPM.contains(&value) || header_unit(unit).is_some() && !is_bracket => continue,
             None => (value, &heading[from..]),
         };

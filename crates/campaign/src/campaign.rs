@@ -20,6 +20,7 @@ use crate::elements::rig::safe_state::SafeStateFile;
 use crate::elements::rig::sensors::SensorsFile;
 use crate::elements::rig::speed_control::{SpeedControlFile, speed_control};
 use crate::elements::turbocharger::efficiency::EfficiencyFile;
+use crate::elements::turbocharger::gas::GasFile;
 use crate::elements::turbocharger::machine::MachineFile;
 use crate::elements::turbocharger::reference::ReferenceFile;
 use mapper_core::{
@@ -226,6 +227,9 @@ pub(crate) struct CampaignFile {
     /// Definition of the isentropic efficiency, of the nominal map and of the results: `enthalpy` is the ratio of the rises of specific enthalpy, and the default for a map from a table; `kappa_of_T1` takes temperatures with the heat capacity at T1 (Burke et al., eq. 2), and is the default for `closed_form`; `constant_gamma` with a ratio of heat capacities of your own.
     #[schemars(example = &"enthalpy")]
     efficiency: Option<EfficiencyFile>,
+    /// The gases that flow through the machine.
+    #[serde(default)]
+    gas: GasFile,
     /// Formats and directory of the results.
     #[serde(default)]
     outputs: Outputs,
@@ -278,7 +282,8 @@ impl CampaignFile {
             MapSource::Table { .. } => EfficiencyDefinition::default(),
         };
         machine.params.compressor.efficiency = self.efficiency.map_or(usual, Into::into);
-        machine.params.compressor.humidity_kg_kg = self.report.air(&boundary).humidity_kg_kg;
+        self.gas.apply(&mut machine.params);
+        machine.params.compressor.humidity_kg_kg = self.report.humidity_kg_kg(&boundary);
         let campaign = Campaign {
             name: self.campaign,
             description: self.description,

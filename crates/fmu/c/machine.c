@@ -10,38 +10,96 @@
 
 static double largest(double a, double b) { return a > b ? a : b; }
 
-/* ---- air ---- */
+/* ---- gas ---- */
 
-static double heat_capacity(double t_k) { return 1002.5 + 275e-6 * (t_k - 200.0) * (t_k - 200.0); }
+#define MOLAR_GAS_CONSTANT 8.314462618
 
-/* Of dry air between two temperatures, J/(kg K). */
-static double mean_heat_capacity(double from_k, double to_k) {
-    const double a = from_k - 200.0, b = to_k - 200.0;
-    return 1002.5 + 275e-6 / 3.0 * (a * a + a * b + b * b);
+/* `dry` with a mass fraction of water vapour. */
+static Gas with_vapour(const Gas *dry, double fraction) {
+    Gas gas;
+    double x;
+    int i;
+    gas.constant = dry->constant + fraction * (VAPOUR.constant - dry->constant);
+    x = fraction * VAPOUR.constant / gas.constant;
+    for (i = 0; i < 7; i++) gas.cp[i] = dry->cp[i] + fraction * (VAPOUR.cp[i] - dry->cp[i]);
+    for (i = 0; i < 4; i++) {
+        gas.virial[i] = dry->is_real ? (1.0 - x) * ((1.0 - x) * dry->virial[i] + 2.0 * x * dry->virial_with_vapour[i])
+                                           + x * x * VAPOUR.virial[i]
+                                     : 0.0;
+        gas.virial_with_vapour[i] = 0.0;
+    }
+    gas.is_real = dry->is_real;
+    return gas;
 }
 
-/* After a rise of the enthalpy of dry air by `rise` J/kg, K: Newton's method. */
-static double heated_k(double from_k, double rise) {
-    double to_k = from_k + rise / heat_capacity(from_k);
+/* At zero pressure, J/(kg K). */
+static double heat_capacity(const Gas *gas, double t_k) {
+    double sum = 0.0;
     int i;
-    for (i = 0; i < 2; i++) to_k += (rise - mean_heat_capacity(from_k, to_k) * (to_k - from_k)) / heat_capacity(to_k);
+    for (i = 6; i >= 0; i--) sum = sum * 1e-3 * t_k + gas->cp[i];
+    return sum;
+}
+
+/* What a pressure adds to the enthalpy in J/kg, the entropy and the heat capacity in J/(kg K) of a perfect gas. */
+static double enthalpy_departure(const Gas *gas, double t_k, double p_pa) {
+    const double *b = gas->virial, x = 1.0 / t_k;
+    return p_pa * gas->constant / MOLAR_GAS_CONSTANT * (b[0] + x * (2.0 * b[1] + x * (3.0 * b[2] + x * 4.0 * b[3])));
+}
+
+static double entropy_departure(const Gas *gas, double t_k, double p_pa) {
+    const double *b = gas->virial, x = 1.0 / t_k;
+    return p_pa * gas->constant / MOLAR_GAS_CONSTANT * x * x * (b[1] + x * (2.0 * b[2] + x * 3.0 * b[3]));
+}
+
+static double heat_capacity_departure(const Gas *gas, double t_k, double p_pa) {
+    const double *b = gas->virial, x = 1.0 / t_k;
+    return -p_pa * gas->constant / MOLAR_GAS_CONSTANT * x * x * (2.0 * b[1] + x * (6.0 * b[2] + x * 12.0 * b[3]));
+}
+
+/* Specific enthalpy, J/kg. */
+static double enthalpy(const Gas *gas, double t_k, double p_pa) {
+    double sum = 0.0;
+    int i;
+    for (i = 6; i >= 0; i--) sum = sum * 1e-3 * t_k + gas->cp[i] / (i + 1);
+    return sum * t_k + enthalpy_departure(gas, t_k, p_pa);
+}
+
+/* int cp/T dT without its first term, J/(kg K). */
+static double entropy_terms(const Gas *gas, double t_k) {
+    double sum = 0.0;
+    int i;
+    for (i = 6; i >= 1; i--) sum = (sum + gas->cp[i] / i) * 1e-3 * t_k;
+    return sum;
+}
+
+/* After a rise of the enthalpy by `rise` J/kg between two pressures, K: Newton's method. */
+static double heated_k(const Gas *gas, double from_k, double from_pa, double to_pa, double rise) {
+    const double to_j_kg = enthalpy(gas, from_k, from_pa) + rise;
+    double to_k = from_k + rise / heat_capacity(gas, from_k);
+    int i;
+    for (i = 0; i < 2; i++)
+        to_k += (to_j_kg - enthalpy(gas, to_k, to_pa)) / (heat_capacity(gas, to_k) + heat_capacity_departure(gas, to_k, to_pa));
     return to_k;
 }
 
-/* After isentropic compression, K; `gas` is the gas constant over the moist ratio of heat capacities. */
-static double isentropic_k(double from_k, double pressure_ratio, double gas) {
-    const double ln_pressure = log(pressure_ratio);
-    double ln_ratio = gas / heat_capacity(from_k) * ln_pressure, to_k = from_k * exp(ln_ratio);
+/* After isentropic compression, K. */
+static double isentropic_k(const Gas *gas, double from_k, double from_pa, double to_pa) {
+    const double fall = gas->constant * log(to_pa / from_pa);
+    double ln_ratio = fall / heat_capacity(gas, from_k), to_k = from_k * exp(ln_ratio);
     int i;
     for (i = 0; i < 2; i++) {
-        const double entropy = (1002.5 + 275e-6 * 200.0 * 200.0) * ln_ratio
-                               + 275e-6 * (to_k - from_k) * (0.5 * (to_k + from_k) - 400.0);
-        const double step = (gas * ln_pressure - entropy) / heat_capacity(to_k);
+        const double entropy = gas->cp[0] * ln_ratio + entropy_terms(gas, to_k) - entropy_terms(gas, from_k)
+                               + entropy_departure(gas, to_k, to_pa) - entropy_departure(gas, from_k, from_pa);
+        const double step = (fall - entropy) / (heat_capacity(gas, to_k) + heat_capacity_departure(gas, to_k, to_pa));
         ln_ratio += step;
         to_k *= 1.0 + step * (1.0 + step * (0.5 + step / 6.0));
     }
     return to_k;
 }
+
+/* ---- convection, by the properties of dry air ---- */
+
+static double air_heat_capacity(double t_k) { return 1002.5 + 275e-6 * (t_k - 200.0) * (t_k - 200.0); }
 static double viscosity(double t_k) { return 1.458e-6 * t_k * sqrt(t_k) / (t_k + 110.4); }
 static double conductivity(double t_k) { return 0.02624 * pow(t_k / 300.0, 0.8646); }
 
@@ -49,7 +107,7 @@ static double conductivity(double t_k) { return 0.02624 * pow(t_k / 300.0, 0.864
 static double convection(double a, double b, double diameter_m, double flow_kg_s, double bulk_k, double wall_k) {
     const double mu = viscosity(bulk_k), k = conductivity(bulk_k);
     const double reynolds = 4.0 * flow_kg_s / (PI * diameter_m * mu);
-    const double prandtl = heat_capacity(bulk_k) * mu / k;
+    const double prandtl = air_heat_capacity(bulk_k) * mu / k;
     const double nusselt = a * exp(b * log(reynolds) + log(prandtl) / 3.0 + WALL_EXPONENT * log(mu / viscosity(wall_k)));
     return nusselt * k / diameter_m;
 }
@@ -78,17 +136,18 @@ static double orifice(double area_m2, double p_up_pa, double t_up_k, double p_do
 
 /* ---- turbine ---- */
 
-static double drop_ratio(double ln_expansion, double cp) { return 1.0 - exp(-GAS_CONSTANT / cp * ln_expansion); }
+static double drop_ratio(double ln_expansion, double cp) { return 1.0 - exp(-TURBINE_GAS.constant / cp * ln_expansion); }
 
 static void turbine(double *r, double housing_k, double speed_rad_s) {
     const double t3_k = r[VR_T3], ln_expansion = log(r[VR_P3] / r[VR_P4]);
-    const double flow = r[VR_turbine_choked_flow] * sqrt(1.0 - exp(-1.1 * ln_expansion)) * (r[VR_P3] / 101325.0) / sqrt(t3_k / 288.15);
-    const double cp = heat_capacity(t3_k);
+    const double flow = r[VR_turbine_choked_flow] * sqrt(1.0 - exp(-1.1 * ln_expansion)) * (r[VR_P3] / 101325.0) / sqrt(t3_k / 288.15)
+                        / sqrt(TURBINE_GAS.constant / GAS_CONSTANT);
+    const double cp = heat_capacity(&TURBINE_GAS, t3_k);
     const double h = convection(r[VR_turbine_nusselt_coefficient], r[VR_turbine_nusselt_exponent], r[VR_turbine_inlet_diameter], flow,
                                 t3_k, housing_k);
     const double conductance = h * r[VR_turbine_internal_area], units = conductance / (flow * cp);
     const double before_k = (t3_k + units * housing_k) / (1.0 + units);
-    const double cp_before = heat_capacity(before_k);
+    const double cp_before = heat_capacity(&TURBINE_GAS, before_k);
     const double spouting = sqrt(2.0 * cp_before * before_k * drop_ratio(ln_expansion, cp_before));
     const double best = r[VR_turbine_peak_blade_speed_ratio];
     const double away = (speed_rad_s * r[VR_turbine_wheel_radius] / spouting - best) / best;
@@ -104,7 +163,7 @@ static void turbine(double *r, double housing_k, double speed_rad_s) {
 /* ---- the T2 probe ---- */
 
 static double probe_time_constant(double tip_m, double pipe_m, double flow_kg_s, double t2_k) {
-    const double mu = viscosity(t2_k), k = conductivity(t2_k), prandtl = heat_capacity(t2_k) * mu / k;
+    const double mu = viscosity(t2_k), k = conductivity(t2_k), prandtl = air_heat_capacity(t2_k) * mu / k;
     const double reynolds = 4.0 * flow_kg_s * tip_m / (PI * pipe_m * pipe_m * mu), root = cbrt(reynolds);
     const double nusselt = 2.0 + (0.4 * sqrt(reynolds) + 0.06 * root * root) * pow(prandtl, 0.4);
     return 8600.0 * 480.0 * tip_m * tip_m / (6.0 * nusselt * k);
@@ -116,31 +175,29 @@ static double probe_time_constant(double tip_m, double pipe_m, double flow_kg_s,
 static double outputs(double *r, const int *switches, const double *y, double *valve_kg_s, double *inner_heat_w) {
     const double t1_k = r[VR_T1], p1_pa = r[VR_P1];
     const double humidity = r[VR_compressor_humidity];
-    const double vapour = humidity / (1.0 + humidity);
-    const double moist_cp = 1.0 + 0.865 * vapour, gas = GAS_CONSTANT * (1.0 + (1.0 / 0.62198 - 1.0) * vapour);
-    const double moist_flow = sqrt(GAS_CONSTANT / gas);
-    const double cp1 = moist_cp * heat_capacity(t1_k);
-    const double pressure_ratio = y[OUTLET] / p1_pa;
+    const Gas gas = with_vapour(&COMPRESSOR_GAS, humidity / (1.0 + humidity));
+    const double flow_ratio = sqrt(GAS_CONSTANT / gas.constant);
+    const double cp1 = heat_capacity(&gas, t1_k);
+    const double p2_pa = y[OUTLET], pressure_ratio = p2_pa / p1_pa;
     const int inner = r[VR_compressor_inner_capacity_ratio] > 0.0;
     const double wall_k = inner ? y[INNER_WALL] : y[COMPRESSOR_HOUSING];
     const double speed_rpm = y[SPEED] * 30.0 / PI;
     const double gamma = r[VR_compressor_efficiency_gamma];
     const int by_enthalpy = switches[SW_compressor_efficiency_by_enthalpy] && gamma <= 0.0;
     const double rise = by_enthalpy
-                        ? mean_heat_capacity(t1_k, isentropic_k(t1_k, pressure_ratio, gas / moist_cp))
-                              / heat_capacity(t1_k) * (isentropic_k(t1_k, pressure_ratio, gas / moist_cp) / t1_k - 1.0)
-                        : pow(pressure_ratio, gamma > 0.0 ? (gamma - 1.0) / gamma : gas / cp1) - 1.0;
+                        ? (enthalpy(&gas, isentropic_k(&gas, t1_k, p1_pa, p2_pa), p2_pa) - enthalpy(&gas, t1_k, p1_pa)) / (cp1 * t1_k)
+                        : pow(pressure_ratio, gamma > 0.0 ? (gamma - 1.0) / gamma : gas.constant / cp1) - 1.0;
     const double circle = r[VR_compressor_recirculation_ratio];
     const double pipe_m = r[VR_compressor_outlet_diameter];
     MapPoint point = map_at(r[VR_compressor_wheel_diameter], speed_rpm * sqrt(MAP_T_REF_K / t1_k), pressure_ratio,
                             r[VR_compressor_flow_scale]);
-    const double flow = largest(point.flow_kg_s * (p1_pa / MAP_P_REF_PA) / sqrt(t1_k / MAP_T_REF_K) * moist_flow / (1.0 + circle),
+    const double flow = largest(point.flow_kg_s * (p1_pa / MAP_P_REF_PA) / sqrt(t1_k / MAP_T_REF_K) * flow_ratio / (1.0 + circle),
                                 LOWEST_FLOW_KG_S);
     const double efficiency = point.efficiency * r[VR_compressor_efficiency_scale];
     const double warm_k = t1_k * (1.0 + rise / efficiency);
-    const double bulk_k = by_enthalpy ? heated_k(t1_k, heat_capacity(t1_k) * (warm_k - t1_k)) : warm_k;
+    const double bulk_k = by_enthalpy ? heated_k(&gas, t1_k, p1_pa, p2_pa, cp1 * (warm_k - t1_k)) : warm_k;
     const double h = convection(r[VR_compressor_nusselt_coefficient], r[VR_compressor_nusselt_exponent], pipe_m, flow, bulk_k, wall_k)
-                     * cbrt(moist_cp);
+                     * cbrt(cp1 / air_heat_capacity(t1_k));
     const double conductance = h * r[VR_compressor_internal_area], alpha = r[VR_compressor_alpha_area];
     double before_w_k, after_w_k, q1_w, units, target_k, equivalent_k;
 
@@ -154,9 +211,10 @@ static double outputs(double *r, const int *switches, const double *y, double *v
     q1_w = before_w_k * (t1_k - wall_k);
     r[VR_T1_prime] = t1_k - q1_w / (flow * cp1);
     equivalent_k = r[VR_T1_prime] * (1.0 + rise / efficiency) / largest(1.0 - circle * rise / efficiency, 0.1);
-    r[VR_T2_prime] = by_enthalpy ? heated_k(r[VR_T1_prime], heat_capacity(t1_k) * (equivalent_k - r[VR_T1_prime])) : equivalent_k;
+    r[VR_T2_prime] = by_enthalpy ? heated_k(&gas, r[VR_T1_prime], p1_pa, p2_pa, cp1 * (equivalent_k - r[VR_T1_prime]))
+                                 : equivalent_k;
     after_w_k = conductance * (wall_k > r[VR_T2_prime] ? r[VR_compressor_hot_metal_h_ratio] : 1.0) * (1.0 - alpha);
-    units = after_w_k / (flow * moist_cp * heat_capacity(bulk_k));
+    units = after_w_k / (flow * heat_capacity(&gas, bulk_k));
     r[VR_T2] = (r[VR_T2_prime] + units * wall_k) / (1.0 + units);
 
     r[VR_N] = speed_rpm;
@@ -171,17 +229,17 @@ static double outputs(double *r, const int *switches, const double *y, double *v
     r[VR_eta] = efficiency;
     r[VR_h] = h;
     r[VR_q_c] = q1_w + after_w_k * (r[VR_T2] - wall_k);
-    r[VR_W_c] = gamma > 0.0 ? flow * moist_cp * mean_heat_capacity(r[VR_T1_prime], equivalent_k) * (equivalent_k - r[VR_T1_prime])
+    r[VR_W_c] = gamma > 0.0 ? flow * (enthalpy(&gas, equivalent_k, p2_pa) - enthalpy(&gas, r[VR_T1_prime], p1_pa))
                             : flow * cp1 * (equivalent_k - r[VR_T1_prime]);
     turbine(r, y[TURBINE_HOUSING], y[SPEED]);
 
     target_k = r[VR_T2] + r[VR_probe_stem_ratio] * (y[COMPRESSOR_HOUSING] - r[VR_T2]);
     if (r[VR_probe_recovery_ratio] != 1.0) {
-        const double velocity = flow * gas * r[VR_T2] / (y[OUTLET] * 0.25 * PI * pipe_m * pipe_m);
-        target_k -= (1.0 - r[VR_probe_recovery_ratio]) * 0.5 * velocity * velocity / heat_capacity(r[VR_T2]);
+        const double velocity = flow * gas.constant * r[VR_T2] / (y[OUTLET] * 0.25 * PI * pipe_m * pipe_m);
+        target_k -= (1.0 - r[VR_probe_recovery_ratio]) * 0.5 * velocity * velocity / air_heat_capacity(r[VR_T2]);
     }
     r[VR_T2_probe] = r[VR_probe_diameter] > 0.0 ? y[PROBE_TIP] : target_k;
-    *valve_kg_s = moist_flow * orifice(r[VR_valve] * r[VR_outlet_discharge_coefficient] * r[VR_outlet_valve_area], y[OUTLET],
+    *valve_kg_s = flow_ratio * orifice(r[VR_valve] * r[VR_outlet_discharge_coefficient] * r[VR_outlet_valve_area], y[OUTLET],
                                        r[VR_T2], p1_pa);
     *inner_heat_w = inner ? r[VR_compressor_inner_conductance] * (wall_k - y[COMPRESSOR_HOUSING]) : 0.0;
     return target_k;
@@ -193,7 +251,9 @@ double probe_target_k(double *r, const int *switches, const double *y) {
 }
 
 void machine_at(double *r, const int *switches, const double *y, double *rates) {
-    const double humidity = r[VR_compressor_humidity], phi = r[VR_compressor_inner_capacity_ratio];
+    const double humidity = r[VR_compressor_humidity], vapour = humidity / (1.0 + humidity);
+    const double gas_constant = COMPRESSOR_GAS.constant + vapour * (VAPOUR.constant - COMPRESSOR_GAS.constant);
+    const double phi = r[VR_compressor_inner_capacity_ratio];
     const double tc_k = y[COMPRESSOR_HOUSING], tt_k = y[TURBINE_HOUSING];
     const double to_bearing = 2.0 * r[VR_bearing_conductivity] * r[VR_bearing_section_area] / r[VR_bearing_length];
     const double to_oil = r[VR_bearing_oil_conductance];
@@ -210,7 +270,7 @@ void machine_at(double *r, const int *switches, const double *y, double *rates) 
                                        : (r[VR_W_t] - r[VR_W_c] - r[VR_bearing_friction] * y[SPEED] * y[SPEED])
                                              / (r[VR_shaft_inertia] * y[SPEED]);
     rates[OUTLET] = switches[SW_driven] ? 0.0
-                                        : GAMMA_AIR * GAS_CONSTANT * (1.0 + 0.6078 * humidity) * r[VR_T2] / r[VR_outlet_volume]
+                                        : GAMMA_AIR * gas_constant * r[VR_T2] / r[VR_outlet_volume]
                                               * (r[VR_m_c] - valve_kg_s);
     balance_w = (phi > 0.0 ? inner_heat_w : r[VR_q_c]) + to_bearing * (bearing_k - tc_k) + radiation_w
                 - external_heat(r[VR_compressor_external_area], r[VR_compressor_emissivity], r[VR_external_convection_ratio], tc_k,

@@ -6,8 +6,12 @@ use crate::variable::{Causality, Switch, Variable};
 use mapper_core::ReferenceState;
 use mapper_physics::compressor_map::characteristic::CompressorCharacteristic;
 use mapper_physics::compressor_map::tabulated_map::{Line, Node, TabulatedMap};
+use mapper_physics::machine::params::Params;
 use mapper_physics::{
-    gas::air,
+    gas::{
+        air,
+        mixture::{Gas, Virials},
+    },
     laws::{housing, nusselt},
     simulation::rodas5p,
 };
@@ -34,6 +38,7 @@ pub fn header(
         FmuMap::ClosedForm(_) => text += "#define MAP_CLOSED_FORM\n\n",
         FmuMap::Table(map) => table(&mut text, map)?,
     }
+    gases(&mut text, machine.params)?;
     tableau(&mut text)?;
     text += "\n#endif\n";
     Ok(text)
@@ -61,6 +66,37 @@ fn constants(text: &mut String, reference: ReferenceState) -> Result<(), FmuErro
     ] {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "#define {name} {}", number(name, value)?);
+    }
+    text.push('\n');
+    Ok(())
+}
+
+/// The gases of both sides, and the vapour that `compressor.humidity` adds.
+fn gases(text: &mut String, params: &Params) -> Result<(), FmuError> {
+    text.push_str(
+        "typedef struct {\n    double constant, cp[7];\n    int is_real;\n    double virial[4], virial_with_vapour[4];\n} Gas;\n",
+    );
+    for (name, gas) in [
+        ("COMPRESSOR_GAS", params.compressor.gas),
+        ("TURBINE_GAS", params.turbine.gas),
+        ("VAPOUR", Gas::vapour()),
+    ] {
+        let list = |values: &[f64]| {
+            let numbers: Result<Vec<String>, FmuError> =
+                values.iter().map(|value| number(name, *value)).collect();
+            numbers.map(|numbers| format!("{{{}}}", numbers.join(", ")))
+        };
+        let virials = gas.virials.unwrap_or(Virials { own: [0.0; 4], with_vapour: [0.0; 4] });
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            text,
+            "static const Gas {name} = {{{}, {}, {}, {}, {}}};",
+            number(name, gas.gas_constant_j_kgk)?,
+            list(&gas.heat_capacity)?,
+            u8::from(gas.virials.is_some()),
+            list(&virials.own)?,
+            list(&virials.with_vapour)?
+        );
     }
     text.push('\n');
     Ok(())

@@ -4,6 +4,7 @@ use mapper_core::{Channel, InletConvection, JointSettings, Method, ReferenceStat
 pub use mapper_core::{DeclaredUncertainty, NoiseColour};
 use mapper_numerics::coloured_noise::ColouredNoise;
 use mapper_physics::gas::air::Air;
+use mapper_physics::gas::mixture::Gas;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -39,7 +40,9 @@ pub struct IdentifyConfig {
     pub reference: ReferenceState,
     /// The compressed air.
     pub air: Air,
-    /// One standard deviation of its humidity, kg/kg: part of the intervals of the joint method.
+    /// The gas of the turbine.
+    pub turbine_gas: Gas,
+    /// One standard deviation of the humidity of `air`, kg/kg: part of the intervals of the joint method.
     pub humidity_sigma_kg_kg: f64,
     /// Pressure at which an isothermal zero has compared the pressure sensors, Pa: their gain errors count from there; 0 without a zero.
     pub rest_pressure_pa: f64,
@@ -75,6 +78,7 @@ impl Default for IdentifyConfig {
             joint: JointSettings::default(),
             reference: ReferenceState::SAE,
             air: Air::PAPER,
+            turbine_gas: Gas::CLOSED_FORM_AIR,
             humidity_sigma_kg_kg: 0.0,
             rest_pressure_pa: 0.0,
             barometer_sigma_pa: 0.0,

@@ -67,8 +67,7 @@ fn of_point(
     heat: Option<KnownHeat<'_>>,
     config: &IdentifyConfig,
 ) -> (IdentifiedPoint, PointBudgets) {
-    let air =
-        measured.humidity_kg_kg.map_or(config.air, |humidity_kg_kg| Air { humidity_kg_kg, ..config.air });
+    let air = measured.humidity_kg_kg.map_or(config.air, |humidity| config.air.with_humidity(humidity));
     let config = &IdentifyConfig { air, ..config.clone() };
     let mut findings = Findings::new();
     let state = EndState {
@@ -231,7 +230,7 @@ impl Inputs {
     /// The efficiency; `None` if there is none.
     fn efficiency(&self) -> Option<f64> {
         let MeasuredPoint { t1_k, p1_pa, p2_pa, .. } = self.point;
-        let apparent = apparent_efficiency(p2_pa / p1_pa, t1_k, self.t2_k, self.air);
+        let apparent = apparent_efficiency(p2_pa / p1_pa, t1_k, self.t2_k, self.air.between(p1_pa, p2_pa));
         let eta = match &self.machine {
             None => apparent,
             Some(machine) => {
@@ -274,7 +273,7 @@ impl Inputs {
     fn model(&self, machine: &Machine, eta: f64) -> (Model, BoundaryConditions) {
         let mut params = machine.params;
         let compressor = &mut params.compressor;
-        (compressor.humidity_kg_kg, compressor.efficiency) = (self.air.humidity_kg_kg, self.air.efficiency);
+        (compressor.humidity_kg_kg, compressor.efficiency) = (self.air.humidity_kg_kg(), self.air.efficiency);
         (compressor.flow_scale_ratio, compressor.efficiency_scale_ratio) = (1.0, 1.0);
         let map = OnePoint {
             // At the state of the inlet itself corrected flow is measured flow; the wheel pumps what recirculates, too.
@@ -370,7 +369,7 @@ impl Inputs {
                 moved.point.p1_pa += by;
                 moved.point.p2_pa += by;
             }
-            (Moved::Humidity, _) => moved.air.humidity_kg_kg += by,
+            (Moved::Humidity, _) => moved.air = moved.air.with_humidity(moved.air.humidity_kg_kg() + by),
             (what, _) => {
                 if let Some(machine) = &mut moved.machine {
                     machine.move_by(what, by);

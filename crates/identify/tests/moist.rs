@@ -21,8 +21,7 @@ fn joint(air: Air, humidity_sigma_kg_kg: f64) -> IdentifyConfig {
 fn declared_humidity_gives_the_points_of_the_model() {
     let clean =
         campaign(&eighteen(), 120.0, Machine { humidity_kg_kg: HUMIDITY_KG_KG, ..Machine::default() });
-    let known = identify(&clean.recording, &joint(Air { humidity_kg_kg: HUMIDITY_KG_KG, ..Air::PAPER }, 0.0))
-        .unwrap();
+    let known = identify(&clean.recording, &joint(Air::PAPER.with_humidity(HUMIDITY_KG_KG), 0.0)).unwrap();
     let dry = identify(&clean.recording, &joint(Air::PAPER, 0.0)).unwrap();
     let mut wrong = 0;
     for ((known, dry), truth) in known.iter().zip(&dry).zip(&clean.truth) {

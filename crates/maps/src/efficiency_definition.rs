@@ -1,22 +1,24 @@
 //! Converts the efficiencies of a map to another definition.
 
-use mapper_core::{CompressorMap, EfficiencyDefinition, EstimateUncertainty, MapPoint};
+use mapper_core::{CompressorMap, EfficiencyDefinition, EstimateUncertainty, MapPoint, ReferenceState};
 use mapper_physics::gas::air::Air;
+use mapper_physics::gas::mixture::Gas;
 use mapper_physics::laws::compression::efficiency_by;
 
-/// Converts the efficiencies of a map from the definition `from` to `to`, for equal temperatures of dry air at the map's reference
-/// temperature. Intervals and standard errors keep their ratio to the efficiency; a fitted surface is dropped.
+/// Converts the efficiencies of a map from the definition `from` to `to`, for equal temperatures of dry air from the map's reference
+/// state. Intervals and standard errors keep their ratio to the efficiency; a fitted surface is dropped.
 pub fn convert_efficiency(
     mut map: CompressorMap,
     from: EfficiencyDefinition,
     to: EfficiencyDefinition,
 ) -> CompressorMap {
     if from != to {
-        let t1_k = map.reference.t_ref_k;
-        let air = Air { efficiency: from, ..Air::DRY };
+        let ReferenceState { t_ref_k, p_ref_pa } = map.reference;
+        let air = Air::new(Gas::air(), 0.0).with_efficiency(from);
         for point in map.lines.iter_mut().flat_map(|line| &mut line.points) {
             if let Some(eta) = point.eta.filter(|eta| *eta > 0.0 && point.pressure_ratio > 1.0) {
-                scale(point, efficiency_by(to, eta, point.pressure_ratio, t1_k, air) / eta);
+                let air = air.between(p_ref_pa, point.pressure_ratio * p_ref_pa);
+                scale(point, efficiency_by(to, eta, point.pressure_ratio, t_ref_k, air) / eta);
             }
         }
         map.fitted = None;

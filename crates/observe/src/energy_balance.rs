@@ -3,6 +3,7 @@
 use mapper_core::{Channel, DeclaredUncertainty, Dimension, Recording};
 use mapper_numerics::statistics::mean;
 use mapper_physics::gas::air::Air;
+use mapper_physics::gas::mixture::Gas;
 use mapper_physics::rig::sensor_fault::CALIBRATED_AT_K;
 use std::collections::BTreeMap;
 
@@ -56,11 +57,20 @@ const WATER_J_KGK: f64 = 4190.0;
 /// Step of the numerical derivatives, ratio of the standard uncertainty.
 const STEP_RATIO: f64 = 0.1;
 
-/// The balance of the means over a time span. `declared`: standard uncertainties of the sensors; `air`: that of the compressor.
+/// The gases of compressor and turbine.
+#[derive(Debug, Clone, Copy)]
+pub struct Gases {
+    /// Of the compressor.
+    pub compressor: Air,
+    /// Of the turbine.
+    pub turbine: Gas,
+}
+
+/// The balance of the means over a time span. `declared`: standard uncertainties of the sensors.
 pub fn energy_balance(
     recording: &Recording,
     span_s: (f64, f64),
-    air: Air,
+    gases: Gases,
     declared: &BTreeMap<Channel, DeclaredUncertainty>,
 ) -> EnergyBalance {
     let mut readings = [f64::NAN; INPUTS.len()];
@@ -76,7 +86,7 @@ pub fn energy_balance(
             sigmas[place] = noise.hypot(of.offset_sigma).hypot(of.gain_sigma_ratio * (reading - zero));
         }
     }
-    let powers = powers_w(&readings, air, 1.0);
+    let powers = powers_w(&readings, gases, 1.0);
     let mut variances = [0.0; POWERS];
     let mut add = |moved: [f64; POWERS]| {
         for ((variance, moved), power) in variances.iter_mut().zip(moved).zip(powers) {
@@ -87,9 +97,9 @@ pub fn energy_balance(
         let mut moved = readings;
         moved[place] += STEP_RATIO * sigma;
         // A missing reading stays missing, and changes only what it is not part of: nothing.
-        add(powers_w(&moved, air, 1.0));
+        add(powers_w(&moved, gases, 1.0));
     }
-    add(powers_w(&readings, air, 1.0 + STEP_RATIO * OIL_RATIO));
+    add(powers_w(&readings, gases, 1.0 + STEP_RATIO * OIL_RATIO));
     let power = |place: usize| {
         let (w, variance): (f64, f64) = (powers[place], variances[place]);
         (w.is_finite()).then(|| Power { w, sigma_w: variance.sqrt() })
@@ -106,11 +116,11 @@ pub fn energy_balance(
 const POWERS: usize = 5;
 
 /// Compressor, turbine, oil, water, losses, W; NaN if a reading is missing.
-fn powers_w(readings: &[f64; INPUTS.len()], air: Air, oil_ratio: f64) -> [f64; POWERS] {
+fn powers_w(readings: &[f64; INPUTS.len()], gases: Gases, oil_ratio: f64) -> [f64; POWERS] {
     let &[m_c, t1_k, t2_k, m_t, t3_k, t4_k, m_oil, oil_k, oil_out_k, m_water, water_k, water_out_k] =
         readings;
-    let compressor = m_c * air.enthalpy_rise_j_kg(t1_k, t2_k);
-    let turbine = m_t * Air::DRY.enthalpy_rise_j_kg(t4_k, t3_k);
+    let compressor = m_c * gases.compressor.enthalpy_rise_j_kg(t1_k, t2_k);
+    let turbine = m_t * Air::new(gases.turbine, 0.0).enthalpy_rise_j_kg(t4_k, t3_k);
     let (at_300_k, rise) = OIL;
     let oil_j_kgk = oil_ratio * (at_300_k + rise * (0.5 * (oil_k + oil_out_k) - 300.0));
     let oil = m_oil * oil_j_kgk * (oil_out_k - oil_k);
@@ -150,7 +160,8 @@ mod tests {
             DeclaredUncertainty { offset_sigma: 1.0, ..DeclaredUncertainty::default() },
         )]);
         let balance = |readings: &[(Channel, f64)]| {
-            energy_balance(&recording(readings), (0.0, 1.0), Air::DRY, &declared)
+            let gases = Gases { compressor: Air::DRY, turbine: Gas::CLOSED_FORM_AIR };
+            energy_balance(&recording(readings), (0.0, 1.0), gases, &declared)
         };
         let gas = balance(&readings);
         let (compressor, turbine) = (gas.compressor.unwrap(), gas.turbine.unwrap());

@@ -7,7 +7,9 @@
 mod support;
 
 use mapper_core::{Channel, IdentifiedPoint, OperatingPoint, Recording, Series, StepKind, StepMarker};
+use mapper_observe::energy_balance::Gases;
 use mapper_physics::gas::air::Air;
+use mapper_physics::gas::mixture::Gas;
 use mapper_report::{turbine_points, turbine_text};
 
 /// Steady states of the nominal model at openings 0.5 and 1 (docs/reference/model.md; T1 298.15 K, P1 100 kPa, T3 773.15 K, P4
@@ -23,6 +25,7 @@ const STATES: [[f64; 7]; 8] = [
     [150e3, 218_647.141_2, 246_383.130_7, 0.057_723_547_07, 0.074_827_811_95, 0.657_467_314_1, 672.558_748_1],
     [150e3, 258_570.997_4, 223_941.524_7, 0.107_535_761_3, 0.094_863_394_22, 0.695_295_509_9, 652.078_956_7],
 ];
+const GASES: Gases = Gases { compressor: Air::PAPER, turbine: Gas::CLOSED_FORM_AIR };
 const T3_K: f64 = 773.15;
 const P4_PA: f64 = 110_000.0;
 /// R/cp of air at about 760 K.
@@ -75,7 +78,7 @@ fn from_the_gas_temperatures(state: &[f64; 7]) -> f64 {
 #[test]
 fn flow_parameter_expansion_ratio_and_efficiency_are_those_of_the_reference() {
     for state in &STATES {
-        let points = turbine_points(&recording(state), &[identified(state)], Air::PAPER);
+        let points = turbine_points(&recording(state), &[identified(state)], GASES);
         let [point] = points.as_slice() else { panic!("{points:?}") };
         // kg K^0.5 / (s kPa), by definition.
         let parameter = state[4] * T3_K.sqrt() / (state[1] / 1e3);
@@ -93,9 +96,9 @@ fn flow_parameter_expansion_ratio_and_efficiency_are_those_of_the_reference() {
 fn bearing_friction_shows_as_lost_efficiency() {
     // A wheel that gives 5 % more power than the compressor takes, by 5 % more flow: the difference is mechanical loss.
     let mut state = STATES[5];
-    let before = turbine_points(&recording(&state), &[identified(&state)], Air::PAPER)[0].efficiency.unwrap();
+    let before = turbine_points(&recording(&state), &[identified(&state)], GASES)[0].efficiency.unwrap();
     state[4] *= 1.05;
-    let after = turbine_points(&recording(&state), &[identified(&state)], Air::PAPER)[0].efficiency.unwrap();
+    let after = turbine_points(&recording(&state), &[identified(&state)], GASES)[0].efficiency.unwrap();
     assert!((before / after - 1.05).abs() < 1e-12);
 }
 
@@ -104,7 +107,7 @@ fn what_is_not_known_is_absent_and_never_a_number() {
     let state = STATES[3];
     let mut unknown = identified(&state);
     unknown.eta = None;
-    let points = turbine_points(&recording(&state), &[unknown], Air::PAPER);
+    let points = turbine_points(&recording(&state), &[unknown], GASES);
     assert_eq!(points[0].efficiency, None);
     let text = turbine_text("turbo_a", &points);
     assert!(
@@ -118,6 +121,6 @@ fn what_is_not_known_is_absent_and_never_a_number() {
     let mut broken = recording(&state);
     broken.series.get_mut(&Channel::T3).unwrap().values.fill(f64::NAN);
     for recording in [backwards, missing, broken] {
-        assert!(turbine_points(&recording, &[identified(&state)], Air::PAPER).is_empty());
+        assert!(turbine_points(&recording, &[identified(&state)], GASES).is_empty());
     }
 }

@@ -17,6 +17,7 @@ mod fleet;
 mod fleet_cluster;
 mod fmu;
 mod full_disk;
+mod gases;
 mod help;
 mod interrupted;
 mod library_errors;

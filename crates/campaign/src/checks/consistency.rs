@@ -16,6 +16,7 @@ pub(crate) fn check(tree: &Tree, files: Files<'_>, notes: &mut Notes) {
     elements::rig::sensors::check(&mut check);
     elements::output::report::check(&mut check);
     elements::turbocharger::machine::check(&mut check);
+    elements::turbocharger::gas::check(&mut check);
     elements::points::sequence::check(&mut check);
     elements::points::grid::check(&mut check);
 }

@@ -76,6 +76,7 @@ pub fn predict(rows: &Readings, declared: &Declared, values: &Values, count: usi
         _,
     ] = values.0;
     let compressor = &declared.params.compressor;
+    let air = compressor.air();
     let count = count.min(rows.len());
     let mut predicted = Predicted::default();
     let mut state: Option<(f64, f64)> = None;
@@ -88,19 +89,20 @@ pub fn predict(rows: &Readings, declared: &Declared, values: &Values, count: usi
                 .clamp(EFFICIENCY.0, EFFICIENCY.1);
         let (mut tc_k, mut reading_k) =
             state.unwrap_or((0.5 * (t1_k + rows.t2_k[i]) + start_over_k, rows.t2_k[i] - t2_offset_k));
-        let rise = isentropic_rise_ratio(rows.p2_pa[i] / rows.p1_pa[i], t1_k, compressor.air());
+        let air = air.between(rows.p1_pa[i], rows.p2_pa[i]);
+        let rise = isentropic_rise_ratio(rows.p2_pa[i] / rows.p1_pa[i], t1_k, air);
         let h_w_m2k = h_ratio
             * nusselt::coefficient_w_m2k(
                 compressor.nusselt_coefficient,
                 compressor.nusselt_exponent,
                 compressor.outlet_diameter_m,
                 flow_kg_s,
-                compressed_k(t1_k, rise, efficiency, compressor.air()),
+                compressed_k(t1_k, rise, efficiency, air),
                 tc_k,
             );
         let gas = compress(
             &CompressionInputs {
-                air: compressor.air(),
+                air,
                 t1_k,
                 tc_k,
                 flow_kg_s,

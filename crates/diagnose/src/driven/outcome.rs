@@ -188,8 +188,10 @@ fn trace(air: Air, rows: &Readings, predicted: &[Predicted], noisy: &[Vec<f64>])
     };
     let end = |i: usize, share: f64| quantile(noisy.iter().map(|one| one[i]), share).unwrap_or(f64::NAN);
     let every = || 0..rows.len();
-    let apparent =
-        |i: usize| apparent_efficiency(rows.p2_pa[i] / rows.p1_pa[i], rows.t1_k[i], rows.t2_k[i], air);
+    let apparent = |i: usize| {
+        let (p1_pa, p2_pa) = (rows.p1_pa[i], rows.p2_pa[i]);
+        apparent_efficiency(p2_pa / p1_pa, rows.t1_k[i], rows.t2_k[i], air.between(p1_pa, p2_pa))
+    };
     Trace {
         t_s: rows.t_s.clone(),
         read_k: rows.t2_k.clone(),

@@ -70,6 +70,7 @@ mod tests {
     fn ends_with(t3_k: f64, t2_read_k: Option<f64>) -> Vec<Option<Ends>> {
         let end = Ends {
             air: mapper_physics::gas::air::Air::PAPER,
+            turbine_gas: mapper_physics::gas::mixture::Gas::CLOSED_FORM_AIR,
             position: 0,
             end_s: 0.0,
             valve_opening_ratio: 1.0,

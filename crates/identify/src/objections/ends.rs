@@ -5,6 +5,7 @@ use mapper_core::{Channel, Recording};
 use mapper_numerics::statistics::median;
 use mapper_observe::plausible::is_reading;
 use mapper_physics::gas::air::Air;
+use mapper_physics::gas::mixture::Gas;
 use mapper_physics::laws::compression::isentropic_rise_ratio;
 
 /// Last part of a step, s.
@@ -30,6 +31,7 @@ pub(crate) struct Ends {
     pub(crate) t4_k: Option<f64>,
     /// The compressed air.
     pub(crate) air: Air,
+    pub(crate) turbine_gas: Gas,
 }
 
 impl Ends {
@@ -52,21 +54,24 @@ pub(crate) fn ends(recording: &Recording, config: &IdentifyConfig) -> Vec<Option
                 median(values.iter().filter(|value| is_reading(channel, **value)))
             };
             let (flow_kg_s, t1_k, t2_k) = (at(Channel::CompressorFlow)?, at(Channel::T1)?, at(Channel::T2)?);
+            let p1_pa = taps::total_pa(config.inlet_tap, at(Channel::P1)?, flow_kg_s, t1_k);
+            let p2_pa = taps::total_pa(config.outlet_tap, at(Channel::P2)?, flow_kg_s, t2_k);
             let end = Ends {
                 position,
                 end_s: step.end_s,
                 valve_opening_ratio: step.valve_opening_ratio,
                 speed_rpm: at(Channel::ShaftSpeed)?,
                 flow_kg_s,
-                p1_pa: taps::total_pa(config.inlet_tap, at(Channel::P1)?, flow_kg_s, t1_k),
-                p2_pa: taps::total_pa(config.outlet_tap, at(Channel::P2)?, flow_kg_s, t2_k),
+                p1_pa,
+                p2_pa,
                 t1_k,
                 t2_k,
                 tc_k: at(Channel::Tc),
                 turbine_flow_kg_s: at(Channel::TurbineFlow),
                 t3_k: at(Channel::T3),
                 t4_k: at(Channel::T4),
-                air: config.air,
+                air: config.air.between(p1_pa, p2_pa),
+                turbine_gas: config.turbine_gas,
             };
             (end.p1_pa > 0.0 && end.p2_pa > 0.0 && end.isentropic_rise_k().is_finite()).then_some(end)
         })

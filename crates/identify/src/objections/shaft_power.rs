@@ -1,6 +1,6 @@
 //! Compares compressor and turbine power: a shaft cannot deliver more than it receives.
 //!
-//! `m_c cp (T2 - T1)` against `m_t cp (T3 - T4)`, the whole enthalpy that the exhaust gas loses, heat included. Bearings and housings take 10
+//! `m_c (h2 - h1)` against `m_t (h3 - h4)`, the whole enthalpy that the exhaust gas loses, heat included. Bearings and housings take 10
 //! to 40 % of it. A single point may exceed it for a while, if a hot compressor housing heats the air or the shaft slows down. The median of a
 //! campaign may not.
 
@@ -9,7 +9,7 @@ use crate::objections::objection::Objection;
 use mapper_core::{Channel, Scaled, Warning};
 use mapper_numerics::statistics::median;
 use mapper_observe::plausible::check_running;
-use mapper_physics::gas::air;
+use mapper_physics::gas::air::Air;
 
 /// Limits for the ratio of compressor to turbine power of the median point: upper, and lower. A turbine housing that loses as much as it
 /// delivers is far below every gas stand.
@@ -26,7 +26,7 @@ pub(crate) fn objections(ends: &[Option<Ends>]) -> Option<Objection> {
                 return None;
             }
             let taken = end.flow_kg_s * end.air.enthalpy_rise_j_kg(end.t1_k, end.t2_k);
-            let given = flow_kg_s * air::heat_capacity_j_kgk(0.5 * (t3_k + t4_k)) * (t3_k - t4_k);
+            let given = flow_kg_s * Air::new(end.turbine_gas, 0.0).enthalpy_rise_j_kg(t4_k, t3_k);
             (given > 0.0).then_some((taken, given))
         })
         .collect();

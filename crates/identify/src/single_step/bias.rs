@@ -115,20 +115,16 @@ fn sensitivity(fit: &Fit, samples: &Samples, geometry: Geometry, channel: Channe
             let reading = column(samples, channel)[i];
             let step = 1e-5 * reading;
             let moved = |by: f64| {
-                let pressures = match channel {
-                    Channel::P1 => samples.p2_pa[i] / (samples.p1_pa[i] + by),
-                    Channel::P2 => (samples.p2_pa[i] + by) / samples.p1_pa[i],
-                    _ => samples.p2_pa[i] / samples.p1_pa[i],
+                let row = match channel {
+                    Channel::Tc => return Row { tc_k: row.tc_k + by, ..row },
+                    Channel::CompressorFlow => return Row { flow_kg_s: row.flow_kg_s + by, ..row },
+                    Channel::T1 => Row { t1_k: row.t1_k + by, ..row },
+                    Channel::P1 => Row { p1_pa: row.p1_pa + by, ..row },
+                    Channel::P2 => Row { p2_pa: row.p2_pa + by, ..row },
+                    _ => row,
                 };
-                match channel {
-                    Channel::Tc => Row { tc_k: row.tc_k + by, ..row },
-                    Channel::CompressorFlow => Row { flow_kg_s: row.flow_kg_s + by, ..row },
-                    Channel::T1 => {
-                        let t1_k = row.t1_k + by;
-                        Row { t1_k, rise_ratio: isentropic_rise_ratio(pressures, t1_k, geometry.air), ..row }
-                    }
-                    _ => Row { rise_ratio: isentropic_rise_ratio(pressures, row.t1_k, geometry.air), ..row },
-                }
+                let air = geometry.air.between(row.p1_pa, row.p2_pa);
+                Row { rise_ratio: isentropic_rise_ratio(row.p2_pa / row.p1_pa, row.t1_k, air), ..row }
             };
             -(fitted_k(moved(step)) - fitted_k(moved(-step))) / (2.0 * step)
         })

@@ -61,7 +61,10 @@ pub fn expected(rows: &[ExpectedRow], interval_s: f64, config: &IdentifyConfig) 
         flow_kg_s: column(|row| row.flow_kg_s),
         rise_ratio: rows
             .iter()
-            .map(|row| isentropic_rise_ratio(row.p2_pa / row.p1_pa, row.t1_k, config.air))
+            .map(|row| {
+                let air = config.air.between(row.p1_pa, row.p2_pa);
+                isentropic_rise_ratio(row.p2_pa / row.p1_pa, row.t1_k, air)
+            })
             .collect(),
         lost: 0,
     };

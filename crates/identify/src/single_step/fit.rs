@@ -47,7 +47,7 @@ impl Geometry {
 
     /// Ratio of h before the wheel to h after it.
     fn inlet_h_ratio(&self, row: Row, eta: f64) -> f64 {
-        let bulk_k = || compressed_k(row.t1_k, row.rise_ratio, eta, self.air);
+        let bulk_k = || compressed_k(row.t1_k, row.rise_ratio, eta, self.air.between(row.p1_pa, row.p2_pa));
         self.inlet.map_or(1.0, |law| law.h_ratio(row.t1_k, bulk_k()))
     }
 }
@@ -121,7 +121,7 @@ pub(crate) fn t2_k(geometry: Geometry, row: Row, eta: f64, h_w_m2k: f64) -> f64 
         inlet_h_ratio: geometry.inlet_h_ratio(row, eta),
         alpha_area_ratio: geometry.alpha_area_ratio,
         internal_area_m2: geometry.internal_area_m2,
-        air: geometry.air,
+        air: geometry.air.between(row.p1_pa, row.p2_pa),
     };
     compress(&inputs, None).t2_k
 }
@@ -132,17 +132,20 @@ pub(crate) struct Row {
     pub(crate) t1_k: f64,
     pub(crate) tc_k: f64,
     pub(crate) flow_kg_s: f64,
+    pub(crate) p1_pa: f64,
+    pub(crate) p2_pa: f64,
     pub(crate) rise_ratio: f64,
 }
 
 /// The rows of the samples in order.
 pub(crate) fn rows(samples: &Samples) -> impl Iterator<Item = Row> + '_ {
-    let pairs = samples.t1_k.iter().zip(&samples.tc_k).zip(&samples.flow_kg_s).zip(&samples.rise_ratio);
-    pairs.map(|(((t1_k, tc_k), flow_kg_s), rise_ratio)| Row {
-        t1_k: *t1_k,
-        tc_k: *tc_k,
-        flow_kg_s: *flow_kg_s,
-        rise_ratio: *rise_ratio,
+    (0..samples.t1_k.len()).map(|i| Row {
+        t1_k: samples.t1_k[i],
+        tc_k: samples.tc_k[i],
+        flow_kg_s: samples.flow_kg_s[i],
+        p1_pa: samples.p1_pa[i],
+        p2_pa: samples.p2_pa[i],
+        rise_ratio: samples.rise_ratio[i],
     })
 }
 

@@ -30,7 +30,8 @@ pub(crate) struct Means {
 
 impl Means {
     pub(crate) fn apparent_eta(&self) -> f64 {
-        apparent_efficiency(self.p2_pa / self.p1_pa, self.t1_k, self.t2_k, self.air)
+        let air = self.air.between(self.p1_pa, self.p2_pa);
+        apparent_efficiency(self.p2_pa / self.p1_pa, self.t1_k, self.t2_k, air)
     }
 
     fn moved(self, channel: Channel, by: f64) -> Self {

@@ -61,7 +61,7 @@ impl Samples {
             let complete = readings.into_iter().all(|(channel, value)| is_reading(channel, value))
                 && flow_kg_s > 0.0
                 && (!with_housing || is_reading(Channel::Tc, tc_k));
-            let rise_ratio = isentropic_rise_ratio(p2_pa / p1_pa, t1_k, config.air);
+            let rise_ratio = isentropic_rise_ratio(p2_pa / p1_pa, t1_k, config.air.between(p1_pa, p2_pa));
             if !complete || !rise_ratio.is_finite() {
                 samples.lost += 1;
                 continue;

@@ -1,7 +1,8 @@
 //! Work and flow coefficients of a map's points, with the apparent work.
 
 use mapper_core::{CompressorMap, ReferenceState};
-use mapper_physics::gas::air::{self, Air};
+use mapper_physics::gas::air::Air;
+use mapper_physics::gas::mixture::Gas;
 use mapper_physics::laws::compression::isentropic_rise_ratio;
 
 /// Unit of the speed ratio, rpm: the estimate does not depend on it, nor on the wheel's diameter.
@@ -39,13 +40,14 @@ impl WorkPoint {
 
 /// Dry air with the map's definition of efficiency; by enthalpy if the map does not name one.
 pub fn air_of(map: &CompressorMap) -> Air {
-    Air { efficiency: map.efficiency.unwrap_or_default(), ..Air::DRY }
+    Air::new(Gas::air(), 0.0).with_efficiency(map.efficiency.unwrap_or_default())
 }
 
 /// Isentropic specific work from the reference temperature, J/kg.
 pub fn isentropic_work_j_kg(reference: ReferenceState, pressure_ratio: f64, air: Air) -> f64 {
-    let t_k = reference.t_ref_k;
-    air::heat_capacity_j_kgk(t_k) * t_k * isentropic_rise_ratio(pressure_ratio, t_k, air)
+    let (t_k, p_pa) = (reference.t_ref_k, reference.p_ref_pa);
+    let air = air.between(p_pa, pressure_ratio * p_pa);
+    air.heat_capacity_j_kgk(t_k) * t_k * isentropic_rise_ratio(pressure_ratio, t_k, air)
 }
 
 /// The points with an efficiency that lie outside choke.
@@ -69,7 +71,7 @@ pub fn work_points(map: &CompressorMap) -> Vec<WorkPoint> {
             let speed_ratio = line.speed_corrected_rpm / UNIT_SPEED_RPM;
             let work_j_kg = isentropic_work_j_kg(reference, point.pressure_ratio, air) / eta;
             let t_k = reference.t_ref_k;
-            let rise_ratio = work_j_kg / (air::heat_capacity_j_kgk(t_k) * t_k);
+            let rise_ratio = work_j_kg / (air.heat_capacity_j_kgk(t_k) * t_k);
             let inlet_flow = flow_kg_s / speed_ratio;
             points.push(WorkPoint {
                 line: index,

@@ -17,7 +17,8 @@ use mapper_core::{
     CompressorMap, EfficiencyDefinition, ImportError, ImportRemark, ImportedMap, MapDescription,
     MeasuredPoint, ReferenceState, StaticTaps, TurbineReadings,
 };
-use mapper_physics::gas::air::Air;
+use mapper_physics::gas::air::{Air, humidity_kg_kg};
+use mapper_physics::gas::mixture::Gas;
 use mapper_physics::gas::pressure_tap::static_to_total_pa;
 use mapper_physics::laws::compression::apparent_efficiency;
 use mapper_yaml::units::{Kind, header_unit};
@@ -192,10 +193,8 @@ fn measured_point(
         p2_pa = static_to_total_pa(p2_pa, flow_kg_s, require(point, Quantity::T2, t2_k)?, diameter_m);
     }
     let humidity = point.of(Quantity::Humidity).map(|(column, written)| match column.is_relative() {
-        true if column.unit.is_empty() => {
-            Air::of_relative_humidity(0.01 * written, t1_k, p1_pa).humidity_kg_kg
-        }
-        true => Air::of_relative_humidity(column.as_stated(written), t1_k, p1_pa).humidity_kg_kg,
+        true if column.unit.is_empty() => humidity_kg_kg(0.01 * written, t1_k, p1_pa),
+        true => humidity_kg_kg(column.as_stated(written), t1_k, p1_pa),
         false => column.as_stated(written),
     });
     if let Some(humidity) = humidity.filter(|humidity| !(0.0..=MAX_HUMIDITY_KG_KG).contains(humidity)) {
@@ -254,7 +253,7 @@ const MAX_HUMIDITY_KG_KG: f64 = 0.1;
 
 /// Corrects a measured point; its efficiency is the apparent one if the table has none.
 fn correct(row: &mut Row, point: &MeasuredPoint, reference: ReferenceState) {
-    let air = Air { humidity_kg_kg: point.humidity_kg_kg.unwrap_or(0.0), ..Air::DRY };
+    let air = Air::new(Gas::air(), point.humidity_kg_kg.unwrap_or(0.0)).between(point.p1_pa, point.p2_pa);
     row.pressure_ratio = point.p2_pa / point.p1_pa;
     row.speed_corrected_rpm = reference.corrected_speed_rpm(point.speed_rpm, point.t1_k);
     row.flow_corrected_kg_s =

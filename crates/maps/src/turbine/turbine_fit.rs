@@ -6,7 +6,7 @@
 
 use crate::turbine::turbine_surface::{Observation, Place, Surface, Term};
 use mapper_core::{FittedTurbine, FittedTurbineLine, FittedTurbineNode, TurbineMap, TurbineMapPoint};
-use mapper_physics::gas::air::isentropic_exponent;
+use mapper_physics::gas::air::Air;
 use mapper_physics::laws::turbine::SWALLOWING_EXPONENT;
 
 /// Terms of the flow over vane position, speed and ln ER, the most important first.
@@ -89,7 +89,7 @@ fn flow_place(vane_position: f64, speed: f64, expansion_ratio: f64) -> Place {
 }
 
 fn efficiency_place(vane_position: f64, speed: f64, expansion_ratio: f64) -> Place {
-    let drop = 1.0 - expansion_ratio.powf(-isentropic_exponent(USUAL_GAS_K));
+    let drop = 1.0 - expansion_ratio.powf(-Air::DRY.isentropic_exponent(USUAL_GAS_K));
     [vane_position, speed, speed / drop.sqrt()]
 }
 

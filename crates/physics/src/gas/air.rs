@@ -1,9 +1,10 @@
-//! Air, dry and moist: gas constant, heat capacity, viscosity, conductivity.
+//! The compressor's gas, dry or moist, and dry air by closed forms: heat capacity, viscosity, conductivity.
 //!
-//! Closed forms of the virtual laboratory, in place of the tables of the paper's reference 12. Domain: 250 to 800 K, at
+//! The closed forms are those of the virtual laboratory, in place of the tables of the paper's reference 12. Domain: 250 to 800 K, at
 //! pressures of a few bar, where air is a perfect gas. Relative to tabulated dry air the heat capacity is within 1 %, the
 //! viscosity within 2 %, the conductivity within 5 % up to 700 K and 7 % at 800 K. Values outside are not clipped.
 
+use super::mixture::Gas;
 use mapper_core::EfficiencyDefinition;
 use serde::{Deserialize, Serialize};
 
@@ -16,9 +17,8 @@ pub const HEAT_CAPACITY_RATIO: f64 = 1.4;
 /// Isobaric heat capacity `1002.5 + 275e-6 (T - 200)^2`, J/(kg K), for 200..800 K.
 #[inline]
 pub fn heat_capacity_j_kgk(temperature_k: f64) -> f64 {
-    let (at_zero, curvature, zero_k) = CP;
-    let above_k = temperature_k - zero_k;
-    at_zero + curvature * above_k * above_k
+    let above_k = temperature_k - 200.0;
+    1002.5 + 275e-6 * above_k * above_k
 }
 
 /// Dynamic viscosity, Pa s (Sutherland: `1.458e-6 T^1.5 / (T + 110.4)`).
@@ -42,90 +42,125 @@ pub fn ln_conductivity_ratio(temperature_k: f64) -> f64 {
     0.8646 * (temperature_k / 300.0).ln()
 }
 
-/// Exponent `kappa = R/cp(T)` of the isentropic temperature ratio `PR^kappa`.
-#[inline]
-pub fn isentropic_exponent(temperature_k: f64) -> f64 {
-    GAS_CONSTANT_J_KGK / heat_capacity_j_kgk(temperature_k)
-}
-
-/// Air in the cell, an ideal gas with a heat capacity that depends on temperature: viscosity and conductivity are those of dry air (40 g/kg lower them by 2.5 % and 1 %).
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+/// Gas that a compressor takes in: a dry gas with water vapour. Viscosity and conductivity are those of dry air (40 g/kg lower them by 2.5 % and
+/// 1 %).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Air {
-    /// Water per dry air, kg/kg, 0 to about 0.06.
-    pub humidity_kg_kg: f64,
+    /// The dry gas with its vapour.
+    gas: Gas,
+    /// Water per dry gas, kg/kg.
+    humidity_kg_kg: f64,
     /// Definition of the efficiency of its compression.
     pub efficiency: EfficiencyDefinition,
+    /// Pressures before and after compression, Pa; 0: a perfect gas.
+    pressures_pa: [f64; 2],
+}
+
+impl Default for Air {
+    fn default() -> Self {
+        Air::DRY
+    }
 }
 
 impl Air {
-    /// Dry air.
-    pub const DRY: Air = Air { humidity_kg_kg: 0.0, efficiency: EfficiencyDefinition::Enthalpy };
-    /// Dry air with the efficiency of the paper's eq. 2.
-    pub const PAPER: Air = Air { humidity_kg_kg: 0.0, efficiency: EfficiencyDefinition::KappaOfT1 };
+    /// Dry air of the closed form.
+    pub const DRY: Air = Air {
+        gas: Gas::CLOSED_FORM_AIR,
+        humidity_kg_kg: 0.0,
+        efficiency: EfficiencyDefinition::Enthalpy,
+        pressures_pa: [0.0; 2],
+    };
+    /// The same with the efficiency of the paper's eq. 2.
+    pub const PAPER: Air = Air { efficiency: EfficiencyDefinition::KappaOfT1, ..Air::DRY };
 
-    /// From relative humidity (0..1), temperature (-20 to 50 degC) and pressure, Pa. The pressure of saturated vapour is that of Buck
-    /// (Buck Research CR-1A manual, 1996), enhanced by 0.4 % in air.
-    ///
-    /// ```
-    /// use mapper_physics::gas::air::Air;
-    /// let air = Air::of_relative_humidity(0.5, 298.15, 101_325.0);
-    /// assert!((air.humidity_kg_kg - 0.00993).abs() < 5e-5);
-    /// ```
-    pub fn of_relative_humidity(relative_ratio: f64, temperature_k: f64, pressure_pa: f64) -> Air {
-        let t_c = temperature_k - 273.15;
-        let (a, b, c, at_0_pa) =
-            if t_c < 0.0 { (23.036, 333.7, 279.82, 611.15) } else { (18.678, 234.5, 257.14, 611.21) };
-        let saturated_pa = 1.004 * at_0_pa * ((a - t_c / b) * t_c / (c + t_c)).exp();
-        let vapour_pa = (relative_ratio * saturated_pa).min(0.5 * pressure_pa);
-        Air { humidity_kg_kg: VAPOUR_MASS_RATIO * vapour_pa / (pressure_pa - vapour_pa), ..Air::DRY }
+    /// A dry gas with 0 to about 0.06 kg of water per kg, and the efficiency by enthalpy.
+    pub fn new(dry: Gas, humidity_kg_kg: f64) -> Air {
+        Air { gas: dry, ..Air::DRY }.with_humidity(humidity_kg_kg)
+    }
+
+    /// The same gas with another humidity, kg/kg.
+    #[inline]
+    #[must_use]
+    pub fn with_humidity(self, humidity_kg_kg: f64) -> Air {
+        if humidity_kg_kg == self.humidity_kg_kg {
+            return self;
+        }
+        let vapour_ratio = |humidity: f64| humidity / (1.0 + humidity);
+        let (old, new) = (vapour_ratio(self.humidity_kg_kg), vapour_ratio(humidity_kg_kg));
+        Air { gas: self.gas.with_vapour((new - old) / (1.0 - old)), humidity_kg_kg, ..self }
+    }
+
+    /// The same gas with another definition of the efficiency.
+    #[inline]
+    #[must_use]
+    pub fn with_efficiency(self, efficiency: EfficiencyDefinition) -> Air {
+        Air { efficiency, ..self }
+    }
+
+    /// The same gas compressed from one pressure to another, Pa, on which enthalpy and entropy of a real gas depend; without it, a perfect gas.
+    #[inline]
+    #[must_use]
+    pub fn between(self, from_pa: f64, to_pa: f64) -> Air {
+        Air { pressures_pa: [from_pa, to_pa], ..self }
+    }
+
+    /// Water per dry gas, kg/kg.
+    #[inline]
+    pub fn humidity_kg_kg(self) -> f64 {
+        self.humidity_kg_kg
     }
 
     /// Specific gas constant, J/(kg K).
     #[inline]
     pub fn gas_constant_j_kgk(self) -> f64 {
-        moist_gas_constant_j_kgk(self.humidity_kg_kg)
+        self.gas.gas_constant_j_kgk
     }
 
-    /// Isobaric heat capacity, J/(kg K).
+    /// Isobaric heat capacity at zero pressure, J/(kg K).
     #[inline]
     pub fn heat_capacity_j_kgk(self, temperature_k: f64) -> f64 {
-        moist_heat_capacity_ratio(self.humidity_kg_kg) * heat_capacity_j_kgk(temperature_k)
+        self.gas.heat_capacity_j_kgk(temperature_k)
     }
 
     /// Rise of specific enthalpy from one temperature to another, J/kg.
     #[inline]
     pub fn enthalpy_rise_j_kg(self, from_k: f64, to_k: f64) -> f64 {
-        moist_heat_capacity_ratio(self.humidity_kg_kg)
-            * mean_heat_capacity_j_kgk(from_k, to_k)
-            * (to_k - from_k)
+        let [from_pa, to_pa] = self.pressures_pa;
+        self.gas.ideal_enthalpy_rise_j_kg(from_k, to_k) + self.gas.departure(to_k, to_pa).enthalpy_j_kg
+            - self.gas.departure(from_k, from_pa).enthalpy_j_kg
     }
 
     /// Temperature after a rise of specific enthalpy from `from_k`, K: the inverse of [`Air::enthalpy_rise_j_kg`].
     #[inline]
     pub fn heated_k(self, from_k: f64, rise_j_kg: f64) -> f64 {
-        let dry_j_kg = rise_j_kg / moist_heat_capacity_ratio(self.humidity_kg_kg);
-        let mut to_k = from_k + dry_j_kg / heat_capacity_j_kgk(from_k);
+        let to_pa = self.pressures_pa[1];
+        let mut to_k = from_k + rise_j_kg / self.heat_capacity_j_kgk(from_k);
         // Newton: after a rise of 200 K the start is 3 K off, the first step 5e-4 K, the second 1e-11 K.
         for _ in 0..2 {
-            let missing_j_kg = dry_j_kg - mean_heat_capacity_j_kgk(from_k, to_k) * (to_k - from_k);
-            to_k += missing_j_kg / heat_capacity_j_kgk(to_k);
+            let missing_j_kg = rise_j_kg - self.enthalpy_rise_j_kg(from_k, to_k);
+            to_k += missing_j_kg
+                / (self.heat_capacity_j_kgk(to_k) + self.gas.departure(to_k, to_pa).heat_capacity_j_kgk);
         }
         to_k
     }
 
-    /// Temperature after isentropic compression from `from_k`, K: `s(T2s) - s(T1) = R ln PR`.
+    /// Temperature after isentropic compression from `from_k`, K: `s(T2s, p2) = s(T1, p1)`.
     #[inline]
     pub fn isentropic_k(self, from_k: f64, pressure_ratio: f64) -> f64 {
-        let ln_pressure_ratio = pressure_ratio.ln();
-        let gas_constant_j_kgk = self.gas_constant_j_kgk() / moist_heat_capacity_ratio(self.humidity_kg_kg);
-        let mut ln_ratio = gas_constant_j_kgk / heat_capacity_j_kgk(from_k) * ln_pressure_ratio;
+        let [from_pa, to_pa] = self.pressures_pa;
+        let gas_constant_j_kgk = self.gas.gas_constant_j_kgk;
+        let fall_j_kgk = gas_constant_j_kgk * pressure_ratio.ln();
+        let start = self.gas.departure(from_k, from_pa);
+        let mut ln_ratio = fall_j_kgk / self.heat_capacity_j_kgk(from_k);
         let mut to_k = from_k * ln_ratio.exp();
         // Newton in ln T: at a pressure ratio of 4 the start is 3e-3 off, the first step 1e-6, the second 1e-13. The exponential of so
         // small a step is its series to third order.
         for _ in 0..2 {
-            let missing_j_kgk =
-                gas_constant_j_kgk * ln_pressure_ratio - entropy_rise_j_kgk(from_k, to_k, ln_ratio);
-            let step = missing_j_kgk / heat_capacity_j_kgk(to_k);
+            let end = self.gas.departure(to_k, to_pa);
+            let missing_j_kgk = fall_j_kgk
+                - self.gas.ideal_entropy_rise_j_kgk(from_k, to_k, ln_ratio)
+                - (end.entropy_j_kgk - start.entropy_j_kgk);
+            let step = missing_j_kgk / (self.heat_capacity_j_kgk(to_k) + end.heat_capacity_j_kgk);
             ln_ratio += step;
             to_k *= 1.0 + step * (1.0 + step * (0.5 + step / 6.0));
         }
@@ -138,50 +173,36 @@ impl Air {
         self.gas_constant_j_kgk() / self.heat_capacity_j_kgk(temperature_k)
     }
 
-    /// Flow of dry air at the same Mach numbers over the flow of this air: `sqrt(R/R_dry)`. Corrected flows are those of dry air.
+    /// Flow of dry air at the same Mach numbers over the flow of this gas: `sqrt(R/R_dry)`. Corrected flows are those of dry air.
     #[inline]
     pub fn dry_flow_ratio(self) -> f64 {
         (self.gas_constant_j_kgk() / GAS_CONSTANT_J_KGK).sqrt()
     }
-}
 
-/// Coefficients of [`heat_capacity_j_kgk`]: J/(kg K), J/(kg K3), K.
-const CP: (f64, f64, f64) = (1002.5, 275e-6, 200.0);
-
-/// Mean heat capacity of dry air between two temperatures, J/(kg K).
-#[inline]
-fn mean_heat_capacity_j_kgk(from_k: f64, to_k: f64) -> f64 {
-    let (at_zero, curvature, zero_k) = CP;
-    let (a, b) = (from_k - zero_k, to_k - zero_k);
-    at_zero + curvature / 3.0 * (a * a + a * b + b * b)
-}
-
-/// `int cp/T dT` of dry air between two temperatures whose ratio has the logarithm `ln_ratio`, J/(kg K).
-#[inline]
-fn entropy_rise_j_kgk(from_k: f64, to_k: f64, ln_ratio: f64) -> f64 {
-    let (at_zero, curvature, zero_k) = CP;
-    (at_zero + curvature * zero_k * zero_k) * ln_ratio
-        + curvature * (to_k - from_k) * (0.5 * (to_k + from_k) - 2.0 * zero_k)
+    /// h of this gas over that of dry air at the same flow: the root of the Prandtl number.
+    #[inline]
+    pub fn h_ratio(self, temperature_k: f64) -> f64 {
+        (self.heat_capacity_j_kgk(temperature_k) / heat_capacity_j_kgk(temperature_k)).cbrt()
+    }
 }
 
 /// Molar mass of water over that of dry air.
 const VAPOUR_MASS_RATIO: f64 = 0.62198;
 
-/// Gas constant of vapour over that of dry air, minus 1.
-const VAPOUR_GAS_CONSTANT_EXCESS: f64 = 1.0 / VAPOUR_MASS_RATIO - 1.0;
-/// Heat capacity of vapour over that of dry air, minus 1: 0.855 at 300 K to 0.886 at 450 K (IAPWS-95 and Lemmon et al. 2000, ideal gas).
-const VAPOUR_HEAT_CAPACITY_EXCESS: f64 = 0.865;
-
-/// Gas constant of air with `humidity_kg_kg` of water per dry air, J/(kg K).
-#[inline]
-pub fn moist_gas_constant_j_kgk(humidity_kg_kg: f64) -> f64 {
-    GAS_CONSTANT_J_KGK * (1.0 + VAPOUR_GAS_CONSTANT_EXCESS * humidity_kg_kg / (1.0 + humidity_kg_kg))
-}
-
-/// Heat capacity of air with `humidity_kg_kg` of water per dry air over that of dry air.
-#[inline]
-pub fn moist_heat_capacity_ratio(humidity_kg_kg: f64) -> f64 {
-    1.0 + VAPOUR_HEAT_CAPACITY_EXCESS * humidity_kg_kg / (1.0 + humidity_kg_kg)
+/// Water per dry gas, kg/kg, of a relative humidity (0..1) at a temperature (-20 to 50 degC) and a pressure, Pa. The pressure of saturated
+/// vapour is that of Buck (Buck Research CR-1A manual, 1996), enhanced by 0.4 % in air.
+///
+/// ```
+/// use mapper_physics::gas::air::humidity_kg_kg;
+/// assert!((humidity_kg_kg(0.5, 298.15, 101_325.0) - 0.00993).abs() < 5e-5);
+/// ```
+pub fn humidity_kg_kg(relative_ratio: f64, temperature_k: f64, pressure_pa: f64) -> f64 {
+    let t_c = temperature_k - 273.15;
+    let (a, b, c, at_0_pa) =
+        if t_c < 0.0 { (23.036, 333.7, 279.82, 611.15) } else { (18.678, 234.5, 257.14, 611.21) };
+    let saturated_pa = 1.004 * at_0_pa * ((a - t_c / b) * t_c / (c + t_c)).exp();
+    let vapour_pa = (relative_ratio * saturated_pa).min(0.5 * pressure_pa);
+    VAPOUR_MASS_RATIO * vapour_pa / (pressure_pa - vapour_pa)
 }
 
 #[cfg(test)]
@@ -219,7 +240,7 @@ mod tests {
             (253.15, 100e3, 0.5, 0.000_322_682),
             (318.15, 95e3, 0.3, 0.019_530_7),
         ] {
-            let found = Air::of_relative_humidity(relative, t_k, p_pa).humidity_kg_kg;
+            let found = humidity_kg_kg(relative, t_k, p_pa);
             assert!((found / expected - 1.0).abs() < 5e-3, "{found} at {t_k} K");
         }
     }
@@ -232,7 +253,7 @@ mod tests {
             (0.04, 300.0, 293.823, 1037.86),
             (0.04, 450.0, 293.823, 1055.37),
         ] {
-            let air = Air { humidity_kg_kg: w, ..Air::DRY };
+            let air = Air::DRY.with_humidity(w);
             assert!((air.gas_constant_j_kgk() / gas_constant - 1.0).abs() < 5e-4);
             // The heat capacity of dry air is within 8e-4 over this range, that of 4 % of vapour within 2 %.
             assert!((air.heat_capacity_j_kgk(t_k) / cp - 1.0).abs() < 2e-3);
@@ -245,7 +266,7 @@ mod tests {
         fn enthalpy_and_entropy_are_consistent(
             t_k in 250.0..330.0f64, ratio in 0.9..6.0f64, rise_j_kg in -20e3..250e3f64, w in 0.0..0.04f64,
         ) {
-            let air = Air { humidity_kg_kg: w, ..Air::DRY };
+            let air = Air::DRY.with_humidity(w);
             let heated_k = air.heated_k(t_k, rise_j_kg);
             prop_assert!((air.enthalpy_rise_j_kg(t_k, heated_k) - rise_j_kg).abs() < 1e-4);
             let end_k = air.isentropic_k(t_k, ratio);

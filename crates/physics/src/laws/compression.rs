@@ -128,7 +128,7 @@ pub fn efficiency_by(
         return efficiency;
     }
     let t2_k = compressed_k(t1_k, isentropic_rise_ratio(pressure_ratio, t1_k, air), efficiency, air);
-    apparent_efficiency(pressure_ratio, t1_k, t2_k, Air { efficiency: definition, ..air })
+    apparent_efficiency(pressure_ratio, t1_k, t2_k, air.with_efficiency(definition))
 }
 
 /// Temperature of gas whose enthalpy has risen from `from_k` by cp(T1) times the rise to `equivalent_k`, K; `equivalent_k` itself where the

@@ -1,10 +1,10 @@
 //! The turbine (vanes fixed): swallowing, heat to the housing, expansion.
 //!
 //! Closed forms of the virtual laboratory for the paper's turbine. Domain: P3 above P4 (the caller checks), expansion ratios up
-//! to about 4, gas treated as air. The efficiency is total to static and a parabola over the blade-speed ratio (e.g. Watson and
+//! to about 4, viscosity and conductivity of air. The efficiency is total to static and a parabola over the blade-speed ratio (e.g. Watson and
 //! Janota, Turbocharging the Internal Combustion Engine, ch. 5), limited to 0.05 far from its best.
 
-use crate::gas::air::{self, GAS_CONSTANT_J_KGK};
+use crate::gas::air::{self, Air};
 use crate::gas::fast_power::power;
 use crate::laws::nusselt;
 use crate::machine::params::{BoundaryConditions, TurbineParams};
@@ -55,11 +55,13 @@ impl TurbineInlet {
     pub fn new(params: &TurbineParams, boundary: &BoundaryConditions) -> Self {
         let expansion_ratio = boundary.p3_pa / boundary.p4_pa;
         let ln_expansion_ratio = expansion_ratio.ln();
+        let gas = Air::new(params.gas, 0.0);
         let flow_kg_s = params.choked_flow_kg_s
             * (1.0 - (SWALLOWING_EXPONENT * ln_expansion_ratio).exp()).sqrt()
             * (boundary.p3_pa / FLOW_REFERENCE_PA)
-            / (boundary.t3_k / FLOW_REFERENCE_K).sqrt();
-        let cp3_j_kgk = air::heat_capacity_j_kgk(boundary.t3_k);
+            / (boundary.t3_k / FLOW_REFERENCE_K).sqrt()
+            / gas.dry_flow_ratio();
+        let cp3_j_kgk = gas.heat_capacity_j_kgk(boundary.t3_k);
         // A wall as viscous as the gas gives the plain correlation; scale that to a wall of 1 Pa s.
         let h_unit_wall_w_m2k = nusselt::coefficient_w_m2k(
             params.nusselt_coefficient,
@@ -74,7 +76,10 @@ impl TurbineInlet {
             t3_k: boundary.t3_k,
             flow_kg_s,
             ln_expansion_ratio,
-            isentropic_drop_ratio: isentropic_drop_ratio(ln_expansion_ratio, cp3_j_kgk),
+            isentropic_drop_ratio: isentropic_drop_ratio(
+                ln_expansion_ratio,
+                gas.isentropic_exponent(boundary.t3_k),
+            ),
             cp3_j_kgk,
             h_unit_wall_w_m2k,
         }
@@ -91,9 +96,10 @@ impl TurbineInlet {
         let conductance_w_k = h_w_m2k * params.internal_area_m2;
         let transfer_units = conductance_w_k / (self.flow_kg_s * self.cp3_j_kgk);
         let t3_prime_k = (self.t3_k + transfer_units * tt_k) / (1.0 + transfer_units);
-        let cp_prime = air::heat_capacity_j_kgk(t3_prime_k);
+        let cp_prime = params.gas.heat_capacity_j_kgk(t3_prime_k);
+        let exponent = params.gas.gas_constant_j_kgk / cp_prime;
         let spouting_velocity_m_s =
-            (2.0 * cp_prime * t3_prime_k * isentropic_drop_ratio(self.ln_expansion_ratio, cp_prime)).sqrt();
+            (2.0 * cp_prime * t3_prime_k * isentropic_drop_ratio(self.ln_expansion_ratio, exponent)).sqrt();
         let blade_speed_ratio = shaft_speed_rad_s * params.wheel_radius_m / spouting_velocity_m_s;
         let away = (blade_speed_ratio - params.peak_blade_speed_ratio) / params.peak_blade_speed_ratio;
         let efficiency = (params.peak_efficiency * (1.0 - 0.8 * away * away)).max(0.05);
@@ -110,10 +116,10 @@ impl TurbineInlet {
     }
 }
 
-/// `1 - ER^(-R/cp)`: the isentropic temperature drop over the inlet temperature.
+/// `1 - ER^-kappa`, kappa = R/cp: the isentropic temperature drop over the inlet temperature.
 #[inline]
-fn isentropic_drop_ratio(ln_expansion_ratio: f64, cp_j_kgk: f64) -> f64 {
-    1.0 - (-GAS_CONSTANT_J_KGK / cp_j_kgk * ln_expansion_ratio).exp()
+fn isentropic_drop_ratio(ln_expansion_ratio: f64, exponent: f64) -> f64 {
+    1.0 - (-exponent * ln_expansion_ratio).exp()
 }
 
 #[cfg(test)]

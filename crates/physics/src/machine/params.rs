@@ -1,6 +1,7 @@
 //! Every parameter of the lumped turbocharger model, with Appendix A's values as default.
 
 use crate::gas::air::Air;
+use crate::gas::mixture::Gas;
 pub use crate::machine::boundary::BoundaryConditions;
 use mapper_core::{EfficiencyDefinition, InletConvection, ReferenceState};
 use serde::{Deserialize, Serialize};
@@ -75,7 +76,10 @@ pub struct CompressorParams {
     /// Part r of the flow that recirculates, hot, from the wheel's exit to its inlet: the wheel, and with it the map, has
     /// (1 + r) times the flow that leaves the compressor; 0.
     pub recirculation_ratio: f64,
-    /// Water in the air of the compressor side, kg per kg of dry air, >= 0; 0.
+    /// The dry gas of the compressor side.
+    #[serde(default = "closed_form_air")]
+    pub gas: Gas,
+    /// Water in that gas, kg per kg of dry gas, >= 0; 0.
     pub humidity_kg_kg: f64,
     /// Definition of the map's efficiency and of every efficiency of this model; by default that of the paper.
     #[serde(default = "paper")]
@@ -108,6 +112,9 @@ pub struct TurbineParams {
     pub emissivity_ratio: f64,
     /// Flow the turbine swallows at large expansion ratio, corrected to 288.15 K and 101.325 kPa, kg/s.
     pub choked_flow_kg_s: f64,
+    /// The gas that drives the turbine.
+    #[serde(default = "closed_form_air")]
+    pub gas: Gas,
     /// Best efficiency of the turbine, 0..1.
     pub peak_efficiency: f64,
     /// Blade-speed ratio of the best efficiency.
@@ -140,15 +147,19 @@ pub struct OutletParams {
     pub discharge_coefficient: f64,
 }
 
+fn closed_form_air() -> Gas {
+    Gas::CLOSED_FORM_AIR
+}
+
 /// Eq. 2 of the paper.
 fn paper() -> EfficiencyDefinition {
     EfficiencyDefinition::KappaOfT1
 }
 
 impl CompressorParams {
-    /// The air that is compressed.
+    /// The gas that is compressed.
     pub fn air(&self) -> Air {
-        Air { humidity_kg_kg: self.humidity_kg_kg, efficiency: self.efficiency }
+        Air::new(self.gas, self.humidity_kg_kg).with_efficiency(self.efficiency)
     }
 }
 
@@ -173,6 +184,7 @@ impl Default for Params {
                 efficiency_scale_ratio: 1.0,
                 flow_scale_ratio: 1.0,
                 recirculation_ratio: 0.0,
+                gas: Gas::CLOSED_FORM_AIR,
                 humidity_kg_kg: 0.0,
                 efficiency: paper(),
                 inner_capacity_ratio: 0.0,
@@ -188,6 +200,7 @@ impl Default for Params {
                 external_area_m2: 80e-3,
                 emissivity_ratio: 0.6,
                 choked_flow_kg_s: 0.078,
+                gas: Gas::CLOSED_FORM_AIR,
                 peak_efficiency: 0.75,
                 peak_blade_speed_ratio: 0.65,
             },

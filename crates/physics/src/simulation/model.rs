@@ -45,14 +45,12 @@ pub struct PreparedModel<'a> {
     flow_correction_ratio: f64,
     air: air::Air,
     cp1_j_kgk: f64,
-    /// Heat capacity of the compressor's air over that of dry air.
-    moist_cp_ratio: f64,
-    /// Gas constant of the compressor's air, J/(kg K).
+    /// Gas constant of the compressor's gas, J/(kg K).
     gas_constant_j_kgk: f64,
-    /// Flow of the compressor's air over that of dry air, through map and valve.
-    moist_flow_ratio: f64,
-    /// h of the compressor's air over that of dry air: the root of the Prandtl number.
-    moist_h_ratio: f64,
+    /// Flow of the compressor's gas over that of dry air, through map and valve.
+    flow_ratio: f64,
+    /// h of the compressor's gas over that of dry air.
+    h_ratio: f64,
 }
 
 impl Model {
@@ -87,9 +85,7 @@ impl Model {
     pub fn prepare_at(&self, t_s: f64, boundary: &BoundaryConditions) -> PreparedModel<'_> {
         let reference = self.map.reference();
         let air = self.params.compressor.air();
-        let moist_cp_ratio = air::moist_heat_capacity_ratio(air.humidity_kg_kg);
-        let gas_constant_j_kgk = air.gas_constant_j_kgk();
-        let moist_flow_ratio = (air::GAS_CONSTANT_J_KGK / gas_constant_j_kgk).sqrt();
+        let flow_ratio = 1.0 / air.dry_flow_ratio();
         let cp1_j_kgk = air.heat_capacity_j_kgk(boundary.t1_k);
         PreparedModel {
             model: self,
@@ -99,14 +95,13 @@ impl Model {
             bearing_conductance_w_k: housing::bearing_conductance_w_k(&self.params.bearing),
             speed_correction_ratio: reference.corrected_speed_rpm(1.0, boundary.t1_k),
             flow_correction_ratio: reference.physical_flow_kg_s(1.0, boundary.t1_k, boundary.p1_pa)
-                * moist_flow_ratio
+                * flow_ratio
                 / (1.0 + self.params.compressor.recirculation_ratio),
             air,
             cp1_j_kgk,
-            moist_cp_ratio,
-            gas_constant_j_kgk,
-            moist_flow_ratio,
-            moist_h_ratio: moist_cp_ratio.cbrt(),
+            gas_constant_j_kgk: air.gas_constant_j_kgk(),
+            flow_ratio,
+            h_ratio: air.h_ratio(boundary.t1_k),
         }
     }
 }
@@ -172,10 +167,10 @@ impl PreparedModel<'_> {
             site.efficiency = efficiency;
         }
 
-        let isentropic_rise_ratio =
-            compression::isentropic_rise_ratio(pressure_ratio, boundary.t1_k, self.air);
+        let air = self.air.between(boundary.p1_pa, state.p2_pa);
+        let isentropic_rise_ratio = compression::isentropic_rise_ratio(pressure_ratio, boundary.t1_k, air);
         // Bulk temperature of the properties: compression from T1 without heat transfer.
-        let bulk_k = compression::compressed_k(boundary.t1_k, isentropic_rise_ratio, efficiency, self.air);
+        let bulk_k = compression::compressed_k(boundary.t1_k, isentropic_rise_ratio, efficiency, air);
         let mut h_w_m2k = nusselt::coefficient_w_m2k(
             compressor.nusselt_coefficient,
             compressor.nusselt_exponent,
@@ -183,7 +178,7 @@ impl PreparedModel<'_> {
             flow_kg_s,
             bulk_k,
             wall_k,
-        ) * self.moist_h_ratio;
+        ) * self.h_ratio;
         if HOOKED {
             h_w_m2k = hooks.fold(&site, h_w_m2k, |hook, site, value| hook.h_w_m2k(site, value));
             site.h_w_m2k = h_w_m2k;
@@ -211,7 +206,7 @@ impl PreparedModel<'_> {
             isentropic_rise_ratio,
             efficiency,
             recirculation_ratio: compressor.recirculation_ratio,
-            air: self.air,
+            air,
         };
         let (mut t2_prime_k, work_j_kg) = wheel.compress(t1_prime_k);
         let compressor_power_w = flow_kg_s * work_j_kg;
@@ -224,7 +219,7 @@ impl PreparedModel<'_> {
             t2_prime_k,
             wall_k,
             flow_kg_s,
-            self.moist_cp_ratio * air::heat_capacity_j_kgk(bulk_k),
+            air.heat_capacity_j_kgk(bulk_k),
         );
         if HOOKED {
             site.t2_k = t2_k;
@@ -289,7 +284,7 @@ impl PreparedModel<'_> {
                 params.turbine.emissivity_ratio,
                 state.tt_k,
             ),
-            valve_flow_kg_s: self.moist_flow_ratio
+            valve_flow_kg_s: self.flow_ratio
                 * orifice::flow_kg_s(
                     boundary.valve_opening_ratio
                         * params.outlet.discharge_coefficient

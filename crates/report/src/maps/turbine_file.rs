@@ -6,7 +6,7 @@
 //! is treated as air. Expansion is from the total inlet pressure to the outlet pressure as tapped.
 
 use mapper_core::{Channel, IdentifiedPoint, Recording, one_line};
-use mapper_physics::gas::air::{Air, heat_capacity_j_kgk, isentropic_exponent};
+use mapper_observe::energy_balance::Gases;
 use mapper_physics::laws::compression::{compressed_k, isentropic_rise_ratio};
 use serde::Serialize;
 use std::fmt::Write;
@@ -30,13 +30,13 @@ pub struct TurbinePoint {
     pub efficiency: Option<f64>,
 }
 
-/// The turbine results of every point whose channels are present and plausible. `air`: the gas of the compressor, with the definition of the
-/// points' efficiency.
-pub fn turbine_points(recording: &Recording, points: &[IdentifiedPoint], air: Air) -> Vec<TurbinePoint> {
-    points.iter().filter_map(|point| turbine_point(recording, point, air)).collect()
+/// The turbine results of every point whose channels are present and plausible; the compressor's gas has the definition of the points'
+/// efficiency.
+pub fn turbine_points(recording: &Recording, points: &[IdentifiedPoint], gases: Gases) -> Vec<TurbinePoint> {
+    points.iter().filter_map(|point| turbine_point(recording, point, gases)).collect()
 }
 
-fn turbine_point(recording: &Recording, point: &IdentifiedPoint, air: Air) -> Option<TurbinePoint> {
+fn turbine_point(recording: &Recording, point: &IdentifiedPoint, gases: Gases) -> Option<TurbinePoint> {
     let step = recording.steps.iter().find(|step| step.index == point.step)?;
     let mean = |channel: Channel| {
         let (_, values) = recording.series.get(&channel)?.slice(step.end_s - AVERAGE_S, step.end_s);
@@ -50,11 +50,11 @@ fn turbine_point(recording: &Recording, point: &IdentifiedPoint, air: Air) -> Op
     if !(expansion_ratio > 1.0 && point.speed_rpm > 0.0) {
         return None;
     }
-    let turbine_w = flow_kg_s
-        * heat_capacity_j_kgk(t3_k)
-        * t3_k
-        * (1.0 - expansion_ratio.powf(-isentropic_exponent(t3_k)));
+    let cp3_j_kgk = gases.turbine.heat_capacity_j_kgk(t3_k);
+    let exponent = gases.turbine.gas_constant_j_kgk / cp3_j_kgk;
+    let turbine_w = flow_kg_s * cp3_j_kgk * t3_k * (1.0 - expansion_ratio.powf(-exponent));
     let compressor_w = point.eta.filter(|eta| *eta > 0.0).map(|eta| {
+        let air = gases.compressor.between(point.p1_pa, point.pressure_ratio * point.p1_pa);
         let rise = isentropic_rise_ratio(point.pressure_ratio, point.t1_k, air);
         let t2_prime_k = compressed_k(point.t1_k, rise, eta, air);
         point.flow_kg_s * air.enthalpy_rise_j_kg(point.t1_k, t2_prime_k)

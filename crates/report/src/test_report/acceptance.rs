@@ -5,8 +5,9 @@ use crate::point_results::end_readings::END_S;
 use mapper_campaign::Campaign;
 use mapper_core::{Channel, DeclaredUncertainty, Recording, StepMarker, half_width_95, step_number};
 use mapper_observe::acceptance::{CriterionResult, judge_acceptance};
-use mapper_observe::energy_balance::{EnergyBalance, Power, energy_balance};
+use mapper_observe::energy_balance::{EnergyBalance, Gases, Power, energy_balance};
 use mapper_physics::gas::air::Air;
+use mapper_physics::gas::mixture::Gas;
 use mapper_recording::score::ScoredPoint;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -38,14 +39,17 @@ pub struct JudgedPoints<'a> {
 }
 
 fn balances<'a>(report: JudgedPoints<'a>) -> Vec<(&'a StepMarker, EnergyBalance)> {
-    let air = report.campaign.map_or(Air::DRY, |campaign| campaign.machine.params.compressor.air());
+    let gases = match report.campaign.map(|campaign| campaign.machine.params) {
+        Some(params) => Gases { compressor: params.compressor.air(), turbine: params.turbine.gas },
+        None => Gases { compressor: Air::DRY, turbine: Gas::CLOSED_FORM_AIR },
+    };
     let steps = report
         .points
         .iter()
         .filter_map(|scored| report.recording.steps.iter().find(|step| step.index == scored.point.step));
     let balance = |step: &'a StepMarker| {
         let span_s = ((step.end_s - END_S).max(step.start_s), step.end_s);
-        (step, energy_balance(report.recording, span_s, air, report.used))
+        (step, energy_balance(report.recording, span_s, gases, report.used))
     };
     steps.map(balance).collect()
 }

@@ -33,6 +33,7 @@ use mapper_diagnose::gap::correction::PointCorrection;
 use mapper_identify::{TwoParameter, ZeroOutcome};
 use mapper_maps::RepeatedJump;
 use mapper_observe::FusedChannel;
+use mapper_physics::gas::mixture::Gas;
 use mapper_recording::score::{ScoreSummary, ScoredMark, ScoredPoint};
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -297,10 +298,16 @@ pub fn condition_facts(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
 
 /// The compressed gas, with its humidity.
 fn gas(campaign: &Campaign) -> String {
-    let water_g_kg = 1e3 * campaign.machine.params.compressor.humidity_kg_kg;
+    let compressor = campaign.machine.params.compressor;
+    let water_g_kg = 1e3 * compressor.humidity_kg_kg;
+    let dry = match compressor.gas {
+        gas if gas == Gas::CLOSED_FORM_AIR => "air".to_owned(),
+        gas if gas == Gas::air() => "air as a real gas".to_owned(),
+        gas => format!("a mixture with R = {:.2} J/(kg K)", gas.gas_constant_j_kgk),
+    };
     match campaign.report.humidity_ratio {
-        Some(_) => format!("air, {water_g_kg:.1} g of water per kg of dry air"),
-        None => "air, taken as dry: no humidity is given".to_owned(),
+        Some(_) => format!("{dry}, {water_g_kg:.1} g of water per kg of dry gas"),
+        None => format!("{dry}, taken as dry: no humidity is given"),
     }
 }
 

@@ -5,6 +5,7 @@ use crate::recording::recording_file::Recorded;
 use crate::{Session, SessionError};
 use mapper_chart::Figure;
 use mapper_core::{ExportError, IdentifiedPoint, ThermalModel};
+use mapper_observe::energy_balance::Gases;
 use mapper_recording::ChannelMap;
 use mapper_recording::score::ScoredPoint;
 use mapper_report::{
@@ -42,7 +43,8 @@ impl Session<'_> {
         let points: Vec<IdentifiedPoint> = identified.points_alone().cloned().collect();
         let (machine, params) = (&campaign.machine.name, &campaign.machine.params);
         let thermal = ThermalExport { machine, params, found: identified.thermal.as_ref() };
-        let turbine = turbine_points(&identified.recording, &points, params.compressor.air());
+        let gases = Gases { compressor: params.compressor.air(), turbine: params.turbine.gas };
+        let turbine = turbine_points(&identified.recording, &points, gases);
         let law = identified.thermal.as_ref().and_then(|found| found.convection.as_ref()?.exponent.value);
         let heat = heat_transfer_figure(machine, &points, law.unwrap_or(params.compressor.nusselt_exponent));
         let mut contents: Vec<(&str, Vec<u8>)> = vec![

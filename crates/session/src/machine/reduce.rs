@@ -17,6 +17,7 @@ use mapper_core::{
 use mapper_identify::{IdentifyConfig, KnownHeat, PressureTap, method_of_table};
 use mapper_maps::{Grouping, assemble, mark_line_ends, reduce_turbine};
 use mapper_physics::gas::air::Air;
+use mapper_physics::gas::mixture::Gas;
 use mapper_physics::machine::params::{BoundaryConditions, Params};
 use mapper_report::{reduced_text, reduced_turbine_text};
 use serde::Deserialize;
@@ -48,8 +49,11 @@ struct PointsFile {
 impl TestStand {
     /// Default sensors and no thermal model, for a table without a campaign.
     fn unknown(table: &Path) -> TestStand {
-        let config =
-            IdentifyConfig { air: Air::DRY, declared: assumed_sensors(), ..IdentifyConfig::default() };
+        let config = IdentifyConfig {
+            air: Air::new(Gas::air(), 0.0),
+            declared: assumed_sensors(),
+            ..IdentifyConfig::default()
+        };
         let remark = "No sensors are declared. Assumed are class A of IEC 60751 for temperatures, class 0.1 for pressures and 0.5 % for the \
                       flow; declare yours in a campaign and give it as the machine.";
         let name = table.file_stem().unwrap_or_default().to_string_lossy().into_owned();

@@ -35,6 +35,7 @@ pub fn identification(campaign: &Campaign) -> IdentifyConfig {
         internal_area_m2: campaign.machine.params.compressor.internal_area_m2,
         internal_area_sigma_ratio: internal_area_sigma_ratio(&campaign.machine.assumed),
         air: campaign.machine.params.compressor.air(),
+        turbine_gas: campaign.machine.params.turbine.gas,
         humidity_sigma_kg_kg: campaign.report.humidity_sigma_kg_kg(&campaign.boundary),
         reference: campaign.reference,
         inlet_tap: tap(Channel::P1),

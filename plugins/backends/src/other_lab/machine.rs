@@ -119,12 +119,11 @@ pub(super) fn evaluate(
 
     // Replace the single wall by the nodes.
     let flow_kg_s = lumped.flow_kg_s;
-    let moist_cp_ratio = air::moist_heat_capacity_ratio(compressor.humidity_kg_kg);
-    let gas_constant_j_kgk = air::moist_gas_constant_j_kgk(compressor.humidity_kg_kg);
-    let rise_ratio =
-        compression::isentropic_rise_ratio(lumped.pressure_ratio, boundary.t1_k, compressor.air());
-    let bulk_k = compression::compressed_k(boundary.t1_k, rise_ratio, lumped.efficiency, compressor.air());
-    let cp2_j_kgk = moist_cp_ratio * air::heat_capacity_j_kgk(bulk_k);
+    let air = compressor.air().between(boundary.p1_pa, wheel.p2_pa);
+    let gas_constant_j_kgk = air.gas_constant_j_kgk();
+    let rise_ratio = compression::isentropic_rise_ratio(lumped.pressure_ratio, boundary.t1_k, air);
+    let bulk_k = compression::compressed_k(boundary.t1_k, rise_ratio, lumped.efficiency, air);
+    let cp2_j_kgk = air.heat_capacity_j_kgk(bulk_k);
     let whole_w_k = lumped.h_w_m2k * compressor.internal_area_m2;
     let directed_w_k =
         |wall_k: f64, gas_k: f64| whole_w_k * if wall_k > gas_k { compressor.hot_metal_h_ratio } else { 1.0 };

@@ -6,7 +6,7 @@ use crate::elements::rig::sensors::CALIBRATED;
 use crate::si_values::optional_si;
 use crate::units::{Fraction, Pressure, Quantity, Temperature};
 use mapper_core::Channel;
-use mapper_physics::gas::air::Air;
+use mapper_physics::gas::air;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_yaml::steps;
 use schemars::JsonSchema;
@@ -52,21 +52,21 @@ pub struct Report {
 }
 
 impl Report {
-    /// Air of a relative humidity in the cell.
-    fn air_of(&self, relative_ratio: f64, boundary: &BoundaryConditions) -> Air {
+    /// Water per dry air in the cell at a relative humidity, kg/kg.
+    fn water_kg_kg(&self, relative_ratio: f64, boundary: &BoundaryConditions) -> f64 {
         let temperature_k = self.cell_temperature_k.unwrap_or(boundary.ambient_temperature_k);
         let pressure_pa = self.barometer_pa.unwrap_or(boundary.p1_pa);
-        Air::of_relative_humidity(relative_ratio, temperature_k, pressure_pa)
+        air::humidity_kg_kg(relative_ratio, temperature_k, pressure_pa)
     }
 
-    /// The inlet air with the humidity of the cell; dry if none is given.
-    pub(crate) fn air(&self, boundary: &BoundaryConditions) -> Air {
-        self.humidity_ratio.map_or(Air::DRY, |ratio| self.air_of(ratio, boundary))
+    /// Water per dry air at the inlet, kg/kg; 0 if no humidity is given.
+    pub(crate) fn humidity_kg_kg(&self, boundary: &BoundaryConditions) -> f64 {
+        self.humidity_ratio.map_or(0.0, |ratio| self.water_kg_kg(ratio, boundary))
     }
 
     /// One standard deviation of the humidity, kg/kg; without a humidity, that of a uniform distribution from dry to saturated.
     pub fn humidity_sigma_kg_kg(&self, boundary: &BoundaryConditions) -> f64 {
-        let saturated_kg_kg = self.air_of(1.0, boundary).humidity_kg_kg;
+        let saturated_kg_kg = self.water_kg_kg(1.0, boundary);
         saturated_kg_kg
             * if self.humidity_ratio.is_some() { HYGROMETER_SIGMA_RATIO } else { UNIFORM_RMS_RATIO }
     }

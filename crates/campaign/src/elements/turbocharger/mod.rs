@@ -1,6 +1,7 @@
-//! Campaign keys that describe the tested turbocharger: machine, geometry, reference state, and efficiency definition.
+//! Campaign keys that describe the tested turbocharger: machine, geometry, gases, reference state, and efficiency definition.
 
 pub(crate) mod efficiency;
+pub(crate) mod gas;
 pub(crate) mod geometry;
 pub(crate) mod machine;
 pub(crate) mod reference;

@@ -193,7 +193,8 @@ impl Setting {
         let t1_k = row.t1_k - offset(0);
         let [p1_pa, p2_pa] = pressures_pa(row, shared, self.rest_pressure_pa);
         let pressure_ratio = p2_pa / p1_pa;
-        let air = Air { humidity_kg_kg: self.air.humidity_kg_kg + shared[HUMIDITY], ..self.air };
+        let humidity_kg_kg = self.air.humidity_kg_kg() + shared[HUMIDITY];
+        let air = self.air.with_humidity(humidity_kg_kg).between(p1_pa, p2_pa);
         let slope = if self.shaped { local[SLOPE] * dot(terms, surface_of(shared)) } else { 0.0 };
         Gas {
             t1_k,
@@ -365,7 +366,7 @@ impl Setting {
             }
             if active[HUMIDITY] {
                 let [p1_pa, p2_pa] = pressures_pa(row, shared, self.rest_pressure_pa);
-                let air = Air { humidity_kg_kg: gas.air.humidity_kg_kg + SLOPE_STEP, ..gas.air };
+                let air = gas.air.with_humidity(gas.air.humidity_kg_kg() + SLOPE_STEP);
                 let rise_ratio = isentropic_rise_ratio(p2_pa / p1_pa, gas.t1_k, air);
                 put(HUMIDITY, full(Gas { air, rise_ratio, ..gas }, SLOPE_STEP));
             }

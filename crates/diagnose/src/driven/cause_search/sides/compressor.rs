@@ -9,7 +9,6 @@ use crate::driven::readings::COMPRESSOR;
 use crate::driven::{PARAMETERS, Parameter};
 use mapper_core::{Channel, ReferenceState};
 use mapper_physics::compressor_map::characteristic::{CharacteristicPoint, CompressorCharacteristic};
-use mapper_physics::gas::air;
 use mapper_physics::laws::housing::compressor_capacity_j_k;
 use mapper_physics::machine::params::{BoundaryConditions, MODEL_REFERENCE};
 use mapper_physics::rig::effect::{Rig, Submodel};
@@ -125,8 +124,7 @@ impl Side for CompressorSide {
         let params = model.params;
         let compressor = params.compressor;
         let inner_ratio = compressor.inner_capacity_ratio;
-        let moist_flow_ratio =
-            (air::GAS_CONSTANT_J_KGK / air::moist_gas_constant_j_kgk(compressor.humidity_kg_kg)).sqrt();
+        let dry_flow_ratio = compressor.air().dry_flow_ratio();
         let [mut t2_probe, mut tc_probe] =
             [Channel::T2, Channel::Tc].map(|channel| ChannelFollower::new(*rig.instruments.path(channel)));
         let mut state = self.start(rig, start_k, t2_offset_k);
@@ -147,8 +145,8 @@ impl Side for CompressorSide {
                 + sss * speed.powi(3)
                 + fff * flow.powi(3))
             .clamp(EFFICIENCY.0, EFFICIENCY.1);
-            let flow_corrected_kg_s = wheel_kg_s
-                / (MODEL_REFERENCE.physical_flow_kg_s(1.0, t1s_k[i], p1s_pa[i]) * moist_flow_ratio);
+            let flow_corrected_kg_s =
+                wheel_kg_s * dry_flow_ratio / MODEL_REFERENCE.physical_flow_kg_s(1.0, t1s_k[i], p1s_pa[i]);
             model.map = Arc::new(AsMeasured { flow_corrected_kg_s, efficiency });
             state.shaft_speed_rad_s = rad_s_of_rpm(speeds_rpm[i]);
             state.p2_pa = p2s_pa[i];

@@ -1,0 +1,236 @@
+//! Gas mixtures: heat capacity, enthalpy and entropy as functions of temperature and pressure.
+//!
+//! The heat capacity of the ideal gas is a polynomial in temperature; the dependence on pressure is the second virial coefficient, by
+//! Tsonopoulos (AIChE J. 20, 1974), with the mixing rules of Prausnitz without binary parameters. For pressure ratios up to 5 from 100 kPa
+//! efficiencies are within 0.02 points and works within 0.05 % of CoolProp's real gases (`tests/coolprop.rs`); without the virial term the
+//! differences are 0.04 points and 0.07 %.
+
+use super::species::{Species, SpeciesData};
+use serde::{Deserialize, Serialize};
+
+/// Molar gas constant, J/(mol K) (SI).
+pub const MOLAR_GAS_CONSTANT_J_MOLK: f64 = 8.314_462_618;
+/// Powers of T/1000 K in a heat capacity.
+const HEAT_CAPACITY_TERMS: usize = 7;
+/// Powers of 1/T in a second virial coefficient.
+const VIRIAL_TERMS: usize = 4;
+
+/// Second virial coefficient, m3/mol, in powers of 1/T.
+pub type SecondVirial = [f64; VIRIAL_TERMS];
+
+/// Second virial coefficients of a gas: its own, and that with water vapour.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Virials {
+    /// Of the gas with itself.
+    pub own: SecondVirial,
+    /// Of the gas with water vapour.
+    pub with_vapour: SecondVirial,
+}
+
+/// A gas of fixed composition. Domain: 220 to 1400 K, up to 10 bar.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Gas {
+    /// Specific gas constant, J/(kg K).
+    pub gas_constant_j_kgk: f64,
+    /// Isobaric heat capacity at zero pressure, J/(kg K), in powers of T/1000 K.
+    pub heat_capacity: [f64; HEAT_CAPACITY_TERMS],
+    /// `None`: a perfect gas.
+    pub virials: Option<Virials>,
+}
+
+/// Fuels whose burnt gas drives a turbine.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Fuel {
+    /// Hydrogen atoms per carbon atom; infinite for hydrogen.
+    pub hydrogen_carbon_ratio: f64,
+}
+
+impl Fuel {
+    /// Hydrogen.
+    pub const HYDROGEN: Fuel = Fuel { hydrogen_carbon_ratio: f64::INFINITY };
+    /// Natural gas (40 CFR 1065.655, table 2).
+    pub const NATURAL_GAS: Fuel = Fuel { hydrogen_carbon_ratio: 3.78 };
+    /// Diesel fuel and kerosene (40 CFR 1065.655, table 2).
+    pub const DIESEL: Fuel = Fuel { hydrogen_carbon_ratio: 1.80 };
+}
+
+impl Gas {
+    /// Dry air of the closed form `cp = 1002.5 + 275e-6 (T - 200)^2` J/(kg K), with which the virtual laboratory and the paper's model compute: a
+    /// perfect gas.
+    pub const CLOSED_FORM_AIR: Gas = Gas {
+        gas_constant_j_kgk: super::air::GAS_CONSTANT_J_KGK,
+        heat_capacity: [1013.5, -110.0, 275.0, 0.0, 0.0, 0.0, 0.0],
+        virials: None,
+    };
+
+    /// Mole fractions of dry air (ISO 2533, with the carbon dioxide of 2020).
+    const AIR: [(Species, f64); 4] =
+        [(Species::N2, 0.780_84), (Species::O2, 0.209_39), (Species::Ar, 0.009_34), (Species::CO2, 0.000_43)];
+
+    /// Dry air as a real gas.
+    pub fn air() -> Gas {
+        Gas::of_mole_fractions(Gas::AIR)
+    }
+
+    /// A mixture. The fractions are scaled to a sum of 1; they must not be negative, and one must be above 0.
+    ///
+    /// ```
+    /// use mapper_physics::gas::{mixture::Gas, species::Species};
+    /// let nitrogen = Gas::of_mole_fractions([(Species::N2, 1.0)]);
+    /// // CoolProp 6: 1.0396 kJ/(kg K) at 300 K, at zero pressure.
+    /// assert!((nitrogen.heat_capacity_j_kgk(300.0) / 1039.6 - 1.0).abs() < 5e-4);
+    /// ```
+    pub fn of_mole_fractions(fractions: impl IntoIterator<Item = (Species, f64)>) -> Gas {
+        let parts: Vec<(SpeciesData, f64)> =
+            fractions.into_iter().map(|(species, fraction)| (species.data(), fraction)).collect();
+        let whole: f64 = parts.iter().map(|(_, fraction)| fraction).sum();
+        let mole_mean = |of: &dyn Fn(&SpeciesData) -> f64| {
+            parts.iter().map(|(data, x)| x * of(data)).sum::<f64>() / whole
+        };
+        let gas_constant_j_kgk = MOLAR_GAS_CONSTANT_J_MOLK / mole_mean(&|data| data.molar_mass_kg_mol);
+        let vapour = Species::H2O.data();
+        let with = |other: &SpeciesData| {
+            std::array::from_fn(|power| mole_mean(&|data| cross_virial(data, other)[power]))
+        };
+        let own = std::array::from_fn(|power| {
+            parts.iter().map(|(data, x)| x * with(data)[power]).sum::<f64>() / whole
+        });
+        Gas {
+            gas_constant_j_kgk,
+            heat_capacity: std::array::from_fn(|power| {
+                gas_constant_j_kgk * mole_mean(&|data| data.heat_capacity[power])
+            }),
+            virials: Some(Virials { own, with_vapour: with(&vapour) }),
+        }
+    }
+
+    /// Water vapour.
+    pub fn vapour() -> Gas {
+        Gas::of_mole_fractions([(Species::H2O, 1.0)])
+    }
+
+    /// Dry air burnt with a fuel, completely: `air_ratio` is the air over the air that the fuel needs, at least 1.
+    pub fn burnt(fuel: Fuel, air_ratio: f64) -> Gas {
+        // Per mole of oxygen in the air: carbon and hydrogen of the fuel take 1/air_ratio of it.
+        let carbon_oxygen = 1.0 / (1.0 + 0.25 * fuel.hydrogen_carbon_ratio);
+        let burnt = 1.0 / air_ratio;
+        let air = Gas::AIR.map(|(species, x)| {
+            let x = x / Gas::AIR[1].1;
+            match species {
+                Species::O2 => (species, x * (1.0 - burnt)),
+                Species::CO2 => (species, x + carbon_oxygen * burnt),
+                _ => (species, x),
+            }
+        });
+        Gas::of_mole_fractions(air.into_iter().chain([(Species::H2O, 2.0 * (1.0 - carbon_oxygen) * burnt)]))
+    }
+
+    /// The gas with water vapour added until its mass fraction in the whole is this; a negative fraction takes vapour away.
+    pub(crate) fn with_vapour(self, mass_ratio: f64) -> Gas {
+        let vapour = Species::H2O.data();
+        let vapour_j_kgk = MOLAR_GAS_CONSTANT_J_MOLK / vapour.molar_mass_kg_mol;
+        let mix = |gas: f64, vapour: f64| gas + mass_ratio * (vapour - gas);
+        let gas_constant_j_kgk = mix(self.gas_constant_j_kgk, vapour_j_kgk);
+        let x = mass_ratio * vapour_j_kgk / gas_constant_j_kgk;
+        Gas {
+            gas_constant_j_kgk,
+            heat_capacity: std::array::from_fn(|power| {
+                mix(self.heat_capacity[power], vapour_j_kgk * vapour.heat_capacity[power])
+            }),
+            virials: self.virials.map(|Virials { own, with_vapour }| {
+                let pure = cross_virial(&vapour, &vapour);
+                Virials {
+                    own: std::array::from_fn(|power| {
+                        (1.0 - x) * ((1.0 - x) * own[power] + 2.0 * x * with_vapour[power])
+                            + x * x * pure[power]
+                    }),
+                    with_vapour: std::array::from_fn(|power| {
+                        (1.0 - x) * with_vapour[power] + x * pure[power]
+                    }),
+                }
+            }),
+        }
+    }
+
+    /// Isobaric heat capacity at zero pressure, J/(kg K).
+    #[inline]
+    pub fn heat_capacity_j_kgk(&self, temperature_k: f64) -> f64 {
+        let t = 1e-3 * temperature_k;
+        self.heat_capacity.iter().rev().fold(0.0, |sum, coefficient| sum * t + coefficient)
+    }
+
+    /// Rise of specific enthalpy between two temperatures at zero pressure, J/kg.
+    #[inline]
+    pub(crate) fn ideal_enthalpy_rise_j_kg(&self, from_k: f64, to_k: f64) -> f64 {
+        let at = |temperature_k: f64| {
+            let t = 1e-3 * temperature_k;
+            let mean = (0..HEAT_CAPACITY_TERMS)
+                .rev()
+                .fold(0.0, |sum, power| sum * t + self.heat_capacity[power] * INVERSE[power + 1]);
+            temperature_k * mean
+        };
+        at(to_k) - at(from_k)
+    }
+
+    /// `int cp/T dT` at zero pressure between two temperatures whose ratio has the logarithm `ln_ratio`, J/(kg K).
+    #[inline]
+    pub(crate) fn ideal_entropy_rise_j_kgk(&self, from_k: f64, to_k: f64, ln_ratio: f64) -> f64 {
+        let at = |temperature_k: f64| {
+            let t = 1e-3 * temperature_k;
+            (1..HEAT_CAPACITY_TERMS)
+                .rev()
+                .fold(0.0, |sum, power| (sum + self.heat_capacity[power] * INVERSE[power]) * t)
+        };
+        self.heat_capacity[0] * ln_ratio + at(to_k) - at(from_k)
+    }
+
+    /// What a pressure adds to enthalpy in J/kg, entropy in J/(kg K) and heat capacity in J/(kg K): those of a perfect gas excluded.
+    #[inline]
+    pub(crate) fn departure(&self, temperature_k: f64, pressure_pa: f64) -> Departure {
+        let Some(Virials { own: [b0, b1, b2, b3], .. }) = self.virials else { return Departure::default() };
+        let per_kg = pressure_pa * self.gas_constant_j_kgk / MOLAR_GAS_CONSTANT_J_MOLK;
+        let x = 1.0 / temperature_k;
+        Departure {
+            // (B - T dB/dT) p, -dB/dT p and -T d2B/dT2 p.
+            enthalpy_j_kg: per_kg * (b0 + x * (2.0 * b1 + x * (3.0 * b2 + x * 4.0 * b3))),
+            entropy_j_kgk: per_kg * x * x * (b1 + x * (2.0 * b2 + x * 3.0 * b3)),
+            heat_capacity_j_kgk: -per_kg * x * x * (2.0 * b1 + x * (6.0 * b2 + x * 12.0 * b3)),
+        }
+    }
+}
+
+/// 1/n.
+const INVERSE: [f64; HEAT_CAPACITY_TERMS + 1] =
+    [0.0, 1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 4.0, 1.0 / 5.0, 1.0 / 6.0, 1.0 / 7.0];
+
+/// Effect of pressure on a real gas, to first order.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Departure {
+    pub(crate) enthalpy_j_kg: f64,
+    pub(crate) entropy_j_kgk: f64,
+    pub(crate) heat_capacity_j_kgk: f64,
+}
+
+/// Second virial coefficient of a pair of species (Tsonopoulos 1974, without the term in Tr^-8, below 1 % above 220 K; Prausnitz's mixing rules).
+fn cross_virial(one: &SpeciesData, other: &SpeciesData) -> SecondVirial {
+    let critical_k = (one.critical_k * other.critical_k).sqrt();
+    let volume_m3_mol = (0.5 * (one.critical_m3_mol.cbrt() + other.critical_m3_mol.cbrt())).powi(3);
+    let compressibility = |data: &SpeciesData| {
+        data.critical_pa * data.critical_m3_mol / (MOLAR_GAS_CONSTANT_J_MOLK * data.critical_k)
+    };
+    // R Tc/pc.
+    let scale_m3_mol = volume_m3_mol / (0.5 * (compressibility(one) + compressibility(other)));
+    let acentric_factor = 0.5 * (one.acentric_factor + other.acentric_factor);
+    let terms = [
+        0.1445 + 0.0637 * acentric_factor,
+        -0.330,
+        -0.1385 + 0.331 * acentric_factor,
+        -0.0121 - 0.423 * acentric_factor,
+    ];
+    let mut scale = scale_m3_mol;
+    terms.map(|term| {
+        let coefficient = scale * term;
+        scale *= critical_k;
+        coefficient
+    })
+}

@@ -8,6 +8,7 @@ use crate::objections::objection::Objection;
 use crate::objections::objections;
 use crate::single_step::dynamic::Estimate;
 use crate::step_data::end_state::{EndState, end_state};
+use crate::step_data::humidity::with_measured_humidity;
 use crate::step_outcome::findings::Findings;
 use crate::step_outcome::two_parameter::TwoParameter;
 use crate::{
@@ -87,6 +88,7 @@ pub fn identify_with_rig(
     nominal: Option<NominalRig<'_>>,
 ) -> Result<Identified, IdentifyError> {
     check(config)?;
+    let config = &with_measured_humidity(recording, config);
     let missing = missing(recording, config.method);
     if !missing.is_empty() {
         return Err(IdentifyError::MissingChannels { method: config.method, missing });

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use crate::lab::{Machine, campaign, eighteen, measured};
-use mapper_core::Method;
+use mapper_core::{Channel, Method, Series};
 use mapper_identify::{IdentifyConfig, identify};
 use mapper_physics::gas::air::Air;
 use rand::SeedableRng;
@@ -64,4 +64,22 @@ fn unknown_humidity_is_in_the_intervals() {
     assert!(wider.iter().all(|sum| *sum > 0.0), "{wider:?}");
     // 95 % of the points; errors of h are common to a draw, so that one draw of five may miss many.
     assert!(held * 5 >= count * 4, "{held} of {count}");
+}
+
+/// A hygrometer or a dew-point mirror gives the points of the humidity that they measure: 75 % at 25 degC are 15.21 g/kg with a dew point of
+/// 20.26 degC at 100 kPa (CoolProp 8, HAPropsSI).
+#[test]
+fn measured_humidity_replaces_the_declared_one() {
+    let machine = Machine { humidity_kg_kg: 0.015_21, ..Machine::default() };
+    let clean = campaign(&eighteen(), 120.0, machine);
+    let known = identify(&clean.recording, &joint(Air::PAPER.with_humidity(0.015_21), 0.0)).unwrap();
+    for (channel, value) in [(Channel::RelativeHumidity, 0.75), (Channel::DewPoint, 293.413)] {
+        let mut recording = clean.recording.clone();
+        let times = recording.series[&Channel::T1].t_s.clone();
+        recording.series.insert(channel, Series { values: vec![value; times.len()], t_s: times });
+        let measured = identify(&recording, &joint(Air::PAPER, 0.01)).unwrap();
+        for (measured, known) in measured.iter().zip(&known) {
+            assert!((measured.eta.unwrap() - known.eta.unwrap()).abs() < 1e-4, "{channel}");
+        }
+    }
 }

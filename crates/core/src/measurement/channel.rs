@@ -69,6 +69,12 @@ pub enum Channel {
     /// Cooling water mass flow.
     #[serde(rename = "m_water")]
     WaterFlow,
+    /// Relative humidity of the air that the compressor takes in.
+    #[serde(rename = "RH")]
+    RelativeHumidity,
+    /// Dew point of that air.
+    #[serde(rename = "T_dew")]
+    DewPoint,
 }
 
 /// The device a channel belongs to; one message per group and sample is recorded.
@@ -148,7 +154,7 @@ pub struct ChannelInfo {
 
 /// Every channel, in recording order.
 #[rustfmt::skip]
-pub const CHANNELS: [ChannelInfo; 24] = {
+pub const CHANNELS: [ChannelInfo; 26] = {
     use Channel as C;
     use Dimension::{MassFlow, Pressure, Ratio, RotationalSpeed, Temperature};
     const fn row(channel: Channel, symbol: &'static str, group: Group, field: &'static str, dimension: Dimension, description: &'static str) -> ChannelInfo {
@@ -179,6 +185,8 @@ pub const CHANNELS: [ChannelInfo; 24] = {
         row(C::TWater,         "T_water",       Group::Turbine,    "water_temperature_k",         Temperature,     "cooling water inlet temperature"),
         row(C::TWaterOut,      "T_water_out",   Group::Turbine,    "water_outlet_temperature_k",  Temperature,     "cooling water outlet temperature"),
         row(C::WaterFlow,      "m_water",       Group::Turbine,    "water_flow_kg_s",             MassFlow,        "cooling water mass flow"),
+        row(C::RelativeHumidity, "RH",          Group::Ambient,    "relative_humidity",           Ratio,           "relative humidity of the inlet air"),
+        row(C::DewPoint,       "T_dew",         Group::Ambient,    "dew_point_k",                 Temperature,     "dew point of the inlet air"),
     ]
 };
 

@@ -20,7 +20,8 @@ pub struct Plausible {
 /// | flows | 1e-4..20 kg/s | leakage of a small machine at idle to engines of 10 MW | -100..100 |
 /// | P1 | 30..600 kPa | absolute; throttled inlet at altitude to the outlet of an upstream stage | 100..1e9 |
 /// | other pressures | 50 kPa..2 MPa | absolute; gauge readings at part load are lower; up to three stages of boost | 100..1e9 |
-/// | T1, ambient | 220..390 K | arctic cell to the outlet of an upstream stage without a cooler | 100..3000 |
+/// | relative humidity | 0..1.05 | saturated air, with the error of a hygrometer | any |
+/// | T1, ambient, dew point | 220..390 K | arctic cell to the outlet of an upstream stage without a cooler | 100..3000 |
 /// | T2 | 220..700 K | limit of compressor wheels | 100..3000 |
 /// | compressor housing | 220..800 K | above the limit of aluminium | 100..3000 |
 /// | oil, water | 220..480 K | oil burns above, and water boils at 18 bar | 100..3000 |
@@ -31,7 +32,7 @@ pub fn plausible(channel: Channel) -> Plausible {
         Channel::CompressorFlow | Channel::TurbineFlow | Channel::OilFlow | Channel::WaterFlow => 1e-4..=20.0,
         Channel::P1 => 3e4..=6e5,
         Channel::P2 | Channel::P3 | Channel::P4 | Channel::P3Command => 5e4..=2e6,
-        Channel::T1 | Channel::TAmb => 220.0..=390.0,
+        Channel::T1 | Channel::TAmb | Channel::DewPoint => 220.0..=390.0,
         Channel::T2 => 220.0..=700.0,
         Channel::Tc => 220.0..=800.0,
         Channel::T3 | Channel::T4 | Channel::Tt | Channel::T3Command => 220.0..=1600.0,
@@ -39,6 +40,7 @@ pub fn plausible(channel: Channel) -> Plausible {
             220.0..=480.0
         }
         Channel::ValveCommand => 0.0..=10.0,
+        Channel::RelativeHumidity => 0.0..=1.05,
     };
     let any = match channel.info().dimension {
         Dimension::RotationalSpeed => 0.0..=1e7,

@@ -3,6 +3,7 @@
 pub(crate) mod cleaning;
 pub(crate) mod commands;
 pub(crate) mod end_state;
+pub(crate) mod humidity;
 pub(crate) mod samples;
 pub(crate) mod taps;
 pub(crate) mod window;

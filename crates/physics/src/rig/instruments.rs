@@ -177,6 +177,7 @@ pub fn true_value(
         Channel::TOilOut | Channel::OilFlow | Channel::TWater | Channel::TWaterOut | Channel::WaterFlow => {
             return None;
         }
+        Channel::RelativeHumidity | Channel::DewPoint => return None,
     };
     let hooks = &prepared.model().hooks;
     Some(if hooks.is_empty() { value } else { hooks.reading(&prepared.site(state, outputs), channel, value) })

@@ -82,6 +82,10 @@ sensors! {
     "T_water_out" t_water_out: TWaterOut, Option<Sensors<TemperatureSensor>>;
     /// Cooling water mass flow.
     "m_water" m_water: WaterFlow, Option<Sensors<FlowSensor>>;
+    /// Relative humidity of the inlet air; with `T_amb`, or with T1 if that is not measured. It replaces `report: {humidity: ...}`.
+    "RH" rh: RelativeHumidity, Option<Sensors<HumiditySensor>>;
+    /// Dew point of the inlet air; it replaces `RH`.
+    "T_dew" t_dew: DewPoint, Option<Sensors<TemperatureSensor>>;
 }
 
 fn declaration<D: Dimension>(
@@ -173,6 +177,16 @@ sensor! {
     noise: [extend("x-min" = "0 kg/s")],
     offset: [extend("x-min" = "0 kg/s"), example = &"0 kg/s"],
     common: [extend("x-min" = "0 kg/s")],
+    gain: " Fixed error of the gain; 0 if none is given.",
+    {} |_, declaration| declaration
+}
+
+sensor! {
+    /// Hygrometer.
+    HumiditySensor: Fraction, Fraction,
+    noise: [extend("x-min" = "0 %"), example = &"0.2 %"],
+    offset: [extend("x-min" = "0 %"), example = &"2 %"],
+    common: [extend("x-min" = "0 %")],
     gain: " Fixed error of the gain; 0 if none is given.",
     {} |_, declaration| declaration
 }

@@ -7,11 +7,13 @@
 use crate::gap::best_fit::coordinate::{Coordinate, coordinates, parameters, set_parameter};
 use crate::gap::best_fit::normal::{PRIOR_STEPS, normal_matrix, nuisance_products};
 use crate::gap::best_fit::selection::{Selection, dot_over};
+use crate::gap::residuals::hypothesis::Course;
 use crate::gap::residuals::study::{Hypothesis, PredictError, Prediction, Study};
-use crate::gap::residuals::whiten::Linearised;
+use crate::gap::residuals::whiten::{Linearised, rows_of_step};
 use mapper_inference::descent::{ENOUGH, End, Model, Normal, Reach, Until, descend, room_within};
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// A hypothesis at its best.
 #[derive(Debug, Clone)]
@@ -60,17 +62,52 @@ pub struct Start {
     /// Nuisances and effects.
     pub hypothesis: Hypothesis,
     /// Their prediction; `None` if the model has not been run there.
-    pub prediction: Option<Prediction>,
-    /// Whitened change for a unit of each effect's search coordinate, which steps correct; empty if each iteration takes it by runs.
-    pub columns: Vec<Vec<f64>>,
+    pub prediction: Option<Arc<Prediction>>,
+    /// Change for a unit of each effect's search coordinate, which steps correct; empty if each iteration takes it by runs.
+    pub columns: Vec<Column>,
+}
+
+/// Whitened change for a unit of an effect's search coordinate. Many starts share one, because a search offers thousands of them.
+#[derive(Debug, Clone)]
+pub struct Column {
+    /// Change for this many units, of the effect throughout.
+    pub change: Arc<Vec<f64>>,
+    /// Units of that change.
+    pub units: f64,
+    /// The effect's share in each step.
+    pub course: Course,
+}
+
+impl Column {
+    fn values(&self, study: &Study) -> Vec<f64> {
+        let mut values: Vec<f64> = self.change.iter().map(|change| change / self.units).collect();
+        if self.course != Course::Throughout {
+            let steps = study.steps.len();
+            for step in 0..steps {
+                let share = self.course.share(step, steps);
+                values[rows_of_step(study, step)].iter_mut().for_each(|value| *value *= share);
+            }
+        }
+        values
+    }
+
+    /// Those of a fit.
+    pub fn of(fit: &Fit) -> Vec<Column> {
+        let whole = |column: &Vec<f64>| Column {
+            change: Arc::new(column.clone()),
+            units: 1.0,
+            course: Course::Throughout,
+        };
+        fit.effect_columns.iter().map(whole).collect()
+    }
 }
 
 impl From<&Fit> for Start {
     fn from(fit: &Fit) -> Start {
         Start {
             hypothesis: fit.hypothesis.clone(),
-            prediction: Some(fit.prediction.clone()),
-            columns: fit.effect_columns.clone(),
+            prediction: Some(Arc::new(fit.prediction.clone())),
+            columns: Column::of(fit),
         }
     }
 }
@@ -117,12 +154,12 @@ pub fn fit_from(
         coordinates,
         most_sigmas: effort.most_sigmas,
         columns_known: !columns.is_empty(),
-        effect_columns: columns.clone(),
+        effect_columns: columns.iter().map(|column| column.values(study)).collect(),
         last: None,
     };
     let until = Until { iterations: effort.iterations, enough: effort.enough };
     let point = match prediction {
-        Some(prediction) => fitted.at_prediction(start.clone(), prediction.clone()),
+        Some(prediction) => fitted.at_prediction(start.clone(), Prediction::clone(prediction)),
         None => fitted.at_hypothesis(start.clone())?,
     };
     let End { unknowns, point, normal, promised } = descend(&mut fitted, unknowns, point, until);

@@ -3,13 +3,21 @@
 use crate::gap::best_fit::normal::{normal_matrix, nuisance_products};
 use crate::gap::best_fit::selection::{Selection, dot_over};
 use crate::gap::residuals::study::Study;
-use crate::gap::residuals::whiten::Linearised;
+use crate::gap::residuals::whiten::{Linearised, dot};
 use nalgebra::{Cholesky, DVector, Dyn};
+use std::ops::Range;
+
+/// Products of the rows of a step of a column: with the free columns, with themselves, with the residual.
+pub(crate) struct Share {
+    pub(crate) right: DVector<f64>,
+    pub(crate) own: f64,
+    pub(crate) seen: f64,
+}
 
 /// Repeated solver for the nuisance block of the normal equations.
 pub(crate) struct Projector<'a> {
     linearised: &'a Linearised,
-    rows: Vec<std::ops::Range<usize>>,
+    rows: Vec<Range<usize>>,
     cholesky: Cholesky<f64, Dyn>,
     /// Additional free columns.
     others: &'a [Vec<f64>],
@@ -44,6 +52,23 @@ impl<'a> Projector<'a> {
         b: &[f64],
         right_b: &DVector<f64>,
     ) -> f64 {
-        dot_over(&self.rows, a, b) - right_a.dot(&self.cholesky.solve(right_b))
+        self.projected(dot_over(&self.rows, a, b), right_a, right_b)
+    }
+
+    /// The same where the product with the free columns in is known.
+    pub(crate) fn projected(&self, product: f64, right_a: &DVector<f64>, right_b: &DVector<f64>) -> f64 {
+        product - right_a.dot(&self.cholesky.solve(right_b))
+    }
+
+    /// [`Projector::right`] of some rows alone, and their product with another column and with themselves.
+    pub(crate) fn share(&self, rows: &Range<usize>, column: &[f64], residual: &[f64]) -> Share {
+        let own = &column[rows.clone()];
+        let columns = self.linearised.columns.iter().chain(self.others);
+        let right = columns.map(|other| dot(&other[rows.clone()], own));
+        Share {
+            right: DVector::from_iterator(self.linearised.columns.len() + self.others.len(), right),
+            own: dot(own, own),
+            seen: dot(own, &residual[rows.clone()]),
+        }
     }
 }

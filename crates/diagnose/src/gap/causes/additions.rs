@@ -1,10 +1,10 @@
 //! Closed-form effect of adding one more effect to a fit.
 
 use crate::gap::best_fit::coordinate::Coordinate;
-use crate::gap::best_fit::fit::{Fit, Start};
-use crate::gap::best_fit::projector::Projector;
+use crate::gap::best_fit::fit::{Column, Fit, Start};
+use crate::gap::best_fit::projector::{Projector, Share};
 use crate::gap::best_fit::selection::Selection;
-use crate::gap::residuals::study::{Study, members};
+use crate::gap::residuals::study::{Prediction, Study, members};
 use crate::gap::residuals::whiten::{Linearised, rows_of_step};
 use mapper_numerics::parallel;
 use mapper_physics::rig::effect::EffectParameter;
@@ -59,8 +59,19 @@ fn of_kind(
     for (right, nuisance) in right_residual.iter_mut().zip(&base.hypothesis.nuisances) {
         *right -= nuisance;
     }
-    let rows = (0..study.steps.len()).map(|step| rows_of_step(study, step)).collect();
-    let look = FitNeighbourhood { study, linearised, projector: &projector, base, right_residual, rows };
+    let rows = selection.steps.iter().enumerate();
+    let rows =
+        rows.map(|(step, selected)| if *selected { rows_of_step(study, step) } else { 0..0 }).collect();
+    let look = FitNeighbourhood {
+        study,
+        linearised,
+        projector: &projector,
+        base,
+        columns: Column::of(base),
+        prediction: Arc::new(base.prediction.clone()),
+        right_residual,
+        rows,
+    };
     let used: Vec<usize> = members(&base.hypothesis).iter().map(|member| study.family(*member)).collect();
     let effects: Vec<usize> = (0..study.catalogue).filter(|effect| !used.contains(effect)).collect();
     let found = parallel::map(&effects, |effect| match study.effects[*effect].info().parameters.as_slice() {
@@ -77,8 +88,11 @@ struct FitNeighbourhood<'a> {
     linearised: &'a Linearised,
     projector: &'a Projector<'a>,
     base: &'a Fit,
+    /// Columns and prediction of the base.
+    columns: Vec<Column>,
+    prediction: Arc<Prediction>,
     right_residual: DVector<f64>,
-    /// Rows of each step.
+    /// Rows of each selected step.
     rows: Vec<Range<usize>>,
 }
 
@@ -90,11 +104,12 @@ impl FitNeighbourhood<'_> {
     }
 
     /// The same with one value and its known change, by which the parameter's coordinate moves by `by`.
-    fn with_change(&self, effect: usize, value: f64, change: &[f64], by: f64) -> Start {
+    fn with_change(&self, effect: usize, value: f64, change: &Arc<Vec<f64>>, by: f64) -> Start {
         let mut start = self.with(effect, vec![value]);
         if by != 0.0 && by.is_finite() {
-            start.columns = self.base.effect_columns.clone();
-            start.columns.push(change.iter().map(|c| c / by).collect());
+            start.columns = self.columns.clone();
+            let course = self.study.courses[effect];
+            start.columns.push(Column { change: change.clone(), units: by, course });
         }
         start
     }
@@ -127,23 +142,24 @@ impl FitNeighbourhood<'_> {
     /// The same effect from each onset.
     fn with_onsets(&self, effect: usize, parameter: &EffectParameter) -> Vec<Addition> {
         let Some((step, change, _)) = self.line(effect, parameter) else { return Vec::new() };
-        let steps = self.rows.len();
-        let mut masked = vec![0.0; change.len()];
-        let mut found = Vec::new();
-        for late in self.study.onsets_of(effect) {
+        // The products of a change that begins with a step are sums over its steps.
+        let of_steps: Vec<Share> =
+            self.rows.iter().map(|rows| self.projector.share(rows, &change, &self.base.residual)).collect();
+        let from = |late: usize| {
             let course = self.study.courses[late];
-            for (step, rows) in self.rows.iter().enumerate() {
-                let share = course.share(step, steps);
-                for row in rows.clone() {
-                    masked[row] = share * change[row];
-                }
+            let mut right = DVector::zeros(self.right_residual.len());
+            let (mut own, mut seen) = (0.0, 0.0);
+            for (step, of_step) in of_steps.iter().enumerate() {
+                let share = course.share(step, of_steps.len());
+                right.axpy(share, &of_step.right, 1.0);
+                own += share * share * of_step.own;
+                seen += share * of_step.seen;
             }
-            let products = self.products(&masked);
-            if products.0 > 1.0 {
-                found.push(self.along(late, parameter, step, &masked, products));
-            }
-        }
-        found
+            let own = self.projector.projected(own, &right, &right);
+            let seen = self.projector.projected(seen, &right, &self.right_residual);
+            (own > 1.0).then(|| self.along(late, parameter, step, &change, (own, seen)))
+        };
+        self.study.onsets_of(effect).into_iter().filter_map(from).collect()
     }
 
     /// A step of the parameter to the side that the data suggest, with its change and products.
@@ -172,7 +188,7 @@ impl FitNeighbourhood<'_> {
         effect: usize,
         parameter: &EffectParameter,
         step: f64,
-        change: &[f64],
+        change: &Arc<Vec<f64>>,
         (own, seen): (f64, f64),
     ) -> Addition {
         let at = |share: f64| (parameter.neutral + share * step).clamp(parameter.low, parameter.high);
@@ -186,7 +202,7 @@ impl FitNeighbourhood<'_> {
         // A weak effect starts at neutral, where the prediction is known.
         let weak = wanted.abs() <= 1.0 && !coordinate.is_logarithmic();
         let mut start = self.with_change(effect, if weak { parameter.neutral } else { at(off) }, change, by);
-        start.prediction = weak.then(|| self.base.prediction.clone());
+        start.prediction = weak.then(|| self.prediction.clone());
         Addition { effect, gain: if step == 0.0 { 0.0 } else { gain }, start }
     }
 }

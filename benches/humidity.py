@@ -31,7 +31,9 @@ def main(program, seeds):
     print("|---:|---|---:|---:|---:|---:|")
     for level in LEVELS:
         found = {"declared": [], "not declared": []}
-        for seed in range(1, seeds + 1):
+        # Each level has its own draws: the points of a recording share most of their error, which the humidity hardly changes.
+        first = 1 + seeds * LEVELS.index(level)
+        for seed in range(first, first + seeds):
             with tempfile.TemporaryDirectory() as folder:
                 folder = Path(folder)
                 file = folder / "true.yaml"

@@ -66,7 +66,7 @@ def diagnose(mapper, folder):
 
 
 def log(mapper, folder):
-    for hours in [1, 3, 10, 30]:
+    for hours in [1, 3, 10]:
         path = folder / "log.csv"
         write_log(path, hours)
         channels = folder / f"log{hours}.yaml"

@@ -25,9 +25,7 @@ pub use identification::identified::{
     standard_error_of,
 };
 pub use identification::inlet_convection::InletConvection;
-pub use identification::joint_settings::{
-    ALPHA_AREA_SIGMA_RATIO, Choice, ConvectionWithinStep, EfficiencyWithinStep, JointSettings,
-};
+pub use identification::joint_settings::{ALPHA_AREA_SIGMA_RATIO, Choice, JointSettings};
 pub use identification::model_tolerances::ModelTolerances;
 pub use identification::result_remark::ResultRemark;
 pub use identification::settle_bands::SettleBands;

@@ -132,7 +132,7 @@ pub struct Thresholds {
     pub residual_over_noise_ratio: f64,
     /// Ratio of the slow residual (10 s means) to the change of T2 above which the fit is poor.
     pub structure_ratio: f64,
-    /// `steady`: averaging time at the end of the step, s.
+    /// Averaging time at the end of the step for `steady` and the balances, s.
     pub steady_mean_s: f64,
     /// `steady`: drift of T2 or Tc above which the step has not settled, K/min.
     pub steady_drift_k_min: f64,

@@ -13,7 +13,6 @@ mod isothermal_zero;
 mod joint;
 mod needs;
 mod objections;
-mod one_fit;
 mod reduce;
 mod single_step;
 mod step_data;
@@ -32,14 +31,11 @@ pub use isothermal_zero::zero_outcome::ZeroOutcome;
 pub use joint::MAX_RESTING_ETA;
 pub use joint::expected::{ExpectedStep, ExpectedTogether, expected_together};
 pub use joint::step_model::surface::EfficiencySurface;
-pub use mapper_core::{
-    Choice, ConvectionWithinStep, EfficiencyWithinStep, JointSettings, SettleBands, WindowRule,
-};
+pub use mapper_core::{Choice, JointSettings, SettleBands, WindowRule};
 pub use needs::{method_for, needs};
-#[doc(hidden)]
-pub use one_fit::{OneFit, one_fit};
 pub use reduce::{KnownHeat, method_of_table, reduce};
-pub use single_step::expected::{Expected, ExpectedRow, expected, expected_steady};
+pub use single_step::expected::{DECLARED_INTERVAL_S, Expected, ExpectedRow, expected, expected_steady};
 pub use single_step::t2_course::{T2Course, t2_course};
+pub use step_data::samples::LONGEST_BRIDGE_S;
 pub use step_outcome::error::{IdentifyError, StepError};
 pub use step_outcome::two_parameter::TwoParameter;

@@ -92,23 +92,6 @@ fn without_noise_convection_that_depends_on_direction_is_found() {
     assert!((factor - 0.65).abs() < 0.02 && eta < 0.003, "factor {factor}, eta {eta}");
 }
 
-/// With all extensions off it is the dynamic method, to the digit.
-#[test]
-fn with_every_refinement_off_it_is_the_dynamic_method() {
-    let campaign = campaign(&eighteen()[..7], 120.0, Machine::default());
-    let mut rng = Pcg64::seed_from_u64(3);
-    let (recording, declared) = measured(&campaign.recording, 1.0, 1.0, &mut rng);
-    let off = IdentifyConfig { joint: JointSettings::all_off(), declared, ..joint() };
-    let dynamic = IdentifyConfig { method: Method::Dynamic, ..off.clone() };
-    let (off, dynamic) =
-        (identify_recording(&recording, &off).unwrap(), identify_recording(&recording, &dynamic).unwrap());
-    assert!(off.thermal.is_none());
-    for (off, dynamic) in off.points.into_iter().zip(dynamic.points) {
-        let (off, dynamic) = (off.unwrap(), dynamic.unwrap());
-        assert_eq!(IdentifiedPoint { method: Method::Dynamic, ..off }, dynamic);
-    }
-}
-
 /// A parameter with its prior switched off is not searched for.
 #[test]
 fn a_fixed_share_stays_what_it_was_declared() {
@@ -372,7 +355,7 @@ fn a_share_that_the_recording_cannot_determine_gets_no_number() {
 /// necessary. The common errors of a campaign are one draw, so 144 points count for some twenty. Of twenty at 95 % fewer than 16 cover it in
 /// 0.3 % of the cases; of twenty at 68 % fewer than 7 or more than 18 in 0.3 % and 0.5 %. Their root mean square is known to 16 %; three of
 /// that are allowed above a width of 1.4. The intervals include what a recording cannot exclude of alpha_A, the probe and the heating/cooling
-/// ratio, none of which this machine has. The common error of h is eight draws. `examples/joint_study.rs` has the hundreds of campaigns.
+/// ratio, none of which this machine has. The common error of h is eight draws.
 #[test]
 fn intervals_of_a_campaign_with_noise_and_offsets_hold_and_are_not_too_wide() {
     let campaign = campaign(&eighteen(), 120.0, Machine::default());

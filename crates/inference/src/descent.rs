@@ -36,15 +36,13 @@ pub enum Reach {
 
 /// Distance from a point to the runs from which slopes are taken, in the coordinates' units: rounding and curvature are both small there.
 pub const FINE: f64 = 0.02;
-/// The same for a cost with small steps.
-const COARSE: f64 = 0.2;
 /// Largest change of an unknown in one iteration, in its unit: models are nonlinear.
 const MAX_MOVE: f64 = 2.0;
 
 impl Reach {
     /// Distance to the runs from which slopes are taken.
     pub fn distance(self) -> f64 {
-        if self == Reach::Fine { FINE } else { COARSE }
+        if self == Reach::Fine { FINE } else { 10.0 * FINE }
     }
 }
 
@@ -56,6 +54,9 @@ pub fn room_within(low: f64, high: f64, at: f64) -> (f64, f64) {
 /// Minimum predicted decrease of the cost for another iteration, if the end is compared with others: a hundredth of evidence is negligible.
 pub const ENOUGH: f64 = 0.02;
 
+/// Alternations between two fits that depend on each other, at most: each one reduces the error to about a tenth.
+pub const ROUNDS: usize = 3;
+
 /// When a descent ends.
 #[derive(Debug, Clone, Copy)]
 pub struct Until {
@@ -63,6 +64,13 @@ pub struct Until {
     pub iterations: usize,
     /// Minimum predicted decrease of the cost for another iteration.
     pub enough: f64,
+}
+
+impl Default for Until {
+    /// For an end that is compared with others.
+    fn default() -> Self {
+        Until { iterations: 10, enough: ENOUGH }
+    }
 }
 
 /// End of a descent.

@@ -17,9 +17,6 @@ use std::collections::BTreeMap;
 
 /// Maximum number of members of an explanation: bounds the search. Judgement.
 pub const MAX_MEMBERS: usize = 4;
-/// Maximum number of changes of the explanation: each member is added, replaced and removed once. If every family is one hypothesis, the
-/// search ends by itself, since each change makes the set more probable.
-const MAX_CHANGES: usize = 4 * MAX_MEMBERS;
 /// Sets from which the search starts, in addition to the empty one: bounds its time. Judgement.
 const MAX_STARTS: usize = 6;
 
@@ -284,7 +281,9 @@ impl Search<'_> {
 
     /// The set to which changes of one member at a time lead from this set.
     fn climb(&self, mut members: Vec<usize>) -> Vec<usize> {
-        for _ in 0..MAX_CHANGES {
+        // Each member is added, replaced and removed once. If every family is one hypothesis, the search ends by itself, since each change
+        // makes the set more probable.
+        for _ in 0..MAX_MEMBERS * MAX_MEMBERS {
             let Some(better) = self.better(&members) else { break };
             members = better;
         }

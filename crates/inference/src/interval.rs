@@ -1,11 +1,11 @@
 //! The shortest interval of a number that is normally distributed about each of many weighted centres.
 
+use mapper_numerics::statistics::EXCLUDE_SIGMAS;
+
 /// Cells of the density for one standard deviation: the interval then errs by less than a hundredth of it.
 const CELLS_PER_SIGMA: f64 = 16.0;
 /// Maximum number of cells between the lowest and the highest centre: bounds the effort if the centres are far apart.
 const MAX_CELLS: f64 = 4096.0;
-/// Standard deviations beyond which a normal density is neglected: 6e-7 of it.
-const REACH_SIGMAS: f64 = 5.0;
 
 /// Coverage of the intervals of results.
 pub const COVERAGE: f64 = 0.95;
@@ -25,7 +25,7 @@ pub fn shortest(centres: &[(f64, f64)], sigma: f64, coverage: f64) -> Option<(f6
     if width <= 0.0 {
         return Some((low, low));
     }
-    let reach = (REACH_SIGMAS * sigma / width).ceil() as usize;
+    let reach = (EXCLUDE_SIGMAS * sigma / width).ceil() as usize;
     let cells = ((high - low) / width).ceil() as usize + 2 + 2 * reach;
     let mut weights = vec![0.0; cells];
     for (weight, x) in centres {

@@ -2,7 +2,7 @@
 
 use crate::IdentifyConfig;
 use crate::config::coloured;
-use crate::objections::ends::{Ends, LAST_S};
+use crate::objections::ends::Ends;
 use mapper_core::{Channel, Recording};
 use mapper_physics::gas::air::Air;
 
@@ -114,13 +114,13 @@ impl Readings {
 
 /// Standard errors of the readings at a step's end from the declared noise, [`CHANNELS`].
 pub(crate) fn noise(config: &IdentifyConfig, recording: &Recording) -> PerChannel {
-    let colour = coloured(config.noise_colour);
+    let (colour, last_s) = (coloured(config.noise_colour), config.thresholds.steady_mean_s);
     CHANNELS.map(|channel| {
         let sigma = config.declared.get(&channel).map_or(0.0, |declared| declared.noise_sigma);
         let samples =
             recording.series.get(&channel).zip(recording.steps.last()).map_or(1, |(series, step)| {
-                series.range((step.end_s - LAST_S).max(step.start_s), step.end_s).len()
+                series.range((step.end_s - last_s).max(step.start_s), step.end_s).len()
             });
-        sigma * colour.variance_of_mean(samples, LAST_S).sqrt()
+        sigma * colour.variance_of_mean(samples, last_s).sqrt()
     })
 }

@@ -5,7 +5,6 @@
 
 use crate::IdentifyConfig;
 use crate::config::coloured;
-use crate::joint::fit::solve::ROUGHLY;
 use crate::joint::fit::start::{self, START_S};
 use crate::joint::step_model::rows::{COARSER, Row, StepRows, block_s_after, place};
 use crate::joint::{fit::refinements, uncertainty::smoothness};
@@ -21,14 +20,12 @@ pub struct ExpectedStep<'a> {
     pub rows: &'a [ExpectedRow],
     /// Efficiency at its end, fraction.
     pub eta: f64,
-    /// Heat-transfer coefficient at its end, W/(m2 K).
-    pub h_w_m2k: f64,
 }
 
 impl ExpectedStep<'_> {
     /// Start values for a fit.
     fn estimate(&self) -> Estimate {
-        Estimate { eta: Some((self.eta, None)), h_w_m2k: Some((self.h_w_m2k, None)), ..Estimate::default() }
+        Estimate { eta: Some((self.eta, None)), ..Estimate::default() }
     }
 }
 
@@ -51,12 +48,12 @@ pub fn expected_together(steps: &[ExpectedStep<'_>], config: &IdentifyConfig) ->
         steps.iter().enumerate().filter_map(|(position, step)| condensed(position, step, config)).collect();
     let alone: Vec<Estimate> = steps.iter().map(ExpectedStep::estimate).collect();
     let mut problem = start::problem(&condensed, &alone, config)?;
-    problem.minimise(ROUGHLY)?;
+    problem.minimise_roughly()?;
     start::refine(&mut problem, &condensed, config)?;
-    problem.minimise(ROUGHLY)?;
-    let resting_eta = refinements::resting_on_declaration(&problem, |_| true)?;
+    problem.minimise_roughly()?;
+    let resting_eta = refinements::resting_on_declaration(&problem, None)?;
     refinements::hold(&mut problem);
-    problem.minimise(ROUGHLY)?;
+    problem.minimise_roughly()?;
     let smoothed = smoothness::smoothed(&problem, &problem.covariance()?, None, &condensed, config.reference);
     let mut found = vec![None; steps.len()];
     for (i, (member, step)) in problem.members.iter().zip(&condensed).enumerate() {

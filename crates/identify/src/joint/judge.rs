@@ -9,9 +9,6 @@ use crate::step_outcome::interval_width;
 use mapper_core::{EstimateUncertainty, LeftOut, ModelDoubt, ModelEvidence, PoorFit, Warning};
 use mapper_numerics::statistics::{HINT_SIGMAS, mean, median, rms};
 
-/// Whitened mean square above which a step is doubtful. Its square times the median step's mean square (at least 1) excludes a step from the
-/// shared parameters.
-const DOUBT_SQUARE: f64 = 2.0;
 /// Mean square of the sums over [`SEGMENT_ROWS`] whitened rows of all steps above which the model itself is doubtful: smoothed inputs and
 /// fitted parameters reduce it from 1 to about 0.8 if the model fits the rig.
 const SLOW_SQUARE: f64 = 1.3;
@@ -38,26 +35,23 @@ fn slow_square(problem: &Problem<'_>, member: &Member<'_>) -> Option<f64> {
     mean(&segments)
 }
 
-/// Excludes steps that fit far worse than the others from the shared parameters; true if that changed anything.
-pub(crate) fn exclude(problem: &mut Problem<'_>) -> bool {
+/// Excludes steps that fit far worse than the others from the shared parameters: their mean square exceeds that of the median step (at least 1)
+/// by the square of the ratio that makes a step doubtful.
+pub(crate) fn exclude(problem: &mut Problem<'_>, config: &IdentifyConfig) {
     let squares: Vec<f64> = problem
         .members
         .iter()
         .map(|member| if member.barred { f64::INFINITY } else { mean_square(problem, member) })
         .collect();
     let open = || squares.iter().copied().filter(|square| square.is_finite());
-    let Some(middle) = median(open()) else { return false };
-    let limit = DOUBT_SQUARE.powi(2) * middle.max(1.0);
-    let mut changed = false;
+    let Some(middle) = median(open()) else { return };
+    let limit = config.thresholds.residual_over_noise_ratio.powi(4) * middle.max(1.0);
     // At most a third is excluded: beyond that, the model is wrong, not the steps.
     let bad = open().filter(|square| *square > limit).count();
     let few = 3 * bad <= open().count();
     for (member, square) in problem.members.iter_mut().zip(&squares) {
-        let shares = !(member.barred || few && *square > limit);
-        changed |= shares != member.shares;
-        member.shares = shares;
+        member.shares = !(member.barred || few && *square > limit);
     }
-    changed
 }
 
 /// Verdict on one step.
@@ -79,16 +73,14 @@ pub(crate) fn judge_step(
     }
     let declared = !config.declared.is_empty();
     let square = mean_square(problem, member);
-    if declared && square > DOUBT_SQUARE {
+    if declared && square.sqrt() > config.thresholds.residual_over_noise_ratio {
         findings.doubt(Warning::PoorFit(PoorFit::NoiseRatio { residual_ratio: square.sqrt() }));
     }
     if !member.shares && !member.barred {
         findings.doubt(Warning::LeftOut(LeftOut::PoorFit));
     }
     let deviation = member.local[LN_DEVIATION];
-    if problem.setting.with_law
-        && deviation.abs() > LAW_SCATTER_RATIO.max(3.0 * member.priors[LN_DEVIATION].sigma)
-    {
+    if deviation.abs() > LAW_SCATTER_RATIO.max(3.0 * member.priors[LN_DEVIATION].sigma) {
         findings.doubt(Warning::OffTheLaw { h_deviation_ratio: deviation.exp_m1() });
     }
 }
@@ -107,7 +99,7 @@ pub(crate) fn doubts(problem: &Problem<'_>, smoothed: &Smoothed, config: &Identi
         doubts.push(ModelEvidence::SlowResidual { residual_ratio: slow.sqrt() });
     }
     let scatter = rms(problem.members.iter().map(|member| member.local[LN_DEVIATION])).unwrap_or(0.0);
-    if problem.setting.with_law && scatter > LAW_SCATTER_RATIO {
+    if scatter > LAW_SCATTER_RATIO {
         doubts.push(ModelEvidence::Scatter { scatter_ratio: scatter });
     }
     let above = |judged: &&Judged| {

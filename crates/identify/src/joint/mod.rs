@@ -14,7 +14,7 @@ pub(crate) mod uncertainty;
 
 use crate::faults::balances::efficiency::FittedEfficiencies;
 use crate::joint::fit::refinements::{Gain, Refinements};
-use crate::joint::fit::solve::{Covariance, FULLY, Problem, ROUGHLY};
+use crate::joint::fit::solve::{Covariance, Problem};
 use crate::joint::step_model::parameters::{INLET, PROBE_MM2, SHARED};
 use crate::joint::uncertainty::smoothness::{Judged, Smoothed};
 use crate::single_step::dynamic::Estimate;
@@ -23,13 +23,11 @@ use crate::step_outcome::findings::Findings;
 use crate::step_outcome::two_parameter::TwoParameter;
 use crate::{IdentifyConfig, step_data::commands};
 use mapper_core::{
-    EstimateUncertainty, FitFailure, JointSettings, LeftOut, Recording, ThermalModel, Verdict, Warning,
-    Window, confidence_interval_95,
+    EstimateUncertainty, FitFailure, LeftOut, Recording, ThermalModel, Verdict, Warning, Window,
+    confidence_interval_95,
 };
+use mapper_inference::descent::ROUNDS;
 use mapper_numerics::statistics::rms;
-
-/// Number of fits before the last one.
-const ROUNDS: usize = 3;
 
 /// Growth of the points' standard errors above which leaving a region out costs more than it gains.
 const MAX_LOST_RATIO: f64 = 2.0;
@@ -67,10 +65,6 @@ pub(crate) fn estimate(
             let (eta_low, eta_high) = confidence_interval_95(eta, error.combined_standard_error());
             two_parameter.push(TwoParameter { step: step.index, eta, eta_low, eta_high });
         }
-    }
-    if config.joint == JointSettings::all_off() {
-        findings.iter_mut().zip(own_findings).for_each(|(findings, own)| findings.take(own));
-        return Joint { estimates: alone, thermal: None, two_parameter: Vec::new(), fitted: None };
     }
     let steps = fit::start::steps(recording, end_states, config, findings);
     let attempt = match Attempt::new(&steps, &alone, config, &[]) {
@@ -232,22 +226,20 @@ fn fitted(
     config: &IdentifyConfig,
 ) -> Option<Fitted> {
     for _ in 0..ROUNDS {
-        problem.minimise(ROUGHLY)?;
+        problem.minimise_roughly()?;
         fit::start::refine(problem, steps, config)?;
         problem.explained = fit::input_noise::explained(problem, steps, config);
-        judge::exclude(problem);
+        judge::exclude(problem, config);
         // A probe on its bound may leave it with better weights.
         problem.active[PROBE_MM2] = problem.probe_fitted;
     }
-    problem.minimise(FULLY)?;
+    problem.minimise()?;
     let inlet_sigma = fit::inlet::settle(problem)?;
     let open = problem.clone();
     let refinements = fit::refinements::settle(problem)?;
     let (covariance, gain) = covariance(problem, refinements.as_ref(), inlet_sigma)?;
     let resting = match &refinements {
-        Some(found) => {
-            fit::refinements::resting_on_declaration(&open, |index| found.probability(index) < 0.5)?
-        }
+        Some(found) => fit::refinements::resting_on_declaration(&open, Some(found))?,
         None => 0.0,
     };
     Some(Fitted { covariance, refined: refinements.zip(gain), resting })

@@ -6,7 +6,8 @@
 //! Econometrica 46, 1978, eq. 2.10).
 
 use crate::joint::fit::solve::{Covariance, Problem};
-use crate::joint::step_model::parameters::{ALPHA, EXPONENT, LN_COEFFICIENT, LN_DIRECTION, Place};
+use crate::joint::fit::start::LAW_SIGMA;
+use crate::joint::step_model::parameters::{EXPONENT, LN_COEFFICIENT, REFINEMENTS};
 use crate::joint::step_model::rows::StepRows;
 use crate::joint::step_model::surface::SurfaceScale;
 use mapper_core::{MapRegion, ReferenceState};
@@ -14,9 +15,6 @@ use mapper_numerics::statistics::{EXCLUDE_SIGMAS, MIN_VALUES};
 
 /// Shares of the steps in a region; the smallest one that helps is left out.
 const SHARES: [f64; 2] = [1.0 / 6.0, 1.0 / 3.0];
-/// Minimum standard error of the difference of each parameter: the effect of small smooth model errors.
-const FLOORS: [(Place, f64); 4] =
-    [(ALPHA, 0.02), (EXPONENT, 0.02), (LN_COEFFICIENT, 0.02), (LN_DIRECTION, 0.01)];
 
 /// Steps at one end of the map.
 pub(crate) struct Region {
@@ -68,8 +66,10 @@ pub(crate) fn disagreement(
         // A parameter fixed as declared has no error.
         if problem.active[index] { covariance.error_of(index) } else { Some(0.0) }
     };
-    FLOORS
-        .into_iter()
+    // Small model errors change a parameter by as much, and the spread of the points about the law changes the law.
+    let with_priors = REFINEMENTS.into_iter().map(|(index, _, _, model_error)| (index, model_error));
+    with_priors
+        .chain([(EXPONENT, LAW_SIGMA), (LN_COEFFICIENT, LAW_SIGMA)])
         .filter_map(|(index, floor)| {
             let (of_all, of_rest) = (error(all, index)?, error(rest, index)?);
             let variance = (of_rest * of_rest - of_all * of_all).max(0.0) + floor * floor;

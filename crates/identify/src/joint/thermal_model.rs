@@ -41,7 +41,7 @@ pub(crate) fn thermal_model(
     let deviations: f64 = problem.members.iter().map(|member| member.local[LN_DEVIATION].powi(2)).sum();
     let reference = problem.setting.reynolds_reference;
     let exponent = problem.shared[EXPONENT];
-    let convection = problem.setting.with_law.then(|| ConvectionLaw {
+    let convection = Some(ConvectionLaw {
         diameter_m: problem.setting.outlet_diameter_m,
         coefficient: of(LN_COEFFICIENT, &|x| x.exp() * reference.powf(-exponent)),
         exponent: of(EXPONENT, &|x| x),

@@ -8,9 +8,6 @@ use mapper_physics::gas::air::Air;
 use mapper_physics::gas::mixture::Gas;
 use mapper_physics::laws::compression::isentropic_rise_ratio;
 
-/// Last part of a step, s.
-pub(crate) const LAST_S: f64 = 10.0;
-
 /// Medians over the last seconds of a step, total pressures, SI (speed in rpm).
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Ends {
@@ -43,6 +40,7 @@ impl Ends {
 
 /// One for each step; `None` if one of its compressor readings is missing.
 pub(crate) fn ends(recording: &Recording, config: &IdentifyConfig) -> Vec<Option<Ends>> {
+    let last_s = config.thresholds.steady_mean_s;
     recording
         .steps
         .iter()
@@ -50,7 +48,7 @@ pub(crate) fn ends(recording: &Recording, config: &IdentifyConfig) -> Vec<Option
         .map(|(position, step)| {
             let at = |channel: Channel| {
                 let series = recording.series.get(&channel)?;
-                let values = series.slice((step.end_s - LAST_S).max(step.start_s), step.end_s).1;
+                let values = series.slice((step.end_s - last_s).max(step.start_s), step.end_s).1;
                 median(values.iter().filter(|value| is_reading(channel, **value)))
             };
             let (flow_kg_s, t1_k, t2_k) = (at(Channel::CompressorFlow)?, at(Channel::T1)?, at(Channel::T2)?);

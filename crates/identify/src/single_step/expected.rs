@@ -9,7 +9,7 @@ use crate::step_data::samples::Samples;
 use mapper_physics::laws::compression::isentropic_rise_ratio;
 
 /// Sample interval to which the declared noise of a campaign refers, s.
-pub(crate) const DECLARED_INTERVAL_S: f64 = 0.1;
+pub const DECLARED_INTERVAL_S: f64 = 0.1;
 
 /// One instant of a forecast, total values.
 #[derive(Debug, Clone, Copy, PartialEq)]

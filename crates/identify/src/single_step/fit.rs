@@ -5,12 +5,12 @@ use crate::IdentifyConfig;
 use crate::single_step::probe_reading::{Followed, Probe};
 use crate::step_data::samples::Samples;
 use mapper_core::{Bound, InletConvection};
-use mapper_numerics::SLOPE_STEP;
+use mapper_numerics::least_squares::{Damping, DampingRule, MAX_ITERATIONS};
+use mapper_numerics::{ROUNDING, SLOPE_STEP};
 use mapper_physics::gas::air::Air;
 use mapper_physics::laws::compression::{CompressionInputs, compress, compressed_k};
 use mapper_physics::laws::inlet_convection::InletLaw;
 use mapper_physics::machine::params::Params;
-use rmpfit::{MPConfig, MPFitter, MPPar, MPResult, MPSide};
 
 /// Search range of the efficiency, fraction. Above 1 is impossible and is reported; the fit may go there to show it.
 pub(crate) const ETA_BOUNDS: (f64, f64) = (0.05, 2.0);
@@ -149,85 +149,70 @@ pub(crate) fn rows(samples: &Samples) -> impl Iterator<Item = Row> + '_ {
     })
 }
 
-struct Problem<'a> {
-    samples: &'a Samples,
+/// Measured minus predicted T2, K, without the part that the probe's first reading explains.
+fn residual_k(
+    samples: &Samples,
     geometry: Geometry,
-    followed: Option<&'a Followed>,
-    config: MPConfig,
-    parameters: [MPPar; 2],
+    followed: Option<&Followed>,
+    [eta, h_w_m2k]: [f64; 2],
+) -> Vec<f64> {
+    let gas_k: Vec<f64> = rows(samples).map(|row| t2_k(geometry, row, eta, h_w_m2k)).collect();
+    let read_k = followed.map_or_else(|| gas_k.clone(), |followed| followed.read(&gas_k));
+    let mut residual_k: Vec<f64> = samples.t2_k.iter().zip(&read_k).map(|(a, b)| a - b).collect();
+    if let Some(followed) = followed {
+        followed.without_first_reading(&mut residual_k);
+    }
+    residual_k
 }
 
-impl MPFitter for Problem<'_> {
-    fn eval(&mut self, parameters: &[f64], deviates: &mut [f64]) -> MPResult<()> {
-        let [eta, h_w_m2k] = [parameters[0], parameters[1]];
-        let gas_k = rows(self.samples).map(|row| t2_k(self.geometry, row, eta, h_w_m2k));
-        let measured_k = &self.samples.t2_k;
-        match self.followed {
-            None => {
-                for ((deviate, gas_k), measured_k) in deviates.iter_mut().zip(gas_k).zip(measured_k) {
-                    *deviate = measured_k - gas_k;
-                }
-            }
-            Some(followed) => {
-                let read_k = followed.read(&gas_k.collect::<Vec<f64>>());
-                for ((deviate, read_k), measured_k) in deviates.iter_mut().zip(read_k).zip(measured_k) {
-                    *deviate = measured_k - read_k;
-                }
-                followed.without_first_reading(deviates);
-            }
-        }
-        Ok(())
-    }
-
-    fn number_of_points(&self) -> usize {
-        self.samples.len()
-    }
-
-    fn config(&self) -> &MPConfig {
-        &self.config
-    }
-
-    fn parameters(&self) -> &[MPPar] {
-        &self.parameters
-    }
-}
-
-fn parameter((low, high): (f64, f64)) -> MPPar {
-    MPPar {
-        limited_low: true,
-        limited_up: true,
-        limit_low: low,
-        limit_up: high,
-        side: MPSide::Both,
-        rel_step: SLOPE_STEP,
-        ..MPPar::new()
-    }
-}
-
-/// The least-squares fit; `None` if it does not converge (or for fewer than 3 samples).
+/// The least-squares fit within the bounds; `None` if it does not converge (or for fewer than 3 samples).
 pub(crate) fn fit(samples: &Samples, geometry: Geometry) -> Option<Fit> {
     if samples.len() < 3 {
         return None;
     }
-    let mut parameters = start(samples, geometry);
     let followed = Followed::of(samples, geometry.probe);
-    let mut problem = Problem {
-        samples,
-        geometry,
-        followed: followed.as_ref(),
-        config: MPConfig { ftol: 1e-15, xtol: 1e-13, gtol: 1e-14, max_iter: 100, ..MPConfig::new() },
-        parameters: [parameter(ETA_BOUNDS), parameter(H_BOUNDS_W_M2K)],
-    };
-    let status = problem.mpfit(&mut parameters).ok()?;
-    let [eta, h_w_m2k] = parameters;
-    if !(eta.is_finite() && h_w_m2k.is_finite()) {
-        return None;
+    let residual = |at: [f64; 2]| residual_k(samples, geometry, followed.as_ref(), at);
+    let at = start(samples, geometry);
+    let mut best = linearised(samples, geometry, followed.clone(), at, residual(at))?;
+    let mut damping = Damping::new(DampingRule::GOOD_START);
+    for _ in 0..MAX_ITERATIONS {
+        let cost = square(&best.residual_k);
+        let normal = normal(&best.jacobian);
+        let right = [0, 1].map(|i| dot(&best.jacobian[i], &best.residual_k));
+        let trial = |damping: f64| {
+            let [[a, b], [_, d]] = normal;
+            let g = inverted([[a * (1.0 + damping), b], [b, d * (1.0 + damping)]])?;
+            let eta = best.eta + g[0][0] * right[0] + g[0][1] * right[1];
+            let h_w_m2k = best.h_w_m2k + g[1][0] * right[0] + g[1][1] * right[1];
+            let to =
+                [eta.clamp(ETA_BOUNDS.0, ETA_BOUNDS.1), h_w_m2k.clamp(H_BOUNDS_W_M2K.0, H_BOUNDS_W_M2K.1)];
+            let there = residual(to);
+            (square(&there) < cost).then_some((to, there))
+        };
+        let Some((to, there)) = damping.search(trial) else { break };
+        let decrease = cost - square(&there);
+        best = linearised(samples, geometry, followed.clone(), to, there)?;
+        if decrease <= ROUNDING * cost {
+            break;
+        }
     }
-    judged(samples, geometry, followed, [eta, h_w_m2k], status.resid)
+    Some(best)
 }
 
-/// Residual, derivatives and normal matrix at given parameters.
-fn judged(
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn square(column: &[f64]) -> f64 {
+    dot(column, column)
+}
+
+fn normal(jacobian: &[Vec<f64>; 2]) -> [[f64; 2]; 2] {
+    [0, 1].map(|i| [0, 1].map(|j| dot(&jacobian[i], &jacobian[j])))
+}
+
+/// A fit with its derivatives at given parameters; `None` if they are singular or not finite.
+fn linearised(
     samples: &Samples,
     geometry: Geometry,
     followed: Option<Followed>,
@@ -254,9 +239,7 @@ fn judged(
             followed.without_first_reading(column);
         }
     }
-    let product = |i: usize, j: usize| jacobian[i].iter().zip(&jacobian[j]).map(|(a, b)| a * b).sum::<f64>();
-    let crossed = product(0, 1);
-    let inverse_normal = inverted([[product(0, 0), crossed], [crossed, product(1, 1)]])?;
+    let inverse_normal = inverted(normal(&jacobian))?;
     Some(Fit { eta, h_w_m2k, residual_k, jacobian, gas_by_h, followed, inverse_normal })
 }
 

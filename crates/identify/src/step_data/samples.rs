@@ -8,7 +8,7 @@ use mapper_observe::plausible::is_reading;
 use mapper_physics::laws::compression::isentropic_rise_ratio;
 
 /// Longest gap between neighbouring samples of a channel, s: slow loggers have 1 Hz.
-pub(crate) const LONGEST_BRIDGE_S: f64 = 2.5;
+pub const LONGEST_BRIDGE_S: f64 = 2.5;
 
 /// Complete rows on the times of T2, as columns of equal length.
 #[derive(Debug, Clone, Default)]

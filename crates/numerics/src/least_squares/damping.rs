@@ -19,6 +19,22 @@ pub struct DampingRule {
     pub tries: usize,
 }
 
+impl DampingRule {
+    /// For a good start and a nearly linear model: small, and quickly negligible.
+    pub const GOOD_START: DampingRule = DampingRule {
+        start: 1e-4,
+        growth: 10.0,
+        relief: 0.1,
+        renewed: 1e-8,
+        least: 1e-12,
+        most: 1e8,
+        tries: 12,
+    };
+}
+
+/// Maximum number of iterations of a fit: a good start needs about ten.
+pub const MAX_ITERATIONS: usize = 60;
+
 /// The damping during a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Damping {

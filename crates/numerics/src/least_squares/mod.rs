@@ -12,5 +12,5 @@ mod damping;
 mod dense;
 
 pub use arrow::{Arrow, ArrowBlock, Reduced};
-pub use damping::{Damping, DampingRule};
+pub use damping::{Damping, DampingRule, MAX_ITERATIONS};
 pub use dense::{damped_step, inverse};

@@ -9,9 +9,7 @@ use crate::rig::drive::soak_s;
 use crate::{Session, SessionError};
 use mapper_campaign::campaign::Date;
 use mapper_campaign::{Campaign, Concern};
-use mapper_core::{
-    Advice, Dwell, JointSettings, Method, Plan, PlanStep, StepKind, VerdictForecast, WindowRule,
-};
+use mapper_core::{Advice, Dwell, Method, Plan, PlanStep, StepKind, VerdictForecast, WindowRule};
 use mapper_identify::ZeroSettings;
 use mapper_physics::laws::standstill::{StandstillState, relax};
 use mapper_physics::laws::thermocouple::time_constant_s;
@@ -193,8 +191,7 @@ fn settling_concern(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
 /// Steps with too little information on alpha_A, probe and heating/cooling ratio for any point with verdict good.
 fn information_concern(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
     let joint = campaign.identification.method == Method::Joint && campaign.sequence.is_none();
-    let settings = campaign.identification.joint;
-    let unpredicted = joint && settings != JointSettings::all_off() && plan.figures.rms_error_eta.is_none();
+    let unpredicted = joint && plan.figures.rms_error_eta.is_none();
     unpredicted.then(|| {
         Concern::warning(
             &["timing"],

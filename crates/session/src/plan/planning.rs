@@ -6,7 +6,7 @@ use crate::plan::surge::add_surge_search;
 use crate::plan::zero_forecast;
 use crate::recording::identification_config::identification;
 use mapper_campaign::Campaign;
-use mapper_core::{JointSettings, Method, OperatingPoint, Plan, PlanInputHashes};
+use mapper_core::{Method, OperatingPoint, Plan, PlanInputHashes};
 use mapper_identify::{IdentifyConfig, ZeroSettings, expected_after_zero};
 use mapper_physics::simulation::model::Model;
 use mapper_planner::{PlanRequest, PredictedMethod, make_plan, sha256_hex};
@@ -107,8 +107,8 @@ impl PlanInputs {
 fn predicted_method(campaign: &Campaign) -> Option<Box<dyn PredictedMethod>> {
     let config = identification_after_zero(campaign);
     let scope = match campaign.identification.method {
-        Method::Joint if config.joint != JointSettings::all_off() => Scope::AllSteps,
-        Method::Dynamic | Method::Joint => Scope::EachStep,
+        Method::Joint => Scope::AllSteps,
+        Method::Dynamic => Scope::EachStep,
         Method::Steady => Scope::Settled,
         Method::Corrected | Method::Imported => return None,
     };

@@ -51,10 +51,7 @@ impl PredictedMethod for Forecaster {
         let steps: Vec<ExpectedStep<'_>> = rows
             .iter()
             .zip(steps)
-            .map(|(rows, step)| {
-                let (eta, h_w_m2k) = step.last().map_or((0.0, 0.0), |end| (end.efficiency, end.h_w_m2k));
-                ExpectedStep { rows, eta, h_w_m2k }
-            })
+            .map(|(rows, step)| ExpectedStep { rows, eta: step.last().map_or(0.0, |end| end.efficiency) })
             .collect();
         let found = expected_together(&steps, &self.config)?;
         Some(MethodResults {

@@ -6,8 +6,8 @@ use crate::recording::identification_config::identification;
 use crate::rig::drive::soak_s;
 use mapper_campaign::Campaign;
 use mapper_core::{
-    Advice, CampaignChange, Dwell, JointSettings, Method, OperatingPoint, Plan, PlanStep, Soak, StepKind,
-    VerdictForecast, WindowRule,
+    Advice, CampaignChange, Dwell, Method, OperatingPoint, Plan, PlanStep, Soak, StepKind, VerdictForecast,
+    WindowRule,
 };
 use mapper_identify::MAX_RESTING_ETA;
 use mapper_numerics::statistics::rms;
@@ -23,10 +23,7 @@ const RESTING_RESERVE_RATIO: f64 = 1.4;
 /// Expected verdicts of the points of `plan`; `None` if the campaign's method does not identify all steps together.
 pub(crate) fn forecast_verdicts(campaign: &Campaign, plan: &Plan) -> Option<VerdictForecast> {
     let settings = &campaign.identification;
-    if settings.method != Method::Joint
-        || settings.joint == JointSettings::all_off()
-        || campaign.sequence.is_some()
-    {
+    if settings.method != Method::Joint || campaign.sequence.is_some() {
         return None;
     }
     let limits = identification(campaign).thresholds;

@@ -4,7 +4,6 @@ use crate::IdentifyConfig;
 use crate::faults::balance_rows::{MACHINE, Machine, Rows, common, own};
 use crate::faults::end_readings::{CHANNELS, Readings};
 use crate::faults::nominal_rig::NominalRig;
-use crate::objections::ends::LAST_S;
 use mapper_core::{Channel, ModelTolerances, Recording, StepMarker};
 use mapper_numerics::statistics::median;
 use mapper_observe::plausible::is_reading;
@@ -34,13 +33,14 @@ pub(crate) fn rows(
         .zip(readings)
         .filter_map(|(step, readings)| Some((step, (*readings)?)))
         .collect();
+    let last_s = config.thresholds.steady_mean_s;
     let of = |machine: &Machine| {
         let Machine::Condition(channel) = *machine else { return None };
         let tolerance = tolerance(channel, nominal.tolerances)?;
         let declared = *nominal.conditions.get(&channel)?;
         let series = recording.series.get(&channel)?;
         let at_end = |step: &StepMarker| {
-            let values = series.slice((step.end_s - LAST_S).max(step.start_s), step.end_s).1;
+            let values = series.slice((step.end_s - last_s).max(step.start_s), step.end_s).1;
             median(values.iter().filter(|value| is_reading(channel, **value)))
         };
         let known: Vec<(f64, Readings)> = steps

@@ -2,23 +2,18 @@
 //!
 //! Both models have the same parameters and predict nearly the same T2. A recording determines `h alpha_A` before the wheel and `h (1 -
 //! alpha_A)` after it. Another h before the wheel therefore changes alpha_A and h, but not the efficiencies. The ratio of the two laws varies
-//! by a few percent over a map, with the gas temperature after the wheel. A recording can distinguish the laws only by this variation, unless
-//! alpha_A is fixed as declared. Then the models differ by some hundredths of alpha_A, and small model errors can cause the same change. A map
-//! steeper than the fitted surface has favoured the wrong model by odds of hundreds to one. So both models are fitted and compared, with such
-//! errors included. If the recording does not decide, the difference becomes an error of everything that it moves.
+//! by a few percent over a map, with the gas temperature after the wheel, and a recording can distinguish the laws only by this variation. A
+//! map steeper than the fitted surface has favoured the wrong model by odds of hundreds to one. So both models are fitted and compared under
+//! the roughness of any map. If alpha_A is fixed as declared, the models differ by some hundredths of it. Small model errors can cause the
+//! same change, so such a recording decides nothing. What is not decided becomes an error of everything that it moves.
 
-use crate::joint::fit::solve::{Covariance, FULLY, Problem};
+use crate::faults::smooth::ANY_ROUGHNESS;
+use crate::joint::fit::solve::{Covariance, Problem};
 use crate::joint::step_model::parameters::{ALPHA, INLET, LN_COEFFICIENT, PROBE_MM2, Prior};
 use mapper_core::{IdentifiedInlet, InletConvection, Origin};
 use mapper_inference::interval::COVERAGE;
 use mapper_numerics::statistics::{HINT_SIGMAS, mean};
 use nalgebra::DMatrix;
-
-/// Change of alpha_A that small model errors can cause: a clearance that grows by a percent as the housing warms up by 100 K looks like 0.06.
-const PASSES_FOR_ALPHA: f64 = 0.025;
-/// Minimum spread of the points about the efficiency surface when the models are compared, fraction. A true map steeper than the surface
-/// favours the wrong model. The surface misses the nominal map by as much at eighteen points without noise (`tests/inlet.rs`).
-const MIN_SURFACE_SIGMA: f64 = 3e-3;
 
 /// Maximum ratio of the distance to its linear estimate: beyond it the linearisation is not valid.
 const MAX_NONLINEARITY: f64 = 2.0;
@@ -47,10 +42,10 @@ pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<Option<f64>> {
     let moved_to = |problem: &mut Problem<'_>, surface_sigma: f64| {
         problem.surface_sigma = surface_sigma;
         problem.active[PROBE_MM2] = problem.probe_fitted;
-        problem.minimise(FULLY)
+        problem.minimise()
     };
-    if tight < MIN_SURFACE_SIGMA {
-        moved_to(problem, MIN_SURFACE_SIGMA)?;
+    if tight < ANY_ROUGHNESS {
+        moved_to(problem, ANY_ROUGHNESS)?;
     }
     let left_open = compared(problem)?;
     moved_to(problem, tight)?;
@@ -69,7 +64,7 @@ fn compared(problem: &mut Problem<'_>) -> Option<Option<f64>> {
     let Some(mut other) = problem.inlet_sought.then(|| otherwise(problem)).flatten() else {
         return Some(None);
     };
-    let seen = 0.5 * (problem.square() - other.square()) * share_of_noise(problem)?;
+    let seen = if problem.active[ALPHA] { 0.5 * (problem.square() - other.square()) } else { 0.0 };
     let mut left = 1.0 / (1.0 + (-seen).exp());
     // Keep the declared model unless the recording decides against it: the other one has other efficiencies.
     if left > COVERAGE {
@@ -114,23 +109,6 @@ pub(crate) fn carry(problem: &mut Problem<'_>, sigma: f64, without: &Covariance)
     Some(with)
 }
 
-/// Factor by which model errors weaken the decision between the models, compared with noise alone: the noise's share of the variance of the
-/// power (0 to 1) by which h before the wheel follows its own law. It is 1 if alpha_A is fitted, because alpha_A then absorbs such errors.
-fn share_of_noise(problem: &Problem<'_>) -> Option<f64> {
-    if problem.active[ALPHA] {
-        return Some(1.0);
-    }
-    let by_noise = problem.information(INLET)?.powf(-0.5);
-    let alpha = problem.shared[ALPHA];
-    let ln_ratios = problem.ln_inlet_ratios();
-    let ln_ratio = mean(&ln_ratios)?;
-    // The change of alpha_A equivalent to the whole way from one model to the other.
-    let way = (alpha * (1.0 - alpha) * ln_ratio).abs();
-    let by_faults = PASSES_FOR_ALPHA / way;
-    let share = (by_noise / by_noise.hypot(by_faults)).powi(2);
-    share.is_finite().then_some(share)
-}
-
 /// Ratio of the distance between the two fits to its linear estimate. The dependence is curved because only the product of alpha_A and h is
 /// determined.
 fn nonlinearity(problem: &Problem<'_>, other: &Problem<'_>, covariance: &Covariance) -> f64 {
@@ -164,7 +142,7 @@ fn otherwise<'a>(problem: &Problem<'a>) -> Option<Problem<'a>> {
     }
     // The probe does not depend on the inlet, but it could be on its bound in only one of the fits.
     other.active[PROBE_MM2] = false;
-    other.minimise(FULLY)?;
+    other.minimise()?;
     other.active[PROBE_MM2] = problem.active[PROBE_MM2];
     Some(other)
 }

@@ -5,13 +5,14 @@
 //! ([`mapper_inference::mixture`]). The fit moves to the mean of the mixture and is linearised again there, because the probe's lag is far
 //! from linear. The spread of the mixture then enters the uncertainty of every number of every point.
 
-use crate::joint::fit::solve::{Covariance, FULLY, Problem};
+use crate::joint::fit::solve::{Covariance, Problem};
 use crate::joint::step_model::parameters::{ALPHA, ETA, OFFSETS, PROBE_MM2, REFINEMENTS, SURFACE};
 use mapper_core::standard_error_of;
 use mapper_inference::interval;
 use mapper_inference::mixture::{Draw, Mixture, Parameter};
 use mapper_numerics::statistics::mean;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix4xX};
+use std::collections::BTreeMap;
 
 /// The joint distribution of the parameters with a prior.
 #[derive(Debug, Clone)]
@@ -44,21 +45,33 @@ pub(crate) fn hold(problem: &mut Problem<'_>) {
     }
 }
 
-/// Error of the efficiencies, fraction (rms of one standard error), if the parameters selected by `neutral` were not neutral. This is the
-/// uncertainty of the efficiencies without the declaration.
-pub(crate) fn resting_on_declaration(open: &Problem<'_>, neutral: impl Fn(usize) -> bool) -> Option<f64> {
-    let sought: Vec<_> = sought(open).into_iter().filter(|(index, ..)| neutral(*index)).collect();
-    if sought.is_empty() {
-        return Some(0.0);
+/// Error of the efficiencies, fraction (rms of one standard error), if parameters that are taken for neutral are not: the part of their variance
+/// that knowing these parameters removes, averaged over the sets of the mixture. `None` as `found`: all are taken for neutral.
+pub(crate) fn resting_on_declaration(open: &Problem<'_>, found: Option<&Refinements>) -> Option<f64> {
+    let covariance = open.covariance()?;
+    let rows: Vec<Option<usize>> = sought(open).iter().map(|(index, ..)| covariance.row_of(*index)).collect();
+    let mut sets: BTreeMap<Vec<usize>, f64> = BTreeMap::new();
+    match found {
+        None => _ = sets.insert(rows.iter().copied().flatten().collect(), 1.0),
+        Some(found) => {
+            for Draw { weight, values } in &found.mixture.draws {
+                let neutral = rows.iter().zip(values.iter()).filter(|(_, value)| **value == 0.0);
+                *sets.entry(neutral.filter_map(|(row, _)| *row).collect()).or_default() += weight;
+            }
+        }
     }
-    let mut held = open.clone();
-    sought.iter().for_each(|(index, ..)| held.active[*index] = false);
-    let (open, held) = (open.covariance()?, held.covariance()?);
-    let variance = |covariance: &Covariance, i: usize| covariance.own.get(i).map(|(own, _)| own[(ETA, ETA)]);
-    let of_steps: Vec<f64> = (0..open.own.len())
-        .filter_map(|i| Some((variance(&open, i)? - variance(&held, i)?).max(0.0)))
-        .collect();
-    Some(mean(&of_steps)?.sqrt())
+    let removed = |neutral: &[usize]| -> Option<f64> {
+        let count = neutral.len();
+        let part =
+            DMatrix::from_fn(count, count, |a, b| covariance.shared[(neutral[a], neutral[b])]).cholesky()?;
+        let of_step = |(_, mixed): &(_, Matrix4xX<f64>)| {
+            let with = DVector::from_iterator(count, neutral.iter().map(|row| mixed[(ETA, *row)]));
+            with.dot(&part.solve(&with))
+        };
+        mean(covariance.own.iter().map(of_step))
+    };
+    let variance: Option<f64> = sets.iter().map(|(neutral, weight)| Some(weight * removed(neutral)?)).sum();
+    Some(variance?.max(0.0).sqrt())
 }
 
 /// Evaluates the mixture of a problem at its minimum and moves the problem to the mean of the mixture; `Some(None)` if there is nothing to
@@ -111,7 +124,7 @@ fn linearised(problem: &mut Problem<'_>, sought: &[(usize, f64, f64, f64)]) -> O
         problem.shared[*index] = declared + at;
         problem.active[*index] = false;
     }
-    problem.minimise(FULLY)?;
+    problem.minimise()?;
     indices.iter().for_each(|index| problem.active[*index] = true);
     let free = found.iter().zip(spread.diagonal().iter()).map(|(x, v)| (*x, v.sqrt())).collect();
     Some(Refinements { indices, mixture, at, free })
@@ -121,11 +134,6 @@ impl Refinements {
     /// Position of a parameter among the others.
     fn place(&self, index: usize) -> Option<usize> {
         self.indices.iter().position(|other| *other == index)
-    }
-
-    /// Probability that a parameter is not neutral; 0 if it is not searched for.
-    pub(crate) fn probability(&self, index: usize) -> f64 {
-        self.place(index).map_or(0.0, |place| self.mixture.off_neutral[place])
     }
 
     /// Best-fit value with all of them free, as a difference from the declared value, and its standard error; `None` if it is not searched

@@ -7,22 +7,12 @@ use crate::joint::step_model::parameters::{
     ETA, LOCAL, LocalVector, OFFSETS, PROBE_MM2, Prior, REFINEMENTS, SHARED, SURFACE, SharedVector,
 };
 use mapper_core::IdentifiedInlet;
+use mapper_inference::descent::ENOUGH;
+use mapper_numerics::ROUNDING;
 use mapper_numerics::coloured_noise::WhiteningFilter;
-use mapper_numerics::least_squares::{Arrow, ArrowBlock, Damping, DampingRule, Reduced};
+use mapper_numerics::least_squares::{Arrow, ArrowBlock, Damping, DampingRule, MAX_ITERATIONS, Reduced};
 use mapper_numerics::parallel;
 use nalgebra::{DMatrix, DVector, Matrix4, Matrix4xX, Vector4};
-
-/// Maximum number of iterations: a good start needs about ten.
-const MAX_ITERATIONS: usize = 60;
-/// Relative decrease of the cost below which the search ends.
-const ENOUGH_RATIO: f64 = 1e-10;
-/// Damping for the step search: small, since the start is good and the model nearly linear.
-const DAMPING: DampingRule =
-    DampingRule { start: 1e-4, growth: 10.0, relief: 0.1, renewed: 1e-8, least: 1e-12, most: 1e8, tries: 12 };
-/// Sufficient decrease, in squares of standard deviations, for an intermediate fit or one that is compared with standard errors.
-pub(crate) const ROUGHLY: f64 = 1e-4;
-/// The same for the last fit: noise-free recordings resolve less than any standard error.
-pub(crate) const FULLY: f64 = 0.0;
 
 /// One step in the fit.
 #[derive(Debug, Clone)]
@@ -296,10 +286,21 @@ impl Problem<'_> {
             .collect()
     }
 
-    /// Finds the minimum from the current parameters; `None` if it does not converge. `enough_square`: see [`ROUGHLY`] and [`FULLY`].
-    pub(crate) fn minimise(&mut self, enough_square: f64) -> Option<f64> {
+    /// Finds the minimum from the current parameters; `None` if it does not converge. Noise-free recordings resolve less than any standard
+    /// error.
+    pub(crate) fn minimise(&mut self) -> Option<f64> {
+        self.descend(0.0)
+    }
+
+    /// The same for an intermediate fit, or one that is compared with standard errors.
+    pub(crate) fn minimise_roughly(&mut self) -> Option<f64> {
+        self.descend(ENOUGH)
+    }
+
+    /// Ends if an iteration decreases the cost by `enough` or less.
+    fn descend(&mut self, enough: f64) -> Option<f64> {
         let mut fitted = self.fitted();
-        let mut damping = Damping::new(DAMPING);
+        let mut damping = Damping::new(DampingRule::GOOD_START);
         let mut best = f64::INFINITY;
         for _ in 0..MAX_ITERATIONS {
             let normal = self.normal(&fitted);
@@ -347,7 +348,7 @@ impl Problem<'_> {
             }
             let decrease = best - cost;
             best = cost;
-            if decrease <= (ENOUGH_RATIO * cost.max(1e-12)).max(enough_square) {
+            if decrease <= (ROUNDING * cost).max(enough) {
                 break;
             }
         }
@@ -362,19 +363,6 @@ impl Problem<'_> {
         indices.iter().map(|index| Some(self.shared[*index] + change[row(index)?])).collect()
     }
 
-    /// Information of the recording alone about a shared parameter with all fitted ones free: the inverse of its least-squares variance, minus
-    /// the prior's part. The parameter itself need not be fitted.
-    pub(crate) fn information(&self, index: usize) -> Option<f64> {
-        let mut fitted = self.fitted();
-        if !fitted.contains(&index) {
-            fitted.push(index);
-        }
-        let row = fitted.iter().position(|other| *other == index)?;
-        let reduced = self.normal(&fitted).equations.reduced(0.0)?.matrix;
-        let variance = reduced.cholesky()?.inverse()[(row, row)];
-        Some(1.0 / variance - self.priors[index].weight())
-    }
-
     /// The problem at its minimum without the efficiency surface: the information of the steps and shared parameters alone.
     pub(crate) fn without_a_surface(&self) -> Option<Self> {
         let mut free = self.clone();
@@ -383,7 +371,7 @@ impl Problem<'_> {
         for (index, _, slab_sigma, _) in REFINEMENTS {
             free.priors[index].sigma = slab_sigma;
         }
-        free.minimise(ROUGHLY)?;
+        free.minimise_roughly()?;
         Some(free)
     }
 

@@ -1,5 +1,6 @@
 //! Prepares a recording for the fit, and estimates noise and spreads from the fit.
 
+use crate::faults::smooth::ANY_ROUGHNESS;
 use crate::joint::fit::inlet;
 use crate::joint::fit::input_noise_spline::Explained;
 use crate::joint::fit::solve::{Member, Problem};
@@ -18,9 +19,7 @@ use crate::step_data::samples::Samples;
 use crate::step_data::window;
 use crate::step_outcome::findings::Findings;
 use crate::{IdentifyConfig, WindowRule, step_data::commands};
-use mapper_core::{
-    Channel, Choice, ConvectionWithinStep, EfficiencyWithinStep, Recording, TooFew, Warning, Window,
-};
+use mapper_core::{Channel, Choice, Recording, TooFew, Warning, Window};
 use mapper_numerics::coloured_noise::{BlockNoise, WhiteningFilter};
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::{DOUBT_SIGMAS, mean};
@@ -40,7 +39,7 @@ pub(crate) const SURFACE_SIGMA: f64 = 1e-3;
 /// Relative error of the surface's effect on a prediction: surfaces through a few points bend differently from maps.
 const SHAPE_ERROR_RATIO: f64 = 0.03;
 /// Expected spread of the points' h about the law, ratio. The recordings of `benches/identification.py` have 0.0022 to 0.003.
-const LAW_SIGMA: f64 = 3e-3;
+pub(crate) const LAW_SIGMA: f64 = 3e-3;
 /// Weight of the expected spread, in points: small next to the dozens of points of a campaign, sufficient without any.
 const PRIOR_WEIGHT: f64 = 4.0;
 /// Logarithms, in tenths, of the spreads that are tried over the expected one: from a thirtieth to thirty times.
@@ -118,8 +117,6 @@ pub(crate) fn problem<'a>(
     let places: Vec<(f64, f64)> = steps.iter().map(|step| step.end.place).collect();
     let scale = SurfaceScale::of(&places, config.reference)?;
     let choice = &config.joint;
-    let with_law = choice.h == ConvectionWithinStep::Law;
-    let shaped = choice.efficiency == EfficiencyWithinStep::Shaped;
     let reynolds = |step: &StepRows| {
         let bulk_k = step.end.t2_k;
         4.0 * step.end.flow_kg_s
@@ -133,8 +130,6 @@ pub(crate) fn problem<'a>(
         outlet_diameter_m: config.outlet_diameter_m,
         inlet_diameter_m: config.inlet_diameter_m,
         reynolds_reference: ln_reference.exp(),
-        with_law,
-        shaped,
     };
 
     let free = Prior { mean: 0.0, sigma: f64::INFINITY };
@@ -148,8 +143,8 @@ pub(crate) fn problem<'a>(
     shared[LN_COEFFICIENT] = law.nusselt_coefficient.ln() + law.nusselt_exponent * ln_reference;
     priors[LN_COEFFICIENT] = Prior { mean: shared[LN_COEFFICIENT], sigma: 3.0 };
     priors[EXPONENT] = Prior { mean: 0.9, sigma: 0.5 };
-    active[LN_COEFFICIENT] = with_law;
-    active[EXPONENT] = with_law;
+    active[LN_COEFFICIENT] = true;
+    active[EXPONENT] = true;
     REFINEMENTS.into_iter().for_each(|(index, sigma, ..)| priors[index].sigma = sigma);
     shared[ALPHA] = config.alpha_area_ratio;
     priors[ALPHA].mean = config.alpha_area_ratio;
@@ -169,7 +164,7 @@ pub(crate) fn problem<'a>(
             priors[OFFSETS + i] = Prior { mean: 0.0, sigma };
             active[OFFSETS + i] = sigma > 0.0;
             priors[BENDS + i] = priors[OFFSETS + i];
-            active[BENDS + i] = shaped && sigma > 0.0;
+            active[BENDS + i] = sigma > 0.0;
         }
         let sigma =
             config.declared.get(&Channel::CompressorFlow).map_or(0.0, |declared| declared.gain_sigma_ratio);
@@ -194,12 +189,11 @@ pub(crate) fn problem<'a>(
     shared[SURFACE] = mean_eta;
     for (k, sigma) in SurfaceScale::prior_sigmas().into_iter().enumerate() {
         priors[SURFACE + k] = Prior { mean: shared[SURFACE + k], sigma };
-        active[SURFACE + k] = shaped;
+        active[SURFACE + k] = true;
     }
 
     let members =
         steps.iter().map(|step| member(step, alone.get(step.position), &scale, mean_eta, config)).collect();
-    let surface_sigma = if shaped { 0.005 } else { f64::INFINITY };
     Some(Problem {
         setting,
         members,
@@ -207,7 +201,7 @@ pub(crate) fn problem<'a>(
         priors,
         active,
         lowest,
-        surface_sigma,
+        surface_sigma: ANY_ROUGHNESS,
         explained: Explained::default(),
         probe_fitted: choice.probe == Choice::Fitted,
         inlet_sought: choice.inlet_h == Choice::Fitted,
@@ -239,11 +233,6 @@ pub(crate) fn member<'a>(
     let mut own = [free; LOCAL];
     local[ETA] = eta;
     own[LN_DEVIATION] = Prior { mean: 0.0, sigma: 0.01 };
-    if config.joint.h != ConvectionWithinStep::Law {
-        local[LN_DEVIATION] =
-            found.and_then(|found| found.h_w_m2k).map_or(500.0, |(h, _)| h).clamp(20.0, 5e3).ln();
-        own[LN_DEVIATION] = Prior { mean: local[LN_DEVIATION], sigma: 3.0 };
-    }
     local[FIRST_READING] = first_k;
     own[FIRST_READING] = Prior { mean: first_k, sigma: 5.0 };
     local[SLOPE] = 1.0;
@@ -299,15 +288,11 @@ pub(crate) fn refine(problem: &mut Problem<'_>, steps: &[StepRows], config: &Ide
     let off_law: Vec<(f64, f64)> = of_steps()
         .map(|(member, (own, _))| (member.local[LN_DEVIATION], own[(LN_DEVIATION, LN_DEVIATION)]))
         .collect();
-    if problem.setting.shaped {
-        problem.surface_sigma = spread(&off_surface, problem.surface_sigma, SURFACE_SIGMA);
-    }
-    if problem.setting.with_law {
-        let before = problem.members.first().map_or(LAW_SIGMA, |member| member.priors[LN_DEVIATION].sigma);
-        let sigma = spread(&off_law, before, LAW_SIGMA);
-        for member in &mut problem.members {
-            member.priors[LN_DEVIATION].sigma = sigma;
-        }
+    problem.surface_sigma = spread(&off_surface, problem.surface_sigma, SURFACE_SIGMA);
+    let before = problem.members.first().map_or(LAW_SIGMA, |member| member.priors[LN_DEVIATION].sigma);
+    let sigma = spread(&off_law, before, LAW_SIGMA);
+    for member in &mut problem.members {
+        member.priors[LN_DEVIATION].sigma = sigma;
     }
     Some(())
 }
@@ -373,7 +358,7 @@ pub(crate) fn set_weights(problem: &mut Problem<'_>, steps: &[StepRows], config:
             (square / (member.measured_k.len() as f64 - 3.0).max(1.0)).sqrt().max(3e-4)
         };
         let by_eta = problem.setting.by_efficiency(&step.end, &problem.shared, &member.local);
-        if let Some(coupled) = coupled(&slopes, by_eta).filter(|_| problem.setting.shaped) {
+        if let Some(coupled) = coupled(&slopes, by_eta) {
             problem.members[i].coupling[BENDS..].copy_from_slice(&coupled);
         }
         let white_sigma_k = if expected > 0.0 { declared[1].max(0.1 * sigma_k) } else { sigma_k };

@@ -29,10 +29,6 @@ pub(crate) struct Setting {
     pub(crate) air: Air,
     /// Reynolds number at which the law's coefficient is defined.
     pub(crate) reynolds_reference: f64,
-    /// Whether h follows the convection law; otherwise h is constant within a step.
-    pub(crate) with_law: bool,
-    /// Whether the efficiency follows the surface.
-    pub(crate) shaped: bool,
 }
 
 /// The model's data of a step: its rows, and the surface terms at each row minus those at the step's end.
@@ -111,12 +107,11 @@ impl Setting {
         let by_k = hotter.bulk_k - here.bulk_k;
         let metal_k = gas.tc_k * (1.0 + SLOPE_STEP);
         let viscosity_ratio = air::viscosity_pa_s(gas.tc_k) / air::viscosity_pa_s(metal_k);
-        let law = if self.with_law { 1.0 } else { 0.0 };
         Answer {
             ln_h_by_bulk: (hotter.h_w_m2k / here.h_w_m2k - 1.0) / by_k,
             inlet_by_bulk: (hotter.inlet_h_ratio - here.inlet_h_ratio) / by_k,
-            ln_h_by_metal: law * nusselt::WALL_EXPONENT * (viscosity_ratio - 1.0) / (metal_k - gas.tc_k),
-            ln_h_by_ln_flow: law * shared[EXPONENT],
+            ln_h_by_metal: nusselt::WALL_EXPONENT * (viscosity_ratio - 1.0) / (metal_k - gas.tc_k),
+            ln_h_by_ln_flow: shared[EXPONENT],
         }
     }
 
@@ -128,9 +123,6 @@ impl Setting {
         } else {
             (shared[INLET] * self.ln_inlet_ratio(gas, shared, bulk_k)).exp()
         };
-        if !self.with_law {
-            return Convection { h_w_m2k: ln_deviation.exp(), bulk_k, inlet_h_ratio };
-        }
         let exponent = shared[EXPONENT];
         let ln_coefficient = shared[LN_COEFFICIENT] + ln_deviation - exponent * self.reynolds_reference.ln();
         let h_w_m2k = nusselt::coefficient_w_m2k(
@@ -173,8 +165,7 @@ impl Setting {
                 internal_area_m2: before_m2 + after_m2,
                 air: gas.air,
             };
-            // Without the law this is the identification of the paper, which takes cp at T2'.
-            compress(&inputs, self.with_law.then_some(bulk_k))
+            compress(&inputs, Some(bulk_k))
         };
         let after_m2 = (1.0 - alpha) * self.internal_area_m2;
         let plain = pass(after_m2);
@@ -195,7 +186,7 @@ impl Setting {
         let pressure_ratio = p2_pa / p1_pa;
         let humidity_kg_kg = self.air.humidity_kg_kg() + shared[HUMIDITY];
         let air = self.air.with_humidity(humidity_kg_kg).between(p1_pa, p2_pa);
-        let slope = if self.shaped { local[SLOPE] * dot(terms, surface_of(shared)) } else { 0.0 };
+        let slope = local[SLOPE] * dot(terms, surface_of(shared));
         Gas {
             t1_k,
             tc_k: row.tc_k - offset(2) - shared[GAINS + 1] * (row.tc_k - CALIBRATED_AT_K),
@@ -299,29 +290,22 @@ impl Setting {
             };
             put(SHARED + ETA, by_eta);
             put(SHARED + LN_DEVIATION, by_ln_h);
-            if self.shaped {
-                put(SHARED + SLOPE, by_eta * dot(terms, surface_of(shared)));
-                for (k, term) in terms.iter().enumerate() {
-                    put(SURFACE + k, by_eta * local[SLOPE] * term);
-                }
+            put(SHARED + SLOPE, by_eta * dot(terms, surface_of(shared)));
+            for (k, term) in terms.iter().enumerate() {
+                put(SURFACE + k, by_eta * local[SLOPE] * term);
             }
-            if self.with_law {
-                put(LN_COEFFICIENT, by_ln_h);
-                let ln_reynolds = (self.reynolds(gas.flow_kg_s, h.bulk_k) / self.reynolds_reference).ln();
-                put(EXPONENT, by_ln_h * ln_reynolds);
-            }
+            put(LN_COEFFICIENT, by_ln_h);
+            let ln_reynolds = (self.reynolds(gas.flow_kg_s, h.bulk_k) / self.reynolds_reference).ln();
+            put(EXPONENT, by_ln_h * ln_reynolds);
             if active[INLET] || shared[INLET] != 0.0 {
                 let moved = Convection { inlet_h_ratio: h.inlet_h_ratio * (1.0 + SLOPE_STEP), ..h };
                 let by_ln_inlet = (self.t2_k(&gas, moved, alpha, ln_direction) - t2_k) / SLOPE_STEP;
                 put(INLET, by_ln_inlet * self.ln_inlet_ratio(&gas, shared, h.bulk_k));
-                if self.with_law {
-                    // The exponent applies to the Reynolds numbers on both sides.
-                    let ln_reynolds = (self.reynolds(gas.flow_kg_s, h.bulk_k) / self.reynolds_reference).ln();
-                    let ln_inlet_over_outlet = (self.outlet_diameter_m * air::viscosity_pa_s(h.bulk_k)
-                        / (self.inlet_diameter_m * air::viscosity_pa_s(gas.t1_k)))
-                    .ln();
-                    put(EXPONENT, by_ln_h * ln_reynolds + by_ln_inlet * shared[INLET] * ln_inlet_over_outlet);
-                }
+                // The exponent applies to the Reynolds numbers on both sides.
+                let ln_inlet_over_outlet = (self.outlet_diameter_m * air::viscosity_pa_s(h.bulk_k)
+                    / (self.inlet_diameter_m * air::viscosity_pa_s(gas.t1_k)))
+                .ln();
+                put(EXPONENT, by_ln_h * ln_reynolds + by_ln_inlet * shared[INLET] * ln_inlet_over_outlet);
             }
             if active[ALPHA] {
                 put(ALPHA, (self.t2_k(&gas, h, alpha + SLOPE_STEP, ln_direction) - t2_k) / SLOPE_STEP);

@@ -105,20 +105,18 @@ pub(crate) fn quantities(
             let (own, mixed) = &covariance.own[i];
             let mut weights = [0.0; SHARED];
             weights[LN_AREA] = -1.0;
-            if problem.setting.with_law {
-                let at = |shared: &SharedVector| {
-                    problem.setting.h_at_end(&steps[i].end, shared, &problem.members[i].local)
-                };
-                let (h_w_m2k, ln_re) = at(&problem.shared);
-                weights[LN_COEFFICIENT] = 1.0;
-                weights[EXPONENT] = ln_re;
-                // The convection law is evaluated at the readings, so a flow error is an error of h.
-                for index in covariance.fitted.iter().copied().filter(|index| is_offset(*index)) {
-                    let step = 0.1 * problem.priors[index].sigma;
-                    let mut moved = problem.shared;
-                    moved[index] += step;
-                    weights[index] = (at(&moved).0 / h_w_m2k).ln() / step;
-                }
+            let at = |shared: &SharedVector| {
+                problem.setting.h_at_end(&steps[i].end, shared, &problem.members[i].local)
+            };
+            let (h_w_m2k, ln_re) = at(&problem.shared);
+            weights[LN_COEFFICIENT] = 1.0;
+            weights[EXPONENT] = ln_re;
+            // The convection law is evaluated at the readings, so a flow error is an error of h.
+            for index in covariance.fitted.iter().copied().filter(|index| is_offset(*index)) {
+                let step = 0.1 * problem.priors[index].sigma;
+                let mut moved = problem.shared;
+                moved[index] += step;
+                weights[index] = (at(&moved).0 / h_w_m2k).ln() / step;
             }
             let weights = DVector::from_iterator(
                 covariance.fitted.len(),

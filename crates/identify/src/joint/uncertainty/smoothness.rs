@@ -34,8 +34,6 @@ const FLOW_LENGTHS: [f64; 5] = [0.35, 0.5, 0.7, 1.0, 2.0];
 const ROUGHNESSES: [f64; 2] = [SURFACE_SIGMA, ANY_ROUGHNESS];
 /// Mean of efficiencies and its standard deviation, fraction: an uninformative prior.
 const MEAN: (f64, f64) = (0.65, 1.0);
-/// Number of points above which the weights come from a subset: the cost grows with the cube.
-const MANY: usize = 120;
 
 /// A number with its error by origin.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -93,7 +91,7 @@ pub(crate) fn smoothed(
     let scale = SurfaceScale::of(&places, reference);
     // With more, the computation would take minutes: offsets keep their declared spread.
     let few = etas.len() <= MAX_STEPS;
-    let solved = match scale.filter(|_| few && problem.setting.shaped && carried) {
+    let solved = match scale.filter(|_| few && carried) {
         None => Vec::new(),
         Some(scale) => {
             let coordinates: Vec<(f64, f64, f64)> = places
@@ -302,7 +300,6 @@ fn together(quantities: &[Quantity], etas: &[Quantity], best: Option<&Solved>) -
 /// All choices of amplitude and lengths with sufficient weight.
 fn solve(etas: &[Quantity], coordinates: &[(f64, f64, f64)], problem: &Problem<'_>) -> Vec<Solved> {
     let mut used: Vec<bool> = problem.members.iter().map(|member| member.shares).collect();
-    let every = used.len().div_ceil(MANY).max(1);
     let mut choices = Vec::new();
     for amplitude in AMPLITUDES {
         for speed_length in SPEED_LENGTHS {
@@ -311,6 +308,9 @@ fn solve(etas: &[Quantity], coordinates: &[(f64, f64, f64)], problem: &Problem<'
             }
         }
     }
+    // The cost grows with the cube: many points get their weights from a subset.
+    let most = MAX_STEPS as f64 / (choices.len() as f64).cbrt();
+    let every = (used.len() as f64 / most).ceil().max(1.0) as usize;
     loop {
         let sample: Vec<usize> = (0..used.len()).filter(|i| used[*i]).step_by(every).collect();
         let evidence = parallel::map(&choices, |choice| {

@@ -21,7 +21,7 @@ pub struct Power {
 pub struct EnergyBalance {
     /// Rise of the enthalpy of the compressor's air: work and heat.
     pub compressor: Option<Power>,
-    /// Drop of the enthalpy of the turbine's gas, which is taken for dry air.
+    /// Drop of the enthalpy of the turbine's gas.
     pub turbine: Option<Power>,
     /// Heat to the oil, bearing friction included.
     pub oil: Option<Power>,

@@ -18,7 +18,7 @@ pub const BALANCE_HEADS: [&str; 6] =
 
 /// Meaning of the columns.
 pub const BALANCE_WORDS: &str = "Means of the last 2 s of each step, half widths of 95 % intervals from the declared sensors. Compressor: rise of \
-                                 the enthalpy of its air. Turbine: drop of the enthalpy of its gas, taken for dry air. Losses: turbine minus the \
+                                 the enthalpy of its air. Turbine: drop of the enthalpy of its gas. Losses: turbine minus the \
                                  others; until the housings are settled, heat that they store is part of them, and so are oil and water where they \
                                  are not measured.";
 

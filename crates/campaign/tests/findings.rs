@@ -861,6 +861,28 @@ fn named_reference_states_are_those_the_makers_print() {
     }
 }
 
+/// Molar gas constant over the molar masses: 8.314462618/0.0289652 and, with 10 % of hydrogen, /0.0262703 (CODATA, IUPAC).
+#[test]
+fn a_gas_is_air_or_a_mixture_whose_fractions_add_up() {
+    let gas_of = |text: &str| {
+        let campaign = run(&format!("{RIGHT}gas: {text}\n")).unwrap_or_else(|findings| panic!("{findings}"));
+        campaign.machine.params
+    };
+    let constant = |text: &str| gas_of(text).compressor.gas.gas_constant_j_kgk;
+    // The standard's air has less carbon dioxide than today's: 0.015.
+    assert!((constant("{compressor: air}") - 287.05).abs() < 0.02);
+    let mixture = "{compressor: {N2: 70.28 %, O2: 18.84 %, Ar: 0.84 %, CO2: 0.04 %, H2: 10 %}}";
+    assert!((constant(mixture) - 316.50).abs() < 0.05, "{}", constant(mixture));
+    // Burnt diesel has less oxygen and more carbon dioxide, which is heavier, and water, which is lighter: its gas constant is that of air within
+    // 0.5 %, its heat capacity larger.
+    let burnt = gas_of("{turbine: {fuel: diesel, air_ratio: 2}}").turbine.gas;
+    let air = gas_of("{compressor: air}").compressor.gas;
+    assert!((burnt.gas_constant_j_kgk / air.gas_constant_j_kgk - 1.0).abs() < 5e-3);
+    assert!((1.02..1.06).contains(&(burnt.heat_capacity_j_kgk(900.0) / air.heat_capacity_j_kgk(900.0))));
+    let findings = mistakes(&format!("{RIGHT}gas: {{compressor: {{N2: 78 %, O2: 2.1 %}}}}\n"));
+    assert_eq!((findings.list.len(), findings.list[0].kind), (1, Kind::Conflict), "{findings}");
+}
+
 #[test]
 fn where_the_schema_is_wider_than_the_reader_the_reader_complains() {
     // For a JSON schema 1.0 is a whole number.

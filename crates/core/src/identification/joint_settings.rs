@@ -75,6 +75,19 @@ impl Default for JointSettings {
 }
 
 impl JointSettings {
+    /// Keys of the parameters that are taken as declared.
+    pub fn held_fixed(&self) -> Vec<String> {
+        let parameters = [
+            ("alpha_area", self.alpha_area),
+            ("probe", self.probe),
+            ("direction", self.direction),
+            ("inlet_h", self.inlet_h),
+            ("offsets", self.offsets),
+        ];
+        let fixed = parameters.into_iter().filter(|(_, choice)| *choice == Choice::Fixed);
+        fixed.map(|(key, _)| key.to_owned()).collect()
+    }
+
     /// Only the two parameters of each step: the dynamic method.
     pub fn all_off() -> Self {
         JointSettings {

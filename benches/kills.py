@@ -4,13 +4,14 @@
     target/python-env/bin/python benches/kills.py --mapper target/release/mapper --kills 500
 
 Runs four campaigns in turn: nine points of a minute evaluated by `dynamic` and by `joint` with a repeated jump, the same with a search of
-the surge line, and the same as a script that waits at each point. Kills each run with SIGKILL at a random moment of a random phase: start
+the surge line, and the same as a script that waits at each point. A resumed run draws other noise, which hides what the kill changes: each
+campaign is also run with a twentieth of the declared noise, compared in standard errors of a run with the declared noise. Kills each run with SIGKILL at a random moment of a random phase: start
 (planning, connecting), recording (soak, warm-up, steps), end (identification, writing of results). Then it goes on with `mapper run
 --resume`, which is killed in the same way up to twice more, until it is through, and compares with the uninterrupted run:
 
 - steps and soaks whose journal entry holds but which the recordings, cut as they are, do not contain;
 - points that are there twice or not at all, and the exit code;
-- efficiencies of points and map, in standard errors of the difference (a resumed run warms up again and draws other noise);
+- efficiencies of points and map, in standard errors of the uninterrupted run;
 - whether `identify RUN` gives the points of `RUN/points.json`, `report RUN` its page, and `drift RUN` the answer of the uninterrupted run.
 """
 
@@ -23,6 +24,7 @@ import json
 import math
 import os
 import random
+import re
 import shutil
 import signal
 import subprocess
@@ -86,7 +88,7 @@ def held(recording):
 class Whole:
     """The uninterrupted run of one campaign."""
 
-    def __init__(self, mapper, kind, campaign, folder):
+    def __init__(self, mapper, kind, campaign, folder, declared=None):
         begin = time.monotonic()
         self.kind, self.campaign = kind, campaign
         process = subprocess.Popen([mapper, "run", str(campaign), "--out", str(folder)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -107,6 +109,8 @@ class Whole:
         self.start_s, self.end_s = first_s, time.monotonic() - begin - last_s
         self.points = {key(p): p for p in points_of(self.run) if p["kind"] == "point"}
         self.map = map_of(self.run)
+        # Standard errors of points and map are those with the declared noise.
+        self.declared = declared or self
         self.drift = drift_of(mapper, self.run)
 
 
@@ -132,10 +136,9 @@ def map_of(run):
     return {(*place, number): cells for place, found in places.items() for number, cells in enumerate(found)}
 
 
-def difference(one, other):
+def difference(one, other, declared):
     """Of two efficiencies, in standard errors."""
-    sigma = math.hypot(one["eta_high"] - one["eta_low"], other["eta_high"] - other["eta_low"]) / (2 * 1.96)
-    return abs(one["eta"] - other["eta"]) / sigma
+    return abs(one["eta"] - other["eta"]) / ((declared["eta_high"] - declared["eta_low"]) / (2 * 1.96))
 
 
 def kill(process, rng, whole, recordings, done_bytes, progress):
@@ -244,9 +247,11 @@ def campaigns(folder):
         for before, after in short + changes:
             assert before in text, before
             text = text.replace(before, after)
-        path = folder / f"{kind}.yaml"
-        path.write_text(text)
-        yield kind, path
+        quiet = re.sub(r"noise: ([0-9.e-]+)", lambda found: f"noise: {float(found[1]) / 20:g}", text)
+        for name, content in ((kind, text), (f"{kind}, noise / 20", quiet)):
+            path = folder / f"{name.replace(', noise / ', '-')}.yaml"
+            path.write_text(content)
+            yield name, path
 
 
 def main():
@@ -263,7 +268,9 @@ def main():
     until = time.monotonic() + 60 * arguments.minutes
     with tempfile.TemporaryDirectory() as scratch, concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
         folder = Path(scratch)
-        wholes = [Whole(mapper, kind, path, folder / f"whole-{kind}") for kind, path in campaigns(folder)]
+        wholes = []
+        for kind, path in campaigns(folder):
+            wholes.append(Whole(mapper, kind, path, folder / f"whole-{path.stem}", wholes[-1] if "noise" in kind else None))
         seeds = itertools.count(arguments.first)
         one_more = lambda index: pool.submit(killed, mapper, folder, index, wholes[index % len(wholes)], arguments.again)
         running = {one_more(next(seeds)) for _ in range(arguments.jobs)}
@@ -293,10 +300,12 @@ def table(found):
             if one["wrong"] or own.keys() != whole.points.keys() or count != len(own) or one["exit"] not in (0, -signal.SIGKILL):
                 wrong += own.keys() != whole.points.keys() or count != len(own) or one["exit"] not in (0, -signal.SIGKILL)
                 print(one["index"], kind, one["kills"], f"exit {one['exit']}, {count} points at {len(own)} places; differ:", one["wrong"], file=sys.stderr)
-            both = [(own[place], whole.points[place]) for place in own.keys() & whole.points.keys()]
-            points += [difference(*pair) for pair in both if all(p["eta"] is not None for p in pair)]
-            cells = [(one["map"][place], whole.map[place]) for place in one["map"].keys() & whole.map.keys()]
-            maps += [difference(*pair) for pair in cells if all(len(cell) == 3 for cell in pair)]
+            places = own.keys() & whole.points.keys() & whole.declared.points.keys()
+            both = [(own[place], whole.points[place], whole.declared.points[place]) for place in places]
+            points += [difference(*three) for three in both if all(p["eta"] is not None for p in three)]
+            places = one["map"].keys() & whole.map.keys() & whole.declared.map.keys()
+            cells = [(one["map"][place], whole.map[place], whole.declared.map[place]) for place in places]
+            maps += [difference(*three) for three in cells if all(len(cell) == 3 for cell in three)]
         numbers = [len(ones), sum(len(one["kills"]) for one in ones), sum("why" in one for one in ones), sum(one["lost"] for one in ones), wrong, differ]
         apart = ", ".join(f"{quantile(points, share):.2f}" for share in (0.5, 0.99, 1.0)) if points else "-"
         print(f"| {kind} | " + " | ".join(map(str, numbers)) + f" | {apart} | {max(maps, default=math.nan):.2f} |")

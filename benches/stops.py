@@ -4,7 +4,7 @@
     target/python-env/bin/python benches/stops.py --mapper target/release/mapper
 
 In a run with a rig, the time is that from the request to the event of the first command of the safe state, which is sent before it is
-reported: an upper bound. While the rig is connected, it is the message that it has no setpoint yet; the safe command then follows the
+reported: an upper bound. Of a rig behind a driver it is the time at which the driver receives that command. While the rig is connected, it is the message that it has no setpoint yet; the safe command then follows the
 connection, and the time between is another row. Elsewhere it is the end of the process, or the message that results are still written.
 """
 
@@ -45,6 +45,12 @@ class Slow(module.PythonRig):
         armed = super().arm()
         pathlib.Path(__file__).with_name("armed").touch()
         return armed
+    def set(self, setpoints):
+        file = pathlib.Path(__file__).with_name("cooled")
+        if not file.exists() and getattr(self, "t3_k", 0.0) > 1.1 * setpoints["t3_k"]:
+            file.write_text(str(time.time()))
+        self.t3_k = setpoints["t3_k"]
+        return super().set(setpoints)
 if __name__ == "__main__":
     module.serve("slow_rig", "1.0", Slow)
 """
@@ -130,8 +136,8 @@ SLOW = ("  virtual_lab: {}", "  slow_rig: {real_time: true}")
 CONNECTING = lambda line: "while the rig is being connected" in line
 
 
-def in_run(replaced, pace, begins, ends=event("interrupted"), since=None):
-    """From the last request, or from the file `since`, to the event of the interruption or another line."""
+def in_run(replaced, pace, begins, ends=event("interrupted"), since=None, until=None):
+    """From the last request, or from the file `since`, to the event of the interruption or another line, or to the time in the file `until`."""
 
     def measure(mapper, folder, requests, rng):
         (folder / "long.rhai").write_text(LONG_SCRIPT)
@@ -158,6 +164,8 @@ def in_run(replaced, pace, begins, ends=event("interrupted"), since=None):
         at = process.until(ends)
         if since is not None:
             asked = time.monotonic() - time.time() + (folder / since).stat().st_mtime
+        if until is not None:
+            at = float((folder / until).read_text()) - time.time() + time.monotonic()
         # The run-down takes seconds in real time.
         process.child.kill()
         process.child.wait()
@@ -209,7 +217,7 @@ PHASES = [
     ("soak (zero)", in_run([], 1, event("soak_started")), NOW),
     ("warm-up", in_run([NO_SOAK], 1, event("rig_time")), NOW),
     ("step", in_run([NO_SOAK, SHORT_WARM_UP], 1, event("step_started")), IN_STEP),
-    ("step, rig behind a driver", in_run([SLOW, NO_SOAK, SHORT_WARM_UP], None, event("step_started")), IN_STEP),
+    ("step, command at a driver", in_run([SLOW, NO_SOAK, SHORT_WARM_UP], None, event("step_started"), until="cooled"), IN_STEP),
     ("a script computes", in_run([SCRIPT, SHORT_SOAK], 200, event("step_ended")), NOW),
     ("surge search", in_run([SURGE, SHORT_SOAK], 300, lambda line: '"approach"' in line), IN_STEP),
     ("results: message", results, ["Ctrl-C", "SIGTERM"]),

@@ -4,7 +4,7 @@ use crate::attended::compute;
 use crate::campaign::Campaign;
 use crate::error::Fault;
 use crate::identified::{Identified, named_method};
-use crate::recording::Recording;
+use crate::recording::{Recording, reader_warnings};
 use crate::registry::registry;
 use mapper_session::{Recorded, Session, SessionError};
 use pyo3::prelude::*;
@@ -60,7 +60,8 @@ pub fn correct(
         let given = (&campaign.campaign, &source.map);
         let corrected = Session::new(&registry).correct_gap(recorded, given, effects, method, None)?;
         let map = serde_json::to_string(&corrected.map).map_err(SessionError::from)?;
-        Ok((map, Identified::of(corrected.identified, recorded, machine)))
+        let (path, warnings) = (Some(&*recorded.path), reader_warnings(&read));
+        Ok((map, Identified::of(corrected.identified, path, &warnings, machine)))
     })
 }
 

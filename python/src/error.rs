@@ -33,14 +33,7 @@ pub enum Fault {
     Session(SessionError),
     /// Of a session that has to do with a campaign's text, which shows the place of a mistake.
     InCampaign(CampaignFault),
-    /// Stopped before the rig was armed.
-    NotBegun,
-    /// The rig runs in real time.
-    RealTime {
-        /// Its backend.
-        backend: String,
-    },
-    /// An argument is wrong.
+    /// An argument is wrong, or the rig.
     Argument(String),
 }
 
@@ -55,10 +48,6 @@ impl From<Fault> for PyErr {
         match fault {
             Fault::Session(error) => of_session(error),
             Fault::InCampaign(error) => of_campaign(&error),
-            Fault::NotBegun => MapperError::new_err("stopped before the rig was armed"),
-            Fault::RealTime { backend } => MapperError::new_err(format!(
-                "backend `{backend}` is a rig in real time; run it with the command `mapper run`, which handles all signals"
-            )),
             Fault::Argument(message) => MapperError::new_err(message),
         }
     }

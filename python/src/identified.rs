@@ -4,7 +4,7 @@ use crate::attended::compute;
 use crate::campaign::Campaign;
 use crate::error::{Fault, IdentificationError};
 use crate::map::Map;
-use crate::recording::Recording;
+use crate::recording::{Recording, reader_warnings};
 use crate::registry::registry;
 use mapper_core::Method;
 use mapper_session::{
@@ -12,6 +12,7 @@ use mapper_session::{
 };
 use pyo3::prelude::*;
 use serde_json::Value;
+use std::path::Path;
 use std::sync::Arc;
 
 /// Points of one recording or of several.
@@ -19,14 +20,13 @@ use std::sync::Arc;
 pub struct Identified {
     found: Arc<Found>,
     machine: String,
-    json: String,
+    json: Value,
 }
 
 impl Identified {
-    /// Points of one recording of a machine.
-    pub fn of(found: Found, recorded: &Recorded, machine: String) -> Identified {
-        let warnings: Vec<String> = recorded.read.warnings.iter().map(ToString::to_string).collect();
-        let json = found.json(Some(&recorded.path), &warnings).to_string();
+    /// Points of recordings of a machine, the first with this path.
+    pub fn of(found: Found, path: Option<&Path>, warnings: &[String], machine: String) -> Identified {
+        let json = found.json(path, warnings);
         Identified { found: Arc::new(found), machine, json }
     }
 }
@@ -35,8 +35,14 @@ impl Identified {
 impl Identified {
     /// What `mapper identify --json` prints.
     #[getter]
-    fn json(&self) -> &str {
-        &self.json
+    fn json(&self) -> String {
+        self.json.to_string()
+    }
+
+    /// Its points only.
+    #[getter]
+    fn points(&self) -> String {
+        self.json["points"].to_string()
     }
 
     /// The map of the points, with a fitted surface if there are enough of them.
@@ -77,14 +83,12 @@ pub fn identify(
         let runs = sources.iter().map(|source| source.with(given)).collect::<Result<Vec<_>, _>>()?;
         let recorded: Vec<Recorded> = runs.into_iter().flatten().collect();
         let path = recorded.first().map(|first| first.path.clone());
-        let warnings: Vec<String> =
-            recorded.iter().flat_map(|one| &one.read.warnings).map(ToString::to_string).collect();
+        let warnings = reader_warnings(&recorded);
         let machine = machine_of(&recorded);
         let registry = registry();
         let found = Session::new(&registry).identify(recorded, map, method)?;
         found.has_points(&warnings)?;
-        let json = found.json(path.as_deref(), &warnings).to_string();
-        Ok(Identified { found: Arc::new(found), machine, json })
+        Ok(Identified::of(found, path.as_deref(), &warnings, machine))
     })
 }
 

@@ -56,15 +56,13 @@ impl Recording {
     fn of(source: Source) -> Result<Recording, Fault> {
         let read = &source.recorded;
         let first = read.first().ok_or(SessionError::NoRecording)?;
-        let warnings: Vec<String> =
-            read.iter().flat_map(|one| &one.read.warnings).map(ToString::to_string).collect();
         let steps: Vec<_> = read.iter().flat_map(|one| &one.read.recording.steps).collect();
         let events: Vec<_> = read.iter().flat_map(|one| &one.read.recording.events).collect();
         let summary = json!({
             "path": first.path,
             "start_time_ns": first.read.start_time_ns,
             "metadata": first.read.metadata,
-            "warnings": warnings,
+            "warnings": reader_warnings(read),
             "steps": steps,
             "events": events,
         });
@@ -130,6 +128,11 @@ impl Recording {
         })?;
         Ok((floats(py, &series.t_s)?, floats(py, &series.values)?))
     }
+}
+
+/// Problems of the files.
+pub fn reader_warnings(read: &[Recorded]) -> Vec<String> {
+    read.iter().flat_map(|one| &one.read.warnings).map(ToString::to_string).collect()
 }
 
 /// Copies numbers once, into memory of Python that NumPy then uses as it is.

@@ -105,12 +105,15 @@ fn run(
     let prepared = session.prepare(request).map_err(|error| inner.fault(error))?;
     let rig = prepared.rig();
     if !rig.simulated_time {
-        return Err(Fault::RealTime { backend: rig.backend });
+        return Err(Fault::Argument(format!(
+            "backend `{}` is a rig in real time; run it with the command `mapper run`, which handles all signals",
+            rig.backend
+        )));
     }
     shared.holds_rig.store(true, Ordering::SeqCst);
     if shared.stop.load(Ordering::SeqCst) {
         shared.holds_rig.store(false, Ordering::SeqCst);
-        return Err(Fault::NotBegun);
+        return Err(Fault::Argument("stopped before the rig was armed".to_owned()));
     }
     let outcome = prepared.run(&session)?;
     let sentence = outcome.sentence();

@@ -202,6 +202,19 @@ fn doomed_campaigns_are_refused_with_their_numbers() {
 }
 
 /// What few machines do is a warning at its key, and the campaign is one that can be run.
+/// A wheel in cm would leave no line of the map within reach; the wheel is named, not each line.
+#[test]
+fn a_wheel_that_does_not_fit_its_map_is_one_mistake() {
+    one(
+        "machine: {name: a, map: closed_form}",
+        "machine: {name: a, map: {file: maps/there.csv, reference: SAE}, geometry: {compressor: {wheel_diameter: 6 mm}}}",
+        Kind::Implausible,
+        "maps/there.csv",
+        "times too large for a wheel of 6 mm",
+        "wheel_diameter",
+    );
+}
+
 #[test]
 fn rare_values_are_warned_of() {
     let warned = |old: &str, new: &str| {

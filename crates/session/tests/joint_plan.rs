@@ -5,7 +5,7 @@
 use crate::common::shipped::campaign;
 use mapper_backends::virtual_lab;
 use mapper_campaign::Campaign;
-use mapper_core::{Dwell, Plan, Timing, VisitOrder};
+use mapper_core::{Dwell, Plan, ResultRemark, Timing, VisitOrder};
 use mapper_formats::FORMATS;
 use mapper_identify::MAX_RESTING_ETA;
 use mapper_planner::plan_other_orders;
@@ -58,6 +58,8 @@ fn seeds_err_as_forecast() {
         let campaign = Campaign { seed, ..first.clone() };
         let folder = tempfile::tempdir().unwrap();
         let results = session.run(RunRequest::new(&campaign, "", folder.path())).unwrap().results.unwrap();
+        let parameters = ["alpha_area", "probe", "direction"].map(str::to_owned).to_vec();
+        assert!(results.remarks.contains(&ResultRemark::HeldFixed { parameters }), "{:?}", results.remarks);
         for scored in &results.points {
             if let (Some(eta), Some(truth)) = (scored.point.eta, &scored.truth) {
                 square += (eta - truth.eta).powi(2);

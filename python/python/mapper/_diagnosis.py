@@ -59,7 +59,7 @@ class Diagnosis:
         """Locations of the gap, largest first; ``size`` is in the unit of the column ``unit``."""
         return _tables.table(self.json["where"])
 
-    def corrected(self, method: str | None = None) -> Result:
+    def corrected(self, method: Result | str | None = None) -> Result:
         """Identify the recording again without the causes found, as ``mapper gap correct`` does.
 
         The intervals contain the uncertainty of the correction. ``json["correction"]`` has each point before and after, and the reason
@@ -68,8 +68,10 @@ class Diagnosis:
         Parameters
         ----------
         method
-            ``steady``, ``dynamic`` or ``joint``; the campaign's if none is given.
+            ``steady``, ``dynamic`` or ``joint``, or a result whose method is used; the campaign's if none is given.
         """
+        if isinstance(method, Result):
+            method = next((str(point["method"]) for point in method._points), None)
         correction, inner = self._correct(method)
         result = Result(inner)
         result.json["correction"] = json.loads(correction)

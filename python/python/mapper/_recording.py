@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,8 +27,15 @@ class Recording:
 
     def __init__(self, inner: _mapper.Recording) -> None:
         self._inner = inner
-        self._summary: dict[str, Any] = json.loads(inner.summary)
-        self._units: dict[str, str] = dict(inner.channels)
+
+    @cached_property
+    def _summary(self) -> dict[str, Any]:
+        summary: dict[str, Any] = json.loads(self._inner.summary)
+        return summary
+
+    @cached_property
+    def _units(self) -> dict[str, str]:
+        return dict(self._inner.channels)
 
     @classmethod
     def read(
@@ -152,22 +160,22 @@ def _clock(frame: pd.DataFrame, time: str | None) -> tuple[npt.NDArray[np.float6
     if time is not None:
         if time not in frame:
             raise _mapper.RecordingError(f"the DataFrame has no column `{time}` for the time")
-        clock = frame[time].reset_index(drop=True)
+        clock = pd.Index(frame[time])
     elif isinstance(frame.index, pd.RangeIndex) and frame.index.name is None:
         raise _mapper.RecordingError("the rows have numbers and no times; name the column of the time with `time=`")
     else:
-        clock = frame.index.to_series().reset_index(drop=True)
+        clock = frame.index
     start_time_ns = None
     if pd.api.types.is_datetime64_any_dtype(clock.dtype):
         start = clock.min()
         start_time_ns = None if pd.isna(start) else int(start.value)
         clock = clock - start
-    if pd.api.types.is_timedelta64_dtype(clock.dtype):
-        clock = clock.dt.total_seconds()
+    if isinstance(clock, pd.TimedeltaIndex):
+        clock = clock.total_seconds()
     return _numbers(clock, "time"), start_time_ns
 
 
-def _numbers(column: pd.Series[Any], symbol: str) -> npt.NDArray[np.float64]:
+def _numbers(column: pd.Series[Any] | pd.Index[Any], symbol: str) -> npt.NDArray[np.float64]:
     """Return the values of a column, one after the other in memory; empty cells are NaN."""
     try:
         return np.ascontiguousarray(column.to_numpy(dtype=np.float64, na_value=np.nan))

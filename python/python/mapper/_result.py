@@ -20,17 +20,17 @@ if TYPE_CHECKING:
 
 
 class Result:
-    """Identified points.
-
-    Attributes
-    ----------
-    json : dict
-        What ``mapper identify --json`` prints.
-    """
+    """Identified points."""
 
     def __init__(self, inner: _mapper.Identified) -> None:
         self._inner = inner
-        self.json: dict[str, Any] = json.loads(inner.json)
+        self._points: list[dict[str, Any]] = json.loads(inner.points)
+
+    @cached_property
+    def json(self) -> dict[str, Any]:
+        """What ``mapper identify --json`` prints."""
+        report: dict[str, Any] = json.loads(self._inner.json)
+        return report
 
     @property
     def points(self) -> pd.DataFrame:
@@ -39,7 +39,7 @@ class Result:
         Speeds in rpm, flows in kg/s, temperatures in K, pressures in Pa; ``eta`` is the isentropic efficiency, fraction, and ``h_w_m2k``
         the heat-transfer coefficient, W/(m^2 K), each with its 95 % interval. ``attrs["units"]`` has all units.
         """
-        return _tables.table(self.json["points"], "step", _tables.POINT)
+        return _tables.table(self._points, "step", _tables.POINT)
 
     @property
     def remarks(self) -> list[str]:
@@ -63,12 +63,11 @@ class Result:
 
     def __repr__(self) -> str:
         """Return a line on the result."""
-        good = sum(point["verdict"] == "good" for point in self.json["points"])
-        return f"Result({len(self.json['points'])} points, {good} good)"
+        good = sum(point["verdict"] == "good" for point in self._points)
+        return f"Result({len(self._points)} points, {good} good)"
 
     def _repr_html_(self) -> str:
-        columns = ["speed_rpm", "flow_kg_s", "pressure_ratio", "eta", "eta_low", "eta_high"]
-        return _tables.html(self.points, [*columns, "h_w_m2k", "h_low_w_m2k", "h_high_w_m2k", "verdict"], repr(self))
+        return _tables.points_html(self.points, repr(self))
 
 
 def identify(

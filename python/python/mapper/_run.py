@@ -66,3 +66,6 @@ class Run:
         """Return a line on the run."""
         count = 0 if self.json is None else len(self.json["points"])
         return f"Run({str(self.directory)!r}, {self.end}, {count} points)"
+
+    def _repr_html_(self) -> str:
+        return _tables.points_html(self.points, repr(self))

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import pandas as pd
-from pandas.api.types import is_numeric_dtype
 
 Json = dict[str, Any]
 
@@ -50,17 +49,22 @@ def table(rows: Sequence[Mapping[str, Any]], index: str | None = None, first: Se
     flat = [_flat(row, objects) for row in rows]
     names = dict.fromkeys(name for row in flat for name in row)
     columns: dict[str, list[Any]] = {}
+    units = {}
     for name in [*(name for name in first if name in names), *(name for name in names if name not in first)]:
         values = [row.get(name) for row in flat]
+        known = next((value for value in values if value is not None), None)
+        unit = unit_of(name)
         # A column without any value has no type of its own: unknown numbers are NaN, and an object that is absent in all rows has no column.
-        if any(value is not None for value in values):
+        if known is not None:
             columns[name] = values
-        elif unit_of(name) is not None:
+        elif unit is not None:
             columns[name] = [float("nan")] * len(flat)
+        if unit is not None and (known is None or isinstance(known, int | float)):
+            units[name] = unit
     rows_of = None if index is None or index not in columns else pd.Index(columns.pop(index), name=index)
-    frame = pd.DataFrame(columns, index=rows_of)
-    units = {str(name): unit_of(str(name)) for name, kind in frame.dtypes.items() if is_numeric_dtype(kind)}
-    frame.attrs["units"] = {name: unit for name, unit in units.items() if unit is not None}
+    # From rows, pandas makes one block of each type, in three quarters of the time that it takes with a dict of columns.
+    frame = pd.DataFrame(list(zip(*columns.values(), strict=True)), index=rows_of, columns=list(columns))
+    frame.attrs["units"] = {name: unit for name, unit in units.items() if name in columns}
     return frame
 
 
@@ -89,6 +93,11 @@ def _flat(row: Mapping[str, Any], objects: set[str], before: str = "") -> Json:
             # An object that is absent in a row has the columns of the other rows.
             flat[name] = value
     return flat
+
+
+def points_html(points: pd.DataFrame, title: str) -> str:
+    """Return the main columns of points as HTML."""
+    return html(points, [name for name in POINT if name not in ("valve", "warnings")], title)
 
 
 def html(frame: pd.DataFrame, columns: Sequence[str], title: str) -> str:

@@ -5,6 +5,7 @@ use mapper_core::EventKind;
 use mapper_recording::{ChannelMap, ReadOptions, ReadReport, read_recording};
 use mapper_tests::{CampaignFile, Finished, mapper, mapper_command, only_run, python};
 use notify::{RecommendedWatcher, RecursiveMode, Watcher};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
@@ -93,6 +94,17 @@ impl Running {
         let id = self.id().to_string();
         let status = Command::new("sh").args(["-c", "kill -\"$1\" \"$2\"", "sh", name, &id]).status();
         assert!(status.unwrap().success());
+    }
+
+    /// Waits until the run prints these words on its standard error; what follows them stays there.
+    pub(crate) fn prints(&mut self, words: &str) {
+        let stderr = self.child.as_mut().unwrap().stderr.as_mut().unwrap();
+        let (mut printed, mut byte) = (Vec::new(), [0]);
+        while !printed.ends_with(words.as_bytes()) {
+            let read = stderr.read_exact(&mut byte);
+            assert!(read.is_ok(), "`{words}` is not in {}", String::from_utf8_lossy(&printed));
+            printed.extend(byte);
+        }
     }
 
     pub(crate) fn kill(mut self) {

@@ -116,12 +116,13 @@ fn ask_wheel_diameter_m() -> Result<f64, Failure> {
     if !std::io::stdin().is_terminal() {
         return Err(missing("the diameter of the compressor wheel is required"));
     }
-    standard_output::warn("Diameter of the compressor's wheel at its exit, e.g. 60mm: ");
+    standard_output::warn("Diameter of the compressor's wheel at its exit, mm: ");
     let mut line = String::new();
     // Limited, because a diameter has only a few characters.
     let read = std::io::stdin().lock().take(64).read_line(&mut line);
     read.map_err(|error| missing(&format!("failed to read the diameter: {error}")))?;
-    parse_length_m(&line).map_err(|error| missing(&error))
+    let length = parse_length_m(&line).or_else(|_| parse_length_m(&format!("{} mm", line.trim())));
+    length.map_err(|error| missing(&error))
 }
 
 /// Parses a quantity whose unit may follow the number without a blank, because a shell would need quotes around a blank.

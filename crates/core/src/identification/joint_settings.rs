@@ -32,6 +32,21 @@ pub struct JointSettings {
     pub offsets: Choice,
 }
 
+impl JointSettings {
+    /// Keys of the parameters that are taken as declared.
+    pub fn held_fixed(&self) -> Vec<String> {
+        let parameters = [
+            ("alpha_area", self.alpha_area),
+            ("probe", self.probe),
+            ("direction", self.direction),
+            ("inlet_h", self.inlet_h),
+            ("offsets", self.offsets),
+        ];
+        let fixed = parameters.into_iter().filter(|(_, choice)| *choice == Choice::Fixed);
+        fixed.map(|(key, _)| key.to_owned()).collect()
+    }
+}
+
 /// Default uncertainty of the assumed alpha_A, one standard deviation: if it has not been
 /// measured, a tenth to a quarter of the area may lie before the wheel.
 pub const ALPHA_AREA_SIGMA_RATIO: f64 = 0.15;

@@ -10,6 +10,8 @@ ResultRemark {
     "recording_incomplete" RecordingIncomplete { file: Option<String>, reason: String },
     /// Channels of the usual method are missing, so that the efficiencies are those of conventional mapping.
     "conventional_mapping" ConventionalMapping { usual: Method, missing: Vec<Channel> },
+    /// Parameters of `joint` are taken as declared; the result depends on them.
+    "held_fixed" HeldFixed { parameters: Vec<String> },
     /// Gauge pressures are added to an ambient pressure that was not measured.
     "unknown_ambient_pressure" UnknownAmbientPressure { pressure_pa: f64, sigma_pa: f64 },
     /// The machine rests before the first step, and the campaign does not use it as a zero.

@@ -17,6 +17,10 @@ pub fn result_remark_text(remark: &ResultRemark) -> String {
                 Method::Steady
             )
         }
+        ResultRemark::HeldFixed { parameters } => format!(
+            "held fixed as declared (`identification.joint`): {}. Every efficiency and every interval depends on it",
+            parameters.join(", ")
+        ),
         ResultRemark::UnknownAmbientPressure { pressure_pa, sigma_pa } => format!(
             "the ambient pressure is unknown: it counts as {:.1} kPa with a standard uncertainty of {:.0} kPa, which the intervals include; \
              write what the barometer read or the altitude of the stand as `ambient_pressure` in the channel map",

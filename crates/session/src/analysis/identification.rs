@@ -171,6 +171,10 @@ impl Session<'_> {
             remarks.extend(why);
             method
         });
+        let parameters = config.joint.held_fixed();
+        if config.method == Method::Joint && !parameters.is_empty() {
+            remarks.push(ResultRemark::HeldFixed { parameters });
+        }
         remarks.extend(unknown_barometer(map));
         let day = recorded.first().and_then(|first| Date::from_epoch_ns(first.read.start_time_ns));
         let soak = campaign.and_then(|campaign| campaign.zero);

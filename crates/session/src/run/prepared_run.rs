@@ -271,7 +271,7 @@ impl PreparedRun<'_> {
         directory: &Path,
         parts: &[RunPart],
     ) -> Result<Results, SessionError> {
-        let what = format!("identifying {} steps", self.plan.steps.len());
+        let what = "identifying the recorded steps".to_owned();
         session.send(SessionEvent::Progress { done_ratio: 0.0, what });
         let (campaign, started_ns) = (self.request.campaign, self.request.started_ns);
         session.results(campaign, &executed?, end.ending(), started_ns, directory, parts)

@@ -123,8 +123,13 @@ fn poll_until(rig: &mut Driver, t_s: &mut f64, reached: impl Fn(&SampleBatch) ->
 /// Maximum time until a restarted server is read, s. The documented 3 s hold on an idle computer (docs/validation/rig.md); other tests run in
 /// parallel here. Without the driver's own reconnection it would take half a minute, or fail.
 const AGAIN_S: f64 = 10.0;
-/// For tests of the driver's own deadlines: on an idle computer they end within 2 s.
-const SLOW_TIMEOUTS: Timeouts = Timeouts { call: Duration::from_secs(20), ..DEFAULT_TIMEOUTS };
+/// The driver's own deadlines are tested here, not those of its host: other tests delay samples, calls and the renewal of the lease.
+const SLOW_TIMEOUTS: Timeouts = Timeouts {
+    call: Duration::from_secs(20),
+    late: Duration::from_secs(20),
+    silence: Duration::from_secs(60),
+    ..DEFAULT_TIMEOUTS
+};
 
 fn reads(batch: &SampleBatch) -> bool {
     batch.last(Channel::T2).is_some_and(f64::is_finite)

@@ -23,8 +23,9 @@ pub(crate) fn find_concerns(campaign: &Campaign) -> Vec<Concern> {
     let mut concerns = Vec::new();
     let wheel_m = params.compressor.wheel_diameter_m;
     if !(USUAL_WHEEL_DIAMETERS_M.0..=USUAL_WHEEL_DIAMETERS_M.1).contains(&wheel_m) {
+        let is_error = !(POSSIBLE_WHEEL_DIAMETERS_M.0..=POSSIBLE_WHEEL_DIAMETERS_M.1).contains(&wheel_m);
         concerns.push(Concern {
-            is_error: !(POSSIBLE_WHEEL_DIAMETERS_M.0..=POSSIBLE_WHEEL_DIAMETERS_M.1).contains(&wheel_m),
+            is_error,
             at: steps!["machine", "geometry", "compressor", "wheel_diameter"].to_vec(),
             message: format!(
                 "a compressor wheel of {} mm is not a turbocharger's: they have {:.0} to {:.0} mm",
@@ -34,7 +35,9 @@ pub(crate) fn find_concerns(campaign: &Campaign) -> Vec<Concern> {
             ),
             remedy: "write its diameter at the exit, with its unit".to_owned(),
         });
-        // The other sizes cannot be compared with an impossible wheel.
+        // The other sizes cannot be compared with such a wheel. The map shows whether the wheel is wrong, which is the cause of all that its
+        // lines cannot reach.
+        concerns.extend(check_map_flow(campaign).filter(|_| !is_error));
         return concerns;
     }
     let reference = similar_machine(wheel_m);

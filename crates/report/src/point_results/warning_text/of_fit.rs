@@ -75,6 +75,9 @@ fn wide(interval: &WideInterval, from_offsets: bool) -> Sentence {
         }
     }
     .then(match (from_offsets, signal) {
+        (true, EtaSignal::Transient { shared: true, .. }) => sentence!(
+            ": begin with a `zero`; after one, hold fixed what is known (`identification.joint`), or declare less"
+        ),
         (true, _) => sentence!(": begin with a `zero`, or calibrate and declare less"),
         (false, EtaSignal::Transient { .. }) => {
             sentence!(": longer dwell, or come to this point by a larger jump")

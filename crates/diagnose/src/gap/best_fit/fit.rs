@@ -9,7 +9,7 @@ use crate::gap::best_fit::normal::{PRIOR_STEPS, normal_matrix, nuisance_products
 use crate::gap::best_fit::selection::{Selection, dot_over};
 use crate::gap::residuals::study::{Hypothesis, PredictError, Prediction, Study};
 use crate::gap::residuals::whiten::Linearised;
-use mapper_inference::descent::{ENOUGH, End, Model, Normal, Reach, Until, descend, room_within};
+use mapper_inference::descent::{End, Model, Normal, Reach, Until, descend, room_within};
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 
@@ -50,7 +50,8 @@ pub struct Effort {
 
 impl Default for Effort {
     fn default() -> Self {
-        Effort { iterations: 10, enough: ENOUGH, most_sigmas: MAX_SIGMAS }
+        let Until { iterations, enough } = Until::default();
+        Effort { iterations, enough, most_sigmas: MAX_SIGMAS }
     }
 }
 

@@ -9,14 +9,13 @@ use crate::drift::runs::time_axis::{self, Block, CampaignStep, mean_variance_rat
 use crate::drift::runs::usable::usable;
 use crate::drift::sensitivity::drive::{Drive, predict};
 use crate::drift::sensitivity::readings::Readings;
+use crate::gap::residuals::whiten::NEAR_SURGE;
 use mapper_core::{Channel, Recording};
 use mapper_observe::channels::{DRIVERS, OUTPUTS};
 use mapper_observe::declared::Declared;
 use mapper_observe::perturbation::Perturbation;
 use nalgebra::{DMatrix, DVector};
 
-/// Segments closer to the surge line are left out: there a hundredth of P2 is a third of the flow, and no parameter's effect is linear.
-const SURGE_LIMIT: f64 = 0.97;
 /// Start of each run that is left out, s: the rig's earlier history is unknown, and rigs are still settling.
 const FIRST_S: f64 = 30.0;
 /// Average model error over a segment, relative to the noise of one sample.
@@ -78,7 +77,7 @@ fn read<'a>(
             let step = &steps[all[*index].0.step];
             let begins = step.from.is_none() && all[*index].0.start_s < step.start_s + FIRST_S;
             !begins
-                && base.surge_position_ratio[*index] < SURGE_LIMIT
+                && base.surge_position_ratio[*index] < NEAR_SURGE
                 && columns
                     .iter()
                     .all(|column| all[*index].1[*column].is_some() && all[*index].2[*column].is_finite())

@@ -2,10 +2,9 @@
 
 use crate::driven::DrivenError;
 use mapper_core::{Channel, Recording};
+use mapper_identify::DECLARED_INTERVAL_S;
 use mapper_observe::plausible::is_reading;
 
-/// Minimum spacing of rows, s: no judged quantity is faster than a probe.
-const SPACING_S: f64 = 0.1;
 /// Maximum number of rows, spread over the whole of a longer log: five minutes at 10 Hz. The sampler evaluates them some hundred thousand
 /// times.
 const MAX_ROWS: usize = 3_000;
@@ -52,7 +51,7 @@ impl Rows {
         }
         let span_s =
             judged.t_s.last().zip(judged.t_s.first()).map_or(0.0, |(last_s, first_s)| last_s - first_s);
-        let spacing_s = SPACING_S.max(span_s / MAX_ROWS as f64);
+        let spacing_s = DECLARED_INTERVAL_S.max(span_s / MAX_ROWS as f64);
         let columns = |channels: &[Channel]| channels.iter().map(|channel| (*channel, Vec::new())).collect();
         let mut rows =
             Rows { drives: columns(wanted.drives), judged: columns(wanted.judged), ..Rows::default() };

@@ -6,7 +6,7 @@ use crate::gap::best_fit::selection::Selection;
 use crate::gap::causes::additions::additions;
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::place::{Gain, places};
-use crate::gap::causes::select::{Search, ranked, refit, search, search_onsets, supported};
+use crate::gap::causes::select::{MIN_SHRINK, Search, ranked, refit, search, search_onsets, supported};
 use crate::gap::causes::smallest_seen::smallest_seen;
 use crate::gap::causes::weigh::{alike, rivals, suspicions, weigh, weight};
 use crate::gap::findings::experiment::Experiment;
@@ -90,8 +90,6 @@ const HOPELESS: f64 = 60.0;
 /// Causes among which each fold chooses again, and how far behind the best in the logarithm of the evidence one may be.
 const CHOSEN_AGAIN: usize = 3;
 const CLOSE: f64 = 10.0;
-/// Share of the null's misfit that a cause must remove to explain a gap in part, also on steps that its fit did not see.
-pub const MIN_SHRINK: f64 = 0.5;
 
 /// Diagnoses a recording.
 ///

@@ -7,8 +7,9 @@ use crate::gap::best_fit::selection::Selection;
 use crate::gap::causes::additions::additions;
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::place::{BEND, Explanation, Gain, Part, RARITY, of_fits, places_of, signature};
-use crate::gap::causes::weigh::{ALIKE, MAX_EQUIVALENT, weight};
-use crate::gap::diagnose::{Diagnosed, MIN_SHRINK};
+use crate::gap::causes::select::MIN_SHRINK;
+use crate::gap::causes::weigh::{MAX_EQUIVALENT, distinguishing, weight};
+use crate::gap::diagnose::Diagnosed;
 use crate::gap::findings::report::{Law, MissingForce, Place, Verdict};
 use crate::gap::gap_reduction::how_far::channels_on;
 use crate::gap::residuals::study::{Study, members};
@@ -73,7 +74,7 @@ pub fn discover(
         && let Some(both) = together_with_cause(&mut bench, diagnosed, best, &training, &everywhere)
     {
         let score = |found: &FittedLaws| found.fitted.first().map_or(f64::NEG_INFINITY, Candidate::score);
-        let better = found.as_ref().is_none_or(|alone| score(&both) > score(alone) + RARE_BESIDE);
+        let better = found.as_ref().is_none_or(|alone| score(&both) > score(alone) + RARITY);
         found = if better { Some(both) } else { found };
     }
     progress(0.6, "what a law leaves");
@@ -122,9 +123,6 @@ struct FittedLaws {
     /// Whether the best leaves only noise.
     adequate: bool,
 }
-
-/// A law in addition to a cause costs as much as a second cause.
-const RARE_BESIDE: f64 = 3.0;
 
 /// Search in addition to the best library cause.
 fn together_with_cause(
@@ -265,7 +263,7 @@ fn propose(
         .map(|addition| addition.gain)
         .fold(0.0, f64::max);
     let left = calibration.outside(adequacy(&bench.study, linearised, &best.fit, one_more).features());
-    let near = |other: &&Candidate| best.score() - other.score() < ALIKE * calibration.temperature;
+    let near = |other: &&Candidate| best.score() - other.score() < distinguishing(calibration);
     let weights: f64 = found
         .fitted
         .iter()

@@ -14,9 +14,14 @@ const EXPECTED_DRIFTS: f64 = 0.5;
 /// sensors are better maintained, and few sensors share a common part that drifts.
 const SELDOM: f64 = 0.25;
 
-/// Onsets next to one that was found, within a grid step on either side: a step of P2 dated 40 s late leaves twenty standard errors in one
-/// segment, which other causes would absorb.
-const CLOSER: usize = 16;
+/// Onsets for one of the grid, a grid step to either side of a detected cause: a step of P2 dated 40 s late leaves twenty standard errors in
+/// one segment, which other causes would absorb.
+const CLOSER: usize = 8;
+
+/// Number of onsets tried over a campaign: the fit refines the onset of a detected cause.
+pub(crate) const ONSETS: usize = 36;
+/// Number of onsets on the fine grid of a detected cause: closer than the compared segments.
+pub(crate) const FINE_ONSETS: usize = ONSETS * CLOSER;
 
 /// A cause, by its position among the observable ones, with a time history.
 #[derive(Debug, Clone, Copy)]
@@ -53,8 +58,7 @@ impl Candidates {
         let spacing_s = (end_s - start_s) / onsets as f64;
         for (known, course) in known {
             let Some(cause) = shown.iter().position(|(cause, _)| cause == known) else { continue };
-            let closer =
-                (0..CLOSER).map(|part| (2.0 * (part as f64 + 0.5) / CLOSER as f64 - 1.0) * spacing_s);
+            let closer = (0..2 * CLOSER).map(|part| ((part as f64 + 0.5) / CLOSER as f64 - 1.0) * spacing_s);
             let onsets_s = closer.map(|by_s| course.onset_s + by_s).chain([course.onset_s]);
             let within = onsets_s.filter(|onset_s| (start_s..end_s).contains(onset_s));
             all.extend(within.map(|onset_s| Candidate { cause, course: Course { onset_s, ..*course } }));
@@ -68,7 +72,7 @@ impl Candidates {
             let cause = shown[*family].0;
             let sigma = cause.sigma_of(course.kind, end_s - start_s);
             // Onsets next to one of the grid share its prior.
-            let share = if place < on_grid { 1.0 } else { 1.0 / CLOSER as f64 };
+            let share = if place < on_grid { 1.0 } else { 0.5 / CLOSER as f64 };
             let prior = share * EXPECTED_DRIFTS * weight(&cause) / weights / courses.len() as f64;
             Hypothesis {
                 family: *family,

@@ -2,7 +2,7 @@
 
 use crate::drift::causes::cause::Cause;
 use crate::drift::causes::time_history::{Course, CourseKind};
-use crate::drift::likelihood::candidates::Candidates;
+use crate::drift::likelihood::candidates::{Candidates, ONSETS};
 use crate::drift::likelihood::low_rank::LowRank;
 use crate::drift::likelihood::residuals::{inflate, leave_out};
 use crate::drift::report::{Alternative, DetectionLimit};
@@ -10,9 +10,6 @@ use crate::drift::runs::request::{DriftError, Unsolvable};
 use crate::drift::sensitivity::readings::Readings;
 use mapper_inference::hypotheses::Member;
 use nalgebra::DMatrix;
-
-/// Number of onsets tried over a campaign: the fit refines the onset of a detected cause.
-const ONSETS: usize = 36;
 
 /// A detected cause, before its time history is fitted closely.
 #[derive(Debug, Clone)]

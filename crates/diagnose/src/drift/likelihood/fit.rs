@@ -2,17 +2,14 @@
 
 use crate::drift::causes::cause::Cause;
 use crate::drift::causes::time_history::Course;
-use crate::drift::likelihood::candidates::{courses, mean_of};
+use crate::drift::likelihood::candidates::{FINE_ONSETS, courses, mean_of};
 use crate::drift::likelihood::low_rank::LowRank;
 use crate::drift::runs::request::{DriftError, Unsolvable};
 use crate::drift::sensitivity::readings::Readings;
+use mapper_inference::descent::ENOUGH;
 use mapper_numerics::statistics::{CHI_SQUARE_1_95, NORMAL_975};
 use nalgebra::{DMatrix, DVector};
 
-/// Number of onsets on the fine grid of a detected cause: closer than the compared segments.
-pub(crate) const FINE_ONSETS: usize = 280;
-/// Evidence (twice the ln of a likelihood ratio) below which a difference is not significant.
-const AS_GOOD: f64 = 0.1;
 /// Rounds in which the onsets of several drifts are fitted in turn, and in which the model is linearised about them: each one reduces the
 /// error to about a tenth.
 pub(crate) const ROUNDS: usize = 2;
@@ -130,7 +127,7 @@ fn fit_one(readings: &Readings, noise: &LowRank, (cause, begun): (Cause, Course)
     let evidence = |index: usize| size(index).powi(2) * information[index];
     let best = (0..fine.len()).max_by(|a, b| evidence(*a).total_cmp(&evidence(*b))).ok_or_else(nothing)?;
     // During a gap in the readings all onsets are equally good: the middle one has the smallest error.
-    let as_good = |index: &usize| evidence(*index) > evidence(best) - AS_GOOD;
+    let as_good = |index: &usize| evidence(*index) > evidence(best) - ENOUGH;
     let first = (0..=best).rev().take_while(as_good).last().unwrap_or(best);
     let last = (best..fine.len()).take_while(as_good).last().unwrap_or(best);
     let peak = first.midpoint(last);

@@ -4,9 +4,9 @@
 use crate::drift::causes::cause::Cause;
 use crate::drift::causes::planted::Planted;
 use crate::drift::causes::time_history::Course;
-use crate::drift::likelihood::candidates::mean_of;
+use crate::drift::likelihood::candidates::{FINE_ONSETS, mean_of};
 use crate::drift::likelihood::decide::{Decision, decide};
-use crate::drift::likelihood::fit::{FINE_ONSETS, Fit, Fits, ROUNDS, fit};
+use crate::drift::likelihood::fit::{Fit, Fits, ROUNDS, fit};
 use crate::drift::runs::request::DriftError;
 use crate::drift::sensitivity::constant_effect::Constant;
 use crate::drift::sensitivity::drive::{Drive, predict};

@@ -4,13 +4,13 @@ use crate::drift::likelihood::candidates::Candidates;
 use crate::drift::likelihood::low_rank::LowRank;
 use crate::drift::runs::request::Unsolvable;
 use crate::drift::sensitivity::readings::Readings;
+use mapper_inference::descent::ROUNDS;
 use mapper_numerics::statistics::median;
 use mapper_observe::perturbation::UNINFORMATIVE;
 use nalgebra::{DMatrix, DVector};
 
 /// Distance from the model, relative to the median segment, above which a segment is an outlier.
 const FAR_OUT: f64 = 5.0;
-const LEAVE_OUT_ROUNDS: usize = 4;
 
 /// Excludes outlying segments even for the best explanation: the model cannot follow the machine there (surge, a valve at its stop). Returns
 /// their number, the noise without them, and the residual of the best explanation.
@@ -25,7 +25,7 @@ pub(crate) fn leave_out(
     let mut out = vec![false; own.len()];
     let mut noise = LowRank::new(own, columns)?;
     let mut left = unexplained(&noise, difference, candidates);
-    for _ in 0..LEAVE_OUT_ROUNDS {
+    for _ in 0..ROUNDS {
         let sizes: Vec<f64> = (0..own.len())
             .map(|block| {
                 left.rows(block * count, count).iter().map(|value| value * value).sum::<f64>() / count as f64

@@ -3,6 +3,7 @@
 use crate::drift::runs::request::RecordedRun;
 use crate::drift::runs::time_axis::CampaignStep;
 use mapper_core::{Channel, Recording, step_number};
+use mapper_identify::LONGEST_BRIDGE_S;
 use std::collections::BTreeMap;
 
 /// Minimum number of visits of one jump: two show a difference, only a third shows whether it persists or grows.
@@ -11,8 +12,6 @@ const VISITS_NEEDED: usize = 3;
 const LONGEST_STEP_S: f64 = 86_400.0;
 /// Longest total time of all steps, s.
 const LONGEST_S: f64 = 30.0 * 86_400.0;
-/// Time without readings of a channel within the steps that counts as a gap, s.
-const GAP_S: f64 = 3.0;
 
 /// All visits of each repeated jump, by position among the steps; most visits first.
 pub(crate) fn groups(steps: &[CampaignStep]) -> Vec<Vec<usize>> {
@@ -120,7 +119,9 @@ fn gap(recording: &Recording) -> Option<(Channel, f64, f64)> {
         let mut all = inner.chain([(start_s, *first), (*last, end_s)]);
         // A slow logger is not a gap: compare with the channel's own sample interval.
         let usual_s = (last - first) / times.len().max(2) as f64;
-        if let Some((from_s, to_s)) = all.find(|(from_s, to_s)| to_s - from_s > GAP_S.max(20.0 * usual_s)) {
+        if let Some((from_s, to_s)) =
+            all.find(|(from_s, to_s)| to_s - from_s > LONGEST_BRIDGE_S.max(20.0 * usual_s))
+        {
             return Some((*channel, from_s, to_s));
         }
     }

@@ -4,16 +4,13 @@ use crate::driven::cause_search::fit::{Fit, Question, normal, whitened};
 use crate::driven::cause_search::side_diagnosis::NotAsked;
 use crate::driven::cause_search::sides::side::Side;
 use crate::gap::causes::calibration::Calibration;
-use crate::gap::causes::smallest_seen::{NO_LENGTH, evidence_needed, smallest_size};
+use crate::gap::causes::smallest_seen::{evidence_needed, smallest_size};
 use crate::gap::findings::in_words;
 use crate::gap::findings::report::SmallestSeen;
 use crate::gap::residuals::study::Hypothesis;
 use mapper_inference::descent::FINE;
-use mapper_numerics::parallel;
+use mapper_numerics::{ROUNDING, parallel};
 use mapper_physics::rig::effect::{EffectInfo, EffectParameter};
-
-/// An effect with a smaller change than this is undetectable, K.
-const NOTHING_K: f64 = 1e-6;
 
 /// Indices of the effects that change a judged channel, and the others with the reason.
 pub(crate) fn audible<S: Side>(question: &Question<'_, S>) -> (Vec<usize>, Vec<NotAsked>) {
@@ -29,7 +26,7 @@ pub(crate) fn audible<S: Side>(question: &Question<'_, S>) -> (Vec<usize>, Vec<N
             let values =
                 info.parameters.iter().map(|p| (p.neutral + share * p.typical_step).clamp(p.low, p.high));
             let there = Hypothesis { effects: vec![(place, values.collect())], ..question.nothing() };
-            question.predict(&there).is_some_and(|predicted| largest(question, &predicted, &base) > NOTHING_K)
+            question.predict(&there).is_some_and(|predicted| largest(question, &predicted, &base) > ROUNDING)
         });
         if changed {
             asked.push(place);
@@ -104,7 +101,7 @@ pub(crate) fn smallest<S: Side>(
         let typical = |p: &EffectParameter| (p.neutral + p.typical_step).clamp(p.low, p.high);
         let neutral: Vec<f64> = others.iter().map(|p| p.neutral).collect();
         let usual: Vec<f64> = others.iter().map(typical).collect();
-        let alone = length_with(&neutral, typical(parameter))?.0 > NO_LENGTH;
+        let alone = length_with(&neutral, typical(parameter))?.0 > ROUNDING;
         let mut taker = 0;
         let smallest = smallest_size(parameter, against, |value| {
             let (sigma, most) = length_with(if alone { &neutral } else { &usual }, value)?;

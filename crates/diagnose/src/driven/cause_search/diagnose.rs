@@ -14,6 +14,7 @@ use crate::driven::cause_search::sides::turbine::TurbineSide;
 use crate::driven::log_rows::Rows;
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::weigh::{estimates, name_of};
+use crate::gap::next_experiment::best_experiment::RIVALS;
 use mapper_core::{Channel, Recording};
 use mapper_inference::interval::IDENTIFIED_RATIO;
 use mapper_numerics::statistics::{NORMAL_975, rms};
@@ -27,10 +28,6 @@ use std::sync::Arc;
 
 /// Maximum number of rows; more add no information, because the model error is correlated over seconds.
 const MAX_ROWS: usize = 800;
-/// Minimum number of rows: some for each unknown.
-const MIN_ROWS: usize = 30;
-/// Maximum number of causes from which each phase selects.
-const CHOICES: usize = 4;
 /// Maximum number of causes shown.
 const SHOWN: usize = 8;
 
@@ -72,9 +69,11 @@ fn of_side<S: Side>(ask: &Ask<'_>) -> Result<Diagnosis, DrivenError> {
     let (calibration, lost_rows) = (ask.calibration, all.lost);
     let rows = calm(&all, ask.declared).thinned(MAX_ROWS);
     let fitted = rows.t_s.partition_point(|t_s| *t_s < ask.fit_until_s);
-    if fitted < MIN_ROWS {
+    // Twice the unknowns.
+    let needed = 2 * S::unknowns().len();
+    if fitted < needed {
         let (rows, until_s) = (fitted, ask.fit_until_s);
-        return Err(DrivenError::TooFewRows { rows, until_s, needed: MIN_ROWS });
+        return Err(DrivenError::TooFewRows { rows, until_s, needed });
     }
     let counts: Vec<bool> = (0..rows.len()).map(|i| i < fitted).collect();
     let side = S::of(rows);
@@ -89,7 +88,7 @@ fn of_side<S: Side>(ask: &Ask<'_>) -> Result<Diagnosis, DrivenError> {
     // The named cause before the comparison with an unmodelled one; held-out phases judge it.
     let likeliest = if posterior.named && causes > 0 { fit_of(0) } else { &found.null };
     let open = posterior.open;
-    let choices: Vec<&Fit> = (0..if posterior.named { causes.min(CHOICES) } else { 0 }).map(fit_of).collect();
+    let choices: Vec<&Fit> = (0..if posterior.named { causes.min(RIVALS) } else { 0 }).map(fit_of).collect();
     let open_effects: Vec<usize> = (0..open)
         .flat_map(|place| fit_of(place).hypothesis.effects.iter().map(|(effect, _)| *effect))
         .collect();

@@ -6,9 +6,10 @@
 use crate::driven::cause_search::noise::Whitening;
 use crate::driven::cause_search::sides::side::{Side, Smooth};
 use crate::gap::best_fit::coordinate::{Coordinate, coordinates, parameters, set_parameter};
+use crate::gap::best_fit::fit::MAX_SIGMAS;
 use crate::gap::best_fit::normal::PRIOR_STEPS;
 use crate::gap::residuals::study::Hypothesis;
-use mapper_inference::descent::{ENOUGH, End, FINE, Model, Normal, Reach, Until, descend, room_within};
+use mapper_inference::descent::{End, FINE, Model, Normal, Reach, Until, descend, room_within};
 use mapper_numerics::minimise::minimise;
 use mapper_physics::rig::effect::{Effect, Rig, add};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -48,10 +49,6 @@ const OUTSIDE_RATIO: f64 = 12.0;
 /// No model of this kind leaves less than so many widths below the median, however well it happens to fit; nor does what is
 /// called a cause outside the catalogue.
 const MIN_LEFT: f64 = -2.0;
-/// An unknown so many standard deviations off is beyond what is known of any machine.
-const MAX_SIGMAS: f64 = 5.0;
-/// Maximum number of iterations.
-const ITERATIONS: usize = 15;
 
 impl<S: Side> Question<'_, S> {
     /// Nothing but what is not known.
@@ -144,8 +141,7 @@ impl<S: Side> Question<'_, S> {
         let known = self.known(start);
         let mut fitted = Fitted { question: self, start, counts, coordinates, known, whitenings: Vec::new() };
         let point = fitted.at(&unknowns)?;
-        let until = Until { iterations: ITERATIONS, enough: ENOUGH };
-        let End { unknowns, point, normal, .. } = descend(&mut fitted, unknowns, point, until);
+        let End { unknowns, point, normal, .. } = descend(&mut fitted, unknowns, point, Until::default());
         let half_ln_determinant = normal.half_ln_determinant()?;
         let outside = |smooth: &Smooth| match smooth.width {
             0.0 => (smooth.median_k, 0.0),

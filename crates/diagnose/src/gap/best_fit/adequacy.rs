@@ -5,13 +5,12 @@ use crate::gap::best_fit::fit::Fit;
 use crate::gap::best_fit::selection::Selection;
 use crate::gap::residuals::study::Study;
 use crate::gap::residuals::whiten::{Linearised, dot, rows_of_step};
+use mapper_numerics::statistics::DOUBT_SIGMAS;
 
 /// Time constants of the smooth basis after a jump, s: a step, and the ranges of probe, gas, housing and turbine housing.
 const BASIS_S: [f64; 5] = [f64::INFINITY, 5.0, 20.0, 60.0, 200.0];
 
-/// Smooth misfit that noise exceeds in one recording of a thousand, standard deviations. Scatter from step to step is counted relative to
-/// it, because scatter grows with the strength of an effect, even of a correct one.
-const NOISE_SIGMA: f64 = 3.3;
+/// Weight of scatter from step to step relative to smooth misfit: scatter grows with the strength of an effect, even of a correct one.
 const SCATTER_COUNTS: f64 = 0.25;
 
 /// Residual of a fit.
@@ -32,7 +31,7 @@ pub struct Adequacy {
 impl Adequacy {
     /// Whether the residual is consistent with noise and an imperfect fit, ignoring further library effects.
     pub fn may_be_noise(&self) -> bool {
-        self.smooth_sigma + SCATTER_COUNTS * self.scatter_sigma < NOISE_SIGMA
+        self.smooth_sigma + SCATTER_COUNTS * self.scatter_sigma < DOUBT_SIGMAS
     }
 
     /// Features for the probability of an unmodelled cause.

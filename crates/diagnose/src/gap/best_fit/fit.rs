@@ -10,7 +10,7 @@ use crate::gap::best_fit::selection::{Selection, dot_over};
 use crate::gap::residuals::hypothesis::Course;
 use crate::gap::residuals::study::{Hypothesis, PredictError, Prediction, Study};
 use crate::gap::residuals::whiten::{Linearised, rows_of_step};
-use mapper_inference::descent::{ENOUGH, End, Model, Normal, Reach, Until, descend, room_within};
+use mapper_inference::descent::{End, Model, Normal, Reach, Until, descend, room_within};
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 use std::sync::Arc;
@@ -52,7 +52,8 @@ pub struct Effort {
 
 impl Default for Effort {
     fn default() -> Self {
-        Effort { iterations: 10, enough: ENOUGH, most_sigmas: MAX_SIGMAS }
+        let Until { iterations, enough } = Until::default();
+        Effort { iterations, enough, most_sigmas: MAX_SIGMAS }
     }
 }
 

@@ -9,6 +9,7 @@ use crate::gap::causes::weigh::{prior, weight};
 use crate::gap::residuals::study::{PredictError, Study, members};
 use crate::gap::residuals::whiten::Linearised;
 use mapper_core::half_width_95;
+use mapper_inference::descent::ROUNDS;
 use mapper_inference::hypotheses::MAX_MEMBERS;
 use mapper_inference::search::{Causes, Known, Limits, Offer, climb, extend};
 
@@ -34,14 +35,12 @@ const LIMITS: Limits = Limits { members: MAX_MEMBERS, starts: 2, fits: 6, slack:
 const STRONG: f64 = 30.0;
 /// Starts with the most linear gain that are fitted as a single: bounds the time. Judgement: half of the library, since strong effects bend.
 const SINGLES: usize = 26;
-/// A further effect that leaves more than this share of the excess cost is one of many that chip at a cause of another kind:
-/// nothing is built upon it.
-const HALVED: f64 = 0.5;
+/// Share of the misfit that a cause must remove to explain it in part, also on steps that its fit did not see. A further effect that removes
+/// less is one of many that chip at a cause of another kind: nothing is built upon it.
+pub const MIN_SHRINK: f64 = 0.5;
 
 /// What one more iteration may promise in the cost of a fit that is at its best: well below what any cause is named for.
 const UNFINISHED: f64 = 1.0;
-/// Linearisations of the tolerances at their fit: bounds the time. Judgement.
-const MAX_RELINEARISATIONS: usize = 3;
 
 const QUICK: Effort = Effort { iterations: 3, enough: 1.0, most_sigmas: 3.0 };
 const EFFORT: Effort =
@@ -67,7 +66,7 @@ pub fn search(search: Search<'_>, progress: &dyn Fn(f64, &str)) -> Result<Search
     let mut null = fit(study, search.linearised, &study.nothing(), selection, Effort::default())?;
     // Tolerances that act differently at the fit than where they were linearised stop it short.
     let mut at_null = None;
-    for _ in 0..MAX_RELINEARISATIONS {
+    for _ in 0..ROUNDS {
         if null.promised < UNFINISHED {
             break;
         }
@@ -188,7 +187,7 @@ impl Causes for Search<'_> {
     fn goes_on(&self, from: &Fit, to: &Fit) -> bool {
         let values: usize = self.selection.rows(self.study).iter().map(ExactSizeIterator::len).sum();
         let excess = |fit: &Fit| (fit.cost - values as f64).max(0.0);
-        to.hypothesis.effects.len() < 3 || excess(to) < HALVED * excess(from)
+        to.hypothesis.effects.len() < 3 || excess(to) < (1.0 - MIN_SHRINK) * excess(from)
     }
 }
 

@@ -10,6 +10,7 @@ use crate::gap::findings::in_words;
 use crate::gap::findings::report::SmallestSeen;
 use crate::gap::residuals::study::Study;
 use crate::gap::residuals::whiten::Linearised;
+use mapper_numerics::ROUNDING;
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::NORMAL_95;
 use mapper_physics::rig::effect::{EffectInfo, EffectParameter};
@@ -17,8 +18,6 @@ use mapper_physics::rig::effect::{EffectInfo, EffectParameter};
 /// Maximum number of runs to find a size, and the tolerance in the logarithm of the length: a tenth of a size does not change a plan.
 const LOOKS: usize = 6;
 const NEAR: f64 = 0.1;
-/// Length of a signature, in sigmas, that is none: rounding.
-pub const NO_LENGTH: f64 = 1e-6;
 
 /// The size from which a recording shows an effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,7 +55,7 @@ pub fn smallest_size(
     let mut before: Option<(f64, f64)> = None;
     for _ in 0..LOOKS {
         let sigma = length(value_at(here))?;
-        if sigma <= NO_LENGTH || here == 0.0 {
+        if sigma <= ROUNDING || here == 0.0 {
             break;
         }
         acts = true;

@@ -10,6 +10,7 @@ use crate::gap::next_experiment::best_experiment::{Rivals, SETTLED};
 use crate::gap::residuals::hypothesis::Course;
 use crate::gap::residuals::study::{EffectValues, Hypothesis, Study};
 use mapper_core::half_width_95;
+use mapper_inference::interval::COVERAGE;
 use mapper_physics::rig::effect::{Effect, EffectInfo, EffectParameter};
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
@@ -148,8 +149,10 @@ fn onsets(study: &Study, fit: &Fit) -> BTreeMap<String, Onset> {
 
 /// Maximum number of alternatives named with the first cause; a longer list does not help.
 pub const MAX_EQUIVALENT: usize = 2;
-/// Evidence difference below which data do not distinguish causes, in calibration temperatures: a factor of 20.
-pub const ALIKE: f64 = 3.0;
+/// Difference in evidence below which data do not distinguish causes: the odds at which an interval excludes a value.
+pub fn distinguishing(calibration: &Calibration) -> f64 {
+    -(1.0 - COVERAGE).ln() * calibration.temperature
+}
 
 /// The named cause and those that the data do not distinguish from it, as in [`Candidate::equivalent`].
 pub(crate) fn alike<'a>(
@@ -160,7 +163,7 @@ pub(crate) fn alike<'a>(
 ) -> Vec<&'a Fit> {
     let shown = || posterior.shown.iter().map(|place| &fits[*place]);
     let best = shown().next().map_or(f64::NEG_INFINITY, weight);
-    let near = |fit: &&Fit| best - weight(fit) < ALIKE * calibration.temperature;
+    let near = |fit: &&Fit| best - weight(fit) < distinguishing(calibration);
     shown().filter(near).take(1 + MAX_EQUIVALENT).collect()
 }
 
@@ -175,7 +178,7 @@ fn equivalents(
     shown
         .iter()
         .skip(1)
-        .filter(|place| scores[1] - scores[**place + 1] < ALIKE * calibration.temperature)
+        .filter(|place| scores[1] - scores[**place + 1] < distinguishing(calibration))
         .map(|place| ids(study, &fits[*place]))
         .take(MAX_EQUIVALENT)
         .collect()

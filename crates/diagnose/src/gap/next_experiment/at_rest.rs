@@ -10,10 +10,8 @@ use crate::gap::findings::experiment::AtRest;
 use crate::gap::residuals::study::{Hypothesis, Study};
 use mapper_core::Channel;
 use mapper_inference::descent::FINE;
+use mapper_observe::perturbation::UNINFORMATIVE;
 use nalgebra::DMatrix;
-
-/// Prior of the common temperature of all sensors, 1 sigma, in units of each remaining uncertainty: effectively unknown.
-const COMMON_SIGMA: f64 = 1e4;
 
 /// Misfit increase of each fit (column) after refitting to a soak, if another fit (row) were true, in squared sigmas.
 pub(crate) fn apart_at_rest(recorded: &Study, soak: &AtRest, fits: &[&Fit]) -> Option<Vec<Vec<f64>>> {
@@ -34,7 +32,8 @@ pub(crate) fn apart_at_rest(recorded: &Study, soak: &AtRest, fits: &[&Fit]) -> O
             let known = fit.precision.nrows();
             let mut precision = DMatrix::zeros(columns.len(), columns.len());
             precision.view_mut((0, 0), (known, known)).copy_from(&fit.precision);
-            precision[(known, known)] = COMMON_SIGMA.powi(-2);
+            // The common temperature of all sensors is unknown.
+            precision[(known, known)] = UNINFORMATIVE.powi(-2);
             Some((here, columns, precision))
         })
         .collect();

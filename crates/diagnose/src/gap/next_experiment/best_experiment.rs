@@ -8,11 +8,12 @@ use crate::gap::next_experiment::outlook::{apart, apart_at_first_sight, recorded
 use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::study::Study;
 use mapper_core::{Channel, OperatingPoint};
+use mapper_inference::interval::COVERAGE;
 use mapper_numerics::parallel;
 use mapper_physics::rig::effect::Submodel;
 
 /// Share of the open probability above which the first cause is settled.
-pub const SETTLED: f64 = 0.95;
+pub const SETTLED: f64 = COVERAGE;
 /// Experiments expected to resolve less than this share of the open question are dropped.
 const MIN_ANSWER: f64 = 0.1;
 /// Number of jumps that are evaluated with refits.
@@ -22,7 +23,7 @@ const SHOWN: usize = 5;
 /// The same of one kind; also of those of each other kind that are evaluated.
 const OF_KIND: usize = 2;
 /// Maximum number of candidates to distinguish.
-const RIVALS: usize = 4;
+pub const RIVALS: usize = 4;
 /// All experiments are compared with the same random draws.
 const SEED: u64 = 1;
 /// Time at the start of a step in a script, s: housings settle within minutes.

@@ -11,6 +11,7 @@ use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::study::{Hypothesis, Study};
 use crate::gap::residuals::whiten::Linearised;
 use mapper_core::{Channel, OperatingPoint, Recording, Series, StepKind, StepMarker};
+use mapper_identify::DECLARED_INTERVAL_S;
 use mapper_observe::averages::time_table::Table;
 use mapper_observe::declared::Declared;
 use mapper_physics::machine::params::BoundaryConditions;
@@ -22,9 +23,8 @@ use std::sync::Arc;
 
 /// Time at the start point before a jump that is also simulated, s.
 const HOLD_S: f64 = 30.0;
-/// Sample intervals of the first pass and of the detailed pass, s.
+/// Sample interval of the first pass, s.
 pub(crate) const COARSE_S: f64 = 0.5;
-const FINE_S: f64 = 0.1;
 /// Maximum time at the target that is simulated, s; longer dwells are cut.
 const MAX_S: f64 = 600.0;
 
@@ -158,7 +158,7 @@ pub fn apart(recorded: &Study, experiment: &Experiment, fits: &[&Fit]) -> Option
     if let AlsoChanged::Soak(soak) = experiment.also {
         return apart_at_rest(recorded, &soak, fits);
     }
-    let study = imagined(recorded, experiment, FINE_S)?;
+    let study = imagined(recorded, experiment, DECLARED_INTERVAL_S)?;
     let nominal = Linearised::new(&study).ok()?;
     let mut predicted = Vec::new();
     for fit in fits {

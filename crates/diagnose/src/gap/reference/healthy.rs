@@ -22,6 +22,7 @@ use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::study::{Group, PredictError, Study};
 use crate::gap::residuals::whiten::{Linearised, dot};
 use mapper_core::{Channel, Recording};
+use mapper_inference::descent::ROUNDS;
 use mapper_observe::averages::time_table::Table;
 use mapper_observe::declared::Declared;
 use mapper_observe::model_inputs::step_timing::with_command_times;
@@ -117,9 +118,6 @@ impl Study {
     }
 }
 
-/// Iterations of the tolerance fit; tolerances are small.
-const ITERATIONS: usize = 4;
-
 /// Fits the tolerances of a fault-free rig. The misfit sets the noise level, so that model error does not push tolerances outside their
 /// priors.
 fn tolerances(study: &Study, linearised: &Linearised) -> Result<Hypothesis, PredictError> {
@@ -128,7 +126,7 @@ fn tolerances(study: &Study, linearised: &Linearised) -> Result<Hypothesis, Pred
     let rows = everywhere.rows(study);
     let (mut best, mut residual) = (study.nothing(), linearised.residual(study, &linearised.base));
     let n = best.nuisances.len();
-    for _ in 0..ITERATIONS {
+    for _ in 0..ROUNDS {
         let excess = (dot(&residual, &residual) / residual.len().max(1) as f64).max(1.0);
         let matrix = &products + DMatrix::identity(n, n) * excess;
         let right = DVector::from_fn(n, |i, _| {

@@ -1,13 +1,11 @@
 //! Response of P3 and the valve to their commands, and whether it is diagnosed.
 
 use mapper_core::{Channel, Recording};
+use mapper_inference::descent::ROUNDS;
 use mapper_observe::averages::time_table::Table;
 use mapper_observe::declared::Declared;
 use mapper_observe::model_inputs::lagged_command::{Response, measured_p3_response, measured_valve_response};
 use mapper_observe::model_inputs::step_timing::{Times, with_command_times};
-
-/// Maximum number of alternations between estimating the response and the step times.
-const TIMED_TURNS: usize = 3;
 
 /// Response of P3 and the valve to their commands.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,7 +55,7 @@ fn timed_p3(table: &Table, recording: &Recording, declared: &Declared) -> (Respo
     };
     let commanded = with_command_times(recording);
     let (mut p3, mut timed) = (follows(&commanded), commanded.clone());
-    for _ in 0..TIMED_TURNS {
+    for _ in 0..ROUNDS {
         let next = Times::read(table, &commanded, p3, noise_sigma).timed(&commanded);
         if next.steps == timed.steps {
             break;

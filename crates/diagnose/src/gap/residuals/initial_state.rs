@@ -1,18 +1,16 @@
 //! Whether the machine had settled when the recording began, and its initial state otherwise.
 
 use mapper_core::Channel;
+use mapper_numerics::ROUNDING;
 use mapper_observe::averages::mean_reading::mean_reading;
 use mapper_observe::averages::time_table::Table;
 use mapper_physics::simulation::model::Model;
 
-/// Factor on the metal's heat capacity that holds its temperature while everything else settles.
-const HEAVY_RATIO: f64 = 1e9;
-
-/// The model with its metal temperatures held.
+/// The model with its metal so heavy that its temperatures hold while everything else settles.
 pub(crate) fn with_metal_held(model: &Model) -> Model {
     let mut heavy = model.clone();
-    heavy.params.compressor.housing_mass_kg *= HEAVY_RATIO;
-    heavy.params.turbine.housing_mass_kg *= HEAVY_RATIO;
+    heavy.params.compressor.housing_mass_kg /= ROUNDING;
+    heavy.params.turbine.housing_mass_kg /= ROUNDING;
     heavy
 }
 

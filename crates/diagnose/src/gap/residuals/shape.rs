@@ -8,10 +8,8 @@ use std::sync::Arc;
 const SPEEDS: usize = 6;
 const FIRST_SPEED: f64 = 0.5;
 const SPEED_WIDTH: f64 = 0.2;
-/// Number of bumps between the surge line (0) and choke (1).
+/// Number of bumps between the surge line (0) and choke (1), each as wide as their distance.
 const WAYS: usize = 3;
-const FIRST_WAY: f64 = 0.1;
-const WAY_WIDTH: f64 = 0.3;
 
 /// Number of basis functions.
 pub const SHAPES: usize = SPEEDS * WAYS;
@@ -32,7 +30,7 @@ fn basis(speed_corrected_rpm: f64, surge_position_ratio: f64) -> [f64; SHAPES] {
     let position = surge_position_ratio.clamp(0.0, 1.0);
     let way = (1.0 - position * position).sqrt();
     let over_speed: [f64; SPEEDS] = bumps((speed - FIRST_SPEED) / SPEED_WIDTH);
-    let over_way: [f64; WAYS] = bumps((way - FIRST_WAY) / WAY_WIDTH);
+    let over_way: [f64; WAYS] = bumps(way * WAYS as f64 - 0.5);
     std::array::from_fn(|i| over_speed[i / WAYS] * over_way[i % WAYS])
 }
 

@@ -223,7 +223,7 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 /// Position on the speed line beyond which a jump runs along or across the surge line: flow and outlet pressure are then too sensitive to be
 /// used in it.
-const NEAR_SURGE: f64 = 0.975;
+pub(crate) const NEAR_SURGE: f64 = 0.975;
 /// Length of a jump, s.
 const JUMP_S: f64 = 3.0;
 /// Time after the last surge cycle in which no reading counts, s: its end is chaotic, and the shaft takes some seconds to recover.

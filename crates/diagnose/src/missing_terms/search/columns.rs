@@ -8,6 +8,7 @@ use crate::gap::residuals::whiten::{Linearised, rows_of_step};
 use crate::missing_terms::terms::law_effect::LawEffect;
 use crate::missing_terms::terms::term::Term;
 use mapper_core::Channel;
+use mapper_numerics::ROUNDING;
 use mapper_numerics::parallel;
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
@@ -135,9 +136,6 @@ pub struct Products {
     free: usize,
 }
 
-/// Prior precision of free columns: keeps the equations solvable.
-const FREE_PRECISION: f64 = 1e-6;
-
 impl Products {
     /// Products of nuisances and other free columns, `columns`, and the residual, in this order.
     pub fn new(base: &Base<'_>, columns: &[Vec<f64>]) -> Products {
@@ -171,7 +169,7 @@ impl Products {
         }
         let mut own = sum.view((0, 0), (n, n)).into_owned();
         for i in 0..n {
-            own[(i, i)] += if i < u { 1.0 } else { FREE_PRECISION };
+            own[(i, i)] += if i < u { 1.0 } else { ROUNDING };
         }
         let mut across = sum.view((0, n), (n, size - n)).into_owned();
         let mut rest = sum.view((n, n), (size - n, size - n)).into_owned();

@@ -188,9 +188,8 @@ fn force(
 /// Correlation lengths of a source term over speed, rpm, and opening.
 const SMOOTH_RPM: f64 = 35e3;
 const SMOOTH_OPENING: f64 = 0.3;
-/// Variances of the common level, the part smooth over the map, and the free part of each step.
+/// Variances of the common level and of the part smooth over the map, each, and of the free part of each step.
 const COMMON: f64 = 0.5;
-const SMOOTH: f64 = 0.5;
 const FREE: f64 = 0.02;
 
 /// Prior covariance of levels and decaying parts for a source term of typical size.
@@ -209,8 +208,8 @@ pub fn covariance(study: &Study, points: &[PointState]) -> DMatrix<f64> {
     DMatrix::from_fn(2 * steps - 1, 2 * steps - 1, |i, j| {
         let free = if i == j { FREE } else { 0.0 };
         match (i < steps, j < steps) {
-            (true, true) => COMMON + SMOOTH * near(at(i), at(j)) + free,
-            (false, false) => 0.5 * SMOOTH * near(jump(i - steps + 1), jump(j - steps + 1)) + free,
+            (true, true) => COMMON + COMMON * near(at(i), at(j)) + free,
+            (false, false) => 0.5 * COMMON * near(jump(i - steps + 1), jump(j - steps + 1)) + free,
             _ => 0.0,
         }
     })

@@ -1,11 +1,13 @@
 //! Wraps terms as an effect, so that the effect fit also fits laws.
 
+use crate::gap::best_fit::fit::MAX_SIGMAS;
+use crate::gap::best_fit::normal::PRIOR_STEPS;
 use crate::missing_terms::terms::term::{Term, put_into};
 use mapper_physics::rig::effect::{Effect, EffectError, EffectInfo, EffectParameter, NamedValues, Rig};
 use std::borrow::Cow;
 
 /// Maximum distance of a coefficient from zero, in steps.
-pub const MAX_STEPS: f64 = 60.0;
+pub const MAX_STEPS: f64 = PRIOR_STEPS * MAX_SIGMAS;
 
 /// Some terms of one part of the machine, each with a coefficient.
 #[derive(Debug, Clone)]

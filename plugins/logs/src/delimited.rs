@@ -127,7 +127,7 @@ fn describe_dialect(dialect: Dialect, decimal_seen: bool) -> String {
     };
     let encoding = match dialect.encoding {
         Encoding::Utf8 => "UTF-8",
-        Encoding::Latin1 => "Latin-1",
+        Encoding::Legacy(encoding) => encoding.name(),
         Encoding::Utf16Le | Encoding::Utf16Be => "UTF-16",
     };
     let decimal = if decimal_seen { "" } else { ", assumed" };

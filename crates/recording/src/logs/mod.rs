@@ -20,6 +20,7 @@ pub use error::LogError;
 pub use file::{LogFile, ReadSeek};
 pub use format::{Log, LogFormat, LogFormats, OpenLog, Row, RowSink};
 pub use layout::{Column, Group, Layout};
+pub use mapper_core::{LegacyEncoding, is_missing_mark};
 pub use mapper_yaml::units::{HeaderUnit, Kind, Reference, Unit, header_unit, split_unit};
 pub use options::{DateOrder, Encoding, LogOptions, OPTION_KEYS, OptionError, OptionKey};
 pub use sparkline::sparkline;

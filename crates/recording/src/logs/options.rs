@@ -1,5 +1,6 @@
 //! The user's options for a log, for properties that automatic detection gets wrong.
 
+use mapper_core::LegacyEncoding;
 use mapper_yaml::units::{Kind, parse};
 
 /// Character encoding of a text file.
@@ -7,8 +8,8 @@ use mapper_yaml::units::{Kind, parse};
 pub enum Encoding {
     /// UTF-8, with or without a byte order mark.
     Utf8,
-    /// Windows-1252, of which Latin-1 is a part.
-    Latin1,
+    /// One of a program before UTF-8.
+    Legacy(LegacyEncoding),
     /// UTF-16, low byte first.
     Utf16Le,
     /// UTF-16, high byte first.
@@ -202,10 +203,9 @@ fn separator(text: &str) -> Option<char> {
 fn encoding(text: &str) -> Option<Encoding> {
     match text.to_ascii_lowercase().as_str() {
         "utf-8" | "utf8" => Some(Encoding::Utf8),
-        "latin-1" | "latin1" | "iso-8859-1" | "windows-1252" | "cp1252" => Some(Encoding::Latin1),
         "utf-16le" | "utf-16" => Some(Encoding::Utf16Le),
         "utf-16be" => Some(Encoding::Utf16Be),
-        _ => None,
+        other => LegacyEncoding::of_name(other).map(Encoding::Legacy),
     }
 }
 

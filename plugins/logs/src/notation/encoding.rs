@@ -1,6 +1,6 @@
 //! Character encodings of a text file.
 
-use mapper_recording::logs::Encoding;
+use mapper_recording::logs::{Encoding, LegacyEncoding};
 use std::io::{self, Read};
 
 /// The encoding of a file that starts with these bytes, and the length of its byte order mark.
@@ -15,7 +15,7 @@ pub(crate) fn guess(head: &[u8]) -> (Encoding, usize) {
             Ok(_) => (Encoding::Utf8, 0),
             // Truncated in the middle of a character.
             Err(error) if error.error_len().is_none() => (Encoding::Utf8, 0),
-            Err(_) => (Encoding::Latin1, 0),
+            Err(_) => (Encoding::Legacy(LegacyEncoding::guess(head)), 0),
         },
     }
 }
@@ -29,7 +29,7 @@ fn looks_like_utf16(head: &[u8], high: usize) -> bool {
 
 pub(crate) fn text(cell: &[u8], encoding: Encoding) -> String {
     match encoding {
-        Encoding::Latin1 => cell.iter().map(|byte| char::from(*byte)).collect(),
+        Encoding::Legacy(encoding) => encoding.decode(cell),
         _ => String::from_utf8_lossy(cell).into_owned(),
     }
 }
@@ -110,8 +110,8 @@ mod tests {
 
     #[test]
     fn the_degree_sign_of_latin_1_is_not_utf_8() {
-        assert_eq!(guess(b"T2 [\xB0C]").0, Encoding::Latin1);
-        assert_eq!(text(b"T2 [\xB0C]", Encoding::Latin1), "T2 [°C]");
+        let (latin1, _) = guess(b"T2 [\xB0C]");
+        assert_eq!(text(b"T2 [\xB0C]", latin1), "T2 [°C]");
         assert_eq!(guess("T2 [°C]".as_bytes()).0, Encoding::Utf8);
         assert_eq!(guess(b"\xEF\xBB\xBFT2"), (Encoding::Utf8, 3));
         let utf16: Vec<u8> = "time;T2 [°C]".encode_utf16().flat_map(u16::to_le_bytes).collect();

@@ -65,7 +65,7 @@ impl RowStream {
         let text: Box<dyn Read> = match dialect.encoding {
             Encoding::Utf16Le => Box::new(Utf16Reader::new(bytes, false)),
             Encoding::Utf16Be => Box::new(Utf16Reader::new(bytes, true)),
-            Encoding::Utf8 | Encoding::Latin1 => bytes,
+            Encoding::Utf8 | Encoding::Legacy(_) => bytes,
         };
         let limited: Box<dyn Read> = Box::new(LineLimiter { inner: text, left: left.clone() });
         let reader = csv::ReaderBuilder::new()

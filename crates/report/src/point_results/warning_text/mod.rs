@@ -11,6 +11,7 @@ use crate::point_results::result_remark_text::result_remark_text;
 use crate::point_results::warning_text::sentence::Sentence;
 use mapper_core::{ModelDoubt, PlanRemark, ResultRemark, Warning};
 use mapper_diagnose::gap::findings::warning::GapWarning;
+use mapper_recording::logs::proposal::ProposalRemark;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
@@ -61,6 +62,8 @@ fn add_messages(value: &mut Value) {
                                 add_message(one, plan_remark_text);
                             } else if has_code(one, ResultRemark::CODES) {
                                 add_message(one, result_remark_text);
+                            } else if has_code(one, ProposalRemark::CODES) {
+                                add_message::<ProposalRemark>(one, ToString::to_string);
                             }
                         }
                     }

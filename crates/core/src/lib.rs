@@ -70,7 +70,8 @@ pub use measurement::recording::{ReadingOrigin, Recording, RecordingError, Serie
 pub use measurement::redundant::{DeclaredElement, Element, MAX_ELEMENTS, RedundantSensors, UnknownElement};
 pub use measurement::sample::{ChannelColumn, ElementColumn, Provenance, Quality, SampleBatch, TruthColumn};
 pub use measurement::step_marker::StepMarker;
-pub use names::column_name::{Clarity, ColumnName, Measured, Place};
+pub use names::column_name::{Clarity, ColumnName, Place};
+pub use names::measured::Measured;
 pub use names::missing::is_missing_mark;
 pub use names::words::Word;
 pub use rig::backend::{
@@ -94,8 +95,8 @@ pub use test_plan::step_number::step_number;
 pub use test_plan::timing::{Dwell, Timing};
 pub use test_plan::verdict_forecast::{Advice, CampaignChange, VerdictForecast};
 pub use test_plan::visit_order::VisitOrder;
-pub use text::legacy_encoding::LegacyEncoding;
 pub use text::one_line::one_line;
 pub use text::probability_text::probability_text;
 pub use text::terminal_text::terminal_text;
+pub use text::text_encoding::TextEncoding;
 pub use text::with_unit::{readable, temperature, with_unit};

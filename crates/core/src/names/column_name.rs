@@ -1,24 +1,9 @@
 //! Reads quantity and place from the name of a column.
 
+use super::measured::Measured;
 use super::name_parts::{Token, parts_of};
 use super::tag::split_tag;
 use super::words::Word;
-
-/// A quantity that a name may have.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[allow(missing_docs, reason = "the names are the quantities")]
-pub enum Measured {
-    Temperature,
-    Pressure,
-    Speed,
-    Flow,
-    VolumeFlow,
-    PressureRatio,
-    Efficiency,
-    Humidity,
-    Opening,
-    Vane,
-}
 
 /// A place of a turbocharger.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 //! Cuts a name into words, letters and numbers.
 
-use super::column_name::Measured;
+use super::measured::Measured;
 use super::words::{Word, meanings};
 
 /// A part of a name.

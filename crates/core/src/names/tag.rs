@@ -1,6 +1,6 @@
 //! Tag numbers of piping diagrams (ISA 5.1): `TT-101`, `PT_2101`, `FT-3`.
 
-use super::column_name::Measured;
+use super::measured::Measured;
 
 /// Tags that are something else with a short number: `PT2` is the total pressure at station 2, `TIT 1` a turbine inlet temperature.
 const LONG_NUMBERS: [&str; 6] = ["tt", "pt", "pi", "pit", "tit", "st"];

@@ -1,68 +1,20 @@
 //! The table of the words in names of measured quantities, in all languages that the readers of logs and maps know.
 
-use super::column_name::Measured;
+use super::measured::Measured;
 use std::collections::HashMap;
 use std::sync::LazyLock;
 
-/// Meaning of a word in a name.
+/// Meaning of a word in a name. `Ratio` is one of pressures if the name has them; `Shaft` is also the turbocharger as a whole, `Exhaust` and
+/// `Air` are the gases of turbine and compressor, `Charge` is the compressed air; `Engine` comes with `Other`, which is any other part of the
+/// stand, or a difference, a limit or an uncertainty; `Acronym` marks the first letters of machine, side and quantity.
+#[allow(missing_docs, reason = "the names are words of the table")]
+#[rustfmt::skip]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Word {
-    /// A quantity.
-    Is(Measured),
-    /// A ratio: of pressures, if the name has them.
-    Ratio,
-    /// The change of pressure in a compressor.
-    Compression,
-    /// The change of pressure in a turbine.
-    Expansion,
-    /// The compressor.
-    Compressor,
-    /// The turbine.
-    Turbine,
-    /// The turbocharger as a whole, or its shaft.
-    Shaft,
-    /// The gas of the turbine.
-    Exhaust,
-    /// The gas of the compressor.
-    Air,
-    /// The compressed air.
-    Charge,
-    /// The oil.
-    Oil,
-    /// A wall.
-    Housing,
-    /// The bearing housing.
-    Bearing,
-    /// The test cell.
-    Ambient,
-    /// The inlet of a machine.
-    In,
-    /// The outlet of a machine.
-    Out,
-    /// Upstream of a machine.
-    Before,
-    /// Downstream of a machine.
-    After,
-    /// A total quantity.
-    Total,
-    /// A static quantity.
-    Static,
-    /// A corrected or reduced quantity.
-    Corrected,
-    /// A computed value.
-    Computed,
-    /// A set value.
-    Command,
-    /// The first letters of machine, side and quantity.
-    Acronym,
-    /// An engine.
-    Engine,
-    /// A manifold of an engine.
-    Manifold,
-    /// Another part of the stand or engine.
-    Other,
-    /// A word without meaning for the quantity.
-    Filler,
+    Is(Measured), Ratio, Compression, Expansion,
+    Compressor, Turbine, Shaft, Exhaust, Air, Charge, Oil, Housing, Bearing, Ambient, Engine, Manifold, Other,
+    In, Out, Before, After, Acronym,
+    Total, Static, Corrected, Computed, Command, Filler,
 }
 
 use Measured::{

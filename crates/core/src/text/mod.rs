@@ -1,7 +1,7 @@
 //! Text made safe for terminals and files of other programs, and numbers with their units.
 
-pub(crate) mod legacy_encoding;
 pub(crate) mod one_line;
 pub(crate) mod probability_text;
 pub(crate) mod terminal_text;
+pub(crate) mod text_encoding;
 pub(crate) mod with_unit;

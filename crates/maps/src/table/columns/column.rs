@@ -142,7 +142,9 @@ pub(crate) fn column(index: usize, heading: &str, machine: Machine) -> Result<Op
         return Ok(None);
     }
     let by_unit = unit.as_deref().and_then(quantity_of_unit);
-    let Some(quantity) = quantity_of_name(&name, &plain, by_unit, machine) else { return Ok(None) };
+    let Some(quantity) = quantity_of_name(&name, &plain, by_unit, machine == Machine::Turbine) else {
+        return Ok(None);
+    };
     Column::with_unit(index, quantity, heading, unit.as_deref()).map(Some)
 }
 

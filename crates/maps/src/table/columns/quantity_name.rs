@@ -1,6 +1,5 @@
 //! The quantity of a heading, from its name and unit.
 
-use crate::table::columns::column::Machine;
 use crate::table::columns::quantity::Quantity;
 use mapper_core::{ColumnName, Measured, Place, Word};
 
@@ -36,7 +35,7 @@ pub(crate) fn quantity_of_name(
     name: &str,
     plain: &str,
     by_unit: Option<Quantity>,
-    machine: Machine,
+    is_turbine_map: bool,
 ) -> Option<Quantity> {
     if plain.is_empty() {
         return by_unit;
@@ -57,7 +56,6 @@ pub(crate) fn quantity_of_name(
     if read.is_other() {
         return None;
     }
-    let is_turbine_map = machine == Machine::Turbine;
     if is_turbine_map {
         if read.has(Word::Is(Measured::Vane)) {
             return Some(Quantity::Vane);

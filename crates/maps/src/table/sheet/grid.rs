@@ -1,6 +1,6 @@
 //! Cells of a table, from text of any encoding, separator and decimal sign, or from a sheet of a workbook.
 
-use mapper_core::{ImportError, LegacyEncoding, is_missing_mark};
+use mapper_core::{ImportError, TextEncoding, is_missing_mark};
 
 /// A row of cells.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,29 +41,17 @@ pub(crate) const MAX_CELLS: usize = 16_384;
 const MAX_LINE_BYTES: usize = 16 * MAX_CELLS;
 const SEPARATOR_LINES: usize = 10_000;
 
-/// Text in UTF-8, in UTF-16 with a byte order mark, or in an older encoding.
+/// Text in any encoding.
 ///
 /// # Errors
 /// [`ImportError::NotText`] if it has control characters, as other files have.
 pub fn text_of(bytes: &[u8]) -> Result<String, ImportError> {
-    let text = match bytes {
-        [0xff, 0xfe, rest @ ..] if rest.len() % 2 == 0 => utf16(rest, u16::from_le_bytes),
-        [0xfe, 0xff, rest @ ..] if rest.len() % 2 == 0 => utf16(rest, u16::from_be_bytes),
-        _ => match std::str::from_utf8(bytes) {
-            // Spreadsheet programs write a byte order mark.
-            Ok(text) => text.strip_prefix('\u{feff}').unwrap_or(text).to_owned(),
-            Err(_) => LegacyEncoding::guess(bytes).decode(bytes),
-        },
-    };
+    let (encoding, mark) = TextEncoding::guess(bytes);
+    let text = encoding.decode(bytes.get(mark..).unwrap_or_default());
     match text.find(|c: char| c.is_control() && !matches!(c, '\n' | '\r' | '\t' | '\u{c}')) {
         Some(at) => Err(ImportError::NotText { line: 1 + text[..at].matches('\n').count() }),
         None => Ok(text),
     }
-}
-
-fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> String {
-    let units = bytes.as_chunks::<2>().0.iter().map(|pair| unit(*pair));
-    char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER)).collect()
 }
 
 impl Grid {

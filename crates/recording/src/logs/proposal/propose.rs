@@ -376,16 +376,3 @@ fn decide_gauge(proposal: &mut Proposal, layout: &Layout, survey: &Survey, units
     });
     proposal.ambient = Some(ambient.unwrap_or(Ambient::Assumed));
 }
-
-/// A number with three to five significant digits, for messages.
-pub(crate) fn short(value: f64) -> String {
-    match value.abs() {
-        _ if !value.is_finite() => "-".to_owned(),
-        0.0 => "0".to_owned(),
-        size if size >= 1e4 => format!("{value:.0}"),
-        size if size >= 100.0 => format!("{value:.1}"),
-        size if size >= 1.0 => format!("{value:.2}"),
-        size if size >= 1e-3 => format!("{value:.4}"),
-        _ => format!("{value:.2e}"),
-    }
-}

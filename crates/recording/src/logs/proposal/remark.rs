@@ -1,6 +1,5 @@
 //! Reasons for the certainty of a proposed channel, and results of the checks between channels.
 
-use super::propose::short;
 use mapper_core::{Channel, coded_enum};
 use std::fmt;
 
@@ -180,5 +179,18 @@ impl ProposalRemark {
             Remark::Other { message, .. } if !message.is_empty() => f.write_str(message),
             other => f.write_str(other.code()),
         }
+    }
+}
+
+/// A number with three to five significant digits, for messages.
+pub(crate) fn short(value: f64) -> String {
+    match value.abs() {
+        _ if !value.is_finite() => "-".to_owned(),
+        0.0 => "0".to_owned(),
+        size if size >= 1e4 => format!("{value:.0}"),
+        size if size >= 100.0 => format!("{value:.1}"),
+        size if size >= 1.0 => format!("{value:.2}"),
+        size if size >= 1e-3 => format!("{value:.4}"),
+        _ => format!("{value:.2e}"),
     }
 }

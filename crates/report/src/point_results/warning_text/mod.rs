@@ -35,7 +35,7 @@ pub(crate) fn sentence_of(warning: &Warning) -> Sentence {
     })
 }
 
-/// A JSON value in which each warning, each doubt and each remark of a plan or of results has its sentence as `message`, for people.
+/// A JSON value in which each warning, each doubt and each remark has its sentence as `message`, for people.
 pub fn with_messages(mut value: Value) -> Value {
     add_messages(&mut value);
     value

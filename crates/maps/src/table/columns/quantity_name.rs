@@ -41,12 +41,12 @@ pub(crate) fn quantity_of_name(
         return by_unit;
     }
     // `N/√θ` and `W√θ/δ` are corrected.
-    if plain.contains('θ') || plain.contains("theta") {
+    if has_root(plain) && (plain.contains('θ') || plain.contains("theta")) {
         let is_flow = plain.contains('δ') || plain.contains("delta");
         return Some(if is_flow { Quantity::Flow } else { Quantity::Speed });
     }
     // `P1t` is a total pressure; in logs it is the turbine's.
-    let is_total = plain.len() <= 4 && plain.starts_with(['p', 't']) && plain.ends_with(|c: char| c == 't');
+    let is_total = plain.len() <= 4 && plain.starts_with(['p', 't']) && plain.ends_with('t');
     let short = plain.trim_end_matches('t');
     let read = ColumnName::read(if is_total && short.ends_with(|c: char| c.is_ascii_digit()) {
         short

@@ -13,6 +13,7 @@ mod coded_enum;
 mod identification;
 mod maps;
 mod measurement;
+mod names;
 mod rig;
 mod schema;
 pub mod test_plan;
@@ -67,6 +68,10 @@ pub use measurement::recording::{ReadingOrigin, Recording, RecordingError, Serie
 pub use measurement::redundant::{DeclaredElement, Element, MAX_ELEMENTS, RedundantSensors, UnknownElement};
 pub use measurement::sample::{ChannelColumn, ElementColumn, Provenance, Quality, SampleBatch, TruthColumn};
 pub use measurement::step_marker::StepMarker;
+pub use names::column_name::{Clarity, ColumnName, Place};
+pub use names::measured::Measured;
+pub use names::missing::is_missing_mark;
+pub use names::words::Word;
 pub use rig::backend::{
     Backend, BackendCause, BackendError, RigDescription, RigMode, SetpointRange, SetpointRanges, Setpoints,
 };
@@ -91,4 +96,5 @@ pub use test_plan::visit_order::VisitOrder;
 pub use text::one_line::one_line;
 pub use text::probability_text::probability_text;
 pub use text::terminal_text::terminal_text;
+pub use text::text_encoding::TextEncoding;
 pub use text::with_unit::{readable, temperature, with_unit};

@@ -12,7 +12,7 @@ use std::fmt::Write;
 pub(crate) const FORMAT: MapFormat = MapFormat {
     name: "sae",
     extension: "txt",
-    further_extensions: &["map", "sae", "dat"],
+    further_extensions: &["map", "sae", "dat", "cmp", "tsv", "prn"],
     description: "SAE text: corrected rpm, corrected kg/s, pressure ratio, efficiency, from choke to surge",
     write: Some(write),
     draw: None,

@@ -121,17 +121,19 @@ fn what_is_written_is_read_to_the_digit() {
         ];
         points.push(TurbineMapPoint { efficiency: None, expansion_ratio: 2.1, ..points[1] });
         let map = TurbineMap { machine: "a & b".to_owned(), points, fitted: None };
-        for name in ["csv", "sae"] {
-            let format = FORMATS.find(name).unwrap();
-            let bytes = format.write_turbine(&map).unwrap();
+        let both =
+            FORMATS.iter().filter(|format| format.turbine.write.is_some() && format.turbine.read.is_some());
+        let mut count = 0;
+        for format in both {
+            let name = format.name;
+            // Formats of the fit alone refuse a map without one.
+            let Ok(bytes) = format.write_turbine(&map) else { continue };
             let back = format.read_turbine(&bytes, None).unwrap_or_else(|error| panic!("{name}: {error}"));
             assert_eq!(back.map, map, "{name}");
             assert!(matches!(format.read(&bytes, None), Err(ImportError::Turbine { .. })), "{name}");
+            count += 1;
         }
-        let json = FORMATS.find("json").unwrap();
-        let bytes = json.write_turbine(&map).unwrap();
-        assert_near(&json.read_turbine(&bytes, None).unwrap().map.points[..2], &map.points[..2]);
-        assert!(matches!(json.read(&bytes, None), Err(ImportError::Turbine { .. })));
+        assert!(count >= 3);
         assert!(FORMATS.find("modelica").unwrap().write_turbine(&map).is_err(), "it needs a fit");
     }
 }

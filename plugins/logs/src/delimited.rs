@@ -1,13 +1,12 @@
 //! CSV and similar formats: cells with a separator between them.
 
 use crate::columns::sample::HEAD_ROWS;
-use crate::notation::encoding;
 use crate::notation::separator::{SEPARATORS, decimal, score, typical_length};
 use crate::notation::table_row::Rows;
 use crate::tables::long_table::{LongForm, LongRows};
 use crate::tables::row_stream::{Dialect, RowStream};
 use crate::tables::table_log::{Origin, Table};
-use mapper_recording::logs::{Encoding, Layout, Log, LogError, LogFile, LogFormat, LogOptions, RowSink};
+use mapper_recording::logs::{Layout, Log, LogError, LogFile, LogFormat, LogOptions, RowSink, TextEncoding};
 use std::io::Cursor;
 use std::ops::Range;
 
@@ -20,11 +19,10 @@ const HEAD_BYTES: usize = 1 << 18;
 
 /// Text of more than one word.
 fn recognises(head: &[u8]) -> bool {
-    let (encoding, _) = encoding::guess(head);
-    let utf16 = matches!(encoding, Encoding::Utf16Le | Encoding::Utf16Be);
+    let (encoding, _) = TextEncoding::guess(head);
     let control =
         head.iter().filter(|byte| **byte < 0x20 && !matches!(byte, b'\t' | b'\n' | b'\r' | 0x0C)).count();
-    utf16
+    encoding.is_utf16()
         || !head.is_empty()
             && control == 0
             && head.iter().any(|byte| SEPARATORS.contains(byte) || *byte == b'\n')
@@ -41,7 +39,7 @@ struct Delimited {
 fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
     options.refuse_keys(&["sheet"]).map_err(|why| file.content_error(NAME, why))?;
     let head = file.head(HEAD_BYTES)?;
-    let (found, mark) = encoding::guess(&head);
+    let (found, mark) = TextEncoding::guess(&head);
     let encoding = options.encoding.unwrap_or(found);
     let whole = head.len() < HEAD_BYTES;
     let rows_by = |separator: u8| -> Result<Vec<Vec<String>>, LogError> {
@@ -125,11 +123,7 @@ fn describe_dialect(dialect: Dialect, decimal_seen: bool) -> String {
         b' ' => "blanks".to_owned(),
         other => format!("`{}`", char::from(other)),
     };
-    let encoding = match dialect.encoding {
-        Encoding::Utf8 => "UTF-8",
-        Encoding::Latin1 => "Latin-1",
-        Encoding::Utf16Le | Encoding::Utf16Be => "UTF-16",
-    };
+    let encoding = dialect.encoding.name();
     let decimal = if decimal_seen { "" } else { ", assumed" };
     let sign = char::from(dialect.decimal);
     format!(

@@ -286,6 +286,38 @@ fn conventions() -> Vec<Vec<(&'static str, Holds)>> {
             ("CAC out T", cooled_t),
         ],
         vec![
+            ("压气机进口压力", a(P1)),
+            ("压气机进口温度", a(T1)),
+            ("压气机出口压力", a(P2)),
+            ("压气机出口温度", a(T2)),
+            ("涡轮前压力", a(P3)),
+            ("涡轮前温度", a(T3)),
+            ("增压器转速", a(ShaftSpeed)),
+            ("空气流量", a(CompressorFlow)),
+            ("发动机转速", Holds::Other(Kind::Speed, 900.0, 3700.0)),
+            ("中冷后温度", cooled_t),
+        ],
+        vec![
+            ("Давление перед компрессором", a(P1)),
+            ("Температура на входе в компрессор", a(T1)),
+            ("Давление за компрессором", a(P2)),
+            ("Температура на выходе из компрессора", a(T2)),
+            ("Давление перед турбиной", a(P3)),
+            ("Температура перед турбиной", a(T3)),
+            ("Частота вращения ротора", a(ShaftSpeed)),
+            ("Расход воздуха", a(CompressorFlow)),
+            ("Расход топлива", Holds::Other(Kind::Flow, 0.0005, 0.006)),
+        ],
+        vec![
+            ("PT-101", a(P1)),
+            ("TT-101", a(T1)),
+            ("PT-102", a(P2)),
+            ("TT-102", a(T2)),
+            ("TE-3", a(T3)),
+            ("SE-1", a(ShaftSpeed)),
+            ("FT-3", a(CompressorFlow)),
+        ],
+        vec![
             ("Pressure", a(P1)),
             ("Temp", a(T1)),
             ("Pressure.1", a(P2)),
@@ -297,7 +329,7 @@ fn conventions() -> Vec<Vec<(&'static str, Holds)>> {
 }
 
 /// Other columns of logs, which are not channels.
-const DECOYS: [(&str, Holds); 16] = [
+const DECOYS: [(&str, Holds); 20] = [
     ("T2 set", temperature(300.0, 400.0)),
     ("P2_soll", pressure(105e3, 230e3)),
     ("n_corr", Holds::Other(Kind::Speed, 21e3, 117e3)),
@@ -314,6 +346,10 @@ const DECOYS: [(&str, Holds); 16] = [
     ("p_crankcase", pressure(100e3, 101e3)),
     ("T2 isentropic", temperature(300.0, 390.0)),
     ("Intake Manifold Pressure", pressure(102e3, 228e3)),
+    ("T2-T1", temperature(290.0, 380.0)),
+    ("T2 limit", temperature(410.0, 411.0)),
+    ("P2 alarm", pressure(240e3, 241e3)),
+    ("Pressure drop compressor inlet filter", pressure(98e3, 99e3)),
 ];
 
 /// Repeats a small sequence of numbers: the same headers in every run.

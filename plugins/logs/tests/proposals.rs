@@ -3,7 +3,7 @@
 
 use mapper_core::Channel;
 use mapper_log_formats::LOG_FORMATS;
-use mapper_recording::logs::proposal::{Certainty, NominalFlows, Proposal, propose};
+use mapper_recording::logs::proposal::{Certainty, NominalFlows, Proposal, ProposalRemark, propose};
 use mapper_recording::logs::{LogFile, LogOptions, survey};
 use std::path::Path;
 
@@ -173,5 +173,52 @@ fn imperial_logs_have_imperial_temperatures() {
     for channel in [Channel::T1, Channel::T2] {
         let proposed = found.entry(channel).unwrap();
         assert_eq!((proposed.unit, proposed.certainty), (Some("degF"), Certainty::Likely), "{channel}");
+    }
+}
+
+/// A tag number has the quantity and no place: speed and flow are likely, the others are named with the remedy.
+#[test]
+fn tag_numbers_are_never_sure() {
+    let row = |load: f64| {
+        vec![20e3 + 90e3 * load, 0.02 + 0.13 * load, 98.0, 22.0, 98.0 + 130.0 * load, 22.0 + 110.0 * load]
+    };
+    for names in [
+        "SE-101 [rpm],FT-3 [kg/s],PT-101 [kPa],TT-101 [degC],PT-102 [kPa],TT-102 [degC]",
+        "ST_2101 [rpm],FIT 2101 [kg/s],PIT_2101A [kPa],TE_2101 [degC],PIT_2102A [kPa],TE_2102 [degC]",
+    ] {
+        let found = proposal(names, row);
+        let likely = |channel: Channel| found.entry(channel).map(|found| (found.column, found.certainty));
+        assert_eq!(likely(Channel::ShaftSpeed), Some((0, Certainty::Likely)), "{names}");
+        assert_eq!(likely(Channel::CompressorFlow), Some((1, Certainty::Likely)), "{names}");
+        assert_eq!(found.channels.len(), 2, "{names}");
+        let named = |remark: &ProposalRemark| matches!(remark, ProposalRemark::TagNumbers { columns } if columns.len() == 4);
+        assert!(found.remarks.iter().any(named), "{names}");
+    }
+    // A total pressure and temperature with their usual numbers are not tags.
+    let found = proposal("PT1 [kPa],PT2 [kPa],TT1 [degC],TT2 [degC]", |load| row(load)[2..].to_vec());
+    assert_eq!(found.remarks.iter().filter(|remark| remark.code() == "tag_numbers").count(), 0);
+}
+
+/// Chinese names, as spreadsheets in China write them: in the encoding GBK.
+#[test]
+fn chinese_names_are_read_in_their_encoding() {
+    let mut text =
+        "时间(s),转速(r/min),流量(kg/h),进口压力(kPa),进口温度(℃),出口压力(kPa),出口温度(℃)\n".to_owned();
+    for second in 0..120 {
+        let load = f64::from(second) / 119.0;
+        let (speed, flow) = (20e3 + 90e3 * load, 80.0 + 460.0 * load);
+        text += &format!("{second},{speed},{flow},98,22,{},{}\n", 98.0 + 130.0 * load, 22.0 + 110.0 * load);
+    }
+    let (bytes, _, _) = encoding_rs::GBK.encode(&text);
+    for bytes in [text.as_bytes(), &bytes] {
+        let file = LogFile::from_bytes(Path::new("log"), bytes);
+        let (_, mut log) = LOG_FORMATS.open(&file, &LogOptions::default()).unwrap();
+        let found = survey(log.as_mut()).unwrap();
+        let found = propose(log.layout(), &found, None);
+        let channels: Vec<Channel> = found.channels.iter().map(|proposed| proposed.channel).collect();
+        use Channel::{CompressorFlow, P1, P2, ShaftSpeed, T1, T2};
+        assert_eq!(channels, [ShaftSpeed, CompressorFlow, P1, T1, P2, T2]);
+        // The others name no machine.
+        assert!(sure(&found).iter().all(|channel| *channel == ShaftSpeed), "{:?}", sure(&found));
     }
 }

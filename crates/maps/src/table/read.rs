@@ -11,6 +11,7 @@ use crate::table::reference;
 use crate::table::rows_to_lines::{Row, map_of_rows};
 use crate::table::sheet::grid::{Grid, text_of};
 use crate::table::sheet::layout::{self, Layout};
+use crate::table::sheet::matrices::points_of_matrices;
 use crate::table::sheet::points::{Point, columns, efficiency_in_percent, points};
 use crate::table::sheet::workbook::grid_of_workbook;
 use mapper_core::{
@@ -86,6 +87,8 @@ pub(super) struct Notes {
 
 fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedMap, ImportError> {
     let given = DescribedColumns::of(description, Machine::Compressor)?;
+    let of_matrices = points_of_matrices(grid);
+    let grid = of_matrices.as_ref().unwrap_or(grid);
     let (grid, layout) = layout::detect_layout(grid, &given)?;
     let grid = grid.as_ref();
     if layout.is_turbine_alone() {

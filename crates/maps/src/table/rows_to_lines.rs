@@ -57,7 +57,7 @@ impl Row {
                 "efficiency",
                 self.eta.unwrap_or(0.5),
                 self.eta.is_none_or(|eta| (-5.0..=1.5).contains(&eta)),
-                "a fraction (0.72), not a percentage",
+                "a fraction (0.72), not a percentage; leave the cell of a missing value empty",
             ),
         ] {
             if !(value.is_finite() && good) {

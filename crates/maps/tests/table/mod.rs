@@ -1,4 +1,5 @@
 //! Integration tests of the module `table`.
 
+mod matrices;
 mod wide;
 mod workbooks;

@@ -6,7 +6,7 @@ use mapper_core::{MapDescription, ReferenceState};
 use mapper_maps::table::read_any_text;
 
 /// Speed, flow, pressure ratio and efficiency of every point.
-fn points(text: &str) -> Vec<[Option<f64>; 4]> {
+pub fn points(text: &str) -> Vec<[Option<f64>; 4]> {
     let given = MapDescription { reference: Some(ReferenceState::SAE), ..MapDescription::default() };
     let map = read_any_text(text, &given).unwrap_or_else(|error| panic!("{error}\n{text}")).map;
     let of_line = |line: &mapper_core::SpeedLine| {
@@ -18,7 +18,7 @@ fn points(text: &str) -> Vec<[Option<f64>; 4]> {
     map.lines.iter().flat_map(of_line).collect()
 }
 
-const FOUR: [[f64; 4]; 4] =
+pub const FOUR: [[f64; 4]; 4] =
     [[6e4, 0.05, 1.4, 0.7], [6e4, 0.06, 1.3, 0.68], [9e4, 0.06, 1.9, 0.72], [9e4, 0.07, 1.8, 0.71]];
 
 #[test]
@@ -53,4 +53,33 @@ fn a_matrix_has_the_quantity_of_its_title() {
     let given = MapDescription { reference: Some(ReferenceState::SAE), ..MapDescription::default() };
     let untitled = text.split_once('\n').unwrap().1;
     assert!(read_any_text(untitled, &given).is_err(), "it may be of efficiencies");
+}
+
+/// Four points as spreadsheets, reports and data systems of several countries have them.
+#[test]
+fn tables_as_they_are_exported() {
+    let expected: Vec<[Option<f64>; 4]> = FOUR.iter().map(|row| row.map(Some)).collect();
+    for text in [
+        // In Chinese, Russian and Japanese.
+        "压气机特性图\n转速(r/min),流量(kg/s),压比,效率\n60000,0.05,1.4,0.7\n60000,0.06,1.3,0.68\n90000,0.06,1.9,0.72\n90000,0.07,1.8,0.71\n",
+        "Частота вращения, об/мин;Расход воздуха, кг/с;Степень повышения давления;КПД\n60000;0,05;1,4;0,7\n60000;0,06;1,3;0,68\n90000;0,06;1,9;0,72\n90000;0,07;1,8;0,71\n",
+        "回転数 [rpm]\t空気流量 [kg/s]\t圧力比\t効率\n60000\t0.05\t1.4\t0.7\n60000\t0.06\t1.3\t0.68\n90000\t0.06\t1.9\t0.72\n90000\t0.07\t1.8\t0.71\n",
+        // Measured and corrected, static and total, of engine and turbine.
+        "MP,N [rpm],N_corr [rpm],Engine speed [rpm],m [kg/s],m_corr [kg/s],PR_ts,PR_tt,Turbine eff,eta_ts,eta_tt\n\
+         1,58000,60000,1500,0.04,0.05,1.3,1.4,0.5,0.6,0.7\n2,58000,60000,1500,0.05,0.06,1.2,1.3,0.5,0.6,0.68\n\
+         3,88000,90000,1500,0.05,0.06,1.8,1.9,0.5,0.6,0.72\n4,88000,90000,1500,0.06,0.07,1.7,1.8,0.5,0.6,0.71\n",
+        // With a mean and the author below, and with an overload outside the map's quantities.
+        "Speed,Flow,PR,Eff,T oil\n60000,0.05,1.4,0.7,OL\n60000,0.06,1.3,0.68,90\n90000,0.06,1.9,0.72,#DIV/0!\n90000,0.07,1.8,0.71,91\n\n\
+         Mean,,,0.7,\nMade by A. Smith on 3/4/2025\n",
+        "Régime (tr/min);Débit (kg/s);Rapport de pression;Rendement\n60\u{202f}000;0,05;1,4;0,7\n60 000;0,06;1,3;0,68\n90 000;0,06;1,9;0,72\n\
+         90\u{a0}000;0,07;1,8;0,71\n",
+        // Of a text document.
+        "| speed rpm | flow kg/s | PR | eta |\n|---|---|---|---|\n| 60000 | 0.05 | 1.4 | 0.7 |\n| 60000 | 0.06 | 1.3 | 0.68 |\n\
+         | 90000 | 0.06 | 1.9 | 0.72 |\n| 90000 | 0.07 | 1.8 | 0.71 |\n",
+        "N/√θ [rpm],W√θ/δ [kg/s],P2/P1,η\n60000,0.05,1.4,0.7\n60000,0.06,1.3,0.68\n90000,0.06,1.9,0.72\n90000,0.07,1.8,0.71\n",
+        "Speed 60,000 RPM\nCorrected Air Flow (kg/s)   Pressure Ratio (P2c/P1c)   Efficiency\n0.05   1.4   0.7\n0.06   1.3   0.68\n\
+         Speed 90,000 RPM\nCorrected Air Flow (kg/s)   Pressure Ratio (P2c/P1c)   Efficiency\n0.06   1.9   0.72\n0.07   1.8   0.71\n",
+    ] {
+        assert_eq!(points(text), expected, "{text}");
+    }
 }

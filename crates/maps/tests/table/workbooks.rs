@@ -7,9 +7,9 @@ use mapper_maps::table::{file_text, read_any_text, read_workbook};
 use std::io::{Cursor, Write};
 
 /// Name, state (`visible`, `hidden`) and rows of a sheet.
-type Sheet<'a> = (&'a str, &'a str, &'a [&'a [&'a str]]);
+pub type Sheet<'a> = (&'a str, &'a str, &'a [&'a [&'a str]]);
 
-fn workbook(sheets: &[Sheet<'_>]) -> Vec<u8> {
+pub fn workbook(sheets: &[Sheet<'_>]) -> Vec<u8> {
     let mut zip = zip::ZipWriter::new(Cursor::new(Vec::new()));
     let mut part = |name: &str, text: &str| {
         zip.start_file(name, zip::write::SimpleFileOptions::default()).unwrap();

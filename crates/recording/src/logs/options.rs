@@ -1,19 +1,7 @@
 //! The user's options for a log, for properties that automatic detection gets wrong.
 
+use mapper_core::TextEncoding;
 use mapper_yaml::units::{Kind, parse};
-
-/// Character encoding of a text file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Encoding {
-    /// UTF-8, with or without a byte order mark.
-    Utf8,
-    /// Windows-1252, of which Latin-1 is a part.
-    Latin1,
-    /// UTF-16, low byte first.
-    Utf16Le,
-    /// UTF-16, high byte first.
-    Utf16Be,
-}
 
 /// The order of the parts of a date.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,7 +22,7 @@ pub struct LogOptions {
     /// Decimal sign: `.` or `,`.
     pub decimal: Option<char>,
     /// Character encoding.
-    pub encoding: Option<Encoding>,
+    pub encoding: Option<TextEncoding>,
     /// Row of the names, from 1; empty rows do not count.
     pub names_row: Option<usize>,
     /// Row of the units, from 1; 0 if there is none.
@@ -113,7 +101,7 @@ pub const OPTION_KEYS: [OptionKey; 12] = [
         name: "encoding",
         description: "How letters are stored: utf-8, latin-1, utf-16le or utf-16be.",
         example: "latin-1",
-        set: |options, text| set(&mut options.encoding, encoding(text)),
+        set: |options, text| set(&mut options.encoding, TextEncoding::of_name(text)),
     },
     OptionKey {
         name: "names_row",
@@ -196,16 +184,6 @@ fn separator(text: &str) -> Option<char> {
         "tab" | "\\t" => Some('\t'),
         "blank" => Some(' '),
         text => one_char(text).filter(char::is_ascii),
-    }
-}
-
-fn encoding(text: &str) -> Option<Encoding> {
-    match text.to_ascii_lowercase().as_str() {
-        "utf-8" | "utf8" => Some(Encoding::Utf8),
-        "latin-1" | "latin1" | "iso-8859-1" | "windows-1252" | "cp1252" => Some(Encoding::Latin1),
-        "utf-16le" | "utf-16" => Some(Encoding::Utf16Le),
-        "utf-16be" => Some(Encoding::Utf16Be),
-        _ => None,
     }
 }
 

@@ -109,7 +109,7 @@ fn proposal_text(layout: &Layout, proposal: &Proposal) -> String {
     let _ = writeln!(text, "  not sure, kept as comments: {}", list(by(Certainty::Unsure)));
     for proposed in proposal.channels.iter().filter(|proposed| !proposed.remarks.is_empty()) {
         let name = layout.columns.get(proposed.column).map_or("", |column| column.name.as_str());
-        let _ = writeln!(text, "  {} (`{name}`): {}", proposed.channel, proposed.remarks.join("; "));
+        let _ = writeln!(text, "  {} (`{name}`): {}", proposed.channel, proposed.remarks_text());
     }
     let gauge: Vec<&str> = proposal
         .channels

@@ -42,7 +42,7 @@ pub fn imported_turbine_text(found: &ImportedTurbine) -> String {
 
 /// A row for each point, with 95 % intervals.
 pub fn reduced_turbine_text(points: &[ReducedTurbinePoint], remarks: &[String]) -> String {
-    let heads = ["vanes", "rpm/K^0.5", "expansion ratio", "flow", "+/- %", "efficiency %", "+/- points"];
+    let heads = ["vanes", "rpm/K^0.5", "expansion ratio", "flow", "+/- %", "apparent eff. %", "+/- points"];
     let mut rows = table::with_heads(&heads);
     for ReducedTurbinePoint { point, flow_standard_error, efficiency_standard_error } in points {
         let flow = point.flow_parameter_kg_sqrt_k_s_kpa;
@@ -57,7 +57,8 @@ pub fn reduced_turbine_text(points: &[ReducedTurbinePoint], remarks: &[String]) 
         ]);
     }
     let mut text = format!(
-        "{rows}\n\nFlow in kg K^0.5/(s kPa). The efficiency is that of T3 and T4, heat loss included.\n"
+        "{rows}\n\nFlow in kg K^0.5/(s kPa). The efficiency is apparent: it is that of T3 and T4, and heat loss between them counts as work, \
+         so it is above the adiabatic one.\n"
     );
     for remark in remarks {
         let _ = writeln!(text, "{remark}");

@@ -195,8 +195,7 @@ impl Registry {
         }
         let points = reduce_turbine(&found.measured, &config.declared);
         let mut text = reduced_turbine_text(&points, &remarks);
-        let json =
-            json!({"points": path, "turbine": points, "remarks": remarks, "file": out.map(|out| out.path)});
+        let json = json!({"points": path, "turbine": points, "efficiency": "apparent", "remarks": remarks, "file": out.map(|out| out.path)});
         if let Some((out, format)) = out.zip(format) {
             write_turbine_fitted_if_needed(path, out, format, TurbineMap { machine: name, ..found.map })?;
             text.push_str(&format!("map        {}\n", out.path.display()));

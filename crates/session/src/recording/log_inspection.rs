@@ -3,6 +3,7 @@
 use crate::{Registry, SessionError};
 use mapper_recording::logs::proposal::{NominalFlows, Proposal, channel_map_text, propose};
 use mapper_recording::logs::{Layout, LogFile, LogOptions, Survey, survey};
+use mapper_report::with_messages;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -83,7 +84,7 @@ impl LogInspection {
                 value
             }).collect::<Vec<_>>(),
             "columns": columns.collect::<Vec<_>>(),
-            "proposal": self.proposal,
+            "proposal": with_messages(json!(self.proposal)),
             "channel_map": self.channel_map(),
         })
     }

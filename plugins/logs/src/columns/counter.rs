@@ -7,7 +7,7 @@ use mapper_recording::logs::{Kind, header_unit};
 
 /// Whether a column of numbers is labelled as a clock: by its name, unless its unit contradicts, or by its unit.
 pub(crate) fn is_clock_name(column: &HeadColumn) -> bool {
-    const NAMES: [&str; 32] = [
+    const NAMES: [&str; 40] = [
         "t",
         "ts",
         "time",
@@ -40,6 +40,14 @@ pub(crate) fn is_clock_name(column: &HeadColumn) -> bool {
         "datum",
         "datenum",
         "fecha",
+        "tempo",
+        "tijd",
+        "tid",
+        "czas",
+        "время",
+        "时间",
+        "日期时间",
+        "時間",
     ];
     let unit = column.unit.as_deref().and_then(header_unit);
     let duration = unit.is_some_and(|unit| unit.kind == Kind::Duration);

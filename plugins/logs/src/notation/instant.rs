@@ -41,6 +41,11 @@ pub(crate) fn parse_instant(text: &str, order: DateOrder) -> Option<Instant> {
     if text.len() > MAX_TEXT_BYTES {
         return None;
     }
+    // `2025年11月18日 09:30:00`
+    if let Some((first, rest)) = text.split_once('日').filter(|_| text.contains('年')) {
+        let text = format!("{} {}", first.replace(['年', '月'], "-"), rest.trim_start());
+        return parse_instant(&text, DateOrder::YearFirst);
+    }
     if let Some(instant) = named_month(text) {
         return Some(instant);
     }
@@ -302,6 +307,7 @@ mod tests {
             ("22.Nov.26 14:03:05.25", DateOrder::DayFirst),
             ("2026-326T14:03:05.25", DateOrder::DayFirst),
             ("2026:326:14:03:05.25", DateOrder::DayFirst),
+            ("2026年11月22日 14:03:05.25", DateOrder::DayFirst),
         ] {
             assert_eq!(parse_instant(text, order).map(Instant::ns), Some(expected), "{text}");
         }

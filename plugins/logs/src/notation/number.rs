@@ -1,6 +1,6 @@
 //! Numbers in the notations of logs.
 
-use mapper_recording::logs::header_unit;
+use mapper_recording::logs::{header_unit, is_missing_mark};
 
 /// Maximum length of a number's text, bytes.
 const MAX_NUMBER_BYTES: usize = 48;
@@ -124,12 +124,7 @@ fn starts_as_thousands(text: &[u8]) -> bool {
 
 /// Whether a cell marks a missing value.
 pub(crate) fn is_missing(cell: &[u8]) -> bool {
-    let cell = cell.trim_ascii();
-    let words: [&[u8]; 14] = [
-        b"", b"-", b"--", b"---", b"nan", b"na", b"n/a", b"#n/a", b"#nv", b"null", b"none", b"inf", b"-inf",
-        b"1.#qnan",
-    ];
-    words.iter().any(|word| cell.eq_ignore_ascii_case(word))
+    std::str::from_utf8(cell).is_ok_and(is_missing_mark)
 }
 
 #[cfg(test)]

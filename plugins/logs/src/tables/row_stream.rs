@@ -1,10 +1,10 @@
 //! Reads the lines of a delimited file one after the other.
 
-use crate::notation::encoding::{self, Utf16Reader};
+use crate::notation::encoding::DecodingReader;
 use crate::notation::instant::{Instant, parse_instant};
 use crate::notation::number::{number_in, parse_number};
 use crate::notation::table_row::{Cells, Rows};
-use mapper_recording::logs::{DateOrder, Encoding, LogError, LogFile};
+use mapper_recording::logs::{DateOrder, LogError, LogFile, TextEncoding};
 use std::cell::Cell;
 use std::io::{self, Read};
 use std::ops::Range;
@@ -16,7 +16,7 @@ const MAX_LINE_BYTES: usize = 1 << 20;
 /// Notation of a delimited file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Dialect {
-    pub(crate) encoding: Encoding,
+    pub(crate) encoding: TextEncoding,
     /// Bytes of the byte order mark.
     pub(crate) mark: usize,
     pub(crate) separator: u8,
@@ -62,10 +62,9 @@ impl RowStream {
         let mark = u64::try_from(dialect.mark).unwrap_or(0);
         // An error in the mark appears at the first line.
         drop(io::copy(&mut bytes.by_ref().take(mark), &mut io::sink()));
-        let text: Box<dyn Read> = match dialect.encoding {
-            Encoding::Utf16Le => Box::new(Utf16Reader::new(bytes, false)),
-            Encoding::Utf16Be => Box::new(Utf16Reader::new(bytes, true)),
-            Encoding::Utf8 | Encoding::Latin1 => bytes,
+        let text: Box<dyn Read> = match dialect.encoding.is_utf8() {
+            true => bytes,
+            false => Box::new(DecodingReader::new(bytes, dialect.encoding.decoder())),
         };
         let limited: Box<dyn Read> = Box::new(LineLimiter { inner: text, left: left.clone() });
         let reader = csv::ReaderBuilder::new()
@@ -105,9 +104,7 @@ impl RowStream {
     /// The cells of the row as text.
     pub(crate) fn texts(&self) -> Vec<String> {
         let count = if self.dialect.separator == b' ' { self.filled.len() } else { self.record.len() };
-        (0..count)
-            .map(|column| encoding::text(self.cell(column), self.dialect.encoding).trim().to_owned())
-            .collect()
+        (0..count).map(|column| String::from_utf8_lossy(self.cell(column)).trim().to_owned()).collect()
     }
 }
 
@@ -117,16 +114,11 @@ impl Cells for RowStream {
     }
 
     fn number_in(&self, column: usize, unit: &str) -> f64 {
-        let text = encoding::text(self.cell(column), self.dialect.encoding);
-        number_in(&text, self.dialect.decimal, unit)
+        number_in(&String::from_utf8_lossy(self.cell(column)), self.dialect.decimal, unit)
     }
 
     fn instant(&self, column: usize, order: DateOrder) -> Option<Instant> {
-        match std::str::from_utf8(self.cell(column)) {
-            Ok(text) => parse_instant(text, order),
-            // Names of months may be in Latin-1.
-            Err(_) => parse_instant(&encoding::text(self.cell(column), self.dialect.encoding), order),
-        }
+        parse_instant(&String::from_utf8_lossy(self.cell(column)), order)
     }
 }
 

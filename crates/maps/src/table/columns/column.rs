@@ -1,8 +1,8 @@
 //! Quantity and unit of a table column, from its heading.
 
 use crate::table::columns::quantity::Quantity;
-use crate::table::columns::quantity_name::{is_turbine, quantity_of_name, quantity_of_turbine};
-use mapper_core::ReferenceState;
+use crate::table::columns::quantity_name::{is_turbine, quantity_of_name};
+use mapper_core::{ColumnName, Measured, ReferenceState, Word};
 use mapper_physics::gas::air::GAS_CONSTANT_J_KGK;
 use mapper_yaml::units::{Kind, Reference, Unit, header_unit, split_unit, volume_flow_m3_s};
 
@@ -91,6 +91,16 @@ impl Column {
         !self.unit.to_lowercase().contains("kg")
     }
 
+    /// Whether the heading names a static quantity.
+    pub(crate) fn is_static(&self) -> bool {
+        ColumnName::read(&parts(&self.heading).0).has(Word::Static)
+    }
+
+    /// Whether the heading names a corrected quantity.
+    pub(crate) fn is_corrected(&self) -> bool {
+        ColumnName::read(&parts(&self.heading).0).has(Word::Corrected)
+    }
+
     /// Whether the heading names a unit.
     pub(crate) fn has_unit(&self) -> bool {
         !self.unit.is_empty()
@@ -132,10 +142,7 @@ pub(crate) fn column(index: usize, heading: &str, machine: Machine) -> Result<Op
         return Ok(None);
     }
     let by_unit = unit.as_deref().and_then(quantity_of_unit);
-    let of_turbine = (machine == Machine::Turbine).then(|| quantity_of_turbine(&plain, by_unit)).flatten();
-    let Some(quantity) =
-        of_turbine.or_else(|| quantity_of_name(&plain, by_unit)).or(by_unit.filter(|_| plain.is_empty()))
-    else {
+    let Some(quantity) = quantity_of_name(&name, &plain, by_unit, machine == Machine::Turbine) else {
         return Ok(None);
     };
     Column::with_unit(index, quantity, heading, unit.as_deref()).map(Some)
@@ -213,6 +220,7 @@ fn is_ratio_kind(inside: &str) -> bool {
             | "t"
             | "s"
     ) || is_dimensionless(inside)
+        || ColumnName::read(inside).measured() == Some(Measured::PressureRatio)
 }
 
 pub(crate) fn is_unit(quantity: Quantity, text: &str) -> bool {

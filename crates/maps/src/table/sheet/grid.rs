@@ -1,6 +1,6 @@
 //! Cells of a table, from text of any encoding, separator and decimal sign, or from a sheet of a workbook.
 
-use mapper_core::ImportError;
+use mapper_core::{ImportError, TextEncoding, is_missing_mark};
 
 /// A row of cells.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,35 +41,28 @@ pub(crate) const MAX_CELLS: usize = 16_384;
 const MAX_LINE_BYTES: usize = 16 * MAX_CELLS;
 const SEPARATOR_LINES: usize = 10_000;
 
-/// Text in UTF-8, in UTF-16 with a byte order mark, or in Latin 1.
+/// Text in any encoding.
 ///
 /// # Errors
 /// [`ImportError::NotText`] if it has control characters, as other files have.
 pub fn text_of(bytes: &[u8]) -> Result<String, ImportError> {
-    let text = match bytes {
-        [0xff, 0xfe, rest @ ..] if rest.len() % 2 == 0 => utf16(rest, u16::from_le_bytes),
-        [0xfe, 0xff, rest @ ..] if rest.len() % 2 == 0 => utf16(rest, u16::from_be_bytes),
-        _ => match std::str::from_utf8(bytes) {
-            // Spreadsheet programs write a byte order mark.
-            Ok(text) => text.strip_prefix('\u{feff}').unwrap_or(text).to_owned(),
-            Err(_) => bytes.iter().map(|byte| char::from(*byte)).collect(),
-        },
-    };
+    let (encoding, mark) = TextEncoding::guess(bytes);
+    let text = encoding.decode(bytes.get(mark..).unwrap_or_default());
     match text.find(|c: char| c.is_control() && !matches!(c, '\n' | '\r' | '\t' | '\u{c}')) {
         Some(at) => Err(ImportError::NotText { line: 1 + text[..at].matches('\n').count() }),
         None => Ok(text),
     }
 }
 
-fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> String {
-    let units = bytes.as_chunks::<2>().0.iter().map(|pair| unit(*pair));
-    char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER)).collect()
-}
-
 impl Grid {
     /// The rows of a workbook.
     pub(crate) fn of_rows(rows: Vec<GridRow>) -> Grid {
         Grid { rows, decimal_comma: false, by_blanks: false, thousands: None }
+    }
+
+    /// Other rows with the same notation of numbers.
+    pub(crate) fn with_rows(&self, rows: Vec<GridRow>) -> Grid {
+        Grid { rows, by_blanks: false, ..*self }
     }
 
     /// The cells of a text.
@@ -90,7 +83,7 @@ impl Grid {
                 })
                 .count()
         };
-        let separators = ['\t', ';', ',', ' '];
+        let separators = ['\t', ';', '|', ',', ' '];
         let best = |count: &dyn Fn(char) -> usize| {
             let counts = separators.into_iter().map(|separator| (count(separator), separator));
             // The first of equals.
@@ -105,12 +98,23 @@ impl Grid {
             lines().take(SEPARATOR_LINES).filter(|(_, line)| is_point(line)).count()
         };
         let separator = best(&count).or_else(|| best(&with_text)).map_or(' ', |(_, separator)| separator);
+        // Of cells between blanks, headings with blanks of their own are apart by at least two.
+        let number_row = |line: &str| {
+            let cells = split(split_comment(line).0, ' ');
+            (count_numbers(&cells, true) >= 3).then_some(cells.len())
+        };
+        let width = lines().filter(|_| separator == ' ').find_map(|(_, line)| number_row(line));
         let mut rows = Vec::new();
         let mut decimal = [0, 0];
         for (at, line) in lines() {
             let (content, comment) = split_comment(line);
             for (text, is_comment) in [(content, false), (comment, true)] {
-                let cells = split(text, separator);
+                let mut cells = split(text, separator);
+                if width.is_some_and(|width| cells.len() > width) {
+                    let wide = text.trim().split("  ").map(str::trim).filter(|cell| !cell.is_empty());
+                    let wide: Vec<String> = wide.map(str::to_owned).collect();
+                    cells = if Some(wide.len()) == width { wide } else { cells };
+                }
                 if cells.iter().all(|cell| !cell.contains(char::is_alphanumeric)) {
                     continue;
                 }
@@ -188,7 +192,22 @@ fn split_comment(line: &str) -> (&str, &str) {
 /// Cells between separators. Between blanks, a unit in brackets belongs to the name before it.
 fn split(line: &str, separator: char) -> Vec<String> {
     if separator != ' ' {
-        let cell = |text: &str| text.trim().trim_matches('"').trim().to_owned();
+        let cell = |text: &str| {
+            let text = text.trim().trim_matches('"').trim();
+            // Blanks between thousands: `60 000`.
+            let grouped =
+                text.contains(char::is_whitespace) && text.starts_with(|c: char| c.is_ascii_digit());
+            let groups = || text.split(char::is_whitespace).skip(1);
+            let is_group = |group: &str| {
+                let digits = group.find(|c: char| !c.is_ascii_digit()).unwrap_or(group.len());
+                digits == 3 && group[digits..].chars().all(|c| c.is_ascii_digit() || ".,".contains(c))
+            };
+            if grouped && groups().all(is_group) {
+                text.split_whitespace().collect()
+            } else {
+                text.to_owned()
+            }
+        };
         let mut cells = vec![String::new()];
         let mut quoted = false;
         for c in line.chars() {
@@ -202,9 +221,12 @@ fn split(line: &str, separator: char) -> Vec<String> {
         return cells.iter().map(|text| cell(text)).collect();
     }
     let mut cells: Vec<String> = Vec::new();
-    for word in
-        line.split(|c: char| c.is_whitespace() || matches!(c, ',' | ';')).filter(|word| !word.is_empty())
-    {
+    // `Speed 60,000 RPM`: a comma between thousands must not be a separator.
+    let words = line.split_whitespace().flat_map(|word| match without_thousands(word, ',') {
+        Some(_) => vec![word],
+        None => word.split([',', ';']).collect(),
+    });
+    for word in words.filter(|word| !word.is_empty()) {
         // "0,14 1,105": a decimal comma must not be a separator.
         match cells.last_mut().filter(|_| word.starts_with(['[', '('])) {
             Some(name) => name.push_str(word),
@@ -225,7 +247,7 @@ fn count_numbers(cells: &[String], decimal_comma: bool) -> usize {
     let bare = |cell: &str| cell.trim_end_matches('%').trim_end().to_owned();
     let number =
         |cell: &str| plain_number(cell).or_else(|| decimal_comma.then(|| comma_number(cell)).flatten());
-    let filled: Vec<&String> = cells.iter().filter(|cell| !is_missing(cell)).collect();
+    let filled: Vec<&String> = cells.iter().filter(|cell| !is_missing_mark(cell)).collect();
     if filled.iter().all(|cell| number(&bare(cell)).is_some()) { filled.len() } else { 0 }
 }
 
@@ -250,12 +272,4 @@ fn without_thousands(text: &str, mark: char) -> Option<String> {
 fn comma_number(text: &str) -> Option<f64> {
     let comma = text.matches(',').count() == 1 && !text.contains('.');
     comma.then(|| plain_number(&text.replacen(',', ".", 1))).flatten()
-}
-
-/// Whether a cell marks a missing value.
-pub(crate) fn is_missing(cell: &str) -> bool {
-    matches!(
-        cell.to_ascii_lowercase().as_str(),
-        "" | "-" | "--" | "---" | "n/a" | "na" | "nan" | "null" | "none" | "#n/a" | "\u{2013}"
-    )
 }

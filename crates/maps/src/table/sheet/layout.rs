@@ -3,10 +3,10 @@
 use crate::table::columns::column::{Column, ColumnError, Machine, column};
 use crate::table::columns::described_columns::DescribedColumns;
 use crate::table::columns::quantity::Quantity;
-use crate::table::sheet::grid::{Grid, GridRow, is_missing};
+use crate::table::sheet::grid::{Grid, GridRow};
 use crate::table::sheet::speed_heading::{speed_in, without_speed};
 use crate::table::units_row::merge_units_row;
-use mapper_core::{ImportError, ImportRemark};
+use mapper_core::{ImportError, ImportRemark, is_missing_mark};
 use std::borrow::Cow;
 
 /// Columns of one block: all of a table, or those of one speed line if lines are side by side.
@@ -216,16 +216,23 @@ fn is_turbine_title(row: &GridRow) -> bool {
         && !text.contains("compressor")
 }
 
-/// The columns with recognised headings; the first of two with the same quantity.
+/// The columns with recognised headings. Of two with the same quantity a map needs the total or corrected one, a table of measured points
+/// the total or measured one; else the first counts.
 fn columns(given: &DescribedColumns, cells: &[String]) -> Result<Vec<Column>, ColumnError> {
-    let mut columns: Vec<Column> = Vec::new();
+    let mut all: Vec<Column> = Vec::new();
     for (index, cell) in
         cells.iter().enumerate().filter(|(_, cell)| cell.contains(char::is_alphabetic) || cell.contains('%'))
     {
-        if let Some(column) = given.column(index, cell)?
-            && columns.iter().all(|known| known.quantity != column.quantity)
-        {
-            columns.push(column);
+        all.extend(given.column(index, cell)?);
+    }
+    let is_map = all.iter().any(|column| column.quantity == Quantity::PressureRatio);
+    let rank = |column: &Column| (column.is_static(), column.is_corrected() != is_map);
+    let mut columns: Vec<Column> = Vec::new();
+    for column in all {
+        match columns.iter_mut().find(|known| known.quantity == column.quantity) {
+            Some(known) if rank(&column) < rank(known) => *known = column,
+            Some(_) => {}
+            None => columns.push(column),
         }
     }
     Ok(columns)
@@ -236,8 +243,10 @@ pub(crate) fn is_heading(given: &DescribedColumns, row: &GridRow) -> bool {
     let named = |cell: &&String| {
         cell.contains(char::is_alphabetic) && !matches!(column(0, cell, given.machine), Ok(None))
     };
-    // `Speed line 60000 rpm` is a title.
-    let has_number = row.cells.iter().any(|cell| cell.parse::<f64>().is_ok());
+    // `Speed line 60,000 rpm` is a title.
+    let is_number =
+        |cell: &String| cell.contains(|c: char| c.is_ascii_digit()) && !cell.contains(char::is_alphabetic);
+    let has_number = row.cells.iter().any(is_number);
     !has_number && row.cells.iter().filter(named).count() >= 2
 }
 
@@ -352,14 +361,7 @@ fn by_speed(grid: &Grid, given: &DescribedColumns, index: usize, headings: &[Str
             Some((name, own)) => (name, Some(own)),
             None => (heading.clone(), carried),
         };
-        let column = match given.column(place, &name).ok()? {
-            // Speeds alone are the headings of the quantity that a row above names.
-            None if name.is_empty() && speed_rpm.is_some() && names_pressure_ratio(grid, given, index) => {
-                given.with_unit(Column::bare(place, Quantity::PressureRatio)).ok()
-            }
-            known => known,
-        };
-        match (column, speed_rpm) {
+        match (given.column(place, &name).ok()?, speed_rpm) {
             (None, _) => {}
             (Some(column), None) => shared.push(column),
             (Some(column), Some(speed_rpm)) => {
@@ -383,13 +385,6 @@ fn by_speed(grid: &Grid, given: &DescribedColumns, index: usize, headings: &[Str
     (groups.len() > 1 && groups.iter().all(is_line)).then_some(groups)
 }
 
-fn names_pressure_ratio(grid: &Grid, given: &DescribedColumns, index: usize) -> bool {
-    let above = grid.rows.iter().take(index).rev().take(10);
-    above.flat_map(|row| &row.cells).any(|cell| {
-        matches!(given.column(0, cell), Ok(Some(column)) if column.quantity == Quantity::PressureRatio)
-    })
-}
-
 /// The speed in the title of a block, rpm: `N = 60000 rpm`, `60 krpm`, or a number alone.
 pub(crate) fn speed_of_title(
     grid: &Grid,
@@ -400,7 +395,7 @@ pub(crate) fn speed_of_title(
     if group.speed_column().is_some() || is_heading(given, row) || vane_of_title(grid, given, row).is_some() {
         return None;
     }
-    let filled: Vec<&String> = row.cells.iter().filter(|cell| !is_missing(cell)).collect();
+    let filled: Vec<&String> = row.cells.iter().filter(|cell| !is_missing_mark(cell)).collect();
     let numbers = filled.iter().filter(|cell| grid.number(cell).is_some()).count();
     (numbers <= 1 && filled.len() <= 4).then(|| speed_in(grid, &row.text())).flatten()
 }

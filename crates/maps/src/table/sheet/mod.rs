@@ -3,6 +3,7 @@
 pub(crate) mod file_text;
 pub(crate) mod grid;
 pub(crate) mod layout;
+pub(crate) mod matrices;
 pub(crate) mod points;
 pub(crate) mod speed_heading;
 pub(crate) mod workbook;

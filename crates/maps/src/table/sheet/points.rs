@@ -4,9 +4,9 @@ use crate::table::columns::column::Column;
 use crate::table::columns::described_columns::DescribedColumns;
 use crate::table::columns::quantity::Quantity;
 use crate::table::rows_to_lines::check_point_count;
-use crate::table::sheet::grid::{Grid, GridRow, is_missing};
+use crate::table::sheet::grid::{Grid, GridRow};
 use crate::table::sheet::layout::{self, Layout};
-use mapper_core::{ImportError, ImportRemark, ImportedColumn, LineEnd, ReferenceState};
+use mapper_core::{ImportError, ImportRemark, ImportedColumn, LineEnd, ReferenceState, is_missing_mark};
 
 /// The values of a point by column, as written.
 pub(crate) struct Point<'a> {
@@ -57,7 +57,7 @@ pub(crate) fn points<'a>(
         let (mut speed, mut last_speed) = (group.speed_rpm, None);
         for row in grid.rows.iter().skip(layout.first_row).filter(|row| !row.is_comment) {
             let cell = |index: usize| row.cells.get(index).map_or("", String::as_str);
-            let is_empty = group.own_columns().iter().all(|column| is_missing(cell(column.index)));
+            let is_empty = group.own_columns().iter().all(|column| is_missing_mark(cell(column.index)));
             let is_title =
                 layout.groups.len() == 1 && row.cells.iter().filter(|cell| !cell.is_empty()).count() == 1;
             if is_empty && !is_title {
@@ -82,6 +82,18 @@ pub(crate) fn points<'a>(
             }
             if row.cells.iter().any(|cell| cell == EXTRAPOLATED) {
                 extrapolated += 1;
+                continue;
+            }
+            // A mean or the name of the author below the table.
+            let has_point = group.columns.iter().any(|column| {
+                column.quantity != Quantity::Efficiency
+                    && !column.quantity.is_optional()
+                    && grid.number(cell(column.index)).is_some()
+            });
+            if !has_point
+                && group.bare_cells == 0
+                && row.cells.iter().any(|cell| cell.contains(char::is_alphabetic))
+            {
                 continue;
             }
             check_point_count(points.len(), row.at)?;
@@ -113,7 +125,7 @@ fn values(grid: &Grid, row: &GridRow, group: &layout::Group) -> Result<Vec<Optio
     for column in &group.columns {
         let text = row.cells.get(column.index).map_or("", String::as_str);
         let value = grid.number(text);
-        if value.is_none() && !is_missing(text) && !column.quantity.is_optional() {
+        if value.is_none() && !is_missing_mark(text) && !column.quantity.is_optional() {
             return Err(ImportError::NotANumber {
                 line: row.at,
                 quantity: column.quantity.name().to_owned(),

@@ -1,6 +1,7 @@
 //! Reads sheets of Excel workbooks.
 
 use crate::table::sheet::grid::{Grid, GridRow, MAX_CELLS, MAX_ROWS, count_number_cells};
+use crate::table::sheet::matrices::{points_of_matrices, quantity_of_title};
 use crate::table::sheet::speed_heading::without_speed;
 use mapper_core::ImportError;
 use std::io::{Cursor, Read};
@@ -33,6 +34,19 @@ pub(crate) fn grid_of_workbook(bytes: &[u8], sheet: Option<&str>) -> Result<Grid
             std::iter::once(title(*rpm)).chain(std::mem::take(&mut known.rows)).collect::<Vec<_>>()
         });
         return Ok(Grid::of_rows(rows.collect()));
+    }
+    // A sheet for each quantity, named after it.
+    if sheet.is_none() {
+        let matrices =
+            sheets.iter().filter(|known| !known.is_hidden && quantity_of_title(&known.name).is_some());
+        let titled = matrices.flat_map(|known| {
+            let title = GridRow { at: 1, cells: vec![known.name.clone()], is_comment: false };
+            std::iter::once(title).chain(known.rows.iter().cloned())
+        });
+        let joined = Grid::of_rows(titled.collect());
+        if points_of_matrices(&joined).is_some() {
+            return Ok(joined);
+        }
     }
     if let Some(known) = sheets.iter_mut().filter(is_read).find(has_table) {
         return Ok(grid(known));

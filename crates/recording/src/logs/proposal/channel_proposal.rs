@@ -1,5 +1,6 @@
 //! The proposed channel map of a log.
 
+use super::remark::ProposalRemark;
 use mapper_core::Channel;
 use serde::Serialize;
 
@@ -34,7 +35,14 @@ pub struct ProposedChannel {
     /// Certainty.
     pub certainty: Certainty,
     /// Reasons for the certainty, and assumptions.
-    pub remarks: Vec<String>,
+    pub remarks: Vec<ProposalRemark>,
+}
+
+impl ProposedChannel {
+    /// Its remarks on one line.
+    pub fn remarks_text(&self) -> String {
+        self.remarks.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
+    }
 }
 
 /// Reference of the gauge pressures.
@@ -59,7 +67,7 @@ pub struct Proposal {
     /// Reference of gauge pressures; `None` if the log has no gauge pressure.
     pub ambient: Option<Ambient>,
     /// Results of the checks between channels.
-    pub remarks: Vec<String>,
+    pub remarks: Vec<ProposalRemark>,
 }
 
 impl Proposal {

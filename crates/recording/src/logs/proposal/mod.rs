@@ -4,10 +4,12 @@ mod channel_proposal;
 mod names;
 mod physics;
 mod propose;
+mod remark;
 mod shared_units;
 mod yaml;
 
 pub use channel_proposal::{Ambient, Certainty, NominalFlows, Proposal, ProposedChannel};
 pub use propose::propose;
-pub(crate) use propose::short;
+pub use remark::ProposalRemark;
+pub(crate) use remark::short;
 pub use yaml::channel_map_text;

@@ -1,11 +1,11 @@
 //! Checks the proposed channels against each other: a compressor raises pressure and temperature, and flow increases with speed.
 
 use super::channel_proposal::{Ambient, Certainty, Proposal, ProposedChannel};
-use super::names::{normalise, speaks_of_engine};
+use super::remark::ProposalRemark as Remark;
 use crate::logs::plausible::STANDARD_ATMOSPHERE_PA;
 use crate::logs::units::{kind_of, unit};
 use crate::logs::{Layout, Survey};
-use mapper_core::Channel;
+use mapper_core::{Channel, ColumnName, Word};
 
 /// Minimum share of samples that agree.
 const MIN_AGREEMENT_SHARE: f64 = 0.9;
@@ -18,9 +18,6 @@ const MAX_ENGINE_RPM: f64 = 8e3;
 
 /// Channels that most logs name by station numbers.
 const NUMBERED: [Channel; 6] = [Channel::P2, Channel::T2, Channel::P3, Channel::T3, Channel::P4, Channel::T4];
-
-/// Gas turbines and some engine programs number the compressor 2 and 3, the turbine 4 and 5.
-const ENGINE_NUMBERS: &str = "its stations may be numbered as in a gas turbine: 2 before and 3 after the compressor, 4 before and 5 after the turbine";
 
 /// Results of the checks.
 #[derive(Clone, Copy, Default)]
@@ -40,12 +37,12 @@ pub(super) fn judge(proposal: &mut Proposal, layout: &Layout, survey: &Survey) -
     let course = |proposal: &Proposal, channel: Channel| Readings::of(proposal, channel, layout, survey);
     let running: Option<Readings> = course(proposal, Channel::ShaftSpeed);
     let raised = [
-        (Channel::P2, Channel::P1, "P2 is above P1"),
-        (Channel::T2, Channel::T1, "T2 is above T1"),
-        (Channel::P3, Channel::P4, "P3 is above P4"),
-        (Channel::T3, Channel::T4, "T3 is above T4"),
+        (Channel::P2, Channel::P1),
+        (Channel::T2, Channel::T1),
+        (Channel::P3, Channel::P4),
+        (Channel::T3, Channel::T4),
     ];
-    for (higher, lower, words) in raised {
+    for (higher, lower) in raised {
         let (Some(high), Some(low)) = (course(proposal, higher), course(proposal, lower)) else { continue };
         let turning =
             |t_s: f64| running.as_ref().is_none_or(|speed| speed.at(t_s).is_none_or(|rpm| rpm > 2000.0));
@@ -60,49 +57,39 @@ pub(super) fn judge(proposal: &mut Proposal, layout: &Layout, survey: &Survey) -
         let share = pairs.iter().filter(|(high, low)| high >= low).count() as f64 / pairs.len() as f64;
         if share >= MIN_AGREEMENT_SHARE {
             agreement.agreeing += 1;
-            proposal.remarks.push(format!(
-                "{words} in {:.0} % of the time that the shaft turns, as expected",
-                100.0 * share
-            ));
+            proposal.remarks.push(Remark::Above { higher, lower, share });
         } else {
-            let message = format!("{words} in only {:.0} % of the time that the shaft turns", 100.0 * share);
-            doubt(proposal, &[higher, lower], &message);
+            doubt(proposal, &[higher, lower], &Remark::SeldomAbove { higher, lower, share });
             agreement.contradicting += 1;
             if higher == Channel::T3 {
                 agreement.suspects_numbering = true;
-                doubt(proposal, &NUMBERED, ENGINE_NUMBERS);
+                doubt(proposal, &NUMBERED, &Remark::OtherStations);
             }
         }
     }
     doubt_bare_housings(proposal, layout);
-    if layout.columns.iter().any(|column| speaks_of_engine(&normalise(&column.name))) {
-        doubt(
-            proposal,
-            &[Channel::ValveCommand],
-            "the log is of an engine: this may be its throttle or bypass",
-        );
+    if layout.columns.iter().any(|column| ColumnName::read(&column.name).has(Word::Engine)) {
+        doubt(proposal, &[Channel::ValveCommand], &Remark::EngineValve);
     }
     let fastest_rpm = running.as_ref().map(|speed| speed.samples().map(|(_, rpm)| rpm).fold(0.0, f64::max));
-    if let Some(rpm) = fastest_rpm.filter(|rpm| *rpm < MAX_ENGINE_RPM) {
-        let message = format!("maximum {rpm:.0} rpm: this may be the engine speed");
-        doubt(proposal, &[Channel::ShaftSpeed], &message);
+    if let Some(max_rpm) = fastest_rpm.filter(|rpm| *rpm < MAX_ENGINE_RPM) {
+        doubt(proposal, &[Channel::ShaftSpeed], &Remark::EngineSpeed { max_rpm });
     }
     if let (Some(speed), Some(flow)) = (running, course(proposal, Channel::CompressorFlow)) {
         let pairs: Vec<(f64, f64)> =
             speed.samples().filter_map(|(t_s, rpm)| Some((rpm, flow.at(t_s)?))).collect();
         match correlation(&pairs) {
             Some(r) if r >= MIN_CORRELATION => {
-                proposal.remarks.push(format!("flow correlates with speed (r = {r:.2})"))
+                proposal.remarks.push(Remark::Correlation { r, is_expected: true });
             }
             Some(r) => {
-                let message = format!("flow does not correlate with speed (r = {r:.2})");
                 for proposed in proposal
                     .channels
                     .iter_mut()
                     .filter(|p| [Channel::ShaftSpeed, Channel::CompressorFlow].contains(&p.channel))
                 {
                     proposed.certainty = proposed.certainty.min(Certainty::Likely);
-                    proposed.remarks.push(message.clone());
+                    proposed.remarks.push(Remark::Correlation { r, is_expected: false });
                 }
             }
             None => {}
@@ -117,10 +104,7 @@ pub(super) fn remark_stations(proposal: &mut Proposal, layout: &Layout) {
         let name = layout.columns.get(proposed.column).map_or("", |column| column.name.as_str());
         if name.contains(char::is_numeric) && proposed.channel != Channel::ShaftSpeed {
             proposed.certainty = proposed.certainty.min(Certainty::Likely);
-            proposed.remarks.push(
-                "stations are numbered 2 to 5 as in a gas turbine: with other numbers T3 would be below T4"
-                    .to_owned(),
-            );
+            proposed.remarks.push(Remark::GasTurbineStations);
         }
     }
 }
@@ -162,9 +146,7 @@ fn decide_bare_housing(proposal: &mut Proposal, layout: &Layout, survey: &Survey
     if let Some(proposed) = proposal.channels.iter_mut().find(bare) {
         proposed.channel = Channel::T2;
         proposed.certainty = proposed.certainty.min(Certainty::Likely);
-        proposed.remarks.push(format!(
-            "up to {hottest_k:.0} K, above the {ideal_k:.0} K of an ideal compression: taken as the gas, not as the housing"
-        ));
+        proposed.remarks.push(Remark::GasTemperature { max_k: hottest_k, ideal_k });
         proposal.channels.retain(|other| other.channel != Channel::T2 || other.certainty > Certainty::Unsure);
         proposal.channels.sort_by_key(|proposed| proposed.channel);
     }
@@ -174,29 +156,24 @@ fn decide_bare_housing(proposal: &mut Proposal, layout: &Layout, survey: &Survey
 fn is_bare(proposed: &ProposedChannel, layout: &Layout) -> bool {
     let column = layout.columns.get(proposed.column);
     column.is_some_and(|column| {
-        column.description.is_empty() && normalise(&column.name).len() <= "temp_c".len()
+        column.description.is_empty() && ColumnName::read(&column.name).part_count() <= 2
     })
 }
 
 /// Marks `T_c` and `T_t` as unsure without a column for the gas: here they are housings, elsewhere the gas after compressor and turbine.
 fn doubt_bare_housings(proposal: &mut Proposal, layout: &Layout) {
-    for (housing, gas, place) in
-        [(Channel::Tc, Channel::T2, "compressor"), (Channel::Tt, Channel::T4, "turbine")]
-    {
+    for (housing, gas) in [(Channel::Tc, Channel::T2), (Channel::Tt, Channel::T4)] {
         let gas_is_known = proposal.entry(gas).is_some_and(|gas| gas.certainty > Certainty::Unsure);
         if !gas_is_known && proposal.entry(housing).is_some_and(|proposed| is_bare(proposed, layout)) {
-            let message = format!(
-                "it may be the gas temperature after the {place}, for which the log has no other column"
-            );
-            doubt(proposal, &[housing], &message);
+            doubt(proposal, &[housing], &Remark::HousingOrGas { gas });
         }
     }
 }
 
-fn doubt(proposal: &mut Proposal, channels: &[Channel], message: &str) {
+fn doubt(proposal: &mut Proposal, channels: &[Channel], remark: &Remark) {
     for proposed in proposal.channels.iter_mut().filter(|proposed| channels.contains(&proposed.channel)) {
         proposed.certainty = Certainty::Unsure;
-        proposed.remarks.push(message.to_owned());
+        proposed.remarks.push(remark.clone());
     }
 }
 

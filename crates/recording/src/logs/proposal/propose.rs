@@ -1,14 +1,15 @@
 //! Assigns the columns of a log to channels.
 
 use super::channel_proposal::{Ambient, Certainty, NominalFlows, Proposal, ProposedChannel};
-use super::names::{Weight, channels_of, is_ambient, is_derived, normalise};
+use super::names::{MIN_CLEAR_WEIGHT, Weight, channels_of};
+use super::remark::ProposalRemark as Remark;
 use super::{physics, shared_units};
 use crate::logs::plausible::{
     AMBIENT_RANGE_PA, TRIMMED_SHARE, fitting_units, is_plausible, looks_like_gauge,
 };
 use crate::logs::units::kind_of;
 use crate::logs::{Column, ColumnSurvey, Layout, Survey};
-use mapper_core::{CHANNELS, Channel, plausible};
+use mapper_core::{CHANNELS, Channel, ColumnName, Word, plausible};
 use mapper_yaml::units::{HeaderUnit, Kind, Reference, Unit, header_unit, volume_flow_m3_s};
 
 /// A column as a candidate for a channel.
@@ -83,22 +84,29 @@ fn propose_with_numbering(
         for sensor in &sensors {
             taken[*sensor] = true;
         }
-        let rivals: Vec<&str> = others
+        let rivals: Vec<String> = others
             .iter()
             .filter(|other| other.is_plausible == best.is_plausible && other.weight + 10 > best.weight)
             .filter(|other| !sensors.contains(&other.column))
-            .map(|other| layout.columns[other.column].name.as_str())
+            .map(|other| layout.columns[other.column].name.clone())
             .take(3)
             .collect();
         let mut proposed = propose_channel(channel, best, layout, survey, &units);
         if !rivals.is_empty() {
             proposed.certainty = proposed.certainty.min(Certainty::Likely);
-            proposed.remarks.push(format!("it could also be {}", rivals.join(" or ")));
+            proposed.remarks.push(Remark::Rivals { columns: rivals });
         }
         proposed.others = sensors;
         proposal.channels.push(proposed);
     }
     note_unknown_units(&mut proposal, &taken, layout, &units);
+    let is_free_tag =
+        |(index, column): &(usize, &Column)| !taken[*index] && ColumnName::read(&column.name).is_tag();
+    let tags = layout.columns.iter().enumerate().filter(is_free_tag);
+    let columns: Vec<String> = tags.map(|(_, column)| column.name.clone()).collect();
+    if !columns.is_empty() {
+        proposal.remarks.push(Remark::TagNumbers { columns });
+    }
     proposal.channels.sort_by_key(|proposed| proposed.channel);
     shared_units::infer_units(&mut proposal, layout, survey);
     decide_gauge(&mut proposal, layout, survey, &units);
@@ -191,25 +199,19 @@ fn note_unknown_units(
         if proposal.entry(*channel).is_some() {
             continue;
         }
-        let why = match volume_flow_m3_s(spelling) {
-            Some(None) => format!(
-                "`{spelling}` is a flow at a standard temperature, which differs between manufacturers: write the unit as one of {}",
-                standard_flows()
-            ),
-            Some(Some(_)) => {
-                format!("`{spelling}` is a volume flow: multiply it by the density at the flow meter first")
-            }
-            None => format!("the unit `{spelling}` is unknown: write a known one"),
-        };
-        proposal.remarks.push(format!("{channel} may be `{}`, but {why}", column.name));
+        let (channel, column, unit) = (*channel, column.name.clone(), spelling.clone());
+        proposal.remarks.push(match volume_flow_m3_s(spelling) {
+            Some(None) => Remark::StandardFlow { channel, column, unit, known_units: standard_flows() },
+            Some(Some(_)) => Remark::VolumeFlow { channel, column, unit },
+            None => Remark::UnknownUnit { channel, column, unit },
+        });
     }
 }
 
 /// The units of flows at a standard temperature.
-fn standard_flows() -> String {
+fn standard_flows() -> Vec<String> {
     let standard = |unit: &&Unit| unit.symbol().contains('(') || unit.symbol().contains("m3/h");
-    let symbols: Vec<&str> = Kind::MassFlow.units().iter().filter(standard).map(Unit::symbol).collect();
-    symbols.join(", ")
+    Kind::MassFlow.units().iter().filter(standard).map(|unit| unit.symbol().to_owned()).collect()
 }
 
 /// Candidate columns of a channel, best first; `named` has the channels of each column's name.
@@ -237,7 +239,7 @@ fn rank_candidates(
         };
         let weight = weight + if is_plausible { 20 } else { 0 };
         // Values that the stand computed rank after all measured ones: no weight of a name is below ten.
-        let weight = if is_derived(&normalise(&column.name)) { weight / 10 } else { weight };
+        let weight = if ColumnName::read(&column.name).is_computed() { weight / 10 } else { weight };
         list.push(Candidate { column: index, weight, is_plausible });
     }
     list.sort_by_key(|candidate| std::cmp::Reverse(candidate.weight));
@@ -263,67 +265,58 @@ fn propose_channel(
     let data = &survey.columns[best.column];
     let (low, high) = (data.quantile(TRIMMED_SHARE), data.quantile(1.0 - TRIMMED_SHARE));
     let fitting = fitting_units(channel, low, high, 0.0);
-    let symbols =
-        |units: &[&'static Unit]| units.iter().map(|unit| unit.symbol()).collect::<Vec<_>>().join(" or ");
+    let symbols = |units: &[&'static Unit]| units.iter().map(|unit| unit.symbol().to_owned()).collect();
     match (units[best.column], fitting.as_slice()) {
         (Some(unit), _) => {
             proposed.unit = Some(unit.unit.symbol());
             proposed.gauge = unit.reference == Reference::Gauge;
             if !best.is_plausible {
                 proposed.certainty = Certainty::Unsure;
-                let instead = if fitting.is_empty() {
-                    String::new()
-                } else {
-                    format!("; {} would be plausible", symbols(&fitting))
-                };
-                proposed.remarks.push(format!(
-                    "{} to {} {} is not plausible{instead}",
-                    short(data.min),
-                    short(data.max),
-                    unit.unit.symbol()
-                ));
+                proposed.remarks.push(Remark::ImplausibleRange {
+                    min: data.min,
+                    max: data.max,
+                    unit: unit.unit.symbol().to_owned(),
+                    plausible_units: symbols(&fitting),
+                });
             }
         }
         (None, [only]) => {
             proposed.unit = Some(only.symbol());
             proposed.certainty = Certainty::Likely;
-            proposed.remarks.push(format!("the log gives no unit; the range fits only {}", only.symbol()));
+            proposed.remarks.push(Remark::OneUnitFits { unit: only.symbol().to_owned(), columns: 1 });
         }
         (None, []) => {
             proposed.certainty = Certainty::Unsure;
-            proposed.remarks.push(format!(
-                "the log gives no unit, and the range {} to {} fits none",
-                short(data.min),
-                short(data.max)
-            ));
+            proposed.remarks.push(Remark::NoUnitFits { min: data.min, max: data.max });
         }
         (None, several) => {
             proposed.unit = several.first().map(|unit| unit.symbol());
             proposed.certainty = Certainty::Unsure;
-            proposed.remarks.push(format!("the log gives no unit; its range fits {}", symbols(several)));
+            proposed.remarks.push(Remark::SeveralUnitsFit { units: symbols(several) });
         }
     }
-    if let Some(remark) = describe_impossible_readings(channel, data, proposed.unit) {
+    if let Some(remark) = impossible_readings(channel, data, proposed.unit) {
         proposed.certainty = proposed.certainty.min(Certainty::Likely);
         proposed.remarks.push(remark);
     }
-    if is_derived(&normalise(&layout.columns[best.column].name)) {
+    let name = ColumnName::read(&layout.columns[best.column].name);
+    if name.is_computed() {
         proposed.certainty = Certainty::Unsure;
-        proposed.remarks.push("its name indicates a computed value".to_owned());
+        proposed.remarks.push(Remark::Computed);
     }
-    if best.weight < 60 && proposed.certainty == Certainty::Sure {
+    if best.weight < MIN_CLEAR_WEIGHT && proposed.certainty == Certainty::Sure {
         proposed.certainty = Certainty::Likely;
-        proposed.remarks.push("the name is ambiguous".to_owned());
+        proposed.remarks.push(if name.is_tag() {
+            Remark::TagNumbers { columns: vec![layout.columns[best.column].name.clone()] }
+        } else {
+            Remark::AmbiguousName
+        });
     }
     proposed
 }
 
 /// A remark about readings that no sensor of the channel can have: marks of missing values, or faults.
-fn describe_impossible_readings(
-    channel: Channel,
-    data: &ColumnSurvey,
-    unit: Option<&'static str>,
-) -> Option<String> {
+fn impossible_readings(channel: Channel, data: &ColumnSurvey, unit: Option<&'static str>) -> Option<Remark> {
     let unit = crate::logs::units::unit(kind_of(channel), unit?).ok()?;
     let range = plausible(channel);
     let (low, high) = (unit.to_inside(data.min), unit.to_inside(data.max));
@@ -336,11 +329,7 @@ fn describe_impossible_readings(
     } else {
         return None;
     };
-    Some(format!(
-        "some readings are {} {}, which is impossible: if they mark missing readings, set `missing: {value}`",
-        short(value),
-        unit.symbol()
-    ))
+    Some(Remark::ImpossibleReadings { value, unit: unit.symbol().to_owned() })
 }
 
 /// Decides which pressures are gauge pressures, and finds the ambient pressure.
@@ -365,14 +354,11 @@ fn decide_gauge(proposal: &mut Proposal, layout: &Layout, survey: &Survey, units
         if looks_like_gauge(proposed.channel, low, high) {
             proposed.gauge = true;
             proposed.certainty = proposed.certainty.min(Certainty::Likely);
-            proposed.remarks.push(format!(
-                "down to {:.1} kPa: too low for an absolute pressure, taken as gauge",
-                low / 1e3
-            ));
+            proposed.remarks.push(Remark::TakenAsGauge { min_pa: low });
         } else if inlet_is_gauge && low < 1.6e5 {
             proposed.gauge = true;
             proposed.certainty = proposed.certainty.min(Certainty::Likely);
-            proposed.remarks.push("the log does not give its reference; taken as gauge like P1".to_owned());
+            proposed.remarks.push(Remark::GaugeLikeInlet);
         }
     }
     if !proposal.channels.iter().any(|proposed| proposed.gauge) {
@@ -381,24 +367,12 @@ fn decide_gauge(proposal: &mut Proposal, layout: &Layout, survey: &Survey, units
     let ambient = layout.columns.iter().enumerate().find_map(|(index, column)| {
         let unit =
             units[index].filter(|unit| unit.kind == Kind::Pressure && unit.reference != Reference::Gauge)?;
-        let named = is_ambient(&normalise(&column.name)) || is_ambient(&normalise(&column.description));
+        let named =
+            [&column.name, &column.description].iter().any(|name| ColumnName::read(name).has(Word::Ambient));
         let median_pa = unit.unit.to_inside(survey.columns[index].quantile(0.5));
         let (least, most) = AMBIENT_RANGE_PA;
         (named && (least..=most).contains(&median_pa))
             .then_some(Ambient::Column { column: index, unit: unit.unit.symbol() })
     });
     proposal.ambient = Some(ambient.unwrap_or(Ambient::Assumed));
-}
-
-/// A number with three to five significant digits, for messages.
-pub(crate) fn short(value: f64) -> String {
-    match value.abs() {
-        _ if !value.is_finite() => "-".to_owned(),
-        0.0 => "0".to_owned(),
-        size if size >= 1e4 => format!("{value:.0}"),
-        size if size >= 100.0 => format!("{value:.1}"),
-        size if size >= 1.0 => format!("{value:.2}"),
-        size if size >= 1e-3 => format!("{value:.4}"),
-        _ => format!("{value:.2e}"),
-    }
 }

@@ -1,6 +1,7 @@
 //! Infers the units of a log without units: columns of one kind share a unit, and physics excludes the others.
 
 use super::channel_proposal::{Certainty, NominalFlows, Proposal, ProposedChannel};
+use super::remark::ProposalRemark as Remark;
 use crate::logs::plausible::{STANDARD_ATMOSPHERE_PA, TRIMMED_SHARE, fitting_units};
 use crate::logs::units::kind_of;
 use crate::logs::{Layout, Survey};
@@ -45,21 +46,14 @@ pub(super) fn infer_units(proposal: &mut Proposal, layout: &Layout, survey: &Sur
             common = kind.units().iter().filter(|unit| unit.symbol() == "degF").collect();
         }
         let [unit] = common.as_slice() else { continue };
-        let count = channels.len();
         for proposed in proposal.channels.iter_mut().filter(|proposed| bare(proposed)) {
             proposed.unit = Some(unit.symbol());
             proposed.certainty = Certainty::Likely;
-            proposed.remarks.retain(|_| false);
-            proposed.remarks.push(match count {
-                _ if unit.symbol() == "degF" => {
-                    "the log gives no unit; other units are imperial, and in degC the inlet would be warmer than a room".to_owned()
-                }
-                1 => format!("the log gives no unit; only {} is plausible", unit.symbol()),
-                _ => format!(
-                    "the log gives no unit; only in {} all {count} columns of the kind are plausible",
-                    unit.symbol()
-                ),
-            });
+            proposed.remarks = vec![if unit.symbol() == "degF" {
+                Remark::Imperial
+            } else {
+                Remark::OneUnitFits { unit: unit.symbol().to_owned(), columns: channels.len() }
+            }];
         }
     }
 }
@@ -120,12 +114,11 @@ pub(super) fn infer_flow_unit(
     let Some(speed_rpm) = top(Channel::ShaftSpeed, 1.0 - TRIMMED_SHARE).filter(|rpm| *rpm > 0.0) else {
         return;
     };
-    let (low_kg_s, high_kg_s, why) = match nominal {
+    let (low_kg_s, high_kg_s, why): (f64, f64, Box<dyn Fn(String) -> Remark>) = match nominal {
         Some(flows) => {
             let (surge_kg_s, choke_kg_s) = flows(speed_rpm);
-            let why =
-                format!("fits the machine ({surge_kg_s:.3} to {choke_kg_s:.3} kg/s at {speed_rpm:.0} rpm)");
-            (surge_kg_s / NOMINAL_FACTOR, choke_kg_s * NOMINAL_FACTOR, why)
+            let why = move |unit| Remark::FitsMachine { unit, surge_kg_s, choke_kg_s, speed_rpm };
+            (surge_kg_s / NOMINAL_FACTOR, choke_kg_s * NOMINAL_FACTOR, Box::new(why))
         }
         None => {
             let Some(outlet_pa) = top(Channel::P2, 1.0 - TRIMMED_SHARE) else { return };
@@ -134,8 +127,8 @@ pub(super) fn infer_flow_unit(
             let tip_m_s = (head_j_kg / HEAD_COEFFICIENT).sqrt();
             let diameter_m = 60.0 * tip_m_s / (PI * speed_rpm);
             let flow_kg_s = FLOW_COEFFICIENT * DENSITY_KG_M3 * tip_m_s * PI / 4.0 * diameter_m * diameter_m;
-            let why = format!("fits speed and pressure ratio (a wheel of about {:.0} mm)", 1e3 * diameter_m);
-            (flow_kg_s / FLOW_FACTOR, flow_kg_s * FLOW_FACTOR, why)
+            let why = move |unit| Remark::FitsWheel { unit, diameter_m };
+            (flow_kg_s / FLOW_FACTOR, flow_kg_s * FLOW_FACTOR, Box::new(why))
         }
     };
     for channel in [Channel::CompressorFlow, Channel::TurbineFlow] {
@@ -154,7 +147,7 @@ pub(super) fn infer_flow_unit(
         if let [unit] = near.as_slice() {
             proposed.unit = Some(unit.symbol());
             proposed.certainty = Certainty::Likely;
-            proposed.remarks = vec![format!("the log gives no unit; {} {why}", unit.symbol())];
+            proposed.remarks = vec![why(unit.symbol().to_owned())];
         }
     }
 }

@@ -27,8 +27,7 @@ pub fn channel_map_text(
     for proposed in &proposal.channels {
         let mut line = format!("{}: {}", proposed.channel.symbol(), source(layout, proposed));
         if !proposed.remarks.is_empty() {
-            let remarks = remark(&proposed.remarks.join("; "));
-            let _ = write!(line, "  # {remarks}");
+            let _ = write!(line, "  # {}", remark(&proposed.remarks_text()));
         }
         let _ = writeln!(text, "  {}{line}", if kept(&proposed) { "" } else { "# " });
     }

@@ -11,6 +11,7 @@ use crate::point_results::result_remark_text::result_remark_text;
 use crate::point_results::warning_text::sentence::Sentence;
 use mapper_core::{ModelDoubt, PlanRemark, ResultRemark, Warning};
 use mapper_diagnose::gap::findings::warning::GapWarning;
+use mapper_recording::logs::proposal::ProposalRemark;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
@@ -34,7 +35,7 @@ pub(crate) fn sentence_of(warning: &Warning) -> Sentence {
     })
 }
 
-/// A JSON value in which each warning, each doubt and each remark of a plan or of results has its sentence as `message`, for people.
+/// A JSON value in which each warning, each doubt and each remark has its sentence as `message`, for people.
 pub fn with_messages(mut value: Value) -> Value {
     add_messages(&mut value);
     value
@@ -61,6 +62,8 @@ fn add_messages(value: &mut Value) {
                                 add_message(one, plan_remark_text);
                             } else if has_code(one, ResultRemark::CODES) {
                                 add_message(one, result_remark_text);
+                            } else if has_code(one, ProposalRemark::CODES) {
+                                add_message::<ProposalRemark>(one, ToString::to_string);
                             }
                         }
                     }

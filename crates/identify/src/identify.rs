@@ -9,6 +9,7 @@ use crate::objections::objections;
 use crate::single_step::dynamic::Estimate;
 use crate::step_data::end_state::{EndState, end_state};
 use crate::step_data::humidity::with_measured_humidity;
+
 use crate::step_outcome::findings::Findings;
 use crate::step_outcome::two_parameter::TwoParameter;
 use crate::{

@@ -36,6 +36,7 @@ pub use needs::{method_for, needs};
 pub use reduce::{KnownHeat, method_of_table, reduce};
 pub use single_step::expected::{DECLARED_INTERVAL_S, Expected, ExpectedRow, expected, expected_steady};
 pub use single_step::t2_course::{T2Course, t2_course};
+pub use step_data::humidity::with_measured_humidity;
 pub use step_data::samples::LONGEST_BRIDGE_S;
 pub use step_outcome::error::{IdentifyError, StepError};
 pub use step_outcome::two_parameter::TwoParameter;

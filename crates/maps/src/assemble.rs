@@ -47,6 +47,7 @@ pub fn assemble(
         reference,
         method,
         efficiency: None,
+        gas: None,
         lines,
         surge: Vec::new(),
         fitted: None,

@@ -1,8 +1,11 @@
-//! The header of every text format: machine, reference state, definition of the efficiency.
+//! The header of every text format: machine, reference state, definition of the efficiency, gas.
 
 use mapper_core::{CompressorMap, Method, one_line};
 use mapper_maps::table::DEFINITION_PREFIX;
 use std::fmt::Write;
+
+/// Start of the comment that names the gas.
+pub(crate) const GAS_PREFIX: &str = "compressed gas: ";
 
 /// Comment lines that begin with `mark`.
 pub(crate) fn heading(map: &CompressorMap, mark: &str) -> String {
@@ -14,6 +17,9 @@ pub(crate) fn heading(map: &CompressorMap, mark: &str) -> String {
     );
     if let Some(definition) = map.efficiency {
         let _ = writeln!(text, "{mark} {DEFINITION_PREFIX}{definition} ({})", definition.description());
+    }
+    if let Some(gas) = &map.gas {
+        let _ = writeln!(text, "{mark} {GAS_PREFIX}{}", one_line(gas));
     }
     text
 }

@@ -21,6 +21,7 @@ fn empty() -> CompressorMap {
         reference: ReferenceState::SAE,
         method: Method::Steady,
         efficiency: None,
+        gas: None,
         lines: vec![],
         surge: Vec::new(),
         fitted: None,

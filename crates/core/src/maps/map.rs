@@ -56,6 +56,9 @@ pub struct CompressorMap {
     /// Definition of the efficiencies; `None` if a map file does not name it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub efficiency: Option<EfficiencyDefinition>,
+    /// The gas that was compressed, in words; corrected flows are those of dry air at equal Mach numbers. `None` if a map file does not name it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gas: Option<String>,
     /// Speed lines in order of speed.
     pub lines: Vec<SpeedLine>,
     /// Measured surge-side ends, in order of speed; empty if none were measured.

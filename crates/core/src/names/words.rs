@@ -12,7 +12,7 @@ use std::sync::LazyLock;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Word {
     Is(Measured), Ratio, Compression, Expansion,
-    Compressor, Turbine, Shaft, Exhaust, Air, Charge, Oil, Housing, Bearing, Ambient, Engine, Manifold, Other,
+    Compressor, Turbine, Shaft, Exhaust, Air, Charge, Oil, Housing, Bearing, Ambient, Dew, Engine, Manifold, Other,
     In, Out, Before, After, Acronym,
     Total, Static, Corrected, Computed, Command, Filler,
 }
@@ -22,8 +22,8 @@ use Measured::{
 };
 use Word::{
     Acronym, After, Air, Ambient, Bearing, Before, Charge, Command, Compression, Compressor, Computed,
-    Corrected, Engine, Exhaust, Expansion, Filler, Housing, In, Is, Manifold, Oil, Other, Out, Ratio, Shaft,
-    Static, Total, Turbine,
+    Corrected, Dew, Engine, Exhaust, Expansion, Filler, Housing, In, Is, Manifold, Oil, Other, Out, Ratio,
+    Shaft, Static, Total, Turbine,
 };
 
 /// Words without accents, umlauts as two letters. Words of one or two letters count alone, or at an end of a compound.
@@ -56,6 +56,7 @@ const TABLE: &[(&[Word], &str)] = &[
     (&[Is(PressureRatio), Expansion], "er 膨胀比 落压比"),
     (&[Is(Efficiency)], "eta η eff effic efficiency wirkungsgrad rendement rendimiento rendimento eficiencia efficienza sprawnosc ucinnost кпд 效率 効率"),
     (&[Is(Humidity)], "rh humidity humid relhum feuchte luftfeuchte humedad umidita humidite humidade wilgotnosc влажност 湿度"),
+    (&[Is(Temperature), Dew], "dew dewpoint taupunkt rosee rocio rugiada orvalho rosy росы 露点"),
     (&[Is(Opening)], "valve ventil klappe drossel drosselklappe bpv back backpressure opening oeffnung vanne valvola valvula клапан 阀门 阀 开度 背压阀"),
     (&[Is(Vane)], "vane vanes vgt vtg vnt rack nozzle leitschaufel leitapparat wastegate 导叶"),
     (&[Ratio], "ratio verhaeltnis rapport taux relacion rapporto razao verhouding отношени степен"),

@@ -11,7 +11,7 @@ const SLOPE_RATIO: f64 = 0.01;
 
 /// The configuration with the humidity that was measured, the mean over the recording. The air of a hygrometer is that of the cell, or of the
 /// inlet if the cell's temperature was not recorded. Without a plausible reading the declared humidity stays.
-pub(crate) fn with_measured_humidity(recording: &Recording, config: &IdentifyConfig) -> IdentifyConfig {
+pub fn with_measured_humidity(recording: &Recording, config: &IdentifyConfig) -> IdentifyConfig {
     let mut config = config.clone();
     let reading = |channel: Channel| {
         let values = &recording.series.get(&channel)?.values;

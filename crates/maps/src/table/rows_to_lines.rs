@@ -148,6 +148,7 @@ pub fn map_of_rows(
         reference,
         method: Method::Imported,
         efficiency: None,
+        gas: None,
         lines,
         surge: Vec::new(),
         fitted: None,

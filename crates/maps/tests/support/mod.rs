@@ -24,6 +24,7 @@ pub fn map_of(rows: &[Row]) -> CompressorMap {
         reference: ReferenceState::SAE,
         method: Method::Imported,
         efficiency: None,
+        gas: None,
         lines,
         surge: Vec::new(),
         fitted: None,

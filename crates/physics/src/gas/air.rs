@@ -167,6 +167,21 @@ impl Air {
         to_k
     }
 
+    /// The gas in words, for readers of a report.
+    pub fn description(self) -> String {
+        let dry = self.with_humidity(0.0).gas;
+        let same = |other: Gas| (dry.gas_constant_j_kgk / other.gas_constant_j_kgk - 1.0).abs() < 1e-9;
+        let dry = match dry.virials {
+            None => "air".to_owned(),
+            Some(_) if same(Gas::air()) => "air as a real gas".to_owned(),
+            Some(_) => format!("a mixture with R = {:.2} J/(kg K)", dry.gas_constant_j_kgk),
+        };
+        match self.humidity_kg_kg {
+            0.0 => format!("{dry}, taken as dry"),
+            water => format!("{dry}, {:.1} g of water per kg of dry gas", 1e3 * water),
+        }
+    }
+
     /// Exponent `kappa = R/cp(T)` of the isentropic temperature ratio `PR^kappa`.
     #[inline]
     pub fn isentropic_exponent(self, temperature_k: f64) -> f64 {

@@ -33,7 +33,6 @@ use mapper_diagnose::gap::correction::PointCorrection;
 use mapper_identify::{TwoParameter, ZeroOutcome};
 use mapper_maps::RepeatedJump;
 use mapper_observe::FusedChannel;
-use mapper_physics::gas::mixture::Gas;
 use mapper_recording::score::{ScoreSummary, ScoredMark, ScoredPoint};
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -292,23 +291,10 @@ pub fn condition_facts(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
     }
     rows.push(("reference state of corrected quantities", report.reference.to_string()));
     rows.push(("definition of efficiency", report.efficiency.description()));
-    rows.extend(report.campaign.map(|campaign| ("gas", gas(campaign))));
+    rows.extend(
+        report.campaign.map(|campaign| ("gas", campaign.machine.params.compressor.air().description())),
+    );
     rows
-}
-
-/// The compressed gas, with its humidity.
-fn gas(campaign: &Campaign) -> String {
-    let compressor = campaign.machine.params.compressor;
-    let water_g_kg = 1e3 * compressor.humidity_kg_kg;
-    let dry = match compressor.gas {
-        gas if gas == Gas::CLOSED_FORM_AIR => "air".to_owned(),
-        gas if gas == Gas::air() => "air as a real gas".to_owned(),
-        gas => format!("a mixture with R = {:.2} J/(kg K)", gas.gas_constant_j_kgk),
-    };
-    match campaign.report.humidity_ratio {
-        Some(_) => format!("{dry}, {water_g_kg:.1} g of water per kg of dry gas"),
-        None => format!("{dry}, taken as dry: no humidity is given"),
-    }
 }
 
 /// Method and settings behind the numbers: name and value in words.

@@ -9,16 +9,17 @@ use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::campaign::Date;
 use mapper_campaign::{Campaign, nominal_model};
 use mapper_core::{
-    Channel, IdentifiedPoint, Method, PointBudgets, Recording, ResultRemark, StepMarker, StepOrigin,
-    SurgeNotFound, ThermalModel, join_recordings,
+    Channel, CompressorMap, IdentifiedPoint, Method, PointBudgets, Recording, ResultRemark, StepMarker,
+    StepOrigin, SurgeNotFound, ThermalModel, join_recordings,
 };
 use mapper_diagnose::gap::correction::PointCorrection;
 use mapper_identify::{
     FoundFault, IdentifyConfig, NominalRig, TwoParameter, ZeroOutcome, ZeroSettings, identify_with_rig,
-    isothermal_zero, method_for,
+    isothermal_zero, method_for, with_measured_humidity,
 };
-use mapper_maps::{RepeatedJump, repeated_jumps};
+use mapper_maps::{AssembleError, Grouping, RepeatedJump, assemble, repeated_jumps};
 use mapper_observe::FusedChannel;
+use mapper_physics::gas::air::Air;
 use mapper_recording::score::{
     PendingTruths, ScoreSummary, ScoredMark, ScoredPoint, Truth, score, score_marks, with_truths,
 };
@@ -118,11 +119,33 @@ impl Identified {
         if self.points.is_empty() { Err(SessionError::NoPoints { why: why.join("; ") }) } else { Ok(()) }
     }
 
+    /// The map of the points with map coordinates: the others are left out.
+    ///
+    /// # Errors
+    /// As [`assemble`].
+    pub(crate) fn map(&self, machine: &str) -> Result<CompressorMap, AssembleError> {
+        let has_place = |point: &&IdentifiedPoint| {
+            let place = [point.flow_corrected_kg_s, point.pressure_ratio, point.speed_corrected_rpm];
+            place.iter().all(|value| value.is_finite())
+        };
+        let points: Vec<IdentifiedPoint> = self.points_alone().filter(has_place).cloned().collect();
+        let config = &self.config;
+        let map = assemble(&points, machine, config.reference, config.method, Grouping::default())?;
+        let surge = self.surge.iter().flat_map(|found| found.marks.iter().map(|scored| scored.mark));
+        let air = with_measured_humidity(&self.recording, config).air;
+        Ok(CompressorMap { surge: surge.collect(), ..with_gas(map, air) })
+    }
+
     /// Jumps that were repeated.
     pub fn repeats(&self) -> Vec<RepeatedJump> {
         let points: Vec<IdentifiedPoint> = self.points_alone().cloned().collect();
         repeated_jumps(&self.recording.steps, &points)
     }
+}
+
+/// The map with its gas and its definition of the efficiency.
+pub(crate) fn with_gas(map: CompressorMap, air: Air) -> CompressorMap {
+    CompressorMap { efficiency: Some(air.efficiency), gas: Some(air.description()), ..map }
 }
 
 impl Session<'_> {

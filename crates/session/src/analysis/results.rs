@@ -14,7 +14,7 @@ use mapper_core::{
     ThermalModel,
 };
 use mapper_identify::{T2Course, TwoParameter, ZeroOutcome, t2_course};
-use mapper_maps::{Grouping, MapFit, MapFitOptions, RepeatedJump, assemble};
+use mapper_maps::{MapFit, MapFitOptions, RepeatedJump};
 use mapper_observe::FusedChannel;
 use mapper_recording::score::{ScoreSummary, ScoredPoint};
 use mapper_recording::{ChannelMap, ReadOptions, ReadWarning, read_recording};
@@ -451,18 +451,10 @@ pub fn compressor_map(
     identified: &Identified,
     remarks: &mut Vec<ResultRemark>,
 ) -> Option<CompressorMap> {
-    let has_place = |point: &&IdentifiedPoint| {
-        [point.flow_corrected_kg_s, point.pressure_ratio, point.speed_corrected_rpm]
-            .iter()
-            .all(|value| value.is_finite())
-    };
-    let placed: Vec<IdentifiedPoint> = identified.points_alone().filter(has_place).cloned().collect();
-    let config = &identified.config;
-    let map = assemble(&placed, machine, config.reference, config.method, Grouping::default())
+    let map = identified
+        .map(machine)
         .map_err(|error| remarks.push(ResultRemark::NoMap { reason: error.to_string() }))
         .ok()?;
-    let marks = identified.surge.iter().flat_map(|surge| surge.marks.iter().map(|scored| scored.mark));
-    let map = CompressorMap { efficiency: Some(config.air.efficiency), surge: marks.collect(), ..map };
     match MapFit::new(&map).and_then(|fit| fit.table(&MapFitOptions::default())) {
         Ok(table) => Some(CompressorMap { fitted: Some(table), ..map }),
         Err(error) => {

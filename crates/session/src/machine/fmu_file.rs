@@ -6,9 +6,9 @@ use crate::recording::files::{Existing, write_file};
 use crate::recording::recording_file::Recorded;
 use crate::{Session, SessionError};
 use mapper_campaign::Campaign;
-use mapper_core::{CompressorMap, IdentifiedPoint, ThermalModel};
+use mapper_core::ThermalModel;
 use mapper_fmu::{FmuMachine, FmuMap, archive, files, table_of_fit};
-use mapper_maps::{Grouping, MapFitOptions, assemble, fit_map};
+use mapper_maps::{MapFitOptions, fit_map};
 use mapper_physics::compressor_map::closed_form_map::ClosedFormMap;
 use mapper_physics::machine::params::Params;
 use mapper_physics::simulation::model::Model;
@@ -81,18 +81,8 @@ impl Session<'_> {
         let campaign = first.require_campaign()?.clone();
         let identified = self.identify(recorded, channels, None)?;
         // Points without map coordinates are skipped; the others may still form a map.
-        let has_place = |point: &&IdentifiedPoint| {
-            let place = [point.flow_corrected_kg_s, point.pressure_ratio, point.speed_corrected_rpm];
-            place.iter().all(|value| value.is_finite())
-        };
-        let points: Vec<IdentifiedPoint> = identified.points_alone().filter(has_place).cloned().collect();
-        let config = &identified.config;
-        let name = &campaign.machine.name;
         let no_map = |why: String| FmuExportError::NoMap(why);
-        let map = assemble(&points, name, config.reference, config.method, Grouping::default())
-            .map_err(|error| no_map(error.to_string()))?;
-        let surge = identified.surge.iter().flat_map(|found| found.marks.iter().map(|scored| scored.mark));
-        let map = CompressorMap { efficiency: Some(config.air.efficiency), surge: surge.collect(), ..map };
+        let map = identified.map(&campaign.machine.name).map_err(|error| no_map(error.to_string()))?;
         let options = MapFitOptions { leave_one_out: false, ..MapFitOptions::default() };
         let map = fit_map(map, &options).map_err(|error| no_map(error.to_string()))?;
         let fitted = map.fitted.as_ref().ok_or_else(|| no_map("it is not fitted".to_owned()))?;
@@ -104,11 +94,11 @@ impl Session<'_> {
             "as declared"
         };
         let export = FmuExport {
-            name: name.clone(),
+            name: campaign.machine.name.clone(),
             origin: format!(
                 "identified by the {} method: fitted map of {} points on {} speed lines, compressor's heat transfer {law}; \
                  turbine, bearing and masses as declared",
-                config.method,
+                identified.config.method,
                 map.lines.iter().map(|line| line.points.len()).sum::<usize>(),
                 map.lines.len()
             ),

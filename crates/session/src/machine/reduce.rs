@@ -2,6 +2,7 @@
 //! was measured, or T3 for its heat balance. Tables of turbine points (N, flow, P3, T3, P4, T4) become a turbine map.
 
 use crate::analysis::budget_file::budget_csv;
+use crate::analysis::identification::with_gas;
 use crate::machine::fmu_file::with_identified;
 use crate::machine::map_work::{MapOut, MapWork, warnings, write_turbine_fitted_if_needed};
 use crate::recording::files::Existing;
@@ -11,8 +12,8 @@ use crate::{
 };
 use mapper_campaign::Campaign;
 use mapper_core::{
-    CompressorMap, ImportError, MapDescription, MeasuredPoint, Method, ModelTolerances, PointBudgets,
-    StaticTaps, ThermalModel, TurbineMap,
+    ImportError, MapDescription, MeasuredPoint, Method, ModelTolerances, PointBudgets, StaticTaps,
+    ThermalModel, TurbineMap,
 };
 use mapper_identify::{IdentifyConfig, KnownHeat, PressureTap, method_of_table};
 use mapper_maps::{Grouping, assemble, mark_line_ends, reduce_turbine};
@@ -149,7 +150,7 @@ impl Registry {
             mapper_identify::reduce(measured, known, &config)?.into_iter().unzip();
         let map = assemble(&points, &name, config.reference, config.method, Grouping::default())
             .map_err(|source| MapWorkError::NotAssembled { path: path.to_owned(), source })?;
-        let mut map = CompressorMap { efficiency: Some(config.air.efficiency), ..map };
+        let mut map = with_gas(map, config.air);
         let ends = mark_line_ends(&mut map, |step| measured.get(step)?.end);
         let mut text = reduced_text(&map, &ends, &budgets, &remarks);
         let json = json!({

@@ -5,6 +5,7 @@ use mapper_core::{
     CommonErrors, CompressorMap, EfficiencyDefinition, ImportError, ImportedMap, MapDescription, MapPoint,
     Method, ReferenceState, SpeedShift, Verdict, Warning,
 };
+use crate::heading::GAS_PREFIX;
 use mapper_maps::table::{
     Row, check_point_count, efficiency_in_comment, line, read_text, reference_in_comment, resolve_reference,
     text_of,
@@ -20,6 +21,7 @@ struct Head {
     machine: String,
     method: Option<Method>,
     efficiency: Option<EfficiencyDefinition>,
+    gas: Option<String>,
     /// First step number: 0 for files of version 0.1.0, which do not contain it.
     first_step: f64,
     columns: Columns,
@@ -38,12 +40,15 @@ pub(super) fn read(bytes: &[u8], given: &MapDescription) -> Result<ImportedMap, 
 
 fn read_own(text: &str, given: Option<ReferenceState>) -> Result<CompressorMap, ImportError> {
     let (mut reference, mut machine, mut method, mut first_step) = (None, String::new(), None, 0.0);
-    let mut efficiency = None;
+    let (mut efficiency, mut gas) = (None, None);
     for comment in text.lines().filter_map(|line| line.trim_start().strip_prefix('#')) {
         reference = reference.or_else(|| reference_in_comment(comment));
         efficiency = efficiency.or_else(|| efficiency_in_comment(comment));
         if let Some((_, name)) = comment.split_once("compressor map of ") {
             machine = name.trim().chars().take(200).collect();
+        }
+        if let Some((_, words)) = comment.split_once(GAS_PREFIX) {
+            gas = Some(words.trim().chars().take(200).collect());
         }
         if let Some((_, name)) = comment.split_once("method: ") {
             method = method_of(name);
@@ -61,7 +66,7 @@ fn read_own(text: &str, given: Option<ReferenceState>) -> Result<CompressorMap, 
     let mut records = reader.records();
     let first = records.next().ok_or(ImportError::Empty)?;
     let columns = find_columns(&record(first)?)?;
-    let head = Head { reference, machine, method, efficiency, first_step, columns };
+    let head = Head { reference, machine, method, efficiency, gas, first_step, columns };
     let mut rows: Vec<(Row, StringRecord)> = Vec::new();
     for next in records {
         let next = record(next)?;
@@ -185,6 +190,7 @@ fn read_own_rows(
         reference,
         method,
         efficiency: head.efficiency,
+        gas: head.gas.clone(),
         lines,
         surge: Vec::new(),
         fitted: None,

@@ -53,6 +53,7 @@ pub fn turbo_a() -> CompressorMap {
         reference: ReferenceState::SAE,
         method: Method::Dynamic,
         efficiency: Some(EfficiencyDefinition::ConstantGamma(1.395)),
+        gas: Some("air, 8.2 g of water per kg of dry gas".to_owned()),
         lines,
         surge: Vec::new(),
         fitted: None,

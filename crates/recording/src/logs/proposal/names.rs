@@ -44,6 +44,13 @@ const KINDS: [(Kind, Measured); 5] = [
 
 /// Channels of a name with their weights; `kind` is that of its unit.
 fn channels_of_name(name: &ColumnName, kind: Option<Kind>) -> Vec<(Channel, Weight)> {
+    let has_unit = |of: Kind| kind.is_none_or(|kind| kind == of);
+    if name.has(Word::Dew) {
+        return has_unit(Kind::Temperature).then_some((Channel::DewPoint, 7)).into_iter().collect();
+    }
+    if name.has(Word::Is(Measured::Humidity)) {
+        return has_unit(Kind::Fraction).then_some((Channel::RelativeHumidity, 7)).into_iter().collect();
+    }
     let by_unit = kind.and_then(|kind| KINDS.iter().find(|(known, _)| *known == kind));
     let measured = match (by_unit, name.measured()) {
         (Some((_, unit)), own) if own.is_none_or(|own| own == *unit) => *unit,
@@ -118,6 +125,8 @@ mod tests {
             ("Turbocharger speed", "", n, "N"),
             ("Drehzahl ATL", "", n, "N"),
             ("Temperatur nach Verdichter", "", t, "T2"),
+            ("rel. Luftfeuchte", "", Some(Kind::Fraction), "RH"),
+            ("Dew point inlet", "", t, "T_dew"),
             ("Druck vor Verdichter", "", p, "P1"),
             ("Druck vor Turbine", "", p, "P3"),
             ("P1C_H", "P1C", p, "P1"),

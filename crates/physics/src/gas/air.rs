@@ -9,7 +9,7 @@ use mapper_core::EfficiencyDefinition;
 use serde::{Deserialize, Serialize};
 
 /// Specific gas constant of dry air, J/(kg K).
-pub const GAS_CONSTANT_J_KGK: f64 = 287.05;
+pub const GAS_CONSTANT_J_KGK: f64 = Gas::CLOSED_FORM_AIR.gas_constant_j_kgk;
 
 /// Ratio of specific heats used where the paper's model holds it constant (orifice, filling of the volume).
 pub const HEAT_CAPACITY_RATIO: f64 = 1.4;

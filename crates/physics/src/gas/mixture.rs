@@ -58,7 +58,7 @@ impl Gas {
     /// Dry air of the closed form `cp = 1002.5 + 275e-6 (T - 200)^2` J/(kg K), with which the virtual laboratory and the paper's model compute: a
     /// perfect gas.
     pub const CLOSED_FORM_AIR: Gas = Gas {
-        gas_constant_j_kgk: super::air::GAS_CONSTANT_J_KGK,
+        gas_constant_j_kgk: 287.05,
         heat_capacity: [1013.5, -110.0, 275.0, 0.0, 0.0, 0.0, 0.0],
         virials: None,
     };

@@ -1,11 +1,11 @@
 //! Reads files of `mapper` with all their columns; [`mapper_maps::table`] reads those of other programs.
 
+use crate::heading::GAS_PREFIX;
 use ::csv::{ReaderBuilder, StringRecord, Trim};
 use mapper_core::{
     CommonErrors, CompressorMap, EfficiencyDefinition, ImportError, ImportedMap, MapDescription, MapPoint,
     Method, ReferenceState, SpeedShift, Verdict, Warning,
 };
-use crate::heading::GAS_PREFIX;
 use mapper_maps::table::{
     Row, check_point_count, efficiency_in_comment, line, read_text, reference_in_comment, resolve_reference,
     text_of,

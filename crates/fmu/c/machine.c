@@ -14,6 +14,9 @@ static double largest(double a, double b) { return a > b ? a : b; }
 
 #define MOLAR_GAS_CONSTANT 8.314462618
 
+/* Of dry air, real or of the closed form as `gas`. */
+static double air_constant(const Gas *gas) { return gas->is_real ? REAL_AIR_GAS_CONSTANT : GAS_CONSTANT; }
+
 /* `dry` with a mass fraction of water vapour. */
 static Gas with_vapour(const Gas *dry, double fraction) {
     Gas gas;
@@ -141,7 +144,7 @@ static double drop_ratio(double ln_expansion, double cp) { return 1.0 - exp(-TUR
 static void turbine(double *r, double housing_k, double speed_rad_s) {
     const double t3_k = r[VR_T3], ln_expansion = log(r[VR_P3] / r[VR_P4]);
     const double flow = r[VR_turbine_choked_flow] * sqrt(1.0 - exp(-1.1 * ln_expansion)) * (r[VR_P3] / 101325.0) / sqrt(t3_k / 288.15)
-                        / sqrt(TURBINE_GAS.constant / GAS_CONSTANT);
+                        / sqrt(TURBINE_GAS.constant / air_constant(&TURBINE_GAS));
     const double cp = heat_capacity(&TURBINE_GAS, t3_k);
     const double h = convection(r[VR_turbine_nusselt_coefficient], r[VR_turbine_nusselt_exponent], r[VR_turbine_inlet_diameter], flow,
                                 t3_k, housing_k);
@@ -176,7 +179,7 @@ static double outputs(double *r, const int *switches, const double *y, double *v
     const double t1_k = r[VR_T1], p1_pa = r[VR_P1];
     const double humidity = r[VR_compressor_humidity];
     const Gas gas = with_vapour(&COMPRESSOR_GAS, humidity / (1.0 + humidity));
-    const double flow_ratio = sqrt(GAS_CONSTANT / gas.constant);
+    const double flow_ratio = sqrt(air_constant(&gas) / gas.constant);
     const double cp1 = heat_capacity(&gas, t1_k);
     const double p2_pa = y[OUTLET], pressure_ratio = p2_pa / p1_pa;
     const int inner = r[VR_compressor_inner_capacity_ratio] > 0.0;

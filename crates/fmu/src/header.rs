@@ -57,6 +57,7 @@ fn constants(text: &mut String, reference: ReferenceState) -> Result<(), FmuErro
     for (name, value) in [
         ("PI", std::f64::consts::PI),
         ("GAS_CONSTANT", air::GAS_CONSTANT_J_KGK),
+        ("REAL_AIR_GAS_CONSTANT", Gas::AIR_GAS_CONSTANT_J_KGK),
         ("GAMMA_AIR", air::HEAT_CAPACITY_RATIO),
         ("STEFAN_BOLTZMANN", housing::STEFAN_BOLTZMANN_W_M2K4),
         ("WALL_EXPONENT", nusselt::WALL_EXPONENT),

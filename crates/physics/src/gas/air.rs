@@ -188,10 +188,13 @@ impl Air {
         self.gas_constant_j_kgk() / self.heat_capacity_j_kgk(temperature_k)
     }
 
-    /// Flow of dry air at the same Mach numbers over the flow of this gas: `sqrt(R/R_dry)`. Corrected flows are those of dry air.
+    /// Flow of dry air, real or of the closed form as this gas, at the same Mach numbers over the flow of this gas: `sqrt(R/R_dry)`. Corrected
+    /// flows are those of dry air.
     #[inline]
     pub fn dry_flow_ratio(self) -> f64 {
-        (self.gas_constant_j_kgk() / GAS_CONSTANT_J_KGK).sqrt()
+        let dry_j_kgk =
+            if self.gas.virials.is_some() { Gas::AIR_GAS_CONSTANT_J_KGK } else { GAS_CONSTANT_J_KGK };
+        (self.gas_constant_j_kgk() / dry_j_kgk).sqrt()
     }
 
     /// h of this gas over that of dry air at the same flow: the root of the Prandtl number.

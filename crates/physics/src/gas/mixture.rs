@@ -63,6 +63,9 @@ impl Gas {
         virials: None,
     };
 
+    /// Specific gas constant of [`Gas::air`], J/(kg K).
+    pub const AIR_GAS_CONSTANT_J_KGK: f64 = 287.039038;
+
     /// Mole fractions of dry air (ISO 2533, with the carbon dioxide of 2020).
     const AIR: [(Species, f64); 4] =
         [(Species::N2, 0.780_84), (Species::O2, 0.209_39), (Species::Ar, 0.009_34), (Species::CO2, 0.000_43)];
@@ -233,4 +236,14 @@ fn cross_virial(one: &SpeciesData, other: &SpeciesData) -> SecondVirial {
         scale *= critical_k;
         coefficient
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_constant_of_air_is_that_of_its_composition() {
+        assert!((Gas::air().gas_constant_j_kgk - Gas::AIR_GAS_CONSTANT_J_KGK).abs() < 1e-6);
+    }
 }

@@ -70,7 +70,7 @@ pub struct Gases {
 pub fn energy_balance(
     recording: &Recording,
     span_s: (f64, f64),
-    gases: Gases,
+    gases: &Gases,
     declared: &BTreeMap<Channel, DeclaredUncertainty>,
 ) -> EnergyBalance {
     let mut readings = [f64::NAN; INPUTS.len()];
@@ -116,7 +116,7 @@ pub fn energy_balance(
 const POWERS: usize = 5;
 
 /// Compressor, turbine, oil, water, losses, W; NaN if a reading is missing.
-fn powers_w(readings: &[f64; INPUTS.len()], gases: Gases, oil_ratio: f64) -> [f64; POWERS] {
+fn powers_w(readings: &[f64; INPUTS.len()], gases: &Gases, oil_ratio: f64) -> [f64; POWERS] {
     let &[m_c, t1_k, t2_k, m_t, t3_k, t4_k, m_oil, oil_k, oil_out_k, m_water, water_k, water_out_k] =
         readings;
     let compressor = m_c * gases.compressor.enthalpy_rise_j_kg(t1_k, t2_k);
@@ -161,7 +161,7 @@ mod tests {
         )]);
         let balance = |readings: &[(Channel, f64)]| {
             let gases = Gases { compressor: Air::DRY, turbine: Gas::CLOSED_FORM_AIR };
-            energy_balance(&recording(readings), (0.0, 1.0), gases, &declared)
+            energy_balance(&recording(readings), (0.0, 1.0), &gases, &declared)
         };
         let gas = balance(&readings);
         let (compressor, turbine) = (gas.compressor.unwrap(), gas.turbine.unwrap());

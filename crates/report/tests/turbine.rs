@@ -78,7 +78,7 @@ fn from_the_gas_temperatures(state: &[f64; 7]) -> f64 {
 #[test]
 fn flow_parameter_expansion_ratio_and_efficiency_are_those_of_the_reference() {
     for state in &STATES {
-        let points = turbine_points(&recording(state), &[identified(state)], GASES);
+        let points = turbine_points(&recording(state), &[identified(state)], &GASES);
         let [point] = points.as_slice() else { panic!("{points:?}") };
         // kg K^0.5 / (s kPa), by definition.
         let parameter = state[4] * T3_K.sqrt() / (state[1] / 1e3);
@@ -96,9 +96,9 @@ fn flow_parameter_expansion_ratio_and_efficiency_are_those_of_the_reference() {
 fn bearing_friction_shows_as_lost_efficiency() {
     // A wheel that gives 5 % more power than the compressor takes, by 5 % more flow: the difference is mechanical loss.
     let mut state = STATES[5];
-    let before = turbine_points(&recording(&state), &[identified(&state)], GASES)[0].efficiency.unwrap();
+    let before = turbine_points(&recording(&state), &[identified(&state)], &GASES)[0].efficiency.unwrap();
     state[4] *= 1.05;
-    let after = turbine_points(&recording(&state), &[identified(&state)], GASES)[0].efficiency.unwrap();
+    let after = turbine_points(&recording(&state), &[identified(&state)], &GASES)[0].efficiency.unwrap();
     assert!((before / after - 1.05).abs() < 1e-12);
 }
 
@@ -107,7 +107,7 @@ fn what_is_not_known_is_absent_and_never_a_number() {
     let state = STATES[3];
     let mut unknown = identified(&state);
     unknown.eta = None;
-    let points = turbine_points(&recording(&state), &[unknown], GASES);
+    let points = turbine_points(&recording(&state), &[unknown], &GASES);
     assert_eq!(points[0].efficiency, None);
     let text = turbine_text("turbo_a", &points);
     assert!(
@@ -121,6 +121,6 @@ fn what_is_not_known_is_absent_and_never_a_number() {
     let mut broken = recording(&state);
     broken.series.get_mut(&Channel::T3).unwrap().values.fill(f64::NAN);
     for recording in [backwards, missing, broken] {
-        assert!(turbine_points(&recording, &[identified(&state)], GASES).is_empty());
+        assert!(turbine_points(&recording, &[identified(&state)], &GASES).is_empty());
     }
 }

@@ -32,11 +32,11 @@ pub struct TurbinePoint {
 
 /// The turbine results of every point whose channels are present and plausible; the compressor's gas has the definition of the points'
 /// efficiency.
-pub fn turbine_points(recording: &Recording, points: &[IdentifiedPoint], gases: Gases) -> Vec<TurbinePoint> {
+pub fn turbine_points(recording: &Recording, points: &[IdentifiedPoint], gases: &Gases) -> Vec<TurbinePoint> {
     points.iter().filter_map(|point| turbine_point(recording, point, gases)).collect()
 }
 
-fn turbine_point(recording: &Recording, point: &IdentifiedPoint, gases: Gases) -> Option<TurbinePoint> {
+fn turbine_point(recording: &Recording, point: &IdentifiedPoint, gases: &Gases) -> Option<TurbinePoint> {
     let step = recording.steps.iter().find(|step| step.index == point.step)?;
     let mean = |channel: Channel| {
         let (_, values) = recording.series.get(&channel)?.slice(step.end_s - AVERAGE_S, step.end_s);

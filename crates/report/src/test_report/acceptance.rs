@@ -49,7 +49,7 @@ fn balances<'a>(report: JudgedPoints<'a>) -> Vec<(&'a StepMarker, EnergyBalance)
         .filter_map(|scored| report.recording.steps.iter().find(|step| step.index == scored.point.step));
     let balance = |step: &'a StepMarker| {
         let span_s = ((step.end_s - END_S).max(step.start_s), step.end_s);
-        (step, energy_balance(report.recording, span_s, gases, report.used))
+        (step, energy_balance(report.recording, span_s, &gases, report.used))
     };
     steps.map(balance).collect()
 }

@@ -44,7 +44,7 @@ impl Session<'_> {
         let (machine, params) = (&campaign.machine.name, &campaign.machine.params);
         let thermal = ThermalExport { machine, params, found: identified.thermal.as_ref() };
         let gases = Gases { compressor: params.compressor.air(), turbine: params.turbine.gas };
-        let turbine = turbine_points(&identified.recording, &points, gases);
+        let turbine = turbine_points(&identified.recording, &points, &gases);
         let law = identified.thermal.as_ref().and_then(|found| found.convection.as_ref()?.exponent.value);
         let heat = heat_transfer_figure(machine, &points, law.unwrap_or(params.compressor.nusselt_exponent));
         let mut contents: Vec<(&str, Vec<u8>)> = vec![

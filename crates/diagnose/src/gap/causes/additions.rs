@@ -159,7 +159,7 @@ impl FitNeighbourhood<'_> {
             let seen = self.projector.projected(seen, &right, &self.right_residual);
             (own > 1.0).then(|| self.along(late, parameter, step, &change, (own, seen)))
         };
-        self.study.onsets_of(effect).into_iter().filter_map(from).collect()
+        self.study.onsets_of(effect).filter_map(from).collect()
     }
 
     /// A step of the parameter to the side that the data suggest, with its change and products.

@@ -28,7 +28,7 @@ fn a_matrix_of_each_quantity_makes_one_map() {
     }
 }
 
-/// Sheets named after their quantity, as a spreadsheet has them beside a sheet of notes.
+/// Sheets named after their quantity, and a sheet of notes.
 #[test]
 fn a_sheet_of_each_quantity_makes_one_map() {
     let notes: &[&[&str]] = &[&["Reference 298 K 100 kPa"]];

@@ -214,7 +214,8 @@ pub(crate) struct Departure {
     pub(crate) heat_capacity_j_kgk: f64,
 }
 
-/// Second virial coefficient of a pair of species (Tsonopoulos 1974, without the term in Tr^-8, below 1 % above 220 K; Prausnitz's mixing rules).
+/// Second virial coefficient of a pair of species (Tsonopoulos 1974; Prausnitz's mixing rules). The term in Tr^-8 is left out: it matters for
+/// water with itself alone, a fifth of that coefficient at 300 K.
 fn cross_virial(one: &SpeciesData, other: &SpeciesData) -> SecondVirial {
     let critical_k = (one.critical_k * other.critical_k).sqrt();
     let volume_m3_mol = (0.5 * (one.critical_m3_mol.cbrt() + other.critical_m3_mol.cbrt())).powi(3);

@@ -33,7 +33,7 @@ impl Species {
     pub const ALL: [Species; 7] =
         [Species::N2, Species::O2, Species::Ar, Species::CO2, Species::H2O, Species::H2, Species::CH4];
 
-    /// Its constants. Masses and critical points are those of CoolProp 6.6; the heat capacities are fitted to its ideal-gas parts from 220 to
+    /// Its constants. Masses and critical points are those of CoolProp 8.0; the heat capacities are fitted to its ideal-gas parts from 220 to
     /// 1400 K, within 0.16 % below 650 K and 0.35 % above (`benches/gas_properties.py`).
     pub(crate) fn data(self) -> SpeciesData {
         let (molar_mass_kg_mol, critical_k, critical_pa, critical_mol_m3, acentric_factor, heat_capacity) =
@@ -75,9 +75,9 @@ impl Species {
                 ),
                 Species::H2 => (
                     2.01588e-3,
-                    33.145,
-                    1.2964e6,
-                    15_508.0,
+                    33.144_33,
+                    1.296_358e6,
+                    15_501.88,
                     -0.219,
                     [1.7648514, 14.777206, -50.053439, 86.678939, -80.838403, 38.831064, -7.526478],
                 ),

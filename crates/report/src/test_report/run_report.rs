@@ -291,9 +291,9 @@ pub fn condition_facts(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
     }
     rows.push(("reference state of corrected quantities", report.reference.to_string()));
     rows.push(("definition of efficiency", report.efficiency.description()));
-    rows.extend(
-        report.campaign.map(|campaign| ("gas", campaign.machine.params.compressor.air().description())),
-    );
+    let measured = report.map.and_then(|map| map.gas.clone());
+    let declared = || report.campaign.map(|campaign| campaign.machine.params.compressor.air().description());
+    rows.extend(measured.or_else(declared).map(|gas| ("gas", gas)));
     rows
 }
 

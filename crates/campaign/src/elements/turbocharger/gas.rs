@@ -9,14 +9,14 @@ use mapper_yaml::{FindingKind, steps};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// Difference of the sum of volume fractions from 1 that rounding explains, ratio: half of the last digit of seven values in tenths of a per cent.
-const MAX_ROUNDING_RATIO: f64 = 0.0035;
+/// Difference of the sum of volume fractions from 1 that rounding explains, ratio: six values rounded to tenths of a per cent.
+const MAX_ROUNDING_RATIO: f64 = 0.003;
 
 /// The gases that flow through the machine.
 #[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct GasFile {
-    /// Dry gas of the compressor: `air` as a real gas, `closed_form_air`, whose heat capacity is a formula (the default, and the gas of the virtual lab's reference solutions), or volume fractions of a mixture. `report: {humidity: 50 %}` adds water vapour.
+    /// Dry gas of the compressor: `air` as a real gas, `closed_form_air`, whose heat capacity is a formula (the default, and the gas of the virtual lab's reference solutions), or volume fractions of a mixture, whose viscosity and conductivity stay those of air. `report: {humidity: 50 %}` adds water vapour.
     #[schemars(example = &"air")]
     compressor: Option<CompressorGas>,
     /// Gas of the turbine: air burnt with a fuel. `closed_form_air` if it is left out.

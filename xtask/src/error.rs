@@ -17,6 +17,8 @@ pub enum Error {
     File { path: PathBuf, source: std::io::Error },
     /// Some steps failed; each has printed the reason.
     Steps { failed: Vec<&'static str> },
+    /// The compiler or clippy printed warnings.
+    Warnings { count: usize },
     /// Tests were left out that had to run.
     LeftOut { count: usize },
     /// Generated documents are not what the program makes now.
@@ -39,6 +41,7 @@ impl std::fmt::Display for Error {
             }
             Error::File { path, source } => write!(f, "failed to use {}: {source}", path.display()),
             Error::Steps { failed } => write!(f, "failed: {}", failed.join(", ")),
+            Error::Warnings { count } => write!(f, "{count} warnings (shown while building)"),
             Error::LeftOut { count } => {
                 write!(
                     f,

@@ -26,6 +26,9 @@ usage: cargo xtask COMMAND
 
 #[allow(clippy::print_stderr)]
 fn main() -> ExitCode {
+    if let Some(code) = checks::lints::as_rustdoc() {
+        return code;
+    }
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let done = match arguments.as_slice() {

@@ -85,25 +85,6 @@ pub fn command(program: impl AsRef<OsStr>, arguments: &[&str]) -> Command {
     command
 }
 
-/// The command at the lowest priority, where the system has one.
-pub fn in_background(command: Command) -> Command {
-    if !cfg!(unix) {
-        return command;
-    }
-    let mut nice = Command::new("nice");
-    nice.args(["-n", "19"]).arg(command.get_program()).args(command.get_args());
-    for (name, value) in command.get_envs() {
-        match value {
-            Some(value) => nice.env(name, value),
-            None => nice.env_remove(name),
-        };
-    }
-    if let Some(directory) = command.get_current_dir() {
-        nice.current_dir(directory);
-    }
-    nice
-}
-
 /// Runs a command with its output shown.
 pub fn run(mut command: Command) -> Result<(), Error> {
     let text = line(&command);

@@ -1,26 +1,81 @@
 //! Lints and documentation.
 
-use crate::step::command;
+use crate::error::Error;
+use crate::step::{command, output, say};
 use crate::workspace;
+use std::ffi::{OsStr, OsString};
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, ExitCode};
+
+/// The rustdoc that [`documenting`] stands in for.
+const REAL_RUSTDOC: &str = "MAPPER_XTASK_RUSTDOC";
 
 /// Clippy on every target of the workspace, with warnings denied.
-pub fn lints(features: &[&str]) -> Command {
-    let head = ["clippy", "--workspace", "--all-targets", "--quiet"];
-    command(workspace::cargo(), &[&head[..], features, &["--", "-D", "warnings"]].concat())
+pub fn clippy() -> Command {
+    command(
+        workspace::cargo(),
+        &["clippy", "--workspace", "--all-targets", "--quiet", "--", "-D", "warnings"],
+    )
 }
 
-/// The documentation of the members of the workspace, with warnings denied.
-///
-/// Uses the environment variables that `cargo clippy` sets, so that Cargo reuses its results. If a release of clippy uses other variables,
-/// the members are only checked again.
-pub fn documentation() -> Command {
-    let head = ["doc", "--no-deps", "--workspace", "--all-features", "--quiet"];
-    let mut documentation = command(workspace::cargo(), &head);
-    documentation
-        .env("RUSTDOCFLAGS", "-D warnings")
-        .env("RUSTC_WORKSPACE_WRAPPER", Path::new(&workspace::cargo()).with_file_name("clippy-driver"))
-        .env("CLIPPY_ARGS", "-D__CLIPPY_HACKERY__warnings__CLIPPY_HACKERY__");
-    documentation
+/// Compiles the members of the workspace with clippy, which is the compiler with more lints: what is built for the tests is not
+/// checked a second time.
+pub fn linting(mut build: Command) -> Command {
+    build.env("RUSTC_WORKSPACE_WRAPPER", Path::new(&workspace::cargo()).with_file_name("clippy-driver"));
+    build
+}
+
+/// An error where a finished build printed warnings: Cargo repeats them.
+pub fn no_warnings(mut build: Command) -> Result<(), Error> {
+    build.args(["--message-format", "json"]);
+    let messages = output(build)?;
+    let warnings = messages.lines().filter(|line| {
+        line.contains(r#""reason":"compiler-message""#) && line.contains(r#""level":"warning""#)
+    });
+    match warnings.count() {
+        0 => Ok(()),
+        count => Err(Error::Warnings { count }),
+    }
+}
+
+/// Lets the tests of the documentation also make the documentation: with the libraries of the tests, which `cargo doc` would check again.
+pub fn documenting(mut tests: Command) -> Result<Command, Error> {
+    let own =
+        std::env::current_exe().map_err(|source| Error::Start { command: "xtask".to_owned(), source })?;
+    tests.env("RUSTDOC", own);
+    tests.env(REAL_RUSTDOC, Path::new(&workspace::cargo()).with_file_name("rustdoc"));
+    Ok(tests)
+}
+
+/// Runs as the rustdoc of [`documenting`], if this process is it: the tests, then the documentation with warnings denied.
+pub fn as_rustdoc() -> Option<ExitCode> {
+    let rustdoc = std::env::var_os(REAL_RUSTDOC)?;
+    let arguments: Vec<OsString> = std::env::args_os().skip(1).collect();
+    let succeeds = |arguments: &[OsString]| {
+        Command::new(&rustdoc).args(arguments).status().is_ok_and(|status| status.success())
+    };
+    let mut well = succeeds(&arguments);
+    if arguments.iter().any(|argument| argument == "--test") {
+        let out = workspace::target_dir().join("doc").into_os_string();
+        let more = ["-D".into(), "warnings".into(), "--out-dir".into(), out];
+        well &= succeeds(&[without_tests(&arguments), more.to_vec()].concat());
+    }
+    if !well {
+        say("rustdoc failed\n");
+    }
+    Some(if well { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// Arguments of rustdoc without those that concern tests.
+fn without_tests(arguments: &[OsString]) -> Vec<OsString> {
+    let mut kept = Vec::new();
+    let mut arguments = arguments.iter();
+    while let Some(argument) = arguments.next() {
+        if argument == "--test-run-directory" || argument == "--test-args" {
+            arguments.next();
+        } else if argument != "--test" && argument != OsStr::new("--no-run") {
+            kept.push(argument.clone());
+        }
+    }
+    kept
 }

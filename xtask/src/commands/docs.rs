@@ -1,5 +1,6 @@
 //! `cargo xtask docs`: generates documents with the program.
 
+use crate::checks::lints;
 use crate::constants;
 use crate::error::Error;
 use crate::step::{command, output, run, say};
@@ -35,7 +36,7 @@ const GENERATED: &[&str] = &[
 const SHIPPED: &str = "campaigns/turbo_a.yaml";
 
 /// The example that writes the pages of sequences and of campaigns.
-pub const EXAMPLE: &str = "reference_docs";
+const EXAMPLE: &str = "reference_docs";
 
 /// Folder of the measured data that docs/validation/real-data.md describes, with the inputs of `mapper transient`.
 const MEASURED: &str = "examples/real/turbotools";
@@ -187,7 +188,7 @@ fn build() -> Result<Programs, Error> {
     let arguments =
         ["build", "--quiet", "--workspace", "--all-features", "--test", "turbine", "--bin", "mapper"];
     let examples = ["--example", EXAMPLE];
-    run(command(workspace::cargo(), &[&arguments[..], &examples].concat()))?;
+    run(lints::linting(command(workspace::cargo(), &[&arguments[..], &examples].concat())))?;
     let built = workspace::target_dir().join("debug");
     let program = |name: &str| built.join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
     Ok(Programs { mapper: program("mapper"), reference_docs: program(&format!("examples/{EXAMPLE}")) })

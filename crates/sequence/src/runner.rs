@@ -9,7 +9,7 @@ use crate::sandbox::{Budget, SCRIPT_LIMIT, STACK_BYTES, build_engine};
 use crate::session::{Session, lock};
 use crate::step::{ScriptMessage, SequenceStep};
 use crate::{api, names};
-use rhai::{AST, Engine, EvalAltResult, Scope};
+use rhai::{AST, Dynamic, Engine, EvalAltResult, Position, Scope};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex};
@@ -165,7 +165,7 @@ fn compile(engine: &Engine, script: &Script) -> Result<AST, Box<ScriptError>> {
     };
     if script.text.len() > SCRIPT_LIMIT {
         let message = format!("the script has {} bytes, more than {SCRIPT_LIMIT}", script.text.len());
-        let thrown = EvalAltResult::ErrorRuntime(message.into(), rhai::Position::NONE);
+        let thrown = EvalAltResult::ErrorRuntime(message.into(), Position::NONE);
         return Err(Box::new(ScriptError::from_run_error(script.path.clone(), "", thrown)));
     }
     if let Some(at) = find_unclosed_comment(&script.text) {
@@ -192,8 +192,15 @@ fn run(script: &Script, budget: &Arc<Budget>, session: Session) {
         return;
     }
     let outcome = compiled.and_then(|ast| {
+        // A native function, such as `sort`, swallows the error of its callback.
+        let unspent = |()| {
+            budget.count_operation().map_or(Ok(()), |end| {
+                Err(EvalAltResult::ErrorTerminated(Dynamic::from(end), Position::NONE).into())
+            })
+        };
         engine
             .run_ast_with_scope(&mut Scope::new(), &ast)
+            .and_then(unspent)
             .map_err(|error| Box::new(ScriptError::from_run_error(script.path.clone(), &script.text, *error)))
     });
     lock(&session).end(|notes| match outcome {

@@ -53,7 +53,7 @@ impl Budget {
     }
 
     /// Counts one operation.
-    fn count_operation(&self) -> Option<ScriptEnd> {
+    pub(crate) fn count_operation(&self) -> Option<ScriptEnd> {
         if self.cancelled.load(Ordering::Relaxed) {
             return Some(ScriptEnd::Cancelled);
         }
@@ -77,6 +77,8 @@ pub(crate) fn build_engine(grid_points: usize, budget: &Arc<Budget>) -> Engine {
     engine.disable_symbol("eval");
     // A value reached through `this` would bypass the measurement of variables below.
     engine.disable_symbol("this");
+    // A function with arguments stored in it is not measured: `f = f.curry(f)` doubles it without limit.
+    engine.disable_symbol("curry");
     let element_limit = ARRAY_LIMIT.max(2 * grid_points);
     // The engine measures the results of functions and operators, but not of `a[i] = b`, so that nested arrays
     // could multiply. Therefore each variable is measured whenever it is used.

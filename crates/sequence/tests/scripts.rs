@@ -275,6 +275,11 @@ fn hostile_scripts_end_with_an_error() {
             "too large",
         ),
         ("fn f(b) { this[0] = b; } let a = [0]; a.f([1]);", "cannot be read"),
+        ("let f = Fn(\"abs\"); loop { f = f.curry(f); }", "cannot be read"),
+        ("let f = Fn(\"abs\"); loop { f = curry(f, f); }", "cannot be read"),
+        // The native function swallows the error of its callback, and nothing follows it.
+        ("let a = [2, 1]; a.sort(|x, y| { loop { } });", "operations"),
+        ("jump(grid()[0]); let a = [2, 1]; a.dedup(|x, y| { loop { } })", "operations"),
         ("let a = []; a.pad(1_000_000_000, 0);", "too large"),
         ("let s = \"x\"; s.pad(1_000_000_000, \"x\");", "too large"),
         ("let s = \"\"; s.pad(4000, \"x\"); s.replace(\"x\", s);", "too large"),

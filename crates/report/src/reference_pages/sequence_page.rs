@@ -42,7 +42,7 @@ rehearsal never touches the rig.
 - Speeds, times and rates are texts with units, as in the campaign: `\"110 krpm\"`, `\"120 s\"`, `\"0.02 K/s\"`.
   Computed ones are written `` `${1.1 * p.speed_rpm} rpm` ``.
 - A number that is not there is `()`; ask `r.has_eta` before using `r.eta`.
-- There are no files, no network, no clock, no modules, no `eval`, no `this`, and functions do not
+- There are no files, no network, no clock, no modules, no `eval`, `this` or `curry`, and functions do not
   capture variables. Operations
   (5 million), depth of calls (32), length of strings (4096 bytes), arrays (4096 elements, or twice the grid) and maps
   (1024 entries), variables (128), steps (2 000), points that the planner orders (100 at once, or the grid; twice as

@@ -36,21 +36,30 @@ fn handle_signal(stop: &RunStop, gentle: bool) {
 /// Faults of the program itself (SIGSEGV and its like) cannot be.
 #[cfg(unix)]
 pub fn run_stop() -> Result<RunStop, Failure> {
+    use nix::sys::signal::{SigSet, Signal};
     use signal_hook::consts::*;
     use signal_hook::iterator::Signals;
     let stop = RunStop::default();
     let raised = stop.clone();
-    // SIGXFSZ: a limit of file sizes; the write then fails with an error.
     let ends = [
         SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGIO, SIGXCPU,
-        SIGXFSZ, SIGABRT,
+        SIGXFSZ, SIGABRT, SIGSYS, SIGTRAP,
     ];
-    let mut signals = Signals::new(ends.into_iter().chain([SIGTSTP])).map_err(failed)?;
+    // A background job that prints to a terminal with `stty tostop` would be suspended. Blocked, the signal lets the text through;
+    // the threads started below inherit this.
+    let mut suspends = SigSet::empty();
+    suspends.add(Signal::SIGTTOU);
+    suspends.add(Signal::SIGTTIN);
+    suspends.thread_block().map_err(failed)?;
+    let mut signals =
+        Signals::new(ends.into_iter().chain(more_signals()).chain([SIGTSTP])).map_err(failed)?;
     let watch = move || {
         signals.forever().for_each(|signal| match signal {
             SIGTSTP if raised.uses_rig() => standard_output::warn(
                 "The run continues, because a suspended program could not protect the rig. Press Ctrl-C to stop the run.\n",
             ),
+            // The write that reached the limit has failed and reports it.
+            SIGXFSZ if !raised.uses_rig() => {}
             // If this fails, the process continues.
             SIGTSTP => drop(signal_hook::low_level::emulate_default_handler(SIGTSTP)),
             _ => handle_signal(&raised, signal == SIGINT),
@@ -58,6 +67,18 @@ pub fn run_stop() -> Result<RunStop, Failure> {
     };
     std::thread::Builder::new().name("signals".to_owned()).spawn(watch).map_err(failed)?;
     Ok(stop)
+}
+
+/// Further signals that would end the process and that only Linux has.
+#[cfg(unix)]
+fn more_signals() -> Vec<i32> {
+    #[cfg(target_os = "linux")]
+    {
+        use nix::libc::{SIGPWR, SIGRTMAX, SIGRTMIN, SIGSTKFLT};
+        (SIGRTMIN()..=SIGRTMAX()).chain([SIGPWR, SIGSTKFLT]).collect()
+    }
+    #[cfg(not(target_os = "linux"))]
+    Vec::new()
 }
 
 /// The flags that Ctrl-C raises while a rig is run.

@@ -33,7 +33,14 @@ function waits(step) {
   return `waits for the heat to move through the window of identification; ends in ${left}`;
 }
 
+// Stop and safe work without the stream of readings, for which the server may have no room.
+function showButtons() {
+  const pressed = { hold: !connected || now?.holds || now?.stops, "go-on": !connected || !now?.holds, stop: connected && now?.stops };
+  document.querySelectorAll("button[data-ask]").forEach(button => { button.disabled = over || Boolean(pressed[button.dataset.ask]); });
+}
+
 function showNow() {
+  showButtons();
   if (!now) return;
   const step = now.step;
   text("phase", over ? "The run has ended" : step ? `${step.step ? `Step ${step.step} of ${Math.max(steps, step.step)}` : "A step once more"}: ${step.place}` : now.phase);
@@ -43,8 +50,6 @@ function showNow() {
   const half = now.left_half_s >= 0.5 ? ` ± ${lasting(now.left_half_s)}` : "";
   const done = paced == null ? "" : `, at about ${new Date(Date.now() + 1000 * paced).toLocaleTimeString("en-GB", { hour: "2-digit", minute: "2-digit" })}` + (pace === 1 ? "" : ` (the rig's time runs ${short(pace)} times as fast)`);
   text("left", over ? "" : `${lasting(now.t_s)} of rig time done, ${lasting(now.left_s)}${half} to the end${done}.`);
-  const pressed = { hold: now.holds || now.stops, "go-on": !now.holds, stop: now.stops, safe: false };
-  document.querySelectorAll("button[data-ask]").forEach(button => { button.disabled = over || !connected || pressed[button.dataset.ask]; });
   const body = byId("readings");
   now.readings.forEach((r, i) => {
     const row = body.rows[i] ?? body.insertRow();

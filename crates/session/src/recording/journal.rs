@@ -178,6 +178,11 @@ pub fn read_journal(path: &Path) -> std::io::Result<Vec<JournalPart>> {
     for line in bytes.split(|byte| *byte == b'\n') {
         match (serde_json::from_slice::<Entry>(line), parts.last_mut()) {
             (Ok(Entry::Part { identity, recording }), _) => {
+                if Path::new(&recording).file_name() != Some(recording.as_ref()) {
+                    let why =
+                        format!("it names the recording `{recording}`, which is not in the run's directory");
+                    return Err(std::io::Error::new(ErrorKind::InvalidData, why));
+                }
                 parts.push(JournalPart {
                     identity,
                     recording,
@@ -251,6 +256,18 @@ mod tests {
             let more = read_journal(&path).unwrap();
             assert_eq!(more.last().unwrap().recording, "c");
             assert_eq!(more.len(), parts.len() + 1);
+        }
+    }
+
+    #[test]
+    fn a_recording_outside_of_the_run_is_refused() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("journal");
+        for name in ["/etc/passwd", "../other/recording.mcap", "", "..", "a/../b"] {
+            let mut journal = Journal::open(&path, false).unwrap();
+            journal.write(&part(name)).unwrap();
+            assert_eq!(read_journal(&path).unwrap_err().kind(), ErrorKind::InvalidData, "{name}");
+            std::fs::remove_file(&path).unwrap();
         }
     }
 

@@ -4,10 +4,10 @@ use crate::recording::resume::InterruptedRun;
 use crate::recording::run_directory;
 use crate::{Registry, SessionError};
 use mapper_campaign::{Campaign, CampaignError};
-use mapper_core::Recording;
+use mapper_core::{Channel, Recording};
 use mapper_observe::OtherMachine;
 use mapper_recording::{ChannelMap, ReadOptions, ReadReport, read_recording, read_recording_from};
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashSet};
 use std::path::{Path, PathBuf};
 
 /// A recording, its file and its campaign.
@@ -154,19 +154,47 @@ fn resumed_run(path: &Path) -> Result<Option<InterruptedRun>, SessionError> {
     }
 }
 
-/// Rejects a recording that was given twice: its noise would count as new evidence.
+/// Rejects a recording that was given twice, even if it was cut, renamed or exported again: its noise would count as new evidence. The parts of
+/// a run may share samples only if they come from a simulator without noise.
 ///
 /// # Errors
-/// [`SessionError::SameRecording`] with both paths, regardless of the file names.
+/// [`SessionError::SameRecording`] with both paths.
 pub(crate) fn check_all_distinct(recorded: &[Recorded]) -> Result<(), SessionError> {
-    for (place, second) in recorded.iter().enumerate() {
-        let series = &second.read.recording.series;
-        let same = |first: &&Recorded| !series.is_empty() && first.read.recording.series == *series;
-        if let Some(first) = recorded[..place].iter().find(same) {
-            return Err(SessionError::SameRecording([first.path.clone(), second.path.clone()]));
+    if recorded.len() < 2 {
+        return Ok(());
+    }
+    let rows: Vec<_> = recorded.iter().map(|one| distinct_rows(&one.read.recording)).collect();
+    let part_of = |one: &Recorded| {
+        run_directory::is_recording(&one.path).then(|| one.path.parent().map(Path::to_owned)).flatten()
+    };
+    for (second, first) in
+        (0..recorded.len()).flat_map(|second| (0..second).map(move |first| (second, first)))
+    {
+        let (a, b) = (&recorded[first], &recorded[second]);
+        let common = || rows[first].intersection(&rows[second]).count();
+        let same = a.read.recording.series == b.read.recording.series && !b.read.recording.series.is_empty();
+        let of_one_run = a.path != b.path && part_of(a).is_some() && part_of(a) == part_of(b);
+        if same || (!of_one_run && 2 * common() > rows[first].len().min(rows[second].len())) {
+            return Err(SessionError::SameRecording([a.path.clone(), b.path.clone()]));
         }
     }
     Ok(())
+}
+
+/// The samples of N, m_c, P2 and T2 to five digits, each once, so that a constant signal counts as one. With noise, two recordings have hardly any in
+/// common; five digits survive an export as single-precision numbers.
+fn distinct_rows(recording: &Recording) -> HashSet<[i64; 4]> {
+    let series = |channel| recording.series.get(&channel);
+    let five_digits = |value: f64| {
+        let exponent = value.abs().log10().floor().clamp(-300.0, 300.0);
+        (value / 10f64.powf(exponent - 4.0)).round() as i64
+    };
+    let channels = [Channel::ShaftSpeed, Channel::CompressorFlow, Channel::P2, Channel::T2].map(series);
+    let times = channels[3].map_or(&[][..], |t2| &t2.t_s);
+    times
+        .iter()
+        .map(|t_s| channels.map(|one| one.and_then(|one| one.interpolate(*t_s)).map_or(0, five_digits)))
+        .collect()
 }
 
 /// The campaign attached to a recording; `None` if there is none.

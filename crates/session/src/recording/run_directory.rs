@@ -32,6 +32,13 @@ pub(crate) fn further_recording(part: usize) -> String {
     format!("recording-{part}.mcap")
 }
 
+/// Whether a file is one of a run's recordings, by its name.
+pub(crate) fn is_recording(path: &Path) -> bool {
+    let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    let number = name.strip_prefix("recording-").and_then(|rest| rest.strip_suffix(".mcap"));
+    name == RECORDING || number.is_some_and(|number| number.parse::<usize>().is_ok())
+}
+
 /// Whether a file of this name is a result: points, map, report, page, or executed steps of a script.
 pub(crate) fn is_result(name: &str) -> bool {
     [POINTS, BUDGET, REPORT, PAGE, EXECUTED].contains(&name) || name.starts_with("map.")

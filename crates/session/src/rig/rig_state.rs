@@ -365,7 +365,13 @@ fn make_directory(path: &Path, shared: bool) -> io::Result<()> {
     if path.is_dir() {
         return Ok(());
     }
-    std::fs::create_dir_all(path)?;
+    std::fs::create_dir_all(path).map_err(|error| match error.kind() {
+        // A file, or a link to a place that does not exist.
+        ErrorKind::AlreadyExists => {
+            io::Error::new(ErrorKind::NotADirectory, "it is a file or a broken link, not a directory")
+        }
+        _ => error,
+    })?;
     if shared { share(path, 0o777) } else { Ok(()) }
 }
 

@@ -27,15 +27,17 @@ pub fn table<H: AsRef<str>, R: AsRef<[String]>>(
     text
 }
 
-/// Markdown in which nothing is HTML: a `<` that would begin a tag, a comment or a declaration is escaped (CommonMark, 6.6).
-pub fn without_html(text: &str) -> String {
+/// Markdown without HTML and links: a `<` that would begin a tag, a comment or a declaration, and a `(` that would begin an address are escaped
+/// (CommonMark, 6.3 and 6.6).
+pub fn without_html_and_links(text: &str) -> String {
     let begins = |next: Option<char>| {
         next.is_some_and(|next| next.is_ascii_alphabetic() || ['/', '!', '?'].contains(&next))
     };
     let mut escaped = String::with_capacity(text.len());
     let mut letters = text.chars().peekable();
     while let Some(letter) = letters.next() {
-        if letter == '<' && begins(letters.peek().copied()) && !escaped.ends_with('\\') {
+        let tag = letter == '<' && begins(letters.peek().copied()) && !escaped.ends_with('\\');
+        if tag || letter == '(' && escaped.ends_with(']') {
             escaped.push('\\');
         }
         escaped.push(letter);
@@ -53,7 +55,7 @@ fn row<C: AsRef<str>>(cells: &[C]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Align, table, without_html};
+    use super::{Align, table, without_html_and_links};
 
     /// CommonMark's table extension requires a backslash before a bar inside a cell.
     #[test]
@@ -63,9 +65,10 @@ mod tests {
     }
 
     #[test]
-    fn a_name_is_no_tag() {
-        let text = "<script>x</script> a < b, T2 <- T1 <!-- --> \\<b>";
-        assert_eq!(without_html(text), "\\<script>x\\</script> a < b, T2 <- T1 \\<!-- --> \\<b>");
+    fn a_name_is_neither_a_tag_nor_a_link() {
+        let text = "<script>x</script> a < b, T2 <- T1 <!-- --> \\<b> [x](y) [K] (z)";
+        let inert = "\\<script>x\\</script> a < b, T2 <- T1 \\<!-- --> \\<b> [x]\\(y) [K] (z)";
+        assert_eq!(without_html_and_links(text), inert);
     }
 
     #[test]

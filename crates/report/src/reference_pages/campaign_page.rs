@@ -1,6 +1,6 @@
 //! The reference of a campaign's keys, from its JSON schema.
 
-use crate::formatting::markdown::{Align, table, without_html};
+use crate::formatting::markdown::{Align, table, without_html_and_links};
 use mapper_campaign::json_schema;
 use serde_json::{Map, Value};
 
@@ -20,7 +20,7 @@ pub fn campaign_page() -> String {
     let mut text = HEAD.to_owned();
     for (key, value) in properties(&schema) {
         let needed = if required(&schema, key) { " Required." } else { "" };
-        text.push_str(&format!("\n## `{key}`\n\n{}{needed}\n", without_html(description(value))));
+        text.push_str(&format!("\n## `{key}`\n\n{}{needed}\n", without_html_and_links(description(value))));
         let mut rows = Vec::new();
         below("", value, &mut rows);
         if rows.is_empty() {
@@ -45,7 +45,11 @@ fn below(path: &str, schema: &Value, rows: &mut Vec<[String; 3]>) {
                 continue;
             }
             let needed = if required(form, key) { " Required." } else { "" };
-            rows.push([name, values(value), format!("{}{needed}", without_html(description(value)))]);
+            rows.push([
+                name,
+                values(value),
+                format!("{}{needed}", without_html_and_links(description(value))),
+            ]);
             below(&path, value, rows);
         }
         if let Some(items) = form.get("items") {

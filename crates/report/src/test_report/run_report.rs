@@ -125,9 +125,14 @@ pub struct SurgeReport<'a> {
     pub surges: usize,
 }
 
-/// The report as Markdown. Names and messages from outside are in it, and no HTML.
+/// The picture of the map, the only link.
+const PICTURE: &str = "![map](map.svg)\n\n";
+
+/// The report as Markdown. Names and messages from outside are in it, but neither HTML, links nor colours.
 pub fn run_report(report: &RunReport<'_>) -> String {
-    markdown::without_html(&terminal_text(&markdown_report(report)))
+    let text = terminal_text(&markdown_report(report)).replace('\u{1b}', "\u{fffd}");
+    let inert = markdown::without_html_and_links;
+    inert(&text).replacen(&inert(PICTURE), PICTURE, 1)
 }
 
 fn markdown_report(report: &RunReport<'_>) -> String {
@@ -167,7 +172,7 @@ fn markdown_report(report: &RunReport<'_>) -> String {
         text.push('\n');
     }
     if has_picture {
-        text.push_str("![map](map.svg)\n\n");
+        text.push_str(PICTURE);
     }
     text.push_str("## Conditions\n\n");
     text.push_str(&facts(&condition_facts(report)));

@@ -182,6 +182,21 @@ pub enum ReadWarning {
         /// The command.
         channel: Channel,
     },
+    /// A gap in the readings is most of a step.
+    #[error(
+        "step {} has no readings for {gap_s:.1} s of its {duration_s:.1} s, from {from_s:.1} s on: the log paused, or its clock was set; split the log there, or correct its times",
+        step_number(*index)
+    )]
+    HollowStep {
+        /// Index of the step, from 0.
+        index: usize,
+        /// Length of the gap, s.
+        gap_s: f64,
+        /// Its start, s.
+        from_s: f64,
+        /// Duration of the step, s.
+        duration_s: f64,
+    },
     /// The run ended within a step.
     #[error("step {} has no end: the run ended early, at {end_s} s", step_number(*index))]
     UnfinishedStep {

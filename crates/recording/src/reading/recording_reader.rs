@@ -13,7 +13,7 @@ use crate::samples::rig_sink::{PositionedMessage, RigSink};
 use crate::samples::series_builder::{SeriesBuilder, run_time_s};
 use crate::step_detection::jump_steps::{can_be_searched, drop_rest_steps, steps_from_jumps};
 use crate::step_detection::measured_valve::{hold_at_step_ends, reversal_share};
-use crate::step_detection::steps::{steps_from_commands, steps_from_markers};
+use crate::step_detection::steps::{hollow_steps, steps_from_commands, steps_from_markers};
 use crate::writing::provenance::OriginMessage;
 use crate::{
     AmbientPressure, ChannelMap, ChannelSource, FormatVersion, ReadWarning, RecordError,
@@ -128,6 +128,7 @@ fn read_as_log(file: &LogFile, map: &ChannelMap, options: &ReadOptions) -> Resul
     let ambient = ambient.as_ref().zip(log.ambient_unit);
     add_derived(map, &mut gathered, &log.units, ambient)?;
     let steps = detect_steps(map, &mut gathered.series, &mut warnings);
+    warnings.extend(hollow_steps(&steps, &gathered.series));
     let RunSeries { series, elements, .. } = gathered;
     Ok(ReadReport {
         recording: Recording { series, elements, steps, ..Recording::default() },
@@ -227,6 +228,7 @@ fn report(
     } else {
         detect_steps(map, &mut gathered.series, &mut warnings)
     };
+    warnings.extend(hollow_steps(&steps, &gathered.series));
     let events =
         sink.events.into_iter().map(|PositionedMessage { log_time_ns, message: mut event, .. }| {
             if sink.start_time_ns.is_none() {

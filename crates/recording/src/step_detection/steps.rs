@@ -135,6 +135,25 @@ pub(crate) fn steps_from_commands(
         .collect()
 }
 
+/// Steps that are mostly a gap in the readings. A pause and a clock that was set at rest look alike.
+pub(crate) fn hollow_steps(
+    steps: &[StepMarker],
+    series: &BTreeMap<Channel, Series>,
+) -> impl Iterator<Item = ReadWarning> {
+    steps.iter().filter_map(|step| {
+        let (times, _) = series.get(&Channel::T2)?.slice(step.start_s, step.end_s);
+        let gaps = times.windows(2).map(|pair| (pair[1] - pair[0], pair[0]));
+        let (gap_s, from_s) = gaps.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let duration_s = step.end_s - step.start_s;
+        (gap_s > MAX_JUMP_GAP_S.max(0.5 * duration_s)).then_some(ReadWarning::HollowStep {
+            index: step.index,
+            gap_s,
+            from_s,
+            duration_s,
+        })
+    })
+}
+
 /// Start and end of each jump of the commands, s.
 fn find_jumps(p3: Option<&Series>, valve: Option<&Series>) -> Vec<(f64, f64)> {
     let p3_changes = p3.map(find_changes).unwrap_or_default();
@@ -225,6 +244,27 @@ mod tests {
             (Channel::P3Command, column(|row| row.1)),
             (Channel::ValveCommand, column(|row| row.2)),
         ])
+    }
+
+    #[test]
+    fn a_step_that_is_mostly_a_gap_is_reported() {
+        let step = |start_s: f64, end_s: f64| StepMarker {
+            index: 4,
+            kind: StepKind::Point,
+            from: None,
+            to: None,
+            start_s,
+            end_s,
+            p3_pa: 2e5,
+            valve_opening_ratio: 1.0,
+        };
+        let t_s: Vec<f64> =
+            (0..600).map(|row| f64::from(row) + if row < 300 { 0.0 } else { 500.0 }).collect();
+        let series = BTreeMap::from([(Channel::T2, Series { values: t_s.clone(), t_s })]);
+        let found = |step| hollow_steps(&[step], &series).collect::<Vec<_>>();
+        assert!(found(step(0.0, 299.0)).is_empty() && found(step(0.0, 1099.0)).is_empty());
+        let hollow = ReadWarning::HollowStep { index: 4, gap_s: 501.0, from_s: 299.0, duration_s: 600.0 };
+        assert_eq!(found(step(250.0, 850.0)), [hollow]);
     }
 
     /// Version 1 of the format has `index` from 0, version 2 `step` from 1.

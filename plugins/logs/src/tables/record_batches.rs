@@ -17,7 +17,9 @@ use arrow_array::types::{
 use arrow_array::{Array, RecordBatch};
 use arrow_schema::{ArrowError, DataType, Field, Schema, TimeUnit};
 use mapper_recording::logs::{Layout, Log, LogError, LogFile, LogOptions, RowSink};
+use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Once;
 
 pub(crate) type Batches = Box<dyn Iterator<Item = Result<RecordBatch, ArrowError>>>;
 
@@ -102,6 +104,12 @@ impl Chunks for BatchChunks<'_> {
     }
 }
 
+thread_local! {
+    /// Whether a panic of this thread becomes an error, so that nothing is printed for it.
+    static CATCHES: Cell<bool> = const { Cell::new(false) };
+}
+static HOOK: Once = Once::new();
+
 /// Reports a panic as an error of the file: Arrow's libraries panic on wrong sizes and offsets (one in a hundred files with flipped bytes).
 /// The intermediate state is dropped, never reused.
 fn catch_panic<T>(
@@ -111,7 +119,18 @@ fn catch_panic<T>(
 ) -> Result<T, LogError> {
     let damaged =
         || file.content_error(name, "it is damaged: a size or an offset in it is invalid; export it again");
-    catch_unwind(AssertUnwindSafe(reading)).unwrap_or_else(|_| Err(damaged()))
+    HOOK.call_once(|| {
+        let print = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |panic| {
+            if !CATCHES.get() {
+                print(panic)
+            }
+        }));
+    });
+    CATCHES.set(true);
+    let read = catch_unwind(AssertUnwindSafe(reading));
+    CATCHES.set(false);
+    read.unwrap_or_else(|_| Err(damaged()))
 }
 
 /// Whether a column contains numbers, times or texts.

@@ -181,20 +181,19 @@ pub(crate) fn check_all_distinct(recorded: &[Recorded]) -> Result<(), SessionErr
     Ok(())
 }
 
-/// The samples of N, m_c, P2 and T2 to five digits, each once, so that a constant signal counts as one. With noise, two recordings have hardly any in
-/// common; five digits survive an export as single-precision numbers.
+/// The samples of N, m_c, P2 and T2 within steps to five digits, each once, so that a constant signal counts as one. With noise, two recordings have
+/// hardly any in common; five digits survive an export as single-precision numbers. Soaks do not count: of simulated rigs with one seed they are equal.
 fn distinct_rows(recording: &Recording) -> HashSet<[i64; 4]> {
-    let series = |channel| recording.series.get(&channel);
     let five_digits = |value: f64| {
         let exponent = value.abs().log10().floor().clamp(-300.0, 300.0);
         (value / 10f64.powf(exponent - 4.0)).round() as i64
     };
-    let channels = [Channel::ShaftSpeed, Channel::CompressorFlow, Channel::P2, Channel::T2].map(series);
-    let times = channels[3].map_or(&[][..], |t2| &t2.t_s);
-    times
-        .iter()
-        .map(|t_s| channels.map(|one| one.and_then(|one| one.interpolate(*t_s)).map_or(0, five_digits)))
-        .collect()
+    let channels = [Channel::ShaftSpeed, Channel::CompressorFlow, Channel::P2, Channel::T2];
+    let series = channels.map(|channel| recording.series.get(&channel));
+    let row = |t_s: f64| series.map(|one| one.and_then(|one| one.interpolate(t_s)).map_or(0, five_digits));
+    let steps = recording.steps.iter();
+    let times = steps.filter_map(|step| Some(series[3]?.slice(step.start_s, step.end_s).0));
+    times.flatten().map(|t_s| row(*t_s)).collect()
 }
 
 /// The campaign attached to a recording; `None` if there is none.

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use crate::lab::{Machine, campaign, eighteen, measured};
-use mapper_core::{Channel, Method, Series};
+use mapper_core::{Channel, IdentifiedPoint, Method, Series};
 use mapper_identify::{IdentifyConfig, identify};
 use mapper_physics::gas::air::Air;
 use rand::SeedableRng;
@@ -64,6 +64,43 @@ fn unknown_humidity_is_in_the_intervals() {
     assert!(wider.iter().all(|sum| *sum > 0.0), "{wider:?}");
     // 95 % of the points; errors of h are common to a draw, so that one draw of five may miss many.
     assert!(held * 5 >= count * 4, "{held} of {count}");
+}
+
+/// The errors that `steady` and `dynamic` state for a barometer and a humidity are those of another identification, of readings or air moved by
+/// one standard deviation.
+#[test]
+fn single_steps_know_barometer_and_humidity() {
+    let clean = campaign(&eighteen()[..2], 120.0, Machine { humidity_kg_kg: 0.01, ..Machine::default() });
+    let (pressure_pa, humidity_kg_kg) = (300.0, 0.002);
+    let mut shifted = clean.recording.clone();
+    for channel in [Channel::P1, Channel::P2] {
+        shifted.series.get_mut(&channel).unwrap().values.iter_mut().for_each(|value| *value += pressure_pa);
+    }
+    let at = |humidity_kg_kg: f64, method| IdentifyConfig {
+        method,
+        air: Air::PAPER.with_humidity(humidity_kg_kg),
+        ..IdentifyConfig::default()
+    };
+    for method in [Method::Steady, Method::Dynamic] {
+        let config = at(0.01, method);
+        let before = identify(&clean.recording, &config).unwrap();
+        let barometer = IdentifyConfig { barometer_sigma_pa: pressure_pa, ..config.clone() };
+        let humidity = IdentifyConfig { humidity_sigma_kg_kg: humidity_kg_kg, ..config.clone() };
+        let moved = at(0.01 + humidity_kg_kg, method);
+        for (stated, recording, other) in
+            [(barometer, &shifted, &config), (humidity, &clean.recording, &moved)]
+        {
+            let (stated, other) =
+                (identify(&clean.recording, &stated).unwrap(), identify(recording, other).unwrap());
+            // The first step has no transient.
+            for ((stated, other), before) in stated.iter().zip(&other).zip(&before).skip(1) {
+                let bias = |of: &IdentifiedPoint| of.eta_uncertainty.unwrap().bias_standard_error;
+                let added = (bias(stated).powi(2) - bias(before).powi(2)).sqrt();
+                let change = (other.eta.unwrap() - before.eta.unwrap()).abs();
+                assert!((change / added - 1.0).abs() < 0.05, "{method:?}: {change} {added}");
+            }
+        }
+    }
 }
 
 /// A hygrometer or a dew-point mirror gives the points of the humidity that they measure: 75 % at 25 degC are 15.21 g/kg with a dew point of

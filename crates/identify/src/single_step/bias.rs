@@ -7,7 +7,6 @@ use crate::IdentifyConfig;
 use crate::single_step::fit::{Fit, Geometry, Row, rows, t2_k};
 use crate::step_data::samples::Samples;
 use mapper_core::Channel;
-use mapper_physics::laws::compression::isentropic_rise_ratio;
 
 /// The channels that enter eqs. 1-3.
 const ENTERING: [Channel; 6] =
@@ -18,8 +17,8 @@ const ENTERING: [Channel; 6] =
 pub(crate) struct DeclaredEffect {
     /// Standard errors of eta and h from fixed offsets and gains.
     pub(crate) bias_standard_errors: [f64; 2],
-    /// Signed effect of one standard deviation of each offset, each gain, the internal area and the assumed alpha_A, which all points share. The order depends on
-    /// the declaration alone.
+    /// Signed effect of one standard deviation of each offset, each gain, the barometer, the humidity, the internal area and the assumed alpha_A,
+    /// which all points share. The order depends on the declaration alone.
     pub(crate) common: [Vec<f64>; 2],
     /// Effect of the assumed alpha_A on eta and h, one standard deviation.
     pub(crate) assumed_alpha: [f64; 2],
@@ -60,6 +59,24 @@ pub(crate) fn declared_effect(
         }
         let mean_square = sensitivity.iter().map(|s| s * s).sum::<f64>() / samples.len().max(1) as f64;
         effect.noise_k2 += mean_square * declared.noise_sigma * declared.noise_sigma;
+    }
+    let mut shared = Vec::new();
+    if config.barometer_sigma_pa > 0.0 {
+        let [p1, p2] = [Channel::P1, Channel::P2].map(|channel| sensitivity(fit, samples, geometry, channel));
+        shared.push(p1.iter().zip(p2).map(|(p1, p2)| (p1 + p2) * config.barometer_sigma_pa).collect());
+    }
+    if config.humidity_sigma_kg_kg > 0.0 {
+        let air = geometry.air.with_humidity(geometry.air.humidity_kg_kg() + config.humidity_sigma_kg_kg);
+        let fitted_k =
+            |geometry: Geometry, row: Row| t2_k(geometry, row.in_air(geometry.air), fit.eta, fit.h_w_m2k);
+        let moved = |row| fitted_k(geometry, row) - fitted_k(Geometry { air, ..geometry }, row);
+        shared.push(rows(samples).map(moved).collect());
+    }
+    for change_k in shared {
+        let response = fit.response(fit.read(change_k).into_iter());
+        squares[0] += response[0] * response[0];
+        squares[1] += response[1] * response[1];
+        effect.push(response);
     }
     if config.internal_area_sigma_ratio > 0.0 {
         // h times the area is what the recording determines.
@@ -123,8 +140,7 @@ fn sensitivity(fit: &Fit, samples: &Samples, geometry: Geometry, channel: Channe
                     Channel::P2 => Row { p2_pa: row.p2_pa + by, ..row },
                     _ => row,
                 };
-                let air = geometry.air.between(row.p1_pa, row.p2_pa);
-                Row { rise_ratio: isentropic_rise_ratio(row.p2_pa / row.p1_pa, row.t1_k, air), ..row }
+                row.in_air(geometry.air)
             };
             -(fitted_k(moved(step)) - fitted_k(moved(-step))) / (2.0 * step)
         })

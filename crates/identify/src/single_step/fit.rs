@@ -8,7 +8,7 @@ use mapper_core::{Bound, InletConvection};
 use mapper_numerics::least_squares::{Damping, DampingRule, MAX_ITERATIONS};
 use mapper_numerics::{ROUNDING, SLOPE_STEP};
 use mapper_physics::gas::air::Air;
-use mapper_physics::laws::compression::{CompressionInputs, compress, compressed_k};
+use mapper_physics::laws::compression::{CompressionInputs, compress, compressed_k, isentropic_rise_ratio};
 use mapper_physics::laws::inlet_convection::InletLaw;
 use mapper_physics::machine::params::Params;
 
@@ -135,6 +135,14 @@ pub(crate) struct Row {
     pub(crate) p1_pa: f64,
     pub(crate) p2_pa: f64,
     pub(crate) rise_ratio: f64,
+}
+
+impl Row {
+    /// The same readings of another gas, or after a change of pressures or T1.
+    pub(crate) fn in_air(self, air: Air) -> Row {
+        let air = air.between(self.p1_pa, self.p2_pa);
+        Row { rise_ratio: isentropic_rise_ratio(self.p2_pa / self.p1_pa, self.t1_k, air), ..self }
+    }
 }
 
 /// The rows of the samples in order.

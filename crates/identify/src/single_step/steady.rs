@@ -122,8 +122,8 @@ fn lag_k(samples: &Samples, trend: &Samples, config: &IdentifyConfig) -> f64 {
     slope_per_s(&trend.t_s, &trend.t2_k).map_or(0.0, |slope_k_s| tau_s * slope_k_s)
 }
 
-/// Noise from the scatter of the samples' own efficiencies (or the declared noise if larger), and offsets and gains one sensor at a time. Also
-/// returns the change due to each, since all points share it.
+/// Noise from the scatter of the samples' own efficiencies (or the declared noise if larger), and offsets and gains one sensor at a time, barometer
+/// and humidity. Also returns the change due to each, since all points share it.
 pub(crate) fn uncertainty(
     means: &Means,
     samples: &Samples,
@@ -140,6 +140,15 @@ pub(crate) fn uncertainty(
         common.extend(spreads.iter().filter(|sigma| **sigma > 0.0).map(|sigma| slope * sigma));
         declared_square += (slope * declared.noise_sigma).powi(2);
     }
+    let by_barometer = |by: f64| means.moved(Channel::P1, by).moved(Channel::P2, by).apparent_eta();
+    let humid = |by: f64| {
+        Means { air: means.air.with_humidity(means.air.humidity_kg_kg() + by), ..*means }.apparent_eta()
+    };
+    let mut share = |sigma: f64, eta: &dyn Fn(f64) -> f64| {
+        common.extend((sigma > 0.0).then(|| eta(sigma) - means.apparent_eta()));
+    };
+    share(config.barometer_sigma_pa, &by_barometer);
+    share(config.humidity_sigma_kg_kg, &humid);
     let etas: Vec<f64> = (0..samples.len())
         .map(|i| samples.t1_k[i] * samples.rise_ratio[i] / (samples.t2_k[i] - samples.t1_k[i]))
         .filter(|eta| eta.is_finite())

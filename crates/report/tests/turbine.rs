@@ -109,7 +109,7 @@ fn what_is_not_known_is_absent_and_never_a_number() {
     unknown.eta = None;
     let points = turbine_points(&recording(&state), &[unknown], &GASES);
     assert_eq!(points[0].efficiency, None);
-    let text = turbine_text("turbo_a", &points);
+    let text = turbine_text("turbo_a", &GASES, &points);
     assert!(
         text.contains("1 points without a compressor efficiency") && text.lines().all(|l| l.starts_with('#'))
     );

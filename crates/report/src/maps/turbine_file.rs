@@ -2,11 +2,12 @@
 //!
 //! Limits: one row a step, at its end. Efficiency is the compressor's power over the turbine's isentropic power, total to
 //! static. It includes the bearing loss, and the heat that the gas loses to the turbine housing before the wheel counts as loss. A
-//! housing that still warms up lowers it. Shaft acceleration is not corrected for: the speed has settled. The gas
-//! is treated as air. Expansion is from the total inlet pressure to the outlet pressure as tapped.
+//! housing that still warms up lowers it. Shaft acceleration is not corrected for: the speed has settled. Expansion is from
+//! the total inlet pressure to the outlet pressure as tapped.
 
 use mapper_core::{Channel, IdentifiedPoint, Recording, one_line};
 use mapper_observe::energy_balance::Gases;
+use mapper_physics::gas::air::Air;
 use mapper_physics::laws::compression::{compressed_k, isentropic_rise_ratio};
 use serde::Serialize;
 use std::fmt::Write;
@@ -69,15 +70,18 @@ fn turbine_point(recording: &Recording, point: &IdentifiedPoint, gases: &Gases) 
 }
 
 /// SAE text, turbine: `SP mfp ER Eff`, in order of speed parameter.
-pub fn turbine_text(machine: &str, points: &[TurbinePoint]) -> String {
+pub fn turbine_text(machine: &str, gases: &Gases, points: &[TurbinePoint]) -> String {
     let mut rows: Vec<(&TurbinePoint, f64)> =
         points.iter().filter_map(|p| Some((p, p.efficiency?))).collect();
     rows.sort_by(|a, b| a.0.speed_parameter_rpm_sqrt_k.total_cmp(&b.0.speed_parameter_rpm_sqrt_k));
     let mut text = format!(
         "# turbine of {}\n\
          # Eff: compressor power over isentropic turbine power, total to static: mechanical loss and heat lost before the\n\
-         # wheel are in it; too low where the turbine housing still warms up. Gas taken for air.\n",
-        one_line(machine)
+         # wheel are in it; too low where the turbine housing still warms up.\n\
+         # Gas of the turbine: {}; of the compressor: {}.\n",
+        one_line(machine),
+        Air::new(gases.turbine, 0.0).description(),
+        gases.compressor.description(),
     );
     let without = points.len() - rows.len();
     if without > 0 {

@@ -6,8 +6,6 @@ use mapper_campaign::Campaign;
 use mapper_core::{Channel, DeclaredUncertainty, Recording, StepMarker, half_width_95, step_number};
 use mapper_observe::acceptance::{CriterionResult, judge_acceptance};
 use mapper_observe::energy_balance::{EnergyBalance, Gases, Power, energy_balance};
-use mapper_physics::gas::air::Air;
-use mapper_physics::gas::mixture::Gas;
 use mapper_recording::score::ScoredPoint;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -28,10 +26,12 @@ pub const ACCEPTANCE_HEADS: [&str; 5] = ["criterion", "limit, %", "largest, %", 
 /// The points and their readings.
 #[derive(Clone, Copy)]
 pub struct JudgedPoints<'a> {
-    /// Its air and criteria; `None` for a log without a campaign.
+    /// Its criteria; `None` for a log without a campaign.
     pub campaign: Option<&'a Campaign>,
     /// The readings.
     pub recording: &'a Recording,
+    /// The gases.
+    pub gases: Gases,
     /// The points.
     pub points: &'a [ScoredPoint],
     /// Uncertainty of each channel used in the identification.
@@ -39,17 +39,13 @@ pub struct JudgedPoints<'a> {
 }
 
 fn balances<'a>(report: JudgedPoints<'a>) -> Vec<(&'a StepMarker, EnergyBalance)> {
-    let gases = match report.campaign.map(|campaign| campaign.machine.params) {
-        Some(params) => Gases { compressor: params.compressor.air(), turbine: params.turbine.gas },
-        None => Gases { compressor: Air::DRY, turbine: Gas::CLOSED_FORM_AIR },
-    };
     let steps = report
         .points
         .iter()
         .filter_map(|scored| report.recording.steps.iter().find(|step| step.index == scored.point.step));
     let balance = |step: &'a StepMarker| {
         let span_s = ((step.end_s - END_S).max(step.start_s), step.end_s);
-        (step, energy_balance(report.recording, span_s, &gases, report.used))
+        (step, energy_balance(report.recording, span_s, &report.gases, report.used))
     };
     steps.map(balance).collect()
 }

@@ -26,13 +26,14 @@ use crate::test_report::zero_text::{ZERO_HEADS, zero_rows, zero_words};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{
-    Channel, CompressorMap, DeclaredUncertainty, EfficiencyDefinition, Event, Method, Plan, PointBudgets,
-    Recording, ReferenceState, ResultRemark, SurgeNotFound, terminal_text,
+    Channel, CompressorMap, DeclaredUncertainty, Event, Method, Plan, PointBudgets, Recording,
+    ReferenceState, ResultRemark, SurgeNotFound, terminal_text,
 };
 use mapper_diagnose::gap::correction::PointCorrection;
 use mapper_identify::{TwoParameter, ZeroOutcome};
 use mapper_maps::RepeatedJump;
 use mapper_observe::FusedChannel;
+use mapper_observe::energy_balance::Gases;
 use mapper_recording::score::{ScoreSummary, ScoredMark, ScoredPoint};
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -63,8 +64,8 @@ pub struct RunReport<'a> {
     pub remarks: &'a [ResultRemark],
     /// Reference state of corrected quantities.
     pub reference: ReferenceState,
-    /// Definition of the efficiencies.
-    pub efficiency: EfficiencyDefinition,
+    /// The gases, with the definition of the efficiencies.
+    pub gases: Gases,
     /// How the points were identified.
     pub method: Method,
     /// Declared share of the internal area before compression.
@@ -96,8 +97,8 @@ pub struct RunReport<'a> {
 impl<'a> RunReport<'a> {
     /// The points and their readings, for energy balance and acceptance.
     pub(crate) fn judged_points(&self) -> JudgedPoints<'a> {
-        let RunReport { campaign, recording, points, used, .. } = *self;
-        JudgedPoints { campaign, recording, points, used }
+        let RunReport { campaign, recording, gases, points, used, .. } = *self;
+        JudgedPoints { campaign, recording, gases, points, used }
     }
 }
 
@@ -295,10 +296,8 @@ pub fn condition_facts(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
         rig.push_str(" (simulated)");
     }
     rows.push(("reference state of corrected quantities", report.reference.to_string()));
-    rows.push(("definition of efficiency", report.efficiency.description()));
-    let measured = report.map.and_then(|map| map.gas.clone());
-    let declared = || report.campaign.map(|campaign| campaign.machine.params.compressor.air().description());
-    rows.extend(measured.or_else(declared).map(|gas| ("gas", gas)));
+    rows.push(("definition of efficiency", report.gases.compressor.efficiency.description()));
+    rows.push(("gas", report.gases.compressor.description()));
     rows
 }
 

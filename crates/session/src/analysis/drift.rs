@@ -1,6 +1,6 @@
 //! Checks whether the rig stayed the same over one or more recordings.
 
-use crate::recording::fusing::{Fused, fused, recordings};
+use crate::recording::fusing::{Fused, fused, recordings, take_air_and_probe};
 use crate::recording::identification_config::identification_with;
 use crate::recording::recording_file::{Recorded, attached_campaign, check_all_distinct, check_machine};
 use crate::{Session, SessionError, plan::planning};
@@ -48,7 +48,7 @@ impl Session<'_> {
         let config = identification_with(campaign, map);
         let Fused { recordings, config, channels } = fused(recordings(recorded), config, Some(campaign), map);
         let sensors = channels.into_iter().next().unwrap_or_default();
-        model.params.t2_probe_diameter_m = config.probe_diameter_m;
+        take_air_and_probe(&mut model, &config);
         let (recordings, config, zero) = zeroed_alike(recordings, config, campaign);
         let fingerprints: Vec<Option<String>> = recorded.iter().map(fingerprint).collect();
         // Of a run that was resumed after its soak, the first recording has only that.

@@ -5,7 +5,6 @@ use crate::recording::recording_file::Recorded;
 use crate::{Session, SessionError};
 use mapper_chart::Figure;
 use mapper_core::{ExportError, IdentifiedPoint, ThermalModel};
-use mapper_observe::energy_balance::Gases;
 use mapper_recording::ChannelMap;
 use mapper_recording::score::ScoredPoint;
 use mapper_report::{
@@ -43,14 +42,14 @@ impl Session<'_> {
         let points: Vec<IdentifiedPoint> = identified.points_alone().cloned().collect();
         let (machine, params) = (&campaign.machine.name, &campaign.machine.params);
         let thermal = ThermalExport { machine, params, found: identified.thermal.as_ref() };
-        let gases = Gases { compressor: params.compressor.air(), turbine: params.turbine.gas };
+        let gases = identified.gases();
         let turbine = turbine_points(&identified.recording, &points, &gases);
         let law = identified.thermal.as_ref().and_then(|found| found.convection.as_ref()?.exponent.value);
         let heat = heat_transfer_figure(machine, &points, law.unwrap_or(params.compressor.nusselt_exponent));
         let mut contents: Vec<(&str, Vec<u8>)> = vec![
             ("thermal_model.json", thermal.json()?),
             ("thermal_model.txt", thermal.text().into_bytes()),
-            ("turbine.txt", turbine_text(machine, &turbine).into_bytes()),
+            ("turbine.txt", turbine_text(machine, &gases, &turbine).into_bytes()),
             ("turbine.json", json_text(&turbine)?.into_bytes()),
             ("heat_transfer.svg", heat.to_svg().into_bytes()),
             ("heat_transfer.png", png(&heat)?),

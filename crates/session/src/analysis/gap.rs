@@ -3,7 +3,7 @@
 use crate::analysis::experiments::experiments;
 use crate::plan::planning::nominal_model;
 use crate::plan::planning::plan;
-use crate::recording::fusing::{Fused, fused, recordings};
+use crate::recording::fusing::{Fused, fused, recordings, take_air_and_probe};
 use crate::recording::identification_config::identification_with;
 use crate::recording::recording_file::{Recorded, check_machine};
 use crate::{Session, SessionError, SessionEvent};
@@ -176,7 +176,7 @@ impl Session<'_> {
             fused(recordings(slice::from_ref(recorded)), config, Some(campaign), map);
         let sensors = channels.into_iter().next().unwrap_or_default();
         let raw = recordings.into_iter().next().unwrap_or_default();
-        model.params.t2_probe_diameter_m = config.probe_diameter_m;
+        take_air_and_probe(&mut model, &config);
         let ready = |drift: Option<&DriftReport>| {
             let recording = taken_off(raw.clone(), drift);
             // The zero reduces the offset uncertainty.

@@ -2,7 +2,7 @@
 
 use crate::plan::surge::find_surge_marks;
 use crate::recording::calibration_warnings;
-use crate::recording::fusing::fused;
+use crate::recording::fusing::{fused, take_air_and_probe};
 use crate::recording::identification_config::{declared_conditions, identification_of, identification_with};
 use crate::recording::recording_file::{Recorded, check_all_distinct, check_machine};
 use crate::{Session, SessionError, SessionEvent};
@@ -19,6 +19,7 @@ use mapper_identify::{
 };
 use mapper_maps::{AssembleError, Grouping, RepeatedJump, assemble, repeated_jumps};
 use mapper_observe::FusedChannel;
+use mapper_observe::energy_balance::Gases;
 use mapper_physics::gas::air::Air;
 use mapper_recording::score::{
     PendingTruths, ScoreSummary, ScoredMark, ScoredPoint, Truth, score, score_marks, with_truths,
@@ -104,6 +105,11 @@ impl Identified {
         with_messages(value)
     }
 
+    /// The gases of compressor and turbine.
+    pub(crate) fn gases(&self) -> Gases {
+        Gases { compressor: self.config.air, turbine: self.config.turbine_gas }
+    }
+
     /// The points without their truth.
     pub fn points_alone(&self) -> impl Iterator<Item = &IdentifiedPoint> {
         self.points.iter().map(|scored| &scored.point)
@@ -132,8 +138,7 @@ impl Identified {
         let config = &self.config;
         let map = assemble(&points, machine, config.reference, config.method, Grouping::default())?;
         let surge = self.surge.iter().flat_map(|found| found.marks.iter().map(|scored| scored.mark));
-        let air = with_measured_humidity(&self.recording, config).air;
-        Ok(CompressorMap { surge: surge.collect(), ..with_gas(map, air) })
+        Ok(CompressorMap { surge: surge.collect(), ..with_gas(map, config.air) })
     }
 
     /// Jumps that were repeated.
@@ -216,8 +221,10 @@ impl Session<'_> {
         let (_, config) = zero.take_off(Recording::default(), fused.config.clone());
         let off = |recording: Recording| zero.take_off(recording, fused.config.clone()).0;
         let (recording, origins) = join_recordings(fused.recordings.into_iter().map(off).collect());
+        let config = with_measured_humidity(&recording, &config);
         let declared = campaign.filter(|campaign| campaign.tolerances_declared);
-        let model = declared.map(nominal_model).transpose()?;
+        let mut model = declared.map(nominal_model).transpose()?;
+        model.iter_mut().for_each(|model| take_air_and_probe(model, &config));
         let nominal = declared.zip(model.as_ref());
         let conditions = campaign.map(declared_conditions).unwrap_or_default();
         let nominal = nominal.map(|(campaign, model)| NominalRig {

@@ -390,7 +390,7 @@ fn run_report_of<'a>(
             .map_or(PointsOrigin::Recordings(identified.config.method), PointsOrigin::Run),
         remarks,
         reference: identified.config.reference,
-        efficiency: identified.config.air.efficiency,
+        gases: identified.gases(),
         method: identified.config.method,
         alpha_area_ratio: identified.config.alpha_area_ratio,
         events: &identified.recording.events,

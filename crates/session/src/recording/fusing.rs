@@ -1,15 +1,16 @@
-//! Fuses several sensors of a channel into one reading. All commands use the same procedure.
+//! Fuses several sensors of a channel into one reading, and takes the humidity over that was measured. All commands use the same procedure.
 
 use crate::recording::recording_file::Recorded;
 use mapper_campaign::Campaign;
 use mapper_core::{Channel, DeclaredUncertainty, Recording, RedundantSensors};
-use mapper_identify::IdentifyConfig;
+use mapper_identify::{IdentifyConfig, with_measured_humidity};
 use mapper_observe::redundant_sensors::fuse::{alike, element_count};
 use mapper_observe::{FusedChannel, fuse, judge_elements};
+use mapper_physics::simulation::model::Model;
 use mapper_recording::ChannelMap;
 use std::collections::BTreeMap;
 
-/// Recordings with one reading per channel, and the declared uncertainty of that reading.
+/// Recordings with one reading per channel, the declared uncertainty of that reading, and the humidity of the first.
 pub(crate) struct Fused {
     pub(crate) recordings: Vec<Recording>,
     pub(crate) config: IdentifyConfig,
@@ -26,13 +27,13 @@ pub(crate) fn fused(
 ) -> Fused {
     let Some(first) = recordings.first().filter(|first| !first.elements.is_empty()) else {
         let channels = vec![Vec::new(); recordings.len()];
-        return Fused { recordings, config, channels };
+        return Fused { config: of_first(&recordings, config), recordings, channels };
     };
     let declared = declared(first, campaign, map);
     let colour = config.noise_colour;
     let judged = recordings.iter().map(|recording| judge_elements(recording, &declared, colour)).collect();
     let channels = alike(judged, &declared);
-    let recordings = recordings
+    let recordings: Vec<Recording> = recordings
         .into_iter()
         .zip(&channels)
         .map(|(recording, fused)| fuse(recording, &declared, fused))
@@ -41,7 +42,18 @@ pub(crate) fn fused(
     for fused in channels.iter().flatten() {
         take_over(&mut config, fused, campaign);
     }
-    Fused { recordings, config, channels }
+    Fused { config: of_first(&recordings, config), recordings, channels }
+}
+
+/// With the humidity that the first recording measured.
+fn of_first(recordings: &[Recording], config: IdentifyConfig) -> IdentifyConfig {
+    recordings.first().map_or(config.clone(), |first| with_measured_humidity(first, &config))
+}
+
+/// Gives a nominal model the probe and the air of a recording.
+pub(crate) fn take_air_and_probe(model: &mut Model, config: &IdentifyConfig) {
+    model.params.t2_probe_diameter_m = config.probe_diameter_m;
+    model.params.compressor.humidity_kg_kg = config.air.humidity_kg_kg();
 }
 
 /// The recordings of several runs as stored.
@@ -84,4 +96,23 @@ fn declared(
         given.cloned().unwrap_or_else(|| RedundantSensors::alike(channel, count, each.unwrap_or_default()))
     };
     channels.map(|channel| (channel, of(channel))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mapper_core::{Channel, Series};
+
+    /// 75 % at 25 degC and 100 kPa are 15.21 g/kg (CoolProp 8, HAPropsSI). The model of a diagnosis takes in that air.
+    #[test]
+    fn a_hygrometer_gives_the_air_of_the_model() {
+        let readings = [(Channel::RelativeHumidity, 0.75), (Channel::T1, 298.15), (Channel::P1, 100e3)];
+        let steady = |(channel, value)| (channel, Series { t_s: vec![0.0, 1.0], values: vec![value; 2] });
+        let recording = Recording { series: readings.map(steady).into(), ..Recording::default() };
+        let Fused { config, .. } =
+            fused(vec![recording], IdentifyConfig::default(), None, &ChannelMap::native());
+        let mut model = Model::nominal();
+        take_air_and_probe(&mut model, &config);
+        assert!((model.params.compressor.humidity_kg_kg / 0.015_21 - 1.0).abs() < 5e-3);
+    }
 }

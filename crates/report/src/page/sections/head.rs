@@ -15,7 +15,7 @@ pub(crate) fn head(page: &RunPage<'_>) -> Markup {
             dl.cover { @for (what, value) in cover_facts(report) { div { dt { (what) } dd { (value) } } } }
             p.under {
                 @if report.score.is_some() { strong { "Simulated rig: nothing was measured on a real machine." } " " }
-                "Efficiency is isentropic, total to total (" (report.efficiency.description()) "); corrected to " (report.reference) "; method " (report.method) "."
+                "Efficiency is isentropic, total to total (" (report.gases.compressor.efficiency.description()) "); corrected to " (report.reference) "; method " (report.method) "."
             }
             section.verdict.clean[clean] aria-labelledby="verdict" {
                 h2 #verdict { (verdict_sentence(report.points.iter().map(|scored| &scored.point))) }

@@ -1,12 +1,14 @@
 //! Uncertainty budgets: their rows combine to the stated intervals, and their sensitivities are those of the whole identification.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
+#![allow(clippy::print_stdout, reason = "docs/validation has the table")]
 
 use crate::lab::{Machine, campaign, eighteen, measured};
 use mapper_core::{Channel, DeclaredUncertainty, Method, Recording, UncertaintyBudget, half_width_95};
 use mapper_identify::{Choice, Identified, IdentifyConfig, JointSettings, identify_recording};
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::mean;
+use mapper_physics::gas::air::Air;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
@@ -171,4 +173,83 @@ fn the_pressure_ratio_agrees_with_draws() {
         let ratio = mean(&squares).unwrap().sqrt() / budgets.pressure_ratio.combined_standard_uncertainty();
         assert!((ratio - 1.0).abs() < 0.05, "step {}: {ratio}", point.step);
     }
+}
+
+/// Standard uncertainty of a humidity: 2.5 % of relative humidity at 35 degC are 0.9 g/kg, at 40 degC 1.2.
+const HUMIDITY_SIGMA_KG_KG: f64 = 1.25e-3;
+
+/// Draws of noise and of all declared errors, each with a whole identification, against the budgets of efficiency and h: as declared, another map
+/// and law of h, moist air. `MAPPER_BUDGET_DRAWS=10000` takes that many of all three machines, for the table in docs/validation.
+#[test]
+fn efficiency_and_h_agree_with_draws() {
+    let asked: Option<u64> = std::env::var("MAPPER_BUDGET_DRAWS").ok().map(|count| count.parse().unwrap());
+    let machines = [
+        Machine::default(),
+        Machine { scales: [0.95, 1.04, 1.3, 0.97], ..Machine::default() },
+        Machine { humidity_kg_kg: 0.02, ..Machine::default() },
+    ];
+    for machine in &machines[..if asked.is_some() { 3 } else { 1 }] {
+        let clean = campaign(&eighteen(), 120.0, *machine).recording;
+        let seeds: Vec<u64> = (0..asked.unwrap_or(12)).collect();
+        let found = parallel::map(&seeds, |seed| drawn(&clean, machine.humidity_kg_kg, *seed));
+        let square = |values: &[f64]| mean(values.iter().map(|value| value * value)).unwrap();
+        for quantity in [0, 1] {
+            let mut ratios = Vec::new();
+            let (mut spread, mut stated) = (0.0, 0.0);
+            for step in 0..found[0].len() {
+                let of = |part: usize| -> Vec<f64> {
+                    found.iter().filter_map(|steps| steps.get(step)).map(|at| at[quantity][part]).collect()
+                };
+                let (values, sigmas) = (of(0), of(1));
+                let middle = mean(&values).unwrap();
+                let around: Vec<f64> = values.iter().map(|value| value / middle - 1.0).collect();
+                let relative: Vec<f64> = sigmas.iter().map(|sigma| sigma / middle).collect();
+                ratios.push((square(&relative) / square(&around)).sqrt());
+                (spread, stated) = (spread + square(&around), stated + square(&relative));
+            }
+            let whole = (stated / spread).sqrt();
+            println!("{machine:?} {} stated over drawn: {whole:.3} {ratios:.3?}", ["eta", "h"][quantity]);
+            // Twelve draws know their spread to a fifth.
+            assert!(asked.is_some() || (whole - 1.0).abs() < 0.6, "{machine:?}: {whole} of {ratios:?}");
+        }
+    }
+}
+
+/// Efficiency and h of the points of one draw, each with its combined standard uncertainty.
+fn drawn(clean: &Recording, humidity_kg_kg: f64, seed: u64) -> Vec<[[f64; 2]; 2]> {
+    let mut random = Pcg64::seed_from_u64(3900 + seed);
+    let (mut recording, mut declared) = measured(clean, 1.0, 1.0, &mut random);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+    let barometer_pa = BAROMETER_PA * normal();
+    for (channel, gain_ratio) in
+        [(Channel::P1, GAIN_RATIO), (Channel::P2, GAIN_RATIO), (Channel::CompressorFlow, 0.005)]
+    {
+        declared.get_mut(&channel).unwrap().gain_sigma_ratio = gain_ratio;
+        let (gain, shift) = (
+            1.0 + gain_ratio * normal(),
+            if channel == Channel::CompressorFlow { 0.0 } else { barometer_pa },
+        );
+        let series = recording.series.get_mut(&channel).unwrap();
+        series.values.iter_mut().for_each(|value| *value = *value * gain + shift);
+    }
+    let humidity_sigma_kg_kg = if humidity_kg_kg > 0.0 { HUMIDITY_SIGMA_KG_KG } else { 0.0 };
+    let config = IdentifyConfig {
+        method: Method::Joint,
+        declared,
+        barometer_sigma_pa: BAROMETER_PA,
+        air: Air::PAPER.with_humidity(humidity_kg_kg + humidity_sigma_kg_kg * normal()),
+        humidity_sigma_kg_kg,
+        joint: if std::env::var("MAPPER_BUDGET_SEARCHED").is_ok() {
+            JointSettings::default()
+        } else {
+            fixed()
+        },
+        ..IdentifyConfig::default()
+    };
+    let of = |budget: &Option<UncertaintyBudget>| {
+        let budget = budget.as_ref().unwrap();
+        [budget.value, budget.combined_standard_uncertainty()]
+    };
+    let found = identify_recording(&recording, &config).unwrap();
+    found.budgets.iter().map(|point| [of(&point.eta), of(&point.h_w_m2k)]).collect()
 }

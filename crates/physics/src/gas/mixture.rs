@@ -2,8 +2,8 @@
 //!
 //! The heat capacity of the ideal gas is a polynomial in temperature; the dependence on pressure is the second virial coefficient, by
 //! Tsonopoulos (AIChE J. 20, 1974), with the mixing rules of Prausnitz without binary parameters. For pressure ratios up to 5 from 100 kPa
-//! efficiencies are within 0.02 points and works within 0.05 % of CoolProp's real gases (`tests/coolprop.rs`); without the virial term the
-//! differences are 0.04 points and 0.07 %.
+//! efficiencies are within 0.02 points and works within 0.05 % of CoolProp's real gases (`tests/tests/all/gases.rs`); without the virial term
+//! the differences are 0.04 points and 0.07 %. Pure gases from 253 to 323 K: N2, O2, Ar 0.03 points and 0.04 %, H2, CO2, CH4 0.06 and 0.07 %.
 
 use super::species::{Species, SpeciesData};
 use serde::{Deserialize, Serialize};

@@ -47,7 +47,7 @@ pub fn set_options(arguments: &OutputOptions, matches: &ArgMatches) {
     let command = std::iter::successors(Some(matches), |of| of.subcommand().map(|(_, deeper)| deeper)).last();
     let json =
         command.is_some_and(|of| of.try_get_one::<bool>("json").ok().flatten().is_some_and(|json| *json));
-    let replaces = command.is_some_and(|of| of.try_contains_id("force").is_ok());
+    let replaces = command.is_some_and(|of| of.try_contains_id("force").unwrap_or(false));
     // It is kept once: `main` alone calls this.
     let _ = CHOSEN.set(ChosenOptions { colour, progress, json, replaces });
 }

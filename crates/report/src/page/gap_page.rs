@@ -1,10 +1,11 @@
 //! A diagnosis as a page with pictures: one self-contained HTML file.
 
+use crate::diagnosis::gap_text::cause;
 use crate::page::prose::sentence;
 use crate::page::shell::{Purpose, shell};
 use crate::page::table::scrolling;
 use crate::{
-    NOTHING, OUTSIDE, four_figures, gap_text, headline, named, next_measurement, stand_actions, suspect_text,
+    NOTHING, OUTSIDE, four_figures, gap_text, headline, next_measurement, stand_actions, suspect_text,
 };
 use mapper_chart::palette::{self, Colour};
 use mapper_chart::{Axis, Figure, Line, Panel, Scatter};
@@ -63,7 +64,7 @@ fn sections(done: &Diagnosed, heading: &dyn Fn(&str) -> Markup) -> Markup {
         @if !diagnosis.inseparable.is_empty() {
             p { "Inseparable in this recording: " (diagnosis.inseparable.join(", ")) "." }
         }
-        figure { (PreEscaped(map_of_where(done))) figcaption { "Ends of the steps, coloured by the difference between measured and computed readings." } }
+        figure { (scrolling("where on the map", &PreEscaped(map_of_where(done)))) figcaption { "Ends of the steps, coloured by the difference between measured and computed readings." } }
         @if !diagnosis.forces.is_empty() {
             (heading("Missing heat, power or flow of each balance, if it alone has one"))
             (forces(done))
@@ -77,7 +78,7 @@ fn sections(done: &Diagnosed, heading: &dyn Fn(&str) -> Markup) -> Markup {
             (heat_map(done, "without a cause", &done.without_cause.1))
             @if let Some((what, fit)) = with_cause { (heat_map(done, &format!("with {what}"), &fit.residual)) }
         }
-        @if with_cause.is_some() { figure { (PreEscaped(traces(done))) } }
+        @if with_cause.is_some() { figure { (scrolling("residuals over time", &PreEscaped(traces(done)))) } }
         (heading("What to do"))
         @if actions.is_empty() && measurement.is_none() { p { "Nothing: the rig is as declared." } }
         @else {
@@ -98,7 +99,7 @@ fn sections(done: &Diagnosed, heading: &dyn Fn(&str) -> Markup) -> Markup {
 fn causes(done: &Diagnosed) -> Markup {
     let diagnosis = &done.diagnosis;
     let candidates = diagnosis.listed().take(8);
-    let rows = candidates.map(|candidate| (named(candidate), candidate.probability)).chain([
+    let rows = candidates.map(|candidate| (cause(candidate), candidate.probability)).chain([
         (NOTHING.to_owned(), diagnosis.probability_none),
         (OUTSIDE.to_owned(), diagnosis.probability_outside),
     ]);

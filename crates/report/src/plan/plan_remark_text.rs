@@ -1,25 +1,36 @@
 //! Sentences of the remarks of plans.
 
-use mapper_core::{Channel, NoBound, PlanRemark, with_unit};
+use mapper_core::{Channel, NoBound, OperatingPoint, PlanRemark, with_unit};
 use std::collections::BTreeMap;
+
+fn place(point: &OperatingPoint) -> String {
+    format!("{:.1} krpm at opening {:.3}", 1e-3 * point.speed_rpm, point.valve_opening_ratio)
+}
 
 /// The sentence of a remark, with values and units.
 pub fn plan_remark_text(remark: &PlanRemark) -> String {
     match remark {
         PlanRemark::RepeatedJump { from, to, times } => {
-            format!("the jump from {from} to {to} is made {times} times to show drift")
+            format!("the jump from {} to {} is made {times} times to show drift", place(from), place(to))
         }
         PlanRemark::NoRepeatedJump => {
             "no jump between the points can be repeated, so that drift would not show".to_owned()
         }
         PlanRemark::AppendedJump { from, to } => {
-            format!("the jump from {from} to {to} is made after all others, and is not a point of the map")
+            format!(
+                "the jump from {} to {} is made after all others, and is not a point of the map",
+                place(from),
+                place(to)
+            )
         }
         PlanRemark::FirstPointAgain { point } => {
-            format!("the first point, {point}, is visited again at the end: no jump led to it at the start")
+            format!(
+                "the first point, {}, is visited again at the end: no jump led to it at the start",
+                place(point)
+            )
         }
         PlanRemark::FirstPointWithoutJump { point } => {
-            format!("no jump leads to the first point, {point}: it has no transient to identify")
+            format!("no jump leads to the first point, {}: it has no transient to identify", place(point))
         }
         PlanRemark::NoWayBack => "a limit forbids the way back to the first point at the end".to_owned(),
         PlanRemark::RestsOnDeclaration { eta_error, max_eta_error } => format!(

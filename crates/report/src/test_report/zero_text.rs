@@ -16,8 +16,8 @@ pub fn zero_words(zero: &ZeroOutcome) -> Option<String> {
             Some(format!("No isothermal zero: {reason}. The declared offsets stand."))
         }
         ZeroOutcome::Found(zero) => Some(format!(
-            "At rest, from {:.0} to {:.0} s, all sensors of a kind read the same; what each read differently is subtracted from its \
-             readings. Half widths of 95 % intervals.",
+            "At rest, from {:.0} to {:.0} s, all sensors of a kind should read the same; the differences are subtracted. Half \
+             widths of 95 % intervals.",
             zero.start_s, zero.end_s
         )),
     }

@@ -124,10 +124,10 @@ def forecasts(mapper, folder, machine, arguments, pool, seeds):
             runs = list(pool.map(lambda seed: mapped(mapper, campaign(folder, machine, order, seed, dwell)), seeds))
             errors = [error(p) for _, _, points in runs for p in points if p["eta"] is not None]
             realised = math.sqrt(sum(e * e for e in errors) / len(errors))
-            stated = [[figures.get(key) for _, figures, _ in runs] for key in ("rms_error_eta", "rms_error_undeclared_eta")]
+            stated = [[figures.get(key) for _, figures, _ in runs] for key in ("rms_error_eta", "rms_error_reported_eta")]
             plans.append([realised] + [None if None in of else 100 * statistics.median(of) for of in stated])
             print(machine, order, dwell, plans[-1], file=sys.stderr, flush=True)
-    for name, place in (("as declared", 1), ("undeclared", 2)):
+    for name, place in (("as declared", 1), ("stated", 2)):
         known = [(plan[0], plan[place]) for plan in plans if plan[place] is not None]
         if len(known) < 3:
             continue

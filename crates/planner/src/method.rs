@@ -22,6 +22,8 @@ pub struct MethodResult {
 pub struct MethodResults {
     /// One result for each step, on a machine that is as declared.
     pub steps: Vec<Option<MethodResult>>,
+    /// Standard error of each efficiency that the method reports after such a recording, fraction.
+    pub reported_sigma_eta: Vec<Option<f64>>,
     /// Efficiency error (rms, one sigma, fraction) that remains if the method has to identify the model parameters from these steps
     /// instead of relying on their declared values.
     pub parameter_error_eta: f64,

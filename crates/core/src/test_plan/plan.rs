@@ -38,6 +38,10 @@ pub struct Predicted {
     pub dtc_k: Option<f64>,
     /// Standard error of the efficiency (fraction); `None` if it was not forecast.
     pub sigma_eta: Option<f64>,
+    /// Standard error of the efficiency that the identification will report (fraction): it includes values of alpha_A, probe and
+    /// heating/cooling ratio that the recording cannot exclude. `None` if it was not forecast.
+    #[serde(default)]
+    pub reported_sigma_eta: Option<f64>,
     /// Relative standard error of the heat-transfer coefficient; `None` if it was not forecast.
     pub sigma_h_rel: Option<f64>,
     /// Error of the identification method itself in the efficiency, without noise (fraction, signed): its
@@ -66,6 +70,7 @@ impl Predicted {
             dt2_k: None,
             dtc_k: None,
             sigma_eta: None,
+            reported_sigma_eta: None,
             sigma_h_rel: None,
             bias_eta: None,
             bias_h_rel: None,
@@ -131,10 +136,13 @@ pub struct PlanFigures {
     /// Root of the mean square of predicted standard error and bias of the efficiency (fraction).
     #[serde(default)]
     pub rms_error_eta: Option<f64>,
-    /// The same if alpha_A, the probe and the heating/cooling ratio are not as declared and have to be identified (fraction); `None` if
-    /// the method identifies none of them, or nothing was forecast.
+    /// Root mean square of the standard errors that the identification will report (fraction): they include other values of alpha_A, probe
+    /// and heating/cooling ratio than the declared ones. `None` if the method identifies none of them, or nothing was forecast.
     #[serde(default)]
-    pub rms_error_undeclared_eta: Option<f64>,
+    pub rms_error_reported_eta: Option<f64>,
+    /// Error of the efficiencies that only the declared values of these parameters exclude (fraction).
+    #[serde(default)]
+    pub resting_eta: Option<f64>,
     /// Largest predicted error of the efficiency, standard error and bias in quadrature (fraction).
     #[serde(default)]
     pub worst_error_eta: Option<f64>,

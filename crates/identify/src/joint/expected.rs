@@ -5,6 +5,7 @@
 
 use crate::IdentifyConfig;
 use crate::config::coloured;
+use crate::joint::Fitted;
 use crate::joint::fit::start::{self, START_S};
 use crate::joint::step_model::rows::{COARSER, Row, StepRows, block_s_after, place};
 use crate::joint::{fit::refinements, uncertainty::smoothness};
@@ -34,6 +35,9 @@ impl ExpectedStep<'_> {
 pub struct ExpectedTogether {
     /// One result per step on a machine as declared; `None` for a step that is too short.
     pub steps: Vec<Option<Expected>>,
+    /// Standard error of each efficiency that the identification of such a recording reports, fraction: it includes the values of alpha_A,
+    /// probe, heating/cooling ratio and h before the wheel that these steps cannot exclude.
+    pub reported_sigma_eta: Vec<Option<f64>>,
     /// Error of the efficiencies (rms over the steps, one sigma, fraction) if alpha_A, probe and heating/cooling ratio had to be found from
     /// these steps. Above [`MAX_RESTING_ETA`](crate::MAX_RESTING_ETA) the points depend on the declaration and are doubtful.
     pub resting_eta: f64,
@@ -52,6 +56,12 @@ pub fn expected_together(steps: &[ExpectedStep<'_>], config: &IdentifyConfig) ->
     start::refine(&mut problem, &condensed, config)?;
     problem.minimise_roughly()?;
     let resting_eta = refinements::resting_on_declaration(&problem, None)?;
+    let mut reported_sigma_eta = vec![None; steps.len()];
+    let mut open = problem.clone();
+    let reported = Fitted::of(&mut open)?.smoothed(&open, &condensed, config);
+    for (eta, step) in reported.eta.iter().zip(&condensed) {
+        reported_sigma_eta[step.position] = Some(eta.uncertainty.combined_standard_error());
+    }
     refinements::hold(&mut problem);
     problem.minimise_roughly()?;
     let smoothed = smoothness::smoothed(&problem, &problem.covariance()?, None, &condensed, config.reference);
@@ -69,7 +79,7 @@ pub fn expected_together(steps: &[ExpectedStep<'_>], config: &IdentifyConfig) ->
         let numbers = [expected.eta, expected.sigma_eta, h_w_m2k, expected.sigma_h_w_m2k];
         found[step.position] = numbers.iter().all(|x| x.is_finite()).then_some(expected);
     }
-    Some(ExpectedTogether { steps: found, resting_eta })
+    Some(ExpectedTogether { steps: found, reported_sigma_eta, resting_eta })
 }
 
 /// The rows to which the method would condense the samples of a recording.

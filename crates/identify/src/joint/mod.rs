@@ -173,10 +173,9 @@ impl<'a> Attempt<'a> {
             let member = problem.members.get_mut(*index)?;
             (member.shares, member.barred) = (false, true);
         }
-        let Fitted { covariance, refined, resting } = fitted(&mut problem, steps, config)?;
-        let known = refined.as_ref().map(|(refinements, gain)| (refinements, gain));
-        let smoothed =
-            uncertainty::smoothness::smoothed(&problem, &covariance, known, steps, config.reference);
+        let fitted = fitted(&mut problem, steps, config)?;
+        let smoothed = fitted.smoothed(&problem, steps, config);
+        let Fitted { covariance, refined, resting } = fitted;
         let refinements = refined.as_ref().map(|(refinements, _)| refinements);
         let thermal =
             thermal_model::thermal_model(&problem, &covariance, &smoothed, refinements, steps, config);
@@ -234,15 +233,33 @@ fn fitted(
         problem.active[PROBE_MM2] = problem.probe_fitted;
     }
     problem.minimise()?;
-    let inlet_sigma = fit::inlet::settle(problem)?;
-    let open = problem.clone();
-    let refinements = fit::refinements::settle(problem)?;
-    let (covariance, gain) = covariance(problem, refinements.as_ref(), inlet_sigma)?;
-    let resting = match &refinements {
-        Some(found) => fit::refinements::resting_on_declaration(&open, Some(found))?,
-        None => 0.0,
-    };
-    Some(Fitted { covariance, refined: refinements.zip(gain), resting })
+    Fitted::of(problem)
+}
+
+impl Fitted {
+    /// Evaluates the parameters with a prior of a problem at its minimum, and moves it to the mean of their mixture.
+    fn of(problem: &mut Problem<'_>) -> Option<Self> {
+        let inlet_sigma = fit::inlet::settle(problem)?;
+        let open = problem.clone();
+        let refinements = fit::refinements::settle(problem)?;
+        let (covariance, gain) = covariance(problem, refinements.as_ref(), inlet_sigma)?;
+        let resting = match &refinements {
+            Some(found) => fit::refinements::resting_on_declaration(&open, Some(found))?,
+            None => 0.0,
+        };
+        Some(Fitted { covariance, refined: refinements.zip(gain), resting })
+    }
+
+    /// The numbers of all points of the problem, with their errors.
+    fn smoothed(
+        &self,
+        problem: &Problem<'_>,
+        steps: &[step_model::rows::StepRows],
+        config: &IdentifyConfig,
+    ) -> Smoothed {
+        let known = self.refined.as_ref().map(|(refinements, gain)| (refinements, gain));
+        uncertainty::smoothness::smoothed(problem, &self.covariance, known, steps, config.reference)
+    }
 }
 
 /// The covariance of a problem at the mean of the mixture, including the uncertainty from the mixture and the inlet model; and the regression

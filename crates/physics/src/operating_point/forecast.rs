@@ -204,18 +204,13 @@ impl StepForecast {
         let settle_s = self.settle_s(bands);
         let window = if has_jump { self.window(rule.of_step_s(settle_s, dwell_s)) } else { &[] };
         let change = |value: fn(&ForecastRow) -> f64| Some(value(window.last()?) - value(window.first()?));
+        let (flow_kg_s, pressure_ratio, t2_k) =
+            end.map_or((0.0, 1.0, 0.0), |row| (row.flow_kg_s, row.p2_pa / row.p1_pa, row.t2_k));
         Predicted {
             dt2_k: change(|row| row.t2_k),
             dtc_k: change(|row| row.tc_k),
-            sigma_eta: None,
-            sigma_h_rel: None,
-            bias_eta: None,
-            bias_h_rel: None,
-            flow_kg_s: end.map_or(0.0, |row| row.flow_kg_s),
-            pressure_ratio: end.map_or(1.0, |row| row.p2_pa / row.p1_pa),
-            t2_k: end.map_or(0.0, |row| row.t2_k),
             settle_s,
-            minutes: dwell_s / 60.0,
+            ..Predicted::settled(flow_kg_s, pressure_ratio, t2_k, dwell_s)
         }
     }
 }

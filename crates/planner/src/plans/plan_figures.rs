@@ -32,7 +32,8 @@ pub(crate) fn compute_figures(
         min_gradient_k: gradients().min_by(f64::total_cmp),
         worst_sigma_eta: largest(&mut measured_steps(steps).filter_map(|predicted| predicted.sigma_eta)),
         rms_error_eta: rms_error_eta(steps),
-        rms_error_undeclared_eta: parameter_error.map(|parameter_error| parameter_error.undeclared_eta),
+        rms_error_reported_eta: parameter_error.map(|parameter_error| parameter_error.reported_eta),
+        resting_eta: parameter_error.map(|parameter_error| parameter_error.eta),
         worst_error_eta: largest(&mut measured_steps(steps).filter_map(error_eta)),
         minutes,
     }

@@ -87,8 +87,8 @@ fn set_error(predicted: &mut Predicted, found: &MethodResult, eta: f64, h_w_m2k:
 pub(crate) struct ParameterError {
     pub(crate) eta: f64,
     pub(crate) max_eta: f64,
-    /// Total rms error if no parameter has its declared value.
-    pub(crate) undeclared_eta: f64,
+    /// The error that the method reports, rms.
+    pub(crate) reported_eta: f64,
 }
 
 /// Adds the errors of a method that identifies all steps together. They are omitted if the steps give too little information for good
@@ -102,16 +102,17 @@ pub(crate) fn add_joint_errors<'a>(
     let every = rows.len().div_ceil(MAX_FORECAST_STEPS).max(1);
     let sample: Vec<&[ForecastRow]> = rows.iter().step_by(every).map(Vec::as_slice).collect();
     let found = method.predict_campaign(&sample)?;
-    let sigmas: Vec<f64> = found.steps.iter().flatten().map(|found| found.sigma_eta).collect();
     let parameter_error = ParameterError {
         eta: found.parameter_error_eta,
         max_eta: found.max_parameter_error_eta,
-        undeclared_eta: rms(&sigmas)?.hypot(found.parameter_error_eta),
+        reported_eta: rms(found.reported_sigma_eta.iter().flatten().copied())?,
     };
     if parameter_error.eta <= parameter_error.max_eta {
-        for ((predicted, rows), found) in predicted.step_by(every).zip(&sample).zip(found.steps) {
+        let results = found.steps.into_iter().zip(found.reported_sigma_eta);
+        for ((predicted, rows), (found, reported)) in predicted.step_by(every).zip(&sample).zip(results) {
             if let (Some(found), Some(end)) = (found, rows.last()) {
                 set_error(predicted, &found, end.efficiency, end.h_w_m2k);
+                predicted.reported_sigma_eta = reported;
             }
         }
     }

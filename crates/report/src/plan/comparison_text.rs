@@ -21,7 +21,7 @@ pub fn comparison_json(plan: &Plan, others: &[Plan]) -> Value {
             "sum_gradient_k": plan.figures.sum_gradient_k,
             "min_gradient_k": plan.figures.min_gradient_k,
             "rms_error_eta": plan.figures.rms_error_eta,
-            "rms_error_undeclared_eta": plan.figures.rms_error_undeclared_eta,
+            "rms_error_reported_eta": plan.figures.rms_error_reported_eta,
             "worst_error_eta": plan.figures.worst_error_eta,
         })
     };
@@ -31,8 +31,7 @@ pub fn comparison_json(plan: &Plan, others: &[Plan]) -> Value {
 /// For people, in 80 columns.
 pub fn comparison_text(plan: &Plan, others: &[Plan]) -> String {
     let mut rows = table::with_heads(
-        &["order", "steps min", "total K", "min K", "rms pts", "worst pts", "undeclared pts"]
-            .map(str::to_owned),
+        &["order", "steps min", "total K", "min K", "rms pts", "worst pts", "stated pts"].map(str::to_owned),
     );
     for plan in std::iter::once(plan).chain(others) {
         let figures = &plan.figures;
@@ -43,12 +42,12 @@ pub fn comparison_text(plan: &Plan, others: &[Plan]) -> String {
             number(figures.min_gradient_k, 1),
             percent(figures.rms_error_eta, 2),
             percent(figures.worst_error_eta, 2),
-            percent(figures.rms_error_undeclared_eta, 2),
+            percent(figures.rms_error_reported_eta, 2),
         ]);
     }
     let legend = format!(
         "total, min: sum and minimum of the thermal gradients. rms, worst: expected error of the efficiency over the points, one sigma, if the machine is as \
-         declared; undeclared: rms if alpha_A, probe and heating/cooling ratio have to be found. \
+         declared; stated: rms of the intervals, which contain other values of alpha_A, probe and heating/cooling ratio. \
          conventional: each point until T2 and housing drift by less than {STABLE_DRIFT_K_MIN} K/min; its error is heat transfer."
     );
     format!("\n{rows}\n\n{}", wrapped(&legend, 80, 0))

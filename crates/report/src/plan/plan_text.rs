@@ -110,13 +110,13 @@ fn summary(campaign: &Campaign, plan: &Plan, soak_s: f64) -> String {
             percent(figures.worst_error_eta, 2)
         )
     });
-    let undeclared = figures.rms_error_undeclared_eta.map(|error| {
+    let reported = figures.rms_error_reported_eta.map(|error| {
         format!(
-            "{} rms if alpha_A, probe and heating/cooling ratio have to be found",
+            "the intervals will state {} rms, because they also contain other values of alpha_A, probe and heating/cooling ratio",
             percent(Some(error), 2)
         )
     });
-    let errors: Vec<String> = declared.into_iter().chain(undeclared).collect();
+    let errors: Vec<String> = declared.into_iter().chain(reported).collect();
     if !errors.is_empty() {
         lines.push(("expected error", errors.join("; ")));
     }

@@ -56,6 +56,7 @@ impl PredictedMethod for Forecaster {
         let found = expected_together(&steps, &self.config)?;
         Some(MethodResults {
             steps: found.steps.into_iter().map(|found| found.map(result)).collect(),
+            reported_sigma_eta: found.reported_sigma_eta,
             parameter_error_eta: found.resting_eta,
             max_parameter_error_eta: MAX_RESTING_ETA,
         })

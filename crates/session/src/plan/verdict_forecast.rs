@@ -10,7 +10,6 @@ use mapper_core::{
     WindowRule,
 };
 use mapper_identify::MAX_RESTING_ETA;
-use mapper_numerics::statistics::rms;
 
 /// Dwells that are tried, relative to the dwell of the campaign. Longer ones would make the run impractical.
 const DWELL_RATIOS: [f64; 6] = [1.25, 1.5, 2.0, 2.5, 3.0, 4.0];
@@ -31,7 +30,7 @@ pub(crate) fn forecast_verdicts(campaign: &Campaign, plan: &Plan) -> Option<Verd
     let is_good = |step: &PlanStep| {
         informative
             && (settings.window != WindowRule::Auto || needed_dwell_s(step, true) <= step.dwell_s)
-            && step.predicted.sigma_eta.is_none_or(|sigma| sigma <= limits.sigma_eta)
+            && step.predicted.reported_sigma_eta.is_none_or(|sigma| sigma <= limits.sigma_eta)
     };
     // The first point is visited again at the end; the better visit goes onto the map.
     let mut best: Vec<(OperatingPoint, bool)> = Vec::new();
@@ -42,16 +41,12 @@ pub(crate) fn forecast_verdicts(campaign: &Campaign, plan: &Plan) -> Option<Verd
             None => best.push((step.to, good)),
         }
     }
-    let sigmas: Vec<f64> = plan.steps.iter().filter_map(|step| step.predicted.sigma_eta).collect();
-    // Both figures include the errors of a machine as declared. The undeclared one also includes errors of the declaration itself.
-    let resting_eta = plan.figures.rms_error_undeclared_eta.zip(rms(&sigmas));
-    let resting_eta = resting_eta
-        .map_or(0.0, |(undeclared, declared)| (undeclared.powi(2) - declared.powi(2)).max(0.0).sqrt());
+    let resting_eta = plan.figures.resting_eta.unwrap_or(0.0);
     Some(VerdictForecast {
         points: best.len(),
         good: best.iter().filter(|(_, good)| *good).count(),
         near_limit: informative && RESTING_RESERVE_RATIO * resting_eta > MAX_RESTING_ETA,
-        eta_standard_error: plan.figures.rms_error_eta,
+        eta_standard_error: plan.figures.rms_error_reported_eta.filter(|_| informative),
         duration_s: soak_s(campaign) + plan.duration_s(),
     })
 }

@@ -54,6 +54,7 @@ fn row(page: &RunPage<'_>, display: &Display, step: &PlanStep) -> Row {
         None => Cell::text("-"),
     };
     let sigma = point.and_then(|point| Some(standard_error_of(point.eta_low?, point.eta_high?)));
+    let expected = step.predicted.reported_sigma_eta.or(step.predicted.sigma_eta);
     let lasted_s = marker.map(|marker| marker.end_s - marker.start_s);
     Row {
         step: point.map(|point| point.step),
@@ -68,7 +69,7 @@ fn row(page: &RunPage<'_>, display: &Display, step: &PlanStep) -> Row {
             optional(lasted_s, 1),
             optional(Some(step.dwell_s), 1),
             optional(point.and_then(|point| point.dtc_k), 1),
-            Cell::number(percent(step.predicted.sigma_eta, 2), step.predicted.sigma_eta.unwrap_or(f64::NAN)),
+            Cell::number(percent(expected, 2), expected.unwrap_or(f64::NAN)),
             Cell::number(percent(sigma, 2), sigma.unwrap_or(f64::NAN)),
         ],
     }

@@ -51,17 +51,17 @@ pub use crate::elements::turbocharger::machine::{DescriptionSource, Machine, Map
 
 /// A checked campaign: everything that a run needs, in SI units and rpm.
 ///
-/// Its JSON is canonical (keys in order, SI values): the planner hashes it.
+/// Its JSON is canonical (ordered keys, SI values), because the planner hashes it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Campaign {
     /// Name; letters, digits, `_`, `-` and `.` only, at most 64.
     pub name: String,
-    /// Its purpose.
+    /// Purpose.
     pub description: Option<String>,
     /// The machine.
     pub machine: Machine,
-    /// Boundary conditions. `p3_pa` and `valve_opening_ratio` are not set by the campaign: they are
-    /// the turbine outlet pressure (no flow) and 1 until the plan sets them.
+    /// Boundary conditions. The plan sets `p3_pa` and `valve_opening_ratio`; until then they are the turbine outlet pressure
+    /// (no flow) and 1.
     pub boundary: BoundaryConditions,
     /// Conditions that follow the compressor's outlet temperature of each point instead.
     pub follow_outlet: FollowOutlet,
@@ -75,7 +75,7 @@ pub struct Campaign {
     pub acceptance: Option<AcceptanceCriteria>,
     /// Declared tolerances of the nominal model; the defaults if the file gives none.
     pub tolerances: ModelTolerances,
-    /// Whether the file gives any tolerances: only then does the campaign declare that the machine matches its nominal map.
+    /// Whether the file gives tolerances: only then the campaign declares that the machine matches its nominal map.
     pub tolerances_declared: bool,
     /// The rig.
     pub backend: BackendChoice,
@@ -85,32 +85,32 @@ pub struct Campaign {
     /// The grid in the order of the file, no point twice: `points` as listed, or for each opening all speeds, or line by
     /// line from choke to surge.
     pub points: Vec<OperatingPoint>,
-    /// The speed lines that the points were resolved from; none if the file gives openings.
+    /// The speed lines of the points; none if the file gives openings.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub lines: Vec<LineRequest>,
     /// Durations.
     pub timing: Timing,
-    /// The soak before the warm-up, for a zero of the sensors, if there is one.
+    /// The soak before the warm-up, for a zero of the sensors.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub zero: Option<Soak>,
     /// Settings of the identification.
     pub identification: Identification,
     /// Order of the points.
     pub order: VisitOrder,
-    /// The script that chooses the next step, if there is one.
+    /// The script that chooses the next step.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sequence: Option<SequenceSource>,
     /// The repeated jump, if there is one.
     pub repeats: Option<Repeats>,
-    /// Whether the first point, which no jump leads to, is visited again at the end of the plan.
+    /// Whether the first point is visited again at the end of the plan, because no jump leads to it at the start.
     pub return_to_first: bool,
-    /// Reaction to repeats that differ by more than declared; `None`: they are not monitored.
+    /// Reaction to repeats that differ by more than declared; `None` if they are not monitored.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub on_drift: Option<OnDrift>,
-    /// Control of the shaft speed of each step; `None`: P3 stays as planned.
+    /// Control of the shaft speed of each step; `None` if P3 keeps its planned value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub speed_control: Option<SpeedControlSettings>,
-    /// The search for surge after all other steps, if there is one.
+    /// The search for surge after all other steps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub surge_search: Option<SurgeSearchSettings>,
     /// Seed of the search and of simulated rigs.
@@ -136,13 +136,13 @@ pub struct Campaign {
 impl Campaign {
     /// The guards of a run: those declared, or one at each limit.
     pub fn guard_set(&self) -> GuardSet {
-        let by = GuardInputs {
+        let inputs = GuardInputs {
             limits: &self.limits,
             sensors: &self.sensors,
             dwell_s: self.timing.dwell.fixed_or_usual_s(),
             speed_is_held: self.speed_control.is_some(),
         };
-        self.guards.clone().unwrap_or_else(|| GuardsFile::default().guards(&by))
+        self.guards.clone().unwrap_or_else(|| GuardsFile::default().guards(&inputs))
     }
 }
 
@@ -171,7 +171,7 @@ pub(crate) struct CampaignFile {
     #[serde(default)]
     #[schemars(example = &"required")]
     calibration: CalibrationRule,
-    /// Criteria of a test code, which the report judges at each point: `PTC 10`, or your own values of another code.
+    /// Criteria of a test code, which the report judges at each point: `PTC 10`, or values of another code.
     #[schemars(example = &"PTC 10")]
     acceptance: Option<AcceptanceFile>,
     /// Declared tolerances of the nominal model; the defaults if none are given.
@@ -181,7 +181,7 @@ pub(crate) struct CampaignFile {
     /// The rig, by the name of its backend, with the backend's own settings below it, e.g. `virtual_lab: {}`. The backend checks its settings.
     #[schemars(length(min = 1, max = 1), extend("minProperties" = 1, "maxProperties" = 1), example = serde_json::json!({"virtual_lab": {}}))]
     backend: BTreeMap<String, serde_json::Value>,
-    /// Auxiliary instruments by a name of your own, e.g. a flow meter unknown to the PLC: read alongside the rig, never commanded.
+    /// Auxiliary instruments by any name, e.g. a flow meter unknown to the PLC: read alongside the rig, never commanded.
     #[serde(default)]
     #[schemars(extend("maxProperties" = 16), example = serde_json::json!({"flow_meter": {"backend": {"ak": {}}}}))]
     readers: BTreeMap<String, ReaderFile>,
@@ -189,30 +189,30 @@ pub(crate) struct CampaignFile {
     pub(crate) grid: GridFile,
     /// Durations of the campaign's parts.
     timing: TimingFile,
-    /// The isothermal zero before the first point; no zero if it is left out.
+    /// The isothermal zero before the first point; no zero if it is omitted.
     zero: Option<ZeroFile>,
     /// Method that identifies efficiency and heat-transfer coefficient.
     identification: Option<IdentificationFile>,
     /// Order of the points. `thermal_gradient`, the default, maximises the sum of the housing's temperature changes (Burke et al., figure 13 b), `min_gradient` the smallest of them; `speed_lines` follows speed lines (figure 13 a), `conventional` too, and holds each point until it no longer drifts; `listed` keeps the order of the grid.
     #[serde(default)]
     order: VisitOrder,
-    /// A rhai script that chooses the next step, in place of `order`: its file, ending in `.rhai`, from the campaign's own directory. docs/reference/sequences.md lists the functions it may call.
+    /// A rhai script that chooses the next step, in place of `order`: a `.rhai` file, relative to the campaign file. docs/reference/sequences.md lists its functions.
     #[schemars(regex(pattern = r"\.rhai$"), example = &"scripts/zigzag.rhai")]
     sequence: Option<String>,
-    /// A jump that is repeated to show drift: by default at least twice, and every 12 steps; `off` for none. A sequence script makes its own repeats.
+    /// A jump that is repeated to detect drift: by default at least twice, and every 12 steps; `off` for none. A sequence script defines its own repeats.
     #[schemars(example = &"off")]
     repeats: Option<RepeatsFile>,
-    /// Whether the first point is visited again at the end, with a jump that leads to it: without a jump it has no transient to identify. `true` if it is left out; the method `steady` and sequence scripts make no such visit.
+    /// Whether the first point is visited again at the end, with a jump that leads to it: without a jump it has no transient to identify. `true` if it is omitted; the method `steady` and sequence scripts make no such visit.
     #[schemars(example = true)]
     return_to_first: Option<bool>,
-    /// Monitors the repeats while the campaign runs: a repeat that differs from its first visit by more than declared is made again; a second difference counts as drift.
+    /// Monitors the repeats while the campaign runs: a repeat that differs from its first visit by more than declared is repeated; a second difference counts as drift.
     drift: Option<DriftFile>,
     /// Holds the shaft speed of each step at its target by adjusting the planned P3; `off` leaves P3 as planned.
     #[schemars(example = &"off")]
     speed_control: Option<SpeedControlFile>,
-    /// Searches for the surge line after all other steps; no search if it is left out.
+    /// Searches for the surge line after all other steps; no search if it is omitted.
     surge_search: Option<SurgeSearchFile>,
-    /// Seed of the search and of simulated rigs: same seed, same bytes. A whole number from 0.
+    /// Seed of the search and of simulated rigs, a whole number from 0; equal seeds give equal bytes.
     #[schemars(example = 1)]
     seed: Option<u64>,
     /// Limits that the run must never exceed.
@@ -224,7 +224,7 @@ pub(crate) struct CampaignFile {
     /// State to which corrected flow and speed refer: SAE (298 K, 100 kPa), Garrett (545 degR, 13.95 psia), BorgWarner (293 K, 98.1 kPa), or `temperature` and `pressure`. SAE if none is given.
     #[schemars(example = &"SAE")]
     reference: Option<ReferenceFile>,
-    /// Definition of the isentropic efficiency, of the nominal map and of the results: `enthalpy` is the ratio of the rises of specific enthalpy, and the default for a map from a table; `kappa_of_T1` takes temperatures with the heat capacity at T1 (Burke et al., eq. 2), and is the default for `closed_form`; `constant_gamma` with a ratio of heat capacities of your own.
+    /// Definition of the isentropic efficiency, of the nominal map and of the results: `enthalpy` is the ratio of the rises of specific enthalpy, and the default for a map from a table; `kappa_of_T1` takes temperatures with the heat capacity at T1 (Burke et al., eq. 2), and is the default for `closed_form`; `constant_gamma` takes a given ratio of heat capacities.
     #[schemars(example = &"enthalpy")]
     efficiency: Option<EfficiencyFile>,
     /// The gases that flow through the machine.
@@ -242,11 +242,11 @@ pub(crate) struct CampaignFile {
 }
 
 impl CampaignFile {
-    /// The campaign of a file without mistakes, and the place in the file of each of its points. Each line has only its first point: the others
+    /// The campaign of a file without mistakes, and the position of each point in the file. Each line has only its first point: the others
     /// need the nominal model.
     ///
     /// # Errors
-    /// Only if the map file or the sequence script can no longer be read.
+    /// An error if the map file or the sequence script can no longer be read.
     pub(crate) fn campaign(
         self,
         origin: &Path,
@@ -269,19 +269,19 @@ impl CampaignFile {
         let alpha_area_ratio = machine.params.compressor.alpha_area_ratio;
         let speed_control = speed_control(self.speed_control);
         let timing = self.timing.timing();
-        let by = GuardInputs {
+        let inputs = GuardInputs {
             limits: &limits,
             sensors: &sensors,
             dwell_s: timing.dwell.fixed_or_usual_s(),
             speed_is_held: speed_control.is_some(),
         };
-        let guards = self.guards.map(|guards| guards.guards(&by));
+        let guards = self.guards.map(|guards| guards.guards(&inputs));
         // The closed form is the paper's machine with the efficiency of eq. 2; tables have the usual definition.
-        let usual = match machine.map {
+        let default_efficiency = match machine.map {
             MapSource::ClosedForm => EfficiencyDefinition::KappaOfT1,
             MapSource::Table { .. } => EfficiencyDefinition::default(),
         };
-        machine.params.compressor.efficiency = self.efficiency.map_or(usual, Into::into);
+        machine.params.compressor.efficiency = self.efficiency.map_or(default_efficiency, Into::into);
         self.gas.apply(&mut machine.params);
         machine.params.compressor.humidity_kg_kg = self.report.humidity_kg_kg(&boundary);
         let campaign = Campaign {

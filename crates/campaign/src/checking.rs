@@ -62,7 +62,7 @@ impl<'a> Check<'a> {
         self.notes.push(self.tree.finding(kind, steps, message, remedy));
     }
 
-    /// Notes a mistake at a key whose value is not the mistake.
+    /// Notes a mistake about a key, not its value.
     pub fn note_key(&mut self, kind: FindingKind, parent: &[Step], key: &str, message: String, remedy: &str) {
         let steps = [parent, &[Step::from(key)]].concat();
         self.notes.push(self.tree.key_finding(kind, &steps, message, remedy));

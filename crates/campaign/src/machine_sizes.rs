@@ -24,11 +24,11 @@ const GEOMETRY: [&str; 2] = ["machine", "geometry"];
 /// A size that the campaign does not give.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AssumedSize {
-    /// Its key below `machine.geometry`, e.g. `compressor.internal_area`.
+    /// Key below `machine.geometry`, e.g. `compressor.internal_area`.
     pub key: String,
-    /// Its name.
+    /// Name.
     pub name: &'static str,
-    /// Its value in `unit`.
+    /// Value in `unit`.
     pub value: f64,
     /// Unit; empty for a plain number.
     pub unit: &'static str,
@@ -41,7 +41,7 @@ pub(crate) struct Size {
     pub name: &'static str,
     pub field: fn(&mut Params) -> &mut f64,
     pub power: i32,
-    /// Maximum usual ratio to the scaled reference; `None` if it varies freely between machines.
+    /// Maximum usual ratio to the scaled reference; `None` if the size varies freely between machines.
     pub usual_ratio: Option<f64>,
     /// Factor to the unit shown, and the unit.
     pub unit: (f64, &'static str),
@@ -79,7 +79,7 @@ pub(crate) const SIZES: &[Size] = &[
 ];
 
 impl Size {
-    /// Its place in the campaign.
+    /// Place in the campaign.
     pub fn steps(&self) -> Vec<Step> {
         GEOMETRY.iter().chain(self.path).map(|key| Step::from(*key)).collect()
     }
@@ -93,7 +93,7 @@ impl Size {
         }
     }
 
-    /// Its value in SI.
+    /// Value in SI.
     pub fn value(&self, params: &Params) -> f64 {
         *(self.field)(&mut params.clone())
     }

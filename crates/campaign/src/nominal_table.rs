@@ -4,7 +4,7 @@ use mapper_core::{IdentifiedPoint, ImportError, MapDescription};
 use mapper_maps::table::read_any_text;
 use mapper_physics::compressor_map::tabulated_map::{MapError, MapRow, TabulatedMap};
 
-/// Why a file is not a nominal map.
+/// Reason why a file is not a nominal map.
 #[derive(Debug, thiserror::Error)]
 pub enum NominalTableError {
     /// The file cannot be read as a map.

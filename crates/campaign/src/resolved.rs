@@ -10,7 +10,7 @@ use mapper_physics::simulation::model::Model;
 use mapper_yaml::{Step, steps};
 use serde::Serialize;
 
-/// Adds the points of the lines to the campaign, or reports mistakes at their lines.
+/// Adds the points of the speed lines to the campaign, or reports the mistakes of the lines.
 pub(crate) fn resolve(campaign: &mut Campaign, model: &Model) -> Result<(), Vec<Concern>> {
     let (mut points, mut concerns) = (Vec::new(), Vec::new());
     let limit_rpm = campaign.limits.speed_max_rpm;
@@ -72,12 +72,12 @@ fn physical_speed_rpm(line: &LineRequest, campaign: &Campaign) -> f64 {
     line.reference.physical_speed_rpm(line.speed_corrected_rpm, campaign.boundary.t1_k)
 }
 
-/// The place of each point in the file: its line.
+/// The place of each point in the file, which is that of its line.
 pub(crate) fn places(campaign: &Campaign) -> Vec<Vec<Step>> {
-    let line_of = |point: &OperatingPoint| {
-        campaign.lines.iter().position(|line| physical_speed_rpm(line, campaign) == point.speed_rpm)
-    };
-    let place = |point: &OperatingPoint| match line_of(point) {
+    let is_on_line =
+        |line: &LineRequest, point: &OperatingPoint| physical_speed_rpm(line, campaign) == point.speed_rpm;
+    let place = |point: &OperatingPoint| match campaign.lines.iter().position(|line| is_on_line(line, point))
+    {
         Some(index) => steps!["grid", "lines", index, "speed_corrected"].to_vec(),
         None => steps!["grid", "lines"].to_vec(),
     };
@@ -108,33 +108,33 @@ pub struct ResolvedPoint {
     pub surge_margin_ratio: f64,
 }
 
-/// The lines of a campaign; none if its file gives openings. A point without a steady state is left out; a
-/// checked campaign has none.
+/// The speed lines of a campaign; none if its file gives openings. Points without a steady state are omitted; a
+/// checked campaign has no such points.
 pub fn resolved_lines(campaign: &Campaign, model: &Model) -> Vec<ResolvedLine> {
     let boundary = &campaign.boundary;
-    let resolved = |point: &OperatingPoint| {
-        let under = BoundaryConditions { valve_opening_ratio: point.valve_opening_ratio, ..*boundary };
-        let held = hold_speed(model, point.speed_rpm, &under, campaign.follow_outlet).ok()?;
-        let flow_kg_s = held.outputs.flow_kg_s;
+    let resolve_point = |point: &OperatingPoint| {
+        let boundary = BoundaryConditions { valve_opening_ratio: point.valve_opening_ratio, ..*boundary };
+        let steady = hold_speed(model, point.speed_rpm, &boundary, campaign.follow_outlet).ok()?;
+        let flow_kg_s = steady.outputs.flow_kg_s;
         Some(ResolvedPoint {
             flow_corrected_kg_s: campaign.reference.corrected_flow_kg_s(
                 flow_kg_s,
                 boundary.t1_k,
                 boundary.p1_pa,
             ),
-            pressure_ratio: held.outputs.pressure_ratio,
+            pressure_ratio: steady.outputs.pressure_ratio,
             valve_opening_ratio: point.valve_opening_ratio,
-            surge_margin_ratio: held.surge_margin_ratio(model),
+            surge_margin_ratio: steady.surge_margin_ratio(model),
         })
     };
-    let of_line = |line| {
+    let resolve_line = |line| {
         let speed_rpm = physical_speed_rpm(line, campaign);
-        let own = campaign.points.iter().filter(|point| point.speed_rpm == speed_rpm);
+        let points = campaign.points.iter().filter(|point| point.speed_rpm == speed_rpm);
         ResolvedLine {
             speed_corrected_rpm: line.speed_corrected_rpm,
             speed_rpm,
-            points: own.filter_map(resolved).collect(),
+            points: points.filter_map(resolve_point).collect(),
         }
     };
-    campaign.lines.iter().map(of_line).collect()
+    campaign.lines.iter().map(resolve_line).collect()
 }

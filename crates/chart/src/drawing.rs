@@ -3,7 +3,7 @@
 use crate::Colour;
 use crate::items::{Dash, Note, TextAnchor};
 
-/// How a line looks.
+/// Style of a line.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Stroke {
     pub colour: Colour,
@@ -33,7 +33,7 @@ impl Stroke {
     }
 }
 
-/// How a text looks.
+/// Style of a text.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TextStyle {
     pub size_px: f64,
@@ -42,7 +42,7 @@ pub(crate) struct TextStyle {
     pub bold: bool,
     /// White rim, so that the text stays legible on lines.
     pub halo: bool,
-    /// Turned counter-clockwise by this, degrees.
+    /// Counter-clockwise rotation, degrees.
     pub turn_deg: f64,
 }
 
@@ -70,7 +70,7 @@ impl TextStyle {
 /// A point of the picture, px from its upper left corner.
 pub(crate) type Px = (f64, f64);
 
-/// One thing that is drawn.
+/// An element of a picture.
 #[derive(Debug, Clone)]
 pub(crate) enum Shape {
     OpenGroup(String),
@@ -81,16 +81,16 @@ pub(crate) enum Shape {
     Line(Px, Px, Stroke),
     /// At least two points.
     Polyline(Vec<Px>, Stroke),
-    /// Polygons of at least three points as one shape, so that no seam shows between neighbours; opacity 0 to 1.
+    /// Polygons of at least three points as one shape, so that there is no gap between neighbours; opacity 0 to 1.
     Areas(Vec<Vec<Px>>, Colour, f64),
     Polygon(Vec<Px>, Colour, Stroke),
     /// Centre and radius.
     Circle(Px, f64, Colour, Stroke),
-    /// Text whose vertical middle is at the point; not empty.
+    /// A text, not empty, with its vertical middle at the point.
     Text(Px, String, TextStyle),
 }
 
-/// A picture: its shapes in the order in which they are drawn.
+/// A picture: its shapes in drawing order.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Drawing {
     pub width_px: f64,
@@ -104,7 +104,7 @@ impl Drawing {
         self.shapes.push(Shape::OpenGroup(name.to_owned()));
     }
 
-    /// Shapes with words, and a link if there is one.
+    /// Draws shapes with a note for the mouse, and a link if there is one.
     pub(crate) fn noted(&mut self, note: &Note, draw: impl FnOnce(&mut Drawing)) {
         self.shapes.push(Shape::OpenNote(note.clone()));
         draw(self);

@@ -3,7 +3,7 @@
 use crate::palette::{GREY, INK};
 use crate::{Colour, Contours};
 
-/// One item to show. Items are drawn in the given order, texts last.
+/// An item of a panel. Items are drawn in the given order, texts last.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Item {
     /// A line series.
@@ -22,21 +22,21 @@ pub enum Item {
     PointLabels(PointLabels),
 }
 
-/// How a line is broken.
+/// Dash pattern of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Dash {
-    /// Not at all.
+    /// A solid line.
     #[default]
     Solid,
     /// Dashes.
     Dashed,
     /// Dots.
     Dotted,
-    /// Dash and dot in turn.
+    /// Alternating dashes and dots.
     DashDot,
 }
 
-/// A line through points; a point that is NaN or infinite breaks it.
+/// A line through points; a NaN or infinite point splits it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {
     /// Points (x, y) in drawing order.
@@ -45,9 +45,9 @@ pub struct Line {
     pub colour: Colour,
     /// Width, px.
     pub width_px: f64,
-    /// Solid or broken.
+    /// Dash pattern.
     pub dash: Dash,
-    /// Whether each segment carries an arrow head at its middle (a path through the map).
+    /// Whether each segment has an arrow head at its middle (a path through the map).
     pub arrows: bool,
     /// Entry in the legend; items with equal text share one entry.
     pub label: Option<String>,
@@ -55,12 +55,12 @@ pub struct Line {
     pub end_label: Option<EndLabel>,
 }
 
-/// Which end of a line.
+/// End of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LineEnd {
-    /// Its first visible point.
+    /// First visible point.
     First,
-    /// Its last visible point.
+    /// Last visible point.
     Last,
 }
 
@@ -69,7 +69,7 @@ pub enum LineEnd {
 pub struct EndLabel {
     /// The text.
     pub text: String,
-    /// Where.
+    /// Position.
     pub end: LineEnd,
 }
 
@@ -85,7 +85,7 @@ impl Line {
         self
     }
 
-    /// Breaks the line.
+    /// Sets the dash pattern.
     pub fn dash(mut self, dash: Dash) -> Self {
         self.dash = dash;
         self
@@ -124,7 +124,7 @@ pub enum Marker {
     Diamond,
     /// Upright cross.
     Plus,
-    /// Slanting cross.
+    /// Diagonal cross.
     Cross,
 }
 
@@ -147,16 +147,16 @@ impl From<(f64, f64)> for ScatterPoint {
     }
 }
 
-/// Points drawn as markers. Error bars widen an axis by at most half the span of the points, beyond that they are cut.
+/// Points drawn as markers. Error bars extend an axis by at most half the span of the points; longer ones are cut.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scatter {
-    /// The points; those that are NaN or infinite are left out.
+    /// The points; NaN or infinite ones are skipped.
     pub points: Vec<ScatterPoint>,
     /// Colour.
     pub colour: Colour,
     /// Shape.
     pub marker: Marker,
-    /// Outline alone.
+    /// Whether only the outline is drawn.
     pub hollow: bool,
     /// Diameter, px.
     pub size_px: f64,
@@ -166,12 +166,12 @@ pub struct Scatter {
     pub notes: Vec<Note>,
 }
 
-/// Tooltip of a point in an SVG, and target of a click. A PNG has neither.
+/// Tooltip of a point in an SVG, and target of a click; not used in a PNG.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Note {
-    /// The words.
+    /// Text of the tooltip.
     pub text: String,
-    /// A file or a page.
+    /// File or page to open on a click.
     pub link: Option<String>,
 }
 
@@ -201,7 +201,7 @@ impl Scatter {
         self
     }
 
-    /// Draws outlines alone.
+    /// Draws only the outlines.
     pub fn hollow(mut self) -> Self {
         self.hollow = true;
         self
@@ -229,14 +229,14 @@ pub enum RuleAt {
     X(f64),
 }
 
-/// A straight reference line across the whole panel. It widens the axis so that it is seen.
+/// A straight reference line across the whole panel. The axis is extended to include it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rule {
-    /// Where.
+    /// Position.
     pub at: RuleAt,
     /// Colour.
     pub colour: Colour,
-    /// Solid or broken.
+    /// Dash pattern.
     pub dash: Dash,
     /// Entry in the legend.
     pub label: Option<String>,
@@ -264,7 +264,7 @@ impl Rule {
 /// A shaded area, e.g. an extrapolated region.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Polygon {
-    /// Corners (x, y); those that are NaN or infinite are left out.
+    /// Corners (x, y); NaN or infinite ones are skipped.
     pub points: Vec<(f64, f64)>,
     /// Colour of the fill.
     pub colour: Colour,
@@ -287,23 +287,14 @@ impl Polygon {
     }
 }
 
-/// What an [`Annotation`]'s place refers to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Space {
-    /// The axes' units.
-    Data,
-    /// The panel: (0, 0) is its lower left corner, (1, 1) its upper right one.
-    Panel,
-}
-
-/// Which part of a text is at its place.
+/// Part of a text that is at its place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TextAnchor {
-    /// Its beginning.
+    /// Beginning.
     Start,
-    /// Its middle.
+    /// Middle.
     Middle,
-    /// Its end.
+    /// End.
     End,
 }
 
@@ -312,13 +303,11 @@ pub enum TextAnchor {
 pub struct Annotation {
     /// The text, one line.
     pub text: String,
-    /// Place (x, y).
+    /// Place (x, y), in the axes' units.
     pub at: (f64, f64),
-    /// What the place refers to.
-    pub space: Space,
     /// Shift from the place, px, to the right and up.
     pub shift_px: (f64, f64),
-    /// Which part of the text is there.
+    /// Part of the text that is at the place.
     pub anchor: TextAnchor,
     /// Colour.
     pub colour: Colour,
@@ -327,27 +316,15 @@ pub struct Annotation {
 impl Annotation {
     /// Text 6 px to the right of a point.
     pub fn new(text: impl Into<String>, at: (f64, f64)) -> Self {
-        Annotation {
-            text: text.into(),
-            at,
-            space: Space::Data,
-            shift_px: (6.0, 0.0),
-            anchor: TextAnchor::Start,
-            colour: INK,
-        }
-    }
-
-    /// Text in a corner of the panel or anywhere in it, by fractions of its sides.
-    pub fn in_panel(text: impl Into<String>, at: (f64, f64), anchor: TextAnchor) -> Self {
-        Annotation { space: Space::Panel, shift_px: (0.0, 0.0), anchor, ..Annotation::new(text, at) }
+        Annotation { text: text.into(), at, shift_px: (6.0, 0.0), anchor: TextAnchor::Start, colour: INK }
     }
 }
 
-/// Short texts next to points, e.g. the numbers of steps. Each is placed where it covers neither a marker nor another text, and as
-/// few lines as possible; one that is away from its point has a leader line.
+/// Short texts next to points, e.g. the numbers of steps. No text covers a marker or another text, and each covers as few lines as
+/// possible; distant texts have a leader line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PointLabels {
-    /// Text and point of each, the most important first; labels without a free position are omitted.
+    /// Texts with their points, the most important first; labels without a free position are omitted.
     pub labels: Vec<(String, (f64, f64))>,
     /// Colour.
     pub colour: Colour,

@@ -38,7 +38,7 @@ pub use figure_layout::figure::{Figure, LegendPlace, Panel};
 pub use figure_layout::ticks::nice_ticks;
 pub use items::{
     Annotation, Dash, EndLabel, Item, Line, LineEnd, Marker, Note, PointLabels, Polygon, Rule, RuleAt,
-    Scatter, ScatterPoint, Space, TextAnchor,
+    Scatter, ScatterPoint, TextAnchor,
 };
 pub use palette::Colour;
 pub use rendering::png::PngError;

@@ -5,7 +5,7 @@ use crate::drawing::{Drawing, Stroke};
 use crate::items::Marker;
 use crate::palette::WHITE;
 
-/// How a marker looks.
+/// Style of a marker.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct MarkerStyle {
     pub marker: Marker,
@@ -46,7 +46,7 @@ pub(crate) fn draw_marker(drawing: &mut Drawing, (x, y): (f64, f64), style: &Mar
     }
 }
 
-/// An arrow head at the middle of a segment; none on a segment too short to show its direction.
+/// An arrow head at the middle of a segment, unless the segment is too short.
 pub(crate) fn draw_arrow(drawing: &mut Drawing, from: (f64, f64), to: (f64, f64), colour: Colour) {
     let (dx, dy) = (to.0 - from.0, to.1 - from.1);
     let length = dx.hypot(dy);

@@ -1,4 +1,4 @@
-//! Colours that people with any colour vision can distinguish, and that survive a black-and-white printer where ordered.
+//! Colours that are distinguishable with any colour vision; ordered ones also on a black-and-white printer.
 
 /// An sRGB colour, 8 bits per channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,10 +39,10 @@ pub const SKY: Colour = Colour(86, 180, 233);
 
 /// Colours for unordered series, in the order they should be used.
 ///
-/// Source: M. Okabe, K. Ito, "Color Universal Design", 2008; its yellow is left out, it is not legible on white.
+/// Source: M. Okabe, K. Ito, "Color Universal Design", 2008; without its yellow, which is not legible on white.
 pub const CATEGORICAL: [Colour; 7] = [BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, INK];
 
-/// Colour of series `index`, from [`CATEGORICAL`], starting again after the last.
+/// Colour of series `index` from [`CATEGORICAL`], cyclically.
 pub fn categorical(index: usize) -> Colour {
     CATEGORICAL[index % CATEGORICAL.len()]
 }
@@ -61,7 +61,7 @@ pub fn sequential(fraction: f64) -> Colour {
         Colour(74, 193, 109),
         Colour(122, 209, 81),
     ];
-    // The last stop is already pale; stay at five sixths of the scale.
+    // The last stop is too pale: use five sixths of the scale.
     let at = unit(fraction) * 5.0;
     let lower = (at.floor() as usize).min(STOPS.len() - 2);
     blend(STOPS[lower], STOPS[lower + 1], at - lower as f64)

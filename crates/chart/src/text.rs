@@ -18,7 +18,7 @@ pub(crate) fn escape(text: &str) -> String {
     out
 }
 
-/// Estimated width, px: generous, since the viewer chooses the font.
+/// Estimated width, px; generous, because the viewer chooses the font.
 pub(crate) fn width_px(text: &str, font_px: f64) -> f64 {
     let em: f64 = text
         .chars()
@@ -51,7 +51,7 @@ pub(crate) fn wrap(text: &str, font_px: f64, max_px: f64) -> Vec<String> {
     lines
 }
 
-/// The text, or as much of its beginning as fits with an ellipsis.
+/// Truncates a text to the width, with an ellipsis.
 pub(crate) fn cut(text: &str, font_px: f64, max_px: f64) -> String {
     if width_px(text, font_px) <= max_px {
         return text.to_owned();

@@ -1,6 +1,6 @@
 //! Enums of warnings and remarks: each variant has a stable code and its values; `mapper-report` turns them into sentences.
 
-/// Declares an enum of warnings or remarks. In JSON a variant has its code as `code`, and its values; readers take no notice of a `message`.
+/// Declares an enum of warnings or remarks. In JSON a variant has the key `code` and its values; readers ignore a `message`.
 #[macro_export]
 macro_rules! coded_enum {
     (
@@ -15,7 +15,7 @@ macro_rules! coded_enum {
         #[non_exhaustive]
         pub enum $enum {
             $($(#[doc = $doc])* #[serde(rename = $code)] $name $({ $($field: $type),* })? $(($inner))?,)*
-            /// Of a file that has no values, or a code of another version.
+            /// An entry of a file without values, or of another version.
             #[serde(untagged)]
             Other { code: String, #[serde(default)] message: String },
         }

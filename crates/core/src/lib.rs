@@ -3,7 +3,7 @@
 //! The program is a chain of functions from data to data: campaign -> [`Plan`] -> [`Recording`] -> [`IdentifiedPoint`] ->
 //! [`CompressorMap`]. This crate defines these types and every measured quantity ([`Channel`]). It does no input or output.
 //!
-//! Conventions: SI inside (kelvin, pascal, kg/s) except shaft speed, which is in rpm as on every map; each `f64`
+//! Conventions: SI units (kelvin, pascal, kg/s), except shaft speed in rpm as on every map; each `f64`
 //! that crosses a boundary carries its unit in its name; pressures and temperatures are total unless a name contains
 //! `static`; corrected quantities are stored with their [`ReferenceState`].
 

@@ -43,7 +43,7 @@ impl Engine<'_> {
             if self.stop.load(Ordering::Relaxed) {
                 return Ok(None);
             }
-            let result = parallel::confined(threads, || work(index, piece))?;
+            let result = parallel::with_threads(threads, || work(index, piece))?;
             (self.on_progress)(done.fetch_add(1, Ordering::Relaxed) + 1, pieces.len());
             Ok(Some(result))
         })

@@ -126,7 +126,7 @@ impl Fleet {
         // For information only; work continues if the disk is full.
         let _ = std::fs::write(&begun, machine.name);
         // One core for each item, so that the processor time of the thread is the cost of the item.
-        let (result, duration_s) = parallel::confined(1, || {
+        let (result, duration_s) = parallel::with_threads(1, || {
             let started_s = (machine.thread_s)();
             let result = run_item(kind, &item, stop);
             (result, (machine.thread_s)() - started_s)

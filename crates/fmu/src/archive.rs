@@ -6,7 +6,7 @@ use std::io::{Cursor, Write};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
-/// The archive of an FMU's files.
+/// Packs the files of an FMU.
 ///
 /// # Errors
 /// [`FmuError::Archive`] or [`FmuError::File`] if the archive cannot hold them.

@@ -8,7 +8,7 @@ use crate::variable::{Causality, Switch, UNITS, Variable};
 use quick_xml::escape::escape;
 use std::fmt::Write;
 
-/// The description, with a GUID that is in the sources too.
+/// Writes the description with the GUID of the sources.
 pub fn description(
     machine: &FmuMachine<'_>,
     variables: &[Variable],
@@ -44,7 +44,7 @@ pub fn description(
         "  <DefaultExperiment startTime=\"0\" stopTime=\"110\" tolerance=\"{DEFAULT_TOLERANCE:e}\" stepSize=\"0.1\"/>\n  <ModelVariables>"
     );
     for (reference, variable) in variables.iter().enumerate() {
-        scalar(&mut xml, reference, variable)?;
+        write_variable(&mut xml, reference, variable)?;
     }
     for (reference, switch) in switches.iter().enumerate() {
         let _ = writeln!(
@@ -57,7 +57,7 @@ pub fn description(
         );
     }
     xml += "  </ModelVariables>\n  <ModelStructure>\n";
-    // Indices of the standard count from 1. Without a list of dependencies, every output may depend on every input, which is the case here.
+    // The standard counts from 1. No list of dependencies is given, because every output may depend on every input.
     let outputs: Vec<usize> = variables
         .iter()
         .enumerate()
@@ -75,7 +75,7 @@ pub fn description(
     Ok(xml)
 }
 
-fn scalar(xml: &mut String, reference: usize, variable: &Variable) -> Result<(), FmuError> {
+fn write_variable(xml: &mut String, reference: usize, variable: &Variable) -> Result<(), FmuError> {
     let (causality, variability) = match variable.causality {
         Causality::Parameter => ("parameter", "fixed"),
         Causality::Input => ("input", "continuous"),

@@ -1,4 +1,4 @@
-//! The files of an FMU, by their paths in the archive.
+//! The files of an FMU with their paths in the archive.
 
 use crate::description::description;
 use crate::header::{header, with_guid};
@@ -17,11 +17,11 @@ pub struct FmuFile {
     pub bytes: Vec<u8>,
 }
 
-/// Every file of the FMU of a machine: the description, then the sources. The GUID is a hash of both: equal machines give equal
-/// FMUs.
+/// Generates all files of a machine's FMU: the description, then the sources. The GUID is a hash of both, so that equal machines give
+/// equal FMUs.
 ///
 /// # Errors
-/// [`FmuError::NotFinite`] naming the number.
+/// [`FmuError::NotFinite`] with the name of the number.
 pub fn files(machine: &FmuMachine<'_>) -> Result<Vec<FmuFile>, FmuError> {
     let (variables, switches) = (variables(machine), switches(machine));
     let header = header(machine, &variables, &switches)?;
@@ -30,12 +30,11 @@ pub fn files(machine: &FmuMachine<'_>) -> Result<Vec<FmuFile>, FmuError> {
     hash.update(&header);
     SOURCES.iter().for_each(|(_, text)| hash.update(text));
     let guid = guid(&hash.finalize());
-    let described = description(machine, &variables, &switches, &guid)?;
-    let data = with_guid(&header, &guid);
+    let description = description(machine, &variables, &switches, &guid)?;
     let source = |name: &str, text: &str| FmuFile { path: format!("sources/{name}"), bytes: text.into() };
-    let mut files = vec![FmuFile { path: "modelDescription.xml".to_owned(), bytes: described.into() }];
+    let mut files = vec![FmuFile { path: "modelDescription.xml".to_owned(), bytes: description.into() }];
     files.extend(SOURCES.iter().map(|(name, text)| source(name, text)));
-    files.push(source("model_data.h", &data));
+    files.push(source("model_data.h", &with_guid(&header, &guid)));
     Ok(files)
 }
 

@@ -1,12 +1,12 @@
-//! A fitted map as the speed lines that an FMU holds.
+//! Converts a fitted map to the speed lines of an FMU.
 
 use mapper_core::{FittedMap, FittedNode, ReferenceState};
 use mapper_physics::compressor_map::tabulated_map::{MapError, MapRow, TabulatedMap};
 
-/// Lowest efficiency in the map of an FMU. Below it the fit no longer describes a compressor.
+/// Minimum efficiency in the map of an FMU. Below it the fit no longer describes a compressor.
 const MIN_EFFICIENCY: f64 = 0.05;
 
-/// The speed lines of a fit, including extrapolated ones, without the far choke end where the gas is not compressed.
+/// The speed lines of a fit, including extrapolated ones, without the end on the choke side at which the gas is not compressed.
 ///
 /// # Errors
 /// [`MapError`] if the remaining lines cannot be simulated.

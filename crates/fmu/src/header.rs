@@ -1,4 +1,4 @@
-//! Writes `model_data.h`: the data of the machine, and constants of the Rust code.
+//! Writes `model_data.h`: the data of the machine, and the constants of the Rust model.
 
 use crate::c_text::{array, identifier, number, numbers};
 use crate::machine::{FmuError, FmuMachine, FmuMap};
@@ -17,10 +17,10 @@ use mapper_physics::{
 };
 use std::fmt::Write;
 
-/// Tolerance if the importer names none, relative to each state.
+/// Default tolerance, relative to each state.
 pub const DEFAULT_TOLERANCE: f64 = 1e-8;
 
-/// The header. The GUID is written by [`with_guid`], since it depends on the rest.
+/// Writes the header without the GUID, which depends on its contents; see [`with_guid`].
 pub fn header(
     machine: &FmuMachine<'_>,
     variables: &[Variable],

@@ -1,4 +1,4 @@
-//! Exports a machine as an FMU (FMI 2.0 co-simulation, C source code), for system simulation programs. [`files`] makes the files in memory
+//! Exports a machine as an FMU (FMI 2.0 co-simulation, C source code), for system simulation programs. [`files`] generates the files in memory
 //! from an [`FmuMachine`], and [`archive`] packs them; this crate writes nothing to disk.
 //!
 //! The equations are C files that ship with the program (`c/`); one generated header contains parameters, start values, the map and the

@@ -17,22 +17,22 @@ pub enum FmuMap {
 /// A machine to export.
 #[derive(Debug, Clone)]
 pub struct FmuMachine<'a> {
-    /// Its name for users.
+    /// Name for users.
     pub name: &'a str,
     /// One sentence on the origin of its numbers.
     pub origin: &'a str,
     /// Parameters.
     pub params: &'a Params,
-    /// The map.
+    /// Compressor map.
     pub map: &'a FmuMap,
     /// Start values of the inputs.
     pub boundary: &'a BoundaryConditions,
-    /// Its initial state unless the importer sets another.
+    /// Initial state, unless the importer sets another one.
     pub start: &'a State,
 }
 
 impl FmuMachine<'_> {
-    /// The name as the standard's model identifier: a C identifier of at most 60 characters.
+    /// The model identifier of the FMI standard: the name as a C identifier of at most 60 characters.
     pub fn identifier(&self) -> String {
         let mut text: String =
             self.name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).take(60).collect();
@@ -43,15 +43,15 @@ impl FmuMachine<'_> {
     }
 }
 
-/// Why no FMU can be made.
+/// Reason why an FMU cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum FmuError {
     /// A number that cannot be written in C.
-    #[error("{name} = {value}: an FMU needs a finite number there")]
+    #[error("{name} = {value}: an FMU needs a finite number")]
     NotFinite {
-        /// Which number.
+        /// Name of the number.
         name: String,
-        /// Its value.
+        /// Value.
         value: f64,
     },
     /// The archive cannot be written.

@@ -1,13 +1,13 @@
-//! The C files of an FMU that are equal for every machine.
+//! The C files that all FMUs share.
 
-/// Name and text of each.
+/// Name and text of each file.
 pub const SOURCES: &[(&str, &str)] = &[
     ("fmu.c", include_str!("../c/fmu.c")),
     ("machine.c", include_str!("../c/machine.c")),
     ("machine.h", include_str!("../c/machine.h")),
     ("map.c", include_str!("../c/map.c")),
     ("rodas5p.c", include_str!("../c/rodas5p.c")),
-    // The standard's own headers (2-clause BSD, Modelica Association), as they are.
+    // Unchanged headers of the standard (2-clause BSD, Modelica Association).
     ("fmi2Functions.h", include_str!("../c/fmi2/fmi2Functions.h")),
     ("fmi2FunctionTypes.h", include_str!("../c/fmi2/fmi2FunctionTypes.h")),
     ("fmi2TypesPlatform.h", include_str!("../c/fmi2/fmi2TypesPlatform.h")),

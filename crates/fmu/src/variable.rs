@@ -1,4 +1,4 @@
-//! One variable of an FMU.
+//! Variables of an FMU and their units.
 
 /// Role of a variable for the importer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -14,15 +14,15 @@ pub enum Causality {
 /// A real variable. Its index in the list is its value reference.
 #[derive(Debug, Clone, Copy)]
 pub struct Variable {
-    /// Name; dots group.
+    /// Name; dots separate groups.
     pub name: &'static str,
     /// Role.
     pub causality: Causality,
-    /// Unit, a name of [`UNITS`].
+    /// Unit, one of [`UNITS`].
     pub unit: &'static str,
-    /// Value until one is set; `None` for outputs.
+    /// Initial value; `None` for outputs.
     pub start: Option<f64>,
-    /// What it is.
+    /// Description.
     pub description: &'static str,
 }
 
@@ -31,16 +31,16 @@ pub struct Variable {
 pub struct Switch {
     /// Name.
     pub name: &'static str,
-    /// Value until one is set.
+    /// Initial value.
     pub start: bool,
-    /// What it does.
+    /// Description.
     pub description: &'static str,
 }
 
 /// A unit in the standard's base units: exponents of kg, m, s, K, rad, and a factor.
 #[derive(Debug, Clone, Copy)]
 pub struct Unit {
-    /// Its name.
+    /// Name.
     pub name: &'static str,
     /// Base units and exponents, and the factor if it is not 1, as attributes of XML.
     pub base: &'static str,

@@ -92,7 +92,7 @@ pub fn variables(machine: &FmuMachine<'_>) -> Vec<Variable> {
         output("eta", "1", "isentropic efficiency of the compression itself, without heat"),
         output("h", "W/(m2.K)", "heat-transfer coefficient of the compressor"),
         output("T1_prime", "K", "gas before the wheel"),
-        output("T2_prime", "K", "gas behind the wheel"),
+        output("T2_prime", "K", "gas after the wheel"),
         output("T2", "K", "gas at the compressor outlet"),
         output("T2_probe", "K", "reading of the T2 probe"),
         output("q_c", "W", "heat from gas to compressor housing"),

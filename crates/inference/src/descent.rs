@@ -3,19 +3,19 @@
 use mapper_numerics::ROUNDING;
 use nalgebra::{DMatrix, DVector};
 
-/// A model whose whitened residuals depend on unknowns. Its cost is their sum of squares and that of the unknowns' distances from their
-/// priors, in standard deviations.
+/// A model whose whitened residuals depend on unknowns. Its cost is the sum of squares of the residuals, plus the squared distance of
+/// each unknown from its prior mean in standard deviations.
 pub trait Model {
     /// Result of the model for values of the unknowns.
     type Point;
 
-    /// The result at these values; `None` if the model has none.
+    /// Evaluates the model; `None` if it has no result at these values.
     fn at(&self, unknowns: &DVector<f64>) -> Option<Self::Point>;
 
     /// The cost of a point.
     fn cost(&self, unknowns: &DVector<f64>, point: &Self::Point) -> f64;
 
-    /// The normal equations there, with slopes that are taken over a small part of the way or over a large one.
+    /// The normal equations at a point; `reach` is the distance of the finite differences.
     fn normal(&mut self, unknowns: &DVector<f64>, point: &Self::Point, reach: Reach) -> Normal;
 
     /// Largest change of each unknown in one iteration: down (at most 0) and up.
@@ -25,72 +25,74 @@ pub trait Model {
     fn accept(&mut self, _: &Self::Point) {}
 }
 
-/// Distance over which slopes are taken.
+/// Distance of the finite differences that give the slopes of the residuals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reach {
     /// For a smooth cost.
     Fine,
-    /// For a cost with small steps, which hide the slope at a fine distance.
+    /// For a cost with small discontinuities, which hide its slope at a short distance.
     Coarse,
 }
 
-/// Distance from a point to the runs from which slopes are taken, in the coordinates' units: rounding and curvature are both small there.
+/// Fine distance of finite differences, in the unknowns' units: both rounding and curvature errors are small.
 pub const FINE: f64 = 0.02;
 /// Largest change of an unknown in one iteration, in its unit: models are nonlinear.
 const MAX_MOVE: f64 = 2.0;
 
 impl Reach {
-    /// Distance to the runs from which slopes are taken.
+    /// The distance, in the unknowns' units.
     pub fn distance(self) -> f64 {
         if self == Reach::Fine { FINE } else { 10.0 * FINE }
     }
 }
 
-/// Room of an unknown between these ends, in one iteration.
+/// Largest change of an unknown in one iteration, down and up, that keeps it between `low` and `high`.
 pub fn room_within(low: f64, high: f64, at: f64) -> (f64, f64) {
     ((low - at).clamp(-MAX_MOVE, 0.0), (high - at).clamp(0.0, MAX_MOVE))
 }
 
-/// Minimum predicted decrease of the cost for another iteration, if the end is compared with others: a hundredth of evidence is negligible.
+/// Minimum predicted decrease of the cost for another iteration, if fits are compared with each other: 0.01 in ln of the evidence is
+/// negligible.
 pub const ENOUGH: f64 = 0.02;
 
-/// Alternations between two fits that depend on each other, at most: each one reduces the error to about a tenth.
+/// Maximum number of alternations between two fits that depend on each other: each reduces the error to about a tenth.
 pub const ROUNDS: usize = 3;
 
-/// When a descent ends.
+/// Stopping rule of a descent.
 #[derive(Debug, Clone, Copy)]
 pub struct Until {
-    /// Maximum number of points at which slopes are taken; the last one is the end.
+    /// Maximum number of evaluations of the normal equations, the one at the result included.
     pub iterations: usize,
     /// Minimum predicted decrease of the cost for another iteration.
     pub enough: f64,
 }
 
 impl Default for Until {
-    /// For an end that is compared with others.
+    /// For fits that are compared with each other.
     fn default() -> Self {
         Until { iterations: 10, enough: ENOUGH }
     }
 }
 
-/// End of a descent.
+/// Result of a descent.
 #[derive(Debug, Clone)]
 pub struct End<Point> {
     /// The unknowns.
     pub unknowns: DVector<f64>,
-    /// Result of the model there.
+    /// Result of the model.
     pub point: Point,
-    /// The normal equations there.
+    /// The normal equations.
     pub normal: Normal,
-    /// Predicted decrease of the cost by one more iteration; above the requested one if no step along the slopes decreases the cost.
+    /// Predicted decrease of the cost by one more iteration; larger than [`Until::enough`] if no step decreased the cost.
     pub promised: f64,
 }
 
-/// Tries along a step, and the factor by which each is shorter than the one before.
-const TRIES: usize = 5;
-const SHORTER: f64 = 0.35;
+/// Maximum number of lengths tried for one step.
+const MAX_STEP_LENGTHS: usize = 5;
+/// Ratio of each length to the previous one.
+const STEP_SHORTENING: f64 = 0.35;
 
-/// Minimises the cost from these unknowns, with the result of the model there.
+/// Minimises the cost from `unknowns`, at which the model gives `point`.
 pub fn descend<M: Model>(
     model: &mut M,
     mut unknowns: DVector<f64>,
@@ -100,22 +102,22 @@ pub fn descend<M: Model>(
     model.accept(&point);
     let mut reach = Reach::Fine;
     let mut normal = model.normal(&unknowns, &point, reach);
-    let mut left = 0.0;
+    let mut predicted_decrease = 0.0;
     for _ in 1..until.iterations {
         let Some((step, promised)) = normal.step(&model.room(&unknowns)) else { break };
-        left = promised;
+        predicted_decrease = promised;
         if promised < until.enough {
             break;
         }
-        let before = model.cost(&unknowns, &point);
-        let tries = (0..TRIES).map(|tries| &unknowns + &step * SHORTER.powi(tries as i32));
-        let lower = tries.into_iter().find_map(|there| {
-            let found = model.at(&there)?;
-            (model.cost(&there, &found) < before).then_some((there, found))
+        let cost = model.cost(&unknowns, &point);
+        let improvement = (0..MAX_STEP_LENGTHS).find_map(|trial| {
+            let unknowns = &unknowns + &step * STEP_SHORTENING.powi(trial as i32);
+            let point = model.at(&unknowns)?;
+            (model.cost(&unknowns, &point) < cost).then_some((unknowns, point))
         });
-        match lower {
-            Some((there, found)) => {
-                (unknowns, point) = (there, found);
+        match improvement {
+            Some(better) => {
+                (unknowns, point) = better;
                 model.accept(&point);
             }
             None if reach == Reach::Coarse => break,
@@ -123,52 +125,52 @@ pub fn descend<M: Model>(
         }
         normal = model.normal(&unknowns, &point, reach);
     }
-    End { unknowns, point, normal, promised: left }
+    End { unknowns, point, normal, promised: predicted_decrease }
 }
 
-/// The normal equations of an iteration: half the cost's second derivatives, and half its slope downwards.
+/// The normal equations of an iteration: half the Hessian of the cost, and half its negative gradient.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Normal {
     /// Precision of the unknowns, priors included.
     pub matrix: DMatrix<f64>,
-    /// Half the slope of the cost, downwards, for each of them.
+    /// Half the negative gradient of the cost.
     pub pull: DVector<f64>,
 }
 
 impl Normal {
-    /// The step to the minimum cost within the room of each unknown, and the predicted decrease. The unknown that would leave its room furthest is
-    /// fixed at its end, and the others are solved again.
+    /// The step to the minimum cost within the bounds of each unknown's change, and the predicted decrease. The unknown that exceeds its
+    /// bounds most is fixed at the bound, and the others are solved again.
     pub fn step(&self, room: &[(f64, f64)]) -> Option<(DVector<f64>, f64)> {
-        let mut held: Vec<Option<f64>> = vec![None; room.len()];
+        let mut fixed: Vec<Option<f64>> = vec![None; room.len()];
         for _ in 0..=room.len() {
-            let free: Vec<usize> = (0..held.len()).filter(|i| held[*i].is_none()).collect();
-            let mut step = DVector::from_fn(held.len(), |i, _| held[i].unwrap_or(0.0));
-            let pushed = &self.matrix * &step;
+            let free: Vec<usize> = (0..fixed.len()).filter(|i| fixed[*i].is_none()).collect();
+            let mut step = DVector::from_fn(fixed.len(), |i, _| fixed[i].unwrap_or(0.0));
+            let fixed_part = &self.matrix * &step;
             let matrix = DMatrix::from_fn(free.len(), free.len(), |i, j| self.matrix[(free[i], free[j])]);
-            let right = DVector::from_fn(free.len(), |i, _| self.pull[free[i]] - pushed[free[i]]);
-            let part = matrix.cholesky()?.solve(&right);
+            let right = DVector::from_fn(free.len(), |i, _| self.pull[free[i]] - fixed_part[free[i]]);
+            let solution = matrix.cholesky()?.solve(&right);
             for (place, index) in free.iter().enumerate() {
-                step[*index] = part[place];
+                step[*index] = solution[place];
             }
-            let beyond = |i: &usize| (room[*i].0 - step[*i]).max(step[*i] - room[*i].1);
-            let furthest = free.into_iter().max_by(|a, b| beyond(a).total_cmp(&beyond(b)));
-            let Some(leaving) = furthest.filter(|i| beyond(i) > ROUNDING) else {
+            let excess = |i: &usize| (room[*i].0 - step[*i]).max(step[*i] - room[*i].1);
+            let worst = free.into_iter().max_by(|a, b| excess(a).total_cmp(&excess(b)));
+            let Some(worst) = worst.filter(|i| excess(i) > ROUNDING) else {
                 let promised = 2.0 * step.dot(&self.pull) - step.dot(&(&self.matrix * &step));
                 return Some((step, promised));
             };
-            held[leaving] = Some(step[leaving].clamp(room[leaving].0.min(0.0), room[leaving].1.max(0.0)));
+            fixed[worst] = Some(step[worst].clamp(room[worst].0.min(0.0), room[worst].1.max(0.0)));
         }
         None
     }
 
-    /// Half the logarithm of the determinant of the precision (Laplace's approximation of the evidence takes it off); `None` where the
+    /// Half the logarithm of the determinant of the precision, which Laplace's approximation of the evidence subtracts; `None` if the
     /// precision is not positive definite.
     pub fn half_ln_determinant(&self) -> Option<f64> {
         let cholesky = self.matrix.clone().cholesky()?;
         Some(cholesky.l_dirty().diagonal().iter().map(|d| d.ln()).sum())
     }
 
-    /// Covariance of the unknowns from the `first` on, the others free.
+    /// Marginal covariance of the unknowns from index `first` on.
     pub fn covariance_from(&self, first: usize) -> Option<DMatrix<f64>> {
         let inverse = self.matrix.clone().cholesky()?.inverse();
         let count = inverse.nrows() - first;

@@ -1,15 +1,15 @@
-//! Which of many hypotheses explain the residuals of linear balances.
+//! Selects the hypotheses that explain the residuals of linear balances.
 //!
-//! A balance is a vector of residuals `r` that would be zero but for errors: `r = C x + e`, with `e ~ N(0, S)` and one column of `C` for
-//! each parameter `x`. Some parameters always differ from zero by as much as is declared of them (`x ~ N(0, sigma^2)`). The others are
+//! A balance is a vector of residuals `r` that are zero except for errors: `r = C x + e`, with `e ~ N(0, S)` and one column of `C` for
+//! each parameter `x`. Some parameters always differ from zero, within their declared uncertainty (`x ~ N(0, sigma^2)`). The others are
 //! hypotheses: each is exactly zero unless it is a member of the explanation, and then `x ~ N(0, sigma^2)` as well. Hypotheses that are
-//! the same cause in another form, as a drift with another onset, make a family, and at most one of a family is a member.
+//! forms of one cause (a drift with different onsets) make a family, and at most one hypothesis of a family is a member.
 //!
 //! The evidence of a set has a closed form (Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, sect. 2.7), so that
-//! nothing is drawn and nothing is fitted. That of a family is the sum over its hypotheses, each with its share of the prior. If the
-//! residuals are as described, a family that is more probable than none comes up in at most a share of all recordings in which nothing is
-//! wrong that is the sum of all priors, by Markov's inequality, for a Bayes factor has mean 1 there. In fact far less: it takes some 4.5
-//! standard errors, and 30 hypotheses have that in one of 5,000.
+//! neither sampling nor fitting is needed. The evidence of a family is the sum over its hypotheses, each with its share of the prior.
+//!
+//! The rate of false alarms in fault-free recordings is at most the sum of all priors (Markov's inequality: without a fault a Bayes factor
+//! has mean 1). The actual rate is far lower: an alarm takes about 4.5 standard errors, which 30 hypotheses reach in one of 5,000 recordings.
 
 use mapper_numerics::ROUNDING;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -17,15 +17,15 @@ use std::collections::BTreeMap;
 
 /// Maximum number of members of an explanation: bounds the search. Judgement.
 pub const MAX_MEMBERS: usize = 4;
-/// Sets from which the search starts, in addition to the empty one: bounds its time. Judgement.
+/// Maximum number of sets from which the search starts, in addition to the empty one: bounds its time. Judgement.
 const MAX_STARTS: usize = 6;
 
 /// Residuals and their sensitivities to the parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Balance {
-    /// One for each row.
+    /// Residuals, one for each row.
     pub residual: DVector<f64>,
-    /// Covariance of the rows without any of the parameters, rows x rows, positive definite.
+    /// Covariance of the residuals if all parameters are zero, rows x rows, positive definite.
     pub covariance: DMatrix<f64>,
     /// Sensitivities of the residuals to the parameters, rows x parameters.
     pub columns: DMatrix<f64>,
@@ -35,19 +35,19 @@ pub struct Balance {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Likelihood {
     precision: DMatrix<f64>,
-    pull: DVector<f64>,
+    precision_mean: DVector<f64>,
 }
 
 /// A parameter that is zero unless it is a member of the explanation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hypothesis {
-    /// Its family: hypotheses of which at most one is a member.
+    /// Its family; at most one hypothesis of a family is a member.
     pub family: usize,
     /// Prior standard deviation if it is a member.
     pub sigma: f64,
     /// ln of the prior probability that it is a member.
     pub ln_prior: f64,
-    /// Whether it is never below zero.
+    /// Whether the parameter is never negative.
     pub at_least_zero: bool,
 }
 
@@ -56,12 +56,12 @@ pub struct Hypothesis {
 pub struct Priors {
     /// Standard deviations of the parameters that always differ from zero: the first columns.
     pub always: Vec<f64>,
-    /// The columns after them.
+    /// Hypotheses: the other columns.
     pub hypotheses: Vec<Hypothesis>,
 }
 
 impl Priors {
-    /// Hypotheses that are all families of their own and equally probable; `expected` of them, above 0 and at most 1, are members on average.
+    /// Equally probable hypotheses, each a family of its own. On average `expected` of them (above 0, at most 1) are members.
     pub fn even(always: Vec<f64>, sigmas: &[f64], expected: f64) -> Priors {
         let ln_prior = (expected / sigmas.len() as f64).ln();
         let hypothesis = |(family, sigma): (usize, &f64)| Hypothesis {
@@ -83,9 +83,9 @@ pub struct Member {
     pub value: f64,
     /// One standard deviation of `value`.
     pub sigma: f64,
-    /// ln of the probability of its family over that of nothing in its place.
+    /// ln of the odds of its family against no hypothesis in its place.
     pub ln_odds: f64,
-    /// Families that could stand in its place, most probable first, with their probability relative to its own (at most about 1).
+    /// Families that could replace it, most probable first, with their probability relative to that of its own family (at most about 1).
     pub alternatives: Vec<(usize, f64)>,
 }
 
@@ -94,30 +94,32 @@ pub struct Member {
 pub struct Explanation {
     /// Empty if no hypothesis is needed.
     pub members: Vec<Member>,
-    /// ln of its probability over that of the empty one.
+    /// ln of its odds against the empty explanation.
     pub ln_odds: f64,
-    /// ln of the probability of each family as the only member over that of none; families that show nothing are not in it.
+    /// ln of the odds of each family as the only member; families that contradict the residuals are missing.
     pub alone: BTreeMap<usize, f64>,
 }
 
 impl Likelihood {
-    /// Of this number of parameters, without any balance.
+    /// An uninformative likelihood of `parameters` parameters: no balance has been added.
     pub fn new(parameters: usize) -> Self {
-        Likelihood { precision: DMatrix::zeros(parameters, parameters), pull: DVector::zeros(parameters) }
+        Likelihood {
+            precision: DMatrix::zeros(parameters, parameters),
+            precision_mean: DVector::zeros(parameters),
+        }
     }
 
-    /// Of hypotheses alone, where the parameters that always differ from zero belong to the covariance `S` already: `C' S^-1 C` and
-    /// `C' S^-1 r`.
-    pub fn of(precision: DMatrix<f64>, pull: DVector<f64>) -> Self {
-        Likelihood { precision, pull }
+    /// A likelihood of hypotheses alone, from `C' S^-1 C` and `C' S^-1 r`; `S` includes the parameters that always differ from zero.
+    pub fn of(precision: DMatrix<f64>, precision_mean: DVector<f64>) -> Self {
+        Likelihood { precision, precision_mean }
     }
 
-    /// Adds a balance that errs independently of the others. `None` where its covariance is not positive definite, a number is not finite or
-    /// the shapes do not agree; nothing is added then.
+    /// Adds a balance whose errors are independent of those of the others. Returns `None` and adds nothing if its covariance is not positive
+    /// definite, a number is not finite or the shapes do not agree.
     pub fn add(&mut self, balance: &Balance) -> Option<()> {
         let Balance { residual, covariance, columns } = balance;
         let rows = residual.len();
-        if covariance.shape() != (rows, rows) || columns.shape() != (rows, self.pull.len()) {
+        if covariance.shape() != (rows, rows) || columns.shape() != (rows, self.precision_mean.len()) {
             return None;
         }
         let numbers = residual.iter().chain(covariance.iter()).chain(columns.iter());
@@ -128,65 +130,67 @@ impl Likelihood {
         let columns = lower.solve_lower_triangular(columns)?;
         let residual = lower.solve_lower_triangular(residual)?;
         self.precision += columns.tr_mul(&columns);
-        self.pull += columns.tr_mul(&residual);
+        self.precision_mean += columns.tr_mul(&residual);
         Some(())
     }
 
-    /// Likelihood of the other parameters, with the first ones, as declared, integrated out.
-    pub(crate) fn given(&self, always: &[f64]) -> Option<Likelihood> {
+    /// Marginal likelihood of the hypotheses: integrates over the first parameters, which have standard deviations `always`.
+    pub(crate) fn marginalise(&self, always: &[f64]) -> Option<Likelihood> {
         if always.is_empty() {
             return Some(self.clone());
         }
-        let (first, count) = (always.len(), self.pull.len());
+        let (first, count) = (always.len(), self.precision_mean.len());
         let scale = DMatrix::from_diagonal(&DVector::from_column_slice(always));
         let own = self.precision.view((0, 0), (first, first));
         let shared = &scale * self.precision.view((0, first), (first, count - first));
-        let pull = &scale * self.pull.rows(0, first);
+        let precision_mean = &scale * self.precision_mean.rows(0, first);
         let factor = (DMatrix::identity(first, first) + &scale * own * &scale).cholesky()?;
         let rest = self.precision.view((first, first), (count - first, count - first));
         Some(Likelihood {
             precision: rest - shared.tr_mul(&factor.solve(&shared)),
-            pull: self.pull.rows(first, count - first) - shared.tr_mul(&factor.solve(&pull)),
+            precision_mean: self.precision_mean.rows(first, count - first)
+                - shared.tr_mul(&factor.solve(&precision_mean)),
         })
     }
 
-    /// Precision and pull of one parameter.
+    /// Precision of one parameter, and precision times mean.
     pub(crate) fn of_parameter(&self, index: usize) -> (f64, f64) {
-        (self.precision[(index, index)], self.pull[index])
+        (self.precision[(index, index)], self.precision_mean[index])
     }
 
-    /// The scaled posterior precision `1 + D H D` of some parameters, factored, and their scaled pull.
+    /// The Cholesky factor of the scaled posterior precision `1 + D H D` of some parameters, and their scaled precision_mean.
     fn posterior(&self, free: &[(usize, f64)]) -> Option<(Cholesky<f64, Dyn>, DVector<f64>)> {
         let count = free.len();
         let matrix = DMatrix::from_fn(count, count, |i, j| {
             let ((a, of_a), (b, of_b)) = (free[i], free[j]);
             of_a * of_b * self.precision[(a, b)] + f64::from(u8::from(i == j))
         });
-        let pull = DVector::from_iterator(count, free.iter().map(|(a, sigma)| sigma * self.pull[*a]));
-        Some((matrix.cholesky()?, pull))
+        let precision_mean =
+            DVector::from_iterator(count, free.iter().map(|(a, sigma)| sigma * self.precision_mean[*a]));
+        Some((matrix.cholesky()?, precision_mean))
     }
 
     /// Standard error with which the balances determine the size of each hypothesis by itself; infinite if they do not.
     pub fn standard_errors(&self, priors: &Priors) -> Option<Vec<f64>> {
-        let information = self.given(&priors.always)?.precision.diagonal();
+        let information = self.marginalise(&priors.always)?.precision.diagonal();
         Some(information.iter().map(|information| information.max(0.0).sqrt().recip()).collect())
     }
 
-    /// Size of a hypothesis, with the other parameters as declared, whose expected residuals make its family as probable as nothing; infinite
-    /// where no size does.
+    /// Smallest size of a hypothesis that can be detected: its expected residuals make its family as probable as no hypothesis at all;
+    /// infinite if no size does.
     pub fn smallest_seen(&self, priors: &Priors, index: usize) -> Option<f64> {
-        let given = self.given(&priors.always)?;
+        let marginal = self.marginalise(&priors.always)?;
         let family = priors.hypotheses[index].family;
         let ln_odds = |size: f64| {
             let of_family = priors.hypotheses.iter().enumerate().filter(|(_, other)| other.family == family);
             let each = of_family.map(|(other, Hypothesis { sigma, ln_prior, .. })| {
-                let scaled = 1.0 + sigma * sigma * given.precision[(other, other)];
-                let pull = sigma * size * given.precision[(other, index)];
-                0.5 * pull * pull / scaled - 0.5 * scaled.ln() + ln_prior
+                let scaled = 1.0 + sigma * sigma * marginal.precision[(other, other)];
+                let precision_mean = sigma * size * marginal.precision[(other, index)];
+                0.5 * precision_mean * precision_mean / scaled - 0.5 * scaled.ln() + ln_prior
             });
             each.fold(f64::NEG_INFINITY, ln_sum)
         };
-        // The odds grow with the size: between nothing and a multiple that is surely seen, halved until it is known to rounding.
+        // The odds grow with the size: bisection between zero and a multiple that is certainly detected.
         let (mut low, mut high) = (0.0, 1e6 * priors.hypotheses[index].sigma);
         if ln_odds(high) < 0.0 {
             return Some(f64::INFINITY);
@@ -204,10 +208,10 @@ impl Likelihood {
 
     /// The most probable set of hypotheses, found by adding, swapping and removing members until nothing is more probable.
     pub fn explain(&self, priors: &Priors) -> Option<Explanation> {
-        let likelihood = self.given(&priors.always)?;
+        let likelihood = self.marginalise(&priors.always)?;
         let search = Search { likelihood: &likelihood, hypotheses: &priors.hypotheses };
-        // From nothing, and from each of the most probable families: two of three causes that nearly add up to each other are left by no
-        // single swap.
+        // Start from the empty set and from each of the most probable families: if one cause nearly equals the sum of two others, no
+        // single swap leads from one explanation to the other.
         let mut starts: Vec<Offer> =
             search.offers(&[]).into_values().filter(|offer| offer.ln_total > 0.0).collect();
         starts.sort_by(|a, b| b.ln_total.total_cmp(&a.ln_total));
@@ -218,14 +222,14 @@ impl Likelihood {
     }
 }
 
-/// A family in a place of the explanation.
+/// A family that may join the explanation.
 #[derive(Debug, Clone, Copy)]
 struct Offer {
     /// Its most probable hypothesis.
     index: usize,
-    /// ln of the odds of the set with that one.
+    /// ln of the odds of the set with this hypothesis.
     ln_odds: f64,
-    /// The same of the whole family.
+    /// ln of the odds of the set with the whole family.
     ln_total: f64,
 }
 
@@ -242,20 +246,20 @@ impl Search<'_> {
 
     /// ln of the probability of a set over that of the empty one.
     fn ln_odds(&self, members: &[usize]) -> f64 {
-        let Some((factor, pull)) = self.likelihood.posterior(&self.free(members)) else {
+        let Some((factor, precision_mean)) = self.likelihood.posterior(&self.free(members)) else {
             return f64::NEG_INFINITY;
         };
-        let scaled = factor.solve(&pull);
+        let scaled = factor.solve(&precision_mean);
         let below = |(index, value): (&usize, &f64)| self.hypotheses[*index].at_least_zero && *value < 0.0;
         if members.iter().zip(scaled.iter()).any(below) {
             return f64::NEG_INFINITY;
         }
         let ln_root_determinant: f64 = factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum();
         let ln_prior: f64 = members.iter().map(|index| self.hypotheses[*index].ln_prior).sum();
-        0.5 * pull.dot(&scaled) - ln_root_determinant + ln_prior
+        0.5 * precision_mean.dot(&scaled) - ln_root_determinant + ln_prior
     }
 
-    /// Every family that has no member among `rest`, added to it.
+    /// Every family without a member in `rest`, with its odds if it is added.
     fn offers(&self, rest: &[usize]) -> BTreeMap<usize, Offer> {
         let mut offers: BTreeMap<usize, Offer> = BTreeMap::new();
         let mut set = rest.to_vec();
@@ -279,7 +283,7 @@ impl Search<'_> {
         offers
     }
 
-    /// The set to which changes of one member at a time lead from this set.
+    /// Changes one member at a time until no change makes the set more probable.
     fn climb(&self, mut members: Vec<usize>) -> Vec<usize> {
         // Each member is added, replaced and removed once. If every family is one hypothesis, the search ends by itself, since each change
         // makes the set more probable.
@@ -290,7 +294,7 @@ impl Search<'_> {
         members
     }
 
-    /// The set that gains most by one member more, one less, or another one in a place; `None` where none gains.
+    /// The set with the largest gain from adding, removing or replacing one member; `None` if no change gains.
     fn better(&self, members: &[usize]) -> Option<Vec<usize>> {
         let places = (members.len() + 1).min(MAX_MEMBERS);
         let mut best: (f64, Option<Vec<usize>>) = (ROUNDING, None);
@@ -302,14 +306,14 @@ impl Search<'_> {
         for place in 0..places {
             let rest = without(members, place);
             let offers = self.offers(&rest);
-            let nothing = self.ln_odds(&rest);
+            let removed = self.ln_odds(&rest);
             let family = members.get(place).map(|index| self.hypotheses[*index].family);
             let now =
-                family.map_or(nothing, |family| offers.get(&family).map_or(nothing, |own| own.ln_total));
-            try_set(nothing - now, rest.clone());
+                family.map_or(removed, |family| offers.get(&family).map_or(removed, |own| own.ln_total));
+            try_set(removed - now, rest.clone());
             for (other, offer) in &offers {
                 let set: Vec<usize> = rest.iter().copied().chain([offer.index]).collect();
-                // Of the own family the best hypothesis may be another one than it was when the rest was another.
+                // The best hypothesis of the same family may change if the other members have changed.
                 let own = Some(*other) == family;
                 let gain = if own { offer.ln_odds - self.ln_odds(members) } else { offer.ln_total - now };
                 try_set(gain, set);
@@ -320,8 +324,8 @@ impl Search<'_> {
 
     fn explanation(&self, members: &[usize]) -> Option<Explanation> {
         let free = self.free(members);
-        let (factor, pull) = self.likelihood.posterior(&free)?;
-        let (solved, inverse) = (factor.solve(&pull), factor.inverse());
+        let (factor, precision_mean) = self.likelihood.posterior(&free)?;
+        let (solved, inverse) = (factor.solve(&precision_mean), factor.inverse());
         let member = |(place, index): (usize, &usize)| {
             let rest = without(members, place);
             let mut offers = self.offers(&rest);

@@ -1,19 +1,19 @@
-//! The shortest interval of a number that is normally distributed about each of many weighted centres.
+//! The shortest interval of a mixture of normal distributions about weighted centres.
 
 use mapper_numerics::statistics::EXCLUDE_SIGMAS;
 
-/// Cells of the density for one standard deviation: the interval then errs by less than a hundredth of it.
+/// Cells of the density for one standard deviation: the error of the interval is then below 0.01 standard deviations.
 const CELLS_PER_SIGMA: f64 = 16.0;
 /// Maximum number of cells between the lowest and the highest centre: bounds the effort if the centres are far apart.
 const MAX_CELLS: f64 = 4096.0;
 
-/// Coverage of the intervals of results.
+/// Coverage of all reported intervals.
 pub const COVERAGE: f64 = 0.95;
-/// A parameter is identified if its interval is narrower than this share of its prior's; otherwise the prior dominates. Judgement.
+/// A parameter is identified if its interval is narrower than this fraction of its prior's interval; otherwise the prior dominates. Judgement.
 pub const IDENTIFIED_RATIO: f64 = 0.7;
 
 /// Shortest interval that contains `coverage` of the mixture of normal distributions about `centres` (weight, value), each with the
-/// standard deviation `sigma`. `None` without centres, or where a number is not finite.
+/// standard deviation `sigma`. `None` if there are no centres or a number is not finite.
 pub fn shortest(centres: &[(f64, f64)], sigma: f64, coverage: f64) -> Option<(f64, f64)> {
     let (low, high) = centres
         .iter()

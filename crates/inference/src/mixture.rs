@@ -3,16 +3,16 @@
 //! A fit with all parameters free gives one Gaussian likelihood of them. Each parameter is either exactly neutral (the spike) or has a
 //! zero-mean normal prior, truncated to its range (the slab). The evidence of each of the `2^n` sets follows in closed form from the one
 //! Gaussian (the Savage-Dickey density ratio: Dickey, Ann. Math. Stat. 42:204, 1971; spike and slab: Mitchell and Beauchamp, JASA 83:1023,
-//! 1988). Beforehand every *number* of parameters off neutral is equally likely, and so is every set of that number, which corrects for
-//! how many could be named (Scott and Berger, Ann. Stat. 38:2587, 2010). A machine that differs in one respect from its declaration
+//! 1988). In the prior every *number* of parameters off neutral is equally probable, and so is every set of that number, which corrects for
+//! multiple comparisons (Scott and Berger, Ann. Stat. 38:2587, 2010). A machine that differs in one respect from its declaration
 //! is then more likely to differ in another.
 
 use mapper_numerics::statistics::BoundedNormal;
 use nalgebra::{DMatrix, DVector};
 
-/// Draws of each set: means and probabilities are then within some thousandths of sums over a grid, as the test shows.
+/// Number of draws of each set: means and probabilities then agree with sums over a grid to some thousandths (tested below).
 const DRAWS: usize = 128;
-/// Minimum weight of a set that is drawn from: a fiftieth of the probability outside a 95 % interval.
+/// Minimum probability of a set that gets draws: a fiftieth of the probability outside a 95 % interval.
 pub const MIN_WEIGHT: f64 = 1e-3;
 /// Bases of the Halton sequence, one for each parameter.
 const BASES: [usize; 8] = [2, 3, 5, 7, 11, 13, 17, 19];
@@ -26,16 +26,16 @@ pub struct Parameter {
     pub low: f64,
     /// Highest value.
     pub high: f64,
-    /// Change that small errors of the model can mimic, one standard deviation. Counts in the evidence.
+    /// Apparent change that small errors of the model can cause, one standard deviation; it enters the evidence only.
     pub model_error: f64,
-    /// Standard deviation of the normal prior under which the Gaussian was found; infinite for none.
+    /// Standard deviation of the normal prior in the fit that gave the Gaussian; infinite for none.
     pub fitted_under_sigma: f64,
 }
 
 /// Values of all parameters with their weight.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Draw {
-    /// All weights add up to 1.
+    /// Weight; all weights add up to 1.
     pub weight: f64,
     /// Distances from neutral, one for each parameter.
     pub values: DVector<f64>,
@@ -53,21 +53,21 @@ pub struct Mixture {
 }
 
 impl Mixture {
-    /// Evaluates all sets. `mean` and `covariance`: of the parameters' distances from neutral, as fitted with all of them free.
-    /// `None` where the covariance is not positive definite or there are more than 8 parameters.
+    /// Evaluates all sets. `mean` and `covariance` are those of the parameters' distances from neutral, from a fit with all of them free.
+    /// `None` if the covariance is not positive definite or there are more than 8 parameters.
     pub fn of(mean: &DVector<f64>, covariance: &DMatrix<f64>, parameters: &[Parameter]) -> Option<Self> {
         let count = parameters.len();
         if count > BASES.len() || mean.len() != count || covariance.shape() != (count, count) {
             return None;
         }
         let exact = Likelihood::of(mean, covariance, parameters)?;
-        let blurred = exact.blurred(parameters)?;
+        let widened = exact.with_model_errors(parameters)?;
         let sets: Vec<Vec<usize>> =
             (0..1usize << count).map(|set| (0..count).filter(|i| set >> i & 1 == 1).collect()).collect();
         let logs: Vec<f64> = sets
             .iter()
             .map(|free| {
-                let evidence = blurred.ln_evidence(free, parameters).unwrap_or(f64::NEG_INFINITY);
+                let evidence = widened.ln_evidence(free, parameters).unwrap_or(f64::NEG_INFINITY);
                 evidence - ln_choose(count, free.len())
             })
             .collect();
@@ -101,8 +101,8 @@ impl Mixture {
         self.draws
             .iter()
             .map(|draw| {
-                let off = &draw.values - &mean;
-                draw.weight * &off * off.transpose()
+                let deviation = &draw.values - &mean;
+                draw.weight * &deviation * deviation.transpose()
             })
             .reduce(|sum, one| sum + one)
     }
@@ -116,49 +116,52 @@ fn ln_choose(all: usize, some: usize) -> f64 {
 /// A Gaussian likelihood in its natural form: precision, and precision times the mean. The precision may be singular.
 struct Likelihood {
     precision: DMatrix<f64>,
-    pull: DVector<f64>,
+    precision_mean: DVector<f64>,
 }
 
 impl Likelihood {
     /// Removes the prior of the fit.
     fn of(mean: &DVector<f64>, covariance: &DMatrix<f64>, parameters: &[Parameter]) -> Option<Self> {
         let mut precision = covariance.clone().cholesky()?.inverse();
-        let pull = &precision * mean;
+        let precision_mean = &precision * mean;
         for (i, parameter) in parameters.iter().enumerate() {
             precision[(i, i)] -= parameter.fitted_under_sigma.powi(-2);
         }
-        Some(Likelihood { precision, pull })
+        Some(Likelihood { precision, precision_mean })
     }
 
-    /// The same with the model's error on top of the fit's.
-    fn blurred(&self, parameters: &[Parameter]) -> Option<Self> {
+    /// The likelihood widened by the errors of the model.
+    fn with_model_errors(&self, parameters: &[Parameter]) -> Option<Self> {
         let errors =
             DVector::from_iterator(parameters.len(), parameters.iter().map(|p| p.model_error.powi(2)));
         let count = parameters.len();
         let spread = DMatrix::identity(count, count) + &self.precision * DMatrix::from_diagonal(&errors);
         let inverse = spread.try_inverse()?;
         let precision = &inverse * &self.precision;
-        Some(Likelihood { precision: 0.5 * (&precision + precision.transpose()), pull: inverse * &self.pull })
+        Some(Likelihood {
+            precision: 0.5 * (&precision + precision.transpose()),
+            precision_mean: inverse * &self.precision_mean,
+        })
     }
 
-    /// Mean and covariance of the free parameters under their slabs, the others being neutral, before their ranges count.
+    /// Mean and covariance of the free parameters with the others neutral, under their normal priors without truncation.
     fn posterior(&self, free: &[usize], parameters: &[Parameter]) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let precision = DMatrix::from_fn(free.len(), free.len(), |a, b| {
             let own = if a == b { parameters[free[a]].slab_sigma.powi(-2) } else { 0.0 };
             self.precision[(free[a], free[b])] + own
         });
         let covariance = precision.cholesky()?.inverse();
-        let pull = DVector::from_iterator(free.len(), free.iter().map(|i| self.pull[*i]));
-        Some((&covariance * pull, covariance))
+        let precision_mean = DVector::from_iterator(free.len(), free.iter().map(|i| self.precision_mean[*i]));
+        Some((&covariance * precision_mean, covariance))
     }
 
-    /// ln of the evidence of a set over that of none.
+    /// ln of the Bayes factor of a set against the empty set.
     fn ln_evidence(&self, free: &[usize], parameters: &[Parameter]) -> Option<f64> {
         if free.is_empty() {
             return Some(0.0);
         }
         let (mean, covariance) = self.posterior(free, parameters)?;
-        let pull = DVector::from_iterator(free.len(), free.iter().map(|i| self.pull[*i]));
+        let precision_mean = DVector::from_iterator(free.len(), free.iter().map(|i| self.precision_mean[*i]));
         let factors = covariance.clone().cholesky()?;
         let ln_volume: f64 = factors.l_dirty().diagonal().iter().map(|x| x.ln()).sum();
         let prior: f64 = free
@@ -168,10 +171,12 @@ impl Likelihood {
                 parameter.slab_sigma.ln() + bounded(0.0, parameter.slab_sigma, parameter).mass().ln()
             })
             .sum();
-        let inside: f64 =
-            inside(&mean, &covariance, free, parameters)?.iter().map(|(mass, _)| mass).sum::<f64>()
-                / DRAWS as f64;
-        Some(0.5 * pull.dot(&mean) + ln_volume - prior + inside.max(f64::MIN_POSITIVE).ln())
+        let mass: f64 = draw_within_ranges(&mean, &covariance, free, parameters)?
+            .iter()
+            .map(|(mass, _)| mass)
+            .sum::<f64>()
+            / DRAWS as f64;
+        Some(0.5 * precision_mean.dot(&mean) + ln_volume - prior + mass.max(f64::MIN_POSITIVE).ln())
     }
 
     /// Appends draws of a set.
@@ -187,12 +192,12 @@ impl Likelihood {
             return Some(());
         }
         let (mean, covariance) = self.posterior(free, parameters)?;
-        let inside = inside(&mean, &covariance, free, parameters)?;
-        let total: f64 = inside.iter().map(|(mass, _)| mass).sum();
-        for (mass, found) in inside {
+        let points = draw_within_ranges(&mean, &covariance, free, parameters)?;
+        let total: f64 = points.iter().map(|(mass, _)| mass).sum();
+        for (mass, point) in points {
             let mut values = DVector::zeros(parameters.len());
-            free.iter().zip(found.iter()).for_each(|(i, value)| values[*i] = *value);
-            // Where nothing of the Gaussian lies within the range, each draw sits on the bound and counts alike.
+            free.iter().zip(point.iter()).for_each(|(i, value)| values[*i] = *value);
+            // If no part of the Gaussian lies within the range, every draw lies on the bound, and all have equal weight.
             let share = if total > 0.0 { mass / total } else { 1.0 / DRAWS as f64 };
             draws.push(Draw { weight: weight * share, values });
         }
@@ -204,10 +209,10 @@ fn bounded(mean: f64, sigma: f64, parameter: &Parameter) -> BoundedNormal {
     BoundedNormal { mean, sigma, low: parameter.low, high: parameter.high }
 }
 
-/// Points of a Gaussian within the ranges, each with its weight; the mean of the weights is the share that lies within. One parameter
-/// after the other is drawn from its truncated normal, given those before (Geweke, Hajivassiliou and Keane: e.g. Train, Discrete
+/// Points of a Gaussian within the ranges, each with its weight; the mean of the weights is the share that lies within. The parameters
+/// are drawn one by one from its truncated normal, given those before (Geweke, Hajivassiliou and Keane: e.g. Train, Discrete
 /// Choice Methods with Simulation, 2009, section 5.6), at the points of a Halton sequence.
-fn inside(
+fn draw_within_ranges(
     mean: &DVector<f64>,
     covariance: &DMatrix<f64>,
     free: &[usize],
@@ -218,11 +223,11 @@ fn inside(
         let (mut normal, mut mass) = (DVector::zeros(free.len()), 1.0);
         let mut values = DVector::zeros(free.len());
         for a in 0..free.len() {
-            let given = mean[a] + (0..a).map(|b| lower[(a, b)] * normal[b]).sum::<f64>();
-            let here = bounded(given, lower[(a, a)], &parameters[free[a]]);
-            mass *= here.mass();
-            values[a] = here.quantile(halton(index, BASES[a]));
-            normal[a] = (values[a] - given) / lower[(a, a)];
+            let conditional_mean = mean[a] + (0..a).map(|b| lower[(a, b)] * normal[b]).sum::<f64>();
+            let distribution = bounded(conditional_mean, lower[(a, a)], &parameters[free[a]]);
+            mass *= distribution.mass();
+            values[a] = distribution.quantile(halton_point(index, BASES[a]));
+            normal[a] = (values[a] - conditional_mean) / lower[(a, a)];
         }
         (mass, values)
     };
@@ -230,7 +235,7 @@ fn inside(
 }
 
 /// The radical inverse of `index` + 1, between 0 and 1 (Halton, Numer. Math. 2:84, 1960).
-fn halton(index: usize, base: usize) -> f64 {
+fn halton_point(index: usize, base: usize) -> f64 {
     let (mut rest, mut digit, mut value) = (index + 1, 1.0 / base as f64, 0.0);
     while rest > 0 {
         value += digit * (rest % base) as f64;

@@ -7,9 +7,9 @@
 use mapper_numerics::parallel;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Causes, and the model in which they act.
+/// Candidate causes, and the model whose fits decide between sets of them.
 pub trait Causes: Sync {
-    /// A set of causes at its best.
+    /// The best fit of a set of causes.
     type Fit: Clone + Send + Sync;
     /// Start of a fit.
     type Start: Clone + Send + Sync;
@@ -20,19 +20,19 @@ pub trait Causes: Sync {
     /// The family of a cause: at most one cause of a family is a member, for example drifts with different onsets.
     fn family(&self, cause: usize) -> usize;
 
-    /// ln of the probability of a fit, but for a constant that all have in common.
+    /// ln of the probability of a fit, up to a constant that all fits share.
     fn ln_odds(&self, fit: &Self::Fit) -> f64;
 
-    /// Predicted gain of each further cause in addition to a fit, linearised.
+    /// Predicted gain of each further cause, from a linearisation about a fit.
     fn offers(&self, base: &Self::Fit) -> Vec<Offer<Self::Start>>;
 
-    /// Start for the fit of a set that has one cause less.
+    /// Start for the fit of the same set except for one cause.
     fn without(&self, fit: &Self::Fit, cause: usize) -> Self::Start;
 
-    /// The fit from there; `None` where the model cannot follow, and where one of the causes does nothing.
+    /// Fits from a start; `None` if the model has no result or if one of the causes has no effect.
     fn fit(&self, start: &Self::Start) -> Option<Self::Fit>;
 
-    /// Whether sets with one cause more than the second should be examined, given the set that it grew from.
+    /// Whether the search should add a cause to `to`, which it reached from `from`.
     fn goes_on(&self, from: &Self::Fit, to: &Self::Fit) -> bool;
 }
 
@@ -56,11 +56,11 @@ pub struct Limits {
     pub starts: usize,
     /// Maximum number of sets fitted in each round.
     pub fits: usize,
-    /// A set is fitted where it promises at most this much less than the best so far has, ln of odds: lines are not exact.
+    /// A set is fitted if its predicted ln of odds is at most this far below that of the best fit: linear predictions are not exact.
     pub slack: f64,
 }
 
-/// Fits by their causes.
+/// The best known fit of each set of causes.
 #[derive(Debug, Clone)]
 pub struct Known<Fit>(BTreeMap<Vec<usize>, Fit>);
 
@@ -93,7 +93,7 @@ impl<Fit: Clone + Send + Sync> Known<Fit> {
         fits
     }
 
-    /// Fits from all of these starts.
+    /// Fits from all starts in parallel, and keeps the results.
     pub fn fit_all<C: Causes<Fit = Fit>>(&mut self, causes: &C, starts: &[C::Start]) {
         for fit in parallel::map(starts, |start| causes.fit(start)).into_iter().flatten() {
             self.keep(causes, fit);
@@ -101,61 +101,63 @@ impl<Fit: Clone + Send + Sync> Known<Fit> {
     }
 }
 
-/// Sets of the same families that are fitted in one round: onsets next to each other promise alike.
-const OF_ONE_FAMILY: usize = 2;
+/// Maximum number of sets of the same families that are fitted in one round: predictions for neighbouring onsets are similar.
+const MAX_FITS_PER_FAMILY: usize = 2;
 
-/// Looks for sets of several causes, where nothing and all single causes are known.
+/// Searches sets of several causes; `known` has the fit without causes and those of all single causes.
 pub fn extend<C: Causes>(causes: &C, known: &mut Known<C::Fit>, limits: Limits) {
-    let nothing = known.get(&[]).map_or(f64::NEG_INFINITY, |null| causes.ln_odds(null));
-    // A single that is far less probable than nothing is not half of anything.
-    let half = |fit: &C::Fit| causes.ln_odds(fit) > nothing - limits.slack;
-    let singles: Vec<C::Fit> = known.ranked(causes).into_iter().filter(half).take(limits.starts).collect();
+    let null = known.get(&[]).map_or(f64::NEG_INFINITY, |null| causes.ln_odds(null));
+    // A single cause that is far less probable than none is not part of a probable pair.
+    let is_plausible = |fit: &C::Fit| causes.ln_odds(fit) > null - limits.slack;
+    let ranked = known.ranked(causes).into_iter();
+    let singles: Vec<C::Fit> = ranked.filter(is_plausible).take(limits.starts).collect();
     for single in &singles {
-        climb_past(causes, known, single, limits, BTreeSet::from([Vec::new()]));
+        climb_beyond(causes, known, single, limits, BTreeSet::from([Vec::new()]));
     }
 }
 
-/// Goes from a known set to the most probable one that changes of one cause at a time lead to; all that is fitted on the way is known then.
+/// Changes one cause at a time, from `start` until no change makes the set more probable. `known` gets every fit.
 pub fn climb<C: Causes>(causes: &C, known: &mut Known<C::Fit>, start: &C::Fit, limits: Limits) {
-    climb_past(causes, known, start, limits, BTreeSet::new());
+    climb_beyond(causes, known, start, limits, BTreeSet::new());
 }
 
-/// The same where all sets that have one cause more than those that were `looked` at are known.
-fn climb_past<C: Causes>(
+/// Like [`climb`]; the sets with one cause more than a set in `extended` are known already.
+fn climb_beyond<C: Causes>(
     causes: &C,
     known: &mut Known<C::Fit>,
     start: &C::Fit,
     limits: Limits,
-    mut looked: BTreeSet<Vec<usize>>,
+    mut extended: BTreeSet<Vec<usize>>,
 ) {
     let mut best = start.clone();
     let mut may_grow = true;
-    // Sets that are offered and not fitted yet, with what is promised of them.
-    let mut offered: BTreeMap<Vec<usize>, (f64, C::Start)> = BTreeMap::new();
+    // Candidate sets that are not fitted yet, with their predicted ln of odds and their starts.
+    let mut candidates: BTreeMap<Vec<usize>, (f64, C::Start)> = BTreeMap::new();
     loop {
         let members = causes.members(&best);
-        // Each set with one cause less, started at this fit: no set should look useful because its parts were off their best.
-        let parts = if members.len() > 1 { members.as_slice() } else { &[] };
-        let fewer: Vec<C::Start> = parts.iter().map(|cause| causes.without(&best, *cause)).collect();
-        known.fit_all(causes, &fewer);
-        let rests = members.iter().map(|cause| without(&members, *cause));
-        let whole = (may_grow && members.len() < limits.members).then(|| members.clone());
-        let bases: Vec<Vec<usize>> = rests.chain(whole).filter(|base| looked.insert(base.clone())).collect();
-        for of_base in bases {
-            let Some(base) = known.get(&of_base) else { continue };
+        // Refit each set without one cause, from this fit: otherwise a set may look useful because its subsets were fitted badly.
+        let removable = if members.len() > 1 { members.as_slice() } else { &[] };
+        let subsets: Vec<C::Start> = removable.iter().map(|cause| causes.without(&best, *cause)).collect();
+        known.fit_all(causes, &subsets);
+        let subsets = members.iter().map(|cause| without(&members, *cause));
+        let full_set = (may_grow && members.len() < limits.members).then(|| members.clone());
+        let bases: Vec<Vec<usize>> =
+            subsets.chain(full_set).filter(|base| extended.insert(base.clone())).collect();
+        for base_members in bases {
+            let Some(base) = known.get(&base_members) else { continue };
             for Offer { cause, ln_gain, start } in causes.offers(base) {
-                let mut set = of_base.clone();
+                let mut set = base_members.clone();
                 set.push(cause);
                 set.sort_unstable();
-                let promised = causes.ln_odds(base) + ln_gain;
-                if offered.get(&set).is_none_or(|(other, _)| *other < promised) {
-                    offered.insert(set, (promised, start));
+                let predicted = causes.ln_odds(base) + ln_gain;
+                if candidates.get(&set).is_none_or(|(other, _)| *other < predicted) {
+                    candidates.insert(set, (predicted, start));
                 }
             }
         }
-        offered.retain(|set, _| known.get(set).is_none());
-        let ahead = known.ranked(causes).first().map_or(f64::NEG_INFINITY, |first| causes.ln_odds(first));
-        let starts = most_promising(causes, &offered, limits, ahead.max(causes.ln_odds(&best)));
+        candidates.retain(|set, _| known.get(set).is_none());
+        let highest = known.ranked(causes).first().map_or(f64::NEG_INFINITY, |first| causes.ln_odds(first));
+        let starts = select_starts(causes, &candidates, limits, highest.max(causes.ln_odds(&best)));
         known.fit_all(causes, &starts);
         let next = known.ranked(causes).into_iter().next();
         let Some(next) = next.filter(|next| causes.ln_odds(next) > causes.ln_odds(&best)) else { return };
@@ -164,25 +166,25 @@ fn climb_past<C: Causes>(
     }
 }
 
-fn most_promising<C: Causes>(
+/// The starts of the most probable candidates, given the ln of odds of the best fit.
+fn select_starts<C: Causes>(
     causes: &C,
-    offered: &BTreeMap<Vec<usize>, (f64, C::Start)>,
+    candidates: &BTreeMap<Vec<usize>, (f64, C::Start)>,
     limits: Limits,
     best: f64,
 ) -> Vec<C::Start> {
-    let enough = offered.iter().filter(|(_, (promised, _))| *promised > best - limits.slack);
-    let mut promising: Vec<_> = enough.collect();
-    promising.sort_by(|a, b| b.1.0.total_cmp(&a.1.0));
-    let mut taken: BTreeMap<Vec<usize>, usize> = BTreeMap::new();
-    let mut of_few = |set: &[usize]| {
+    let within_slack = candidates.iter().filter(|(_, (predicted, _))| *predicted > best - limits.slack);
+    let mut selected: Vec<_> = within_slack.collect();
+    selected.sort_by(|a, b| b.1.0.total_cmp(&a.1.0));
+    let mut counts: BTreeMap<Vec<usize>, usize> = BTreeMap::new();
+    selected.retain(|(set, _)| {
         let mut families: Vec<usize> = set.iter().map(|cause| causes.family(*cause)).collect();
         families.sort_unstable();
-        let count = taken.entry(families).or_default();
+        let count = counts.entry(families).or_default();
         *count += 1;
-        *count <= OF_ONE_FAMILY
-    };
-    promising.retain(|(set, _)| of_few(set));
-    promising.into_iter().take(limits.fits).map(|(_, (_, start))| start.clone()).collect()
+        *count <= MAX_FITS_PER_FAMILY
+    });
+    selected.into_iter().take(limits.fits).map(|(_, (_, start))| start.clone()).collect()
 }
 
 fn without(members: &[usize], cause: usize) -> Vec<usize> {

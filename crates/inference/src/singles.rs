@@ -1,30 +1,30 @@
-//! Each hypothesis as the only one that is true.
+//! Each hypothesis as the only member of the explanation.
 
 use crate::hypotheses::{Likelihood, Priors};
 
-/// A hypothesis by itself.
+/// A hypothesis as the only member of the explanation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Single {
     /// Position among the hypotheses.
     pub index: usize,
-    /// Its probability over that of none.
+    /// Its odds against no hypothesis.
     pub odds: f64,
-    /// Its size: mean and standard deviation.
+    /// Its size: mean.
     pub value: f64,
     /// One standard deviation of `value`.
     pub sigma: f64,
 }
 
 impl Likelihood {
-    /// Every hypothesis as the only member of the explanation; `None` if the declared parameters have no density.
+    /// Every hypothesis as the only member of the explanation; `None` if the covariance of the declared parameters is singular.
     pub fn singles(&self, priors: &Priors) -> Option<Vec<Single>> {
-        let given = self.given(&priors.always)?;
+        let marginal = self.marginalise(&priors.always)?;
         let single = |(index, hypothesis): (usize, &crate::hypotheses::Hypothesis)| {
-            let (precision, pull) = given.of_parameter(index);
+            let (precision, precision_mean) = marginal.of_parameter(index);
             let scaled = 1.0 + hypothesis.sigma.powi(2) * precision;
-            let value = hypothesis.sigma.powi(2) * pull / scaled;
+            let value = hypothesis.sigma.powi(2) * precision_mean / scaled;
             let possible = !(hypothesis.at_least_zero && value < 0.0);
-            let odds = (0.5 * value * pull - 0.5 * scaled.ln() + hypothesis.ln_prior).exp();
+            let odds = (0.5 * value * precision_mean - 0.5 * scaled.ln() + hypothesis.ln_prior).exp();
             possible.then(|| Single { index, odds, value, sigma: hypothesis.sigma / scaled.sqrt() })
         };
         Some(priors.hypotheses.iter().enumerate().filter_map(single).collect())

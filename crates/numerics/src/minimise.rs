@@ -1,18 +1,18 @@
 //! The minimum of a scalar function on an interval.
 
-/// Maximum number of evaluations. Golden section alone halves an interval in less than two, so that this is enough for all digits.
+/// Maximum number of evaluations. Golden section alone halves the interval in fewer than two evaluations, so the limit suffices for full precision.
 const MAX_EVALUATIONS: usize = 200;
-/// The golden section's smaller part of an interval: (3 - sqrt(5)) / 2.
-const SECTION: f64 = 0.381_966_011_250_105_1;
+/// Golden section: the smaller part of the interval, (3 - sqrt(5)) / 2.
+const GOLDEN_SECTION: f64 = 0.381_966_011_250_105_1;
 /// Relative distance below which values of a smooth function cannot be distinguished: the square root of the rounding error.
 const RESOLUTION: f64 = 1.5e-8;
 
-/// Minimum of a function: its place and the value there.
+/// A minimum of a function.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Minimum {
-    /// Place, in the unit of the interval.
+    /// Argument, in the unit of the interval.
     pub at: f64,
-    /// The function's value there.
+    /// Value of the function.
     pub value: f64,
 }
 
@@ -29,36 +29,36 @@ pub fn minimise(low: f64, high: f64, tolerance: f64, mut f: impl FnMut(f64) -> f
         value: Some(f(at)).filter(|value| value.is_finite()).unwrap_or(f64::INFINITY),
     };
     let (mut a, mut b) = (low, high);
-    let mut best = f(a + SECTION * (b - a));
-    // The second best, and the one that was second best before.
+    let mut best = f(a + GOLDEN_SECTION * (b - a));
+    // The second best, and the previous second best.
     let (mut second, mut third) = (best, best);
-    // The last step, and the one before it.
+    // The last two steps.
     let (mut step, mut step_before) = (0.0f64, 0.0f64);
     for _ in 1..MAX_EVALUATIONS {
         let middle = 0.5 * (a + b);
-        let near = RESOLUTION * best.at.abs() + tolerance / 3.0;
-        if (best.at - middle).abs() <= 2.0 * near - 0.5 * (b - a) {
+        let min_step = RESOLUTION * best.at.abs() + tolerance / 3.0;
+        if (best.at - middle).abs() <= 2.0 * min_step - 0.5 * (b - a) {
             break;
         }
-        let parabola = if step_before.abs() > near { parabola(best, second, third) } else { None };
+        let parabola = if step_before.abs() > min_step { parabola(best, second, third) } else { None };
         let allowed = |step: &f64| {
             let at = best.at + step;
             step.abs() < 0.5 * step_before.abs() && at > a && at < b
         };
         (step, step_before) = match parabola.filter(allowed) {
             Some(found) => {
-                // Not too near to an end.
+                // Keep a distance from the ends.
                 let at = best.at + found;
-                let inside = at - a >= 2.0 * near && b - at >= 2.0 * near;
-                (if inside { found } else { near.copysign(middle - best.at) }, step)
+                let inside = at - a >= 2.0 * min_step && b - at >= 2.0 * min_step;
+                (if inside { found } else { min_step.copysign(middle - best.at) }, step)
             }
             None => {
                 let part = if best.at < middle { b - best.at } else { a - best.at };
-                (SECTION * part, part)
+                (GOLDEN_SECTION * part, part)
             }
         };
-        // Nor nearer to the best than two values can be distinguished.
-        let next = f(best.at + if step.abs() >= near { step } else { near.copysign(step) });
+        // Keep a distance from the best point: closer values cannot be distinguished.
+        let next = f(best.at + if step.abs() >= min_step { step } else { min_step.copysign(step) });
         if next.value <= best.value {
             if next.at < best.at {
                 b = best.at

@@ -3,29 +3,29 @@
 use crate::minimise::minimise;
 use nalgebra::{DMatrix, DVector};
 
-/// Iterations over the variances. A few are enough, because crossed groups hardly interact.
-const ROUNDS: usize = 60;
-/// Change of a share at which the rounds end.
-const SETTLED: f64 = 1e-7;
-/// Largest ratio of a group's standard deviation to the rest's that is distinguished from an infinite one.
-const LARGEST_RATIO: f64 = 1e4;
-/// Part of the sum of squares below which nothing is left but rounding.
+/// Maximum number of iterations over the variances. A few suffice, because crossed groups hardly interact.
+const MAX_ROUNDS: usize = 60;
+/// The iteration has converged if no share changes by more than twice this.
+const SHARE_TOLERANCE: f64 = 1e-7;
+/// Largest ratio of a group's standard deviation to the residual's that is distinguished from infinity.
+const MAX_RATIO: f64 = 1e4;
+/// Fraction of the sum of squares below which a residual is rounding error.
 const ROUNDING: f64 = 1e-14;
-/// Share of a column's square that is independent of the other columns; below this they count as linearly dependent.
-const COLLINEAR: f64 = 1e-12;
+/// Minimum fraction of a column's square that is independent of the other columns; below it the columns count as linearly dependent.
+const MIN_INDEPENDENT_RATIO: f64 = 1e-12;
 
 /// Maximum level; a larger one is a mistake in the data and would need too much memory.
 const MAX_LEVELS: usize = 100_000;
 
-/// Observations `y = fixed * coefficients + sum of the effect of each group's level + rest`, all effects and the rest independent and
-/// normal, the rest equally wide everywhere.
+/// Observations `y = fixed * coefficients + sum of the effect of each group's level + residual`. All effects and residuals are independent
+/// and normal, and all residuals have the same variance.
 #[derive(Debug, Clone)]
 pub struct MixedModel<'a> {
     /// The response, n values in any unit.
     pub y: &'a [f64],
-    /// n rows, a column for each coefficient; of full rank.
+    /// Design matrix of the fixed effects: n rows, a column for each coefficient; of full rank.
     pub fixed: DMatrix<f64>,
-    /// For each group the level of each observation, from 0. The first may have many levels, the others some hundred together.
+    /// For each group the level of each observation, from 0. The first group may have many levels, the others some hundred together.
     pub groups: Vec<&'a [usize]>,
 }
 
@@ -36,7 +36,7 @@ pub struct MixedFit {
     pub coefficients: Vec<Effect>,
     /// Standard deviation of each group's effects.
     pub group_sigmas: Vec<f64>,
-    /// Standard deviation of the rest.
+    /// Standard deviation of the residual.
     pub rest_sigma: f64,
     /// The effect of each level of each group, shrunk towards 0 (best linear unbiased prediction).
     pub effects: Vec<Vec<Effect>>,
@@ -45,48 +45,48 @@ pub struct MixedFit {
 /// An estimate with its standard error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effect {
-    /// The number.
+    /// Estimate.
     pub value: f64,
-    /// Its standard error, the variances taken as known.
+    /// Standard error if the variances are known.
     pub standard_error: f64,
 }
 
-/// Why a fit fails.
+/// Reason for the failure of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NoFit {
-    /// Not more observations than coefficients.
+    /// There are not more observations than coefficients.
     TooFew,
-    /// Rows, levels and values are not of one length, or a value is not finite.
-    Form,
+    /// Rows, levels and values differ in number, or a value is not finite.
+    Invalid,
     /// Columns of `fixed` are linearly dependent.
     Collinear,
 }
 
 impl MixedModel<'_> {
-    /// Fits by restricted maximum likelihood. A variance may come out as exactly 0.
+    /// Fits by restricted maximum likelihood. A variance may be exactly 0.
     ///
     /// # Errors
     /// [`NoFit`].
     ///
     /// Source: Henderson's mixed model equations and the restricted likelihood that their factors give; e.g. Searle, Casella and
-    /// McCulloch, Variance Components (1992), chapters 6 and 7. The level of the first group is eliminated by hand, since its
+    /// McCulloch, Variance Components (1992), chapters 6 and 7. The levels of the first group are eliminated first, since their
     /// block is diagonal.
     pub fn fit(&self) -> Result<MixedFit, NoFit> {
-        let sums = Sums::of(self)?;
+        let sums = Sums::new(self)?;
         let mut shares = vec![0.5; self.groups.len()];
-        for _ in 0..ROUNDS {
+        for _ in 0..MAX_ROUNDS {
             let before = shares.clone();
-            for place in 0..shares.len() {
+            for group in 0..shares.len() {
                 let mut at = |share: f64| {
-                    shares[place] = share;
+                    shares[group] = share;
                     sums.criterion(&shares)
                 };
-                let nothing = at(0.0);
-                let found = minimise(0.0, LARGEST_RATIO / (1.0 + LARGEST_RATIO), SETTLED, at);
-                // Ends are not evaluated by the search.
-                shares[place] = if nothing <= found.value { 0.0 } else { found.at };
+                let value_at_zero = at(0.0);
+                let minimum = minimise(0.0, MAX_RATIO / (1.0 + MAX_RATIO), SHARE_TOLERANCE, at);
+                // The search does not evaluate the ends.
+                shares[group] = if value_at_zero <= minimum.value { 0.0 } else { minimum.at };
             }
-            if before.iter().zip(&shares).all(|(a, b)| (a - b).abs() <= 2.0 * SETTLED) {
+            if before.iter().zip(&shares).all(|(a, b)| (a - b).abs() <= 2.0 * SHARE_TOLERANCE) {
                 break;
             }
         }
@@ -94,22 +94,22 @@ impl MixedModel<'_> {
     }
 }
 
-/// Ratio of a group's standard deviation to the rest's, from its share (0 to 1) of their sum.
+/// Ratio of a group's standard deviation to the residual's, from its share (0 to 1) of their sum.
 fn ratio(share: f64) -> f64 {
     share / (1.0 - share)
 }
 
-/// Sums over the observations, formed once.
+/// Sums over the observations, independent of the variances.
 struct Sums {
     observations: usize,
     coefficients: usize,
-    /// Group of each column of `columns` behind the coefficients, from 1.
+    /// Group of each column of `columns` after the coefficients, from 1.
     group_of: Vec<usize>,
     levels: Vec<usize>,
     /// Observations of each level of the first group.
     counts: Vec<f64>,
-    /// Levels of the first group by columns.
-    across: DMatrix<f64>,
+    /// Products of the levels of the first group with all other columns.
+    cross_products: DMatrix<f64>,
     columns: DMatrix<f64>,
     first_y: DVector<f64>,
     columns_y: DVector<f64>,
@@ -130,12 +130,12 @@ struct Solved {
 }
 
 impl Sums {
-    fn of(model: &MixedModel<'_>) -> Result<Sums, NoFit> {
+    fn new(model: &MixedModel<'_>) -> Result<Sums, NoFit> {
         let (n, p) = model.fixed.shape();
         let lengths = model.groups.iter().all(|group| group.len() == n) && model.y.len() == n;
         let finite = model.y.iter().chain(model.fixed.iter()).all(|value| value.is_finite());
         if !lengths || !finite || model.groups.is_empty() || p == 0 {
-            return Err(NoFit::Form);
+            return Err(NoFit::Invalid);
         }
         if n <= p {
             return Err(NoFit::TooFew);
@@ -146,7 +146,7 @@ impl Sums {
             .map(|group| group.iter().max().map_or(0, |level| level.saturating_add(1)))
             .collect();
         if levels.iter().any(|count| *count > MAX_LEVELS) {
-            return Err(NoFit::Form);
+            return Err(NoFit::Invalid);
         }
         let group_of: Vec<usize> =
             (1..levels.len()).flat_map(|group| std::iter::repeat_n(group, levels[group])).collect();
@@ -163,7 +163,7 @@ impl Sums {
             observations: n,
             coefficients: p,
             counts: vec![0.0; levels[0]],
-            across: DMatrix::zeros(levels[0], width),
+            cross_products: DMatrix::zeros(levels[0], width),
             columns: DMatrix::zeros(width, width),
             first_y: DVector::zeros(levels[0]),
             columns_y: DVector::zeros(width),
@@ -180,7 +180,7 @@ impl Sums {
             sums.first_y[first] += y;
             sums.yy += y * y;
             for (a, value) in &row {
-                sums.across[(first, *a)] += value;
+                sums.cross_products[(first, *a)] += value;
                 sums.columns_y[*a] += value * y;
                 for (b, other) in &row {
                     sums.columns[(*a, *b)] += value * other;
@@ -190,11 +190,11 @@ impl Sums {
         Ok(sums)
     }
 
-    /// Minus twice the restricted log-likelihood, but for a constant; infinite where the equations cannot be solved.
+    /// Minus twice the restricted log-likelihood, up to a constant; infinite if the equations cannot be solved.
     fn criterion(&self, shares: &[f64]) -> f64 {
         let Some(solved) = self.solve(shares) else { return f64::INFINITY };
-        let free = (self.observations - self.coefficients) as f64;
-        solved.log_determinant + free * solved.square.ln()
+        let degrees_of_freedom = (self.observations - self.coefficients) as f64;
+        solved.log_determinant + degrees_of_freedom * solved.square.ln()
     }
 
     /// Solves the equations. Effects are scaled by the standard deviation of their group, so that a zero variance causes no division by
@@ -207,27 +207,28 @@ impl Sums {
         });
         let diagonal: Vec<f64> =
             self.counts.iter().map(|count| first_ratio * first_ratio * count + 1.0).collect();
-        let cross = DMatrix::from_fn(self.across.nrows(), self.across.ncols(), |row, column| {
-            first_ratio * scale[column] * self.across[(row, column)]
-        });
-        let mut left = DMatrix::from_fn(scale.len(), scale.len(), |row, column| {
+        let cross =
+            DMatrix::from_fn(self.cross_products.nrows(), self.cross_products.ncols(), |row, column| {
+                first_ratio * scale[column] * self.cross_products[(row, column)]
+            });
+        let mut matrix = DMatrix::from_fn(scale.len(), scale.len(), |row, column| {
             scale[row] * scale[column] * self.columns[(row, column)]
         });
         for column in p..scale.len() {
-            left[(column, column)] += 1.0;
+            matrix[(column, column)] += 1.0;
         }
-        let mut over = cross.clone();
+        let mut scaled_cross = cross.clone();
         for (row, diagonal) in diagonal.iter().enumerate() {
-            over.row_mut(row).scale_mut(1.0 / diagonal);
+            scaled_cross.row_mut(row).scale_mut(1.0 / diagonal);
         }
-        left -= cross.transpose() * &over;
+        matrix -= cross.transpose() * &scaled_cross;
         let first_y = first_ratio * &self.first_y;
-        let right = scale.component_mul(&self.columns_y) - over.transpose() * &first_y;
-        let sizes = left.diagonal();
-        let factors = left.cholesky()?;
-        // Of a column that depends on the others only rounding remains.
-        let left_over = factors.l_dirty().diagonal();
-        if left_over.iter().zip(&sizes).any(|(left, size)| left * left < COLLINEAR * size) {
+        let right = scale.component_mul(&self.columns_y) - scaled_cross.transpose() * &first_y;
+        let sizes = matrix.diagonal();
+        let factors = matrix.cholesky()?;
+        // Only rounding remains of a column that depends on the others.
+        let pivots = factors.l_dirty().diagonal();
+        if pivots.iter().zip(&sizes).any(|(pivot, size)| pivot * pivot < MIN_INDEPENDENT_RATIO * size) {
             return None;
         }
         let solution = factors.solve(&right);
@@ -235,10 +236,10 @@ impl Sums {
             (first_y[row] - cross.row(row).transpose().dot(&solution)) / diagonal[row]
         });
         let square = self.yy - scale.component_mul(&self.columns_y).dot(&solution) - first_y.dot(&first);
-        let logs = diagonal.iter().map(|x| x.ln()).sum::<f64>();
-        let of_factors = factors.l_dirty().diagonal().iter().map(|x| 2.0 * x.ln()).sum::<f64>();
+        let diagonal_logs = diagonal.iter().map(|x| x.ln()).sum::<f64>();
+        let factor_logs = factors.l_dirty().diagonal().iter().map(|x| 2.0 * x.ln()).sum::<f64>();
         Some(Solved {
-            log_determinant: logs + of_factors,
+            log_determinant: diagonal_logs + factor_logs,
             square: square.max(ROUNDING * self.yy).max(f64::MIN_POSITIVE),
             inverse: factors.inverse(),
             scale,
@@ -252,8 +253,8 @@ impl Sums {
 
     fn fit(&self, shares: &[f64]) -> Option<MixedFit> {
         let solved = self.solve(shares)?;
-        let free = (self.observations - self.coefficients) as f64;
-        let rest_sigma = (solved.square / free).sqrt();
+        let degrees_of_freedom = (self.observations - self.coefficients) as f64;
+        let rest_sigma = (solved.square / degrees_of_freedom).sqrt();
         let column = |column: usize| Effect {
             value: solved.scale[column] * solved.solution[column],
             standard_error: rest_sigma
@@ -262,13 +263,13 @@ impl Sums {
         };
         let first = |row: usize| {
             let cross = solved.cross.row(row);
-            let behind = (cross * &solved.inverse * cross.transpose())[(0, 0)];
+            let other_variance = (cross * &solved.inverse * cross.transpose())[(0, 0)];
             let diagonal = solved.diagonal[row];
             Effect {
                 value: solved.first_ratio * solved.first[row],
                 standard_error: rest_sigma
                     * solved.first_ratio
-                    * (1.0 / diagonal + behind / (diagonal * diagonal)).sqrt(),
+                    * (1.0 / diagonal + other_variance / (diagonal * diagonal)).sqrt(),
             }
         };
         let mut effects = vec![(0..self.counts.len()).map(first).collect::<Vec<_>>()];
@@ -395,10 +396,10 @@ mod tests {
                 DMatrix::from_fn(y.len(), columns, |row, column| if column == 0 { 1.0 } else { row as f64 });
             MixedModel { y, fixed, groups: vec![groups] }.fit()
         };
-        assert_eq!(fit(&[1.0, 2.0], 1, &groups), Err(NoFit::Form));
-        assert_eq!(fit(&[1.0, f64::NAN, 1.0], 1, &groups), Err(NoFit::Form));
+        assert_eq!(fit(&[1.0, 2.0], 1, &groups), Err(NoFit::Invalid));
+        assert_eq!(fit(&[1.0, f64::NAN, 1.0], 1, &groups), Err(NoFit::Invalid));
         assert_eq!(fit(&[1.0, 2.0, 3.0], 3, &groups), Err(NoFit::TooFew));
-        assert_eq!(fit(&[1.0, 2.0, 3.0], 1, &[0, 1, usize::MAX - 1]), Err(NoFit::Form));
+        assert_eq!(fit(&[1.0, 2.0, 3.0], 1, &[0, 1, usize::MAX - 1]), Err(NoFit::Invalid));
         let same = MixedModel {
             y: &[1.0, 2.0, 4.0],
             fixed: DMatrix::from_element(3, 2, 1.0),

@@ -9,7 +9,7 @@ use std::sync::Mutex;
 use std::sync::PoisonError;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// `work` on every item, on rayon's pool: as many threads as there are cores unless the program, or `RAYON_NUM_THREADS`, says otherwise.
+/// Applies `work` to every item on rayon's pool: one thread per core, unless the program or `RAYON_NUM_THREADS` sets another number.
 /// Calls may be nested.
 ///
 /// A worker that waits for a nested call may start another item. Use [`try_map_on`] for long work with a limited number of concurrent
@@ -18,11 +18,11 @@ pub fn map<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<
     items.par_iter().with_max_len(1).map(&work).collect()
 }
 
-/// The same with work that may fail. After a failure no later item is started. Earlier items are still finished, so that the returned error
+/// Like [`map`], with work that may fail. After a failure no later item is started. Earlier items are still finished, so that the returned error
 /// is that of the first failing item for any number of cores.
 ///
 /// # Errors
-/// That of the first item whose work fails.
+/// The error of the first item whose work fails.
 pub fn try_map<T, R, E>(items: &[T], work: impl Fn(&T) -> Result<R, E> + Sync) -> Result<Vec<R>, E>
 where
     T: Sync,
@@ -30,7 +30,7 @@ where
     E: Send,
 {
     let failed = AtomicUsize::new(items.len());
-    let one = |(index, item)| {
+    let run = |(index, item)| {
         if index > failed.load(Ordering::Relaxed) {
             return None;
         }
@@ -40,16 +40,16 @@ where
         }
         Some(result)
     };
-    // Whatever was not begun comes behind a failure.
-    let results: Vec<Option<Result<R, E>>> = items.par_iter().enumerate().with_max_len(1).map(one).collect();
+    // Items without a result come after a failure.
+    let results: Vec<Option<Result<R, E>>> = items.par_iter().enumerate().with_max_len(1).map(run).collect();
     results.into_iter().flatten().collect()
 }
 
-/// As [`try_map`], with exactly `threads` items at a time (1 at least) on threads of their own, for work that lasts, takes
-/// memory or itself spreads over the cores. `work` is handed the item's position too.
+/// Like [`try_map`], with at most `threads` items at a time (at least 1) on dedicated threads: for work that takes long, needs much
+/// memory or is itself parallel. `work` also gets the index of the item.
 ///
 /// # Errors
-/// That of the first item whose work fails.
+/// The error of the first item whose work fails.
 pub fn try_map_on<T, R, E>(
     threads: usize,
     items: &[T],
@@ -71,7 +71,7 @@ where
                 return;
             }
             let result = catch_unwind(AssertUnwindSafe(|| work(index, item))).unwrap_or_else(|panic| {
-                // Nothing new is begun while the others end.
+                // Start no other item.
                 next.store(items.len(), Ordering::Relaxed);
                 resume_unwind(panic)
             });
@@ -81,7 +81,7 @@ where
             results.lock().unwrap_or_else(PoisonError::into_inner).push((index, result));
         }
     };
-    // Not rayon, because a worker that waits for nested work would start another item and hold two.
+    // Not rayon: one of its workers that waits for nested work would start another item and hold two.
     std::thread::scope(|scope| {
         let workers: Vec<_> = (0..threads.clamp(1, items.len().max(1))).map(|_| scope.spawn(run)).collect();
         for worker in workers {
@@ -95,9 +95,9 @@ where
     results.into_iter().map(|(_, result)| result).collect()
 }
 
-/// `work` with at most so many threads for all its [`map`] and [`try_map`]: for long pieces of work that share the cores. If no threads are
-/// available, it runs on those of the whole program.
-pub fn confined<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R {
+/// Runs `work` with at most `threads` threads for all its calls of [`map`] and [`try_map`], for long tasks that share the cores. If no
+/// threads can be started, `work` uses those of the whole program.
+pub fn with_threads<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R {
     match rayon::ThreadPoolBuilder::new().num_threads(threads.max(1)).build() {
         Ok(pool) => pool.install(work),
         Err(_) => work(),
@@ -110,7 +110,7 @@ mod tests {
 
     /// Never more at a time than allowed, and the results are those of any number.
     #[test]
-    fn confined_work_keeps_to_its_threads() {
+    fn work_with_threads_uses_only_these() {
         let items: Vec<u64> = (0..200).collect();
         let (at_once, most) = (AtomicUsize::new(0), AtomicUsize::new(0));
         let one = |i: &u64| {
@@ -119,7 +119,7 @@ mod tests {
             at_once.fetch_sub(1, Ordering::SeqCst);
             result
         };
-        let found = confined(1, || map(&items, one));
+        let found = with_threads(1, || map(&items, one));
         assert_eq!(most.load(Ordering::SeqCst), 1);
         assert_eq!(found, map(&items, one));
     }

@@ -1,35 +1,36 @@
-//! The place of a polyline that is nearest to a point.
+//! The nearest point of a polyline.
 
-/// A place on a polyline.
+/// The nearest point of a polyline to a given point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NearestOnPolyline {
-    /// Index of the segment: it begins at the vertex of that index.
+    /// Index of the segment, which is that of its first vertex.
     pub segment: usize,
-    /// Place within the segment, 0 at its beginning, 1 at its end, ratio.
+    /// Position within the segment, 0 at its start and 1 at its end, ratio.
     pub share_ratio: f64,
-    /// Distance of the point from it, in the unit of the coordinates.
+    /// Distance between the two points, in the unit of the coordinates.
     pub distance: f64,
-    /// Whether the point lies beyond the polyline's first or last vertex: then that is the nearest place.
+    /// Whether the given point lies beyond the first or last vertex, which is then the nearest point.
     pub beyond_end: bool,
 }
 
 impl NearestOnPolyline {
-    /// Nearest place of the polyline through `vertices` to `point`; the first of several as near. `None` for less than two
-    /// vertices, or coordinates that are not numbers.
+    /// The point of the polyline through `vertices` that is nearest to `point`, the first one of several. `None` for fewer than two
+    /// vertices or NaN coordinates.
     pub fn of(vertices: &[(f64, f64)], point: (f64, f64)) -> Option<Self> {
-        // A tiny distance beyond an end is rounding error.
-        const HAIR: f64 = 1e-6;
+        // A smaller distance beyond an end is rounding error.
+        const TOLERANCE: f64 = 1e-6;
         let last = vertices.len().checked_sub(2)?;
-        let on = |(segment, pair): (usize, &[(f64, f64)])| {
+        let nearest_in = |(segment, pair): (usize, &[(f64, f64)])| {
             let ((ax, ay), (bx, by)) = (pair[0], pair[1]);
             let (dx, dy) = (bx - ax, by - ay);
             let share = ((point.0 - ax) * dx + (point.1 - ay) * dy) / (dx * dx + dy * dy).max(1e-30);
             let share_ratio = share.clamp(0.0, 1.0);
             let distance = (point.0 - ax - share_ratio * dx).hypot(point.1 - ay - share_ratio * dy);
-            let beyond_end = (segment == 0 && share < -HAIR) || (segment == last && share > 1.0 + HAIR);
+            let beyond_end =
+                (segment == 0 && share < -TOLERANCE) || (segment == last && share > 1.0 + TOLERANCE);
             NearestOnPolyline { segment, share_ratio, distance, beyond_end }
         };
-        let places = vertices.windows(2).enumerate().map(on).filter(|place| !place.distance.is_nan());
+        let places = vertices.windows(2).enumerate().map(nearest_in).filter(|place| !place.distance.is_nan());
         places.min_by(|a, b| a.distance.total_cmp(&b.distance))
     }
 }

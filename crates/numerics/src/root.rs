@@ -1,8 +1,8 @@
-//! Zeros of a scalar function, and changes of a condition, on an interval.
+//! The root of a scalar function, and the change of a condition, in an interval.
 
 /// Finds where `f` changes sign between `low` and `high` by a mix of secant (Illinois) and bisection.
 ///
-/// `None` where the signs at both ends are equal or a value is not finite. Converges to neighbouring floats or
+/// `None` if the signs at both ends are equal or a value is not finite. Converges to neighbouring floats or
 /// `tolerance`, whichever is wider, in the unit of `low` and `high`; at most 200 evaluations.
 ///
 /// Source: M. Dowell, P. Jarratt, "A modified regula falsi method for computing the root of an equation", BIT 11 (1971).
@@ -45,11 +45,11 @@ pub fn root_between(low: f64, high: f64, tolerance: f64, mut f: impl FnMut(f64) 
     Some(b)
 }
 
-/// The two ends of the interval, at most `tolerance` wide or of neighbouring floats, in which `is_low` changes from true to
-/// false; in the unit of `low` and `high`, which are finite and rise.
+/// Returns an interval, at most `tolerance` wide or of neighbouring floats, in which `is_low` changes from true to false. `low` and
+/// `high` are finite, and `low < high`.
 ///
-/// Bisection. The condition is assumed to be true at `low` and false at `high`, without evaluation. If it changes more than once, one of
-/// the changes is found.
+/// Bisection. The condition is assumed to be true at `low` and false at `high`, without evaluation. If it changes more than once, the
+/// result contains one of the changes.
 pub fn bisect(low: f64, high: f64, tolerance: f64, mut is_low: impl FnMut(f64) -> bool) -> (f64, f64) {
     let (mut low, mut high) = (low, high);
     while high - low > tolerance {

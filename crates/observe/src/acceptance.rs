@@ -4,10 +4,10 @@ use crate::energy_balance::EnergyBalance;
 use mapper_core::{AcceptanceCriteria, Channel, Recording, StepMarker};
 use mapper_numerics::statistics::mean;
 
-/// One criterion at all steps.
+/// Result of a criterion at all steps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CriterionResult {
-    /// The channel whose fluctuation it limits; `None` for the heat balance.
+    /// The channel with the limited fluctuation; `None` for the heat balance.
     pub channel: Option<Channel>,
     /// The limit, ratio.
     pub limit_ratio: f64,
@@ -16,12 +16,12 @@ pub struct CriterionResult {
 }
 
 impl CriterionResult {
-    /// The steps that do not fulfil it.
+    /// The steps that do not fulfil the criterion.
     pub fn failed(&self) -> impl Iterator<Item = usize> {
         self.steps.iter().filter(|(_, ratio)| *ratio > self.limit_ratio).map(|(step, _)| *step)
     }
 
-    /// The largest ratio; `None` if it could not be judged.
+    /// The largest ratio; `None` if no step could be judged.
     pub fn largest_ratio(&self) -> Option<f64> {
         self.steps.iter().map(|(_, ratio)| *ratio).reduce(f64::max)
     }
@@ -49,7 +49,10 @@ pub fn judge_acceptance(
     let balance = criteria.heat_balance_ratio.map(|limit_ratio| CriterionResult {
         channel: None,
         limit_ratio,
-        steps: steps.iter().filter_map(|(step, of)| Some((step.index, heat_balance(of)?))).collect(),
+        steps: steps
+            .iter()
+            .filter_map(|(step, balance)| Some((step.index, heat_balance(balance)?)))
+            .collect(),
     });
     fluctuations.chain(balance).collect()
 }
@@ -96,7 +99,7 @@ mod tests {
         let judged =
             judge_acceptance(&criteria, &recording, &[(&steps[0], balance(-4.0)), (&steps[1], balance(6.0))]);
         let failed: Vec<(Option<Channel>, Vec<usize>)> =
-            judged.iter().map(|one| (one.channel, one.failed().collect())).collect();
+            judged.iter().map(|judgement| (judgement.channel, judgement.failed().collect())).collect();
         assert_eq!(failed, [(Some(Channel::P1), vec![0]), (Some(Channel::P2), vec![]), (None, vec![1])]);
         assert!((judged[0].largest_ratio().unwrap() - 0.01).abs() < 1e-4);
         assert_eq!(judged[1].largest_ratio(), None, "P2 was not recorded");

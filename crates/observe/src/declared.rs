@@ -5,7 +5,7 @@ use mapper_physics::machine::params::BoundaryConditions;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Declared uncertainty of every sensor of a recording, by a rule common to all programs.
+/// Merges the declared uncertainties of every sensor of a recording, by a rule common to all programs.
 ///
 /// The most specific declaration applies. `channel_map` describes the sensors of this recording: for a channel declared there, its noise and
 /// offset replace those of the campaign's `sensors`. A gain of 0 means that none was declared. The campaign's gain then replaces the channel
@@ -16,24 +16,24 @@ pub fn declared_uncertainties(
     channel_map: &BTreeMap<Channel, DeclaredUncertainty>,
 ) -> BTreeMap<Channel, DeclaredUncertainty> {
     let mut declared = sensors.clone();
-    for (channel, here) in channel_map {
+    for (channel, mapped) in channel_map {
         let entry = declared.entry(*channel).or_default();
-        let gain_sigma_ratio = or(here.gain_sigma_ratio, entry.gain_sigma_ratio);
-        *entry = DeclaredUncertainty { gain_sigma_ratio, ..*here };
+        let gain_sigma_ratio = declared_or(mapped.gain_sigma_ratio, entry.gain_sigma_ratio);
+        *entry = DeclaredUncertainty { gain_sigma_ratio, ..*mapped };
     }
     for (channel, entry) in &mut declared {
         if channel.info().dimension == Dimension::MassFlow {
-            entry.gain_sigma_ratio = or(entry.gain_sigma_ratio, tolerances.flow_meter_gain_ratio);
+            entry.gain_sigma_ratio = declared_or(entry.gain_sigma_ratio, tolerances.flow_meter_gain_ratio);
         }
     }
     declared
 }
 
-fn or(declared_value: f64, otherwise: f64) -> f64 {
-    if declared_value > 0.0 { declared_value } else { otherwise }
+fn declared_or(declared: f64, default: f64) -> f64 {
+    if declared > 0.0 { declared } else { default }
 }
 
-/// All declarations.
+/// Declared uncertainties from all sources.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Declared {
     /// Noise, offset and gain of each sensor, as [`declared_uncertainties`] merges them.
@@ -60,7 +60,7 @@ pub struct CommonOffset {
     pub reading: f64,
 }
 
-/// Pressure at which an isothermal zero has compared the pressure sensors, Pa; 0 if it has not.
+/// Pressure of the isothermal zero of the pressure sensors, Pa; 0 without a zero.
 pub fn rest_pressure_pa(common: &[CommonOffset]) -> f64 {
     common.iter().find(|common| common.channels.contains(&Channel::P1)).map_or(0.0, |common| common.reading)
 }
@@ -76,9 +76,9 @@ impl Declared {
         rest_pressure_pa(&self.common_offsets)
     }
 
-    /// Noise of one sample, in the channel's unit: as declared, otherwise that of a usual sensor.
+    /// Noise of one sample, in the channel's unit: the declared one, otherwise that of a typical sensor.
     pub fn noise_sigma(&self, channel: Channel) -> f64 {
-        or(self.of(channel).noise_sigma, usual_noise_sigma(channel))
+        declared_or(self.of(channel).noise_sigma, usual_noise_sigma(channel))
     }
 
     /// Remaining fixed offset after calibration, in the channel's unit.
@@ -87,7 +87,7 @@ impl Declared {
     }
 }
 
-/// Noise of one sample of a gas stand's usual sensor, in the channel's unit.
+/// Noise of one sample of a typical sensor of a gas stand, in the channel's unit.
 pub fn usual_noise_sigma(channel: Channel) -> f64 {
     match channel.info().dimension {
         Dimension::RotationalSpeed => 30.0,

@@ -12,11 +12,11 @@ use std::collections::BTreeMap;
 pub struct Power {
     /// The power, W.
     pub w: f64,
-    /// Its standard uncertainty, W.
+    /// Standard uncertainty, W.
     pub sigma_w: f64,
 }
 
-/// Powers and heats from the readings of one time span; `None` if a reading is missing.
+/// Powers and heat flows from the readings of a time span; `None` if a reading is missing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EnergyBalance {
     /// Rise of the enthalpy of the compressor's air: work and heat.
@@ -27,8 +27,8 @@ pub struct EnergyBalance {
     pub oil: Option<Power>,
     /// Heat to the cooling water.
     pub water: Option<Power>,
-    /// Turbine minus compressor, oil and water: heat to the cell and, until the housings are settled, heat that they store. It includes oil
-    /// and water where these are not measured.
+    /// Turbine minus compressor, oil and water: heat to the cell and, until the housings have settled, stored heat. It includes oil and water
+    /// if they are not measured.
     pub losses: Option<Power>,
 }
 
@@ -54,7 +54,7 @@ const INPUTS: [Channel; 16] = [
 
 /// Heat capacity of engine oil at 300 K, J/(kg K), and its rise, J/(kg K2): Incropera, Fundamentals of Heat and Mass Transfer, table A.5.
 const OIL: (f64, f64) = (1909.0, 4.2);
-/// Standard uncertainty of it, ratio. Judgement: oils of different make differ by some percent.
+/// Standard uncertainty of the heat capacity of oil, ratio. Judgement: different oils differ by some percent.
 const OIL_RATIO: f64 = 0.03;
 /// Heat capacity of water, J/(kg K): 4178 at 310 K to 4217 at 373 K (the same book, table A.6).
 const WATER_J_KGK: f64 = 4190.0;
@@ -64,9 +64,9 @@ const STEP_RATIO: f64 = 0.1;
 /// The gases of compressor and turbine.
 #[derive(Debug, Clone, Copy)]
 pub struct Gases {
-    /// Of the compressor.
+    /// Gas of the compressor.
     pub compressor: Air,
-    /// Of the turbine.
+    /// Gas of the turbine.
     pub turbine: Gas,
 }
 
@@ -85,25 +85,25 @@ pub fn energy_balance(
         let Some(reading) = mean(values) else { continue };
         readings[place] = reading;
         let zero = if channel.info().dimension == Dimension::Temperature { CALIBRATED_AT_K } else { 0.0 };
-        if let Some(of) = declared.get(&channel) {
-            let noise = of.noise_sigma / (values.len() as f64).sqrt();
-            sigmas[place] = noise.hypot(of.offset_sigma).hypot(of.gain_sigma_ratio * (reading - zero));
+        if let Some(declared) = declared.get(&channel) {
+            let noise = declared.noise_sigma / (values.len() as f64).sqrt();
+            let gain_error = declared.gain_sigma_ratio * (reading - zero);
+            sigmas[place] = noise.hypot(declared.offset_sigma).hypot(gain_error);
         }
     }
     let powers = powers_w(&readings, gases, 1.0);
     let mut variances = [0.0; POWERS];
-    let mut add = |moved: [f64; POWERS]| {
-        for ((variance, moved), power) in variances.iter_mut().zip(moved).zip(powers) {
-            *variance += ((moved - power) / STEP_RATIO).powi(2);
+    let mut add_variance = |shifted: [f64; POWERS]| {
+        for ((variance, shifted), power) in variances.iter_mut().zip(shifted).zip(powers) {
+            *variance += ((shifted - power) / STEP_RATIO).powi(2);
         }
     };
     for (place, sigma) in sigmas.into_iter().enumerate() {
-        let mut moved = readings;
-        moved[place] += STEP_RATIO * sigma;
-        // A missing reading stays missing, and changes only what it is not part of: nothing.
-        add(powers_w(&moved, gases, 1.0));
+        let mut shifted = readings;
+        shifted[place] += STEP_RATIO * sigma;
+        add_variance(powers_w(&shifted, gases, 1.0));
     }
-    add(powers_w(&readings, gases, 1.0 + STEP_RATIO * OIL_RATIO));
+    add_variance(powers_w(&readings, gases, 1.0 + STEP_RATIO * OIL_RATIO));
     let power = |place: usize| {
         let (w, variance): (f64, f64) = (powers[place], variances[place]);
         (w.is_finite()).then(|| Power { w, sigma_w: variance.sqrt() })
@@ -119,7 +119,7 @@ pub fn energy_balance(
 
 const POWERS: usize = 5;
 
-/// Compressor, turbine, oil, water, losses, W; NaN if a reading is missing.
+/// The powers of compressor, turbine, oil, water, losses, W; NaN if a reading is missing.
 fn powers_w(readings: &[f64; INPUTS.len()], gases: &Gases, oil_ratio: f64) -> [f64; POWERS] {
     let &[
         m_c,
@@ -149,8 +149,8 @@ fn powers_w(readings: &[f64; INPUTS.len()], gases: &Gases, oil_ratio: f64) -> [f
     let oil_j_kgk = oil_ratio * (at_300_k + rise * (0.5 * (oil_k + oil_out_k) - 300.0));
     let oil = m_oil * oil_j_kgk * (oil_out_k - oil_k);
     let water = m_water * WATER_J_KGK * (water_out_k - water_k);
-    let measured = |heat: f64| if heat.is_finite() { heat } else { 0.0 };
-    [compressor, turbine, oil, water, turbine - compressor - measured(oil) - measured(water)]
+    let zero_if_missing = |heat: f64| if heat.is_finite() { heat } else { 0.0 };
+    [compressor, turbine, oil, water, turbine - compressor - zero_if_missing(oil) - zero_if_missing(water)]
 }
 
 #[cfg(test)]

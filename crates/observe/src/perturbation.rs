@@ -6,10 +6,10 @@ use mapper_physics::machine::params::{BoundaryConditions, Params};
 use mapper_physics::simulation::inputs::Inputs;
 use mapper_physics::simulation::model::State;
 
-/// Factor on the standard deviation of a value without information.
+/// Factor on the standard deviation of an uninformative prior.
 pub const UNINFORMATIVE: f64 = 1e4;
 
-/// One quantity of model, inputs or initial state.
+/// A quantity of model, inputs or initial state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Perturbation {
     /// A boundary condition, by the channel that measures it; in its unit.
@@ -48,10 +48,10 @@ const AMBIENT_SIGMA_K: f64 = 1.0;
 const START_SIGMA_K: f64 = 5.0;
 
 impl Perturbation {
-    /// One standard deviation of its error, in its unit, as the campaign declares it. 0 for quantities without a tolerance: inputs, whose
-    /// sensors are declared, and friction, which the nominal model does not have.
+    /// Declared standard deviation of its error, in its unit. 0 for quantities without a tolerance: inputs, which have declared sensors,
+    /// and friction, which the nominal model omits.
     ///
-    /// A campaign declares no tolerance of the turbine's flow and convection: those of the compressor apply.
+    /// A campaign declares no tolerance of the turbine's flow and convection; those of the compressor apply.
     pub fn tolerance(self, declared: &ModelTolerances) -> f64 {
         match self {
             Perturbation::Input(_) | Perturbation::Friction => 0.0,
@@ -112,20 +112,20 @@ impl Perturbation {
     }
 }
 
-/// Inputs with shifts on some of them.
+/// Inputs with shifts.
 #[derive(Debug, Clone, Copy)]
 pub struct ShiftedInputs<'a, I> {
-    /// As recorded.
+    /// The recording itself.
     pub inputs: &'a I,
-    /// Shift of each, in its unit.
+    /// Shifts, each in its unit.
     pub shifts: &'a [(Perturbation, f64)],
 }
 
 impl<I: Inputs> Inputs for ShiftedInputs<'_, I> {
     fn at(&self, t_s: f64) -> BoundaryConditions {
         let mut boundary = self.inputs.at(t_s);
-        for (knob, by) in self.shifts {
-            knob.shift(&mut boundary, *by);
+        for (perturbation, by) in self.shifts {
+            perturbation.shift(&mut boundary, *by);
         }
         boundary
     }
@@ -164,11 +164,11 @@ mod tests {
     #[test]
     fn each_knob_turns_one_thing_of_its_own() {
         let mut seen = Vec::new();
-        for knob in MACHINE {
+        for perturbation in MACHINE {
             let mut params = Params::default();
-            knob.turn(&mut params, 0.25);
-            assert_ne!(params, Params::default(), "{knob:?}");
-            assert!(!seen.contains(&params), "{knob:?}");
+            perturbation.turn(&mut params, 0.25);
+            assert_ne!(params, Params::default(), "{perturbation:?}");
+            assert!(!seen.contains(&params), "{perturbation:?}");
             seen.push(params);
         }
         let mut boundary = BoundaryConditions::default();

@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 
 /// A recording of a different machine from the campaign's.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("the recording was made on another machine: {what} `{recorded}`, the campaign names `{expected}`")]
+#[error(
+    "the recording was made on another machine: {what} `{recorded}` instead of the campaign's `{expected}`"
+)]
 pub struct OtherMachine {
     /// The difference: `machine` or `serial number`.
     pub what: &'static str,
@@ -29,9 +31,9 @@ pub fn same_machine(
     let pairs =
         [("machine", "machine", Some(machine_name)), ("serial_number", "serial number", serial_number)];
     for (key, what, expected) in pairs {
-        let named = |text: &&str| !text.is_empty();
-        let recorded = recorded.get(key).map(String::as_str).filter(named);
-        if let (Some(recorded), Some(expected)) = (recorded, expected.filter(named))
+        let is_named = |text: &&str| !text.is_empty();
+        let recorded = recorded.get(key).map(String::as_str).filter(is_named);
+        if let (Some(recorded), Some(expected)) = (recorded, expected.filter(is_named))
             && recorded != expected
         {
             let (recorded, expected) = (recorded.to_owned(), expected.to_owned());

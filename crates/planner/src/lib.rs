@@ -4,7 +4,7 @@
 //! expected errors and an upper bound on the gradients of any other order.
 //!
 //! The housing does not settle within a dwell, so the temperature gradient of a step depends on the steps before it. The search
-//! therefore carries the housing temperatures from step to step, with a reduced model of a few products per step (`housing`). The
+//! therefore predicts the housing temperatures after each step, with a reduced model of a few products (`housing`). The
 //! chosen order is then simulated with the full model (`forecast`).
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]

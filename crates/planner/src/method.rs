@@ -9,18 +9,18 @@ pub use mapper_physics::operating_point::forecast::ForecastRow;
 pub struct MethodResult {
     /// Efficiency without noise, fraction.
     pub eta: f64,
-    /// Its standard error from declared noise and offsets, fraction.
+    /// Standard error from declared noise and offsets, fraction.
     pub sigma_eta: f64,
     /// Heat-transfer coefficient without noise, W/(m2 K).
     pub h_w_m2k: f64,
-    /// Its standard error, W/(m2 K).
+    /// Standard error, W/(m2 K).
     pub sigma_h_w_m2k: f64,
 }
 
 /// Expected results of the method for all steps of a campaign.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MethodResults {
-    /// One result for each step, on a machine that is as declared.
+    /// One result for each step, on a machine with the declared parameters.
     pub steps: Vec<Option<MethodResult>>,
     /// Standard error of each efficiency that the method reports after such a recording, fraction.
     pub reported_sigma_eta: Vec<Option<f64>>,

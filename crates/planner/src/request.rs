@@ -7,7 +7,7 @@ use mapper_physics::operating_point::follow_outlet::FollowOutlet;
 use mapper_physics::simulation::model::Model;
 use mapper_physics::simulation::simulate::SimulationError;
 
-/// Everything a plan depends on.
+/// All inputs of a plan.
 #[derive(Debug, Clone)]
 pub struct PlanRequest<'a> {
     /// Name of the campaign.
@@ -22,17 +22,17 @@ pub struct PlanRequest<'a> {
     pub follow_outlet: FollowOutlet,
     /// The points, in listed order.
     pub points: &'a [OperatingPoint],
-    /// How they are ordered.
+    /// Criterion of their order.
     pub order: VisitOrder,
     /// Durations.
     pub timing: Timing,
-    /// Part of each step over which gradients are counted.
+    /// Part of each step in which gradients are predicted.
     pub window: WindowRule,
-    /// When a point counts as settled.
+    /// Criterion for a settled point.
     pub settle_bands: SettleBands,
     /// Limits of every step.
     pub limits: Limits,
-    /// Repeated jumps that show drift, if any.
+    /// Repeated jumps to detect drift.
     pub repeats: Option<Repeats>,
     /// Visits the first point once more at the end, because no jump leads to it at the start.
     pub return_to_first: bool,
@@ -60,7 +60,7 @@ pub struct UnreachablePoint {
 /// Failure of planning.
 #[derive(Debug, thiserror::Error)]
 pub enum PlanError {
-    /// All points that cannot be reached within the limits.
+    /// Points cannot be reached within the limits.
     #[error("{} of the points cannot be reached: {}", .0.len(), .0.iter().map(|point| format!("{} ({})", point.point, point.reason)).collect::<Vec<_>>().join("; "))]
     Unreachable(Vec<UnreachablePoint>),
     /// No points.
@@ -90,7 +90,7 @@ pub enum PlanError {
         "`required_sigma_eta` needs an identification method that predicts errors; set `identification.method: joint`, or give `timing.dwell`"
     )]
     NoPredictedError,
-    /// No order of the points avoids jumps that are not allowed.
+    /// Every order of the points contains a forbidden jump.
     #[error(
                 "every order that was tried contains a forbidden jump: {}; widen the limits or remove points",
         .0.join("; ")

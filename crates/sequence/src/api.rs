@@ -12,13 +12,13 @@ use std::sync::{Arc, Mutex};
 
 pub(crate) type SharedSession = Arc<Mutex<Session>>;
 
-/// One function or property.
+/// A function or property.
 pub struct Entry {
     /// Chapter of the documentation.
     pub group: &'static str,
     /// Call syntax in a script.
     pub signature: &'static str,
-    /// One or two sentences.
+    /// Description of one or two sentences.
     pub doc: &'static str,
     register: fn(&mut Engine, &SharedSession),
 }
@@ -30,8 +30,8 @@ struct Point(OperatingPoint);
 /// Default drift of T2 and Tc at which a point counts as settled, K/s: 1 K in a minute.
 const SETTLED_RATE_K_S: f64 = 1.0 / 60.0;
 
-/// Standard errors of unknown quantities, as scripts receive them. They are finite because rhai compares by relative differences:
-/// no value exceeds another next to infinity. An efficiency lies between 0 and 1.
+/// Standard errors of unknown quantities in scripts. They are finite because rhai compares by relative differences, which infinity
+/// makes meaningless. An efficiency lies between 0 and 1.
 const SIGMA_ETA_MAX: f64 = 1.0;
 const SIGMA_H_MAX_W_M2K: f64 = 1e6;
 
@@ -71,7 +71,7 @@ table! {
     "Points" {
         "grid()", "All points of the campaign's grid, in its order." => |engine, session| {
             let session = session.clone();
-            engine.register_fn("grid", move || points_array(&lock(&session).request.points));
+            engine.register_fn("grid", move || to_array(&lock(&session).request.points));
         };
         "point(speed, opening)", "A point, e.g. `point(\"110 krpm\", 0.7)`; it need not be one of the grid." => |engine, _| {
             engine.register_fn("point", |speed: &str, opening: FLOAT| parse_point(speed, opening));
@@ -93,11 +93,11 @@ table! {
             let session = session.clone();
             engine.register_fn("reachable", move |point: Point| lock(&session).is_reachable(point.0));
         };
-        "order(points)", "The points in the order the planner gives them under the campaign's `order`." => |engine, session| {
+        "order(points)", "The points, ordered by the planner according to the campaign's `order`." => |engine, session| {
             let session = session.clone();
             engine.register_fn("order", move |points: Array| -> Result<Array, ScriptThrow> {
                 let points = parse_points(points)?;
-                Ok(points_array(&lock(&session).order(&points)?))
+                Ok(to_array(&lock(&session).order(&points)?))
             });
         };
     }
@@ -105,23 +105,23 @@ table! {
         "dwell(time)", "Time at each point from now on, jump included; the campaign's `timing.dwell` until then." => |engine, session| {
             let session = session.clone();
             engine.register_fn("dwell", move |time: &str| -> Result<(), ScriptThrow> {
-                lock(&session).dwell_s = quantity(Kind::Duration, time)?;
+                lock(&session).dwell_s = parse_quantity(Kind::Duration, time)?;
                 Ok(())
             });
         };
-        "t3(temperature)", "Turbine inlet temperature of the steps that follow; the campaign's until then. Speed is held: P3 is what the nominal machine needs with it." => |engine, session| {
+        "t3(temperature)", "Turbine inlet temperature of the steps that follow; the campaign's until then. The speed does not change: P3 follows from the nominal machine." => |engine, session| {
             let session = session.clone();
             engine.register_fn("t3", move |temperature: &str| -> Result<(), ScriptThrow> {
-                lock(&session).set_t3(quantity(Kind::Temperature, temperature)?)
+                lock(&session).set_t3(parse_quantity(Kind::Temperature, temperature)?)
             });
         };
         "oil(temperature)", "Oil inlet temperature of the steps that follow; the campaign's until then." => |engine, session| {
             let session = session.clone();
             engine.register_fn("oil", move |temperature: &str| -> Result<(), ScriptThrow> {
-                lock(&session).set_oil_temperature(quantity(Kind::Temperature, temperature)?)
+                lock(&session).set_oil_temperature(parse_quantity(Kind::Temperature, temperature)?)
             });
         };
-        "jump(p)", "Goes to `p`, stays there, and returns the step's result. A point that was visited before counts as a repeat." => |engine, session| {
+        "jump(p)", "Goes to `p`, stays for the dwell, and returns the step's result. A point that was visited before counts as a repeat." => |engine, session| {
             let session = session.clone();
             engine.register_fn("jump", move |point: Point| {
                 let mut session = lock(&session);
@@ -129,28 +129,28 @@ table! {
                 session.step(point.0, dwell_s, EndCondition::Dwell)
             });
         };
-        "jump(p, time)", "The same with its own time." => |engine, session| {
+        "jump(p, time)", "Like `jump(p)`, with another dwell." => |engine, session| {
             let session = session.clone();
             engine.register_fn("jump", move |point: Point, time: &str| {
-                let dwell_s = quantity(Kind::Duration, time)?;
+                let dwell_s = parse_quantity(Kind::Duration, time)?;
                 lock(&session).step(point.0, dwell_s, EndCondition::Dwell)
             });
         };
         "settle(p, longest)", "Goes to `p` and holds until it has settled, at most `longest`: over the last 30 s, T2 and Tc drift by less than 1 K in a minute, and speed, flow and pressure ratio stay within the campaign's `stabilisation`." => |engine, session| {
             let session = session.clone();
             engine.register_fn("settle", move |point: Point, longest: &str| {
-                let max_s = quantity(Kind::Duration, longest)?;
+                let max_s = parse_quantity(Kind::Duration, longest)?;
                 lock(&session).settle(point.0, max_s, SETTLED_RATE_K_S)
             });
         };
-        "settle(p, longest, rate)", "The same with its own drift limit, e.g. `\"0.005 K/s\"`." => |engine, session| {
+        "settle(p, longest, rate)", "Like `settle(p, longest)`, with another drift limit, e.g. `\"0.005 K/s\"`." => |engine, session| {
             let session = session.clone();
             engine.register_fn("settle", move |point: Point, longest: &str, rate: &str| {
-                let (max_s, rate_k_s) = (quantity(Kind::Duration, longest)?, quantity(Kind::TemperatureRate, rate)?);
+                let (max_s, rate_k_s) = (parse_quantity(Kind::Duration, longest)?, parse_quantity(Kind::TemperatureRate, rate)?);
                 lock(&session).settle(point.0, max_s, rate_k_s)
             });
         };
-        "repeat(n)", "Repeats step `n` by the same jump, so that the two can be compared: goes to where it came from, unless already there, and jumps again. Returns the result of the jump." => |engine, session| {
+        "repeat(n)", "Repeats step `n` by the same jump, so that the two can be compared: goes to the start of the jump if necessary, and jumps again. Returns the result of the jump." => |engine, session| {
             let session = session.clone();
             engine.register_fn("repeat", move |number: INT| lock(&session).repeat(number));
         };
@@ -169,7 +169,7 @@ table! {
         "r.step", "Number of the step, from 1." => |engine, _| {
             engine.register_get("step", |result: &mut StepResult| result.number as INT);
         };
-        "r.point", "The point it was to reach." => |engine, _| {
+        "r.point", "Target of the step." => |engine, _| {
             engine.register_get("point", |result: &mut StepResult| Point(result.target));
         };
         "r.verdict", "`\"good\"`, `\"doubtful\"` or `\"unusable\"`." => |engine, _| {
@@ -178,19 +178,19 @@ table! {
         "r.warnings", "Codes of the reasons for the verdict, e.g. `small_gradient`." => |engine, _| {
             engine.register_get("warnings", |result: &mut StepResult| warning_codes(result));
         };
-        "r.has_eta", "Whether there is an efficiency. The first step of a run has no jump and thus none." => |engine, _| {
+        "r.has_eta", "Whether the step has an efficiency. The first step of a run has none, because it has no jump." => |engine, _| {
             engine.register_get("has_eta", |result: &mut StepResult| result.eta().is_some());
         };
         "r.eta", "Efficiency, fraction." => |engine, _| {
-            engine.register_get("eta", |result: &mut StepResult| number(result.eta()));
+            engine.register_get("eta", |result: &mut StepResult| number_or_unit(result.eta()));
         };
-        "r.sigma_eta", "Its standard error, fraction; 1 where there is no efficiency, so that `r.sigma_eta > 0.005` holds." => |engine, _| {
+        "r.sigma_eta", "Its standard error, fraction; 1 without an efficiency, so that `r.sigma_eta > 0.005` is true." => |engine, _| {
             engine.register_get("sigma_eta", |result: &mut StepResult| result.sigma_eta().min(SIGMA_ETA_MAX));
         };
         "r.h_w_m2k", "Heat-transfer coefficient, W/(m2 K)." => |engine, _| {
-            engine.register_get("h_w_m2k", |result: &mut StepResult| number(result.h_w_m2k()));
+            engine.register_get("h_w_m2k", |result: &mut StepResult| number_or_unit(result.h_w_m2k()));
         };
-        "r.sigma_h_w_m2k", "Its standard error, W/(m2 K); 1e6 where there is no coefficient." => |engine, _| {
+        "r.sigma_h_w_m2k", "Its standard error, W/(m2 K); 1e6 without a coefficient." => |engine, _| {
             engine.register_get("sigma_h_w_m2k", |result: &mut StepResult| result.sigma_h_w_m2k().min(SIGMA_H_MAX_W_M2K));
         };
         "r.speed_rpm", "Measured shaft speed at the end of the step, rpm." => |engine, _| {
@@ -208,12 +208,12 @@ table! {
         "r.dtc_k", "Change of the housing temperature over the window, K." => |engine, _| {
             register_measurement(engine, "dtc_k", |point| point.dtc_k);
         };
-        "r.duration_s", "How long the step took, s." => |engine, _| {
+        "r.duration_s", "Duration of the step, s." => |engine, _| {
             engine.register_get("duration_s", |result: &mut StepResult| result.end_s - result.start_s);
         };
     }
     "Other" {
-        "elapsed_s()", "Time since the run began, warm-up included, s." => |engine, session| {
+        "elapsed_s()", "Time since the start of the run, warm-up included, s." => |engine, session| {
             let session = session.clone();
             engine.register_fn("elapsed_s", move || lock(&session).now_s());
         };
@@ -227,35 +227,38 @@ table! {
 /// Registers a property of a result's point.
 fn register_measurement(engine: &mut Engine, name: &'static str, value: fn(&IdentifiedPoint) -> Option<f64>) {
     engine.register_get(name, move |result: &mut StepResult| {
-        number(result.identified.as_ref().and_then(value).filter(|value| value.is_finite()))
+        number_or_unit(result.identified.as_ref().and_then(value).filter(|value| value.is_finite()))
     });
 }
 
-fn number(value: Option<f64>) -> Dynamic {
+fn number_or_unit(value: Option<f64>) -> Dynamic {
     value.map_or(Dynamic::UNIT, Dynamic::from_float)
 }
 
-fn points_array(points: &[OperatingPoint]) -> Array {
+fn to_array(points: &[OperatingPoint]) -> Array {
     points.iter().map(|point| Dynamic::from(Point(*point))).collect()
 }
 
-fn quantity(kind: Kind, text: &str) -> Result<f64, ScriptThrow> {
+fn parse_quantity(kind: Kind, text: &str) -> Result<f64, ScriptThrow> {
     mapper_yaml::units::parse(kind, text).map_err(|error| throw(error.to_string(), &error.remedy(kind)))
 }
 
 fn parse_point(speed: &str, opening: FLOAT) -> Result<Point, ScriptThrow> {
-    let speed_rpm = quantity(Kind::Speed, speed)?;
+    let speed_rpm = parse_quantity(Kind::Speed, speed)?;
     Ok(Point(OperatingPoint { speed_rpm, valve_opening_ratio: opening }))
 }
 
 fn parse_points(array: Array) -> Result<Vec<OperatingPoint>, ScriptThrow> {
-    let one = |item: Dynamic| {
+    let parse = |item: Dynamic| {
         let kind = item.type_name();
         item.try_cast::<Point>().map(|point| point.0).ok_or_else(|| {
-            throw(format!("order() takes an array of points; this one holds a {kind}"), "e.g. order(grid())")
+            throw(
+                format!("order() takes an array of points; this array contains a {kind}"),
+                "e.g. order(grid())",
+            )
         })
     };
-    array.into_iter().map(one).collect()
+    array.into_iter().map(parse).collect()
 }
 
 fn warning_codes(result: &StepResult) -> Array {

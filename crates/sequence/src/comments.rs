@@ -1,4 +1,4 @@
-//! Finds comments that are never closed. The language treats the whole rest of the script as a comment, so that steps would be lost.
+//! Finds comments that are never closed. The language treats the rest of the script as a comment, so that steps would be lost.
 
 use rhai::Position;
 
@@ -24,12 +24,12 @@ pub(crate) fn find_unclosed_comment(text: &str) -> Option<Position> {
     None
 }
 
-/// Bytes up to and including a mark, or all.
+/// Number of bytes up to the end of a mark; all bytes if there is no mark.
 fn length_until(text: &[u8], mark: &[u8]) -> usize {
     text.windows(mark.len()).position(|window| window == mark).map_or(text.len(), |found| found + mark.len())
 }
 
-/// Bytes of a block comment, in which others may be nested; `None` if it does not end.
+/// Number of bytes of a block comment, which may contain others; `None` if it does not end.
 fn block_length(text: &[u8]) -> Option<usize> {
     let (mut depth, mut at) = (0usize, 0);
     while at + 1 < text.len() {
@@ -45,7 +45,7 @@ fn block_length(text: &[u8]) -> Option<usize> {
     None
 }
 
-/// Bytes of a text in quotes; a backslash protects the next letter.
+/// Number of bytes of a text in quotes; a backslash escapes the next character.
 fn quoted_length(text: &[u8], quote: u8) -> usize {
     let mut at = 1;
     while let Some(byte) = text.get(at) {
@@ -58,7 +58,7 @@ fn quoted_length(text: &[u8], quote: u8) -> usize {
     text.len()
 }
 
-/// Bytes of a raw text such as `#"..."#`; 1 for any other `#`.
+/// Number of bytes of a raw text such as `#"..."#`; 1 for any other `#`.
 fn raw_length(text: &[u8]) -> usize {
     let hashes = text.iter().take_while(|byte| **byte == b'#').count();
     if text.get(hashes) != Some(&b'"') {

@@ -27,7 +27,7 @@ pub enum SequenceError {
         /// Limit, s.
         limit_s: u64,
     },
-    /// The script's thread has ended unexpectedly: a fault of the program.
+    /// The script's thread ended unexpectedly: a fault of the program.
     #[error("the sequence script ended without a result: this is a fault of the program")]
     Lost,
 }
@@ -84,8 +84,8 @@ impl ScriptError {
         Ok(())
     }
 
-    fn new(path: PathBuf, text: &str, at: Position, message: String, remedy: String) -> Self {
-        // Replaced one for one, so that the column still fits; terminals would interpret control characters.
+    pub(crate) fn new(path: PathBuf, text: &str, at: Position, message: String, remedy: String) -> Self {
+        // Replace control characters, which terminals would interpret, one by one, so that the column remains correct.
         let harmless = |c: char| match c {
             '\t' => ' ',
             c if c.is_control() => '?',
@@ -108,11 +108,6 @@ impl ScriptError {
         }
     }
 
-    /// An error that is found without running the script.
-    pub(crate) fn at(path: PathBuf, text: &str, at: Position, message: String, remedy: String) -> Self {
-        Self::new(path, text, at, message, remedy)
-    }
-
     pub(crate) fn from_parse_error(path: PathBuf, text: &str, error: &ParseError) -> Self {
         let message = format!("the sequence script cannot be read: {}", error.err_type());
         Self::new(path, text, error.position(), message, String::new())
@@ -129,7 +124,7 @@ impl ScriptError {
         let at = error.position();
         let (message, remedy) = message_and_remedy(error);
         let mut script_error = Self::new(path, text, at, message, remedy);
-        // A deep recursion is shown by its first and last calls.
+        // For a deep recursion, show the innermost calls only.
         called_from.truncate(5);
         script_error.called_from = called_from;
         script_error
@@ -151,12 +146,11 @@ fn message_and_remedy(error: EvalAltResult) -> (String, String) {
         {
             (
                 format!("the sequence script took more than {OPERATION_LIMIT} operations and was stopped"),
-                "look for a loop that does not end, or that goes through all points for each point"
-                    .to_owned(),
+                "look for an endless loop, or for a loop over all points inside another one".to_owned(),
             )
         }
         EvalAltResult::ErrorTerminated(..) => {
-            ("the sequence script was ended from outside".to_owned(), String::new())
+            ("the program ended the sequence script".to_owned(), String::new())
         }
         EvalAltResult::ErrorStackOverflow(_) => (
             format!("functions of the sequence script call each other more than {CALL_DEPTH_LIMIT} deep"),
@@ -171,7 +165,7 @@ fn message_and_remedy(error: EvalAltResult) -> (String, String) {
         }
         EvalAltResult::ErrorFunctionNotFound(signature, _) => (
             format!("no function `{signature}` exists for sequence scripts"),
-            "docs/reference/sequences.md lists the functions and what they take".to_owned(),
+            crate::names::SEE_REFERENCE.to_owned(),
         ),
         other => {
             let mut other = other;
@@ -181,7 +175,7 @@ fn message_and_remedy(error: EvalAltResult) -> (String, String) {
     }
 }
 
-/// A script may throw anything, and a refusal that it caught.
+/// A script may throw any value, or rethrow a refusal.
 fn thrown_message_and_remedy(thrown: Dynamic) -> (String, String) {
     match thrown.try_cast_result::<Refusal>() {
         Ok(Refusal { message, remedy }) => (message, remedy),

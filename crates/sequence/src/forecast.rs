@@ -1,4 +1,4 @@
-//! Predicts each step with the nominal machine; the thermal state of its housings is kept from step to step.
+//! Predicts each step with the nominal machine, from the thermal state after the previous step.
 
 use crate::request::SequenceRequest;
 use mapper_core::Predicted;
@@ -8,7 +8,7 @@ use mapper_physics::simulation::model::State;
 use mapper_physics::simulation::simulate::SimulationError;
 use mapper_physics::simulation::steady::SteadyState;
 
-/// A step whose duration is within this of the planned one ends in the planned state, s: one forecast interval.
+/// Maximum difference between executed and planned duration for a step to end in the planned state, s: one forecast interval.
 const PLANNED_TOLERANCE_S: f64 = 0.5;
 
 /// State of the nominal machine along a sequence.

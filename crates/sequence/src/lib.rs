@@ -1,5 +1,4 @@
-//! Runs test sequences written in rhai. A user writes a script instead of using the planner; it chooses each step from the results of
-//! the previous ones.
+//! Runs test sequences written in rhai: scripts that replace the planner and choose each step from the results of the previous ones.
 //!
 //! `session` starts a [`SequenceRunner`], which runs the script on its own thread and synchronises with it at each step: the script waits
 //! while a step is executed, and the caller waits while the script computes.

@@ -1,4 +1,4 @@
-//! Finds unknown functions and properties in a script without running it. Otherwise a rarely taken branch might fail only during
+//! Finds unknown functions and properties before a script runs. Otherwise a rarely executed branch might fail in the middle of
 //! a long run.
 
 use mapper_yaml::closest;
@@ -33,7 +33,7 @@ pub(crate) struct UnknownName {
     pub(crate) remedy: String,
 }
 
-/// Refuses the first call of an unknown function, a call with a wrong number of arguments, and the first unknown
+/// Returns the first mistake of a script: a call of an unknown function, a wrong number of arguments, or an unknown
 /// property.
 pub(crate) fn check(engine: &Engine, ast: &AST) -> Result<(), UnknownName> {
     let mut functions = FunctionTable::new();
@@ -78,15 +78,15 @@ pub(crate) fn check(engine: &Engine, ast: &AST) -> Result<(), UnknownName> {
         let getters: Vec<&str> = functions.keys().filter_map(|name| name.strip_prefix(GETTER)).collect();
         problems.push((
             at,
-            format!("nothing in a sequence script has a property `{name}`"),
+            format!("no value of a sequence script has a property `{name}`"),
             remedy_for(&name, &getters),
         ));
     }
     problems.sort_by_key(|(at, ..)| (at.line(), at.position()));
-    match problems.into_iter().next() {
-        None => Ok(()),
-        Some((at, message, remedy)) => Err(UnknownName { at, message, remedy }),
-    }
+    problems
+        .into_iter()
+        .next()
+        .map_or(Ok(()), |(at, message, remedy)| Err(UnknownName { at, message, remedy }))
 }
 
 fn check_call(functions: &FunctionTable, name: &str, count: usize) -> Option<(String, String)> {
@@ -101,15 +101,15 @@ fn check_call(functions: &FunctionTable, name: &str, count: usize) -> Option<(St
     if counts.contains(&count) {
         return None;
     }
-    let takes: Vec<String> = counts.iter().map(ToString::to_string).collect();
-    let message = format!("`{name}` is called with {count} arguments, and takes {}", takes.join(" or "));
+    let allowed: Vec<String> = counts.iter().map(ToString::to_string).collect();
+    let message = format!("`{name}` is called with {count} arguments, but takes {}", allowed.join(" or "));
     Some((message, SEE_REFERENCE.to_owned()))
 }
 
-const SEE_REFERENCE: &str = "docs/reference/sequences.md lists the functions and what they take";
+pub(crate) const SEE_REFERENCE: &str = "docs/reference/sequences.md lists the functions and their arguments";
 
-fn remedy_for(name: &str, among: &[&str]) -> String {
-    match closest(name, among) {
+fn remedy_for(name: &str, known_names: &[&str]) -> String {
+    match closest(name, known_names) {
         Some(guess) => format!("did you mean `{guess}`? {SEE_REFERENCE}"),
         None => SEE_REFERENCE.to_owned(),
     }

@@ -7,7 +7,7 @@ use mapper_physics::operating_point::reach::{describe_obstacles, reach};
 use mapper_physics::simulation::model::Model;
 use mapper_physics::simulation::steady::SteadyState;
 
-/// Requests the planner's order of a set of points; the error is a readable sentence.
+/// Asks the planner for the order of a set of points; the error is a sentence.
 pub type OrderPoints = Box<dyn Fn(&[OperatingPoint]) -> Result<Vec<OperatingPoint>, String> + Send>;
 
 /// All inputs of a sequence except its script.
@@ -28,7 +28,7 @@ pub struct SequenceRequest {
     pub follow_outlet: FollowOutlet,
     /// Limits of every step.
     pub limits: Limits,
-    /// Calls the planner.
+    /// The planner.
     pub order: OrderPoints,
 }
 

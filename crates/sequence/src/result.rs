@@ -7,15 +7,15 @@ use mapper_core::{IdentifiedPoint, OperatingPoint, Verdict};
 pub struct StepResult {
     /// Number of the step, from 1, as tables print it.
     pub number: usize,
-    /// Its target.
+    /// Target.
     pub target: OperatingPoint,
-    /// Its origin; `None` for the first step.
+    /// Origin; `None` for the first step.
     pub from: Option<OperatingPoint>,
-    /// Its start, run time, s.
+    /// Start, run time, s.
     pub start_s: f64,
-    /// Its end, run time, s.
+    /// End, run time, s.
     pub end_s: f64,
-    /// The identified point; `None` if not even its place on the map is known.
+    /// The identified point; `None` if its position on the map is not known.
     pub identified: Option<IdentifiedPoint>,
 }
 

@@ -18,7 +18,7 @@ use std::time::Duration;
 
 /// Duration of one wait for a script's next step; a stop is noticed within this time.
 const WAIT: Duration = Duration::from_millis(20);
-/// Maximum number of waits for one step: one minute, enough to plan the whole grid several times.
+/// Maximum number of waits for one step: one minute is enough to plan the whole grid several times.
 const MAX_WAITS: u32 = 3_000;
 
 /// A script's text, and its name in messages.
@@ -26,7 +26,7 @@ const MAX_WAITS: u32 = 3_000;
 pub struct Script {
     /// Path of its file.
     pub path: PathBuf,
-    /// Its text.
+    /// Text.
     pub text: String,
 }
 
@@ -87,8 +87,7 @@ impl SequenceRunner {
         }
     }
 
-    /// Whether [`next_step`](Self::next_step) will return at once; waits some milliseconds for that. To end the script, drop the
-    /// runner.
+    /// Whether [`next_step`](Self::next_step) will return at once; waits up to 20 ms for the script.
     pub fn is_ready(&mut self) -> bool {
         let Some(messages) = self.messages.as_ref().filter(|_| self.to_script.is_some()) else {
             return true;
@@ -148,7 +147,7 @@ impl SequenceRunner {
 
 impl Drop for SequenceRunner {
     fn drop(&mut self) {
-        // The script ends at its next operation. Both channels are closed before the join: the thread may wait at either.
+        // The script ends at its next operation. Close both channels before the join, because the thread may wait at either.
         self.budget.cancel();
         self.to_script = None;
         self.messages = None;
@@ -160,20 +159,19 @@ impl Drop for SequenceRunner {
 }
 
 fn compile(engine: &Engine, script: &Script) -> Result<AST, Box<ScriptError>> {
-    let fail = |error: &rhai::ParseError| {
-        Box::new(ScriptError::from_parse_error(script.path.clone(), &script.text, error))
-    };
     if script.text.len() > SCRIPT_LIMIT {
         let message = format!("the script has {} bytes, more than {SCRIPT_LIMIT}", script.text.len());
         let thrown = EvalAltResult::ErrorRuntime(message.into(), Position::NONE);
         return Err(Box::new(ScriptError::from_run_error(script.path.clone(), "", thrown)));
     }
     if let Some(at) = find_unclosed_comment(&script.text) {
-        let message = "this comment is never closed: all that follows is part of it".to_owned();
-        let remedy = "write `*/` where it ends".to_owned();
-        return Err(Box::new(ScriptError::at(script.path.clone(), &script.text, at, message, remedy)));
+        let message = "this comment is never closed, so the rest of the script is part of it".to_owned();
+        let remedy = "write `*/` at its end".to_owned();
+        return Err(Box::new(ScriptError::new(script.path.clone(), &script.text, at, message, remedy)));
     }
-    engine.compile(&script.text).map_err(|error| fail(&error))
+    engine
+        .compile(&script.text)
+        .map_err(|error| Box::new(ScriptError::from_parse_error(script.path.clone(), &script.text, &error)))
 }
 
 /// Main function of a script's thread.
@@ -184,11 +182,10 @@ fn run(script: &Script, budget: &Arc<Budget>, session: Session) {
     let compiled = compile(&engine, script).and_then(|ast| match names::check(&engine, &ast) {
         Ok(()) => Ok(ast),
         Err(UnknownName { at, message, remedy }) => {
-            Err(Box::new(ScriptError::at(script.path.clone(), &script.text, at, message, remedy)))
+            Err(Box::new(ScriptError::new(script.path.clone(), &script.text, at, message, remedy)))
         }
     });
-    let first_request = lock(&session).wait();
-    if first_request.is_err() {
+    if lock(&session).wait().is_err() {
         return;
     }
     let outcome = compiled.and_then(|ast| {

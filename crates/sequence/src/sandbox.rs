@@ -40,7 +40,7 @@ pub(crate) struct Budget {
 /// Reason for which a script was ended from outside.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ScriptEnd {
-    /// It used up its operations.
+    /// The script exceeded the limit of operations.
     OutOfOperations,
     /// The runner does not need it any more.
     Cancelled,

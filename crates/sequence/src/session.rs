@@ -7,6 +7,7 @@ use crate::result::StepResult;
 use crate::settle::SettleRule;
 use crate::step::{EndCondition, ScriptMessage, SequenceStep};
 use mapper_core::{OperatingPoint, PlanStep, StepKind};
+use mapper_physics::simulation::steady::SteadyState;
 use rhai::{EvalAltResult, Position};
 use std::sync::mpsc::{Receiver, SyncSender};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -19,8 +20,8 @@ const STEP_LIMIT: usize = 2_000;
 const DWELL_LIMIT_S: f64 = 14_400.0;
 /// Maximum duration of a sequence, s: three days, all of which the rehearsal has to simulate.
 const DURATION_LIMIT_S: f64 = 3.0 * 86_400.0;
-/// Maximum number of checked points without a step to them, plus an allowance for each point of the grid. Each check takes
-/// the time of some thousand operations.
+/// Maximum number of checks of points without a step to them, and an allowance for each point of the grid. A check takes as long as some
+/// thousand operations.
 const CHECK_LIMIT: usize = 2_000;
 const CHECKS_PER_POINT: usize = 10;
 /// Maximum number of points in one call of the planner (at least the grid); twice as many in total.
@@ -87,7 +88,7 @@ impl Session {
             let harmless = |c: char| if c.is_control() { ' ' } else { c };
             self.notes.push(text.chars().take(NOTE_LENGTH_LIMIT).map(harmless).collect());
         } else if self.note_count == NOTE_LIMIT {
-            self.notes.push(format!("the script has made {NOTE_LIMIT} notes; further ones are left out"));
+            self.notes.push(format!("the script has made {NOTE_LIMIT} notes; further ones are omitted"));
         }
     }
 
@@ -95,13 +96,10 @@ impl Session {
         CHECK_LIMIT + CHECKS_PER_POINT * self.request.points.len()
     }
 
-    fn check(
-        &mut self,
-        point: OperatingPoint,
-    ) -> Result<mapper_physics::simulation::steady::SteadyState, ScriptThrow> {
+    fn check(&mut self, point: OperatingPoint) -> Result<SteadyState, ScriptThrow> {
         let limit = self.check_limit();
         if self.checks >= limit {
-            let message = format!("the script has checked {limit} points without going there");
+            let message = format!("the script has checked {limit} points without a step to them");
             return Err(throw(message, "check fewer points"));
         }
         self.checks += 1;
@@ -118,14 +116,14 @@ impl Session {
 
     /// The planner's order of a set of points.
     pub fn order(&mut self, points: &[OperatingPoint]) -> Result<Vec<OperatingPoint>, ScriptThrow> {
-        // The search time grows faster than the number of points: a set larger than the grid is refused.
-        let largest = ORDER_LIMIT.max(self.request.points.len());
-        if points.len() > largest {
+        // The search time grows faster than the number of points, so a set larger than the grid is refused.
+        let max_points = ORDER_LIMIT.max(self.request.points.len());
+        if points.len() > max_points {
             let message =
-                format!("the planner orders at most {largest} points at once, not {}", points.len());
+                format!("the planner orders at most {max_points} points at once, not {}", points.len());
             return Err(throw(message, "order the grid, or a part of it"));
         }
-        let limit = 2 * largest;
+        let limit = 2 * max_points;
         self.ordered_points += points.len();
         if self.ordered_points > limit {
             let message = format!("the planner has been asked to order more than {limit} points in total");
@@ -142,8 +140,9 @@ impl Session {
     pub fn result(&self, number: i64) -> Result<StepResult, ScriptThrow> {
         let index = usize::try_from(number).ok().and_then(|number| number.checked_sub(1));
         index.and_then(|index| self.results.get(index)).cloned().ok_or_else(|| {
-            let message = format!("no result of step {number}: {} have been run", self.results.len());
-            throw(message, "steps are counted from 1; jump() returns its own result")
+            let message =
+                format!("no result of step {number}: {} steps have been executed", self.results.len());
+            throw(message, "steps are counted from 1; jump() returns the result of its step")
         })
     }
 
@@ -179,7 +178,10 @@ impl Session {
     ) -> Result<StepResult, ScriptThrow> {
         let (index, start_s) = (self.results.len(), self.now_s());
         if index >= STEP_LIMIT {
-            return Err(throw(format!("a sequence may have {STEP_LIMIT} steps"), "end the sequence earlier"));
+            return Err(throw(
+                format!("a sequence may have at most {STEP_LIMIT} steps"),
+                "end the sequence earlier",
+            ));
         }
         if !(dwell_s > 0.0 && dwell_s <= DWELL_LIMIT_S) {
             let message =
@@ -220,16 +222,16 @@ impl Session {
 
     /// Repeats a step by the same jump.
     pub fn repeat(&mut self, number: i64) -> Result<StepResult, ScriptThrow> {
-        let before = self.result(number)?;
-        let Some(from) = before.from else {
-            let message = format!("step {number} has no jump that could be repeated: the run began there");
+        let earlier = self.result(number)?;
+        let Some(from) = earlier.from else {
+            let message = format!("step {number} has no jump to repeat: the run began with it");
             return Err(throw(message, "repeat a later step, or jump to its point"));
         };
         let now = self.results.last().map(|result| result.target);
         if now.is_none_or(|now| !now.is_same_place(&from)) {
             self.step(from, self.dwell_s, EndCondition::Dwell)?;
         }
-        self.step(before.target, before.end_s - before.start_s, EndCondition::Dwell)
+        self.step(earlier.target, earlier.end_s - earlier.start_s, EndCondition::Dwell)
     }
 
     /// Stays at a point until it has settled.
@@ -247,17 +249,17 @@ impl Session {
 /// Temperature range of the model, K; the limits of a rig are checked before the run.
 const PLAUSIBLE_K: std::ops::RangeInclusive<f64> = 250.0..=1400.0;
 
-fn check_temperature(what: &str, value_k: f64) -> Result<f64, ScriptThrow> {
+fn check_temperature(name: &str, value_k: f64) -> Result<f64, ScriptThrow> {
     if PLAUSIBLE_K.contains(&value_k) {
         return Ok(value_k);
     }
-    let message = format!("the {what} cannot be {value_k:.2} K");
+    let message = format!("the {name} cannot be {value_k:.2} K");
     Err(throw(message, "give a temperature such as \"70 degC\""))
 }
 
-fn outlet_follows_error(what: &str) -> ScriptThrow {
-    let message = format!("the {what} follows the compressor's outlet in this campaign");
-    throw(message, "take it out of `boundary.follow_outlet`")
+fn outlet_follows_error(name: &str) -> ScriptThrow {
+    let message = format!("the {name} follows the compressor's outlet in this campaign");
+    throw(message, "remove it from `boundary.follow_outlet`")
 }
 
 /// The error that ends the script when its caller no longer exists. The script cannot catch it.

@@ -41,7 +41,7 @@ impl SettleWatch {
         SettleWatch { rule, start_s, samples: VecDeque::new() }
     }
 
-    /// Takes the next samples; true when the point has settled.
+    /// Adds the next samples; returns whether the point has settled.
     pub fn has_settled(&mut self, batch: &SampleBatch) -> bool {
         let columns = CHANNELS.map(|channel| batch.column(channel));
         for (index, t_s) in batch.t_s.iter().enumerate().filter(|(_, t_s)| **t_s >= self.start_s) {
@@ -78,7 +78,7 @@ impl SettleWatch {
         })
     }
 
-    /// Medians over blocks counted backwards from `now_s`; NaN where a block has no value.
+    /// Medians over blocks counted backwards from `now_s`; NaN for blocks without a value.
     fn block_medians(&self, now_s: f64, signal: fn(&[f64; COLUMNS]) -> f64) -> Vec<f64> {
         let count = (WINDOW_S / BLOCK_S) as usize;
         let mut blocks: Vec<Vec<f64>> = vec![Vec::new(); count];

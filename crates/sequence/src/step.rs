@@ -9,7 +9,7 @@ use mapper_core::PlanStep;
 pub enum EndCondition {
     /// After the step's duration.
     Dwell,
-    /// When it has settled, after the step's duration at the latest.
+    /// As soon as the point has settled, at the latest after the step's duration.
     UntilSettled(SettleRule),
 }
 

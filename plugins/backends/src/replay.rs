@@ -20,7 +20,7 @@ pub const PLUGIN: BackendPlugin = BackendPlugin {
     make,
 };
 
-/// A recording that cannot be replayed any further.
+/// Reason for the end of a replay.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplayError {
     /// The settings name no file.
@@ -38,17 +38,18 @@ pub enum ReplayError {
 }
 
 fn make(_: &NominalRig, settings: &serde_json::Value) -> Result<Box<dyn Backend>, BackendError> {
-    let wrong = |key: &str, problem: ReplayError| BackendError::Settings {
+    let settings_error = |key: &str, problem: ReplayError| BackendError::Settings {
         backend: NAME.to_owned(),
         path: key.to_owned(),
         source: Box::new(problem),
     };
     let path = |key: &str| settings.get(key).and_then(|value| value.as_str()).map(Path::new);
-    let recording = path("recording").ok_or_else(|| wrong("recording", ReplayError::NoRecording))?;
+    let recording = path("recording").ok_or_else(|| settings_error("recording", ReplayError::NoRecording))?;
     let map = path("channels").map(ChannelMap::load).transpose();
-    let map = map.map_err(|error| wrong("channels", error.into()))?.unwrap_or_else(ChannelMap::native);
+    let map =
+        map.map_err(|error| settings_error("channels", error.into()))?.unwrap_or_else(ChannelMap::native);
     let report = read_recording(recording, &map, &ReadOptions::default())
-        .map_err(|error| wrong("recording", error.into()))?;
+        .map_err(|error| settings_error("recording", error.into()))?;
     Ok(Box::new(ReplayBackend::new(&report.recording)))
 }
 
@@ -68,7 +69,7 @@ pub struct ReplayBackend {
     elements: Vec<ElementColumn>,
     events: Vec<Event>,
     armed: bool,
-    /// Samples and events handed out so far.
+    /// Samples and events returned by polls so far.
     samples_played: usize,
     events_played: usize,
     /// Setpoints not yet compared with the recording.
@@ -96,7 +97,7 @@ impl ReplayBackend {
                 let values = if measured(channel) {
                     values_at_samples(series, &t_s)
                 } else {
-                    hold_values(series, &t_s)
+                    t_s.iter().map(|t| series.held(*t).unwrap_or(f64::NAN)).collect()
                 };
                 ChannelColumn { channel: *channel, values }
             })
@@ -145,13 +146,13 @@ impl ReplayBackend {
         let recorded = |channel| self.columns.iter().find(|column| column.channel == channel);
         commands.into_iter()
             .filter_map(|(channel, value)| {
-                let then = recorded(channel)?.values.get(sample).copied()?;
-                let differs = (value - then).abs() > SETPOINT_TOLERANCE_RATIO * then.abs();
+                let command = recorded(channel)?.values.get(sample).copied()?;
+                let differs = (value - command).abs() > SETPOINT_TOLERANCE_RATIO * command.abs();
                 differs.then(|| Event {
                     t_s,
                     kind: EventKind::Note,
                     message: format!(
-                        "{channel} is set to {value} {unit}, but was {then} {unit} in the recording being replayed",
+                        "{channel} is set to {value} {unit}, but was {command} {unit} in the recording being replayed",
                         unit = channel.unit()
                     ),
                 })
@@ -206,7 +207,7 @@ impl Backend for ReplayBackend {
             && let Some(setpoints) =
                 self.pending.take().filter(|setpoints| setpoints.mode == RigMode::Running)
         {
-            // Setpoints apply from the last poll on, so the first sample after it shows them.
+            // Setpoints apply from the last poll, so they affect the next sample.
             events.extend(self.note_differences(&setpoints, start));
             events.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
         }
@@ -262,15 +263,11 @@ fn values_at_samples(series: &Series, t_s: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-fn hold_values(series: &Series, t_s: &[f64]) -> Vec<f64> {
-    t_s.iter().map(|t| series.held(*t).unwrap_or(f64::NAN)).collect()
-}
-
-/// From the median interval of samples, which pauses do not affect; 0 below two samples.
+/// Sample rate from the median interval, which pauses do not affect; 0 below two samples.
 fn sample_rate_hz(t_s: &[f64]) -> f64 {
-    let mut distances_s: Vec<f64> = t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    distances_s.sort_by(f64::total_cmp);
-    distances_s.get(distances_s.len() / 2).map_or(0.0, |distance_s| 1.0 / distance_s)
+    let mut intervals_s: Vec<f64> = t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    intervals_s.sort_by(f64::total_cmp);
+    intervals_s.get(intervals_s.len() / 2).map_or(0.0, |interval_s| 1.0 / interval_s)
 }
 
 #[cfg(test)]

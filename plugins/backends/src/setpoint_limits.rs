@@ -2,7 +2,7 @@
 
 use mapper_core::{SetpointRange, SetpointRanges};
 
-/// Setpoints accepted by the backends here.
+/// Setpoints accepted by the backends of this crate.
 pub(crate) const ACCEPTED: SetpointRanges = SetpointRanges {
     p3_pa: SetpointRange { low: 50e3, high: 2e6 },
     t3_k: SetpointRange { low: 250.0, high: 1400.0 },

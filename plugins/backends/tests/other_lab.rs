@@ -87,7 +87,7 @@ fn at_rest_the_energy_closes() {
     let structure = OtherStructure::default();
     let mut machine = structure.settled(&model, 0.0, &boundary, Watch::default()).unwrap();
     let mut checked = 0;
-    let inputs = mapper_backends::virtual_lab::LabInputs::held(&boundary);
+    let inputs = mapper_backends::virtual_lab::LabInputs::constant(&boundary);
     let mut on_sample = |_: f64, _: &_, outputs: &mapper_physics::simulation::model::Outputs| {
         let to_metal_w = outputs.compressor_heat_w + outputs.turbine.heat_w;
         let to_oil_w =

@@ -1,4 +1,4 @@
-//! P3 follows its command more slowly.
+//! Lag of P3 behind its command.
 
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::TooManyExtraStates;
@@ -7,10 +7,10 @@ use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 use mapper_physics::rig::instruments::NOMINAL_P3_LAG_S;
 
 effect_parameters! {
-    /// P3 follows its command more slowly.
+    /// Lag of P3 behind its command.
     #[derive(Debug)]
     pub(crate) struct ActuatorLag {
-        /// Time constant of P3 after its command, s.
+        /// Time constant of the lag, s.
         lag_s = "actuator_lag" ["s"] 0.0 .. 10.0, neutral 0.3, step 0.7;
     }
 }

@@ -38,7 +38,7 @@ mod tests {
 
     #[test]
     fn only_metal_hotter_than_its_gas_has_another_convection() {
-        // The housing at 340 K is colder than the gas behind the wheel: nothing changes.
+        // The housing at 340 K is colder than the gas after the wheel: nothing changes.
         assert_eq!(
             Instant::with(DirectionalHtc { hot_metal_ratio: 0.65 }).outputs.t2_k,
             Instant::nominal().outputs.t2_k

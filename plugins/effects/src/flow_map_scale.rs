@@ -19,7 +19,7 @@ impl EffectKind for FlowMapScale {
         id: "flow_map_scale",
         name: "compressor flow",
         description: "the compressor delivers more or less flow at equal speed and pressure ratio",
-        equation: "m_corr = s m(N, PR), eta(N, m_corr): the efficiency is the map's at the flow that is delivered",
+        equation: "m_corr = s m(N, PR), eta(N, m_corr): the efficiency is that of the map at the delivered flow",
         source: "worn or fouled compressor, other trim",
         submodel: Submodel::CompressorFlow,
         also_shows_in: &[],

@@ -1,4 +1,4 @@
-//! All convection of the compressor housing is stronger or weaker.
+//! The convection of the compressor housing is stronger or weaker.
 
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::TooManyExtraStates;
@@ -6,7 +6,7 @@ use mapper_physics::rig::effect::{Rig, Submodel};
 use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 effect_parameters! {
-    /// All convection of the compressor housing is stronger or weaker.
+    /// The convection of the compressor housing is stronger or weaker.
     #[derive(Debug)]
     pub(crate) struct HtcScale {
         /// h over the correlation's.

@@ -18,7 +18,7 @@ impl EffectKind for Humidity {
     const ABOUT: EffectText = EffectText {
         id: "humidity",
         name: "moist air",
-        description: "the compressor breathes moist air",
+        description: "the compressor takes in moist air",
         equation: "R (1 + 0.6078 w), cp (1 + 0.84 w), flow times sqrt(287.05/R) on the compressor side",
         source: "mixture of ideal gases; cp of vapour 1850 J/(kg K)",
         submodel: Submodel::CompressorFlow,

@@ -1,4 +1,4 @@
-//! The heat transfer coefficient before the wheel differs from the one after it.
+//! The heat transfer coefficient before the wheel differs from that after it.
 
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::TooManyExtraStates;
@@ -6,7 +6,7 @@ use mapper_physics::rig::effect::{Rig, Submodel};
 use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
 
 effect_parameters! {
-    /// The heat transfer coefficient before the wheel differs from the one after it.
+    /// The heat transfer coefficient before the wheel differs from that after it.
     #[derive(Debug)]
     pub(crate) struct InletHtc {
         /// h before the wheel over that of the nominal model; Appendix A's 40 mm before 35 mm give 0.75.
@@ -18,7 +18,7 @@ impl EffectKind for InletHtc {
     const ABOUT: EffectText = EffectText {
         id: "inlet_htc",
         name: "convection before the wheel",
-        description: "convection before the wheel differs from that behind it, as in an inlet of another diameter; shows only where alpha_A is above 0",
+        description: "convection before the wheel differs from that after it, as in an inlet of another diameter; shows only where alpha_A is above 0",
         equation: "q1 = s h alpha_A A_c (T1 - Tc); by the law of the inlet's own diameter s is about (d_out/d_in)^(1 + b)",
         source: "Burke et al., section 5.2 and Appendix A (inlet diameter)",
         submodel: Submodel::CompressorGas,
@@ -47,7 +47,7 @@ mod tests {
         };
         let rise_k = |inlet_ratio: f64| at(0.2, inlet_ratio).t1_prime_k - T1_K;
         assert!((rise_k(0.75) / rise_k(1.0) - 0.75).abs() < 1e-9);
-        assert_eq!(at(0.2, 0.75).h_w_m2k, at(0.2, 1.0).h_w_m2k, "the reported h is that behind the wheel");
+        assert_eq!(at(0.2, 0.75).h_w_m2k, at(0.2, 1.0).h_w_m2k, "the reported h is that after the wheel");
         assert_eq!(at(0.0, 0.75), at(0.0, 1.0));
     }
 }

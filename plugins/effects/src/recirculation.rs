@@ -10,7 +10,7 @@ effect_parameters! {
     #[derive(Debug)]
     pub(crate) struct Recirculation {
         /// Recirculated share r of the delivered flow.
-        back_ratio = "recirculation" ["1"] 0.0 .. 0.3, neutral 0.0, step 0.03;
+        recirculation_ratio = "recirculation" ["1"] 0.0 .. 0.3, neutral 0.0, step 0.03;
     }
 }
 
@@ -18,7 +18,7 @@ impl EffectKind for Recirculation {
     const ABOUT: EffectText = EffectText {
         id: "recirculation",
         name: "recirculation",
-        description: "part of the flow comes back, hot, from behind the wheel to its inlet",
+        description: "part of the flow recirculates, hot, from the outlet of the wheel to its inlet",
         equation: "the wheel pumps (1 + r) m, the map's flow; T2' = T1' (1 + X)/(1 - r X), X = (PR^kappa - 1)/eta",
         source: "mixing balance of a ported shroud or backflow",
         submodel: Submodel::CompressorFlow,
@@ -26,7 +26,7 @@ impl EffectKind for Recirculation {
     };
 
     fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
-        rig.model.params.compressor.recirculation_ratio += self.back_ratio;
+        rig.model.params.compressor.recirculation_ratio += self.recirculation_ratio;
         Ok(())
     }
 }
@@ -41,7 +41,7 @@ mod tests {
     fn the_wheel_works_on_the_mixed_gas() {
         let r = 0.05;
         let (nominal, at) =
-            (Instant::nominal().outputs, Instant::with(Recirculation { back_ratio: r }).outputs);
+            (Instant::nominal().outputs, Instant::with(Recirculation { recirculation_ratio: r }).outputs);
         assert!((at.flow_kg_s * (1.0 + r) / nominal.flow_kg_s - 1.0).abs() < 1e-12);
         let mixed_k = (at.t1_prime_k + r * at.t2_prime_k) / (1.0 + r);
         let rise = nominal.t2_prime_k / nominal.t1_prime_k;

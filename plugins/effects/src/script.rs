@@ -1,4 +1,4 @@
-//! A candidate effect written in rhai: a header that names it, and functions for the hooks that it uses.
+//! A candidate effect in rhai: a header with its name and parameters, and functions for its hooks.
 //!
 //! A script computes with numbers only: arithmetic, comparison and mathematics, but no arrays, maps, files or clock. Its work
 //! is limited, so that it ends, with the same result on every machine.
@@ -20,7 +20,7 @@ use mapper_physics::rig::effect::{Effect, EffectError, EffectInfo, NamedValues, 
 use std::path::Path;
 use std::sync::Arc;
 
-/// Longest script, bytes.
+/// Maximum length of a script, bytes.
 const MAX_SCRIPT_BYTES: usize = 64 << 10;
 
 /// An effect defined by a script.
@@ -33,11 +33,11 @@ pub struct ScriptEffect {
 }
 
 impl ScriptEffect {
-    /// Reads a script; `path` names it in messages.
+    /// Reads a script; messages contain `path`.
     ///
     /// # Errors
     /// [`ScriptEffectError`] with the line: a header without id, submodel or parameter, a mistake in the script, or a script
-    /// that defines none of the hooks.
+    /// without hooks.
     pub fn new(text: &str, path: &Path) -> Result<Self, ScriptEffectError> {
         let fail = |line: Option<usize>, message: String| ScriptEffectError::new(path, text, line, message);
         if text.len() > MAX_SCRIPT_BYTES {
@@ -57,7 +57,7 @@ impl Effect for ScriptEffect {
     }
 
     fn prepare(&self, values: &NamedValues<'_>, rig: &mut Rig) -> Result<(), EffectError> {
-        // At neutral the effect is absent, regardless of rounding in the script.
+        // With neutral values the effect is absent, regardless of rounding in the script.
         if values.is_neutral() {
             return Ok(());
         }

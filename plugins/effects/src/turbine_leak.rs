@@ -19,7 +19,7 @@ impl EffectKind for TurbineLeak {
     const ABOUT: EffectText = EffectText {
         id: "turbine_leak",
         name: "leak past the turbine wheel",
-        description: "hot gas flows past the turbine wheel and mixes with the gas behind it",
+        description: "hot gas flows past the turbine wheel and mixes with the gas after it",
         equation: "the meter reads (1 + r) m_t; T4 = (T4,wheel + r T3)/(1 + r)",
         source: "mixing balance of a waste gate that does not close",
         submodel: Submodel::TurbineFlow,
@@ -48,7 +48,7 @@ mod tests {
     use crate::testing::Instant;
     use mapper_physics::rig::instruments::true_value;
 
-    /// The wheel's own flow and power stay; the enthalpy behind the mixing is that of both parts.
+    /// The wheel's own flow and power stay; the enthalpy after the mixing is that of both parts.
     #[test]
     fn the_meter_reads_both_parts_and_the_wheel_has_its_own() {
         let (nominal, at) = (Instant::nominal(), Instant::with(TurbineLeak { leak_ratio: 0.05 }));

@@ -1,7 +1,9 @@
 //! The fitted surface in the picture: lines, contours, surge and choke, and grey for extrapolation.
 
 use crate::labels::{percent, speed};
-use mapper_chart::efficiency_mesh::{SUBDIVISIONS, across, contour_levels, fitted_surface};
+use mapper_chart::efficiency_mesh::{
+    SUBDIVISIONS, contour_levels, fitted_surface, interpolate_between_lines,
+};
 use mapper_chart::{Contours, Dash, Line, LineEnd, Panel, Polygon, palette};
 use mapper_core::{
     CompressorMap, FittedLine, FittedMap, FittedNode, MapUnits, SpeedLine, confidence_interval_95,
@@ -136,7 +138,7 @@ fn add_shade(panel: &mut Panel, fitted: &FittedMap) {
         let over_speed = |value: fn(&FittedNode) -> f64| {
             let values: Vec<f64> =
                 fitted.lines.iter().map(|line| line.nodes.get(column).map_or(f64::NAN, value)).collect();
-            across(&speeds, &values)
+            interpolate_between_lines(&speeds, &values)
         };
         let (flow, ratio) = (over_speed(|n| n.flow_corrected_kg_s), over_speed(|n| n.pressure_ratio));
         (pair * SUBDIVISIONS..=(pair + 1) * SUBDIVISIONS).map(|i| (flow[i], ratio[i])).collect()

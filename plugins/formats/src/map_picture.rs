@@ -7,7 +7,7 @@
 use crate::fitted_items;
 use crate::heading::efficiency_name;
 use crate::labels::{percent, speed};
-use mapper_chart::efficiency_mesh::{contour_levels, efficiency_surface, ordered, speed_curve};
+use mapper_chart::efficiency_mesh::{contour_levels, efficiency_surface, points_surge_to_choke, speed_curve};
 use mapper_chart::{Axis, Contours, Figure, Line, LineEnd, Marker, Panel, Scatter, ScatterPoint, palette};
 use mapper_core::{CompressorMap, MapPoint, MapUnits, Method, SurgeMark, Verdict, confidence_interval_95};
 
@@ -108,7 +108,7 @@ fn efficiency_panel(map: &CompressorMap, units: &MapUnits) -> Panel {
     let last = map.lines.len().saturating_sub(1).max(1) as f64;
     for (index, line) in map.lines.iter().enumerate() {
         let colour = palette::sequential(index as f64 / last);
-        let points: Vec<(ScatterPoint, Verdict)> = ordered(map, line)
+        let points: Vec<(ScatterPoint, Verdict)> = points_surge_to_choke(map, line)
             .into_iter()
             .filter_map(|point| {
                 let p = &point.identified;

@@ -1,4 +1,4 @@
-//! The calibration register: whether the calibration of each sensor supports its readings.
+//! Checks that the calibration of each sensor supports its readings.
 
 use crate::campaign::Campaign;
 use crate::elements::rig::calibration::{Calibration, CalibrationRule, Date};
@@ -29,20 +29,19 @@ impl Campaign {
     ) -> Vec<CalibrationWarning> {
         let mut warnings = Vec::new();
         for (&channel, declaration) in &self.sensors {
-            let read = readings(channel);
+            let range = readings(channel);
             for (index, sensor, calibration) in declaration.calibrated(channel) {
-                let redundant = declaration.redundant.as_ref().and_then(|all| all.elements.get(index?));
+                let redundant =
+                    declaration.redundant.as_ref().and_then(|sensors| sensors.elements.get(index?));
                 let declared = redundant.map_or(declaration.declared, |element| element.declared);
                 let mut defects = Vec::new();
                 if self.calibration == CalibrationRule::Required {
                     let missing = first_missing_key(calibration).map(str::to_owned);
                     defects.extend(missing.map(|key| CalibrationDefect::Missing { key }));
                 }
-                defects.extend(
-                    calibration
-                        .into_iter()
-                        .flat_map(|one| find_contradictions(channel, one, day, read, &declared)),
-                );
+                defects.extend(calibration.into_iter().flat_map(|calibration| {
+                    find_contradictions(channel, calibration, day, range, &declared)
+                }));
                 let sensors = [Step::from("sensors"), Step::from(channel.symbol())].into_iter();
                 let at: Vec<Step> =
                     sensors.chain(index.map(Step::from)).chain([Step::from("calibration")]).collect();
@@ -64,14 +63,14 @@ fn first_missing_key(calibration: Option<&Calibration>) -> Option<&'static str> 
         ("due", calibration.due.is_some()),
         ("range", calibration.range.is_some()),
     ];
-    keys.into_iter().find(|(_, has)| !has).map(|(key, _)| key)
+    keys.into_iter().find(|(_, is_given)| !is_given).map(|(key, _)| key)
 }
 
 fn find_contradictions(
     channel: Channel,
     calibration: &Calibration,
     day: Option<Date>,
-    read: Option<(f64, f64)>,
+    readings: Option<(f64, f64)>,
     declared: &DeclaredUncertainty,
 ) -> Vec<CalibrationDefect> {
     let mut defects = Vec::new();
@@ -80,13 +79,13 @@ fn find_contradictions(
     {
         defects.push(CalibrationDefect::Expired { due: due.to_string(), day: day.to_string() });
     }
-    if let (Some((min, max)), Some((low, high))) = (calibration.range, read)
+    if let (Some((min, max)), Some((low, high))) = (calibration.range, readings)
         && (low < min || high > max)
     {
         let reading = if min - low > high - max { low } else { high };
         defects.push(CalibrationDefect::Range { reading, min, max });
     }
-    if let (Some(expanded), Some((_, high))) = (calibration.uncertainty, read) {
+    if let (Some(expanded), Some((_, high))) = (calibration.uncertainty, readings) {
         // k = 2, with a tolerance of a tenth for rounding.
         let certified = 0.5 * expanded;
         let zero = if channel.info().dimension == Dimension::Temperature { CALIBRATED_AT_K } else { 0.0 };
@@ -104,20 +103,26 @@ pub fn forecast_calibration_warnings(
     model: &Model,
     day: Option<Date>,
 ) -> Vec<CalibrationWarning> {
-    let declares = |channel: &Channel| {
-        let calibrations = campaign.sensors.get(channel).into_iter().flat_map(|one| &one.calibrations);
-        calibrations.flatten().any(|one| one.range.is_some() || one.uncertainty.is_some())
+    let needs_readings = |channel: &Channel| {
+        let calibrations = campaign.sensors.get(channel).into_iter().flat_map(|sensor| &sensor.calibrations);
+        calibrations
+            .flatten()
+            .any(|calibration| calibration.range.is_some() || calibration.uncertainty.is_some())
     };
     let mut forecast: BTreeMap<Channel, (f64, f64)> = BTreeMap::new();
-    let channels: Vec<Channel> = campaign.sensors.keys().copied().filter(declares).collect();
+    let channels: Vec<Channel> = campaign.sensors.keys().copied().filter(needs_readings).collect();
     let points = if channels.is_empty() { &[][..] } else { &campaign.points };
     for point in points {
-        let under =
+        let boundary =
             BoundaryConditions { valve_opening_ratio: point.valve_opening_ratio, ..campaign.boundary };
-        let Ok(held) = hold_speed(model, point.speed_rpm, &under, campaign.follow_outlet) else { continue };
-        let prepared = model.prepare(&held.boundary);
+        let Ok(steady) = hold_speed(model, point.speed_rpm, &boundary, campaign.follow_outlet) else {
+            continue;
+        };
+        let prepared = model.prepare(&steady.boundary);
         for channel in &channels {
-            let Some(value) = true_value(*channel, &prepared, &held.state, &held.outputs) else { continue };
+            let Some(value) = true_value(*channel, &prepared, &steady.state, &steady.outputs) else {
+                continue;
+            };
             let range = forecast.entry(*channel).or_insert((value, value));
             *range = (range.0.min(value), range.1.max(value));
         }

@@ -5,18 +5,18 @@ use mapper_yaml::Step;
 /// An unusual or impossible setting of a campaign.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Concern {
-    /// Whether the campaign cannot run; else it is a warning.
+    /// Whether it is an error, so that the campaign cannot run; otherwise a warning.
     pub is_error: bool,
-    /// The key it refers to.
+    /// The key, as a path.
     pub at: Vec<Step>,
-    /// What is wrong, with values and units.
+    /// Description, with values and units.
     pub message: String,
     /// The remedy.
     pub remedy: String,
 }
 
 impl Concern {
-    /// A warning at a key, by its path from the top.
+    /// A warning at the key with this path.
     pub fn warning(path: &[&str], message: String, remedy: String) -> Self {
         let at = path.iter().map(|key| Step::from(*key)).collect();
         Concern { is_error: false, at, message, remedy }

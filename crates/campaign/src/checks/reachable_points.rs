@@ -14,7 +14,7 @@ use std::sync::Arc;
 pub struct UnreachablePoint {
     /// Index in [`Campaign::points`].
     pub point: usize,
-    /// Why, with values and units.
+    /// Reason, with values and units.
     pub reason: String,
     /// The remedy.
     pub remedy: String,
@@ -35,7 +35,7 @@ pub fn nominal_model(campaign: &Campaign) -> Result<Model, NominalTableError> {
 
 /// The points that cannot be measured, each with all reasons; see [`mapper_physics::operating_point::reach`].
 pub fn unreachable_points(campaign: &Campaign, model: &Model) -> Vec<UnreachablePoint> {
-    let complaint = |(index, point): (usize, &OperatingPoint)| {
+    let check_point = |(index, point): (usize, &OperatingPoint)| {
         let (boundary, limits) = (&campaign.boundary, &campaign.limits);
         let obstacles = reach(model, *point, boundary, campaign.follow_outlet, limits).err()?;
         let (krpm, opening) = point.shown();
@@ -45,5 +45,5 @@ pub fn unreachable_points(campaign: &Campaign, model: &Model) -> Vec<Unreachable
             remedy: obstacles.first()?.remedy().to_owned(),
         })
     };
-    campaign.points.iter().enumerate().filter_map(complaint).collect()
+    campaign.points.iter().enumerate().filter_map(check_point).collect()
 }

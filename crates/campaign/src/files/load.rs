@@ -30,7 +30,7 @@ pub enum CampaignError {
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Cause.
         source: io::Error,
     },
     /// The file has mistakes.
@@ -70,10 +70,10 @@ pub fn check(
     })
 }
 
-/// As [`check`], with the caller's own criterion for reachable points.
+/// Like [`check`], with another criterion for reachable points.
 ///
 /// # Errors
-/// All mistakes of the text together; points are checked only if nothing else is wrong.
+/// All mistakes of the text; points are checked only if there are no others.
 pub fn check_with(
     text: &str,
     origin: &Path,
@@ -174,7 +174,7 @@ pub fn mistakes(text: &str, origin: &Path, concerns: Vec<Concern>) -> Findings {
     tree.findings(notes)
 }
 
-/// Files of other commands, by a key that only they have.
+/// Files of other commands, by a key that occurs only in them.
 const OTHER_FILES: [(&str, &str, &str); 2] = [
     ("nightly", "this file describes nightly runs, not a campaign", "use `mapper nightly FILE`"),
     (

@@ -13,7 +13,7 @@ static DOCUMENT: Document = Document { name: "nightly campaign", example: "campa
 const MAX_RUNS: usize = 10_000;
 const DEFAULT_NIGHTS: usize = 14;
 
-/// Errors of loading a nightly campaign.
+/// Error while loading a nightly campaign.
 #[derive(Debug, thiserror::Error)]
 pub enum NightlyError {
     /// The file cannot be read.
@@ -21,7 +21,7 @@ pub enum NightlyError {
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Cause.
         source: std::io::Error,
     },
     /// The file has mistakes.
@@ -36,7 +36,7 @@ pub struct Nightly {
     pub name: String,
     /// The history's file, relative to the working directory as written.
     pub history: PathBuf,
-    /// Nights that make the band, >= 1.
+    /// Number of nights in the band, >= 1.
     pub nights: usize,
     /// Campaigns with methods and seeds.
     pub groups: Vec<NightlyGroup>,
@@ -58,7 +58,7 @@ pub struct NightlyGroup {
 }
 
 impl NightlyGroup {
-    /// Number of runs; a table of machines counts as one machine, since it is not read here.
+    /// Number of runs; a table of machines counts as one machine, because it has not been read yet.
     pub fn runs(&self) -> usize {
         let machines = self.drawn_machines.unwrap_or(1);
         self.methods.len().max(1).saturating_mul(self.seeds.len().max(1)).saturating_mul(machines)
@@ -86,7 +86,7 @@ struct NightlyFile {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct BandFile {
-    /// Number of nights that make the band, a whole number from 1; 14 are usual.
+    /// Number of nights in the band, a whole number from 1; usually 14.
     #[schemars(range(min = 1), example = 14)]
     nights: usize,
 }
@@ -112,11 +112,11 @@ struct GroupFile {
     drawn_machines: Option<usize>,
 }
 
-/// Reads a nightly campaign. The campaigns it names are not read.
+/// Loads a nightly campaign, without the campaign files in it.
 ///
 /// # Errors
 /// [`NightlyError::Read`] if the file cannot be read; [`NightlyError::Mistakes`] if it has unknown or missing
-/// keys, or requests no run, the same run twice, or more than 10 000.
+/// keys, or requests no run, a campaign twice, or more than 10 000 runs.
 pub fn load_nightly(path: &Path) -> Result<Nightly, NightlyError> {
     let mistakes = |findings| NightlyError::Mistakes(Box::new(findings));
     let text = mapper_yaml::open(&DOCUMENT, path, MAX_FILE_BYTES)
@@ -129,20 +129,18 @@ fn check(text: &str, path: &Path) -> Result<Nightly, Findings> {
     let (tree, mut notes) = mapper_yaml::read(Source::new(&DOCUMENT, path, text))?;
     Schema::of::<NightlyFile>().check(&tree, &mut notes);
     if notes.is_empty() {
-        match tree.deserialise().map(|file| nightly(file, path.parent().unwrap_or(Path::new("")))) {
+        match tree.deserialise().map(|file| resolve(file, path.parent().unwrap_or(Path::new("")))) {
             Ok(Ok(nightly)) => return Ok(nightly),
-            Ok(Err(mistakes)) => {
-                for Mistake { steps, kind, message, remedy } in mistakes {
-                    notes.push(tree.finding(kind, &steps, message, remedy));
-                }
-            }
+            Ok(Err(mistakes)) => mistakes.into_iter().for_each(|Mistake { steps, kind, message, remedy }| {
+                notes.push(tree.finding(kind, &steps, message, remedy));
+            }),
             Err(finding) => notes.push(finding),
         }
     }
     Err(tree.findings(notes))
 }
 
-/// Checks beyond the schema.
+/// A mistake that the schema does not show.
 struct Mistake {
     steps: Vec<Step>,
     kind: FindingKind,
@@ -150,7 +148,8 @@ struct Mistake {
     remedy: &'static str,
 }
 
-fn nightly(file: NightlyFile, folder: &Path) -> Result<Nightly, Vec<Mistake>> {
+/// Resolves the paths, and checks the rules beyond the schema.
+fn resolve(file: NightlyFile, folder: &Path) -> Result<Nightly, Vec<Mistake>> {
     let mut mistakes = Vec::new();
     let mut campaigns = BTreeSet::new();
     for (index, group) in file.runs.iter().enumerate() {
@@ -166,8 +165,8 @@ fn nightly(file: NightlyFile, folder: &Path) -> Result<Nightly, Vec<Mistake>> {
             mistakes.push(Mistake {
                 steps: steps!["runs", index, "drawn_machines"].to_vec(),
                 kind: FindingKind::Range,
-                message: "the machines are given and drawn".to_owned(),
-                remedy: "keep `machines` or `drawn_machines`",
+                message: "`machines` and `drawn_machines` exclude each other".to_owned(),
+                remedy: "remove one of the two",
             });
         }
     }
@@ -187,7 +186,7 @@ fn nightly(file: NightlyFile, folder: &Path) -> Result<Nightly, Vec<Mistake>> {
         mistakes.push(Mistake {
             steps: steps!["runs"].to_vec(),
             kind: FindingKind::Range,
-            message: format!("it asks for {runs} runs; 1 to {MAX_RUNS} are allowed"),
+            message: format!("{runs} runs are requested; 1 to {MAX_RUNS} are allowed"),
             remedy: "name at least one campaign, and fewer methods or seeds if there are too many runs",
         });
     }

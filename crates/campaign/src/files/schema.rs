@@ -12,7 +12,7 @@ pub fn json_schema() -> Value {
     mapper_yaml::json_schema_of::<CampaignFile>()
 }
 
-/// The compiled schema for validation; made once.
+/// The schema, compiled once, for validation.
 pub(crate) static SCHEMA: LazyLock<Schema> = LazyLock::new(Schema::of::<CampaignFile>);
 
 #[cfg(test)]

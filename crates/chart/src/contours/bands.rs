@@ -4,13 +4,13 @@ use crate::StructuredGrid;
 use crate::contours::grid::Node;
 use crate::contours::marching::crossing;
 
-/// Polygons (x, y) that together cover where `low <= z < high`; neighbouring cells wholly inside are one polygon.
+/// Polygons (x, y) that together cover the area with `low <= z < high`; neighbouring cells inside it form one polygon.
 ///
-/// Rims are those of [`crate::contour_lines`], except inside a saddle cell, where they may differ within the cell.
+/// Their edges are those of [`crate::contour_lines`], except within saddle cells.
 pub(crate) fn band(grid: &StructuredGrid, low: f64, high: f64) -> Vec<Vec<(f64, f64)>> {
     let mut polygons = Vec::new();
     for row in 0..grid.rows().saturating_sub(1) {
-        // Corners below and above of the run of whole cells so far.
+        // Lower and upper corners of the current run of whole cells.
         let mut run: Vec<[Node; 2]> = Vec::new();
         for column in 0..grid.columns().saturating_sub(1) {
             let cell = grid.cell(row, column);
@@ -25,7 +25,7 @@ pub(crate) fn band(grid: &StructuredGrid, low: f64, high: f64) -> Vec<Vec<(f64, 
                     close_run(&mut run, &mut polygons);
                     if let Some(cell) = other {
                         for piece in pieces(&cell) {
-                            let inside = cut_below(&cut_above(&piece, high), low);
+                            let inside = cut(&cut(&piece, high, |z| z < high), low, |z| z >= low);
                             if inside.len() > 2 {
                                 polygons.push(inside.iter().map(|n| (n[0], n[1])).collect());
                             }
@@ -39,8 +39,8 @@ pub(crate) fn band(grid: &StructuredGrid, low: f64, high: f64) -> Vec<Vec<(f64, 
     polygons
 }
 
-/// The cell itself, or four triangles around its middle if it is a saddle: cut as a whole, a saddle's bands
-/// would overlap. The middle has the corners' mean, by which the contour lines read a saddle too.
+/// The cell itself, or four triangles around its middle if it is a saddle: otherwise the bands of a
+/// saddle would overlap. The middle has the mean of the corners, as for contour lines.
 fn pieces(cell: &[Node; 4]) -> Vec<Vec<Node>> {
     let [a, b, c, d] = cell.map(|node| node[2]);
     let saddle = a.min(c) > b.max(d) || b.min(d) > a.max(c);
@@ -59,17 +59,7 @@ fn close_run(run: &mut Vec<[Node; 2]>, polygons: &mut Vec<Vec<(f64, f64)>>) {
     }
 }
 
-/// Keeps the part with `z >= level`; infinite levels keep all or nothing.
-fn cut_below(polygon: &[Node], level: f64) -> Vec<Node> {
-    cut(polygon, level, |z| z >= level)
-}
-
-/// Keeps the part with `z < level`.
-fn cut_above(polygon: &[Node], level: f64) -> Vec<Node> {
-    cut(polygon, level, |z| z < level)
-}
-
-/// Sutherland-Hodgman against one level of z.
+/// Keeps the part of a polygon on one side of a level of z (Sutherland-Hodgman); infinite levels keep all or nothing.
 fn cut(polygon: &[Node], level: f64, keep: impl Fn(f64) -> bool) -> Vec<Node> {
     let mut out = Vec::with_capacity(polygon.len() + 2);
     for (i, node) in polygon.iter().enumerate() {

@@ -3,12 +3,12 @@
 use crate::palette::{BLUE, GREY};
 use crate::{Colour, StructuredGrid};
 
-/// A level with its text.
+/// A contour level with its label.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContourLevel {
-    /// Value, unit of the field.
+    /// Value, in the unit of the field.
     pub value: f64,
-    /// Text on the line; empty for none.
+    /// Label on the line; empty for none.
     pub label: String,
 }
 
@@ -21,14 +21,14 @@ pub struct Contours {
     pub levels: Vec<ContourLevel>,
     /// Colour of lines and texts.
     pub colour: Colour,
-    /// Shading between the levels: from white below the first towards this colour above the last.
+    /// Shading between the levels, from white below the first level to this colour above the last.
     pub shade: Option<Colour>,
     /// Entry in the legend.
     pub label: Option<String>,
 }
 
 impl Contours {
-    /// Contours at `levels` (unit of the field, any order; values that are not finite are left out), each labelled
+    /// Contours at `levels` (unit of the field, any order; values that are not finite are skipped), each labelled
     /// by `text`.
     pub fn new(grid: StructuredGrid, levels: &[f64], text: impl Fn(f64) -> String) -> Self {
         let mut values: Vec<f64> = levels.iter().copied().filter(|v| v.is_finite()).collect();

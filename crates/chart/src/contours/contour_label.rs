@@ -1,26 +1,26 @@
 //! Position of the text on a contour line.
 
-/// A place for a text on a line.
+/// Position and angle of a text on a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct LabelPlace {
     /// Middle of the text, px.
     pub centre: (f64, f64),
     /// Counter-clockwise turn, degrees, -90..90: never upside down.
     pub turn_deg: f64,
-    /// The stretch of the line the text covers, from its start, px.
+    /// The part of the line that the text covers, from the start of the line, px.
     pub gap: (f64, f64),
 }
 
-/// Finds the straightest stretch, away from `obstacles`, that holds a text `width_px` wide; `None` if the line is
-/// too short. Middles of texts already placed are obstacles too.
+/// Finds the straightest part of a line for a text `width_px` wide, away from `obstacles`; `None` if the line is
+/// too short. Placed texts are obstacles too.
 pub(crate) fn place(line: &[(f64, f64)], width_px: f64, obstacles: &[(f64, f64)]) -> Option<LabelPlace> {
-    let lengths = cumulative(line);
+    let lengths = cumulative_lengths(line);
     let total = *lengths.last()?;
     let half = 0.5 * width_px + 2.0;
     if !total.is_finite() || total < 2.0 * half + 16.0 {
         return None;
     }
-    // From the middle outwards, so that the middle wins if all else is equal.
+    // From the middle outwards, so that the middle wins a tie.
     const SHARES: [f64; 13] = [0.5, 0.44, 0.56, 0.38, 0.62, 0.32, 0.68, 0.26, 0.74, 0.2, 0.8, 0.14, 0.86];
     let mut best: Option<(f64, LabelPlace)> = None;
     for (rank, share) in SHARES.into_iter().enumerate() {
@@ -34,12 +34,12 @@ pub(crate) fn place(line: &[(f64, f64)], width_px: f64, obstacles: &[(f64, f64)]
             at(line, &lengths, middle + half),
         );
         let chord = (to.0 - from.0).hypot(to.1 - from.1);
-        let near =
+        let nearest =
             obstacles.iter().map(|o| (o.0 - centre.0).hypot(o.1 - centre.1)).fold(f64::INFINITY, f64::min);
         let bend = 1.0 - chord / (2.0 * half);
-        let crowding = ((half + 8.0 - near) / (half + 8.0)).max(0.0);
+        let crowding = ((half + 8.0 - nearest) / (half + 8.0)).max(0.0);
         let cost = 4.0 * bend + 2.0 * crowding + 0.01 * rank as f64;
-        // Paper's y points down.
+        // The y axis of the drawing points down.
         let mut turn_deg = -(to.1 - from.1).atan2(to.0 - from.0).to_degrees();
         if turn_deg > 90.0 {
             turn_deg -= 180.0;
@@ -53,9 +53,9 @@ pub(crate) fn place(line: &[(f64, f64)], width_px: f64, obstacles: &[(f64, f64)]
     best.map(|b| b.1)
 }
 
-/// The line without the stretch `gap`.
+/// The line without the part `gap`.
 pub(crate) fn without_gap(line: &[(f64, f64)], gap: (f64, f64)) -> [Vec<(f64, f64)>; 2] {
-    let lengths = cumulative(line);
+    let lengths = cumulative_lengths(line);
     let mut before: Vec<(f64, f64)> =
         line.iter().zip(&lengths).filter(|(_, s)| **s < gap.0).map(|(p, _)| *p).collect();
     before.push(at(line, &lengths, gap.0));
@@ -65,7 +65,7 @@ pub(crate) fn without_gap(line: &[(f64, f64)], gap: (f64, f64)) -> [Vec<(f64, f6
 }
 
 /// Length of the line up to each of its points.
-fn cumulative(line: &[(f64, f64)]) -> Vec<f64> {
+fn cumulative_lengths(line: &[(f64, f64)]) -> Vec<f64> {
     let mut sum = 0.0;
     let mut out = Vec::with_capacity(line.len());
     for (i, p) in line.iter().enumerate() {
@@ -77,7 +77,7 @@ fn cumulative(line: &[(f64, f64)]) -> Vec<f64> {
     out
 }
 
-/// The point at a length along the line; its ends beyond them. The line is not empty.
+/// The point at a length along the line, limited to its ends. The line is not empty.
 fn at(line: &[(f64, f64)], lengths: &[f64], length: f64) -> (f64, f64) {
     let next = lengths.partition_point(|s| *s < length);
     if next == 0 {

@@ -1,9 +1,9 @@
-//! A field on a structured grid whose nodes may lie anywhere.
+//! A field on a structured grid with nodes at any coordinates.
 
 /// `rows * columns` nodes with coordinates and a value each, row after row; node (r, c) is at `r * columns + c`.
 ///
 /// Neighbours in (r, c) are corners of a cell; the coordinates are free, so speed lines of a map make rows.
-/// A node whose value or coordinate is NaN or infinite is unknown, and so are the cells it touches.
+/// A node with a NaN or infinite value or coordinate is unknown, and so are its cells.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StructuredGrid {
     rows: usize,
@@ -13,17 +13,17 @@ pub struct StructuredGrid {
     z: Vec<f64>,
 }
 
-/// Why a grid cannot be made.
+/// Reason why a grid cannot be made.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum GridError {
-    /// A column of numbers has the wrong length.
+    /// Coordinates or values have the wrong length.
     #[error(
         "a grid of {rows} rows and {columns} columns needs rows * columns values each; x has {x}, y {y}, z {z}"
     )]
     Length {
-        /// Rows asked for.
+        /// Requested number of rows.
         rows: usize,
-        /// Columns asked for.
+        /// Requested number of columns.
         columns: usize,
         /// Number of x values.
         x: usize,
@@ -49,8 +49,8 @@ impl StructuredGrid {
         y: Vec<f64>,
         z: Vec<f64>,
     ) -> Result<Self, GridError> {
-        let wanted = rows.checked_mul(columns);
-        if [x.len(), y.len(), z.len()].iter().any(|len| Some(*len) != wanted) {
+        let expected = rows.checked_mul(columns);
+        if [x.len(), y.len(), z.len()].iter().any(|len| Some(*len) != expected) {
             return Err(GridError::Length { rows, columns, x: x.len(), y: y.len(), z: z.len() });
         }
         Ok(StructuredGrid { rows, columns, x, y, z })
@@ -78,7 +78,7 @@ impl StructuredGrid {
         self.columns
     }
 
-    /// Node coordinates and value, `None` outside the grid or where the node is unknown.
+    /// Coordinates and value of a node; `None` if it is unknown or outside the grid.
     pub fn node(&self, row: usize, column: usize) -> Option<[f64; 3]> {
         if row >= self.rows || column >= self.columns {
             return None;

@@ -1,8 +1,8 @@
 //! Contour lines by marching squares with support for missing values.
 //!
-//! Source: W. E. Lorensen, H. E. Cline, "Marching cubes", SIGGRAPH 1987, in two dimensions; the two readings of a
+//! Source: W. E. Lorensen, H. E. Cline, "Marching cubes", SIGGRAPH 1987, in two dimensions; the two interpretations of a
 //! saddle are distinguished by the mean of the four corners. A crossing is found on each cell edge by linear
-//! interpolation, so on a plane field every point of a contour lies on one straight line whatever the grid's shape.
+//! interpolation, so the contours of a plane field are straight on any grid.
 
 use crate::StructuredGrid;
 use crate::contours::grid::Node;
@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 /// The lines on which the field equals `level` (unit of z), as chains of (x, y) in the axes' units.
 ///
 /// Cells with an unknown corner have no part of a line. A closed line repeats its first point at the end. A field
-/// equal to `level` over an area has no line there but at its lower rim. Empty for a `level` that is not finite.
+/// equal to `level` over an area has a line only at the lower edge of the area. Empty for a `level` that is not finite.
 pub fn contour_lines(grid: &StructuredGrid, level: f64) -> Vec<Vec<(f64, f64)>> {
     if !level.is_finite() {
         return Vec::new();
@@ -37,7 +37,7 @@ pub fn contour_lines(grid: &StructuredGrid, level: f64) -> Vec<Vec<(f64, f64)>> 
         .collect()
 }
 
-/// Number of a grid edge: from node (row, column) to the right (0) or up (1).
+/// Index of a grid edge: from node (row, column) to the right (0) or up (1).
 fn edge_id(grid: &StructuredGrid, row: usize, column: usize, up: usize) -> usize {
     2 * (row * grid.columns() + column) + up
 }
@@ -51,8 +51,8 @@ fn cell_segments(
     segments: &mut Vec<[usize; 2]>,
 ) {
     let above = cell.map(|node| node[2] >= level);
-    // Edges in order around the cell, each with its corners named in the grid's order, so that two cells find
-    // the very same point on the edge they share.
+    // Edges in order around the cell, each with its corners in the order of the grid, so that two cells have the same
+    // point on a common edge.
     let edges = [
         (edge_id(grid, row, column, 0), 0, 1),
         (edge_id(grid, row, column + 1, 1), 1, 2),

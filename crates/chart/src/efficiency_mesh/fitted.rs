@@ -1,11 +1,11 @@
 //! The mesh of a fitted map.
 
-use super::surface::across;
+use super::surface::interpolate_between_lines;
 use crate::StructuredGrid;
 use mapper_core::{FittedMap, FittedNode};
 
 /// Efficiency (fraction) over corrected flow (x, kg/s) and pressure ratio (y) on the supported part of a fitted map, finer in
-/// speed than its lines; NaN where the fit is extrapolated. `None` for fewer than two lines.
+/// speed than its lines; NaN in extrapolated parts. `None` for fewer than two lines.
 pub fn fitted_surface(fitted: &FittedMap) -> Option<StructuredGrid> {
     let speeds: Vec<f64> = fitted.lines.iter().map(|line| line.speed_corrected_rpm).collect();
     let columns = fitted.beta_ratio.len();
@@ -22,11 +22,11 @@ pub fn fitted_surface(fitted: &FittedMap) -> Option<StructuredGrid> {
         for (field, value) in fields.iter_mut().zip(values) {
             let over_speed: Vec<f64> =
                 fitted.lines.iter().map(|line| line.nodes.get(column).map_or(f64::NAN, value)).collect();
-            field.push(across(&speeds, &over_speed));
+            field.push(interpolate_between_lines(&speeds, &over_speed));
         }
     }
     let rows = fields[0].first()?.len();
-    // Column by column as made; the grid wants row by row.
+    // The values are computed by columns, but the grid is stored by rows.
     let flat =
         |field: &Vec<Vec<f64>>| (0..rows).flat_map(|r| field.iter().map(move |c| c[r])).collect::<Vec<f64>>();
     StructuredGrid::new(rows, columns, flat(&fields[0]), flat(&fields[1]), flat(&fields[2])).ok()

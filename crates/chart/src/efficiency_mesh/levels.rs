@@ -2,7 +2,7 @@
 
 use crate::nice_ticks;
 
-/// Round levels (fractions): finer towards the best efficiency, where the map is flat.
+/// Round levels (fractions), finer near the best efficiency, where the map is flat.
 pub fn contour_levels(range: Option<(f64, f64)>) -> Vec<f64> {
     let Some((low, high)) = range else { return Vec::new() };
     let (low, high) = (low.max(0.0), high.min(1.5));

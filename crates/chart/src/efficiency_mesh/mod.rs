@@ -8,4 +8,6 @@ mod surface;
 
 pub use fitted::fitted_surface;
 pub use levels::contour_levels;
-pub use surface::{SUBDIVISIONS, across, efficiency_surface, ordered, speed_curve};
+pub use surface::{
+    SUBDIVISIONS, efficiency_surface, interpolate_between_lines, points_surge_to_choke, speed_curve,
+};

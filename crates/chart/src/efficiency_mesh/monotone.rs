@@ -1,4 +1,4 @@
-//! Cubic interpolation that keeps monotone data monotone: it never goes beyond two neighbouring values.
+//! Monotone cubic interpolation: it stays between neighbouring values.
 //!
 //! Source: F. N. Fritsch, J. Butland, "A method for constructing local monotone piecewise cubic interpolants",
 //! SIAM J. Sci. Stat. Comput. 5 (1984) 300-304; the harmonic mean of neighbouring slopes, one-sided ends.
@@ -11,7 +11,7 @@ pub(crate) struct Monotone<'a> {
 }
 
 impl<'a> Monotone<'a> {
-    /// `x` strictly rising and as long as `y`; `None` for fewer than two points or anything else.
+    /// `None` for fewer than two points, or if `x` does not rise strictly or is not as long as `y`.
     pub(crate) fn new(x: &'a [f64], y: &'a [f64]) -> Option<Self> {
         if x.len() < 2 || x.len() != y.len() || !x.windows(2).all(|w| w[1] > w[0]) {
             return None;

@@ -1,14 +1,14 @@
-//! Efficiency between the measured points, used only for pictures and only inside the measured region.
+//! Efficiency between the measured points, only for pictures and only inside the measured region.
 //!
 //! Each speed line is a row of a structured grid. Along a line the position runs from 0 at its surge-side point to 1
 //! at its choke-side point, by length on the map with both axes scaled to the map's spans; flow, pressure ratio and
-//! efficiency are monotone cubics of it. Between lines the same three, at equal position, are monotone cubics of
-//! corrected speed. A monotone cubic never leaves the range of the two values it joins, so the picture shows no
-//! efficiency better than the best measured nor worse than the worst.
+//! efficiency are monotone cubics of it. Between lines, at equal position, the same three quantities are monotone
+//! cubics of corrected speed. A monotone cubic stays within the range of the values that it joins, so the picture shows no
+//! efficiency outside the measured range.
 //!
-//! NaN (no support): before the first and after the last point of a line that has an efficiency, and between two lines wherever one of them
-//! has none. A point without efficiency between two with one is bridged. Lines with fewer than two distinct points are not used. Points
-//! closer than 1 % of the map's diagonal (repeats) count as one, their mean.
+//! The efficiency is NaN before the first and after the last point of a line with an efficiency, and between two lines at positions where
+//! one of them is NaN. Points without an efficiency between others are bridged. Lines with fewer than two distinct points are not used.
+//! Points closer than 1 % of the map's diagonal (repeats) are replaced by their mean.
 
 use super::monotone::Monotone;
 use crate::StructuredGrid;
@@ -18,15 +18,15 @@ use mapper_core::{CompressorMap, MapPoint, SpeedLine};
 const COLUMNS: usize = 49;
 /// Rows of the mesh from one line to the next.
 pub const SUBDIVISIONS: usize = 8;
-/// Distance below which points count as one, share of the map's diagonal.
-const SAME_PLACE: f64 = 0.01;
+/// Distance below which points are merged, as a fraction of the map's diagonal.
+const MERGE_DISTANCE: f64 = 0.01;
 
 /// Efficiency (fraction) over corrected flow (x, kg/s) and pressure ratio (y) inside the measured region, as
-/// described in the source of this module; NaN where not supported. `None` where fewer than two lines can take part.
+/// described in the source of this module; NaN outside it. `None` if fewer than two lines can be used.
 pub fn efficiency_surface(map: &CompressorMap) -> Option<StructuredGrid> {
     let spans = spans(map)?;
     let mut rows: Vec<Row> = map.lines.iter().filter_map(|line| row(line, spans)).collect();
-    // Speeds must rise strictly; of two lines at one speed the first is taken.
+    // Speeds must rise strictly; the first of two lines with equal speed is used.
     rows.dedup_by(|b, a| b.speed_corrected_rpm <= a.speed_corrected_rpm);
     if rows.len() < 2 {
         return None;
@@ -37,7 +37,7 @@ pub fn efficiency_surface(map: &CompressorMap) -> Option<StructuredGrid> {
     for column in 0..COLUMNS {
         let pick = |field: usize| rows.iter().map(|row| row.nodes[column][field]).collect::<Vec<f64>>();
         for (field, out) in [&mut x, &mut y, &mut z].into_iter().enumerate() {
-            for (r, value) in across(&speeds, &pick(field)).into_iter().enumerate() {
+            for (r, value) in interpolate_between_lines(&speeds, &pick(field)).into_iter().enumerate() {
                 out[r * COLUMNS + column] = value;
             }
         }
@@ -45,7 +45,7 @@ pub fn efficiency_surface(map: &CompressorMap) -> Option<StructuredGrid> {
     StructuredGrid::new(row_count, COLUMNS, x, y, z).ok()
 }
 
-/// A speed line resampled: flow, pressure ratio, efficiency at equal steps of position.
+/// A resampled speed line: flow, pressure ratio and efficiency at equal steps of position.
 struct Row {
     speed_corrected_rpm: f64,
     nodes: Vec<[f64; 3]>,
@@ -61,8 +61,8 @@ fn spans(map: &CompressorMap) -> Option<(f64, f64)> {
     Some((span(|p| p.flow_corrected_kg_s)?, span(|p| p.pressure_ratio)?))
 }
 
-/// The line's points from surge to choke side, by flow and falling pressure ratio together, so that noise does not
-/// shuffle points on the steep part at choke or the flat part at surge.
+/// Sorts the points of a line from surge to choke by flow minus pressure ratio, so that noise does not change the order of
+/// points on the steep part at choke or on the flat part at surge.
 pub fn surge_to_choke(line: &SpeedLine, (flow_span, ratio_span): (f64, f64)) -> Vec<&MapPoint> {
     let mut points: Vec<&MapPoint> = line.points.iter().collect();
     let key = |p: &MapPoint| p.flow_corrected_kg_s / flow_span - p.pressure_ratio / ratio_span;
@@ -70,22 +70,25 @@ pub fn surge_to_choke(line: &SpeedLine, (flow_span, ratio_span): (f64, f64)) -> 
     points
 }
 
-/// The points of a line from surge to choke side, by flow and falling pressure ratio together in shares of the map's spans.
-pub fn ordered<'a>(map: &CompressorMap, line: &'a SpeedLine) -> Vec<&'a MapPoint> {
+/// Sorts the points of a line from surge to choke; see [`surge_to_choke`].
+pub fn points_surge_to_choke<'a>(map: &CompressorMap, line: &'a SpeedLine) -> Vec<&'a MapPoint> {
     surge_to_choke(line, spans(map).unwrap_or((1.0, 1.0)))
 }
 
-/// The speed line as drawn: (corrected flow, kg/s; pressure ratio) from surge to choke side, the surface's own edge.
+/// The curve of a speed line for drawing: (corrected flow, kg/s; pressure ratio) from surge to choke side, on the surface.
 ///
-/// For a line that is not used in the surface, the measured points are returned.
+/// If the surface does not use the line, the curve consists of the measured points.
 pub fn speed_curve(map: &CompressorMap, line: &SpeedLine) -> Vec<(f64, f64)> {
     match spans(map).and_then(|spans| row(line, spans)) {
         Some(row) => row.nodes.iter().map(|node| (node[0], node[1])).collect(),
-        None => ordered(map, line).iter().map(|p| (p.flow_corrected_kg_s, p.pressure_ratio)).collect(),
+        None => points_surge_to_choke(map, line)
+            .iter()
+            .map(|p| (p.flow_corrected_kg_s, p.pressure_ratio))
+            .collect(),
     }
 }
 
-/// Mean of points that stand at one place.
+/// Mean of merged points.
 struct Place {
     flow: f64,
     ratio: f64,
@@ -105,7 +108,7 @@ fn row(line: &SpeedLine, spans: (f64, f64)) -> Option<Row> {
     let ratios: Vec<f64> = places.iter().map(|p| p.ratio).collect();
     let (eta_positions, etas): (Vec<f64>, Vec<f64>) =
         places.iter().zip(&position).filter_map(|(p, s)| p.eta.map(|eta| (*s, eta))).unzip();
-    // No place, one place, or all in one: no interpolant, and the line takes no part.
+    // Fewer than two places have no interpolant; the line is then not used.
     let (flow, ratio) = (Monotone::new(&position, &flows)?, Monotone::new(&position, &ratios)?);
     let eta = Monotone::new(&eta_positions, &etas);
     let nodes = (0..COLUMNS)
@@ -119,14 +122,14 @@ fn row(line: &SpeedLine, spans: (f64, f64)) -> Option<Row> {
 
 fn places(line: &SpeedLine, spans: (f64, f64)) -> Vec<Place> {
     let points = surge_to_choke(line, spans);
-    let known =
+    let finite =
         points.into_iter().filter(|p| p.flow_corrected_kg_s.is_finite() && p.pressure_ratio.is_finite());
     let mut clusters: Vec<Vec<&MapPoint>> = Vec::new();
-    for point in known {
+    for point in finite {
         let near = |other: &&MapPoint| {
             let flow = (point.flow_corrected_kg_s - other.flow_corrected_kg_s) / spans.0;
             let ratio = (point.pressure_ratio - other.pressure_ratio) / spans.1;
-            flow.hypot(ratio) < SAME_PLACE * std::f64::consts::SQRT_2
+            flow.hypot(ratio) < MERGE_DISTANCE * std::f64::consts::SQRT_2
         };
         match clusters.last_mut() {
             Some(cluster) if cluster.first().is_some_and(near) => cluster.push(point),
@@ -149,8 +152,8 @@ fn places(line: &SpeedLine, spans: (f64, f64)) -> Vec<Place> {
         .collect()
 }
 
-/// Values between lines, `SUBDIVISIONS` a gap; NaN in every gap with an unknown end.
-pub fn across(speeds: &[f64], values: &[f64]) -> Vec<f64> {
+/// Interpolates between lines, with `SUBDIVISIONS` values per gap; NaN in gaps with an unknown end.
+pub fn interpolate_between_lines(speeds: &[f64], values: &[f64]) -> Vec<f64> {
     let mut out = vec![f64::NAN; (speeds.len() - 1) * SUBDIVISIONS + 1];
     let mut start = 0;
     while start < values.len() {

@@ -1,17 +1,17 @@
-//! An axis as the caller describes it.
+//! Settings of an axis.
 
-/// Title with unit, and the range if it does not follow the data.
+/// Settings of an axis; without a range it follows the data.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Axis {
-    /// Title; say the unit in it, e.g. `corrected mass flow, kg/s`.
+    /// Title with the unit, e.g. `corrected mass flow, kg/s`.
     pub title: String,
     /// Lower end, in the axis' unit; `None` follows the data.
     pub low: Option<f64>,
     /// Upper end, in the axis' unit; `None` follows the data.
     pub high: Option<f64>,
-    /// Factor from the drawn values to the numbers at the axis, if the title has another unit; `None` for 1.
+    /// Factor from the values of the data to the numbers of the tick labels, if the title has another unit; `None` for 1.
     pub written_times: Option<f64>,
-    /// Ticks with their labels instead of round numbers, e.g. names of cases.
+    /// Ticks with labels, instead of round numbers, e.g. names of cases.
     pub ticks: Option<Vec<(f64, String)>>,
 }
 
@@ -27,19 +27,19 @@ impl Axis {
         self
     }
 
-    /// Fixes the lower end alone, in the axis' unit.
+    /// Fixes the lower end only, in the axis' unit.
     pub fn from(mut self, low: f64) -> Self {
         self.low = Some(low);
         self
     }
 
-    /// Writes values times `factor` at the axis. One that is not above 0 and finite counts as 1.
+    /// Multiplies the numbers of the tick labels by `factor`. A factor that is not positive and finite counts as 1.
     pub fn written_times(mut self, factor: f64) -> Self {
         self.written_times = Some(factor);
         self
     }
 
-    /// Sets ticks by hand.
+    /// Sets the ticks with their labels.
     pub fn ticks(mut self, ticks: Vec<(f64, String)>) -> Self {
         self.ticks = Some(ticks);
         self

@@ -1,4 +1,4 @@
-//! Clips lines and areas at a rectangle, so that the picture does not depend on clipping by the viewer.
+//! Clips lines and areas to a rectangle, so that the picture does not depend on the viewer.
 
 /// An axis-parallel rectangle, px: left, top, right, bottom.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -11,7 +11,7 @@ pub(crate) struct Rect {
 
 impl Rect {
     pub(crate) fn contains(&self, (x, y): (f64, f64)) -> bool {
-        // Half a hundredth of a pixel: what rounding can add.
+        // Rounding to hundredths of a pixel.
         let slack = 0.005;
         x >= self.left - slack && x <= self.right + slack && y >= self.top - slack && y <= self.bottom + slack
     }
@@ -59,7 +59,7 @@ fn segment(a: (f64, f64), b: (f64, f64), rect: &Rect) -> Option<((f64, f64), (f6
         .then(|| (if enter > 0.0 { at(enter) } else { a }, if leave < 1.0 { at(leave) } else { b }))
 }
 
-/// The pieces of a chain of points inside the rectangle; a point that is not finite breaks the chain.
+/// The pieces of a polyline inside the rectangle; a point that is not finite splits it.
 pub(crate) fn polyline(points: &[(f64, f64)], rect: &Rect) -> Vec<Vec<(f64, f64)>> {
     let mut pieces: Vec<Vec<(f64, f64)>> = Vec::new();
     let mut joined = false;
@@ -79,7 +79,7 @@ pub(crate) fn polyline(points: &[(f64, f64)], rect: &Rect) -> Vec<Vec<(f64, f64)
     pieces
 }
 
-/// The part of a polygon inside the rectangle (Sutherland-Hodgman); points that are not finite are left out.
+/// The part of a polygon inside the rectangle (Sutherland-Hodgman); points that are not finite are skipped.
 pub(crate) fn polygon(points: &[(f64, f64)], rect: &Rect) -> Vec<(f64, f64)> {
     let mut shape: Vec<(f64, f64)> =
         points.iter().copied().filter(|p| p.0.is_finite() && p.1.is_finite()).collect();

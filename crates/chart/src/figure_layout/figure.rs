@@ -23,7 +23,7 @@ pub struct Panel {
     pub x: Axis,
     /// Vertical axis.
     pub y: Axis,
-    /// What is shown, in drawing order.
+    /// Contents, in drawing order.
     pub items: Vec<Item>,
     /// Position of the legend.
     pub legend: LegendPlace,
@@ -64,7 +64,7 @@ impl Panel {
 pub struct Figure {
     /// Title.
     pub title: String,
-    /// Lines below the title, smaller; each is wrapped if it is too long.
+    /// Smaller lines below the title; long ones are wrapped.
     pub subtitles: Vec<String>,
     /// Panels, row after row.
     pub panels: Vec<Panel>,

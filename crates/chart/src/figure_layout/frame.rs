@@ -1,11 +1,11 @@
 //! Conversion from the units of the axes to px.
 
 use crate::figure_layout::clip::Rect;
-use crate::figure_layout::ticks::{labels, nice_ticks, usable_range};
+use crate::figure_layout::ticks::{labels, nice_ticks, valid_range};
 use crate::items::{Item, RuleAt, Scatter};
 use crate::{Axis, Panel};
 
-/// One axis, settled: range and ticks.
+/// An axis with its final range and ticks.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Scale {
     pub low: f64,
@@ -14,10 +14,10 @@ pub(crate) struct Scale {
 }
 
 impl Scale {
-    /// Share of the axis at a value, 0 at its low end, 1 at its high end; NaN for a value that is not finite.
+    /// Position of a value on the axis, 0 at the low end, 1 at the high end; NaN for a value that is not finite.
     ///
     /// Values are limited to a million times the axis length, so that clipping at the frame keeps its precision.
-    fn share(&self, value: f64) -> f64 {
+    fn position(&self, value: f64) -> f64 {
         if value.is_finite() {
             ((value - self.low) / (self.high - self.low)).clamp(-1e6, 1e6)
         } else {
@@ -37,8 +37,8 @@ pub(crate) struct Frame {
 impl Frame {
     pub(crate) fn px(&self, (x, y): (f64, f64)) -> (f64, f64) {
         (
-            self.rect.left + self.x.share(x) * self.rect.width(),
-            self.rect.bottom - self.y.share(y) * self.rect.height(),
+            self.rect.left + self.x.position(x) * self.rect.width(),
+            self.rect.bottom - self.y.position(y) * self.rect.height(),
         )
     }
 }
@@ -65,8 +65,8 @@ impl Extent {
     }
 }
 
-/// Scales of a panel, `width_px` by `height_px` large.
-pub(crate) fn scales(panel: &Panel, width_px: f64, height_px: f64) -> (Scale, Scale) {
+/// Determines the scales of a panel of `width_px` by `height_px`.
+pub(crate) fn fit_scales(panel: &Panel, width_px: f64, height_px: f64) -> (Scale, Scale) {
     let (mut x, mut y) = (Extent::NONE, Extent::NONE);
     for item in &panel.items {
         let mut add = |(px, py): (f64, f64)| {
@@ -98,10 +98,10 @@ pub(crate) fn scales(panel: &Panel, width_px: f64, height_px: f64) -> (Scale, Sc
         widen(&mut x, points_x, scatter, |p| p.x_interval);
         widen(&mut y, points_y, scatter, |p| p.y_interval);
     }
-    (scale(&panel.x, x, (width_px / 75.0) as usize), scale(&panel.y, y, (height_px / 48.0) as usize))
+    (fit_scale(&panel.x, x, (width_px / 75.0) as usize), fit_scale(&panel.y, y, (height_px / 48.0) as usize))
 }
 
-/// Makes room for error bars, up to half the span of the points on each side, so that one very uncertain point does not compress all
+/// Extends the range for error bars, up to half the span of the points on each side, so that one very uncertain point does not compress all
 /// others.
 fn widen(
     extent: &mut Extent,
@@ -123,20 +123,20 @@ fn widen(
     }
 }
 
-fn scale(axis: &Axis, data: Extent, target: usize) -> Scale {
+fn fit_scale(axis: &Axis, data: Extent, target: usize) -> Scale {
     let fixed = |end: Option<f64>| end.filter(|v| v.is_finite());
     let (low, high) = (fixed(axis.low), fixed(axis.high));
     let (low, high) = if data.is_none() {
         match (low, high) {
-            (Some(low), Some(high)) => usable_range(low, high),
-            (Some(low), None) => usable_range(low, low + 1.0),
-            (None, Some(high)) => usable_range(high - 1.0, high),
+            (Some(low), Some(high)) => valid_range(low, high),
+            (Some(low), None) => valid_range(low, low + 1.0),
+            (None, Some(high)) => valid_range(high - 1.0, high),
             (None, None) => (0.0, 1.0),
         }
     } else {
-        let (data_low, data_high) = usable_range(data.low, data.high);
+        let (data_low, data_high) = valid_range(data.low, data.high);
         let padding = 0.05 * (data_high - data_low);
-        usable_range(low.unwrap_or(data_low - padding), high.unwrap_or(data_high + padding))
+        valid_range(low.unwrap_or(data_low - padding), high.unwrap_or(data_high + padding))
     };
     let ticks = match &axis.ticks {
         Some(ticks) => ticks.iter().filter(|t| t.0 >= low && t.0 <= high).cloned().collect(),

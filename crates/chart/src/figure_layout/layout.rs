@@ -1,7 +1,7 @@
 //! Positions of all parts of a figure.
 
 use crate::figure_layout::clip::Rect;
-use crate::figure_layout::frame::{Frame, scales};
+use crate::figure_layout::frame::{Frame, fit_scales};
 use crate::figure_layout::legend::{Entry, ROW_PX, entries, flow};
 use crate::text::{width_px, wrap};
 use crate::{Figure, LegendPlace, Panel};
@@ -15,7 +15,7 @@ pub(crate) const MARGIN_PX: f64 = 16.0;
 /// Ticks, their labels and the axis title below a drawing area.
 const BELOW_PX: f64 = 54.0;
 
-/// A panel with its place.
+/// A panel with the positions of its parts.
 pub(crate) struct PlacedPanel<'a> {
     pub panel: &'a Panel,
     pub frame: Frame,
@@ -24,7 +24,7 @@ pub(crate) struct PlacedPanel<'a> {
     pub legend_origin: (f64, f64),
 }
 
-/// The whole sheet.
+/// The whole figure with the positions of its parts.
 pub(crate) struct Sheet<'a> {
     pub width: f64,
     pub height: f64,
@@ -38,11 +38,11 @@ pub(crate) fn layout(figure: &Figure) -> Sheet<'_> {
     let (width, height) = (size(figure.panel_width_px, 520.0), size(figure.panel_height_px, 400.0));
     let columns = figure.columns.clamp(1, figure.panels.len().max(1));
 
-    let settled: Vec<_> = figure
+    let measured: Vec<_> = figure
         .panels
         .iter()
         .map(|panel| {
-            let (x, y) = scales(panel, width, height);
+            let (x, y) = fit_scales(panel, width, height);
             let entries = if panel.legend == LegendPlace::None { Vec::new() } else { entries(panel) };
             let tick_width = y.ticks.iter().map(|t| width_px(&t.1, TICK_PX)).fold(0.0, f64::max);
             let left = 10.0 + tick_width + if panel.y.title.is_empty() { 0.0 } else { 10.0 + AXIS_TITLE_PX };
@@ -54,12 +54,12 @@ pub(crate) fn layout(figure: &Figure) -> Sheet<'_> {
         })
         .collect();
 
-    // One width for all panels of a column keeps frames aligned.
-    let column_room = |column: usize, part: &dyn Fn(usize) -> f64| {
-        (column..settled.len()).step_by(columns).map(part).fold(0.0, f64::max)
+    // Equal widths in a column keep the frames aligned.
+    let max_in_column = |column: usize, part: &dyn Fn(usize) -> f64| {
+        (column..measured.len()).step_by(columns).map(part).fold(0.0, f64::max)
     };
-    let lefts: Vec<f64> = (0..columns).map(|c| column_room(c, &|i| settled[i].4)).collect();
-    let rights: Vec<f64> = (0..columns).map(|c| column_room(c, &|i| settled[i].5)).collect();
+    let lefts: Vec<f64> = (0..columns).map(|c| max_in_column(c, &|i| measured[i].4)).collect();
+    let rights: Vec<f64> = (0..columns).map(|c| max_in_column(c, &|i| measured[i].5)).collect();
     let sheet_width = 2.0 * MARGIN_PX
         + lefts.iter().zip(&rights).map(|(left, right)| left + width + right).sum::<f64>()
         + 18.0 * (columns - 1) as f64;
@@ -70,8 +70,8 @@ pub(crate) fn layout(figure: &Figure) -> Sheet<'_> {
         figure.subtitles.iter().flat_map(|line| wrap(line, SUBTITLE_PX, text_width)).collect();
     let mut top = MARGIN_PX + 24.0 * title.len() as f64 + 18.0 * subtitle.len() as f64 + 8.0;
 
-    let mut panels = Vec::with_capacity(settled.len());
-    let mut rows = settled.into_iter().peekable();
+    let mut panels = Vec::with_capacity(measured.len());
+    let mut rows = measured.into_iter().peekable();
     while rows.peek().is_some() {
         let row: Vec<_> = rows.by_ref().take(columns).collect();
         let title_room = if row.iter().any(|r| !r.0.title.is_empty()) { 24.0 } else { 6.0 };

@@ -13,7 +13,7 @@ const SWATCH_PX: f64 = 28.0;
 const GAP_PX: f64 = 18.0;
 const LONGEST_TEXT_PX: f64 = 420.0;
 
-/// A piece of a swatch.
+/// A symbol in the legend.
 #[derive(Debug, Clone, Copy)]
 enum Swatch {
     Line(Stroke),
@@ -21,7 +21,7 @@ enum Swatch {
     Area(Colour, f64),
 }
 
-/// A text with what it explains.
+/// A text with the symbol that it explains.
 #[derive(Debug, Clone)]
 pub(crate) struct Entry {
     text: String,
@@ -69,7 +69,7 @@ pub(crate) fn entries(panel: &Panel) -> Vec<Entry> {
         let Some(label) = label else { continue };
         let text = cut(label, FONT_PX, LONGEST_TEXT_PX);
         match entries.iter_mut().find(|entry| entry.text == text) {
-            // Areas are translucent: one upon another in a swatch would be darker than any in the picture.
+            // Areas are translucent: overlapping ones in a swatch would be darker than in the picture.
             Some(entry) if matches!(swatch, Swatch::Area(..)) && entry.has_area() => {}
             Some(entry) => entry.swatches.push(swatch),
             None => entries.push(Entry { text, swatches: vec![swatch] }),
@@ -78,9 +78,9 @@ pub(crate) fn entries(panel: &Panel) -> Vec<Entry> {
     entries
 }
 
-/// Upper left corners of entries flowing into rows `width` px wide, and the number of rows.
+/// Upper left corners of entries in rows of `width` px, and the number of rows.
 pub(crate) fn flow(entries: &[Entry], width: f64) -> (Vec<(f64, f64)>, usize) {
-    // Equal columns look calmer than ragged rows.
+    // Equal columns are easier to read than ragged rows.
     let cell = entries.iter().map(Entry::width_px).fold(1.0, f64::max);
     let columns = ((width / cell) as usize).max(1);
     let places =

@@ -7,25 +7,25 @@ use crate::text::width_px;
 
 type Px = (f64, f64);
 
-/// Gaps between point and text that are tried, px.
+/// Candidate gaps between point and text, px.
 const GAPS_PX: [f64; 9] = [3.0, 6.0, 10.0, 15.0, 21.0, 28.0, 36.0, 48.0, 64.0];
 /// Directions that are tried at each gap.
 const DIRECTIONS: usize = 24;
-/// From this gap on a leader line shows whose text it is.
+/// Minimum gap at which a leader line connects a text with its point.
 const LEADER_FROM_PX: f64 = 8.0;
 /// Cost of a line through the text, as px of gap: a line behind a short text hides little of it.
 const CROSSED_PX: f64 = 1.5;
-/// The same of a leader line through a marker, a text or another leader line.
+/// Cost of a leader line through a marker, a text or another leader line, as px of gap.
 const LEADER_CROSSED_PX: f64 = 40.0;
 /// Room around a text, px.
 const ROOM_PX: f64 = 2.0;
-/// Bold digits are wider than the letters that widths are estimated from.
+/// Factor on estimated widths for bold digits, which are wider than letters.
 const BOLD_RATIO: f64 = 1.12;
 
 /// A place for a text.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PlacedLabel {
-    /// Its middle, px.
+    /// Middle, px.
     pub centre: Px,
     /// From the point to the text.
     pub leader: Option<(Px, Px)>,
@@ -41,7 +41,7 @@ pub(crate) struct Surroundings {
 }
 
 impl Surroundings {
-    /// Everything in a panel, with the texts that have their places already.
+    /// The obstacles of a panel, placed texts included.
     pub(crate) fn of(frame: &Frame, items: &[Item], mut boxes: Vec<Rect>) -> Self {
         let mut lines = Vec::new();
         for item in items {
@@ -59,7 +59,7 @@ impl Surroundings {
         Surroundings { inside: frame.rect, boxes, lines, leaders: Vec::new() }
     }
 
-    /// The cheapest place around a point, which is taken from then on; `None` if there is none.
+    /// Finds the cheapest place around a point, and occupies it; `None` if no place is free.
     pub(crate) fn place(&mut self, point: Px, text: &str, size_px: f64) -> Option<PlacedLabel> {
         let half = (0.5 * BOLD_RATIO * width_px(text, size_px) + ROOM_PX, 0.5 * size_px + ROOM_PX);
         let mut best: Option<(f64, PlacedLabel, Rect)> = None;
@@ -70,7 +70,7 @@ impl Surroundings {
             for direction in 0..DIRECTIONS {
                 let turn = (direction as f64 / DIRECTIONS as f64 - 0.125) * std::f64::consts::TAU;
                 let (ux, uy) = (turn.cos(), turn.sin());
-                // The middle of a box whose nearest edge is so far from the point.
+                // The middle of a box at this gap from the point.
                 let reach = (half.0 / ux.abs().max(1e-9)).min(half.1 / uy.abs().max(1e-9)) + gap_px;
                 let (x, y) = (point.0 + reach * ux, point.1 + reach * uy);
                 let around =
@@ -130,7 +130,7 @@ mod tests {
 
     #[test]
     fn no_text_covers_a_marker_or_another_text() {
-        // As many as a picture may have to number find a place; of more, most do.
+        // All labels of a usual number of points find a place; of more points, most do.
         for (count, most) in [(1, 1.0), (20, 1.0), (60, 1.0), (200, 0.8)] {
             let (mut surroundings, points) = crowd(count);
             let placed = points

@@ -1,31 +1,34 @@
 //! Round numbers for axes and contour levels.
 
-/// Largest magnitude an axis shows; beyond it the span of an axis could overflow.
-const LARGEST: f64 = 1e300;
-/// Smallest span of an axis relative to its largest value: below it, tick labels could not distinguish ticks.
-const SMALLEST_RELATIVE_SPAN: f64 = 1e-9;
+/// Maximum magnitude on an axis; beyond it the span of an axis could overflow.
+const MAX_MAGNITUDE: f64 = 1e300;
+/// Minimum span of an axis relative to its largest value: below it, tick labels could not distinguish ticks.
+const MIN_RELATIVE_SPAN: f64 = 1e-9;
 
-/// Makes any pair of numbers a usable axis range: ordered, finite, with a span that is not lost in rounding.
-pub(crate) fn usable_range(low: f64, high: f64) -> (f64, f64) {
+/// Turns any pair of numbers into a valid axis range: ordered, finite, with a span above rounding.
+pub(crate) fn valid_range(low: f64, high: f64) -> (f64, f64) {
     if !low.is_finite() || !high.is_finite() {
         return (0.0, 1.0);
     }
-    let (low, high) = (low.min(high).clamp(-LARGEST, LARGEST), low.max(high).clamp(-LARGEST, LARGEST));
+    let (low, high) = (
+        low.min(high).clamp(-MAX_MAGNITUDE, MAX_MAGNITUDE),
+        low.max(high).clamp(-MAX_MAGNITUDE, MAX_MAGNITUDE),
+    );
     let largest = low.abs().max(high.abs());
-    if high - low > (SMALLEST_RELATIVE_SPAN * largest).max(1e-250) {
+    if high - low > (MIN_RELATIVE_SPAN * largest).max(1e-250) {
         return (low, high);
     }
     let half = if largest < 1e-240 { 1.0 } else { 0.05 * largest };
-    ((low - half).max(-2.0 * LARGEST), (high + half).min(2.0 * LARGEST))
+    ((low - half).max(-2.0 * MAX_MAGNITUDE), (high + half).min(2.0 * MAX_MAGNITUDE))
 }
 
 /// Round numbers (1, 2, 2.5 or 5 times a power of ten apart) between `low` and `high`, about `target` of them.
 ///
-/// At least two and never more than 4 `target` + 4; for a range that is empty, infinite or NaN the ticks of a widened one.
+/// At least two and at most 4 `target` + 4. An empty, infinite or NaN range is replaced by a valid one.
 pub fn nice_ticks(low: f64, high: f64, target: usize) -> Vec<f64> {
-    let (low, high) = usable_range(low, high);
+    let (low, high) = valid_range(low, high);
     let target = target.clamp(1, 1000);
-    // A round step may leave a single tick in the range, or none; an axis needs two to be read.
+    // A round step may give one tick or none; a readable axis needs two.
     [1, 2, 4]
         .into_iter()
         .map(|finer| {
@@ -35,22 +38,22 @@ pub fn nice_ticks(low: f64, high: f64, target: usize) -> Vec<f64> {
         .unwrap_or_default()
 }
 
-/// Multiples of `step` in the range, at most `most`.
-fn ticks_with_step(low: f64, high: f64, step: f64, most: usize) -> Vec<f64> {
-    // Indices instead of repeated addition avoid accumulated rounding errors and an endless loop.
+/// Multiples of `step` in the range, at most `max_ticks`.
+fn ticks_with_step(low: f64, high: f64, step: f64, max_ticks: usize) -> Vec<f64> {
+    // Multiply instead of adding repeatedly, which would accumulate rounding errors.
     let first = (low / step - 1e-9).ceil();
-    let count = ((high / step + 1e-9).floor() - first + 1.0).clamp(0.0, most as f64) as usize;
+    let count = ((high / step + 1e-9).floor() - first + 1.0).clamp(0.0, max_ticks as f64) as usize;
     (0..count).map(|i| (first + i as f64) * step).map(|tick| if tick == 0.0 { 0.0 } else { tick }).collect()
 }
 
-/// The smallest of 1, 2, 2.5, 5, 10 times a power of ten that is at least `raw`.
+/// Rounds `raw` up to 1, 2, 2.5, 5 or 10 times a power of ten.
 fn nice_step(raw: f64) -> f64 {
     let power = 10f64.powf(raw.log10().floor());
     let factor = [1.0, 2.0, 2.5, 5.0].into_iter().find(|f| raw <= f * power * (1.0 + 1e-9)).unwrap_or(10.0);
     factor * power
 }
 
-/// Labels that distinguish all `values`: fixed point where that is short, scientific elsewhere.
+/// Labels that distinguish all `values`: fixed point if that is short, otherwise scientific.
 pub(crate) fn labels(values: &[f64]) -> Vec<String> {
     let largest = values.iter().fold(0.0f64, |a, v| a.max(v.abs()));
     let step = values.windows(2).map(|w| (w[1] - w[0]).abs()).fold(f64::INFINITY, f64::min);
@@ -88,7 +91,7 @@ mod tests {
         #[test]
         fn ticks_are_few_rising_inside_and_distinct(low in proptest::num::f64::ANY, high in proptest::num::f64::ANY, target in 0usize..30) {
             let ticks = nice_ticks(low, high, target);
-            let (low, high) = usable_range(low, high);
+            let (low, high) = valid_range(low, high);
             prop_assert!(low < high);
             prop_assert!(ticks.len() > 1 && ticks.len() <= 4 * target.max(1) + 4, "{} ticks", ticks.len());
             prop_assert!(ticks.windows(2).all(|w| w[0] < w[1]));

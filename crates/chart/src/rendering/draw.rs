@@ -1,4 +1,4 @@
-//! Drawing a laid-out figure.
+//! Draws a figure.
 
 use crate::contours::bands::band;
 use crate::contours::contour_label::{place, without_gap};
@@ -11,7 +11,7 @@ use crate::figure_layout::layout::{
 };
 use crate::figure_layout::legend;
 use crate::figure_layout::point_labels::Surroundings;
-use crate::items::{Annotation, Dash, Item, Line, LineEnd, Rule, RuleAt, Scatter, Space, TextAnchor};
+use crate::items::{Annotation, Dash, Item, Line, LineEnd, Rule, RuleAt, Scatter, TextAnchor};
 use crate::markers::{MarkerStyle, draw_arrow, draw_marker};
 use crate::palette::{INK, LIGHT_GREY};
 use crate::text::{cut, width_px};
@@ -20,7 +20,7 @@ use crate::{Contours, Figure};
 const LABEL_PX: f64 = 11.0;
 const MAX_LEVELS: usize = 100;
 
-/// Texts drawn after everything else, so that no line crosses them.
+/// A text that is drawn after everything else, so that no line crosses it.
 struct LateText {
     at: (f64, f64),
     text: String,
@@ -29,7 +29,7 @@ struct LateText {
     at_line_end: bool,
 }
 
-pub(crate) fn figure(figure: &Figure) -> Drawing {
+pub(crate) fn draw_figure(figure: &Figure) -> Drawing {
     let sheet = layout(figure);
     let mut drawing = Drawing {
         width_px: sheet.width,
@@ -47,32 +47,32 @@ pub(crate) fn figure(figure: &Figure) -> Drawing {
         y += 18.0;
     }
     for placed in &sheet.panels {
-        panel(&mut drawing, placed);
+        draw_panel(&mut drawing, placed);
     }
     drawing
 }
 
-fn panel(drawing: &mut Drawing, placed: &PlacedPanel<'_>) {
+fn draw_panel(drawing: &mut Drawing, placed: &PlacedPanel<'_>) {
     let frame = &placed.frame;
     drawing.open_group("panel");
-    axes(drawing, placed);
-    let mut obstacles = obstacles(frame, &placed.panel.items);
+    draw_axes(drawing, placed);
+    let mut obstacles = find_obstacles(frame, &placed.panel.items);
     let mut late = Vec::new();
     for item in &placed.panel.items {
         match item {
-            Item::Line(item) => line(drawing, frame, item, &mut late),
-            Item::Scatter(item) => scatter(drawing, frame, item),
-            Item::Rule(item) => rule(drawing, frame, item),
-            Item::Contours(item) => contours(drawing, frame, item, &mut obstacles, &mut late),
+            Item::Line(item) => draw_line(drawing, frame, item, &mut late),
+            Item::Scatter(item) => draw_scatter(drawing, frame, item),
+            Item::Rule(item) => draw_rule(drawing, frame, item),
+            Item::Contours(item) => draw_contours(drawing, frame, item, &mut obstacles, &mut late),
             Item::Polygon(item) => {
                 let points: Vec<_> = item.points.iter().map(|p| frame.px(*p)).collect();
                 drawing.areas(&[clip::polygon(&points, &frame.rect)], item.colour, item.opacity);
             }
-            Item::Annotation(item) => annotation(frame, item, &mut late),
+            Item::Annotation(item) => add_annotation(frame, item, &mut late),
             Item::PointLabels(_) => {}
         }
     }
-    point_labels(drawing, placed, &mut late);
+    draw_point_labels(drawing, placed, &mut late);
     for text in &late {
         drawing.text(text.at, &text.text, &text.style);
     }
@@ -80,8 +80,8 @@ fn panel(drawing: &mut Drawing, placed: &PlacedPanel<'_>) {
     drawing.close_group();
 }
 
-/// Positions that labels of contour lines avoid: markers, arrow heads and texts at the ends of lines.
-fn obstacles(frame: &Frame, items: &[Item]) -> Vec<(f64, f64)> {
+/// Finds the positions that labels of contour lines avoid: markers, arrow heads and texts at the ends of lines.
+fn find_obstacles(frame: &Frame, items: &[Item]) -> Vec<(f64, f64)> {
     let mut out = Vec::new();
     for item in items {
         match item {
@@ -102,7 +102,7 @@ fn obstacles(frame: &Frame, items: &[Item]) -> Vec<(f64, f64)> {
     out
 }
 
-fn axes(drawing: &mut Drawing, placed: &PlacedPanel<'_>) {
+fn draw_axes(drawing: &mut Drawing, placed: &PlacedPanel<'_>) {
     let (frame, panel) = (&placed.frame, placed.panel);
     let Rect { left, top, right, bottom } = frame.rect;
     let (grid, ink) = (Stroke::solid(LIGHT_GREY, 0.8), Stroke::solid(INK, 1.0));
@@ -140,7 +140,7 @@ fn axes(drawing: &mut Drawing, placed: &PlacedPanel<'_>) {
     );
 }
 
-fn line(drawing: &mut Drawing, frame: &Frame, line: &Line, late: &mut Vec<LateText>) {
+fn draw_line(drawing: &mut Drawing, frame: &Frame, line: &Line, late: &mut Vec<LateText>) {
     let points: Vec<_> = line.points.iter().map(|p| frame.px(*p)).collect();
     let stroke = Stroke { colour: line.colour, width_px: line.width_px, dash: line.dash };
     let pieces = clip::polyline(&points, &frame.rect);
@@ -174,23 +174,23 @@ fn end_label_at(frame: &Frame, line: &Line) -> Option<(f64, f64)> {
         LineEnd::First => pieces.first().map(|p| (p[1], p[0])),
         LineEnd::Last => pieces.last().map(|p| (p[p.len() - 2], p[p.len() - 1])),
     };
-    // A line of one visible point still gets its text.
+    // A line with a single visible point also gets its text.
     let single =
         points.iter().copied().find(|p| p.0.is_finite() && p.1.is_finite() && frame.rect.contains(*p));
     let (inner, end) = ends.or(single.map(|p| ((p.0 - 1.0, p.1), p)))?;
     let length = (end.0 - inner.0).hypot(end.1 - inner.1).max(1e-9);
     let (ux, uy) = ((end.0 - inner.0) / length, (end.1 - inner.1) / length);
     let half_width = 0.5 * width_px(&label.text, LABEL_PX);
-    // As far out as the text's box needs in this direction, but not over the frame's edge.
+    // The distance that the box of the text needs in this direction, within the frame.
     let centre = (end.0 + ux * (half_width + 8.0), end.1 + uy * 14.0);
     let y = centre.1.clamp(frame.rect.top + 8.0, frame.rect.bottom - 8.0);
-    // No room above or below: next to the end instead of on it.
+    // Without room above or below, place the text next to the end.
     let x = if y == centre.1 { centre.0 } else { end.0 - half_width - 9.0 };
     let leftmost = frame.rect.left + half_width + 2.0;
     Some((x.clamp(leftmost, leftmost.max(frame.rect.right - half_width - 2.0)), y))
 }
 
-fn scatter(drawing: &mut Drawing, frame: &Frame, scatter: &Scatter) {
+fn draw_scatter(drawing: &mut Drawing, frame: &Frame, scatter: &Scatter) {
     let style = MarkerStyle {
         marker: scatter.marker,
         colour: scatter.colour,
@@ -201,7 +201,7 @@ fn scatter(drawing: &mut Drawing, frame: &Frame, scatter: &Scatter) {
         for (interval, along_x) in [(point.x_interval, true), (point.y_interval, false)] {
             let Some((low, high)) = interval else { continue };
             let end = |v: f64| frame.px(if along_x { (v, point.y) } else { (point.x, v) });
-            error_bar(drawing, frame, end(low), end(high), along_x, scatter);
+            draw_error_bar(drawing, frame, end(low), end(high), along_x, scatter);
         }
     }
     for (index, point) in scatter.points.iter().enumerate() {
@@ -215,8 +215,8 @@ fn scatter(drawing: &mut Drawing, frame: &Frame, scatter: &Scatter) {
     }
 }
 
-/// A bar with caps; an end outside the frame is cut and has no cap.
-fn error_bar(
+/// Draws a bar with caps; an end outside the frame is cut and has no cap.
+fn draw_error_bar(
     drawing: &mut Drawing,
     frame: &Frame,
     low: (f64, f64),
@@ -234,7 +234,7 @@ fn error_bar(
     }
 }
 
-fn rule(drawing: &mut Drawing, frame: &Frame, rule: &Rule) {
+fn draw_rule(drawing: &mut Drawing, frame: &Frame, rule: &Rule) {
     let ends = match rule.at {
         RuleAt::Y(value) => [(frame.x.low, value), (frame.x.high, value)],
         RuleAt::X(value) => [(value, frame.y.low), (value, frame.y.high)],
@@ -245,7 +245,7 @@ fn rule(drawing: &mut Drawing, frame: &Frame, rule: &Rule) {
     }
 }
 
-fn contours(
+fn draw_contours(
     drawing: &mut Drawing,
     frame: &Frame,
     contours: &Contours,
@@ -294,8 +294,8 @@ fn contours(
     }
 }
 
-/// Called last, because the labels avoid everything else.
-fn point_labels(drawing: &mut Drawing, placed: &PlacedPanel<'_>, late: &mut Vec<LateText>) {
+/// Draws the labels; called last, because they avoid everything else.
+fn draw_point_labels(drawing: &mut Drawing, placed: &PlacedPanel<'_>, late: &mut Vec<LateText>) {
     let texts = late.iter().map(|text| text_box(text.at, &text.text, &text.style)).collect();
     let mut surroundings = Surroundings::of(&placed.frame, &placed.panel.items, texts);
     for item in &placed.panel.items {
@@ -325,15 +325,9 @@ fn text_box(at: (f64, f64), text: &str, style: &TextStyle) -> Rect {
     Rect { left, top: at.1 - half, right: left + width, bottom: at.1 + half }
 }
 
-fn annotation(frame: &Frame, item: &Annotation, late: &mut Vec<LateText>) {
-    let at = match item.space {
-        Space::Data => frame.px(item.at),
-        Space::Panel => (
-            frame.rect.left + item.at.0 * frame.rect.width(),
-            frame.rect.bottom - item.at.1 * frame.rect.height(),
-        ),
-    };
-    let at = (at.0 + item.shift_px.0, at.1 - item.shift_px.1);
+fn add_annotation(frame: &Frame, item: &Annotation, late: &mut Vec<LateText>) {
+    let (x, y) = frame.px(item.at);
+    let at = (x + item.shift_px.0, y - item.shift_px.1);
     if at.0.is_finite() && at.1.is_finite() && frame.rect.contains(at) {
         let style = TextStyle::new(LABEL_PX, item.colour, item.anchor).halo();
         late.push(LateText { at, text: item.text.clone(), style, at_line_end: false });

@@ -1,14 +1,14 @@
 //! Outlines of letters from a built-in font (DejaVu Sans, free licence), so that a figure gives the same pixels on every computer.
 //!
 //! Letters are placed from left to right with the kerning of the font, which is sufficient for titles, units and numbers. Joined or
-//! right-to-left scripts are correct only in the SVG, where the viewer sets the text.
+//! right-to-left scripts are correct only in the SVG, because the viewer sets its text.
 
 use crate::drawing::{Px, TextStyle};
 use crate::items::TextAnchor;
 use tiny_skia::{Path, PathBuilder, Transform};
 use ttf_parser::{Face, GlyphId, OutlineBuilder};
 
-/// Regular and bold.
+/// The regular and the bold font.
 pub(crate) struct Fonts {
     regular: Face<'static>,
     bold: Face<'static>,
@@ -16,7 +16,7 @@ pub(crate) struct Fonts {
 
 impl Fonts {
     /// # Errors
-    /// If the built-in font is not a font: a fault of the build.
+    /// If the built-in font cannot be parsed: a fault of the build.
     pub(crate) fn new() -> Result<Self, ttf_parser::FaceParsingError> {
         let regular = Face::parse(dejavu::sans::regular(), 0)?;
         Ok(Fonts { regular, bold: Face::parse(dejavu::sans::bold(), 0)? })
@@ -27,15 +27,15 @@ impl Fonts {
         let face = if style.bold { &self.bold } else { &self.regular };
         let em = style.size_px as f32 / f32::from(face.units_per_em());
         let mut pen = Pen { builder: PathBuilder::new(), x: 0.0 };
-        let mut before: Option<GlyphId> = None;
+        let mut previous: Option<GlyphId> = None;
         for c in text.chars() {
             let shown = if c.is_whitespace() { ' ' } else { c };
             // Glyph 0 is the font's replacement for missing characters.
             let glyph = face.glyph_index(shown).unwrap_or_default();
-            pen.x += before.map_or(0.0, |before| kerning(face, before, glyph));
+            pen.x += previous.map_or(0.0, |previous| kerning(face, previous, glyph));
             face.outline_glyph(glyph, &mut pen);
             pen.x += f32::from(face.glyph_hor_advance(glyph).unwrap_or_default());
-            before = Some(glyph);
+            previous = Some(glyph);
         }
         let start = match style.anchor {
             TextAnchor::Start => 0.0,
@@ -59,7 +59,7 @@ fn kerning(face: &Face<'_>, left: GlyphId, right: GlyphId) -> f32 {
     horizontal.find_map(|table| table.glyphs_kerning(left, right)).map_or(0.0, f32::from)
 }
 
-/// Draws glyphs one behind the other, font units.
+/// Draws glyphs one after the other, font units.
 struct Pen {
     builder: PathBuilder,
     /// Left end of the next glyph.

@@ -1,4 +1,4 @@
-//! A drawing as pixels.
+//! Renders a drawing as pixels.
 
 use crate::drawing::{Drawing, Px, Shape, Stroke};
 use crate::palette::WHITE;
@@ -9,17 +9,17 @@ use tiny_skia::{Color, FillRule, LineJoin, Paint, Path, PathBuilder, Pixmap, Str
 /// Maximum number of pixels of a picture.
 const MAX_PIXELS: f64 = 64e6;
 
-/// Width of the white rim around a text, px on both sides together.
+/// Width of the white rim around a text, px, both sides together.
 const HALO_PX: f32 = 3.0;
 
-/// Why a figure cannot be drawn as pixels.
+/// Reason why a figure cannot be drawn as pixels.
 #[derive(Debug, thiserror::Error)]
 pub enum PngError {
-    /// The font of this program was not understood.
+    /// The font of the program cannot be parsed.
     #[error("failed to read the font that comes with the program: {0}")]
     Font(#[from] ttf_parser::FaceParsingError),
-    /// Too large or of no size.
-    #[error("a picture of {width} by {height} pixels cannot be made; at most 64 million pixels")]
+    /// The picture is too large or empty.
+    #[error("a picture of {width} by {height} pixels cannot be made; at most 64 million pixels are allowed")]
     Size {
         /// Width, pixels.
         width: f64,
@@ -29,24 +29,23 @@ pub enum PngError {
     /// The encoder failed.
     #[error("failed to encode the picture: {source}")]
     Encode {
-        /// Its error.
+        /// Error.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
 }
 
 impl Figure {
-    /// The picture as a PNG file, `scale` pixels for each unit of the SVG (above 0; 2 is sharp on paper).
+    /// Renders a PNG file with `scale` pixels for each unit of the SVG (above 0; 2 is sharp on paper).
     ///
     /// # Errors
     /// [`PngError`].
     pub fn to_png(&self, scale: f32) -> Result<Vec<u8>, PngError> {
-        let drawing = crate::rendering::draw::figure(self);
-        let pixels = pixels(&drawing, scale)?;
+        let pixels = render(&crate::rendering::draw::draw_figure(self), scale)?;
         pixels.encode_png().map_err(|error| PngError::Encode { source: Box::new(error) })
     }
 }
 
-fn pixels(drawing: &Drawing, scale: f32) -> Result<Pixmap, PngError> {
+fn render(drawing: &Drawing, scale: f32) -> Result<Pixmap, PngError> {
     let size = |px: f64| px.ceil() * f64::from(scale);
     let (width, height) = (size(drawing.width_px), size(drawing.height_px));
     // NaN counts as too large.
@@ -96,7 +95,7 @@ impl Canvas {
         }
     }
 
-    /// Draws nothing without a path: from too few points, or from points that are not numbers.
+    /// Fills a path; `None` if it had too few points, or NaN coordinates.
     fn fill(&mut self, path: Option<Path>, colour: Colour, opacity: f64) {
         if let Some(path) = path {
             self.pixels.fill_path(&path, &paint(colour, opacity), FillRule::Winding, self.to_pixels, None);
@@ -105,14 +104,14 @@ impl Canvas {
 
     fn outline(&mut self, path: Option<Path>, stroke: &Stroke, line_join: LineJoin) {
         let dashes: Vec<f32> = stroke.dashes_px().into_iter().map(|length| length as f32).collect();
-        let look = tiny_skia::Stroke {
+        let stroke_style = tiny_skia::Stroke {
             width: stroke.drawn_width_px() as f32,
             line_join,
             dash: StrokeDash::new(dashes, 0.0),
             ..tiny_skia::Stroke::default()
         };
         if let Some(path) = path {
-            self.pixels.stroke_path(&path, &paint(stroke.colour, 1.0), &look, self.to_pixels, None);
+            self.pixels.stroke_path(&path, &paint(stroke.colour, 1.0), &stroke_style, self.to_pixels, None);
         }
     }
 }

@@ -6,12 +6,12 @@ use crate::palette::WHITE;
 use crate::text::escape;
 use std::fmt::Write;
 
-/// The whole document.
-pub(crate) fn document(drawing: &Drawing) -> String {
+/// Writes the SVG document.
+pub(crate) fn write_document(drawing: &Drawing) -> String {
     let (w, h) = (px(drawing.width_px.ceil()), px(drawing.height_px.ceil()));
     let mut body = String::new();
     for shape in &drawing.shapes {
-        element(&mut body, shape);
+        write_element(&mut body, shape);
     }
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w}\" height=\"{h}\" viewBox=\"0 0 {w} {h}\" \
@@ -21,7 +21,7 @@ pub(crate) fn document(drawing: &Drawing) -> String {
     )
 }
 
-fn element(body: &mut String, shape: &Shape) {
+fn write_element(body: &mut String, shape: &Shape) {
     // Writing to a string cannot fail.
     let _ = match shape {
         Shape::OpenGroup(name) => writeln!(body, "<g class=\"{}\">", escape(name)),
@@ -41,25 +41,25 @@ fn element(body: &mut String, shape: &Shape) {
             px(from.1),
             px(to.0),
             px(to.1),
-            attributes(stroke)
+            format_stroke(stroke)
         ),
         Shape::Polyline(points, stroke) => writeln!(
             body,
             "<polyline points=\"{}\" fill=\"none\" stroke-linejoin=\"round\" {}/>",
-            list(points),
-            attributes(stroke)
+            format_points(points),
+            format_stroke(stroke)
         ),
         Shape::Areas(polygons, fill, opacity) => {
-            let data: String = polygons.iter().map(|points| format!("M{}Z", list(points))).collect();
+            let data: String = polygons.iter().map(|points| format!("M{}Z", format_points(points))).collect();
             let (fill, opacity) = (fill.hex(), px(*opacity));
             writeln!(body, "<path d=\"{data}\" fill=\"{fill}\" fill-opacity=\"{opacity}\"/>")
         }
         Shape::Polygon(points, fill, stroke) => writeln!(
             body,
             "<polygon points=\"{}\" fill=\"{}\" {}/>",
-            list(points),
+            format_points(points),
             fill.hex(),
-            attributes(stroke)
+            format_stroke(stroke)
         ),
         Shape::Circle(centre, radius, fill, stroke) => writeln!(
             body,
@@ -68,13 +68,13 @@ fn element(body: &mut String, shape: &Shape) {
             px(centre.1),
             px(*radius),
             fill.hex(),
-            attributes(stroke)
+            format_stroke(stroke)
         ),
-        Shape::Text(at, written, style) => text(body, *at, written, style),
+        Shape::Text(at, written, style) => write_text(body, *at, written, style),
     };
 }
 
-fn text(body: &mut String, at: Px, text: &str, style: &TextStyle) -> std::fmt::Result {
+fn write_text(body: &mut String, at: Px, text: &str, style: &TextStyle) -> std::fmt::Result {
     let anchor = match style.anchor {
         TextAnchor::Start => "start",
         TextAnchor::Middle => "middle",
@@ -94,7 +94,7 @@ fn text(body: &mut String, at: Px, text: &str, style: &TextStyle) -> std::fmt::R
     );
     let text = escape(text);
     if style.halo {
-        // Drawn twice: every viewer knows this, not every one knows paint-order.
+        // Draw the text twice: not every viewer supports `paint-order`.
         let white = WHITE.hex();
         writeln!(
             body,
@@ -104,7 +104,7 @@ fn text(body: &mut String, at: Px, text: &str, style: &TextStyle) -> std::fmt::R
     writeln!(body, "<text {common} fill=\"{}\">{text}</text>", style.colour.hex())
 }
 
-fn attributes(stroke: &Stroke) -> String {
+fn format_stroke(stroke: &Stroke) -> String {
     let mut out =
         format!("stroke=\"{}\" stroke-width=\"{}\"", stroke.colour.hex(), px(stroke.drawn_width_px()));
     let lengths: Vec<String> = stroke.dashes_px().into_iter().map(px).collect();
@@ -114,7 +114,7 @@ fn attributes(stroke: &Stroke) -> String {
     out
 }
 
-/// A coordinate with at most two decimals; what is not finite becomes 0.
+/// A coordinate with at most two decimals; 0 if it is not finite.
 pub(crate) fn px(value: f64) -> String {
     if !value.is_finite() {
         return "0".to_owned();
@@ -124,7 +124,7 @@ pub(crate) fn px(value: f64) -> String {
     if text == "-0" || text.is_empty() { "0".to_owned() } else { text.to_owned() }
 }
 
-fn list(points: &[(f64, f64)]) -> String {
+fn format_points(points: &[(f64, f64)]) -> String {
     let mut out = String::with_capacity(points.len() * 14);
     for (x, y) in points {
         if !out.is_empty() {
@@ -138,7 +138,7 @@ fn list(points: &[(f64, f64)]) -> String {
 impl crate::Figure {
     /// The picture as an SVG document. The same figure gives the same bytes.
     pub fn to_svg(&self) -> String {
-        document(&crate::rendering::draw::figure(self))
+        write_document(&crate::rendering::draw::draw_figure(self))
     }
 }
 

@@ -9,21 +9,21 @@ use std::collections::BTreeMap;
 pub struct AcceptanceCriteria {
     /// Name of the code.
     pub name: String,
-    /// Where the values come from.
+    /// Source of the values.
     pub source: String,
-    /// Time at the end of a step over which they are judged, s.
+    /// Time at the end of a step over which the criteria are judged, s.
     pub window_s: f64,
-    /// Permitted fluctuation of each channel: highest minus lowest reading over the mean, temperatures and pressures absolute.
+    /// Permitted fluctuation of each channel: highest minus lowest reading, relative to the mean; temperatures and pressures absolute.
     pub fluctuation_ratio: BTreeMap<Channel, f64>,
-    /// Permitted size of the losses in the energy balance over the power of the turbine.
+    /// Permitted losses in the energy balance, relative to the turbine power.
     pub heat_balance_ratio: Option<f64>,
 }
 
-/// Time over which criteria without a window are judged, s. Judgement: the gas is settled, and a step of 40 s has it.
+/// Window of criteria that do not define one, s. Judgement: the gas has settled by then, and a step of 40 s is long enough.
 pub const ACCEPTANCE_WINDOW_S: f64 = 20.0;
 
 impl AcceptanceCriteria {
-    /// ASME PTC 10-1997, the rows of its table 3.4 that a turbocharger has.
+    /// ASME PTC 10-1997: the rows of table 3.4 that apply to a turbocharger.
     pub fn ptc_10() -> Self {
         let fluctuations = [
             (Channel::ShaftSpeed, 0.005),

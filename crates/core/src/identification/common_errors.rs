@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// Signed effects of a recording's common errors on one of its points.
 ///
 /// Entry `k` of a list is the change due to one standard deviation of error `k`; error `k` is the same at every point of the
-/// recording, and errors of different `k` are independent. So the covariance of two points is the sum of the products of
+/// recording, and errors of different `k` are independent. The covariance of two points is therefore the sum of the products of
 /// their entries. The variance of one point is the sum of the squares of its entries plus its own part, which no other
 /// point shares. The lists of `eta` and of `h` number their errors independently.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -25,7 +25,7 @@ pub struct CommonErrors {
 impl CommonErrors {
     /// Standard error of `eta` from shared errors, fraction.
     pub fn eta_standard_error(&self) -> f64 {
-        root_sum_of_squares(&self.eta_changes)
+        self.eta_changes.iter().map(|change| change * change).sum::<f64>().sqrt()
     }
 
     /// Covariance of the point's `eta` with that of another point of the recording, without their own parts, fraction
@@ -33,13 +33,4 @@ impl CommonErrors {
     pub fn eta_covariance(&self, other: &CommonErrors) -> f64 {
         self.eta_changes.iter().zip(&other.eta_changes).map(|(one, other)| one * other).sum()
     }
-
-    /// Standard error of `h` from shared errors, W/(m2 K).
-    pub fn h_standard_error_w_m2k(&self) -> f64 {
-        root_sum_of_squares(&self.h_changes_w_m2k)
-    }
-}
-
-fn root_sum_of_squares(changes: &[f64]) -> f64 {
-    changes.iter().map(|change| change * change).sum::<f64>().sqrt()
 }

@@ -3,7 +3,7 @@
 use crate::{CommonErrors, OperatingPoint, StepKind, Warning};
 use serde::{Deserialize, Serialize};
 
-/// How a point was identified.
+/// Method that identified a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
@@ -15,7 +15,7 @@ pub enum Method {
     Joint,
     /// Steady points, with the heat to the measured housing removed by eqs. 1-3 and a known law of convection.
     Corrected,
-    /// Read from a map that does not state how its efficiency was found.
+    /// Read from a map that does not state its method.
     Imported,
 }
 
@@ -39,7 +39,7 @@ pub enum Verdict {
     Good,
     /// Use it with care: `warnings` give the reasons.
     Doubtful,
-    /// Do not use it: `warnings` give the reasons. Its results are absent or meaningless.
+    /// Do not use the point: its results are absent or meaningless; `warnings` give the reasons.
     Unusable,
 }
 
@@ -68,12 +68,12 @@ pub struct EstimateUncertainty {
     /// One standard error from noise, serial correlation of the residual included; unit of the quantity.
     pub noise_standard_error: f64,
     /// One standard error from declared fixed sensor offsets and gains, and from the estimated error of the method's own
-    /// assumptions (a constant h where the flow still moves); unit of the quantity.
+    /// assumptions (a constant h although the flow still changes); unit of the quantity.
     pub bias_standard_error: f64,
 }
 
 impl EstimateUncertainty {
-    /// Both origins in quadrature; unit of the quantity.
+    /// Root sum of squares of both; unit of the quantity.
     pub fn combined_standard_error(&self) -> f64 {
         self.noise_standard_error.hypot(self.bias_standard_error)
     }
@@ -98,7 +98,7 @@ pub fn standard_error_of(low: f64, high: f64) -> f64 {
     0.5 * (high - low) / Z_975
 }
 
-/// One identified point of the map. Missing results are `None`, never invented.
+/// An identified point of the map. Missing results are `None`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct IdentifiedPoint {
     /// Index of the step, from 0; files have its number, from 1.
@@ -107,7 +107,7 @@ pub struct IdentifiedPoint {
     /// Whether the step was made for the map, or to detect drift.
     #[serde(default)]
     pub kind: StepKind,
-    /// The target of the plan; `None` in recordings made by others.
+    /// The target of the plan; `None` in imported recordings.
     pub target: Option<OperatingPoint>,
     /// Measured shaft speed at the end of the step, rpm.
     pub speed_rpm: f64,
@@ -145,7 +145,7 @@ pub struct IdentifiedPoint {
     /// The part of these errors that the recording's other points share.
     #[serde(default)]
     pub common: CommonErrors,
-    /// How it was identified.
+    /// Method that identified it.
     pub method: Method,
     /// Whether to use it.
     pub verdict: Verdict,
@@ -165,19 +165,9 @@ impl IdentifiedPoint {
     /// Standard error of `eta` that no other point shares, fraction; `None` without an interval.
     pub fn eta_own_standard_error(&self) -> Option<f64> {
         let all = standard_error_of(self.eta_low?, self.eta_high?);
-        Some(remaining_standard_error(all, self.common.eta_standard_error()))
+        let common = self.common.eta_standard_error();
+        Some((all * all - common * common).max(0.0).sqrt())
     }
-
-    /// Standard error of `h` that no other point shares, W/(m2 K); `None` without an interval.
-    pub fn h_own_standard_error_w_m2k(&self) -> Option<f64> {
-        let all = standard_error_of(self.h_low_w_m2k?, self.h_high_w_m2k?);
-        Some(remaining_standard_error(all, self.common.h_standard_error_w_m2k()))
-    }
-}
-
-/// The standard error that remains after an independent part is removed.
-fn remaining_standard_error(all: f64, part: f64) -> f64 {
-    (all * all - part * part).max(0.0).sqrt()
 }
 
 /// A number that is null if unknown.

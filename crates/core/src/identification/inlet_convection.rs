@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Model of the heat-transfer coefficient upstream of the wheel. It has an effect only if part of the internal area lies there (alpha_A above 0).
+/// Model of the heat-transfer coefficient upstream of the wheel. It matters only if part of the internal area lies upstream (alpha_A above 0).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[schemars(transform = crate::schema::flatten_to_names)]
@@ -16,7 +16,7 @@ pub enum InletConvection {
 }
 
 impl InletConvection {
-    /// The other of the two.
+    /// The other model.
     pub fn other(self) -> Self {
         match self {
             InletConvection::Shared => InletConvection::Own,

@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// One-sigma tolerances of the nominal model, ratios to the nominal value, and of the rig's conditions: a deviation within them is not an effect.
+/// One-sigma tolerances of the nominal model (ratios to the nominal value) and of the rig's boundary conditions. A deviation within these
+/// tolerances is not an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ModelTolerances {

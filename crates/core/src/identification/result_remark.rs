@@ -4,23 +4,23 @@ use crate::coded_enum::coded_enum;
 use crate::{Channel, Method};
 
 coded_enum! {
-/// A remark on the results as a whole, by its stable code. `reason`: the message of the error behind it.
+/// A remark on the results as a whole, by its stable code. `reason` is the message of the underlying error.
 ResultRemark {
     /// A recording could be read in parts only; `file` is given if there are several.
     "recording_incomplete" RecordingIncomplete { file: Option<String>, reason: String },
     /// Channels of the usual method are missing, so that the efficiencies are those of conventional mapping.
     "conventional_mapping" ConventionalMapping { usual: Method, missing: Vec<Channel> },
-    /// Parameters of `joint` are taken as declared; the result depends on them.
+    /// Parameters of `joint` keep their declared values; the result depends on them.
     "held_fixed" HeldFixed { parameters: Vec<String> },
     /// Gauge pressures are added to an ambient pressure that was not measured.
     "unknown_ambient_pressure" UnknownAmbientPressure { pressure_pa: f64, sigma_pa: f64 },
-    /// The machine rests before the first step, and the campaign does not use it as a zero.
+    /// The recording starts with the machine at rest, and the campaign does not use this as a zero.
     "unused_rest" UnusedRest { start_s: f64, end_s: f64 },
     /// The points are corrected for a cause that the diagnosis names.
     "corrected" Corrected { causes: Vec<String>, probability: f64 },
     /// The drift of a sensor was subtracted.
     "drift_subtracted" DriftSubtracted { reason: String },
-    /// The points make no map.
+    /// No map can be made from the points.
     "no_map" NoMap { reason: String },
     /// The map has no fitted surface.
     "map_not_fitted" MapNotFitted { reason: String },

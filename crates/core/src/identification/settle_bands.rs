@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Largest variation (maximum minus minimum) of each quantity, as a ratio of its mean, from some time to the end
-/// of a step: the operating point has settled at that time. The criterion is implemented only in the
+/// Maximum variation (maximum minus minimum) of each quantity, as a ratio of its mean: an operating point has settled at a time if the
+/// variation from then to the end of the step is within these bands. The criterion is implemented only in the
 /// `settled` module of `mapper-physics`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -17,7 +17,7 @@ pub struct SettleBands {
 }
 
 impl Default for SettleBands {
-    /// The typical variations of section 3 of Burke et al.: 0.8 % in speed, 1.5 % in flow, 2 % in pressure ratio.
+    /// The typical variations in section 3 of Burke et al.: 0.8 % in speed, 1.5 % in flow, 2 % in pressure ratio.
     fn default() -> Self {
         SettleBands { speed_ratio: 0.008, flow_ratio: 0.015, pressure_ratio_ratio: 0.02 }
     }

@@ -22,9 +22,9 @@ pub enum Origin {
 pub struct SharedValue {
     /// The value; `None` if the recording cannot distinguish it from other parameters.
     pub value: Option<f64>,
-    /// Its standard errors by origin, unit of the value.
+    /// Standard errors by origin, unit of the value.
     pub uncertainty: EstimateUncertainty,
-    /// Its origin.
+    /// Origin.
     pub origin: Origin,
 }
 
@@ -56,20 +56,20 @@ pub struct ConvectionLaw {
     pub coefficient: SharedValue,
     /// Exponent b.
     pub exponent: SharedValue,
-    /// Reynolds number at which coefficient and exponent are uncorrelated: the mean of the points' logarithms.
+    /// Reynolds number at which coefficient and exponent are uncorrelated: the geometric mean of the points.
     pub reynolds_reference: f64,
     /// Smallest and largest Reynolds number of the points: values outside are an extrapolation.
     pub reynolds_range: (f64, f64),
-    /// Root mean square of the single points' deviation from the law, ratio.
+    /// Root mean square of the deviations of the points from the law, ratio.
     pub deviation_ratio: f64,
 }
 
-/// Two shared parameters that the recording hardly distinguishes.
+/// Two shared parameters that are hardly distinguishable.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CorrelatedPair {
-    /// Symbol of one.
+    /// Symbol of the first parameter.
     pub first: String,
-    /// Symbol of the other.
+    /// Symbol of the second parameter.
     pub second: String,
     /// Correlation of their estimates, -1..1.
     pub correlation: f64,
@@ -92,7 +92,7 @@ pub struct IdentifiedInlet {
     pub alpha_area_otherwise_ratio: Option<f64>,
 }
 
-/// Result of a joint identification that belongs to no single point.
+/// Results of a joint identification that concern all points.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ThermalModel {
     /// The convection law; `None` if each point has its own coefficient.
@@ -101,7 +101,7 @@ pub struct ThermalModel {
     pub internal_area_m2: f64,
     /// Share of the internal area before compression, alpha_A.
     pub alpha_area_ratio: SharedValue,
-    /// Model of h before the wheel; `None` if it has no effect, since no area lies there.
+    /// Model of h before the wheel; `None` if no area lies before the wheel.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inlet: Option<IdentifiedInlet>,
     /// Tip diameter of the T2 probe (eqs. 11-12), m; 0 is an ideal probe.
@@ -110,14 +110,14 @@ pub struct ThermalModel {
     pub direction_factor: SharedValue,
     /// Offsets of readings (reading minus true value), by channel, K or Pa.
     pub offsets: BTreeMap<Channel, SharedValue>,
-    /// Parameters that are nearly indistinguishable (correlation beyond 0.95 in size).
+    /// Parameters that are nearly indistinguishable (absolute correlation above 0.95).
     pub entangled: Vec<CorrelatedPair>,
     /// Evidence against the model; empty if there is none.
     #[serde(deserialize_with = "with_values")]
     pub doubts: Vec<ModelDoubt>,
 }
 
-/// Doubts of older files are sentences without values, and are left out.
+/// Doubts of older files are sentences without values, and are dropped.
 fn with_values<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<ModelDoubt>, D::Error> {
     let stored = Vec::<Value>::deserialize(deserializer)?;
     Ok(stored.into_iter().filter_map(|doubt| serde_json::from_value(doubt).ok()).collect())

@@ -15,7 +15,7 @@ pub struct BudgetRow {
     pub sensitivity: f64,
     /// Product of the two, in the unit of the number.
     pub contribution: f64,
-    /// Degrees of freedom of the standard uncertainty; `None` if it is declared, and counts as exactly known.
+    /// Degrees of freedom of the standard uncertainty; `None` for a declared uncertainty, which counts as exactly known.
     pub degrees_of_freedom: Option<f64>,
 }
 

@@ -9,17 +9,17 @@ coded_enum! {
 Warning {
     /// The median of a step is outside the range of a running machine.
     "dead_channel" DeadChannel { channel: Channel, reading: f64 },
-    /// One value for seconds.
+    /// The reading was constant for seconds.
     "frozen_channel" FrozenChannel { channel: Channel, reading: f64, from_s: f64, to_s: f64 },
     /// A noisy channel repeated a value within the step.
     "stuck" Stuck { channel: Channel, duration_s: f64 },
-    /// Far more noise than declared; one standard deviation, in the channel's unit.
+    /// The noise is far larger than declared; one standard deviation, in the channel's unit.
     "noisy_channel" NoisyChannel { channel: Channel, noise: f64, declared_noise: f64 },
     /// A wrong scale, an offset or a drift.
     "scaled_channel" ScaledChannel(Scaled),
     /// Two channels are swapped.
     "swapped_channels" SwappedChannels(Swapped),
-    /// A channel lags the others; negative: it leads them.
+    /// A channel lags the others, or leads them if `lag_s` is negative.
     "late_channel" LateChannel { channel: Channel, lag_s: f64, jumps: usize },
     /// Channels contradict each other.
     "contradicted_channel" ContradictedChannel { faults: Vec<SuspectedFault> },
@@ -29,22 +29,22 @@ Warning {
     "steps_contradict" StepsContradict(StepConflict),
     /// Samples were lost (NaN, gaps).
     "lost_samples" LostSamples { lost: usize, samples: usize },
-    /// Samples were left out: spikes.
+    /// Spikes were excluded.
     "outliers" Outliers { count: usize },
     /// The calibration of a sensor does not support its readings.
     "calibration" Calibration { channel: Channel, sensor: String, defect: CalibrationDefect },
-    /// Part of the state at the step's end is not from its last seconds.
+    /// Part of the final state of the step is older than its last seconds.
     "end_state" EndState { channel: Channel, lost_before_end_s: f64 },
 
     /// No jump leads to the step (dynamic method).
     "no_transient" NoTransient,
-    /// The efficiency comes from the shared parameters, as no jump leads to the step, or from a convection law of this origin.
+    /// The efficiency comes from the shared parameters, because no jump leads to the step, or from a convection law of this origin.
     "through_the_law" ThroughTheLaw { convection_origin: Option<String> },
     /// The window has too few complete samples.
     "too_few_samples" TooFewSamples(TooFew),
     /// The requested window does not fit into the step.
     "window_cut" WindowCut { requested_end_s: f64, step_s: f64 },
-    /// Speed, flow or pressure ratio did not stabilise in time; `used_s`: the end that is used nevertheless.
+    /// Speed, flow or pressure ratio did not stabilise in time; `used_s` is the end of the window that is used instead.
     "not_stabilised" NotStabilised { quantity: String, settled_s: f64, needed_s: f64, used_s: Option<f64> },
     /// A temperature still drifts (steady method).
     "not_settled" NotSettled { channel: Channel, drift_k_min: f64, limit_k_min: f64 },
@@ -73,9 +73,9 @@ Warning {
     "offsets_dominate" OffsetsDominate(WideInterval),
     /// Noise makes the efficiency uncertain.
     "noise_dominates" NoiseDominates(WideInterval),
-    /// The recording alone determines the efficiencies only this well.
+    /// The efficiencies depend on declared uncertainties; from the recording alone they have this error.
     "rests_on_declaration" RestsOnDeclaration { eta_error: f64 },
-    /// The efficiency depends on an alpha_A that is not known well enough.
+    /// The efficiency depends on an alpha_A with too large an uncertainty.
     "assumed_alpha" AssumedAlpha { alpha_area_ratio: f64, alpha_area_sigma_ratio: f64, eta_sigma: f64 },
     /// No sensor uncertainty is declared.
     "nothing_declared" NothingDeclared,
@@ -105,13 +105,13 @@ macro_rules! kinds {
 }
 
 kinds! {
-    /// What is wrong with a calibration; values in the unit of the channel.
+    /// Defect of a calibration; values in the unit of the channel.
     CalibrationDefect {
-        /// It is required, and this key of it is missing; the whole of it if the key is `calibration`.
+        /// A required key is missing; if `key` is `calibration`, the whole calibration is missing.
         Missing { key: String },
-        /// It is not valid any more on the day of the run; days as year-month-day.
+        /// The calibration was due before the day of the run; days as year-month-day.
         Expired { due: String, day: String },
-        /// A reading is outside the calibrated range: the farthest one.
+        /// Readings are outside the calibrated range; `reading` is the farthest one.
         Range { reading: f64, min: f64, max: f64 },
         /// The certificate's standard uncertainty is larger than the declared one.
         Uncertainty { certified: f64, declared: f64 },
@@ -122,14 +122,14 @@ kinds! {
         SpecificSpeed { speed_rpm: f64, flow_kg_s: f64, pressure_ratio: f64, specific_speed: f64 },
         /// T2 does not follow from the pressure ratio.
         ApparentEfficiency { rise_k: f64, t1_k: f64, pressure_ratio: f64, isentropic_rise_k: f64, efficiency: f64 },
-        /// The same at some points only.
+        /// T2 does not follow from the pressure ratio, at some points only.
         SomePoints,
-        /// The compressor takes more than the turbine delivers, or far less.
+        /// The compressor takes more power than the turbine delivers, or far less.
         ShaftPower { compressor_w: f64, turbine_w: f64, power_ratio: f64 },
     }
     /// Evidence for swapped channels; medians.
     Swapped {
-        /// P2 lies below P1 at so many points.
+        /// P2 lies below P1 at `points` of `of` points.
         P2BelowP1 { points: usize, of: usize, p1_pa: f64, p2_pa: f64 },
         /// T2 is hotter than T3 at most points.
         T2AboveT3,
@@ -149,7 +149,7 @@ kinds! {
         ShortStep { step_s: f64 },
         /// The commands changed until shortly before the end.
         LateCommands { before_end_s: f64 },
-        /// Samples in the window.
+        /// Too few samples in the window.
         Samples { complete: usize, lost: usize, needed: usize },
     }
     /// Reason for no efficiency.
@@ -161,7 +161,7 @@ kinds! {
         /// The pressure ratio is at most 1.
         NoPressureRise,
     }
-    /// The quantity on a bound.
+    /// The quantity that reached a bound of the search.
     Bound {
         /// Efficiency.
         Eta { eta: f64 },
@@ -170,11 +170,11 @@ kinds! {
     }
     /// The fit that failed.
     FitFailure {
-        /// Of this step.
+        /// The fit of this step.
         Step,
-        /// Of all steps: this one was identified alone.
+        /// The fit of all steps; this step was identified alone.
         AllSteps,
-        /// No finite number for this step.
+        /// The fit gave no finite number for this step.
         NotFinite,
     }
     /// Evidence for a poor fit.
@@ -183,25 +183,25 @@ kinds! {
         Eta { eta: f64 },
         /// The residual of T2 relative to the declared noise.
         NoiseRatio { residual_ratio: f64 },
-        /// The residual of T2, and what the declared noise explains.
+        /// The residual of T2 and the part that the declared noise explains.
         Noise { residual_k: f64, noise_k: f64 },
-        /// The residual of T2 has a shape: means over `block_s`, while T2 changes by `dt2_k`.
+        /// The residual of T2 is systematic: it remains in means over `block_s`, while T2 changes by `dt2_k`.
         Shape { residual_k: f64, block_s: f64, dt2_k: f64 },
     }
     /// Result of a heat correction.
     HeatCorrected {
-        /// Corrected by one heat for the whole map.
+        /// Corrected with one heat flow for the whole map.
         Corrected { apparent_eta: f64 },
-        /// The efficiency would be too high without this heat.
+        /// Without this heat flow the efficiency would be too high.
         TooMuchHeat { heat_w: f64 },
     }
     /// Reason for excluding a step from the shared parameters.
     LeftOut {
-        /// It fits far worse than the others.
+        /// The step fits far worse than the others.
         PoorFit,
-        /// Its readings failed a check.
+        /// Readings failed a check.
         Readings,
-        /// Its region of the map disagrees with the others.
+        /// Region of the map disagrees with the others.
         Region { region: MapRegion, sigmas: f64, doubts: Vec<ModelDoubt> },
     }
     /// Evidence against the joint model.
@@ -256,16 +256,16 @@ pub enum EndEvidence {
 /// A wide interval of the efficiency: standard errors as fractions, and the signal.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct WideInterval {
-    /// From noise.
+    /// Standard error from noise.
     pub eta_noise_sigma: f64,
-    /// From declared offsets and gains, and from shared parameters.
+    /// Standard error from declared offsets and gains, and from shared parameters.
     pub eta_bias_sigma: f64,
     /// The signal.
     #[serde(flatten)]
     pub signal: EtaSignal,
 }
 
-/// What an efficiency is derived from.
+/// Signal from which an efficiency is derived.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum EtaSignal {
@@ -298,7 +298,7 @@ pub struct SuspectedFault {
     pub unit: String,
     /// Names of other faults that are at least one twentieth as probable.
     pub alternatives: Vec<String>,
-    /// Whether any number of the points depends on it; if not, they keep their verdicts.
+    /// Whether results of the points depend on it; if not, the points keep their verdicts.
     pub touches_points: bool,
 }
 

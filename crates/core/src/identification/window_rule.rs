@@ -1,4 +1,4 @@
-//! Which part of a step is evaluated.
+//! The evaluated part of a step.
 
 use serde::{Deserialize, Serialize};
 
@@ -22,14 +22,14 @@ impl WindowRule {
     /// Earliest start of an automatic window after the last change of a command, s: the typical time in Burke et al.,
     /// and the time that probes of 1.5 mm need to follow.
     pub const EARLIEST_S: f64 = 10.0;
-    /// Shortest useful window, s. A step that settles later uses its last seconds of this length, and is doubtful.
+    /// Shortest useful window, s. A step that settles later uses a window of this length at its end, and is doubtful.
     pub const SHORTEST_S: f64 = 30.0;
 
-    /// Share of a step, at its end, in which its operating point must have settled for a method that evaluates the step from
-    /// its jump on. The point's state is the mean of the last seconds, but an oscillating step may pass through a momentary rest. Judgement.
+    /// Fraction at the end of a step in which its operating point must have settled, for methods that evaluate the step from
+    /// its jump on. The point's state is the mean of the last seconds, but an oscillating step may be steady for a moment only. Judgement.
     const SETTLED_END_RATIO: f64 = 0.25;
 
-    /// The same for a step of `dwell_s`, s: at most [`Self::SHORTEST_S`].
+    /// Length of this part for a step of `dwell_s`, s: at most [`Self::SHORTEST_S`].
     pub fn settled_end_s(dwell_s: f64) -> f64 {
         (Self::SETTLED_END_RATIO * dwell_s).min(Self::SHORTEST_S)
     }

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// The definition of an isentropic efficiency.
 ///
-/// Definitions differ in how the temperatures of the end points become work: by up to 0.2 points at a pressure ratio of 2 and 0.7 at 4.
+/// Definitions differ in the conversion of temperatures to work: by up to 0.2 points at a pressure ratio of 2 and 0.7 at 4.
 /// An efficiency is therefore meaningful only together with its definition.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -15,7 +15,7 @@ pub enum EfficiencyDefinition {
     Enthalpy,
     /// `T1 (PR^((gamma - 1)/gamma) - 1)/(T2 - T1)` with this ratio of heat capacities, above 1.
     ConstantGamma(f64),
-    /// The same with `(gamma - 1)/gamma = R/cp(T1)` (Burke et al., eq. 2).
+    /// `T1 (PR^kappa - 1)/(T2 - T1)` with `kappa = R/cp(T1)` (Burke et al., eq. 2).
     #[serde(rename = "kappa_of_T1")]
     KappaOfT1,
 }
@@ -35,7 +35,7 @@ impl EfficiencyDefinition {
     }
 }
 
-/// The definition as files and options write it: `enthalpy`, `kappa_of_T1`, `constant_gamma 1.4`.
+/// The definition as text for files and options: `enthalpy`, `kappa_of_T1`, `constant_gamma 1.4`.
 impl std::fmt::Display for EfficiencyDefinition {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
@@ -63,7 +63,7 @@ impl std::str::FromStr for EfficiencyDefinition {
             "kappa_of_T1" => Ok(EfficiencyDefinition::KappaOfT1),
             other => {
                 let gamma = other.strip_prefix("constant_gamma").and_then(|rest| rest.trim().parse().ok());
-                // A diatomic gas has 1.4, a monatomic one 5/3; kinetic theory allows no more.
+                // A diatomic gas has 1.4, a monatomic gas 5/3, the maximum of kinetic theory.
                 let gamma = gamma.filter(|gamma: &f64| *gamma > 1.0 && *gamma < 2.0).ok_or_else(unknown)?;
                 Ok(EfficiencyDefinition::ConstantGamma(gamma))
             }

@@ -1,4 +1,4 @@
-//! A smooth surface through a map's points, as a table over speed and the place on the line.
+//! A smooth surface through the points of a map, as a table over speed and the position on the line.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,23 +14,23 @@ pub struct FittedNode {
     /// Isentropic efficiency by the work coefficient: isentropic work over actual work. Actual specific work over
     /// `cp T_ref`, ratio, always above 0.
     pub work_ratio: f64,
-    /// Standard error across the line: its part along flow, kg/s.
+    /// Flow component of the standard error across the line, kg/s.
     pub flow_standard_error_kg_s: f64,
-    /// Standard error across the line: its part along the pressure ratio.
+    /// Pressure ratio component of the standard error across the line.
     pub pressure_ratio_standard_error: f64,
     /// Standard error of `eta`, including the shared part, fraction.
     pub eta_standard_error: f64,
-    /// The part that all places share, as far as the points determine it: it moves the whole surface, fraction.
+    /// Part of the standard error of `eta` that all nodes share, as far as the points determine it, fraction.
     #[serde(default)]
     pub eta_common_standard_error: f64,
-    /// Standard error that the corrected flows of all places share (the flow meter's gain), kg/s; not part of that across
+    /// Standard error that the corrected flows of all nodes share (the gain of the flow meter), kg/s; not part of the error across
     /// the line.
     #[serde(default)]
     pub flow_common_standard_error_kg_s: f64,
-    /// The same of the pressure ratio.
+    /// Standard error that the pressure ratios of all nodes share.
     #[serde(default)]
     pub pressure_ratio_common_standard_error: f64,
-    /// Whether no measured point supports this place: beyond the ends of the measured lines, or between two lines
+    /// Whether no measured point supports this node: beyond the ends of the measured lines, or between two lines
     /// beyond the outermost speeds.
     pub extrapolated: bool,
 }
@@ -63,7 +63,7 @@ pub struct LeftOutLine {
     /// `None` in files that do not contain it.
     #[serde(default)]
     pub distance_held_ratio: Option<f64>,
-    /// Share of its efficiencies that lie within theirs; `None` without any.
+    /// Share of its efficiencies within their 95 % intervals; `None` without efficiencies.
     #[serde(default)]
     pub eta_held_ratio: Option<f64>,
 }
@@ -71,7 +71,7 @@ pub struct LeftOutLine {
 /// A fitted map: a rectangular table over corrected speed and `beta` (0 at the choke end, 1 at the surge end).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FittedMap {
-    /// Place on the line of each node, 0..1, rising.
+    /// Position of each node on its line, 0..1, rising.
     pub beta_ratio: Vec<f64>,
     /// Lines in order of speed, each with as many nodes as `beta_ratio`.
     pub lines: Vec<FittedLine>,
@@ -83,7 +83,7 @@ pub struct FittedMap {
     pub line_scatter_ratio: f64,
     /// Pairs of neighbouring lines that cross; 0 in a valid fit.
     pub crossings: usize,
-    /// The errors at each line when it is left out; empty if not requested or if there are too few lines.
+    /// Error at each line if it is left out of the fit; empty if not requested or if there are too few lines.
     pub left_out: Vec<LeftOutLine>,
 }
 
@@ -97,7 +97,7 @@ impl FittedMap {
     pub fn choke_line(&self) -> impl Iterator<Item = (f64, &FittedNode)> {
         self.lines.iter().filter_map(|line| {
             let largest = line.nodes.iter().map(|n| n.flow_corrected_kg_s).fold(f64::MIN, f64::max);
-            // The end of a line is vertical: its top is where the machine chokes.
+            // The end of a line is vertical: the machine chokes at its top.
             let node = line.nodes.iter().rev().find(|n| n.flow_corrected_kg_s >= 0.998 * largest)?;
             Some((line.speed_corrected_rpm, node))
         })

@@ -1,4 +1,4 @@
-//! A map from a file, with what the reader understood.
+//! A map from a file, with the assumptions of its reader.
 
 use crate::{CompressorMap, ReferenceState};
 use serde::Serialize;
@@ -10,9 +10,9 @@ pub struct ImportedMap {
     pub map: CompressorMap,
     /// The columns of a table; empty for files that name their fields.
     pub columns: Vec<ImportedColumn>,
-    /// What the reader assumed or computed.
+    /// Assumptions and computations of the reader.
     pub remarks: Vec<ImportRemark>,
-    /// The points of a table of measured ones, in its order; empty for any other file.
+    /// The points of a table of measured points, in its order; empty for any other file.
     pub measured: Vec<MeasuredPoint>,
 }
 
@@ -96,15 +96,15 @@ impl From<CompressorMap> for ImportedMap {
 /// A column of a table of points.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ImportedColumn {
-    /// Its heading; empty if it has none.
+    /// Heading; empty if it has none.
     pub heading: String,
-    /// Its number, from 1.
+    /// Number, from 1.
     pub number: usize,
     /// The quantity it holds.
     pub quantity: &'static str,
     /// Key of the quantity in a map description.
     pub key: &'static str,
-    /// Its unit as written; empty if it names none.
+    /// Unit as written; empty if it names none.
     pub unit: String,
     /// Smallest value in SI, speeds in rpm; volume flows as mass flows, reduced quantities as corrected ones.
     pub low: f64,
@@ -112,13 +112,13 @@ pub struct ImportedColumn {
     pub high: f64,
 }
 
-/// What a reader of a map assumed or computed.
+/// Assumption or computation of a map reader.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ImportRemark {
     /// The columns have no headings: rpm, kg/s, pressure ratio, efficiency were assumed.
     NoHeading,
-    /// Columns without headings behind the efficiency were left out.
+    /// Columns without headings after the efficiency were ignored.
     FurtherColumns {
         /// Their number.
         count: usize,
@@ -138,14 +138,14 @@ pub enum ImportRemark {
     Measured,
     /// The file names no unit of flow; kg/s was taken.
     FlowUnitAssumed,
-    /// Speeds without a unit were taken as rpm/K^0.5, from their size.
+    /// Speeds without a unit were assumed to be in rpm/K^0.5, because of their size.
     SpeedParameterAssumed,
-    /// Relative speeds were multiplied by this one.
+    /// Relative speeds were multiplied by this speed.
     DesignSpeed {
         /// Speed of 1, rpm.
         rpm: f64,
     },
-    /// Nodes that the fit of the map extrapolated were left out.
+    /// Extrapolated nodes of the fitted map were ignored.
     ExtrapolatedNodes {
         /// Their number.
         count: usize,

@@ -14,7 +14,7 @@ pub struct MapPoint {
     pub eta: Option<f64>,
     /// The point as identified, with its uncertainty and warnings.
     pub identified: IdentifiedPoint,
-    /// The correction of the point to the speed of its line; `None` if it is as measured.
+    /// The correction of the point to the speed of its line; `None` if it was not corrected.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shift: Option<SpeedShift>,
 }
@@ -51,12 +51,12 @@ pub struct CompressorMap {
     pub machine: String,
     /// Reference state of corrected flow and speed.
     pub reference: ReferenceState,
-    /// How the points were identified.
+    /// Method that identified the points.
     pub method: Method,
     /// Definition of the efficiencies; `None` if a map file does not name it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub efficiency: Option<EfficiencyDefinition>,
-    /// The gas that was compressed, in words; corrected flows are those of dry air at equal Mach numbers. `None` if a map file does not name it.
+    /// Description of the gas; corrected flows are those of dry air at equal Mach numbers. `None` if a map file does not name it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gas: Option<String>,
     /// Speed lines in order of speed.
@@ -70,7 +70,7 @@ pub struct CompressorMap {
 }
 
 impl CompressorMap {
-    /// The same map with corrected flows and speeds referred to another state.
+    /// Refers the corrected flows and speeds to another reference state.
     pub fn at_reference(mut self, reference: ReferenceState) -> Self {
         let (flow, speed) =
             (self.reference.flow_factor_to(reference), self.reference.speed_factor_to(reference));

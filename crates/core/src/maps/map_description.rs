@@ -1,8 +1,8 @@
-//! What a user states about a map file: the parts that the file leaves open.
+//! A user's description of a map file: the data that the file omits.
 
 use crate::ReferenceState;
 
-/// Statements about a map file. What is not stated is found in the file, or is an error.
+/// Statements about a map file. Data that are not stated must be in the file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct MapDescription {
     /// Reference state of the corrected quantities.

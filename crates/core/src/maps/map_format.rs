@@ -4,13 +4,13 @@ use crate::{
     CompressorMap, ExportError, ImportError, ImportedMap, ImportedTurbine, MapDescription, TurbineMap,
 };
 
-/// Largest map file that is read, bytes: a measured map has some ten thousand.
+/// Maximum size of a map file, bytes: a measured map has some ten thousand.
 pub const MAP_FILE_SIZE_LIMIT: usize = 32 << 20;
 
 /// Turns a map into the bytes of a file. The same map gives the same bytes.
 pub type WriteMap = fn(&CompressorMap) -> Result<Vec<u8>, ExportError>;
 
-/// Turns a map into the bytes of a picture, its numbers in these units.
+/// Turns a map into the bytes of a picture with numbers in these units.
 pub type DrawMap = fn(&CompressorMap, &MapUnits) -> Result<Vec<u8>, ExportError>;
 
 /// Units of a picture of a map; the map itself stays in kg/s and rpm.
@@ -38,9 +38,9 @@ impl Default for MapUnits {
     }
 }
 
-/// Parses the bytes of a file into a map; the second argument is what the user states about the file.
+/// Parses the bytes of a file into a map; the second argument is the user's description of the file.
 ///
-/// A map without a reference state is rejected: a wrong one shifts speeds by 1.7 % and more, and goes unnoticed.
+/// A map without a reference state is rejected: a wrong one shifts speeds by 1.7 % and more, and is not noticed.
 pub type ReadMap = fn(&[u8], &MapDescription) -> Result<ImportedMap, ImportError>;
 
 /// Turns a turbine map into the bytes of a file.
@@ -73,13 +73,13 @@ pub struct MapFormat {
     pub further_extensions: &'static [&'static str],
     /// A one-line description.
     pub description: &'static str,
-    /// Its writer, if maps can be written in it.
+    /// Writer, if the format can be written.
     pub write: Option<WriteMap>,
-    /// Its writer in other units, if it is a picture.
+    /// Writer in display units, if the format is a picture.
     pub draw: Option<DrawMap>,
-    /// Its reader, if maps can be read from it.
+    /// Reader, if the format can be read.
     pub read: Option<ReadMap>,
-    /// The same for maps of turbines.
+    /// Writer and reader of turbine maps.
     pub turbine: TurbineFormat,
 }
 
@@ -92,7 +92,7 @@ impl MapFormat {
                 .any(|known| known.eq_ignore_ascii_case(extension))
     }
 
-    /// The content of a file with `map`.
+    /// Writes a file with `map`.
     ///
     /// # Errors
     /// [`ExportError`]: the format is read-only, or it cannot represent this map.
@@ -103,15 +103,15 @@ impl MapFormat {
         }
     }
 
-    /// The same, a picture in display units.
+    /// Writes a map in display units, if the format is a picture.
     ///
     /// # Errors
-    /// As [`MapFormat::write`].
+    /// Those of [`MapFormat::write`].
     pub fn write_in(&self, map: &CompressorMap, units: &MapUnits) -> Result<Vec<u8>, ExportError> {
         self.draw.map_or_else(|| self.write(map), |draw| draw(map, units))
     }
 
-    /// Parses the map of a file; `given` is what the user states about it, or the reference state alone.
+    /// Parses the map of a file; `given` is the user's description of it, or the reference state alone.
     ///
     /// # Errors
     /// [`ImportError`]: the format is write-only, the file is too large, not text, not a map (with its line), or
@@ -124,7 +124,7 @@ impl MapFormat {
         read(bytes, &given.into())
     }
 
-    /// The content of a file with the map of a turbine.
+    /// Writes a file with the map of a turbine.
     ///
     /// # Errors
     /// [`ExportError`]: the format has no turbine maps, or it cannot represent this one.
@@ -138,7 +138,7 @@ impl MapFormat {
     /// Parses the map of a turbine.
     ///
     /// # Errors
-    /// As [`MapFormat::read`].
+    /// Those of [`MapFormat::read`].
     pub fn read_turbine(
         &self,
         bytes: &[u8],
@@ -157,7 +157,7 @@ impl MapFormat {
 pub struct MapFormats(pub &'static [MapFormat]);
 
 impl MapFormats {
-    /// All of them, in display order.
+    /// All formats, in display order.
     pub fn iter(self) -> impl Iterator<Item = &'static MapFormat> {
         self.0.iter()
     }
@@ -172,7 +172,7 @@ impl MapFormats {
         self.iter().filter(|format| format.write.is_some())
     }
 
-    /// The format of a file to write, from its name, ignoring case. The longest extension counts:
+    /// The format for writing a file of this name, ignoring case. The longest extension counts:
     /// `map.fitted.csv` is not plain CSV.
     pub fn written_to(self, file_name: &str) -> Option<&'static MapFormat> {
         let file_name = file_name.to_ascii_lowercase();
@@ -183,7 +183,7 @@ impl MapFormats {
             .max_by_key(|format| format.extension.len())
     }
 
-    /// The format of a file to read, from its extension (without the dot).
+    /// The format for reading a file with this extension (without the dot).
     pub fn read_from(self, extension: &str) -> Option<&'static MapFormat> {
         self.iter().find(|format| format.reads_extension(extension))
     }

@@ -1,11 +1,11 @@
-//! Why a map cannot be written, and why a file is not a map.
+//! Errors of writing and reading maps.
 
 use crate::{ReferenceState, step_number};
 
 /// The error of a library below a format.
 type Cause = Box<dyn std::error::Error + Send + Sync>;
 
-/// Why a map could not be written.
+/// Reason why a map could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
     /// The library that writes the format failed.
@@ -16,14 +16,14 @@ pub enum ExportError {
         /// The error of the library.
         source: Cause,
     },
-    /// A coordinate is not a number: JSON would turn it into null, and the file could not be read back.
+    /// A coordinate is NaN: JSON would turn it into null, and the file would be unreadable.
     #[error("step {}: {quantity} is {value}, which the format cannot represent; remove the point from the map", step_number(*step))]
     NotFinite {
         /// Index of the step, from 0.
         step: usize,
-        /// Which field.
+        /// Name of the field.
         quantity: &'static str,
-        /// Its value.
+        /// Value.
         value: f64,
     },
     /// The format is a table over the whole map, and the map has only points.
@@ -53,13 +53,13 @@ impl ExportError {
     }
 }
 
-/// Why a file is not a map.
+/// Reason why a file is not a map.
 #[derive(Debug, thiserror::Error)]
 pub enum ImportError {
     /// Larger than any map.
     #[error("the file has {bytes} bytes; a map has at most {limit}")]
     TooLarge {
-        /// Its size.
+        /// Size.
         bytes: usize,
         /// Largest size read.
         limit: usize,
@@ -181,9 +181,9 @@ pub enum ImportError {
          `design_pressure_ratio` or `design_efficiency`; leave these out, or correct NcMapDes and RlineMapDes"
     )]
     DesignPoint {
-        /// Its speed as in the file.
+        /// Speed as in the file.
         speed: f64,
-        /// Its auxiliary coordinate.
+        /// Auxiliary coordinate.
         rline: f64,
     },
     /// An invalid statement of the user about this file.
@@ -191,7 +191,7 @@ pub enum ImportError {
     Description {
         /// Key of the statement.
         key: &'static str,
-        /// Its text.
+        /// Text.
         text: String,
         /// The problem.
         problem: String,
@@ -210,7 +210,7 @@ pub enum ImportError {
         /// The problem.
         problem: String,
     },
-    /// All lines slower than any turbocharger's.
+    /// All lines are slower than those of any turbocharger.
     #[error(
         "the fastest speed line has only {speed_corrected_rpm} rpm, which is too slow for a turbocharger; if the speeds are in krpm, write that \
          in the heading (`speed [krpm]`)"
@@ -239,9 +239,9 @@ pub enum ImportError {
     NotANumber {
         /// Line, from 1.
         line: usize,
-        /// Which quantity or column.
+        /// Name of the quantity or column.
         quantity: String,
-        /// Its text, shortened.
+        /// Text, shortened.
         text: String,
     },
     /// A value without physical meaning.
@@ -249,9 +249,9 @@ pub enum ImportError {
     Value {
         /// Line, from 1.
         line: usize,
-        /// Which column.
+        /// Name of the column.
         quantity: &'static str,
-        /// Its value.
+        /// Value.
         value: f64,
         /// The allowed range.
         needed: &'static str,
@@ -262,11 +262,11 @@ pub enum ImportError {
     /// A field of a JSON map is not a valid number.
     #[error("{place}: {quantity} = {value} is not possible; it must be {needed}")]
     Field {
-        /// Which line and point of the map.
+        /// Line and point of the map.
         place: String,
-        /// Which field.
+        /// Name of the field.
         quantity: &'static str,
-        /// Its value.
+        /// Value.
         value: f64,
         /// The allowed range.
         needed: &'static str,
@@ -283,7 +283,7 @@ pub enum ImportError {
         "the file has the reference state {found}, but {given} was stated; leave the statement out, or correct the file"
     )]
     ReferenceConflict {
-        /// In the file.
+        /// Reference state in the file.
         found: ReferenceState,
         /// Given.
         given: ReferenceState,

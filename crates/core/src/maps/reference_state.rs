@@ -32,12 +32,12 @@ impl ReferenceState {
         (200.0..=400.0).contains(&self.t_ref_k) && (50e3..=200e3).contains(&self.p_ref_pa)
     }
 
-    /// Factor that turns a corrected flow of this state into one of `other` (the machine's state is the same).
+    /// Factor that converts a corrected flow of this reference state to `other`.
     pub fn flow_factor_to(&self, other: ReferenceState) -> f64 {
         (other.p_ref_pa / self.p_ref_pa) * (self.t_ref_k / other.t_ref_k).sqrt()
     }
 
-    /// Factor that turns a corrected speed of this state into one of `other`.
+    /// Factor that converts a corrected speed of this reference state to `other`.
     pub fn speed_factor_to(&self, other: ReferenceState) -> f64 {
         (other.t_ref_k / self.t_ref_k).sqrt()
     }
@@ -70,7 +70,7 @@ pub struct NamedReference {
     pub name: &'static str,
     /// The state.
     pub state: ReferenceState,
-    /// How it is printed on maps.
+    /// Text on printed maps.
     pub printed: &'static str,
 }
 

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// One point of a turbine map. Speed and flow are reduced by the state at the inlet, so they need no reference state.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TurbineMapPoint {
-    /// Position of the vanes or of the bypass valve as the file has it; `None` for fixed geometry.
+    /// Position of the vanes or of the bypass valve, as in the file; `None` for fixed geometry.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub vane_position: Option<f64>,
     /// Speed over the root of the inlet temperature, rpm/K^0.5.
@@ -36,9 +36,9 @@ pub struct TurbineMap {
 pub struct FittedTurbine {
     /// Lines in order of vane position and speed.
     pub lines: Vec<FittedTurbineLine>,
-    /// Root mean square of the flow's error at lines that the fit does not know, fraction of the flow.
+    /// Root mean square of the flow's error at lines that were left out of the fit, fraction of the flow.
     pub flow_error_rms_ratio: f64,
-    /// The same of the efficiency, fraction; `None` without efficiencies.
+    /// Root mean square of the efficiency's error at these lines, fraction; `None` without efficiencies.
     pub efficiency_error_rms: Option<f64>,
 }
 
@@ -50,11 +50,11 @@ pub struct FittedTurbineLine {
     pub vane_position: Option<f64>,
     /// Speed parameter, rpm/K^0.5.
     pub speed_parameter_rpm_sqrt_k: f64,
-    /// Nodes in order of expansion ratio, the same of all lines.
+    /// Nodes in order of expansion ratio, which is the same for all lines.
     pub nodes: Vec<FittedTurbineNode>,
 }
 
-/// A node of a fitted turbine map, with 95 % intervals of a measurement there.
+/// A node of a fitted turbine map, with 95 % intervals of a measurement at the node.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FittedTurbineNode {
     /// Expansion ratio.
@@ -82,9 +82,9 @@ pub struct ImportedTurbine {
     pub map: TurbineMap,
     /// The columns of the table.
     pub columns: Vec<ImportedColumn>,
-    /// What the reader assumed.
+    /// Assumptions of the reader.
     pub remarks: Vec<ImportRemark>,
-    /// The points of a table of measured ones, in its order; empty for any other file.
+    /// The points of a table of measured points, in its order; empty for any other file.
     pub measured: Vec<MeasuredTurbinePoint>,
 }
 

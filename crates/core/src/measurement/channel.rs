@@ -19,7 +19,7 @@ pub enum Channel {
     T1,
     /// Compressor outlet pressure (station 2).
     P2,
-    /// Compressor outlet total temperature as the probe reads it (station 2).
+    /// Compressor outlet total temperature, as read by the probe (station 2).
     T2,
     /// Compressor housing temperature.
     Tc,
@@ -148,7 +148,7 @@ pub struct ChannelInfo {
     pub field: &'static str,
     /// Physical dimension.
     pub dimension: Dimension,
-    /// One line for people.
+    /// Description of one line.
     pub description: &'static str,
 }
 
@@ -190,7 +190,7 @@ pub const CHANNELS: [ChannelInfo; 26] = {
     ]
 };
 
-/// Number of channels that the model has: the first ones. The others are only measured.
+/// Number of modelled channels, which are the first ones. The others are only measured.
 pub const MODELLED_CHANNELS: usize = 19;
 
 impl Channel {

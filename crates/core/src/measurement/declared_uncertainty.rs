@@ -14,13 +14,13 @@ pub struct DeclaredUncertainty {
     pub gain_sigma_ratio: f64,
 }
 
-/// Sensor noise as a white and a first-order part in quadrature: shares `sqrt(1 - c^2)` and `c`.
+/// Colour of the sensor noise: white noise and first-order noise, with standard deviations `sqrt(1 - c^2)` and `c` of the total.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NoiseColour {
-    /// Share c of the first-order part in the standard deviation, 0..1.
+    /// Share c of the first-order noise in the standard deviation, 0..1.
     pub first_order_share_ratio: f64,
-    /// Its time constant, s, > 0.
+    /// Time constant, s, > 0.
     pub time_constant_s: f64,
 }
 

@@ -1,8 +1,8 @@
-//! The operating point of a step as measured. It distinguishes points if no commands were recorded.
+//! The measured operating point of a step, which distinguishes points if no commands were recorded.
 
 use crate::{Channel, Recording, Series, StepMarker};
 
-/// Channels that jump between the points of a map, with the relative change from which two points differ. Temperatures are not among them,
+/// Channels that jump between the points of a map, with the minimum relative change between two different points. Temperatures are not among them,
 /// because they take minutes to follow.
 pub const JUMPS: [(Channel, f64); 4] = [
     (Channel::ShaftSpeed, 0.01),
@@ -51,17 +51,17 @@ impl HeldPoint {
     pub fn is_same(&self, other: &HeldPoint) -> bool {
         let ratio =
             |channel: Channel| JUMPS.iter().find(|(of, _)| *of == channel).map_or(0.0, |(_, ratio)| *ratio);
-        let alike = |a: f64, b: f64, ratio: f64| (a - b).abs() <= ratio * a.abs().max(b.abs());
-        let unknown_or_alike = |a: f64, b: f64, ratio: f64| a.is_nan() && b.is_nan() || alike(a, b, ratio);
+        let is_close = |a: f64, b: f64, ratio: f64| (a - b).abs() <= ratio * a.abs().max(b.abs());
+        let unknown_or_close = |a: f64, b: f64, ratio: f64| a.is_nan() && b.is_nan() || is_close(a, b, ratio);
         let opening = (self.valve_opening_ratio, other.valve_opening_ratio);
         let same_opening = if opening.0.is_nan() && opening.1.is_nan() {
-            alike(self.flow_kg_s, other.flow_kg_s, ratio(Channel::CompressorFlow))
+            is_close(self.flow_kg_s, other.flow_kg_s, ratio(Channel::CompressorFlow))
         } else {
-            alike(opening.0, opening.1, VALVE_JUMP_RATIO)
+            is_close(opening.0, opening.1, VALVE_JUMP_RATIO)
         };
         same_opening
-            && alike(self.speed_rpm, other.speed_rpm, ratio(Channel::ShaftSpeed))
-            && unknown_or_alike(self.p3_pa, other.p3_pa, ratio(Channel::P3))
+            && is_close(self.speed_rpm, other.speed_rpm, ratio(Channel::ShaftSpeed))
+            && unknown_or_close(self.p3_pa, other.p3_pa, ratio(Channel::P3))
     }
 }
 

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 /// Time between two joined recordings, s: much longer than the thermal time constant of any housing, so that the last step of one
 /// recording does not count as the start of the first jump of the next.
 const RECORDING_GAP_S: f64 = 3600.0;
-/// Tolerance of the commands within which steps of logs without targets are at the same point.
+/// Tolerance of the commands for two steps at the same point, in logs without targets.
 const SAME_COMMAND_RATIO: f64 = 5e-3;
 
 /// Origin of a step of a joined recording.
@@ -14,7 +14,7 @@ const SAME_COMMAND_RATIO: f64 = 5e-3;
 pub struct StepOrigin {
     /// Number of the recording, from 0.
     pub recording: usize,
-    /// Index of the step there.
+    /// Index of the step in its recording.
     pub step: usize,
 }
 
@@ -23,39 +23,39 @@ pub struct StepOrigin {
 /// are compared by target, by command, or by measurement if neither is known. Also returns the origin of each step, in order.
 pub fn join_recordings(recordings: Vec<Recording>) -> (Recording, Vec<StepOrigin>) {
     let alone = recordings.len() < 2;
-    let mut whole = Recording::default();
+    let mut joined = Recording::default();
     let mut origins = Vec::new();
-    // The measured point of each step and of the one before it, if only measurements identify the points.
+    // The measured points of each step and of the previous step, if only measurements identify the points.
     let mut step_points: Vec<StepPoints> = Vec::new();
     for (number, mut recording) in recordings.into_iter().enumerate() {
         origins.extend(recording.steps.iter().map(|step| StepOrigin { recording: number, step: step.index }));
         if alone {
             return (recording, origins);
         }
-        let shift_s = end_s(&whole).map_or(0.0, |end_s| end_s + RECORDING_GAP_S) - start_s(&recording);
-        let before = whole.steps.len();
+        let shift_s = end_s(&joined).map_or(0.0, |end_s| end_s + RECORDING_GAP_S) - start_s(&recording);
+        let before = joined.steps.len();
         let points: Vec<Option<HeldPoint>> =
             recording.steps.iter().map(|step| HeldPoint::of(&recording, step)).collect();
         let from = std::iter::once(None).chain(points.iter().copied());
         step_points.extend(points.iter().copied().zip(from));
         for (step, own_points) in recording.steps.iter_mut().zip(step_points[before..].to_vec()) {
-            step.kind = kind((step, own_points), &whole.steps[..before], &step_points);
-            step.index = whole.steps.len();
+            step.kind = kind((step, own_points), &joined.steps[..before], &step_points);
+            step.index = joined.steps.len();
             step.start_s += shift_s;
             step.end_s += shift_s;
-            whole.steps.push(*step);
+            joined.steps.push(*step);
         }
         recording.events.iter_mut().for_each(|event| event.t_s += shift_s);
-        whole.events.append(&mut recording.events);
-        append(&mut whole.series, recording.series, shift_s);
-        append::<Element>(&mut whole.elements, recording.elements, shift_s);
+        joined.events.append(&mut recording.events);
+        append(&mut joined.series, recording.series, shift_s);
+        append::<Element>(&mut joined.elements, recording.elements, shift_s);
     }
-    (whole, origins)
+    (joined, origins)
 }
 
-fn append<K: Ord>(whole: &mut BTreeMap<K, Series>, more: BTreeMap<K, Series>, shift_s: f64) {
+fn append<K: Ord>(joined: &mut BTreeMap<K, Series>, more: BTreeMap<K, Series>, shift_s: f64) {
     for (key, mut series) in more {
-        let together = whole.entry(key).or_default();
+        let together = joined.entry(key).or_default();
         together.t_s.extend(series.t_s.iter().map(|t_s| t_s + shift_s));
         together.values.append(&mut series.values);
     }
@@ -78,27 +78,27 @@ fn kind(
         (Some(to), Some(other), _) => to == other,
         (None, None, Some(_)) => same(held.0, other_held.0),
         (None, None, None) => {
-            alike(step.p3_pa, other.p3_pa) && alike(step.valve_opening_ratio, other.valve_opening_ratio)
+            is_close(step.p3_pa, other.p3_pa) && is_close(step.valve_opening_ratio, other.valve_opening_ratio)
         }
         _ => false,
     };
     // A repeat serves only for comparison: the point itself may come later, by another jump.
-    let mut there = earlier
+    let mut same_points = earlier
         .iter()
         .zip(earlier_held)
         .filter(|(other, _)| other.kind.measures())
         .filter(at_the_point)
         .peekable();
-    if step.kind != StepKind::Point || there.peek().is_none() {
+    if step.kind != StepKind::Point || same_points.peek().is_none() {
         return step.kind;
     }
-    let by_the_same_jump = |(other, other_held): (&StepMarker, &StepPoints)| {
+    let has_same_jump = |(other, other_held): (&StepMarker, &StepPoints)| {
         other.from == step.from && same(held.1, other_held.1)
     };
-    if there.any(by_the_same_jump) { StepKind::Repeat } else { StepKind::Return }
+    if same_points.any(has_same_jump) { StepKind::Repeat } else { StepKind::Return }
 }
 
-fn alike(a: f64, b: f64) -> bool {
+fn is_close(a: f64, b: f64) -> bool {
     (a - b).abs() <= SAME_COMMAND_RATIO * a.abs().max(b.abs())
 }
 
@@ -148,26 +148,26 @@ mod tests {
         let mut first = recording(0.0, &[(None, at(5e4)), (at(5e4), at(9e4))]);
         first.steps[1].kind = StepKind::Repeat;
         let second = recording(700.0, &[(None, at(7e4)), (at(7e4), at(9e4))]);
-        let (whole, _) = join_recordings(vec![first, second]);
-        assert_eq!(whole.steps[3].kind, StepKind::Point);
+        let (joined, _) = join_recordings(vec![first, second]);
+        assert_eq!(joined.steps[3].kind, StepKind::Point);
     }
 
     #[test]
     fn what_was_visited_before_is_no_new_point() {
         let first = recording(0.0, &[(None, at(5e4)), (at(5e4), at(9e4))]);
         let second = recording(700.0, &[(None, at(7e4)), (at(5e4), at(9e4)), (at(9e4), at(5e4))]);
-        let (whole, origins) = join_recordings(vec![first, second]);
-        let kinds: Vec<_> = whole.steps.iter().map(|step| step.kind).collect();
+        let (joined, origins) = join_recordings(vec![first, second]);
+        let kinds: Vec<_> = joined.steps.iter().map(|step| step.kind).collect();
         use StepKind::{Point, Repeat, Return};
         assert_eq!(kinds, [Point, Point, Point, Repeat, Return]);
         assert_eq!(origins[3], StepOrigin { recording: 1, step: 1 });
-        let t2 = &whole.series[&Channel::T2];
+        let t2 = &joined.series[&Channel::T2];
         assert!(t2.t_s.is_sorted_by(|a, b| a < b), "times rise");
         // Each step keeps its samples.
-        for step in &whole.steps {
+        for step in &joined.steps {
             assert_eq!(t2.slice(step.start_s, step.end_s).0.len(), 11);
         }
-        assert!(whole.steps[2].start_s - whole.steps[1].end_s >= RECORDING_GAP_S);
+        assert!(joined.steps[2].start_s - joined.steps[1].end_s >= RECORDING_GAP_S);
     }
 
     /// Speeds and flows that were held for 100 s each, without commands.
@@ -203,8 +203,8 @@ mod tests {
         let first = measured(&[(6e4, 0.03), (9e4, 0.05), (9e4, 0.04)]);
         // Set by hand: the same jump, the first point of the first run by another jump, and a new point.
         let second = measured(&[(6.02e4, 0.0301), (9.03e4, 0.0496), (6e4, 0.03), (9e4, 0.045)]);
-        let (whole, _) = join_recordings(vec![first, second]);
-        let kinds: Vec<_> = whole.steps[3..].iter().map(|step| step.kind).collect();
+        let (joined, _) = join_recordings(vec![first, second]);
+        let kinds: Vec<_> = joined.steps[3..].iter().map(|step| step.kind).collect();
         use StepKind::{Point, Repeat, Return};
         assert_eq!(kinds, [Repeat, Repeat, Return, Point]);
     }

@@ -61,7 +61,7 @@ impl SampleBatch {
         columns.chain(elements).chain(truth).for_each(|values| values.resize(after, f64::NAN));
     }
 
-    /// Cuts after the first `at` samples and returns the later ones. The events stay.
+    /// Splits off and returns the samples after the first `at`. The events stay.
     pub fn split_off(&mut self, at: usize) -> SampleBatch {
         fn cut<T>(values: &mut Vec<T>, at: usize) -> Vec<T> {
             values.split_off(at.min(values.len()))
@@ -72,29 +72,29 @@ impl SampleBatch {
             columns: self
                 .columns
                 .iter_mut()
-                .map(|one| ChannelColumn { channel: one.channel, values: cut(&mut one.values, at) })
+                .map(|column| ChannelColumn { channel: column.channel, values: cut(&mut column.values, at) })
                 .collect(),
             elements: self
                 .elements
                 .iter_mut()
-                .map(|one| ElementColumn { element: one.element, values: cut(&mut one.values, at) })
+                .map(|column| ElementColumn { element: column.element, values: cut(&mut column.values, at) })
                 .collect(),
             provenance: self
                 .provenance
                 .iter_mut()
-                .map(|one| Provenance {
-                    channel: one.channel,
-                    source_t_s: cut(&mut one.source_t_s, at),
-                    quality: cut(&mut one.quality, at),
+                .map(|column| Provenance {
+                    channel: column.channel,
+                    source_t_s: cut(&mut column.source_t_s, at),
+                    quality: cut(&mut column.quality, at),
                 })
                 .collect(),
             truth: self
                 .truth
                 .iter_mut()
-                .map(|one| TruthColumn {
-                    name: one.name.clone(),
-                    unit: one.unit.clone(),
-                    values: cut(&mut one.values, at),
+                .map(|column| TruthColumn {
+                    name: column.name.clone(),
+                    unit: column.unit.clone(),
+                    values: cut(&mut column.values, at),
                 })
                 .collect(),
             events: Vec::new(),

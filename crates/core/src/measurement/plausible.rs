@@ -8,7 +8,7 @@ use std::ops::RangeInclusive;
 pub struct Plausible {
     /// Readings of a running machine, from a car's turbocharger (wheels of 30 mm) to a ship's (of 300 mm).
     pub running: RangeInclusive<f64>,
-    /// Any single reading, standstill, spikes and faults of the meter included: a value outside is invalid.
+    /// Any single reading, including standstill, spikes and faults of the meter: a value outside is invalid.
     pub any: RangeInclusive<f64>,
 }
 

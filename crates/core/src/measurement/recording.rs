@@ -14,7 +14,7 @@ pub struct Series {
 }
 
 impl Series {
-    /// Value at `t_s` by linear interpolation, held constant beyond both ends. `None` for an empty series.
+    /// Value at `t_s` by linear interpolation, constant beyond both ends. `None` for an empty series.
     pub fn interpolate(&self, t_s: f64) -> Option<f64> {
         let after = self.t_s.partition_point(|t| *t < t_s);
         match (after.checked_sub(1), self.t_s.get(after)) {
@@ -64,19 +64,19 @@ pub struct ReadingOrigin {
 pub struct Recording {
     /// Measured and commanded channels.
     pub series: BTreeMap<Channel, Series>,
-    /// Each sensor of the channels that have several; empty if there are none.
+    /// Each sensor of channels with redundant sensors.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub elements: BTreeMap<Element, Series>,
-    /// Readings that are not good, or were taken before they arrived, in order; others have no entry. A bad one is NaN in its series.
+    /// Readings that are not good or arrived late, in order; others have no entry. A bad reading is NaN in its series.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub origins: BTreeMap<Channel, Vec<ReadingOrigin>>,
-    /// Steps in order; in recordings made by others found from changes of the command channels.
+    /// Steps in order; in imported recordings found from changes of the command channels.
     pub steps: Vec<StepMarker>,
     /// Events in order.
     pub events: Vec<Event>,
 }
 
-/// Why a recording cannot be used.
+/// Reason why a recording cannot be used.
 #[derive(Debug, Clone, thiserror::Error, PartialEq)]
 pub enum RecordingError {
     /// A required channel is missing.
@@ -91,7 +91,7 @@ impl Recording {
     /// The series of a channel.
     ///
     /// # Errors
-    /// [`RecordingError::MissingChannel`] if the recording has none, or an empty one.
+    /// [`RecordingError::MissingChannel`] if the channel is missing or empty.
     pub fn require(&self, channel: Channel) -> Result<&Series, RecordingError> {
         self.series
             .get(&channel)

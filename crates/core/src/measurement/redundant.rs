@@ -6,21 +6,21 @@ use serde::{Deserialize, Serialize};
 /// Maximum number of sensors on one channel.
 pub const MAX_ELEMENTS: usize = 16;
 
-/// While the rig runs, a reading that deviates from the median of all by more than this is skipped; standard deviations of noise and offset
-/// together. Identification excludes sensors based on the whole recording instead.
+/// During a run, a reading is skipped if its deviation from the median of all sensors exceeds this limit, in standard deviations of
+/// noise and offset together. Identification excludes sensors on the basis of the whole recording instead.
 const LIVE_LIMIT_SIGMAS: f64 = 8.0;
 
 /// Exponent of a probe's lag with its diameter: `tau ~ d^2/Nu`, and Nu (eq. 11) about as `d^0.5` at the Reynolds numbers of
 /// a tip of one to four millimetres in an outlet pipe.
 const LAG_EXPONENT: f64 = 1.5;
 
-/// One of the sensors of a channel; written `T2/3`.
+/// One of several sensors of a channel, written `T2/3`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Element {
-    /// Its channel.
+    /// Channel.
     pub channel: Channel,
-    /// Its number, from 1.
+    /// Number, from 1.
     pub number: usize,
 }
 
@@ -50,12 +50,12 @@ impl From<Element> for String {
     }
 }
 
-/// A text that names no sensor of a channel.
+/// A text that is not the name of a sensor.
 #[derive(Debug, Clone, thiserror::Error, PartialEq, Eq)]
 pub enum UnknownElement {
-    /// It is not a channel and a number.
+    /// The text is not a channel and a number.
     #[error("`{0}` is not a channel and the number of one of its sensors, such as `T2/3`")]
-    Form(String),
+    NotElement(String),
     /// Unknown channel.
     #[error(transparent)]
     Channel(#[from] UnknownChannel),
@@ -66,7 +66,7 @@ impl TryFrom<String> for Element {
 
     fn try_from(text: String) -> Result<Element, UnknownElement> {
         let parts = text.rsplit_once('/').and_then(|(channel, number)| Some((channel, number.parse().ok()?)));
-        let Some((channel, number @ 1..)) = parts else { return Err(UnknownElement::Form(text)) };
+        let Some((channel, number @ 1..)) = parts else { return Err(UnknownElement::NotElement(text)) };
         Ok(Element { channel: channel.parse()?, number })
     }
 }
@@ -76,7 +76,7 @@ impl TryFrom<String> for Element {
 pub struct DeclaredElement {
     /// Display name; `T2/3` if none is given.
     pub name: String,
-    /// Its own noise, offset and gain error, independent of those of the others.
+    /// Own noise, offset and gain error, independent of those of the others.
     pub declared: DeclaredUncertainty,
     /// Diameter of the probe's tip, m; 0 is a probe without inertia.
     pub probe_diameter_m: f64,
@@ -90,7 +90,7 @@ pub struct DeclaredElement {
 pub struct RedundantSensors {
     /// The sensors in the order of their numbers.
     pub elements: Vec<DeclaredElement>,
-    /// Offset that all of them share (one calibration bath, one place in the flow), in the channel's unit, one standard
+    /// Offset that all sensors share (one calibration bath, one position in the flow), in the channel's unit, one standard
     /// deviation, >= 0. It does not average out.
     pub common_offset_sigma: f64,
 }
@@ -106,7 +106,7 @@ impl RedundantSensors {
         RedundantSensors { elements: (1..=count).map(element).collect(), common_offset_sigma: 0.0 }
     }
 
-    /// Weights of the sensors that `in_use` names by their index from 0; their sum is 1, and the others have 0.
+    /// Weights of the sensors: their sum is 1, and sensors for which `in_use` (by index from 0) is false have 0.
     pub fn weights(&self, in_use: impl Fn(usize) -> bool) -> Vec<f64> {
         let only_gains = self
             .elements
@@ -125,7 +125,7 @@ impl RedundantSensors {
             .enumerate()
             .map(|(index, element)| in_use(index).then(|| variance(&element.declared)))
             .collect();
-        // Sensors without any declared error share all of the weight.
+        // Sensors without a declared error share the whole weight.
         let exact = variances.iter().flatten().any(|variance| *variance <= 0.0);
         let raw = variances.iter().map(|variance| match variance {
             Some(variance) if exact => f64::from(u8::from(*variance <= 0.0)),
@@ -140,45 +140,46 @@ impl RedundantSensors {
     /// Uncertainty of the combined reading of the sensors in use: individual errors average out, the common offset does not.
     pub fn fused(&self, in_use: impl Fn(usize) -> bool) -> DeclaredUncertainty {
         let weights = self.weights(in_use);
-        let averaged = |of: fn(&DeclaredUncertainty) -> f64| {
+        let average = |value: fn(&DeclaredUncertainty) -> f64| {
             let share =
-                |(weight, element): (&f64, &DeclaredElement)| (weight * of(&element.declared)).powi(2);
+                |(weight, element): (&f64, &DeclaredElement)| (weight * value(&element.declared)).powi(2);
             weights.iter().zip(&self.elements).map(share).sum::<f64>().sqrt()
         };
         DeclaredUncertainty {
-            noise_sigma: averaged(|declared| declared.noise_sigma),
-            offset_sigma: averaged(|declared| declared.offset_sigma).hypot(self.common_offset_sigma),
-            gain_sigma_ratio: averaged(|declared| declared.gain_sigma_ratio),
+            noise_sigma: average(|declared| declared.noise_sigma),
+            offset_sigma: average(|declared| declared.offset_sigma).hypot(self.common_offset_sigma),
+            gain_sigma_ratio: average(|declared| declared.gain_sigma_ratio),
         }
     }
 
     /// Diameter, m, of the single probe with the same lag as the combined reading of the sensors in use. To first order in the lag,
     /// a mean of lagged readings lags by the mean of their lags.
     pub fn probe_diameter_m(&self, in_use: impl Fn(usize) -> bool) -> f64 {
-        let lags = self.weights(in_use);
-        let lags = lags.iter().zip(&self.elements);
+        let weights = self.weights(in_use);
+        let lags = weights.iter().zip(&self.elements);
         let mean: f64 =
             lags.map(|(weight, element)| weight * element.probe_diameter_m.powf(LAG_EXPONENT)).sum();
         mean.powf(LAG_EXPONENT.recip())
     }
 
     /// The reading of the channel at one instant, for guards and settle bands while the rig runs: the weighted mean
-    /// without outliers from the median. `readings` in the order of the sensors; NaN if none of them has a reading.
+    /// without outliers. `readings` in the order of the sensors; NaN if none is finite.
     pub fn live(&self, readings: &[f64]) -> f64 {
         let mut sorted: Vec<f64> = readings.iter().copied().filter(|reading| reading.is_finite()).collect();
         sorted.sort_by(f64::total_cmp);
         let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };
         let middle = 0.5 * (sorted[last / 2] + sorted[last - last / 2]);
-        let reads = |index: usize| readings.get(index).is_some_and(|reading| reading.is_finite());
-        let near = |index: usize| {
+        let has_reading = |index: usize| readings.get(index).is_some_and(|reading| reading.is_finite());
+        let is_near = |index: usize| {
             let declared = &self.elements[index].declared;
             let sigma =
                 declared.noise_sigma.hypot(declared.offset_sigma).hypot(declared.gain_sigma_ratio * middle);
-            reads(index) && (sigma <= 0.0 || (readings[index] - middle).abs() <= LIVE_LIMIT_SIGMAS * sigma)
+            has_reading(index)
+                && (sigma <= 0.0 || (readings[index] - middle).abs() <= LIVE_LIMIT_SIGMAS * sigma)
         };
-        // Two sensors that contradict each other are both far from their median; then both are used.
-        let any_near = (0..self.elements.len()).any(near);
-        let weights = self.weights(|index| if any_near { near(index) } else { reads(index) });
+        // Two contradicting sensors are both far from their median; both are used.
+        let any_near = (0..self.elements.len()).any(is_near);
+        let weights = self.weights(|index| if any_near { is_near(index) } else { has_reading(index) });
         let used = weights.iter().zip(readings).filter(|(weight, _)| **weight > 0.0);
         used.map(|(weight, reading)| weight * reading).sum()
     }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// The samples of one channel in a batch.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ChannelColumn {
-    /// Its channel.
+    /// Channel.
     pub channel: Channel,
     /// SI values, as long as the batch's `t_s`; NaN for missing readings.
     pub values: Vec<f64>,
@@ -15,7 +15,7 @@ pub struct ChannelColumn {
 /// The samples of one of several sensors of a channel.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ElementColumn {
-    /// Its sensor.
+    /// Sensor.
     pub element: Element,
     /// SI values, as long as the batch's `t_s`. NaN if the sensor gave nothing.
     pub values: Vec<f64>,
@@ -36,7 +36,7 @@ pub enum Quality {
 /// Provenance of a channel's readings, in addition to their arrival times.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Provenance {
-    /// Its channel.
+    /// Channel.
     pub channel: Channel,
     /// When the source took each reading, s since arming; as long as the batch's `t_s`.
     pub source_t_s: Vec<f64>,
@@ -65,10 +65,10 @@ pub struct SampleBatch {
     /// One column per channel; for a channel with several sensors the combined reading
     /// ([`RedundantSensors::live`](crate::RedundantSensors::live)).
     pub columns: Vec<ChannelColumn>,
-    /// Each sensor of the channels that have several; empty if there are none.
+    /// Each sensor of channels with redundant sensors.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub elements: Vec<ElementColumn>,
-    /// Channels with readings that are not good or were taken before they arrived; others have no entry.
+    /// Channels with readings that are not good or arrived late; others have no entry.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub provenance: Vec<Provenance>,
     /// Truth of a simulated rig; empty for a real one.
@@ -83,7 +83,7 @@ impl SampleBatch {
         self.columns.iter().find(|column| column.channel == channel).map(|c| c.values.as_slice())
     }
 
-    /// Provenance of one channel's readings; `None`: each was good, and taken when it arrived.
+    /// Provenance of a channel's readings; `None` if every reading is good and arrived immediately.
     pub fn provenance_of(&self, channel: Channel) -> Option<&Provenance> {
         self.provenance.iter().find(|provenance| provenance.channel == channel)
     }

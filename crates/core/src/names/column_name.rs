@@ -77,7 +77,7 @@ impl ColumnName {
         self.tokens.len()
     }
 
-    /// Whether it is of another part of the stand or engine, or a difference, a limit or an uncertainty of a quantity.
+    /// Whether the column belongs to another part of the stand or engine, or is a difference, a limit or an uncertainty.
     pub fn is_other(&self) -> bool {
         let stations = |quantity: char| {
             let is_place = |pair: &&[Token]| matches!(pair, [Token::Letter(letter), Token::Number(_)] if *letter == quantity);
@@ -93,12 +93,12 @@ impl ColumnName {
             || self.has(Word::Manifold) && !self.has(Word::Exhaust)
     }
 
-    /// Whether it names a set value: `w` behind the quantity is the German letter for it.
+    /// Whether the name is that of a setpoint: `w` after the quantity is the German symbol for it.
     pub fn is_command(&self) -> bool {
         self.has(Word::Command) || self.tokens.iter().skip(1).any(|token| *token == Token::Letter('w'))
     }
 
-    /// Whether it names a value that the stand computed. A static temperature cannot be measured.
+    /// Whether the stand computed the value. A static temperature cannot be measured.
     pub fn is_computed(&self) -> bool {
         self.has(Word::Corrected)
             || self.has(Word::Computed)
@@ -121,12 +121,12 @@ impl ColumnName {
             let in_front = self.tokens.first().and_then(|token| token.measured());
             return if words.all(|other| other == first) { Some(first) } else { in_front };
         }
-        // `T_C_n_Verd` starts with its quantity; in `Compressor T out` it is behind the machine.
+        // In `T_C_n_Verd` the quantity comes first, in `Compressor T out` after the machine.
         let in_front = self.tokens.first().and_then(|token| token.letter());
         in_front.or(self.tag).or_else(|| self.tokens.get(self.letter_behind_machine()?)?.letter())
     }
 
-    /// Station numbers behind pressures: `p2/p1` has two.
+    /// Station numbers after pressures: `p2/p1` has two.
     fn pressure_stations(&self) -> impl Iterator<Item = u32> + '_ {
         self.tokens.windows(2).filter_map(|pair| match pair {
             [Token::Letter('p'), Token::Number(number)] => Some(*number),
@@ -135,7 +135,7 @@ impl ColumnName {
         })
     }
 
-    /// Whether words or stations are of the turbine. A letter is not enough: `t` may also mean total.
+    /// Whether words or stations refer to the turbine. A letter is not enough: `t` may also mean total.
     pub fn is_of_turbine(&self) -> bool {
         self.has(Word::Turbine) && !self.has(Word::Compressor)
             || self.has(Word::Expansion)
@@ -202,7 +202,8 @@ impl ColumnName {
     /// Place of a pressure, temperature, ratio or efficiency.
     fn place_of_state(&self, measured: Measured) -> Option<(Place, Clarity)> {
         let (machine, by_letter) = self.machine();
-        let of = |compressor, turbine| if machine == Some(Place::Turbine) { turbine } else { compressor };
+        let of_machine =
+            |compressor, turbine| if machine == Some(Place::Turbine) { turbine } else { compressor };
         let (is_in, is_out) = self.sides(machine.is_some());
         if self.has(Word::Oil) {
             return Some((if is_out { Place::OilOut } else { Place::Oil }, Clarity::Clear));
@@ -217,7 +218,7 @@ impl ColumnName {
         let is_gas = self.has(Word::Exhaust) || self.has(Word::Charge);
         let station = self.station().filter(|(_, clarity)| !is_gas || *clarity == Clarity::Clear);
         if machine.is_some() && is_in != is_out {
-            let place = if is_in { of(1, 3) } else { of(2, 4) };
+            let place = if is_in { of_machine(1, 3) } else { of_machine(2, 4) };
             let agrees = station.is_none_or(|(number, _)| number == place || number > 4);
             let clarity = match self.has(Word::Acronym) {
                 true if self.tokens.len() == 1 => Clarity::Short,
@@ -249,7 +250,7 @@ impl ColumnName {
                 return Some((machine, Clarity::Clear));
             }
             (Some(_), Measured::Pressure) if by_letter && self.tokens.len() == 2 => {
-                return Some((Place::Station(of(2, 3)), Clarity::Vague));
+                return Some((Place::Station(of_machine(2, 3)), Clarity::Vague));
             }
             (Some(_), _) => return None,
             (None, _) => {}
@@ -295,7 +296,7 @@ impl ColumnName {
         self.station().is_some_and(|(number, _)| number == 21)
     }
 
-    /// Number of the station: behind the quantity, or behind the letter of a machine.
+    /// Number of the station: after the quantity, or after the letter of a machine.
     fn station(&self) -> Option<(u32, Clarity)> {
         let quantity = self.quantity();
         let is_letter = |at: usize| matches!(self.tokens.get(at), Some(Token::Letter(_)));
@@ -351,7 +352,7 @@ impl ColumnName {
         pair.filter(|_| !self.tokens.iter().any(|token| token.is_machine()))
     }
 
-    /// Whether the name has an inlet, and an outlet; `has_machine`: before and after count.
+    /// Whether the name has an inlet, and whether it has an outlet; with `has_machine`, `before` and `after` count too.
     fn sides(&self, has_machine: bool) -> (bool, bool) {
         if let Some((is_after, _)) = self.sides_of_letters() {
             return (!is_after, is_after);

@@ -1,4 +1,4 @@
-//! What the names of columns say, for the readers of logs and maps.
+//! The meaning of column names, for the readers of logs and maps.
 
 pub(crate) mod column_name;
 pub(crate) mod measured;

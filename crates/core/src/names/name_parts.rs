@@ -91,7 +91,7 @@ fn is_unspaced(letter: char) -> bool {
     matches!(letter, '\u{3040}'..='\u{30ff}' | '\u{4e00}'..='\u{9fff}')
 }
 
-/// Maximum length of a compound, bytes: twice that of the longest German ones, which limits the time for any name.
+/// Maximum length of a compound, bytes: twice that of the longest German words. It limits the time for any name.
 const MAX_WORD_BYTES: usize = 64;
 
 /// Adds the letters and numbers of a part between blanks.
@@ -100,8 +100,8 @@ fn push_part(tokens: &mut Vec<Token>, part: &str) {
     let mut rest = part;
     while let Some(first) = rest.chars().next() {
         let end = rest.find(|c| class(c) != class(first)).unwrap_or(rest.len());
-        let (piece, behind) = rest.split_at(end);
-        rest = behind;
+        let (piece, tail) = rest.split_at(end);
+        rest = tail;
         if first.is_ascii_digit() {
             tokens.push(piece.parse().map_or(Token::Unknown, Token::Number));
         } else if let Some(words) = meanings(piece) {
@@ -122,7 +122,7 @@ fn push_part(tokens: &mut Vec<Token>, part: &str) {
 const SHORT_STARTS: [&str; 5] = ["pr", "pi", "nc", "mc", "wc"];
 const SHORT_ENDS: [&str; 5] = ["in", "ts", "tt", "tc", "tl"];
 
-/// The parts of a compound, if all of it is known: `luftmassenstrom`, `tcompin`, `mdotc`.
+/// The parts of a compound, if all are known: `luftmassenstrom`, `tcompin`, `mdotc`.
 fn compound(text: &str) -> Option<Vec<Token>> {
     const LINK: &[Word] = &[Word::Filler];
     let places: Vec<usize> = text.char_indices().map(|(at, _)| at).chain([text.len()]).collect();
@@ -168,7 +168,7 @@ fn compound(text: &str) -> Option<Vec<Token>> {
     Some(parts)
 }
 
-/// Adds the words of at least four letters in a word that is not known as a whole: inflected ones, and compounds with other words.
+/// Adds the known words of at least four letters within an unknown word, such as inflected forms and compounds.
 fn push_known_stems(tokens: &mut Vec<Token>, text: &str) {
     let places: Vec<usize> = text.char_indices().map(|(at, _)| at).chain([text.len()]).collect();
     let (mut index, mut is_known) = (0, true);

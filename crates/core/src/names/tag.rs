@@ -2,7 +2,7 @@
 
 use super::measured::Measured;
 
-/// Tags that are something else with a short number: `PT2` is the total pressure at station 2, `TIT 1` a turbine inlet temperature.
+/// Tags with another meaning if their number is short: `PT2` is the total pressure at station 2, `TIT 1` a turbine inlet temperature.
 const LONG_NUMBERS: [&str; 6] = ["tt", "pt", "pi", "pit", "tit", "st"];
 
 /// The quantity of a tag number at the start of a name, and the rest of the name.
@@ -27,8 +27,8 @@ pub(super) fn split_tag(name: &str) -> Option<(Measured, &str)> {
     }
     let number = rest.trim_start_matches(['-', '_', ' ', '.']);
     let digits = number.find(|c: char| !c.is_ascii_digit()).unwrap_or(number.len());
-    let behind = number[digits..].trim_start_matches(|c: char| c.is_ascii_uppercase());
-    let ends = behind.is_empty() || behind.starts_with(|c: char| !c.is_alphanumeric());
+    let suffix = number[digits..].trim_start_matches(|c: char| c.is_ascii_uppercase());
+    let ends = suffix.is_empty() || suffix.starts_with(|c: char| !c.is_alphanumeric());
     let least = if LONG_NUMBERS.contains(&code.as_str()) { 3 } else { 1 };
-    (ends && (least..=5).contains(&digits)).then_some((measured, behind))
+    (ends && (least..=5).contains(&digits)).then_some((measured, suffix))
 }

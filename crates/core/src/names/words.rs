@@ -4,9 +4,11 @@ use super::measured::Measured;
 use std::collections::HashMap;
 use std::sync::LazyLock;
 
-/// Meaning of a word in a name. `Ratio` is one of pressures if the name has them; `Shaft` is also the turbocharger as a whole, `Exhaust` and
-/// `Air` are the gases of turbine and compressor, `Charge` is the compressed air; `Engine` comes with `Other`, which is any other part of the
-/// stand, or a difference, a limit or an uncertainty; `Acronym` marks the first letters of machine, side and quantity.
+/// Meaning of a word in a name.
+///
+/// `Ratio` is a pressure ratio if the name contains a pressure. `Shaft` is also the turbocharger as a whole. `Exhaust` and `Air` are the
+/// gases of turbine and compressor, and `Charge` is the compressed air. `Other` is any other part of the stand, a difference, a limit or an
+/// uncertainty; `Engine` always has `Other` too. `Acronym` marks abbreviations such as CIT (compressor inlet temperature).
 #[allow(missing_docs, reason = "the names are words of the table")]
 #[rustfmt::skip]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

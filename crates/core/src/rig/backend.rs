@@ -28,7 +28,7 @@ pub struct Setpoints {
     pub oil_temperature_k: f64,
 }
 
-/// A rig's description before it is armed.
+/// A rig's description before the backend is armed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RigDescription {
     /// Name of the backend, e.g. `virtual_lab`.
@@ -51,13 +51,13 @@ pub struct RigDescription {
     /// the rig.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reached_at: Option<String>,
-    /// Guards that must be present, and end the run, before it is armed.
+    /// Guards that a run must have, with a reaction that ends the run; the rig is not armed without them.
     #[serde(default)]
     pub needs_guarded: Vec<GuardName>,
-    /// Accepted setpoints; `None` if the rig only reports them when they are sent.
+    /// Accepted setpoints; `None` if the rig checks them only when they are sent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub accepts: Option<SetpointRanges>,
-    /// Its own safe shutdown; a campaign may declare another.
+    /// Own safe shutdown; a campaign may declare another.
     #[serde(default)]
     pub safe: SafeTrajectory,
 }
@@ -117,28 +117,28 @@ pub trait Backend: Send {
     /// Takes control of the rig; run time 0 starts here.
     ///
     /// # Errors
-    /// [`BackendError::OutOfOrder`] if it is armed already, [`BackendError::Lost`] if it cannot be reached.
+    /// [`BackendError::OutOfOrder`] if the backend is armed already, [`BackendError::Lost`] if it cannot be reached.
     fn arm(&mut self) -> Result<(), BackendError>;
 
     /// Sends new setpoints, effective from the time of the last poll on.
     ///
     /// # Errors
-    /// [`BackendError::OutOfOrder`] before it is armed, [`BackendError::SetpointOutOfRange`],
+    /// [`BackendError::OutOfOrder`] before the backend is armed, [`BackendError::SetpointOutOfRange`],
     /// [`BackendError::Simulation`] or [`BackendError::Lost`] if the rig cannot follow.
     fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError>;
 
     /// Lets the rig run until `until_s` (seconds since arming) and returns the samples since the last poll.
     ///
     /// # Errors
-    /// [`BackendError::OutOfOrder`] before it is armed and has setpoints, [`BackendError::Simulation`] and
+    /// [`BackendError::OutOfOrder`] before the backend is armed and has setpoints, [`BackendError::Simulation`] and
     /// [`BackendError::Lost`] with the time at which it stopped.
     fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError>;
 
-    /// Holds the last setpoints while an operator inspects the run. A rig that keeps them by itself does nothing;
-    /// one behind a controller sends them again, which shows whether the controller still accepts them.
+    /// Holds the last setpoints while an operator inspects the run. A rig that keeps its setpoints does nothing;
+    /// a rig with a controller sends them again, which shows whether the controller still accepts them.
     ///
     /// # Errors
-    /// As those of [`set`](Backend::set).
+    /// Those of [`set`](Backend::set).
     fn hold(&mut self) -> Result<(), BackendError> {
         Ok(())
     }
@@ -146,17 +146,17 @@ pub trait Backend: Send {
     /// Brings the rig into its safe state: air off, valve open.
     ///
     /// # Errors
-    /// [`BackendError::OutOfOrder`] before it is armed, [`BackendError::Lost`] if it cannot be reached.
+    /// [`BackendError::OutOfOrder`] before the backend is armed, [`BackendError::Lost`] if it cannot be reached.
     fn make_safe(&mut self) -> Result<(), BackendError>;
 
     /// Releases control of the rig.
     ///
     /// # Errors
-    /// [`BackendError::OutOfOrder`] before it is armed, [`BackendError::Lost`] if it cannot be reached.
+    /// [`BackendError::OutOfOrder`] before the backend is armed, [`BackendError::Lost`] if it cannot be reached.
     fn disarm(&mut self) -> Result<(), BackendError>;
 }
 
-/// Why a call of a backend failed.
+/// Reason why a call of a backend failed.
 #[derive(Debug, thiserror::Error)]
 pub enum BackendError {
     /// A call out of order in the life cycle.
@@ -176,7 +176,7 @@ pub enum BackendError {
         with_unit(high, unit)
     )]
     SetpointOutOfRange {
-        /// Which setpoint.
+        /// Name of the setpoint.
         quantity: &'static str,
         /// Requested value.
         value: f64,
@@ -194,7 +194,7 @@ pub enum BackendError {
         backend: String,
         /// Key path below `backend.settings`.
         path: String,
-        /// What is wrong, and the remedy.
+        /// The mistake and its remedy.
         source: BackendCause,
     },
     /// A simulation could not continue.
@@ -223,5 +223,5 @@ pub enum BackendError {
     },
 }
 
-/// The backend's own error. Each backend has its own error type, which this interface does not know.
+/// The error of the backend. Each backend has its own error type.
 pub type BackendCause = Box<dyn std::error::Error + Send + Sync>;

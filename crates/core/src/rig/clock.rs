@@ -1,4 +1,4 @@
-//! Time as an argument: the run's clock.
+//! Clock of a run: real time, or as fast as the simulation allows.
 
 /// Paces a run. The backend owns the time of its samples; the clock decides when to request them.
 pub trait Clock {
@@ -55,10 +55,10 @@ impl<W: Wall> Clock for PacedClock<W> {
     fn wait_until(&mut self, t_s: f64) {
         let now_s = self.wall.now_s();
         let start_s = *self.start_s.get_or_insert(now_s);
-        let left_s = start_s + t_s / self.speed_ratio - now_s;
-        // A late call does not wait, so that a slow disk delays one poll and not all later ones.
-        if left_s > 0.0 {
-            self.wall.wait_s(left_s);
+        let remaining_s = start_s + t_s / self.speed_ratio - now_s;
+        // A late call does not wait, so that a slow disk delays only one poll.
+        if remaining_s > 0.0 {
+            self.wall.wait_s(remaining_s);
         }
     }
 }

@@ -22,7 +22,7 @@ pub enum GuardName {
     HousingGradient,
     /// Variation of pressure and flow.
     Surge,
-    /// A target speed that is not reached, or lost.
+    /// A target speed that is missed at the end of the step.
     Speed,
     /// Samples in order, in time, and not frozen.
     Signals,
@@ -52,9 +52,9 @@ impl std::fmt::Display for GuardName {
 #[serde(rename_all = "snake_case")]
 #[schemars(transform = crate::schema::flatten_to_names)]
 pub enum Reaction {
-    /// Report it, and continue.
+    /// Report the violation, and continue.
     Note,
-    /// Hold the setpoints until it is over, and extend the step by that time.
+    /// Hold the setpoints until the condition has ended, and extend the step by this time.
     Hold,
     /// Go back, and approach the step again in smaller steps.
     SmallerSteps,
@@ -67,7 +67,7 @@ pub enum Reaction {
 }
 
 impl Reaction {
-    /// Whether it ends the run.
+    /// Whether the reaction ends the run.
     pub fn ends_the_run(self) -> bool {
         self >= Reaction::Safe
     }
@@ -82,10 +82,10 @@ pub struct LargestChange {
     pub within_s: f64,
 }
 
-/// A guard over one channel. Without any bound it still checks that the channel delivers readings.
+/// A guard of one channel. Without bounds it checks only that the channel delivers readings.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SignalGuard {
-    /// Its name.
+    /// Name.
     pub name: GuardName,
     /// The channel.
     pub channel: Channel,
@@ -95,7 +95,7 @@ pub struct SignalGuard {
     pub below: Option<f64>,
     /// Largest change.
     pub change: Option<LargestChange>,
-    /// Hysteresis: a value beyond a bound counts until it is this far back, unit of the channel, >= 0.
+    /// Hysteresis: a violation ends only when the value is within the bound by this margin, unit of the channel, >= 0.
     pub hysteresis: f64,
     /// The guard trips when a value has been beyond a bound for this time, s, >= 0.
     pub dwell_s: f64,
@@ -114,13 +114,13 @@ pub struct SurgeVariation {
     pub flow_ratio: f64,
     /// Threshold of the simultaneous variation of P2 or P1, one standard deviation over the pressure, ratio.
     pub pressure_ratio: f64,
-    /// It trips after this time, s, since a jump may touch the surge line.
+    /// Time until the guard trips, s: a jump may touch the surge line.
     pub dwell_s: f64,
     /// Reaction.
     pub reaction: Reaction,
 }
 
-/// The guard over the target speed of a step.
+/// The guard of the target speed of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SpeedBand {
     /// Largest deviation in the last seconds of a step, ratio.
@@ -132,11 +132,11 @@ pub struct SpeedBand {
 /// All guards of a run.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct GuardSet {
-    /// One channel each.
+    /// Guards of single channels.
     pub signals: Vec<SignalGuard>,
-    /// Against surge.
+    /// Guard against surge.
     pub surge: Option<SurgeVariation>,
-    /// Over the speed.
+    /// Guard of the speed.
     pub speed: Option<SpeedBand>,
 }
 
@@ -156,14 +156,14 @@ impl GuardSet {
     }
 }
 
-/// The safe shutdown: valve open and heater off at once, turbine inlet pressure down at a slew, air off.
+/// The safe shutdown: open the valve and switch the heater off at once, reduce the turbine inlet pressure at its slew rate, cut the air.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SafeTrajectory {
     /// Rate at which P3 goes down, Pa/s, > 0; `None`: the air is cut at once.
     pub p3_slew_pa_s: Option<f64>,
     /// Opening of the back-pressure valve during the shutdown, ratio; a step with a larger opening keeps it.
     pub valve_opening_ratio: f64,
-    /// Longest time of the shutdown, s, > 0: the air is cut then, whatever P3 is.
+    /// Maximum duration of the shutdown, s, > 0: the air is then cut at any P3.
     pub within_s: f64,
 }
 

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Longest allowed time beyond the surge line, s: a jump may touch the line, a point may not stay beyond it.
+/// Maximum time beyond the surge line, s: a jump may touch the line, but a point may not stay beyond it.
 pub const SURGE_ALLOWED_S: f64 = 5.0;
 
 /// Limits of a rig and its machine. They apply to points, to jumps, and to a run.
@@ -15,7 +15,7 @@ pub struct Limits {
     pub p3_min_pa: f64,
     /// Highest allowed setpoint of the turbine inlet pressure, Pa.
     pub p3_max_pa: f64,
-    /// Time the rig takes from the lowest to the highest turbine inlet pressure, s, > 0; `None`: not considered.
+    /// Time of the rig from the lowest to the highest turbine inlet pressure, s, > 0; `None` if it is not considered.
     pub p3_stroke_s: Option<f64>,
     /// Highest turbine inlet temperature, K.
     pub t3_max_k: Option<f64>,
@@ -29,12 +29,12 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Fastest change of the turbine inlet pressure that the rig can make, Pa/s; `None` if no stroke is given.
+    /// Maximum rate of the turbine inlet pressure, Pa/s; `None` if no stroke is given.
     pub fn p3_slew_max_pa_s(&self) -> Option<f64> {
         self.p3_stroke_s.map(|stroke_s| (self.p3_max_pa - self.p3_min_pa) / stroke_s)
     }
 
-    /// Smallest surge margin that a point may have: the declared one, or the surge line.
+    /// Minimum surge margin of a point: the declared one, or the surge line.
     pub fn surge_margin_floor_ratio(&self) -> f64 {
         self.surge_margin_min_ratio.unwrap_or(0.0)
     }

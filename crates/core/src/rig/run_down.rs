@@ -6,7 +6,7 @@ use crate::{OperatingPoint, RigMode, SafeTrajectory, SetpointRange, SetpointRang
 const HEATER_OFF_K: f64 = 293.15;
 
 impl SafeTrajectory {
-    /// Setpoints `after_s` into the shutdown that began at `from`: heater off, valve open, P3 falling at its slew rate. `None` means that the air
+    /// Setpoints at the time `after_s` of a shutdown that began at the setpoints `from`: heater off, valve open, P3 falling at its slew rate. `None` means that the air
     /// must be cut off: without a slew rate at once, otherwise at the end of the shutdown or once P3 has reached `p3_min_pa`.
     ///
     /// Heater and valve setpoints are limited to the ranges of the rig. A rig that does not accept 293 K gets its lowest setpoint, because a
@@ -19,17 +19,17 @@ impl SafeTrajectory {
         accepts: Option<&SetpointRanges>,
     ) -> Option<Setpoints> {
         let p3_pa = from.p3_pa - self.p3_slew_pa_s? * after_s;
-        let goes_on = from.mode == RigMode::Running && after_s <= self.within_s && p3_pa > p3_min_pa;
-        let nearest = |value: f64, range: Option<SetpointRange>| match range {
+        let is_running = from.mode == RigMode::Running && after_s <= self.within_s && p3_pa > p3_min_pa;
+        let clamp_to = |value: f64, range: Option<SetpointRange>| match range {
             Some(SetpointRange { low, high }) => value.min(high).max(low),
             None => value,
         };
         let opening =
             from.valve_opening_ratio.max(self.valve_opening_ratio).min(OperatingPoint::OPENING_MAX_RATIO);
-        goes_on.then_some(Setpoints {
+        is_running.then_some(Setpoints {
             p3_pa,
-            t3_k: nearest(HEATER_OFF_K, accepts.map(|accepts| accepts.t3_k)),
-            valve_opening_ratio: nearest(opening, accepts.map(|accepts| accepts.valve_opening_ratio)),
+            t3_k: clamp_to(HEATER_OFF_K, accepts.map(|accepts| accepts.t3_k)),
+            valve_opening_ratio: clamp_to(opening, accepts.map(|accepts| accepts.valve_opening_ratio)),
             ..*from
         })
     }

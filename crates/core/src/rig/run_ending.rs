@@ -1,8 +1,8 @@
-//! How a run ended.
+//! The end of a run.
 
 use serde::{Deserialize, Serialize};
 
-/// How a run ended; its `code` is stable.
+/// Reason for the end of a run; its `code` is stable.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "code", rename_all = "snake_case")]
 pub enum RunEnding {
@@ -10,10 +10,10 @@ pub enum RunEnding {
     Completed,
     /// Drift was detected, and the campaign asks to stop in that case.
     Drifted {
-        /// What drifted.
+        /// Description of the drift.
         reason: String,
     },
-    /// The operator stopped it.
+    /// The operator stopped the run.
     Interrupted {
         /// Run time, s.
         t_s: f64,
@@ -22,10 +22,10 @@ pub enum RunEnding {
     Tripped {
         /// Run time, s.
         t_s: f64,
-        /// What tripped it.
+        /// Cause of the trip.
         reason: String,
     },
-    /// Rig, script or recording failed.
+    /// The rig, the script or the recording failed.
     Failed {
         /// The error.
         reason: String,

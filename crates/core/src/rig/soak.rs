@@ -10,20 +10,20 @@ use serde::{Deserialize, Serialize};
 pub struct Soak {
     /// Time at rest, s, > 0.
     pub duration_s: f64,
-    /// Oil inlet temperature during the soak, K: that of cell and inlet air.
+    /// Oil inlet temperature during the soak, K: equal to that of cell and inlet air.
     pub oil_temperature_k: f64,
-    /// Temperature non-uniformity: one standard deviation of the true temperature at one sensor about that at all, K, >= 0.
+    /// Temperature non-uniformity: standard deviation of the true temperature at a sensor about the mean of all, K, >= 0.
     pub temperature_sigma_k: f64,
-    /// The same of the pressure taps, Pa, >= 0.
+    /// Standard deviation of the pressure taps at rest, Pa, >= 0.
     pub pressure_sigma_pa: f64,
 }
 
 impl Soak {
-    /// Sensors that must read the same at standstill: temperatures, and pressures.
+    /// Groups of sensors that must read the same at standstill: temperatures and pressures.
     pub const EQUAL_AT_REST: [&'static [Channel]; 2] =
         [&[Channel::T1, Channel::T2, Channel::Tc, Channel::TOil], &[Channel::P1, Channel::P2]];
     /// Default temperature non-uniformity of a soak: 0.05 K.
     pub const TEMPERATURE_SIGMA_K: f64 = 0.05;
-    /// The same of the pressures: 5 Pa.
+    /// Default of [`Soak::pressure_sigma_pa`]: 5 Pa.
     pub const PRESSURE_SIGMA_PA: f64 = 5.0;
 }

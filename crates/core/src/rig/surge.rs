@@ -3,20 +3,20 @@
 use crate::{Recording, Series, StepKind};
 use serde::{Deserialize, Serialize};
 
-/// The approach to the surge line at the end of a speed line: the valve closes in small steps until the surge flow is
-/// known, or until it is as near as [`SurgeSearchSettings::closest_margin_ratio`].
+/// Settings of the approach to surge at the end of a speed line: the valve closes in small steps until the surge flow is
+/// known, or until the margin has fallen to [`SurgeSearchSettings::closest_margin_ratio`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SurgeSearchSettings {
-    /// Smallest surge margin to approach, by the surge flow known by then, ratio, > 0.
+    /// Minimum surge margin of the approach, relative to the current estimate of the surge flow, ratio, > 0.
     pub closest_margin_ratio: f64,
-    /// Largest change of the valve's opening at a step while the line may be near, ratio, > 0.
+    /// Maximum change of the valve opening in one step while the surge line may be near, ratio, > 0.
     pub step_ratio: f64,
-    /// Time at each opening, s; the rig needs its first [`SurgeSearchSettings::SETTLE_S`] to follow.
+    /// Time at each opening, s; the rig follows during the first [`SurgeSearchSettings::SETTLE_S`].
     pub dwell_s: f64,
     /// Standard error of the surge flow at which a line is finished, ratio, > 0, without the flow meter's gain.
     pub wanted_standard_error_ratio: f64,
-    /// Maximum number of steps of one line, without the return from the line.
+    /// Maximum number of steps of one line, without the return to safe flow.
     pub most_steps: usize,
 }
 
@@ -41,7 +41,7 @@ impl Default for SurgeSearchSettings {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SurgeFoundBy {
-    /// The growth of the variation of pressures and flow, extrapolated to the line. The compressor was not in surge.
+    /// Extrapolated growth of the variation of pressures and flow. The compressor was not in surge.
     Precursor,
     /// The compressor went into surge: the flow lies between the last opening without surge and the one that surged.
     Surge,
@@ -56,21 +56,21 @@ pub struct SurgeMark {
     pub speed_corrected_rpm: f64,
     /// Corrected flow at surge, kg/s.
     pub flow_corrected_kg_s: f64,
-    /// Its standard error without the flow meter's gain, kg/s.
+    /// Standard error without the flow meter's gain, kg/s.
     pub flow_standard_error_kg_s: f64,
     /// Standard error that all corrected flows share through the flow meter's gain, kg/s.
     pub flow_common_standard_error_kg_s: f64,
     /// Total pressure ratio P2/P1 at surge.
     pub pressure_ratio: f64,
-    /// Its standard error.
+    /// Standard error.
     pub pressure_ratio_standard_error: f64,
     /// Smallest corrected flow measured during the approach, kg/s.
     pub closest_flow_corrected_kg_s: f64,
-    /// Run time at the end of that measurement, s.
+    /// Run time at the end of the measurement with this flow, s.
     pub closest_end_s: f64,
-    /// Its evidence.
+    /// Evidence.
     pub found_by: SurgeFoundBy,
-    /// Openings during the approach.
+    /// Number of openings in the approach.
     pub steps: usize,
 }
 
@@ -79,9 +79,9 @@ pub struct SurgeMark {
 pub struct SurgeNotFound {
     /// Target shaft speed of the line (physical), rpm.
     pub target_speed_rpm: f64,
-    /// Openings that were tried.
+    /// Number of openings in the approach.
     pub openings: usize,
-    /// Whether they were enough to locate surge: the variation of pressures and flow did not grow over them.
+    /// Whether the openings would suffice to locate surge; the variation of pressures and flow did not grow over them.
     pub enough: bool,
 }
 
@@ -106,8 +106,8 @@ impl SurgeMark {
 }
 
 impl Recording {
-    /// Removes the approaches to surge, and everything after the first of them, and returns them. They contain no points and must not affect the
-    /// identification of any. `None` if the recording has none.
+    /// Splits the recording at the first approach to surge, and returns the rest. Approaches contain no points and must not affect the
+    /// identification. `None` if the recording has no approach.
     pub fn split_off_approaches(&mut self) -> Option<Recording> {
         let first = self.steps.iter().position(|step| step.kind == StepKind::Approach)?;
         let from_s = self.steps[first].start_s;

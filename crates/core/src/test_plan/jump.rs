@@ -17,11 +17,10 @@ pub struct Jump {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Repeats {
-    /// The jump; `None`: from the slowest to the fastest point of the middle opening, or the next best allowed
-    /// jump.
+    /// The jump. If it is `None`, the jump from the slowest to the fastest point of the middle opening, or the best jump that is allowed.
     pub jump: Option<Jump>,
-    /// Maximum number of steps between two of them, >= 2.
+    /// Maximum number of steps between two repeats, >= 2.
     pub every_steps: usize,
-    /// Minimum number of them, >= 1.
+    /// Minimum number of repeats, >= 1.
     pub at_least: usize,
 }

@@ -16,7 +16,7 @@ impl OperatingPoint {
     /// Largest setpoint of a back-pressure valve's opening, relative to its nominal area.
     pub const OPENING_MAX_RATIO: f64 = 2.5;
 
-    /// Speed in krpm and opening, rounded to the resolution of a rig: a hundredth rpm, and 1e-4.
+    /// Speed in krpm and opening for display, rounded to the resolution of a rig: 0.01 rpm and 1e-4.
     pub fn shown(&self) -> (f64, f64) {
         ((self.speed_rpm * 1e2).round() / 1e5, (self.valve_opening_ratio * 1e4).round() / 1e4)
     }

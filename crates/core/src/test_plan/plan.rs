@@ -1,7 +1,7 @@
 //! The plan as data: steps, their order, and the expected results.
 
 use crate::OperatingPoint;
-use crate::test_plan::plan_remark::{NoBound, PlanRemark, no_bound, remarks};
+use crate::test_plan::plan_remark::{NoBound, PlanRemark, deserialize_no_bound, deserialize_remarks};
 use serde::{Deserialize, Serialize};
 
 /// Whether a step measures a point for the map or revisits one.
@@ -13,7 +13,7 @@ pub enum StepKind {
     Point,
     /// A revisit, to detect drift.
     Repeat,
-    /// The first point again, at the end: no jump led to it at the start.
+    /// Second visit of the first point at the end, because no jump leads to it at the start.
     Return,
     /// A step of an approach to the surge line, after all others.
     Approach,
@@ -48,7 +48,7 @@ pub struct Predicted {
     /// result minus the model's own mean over the window. `None` if it was not forecast.
     #[serde(default)]
     pub bias_eta: Option<f64>,
-    /// The same of the heat-transfer coefficient, relative.
+    /// Error of the identification method itself in the heat-transfer coefficient, relative. `None` if it was not forecast.
     #[serde(default)]
     pub bias_h_rel: Option<f64>,
     /// Compressor mass flow at the end of the step, kg/s.
@@ -83,13 +83,13 @@ impl Predicted {
     }
 }
 
-/// One step: go to a point and stay there.
+/// A step: a jump to a point and a dwell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlanStep {
     /// Index in the plan, from 0; files have its number, from 1.
     #[serde(flatten, with = "crate::test_plan::step_number::entry")]
     pub index: usize,
-    /// Point, repeat, the first point again, or approach to surge.
+    /// Purpose of the step.
     pub kind: StepKind,
     /// Point before the jump; `None` for the first step.
     pub from: Option<OperatingPoint>,
@@ -110,7 +110,7 @@ pub struct PlanStep {
     pub predicted: Predicted,
 }
 
-/// Hashes of the plan's inputs; a plan whose hashes no longer match is stale.
+/// Hashes of the plan's inputs; a plan with other hashes is stale.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PlanInputHashes {
     /// SHA-256 of the campaign as parsed (defaults filled in, units resolved).
@@ -153,9 +153,9 @@ pub struct PlanFigures {
 /// Bounds on the best possible order, by the housing model of the search.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PlanBound {
-    /// No order has a larger sum of housing gradients, K.
+    /// Upper bound on the sum of housing gradients of any order, K.
     pub sum_gradient_k: f64,
-    /// No order has a larger smallest gradient, K.
+    /// Upper bound on the smallest housing gradient of any order, K.
     pub min_gradient_k: f64,
     /// Gap between the optimised figure and its bound, % of the bound; `None` if no bound is known.
     pub gap_percent: Option<f64>,
@@ -163,7 +163,7 @@ pub struct PlanBound {
     pub proven: bool,
     /// Tolerance of the proof, %; `None` without one.
     pub proof_tolerance_percent: Option<f64>,
-    /// Largest deviation of the search's housing model from the full simulation along this plan, K of gradient.
+    /// Maximum deviation of the search's housing model from the full simulation along this plan, K of gradient.
     pub model_error_k: f64,
 }
 
@@ -192,11 +192,11 @@ pub struct Plan {
     /// Bounds on the best possible order; `None` if the order was not searched for.
     #[serde(default)]
     pub bound: Option<PlanBound>,
-    /// Why there is no bound; `None` if there is one, or none was requested.
-    #[serde(default, deserialize_with = "no_bound")]
+    /// Reason why there is no bound; `None` if there is one, or none was requested.
+    #[serde(default, deserialize_with = "deserialize_no_bound")]
     pub bound_remark: Option<NoBound>,
     /// Remarks for the operator of the plan.
-    #[serde(default, deserialize_with = "remarks")]
+    #[serde(default, deserialize_with = "deserialize_remarks")]
     pub remarks: Vec<PlanRemark>,
 }
 

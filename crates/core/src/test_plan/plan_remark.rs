@@ -9,9 +9,9 @@ use std::collections::BTreeMap;
 coded_enum! {
 /// A remark for the operator of a plan, by its stable code.
 PlanRemark {
-    /// A jump is repeated to show drift.
+    /// A jump is repeated to detect drift.
     "repeated_jump" RepeatedJump { from: OperatingPoint, to: OperatingPoint, times: usize },
-    /// No jump can be repeated, so that drift would not show.
+    /// No jump can be repeated, so that drift cannot be detected.
     "no_repeated_jump" NoRepeatedJump,
     /// A jump follows all other steps, and is not a point of the map.
     "appended_jump" AppendedJump { from: OperatingPoint, to: OperatingPoint },
@@ -19,35 +19,37 @@ PlanRemark {
     "first_point_again" FirstPointAgain { point: OperatingPoint },
     /// No jump leads to the first point, so that it has no transient.
     "first_point_without_jump" FirstPointWithoutJump { point: OperatingPoint },
-    /// A limit forbids the way back to the first point.
+    /// A limit forbids the return to the first point.
     "no_way_back" NoWayBack,
-    /// The points will have the warning of this code: error without a declaration, and the largest permitted one.
+    /// The points will have the warning of this code: the error without declared uncertainties, and the largest permitted one.
     "rests_on_declaration" RestsOnDeclaration { eta_error: f64, max_eta_error: f64 },
     /// The longest dwell does not reach the required error.
     "required_error_not_reached" RequiredErrorNotReached { dwell_s: f64, eta_sigma: f64, required_eta_sigma: f64 },
-    /// The search for surge behind the steps.
+    /// The search for surge after the steps.
     "surge_search" SurgeSearch { lines: usize, closest_margin_ratio: f64, steps: usize, duration_s: f64 },
-    /// Offsets that the soak leaves, in the channels' units, and those that a longer one would clearly reduce.
+    /// Offsets that remain after the soak, in the channels' units, and those after a longer soak that would clearly reduce them.
     "offsets_after_soak" OffsetsAfterSoak {
         soak_s: f64, offset_sigmas: BTreeMap<Channel, f64>, longer_soak_s: f64, longer_offset_sigmas: BTreeMap<Channel, f64>
     },
 }
 }
 
-/// Why a plan has no bound.
+/// Reason for a missing bound on the gradients of a plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum NoBound {
     /// The order was not searched for.
     OrderNotSearched,
-    /// A jump was put behind the points.
+    /// A jump was appended to the points.
     AppendedJump,
-    /// More points than its table takes, or a housing whose states stay within no box.
+    /// There are too many points for its table, or the housing states are unbounded.
     TooLarge,
 }
 
-/// Remarks of older plans are sentences.
-pub(crate) fn remarks<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<PlanRemark>, D::Error> {
+/// Reads the remarks of a plan; those of older plans are sentences.
+pub(crate) fn deserialize_remarks<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Vec<PlanRemark>, D::Error> {
     let stored = Vec::<Value>::deserialize(deserializer)?;
     let read = |remark: Value| match remark {
         Value::String(message) => Ok(PlanRemark::Other { code: "sentence".to_owned(), message }),
@@ -56,8 +58,10 @@ pub(crate) fn remarks<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<
     stored.into_iter().map(read).collect()
 }
 
-/// That of older plans is a sentence, and is left out.
-pub(crate) fn no_bound<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<NoBound>, D::Error> {
+/// Reads the reason for a missing bound; that of older plans is a sentence, and is dropped.
+pub(crate) fn deserialize_no_bound<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Option<NoBound>, D::Error> {
     let stored = Option::<Value>::deserialize(deserializer)?;
     Ok(stored.and_then(|value| serde_json::from_value(value).ok()))
 }

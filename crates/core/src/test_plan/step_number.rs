@@ -18,7 +18,7 @@ fn index_of<E: Error>(number: usize) -> Result<usize, E> {
 /// Writes the number of the step at `index`.
 ///
 /// # Errors
-/// Those of the serializer.
+/// The errors of the serializer.
 pub fn serialize<S: Serializer>(index: &usize, serializer: S) -> Result<S::Ok, S::Error> {
     step_number(*index).serialize(serializer)
 }
@@ -26,7 +26,7 @@ pub fn serialize<S: Serializer>(index: &usize, serializer: S) -> Result<S::Ok, S
 /// Reads a number from 1 as an index.
 ///
 /// # Errors
-/// Those of the deserializer; 0 is not a valid step.
+/// The errors of the deserializer, and an error for step 0.
 pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
     index_of(usize::deserialize(deserializer)?)
 }
@@ -39,7 +39,7 @@ pub mod list {
     /// Writes the numbers of the steps at `indices`.
     ///
     /// # Errors
-    /// Those of the serializer.
+    /// The errors of the serializer.
     pub fn serialize<S: Serializer>(indices: &[usize], serializer: S) -> Result<S::Ok, S::Error> {
         indices.iter().copied().map(step_number).collect::<Vec<_>>().serialize(serializer)
     }
@@ -53,7 +53,7 @@ pub mod lists {
     /// Writes the numbers of the steps at `indices`, group by group.
     ///
     /// # Errors
-    /// Those of the serializer.
+    /// The errors of the serializer.
     pub fn serialize<S: Serializer>(indices: &[Vec<usize>], serializer: S) -> Result<S::Ok, S::Error> {
         let numbers = |group: &Vec<usize>| group.iter().copied().map(step_number).collect::<Vec<_>>();
         indices.iter().map(numbers).collect::<Vec<_>>().serialize(serializer)
@@ -68,7 +68,7 @@ pub mod option {
     /// Writes the number of the step at `index`, or null.
     ///
     /// # Errors
-    /// Those of the serializer.
+    /// The errors of the serializer.
     pub fn serialize<S: Serializer>(index: &Option<usize>, serializer: S) -> Result<S::Ok, S::Error> {
         index.map(step_number).serialize(serializer)
     }
@@ -93,7 +93,7 @@ pub mod entry {
     /// Writes `step`.
     ///
     /// # Errors
-    /// Those of the serializer.
+    /// The errors of the serializer.
     pub fn serialize<S: Serializer>(index: &usize, serializer: S) -> Result<S::Ok, S::Error> {
         StepField { step: step_number(*index) }.serialize(serializer)
     }
@@ -101,7 +101,7 @@ pub mod entry {
     /// Reads `step` or `index`.
     ///
     /// # Errors
-    /// Those of the deserializer; if neither is present, and if `step` is 0.
+    /// The errors of the deserializer, and an error if neither key is present or `step` is 0.
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
         let StepOrIndex { step, index } = StepOrIndex::deserialize(deserializer)?;
         match step {

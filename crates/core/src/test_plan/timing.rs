@@ -10,7 +10,7 @@ pub enum Dwell {
     Fixed(f64),
     /// Fills this total time of warm-up, steps and cool-down, s, > 0.
     TimeBudget(f64),
-    /// The time that the efficiencies need to reach this forecast standard error (rms over the points, fraction, > 0).
+    /// The shortest duration with this forecast standard error of the efficiencies (rms over the points, fraction, > 0).
     RequiredSigmaEta(f64),
 }
 

@@ -1,4 +1,4 @@
-//! Verdicts that the points of a campaign are expected to get, and changes of the campaign that improve them.
+//! Expected verdicts of the points of a campaign, and changes of the campaign that improve them.
 
 use serde::Serialize;
 
@@ -7,7 +7,7 @@ use serde::Serialize;
 pub struct VerdictForecast {
     /// Points that the campaign measures.
     pub points: usize,
-    /// Those expected to be good.
+    /// Points with the expected verdict `good`.
     pub good: usize,
     /// Whether the steps may contain too little information to check the declared parameters, which would make all points doubtful.
     pub near_limit: bool,
@@ -18,7 +18,7 @@ pub struct VerdictForecast {
 }
 
 impl VerdictForecast {
-    /// Points that are good also if the steps contain less information than expected.
+    /// Points that are good even if the steps contain less information than expected.
     pub fn surely_good(&self) -> usize {
         if self.near_limit { 0 } else { self.good }
     }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// Criterion for the order of the points. Campaigns and plans write it in snake case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-// Without descriptions of its own the schema is one list of names: a message can suggest the intended one.
+// The schema is one list of names without descriptions, so that a message can suggest the intended name.
 #[schemars(transform = crate::schema::flatten_to_names)]
 #[schemars(extend("x-removed" = {
     "sum_gradient": "write `order: thermal_gradient`, its new name",
@@ -24,14 +24,14 @@ pub enum VisitOrder {
     MinGradient,
     /// By speed, on each line from the widest valve opening to the narrowest (Burke et al., figure 13 a).
     SpeedLines,
-    /// As in the grid.
+    /// The order of the grid.
     Listed,
     /// As `speed_lines`, but each step lasts until T2 and the housing no longer drift: conventional mapping, for comparison.
     Conventional,
 }
 
 impl VisitOrder {
-    /// All of them.
+    /// All orders.
     pub const ALL: [VisitOrder; 5] = [
         VisitOrder::ThermalGradient,
         VisitOrder::MinGradient,

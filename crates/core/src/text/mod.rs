@@ -1,4 +1,4 @@
-//! Text made safe for terminals and files of other programs, and numbers with their units.
+//! Safe text for terminals and files of other programs, and numbers with their units.
 
 pub(crate) mod one_line;
 pub(crate) mod probability_text;

@@ -6,7 +6,7 @@ use std::borrow::Cow;
 const OWN_CODES: [&str; 11] = ["0", "1", "30", "31", "32", "33", "34", "35", "36", "37", "39"];
 
 /// Replaces control characters except line ends and tabs, escape sequences except colours, and marks for right-to-left text. Names of files,
-/// channels and units, and messages of drivers, come from outside and could otherwise control the terminal or hide text.
+/// channels and units, and messages of drivers, are foreign text and could otherwise control the terminal or hide text.
 pub fn terminal_text(text: &str) -> Cow<'_, str> {
     let unsafe_char = |c: char| {
         c.is_control() && !matches!(c, '\n' | '\t')

@@ -10,7 +10,7 @@ use encoding_rs::{
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TextEncoding(&'static Encoding);
 
-/// Bytes that are evaluated, and lines among them that have letters outside ASCII.
+/// Maximum number of evaluated bytes, and of evaluated lines with letters outside ASCII.
 const MAX_SAMPLE_BYTES: usize = 1 << 16;
 const MAX_LINES: usize = 200;
 
@@ -22,7 +22,7 @@ impl TextEncoding {
             _ if looks_like_utf16(head, 1) => (UTF_16LE, 0),
             _ if looks_like_utf16(head, 0) => (UTF_16BE, 0),
             Err(error) if error.error_len().is_some() => (guess_before_utf8(head), 0),
-            // Or truncated in the middle of a character.
+            // UTF-8, possibly truncated in the middle of a character.
             _ => (UTF_8, 0),
         });
         (TextEncoding(encoding), mark)
@@ -34,17 +34,17 @@ impl TextEncoding {
         Encoding::for_label_no_replacement(name.as_bytes()).map(TextEncoding)
     }
 
-    /// Its name.
+    /// Name.
     pub fn name(self) -> &'static str {
         if self.0 == WINDOWS_1252 { "Latin-1" } else { self.0.name() }
     }
 
-    /// Whether it is UTF-8.
+    /// Whether the encoding is UTF-8.
     pub fn is_utf8(self) -> bool {
         self.0 == UTF_8
     }
 
-    /// Whether it is a form of UTF-16.
+    /// Whether the encoding is a form of UTF-16.
     pub fn is_utf16(self) -> bool {
         [UTF_16LE, UTF_16BE].contains(&self.0)
     }
@@ -80,7 +80,7 @@ fn guess_before_utf8(bytes: &[u8]) -> &'static Encoding {
         };
         lines.iter().map(count).sum::<usize>()
     };
-    // The last of equals.
+    // Of equal counts, `max_by_key` returns the last.
     let all = [WINDOWS_1250, WINDOWS_1251, SHIFT_JIS, GB18030, WINDOWS_1252];
     all.into_iter().max_by_key(|encoding| known_words(encoding)).unwrap_or(WINDOWS_1252)
 }

@@ -12,43 +12,37 @@ pub struct ColouredNoise {
 }
 
 impl ColouredNoise {
-    /// Noise of which `first_order_share_ratio` (0 to 1; anything else counts as the nearer end) of the standard deviation
-    /// lasts `time_constant_s`.
+    /// Noise whose first-order part has `first_order_share_ratio` of the standard deviation; values outside 0 to 1 are clamped.
     pub fn new(first_order_share_ratio: f64, time_constant_s: f64) -> Self {
         ColouredNoise { first_order_share_ratio: first_order_share_ratio.clamp(0.0, 1.0), time_constant_s }
     }
 
-    /// Share of the variance that the first-order part has.
+    /// Variance of the first-order part over that of the whole.
     pub fn first_order_variance_ratio(self) -> f64 {
         self.first_order_share_ratio * self.first_order_share_ratio
     }
 
-    /// Share of the variance that the white part has.
+    /// Variance of the white part over that of the whole.
     pub fn white_variance_ratio(self) -> f64 {
         1.0 - self.first_order_variance_ratio()
     }
 
-    /// Correlation of two samples `apart_s` apart, whose white parts are independent unless they are the same sample.
-    pub fn correlation(self, apart_s: f64) -> f64 {
-        if apart_s == 0.0 {
+    /// Correlation of two samples at a distance of `distance_s`. The white parts of different samples are independent.
+    pub fn correlation(self, distance_s: f64) -> f64 {
+        if distance_s == 0.0 {
             return 1.0;
         }
-        self.first_order_variance_ratio() * first_order::memory(apart_s, self.time_constant_s)
+        self.first_order_variance_ratio() * first_order::memory(distance_s, self.time_constant_s)
     }
 
     /// Variance of the mean of `samples` readings spread evenly over `length_s`, over the variance of one reading.
     ///
-    /// The first-order part is averaged over the whole length, not over the instants of the samples: a difference of one
-    /// twelfth of the samples' distance in time constants, squared.
+    /// The first-order part is averaged over the whole length, not over the instants of the samples. The relative error is one
+    /// twelfth of the square of the sample interval in time constants.
     pub fn variance_of_mean(self, samples: usize, length_s: f64) -> f64 {
         let first_order = self.first_order_variance_ratio();
         self.white_variance_ratio() / samples.max(1) as f64
             + first_order::variance_of_mean(first_order, length_s, self.time_constant_s)
-    }
-
-    /// Number of independent readings whose mean has the same standard deviation as the mean of `samples` readings over `length_s`.
-    pub fn effective_samples(self, samples: usize, length_s: f64) -> f64 {
-        1.0 / self.variance_of_mean(samples, length_s)
     }
 }
 
@@ -71,15 +65,14 @@ mod tests {
         let noise = ColouredNoise::new(0.6, 2.0);
         let times_s: Vec<f64> = (0..200).map(|i| 0.1 * f64::from(i)).collect();
         let pairs = times_s.iter().flat_map(|a| times_s.iter().map(move |b| a - b));
-        let direct = pairs.map(|apart_s| noise.correlation(apart_s)).sum::<f64>() / 4e4;
+        let direct = pairs.map(|distance_s| noise.correlation(distance_s)).sum::<f64>() / 4e4;
         // Samples 0.1 s apart under 2 s: (0.05)^2 / 12 of the first-order part.
         assert!((noise.variance_of_mean(200, 20.0) / direct - 1.0).abs() < 5e-4);
-        assert!((noise.effective_samples(200, 20.0) * direct - 1.0).abs() < 5e-4);
     }
 
     #[test]
     fn white_noise_has_as_many_samples_as_there_are() {
-        assert!((ColouredNoise::new(0.0, 2.0).effective_samples(50, 5.0) - 50.0).abs() < 1e-12);
+        assert!((50.0 * ColouredNoise::new(0.0, 2.0).variance_of_mean(50, 5.0) - 1.0).abs() < 1e-12);
         assert_eq!(ColouredNoise::new(2.0, 1.0).first_order_share_ratio, 1.0);
     }
 }

@@ -1,7 +1,7 @@
-//! The product with the process's correlation matrix.
+//! The product with the correlation matrix of a first-order process.
 
-/// `R x` with `R_ij = exp(-|t_i - t_j| / time_constant_s)`, in one pass forwards and one backwards; as many values as `x`
-/// has, in its unit. `t_s` rises and is as long as `x`.
+/// Computes `R x` with `R_ij = exp(-|t_i - t_j| / time_constant_s)`, in one pass forwards and one backwards; in the unit of `x`. `t_s`
+/// rises and is as long as `x`.
 pub fn correlate(t_s: &[f64], x: &[f64], time_constant_s: f64) -> Vec<f64> {
     let decay = |i: usize| ((t_s[i - 1] - t_s[i]) / time_constant_s).exp();
     let mut sums = x.to_vec();

@@ -7,10 +7,10 @@
 use super::ColouredNoise;
 use super::first_order;
 
-/// Gains of the filter along rows.
+/// Kalman filter that whitens columns row by row.
 #[derive(Debug, Clone, Default)]
 pub struct WhiteningFilter {
-    /// Memory from the row before, gain, and one over the innovation's standard deviation.
+    /// For each row: decay since the previous row, Kalman gain, and the reciprocal of the innovation's standard deviation.
     gains: Vec<[f64; 3]>,
 }
 
@@ -24,9 +24,9 @@ pub struct BlockNoise {
 }
 
 impl BlockNoise {
-    /// Noise of the mean of `samples` readings over `block_s`, whose variance is 1 each.
+    /// Noise of the mean of `samples` readings over `block_s`; each reading has variance 1.
     ///
-    /// Means of a first-order process over blocks correlate as [`first_order::block_covariance`] says, which gives the first-order part.
+    /// The first-order part has the covariance [`first_order::block_covariance`] between blocks.
     /// The white part is reduced so that the total variance of the mean is correct.
     pub fn of_mean(noise: ColouredNoise, samples: f64, block_s: f64) -> Self {
         let share = noise.first_order_variance_ratio();
@@ -42,8 +42,8 @@ impl BlockNoise {
 }
 
 impl WhiteningFilter {
-    /// For rows at `t_s` (rising) with the standard deviation `sigma` of a single sample, of whose white part only that of
-    /// `white_sigma` is left.
+    /// A filter for rows at rising times. A single sample has the standard deviation `sigma`; the white part of the rows is that of
+    /// samples with `white_sigma`.
     pub fn new(
         rows: impl Iterator<Item = (f64, BlockNoise)>,
         time_constant_s: f64,

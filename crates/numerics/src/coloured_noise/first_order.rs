@@ -1,11 +1,11 @@
-//! The first-order process by itself.
+//! Correlation and means of a first-order process.
 
 /// Correlation of two values of the process `apart_s` apart; 0 for a process without memory.
 pub fn memory(apart_s: f64, time_constant_s: f64) -> f64 {
     if time_constant_s > 0.0 { (-apart_s.abs() / time_constant_s).exp() } else { 0.0 }
 }
 
-/// Variance of the process's mean over `length_s`, in the unit of `variance`, that of a single value.
+/// Variance of the process's mean over `length_s`, in the unit of `variance`. `variance` is that of a single value.
 ///
 /// `variance * 2 (x - 1 + exp(-x)) / x^2` with `x` the length in time constants: the integral of the correlation over the
 /// square of the length.
@@ -25,11 +25,11 @@ pub fn variance_of_mean(variance: f64, length_s: f64, time_constant_s: f64) -> f
     variance * 2.0 * (x - 1.0 + (-x).exp()) / (x * x)
 }
 
-/// Covariance of the process's means over two neighbouring blocks of `length_s` each, before the memory of a block's length
-/// is subtracted: blocks `k` apart (1 or more) have `block_covariance * memory(k * length_s)`.
+/// Factor of the covariance of the process's means over two blocks of `length_s` each: blocks `k` apart (at least 1) have the
+/// covariance `block_covariance * memory(k * length_s)`.
 ///
-/// `variance * (2 cosh(x) - 2) / x^2` with `x` the length in time constants. It grows without bound with the length, as the
-/// memory falls; in the unit of `variance`. For a time constant of 0 it is infinite.
+/// `variance * (2 cosh(x) - 2) / x^2` with `x` the length in time constants. In the unit of `variance`; it grows
+/// without bound with the length, as the memory falls. For a time constant of 0 it is infinite.
 pub fn block_covariance(variance: f64, length_s: f64, time_constant_s: f64) -> f64 {
     let x = length_s / time_constant_s;
     // The formula loses digits below this limit; the next term of the series is x^2 / 12.

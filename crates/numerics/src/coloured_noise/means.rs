@@ -4,16 +4,15 @@ use super::ColouredNoise;
 use super::first_order::memory;
 use nalgebra::DMatrix;
 
-/// Distance in time constants beyond which correlation is neglected; it is 6e-6 there.
-const FORGOTTEN: f64 = 12.0;
-/// Blocks with fewer samples than this are summed over all pairs.
-const FEW_SAMPLES: usize = 4;
+/// Distance in time constants beyond which correlation is neglected: it is then below 6e-6.
+const NEGLIGIBLE_CORRELATION_DISTANCE: f64 = 12.0;
+/// Blocks with fewer samples are summed over all pairs of samples.
+const MIN_SAMPLES_FACTORED: usize = 4;
 
 /// Covariance of means of noise with standard deviation 1; one row for each block.
 ///
 /// `C_ij = (1 - c^2) delta_ij / n_i + c^2 mean_kl exp(-|t_k - t_l| / tau)`, k in block i, l in block j, with c the
-/// first-order share. `blocks` are the times of each block's samples, s: rising, blocks one behind the other and none of
-/// them empty.
+/// first-order share. `blocks` has the times of each block's samples, s, rising over all blocks; no block is empty.
 pub fn covariance_of_means(blocks: &[&[f64]], noise: ColouredNoise) -> DMatrix<f64> {
     let tau_s = noise.time_constant_s;
     let mean_s = |times: &[f64]| times.iter().sum::<f64>() / times.len() as f64;
@@ -22,13 +21,14 @@ pub fn covariance_of_means(blocks: &[&[f64]], noise: ColouredNoise) -> DMatrix<f
     let mut covariance = DMatrix::zeros(n, n);
     for i in 0..n {
         for j in 0..=i {
-            let (of_i, of_j) = (blocks[i], blocks[j]);
+            let (times_i, times_j) = (blocks[i], blocks[j]);
             let apart_s = means_s[i] - means_s[j];
-            let correlation = if apart_s > FORGOTTEN * tau_s && i != j {
+            let correlation = if apart_s > NEGLIGIBLE_CORRELATION_DISTANCE * tau_s && i != j {
                 0.0
-            } else if i == j || of_i.len().min(of_j.len()) < FEW_SAMPLES {
-                let pairs = of_i.iter().flat_map(|a| of_j.iter().map(move |b| a - b));
-                pairs.map(|apart_s| memory(apart_s, tau_s)).sum::<f64>() / (of_i.len() * of_j.len()) as f64
+            } else if i == j || times_i.len().min(times_j.len()) < MIN_SAMPLES_FACTORED {
+                let pairs = times_i.iter().flat_map(|a| times_j.iter().map(move |b| a - b));
+                pairs.map(|apart_s| memory(apart_s, tau_s)).sum::<f64>()
+                    / (times_i.len() * times_j.len()) as f64
             } else {
                 // Blocks do not overlap: the exponential of the distance factors.
                 let from = |block: usize, sign: f64| {
@@ -40,7 +40,7 @@ pub fn covariance_of_means(blocks: &[&[f64]], noise: ColouredNoise) -> DMatrix<f
             };
             let mut value = noise.first_order_variance_ratio() * correlation;
             if i == j {
-                value += noise.white_variance_ratio() / of_i.len() as f64;
+                value += noise.white_variance_ratio() / times_i.len() as f64;
             }
             covariance[(i, j)] = value;
             covariance[(j, i)] = value;
@@ -49,24 +49,24 @@ pub fn covariance_of_means(blocks: &[&[f64]], noise: ColouredNoise) -> DMatrix<f
     covariance
 }
 
-/// Lower Cholesky factor of a covariance, kept to whiten many vectors.
+/// Lower Cholesky factor of a covariance, to whiten many vectors.
 #[derive(Debug, Clone)]
 pub struct WhiteningFactor {
     lower: DMatrix<f64>,
 }
 
 impl WhiteningFactor {
-    /// Factor of a covariance; `None` where it is not positive definite.
+    /// Factor of a covariance; `None` if it is not positive definite.
     pub fn new(covariance: DMatrix<f64>) -> Option<Self> {
         Some(WhiteningFactor { lower: covariance.cholesky()?.unpack() })
     }
 
-    /// For `n` independent values of standard deviation `sigma`.
+    /// Factor for `n` independent values with standard deviation `sigma`.
     pub fn independent(n: usize, sigma: f64) -> Self {
         WhiteningFactor { lower: DMatrix::identity(n, n) * sigma }
     }
 
-    /// `L^-1 v`, in place; `values` are as many as the covariance has rows.
+    /// Replaces `values` by `L^-1 values`, one value for each row of the covariance.
     pub fn whiten(&self, values: &mut [f64]) {
         let n = values.len();
         // Columns are contiguous: forward substitution by columns.

@@ -1,7 +1,7 @@
 //! Coloured noise: white noise plus a stationary first-order process with the autocorrelation `exp(-|t - s| / time constant)`
-//! (Ornstein-Uhlenbeck; AR(1) where samples are evenly spaced).
+//! (Ornstein-Uhlenbeck; AR(1) if samples are evenly spaced).
 //!
-//! Contains variance and covariance of means, the effective number of independent samples, the product with the correlation matrix, and two
+//! Contains the variance and covariance of means, the product with the correlation matrix, and two
 //! ways to whiten residuals.
 //!
 //! Source: P. E. Kloeden, E. Platen, Numerical Solution of Stochastic Differential Equations (1992), section 4.4; M. B.

@@ -2,47 +2,47 @@
 //! share. The groups are eliminated one by one, so that the work grows with their number, not with its cube.
 //!
 //! Source: B. Triggs, P. McLauchlan, R. Hartley, A. Fitzgibbon, "Bundle adjustment - a modern synthesis" (2000), section 6.1,
-//! where this is the reduced camera system.
+//! which calls the result the reduced camera system.
 
 use nalgebra::{Const, DMatrix, DVector, Dyn, OMatrix, SMatrix, SVector};
 
-/// One group's part of the normal equations, of `L` parameters of its own.
+/// The normal equations of one group with `L` own parameters.
 #[derive(Debug, Clone)]
 pub struct ArrowBlock<const L: usize> {
-    /// Own by own.
+    /// Block of the group's own parameters.
     pub own: SMatrix<f64, L, L>,
-    /// Own by shared.
+    /// Block between the group's own parameters and the shared ones.
     pub mixed: OMatrix<f64, Const<L>, Dyn>,
-    /// Right side.
+    /// Right-hand side.
     pub right: SVector<f64, L>,
-    /// Whether the group contributes to the shared parameters; otherwise it only follows them.
+    /// Whether the group contributes to the estimate of the shared parameters.
     pub shares: bool,
 }
 
-/// The equations of all parameters.
+/// The normal equations of all parameters.
 #[derive(Debug, Clone)]
 pub struct Arrow<const L: usize> {
-    /// Shared by shared, before the groups are taken out.
+    /// Block of the shared parameters, before the groups are eliminated.
     pub shared: DMatrix<f64>,
-    /// Right side of the shared ones.
+    /// Right-hand side of the shared parameters.
     pub right: DVector<f64>,
     /// The groups.
     pub blocks: Vec<ArrowBlock<L>>,
 }
 
-/// The equations of the shared parameters, with the groups' own eliminated.
+/// The equations of the shared parameters after elimination of the groups.
 #[derive(Debug, Clone)]
 pub struct Reduced<const L: usize> {
-    /// Shared by shared: the Schur complement.
+    /// The Schur complement.
     pub matrix: DMatrix<f64>,
-    /// Its right side.
+    /// Right-hand side.
     pub right: DVector<f64>,
     /// Inverse of each group's own matrix.
     pub inverses: Vec<SMatrix<f64, L, L>>,
 }
 
 impl<const L: usize> Arrow<L> {
-    /// Eliminates the groups, with the diagonal raised by `damping` times itself; `None` where a group's own matrix is not
+    /// Eliminates the groups, with the diagonal multiplied by `1 + damping`; `None` if a group's own matrix is not
     /// positive definite.
     pub fn reduced(&self, damping: f64) -> Option<Reduced<L>> {
         let (mut matrix, mut right) = (self.shared.clone(), self.right.clone());
@@ -57,16 +57,16 @@ impl<const L: usize> Arrow<L> {
             }
             let inverse = own.cholesky()?.inverse();
             if block.shares {
-                let folded = block.mixed.transpose() * inverse;
-                matrix -= &folded * &block.mixed;
-                right -= &folded * block.right;
+                let eliminated = block.mixed.transpose() * inverse;
+                matrix -= &eliminated * &block.mixed;
+                right -= &eliminated * block.right;
             }
             inverses.push(inverse);
         }
         Some(Reduced { matrix, right, inverses })
     }
 
-    /// The damped step of the shared parameters, and of each group's own; `None` where the equations cannot be solved.
+    /// The damped step of the shared parameters and of each group's own; `None` if the equations cannot be solved.
     pub fn step(&self, damping: f64) -> Option<(DVector<f64>, Vec<SVector<f64, L>>)> {
         let Reduced { matrix, right, inverses } = self.reduced(damping)?;
         let shared = if matrix.nrows() == 0 { DVector::zeros(0) } else { matrix.cholesky()?.solve(&right) };

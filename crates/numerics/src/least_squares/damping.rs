@@ -1,6 +1,6 @@
-//! Damping of the steps, and the search for a step that reduces the cost.
+//! Levenberg-Marquardt damping, and the search for a step that reduces the cost.
 
-/// How the damping changes. All are ratios of the normal matrix's diagonal, or factors on them.
+/// How the damping changes during a fit. Damping is a fraction of the diagonal of the normal matrix.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DampingRule {
     /// Initial value.
@@ -8,27 +8,27 @@ pub struct DampingRule {
     /// Factor after a rejected step, above 1.
     pub growth: f64,
     /// Factor after an accepted step, below 1.
-    pub relief: f64,
-    /// Minimum value after a rejected step, so that a very small damping recovers in few steps.
-    pub renewed: f64,
-    /// Minimum value after an accepted step.
-    pub least: f64,
-    /// Maximum value; beyond it steps are too short to change anything, and the search ends.
-    pub most: f64,
-    /// Steps tried before the search ends.
-    pub tries: usize,
+    pub reduction: f64,
+    /// Minimum after a rejected step, so that a very small damping grows back in few trials.
+    pub min_after_rejection: f64,
+    /// Minimum after an accepted step.
+    pub min: f64,
+    /// Maximum: beyond it steps are too short to change anything, and the search ends.
+    pub max: f64,
+    /// Maximum number of trial steps of a search.
+    pub max_trials: usize,
 }
 
 impl DampingRule {
-    /// For a good start and a nearly linear model: small, and quickly negligible.
+    /// For a good start and a nearly linear model: starts small and quickly becomes negligible.
     pub const GOOD_START: DampingRule = DampingRule {
         start: 1e-4,
         growth: 10.0,
-        relief: 0.1,
-        renewed: 1e-8,
-        least: 1e-12,
-        most: 1e8,
-        tries: 12,
+        reduction: 0.1,
+        min_after_rejection: 1e-8,
+        min: 1e-12,
+        max: 1e8,
+        max_trials: 12,
     };
 }
 
@@ -43,7 +43,7 @@ pub struct Damping {
 }
 
 impl Damping {
-    /// Damping at its start.
+    /// Starts with the initial damping of a rule.
     pub fn new(rule: DampingRule) -> Self {
         Damping { rule, value: rule.start }
     }
@@ -53,13 +53,13 @@ impl Damping {
     ///
     /// The next search starts from the accepted damping, reduced.
     pub fn search<T>(&mut self, mut trial: impl FnMut(f64) -> Option<T>) -> Option<T> {
-        for _ in 0..self.rule.tries {
+        for _ in 0..self.rule.max_trials {
             if let Some(found) = trial(self.value) {
-                self.value = (self.value * self.rule.relief).max(self.rule.least);
+                self.value = (self.value * self.rule.reduction).max(self.rule.min);
                 return Some(found);
             }
-            self.value = (self.value * self.rule.growth).max(self.rule.renewed);
-            if self.value > self.rule.most {
+            self.value = (self.value * self.rule.growth).max(self.rule.min_after_rejection);
+            if self.value > self.rule.max {
                 break;
             }
         }
@@ -74,11 +74,11 @@ mod tests {
     const RULE: DampingRule = DampingRule {
         start: 1e-2,
         growth: 10.0,
-        relief: 0.1,
-        renewed: 1e-6,
-        least: 1e-8,
-        most: 1e3,
-        tries: 12,
+        reduction: 0.1,
+        min_after_rejection: 1e-6,
+        min: 1e-8,
+        max: 1e3,
+        max_trials: 12,
     };
 
     #[test]
@@ -101,7 +101,7 @@ mod tests {
             None
         };
         assert_eq!(Damping::new(RULE).search(&mut never), None);
-        assert_eq!(Damping::new(DampingRule { most: f64::INFINITY, ..RULE }).search(&mut never), None);
+        assert_eq!(Damping::new(DampingRule { max: f64::INFINITY, ..RULE }).search(&mut never), None);
         // 1e-2 to 1e3 in factors of ten, and the tries allowed.
         assert!((6..=7).contains(&(count - 12)), "{count}");
     }

@@ -48,11 +48,11 @@ mod tests {
         let mut damping = Damping::new(DampingRule {
             start: 1e-3,
             growth: 10.0,
-            relief: 0.1,
-            renewed: 1e-9,
-            least: 1e-14,
-            most: 1e8,
-            tries: 20,
+            reduction: 0.1,
+            min_after_rejection: 1e-9,
+            min: 1e-14,
+            max: 1e8,
+            max_trials: 20,
         });
         for _ in 0..50 {
             let (r, j) = (residuals(&b), jacobian(&b));

@@ -1,8 +1,8 @@
-//! Nonlinear least squares by damped steps: the damping and its search, and the solution of the damped normal equations,
-//! whether their matrix is full or has the shape of an arrow.
+//! Nonlinear least squares by damped steps: the control of the damping, and the solution of the damped normal equations, whose matrix
+//! is full or arrow-shaped.
 //!
-//! The caller defines the problem: residuals, weights, bounds, and estimates between the steps. docs/decisions/0010-numerics.md says why no
-//! library is used.
+//! The caller defines the problem: residuals, weights, bounds, and estimates between the steps. docs/decisions/0010-numerics.md gives
+//! the reasons for not using a library.
 //!
 //! Source: K. Levenberg, Quarterly of Applied Mathematics 2 (1944); D. W. Marquardt, SIAM Journal 11 (1963), whose damping is
 //! relative to the diagonal, so that units of the parameters do not matter.

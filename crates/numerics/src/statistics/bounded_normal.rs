@@ -16,53 +16,40 @@ pub struct BoundedNormal {
 }
 
 impl BoundedNormal {
-    /// Share of the unbounded distribution that lies between the bounds.
+    /// Probability of the untruncated distribution between the bounds.
     pub fn mass(&self) -> f64 {
-        let (near, far) = self.tails();
+        let (near, far) = self.tail_probabilities();
         near - far
     }
 
-    /// Share of what lies between the bounds that lies above (or else below) `value`.
-    pub fn share_beyond(&self, value: f64, above: bool) -> f64 {
-        let value = value.clamp(self.low, self.high);
-        let beyond = if above {
-            BoundedNormal { low: value, ..*self }
-        } else {
-            BoundedNormal { high: value, ..*self }
-        };
-        let (all, beyond) = (self.mass(), beyond.mass());
-        if all > 0.0 {
-            return (beyond / all).clamp(0.0, 1.0);
-        }
-        // All of it is at the nearer bound.
-        let at = self.quantile(0.5);
-        if (above && value < at) || (!above && value > at) { 1.0 } else { 0.0 }
-    }
-
-    /// Value below which `share` (between 0 and 1) of what lies between the bounds is; the nearest bound if the probability between them
+    /// Quantile of the truncated distribution at `share` (between 0 and 1); the nearest bound if the probability between the bounds
     /// underflows.
     pub fn quantile(&self, share: f64) -> f64 {
-        let upward = self.upward();
-        let (near, far) = self.tails();
+        let upper = self.uses_upper_tail();
+        let (near, far) = self.tail_probabilities();
         if near <= far {
-            return if upward { self.low } else { self.high };
+            return if upper { self.low } else { self.high };
         }
-        let passed = if upward { share } else { 1.0 - share };
-        // Below 1 ulp of a tail its quantile is beyond any bound, and infinite.
-        let sigmas = -Normal::standard().inverse_cdf((near - passed * (near - far)).clamp(0.0, 1.0));
-        (self.mean + self.sigma * if upward { sigmas } else { -sigmas }).clamp(self.low, self.high)
+        let tail_share = if upper { share } else { 1.0 - share };
+        // A tail below 1 ulp has an infinite quantile, which the bounds clamp.
+        let sigmas = -Normal::standard().inverse_cdf((near - tail_share * (near - far)).clamp(0.0, 1.0));
+        (self.mean + self.sigma * if upper { sigmas } else { -sigmas }).clamp(self.low, self.high)
     }
 
-    /// Whether the bounds lie rather above the mean: shares are then counted from above, where they stay exact.
-    fn upward(&self) -> bool {
+    /// Whether the centre of the bounds lies above the mean: the upper tail is then used, because it is more exact.
+    fn uses_upper_tail(&self) -> bool {
         0.5 * (self.low + self.high) >= self.mean
     }
 
-    /// Shares of the unbounded distribution beyond the bound that is nearer to the mean, and beyond the other one.
-    fn tails(&self) -> (f64, f64) {
+    /// Probability of the untruncated distribution beyond the bound nearer to the mean, and beyond the other bound.
+    fn tail_probabilities(&self) -> (f64, f64) {
         let normal = Normal::standard();
         let (low, high) = ((self.low - self.mean) / self.sigma, (self.high - self.mean) / self.sigma);
-        if self.upward() { (normal.sf(low), normal.sf(high)) } else { (normal.cdf(high), normal.cdf(low)) }
+        if self.uses_upper_tail() {
+            (normal.sf(low), normal.sf(high))
+        } else {
+            (normal.cdf(high), normal.cdf(low))
+        }
     }
 }
 
@@ -80,11 +67,6 @@ mod tests {
             for (share, expected) in [(0.1, at_10), (0.975, at_975)] {
                 let found = bounded.quantile(share);
                 assert!((found - expected).abs() < 1e-6 * sigma, "{bounded:?} at {share}: {found}");
-                assert!(
-                    (bounded.share_beyond(expected, false) - share).abs() < 1e-6,
-                    "{bounded:?} below {expected}"
-                );
-                assert!((bounded.share_beyond(expected, true) + share - 1.0).abs() < 1e-6, "{bounded:?}");
             }
         }
     }
@@ -95,7 +77,6 @@ mod tests {
         assert_eq!((bounded.mass(), bounded.quantile(0.5)), (0.0, 0.0));
         let bounded = BoundedNormal { mean: 1e3, ..bounded };
         assert_eq!((bounded.mass(), bounded.quantile(0.5)), (0.0, 1.0));
-        assert_eq!((bounded.share_beyond(0.5, true), bounded.share_beyond(0.5, false)), (1.0, 0.0));
     }
 
     const SCIPY: [(f64, f64, f64, f64, f64, f64, f64); 6] = [

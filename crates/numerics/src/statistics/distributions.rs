@@ -9,33 +9,33 @@ pub const NORMAL_975: f64 = 1.959_963_984_540_054;
 /// 95 % quantile of the standard normal distribution: a quantity this far above a threshold exceeds it in 95 of 100 cases.
 pub const NORMAL_95: f64 = 1.644_853_626_951_472;
 
-/// Threshold for a hint, in standard deviations: a normal quantity exceeds it by chance once in 22 times.
+/// Threshold for a hint, in standard deviations: by chance exceeded once in 22 times.
 pub const HINT_SIGMAS: f64 = 2.0;
-/// Threshold to doubt one number: exceeded by chance once in 370 times.
+/// Threshold for a doubt about one number, in standard deviations: by chance exceeded once in 370 times.
 pub const DOUBT_SIGMAS: f64 = 3.0;
-/// Threshold to exclude one number of hundreds: exceeded by chance once in 16,000 times.
+/// Threshold for excluding one of hundreds of numbers, in standard deviations: by chance exceeded once in 16,000 times.
 pub const EXCLUDE_SIGMAS: f64 = 4.0;
 
-/// Fewest values that give a mean and its scatter: the standard deviation of so many is known to a quarter, 1 / sqrt(2 (n - 1)).
+/// Minimum number of values for a mean and its scatter: the relative error of their standard deviation, 1 / sqrt(2 (n - 1)), is a quarter.
 pub const MIN_VALUES: usize = 8;
 
 /// 95 % quantile of chi-square with one degree of freedom: the square of [`NORMAL_975`].
 pub const CHI_SQUARE_1_95: f64 = 3.841_458_820_694_124;
 
-/// Quantile of the standard normal distribution at `share` (between 0 and 1); `None` elsewhere.
+/// Quantile of the standard normal distribution at `share` (between 0 and 1); otherwise `None`.
 pub fn normal_quantile(share: f64) -> Option<f64> {
     (share > 0.0 && share < 1.0).then(|| Normal::standard().inverse_cdf(share))
 }
 
-/// Quantile of Student's t distribution at `share` (between 0 and 1), for `degrees_of_freedom` above 0; `None` elsewhere.
+/// Quantile of Student's t distribution at `share` (between 0 and 1), for `degrees_of_freedom` above 0; otherwise `None`.
 pub fn student_quantile(share: f64, degrees_of_freedom: f64) -> Option<f64> {
     let inside = share > 0.0 && share < 1.0;
     let distribution = StudentsT::new(0.0, 1.0, degrees_of_freedom).ok().filter(|_| inside)?;
     Some(distribution.inverse_cdf(share))
 }
 
-/// Both ends of the exact 95 % interval of a share of which `hits` out of `trials` were seen (Clopper and Pearson 1934); 0 and 1
-/// without trials. Neither has to be whole: `n` independent shares between 0 and 1 whose mean is `m` count as `n m` hits.
+/// The exact 95 % interval of a probability, from `hits` out of `trials` (Clopper and Pearson 1934); 0 to 1 without trials. The counts may
+/// be fractions: `n` independent values between 0 and 1 with mean `m` count as `n m` hits.
 pub fn share_interval_95(hits: f64, trials: f64) -> (f64, f64) {
     let misses = trials - hits;
     let low = if hits > 0.0 { inv_beta_reg(hits, misses.max(0.0) + 1.0, 0.025) } else { 0.0 };

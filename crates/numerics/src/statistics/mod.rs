@@ -1,7 +1,7 @@
 //! Statistics of lists of numbers.
 //!
-//! All functions take slices and iterators, and none skips values silently. Without values the result is `None`; a NaN among the values
-//! makes the result NaN, as in numpy. To ignore gaps, filter them first.
+//! No function skips values silently. The result is `None` if there are no values, and NaN if one of them is NaN, as in numpy. To ignore
+//! gaps, filter them first.
 
 mod bounded_normal;
 mod distributions;

@@ -2,11 +2,11 @@
 
 use std::borrow::Borrow;
 
-/// The middle value; the mean of the two middle ones where their number is even. `None` without values, NaN where one of
+/// The middle value, or the mean of the two middle ones if their number is even. `None` without values, NaN if one of
 /// them is NaN.
 ///
 /// In the unit of the values. Source: R. J. Hyndman, Y. Fan, "Sample quantiles in statistical packages", The American
-/// Statistician 50 (1996): all of their definitions but the discontinuous ones agree on the median.
+/// Statistician 50 (1996): all their continuous definitions agree on the median.
 pub fn median<T: Borrow<f64>>(values: impl IntoIterator<Item = T>) -> Option<f64> {
     let mut values: Vec<f64> = values.into_iter().map(|value| *value.borrow()).collect();
     let middle = values.len() / 2;
@@ -19,21 +19,21 @@ pub fn median<T: Borrow<f64>>(values: impl IntoIterator<Item = T>) -> Option<f64
     let even = values.len().is_multiple_of(2);
     let (below, upper, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
     let upper = *upper;
-    // Where the number is even, at least one value lies below the upper of the two middle ones.
+    // If the number is even, at least one value lies below the upper of the two middle ones.
     let lower = if even { below.iter().copied().fold(f64::NEG_INFINITY, f64::max) } else { upper };
-    Some(halfway(lower, upper))
+    Some(midpoint(lower, upper))
 }
 
-/// [`median`] of values that are in order already and without NaN, as a window that slides over a signal keeps them.
+/// [`median`] of sorted values without NaN, e.g. those of a sliding window.
 pub fn median_of_sorted(sorted: &[f64]) -> Option<f64> {
     let upper = sorted.get(sorted.len() / 2)?;
-    Some(halfway(sorted[(sorted.len() - 1) / 2], *upper))
+    Some(midpoint(sorted[(sorted.len() - 1) / 2], *upper))
 }
 
-/// The value nearest to `share` (0 to 1) of the way from the smallest to the largest: always one of the values.
-/// `None` without values, NaN where a value is NaN.
+/// The value whose rank is nearest to `share` (0 to 1) of the way from the smallest to the largest: always one of the values.
+/// `None` without values, NaN if a value is NaN.
 ///
-/// In the unit of the values. For searches that depend on the last digit; use [`median`] and [`quantile`] for results.
+/// In the unit of the values. For searches whose path depends on the last digit; use [`median`] and [`quantile`] for results.
 pub fn nearest_rank<T: Borrow<f64>>(values: impl IntoIterator<Item = T>, share: f64) -> Option<f64> {
     let mut values: Vec<f64> = values.into_iter().map(|value| *value.borrow()).collect();
     let place = (share.clamp(0.0, 1.0) * values.len().checked_sub(1)? as f64).round() as usize;
@@ -43,15 +43,15 @@ pub fn nearest_rank<T: Borrow<f64>>(values: impl IntoIterator<Item = T>, share: 
     Some(*values.select_nth_unstable_by(place, f64::total_cmp).1)
 }
 
-/// Mean of two values, without the difference or sum of equal infinities.
-fn halfway(lower: f64, upper: f64) -> f64 {
+/// Mean of two values, which may be equal infinities.
+fn midpoint(lower: f64, upper: f64) -> f64 {
     if lower == upper { upper } else { 0.5 * (lower + upper) }
 }
 
-/// The value below which `share` (0 to 1) of the values lie, by straight lines between the values in order, of which the
-/// smallest stands for 0 and the largest for 1. `None` without values or with another share, NaN where a value is NaN.
+/// The value below which `share` (0 to 1) of the values lie, by linear interpolation between the sorted values: the smallest at 0, the
+/// largest at 1. `None` without values or with another share, NaN if a value is NaN.
 ///
-/// In the unit of the values. Type 7 of Hyndman and Fan (1996), which is what numpy, R and spreadsheets do by default.
+/// In the unit of the values. Type 7 of Hyndman and Fan (1996), the default of numpy, R and spreadsheets.
 pub fn quantile<T: Borrow<f64>>(values: impl IntoIterator<Item = T>, share: f64) -> Option<f64> {
     let mut values: Vec<f64> = values.into_iter().map(|value| *value.borrow()).collect();
     if values.is_empty() || !(0.0..=1.0).contains(&share) {
@@ -65,9 +65,9 @@ pub fn quantile<T: Borrow<f64>>(values: impl IntoIterator<Item = T>, share: f64)
     let (_, lower, above) = values.select_nth_unstable_by(index, f64::total_cmp);
     let lower = *lower;
     let upper = above.iter().copied().reduce(f64::min).unwrap_or(lower);
-    let part = place - index as f64;
-    // Without the difference of equal infinities.
-    Some(if part == 0.0 || lower == upper { lower } else { lower + part * (upper - lower) })
+    let fraction = place - index as f64;
+    // Equal infinities have no difference.
+    Some(if fraction == 0.0 || lower == upper { lower } else { lower + fraction * (upper - lower) })
 }
 
 #[cfg(test)]

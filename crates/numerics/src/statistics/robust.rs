@@ -3,11 +3,11 @@
 use super::order::median;
 use std::borrow::Borrow;
 
-/// Standard deviation over median size of a normal distribution about 0: 1 / quantile(0.75).
+/// Standard deviation over median absolute value of a normal distribution about 0: 1 / quantile(0.75).
 pub const MEDIAN_SIZE_TO_SIGMA: f64 = 1.482_602_218_505_602;
 
-/// Standard deviation of normally distributed deviations about 0, in their unit, from their median absolute value, which stays finite with
-/// up to half outliers. `None` without values, NaN where one of them is NaN.
+/// Standard deviation of normally distributed deviations about 0, in their unit, from their median absolute value: up to half of them may
+/// be outliers. `None` without values, NaN if one of them is NaN.
 ///
 /// Source: F. R. Hampel, "The influence curve and its role in robust estimation", J. Am. Stat. Assoc. 69 (1974).
 pub fn robust_sigma<T: Borrow<f64>>(deviations: impl IntoIterator<Item = T>) -> Option<f64> {

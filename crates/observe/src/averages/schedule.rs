@@ -1,11 +1,12 @@
-//! Segments of a step for averaging readings: short after the jump, long when only the metal's temperature changes.
+//! Segments of a step for averaging readings: short after the jump, long while only the temperature of the metal changes.
 
 /// Rule for cutting a step into segments.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Schedule {
     /// Start of the first segment after that of the step, s.
     pub first_s: f64,
-    /// Pairs of time since the step's start until which a segment length applies, and that length, s; the last one applies without limit.
+    /// Segment lengths: pairs of an end time, from the start of the step, and the length that applies until then, s. The last length applies
+    /// without limit.
     pub lengths_s: &'static [(f64, f64)],
     /// Segments shorter than this are merged with the previous one, s ...
     pub shortest_s: f64,
@@ -14,11 +15,11 @@ pub struct Schedule {
 }
 
 impl Schedule {
-    /// Starts and ends of the segments from `start_s` to `end_s`, each at least `interval_s` (the distance of two samples) long. They have
-    /// no gaps; the list is empty if the step is shorter than the shortest segment.
-    pub fn stretches(&self, start_s: f64, end_s: f64, interval_s: f64) -> Vec<(f64, f64)> {
+    /// Starts and ends of the segments from `start_s` to `end_s`, without gaps. Each is at least as long as the sample interval `interval_s`.
+    /// The list is empty if the step is shorter than the shortest segment.
+    pub fn segments(&self, start_s: f64, end_s: f64, interval_s: f64) -> Vec<(f64, f64)> {
         let whole_s = end_s - start_s;
-        let mut found = Vec::new();
+        let mut segments = Vec::new();
         let mut at_s = self.first_s;
         while whole_s - at_s > 1e-9 {
             let row = self.lengths_s.iter().find(|(until_s, _)| at_s < until_s - 1e-9);
@@ -31,10 +32,10 @@ impl Schedule {
             if whole_s - next_s < shortest_s {
                 next_s = whole_s;
             }
-            found.push((start_s + at_s, start_s + next_s));
+            segments.push((start_s + at_s, start_s + next_s));
             at_s = next_s;
         }
-        found
+        segments
     }
 }
 
@@ -50,26 +51,26 @@ mod tests {
     };
 
     #[test]
-    fn a_step_of_two_minutes_has_five_stretches_without_holes() {
+    fn a_step_of_two_minutes_has_five_segments_without_gaps() {
         let edges = [(105.0, 115.0), (115.0, 135.0), (135.0, 165.0), (165.0, 195.0), (195.0, 220.0)];
-        assert_eq!(SLOW.stretches(100.0, 220.0, 0.1), edges);
-        assert!(SLOW.stretches(100.0, 104.0, 0.1).is_empty());
+        assert_eq!(SLOW.segments(100.0, 220.0, 0.1), edges);
+        assert!(SLOW.segments(100.0, 104.0, 0.1).is_empty());
         // Three seconds more than a whole segment belong to it.
-        assert_eq!(SLOW.stretches(0.0, 38.0, 0.1), [(5.0, 15.0), (15.0, 38.0)]);
+        assert_eq!(SLOW.segments(0.0, 38.0, 0.1), [(5.0, 15.0), (15.0, 38.0)]);
     }
 
     #[test]
-    fn no_stretch_is_shorter_than_a_sample_or_than_its_share() {
+    fn no_segment_is_shorter_than_a_sample_or_than_its_share() {
         let fast = Schedule {
             first_s: 0.0,
             lengths_s: &[(1.0, 0.1), (f64::INFINITY, 10.0)],
             shortest_s: 0.0,
             shortest_ratio: 0.5,
         };
-        let stretches = fast.stretches(7.0, 24.0, 0.25);
-        assert_eq!(stretches.first().map(|s| s.0), Some(7.0));
-        assert_eq!(stretches.last().map(|s| s.1), Some(24.0));
-        assert!(stretches.windows(2).all(|pair| pair[0].1 == pair[1].0));
-        assert!(stretches.iter().all(|(from_s, to_s)| to_s - from_s > 0.24));
+        let segments = fast.segments(7.0, 24.0, 0.25);
+        assert_eq!(segments.first().map(|s| s.0), Some(7.0));
+        assert_eq!(segments.last().map(|s| s.1), Some(24.0));
+        assert!(segments.windows(2).all(|pair| pair[0].1 == pair[1].0));
+        assert!(segments.iter().all(|(from_s, to_s)| to_s - from_s > 0.24));
     }
 }

@@ -4,7 +4,7 @@ use mapper_core::{Channel, Recording, Series};
 use mapper_numerics::statistics::median;
 use std::collections::BTreeMap;
 
-/// All channels at the same times; NaN without a value.
+/// All channels at the same times; NaN for missing values.
 #[derive(Debug, Clone)]
 pub struct Table {
     /// Times, s, rising.
@@ -19,7 +19,7 @@ pub struct Table {
 const GAP_INTERVALS: f64 = 2.5;
 
 impl Table {
-    /// Puts the measured channels of a recording on the time base of the shaft speed, or of the first channel.
+    /// Resamples the measured channels of a recording to the times of the shaft speed, or of the first channel.
     pub fn new(recording: &Recording) -> Option<Table> {
         let measured = |channel: &Channel| channel.info().group != mapper_core::Group::Command;
         let base = recording
@@ -32,7 +32,7 @@ impl Table {
             .series
             .iter()
             .filter(|(channel, series)| measured(channel) && series.t_s.len() > 1)
-            .map(|(channel, series)| (*channel, on_base(series, &t_s, interval_s)))
+            .map(|(channel, series)| (*channel, resample(series, &t_s, interval_s)))
             .collect();
         Some(Table { t_s, interval_s, columns })
     }
@@ -53,8 +53,8 @@ fn median_interval_s(t_s: &[f64]) -> Option<f64> {
     median(t_s.windows(2).map(|pair| pair[1] - pair[0]))
 }
 
-/// The values of a series at other times; NaN in its gaps. `interval_s` is the typical interval of those times.
-pub(crate) fn on_base(series: &Series, t_s: &[f64], interval_s: f64) -> Vec<f64> {
+/// The values of a series at the times `t_s`, with the typical interval `interval_s`; NaN in gaps.
+pub(crate) fn resample(series: &Series, t_s: &[f64], interval_s: f64) -> Vec<f64> {
     if series.t_s == t_s {
         return series.values.clone();
     }

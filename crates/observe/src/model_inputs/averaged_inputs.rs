@@ -1,7 +1,7 @@
 //! Recorded boundary conditions as model inputs: averaged in quiet segments, unaveraged after jumps.
 //!
-//! Unlike [`smoothed_inputs`](crate::model_inputs::smoothed_inputs) these keep the noise of means, which is independent between segments, and follow a step
-//! of an input sensor. The search for drift needs both.
+//! In contrast to [`smoothed_inputs`](crate::model_inputs::smoothed_inputs), these keep the noise of means, which is independent between
+//! segments, and follow a step of an input sensor. The search for drift needs both properties.
 
 use crate::averages::mean_reading::BEFORE_S;
 use crate::averages::schedule::Schedule;
@@ -9,16 +9,17 @@ use crate::averages::time_table::Table;
 use crate::channels::{DRIVERS, boundary_condition};
 use crate::model_inputs::lagged_command::{LaggedCommand, Level, Response, measured_valve_response};
 use mapper_core::{Channel, Recording};
+use mapper_numerics::statistics::mean;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::inputs::{Inputs, InputsError, InterpolatedInputs};
 
 /// Time after a jump for which readings are not averaged, s: actuators need some tenths.
 const RAW_S: f64 = 3.0;
-/// Largest lag that is attributed to the valve, s: pneumatic and electric actuators of this size need 0.1 to 1 s, flow meters up to several
+/// Maximum lag that is attributed to the valve, s: pneumatic and electric actuators of this size need 0.1 to 1 s, flow meters up to several
 /// seconds. Judgement.
 const MAX_VALVE_LAG_S: f64 = 1.5;
-/// Averaging times after that. A loop that holds the speed trims P3 by a per cent within ten seconds of the jump, and a mean must not lag
-/// behind that. It is at least the time step of the model, which would otherwise see single means.
+/// Averaging times after the raw readings. A speed-control loop corrects P3 by a per cent within ten seconds of the jump, and the means must
+/// follow this. Each is at least as long as the time step of the model.
 const AFTER_JUMP: Schedule = Schedule {
     first_s: RAW_S,
     lengths_s: &[(8.0, 0.5), (20.0, 1.0), (50.0, 5.0), (f64::INFINITY, 10.0)],
@@ -78,7 +79,7 @@ impl AveragedInputs {
             let next_s = jumps.get(index + 1).map_or(end_s, |next| next.0);
             let mut nodes =
                 Nodes { recording, nominal, command: &command, t_s: Vec::new(), rows: Vec::new() };
-            nodes.level(*start_s, next_s, index > 0);
+            nodes.add_level(*start_s, next_s, index > 0);
             inputs.starts_s.push(*start_s);
             inputs.levels.push(InterpolatedInputs::new(nodes.t_s, nodes.rows)?);
         }
@@ -90,7 +91,8 @@ impl AveragedInputs {
     }
 }
 
-/// Response of the valve, from the recording; immediate if unknown, or if it is the flow meter that lags (slower than any valve).
+/// Response of the valve, from the recording. It is immediate if it is unknown or slower than any valve, which indicates a lag of the flow
+/// meter.
 fn valve_response(recording: &Recording, nominal: &BoundaryConditions) -> Response {
     let measured =
         Table::new(recording).and_then(|table| measured_valve_response(&table, recording, nominal.p1_pa));
@@ -106,8 +108,8 @@ struct Nodes<'a> {
 }
 
 impl Nodes<'_> {
-    /// Nodes from one jump to the next.
-    fn level(&mut self, start_s: f64, end_s: f64, after_jump: bool) {
+    /// Adds the nodes from one jump to the next.
+    fn add_level(&mut self, start_s: f64, end_s: f64, after_jump: bool) {
         let raw_end_s = if after_jump { (start_s + RAW_S).min(end_s) } else { start_s };
         if after_jump {
             let t_s = self
@@ -124,20 +126,17 @@ impl Nodes<'_> {
                 let mut row = self.means(start_s, raw_end_s);
                 row.valve_opening_ratio = self.command.valve_opening_ratio(t_s);
                 for channel in [Channel::P3, Channel::P4] {
-                    let read = self.recording.series.get(&channel).and_then(|series| series.interpolate(t_s));
-                    if let (Some(read), Some(value)) = (read, boundary_condition(&mut row, channel)) {
-                        *value = read;
+                    let reading =
+                        self.recording.series.get(&channel).and_then(|series| series.interpolate(t_s));
+                    if let (Some(reading), Some(value)) = (reading, boundary_condition(&mut row, channel)) {
+                        *value = reading;
                     }
                 }
                 self.push(t_s, row);
             }
         }
-        let stretches = if after_jump {
-            AFTER_JUMP.stretches(start_s, end_s, 0.0)
-        } else {
-            AT_REST.stretches(start_s, end_s, 0.0)
-        };
-        for (low_s, high_s) in stretches {
+        let schedule = if after_jump { AFTER_JUMP } else { AT_REST };
+        for (low_s, high_s) in schedule.segments(start_s, end_s, 0.0) {
             let row = self.means(low_s, high_s - BEFORE_S);
             self.push(0.5 * (low_s + high_s), row);
         }
@@ -163,11 +162,8 @@ impl Nodes<'_> {
                 continue;
             };
             let values = series.slice(start_s, end_s).1;
-            *value = if values.is_empty() {
-                series.interpolate(0.5 * (start_s + end_s)).unwrap_or(*value)
-            } else {
-                values.iter().sum::<f64>() / values.len() as f64
-            };
+            let middle = || series.interpolate(0.5 * (start_s + end_s));
+            *value = mean(values).or_else(middle).unwrap_or(*value);
         }
         row
     }

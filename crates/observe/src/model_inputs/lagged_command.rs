@@ -1,9 +1,9 @@
-//! Response of P3 and the valve to their commands: a first-order lag and a rate limit. Also the recorded response.
+//! Response of P3 and the valve to their commands: a first-order lag and a rate limit, and their estimation from a recording.
 
 use crate::averages::time_table::Table;
 use mapper_core::{Channel, Recording, StepMarker};
 use mapper_numerics::minimise::minimise;
-use mapper_numerics::statistics::median;
+use mapper_numerics::statistics::{mean, median};
 use mapper_physics::laws::orifice;
 
 /// Change of a command below which it counts as constant.
@@ -35,7 +35,7 @@ impl Response {
         Response { lag_s, slew_per_s: f64::INFINITY }
     }
 
-    /// Position `elapsed_s` after it began to move from `from` to `to`.
+    /// Position `elapsed_s` after the start of a movement from `from` to `to`.
     fn approach(self, from: f64, to: f64, elapsed_s: f64) -> f64 {
         let (jump, elapsed_s) = (to - from, elapsed_s.max(0.0));
         let limited = self.slew_per_s.is_finite();
@@ -43,8 +43,8 @@ impl Response {
         if elapsed_s < ramp_s {
             from + self.slew_per_s * jump.signum() * elapsed_s
         } else if self.lag_s > 0.0 {
-            let left = if limited { jump.abs().min(self.slew_per_s * self.lag_s) } else { jump.abs() };
-            to - left * jump.signum() * (-(elapsed_s - ramp_s) / self.lag_s).exp()
+            let remaining = if limited { jump.abs().min(self.slew_per_s * self.lag_s) } else { jump.abs() };
+            to - remaining * jump.signum() * (-(elapsed_s - ramp_s) / self.lag_s).exp()
         } else {
             to
         }
@@ -68,17 +68,16 @@ pub struct LaggedCommand {
 impl LaggedCommand {
     /// The response to `levels` (rising in time, at least one) from steady state.
     pub fn new(levels: Vec<Level>, p3: Response, valve: Response) -> Self {
-        let at_start = |of: fn(&Level) -> f64, response: Response| {
+        let at_start = |value: fn(&Level) -> f64, response: Response| {
             let mut at_start: Vec<f64> = Vec::with_capacity(levels.len());
             for (index, level) in levels.iter().enumerate() {
-                let value = match index.checked_sub(1) {
-                    None => of(level),
+                at_start.push(match index.checked_sub(1) {
+                    None => value(level),
                     Some(before) => {
                         let from = &levels[before];
-                        response.approach(at_start[before], of(from), level.start_s - from.start_s)
+                        response.approach(at_start[before], value(from), level.start_s - from.start_s)
                     }
-                };
-                at_start.push(value);
+                });
             }
             at_start
         };
@@ -88,14 +87,14 @@ impl LaggedCommand {
     }
 
     /// The response to the commands of a recording with at least one step: a level for each step, and one for each further P3 command within
-    /// it, as from a loop that holds the speed.
+    /// it, e.g. of a speed-control loop.
     pub fn of_recording(recording: &Recording, p3: Response, valve: Response) -> Self {
         let levels = recording.steps.iter().flat_map(|step| levels_of_step(recording, step));
         LaggedCommand::new(levels.collect(), p3, valve)
     }
 
-    /// The same commands with other responses.
-    fn with(&self, p3: Response, valve: Response) -> LaggedCommand {
+    /// Replaces the responses, and keeps the commands.
+    fn with_responses(&self, p3: Response, valve: Response) -> LaggedCommand {
         LaggedCommand::new(self.levels.clone(), p3, valve)
     }
 
@@ -129,18 +128,18 @@ impl LaggedCommand {
     }
 }
 
-/// The first level of a step, and the later levels of a loop that holds the speed.
+/// The first level of a step, and the later levels of a speed-control loop.
 pub(crate) fn levels_of_step(recording: &Recording, step: &StepMarker) -> Vec<Level> {
     let (mut start_s, mut p3_pa) = (step.start_s, step.p3_pa);
     let level = |start_s, p3_pa| Level { start_s, p3_pa, valve_opening_ratio: step.valve_opening_ratio };
     let mut levels = vec![level(start_s, p3_pa)];
     let Some(command) = recording.series.get(&Channel::P3Command) else { return levels };
     let (t_s, values) = command.slice(step.start_s, step.end_s);
-    // The first sample may precede the change, and a change is later than the sample before it.
+    // The first sample may precede the change; each change is later than the previous sample.
     for (pair_s, value) in t_s.windows(2).zip(values.iter().skip(1)) {
         // The read-back of a constant command varies in its last digits.
-        let moved = p3_pa.is_nan() || !is_same_command(*value, p3_pa);
-        if moved && value.is_finite() && pair_s[0] > start_s {
+        let changed = p3_pa.is_nan() || !is_same_command(*value, p3_pa);
+        if changed && value.is_finite() && pair_s[0] > start_s {
             (start_s, p3_pa) = (pair_s[0], *value);
             levels.push(level(start_s, p3_pa));
         }
@@ -153,36 +152,16 @@ pub(crate) fn is_same_command(value: f64, other: f64) -> bool {
     (value / other - 1.0).abs() <= COMMAND_TOLERANCE_RATIO
 }
 
-/// Number of lags, and rates in median jumps per second, of the coarse search.
-const COARSE_LAGS: usize = 24;
+/// Number of intervals of a coarse search.
+const COARSE_STEPS: usize = 24;
+/// Rates of the coarse search, in median jumps per second.
 const RATES: [f64; 9] = [0.2, 0.35, 0.6, 1.0, 1.7, 3.0, 5.0, 9.0, 16.0];
-/// Reduction of the squared residuals, in their mean square, above which a rate limit is accepted: ten standard deviations of white noise, five
-/// of coloured noise over the half second of a ramp. Accepting a limit wrongly has no effect, since a fast rate equals a lag alone.
+/// Reduction of the sum of squared residuals, relative to their mean square, above which a rate limit is accepted: ten standard deviations of white noise, five
+/// of coloured noise over the half second of a ramp. A wrongly accepted limit has no effect, because a fast rate is equivalent to a lag alone.
 const MIN_COST_REDUCTION: f64 = 100.0;
-/// The same of the best of [`RATES`], for a fine search: half of the distance between two rates costs less than nine tenths of a limit.
+/// Reduction by the best of [`RATES`] above which a fine search follows: half of the distance between two rates loses less than 90 % of
+/// the reduction.
 const MIN_COARSE_REDUCTION: f64 = 0.1 * MIN_COST_REDUCTION;
-
-/// Time constant of the measured P3 relative to its command, s, and its standard error; `None` without jumps or P3.
-///
-/// Minimises the squared residual of the first seconds after each jump; the level after it is free, so that no offset enters.
-pub fn measured_lag_s(table: &Table, recording: &Recording, noise_sigma: f64) -> Option<(f64, f64)> {
-    let values = table.column(Channel::P3)?;
-    let jumps = p3_jumps(recording, noise_sigma);
-    let commanded = LaggedCommand::of_recording(recording, Response::lag(0.0), Response::lag(0.0));
-    let cost = |lag_s: f64| {
-        let command = commanded.with(Response::lag(lag_s), Response::lag(0.0));
-        cost_of(table, values, &jumps, |t_s| command.p3_pa(t_s)) / (noise_sigma * noise_sigma).max(1e-9)
-    };
-    if jumps.is_empty() {
-        return None;
-    }
-    let (lag_s, _) = best_lag(cost)?;
-    // Curvature of the cost gives the error.
-    let away_s = 0.02 * lag_s;
-    let curvature = (cost(lag_s + away_s) + cost(lag_s - away_s) - 2.0 * cost(lag_s)) / (away_s * away_s);
-    let error_s = if curvature > 0.0 { (2.0 / curvature).sqrt() } else { lag_s };
-    Some((lag_s, error_s))
-}
 
 /// Response of the measured P3 to its command, with a rate limit if the recording supports one; `None` without jumps or P3.
 pub fn measured_p3_response(table: &Table, recording: &Recording, noise_sigma: f64) -> Option<Response> {
@@ -190,8 +169,8 @@ pub fn measured_p3_response(table: &Table, recording: &Recording, noise_sigma: f
     let jumps = p3_jumps(recording, noise_sigma);
     let sizes = recording.steps.windows(2).map(|pair| (pair[1].p3_pa - pair[0].p3_pa).abs());
     let commanded = LaggedCommand::of_recording(recording, Response::lag(0.0), Response::lag(0.0));
-    measured_response(table, values, &jumps, sizes.collect(), |response| {
-        let command = commanded.with(response, Response::lag(0.0));
+    estimate_response(table, values, &jumps, sizes.collect(), |response| {
+        let command = commanded.with_responses(response, Response::lag(0.0));
         move |t_s| command.p3_pa(t_s)
     })
 }
@@ -208,10 +187,10 @@ pub fn measured_valve_response(table: &Table, recording: &Recording, nominal_p1_
             flow[i] / orifice::flow_kg_s(1.0, p2[i], t2[i], p1_pa).max(1e-9)
         })
         .collect();
-    let moved = |pair: &[StepMarker]| (pair[1].valve_opening_ratio - pair[0].valve_opening_ratio).abs();
+    let change = |pair: &[StepMarker]| (pair[1].valve_opening_ratio - pair[0].valve_opening_ratio).abs();
     let jumps: Vec<f64> =
-        recording.steps.windows(2).filter(|pair| moved(pair) > 0.02).map(|pair| pair[1].start_s).collect();
-    // Converted to openings, using their mean over all settled ends.
+        recording.steps.windows(2).filter(|pair| change(pair) > 0.02).map(|pair| pair[1].start_s).collect();
+    // Convert areas to openings, with the median ratio at the settled ends of the steps.
     let mut areas: Vec<f64> = recording
         .steps
         .iter()
@@ -224,10 +203,10 @@ pub fn measured_valve_response(table: &Table, recording: &Recording, nominal_p1_
     areas.sort_by(f64::total_cmp);
     let area_m2 = *areas.get(areas.len() / 2)?;
     let openings: Vec<f64> = openings.iter().map(|x| x / area_m2).collect();
-    let sizes = recording.steps.windows(2).map(moved).filter(|size| *size > 0.02);
+    let sizes = recording.steps.windows(2).map(change).filter(|size| *size > 0.02);
     let commanded = LaggedCommand::of_recording(recording, Response::lag(0.0), Response::lag(0.0));
-    measured_response(table, &openings, &jumps, sizes.collect(), |response| {
-        let command = commanded.with(Response::lag(0.0), response);
+    estimate_response(table, &openings, &jumps, sizes.collect(), |response| {
+        let command = commanded.with_responses(Response::lag(0.0), response);
         move |t_s| command.valve_opening_ratio(t_s)
     })
 }
@@ -241,37 +220,43 @@ fn p3_jumps(recording: &Recording, noise_sigma: f64) -> Vec<f64> {
 /// Time before and after a jump over which a response is compared, s.
 const AROUND_S: (f64, f64) = (3.0, 12.0);
 
-/// Squared residuals of the seconds around each jump, with a free level.
-fn cost_of(table: &Table, values: &[f64], jumps: &[f64], predicted: impl Fn(f64) -> f64) -> f64 {
+/// Sum of squared residuals around each jump, with a free level.
+fn sum_of_squares(table: &Table, values: &[f64], jumps: &[f64], predicted: impl Fn(f64) -> f64) -> f64 {
     let mut total = 0.0;
     for jump_s in jumps {
         let range = table.range(jump_s - AROUND_S.0, jump_s + AROUND_S.1);
-        let rest: Vec<f64> =
+        let residuals: Vec<f64> =
             range.filter(|i| values[*i].is_finite()).map(|i| values[i] - predicted(table.t_s[i])).collect();
-        let mean = rest.iter().sum::<f64>() / rest.len().max(1) as f64;
-        total += rest.iter().map(|r| (r - mean) * (r - mean)).sum::<f64>();
+        let mean = mean(&residuals).unwrap_or(0.0);
+        total += residuals.iter().map(|residual| (residual - mean) * (residual - mean)).sum::<f64>();
     }
     total
 }
 
 /// The lag with minimum cost, and that cost.
 fn best_lag(cost: impl Fn(f64) -> f64) -> Option<(f64, f64)> {
-    // Logarithmic, from 1 ms to 60 s. Coarse search first: the cost has a single minimum only for first-order responses.
-    let (shortest, longest) = (1e-3f64.ln(), 60f64.ln());
-    let place = |i: usize| shortest + (longest - shortest) * i as f64 / COARSE_LAGS as f64;
-    let costs: Vec<f64> = (0..=COARSE_LAGS).map(|i| cost(place(i).exp())).collect();
-    let best = (0..=COARSE_LAGS).min_by(|a, b| costs[*a].total_cmp(&costs[*b]))?;
-    let (low, high) = (place(best.saturating_sub(1)), place((best + 1).min(COARSE_LAGS)));
-    let lag_s = minimise(low, high, 1e-6, |x| cost(x.exp())).at.exp();
+    let lag_s = minimise_globally((1e-3, 60.0), 1e-6, &cost)?;
     Some((lag_s, cost(lag_s)))
 }
 
-fn measured_response<Prediction: Fn(f64) -> f64>(
+/// Minimum of a positive variable on a logarithmic scale. A coarse search comes first, because the cost may have several minima: responses
+/// may not be of first order, and a rate limit may not affect all jumps.
+fn minimise_globally((low, high): (f64, f64), tolerance: f64, cost: impl Fn(f64) -> f64) -> Option<f64> {
+    let (low, high) = (low.ln(), high.ln());
+    let position = |i: usize| low + (high - low) * i as f64 / COARSE_STEPS as f64;
+    let costs: Vec<f64> = (0..=COARSE_STEPS).map(|i| cost(position(i).exp())).collect();
+    let best = (0..=COARSE_STEPS).min_by(|a, b| costs[*a].total_cmp(&costs[*b]))?;
+    let (low, high) = (position(best.saturating_sub(1)), position((best + 1).min(COARSE_STEPS)));
+    Some(minimise(low, high, tolerance, |x| cost(x.exp())).at.exp())
+}
+
+/// Estimates the response with the least squared residuals around the jumps, whose median size is that of `sizes`.
+fn estimate_response<Prediction: Fn(f64) -> f64>(
     table: &Table,
     values: &[f64],
     jumps: &[f64],
     sizes: Vec<f64>,
-    follow: impl Fn(Response) -> Prediction,
+    predict: impl Fn(Response) -> Prediction,
 ) -> Option<Response> {
     let size = median(&sizes).filter(|size| *size > 0.0)?;
     if jumps.is_empty() {
@@ -280,25 +265,20 @@ fn measured_response<Prediction: Fn(f64) -> f64>(
     let around = |jump_s: &f64| table.range(jump_s - AROUND_S.0, jump_s + AROUND_S.1).len();
     let samples = jumps.iter().map(around).sum::<usize>().max(1) as f64;
     let at_rate = |slew_per_s: f64| {
-        let cost = |lag_s: f64| cost_of(table, values, jumps, follow(Response { lag_s, slew_per_s }));
+        let cost = |lag_s: f64| sum_of_squares(table, values, jumps, predict(Response { lag_s, slew_per_s }));
         best_lag(cost).map(|(lag_s, cost)| (cost, Response { lag_s, slew_per_s }))
     };
-    let alone = at_rate(f64::INFINITY)?;
+    let unlimited = at_rate(f64::INFINITY)?;
     let coarse = RATES.iter().filter_map(|rate| at_rate(rate * size));
     let (coarse_cost, coarse) = coarse.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let limits = |cost: f64, least: f64| alone.0 - cost > least * cost / samples;
-    if !limits(coarse_cost, MIN_COARSE_REDUCTION) {
-        return Some(alone.1);
+    let is_better = |cost: f64, min_reduction: f64| unlimited.0 - cost > min_reduction * cost / samples;
+    if !is_better(coarse_cost, MIN_COARSE_REDUCTION) {
+        return Some(unlimited.1);
     }
-    // Jumps that the limit does not affect give the cost a second minimum, so a coarse search comes first.
-    let (low, high) = ((coarse.slew_per_s / 1.8).ln(), (coarse.slew_per_s * 1.8).ln());
-    let place = |i: usize| low + (high - low) * i as f64 / COARSE_LAGS as f64;
-    let cost = |rate: f64| at_rate(rate.exp()).map_or(f64::INFINITY, |(cost, _)| cost);
-    let costs: Vec<f64> = (0..=COARSE_LAGS).map(|i| cost(place(i))).collect();
-    let best = (0..=COARSE_LAGS).min_by(|a, b| costs[*a].total_cmp(&costs[*b]))?;
-    let (low, high) = (place(best.saturating_sub(1)), place((best + 1).min(COARSE_LAGS)));
-    let limited = at_rate(minimise(low, high, 1e-4, cost).at.exp());
-    Some(limited.filter(|(cost, _)| limits(*cost, MIN_COST_REDUCTION)).unwrap_or(alone).1)
+    let cost = |rate: f64| at_rate(rate).map_or(f64::INFINITY, |(cost, _)| cost);
+    let range = (coarse.slew_per_s / 1.8, coarse.slew_per_s * 1.8);
+    let limited = at_rate(minimise_globally(range, 1e-4, cost)?);
+    Some(limited.filter(|(cost, _)| is_better(*cost, MIN_COST_REDUCTION)).unwrap_or(unlimited).1)
 }
 
 #[cfg(test)]

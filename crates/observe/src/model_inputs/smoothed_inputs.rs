@@ -1,24 +1,24 @@
 //! The recorded boundary conditions as model inputs, without their noise.
 //!
 //! P3 is its command with a first-order lag, whose time constant is fitted to the measured P3, plus a smooth remainder. Other quantities may
-//! jump with P3 (P4 does, because of the flow): regression gives that share, and the remainder is smooth. A jump is never smoothed over.
+//! jump with P3 (P4 does, because of the flow): regression gives that share, and the remainder is smooth. Jumps are not smoothed.
 
 use crate::averages::time_table::Table;
 use crate::channels::{DRIVERS, boundary_condition};
 use crate::declared::Declared;
 use crate::model_inputs::lagged_command::{LaggedCommand, Response};
-use crate::model_inputs::smoother::{Course, smooth};
+use crate::model_inputs::smoother::{TimeHistory, smooth};
 use mapper_core::{Channel, Recording};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::inputs::Inputs;
 
-/// A recorded quantity without its noise: a smooth part, plus a share of P3's own time history.
+/// A recorded quantity without its noise: a smooth part, plus a part proportional to P3.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Driver {
     /// The smooth part.
-    pub course: Course,
-    /// Change for each pascal of P3.
-    pub along_p3: f64,
+    pub history: TimeHistory,
+    /// Change per pascal of P3.
+    pub per_p3: f64,
 }
 
 /// Recorded boundary conditions over time, without their noise.
@@ -26,9 +26,9 @@ pub struct Driver {
 pub struct SmoothedInputs {
     /// P3 according to its command.
     pub command: LaggedCommand,
-    /// Starts of the steps, s: changes by a loop within a step are too small to interrupt an integration.
+    /// Starts of the steps, s. Changes within a step by a speed-control loop are too small to interrupt an integration.
     jumps_s: Vec<f64>,
-    p3_rest: Course,
+    p3_residual: TimeHistory,
     /// Every other boundary condition by its channel.
     drivers: Vec<(Channel, Driver)>,
     nominal: BoundaryConditions,
@@ -53,24 +53,27 @@ impl SmoothedInputs {
         (p3, valve): (Response, Response),
     ) -> SmoothedInputs {
         let command = LaggedCommand::of_recording(recording, p3, valve);
-        let along: Vec<f64> = table.t_s.iter().map(|t| command.p3_pa(*t)).collect();
+        let commanded_p3: Vec<f64> = table.t_s.iter().map(|t| command.p3_pa(*t)).collect();
         let jumps_s: Vec<f64> = recording.steps.iter().map(|step| step.start_s).collect();
         let smoothed = |channel: Channel, values: &[f64]| {
             smooth(&table.t_s, values, declared.noise_sigma(channel), declared.noise_colour, &jumps_s)
         };
-        let p3_rest = table.column(Channel::P3).and_then(|values| {
-            let rest: Vec<f64> = values.iter().zip(&along).map(|(p3, a)| p3 - a).collect();
-            smoothed(Channel::P3, &rest)
+        let p3_residual = table.column(Channel::P3).and_then(|values| {
+            let residual: Vec<f64> =
+                values.iter().zip(&commanded_p3).map(|(p3, commanded)| p3 - commanded).collect();
+            smoothed(Channel::P3, &residual)
         });
         let driver = |channel: Channel| {
             let values = table.column(channel)?;
-            let along_p3 = share_along(table, values, (&command, &along), declared.noise_sigma(channel));
-            let rest: Vec<f64> = values.iter().zip(&along).map(|(v, a)| v - along_p3 * a).collect();
-            Some((channel, Driver { course: smoothed(channel, &rest)?, along_p3 }))
+            let per_p3 =
+                change_per_pascal(table, values, (&command, &commanded_p3), declared.noise_sigma(channel));
+            let residual: Vec<f64> =
+                values.iter().zip(&commanded_p3).map(|(value, p3)| value - per_p3 * p3).collect();
+            Some((channel, Driver { history: smoothed(channel, &residual)?, per_p3 }))
         };
         let others = DRIVERS.into_iter().filter(|channel| *channel != Channel::P3);
         SmoothedInputs {
-            p3_rest: p3_rest.unwrap_or_else(|| Course::constant(0.0)),
+            p3_residual: p3_residual.unwrap_or_else(|| TimeHistory::constant(0.0)),
             drivers: others.chain([Channel::TAmb]).filter_map(driver).collect(),
             nominal: declared.nominal,
             jumps_s,
@@ -81,26 +84,26 @@ impl SmoothedInputs {
     /// Uncertainty of each of [`DRIVERS`] in addition to its fixed offset; `None` for those that are not recorded.
     pub fn noise(&self) -> [Option<InputNoise>; DRIVERS.len()] {
         DRIVERS.map(|channel| {
-            let course = match channel {
-                Channel::P3 => &self.p3_rest,
-                _ => &self.drivers.iter().find(|(other, _)| *other == channel)?.1.course,
+            let history = match channel {
+                Channel::P3 => &self.p3_residual,
+                _ => &self.drivers.iter().find(|(other, _)| *other == channel)?.1.history,
             };
-            Some(InputNoise { sigma: course.sigma, correlation_s: course.correlation_s })
+            Some(InputNoise { sigma: history.sigma, correlation_s: history.correlation_s })
         })
     }
 }
 
 impl Inputs for SmoothedInputs {
     fn at(&self, t_s: f64) -> BoundaryConditions {
-        let by_command_pa = self.command.p3_pa(t_s);
+        let commanded_p3_pa = self.command.p3_pa(t_s);
         let mut boundary = BoundaryConditions {
-            p3_pa: by_command_pa + self.p3_rest.at(t_s),
+            p3_pa: commanded_p3_pa + self.p3_residual.at(t_s),
             valve_opening_ratio: self.command.valve_opening_ratio(t_s),
             ..self.nominal
         };
         for (channel, driver) in &self.drivers {
             if let Some(value) = boundary_condition(&mut boundary, *channel) {
-                *value = driver.course.at(t_s) + driver.along_p3 * by_command_pa;
+                *value = driver.history.at(t_s) + driver.per_p3 * commanded_p3_pa;
             }
         }
         boundary
@@ -119,18 +122,19 @@ impl Inputs for SmoothedInputs {
 /// Length of the segments before and after a jump that give its height, s.
 const LEVEL_WINDOW_S: f64 = 8.0;
 
-/// Change of `values` per pascal of P3, from their jumps at P3's jumps; 0 if they do not follow it. `along` is P3 according to its command.
-fn share_along(
+/// Change of `values` per pascal of P3, by regression of their jumps on those of P3; 0 if it is not significant. `commanded_p3` is P3 according
+/// to its command.
+fn change_per_pascal(
     table: &Table,
     values: &[f64],
-    (command, along): (&LaggedCommand, &[f64]),
+    (command, commanded_p3): (&LaggedCommand, &[f64]),
     noise_sigma: f64,
 ) -> f64 {
     let (mut sum_xy, mut sum_xx, mut pairs) = (0.0, 0.0, Vec::new());
     for pair in command.levels().windows(2) {
         let jump_s = pair[1].start_s;
         let settled_s = jump_s + command.p3_settles_s(pair[0].p3_pa, pair[1].p3_pa);
-        // Changes by a speed-holding loop right after a jump are not separate jumps.
+        // Changes by a speed-control loop right after a jump are not separate jumps.
         if pair[0].start_s > jump_s - LEVEL_WINDOW_S {
             continue;
         }
@@ -138,7 +142,7 @@ fn share_along(
             let before = line_at(table, values, jump_s - LEVEL_WINDOW_S, jump_s, jump_s)?;
             Some(line_at(table, values, settled_s, settled_s + LEVEL_WINDOW_S, jump_s)? - before)
         };
-        let (Some(change), Some(height_pa)) = (height(values), height(along)) else { continue };
+        let (Some(change), Some(height_pa)) = (height(values), height(commanded_p3)) else { continue };
         pairs.push((height_pa, change));
         sum_xy += height_pa * change;
         sum_xx += height_pa * height_pa;
@@ -148,7 +152,7 @@ fn share_along(
     }
     let share = sum_xy / sum_xx;
     let scatter = pairs.iter().map(|(x, y)| (y - share * x).powi(2)).sum::<f64>() / (pairs.len() - 1) as f64;
-    // The noise is the lower limit.
+    // The noise limits the scatter from below.
     let error = (scatter.max(noise_sigma * noise_sigma * 0.1) / sum_xx).sqrt();
     if share.abs() > 6.0 * error { share } else { 0.0 }
 }

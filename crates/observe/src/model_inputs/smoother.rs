@@ -1,9 +1,9 @@
-//! Smooths a varying quantity with noise of known size.
+//! Smooths a varying quantity whose noise is known.
 //!
 //! The model is an integrated random walk with white and first-order noise. Its intensity is chosen by likelihood, and the smoothed time
-//! history comes from the Kalman smoother (Rauch, Tung and Striebel 1965). If nothing varies, the result is a straight line through the whole
-//! recording. Otherwise its slope may also change at given times of command changes: a temperature that follows its command with a lag has a
-//! kink there.
+//! history comes from the Kalman smoother (Rauch, Tung and Striebel 1965). A constant quantity becomes a straight line through the whole
+//! recording. Otherwise the slope may also change at the times of command changes: a temperature that follows its command with a lag has a
+//! kink at each of them.
 
 use mapper_core::NoiseColour;
 use mapper_numerics::coloured_noise::{memory, variance_of_mean};
@@ -15,11 +15,11 @@ const BIN_S: f64 = 1.0;
 
 /// A smooth time history with its uncertainty.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Course {
+pub struct TimeHistory {
     start_s: f64,
     value: Vec<f64>,
     slope_s: Vec<f64>,
-    /// Whether the slope changes before each value, halfway from the one before it; empty if it changes nowhere.
+    /// Whether the slope has a kink halfway between the previous value and each value; empty if there are no kinks.
     kinks: Vec<bool>,
     /// Typical standard deviation of the time history, in the quantity's unit.
     pub sigma: f64,
@@ -27,10 +27,10 @@ pub struct Course {
     pub correlation_s: f64,
 }
 
-impl Course {
+impl TimeHistory {
     /// A constant value.
-    pub fn constant(value: f64) -> Course {
-        Course {
+    pub fn constant(value: f64) -> TimeHistory {
+        TimeHistory {
             start_s: 0.0,
             value: vec![value],
             slope_s: vec![0.0],
@@ -55,9 +55,9 @@ impl Course {
         let (a, b) = (self.value[i], self.value[i + 1]);
         let (da, db) = (BIN_S * self.slope_s[i], BIN_S * self.slope_s[i + 1]);
         if self.kinks.get(i + 1) == Some(&true) {
-            // Both sides go on to the kink.
-            let halfway = 0.5 * (a + 0.5 * da + b - 0.5 * db);
-            return if x < 0.5 { a + 2.0 * x * (halfway - a) } else { b + 2.0 * (1.0 - x) * (halfway - b) };
+            // Extrapolate both sides to the kink.
+            let kink = 0.5 * (a + 0.5 * da + b - 0.5 * db);
+            return if x < 0.5 { a + 2.0 * x * (kink - a) } else { b + 2.0 * (1.0 - x) * (kink - b) };
         }
         // Cubic with the slopes of the smoother.
         let rise = b - a;
@@ -66,27 +66,27 @@ impl Course {
 }
 
 struct Bin {
-    /// Mean of the samples, `None` without any.
+    /// Mean of the samples; `None` if there are none.
     mean: Option<f64>,
     samples: f64,
 }
 
-/// Standard deviations of a change of slope that are tried, noise of a sample a second.
+/// Candidate standard deviations of a change of slope, in noise of a sample per second.
 const KINKS_PER_S: [f64; 4] = [0.01, 0.1, 1.0, 10.0];
-/// Gain of the log likelihood from which changes of slope are assumed: that of one more parameter at three standard deviations.
+/// Minimum gain of the log likelihood for changes of slope: that of one more parameter at three standard deviations.
 const MIN_LIKELIHOOD_GAIN: f64 = 4.5;
-/// Exponents of the intensity over the variance, in steps of half a decade.
+/// Candidate exponents of the ratio of intensity to variance, in half decades.
 const EXPONENTS: std::ops::RangeInclusive<i32> = -26..=4;
 
-/// The time history through `values` at `t_s` (rising; NaN counts as missing) with the noise `noise_sigma` of one sample. Its slope may change
-/// at `kinks_s`. `None` without any value.
+/// Smooths `values` at `t_s` (rising; NaN counts as missing); one sample has the noise `noise_sigma`. The slope may change
+/// at `kinks_s`. `None` if all values are missing.
 pub fn smooth(
     t_s: &[f64],
     values: &[f64],
     noise_sigma: f64,
     colour: NoiseColour,
     kinks_s: &[f64],
-) -> Option<Course> {
+) -> Option<TimeHistory> {
     let bins = bins(t_s, values);
     let first = bins.iter().find_map(|bin| bin.mean)?;
     let start_s = t_s[0] + 0.5 * BIN_S;
@@ -95,7 +95,7 @@ pub fn smooth(
     let tau_s = colour.time_constant_s.max(1e-3);
     let mut kinks = vec![false; bins.len()];
     for kink_s in kinks_s {
-        // Between the bins whose common edge is the nearest.
+        // Move the kink to the nearest edge between two bins.
         let edge = ((kink_s - t_s[0]) / BIN_S).round();
         if let Some(kink) = (edge >= 1.0).then(|| kinks.get_mut(edge as usize)).flatten() {
             *kink = true;
@@ -110,25 +110,25 @@ pub fn smooth(
         coloured_variance: variance_of_mean(c2 * noise_sigma * noise_sigma, BIN_S, tau_s),
         coloured_decay: memory(BIN_S, tau_s),
     };
-    // Ratio of intensity to variance, 1/s^3: from a straight line over hours to a time history that follows each bin.
+    // From a straight line over hours to a time history that follows each bin.
     let intensity = |exponent: i32| noise_sigma * noise_sigma * 10f64.powf(0.5 * f64::from(exponent));
-    let likeliest = |kink_variance: f64, exponents: std::ops::RangeInclusive<i32>| {
+    let most_likely = |kink_variance: f64, exponents: std::ops::RangeInclusive<i32>| {
         let mut best = (f64::NEG_INFINITY, *exponents.start());
         for exponent in exponents {
-            let likelihood = filter.run(intensity(exponent), kink_variance, None);
+            let likelihood = filter.filter(intensity(exponent), kink_variance, None);
             if likelihood > best.0 {
                 best = (likelihood, exponent);
             }
         }
         best
     };
-    let (likelihood, smooth) = likeliest(0.0, EXPONENTS);
-    let mut best = (likelihood + MIN_LIKELIHOOD_GAIN, smooth, 0.0);
-    // Kinks only reduce the variation, and a constant has none.
-    if smooth > *EXPONENTS.start() && kinks.contains(&true) {
+    let (likelihood, smooth_exponent) = most_likely(0.0, EXPONENTS);
+    let mut best = (likelihood + MIN_LIKELIHOOD_GAIN, smooth_exponent, 0.0);
+    // Kinks only reduce the intensity, and a constant has none.
+    if smooth_exponent > *EXPONENTS.start() && kinks.contains(&true) {
         for kink_per_s in KINKS_PER_S {
             let variance = (kink_per_s * noise_sigma).powi(2);
-            let (likelihood, exponent) = likeliest(variance, *EXPONENTS.start()..=smooth);
+            let (likelihood, exponent) = most_likely(variance, *EXPONENTS.start()..=smooth_exponent);
             if likelihood > best.0 {
                 best = (likelihood, exponent, variance);
             }
@@ -137,19 +137,19 @@ pub fn smooth(
     let (_, exponent, kink_variance) = best;
     let best_intensity = intensity(exponent);
     let mut tracks = Vec::with_capacity(bins.len());
-    filter.run(best_intensity, kink_variance, Some(&mut tracks));
-    let (value, slope_s, variance) = filter.back(&tracks);
+    filter.filter(best_intensity, kink_variance, Some(&mut tracks));
+    let (value, slope_s, variance) = filter.smooth(&tracks);
     let kinks = if kink_variance > 0.0 { kinks.clone() } else { Vec::new() };
     // Density of the noise at low frequency; the smoother's window is the fourth root of its ratio to the intensity.
     let density = filter.white_variance * 0.1 + 2.0 * tau_s * c2 * noise_sigma * noise_sigma;
     let correlation_s = (density / best_intensity).powf(0.25).clamp(2.0, 1e4) * std::f64::consts::SQRT_2;
     let sigma = median(&variance).unwrap_or(0.0).max(0.0).sqrt();
-    Some(Course { start_s, value, slope_s, kinks, sigma, correlation_s })
+    Some(TimeHistory { start_s, value, slope_s, kinks, sigma, correlation_s })
 }
 
 fn bins(t_s: &[f64], values: &[f64]) -> Vec<Bin> {
     let (Some(first_s), Some(last_s)) = (t_s.first(), t_s.last()) else { return Vec::new() };
-    // A day at most: a longer file is not a campaign.
+    // At most two days: a longer file is not a campaign.
     let count = (((last_s - first_s) / BIN_S).floor() as usize + 1).min(200_000);
     let mut sums = vec![(0.0, 0usize); count];
     for (t, value) in t_s.iter().zip(values) {
@@ -182,12 +182,12 @@ impl Filter<'_> {
         Matrix3::new(1.0, BIN_S, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, self.coloured_decay)
     }
 
-    /// Log likelihood, up to a constant independent of the intensity.
-    fn run(&self, intensity: f64, kink_variance: f64, mut tracks: Option<&mut Vec<Track>>) -> f64 {
+    /// Forward pass: log likelihood, up to a constant independent of the intensity.
+    fn filter(&self, intensity: f64, kink_variance: f64, mut tracks: Option<&mut Vec<Track>>) -> f64 {
         let transition = self.transition();
         let (d, q) = (BIN_S, intensity);
         let coloured = self.coloured_variance * (1.0 - self.coloured_decay * self.coloured_decay);
-        let drive = Matrix3::new(
+        let process_noise = Matrix3::new(
             q * d * d * d / 3.0,
             q * d * d / 2.0,
             0.0,
@@ -198,10 +198,10 @@ impl Filter<'_> {
             0.0,
             coloured,
         );
-        // Halfway from one bin's middle to the next.
+        // The kink is halfway between the middles of two bins.
         let kink = Vector3::new(0.5 * d, 1.0, 0.0);
-        let at_kink = drive + kink * kink.transpose() * kink_variance;
-        let see = RowVector3::new(1.0, 0.0, 1.0);
+        let process_noise_at_kink = process_noise + kink * kink.transpose() * kink_variance;
+        let observe = RowVector3::new(1.0, 0.0, 1.0);
         let wide = 1e3 * self.noise_sigma;
         let mut mean = Vector3::new(self.first, 0.0, 0.0);
         let mut covariance =
@@ -209,28 +209,29 @@ impl Filter<'_> {
         let mut likelihood = 0.0;
         for (place, bin) in self.bins.iter().enumerate() {
             let (before, before_covariance) = (mean, covariance);
-            if let Some(seen) = bin.mean {
-                let variance =
-                    (see * covariance * see.transpose())[0] + self.white_variance / bin.samples.max(1.0);
-                let gain = covariance * see.transpose() / variance;
-                let innovation = seen - (see * mean)[0];
+            if let Some(observed) = bin.mean {
+                let variance = (observe * covariance * observe.transpose())[0]
+                    + self.white_variance / bin.samples.max(1.0);
+                let gain = covariance * observe.transpose() / variance;
+                let innovation = observed - (observe * mean)[0];
                 likelihood -= 0.5 * (innovation * innovation / variance + variance.ln());
                 mean += gain * innovation;
-                covariance -= gain * see * covariance;
+                covariance -= gain * observe * covariance;
                 covariance = 0.5 * (covariance + covariance.transpose());
             }
             if let Some(tracks) = tracks.as_deref_mut() {
                 tracks.push((before, before_covariance, mean, covariance));
             }
             mean = transition * mean;
-            let driven = if self.kinks.get(place + 1) == Some(&true) { at_kink } else { drive };
-            covariance = transition * covariance * transition.transpose() + driven;
+            let has_kink = self.kinks.get(place + 1) == Some(&true);
+            covariance = transition * covariance * transition.transpose()
+                + if has_kink { process_noise_at_kink } else { process_noise };
         }
         likelihood
     }
 
-    /// Smoothed values, slopes and variances of the time history.
-    fn back(&self, tracks: &[Track]) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+    /// Backward pass: smoothed values, slopes and variances of the time history.
+    fn smooth(&self, tracks: &[Track]) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
         let transition = self.transition();
         let n = tracks.len();
         let (mut value, mut slope, mut variance) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
@@ -238,13 +239,14 @@ impl Filter<'_> {
         for k in (0..n).rev() {
             if k + 1 < n {
                 let (next, next_covariance, ..) = tracks[k + 1];
-                let (_, _, here, here_covariance) = tracks[k];
+                let (_, _, filtered, filtered_covariance) = tracks[k];
                 if let Some(inverse) = next_covariance.try_inverse() {
-                    let gain = here_covariance * transition.transpose() * inverse;
-                    mean = here + gain * (mean - next);
-                    covariance = here_covariance + gain * (covariance - next_covariance) * gain.transpose();
+                    let gain = filtered_covariance * transition.transpose() * inverse;
+                    mean = filtered + gain * (mean - next);
+                    covariance =
+                        filtered_covariance + gain * (covariance - next_covariance) * gain.transpose();
                 } else {
-                    (mean, covariance) = (here, here_covariance);
+                    (mean, covariance) = (filtered, filtered_covariance);
                 }
             }
             (value[k], slope[k], variance[k]) = (mean[0], mean[1], covariance[(0, 0)]);
@@ -260,7 +262,7 @@ mod tests {
     use rand_distr::StandardNormal;
     use rand_pcg::Pcg64;
 
-    fn noisy(course: impl Fn(f64) -> f64, seed: u64) -> (Vec<f64>, Vec<f64>) {
+    fn noisy(history: impl Fn(f64) -> f64, seed: u64) -> (Vec<f64>, Vec<f64>) {
         let mut random = Pcg64::seed_from_u64(seed);
         let colour = NoiseColour::default();
         let decay = (-0.1 / colour.time_constant_s).exp();
@@ -272,7 +274,7 @@ mod tests {
                 let kick: f64 = random.sample(StandardNormal);
                 slow = decay * slow + (1.0 - decay * decay).sqrt() * kick;
                 let white: f64 = random.sample(StandardNormal);
-                course(*t) + 0.1 * (0.8 * white + 0.6 * slow)
+                history(*t) + 0.1 * (0.8 * white + 0.6 * slow)
             })
             .collect();
         (t_s, values)
@@ -281,21 +283,22 @@ mod tests {
     #[test]
     fn a_constant_is_found_within_the_error_of_its_mean_and_a_wave_within_its_own_statement() {
         let (t_s, values) = noisy(|_| 5.0, 1);
-        let course = smooth(&t_s, &values, 0.1, NoiseColour::default(), &[]).unwrap();
+        let history = smooth(&t_s, &values, 0.1, NoiseColour::default(), &[]).unwrap();
         // Noise of a mean over 1200 s: sqrt((2 * 2 * 0.36 + 0.1 * 0.64)/1200) * 0.1 = 0.0035; a line doubles it at its
         // ends. Four of these.
         for t in [0.0, 300.0, 600.0, 1190.0] {
-            assert!((course.at(t) - 5.0).abs() < 0.03, "{t}: {}", course.at(t));
+            assert!((history.at(t) - 5.0).abs() < 0.03, "{t}: {}", history.at(t));
         }
         let wave = |t: f64| 2.0 * (t / 7.0).sin();
         let (t_s, values) = noisy(wave, 2);
-        let course = smooth(&t_s, &values, 0.1, NoiseColour::default(), &[]).unwrap();
+        let history = smooth(&t_s, &values, 0.1, NoiseColour::default(), &[]).unwrap();
         let n = 1150;
-        let mean_square =
-            (0..n).map(|i| (course.at(20.0 + f64::from(i)) - wave(20.0 + f64::from(i))).powi(2)).sum::<f64>()
-                / f64::from(n);
+        let mean_square = (0..n)
+            .map(|i| (history.at(20.0 + f64::from(i)) - wave(20.0 + f64::from(i))).powi(2))
+            .sum::<f64>()
+            / f64::from(n);
         // A wave is not a random walk, so its error estimate is only good to a factor of two either way.
-        let ratio = mean_square.sqrt() / course.sigma;
+        let ratio = mean_square.sqrt() / history.sigma;
         assert!((0.5..2.0).contains(&ratio), "{ratio}");
     }
 
@@ -305,9 +308,9 @@ mod tests {
         for value in &mut values[4_000..5_000] {
             *value = f64::NAN;
         }
-        let course = smooth(&t_s, &values, 0.1, NoiseColour::default(), &[]).unwrap();
+        let history = smooth(&t_s, &values, 0.1, NoiseColour::default(), &[]).unwrap();
         // Ten times the error of a straight line through all of it.
-        assert!((course.at(450.0) - 4.5).abs() < 0.1, "{}", course.at(450.0));
+        assert!((history.at(450.0) - 4.5).abs() < 0.1, "{}", history.at(450.0));
         assert!(smooth(&t_s, &vec![f64::NAN; t_s.len()], 0.1, NoiseColour::default(), &[]).is_none());
         assert!(smooth(&[], &[], 0.1, NoiseColour::default(), &[]).is_none());
     }
@@ -328,8 +331,8 @@ mod tests {
             .flat_map(|kink_s| (-4..=4).map(move |i| kink_s + 0.5 * f64::from(i)))
             .collect();
         let off = |kinks_s: &[f64]| {
-            let course = smooth(&t_s, &values, 0.1, NoiseColour::default(), kinks_s).unwrap();
-            (near.iter().map(|t| (course.at(*t) - lagged(*t)).powi(2)).sum::<f64>() / near.len() as f64)
+            let history = smooth(&t_s, &values, 0.1, NoiseColour::default(), kinks_s).unwrap();
+            (near.iter().map(|t| (history.at(*t) - lagged(*t)).powi(2)).sum::<f64>() / near.len() as f64)
                 .sqrt()
         };
         let (rounded, kinked) = (off(&[]), off(&kinks_s));

@@ -8,29 +8,29 @@ use crate::averages::time_table::Table;
 use crate::model_inputs::lagged_command::{LaggedCommand, Level, Response, is_same_command, levels_of_step};
 use mapper_core::{Channel, Recording, StepMarker};
 use mapper_numerics::minimise::minimise;
-use mapper_numerics::statistics::{median, robust_sigma};
+use mapper_numerics::statistics::{mean, median, rms, robust_sigma};
 use std::ops::Range;
 
 /// Maximum delay of a command behind its step's start, s; a later one belongs to another change.
 const MAX_COMMAND_DELAY_S: f64 = 2.0;
-/// Maximum sample spacing of a command that still dates its change, s.
+/// Maximum sample spacing of a command for the timing of its change, s.
 const MAX_COMMAND_SPACING_S: f64 = 1.0;
-/// Time before a jump over which the level of P3 is taken, s.
+/// Time before a jump over which P3 is averaged, s.
 const LEVEL_WINDOW_S: f64 = 3.0;
-/// Thresholds for a moved P3: standard deviations of its scatter, and share of the jump.
-const MOVED_SIGMAS: f64 = 6.0;
-const MOVED_RATIO: f64 = 0.02;
-/// Time before and after a jump of P3 that is used to date it, s.
+/// Thresholds for a change of P3: in standard deviations of its scatter, and as a fraction of the jump.
+const MIN_CHANGE_SIGMAS: f64 = 6.0;
+const MIN_CHANGE_RATIO: f64 = 0.02;
+/// Time before and after a jump of P3 that is used for its timing, s.
 const AROUND_S: (f64, f64) = (1.0, 3.0);
-/// The jumps are dated separately if they differ by more than these, in errors and in s.
+/// The jumps are timed separately if they differ by more than these, in standard errors and in s.
 const MIN_DIFFERENCE_SIGMAS: f64 = 3.0;
 const MIN_DIFFERENCE_S: f64 = 3e-3;
 /// Scatter of the sample times below which it is neglected, s.
 const MIN_SCATTER_S: f64 = 1e-3;
-/// Minimum rate of P3 for dating samples, in noise sigmas a second.
+/// Minimum rate of P3 for the timing of samples, in noise sigmas per second.
 const MIN_RATE_SIGMAS_PER_S: f64 = 50.0;
 
-/// The recording with each step starting at the last sample before its command changed, so that it includes its whole transient.
+/// Moves the start of each step to the last sample before its command changed, so that the step includes its whole transient.
 pub fn with_command_times(recording: &Recording) -> Recording {
     let mut corrected = recording.clone();
     for index in 0..corrected.steps.len() {
@@ -47,23 +47,24 @@ pub fn with_command_times(recording: &Recording) -> Recording {
     corrected
 }
 
+/// Time of the last sample before the command of a step changed, s.
 fn command_s(recording: &Recording, step: &StepMarker) -> f64 {
     let commands = [(Channel::P3Command, step.p3_pa), (Channel::ValveCommand, step.valve_opening_ratio)];
     let late = |(channel, commanded): (Channel, f64)| {
         let command = recording.series.get(&channel)?;
         let before = command.held(step.start_s)?;
         let (t_s, values) = command.slice(step.start_s, (step.start_s + MAX_COMMAND_DELAY_S).min(step.end_s));
-        let still = values.iter().take_while(|value| is_same_command(**value, before)).count();
-        let then = values.get(still)?;
-        (still > 0 && !is_same_command(before, commanded) && is_same_command(*then, commanded))
-            .then(|| t_s[still - 1])
+        let unchanged = values.iter().take_while(|value| is_same_command(**value, before)).count();
+        let after = values.get(unchanged)?;
+        (unchanged > 0 && !is_same_command(before, commanded) && is_same_command(*after, commanded))
+            .then(|| t_s[unchanged - 1])
     };
     let late_s = commands.into_iter().find_map(late).map(|late_s| late_s.max(step.start_s));
     late_s.or_else(|| sampled_delay_s(recording, step)).unwrap_or(step.start_s)
 }
 
-/// If a log has the command only at its samples, a step begins with the first sample of the new command. The rig may have received it at any
-/// time since the sample before. Measured P3 has then moved by that first sample.
+/// If a log has the command only at its samples, a step begins with the first sample of the new command. If measured P3 has changed by
+/// that sample, the rig received the command earlier: this returns the time of the previous sample, s.
 fn sampled_delay_s(recording: &Recording, step: &StepMarker) -> Option<f64> {
     let (command, p3) = (recording.series.get(&Channel::P3Command)?, recording.series.get(&Channel::P3)?);
     let first = command.t_s.partition_point(|t_s| *t_s < step.start_s);
@@ -74,23 +75,24 @@ fn sampled_delay_s(recording: &Recording, step: &StepMarker) -> Option<f64> {
     if is_same_command(before_pa, after_pa) || step.start_s - before_s > MAX_COMMAND_SPACING_S {
         return None;
     }
-    // Movement of P3 at a constant command, noise included.
-    let still = p3.slice(step.start_s - LEVEL_WINDOW_S, before_s + 1e-9).1;
-    let level_pa = median(still.iter().filter(|value| value.is_finite()))?;
-    let scatter_pa = robust_sigma(still.iter().map(|value| value - level_pa))?;
-    let seen_pa = p3
+    // Scatter of P3 at a constant command.
+    let constant = p3.slice(step.start_s - LEVEL_WINDOW_S, before_s + 1e-9).1;
+    let level_pa = median(constant.iter().filter(|value| value.is_finite()))?;
+    let scatter_pa = robust_sigma(constant.iter().map(|value| value - level_pa))?;
+    let measured_pa = p3
         .held(step.start_s)
         .filter(|_| p3.t_s.binary_search_by(|t_s| t_s.total_cmp(&step.start_s)).is_ok())?;
-    let moved_pa = (seen_pa - level_pa) * jump_pa.signum();
-    (moved_pa > MOVED_SIGMAS * scatter_pa && moved_pa > MOVED_RATIO * jump_pa.abs()).then_some(before_s)
+    let change_pa = (measured_pa - level_pa) * jump_pa.signum();
+    (change_pa > MIN_CHANGE_SIGMAS * scatter_pa && change_pa > MIN_CHANGE_RATIO * jump_pa.abs())
+        .then_some(before_s)
 }
 
-/// Times found from the measured P3.
+/// Times estimated from the measured P3.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Times {
-    /// When each step's command reached the rig, s.
+    /// Time at which the command of each step reached the rig, s.
     pub starts_s: Vec<f64>,
-    /// Scatter of the samples' own times, one standard deviation, s.
+    /// Scatter of the sample times, one standard deviation, s.
     pub scatter_s: f64,
 }
 
@@ -101,23 +103,20 @@ impl Times {
         let mut times = Times { starts_s: steps.iter().map(|step| step.start_s).collect(), scatter_s: 0.0 };
         let Some(values) = table.column(Channel::P3) else { return times };
         let jumps = Jump::of_recording(table, recording, p3, noise_sigma);
-        let found: Vec<(f64, f64)> = jumps.iter().map(|jump| jump.shift_s(table, values)).collect();
-        let Some(common_s) = median(found.iter().map(|(shift_s, _)| *shift_s)) else { return times };
-        let mean_square = |of: &dyn Fn(&(f64, f64)) -> f64| {
-            (found.iter().map(|one| of(one).powi(2)).sum::<f64>() / found.len() as f64).sqrt()
-        };
-        let apart = mean_square(&|(shift_s, error_s)| (shift_s - common_s) / error_s);
-        if apart > MIN_DIFFERENCE_SIGMAS && mean_square(&|(shift_s, _)| shift_s - common_s) > MIN_DIFFERENCE_S
-        {
-            for (jump, (shift_s, _)) in jumps.iter().zip(&found) {
+        let shifts: Vec<(f64, f64)> = jumps.iter().map(|jump| jump.shift_s(table, values)).collect();
+        let Some(common_s) = median(shifts.iter().map(|(shift_s, _)| *shift_s)) else { return times };
+        let difference_sigmas = rms(shifts.iter().map(|(shift_s, error_s)| (shift_s - common_s) / error_s));
+        let difference_s = rms(shifts.iter().map(|(shift_s, _)| shift_s - common_s));
+        if difference_sigmas > Some(MIN_DIFFERENCE_SIGMAS) && difference_s > Some(MIN_DIFFERENCE_S) {
+            for (jump, (shift_s, _)) in jumps.iter().zip(&shifts) {
                 times.starts_s[jump.step] += shift_s;
             }
         }
-        times.scatter_s = scatter_s(table, values, &jumps, &found);
+        times.scatter_s = scatter_s(table, values, &jumps, &shifts);
         times
     }
 
-    /// The recording with its steps starting when their commands reached the rig.
+    /// The recording with each step starting when its command reached the rig.
     pub fn timed(&self, recording: &Recording) -> Recording {
         let mut timed = recording.clone();
         for (step, start_s) in timed.steps.iter_mut().zip(&self.starts_s) {
@@ -172,27 +171,31 @@ impl Jump {
     /// Residual of the measured P3, minus its mean, so that no offset enters.
     fn residuals(&self, table: &Table, values: &[f64], shift_s: f64) -> Vec<f64> {
         let command = self.command(shift_s);
-        let rest: Vec<f64> = self.samples.clone().map(|i| values[i] - command.p3_pa(table.t_s[i])).collect();
-        let seen = || rest.iter().filter(|rest| rest.is_finite());
-        let mean = seen().sum::<f64>() / seen().count().max(1) as f64;
-        rest.iter().map(|rest| rest - mean).collect()
+        let residual = |i: usize| values[i] - command.p3_pa(table.t_s[i]);
+        let residuals: Vec<f64> = self.samples.clone().map(residual).collect();
+        let mean = mean(residuals.iter().filter(|residual| residual.is_finite())).unwrap_or(0.0);
+        residuals.iter().map(|residual| residual - mean).collect()
     }
 
     /// Rate of P3 at each sample, Pa/s.
     fn slopes(&self, table: &Table, shift_s: f64) -> Vec<f64> {
-        let (command, by_s) = (self.command(shift_s), 1e-3);
+        let (command, step_s) = (self.command(shift_s), 1e-3);
         let start_s = self.levels[self.at].start_s + shift_s;
-        let slope = |t_s: f64| (command.p3_pa(t_s + by_s) - command.p3_pa(t_s)) / by_s;
+        let slope = |t_s: f64| (command.p3_pa(t_s + step_s) - command.p3_pa(t_s)) / step_s;
         self.samples.clone().map(|i| if table.t_s[i] > start_s { slope(table.t_s[i]) } else { 0.0 }).collect()
     }
 
     /// Delay of the command relative to its sample, and its error, s.
     fn shift_s(&self, table: &Table, values: &[f64]) -> (f64, f64) {
         let cost = |shift_s: f64| {
-            let rest = self.residuals(table, values, shift_s);
-            rest.iter().filter(|rest| rest.is_finite()).map(|rest| rest * rest).sum::<f64>()
+            let residuals = self.residuals(table, values, shift_s);
+            residuals
+                .iter()
+                .filter(|residual| residual.is_finite())
+                .map(|residual| residual * residual)
+                .sum::<f64>()
         };
-        // The command came between two samples, and acts within a sample of that.
+        // The command came between two samples, and acts within one sample interval.
         let (low_s, high_s) = (-0.5 * self.interval_s, 2.0 * self.interval_s);
         let shift_s = minimise(low_s, high_s, 1e-5, cost).at;
         let information: f64 = self.slopes(table, shift_s).iter().map(|slope| slope * slope).sum();
@@ -200,34 +203,34 @@ impl Jump {
     }
 }
 
-/// Scatter of the sample times, from irregular P3 after jumps: each sample compared with its two neighbours, so that smooth differences (such
-/// as another response than the assumed one) cancel.
-fn scatter_s(table: &Table, values: &[f64], jumps: &[Jump], found: &[(f64, f64)]) -> f64 {
+/// Scatter of the sample times, from irregular P3 after jumps. Each sample is compared with its two neighbours, so that smooth differences
+/// cancel, such as a response other than the assumed one.
+fn scatter_s(table: &Table, values: &[f64], jumps: &[Jump], shifts: &[(f64, f64)]) -> f64 {
     let (mut sum, mut weights, mut chi, mut count) = (0.0, 0.0, 0.0, 0.0);
-    for (jump, (shift_s, _)) in jumps.iter().zip(found) {
-        let (rest, slopes) = (jump.residuals(table, values, *shift_s), jump.slopes(table, *shift_s));
+    for (jump, (shift_s, _)) in jumps.iter().zip(shifts) {
+        let (residuals, slopes) = (jump.residuals(table, values, *shift_s), jump.slopes(table, *shift_s));
         let noise_sigma = jump.noise_sigma;
-        for (rest, slopes) in rest.windows(3).zip(slopes.windows(3)) {
+        for (residuals, slopes) in residuals.windows(3).zip(slopes.windows(3)) {
             if slopes.iter().any(|slope| slope.abs() < MIN_RATE_SIGMAS_PER_S * noise_sigma) {
                 continue;
             }
-            let late_s = |i: usize| -rest[i] / slopes[i];
-            let uneven_s = late_s(1) - 0.5 * (late_s(0) + late_s(2));
+            let delay_s = |i: usize| -residuals[i] / slopes[i];
+            let irregularity_s = delay_s(1) - 0.5 * (delay_s(0) + delay_s(2));
             let variance = |i: usize, share: f64| (share * noise_sigma / slopes[i]).powi(2);
             let noise = variance(0, 0.5) + variance(1, 1.0) + variance(2, 0.5);
-            if uneven_s.is_finite() {
+            if irregularity_s.is_finite() {
                 let weight = 1.0 / noise;
-                sum += weight * (uneven_s * uneven_s - noise);
+                sum += weight * (irregularity_s * irregularity_s - noise);
                 weights += 1.5 * weight;
-                chi += uneven_s * uneven_s / noise;
+                chi += irregularity_s * irregularity_s / noise;
                 count += 1.0;
             }
         }
     }
-    // Neighbours share samples: twice the scatter of independent ones.
-    let chance = count + 5.0 * 2.0 * f64::sqrt(2.0 * count);
+    // Neighbouring triples share samples, which doubles the scatter of `chi`.
+    let chi_limit = count + 5.0 * 2.0 * f64::sqrt(2.0 * count);
     let scatter_s = f64::sqrt(f64::max(sum / f64::max(weights, 1e-30), 0.0));
-    if count > 0.0 && chi > chance && scatter_s > MIN_SCATTER_S { scatter_s } else { 0.0 }
+    if count > 0.0 && chi > chi_limit && scatter_s > MIN_SCATTER_S { scatter_s } else { 0.0 }
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! The readings of several sensors as means over common short segments, independent of their sampling.
+//! Means of redundant sensors over common short blocks, independent of their sampling.
 
 use crate::plausible::is_reading;
 use mapper_core::{Channel, Series};
@@ -8,14 +8,14 @@ const BLOCK_S: f64 = 2.0;
 /// Maximum number of blocks of a recording; a longer one has longer blocks.
 const MAX_BLOCKS: f64 = 100_000.0;
 
-/// Means of each sensor, block by block; NaN without a reading.
+/// Block means of each sensor; NaN without a reading.
 #[derive(Debug, Clone)]
 pub(crate) struct Blocks {
     pub(crate) start_s: f64,
     pub(crate) length_s: f64,
-    /// By sensor.
+    /// Block means of each sensor.
     pub(crate) means: Vec<Vec<f64>>,
-    /// Usual number of samples in a block, by sensor.
+    /// Typical number of samples in a block of each sensor.
     pub(crate) samples: Vec<usize>,
 }
 
@@ -30,20 +30,20 @@ impl Blocks {
             return None;
         }
         let length_s = BLOCK_S.max(span_s / MAX_BLOCKS);
-        let count = (span_s / length_s) as usize + 1;
+        let block_count = (span_s / length_s) as usize + 1;
         let (mut means, mut samples) = (Vec::new(), Vec::new());
         for series in sensors {
-            let mut sums = vec![(0.0, 0usize); count];
+            let mut sums = vec![(0.0, 0usize); block_count];
             for (t_s, value) in series.iter().flat_map(|series| series.t_s.iter().zip(&series.values)) {
                 let block = sums.get_mut(((t_s - start_s) / length_s) as usize);
-                if let Some((sum, read)) = block.filter(|_| is_reading(channel, *value)) {
-                    (*sum, *read) = (*sum + value, *read + 1);
+                if let Some((sum, count)) = block.filter(|_| is_reading(channel, *value)) {
+                    (*sum, *count) = (*sum + value, *count + 1);
                 }
             }
-            let all: usize = sums.iter().map(|(_, read)| read).sum();
-            let with_any = sums.iter().filter(|(_, read)| *read > 0).count().max(1);
-            samples.push(all / with_any);
-            means.push(sums.into_iter().map(|(sum, read)| sum / read as f64).collect());
+            let all: usize = sums.iter().map(|(_, count)| count).sum();
+            let filled = sums.iter().filter(|(_, count)| *count > 0).count().max(1);
+            samples.push(all / filled);
+            means.push(sums.into_iter().map(|(sum, count)| sum / count as f64).collect());
         }
         Some(Blocks { start_s, length_s, means, samples })
     }
@@ -53,7 +53,7 @@ impl Blocks {
         self.means.first().map_or(0, Vec::len)
     }
 
-    /// The weighted mean of these sensors, block by block; NaN if one of them is missing.
+    /// The weighted mean of the sensors in each block; NaN if one of them is missing.
     pub(crate) fn weighted(&self, weights: &[f64]) -> Vec<f64> {
         let at = |block: usize| {
             let used = weights.iter().zip(&self.means).filter(|(weight, _)| **weight > 0.0);

@@ -4,44 +4,44 @@ use mapper_core::{Channel, DeclaredUncertainty, Element};
 use serde::Serialize;
 use std::fmt;
 
-/// Reason for leaving out one of several sensors.
+/// Reason for excluding a redundant sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fault {
-    /// Its reading differs from the others.
+    /// Reading differs from the others.
     Off {
-        /// Its reading minus theirs, in the channel's unit.
+        /// Its reading minus that of the others, in the channel's unit.
         by: f64,
-        /// The same in declared standard deviations of that difference.
+        /// The difference in declared standard deviations of it.
         sigmas: f64,
     },
-    /// It follows changes later or earlier than the others.
+    /// The sensor lags or leads the others.
     Slow {
-        /// Its lag minus theirs, s.
+        /// Its lag minus that of the others, s.
         lag_s: f64,
     },
-    /// It is stuck while the others change.
+    /// The sensor is stuck while the others change.
     Stuck {
-        /// Run time from which it is stuck, s.
+        /// Start of the constant reading in run time, s.
         from_s: f64,
-        /// Its constant reading, in the channel's unit.
+        /// Constant reading, in the channel's unit.
         reading: f64,
     },
-    /// It gives no reading for much of the time.
+    /// The sensor gives no reading for much of the time.
     Silent {
-        /// Share of the recording without one.
+        /// Fraction of the recording without a reading.
         missing_ratio: f64,
     },
 }
 
-/// A sensor that is left out.
+/// An excluded sensor.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FaultyElement {
-    /// Its number.
+    /// Number.
     pub element: Element,
-    /// Its display name.
+    /// Display name.
     pub name: String,
-    /// Number of sensors it was compared with.
+    /// Number of sensors that it was compared with.
     pub others: usize,
     /// The reason.
     pub fault: Fault,
@@ -57,7 +57,11 @@ impl fmt::Display for FaultyElement {
         match self.fault {
             Fault::Off { by, sigmas } => {
                 let side = if by < 0.0 { "below" } else { "above" };
-                write!(f, "{name} reads {} {unit} {side} {others} ({sigmas:.1} sigma)", Short(by.abs()))?;
+                write!(
+                    f,
+                    "{name} reads {} {unit} {side} {others} ({sigmas:.1} sigma)",
+                    ShortNumber(by.abs())
+                )?;
             }
             Fault::Slow { lag_s } => {
                 let later = if lag_s < 0.0 { "earlier" } else { "later" };
@@ -74,10 +78,10 @@ impl fmt::Display for FaultyElement {
     }
 }
 
-/// A difference of any size in few digits.
-struct Short(f64);
+/// Displays a difference with few digits.
+struct ShortNumber(f64);
 
-impl fmt::Display for Short {
+impl fmt::Display for ShortNumber {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.0 {
             value if value >= 100.0 => write!(f, "{value:.0}"),
@@ -90,7 +94,7 @@ impl fmt::Display for Short {
 /// Sensors that contradict each other, without a way to identify the wrong one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Contradiction {
-    /// The one that differs most from the others in use.
+    /// The sensor that differs most from the others in use.
     pub name: String,
     /// The difference.
     pub fault: Fault,
@@ -98,14 +102,14 @@ pub struct Contradiction {
     pub widened_by: f64,
 }
 
-/// Result of fusing the several sensors of a channel.
+/// Result of fusing the redundant sensors of a channel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FusedChannel {
     /// The channel.
     pub channel: Channel,
     /// Number of its sensors.
     pub sensors: usize,
-    /// The sensors left out.
+    /// The excluded sensors.
     pub left_out: Vec<FaultyElement>,
     /// Contradiction between the remaining ones.
     pub contradiction: Option<Contradiction>,
@@ -132,8 +136,8 @@ impl fmt::Display for FusedChannel {
             "{}: {in_use} of {} sensors, together with noise {} {unit} and offset {} {unit}",
             self.channel,
             self.sensors,
-            Short(noise_sigma),
-            Short(offset_sigma)
+            ShortNumber(noise_sigma),
+            ShortNumber(offset_sigma)
         )?;
         if gain_sigma_ratio > 0.0 {
             write!(f, ", gain {:.2} %", 100.0 * gain_sigma_ratio)?;
@@ -152,7 +156,7 @@ impl fmt::Display for FusedChannel {
             write!(
                 f,
                 "; {name} {what}, and the wrong one cannot be identified: all are used, and the offset covers them (+/- {} {unit})",
-                Short(*widened_by)
+                ShortNumber(*widened_by)
             )?;
         }
         Ok(())

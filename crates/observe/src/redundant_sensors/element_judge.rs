@@ -1,8 +1,8 @@
-//! Detects redundant sensors of a channel with an offset or a lag, and stuck or silent ones, over a whole recording.
+//! Detects redundant sensors with an offset or a lag, and stuck or silent ones, over a whole recording.
 //!
-//! Each sensor is compared with the weighted mean of the others in use. The worst one beyond its limit is left out, and the remaining ones are
-//! judged again, as long as more than half remain. With two, the wrong one cannot be identified. A stuck or silent sensor is identified by its
-//! own readings.
+//! Each sensor is compared with the weighted mean of the others in use. The worst sensor beyond its limit is excluded, and the others are
+//! judged again, as long as more than half of the sensors remain. Of two sensors the wrong one cannot be identified. A stuck or silent
+//! sensor is identified by its own readings.
 
 use crate::redundant_sensors::element_blocks::Blocks;
 use crate::redundant_sensors::element_fault::Fault;
@@ -11,34 +11,34 @@ use mapper_numerics::coloured_noise::ColouredNoise;
 use mapper_numerics::statistics::mean;
 use mapper_physics::laws::thermocouple;
 
-/// Share of fault-free recordings in which a sensor is left out for its offset; half of the permitted false alarms.
+/// Fraction of fault-free recordings in which a sensor is excluded for its offset; half of the permitted false alarms.
 pub(crate) const FALSE_ALARMS_RATIO: f64 = 0.005;
-/// Number of parts of the recording, each judged by its mean difference: an offset that starts in the middle shows in full in the last part.
+/// Number of parts of the recording that are judged separately: an offset that starts in the middle has its full size in the last part.
 const PARTS: usize = 4;
 /// Minimum number of blocks for a decision.
 const MIN_BLOCKS: usize = 10;
-/// Share of the recording without a reading above which a sensor is silent, if another one has readings.
+/// A sensor is silent if it gives no reading in a larger fraction of the blocks, compared with the sensor that has most.
 const MAX_MISSING_RATIO: f64 = 0.5;
-/// Time and number of samples for which a reading repeats to the last digit before it counts as stuck, s.
+/// Minimum duration, s, and number of samples of a reading that repeats to the last digit for a stuck sensor.
 const FROZEN_S: f64 = 20.0;
 const FROZEN_SAMPLES: usize = 20;
-/// Share of samples that must differ from the one before for a live sensor: a coarse digit repeats often.
+/// Minimum fraction of samples of a live sensor that differ from the previous one: a coarse digit repeats often.
 const MIN_CHANGING_RATIO: f64 = 0.2;
-/// Band of block noise within which a reading counts as constant, standard deviations; chance exceeds it in 1e-8 of blocks.
+/// Band within which a reading counts as constant, in standard deviations of a block mean; noise exceeds it in 1e-8 of blocks.
 const CONSTANT_BAND_SIGMAS: f64 = 6.0;
-/// Minimum movement of the others meanwhile, in widths of that band, and its duration in blocks (20 s): a slow probe has completed half of the
-/// change by then.
+/// Minimum change of the other sensors in the same time, in widths of this band, and its duration in blocks (20 s), after which a slow probe
+/// has followed by half of the change.
 const MIN_MOVE_BANDS: f64 = 4.0;
 const MIN_MOVE_BLOCKS: usize = 10;
 /// Difference of lags that is always acceptable, s: at the slopes of a usual window it is smaller than a sensor's offset.
 const LAG_TOLERANCE_S: f64 = 0.5;
-/// Accuracy of a lag computed from the tip diameter, ratio: tips are not spheres, and the flow is unknown here.
+/// Accuracy of a lag computed from the tip diameter, ratio: tips are not spheres, and the flow is not known.
 const LAG_TOLERANCE_RATIO: f64 = 0.5;
-/// Standard errors above which a lag is significant.
+/// Minimum size of a significant lag, in standard errors.
 const MIN_LAG_SIGMAS: f64 = 6.0;
 /// Factor on the regression's standard errors, which assume independent residuals; those of blocks are slightly correlated.
 const STANDARD_ERROR_FACTOR: f64 = 2.0;
-/// Ratio of slopes to their noise above which a lag can be seen.
+/// Minimum ratio of slopes to their noise for the estimate of a lag.
 const MIN_SLOPE_SIGMAS: f64 = 5.0;
 /// Typical outlet pipe, flow and temperature: lags of declared diameters are only compared with each other.
 const USUAL_PIPE_M: f64 = 0.035;
@@ -48,7 +48,7 @@ const USUAL_T2_K: f64 = 350.0;
 /// Result for the sensors of one channel, by their positions from 0.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Judgement {
-    /// Those to be left out, with the reason and the number of sensors compared.
+    /// Sensors to exclude, with the reason and the number of compared sensors.
     pub(crate) left_out: Vec<(usize, Fault, usize)>,
     /// The worst difference among the remaining ones, if the wrong one cannot be identified.
     pub(crate) contradiction: Option<(usize, Fault)>,
@@ -69,7 +69,7 @@ pub(crate) fn comparisons(sensors: usize) -> usize {
     if sensors > 2 { sensors } else { 1 }
 }
 
-/// Judges the sensors of a channel. `limit_sigmas`: maximum offset of one.
+/// Judges the sensors of a channel. `limit_sigmas` is the maximum offset.
 pub(crate) fn judge(
     channel: Channel,
     sensors: &[Option<&Series>],
@@ -81,17 +81,17 @@ pub(crate) fn judge(
     let Some(blocks) = Blocks::new(channel, sensors) else { return judgement };
     let colour = ColouredNoise::new(colour.first_order_share_ratio, colour.time_constant_s);
     let judge = Judge { sensors, declared, blocks: &blocks, colour, limit_sigmas };
-    judge.silent(&mut judgement);
-    judge.stuck(&mut judgement);
-    let most_out = sensors.len().saturating_sub(1) / 2;
+    judge.exclude_silent(&mut judgement);
+    judge.exclude_stuck(&mut judgement);
+    let max_left_out = sensors.len().saturating_sub(1) / 2;
     loop {
         let in_use = judgement.in_use(sensors.len());
         let differences = in_use.iter().filter_map(|index| judge.difference(*index, &in_use));
-        let Some(worst) = differences.filter(|found| found.severity > 1.0).max_by(Difference::by_severity)
-        else {
+        let excessive = differences.filter(|difference| difference.severity > 1.0);
+        let Some(worst) = excessive.max_by(|a, b| a.severity.total_cmp(&b.severity)) else {
             return judgement;
         };
-        if in_use.len() < 3 || judgement.left_out.len() >= most_out {
+        if in_use.len() < 3 || judgement.left_out.len() >= max_left_out {
             judgement.contradiction = Some((worst.index, worst.fault));
             return judgement;
         }
@@ -107,33 +107,27 @@ struct Judge<'a> {
     limit_sigmas: f64,
 }
 
-/// Difference of a sensor from the others; a severity above 1 is too much.
+/// Difference of a sensor from the others; it is excessive if the severity is above 1.
 struct Difference {
     index: usize,
     severity: f64,
     fault: Fault,
 }
 
-impl Difference {
-    fn by_severity(&self, other: &Difference) -> std::cmp::Ordering {
-        self.severity.total_cmp(&other.severity)
-    }
-}
-
 impl Judge<'_> {
-    fn silent(&self, judgement: &mut Judgement) {
-        let read = |means: &Vec<f64>| means.iter().filter(|mean| mean.is_finite()).count();
-        let counts: Vec<usize> = self.blocks.means.iter().map(read).collect();
-        let most = counts.iter().copied().max().unwrap_or(0);
+    fn exclude_silent(&self, judgement: &mut Judgement) {
+        let count_readings = |means: &Vec<f64>| means.iter().filter(|mean| mean.is_finite()).count();
+        let counts: Vec<usize> = self.blocks.means.iter().map(count_readings).collect();
+        let max_count = counts.iter().copied().max().unwrap_or(0);
         for (index, count) in counts.iter().enumerate() {
-            let missing_ratio = 1.0 - *count as f64 / most.max(1) as f64;
+            let missing_ratio = 1.0 - *count as f64 / max_count.max(1) as f64;
             if missing_ratio > MAX_MISSING_RATIO {
                 judgement.left_out.push((index, Fault::Silent { missing_ratio }, counts.len() - 1));
             }
         }
     }
 
-    fn stuck(&self, judgement: &mut Judgement) {
+    fn exclude_stuck(&self, judgement: &mut Judgement) {
         let in_use = judgement.in_use(self.sensors.len());
         let mut found = Vec::new();
         for index in &in_use {
@@ -141,17 +135,17 @@ impl Judge<'_> {
             if others.is_empty() {
                 continue;
             }
-            let still = self.frozen(*index, &others).or_else(|| self.unmoved(*index, &others));
-            found.extend(still.map(|fault| (*index, fault, others.len())));
+            let fault = self.find_frozen(*index, &others).or_else(|| self.find_constant(*index, &others));
+            found.extend(fault.map(|fault| (*index, fault, others.len())));
         }
-        // If all are constant, nothing changed.
+        // If all sensors are constant, the quantity did not change.
         if found.len() < in_use.len() {
             judgement.left_out.extend(found);
         }
     }
 
-    /// A reading that repeats to the last digit while all others change.
-    fn frozen(&self, index: usize, others: &[usize]) -> Option<Fault> {
+    /// Finds a reading that repeats to the last digit while all others change.
+    fn find_frozen(&self, index: usize, others: &[usize]) -> Option<Fault> {
         let series = self.sensors[index]?;
         let (mut start, mut longest) = (0, (0, 0));
         for i in 1..=series.values.len() {
@@ -164,35 +158,36 @@ impl Judge<'_> {
         }
         let (from_s, to_s) = (*series.t_s.get(longest.0)?, *series.t_s.get(longest.1)?);
         let reading = *series.values.get(longest.0)?;
-        let alive = |other: &usize| {
+        let changes = |other: &usize| {
             let values = self.sensors[*other].map(|series| series.slice(from_s, to_s).1).unwrap_or_default();
-            let changes = values.windows(2).filter(|pair| pair[0] != pair[1]).count();
-            changes as f64 > MIN_CHANGING_RATIO * values.len() as f64
+            let change_count = values.windows(2).filter(|pair| pair[0] != pair[1]).count();
+            change_count as f64 > MIN_CHANGING_RATIO * values.len() as f64
         };
         let long = to_s - from_s >= FROZEN_S && longest.1 - longest.0 >= FROZEN_SAMPLES;
-        (long && others.iter().all(alive)).then_some(Fault::Stuck { from_s, reading })
+        (long && others.iter().all(changes)).then_some(Fault::Stuck { from_s, reading })
     }
 
-    /// A reading that stays within its noise while the others move far and stay there.
-    fn unmoved(&self, index: usize, others: &[usize]) -> Option<Fault> {
+    /// Finds a reading that stays within its noise while the others change far and permanently.
+    fn find_constant(&self, index: usize, others: &[usize]) -> Option<Fault> {
         let band = CONSTANT_BAND_SIGMAS * self.block_sigma(index).max(f64::MIN_POSITIVE);
         let own = &self.blocks.means[index];
         let reference = self.blocks.weighted(&self.declared.weights(|other| others.contains(&other)));
         let mut start: Option<usize> = None;
-        let mut away = 0;
+        let mut changed_blocks = 0;
         for block in 0..own.len() {
             if !(own[block].is_finite() && reference[block].is_finite()) {
                 continue;
             }
             match start {
                 Some(first) if (own[block] - own[first]).abs() <= band => {
-                    away += usize::from((reference[block] - reference[first]).abs() > MIN_MOVE_BANDS * band);
-                    if away >= MIN_MOVE_BLOCKS {
+                    changed_blocks +=
+                        usize::from((reference[block] - reference[first]).abs() > MIN_MOVE_BANDS * band);
+                    if changed_blocks >= MIN_MOVE_BLOCKS {
                         let from_s = self.blocks.start_s + first as f64 * self.blocks.length_s;
                         return Some(Fault::Stuck { from_s, reading: own[first] });
                     }
                 }
-                _ => (start, away) = (Some(block), 0),
+                _ => (start, changed_blocks) = (Some(block), 0),
             }
         }
         None
@@ -219,11 +214,11 @@ impl Judge<'_> {
         }
         let lag = self.lag(index, &weights, &rows);
         let (by, sigmas) = self.offset(index, &weights, &rows, lag.map_or(0.0, |lag| lag.lag_s));
-        let off =
+        let offset =
             Difference { index, severity: sigmas / self.limit_sigmas, fault: Fault::Off { by, sigmas } };
         let slow =
             lag.map(|Lag { lag_s, severity }| Difference { index, severity, fault: Fault::Slow { lag_s } });
-        Some(slow.filter(|slow| slow.severity > off.severity).unwrap_or(off))
+        Some(slow.filter(|slow| slow.severity > offset.severity).unwrap_or(offset))
     }
 
     /// Lag of a sensor relative to the others: first-order lags give `x - r = -tau x'` for any gas temperature.
@@ -260,7 +255,7 @@ impl Judge<'_> {
         })
     }
 
-    /// Largest difference among the parts of the recording, and the same in its declared standard deviations.
+    /// Largest difference among the parts of the recording, also in its declared standard deviations.
     fn offset(&self, index: usize, weights: &[f64], rows: &[(f64, f64, f64)], lag_s: f64) -> (f64, f64) {
         let parts = PARTS.min(rows.len() / MIN_BLOCKS).max(1);
         let mut worst = (0.0, 0.0);
@@ -280,7 +275,7 @@ impl Judge<'_> {
             let others = weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0);
             let sigma =
                 (variance(index) + others.map(|(other, w)| w * w * variance(other)).sum::<f64>()).sqrt();
-            // Without any declaration nothing is decided.
+            // Without a declared uncertainty there is no decision.
             let sigmas = if sigma > 0.0 { by.abs() / sigma } else { 0.0 };
             if sigmas > worst.1 {
                 worst = (by, sigmas);

@@ -1,8 +1,8 @@
 //! The virtual laboratory's own compressor, "turbo_a", in closed form.
 //!
-//! The paper does not print its map tables; these forms replace them (flow as a function of speed and pressure
-//! ratio, an ellipse-like line between a zero-slope and a choke point; efficiency a parabola over flow). Fitted by eye to the
-//! ranges plotted in the paper: 50 to 170 krpm, corrected to SAE's reference state. Outside, the forms continue smoothly.
+//! The paper does not print its map tables; these formulas replace them. A speed line is part of an ellipse-like curve between a
+//! zero-slope and a choke point, and the efficiency is a parabola over flow. They were fitted by eye to the ranges plotted in the paper, 50
+//! to 170 krpm corrected to SAE's reference state, and continue smoothly outside these ranges.
 //! Compressors with another wheel are geometrically similar: equal tip speed gives equal pressure ratio and efficiency, and a flow in
 //! proportion to the square of the wheel (e.g. Dixon and Hall, Fluid Mechanics and Thermodynamics of Turbomachinery, ch. 2).
 
@@ -20,7 +20,7 @@ pub struct ClosedFormMap {
     pub wheel_diameter_m: f64,
 }
 
-/// The two ends of a speed line and the flow between them.
+/// The two ends of a speed line.
 struct SpeedLineEnds {
     zero_slope_pressure_ratio: f64,
     zero_slope_flow_kg_s: f64,
@@ -81,13 +81,13 @@ impl CompressorCharacteristic for ClosedFormMap {
         };
         let flow = flow_scale_ratio * unscaled;
         let n = ends.speed_ratio;
-        let fast = (n - 1.2).max(0.0);
-        let peak = 0.74 - 0.07 * (n - 1.05) * (n - 1.05) - 0.10 * fast * fast;
+        let excess_speed = (n - 1.2).max(0.0);
+        let peak = 0.74 - 0.07 * (n - 1.05) * (n - 1.05) - 0.10 * excess_speed * excess_speed;
         let best_flow = m_zs + 0.42 * (m_ch - m_zs);
-        let away = (flow - best_flow) / (m_ch - m_zs);
+        let offset = (flow - best_flow) / (m_ch - m_zs);
         CharacteristicPoint {
             flow_corrected_kg_s: flow,
-            efficiency: (peak * (1.0 - 0.9 * away * away)).max(0.2),
+            efficiency: (peak * (1.0 - 0.9 * offset * offset)).max(0.2),
             surge_position_ratio: x,
         }
     }

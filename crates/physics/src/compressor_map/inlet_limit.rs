@@ -1,13 +1,13 @@
 //! Upper bound on the flow of any compressor, to detect wrong units.
 //!
 //! An inlet passes at most the flow of a choked pipe of the wheel's diameter, and the tip speed of a wheel is limited.
-//! Together they limit the flow by the speed alone: 13 kg/s at 50 krpm, 1.5 kg/s at 150 krpm. Real machines have at least a tenth of it.
+//! Together they limit the flow by the speed alone: 13 kg/s at 50 krpm, 1.5 kg/s at 150 krpm. Real machines reach at least a tenth of this.
 
 use crate::gas::air;
 
 /// Maximum tip speed of a wheel, m/s: forged titanium; series wheels reach 560 m/s.
 pub const MAX_TIP_SPEED_M_S: f64 = 700.0;
-/// State at which the pipe chokes: a reference state's temperature and pressure (SAE).
+/// Inlet temperature and pressure of the choked pipe: the SAE reference state.
 const T_K: f64 = 298.0;
 const P_PA: f64 = 100e3;
 /// Minimum top speed of a turbocharger's map, rpm: the largest, on ship engines, reach about 9000 rpm.

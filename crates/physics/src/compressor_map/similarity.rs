@@ -1,7 +1,7 @@
-//! Similarity of speed lines: at equal place on the line flow is proportional to speed, isentropic head to its square.
+//! Similarity of speed lines: at equal position on the line, flow is proportional to speed and isentropic head to its square.
 //!
 //! The fan laws (e.g. Dixon and Hall, Fluid Mechanics and Thermodynamics of Turbomachinery, ch. 2). They apply to small
-//! changes of speed: within 2 % here. For larger changes compressibility bends the line.
+//! changes of speed: within 2 % here. For larger changes compressibility changes the shape of the line.
 
 /// (gamma - 1)/gamma of cold air.
 const KAPPA: f64 = 1.0 - 1.0 / crate::gas::air::HEAT_CAPACITY_RATIO;

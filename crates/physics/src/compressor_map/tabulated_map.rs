@@ -1,9 +1,8 @@
-//! A user's own compressor map: speed lines of corrected speed, flow, pressure ratio and efficiency.
+//! A compressor map from a table: speed lines of corrected speed, flow, pressure ratio and efficiency.
 //!
-//! Each line is described by its two ends and its shape between them over the same coordinate x that the closed form
-//! uses (0 at the choke end, 1 at the surge end), so that lines of different speed can be blended at equal x. Beyond
-//! the outermost lines similarity applies: flow in proportion to speed, isentropic head to its square. That is an
-//! extrapolation for the run-up of a machine, not a measurement.
+//! Each line has two ends and a shape between them over the coordinate x of the closed form (0 at the choke end, 1 at the
+//! surge end), so that lines of different speed can be blended at equal x. Beyond the outermost lines similarity applies:
+//! flow in proportion to speed, isentropic head to its square. This extrapolation is only for the run-up of a machine.
 
 use crate::compressor_map::characteristic::{CharacteristicPoint, CompressorCharacteristic};
 use crate::compressor_map::inlet_limit::{MAX_SPEED_RPM, MIN_TOP_SPEED_RPM, max_flow_kg_s};
@@ -23,7 +22,7 @@ pub struct MapRow {
     pub efficiency: f64,
 }
 
-/// Why a table is not a map.
+/// Reason why a table is not a map.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MapError {
     /// An invalid value.
@@ -34,9 +33,9 @@ pub enum MapError {
     Value {
         /// Row, from 1, header not counted.
         row: usize,
-        /// Which column.
+        /// Name of the column.
         quantity: &'static str,
-        /// Its value.
+        /// Value.
         value: f64,
         /// Unit of the column.
         unit: &'static str,
@@ -66,12 +65,12 @@ pub enum MapError {
     Crossing {
         /// The line's corrected speed, rpm.
         speed_corrected_rpm: f64,
-        /// Its highest pressure ratio.
+        /// Highest pressure ratio.
         pressure_ratio: f64,
         /// Highest pressure ratio of the next slower line.
         slower_pressure_ratio: f64,
     },
-    /// All lines slower than any turbocharger's.
+    /// All lines are slower than those of any turbocharger.
     #[error(
         "the fastest speed line turns at {} only: no turbocharger is that slow; if the table has krpm, add the unit to its heading (`speed [krpm]`)",
         with_unit(speed_corrected_rpm, "rpm")
@@ -123,10 +122,10 @@ pub struct Line {
     pub nodes: Vec<Node>,
 }
 
-/// A place on a speed line.
+/// A node of a speed line.
 #[derive(Debug, Clone, Copy)]
 pub struct Node {
-    /// Pressure ratio above the choke end's, over the line's whole span: 0 there, 1 at the surge end.
+    /// Pressure ratio minus that of the choke end, over the span of the line: 0 at the choke end, 1 at the surge end.
     pub x: f64,
     /// Corrected flow, kg/s.
     pub flow_kg_s: f64,
@@ -150,7 +149,7 @@ const MAX_LINE_SPEED_DIFFERENCE_RATIO: f64 = 0.01;
 impl TabulatedMap {
     /// Builds a map from rows in any order, at `reference`.
     ///
-    /// Points on the surge side of a line's highest pressure ratio are left out: there, flow is not a function of
+    /// Points on the surge side of a line's highest pressure ratio are skipped, because there flow is not a function of
     /// pressure ratio.
     ///
     /// # Errors
@@ -158,7 +157,7 @@ impl TabulatedMap {
     pub fn new(rows: &[MapRow], reference: ReferenceState) -> Result<Self, MapError> {
         for (index, row) in rows.iter().enumerate() {
             let positive = "finite and above 0";
-            for (quantity, value, unit, good, needed) in [
+            for (quantity, value, unit, is_valid, needed) in [
                 ("speed", row.speed_corrected_rpm, "rpm", row.speed_corrected_rpm > 0.0, positive),
                 ("flow", row.flow_corrected_kg_s, "kg/s", row.flow_corrected_kg_s > 0.0, positive),
                 ("pressure ratio", row.pressure_ratio, "1", row.pressure_ratio > 0.0, positive),
@@ -170,7 +169,7 @@ impl TabulatedMap {
                     "a fraction above 0, at most 1",
                 ),
             ] {
-                if !(value.is_finite() && good) {
+                if !(value.is_finite() && is_valid) {
                     return Err(MapError::Value { row: index + 1, quantity, value, unit, needed });
                 }
             }
@@ -234,7 +233,7 @@ impl TabulatedMap {
         self.lines.iter().map(|line| line.speed_corrected_rpm).collect()
     }
 
-    /// The two lines to blend and the share of the upper one; beyond the outermost, that line alone.
+    /// The two lines to blend and the weight of the upper one; beyond the outermost line, that line alone.
     fn neighbours(&self, speed_corrected_rpm: f64) -> (&Line, &Line, f64) {
         let after = self.lines.partition_point(|line| line.speed_corrected_rpm <= speed_corrected_rpm);
         let last = self.lines.len() - 1;
@@ -250,7 +249,7 @@ impl TabulatedMap {
         (low, high, share)
     }
 
-    /// Speed over that of the line it is scaled from; 1 between the outermost lines.
+    /// Speed over that of the scaled line; 1 between the outermost lines.
     fn similarity_ratio(&self, speed_corrected_rpm: f64) -> f64 {
         let first = self.lines.first().map_or(1.0, |line| line.speed_corrected_rpm);
         let last = self.lines.last().map_or(1.0, |line| line.speed_corrected_rpm);
@@ -269,7 +268,8 @@ impl TabulatedMap {
         )
     }
 
-    fn blended(&self, speed_corrected_rpm: f64, x: f64) -> Node {
+    /// The node at `x` of the line at a corrected speed.
+    fn blend(&self, speed_corrected_rpm: f64, x: f64) -> Node {
         let (low, high, share) = self.neighbours(speed_corrected_rpm);
         let (a, b) = (low.at(x), high.at(x));
         let ratio = self.similarity_ratio(speed_corrected_rpm);
@@ -282,11 +282,11 @@ impl TabulatedMap {
 }
 
 impl Line {
-    /// Takes rows of one line in order of falling flow.
+    /// A line from its rows in order of falling flow.
     fn new(rows: &[MapRow]) -> Result<Self, MapError> {
         let speed_corrected_rpm =
             rows.iter().map(|row| row.speed_corrected_rpm).sum::<f64>() / rows.len() as f64;
-        // From choke towards surge the pressure ratio must rise; points where it does not are left out.
+        // From choke towards surge the pressure ratio must rise; other points are skipped.
         let mut rising: Vec<&MapRow> = Vec::new();
         for row in rows {
             if rising.last().is_none_or(|last| {
@@ -315,7 +315,7 @@ impl Line {
         Ok(Line { speed_corrected_rpm, choke_pressure_ratio, surge_pressure_ratio, nodes })
     }
 
-    /// Linear between the nodes, held constant beyond both ends.
+    /// Linear interpolation between the nodes, constant beyond both ends.
     fn at(&self, x: f64) -> Node {
         let after = self.nodes.partition_point(|node| node.x <= x).clamp(1, self.nodes.len() - 1);
         let (a, b) = (self.nodes[after - 1], self.nodes[after]);
@@ -336,8 +336,8 @@ impl CompressorCharacteristic for TabulatedMap {
     fn evaluate(&self, speed_corrected_rpm: f64, pressure_ratio: f64) -> CharacteristicPoint {
         let (choke_pr, surge_pr) = self.ends(speed_corrected_rpm);
         let x = (pressure_ratio - choke_pr) / (surge_pr - choke_pr);
-        let node = self.blended(speed_corrected_rpm, x);
-        // Beyond the surge line the flow falls as the closed form's does.
+        let node = self.blend(speed_corrected_rpm, x);
+        // Beyond the surge line the flow falls as in the closed form.
         let beyond = (x - 1.0).max(0.0);
         CharacteristicPoint {
             flow_corrected_kg_s: node.flow_kg_s * (1.0 - 2.0 * beyond),
@@ -347,11 +347,11 @@ impl CompressorCharacteristic for TabulatedMap {
     }
 
     fn surge_point(&self, speed_corrected_rpm: f64) -> (f64, f64) {
-        (self.blended(speed_corrected_rpm, 1.0).flow_kg_s, self.ends(speed_corrected_rpm).1)
+        (self.blend(speed_corrected_rpm, 1.0).flow_kg_s, self.ends(speed_corrected_rpm).1)
     }
 
     fn choke_flow_corrected_kg_s(&self, speed_corrected_rpm: f64) -> f64 {
-        self.blended(speed_corrected_rpm, 0.0).flow_kg_s
+        self.blend(speed_corrected_rpm, 0.0).flow_kg_s
     }
 
     fn fingerprint(&self) -> String {

@@ -1,4 +1,4 @@
-//! The compressor's gas, dry or moist, and dry air by closed forms: heat capacity, viscosity, conductivity.
+//! The gas of the compressor, dry or moist, and closed forms for dry air: heat capacity, viscosity, conductivity.
 //!
 //! The closed forms are those of the virtual laboratory, in place of the tables of the paper's reference 12. Domain: 250 to 800 K, at
 //! pressures of a few bar, where air is a perfect gas. Relative to tabulated dry air the heat capacity is within 1 %, the
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// Specific gas constant of dry air, J/(kg K).
 pub const GAS_CONSTANT_J_KGK: f64 = Gas::CLOSED_FORM_AIR.gas_constant_j_kgk;
 
-/// Ratio of specific heats used where the paper's model holds it constant (orifice, filling of the volume).
+/// Ratio of specific heats in parts of the paper's model with a constant ratio (orifice, filling of the volume).
 pub const HEAT_CAPACITY_RATIO: f64 = 1.4;
 
 /// Isobaric heat capacity `1002.5 + 275e-6 (T - 200)^2`, J/(kg K), for 200..800 K.
@@ -42,7 +42,7 @@ pub fn ln_conductivity_ratio(temperature_k: f64) -> f64 {
     0.8646 * (temperature_k / 300.0).ln()
 }
 
-/// Gas that a compressor takes in: a dry gas with water vapour. Viscosity and conductivity are those of dry air: 40 g/kg change them by -1.6 to -2.7 %
+/// Gas at the inlet of a compressor: a dry gas with water vapour. Viscosity and conductivity are those of dry air: 40 g/kg change them by -1.6 to -2.7 %
 /// and +0.2 to -1.2 % between 300 and 400 K (CoolProp 7, `HAPropsSI`), h by +1.4 % at all temperatures, which a fitted coefficient absorbs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Air {
@@ -70,7 +70,7 @@ impl Air {
         efficiency: EfficiencyDefinition::Enthalpy,
         pressures_pa: [0.0; 2],
     };
-    /// The same with the efficiency of the paper's eq. 2.
+    /// [`Air::DRY`] with the efficiency of the paper's eq. 2.
     pub const PAPER: Air = Air { efficiency: EfficiencyDefinition::KappaOfT1, ..Air::DRY };
 
     /// A dry gas with 0 to about 0.06 kg of water per kg, and the efficiency by enthalpy.
@@ -78,7 +78,7 @@ impl Air {
         Air { gas: dry, ..Air::DRY }.with_humidity(humidity_kg_kg)
     }
 
-    /// The same gas with another humidity, kg/kg.
+    /// Sets the humidity, kg/kg.
     #[inline]
     #[must_use]
     pub fn with_humidity(self, humidity_kg_kg: f64) -> Air {
@@ -90,14 +90,14 @@ impl Air {
         Air { gas: self.gas.with_vapour((new - old) / (1.0 - old)), humidity_kg_kg, ..self }
     }
 
-    /// The same gas with another definition of the efficiency.
+    /// Sets the definition of the efficiency.
     #[inline]
     #[must_use]
     pub fn with_efficiency(self, efficiency: EfficiencyDefinition) -> Air {
         Air { efficiency, ..self }
     }
 
-    /// The same gas compressed from one pressure to another, Pa, on which enthalpy and entropy of a real gas depend; without it, a perfect gas.
+    /// Sets the pressures before and after compression, Pa, on which enthalpy and entropy of a real gas depend. Without them the gas is perfect.
     #[inline]
     #[must_use]
     pub fn between(self, from_pa: f64, to_pa: f64) -> Air {
@@ -135,10 +135,10 @@ impl Air {
     pub fn heated_k(self, from_k: f64, rise_j_kg: f64) -> f64 {
         let to_pa = self.pressures_pa[1];
         let mut to_k = from_k + rise_j_kg / self.heat_capacity_j_kgk(from_k);
-        // Newton: after a rise of 200 K the start is 3 K off, the first step 5e-4 K, the second 1e-11 K.
+        // Newton's method: for a rise of 200 K the error of the start is 3 K, after the first step 5e-4 K, after the second 1e-11 K.
         for _ in 0..2 {
-            let missing_j_kg = rise_j_kg - self.enthalpy_rise_j_kg(from_k, to_k);
-            to_k += missing_j_kg
+            let residual_j_kg = rise_j_kg - self.enthalpy_rise_j_kg(from_k, to_k);
+            to_k += residual_j_kg
                 / (self.heat_capacity_j_kgk(to_k) + self.gas.departure(to_k, to_pa).heat_capacity_j_kgk);
         }
         to_k
@@ -149,25 +149,25 @@ impl Air {
     pub fn isentropic_k(self, from_k: f64, pressure_ratio: f64) -> f64 {
         let [from_pa, to_pa] = self.pressures_pa;
         let gas_constant_j_kgk = self.gas.gas_constant_j_kgk;
-        let fall_j_kgk = gas_constant_j_kgk * pressure_ratio.ln();
+        let entropy_drop_j_kgk = gas_constant_j_kgk * pressure_ratio.ln();
         let start = self.gas.departure(from_k, from_pa);
-        let mut ln_ratio = fall_j_kgk / self.heat_capacity_j_kgk(from_k);
+        let mut ln_ratio = entropy_drop_j_kgk / self.heat_capacity_j_kgk(from_k);
         let mut to_k = from_k * ln_ratio.exp();
-        // Newton in ln T: at a pressure ratio of 4 the start is 3e-3 off, the first step 1e-6, the second 1e-13. The exponential of so
-        // small a step is its series to third order.
+        // Newton's method in ln T: at a pressure ratio of 4 the error of the start is 3e-3, after the first step 1e-6, after the second 1e-13.
+        // The exponential of such a small step is its series to third order.
         for _ in 0..2 {
             let end = self.gas.departure(to_k, to_pa);
-            let missing_j_kgk = fall_j_kgk
+            let residual_j_kgk = entropy_drop_j_kgk
                 - self.gas.ideal_entropy_rise_j_kgk(from_k, to_k, ln_ratio)
                 - (end.entropy_j_kgk - start.entropy_j_kgk);
-            let step = missing_j_kgk / (self.heat_capacity_j_kgk(to_k) + end.heat_capacity_j_kgk);
+            let step = residual_j_kgk / (self.heat_capacity_j_kgk(to_k) + end.heat_capacity_j_kgk);
             ln_ratio += step;
             to_k *= 1.0 + step * (1.0 + step * (0.5 + step / 6.0));
         }
         to_k
     }
 
-    /// The gas in words, for readers of a report.
+    /// Description of the gas for a report.
     pub fn description(self) -> String {
         let dry = self.with_humidity(0.0).gas;
         let same = |other: Gas| (dry.gas_constant_j_kgk / other.gas_constant_j_kgk - 1.0).abs() < 1e-9;
@@ -188,8 +188,8 @@ impl Air {
         self.gas_constant_j_kgk() / self.heat_capacity_j_kgk(temperature_k)
     }
 
-    /// Flow of dry air, real or of the closed form as this gas, at the same Mach numbers over the flow of this gas: `sqrt(R/R_dry)`. Corrected
-    /// flows are those of dry air.
+    /// Flow of dry air at the same Mach numbers, over the flow of this gas: `sqrt(R/R_dry)`. Dry air is real or of the closed form like this
+    /// gas. Corrected flows are those of dry air.
     #[inline]
     pub fn dry_flow_ratio(self) -> f64 {
         let dry_j_kgk =

@@ -1,7 +1,7 @@
-//! Fast powers of positive numbers, for code that runs a hundred thousand times a second.
+//! Fast power function for positive numbers, for code that runs a hundred thousand times a second.
 
-/// `base^exponent` for `base` > 0. The library's is correct to the last bit and takes twice as long; this one is accurate to
-/// a few bits for the exponents of correlations.
+/// `base^exponent` for `base` > 0, to a few bits for the exponents of correlations. The library function is exact to the last bit and takes
+/// twice as long.
 #[inline]
 pub(crate) fn power(base: f64, exponent: f64) -> f64 {
     (exponent * base.ln()).exp()

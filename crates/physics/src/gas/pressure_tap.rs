@@ -1,4 +1,4 @@
-//! Static pressure at a pipe's wall and total pressure of the flow in it.
+//! Relation of the static pressure at the wall of a pipe and the total pressure of its flow.
 //!
 //! One-dimensional isentropic relations of a perfect gas (e.g. Shapiro, The Dynamics and Thermodynamics of
 //! Compressible Fluid Flow, ch. 4), with the ratio of specific heats at the total temperature. Domain: subsonic flow that
@@ -12,8 +12,7 @@ fn heat_capacity_ratio(temperature_k: f64) -> f64 {
     cp / (cp - air::GAS_CONSTANT_J_KGK)
 }
 
-/// Total pressure, Pa, of `flow_kg_s` at total temperature `total_temperature_k` in a pipe of `pipe_diameter_m`
-/// whose wall has `static_pa`.
+/// Total pressure, Pa, of a flow in a pipe, from the static pressure at its wall.
 ///
 /// Continuity gives `m sqrt(R T0)/(p A) = sqrt(gamma) M sqrt(1 + (gamma-1)/2 M^2)`, a quadratic in M^2 for static
 /// pressure and total temperature; then `p0/p = (1 + (gamma-1)/2 M^2)^(gamma/(gamma-1))`. Valid up to
@@ -36,7 +35,7 @@ pub fn static_to_total_pa(
 
 /// Static pressure, Pa, at the wall: the inverse of [`static_to_total_pa`] on its subsonic branch.
 ///
-/// `None` if the pipe would have to pass more than sonic flow.
+/// `None` if the flow exceeds the choking flow of the pipe.
 pub fn total_to_static_pa(
     total_pa: f64,
     flow_kg_s: f64,

@@ -33,7 +33,7 @@ impl Species {
     pub const ALL: [Species; 7] =
         [Species::N2, Species::O2, Species::Ar, Species::CO2, Species::H2O, Species::H2, Species::CH4];
 
-    /// Its constants. Masses and critical points are those of CoolProp 8.0; the heat capacities are fitted to its ideal-gas parts from 220 to
+    /// Constants of the species. Masses and critical points are those of CoolProp 8.0; the heat capacities are fitted to its ideal-gas parts from 220 to
     /// 1400 K, within 0.16 % below 650 K and 0.35 % above (`benches/gas_properties.py`).
     pub(crate) fn data(self) -> SpeciesData {
         let (molar_mass_kg_mol, critical_k, critical_pa, critical_mol_m3, acentric_factor, heat_capacity) =

@@ -2,20 +2,20 @@
 
 use crate::machine::state::rad_s_of_rpm;
 
-/// Friction power, W, of a friction c in W s^2/rad^2 at a shaft speed in rad/s.
+/// Friction power, W, from the friction coefficient c in W s^2/rad^2 and the shaft speed in rad/s.
 pub fn friction_power_w(bearing_friction_w_s2: f64, shaft_speed_rad_s: f64) -> f64 {
     bearing_friction_w_s2 * shaft_speed_rad_s * shaft_speed_rad_s
 }
 
-/// A friction in W s^2/rad^2 in a familiar form: its power at 150 krpm to two figures, e.g. "370 W at 150 krpm".
+/// A friction coefficient in W s^2/rad^2 as text: the power at 150 krpm to two digits, e.g. "370 W at 150 krpm".
 pub fn at_150_krpm(bearing_friction_w_s2: f64) -> String {
     let power_w = friction_power_w(bearing_friction_w_s2, rad_s_of_rpm(150e3));
     if power_w == 0.0 || !power_w.is_finite() {
         return format!("{power_w} W at 150 krpm");
     }
-    let second_figure = power_w.abs().log10().floor() as i32 - 1;
-    let step_w = 10f64.powi(second_figure);
-    let decimals = (-second_figure).max(0) as usize;
+    let second_digit = power_w.abs().log10().floor() as i32 - 1;
+    let step_w = 10f64.powi(second_digit);
+    let decimals = (-second_digit).max(0) as usize;
     format!("{:.decimals$} W at 150 krpm", (power_w / step_w).round() * step_w)
 }
 

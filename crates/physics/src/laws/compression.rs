@@ -1,13 +1,13 @@
 //! Compression with heat transfer before and after it: eqs. 1-3 of the paper.
 //!
-//! Errata followed here: eq. 2 is `T2' = T1' + (T2s' - T1')/eta`; heat is positive from gas to metal; eq. 1 uses the
+//! Corrected errata: eq. 2 is `T2' = T1' + (T2s' - T1')/eta`; heat is positive from gas to metal; eq. 1 uses the
 //! inlet temperature T1, eq. 3 the outlet temperature T2.
 //!
 //! The paper defines the efficiency by temperatures at `kappa = R/cp(T1)`. [`EfficiencyDefinition`] also has the ratio of enthalpy rises:
 //! eqs. 1-3 then hold for the enthalpy over cp(T1), and [`Air::heated_k`] gives the temperature.
 //!
-//! Domain: flow, efficiency, temperatures and areas above 0 (efficiency may be negative where the machine brakes the gas);
-//! pressure ratios up to about 6. Eq. 3 is the one-node form of a heat exchanger: the gas never passes the metal's temperature.
+//! Domain: flow, efficiency, temperatures and areas above 0 (the efficiency is negative if the machine brakes the gas);
+//! pressure ratios up to about 6. Eq. 3 is the one-node form of a heat exchanger: the temperature of the gas cannot cross that of the metal.
 
 use crate::gas::air::Air;
 use crate::gas::fast_power::power;
@@ -38,7 +38,7 @@ pub struct CompressionInputs {
     pub air: Air,
 }
 
-/// Temperatures and heats along the way.
+/// Temperatures and heat flows along the gas path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Compression {
     /// Before the wheel (station 1'), K.
@@ -53,7 +53,7 @@ pub struct Compression {
     pub q2_w: f64,
 }
 
-/// Isentropic rise over the inlet temperature: of the temperature, or of the enthalpy over cp(T1), as the definition of the efficiency says.
+/// Isentropic rise over the inlet temperature: of the temperature, or of the enthalpy over cp(T1), according to the definition of the efficiency.
 #[inline]
 pub fn isentropic_rise_ratio(pressure_ratio: f64, t1_k: f64, air: Air) -> f64 {
     match air.efficiency {
@@ -108,7 +108,7 @@ pub fn apparent_efficiency(pressure_ratio: f64, t1_k: f64, t2_k: f64, air: Air) 
     t1_k * isentropic_rise_ratio(pressure_ratio, t1_k, air) / actual_rise_k(t1_k, t2_k, air)
 }
 
-/// The same efficiency by another definition, fraction: the temperatures stay. For a map, T1 is that of its reference state.
+/// Converts an efficiency to another definition at equal temperatures, fraction. For a map, T1 is that of its reference state.
 ///
 /// ```
 /// use mapper_core::EfficiencyDefinition;
@@ -131,7 +131,7 @@ pub fn efficiency_by(
     apparent_efficiency(pressure_ratio, t1_k, t2_k, air.with_efficiency(definition))
 }
 
-/// Temperature of gas whose enthalpy has risen from `from_k` by cp(T1) times the rise to `equivalent_k`, K; `equivalent_k` itself where the
+/// Temperature of gas whose enthalpy has risen from `from_k` by cp(T1) times the rise to `equivalent_k`, K; `equivalent_k` itself if the
 /// efficiency is defined by temperatures.
 #[inline]
 fn actual_k(t1_k: f64, from_k: f64, equivalent_k: f64, air: Air) -> f64 {
@@ -143,7 +143,7 @@ fn actual_k(t1_k: f64, from_k: f64, equivalent_k: f64, air: Air) -> f64 {
     }
 }
 
-/// Eq. 1 for a conductance before the wheel: heat from gas to metal in W, and the gas after it in K.
+/// Eq. 1 for a conductance before the wheel: heat from gas to metal, W, and temperature of the gas at the wheel, K.
 #[inline]
 pub fn before_wheel(
     conductance_w_k: f64,
@@ -165,21 +165,21 @@ pub struct Wheel {
     pub isentropic_rise_ratio: f64,
     /// Isentropic efficiency, fraction.
     pub efficiency: f64,
-    /// Share of the flow that comes back, hot, to the wheel's inlet.
+    /// Share of the flow that recirculates, hot, to the wheel's inlet.
     pub recirculation_ratio: f64,
     /// The gas.
     pub air: Air,
 }
 
 impl Wheel {
-    /// Gas behind the wheel in K, and the work in J/kg. `r` m of the (1 + r) m that the wheel pumps come back to its inlet, so that
+    /// Temperature of the gas after the wheel, K, and the work, J/kg. The wheel pumps (1 + r) m, of which r m recirculates, so that
     /// T2' = T1'(1 + X)/(1 - r X) with X = rise/efficiency. Eq. 2 if `recirculation_ratio` is 0.
     #[inline]
     pub fn compress(&self, t1_prime_k: f64) -> (f64, f64) {
         let x = self.isentropic_rise_ratio / self.efficiency;
-        // Beyond a tenth the recirculation would heat itself without bound; no compressor comes near it.
-        let circle = (1.0 - self.recirculation_ratio * x).max(0.1);
-        let equivalent_k = t1_prime_k * (1.0 + x) / circle;
+        // Below 0.1 the recirculating flow would heat itself without bound; no compressor comes near this.
+        let denominator = (1.0 - self.recirculation_ratio * x).max(0.1);
+        let equivalent_k = t1_prime_k * (1.0 + x) / denominator;
         let t2_prime_k = actual_k(self.t1_k, t1_prime_k, equivalent_k, self.air);
         let work_j_kg = match self.air.efficiency {
             EfficiencyDefinition::ConstantGamma(_) => self.air.enthalpy_rise_j_kg(t1_prime_k, t2_prime_k),
@@ -191,7 +191,7 @@ impl Wheel {
     }
 }
 
-/// Eq. 3 for a conductance after the wheel: heat from gas to metal in W, and the gas at the outlet in K.
+/// Eq. 3 for a conductance after the wheel: heat from gas to metal, W, and temperature of the gas at the outlet, K.
 #[inline]
 pub fn after_wheel(
     conductance_w_k: f64,

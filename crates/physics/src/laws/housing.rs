@@ -1,7 +1,7 @@
-//! The metal: conduction through the bearing housing, heat to the oil and to the cell, heat capacities.
+//! Heat transfer of the housings: conduction through the bearing housing, heat to the oil and to the cell, heat capacities.
 //!
-//! Each housing is one temperature: its Biot number is below 0.1 with the coefficients of the paper. Free convection is
-//! Appendix A's, turbulent over a body of some 0.1 m: walls 10 K and more above the cell. Heat capacities are straight lines
+//! Each housing has one temperature: its Biot number is below 0.1 with the coefficients of the paper. Free convection is that of
+//! Appendix A: turbulent over a body of some 0.1 m, with walls at least 10 K above the cell. Heat capacities are straight lines
 //! over the ranges of Appendix A and are extrapolated beyond them.
 
 use crate::machine::params::{BearingParams, Params};
@@ -9,10 +9,10 @@ use crate::machine::params::{BearingParams, Params};
 /// Stefan-Boltzmann constant, W/(m2 K4).
 pub const STEFAN_BOLTZMANN_W_M2K4: f64 = 5.670_374_419e-8;
 
-/// Free convection of a housing, `h_ext = 1.25 |T - T_amb|^(1/3)` (Appendix A): the 1.25, W/(m2 K^(4/3)).
+/// Coefficient of free convection of a housing, `h_ext = 1.25 |T - T_amb|^(1/3)` (Appendix A), W/(m2 K^(4/3)).
 const FREE_CONVECTION_COEFFICIENT: f64 = 1.25;
 
-/// Half the bearing housing each way: conductance from a housing to the bearing node, W/K.
+/// Conductance from a housing to the bearing node, through half of the bearing housing, W/K.
 pub fn bearing_conductance_w_k(bearing: &BearingParams) -> f64 {
     2.0 * bearing.conductivity_w_mk * bearing.section_area_m2 / bearing.length_m
 }
@@ -41,7 +41,7 @@ pub fn external_heat_w(
     ambient_k: f64,
 ) -> f64 {
     let over_k = wall_k - ambient_k;
-    // The library's cube root takes three times as long as this; 0 gives exp(-inf) = 0, as required.
+    // The library function `cbrt` takes three times as long; 0 gives exp(-inf) = 0, as required.
     let third_root = (over_k.abs().ln() / 3.0).exp();
     let (wall2, ambient2) = (wall_k * wall_k, ambient_k * ambient_k);
     area_m2

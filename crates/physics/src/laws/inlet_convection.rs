@@ -1,13 +1,13 @@
 //! Convection before the compressor's wheel: the Nusselt law of the outlet at the inlet's own diameter and gas.
 //!
 //! Eqs. 1 and 3 of Burke et al. have one h; their section 5.2 states that this "is not correct", and Appendix A gives the
-//! inlet a diameter of its own. Coefficient and exponent of the law are those of the outlet: no others have been measured.
+//! inlet a diameter of its own. Coefficient and exponent of the law are those of the outlet: the inlet's own have not been measured.
 
 use crate::laws::nusselt::coefficient_w_m2k;
 use crate::machine::params::CompressorParams;
 use mapper_core::InletConvection;
 
-/// Machine data for the ratio of both coefficients.
+/// Machine data that determine the ratio of the inlet's heat transfer coefficient to the outlet's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InletLaw {
     /// Exponent b of the Reynolds number.

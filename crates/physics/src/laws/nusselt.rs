@@ -25,7 +25,7 @@ pub fn coefficient_w_m2k(
     let mu = air::viscosity_pa_s(bulk_k);
     let ln_k_ratio = air::ln_conductivity_ratio(bulk_k);
     let reynolds = 4.0 * flow_kg_s / (std::f64::consts::PI * diameter_m * mu);
-    // All powers as one exponential of a sum of logarithms: half the time, in the line where the model spends most of it.
+    // All powers in one exponential of a sum of logarithms: half the time of this formula, in which the model spends most of its time.
     let ln_prandtl =
         (air::heat_capacity_j_kgk(bulk_k) * mu / air::CONDUCTIVITY_AT_300_K_W_MK).ln() - ln_k_ratio;
     let ln_nusselt =

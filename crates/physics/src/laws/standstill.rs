@@ -1,6 +1,6 @@
 //! The machine at rest: no flow, both housings relax to the cell through the bearing housing.
 //!
-//! The running model is singular at speed 0 and flow 0; this one replaces it for soaks and zeros. Domain: no gas flow
+//! The running model is singular at speed 0 and flow 0; this model replaces it for soaks and zeros. Domain: no gas flow
 //! at all; the heat balances are those of [`housing`] without their gas side.
 
 use crate::laws::housing;
@@ -15,7 +15,7 @@ pub struct StandstillState {
     pub tt_k: f64,
 }
 
-/// Longest step of the integration, s: a hundredth of the housings' time constants, which are minutes.
+/// Maximum step of the integration, s: a hundredth of the time constants of the housings, which are minutes.
 const MAX_STEP_S: f64 = 1.0;
 
 /// Housing temperatures `duration_s` later.

@@ -1,7 +1,7 @@
 //! The T2 probe: a small sphere in the outlet pipe (eqs. 11-12).
 //!
-//! Eq. 11 is Whitaker's correlation (AIChE J. 18, 1972) for a sphere: Re 3.5 to 7.6e4, Pr 0.71 to 380. The tip is one
-//! temperature, which needs a Biot number below 0.1: tips up to some 10 mm here.
+//! Eq. 11 is Whitaker's correlation (AIChE J. 18, 1972) for a sphere: Re 3.5 to 7.6e4, Pr 0.71 to 380. The tip has one
+//! temperature, which requires a Biot number below 0.1: here tips up to some 10 mm.
 
 use crate::gas::air;
 

@@ -1,15 +1,15 @@
-//! The turbine (vanes fixed): swallowing, heat to the housing, expansion.
+//! The turbine (fixed vanes): swallowing capacity, heat to the housing, expansion.
 //!
 //! Closed forms of the virtual laboratory for the paper's turbine. Domain: P3 above P4 (the caller checks), expansion ratios up
 //! to about 4, viscosity and conductivity of air. The efficiency is total to static and a parabola over the blade-speed ratio (e.g. Watson and
-//! Janota, Turbocharging the Internal Combustion Engine, ch. 5), limited to 0.05 far from its best.
+//! Janota, Turbocharging the Internal Combustion Engine, ch. 5), at least 0.05.
 
 use crate::gas::air::{self, Air};
 use crate::gas::fast_power::power;
 use crate::laws::nusselt;
 use crate::machine::params::{BoundaryConditions, TurbineParams};
 
-/// State of the ISA day to which the swallowing curve is corrected.
+/// Reference state of the swallowing capacity: the ISA day.
 const FLOW_REFERENCE_K: f64 = 288.15;
 const FLOW_REFERENCE_PA: f64 = 101_325.0;
 /// Exponent of the swallowing curve `1 - (P3/P4)^-1.1`.
@@ -26,7 +26,7 @@ pub struct TurbineInlet {
     /// `1 - (P3/P4)^(-R/cp(T3))`, the isentropic drop over T3'.
     isentropic_drop_ratio: f64,
     cp3_j_kgk: f64,
-    /// Heat-transfer coefficient for a wall of viscosity 1 Pa s; the wall's own viscosity enters with ^-0.14.
+    /// Heat-transfer coefficient at a gas viscosity of 1 Pa s at the wall; the actual viscosity enters with the exponent -0.14.
     h_unit_wall_w_m2k: f64,
 }
 
@@ -62,7 +62,7 @@ impl TurbineInlet {
             / (boundary.t3_k / FLOW_REFERENCE_K).sqrt()
             / gas.dry_flow_ratio();
         let cp3_j_kgk = gas.heat_capacity_j_kgk(boundary.t3_k);
-        // A wall as viscous as the gas gives the plain correlation; scale that to a wall of 1 Pa s.
+        // At equal viscosity of wall and gas the viscosity ratio is 1; scale this to a wall of 1 Pa s.
         let h_unit_wall_w_m2k = nusselt::coefficient_w_m2k(
             params.nusselt_coefficient,
             params.nusselt_exponent,
@@ -101,8 +101,8 @@ impl TurbineInlet {
         let spouting_velocity_m_s =
             (2.0 * cp_prime * t3_prime_k * isentropic_drop_ratio(self.ln_expansion_ratio, exponent)).sqrt();
         let blade_speed_ratio = shaft_speed_rad_s * params.wheel_radius_m / spouting_velocity_m_s;
-        let away = (blade_speed_ratio - params.peak_blade_speed_ratio) / params.peak_blade_speed_ratio;
-        let efficiency = (params.peak_efficiency * (1.0 - 0.8 * away * away)).max(0.05);
+        let deviation = (blade_speed_ratio - params.peak_blade_speed_ratio) / params.peak_blade_speed_ratio;
+        let efficiency = (params.peak_efficiency * (1.0 - 0.8 * deviation * deviation)).max(0.05);
         let drop_k = efficiency * t3_prime_k * self.isentropic_drop_ratio;
         TurbineState {
             t3_prime_k,

@@ -63,9 +63,9 @@ pub enum BoundaryError {
     NotPhysical {
         /// Name of the boundary condition.
         name: &'static str,
-        /// Its value.
+        /// Value.
         value: f64,
-        /// Its unit.
+        /// Unit.
         unit: &'static str,
     },
 }

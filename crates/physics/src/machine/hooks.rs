@@ -1,6 +1,6 @@
 //! Extension points of the model: named places in the gas path and the metal.
 //!
-//! [Parameters](crate::machine::params::Params) change the model's numbers; hooks are for everything else. Each receives the model's value
+//! [Parameters](crate::machine::params::Params) change the model's numbers; hooks make all other changes. Each receives the model's value
 //! and returns the value to use.
 
 use crate::machine::params::BoundaryConditions;
@@ -8,7 +8,7 @@ use crate::machine::state::{MAX_EXTRA, State};
 use mapper_core::Channel;
 use std::sync::Arc;
 
-/// Data known when a hook is called; values that come later in the gas path are NaN.
+/// Data at the call of a hook; values from later in the gas path are NaN.
 #[derive(Debug, Clone, Copy)]
 pub struct Site<'a> {
     /// Time, s; NaN in a steady state and while all inputs are constant.
@@ -116,7 +116,7 @@ pub trait Hooks: std::fmt::Debug + Send + Sync {
         0.0
     }
 
-    /// Flow added to the volume behind the compressor, at the gas temperature there, kg/s; a leak is negative.
+    /// Flow added to the volume after the compressor, at its gas temperature, kg/s; a leak is negative.
     fn flow_to_outlet_kg_s(&self, _site: &Site<'_>) -> f64 {
         0.0
     }
@@ -131,12 +131,12 @@ pub trait Hooks: std::fmt::Debug + Send + Sync {
         value
     }
 
-    /// Number of hidden temperatures it needs, at most [`MAX_EXTRA`].
+    /// Number of hidden temperatures of the hooks, at most [`MAX_EXTRA`].
     fn extra_states(&self) -> usize {
         0
     }
 
-    /// Rates of its hidden temperatures, K/s; `rates` has [`extra_states`](Hooks::extra_states) elements.
+    /// Rates of the hidden temperatures, K/s; `rates` has [`extra_states`](Hooks::extra_states) elements.
     fn extra_rates_k_s(&self, _site: &Site<'_>, _rates: &mut [f64]) {}
 
     /// The first fault so far, if any: hooks cannot fail, so they return NaN and keep the reason.
@@ -159,14 +159,14 @@ struct PositionedHooks {
     extra_states: usize,
 }
 
-/// The hooks of a model need more hidden temperatures than it has room for.
+/// The hooks need more hidden temperatures than a model can have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "the effects need {wanted} hidden temperatures together; a model has room for {MAX_EXTRA}: try fewer effects at once"
+    "the effects need {needed} hidden temperatures together; a model has room for {MAX_EXTRA}: try fewer effects at once"
 )]
 pub struct TooManyExtraStates {
-    /// The number they need.
-    pub wanted: usize,
+    /// Number of hidden temperatures needed.
+    pub needed: usize,
 }
 
 impl HookList {
@@ -176,27 +176,27 @@ impl HookList {
     /// [`TooManyExtraStates`]; the list is then unchanged.
     pub fn push(&mut self, hooks: Arc<dyn Hooks>) -> Result<(), TooManyExtraStates> {
         let extra_states = hooks.extra_states();
-        let wanted = self.extra_states.saturating_add(extra_states);
-        if wanted > MAX_EXTRA {
-            return Err(TooManyExtraStates { wanted });
+        let needed = self.extra_states.saturating_add(extra_states);
+        if needed > MAX_EXTRA {
+            return Err(TooManyExtraStates { needed });
         }
         self.placed.push(PositionedHooks { hooks, first_extra: self.extra_states, extra_states });
-        self.extra_states = wanted;
+        self.extra_states = needed;
         Ok(())
     }
 
-    /// Whether there are none.
+    /// Whether the list has no hooks.
     #[inline]
     pub fn is_empty(&self) -> bool {
         self.placed.is_empty()
     }
 
-    /// Hidden temperatures of all of them.
+    /// Number of hidden temperatures of all hooks.
     pub fn extra_states(&self) -> usize {
         self.extra_states
     }
 
-    /// The first fault of any of them.
+    /// The first fault of any hook.
     pub fn fault(&self) -> Option<String> {
         self.placed.iter().find_map(|placed| placed.hooks.fault())
     }
@@ -206,9 +206,9 @@ impl HookList {
         &self,
         site: &Site<'_>,
         value: f64,
-        ask: impl Fn(&dyn Hooks, &Site<'_>, f64) -> f64,
+        call: impl Fn(&dyn Hooks, &Site<'_>, f64) -> f64,
     ) -> f64 {
-        self.placed.iter().fold(value, |value, placed| ask(placed.hooks.as_ref(), &placed.site(site), value))
+        self.placed.iter().fold(value, |value, placed| call(placed.hooks.as_ref(), &placed.site(site), value))
     }
 
     /// The input of the sensor of `channel`, given `value`.

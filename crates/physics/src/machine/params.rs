@@ -24,9 +24,9 @@ pub struct Params {
     pub outlet: OutletParams,
     /// Diameter of the T2 probe's tip, m; 0 is an ideal probe (eqs. 11-12).
     pub t2_probe_diameter_m: f64,
-    /// Share chi of the way from gas to housing that the T2 probe's stem pulls its tip: it tends to T2 + chi (Tc - T2); 0.
+    /// Stem conduction chi of the T2 probe: its tip tends to T2 + chi (Tc - T2); 0.
     pub t2_probe_stem_ratio: f64,
-    /// Recovery r of the T2 probe: it tends to T2 - (1 - r) v^2/(2 cp), v in the outlet pipe; 1.
+    /// Recovery r of the T2 probe: its tip tends to T2 - (1 - r) v^2/(2 cp), v in the outlet pipe; 1.
     pub t2_probe_recovery_ratio: f64,
     /// Bearing friction c: c omega^2 is taken from the shaft, W s^2/rad^2, >= 0; Appendix A has none.
     pub bearing_friction_w_s2: f64,
@@ -73,8 +73,8 @@ pub struct CompressorParams {
     pub efficiency_scale_ratio: f64,
     /// Multiplies the map's flow, > 0; 1. The efficiency is the map's at the multiplied flow.
     pub flow_scale_ratio: f64,
-    /// Part r of the flow that recirculates, hot, from the wheel's exit to its inlet: the wheel, and with it the map, has
-    /// (1 + r) times the flow that leaves the compressor; 0.
+    /// Recirculation r: hot flow from the exit of the wheel to its inlet, over the flow that leaves the compressor. The wheel, and therefore
+    /// the map, has (1 + r) times that flow; 0.
     pub recirculation_ratio: f64,
     /// The dry gas of the compressor side.
     #[serde(default = "closed_form_air")]
@@ -110,7 +110,7 @@ pub struct TurbineParams {
     pub external_area_m2: f64,
     /// External emissivity, 0..1, ratio to a black body.
     pub emissivity_ratio: f64,
-    /// Flow the turbine swallows at large expansion ratio, corrected to 288.15 K and 101.325 kPa, kg/s.
+    /// Swallowing capacity of the turbine at a large expansion ratio, corrected to 288.15 K and 101.325 kPa, kg/s.
     pub choked_flow_kg_s: f64,
     /// The gas that drives the turbine.
     #[serde(default = "closed_form_air")]

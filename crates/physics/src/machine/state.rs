@@ -44,7 +44,7 @@ impl State {
         self.shaft_speed_rad_s * 30.0 / std::f64::consts::PI
     }
 
-    /// The first `N` states, in the order of the fields.
+    /// The first `N` components, in the order of the fields.
     #[inline]
     pub(crate) fn to_array<const N: usize>(self) -> [f64; N] {
         let all = [
@@ -60,7 +60,7 @@ impl State {
         std::array::from_fn(|i| all[i])
     }
 
-    /// From the first `N` >= 5 states; further states are in equilibrium with the housing.
+    /// Creates a state from its first `N` >= 5 components; the others are in equilibrium with the housing.
     #[inline]
     pub(crate) fn from_array<const N: usize>(y: &[f64; N]) -> Self {
         let at = |i: usize| if i < N { y[i] } else { y[2] };
@@ -76,7 +76,7 @@ impl State {
     }
 }
 
-/// Shaft speed in rad/s of one in rpm.
+/// Converts a shaft speed from rpm to rad/s.
 pub fn rad_s_of_rpm(speed_rpm: f64) -> f64 {
     speed_rpm * std::f64::consts::PI / 30.0
 }

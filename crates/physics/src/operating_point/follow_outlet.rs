@@ -45,13 +45,13 @@ pub fn hold_speed(
         return steady::hold_speed(model, speed_rpm, &boundary);
     }
     for _ in 0..MAX_ROUNDS {
-        let held = steady::hold_speed(model, speed_rpm, &boundary)?;
-        let outlet_k = held.outputs.t2_k;
+        let steady_state = steady::hold_speed(model, speed_rpm, &boundary)?;
+        let outlet_k = steady_state.outputs.t2_k;
         let off_k = |follows: bool, value_k: f64| if follows { (outlet_k - value_k).abs() } else { 0.0 };
         if off_k(follow.turbine_inlet, boundary.t3_k).max(off_k(follow.oil, boundary.oil_temperature_k))
             < TOLERANCE_K
         {
-            return Ok(held);
+            return Ok(steady_state);
         }
         if follow.turbine_inlet {
             boundary.t3_k = outlet_k;
@@ -74,8 +74,8 @@ mod tests {
         let model = Model::nominal();
         let boundary = BoundaryConditions { valve_opening_ratio: 0.7, ..BoundaryConditions::default() };
         let follow = FollowOutlet { turbine_inlet: true, oil: true };
-        let error = |held: &SteadyState| {
-            let outputs = &held.outputs;
+        let error = |steady_state: &SteadyState| {
+            let outputs = &steady_state.outputs;
             let rise = crate::laws::compression::isentropic_rise_ratio(
                 outputs.pressure_ratio,
                 boundary.t1_k,
@@ -84,11 +84,11 @@ mod tests {
             (boundary.t1_k * rise / (outputs.t2_k - boundary.t1_k) - outputs.efficiency).abs()
         };
         for speed_rpm in [50e3, 80e3] {
-            let held = hold_speed(&model, speed_rpm, &boundary, follow).unwrap();
-            assert!((held.boundary.t3_k - held.outputs.t2_k).abs() < 1e-5);
-            assert!((held.boundary.oil_temperature_k - held.outputs.t2_k).abs() < 1e-5);
+            let steady_state = hold_speed(&model, speed_rpm, &boundary, follow).unwrap();
+            assert!((steady_state.boundary.t3_k - steady_state.outputs.t2_k).abs() < 1e-5);
+            assert!((steady_state.boundary.oil_temperature_k - steady_state.outputs.t2_k).abs() < 1e-5);
             // The remaining difference is the housings' loss to the cell, some watts.
-            assert!(error(&held) < 0.01, "{}", error(&held));
+            assert!(error(&steady_state) < 0.01, "{}", error(&steady_state));
         }
         // At low speed the hot turbine heats the compressor most: several points of efficiency.
         let cold = hold_speed(&model, 50e3, &boundary, follow).unwrap();

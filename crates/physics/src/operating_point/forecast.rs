@@ -11,7 +11,7 @@ const SAMPLE_S: f64 = 0.5;
 /// Maximum number of samples of a forecast; steps of more than 10 000 s are sampled more coarsely.
 const MAX_SAMPLES: f64 = 20_000.0;
 
-/// One instant of a forecast step.
+/// A row of a forecast: the machine at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ForecastRow {
     /// Time after the jump, s.
@@ -39,7 +39,7 @@ pub struct ForecastRow {
 /// A step of the nominal machine.
 #[derive(Debug, Clone)]
 pub struct StepForecast {
-    /// Its rows from the jump to the end; the last one is always the end.
+    /// Rows from the jump to the end; the last one is always the end.
     pub rows: Vec<ForecastRow>,
     /// Interval of the rows, s.
     pub interval_s: f64,
@@ -51,10 +51,6 @@ pub struct StepForecast {
     pub highest_t2_k: f64,
     /// Longest time beyond the surge line, s.
     pub longest_surge_s: f64,
-    /// The machine at each row.
-    states: Vec<State>,
-    /// Intervals beyond the surge line, s.
-    surges_s: Vec<(f64, f64)>,
 }
 
 /// The machine after `duration_s` at `boundary`.
@@ -72,7 +68,7 @@ pub fn hold(
     Ok(simulator.state())
 }
 
-/// The machine at its first point after `warm_up_s` there, from housings at ambient temperature; `first` is the
+/// The machine after `warm_up_s` at its first point, from housings at ambient temperature; `first` is the
 /// point's steady state.
 ///
 /// # Errors
@@ -99,8 +95,7 @@ pub fn forecast_step(
 ) -> Result<StepForecast, SimulationError> {
     let mut simulator = Simulator::new(model, 0.0, state, DEFAULT_RELATIVE_TOLERANCE, Watch::default());
     let mut rows: Vec<ForecastRow> = Vec::new();
-    let mut states: Vec<State> = Vec::new();
-    let (mut surge_since_s, mut surges_s) = (None, Vec::new());
+    let (mut surge_since_s, mut longest_surge_s) = (None, 0.0f64);
     let interval_s = SAMPLE_S.max(dwell_s / MAX_SAMPLES);
     let count = (dwell_s / interval_s).floor() as usize;
     let times = (0..=count).map(|i| i as f64 * interval_s).filter(|t| *t < dwell_s).chain([dwell_s]);
@@ -109,7 +104,6 @@ pub fn forecast_step(
         boundary,
         times,
         |t_s, state, outputs| {
-            states.push(*state);
             rows.push(ForecastRow {
                 t_s,
                 speed_rpm: state.shaft_speed_rpm(),
@@ -125,49 +119,27 @@ pub fn forecast_step(
         },
         |event| match event.crossing {
             Crossing::SurgeEntered => surge_since_s = Some(event.t_s),
-            Crossing::SurgeLeft => surges_s.push((surge_since_s.take().unwrap_or(0.0), event.t_s)),
+            Crossing::SurgeLeft => {
+                longest_surge_s = longest_surge_s.max(event.t_s - surge_since_s.take().unwrap_or(0.0));
+            }
             Crossing::OverspeedEntered | Crossing::OverspeedLeft => {}
         },
     )?;
     if let Some(since_s) = surge_since_s {
-        surges_s.push((since_s, dwell_s));
+        longest_surge_s = longest_surge_s.max(dwell_s - since_s);
     }
-    Ok(StepForecast::of(rows, states, surges_s, interval_s, simulator.state()))
+    let highest = |value: fn(&ForecastRow) -> f64| rows.iter().map(value).fold(f64::NEG_INFINITY, f64::max);
+    Ok(StepForecast {
+        highest_speed_rpm: highest(|row| row.speed_rpm),
+        highest_t2_k: highest(|row| row.t2_k),
+        longest_surge_s,
+        end: simulator.state(),
+        interval_s,
+        rows,
+    })
 }
 
 impl StepForecast {
-    fn of(
-        rows: Vec<ForecastRow>,
-        states: Vec<State>,
-        surges_s: Vec<(f64, f64)>,
-        interval_s: f64,
-        end: State,
-    ) -> Self {
-        let highest =
-            |value: fn(&ForecastRow) -> f64| rows.iter().map(value).fold(f64::NEG_INFINITY, f64::max);
-        StepForecast {
-            highest_speed_rpm: highest(|row| row.speed_rpm),
-            highest_t2_k: highest(|row| row.t2_k),
-            longest_surge_s: surges_s.iter().map(|(from_s, to_s)| to_s - from_s).fold(0.0, f64::max),
-            end,
-            interval_s,
-            rows,
-            states,
-            surges_s,
-        }
-    }
-
-    /// The same step, ended at one of its rows; `None` without a row at `dwell_s`.
-    pub fn ended_at(&self, dwell_s: f64) -> Option<StepForecast> {
-        let last = self.rows.partition_point(|row| row.t_s < dwell_s - 1e-9);
-        let end = self.rows.get(last).filter(|row| row.t_s <= dwell_s + 1e-9)?;
-        let before_end = self.surges_s.iter().filter(|(from_s, _)| *from_s < end.t_s);
-        let surges_s = before_end.map(|(from_s, to_s)| (*from_s, to_s.min(end.t_s))).collect();
-        let (rows, states) = (self.rows.get(..=last)?.to_vec(), self.states.get(..=last)?.to_vec());
-        let end = *states.last()?;
-        Some(StepForecast::of(rows, states, surges_s, self.interval_s, end))
-    }
-
     /// Time at which the operating point has settled, s after the jump; `None` if it has not settled before the
     /// last interval. [`crate::operating_point::settled`] defines settling.
     pub fn settle_s(&self, bands: &SettleBands) -> Option<f64> {
@@ -192,8 +164,8 @@ impl StepForecast {
         // Half an interval of slack for rounding.
         let slack_s = 0.5 * self.interval_s;
         let first = self.rows.partition_point(|row| row.t_s <= start_s - slack_s);
-        let behind = self.rows.partition_point(|row| row.t_s < end_s + slack_s);
-        self.rows.get(first..behind).unwrap_or_default()
+        let end = self.rows.partition_point(|row| row.t_s < end_s + slack_s);
+        self.rows.get(first..end).unwrap_or_default()
     }
 
     /// The expected results of the step, without the errors of an identification. Without a jump (the first step of a
@@ -232,24 +204,6 @@ mod tests {
         assert!(predicted.dtc_k.unwrap().abs() < 1e-2 && predicted.dt2_k.unwrap().abs() < 1e-2);
         let first = forecast.predicted(&WindowRule::Auto, &SettleBands::default(), false);
         assert_eq!((first.dt2_k, first.dtc_k), (None, None), "no jump, no gradient");
-    }
-
-    #[test]
-    fn a_step_that_is_ended_early_is_the_shorter_step() {
-        let model = Model::nominal();
-        let boundary = BoundaryConditions { valve_opening_ratio: 0.7, ..BoundaryConditions::default() };
-        let slow = hold_speed(&model, 60e3, &boundary).unwrap();
-        let fast = hold_speed(&model, 130e3, &boundary).unwrap();
-        let long = forecast_step(&model, slow.state, &fast.boundary, 120.0).unwrap();
-        let short = forecast_step(&model, slow.state, &fast.boundary, 37.0).unwrap();
-        let ended = long.ended_at(37.0).unwrap();
-        assert_eq!((ended.rows.len(), ended.rows.last().unwrap().t_s), (short.rows.len(), 37.0));
-        // The integration's tolerance is 1e-6.
-        for (a, b) in [(ended.end.tc_k, short.end.tc_k), (ended.end.tt_k, short.end.tt_k)] {
-            assert!((a / b - 1.0).abs() < 1e-5, "{a} {b}");
-        }
-        assert!((ended.highest_t2_k / short.highest_t2_k - 1.0).abs() < 1e-5);
-        assert!(long.ended_at(37.2).is_none(), "no such row");
     }
 
     #[test]

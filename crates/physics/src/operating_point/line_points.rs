@@ -1,13 +1,12 @@
-//! The points of one corrected speed on the nominal machine, from choke to surge: their places on the line, and the
+//! The points of a speed line on the nominal machine, from choke to surge: their positions on the line, and the
 //! opening of the back-pressure valve for each.
 //!
-//! **The ends.** On the choke side the widest requested opening; on the surge side the flow at the requested surge
-//! margin ([`SteadyState::surge_margin_ratio`]). Between them points are evenly spaced in corrected
-//! flow.
+//! **The ends.** The choke end has the widest requested opening, the surge end the flow at the requested surge
+//! margin ([`SteadyState::surge_margin_ratio`]). The points between them are evenly spaced in corrected flow.
 //!
 //! **The opening.** At a given speed and flow the map gives P2. The valve is the orifice of
 //! [`orifice`](crate::laws::orifice), whose flow is in proportion to its opening, so that `opening = m_c / m_orifice(P2, T2, 1)`.
-//! T2 depends on the housings, which depend on the flow: opening and [steady state](crate::simulation::steady) are found alternately; each
+//! T2 depends on the housings, which depend on the flow: opening and [steady state](crate::simulation::steady) are computed alternately; each
 //! round reduces the difference to some per cent.
 
 use crate::machine::params::BoundaryConditions;
@@ -31,10 +30,10 @@ const MIN_OPENING_RATIO: f64 = 1e-3;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Spread {
-    /// This number of points, evenly spaced in corrected flow, 2 to [`MAX_POINTS`].
+    /// A number of points, evenly spaced in corrected flow, 2 to [`MAX_POINTS`].
     Points(usize),
-    /// From the choke end at this distance in corrected flow, kg/s, > 0; then the surge end. A remainder of less
-    /// than half a distance is added to the distance before it.
+    /// A spacing from the choke end in corrected flow, kg/s, > 0, and the surge end. A remainder of less than half a spacing
+    /// lengthens the last one.
     SpacingKgS(f64),
 }
 
@@ -45,7 +44,7 @@ pub struct LineRequest {
     pub speed_corrected_rpm: f64,
     /// Reference state of speed and spacing.
     pub reference: ReferenceState,
-    /// Places of its points.
+    /// Distribution of its points.
     pub spread: Spread,
     /// Surge margin of the last point, ratio, > -1.
     pub surge_margin_ratio: f64,
@@ -53,29 +52,29 @@ pub struct LineRequest {
     pub widest_opening_ratio: f64,
 }
 
-/// Why a line has no points.
+/// Reason why a line has no points.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum LineError {
     /// The machine has no steady state on the line.
-    #[error("the nominal machine cannot be held there: {0}")]
+    #[error("the nominal machine has no steady state: {0}")]
     NoSteadyState(#[from] SteadyError),
     /// The valve, at its widest requested opening, passes less flow than the surge end.
     #[error(
-        "the line has no room: its choke end at opening {widest_opening_ratio} has {:.2} g/s corrected, its surge end with a margin of {:.1} % would have {:.2} g/s", 1e3 * .choke_end_kg_s, 100.0 * .surge_margin_ratio, 1e3 * .surge_end_kg_s
+        "the line has no points: its choke end at opening {widest_opening_ratio} has {:.2} g/s corrected, its surge end with a margin of {:.1} % would have {:.2} g/s", 1e3 * .choke_end_kg_s, 100.0 * .surge_margin_ratio, 1e3 * .surge_end_kg_s
     )]
     NoRoom {
         /// Widest requested opening.
         widest_opening_ratio: f64,
-        /// Corrected flow there, kg/s.
+        /// Corrected flow at the choke end, kg/s.
         choke_end_kg_s: f64,
         /// Requested surge margin.
         surge_margin_ratio: f64,
-        /// Corrected flow there, kg/s.
+        /// Corrected flow at the surge end, kg/s.
         surge_end_kg_s: f64,
     },
     /// The spacing is larger than the line is long.
     #[error(
-        "a spacing of {:.2} g/s leaves one point: from choke ({:.2} g/s corrected) to surge end ({:.2} g/s) there are {:.2} g/s", 1e3 * .spacing_kg_s, 1e3 * .choke_end_kg_s, 1e3 * .surge_end_kg_s, 1e3 * (.choke_end_kg_s - .surge_end_kg_s)
+        "a spacing of {:.2} g/s gives one point: from choke ({:.2} g/s corrected) to surge end ({:.2} g/s) the line has {:.2} g/s", 1e3 * .spacing_kg_s, 1e3 * .choke_end_kg_s, 1e3 * .surge_end_kg_s, 1e3 * (.choke_end_kg_s - .surge_end_kg_s)
     )]
     SpacingTooWide {
         /// Requested spacing, kg/s.
@@ -103,7 +102,7 @@ impl LineError {
     /// The remedy.
     pub fn remedy(&self) -> &'static str {
         match self {
-            LineError::NoSteadyState(_) => "leave the line out, or change its speed",
+            LineError::NoSteadyState(_) => "remove the line, or change its speed",
             LineError::NoRoom { .. } => "lower `surge_margin`, or raise `widest_opening`",
             LineError::SpacingTooWide { .. } => "choose a smaller spacing, or a number of `points`",
             LineError::TooManyPoints { .. } => "choose a wider spacing, or a number of `points`",
@@ -127,8 +126,8 @@ pub fn line_points(
         hold_speed(model, speed_rpm, &BoundaryConditions { valve_opening_ratio, ..*boundary }, follow)
     };
     let choke_end = hold(line.widest_opening_ratio)?;
-    // Flows are compared in the map's reference state, and shown in the requested one.
-    let shown = model.map.reference().flow_factor_to(line.reference);
+    // Compute with flows in the reference state of the map, and show them in the requested one.
+    let display_factor = model.map.reference().flow_factor_to(line.reference);
     let map_speed_rpm = model.map.reference().corrected_speed_rpm(speed_rpm, boundary.t1_k);
     let choke_flow_kg_s = choke_end.outputs.flow_corrected_kg_s;
     // Rounding must not put the last point on the wrong side of a limit of the same margin.
@@ -138,9 +137,9 @@ pub fn line_points(
     if range_kg_s.is_nan() || range_kg_s <= 0.0 {
         return Err(LineError::NoRoom {
             widest_opening_ratio: line.widest_opening_ratio,
-            choke_end_kg_s: choke_flow_kg_s * shown,
+            choke_end_kg_s: choke_flow_kg_s * display_factor,
             surge_margin_ratio: line.surge_margin_ratio,
-            surge_end_kg_s: surge_flow_kg_s * shown,
+            surge_end_kg_s: surge_flow_kg_s * display_factor,
         });
     }
     let intervals: Vec<f64> = match line.spread {
@@ -148,74 +147,83 @@ pub fn line_points(
             let last = count.clamp(2, MAX_POINTS) - 1;
             (1..=last).map(|index| index as f64 / last as f64).collect()
         }
-        Spread::SpacingKgS(spacing_kg_s) => {
-            spaced(spacing_kg_s, choke_flow_kg_s * shown, surge_flow_kg_s * shown)?
-        }
+        Spread::SpacingKgS(spacing_kg_s) => spaced_positions(
+            spacing_kg_s,
+            choke_flow_kg_s * display_factor,
+            surge_flow_kg_s * display_factor,
+        )?,
     };
     let mut points = vec![OperatingPoint { speed_rpm, valve_opening_ratio: line.widest_opening_ratio }];
-    let mut near = choke_end;
+    let mut steady_state = choke_end;
     for share in intervals {
-        near = hold_flow(model, &hold, &near, choke_flow_kg_s - share * range_kg_s)?;
-        points.push(OperatingPoint { speed_rpm, valve_opening_ratio: near.boundary.valve_opening_ratio });
+        steady_state = hold_flow(model, &hold, &steady_state, choke_flow_kg_s - share * range_kg_s)?;
+        points.push(OperatingPoint {
+            speed_rpm,
+            valve_opening_ratio: steady_state.boundary.valve_opening_ratio,
+        });
     }
     Ok(points)
 }
 
-/// Places after the choke end as shares of the line, for a spacing; flows corrected, kg/s.
-fn spaced(spacing_kg_s: f64, choke_end_kg_s: f64, surge_end_kg_s: f64) -> Result<Vec<f64>, LineError> {
+/// Positions on the line after the choke end, for a spacing; corrected flows, kg/s.
+fn spaced_positions(
+    spacing_kg_s: f64,
+    choke_end_kg_s: f64,
+    surge_end_kg_s: f64,
+) -> Result<Vec<f64>, LineError> {
     let range_kg_s = choke_end_kg_s - surge_end_kg_s;
-    // A range that is a whole number of spacings except for rounding counts as whole.
-    let whole = (range_kg_s / spacing_kg_s * (1.0 + 1e-9)).floor();
-    if whole < 1.0 {
+    // Rounding must not reduce a whole number of spacings.
+    let count = (range_kg_s / spacing_kg_s * (1.0 + 1e-9)).floor();
+    if count < 1.0 {
         return Err(LineError::SpacingTooWide { spacing_kg_s, choke_end_kg_s, surge_end_kg_s });
     }
-    let rest_ratio = range_kg_s / spacing_kg_s - whole;
-    let inner = if rest_ratio < 0.5 { whole - 1.0 } else { whole };
+    let remainder_ratio = range_kg_s / spacing_kg_s - count;
+    let inner = if remainder_ratio < 0.5 { count - 1.0 } else { count };
     if inner + 2.0 > MAX_POINTS as f64 {
         return Err(LineError::TooManyPoints { spacing_kg_s, count: inner + 2.0, range_kg_s });
     }
-    let places = (1..=inner as usize).map(|index| index as f64 * spacing_kg_s / range_kg_s);
-    Ok(places.chain([1.0]).collect())
+    let positions = (1..=inner as usize).map(|index| index as f64 * spacing_kg_s / range_kg_s);
+    Ok(positions.chain([1.0]).collect())
 }
 
-/// The steady state with this corrected flow (the map's reference state) at the speed of `near`, from which it starts.
+/// Finds the steady state with this corrected flow (in the reference state of the map), from a steady state at the same speed.
 fn hold_flow(
     model: &Model,
     hold: &impl Fn(f64) -> Result<SteadyState, SteadyError>,
     near: &SteadyState,
     flow_corrected_kg_s: f64,
 ) -> Result<SteadyState, SteadyError> {
-    let mut held = *near;
+    let mut steady_state = *near;
     for _ in 0..MAX_ROUNDS {
-        if (held.outputs.flow_corrected_kg_s / flow_corrected_kg_s - 1.0).abs() < TOLERANCE_RATIO {
+        if (steady_state.outputs.flow_corrected_kg_s / flow_corrected_kg_s - 1.0).abs() < TOLERANCE_RATIO {
             break;
         }
-        let opening = opening_of_flow(model, &held, flow_corrected_kg_s);
+        let opening = opening_of_flow(model, &steady_state, flow_corrected_kg_s);
         let Some(opening) = opening.filter(|opening| opening.is_finite() && *opening > MIN_OPENING_RATIO)
         else {
             return Err(SteadyError::NoFlowBalance {
-                speed_rpm: held.state.shaft_speed_rpm(),
-                valve_opening_ratio: held.boundary.valve_opening_ratio,
+                speed_rpm: steady_state.state.shaft_speed_rpm(),
+                valve_opening_ratio: steady_state.boundary.valve_opening_ratio,
             });
         };
-        held = hold(opening)?;
+        steady_state = hold(opening)?;
     }
-    Ok(held)
+    Ok(steady_state)
 }
 
-/// The opening that passes this flow at the speed and with the housings of `held`; `None` if the line has no such flow.
-fn opening_of_flow(model: &Model, held: &SteadyState, flow_corrected_kg_s: f64) -> Option<f64> {
-    let (prepared, boundary) = (model.prepare(&held.boundary), &held.boundary);
-    let at = |p2_pa: f64| prepared.evaluate(&State { p2_pa, ..held.state });
+/// The opening that passes this flow at the speed and with the housings of `steady_state`; `None` if the line has no such flow.
+fn opening_of_flow(model: &Model, steady_state: &SteadyState, flow_corrected_kg_s: f64) -> Option<f64> {
+    let (prepared, boundary) = (model.prepare(&steady_state.boundary), &steady_state.boundary);
+    let at = |p2_pa: f64| prepared.evaluate(&State { p2_pa, ..steady_state.state });
     let corrected_rpm =
-        model.map.reference().corrected_speed_rpm(held.state.shaft_speed_rpm(), boundary.t1_k);
+        model.map.reference().corrected_speed_rpm(steady_state.state.shaft_speed_rpm(), boundary.t1_k);
     let surge_pressure_ratio = model.map.surge_point(corrected_rpm).1;
     // Far enough beyond the surge line for margins below 0.
     let highest_pa = boundary.p1_pa * (1.0 + 2.0 * (surge_pressure_ratio - 1.0).max(1e-3));
     let excess_kg_s = |p2_pa: f64| at(p2_pa).flow_corrected_kg_s - flow_corrected_kg_s;
     let p2_pa = root_between(boundary.p1_pa, highest_pa, 0.0, excess_kg_s)?;
-    let wanted = at(p2_pa);
-    Some(boundary.valve_opening_ratio * wanted.flow_kg_s / wanted.valve_flow_kg_s)
+    let target = at(p2_pa);
+    Some(boundary.valve_opening_ratio * target.flow_kg_s / target.valve_flow_kg_s)
 }
 
 #[cfg(test)]
@@ -249,14 +257,14 @@ mod tests {
     fn at_rest(point: OperatingPoint) -> (f64, f64) {
         let model = Model::nominal();
         let boundary = BoundaryConditions { valve_opening_ratio: point.valve_opening_ratio, ..boundary() };
-        let held = steady::hold_speed(&model, point.speed_rpm, &boundary).unwrap();
-        let cold = State { tc_k: 300.0, tt_k: 400.0, ..held.state };
+        let steady_state = steady::hold_speed(&model, point.speed_rpm, &boundary).unwrap();
+        let cold = State { tc_k: 300.0, tt_k: 400.0, ..steady_state.state };
         let mut simulator = Simulator::new(&model, 0.0, cold, DEFAULT_RELATIVE_TOLERANCE, Watch::default());
         let mut flow_kg_s = 0.0;
         simulator
             .run_to(
                 10_800.0,
-                &held.boundary,
+                &steady_state.boundary,
                 [10_800.0],
                 |_, _, outputs| flow_kg_s = outputs.flow_kg_s,
                 |_| {},

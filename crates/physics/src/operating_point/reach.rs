@@ -1,6 +1,6 @@
-//! Which operating points can be measured: the definition that campaign, plan and sequence share.
+//! The definition of a reachable operating point that campaign, plan and sequence share.
 //!
-//! **Definition.** A point can be reached if the nominal machine has a steady state there that violates no limit of the
+//! **Definition.** A point can be reached if the nominal machine has a steady state at it that violates no limit of the
 //! campaign. Its surge margin is [`SteadyState::surge_margin_ratio`]; if no minimum is declared, the limit is the
 //! nominal map's surge line.
 
@@ -19,7 +19,7 @@ pub enum Obstacle {
         /// Largest opening, relative to the nominal area.
         highest_ratio: f64,
     },
-    /// The machine has no steady state there.
+    /// The machine has no steady state at the point.
     #[error("cannot be held: {0}")]
     NoSteadyState(#[source] SteadyError),
     /// The shaft turns too fast.
@@ -96,24 +96,22 @@ impl Obstacle {
             Obstacle::Opening { .. } => "choose an opening within the range",
             Obstacle::NoSteadyState(_) => "remove the point, or change speed or opening",
             Obstacle::Speed { .. } => {
-                "choose a lower speed, or raise the limit if the machine allows it; the limits hold for scripts as well"
+                "choose a lower speed, or raise the limit if the machine allows it; the limits apply to scripts too"
             }
             Obstacle::Surge { .. } => "remove the point, or open the valve further",
             Obstacle::SurgeMargin { .. } => {
-                "leave the point out, open the valve further, or lower the limit if the rig allows it"
+                "remove the point, open the valve further, or lower the limit if the rig allows it"
             }
             Obstacle::HighP3 { .. } | Obstacle::LowP3 { .. } => {
-                "leave the point out, change it, or widen the limit if the rig allows it"
+                "remove the point, change it, or widen the limit if the rig allows it"
             }
-            Obstacle::T2 { .. } => {
-                "leave the point out, change it, or raise the limit if the machine allows it"
-            }
+            Obstacle::T2 { .. } => "remove the point, change it, or raise the limit if the machine allows it",
             Obstacle::T3 { .. } => "lower `boundary.turbine_inlet_temperature`, or raise the limit",
         }
     }
 }
 
-/// The steady state of the nominal machine at `point`, whose valve opening replaces that of `boundary`.
+/// Solves the steady state of the nominal machine at `point`, whose valve opening replaces that of `boundary`.
 ///
 /// # Errors
 /// All reasons why the point cannot be reached, at least one.
@@ -135,7 +133,7 @@ pub fn reach(
     let boundary = BoundaryConditions { valve_opening_ratio: point.valve_opening_ratio, ..*boundary };
     match hold_speed(model, point.speed_rpm, &boundary, follow) {
         Ok(steady) => {
-            obstacles.extend(broken_limits(model, &steady, limits));
+            obstacles.extend(find_violations(model, &steady, limits));
             if obstacles.is_empty() { Ok(steady) } else { Err(obstacles) }
         }
         Err(error) => {
@@ -145,30 +143,30 @@ pub fn reach(
     }
 }
 
-fn broken_limits(model: &Model, steady: &SteadyState, limits: &Limits) -> Vec<Obstacle> {
-    let mut broken = Vec::new();
+fn find_violations(model: &Model, steady: &SteadyState, limits: &Limits) -> Vec<Obstacle> {
+    let mut violations = Vec::new();
     let margin_ratio = steady.surge_margin_ratio(model);
     match limits.surge_margin_min_ratio {
         Some(limit_ratio) if margin_ratio < limit_ratio => {
-            broken.push(Obstacle::SurgeMargin { margin_ratio, limit_ratio });
+            violations.push(Obstacle::SurgeMargin { margin_ratio, limit_ratio });
         }
         None if margin_ratio < limits.surge_margin_floor_ratio() => {
-            broken.push(Obstacle::Surge { margin_ratio });
+            violations.push(Obstacle::Surge { margin_ratio });
         }
         _ => {}
     }
     let p3_pa = steady.boundary.p3_pa;
     if p3_pa > limits.p3_max_pa {
-        broken.push(Obstacle::HighP3 { p3_pa, limit_pa: limits.p3_max_pa });
+        violations.push(Obstacle::HighP3 { p3_pa, limit_pa: limits.p3_max_pa });
     } else if p3_pa < limits.p3_min_pa {
-        broken.push(Obstacle::LowP3 { p3_pa, limit_pa: limits.p3_min_pa });
+        violations.push(Obstacle::LowP3 { p3_pa, limit_pa: limits.p3_min_pa });
     }
     let (t2_k, t3_k) = (steady.outputs.t2_k, steady.boundary.t3_k);
     let t2 = limits.t2_max_k.filter(|limit_k| t2_k > *limit_k);
-    broken.extend(t2.map(|limit_k| Obstacle::T2 { t2_k, limit_k }));
+    violations.extend(t2.map(|limit_k| Obstacle::T2 { t2_k, limit_k }));
     let t3 = limits.t3_max_k.filter(|limit_k| t3_k > *limit_k);
-    broken.extend(t3.map(|limit_k| Obstacle::T3 { t3_k, limit_k }));
-    broken
+    violations.extend(t3.map(|limit_k| Obstacle::T3 { t3_k, limit_k }));
+    violations
 }
 
 /// Joins all reasons to one clause that follows the name of a point.

@@ -1,7 +1,7 @@
-//! When an operating point has settled: the definition that plan, sequence and identification share.
+//! The definition of a settled operating point that plan, sequence and identification share.
 //!
 //! **Definition.** A quantity has settled at a time if, from that time to the end of the evaluated segment,
-//! its maximum minus its minimum, minus the spread that its noise alone would have, is at most its band
+//! its maximum minus its minimum, minus the spread caused by its noise, is at most its band
 //! ([`SettleBands`]) times the mean. An operating point has settled when shaft speed, compressor flow and pressure ratio
 //! all have. Values of a model have no noise; recorded ones are condensed to medians over blocks first.
 //!
@@ -17,25 +17,25 @@ const NOISE_SPREAD_SIGMAS: f64 = 5.0;
 /// Distance of the blocks whose second difference measures noise: longer than the correlation of noise.
 const NOISE_LAG_BLOCKS: usize = 4;
 
-/// Number of values, from the last one backwards, that vary together by at most `allowed_ratio` of their mean, once
-/// `noise_spread` (in the values' own unit, >= 0) is subtracted. NaN counts as settled; a series of only NaN never settles.
+/// Number of values, from the last one backwards, whose spread minus `noise_spread` (in the unit of the values, >= 0) is at most
+/// `allowed_ratio` of their mean. NaN counts as settled; a series of only NaN never settles.
 pub fn settled_count(
     backwards: impl IntoIterator<Item = f64>,
     allowed_ratio: f64,
     noise_spread: f64,
 ) -> usize {
-    let (mut low, mut high, mut sum, mut seen) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0);
+    let (mut low, mut high, mut sum, mut valid) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0);
     let mut count = 0;
     for value in backwards {
         if !value.is_nan() {
-            (low, high, sum, seen) = (low.min(value), high.max(value), sum + value, seen + 1.0);
-            if high - low - noise_spread > allowed_ratio * (sum / seen).abs() {
+            (low, high, sum, valid) = (low.min(value), high.max(value), sum + value, valid + 1.0);
+            if high - low - noise_spread > allowed_ratio * (sum / valid).abs() {
                 return count;
             }
         }
         count += 1;
     }
-    if seen > 0.0 { count } else { 0 }
+    if valid > 0.0 { count } else { 0 }
 }
 
 /// Signals of an operating point by their names in messages, each with its band, for values counted backwards.
@@ -52,8 +52,8 @@ pub fn with_bands<T>(
     ]
 }
 
-/// Spread that the noise of recorded `blocks` (medians, in order) alone would have: from their second differences, whose
-/// median ignores real changes of the signal. 0 if there are too few.
+/// Spread caused by the noise of recorded `blocks` (medians, in order), from the median of their second differences, which ignores real
+/// changes of the signal. 0 if there are too few blocks.
 pub fn noise_spread(blocks: &[f64]) -> f64 {
     let lag = NOISE_LAG_BLOCKS;
     let differences = (2 * lag..blocks.len())

@@ -13,33 +13,35 @@ use mapper_core::SpeedResponse;
 /// Relative step of the finite differences: much larger than the tolerance of steady states, much smaller than any curvature.
 const STEP_RATIO: f64 = 1e-3;
 
-/// The response at `speed_rpm` under `boundary`, whose `p3_pa` is ignored. `None` if the machine has no steady state there,
-/// or one that more pressure slows down.
+/// The response at `speed_rpm` under `boundary`, whose `p3_pa` is ignored. `None` if the machine has no steady state,
+/// or if the speed falls with rising P3.
 pub fn speed_response(model: &Model, speed_rpm: f64, boundary: &BoundaryConditions) -> Option<SpeedResponse> {
-    differences(model, speed_rpm, boundary).ok().filter(|response| {
+    differentiate(model, speed_rpm, boundary).ok().filter(|response| {
         [response.rpm_per_pa, response.p3_per_power, response.time_constant_s]
             .iter()
             .all(|value| value.is_finite() && *value > 0.0)
     })
 }
 
-fn differences(
+fn differentiate(
     model: &Model,
     speed_rpm: f64,
     boundary: &BoundaryConditions,
 ) -> Result<SpeedResponse, SteadyError> {
-    let held = hold_speed(model, speed_rpm, boundary)?;
+    let steady_state = hold_speed(model, speed_rpm, boundary)?;
     let faster_rpm = speed_rpm * (1.0 + STEP_RATIO);
-    let p3_pa = held.boundary.p3_pa;
+    let p3_pa = steady_state.boundary.p3_pa;
     let rpm_per_pa =
         (faster_rpm - speed_rpm) / (hold_speed(model, faster_rpm, boundary)?.boundary.p3_pa - p3_pa);
     let power_w = |p3_pa: f64| {
-        let inlet = TurbineInlet::new(&model.params.turbine, &BoundaryConditions { p3_pa, ..held.boundary });
-        inlet.at(held.state.tt_k, held.state.shaft_speed_rad_s).power_w
+        let inlet =
+            TurbineInlet::new(&model.params.turbine, &BoundaryConditions { p3_pa, ..steady_state.boundary });
+        inlet.at(steady_state.state.tt_k, steady_state.state.shaft_speed_rad_s).power_w
     };
     let w_per_pa = (power_w(p3_pa * (1.0 + STEP_RATIO)) - power_w(p3_pa)) / (p3_pa * STEP_RATIO);
     let rad_s_per_pa = rad_s_of_rpm(rpm_per_pa);
-    let shaft_s = model.params.shaft_inertia_kgm2 * held.state.shaft_speed_rad_s * rad_s_per_pa / w_per_pa;
+    let shaft_s =
+        model.params.shaft_inertia_kgm2 * steady_state.state.shaft_speed_rad_s * rad_s_per_pa / w_per_pa;
     Ok(SpeedResponse {
         rpm_per_pa,
         p3_per_power: power_w(p3_pa) / (p3_pa * w_per_pa),
@@ -63,12 +65,13 @@ mod tests {
             model.params.turbine.housing_mass_kg = 1e3;
             let boundary = BoundaryConditions { valve_opening_ratio, ..BoundaryConditions::default() };
             let response = speed_response(&model, speed_rpm, &boundary).unwrap();
-            let held = hold_speed(&model, speed_rpm, &boundary).unwrap();
-            let step_pa = 0.002 * held.boundary.p3_pa;
-            let stepped = BoundaryConditions { p3_pa: held.boundary.p3_pa + step_pa, ..held.boundary };
+            let steady_state = hold_speed(&model, speed_rpm, &boundary).unwrap();
+            let step_pa = 0.002 * steady_state.boundary.p3_pa;
+            let stepped =
+                BoundaryConditions { p3_pa: steady_state.boundary.p3_pa + step_pa, ..steady_state.boundary };
             let shaft_s = response.time_constant_s - NOMINAL_P3_LAG_S;
             let mut simulator =
-                Simulator::new(&model, 0.0, held.state, DEFAULT_RELATIVE_TOLERANCE, Watch::default());
+                Simulator::new(&model, 0.0, steady_state.state, DEFAULT_RELATIVE_TOLERANCE, Watch::default());
             let mut rise_rpm = Vec::new();
             let times = [shaft_s, 20.0 * shaft_s + 5.0];
             simulator

@@ -16,7 +16,7 @@ pub struct BackendPlugin {
     pub name: &'static str,
     /// A one-line description.
     pub summary: &'static str,
-    /// Its constructor.
+    /// Constructor.
     pub make: MakeBackend,
 }
 

@@ -52,11 +52,11 @@ pub enum Submodel {
     CompressorGas,
     /// Probe before the compressor.
     T1Probe,
-    /// Probe behind the compressor.
+    /// Probe after the compressor.
     T2Probe,
     /// Probe in the compressor housing.
     TcProbe,
-    /// Pressure sensor behind the compressor.
+    /// Pressure sensor after the compressor.
     P2Sensor,
     /// Pressure sensor before the compressor.
     P1Sensor,
@@ -64,7 +64,7 @@ pub enum Submodel {
     P3Sensor,
     /// Probe before the turbine.
     T3Probe,
-    /// Pressure sensor behind the turbine.
+    /// Pressure sensor after the turbine.
     P4Sensor,
     /// Probe of the oil's temperature.
     OilProbe,
@@ -77,7 +77,7 @@ pub enum Submodel {
 }
 
 impl Submodel {
-    /// All of them, in the order of the flow.
+    /// All submodels, in the order of the flow.
     pub const ALL: [Submodel; 19] = [
         Submodel::Actuator,
         Submodel::TurbineFlow,
@@ -100,7 +100,7 @@ impl Submodel {
         Submodel::TurbineHousing,
     ];
 
-    /// Its name in files and reports.
+    /// Name in files and reports.
     pub fn name(self) -> &'static str {
         match self {
             Submodel::Actuator => "actuator",
@@ -146,9 +146,9 @@ pub struct EffectParameter {
 /// A row of a table of effects.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EffectInfo {
-    /// Its name: lower case, digits and `_`.
+    /// Name: lower case, digits and `_`.
     pub id: Cow<'static, str>,
-    /// Its display name.
+    /// Display name.
     pub name: Cow<'static, str>,
     /// A one-line description.
     pub description: Cow<'static, str>,
@@ -156,11 +156,11 @@ pub struct EffectInfo {
     pub equation: Cow<'static, str>,
     /// Source of the equation.
     pub source: Cow<'static, str>,
-    /// Its submodel.
+    /// Submodel.
     pub submodel: Submodel,
     /// Submodels in which its gap may also appear: neighbours that share a balance with it.
     pub also_shows_in: Vec<Submodel>,
-    /// Its parameters, at least one.
+    /// Parameters, at least one.
     pub parameters: Vec<EffectParameter>,
 }
 
@@ -234,7 +234,7 @@ impl<'a> NamedValues<'a> {
 /// It changes parameters of the model and of the instruments once, before a run; anything else it
 /// adds as [`Hooks`]. At neutral values it changes nothing.
 pub trait Effect: std::fmt::Debug + Send + Sync {
-    /// Its description.
+    /// Description.
     fn info(&self) -> &EffectInfo;
 
     /// Adds it to a rig.
@@ -245,7 +245,7 @@ pub trait Effect: std::fmt::Debug + Send + Sync {
     fn prepare(&self, values: &NamedValues<'_>, rig: &mut Rig) -> Result<(), EffectError>;
 }
 
-/// Why an effect cannot be added to a rig.
+/// Reason why an effect cannot be added to a rig.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum EffectError {
     /// Too few or too many values.
@@ -269,9 +269,9 @@ pub enum EffectError {
         id: String,
         /// The parameter.
         name: String,
-        /// Its value.
+        /// Value.
         value: f64,
-        /// Its unit.
+        /// Unit.
         unit: String,
         /// Smallest value.
         low: f64,
@@ -305,7 +305,7 @@ pub fn add(rig: &mut Rig, effect: &dyn Effect, values: &[f64]) -> Result<(), Eff
 /// `nominal` with all `effects` at their values.
 ///
 /// # Errors
-/// As [`add`].
+/// Those of [`add`].
 pub fn compose<'a>(
     nominal: &Rig,
     effects: impl IntoIterator<Item = (&'a dyn Effect, &'a [f64])>,

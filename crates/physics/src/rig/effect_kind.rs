@@ -11,7 +11,7 @@ use std::sync::Arc;
 pub struct EffectText {
     /// Name: lower case, digits and `_`.
     pub id: &'static str,
-    /// Its display name, a noun that can be the subject of a sentence.
+    /// Display name, a noun that can be the subject of a sentence.
     pub name: &'static str,
     /// A one-line description.
     pub description: &'static str,
@@ -19,7 +19,7 @@ pub struct EffectText {
     pub equation: &'static str,
     /// Source of the equation.
     pub source: &'static str,
-    /// Its submodel.
+    /// Submodel.
     pub submodel: Submodel,
     /// Submodels in which its gap may also appear: neighbours that share a balance with it.
     pub also_shows_in: &'static [Submodel],
@@ -39,10 +39,10 @@ pub trait EffectNumbers: Sized {
 
 /// An effect whose parameters are the fields of `Self`.
 pub trait EffectKind: EffectNumbers + std::fmt::Debug + Send + Sync + 'static {
-    /// Its description.
+    /// Description.
     const ABOUT: EffectText;
 
-    /// Adds it to a rig. At neutral values nothing changes.
+    /// Adds the effect to a rig. Neutral values change nothing.
     ///
     /// # Errors
     /// [`TooManyExtraStates`] if the rig has no room for its hidden temperatures.

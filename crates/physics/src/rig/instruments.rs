@@ -13,7 +13,7 @@ pub struct ChannelPath {
     pub offset: f64,
     /// Time constant of its first-order lag, s, >= 0; 0 follows at once.
     pub lag_s: f64,
-    /// Share of the way from the gas to its wall that a probe is drawn; 0.
+    /// Conduction of a probe: share of the difference between wall and gas that is added to the gas temperature; 0.
     pub towards_wall_ratio: f64,
     /// Error at [`FULL_FLUX_KG_M2S`] in the channel's unit, proportional to the square of the flow; 0.
     pub with_flow_squared: f64,
@@ -24,7 +24,7 @@ pub struct ChannelPath {
 /// Flow per area of the inlet pipe to which errors that grow with the flow refer, kg/(s m2): 100 m/s of air at 20 degC and 1 atm.
 pub const FULL_FLUX_KG_M2S: f64 = 120.0;
 
-/// What acts on a sensor in addition to its quantity.
+/// Influences on a sensor in addition to its quantity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Surroundings {
     /// Temperature of the wall around the probe, K.

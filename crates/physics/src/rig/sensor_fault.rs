@@ -12,15 +12,15 @@ use std::sync::Arc;
 /// Form of the error of a reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum FaultKind {
-    /// A thermocouple tends from the gas towards its wall: share of the way.
+    /// A thermocouple reads a temperature between gas and wall: share of the difference.
     TowardsWall,
     /// The reading follows with a lag, s. T2 has two in series: a sheath of this diameter, m, as in eqs. 11 and 12, and the element in it.
     Lag,
     /// An error proportional to the reading; for temperatures, to the difference from [`CALIBRATED_AT_K`]. Ratio.
     Gain,
-    /// The same error in every reading, in the channel's unit (K, Pa, kg/s, rpm).
+    /// A constant error of every reading, in the channel's unit (K, Pa, kg/s, rpm).
     Offset,
-    /// Zero at the start of the run, the full size at its end, and proportional to the time between: unit of the channel, but a ratio to the
+    /// A drift from zero at the start of the run to the full size at its end: in the unit of the channel, but a ratio to the
     /// reading for flow and speed.
     Drift,
     /// An error proportional to the square of the flow, in the channel's unit at
@@ -28,7 +28,7 @@ pub enum FaultKind {
     WithFlowSquared,
     /// An error proportional to the opening of the valve, in the channel's unit at opening 1: flow around a tap that changes with it.
     WithValve,
-    /// The reading repeats one value, for longer than noise allows, s.
+    /// The reading repeats one value for longer than noise allows, s.
     Frozen,
 }
 
@@ -44,14 +44,14 @@ pub struct SensorFault {
     pub sigma: f64,
     /// Size in a search by runs of the model; empty if there is none.
     sizes: &'static [Size],
-    /// Which recordings are searched for it by runs of the model.
+    /// Kinds of recordings that are searched for the fault by runs of the model.
     searched_in: SearchedIn,
 }
 
 /// Kind of recording that is searched for a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum SearchedIn {
-    /// Both.
+    /// Both kinds of recordings.
     All,
     /// Only logs without steps: a stand holds the inlet of the turbine constant, and declares its probes.
     Logs,
@@ -109,7 +109,7 @@ const fn on_stands(
     SensorFault { searched_in: SearchedIn::Stands, ..searched(channels, kind, sigma, sizes) }
 }
 
-/// All faults considered.
+/// All sensor faults.
 pub const CATALOGUE: [SensorFault; 60] = {
     use Channel::{CompressorFlow, P1, P2, P3, P4, ShaftSpeed, T1, T2, T3, T4, TOil, Tc, Tt, TurbineFlow};
     use FaultKind::{Drift, Frozen, Gain, Lag, Offset, TowardsWall, WithFlowSquared, WithValve};
@@ -207,15 +207,15 @@ const OF_COMPRESSOR: [Channel; 7] = {
 pub fn additive() -> impl Iterator<Item = &'static SensorFault> {
     use FaultKind::{Drift, Gain, Offset, TowardsWall};
     CATALOGUE.iter().filter(|fault| {
-        // T1 is a reference of every balance: only a model that it drives distinguishes its wall from a gain.
+        // Every balance uses T1 as reference, so only a model with T1 as input distinguishes conduction to the wall from a gain error.
         let additive = matches!(fault.kind, Offset | Gain | Drift)
             || (fault.kind == TowardsWall && fault.channels == [Channel::T2]);
         additive && fault.channels.iter().all(|channel| OF_COMPRESSOR.contains(channel))
     })
 }
 
-/// Error of a reading by a gain error of 1. `rest_pressure_pa`: where an isothermal zero has compared the pressure sensors, so that their
-/// gain errors count from there; 0 without one.
+/// Error of a reading for a gain error of 1. `rest_pressure_pa`: pressure of the isothermal zero, at which gain errors of pressure sensors
+/// vanish; 0 without a zero.
 pub fn gain_error(channel: Channel, reading: f64, rest_pressure_pa: f64) -> f64 {
     match channel {
         Channel::T1 | Channel::T2 | Channel::Tc => reading - CALIBRATED_AT_K,
@@ -224,12 +224,12 @@ pub fn gain_error(channel: Channel, reading: f64, rest_pressure_pa: f64) -> f64 
     }
 }
 
-/// All drifts, of both sides.
+/// All drifts, of compressor and turbine.
 pub fn drifts() -> impl Iterator<Item = &'static SensorFault> {
     CATALOGUE.iter().filter(|fault| fault.kind == FaultKind::Drift)
 }
 
-/// Longest time for which noise lets a channel repeat one value, s; infinite for a channel without noise that is known.
+/// Maximum time for which a noisy channel can repeat one value, s; infinite if the noise of the channel is not known.
 pub fn repeats_s(channel: Channel) -> f64 {
     let frozen = |fault: &&SensorFault| fault.kind == FaultKind::Frozen && fault.channels == [channel];
     CATALOGUE.iter().find(frozen).map_or(f64::INFINITY, |fault| fault.sigma)
@@ -377,7 +377,7 @@ impl Effect for FaultEffect {
         match self.fault.kind {
             FaultKind::Gain => path.gain_ratio *= size,
             FaultKind::Lag => path.lag_s += size,
-            // Its tip has a state of its own, which the stem acts on.
+            // The stem acts on the tip, which has its own state.
             FaultKind::TowardsWall if self.fault.channels[0] == Channel::T2 => {
                 rig.model.params.t2_probe_stem_ratio += size;
             }
@@ -403,8 +403,8 @@ impl fmt::Display for SensorFault {
                 return write!(f, "conduction along the {} probe", self.channel_names());
             }
             FaultKind::WithFlowSquared | FaultKind::WithValve => {
-                let with = if self.kind == FaultKind::WithValve { "valve opening" } else { "flow squared" };
-                return write!(f, "error of {} with {with}", self.channel_names());
+                let cause = if self.kind == FaultKind::WithValve { "valve opening" } else { "flow squared" };
+                return write!(f, "error of {} with {cause}", self.channel_names());
             }
             FaultKind::Frozen => "frozen reading",
         };

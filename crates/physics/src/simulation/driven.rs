@@ -1,7 +1,7 @@
 //! The model driven by recorded inputs on a frozen grid of steps.
 //!
 //! Runs with slightly different parameters share every step, so that their difference is as smooth as the model
-//! itself, which a fit needs and adaptive steps would destroy. The grid is fine after each jump and coarse while only the metal
+//! itself. A fit needs this, and adaptive steps would destroy it. The grid is fine after each jump and coarse while only the metal
 //! changes; each step is one of [Rodas5P](crate::simulation::rosenbrock), which is L-stable, so that the outlet volume (milliseconds)
 //! does not limit it.
 
@@ -20,35 +20,35 @@ const STEPS_S: [(f64, f64); 7] =
     [(0.004, 0.001), (0.02, 0.004), (0.2, 0.02), (3.0, 0.1), (8.0, 0.8), (20.0, 2.0), (f64::INFINITY, 6.0)];
 
 /// Estimated error of a step, relative to the states, above which the grid is too coarse for it: 10 rpm at 100 krpm and 10 Pa at 100 kPa, a
-/// third of the noise of a sample at most. Along the surge line it is exceeded by a hundred times.
+/// third of the noise of a sample at most. Along the surge line the error is a hundred times larger.
 const GRID_TOLERANCE: f64 = 1e-4;
-/// Tolerance on the way to a steady state, of which only the end must be accurate.
+/// Tolerance of the approach to a steady state: only the end must be accurate.
 const ANY_ERROR: f64 = 1e6;
-/// Relative tolerance of the integration where the grid's own steps are too coarse: that of the virtual lab. Maximum number of
-/// its steps: surge cycles last a second, and a hundred steps each.
+/// Relative tolerance of the integration if the steps of the grid are too coarse: that of the virtual lab. Maximum number of
+/// its steps: a surge cycle lasts a second and takes a hundred steps.
 const RESCUE_TOLERANCE: f64 = 1e-5;
 const MAX_RESCUE_STEPS: usize = 10_000;
 
-/// Times between which the integration takes single steps.
+/// Times between which the integration takes one step each.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrozenGrid {
     nodes_s: Vec<f64>,
 }
 
 impl FrozenGrid {
-    /// A grid from `start_s` to `end_s` with nodes at each jump and each of `times_s` within (rising both), and between
-    /// them as fine as the time since the last jump requires. Results are read only at nodes, where the method is
+    /// A grid from `start_s` to `end_s` with nodes at each of `jumps_s` and `times_s` (both rising), and between
+    /// these with the step length for the time since the last jump. Results are read only at nodes, where the method is
     /// stiffly accurate.
     pub fn new(start_s: f64, end_s: f64, jumps_s: &[f64], times_s: &[f64]) -> Self {
-        let mut wanted: Vec<f64> = jumps_s.iter().chain(times_s).copied().collect();
-        wanted.retain(|t| *t > start_s && *t < end_s);
-        wanted.push(end_s);
-        wanted.sort_by(f64::total_cmp);
+        let mut stops_s: Vec<f64> = jumps_s.iter().chain(times_s).copied().collect();
+        stops_s.retain(|t| *t > start_s && *t < end_s);
+        stops_s.push(end_s);
+        stops_s.sort_by(f64::total_cmp);
         let mut nodes_s = vec![start_s];
         let before_start = |jump_s: &f64| *jump_s <= start_s;
         let mut jump_s = jumps_s.iter().copied().filter(before_start).fold(f64::NEG_INFINITY, f64::max);
         let mut at_s = start_s;
-        for until_s in wanted {
+        for until_s in stops_s {
             while until_s - at_s > 1e-9 {
                 let since_s = at_s - jump_s;
                 let limit_s =
@@ -66,7 +66,7 @@ impl FrozenGrid {
         FrozenGrid { nodes_s }
     }
 
-    /// The steps between two of its nodes; none outside its ends.
+    /// The steps between two nodes; none outside the grid.
     pub fn part(&self, from_s: f64, to_s: f64) -> FrozenGrid {
         let inside = |t_s: &&f64| (from_s..=to_s).contains(*t_s);
         FrozenGrid { nodes_s: self.nodes_s.iter().filter(inside).copied().collect() }
@@ -127,7 +127,7 @@ fn drive_within(
 pub fn settle(model: &Model, boundary: &BoundaryConditions, guess: State) -> Result<State, DriveError> {
     // Growing steps: one far longer than every time constant of an L-stable method ends at the steady state. If the guess is
     // beyond the surge line, the first step is too long for the outlet volume: start again from its own milliseconds.
-    let gently = |first_s: f64, growth: f64| {
+    let drive_with_steps = |first_s: f64, growth: f64| {
         let mut nodes_s = vec![0.0];
         let mut step_s = first_s;
         let mut at_s = 0.0;
@@ -138,7 +138,7 @@ pub fn settle(model: &Model, boundary: &BoundaryConditions, guess: State) -> Res
         }
         drive_within(ANY_ERROR, model, boundary, guess, &FrozenGrid { nodes_s }, &[], |_, _, _, _| {})
     };
-    gently(0.02, 1.5).or_else(|_| gently(1e-4, 1.2))
+    drive_with_steps(0.02, 1.5).or_else(|_| drive_with_steps(1e-4, 1.2))
 }
 
 fn run<const N: usize>(
@@ -158,7 +158,7 @@ where
     let mut next = times_s.partition_point(|t| *t < start_s);
     for pair in grid.nodes_s.windows(2) {
         let failed = DriveError { t_s: pair[0] };
-        // Within a step the inputs are those of its own level, also at its end, where the next jump may be.
+        // The step uses its own inputs up to its end, even if the inputs jump there.
         let end_s = pair[1];
         let boundary = inputs.at(pair[0]);
         boundary.check().map_err(|_| failed)?;
@@ -173,14 +173,14 @@ where
         };
         // The speed line has a corner on the surge line, with an infinite slope on one side: short steps across it.
         let surge_before = system.surge_position(&integrator.y);
-        let kept = integrator.clone();
+        let saved = integrator.clone();
         let step = integrator.step_on_grid(&mut system, end_s).ok().filter(|(step, _)| is_physical(&step.y1));
         let step = match step {
             Some((step, error)) if error <= 1.0 && !system.crosses_corner(surge_before, &step.y1) => step,
-            // A step across the corner, one along a steep part of a speed line, and one that fails, deep beyond the surge line.
+            // The step crosses the corner, runs along a steep part of a speed line, or fails far beyond the surge line.
             _ => {
-                integrator = kept;
-                with_error_control(&mut integrator, &mut system, end_s).ok_or(failed)?
+                integrator = saved;
+                step_with_error_control(&mut integrator, &mut system, end_s).ok_or(failed)?
             }
         };
         while let Some(t_s) = times_s.get(next).filter(|t| **t <= end_s) {
@@ -194,7 +194,7 @@ where
 }
 
 /// Integrates to `end_s` with error control; `None` if no physically possible state leads there.
-fn with_error_control<const N: usize>(
+fn step_with_error_control<const N: usize>(
     integrator: &mut Integrator<N>,
     system: &mut DrivenSystem<'_, impl Inputs>,
     end_s: f64,
@@ -239,7 +239,7 @@ impl<I: Inputs> DrivenSystem<'_, I> {
         self.on_map(&State::from_array(y)).surge_position_ratio
     }
 
-    /// Whether a step from this place on the speed line crosses the surge line.
+    /// Whether a step crosses the surge line.
     fn crosses_corner<const N: usize>(&mut self, surge_before: f64, after: &[f64; N]) -> bool {
         (surge_before < 1.0) != (self.surge_position(after) < 1.0)
     }
@@ -259,9 +259,9 @@ impl<I: Inputs> DrivenSystem<'_, I> {
             Some((at, known)) if same(&at) => known,
             Some(_) => self.prepared.on_map(state),
             None => {
-                let asked = self.prepared.on_map(state);
-                self.on_map = Some((*state, asked));
-                asked
+                let point = self.prepared.on_map(state);
+                self.on_map = Some((*state, point));
+                point
             }
         }
     }
@@ -278,8 +278,8 @@ impl<const N: usize, I: Inputs> OdeSystem<N> for DrivenSystem<'_, I> {
 
     fn time_derivative(&mut self, t_s: f64, y: &[f64; N], rates: &[f64; N]) -> Option<[f64; N]> {
         let ahead_s = 1e-6;
-        let moved = self.rates(t_s + ahead_s, y);
-        Some(std::array::from_fn(|i| (moved[i] - rates[i]) / ahead_s))
+        let rates_ahead = self.rates(t_s + ahead_s, y);
+        Some(std::array::from_fn(|i| (rates_ahead[i] - rates[i]) / ahead_s))
     }
 }
 

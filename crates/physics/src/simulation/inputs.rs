@@ -44,7 +44,7 @@ pub struct InterpolatedInputs {
     rows: Vec<BoundaryConditions>,
 }
 
-/// Why a table cannot be interpolated.
+/// Reason why a table cannot be interpolated.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum InputsError {
     /// No rows, or more or fewer rows than times.
@@ -94,16 +94,16 @@ impl Inputs for InterpolatedInputs {
         }
         let (a, b) = (&self.rows[after - 1], &self.rows[after]);
         let share = (t_s - self.t_s[after - 1]) / (self.t_s[after] - self.t_s[after - 1]);
-        let between = |x: f64, y: f64| x + (y - x) * share;
+        let interpolate = |x: f64, y: f64| x + (y - x) * share;
         BoundaryConditions {
-            t1_k: between(a.t1_k, b.t1_k),
-            p1_pa: between(a.p1_pa, b.p1_pa),
-            p3_pa: between(a.p3_pa, b.p3_pa),
-            t3_k: between(a.t3_k, b.t3_k),
-            p4_pa: between(a.p4_pa, b.p4_pa),
-            oil_temperature_k: between(a.oil_temperature_k, b.oil_temperature_k),
-            ambient_temperature_k: between(a.ambient_temperature_k, b.ambient_temperature_k),
-            valve_opening_ratio: between(a.valve_opening_ratio, b.valve_opening_ratio),
+            t1_k: interpolate(a.t1_k, b.t1_k),
+            p1_pa: interpolate(a.p1_pa, b.p1_pa),
+            p3_pa: interpolate(a.p3_pa, b.p3_pa),
+            t3_k: interpolate(a.t3_k, b.t3_k),
+            p4_pa: interpolate(a.p4_pa, b.p4_pa),
+            oil_temperature_k: interpolate(a.oil_temperature_k, b.oil_temperature_k),
+            ambient_temperature_k: interpolate(a.ambient_temperature_k, b.ambient_temperature_k),
+            valve_opening_ratio: interpolate(a.valve_opening_ratio, b.valve_opening_ratio),
         }
     }
 

@@ -80,7 +80,7 @@ impl Model {
         self.prepare_at(f64::NAN, boundary)
     }
 
-    /// The same at a time, s, which is passed to hooks.
+    /// The model under fixed boundary conditions at a time, s, which is passed to hooks.
     #[inline]
     pub fn prepare_at(&self, t_s: f64, boundary: &BoundaryConditions) -> PreparedModel<'_> {
         let reference = self.map.reference();
@@ -131,7 +131,7 @@ impl PreparedModel<'_> {
     /// Like [`PreparedModel::evaluate`], with a known value of the map.
     #[inline]
     pub(crate) fn evaluate_on_map(&self, state: &State, on_map: CharacteristicPoint) -> Outputs {
-        // Two bodies from one text: a model without hooks must not pay for checking them.
+        // Two compiled versions: a model without hooks must not spend time on checks for them.
         if self.model.hooks.is_empty() {
             self.evaluate_with::<false>(state, on_map)
         } else {
@@ -145,8 +145,8 @@ impl PreparedModel<'_> {
         let compressor = &params.compressor;
         let pressure_ratio = state.p2_pa / boundary.p1_pa;
         let flow_corrected_kg_s = on_map.flow_corrected_kg_s;
-        let inner = self.model.has_inner_wall();
-        let wall_k = if inner { state.inner_k } else { state.tc_k };
+        let has_inner_wall = self.model.has_inner_wall();
+        let wall_k = if has_inner_wall { state.inner_k } else { state.tc_k };
         let bearing_k = housing::bearing_k(
             self.bearing_conductance_w_k,
             params.bearing.oil_conductance_w_k,
@@ -272,8 +272,12 @@ impl PreparedModel<'_> {
             } else {
                 housing::radiation_w(params.radiation_area_m2, state.tt_k, state.tc_k)
             },
-            inner_heat_w: if inner { compressor.inner_conductance_w_k * (wall_k - state.tc_k) } else { 0.0 },
-            added: if HOOKED { self.added(&site) } else { HookTerms::default() },
+            inner_heat_w: if has_inner_wall {
+                compressor.inner_conductance_w_k * (wall_k - state.tc_k)
+            } else {
+                0.0
+            },
+            added: if HOOKED { self.sum_hook_terms(&site) } else { HookTerms::default() },
             compressor_external_heat_w: external_heat_w(
                 compressor.external_area_m2,
                 compressor.emissivity_ratio,
@@ -299,12 +303,12 @@ impl PreparedModel<'_> {
         }
     }
 
-    /// Additions of hooks at a site where the gas path is known.
+    /// Sums the terms that hooks add, at a site whose gas path is known.
     #[cold]
-    fn added(&self, site: &Site<'_>) -> HookTerms {
+    fn sum_hook_terms(&self, site: &Site<'_>) -> HookTerms {
         let hooks = &self.model.hooks;
-        let sum = |ask: fn(&dyn Hooks, &Site<'_>) -> f64| {
-            hooks.fold(site, 0.0, |hook, site, sum| sum + ask(hook, site))
+        let sum = |term: fn(&dyn Hooks, &Site<'_>) -> f64| {
+            hooks.fold(site, 0.0, |hook, site, sum| sum + term(hook, site))
         };
         HookTerms {
             compressor_heat_w: sum(|hook, site| hook.heat_to_compressor_w(site)),

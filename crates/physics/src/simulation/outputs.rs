@@ -14,7 +14,7 @@ pub struct Outputs {
     pub pressure_ratio: f64,
     /// Isentropic efficiency, total to total, fraction.
     pub efficiency: f64,
-    /// Place on the speed line: <= 0 choked, 1 on the surge line, > 1 beyond it.
+    /// Position on the speed line: <= 0 choked, 1 on the surge line, > 1 beyond it.
     pub surge_position_ratio: f64,
     /// Heat-transfer coefficient between gas and compressor housing, W/(m2 K).
     pub h_w_m2k: f64,
@@ -30,7 +30,7 @@ pub struct Outputs {
     pub t2_probe_target_k: f64,
     /// Time constant of the T2 probe, s; 0 for an ideal one.
     pub t2_probe_time_constant_s: f64,
-    /// Heat from gas to compressor housing, both places, W.
+    /// Heat from gas to compressor housing, before and after the wheel, W.
     pub compressor_heat_w: f64,
     /// Temperature of the metal that touches the compressor's gas, K.
     pub wall_k: f64,
@@ -69,7 +69,7 @@ pub struct HookTerms {
     pub turbine_heat_w: f64,
     /// Power to the shaft, W.
     pub shaft_power_w: f64,
-    /// Flow to the volume behind the compressor, kg/s.
+    /// Flow to the volume after the compressor, kg/s.
     pub outlet_flow_kg_s: f64,
     /// Rates of the hidden temperatures, K/s.
     pub extra_rates_k_s: [f64; MAX_EXTRA],

@@ -52,7 +52,7 @@ impl<const N: usize> Step<N> {
     }
 }
 
-/// Why an integration could not continue.
+/// Reason why an integration could not continue.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum IntegrationError {
     /// The error control requires ever smaller steps.
@@ -112,10 +112,10 @@ where
         self.steps
     }
 
-    /// Takes one step, at the longest to `end_s` (> `t_s`).
+    /// Takes one step, at most to `end_s` (> `t_s`).
     ///
     /// # Errors
-    /// [`IntegrationError`] if no step of sensible size meets the tolerance.
+    /// [`IntegrationError`] if no step above the minimum size meets the tolerance.
     pub fn step(&mut self, system: &mut impl OdeSystem<N>, end_s: f64) -> Result<Step<N>, IntegrationError> {
         self.steps += 1;
         if self.steps > MAX_STEPS {
@@ -125,37 +125,37 @@ where
         let f0 = system.rates(t0_s, &y0);
         let jacobian = self.jacobian(system, t0_s, &y0, &f0);
         let time_derivative = system.time_derivative(t0_s, &y0, &f0);
-        let left_s = end_s - t0_s;
+        let remaining_s = end_s - t0_s;
         let mut h = if self.next_step_s > 0.0 { self.next_step_s } else { self.first_step_s(&y0, &f0) };
         let mut rejected = false;
         loop {
-            // Two equal steps rather than a long one and a sliver.
-            let ends_here = h >= left_s * (1.0 - 1e-9);
-            let tried_s = if ends_here {
-                left_s
-            } else if h > 0.5 * left_s {
-                0.5 * left_s
+            // Two equal steps instead of a long and a tiny one.
+            let ends_here = h >= remaining_s * (1.0 - 1e-9);
+            let step_s = if ends_here {
+                remaining_s
+            } else if h > 0.5 * remaining_s {
+                0.5 * remaining_s
             } else {
                 h
             };
-            if tried_s <= 1e-14 * t0_s.abs().max(1.0) && !ends_here {
-                return Err(IntegrationError::StepTooSmall { t_s: t0_s, step_s: tried_s });
+            if step_s <= 1e-14 * t0_s.abs().max(1.0) && !ends_here {
+                return Err(IntegrationError::StepTooSmall { t_s: t0_s, step_s });
             }
-            let stages = self.stages(system, &jacobian, &f0, time_derivative.as_ref(), tried_s);
+            let stages = self.stages(system, &jacobian, &f0, time_derivative.as_ref(), step_s);
             let error = stages.as_ref().map_or(f64::INFINITY, |stages| self.error_norm(&y0, stages));
             if let (Some(stages), true) = (stages, error <= 1.0) {
                 // The error estimate is of order 4, so the local error goes with the fifth power of the step.
                 let factor = (0.9 * error.max(1e-10).powf(-0.2)).clamp(0.2, 6.0);
-                let proposed_s = tried_s * if rejected { factor.min(1.0) } else { factor };
-                // A step cut short by `end_s` gives little information on how long it might have been.
-                self.next_step_s = if tried_s < h { proposed_s.max(h) } else { proposed_s };
-                let t1_s = if ends_here { end_s } else { t0_s + tried_s };
+                let proposed_s = step_s * if rejected { factor.min(1.0) } else { factor };
+                // A step limited by `end_s` shows little about the largest possible step.
+                self.next_step_s = if step_s < h { proposed_s.max(h) } else { proposed_s };
+                let t1_s = if ends_here { end_s } else { t0_s + step_s };
                 self.t_s = t1_s;
                 self.y = stages.y1;
                 return Ok(Step { t0_s, t1_s, y0, y1: stages.y1, dense: stages.dense });
             }
             rejected = true;
-            h = tried_s * if error.is_finite() { (0.9 * error.powf(-0.2)).clamp(0.1, 0.9) } else { 0.1 };
+            h = step_s * if error.is_finite() { (0.9 * error.powf(-0.2)).clamp(0.1, 0.9) } else { 0.1 };
             if h < 1e-14 * t0_s.abs().max(1.0) {
                 return Err(IntegrationError::StepTooSmall { t_s: t0_s, step_s: h });
             }
@@ -212,15 +212,15 @@ where
         f: &[f64; N],
     ) -> SMatrix<f64, N, N> {
         let mut jacobian = SMatrix::<f64, N, N>::zeros();
-        let mut moved = *y;
+        let mut shifted = *y;
         for column in 0..N {
-            moved[column] = y[column] + 1.5e-8 * y[column].abs().max(1e-3);
-            let step = moved[column] - y[column];
-            let rates = system.rates(t_s, &moved);
+            shifted[column] = y[column] + 1.5e-8 * y[column].abs().max(1e-3);
+            let step = shifted[column] - y[column];
+            let rates = system.rates(t_s, &shifted);
             for row in 0..N {
                 jacobian[(row, column)] = (rates[row] - f[row]) / step;
             }
-            moved[column] = y[column];
+            shifted[column] = y[column];
         }
         jacobian
     }

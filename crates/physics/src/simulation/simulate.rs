@@ -34,7 +34,7 @@ pub enum Crossing {
     OverspeedLeft,
 }
 
-/// A crossing with its time and the state there.
+/// A crossing with its time and state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModelEvent {
     /// Time, s.
@@ -47,7 +47,7 @@ pub struct ModelEvent {
     pub pressure_ratio: f64,
 }
 
-/// Why a simulation could not continue.
+/// Reason why a simulation could not continue.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum SimulationError {
     /// The boundary conditions are not valid.
@@ -71,18 +71,18 @@ pub struct Simulator {
     crossings: CrossingWatch,
 }
 
-/// An integrator with as many states as the model has: the nominal one does not pay for the others' linear algebra.
+/// An integrator with the number of states of the model, so that the nominal model has no linear algebra for unused states.
 #[derive(Debug, Clone)]
 enum SizedIntegrator {
-    /// Without inner wall and hidden temperatures.
+    /// For a model without inner wall and hidden temperatures.
     Five(Integrator<5>),
-    /// With an inner wall.
+    /// For a model with an inner wall.
     Six(Integrator<6>),
-    /// With hidden temperatures, with or without inner wall.
+    /// For a model with hidden temperatures.
     All(Integrator<MAX_STATES>),
 }
 
-/// The same expression for an integrator of any size.
+/// Evaluates the same expression for an integrator of any size.
 macro_rules! sized {
     ($integrator:expr, $name:ident => $body:expr) => {
         match $integrator {
@@ -150,7 +150,7 @@ impl Simulator {
         sized!(&self.integrator, integrator => integrator.steps())
     }
 
-    /// Continues as a machine with other parameters, e.g. one that fouls. The states of the model must not change, nor
+    /// Continues with other parameters of the machine, e.g. while it fouls. The states of the model must not change, nor
     /// whether it has an inner wall.
     pub fn change_params(&mut self, params: Params) {
         if params != self.model.params {
@@ -327,7 +327,7 @@ impl<const N: usize, I: Inputs> OdeSystem<N> for ModelSystem<'_, I> {
         }
         // A forward difference, because there may be a kink at the start. Inputs are linear or exponential over much longer times.
         let ahead_s = 1e-6;
-        let moved = self.rates(t_s + ahead_s, y);
-        Some(std::array::from_fn(|i| (moved[i] - rates[i]) / ahead_s))
+        let rates_ahead = self.rates(t_s + ahead_s, y);
+        Some(std::array::from_fn(|i| (rates_ahead[i] - rates[i]) / ahead_s))
     }
 }

@@ -1,4 +1,4 @@
-//! The steady state at a given speed, and the turbine pressure that holds it.
+//! The steady state at a given speed, and the turbine inlet pressure that holds the speed.
 
 use crate::machine::params::BoundaryConditions;
 use crate::machine::state::MAX_EXTRA;
@@ -6,7 +6,7 @@ use crate::simulation::model::{BoundaryError, Model, Outputs, State, rad_s_of_rp
 use mapper_numerics::root::root_between;
 use nalgebra::{SMatrix, SVector};
 
-/// Temperatures in equilibrium: both housings, the inner wall, hidden ones.
+/// Unknown temperatures: both housings, the inner wall, and the extra states of effects.
 const HEAT_NODES: usize = 3 + MAX_EXTRA;
 type Temperatures = SVector<f64, HEAT_NODES>;
 
@@ -30,15 +30,15 @@ impl SteadyState {
     }
 }
 
-/// Why no steady state was found.
+/// Reason for a missing steady state.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum SteadyError {
     /// The boundary conditions are not valid.
     #[error(transparent)]
     Boundary(#[from] BoundaryError),
-    /// The valve passes less than the compressor delivers at any pressure, or the other way round.
+    /// The flows of compressor and valve are equal at no pressure.
     #[error(
-        "at {speed_rpm:.0} rpm no outlet pressure makes the compressor deliver what the valve (opening {valve_opening_ratio}) passes"
+        "at {speed_rpm:.0} rpm the flows of compressor and valve (opening {valve_opening_ratio}) are equal at no outlet pressure"
     )]
     NoFlowBalance {
         /// Shaft speed, rpm.
@@ -48,14 +48,14 @@ pub enum SteadyError {
     },
     /// No turbine inlet pressure up to `highest_pa` drives the compressor at this speed.
     #[error(
-        "no turbine inlet pressure between {lowest_pa:.0} and {highest_pa:.0} Pa gives the {power_w:.0} W that {speed_rpm:.0} rpm takes at valve opening {valve_opening_ratio}"
+        "no turbine inlet pressure between {lowest_pa:.0} and {highest_pa:.0} Pa gives the {power_w:.0} W that the compressor needs at {speed_rpm:.0} rpm, valve opening {valve_opening_ratio}"
     )]
     NoPowerBalance {
         /// Shaft speed, rpm.
         speed_rpm: f64,
         /// Valve opening.
         valve_opening_ratio: f64,
-        /// Power that compressor and bearings take, W.
+        /// Power demand of compressor and bearings, W.
         power_w: f64,
         /// Lowest pressure tried, Pa.
         lowest_pa: f64,
@@ -79,9 +79,9 @@ const MAX_EXPANSION_RATIO: f64 = 20.0;
 /// Largest residual heat flow of a housing, W: far below 1e-6 of any shaft power.
 const HEAT_TOLERANCE_W: f64 = 1e-9;
 
-/// The steady state at `speed_rpm` under `boundary`, whose `p3_pa` is ignored and computed.
+/// Finds the steady state at `speed_rpm` under `boundary`. Ignores `p3_pa` and computes it.
 ///
-/// Nested: outlet pressure from flow balance, P3 from power balance, temperatures by Newton's method.
+/// Nested solution: outlet pressure from the flow balance, P3 from the power balance, temperatures by Newton's method.
 ///
 /// # Errors
 /// [`SteadyError`] with the balance that cannot be met.
@@ -102,15 +102,15 @@ pub fn hold_speed(
         let (boundary, state) = steady_gas_path(model, speed_rpm, &boundary, temperatures)?;
         Ok((heat_flows_w(model, &boundary, &state), (boundary, state)))
     };
-    let (at_rest, mut state) = settle(model, &boundary, no_heat_balance, balance)?;
-    let outputs = model.prepare(&at_rest).evaluate(&state);
-    state.t2_tip_k = outputs.t2_probe_target_k;
-    let outputs = model.prepare(&at_rest).evaluate(&state);
-    Ok(SteadyState { boundary: at_rest, state, outputs })
+    let (boundary, mut state) = settle(model, &boundary, no_heat_balance, balance)?;
+    let prepared = model.prepare(&boundary);
+    state.t2_tip_k = prepared.evaluate(&state).t2_probe_target_k;
+    let outputs = prepared.evaluate(&state);
+    Ok(SteadyState { boundary, state, outputs })
 }
 
-/// The housings in equilibrium around a compressor at a known speed and outlet pressure. `p3_pa` is that of `boundary`, or the one that holds the
-/// speed. `None` if there is none.
+/// Finds the equilibrium of the housings at a known speed and outlet pressure. If P3 is not known, it is the pressure that holds the speed.
+/// `None` if there is no equilibrium.
 pub fn settle_housings(
     model: &Model,
     boundary: &BoundaryConditions,
@@ -155,7 +155,7 @@ fn heat_flows_w(model: &Model, boundary: &BoundaryConditions, state: &State) -> 
     ])
 }
 
-/// Newton's method on the temperatures of all nodes; `balance` gives their heat flows and the state that belongs to them.
+/// Solves for the temperatures of all nodes by Newton's method; `balance` gives their heat flows and the result for these temperatures.
 fn settle<T, E>(
     model: &Model,
     boundary: &BoundaryConditions,
@@ -163,47 +163,48 @@ fn settle<T, E>(
     balance: impl Fn(Temperatures) -> Result<(Temperatures, T), E>,
 ) -> Result<T, E> {
     let extra_states = model.hooks.extra_states();
-    let moves = [true, true, model.has_inner_wall(), extra_states > 0, extra_states > 1];
+    let is_free = [true, true, model.has_inner_wall(), extra_states > 0, extra_states > 1];
     let first_k = boundary.t1_k + 30.0;
     let turbine_k = 0.5 * (boundary.t3_k + boundary.ambient_temperature_k);
     let mut temperatures = Temperatures::from([first_k, turbine_k, first_k, first_k, first_k]);
-    let (mut heat_w, mut settled) = balance(temperatures)?;
+    let (mut heat_w, mut result) = balance(temperatures)?;
     for _ in 0..60 {
         if heat_w.amax() < HEAT_TOLERANCE_W {
-            return Ok(settled);
+            return Ok(result);
         }
-        // Forward differences of the balances, which are smooth in the temperatures; constant temperatures stay.
+        // Forward differences of the balances, which are smooth in the temperatures.
         let step_k = 1e-4;
         let mut slopes = SMatrix::<f64, HEAT_NODES, HEAT_NODES>::identity();
-        for node in (0..HEAT_NODES).filter(|node| moves[*node]) {
-            let mut moved = temperatures;
-            moved[node] += step_k;
-            let (by_node, _) = balance(moved)?;
-            slopes.set_column(node, &((by_node - heat_w) / step_k));
+        for node in (0..HEAT_NODES).filter(|node| is_free[*node]) {
+            let mut shifted = temperatures;
+            shifted[node] += step_k;
+            let (shifted_heat_w, _) = balance(shifted)?;
+            slopes.set_column(node, &((shifted_heat_w - heat_w) / step_k));
         }
         let Some(step) = slopes.lu().solve(&-heat_w).filter(|step| step.iter().all(|step| step.is_finite()))
         else {
             return Err(no_heat_balance);
         };
-        let before = (heat_w, temperatures);
-        let mut share = (80.0 / step.amax()).min(1.0);
+        let (old_heat_w, old_temperatures) = (heat_w, temperatures);
+        let mut fraction = (80.0 / step.amax()).min(1.0);
         loop {
-            temperatures = (before.1 + step * share).map(|temperature| temperature.clamp(200.0, 1500.0));
-            (heat_w, settled) = balance(temperatures)?;
-            if heat_w.norm() < before.0.norm() || share < 1e-3 {
+            temperatures =
+                (old_temperatures + step * fraction).map(|temperature| temperature.clamp(200.0, 1500.0));
+            (heat_w, result) = balance(temperatures)?;
+            if heat_w.norm() < old_heat_w.norm() || fraction < 1e-3 {
                 break;
             }
-            share *= 0.5;
+            fraction *= 0.5;
         }
-        if temperatures == before.1 {
+        if temperatures == old_temperatures {
             // The balances are within rounding.
-            return if heat_w.amax() < 1e-6 { Ok(settled) } else { Err(no_heat_balance) };
+            return if heat_w.amax() < 1e-6 { Ok(result) } else { Err(no_heat_balance) };
         }
     }
     Err(no_heat_balance)
 }
 
-/// P2 from flow balance and P3 from power balance, at given speed and housing temperatures.
+/// Solves P2 from the flow balance and P3 from the power balance, at given speed and housing temperatures.
 fn steady_gas_path(
     model: &Model,
     speed_rpm: f64,
@@ -221,7 +222,7 @@ fn steady_gas_path(
     let prepared = model.prepare(&boundary);
     let corrected_rpm = model.map.reference().corrected_speed_rpm(speed_rpm, boundary.t1_k);
     let (_, surge_pr) = model.map.surge_point(corrected_rpm);
-    // Far enough beyond the surge line for the flow to have vanished.
+    // Far enough beyond the surge line that the flow is zero.
     let highest_pa = boundary.p1_pa * (1.0 + 2.0 * (surge_pr - 1.0).max(1e-3));
     let p2_pa = root_between(boundary.p1_pa, highest_pa, 0.0, |p2_pa| {
         let outputs = prepared.evaluate(&at(p2_pa));
@@ -238,11 +239,12 @@ fn steady_gas_path(
     Ok((boundary, state))
 }
 
-/// Power that compressor and bearings take, W.
+/// Power demand of compressor and bearings, W.
 fn shaft_load_w(outputs: &Outputs) -> f64 {
     outputs.compressor_power_w + outputs.friction_power_w - outputs.added.shaft_power_w
 }
 
+/// Range of turbine inlet pressures to search, Pa.
 fn turbine_pressures_pa(boundary: &BoundaryConditions) -> (f64, f64) {
     (boundary.p4_pa * (1.0 + 1e-6), boundary.p4_pa * MAX_EXPANSION_RATIO)
 }
@@ -267,16 +269,17 @@ fn holding_p3_pa(
 /// Range of speeds that [`settle_under`] searches, rpm.
 const SETTLE_SPEEDS_RPM: (f64, f64) = (5_000.0, 400_000.0);
 
-/// The steady state that the machine runs up to from below under `boundary`, its `p3_pa` included.
+/// Finds the steady state that the machine reaches from low speed under `boundary`, `p3_pa` included.
 ///
-/// The lowest speed whose own P3 is the given one, found on a geometric grid of 5 % and refined to rounding.
+/// It is the lowest speed that needs this P3, found on a geometric grid of 5 % and refined to rounding.
 ///
 /// # Errors
 /// [`SteadyError`] if the boundary conditions are not valid or no speed from 5 to 400 krpm balances them.
 pub fn settle_under(model: &Model, boundary: &BoundaryConditions) -> Result<SteadyState, SteadyError> {
     boundary.check()?;
     let excess_pa = |speed_rpm: f64| {
-        hold_speed(model, speed_rpm, boundary).map_or(f64::NAN, |held| held.boundary.p3_pa - boundary.p3_pa)
+        hold_speed(model, speed_rpm, boundary)
+            .map_or(f64::NAN, |steady| steady.boundary.p3_pa - boundary.p3_pa)
     };
     let mut low_rpm = SETTLE_SPEEDS_RPM.0;
     while low_rpm < SETTLE_SPEEDS_RPM.1 {

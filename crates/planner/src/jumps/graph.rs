@@ -10,7 +10,7 @@ use mapper_core::{OperatingPoint, Predicted, SURGE_ALLOWED_S, readable, temperat
 use mapper_physics::simulation::steady::SteadyState;
 use petgraph::graph::DiGraph;
 
-/// Why a jump is not allowed.
+/// Reason why a jump is not allowed.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum Rejection {
     /// The compressor stays beyond the surge line for too long.
@@ -84,7 +84,7 @@ pub struct JumpForecast {
     pub p3_pa: f64,
     /// Change of the turbine inlet pressure, Pa (signed).
     pub p3_change_pa: f64,
-    /// All limits that it violates; empty for an allowed jump.
+    /// All violated limits; empty for an allowed jump.
     pub rejections: Vec<Rejection>,
 }
 
@@ -170,7 +170,7 @@ pub fn explain_jump(
 /// Each edge costs one simulation: use it for tens of points.
 ///
 /// # Errors
-/// As [`explain_jump`].
+/// Those of [`explain_jump`].
 pub fn build_jump_graph(
     request: &PlanRequest<'_>,
 ) -> Result<DiGraph<OperatingPoint, JumpForecast>, PlanError> {

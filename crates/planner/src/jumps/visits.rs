@@ -1,4 +1,4 @@
-//! The visits of a plan: its points in order, the repeats of one jump for drift, the return to the first point, an appended jump.
+//! The visits of a plan: its points in order, repeats of one jump to detect drift, the return to the first point, and an appended jump.
 
 use crate::jumps::graph::forecast_jump;
 use crate::ordering::objective::{FORBIDDEN_PENALTY, Objective};
@@ -7,10 +7,10 @@ use crate::thermal_memory::chain::{Chain, RepeatedJump, return_jump};
 use mapper_core::{Jump, OperatingPoint, Repeats, StepKind};
 use mapper_physics::simulation::steady::SteadyState;
 
-/// Maximum number of jumps that are simulated to find one for repeats.
+/// Maximum number of simulated jumps in the search for a jump to repeat.
 const MAX_SIMULATED_JUMPS: usize = 24;
 
-/// Up to this many points, a repeat may move anywhere in the order if no position near its own is allowed.
+/// In plans of at most this many points, a repeat may move anywhere if no position near its own is allowed.
 const MAX_POINTS_FREE_REPEATS: usize = 200;
 
 /// One visit of a point.
@@ -20,13 +20,13 @@ pub(crate) struct Visit {
     pub(crate) kind: StepKind,
 }
 
-/// Number of repeats among so many points: one at each end, and others in between, at most the requested spacing apart.
+/// Number of repeats in a plan of `points` points: one at each end, and others in between, at most the requested spacing apart.
 pub(crate) fn repeat_count(repeats: Repeats, points: usize) -> usize {
     (points.div_ceil(repeats.every_steps.max(1)) + 1).max(repeats.at_least).min(points.max(1))
 }
 
-/// Lists allowed jumps that suit repeats, best first: a large rise in speed at a middle opening, which moves the housing far and ends
-/// at high speed, where the efficiency is most certain.
+/// Lists allowed jumps for repeats, best first: a large rise in speed at a middle opening changes the housing temperature most, and ends
+/// at high speed, where the efficiency has the smallest error.
 pub(crate) fn propose_repeated_jumps(
     request: &PlanRequest<'_>,
     targets: &[SteadyState],
@@ -36,36 +36,36 @@ pub(crate) fn propose_repeated_jumps(
     openings.sort_by(f64::total_cmp);
     let Some(&middle) = openings.get(openings.len() / 2) else { return Ok(Vec::new()) };
     // Jumps at one opening, from the slowest point. If no opening has two speeds, jumps between openings.
-    let mut found: Vec<(usize, usize)> = Vec::new();
+    let mut jumps: Vec<(usize, usize)> = Vec::new();
     openings.dedup();
     for opening in &openings {
-        let of_opening = |i: &usize| points[*i].valve_opening_ratio == *opening;
-        found.extend(jumps_from_slowest(points, (0..points.len()).filter(of_opening).collect()));
+        let has_opening = |i: &usize| points[*i].valve_opening_ratio == *opening;
+        jumps.extend(jumps_from_slowest(points, (0..points.len()).filter(has_opening).collect()));
     }
-    if found.is_empty() {
-        found = jumps_from_slowest(points, (0..points.len()).collect());
+    if jumps.is_empty() {
+        jumps = jumps_from_slowest(points, (0..points.len()).collect());
     }
     let off_middle = |i: usize| (points[i].valve_opening_ratio - middle).abs();
-    found.sort_by(|a, b| {
+    jumps.sort_by(|a, b| {
         let by_opening = off_middle(a.1).total_cmp(&off_middle(b.1));
         by_opening.then(points[b.1].speed_rpm.total_cmp(&points[a.1].speed_rpm)).then(a.cmp(b))
     });
     let mut allowed = Vec::new();
-    for (from, to) in found.into_iter().take(MAX_SIMULATED_JUMPS) {
-        let made = forecast_jump(request, (points[from], &targets[from]), (points[to], &targets[to]))?;
-        if made.rejections.is_empty() {
-            allowed.push(Jump { from: made.from, to: made.to });
+    for (from, to) in jumps.into_iter().take(MAX_SIMULATED_JUMPS) {
+        let jump = forecast_jump(request, (points[from], &targets[from]), (points[to], &targets[to]))?;
+        if jump.rejections.is_empty() {
+            allowed.push(Jump { from: jump.from, to: jump.to });
         }
     }
     Ok(allowed)
 }
 
 /// Lists the jumps from the slowest of some points to each faster one.
-fn jumps_from_slowest(points: &[OperatingPoint], of: Vec<usize>) -> Vec<(usize, usize)> {
+fn jumps_from_slowest(points: &[OperatingPoint], selected: Vec<usize>) -> Vec<(usize, usize)> {
     let by_speed = |a: &usize, b: &usize| points[*a].speed_rpm.total_cmp(&points[*b].speed_rpm);
-    let Some(slowest) = of.iter().copied().min_by(by_speed) else { return Vec::new() };
+    let Some(slowest) = selected.iter().copied().min_by(by_speed) else { return Vec::new() };
     let faster = |to: &usize| points[*to].speed_rpm > points[slowest].speed_rpm;
-    of.into_iter().filter(faster).map(|to| (slowest, to)).collect()
+    selected.into_iter().filter(faster).map(|to| (slowest, to)).collect()
 }
 
 /// The visits of an order without repeats.
@@ -75,8 +75,8 @@ pub(crate) fn visits_of_points(order: &[usize]) -> Vec<Visit> {
 
 /// Inserts the repeats of a jump into an order.
 ///
-/// Each repeat may move by a quarter of the spacing to a position where it adds one step instead of two, because the order visits its
-/// start anyway. Among equal positions, the one that costs the points the least gradient wins.
+/// Each repeat may move by a quarter of the spacing to a position where the order visits the start of the jump anyway, so that the repeat
+/// adds one step instead of two. Among equal positions, the one with the smallest loss of gradient at the points wins.
 pub(crate) fn insert_repeats<C: Chain>(
     chain: &C,
     order: &[usize],
@@ -89,11 +89,11 @@ pub(crate) fn insert_repeats<C: Chain>(
     let slack = (spacing / 4.0).floor() as usize;
     let mut inserted = 0;
     for repeat in 0..count {
-        // Position in points of the order, behind at least one step.
+        // Position as a number of points, at least one.
         let ideal = ((repeat as f64 * spacing).round() as usize).clamp(1, points);
         let before = value(chain, &visits, objective);
         let best_of = |places: std::ops::RangeInclusive<usize>| {
-            // Not between the two ends of another repeat.
+            // Exclude positions between the two steps of another repeat.
             let free =
                 |place: &usize| visits.get(place + inserted).is_none_or(|next| next.kind == StepKind::Point);
             places
@@ -102,17 +102,17 @@ pub(crate) fn insert_repeats<C: Chain>(
                     let at = place + inserted;
                     let trial = insert_repeat(&visits, at, jump);
                     let value = value(chain, &trial, objective);
-                    // Allowed positions first, then fewer steps.
+                    // Prefer allowed positions, then fewer steps.
                     let is_forbidden = value < before - 0.5 * FORBIDDEN_PENALTY;
                     ((is_forbidden, trial.len()), -value, place.abs_diff(ideal), trial)
                 })
                 .min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)))
         };
-        let near = best_of(ideal.saturating_sub(slack).max(1)..=(ideal + slack).min(points));
-        let best = match near {
+        let nearby = best_of(ideal.saturating_sub(slack).max(1)..=(ideal + slack).min(points));
+        let best = match nearby {
             // A distant position is better than a forbidden one.
             Some(((true, _), ..)) if points <= MAX_POINTS_FREE_REPEATS => best_of(1..=points),
-            near => near,
+            nearby => nearby,
         };
         if let Some((.., trial)) = best {
             inserted += trial.len() - visits.len();

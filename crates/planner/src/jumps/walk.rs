@@ -1,4 +1,4 @@
-//! Simulates the steps of an order one after the other, with the full model.
+//! Simulates the steps of an order with the full model.
 
 use crate::jumps::graph::find_rejections;
 use crate::jumps::visits::Visit;
@@ -10,11 +10,11 @@ use mapper_physics::simulation::model::State;
 use mapper_physics::simulation::steady::SteadyState;
 
 /// Drift of T2 and of the housing below which conventional mapping takes its reading, K/min: a fifth of the 0.5 K/min allowed for a
-/// settled point (`steady`), because noise lets some readings pass too early (`campaigns/stabilised.rhai`).
+/// settled point (`steady`), because with noise some readings pass too early (`campaigns/stabilised.rhai`).
 pub const STABLE_DRIFT_K_MIN: f64 = 0.1;
 /// Interval over which conventional mapping measures the drift, s.
 const DRIFT_INTERVAL_S: f64 = 10.0;
-/// Maximum wait of conventional mapping at a point, s: an hour, four times the longest that Burke et al. state.
+/// Maximum wait of conventional mapping at a point, s: an hour, four times the longest wait in Burke et al.
 const MAX_WAIT_S: f64 = 3600.0;
 
 /// A forbidden jump of an order, with the violated limits.
@@ -56,16 +56,18 @@ pub(crate) fn walk(
             _ => dwell_s,
         };
         let Forecast { predicted, end, rows: of_step, .. } = {
-            let made = forecast(request, state, &target.boundary, dwell_s, now.is_some()).map_err(fail)?;
+            let step_forecast =
+                forecast(request, state, &target.boundary, dwell_s, now.is_some()).map_err(fail)?;
             if let Some((_, from)) = now {
                 let p3_change_pa = target.boundary.p3_pa - targets[from].boundary.p3_pa;
-                let reasons = find_rejections(request, &made, p3_change_pa, target.boundary.t3_k, dwell_s);
+                let reasons =
+                    find_rejections(request, &step_forecast, p3_change_pa, target.boundary.t3_k, dwell_s);
                 if !reasons.is_empty() {
                     let reasons = reasons.iter().map(ToString::to_string).collect::<Vec<_>>().join(", and ");
                     forbidden.push(ForbiddenJump { from, to: visit.index, reasons });
                 }
             }
-            made
+            step_forecast
         };
         steps.push(PlanStep {
             index: steps.len(),

@@ -11,7 +11,7 @@ use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
 
 const MAX_SUCCESSORS: usize = 10;
-/// Above this many points there are no candidates, because the table of weights grows with the square.
+/// Maximum number of points with candidates: the table of weights grows with its square.
 pub(crate) const MAX_POINTS: usize = 4000;
 /// Lower limit of a weight: the assignment needs finite weights for forbidden jumps.
 const MIN_VALUE: f64 = -1e9;
@@ -38,10 +38,9 @@ impl Candidates {
                 objective.value(chain, from, to, chain.step(from, to, state).0).max(MIN_VALUE)
             }));
         }
-        let sizes: Vec<f64> = weight.iter().copied().filter(|weight| *weight > 0.5 * MIN_VALUE).collect();
-        let size = |share| nearest_rank(&sizes, share).unwrap_or(0.0);
-        let (smallest, largest) = (size(0.02), size(0.98));
-        let spread = (largest - smallest).max(1e-9);
+        let finite: Vec<f64> = weight.iter().copied().filter(|weight| *weight > 0.5 * MIN_VALUE).collect();
+        let quantile = |share| nearest_rank(&finite, share).unwrap_or(0.0);
+        let spread = (quantile(0.98) - quantile(0.02)).max(1e-9);
         let prices = run_auction(n, &weight, (0.2 * spread, 2e-3 * spread));
         for (i, &from) in given.iter().enumerate() {
             let mut rated: Vec<(f64, usize)> = (0..n)

@@ -134,7 +134,7 @@ impl<C: Chain> BranchAndBound<'_, C> {
     /// Upper bound on the figure of any completion of this partial order.
     fn bound_remaining(&self, last: usize, partial_k: f64) -> f64 {
         let remaining = || (0..self.points.len()).filter(|place| !self.used[*place]);
-        let into = |to: usize| {
+        let bound_into = |to: usize| {
             let inner =
                 remaining().filter(|from| *from != to).map(|from| self.gradient_bounds.weight_k(from, to));
             inner.fold(self.gradient_bounds.weight_k(last, to), f64::max)
@@ -145,9 +145,9 @@ impl<C: Chain> BranchAndBound<'_, C> {
         match self.figure {
             // The smaller of two bounds for each point: reached from the remaining points, or from any point.
             Figure::Sum => {
-                partial_k + reached().map(|to| into(to).min(self.max_gradient_into_k[to])).sum::<f64>()
+                partial_k + reached().map(|to| bound_into(to).min(self.max_gradient_into_k[to])).sum::<f64>()
             }
-            Figure::Minimum => reached().map(into).fold(partial_k, f64::min),
+            Figure::Minimum => reached().map(bound_into).fold(partial_k, f64::min),
         }
     }
 }
@@ -209,7 +209,7 @@ mod tests {
             let given: Vec<usize> = (0..n).collect();
             let found = search(&chain, &given, Objective::Sum, Effort { moves: 20_000, starts: 2 }, 7).swap_remove(0);
             prop_assert!((Objective::Sum.figure(&chain, &found) - best).abs() < 1e-9);
-                        // The same with the return to the first point.
+                        // Include the return to the first point.
             chain.has_return = true;
             let best = best_of_all(&chain, &mut Vec::new());
             let found = search(&chain, &given, Objective::Sum, Effort { moves: 20_000, starts: 2 }, 7).swap_remove(0);

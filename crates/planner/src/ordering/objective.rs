@@ -26,8 +26,8 @@ impl Objective {
         let value = match self {
             Objective::Sum => size_k,
             Objective::Minimum { target_k } => {
-                let missing_k = (target_k - size_k).max(0.0);
-                -missing_k * missing_k
+                let shortfall_k = (target_k - size_k).max(0.0);
+                -shortfall_k * shortfall_k
             }
         };
         if size_k > chain.gradient_max_k() || !chain.admissible(from, to) {

@@ -1,4 +1,4 @@
-//! Orders a set of points as the request demands.
+//! Orders a set of points by the criterion of the request.
 
 use crate::ordering::exact::{Figure, branch_and_bound};
 use crate::ordering::objective::Objective;
@@ -10,9 +10,9 @@ use mapper_core::{OperatingPoint, VisitOrder};
 
 /// Repeats are inserted so that gradients stay above this, K, if possible.
 const REPEATS_KEEP_K: f64 = 30.0;
-/// An order is proven to be the best if no other is better by more than this.
+/// An order is proven to be the best if no other order is better by more than this.
 pub(crate) const PROOF_TOLERANCE_RATIO: f64 = 1e-3;
-/// Up to this many points a proof is attempted: for more it rarely ends within [`PROOF_NODES`].
+/// Maximum number of points for a proof: with more points it rarely ends within [`PROOF_NODES`].
 const MAX_PROVEN_POINTS: usize = 14;
 /// Maximum number of partial orders of a proof: a fraction of a second.
 const PROOF_NODES: u64 = 300_000;
@@ -20,7 +20,7 @@ const PROOF_NODES: u64 = 300_000;
 #[derive(Debug, Clone)]
 pub(crate) struct PointOrder {
     pub(crate) order: Vec<usize>,
-    /// Whether it is proven to be the best within [`PROOF_TOLERANCE_RATIO`] on the reduced housing.
+    /// Whether the order is proven to be the best within [`PROOF_TOLERANCE_RATIO`] on the reduced housing.
     pub(crate) proven: bool,
 }
 
@@ -30,8 +30,8 @@ impl PointOrder {
     }
 }
 
-/// Along speed lines: by speed, on each line from the widest opening to the narrowest.
-pub(crate) fn by_speed_line(a: &OperatingPoint, b: &OperatingPoint) -> std::cmp::Ordering {
+/// Order along speed lines: by speed, and on each line from the widest opening to the narrowest.
+pub(crate) fn compare_along_speed_lines(a: &OperatingPoint, b: &OperatingPoint) -> std::cmp::Ordering {
     let by_opening = b.valve_opening_ratio.total_cmp(&a.valve_opening_ratio);
     a.speed_rpm.total_cmp(&b.speed_rpm).then(by_opening)
 }
@@ -56,7 +56,7 @@ pub(crate) fn search_orders(
         VisitOrder::Listed => return vec![PointOrder::unproven(given.to_vec())],
         VisitOrder::SpeedLines | VisitOrder::Conventional => {
             let mut order = given.to_vec();
-            order.sort_by(|a, b| by_speed_line(&points[*a], &points[*b]));
+            order.sort_by(|a, b| compare_along_speed_lines(&points[*a], &points[*b]));
             return vec![PointOrder::unproven(order)];
         }
         VisitOrder::ThermalGradient => {

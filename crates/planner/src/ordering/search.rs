@@ -1,4 +1,4 @@
-//! Searches a good order under thermal memory: simulated annealing with restarts, seeded, with a limited number of moves.
+//! Searches for a good order under thermal memory: simulated annealing with restarts, seeded, with a limited number of moves.
 //!
 //! A move swaps two points, reverses a short piece, or moves a piece elsewhere. Half of the moves are random; the others create a jump
 //! that the assignment of successors (`candidates`) favours. The effect of a move is computed from the first changed step until the
@@ -35,7 +35,7 @@ pub struct Effort {
 }
 
 impl Effort {
-    /// A fraction of a second for 50 points, some seconds for 2000. `factor` scales the moves: ten times as many increase the sum by
+    /// Usual effort: a fraction of a second for 50 points, some seconds for 2000. `factor` scales the moves: ten times as many increase the sum by
     /// less than 0.3 % (docs/explanation/planner.md).
     pub fn usual(points: usize, factor: f64) -> Self {
         let (moves, starts) = match points {
@@ -49,7 +49,7 @@ impl Effort {
     }
 }
 
-/// Returns the best order of each start, the best of them first. None is worse than `given`.
+/// Returns the best order of each start, in order of value. No order is worse than `given`.
 pub fn search<C: Chain + Sync>(
     chain: &C,
     given: &[usize],
@@ -73,7 +73,7 @@ fn search_among<C: Chain + Sync>(
     }
     let greedy = build_greedy_order(chain, given, objective);
     let starts: Vec<u64> = (0..effort.starts.max(1)).collect();
-    let one = |start: &u64| {
+    let run_from = |start: &u64| {
         let mut random = Pcg64Mcg::seed_from_u64(seed.wrapping_mul(SEED_STRIDE).wrapping_add(*start));
         let mut best = given.to_vec();
         let mut best_figure = objective.figure(chain, &best);
@@ -85,12 +85,12 @@ fn search_among<C: Chain + Sync>(
         );
         (best_figure, best)
     };
-    let mut found = parallel::map(&starts, one);
+    let mut found = parallel::map(&starts, run_from);
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     found.into_iter().map(|(_, order)| order).collect()
 }
 
-/// Searches the order with the largest minimum gradient. The target rises while it is met.
+/// Searches for the order with the largest minimum gradient. The target rises as long as it is reached.
 pub fn search_min_gradient<C: Chain + Sync>(
     chain: &C,
     given: &[usize],
@@ -103,7 +103,7 @@ pub fn search_min_gradient<C: Chain + Sync>(
     let mean_k = mean_k.min(chain.gradient_max_k());
     let candidates = Candidates::new(chain, given, Objective::Minimum { target_k: mean_k });
     let (mut best_k, mut rise_k) = (min_k(&order), mean_k);
-    // Many points need more moves to agree on the smallest gradient than on their sum.
+    // With many points, the smallest gradient needs more moves than the sum.
     let times = if given.len() > MANY_POINTS { 2 } else { 1 } * effort.starts.max(1);
     let each = Effort { moves: effort.moves.saturating_mul(times) / TARGET_ROUNDS, starts: 1 };
     for round in 0..TARGET_ROUNDS {
@@ -134,10 +134,10 @@ pub(crate) fn build_greedy_order<C: Chain>(chain: &C, given: &[usize], objective
             (Some(state), Some(&from)) => {
                 let value = |to: usize| objective.value(chain, from, to, chain.step(from, to, state).0);
                 let mut best = (0, f64::NEG_INFINITY);
-                for (place, &to) in remaining.iter().enumerate() {
+                for (index, &to) in remaining.iter().enumerate() {
                     let value = value(to);
                     if value > best.1 {
-                        best = (place, value);
+                        best = (index, value);
                     }
                 }
                 best.0
@@ -177,10 +177,10 @@ struct Annealing<'a, C: Chain> {
     order: Vec<usize>,
     /// Position of each point of the chain in the order; undefined for other points.
     position_of: Vec<usize>,
-    /// State before each position's step and its value. Position 0 has no state; the entry behind the last position holds the final
+    /// State before each position's step and its value. Position 0 has no state; the entry after the last position holds the final
     /// state and the value of the return jump.
     step_states: Vec<StepState<C::State>>,
-    /// The proposed order from position `begin` on; the points behind the pieces keep their order.
+    /// The proposed order from position `begin` on; the points after the pieces keep their order.
     pieces: Vec<Piece>,
     begin: usize,
     /// Changed steps of the proposal, by new position.
@@ -256,8 +256,8 @@ impl<'a, C: Chain> Annealing<'a, C> {
         let mut from = self.begin.checked_sub(1).map(|p| self.order[p]);
         let mut position = self.begin;
         let rest = self.pieces.iter().map(|piece| piece.end).max().unwrap_or(n);
-        for which in 0..=self.pieces.len() {
-            let piece = self.pieces.get(which).copied().unwrap_or_else(|| forward_piece(rest, n));
+        for index in 0..=self.pieces.len() {
+            let piece = self.pieces.get(index).copied().unwrap_or_else(|| forward_piece(rest, n));
             let mut done = 0;
             while done < piece.end - piece.start {
                 let k = if piece.reversed { piece.end - 1 - done } else { piece.start + done };
@@ -292,9 +292,9 @@ impl<'a, C: Chain> Annealing<'a, C> {
             }
             _ => self.order[0],
         };
-        let back = self.return_jump(from.map(|last| (first, last)), state);
-        gain += back - self.step_states[n].1;
-        self.log.push((n, (state, back)));
+        let return_value = self.return_jump(from.map(|last| (first, last)), state);
+        gain += return_value - self.step_states[n].1;
+        self.log.push((n, (state, return_value)));
         gain
     }
 
@@ -376,11 +376,11 @@ impl<'a, C: Chain> Annealing<'a, C> {
             }
             _ => {
                 let end = (i + random.random_range(1..=3usize)).min(n);
-                let reach = MAX_PIECE_LENGTH.min(n);
+                let max_distance = MAX_PIECE_LENGTH.min(n);
                 let to = if random.random::<bool>() {
                     random.random_range(0..=n)
                 } else {
-                    (i + random.random_range(0..=2 * reach)).saturating_sub(reach).min(n)
+                    (i + random.random_range(0..=2 * max_distance)).saturating_sub(max_distance).min(n)
                 };
                 if !(i..=end).contains(&to) {
                     self.propose_shift(i, end, to, kind.is_multiple_of(4));
@@ -404,12 +404,12 @@ impl<'a, C: Chain> Annealing<'a, C> {
         };
         match kind % 3 {
             0 if i + 1 < n => self.propose_swap(i + 1, q),
-            // Move the piece that begins with the candidate behind this point.
+            // Move the piece that begins with the candidate to the position after this point.
             1 => {
                 let end = (q + length).min(if q < i { i } else { n });
                 self.propose_shift(q, end, i + 1, false);
             }
-            // Move the piece that ends with this point before the candidate.
+            // Move the piece that ends with this point to the position before the candidate.
             _ => {
                 let start = (i + 1).saturating_sub(length).max(if q < i { q + 1 } else { 0 });
                 self.propose_shift(start, i + 1, q, false);

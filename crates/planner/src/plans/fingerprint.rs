@@ -1,4 +1,4 @@
-//! Hashes of the inputs of a plan, so that a run can tell whether campaign or model have changed since.
+//! Hashes of the inputs of a plan, so that a run can detect a changed campaign or model.
 
 use crate::request::PlanRequest;
 use mapper_core::PlanInputHashes;
@@ -16,7 +16,7 @@ pub fn sha256_hex(text: &str) -> String {
 
 /// Hashes the campaign and the nominal machine of `request`.
 pub fn hash_inputs(request: &PlanRequest<'_>) -> PlanInputHashes {
-    // Debug prints every parameter with all its digits.
+    // `Debug` prints every parameter with all digits.
     let model = format!("{:?} {}", request.model.params, request.model.map.fingerprint());
     PlanInputHashes {
         campaign_sha256: sha256_hex(request.campaign_canonical),

@@ -8,13 +8,13 @@ use crate::targets::solve_steady_states;
 use mapper_core::{Dwell, Jump, Plan, PlanRemark, Repeats, WindowRule};
 use mapper_physics::simulation::steady::SteadyState;
 
-/// Jumps tried for repeats if the request names none; each needs a complete search.
+/// Maximum number of jumps tried for repeats if the request gives none; each needs a complete search.
 const MAX_REPEATED_JUMPS_TRIED: usize = 3;
 /// Minimum dwell, s: a window begins no earlier than [`WindowRule::EARLIEST_S`] and lasts at least as long.
 const MIN_DWELL_S: f64 = 2.0 * WindowRule::EARLIEST_S;
 /// Maximum dwell, s: at five minutes a point, conventional mapping is as fast (Burke et al.: 5 to 15 minutes a point).
 const MAX_DWELL_S: f64 = 300.0;
-/// Dwell with which the search for the required dwell begins, s: about one time constant of the housing.
+/// First dwell in the search for the required dwell, s: about one time constant of the housing.
 const FIRST_DWELL_S: f64 = 40.0;
 /// Maximum number of forecasts in the search for the required dwell: the power law between the last two needs four to six of them for a
 /// resolution of one second.
@@ -29,8 +29,8 @@ pub fn make_plan(request: &PlanRequest<'_>) -> Result<Plan, PlanError> {
         return Err(PlanError::NoPoints);
     }
     let targets = solve_steady_states(request, request.points)?;
-    let made = plan_with_repeats(request, &targets);
-    let (true, Err(PlanError::NoAdmissibleOrder(_))) = (request.return_to_first, &made) else { return made };
+    let plan = plan_with_repeats(request, &targets);
+    let (true, Err(PlanError::NoAdmissibleOrder(_))) = (request.return_to_first, &plan) else { return plan };
     // Only the return may be forbidden. It is a default, not a request, so the plan is made without it.
     let mut plan = plan_with_repeats(&PlanRequest { return_to_first: false, ..request.clone() }, &targets)?;
     plan.remarks.push(PlanRemark::NoWayBack);
@@ -48,7 +48,7 @@ fn plan_with_repeats(request: &PlanRequest<'_>, targets: &[SteadyState]) -> Resu
         match plan_with_jump(request, targets, Some((repeats, jump))) {
             // The jump may be allowed from a steady state, but not from the housing temperatures of the plan: try the next one.
             Err(error @ PlanError::NoAdmissibleOrder(_)) => no_order = Some(error),
-            made => return made,
+            result => return result,
         }
     }
     let mut plan = plan_with_jump(request, targets, None).map_err(|error| no_order.unwrap_or(error))?;

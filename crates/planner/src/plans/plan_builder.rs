@@ -18,8 +18,9 @@ use mapper_core::{
     VisitOrder,
 };
 use mapper_physics::simulation::steady::SteadyState;
+use std::borrow::Cow;
 
-/// Maximum number of searches: each forbids the jumps that the full simulation rejected in the order before.
+/// Maximum number of searches: each forbids the jumps that the full simulation rejected in the previous order.
 const MAX_REORDERINGS: usize = 25;
 /// Effort of a repeated search relative to the first: with one jump forbidden, the best order changes little.
 const REORDER_EFFORT_RATIO: f64 = 0.2;
@@ -35,7 +36,7 @@ pub fn max_steps(request: &PlanRequest<'_>) -> usize {
 /// Builds plans of the same points for any dwell.
 pub(crate) struct PlanBuilder<'a> {
     request: &'a PlanRequest<'a>,
-    /// The request's points, then those that are visited only by repeats and the appended jump.
+    /// The points of the request, then those of repeats and of the appended jump only.
     points: Vec<OperatingPoint>,
     targets: Vec<SteadyState>,
     repeated: Option<RepeatedJump>,
@@ -44,7 +45,7 @@ pub(crate) struct PlanBuilder<'a> {
 
 /// An order of the points with its simulated steps.
 pub(crate) struct Draft {
-    /// Dwell of each step, s; in conventional mapping the minimum.
+    /// Dwell of each step, s; the minimum dwell in conventional mapping.
     pub(crate) dwell_s: f64,
     ordered: PointOrder,
     visits: Vec<Visit>,
@@ -144,7 +145,6 @@ impl<'a> PlanBuilder<'a> {
             let (visits, returned) = self.visits(housing, &ordered.order);
             (value(housing, &visits, objective), (ordered, visits, returned))
         });
-        // The first of equal ones.
         let better = |best: (f64, _), other: (f64, _)| if other.0 > best.0 { other } else { best };
         with_visits.reduce(better).map(|(_, best)| best)
     }
@@ -207,13 +207,9 @@ impl<'a> PlanBuilder<'a> {
         if !request.order.is_searched() || request.appended.is_some() {
             return Ok(None);
         }
-        let made;
         let housing = match &draft.housing {
-            Some(housing) => housing,
-            None => {
-                made = Housing::new(request, &self.points, &self.targets, draft.dwell_s)?;
-                &made
-            }
+            Some(housing) => Cow::Borrowed(housing),
+            None => Cow::Owned(Housing::new(request, &self.points, &self.targets, draft.dwell_s)?),
         };
         let mut nodes: Vec<usize> = draft.ordered.order.clone();
         let has_return = draft.visits.iter().any(|visit| visit.kind == StepKind::Return);
@@ -230,20 +226,20 @@ impl<'a> PlanBuilder<'a> {
             to: place(jump.to),
             count: jump.count,
         });
-        let Some(gradient_bounds) = GradientBounds::new(housing, &nodes) else { return Ok(None) };
+        let Some(gradient_bounds) = GradientBounds::new(&housing, &nodes) else { return Ok(None) };
         let order: Vec<usize> = draft.visits.iter().map(|visit| visit.index).collect();
-        let reduced_k = gradients_k(housing, &order);
-        let (mut found_k, mut more_k, mut error_k) = (0.0, 0.0, 0.0f64);
+        let reduced_k = gradients_k(&*housing, &order);
+        let (mut found_k, mut excess_k, mut error_k) = (0.0, 0.0, 0.0f64);
         for (step, reduced_k) in draft.steps.iter().skip(1).zip(&reduced_k) {
-            let off_k = step.predicted.dtc_k.unwrap_or(0.0).abs() - reduced_k;
-            error_k = error_k.max(off_k.abs());
+            let deviation_k = step.predicted.dtc_k.unwrap_or(0.0).abs() - reduced_k;
+            error_k = error_k.max(deviation_k.abs());
             if step.kind.measures() {
-                (found_k, more_k) = (found_k + reduced_k, more_k + off_k);
+                (found_k, excess_k) = (found_k + reduced_k, excess_k + deviation_k);
             }
         }
         let bound = gradient_bounds.bound(counted, repeated, has_return, found_k);
         // The bound applies to the reduced housing. Add the excess of the full model along this plan.
-        let (sum_bound_k, min_bound_k) = (bound.sum_k + f64::max(more_k, 0.0), bound.min_k + error_k);
+        let (sum_bound_k, min_bound_k) = (bound.sum_k + f64::max(excess_k, 0.0), bound.min_k + error_k);
         let found = compute_figures(&draft.steps, 0.0, None);
         let below = |figure: f64, bound: f64| (bound > 0.0).then(|| 100.0 * (1.0 - figure / bound));
         Ok(Some(PlanBound {
@@ -259,14 +255,17 @@ impl<'a> PlanBuilder<'a> {
         }))
     }
 
-    /// Why the bound is missing.
+    /// Reason why the bound is missing.
     fn bound_remark(&self, bound: Option<&PlanBound>) -> Option<NoBound> {
         let request = self.request;
-        match () {
-            () if bound.is_some() || !request.bound => None,
-            () if !request.order.is_searched() => Some(NoBound::OrderNotSearched),
-            () if request.appended.is_some() => Some(NoBound::AppendedJump),
-            () => Some(NoBound::TooLarge),
+        if bound.is_some() || !request.bound {
+            None
+        } else if !request.order.is_searched() {
+            Some(NoBound::OrderNotSearched)
+        } else if request.appended.is_some() {
+            Some(NoBound::AppendedJump)
+        } else {
+            Some(NoBound::TooLarge)
         }
     }
 

@@ -8,7 +8,7 @@ pub trait Chain {
     /// Number of points.
     fn len(&self) -> usize;
 
-    /// Whether it has no points.
+    /// Whether the chain has no points.
     fn is_empty(&self) -> bool {
         self.len() == 0
     }

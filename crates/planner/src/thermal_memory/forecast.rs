@@ -91,8 +91,8 @@ pub(crate) struct ParameterError {
     pub(crate) reported_eta: f64,
 }
 
-/// Adds the errors of a method that identifies all steps together. They are omitted if the steps give too little information for good
-/// points, because the prediction is unreliable then. `rows`: forecast rows of each step.
+/// Adds the errors of a method that identifies all steps together. They are omitted if the steps contain too little information about the
+/// parameters, because the prediction is unreliable then. `rows`: forecast rows of each step.
 pub(crate) fn add_joint_errors<'a>(
     request: &PlanRequest<'_>,
     rows: &[Vec<ForecastRow>],

@@ -1,9 +1,9 @@
-//! Reduced model of the housing for the search: the effect of a dwell at each point on the two housing temperatures.
+//! Reduced housing model for the search: the effect of a dwell at each point on the two housing temperatures.
 //!
-//! The result of a step is almost linear in the initial temperatures (Tc, Tt) and the previous shaft speed. Six simulations of the
-//! full model per point, from states that span the campaign, fit the coefficients of `1, c, t, w, c^2` (c, t, w: Tc, Tt and the
-//! previous speed, scaled to -1..1) for the gradient in the window and for both final temperatures. A step of the search is then three
-//! short sums. Every plan states the deviation from the full simulation.
+//! The result of a step is almost linear in the initial temperatures (Tc, Tt) and the previous shaft speed. For each
+//! point, six simulations of the full model from states that span the campaign give the coefficients of `1, c, t, w, c^2` (c, t, w: Tc, Tt
+//! and the previous speed, scaled to -1..1) for the gradient in the window and for both final temperatures. A step of the search is then
+//! three short sums. Every plan states the deviation from the full simulation.
 
 use crate::request::{PlanError, PlanRequest};
 use crate::thermal_memory::chain::Chain;
@@ -15,7 +15,7 @@ use mapper_physics::simulation::model::State;
 use mapper_physics::simulation::steady::SteadyState;
 use std::collections::HashSet;
 
-/// Difference of two housing temperatures, K, whose effect on later gradients is below the resolution of any sensor.
+/// Housing temperatures that differ by less, K, lead to later gradients that no sensor can distinguish.
 const INDISTINGUISHABLE_K: f64 = 0.01;
 
 /// Scaled (c, t, w) of three of the six initial states; the other three are their mirror images.
@@ -32,7 +32,7 @@ impl Surface {
         k[0] + (k[1] + k[4] * c) * c + k[2] * t + k[3] * w
     }
 
-    /// Fits values at the initial states of [`DESIGN`] and their mirror images: the odd part exactly, the even part as a line in c^2
+    /// Fits values at the initial states of [`DESIGN`] and their mirror images: the odd part exactly, and the even part as a line in c^2
     /// by least squares.
     pub(crate) fn fit(values: [[f64; 2]; 3]) -> Self {
         let odd = values.map(|[a, b]| 0.5 * (a - b));
@@ -46,12 +46,12 @@ impl Surface {
         Surface([mean_y - slope * mean_x, k1, k2, k3, slope])
     }
 
-    /// Smallest and largest value over a box of c and t at one w.
+    /// Minimum and maximum over a box of c and t at one w.
     pub(crate) fn range(&self, c: (f64, f64), t: (f64, f64), w: f64) -> (f64, f64) {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        let bend = -self.0[1] / (2.0 * self.0[4]);
-        let inside = (bend > c.0 && bend < c.1).then_some(bend);
-        for c in [Some(c.0), Some(c.1), inside].into_iter().flatten() {
+        let vertex = -self.0[1] / (2.0 * self.0[4]);
+        let vertex_inside = (vertex > c.0 && vertex < c.1).then_some(vertex);
+        for c in [Some(c.0), Some(c.1), vertex_inside].into_iter().flatten() {
             for t in [t.0, t.1] {
                 let value = self.at(c, t, w);
                 (low, high) = (low.min(value), high.max(value));
@@ -61,23 +61,23 @@ impl Surface {
     }
 }
 
-/// Cramer's rule; the design's determinant is fixed and not 0.
+/// Solves three equations by Cramer's rule; the determinant of [`DESIGN`] is not 0.
 fn solve3(m: [[f64; 3]; 3], y: [f64; 3]) -> [f64; 3] {
     let det = |m: [[f64; 3]; 3]| {
         m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0])
             + m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0])
     };
-    let whole = det(m);
+    let determinant = det(m);
     std::array::from_fn(|column| {
         let mut replaced = m;
         for row in 0..3 {
             replaced[row][column] = y[row];
         }
-        det(replaced) / whole
+        det(replaced) / determinant
     })
 }
 
-/// Effect of a dwell at one point.
+/// Response of the housing to a dwell at one point.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Response {
     pub(crate) gradient_k: Surface,
@@ -91,7 +91,7 @@ pub(crate) struct Response {
     first: [f64; 2],
 }
 
-/// From the smallest to the largest.
+/// Minimum and maximum.
 pub(crate) type Interval = (f64, f64);
 
 /// Range of the scaled Tc and Tt at the end of a dwell.
@@ -104,7 +104,7 @@ pub(crate) struct Housing {
     forbidden: HashSet<(usize, usize)>,
     gradient_max_k: f64,
     is_indistinguishable: [f64; 2],
-    /// Whether orders return to their first point.
+    /// Whether the order returns to its first point.
     pub(crate) has_return: bool,
 }
 
@@ -126,7 +126,7 @@ impl Scale {
         }
         Scale {
             middle: [0, 1, 2].map(|i| 0.5 * (low[i] + high[i])),
-            // A grid of one point still needs a width.
+            // A grid of one point needs a width too.
             half: [0, 1, 2].map(|i| (0.5 * (high[i] - low[i])).max(1.0)),
         }
     }
@@ -147,13 +147,13 @@ impl Housing {
     ) -> Result<Self, PlanError> {
         let scale = Scale::new(targets);
         let slowest_and_fastest = slowest_and_fastest(targets).ok_or(PlanError::NoPoints)?;
-        let aims: Vec<(OperatingPoint, &SteadyState)> = points.iter().copied().zip(targets).collect();
-        let one = |(to, target): &(OperatingPoint, &SteadyState)| {
+        let targets: Vec<(OperatingPoint, &SteadyState)> = points.iter().copied().zip(targets).collect();
+        let simulate = |(to, target): &(OperatingPoint, &SteadyState)| {
             simulate_response(request, target, dwell_s, &scale, slowest_and_fastest)
                 .map_err(|source| PlanError::Forecast { to: *to, source })
         };
         Ok(Housing {
-            responses: parallel::try_map(&aims, one)?,
+            responses: parallel::try_map(&targets, simulate)?,
             forbidden: HashSet::new(),
             gradient_max_k: request.limits.housing_gradient_max_k.unwrap_or(f64::INFINITY),
             is_indistinguishable: [INDISTINGUISHABLE_K / scale.half[0], INDISTINGUISHABLE_K / scale.half[1]],
@@ -161,7 +161,7 @@ impl Housing {
         })
     }
 
-    /// Forbids a jump.
+    /// Forbids the jump between two points.
     pub(crate) fn forbid(&mut self, from: usize, to: usize) {
         self.forbidden.insert((from, to));
     }
@@ -179,7 +179,7 @@ fn slowest_and_fastest(targets: &[SteadyState]) -> Option<[&SteadyState; 2]> {
     Some([targets.iter().min_by(by_speed)?, targets.iter().max_by(by_speed)?])
 }
 
-/// Initial states of the simulations of each point, which span the campaign.
+/// Initial states of the simulations for each point; they span the campaign.
 fn start_states(scale: &Scale, [slowest, fastest]: [&SteadyState; 2]) -> [[State; 2]; 3] {
     DESIGN.map(|design| {
         [1.0, -1.0].map(|sign| {
@@ -207,9 +207,8 @@ fn simulate_response(
         for (j, state) in pair.into_iter().enumerate() {
             let forecast = forecast(request, state, &target.boundary, dwell_s, true)?;
             gradient_k[i][j] = forecast.predicted.dtc_k.unwrap_or(0.0);
-            let left = scale.scaled(&forecast.end);
-            end[0][i][j] = left[0];
-            end[1][i][j] = left[1];
+            let [tc, tt, _] = scale.scaled(&forecast.end);
+            (end[0][i][j], end[1][i][j]) = (tc, tt);
         }
     }
     let first_step_s = request.timing.warm_up_s + dwell_s;

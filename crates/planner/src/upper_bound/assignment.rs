@@ -51,11 +51,11 @@ pub(crate) fn solve_assignment(n: usize, weight: impl Fn(usize, usize) -> f64) -
     (column_of.iter().enumerate().map(|(row, column)| weight(row, *column)).sum(), column_of)
 }
 
-/// Finds the largest threshold at which all rows except `spared` can be matched to different columns with at least that weight.
+/// Finds the largest threshold at which all rows except `max_unmatched` can be matched to different columns with at least that weight.
 pub(crate) fn solve_bottleneck(
     rows: usize,
     columns: usize,
-    spared: usize,
+    max_unmatched: usize,
     weight: impl Fn(usize, usize) -> f64,
 ) -> f64 {
     let places = (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j)));
@@ -65,38 +65,34 @@ pub(crate) fn solve_bottleneck(
     thresholds.dedup();
     let can_match = |threshold: f64| {
         let mut row_of = vec![None; columns];
-        let missing = (0..rows)
+        let unmatched = (0..rows)
             .filter(|&row| {
-                let mut seen = vec![false; columns];
-                !augment(row, &|i, j| weight(i, j) >= threshold, &mut seen, &mut row_of)
+                let mut visited = vec![false; columns];
+                !augment(row, &|i, j| weight(i, j) >= threshold, &mut visited, &mut row_of)
             })
-            .take(spared + 1)
+            .take(max_unmatched + 1)
             .count();
-        missing <= spared
+        unmatched <= max_unmatched
     };
-    let (mut low, mut high) = (0, thresholds.len());
-    // Invariant: the threshold at `low` is met (or low is 0), that at `high` is not.
-    while high - low > 1 {
-        let middle = (low + high) / 2;
-        if can_match(thresholds[middle]) { low = middle } else { high = middle }
-    }
-    thresholds.get(low).copied().unwrap_or(f64::INFINITY)
+    let possible = thresholds.partition_point(|threshold| can_match(*threshold));
+    thresholds.get(possible.saturating_sub(1)).copied().unwrap_or(f64::INFINITY)
 }
 
+/// Searches an augmenting path from `row`, so that one more row is matched.
 fn augment(
     row: usize,
     edge: &impl Fn(usize, usize) -> bool,
-    seen: &mut [bool],
+    visited: &mut [bool],
     row_of: &mut [Option<usize>],
 ) -> bool {
-    for column in 0..seen.len() {
-        if seen[column] || !edge(row, column) {
+    for column in 0..visited.len() {
+        if visited[column] || !edge(row, column) {
             continue;
         }
-        seen[column] = true;
+        visited[column] = true;
         let free = match row_of[column] {
             None => true,
-            Some(other) => augment(other, edge, seen, row_of),
+            Some(other) => augment(other, edge, visited, row_of),
         };
         if free {
             row_of[column] = Some(row);
@@ -137,14 +133,14 @@ mod tests {
             // Sums of at most six numbers below 10.
             prop_assert!((solve_assignment(n, weight).0 - best).abs() < 1e-12);
             // All rows, and all but the worst one.
-            for spared in 0..n.min(2) {
+            for max_unmatched in 0..n.min(2) {
                 let smallest = |p: &Vec<usize>| {
                     let mut row: Vec<f64> = p.iter().enumerate().map(|(i, j)| weight(i, *j)).collect();
                     row.sort_by(f64::total_cmp);
-                    row[spared]
+                    row[max_unmatched]
                 };
                 let largest = all.iter().map(smallest).fold(f64::NEG_INFINITY, f64::max);
-                prop_assert_eq!(solve_bottleneck(n, n, spared, weight), largest);
+                prop_assert_eq!(solve_bottleneck(n, n, max_unmatched, weight), largest);
             }
         }
     }

@@ -6,7 +6,7 @@
 
 /// Ratio of each increment to the one before.
 const INCREMENT_RATIO: f64 = 0.2;
-/// Maximum number of bids for each row in a round, so that an auction ends whatever the weights.
+/// Maximum number of bids for each row in a round, so that an auction ends for any weights.
 const MAX_BIDS_PER_ROW: usize = 60;
 
 /// Prices of the columns, and the resulting upper bound.
@@ -26,16 +26,16 @@ pub(crate) fn run_auction(n: usize, weight: &[f64], increments: (f64, f64)) -> P
     let mut price = vec![0.0f64; n];
     let (mut increment, last) = increments;
     // A single row has no competitor.
-    let mut more = n > 1;
-    while more {
+    let mut has_next_round = n > 1;
+    while has_next_round {
         let mut row_of: Vec<Option<usize>> = vec![None; n];
-        let mut waiting: Vec<usize> = (0..n).rev().collect();
-        let mut left = MAX_BIDS_PER_ROW * n;
-        while let Some(row) = waiting.pop() {
-            if left == 0 {
+        let mut unassigned: Vec<usize> = (0..n).rev().collect();
+        let mut bids_left = MAX_BIDS_PER_ROW * n;
+        while let Some(row) = unassigned.pop() {
+            if bids_left == 0 {
                 break;
             }
-            left -= 1;
+            bids_left -= 1;
             let (mut best, mut second, mut column) = (f64::NEG_INFINITY, f64::NEG_INFINITY, 0);
             for (j, (weight, price)) in weight[n * row..n * (row + 1)].iter().zip(&price).enumerate() {
                 let profit = weight - price;
@@ -48,9 +48,9 @@ pub(crate) fn run_auction(n: usize, weight: &[f64], increments: (f64, f64)) -> P
                 }
             }
             price[column] += best - second + increment;
-            waiting.extend(row_of[column].replace(row));
+            unassigned.extend(row_of[column].replace(row));
         }
-        more = increment > last;
+        has_next_round = increment > last;
         increment = (increment * INCREMENT_RATIO).max(last);
     }
     let profit: Vec<f64> = (0..n)

@@ -1,9 +1,9 @@
 //! Upper bounds on the gradients of any order.
 //!
-//! The gradient of a step depends on the state before it, and so on all earlier steps. But a dwell at a point ends in a limited range of
-//! states, whatever came before. The largest gradient over that range is an upper bound for the jump, and the best assignment of
-//! successors with these weights is an upper bound on the sum of any order. For up to [`MAX_RELAXATION_POINTS`] points, `relaxation`
-//! tightens it.
+//! The gradient of a step depends on the state before it, and therefore on all earlier steps. But a dwell at a point always ends in a limited
+//! range of states. The largest gradient over that range is an upper bound for the jump, and the best assignment of
+//! successors with these weights is an upper bound on the sum of any order. For up to [`MAX_RELAXATION_POINTS`] points, a
+//! Lagrangian relaxation gives a tighter bound.
 
 use crate::thermal_memory::chain::{Chain, RepeatedJump};
 use crate::thermal_memory::housing::{Housing, Interval, StateBox};
@@ -13,8 +13,9 @@ use crate::upper_bound::relaxation::{RelaxationProblem, bound_sum_k};
 
 /// Rounds of narrowing the ranges: each multiplies the remaining excess by the memory of the housing over one dwell.
 const ROUNDS: usize = 12;
-/// Above this many points an auction bounds the sum, with these first and last increments, K.
+/// Above this many points an auction bounds the sum instead of the relaxation.
 pub(crate) const MAX_RELAXATION_POINTS: usize = 500;
+/// First and last increments of the auction, K.
 const INCREMENTS_K: (f64, f64) = (5.0, 0.01);
 /// Above this many points no bound is computed: its table grows with the square.
 pub(crate) const MAX_POINTS: usize = 4000;
@@ -59,7 +60,7 @@ impl<'a> GradientBounds<'a> {
         Some(GradientBounds { housing, points: points.to_vec(), boxes, n, weight_k })
     }
 
-    /// Largest gradient of the jump between two places of the list.
+    /// Largest gradient of the jump between two points of the list.
     pub(crate) fn weight_k(&self, from: usize, to: usize) -> f64 {
         self.weight_k[self.n * from + to]
     }
@@ -75,7 +76,7 @@ impl<'a> GradientBounds<'a> {
     ) -> Bound {
         let n = self.n;
         let copies = repeated.map_or(0, |repeated| 2 * repeated.count);
-        let real = |i: usize| match repeated {
+        let original = |i: usize| match repeated {
             Some(repeated) if i >= n => {
                 if (i - n).is_multiple_of(2) {
                     repeated.from
@@ -90,8 +91,8 @@ impl<'a> GradientBounds<'a> {
             let (housing, points, boxes) = (self.housing, &self.points, &self.boxes);
             bound_sum_k(&RelaxationProblem { housing, points, counted, boxes, repeated, has_return }, found_k)
         } else {
-            // An extra node closes the path to a circle: it follows the last point and precedes the first. A return jump closes the
-            // circle itself.
+            // An extra node closes the path to a cycle: it follows the last point and precedes the first. A return jump closes the
+            // cycle itself.
             let size = if has_return { end } else { end + 1 };
             let weight = |i: usize, j: usize| {
                 if i == end {
@@ -100,18 +101,18 @@ impl<'a> GradientBounds<'a> {
                     // A repeat, or the end of the path.
                     0.0
                 } else {
-                    self.weight_k(real(i), j).max(-1e9)
+                    self.weight_k(original(i), j).max(-1e9)
                 }
             };
             let table: Vec<f64> = (0..size * size).map(|place| weight(place / size, place % size)).collect();
             run_auction(size, &table, INCREMENTS_K).bound
         };
         let min_k = if n <= MAX_MATCHING_POINTS {
-            solve_bottleneck(counted, end, usize::from(!has_return), |j, i| self.weight_k(real(i), j))
+            solve_bottleneck(counted, end, usize::from(!has_return), |j, i| self.weight_k(original(i), j))
         } else {
             // A step leads to every point, except to the first if the order does not return.
-            let into = |j: usize| (0..n).map(|i| self.weight_k(i, j)).fold(f64::NEG_INFINITY, f64::max);
-            let mut best: Vec<f64> = (0..counted).map(into).collect();
+            let max_into = |j: usize| (0..n).map(|i| self.weight_k(i, j)).fold(f64::NEG_INFINITY, f64::max);
+            let mut best: Vec<f64> = (0..counted).map(max_into).collect();
             best.sort_by(f64::total_cmp);
             best.get(usize::from(!has_return)).copied().unwrap_or(f64::INFINITY)
         };
@@ -121,11 +122,11 @@ impl<'a> GradientBounds<'a> {
 
 /// Bounds the scaled states at the end of a dwell at each point.
 pub(crate) fn bound_states(housing: &Housing, points: &[usize]) -> Option<Vec<(Interval, Interval)>> {
-    let everything = |size: f64| ((-size, size), (-size, size));
+    let full_range = |size: f64| ((-size, size), (-size, size));
     let within = |inner: Interval, outer: Interval| inner.0 >= outer.0 && inner.1 <= outer.1;
     for size in [1.5, 3.0, 6.0] {
         let first_inside = points.iter().all(|&to| housing.first(to).iter().all(|x| x.abs() <= size));
-        let mut boxes = vec![everything(size); points.len()];
+        let mut boxes = vec![full_range(size); points.len()];
         let images = propagate_boxes(housing, points, &boxes);
         let inside =
             |image: &(Interval, Interval)| within(image.0, (-size, size)) && within(image.1, (-size, size));

@@ -23,7 +23,7 @@ const MAX_PAIRS: usize = 1_000_000;
 /// smaller bound, and the share of the previous direction in the next one (Camerini, Fratta and Maffioli, Mathematical Programming Study
 /// 3:26, 1975). Any values give a valid bound; these gave the smallest for turbo_a after 100 iterations.
 const FIRST_STEP: f64 = 0.7;
-const STEP_FALL: f64 = 0.7;
+const STEP_REDUCTION: f64 = 0.7;
 const PATIENCE: usize = 4;
 const MEMORY: f64 = 0.5;
 /// Number of first points whose assignment is solved exactly, those with the largest bounds. The bound of the next one covers all others.
@@ -135,19 +135,19 @@ pub(crate) fn bound_sum_k(problem: &RelaxationProblem<'_>, found_k: f64) -> f64 
     let pairs = nodes.len() * nodes.len();
     let iterations = (MAX_PAIRS / pairs.max(1)).min(MAX_ITERATIONS);
     let (mut bound_k, mut best_prices) = (f64::INFINITY, prices.clone());
-    let (mut step, mut waited) = (FIRST_STEP, 0);
+    let (mut step, mut stalled) = (FIRST_STEP, 0);
     let mut direction: Vec<Price> = prices.clone();
     for _ in 0..=iterations {
         let table = relaxation.table(&prices);
         let weight = |from: usize, to: usize| table[from * nodes.len() + to].weight_k;
         let (sum_k, successor) = solve_assignment(nodes.len(), weight);
         if sum_k < bound_k - 1e-6 * sum_k.abs() {
-            (bound_k, waited) = (sum_k, 0);
+            (bound_k, stalled) = (sum_k, 0);
             best_prices.clone_from(&prices);
         } else {
-            waited += 1;
-            if waited == PATIENCE {
-                (step, waited) = (step * STEP_FALL, 0);
+            stalled += 1;
+            if stalled == PATIENCE {
+                (step, stalled) = (step * STEP_REDUCTION, 0);
                 prices.clone_from(&best_prices);
                 continue;
             }
@@ -289,8 +289,8 @@ impl Relaxation<'_> {
             + received.steepest_k() * end_c.0[4].abs()
             + received.slope_k.abs() * end_t.0[4].abs();
         let allowed_k = 0.25 * bend_k * paid.spacing * paid.spacing;
-        let most_k = problem.housing.gradient_max_k() + max_price_k;
-        best.weight_k = (best.weight_k + allowed_k).min(most_k + allowed_k);
+        let max_k = problem.housing.gradient_max_k() + max_price_k;
+        best.weight_k = (best.weight_k + allowed_k).min(max_k + allowed_k);
         best
     }
 
@@ -304,11 +304,12 @@ impl Relaxation<'_> {
         received: &Price,
         try_state: &mut impl FnMut(f64, f64),
     ) {
-        let (one, other) = (end_c.at(c, t_low, w), end_c.at(c, t_high, w));
-        let (low, high) = (one.min(other), one.max(other));
+        let (end_at_low, end_at_high) = (end_c.at(c, t_low, w), end_c.at(c, t_high, w));
+        let (low, high) = (end_at_low.min(end_at_high), end_at_low.max(end_at_high));
         let (first, last) = (received.piece(low).0 + 1, received.piece(high).0);
         for knot in first..=last {
-            let t = t_low + (t_high - t_low) * (received.knot(knot) - one) / (other - one);
+            let t =
+                t_low + (t_high - t_low) * (received.knot(knot) - end_at_low) / (end_at_high - end_at_low);
             if t > t_low && t < t_high {
                 try_state(c, t);
             }
@@ -367,13 +368,14 @@ impl Relaxation<'_> {
     fn bound_with_return_k(&self, prices: &[Price], bound_k: f64) -> f64 {
         let n = self.nodes.len();
         let table = self.table(prices);
-        let other_ends = |first: usize, from: usize, to: usize| {
-            let ends = match () {
-                () if from == first => EndPricing::First,
-                () if to == first => EndPricing::Last,
-                () => return table[from * n + to].weight_k,
-            };
-            self.weight(from, to, prices, ends).weight_k
+        let weight_k = |first: usize, from: usize, to: usize| {
+            if from == first {
+                self.weight(from, to, prices, EndPricing::First).weight_k
+            } else if to == first {
+                self.weight(from, to, prices, EndPricing::Last).weight_k
+            } else {
+                table[from * n + to].weight_k
+            }
         };
         // An assignment gains at most the gain of its two changed jumps.
         let gain_k = |first: &usize| {
@@ -382,7 +384,7 @@ impl Relaxation<'_> {
                 if before_k <= IMPOSSIBLE_K {
                     f64::NEG_INFINITY
                 } else {
-                    other_ends(*first, from, to) - before_k
+                    weight_k(*first, from, to) - before_k
                 }
             };
             let largest = |gains: &mut dyn Iterator<Item = f64>| gains.fold(f64::NEG_INFINITY, f64::max);
@@ -394,20 +396,20 @@ impl Relaxation<'_> {
         let mut firsts: Vec<(f64, usize)> =
             gains_k.into_iter().map(|gain_k| bound_k + gain_k).zip(points).collect();
         firsts.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let exactly = |(_, first): &(f64, usize)| {
-            let changed: Vec<f64> = (0..n * n).map(|at| other_ends(*first, at / n, at % n)).collect();
-            solve_assignment(n, |from, to| changed[from * n + to]).0
+        let solve = |(_, first): &(f64, usize)| {
+            let weights_k: Vec<f64> = (0..n * n).map(|at| weight_k(*first, at / n, at % n)).collect();
+            solve_assignment(n, |from, to| weights_k[from * n + to]).0
         };
-        let (some, others) = firsts.split_at(firsts.len().min(MAX_EXACT_FIRST_POINTS));
-        let of_others = others.first().map_or(f64::NEG_INFINITY, |first| first.0);
-        parallel::map(some, exactly).into_iter().fold(of_others, f64::max)
+        let (solved, others) = firsts.split_at(firsts.len().min(MAX_EXACT_FIRST_POINTS));
+        let bound_of_others_k = others.first().map_or(f64::NEG_INFINITY, |first| first.0);
+        parallel::map(solved, solve).into_iter().fold(bound_of_others_k, f64::max)
     }
 }
 
-/// Which ends of a jump have a price.
+/// Ends of a jump that have a price.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum EndPricing {
-    /// Both.
+    /// Both ends.
     Priced,
     /// Only the end: the first jump of an order starts from the state after the warm-up.
     First,

@@ -4,7 +4,7 @@ use crate::recording::recording_file::Recorded;
 use mapper_campaign::Campaign;
 use mapper_core::{Channel, DeclaredUncertainty, Recording, RedundantSensors};
 use mapper_identify::{IdentifyConfig, with_measured_humidity};
-use mapper_observe::redundant_sensors::fuse::{alike, element_count};
+use mapper_observe::redundant_sensors::fuse::{element_count, harmonise};
 use mapper_observe::{FusedChannel, fuse, judge_elements};
 use mapper_physics::simulation::model::Model;
 use mapper_recording::ChannelMap;
@@ -32,7 +32,7 @@ pub(crate) fn fused(
     let declared = declared(first, campaign, map);
     let colour = config.noise_colour;
     let judged = recordings.iter().map(|recording| judge_elements(recording, &declared, colour)).collect();
-    let channels = alike(judged, &declared);
+    let channels = harmonise(judged, &declared);
     let recordings: Vec<Recording> = recordings
         .into_iter()
         .zip(&channels)

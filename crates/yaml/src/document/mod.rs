@@ -1,4 +1,4 @@
-//! YAML text read within limits: its values, and the place of every key for later messages.
+//! Parses YAML within limits: the values, and the position of every key for later messages.
 
 pub(crate) mod file;
 pub(crate) mod path;

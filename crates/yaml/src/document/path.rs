@@ -1,6 +1,6 @@
 //! Paths of keys and indices.
 
-/// One step from a value to a part of it.
+/// A step from a value to one of its children.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum Step {
     /// To the value of a key.

@@ -13,19 +13,20 @@ use serde::de::IgnoredAny;
 use std::collections::HashMap;
 use std::ops::Range;
 
-/// Deepest nesting that is read; a campaign needs six.
+/// Maximum depth of nesting; a campaign needs six.
 const DEPTH_LIMIT: usize = 32;
 
-/// Maximum number of values that are read; the longest list of points a campaign's grid may have takes three each.
+/// Maximum number of values; the longest grid of a campaign needs three for each point.
 const VALUE_LIMIT: usize = 100_000;
 
-/// Number of characters after a syntax error that libyaml gets in order to locate it; its run time grows with the square of the nesting.
+/// Maximum length of the text after a syntax error that libyaml parses to locate the error: its run time grows with the square of the
+/// nesting.
 const TAIL_LIMIT: usize = 1000;
 
 pub(crate) const SYNTAX_REMEDY: &str =
     "check the indentation (spaces, no tabs), the space after each colon, quotes and brackets up to here";
 
-/// Where a value and its key are.
+/// Position of a value and its key.
 #[derive(Debug)]
 pub(crate) struct Place {
     /// Byte range of the key; `None` for an item of a list.
@@ -38,25 +39,25 @@ pub(crate) struct Place {
 #[derive(Debug, Default)]
 pub(crate) struct Places {
     list: Vec<Place>,
-    /// Index of a part by the index of the whole.
-    parts: HashMap<(usize, Step), usize>,
+    /// Index of a child by the index of its parent.
+    children: HashMap<(usize, Step), usize>,
 }
 
 impl Places {
-    /// The place at the end of a path, or of its nearest parent; whether it is the end.
+    /// The place at the end of a path and true, or the place of its nearest existing parent and false.
     pub fn nearest(&self, steps: &[Step]) -> Option<(&Place, bool)> {
         let mut index = 0;
-        let part = |whole: &mut usize, step: &Step| {
-            *whole = *self.parts.get(&(*whole, step.clone()))?;
+        let mut descend = |step: &Step| {
+            index = *self.children.get(&(index, step.clone()))?;
             Some(())
         };
-        let is_end = steps.iter().all(|step| part(&mut index, step).is_some());
+        let is_end = steps.iter().all(|step| descend(step).is_some());
         Some((self.list.get(index)?, is_end))
     }
 }
 
-/// Returns the places, and the text for serde_yaml: without the refused aliases and tags, and with a blank in `{key:}`,
-/// which is valid YAML 1.2 and an error for libyaml. `None` if the text cannot be read; then at least one finding gives
+/// Returns the places, and the text for serde_yaml: without the rejected aliases and tags, and with a blank in `{key:}`,
+/// which is valid YAML 1.2 and an error for libyaml. `None` if the text cannot be parsed; at least one note gives
 /// the reason.
 pub(crate) fn locate(source: &Source, notes: &mut Notes) -> Option<(Places, String)> {
     let readable = source.text().to_owned();
@@ -72,7 +73,7 @@ pub(crate) fn locate(source: &Source, notes: &mut Notes) -> Option<(Places, Stri
     Some((places, readable))
 }
 
-/// A collection whose end was not read yet.
+/// A collection whose end has not been reached.
 struct Open {
     /// Index of its place.
     index: usize,
@@ -96,15 +97,15 @@ struct Walk<'a> {
     empty: Vec<usize>,
 }
 
-/// Reading cannot continue; the finding is already noted.
+/// The parser cannot continue; the finding is already noted.
 struct Stop;
 
 impl Walk<'_> {
     fn document(&mut self) -> Result<(), Stop> {
         let text = self.source.text();
-        // Line breaks of YAML 1.1 only: saphyr reads a comment where libyaml reads the next line.
+        // These are line breaks in YAML 1.1 only: libyaml starts a new line, saphyr continues a comment.
         if let Some((at, breaks)) = text.char_indices().find(|(_, c)| "\u{85}\u{2028}\u{2029}".contains(*c)) {
-            let message = format!("the character U+{:04X} is not read", u32::from(breaks));
+            let message = format!("the character U+{:04X} is not allowed", u32::from(breaks));
             self.note(FindingKind::Unsupported, at..at, message, "remove it");
             return Err(Stop);
         }
@@ -138,19 +139,19 @@ impl Walk<'_> {
         self.notes.push_with(|| source.finding(kind, String::new(), span, message, remedy.to_owned()));
     }
 
-    /// libyaml gives the line of a tab, where saphyr gives the line before it.
+    /// Notes a syntax error at the position given by libyaml: for a tab, saphyr gives the line before it.
     fn on_syntax_error(&mut self, error: &ScanError) -> Stop {
         let text = self.source.text();
         let at = self.source.byte_of_char(error.marker().index());
         let lines = text.get(at..).into_iter().flat_map(|tail| tail.split_inclusive('\n')).take(2);
         let end = text.floor_char_boundary(at + lines.map(str::len).sum::<usize>().min(TAIL_LIMIT));
-        let known = serde_yaml::from_str::<IgnoredAny>(text.get(..end).unwrap_or_default());
-        let placed = known.err().and_then(|error| {
+        let libyaml_result = serde_yaml::from_str::<IgnoredAny>(text.get(..end).unwrap_or_default());
+        let located = libyaml_result.err().and_then(|error| {
             let place = self.source.byte_of_char(error.location()?.index());
             // At the end of the excerpt, the error is caused by the cut.
             (place < end).then(|| (place, error.to_string()))
         });
-        let (at, reason) = placed.unwrap_or_else(|| (at, error.info().to_owned()));
+        let (at, reason) = located.unwrap_or_else(|| (at, error.info().to_owned()));
         self.note(FindingKind::Syntax, at..at, format!("this is not YAML: {reason}"), SYNTAX_REMEDY);
         Stop
     }
@@ -204,7 +205,7 @@ impl Walk<'_> {
     }
 
     fn refuse(&mut self, syntax: &str, remedy: &str, span: &Range<usize>) {
-        let message = format!("{syntax} are not read in a {}", self.source.document.name);
+        let message = format!("{syntax} are not allowed in a {}", self.source.document.name);
         self.note(FindingKind::Unsupported, span.clone(), message, remedy);
     }
 
@@ -220,7 +221,7 @@ impl Walk<'_> {
         }
     }
 
-    /// Takes an alias or a tag out of the text, so that the rest is checked too.
+    /// Replaces an alias or a tag by blanks, so that the rest of the text is checked too.
     fn blank(&mut self, start: usize) {
         let token = self.readable.get(start..).filter(|rest| rest.starts_with(['*', '!']));
         let length = token.map_or(0, |token| {
@@ -231,7 +232,7 @@ impl Walk<'_> {
 
     fn on_key(&mut self, key: String, span: Range<usize>) {
         let Some(Open { index, parts: Parts::Mapping(pending) }) = self.open.last_mut() else { return };
-        let is_known = self.places.parts.contains_key(&(*index, Step::Key(key.clone())));
+        let is_known = self.places.children.contains_key(&(*index, Step::Key(key.clone())));
         *pending = Some((key.clone(), span.clone()));
         if key == "<<" {
             self.refuse("merge keys (`<<`)", "write the keys out", &span);
@@ -265,17 +266,17 @@ impl Walk<'_> {
         self.on_value(span, false).map(drop)
     }
 
-    /// The index of its place.
+    /// Notes a value, and returns the index of its place.
     fn on_value(&mut self, span: Range<usize>, is_collection: bool) -> Result<usize, Stop> {
         let index = self.places.list.len();
         if index >= VALUE_LIMIT {
             let message = format!("the file has more than {VALUE_LIMIT} values");
-            let remedy = "is this the right file? A long list may have a shorter form, as a grid has `speeds` and `openings`";
+            let remedy = "check that this is the right file; a grid is shorter with `speeds` and `openings`";
             self.note(FindingKind::TooLarge, span, message, remedy);
             return Err(Stop);
         }
         let start = span.start;
-        let (whole, step, place) = match self.open.last_mut() {
+        let (parent, step, place) = match self.open.last_mut() {
             None => {
                 self.places.list.push(Place { key: None, value: start..start });
                 return Ok(index);
@@ -292,12 +293,12 @@ impl Walk<'_> {
         };
         self.places.list.push(place);
         // The last of two equal keys applies, as in serde_yaml.
-        self.places.parts.insert((whole, step), index);
+        self.places.children.insert((parent, step), index);
         Ok(index)
     }
 }
 
-/// The text with spaces for tabs, except for tabs in the indentation: saphyr refuses a tab after a colon, which is valid.
+/// Replaces tabs by spaces, except in the indentation: saphyr rejects a tab after a colon, which is valid YAML.
 fn with_plain_blanks(text: &str) -> impl Iterator<Item = char> {
     text.chars().scan(true, |is_indentation, c| {
         *is_indentation = c == '\n' || (*is_indentation && matches!(c, ' ' | '\t'));
@@ -305,7 +306,7 @@ fn with_plain_blanks(text: &str) -> impl Iterator<Item = char> {
     })
 }
 
-/// Whether a plain scalar is anything but an infinite number or none.
+/// False for a plain scalar that is infinite or NaN as a number.
 fn is_finite(text: &str) -> bool {
     let digits = text.trim_start_matches(['+', '-']);
     let is_named = [".inf", ".nan"].iter().any(|name| digits.eq_ignore_ascii_case(name));

@@ -11,7 +11,7 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::ops::Range;
 
-/// A text that was read.
+/// A parsed YAML text.
 #[derive(Debug)]
 pub struct Tree {
     source: Source,
@@ -21,10 +21,10 @@ pub struct Tree {
     places: Places,
 }
 
-/// Reads a text; the notes are about YAML that is not used here.
+/// Parses a text. The notes are about unsupported features of YAML.
 ///
 /// # Errors
-/// The reasons why no values can be read.
+/// The mistakes that make the text unreadable.
 pub fn read(source: Source) -> Result<(Tree, Notes), Findings> {
     let mut notes = Notes::default();
     let Some((places, readable)) = locate(&source, &mut notes) else {
@@ -80,8 +80,8 @@ impl Tree {
         self.get(steps).and_then(Value::as_object).into_iter().flatten().map(|(key, _)| key.as_str())
     }
 
-    /// Byte range for a finding about a value: the scalar itself, or the key of a mapping or list; the nearest parent if the path does not
-    /// exist.
+    /// Byte range for a finding about a value: the scalar itself, or the key of a mapping or list. If the path does not exist, that of the
+    /// nearest parent.
     pub fn place(&self, steps: &[Step]) -> Range<usize> {
         self.places.nearest(steps).map_or(0..0, |(place, _)| place.value.clone())
     }
@@ -116,7 +116,7 @@ impl Tree {
     /// Deserialises the text into a type. Call it only if no mistakes were found.
     ///
     /// # Errors
-    /// The first value that does not fit, which the schema of the type allows.
+    /// The first value that the type rejects although its schema allows it.
     pub fn deserialise<T: DeserializeOwned>(&self) -> Result<T, Finding> {
         let document = serde_yaml::Deserializer::from_str(&self.readable);
         serde_path_to_error::deserialize(document).map_err(|error| {

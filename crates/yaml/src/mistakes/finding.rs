@@ -1,15 +1,15 @@
-//! One mistake of a file: what is wrong, where, and the remedy.
+//! A mistake in a file: its position, its description and the remedy.
 
 use serde::Serialize;
 use std::ops::Range;
 
-/// What kind of mistake it is.
+/// Kind of mistake.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FindingKind {
     /// The text is not YAML, or not UTF-8.
     Syntax,
-    /// YAML that our files do not use: anchors, aliases, merge keys, tags, several documents.
+    /// YAML that is not supported: anchors, aliases, merge keys, tags, several documents.
     Unsupported,
     /// The file, its nesting or its grid is too large.
     TooLarge,
@@ -17,13 +17,13 @@ pub enum FindingKind {
     UnknownKey,
     /// A key that occurs twice in one mapping.
     DuplicateKey,
-    /// A key that is needed and not there.
+    /// A required key is missing.
     MissingKey,
     /// Text where a number is needed, a list where a mapping is needed, and the like.
     WrongType,
-    /// A value that is none of those allowed, or not of the form it needs.
+    /// A value that is not allowed, or does not have the required form.
     WrongValue,
-    /// A quantity without its unit, or with one that does not measure it.
+    /// A quantity without a unit, or with one of another kind of quantity.
     Unit,
     /// A value outside its range.
     Range,
@@ -31,27 +31,27 @@ pub enum FindingKind {
     Duplicate,
     /// Two statements that contradict each other.
     Conflict,
-    /// A file that is named and cannot be read.
+    /// A referenced file cannot be read.
     MissingFile,
     /// A point that the machine cannot reach within the limits.
     Unreachable,
-    /// Values that no machine has, or that cannot give a result.
+    /// Values that are impossible for a machine, or that cannot give a result.
     Implausible,
     /// A warning: valid, but rarely intended.
     Unusual,
 }
 
 impl FindingKind {
-    /// Whether it is a warning: the file can be used as it is.
+    /// Whether the finding is a warning, and the file can be used.
     pub fn is_warning(self) -> bool {
         self == FindingKind::Unusual
     }
 }
 
-/// One mistake.
+/// A mistake.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
-    /// What kind of mistake it is.
+    /// Kind of mistake.
     pub kind: FindingKind,
     /// Path of keys, e.g. `grid.points[3].speed`; empty for the file as a whole.
     pub path: String,
@@ -59,9 +59,9 @@ pub struct Finding {
     pub line: usize,
     /// Column, from 1, in characters.
     pub column: usize,
-    /// What is wrong, with values and units.
+    /// Description, with values and units.
     pub message: String,
-    /// What would be right.
+    /// Remedy.
     pub remedy: String,
     /// Byte range in the text, within one line.
     #[serde(skip)]

@@ -13,15 +13,15 @@ pub struct Findings {
     pub(crate) source: Box<Source>,
     /// At most [`Findings::LIMIT`] mistakes.
     pub list: Vec<Finding>,
-    /// How many more there are.
+    /// Number of further mistakes.
     pub omitted: usize,
 }
 
 impl Findings {
-    /// How many findings are kept; beyond that they are counted.
+    /// Maximum number of findings that are kept; further ones are counted.
     pub const LIMIT: usize = SHOWN_LIMIT;
 
-    /// What was noted about a text, in the order of the text.
+    /// The notes about a text, in the order of the text.
     pub fn new(source: Source, notes: Notes) -> Self {
         let (mut list, overflow) = notes.into_parts();
         list.sort_by_key(|finding| finding.span.start);
@@ -30,19 +30,19 @@ impl Findings {
         Findings { source: Box::new(source), list, omitted }
     }
 
-    /// One mistake alone, at a byte of the text.
+    /// A single mistake, at a byte of the text.
     pub fn single(source: Source, kind: FindingKind, at: usize, message: String, remedy: String) -> Self {
         let mut notes = Notes::default();
         notes.push(source.finding(kind, String::new(), at..at, message, remedy));
         Findings::new(source, notes)
     }
 
-    /// The file they are about.
+    /// The file with the mistakes.
     pub fn origin(&self) -> &Path {
         &self.source.origin
     }
 
-    /// Number of mistakes, those not kept included.
+    /// Number of mistakes, the omitted ones included.
     pub fn count(&self) -> usize {
         self.list.len() + self.omitted
     }

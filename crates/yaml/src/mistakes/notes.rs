@@ -10,15 +10,15 @@ pub struct Notes {
 }
 
 impl Notes {
-    /// Ten times what is shown, so that sorting by position shows the first ones of the file.
+    /// Ten times the number shown, so that those shown are the first ones of the file after sorting.
     const LIMIT: usize = 10 * SHOWN_LIMIT;
 
-    /// Adds one.
+    /// Adds a finding.
     pub fn push(&mut self, finding: Finding) {
         self.push_with(|| finding);
     }
 
-    /// Makes the finding only if it is kept: placing it in a long line takes time.
+    /// Creates and adds a finding if the limit is not reached: locating it in a long line takes time.
     pub fn push_with(&mut self, finding: impl FnOnce() -> Finding) {
         if self.list.len() < Self::LIMIT {
             self.list.push(finding());
@@ -27,17 +27,17 @@ impl Notes {
         }
     }
 
-    /// Whether there were more than are kept; then further checks are skipped too.
+    /// Whether the limit was exceeded; further checks are then unnecessary.
     pub fn is_full(&self) -> bool {
         self.overflow > 0
     }
 
-    /// Whether nothing was found wrong.
+    /// Whether there are no findings.
     pub fn is_empty(&self) -> bool {
         self.list.is_empty()
     }
 
-    /// Those kept so far, in the order in which they were found.
+    /// The findings, in the order of the checks.
     pub fn list(&self) -> &[Finding] {
         &self.list
     }

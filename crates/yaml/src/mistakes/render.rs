@@ -1,4 +1,4 @@
-//! Findings for people: file, line, the source line with carets, and the remedy.
+//! Findings as text: file, line, the source line with carets, and the remedy.
 
 use crate::mistakes::finding::Finding;
 use crate::mistakes::findings::Findings;
@@ -7,7 +7,7 @@ use annotate_snippets::{AnnotationKind, Level, Origin, Renderer, Snippet};
 use std::fmt;
 use std::ops::Range;
 
-/// Longest source line that is shown, bytes.
+/// Maximum length of a source line that is shown, bytes.
 const LINE_LIMIT: usize = 400;
 
 /// Width to which messages are wrapped, characters: 80 with the margin of their level.
@@ -17,11 +17,11 @@ const MARGIN: usize = 12;
 impl Findings {
     /// All findings, each with its place in the file; `colours` only for a terminal.
     pub fn render(&self, colours: bool) -> String {
-        // ASCII characters in both: the carets are carets, and logs stay legible.
+        // ASCII characters, so that logs stay legible.
         let renderer = if colours { Renderer::styled() } else { Renderer::plain() }
             .decor_style(DecorStyle::Ascii)
             .term_width(WIDTH + MARGIN);
-        let name = harmless(&self.source.origin.display().to_string());
+        let name = replace_control_characters(&self.source.origin.display().to_string());
         let mut out = String::new();
         for finding in &self.list {
             let message = match finding.path.as_str() {
@@ -29,7 +29,7 @@ impl Findings {
                 path => format!("{path}: {}", finding.message),
             };
             let level = if finding.kind.is_warning() { Level::WARNING } else { Level::ERROR };
-            let title = level.primary_title(wrapped(&message));
+            let title = level.primary_title(wrap(&message));
             let line = Line::of(self.source.text(), finding);
             let group = if line.text.len() <= LINE_LIMIT {
                 let span = AnnotationKind::Primary.span(line.span.clone());
@@ -39,7 +39,7 @@ impl Findings {
             } else {
                 title.element(Origin::path(&name).line(finding.line).char_column(finding.column))
             };
-            let help = Level::HELP.message(wrapped(&finding.remedy));
+            let help = Level::HELP.message(wrap(&finding.remedy));
             out.push_str(&renderer.render(&[group.element(help)]));
             out.push_str("\n\n");
         }
@@ -83,25 +83,25 @@ impl Line {
         let from = (at - start).min(line.len());
         let next = line.get(from..).and_then(|rest| rest.chars().next()).map_or(0, char::len_utf8);
         let to = (finding.span.end.max(at) - start).max(from + next).min(line.len());
-        Line { text: harmless(line), span: from..to }
+        Line { text: replace_control_characters(line), span: from..to }
     }
 }
 
 /// Replaces control characters, which a terminal would interpret, by characters of the same length, so that byte offsets stay valid.
-fn harmless(text: &str) -> String {
-    let one = |c: char| match c {
+fn replace_control_characters(text: &str) -> String {
+    let replace = |c: char| match c {
         c if !c.is_control() || c == '\t' => c,
         c if c.len_utf8() == 1 => '?',
         _ => '¿',
     };
-    text.chars().map(one).collect()
+    text.chars().map(replace).collect()
 }
 
 /// Wraps text between words.
-fn wrapped(text: &str) -> String {
+fn wrap(text: &str) -> String {
     let mut out = String::new();
     let mut width = 0;
-    for word in harmless(text).split(' ') {
+    for word in replace_control_characters(text).split(' ') {
         let length = word.chars().count();
         if width > 0 && width + 1 + length > WIDTH {
             out.push('\n');

@@ -1,15 +1,15 @@
-//! A text, its origin, and how offsets become lines and columns.
+//! A text with its origin, and the conversion of offsets to lines and columns.
 
 use crate::mistakes::finding::{Finding, FindingKind};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// What messages call a kind of file.
+/// Name of a kind of file in messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Document {
-    /// Its name, which takes the article `a`, e.g. `campaign`.
+    /// Name, which takes the article `a`, e.g. `campaign`.
     pub name: &'static str,
-    /// A file that ships and shows all of it, e.g. `campaigns/turbo_a.yaml`.
+    /// A complete example that ships with the program, e.g. `campaigns/turbo_a.yaml`.
     pub example: &'static str,
 }
 
@@ -18,10 +18,10 @@ pub struct Document {
 pub struct Source {
     /// The file, for messages; relative paths in the text start from its directory.
     pub origin: PathBuf,
-    /// What kind of file it is.
+    /// Kind of file.
     pub document: &'static Document,
     text: String,
-    /// Byte offset of each character, the end included; empty for plain ASCII, where the two are equal.
+    /// Byte offset of each character, the end included; empty for ASCII, because there both offsets are equal.
     char_offsets: Vec<usize>,
     /// Byte offset of each line's first character.
     line_starts: Vec<usize>,
@@ -72,7 +72,7 @@ impl Source {
             .get(start..end)
             .and_then(|inside| inside.iter().position(|b| matches!(b, b'\n' | b'\r')))
             .map_or(end, |length| start + length);
-        // The parser counts trailing blanks and comments into some spans.
+        // The parser includes trailing blanks and comments in some spans.
         let trimmed = self.text.get(start..cut).map_or(0, |inside| inside.trim_end().len());
         Finding { kind, path, line, column, message, remedy, span: start..start + trimmed }
     }

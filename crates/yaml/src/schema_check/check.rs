@@ -6,28 +6,28 @@ use crate::document::path::{Step, path_text};
 use crate::document::tree::Tree;
 use crate::mistakes::finding::{Finding, FindingKind};
 use crate::mistakes::notes::Notes;
-use crate::schema_check::complaint::{
-    complain, example_of, example_sentence, keys_of, quoted, replacement, shortened, with_description,
+use crate::schema_check::messages::{
+    describe_violation, example_of, example_sentence, keys_of, quote, replacement, shorten, with_description,
     wrong_name,
 };
-use crate::schema_check::quantity_check::{self, Complaint};
-use crate::schema_check::rules::{Rule, Violation, violations};
+use crate::schema_check::quantity_check::{self, Message};
+use crate::schema_check::rules::{Rule, Violation, find_violations};
 use crate::schema_check::schema::Schema;
 use crate::schema_check::suggestion::{closest, guess};
 use serde_json::{Map, Value};
 use std::collections::HashSet;
 
-/// Unknown keys of one mapping that are reported; looking up the place of each takes time.
+/// Maximum number of unknown keys of one mapping that are reported; finding the position of each takes time.
 const UNKNOWN_KEYS_LIMIT: usize = 200;
 
 impl Schema {
-    /// Checks everything the schema says, quantities included, and notes what is wrong.
+    /// Checks a document against the schema, quantities included, and notes every mistake.
     pub fn check(&self, tree: &Tree, notes: &mut Notes) {
-        // A rejected value already has a finding.
-        let refused = notes.list().iter().map(|finding| finding.span.start).collect();
-        let mut check = Check { tree, notes, refused };
-        for violation in violations(&self.value, tree.value()) {
-            check.translate(&violation);
+        // Values with a finding are not checked again.
+        let rejected = notes.list().iter().map(|finding| finding.span.start).collect();
+        let mut check = Check { tree, notes, rejected };
+        for violation in find_violations(&self.value, tree.value()) {
+            check.report(&violation);
             if check.notes.is_full() {
                 break;
             }
@@ -38,38 +38,38 @@ impl Schema {
 struct Check<'a> {
     tree: &'a Tree,
     notes: &'a mut Notes,
-    refused: HashSet<usize>,
+    rejected: HashSet<usize>,
 }
 
 impl Check<'_> {
-    fn translate(&mut self, violation: &Violation<'_>) {
+    fn report(&mut self, violation: &Violation<'_>) {
         let Violation { steps, schema, value, rule } = violation;
         match rule {
-            Rule::Quantity(complaint) => self.note(steps, complaint),
-            // Type, range and kind all fail for one mistake.
+            Rule::Quantity(message) => self.note(steps, message),
+            // One mistake in a quantity violates type, range and kind: report it once.
             _ if quantity_check::check(schema, value).is_some() => {}
-            Rule::UnknownKeys(keys) => self.unknown_keys(steps, keys, schema),
-            Rule::MissingKey(key) => self.missing_key(steps, key, schema),
-            Rule::NoForm(forms) => self.best_form(steps, forms, schema, value),
+            Rule::UnknownKeys(keys) => self.report_unknown_keys(steps, keys, schema),
+            Rule::MissingKey(key) => self.report_missing_key(steps, key, schema),
+            Rule::NoForm(forms) => self.report_intended_form(steps, forms, schema, value),
             rule => {
-                if let Some(complaint) = complain(rule, schema, value) {
-                    self.note(steps, &complaint);
+                if let Some(message) = describe_violation(rule, schema, value) {
+                    self.note(steps, &message);
                 }
             }
         }
     }
 
-    fn note(&mut self, steps: &[Step], Complaint { kind, message, remedy }: &Complaint) {
+    fn note(&mut self, steps: &[Step], Message { kind, message, remedy }: &Message) {
         self.push(self.tree.finding(*kind, steps, message, remedy));
     }
 
     fn push(&mut self, finding: Finding) {
-        if !self.refused.contains(&finding.span.start) {
+        if !self.rejected.contains(&finding.span.start) {
             self.notes.push(finding);
         }
     }
 
-    fn unknown_keys(&mut self, steps: &[Step], unexpected: &[&str], schema: &Map<String, Value>) {
+    fn report_unknown_keys(&mut self, steps: &[Step], unexpected: &[&str], schema: &Map<String, Value>) {
         let known = keys_of(schema);
         let within = match path_text(steps) {
             path if path.is_empty() => format!("in a {}", self.tree.source().document.name),
@@ -79,7 +79,7 @@ impl Check<'_> {
             let (message, remedy) = match replacement(schema, key) {
                 Some(remedy) => (format!("the key `{key}` is no longer known {within}"), remedy.to_owned()),
                 None => (
-                    format!("there is no key `{}` {within}", shortened(key)),
+                    format!("there is no key `{}` {within}", shorten(key)),
                     format!("{}the keys are {}", guess(key, &known), known.join(", ")),
                 ),
             };
@@ -88,9 +88,9 @@ impl Check<'_> {
         }
     }
 
-    fn missing_key(&mut self, steps: &[Step], key: &str, schema: &Map<String, Value>) {
+    fn report_missing_key(&mut self, steps: &[Step], key: &str, schema: &Map<String, Value>) {
         let known = keys_of(schema);
-        let is_mistyped = |there: &str| !known.contains(&there) && closest(there, &known) == Some(key);
+        let is_mistyped = |present: &str| !known.contains(&present) && closest(present, &known) == Some(key);
         // A mistyped key is already reported as an unknown key.
         if self.tree.keys(steps).take(UNKNOWN_KEYS_LIMIT).any(is_mistyped) {
             return;
@@ -101,27 +101,27 @@ impl Check<'_> {
             path => format!("`{path}`"),
         };
         let example = property.and_then(example_of).map_or(format!("{key}: ..."), |e| format!("{key}: {e}"));
-        let complaint = Complaint {
+        let message = Message {
             kind: FindingKind::MissingKey,
             message: format!("{within} has no key `{key}`"),
             remedy: with_description(format!("write e.g. `{example}`"), property.and_then(Value::as_object)),
         };
-        self.note(steps, &complaint);
+        self.note(steps, &message);
     }
 
-    /// For alternative forms, reports the violation of the form with the same type, which was probably intended.
-    fn best_form(
+    /// For alternative forms, reports the violations of the form with the same type, which was probably intended.
+    fn report_intended_form(
         &mut self,
         steps: &[Step],
         forms: &[Vec<Violation<'_>>],
         schema: &Map<String, Value>,
         value: &Value,
     ) {
-        let of_another_type = |violation: &Violation<'_>| {
+        let has_other_type = |violation: &Violation<'_>| {
             violation.steps.len() == steps.len() && matches!(violation.rule, Rule::Type)
         };
-        let meant: Vec<_> = forms.iter().filter(|form| !form.iter().any(of_another_type)).collect();
-        let names: Option<Vec<&str>> = meant
+        let intended: Vec<_> = forms.iter().filter(|form| !form.iter().any(has_other_type)).collect();
+        let names: Option<Vec<&str>> = intended
             .iter()
             .flat_map(|form| form.iter())
             .map(|violation| match &violation.rule {
@@ -130,17 +130,17 @@ impl Check<'_> {
             })
             .collect::<Option<Vec<_>>>()
             .map(|lists| lists.concat());
-        match (names, meant.as_slice()) {
-            // The description of the whole says more than that of the list of names.
+        match (names, intended.as_slice()) {
+            // The description of the whole is more helpful than that of the list of names.
             (Some(names), [_, ..]) => self.note(steps, &wrong_name(&names, schema, value)),
-            (_, [form]) => form.iter().for_each(|violation| self.translate(violation)),
+            (_, [form]) => form.iter().for_each(|violation| self.report(violation)),
             _ => {
-                let complaint = Complaint {
+                let message = Message {
                     kind: FindingKind::WrongType,
-                    message: format!("{} is not one of the forms allowed here", quoted(value)),
+                    message: format!("{} is not one of the forms allowed here", quote(value)),
                     remedy: with_description(example_sentence(schema), Some(schema)),
                 };
-                self.note(steps, &complaint);
+                self.note(steps, &message);
             }
         }
     }

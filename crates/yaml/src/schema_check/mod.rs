@@ -1,7 +1,7 @@
 //! Checks of YAML values against the JSON schema of a type, with a message and a suggestion for each mistake.
 
 pub(crate) mod check;
-pub(crate) mod complaint;
+pub(crate) mod messages;
 pub(crate) mod quantity_check;
 pub(crate) mod rules;
 pub(crate) mod schema;

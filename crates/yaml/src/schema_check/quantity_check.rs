@@ -4,16 +4,16 @@ use crate::mistakes::finding::FindingKind;
 use crate::units::{Kind, parse};
 use serde_json::{Map, Value};
 
-/// What is wrong with a quantity, and what would be right.
+/// A mistake and its remedy, without a position.
 #[derive(Debug, Clone)]
-pub(crate) struct Complaint {
+pub(crate) struct Message {
     pub kind: FindingKind,
     pub message: String,
     pub remedy: String,
 }
 
 /// Checks a value against `x-quantity`, `x-min`, `x-max` and `x-above` of its schema.
-pub(crate) fn check(schema: &Map<String, Value>, value: &Value) -> Option<Complaint> {
+pub(crate) fn check(schema: &Map<String, Value>, value: &Value) -> Option<Message> {
     let kind = schema.get("x-quantity").and_then(Value::as_str).and_then(Kind::from_key)?;
     let example = schema.get("examples").and_then(|list| list.get(0)).and_then(Value::as_str);
     let example = example.unwrap_or_else(|| kind.example());
@@ -22,14 +22,14 @@ pub(crate) fn check(schema: &Map<String, Value>, value: &Value) -> Option<Compla
         // A bare number is a quantity without its unit.
         Value::Number(number) => number.to_string(),
         Value::Null => {
-            return Some(Complaint {
+            return Some(Message {
                 kind: FindingKind::WrongType,
                 message: "there is no value".into(),
                 remedy: format!("write {}, e.g. `{example}`, or remove the key", kind.name()),
             });
         }
         _ => {
-            return Some(Complaint {
+            return Some(Message {
                 kind: FindingKind::WrongType,
                 message: format!("{} is given where {} is needed", name_of(value), kind.name()),
                 remedy: format!("write e.g. `{example}` (units: {})", kind.unit_list()),
@@ -39,7 +39,7 @@ pub(crate) fn check(schema: &Map<String, Value>, value: &Value) -> Option<Compla
     let inside = match parse(kind, &text) {
         Ok(inside) => inside,
         Err(error) => {
-            return Some(Complaint {
+            return Some(Message {
                 kind: FindingKind::Unit,
                 message: error.to_string(),
                 remedy: error.remedy(kind),
@@ -61,14 +61,14 @@ pub(crate) fn check(schema: &Map<String, Value>, value: &Value) -> Option<Compla
     bounds.extend(low.map(|(_, text)| format!("at least {text}")));
     bounds.extend(above.map(|(_, text)| format!("above {text}")));
     bounds.extend(high.map(|(_, text)| format!("at most {text}")));
-    Some(Complaint {
+    Some(Message {
         kind: FindingKind::Range,
         message: format!("`{text}` is too {}", if too_low { "low" } else { "high" }),
         remedy: format!("it must be {}", bounds.join(" and ")),
     })
 }
 
-/// What a JSON value is called in a message.
+/// The name of a value's type in messages.
 pub(crate) fn name_of(value: &Value) -> &'static str {
     match value {
         Value::Null => "nothing",

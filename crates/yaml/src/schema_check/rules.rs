@@ -1,19 +1,19 @@
 //! Checks a value against a JSON schema and returns every violation.
 //!
-//! The keywords are those that schemas made from our own types have; another keyword is a violation. Tests compare the
+//! Supports the keywords of schemas that are generated from our own types; any other keyword is a violation. Tests compare the
 //! verdict with that of a complete validator.
 
 use crate::document::path::Step;
-use crate::schema_check::quantity_check::{self, Complaint};
+use crate::schema_check::quantity_check::{self, Message};
 use serde_json::{Map, Value};
 use std::collections::HashSet;
 
-/// A value, or a place without one, that a schema does not allow.
+/// A value that violates a schema, or a missing one.
 #[derive(Debug)]
 pub(crate) struct Violation<'a> {
     /// The value's place.
     pub steps: Vec<Step>,
-    /// The schema that holds the violated rule.
+    /// The schema with the violated rule.
     pub schema: &'a Map<String, Value>,
     /// The value.
     pub value: &'a Value,
@@ -24,7 +24,7 @@ pub(crate) struct Violation<'a> {
 #[derive(Debug)]
 pub(crate) enum Rule<'a> {
     Type,
-    /// The names allowed.
+    /// The allowed names.
     Names(Vec<&'a str>),
     Pattern,
     Minimum(&'a Value),
@@ -39,14 +39,14 @@ pub(crate) enum Rule<'a> {
     MissingKey(&'a str),
     /// None of several alternative forms fits, with the violations of each.
     NoForm(Vec<Vec<Violation<'a>>>),
-    /// More than one form fits of which one must.
+    /// More than one form fits, but exactly one must.
     SeveralForms,
-    Quantity(Complaint),
+    Quantity(Message),
     /// An unsupported keyword: a defect of the program.
     UnknownKeyword(&'a str),
 }
 
-/// Keywords that demand nothing of a value alone, or nothing of a value of this type.
+/// Keywords that are checked elsewhere, or that do not apply to a value of this type.
 const KNOWN: [&str; 21] = [
     "$schema",
     "title",
@@ -71,16 +71,16 @@ const KNOWN: [&str; 21] = [
     "maxProperties",
 ];
 
-/// Everything that is wrong with a value.
-pub(crate) fn violations<'a>(schema: &'a Value, value: &'a Value) -> Vec<Violation<'a>> {
-    let mut walk = Walk { steps: Vec::new(), found: Vec::new() };
+/// Returns all violations of a schema by a value.
+pub(crate) fn find_violations<'a>(schema: &'a Value, value: &'a Value) -> Vec<Violation<'a>> {
+    let mut walk = Walk { steps: Vec::new(), violations: Vec::new() };
     walk.check(schema, value);
-    walk.found
+    walk.violations
 }
 
 struct Walk<'a> {
     steps: Vec<Step>,
-    found: Vec<Violation<'a>>,
+    violations: Vec<Violation<'a>>,
 }
 
 impl<'a> Walk<'a> {
@@ -91,36 +91,41 @@ impl<'a> Walk<'a> {
             _ => return,
         };
         for (keyword, argument) in schema {
-            if let Some(rule) = violated(keyword, argument, schema, value) {
+            if let Some(rule) = check_keyword(keyword, argument, schema, value) {
                 self.note(schema, value, rule);
             }
         }
-        self.forms(schema, value);
+        self.check_forms(schema, value);
         match value {
-            Value::Array(items) => self.items(schema, items),
-            Value::Object(entries) => self.entries(schema, value, entries),
+            Value::Array(items) => self.check_items(schema, items),
+            Value::Object(entries) => self.check_entries(schema, value, entries),
             _ => {}
         }
     }
 
     fn note(&mut self, schema: &'a Map<String, Value>, value: &'a Value, rule: Rule<'a>) {
-        self.found.push(Violation { steps: self.steps.clone(), schema, value, rule });
+        self.violations.push(Violation { steps: self.steps.clone(), schema, value, rule });
     }
 
-    fn below(&mut self, step: Step, schema: &'a Value, value: &'a Value) {
+    fn check_child(&mut self, step: Step, schema: &'a Value, value: &'a Value) {
         self.steps.push(step);
         self.check(schema, value);
         self.steps.pop();
     }
 
-    fn items(&mut self, schema: &'a Map<String, Value>, items: &'a [Value]) {
+    fn check_items(&mut self, schema: &'a Map<String, Value>, items: &'a [Value]) {
         let Some(inner) = schema.get("items") else { return };
         for (index, item) in items.iter().enumerate() {
-            self.below(Step::Index(index), inner, item);
+            self.check_child(Step::Index(index), inner, item);
         }
     }
 
-    fn entries(&mut self, schema: &'a Map<String, Value>, value: &'a Value, entries: &'a Map<String, Value>) {
+    fn check_entries(
+        &mut self,
+        schema: &'a Map<String, Value>,
+        value: &'a Value,
+        entries: &'a Map<String, Value>,
+    ) {
         let properties = schema.get("properties").and_then(Value::as_object);
         let others = schema.get("additionalProperties");
         let mut unknown = Vec::new();
@@ -128,7 +133,7 @@ impl<'a> Walk<'a> {
             let inner = properties.and_then(|properties| properties.get(key)).or(others);
             match inner {
                 Some(Value::Bool(false)) => unknown.push(key.as_str()),
-                Some(inner) => self.below(Step::Key(key.clone()), inner, value),
+                Some(inner) => self.check_child(Step::Key(key.clone()), inner, value),
                 None => {}
             }
         }
@@ -141,16 +146,16 @@ impl<'a> Walk<'a> {
         }
     }
 
-    fn forms(&mut self, schema: &'a Map<String, Value>, value: &'a Value) {
+    fn check_forms(&mut self, schema: &'a Map<String, Value>, value: &'a Value) {
         for (keyword, exactly_one) in [("anyOf", false), ("oneOf", true)] {
             let Some(forms) = schema.get(keyword).and_then(Value::as_array) else { continue };
             let mut tried = Vec::new();
             for form in forms {
-                let mut walk = Walk { steps: self.steps.clone(), found: Vec::new() };
+                let mut walk = Walk { steps: self.steps.clone(), violations: Vec::new() };
                 walk.check(form, value);
-                tried.push(walk.found);
+                tried.push(walk.violations);
             }
-            match tried.iter().filter(|found| found.is_empty()).count() {
+            match tried.iter().filter(|violations| violations.is_empty()).count() {
                 0 => self.note(schema, value, Rule::NoForm(tried)),
                 1 => {}
                 _ if exactly_one => self.note(schema, value, Rule::SeveralForms),
@@ -160,8 +165,8 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// Whether a value violates one keyword that needs no look into its entries.
-fn violated<'a>(
+/// Checks one keyword that does not concern the entries of the value.
+fn check_keyword<'a>(
     keyword: &'a str,
     argument: &'a Value,
     schema: &Map<String, Value>,
@@ -214,7 +219,7 @@ fn violated<'a>(
     }
 }
 
-/// A text that is the same for equal values only. Numbers are compared by value: 1 and 1.0 are equal.
+/// A text that identifies a value: 1 and 1.0 are equal.
 fn key_of(item: &Value) -> String {
     match item.as_f64() {
         Some(number) => number.to_string(),
@@ -327,7 +332,7 @@ mod tests {
             for (value, valid) in [(right, true), (wrong, false)] {
                 let document = json!({"name": "ab", "mode": "auto", key: value});
                 assert_eq!(oracle.is_valid(&document), valid, "{document}");
-                assert_eq!(violations(&schema, &document).is_empty(), valid, "{document}");
+                assert_eq!(find_violations(&schema, &document).is_empty(), valid, "{document}");
             }
         }
     }
@@ -340,7 +345,7 @@ mod tests {
             thread_local! { static ORACLE: jsonschema::Validator = oracle(); }
             let valid = ORACLE.with(|oracle| oracle.is_valid(&document));
             let schema = schema();
-            prop_assert_eq!(violations(&schema, &document).is_empty(), valid, "{}", document);
+            prop_assert_eq!(find_violations(&schema, &document).is_empty(), valid, "{}", document);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! A JSON schema made from a type: given to editors, and what a file is checked against.
+//! A JSON schema generated from a type, for editors and for the checks of files.
 
 use schemars::transform::{Transform, transform_subschemas};
 use schemars::{JsonSchema, generate::SchemaSettings};
@@ -16,7 +16,7 @@ impl Schema {
         Schema::new(json_schema_of::<T>())
     }
 
-    /// A schema written out.
+    /// A schema from its JSON value.
     pub fn new(value: Value) -> Self {
         Schema { value }
     }

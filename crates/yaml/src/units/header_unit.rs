@@ -1,4 +1,4 @@
-//! Units as the headers of logs and tables write them.
+//! Units in the headers of logs and tables.
 
 use super::kind::CUBIC_FOOT_M3;
 use super::{BARE_RATIO, Kind, Unit};
@@ -8,7 +8,7 @@ use serde::Serialize;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reference {
-    /// The header does not say.
+    /// The header does not state it.
     Unstated,
     /// Vacuum.
     Absolute,
@@ -19,15 +19,15 @@ pub enum Reference {
 /// A recognised unit of a header.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeaderUnit {
-    /// What it measures.
+    /// Kind of quantity.
     pub kind: Kind,
     /// The unit.
     pub unit: &'static Unit,
-    /// What a pressure is measured from.
+    /// Reference of a pressure.
     pub reference: Reference,
 }
 
-/// Spellings that logs use in addition to those of the table of units, in small letters without blanks.
+/// Spellings in logs, in addition to those of the table of units; lower case without blanks.
 const SPELLINGS: &[(Kind, &str, &[&str])] = &[
     (
         Kind::Temperature,
@@ -124,7 +124,7 @@ const SPELLINGS: &[(Kind, &str, &[&str])] = &[
     (Kind::Duration, "h", &["h", "hr", "hours", "std", "stunden"]),
 ];
 
-/// Pressures without what they are measured from.
+/// Units of pressure without a reference.
 const PRESSURES: &[(&str, &str)] = &[
     ("mbar", "mbar"),
     ("kpa", "kPa"),
@@ -160,8 +160,8 @@ const PRESSURES: &[(&str, &str)] = &[
     ("па", "Pa"),
 ];
 
-/// Units of volume flow in small letters without blanks, and their value in m3/s; `None` for a volume under standard conditions, which the
-/// unit does not state.
+/// Units of volume flow, lower case without blanks, and their value in m3/s; `None` for a volume at standard conditions, which the
+/// unit does not define.
 const VOLUME_FLOWS: &[(Option<f64>, &[&str])] = &[
     (None, &["scfm", "sft3/min", "std.cfm", "stdcfm", "slpm", "sl/min", "nl/min", "nlpm", "slm"]),
     (Some(1.0), &["m3/s", "m³/s", "m^3/s", "cbm/s"]),
@@ -174,7 +174,8 @@ const VOLUME_FLOWS: &[(Option<f64>, &[&str])] = &[
     (Some(CUBIC_FOOT_M3), &["cfs", "ft3/s", "ft^3/s", "ft³/s"]),
 ];
 
-/// Whether a unit is one of volume flow, and its value in m3/s; `Some(None)` under standard conditions, which the unit does not state.
+/// The value of a unit of volume flow in m3/s; `Some(None)` for a volume at standard conditions, which the unit does not define; `None` for
+/// other units.
 pub fn volume_flow_m3_s(text: &str) -> Option<Option<f64>> {
     let plain: String = text.chars().filter(|c| !c.is_whitespace() && !"[]()".contains(*c)).collect();
     let lower = plain.to_lowercase();
@@ -185,7 +186,7 @@ const GAUGE: &[&str] =
     &["g", "(g)", "_g", "rel", "_rel", "(rel)", "r", "ü", "(ü)", "gauge", "ue", "-g", "relativ"];
 const ABSOLUTE: &[&str] = &["a", "(a)", "_a", "abs", "_abs", "(abs)", "absolute", "absolut", "-a", "abs."];
 
-/// The unit that a header text stands for; `None` if it is not a unit.
+/// Recognises the unit in a header; `None` if the text is not a unit.
 pub fn header_unit(text: &str) -> Option<HeaderUnit> {
     let plain: String = text.chars().filter(|c| !c.is_whitespace() && !['[', ']'].contains(c)).collect();
     let lower = plain.to_lowercase();
@@ -210,18 +211,17 @@ pub fn header_unit(text: &str) -> Option<HeaderUnit> {
     None
 }
 
-/// The unit with that symbol, which for a share may be none.
+/// The unit with this symbol; ratios also have the unit `1`.
 fn unit(kind: Kind, symbol: &str) -> Option<&'static Unit> {
     kind.unit(symbol).or((symbol == BARE_RATIO.symbol()).then_some(&BARE_RATIO))
 }
 
-/// A name and its unit, if a header holds both: `T2 [degC]`, `T2 (degC)`, `p2 / kPa`, `p2 in kPa`, `T2_degC`.
+/// Splits a header into its name and its unit, if it has both: `T2 [degC]`, `T2 (degC)`, `p2 / kPa`, `p2 in kPa`, `T2_degC`.
 pub fn split_unit(header: &str) -> (String, Option<String>) {
     let header = header.trim();
-    let whole = || (header.to_owned(), None);
     for (open, close, any) in [('[', ']', true), ('(', ')', false), ('{', '}', false), ('<', '>', false)] {
         let Some(inside) = header.strip_suffix(close) else { continue };
-        // The bracket that the last one closes: `P2 (kPa(g))`.
+        // The opening bracket that belongs to the last closing one: `P2 (kPa(g))`.
         let mut depth = 1;
         let opens = |(_, letter): &(usize, char)| {
             depth += i32::from(*letter == close) - i32::from(*letter == open);
@@ -229,7 +229,7 @@ pub fn split_unit(header: &str) -> (String, Option<String>) {
         };
         let Some((at, _)) = inside.char_indices().rev().find(opens) else { continue };
         let (name, unit) = (&inside[..at], inside[at + open.len_utf8()..].trim());
-        // `bar (g)` and `[bar(g)]` hold brackets of their own.
+        // `bar (g)` and `[bar(g)]` contain brackets.
         if !name.trim().is_empty()
             && !unit.is_empty()
             && (any || header_unit(unit).is_some() || volume_flow_m3_s(unit).is_some())
@@ -237,12 +237,12 @@ pub fn split_unit(header: &str) -> (String, Option<String>) {
             return (name.trim().trim_end_matches(['/', ',']).trim().to_owned(), Some(unit.to_owned()));
         }
     }
-    // The longest unit is the one that is meant: `m kg/h` ends in `h` as well.
+    // Take the longest unit: `m kg/h` ends in `h` as well.
     let mut best: Option<(&str, &str)> = None;
     for between in [" / ", " in ", "/", ", ", "_", " "] {
         for (at, _) in header.match_indices(between) {
             let (name, unit) = (header[..at].trim(), header[at + between.len()..].trim());
-            // A single letter behind a blank or a line is a place more often than a unit: `T_C`, `p_a`.
+            // A single letter after a blank or an underscore is more often a station than a unit: `T_C`, `p_a`.
             let doubtful = [" ", "_"].contains(&between) && unit.len() < 2;
             let longer = best.is_none_or(|(_, known)| known.len() < unit.len());
             let stated = !name.is_empty() && !doubtful && unit != "-" && !unit.ends_with("--");
@@ -254,7 +254,7 @@ pub fn split_unit(header: &str) -> (String, Option<String>) {
     if let Some((name, unit)) = best {
         return (name.to_owned(), Some(unit.to_owned()));
     }
-    whole()
+    (header.to_owned(), None)
 }
 
 #[cfg(test)]

@@ -1,11 +1,11 @@
 //! The table of quantities and their units.
 
-/// One unit: `inside = (value + zero) * numerator / denominator * 10^decade`.
+/// A unit. Conversion to the internal unit (SI, except rpm for shaft speed): `(value + zero) * numerator / denominator * 10^decade`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unit {
     /// Spellings; the first is the one shown to people.
     pub spellings: &'static [&'static str],
-    /// What is added to a written value before scaling; not 0 for degC and degF alone.
+    /// Offset that is added to a written value before scaling; 0 except for degC and degF.
     pub zero: f64,
     /// Numerator of the exact factor.
     pub numerator: f64,
@@ -21,7 +21,7 @@ impl Unit {
         self.spellings.first().copied().unwrap_or_default()
     }
 
-    /// A value in this unit, in the unit used inside (SI; rpm for shaft speed).
+    /// Converts a value from this unit to the internal unit (SI, except rpm for shaft speed).
     pub fn to_inside(&self, value: f64) -> f64 {
         // Adding 0 would turn -0 into 0; values in the internal unit must not change at all.
         let shifted = if self.zero == 0.0 { value } else { value + self.zero };
@@ -35,7 +35,7 @@ impl Unit {
         factors(self) == factors(other)
     }
 
-    /// A value in the unit used inside, in this unit.
+    /// Converts a value from the internal unit to this unit.
     pub fn from_inside(&self, inside: f64) -> f64 {
         let scaled = if self.decade < 0 {
             inside * 10f64.powi(-self.decade)
@@ -156,7 +156,7 @@ const PRESSURE_RATE: &[Unit] = &[decimal(&["Pa/s"], 0), decimal(&["kPa/s"], 3), 
 const TEMPERATURE_RATE: &[Unit] = &[decimal(&["K/s"], 0), unit(&["K/min"], 1.0, 60.0)];
 const RATIO_RATE: &[Unit] = &[decimal(&["1/s"], 0), decimal(&["%/s"], -2)];
 
-/// Ties a type to its kind.
+/// A type that stands for a kind of quantity.
 pub trait Dimension {
     /// The kind.
     const KIND: Kind;
@@ -165,7 +165,7 @@ pub trait Dimension {
 /// Declares the kinds: for each its type, its key, its name with the article, a value as one would write it, and its units.
 macro_rules! kinds {
     ($($(#[$doc:meta])* $name:ident $key:literal, $named:literal, $example:literal, $units:ident;)*) => {
-        /// What a value written with a unit measures.
+        /// Kind of a quantity.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
         pub enum Kind {
             $($(#[$doc])* $name,)*
@@ -199,7 +199,7 @@ macro_rules! kinds {
                 match self { $(Kind::$name => $example,)* }
             }
 
-            /// The units that may be written; the first of them is the unit used inside, but for fractions.
+            /// The allowed units; the first is the internal unit, except for fractions.
             pub fn units(self) -> &'static [Unit] {
                 match self { $(Kind::$name => $units,)* }
             }
@@ -208,43 +208,43 @@ macro_rules! kinds {
 }
 
 kinds! {
-    /// Absolute temperature, K inside.
+    /// Absolute temperature; stored in K.
     Temperature "temperature", "a temperature", "25 degC", TEMPERATURE;
-    /// Difference of temperatures (noise, offset), K inside.
+    /// Difference of temperatures (noise, offset); stored in K.
     TemperatureDifference "temperature_difference", "a temperature difference", "0.25 K", TEMPERATURE_DIFFERENCE;
-    /// Absolute pressure, Pa inside.
+    /// Absolute pressure; stored in Pa.
     Pressure "pressure", "an absolute pressure", "100 kPa", PRESSURE;
-    /// Difference of pressures (noise, offset), Pa inside.
+    /// Difference of pressures (noise, offset); stored in Pa.
     PressureDifference "pressure_difference", "a pressure difference", "50 Pa", PRESSURE_DIFFERENCE;
-    /// Shaft speed, rpm inside.
+    /// Shaft speed; stored in rpm.
     Speed "speed", "a shaft speed", "110 krpm", SPEED;
-    /// Mass flow, kg/s inside.
+    /// Mass flow; stored in kg/s.
     MassFlow "mass_flow", "a mass flow", "1.5e-4 kg/s", MASS_FLOW;
-    /// Time, s inside.
+    /// Time; stored in s.
     Duration "duration", "a time", "10 s", DURATION;
-    /// Length, m inside.
+    /// Length; stored in m.
     Length "length", "a length", "35 mm", LENGTH;
-    /// Area, m2 inside.
+    /// Area; stored in m2.
     Area "area", "an area", "29e-3 m^2", AREA;
-    /// Volume, m3 inside.
+    /// Volume; stored in m3.
     Volume "volume", "a volume", "0.78e-3 m^3", VOLUME;
-    /// Mass, kg inside.
+    /// Mass; stored in kg.
     Mass "mass", "a mass", "0.93 kg", MASS;
-    /// Moment of inertia, kg m2 inside.
+    /// Moment of inertia; stored in kg m2.
     Inertia "inertia", "a moment of inertia", "16e-6 kg m^2", INERTIA;
-    /// Thermal conductance, W/K inside.
+    /// Thermal conductance; stored in W/K.
     Conductance "conductance", "a thermal conductance", "8 W/K", CONDUCTANCE;
-    /// Thermal conductivity, W/(m K) inside.
+    /// Thermal conductivity; stored in W/(m K).
     Conductivity "conductivity", "a thermal conductivity", "47.5 W/(m K)", CONDUCTIVITY;
-    /// Share of a whole, a ratio inside.
+    /// Share of a whole; stored as a ratio.
     Fraction "fraction", "a share", "0.5 %", FRACTION;
-    /// Frequency, Hz inside.
+    /// Frequency; stored in Hz.
     Frequency "frequency", "a frequency", "10 Hz", FREQUENCY;
-    /// Rate of a pressure, Pa/s inside.
+    /// Rate of a pressure; stored in Pa/s.
     PressureRate "pressure_rate", "a rate of pressure", "100 kPa/s", PRESSURE_RATE;
-    /// Rate of a temperature, K/s inside.
+    /// Rate of a temperature; stored in K/s.
     TemperatureRate "temperature_rate", "a rate of temperature", "5 K/s", TEMPERATURE_RATE;
-    /// Rate of a ratio such as a valve opening, 1/s inside.
+    /// Rate of a ratio such as a valve opening; stored in 1/s.
     RatioRate "ratio_rate", "a rate of opening", "1 1/s", RATIO_RATE;
 }
 

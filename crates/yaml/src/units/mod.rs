@@ -1,9 +1,9 @@
-//! Values written with units: the one table of what may be written, its parsing, and [`Quantity`].
+//! Values with units: the table of allowed units, the parser, and [`Quantity`].
 //!
 //! Decimal prefixes are added to the written exponent, so that `1.1 bar` is the `f64` nearest to 110000 and
-//! `52 mm` equals `52e-3`; the few other factors are exact definitions. A units library multiplies by a rounded
-//! factor, has no name for `krpm`, and parses only its own spellings; this table is short enough to be read against
-//! the definitions of its units.
+//! `52 mm` equals `52e-3`; the few other factors are exact definitions. A library for units multiplies by a rounded
+//! factor, has no name for `krpm`, and parses only its own spellings; this table is short enough to check against
+//! the definitions of the units.
 
 mod header_unit;
 mod kind;

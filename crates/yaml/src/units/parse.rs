@@ -2,39 +2,39 @@
 
 use super::{Kind, Unit};
 
-/// Why a text is not a quantity of the kind that is needed.
+/// Reason why a text is not a quantity of the required kind.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum UnitError {
     /// It does not start with a number.
     #[error("`{text}` does not start with a number")]
     NoNumber {
-        /// What was written.
+        /// The text as written.
         text: String,
     },
     /// A decimal comma.
     #[error("`{text}` has a decimal comma")]
     DecimalComma {
-        /// What was written.
+        /// The text as written.
         text: String,
     },
-    /// The number is too large for the computer.
+    /// The number overflows.
     #[error("`{text}` is not a finite number")]
     NotFinite {
-        /// What was written.
+        /// The text as written.
         text: String,
     },
     /// A number without its unit.
     #[error("`{text}` has no unit")]
     NoUnit {
-        /// What was written.
+        /// The text as written.
         text: String,
     },
-    /// A unit that does not measure this.
+    /// A unit of another kind of quantity.
     #[error("`{unit}` is not a unit of {}", .kind.name())]
     WrongUnit {
         /// The unit as written.
         unit: String,
-        /// What is measured.
+        /// The required kind of quantity.
         kind: Kind,
     },
 }
@@ -64,38 +64,36 @@ fn wrong_unit_remedy(unit: &str, kind: Kind, units: &str) -> String {
         Kind::Pressure
             if ["psi", "psig", "barg", "bara", "bar(g)", "bar(a)", "kpag"].contains(&lower.as_str()) =>
         {
-            format!(
-                "all pressures are absolute, and the unit must leave no doubt about it; write one of {units}"
-            )
+            format!("all pressures are absolute, and the unit must be unambiguous; write one of {units}")
         }
         Kind::TemperatureDifference if Kind::Temperature.unit(unit).is_some() => {
             format!("`{unit}` gives a temperature, not a difference of two; write one of {units}")
         }
         _ => {
-            let same_but_for_case = kind
+            let differs_in_case = kind
                 .units()
                 .iter()
                 .find(|candidate| candidate.spellings.iter().any(|s| s.to_lowercase() == lower))
                 .map(|candidate| format!("did you mean `{}`? ", candidate.symbol()));
-            format!("{}the units of {} are {units}", same_but_for_case.unwrap_or_default(), kind.name())
+            format!("{}the units of {} are {units}", differs_in_case.unwrap_or_default(), kind.name())
         }
     }
 }
 
-/// Reads a number and its unit, e.g. `110 krpm`; the result is in the unit used inside (SI; rpm for shaft speed).
+/// Parses a number and its unit, e.g. `110 krpm`; the result is in SI units, except shaft speed in rpm.
 ///
 /// Sign, decimal point and exponent are allowed; the blank before the unit may be missing.
 ///
 /// # Errors
-/// [`UnitError`], whose [`remedy`](UnitError::remedy) says what would be right.
+/// [`UnitError`], with its [`remedy`](UnitError::remedy).
 pub fn parse(kind: Kind, text: &str) -> Result<f64, UnitError> {
     parse_with(kind, text, |spelling| kind.unit(spelling))
 }
 
-/// As [`parse`], with the units that `unit_of` knows. It is asked for the empty spelling if the text is a bare number.
+/// Like [`parse`], with the units that `unit_of` returns. The spelling of a bare number's unit is empty.
 ///
 /// # Errors
-/// As [`parse`].
+/// The same as those of [`parse`].
 pub fn parse_with(
     kind: Kind,
     text: &str,
@@ -115,13 +113,13 @@ pub fn parse_with(
         "" => UnitError::NoUnit { text: text.to_owned() },
         _ => UnitError::WrongUnit { unit: unit.to_owned(), kind },
     })?;
-    let inside = shifted(number, found).unwrap_or_else(|| found.to_inside(value));
-    if inside.is_finite() { Ok(inside) } else { Err(UnitError::NotFinite { text: text.to_owned() }) }
+    let value = shift_decimal_point(number, found).unwrap_or_else(|| found.to_inside(value));
+    if value.is_finite() { Ok(value) } else { Err(UnitError::NotFinite { text: text.to_owned() }) }
 }
 
-/// The value of a unit that differs from the one inside by a power of ten alone: `1.1 bar` is read as `1.1e5`, so
-/// that it is the `f64` nearest to what was written.
-fn shifted(number: &str, unit: &Unit) -> Option<f64> {
+/// Converts a unit that differs from the SI unit by a power of ten only: `1.1 bar` becomes `1.1e5`, the `f64` nearest to the written
+/// value.
+fn shift_decimal_point(number: &str, unit: &Unit) -> Option<f64> {
     if unit.zero != 0.0 || unit.numerator != unit.denominator {
         return None;
     }
@@ -130,7 +128,7 @@ fn shifted(number: &str, unit: &Unit) -> Option<f64> {
     format!("{mantissa}e{exponent}").parse().ok()
 }
 
-/// Bytes of the number at the start of the text: `[+-]digits[.digits][e[+-]digits]`, at least one digit.
+/// Length in bytes of the number at the start of the text: `[+-]digits[.digits][e[+-]digits]`, at least one digit.
 fn number_length(text: &str) -> usize {
     let bytes = text.as_bytes();
     let digits_from = |start: usize| bytes.iter().skip(start).take_while(|b| b.is_ascii_digit()).count();

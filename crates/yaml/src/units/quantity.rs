@@ -1,4 +1,4 @@
-//! A value of a known kind, as written in the YAML.
+//! A value with its unit in a YAML file.
 
 use super::{Dimension, Kind, parse};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -11,22 +11,22 @@ use std::{borrow::Cow, marker::PhantomData};
 /// range with `x-min`, `x-max` (both inclusive) and `x-above` (exclusive), written with units as well.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quantity<D> {
-    /// The value in the unit used inside: SI, but rpm for shaft speed.
-    pub inside: f64,
+    /// The value in SI units, except shaft speed in rpm.
+    pub value: f64,
     dimension: PhantomData<D>,
 }
 
 impl<D: Dimension> Quantity<D> {
-    /// From a value in the unit used inside.
-    pub fn from_inside(inside: f64) -> Self {
-        Quantity { inside, dimension: PhantomData }
+    /// A quantity from its value in SI units, except shaft speed in rpm.
+    pub fn new(value: f64) -> Self {
+        Quantity { value, dimension: PhantomData }
     }
 }
 
 impl<D> From<Quantity<D>> for f64 {
-    /// The value in the unit used inside.
+    /// The value in SI units, except shaft speed in rpm.
     fn from(quantity: Quantity<D>) -> f64 {
-        quantity.inside
+        quantity.value
     }
 }
 
@@ -34,7 +34,7 @@ impl<'de, D: Dimension> Deserialize<'de> for Quantity<D> {
     fn deserialize<S: Deserializer<'de>>(deserializer: S) -> Result<Self, S::Error> {
         let text = String::deserialize(deserializer)?;
         parse(D::KIND, &text)
-            .map(Self::from_inside)
+            .map(Self::new)
             .map_err(|error| de::Error::custom(format!("{error}; {}", error.remedy(D::KIND))))
     }
 }

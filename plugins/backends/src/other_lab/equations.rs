@@ -1,4 +1,4 @@
-//! Puts the equations of this lab into the rig of the virtual lab.
+//! Connects the equations of this lab with the rig of the virtual lab.
 
 use super::motion::Motion;
 use super::structure::{NAME, OtherStructure};
@@ -35,9 +35,9 @@ impl Structure for OtherStructure {
         boundary: &BoundaryConditions,
         watch: Watch,
     ) -> Result<Box<dyn RunningMachine>, StructureError> {
-        // Starting at the steady state of the lumped model, these equations settle to their own.
-        let rest = steady::settle_under(model, boundary)?;
-        let mut motion = Motion::new(model, self.clone(), t_s, rest.state, watch);
+        // Start from the steady state of the lumped model, and settle to that of these equations.
+        let lumped = steady::settle_under(model, boundary)?;
+        let mut motion = Motion::new(model, self.clone(), t_s, lumped.state, watch);
         motion.settle(boundary)?;
         Ok(Box::new(motion))
     }

@@ -36,7 +36,7 @@ pub(super) const SIZES: [f64; STATES] =
 
 /// Specific heat ratio of air in the volumes.
 const GAMMA: f64 = 1.4;
-/// Position on the speed line at which the flow separates, and the return that it needs to reattach.
+/// Position on the speed line at which the flow separates, and the distance back to its reattachment.
 const SEPARATION_POSITION: f64 = 0.90;
 const REATTACHMENT_DISTANCE: f64 = 0.12;
 /// Width of that transition as a position on the speed line, and its time, s.
@@ -88,7 +88,7 @@ fn mean(values: &[f64; NODES], shares: &[f64; NODES]) -> f64 {
     values.iter().zip(shares).map(|(value, share)| value * share).sum()
 }
 
-/// Evaluates everything at one instant. `model` is the rig's, with flow and efficiency scales without separation.
+/// Evaluates the machine at one time. `model` is that of the rig, with flow and efficiency scales without separation.
 pub(super) fn evaluate(
     model: &Model,
     structure: &OtherStructure,
@@ -144,7 +144,7 @@ pub(super) fn evaluate(
         compression::after_wheel(one_wall_w_k, lumped.t2_prime_k, lumped.wall_k, flow_kg_s, cp2_j_kgk);
     // Keeps the change that hooks make to the outlet gas.
     let gas_k = gas_k + (lumped.t2_k - one_wall_k);
-    // Before the wheel, the gas exchanges heat with the shroud. Its temperature there is the model's, at the mean wall temperature.
+    // Before the wheel, the gas exchanges heat with the shroud. Its temperature is that of the model, at the mean wall temperature.
     heats_w[0] += lumped.compressor_heat_w - one_wall_w;
 
     // Two volumes and the duct between them.
@@ -252,8 +252,8 @@ fn separation_rate(structure: &OtherStructure, place: f64, separation: f64) -> f
         return 0.0;
     }
     let threshold = SEPARATION_POSITION - REATTACHMENT_DISTANCE * separation;
-    let wanted = 1.0 / (1.0 + (-(place - threshold) / (0.25 * TRANSITION)).exp());
-    (wanted - separation) / SEPARATION_S
+    let equilibrium = 1.0 / (1.0 + (-(place - threshold) / (0.25 * TRANSITION)).exp());
+    (equilibrium - separation) / SEPARATION_S
 }
 
 #[cfg(test)]

@@ -1,5 +1,5 @@
-//! A simulated gas stand with other equations than the lumped model, so that a diagnosis can be checked with a machine that it does not
-//! assume: a housing of four nodes, two volumes and a duct behind the wheel, a map with hysteresis, second-order sensors. Actuators,
+//! A simulated gas stand whose equations differ from the lumped model, to check a diagnosis with a machine that it does not
+//! assume: a housing of four nodes, two volumes and a duct after the wheel, a map with hysteresis, second-order sensors. Actuators,
 //! weather, offsets, noise, standstill and trips are those of the virtual lab.
 
 mod equations;

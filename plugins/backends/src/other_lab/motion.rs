@@ -14,16 +14,16 @@ use mapper_physics::simulation::simulate::{
 /// Simulated time to a steady state, s: many time constants of the turbine housing.
 const SETTLING_TIME_S: f64 = 40_000.0;
 
-/// A machine with these equations.
+/// A running machine with the equations of this lab.
 #[derive(Debug)]
 pub(super) struct Motion {
     model: Model,
     structure: OtherStructure,
     watch: Watch,
-    /// `None` until the boundary conditions are known; then it contains the start.
+    /// `None` until the boundary conditions are known.
     integrator: Option<Integrator<STATES>>,
-    begin: (f64, State),
-    /// Whether it was beyond the surge line and above the speed limit at the end of the last step.
+    initial: (f64, State),
+    /// Whether the machine was beyond the surge line, and above the speed limit, at the end of the last step.
     beyond: Option<[bool; 2]>,
 }
 
@@ -35,18 +35,25 @@ impl Motion {
         state: State,
         watch: Watch,
     ) -> Self {
-        Motion { model: model.clone(), structure, watch, integrator: None, begin: (t_s, state), beyond: None }
+        Motion {
+            model: model.clone(),
+            structure,
+            watch,
+            integrator: None,
+            initial: (t_s, state),
+            beyond: None,
+        }
     }
 
     /// Settles to the steady state under `boundary`, without advancing the lab's time.
     pub(super) fn settle(&mut self, boundary: &BoundaryConditions) -> Result<(), StructureError> {
-        let (t_s, state) = self.begin;
+        let (t_s, state) = self.initial;
         let mut integrator = Integrator::new(t_s, start(&self.model, boundary, &state), tolerances());
         let mut system = System::new(&self.model, &self.structure, boundary, t_s);
         while integrator.t_s < t_s + SETTLING_TIME_S {
             integrator.step(&mut system, t_s + SETTLING_TIME_S)?;
         }
-        self.begin.1 = lumped_state(&integrator.y);
+        self.initial.1 = lumped_state(&integrator.y);
         self.integrator = Some(Integrator::new(t_s, integrator.y, tolerances()));
         Ok(())
     }
@@ -59,7 +66,7 @@ fn tolerances() -> Tolerances<STATES> {
 
 impl RunningMachine for Motion {
     fn state(&self) -> State {
-        self.integrator.as_ref().map_or(self.begin.1, |integrator| lumped_state(&integrator.y))
+        self.integrator.as_ref().map_or(self.initial.1, |integrator| lumped_state(&integrator.y))
     }
 
     fn restart(&mut self) {
@@ -83,9 +90,9 @@ impl RunningMachine for Motion {
         on_sample: &mut dyn FnMut(f64, &State, &Outputs),
         on_event: &mut dyn FnMut(ModelEvent),
     ) -> Result<(), SimulationError> {
-        let Motion { model, structure, watch, integrator, begin, beyond } = self;
+        let Motion { model, structure, watch, integrator, initial, beyond } = self;
         let integrator = integrator.get_or_insert_with(|| {
-            let (t_s, state) = *begin;
+            let (t_s, state) = *initial;
             Integrator::new(t_s, start(model, &inputs.at(t_s), &state), tolerances())
         });
         let mut samples = sample_times_s.peekable();
@@ -108,7 +115,7 @@ impl RunningMachine for Motion {
                 while let Some(t_s) = samples.next_if(|t| *t <= step.t1_s) {
                     sample(t_s, &step.at(t_s));
                 }
-                report(model, structure, *watch, inputs, (step.t1_s, &step.y1), beyond, on_event);
+                report_crossings(model, structure, *watch, inputs, (step.t1_s, &step.y1), beyond, on_event);
             }
             if kink_s <= end_s {
                 integrator.restart();
@@ -118,8 +125,8 @@ impl RunningMachine for Motion {
     }
 }
 
-/// Reports crossings of limits since the last step, with the time of the step's end: the steps are far shorter than a sample.
-fn report(
+/// Reports crossings of limits since the last step, at the end of the step: steps are far shorter than a sample.
+fn report_crossings(
     model: &Model,
     structure: &OtherStructure,
     watch: Watch,
@@ -131,13 +138,13 @@ fn report(
     let now = evaluate(model, structure, inputs.time_s(t_s), &inputs.at(t_s), y);
     let speed_rpm = now.state.shaft_speed_rpm();
     let pressure_ratio = now.outputs.pressure_ratio;
-    let is = [now.outputs.surge_position_ratio > 1.0, speed_rpm > watch.overspeed_rpm];
-    let was = beyond.replace(is).unwrap_or(is);
+    let is_beyond = [now.outputs.surge_position_ratio > 1.0, speed_rpm > watch.overspeed_rpm];
+    let was_beyond = beyond.replace(is_beyond).unwrap_or(is_beyond);
     let crossings = [
         [Crossing::SurgeEntered, Crossing::SurgeLeft],
         [Crossing::OverspeedEntered, Crossing::OverspeedLeft],
     ];
-    for ((was, is), [entered, left]) in was.into_iter().zip(is).zip(crossings) {
+    for ((was, is), [entered, left]) in was_beyond.into_iter().zip(is_beyond).zip(crossings) {
         if was != is {
             let crossing = if is { entered } else { left };
             on_event(ModelEvent { t_s, crossing, speed_rpm, pressure_ratio });
@@ -174,7 +181,7 @@ impl<I: Inputs> OdeSystem<STATES> for System<'_, I> {
         }
         // A forward difference, because there may be a kink at `t_s`.
         let ahead_s = 1e-6;
-        let moved = self.rates(t_s + ahead_s, y);
-        Some(std::array::from_fn(|i| (moved[i] - rates[i]) / ahead_s))
+        let rates_ahead = self.rates(t_s + ahead_s, y);
+        Some(std::array::from_fn(|i| (rates_ahead[i] - rates[i]) / ahead_s))
     }
 }

@@ -5,7 +5,7 @@ use mapper_physics::laws::compression::after_wheel;
 
 /// Nodes of the housing: shroud, diffuser, scroll, outlet flange.
 pub(super) const NODES: usize = 4;
-/// Share of each node in the area behind the wheel; the shroud also has the area before the wheel.
+/// Share of each node in the area after the wheel; the shroud also has the area before the wheel.
 pub(super) const AREA_SHARES: [f64; NODES] = [0.1, 0.3, 0.35, 0.25];
 /// Share of the housing's heat capacity.
 pub(super) const CAPACITY_SHARES: [f64; NODES] = [0.2, 0.2, 0.4, 0.2];

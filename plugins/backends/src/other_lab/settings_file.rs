@@ -1,9 +1,8 @@
-//! The lab's settings as a campaign writes them below `backend: {other_lab: ...}`: all keys of the virtual lab, and
-//! `structure`.
+//! Settings of the lab in a campaign, below `backend: {other_lab: ...}`: all keys of the virtual lab, and `structure`.
 
 use super::equations::apply_structure;
 use super::structure::{NAME, OtherStructure};
-use crate::virtual_lab::{LabSettings, SettingProblem, read_settings, within};
+use crate::virtual_lab::{LabSettings, SettingProblem, check_range, read_settings};
 use mapper_core::BackendError;
 use mapper_physics::rig::nominal_rig::NominalRig;
 use mapper_yaml::units::{Conductance, Fraction, Length, Quantity};
@@ -45,17 +44,18 @@ pub(super) fn read(settings: &serde_json::Value, nominal: &NominalRig) -> Result
 }
 
 fn read_keys(settings: &serde_json::Value, nominal: &NominalRig) -> Result<LabSettings, BackendError> {
-    let mut rest = settings.clone();
-    let own = rest.as_object_mut().and_then(|keys| keys.remove("structure")).unwrap_or_default();
-    let file: StructureFile = if own.is_null() {
+    let mut lab_settings = settings.clone();
+    let structure =
+        lab_settings.as_object_mut().and_then(|keys| keys.remove("structure")).unwrap_or_default();
+    let file: StructureFile = if structure.is_null() {
         StructureFile::default()
     } else {
-        serde_path_to_error::deserialize(&own).map_err(|error| {
+        serde_path_to_error::deserialize(&structure).map_err(|error| {
             let key = format!("structure.{}", error.path());
             SettingProblem::Form(error.into_inner()).at(key.trim_end_matches('.').to_owned())
         })?
     };
-    let mut lab = read_settings(&rest, nominal)?;
+    let mut lab = read_settings(&lab_settings, nominal)?;
     apply_structure(&mut lab, file.structure()?);
     Ok(lab)
 }
@@ -64,13 +64,17 @@ impl StructureFile {
     fn structure(&self) -> Result<OtherStructure, BackendError> {
         let defaults = OtherStructure::default();
         let structure = OtherStructure {
-            housing_coupling_w_k: self.housing_coupling.map_or(defaults.housing_coupling_w_k, |it| it.inside),
-            uneven_h_ratio: self.uneven_h.map_or(defaults.uneven_h_ratio, |it| it.inside),
+            housing_coupling_w_k: self
+                .housing_coupling
+                .map_or(defaults.housing_coupling_w_k, |quantity| quantity.value),
+            uneven_h_ratio: self.uneven_h.map_or(defaults.uneven_h_ratio, |quantity| quantity.value),
             mixed_gas: self.mixed_gas.unwrap_or(defaults.mixed_gas),
-            duct_length_m: self.duct_length.map_or(defaults.duct_length_m, |it| it.inside),
+            duct_length_m: self.duct_length.map_or(defaults.duct_length_m, |quantity| quantity.value),
             duct_loss_ratio: self.duct_loss.unwrap_or(defaults.duct_loss_ratio),
-            volume_share_ratio: self.volume_share.map_or(defaults.volume_share_ratio, |it| it.inside),
-            hysteresis_ratio: self.hysteresis.map_or(defaults.hysteresis_ratio, |it| it.inside),
+            volume_share_ratio: self
+                .volume_share
+                .map_or(defaults.volume_share_ratio, |quantity| quantity.value),
+            hysteresis_ratio: self.hysteresis.map_or(defaults.hysteresis_ratio, |quantity| quantity.value),
             sensor_speed_ratio: self.sensor_speed.unwrap_or(defaults.sensor_speed_ratio),
         };
         for (key, value, unit, range) in [
@@ -82,7 +86,7 @@ impl StructureFile {
             ("hysteresis", 100.0 * structure.hysteresis_ratio, "%", 0.0..=10.0),
             ("sensor_speed", structure.sensor_speed_ratio, "", 0.1..=100.0),
         ] {
-            within(value, unit, range).map_err(|problem| problem.at(format!("structure.{key}")))?;
+            check_range(value, unit, range).map_err(|problem| problem.at(format!("structure.{key}")))?;
         }
         Ok(structure)
     }

@@ -12,14 +12,14 @@ pub struct OtherStructure {
     /// Conductance between neighbouring nodes of the housing, W/K, > 0. Aluminium, 160 W/(m K), a wall of 150 mm by 8 mm,
     /// nodes 40 mm apart: 5 W/K.
     pub housing_coupling_w_k: f64,
-    /// Fall of h along the passage, ratio: 0 is even; 0.5 is from 1.5 times the mean behind the wheel to 0.5
+    /// Decrease of h along the passage, ratio: 0 is uniform; 0.5 is from 1.5 times the mean after the wheel to 0.5
     /// times at the outlet flange.
     pub uneven_h_ratio: f64,
     /// Whether the gas has one temperature in the whole passage, as in the lumped model; otherwise it cools along it.
     pub mixed_gas: bool,
     /// Length of the duct between the two volumes, m, > 0: its gas has inertia.
     pub duct_length_m: f64,
-    /// Loss of the duct over its dynamic pressure.
+    /// Pressure loss of the duct, relative to its dynamic pressure.
     pub duct_loss_ratio: f64,
     /// Share of the outlet volume between wheel and duct, in the open interval 0..1.
     pub volume_share_ratio: f64,
@@ -45,7 +45,7 @@ impl Default for OtherStructure {
 }
 
 impl OtherStructure {
-    /// The limit in which these equations equal the lumped model's: coupled nodes, even h, mixed gas, a short duct without loss,
+    /// The limit in which these equations equal those of the lumped model: coupled nodes, uniform h, mixed gas, a short duct without loss,
     /// almost no volume before it, no hysteresis, fast sensors.
     pub fn lumped_limit() -> Self {
         OtherStructure {

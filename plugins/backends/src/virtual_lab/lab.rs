@@ -21,7 +21,7 @@ use mapper_physics::simulation::inputs::Inputs;
 use mapper_physics::simulation::model::{State, rad_s_of_rpm};
 use mapper_physics::simulation::simulate::{Crossing, ModelEvent, SimulationError, Watch};
 
-/// Shaft speed at which a starting machine enters the running model and a stopping one leaves it, rpm.
+/// Shaft speed at which the running model takes over during a start, and ends during a stop, rpm.
 const CRANKING_SPEED_RPM: f64 = 5_000.0;
 
 /// Minimum pressure ratio for surge events: during start-up the machine crosses the
@@ -42,7 +42,7 @@ enum Machine {
     },
 }
 
-/// A simulation that stopped because an effect's hook gave no number.
+/// A simulation that stopped because a hook of an effect returned NaN.
 #[derive(Debug, thiserror::Error)]
 #[error("{source}: {fault}")]
 struct EffectFault {
@@ -50,12 +50,13 @@ struct EffectFault {
     fault: String,
 }
 
+/// The state of an armed lab.
 #[derive(Debug)]
-struct Armed {
+struct ArmedLab {
     inputs: LabInputs,
     /// `None` until the first setpoints, at which the lab starts settled.
     machine: Option<Machine>,
-    wanted: RigMode,
+    requested_mode: RigMode,
     tripped: bool,
     sensor_bank: SensorBank,
     commands: Option<Setpoints>,
@@ -68,10 +69,10 @@ struct Armed {
 #[derive(Debug)]
 pub struct VirtualLab {
     settings: LabSettings,
-    armed: Option<Armed>,
+    armed: Option<ArmedLab>,
 }
 
-/// Channels the lab delivers: all of them.
+/// Channels of the lab: all modelled ones.
 fn channels() -> Vec<Channel> {
     CHANNELS[..MODELLED_CHANNELS].iter().map(|row| row.channel).collect()
 }
@@ -82,7 +83,7 @@ impl VirtualLab {
         VirtualLab { settings, armed: None }
     }
 
-    fn armed(&mut self, call: &'static str) -> Result<(&LabSettings, &mut Armed), BackendError> {
+    fn armed(&mut self, call: &'static str) -> Result<(&LabSettings, &mut ArmedLab), BackendError> {
         match self.armed.as_mut() {
             Some(armed) => Ok((&self.settings, armed)),
             None => Err(BackendError::OutOfOrder { call, state: "not armed", needed: "armed" }),
@@ -123,7 +124,7 @@ impl Backend for VirtualLab {
             })
             .collect();
         let at_rest = StandstillState { tc_k: cell.ambient_temperature_k, tt_k: cell.ambient_temperature_k };
-        self.armed = Some(Armed {
+        self.armed = Some(ArmedLab {
             inputs: LabInputs {
                 cell,
                 weather: settings.weather.clone(),
@@ -136,7 +137,7 @@ impl Backend for VirtualLab {
                 Start::Standstill => Some(Machine::Standstill { state: at_rest, t_s: 0.0 }),
                 Start::Settled => None,
             },
-            wanted: RigMode::Standstill,
+            requested_mode: RigMode::Standstill,
             tripped: false,
             sensor_bank: SensorBank {
                 sensors,
@@ -144,15 +145,16 @@ impl Backend for VirtualLab {
                     .iter()
                     .map(|row| ChannelFollower::new(*settings.instruments.path(row.channel)))
                     .collect(),
-                several: settings
+                redundant: settings
                     .redundant
                     .iter()
-                    .map(|(channel, of)| ElementBank::new(*channel, of, sample_s, settings.seed))
+                    .map(|(channel, elements)| ElementBank::new(*channel, elements, sample_s, settings.seed))
                     .collect(),
                 second_order: CHANNELS
                     .iter()
                     .map(|row| {
-                        settings.second_order.get(&row.channel).map(|of| SecondOrderFollower::new(*of))
+                        let dynamics = settings.second_order.get(&row.channel)?;
+                        Some(SecondOrderFollower::new(*dynamics))
                     })
                     .collect(),
                 resonator: Resonator::new(settings.surge_precursor, settings.seed),
@@ -169,13 +171,13 @@ impl Backend for VirtualLab {
         setpoint_limits::ACCEPTED.check(setpoints)?;
         let (settings, armed) = self.armed("set")?;
         armed.commands = Some(*setpoints);
-        armed.wanted = if armed.tripped { RigMode::Standstill } else { setpoints.mode };
+        armed.requested_mode = if armed.tripped { RigMode::Standstill } else { setpoints.mode };
         let now_s = armed.now_s;
-        let p3_pa = match armed.wanted {
+        let p3_pa = match armed.requested_mode {
             RigMode::Running => setpoints.p3_pa,
             RigMode::Standstill => armed.inputs.cell.p4_pa * MIN_EXPANSION_RATIO,
         };
-        let first = armed.machine.is_none();
+        let is_first = armed.machine.is_none();
         for (actuator, command) in [
             (&mut armed.inputs.p3, p3_pa),
             (&mut armed.inputs.t3, setpoints.t3_k),
@@ -184,13 +186,13 @@ impl Backend for VirtualLab {
         ] {
             actuator.set(now_s, command);
         }
-        if first {
-            // The rig starts as if it had been at its first setpoints for a long time.
+        if is_first {
+            // The rig starts in the steady state of its first setpoints.
             armed.inputs.p3 = Actuator::at_rest(settings.p3_actuator, p3_pa);
             armed.inputs.t3 = Actuator::at_rest(settings.t3_actuator, setpoints.t3_k);
             armed.inputs.valve = Actuator::at_rest(settings.valve_actuator, setpoints.valve_opening_ratio);
             armed.inputs.oil = Actuator::at_rest(settings.oil_actuator, setpoints.oil_temperature_k);
-            armed.machine = Some(settled(settings, armed, now_s)?);
+            armed.machine = Some(settle(settings, armed, now_s)?);
         } else if let Some(Machine::Running(simulator)) = armed.machine.as_mut() {
             simulator.restart();
         }
@@ -209,7 +211,7 @@ impl Backend for VirtualLab {
     fn make_safe(&mut self) -> Result<(), BackendError> {
         let (settings, armed) = self.armed("make_safe")?;
         let now_s = armed.now_s;
-        armed.wanted = RigMode::Standstill;
+        armed.requested_mode = RigMode::Standstill;
         armed.inputs.p3.set(now_s, armed.inputs.cell.p4_pa * MIN_EXPANSION_RATIO);
         armed.inputs.valve.set(now_s, 1.0f64.max(armed.inputs.valve.value(now_s)));
         if let Some(Machine::Running(simulator)) = armed.machine.as_mut() {
@@ -229,9 +231,9 @@ impl Backend for VirtualLab {
     }
 }
 
-/// A machine in steady state under the present inputs.
-fn settled(settings: &LabSettings, armed: &Armed, now_s: f64) -> Result<Machine, BackendError> {
-    match armed.wanted {
+/// A machine in steady state under the current inputs.
+fn settle(settings: &LabSettings, armed: &ArmedLab, now_s: f64) -> Result<Machine, BackendError> {
+    match armed.requested_mode {
         RigMode::Running => {
             let boundary = armed.inputs.at(now_s);
             let machine = settings.structure.settled(&settings.model, now_s, &boundary, watch(settings));
@@ -241,7 +243,7 @@ fn settled(settings: &LabSettings, armed: &Armed, now_s: f64) -> Result<Machine,
         RigMode::Standstill => {
             let ambient_k = settings.cell.ambient_temperature_k;
             let state = StandstillState { tc_k: ambient_k, tt_k: ambient_k };
-            // A day at rest.
+            // After a day at rest.
             let oil_k = armed.inputs.oil.value(now_s);
             let state = standstill::relax(&settings.model.params, state, oil_k, ambient_k, 86_400.0);
             Ok(Machine::Standstill { state, t_s: now_s })
@@ -253,12 +255,12 @@ fn watch(settings: &LabSettings) -> Watch {
     Watch { overspeed_rpm: settings.trip_speed_rpm }
 }
 
-impl Armed {
+impl ArmedLab {
     fn advance(&mut self, settings: &LabSettings, until_s: f64) -> Result<SampleBatch, BackendError> {
         let mut batch = SampleCollector::new(self.next_sequence, &self.sensor_bank);
         // A time before the first sample, or NaN, requests no sample.
-        let asks_for_the_first = self.next_sequence == 0 && until_s >= 0.0;
-        while self.now_s < until_s || (self.now_s == 0.0 && asks_for_the_first) {
+        let needs_first_sample = self.next_sequence == 0 && until_s >= 0.0;
+        while self.now_s < until_s || (self.now_s == 0.0 && needs_first_sample) {
             self.switch_machine(settings);
             self.drift(settings);
             let next_s = self.advance_machine(settings, until_s, &mut batch)?;
@@ -271,10 +273,10 @@ impl Armed {
         Ok(batch.finish(std::mem::take(&mut self.pending_events)))
     }
 
-    /// Starts a machine at rest that should run, and stops a slow one that should rest.
+    /// Switches between standstill and the running model if the requested mode asks for it.
     fn switch_machine(&mut self, settings: &LabSettings) {
         let now_s = self.now_s;
-        let next = match (&self.machine, self.wanted) {
+        let next = match (&self.machine, self.requested_mode) {
             (Some(Machine::Standstill { state, .. }), RigMode::Running) => {
                 let cell = &self.inputs.cell;
                 let speed_rad_s = rad_s_of_rpm(CRANKING_SPEED_RPM);
@@ -297,8 +299,9 @@ impl Armed {
         if let Some(Machine::Running(simulator)) = self.machine.as_mut()
             && settings.drifts.iter().any(LabDrift::is_machine)
         {
-            let held_s = (self.now_s / drift::MACHINE_UPDATE_S + 1e-9).floor() * drift::MACHINE_UPDATE_S;
-            let middle_s = held_s + 0.5 * drift::MACHINE_UPDATE_S;
+            let interval_start_s =
+                (self.now_s / drift::MACHINE_UPDATE_S + 1e-9).floor() * drift::MACHINE_UPDATE_S;
+            let middle_s = interval_start_s + 0.5 * drift::MACHINE_UPDATE_S;
             simulator.change_params(drift::drifted_machine(
                 &settings.drifts,
                 settings.model.params,
@@ -307,7 +310,7 @@ impl Armed {
         }
     }
 
-    /// Runs the machine to `until_s`, or for a second if it may have to be switched; returns the time reached.
+    /// Runs the machine to `until_s`, or for at most a second while it is stopping; returns the time reached.
     fn advance_machine(
         &mut self,
         settings: &LabSettings,
@@ -315,7 +318,7 @@ impl Armed {
         batch: &mut SampleCollector,
     ) -> Result<f64, BackendError> {
         let start_s = self.now_s;
-        let coasting = self.wanted == RigMode::Standstill;
+        let coasting = self.requested_mode == RigMode::Standstill;
         let mut end_s = if coasting { until_s.min(start_s + 1.0) } else { until_s };
         if settings.drifts.iter().any(LabDrift::is_machine) {
             // A fixed grid, so that the result does not depend on the polling rate.
@@ -326,7 +329,7 @@ impl Armed {
         let rate_hz = settings.sample_rate_hz;
         let mut sample_times_s =
             (first_index..).map(|index| index as f64 / rate_hz).take_while(|t| *t <= end_s);
-        let Armed { inputs, machine, sensor_bank, commands, .. } = self;
+        let ArmedLab { inputs, machine, sensor_bank, commands, .. } = self;
         match machine {
             None => Err(BackendError::OutOfOrder {
                 call: "poll",
@@ -355,7 +358,7 @@ impl Armed {
                     self.report(settings, crossing, end_s);
                 }
                 result.map_err(|error| {
-                    // A hook returns NaN on failure and keeps the reason.
+                    // A failed hook returns NaN and stores the reason.
                     let source = match settings.model.hooks.fault() {
                         Some(fault) => EffectFault { source: error, fault }.into(),
                         None => error.into(),
@@ -387,11 +390,11 @@ impl Armed {
         }
     }
 
-    /// Turns a crossing into an event; beyond the trip speed the lab cuts its own air, at `now_s`.
+    /// Reports a crossing as an event; beyond the trip speed the lab cuts its air at `now_s`.
     fn report(&mut self, settings: &LabSettings, event: ModelEvent, now_s: f64) {
         let ModelEvent { t_s, crossing, speed_rpm, pressure_ratio } = event;
-        let of_surge = matches!(crossing, Crossing::SurgeEntered | Crossing::SurgeLeft);
-        if of_surge && pressure_ratio < MIN_SURGE_RATIO {
+        let is_surge = matches!(crossing, Crossing::SurgeEntered | Crossing::SurgeLeft);
+        if is_surge && pressure_ratio < MIN_SURGE_RATIO {
             return;
         }
         let (kind, message) = match crossing {
@@ -417,7 +420,7 @@ impl Armed {
         };
         if crossing == Crossing::OverspeedEntered {
             self.tripped = true;
-            self.wanted = RigMode::Standstill;
+            self.requested_mode = RigMode::Standstill;
             self.inputs.p3.set(now_s, self.inputs.cell.p4_pa * MIN_EXPANSION_RATIO);
         }
         self.pending_events.push(Event { t_s, kind, message });

@@ -9,7 +9,7 @@ mod sensors;
 mod settings;
 mod truth;
 
-pub use campaign_keys::setting_problem::{SettingProblem, within};
+pub use campaign_keys::setting_problem::{SettingProblem, check_range};
 pub use campaign_keys::settings_file::read_settings;
 pub use lab::VirtualLab;
 pub use name::NAME;

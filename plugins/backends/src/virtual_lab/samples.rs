@@ -15,7 +15,7 @@ use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::rig::instruments::{ChannelFollower, Instruments};
 use mapper_physics::simulation::model::{Outputs, PreparedModel, State};
 
-/// Frequency of the surge cycle, Hz: the order of a small compressor with a short outlet duct.
+/// Frequency of the surge cycle, Hz: the order of magnitude of a small compressor with a short outlet duct.
 const SURGE_FREQUENCY_HZ: f64 = 7.3;
 
 /// True values at the sensors at one instant.
@@ -38,7 +38,7 @@ impl Instant<'_> {
         let Some(outputs) = self.outputs() else { return f64::NAN };
         let map = &settings.model.map;
         let corrected_rpm = map.reference().corrected_speed_rpm(self.speed_rpm, self.boundary.t1_k);
-        // In proportion to the present flow, which the model converted from corrected to physical.
+        // In proportion to the current flow, which the model converted from corrected to physical.
         let scale_ratio = settings.model.params.compressor.flow_scale_ratio;
         let surge_ratio = scale_ratio * map.surge_point(corrected_rpm).0 / outputs.flow_corrected_kg_s;
         surge_ratio * outputs.flow_kg_s
@@ -52,8 +52,8 @@ pub(super) struct SensorBank {
     pub(super) followers: Vec<ChannelFollower>,
     /// Second-order sensors, by channel.
     pub(super) second_order: Vec<Option<SecondOrderFollower>>,
-    /// Channels with several sensors.
-    pub(super) several: Vec<ElementBank>,
+    /// Channels with redundant sensors.
+    pub(super) redundant: Vec<ElementBank>,
     /// Fluctuations of flow and pressures before surge.
     pub(super) resonator: Resonator,
 }
@@ -73,7 +73,7 @@ impl SampleCollector {
             first_sequence,
             t_s: Vec::new(),
             columns: vec![Vec::new(); MODELLED_CHANNELS],
-            elements: sensor_bank.several.iter().flat_map(ElementBank::columns).collect(),
+            elements: sensor_bank.redundant.iter().flat_map(ElementBank::columns).collect(),
             truth: TruthRecorder::default(),
         }
     }
@@ -95,7 +95,7 @@ impl SampleCollector {
         self.t_s.push(t_s);
         let surge_flow_kg_s = instant.surge_flow_kg_s(settings);
         let prepared = instant.running.map(|_| settings.model.prepare(&instant.boundary));
-        let SensorBank { sensors, followers, second_order, several, resonator } = sensor_bank;
+        let SensorBank { sensors, followers, second_order, redundant, resonator } = sensor_bank;
         let swing = compute_swing(t_s, instant, surge_flow_kg_s, resonator, settings);
         let mut elements = self.elements.iter_mut();
         let follow = followers.iter_mut().zip(second_order);
@@ -106,15 +106,16 @@ impl SampleCollector {
                 Some(pipe_diameter_m) => wall_pressure_pa(row.channel, total, *pipe_diameter_m, instant),
                 None => total,
             };
-            let uneven = settings.uneven_at_rest.get(&row.channel).filter(|_| instant.running.is_none());
+            let nonuniformity =
+                settings.uneven_at_rest.get(&row.channel).filter(|_| instant.running.is_none());
             let truth = second.as_mut().map_or(truth, |second| second.read(t_s, truth));
-            let truth = follower.read(t_s, truth) + uneven.copied().unwrap_or(0.0);
+            let truth = follower.read(t_s, truth) + nonuniformity.copied().unwrap_or(0.0);
             let drifted = |reading| drift::drifted_reading(&settings.drifts, row.channel, t_s, reading);
-            if let Some(bank) = several.iter_mut().find(|bank| bank.channel == row.channel) {
+            if let Some(bank) = redundant.iter_mut().find(|bank| bank.channel == row.channel) {
                 let pipe_diameter_m = settings.model.params.compressor.outlet_diameter_m;
-                let (readings, together) = bank.read(t_s, truth, instant.outputs(), pipe_diameter_m, drifted);
+                let (readings, combined) = bank.read(t_s, truth, instant.outputs(), pipe_diameter_m, drifted);
                 readings.iter().zip(&mut elements).for_each(|(reading, column)| column.values.push(*reading));
-                column.push(together);
+                column.push(combined);
                 continue;
             }
             let sensor = sensors.iter_mut().find(|(channel, _)| *channel == row.channel);
@@ -137,7 +138,7 @@ impl SampleCollector {
     }
 }
 
-/// Swing of flow and pressures: by the surge cycle in surge, by the precursor before it.
+/// Fluctuations of flow and pressures: the surge cycle in surge, the precursor before it.
 fn compute_swing(
     t_s: f64,
     instant: &Instant<'_>,
@@ -152,7 +153,7 @@ fn compute_swing(
         return Swing { flow_ratio, p2_ratio: P2_SHARE * flow_ratio, p1_ratio: 0.0 };
     }
     let margin_ratio = outputs.flow_kg_s / surge_flow_kg_s - 1.0;
-    // Half of the swing in surge, beyond which the surge cycle takes over.
+    // Half of the fluctuation in surge, at which the surge cycle takes over.
     let max_rms_ratio = 0.5 * settings.surge_swing_ratio;
     let params = &settings.model.params;
     resonator.next(margin_ratio, 1.0 / settings.sample_rate_hz, params, outputs.t2_k, max_rms_ratio)

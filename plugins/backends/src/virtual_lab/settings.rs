@@ -1,4 +1,4 @@
-//! Settings of the virtual lab, in SI units. They are the truth: only the lab reads them.
+//! Settings of the virtual lab, in SI units. They are the simulator's truth: only the lab reads them.
 
 use crate::virtual_lab::rig::actuator::ActuatorDynamics;
 use crate::virtual_lab::rig::boundary_wander::Weather;
@@ -19,7 +19,7 @@ use std::sync::Arc;
 /// State of the machine when the lab is armed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Start {
-    /// At rest, everything at ambient temperature.
+    /// At rest and at ambient temperature.
     Standstill,
     /// Settled at the first setpoints.
     Settled,
@@ -66,9 +66,9 @@ pub struct LabSettings {
     pub structure: Arc<dyn Structure>,
     /// Sensors with a second-order response before their own lag; none in the nominal lab.
     pub second_order: BTreeMap<Channel, SecondOrder>,
-    /// Swing of flow and outlet pressure beyond the surge line, ratio of their values.
+    /// Fluctuation of flow and outlet pressure beyond the surge line, ratio of their values.
     pub surge_swing_ratio: f64,
-    /// Swing of flow and pressures before the surge line.
+    /// Fluctuation of flow and pressures before the surge line.
     pub surge_precursor: SurgePrecursor,
     /// Seed of all noise.
     pub seed: u64,

@@ -129,12 +129,12 @@ impl Settings {
 
     /// Samples per second, Hz.
     pub(crate) fn rate_hz(&self) -> f64 {
-        self.rate.as_ref().map_or(2.0, |rate| rate.inside)
+        self.rate.as_ref().map_or(2.0, |rate| rate.value)
     }
 
     /// Timeout of an answer, s.
     pub(crate) fn timeout_s(&self) -> f64 {
-        self.timeout.as_ref().map_or(0.3, |timeout| timeout.inside)
+        self.timeout.as_ref().map_or(0.3, |timeout| timeout.value)
     }
 }
 

@@ -64,10 +64,10 @@ impl Accepts {
     /// The permitted range, SI.
     pub fn range(&self, target: Target) -> SetpointRange {
         let (low, high) = match target {
-            Target::P3 => (self.p3[0].inside, self.p3[1].inside),
-            Target::T3 => (self.t3[0].inside, self.t3[1].inside),
+            Target::P3 => (self.p3[0].value, self.p3[1].value),
+            Target::T3 => (self.t3[0].value, self.t3[1].value),
             Target::Valve => (self.valve[0], self.valve[1]),
-            Target::OilTemperature => (self.oil_temperature[0].inside, self.oil_temperature[1].inside),
+            Target::OilTemperature => (self.oil_temperature[0].value, self.oil_temperature[1].value),
             Target::Air => (0.0, 1.0),
             Target::Heartbeat => (0.0, f64::from(MAX_HEARTBEAT)),
         };
@@ -101,9 +101,9 @@ impl Safe {
     /// The trajectory for the rig's description.
     pub fn trajectory(&self) -> SafeTrajectory {
         SafeTrajectory {
-            p3_slew_pa_s: self.pressure_slew.as_ref().map(|slew| slew.inside),
+            p3_slew_pa_s: self.pressure_slew.as_ref().map(|slew| slew.value),
             valve_opening_ratio: self.opening,
-            within_s: self.within.inside,
+            within_s: self.within.value,
         }
     }
 }

@@ -67,7 +67,7 @@ impl Stand {
         };
         // The heartbeat is sent with the samples.
         check_range(self.rate_hz, "Hz", 2.0, 50.0).map_err(at("rate"))?;
-        check_range(self.safe.within.inside, "s", 0.1, 120.0).map_err(at("safe.within"))?;
+        check_range(self.safe.within.value, "s", 0.1, 120.0).map_err(at("safe.within"))?;
         for (_, channel) in REQUIRED_GUARDS {
             if !self.channels.contains(&channel) {
                 return Err(("read".to_owned(), LimitError::NotMeasured(channel)));

@@ -131,7 +131,7 @@ impl Settings {
 
     /// Time for a request, s.
     pub(crate) fn timeout_s(&self) -> f64 {
-        self.timeout.as_ref().map_or(0.2, |timeout| timeout.inside)
+        self.timeout.as_ref().map_or(0.2, |timeout| timeout.value)
     }
 
     /// Location of a target.
@@ -154,7 +154,7 @@ impl Settings {
             rig: self.rig.clone().unwrap_or_else(|| format!("modbus {}", self.address)),
             // Behind a gateway each unit is a separate stand.
             reached_at: format!("{} unit {}", self.address, self.unit),
-            rate_hz: self.rate.as_ref().map_or(10.0, |rate| rate.inside),
+            rate_hz: self.rate.as_ref().map_or(10.0, |rate| rate.value),
             channels: self.read.keys().copied().collect(),
             accepts: self.accepts,
             safe: self.safe,

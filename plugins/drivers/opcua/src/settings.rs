@@ -272,7 +272,7 @@ impl Settings {
 
     /// Time for a read, s.
     pub(crate) fn timeout_s(&self) -> f64 {
-        self.timeout.as_ref().map_or(0.3, |timeout| timeout.inside)
+        self.timeout.as_ref().map_or(0.3, |timeout| timeout.value)
     }
 
     /// The stand for these settings.
@@ -282,7 +282,7 @@ impl Settings {
             version: env!("CARGO_PKG_VERSION"),
             rig: self.rig.clone().unwrap_or_else(|| format!("opcua {}", self.endpoint)),
             reached_at: crate::store::server(&self.endpoint).to_ascii_lowercase(),
-            rate_hz: self.rate.as_ref().map_or(10.0, |rate| rate.inside),
+            rate_hz: self.rate.as_ref().map_or(10.0, |rate| rate.value),
             channels: self.read.keys().copied().collect(),
             accepts: self.accepts,
             safe: self.safe,

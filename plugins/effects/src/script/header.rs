@@ -29,36 +29,37 @@ pub(super) fn read(text: &str) -> Result<Header, Mistake> {
     let mut parameters: Vec<EffectParameter> = Vec::new();
     for (index, line) in text.lines().enumerate() {
         let Some(header) = line.trim_start().strip_prefix("//!") else { continue };
-        let here = |message: String| (Some(index + 1), message);
+        let at_line = |message: String| (Some(index + 1), message);
         let Some((key, value)) = header.split_once(':') else { continue };
         let value = value.trim();
         let owned = || Some(Cow::<'static, str>::Owned(value.to_owned()));
         match key.trim() {
             "effect" if is_name(value) => id = owned(),
             "effect" => {
-                return Err(here(format!(
+                return Err(at_line(format!(
                     "`{value}` is not a valid name: use lower-case letters, digits and _, at most 40"
                 )));
             }
             "description" => description = owned(),
             "equation" => equation = owned(),
             "source" => source = owned(),
-            "submodel" => submodel = Some(submodel_called(value).map_err(here)?),
+            "submodel" => submodel = Some(submodel_called(value).map_err(at_line)?),
             "parameter" => {
-                let parameter = parameter(value).ok_or_else(|| here(format!("write `{PARAMETER_FORM}`")))?;
-                check(&parameter, &parameters).map_err(here)?;
+                let parameter =
+                    parameter(value).ok_or_else(|| at_line(format!("write `{PARAMETER_FORM}`")))?;
+                check(&parameter, &parameters).map_err(at_line)?;
                 parameters.push(parameter);
             }
             "lag" => {
                 let (channel, name) = value
                     .split_once(char::is_whitespace)
-                    .ok_or_else(|| here(format!("write `{LAG_FORM}`")))?;
-                let channel: Channel = channel.parse().map_err(|unknown| here(format!("{unknown}")))?;
+                    .ok_or_else(|| at_line(format!("write `{LAG_FORM}`")))?;
+                let channel: Channel = channel.parse().map_err(|unknown| at_line(format!("{unknown}")))?;
                 lags.push((channel, name.trim().to_owned()));
             }
             other => {
                 let keys = "effect, description, equation, source, submodel, parameter, lag";
-                return Err(here(format!("`{other}` is not a key of an effect; the keys are {keys}")));
+                return Err(at_line(format!("`{other}` is not a key of an effect; the keys are {keys}")));
             }
         }
     }

@@ -1,4 +1,4 @@
-//! Checks that the dwell leaves the identification a window.
+//! Checks that the dwell is long enough for the window of the identification.
 
 use crate::campaign::Campaign;
 use crate::checks::concern::Concern;
@@ -21,11 +21,11 @@ pub(crate) fn find_concerns(campaign: &Campaign) -> Vec<Concern> {
     match identification.window {
         WindowRule::Auto if dwell_s < needed_s => {
             // A script may choose any dwell.
-            let none = dwell_s <= earliest_s;
+            let no_window = dwell_s <= earliest_s;
             let outcome =
-                if none { "no point would have an efficiency" } else { "every point would be doubtful" };
+                if no_window { "no point would have an efficiency" } else { "every point would be doubtful" };
             vec![Concern {
-                is_error: none && campaign.sequence.is_none(),
+                is_error: no_window && campaign.sequence.is_none(),
                 at: steps!["timing", "dwell"].to_vec(),
                 message: format!(
                     "a dwell of {dwell_s} s is shorter than the {needed_s} s that `window: auto` needs (from {earliest_s} s \
@@ -41,7 +41,7 @@ pub(crate) fn find_concerns(campaign: &Campaign) -> Vec<Concern> {
                 "the window is {} s long, shorter than the {shortest_s} s from which efficiency and heat transfer are distinguishable",
                 end_s - start_s
             ),
-            remedy: "end it later, or begin it earlier".to_owned(),
+            remedy: "lengthen the window".to_owned(),
         }],
         WindowRule::Auto | WindowRule::Fixed { .. } => Vec::new(),
     }

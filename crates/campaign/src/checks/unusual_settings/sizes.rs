@@ -10,7 +10,7 @@ use mapper_yaml::{Step, steps};
 /// Usual diameters of compressor wheels, m: 20 mm in the smallest passenger cars, 200 mm in locomotives. Ships have larger ones, which are
 /// not tested on such gas stands.
 const USUAL_WHEEL_DIAMETERS_M: (f64, f64) = (0.02, 0.2);
-/// Possible diameters of compressor wheels, m: outside, a tenth of the smallest to ten times the largest usual one, the unit is wrong.
+/// Possible diameters of compressor wheels, m: a tenth of the smallest to ten times the largest usual one. Outside, the unit is wrong.
 const POSSIBLE_WHEEL_DIAMETERS_M: (f64, f64) = (0.002, 2.0);
 /// Maximum ratio, either way, of a compressor's choke flow to the scaled reference machine's at equal tip speed. Confused units differ by
 /// more: lb/min and kg/s by 132, g/s and kg/s by 1000.
@@ -28,20 +28,20 @@ pub(crate) fn find_concerns(campaign: &Campaign) -> Vec<Concern> {
             is_error,
             at: steps!["machine", "geometry", "compressor", "wheel_diameter"].to_vec(),
             message: format!(
-                "a compressor wheel of {} mm is not a turbocharger's: they have {:.0} to {:.0} mm",
+                "a compressor wheel of {} mm is unusual: turbochargers have {:.0} to {:.0} mm",
                 to_mm(wheel_m),
                 1e3 * USUAL_WHEEL_DIAMETERS_M.0,
                 1e3 * USUAL_WHEEL_DIAMETERS_M.1
             ),
             remedy: "write its diameter at the exit, with its unit".to_owned(),
         });
-        // The other sizes cannot be compared with such a wheel. The map shows whether the wheel is wrong, which is the cause of all that its
-        // lines cannot reach.
+        // The other sizes cannot be compared with such a wheel. The map shows whether the wheel is wrong, which would make
+        // points of its lines unreachable.
         concerns.extend(check_map_flow(campaign).filter(|_| !is_error));
         return concerns;
     }
     let reference = similar_machine(wheel_m);
-    let judged = |size: &Size| {
+    let check_size = |size: &Size| {
         let usual_ratio = size.usual_ratio?;
         let (value, usual) = (size.value(params), size.value(&reference));
         let ((low, high), (by, unit)) = ((usual / usual_ratio, usual * usual_ratio), size.unit);
@@ -59,23 +59,23 @@ pub(crate) fn find_concerns(campaign: &Campaign) -> Vec<Concern> {
             remedy: "check the value and its unit, and the wheel's diameter".to_owned(),
         })
     };
-    concerns.extend(SIZES.iter().filter_map(judged));
+    concerns.extend(SIZES.iter().filter_map(check_size));
     concerns.extend(check_map_flow(campaign));
     if params.turbine.peak_efficiency > MAX_TURBINE_EFFICIENCY {
         concerns.push(Concern {
             is_error: false,
             at: steps!["machine", "geometry", "turbine", "peak_efficiency"].to_vec(),
             message: format!(
-                "a peak efficiency of {} is more than any turbocharger's turbine has; the best have {MAX_TURBINE_EFFICIENCY}",
+                "a peak efficiency of {} is above that of any turbine of a turbocharger; the best have {MAX_TURBINE_EFFICIENCY}",
                 params.turbine.peak_efficiency
             ),
-            remedy: "write the turbine's own peak, total to static, e.g. 0.75".to_owned(),
+            remedy: "write the peak efficiency of the turbine, total to static, e.g. 0.75".to_owned(),
         });
     }
     concerns
 }
 
-/// Checks the flow of the nominal map: one that is impossible for the wheel has another unit than assumed.
+/// Checks the flow of the nominal map: a flow that is impossible for the wheel has a wrong unit.
 fn check_map_flow(campaign: &Campaign) -> Option<Concern> {
     let MapSource::Table { named, .. } = &campaign.machine.map else { return None };
     let map = campaign.machine.map.table()?.ok()?;
@@ -108,12 +108,13 @@ fn check_map_flow(campaign: &Campaign) -> Option<Concern> {
     })
 }
 
-/// One significant digit.
+/// Rounds to one significant digit.
 fn one_digit(value: f64) -> f64 {
     let unit = 10f64.powi(value.log10().floor() as i32);
     (value / unit).round() * unit
 }
 
+/// A number with two significant digits.
 fn two_digits(value: f64) -> String {
     let digits = (1.0 - value.abs().log10().floor()).max(0.0);
     if digits > 4.0 { format!("{value:.1e}") } else { format!("{value:.*}", digits as usize) }

@@ -7,7 +7,7 @@ use mapper_physics::compressor_map::inlet_limit::MAX_TIP_SPEED_M_S;
 use mapper_yaml::{Step, steps};
 use std::f64::consts::PI;
 
-/// Usual maximum tip speed, m/s: series wheels reach 560 m/s (see [`MAX_TIP_SPEED_M_S`]), and a warning has to leave them some room.
+/// Usual maximum tip speed, m/s: series wheels reach 560 m/s (see [`MAX_TIP_SPEED_M_S`]), and the warning must leave some margin.
 const MAX_USUAL_TIP_SPEED_M_S: f64 = 600.0;
 /// Extrapolation of a map beyond its outermost speed lines that is only a warning, as a ratio of their speed. Judgement: not much more
 /// than the distance between two lines.
@@ -39,9 +39,9 @@ fn check_tip_speed(campaign: &Campaign, speed_rpm: f64) -> Vec<Concern> {
         ("compressor", "wheel_diameter", params.compressor.wheel_diameter_m),
         ("turbine", "wheel_radius", 2.0 * params.turbine.wheel_radius_m),
     ];
-    let one = |(side, key, diameter_m): (&'static str, &'static str, f64)| {
+    let check_wheel = |(side, key, diameter_m): (&'static str, &'static str, f64)| {
         let tip_m_s = PI * diameter_m * speed_rpm / 60.0;
-        // A wheel scaled from the other one would repeat its mistake.
+        // A wheel that is scaled from the other one would repeat its mistake.
         let is_assumed = campaign.machine.assumed.iter().any(|size| size.key == format!("{side}.{key}"));
         (tip_m_s > MAX_USUAL_TIP_SPEED_M_S && !is_assumed).then(|| Concern {
             is_error: tip_m_s > MAX_TIP_SPEED_M_S,
@@ -59,24 +59,24 @@ fn check_tip_speed(campaign: &Campaign, speed_rpm: f64) -> Vec<Concern> {
             remedy: "correct the wheel's size, or lower the highest speed of the grid".to_owned(),
         })
     };
-    wheels.into_iter().filter_map(one).collect()
+    wheels.into_iter().filter_map(check_wheel).collect()
 }
 
-/// The grid's speeds and those of the nominal table.
+/// Compares the speed range of the grid with that of the nominal table.
 fn check_table_range(campaign: &Campaign, [slowest, fastest]: [(f64, Vec<Step>); 2]) -> Vec<Concern> {
     let MapSource::Table { named, reference, .. } = &campaign.machine.map else { return Vec::new() };
     let Some(Ok(map)) = campaign.machine.map.table() else { return Vec::new() };
     let lines_rpm = map.speeds_corrected_rpm();
     let (Some(&low_rpm), Some(&high_rpm)) = (lines_rpm.first(), lines_rpm.last()) else { return Vec::new() };
     let correction = (reference.t_ref_k / campaign.boundary.t1_k).sqrt();
-    let one = |(rpm, at): (f64, Vec<Step>), edge_rpm: f64, verb: &str, beyond: f64| {
+    let check_end = |(rpm, at): (f64, Vec<Step>), edge_rpm: f64, verb: &str, beyond: f64| {
         let corrected_rpm = rpm * correction;
         (beyond > ROUNDING_RATIO).then(|| Concern {
-            // `lines` need the map's surge and choke, which cannot be extrapolated.
+            // `lines` need the surge and choke of the map, which cannot be extrapolated.
             is_error: beyond > MAX_EXTRAPOLATION_RATIO || !campaign.lines.is_empty(),
             at,
             message: format!(
-                "the grid goes to {:.1} krpm ({:.1} krpm corrected), the nominal map `{named}` {verb} at {:.1} krpm: \
+                "the grid goes to {:.1} krpm ({:.1} krpm corrected), but the nominal map `{named}` {verb} at {:.1} krpm: \
                  forecast and plan would be unreliable there",
                 rpm / 1e3,
                 corrected_rpm / 1e3,
@@ -88,7 +88,7 @@ fn check_table_range(campaign: &Campaign, [slowest, fastest]: [(f64, Vec<Step>);
     };
     let below = 1.0 - slowest.0 * correction / low_rpm;
     let above = fastest.0 * correction / high_rpm - 1.0;
-    [one(slowest, low_rpm, "begins", below), one(fastest, high_rpm, "ends", above)]
+    [check_end(slowest, low_rpm, "begins", below), check_end(fastest, high_rpm, "ends", above)]
         .into_iter()
         .flatten()
         .collect()

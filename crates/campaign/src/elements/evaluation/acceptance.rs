@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
-// Untagged: the form of the YAML node shows which variant it is, and the schema was checked before.
+// Untagged: the type of the YAML node determines the variant, and the schema has been checked.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub(crate) enum AcceptanceFile {
@@ -22,7 +22,7 @@ pub(crate) enum AcceptancePreset {
     Ptc10,
 }
 
-/// Criteria of another code, from your copy of it.
+/// Criteria of another code.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct OwnCriteria {
@@ -31,14 +31,14 @@ pub(crate) struct OwnCriteria {
     name: String,
     /// Edition and clause of the values.
     source: String,
-    /// Time at the end of each step over which they are judged; 20 s if none is given.
+    /// Window at the end of each step in which the criteria are judged; 20 s if none is given.
     #[schemars(extend("x-above" = "0 s"))]
     window: Option<Quantity<Duration>>,
-    /// Permitted fluctuation of each channel: highest minus lowest reading over the mean, temperatures and pressures absolute.
+    /// Permitted fluctuation of each channel: highest minus lowest reading, relative to the mean; temperatures and pressures absolute.
     #[serde(default)]
     #[schemars(with = "BTreeMap<SensorSymbol, Fluctuation>")]
     fluctuation: BTreeMap<Channel, Fluctuation>,
-    /// Permitted size of the losses in the energy balance over the power of the turbine.
+    /// Permitted losses in the energy balance, relative to the turbine power.
     #[schemars(extend("x-min" = "0 %", "x-max" = "100 %"), example = &"5 %")]
     heat_balance: Option<Quantity<Fraction>>,
 }
@@ -62,9 +62,9 @@ impl From<AcceptanceFile> for AcceptanceCriteria {
                 fluctuation_ratio: own
                     .fluctuation
                     .into_iter()
-                    .map(|(at, ratio)| (at, ratio.0.inside))
+                    .map(|(at, ratio)| (at, ratio.0.value))
                     .collect(),
-                heat_balance_ratio: own.heat_balance.map(|ratio| ratio.inside),
+                heat_balance_ratio: own.heat_balance.map(|ratio| ratio.value),
             },
         }
     }

@@ -43,7 +43,7 @@ pub(crate) struct IdentificationFile {
     #[serde(default, deserialize_with = "SettleBandsElement::deserialize")]
     #[schemars(with = "SettleBandsElement")]
     stabilisation: SettleBands,
-    /// Parameters that `joint` identifies or takes as declared; by default it identifies all.
+    /// Parameters that `joint` identifies or keeps at their declared values; by default it identifies all.
     #[serde(default)]
     joint: JointSettings,
 }

@@ -8,7 +8,7 @@ use mapper_yaml::steps;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-// Untagged: the form of the YAML node shows which variant it is, and the schema was checked before.
+// Untagged: the type of the YAML node determines the variant, and the schema has been checked.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub(crate) enum WindowFile {
@@ -39,7 +39,7 @@ impl From<WindowFile> for WindowRule {
         match file {
             WindowFile::Named(NamedWindow::Auto) => WindowRule::Auto,
             WindowFile::Fixed(FixedWindow { start, end }) => {
-                WindowRule::Fixed { start_s: start.inside, end_s: end.inside }
+                WindowRule::Fixed { start_s: start.value, end_s: end.value }
             }
         }
     }

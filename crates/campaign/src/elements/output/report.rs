@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Report {
-    /// Customer of the test, for the head of the report.
+    /// Customer of the test, for the header of the report.
     pub customer: Option<String>,
     /// Number of the report.
     pub number: Option<String>,
@@ -27,7 +27,7 @@ pub struct Report {
     pub approved_by: Option<String>,
     /// Operator of the test.
     pub operator: Option<String>,
-    /// Place of the test.
+    /// Test cell.
     pub test_cell: Option<String>,
     /// Day of the last calibration of each sensor, by its symbol, e.g. `T2: 2026-09-01`: the short form of `calibration` at the sensor.
     #[serde(default)]
@@ -52,14 +52,14 @@ pub struct Report {
 }
 
 impl Report {
-    /// Water per dry air in the cell at a relative humidity, kg/kg.
+    /// Mass of water per mass of dry air in the cell at a relative humidity, kg/kg.
     fn water_kg_kg(&self, relative_ratio: f64, boundary: &BoundaryConditions) -> f64 {
         let temperature_k = self.cell_temperature_k.unwrap_or(boundary.ambient_temperature_k);
         let pressure_pa = self.barometer_pa.unwrap_or(boundary.p1_pa);
         air::humidity_kg_kg(relative_ratio, temperature_k, pressure_pa)
     }
 
-    /// Water per dry air at the inlet, kg/kg; 0 if no humidity is given.
+    /// Mass of water per mass of dry air at the inlet, kg/kg; 0 if no humidity is given.
     pub(crate) fn humidity_kg_kg(&self, boundary: &BoundaryConditions) -> f64 {
         self.humidity_ratio.map_or(0.0, |ratio| self.water_kg_kg(ratio, boundary))
     }

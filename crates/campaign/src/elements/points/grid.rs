@@ -63,7 +63,7 @@ pub(crate) struct SpeedFile(#[schemars(extend("x-above" = "0 rpm", "x-max" = "10
 
 impl From<PointFile> for OperatingPoint {
     fn from(file: PointFile) -> Self {
-        OperatingPoint { speed_rpm: file.speed.0.inside, valve_opening_ratio: file.opening.0 }
+        OperatingPoint { speed_rpm: file.speed.0.value, valve_opening_ratio: file.opening.0 }
     }
 }
 
@@ -74,7 +74,7 @@ impl GridFile {
         self.lines.iter().flatten().map(|line| line.request(defaults, reference, limits)).collect()
     }
 
-    /// The points, and the place of each in the file: its entry in `points`, or its speed in `speeds`.
+    /// The points, and the position of each in the file: its entry in `points`, or its speed in `speeds`.
     ///
     /// Returns only the first point of each of `lines`, since their openings are not known yet.
     pub(crate) fn points(&self, lines: &[LineRequest], t1_k: f64) -> (Vec<OperatingPoint>, Vec<Vec<Step>>) {
@@ -100,7 +100,7 @@ impl GridFile {
             .flatten()
             .flat_map(|opening| {
                 speeds.iter().enumerate().map(|(index, speed)| {
-                    let point = OperatingPoint { speed_rpm: speed.0.inside, valve_opening_ratio: opening.0 };
+                    let point = OperatingPoint { speed_rpm: speed.0.value, valve_opening_ratio: opening.0 };
                     (point, steps!["grid", "speeds", index].to_vec())
                 })
             })
@@ -119,22 +119,22 @@ pub(crate) fn check(check: &mut Check<'_>) {
     let Some(grid) = check.get(&steps!["grid"]).and_then(Value::as_object) else { return };
     let has = |key: &str| grid.contains_key(key);
     let (speeds, openings, points, skip) = (has("speeds"), has("openings"), has("points"), has("skip"));
-    let here = steps!["grid"];
-    let other = ["speeds", "openings", "points", "skip"].into_iter().find(|key| has(key));
-    let of_lines = ["surge_margin", "widest_opening"].into_iter().find(|key| has(key));
+    let path = steps!["grid"];
+    let other_form = ["speeds", "openings", "points", "skip"].into_iter().find(|key| has(key));
+    let line_key = ["surge_margin", "widest_opening"].into_iter().find(|key| has(key));
     if has("lines") {
-        if let Some(key) = other {
+        if let Some(key) = other_form {
             let message = format!("`{key}` is given together with `lines`");
-            check.note_key(FindingKind::Conflict, &here, key, message, FORMS);
+            check.note_key(FindingKind::Conflict, &path, key, message, FORMS);
         }
         lines::check(check);
         return;
     }
-    if let Some(key) = of_lines {
+    if let Some(key) = line_key {
         let message = format!("`{key}` belongs to `lines`, and the grid has none");
         check.note_key(
             FindingKind::Conflict,
-            &here,
+            &path,
             key,
             message,
             "remove it, or write the points as `lines`",
@@ -142,12 +142,12 @@ pub(crate) fn check(check: &mut Check<'_>) {
     }
     match (speeds, openings, points) {
         (false, false, false) => {
-            check.note(FindingKind::MissingKey, &here, "the grid has no points".into(), FORMS);
+            check.note(FindingKind::MissingKey, &path, "the grid has no points".into(), FORMS);
         }
         (true, false, false) => {
             check.note(
                 FindingKind::MissingKey,
-                &here,
+                &path,
                 "`grid` has `speeds` but not `openings`".into(),
                 FORMS,
             );
@@ -155,14 +155,14 @@ pub(crate) fn check(check: &mut Check<'_>) {
         (false, true, false) => {
             check.note(
                 FindingKind::MissingKey,
-                &here,
+                &path,
                 "`grid` has `openings` but not `speeds`".into(),
                 FORMS,
             );
         }
         (true, _, true) | (_, true, true) => {
             let message = "`points` is given together with `speeds` or `openings`".to_owned();
-            check.note_key(FindingKind::Conflict, &here, "points", message, FORMS);
+            check.note_key(FindingKind::Conflict, &path, "points", message, FORMS);
         }
         _ => {}
     }
@@ -208,7 +208,7 @@ fn check_openings(check: &mut Check<'_>) {
     }
 }
 
-/// Duplicates and speeds of `points` or `skip`.
+/// Checks `points` or `skip` for duplicates and for speeds above the limit.
 fn check_points(check: &mut Check<'_>, list: &str) {
     let mut seen = HashSet::new();
     for (index, (rpm, opening)) in points(check, list) {
@@ -235,7 +235,7 @@ fn check_product(check: &mut Check<'_>) {
         .map(|opening| point_key(0.0, opening))
         .collect();
     let count = speeds.len().saturating_mul(openings.len());
-    let here = steps!["grid"];
+    let path = steps!["grid"];
     if count > MAX_POINTS {
         let dwell = check.quantity(Kind::Duration, &steps!["timing", "dwell"]);
         let days = dwell.map(|(dwell_s, _)| count as f64 * dwell_s / 86_400.0);
@@ -245,7 +245,7 @@ fn check_product(check: &mut Check<'_>) {
             "the grid has {count} points{lasts}, and {pairs:.0} times as many pairs as the planner allows"
         );
         let remedy = format!("a grid may have at most {MAX_POINTS}; divide it into several campaigns");
-        check.note(FindingKind::TooLarge, &here, message, &remedy);
+        check.note(FindingKind::TooLarge, &path, message, &remedy);
         return;
     }
     let mut skipped = HashSet::new();

@@ -1,4 +1,4 @@
-//! `grid.lines`: corrected speeds, and on each of them points from choke to surge.
+//! `grid.lines`: speed lines by their corrected speed, each with points from choke to surge.
 
 use crate::checking::Check;
 use crate::elements::points::opening::Opening;
@@ -44,19 +44,19 @@ pub(crate) struct LineDefaults {
 }
 
 impl LineFile {
-    /// The line in SI. `limits`: no point may violate them.
+    /// The line in SI units. No point may violate `limits`.
     pub(crate) fn request(
         &self,
         defaults: LineDefaults,
         reference: ReferenceState,
         limits: &Limits,
     ) -> LineRequest {
-        let margin = self.surge_margin.or(defaults.surge_margin).map(|margin| margin.inside);
+        let margin = self.surge_margin.or(defaults.surge_margin).map(|margin| margin.value);
         LineRequest {
-            speed_corrected_rpm: self.speed_corrected.inside,
+            speed_corrected_rpm: self.speed_corrected.value,
             reference,
             spread: match (self.points, self.spacing) {
-                (None, Some(spacing)) => Spread::SpacingKgS(spacing.inside),
+                (None, Some(spacing)) => Spread::SpacingKgS(spacing.value),
                 // The check rejects a line that has neither.
                 (count, _) => Spread::Points(count.unwrap_or(2)),
             },
@@ -74,19 +74,19 @@ impl LineFile {
 pub(crate) fn check(check: &mut Check<'_>) {
     let mut seen = HashSet::new();
     for index in 0..check.count(&steps!["grid", "lines"]) {
-        let here = steps!["grid", "lines", index];
+        let path = steps!["grid", "lines", index];
         let has = |key: &str| check.get(&steps!["grid", "lines", index, key]).is_some();
         match (has("points"), has("spacing")) {
             (true, true) => {
                 let message = "the line has both `points` and `spacing`".to_owned();
-                let remedy = "give either the number of its points, or their distance";
-                check.note_key(FindingKind::Conflict, &here, "spacing", message, remedy);
+                let remedy = "give either the number of points or their spacing";
+                check.note_key(FindingKind::Conflict, &path, "spacing", message, remedy);
             }
             (false, false)
-                if check.get(&here).and_then(Value::as_object).is_some_and(|line| !line.is_empty()) =>
+                if check.get(&path).and_then(Value::as_object).is_some_and(|line| !line.is_empty()) =>
             {
                 let message = "the line has neither `points` nor `spacing`".to_owned();
-                check.note(FindingKind::MissingKey, &here, message, FORM);
+                check.note(FindingKind::MissingKey, &path, message, FORM);
             }
             _ => {}
         }

@@ -12,7 +12,7 @@ use serde::Deserialize;
 const DEFAULT_SPACING_STEPS: usize = 12;
 const DEFAULT_COUNT: usize = 2;
 
-// Untagged: the form of the YAML node shows which variant it is, and the schema was checked before.
+// Untagged: the type of the YAML node determines the variant, and the schema has been checked.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub(crate) enum RepeatsFile {
@@ -50,7 +50,7 @@ pub(crate) struct JumpFile {
     to: PointFile,
 }
 
-/// Repeats unless the file switches them off.
+/// The repeats, with default values; `None` if the file switches them off.
 pub(crate) fn repeats(file: Option<RepeatsFile>) -> Option<Repeats> {
     let file = match file {
         Some(RepeatsFile::Jump(file)) => file,

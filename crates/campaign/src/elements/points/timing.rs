@@ -36,12 +36,12 @@ impl TimingFile {
     /// The timing of a file in which [`check`] found exactly one of the three ways to set the dwell.
     pub(crate) fn timing(self) -> Timing {
         let dwell = match (self.dwell, self.time_budget, self.required_sigma_eta) {
-            (_, Some(budget), _) => Dwell::TimeBudget(budget.inside),
-            (_, _, Some(sigma)) => Dwell::RequiredSigmaEta(sigma.inside),
-            (dwell, _, _) => Dwell::Fixed(dwell.map_or(0.0, |dwell| dwell.inside)),
+            (_, Some(budget), _) => Dwell::TimeBudget(budget.value),
+            (_, _, Some(sigma)) => Dwell::RequiredSigmaEta(sigma.value),
+            (dwell, _, _) => Dwell::Fixed(dwell.map_or(0.0, |dwell| dwell.value)),
         };
-        let or_none = |time: Option<Quantity<Duration>>| time.map_or(0.0, |time| time.inside);
-        Timing { warm_up_s: or_none(self.warm_up), cool_down_s: or_none(self.cool_down), dwell }
+        let or_zero = |time: Option<Quantity<Duration>>| time.map_or(0.0, |time| time.value);
+        Timing { warm_up_s: or_zero(self.warm_up), cool_down_s: or_zero(self.cool_down), dwell }
     }
 }
 

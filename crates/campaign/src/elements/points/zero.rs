@@ -6,7 +6,7 @@ use mapper_core::Soak;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// The isothermal zero: the run begins with a soak, in which T1, T2, Tc and T_oil see one temperature, and P1 and P2 one pressure; the identification subtracts their differences.
+/// The isothermal zero: the run begins with a soak, in which T1, T2, Tc and T_oil have one temperature, and P1 and P2 one pressure; the identification subtracts their differences.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ZeroFile {
@@ -16,10 +16,10 @@ pub(crate) struct ZeroFile {
     /// Oil inlet temperature during the soak; that of the inlet air if none is given.
     #[schemars(extend("x-min" = "250 K", "x-max" = "450 K"), example = &"25 degC")]
     oil_temperature: Option<Quantity<Temperature>>,
-    /// Temperature non-uniformity of the rig at rest, one standard deviation of the temperature at one sensor about that at all: the uncertainty of each offset after the zero; 0.05 K if none is given.
+    /// Temperature non-uniformity of the rig at rest, one standard deviation of the temperature at a sensor about the mean of all sensors: the uncertainty of each offset after the zero; 0.05 K if none is given.
     #[schemars(extend("x-min" = "0 K", "x-max" = "10 K"), example = &"0.05 K")]
     evenness: Option<Quantity<TemperatureDifference>>,
-    /// The same for the pressure at P1 and P2; 5 Pa if none is given.
+    /// Uncertainty of the pressure at P1 and P2 at rest, one standard deviation; 5 Pa if none is given.
     #[schemars(extend("x-min" = "0 Pa", "x-max" = "1 kPa"), example = &"5 Pa")]
     pressure_evenness: Option<Quantity<PressureDifference>>,
 }
@@ -28,7 +28,7 @@ impl ZeroFile {
     /// The soak, with the inlet air's temperature if none is given for the oil, K.
     pub(crate) fn soak(self, inlet_temperature_k: f64) -> Soak {
         Soak {
-            duration_s: self.soak.inside,
+            duration_s: self.soak.value,
             oil_temperature_k: value_or(self.oil_temperature, inlet_temperature_k),
             temperature_sigma_k: value_or(self.evenness, Soak::TEMPERATURE_SIGMA_K),
             pressure_sigma_pa: value_or(self.pressure_evenness, Soak::PRESSURE_SIGMA_PA),

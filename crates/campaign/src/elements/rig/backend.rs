@@ -1,4 +1,4 @@
-//! `backend:`, opaque to everything but the backend.
+//! `backend:`, whose settings only the backend itself interprets.
 
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -8,11 +8,11 @@ use std::collections::BTreeMap;
 pub struct BackendChoice {
     /// Name, e.g. `virtual_lab`.
     pub name: String,
-    /// Its settings, unchecked.
+    /// Settings, unchecked.
     pub settings: serde_json::Value,
 }
 
-/// The one entry of the mapping, as the schema has it.
+/// The single entry of the mapping, which the schema ensures.
 pub(crate) fn backend(file: BTreeMap<String, serde_json::Value>) -> BackendChoice {
     let (name, settings) = file.into_iter().next().unwrap_or_default();
     BackendChoice { name, settings }

@@ -29,13 +29,13 @@ pub(crate) struct BoundaryFile {
     /// Oil inlet temperature.
     #[schemars(extend("x-min" = "230 K", "x-max" = "450 K"), example = &"50 degC")]
     oil_temperature: Quantity<Temperature>,
-    /// Conditions that follow the compressor's outlet temperature instead, at each point that of the nominal machine in steady state: `[turbine_inlet_temperature, oil_temperature]` for adiabatic mapping. None if it is left out.
+    /// Conditions that follow the outlet temperature of the compressor instead, which is that of the nominal machine in steady state at each point: `[turbine_inlet_temperature, oil_temperature]` for adiabatic mapping. None if it is omitted.
     #[serde(default)]
     #[schemars(extend("uniqueItems" = true, "examples" = [["turbine_inlet_temperature", "oil_temperature"]]))]
     follow_outlet: Vec<FollowerName>,
 }
 
-/// What may follow the compressor's outlet temperature.
+/// Quantities that may follow the compressor outlet temperature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum FollowerName {
@@ -47,13 +47,13 @@ impl BoundaryFile {
     /// The boundary conditions; P3 and valve come from the plan, and are set to no flow and to 1 until then.
     pub(crate) fn conditions(&self) -> BoundaryConditions {
         BoundaryConditions {
-            t1_k: self.inlet_temperature.inside,
-            p1_pa: self.inlet_pressure.inside,
-            p3_pa: self.turbine_outlet_pressure.inside,
-            t3_k: self.turbine_inlet_temperature.inside,
-            p4_pa: self.turbine_outlet_pressure.inside,
-            oil_temperature_k: self.oil_temperature.inside,
-            ambient_temperature_k: value_or(self.ambient_temperature, self.inlet_temperature.inside),
+            t1_k: self.inlet_temperature.value,
+            p1_pa: self.inlet_pressure.value,
+            p3_pa: self.turbine_outlet_pressure.value,
+            t3_k: self.turbine_inlet_temperature.value,
+            p4_pa: self.turbine_outlet_pressure.value,
+            oil_temperature_k: self.oil_temperature.value,
+            ambient_temperature_k: value_or(self.ambient_temperature, self.inlet_temperature.value),
             valve_opening_ratio: 1.0,
         }
     }

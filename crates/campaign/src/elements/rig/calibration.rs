@@ -12,7 +12,7 @@ pub enum CalibrationRule {
     /// An expired calibration, or a reading outside the calibrated range, is a warning.
     #[default]
     Optional,
-    /// Every sensor has a calibration with its due day and range; whatever contradicts them is an error.
+    /// Every sensor must have a calibration with its due day and range; a contradiction is an error.
     Required,
 }
 
@@ -29,7 +29,7 @@ impl CalibrationRule {
 pub struct Date(jiff::civil::Date);
 
 impl Date {
-    /// The day in UTC of a time in nanoseconds since 1970; `None` for 0, which is no date: simulated time starts there.
+    /// The day in UTC of a time in nanoseconds since 1970; `None` for 0, the start of simulated time.
     pub fn from_epoch_ns(ns: u64) -> Option<Date> {
         let seconds = i64::try_from(ns / 1_000_000_000).ok().filter(|seconds| *seconds > 0)?;
         let instant = jiff::Timestamp::from_second(seconds).ok()?;
@@ -65,17 +65,17 @@ impl std::fmt::Display for Date {
     }
 }
 
-/// Calibration of a sensor, as its certificate states it.
+/// Calibration of a sensor, according to its certificate.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct CalibrationFile<R, U> {
     /// Number of the certificate.
     certificate: Option<String>,
-    /// Laboratory that issued it.
+    /// Laboratory that issued the certificate.
     laboratory: Option<String>,
     /// Day of the calibration.
     date: Date,
-    /// Last day on which it is valid; without one it does not expire.
+    /// Last day of validity; without it the calibration does not expire.
     due: Option<Date>,
     /// Calibrated range of readings.
     range: Option<RangeFile<R>>,
@@ -98,11 +98,11 @@ struct RangeFile<R> {
 pub struct Calibration {
     /// Number of the certificate.
     pub certificate: Option<String>,
-    /// Laboratory that issued it.
+    /// Laboratory that issued the certificate.
     pub laboratory: Option<String>,
     /// Day of the calibration.
     pub date: Date,
-    /// Last day on which it is valid.
+    /// Last day of validity.
     pub due: Option<Date>,
     /// Calibrated range of readings, lowest and highest.
     pub range: Option<(f64, f64)>,
@@ -111,12 +111,12 @@ pub struct Calibration {
 }
 
 impl Calibration {
-    /// A calibration of which only the day is known.
+    /// A calibration with only its day.
     pub(crate) fn from_date(date: Date) -> Self {
         Calibration { certificate: None, laboratory: None, date, due: None, range: None, uncertainty: None }
     }
 
-    /// Whether more than its day is known.
+    /// Whether the calibration has more data than its day.
     pub fn is_certified(&self) -> bool {
         *self != Calibration::from_date(self.date)
     }
@@ -148,7 +148,7 @@ pub(crate) fn check(check: &mut Check<'_>, calibration: &[Step]) {
     }
 }
 
-/// The day at a place; notes one that the calendar does not have. The schema checks the form.
+/// Reads the day at a place, and notes a day that does not exist. The schema checks the form.
 pub(crate) fn check_date(check: &mut Check<'_>, steps: &[Step]) -> Option<Date> {
     let text = check.text(steps)?;
     let date = text.parse().ok();

@@ -153,7 +153,7 @@ struct SurgeFile {
     /// Variation of P2 or P1 that must occur together with that of the flow; 1 % if none is given.
     #[schemars(extend("x-above" = "0 %", "x-max" = "50 %"), example = &"1 %")]
     pressure: Option<Quantity<Fraction>>,
-    /// Trips after this time: a jump may touch the surge line, a point may not stay there; 5 s if none is given.
+    /// Trips after this time: a jump may touch the surge line, a point may not stay beyond it; 5 s if none is given.
     #[schemars(extend("x-min" = "0 s", "x-max" = "5 s"), example = &"5 s")]
     dwell: Option<Quantity<Duration>>,
     /// Reaction; `safe` if none is given.
@@ -197,7 +197,7 @@ pub(crate) struct GuardInputs<'a> {
 const DEFAULT_DWELL_S: f64 = 0.2;
 /// Default age of a reading before a trip, s. Judgement: a few samples of an instrument that reads once a second.
 pub const DEFAULT_MAX_AGE_S: f64 = 3.0;
-/// Default time without any change before a channel counts as frozen, s: 200 samples at 10 Hz, none of which has noise.
+/// Default time without any change before a channel counts as frozen, s: 200 samples at 10 Hz without noise.
 const DEFAULT_FROZEN_S: f64 = 20.0;
 /// Default time beyond an oil limit before a trip, s. Judgement: ten samples at 10 Hz.
 const DEFAULT_OIL_DWELL_S: f64 = 1.0;
@@ -259,9 +259,9 @@ impl GuardsFile {
                 limits.t3_max_k,
             ),
         ] {
-            let above = file.above.map(|above| above.inside).or(limit_k);
+            let above = file.above.map(|above| above.value).or(limit_k);
             let change = file.change.map(|change| LargestChange {
-                change: change.inside,
+                change: change.value,
                 within_s: value_or(file.within, DEFAULT_CHANGE_WITHIN_S),
             });
             // T2 is monitored for valid readings even without a limit.
@@ -279,15 +279,15 @@ impl GuardsFile {
         signals.push(guard(GuardName::Signals, Channel::P2, Reaction::Safe));
         if let Some(oil) = self.oil_temperature {
             signals.push(SignalGuard {
-                above: oil.above.map(|above| above.inside),
-                below: oil.below.map(|below| below.inside),
+                above: oil.above.map(|above| above.value),
+                below: oil.below.map(|below| below.value),
                 hysteresis: value_or(oil.hysteresis, 0.0),
                 dwell_s: value_or(oil.dwell, DEFAULT_OIL_DWELL_S),
                 ..guard(GuardName::OilTemperature, Channel::TOil, oil.reaction.unwrap_or(Reaction::Safe))
             });
         }
         let housing = self.housing_gradient;
-        let change_k = housing.map(|file| file.change.inside).or(limits.housing_gradient_max_k);
+        let change_k = housing.map(|file| file.change.value).or(limits.housing_gradient_max_k);
         if let Some(change) = change_k {
             let within_s = value_or(housing.and_then(|file| file.within), dwell_s);
             let reaction = housing.and_then(|file| file.reaction).unwrap_or(Reaction::Note);

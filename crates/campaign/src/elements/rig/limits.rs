@@ -41,7 +41,7 @@ pub(crate) struct PressureRangeFile {
     /// Highest pressure.
     #[schemars(extend("x-above" = "0 kPa", "x-max" = "2 MPa"), example = &"400 kPa")]
     max: Quantity<Pressure>,
-    /// Time the rig takes from the lowest to the highest pressure; if none is given, the plan ignores it.
+    /// Time of the rig from the lowest to the highest pressure; the plan ignores it if none is given.
     #[schemars(extend("x-above" = "0 s", "x-max" = "24 h"), example = &"10 s")]
     stroke: Option<Quantity<Duration>>,
 }
@@ -50,14 +50,14 @@ impl From<LimitsFile> for Limits {
     fn from(file: LimitsFile) -> Self {
         let p3 = file.turbine_inlet_pressure;
         Limits {
-            speed_max_rpm: file.speed.inside,
-            p3_min_pa: p3.min.inside,
-            p3_max_pa: p3.max.inside,
-            p3_stroke_s: p3.stroke.map(|stroke| stroke.inside),
-            t3_max_k: file.turbine_inlet_temperature.map(|limit| limit.inside),
-            t2_max_k: file.compressor_outlet_temperature.map(|limit| limit.inside),
-            surge_margin_min_ratio: file.surge_margin.map(|limit| limit.inside),
-            housing_gradient_max_k: file.housing_gradient.map(|limit| limit.inside),
+            speed_max_rpm: file.speed.value,
+            p3_min_pa: p3.min.value,
+            p3_max_pa: p3.max.value,
+            p3_stroke_s: p3.stroke.map(|stroke| stroke.value),
+            t3_max_k: file.turbine_inlet_temperature.map(|limit| limit.value),
+            t2_max_k: file.compressor_outlet_temperature.map(|limit| limit.value),
+            surge_margin_min_ratio: file.surge_margin.map(|limit| limit.value),
+            housing_gradient_max_k: file.housing_gradient.map(|limit| limit.value),
         }
     }
 }
@@ -82,14 +82,14 @@ pub(crate) fn check(check: &mut Check<'_>) {
         let remedy = "raise it, or lower `boundary.turbine_outlet_pressure`";
         check.note(FindingKind::Conflict, &high_path, message, remedy);
     }
-    let wanted_path = steps!["boundary", "turbine_inlet_temperature"];
-    let wanted = check.quantity(Kind::Temperature, &wanted_path);
+    let setpoint_path = steps!["boundary", "turbine_inlet_temperature"];
+    let setpoint = check.quantity(Kind::Temperature, &setpoint_path);
     let limit = check.quantity(Kind::Temperature, &steps!["limits", "turbine_inlet_temperature"]);
-    if let (Some((wanted_k, wanted)), Some((limit_k, limit))) = (wanted, limit)
-        && wanted_k > limit_k
+    if let (Some((setpoint_k, setpoint)), Some((limit_k, limit))) = (setpoint, limit)
+        && setpoint_k > limit_k
     {
-        let message = format!("`{wanted}` is above `limits.turbine_inlet_temperature`, `{limit}`");
-        check.note(FindingKind::Conflict, &wanted_path, message, "lower it, or raise the limit");
+        let message = format!("`{setpoint}` is above `limits.turbine_inlet_temperature`, `{limit}`");
+        check.note(FindingKind::Conflict, &setpoint_path, message, "lower it, or raise the limit");
     }
 }
 

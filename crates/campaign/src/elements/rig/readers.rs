@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 pub struct ReaderChoice {
     /// Display name.
     pub name: String,
-    /// Its backend or driver.
+    /// Backend or driver.
     pub backend: BackendChoice,
     /// Channels to use; `None`: all that it delivers.
     pub channels: Option<Vec<Channel>>,
@@ -26,7 +26,7 @@ pub(crate) struct ReaderFile {
     /// Name of its backend or driver, with its own settings below it.
     #[schemars(length(min = 1, max = 1), extend("minProperties" = 1, "maxProperties" = 1), example = serde_json::json!({"ak": {}}))]
     backend: BTreeMap<String, serde_json::Value>,
-    /// Channels to use, even if the rig delivers them too; all that it delivers if the list is left out.
+    /// Channels to use, even if the rig delivers them too; all channels of the instrument if the list is omitted.
     #[schemars(length(min = 1, max = 19), example = serde_json::json!(["m_c"]))]
     channels: Option<Vec<String>>,
 }
@@ -36,7 +36,7 @@ pub(crate) fn readers(file: BTreeMap<String, ReaderFile>) -> Vec<ReaderChoice> {
     let choice = |(name, file): (String, ReaderFile)| ReaderChoice {
         name,
         backend: backend(file.backend),
-        // Each was checked before.
+        // The check has rejected unknown symbols.
         channels: file
             .channels
             .map(|symbols| symbols.iter().filter_map(|symbol| symbol.parse().ok()).collect()),
@@ -49,22 +49,22 @@ pub(crate) fn check(check: &mut Check<'_>) {
     let tree = check.tree;
     let mut taken: BTreeMap<String, String> = BTreeMap::new();
     for name in tree.keys(&steps!["readers"]) {
-        let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"_-".contains(&byte);
-        if name.is_empty() || name.len() > 40 || !name.bytes().all(plain) {
+        let is_allowed = |byte: u8| byte.is_ascii_alphanumeric() || b"_-".contains(&byte);
+        if name.is_empty() || name.len() > 40 || !name.bytes().all(is_allowed) {
             let message = format!("`{name}` cannot be the name of a reader");
             let remedy = "use letters, digits, `_` and `-`, at most 40";
             check.note_key(FindingKind::WrongValue, &steps!["readers"], name, message, remedy);
             continue;
         }
         for index in 0..check.count(&steps!["readers", name, "channels"]) {
-            let place = steps!["readers", name, "channels", index];
-            let Some(symbol) = check.text(&place).map(str::to_owned) else { continue };
+            let path = steps!["readers", name, "channels", index];
+            let Some(symbol) = check.text(&path).map(str::to_owned) else { continue };
             if let Err(error) = symbol.parse::<Channel>() {
                 let remedy = "write the symbol of a measured quantity, e.g. `m_c`";
-                check.note(FindingKind::WrongValue, &place, error.to_string(), remedy);
+                check.note(FindingKind::WrongValue, &path, error.to_string(), remedy);
             } else if let Some(other) = taken.insert(symbol.clone(), name.to_owned()) {
                 let message = format!("{symbol} is already taken from `{other}`");
-                check.note(FindingKind::Conflict, &place, message, "take each channel from one reader");
+                check.note(FindingKind::Conflict, &path, message, "take each channel from one reader");
             }
         }
     }

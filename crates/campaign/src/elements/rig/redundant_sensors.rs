@@ -7,10 +7,10 @@ use mapper_yaml::{FindingKind, Step, steps};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// One sensor as declared; one standard deviation throughout, in the channel's unit (K, Pa, kg/s, rpm).
+/// A declared sensor; all uncertainties are one standard deviation, in the channel's unit (K, Pa, kg/s, rpm).
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct SensorDeclaration {
-    /// Noise, offset left after calibration, gain; those of the combined reading if there are several sensors.
+    /// Noise, offset after calibration, gain; those of the combined reading if there are several sensors.
     pub declared: DeclaredUncertainty,
     /// Whether a gain is declared, which may be 0.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
@@ -20,7 +20,7 @@ pub struct SensorDeclaration {
     /// Diameter of the probe's tip, m; 0 is a probe without inertia. For several sensors, that of the single probe with the same
     /// lag as the combined reading.
     pub probe_diameter_m: f64,
-    /// Each of several sensors; `None` if there is only one.
+    /// Each of the redundant sensors; `None` if there is only one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub redundant: Option<RedundantSensors>,
     /// The calibration of each sensor as listed; one for identical sensors. Empty if none is declared.
@@ -29,7 +29,7 @@ pub struct SensorDeclaration {
 }
 
 impl SensorDeclaration {
-    /// Each sensor with its calibration: its place in a list, its name, and the calibration if it has one.
+    /// Each sensor with its calibration: its index in a list, its name, and the calibration if it has one.
     pub fn calibrated(&self, channel: Channel) -> Vec<(Option<usize>, String, Option<&Calibration>)> {
         let listed = match &self.redundant {
             Some(redundant) if self.calibrations.len() > 1 => redundant.elements.as_slice(),
@@ -103,8 +103,8 @@ impl<S: Sensor> Sensors<S> {
             Sensors::Alike(sensor) => sensor.declaration().calibrations,
             Sensors::Each(sensors) => sensors.iter().flat_map(|one| one.declaration().calibrations).collect(),
         };
-        let none = calibrations.iter().all(Option::is_none);
-        let calibrations = if none { Vec::new() } else { calibrations };
+        let has_none = calibrations.iter().all(Option::is_none);
+        let calibrations = if has_none { Vec::new() } else { calibrations };
         let declared = redundant.fused(|_| true);
         if members.len() < 2 {
             let offset_sigma = first.declared.offset_sigma.hypot(common_offset_sigma);
@@ -137,7 +137,7 @@ impl<S: Sensor> DeclaredSensors for Option<Sensors<S>> {
     }
 }
 
-/// The places of a channel's sensors in the file.
+/// The paths of a channel's sensors in the file.
 pub(crate) fn sensor_places(check: &Check<'_>, symbol: &str) -> Vec<Vec<Step>> {
     let channel = steps!["sensors", symbol];
     match check.count(&channel) {
@@ -163,7 +163,7 @@ pub(crate) fn check_redundant_sensors(check: &mut Check<'_>, symbol: &str) {
             check.note(FindingKind::Conflict, &path, message, remedy);
         }
     }
-    // The common offset comes from one place in the flow and one calibration bath, so all sensors have the same one.
+    // The common offset comes from one position in the flow and one calibration bath, so all sensors have the same one.
     for key in ["common_offset", "tap", "pipe_diameter"] {
         let text_of = |check: &Check<'_>, place: &[Step]| check.text(&at(place, key)).map(str::to_owned);
         let first = places.iter().find_map(|place| text_of(check, place));

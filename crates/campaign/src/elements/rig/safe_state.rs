@@ -5,7 +5,7 @@ use mapper_core::SafeTrajectory;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// The safe shutdown, in place of the rig's own: the valve opens and the heater goes off at once, P3 goes down, then the air is cut.
+/// The safe shutdown, in place of that of the rig: the valve opens and the heater switches off at once, P3 falls, then the air is cut.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct SafeStateFile {
@@ -15,7 +15,7 @@ pub(crate) struct SafeStateFile {
     /// Opening of the back-pressure valve during the shutdown; 1 if none is given. A step with a larger opening keeps it.
     #[schemars(range(min = 0.5, max = 2.5), example = 1.0)]
     opening: Option<f64>,
-    /// Longest time of the shutdown: the air is cut then, whatever P3 is; 20 s if none is given.
+    /// Maximum duration of the shutdown, after which the air is cut at any P3; 20 s if none is given.
     #[schemars(extend("x-min" = "1 s", "x-max" = "2 min"), example = &"20 s")]
     within: Option<Quantity<Duration>>,
 }
@@ -25,7 +25,7 @@ impl SafeStateFile {
     pub(crate) fn trajectory(self) -> SafeTrajectory {
         let usual = SafeTrajectory::default();
         SafeTrajectory {
-            p3_slew_pa_s: Some(self.pressure_slew.inside),
+            p3_slew_pa_s: Some(self.pressure_slew.value),
             valve_opening_ratio: self.opening.unwrap_or(usual.valve_opening_ratio),
             within_s: crate::si_values::value_or(self.within, usual.within_s),
         }

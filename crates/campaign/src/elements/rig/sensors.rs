@@ -95,7 +95,7 @@ fn declaration<D: Dimension>(
 ) -> SensorDeclaration {
     SensorDeclaration {
         declared: DeclaredUncertainty {
-            noise_sigma: noise.inside,
+            noise_sigma: noise.value,
             offset_sigma: value_or(offset, 0.0),
             gain_sigma_ratio: value_or(gain, 0.0),
         },
@@ -122,7 +122,7 @@ macro_rules! sensor {
             /// Noise of one sample.
             #[schemars($($noise)*)]
             noise: Quantity<$dimension>,
-            /// Fixed offset left after calibration; 0 if none is given.
+            /// Fixed offset after calibration; 0 if none is given.
             #[schemars($($offset)*)]
             offset: Option<Quantity<$dimension>>,
             #[doc = $gain]
@@ -138,7 +138,7 @@ macro_rules! sensor {
             /// Offset that all sensors of the channel share and that does not average out (one calibration bath, stratification, radiation); 0 if none is given.
             #[schemars($($common)*)]
             common_offset: Option<Quantity<$dimension>>,
-            /// Calibration of this sensor, as its certificate states it.
+            /// Calibration of this sensor, according to its certificate.
             calibration: Option<CalibrationFile<Quantity<$reading>, Quantity<$dimension>>>,
         }
 
@@ -199,14 +199,14 @@ sensor! {
     common: [extend("x-min" = "0 Pa")],
     gain: " Fixed error of the gain; if none is given, identification takes 0.058 % (accuracy class 0.1).",
     {
-        /// What the tap measures: `total` (the default), or `static`, converted with `pipe_diameter`.
+        /// Pressure at the tap: `total` (the default), or `static`, converted with `pipe_diameter`.
         tap: Option<TapName>,
         /// Inner diameter of the pipe at the tap; needed for a static tap.
         #[schemars(extend("x-above" = "0 mm", "x-max" = "1 m"), example = &"40 mm")]
         pipe_diameter: Option<Quantity<Length>>,
     }
     |sensor, declaration| {
-        let diameter = sensor.pipe_diameter.map(|diameter| diameter.inside);
+        let diameter = sensor.pipe_diameter.map(|diameter| diameter.value);
         let static_tap_pipe_diameter_m = diameter.filter(|_| sensor.tap == Some(TapName::Static));
         SensorDeclaration { static_tap_pipe_diameter_m, ..declaration }
     }

@@ -4,7 +4,7 @@ use mapper_core::EfficiencyDefinition;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-// Untagged: the form of the YAML node shows which variant it is, and the schema was checked before.
+// Untagged: the type of the YAML node determines the variant, and the schema has been checked.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub(crate) enum EfficiencyFile {

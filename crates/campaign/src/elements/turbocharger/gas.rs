@@ -19,11 +19,11 @@ pub(crate) struct GasFile {
     /// Dry gas of the compressor: `air` as a real gas, `closed_form_air`, whose heat capacity is a formula (the default, and the gas of the virtual lab's reference solutions), or volume fractions of a mixture, whose viscosity and conductivity stay those of air. `report: {humidity: 50 %}` adds water vapour.
     #[schemars(example = &"air")]
     compressor: Option<CompressorGas>,
-    /// Gas of the turbine: air burnt with a fuel. `closed_form_air` if it is left out.
+    /// Gas of the turbine: combustion products of a fuel in air. `closed_form_air` if it is omitted.
     turbine: Option<BurntGas>,
 }
 
-// Untagged: the form of the YAML node shows which variant it is, and the schema was checked before.
+// Untagged: the type of the YAML node determines the variant, and the schema has been checked.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub(crate) enum CompressorGas {
@@ -75,7 +75,7 @@ pub(crate) struct BurntGas {
     /// The fuel.
     #[schemars(example = &"diesel")]
     fuel: FuelName,
-    /// Air over the air that the fuel needs, a plain number.
+    /// Actual over stoichiometric amount of air, a plain number.
     #[schemars(range(min = 1, max = 100), example = 3)]
     air_ratio: f64,
 }
@@ -128,7 +128,7 @@ impl From<CompressorGas> for Gas {
                     (Species::H2, hydrogen),
                     (Species::CH4, methane),
                 ];
-                let given = fractions.into_iter().filter_map(|(species, x)| Some((species, x?.inside)));
+                let given = fractions.into_iter().filter_map(|(species, x)| Some((species, x?.value)));
                 Gas::of_mole_fractions(given)
             }
         }

@@ -29,7 +29,7 @@ impl GeometryFile {
     /// The machine: the values of the file, and the reference machine scaled to its wheel for all others.
     pub(crate) fn machine(self) -> Params {
         let wheel = self.compressor.as_ref().and_then(|compressor| compressor.wheel_diameter);
-        let mut params = wheel.map_or_else(Params::default, |wheel| similar_machine(wheel.inside));
+        let mut params = wheel.map_or_else(Params::default, |wheel| similar_machine(wheel.value));
         self.apply(&mut params);
         params
     }
@@ -141,7 +141,7 @@ pub(crate) struct TurbineFile {
     emissivity: Option<f64>,
     /// Internal convection.
     nusselt: Option<NusseltFile>,
-    /// Flow swallowed at large expansion ratio, corrected to 288.15 K and 101.325 kPa.
+    /// Swallowing capacity at a large expansion ratio, corrected to 288.15 K and 101.325 kPa.
     #[schemars(extend("x-above" = "0 kg/s"))]
     choked_flow: Option<Quantity<MassFlow>>,
     /// Best efficiency, a plain number above 0, at most 1.

@@ -47,7 +47,7 @@ pub enum MapSource {
         /// Path as resolved from the campaign file. Not part of the canonical JSON: only the text identifies the map.
         #[serde(skip)]
         path: PathBuf,
-        /// The path as the campaign writes it. Not part of the canonical JSON either.
+        /// The path in the campaign. Not part of the canonical JSON either.
         #[serde(skip)]
         named: String,
         /// The file's text, which [`crate::nominal_model`] reads.
@@ -63,7 +63,7 @@ pub enum MapSource {
 /// A map description of a campaign.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DescriptionSource {
-    /// The path as the campaign writes it. Not part of the canonical JSON.
+    /// The path in the campaign. Not part of the canonical JSON.
     #[serde(skip)]
     pub named: String,
     /// The file's text.
@@ -102,7 +102,7 @@ pub(crate) struct MachineFile {
     map: MapFile,
 }
 
-// Untagged: the form of the YAML node shows which variant it is, and the schema was checked before.
+// Untagged: the type of the YAML node determines the variant, and the schema has been checked.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub(crate) enum MapFile {
@@ -120,7 +120,7 @@ pub(crate) enum NamedMap {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct TableFile {
-    /// Map file in any layout that `mapper map inspect` understands, relative to the campaign file.
+    /// Map file in any layout of `mapper map inspect`, relative to the campaign file.
     #[schemars(length(min = 1), example = &"maps/x.csv")]
     pub file: String,
     /// State to which the table's corrected flow and speed refer. The usual choices: SAE (298 K, 100 kPa), Garrett (545 degR, 13.95 psia), BorgWarner (293 K, 98.1 kPa); or `temperature` and `pressure`.
@@ -218,12 +218,12 @@ fn description(check: &mut Check<'_>) -> Option<MapDescription> {
 
 /// The reference state of the table, if it is given and valid.
 fn reference(check: &Check<'_>) -> Option<ReferenceState> {
-    let here = steps!["machine", "map", "reference"];
-    if let Some(name) = check.text(&here) {
+    let path = steps!["machine", "map", "reference"];
+    if let Some(name) = check.text(&path) {
         return ReferenceState::named(name);
     }
-    let of = |key: &str| [&here[..], &steps![key]].concat();
-    let (t_ref_k, _) = check.quantity(Kind::Temperature, &of("temperature"))?;
-    let (p_ref_pa, _) = check.quantity(Kind::Pressure, &of("pressure"))?;
+    let join = |key: &str| [&path[..], &steps![key]].concat();
+    let (t_ref_k, _) = check.quantity(Kind::Temperature, &join("temperature"))?;
+    let (p_ref_pa, _) = check.quantity(Kind::Pressure, &join("pressure"))?;
     Some(ReferenceState { t_ref_k, p_ref_pa })
 }

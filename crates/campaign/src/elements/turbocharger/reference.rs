@@ -5,7 +5,7 @@ use mapper_core::ReferenceState;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-// Untagged: the form of the YAML node shows which variant it is, and the schema was checked before.
+// Untagged: the type of the YAML node determines the variant, and the schema has been checked.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub(crate) enum ReferenceFile {
@@ -40,7 +40,7 @@ impl From<ReferenceFile> for ReferenceState {
             ReferenceFile::Named(NamedReference::Garrett) => ReferenceState::GARRETT,
             ReferenceFile::Named(NamedReference::BorgWarner) => ReferenceState::BORGWARNER,
             ReferenceFile::State(state) => {
-                ReferenceState { t_ref_k: state.temperature.inside, p_ref_pa: state.pressure.inside }
+                ReferenceState { t_ref_k: state.temperature.value, p_ref_pa: state.pressure.value }
             }
         }
     }

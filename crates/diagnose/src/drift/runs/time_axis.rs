@@ -123,8 +123,8 @@ fn condition_of(marker: &StepMarker, held: Option<HeldPoint>, conditions: &mut V
 /// The segments of all steps.
 pub(crate) fn blocks(steps: &[CampaignStep]) -> Vec<Block> {
     let of_step = |(position, step): (usize, &CampaignStep)| {
-        let stretches = STRETCHES.stretches(step.start_s, step.end_s, 0.0);
-        stretches.into_iter().map(move |(start_s, end_s)| Block { step: position, start_s, end_s })
+        let segments = STRETCHES.segments(step.start_s, step.end_s, 0.0);
+        segments.into_iter().map(move |(start_s, end_s)| Block { step: position, start_s, end_s })
     };
     steps.iter().enumerate().flat_map(of_step).collect()
 }

@@ -27,11 +27,11 @@ const START_ROUGHNESS: Parameters = [0.5, 0.5, 3.0, 1.0, 1.5, 1.5, 0.15, 0.15, 0
 const DAMPING: DampingRule = DampingRule {
     start: 1e-2,
     growth: 5.0,
-    relief: 0.2,
-    renewed: 1e-6,
-    least: 1e-9,
-    most: f64::INFINITY,
-    tries: 6,
+    reduction: 0.2,
+    min_after_rejection: 1e-6,
+    min: 1e-9,
+    max: f64::INFINITY,
+    max_trials: 6,
 };
 
 /// Start of a search.

@@ -66,7 +66,7 @@ impl<'a> Schedule<'a> {
             t3_actuator: at_once,
             valve_actuator: at_once,
             oil_actuator: at_once,
-            weather: Weather::drawn(night_seed),
+            weather: Weather::draw(night_seed),
             seed: night_seed,
             ..LabSettings::ideal(self.nominal.clone(), self.campaign.boundary)
         };

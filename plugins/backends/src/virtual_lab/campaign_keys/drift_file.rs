@@ -17,7 +17,7 @@ pub(crate) struct DriftFile {
     /// Duration of the change; it continues at this rate afterwards. Default: a step.
     #[serde(default)]
     over: Option<Quantity<mapper_yaml::units::Duration>>,
-    /// Begin; default 0, negative for a drift that began before the run.
+    /// Start; default 0, negative for a drift that began before the run.
     #[serde(default)]
     from: Option<Quantity<mapper_yaml::units::Duration>>,
 }
@@ -38,18 +38,18 @@ fn read_one(index: usize, file: &DriftFile) -> Result<LabDrift, BackendError> {
         },
     };
     let change = parse_change(target, &file.change).map_err(|problem| problem.at(key("change")))?;
-    let over_s = file.over.map(|over| over.inside);
+    let over_s = file.over.map(|over| over.value);
     if let Some(over_s) = over_s.filter(|over_s| *over_s <= 0.0) {
         return Err(SettingProblem::NoDuration { over_s }.at(key("over")));
     }
-    Ok(LabDrift { target, change, over_s, from_s: file.from.map_or(0.0, |from| from.inside) })
+    Ok(LabDrift { target, change, over_s, from_s: file.from.map_or(0.0, |from| from.value) })
 }
 
 fn is_command(channel: Channel) -> bool {
     matches!(channel, Channel::P3Command | Channel::T3Command | Channel::ValveCommand | Channel::TOilCommand)
 }
 
-/// Beyond this limit the machine, or the air supply behind a sensor, would be unphysical.
+/// Maximum relative change: a larger one would be physically impossible for the machine or its air supply.
 const MAX_CHANGE_RATIO: f64 = 0.3;
 
 fn parse_change(target: DriftTarget, text: &str) -> Result<f64, SettingProblem> {

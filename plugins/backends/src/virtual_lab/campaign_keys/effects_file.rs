@@ -1,4 +1,4 @@
-//! `effects:` below `virtual_lab`: effects of the true machine that the campaign's nominal model does not have.
+//! `effects:` below `virtual_lab`: effects of the simulated machine that the nominal model of the campaign omits.
 
 use crate::virtual_lab::campaign_keys::setting_problem::SettingProblem;
 use mapper_core::BackendError;
@@ -8,7 +8,7 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// One value, or several by name.
+/// A single value, or several values by name.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(untagged)]
 pub(crate) enum EffectValues {
@@ -17,7 +17,7 @@ pub(crate) enum EffectValues {
     Named(BTreeMap<String, ValueText>),
 }
 
-/// A bare number, for ratios, or a value with its unit.
+/// A number, for ratios, or a value with its unit.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(untagged)]
 pub(crate) enum ValueText {
@@ -28,10 +28,10 @@ pub(crate) enum ValueText {
 /// Applies the effects to a rig.
 pub(crate) fn apply_effects(
     rig: &mut Rig,
-    wanted: &BTreeMap<String, EffectValues>,
+    requested: &BTreeMap<String, EffectValues>,
     known: &[Arc<dyn Effect>],
 ) -> Result<(), BackendError> {
-    for (id, values) in wanted {
+    for (id, values) in requested {
         let key = format!("effects.{id}");
         let Some(effect) = known.iter().find(|effect| effect.info().id == id.as_str()) else {
             let ids: Vec<&str> = known.iter().map(|effect| effect.info().id.as_ref()).collect();
@@ -41,7 +41,7 @@ pub(crate) fn apply_effects(
         if let Some(name) = values.unknown_name(parameters) {
             return Err(form_problem(parameters).at(format!("{key}.{name}")));
         }
-        read_all(parameters, values)
+        read_parameters(parameters, values)
             .and_then(|values| Ok(effect::add(rig, effect.as_ref(), &values)?))
             .map_err(|problem| problem.at(key))?;
     }
@@ -52,13 +52,19 @@ impl EffectValues {
     /// The first name that is not a parameter.
     fn unknown_name(&self, parameters: &[EffectParameter]) -> Option<&str> {
         let EffectValues::Named(values) = self else { return None };
-        values.keys().map(String::as_str).find(|name| parameters.iter().all(|one| one.name != *name))
+        values
+            .keys()
+            .map(String::as_str)
+            .find(|name| parameters.iter().all(|parameter| parameter.name != *name))
     }
 }
 
 /// A value for each parameter, in their order.
-fn read_all(parameters: &[EffectParameter], values: &EffectValues) -> Result<Vec<f64>, SettingProblem> {
-    let read_one = |parameter: &EffectParameter| {
+fn read_parameters(
+    parameters: &[EffectParameter],
+    values: &EffectValues,
+) -> Result<Vec<f64>, SettingProblem> {
+    let read_parameter = |parameter: &EffectParameter| {
         let value = match values {
             EffectValues::Number(number) if parameters.len() == 1 => &ValueText::Number(*number),
             EffectValues::Text(text) if parameters.len() == 1 => &ValueText::Text(text.clone()),
@@ -67,18 +73,20 @@ fn read_all(parameters: &[EffectParameter], values: &EffectValues) -> Result<Vec
             }
             EffectValues::Number(_) | EffectValues::Text(_) => return Err(form_problem(parameters)),
         };
-        read(parameter, value)
+        read_value(parameter, value)
     };
-    parameters.iter().map(read_one).collect()
+    parameters.iter().map(read_parameter).collect()
 }
 
 fn form_problem(parameters: &[EffectParameter]) -> SettingProblem {
-    let names: Vec<String> =
-        parameters.iter().map(|one| format!("{}: a value in {}", one.name, one.unit)).collect();
+    let names: Vec<String> = parameters
+        .iter()
+        .map(|parameter| format!("{}: a value in {}", parameter.name, parameter.unit))
+        .collect();
     SettingProblem::EffectForm { form: format!("{{{}}}", names.join(", ")) }
 }
 
-fn read(parameter: &EffectParameter, value: &ValueText) -> Result<f64, SettingProblem> {
+fn read_value(parameter: &EffectParameter, value: &ValueText) -> Result<f64, SettingProblem> {
     let unit = parameter.unit.as_ref();
     let ratio = matches!(unit, "1" | "kg/kg");
     match value {

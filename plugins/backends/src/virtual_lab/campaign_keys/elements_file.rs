@@ -1,6 +1,6 @@
 //! The lab's redundant sensors as declared, and `faults:` below `virtual_lab`: offset, slow or stuck sensors.
 
-use crate::virtual_lab::campaign_keys::setting_problem::{SettingProblem, within};
+use crate::virtual_lab::campaign_keys::setting_problem::{SettingProblem, check_range};
 use crate::virtual_lab::sensors::draws::{Draws, offset_kind};
 use crate::virtual_lab::sensors::elements::{LabElement, LabElements, stream};
 use crate::virtual_lab::sensors::sensor::SensorErrors;
@@ -18,7 +18,7 @@ pub(crate) struct FaultFile {
     channel: Channel,
     /// Number of the sensor, from 1.
     element: usize,
-    /// Its offset, in place of the drawn one.
+    /// Offset, in place of the drawn one.
     #[serde(default)]
     offset: Option<String>,
     /// Run time at which the reading freezes.
@@ -44,7 +44,7 @@ pub(crate) fn read(
         .keys()
         .filter_map(|channel| Some((*channel, make_elements(*channel, nominal, draws)?)))
         .collect();
-    // Settings of a channel apply to each of its sensors.
+    // The settings of a channel apply to each of its sensors.
     for (channel, offset) in offset_of {
         let members = lab.get_mut(channel).map(|elements| &mut elements.elements);
         members.into_iter().flatten().for_each(|element| element.errors.offset = *offset);
@@ -58,7 +58,7 @@ pub(crate) fn read(
 fn make_elements(channel: Channel, nominal: &NominalRig, draws: &Draws) -> Option<LabElements> {
     let declared = nominal.redundant.get(&channel)?.clone();
     let common = declared.common_offset_sigma * draws.of(channel as u64).0;
-    // Probes of equal diameter are the machine's own, whose true diameter may differ from the declared one.
+    // Probes of the declared diameter have the true diameter of the machine's probe, which may differ.
     let first_m = declared.elements.first().map(|element| element.probe_diameter_m);
     let have_equal_tips = declared.elements.iter().all(|element| Some(element.probe_diameter_m) == first_m);
     let make_element = |(index, element): (usize, &DeclaredElement)| {
@@ -95,19 +95,19 @@ fn apply_fault(
             .map_err(|source| SettingProblem::Quantity { kind, source }.at(key("offset")))?;
     }
     if let Some(stuck_after) = file.stuck_after {
-        element.stuck_after_s = stuck_after.inside;
+        element.stuck_after_s = stuck_after.value;
     }
     if let Some(diameter) = file.probe_diameter {
         if file.channel != Channel::T2 {
             return Err(SettingProblem::NoProbe { channel: file.channel }.at(key("probe_diameter")));
         }
-        within(1e3 * diameter.inside, "mm", 0.0..=20.0)
+        check_range(1e3 * diameter.value, "mm", 0.0..=20.0)
             .map_err(|problem| problem.at(key("probe_diameter")))?;
-        element.probe_diameter_m = Some(diameter.inside);
+        element.probe_diameter_m = Some(diameter.value);
     }
     if let Some(lag) = file.lag {
-        within(lag.inside, "s", 0.0..=3600.0).map_err(|problem| problem.at(key("lag")))?;
-        element.lag_s = lag.inside;
+        check_range(lag.value, "s", 0.0..=3600.0).map_err(|problem| problem.at(key("lag")))?;
+        element.lag_s = lag.value;
     }
     Ok(())
 }

@@ -29,7 +29,7 @@ pub enum SettingProblem {
     NotPositive {
         /// The value.
         value: f64,
-        /// Its unit.
+        /// Unit.
         unit: &'static str,
     },
     /// A value that must not be below zero.
@@ -37,13 +37,13 @@ pub enum SettingProblem {
     Negative {
         /// The value.
         value: f64,
-        /// Its unit.
+        /// Unit.
         unit: &'static str,
     },
     /// A text that is not a value with a unit of the right kind.
     #[error("{source}; {}", source.remedy(*kind))]
     Quantity {
-        /// Its physical quantity.
+        /// Physical quantity.
         kind: Kind,
         /// The error in the text.
         source: UnitError,
@@ -128,7 +128,7 @@ impl SettingProblem {
 ///
 /// # Errors
 /// [`SettingProblem::OutOfRange`].
-pub fn within(value: f64, unit: &'static str, range: RangeInclusive<f64>) -> Result<(), SettingProblem> {
+pub fn check_range(value: f64, unit: &'static str, range: RangeInclusive<f64>) -> Result<(), SettingProblem> {
     if range.contains(&value) {
         return Ok(());
     }

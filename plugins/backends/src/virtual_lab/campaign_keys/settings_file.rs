@@ -1,9 +1,9 @@
-//! The lab's settings as a campaign writes them below `backend: {virtual_lab: ...}`.
+//! Settings of the lab in a campaign, below `backend: {virtual_lab: ...}`.
 
 use crate::virtual_lab::campaign_keys::drift_file::{self, DriftFile};
 use crate::virtual_lab::campaign_keys::effects_file::{EffectValues, apply_effects};
 use crate::virtual_lab::campaign_keys::elements_file::{self, FaultFile};
-use crate::virtual_lab::campaign_keys::setting_problem::{SettingProblem, within};
+use crate::virtual_lab::campaign_keys::setting_problem::{SettingProblem, check_range};
 use crate::virtual_lab::rig::actuator::ActuatorDynamics;
 use crate::virtual_lab::rig::boundary_wander::Weather;
 use crate::virtual_lab::rig::precursor::SurgePrecursor;
@@ -40,7 +40,7 @@ struct SettingsFile {
     noise: NoiseName,
     /// `drawn` from the declared uncertainty (the default), or `none`.
     offsets: OffsetsName,
-    /// Offsets of single channels, in their own units, instead of drawn ones.
+    /// Offsets of single channels, in their units, instead of drawn ones.
     offset_of: BTreeMap<Channel, String>,
     /// Effects of the true machine that the declared one does not have.
     effects: BTreeMap<String, EffectValues>,
@@ -52,7 +52,7 @@ struct SettingsFile {
     weather: WeatherName,
     /// `drawn` from the campaign's tolerances, or `none` (the default).
     tolerances: TolerancesName,
-    /// Seed of that draw, so that a machine stays the same under other noise; default: the campaign's.
+    /// Seed of the tolerances, so that a machine stays the same under other noise; default: the campaign's.
     tolerances_seed: Option<u64>,
     /// Deviations of the machine within its tolerances, in place of a draw.
     deviations: DeviationsFile,
@@ -73,7 +73,7 @@ struct SettingsFile {
 struct PrecursorFile {
     /// Surge margin at which it begins; default 25 %.
     onset: Option<Quantity<Fraction>>,
-    /// Root mean square of the flow's swing at half that margin; default 0.3 %.
+    /// Root mean square of the flow fluctuation at half that margin; default 0.3 %.
     size: Option<Quantity<Fraction>>,
     /// Exponent by which the variance grows with the inverse of the margin; default 1.
     growth: Option<f64>,
@@ -119,7 +119,7 @@ enum TolerancesName {
     None,
 }
 
-/// Deviations of the machine, as a diagnosis found them.
+/// Deviations of the machine, as found by a diagnosis.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct DeviationsFile {
@@ -134,11 +134,11 @@ struct DeviationsFile {
 }
 
 impl DeviationsFile {
-    /// Applies them to a rig.
+    /// Applies the deviations to a rig.
     fn apply(&self, rig: &mut Rig) -> Result<(), BackendError> {
         let scale = |key: &str, deviation: &Option<Quantity<Fraction>>| {
-            let ratio = deviation.as_ref().map_or(0.0, |deviation| deviation.inside);
-            within(100.0 * ratio, "%", -90.0..=900.0)
+            let ratio = deviation.as_ref().map_or(0.0, |deviation| deviation.value);
+            check_range(100.0 * ratio, "%", -90.0..=900.0)
                 .map_err(|problem| problem.at(format!("deviations.{key}")))?;
             Ok::<f64, BackendError>(1.0 + ratio)
         };
@@ -207,10 +207,10 @@ pub fn read_settings(
     };
     let params = &nominal.model.params;
     let model = Model { params: apply_true_params(*params, &file.machine)?, ..nominal.model.clone() };
-    let sample_rate_hz = file.sample_rate.map_or(10.0, |rate| rate.inside);
-    within(sample_rate_hz, "Hz", 0.1..=1000.0).map_err(|problem| problem.at("sample_rate"))?;
-    let surge_swing_ratio = file.surge_swing.map_or(0.08, |swing| swing.inside);
-    within(100.0 * surge_swing_ratio, "%", 0.0..=100.0).map_err(|problem| problem.at("surge_swing"))?;
+    let sample_rate_hz = file.sample_rate.map_or(10.0, |rate| rate.value);
+    check_range(sample_rate_hz, "Hz", 0.1..=1000.0).map_err(|problem| problem.at("sample_rate"))?;
+    let surge_swing_ratio = file.surge_swing.map_or(0.08, |swing| swing.value);
+    check_range(100.0 * surge_swing_ratio, "%", 0.0..=100.0).map_err(|problem| problem.at("surge_swing"))?;
     let mut rig = Rig::new(model);
     if file.tolerances == TolerancesName::Drawn {
         draw_tolerances(&mut rig, &nominal.tolerances, file.tolerances_seed.unwrap_or(nominal.seed));
@@ -229,7 +229,7 @@ pub fn read_settings(
         instruments: Instruments::default(),
         weather: match file.weather {
             WeatherName::Calm => Weather::default(),
-            WeatherName::Wandering => Weather::drawn(nominal.seed),
+            WeatherName::Wandering => Weather::draw(nominal.seed),
         },
         cell: nominal.boundary,
         rig: file.rig.clone(),
@@ -250,7 +250,7 @@ pub fn read_settings(
         },
         drifts: drift_file::read(&file.drift)?,
         static_tap_pipe_diameters_m: nominal.static_tap_pipe_diameters_m.clone(),
-        trip_speed_rpm: file.trip_speed.map_or(1.1 * nominal.speed_max_rpm, |speed| speed.inside),
+        trip_speed_rpm: file.trip_speed.map_or(1.1 * nominal.speed_max_rpm, |speed| speed.value),
         structure: Arc::new(Lumped),
         second_order: BTreeMap::new(),
         surge_swing_ratio,
@@ -263,9 +263,10 @@ pub fn read_settings(
 
 impl<Rate: Dimension> ActuatorFile<Rate> {
     fn dynamics(&self, name: &str, lag_s: f64, slew_per_s: f64) -> Result<ActuatorDynamics, BackendError> {
-        let lag_s = self.lag.map_or(lag_s, |lag| lag.inside);
-        let slew_per_s = self.slew.as_ref().map_or(slew_per_s, |slew| slew.inside);
-        within(lag_s, "s", 0.0..=3600.0).map_err(|problem| problem.at(format!("actuators.{name}.lag")))?;
+        let lag_s = self.lag.map_or(lag_s, |lag| lag.value);
+        let slew_per_s = self.slew.as_ref().map_or(slew_per_s, |slew| slew.value);
+        check_range(lag_s, "s", 0.0..=3600.0)
+            .map_err(|problem| problem.at(format!("actuators.{name}.lag")))?;
         if slew_per_s <= 0.0 {
             let problem = SettingProblem::NotPositive { value: slew_per_s, unit: rate_unit::<Rate>() };
             return Err(problem.at(format!("actuators.{name}.slew")));
@@ -277,15 +278,16 @@ impl<Rate: Dimension> ActuatorFile<Rate> {
 impl PrecursorFile {
     fn precursor(&self) -> Result<SurgePrecursor, BackendError> {
         let usual = SurgePrecursor::USUAL;
-        let onset_margin_ratio = self.onset.map_or(usual.onset_margin_ratio, |onset| onset.inside);
-        let size_ratio = self.size.map_or(usual.size_ratio, |size| size.inside);
+        let onset_margin_ratio = self.onset.map_or(usual.onset_margin_ratio, |onset| onset.value);
+        let size_ratio = self.size.map_or(usual.size_ratio, |size| size.value);
         let growth = self.growth.unwrap_or(usual.growth);
         for (key, value, unit, range) in [
             ("onset", 100.0 * onset_margin_ratio, "%", 0.1..=50.0),
             ("size", 100.0 * size_ratio, "%", 0.0..=10.0),
             ("growth", growth, "", 0.2..=4.0),
         ] {
-            within(value, unit, range).map_err(|problem| problem.at(format!("surge_precursor.{key}")))?;
+            check_range(value, unit, range)
+                .map_err(|problem| problem.at(format!("surge_precursor.{key}")))?;
         }
         Ok(SurgePrecursor { onset_margin_ratio, size_ratio, growth })
     }
@@ -293,20 +295,20 @@ impl PrecursorFile {
 
 fn apply_true_params(mut params: Params, file: &MachineFile) -> Result<Params, BackendError> {
     if let Some(alpha) = file.alpha_area {
-        within(alpha, "", 0.0..=1.0).map_err(|problem| problem.at("machine.alpha_area"))?;
+        check_range(alpha, "", 0.0..=1.0).map_err(|problem| problem.at("machine.alpha_area"))?;
         params.compressor.alpha_area_ratio = alpha;
     }
     if let Some(diameter) = file.probe_diameter {
-        within(1e3 * diameter.inside, "mm", 0.0..=20.0)
+        check_range(1e3 * diameter.value, "mm", 0.0..=20.0)
             .map_err(|problem| problem.at("machine.probe_diameter"))?;
-        params.t2_probe_diameter_m = diameter.inside;
+        params.t2_probe_diameter_m = diameter.value;
     }
     if let Some(conductance) = file.oil_conductance {
-        if conductance.inside < 0.0 {
-            let problem = SettingProblem::Negative { value: conductance.inside, unit: "W/K" };
+        if conductance.value < 0.0 {
+            let problem = SettingProblem::Negative { value: conductance.value, unit: "W/K" };
             return Err(problem.at("machine.oil_conductance"));
         }
-        params.bearing.oil_conductance_w_k = conductance.inside;
+        params.bearing.oil_conductance_w_k = conductance.value;
     }
     Ok(params)
 }
@@ -336,7 +338,7 @@ fn draw_sensors(
     sensors
 }
 
-/// Drawn from the declared non-uniformity of the soak; empty without a declaration.
+/// Draws errors at rest from the declared non-uniformity of the soak; empty without a declaration.
 fn draw_nonuniformity(nominal: &NominalRig) -> BTreeMap<Channel, f64> {
     let Some(soak) = nominal.soak else { return BTreeMap::new() };
     // A separate stream from that of the offsets.

@@ -20,7 +20,7 @@ pub struct Actuator {
     command: f64,
 }
 
-/// Remaining share of the last command's jump at which the actuator counts as arrived.
+/// Remaining fraction of the last jump of the command at which the actuator counts as arrived.
 const ARRIVED_RATIO: f64 = 1e-9;
 
 impl Actuator {
@@ -48,13 +48,13 @@ impl Actuator {
         } else if after_s < ramp_s {
             self.start + self.dynamics.slew_per_s * jump.signum() * after_s
         } else {
-            // The distance to the command at which the lag's own rate falls below the slew limit.
-            let left = jump.abs().min(self.dynamics.slew_per_s * self.dynamics.lag_s);
-            self.command - left * jump.signum() * (-(after_s - ramp_s) / self.dynamics.lag_s).exp()
+            // The distance to the command at which the rate of the lag falls below the slew limit.
+            let remaining = jump.abs().min(self.dynamics.slew_per_s * self.dynamics.lag_s);
+            self.command - remaining * jump.signum() * (-(after_s - ramp_s) / self.dynamics.lag_s).exp()
         }
     }
 
-    /// The next time after `t_s` at which the time history changes its form; infinity if there is none.
+    /// The next time after `t_s` at which the form of the time history changes; infinity if there is none.
     pub fn next_kink_s(&self, t_s: f64) -> f64 {
         let (ramp_s, exponential_s) = self.phases_s();
         [self.since_s + ramp_s, self.since_s + ramp_s + exponential_s]

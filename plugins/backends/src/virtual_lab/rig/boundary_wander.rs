@@ -4,7 +4,7 @@ use mapper_physics::machine::params::BoundaryConditions;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-/// One slow wave.
+/// A slow sine wave.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Wave {
     amplitude: f64,
@@ -18,7 +18,7 @@ impl Wave {
     }
 }
 
-/// Waves of each uncommanded boundary condition, and of the supplies behind two commanded ones.
+/// Waves of each uncommanded boundary condition, and of the supplies of two commanded ones.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Weather {
     t1_k: Vec<Wave>,
@@ -27,7 +27,7 @@ pub struct Weather {
     p4_pa: Vec<Wave>,
     oil_k: Vec<Wave>,
     ambient_k: Vec<Wave>,
-    /// Rise of P4 with P3, Pa/Pa: the exhaust behind the turbine resists its flow.
+    /// Rise of P4 with P3, Pa/Pa: flow resistance of the exhaust.
     p4_by_p3_ratio: f64,
 }
 
@@ -35,9 +35,9 @@ pub struct Weather {
 const P3_WITHOUT_RISE_PA: f64 = 150e3;
 
 impl Weather {
-    /// A day of `seed`: inlet and cell within about 1 K over a quarter of an hour and more, oil 2 K, turbine inlet 1 K over
-    /// minutes, P1 and P4 some ten to hundred pascal, and an exhaust that resists by up to 8 Pa per kPa of P3.
-    pub fn drawn(seed: u64) -> Self {
+    /// Draws the fluctuations of a day from `seed`: inlet and cell within about 1 K over a quarter of an hour and more, oil 2 K, turbine inlet 1 K over
+    /// minutes, P1 and P4 some ten to hundred pascal, and an exhaust resistance of up to 8 Pa per kPa of P3.
+    pub fn draw(seed: u64) -> Self {
         // A separate random stream: the odd multipliers differ from those of noise and offsets.
         let mut random =
             Pcg64::seed_from_u64(seed.wrapping_mul(0xBF58_476D_1CE4_E5B9) ^ 0x94D0_49BB_1331_11EB);
@@ -69,8 +69,8 @@ impl Weather {
         *self == Weather::default()
     }
 
-    /// The boundary conditions at `t_s`: `boundary` with this weather.
-    pub fn over(&self, boundary: BoundaryConditions, t_s: f64) -> BoundaryConditions {
+    /// Adds the fluctuations at `t_s` to `boundary`.
+    pub fn add_to(&self, boundary: BoundaryConditions, t_s: f64) -> BoundaryConditions {
         let sum = |waves: &[Wave]| waves.iter().map(|wave| wave.at(t_s)).sum::<f64>();
         BoundaryConditions {
             t1_k: boundary.t1_k + sum(&self.t1_k),
@@ -93,15 +93,15 @@ mod tests {
     #[test]
     fn weather_is_slow_small_and_repeatable() {
         let nominal = BoundaryConditions { p3_pa: 150e3, ..Default::default() };
-        assert_eq!(Weather::default().over(nominal, 100.0), nominal);
-        assert!(Weather::default().is_calm() && !Weather::drawn(1).is_calm());
-        assert_eq!(Weather::drawn(3), Weather::drawn(3));
-        assert_ne!(Weather::drawn(3), Weather::drawn(4));
+        assert_eq!(Weather::default().add_to(nominal, 100.0), nominal);
+        assert!(Weather::default().is_calm() && !Weather::draw(1).is_calm());
+        assert_eq!(Weather::draw(3), Weather::draw(3));
+        assert_ne!(Weather::draw(3), Weather::draw(4));
         for seed in 0..50 {
-            let weather = Weather::drawn(seed);
+            let weather = Weather::draw(seed);
             for i in 0..40 {
                 let t_s = f64::from(i) * 50.0;
-                let (now, soon) = (weather.over(nominal, t_s), weather.over(nominal, t_s + 1.0));
+                let (now, soon) = (weather.add_to(nominal, t_s), weather.add_to(nominal, t_s + 1.0));
                 // Two waves of at most 0.8 of the amplitude.
                 assert!((now.t1_k - nominal.t1_k).abs() <= 1.6 && (now.t3_k - nominal.t3_k).abs() <= 1.6);
                 // The fastest wave of T3 has 150 s: 2 pi/150 of its amplitude in a second, twice.

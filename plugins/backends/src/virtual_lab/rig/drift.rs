@@ -1,4 +1,4 @@
-//! Drifts in the lab at run time: of a sensor, or of the machine itself.
+//! Drifts of the lab during a run: of a sensor, or of the machine.
 
 use mapper_core::{Channel, Dimension};
 use mapper_physics::machine::params::Params;
@@ -8,13 +8,13 @@ use mapper_physics::machine::params::Params;
 pub enum DriftTarget {
     /// A sensor's reading; for a flow meter, its gain.
     Sensor(Channel),
-    /// Efficiency of the compressor, relative, and the flow of its map by 0.6 of it.
+    /// Relative efficiency of the compressor, and 0.6 times that change of its flow.
     Fouling,
     /// Bearing power loss c omega^2: c, W s^2/rad^2.
     BearingFriction,
 }
 
-/// One drift: a step at its begin, or a steady and unlimited change from then on.
+/// A drift: a step, or a steady unlimited change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LabDrift {
     /// The drifting quantity.
@@ -23,7 +23,7 @@ pub struct LabDrift {
     pub change: f64,
     /// Duration of the change, s; `None` is a step.
     pub over_s: Option<f64>,
-    /// Begin, run time, s; below 0 it began before the run.
+    /// Start in run time, s; negative before the run.
     pub from_s: f64,
 }
 
@@ -60,13 +60,13 @@ pub fn drifted_reading(drifts: &[LabDrift], channel: Channel, t_s: f64, reading:
 /// The drifted machine at a time.
 pub fn drifted_machine(drifts: &[LabDrift], mut params: Params, t_s: f64) -> Params {
     for drift in drifts {
-        let now = drift.at(t_s);
+        let change = drift.at(t_s);
         match drift.target {
             DriftTarget::Fouling => {
-                params.compressor.efficiency_scale_ratio *= 1.0 + now;
-                params.compressor.flow_scale_ratio *= 1.0 + FOULING_FLOW_SHARE * now;
+                params.compressor.efficiency_scale_ratio *= 1.0 + change;
+                params.compressor.flow_scale_ratio *= 1.0 + FOULING_FLOW_SHARE * change;
             }
-            DriftTarget::BearingFriction => params.bearing_friction_w_s2 += now,
+            DriftTarget::BearingFriction => params.bearing_friction_w_s2 += change,
             DriftTarget::Sensor(_) => {}
         }
     }

@@ -8,12 +8,12 @@ use mapper_physics::simulation::inputs::Inputs;
 /// Minimum ratio of air supply to P4 while the model runs: the model divides by the turbine's flow.
 pub const MIN_EXPANSION_RATIO: f64 = 1.0005;
 
-/// Actuators over the conditions of the cell.
+/// The conditions of the cell, and the actuators.
 #[derive(Debug, Clone)]
 pub struct LabInputs {
     /// T1, P1, P4 and the ambient temperature.
     pub cell: BoundaryConditions,
-    /// How they wander.
+    /// Slow fluctuations of the boundary conditions.
     pub weather: Weather,
     /// Turbine inlet pressure, Pa.
     pub p3: Actuator,
@@ -26,8 +26,8 @@ pub struct LabInputs {
 }
 
 impl LabInputs {
-    /// Everything constant at `boundary`.
-    pub fn held(boundary: &BoundaryConditions) -> Self {
+    /// Constant inputs at `boundary`.
+    pub fn constant(boundary: &BoundaryConditions) -> Self {
         let at_rest =
             |value: f64| Actuator::at_rest(ActuatorDynamics { lag_s: 0.0, slew_per_s: f64::INFINITY }, value);
         LabInputs {
@@ -55,7 +55,7 @@ impl Inputs for LabInputs {
             ..self.cell
         };
         if !self.weather.is_calm() {
-            boundary = self.weather.over(boundary, t_s);
+            boundary = self.weather.add_to(boundary, t_s);
         }
         boundary.p3_pa = boundary.p3_pa.max(boundary.p4_pa * MIN_EXPANSION_RATIO);
         boundary

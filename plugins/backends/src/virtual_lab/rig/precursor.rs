@@ -3,7 +3,7 @@
 //! Compressor, outlet duct and volume are a Helmholtz resonator whose damping is the slope of the speed line (E. M. Greitzer,
 //! "Surge and rotating stall in axial flow compressors, part I", J. Eng. Power 98 (1976) 190-198). Near the zero-slope point
 //! that slope goes to zero in proportion to the distance in flow, and a resonator that turbulence excites has a variance in
-//! inverse proportion to its damping. Sampled at some 10 Hz, it appears as aliased noise of growing size. Such growth
+//! inverse proportion to its damping. Sampled at some 10 Hz, this appears as aliased noise of growing size. Such growth
 //! before surge was measured on turbochargers, e.g. by J. Galindo et al., Exp. Thermal Fluid Sci. 30 (2006) 449-462.
 
 use mapper_physics::gas::air;
@@ -15,7 +15,7 @@ use rand_pcg::Pcg64;
 /// Growth of the fluctuation; a size of 0 means none.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurgePrecursor {
-    /// Surge margin (flow over surge flow, minus one) below which flow and pressures begin to swing, ratio, > 0.
+    /// Surge margin (flow over surge flow, minus one) at which flow and pressures begin to fluctuate, ratio, > 0.
     pub onset_margin_ratio: f64,
     /// Root mean square of the flow fluctuation at half that margin, ratio of the flow.
     pub size_ratio: f64,
@@ -24,27 +24,27 @@ pub struct SurgePrecursor {
 }
 
 impl SurgePrecursor {
-    /// A lab without any.
+    /// No precursor.
     pub const NONE: SurgePrecursor =
         SurgePrecursor { onset_margin_ratio: 0.25, size_ratio: 0.0, growth: 1.0 };
     /// The default of a campaign.
     pub const USUAL: SurgePrecursor = SurgePrecursor { size_ratio: 3e-3, ..SurgePrecursor::NONE };
 
-    /// Root mean square of the flow fluctuation, ratio: at most `most_ratio`, at which the swing limits itself.
+    /// Root mean square of the flow fluctuation, ratio: at most `max_rms_ratio`, at which the fluctuation saturates.
     fn rms_ratio(&self, margin_ratio: f64, max_rms_ratio: f64) -> f64 {
         if margin_ratio >= self.onset_margin_ratio {
             return 0.0;
         }
-        // Its value at the onset is already part of the sensors' noise.
-        let over = |margin_ratio: f64| (self.onset_margin_ratio / margin_ratio).powf(self.growth) - 1.0;
-        let variance = over(margin_ratio.max(1e-4)) / over(0.5 * self.onset_margin_ratio);
+        // The fluctuation at the onset is part of the sensors' noise.
+        let growth = |margin_ratio: f64| (self.onset_margin_ratio / margin_ratio).powf(self.growth) - 1.0;
+        let variance = growth(margin_ratio.max(1e-4)) / growth(0.5 * self.onset_margin_ratio);
         (self.size_ratio * variance.max(0.0).sqrt()).min(max_rms_ratio)
     }
 }
 
 /// Length of the outlet duct between wheel and volume, m: that of a gas stand.
 const DUCT_LENGTH_M: f64 = 0.5;
-/// Damping of the resonator over the critical one at the onset: slope of the line and of the valve's resistance there, over twice
+/// Damping ratio of the resonator at the onset: slope of the speed line and of the valve's resistance, over twice
 /// the resonator's impedance.
 const DAMPING_AT_ONSET_RATIO: f64 = 0.13;
 
@@ -55,14 +55,14 @@ fn helmholtz_rad_s(params: &Params, gas_k: f64) -> f64 {
     sound_m_s * (area_m2 / (DUCT_LENGTH_M * params.outlet.volume_m3)).sqrt()
 }
 
-/// Relative swings of the readings at one instant.
+/// Relative fluctuations of the readings at one instant.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Swing {
-    /// Of the compressor's flow.
+    /// Fluctuation of the compressor's flow.
     pub(crate) flow_ratio: f64,
-    /// Of P2: smaller than that of the flow, since the volume damps it.
+    /// Fluctuation of P2: smaller than that of the flow, because the volume damps it.
     pub(crate) p2_ratio: f64,
-    /// Of P1.
+    /// Fluctuation of P1.
     pub(crate) p1_ratio: f64,
 }
 
@@ -88,7 +88,7 @@ impl Resonator {
         Resonator { settings, random, swing }
     }
 
-    /// The swing at the next sample; `margin_ratio` is the surge margin, `most_ratio` the maximum root mean square.
+    /// The swing at the next sample; `margin_ratio` is the surge margin.
     pub(crate) fn next(
         &mut self,
         margin_ratio: f64,
@@ -104,15 +104,15 @@ impl Resonator {
         let angular_rad_s = helmholtz_rad_s(params, gas_k);
         let damping_ratio =
             DAMPING_AT_ONSET_RATIO * (margin_ratio / self.settings.onset_margin_ratio).max(1e-3);
-        let kept_ratio = (-damping_ratio * angular_rad_s * sample_s).exp();
-        let fresh_ratio = (1.0 - kept_ratio * kept_ratio).sqrt();
+        let memory_ratio = (-damping_ratio * angular_rad_s * sample_s).exp();
+        let innovation_ratio = (1.0 - memory_ratio * memory_ratio).sqrt();
         let (sin, cos) = (angular_rad_s * sample_s).sin_cos();
         let kicks: [f64; 2] =
             [StandardNormal.sample(&mut self.random), StandardNormal.sample(&mut self.random)];
         let [flow, pressure] = self.swing;
         self.swing = [
-            kept_ratio * (cos * flow - sin * pressure) + fresh_ratio * kicks[0],
-            kept_ratio * (sin * flow + cos * pressure) + fresh_ratio * kicks[1],
+            memory_ratio * (cos * flow - sin * pressure) + innovation_ratio * kicks[0],
+            memory_ratio * (sin * flow + cos * pressure) + innovation_ratio * kicks[1],
         ];
         let [flow, pressure] = self.swing.map(|swing| rms_ratio * swing);
         Swing { flow_ratio: flow, p2_ratio: P2_SHARE * pressure, p1_ratio: -P1_SHARE * flow }

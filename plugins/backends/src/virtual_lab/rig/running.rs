@@ -14,7 +14,7 @@ pub type StructureError = Box<dyn std::error::Error + Send + Sync>;
 
 /// A running machine: the lab's interface to its equations.
 pub trait RunningMachine: std::fmt::Debug + Send {
-    /// Its state as the rig's sensors define it.
+    /// State as the rig's sensors define it.
     fn state(&self) -> State;
 
     /// Resets the step size; called after a jump of the inputs.
@@ -78,8 +78,8 @@ impl Structure for Lumped {
         boundary: &BoundaryConditions,
         watch: Watch,
     ) -> Result<Box<dyn RunningMachine>, StructureError> {
-        let rest = steady::settle_under(model, boundary)?;
-        Ok(self.start(model, t_s, rest.state, watch))
+        let steady_state = steady::settle_under(model, boundary)?;
+        Ok(self.start(model, t_s, steady_state.state, watch))
     }
 }
 

@@ -1,4 +1,4 @@
-//! Normal deviations of every fault-free machine: parameters and a map that differ within declared tolerances.
+//! Normal deviations of a fault-free machine: parameters and a map within declared tolerances.
 
 use mapper_core::{ModelTolerances, ReferenceState};
 use mapper_physics::compressor_map::characteristic::{CharacteristicPoint, CompressorCharacteristic};
@@ -45,22 +45,22 @@ impl UnevenMap {
     /// An error with a standard deviation of `sigma_ratio` over all draws, and about one period over the map.
     fn new(map: Arc<dyn CompressorCharacteristic>, sigma_ratio: f64, random: &mut Pcg64) -> Self {
         let amplitude = sigma_ratio * (2.0 / WAVES as f64).sqrt();
-        let turn = 2.0 * std::f64::consts::PI;
+        let full_turn = 2.0 * std::f64::consts::PI;
         let waves = std::array::from_fn(|_| {
             [
                 amplitude,
-                random.random_range(0.0..turn),
-                turn * random.random_range(-0.7..0.7),
-                turn * random.random_range(-0.7..0.7),
+                random.random_range(0.0..full_turn),
+                full_turn * random.random_range(-0.7..0.7),
+                full_turn * random.random_range(-0.7..0.7),
             ]
         });
         UnevenMap { map, waves }
     }
 
     fn error_ratio(&self, speed_corrected_rpm: f64, surge_position_ratio: f64) -> f64 {
-        let place = surge_position_ratio.clamp(-0.5, 1.5);
-        let wave = |[amplitude, phase, by_speed, by_place]: [f64; 4]| {
-            amplitude * (phase + by_speed * speed_corrected_rpm * 1e-5 + by_place * place).sin()
+        let position = surge_position_ratio.clamp(-0.5, 1.5);
+        let wave = |[amplitude, phase, by_speed, by_position]: [f64; 4]| {
+            amplitude * (phase + by_speed * speed_corrected_rpm * 1e-5 + by_position * position).sin()
         };
         self.waves.map(wave).iter().sum()
     }

@@ -1,4 +1,4 @@
-//! Draws from declared uncertainty: the errors of a sensor, by the seed and its own stream of random numbers.
+//! Draws the errors of a sensor from its declared uncertainty, with a separate stream of random numbers for each sensor.
 
 use crate::virtual_lab::sensors::sensor::SensorErrors;
 use mapper_core::{Channel, DeclaredUncertainty};
@@ -7,12 +7,12 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
-/// Shares of white and of first-order noise (2 s) in the declared standard deviation: 0.8 and 0.6 in quadrature.
+/// White and first-order parts of the declared standard deviation, in quadrature.
 const WHITE_SHARE: f64 = 0.8;
 const COLOURED_SHARE: f64 = 0.6;
 const COLOURED_TIME_CONSTANT_S: f64 = 2.0;
 
-/// How sensor errors follow from declared uncertainties.
+/// Rule for sensor errors from declared uncertainties.
 pub(crate) struct Draws {
     pub(crate) seed: u64,
     /// Noise over declared noise.
@@ -40,9 +40,9 @@ impl Draws {
     }
 }
 
-/// Two standard normal numbers that belong to one stream of one seed: for its offset and for its gain.
+/// Draws two standard normal numbers of a stream, for offset and gain.
 pub(crate) fn draw(seed: u64, stream: u64) -> (f64, f64) {
-    // A separate stream from the sensor's noise: that one starts from the same seed with other multipliers.
+    // A stream separate from the noise of the sensor, which has other multipliers of the same seed.
     let mixed = seed.wrapping_mul(0xA24B_AED4_963E_E407) ^ (stream + 1).wrapping_mul(0x9FB2_1C65_1E98_DF25);
     let mut random = Pcg64::seed_from_u64(mixed);
     (StandardNormal.sample(&mut random), StandardNormal.sample(&mut random))

@@ -1,4 +1,4 @@
-//! Redundant sensors of one channel in the lab: each with its own errors, its own probe, and perhaps a fault.
+//! Redundant sensors of a channel in the lab: each has its own errors and probe, and may have a fault.
 
 use crate::virtual_lab::sensors::sensor::{Sensor, SensorErrors};
 use mapper_core::{Channel, Element, ElementColumn, RedundantSensors};
@@ -6,10 +6,10 @@ use mapper_physics::laws::thermocouple;
 use mapper_physics::rig::instruments::{ChannelFollower, ChannelPath};
 use mapper_physics::simulation::model::Outputs;
 
-/// True properties of one of several sensors.
+/// True properties of a redundant sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LabElement {
-    /// Its errors.
+    /// Errors.
     pub errors: SensorErrors,
     /// Diameter of its tip, m, if it differs from the machine's T2 probe; for T2 only.
     pub probe_diameter_m: Option<f64>,
@@ -22,16 +22,16 @@ pub struct LabElement {
 /// The sensors of one channel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LabElements {
-    /// As declared: how the rig combines them into one reading.
+    /// Declared sensors, which the rig combines into one reading.
     pub declared: RedundantSensors,
-    /// As they truly are.
+    /// True sensors.
     pub elements: Vec<LabElement>,
 }
 
 /// Offset of the random streams of redundant sensors, above those of the channels.
 const STREAMS_OF_CHANNELS: u64 = 1000;
 
-/// The stream of random numbers of one of several sensors.
+/// The stream of random numbers of a redundant sensor.
 pub(crate) fn stream(element: Element) -> u64 {
     element.channel as u64 + STREAMS_OF_CHANNELS * element.number as u64
 }
@@ -47,14 +47,14 @@ pub(crate) struct ElementBank {
 
 #[derive(Debug)]
 struct Member {
-    of: LabElement,
+    properties: LabElement,
     sensor: Sensor,
     follower: ChannelFollower,
     tip: Option<Tip>,
     last: f64,
 }
 
-/// A tip that follows the gas: time, gas and tip of the last sample.
+/// A probe tip that follows the gas: time, gas and tip temperature of the last sample.
 #[derive(Debug, Clone, Copy)]
 struct Tip {
     t_s: f64,
@@ -63,9 +63,9 @@ struct Tip {
 }
 
 impl ElementBank {
-    pub(crate) fn new(channel: Channel, of: &LabElements, sample_s: f64, seed: u64) -> Self {
+    pub(crate) fn new(channel: Channel, elements: &LabElements, sample_s: f64, seed: u64) -> Self {
         let member = |(index, element): (usize, &LabElement)| Member {
-            of: *element,
+            properties: *element,
             sensor: Sensor::new(
                 element.errors,
                 sample_s,
@@ -78,9 +78,9 @@ impl ElementBank {
         };
         ElementBank {
             channel,
-            declared: of.declared.clone(),
-            members: of.elements.iter().enumerate().map(member).collect(),
-            readings: vec![f64::NAN; of.elements.len()],
+            declared: elements.declared.clone(),
+            members: elements.elements.iter().enumerate().map(member).collect(),
+            readings: vec![f64::NAN; elements.elements.len()],
         }
     }
 
@@ -102,9 +102,9 @@ impl ElementBank {
         drifted: impl Fn(f64) -> f64,
     ) -> (&[f64], f64) {
         for (member, reading) in self.members.iter_mut().zip(&mut self.readings) {
-            let seen = truth + member.offset_from_probe_k(t_s, outputs, pipe_diameter_m);
-            let read = drifted(member.sensor.read(member.follower.read(t_s, seen)));
-            if t_s < member.of.stuck_after_s || member.last.is_nan() {
+            let quantity = truth + member.offset_from_probe_k(t_s, outputs, pipe_diameter_m);
+            let read = drifted(member.sensor.read(member.follower.read(t_s, quantity)));
+            if t_s < member.properties.stuck_after_s || member.last.is_nan() {
                 member.last = read;
             }
             *reading = member.last;
@@ -114,10 +114,10 @@ impl ElementBank {
 }
 
 impl Member {
-    /// Temperature of its own tip minus that of the machine's probe, K; 0 for all but T2 probes of another diameter.
+    /// Temperature of its tip minus that of the machine's probe, K; 0 except for T2 probes of another diameter.
     fn offset_from_probe_k(&mut self, t_s: f64, outputs: Option<&Outputs>, pipe_diameter_m: f64) -> f64 {
-        let Some((diameter_m, outputs)) = self.of.probe_diameter_m.zip(outputs) else {
-            // At rest all tips have settled to one temperature.
+        let Some((diameter_m, outputs)) = self.properties.probe_diameter_m.zip(outputs) else {
+            // At rest all tips have the same temperature.
             self.tip = None;
             return 0.0;
         };

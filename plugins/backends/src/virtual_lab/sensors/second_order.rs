@@ -1,6 +1,6 @@
 //! A second-order sensor: a pressure line, a meter with its filter, a probe in its sheath.
 
-/// Its response: `y'' = w^2 (x - y) - 2 zeta w y'`, `w = 2 pi f`.
+/// Response: `y'' = w^2 (x - y) - 2 zeta w y'`, `w = 2 pi f`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SecondOrder {
     /// Natural frequency, Hz, > 0.
@@ -12,12 +12,12 @@ pub struct SecondOrder {
 /// Computes the response from sample to sample; starts settled at its first value.
 #[derive(Debug, Clone)]
 pub(crate) struct SecondOrderFollower {
-    of: SecondOrder,
-    last: Option<Last>,
+    sensor: SecondOrder,
+    last: Option<Sample>,
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Last {
+struct Sample {
     t_s: f64,
     input: f64,
     output: f64,
@@ -30,44 +30,44 @@ const STEP_RATIO: f64 = 0.1;
 const MAX_STEPS: f64 = 2000.0;
 
 impl SecondOrderFollower {
-    pub(crate) fn new(of: SecondOrder) -> Self {
-        SecondOrderFollower { of, last: None }
+    pub(crate) fn new(sensor: SecondOrder) -> Self {
+        SecondOrderFollower { sensor, last: None }
     }
 
     /// The output at `t_s`, which must increase from call to call; between samples the input is taken as linear.
     pub(crate) fn read(&mut self, t_s: f64, input: f64) -> f64 {
-        let now = match self.last {
+        let current = match self.last {
             Some(last) if t_s > last.t_s => self.advance(last, t_s, input),
-            _ => Last { t_s, input, output: input, rate_per_s: 0.0 },
+            _ => Sample { t_s, input, output: input, rate_per_s: 0.0 },
         };
-        self.last = Some(now);
-        now.output
+        self.last = Some(current);
+        current.output
     }
 
-    fn advance(&self, last: Last, t_s: f64, input: f64) -> Last {
-        let SecondOrder { frequency_hz, damping_ratio } = self.of;
+    fn advance(&self, last: Sample, t_s: f64, input: f64) -> Sample {
+        let SecondOrder { frequency_hz, damping_ratio } = self.sensor;
         let w = 2.0 * std::f64::consts::PI * frequency_hz;
         let span_s = t_s - last.t_s;
         let steps = (span_s * w * damping_ratio.max(1.0) / STEP_RATIO).ceil().max(1.0);
         if steps > MAX_STEPS {
-            return Last { t_s, input, output: input, rate_per_s: 0.0 };
+            return Sample { t_s, input, output: input, rate_per_s: 0.0 };
         }
         let dt_s = span_s / steps;
         let slope = (input - last.input) / span_s;
         let rates = |at_s: f64, [y, v]: [f64; 2]| {
             [v, w * w * (last.input + slope * at_s - y) - 2.0 * damping_ratio * w * v]
         };
-        let moved = |y: [f64; 2], k: [f64; 2], h_s: f64| [y[0] + h_s * k[0], y[1] + h_s * k[1]];
+        let advanced = |y: [f64; 2], k: [f64; 2], h_s: f64| [y[0] + h_s * k[0], y[1] + h_s * k[1]];
         let mut y = [last.output, last.rate_per_s];
         for step in 0..steps as u64 {
             let at_s = step as f64 * dt_s;
             let k1 = rates(at_s, y);
-            let k2 = rates(at_s + 0.5 * dt_s, moved(y, k1, 0.5 * dt_s));
-            let k3 = rates(at_s + 0.5 * dt_s, moved(y, k2, 0.5 * dt_s));
-            let k4 = rates(at_s + dt_s, moved(y, k3, dt_s));
+            let k2 = rates(at_s + 0.5 * dt_s, advanced(y, k1, 0.5 * dt_s));
+            let k3 = rates(at_s + 0.5 * dt_s, advanced(y, k2, 0.5 * dt_s));
+            let k4 = rates(at_s + dt_s, advanced(y, k3, dt_s));
             y = std::array::from_fn(|i| y[i] + dt_s / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]));
         }
-        Last { t_s, input, output: y[0], rate_per_s: y[1] }
+        Sample { t_s, input, output: y[0], rate_per_s: y[1] }
     }
 }
 

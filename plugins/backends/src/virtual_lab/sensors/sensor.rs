@@ -19,7 +19,7 @@ pub struct SensorErrors {
     pub gain_ratio: f64,
 }
 
-/// One sensor with its own random stream, so that its noise does not depend on reads of other sensors.
+/// A sensor with its own random stream, so that its noise does not depend on other sensors.
 #[derive(Debug, Clone)]
 pub struct Sensor {
     errors: SensorErrors,
@@ -40,7 +40,7 @@ impl Sensor {
         } else {
             0.0
         };
-        // Starts in its stationary state.
+        // Start in the stationary state of the coloured noise.
         let first: f64 = StandardNormal.sample(&mut random);
         Sensor { errors, random, coloured: errors.coloured_sigma * first, memory_ratio }
     }

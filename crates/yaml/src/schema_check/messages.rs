@@ -1,24 +1,28 @@
 //! Messages of the violated rules.
 
 use crate::mistakes::finding::FindingKind;
-use crate::schema_check::quantity_check::{Complaint, name_of};
+use crate::schema_check::quantity_check::{Message, name_of};
 use crate::schema_check::rules::Rule;
 use crate::schema_check::suggestion::guess;
 use serde_json::{Map, Value};
 
 /// The message for a violated rule about a value itself; `None` for rules about keys and alternative forms, which need other positions.
-pub(crate) fn complain(rule: &Rule<'_>, schema: &Map<String, Value>, value: &Value) -> Option<Complaint> {
-    let range = |message: String, remedy: String| Complaint { kind: FindingKind::Range, message, remedy };
+pub(crate) fn describe_violation(
+    rule: &Rule<'_>,
+    schema: &Map<String, Value>,
+    value: &Value,
+) -> Option<Message> {
+    let range = |message: String, remedy: String| Message { kind: FindingKind::Range, message, remedy };
     let bound = |message: &str, bound: String| {
         range(format!("{value} is too {message}"), with_description(bound, Some(schema)))
     };
-    let thing = if value.is_array() { "list" } else { "mapping" };
+    let noun = if value.is_array() { "list" } else { "mapping" };
     Some(match rule {
         Rule::Type => wrong_type(schema, value),
         Rule::Names(names) => wrong_name(names, schema, value),
-        Rule::Pattern => Complaint {
+        Rule::Pattern => Message {
             kind: FindingKind::WrongValue,
-            message: format!("{} is not of the form needed", quoted(value)),
+            message: format!("{} is not of the form needed", quote(value)),
             remedy: with_description(example_sentence(schema), Some(schema)),
         },
         Rule::Minimum(limit) => bound("low", format!("it must be at least {limit}")),
@@ -28,7 +32,7 @@ pub(crate) fn complain(rule: &Rule<'_>, schema: &Map<String, Value>, value: &Val
         Rule::TooShort => {
             let remedy = with_description(example_sentence(schema), Some(schema));
             let empty = value.as_array().is_none_or(Vec::is_empty);
-            range(format!("the {thing} {}", if empty { "is empty" } else { "is too short" }), remedy)
+            range(format!("the {noun} {}", if empty { "is empty" } else { "is too short" }), remedy)
         }
         Rule::TooLong(limit) if value.is_array() => {
             let remedy = with_description(format!("it must have at most {limit} entries"), Some(schema));
@@ -40,17 +44,17 @@ pub(crate) fn complain(rule: &Rule<'_>, schema: &Map<String, Value>, value: &Val
             let remedy = with_description(format!("it must have {count} {limit}"), Some(schema));
             range("the mapping has too many keys".to_owned(), remedy)
         }
-        Rule::Repeated => Complaint {
+        Rule::Repeated => Message {
             kind: FindingKind::Duplicate,
             message: "an entry appears twice".to_owned(),
             remedy: "remove one of the two".to_owned(),
         },
-        Rule::SeveralForms => Complaint {
+        Rule::SeveralForms => Message {
             kind: FindingKind::WrongValue,
-            message: format!("{} has more than one meaning here", quoted(value)),
+            message: format!("{} has more than one meaning here", quote(value)),
             remedy: with_description(example_sentence(schema), Some(schema)),
         },
-        Rule::UnknownKeyword(keyword) => Complaint {
+        Rule::UnknownKeyword(keyword) => Message {
             kind: FindingKind::Unsupported,
             message: format!("the program's own schema has the unknown keyword `{keyword}`"),
             remedy: "this is a fault of the program; please report it".to_owned(),
@@ -59,33 +63,33 @@ pub(crate) fn complain(rule: &Rule<'_>, schema: &Map<String, Value>, value: &Val
     })
 }
 
-fn wrong_type(schema: &Map<String, Value>, value: &Value) -> Complaint {
+fn wrong_type(schema: &Map<String, Value>, value: &Value) -> Message {
     let names = match schema.get("type") {
         Some(Value::Array(names)) => names.as_slice(),
         Some(name) => std::slice::from_ref(name),
         None => &[],
     };
-    let needed: Vec<&str> = names.iter().filter_map(Value::as_str).map(needed).collect();
+    let needed: Vec<&str> = names.iter().filter_map(Value::as_str).map(type_name).collect();
     let needed = needed.join(" or ");
     let remedy = match value {
         Value::Null => format!("{}, or remove the key", example_sentence(schema)),
         Value::Number(number) if needed == "text" => format!("put it into quotes: `\"{number}\"`"),
         _ => example_sentence(schema),
     };
-    Complaint {
+    Message {
         kind: FindingKind::WrongType,
         message: match value {
             Value::Null => "there is no value".into(),
             Value::Array(_) | Value::Object(_) => {
                 format!("{} is given where {needed} is needed", name_of(value))
             }
-            _ => format!("{} is {}, but {needed} is needed", quoted(value), name_of(value)),
+            _ => format!("{} is {}, but {needed} is needed", quote(value), name_of(value)),
         },
         remedy: with_description(remedy, Some(schema)),
     }
 }
 
-fn needed(name: &str) -> &'static str {
+fn type_name(name: &str) -> &'static str {
     match name {
         "object" => "a mapping",
         "array" => "a list",
@@ -97,32 +101,32 @@ fn needed(name: &str) -> &'static str {
     }
 }
 
-/// A name that is none of those allowed.
-pub(crate) fn wrong_name(options: &[&str], schema: &Map<String, Value>, value: &Value) -> Complaint {
+/// The message for a name that is not allowed.
+pub(crate) fn wrong_name(options: &[&str], schema: &Map<String, Value>, value: &Value) -> Message {
     if let Some(replacement) = value.as_str().and_then(|name| replacement(schema, name)) {
-        let message = format!("{} is no longer known", quoted(value));
-        return Complaint { kind: FindingKind::WrongValue, message, remedy: replacement.to_owned() };
+        let message = format!("{} is no longer known", quote(value));
+        return Message { kind: FindingKind::WrongValue, message, remedy: replacement.to_owned() };
     }
     let guess = value.as_str().map(|text| guess(text, options)).unwrap_or_default();
-    Complaint {
+    Message {
         kind: FindingKind::WrongValue,
-        message: format!("{} is not one of {}", quoted(value), options.join(", ")),
+        message: format!("{} is not one of {}", quote(value), options.join(", ")),
         remedy: with_description(format!("{guess}write one of {}", options.join(", ")), Some(schema)),
     }
 }
 
-/// What replaces a key or a name that earlier versions had, by the keyword `x-removed` of its schema.
+/// The replacement of a key or a name of earlier versions, from the keyword `x-removed` of its schema.
 pub(crate) fn replacement<'a>(schema: &'a Map<String, Value>, name: &str) -> Option<&'a str> {
     schema.get("x-removed")?.get(name)?.as_str()
 }
 
-/// The keys that a mapping may have.
+/// The allowed keys of a mapping.
 pub(crate) fn keys_of(schema: &Map<String, Value>) -> Vec<&str> {
     let properties = schema.get("properties").and_then(Value::as_object);
     properties.map(|properties| properties.keys().map(String::as_str).collect()).unwrap_or_default()
 }
 
-/// The example of a schema, or one made of those of the keys it requires.
+/// The example of a schema, or one that combines the examples of its required keys.
 pub(crate) fn example_of(schema: &Value) -> Option<String> {
     if let Some(example) = schema.get("examples").and_then(|list| list.get(0)) {
         return Some(example.as_str().map_or_else(|| example.to_string(), str::to_owned));
@@ -141,7 +145,7 @@ pub(crate) fn example_of(schema: &Value) -> Option<String> {
     Some(format!("{{{}}}", required?.join(", ")))
 }
 
-/// What to write, as the schema shows it.
+/// A remedy with the example of the schema.
 pub(crate) fn example_sentence(schema: &Map<String, Value>) -> String {
     let example = schema.get("examples").and_then(|list| list.get(0));
     let example = example.map(|e| e.as_str().map_or_else(|| e.to_string(), str::to_owned));
@@ -157,7 +161,7 @@ pub(crate) fn example_sentence(schema: &Map<String, Value>) -> String {
     }
 }
 
-/// A remedy, and what the schema says about the thing.
+/// Appends the description of the schema to a remedy.
 pub(crate) fn with_description(remedy: String, schema: Option<&Map<String, Value>>) -> String {
     match schema.and_then(|schema| schema.get("description")).and_then(Value::as_str) {
         Some(description) => format!("{remedy}. {description}"),
@@ -165,18 +169,18 @@ pub(crate) fn with_description(remedy: String, schema: Option<&Map<String, Value
     }
 }
 
-/// A value as a message names it.
-pub(crate) fn quoted(value: &Value) -> String {
+/// A value for a message.
+pub(crate) fn quote(value: &Value) -> String {
     match value {
-        Value::String(text) => format!("`{}`", shortened(text)),
+        Value::String(text) => format!("`{}`", shorten(text)),
         Value::Null => "nothing".to_owned(),
         Value::Array(_) | Value::Object(_) => name_of(value).to_owned(),
         other => format!("`{other}`"),
     }
 }
 
-/// A text short enough for a message, without control characters.
-pub(crate) fn shortened(text: &str) -> String {
+/// Shortens a text for a message, and replaces its control characters.
+pub(crate) fn shorten(text: &str) -> String {
     let clean: String = text.chars().take(60).map(|c| if c.is_control() { '?' } else { c }).collect();
     if text.chars().count() > 60 { format!("{clean}...") } else { clean }
 }

@@ -46,6 +46,12 @@ fn names_are_unique_and_every_format_takes_any_map_and_repeats_itself() {
         }
     }
     assert!(FORMATS.find("ods").is_none());
+    // A file is written under every extension of its format; the longest counts.
+    let written = |name: &str| FORMATS.written_to(name).map(|format| format.name);
+    let names = ["x.sae", "x.TXT", "x.modelica.txt", "x.map", "x.npss.map", "x.fitted.csv", "x.xlsx", "sae"];
+    let formats = ["sae", "sae", "modelica", "sae", "npss", "fitted"].map(Some);
+    assert_eq!(names.map(written)[..6], formats);
+    assert_eq!(names.map(written)[6..], [None, None]);
 }
 
 #[test]

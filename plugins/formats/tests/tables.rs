@@ -136,7 +136,8 @@ fn a_reference_in_the_preamble_is_noticed() {
 #[test]
 fn measured_points_become_a_map() {
     let found = read("raw_points_not_corrected.csv", Some(ReferenceState::SAE)).unwrap();
-    assert_eq!(found.remarks, [ImportRemark::Measured]);
+    let unused = ImportRemark::UnusedColumns { headings: vec!["MP".to_owned()] };
+    assert_eq!(found.remarks, [unused, ImportRemark::Measured]);
     let first = numbers(&found.map)
         .into_iter()
         .find(|row| row[1].is_some_and(|flow| (flow - 0.1389).abs() < 1e-4))
@@ -333,6 +334,31 @@ fn a_measured_table_keeps_what_was_measured() {
 }
 
 /// Units below the names, of every quantity that a table may have: humidity, volumes and reduced parameters too.
+/// Merged cells name the machines of points; two columns of one quantity, and one of none, are named.
+#[test]
+fn merged_cells_name_machines_and_unused_columns_are_named() {
+    let text = "Nr;Welle;Verdichter;;;;;Turbine;;Öl;\n\
+                ;Drehzahl;Massenstrom;p ein;T ein;p aus;T aus;p ein;T ein;T ein;T ein\n\
+                ;1/min;kg/h;mbar;°C;mbar;°C;mbar;°C;°C;K\n\
+                1;59880;504,0;985,0;21,3;1088,4;38,99;1800,0;600,0;90,0;363,15\n\
+                2;59880;404,0;985,0;21,3;1188,4;48,99;1900,0;610,0;91,0;364,15\n";
+    let found = read_bytes("points.csv", text.as_bytes(), Some(ReferenceState::SAE)).unwrap();
+    let turbine = &found.measured[0].turbine;
+    let near = |value: Option<f64>, expected: f64| (value.unwrap() - expected).abs() < 1e-6;
+    assert!(near(turbine.p3_pa, 180e3) && near(turbine.t3_k, 873.15) && near(turbine.oil_k, 363.15));
+    assert!((found.measured[0].t1_k - 294.45).abs() < 1e-9);
+    let headings = vec!["T ein Öl [K]".to_owned()];
+    assert!(found.remarks.contains(&ImportRemark::UnusedColumns { headings }), "{:?}", found.remarks);
+}
+
+/// Fractions below a heading in % would be efficiencies of half a percent.
+#[test]
+fn fractions_in_percent_are_refused() {
+    let text = "n [rpm],m [kg/s],PR,eta [%]\n60000,0.05,1.3,0.62\n60000,0.04,1.4,0.7\n";
+    let error = read_bytes("map.csv", text.as_bytes(), Some(ReferenceState::SAE)).unwrap_err();
+    assert!(matches!(error, ImportError::Value { quantity: "efficiency", .. }), "{error}");
+}
+
 #[test]
 fn units_below_the_names_of_any_quantity() {
     let text = "Shaft Speed,Air Mass Flow,P1,T1,P2,T2,Casing temp,Abs. humidity\nkrpm,lb/min,inHg,degF,psia,degF,degF,g/kg\n\

@@ -113,7 +113,7 @@ pub struct ImportedColumn {
 }
 
 /// Assumption or computation of a map reader.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ImportRemark {
     /// The columns have no headings: rpm, kg/s, pressure ratio, efficiency were assumed.
@@ -122,6 +122,11 @@ pub enum ImportRemark {
     FurtherColumns {
         /// Their number.
         count: usize,
+    },
+    /// Columns are not used: another one has their quantity, or the map has no such quantity.
+    UnusedColumns {
+        /// Their headings.
+        headings: Vec<String>,
     },
     /// Efficiencies are percentages, from their size.
     EfficiencyInPercent,

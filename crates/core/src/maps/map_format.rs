@@ -69,7 +69,7 @@ pub struct MapFormat {
     pub name: &'static str,
     /// Extension, without the dot, of written files; it may have several parts (`fitted.csv`).
     pub extension: &'static str,
-    /// Further extensions that identify a file to read.
+    /// Further extensions of its files.
     pub further_extensions: &'static [&'static str],
     /// A one-line description.
     pub description: &'static str,
@@ -84,12 +84,9 @@ pub struct MapFormat {
 }
 
 impl MapFormat {
-    /// Whether maps are read from files of this extension, ignoring case.
-    fn reads_extension(&self, extension: &str) -> bool {
-        self.read.is_some()
-            && std::iter::once(&self.extension)
-                .chain(self.further_extensions)
-                .any(|known| known.eq_ignore_ascii_case(extension))
+    /// All extensions of its files.
+    fn extensions(&self) -> impl Iterator<Item = &'static str> + use<> {
+        std::iter::once(self.extension).chain(self.further_extensions.iter().copied())
     }
 
     /// Writes a file with `map`.
@@ -176,22 +173,26 @@ impl MapFormats {
     /// `map.fitted.csv` is not plain CSV.
     pub fn written_to(self, file_name: &str) -> Option<&'static MapFormat> {
         let file_name = file_name.to_ascii_lowercase();
-        self.written()
-            .filter(|format| {
-                file_name.strip_suffix(format.extension).is_some_and(|before| before.ends_with('.'))
-            })
-            .max_by_key(|format| format.extension.len())
+        let ends =
+            |extension: &&str| file_name.strip_suffix(*extension).is_some_and(|before| before.ends_with('.'));
+        let fitting = |format: &'static MapFormat| {
+            let longest = format.extensions().filter(ends).map(str::len).max()?;
+            Some((longest, format))
+        };
+        let longest = self.written().filter_map(fitting).max_by_key(|(length, _)| *length);
+        longest.map(|(_, format)| format)
     }
 
     /// The format for reading a file with this extension (without the dot).
     pub fn read_from(self, extension: &str) -> Option<&'static MapFormat> {
-        self.iter().find(|format| format.reads_extension(extension))
+        let is_read = |format: &&MapFormat| {
+            format.read.is_some() && format.extensions().any(|known| known.eq_ignore_ascii_case(extension))
+        };
+        self.iter().find(is_read)
     }
 
     /// Every extension of files that can be read.
     pub fn read_extensions(self) -> impl Iterator<Item = &'static str> {
-        self.iter().filter(|format| format.read.is_some()).flat_map(|format| {
-            std::iter::once(format.extension).chain(format.further_extensions.iter().copied())
-        })
+        self.iter().filter(|format| format.read.is_some()).flat_map(MapFormat::extensions)
     }
 }

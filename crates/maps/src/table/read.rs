@@ -131,6 +131,7 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedMap, Import
         }
         rows.push(row);
     }
+    check_unit_of_efficiency(&layout, &rows)?;
     scale_to_design(&mut rows, MapDesign::default(), description.design, &mut remarks)?;
     rows.iter().try_for_each(Row::check)?;
     if rows.iter().all(|row| row.eta.is_none()) {
@@ -140,6 +141,25 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedMap, Import
     let efficiency =
         if layout.is_measured() { Some(EfficiencyDefinition::Enthalpy) } else { notes.efficiency };
     Ok(ImportedMap { map: CompressorMap { efficiency, ..map }, columns, remarks, measured })
+}
+
+/// Maximum efficiency of fractions below a heading in %: 1 is the maximum of a fraction, and usable points have more than 1.5 %.
+const MAX_FRACTION_IN_PERCENT: f64 = 0.015;
+
+/// Refuses fractions below a heading in %.
+fn check_unit_of_efficiency(layout: &Layout, rows: &[Row]) -> Result<(), ImportError> {
+    let mut columns = layout.groups.iter().flat_map(|group| &group.columns);
+    let is_in_percent = columns.any(|column| column.quantity == Quantity::Efficiency && column.has_unit());
+    let etas = || rows.iter().filter_map(|row| Some((row.at, row.eta?))).filter(|_| is_in_percent);
+    match etas().next().filter(|_| etas().all(|(_, eta)| (0.0..MAX_FRACTION_IN_PERCENT).contains(&eta))) {
+        None => Ok(()),
+        Some((line, value)) => Err(ImportError::Value {
+            line,
+            quantity: "efficiency",
+            value,
+            needed: "a percentage (72) as its unit says; if the column has fractions, leave the unit out",
+        }),
+    }
 }
 
 /// A value that a point must have.

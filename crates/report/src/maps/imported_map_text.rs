@@ -36,7 +36,7 @@ pub fn imported_map_text(found: &ImportedMap) -> String {
         None => writeln!(text, "The file does not name the definition of its efficiency."),
     };
     for remark in &found.remarks {
-        let _ = writeln!(text, "{}", import_remark_text(*remark));
+        let _ = writeln!(text, "{}", import_remark_text(remark));
     }
     text
 }
@@ -65,13 +65,17 @@ fn significant(value: f64) -> String {
 }
 
 /// A sentence on what was assumed.
-pub fn import_remark_text(remark: ImportRemark) -> String {
+pub fn import_remark_text(remark: &ImportRemark) -> String {
     match remark {
         ImportRemark::NoHeading => {
             "The columns have no headings; taken as rpm, kg/s, pressure ratio and efficiency.".to_owned()
         }
         ImportRemark::FurtherColumns { count } => format!(
             "{count} columns behind the efficiency have no headings and were left out; name them by `--with`, e.g. `--with efficiency=#5`."
+        ),
+        ImportRemark::UnusedColumns { headings } => format!(
+            "Columns that are not used: {}. `--with` selects another column for a quantity, e.g. `--with flow=#5`.",
+            headings.iter().map(|heading| format!("`{heading}`")).collect::<Vec<_>>().join(", ")
         ),
         ImportRemark::EfficiencyInPercent => {
             "The efficiencies are taken as percentages, from their size.".to_owned()

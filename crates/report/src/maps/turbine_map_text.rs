@@ -35,7 +35,7 @@ pub fn imported_turbine_text(found: &ImportedTurbine) -> String {
         "{lines}\n\nThe map of a turbine: speed and flow are reduced by the state at its inlet."
     );
     for remark in &found.remarks {
-        let _ = writeln!(text, "{}", import_remark_text(*remark));
+        let _ = writeln!(text, "{}", import_remark_text(remark));
     }
     text
 }

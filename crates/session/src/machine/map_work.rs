@@ -57,7 +57,7 @@ impl MapOut<'_> {
 }
 
 pub(crate) fn warnings(path: &Path, remarks: &[ImportRemark]) -> Vec<String> {
-    remarks.iter().map(|remark| format!("{}: {}", path.display(), import_remark_text(*remark))).collect()
+    remarks.iter().map(|remark| format!("{}: {}", path.display(), import_remark_text(remark))).collect()
 }
 
 impl Registry {

@@ -267,13 +267,14 @@ fn quantity_of_unit(unit: &str) -> Option<Quantity> {
 }
 
 fn is_root(lower: &str) -> bool {
+    let lower = lower.replace(',', ".");
     ["k^0.5", "k^.5", "k^1/2", "sqrt(k", "sqrtk", "√k", "k0.5", "k**0.5"]
         .iter()
         .any(|root| lower.contains(root))
 }
 
 fn scale(quantity: Quantity, unit: &str) -> Option<Scale> {
-    let unit = &unit.replace(['·', '⋅'], "*");
+    let unit = &unit.replace(['·', '⋅'], "*").replace(',', ".");
     let lower = unit.trim().to_lowercase();
     match quantity {
         Quantity::VolumeFlow => Some(Scale::Factor(volume_flow_m3_s(unit)??)),

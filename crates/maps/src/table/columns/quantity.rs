@@ -2,125 +2,98 @@
 
 use mapper_yaml::units::Kind;
 
-/// Quantities of a table of points.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Quantity {
+/// Declares the quantities with their keys in a map description, their names in messages, and the kinds of their units.
+macro_rules! quantities {
+    ($($(#[doc = $doc:literal])* $quantity:ident $key:literal $name:literal $kind:ident,)*) => {
+        /// Quantities of a table of points.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub enum Quantity {
+            $($(#[doc = $doc])* $quantity,)*
+        }
+
+        impl Quantity {
+            /// Its key in a map description.
+            pub fn key(self) -> &'static str {
+                match self {
+                    $(Quantity::$quantity => $key,)*
+                }
+            }
+
+            /// The quantity of a key.
+            pub(crate) fn of_key(key: &str) -> Option<Quantity> {
+                match key {
+                    $($key => Some(Quantity::$quantity),)*
+                    _ => None,
+                }
+            }
+
+            /// Its name in messages.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Quantity::$quantity => $name,)*
+                }
+            }
+
+            /// Kind of its units.
+            pub(crate) fn kind(self) -> Kind {
+                match self {
+                    $(Quantity::$quantity => Kind::$kind,)*
+                }
+            }
+        }
+    };
+}
+
+quantities! {
     /// Corrected speed; the measured speed in a table of measured points.
-    Speed,
+    Speed "speed" "speed" Speed,
     /// Speed over the root of T1.
-    ReducedSpeed,
+    ReducedSpeed "reduced_speed" "speed over the root of temperature" Speed,
     /// Corrected flow; the measured flow in a table of measured points.
-    Flow,
+    Flow "flow" "mass flow" MassFlow,
     /// Volume flow at the inlet, at the reference state.
-    VolumeFlow,
+    VolumeFlow "volume_flow" "volume flow" MassFlow,
     /// Flow times the root of T1 over P1.
-    ReducedFlow,
+    ReducedFlow "reduced_flow" "flow times the root of temperature over pressure" MassFlow,
     /// Total pressure ratio.
-    PressureRatio,
+    PressureRatio "pressure_ratio" "pressure ratio" Fraction,
     /// Isentropic efficiency.
-    Efficiency,
+    Efficiency "efficiency" "efficiency" Fraction,
     /// Position of a turbine's vanes.
-    Vane,
+    Vane "vane" "vane position" Fraction,
     /// Measured inlet pressure.
-    P1,
+    P1 "p1" "P1" Pressure,
     /// Measured outlet pressure.
-    P2,
+    P2 "p2" "P2" Pressure,
     /// Measured inlet temperature.
-    T1,
+    T1 "t1" "T1" Temperature,
     /// Measured outlet temperature.
-    T2,
+    T2 "t2" "T2" Temperature,
     /// Temperature of the compressor housing.
-    Tc,
+    Tc "tc" "housing temperature" Temperature,
     /// Humidity of the air: water per dry air, or relative.
-    Humidity,
+    Humidity "humidity" "humidity" Fraction,
     /// Ambient pressure, the reference of gauge pressures.
-    Ambient,
+    Ambient "ambient_pressure" "ambient pressure" Pressure,
     /// Measured turbine inlet pressure.
-    P3,
+    P3 "p3" "P3" Pressure,
     /// Measured turbine outlet pressure.
-    P4,
+    P4 "p4" "P4" Pressure,
     /// Measured turbine inlet temperature.
-    T3,
+    T3 "t3" "T3" Temperature,
     /// Measured turbine outlet temperature.
-    T4,
+    T4 "t4" "T4" Temperature,
     /// Measured flow of the turbine, in a table that has the compressor's as well.
-    TurbineFlow,
+    TurbineFlow "turbine_flow" "turbine flow" MassFlow,
     /// Temperature of the oil that enters the bearing housing.
-    Oil,
+    Oil "oil_temperature" "oil temperature" Temperature,
 }
 
 impl Quantity {
-    /// Every quantity.
-    pub(crate) const ALL: [Quantity; 21] = [
-        Quantity::Speed,
-        Quantity::ReducedSpeed,
-        Quantity::Flow,
-        Quantity::VolumeFlow,
-        Quantity::ReducedFlow,
-        Quantity::PressureRatio,
-        Quantity::Efficiency,
-        Quantity::Vane,
-        Quantity::P1,
-        Quantity::P2,
-        Quantity::T1,
-        Quantity::T2,
-        Quantity::Tc,
-        Quantity::Humidity,
-        Quantity::Ambient,
-        Quantity::P3,
-        Quantity::P4,
-        Quantity::T3,
-        Quantity::T4,
-        Quantity::TurbineFlow,
-        Quantity::Oil,
-    ];
-
-    /// Its key in a map description.
-    pub fn key(self) -> &'static str {
-        match self {
-            Quantity::Speed => "speed",
-            Quantity::ReducedSpeed => "reduced_speed",
-            Quantity::Flow => "flow",
-            Quantity::VolumeFlow => "volume_flow",
-            Quantity::ReducedFlow => "reduced_flow",
-            Quantity::PressureRatio => "pressure_ratio",
-            Quantity::Efficiency => "efficiency",
-            Quantity::Vane => "vane",
-            Quantity::P1 => "p1",
-            Quantity::P2 => "p2",
-            Quantity::T1 => "t1",
-            Quantity::T2 => "t2",
-            Quantity::Tc => "tc",
-            Quantity::Humidity => "humidity",
-            Quantity::Ambient => "ambient_pressure",
-            Quantity::P3 => "p3",
-            Quantity::P4 => "p4",
-            Quantity::T3 => "t3",
-            Quantity::T4 => "t4",
-            Quantity::TurbineFlow => "turbine_flow",
-            Quantity::Oil => "oil_temperature",
-        }
-    }
-
-    /// The quantity of a key.
-    pub(crate) fn of_key(key: &str) -> Option<Quantity> {
-        Quantity::ALL.into_iter().find(|quantity| quantity.key() == key)
-    }
-
     /// Whether a point may be without it.
     pub(crate) fn is_optional(self) -> bool {
-        matches!(
-            self,
-            Quantity::Tc
-                | Quantity::Humidity
-                | Quantity::Ambient
-                | Quantity::P3
-                | Quantity::P4
-                | Quantity::T3
-                | Quantity::T4
-                | Quantity::TurbineFlow
-                | Quantity::Oil
-        )
+        use Quantity::{Ambient, Humidity, Oil, P3, P4, T3, T4, Tc, TurbineFlow};
+        matches!(self, Tc | Humidity | Ambient | P3 | P4 | T3 | T4 | TurbineFlow | Oil)
     }
 
     /// Whether both are forms of one physical quantity.
@@ -140,50 +113,6 @@ impl Quantity {
             Quantity::ReducedFlow => "kg/s*K^0.5/kPa, kg/s*K^0.5/MPa, kg/s*K^0.5/bar".to_owned(),
             Quantity::Humidity => "%, g/kg, kg/kg".to_owned(),
             _ => self.kind().unit_list(),
-        }
-    }
-
-    /// Its name in messages.
-    pub fn name(self) -> &'static str {
-        match self {
-            Quantity::Speed => "speed",
-            Quantity::ReducedSpeed => "speed over the root of temperature",
-            Quantity::Flow => "mass flow",
-            Quantity::VolumeFlow => "volume flow",
-            Quantity::ReducedFlow => "flow times the root of temperature over pressure",
-            Quantity::PressureRatio => "pressure ratio",
-            Quantity::Efficiency => "efficiency",
-            Quantity::Vane => "vane position",
-            Quantity::P1 => "P1",
-            Quantity::P2 => "P2",
-            Quantity::T1 => "T1",
-            Quantity::T2 => "T2",
-            Quantity::Tc => "housing temperature",
-            Quantity::Humidity => "humidity",
-            Quantity::Ambient => "ambient pressure",
-            Quantity::P3 => "P3",
-            Quantity::P4 => "P4",
-            Quantity::T3 => "T3",
-            Quantity::T4 => "T4",
-            Quantity::TurbineFlow => "turbine flow",
-            Quantity::Oil => "oil temperature",
-        }
-    }
-
-    /// Kind of its units.
-    pub(crate) fn kind(self) -> Kind {
-        match self {
-            Quantity::Speed | Quantity::ReducedSpeed => Kind::Speed,
-            Quantity::Flow | Quantity::TurbineFlow | Quantity::VolumeFlow | Quantity::ReducedFlow => {
-                Kind::MassFlow
-            }
-            Quantity::PressureRatio | Quantity::Efficiency | Quantity::Vane | Quantity::Humidity => {
-                Kind::Fraction
-            }
-            Quantity::P1 | Quantity::P2 | Quantity::P3 | Quantity::P4 | Quantity::Ambient => Kind::Pressure,
-            Quantity::T1 | Quantity::T2 | Quantity::T3 | Quantity::T4 | Quantity::Tc | Quantity::Oil => {
-                Kind::Temperature
-            }
         }
     }
 }

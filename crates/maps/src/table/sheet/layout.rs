@@ -4,8 +4,8 @@ use crate::table::columns::column::{Column, ColumnError, Machine, column};
 use crate::table::columns::described_columns::DescribedColumns;
 use crate::table::columns::quantity::Quantity;
 use crate::table::sheet::grid::{Grid, GridRow};
+use crate::table::sheet::headings::Headings;
 use crate::table::sheet::speed_heading::{speed_in, without_speed};
-use crate::table::units_row::merge_units_row;
 use mapper_core::{ImportError, ImportRemark, is_missing_mark};
 use std::borrow::Cow;
 
@@ -73,6 +73,14 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
+    /// The layout below headings, with a remark on those that no group uses.
+    fn below(headings: &Headings, groups: Vec<Group>) -> Layout {
+        let used: Vec<usize> =
+            groups.iter().flat_map(|group| &group.columns).map(|column| column.index).collect();
+        let remarks = headings.unused(&used).into_iter().collect();
+        Layout { groups, first_row: headings.first_row, remarks }
+    }
+
     /// Whether the points are measured values that are not corrected.
     pub(crate) fn is_measured(&self) -> bool {
         self.groups.iter().any(Group::is_measured)
@@ -135,9 +143,9 @@ fn layout(grid: &Grid, given: &DescribedColumns) -> Result<Option<Layout>, Impor
         if let Some(groups) = side_by_side(grid, given, index, &headings.cells)
             .or_else(|| by_speed(grid, given, index, &headings.cells))
         {
-            return Ok(Some(Layout { groups, first_row: headings.first_row, remarks: Vec::new() }));
+            return Ok(Some(Layout::below(&headings, groups)));
         }
-        let known = match columns(given, &row.cells) {
+        let known = match columns(given, &headings.names) {
             Ok(known) => known,
             // Only a row of headings can have a wrong unit.
             Err(error) if is_reported(given, row, &error) => return Err(wrong(row, error)),
@@ -145,7 +153,7 @@ fn layout(grid: &Grid, given: &DescribedColumns) -> Result<Option<Layout>, Impor
         };
         let group = Group { columns: known, ..Group::default() };
         if group.is_complete() && (!row.is_comment || group.columns.len() >= 3) {
-            return with_heading(grid, given, index, row, group).map(Some);
+            return with_heading(grid, given, index, headings, group).map(Some);
         }
         if group.columns.len() >= 2 && near.is_none_or(|(count, _)| group.columns.len() > count) {
             near = Some((group.columns.len(), index));
@@ -256,54 +264,34 @@ fn missing(given: &DescribedColumns, row: &GridRow) -> &'static str {
     if group.has_flow() { "pressure ratio (or P1, P2 and T1)" } else { "flow" }
 }
 
-/// The cells of a row of headings, with the units of the row below it.
-struct Headings {
-    cells: Vec<String>,
-    /// Index of the first row below.
-    first_row: usize,
-}
-
-impl Headings {
-    fn of(grid: &Grid, index: usize, row: &GridRow) -> Headings {
-        fn texts(row: &GridRow) -> Vec<&str> {
-            row.cells.iter().map(String::as_str).collect()
-        }
-        let joined = grid.rows.get(index + 1).and_then(|below| merge_units_row(&texts(row), &texts(below)));
-        let first_row = index + 1 + usize::from(joined.is_some());
-        Headings { cells: joined.unwrap_or_else(|| row.cells.clone()), first_row }
-    }
-}
-
 /// The layout below a heading: its units may be in a row of their own; without a speed column each block has its speed in a title.
 fn with_heading(
     grid: &Grid,
     given: &DescribedColumns,
     index: usize,
-    row: &GridRow,
+    headings: Headings,
     mut group: Group,
 ) -> Result<Layout, ImportError> {
-    let Headings { cells, first_row } = Headings::of(grid, index, row);
-    if first_row > index + 1 {
-        let below = grid.rows.get(index + 1).unwrap_or(row);
-        group.columns = columns(given, &cells).map_err(|error| wrong(below, error))?;
+    if let Some(below) = grid.rows.get(index + 1).filter(|_| headings.first_row > index + 1) {
+        group.columns = columns(given, &headings.cells).map_err(|error| wrong(below, error))?;
     }
     let title_above = index
         .checked_sub(1)
         .and_then(|above| grid.rows.get(above))
         .and_then(|above| speed_of_title(grid, given, above, &group));
     if group.speed_column().is_none() {
-        let titled =
-            grid.rows.iter().skip(first_row).any(|row| speed_of_title(grid, given, row, &group).is_some());
+        let mut below = grid.rows.iter().skip(headings.first_row);
+        let titled = below.any(|row| speed_of_title(grid, given, row, &group).is_some());
         if title_above.is_none() && !titled {
             return Err(ImportError::NoColumn {
-                line: row.at,
+                line: grid.rows.get(index).map_or(1, |row| row.at),
                 missing: "corrected speed",
-                found: row.cells.join(", ").chars().take(120).collect(),
+                found: headings.names.join(", ").chars().take(120).collect(),
             });
         }
         group.speed_rpm = title_above;
     }
-    Ok(Layout { groups: vec![group], first_row, remarks: Vec::new() })
+    Ok(Layout::below(&headings, vec![group]))
 }
 
 /// Lines side by side: pairs of flow and pressure ratio (X and Y in files of digitisers), each with its speed above.

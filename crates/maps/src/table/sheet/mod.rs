@@ -2,6 +2,7 @@
 
 pub(crate) mod file_text;
 pub(crate) mod grid;
+pub(crate) mod headings;
 pub(crate) mod layout;
 pub(crate) mod matrices;
 pub(crate) mod points;

@@ -1,0 +1,79 @@
+//! A row of headings, with merged cells above it and units below it.
+
+use crate::table::columns::column::parts;
+use crate::table::sheet::grid::{Grid, GridRow};
+use crate::table::units_row::merge_units_row;
+use mapper_core::{ColumnName, ImportRemark, Word};
+
+/// A row of headings.
+pub(crate) struct Headings {
+    /// The cells, with the machine of a merged cell above them.
+    pub(crate) names: Vec<String>,
+    /// The names with the units of the row below.
+    pub(crate) cells: Vec<String>,
+    /// Index of the first row below.
+    pub(crate) first_row: usize,
+}
+
+impl Headings {
+    pub(crate) fn of(grid: &Grid, index: usize, row: &GridRow) -> Headings {
+        fn texts(cells: &[String]) -> Vec<&str> {
+            cells.iter().map(String::as_str).collect()
+        }
+        let above = index.checked_sub(1).and_then(|above| grid.rows.get(above));
+        let names = above
+            .filter(|above| !grid.by_blanks && is_row_of_groups(above, row))
+            .map_or_else(|| row.cells.clone(), |above| with_groups(&above.cells, &row.cells));
+        let below = grid.rows.get(index + 1);
+        let joined = below.and_then(|below| merge_units_row(&texts(&names), &texts(&below.cells)));
+        let first_row = index + 1 + usize::from(joined.is_some());
+        Headings { cells: joined.unwrap_or_else(|| names.clone()), names, first_row }
+    }
+
+    /// A remark that names the columns outside `used`, if there are any.
+    pub(crate) fn unused(&self, used: &[usize]) -> Option<ImportRemark> {
+        let is_unused = |(index, cell): &(usize, &String)| !cell.is_empty() && !used.contains(index);
+        let unused = self.cells.iter().enumerate().filter(is_unused);
+        let headings: Vec<String> =
+            unused.map(|(_, cell)| cell.chars().take(60).collect()).take(MAX_NAMED).collect();
+        (!headings.is_empty()).then_some(ImportRemark::UnusedColumns { headings })
+    }
+}
+
+/// Maximum number of unused columns that a remark names.
+const MAX_NAMED: usize = 20;
+
+/// Whether merged cells above a row name the machines of its columns. A title stands alone in the first column.
+fn is_row_of_groups(above: &GridRow, row: &GridRow) -> bool {
+    let filled = || above.cells.iter().enumerate().filter(|(_, cell)| !cell.is_empty());
+    let has_gap = |(index, cell): (usize, &String)| {
+        !cell.is_empty() && above.cells.get(index).is_none_or(String::is_empty)
+    };
+    !above.is_comment
+        && filled().any(|(index, _)| index > 0)
+        && filled().all(|(_, cell)| !cell.contains(|c: char| c.is_ascii_digit()))
+        && filled().any(|(_, cell)| names_machine(cell))
+        && row.cells.iter().enumerate().any(has_gap)
+}
+
+fn names_machine(text: &str) -> bool {
+    let name = ColumnName::read(text);
+    [Word::Compressor, Word::Turbine, Word::Shaft, Word::Oil].iter().any(|word| name.has(*word))
+}
+
+/// The names with the machine above them, which a merged cell has only in its first column: `p in [kPa]` below `Turbine` becomes
+/// `p in Turbine [kPa]`.
+fn with_groups(above: &[String], cells: &[String]) -> Vec<String> {
+    let mut group = "";
+    let named = cells.iter().enumerate().map(|(index, cell)| {
+        group = above.get(index).filter(|cell| !cell.is_empty()).map_or(group, String::as_str);
+        if cell.is_empty() || !names_machine(group) || names_machine(cell) {
+            return cell.clone();
+        }
+        match parts(cell) {
+            (name, Some(unit)) if !name.is_empty() => format!("{name} {group} [{unit}]"),
+            _ => format!("{cell} {group}"),
+        }
+    });
+    named.collect()
+}

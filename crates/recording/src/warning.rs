@@ -1,6 +1,7 @@
 //! Warnings about recordings that were read despite a fault.
 
 use crate::ChunkError;
+use crate::logs::LogFinding;
 use mapper_core::{Channel, step_number};
 
 /// A warning for the user of a recording. Each displays as one sentence with values.
@@ -137,8 +138,8 @@ pub enum ReadWarning {
     /// A finding of the log's reader.
     #[error("{finding}")]
     Log {
-        /// The sentence.
-        finding: String,
+        /// The finding.
+        finding: LogFinding,
     },
     /// A fast log was averaged during reading.
     #[error("the log is faster than identification needs: it was averaged to 10 samples a second")]

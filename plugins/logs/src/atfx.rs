@@ -8,7 +8,7 @@ use crate::notation::instant::{Instant, parse_instant};
 use crate::tables::column_log::{ColumnTable, column_log};
 use crate::tables::column_rows::Chunk;
 use mapper_recording::logs::limits::MAX_UNPACKED_BYTES;
-use mapper_recording::logs::{DateOrder, Log, LogError, LogFile, LogFormat, LogOptions};
+use mapper_recording::logs::{DateOrder, Log, LogError, LogFile, LogFinding, LogFormat, LogOptions};
 use quick_xml::Reader;
 use quick_xml::events::Event;
 use std::collections::HashMap;
@@ -72,7 +72,7 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
     }
     let contents = contents(file).map_err(wrong)?;
     let mut binaries = Binaries { file, contents: &contents, read: HashMap::new(), left: MAX_UNPACKED_BYTES };
-    let (mut tables, mut problems): (Vec<(String, ColumnTable)>, Vec<String>) = (Vec::new(), Vec::new());
+    let (mut tables, mut problems): (Vec<(String, ColumnTable)>, Vec<LogFinding>) = (Vec::new(), Vec::new());
     for column in &contents.columns {
         let quantity = contents.quantities.get(column.text("measurement_quantity"));
         let name = Some(column.text("name")).filter(|name| !name.is_empty());
@@ -83,7 +83,7 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
         let chunk = match binaries.chunk(column, rows) {
             Ok(chunk) => chunk,
             Err(why) => {
-                problems.push(format!("`{name}` was left out: {why}"));
+                problems.push(LogFinding::skipped("column", &name, why));
                 continue;
             }
         };

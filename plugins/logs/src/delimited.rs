@@ -6,7 +6,9 @@ use crate::notation::table_row::Rows;
 use crate::tables::long_table::{LongForm, LongRows};
 use crate::tables::row_stream::{Dialect, RowStream};
 use crate::tables::table_log::{Origin, Table};
-use mapper_recording::logs::{Layout, Log, LogError, LogFile, LogFormat, LogOptions, RowSink, TextEncoding};
+use mapper_recording::logs::{
+    Layout, Log, LogError, LogFile, LogFinding, LogFormat, LogOptions, RowSink, TextEncoding,
+};
 use std::io::Cursor;
 use std::ops::Range;
 
@@ -88,10 +90,16 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
         let gathered = LogOptions { names_row: None, units_row: None, data_row: None, ..options.clone() };
         table = Table::analyse(&form.wide(&rows), decimal, &gathered, Origin::Rows)
             .map_err(|message| file.content_error(NAME, message))?;
-        table.layout.findings.insert(0, form.words(&rows));
+        table.layout.findings.insert(0, form.finding(&rows));
     }
     let dialect = Dialect { encoding, mark, separator, decimal };
-    table.layout.findings.insert(0, describe_dialect(dialect, seen || options.decimal.is_some()));
+    let found = LogFinding::Dialect {
+        separator: char::from(separator),
+        decimal: char::from(decimal),
+        is_decimal_assumed: !seen && options.decimal.is_none(),
+        encoding: encoding.name().to_owned(),
+    };
+    table.layout.findings.insert(0, found);
     Ok(Box::new(Delimited { file: file.clone(), dialect, table, long }))
 }
 
@@ -115,20 +123,6 @@ fn join_names(rows: &mut [Vec<String>], spans: &[Vec<Range<usize>>]) {
         }
         *row = if names.len() == length { names } else { vec![row.join(" ")] };
     }
-}
-
-fn describe_dialect(dialect: Dialect, decimal_seen: bool) -> String {
-    let separator = match dialect.separator {
-        b'\t' => "tab".to_owned(),
-        b' ' => "blanks".to_owned(),
-        other => format!("`{}`", char::from(other)),
-    };
-    let encoding = dialect.encoding.name();
-    let decimal = if decimal_seen { "" } else { ", assumed" };
-    let sign = char::from(dialect.decimal);
-    format!(
-        "text: separator {separator}, decimal sign `{sign}`{decimal}, letters in {encoding} (separator, decimal, encoding)"
-    )
 }
 
 impl Log for Delimited {

@@ -7,7 +7,7 @@ use crate::columns::table_head::MAX_COLUMNS;
 use crate::tables::column_log::{ColumnTable, column_log};
 use crate::tables::column_rows::Chunk;
 use mapper_recording::logs::limits::MAX_UNPACKED_BYTES;
-use mapper_recording::logs::{Log, LogError, LogFile, LogFormat, LogOptions};
+use mapper_recording::logs::{Log, LogError, LogFile, LogFinding, LogFormat, LogOptions};
 use std::io::Read;
 
 pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
@@ -56,10 +56,8 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
     }
     let mut problems = Vec::new();
     if reader.left_out > 0 {
-        problems.push(format!(
-            "{} variables are left out: texts, cells, objects, complex or single numbers",
-            reader.left_out
-        ));
+        problems
+            .push(LogFinding::left_out(reader.left_out, "texts, cells, objects, complex or single numbers"));
     }
     let tables = tables.into_iter().map(|mut table| {
         without_common_prefix(&mut table);

@@ -3,7 +3,7 @@
 use crate::mdf_source::MdfSource;
 use falcon_mdf::mdf3::Mdf3File;
 use mapper_recording::logs::{
-    Column, Group, Layout, Log, LogError, LogFile, LogFormat, LogOptions, Row, RowSink,
+    Column, Group, Layout, Log, LogError, LogFile, LogFinding, LogFormat, LogOptions, Row, RowSink,
 };
 use std::collections::BTreeMap;
 
@@ -96,13 +96,12 @@ fn open(path: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
     if channels.is_empty() {
         return Err(path.content_error(NAME, "no group has a time channel and another one with samples"));
     }
-    layout.findings.push(format!(
-        "version {} of MDF, written by `{}`",
-        file.version().trim(),
-        file.program().trim()
-    ));
+    layout.findings.push(LogFinding::MdfVersion {
+        version: file.version().trim().to_owned(),
+        program: file.program().trim().to_owned(),
+    });
     if without_clock > 0 {
-        layout.findings.push(format!("{without_clock} channels without a time channel were left out"));
+        layout.findings.push(LogFinding::left_out(without_clock, "their groups have no time channel"));
     }
     Ok(Box::new(Mdf3 {
         path: path.clone(),

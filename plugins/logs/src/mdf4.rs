@@ -4,7 +4,7 @@ use crate::mdf_source::MdfSource;
 use falcon_mdf::{Channel, ChannelGroup, Conversion, Mf4File, OpenOptions, Signal};
 use mapper_recording::logs::limits::{MAX_BLOCK_BYTES, max_unpacked_bytes};
 use mapper_recording::logs::{
-    Column, Group, Kind, Layout, Log, LogError, LogFile, LogFormat, LogOptions, Row, RowSink,
+    Column, Group, Kind, Layout, Log, LogError, LogFile, LogFinding, LogFormat, LogOptions, Row, RowSink,
 };
 use std::collections::BTreeSet;
 
@@ -111,30 +111,28 @@ fn open(path: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
     }
     distinct_names(&mut log.layout);
     let findings = &mut log.layout.findings;
-    findings.push(format!("clocks: {} groups, each with its own (time, time_unit)", log.masters.len()));
+    findings.push(LogFinding::Clocks { groups: log.masters.len() });
     if has_frames {
-        findings.push(UNDECODED.to_owned());
+        findings.push(LogFinding::BusFrames);
     }
     if left_out > 0 {
-        findings.push(format!("{left_out} channels were left out: texts, arrays, or unreadable"));
+        findings.push(LogFinding::left_out(left_out, "texts, arrays, or unreadable"));
     }
     if without_clock > 0 {
-        findings.push(format!(
-            "{without_clock} channels were left out: their groups have no clock; name one with `time`"
-        ));
+        findings
+            .push(LogFinding::left_out(without_clock, "their groups have no clock; name one with `time`"));
     }
     log.layout.start_time_ns = u64::try_from(log.file.start_time().timestamp_ns).ok().filter(|ns| *ns > 0);
     if log.layout.groups.is_empty() {
         let without_clock = "it has no group of numbers with a clock; name the clock's channel with `time`";
-        return Err(path.content_error(NAME, if has_frames { UNDECODED } else { without_clock }));
+        let frames = LogFinding::BusFrames.to_string();
+        return Err(path.content_error(NAME, if has_frames { frames.as_str() } else { without_clock }));
     }
     Ok(Box::new(log))
 }
 
 /// Channels of undecoded frames (ASAM MDF, bus logging): their numbers are identifiers and bytes.
 const FRAMES: [&str; 5] = ["CAN_DataFrame", "CAN_RemoteFrame", "LIN_Frame", "FLX_Frame", "ETH_Frame"];
-const UNDECODED: &str = "it contains frames of a bus (CAN, LIN, FlexRay, Ethernet) that are not decoded and have no signals: decode them with the database \
-     of the bus (DBC, ARXML) in the measuring program, or with asammdf (`MDF(FILE).extract_bus_logging({\"CAN\": [(DBC, 0)]}).save(NEW)`)";
 
 fn name_of(group: &ChannelGroup, index: usize) -> String {
     let source = group.source.as_ref().map(|source| source.name.clone());

@@ -6,7 +6,9 @@ use crate::notation::instant::Instant;
 use crate::tables::column_rows::{Chunk, Chunks, ColumnRows};
 use crate::tables::joined_tables::{Part, join_tables};
 use crate::tables::table_log::{Origin, Table};
-use mapper_recording::logs::{Layout, Log, LogError, LogFile, LogFormat, LogOptions, ReadSeek, Row, RowSink};
+use mapper_recording::logs::{
+    Layout, Log, LogError, LogFile, LogFinding, LogFormat, LogOptions, ReadSeek, Row, RowSink,
+};
 use std::io::{Seek as _, SeekFrom};
 use tedium::{ChannelPath, PropertyPath, PropertyValue, TdmsError, TdmsFile, TdmsStorageType};
 
@@ -126,12 +128,12 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
                     found.push((title, table));
                     channels.push(channels_of);
                 }
-                Err(problem) => problems.push(format!("group `{title}` was skipped: {problem}")),
+                Err(problem) => problems.push(LogFinding::skipped("group", &title, problem)),
             }
         }
     }
     if empty > 0 {
-        problems.push(format!("{empty} channels were left out: they are empty"));
+        problems.push(LogFinding::left_out(empty, "they are empty"));
     }
     let (layout, parts) =
         join_tables("group", found, problems).map_err(|why| file.content_error(NAME, why))?;
@@ -228,7 +230,7 @@ fn analyse_table(
     };
     if let Some(waveform) = waveform {
         let findings = &mut table.layout.findings;
-        findings.push(format!("clock: a waveform with a value every {} s (time, rate)", waveform.interval_s));
+        findings.push(LogFinding::Waveform { interval_s: waveform.interval_s });
         let start_ns = waveform.start.map(|start| start.ns() as f64 + 1e9 * waveform.start_offset_s);
         table.layout.start_time_ns =
             start_ns.filter(|ns| *ns > 0.0 && *ns < i64::MAX as f64).map(|ns| ns as u64);

@@ -13,7 +13,7 @@ use crate::tables::joined_tables::{Part, join_tables};
 use crate::tables::table_log::{Origin, Table};
 use calamine::{DataRef, DataType, Reader, SheetVisible, Xlsx};
 use mapper_recording::logs::{
-    DateOrder, Layout, Log, LogError, LogFile, LogFormat, LogOptions, ReadSeek, Row, RowSink,
+    DateOrder, Layout, Log, LogError, LogFile, LogFinding, LogFormat, LogOptions, ReadSeek, Row, RowSink,
 };
 
 pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
@@ -135,7 +135,7 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
         None => of_hidden == is_hidden,
     };
     let mut found: Vec<(String, Table, u8)> = Vec::new();
-    let mut problems: Vec<String> = Vec::new();
+    let mut problems: Vec<LogFinding> = Vec::new();
     let hidden: Vec<&str> =
         sheets.iter().filter(|(_, hidden)| *hidden).map(|(name, _)| name.as_str()).collect();
     // A hidden sheet may have obsolete data: it is read only if it is named, or no visible one has a table.
@@ -147,7 +147,7 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
             let Some(cells) = book.cells(file, name) else { continue };
             match head_of(SheetRows::new(cells, b'.'), options)? {
                 Some(Ok((table, decimal))) => found.push((name.clone(), table, decimal)),
-                Some(Err(problem)) => problems.push(format!("sheet `{name}` was skipped: {problem}")),
+                Some(Err(problem)) => problems.push(LogFinding::skipped("sheet", name, problem)),
                 None => {}
             }
         }
@@ -156,15 +156,13 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
         }
         if of_hidden && found.len() > 1 {
             found.clear();
-            problems.push("no visible sheet has a table, and several hidden ones have: name one".to_owned());
+            problems.push(LogFinding::SeveralHidden);
         }
     }
     if let (None, false) = (&options.sheet, hidden.is_empty()) {
         let is_read = found.iter().any(|(name, ..)| hidden.contains(&name.as_str()));
-        problems.push(match is_read {
-            true => format!("hidden: {}; read because no visible sheet has a table", hidden.join(", ")),
-            false => format!("hidden, and read only if named by `sheet`: {}", hidden.join(", ")),
-        });
+        let sheets = hidden.iter().map(|name| (*name).to_owned()).collect();
+        problems.push(LogFinding::HiddenSheets { sheets, is_read });
     }
     let decimals = found.iter().map(|(.., decimal)| *decimal).collect();
     let found = found.into_iter().map(|(name, table, _)| (name, table)).collect();
@@ -231,12 +229,9 @@ fn note_empty_columns(table: &mut Table, head: &[Vec<String>]) {
         head.iter().take(table.data_row()).any(|row| row.get(column).is_some_and(|cell| !cell.is_empty()))
     };
     let names = table.named_columns().filter(|(column, _)| named(*column) && empty(*column));
-    let names: Vec<String> = names.map(|(_, name)| format!("`{name}`")).collect();
-    if !names.is_empty() {
-        table.layout.findings.push(format!(
-            "{} without a value: formulas have values only after a spreadsheet program has calculated and saved them",
-            names.join(", ")
-        ));
+    let columns: Vec<String> = names.map(|(_, name)| name.to_owned()).collect();
+    if !columns.is_empty() {
+        table.layout.findings.push(LogFinding::WithoutValues { columns });
     }
 }
 

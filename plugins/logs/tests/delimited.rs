@@ -110,7 +110,11 @@ fn rows_that_share_a_second_are_spread_over_it() {
         "{:?}",
         &rows[0][..12]
     );
-    assert!(layout.findings.iter().any(|finding| finding.contains("10 rows share")), "{:?}", layout.findings);
+    assert!(
+        layout.findings.iter().any(|finding| finding.to_string().contains("10 rows share")),
+        "{:?}",
+        layout.findings
+    );
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Two hundred headers from names, units, languages and station conventions: what is called sure must be right.
+//! Two hundred headers from names, units, languages and station conventions: what is called sure must have the right column and unit.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
 use mapper_core::Channel::{
@@ -6,7 +6,7 @@ use mapper_core::Channel::{
 };
 use mapper_log_formats::LOG_FORMATS;
 use mapper_recording::logs::proposal::{Certainty, propose};
-use mapper_recording::logs::{LogFile, LogOptions, survey};
+use mapper_recording::logs::{LogFile, LogOptions, header_unit, survey};
 use std::path::Path;
 
 /// What a column holds.
@@ -58,6 +58,9 @@ fn value(holds: Holds, load: f64) -> (Kind, f64) {
     }
 }
 
+/// Ambient pressure of gauge pressures, Pa.
+const AMBIENT_PA: f64 = 98.6e3;
+
 /// Units as a log writes them: name, and the number of an SI value.
 type Unit = (&'static str, fn(f64) -> f64);
 
@@ -72,7 +75,12 @@ const UNITS: [[Unit; 4]; 6] = [
     ],
     [("K", |k| k), ("bar", |pa| pa / 1e5), ("1/min", |n| n), ("kg/h", |m| m * 3600.0)],
     [("°C", |k| k - 273.15), ("mbar", |pa| pa / 100.0), ("krpm", |n| n / 1e3), ("g/s", |m| m * 1e3)],
-    [("degC", |k| k - 273.15), ("kPa(g)", |pa| pa / 1e3 - 98.6), ("U/min", |n| n), ("kg/min", |m| m * 60.0)],
+    [
+        ("degC", |k| k - 273.15),
+        ("kPa(g)", |pa| (pa - AMBIENT_PA) / 1e3),
+        ("U/min", |n| n),
+        ("kg/min", |m| m * 60.0),
+    ],
     [("", |k| k - 273.15), ("", |pa| pa / 1e3), ("", |n| n), ("", |m| m)],
 ];
 
@@ -405,12 +413,22 @@ fn what_is_called_sure_is_right() {
         present += columns.iter().filter(|(_, holds)| matches!(holds, Holds::A(_))).count();
         for proposed in &proposal.channels {
             let (name, holds) = columns[proposed.column];
-            let right = holds == Holds::A(proposed.channel);
+            let unit = header_unit(proposed.unit.unwrap_or_default());
+            let (_, si) = value(holds, 1.0);
+            let read = unit.map_or(f64::NAN, |unit| {
+                unit.unit.to_inside(unit_of(holds).1(si)) + if proposed.gauge { AMBIENT_PA } else { 0.0 }
+            });
+            let right = holds == Holds::A(proposed.channel) && (read / si - 1.0).abs() < 1e-3;
             found += usize::from(right && proposed.certainty > Certainty::Unsure);
             if proposed.certainty == Certainty::Sure {
                 sure += 1;
                 if !right {
-                    wrong.push(format!("{header}: {} taken for {}", title(name, holds), proposed.channel));
+                    wrong.push(format!(
+                        "{header}: {} taken for {} in {:?}",
+                        title(name, holds),
+                        proposed.channel,
+                        proposed.unit
+                    ));
                 }
             }
         }

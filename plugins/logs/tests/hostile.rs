@@ -3,7 +3,7 @@
 
 use mapper_log_formats::LOG_FORMATS;
 use mapper_recording::logs::proposal::{channel_map_text, propose};
-use mapper_recording::logs::{LogFile, LogOptions, survey};
+use mapper_recording::logs::{LogFile, LogFinding, LogOptions, survey};
 use proptest::prelude::*;
 use std::io::Write;
 use std::path::Path;
@@ -358,7 +358,7 @@ fn a_hidden_sheet_is_read_only_if_it_is_named() {
     let file = LogFile::from_bytes(Path::new("log.xlsx"), &workbook(&with_hidden));
     let first = |options: &LogOptions| {
         let (_, mut log) = LOG_FORMATS.open(&file, options).unwrap();
-        let (mut values, findings) = (Vec::new(), log.layout().findings.join("; "));
+        let (mut values, findings) = (Vec::new(), log.layout().findings.clone());
         log.rows(&[0], &mut |row| {
             values.push(row.values[0]);
             Ok(())
@@ -368,7 +368,8 @@ fn a_hidden_sheet_is_read_only_if_it_is_named() {
     };
     let (value, rows, findings) = first(&LogOptions::default());
     assert_eq!((value, rows), (2.5, 38));
-    assert!(findings.contains("Old"), "{findings}");
+    let hidden = |is_read: bool| LogFinding::HiddenSheets { sheets: vec!["Old".to_owned()], is_read };
+    assert!(findings.contains(&hidden(false)), "{findings:?}");
     let (value, ..) = first(&LogOptions { sheet: Some("Old".to_owned()), ..LogOptions::default() });
     assert_eq!(value, 2.25);
     // If no visible sheet has a table, the hidden one is the log.
@@ -377,7 +378,7 @@ fn a_hidden_sheet_is_read_only_if_it_is_named() {
         first_sheet.1.split("<sheetData>").next().unwrap().to_owned() + "<sheetData/></worksheet>";
     let file = LogFile::from_bytes(Path::new("log.xlsx"), &workbook(&with_hidden));
     let (_, log) = LOG_FORMATS.open(&file, &LogOptions::default()).unwrap();
-    assert!(log.layout().findings.join("; ").contains("Old"));
+    assert!(log.layout().findings.contains(&hidden(true)));
 }
 
 /// MATLAB data of level 5: vectors in a structure, and by themselves.

@@ -109,6 +109,18 @@ fn a_flow_keeps_its_unit() {
     assert_eq!((flow.unit, flow.certainty), (Some("kg/s"), Certainty::Likely));
 }
 
+/// The station may stand behind total or static, and a volume flow is named by its unit alone.
+#[test]
+fn totals_with_a_station_and_volume_flows_are_understood() {
+    let found = proposal("Tstat2 [K],Ttot2 [K],p_tot_1 [kPa],Q [Nm3/min]", |load| {
+        vec![297.0 + 100.0 * load, 300.0 + 100.0 * load, 98.0, 1.0 + 5.0 * load]
+    });
+    let column = |channel: Channel| found.entry(channel).map(|found| found.column);
+    assert_eq!([Channel::T2, Channel::P1].map(column), [Some(1), Some(2)]);
+    let named = |remark: &ProposalRemark| matches!(remark, ProposalRemark::StandardFlow { column, .. } if column == "Q");
+    assert!(found.remarks.iter().any(named), "{:?}", found.remarks);
+}
+
 /// `T_c` is the gas if it is hotter than an ideal compression makes it, and cannot be if it is cooler.
 #[test]
 fn a_temperature_without_a_place_is_judged_by_the_pressure() {
@@ -176,7 +188,8 @@ fn imperial_logs_have_imperial_temperatures() {
     }
 }
 
-/// A tag number has the quantity and no place: speed and flow are likely, the others are named with the remedy.
+/// A tag number has the quantity and no place. Loops with a temperature and a pressure are placed if only one order is a compressor;
+/// else they are named with the remedy.
 #[test]
 fn tag_numbers_are_never_sure() {
     let row = |load: f64| {
@@ -190,10 +203,43 @@ fn tag_numbers_are_never_sure() {
         let likely = |channel: Channel| found.entry(channel).map(|found| (found.column, found.certainty));
         assert_eq!(likely(Channel::ShaftSpeed), Some((0, Certainty::Likely)), "{names}");
         assert_eq!(likely(Channel::CompressorFlow), Some((1, Certainty::Likely)), "{names}");
+        let places = [Channel::P1, Channel::T1, Channel::P2, Channel::T2];
+        assert_eq!(
+            places.map(likely),
+            [2, 3, 4, 5].map(|column| Some((column, Certainty::Likely))),
+            "{names}"
+        );
+        // A rise of 15 K at 2.3 bar would be an efficiency of 5.
+        let found = proposal(names, |load| {
+            let mut row = row(load);
+            row[5] = 22.0 + 15.0 * load;
+            row
+        });
         assert_eq!(found.channels.len(), 2, "{names}");
         let named = |remark: &ProposalRemark| matches!(remark, ProposalRemark::TagNumbers { columns } if columns.len() == 4);
         assert!(found.remarks.iter().any(named), "{names}");
     }
+    // Compressor, turbine and oil in any order of the numbers.
+    let names = "TI1104 [degC],PI1104 [kPa],TI1101 [degC],PI1101 [bar g],TI1150 [degC],PI1150 [kPa],TI1103 [degC],PI1103 [kPa],TI1102 [degC],PI1102 [kPa]";
+    let found = proposal(names, |load| {
+        let (t2_degc, p2_kpa) = (22.0 + 110.0 * load, 98.0 + 130.0 * load);
+        let (t3_degc, p3_kpa) = (500.0 + 100.0 * load, 100.0 + 115.0 * load);
+        let t4_degc = t3_degc - 80.0 * load;
+        vec![t4_degc, 99.0, 22.0, -0.033, 75.0, 300.0, t3_degc, p3_kpa, t2_degc, p2_kpa]
+    });
+    let column = |channel: Channel| found.entry(channel).map(|found| found.column);
+    let places = [
+        Channel::T1,
+        Channel::P1,
+        Channel::T2,
+        Channel::P2,
+        Channel::T3,
+        Channel::P3,
+        Channel::T4,
+        Channel::P4,
+    ];
+    assert_eq!(places.map(column), [2, 3, 8, 9, 6, 7, 0, 1].map(Some));
+    assert_eq!(sure(&found), []);
     // A total pressure and temperature with their usual numbers are not tags.
     let found = proposal("PT1 [kPa],PT2 [kPa],TT1 [degC],TT2 [degC]", |load| row(load)[2..].to_vec());
     assert_eq!(found.remarks.iter().filter(|remark| remark.code() == "tag_numbers").count(), 0);

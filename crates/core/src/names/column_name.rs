@@ -2,7 +2,7 @@
 
 use super::measured::Measured;
 use super::name_parts::{Token, parts_of};
-use super::tag::split_tag;
+use super::tag::{Tag, split_tag};
 use super::words::Word;
 
 /// A place of a turbocharger.
@@ -43,7 +43,7 @@ pub enum Clarity {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ColumnName {
     tokens: Vec<Token>,
-    tag: Option<Measured>,
+    tag: Option<Tag>,
 }
 
 /// Maximum number of letters of a name that are evaluated.
@@ -65,6 +65,11 @@ impl ColumnName {
     /// Whether the name is a tag number of a piping diagram, which has the quantity and no place.
     pub fn is_tag(&self) -> bool {
         self.tag.is_some()
+    }
+
+    /// The quantity of a tag number, and the number of its loop.
+    pub fn tag(&self) -> Option<(Measured, u32)> {
+        self.tag.map(|tag| (tag.measured, tag.number))
     }
 
     /// Whether every part of it is known.
@@ -123,7 +128,9 @@ impl ColumnName {
         }
         // In `T_C_n_Verd` the quantity comes first, in `Compressor T out` after the machine.
         let in_front = self.tokens.first().and_then(|token| token.letter());
-        in_front.or(self.tag).or_else(|| self.tokens.get(self.letter_behind_machine()?)?.letter())
+        in_front
+            .or(self.tag.map(|tag| tag.measured))
+            .or_else(|| self.tokens.get(self.letter_behind_machine()?)?.letter())
     }
 
     /// Station numbers after pressures: `p2/p1` has two.
@@ -305,7 +312,11 @@ impl ColumnName {
         };
         self.tokens.iter().enumerate().find_map(|(at, token)| {
             let Token::Number(number) = token else { return None };
-            let before = at.checked_sub(1)?;
+            let mut before = at.checked_sub(1)?;
+            // `T_tot_1`, `pstat2`.
+            if quantity.is_some_and(|quantity| quantity + 1 == before) && is_total(before) {
+                before -= 1;
+            }
             let clarity = match self.tokens.get(before)? {
                 _ if quantity == Some(before) && (is_letter(before) || is_total(before)) => Clarity::Clear,
                 _ if quantity == Some(before) => Clarity::Vague,

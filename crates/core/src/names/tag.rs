@@ -5,8 +5,16 @@ use super::measured::Measured;
 /// Tags with another meaning if their number is short: `PT2` is the total pressure at station 2, `TIT 1` a turbine inlet temperature.
 const LONG_NUMBERS: [&str; 6] = ["tt", "pt", "pi", "pit", "tit", "st"];
 
-/// The quantity of a tag number at the start of a name, and the rest of the name.
-pub(super) fn split_tag(name: &str) -> Option<(Measured, &str)> {
+/// A tag number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Tag {
+    pub(super) measured: Measured,
+    /// The number of its loop.
+    pub(super) number: u32,
+}
+
+/// The tag number at the start of a name, and the rest of the name.
+pub(super) fn split_tag(name: &str) -> Option<(Tag, &str)> {
     let letters = name.find(|c: char| !c.is_ascii_alphabetic())?;
     let (code, rest) = name.split_at(letters);
     let code = code.to_ascii_lowercase();
@@ -30,5 +38,6 @@ pub(super) fn split_tag(name: &str) -> Option<(Measured, &str)> {
     let suffix = number[digits..].trim_start_matches(|c: char| c.is_ascii_uppercase());
     let ends = suffix.is_empty() || suffix.starts_with(|c: char| !c.is_alphanumeric());
     let least = if LONG_NUMBERS.contains(&code.as_str()) { 3 } else { 1 };
-    (ends && (least..=5).contains(&digits)).then_some((measured, suffix))
+    let loop_number = number[..digits].parse().ok()?;
+    (ends && (least..=5).contains(&digits)).then_some((Tag { measured, number: loop_number }, suffix))
 }

@@ -1,5 +1,6 @@
 //! Groups and columns of a log, as its reader detected them.
 
+use crate::logs::LogFinding;
 use serde::Serialize;
 
 /// Groups and columns of a log.
@@ -9,8 +10,8 @@ pub struct Layout {
     pub groups: Vec<Group>,
     /// Columns without the clocks, in the order of the file.
     pub columns: Vec<Column>,
-    /// Detected properties, one sentence each, with the option that overrides it.
-    pub findings: Vec<String>,
+    /// Detected properties.
+    pub findings: Vec<LogFinding>,
     /// Time 0 of all groups in nanoseconds since 1970-01-01 in the log's time zone; `None` if the log has no dates.
     pub start_time_ns: Option<u64>,
 }
@@ -41,9 +42,9 @@ pub struct Column {
 
 impl Layout {
     /// Adds a finding unless it is there already.
-    pub fn add_finding(&mut self, finding: Option<&str>) {
-        let known = |finding: &&str| self.findings.iter().any(|other| other == finding);
-        self.findings.extend(finding.filter(|finding| !known(finding)).map(str::to_owned));
+    pub fn add_finding(&mut self, finding: Option<LogFinding>) {
+        let is_new = |finding: &LogFinding| !self.findings.contains(finding);
+        self.findings.extend(finding.filter(is_new));
     }
 
     /// Columns of that name, or with that header as a whole, in a group of that name (any if `topic` is empty).

@@ -1,4 +1,4 @@
-//! Compresses a long series to a bounded number of means.
+//! Compresses a long series to a bounded number of means, and draws a series in one line of text.
 
 /// Maximum number of means; a power of two.
 const MAX_BINS: usize = 512;
@@ -46,6 +46,34 @@ impl Trace {
     }
 }
 
+/// Eighths of a line's height.
+const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+
+/// A sparkline of at most `width` characters from the minimum to the maximum of `values`; each character shows the mean of its share of
+/// them, a blank if it has none.
+pub fn sparkline(values: &[f64], width: usize) -> String {
+    let finite = || values.iter().copied().filter(|value| value.is_finite());
+    let low = finite().fold(f64::INFINITY, f64::min);
+    let high = finite().fold(f64::NEG_INFINITY, f64::max);
+    let width = width.min(values.len());
+    let share = |index: usize| {
+        let part =
+            values.get(index * values.len() / width..(index + 1) * values.len() / width).unwrap_or_default();
+        let (mut sum, mut count) = (0.0, 0.0);
+        for value in part.iter().filter(|value| value.is_finite()) {
+            sum += value;
+            count += 1.0;
+        }
+        sum / count
+    };
+    let bar = |value: f64| match value {
+        value if !value.is_finite() => ' ',
+        _ if high <= low => BARS[3],
+        value => BARS[((8.0 * (value - low) / (high - low)) as usize).min(7)],
+    };
+    (0..width).map(|index| bar(share(index))).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -59,5 +87,14 @@ mod tests {
         assert!(means.is_sorted());
         let whole: f64 = means.iter().take(means.len() - 1).sum::<f64>() / (means.len() - 1) as f64;
         assert!((whole / 50_000.0 - 1.0).abs() < 0.02, "{whole}");
+    }
+
+    #[test]
+    fn a_ramp_rises_a_constant_is_level_and_a_gap_is_blank() {
+        let ramp: Vec<f64> = (0..16).map(f64::from).collect();
+        assert_eq!(sparkline(&ramp, 8), "▁▂▃▄▅▆▇█");
+        assert_eq!(sparkline(&[2.0; 5], 3), "▄▄▄");
+        assert_eq!(sparkline(&[0.0, f64::NAN, 1.0], 3), "▁ █");
+        assert_eq!(sparkline(&[], 8), "");
     }
 }

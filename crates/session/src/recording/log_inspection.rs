@@ -72,7 +72,7 @@ impl LogInspection {
                 "max": data.max,
             })
         });
-        json!({
+        with_messages(json!({
             "log": self.path,
             "format": self.format,
             "findings": self.layout.findings,
@@ -84,9 +84,9 @@ impl LogInspection {
                 value
             }).collect::<Vec<_>>(),
             "columns": columns.collect::<Vec<_>>(),
-            "proposal": with_messages(json!(self.proposal)),
+            "proposal": self.proposal,
             "channel_map": self.channel_map(),
-        })
+        }))
     }
 
     /// The proposal as text of a channel map.

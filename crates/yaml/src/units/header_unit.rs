@@ -132,6 +132,7 @@ const PRESSURES: &[(&str, &str)] = &[
     ("mpa", "MPa"),
     ("bar", "bar"),
     ("atm", "atm"),
+    ("at", "kgf/cm2"),
     ("psi", "psia"),
     ("lbf/in2", "psia"),
     ("lbf/in^2", "psia"),
@@ -163,7 +164,13 @@ const PRESSURES: &[(&str, &str)] = &[
 /// Units of volume flow, lower case without blanks, and their value in m3/s; `None` for a volume at standard conditions, which the
 /// unit does not define.
 const VOLUME_FLOWS: &[(Option<f64>, &[&str])] = &[
-    (None, &["scfm", "sft3/min", "std.cfm", "stdcfm", "slpm", "sl/min", "nl/min", "nlpm", "slm"]),
+    (
+        None,
+        &[
+            "scfm", "sft3/min", "std.cfm", "stdcfm", "slpm", "sl/min", "nl/min", "nlpm", "slm", "nm3/min",
+            "nm³/min", "sm3/min", "sm³/min",
+        ],
+    ),
     (Some(1.0), &["m3/s", "m³/s", "m^3/s", "cbm/s"]),
     (Some(1.0 / 60.0), &["m3/min", "m³/min", "m^3/min"]),
     (Some(1.0 / 3600.0), &["m3/h", "m³/h", "m^3/h", "m3/hr"]),

@@ -2,7 +2,7 @@
 
 use crate::notation::instant::NS_PER_DAY;
 use crate::notation::table_row::Cells;
-use mapper_recording::logs::DateOrder;
+use mapper_recording::logs::{DateOrder, LogFinding};
 
 /// The source of a group's time.
 #[derive(Debug, Clone, PartialEq)]
@@ -98,11 +98,8 @@ impl ClockHand {
     }
 
     /// A remark if local time went back at the end of daylight saving.
-    pub(crate) fn remark(&self) -> Option<&'static str> {
-        self.hour_back.then_some(
-            "clock: a date goes back by an hour, as at the end of daylight saving; the rows after it are taken as an hour later \
-             (name a clock without daylight saving by `time` if that is wrong)",
-        )
+    pub(crate) fn remark(&self) -> Option<LogFinding> {
+        self.hour_back.then_some(LogFinding::HourBack)
     }
 
     /// The row's time, s; `None` if the group has no sample in it.

@@ -4,9 +4,9 @@ use crate::columns::clock::{Clock, GroupClock, NS_PER_HOUR, Spread, restart_offs
 use crate::columns::counter::{count_unit_s, describe_unit, is_clock_name};
 use crate::columns::sample::{Sample, SampleRow, cells};
 use crate::columns::table_head::HeadColumn;
-use crate::notation::instant::{NS_PER_DAY, guess_order, minutes_and_seconds, parse_instant};
+use crate::notation::instant::{Instant, NS_PER_DAY, guess_order, minutes_and_seconds, parse_instant};
 use crate::notation::number::parse_number;
-use mapper_recording::logs::{DateOrder, Group, LogOptions};
+use mapper_recording::logs::{DateOrder, Group, LogFinding, LogOptions};
 
 /// The clocks of a table.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -14,7 +14,7 @@ pub(crate) struct Clocks {
     pub(crate) groups: Vec<(Group, GroupClock)>,
     /// Group of each column; `None` for clocks.
     pub(crate) group_of: Vec<Option<usize>>,
-    pub(crate) findings: Vec<String>,
+    pub(crate) findings: Vec<LogFinding>,
     /// Time 0 in nanoseconds since 1970, if there is a date.
     pub(crate) start_time_ns: Option<u64>,
 }
@@ -113,7 +113,7 @@ pub(crate) fn choose(sample: &Sample<'_>, options: &LogOptions) -> Result<Clocks
     let mut clocks = Clocks { group_of: vec![Some(0); sample.columns.len()], ..Clocks::default() };
     let candidates = match (options.time.as_slice(), options.rate_hz) {
         ([], Some(rate_hz)) => {
-            clocks.findings.push(format!("clock: none, {rate_hz} samples a second as given (rate)"));
+            clocks.findings.push(LogFinding::Rate { rate_hz });
             let clock = Clock::Rate { interval_s: 1.0 / rate_hz };
             clocks.groups.push((
                 Group::default(),
@@ -180,18 +180,9 @@ pub(crate) fn choose(sample: &Sample<'_>, options: &LogOptions) -> Result<Clocks
         if disordered {
             words.push_str(", rows are out of order and were sorted by it");
         }
-        let others: Vec<String> = group
-            .iter()
-            .filter(|other| other.at != candidate.at)
-            .map(|other| format!("`{}`", name_of(other)))
-            .collect();
-        let others = if others.is_empty() {
-            String::new()
-        } else {
-            format!("; also present: {}", others.join(" and "))
-        };
-        let of = if groups.len() == 1 { "clock".to_owned() } else { format!("clock of group `{name}`") };
-        clocks.findings.push(format!("{of}: {words}{others} (time, time_unit)"));
+        let others = group.iter().filter(|other| other.at != candidate.at);
+        let others = others.map(|other| name_of(other)).collect();
+        clocks.findings.push(LogFinding::Clock { group: name.clone(), clock: words.clone(), others });
         let zero_ns = (zero_s * 1e9).round();
         let clock = GroupClock {
             clock: candidate.clock.clone(),
@@ -209,7 +200,7 @@ pub(crate) fn choose(sample: &Sample<'_>, options: &LogOptions) -> Result<Clocks
         }
     }
     if mixed {
-        clocks.findings.push("the clocks count from different epochs: each group begins at 0 s".to_owned());
+        clocks.findings.push(LogFinding::DifferentEpochs);
     }
     if let (Some(dated), Some((_, first))) = (dated, clocks.groups.first()) {
         let start_s = dated.first_s()
@@ -333,7 +324,11 @@ fn named_clock(names: &[String], sample: &Sample<'_>, options: &LogOptions) -> R
     Ok(made)
 }
 
-fn find_candidates(sample: &Sample<'_>, options: &LogOptions, findings: &mut Vec<String>) -> Vec<Candidate> {
+fn find_candidates(
+    sample: &Sample<'_>,
+    options: &LogOptions,
+    findings: &mut Vec<LogFinding>,
+) -> Vec<Candidate> {
     let mut candidates: Vec<Candidate> = Vec::new();
     let mut dates: Vec<usize> = Vec::new();
     for (at, column) in sample.columns.iter().enumerate() {
@@ -342,10 +337,7 @@ fn find_candidates(sample: &Sample<'_>, options: &LogOptions, findings: &mut Vec
         if share(at, sample, order) > 0.8 {
             let (has_date, has_time) = date_and_time_in(at, sample, order);
             if has_date && !sure && options.date_order.is_none() {
-                findings.push(format!(
-                    "date: `{}` is ambiguous; the month is assumed to be first (date_order)",
-                    column.name
-                ));
+                findings.push(LogFinding::AmbiguousDate { column: column.name.clone() });
             }
             if !has_time {
                 dates.push(at);
@@ -381,7 +373,10 @@ fn share(column: usize, sample: &Sample<'_>, order: DateOrder) -> f64 {
     let (mut instants, mut all) = (0.0, 0.0);
     for cell in cells(column, sample) {
         all += 1.0;
-        if parse_instant(cell, order).is_some() && parse_number(cell.as_bytes(), sample.decimal).is_none() {
+        // Of numbers, only a date with its time counts: `20261122140305`.
+        let is_whole = |instant: Instant| instant.day.is_some() && instant.ns_of_day.is_some();
+        let is_number = || parse_number(cell.as_bytes(), sample.decimal).is_some();
+        if parse_instant(cell, order).is_some_and(|instant| is_whole(instant) || !is_number()) {
             instants += 1.0;
         }
     }

@@ -55,7 +55,7 @@ pub(crate) fn is_clock_name(column: &HeadColumn) -> bool {
     let named = NAMES.contains(&name.as_str())
         || name.contains("time")
         || name.contains("zeit")
-        || name.starts_with("elapsed");
+        || ["elapsed", "epoch", "unix"].iter().any(|start| name.starts_with(start));
     duration || named && column.unit.is_none()
 }
 

@@ -3,7 +3,7 @@
 use crate::notation::instant::parse_instant;
 use crate::notation::number::{is_missing, number_with_unit, read_number};
 use crate::notation::separator::typical_length;
-use mapper_recording::logs::{DateOrder, LogOptions, header_unit, split_unit};
+use mapper_recording::logs::{DateOrder, LogFinding, LogOptions, header_unit, split_unit};
 use std::collections::BTreeMap;
 
 pub(crate) const MAX_COLUMNS: usize = 10_000;
@@ -15,9 +15,8 @@ pub(crate) struct TableHead {
     pub(crate) data_row: usize,
     /// Unit after each number of a column, if the cells have one.
     pub(crate) cell_units: BTreeMap<usize, String>,
-    /// Description of the rows of the head.
-    pub(crate) head: String,
-    pub(crate) findings: Vec<String>,
+    /// The rows of the head, and further findings.
+    pub(crate) findings: Vec<LogFinding>,
 }
 
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -53,13 +52,7 @@ pub(crate) fn analyse_head(
     let named = header.iter().any(|row| Some(*row) != units_row && has_words(&rows[*row]));
     let others =
         || header.iter().copied().filter(|row| Some(*row) != units_row && (!named || has_words(&rows[*row])));
-    let filled = |row: &usize| distinct(rows.get(*row));
-    // The first of the rows with the most names; later ones have long names.
-    let most = others().map(|row| filled(&row)).max().unwrap_or(0);
-    let names_row = options
-        .names_row
-        .map(|row| row - 1)
-        .or_else(|| others().find(|row| 10 * filled(row) >= 8 * most && most > 0));
+    let names_row = options.names_row.map(|row| row - 1).or_else(|| names_row(rows, others().collect()));
     let width = rows.get(data_row..).unwrap_or_default().iter().map(Vec::len).max().unwrap_or(0).max(length);
     if width > MAX_COLUMNS {
         return Err(format!("it has {width} columns; at most {MAX_COLUMNS} are read"));
@@ -102,8 +95,10 @@ pub(crate) fn analyse_head(
             name = format!("column {}", column + 1);
         }
         // The group distinguishes columns with the same name.
-        let group = group_row.map_or("", |row| label(rows, row, column));
-        if !group.is_empty() && names.iter().filter(|other| **other == name).count() > 1 {
+        let is_repeated = names.iter().filter(|other| **other == name).count() > 1;
+        let above = group_row.or(labels.first().copied().filter(|row| Some(*row) < names_row));
+        let group = above.map_or("", |row| label(rows, row, column, is_repeated));
+        if !group.is_empty() && is_repeated {
             name = format!("{group} {name}");
         }
         let count = seen.entry(name.clone()).or_default();
@@ -115,7 +110,7 @@ pub(crate) fn analyse_head(
         let listed = listed_name(preamble, &header);
         let description: Vec<&str> = labels
             .iter()
-            .map(|row| label(rows, *row, column))
+            .map(|row| label(rows, *row, column, is_repeated))
             .chain(listed)
             .filter(|text| !text.is_empty())
             .collect();
@@ -133,9 +128,8 @@ pub(crate) fn analyse_head(
     }
     let found =
         HeadRows { names_row, units_row, distant_units, group_row, header: &header, data_row, repeated };
-    let head = describe_head(&found, &columns);
     let findings = findings(&found, &columns, cell_units.len());
-    Ok(TableHead { columns, data_row, cell_units, head, findings })
+    Ok(TableHead { columns, data_row, cell_units, findings })
 }
 
 struct HeadRows<'a> {
@@ -150,35 +144,27 @@ struct HeadRows<'a> {
     repeated: usize,
 }
 
-fn describe_head(found: &HeadRows<'_>, columns: &[HeadColumn]) -> String {
-    let row_number = |row: Option<usize>| row.map_or("none".to_owned(), |row| (row + 1).to_string());
-    let in_names = found.units_row.is_none() && columns.iter().any(|column| column.unit.is_some());
-    let units = if in_names { "in the names".to_owned() } else { row_number(found.units_row) };
-    format!(
-        "header: names in row {}, units {}{}, data from row {} (names_row, units_row, data_row)",
-        row_number(found.names_row),
-        if found.units_row.is_some() { "in row " } else { "" },
-        units,
-        found.data_row + 1
-    )
-}
-
-/// Further findings about the head.
-fn findings(found: &HeadRows<'_>, columns: &[HeadColumn], cell_units: usize) -> Vec<String> {
-    let mut findings = Vec::new();
-    if let Some(row) = found.distant_units.filter(|_| columns.iter().any(|column| column.unit.is_some())) {
-        findings.push(format!("units of columns without one are in row {}", row + 1));
+/// The rows of the head, and further findings about it.
+fn findings(found: &HeadRows<'_>, columns: &[HeadColumn], cell_units: usize) -> Vec<LogFinding> {
+    let has_units = columns.iter().any(|column| column.unit.is_some());
+    let mut findings = vec![LogFinding::Header {
+        names_row: found.names_row.map(|row| row + 1),
+        units_row: found.units_row.map(|row| row + 1),
+        units_in_names: found.units_row.is_none() && has_units,
+        data_row: found.data_row + 1,
+    }];
+    if let Some(row) = found.distant_units.filter(|_| has_units) {
+        findings.push(LogFinding::DistantUnits { row: row + 1 });
     }
     if cell_units > 0 {
-        findings.push(format!("{} columns have their unit after each number", cell_units));
+        findings.push(LogFinding::UnitsInCells { columns: cell_units });
     }
     let before = found.group_row.or(found.header.first().copied()).unwrap_or(found.data_row);
     if before > 0 {
-        findings.push(format!("{before} rows before the header were skipped"));
+        findings.push(LogFinding::SkippedRows { rows: before });
     }
     if found.repeated > 0 {
-        findings
-            .push(format!("{} names are repeated; the later ones are numbered: `name (2)`", found.repeated));
+        findings.push(LogFinding::RepeatedNames { names: found.repeated });
     }
     findings
 }
@@ -248,15 +234,26 @@ fn unit_in_cells(rows: &[Vec<String>], column: usize, decimal: u8) -> Option<Str
     unit.filter(|_| 2 * with > all).map(str::to_owned)
 }
 
-/// Cells of a row of labels; a row of groups names only the first column of each.
-fn label(rows: &[Vec<String>], row: usize, column: usize) -> &str {
+/// Cells of a row of labels; a row of groups, which is sparse or above repeated names, names only the first column of each.
+fn label(rows: &[Vec<String>], row: usize, column: usize, is_repeated: bool) -> &str {
     let Some(cells) = rows.get(row) else { return "" };
     let sparse = 2 * cells.iter().filter(|cell| !cell.is_empty()).count() < cells.len();
     let own = cells.get(column).map_or("", String::as_str);
-    if !own.is_empty() || !sparse {
+    if !own.is_empty() || !(sparse || is_repeated) {
         return own;
     }
     cells.get(..column).unwrap_or_default().iter().rfind(|cell| !cell.is_empty()).map_or("", String::as_str)
+}
+
+/// The first of the full rows with the most names: later ones have long names, and merged cells above leave blanks.
+fn names_row(rows: &[Vec<String>], mut candidates: Vec<usize>) -> Option<usize> {
+    let filled =
+        |row: &usize| rows.get(*row).map_or(0, |row| row.iter().filter(|cell| !cell.is_empty()).count());
+    let names = |row: &usize| distinct(rows.get(*row));
+    let longest = candidates.iter().map(filled).max()?;
+    candidates.retain(|row| 10 * filled(row) >= 8 * longest);
+    let most = candidates.iter().map(names).max().filter(|most| *most > 0)?;
+    candidates.into_iter().find(|row| 10 * names(row) >= 8 * most)
 }
 
 fn distinct(row: Option<&Vec<String>>) -> usize {

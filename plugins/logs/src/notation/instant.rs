@@ -43,7 +43,8 @@ pub(crate) fn parse_instant(text: &str, order: DateOrder) -> Option<Instant> {
     }
     // `2025年11月18日 09:30:00`
     if let Some((first, rest)) = text.split_once('日').filter(|_| text.contains('年')) {
-        let text = format!("{} {}", first.replace(['年', '月'], "-"), rest.trim_start());
+        let time = rest.trim().replace(['时', '時', '分'], ":").replace('秒', "");
+        let text = format!("{} {time}", first.replace(['年', '月'], "-"));
         return parse_instant(&text, DateOrder::YearFirst);
     }
     if let Some(instant) = named_month(text) {
@@ -52,7 +53,7 @@ pub(crate) fn parse_instant(text: &str, order: DateOrder) -> Option<Instant> {
     if !text.starts_with(|c: char| c.is_ascii_digit()) || !text.is_ascii() {
         return None;
     }
-    if let Some(instant) = day_of_year(text).or_else(|| days_and_time(text)) {
+    if let Some(instant) = day_of_year(text).or_else(|| days_and_time(text)).or_else(|| compact(text)) {
         return Some(instant);
     }
     let Some(end_of_first) = text.find([' ', 'T', '_']) else {
@@ -153,6 +154,18 @@ fn day_of_year(text: &str) -> Option<Instant> {
         // Without a year it is a count of days, not a date.
         None => Instant { day: None, ns_of_day: Some(day * NS_PER_DAY + ns_of_day) },
     })
+}
+
+/// `20261122140305` or `20261122140305.25`: date and time of day without separators.
+fn compact(text: &str) -> Option<Instant> {
+    let (digits, fraction) = text.split_once('.').unwrap_or((text, "0"));
+    if digits.len() != 14 || !digits.bytes().all(|byte| byte.is_ascii_digit()) {
+        return None;
+    }
+    let part = |from: usize, to: usize| digits.get(from..to)?.parse::<i64>().ok();
+    let day = civil_day(part(0, 4)?, part(4, 6)?, part(6, 8)?)?;
+    let time = format!("{}:{}:{}.{fraction}", &digits[8..10], &digits[10..12], &digits[12..]);
+    Some(Instant { day: Some(day), ns_of_day: Some(time_of_day(&time)?) })
 }
 
 /// `0 days 00:00:10.5`, as Python writes durations.
@@ -308,6 +321,8 @@ mod tests {
             ("2026-326T14:03:05.25", DateOrder::DayFirst),
             ("2026:326:14:03:05.25", DateOrder::DayFirst),
             ("2026年11月22日 14:03:05.25", DateOrder::DayFirst),
+            ("2026年11月22日 14时03分05.25秒", DateOrder::DayFirst),
+            ("20261122140305.25", DateOrder::DayFirst),
         ] {
             assert_eq!(parse_instant(text, order).map(Instant::ns), Some(expected), "{text}");
         }
@@ -331,6 +346,7 @@ mod tests {
             "400:10:20:30",
             "Speed 1 2026",
             "5 days",
+            "20261322140305",
             "",
         ] {
             assert_eq!(parse_instant(text, DateOrder::DayFirst), None, "{text}");

@@ -4,7 +4,7 @@ use crate::columns::sample::HEAD_ROWS;
 use crate::tables::column_rows::{Chunk, Chunks, ColumnRows};
 use crate::tables::joined_tables::{Part, join_tables};
 use crate::tables::table_log::{Origin, Table};
-use mapper_recording::logs::{Layout, Log, LogError, LogFile, LogOptions, Row, RowSink};
+use mapper_recording::logs::{Layout, Log, LogError, LogFile, LogFinding, LogOptions, Row, RowSink};
 
 /// Columns of equal length.
 pub(crate) struct ColumnTable {
@@ -38,7 +38,7 @@ pub(crate) fn column_log(
     file: &LogFile,
     (name, word): (&'static str, &str),
     tables: Vec<ColumnTable>,
-    mut problems: Vec<String>,
+    mut problems: Vec<LogFinding>,
     options: &LogOptions,
 ) -> Result<Box<dyn Log>, LogError> {
     let (mut found, mut kept) = (Vec::new(), Vec::new());
@@ -51,7 +51,7 @@ pub(crate) fn column_log(
                 found.push((table.title.clone(), looked));
                 kept.push(table);
             }
-            Err(problem) => problems.push(format!("{word} `{}` was skipped: {problem}", table.title)),
+            Err(problem) => problems.push(LogFinding::skipped(word, &table.title, problem)),
         }
     }
     let (layout, parts) = join_tables(word, found, problems).map_err(|why| file.content_error(name, why))?;

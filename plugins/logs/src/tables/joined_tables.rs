@@ -1,7 +1,7 @@
 //! Joins several tables of one file to one log: sheets of a workbook, groups of a measurement.
 
 use crate::tables::table_log::Table;
-use mapper_recording::logs::{Layout, LogError, Row, RowSink};
+use mapper_recording::logs::{Layout, LogError, LogFinding, Row, RowSink};
 
 /// A table of the file.
 #[derive(Debug)]
@@ -35,11 +35,15 @@ impl Part {
 pub(crate) fn join_tables(
     word: &str,
     found: Vec<(String, Table)>,
-    problems: Vec<String>,
+    problems: Vec<LogFinding>,
 ) -> Result<(Layout, Vec<Part>), String> {
     if found.is_empty() {
-        let why = if problems.is_empty() { format!("no {word} holds anything") } else { problems.join("; ") };
-        return Err(why);
+        let problems: Vec<String> = problems.iter().map(LogFinding::to_string).collect();
+        return Err(if problems.is_empty() {
+            format!("no {word} holds anything")
+        } else {
+            problems.join("; ")
+        });
     }
     let several = found.len() > 1;
     let mut layout = Layout::default();
@@ -62,7 +66,11 @@ pub(crate) fn join_tables(
             column
         }));
         let findings = table.layout.findings.drain(..);
-        layout.findings.extend(findings.map(|finding| format!("{word} `{name}`: {finding}")));
+        layout.findings.extend(findings.map(|finding| LogFinding::InTable {
+            part: word.to_owned(),
+            name: name.clone(),
+            finding: Box::new(finding),
+        }));
         // If one table has no date, all are assumed to start together.
         let start = starts.as_ref().and_then(|starts| starts.get(index)).copied();
         let later_s = start.zip(layout.start_time_ns).map_or(0.0, |(own, first)| (own - first) as f64 / 1e9);

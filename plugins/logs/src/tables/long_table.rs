@@ -5,7 +5,7 @@ use crate::notation::number::{is_missing, number_in, read_number};
 use crate::notation::table_row::{Cells, Rows};
 use crate::tables::row_stream::RowStream;
 use crate::tables::table_log::Table;
-use mapper_recording::logs::{DateOrder, LogError, header_unit};
+use mapper_recording::logs::{DateOrder, LogError, LogFinding, header_unit};
 use std::collections::BTreeSet;
 
 const MAX_NAMES: usize = 1000;
@@ -82,18 +82,11 @@ impl LongForm {
         Some(LongForm { clock, name, value, data_row, header: heads, names })
     }
 
-    /// Describes the form, for the findings.
-    pub(crate) fn words(&self, rows: &[Vec<String>]) -> String {
-        let cell = |at: usize| {
-            let header = self.data_row.checked_sub(1).and_then(|row| rows.get(row));
-            header.and_then(|row| row.get(at)).map_or("", String::as_str)
-        };
-        format!(
-            "long form: `{}` names the quantity of a row and `{}` is its value; {} quantities are in the first rows, and later ones are not read",
-            cell(self.name),
-            cell(self.value),
-            self.names.len()
-        )
+    /// Describes the form.
+    pub(crate) fn finding(&self, rows: &[Vec<String>]) -> LogFinding {
+        let header = self.data_row.checked_sub(1).and_then(|row| rows.get(row));
+        let cell = |at: usize| header.and_then(|row| row.get(at)).cloned().unwrap_or_default();
+        LogFinding::LongForm { name: cell(self.name), value: cell(self.value), quantities: self.names.len() }
     }
 
     /// The sample with a column for each quantity.

@@ -16,7 +16,7 @@ use arrow_array::types::{
 };
 use arrow_array::{Array, RecordBatch};
 use arrow_schema::{ArrowError, DataType, Field, Schema, TimeUnit};
-use mapper_recording::logs::{Layout, Log, LogError, LogFile, LogOptions, RowSink};
+use mapper_recording::logs::{Layout, Log, LogError, LogFile, LogFinding, LogOptions, RowSink};
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Once;
@@ -55,9 +55,8 @@ pub(crate) fn open_log(
         Table::analyse(&rows, b'.', options, Origin::Columns).map_err(|why| file.content_error(name, why))?;
     let unread = schema.fields().iter().filter(|field| !is_read(field.data_type())).count();
     if unread > 0 {
-        let findings = &mut table.layout.findings;
-        findings
-            .push(format!("{unread} columns were left out: lists, structures, or of an unsupported type"));
+        let reason = "lists, structures, or of an unsupported type";
+        table.layout.findings.push(LogFinding::left_out(unread, reason));
     }
     Ok(Box::new(BatchLog { file: file.clone(), name, open, table }))
 }

@@ -7,7 +7,7 @@ use crate::columns::table_head::{TableHead, analyse_head};
 use crate::notation::instant::Instant;
 use crate::notation::table_row::{Cells, Rows};
 use crate::tables::row_sorter::RowSorter;
-use mapper_recording::logs::{Column, DateOrder, Layout, LogError, LogOptions, Row, RowSink};
+use mapper_recording::logs::{Column, DateOrder, Layout, LogError, LogFinding, LogOptions, Row, RowSink};
 use std::collections::BTreeMap;
 
 struct GroupReader {
@@ -73,10 +73,9 @@ impl Table {
         options: &LogOptions,
         origin: Origin,
     ) -> Result<Table, String> {
-        let TableHead { columns, data_row, cell_units, head, mut findings } =
-            analyse_head(rows, decimal, options)?;
-        if origin == Origin::Rows {
-            findings.insert(0, head);
+        let TableHead { columns, data_row, cell_units, mut findings } = analyse_head(rows, decimal, options)?;
+        if origin != Origin::Rows {
+            findings.retain(|finding| !matches!(finding, LogFinding::Header { .. }));
         }
         let sample = Sample { columns: &columns, rows: rows.get(data_row..).unwrap_or_default(), decimal };
         let mut clocks = choose(&sample, options)?;
@@ -126,7 +125,7 @@ impl Table {
         rows: &mut dyn Rows,
         wanted: &[usize],
         sink: &mut RowSink<'_>,
-    ) -> Result<Option<&'static str>, LogError> {
+    ) -> Result<Option<LogFinding>, LogError> {
         for _ in 0..self.data_row {
             if !rows.advance()? {
                 return Ok(None);

@@ -6,6 +6,7 @@ mod physics;
 mod propose;
 mod remark;
 mod shared_units;
+mod tag_stations;
 mod yaml;
 
 pub use channel_proposal::{Ambient, Certainty, NominalFlows, Proposal, ProposedChannel};

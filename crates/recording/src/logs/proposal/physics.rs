@@ -63,7 +63,7 @@ pub(super) fn judge(proposal: &mut Proposal, layout: &Layout, survey: &Survey) -
             agreement.contradicting += 1;
             if higher == Channel::T3 {
                 agreement.suspects_numbering = true;
-                doubt(proposal, &NUMBERED, &Remark::OtherStations);
+                doubt_stations(proposal);
             }
         }
     }
@@ -98,6 +98,11 @@ pub(super) fn judge(proposal: &mut Proposal, layout: &Layout, survey: &Survey) -
     agreement
 }
 
+/// Marks the numbered stations as unsure.
+pub(super) fn doubt_stations(proposal: &mut Proposal) {
+    doubt(proposal, &NUMBERED, &Remark::OtherStations);
+}
+
 /// Marks channels whose stations were renumbered.
 pub(super) fn remark_stations(proposal: &mut Proposal, layout: &Layout) {
     for proposed in proposal.channels.iter_mut() {
@@ -110,7 +115,7 @@ pub(super) fn remark_stations(proposal: &mut Proposal, layout: &Layout) {
 }
 
 /// (gamma - 1) / gamma of air.
-const EXPONENT: f64 = 0.2857;
+pub(super) const EXPONENT: f64 = 0.2857;
 
 /// Minimum pressure ratio: from here the gas is at least 38 K above the inlet, and an unheated housing is far below it.
 const MIN_PRESSURE_RATIO: f64 = 1.5;

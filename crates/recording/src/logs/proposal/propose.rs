@@ -3,7 +3,7 @@
 use super::channel_proposal::{Ambient, Certainty, NominalFlows, Proposal, ProposedChannel};
 use super::names::{MIN_CLEAR_WEIGHT, Weight, channels_of};
 use super::remark::ProposalRemark as Remark;
-use super::{physics, shared_units};
+use super::{physics, shared_units, tag_stations};
 use crate::logs::plausible::{
     AMBIENT_RANGE_PA, TRIMMED_SHARE, fitting_units, is_plausible, looks_like_gauge,
 };
@@ -21,8 +21,10 @@ struct Candidate {
 
 /// Proposes a channel map; `nominal` gives the machine's flows, if it is known.
 pub fn propose(layout: &Layout, survey: &Survey, nominal: Option<NominalFlows<'_>>) -> Proposal {
-    let (proposal, agreement) = propose_with_numbering(layout, survey, nominal, StationNumbering::Usual);
-    if agreement.suspects_numbering {
+    let (mut proposal, agreement) = propose_with_numbering(layout, survey, nominal, StationNumbering::Usual);
+    let has_first = [Channel::P1, Channel::T1].iter().any(|channel| proposal.entry(*channel).is_some());
+    let is_without_first = !has_first && has_fifth_station(layout);
+    if agreement.suspects_numbering || is_without_first {
         let (mut renumbered, agreement) =
             propose_with_numbering(layout, survey, nominal, StationNumbering::GasTurbine);
         let has_fifth = [Channel::P4, Channel::T4].iter().any(|channel| renumbered.entry(*channel).is_some());
@@ -31,7 +33,22 @@ pub fn propose(layout: &Layout, survey: &Survey, nominal: Option<NominalFlows<'_
             return renumbered;
         }
     }
+    if is_without_first {
+        physics::doubt_stations(&mut proposal);
+    }
     proposal
+}
+
+/// Whether a column has a pressure or temperature of station 5, which only a gas turbine's numbering has.
+fn has_fifth_station(layout: &Layout) -> bool {
+    let outlet = |name: &str| {
+        let is_outlet = |(channel, _): &(Channel, Weight)| [Channel::P4, Channel::T4].contains(channel);
+        channels_of(name, "", "", None).iter().any(is_outlet)
+    };
+    let is_fifth = |column: &Column| {
+        column.name.contains('5') && outlet(&StationNumbering::GasTurbine.renumber(&column.name))
+    };
+    layout.columns.iter().any(is_fifth)
 }
 
 /// Station numbers in the names of a log.
@@ -99,6 +116,7 @@ fn propose_with_numbering(
         proposed.others = sensors;
         proposal.channels.push(proposed);
     }
+    tag_stations::propose_stations(&mut proposal, &mut taken, layout, survey, &units);
     note_unknown_units(&mut proposal, &taken, layout, &units);
     let is_free_tag =
         |(index, column): &(usize, &Column)| !taken[*index] && ColumnName::read(&column.name).is_tag();
@@ -195,11 +213,14 @@ fn note_unknown_units(
         let named = channels_of(without_number(column, layout), group, &column.description, None);
         let kind = volume_flow_m3_s(spelling).map(|_| Kind::MassFlow);
         let is_plausible = |channel: Channel| kind.is_none_or(|kind| kind == kind_of(channel));
-        let Some((channel, _)) = named.iter().find(|(channel, _)| is_plausible(*channel)) else { continue };
-        if proposal.entry(*channel).is_some() {
+        let named = named.iter().map(|(channel, _)| *channel).find(|channel| is_plausible(*channel));
+        // The unit alone shows a flow.
+        let by_unit =
+            kind.filter(|_| !ColumnName::read(&column.name).is_other()).map(|_| Channel::CompressorFlow);
+        let Some(channel) = named.or(by_unit).filter(|channel| proposal.entry(*channel).is_none()) else {
             continue;
-        }
-        let (channel, column, unit) = (*channel, column.name.clone(), spelling.clone());
+        };
+        let (column, unit) = (column.name.clone(), spelling.clone());
         proposal.remarks.push(match volume_flow_m3_s(spelling) {
             Some(None) => Remark::StandardFlow { channel, column, unit, known_units: standard_flows() },
             Some(Some(_)) => Remark::VolumeFlow { channel, column, unit },

@@ -12,6 +12,8 @@ ProposalRemark {
     "ambiguous_name" AmbiguousName,
     /// The names are tag numbers of a piping diagram, which have the quantity and no place.
     "tag_numbers" TagNumbers { columns: Vec<String> },
+    /// The tag number gives no place, but only one order of the loops is a compressor (and turbine).
+    "tag_station" TagStation { number: u32 },
     /// The name indicates a value that the stand computed.
     "computed" Computed,
     /// The readings are impossible in the unit of the log.
@@ -71,6 +73,10 @@ impl fmt::Display for ProposalRemark {
                 f,
                 "{}: tag numbers give no place; look it up in the piping diagram of the stand and write the columns into a channel map",
                 columns.join(", ")
+            ),
+            Remark::TagStation { number } => write!(
+                f,
+                "tag numbers give no place; of all loops with a temperature and a pressure, only {number} has the readings of this station"
             ),
             Remark::Computed => f.write_str("its name indicates a computed value"),
             Remark::ImplausibleRange { min, max, unit, plausible_units } => {

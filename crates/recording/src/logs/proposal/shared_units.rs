@@ -1,6 +1,7 @@
 //! Infers the units of a log without units: columns of one kind share a unit, and physics excludes the others.
 
 use super::channel_proposal::{Certainty, NominalFlows, Proposal, ProposedChannel};
+use super::physics::EXPONENT;
 use super::remark::ProposalRemark as Remark;
 use crate::logs::plausible::{STANDARD_ATMOSPHERE_PA, TRIMMED_SHARE, fitting_units};
 use crate::logs::units::kind_of;
@@ -91,7 +92,6 @@ const FLOW_FACTOR: f64 = 8.0;
 
 /// Dry air at room temperature, within a few per cent: small compared with [`FLOW_FACTOR`].
 const CP_J_KGK: f64 = 1005.0;
-const EXPONENT: f64 = 0.2857;
 const DENSITY_KG_M3: f64 = 1.15;
 const INLET_K: f64 = 298.0;
 

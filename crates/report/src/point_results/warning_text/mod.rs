@@ -11,6 +11,7 @@ use crate::point_results::result_remark_text::result_remark_text;
 use crate::point_results::warning_text::sentence::Sentence;
 use mapper_core::{ModelDoubt, PlanRemark, ResultRemark, Warning};
 use mapper_diagnose::gap::findings::warning::GapWarning;
+use mapper_recording::logs::LogFinding;
 use mapper_recording::logs::proposal::ProposalRemark;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -35,7 +36,7 @@ pub(crate) fn sentence_of(warning: &Warning) -> Sentence {
     })
 }
 
-/// A JSON value in which each warning, each doubt and each remark has its sentence as `message`, for people.
+/// A JSON value in which each warning, doubt, remark and finding has its sentence as `message`, for people.
 pub fn with_messages(mut value: Value) -> Value {
     add_messages(&mut value);
     value
@@ -65,6 +66,11 @@ fn add_messages(value: &mut Value) {
                             } else if has_code(one, ProposalRemark::CODES) {
                                 add_message::<ProposalRemark>(one, ToString::to_string);
                             }
+                        }
+                    }
+                    ("findings", Value::Array(all)) => {
+                        for one in all.iter_mut().filter(|one| has_code(one, LogFinding::CODES)) {
+                            add_message::<LogFinding>(one, ToString::to_string);
                         }
                     }
                     ("doubts", Value::Array(all)) => {

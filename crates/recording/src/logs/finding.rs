@@ -1,0 +1,180 @@
+//! Properties of a log that its reader detected, with the option that overrides each.
+
+use mapper_core::coded_enum;
+use std::fmt;
+
+coded_enum! {
+/// A property of a log, by its stable code. It displays as one sentence with values. Rows count from 1.
+LogFinding {
+    /// How the text of the log is written.
+    "dialect" Dialect { separator: char, decimal: char, is_decimal_assumed: bool, encoding: String },
+    /// The rows of the header; `units_in_names`: the names contain the units.
+    "header" Header { names_row: Option<usize>, units_row: Option<usize>, units_in_names: bool, data_row: usize },
+    /// A row apart from the header has the units of columns without one.
+    "distant_units" DistantUnits { row: usize },
+    /// Cells have their unit after the number.
+    "units_in_cells" UnitsInCells { columns: usize },
+    /// Rows before the header were skipped.
+    "skipped_rows" SkippedRows { rows: usize },
+    /// Equal names were numbered.
+    "repeated_names" RepeatedNames { names: usize },
+    /// Each row names its quantity.
+    "long_form" LongForm { name: String, value: String, quantities: usize },
+    /// The user gave the rate.
+    "rate" Rate { rate_hz: f64 },
+    /// The file has the interval of its samples.
+    "waveform" Waveform { interval_s: f64 },
+    /// The clock of a group; `others`: clocks of the same pace.
+    "clock" Clock { group: String, clock: String, others: Vec<String> },
+    /// Each group has a clock of its own.
+    "clocks" Clocks { groups: usize },
+    /// The clocks have different epochs.
+    "epochs" DifferentEpochs,
+    /// Day and month of a date cannot be distinguished.
+    "ambiguous_date" AmbiguousDate { column: String },
+    /// A date goes back by an hour.
+    "hour_back" HourBack,
+    /// Program and version of an MDF file.
+    "mdf_version" MdfVersion { version: String, program: String },
+    /// The file contains frames of a bus.
+    "bus_frames" BusFrames,
+    /// Columns with a name have no values.
+    "without_values" WithoutValues { columns: Vec<String> },
+    /// Columns were left out.
+    "left_out" LeftOut { columns: usize, reason: String },
+    /// A named column or table was left out.
+    "skipped" Skipped { part: String, name: String, reason: String },
+    /// Hidden sheets, and whether they are read.
+    "hidden_sheets" HiddenSheets { sheets: Vec<String>, is_read: bool },
+    /// Only hidden sheets have tables, and several do.
+    "several_hidden" SeveralHidden,
+    /// A property of one table of the file.
+    "in_table" InTable { part: String, name: String, finding: Box<LogFinding> },
+}
+}
+
+impl LogFinding {
+    /// Columns that were left out, with the reason.
+    pub fn left_out(columns: usize, reason: &str) -> LogFinding {
+        LogFinding::LeftOut { columns, reason: reason.to_owned() }
+    }
+
+    /// A part of the file that was left out, with the reason.
+    pub fn skipped(part: &str, name: &str, reason: impl fmt::Display) -> LogFinding {
+        LogFinding::Skipped { part: part.to_owned(), name: name.to_owned(), reason: reason.to_string() }
+    }
+}
+
+/// Names in quotes of code.
+fn quoted(names: &[String], separator: &str) -> String {
+    names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(separator)
+}
+
+impl fmt::Display for LogFinding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let row = |row: &Option<usize>| row.map_or("none".to_owned(), |row| row.to_string());
+        match self {
+            LogFinding::Dialect { separator, decimal, is_decimal_assumed, encoding } => {
+                let separator = match separator {
+                    '\t' => "tab".to_owned(),
+                    ' ' => "blanks".to_owned(),
+                    other => format!("`{other}`"),
+                };
+                let assumed = if *is_decimal_assumed { ", assumed" } else { "" };
+                write!(
+                    f,
+                    "text: separator {separator}, decimal sign `{decimal}`{assumed}, letters in {encoding} (separator, decimal, encoding)"
+                )
+            }
+            LogFinding::Header { names_row, units_row, units_in_names, data_row } => {
+                let units = match units_row {
+                    Some(row) => format!("in row {row}"),
+                    None if *units_in_names => "in the names".to_owned(),
+                    None => "none".to_owned(),
+                };
+                write!(
+                    f,
+                    "header: names in row {}, units {units}, data from row {data_row} (names_row, units_row, data_row)",
+                    row(names_row)
+                )
+            }
+            LogFinding::DistantUnits { row } => write!(f, "units of columns without one are in row {row}"),
+            LogFinding::UnitsInCells { columns } => {
+                write!(f, "{columns} columns have their unit after each number")
+            }
+            LogFinding::SkippedRows { rows } => write!(f, "{rows} rows before the header were skipped"),
+            LogFinding::RepeatedNames { names } => {
+                write!(f, "{names} names are repeated; the later ones are numbered: `name (2)`")
+            }
+            LogFinding::LongForm { name, value, quantities } => write!(
+                f,
+                "long form: `{name}` names the quantity of a row and `{value}` is its value; {quantities} quantities are in the first rows, and later ones are not read"
+            ),
+            LogFinding::Rate { rate_hz } => {
+                write!(f, "clock: none, {rate_hz} samples a second as given (rate)")
+            }
+            LogFinding::Waveform { interval_s } => {
+                write!(f, "clock: a waveform with a value every {interval_s} s (time, rate)")
+            }
+            other => other.write_clock_or_part(f),
+        }
+    }
+}
+
+impl LogFinding {
+    /// The sentence about clocks or parts of the file.
+    fn write_clock_or_part(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            LogFinding::Clock { group, clock, others } => {
+                f.write_str("clock")?;
+                if !group.is_empty() {
+                    write!(f, " of group `{group}`")?;
+                }
+                write!(f, ": {clock}")?;
+                if !others.is_empty() {
+                    write!(f, "; also present: {}", quoted(others, " and "))?;
+                }
+                f.write_str(" (time, time_unit)")
+            }
+            LogFinding::Clocks { groups } => {
+                write!(f, "clocks: {groups} groups, each with its own (time, time_unit)")
+            }
+            LogFinding::DifferentEpochs => {
+                f.write_str("the clocks count from different epochs: each group begins at 0 s")
+            }
+            LogFinding::AmbiguousDate { column } => {
+                write!(f, "date: `{column}` is ambiguous; the month is assumed to be first (date_order)")
+            }
+            LogFinding::HourBack => f.write_str(
+                "clock: a date goes back by an hour, as at the end of daylight saving; the rows after it are taken as an hour later \
+                 (name a clock without daylight saving by `time` if that is wrong)",
+            ),
+            LogFinding::MdfVersion { version, program } => {
+                write!(f, "version {version} of MDF, written by `{program}`")
+            }
+            LogFinding::BusFrames => f.write_str(
+                "it contains frames of a bus (CAN, LIN, FlexRay, Ethernet) that are not decoded and have no signals: decode them with the database \
+                 of the bus (DBC, ARXML) in the measuring program, or with asammdf (`MDF(FILE).extract_bus_logging({\"CAN\": [(DBC, 0)]}).save(NEW)`)",
+            ),
+            LogFinding::WithoutValues { columns } => write!(
+                f,
+                "{} without a value: formulas have values only after a spreadsheet program has calculated and saved them",
+                quoted(columns, ", ")
+            ),
+            LogFinding::LeftOut { columns, reason } => write!(f, "{columns} columns were left out: {reason}"),
+            LogFinding::Skipped { part, name, reason } => write!(f, "{part} `{name}` was skipped: {reason}"),
+            LogFinding::HiddenSheets { sheets, is_read: true } => {
+                write!(f, "hidden: {}; read because no visible sheet has a table", sheets.join(", "))
+            }
+            LogFinding::HiddenSheets { sheets, is_read: false } => {
+                write!(f, "hidden, and read only if named by `sheet`: {}", sheets.join(", "))
+            }
+            LogFinding::SeveralHidden => {
+                f.write_str("no visible sheet has a table, and several hidden ones have: name one")
+            }
+            LogFinding::InTable { part, name, finding } => write!(f, "{part} `{name}`: {finding}"),
+            LogFinding::Other { message, .. } => f.write_str(message),
+            other => f.write_str(other.code()),
+        }
+    }
+}

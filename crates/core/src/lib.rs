@@ -61,7 +61,7 @@ pub use measurement::channel::{
 };
 pub use measurement::declared_uncertainty::{DeclaredUncertainty, NoiseColour};
 pub use measurement::event::{Event, EventKind};
-pub use measurement::held_point::{HeldPoint, JUMPS, VALVE_JUMP_RATIO};
+pub use measurement::held_point::{JUMPS, StepPoint, VALVE_JUMP_RATIO, jump_ratio};
 pub use measurement::joined_recordings::{StepOrigin, join_recordings};
 pub use measurement::plausible::{Plausible, measurable, plausible};
 pub use measurement::recording::{ReadingOrigin, Recording, RecordingError, Series};

@@ -1,13 +1,12 @@
 //! Joins several recordings of one machine into one.
 
-use crate::{Element, HeldPoint, Recording, Series, StepKind, StepMarker};
+use crate::measurement::held_point::{HeldPoint, StepPoint};
+use crate::{Element, Recording, Series, StepKind, StepMarker};
 use std::collections::BTreeMap;
 
 /// Time between two joined recordings, s: much longer than the thermal time constant of any housing, so that the last step of one
 /// recording does not count as the start of the first jump of the next.
 const RECORDING_GAP_S: f64 = 3600.0;
-/// Tolerance of the commands for two steps at the same point, in logs without targets.
-const SAME_COMMAND_RATIO: f64 = 5e-3;
 
 /// Origin of a step of a joined recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,7 +24,7 @@ pub fn join_recordings(recordings: Vec<Recording>) -> (Recording, Vec<StepOrigin
     let alone = recordings.len() < 2;
     let mut joined = Recording::default();
     let mut origins = Vec::new();
-    // The measured points of each step and of the previous step, if only measurements identify the points.
+    // The point of each step, and the measured one before it, if only measurements identify the points.
     let mut step_points: Vec<StepPoints> = Vec::new();
     for (number, mut recording) in recordings.into_iter().enumerate() {
         origins.extend(recording.steps.iter().map(|step| StepOrigin { recording: number, step: step.index }));
@@ -34,9 +33,9 @@ pub fn join_recordings(recordings: Vec<Recording>) -> (Recording, Vec<StepOrigin
         }
         let shift_s = end_s(&joined).map_or(0.0, |end_s| end_s + RECORDING_GAP_S) - start_s(&recording);
         let before = joined.steps.len();
-        let points: Vec<Option<HeldPoint>> =
-            recording.steps.iter().map(|step| HeldPoint::of(&recording, step)).collect();
-        let from = std::iter::once(None).chain(points.iter().copied());
+        let points: Vec<StepPoint> =
+            recording.steps.iter().map(|step| StepPoint::of(&recording, step)).collect();
+        let from = std::iter::once(None).chain(points.iter().map(|point| point.held));
         step_points.extend(points.iter().copied().zip(from));
         for (step, own_points) in recording.steps.iter_mut().zip(step_points[before..].to_vec()) {
             step.kind = kind((step, own_points), &joined.steps[..before], &step_points);
@@ -61,45 +60,34 @@ fn append<K: Ord>(joined: &mut BTreeMap<K, Series>, more: BTreeMap<K, Series>, s
     }
 }
 
-/// The measured points of a step and of the step before it.
-type StepPoints = (Option<HeldPoint>, Option<HeldPoint>);
+/// The point of a step, and the measured point of the step before it.
+type StepPoints = (StepPoint, Option<HeldPoint>);
 
 fn kind(
-    (step, held): (&StepMarker, StepPoints),
+    (step, (point, before)): (&StepMarker, StepPoints),
     earlier: &[StepMarker],
-    earlier_held: &[StepPoints],
+    earlier_points: &[StepPoints],
 ) -> StepKind {
     let same = |a: Option<HeldPoint>, b: Option<HeldPoint>| match (a, b) {
         (Some(a), Some(b)) => a.is_same(&b),
         (None, None) => true,
         _ => false,
     };
-    let at_the_point = |(other, other_held): &(&StepMarker, &StepPoints)| match (step.to, other.to, held.0) {
-        (Some(to), Some(other), _) => to == other,
-        (None, None, Some(_)) => same(held.0, other_held.0),
-        (None, None, None) => {
-            is_close(step.p3_pa, other.p3_pa) && is_close(step.valve_opening_ratio, other.valve_opening_ratio)
-        }
-        _ => false,
-    };
+    let at_the_point = |(_, (other, _)): &(&StepMarker, &StepPoints)| point.is_same(other);
     // A repeat serves only for comparison: the point itself may come later, by another jump.
     let mut same_points = earlier
         .iter()
-        .zip(earlier_held)
+        .zip(earlier_points)
         .filter(|(other, _)| other.kind.measures())
         .filter(at_the_point)
         .peekable();
     if step.kind != StepKind::Point || same_points.peek().is_none() {
         return step.kind;
     }
-    let has_same_jump = |(other, other_held): (&StepMarker, &StepPoints)| {
-        other.from == step.from && same(held.1, other_held.1)
+    let has_same_jump = |(other, (_, other_before)): (&StepMarker, &StepPoints)| {
+        other.from == step.from && same(before, *other_before)
     };
     if same_points.any(has_same_jump) { StepKind::Repeat } else { StepKind::Return }
-}
-
-fn is_close(a: f64, b: f64) -> bool {
-    (a - b).abs() <= SAME_COMMAND_RATIO * a.abs().max(b.abs())
 }
 
 fn all(recording: &Recording) -> impl Iterator<Item = &Series> {

@@ -50,7 +50,7 @@ fn read<'a>(
     steps: Vec<CampaignStep>,
 ) -> Result<(Readings, Vec<Drive<'a>>), DriftError> {
     for (run, recording) in recordings.iter().enumerate() {
-        usable(run, recording)?;
+        usable(run, recording, request.identification.thresholds.lost_samples_ratio)?;
     }
     let columns: Vec<usize> = (0..OUTPUTS.len())
         .filter(|output| recordings.iter().all(|recording| recording.require(OUTPUTS[*output]).is_ok()))

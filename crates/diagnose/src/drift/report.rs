@@ -6,7 +6,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// The verdict.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DriftVerdict {
     /// No drift is more probable than any drift.
@@ -18,6 +18,7 @@ pub enum DriftVerdict {
     /// The machine changes and a sensor drifts.
     SensorAndMachine,
     /// Either the recording cannot identify the drift, or it cannot show whether there is one: see `reason`.
+    #[default]
     Unclear,
 }
 
@@ -170,7 +171,7 @@ impl FoundDrift {
 }
 
 /// The drift report of a campaign.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct DriftReport {
     /// The verdict.
     pub verdict: DriftVerdict,
@@ -191,14 +192,6 @@ pub struct DriftReport {
 impl DriftReport {
     /// A recording without enough information, with the reason.
     pub fn without_verdict(reason: String) -> Self {
-        DriftReport {
-            verdict: DriftVerdict::Unclear,
-            drifts: Vec::new(),
-            alone: Vec::new(),
-            reason,
-            detection_limits: Vec::new(),
-            groups: Vec::new(),
-            corrected_points: Vec::new(),
-        }
+        DriftReport { reason, ..DriftReport::default() }
     }
 }

@@ -13,9 +13,6 @@ use mapper_identify::identify_each;
 use mapper_observe::averages::mean_reading::mean_between;
 use nalgebra::DVector;
 
-/// Averaging time at the end of a step, s.
-const END_S: f64 = 5.0;
-
 /// Points of a run; empty if the recording cannot be identified.
 pub(crate) fn identified(recording: &Recording, request: &DriftRequest<'_>) -> Vec<IdentifiedPoint> {
     identify_each(recording, request.identification)
@@ -79,7 +76,7 @@ pub(crate) fn corrected_points(
                 run: step.run,
                 step: step.index,
                 speed_rpm: recorded.map_or_else(
-                    || end_speed_rpm(recordings[step.run], step).unwrap_or(f64::NAN),
+                    || end_speed_rpm(request, recordings[step.run], step).unwrap_or(f64::NAN),
                     |point| point.speed_rpm,
                 ),
                 valve: step.valve_opening_ratio,
@@ -95,6 +92,11 @@ pub(crate) fn corrected_points(
 }
 
 /// Mean speed of the last seconds of a step, rpm.
-pub(crate) fn end_speed_rpm(recording: &Recording, step: &CampaignStep) -> Option<f64> {
-    mean_between(recording, Channel::ShaftSpeed, step.end_s - END_S, step.end_s, 1)
+pub(crate) fn end_speed_rpm(
+    request: &DriftRequest<'_>,
+    recording: &Recording,
+    step: &CampaignStep,
+) -> Option<f64> {
+    let start_s = step.end_s - request.identification.thresholds.steady_mean_s;
+    mean_between(recording, Channel::ShaftSpeed, start_s, step.end_s, 1)
 }

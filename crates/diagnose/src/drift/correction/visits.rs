@@ -17,7 +17,7 @@ pub(crate) fn group(
     visits: &[usize],
 ) -> RepeatGroup {
     let in_words = |step: Option<&CampaignStep>| {
-        let speed = |step: &CampaignStep| end_speed_rpm(recordings[step.run], step);
+        let speed = |step: &CampaignStep| end_speed_rpm(request, recordings[step.run], step);
         step.map_or_else(String::new, |step| {
             let speed =
                 speed(step).map_or_else(|| "-".to_owned(), |speed_rpm| format!("{:.1}", speed_rpm / 1e3));

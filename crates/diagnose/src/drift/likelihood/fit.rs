@@ -6,13 +6,9 @@ use crate::drift::likelihood::candidates::{FINE_ONSETS, courses, mean_of};
 use crate::drift::likelihood::low_rank::LowRank;
 use crate::drift::runs::request::{DriftError, Unsolvable};
 use crate::drift::sensitivity::readings::Readings;
-use mapper_inference::descent::ENOUGH;
+use mapper_inference::descent::{ENOUGH, ROUNDS};
 use mapper_numerics::statistics::{CHI_SQUARE_1_95, NORMAL_975};
 use nalgebra::{DMatrix, DVector};
-
-/// Rounds in which the onsets of several drifts are fitted in turn, and in which the model is linearised about them: each one reduces the
-/// error to about a tenth.
-pub(crate) const ROUNDS: usize = 2;
 
 /// A cause with its best time history and size.
 #[derive(Debug, Clone)]

@@ -6,12 +6,13 @@ use crate::drift::causes::planted::Planted;
 use crate::drift::causes::time_history::Course;
 use crate::drift::likelihood::candidates::{FINE_ONSETS, mean_of};
 use crate::drift::likelihood::decide::{Decision, decide};
-use crate::drift::likelihood::fit::{Fit, Fits, ROUNDS, fit};
+use crate::drift::likelihood::fit::{Fit, Fits, fit};
 use crate::drift::runs::request::DriftError;
 use crate::drift::sensitivity::constant_effect::Constant;
 use crate::drift::sensitivity::drive::{Drive, predict};
 use crate::drift::sensitivity::nuisance;
 use crate::drift::sensitivity::readings::Readings;
+use mapper_inference::descent::ROUNDS;
 use mapper_observe::declared::Declared;
 use nalgebra::DMatrix;
 

@@ -8,9 +8,7 @@ use std::collections::BTreeMap;
 
 /// Minimum number of visits of one jump: two show a difference, only a third shows whether it persists or grows.
 const VISITS_NEEDED: usize = 3;
-/// Longest step that the model is driven through, s.
-const LONGEST_STEP_S: f64 = 86_400.0;
-/// Longest total time of all steps, s.
+/// Longest total time of all steps that the model is driven through, s.
 const LONGEST_S: f64 = 30.0 * 86_400.0;
 
 /// All visits of each repeated jump, by position among the steps; most visits first.
@@ -49,17 +47,17 @@ pub(crate) fn refusal(
             step.run + 1
         ));
     }
-    let longest = steps.iter().find(|step| step.end_s - step.start_s > LONGEST_STEP_S);
-    let whole_s: f64 = steps.iter().map(|step| step.end_s - step.start_s).sum();
-    if let Some(step) = longest.or(steps.first().filter(|_| whole_s > LONGEST_S)) {
+    let length_s = |step: &CampaignStep| step.end_s - step.start_s;
+    let whole_s: f64 = steps.iter().map(length_s).sum();
+    let longest = steps.iter().max_by(|a, b| length_s(a).total_cmp(&length_s(b)));
+    if let Some(step) = longest.filter(|_| whole_s > LONGEST_S) {
         return Some(format!(
-            "No verdict: step {} of recording {} lasts {:.1} h of {:.1} h in total; steps of a campaign last up to {:.0} h, and all of \
-             them up to {:.0} h. A wrong time in the log would do that.",
+            "No verdict: step {} of recording {} lasts {:.1} h of {:.1} h in total; the steps of a campaign last up to {:.0} h. A \
+             wrong time in the log would do that.",
             step_number(step.index),
             step.run + 1,
-            (step.end_s - step.start_s) / 3600.0,
+            length_s(step) / 3600.0,
             whole_s / 3600.0,
-            LONGEST_STEP_S / 3600.0,
             LONGEST_S / 3600.0,
         ));
     }

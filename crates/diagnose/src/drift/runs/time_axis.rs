@@ -1,6 +1,6 @@
 //! Steps of all runs on one time axis, and the segments of them over which readings are averaged.
 
-use mapper_core::{Channel, HeldPoint, NoiseColour, Recording, StepMarker};
+use mapper_core::{Channel, NoiseColour, Recording, StepPoint};
 use mapper_numerics::coloured_noise::ColouredNoise;
 use mapper_observe::averages::mean_reading::{BEFORE_S, mean_between};
 use mapper_observe::averages::schedule::Schedule;
@@ -12,9 +12,6 @@ const STRETCHES: Schedule = Schedule {
     shortest_s: 5.0,
     shortest_ratio: 0.0,
 };
-
-/// Relative difference below which two commands are the same point: other programs round them.
-const SAME_COMMAND: f64 = 1e-3;
 
 /// A step of one of the runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,14 +50,18 @@ impl Block {
 
 /// Steps of all runs, each with its operating point.
 pub(crate) fn steps(runs: &[&Recording]) -> Vec<CampaignStep> {
-    let mut conditions: Vec<Condition> = Vec::new();
+    let mut conditions: Vec<StepPoint> = Vec::new();
     let mut steps: Vec<CampaignStep> = Vec::new();
     let mut offset_s = 0.0;
     for (run, recording) in runs.iter().enumerate() {
         let mut from = None;
         for marker in &recording.steps {
-            let held = HeldPoint::of(recording, marker);
-            let condition = condition_of(marker, held, &mut conditions);
+            let point = StepPoint::of(recording, marker);
+            let known = conditions.iter().position(|known| known.is_same(&point));
+            let condition = known.unwrap_or_else(|| {
+                conditions.push(point);
+                conditions.len() - 1
+            });
             steps.push(CampaignStep {
                 run,
                 index: marker.index,
@@ -78,46 +79,6 @@ pub(crate) fn steps(runs: &[&Recording]) -> Vec<CampaignStep> {
         offset_s += recording.steps.last().map_or(0.0, |marker| marker.end_s);
     }
     steps
-}
-
-/// Command of an operating point: its speed if known, since a loop that holds it moves P3; otherwise P3, Pa. Also the valve opening. Without a
-/// command, the measured value.
-#[derive(Debug, Clone, Copy)]
-struct Condition {
-    speed_rpm: Option<f64>,
-    p3_pa: f64,
-    valve_opening_ratio: f64,
-    held: Option<HeldPoint>,
-}
-
-impl Condition {
-    fn is_same(&self, other: &Condition) -> bool {
-        if let (Some(own), Some(other)) = (self.held, other.held) {
-            return own.is_same(&other);
-        }
-        let same = |a: f64, b: f64| (a - b).abs() <= SAME_COMMAND * a.abs().max(b.abs());
-        let drive = match (self.speed_rpm, other.speed_rpm) {
-            (Some(own), Some(other)) => same(own, other),
-            _ => same(self.p3_pa, other.p3_pa),
-        };
-        drive && same(self.valve_opening_ratio, other.valve_opening_ratio)
-    }
-}
-
-fn condition_of(marker: &StepMarker, held: Option<HeldPoint>, conditions: &mut Vec<Condition>) -> usize {
-    let condition = Condition {
-        speed_rpm: marker.to.map(|to| to.speed_rpm),
-        p3_pa: marker.p3_pa,
-        valve_opening_ratio: marker.valve_opening_ratio,
-        held,
-    };
-    match conditions.iter().position(|known| known.is_same(&condition)) {
-        Some(position) => position,
-        None => {
-            conditions.push(condition);
-            conditions.len() - 1
-        }
-    }
 }
 
 /// The segments of all steps.

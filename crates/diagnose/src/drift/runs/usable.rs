@@ -8,14 +8,12 @@ use mapper_observe::plausible::check_running;
 
 /// Channels needed to judge drift.
 const NEEDED: [Channel; 4] = [Channel::ShaftSpeed, Channel::P2, Channel::T2, Channel::T1];
-/// Maximum share of readings that are not numbers.
-const NOT_NUMBERS_SHARE: f64 = 0.02;
 
-/// Checks the model inputs and the compared channels, within the steps.
+/// Checks the model inputs and the compared channels, within the steps. `lost_ratio`: maximum share of readings that are not numbers.
 ///
 /// # Errors
 /// [`DriftError`] with the missing or wrong input.
-pub(crate) fn usable(run: usize, recording: &Recording) -> Result<(), DriftError> {
+pub(crate) fn usable(run: usize, recording: &Recording, lost_ratio: f64) -> Result<(), DriftError> {
     let missing: Vec<Channel> =
         NEEDED.into_iter().filter(|channel| recording.require(*channel).is_err()).collect();
     if !missing.is_empty() {
@@ -29,7 +27,7 @@ pub(crate) fn usable(run: usize, recording: &Recording) -> Result<(), DriftError
         let values = series.slice(first.start_s, last.end_s).1;
         let finite: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
         let (missing, all) = (values.len() - finite.len(), values.len());
-        if missing as f64 > NOT_NUMBERS_SHARE * all as f64 {
+        if missing as f64 > lost_ratio * all as f64 {
             return Err(DriftError::NotNumbers { run, channel, missing, all });
         }
         if let Some(middle) = median(&finite) {

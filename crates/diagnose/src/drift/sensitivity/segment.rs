@@ -13,9 +13,8 @@ const STEPS_S: [(f64, f64); 5] = [(0.2, 0.05), (3.0, 0.1), (8.0, 0.5), (20.0, 1.
 /// Time for which a jump is left out if the model cannot follow it (deep beyond the surge line), s. Shaft and outlet then start from their
 /// readings, the metal from the change of its readings.
 pub(crate) const LEFT_OUT_S: f64 = 5.0;
-/// Time over which a drifting machine is taken as constant, s, and the maximum number of such parts in a long step.
+/// Time over which a drifting machine is taken as constant, s.
 const PART_S: f64 = 30.0;
-const MAX_PARTS: f64 = 60.0;
 
 /// One step of the run.
 pub(crate) struct Stretch {
@@ -73,7 +72,7 @@ impl Stretch {
     pub(crate) fn parts(&self, start_s: f64, planted: &[Planted]) -> Vec<(f64, f64)> {
         let mut edges = vec![start_s];
         for Planted { course, .. } in planted.iter().filter(|planted| planted.machine_changes()) {
-            let count = ((self.end_s - start_s) / PART_S).ceil().clamp(1.0, MAX_PARTS);
+            let count = ((self.end_s - start_s) / PART_S).ceil().max(1.0);
             edges.extend(
                 (1..count as usize).map(|part| start_s + (self.end_s - start_s) * part as f64 / count),
             );

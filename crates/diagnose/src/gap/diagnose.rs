@@ -87,9 +87,6 @@ pub struct Diagnosed {
 const FINALISTS: usize = 7;
 /// Of these, beyond the first three, a fit this far behind the best in the logarithm of the evidence is left out.
 const HOPELESS: f64 = 60.0;
-/// Causes among which each fold chooses again, and how far behind the best in the logarithm of the evidence one may be.
-const CHOSEN_AGAIN: usize = 3;
-const CLOSE: f64 = 10.0;
 
 /// Diagnoses a recording.
 ///
@@ -204,17 +201,13 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     let posterior = weigh(&study, &calibration, &null, &fits, &left);
     let named = posterior.named;
     let weight = |fit: &Fit| weight(&calibration, &study, fit);
-    let causes: Vec<&Fit> = fits
-        .iter()
-        .filter(|_| named)
-        .take(CHOSEN_AGAIN)
-        .filter(|fit| weight(best) - weight(fit) < CLOSE)
-        .collect();
+    // Causes that the data do not distinguish: each fold chooses among them again, and they share the place.
+    let alike: Vec<&Fit> = if named { alike(&posterior, &calibration, &fits, &weight) } else { Vec::new() };
     let compared = Compared {
         study: &study,
         linearised: [&linearised, at_best],
         null: &null,
-        causes: &causes,
+        causes: &alike,
         weight: &weight,
     };
     let gap = how_far(compared, &folds);
@@ -239,8 +232,6 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
             gains.push(Gain { fit, gain: null.cost - fit.cost });
         }
     }
-    // Causes that the data do not distinguish share the place.
-    let alike: Vec<&Fit> = if named { alike(&posterior, &calibration, &fits, &weight) } else { Vec::new() };
     let inseparable = inseparable(&study, &alike);
     let rank =
         |gain: &Gain<'_>| alike.iter().position(|fit| std::ptr::eq(*fit, gain.fit)).unwrap_or(usize::MAX);

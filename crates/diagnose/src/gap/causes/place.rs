@@ -12,10 +12,7 @@ use crate::gap::residuals::study::{Study, members};
 use crate::gap::residuals::whiten::Linearised;
 use mapper_physics::rig::effect::Submodel;
 
-/// Minimum share of the gap for a part to be listed.
-const MIN_SHARE: f64 = 0.01;
-
-/// Linearisation error as a share of the gain: explanations closer than this remain open.
+/// Linearisation error as a share of the gain: explanations closer than this remain open, and a part with less of the gap is not listed.
 pub const BEND: f64 = 0.01;
 
 /// Approximate cost of one more effect in log evidence.
@@ -136,7 +133,7 @@ pub fn places_of(
         }
     }
     parts.sort_by(|a, b| b.1.total_cmp(&a.1));
-    parts.retain(|(_, share, ..)| *share >= MIN_SHARE);
+    parts.retain(|(_, share, ..)| *share >= BEND);
     let points = study.points(&null.hypothesis).unwrap_or_default();
     let shown = parts.into_iter().filter_map(|(submodel, share, _, part)| {
         Some((submodel, share, show(study, linearised, &(part.signature)()?, &points)?))

@@ -434,7 +434,7 @@ impl Suggestion {
 }
 
 /// Probability below which a cause other than the first is not listed: it would be shown as "<0.5 %".
-const EXCLUDED: f64 = 0.005;
+pub(crate) const EXCLUDED: f64 = 0.005;
 
 impl Diagnosis {
     /// Causes to list: the first, and others that are not excluded.

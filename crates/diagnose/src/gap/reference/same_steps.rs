@@ -2,12 +2,9 @@
 
 use crate::gap::preconditions::problem::Problem;
 use crate::gap::residuals::study::Study;
-use mapper_core::Channel;
+use mapper_core::{Channel, VALVE_JUMP_RATIO, jump_ratio};
 use mapper_observe::averages::mean_reading::mean_reading;
 
-/// Allowed differences of a step's commanded P3 (ratio) and valve opening: model error hardly changes over this distance.
-const P3_RATIO: f64 = 0.02;
-const OPENING: f64 = 0.01;
 /// Length of a step, s.
 const LENGTH_S: f64 = 1.0;
 /// Turbine inlet temperature, K: a smaller difference is ambient variation, not another operating point.
@@ -37,8 +34,10 @@ pub(crate) fn same_steps(healthy: &Study, study: &Study) -> Result<(), Problem> 
                 Err(Problem::OtherStep { step, what, healthy, recorded, unit, within })
             }
         };
-        differs("commanded P3", theirs.p3_pa / 1e3, ours.p3_pa / 1e3, "kPa", P3_RATIO * ours.p3_pa / 1e3)?;
-        differs("opening of the valve", theirs.valve_opening_ratio, ours.valve_opening_ratio, "", OPENING)?;
+        // Model error hardly changes between points that count as one.
+        let (p3_kpa, opening) = (ours.p3_pa / 1e3, ours.valve_opening_ratio);
+        differs("commanded P3", theirs.p3_pa / 1e3, p3_kpa, "kPa", jump_ratio(Channel::P3) * p3_kpa)?;
+        differs("opening of the valve", theirs.valve_opening_ratio, opening, "", VALVE_JUMP_RATIO * opening)?;
         // The running time before the first jump is not compared.
         if index > 0 {
             differs("length", theirs.end_s - theirs.start_s, ours.end_s - ours.start_s, "s", LENGTH_S)?;

@@ -16,7 +16,7 @@ use mapper_core::{
     ModelTolerances, NoCompression, PointBudgets, ReferenceState, StepKind, StepMarker, Warning,
 };
 use mapper_numerics::root::root_between;
-use mapper_physics::compressor_map::characteristic::{CharacteristicPoint, CompressorCharacteristic};
+use mapper_physics::compressor_map::one_point_map::OnePointMap;
 use mapper_physics::gas::air::Air;
 use mapper_physics::laws::compression::apparent_efficiency;
 use mapper_physics::machine::boundary::BoundaryConditions;
@@ -275,13 +275,13 @@ impl Inputs {
         let compressor = &mut params.compressor;
         (compressor.humidity_kg_kg, compressor.efficiency) = (self.air.humidity_kg_kg(), self.air.efficiency);
         (compressor.flow_scale_ratio, compressor.efficiency_scale_ratio) = (1.0, 1.0);
-        let map = OnePoint {
+        let map = OnePointMap {
             // At the state of the inlet itself corrected flow is measured flow; the wheel pumps what recirculates, too.
             reference: ReferenceState { t_ref_k: self.point.t1_k, p_ref_pa: self.point.p1_pa },
-            flow_kg_s: self.point.flow_kg_s
+            flow_corrected_kg_s: self.point.flow_kg_s
                 * self.air.dry_flow_ratio()
                 * (1.0 + compressor.recirculation_ratio),
-            eta,
+            efficiency: eta,
         };
         let boundary =
             BoundaryConditions { t1_k: self.point.t1_k, p1_pa: self.point.p1_pa, ..machine.boundary };
@@ -412,39 +412,5 @@ impl Machine {
             Moved::AmbientTemperature => boundary.ambient_temperature_k += by,
             Moved::Reading(_) | Moved::Gain(_) | Moved::Barometer | Moved::Humidity => {}
         }
-    }
-}
-
-/// The map of a machine at one point.
-#[derive(Debug, Clone, Copy)]
-struct OnePoint {
-    reference: ReferenceState,
-    flow_kg_s: f64,
-    eta: f64,
-}
-
-impl CompressorCharacteristic for OnePoint {
-    fn reference(&self) -> ReferenceState {
-        self.reference
-    }
-
-    fn evaluate(&self, _: f64, _: f64) -> CharacteristicPoint {
-        CharacteristicPoint {
-            flow_corrected_kg_s: self.flow_kg_s,
-            efficiency: self.eta,
-            surge_position_ratio: 0.0,
-        }
-    }
-
-    fn surge_point(&self, _: f64) -> (f64, f64) {
-        (self.flow_kg_s, f64::NAN)
-    }
-
-    fn choke_flow_corrected_kg_s(&self, _: f64) -> f64 {
-        self.flow_kg_s
-    }
-
-    fn fingerprint(&self) -> String {
-        String::new()
     }
 }

@@ -1,6 +1,6 @@
 //! Compressor side driven by its measured neighbours: eqs. 1-3, one housing node, and the probe.
 
-use crate::driven::{Readings, Values};
+use crate::driven::{Rows, Values};
 use mapper_numerics::statistics::mean;
 use mapper_physics::laws::compression::{CompressionInputs, compress, compressed_k, isentropic_rise_ratio};
 use mapper_physics::laws::housing::compressor_capacity_j_k;
@@ -23,27 +23,23 @@ pub struct Declared {
 
 impl Declared {
     /// Reference at the geometric means of the rows.
-    pub fn new(params: Params, rows: &Readings) -> Self {
-        Declared {
-            params,
-            middle_speed_rpm: geometric_mean(rows.speed_rpm.iter().copied()),
-            middle_flow: geometric_mean((0..rows.len()).map(|i| flow_coefficient_of(rows, i))),
-        }
+    pub fn new(params: Params, rows: &Rows) -> Self {
+        let (middle_speed_rpm, middle_flow) = middles(rows);
+        Declared { params, middle_speed_rpm, middle_flow }
     }
 }
 
-/// Geometric mean of positive values; 1 of none.
-pub(crate) fn geometric_mean(values: impl Iterator<Item = f64>) -> f64 {
-    mean(values.map(f64::ln)).map_or(1.0, f64::exp)
+/// Geometric means of speed and flow coefficient over the rows; 1 without any.
+pub(crate) fn middles(rows: &Rows) -> (f64, f64) {
+    let [speed_rpm, flow_kg_s, p1_pa, _, t1_k] = rows.drives();
+    let flow = |i: usize| flow_coefficient(speed_rpm[i], flow_kg_s[i], p1_pa[i], t1_k[i]).ln();
+    let geometric = |mean: Option<f64>| mean.map_or(1.0, f64::exp);
+    (geometric(mean(speed_rpm.iter().map(|rpm| rpm.ln()))), geometric(mean((0..rows.len()).map(flow))))
 }
 
 /// Flow over speed at inlet density: the flow coefficient without wheel size and gas constant.
 pub(crate) fn flow_coefficient(speed_rpm: f64, flow_kg_s: f64, p1_pa: f64, t1_k: f64) -> f64 {
     flow_kg_s * t1_k / (p1_pa * speed_rpm)
-}
-
-fn flow_coefficient_of(rows: &Readings, i: usize) -> f64 {
-    flow_coefficient(rows.speed_rpm[i], rows.flow_kg_s[i], rows.p1_pa[i], rows.t1_k[i])
 }
 
 /// Predicted sensor readings.
@@ -58,7 +54,7 @@ pub struct Predicted {
 }
 
 /// Simulates the first `count` rows.
-pub fn predict(rows: &Readings, declared: &Declared, values: &Values, count: usize) -> Predicted {
+pub fn predict(rows: &Rows, declared: &Declared, values: &Values, count: usize) -> Predicted {
     let [
         eta,
         eta_speed,
@@ -78,19 +74,21 @@ pub fn predict(rows: &Readings, declared: &Declared, values: &Values, count: usi
     let compressor = &declared.params.compressor;
     let air = compressor.air();
     let count = count.min(rows.len());
+    let [speed_rpm, flows_kg_s, p1_pa, p2_pa, t1s_k] = rows.drives();
+    let t2_k = &rows.judged[0].1;
     let mut predicted = Predicted::default();
     let mut state: Option<(f64, f64)> = None;
     for i in 0..count {
-        let (t1_k, flow_kg_s) = (rows.t1_k[i], rows.flow_kg_s[i]);
-        let speed = (rows.speed_rpm[i] / declared.middle_speed_rpm).ln();
-        let flow = (flow_coefficient_of(rows, i) / declared.middle_flow).ln();
+        let (t1_k, flow_kg_s) = (t1s_k[i], flows_kg_s[i]);
+        let speed = (speed_rpm[i] / declared.middle_speed_rpm).ln();
+        let flow = (flow_coefficient(speed_rpm[i], flow_kg_s, p1_pa[i], t1_k) / declared.middle_flow).ln();
         let efficiency =
             (eta + (eta_speed + eta_speed_2 * speed) * speed + (eta_flow + eta_flow_2 * flow) * flow)
                 .clamp(EFFICIENCY.0, EFFICIENCY.1);
         let (mut tc_k, mut reading_k) =
-            state.unwrap_or((0.5 * (t1_k + rows.t2_k[i]) + start_over_k, rows.t2_k[i] - t2_offset_k));
-        let air = air.between(rows.p1_pa[i], rows.p2_pa[i]);
-        let rise = isentropic_rise_ratio(rows.p2_pa[i] / rows.p1_pa[i], t1_k, air);
+            state.unwrap_or((0.5 * (t1_k + t2_k[i]) + start_over_k, t2_k[i] - t2_offset_k));
+        let air = air.between(p1_pa[i], p2_pa[i]);
+        let rise = isentropic_rise_ratio(p2_pa[i] / p1_pa[i], t1_k, air);
         let h_w_m2k = h_ratio
             * nusselt::coefficient_w_m2k(
                 compressor.nusselt_coefficient,
@@ -121,7 +119,7 @@ pub fn predict(rows: &Readings, declared: &Declared, values: &Values, count: usi
             thermocouple::time_constant_s(1e-3 * probe_mm, compressor.outlet_diameter_m, flow_kg_s, gas.t2_k);
         if state.is_none() {
             // The probe starts at its reading.
-            reading_k = rows.t2_k[i] - t2_offset_k;
+            reading_k = t2_k[i] - t2_offset_k;
         }
         predicted.t2_k.push(reading_k + t2_offset_k);
         predicted.tc_k.push(tc_k);

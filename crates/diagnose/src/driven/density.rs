@@ -1,7 +1,7 @@
 //! Agreement of parameter values with the rows of a log.
 
 use crate::driven::parameters::COUNT;
-use crate::driven::{Declared, Readings, Values, predict};
+use crate::driven::{Declared, Rows, Values, predict};
 
 /// Correlation time of model and sensor errors, s: a probe's own time constant.
 pub(crate) const ALIKE_S: f64 = 2.0;
@@ -11,12 +11,7 @@ pub(crate) const HOUSING_SIGMA_K: f64 = 3.0;
 pub(crate) const HOUSING_ALIKE_S: f64 = 60.0;
 
 /// Log posterior density of standard normal parameters, up to a constant; minus infinity if the model has no solution.
-pub(crate) fn log_density(
-    standard: &[f64; COUNT],
-    rows: &Readings,
-    declared: &Declared,
-    count: usize,
-) -> f64 {
+pub(crate) fn log_density(standard: &[f64; COUNT], rows: &Rows, declared: &Declared, count: usize) -> f64 {
     let values = Values::of_standard(standard);
     let prior = -0.5 * standard.iter().map(|z| z * z).sum::<f64>();
     let predicted = predict(rows, declared, &values, count);
@@ -40,7 +35,7 @@ pub(crate) fn log_density(
         sum
     };
     let density = prior
-        + residual(&rows.t2_k, &predicted.t2_k, sigma_k, ALIKE_S)
-        + residual(&rows.tc_k, &predicted.tc_k, HOUSING_SIGMA_K, HOUSING_ALIKE_S);
+        + residual(&rows.judged[0].1, &predicted.t2_k, sigma_k, ALIKE_S)
+        + residual(&rows.judged[1].1, &predicted.tc_k, HOUSING_SIGMA_K, HOUSING_ALIKE_S);
     if density.is_finite() { density } else { f64::NEG_INFINITY }
 }

@@ -20,11 +20,25 @@ pub(crate) struct Wanted<'a> {
     pub(crate) works: fn(&[f64]) -> bool,
 }
 
+/// Pressure ratio below which a compressor or turbine does hardly any work, so that its temperatures do not show its efficiency.
+pub(crate) const WORKING_RATIO: f64 = 1.02;
+/// Minimum flow at which the gas path is evaluated, kg/s (its equations divide by it).
+pub(crate) const SMALLEST_FLOW_KG_S: f64 = 1e-3;
+/// Channels that the compressor side needs.
+pub(crate) const COMPRESSOR: Wanted<'_> = Wanted {
+    drives: &[Channel::ShaftSpeed, Channel::CompressorFlow, Channel::P1, Channel::P2, Channel::T1],
+    judged: &[Channel::T2, Channel::Tc],
+    works: |row| {
+        let [speed_rpm, flow_kg_s, p1_pa, p2_pa, _] = *row else { return false };
+        p2_pa >= WORKING_RATIO * p1_pa && flow_kg_s >= SMALLEST_FLOW_KG_S && speed_rpm > 0.0
+    },
+};
+
 /// Complete rows, as columns of equal length. SI units.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Rows {
+pub struct Rows {
     /// Time, s, rising.
-    pub(crate) t_s: Vec<f64>,
+    pub t_s: Vec<f64>,
     /// Driving channels, in the requested order.
     pub(crate) drives: Vec<(Channel, Vec<f64>)>,
     /// Their rates of change, per second; empty if not requested.
@@ -36,6 +50,19 @@ pub(crate) struct Rows {
 }
 
 impl Rows {
+    /// Rows of the compressor side at the times of T2.
+    ///
+    /// # Errors
+    /// [`DrivenError::Channel`] if speed, flow, P1, P2, T1 or T2 is missing.
+    pub fn of_compressor(recording: &Recording) -> Result<Self, DrivenError> {
+        Rows::read(recording, COMPRESSOR)
+    }
+
+    /// The driving channels, in the requested order.
+    pub(crate) fn drives<const N: usize>(&self) -> [&[f64]; N] {
+        std::array::from_fn(|place| self.drives.get(place).map_or(&[][..], |(_, column)| column))
+    }
+
     /// Rows of a recording at the times of the first judged channel.
     ///
     /// # Errors
@@ -88,7 +115,8 @@ impl Rows {
     }
 
     /// Number of rows.
-    pub(crate) fn len(&self) -> usize {
+    #[expect(clippy::len_without_is_empty, reason = "nothing asks whether there are rows")]
+    pub fn len(&self) -> usize {
         self.t_s.len()
     }
 

@@ -15,10 +15,9 @@ mod error;
 mod log_rows;
 mod outcome;
 mod parameters;
-mod readings;
 
 pub use compressor_side::{Declared, Predicted, predict};
 pub use error::DrivenError;
+pub use log_rows::Rows;
 pub use outcome::{DrivenOutcome, FoundParameter, Judged, Moves, Trace, identify};
 pub use parameters::{PARAMETERS, Parameter, Values};
-pub use readings::Readings;

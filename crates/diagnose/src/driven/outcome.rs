@@ -3,7 +3,7 @@
 use crate::driven::density::log_density;
 use crate::driven::ensemble::draws;
 use crate::driven::parameters::{COUNT, PARAMETERS, Parameter};
-use crate::driven::{Declared, DrivenError, Predicted, Readings, Values, predict};
+use crate::driven::{Declared, DrivenError, Predicted, Rows, Values, predict};
 use mapper_inference::interval::IDENTIFIED_RATIO;
 use mapper_numerics::statistics::{mean, quantile, rms};
 use mapper_physics::gas::air::Air;
@@ -13,9 +13,6 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
-
-/// Minimum number of rows: twice the parameters.
-const MIN_ROWS: usize = 2 * COUNT;
 
 /// Posterior of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -111,14 +108,15 @@ pub struct DrivenOutcome {
 /// # Errors
 /// [`DrivenError::TooFewRows`] if there are too few rows to fit.
 pub fn identify(
-    rows: &Readings,
+    rows: &Rows,
     params: Params,
     fit_until_s: f64,
     seed: u64,
 ) -> Result<DrivenOutcome, DrivenError> {
     let fitted = rows.t_s.partition_point(|t_s| *t_s < fit_until_s);
-    if fitted < MIN_ROWS {
-        return Err(DrivenError::TooFewRows { rows: fitted, until_s: fit_until_s, needed: MIN_ROWS });
+    let needed = 2 * COUNT;
+    if fitted < needed {
+        return Err(DrivenError::TooFewRows { rows: fitted, until_s: fit_until_s, needed });
     }
     let declared = Declared::new(params, rows);
     let sample: Vec<Values> = draws(|standard| log_density(standard, rows, &declared, fitted), seed)
@@ -160,7 +158,7 @@ fn found(parameter: Parameter, place: usize, sample: &[Values]) -> FoundParamete
 }
 
 /// Each draw with its own noise, as if it were the truth.
-fn with_noise(sample: &[Values], predicted: &[Predicted], rows: &Readings, seed: u64) -> Vec<Vec<f64>> {
+fn with_noise(sample: &[Values], predicted: &[Predicted], rows: &Rows, seed: u64) -> Vec<Vec<f64>> {
     let mut random = Pcg64Mcg::seed_from_u64(seed.wrapping_add(1));
     sample
         .iter()
@@ -182,19 +180,20 @@ fn with_noise(sample: &[Values], predicted: &[Predicted], rows: &Readings, seed:
         .collect()
 }
 
-fn trace(air: Air, rows: &Readings, predicted: &[Predicted], noisy: &[Vec<f64>]) -> Trace {
+fn trace(air: Air, rows: &Rows, predicted: &[Predicted], noisy: &[Vec<f64>]) -> Trace {
     let over = |i: usize, pick: &dyn Fn(&Predicted) -> &[f64]| {
         mean(predicted.iter().map(|one| pick(one)[i])).unwrap_or(f64::NAN)
     };
     let end = |i: usize, share: f64| quantile(noisy.iter().map(|one| one[i]), share).unwrap_or(f64::NAN);
     let every = || 0..rows.len();
+    let ([_, _, p1_pa, p2_pa, t1_k], t2_k) = (rows.drives(), &rows.judged[0].1);
     let apparent = |i: usize| {
-        let (p1_pa, p2_pa) = (rows.p1_pa[i], rows.p2_pa[i]);
-        apparent_efficiency(p2_pa / p1_pa, rows.t1_k[i], rows.t2_k[i], air.between(p1_pa, p2_pa))
+        let air = air.between(p1_pa[i], p2_pa[i]);
+        apparent_efficiency(p2_pa[i] / p1_pa[i], t1_k[i], t2_k[i], air)
     };
     Trace {
         t_s: rows.t_s.clone(),
-        read_k: rows.t2_k.clone(),
+        read_k: t2_k.clone(),
         predicted_k: every().map(|i| over(i, &|one| &one.t2_k)).collect(),
         low_k: every().map(|i| end(i, 0.025)).collect(),
         high_k: every().map(|i| end(i, 0.975)).collect(),
@@ -203,7 +202,7 @@ fn trace(air: Air, rows: &Readings, predicted: &[Predicted], noisy: &[Vec<f64>])
     }
 }
 
-fn judged(rows: &Readings, trace: &Trace, noisy: &[Vec<f64>], from: usize, until: usize) -> Judged {
+fn judged(rows: &Rows, trace: &Trace, noisy: &[Vec<f64>], from: usize, until: usize) -> Judged {
     let distance = |truth_k: &[f64]| {
         let off = (from..until).map(|i| truth_k[i] - trace.predicted_k[i]);
         rms(off).unwrap_or(f64::NAN)
@@ -211,12 +210,12 @@ fn judged(rows: &Readings, trace: &Trace, noisy: &[Vec<f64>], from: usize, until
     let expected: Vec<f64> = noisy.iter().map(|one| distance(one)).collect();
     let at = |share: f64| quantile(&expected, share).unwrap_or(f64::NAN);
     let inside =
-        (from..until).filter(|i| (trace.low_k[*i]..=trace.high_k[*i]).contains(&rows.t2_k[*i])).count();
+        (from..until).filter(|i| (trace.low_k[*i]..=trace.high_k[*i]).contains(&trace.read_k[*i])).count();
     Judged {
         from_s: rows.t_s[from],
         until_s: rows.t_s[until - 1],
         rows: until - from,
-        rms_k: distance(&rows.t2_k),
+        rms_k: distance(&trace.read_k),
         expected_rms_k: at(0.5),
         expected_low_k: at(0.025),
         expected_high_k: at(0.975),
@@ -228,7 +227,7 @@ fn judged(rows: &Readings, trace: &Trace, noisy: &[Vec<f64>], from: usize, until
 fn moves(
     sample: &[Values],
     predicted: &[Predicted],
-    rows: &Readings,
+    rows: &Rows,
     declared: &Declared,
     fitted: usize,
     name: &str,

@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_core::{Channel, Recording, Series};
-use mapper_diagnose::driven::{DrivenError, DrivenOutcome, Readings, identify};
+use mapper_diagnose::driven::{DrivenError, DrivenOutcome, Rows, identify};
 use mapper_physics::machine::params::{BoundaryConditions, Params};
 use mapper_physics::simulation::driven::{FrozenGrid, drive};
 use mapper_physics::simulation::inputs::{Inputs, InterpolatedInputs};
@@ -81,7 +81,7 @@ fn what_is_left_of_the_brake_is_what_was_expected() {
     for seed in 0..seeds {
         let (recording, declared, truth) = log(seed);
         let outcome: DrivenOutcome =
-            identify(&Readings::of(&recording).unwrap(), declared, BRAKE_S, 1).unwrap();
+            identify(&Rows::of_compressor(&recording).unwrap(), declared, BRAKE_S, 1).unwrap();
         let h = truth.compressor.nusselt_coefficient / declared.compressor.nusselt_coefficient;
         for (count, (name, truth)) in
             known.iter_mut().zip([("probe", 1e3 * truth.t2_probe_diameter_m), ("h", h)])
@@ -108,7 +108,7 @@ fn a_long_log_is_thinned() {
         series.t_s = (0..864_000).map(|i| 0.1 * f64::from(i)).collect();
         series.values = vec![series.values[0]; series.t_s.len()];
     }
-    let rows = Readings::of(&recording).unwrap();
+    let rows = Rows::of_compressor(&recording).unwrap();
     assert!((2_000..=3_001).contains(&rows.len()), "{}", rows.len());
     assert!(rows.t_s.last().unwrap() > &86_000.0);
 }
@@ -116,9 +116,9 @@ fn a_long_log_is_thinned() {
 #[test]
 fn too_little_is_refused() {
     let (recording, declared, _) = log(0);
-    let rows = Readings::of(&recording).unwrap();
+    let rows = Rows::of_compressor(&recording).unwrap();
     assert!(matches!(identify(&rows, declared, 1.0, 1), Err(DrivenError::TooFewRows { rows: 9, .. })));
     let mut without = recording;
     without.series.remove(&Channel::P2);
-    assert!(matches!(Readings::of(&without), Err(DrivenError::Channel(_))));
+    assert!(matches!(Rows::of_compressor(&without), Err(DrivenError::Channel(_))));
 }

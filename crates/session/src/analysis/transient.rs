@@ -7,7 +7,7 @@ use crate::recording::recording_file::{Recorded, check_machine};
 use crate::{Session, SessionError};
 use mapper_core::ExportError;
 use mapper_diagnose::driven::cause_search::{Ask, Diagnosis, Which, diagnose};
-use mapper_diagnose::driven::{DrivenOutcome, Readings, identify};
+use mapper_diagnose::driven::{DrivenOutcome, Rows, identify};
 use mapper_diagnose::gap::causes::calibration::Calibration;
 use mapper_observe::Declared;
 use mapper_physics::rig::effect::{Effect, Rig};
@@ -61,7 +61,7 @@ impl Session<'_> {
         let fit_until_s = fit_until_s.unwrap_or(f64::INFINITY);
         let identified = match side {
             Which::Compressor => {
-                let rows = Readings::of(recording)?;
+                let rows = Rows::of_compressor(recording)?;
                 Some(identify(&rows, campaign.machine.params, fit_until_s, campaign.seed)?)
             }
             Which::Turbine => None,

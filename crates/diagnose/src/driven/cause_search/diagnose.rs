@@ -14,6 +14,7 @@ use crate::driven::cause_search::sides::turbine::TurbineSide;
 use crate::driven::log_rows::Rows;
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::weigh::{estimates, name_of};
+use crate::gap::findings::report::EXCLUDED;
 use crate::gap::next_experiment::best_experiment::RIVALS;
 use mapper_core::{Channel, Recording};
 use mapper_inference::interval::IDENTIFIED_RATIO;
@@ -28,8 +29,6 @@ use std::sync::Arc;
 
 /// Maximum number of rows; more add no information, because the model error is correlated over seconds.
 const MAX_ROWS: usize = 800;
-/// Maximum number of causes shown.
-const SHOWN: usize = 8;
 
 /// Inputs of a diagnosis.
 pub struct Ask<'a> {
@@ -84,7 +83,8 @@ fn of_side<S: Side>(ask: &Ask<'_>) -> Result<Diagnosis, DrivenError> {
     let found = search(&question, &asked, &counts, calibration).ok_or(DrivenError::NoAnswer)?;
     let posterior = weigh(calibration, asked.len(), &found);
     let fit_of = |place: usize| &found.fits[posterior.causes[place].0];
-    let causes = posterior.causes.len().min(SHOWN);
+    let listed = |(_, probability): &&(usize, f64)| *probability >= EXCLUDED;
+    let causes = posterior.causes.iter().take_while(listed).count().max(posterior.open);
     // The named cause before the comparison with an unmodelled one; held-out phases judge it.
     let likeliest = if posterior.named && causes > 0 { fit_of(0) } else { &found.null };
     let open = posterior.open;
@@ -121,7 +121,7 @@ fn of_side<S: Side>(ask: &Ask<'_>) -> Result<Diagnosis, DrivenError> {
         causes: (0..causes)
             .map(|place| cause(&question, calibration, fit_of(place), posterior.causes[place].1))
             .collect(),
-        open: open.min(causes),
+        open,
         before_k: off_k(&question, &found.null.predicted, 0..fitted),
         after_k: off_k(&question, &likeliest.predicted, 0..fitted),
         held_out,

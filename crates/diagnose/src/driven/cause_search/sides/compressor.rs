@@ -1,14 +1,13 @@
 //! Compressor side of the model with all effects. Flow and efficiency come from measurement and free parameters instead of the map.
 
 use crate::driven::cause_search::sides::side::{Side, Smooth, Which, truth};
-use crate::driven::compressor_side::{EFFICIENCY, flow_coefficient, geometric_mean};
+use crate::driven::compressor_side::{EFFICIENCY, flow_coefficient, middles};
 use crate::driven::density::{ALIKE_S, HOUSING_ALIKE_S, HOUSING_SIGMA_K};
-use crate::driven::log_rows::{Rows, Wanted};
+use crate::driven::log_rows::{COMPRESSOR, Rows, Wanted};
 use crate::driven::parameters::Spread;
-use crate::driven::readings::COMPRESSOR;
 use crate::driven::{PARAMETERS, Parameter};
-use mapper_core::{Channel, ReferenceState};
-use mapper_physics::compressor_map::characteristic::{CharacteristicPoint, CompressorCharacteristic};
+use mapper_core::Channel;
+use mapper_physics::compressor_map::one_point_map::OnePointMap;
 use mapper_physics::laws::housing::compressor_capacity_j_k;
 use mapper_physics::machine::params::{BoundaryConditions, MODEL_REFERENCE};
 use mapper_physics::rig::effect::{Rig, Submodel};
@@ -73,12 +72,7 @@ impl Side for CompressorSide {
     }
 
     fn of(rows: Rows) -> Self {
-        let middle_speed_rpm = geometric_mean(rows.drive(Channel::ShaftSpeed).iter().copied());
-        let at = |i: usize| {
-            let [speed_rpm, flow_kg_s, p1_pa, _, t1_k] = std::array::from_fn(|place| rows.drives[place].1[i]);
-            flow_coefficient(speed_rpm, flow_kg_s, p1_pa, t1_k)
-        };
-        let middle_flow = geometric_mean((0..rows.len()).map(at));
+        let (middle_speed_rpm, middle_flow) = middles(&rows);
         CompressorSide { rows, middle_speed_rpm, middle_flow }
     }
 
@@ -147,7 +141,7 @@ impl Side for CompressorSide {
             .clamp(EFFICIENCY.0, EFFICIENCY.1);
             let flow_corrected_kg_s =
                 wheel_kg_s * dry_flow_ratio / MODEL_REFERENCE.physical_flow_kg_s(1.0, t1s_k[i], p1s_pa[i]);
-            model.map = Arc::new(AsMeasured { flow_corrected_kg_s, efficiency });
+            model.map = Arc::new(OnePointMap { reference: MODEL_REFERENCE, flow_corrected_kg_s, efficiency });
             state.shaft_speed_rad_s = rad_s_of_rpm(speeds_rpm[i]);
             state.p2_pa = p2s_pa[i];
             let prepared = model.prepare_at(rows.t_s[i], &boundary);
@@ -252,43 +246,6 @@ impl Tip {
 
 /// Time constant of a tip that starts halfway between reading and target, s.
 const FAST_S: f64 = 0.3;
-
-/// A map that returns the measured values at any operating point.
-#[derive(Debug)]
-struct AsMeasured {
-    flow_corrected_kg_s: f64,
-    efficiency: f64,
-}
-
-impl CompressorCharacteristic for AsMeasured {
-    fn reference(&self) -> ReferenceState {
-        MODEL_REFERENCE
-    }
-
-    fn evaluate(&self, _: f64, _: f64) -> CharacteristicPoint {
-        CharacteristicPoint {
-            flow_corrected_kg_s: self.flow_corrected_kg_s,
-            efficiency: self.efficiency,
-            surge_position_ratio: 0.5,
-        }
-    }
-
-    fn evaluate_scaled(&self, speed_rpm: f64, pressure_ratio: f64, _: f64) -> CharacteristicPoint {
-        self.evaluate(speed_rpm, pressure_ratio)
-    }
-
-    fn surge_point(&self, _: f64) -> (f64, f64) {
-        (self.flow_corrected_kg_s, 1.0)
-    }
-
-    fn choke_flow_corrected_kg_s(&self, _: f64) -> f64 {
-        self.flow_corrected_kg_s
-    }
-
-    fn fingerprint(&self) -> String {
-        "as measured".to_owned()
-    }
-}
 
 #[cfg(test)]
 mod tests {

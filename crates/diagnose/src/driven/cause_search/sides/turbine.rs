@@ -3,9 +3,8 @@
 use crate::driven::Parameter;
 use crate::driven::cause_search::sides::side::{Side, Smooth, Which, truth};
 use crate::driven::density::{ALIKE_S, HOUSING_ALIKE_S};
-use crate::driven::log_rows::{Rows, Wanted};
+use crate::driven::log_rows::{Rows, SMALLEST_FLOW_KG_S, WORKING_RATIO, Wanted};
 use crate::driven::parameters::Spread;
-use crate::driven::readings::{SMALLEST_FLOW_KG_S, WORKING_RATIO};
 use mapper_core::Channel;
 use mapper_physics::laws::housing::turbine_capacity_j_k;
 use mapper_physics::laws::turbine::TurbineInlet;

@@ -39,10 +39,6 @@ pub struct Discovered {
 
 /// Number of leave-one-out folds of steps in which a law must recur.
 const FOLDS: usize = 6;
-/// Minimum share of the folds in which a law must recur.
-const MIN_STABILITY: f64 = 0.5;
-/// Maximum number of reported source terms.
-const FORCES: usize = 3;
 
 /// Searches outside the effect library, if the diagnosis leaves a residual; see [`wanted`].
 pub fn discover(
@@ -91,7 +87,7 @@ pub fn discover(
     progress(1.0, "done");
     Discovered {
         laws,
-        forces: forces.into_iter().take(FORCES).map(reported_force).collect(),
+        forces: forces.into_iter().take(1 + MAX_EQUIVALENT).map(reported_force).collect(),
         places: Some(places),
         settled: settled_fit,
     }
@@ -201,7 +197,7 @@ fn fitted(
     let quick = Effort { iterations: 3, enough: 1.0, ..Effort::default() };
     let mut trained = bench.fit(&base.hypothesis, base.linearised, chosen, training, quick);
     keep_determined(&bench.library, &mut trained);
-    trained.truncate(FINALISTS);
+    trained.truncate(1 + MAX_EQUIVALENT);
     // Tolerances act differently in the presence of a strong term.
     let at_trained = base.linearised.at(&bench.study, &trained.first()?.fit.hypothesis).ok();
     let linearised = at_trained.as_ref().unwrap_or(base.linearised);
@@ -212,8 +208,6 @@ fn fitted(
     Some((trained, fitted))
 }
 
-/// Number of laws fitted to convergence.
-const FINALISTS: usize = 3;
 /// Minimum evidence of a recurring law in a fold, as a share of the best evidence.
 const LIKE: f64 = 0.95;
 
@@ -248,7 +242,8 @@ fn propose(
     };
     let (before, after) = (read(before), read(trained.fit.clone()));
     let shrink = shrink(study, &before, &after, held_out);
-    if shrink < MIN_SHRINK || found.stability < MIN_STABILITY {
+    // It must recur in half of the folds.
+    if shrink < MIN_SHRINK || found.stability < 0.5 {
         return Vec::new();
     }
     let (channels, worse) = channels_on(study, linearised, [&before, &after], held_out);

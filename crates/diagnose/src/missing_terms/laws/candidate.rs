@@ -2,6 +2,7 @@
 
 use crate::gap::best_fit::fit::{Effort, Fit, fit, fit_from};
 use crate::gap::best_fit::selection::Selection;
+use crate::gap::causes::weigh::MAX_EQUIVALENT;
 use crate::gap::residuals::study::{Hypothesis, Study};
 use crate::gap::residuals::whiten::Linearised;
 use crate::missing_terms::search::select::Choice;
@@ -144,7 +145,7 @@ pub fn worth(library: &[Term], choices: &[Choice]) -> Vec<Choice> {
     let least = PROMISE * best.gain;
     for choice in choices.iter().filter(|choice| choice.gain > least) {
         let of_part = selected.iter().filter(|other| part(other) == part(choice)).count();
-        let parts = if part(choice) == part(best) { OF_THE_BEST_PART } else { OF_OTHER_PARTS };
+        let parts = if part(choice) == part(best) { 1 + MAX_EQUIVALENT } else { 1 };
         if of_part < parts && selected.len() < MAX {
             selected.push(choice.clone());
         }
@@ -156,5 +157,3 @@ pub fn worth(library: &[Term], choices: &[Choice]) -> Vec<Choice> {
 const PROMISE: f64 = 0.3;
 /// Maximum number of fitted laws.
 const MAX: usize = 6;
-const OF_THE_BEST_PART: usize = 3;
-const OF_OTHER_PARTS: usize = 1;

@@ -1,10 +1,10 @@
 //! Laws that begin during a recording.
 
 use crate::gap::best_fit::normal::PRIOR_STEPS;
-use crate::gap::residuals::whiten::rows_of_step;
+use crate::gap::causes::weigh::MAX_EQUIVALENT;
 use crate::missing_terms::search::columns::{Base, Products};
 use crate::missing_terms::search::evidence::weigh;
-use crate::missing_terms::search::residual_source::APART;
+use crate::missing_terms::search::residual_source::in_each_step;
 use crate::missing_terms::search::select::Choice;
 use crate::missing_terms::terms::expression::{Expression, product};
 use crate::missing_terms::terms::term::{Role, Term};
@@ -99,7 +99,7 @@ pub fn begun(
     let stability = again.count() as f64 / folds.len().max(1) as f64;
     let mut chosen: Vec<Choice> = Vec::new();
     for choice in found {
-        if chosen.len() < 3 && chosen.iter().all(|other| other.terms != choice.terms) {
+        if chosen.len() <= MAX_EQUIVALENT && chosen.iter().all(|other| other.terms != choice.terms) {
             chosen.push(choice);
         }
     }
@@ -129,38 +129,20 @@ fn from(term: &Term, begin_s: f64, step: usize) -> Term {
     later
 }
 
-/// Whitened changes for one step of a term's coefficient, for an onset at each step of the recording.
+/// Whitened changes for one step of a term's coefficient, for an onset at each step of the recording: a term with an onset is the sum of its
+/// parts in each later step.
 fn from_each_step(base: &Base<'_>, term: &Term) -> Vec<Vec<f64>> {
-    let study = base.study;
-    let steps = study.steps.len();
-    let span = |step: usize| {
-        let begin_s = if step == 0 { f64::NEG_INFINITY } else { study.steps[step].marker.start_s };
-        (begin_s, study.steps.get(step + 1).map_or(f64::INFINITY, |next| next.marker.start_s))
-    };
-    let members = |colour: usize| (colour..steps).step_by(APART);
-    let during: Vec<Term> = (0..APART.min(steps))
-        .map(|colour| {
-            let course = Course { shape: Shape::Level, spans_s: members(colour).map(span).collect() };
-            let mut during = term.clone();
-            for (_, formula) in &mut during.acts_on {
-                *formula = product(Expression::InTime(course.clone()), formula.clone());
-            }
-            during
-        })
-        .collect();
-    let mut columns = vec![vec![0.0; study.measured.len()]; steps];
-    for (colour, change) in base.changes(&during).into_iter().enumerate() {
-        let Some(change) = change else { continue };
-        for member in members(colour) {
-            // A term with an onset is the sum of its parts in each later step.
-            for step in member..(member + APART).min(steps) {
-                for row in rows_of_step(study, step) {
-                    for column in &mut columns[..=member] {
-                        column[row] += change[row];
-                    }
-                }
-            }
+    let during = |course: Course| {
+        let mut during = term.clone();
+        for (_, formula) in &mut during.acts_on {
+            *formula = product(Expression::InTime(course.clone()), formula.clone());
         }
+        during
+    };
+    let mut columns = in_each_step(base, Shape::Level, during, |terms| base.changes(terms));
+    for step in (1..columns.len()).rev() {
+        let (before, later) = columns.split_at_mut(step);
+        before[step - 1].iter_mut().zip(&later[0]).for_each(|(before, later)| *before += later);
     }
     columns
 }

@@ -18,7 +18,7 @@ use mapper_numerics::parallel;
 use nalgebra::{DMatrix, DVector};
 
 /// Distance between steps that share one run: a housing forgets an earlier step within a minute or two.
-pub const APART: usize = 5;
+const APART: usize = 5;
 
 /// Balances whose source term needs model runs.
 const RUN: [Balance; 8] = [
@@ -69,32 +69,35 @@ pub fn forces(base: &Base<'_>, counts: &[bool], wanted: &dyn Fn(&Balance) -> boo
 
 /// Changes due to a typical source term in one step each, in the channels' units: levels first, then the decaying parts.
 pub fn columns(base: &Base<'_>, balance: Balance) -> Vec<Vec<f64>> {
-    let study = base.study;
-    let steps = study.steps.len();
-    let mut columns: Vec<Vec<f64>> = Vec::new();
-    for shape in [Shape::Level, Shape::Decay] {
-        let of_shape = match balance {
-            Balance::Reading(channel) => read(study, channel, shape),
-            _ => run(base, balance, shape),
+    let size = balance.plain_size();
+    let term = |course: Course| Term {
+        acts_on: vec![(balance, Expression::InTime(course))],
+        unit: balance.unit(),
+        step: size,
+        words: String::new(),
+        role: Role::Other,
+        positive: false,
+    };
+    let of_shape = |shape: Shape| {
+        let columns = match balance {
+            Balance::Reading(channel) => read(base.study, channel, shape, size),
+            _ => in_each_step(base, shape, term, |terms| base.raw_changes(terms)),
         };
-        columns.extend(
-            (0..steps).filter(|step| shape == Shape::Level || *step > 0).map(|step| of_shape[step].clone()),
-        );
-    }
-    for column in &mut columns {
-        column.iter_mut().for_each(|value| *value *= balance.plain_size());
-    }
-    columns
+        // Nothing decays in the first step, which has no jump.
+        columns.into_iter().skip(usize::from(shape == Shape::Decay))
+    };
+    of_shape(Shape::Level).chain(of_shape(Shape::Decay)).collect()
 }
 
 /// A sensor offset needs no model run.
-fn read(study: &Study, channel: Channel, shape: Shape) -> Vec<Vec<f64>> {
+fn read(study: &Study, channel: Channel, shape: Shape, size: f64) -> Vec<Vec<f64>> {
     (0..study.steps.len())
         .map(|step| {
             let mut column = vec![0.0; study.measured.len()];
             for group in study.groups.iter().filter(|g| g.step == step && OUTPUTS[g.output] == channel) {
                 for (row, block) in group.rows.clone().zip(&group.blocks) {
-                    column[row] = shape.at(study.steps[step].blocks[*block].since_jump_s.max(0.0));
+                    let since_s = study.steps[step].blocks[*block].since_jump_s.max(0.0);
+                    column[row] = size * shape.at(since_s);
                 }
             }
             column
@@ -102,37 +105,29 @@ fn read(study: &Study, channel: Channel, shape: Shape) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// Changes per unit of source term, from runs in which several distant steps have it.
-fn run(base: &Base<'_>, balance: Balance, shape: Shape) -> Vec<Vec<f64>> {
+/// For each step the change of the recording by a `term` that acts in this step alone, from runs in which several distant steps have it.
+pub fn in_each_step(
+    base: &Base<'_>,
+    shape: Shape,
+    term: impl Fn(Course) -> Term,
+    changes: impl Fn(&[Term]) -> Vec<Option<Vec<f64>>>,
+) -> Vec<Vec<f64>> {
     let study = base.study;
     let steps = study.steps.len();
     let span = |step: usize| {
         let begin_s = if step == 0 { f64::NEG_INFINITY } else { study.steps[step].marker.start_s };
-        let end_s = study.steps.get(step + 1).map_or(f64::INFINITY, |next| next.marker.start_s);
-        (begin_s, end_s)
+        (begin_s, study.steps.get(step + 1).map_or(f64::INFINITY, |next| next.marker.start_s))
     };
     let members = |colour: usize| (colour..steps).step_by(APART);
-    let terms: Vec<Term> = (0..APART.min(steps))
-        .map(|colour| {
-            let course = Course { shape, spans_s: members(colour).map(span).collect() };
-            Term {
-                acts_on: vec![(balance, Expression::InTime(course))],
-                unit: balance.unit(),
-                step: balance.plain_size(),
-                words: String::new(),
-                role: Role::Other,
-                positive: false,
-            }
-        })
-        .collect();
+    let course = |colour: usize| Course { shape, spans_s: members(colour).map(span).collect() };
+    let terms: Vec<Term> = (0..APART.min(steps)).map(|colour| term(course(colour))).collect();
     let mut columns = vec![vec![0.0; study.measured.len()]; steps];
-    for (colour, change) in base.raw_changes(&terms).into_iter().enumerate() {
+    for (colour, change) in changes(&terms).into_iter().enumerate() {
         let Some(change) = change else { continue };
         for member in members(colour) {
             for step in member..(member + APART).min(steps) {
-                for row in rows_of_step(study, step) {
-                    columns[member][row] = change[row] / balance.plain_size();
-                }
+                let rows = rows_of_step(study, step);
+                columns[member][rows.clone()].copy_from_slice(&change[rows]);
             }
         }
     }

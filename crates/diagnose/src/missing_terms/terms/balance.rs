@@ -88,13 +88,13 @@ impl Balance {
     /// Name of the source term, for sentences.
     pub fn words(self) -> String {
         match self {
-            Balance::CompressorHousing => "heat to the compressor housing".to_owned(),
-            Balance::TurbineHousing => "heat to the turbine housing".to_owned(),
             Balance::Shaft => "torque on the shaft".to_owned(),
             Balance::Outlet => "flow into the outlet volume".to_owned(),
-            Balance::GasBefore => "heat to the gas before the wheel".to_owned(),
-            Balance::GasAfter => "heat to the gas behind the wheel".to_owned(),
-            Balance::GasOutlet => "heat to the gas at the outlet".to_owned(),
+            Balance::CompressorHousing
+            | Balance::TurbineHousing
+            | Balance::GasBefore
+            | Balance::GasAfter
+            | Balance::GasOutlet => format!("heat to {}", self.place_words()),
             Balance::Work => "efficiency".to_owned(),
             Balance::Convection => "h".to_owned(),
             Balance::MapFlow => "the map's flow".to_owned(),

@@ -22,8 +22,8 @@ mod text;
 pub use identification::acceptance::{ACCEPTANCE_WINDOW_S, AcceptanceCriteria};
 pub use identification::common_errors::CommonErrors;
 pub use identification::identified::{
-    EstimateUncertainty, IdentifiedPoint, Method, Verdict, Window, confidence_interval_95, half_width_95,
-    standard_error_of,
+    EstimateUncertainty, IdentifiedPoint, Method, MethodResult, MethodResults, Verdict, Window,
+    confidence_interval_95, half_width_95, standard_error_of,
 };
 pub use identification::inlet_convection::InletConvection;
 pub use identification::joint_settings::{ALPHA_AREA_SIGMA_RATIO, Choice, JointSettings};

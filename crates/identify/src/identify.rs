@@ -46,7 +46,7 @@ pub fn identify_each(
     recording: &Recording,
     config: &IdentifyConfig,
 ) -> Result<Vec<Result<IdentifiedPoint, StepError>>, IdentifyError> {
-    Ok(identify_recording(recording, config)?.points)
+    Ok(identify_recording(recording, config, None)?.points)
 }
 
 /// Result of the identification of a recording.
@@ -67,23 +67,12 @@ pub struct Identified {
     pub budgets: Vec<PointBudgets>,
 }
 
-/// Like [`identify_each`], with the shared parameters of the points (joint method alone).
+/// Like [`identify_each`], with the shared parameters of the points (joint method alone). Compared with a declared rig, if one is given: points
+/// are then doubtful if flow, speed or efficiencies differ from it by more than its tolerances.
 ///
 /// # Errors
 /// As [`identify`].
 pub fn identify_recording(
-    recording: &Recording,
-    config: &IdentifyConfig,
-) -> Result<Identified, IdentifyError> {
-    identify_with_rig(recording, config, None)
-}
-
-/// Like [`identify_recording`], compared with a declared rig: points are doubtful if flow, speed or efficiencies differ from it by more than
-/// its tolerances.
-///
-/// # Errors
-/// As [`identify`].
-pub fn identify_with_rig(
     recording: &Recording,
     config: &IdentifyConfig,
     nominal: Option<NominalRig<'_>>,

@@ -22,19 +22,18 @@ pub use config::{DeclaredUncertainty, IdentifyConfig, NoiseColour, PressureTap, 
 pub use faults::balance_rows::Machine;
 pub use faults::found_fault::{FoundFault, Suspect};
 pub use faults::nominal_rig::NominalRig;
-pub use identify::{Identified, identify, identify_each, identify_recording, identify_with_rig};
+pub use identify::{Identified, identify, identify_each, identify_recording};
 pub use isothermal_zero::zero::{
-    IsothermalZero, NoZero, ZeroSettings, expected_after_zero, isothermal_zero, isothermal_zero_with_a_fault,
-    zeroed,
+    IsothermalZero, NoZero, ZeroSettings, expected_after_zero, isothermal_zero, zeroed,
 };
 pub use isothermal_zero::zero_outcome::ZeroOutcome;
 pub use joint::MAX_RESTING_ETA;
-pub use joint::expected::{ExpectedStep, ExpectedTogether, expected_together};
+pub use joint::expected::expected_together;
 pub use joint::step_model::surface::EfficiencySurface;
 pub use mapper_core::{Choice, JointSettings, SettleBands, WindowRule};
 pub use needs::{method_for, needs};
 pub use reduce::{KnownHeat, method_of_table, reduce};
-pub use single_step::expected::{DECLARED_INTERVAL_S, Expected, ExpectedRow, expected, expected_steady};
+pub use single_step::expected::{DECLARED_INTERVAL_S, expected, expected_steady};
 pub use single_step::t2_course::{T2Course, t2_course};
 pub use step_data::humidity::with_measured_humidity;
 pub use step_data::samples::LONGEST_BRIDGE_S;

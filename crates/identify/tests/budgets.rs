@@ -39,7 +39,7 @@ fn identified(
         joint,
         ..IdentifyConfig::default()
     };
-    identify_recording(recording, &config).unwrap()
+    identify_recording(recording, &config, None).unwrap()
 }
 
 /// Parameters with a prior are fixed: their selection is not linear in the readings.
@@ -93,7 +93,7 @@ fn an_uncertain_area_is_in_h_alone() {
             internal_area_sigma_ratio,
             ..usual
         };
-        identify_recording(&recording, &config).unwrap()
+        identify_recording(&recording, &config, None).unwrap()
     };
     let sigma_ratio = 0.01;
     let (known, uncertain, off) = (with(1.0, 0.0), with(1.0, sigma_ratio), with(1.0 + sigma_ratio, 0.0));
@@ -250,6 +250,6 @@ fn drawn(clean: &Recording, humidity_kg_kg: f64, seed: u64) -> Vec<[[f64; 2]; 2]
         let budget = budget.as_ref().unwrap();
         [budget.value, budget.combined_standard_uncertainty()]
     };
-    let found = identify_recording(&recording, &config).unwrap();
+    let found = identify_recording(&recording, &config, None).unwrap();
     found.budgets.iter().map(|point| [of(&point.eta), of(&point.h_w_m2k)]).collect()
 }

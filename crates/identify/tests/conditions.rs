@@ -19,7 +19,7 @@ use changes::{CHANGES, Change};
 use mapper_core::{
     Channel, DeclaredUncertainty, Method, ModelTolerances, Recording, Series, StepKind, StepMarker, Verdict,
 };
-use mapper_identify::{IdentifyConfig, NominalRig, identify_with_rig};
+use mapper_identify::{IdentifyConfig, NominalRig, identify_recording};
 use mapper_numerics::parallel;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::model::Model;
@@ -132,7 +132,7 @@ fn score(case: &Case, change: &Change) -> Score {
         ..IdentifyConfig::default()
     };
     let nominal = Some(nominal).filter(|_| std::env::var("MAPPER_CONDITIONS_UNDECLARED").is_err());
-    let found = identify_with_rig(&recording, &config, nominal).unwrap();
+    let found = identify_recording(&recording, &config, nominal).unwrap();
     let mut score = Score::default();
     for point in found.points.iter().flatten().filter(|point| point.verdict == Verdict::Good) {
         let truth = &case.truth[point.step];

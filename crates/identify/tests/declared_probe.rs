@@ -9,7 +9,7 @@ use rand_pcg::Pcg64;
 
 /// Errors of eta (fraction) and h (ratio) of every point with both.
 fn errors(campaign: &Campaign, recording: &Recording, config: &IdentifyConfig) -> Vec<(f64, f64)> {
-    let Identified { points, .. } = identify_recording(recording, config).unwrap();
+    let Identified { points, .. } = identify_recording(recording, config, None).unwrap();
     let off = |(point, truth): (&IdentifiedPoint, &lab::Truth)| {
         Some((point.eta? - truth.eta, point.h_w_m2k? / truth.h_w_m2k - 1.0))
     };
@@ -90,7 +90,7 @@ fn the_steady_method_reads_ahead_of_a_declared_probe() {
     let (fast, slow) = (with_probe(0.0), with_probe(PROBE_M));
     let of = |campaign: &Campaign, declared_m| -> Vec<IdentifiedPoint> {
         let config = config(Method::Steady, declared_m);
-        let Identified { points, .. } = identify_recording(&campaign.recording, &config).unwrap();
+        let Identified { points, .. } = identify_recording(&campaign.recording, &config, None).unwrap();
         points.into_iter().map(Result::unwrap).collect()
     };
     let (ideal, declared, silent) = (of(&fast, 0.0), of(&slow, PROBE_M), of(&slow, 0.0));

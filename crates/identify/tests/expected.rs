@@ -3,7 +3,8 @@
 
 use crate::common::{RIG, Transient, add_noise};
 use mapper_core::Channel;
-use mapper_identify::{DeclaredUncertainty, ExpectedRow, IdentifyConfig, WindowRule, expected, identify};
+use mapper_identify::{DeclaredUncertainty, IdentifyConfig, WindowRule, expected, identify};
+use mapper_physics::operating_point::forecast::ForecastRow;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
@@ -22,13 +23,13 @@ fn config(with_offsets: bool) -> IdentifyConfig {
 }
 
 /// Noise-free rows of the window, `every` tenths of a second apart.
-fn rows(transient: &Transient, every: usize) -> Vec<ExpectedRow> {
+fn rows(transient: &Transient, every: usize) -> Vec<ForecastRow> {
     let recording = transient.recording();
     let at = |channel, i: usize| recording.series[&channel].values[i];
     // The jump is at 30 s.
     (400..=1400)
         .step_by(every)
-        .map(|i| ExpectedRow {
+        .map(|i| ForecastRow {
             t_s: 0.1 * i as f64,
             speed_rpm: at(Channel::ShaftSpeed, i),
             t1_k: at(Channel::T1, i),
@@ -37,6 +38,8 @@ fn rows(transient: &Transient, every: usize) -> Vec<ExpectedRow> {
             p1_pa: at(Channel::P1, i),
             p2_pa: at(Channel::P2, i),
             flow_kg_s: at(Channel::CompressorFlow, i),
+            efficiency: transient.eta,
+            h_w_m2k: transient.h_w_m2k,
         })
         .collect()
 }

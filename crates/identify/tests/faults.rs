@@ -8,7 +8,7 @@
 
 use crate::lab::{Machine as LabMachine, campaign, measured};
 use mapper_core::{Channel, Method, ModelTolerances, Recording, Verdict};
-use mapper_identify::{Identified, IdentifyConfig, Machine, NominalRig, Suspect, identify_with_rig};
+use mapper_identify::{Identified, IdentifyConfig, Machine, NominalRig, Suspect, identify_recording};
 use mapper_physics::rig::sensor_fault::additive;
 use mapper_physics::simulation::model::Model;
 use rand::seq::SliceRandom;
@@ -55,7 +55,7 @@ fn drawn(seed: u64) -> Drawn {
 fn found(drawn: &Drawn, recording: &Recording) -> Identified {
     let (model, tolerances) = (Model::nominal(), ModelTolerances::default());
     let nominal = NominalRig { model: &model, tolerances: &tolerances, conditions: &BTreeMap::new() };
-    identify_with_rig(recording, &drawn.config, Some(nominal).filter(|_| drawn.is_declared)).unwrap()
+    identify_recording(recording, &drawn.config, Some(nominal).filter(|_| drawn.is_declared)).unwrap()
 }
 
 /// The recording with a fault of this size.
@@ -102,7 +102,7 @@ fn another_valve_is_named_and_leaves_the_points_as_they_are() {
     let (mut model, tolerances) = (Model::nominal(), ModelTolerances::default());
     let good = |model: &Model| {
         let nominal = NominalRig { model, tolerances: &tolerances, conditions: &BTreeMap::new() };
-        let found = identify_with_rig(&drawn.recording, &drawn.config, Some(nominal)).unwrap();
+        let found = identify_recording(&drawn.recording, &drawn.config, Some(nominal)).unwrap();
         let good = found.points.iter().flatten().filter(|point| point.verdict == Verdict::Good).count();
         (good, found.faults)
     };

@@ -13,7 +13,7 @@ fn joint() -> IdentifyConfig {
 }
 
 fn found(recording: &Recording, config: &IdentifyConfig) -> (Vec<IdentifiedPoint>, ThermalModel) {
-    let Identified { points, thermal, .. } = identify_recording(recording, config).unwrap();
+    let Identified { points, thermal, .. } = identify_recording(recording, config, None).unwrap();
     (points.into_iter().map(Result::unwrap).collect(), thermal.unwrap())
 }
 

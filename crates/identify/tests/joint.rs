@@ -15,7 +15,7 @@ fn joint() -> IdentifyConfig {
 }
 
 fn found(recording: &Recording, config: &IdentifyConfig) -> (Vec<IdentifiedPoint>, ThermalModel) {
-    let Identified { points, thermal, .. } = identify_recording(recording, config).unwrap();
+    let Identified { points, thermal, .. } = identify_recording(recording, config, None).unwrap();
     (points.into_iter().map(Result::unwrap).collect(), thermal.unwrap())
 }
 
@@ -222,7 +222,7 @@ fn the_result_is_repeatable() {
 fn a_campaign_of_one_step_gives_what_it_can() {
     let campaign = campaign(&eighteen()[..1], 120.0, Machine::default());
     let config = IdentifyConfig { window: WindowRule::Fixed { start_s: 10.0, end_s: 110.0 }, ..joint() };
-    let Identified { points, .. } = identify_recording(&campaign.recording, &config).unwrap();
+    let Identified { points, .. } = identify_recording(&campaign.recording, &config, None).unwrap();
     let point = points[0].as_ref().unwrap();
     // Settled, and alone: efficiency and heat cannot be separated. The point is not good, but its interval covers the truth.
     assert_ne!(point.verdict, Verdict::Good, "{point:?}");
@@ -334,7 +334,7 @@ fn samples_that_are_no_number_are_reported() {
 fn a_missing_channel_is_named() {
     let (_, mut recording, config) = noisy(28);
     recording.series.remove(&Channel::Tc);
-    match identify_recording(&recording, &config) {
+    match identify_recording(&recording, &config, None) {
         Err(mapper_identify::IdentifyError::MissingChannels { missing, .. }) => {
             assert_eq!(missing, [Channel::Tc]);
         }

@@ -13,7 +13,7 @@ use crate::lab::{Campaign, Machine, campaign, measured};
 use mapper_core::{Channel, IdentifiedPoint, Method, ModelTolerances, Recording, Verdict, Warning};
 use mapper_identify::{
     Choice, DeclaredUncertainty, Identified, IdentifyConfig, JointSettings, NominalRig, StepError,
-    Thresholds, identify_each, identify_with_rig,
+    Thresholds, identify_each, identify_recording,
 };
 use mapper_physics::simulation::model::Model;
 use rand::SeedableRng;
@@ -106,7 +106,7 @@ fn score(recording: &Recording, fault_free: &FaultFree, method: Method) -> Score
     // As in a campaign that declares tolerances.
     let (model, tolerances) = (Model::nominal(), ModelTolerances::default());
     let nominal = NominalRig { model: &model, tolerances: &tolerances, conditions: &BTreeMap::new() };
-    let Ok(Identified { points, .. }) = identify_with_rig(recording, &config, Some(nominal)) else {
+    let Ok(Identified { points, .. }) = identify_recording(recording, &config, Some(nominal)) else {
         return score;
     };
     // The same steps on readings without noise and fault: true position, and the truth of `steady`.
@@ -247,7 +247,7 @@ fn fault_free_recordings_get_no_objections() {
             METHODS.map(|method| {
                 let config =
                     IdentifyConfig { method, declared: declared.clone(), ..IdentifyConfig::default() };
-                let found = identify_with_rig(&recording, &config, nominal).unwrap();
+                let found = identify_recording(&recording, &config, nominal).unwrap();
                 let warnings = found.points.into_iter().flatten().flat_map(|point| point.warnings);
                 warnings.filter(|warning| OBJECTIONS.contains(&warning.code())).collect::<Vec<Warning>>()
             })

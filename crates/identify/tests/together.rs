@@ -4,7 +4,7 @@
 
 use crate::lab::{Campaign, Machine, campaign, eighteen, measured};
 use mapper_core::{Channel, IdentifiedPoint, Method, ModelTolerances, StepKind, Verdict};
-use mapper_identify::{IdentifyConfig, NominalRig, identify, identify_with_rig};
+use mapper_identify::{IdentifyConfig, NominalRig, identify, identify_recording};
 use mapper_physics::simulation::model::Model;
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
@@ -23,7 +23,7 @@ fn found_beside(
 ) -> Vec<IdentifiedPoint> {
     let (recording, declared) = measured(&clean.recording, 1.0, 1.0, &mut Pcg64::seed_from_u64(seed));
     let config = IdentifyConfig { method, declared, ..IdentifyConfig::default() };
-    identify_with_rig(&recording, &config, nominal).unwrap().points.into_iter().map(Result::unwrap).collect()
+    identify_recording(&recording, &config, nominal).unwrap().points.into_iter().map(Result::unwrap).collect()
 }
 
 /// The dynamic method's common errors equal its response to a common offset of all readings: T2 by its declared offset.

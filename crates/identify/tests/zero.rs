@@ -3,9 +3,7 @@
 
 use crate::lab::{Machine, campaign, eighteen, measured};
 use mapper_core::{Channel, DeclaredUncertainty, Method, Recording, Series};
-use mapper_identify::{
-    IdentifyConfig, NoZero, ZeroSettings, identify, isothermal_zero, isothermal_zero_with_a_fault, zeroed,
-};
+use mapper_identify::{IdentifyConfig, NoZero, ZeroSettings, identify, isothermal_zero, zeroed};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
@@ -101,7 +99,7 @@ fn a_broken_sensor_is_held_against_the_others() {
     };
     let mut shift = |channel: Channel, by_k: f64| {
         broken.series.get_mut(&channel).unwrap().values.iter_mut().for_each(|value| *value += by_k);
-        isothermal_zero_with_a_fault(&broken, &config, &ZeroSettings::default())
+        isothermal_zero(&broken, &config, &ZeroSettings { allows_a_fault: true, ..ZeroSettings::default() })
     };
     let zero = shift(Channel::T2, 4.0).unwrap();
     assert!((zero.offsets[&Channel::T2] - 4.0).abs() < 1e-9, "{:?}", zero.offsets);

@@ -2,34 +2,8 @@
 //!
 //! The planner does not depend on the identification crate; the caller passes an implementation.
 
+pub use mapper_core::{MethodResult, MethodResults};
 pub use mapper_physics::operating_point::forecast::ForecastRow;
-
-/// Expected result of the method for one step.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MethodResult {
-    /// Efficiency without noise, fraction.
-    pub eta: f64,
-    /// Standard error from declared noise and offsets, fraction.
-    pub sigma_eta: f64,
-    /// Heat-transfer coefficient without noise, W/(m2 K).
-    pub h_w_m2k: f64,
-    /// Standard error, W/(m2 K).
-    pub sigma_h_w_m2k: f64,
-}
-
-/// Expected results of the method for all steps of a campaign.
-#[derive(Debug, Clone, PartialEq)]
-pub struct MethodResults {
-    /// One result for each step, on a machine with the declared parameters.
-    pub steps: Vec<Option<MethodResult>>,
-    /// Standard error of each efficiency that the method reports after such a recording, fraction.
-    pub reported_sigma_eta: Vec<Option<f64>>,
-    /// Efficiency error (rms, one sigma, fraction) that remains if the method has to identify the model parameters from these steps
-    /// instead of relying on their declared values.
-    pub parameter_error_eta: f64,
-    /// Largest such error at which points can still be good, fraction.
-    pub max_parameter_error_eta: f64,
-}
 
 /// An identification method, for planning.
 pub trait PredictedMethod: std::fmt::Debug + Sync {

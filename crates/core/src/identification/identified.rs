@@ -174,3 +174,31 @@ impl IdentifiedPoint {
 fn nan_where_null<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }
+
+/// Expected result of the method for one step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MethodResult {
+    /// Efficiency without noise, fraction.
+    pub eta: f64,
+    /// Standard error from declared noise and offsets, fraction.
+    pub sigma_eta: f64,
+    /// Heat-transfer coefficient without noise, W/(m2 K).
+    pub h_w_m2k: f64,
+    /// Standard error, W/(m2 K).
+    pub sigma_h_w_m2k: f64,
+}
+
+/// Expected results of the method for all steps of a campaign.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MethodResults {
+    /// One result for each step, on a machine with the declared parameters.
+    pub steps: Vec<Option<MethodResult>>,
+    /// Standard error of each efficiency that the method reports after such a recording, fraction: it includes the values of alpha_A, probe,
+    /// heating/cooling ratio and h before the wheel that these steps cannot exclude.
+    pub reported_sigma_eta: Vec<Option<f64>>,
+    /// Efficiency error (rms, one sigma, fraction) that remains if the method has to identify the model parameters from these steps
+    /// instead of relying on their declared values.
+    pub parameter_error_eta: f64,
+    /// Largest such error at which points can still be good, fraction.
+    pub max_parameter_error_eta: f64,
+}

@@ -32,6 +32,8 @@ pub struct ZeroSettings {
     pub shortest_s: f64,
     /// Maximum drift of a temperature over the segment, K/min; a faster drift means an unfinished soak.
     pub drift_k_min: f64,
+    /// Whether one temperature sensor may exceed its declared offset.
+    pub allows_a_fault: bool,
 }
 
 impl Default for ZeroSettings {
@@ -43,6 +45,7 @@ impl Default for ZeroSettings {
             longest_s: 600.0,
             shortest_s: 60.0,
             drift_k_min: 0.1,
+            allows_a_fault: false,
         }
     }
 }
@@ -120,7 +123,8 @@ pub enum NoZero {
 /// Finds the offsets of T1, T2, Tc and T_oil against each other, and of P1 and P2.
 ///
 /// Channels without a declared offset count as exact. Common temperature and pressure are means weighted by declared offset and
-/// non-uniformity.
+/// non-uniformity. If a fault is allowed, drifting oil is left out, and a temperature sensor that exceeds its declared offset is compared with
+/// the others; if two pressure taps differ by more, either may be wrong, so both keep their declared offsets.
 ///
 /// # Errors
 /// [`NoZero`] if the recording has no soak, or an unsuitable one.
@@ -128,28 +132,6 @@ pub fn isothermal_zero(
     recording: &Recording,
     config: &IdentifyConfig,
     settings: &ZeroSettings,
-) -> Result<IsothermalZero, NoZero> {
-    zero_of(recording, config, settings, false)
-}
-
-/// Like [`isothermal_zero`], for a rig on which one temperature sensor may exceed its declared offset: it is compared with the others, and
-/// drifting oil is left out. If two pressure taps differ by more, either may be wrong, so both keep their declared offsets.
-///
-/// # Errors
-/// [`NoZero`] if the recording has no soak, or an unsuitable one.
-pub fn isothermal_zero_with_a_fault(
-    recording: &Recording,
-    config: &IdentifyConfig,
-    settings: &ZeroSettings,
-) -> Result<IsothermalZero, NoZero> {
-    zero_of(recording, config, settings, true)
-}
-
-fn zero_of(
-    recording: &Recording,
-    config: &IdentifyConfig,
-    settings: &ZeroSettings,
-    a_fault: bool,
 ) -> Result<IsothermalZero, NoZero> {
     let (start_s, end_s) = at_rest(recording);
     let no_soak = NoZero::NoSoak { found_s: (end_s - start_s).max(0.0), needed_s: settings.shortest_s };
@@ -165,7 +147,7 @@ fn zero_of(
             let Some(reading) = soak_mean(recording, *channel, start_s, end_s) else { continue };
             let drifts = group.len() > 2 && reading.drift_per_min.abs() > settings.drift_k_min;
             // A drifting oil supply is independent of the cell, and no other sensor depends on it.
-            if drifts && a_fault && *channel == Channel::TOil {
+            if drifts && settings.allows_a_fault && *channel == Channel::TOil {
                 continue;
             }
             if drifts {
@@ -199,7 +181,7 @@ fn zero_of(
         if let Some(first) = uneven(common, None) {
             let Reading { channel, mean, total, .. } = *first;
             let refused = NoZero::Uneven { channel, off: mean - common, sigma: total };
-            if !a_fault {
+            if !settings.allows_a_fault {
                 return Err(refused);
             }
             if readings.len() < 3 {

@@ -1,10 +1,8 @@
 //! Result of the isothermal zero that a campaign requests.
 
 use crate::IdentifyConfig;
-use crate::isothermal_zero::zero::{
-    IsothermalZero, NoZero, ZeroSettings, isothermal_zero, isothermal_zero_with_a_fault, zeroed,
-};
-use mapper_core::{Recording, Soak};
+use crate::isothermal_zero::zero::{IsothermalZero, NoZero, ZeroSettings, isothermal_zero, zeroed};
+use mapper_core::Recording;
 use serde::{Serialize, Serializer};
 
 /// Whether offsets were subtracted from a recording.
@@ -20,18 +18,10 @@ pub enum ZeroOutcome {
 }
 
 impl ZeroOutcome {
-    /// Searches for the zero of a recording if a soak was requested.
-    pub fn of(recording: &Recording, config: &IdentifyConfig, soak: Option<Soak>) -> Self {
-        let Some(soak) = soak else { return ZeroOutcome::NotAsked };
-        isothermal_zero(recording, config, &ZeroSettings::from(soak))
-            .map_or_else(ZeroOutcome::Refused, ZeroOutcome::Found)
-    }
-
-    /// The same for a rig on which a temperature sensor may be broken.
-    pub fn with_a_fault(recording: &Recording, config: &IdentifyConfig, soak: Option<Soak>) -> Self {
-        let Some(soak) = soak else { return ZeroOutcome::NotAsked };
-        isothermal_zero_with_a_fault(recording, config, &ZeroSettings::from(soak))
-            .map_or_else(ZeroOutcome::Refused, ZeroOutcome::Found)
+    /// Searches for the zero of a recording, if one was requested.
+    pub fn of(recording: &Recording, config: &IdentifyConfig, settings: Option<ZeroSettings>) -> Self {
+        let Some(settings) = settings else { return ZeroOutcome::NotAsked };
+        isothermal_zero(recording, config, &settings).map_or_else(ZeroOutcome::Refused, ZeroOutcome::Found)
     }
 
     /// The zero, if one was found.

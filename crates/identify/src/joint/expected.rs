@@ -8,54 +8,31 @@ use crate::config::coloured;
 use crate::joint::Fitted;
 use crate::joint::fit::start::{self, START_S};
 use crate::joint::step_model::rows::{COARSER, Row, StepRows, block_s_after, place};
-use crate::joint::{fit::refinements, uncertainty::smoothness};
+use crate::joint::{MAX_RESTING_ETA, fit::refinements, uncertainty::smoothness};
 use crate::single_step::dynamic::Estimate;
-use crate::single_step::expected::{DECLARED_INTERVAL_S, Expected, ExpectedRow};
+use crate::single_step::expected::DECLARED_INTERVAL_S;
+use mapper_core::{MethodResult, MethodResults};
 use mapper_numerics::coloured_noise::BlockNoise;
 use mapper_numerics::statistics::MIN_VALUES;
+use mapper_physics::operating_point::forecast::ForecastRow;
 
-/// A forecast step.
-#[derive(Debug, Clone, Copy)]
-pub struct ExpectedStep<'a> {
-    /// Its instants; `t_s` counts from the jump, the last one is the step's end.
-    pub rows: &'a [ExpectedRow],
-    /// Efficiency at its end, fraction.
-    pub eta: f64,
-}
-
-impl ExpectedStep<'_> {
-    /// Start values for a fit.
-    fn estimate(&self) -> Estimate {
-        Estimate { eta: Some((self.eta, None)), ..Estimate::default() }
-    }
-}
-
-/// The expected result of the joint method for the steps of a campaign.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ExpectedTogether {
-    /// One result per step on a machine as declared; `None` for a step that is too short.
-    pub steps: Vec<Option<Expected>>,
-    /// Standard error of each efficiency that the identification of such a recording reports, fraction: it includes the values of alpha_A,
-    /// probe, heating/cooling ratio and h before the wheel that these steps cannot exclude.
-    pub reported_sigma_eta: Vec<Option<f64>>,
-    /// Error of the efficiencies (rms over the steps, one sigma, fraction) if alpha_A, probe and heating/cooling ratio had to be found from
-    /// these steps. Above [`MAX_RESTING_ETA`](crate::MAX_RESTING_ETA) the points depend on the declaration and are doubtful.
-    pub resting_eta: f64,
-}
-
-/// Identifies noise-free steps together; `None` if the fit does not converge.
+/// Identifies noise-free steps together, each from its jump to its end; `None` if the fit does not converge.
 ///
 /// The errors are computed with alpha_A, probe and heating/cooling ratio as declared: without evidence against the declaration, the method
 /// shrinks them towards it. After an isothermal zero `config` is that of [`expected_after_zero`](crate::expected_after_zero).
-pub fn expected_together(steps: &[ExpectedStep<'_>], config: &IdentifyConfig) -> Option<ExpectedTogether> {
+pub fn expected_together(steps: &[&[ForecastRow]], config: &IdentifyConfig) -> Option<MethodResults> {
     let condensed: Vec<StepRows> =
         steps.iter().enumerate().filter_map(|(position, step)| condensed(position, step, config)).collect();
-    let alone: Vec<Estimate> = steps.iter().map(ExpectedStep::estimate).collect();
+    let start = |rows: &&[ForecastRow]| Estimate {
+        eta: rows.last().map(|end| (end.efficiency, None)),
+        ..Estimate::default()
+    };
+    let alone: Vec<Estimate> = steps.iter().map(start).collect();
     let mut problem = start::problem(&condensed, &alone, config)?;
     problem.minimise_roughly()?;
     start::refine(&mut problem, &condensed, config)?;
     problem.minimise_roughly()?;
-    let resting_eta = refinements::resting_on_declaration(&problem, None)?;
+    let parameter_error_eta = refinements::resting_on_declaration(&problem, None)?;
     let mut reported_sigma_eta = vec![None; steps.len()];
     let mut open = problem.clone();
     let reported = Fitted::of(&mut open)?.smoothed(&open, &condensed, config);
@@ -70,7 +47,7 @@ pub fn expected_together(steps: &[ExpectedStep<'_>], config: &IdentifyConfig) ->
         let (eta, ln_h) = (smoothed.eta[i], smoothed.ln_h[i]);
         let h_w_m2k =
             problem.setting.h_at_end(&step.end, &problem.shared, &member.local).0 * ln_h.value.exp();
-        let expected = Expected {
+        let expected = MethodResult {
             eta: eta.value,
             sigma_eta: eta.uncertainty.combined_standard_error(),
             h_w_m2k,
@@ -79,27 +56,32 @@ pub fn expected_together(steps: &[ExpectedStep<'_>], config: &IdentifyConfig) ->
         let numbers = [expected.eta, expected.sigma_eta, h_w_m2k, expected.sigma_h_w_m2k];
         found[step.position] = numbers.iter().all(|x| x.is_finite()).then_some(expected);
     }
-    Some(ExpectedTogether { steps: found, reported_sigma_eta, resting_eta })
+    Some(MethodResults {
+        steps: found,
+        reported_sigma_eta,
+        parameter_error_eta,
+        max_parameter_error_eta: MAX_RESTING_ETA,
+    })
 }
 
 /// The rows to which the method would condense the samples of a recording.
-fn condensed(position: usize, step: &ExpectedStep<'_>, config: &IdentifyConfig) -> Option<StepRows> {
-    let first = step.rows.partition_point(|expected| expected.t_s < START_S);
-    let first_s = step.rows.get(first)?.t_s;
+fn condensed(position: usize, step: &[ForecastRow], config: &IdentifyConfig) -> Option<StepRows> {
+    let first = step.partition_point(|expected| expected.t_s < START_S);
+    let first_s = step.get(first)?.t_s;
     let mut rows: Vec<Row> = Vec::new();
-    for expected in &step.rows[first..] {
+    for expected in &step[first..] {
         let block_s = COARSER * block_s_after(expected.t_s - first_s, config);
         // Half a nanosecond: times are rounded.
         if rows.last().is_none_or(|last| expected.t_s - last.t_s >= block_s - 5e-10) {
             rows.push(row(expected, noise(block_s, config), config));
         }
     }
-    let end = row(step.rows.last()?, rows.last()?.noise, config);
+    let end = row(step.last()?, rows.last()?.noise, config);
     let usable = rows.len() >= MIN_VALUES && end.place.0 > 0.0 && end.place.1 > 0.0;
     usable.then_some(StepRows { position, rows, end })
 }
 
-fn row(expected: &ExpectedRow, noise: BlockNoise, config: &IdentifyConfig) -> Row {
+fn row(expected: &ForecastRow, noise: BlockNoise, config: &IdentifyConfig) -> Row {
     Row {
         t_s: expected.t_s,
         t1_k: expected.t1_k,

@@ -104,7 +104,7 @@ fn change(series: &Series, moment_s: f64, slope: bool) -> Option<f64> {
     }
     let rate = |from_s: f64, to_s: f64| {
         let (t_s, values) = series.slice(from_s, to_s);
-        slope_per_s(t_s, values)
+        slope_per_s(t_s.iter().copied().zip(values.iter().copied()))
     };
     let change = rate(moment_s, moment_s + 2.0 * LEVEL_S)? - rate(moment_s - 2.0 * LEVEL_S, moment_s)?;
     Some(change).filter(|change| change.is_finite())

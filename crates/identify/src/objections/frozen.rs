@@ -7,7 +7,7 @@ use crate::IdentifyConfig;
 use crate::needs::needs;
 use crate::objections::ends::Ends;
 use crate::objections::objection::Objection;
-use mapper_core::{Channel, Recording, Series, Warning};
+use mapper_core::{Channel, Recording, Series, Warning, jump_ratio};
 use mapper_numerics::statistics::MIN_VALUES;
 use mapper_physics::rig::sensor_fault::repeats_s;
 
@@ -15,9 +15,6 @@ use mapper_physics::rig::sensor_fault::repeats_s;
 const COARSE_SHARE: f64 = 0.3;
 /// Time after a jump within which every channel but those of the inlet has moved, s.
 const AFTER_JUMP_S: f64 = 15.0;
-
-/// Minimum difference of two steps' ends that counts as a jump, ratio.
-const MOVED_RATIO: f64 = 0.02;
 
 /// A run of one repeated value.
 struct Run {
@@ -39,13 +36,15 @@ pub(crate) fn objections(
 
 /// Whether the operating point changes between any steps.
 fn moves(ends: &[Option<Ends>]) -> bool {
-    let read: [fn(&Ends) -> f64; 3] = [|end| end.speed_rpm, |end| end.flow_kg_s, |end| end.p2_pa];
-    read.into_iter().any(|read| {
-        let (low, high) =
-            ends.iter().flatten().map(read).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
-                (low.min(value), high.max(value))
-            });
-        high > low * (1.0 + MOVED_RATIO)
+    let read: [(Channel, fn(&Ends) -> f64); 3] = [
+        (Channel::ShaftSpeed, |end| end.speed_rpm),
+        (Channel::CompressorFlow, |end| end.flow_kg_s),
+        (Channel::P2, |end| end.p2_pa),
+    ];
+    read.into_iter().any(|(channel, read)| {
+        let ends = || ends.iter().flatten().map(read);
+        let (low, high) = (ends().fold(f64::INFINITY, f64::min), ends().fold(f64::NEG_INFINITY, f64::max));
+        high > low * (1.0 + jump_ratio(channel))
     })
 }
 

@@ -4,13 +4,10 @@
 //! opposite sign. Sensors are independent, so squares add.
 
 use crate::IdentifyConfig;
-use crate::single_step::fit::{Fit, Geometry, Row, rows, t2_k};
-use crate::step_data::samples::Samples;
+use crate::single_step::fit::{Fit, Geometry, t2_k};
+use crate::step_data::samples::{Row, Samples};
 use mapper_core::Channel;
-
-/// The channels that enter eqs. 1-3.
-const ENTERING: [Channel; 6] =
-    [Channel::T1, Channel::T2, Channel::Tc, Channel::P1, Channel::P2, Channel::CompressorFlow];
+use mapper_physics::gas::air::Air;
 
 /// Effect of the declared uncertainties.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -36,18 +33,23 @@ pub(crate) fn declared_effect(
 ) -> DeclaredEffect {
     let mut effect = DeclaredEffect::default();
     let mut squares = [0.0; 2];
-    for channel in ENTERING {
+    for channel in Row::CHANNELS {
         let Some(declared) = config.declared.get(&channel) else { continue };
-        let values = column(samples, channel);
         let sensitivity = sensitivity(fit, samples, geometry, channel);
         let read = |change_k: Vec<f64>| {
             // The probe's lag does not act on its own offset.
             let change_k = if channel == Channel::T2 { change_k } else { fit.read(change_k) };
-            fit.response(change_k.into_iter())
+            fit.response(&change_k)
         };
         let responses = [
             read(sensitivity.iter().map(|s| s * declared.offset_sigma).collect()),
-            read(sensitivity.iter().zip(values).map(|(s, v)| s * v * declared.gain_sigma_ratio).collect()),
+            read(
+                sensitivity
+                    .iter()
+                    .zip(&samples.rows)
+                    .map(|(s, row)| s * row.read(channel) * declared.gain_sigma_ratio)
+                    .collect(),
+            ),
         ];
         for (response, sigma) in responses.into_iter().zip([declared.offset_sigma, declared.gain_sigma_ratio])
         {
@@ -67,13 +69,14 @@ pub(crate) fn declared_effect(
     }
     if config.humidity_sigma_kg_kg > 0.0 {
         let air = geometry.air.with_humidity(geometry.air.humidity_kg_kg() + config.humidity_sigma_kg_kg);
-        let fitted_k =
-            |geometry: Geometry, row: Row| t2_k(geometry, row.in_air(geometry.air), fit.eta, fit.h_w_m2k);
-        let moved = |row| fitted_k(geometry, row) - fitted_k(Geometry { air, ..geometry }, row);
-        shared.push(rows(samples).map(moved).collect());
+        let fitted_k = |row: &Row, air: Air| {
+            t2_k(Geometry { air, ..geometry }, &row.compressing(air), fit.eta, fit.h_w_m2k)
+        };
+        let moved = |row| fitted_k(row, geometry.air) - fitted_k(row, air);
+        shared.push(samples.rows.iter().map(moved).collect());
     }
     for change_k in shared {
-        let response = fit.response(fit.read(change_k).into_iter());
+        let response = fit.response(&fit.read(change_k));
         squares[0] += response[0] * response[0];
         squares[1] += response[1] * response[1];
         effect.push(response);
@@ -87,15 +90,15 @@ pub(crate) fn declared_effect(
     effect.bias_standard_errors = squares.map(f64::sqrt);
     if config.alpha_area_sigma_ratio > 0.0 {
         // The effect of another alpha_A equals that of the same error of the measured T2.
-        let fitted_k = |row: Row, by: f64| {
+        let fitted_k = |row: &Row, by: f64| {
             let geometry = Geometry { alpha_area_ratio: geometry.alpha_area_ratio + by, ..geometry };
             t2_k(geometry, row, fit.eta, fit.h_w_m2k)
         };
         // Step towards the middle, so that the share stays valid.
         let away = if geometry.alpha_area_ratio > 0.5 { -1.0 } else { 1.0 };
         let sigma = away * config.alpha_area_sigma_ratio;
-        let moved_k = rows(samples).map(|row| fitted_k(row, sigma) - fitted_k(row, 0.0)).collect();
-        effect.assumed_alpha = fit.response(fit.read(moved_k).into_iter());
+        let moved_k = samples.rows.iter().map(|row| fitted_k(row, sigma) - fitted_k(row, 0.0)).collect();
+        effect.assumed_alpha = fit.response(&fit.read(moved_k));
         effect.push(effect.assumed_alpha);
     }
     effect
@@ -109,40 +112,15 @@ impl DeclaredEffect {
     }
 }
 
-fn column(samples: &Samples, channel: Channel) -> &[f64] {
-    match channel {
-        Channel::T1 => &samples.t1_k,
-        Channel::Tc => &samples.tc_k,
-        Channel::P1 => &samples.p1_pa,
-        Channel::P2 => &samples.p2_pa,
-        Channel::CompressorFlow => &samples.flow_kg_s,
-        _ => &samples.t2_k,
-    }
-}
-
 /// Derivative of (measured minus fitted T2) by the reading of a channel, per row.
 fn sensitivity(fit: &Fit, samples: &Samples, geometry: Geometry, channel: Channel) -> Vec<f64> {
     if channel == Channel::T2 {
         return vec![1.0; samples.len()];
     }
-    let fitted_k = |row: Row| t2_k(geometry, row, fit.eta, fit.h_w_m2k);
-    rows(samples)
-        .enumerate()
-        .map(|(i, row)| {
-            let reading = column(samples, channel)[i];
-            let step = 1e-5 * reading;
-            let moved = |by: f64| {
-                let row = match channel {
-                    Channel::Tc => return Row { tc_k: row.tc_k + by, ..row },
-                    Channel::CompressorFlow => return Row { flow_kg_s: row.flow_kg_s + by, ..row },
-                    Channel::T1 => Row { t1_k: row.t1_k + by, ..row },
-                    Channel::P1 => Row { p1_pa: row.p1_pa + by, ..row },
-                    Channel::P2 => Row { p2_pa: row.p2_pa + by, ..row },
-                    _ => row,
-                };
-                row.in_air(geometry.air)
-            };
-            -(fitted_k(moved(step)) - fitted_k(moved(-step))) / (2.0 * step)
-        })
-        .collect()
+    let of = |row: &Row| {
+        let step = 1e-5 * row.read(channel);
+        let moved = |by: f64| t2_k(geometry, &row.moved(channel, by, geometry.air), fit.eta, fit.h_w_m2k);
+        -(moved(step) - moved(-step)) / (2.0 * step)
+    };
+    samples.rows.iter().map(of).collect()
 }

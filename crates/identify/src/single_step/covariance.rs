@@ -7,8 +7,9 @@
 
 use crate::NoiseColour;
 use crate::config::coloured;
-use crate::single_step::fit::Fit;
+use crate::single_step::fit::{Fit, dot, products};
 use mapper_numerics::coloured_noise::correlate;
+use nalgebra::Matrix2;
 
 /// Variances of the two parts of the residual, K2.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,8 +32,8 @@ impl NoiseVariances {
 /// Products of the first-order part's correlation matrix with the columns of the fit.
 pub(crate) struct Correlation {
     /// `J' R J`.
-    jrj: [[f64; 2]; 2],
-    inverse_normal: [[f64; 2]; 2],
+    jrj: Matrix2<f64>,
+    inverse_normal: Matrix2<f64>,
     variances: NoiseVariances,
 }
 
@@ -40,25 +41,22 @@ impl Correlation {
     /// Prepares the noise estimate of a fit with samples at `t_s`.
     pub(crate) fn of(fit: &Fit, t_s: &[f64], colour: NoiseColour) -> Self {
         let (g, jacobian) = (&fit.inverse_normal, &fit.jacobian);
-        let smoothed = [
-            correlate(t_s, &jacobian[0], colour.time_constant_s),
-            correlate(t_s, &jacobian[1], colour.time_constant_s),
-        ];
+        let smoothed = [0, 1].map(|i| correlate(t_s, &jacobian[i], colour.time_constant_s));
         let jrj = products(jacobian, &smoothed);
         let jrrj = products(&smoothed, &smoothed);
         let n = t_s.len() as f64;
-        let g_jrj = multiply(g, &jrj);
+        let g_jrj = g * jrj;
         // Sum of squared correlations: the square of a first-order correlation has half the time constant.
         let ones = vec![1.0; t_s.len()];
         let squares: f64 = correlate(t_s, &ones, 0.5 * colour.time_constant_s).iter().sum();
         // Traces of M, M R and M R M R with M = 1 - J (J'J)^-1 J'.
         let trace_m = n - 2.0;
-        let trace_mr = n - trace(&g_jrj);
-        let trace_mrmr = squares - 2.0 * trace(&multiply(g, &jrrj)) + trace(&multiply(&g_jrj, &g_jrj));
+        let trace_mr = n - g_jrj.trace();
+        let trace_mrmr = squares - 2.0 * (g * jrrj).trace() + (g_jrj * g_jrj).trace();
         let residual = &fit.residual_k;
-        let white_form: f64 = residual.iter().map(|r| r * r).sum();
+        let white_form = dot(residual, residual);
         let smoothed_residual = correlate(t_s, residual, colour.time_constant_s);
-        let correlated_form: f64 = residual.iter().zip(&smoothed_residual).map(|(a, b)| a * b).sum();
+        let correlated_form = dot(residual, &smoothed_residual);
         let determinant = trace_m * trace_mrmr - trace_mr * trace_mr;
         let white_k2 = (white_form * trace_mrmr - correlated_form * trace_mr) / determinant;
         let first_order_k2 = (trace_m * correlated_form - trace_mr * white_form) / determinant;
@@ -81,21 +79,7 @@ impl Correlation {
     /// Standard errors of eta and h under given noise of T2.
     pub(crate) fn standard_errors_for(&self, variances: NoiseVariances) -> [f64; 2] {
         let g = &self.inverse_normal;
-        let correlated = multiply(&multiply(g, &self.jrj), g);
-        [0, 1].map(|i| {
-            (variances.white_k2 * g[i][i] + variances.first_order_k2 * correlated[i][i]).max(0.0).sqrt()
-        })
+        let covariance = variances.white_k2 * g + variances.first_order_k2 * (g * self.jrj * g);
+        covariance.diagonal().map(|variance| variance.max(0.0).sqrt()).into()
     }
-}
-
-fn products(a: &[Vec<f64>; 2], b: &[Vec<f64>; 2]) -> [[f64; 2]; 2] {
-    [0, 1].map(|i| [0, 1].map(|j| a[i].iter().zip(&b[j]).map(|(x, y)| x * y).sum()))
-}
-
-fn multiply(a: &[[f64; 2]; 2], b: &[[f64; 2]; 2]) -> [[f64; 2]; 2] {
-    [0, 1].map(|i| [0, 1].map(|j| a[i][0] * b[0][j] + a[i][1] * b[1][j]))
-}
-
-fn trace(m: &[[f64; 2]; 2]) -> f64 {
-    m[0][0] + m[1][1]
 }

@@ -80,9 +80,9 @@ pub(crate) fn estimate(
     if !enough(&samples, config, findings) {
         return estimate;
     }
-    estimate.dt2_k = samples.change(&samples.t2_k, limits.end_mean_s);
-    estimate.dtc_k = samples.change(&samples.tc_k, limits.end_mean_s);
-    let rise_ratio = mean(&samples.rise_ratio).unwrap_or(0.0);
+    estimate.dt2_k = samples.change(|row| row.t2_k, limits.end_mean_s);
+    estimate.dtc_k = samples.change(|row| row.tc_k, limits.end_mean_s);
+    let rise_ratio = samples.mean(|row| row.rise_ratio).unwrap_or(0.0);
     if rise_ratio < SMALLEST_RISE_RATIO {
         findings.refuse(Warning::NoCompression(NoCompression::NoPressureRise));
         return estimate;
@@ -139,7 +139,7 @@ fn uncertainties(
     declared: &DeclaredEffect,
     drift: Option<FlowDrift>,
 ) -> [EstimateUncertainty; 2] {
-    let correlation = Correlation::of(fit, &samples.t_s, config.noise_colour);
+    let correlation = Correlation::of(fit, &samples.times_s(), config.noise_colour);
     let found = correlation.standard_errors();
     // A short residual may have less noise than the sensors.
     let expected =
@@ -222,9 +222,9 @@ fn judge_residual(view: &View<'_>, dt2_k: Option<f64>, findings: &mut Findings) 
 fn slow_rms_k(fit: &Fit, samples: &Samples) -> f64 {
     let (mut start, mut sum, mut blocks) = (0, 0.0, 0.0);
     while start < samples.len() {
-        let end_s = samples.t_s[start] + STRUCTURE_BLOCK_S;
+        let end_s = samples.rows[start].t_s + STRUCTURE_BLOCK_S;
         // At least one sample, so that the loop ends for any times.
-        let end = samples.t_s.partition_point(|t| *t < end_s).max(start + 1);
+        let end = samples.rows.partition_point(|row| row.t_s < end_s).max(start + 1);
         let block = mean(&fit.residual_k[start..end]).unwrap_or(0.0);
         (start, sum, blocks) = (end, sum + block * block, blocks + 1.0);
     }

@@ -3,14 +3,16 @@
 
 use crate::IdentifyConfig;
 use crate::single_step::probe_reading::{Followed, Probe};
-use crate::step_data::samples::Samples;
+use crate::step_data::samples::{Row, Samples};
 use mapper_core::{Bound, InletConvection};
 use mapper_numerics::least_squares::{Damping, DampingRule, MAX_ITERATIONS};
+use mapper_numerics::statistics::rms;
 use mapper_numerics::{ROUNDING, SLOPE_STEP};
 use mapper_physics::gas::air::Air;
-use mapper_physics::laws::compression::{CompressionInputs, compress, compressed_k, isentropic_rise_ratio};
+use mapper_physics::laws::compression::{CompressionInputs, compress, compressed_k};
 use mapper_physics::laws::inlet_convection::InletLaw;
 use mapper_physics::machine::params::Params;
+use nalgebra::{Matrix2, Vector2};
 
 /// Search range of the efficiency, fraction. Above 1 is impossible and is reported; the fit may go there to show it.
 pub(crate) const ETA_BOUNDS: (f64, f64) = (0.05, 2.0);
@@ -46,7 +48,7 @@ impl Geometry {
     }
 
     /// Ratio of h before the wheel to h after it.
-    fn inlet_h_ratio(&self, row: Row, eta: f64) -> f64 {
+    fn inlet_h_ratio(&self, row: &Row, eta: f64) -> f64 {
         let bulk_k = || compressed_k(row.t1_k, row.rise_ratio, eta, self.air.between(row.p1_pa, row.p2_pa));
         self.inlet.map_or(1.0, |law| law.h_ratio(row.t1_k, bulk_k()))
     }
@@ -66,7 +68,7 @@ pub(crate) struct Fit {
     /// Response of the probe to the gas; `None` without inertia.
     pub(crate) followed: Option<Followed>,
     /// `(J'J)^-1`.
-    pub(crate) inverse_normal: [[f64; 2]; 2],
+    pub(crate) inverse_normal: Matrix2<f64>,
 }
 
 impl Fit {
@@ -79,20 +81,13 @@ impl Fit {
     }
 
     /// Parameter change due to a change of the reading: `(J'J)^-1 J' y`.
-    pub(crate) fn response(&self, t2_change_k: impl Iterator<Item = f64>) -> [f64; 2] {
-        let mut right = [0.0; 2];
-        for (i, change_k) in t2_change_k.enumerate() {
-            right[0] += self.jacobian[0][i] * change_k;
-            right[1] += self.jacobian[1][i] * change_k;
-        }
-        let g = &self.inverse_normal;
-        [g[0][0] * right[0] + g[0][1] * right[1], g[1][0] * right[0] + g[1][1] * right[1]]
+    pub(crate) fn response(&self, t2_change_k: &[f64]) -> [f64; 2] {
+        (self.inverse_normal * right(&self.jacobian, t2_change_k)).into()
     }
 
     /// Root mean square of the residual, K.
     pub(crate) fn residual_rms_k(&self) -> f64 {
-        let sum: f64 = self.residual_k.iter().map(|r| r * r).sum();
-        (sum / self.residual_k.len().max(1) as f64).sqrt()
+        rms(&self.residual_k).unwrap_or(0.0)
     }
 
     /// Name of a parameter on its bound, if any.
@@ -110,7 +105,7 @@ impl Fit {
 
 /// T2 by eqs. 1-3 for one row, K.
 #[inline]
-pub(crate) fn t2_k(geometry: Geometry, row: Row, eta: f64, h_w_m2k: f64) -> f64 {
+pub(crate) fn t2_k(geometry: Geometry, row: &Row, eta: f64, h_w_m2k: f64) -> f64 {
     let inputs = CompressionInputs {
         t1_k: row.t1_k,
         tc_k: row.tc_k,
@@ -126,37 +121,6 @@ pub(crate) fn t2_k(geometry: Geometry, row: Row, eta: f64, h_w_m2k: f64) -> f64 
     compress(&inputs, None).t2_k
 }
 
-/// Inputs of eqs. 1-3 from one sample.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Row {
-    pub(crate) t1_k: f64,
-    pub(crate) tc_k: f64,
-    pub(crate) flow_kg_s: f64,
-    pub(crate) p1_pa: f64,
-    pub(crate) p2_pa: f64,
-    pub(crate) rise_ratio: f64,
-}
-
-impl Row {
-    /// The same readings of another gas, or after a change of pressures or T1.
-    pub(crate) fn in_air(self, air: Air) -> Row {
-        let air = air.between(self.p1_pa, self.p2_pa);
-        Row { rise_ratio: isentropic_rise_ratio(self.p2_pa / self.p1_pa, self.t1_k, air), ..self }
-    }
-}
-
-/// The rows of the samples in order.
-pub(crate) fn rows(samples: &Samples) -> impl Iterator<Item = Row> + '_ {
-    (0..samples.t1_k.len()).map(|i| Row {
-        t1_k: samples.t1_k[i],
-        tc_k: samples.tc_k[i],
-        flow_kg_s: samples.flow_kg_s[i],
-        p1_pa: samples.p1_pa[i],
-        p2_pa: samples.p2_pa[i],
-        rise_ratio: samples.rise_ratio[i],
-    })
-}
-
 /// Measured minus predicted T2, K, without the part that the probe's first reading explains.
 fn residual_k(
     samples: &Samples,
@@ -164,9 +128,9 @@ fn residual_k(
     followed: Option<&Followed>,
     [eta, h_w_m2k]: [f64; 2],
 ) -> Vec<f64> {
-    let gas_k: Vec<f64> = rows(samples).map(|row| t2_k(geometry, row, eta, h_w_m2k)).collect();
+    let gas_k: Vec<f64> = samples.rows.iter().map(|row| t2_k(geometry, row, eta, h_w_m2k)).collect();
     let read_k = followed.map_or_else(|| gas_k.clone(), |followed| followed.read(&gas_k));
-    let mut residual_k: Vec<f64> = samples.t2_k.iter().zip(&read_k).map(|(a, b)| a - b).collect();
+    let mut residual_k: Vec<f64> = samples.rows.iter().zip(&read_k).map(|(row, b)| row.t2_k - b).collect();
     if let Some(followed) = followed {
         followed.without_first_reading(&mut residual_k);
     }
@@ -185,15 +149,15 @@ pub(crate) fn fit(samples: &Samples, geometry: Geometry) -> Option<Fit> {
     let mut damping = Damping::new(DampingRule::GOOD_START);
     for _ in 0..MAX_ITERATIONS {
         let cost = square(&best.residual_k);
-        let normal = normal(&best.jacobian);
-        let right = [0, 1].map(|i| dot(&best.jacobian[i], &best.residual_k));
+        let normal = products(&best.jacobian, &best.jacobian);
+        let right = right(&best.jacobian, &best.residual_k);
         let trial = |damping: f64| {
-            let [[a, b], [_, d]] = normal;
-            let g = inverted([[a * (1.0 + damping), b], [b, d * (1.0 + damping)]])?;
-            let eta = best.eta + g[0][0] * right[0] + g[0][1] * right[1];
-            let h_w_m2k = best.h_w_m2k + g[1][0] * right[0] + g[1][1] * right[1];
-            let to =
-                [eta.clamp(ETA_BOUNDS.0, ETA_BOUNDS.1), h_w_m2k.clamp(H_BOUNDS_W_M2K.0, H_BOUNDS_W_M2K.1)];
+            let damped = normal + Matrix2::from_diagonal(&(damping * normal.diagonal()));
+            let step = inverted(damped)? * right;
+            let to = [
+                (best.eta + step[0]).clamp(ETA_BOUNDS.0, ETA_BOUNDS.1),
+                (best.h_w_m2k + step[1]).clamp(H_BOUNDS_W_M2K.0, H_BOUNDS_W_M2K.1),
+            ];
             let there = residual(to);
             (square(&there) < cost).then_some((to, there))
         };
@@ -207,7 +171,7 @@ pub(crate) fn fit(samples: &Samples, geometry: Geometry) -> Option<Fit> {
     Some(best)
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
@@ -215,8 +179,13 @@ fn square(column: &[f64]) -> f64 {
     dot(column, column)
 }
 
-fn normal(jacobian: &[Vec<f64>; 2]) -> [[f64; 2]; 2] {
-    [0, 1].map(|i| [0, 1].map(|j| dot(&jacobian[i], &jacobian[j])))
+/// Scalar products of each column of `a` with each of `b`.
+pub(crate) fn products(a: &[Vec<f64>; 2], b: &[Vec<f64>; 2]) -> Matrix2<f64> {
+    Matrix2::from_fn(|i, j| dot(&a[i], &b[j]))
+}
+
+fn right(jacobian: &[Vec<f64>; 2], column: &[f64]) -> Vector2<f64> {
+    Vector2::from_fn(|i, _| dot(&jacobian[i], column))
 }
 
 /// A fit with its derivatives at given parameters; `None` if they are singular or not finite.
@@ -231,7 +200,7 @@ fn linearised(
     // A relative step needs an h above 0.
     let step_h = SLOPE_STEP * h_w_m2k.max(1.0);
     let mut jacobian = [Vec::with_capacity(samples.len()), Vec::with_capacity(samples.len())];
-    for row in rows(samples) {
+    for row in &samples.rows {
         let by_eta = (t2_k(geometry, row, eta + step_eta, h_w_m2k)
             - t2_k(geometry, row, eta - step_eta, h_w_m2k))
             / (2.0 * step_eta);
@@ -247,55 +216,46 @@ fn linearised(
             followed.without_first_reading(column);
         }
     }
-    let inverse_normal = inverted(normal(&jacobian))?;
+    let inverse_normal = inverted(products(&jacobian, &jacobian))?;
     Some(Fit { eta, h_w_m2k, residual_k, jacobian, gas_by_h, followed, inverse_normal })
 }
 
 /// Inverse of a symmetric positive definite matrix; `None` if it is numerically singular.
-pub(crate) fn inverted(m: [[f64; 2]; 2]) -> Option<[[f64; 2]; 2]> {
-    let determinant = m[0][0] * m[1][1] - m[0][1] * m[1][0];
-    let usable = determinant.is_finite() && determinant > 1e-13 * m[0][0] * m[1][1];
-    usable.then(|| {
-        [[m[1][1] / determinant, -m[0][1] / determinant], [-m[1][0] / determinant, m[0][0] / determinant]]
-    })
+fn inverted(m: Matrix2<f64>) -> Option<Matrix2<f64>> {
+    let determinant = m.determinant();
+    (determinant.is_finite() && determinant > 1e-13 * m[(0, 0)] * m[(1, 1)]).then(|| m.try_inverse())?
 }
 
 /// Start values: with the measured T2 in the heat terms, eqs. 1-3 are linear in 1/eta and h except for one product, which takes 1/eta from the
 /// temperature rise.
 fn start(samples: &Samples, geometry: Geometry) -> [f64; 2] {
     let (mut rise_k, mut isentropic_k) = (0.0, 0.0);
-    for (row, t2_k) in rows(samples).zip(&samples.t2_k) {
-        rise_k += t2_k - row.t1_k;
+    for row in &samples.rows {
+        rise_k += row.t2_k - row.t1_k;
         isentropic_k += row.t1_k * row.rise_ratio;
     }
     let apparent = (rise_k / isentropic_k).clamp(1.0, 4.0);
-    let mut normal = [[0.0; 2]; 2];
-    let mut right = [0.0; 2];
-    for (row, t2_k) in rows(samples).zip(&samples.t2_k) {
+    let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
+    for row in &samples.rows {
+        let t2_k = row.t2_k;
         let before = geometry.inlet_h_ratio(row, 1.0 / apparent)
             * geometry.alpha_area_ratio
             * geometry.internal_area_m2
             / (row.flow_kg_s * geometry.air.heat_capacity_j_kgk(row.t1_k));
         let after = (1.0 - geometry.alpha_area_ratio) * geometry.internal_area_m2
-            / (row.flow_kg_s * geometry.air.heat_capacity_j_kgk(*t2_k));
-        let columns = [
+            / (row.flow_kg_s * geometry.air.heat_capacity_j_kgk(t2_k));
+        let columns = Vector2::new(
             row.t1_k * row.rise_ratio,
             before * (row.tc_k - row.t1_k) * (1.0 + row.rise_ratio * apparent) + after * (row.tc_k - t2_k),
-        ];
-        for i in 0..2 {
-            right[i] += columns[i] * (t2_k - row.t1_k);
-            for j in 0..2 {
-                normal[i][j] += columns[i] * columns[j];
-            }
-        }
+        );
+        right += columns * (t2_k - row.t1_k);
+        normal += columns * columns.transpose();
     }
     let inside = |value: f64, (low, high): (f64, f64), fallback: f64| {
         if value.is_finite() && value > low && value < high { value } else { fallback }
     };
-    let [inverse_eta, h_w_m2k] = match inverted(normal) {
-        Some(g) => [g[0][0] * right[0] + g[0][1] * right[1], g[1][0] * right[0] + g[1][1] * right[1]],
-        None => [apparent, f64::NAN],
-    };
+    let found: Option<[f64; 2]> = inverted(normal).map(|g| (g * right).into());
+    let [inverse_eta, h_w_m2k] = found.unwrap_or([apparent, f64::NAN]);
     [
         inside(1.0 / inverse_eta, ETA_BOUNDS, (1.0 / apparent).clamp(0.25, 1.0)),
         inside(h_w_m2k, H_BOUNDS_W_M2K, 500.0),

@@ -32,8 +32,7 @@ impl Followed {
         if probe.diameter_m <= 0.0 || samples.len() < 2 {
             return None;
         }
-        let courses = samples.t_s.iter().zip(&samples.flow_kg_s).zip(&samples.t2_k);
-        let rows = courses.map(|((t_s, flow_kg_s), t2_k)| (*t_s, *flow_kg_s, *t2_k));
+        let rows = samples.rows.iter().map(|row| (row.t_s, row.flow_kg_s, row.t2_k));
         let lags = lags(rows, probe.diameter_m, probe.pipe_diameter_m);
         let memory = follow(&lags, 1.0, &vec![0.0; samples.len()]);
         let memory_square = memory.iter().map(|share| share * share).sum();

@@ -6,11 +6,11 @@
 use crate::config::coloured;
 use crate::single_step::dynamic::{Estimate, enough};
 use crate::step_data::cleaning::without_spikes;
-use crate::step_data::samples::{Samples, slope_per_s};
+use crate::step_data::samples::{Row, Samples, slope_per_s};
 use crate::step_outcome::findings::Findings;
 use crate::{IdentifyConfig, step_outcome::interval_width};
 use mapper_core::{Channel, EstimateUncertainty, EtaSignal, NoCompression, Recording, Warning, Window};
-use mapper_numerics::statistics::{mean, standard_deviation};
+use mapper_numerics::statistics::standard_deviation;
 use mapper_physics::gas::air::Air;
 use mapper_physics::laws::compression::apparent_efficiency;
 use mapper_physics::laws::thermocouple::time_constant_s;
@@ -18,41 +18,10 @@ use mapper_physics::laws::thermocouple::time_constant_s;
 /// Segment at the end of a step in which temperatures must not drift, s: with noise of 0.1 K its slope is then known to better than 0.1 K/min.
 const DRIFT_SPAN_S: f64 = 60.0;
 
-/// Means over the end of a step.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Means {
-    pub(crate) t1_k: f64,
-    pub(crate) t2_k: f64,
-    pub(crate) p1_pa: f64,
-    pub(crate) p2_pa: f64,
-    pub(crate) air: Air,
-}
-
-impl Means {
-    pub(crate) fn apparent_eta(&self) -> f64 {
-        let air = self.air.between(self.p1_pa, self.p2_pa);
-        apparent_efficiency(self.p2_pa / self.p1_pa, self.t1_k, self.t2_k, air)
-    }
-
-    fn moved(self, channel: Channel, by: f64) -> Self {
-        let mut moved = self;
-        match channel {
-            Channel::T1 => moved.t1_k += by,
-            Channel::T2 => moved.t2_k += by,
-            Channel::P1 => moved.p1_pa += by,
-            _ => moved.p2_pa += by,
-        }
-        moved
-    }
-
-    fn value(&self, channel: Channel) -> f64 {
-        match channel {
-            Channel::T1 => self.t1_k,
-            Channel::T2 => self.t2_k,
-            Channel::P1 => self.p1_pa,
-            _ => self.p2_pa,
-        }
-    }
+/// The efficiency if heat between gas and housing counts as work.
+pub(crate) fn apparent_eta(row: &Row, air: Air) -> f64 {
+    let air = air.between(row.p1_pa, row.p2_pa);
+    apparent_efficiency(row.p2_pa / row.p1_pa, row.t1_k, row.t2_k, air)
 }
 
 /// Identifies the step at `position`.
@@ -72,20 +41,23 @@ pub(crate) fn estimate(
     if !enough(&samples, config, findings) {
         return estimate;
     }
-    estimate.dt2_k = samples.change(&samples.t2_k, limits.end_mean_s);
-    estimate.dtc_k = samples.change(&samples.tc_k, limits.end_mean_s);
-    let of = |column: &[f64]| mean(column).unwrap_or(f64::NAN);
+    estimate.dt2_k = samples.change(|row| row.t2_k, limits.end_mean_s);
+    estimate.dtc_k = samples.change(|row| row.tc_k, limits.end_mean_s);
+    let of = |of: fn(&Row) -> f64| samples.mean(of).unwrap_or(f64::NAN);
     let trend_window = Window { start_s: (step.end_s - DRIFT_SPAN_S).max(step.start_s), end_s: step.end_s };
     let trend = Samples::of(recording, trend_window, config, false);
     let lag_k = lag_k(&samples, &trend, config);
-    let means = Means {
-        air: config.air,
-        t1_k: of(&samples.t1_k),
-        t2_k: of(&samples.t2_k) + lag_k,
-        p1_pa: of(&samples.p1_pa),
-        p2_pa: of(&samples.p2_pa),
+    let means = Row {
+        t_s: step.end_s,
+        t1_k: of(|row| row.t1_k),
+        t2_k: of(|row| row.t2_k) + lag_k,
+        tc_k: of(|row| row.tc_k),
+        p1_pa: of(|row| row.p1_pa),
+        p2_pa: of(|row| row.p2_pa),
+        flow_kg_s: of(|row| row.flow_kg_s),
+        rise_ratio: of(|row| row.rise_ratio),
     };
-    let eta = means.apparent_eta();
+    let eta = apparent_eta(&means, config.air);
     if !(eta.is_finite() && eta > 0.0) {
         findings.refuse(Warning::NoCompression(NoCompression::NoRise {
             rise_k: means.t2_k - means.t1_k,
@@ -97,8 +69,9 @@ pub(crate) fn estimate(
     // The drift is not linear, so the correction may be wrong by its own size.
     let lag_eta = eta * lag_k / (means.t2_k - means.t1_k);
     uncertainty.bias_standard_error = uncertainty.bias_standard_error.hypot(lag_eta);
-    for (channel, column) in [(Channel::T2, &trend.t2_k), (Channel::Tc, &trend.tc_k)] {
-        let Some(drift_k_min) = slope_per_s(&trend.t_s, column).map(|slope| 60.0 * slope) else { continue };
+    for channel in [Channel::T2, Channel::Tc] {
+        let readings = trend.rows.iter().map(|row| (row.t_s, row.read(channel)));
+        let Some(drift_k_min) = slope_per_s(readings).map(|slope| 60.0 * slope) else { continue };
         if drift_k_min.abs() > limits.steady_drift_k_min {
             let limit_k_min = limits.steady_drift_k_min;
             findings.doubt(Warning::NotSettled { channel, drift_k_min, limit_k_min });
@@ -117,44 +90,43 @@ pub(crate) fn estimate(
 
 /// Remaining lag of the declared probe behind the gas, K: its time constant times the drift of its reading.
 fn lag_k(samples: &Samples, trend: &Samples, config: &IdentifyConfig) -> f64 {
-    let (Some(flow_kg_s), Some(t2_k)) = (mean(&samples.flow_kg_s), mean(&samples.t2_k)) else { return 0.0 };
+    let means = samples.mean(|row| row.flow_kg_s).zip(samples.mean(|row| row.t2_k));
+    let Some((flow_kg_s, t2_k)) = means else { return 0.0 };
     let tau_s = time_constant_s(config.probe_diameter_m, config.outlet_diameter_m, flow_kg_s, t2_k);
-    slope_per_s(&trend.t_s, &trend.t2_k).map_or(0.0, |slope_k_s| tau_s * slope_k_s)
+    slope_per_s(trend.rows.iter().map(|row| (row.t_s, row.t2_k))).map_or(0.0, |slope_k_s| tau_s * slope_k_s)
 }
 
 /// Noise from the scatter of the samples' own efficiencies (or the declared noise if larger), and offsets and gains one sensor at a time, barometer
 /// and humidity. Also returns the change due to each, since all points share it.
 pub(crate) fn uncertainty(
-    means: &Means,
+    means: &Row,
     samples: &Samples,
     config: &IdentifyConfig,
 ) -> (EstimateUncertainty, Vec<f64>) {
     let (mut common, mut declared_square) = (Vec::new(), 0.0);
     for channel in [Channel::T1, Channel::T2, Channel::P1, Channel::P2] {
         let Some(declared) = config.declared.get(&channel) else { continue };
-        let value = means.value(channel);
+        let value = means.read(channel);
         let step = 1e-5 * value;
-        let slope = (means.moved(channel, step).apparent_eta() - means.moved(channel, -step).apparent_eta())
-            / (2.0 * step);
+        let moved = |by: f64| apparent_eta(&means.moved(channel, by, config.air), config.air);
+        let slope = (moved(step) - moved(-step)) / (2.0 * step);
         let spreads = [declared.offset_sigma, value * declared.gain_sigma_ratio];
         common.extend(spreads.iter().filter(|sigma| **sigma > 0.0).map(|sigma| slope * sigma));
         declared_square += (slope * declared.noise_sigma).powi(2);
     }
-    let by_barometer = |by: f64| means.moved(Channel::P1, by).moved(Channel::P2, by).apparent_eta();
-    let humid = |by: f64| {
-        Means { air: means.air.with_humidity(means.air.humidity_kg_kg() + by), ..*means }.apparent_eta()
+    let mut share = |sigma: f64, moved: &Row, air: Air| {
+        let change = apparent_eta(moved, air) - apparent_eta(means, config.air);
+        common.extend((sigma > 0.0).then_some(change));
     };
-    let mut share = |sigma: f64, eta: &dyn Fn(f64) -> f64| {
-        common.extend((sigma > 0.0).then(|| eta(sigma) - means.apparent_eta()));
-    };
-    share(config.barometer_sigma_pa, &by_barometer);
-    share(config.humidity_sigma_kg_kg, &humid);
-    let etas: Vec<f64> = (0..samples.len())
-        .map(|i| samples.t1_k[i] * samples.rise_ratio[i] / (samples.t2_k[i] - samples.t1_k[i]))
-        .filter(|eta| eta.is_finite())
-        .collect();
+    let (by_pa, by_kg_kg) = (config.barometer_sigma_pa, config.humidity_sigma_kg_kg);
+    let higher = means.moved(Channel::P1, by_pa, config.air).moved(Channel::P2, by_pa, config.air);
+    share(by_pa, &higher, config.air);
+    share(by_kg_kg, means, config.air.with_humidity(config.air.humidity_kg_kg() + by_kg_kg));
+    let eta = |row: &Row| row.t1_k * row.rise_ratio / (row.t2_k - row.t1_k);
+    let etas: Vec<f64> = samples.rows.iter().map(eta).filter(|eta| eta.is_finite()).collect();
     let scatter = standard_deviation(&etas).unwrap_or(0.0).powi(2);
-    let span_s = samples.t_s.last().copied().unwrap_or(0.0) - samples.t_s.first().copied().unwrap_or(0.0);
+    let ends = samples.rows.first().zip(samples.rows.last());
+    let span_s = ends.map_or(0.0, |(first, last)| last.t_s - first.t_s);
     let averaging = coloured(config.noise_colour).variance_of_mean(etas.len(), span_s);
     let noise_square = scatter.max(declared_square) * averaging;
     let bias_square: f64 = common.iter().map(|change: &f64| change * change).sum();

@@ -1,7 +1,7 @@
 //! Predicted and measured T2 of a step, so that a user can check a point.
 
 use crate::IdentifyConfig;
-use crate::single_step::fit::{Geometry, rows, t2_k};
+use crate::single_step::fit::{Geometry, t2_k};
 use crate::single_step::probe_reading::Followed;
 use crate::step_data::samples::Samples;
 use mapper_core::{IdentifiedPoint, Recording};
@@ -35,21 +35,19 @@ pub fn t2_course(
     let (eta, h_w_m2k, window) = (point.eta?, point.h_w_m2k?, point.window?);
     let samples = Samples::of(recording, window, config, true);
     let geometry = Geometry::of(config);
-    let gas_k: Vec<f64> = rows(&samples).map(|row| t2_k(geometry, row, eta, h_w_m2k)).collect();
+    let read: Vec<f64> = samples.rows.iter().map(|row| row.t2_k).collect();
+    let gas_k: Vec<f64> = samples.rows.iter().map(|row| t2_k(geometry, row, eta, h_w_m2k)).collect();
     let model_k = match Followed::of(&samples, geometry.probe) {
         None => gas_k,
         Some(followed) => {
             // The probe's first reading is unknown: the part of the difference that it explains belongs to the model.
             let read_k = followed.read(&gas_k);
-            let mut left: Vec<f64> =
-                samples.t2_k.iter().zip(&read_k).map(|(read, model)| read - model).collect();
+            let mut left: Vec<f64> = read.iter().zip(&read_k).map(|(read, model)| read - model).collect();
             followed.without_first_reading(&mut left);
-            samples.t2_k.iter().zip(&left).map(|(read, left)| read - left).collect()
+            read.iter().zip(&left).map(|(read, left)| read - left).collect()
         }
     };
-    let shift_k = mean(
-        samples.t2_k.iter().zip(&model_k).map(|(read, model)| read - model).collect::<Vec<_>>().as_slice(),
-    )?;
+    let shift_k = mean(read.iter().zip(&model_k).map(|(read, model)| read - model))?;
     let model_k = model_k.into_iter().map(|model| model + shift_k).collect();
-    Some(T2Course { step: point.step, t_s: samples.t_s, read_k: samples.t2_k, model_k, shift_k })
+    Some(T2Course { step: point.step, t_s: samples.times_s(), read_k: read, model_k, shift_k })
 }

@@ -1,7 +1,7 @@
 //! Removes samples that are not measurements: spikes, and constant readings of a channel with declared noise.
 
 use crate::IdentifyConfig;
-use crate::step_data::samples::Samples;
+use crate::step_data::samples::{Row, Samples};
 use crate::step_outcome::findings::Findings;
 use mapper_core::{Channel, Warning};
 use mapper_numerics::statistics::{MIN_VALUES, median_of_sorted, robust_sigma};
@@ -17,47 +17,39 @@ pub(crate) fn without_spikes(samples: Samples, findings: &mut Findings) -> Sampl
 }
 
 /// The samples without spikes and without those of a stuck channel; reports removals in `findings`.
-pub(crate) fn cleaned(samples: Samples, config: &IdentifyConfig, findings: &mut Findings) -> Samples {
-    // Smallest relevant differences: K for temperatures, share of the reading for flow and pressures.
-    let columns: [(Channel, &[f64], f64); 6] = [
-        (Channel::T1, &samples.t1_k, 1.0),
-        (Channel::T2, &samples.t2_k, 1.0),
-        (Channel::Tc, &samples.tc_k, 1.0),
-        (Channel::P1, &samples.p1_pa, 500.0),
-        (Channel::P2, &samples.p2_pa, 1000.0),
-        (Channel::CompressorFlow, &samples.flow_kg_s, 2e-3),
-    ];
+pub(crate) fn cleaned(mut samples: Samples, config: &IdentifyConfig, findings: &mut Findings) -> Samples {
+    let t_s = samples.times_s();
     let mut kept = vec![true; samples.len()];
     let mut spikes = 0;
-    for (channel, column, smallest) in columns {
-        for index in spikes_of(column, smallest) {
-            if let Some(keep) = kept.get_mut(index) {
-                spikes += usize::from(*keep);
-                *keep = false;
-            }
+    for channel in Row::CHANNELS {
+        // Smallest relevant difference.
+        let smallest = match channel {
+            Channel::P1 => 500.0,
+            Channel::P2 => 1000.0,
+            Channel::CompressorFlow => 2e-3,
+            _ => 1.0,
+        };
+        let column: Vec<f64> = samples.rows.iter().map(|row| row.read(channel)).collect();
+        for index in spikes_of(&column, smallest) {
+            spikes += usize::from(kept[index]);
+            kept[index] = false;
         }
         let noisy = config.declared.get(&channel).is_some_and(|declared| declared.noise_sigma > 0.0);
         if !noisy {
             continue;
         }
-        let stuck = stuck_of(&samples.t_s, column, repeats_s(channel));
+        let stuck = stuck_of(&t_s, &column, repeats_s(channel));
         if let (Some(first), Some(last)) = (stuck.first(), stuck.last()) {
-            let at = |index: usize| samples.t_s.get(index).copied().unwrap_or(f64::NAN);
-            findings.doubt(Warning::Stuck { channel, duration_s: at(*last) - at(*first) });
+            findings.doubt(Warning::Stuck { channel, duration_s: t_s[*last] - t_s[*first] });
         }
-        for index in stuck {
-            if let Some(keep) = kept.get_mut(index) {
-                *keep = false;
-            }
-        }
+        stuck.into_iter().for_each(|index| kept[index] = false);
     }
     if spikes > 0 {
         findings.remark(Warning::Outliers { count: spikes });
     }
-    if kept.iter().all(|keep| *keep) {
-        return samples;
-    }
-    samples.filtered(|index| kept.get(index).copied().unwrap_or(false))
+    let mut kept = kept.into_iter();
+    samples.rows.retain(|_| kept.next().unwrap_or(false));
+    samples
 }
 
 fn spikes_of(column: &[f64], smallest: f64) -> Vec<usize> {

@@ -3,17 +3,17 @@
 //! A closed loop that holds the speed keeps moving P3 a little. That counts neither as a jump nor as unsettled.
 
 use mapper_core::{Channel, Recording, StepMarker};
+use mapper_numerics::ROUNDING;
 
-/// Change of a command below which it counts as constant, ratio.
-const HELD_RATIO: f64 = 1e-6;
 /// Share of the final P3 within which a loop is holding it: the housings' slow warming needs no more.
 const TRIM_RATIO: f64 = 5e-3;
 
 /// Gap to the previous step above which the previous command is not the starting point, s.
 const LEADS_ON_S: f64 = 60.0;
 
+/// Whether a command changes by more than rounding; an unknown one does not.
 fn changed(before: f64, after: f64) -> bool {
-    (after - before).abs() > HELD_RATIO * before.abs().max(after.abs())
+    (after - before).abs() > ROUNDING * before.abs().max(after.abs())
 }
 
 /// Whether the step at `position` of `steps` begins with a change of what was commanded.

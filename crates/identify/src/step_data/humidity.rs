@@ -2,12 +2,10 @@
 
 use crate::config::IdentifyConfig;
 use mapper_core::{Channel, Recording};
+use mapper_numerics::SLOPE_STEP;
 use mapper_numerics::statistics::mean;
 use mapper_observe::plausible::check_running;
 use mapper_physics::gas::air::humidity_kg_kg;
-
-/// Change of a reading for the sensitivity of the humidity, ratio: its curvature over 1 % is a hundredth of its slope.
-const SLOPE_RATIO: f64 = 0.01;
 
 /// The configuration with the humidity that was measured, the mean over the recording. The air of a hygrometer is that of the cell, or of the
 /// inlet if the cell's temperature was not recorded. Without a plausible reading the declared humidity stays.
@@ -28,7 +26,7 @@ pub fn with_measured_humidity(recording: &Recording, config: &IdentifyConfig) ->
     let at_dew_point = |temperature_k: f64| humidity_kg_kg(1.0, temperature_k, p1_pa);
     let at_relative = |ratio: f64| humidity_kg_kg(ratio, cell_k, p1_pa);
     let measured = |(value, sigma): (f64, f64), humidity: &dyn Fn(f64) -> f64| {
-        let by = SLOPE_RATIO * value;
+        let by = SLOPE_STEP * value;
         (humidity(value), ((humidity(value + by) - humidity(value - by)) / (2.0 * by)).abs() * sigma)
     };
     // A mirror is the more accurate of the two.

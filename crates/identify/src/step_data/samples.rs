@@ -5,31 +5,91 @@ use crate::step_data::taps;
 use mapper_core::{Channel, Recording, Series, Window};
 use mapper_numerics::statistics::mean;
 use mapper_observe::plausible::is_reading;
+use mapper_physics::gas::air::Air;
 use mapper_physics::laws::compression::isentropic_rise_ratio;
+use mapper_physics::operating_point::forecast::ForecastRow;
 
 /// Longest gap between neighbouring samples of a channel, s: slow loggers have 1 Hz.
 pub const LONGEST_BRIDGE_S: f64 = 2.5;
 
-/// Complete rows on the times of T2, as columns of equal length.
+/// Readings at one instant, total pressures.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Row {
+    pub(crate) t_s: f64,
+    pub(crate) t1_k: f64,
+    pub(crate) t2_k: f64,
+    /// NaN if the recording has no housing temperature (steady method).
+    pub(crate) tc_k: f64,
+    pub(crate) p1_pa: f64,
+    pub(crate) p2_pa: f64,
+    pub(crate) flow_kg_s: f64,
+    /// `PR^kappa - 1`.
+    pub(crate) rise_ratio: f64,
+}
+
+impl Row {
+    /// The channels of a row but that of speed.
+    pub(crate) const CHANNELS: [Channel; 6] =
+        [Channel::T1, Channel::T2, Channel::Tc, Channel::P1, Channel::P2, Channel::CompressorFlow];
+
+    /// The reading of one of [`Row::CHANNELS`].
+    pub(crate) fn read(&self, channel: Channel) -> f64 {
+        let mut row = *self;
+        row.reading(channel).map_or(f64::NAN, |reading| *reading)
+    }
+
+    fn reading(&mut self, channel: Channel) -> Option<&mut f64> {
+        Some(match channel {
+            Channel::T1 => &mut self.t1_k,
+            Channel::T2 => &mut self.t2_k,
+            Channel::Tc => &mut self.tc_k,
+            Channel::P1 => &mut self.p1_pa,
+            Channel::P2 => &mut self.p2_pa,
+            Channel::CompressorFlow => &mut self.flow_kg_s,
+            _ => return None,
+        })
+    }
+
+    /// With an error of a channel.
+    pub(crate) fn moved(mut self, channel: Channel, by: f64, air: Air) -> Row {
+        self.reading(channel).into_iter().for_each(|reading| *reading += by);
+        self.compressing(air)
+    }
+
+    /// With the temperature rise of isentropic compression between its pressures.
+    pub(crate) fn compressing(self, air: Air) -> Row {
+        let rise_ratio =
+            isentropic_rise_ratio(self.p2_pa / self.p1_pa, self.t1_k, air.between(self.p1_pa, self.p2_pa));
+        Row { rise_ratio, ..self }
+    }
+}
+
+/// A row of a forecast, which has no losses of pressure.
+pub(crate) fn forecast_row(row: &ForecastRow, air: Air) -> Row {
+    let ForecastRow { t_s, t1_k, t2_k, tc_k, p1_pa, p2_pa, flow_kg_s, .. } = *row;
+    Row { t_s, t1_k, t2_k, tc_k, p1_pa, p2_pa, flow_kg_s, rise_ratio: f64::NAN }.compressing(air)
+}
+
+/// Complete rows at the times of T2.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Samples {
-    pub(crate) t_s: Vec<f64>,
-    pub(crate) t1_k: Vec<f64>,
-    pub(crate) t2_k: Vec<f64>,
-    /// NaN if the recording has no housing temperature (steady method).
-    pub(crate) tc_k: Vec<f64>,
-    pub(crate) p1_pa: Vec<f64>,
-    pub(crate) p2_pa: Vec<f64>,
-    pub(crate) flow_kg_s: Vec<f64>,
-    /// `PR^kappa - 1`.
-    pub(crate) rise_ratio: Vec<f64>,
+    pub(crate) rows: Vec<Row>,
     /// Rows omitted because a value was missing or not physical.
     pub(crate) lost: usize,
 }
 
 impl Samples {
     pub(crate) fn len(&self) -> usize {
-        self.t_s.len()
+        self.rows.len()
+    }
+
+    pub(crate) fn times_s(&self) -> Vec<f64> {
+        self.rows.iter().map(|row| row.t_s).collect()
+    }
+
+    /// Mean of a column; `None` without rows.
+    pub(crate) fn mean(&self, of: fn(&Row) -> f64) -> Option<f64> {
+        mean(self.rows.iter().map(of))
     }
 
     /// The rows of `window`. `with_housing`: whether a row needs Tc to be complete.
@@ -51,65 +111,35 @@ impl Samples {
             let (t1_k, tc_k, flow_kg_s, t2_k) = (t1_k[i], tc_k[i], flow_kg_s[i], t2_k[i]);
             let p1_pa = taps::total_pa(config.inlet_tap, p1_pa[i], flow_kg_s, t1_k);
             let p2_pa = taps::total_pa(config.outlet_tap, p2_pa[i], flow_kg_s, t2_k);
-            let readings = [
-                (Channel::T1, t1_k),
-                (Channel::T2, t2_k),
-                (Channel::P1, p1_pa),
-                (Channel::P2, p2_pa),
-                (Channel::CompressorFlow, flow_kg_s),
-            ];
-            let complete = readings.into_iter().all(|(channel, value)| is_reading(channel, value))
-                && flow_kg_s > 0.0
-                && (!with_housing || is_reading(Channel::Tc, tc_k));
-            let rise_ratio = isentropic_rise_ratio(p2_pa / p1_pa, t1_k, config.air.between(p1_pa, p2_pa));
-            if !complete || !rise_ratio.is_finite() {
+            let rise_ratio = f64::NAN;
+            let row = Row { t_s: t_s[i], t1_k, t2_k, tc_k, p1_pa, p2_pa, flow_kg_s, rise_ratio };
+            let row = row.compressing(config.air);
+            let is_complete = Row::CHANNELS.into_iter().all(|channel| {
+                (channel == Channel::Tc && !with_housing) || is_reading(channel, row.read(channel))
+            });
+            if is_complete && flow_kg_s > 0.0 && row.rise_ratio.is_finite() {
+                samples.rows.push(row);
+            } else {
                 samples.lost += 1;
-                continue;
             }
-            samples.t_s.push(t_s[i]);
-            samples.t1_k.push(t1_k);
-            samples.t2_k.push(t2_k);
-            samples.tc_k.push(tc_k);
-            samples.p1_pa.push(p1_pa);
-            samples.p2_pa.push(p2_pa);
-            samples.flow_kg_s.push(flow_kg_s);
-            samples.rise_ratio.push(rise_ratio);
         }
         samples
     }
 
-    /// The rows with a true `keep`, by index.
-    pub(crate) fn filtered(&self, keep: impl Fn(usize) -> bool) -> Self {
-        let pick = |column: &[f64]| {
-            column.iter().enumerate().filter(|(i, _)| keep(*i)).map(|(_, value)| *value).collect()
-        };
-        Samples {
-            t_s: pick(&self.t_s),
-            t1_k: pick(&self.t1_k),
-            t2_k: pick(&self.t2_k),
-            tc_k: pick(&self.tc_k),
-            p1_pa: pick(&self.p1_pa),
-            p2_pa: pick(&self.p2_pa),
-            flow_kg_s: pick(&self.flow_kg_s),
-            rise_ratio: pick(&self.rise_ratio),
-            lost: self.lost,
-        }
-    }
-
     /// Change of a column over the window: mean of its last `seconds` minus that of its first.
-    pub(crate) fn change(&self, column: &[f64], seconds: f64) -> Option<f64> {
-        let (first_s, last_s) = (*self.t_s.first()?, *self.t_s.last()?);
+    pub(crate) fn change(&self, of: fn(&Row) -> f64, seconds: f64) -> Option<f64> {
+        let (first_s, last_s) = (self.rows.first()?.t_s, self.rows.last()?.t_s);
         let seconds = seconds.min(0.5 * (last_s - first_s));
-        let early = self.t_s.partition_point(|t| *t <= first_s + seconds);
-        let late = self.t_s.partition_point(|t| *t < last_s - seconds);
-        let change = mean(&column[late..])? - mean(&column[..early])?;
+        let early = self.rows.partition_point(|row| row.t_s <= first_s + seconds);
+        let late = self.rows.partition_point(|row| row.t_s < last_s - seconds);
+        let change = mean(self.rows[late..].iter().map(of))? - mean(self.rows[..early].iter().map(of))?;
         change.is_finite().then_some(change)
     }
 }
 
-/// Least-squares slope of a column, 1/s; `None` without two finite samples.
-pub(crate) fn slope_per_s(t_s: &[f64], values: &[f64]) -> Option<f64> {
-    let usable = || t_s.iter().zip(values).filter(|(_, value)| value.is_finite());
+/// Least-squares slope of values over times, 1/s; `None` without two finite values.
+pub(crate) fn slope_per_s(points: impl Iterator<Item = (f64, f64)> + Clone) -> Option<f64> {
+    let usable = || points.clone().filter(|(_, value)| value.is_finite());
     let count = usable().count() as f64;
     let (mean_t, mean) = usable().fold((0.0, 0.0), |(t, v), (a, b)| (t + a / count, v + b / count));
     let (top, bottom) = usable().fold((0.0, 0.0), |(top, bottom), (t, value)| {

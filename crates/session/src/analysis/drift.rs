@@ -83,9 +83,9 @@ fn zeroed_alike(
     config: IdentifyConfig,
     campaign: &Campaign,
 ) -> (Vec<Recording>, IdentifyConfig, ZeroOutcome) {
-    let zero = recordings
-        .first()
-        .map_or(ZeroOutcome::NotAsked, |first| ZeroOutcome::of(first, &config, campaign.zero));
+    let zero = recordings.first().map_or(ZeroOutcome::NotAsked, |first| {
+        ZeroOutcome::of(first, &config, campaign.zero.map(Into::into))
+    });
     let off = |recording: Recording| zero.take_off(recording, config.clone()).0;
     let recordings = recordings.into_iter().map(off).collect();
     // Declared offsets are kept: they are not drift. The zero determines them far better than the model, whose own errors would appear as

@@ -8,7 +8,7 @@ use crate::recording::identification_config::identification_with;
 use crate::recording::recording_file::{Recorded, check_machine};
 use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::Campaign;
-use mapper_core::{Channel, DeclaredUncertainty, Recording, StepMarker};
+use mapper_core::{Channel, DeclaredUncertainty, Recording, Soak, StepMarker};
 use mapper_diagnose::drift::{CauseKind, DriftReport, without_drift};
 use mapper_diagnose::gap::best_fit::adequacy::adequacy;
 use mapper_diagnose::gap::best_fit::fit::{Effort, fit};
@@ -27,7 +27,7 @@ use mapper_diagnose::gap::residuals::study::Study;
 use mapper_diagnose::gap::residuals::whiten::Linearised;
 use mapper_diagnose::gap::twin::{Expected, Found, Held, forecast_steps, hold};
 use mapper_diagnose::missing_terms::discover::discover;
-use mapper_identify::ZeroOutcome;
+use mapper_identify::{ZeroOutcome, ZeroSettings};
 use mapper_observe::averages::time_table::Table;
 use mapper_observe::model_inputs::lagged_command::Response;
 use mapper_observe::{Declared, FusedChannel};
@@ -180,7 +180,8 @@ impl Session<'_> {
         let ready = |drift: Option<&DriftReport>| {
             let recording = taken_off(raw.clone(), drift);
             // The zero reduces the offset uncertainty.
-            let zero = ZeroOutcome::with_a_fault(&recording, &config, campaign.zero);
+            let settings = |soak: Soak| ZeroSettings { allows_a_fault: true, ..soak.into() };
+            let zero = ZeroOutcome::of(&recording, &config, campaign.zero.map(settings));
             let off_at_rest = off_at_rest(&zero, &config.declared);
             let (recording, zeroed) = zero.take_off(recording, config.clone());
             let declared = Declared {

@@ -14,7 +14,7 @@ use mapper_core::{
 };
 use mapper_diagnose::gap::correction::PointCorrection;
 use mapper_identify::{
-    FoundFault, IdentifyConfig, NominalRig, TwoParameter, ZeroOutcome, ZeroSettings, identify_with_rig,
+    FoundFault, IdentifyConfig, NominalRig, TwoParameter, ZeroOutcome, ZeroSettings, identify_recording,
     isothermal_zero, method_for, with_measured_humidity,
 };
 use mapper_maps::{AssembleError, Grouping, RepeatedJump, assemble, repeated_jumps};
@@ -216,7 +216,7 @@ impl Session<'_> {
         let fused = fused(recordings, config, campaign, map);
         let sensors = fused.channels.into_iter().next().unwrap_or_default();
         let first = fused.recordings.first().ok_or(SessionError::NoRecording)?;
-        let zero = ZeroOutcome::of(first, &fused.config, soak);
+        let zero = ZeroOutcome::of(first, &fused.config, soak.map(Into::into));
         remarks.extend(campaign.filter(|_| soak.is_none()).and_then(|_| unused_rest(first, &fused.config)));
         let (_, config) = zero.take_off(Recording::default(), fused.config.clone());
         let off = |recording: Recording| zero.take_off(recording, fused.config.clone()).0;
@@ -232,7 +232,7 @@ impl Session<'_> {
             tolerances: &campaign.tolerances,
             conditions: &conditions,
         });
-        let found = identify_with_rig(&recording, &config, nominal)?;
+        let found = identify_recording(&recording, &config, nominal)?;
         let mut points: Vec<IdentifiedPoint> = found.points.into_iter().filter_map(Result::ok).collect();
         if let Some(campaign) = campaign {
             calibration_warnings::warn(&mut points, &recording, campaign, day);

@@ -24,17 +24,12 @@ pub(crate) fn measured(
     readings: &[Option<Readings>],
     config: &IdentifyConfig,
 ) -> Rows {
-    let heat = &fitted.heat;
-    let known: Vec<(usize, Readings)> = fitted
-        .positions
-        .iter()
-        .enumerate()
-        .filter_map(|(row, position)| Some((row, (*readings.get(*position)?)?)))
-        .collect();
+    let heat = &fitted.ln_h;
+    let known = fitted.known(readings);
     let count = known.len();
     let units = |(row, readings): &(usize, Readings)| {
         let capacity_w_k = readings.flow_kg_s() * config.air.heat_capacity_j_kgk(readings.t2_k());
-        heat.ln_h[*row].exp() * config.internal_area_m2 / capacity_w_k
+        heat.values[*row].exp() * config.internal_area_m2 / capacity_w_k
     };
     let units: Vec<f64> = known.iter().map(units).collect();
     let by_gain: Vec<f64> = units.iter().map(|units| units.exp_m1() / units).collect();
@@ -47,7 +42,7 @@ pub(crate) fn measured(
         std::array::from_fn(|channel| by_fit[channel].unwrap_or_else(|| fallback(channel)))
     };
     Rows {
-        residual: known.iter().map(|(row, _)| heat.ln_h[*row]).collect(),
+        residual: known.iter().map(|(row, _)| heat.values[*row]).collect(),
         covariance: DMatrix::from_fn(count, count, |i, j| heat.covariance[(known[i].0, known[j].0)]),
         by_reading: known.iter().map(by_reading).collect(),
         readings: known.iter().map(|(_, readings)| *readings).collect(),
@@ -70,9 +65,9 @@ pub(crate) fn rows(
 ) -> Option<Rows> {
     let mut rows = measured(fitted, readings, config);
     let compressor = &nominal.model.params.compressor;
-    let known = fitted.positions.iter().zip(&fitted.eta);
-    let etas = known.filter(|(position, _)| readings.get(**position).is_some_and(Option::is_some));
-    let etas: Vec<f64> = etas.map(|(_, eta)| eta.clamp(ETA_BOUNDS.0, ETA_BOUNDS.1)).collect();
+    let known = fitted.known(readings).into_iter();
+    let etas: Vec<f64> =
+        known.map(|(row, _)| fitted.eta.values[row].clamp(ETA_BOUNDS.0, ETA_BOUNDS.1)).collect();
     for (i, (readings, eta)) in rows.readings.iter().zip(etas).enumerate() {
         let declared = |readings: &Readings| {
             let h_w_m2k = nusselt::coefficient_w_m2k(

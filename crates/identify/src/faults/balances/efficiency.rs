@@ -6,7 +6,7 @@
 
 use crate::faults::balance_rows::{Machine, Rows, common, own};
 use crate::faults::balances::head::ROUGHNESS;
-use crate::faults::end_readings::{PerChannel, Readings};
+use crate::faults::end_readings::{CHANNELS, PerChannel, Readings};
 use crate::faults::nominal_rig::NominalRig;
 use crate::faults::places::{Places, is_on_a_map};
 use crate::faults::smooth::{ANY_ROUGHNESS, At, Smooth};
@@ -16,31 +16,34 @@ use mapper_physics::laws::compression::{actual_rise_k, compressed_k, isentropic_
 use mapper_physics::rig::sensor_fault::FaultKind;
 use nalgebra::{DMatrix, DVector};
 
-/// Efficiencies as fitted, before the smoothness prior.
+/// Efficiencies and heat-transfer coefficients as fitted, before the smoothness prior.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct FittedEfficiencies {
     /// Positions of the steps.
     pub(crate) positions: Vec<usize>,
     /// Fractions.
-    pub(crate) eta: Vec<f64>,
+    pub(crate) eta: FittedQuantity,
+    /// ln of h, W/(m2 K).
+    pub(crate) ln_h: FittedQuantity,
+}
+
+/// One quantity of all steps.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct FittedQuantity {
+    pub(crate) values: Vec<f64>,
     /// Their covariance, without the declared errors of the sensors.
     pub(crate) covariance: DMatrix<f64>,
     /// Sensitivity of each one to a constant error of each channel in all steps, per unit of the channel; `None` if no error of the channel is
     /// declared, because the fit then does not compute it.
-    pub(crate) by_reading: Vec<[Option<f64>; 7]>,
-    /// The same of ln h.
-    pub(crate) heat: FittedHeat,
+    pub(crate) by_reading: Vec<[Option<f64>; CHANNELS.len()]>,
 }
 
-/// Heat-transfer coefficients as fitted.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct FittedHeat {
-    /// ln of h, W/(m2 K).
-    pub(crate) ln_h: Vec<f64>,
-    /// Their covariance, without the declared errors of the sensors.
-    pub(crate) covariance: DMatrix<f64>,
-    /// Sensitivity of each one to a constant error of each channel in all steps.
-    pub(crate) by_reading: Vec<[Option<f64>; 7]>,
+impl FittedEfficiencies {
+    /// The rows of steps with readings. `readings`: of all steps, by position.
+    pub(crate) fn known(&self, readings: &[Option<Readings>]) -> Vec<(usize, Readings)> {
+        let rows = self.positions.iter().enumerate();
+        rows.filter_map(|(row, position)| Some((row, (*readings.get(*position)?)?))).collect()
+    }
 }
 
 /// `-ln eta` of any compressor: it changes by 0.4 over a speed line and by some 0.1 over the speeds. Judgement, checked by the chi-square of
@@ -85,30 +88,26 @@ pub(crate) fn rows(
         None => Some((0.0, 0.0)),
     };
     let known: Vec<(usize, Readings, (f64, f64))> = fitted
-        .positions
-        .iter()
-        .enumerate()
-        .filter_map(|(row, position)| {
-            let readings = (*readings.get(*position)?).filter(is_on_a_map)?;
-            let (ln_work, slope) = expected(&readings)?;
-            ((ETA_BOUNDS.0..=ETA_BOUNDS.1).contains(&fitted.eta[row]) && ln_work.is_finite()).then_some((
-                row,
-                readings,
-                (ln_work, slope),
-            ))
+        .known(readings)
+        .into_iter()
+        .filter(|(row, readings)| {
+            is_on_a_map(readings) && (ETA_BOUNDS.0..=ETA_BOUNDS.1).contains(&fitted.eta.values[*row])
         })
+        .filter_map(|(row, readings)| Some((row, readings, expected(&readings)?)))
+        .filter(|(_, _, (ln_work, _))| ln_work.is_finite())
         .collect();
     let count = known.len();
     let readings: Vec<Readings> = known.iter().map(|(_, readings, _)| *readings).collect();
     let places = Places::of(&readings, reference)?;
     let at: Vec<At> = readings.iter().map(|readings| places.at(readings)).collect();
     let residual: Vec<f64> =
-        known.iter().map(|(row, _, (ln_work, _))| -fitted.eta[*row].ln() - ln_work).collect();
-    let by_eta: Vec<f64> = known.iter().map(|(row, _, _)| -fitted.eta[*row].recip()).collect();
+        known.iter().map(|(row, _, (ln_work, _))| -fitted.eta.values[*row].ln() - ln_work).collect();
+    let by_eta: Vec<f64> = known.iter().map(|(row, _, _)| -fitted.eta.values[*row].recip()).collect();
     let measured = DMatrix::from_fn(count, count, |i, j| {
-        by_eta[i] * by_eta[j] * fitted.covariance[(known[i].0, known[j].0)]
+        by_eta[i] * by_eta[j] * fitted.eta.covariance[(known[i].0, known[j].0)]
     });
-    let heat: Vec<f64> = known.iter().map(|(row, readings, _)| heat(readings, fitted.eta[*row])).collect();
+    let heat: Vec<f64> =
+        known.iter().map(|(row, readings, _)| heat(readings, fitted.eta.values[*row])).collect();
     let measured = measured + common(&heat, HEAT_RATIO);
     let (covariance, by_machine, by_place): (_, _, Vec<PerChannel>) = match nominal {
         Some(nominal) => {
@@ -134,14 +133,14 @@ pub(crate) fn rows(
     };
     let by_reading = (0..count).map(|i| {
         let (row, readings, _) = &known[i];
-        let (by_fit, apparent) = (fitted.by_reading[*row], readings.derivatives(apparent));
+        let (by_fit, apparent) = (fitted.eta.by_reading[*row], readings.derivatives(apparent));
         std::array::from_fn(|channel| {
             by_eta[i] * by_fit[channel].unwrap_or(apparent[channel]) - by_place[i][channel]
         })
     });
     let by_reading = by_reading.collect();
     let readings =
-        known.iter().map(|(row, readings, _)| as_gains_count(readings, fitted.eta[*row])).collect();
+        known.iter().map(|(row, readings, _)| as_gains_count(readings, fitted.eta.values[*row])).collect();
     // It changes the slope of T2 over Tc, which convection absorbs, and nothing at equal temperatures.
     let by_fault = vec![(Channel::T2, FaultKind::TowardsWall, vec![0.0; count])];
     Some(Rows { residual, covariance, readings, by_reading, by_machine, by_fault })
@@ -149,22 +148,20 @@ pub(crate) fn rows(
 
 /// The efficiencies themselves, with the effects of errors on them.
 pub(crate) fn measured(fitted: &FittedEfficiencies, readings: &[Option<Readings>]) -> Rows {
-    let known: Vec<(usize, Readings)> = fitted
-        .positions
-        .iter()
-        .enumerate()
-        .filter_map(|(row, position)| Some((row, (*readings.get(*position)?)?)))
-        .collect();
+    let known = fitted.known(readings);
     let by_reading = |(row, readings): &(usize, Readings)| {
         let apparent = readings.derivatives(apparent);
-        std::array::from_fn(|channel| fitted.by_reading[*row][channel].unwrap_or(apparent[channel]))
+        std::array::from_fn(|channel| fitted.eta.by_reading[*row][channel].unwrap_or(apparent[channel]))
     };
     let count = known.len();
     Rows {
-        residual: known.iter().map(|(row, _)| fitted.eta[*row]).collect(),
+        residual: known.iter().map(|(row, _)| fitted.eta.values[*row]).collect(),
         covariance: DMatrix::zeros(count, count),
         by_reading: known.iter().map(by_reading).collect(),
-        readings: known.iter().map(|(row, readings)| as_gains_count(readings, fitted.eta[*row])).collect(),
+        readings: known
+            .iter()
+            .map(|(row, readings)| as_gains_count(readings, fitted.eta.values[*row]))
+            .collect(),
         by_machine: Vec::new(),
         by_fault: vec![(Channel::T2, FaultKind::TowardsWall, vec![0.0; count])],
     }

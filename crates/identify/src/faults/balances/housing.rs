@@ -15,7 +15,7 @@ use crate::IdentifyConfig;
 use crate::config::coloured;
 use crate::faults::balance_rows::{Rows, common, own};
 use crate::faults::end_readings::{CHANNELS, MAX_STEPS, PerChannel, Readings, span_s};
-use crate::step_data::samples::{Samples, slope_per_s};
+use crate::step_data::samples::{Row, Samples, slope_per_s};
 use mapper_core::{Channel, Recording, StepKind, StepMarker, Window, WindowRule};
 use mapper_numerics::statistics::{MIN_VALUES, mean};
 use mapper_physics::rig::sensor_fault::FaultKind;
@@ -152,14 +152,15 @@ fn parts(recording: &Recording, start_s: f64, end_s: f64, config: &IdentifyConfi
         if range.len() < MIN_VALUES {
             return None;
         }
-        let of = |column: &[f64]| mean(&column[range.clone()]);
-        let (middle_s, tc_k, t1_k) = (of(&samples.t_s)?, of(&samples.tc_k)?, of(&samples.t1_k)?);
-        let t2_k = of(&samples.t2_k)?;
-        let capacity_w_k = of(&samples.flow_kg_s)? * config.air.heat_capacity_j_kgk(t1_k);
+        let rows = &samples.rows[range];
+        let of = |of: fn(&Row) -> f64| mean(rows.iter().map(of));
+        let (middle_s, tc_k, t1_k) = (of(|row| row.t_s)?, of(|row| row.tc_k)?, of(|row| row.t1_k)?);
+        let t2_k = of(|row| row.t2_k)?;
+        let capacity_w_k = of(|row| row.flow_kg_s)? * config.air.heat_capacity_j_kgk(t1_k);
         let conductance_w_k = capacity_w_k * (1.0 - kept) / kept;
         // d((1 - kept)/kept) = -d kept/kept^2.
         let conductance_error_w_k = capacity_w_k * error / (kept * kept);
-        let slope_k_s = slope_per_s(&samples.t_s[range.clone()], &samples.tc_k[range.clone()])?;
+        let slope_k_s = slope_per_s(rows.iter().map(|row| (row.t_s, row.tc_k)))?;
         conductance_error_w_k.is_finite().then_some(Part {
             slope_k_s,
             t1_k,
@@ -180,18 +181,16 @@ fn kept_ratio(samples: &Samples, config: &IdentifyConfig) -> Option<(f64, f64)> 
     if count < 2 * MIN_VALUES {
         return None;
     }
-    let row = |i: usize| {
-        let rise_k = samples.t1_k[i] * samples.rise_ratio[i];
-        (samples.t1_k[i] - samples.tc_k[i], rise_k, samples.t2_k[i] - samples.tc_k[i])
-    };
-    let (aa, ab, bb, ay, by) = (0..count).map(row).fold((0.0, 0.0, 0.0, 0.0, 0.0), |sums, (a, b, y)| {
+    let row = |row: &Row| (row.t1_k - row.tc_k, row.t1_k * row.rise_ratio, row.t2_k - row.tc_k);
+    let rows = || samples.rows.iter().map(row);
+    let (aa, ab, bb, ay, by) = rows().fold((0.0, 0.0, 0.0, 0.0, 0.0), |sums, (a, b, y)| {
         (sums.0 + a * a, sums.1 + a * b, sums.2 + b * b, sums.3 + a * y, sums.4 + b * y)
     });
     let determinant = aa * bb - ab * ab;
     let (kept, of_rise) = ((bb * ay - ab * by) / determinant, (aa * by - ab * ay) / determinant);
-    let left: f64 = (0..count).map(row).map(|(a, b, y)| (y - kept * a - of_rise * b).powi(2)).sum();
+    let left: f64 = rows().map(|(a, b, y)| (y - kept * a - of_rise * b).powi(2)).sum();
     // Samples that count as one: twice the correlation time of the coloured part of the noise.
-    let interval_s = (samples.t_s.last()? - samples.t_s.first()?) / (count - 1) as f64;
+    let interval_s = (samples.rows.last()?.t_s - samples.rows.first()?.t_s) / (count - 1) as f64;
     let colour = coloured(config.noise_colour);
     let alike = 1.0 + 2.0 * colour.first_order_variance_ratio() * colour.time_constant_s / interval_s;
     let variance = alike * left / count as f64 * bb / determinant;

@@ -4,7 +4,7 @@ use crate::IdentifyConfig;
 use crate::config::coloured;
 use crate::joint::step_model::smoothing::Smoother;
 use crate::step_data::end_state::EndState;
-use crate::step_data::samples::Samples;
+use crate::step_data::samples::{self, Samples};
 use mapper_core::{Channel, Recording, Window};
 use mapper_numerics::coloured_noise::BlockNoise;
 use mapper_numerics::statistics::mean;
@@ -56,27 +56,28 @@ pub(crate) fn condensed(
     let mut rows = Vec::new();
     let mut start = 0;
     while start < samples.len() {
-        let start_s = samples.t_s[start];
-        let block_s = block_s_after(start_s - samples.t_s[0], config);
+        let start_s = samples.rows[start].t_s;
+        let block_s = block_s_after(start_s - samples.rows[0].t_s, config);
         // Half a nanosecond: times of samples are rounded.
-        let end = samples.t_s.partition_point(|t| *t < start_s + block_s - 5e-10).max(start + 1);
-        let of = |column: &[f64]| mean(&column[start..end]).unwrap_or(f64::NAN);
-        let t_s = of(&samples.t_s);
-        let (first_s, last_s) = (samples.t_s[start], samples.t_s[end - 1]);
+        let end = samples.rows.partition_point(|row| row.t_s < start_s + block_s - 5e-10).max(start + 1);
+        let of =
+            |of: fn(&samples::Row) -> f64| mean(samples.rows[start..end].iter().map(of)).unwrap_or(f64::NAN);
+        let t_s = of(|row| row.t_s);
+        let (first_s, last_s) = (start_s, samples.rows[end - 1].t_s);
         let (_, speeds) = speed.slice(first_s, last_s);
         let speeds: Vec<f64> =
             speeds.iter().copied().filter(|value| *value > 0.0 && value.is_finite()).collect();
         let speed_rpm = mean(&speeds).or_else(|| speed.interpolate(t_s)).unwrap_or(end_state.speed_rpm);
-        let (t1_k, p1_pa, flow_kg_s) = (of(&samples.t1_k), of(&samples.p1_pa), of(&samples.flow_kg_s));
+        let (t1_k, p1_pa, flow_kg_s) = (of(|row| row.t1_k), of(|row| row.p1_pa), of(|row| row.flow_kg_s));
         let count = (end - start) as f64;
         let block_s = if end > start + 1 { (last_s - first_s) * count / (count - 1.0) } else { 0.0 };
         rows.push(Row {
             t_s,
             t1_k,
-            t2_k: of(&samples.t2_k),
-            tc_k: of(&samples.tc_k),
+            t2_k: of(|row| row.t2_k),
+            tc_k: of(|row| row.tc_k),
             p1_pa,
-            p2_pa: of(&samples.p2_pa),
+            p2_pa: of(|row| row.p2_pa),
             flow_kg_s,
             place: place(config, speed_rpm, flow_kg_s, t1_k, p1_pa),
             noise: BlockNoise::of_mean(coloured(config.noise_colour), count, block_s),
@@ -89,12 +90,11 @@ pub(crate) fn condensed(
     let last = *rows.last()?;
     let end_window = Window { start_s: step.end_s - config.thresholds.end_mean_s, end_s: step.end_s };
     let at_end = Samples::of(recording, end_window, config, true);
-    let of = |column: &[f64], otherwise: f64| mean(column).unwrap_or(otherwise);
     let end = Row {
         t_s: step.end_s,
         t1_k: end_state.t1_k,
-        t2_k: of(&at_end.t2_k, last.t2_k),
-        tc_k: of(&at_end.tc_k, last.tc_k),
+        t2_k: at_end.mean(|row| row.t2_k).unwrap_or(last.t2_k),
+        tc_k: at_end.mean(|row| row.tc_k).unwrap_or(last.tc_k),
         p1_pa: end_state.p1_pa,
         p2_pa: end_state.p1_pa * end_state.pressure_ratio,
         flow_kg_s: end_state.flow_kg_s,

@@ -6,7 +6,7 @@
 //! Learning, 2006, ch. 2 and 5). Its amplitude and lengths are averaged with their posterior weights. On a strongly curved map the offsets
 //! keep their declared spread; on a flat one they lose about half of it. All quantities correlated with the efficiencies are corrected too.
 
-use crate::faults::balances::efficiency::{FittedEfficiencies, FittedHeat};
+use crate::faults::balances::efficiency::{FittedEfficiencies, FittedQuantity};
 use crate::faults::end_readings::{CHANNELS, MAX_STEPS};
 use crate::faults::smooth::ANY_ROUGHNESS;
 use crate::joint::fit::refinements::{Gain, Refinements};
@@ -21,7 +21,7 @@ use crate::joint::uncertainty::quantity::{Quantity, is_offset, of_shared, quanti
 use mapper_core::{BudgetRow, Channel, EstimateUncertainty, ReferenceState, confidence_interval_95};
 use mapper_inference::mixture::MIN_WEIGHT;
 use mapper_numerics::parallel;
-use mapper_numerics::statistics::{EXCLUDE_SIGMAS, median};
+use mapper_numerics::statistics::{EXCLUDE_SIGMAS, mean, median};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// Standard deviations of the efficiencies about their mean, fraction: the range of compressor maps along a valve opening and across.
@@ -32,8 +32,6 @@ const SPEED_LENGTHS: [f64; 4] = [0.7, 1.0, 1.4, 2.0];
 const FLOW_LENGTHS: [f64; 5] = [0.35, 0.5, 0.7, 1.0, 2.0];
 /// Deviation from any smooth function, fraction: of machines in simulation, and of a measured map.
 const ROUGHNESSES: [f64; 2] = [SURFACE_SIGMA, ANY_ROUGHNESS];
-/// Mean of efficiencies and its standard deviation, fraction: an uninformative prior.
-const MEAN: (f64, f64) = (0.65, 1.0);
 
 /// A number with its error by origin.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -116,21 +114,17 @@ pub(crate) fn as_measured(problem: &Problem<'_>, steps: &[StepRows]) -> Option<F
     let covariance = &problem.covariance()?;
     let (etas, ln_hs) = quantities(problem, covariance, steps);
     let kept: Vec<usize> = (0..etas.len()).filter(|i| problem.members[*i].shares).collect();
-    let (of_etas, by_reading) = without_readings(covariance, &etas, &kept, steps);
-    let (of_ln_hs, ln_h_by_reading) = without_readings(covariance, &ln_hs, &kept, steps);
     let ln_h = |i: &usize| {
         problem.setting.h_at_end(&steps[*i].end, &problem.shared, &problem.members[*i].local).0.ln()
     };
+    let fitted = |quantities: &[Quantity], value: &dyn Fn(&usize) -> f64| {
+        let (without, by_reading) = without_readings(covariance, quantities, &kept, steps);
+        FittedQuantity { values: kept.iter().map(value).collect(), covariance: without, by_reading }
+    };
     Some(FittedEfficiencies {
         positions: kept.iter().map(|i| steps[*i].position).collect(),
-        eta: kept.iter().map(|i| etas[*i].value).collect(),
-        covariance: of_etas,
-        by_reading,
-        heat: FittedHeat {
-            ln_h: kept.iter().map(ln_h).collect(),
-            covariance: of_ln_hs,
-            by_reading: ln_h_by_reading,
-        },
+        eta: fitted(&etas, &|i| etas[*i].value),
+        ln_h: fitted(&ln_hs, &ln_h),
     })
 }
 
@@ -300,6 +294,7 @@ fn together(quantities: &[Quantity], etas: &[Quantity], best: Option<&Solved>) -
 /// All choices of amplitude and lengths with sufficient weight.
 fn solve(etas: &[Quantity], coordinates: &[(f64, f64, f64)], problem: &Problem<'_>) -> Vec<Solved> {
     let mut used: Vec<bool> = problem.members.iter().map(|member| member.shares).collect();
+    let level = mean(etas.iter().map(|eta| eta.value)).unwrap_or(0.0);
     let mut choices = Vec::new();
     for amplitude in AMPLITUDES {
         for speed_length in SPEED_LENGTHS {
@@ -314,7 +309,7 @@ fn solve(etas: &[Quantity], coordinates: &[(f64, f64, f64)], problem: &Problem<'
     loop {
         let sample: Vec<usize> = (0..used.len()).filter(|i| used[*i]).step_by(every).collect();
         let evidence = parallel::map(&choices, |choice| {
-            evidence(etas, coordinates, &sample, choice).unwrap_or(f64::NEG_INFINITY)
+            evidence((etas, level), coordinates, &sample, choice).unwrap_or(f64::NEG_INFINITY)
         });
         let best = evidence.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         if !best.is_finite() {
@@ -330,7 +325,7 @@ fn solve(etas: &[Quantity], coordinates: &[(f64, f64, f64)], problem: &Problem<'
                 // Excluded points get an error so large that they have no weight.
                 let matrix = matrix(etas, coordinates, &(0..etas.len()).collect::<Vec<_>>(), choice, &used);
                 let factors = matrix.cholesky()?;
-                let off = DVector::from_iterator(etas.len(), etas.iter().map(|eta| eta.value - MEAN.0));
+                let off = DVector::from_iterator(etas.len(), etas.iter().map(|eta| eta.value - level));
                 Some(Solved { weight: *weight, drive: factors.solve(&off), factors })
             })
             .collect();
@@ -375,20 +370,21 @@ fn matrix(
             + amplitude * amplitude * (-0.5 * (by_speed * by_speed + by_flow * by_flow)).exp()
             // It cannot be distinguished from an offset.
             + SLOW_LOSS * SLOW_LOSS * slow * other_slow
-            + MEAN.1 * MEAN.1
+            // Any level: an uninformative prior about the mean of the points.
+            + 1.0
             + own
     })
 }
 
 /// Log density of the points under a choice, up to a constant.
 fn evidence(
-    etas: &[Quantity],
+    (etas, level): (&[Quantity], f64),
     coordinates: &[(f64, f64, f64)],
     points: &[usize],
     choice: &[f64; 4],
 ) -> Option<f64> {
     let factors = matrix(etas, coordinates, points, choice, &vec![true; etas.len()]).cholesky()?;
-    let off = DVector::from_iterator(points.len(), points.iter().map(|i| etas[*i].value - MEAN.0));
+    let off = DVector::from_iterator(points.len(), points.iter().map(|i| etas[*i].value - level));
     let ln_determinant: f64 = factors.l_dirty().diagonal().iter().map(|x| x.ln()).sum();
     Some(-0.5 * off.dot(&factors.solve(&off)) - ln_determinant)
 }

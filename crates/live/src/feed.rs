@@ -3,7 +3,7 @@
 use crate::live_run::LiveRun;
 use crate::operator_commands::OperatorCommand;
 use crate::state::{
-    LoggedMessage, MAX_EVENTS, MAX_POINTS, Now, Reading, State, Step, TRACE_ROWS, TracedChannel, Units,
+    LoggedMessage, MAX_EVENTS, MAX_POINTS, Now, Reading, State, Step, TRACE_ROWS, TracedChannel,
 };
 use mapper_campaign::Campaign;
 use mapper_core::{Channel, IdentifiedPoint, PlanStep, SignalGuard, StepMarker};
@@ -56,7 +56,6 @@ impl Feed {
     pub(crate) fn new(run: &LiveRun<'_>) -> Self {
         let display = Display::new(&run.campaign.display);
         let soak_s = soak_s(run.campaign);
-        let units = display.units();
         let mut speeds_rpm: Vec<f64> = run.plan.steps.iter().map(|step| step.to.speed_rpm).collect();
         speeds_rpm.sort_by(f64::total_cmp);
         let mut lines: Vec<String> = speeds_rpm.iter().map(|rpm| display.line_name(*rpm)).collect();
@@ -64,11 +63,7 @@ impl Feed {
         let state = State {
             machine: run.campaign.machine.name.clone(),
             campaign: run.campaign.name.clone(),
-            units: Units {
-                flow: units.flow.clone(),
-                speed: units.speed.clone(),
-                temperature: units.temperature.clone(),
-            },
+            units: display.units().clone(),
             lines,
             planned: planned(run.campaign, run.plan, &display),
             steps: run.plan.steps.len(),

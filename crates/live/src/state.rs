@@ -1,5 +1,6 @@
 //! The state shown by a browser, with a size limit for any run.
 
+use mapper_campaign::campaign::DisplayUnits;
 use mapper_report::page::{LiveMap, LivePoint, Planned};
 use serde::Serialize;
 use std::collections::VecDeque;
@@ -15,7 +16,7 @@ pub(crate) const MAX_POINTS: usize = 2000;
 pub(crate) struct State {
     pub(crate) machine: String,
     pub(crate) campaign: String,
-    pub(crate) units: Units,
+    pub(crate) units: DisplayUnits,
     /// Names of the speed lines, from slow to fast.
     pub(crate) lines: Vec<String>,
     /// Expected points on the map.
@@ -35,13 +36,6 @@ pub(crate) struct State {
     pub(crate) now: Now,
     pub(crate) outcome: Option<String>,
     pub(crate) page: Option<String>,
-}
-
-#[derive(Debug, Clone, Serialize)]
-pub(crate) struct Units {
-    pub(crate) flow: String,
-    pub(crate) speed: String,
-    pub(crate) temperature: String,
 }
 
 #[derive(Debug, Clone, Serialize)]

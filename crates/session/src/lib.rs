@@ -55,7 +55,7 @@ pub use analysis::drift::Drift;
 pub use analysis::further_results::RigFiles;
 pub use analysis::gap::Gap;
 pub use analysis::gap_correction::GapCorrection;
-pub use analysis::identification::{Identified, SoughtSurge};
+pub use analysis::identification::Identified;
 pub use analysis::pdf::{PrintError, page_as_pdf};
 pub use analysis::results::{Results, compressor_map};
 pub use analysis::transient::{Transient, write_transient};

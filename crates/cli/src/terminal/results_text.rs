@@ -6,11 +6,12 @@ use mapper_identify::{TwoParameter, ZeroOutcome};
 use mapper_maps::RepeatedJump;
 use mapper_observe::FusedChannel;
 use mapper_report::{
-    Display, Paint, ScoredPoint, disagreement_text, first_doubts_text, paint_verdict, points_by_line_text,
-    points_text, repeated_jumps_text, result_remark_text, sensors_text, shared_errors_text,
-    surge_columns_text, surge_text, thermal_text, truth_text, verdict_sentence, wrapped, zero_text,
+    Display, Paint, ScoredPoint, SurgeReport, disagreement_text, first_doubts_text, paint_verdict,
+    points_by_line_text, points_text, repeated_jumps_text, result_remark_text, sensors_text,
+    shared_errors_text, surge_columns_text, surge_text, thermal_text, truth_text, verdict_sentence, wrapped,
+    zero_text,
 };
-use mapper_session::{Identified, Results, SoughtSurge};
+use mapper_session::{Identified, Results};
 use std::fmt::Write;
 
 /// Default width of a terminal, columns.
@@ -36,7 +37,7 @@ struct ShownResults<'a> {
     thermal: Option<&'a ThermalModel>,
     sensors: &'a [FusedChannel],
     zero: &'a ZeroOutcome,
-    surge: Option<&'a SoughtSurge>,
+    surge: Option<&'a SurgeReport>,
     remarks: Vec<String>,
     /// The command that shows the rest.
     more: &'a str,

@@ -7,24 +7,18 @@ use crate::page::drawn_steps::{DrawnStep, drawn_steps};
 use crate::page::run_page::RunPage;
 use crate::page::sections;
 use crate::page::shell::{Purpose, shell};
+use mapper_campaign::campaign::DisplayUnits;
 use maud::html;
 use serde::Serialize;
 
 /// Data of the script.
 #[derive(Serialize)]
 struct Drawn {
-    units: Units,
+    units: DisplayUnits,
     points: Vec<DrawnPoint>,
     map: DrawnMap,
     steps: Vec<DrawnStep>,
     others: Vec<DrawnOther>,
-}
-
-#[derive(Serialize)]
-struct Units {
-    flow: String,
-    speed: String,
-    temperature: String,
 }
 
 #[derive(Serialize)]
@@ -42,11 +36,7 @@ pub fn run_page(page: &RunPage<'_>) -> Result<String, serde_json::Error> {
     let units = report.campaign.map(|campaign| campaign.display.clone()).unwrap_or_default();
     let display = Display::new(&units);
     let drawn = Drawn {
-        units: Units {
-            flow: units.flow.clone(),
-            speed: units.speed.clone(),
-            temperature: units.temperature.clone(),
-        },
+        units: units.clone(),
         points: drawn_points(page, &display),
         map: page.report.map.map(|map| drawn_map(map, &display)).unwrap_or_default(),
         steps: drawn_steps(page, &display),

@@ -35,6 +35,7 @@ use mapper_maps::RepeatedJump;
 use mapper_observe::FusedChannel;
 use mapper_observe::energy_balance::Gases;
 use mapper_recording::score::{ScoreSummary, ScoredMark, ScoredPoint};
+use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -89,7 +90,7 @@ pub struct RunReport<'a> {
     /// Deviations of the points from the simulator's truth; `None` on a real rig.
     pub score: Option<&'a ScoreSummary>,
     /// Result of the search for surge; `None` if there was none.
-    pub surge: Option<SurgeReport<'a>>,
+    pub surge: Option<&'a SurgeReport>,
     /// Whether a picture of the map is next to the report as `map.svg`.
     pub has_picture: bool,
 }
@@ -116,12 +117,12 @@ pub struct ReportSource {
 }
 
 /// Result of the search for surge.
-#[derive(Clone, Copy)]
-pub struct SurgeReport<'a> {
-    /// Marks in order of speed.
-    pub marks: &'a [ScoredMark],
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct SurgeReport {
+    /// The marks in order of speed, with the truth if the recording contains it.
+    pub marks: Vec<ScoredMark>,
     /// Lines on which no mark was found.
-    pub remarks: &'a [SurgeNotFound],
+    pub remarks: Vec<SurgeNotFound>,
     /// How often the compressor went into surge.
     pub surges: usize,
 }
@@ -212,7 +213,7 @@ fn markdown_report(report: &RunReport<'_>) -> String {
     text.push_str(&budget_section(report.budgets));
     text.push_str(&acceptance_sections(report.judged_points()));
     if let Some(SurgeReport { marks, remarks, surges }) = surge {
-        let _ = write!(text, "\n## Surge\n\n{}", surge_text(marks, remarks, surges, &units));
+        let _ = write!(text, "\n## Surge\n\n{}", surge_text(marks, remarks, *surges, &units));
     }
     if let Some(words) = zero_words(report.zero) {
         let _ = writeln!(text, "\n## Isothermal zero\n\n{words}\n");

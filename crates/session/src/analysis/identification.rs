@@ -10,7 +10,7 @@ use mapper_campaign::campaign::Date;
 use mapper_campaign::{Campaign, nominal_model};
 use mapper_core::{
     Channel, CompressorMap, IdentifiedPoint, Method, PointBudgets, Recording, ResultRemark, StepMarker,
-    StepOrigin, SurgeNotFound, ThermalModel, join_recordings,
+    StepOrigin, ThermalModel, join_recordings,
 };
 use mapper_diagnose::gap::correction::PointCorrection;
 use mapper_identify::{
@@ -22,14 +22,12 @@ use mapper_observe::FusedChannel;
 use mapper_observe::energy_balance::Gases;
 use mapper_physics::gas::air::Air;
 use mapper_recording::score::{
-    PendingTruths, ScoreSummary, ScoredMark, ScoredPoint, Truth, score, score_marks, with_truths,
+    PendingTruths, ScoreSummary, ScoredPoint, Truth, score, score_marks, with_truths,
 };
 use mapper_recording::{AmbientPressure, Barometer, ChannelMap};
-use mapper_report::{result_remark_text, with_messages};
-use serde::Serialize;
-use serde_json::{Value, json};
-
+use mapper_report::{SurgeReport, result_remark_text, with_messages};
 use mapper_runner::surge::SurgeMarks;
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// Minimum soak before the first step, s, that triggers a remark. Thermocouples in a housing need this time to equalise.
@@ -61,22 +59,11 @@ pub struct Identified {
     /// Errors of the points against the truth; `None` on a real rig.
     pub score: Option<ScoreSummary>,
     /// Surge-side limits of the map; `None` if there was no search.
-    pub surge: Option<SoughtSurge>,
+    pub surge: Option<SurgeReport>,
     /// Efficiencies before and after a correction for the causes of a gap; empty without one.
     pub corrections: Vec<PointCorrection>,
     /// Other remarks.
     pub remarks: Vec<ResultRemark>,
-}
-
-/// Result of the surge search.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct SoughtSurge {
-    /// The marks in order of speed, with the truth if the recording contains it.
-    pub marks: Vec<ScoredMark>,
-    /// Lines without a surge point.
-    pub remarks: Vec<SurgeNotFound>,
-    /// Number of surge events of the compressor.
-    pub surges: usize,
 }
 
 impl Identified {
@@ -352,14 +339,13 @@ fn sought(
     off: impl Fn(Recording) -> Recording,
     campaign: Option<&Campaign>,
     config: &IdentifyConfig,
-) -> Option<SoughtSurge> {
-    let mut all: Option<SoughtSurge> = None;
+) -> Option<SurgeReport> {
+    let mut all: Option<SurgeReport> = None;
     for (Source { approaches, .. }, truth) in sources.iter().zip(truths) {
         let Some(approaches) = approaches.clone().map(&off) else { continue };
         let SurgeMarks { marks, remarks, surges } = find_surge_marks(&approaches, campaign, config);
         let marks = score_marks(truth, &approaches, config.reference, marks);
-        let together =
-            all.get_or_insert_with(|| SoughtSurge { marks: Vec::new(), remarks: Vec::new(), surges: 0 });
+        let together = all.get_or_insert_with(SurgeReport::default);
         together.marks.extend(marks);
         together.remarks.extend(remarks);
         together.surges += surges;

@@ -1,7 +1,7 @@
 //! Results of a run or recording: points, map and report, as data and as files in its directory.
 
 use crate::analysis::budget_file::budget_csv;
-use crate::analysis::identification::{Identified, SoughtSurge};
+use crate::analysis::identification::Identified;
 use crate::recording::files::{json_text, write_new};
 use crate::recording::program::program_and_commit;
 use crate::recording::recording_file::{Recorded, merge_parts};
@@ -60,7 +60,7 @@ pub struct Results {
     pub zero: ZeroOutcome,
     /// Surge-side limits of the map; `None` if there was no search.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub surge: Option<SoughtSurge>,
+    pub surge: Option<SurgeReport>,
     /// Other remarks.
     pub remarks: Vec<ResultRemark>,
     /// Why a file of the results could not be written, and how to write it later; `None`: all were written.
@@ -399,11 +399,7 @@ fn run_report_of<'a>(
         two_parameter: &identified.two_parameter,
         sensors: &identified.sensors,
         score: identified.score.as_ref(),
-        surge: identified.surge.as_ref().map(|surge| SurgeReport {
-            marks: &surge.marks,
-            remarks: &surge.remarks,
-            surges: surge.surges,
-        }),
+        surge: identified.surge.as_ref(),
         has_picture,
     }
 }

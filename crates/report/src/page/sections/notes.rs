@@ -37,7 +37,7 @@ pub(crate) fn notes(page: &RunPage<'_>, units: &DisplayUnits) -> Markup {
             }
             @if let Some(surge) = report.surge {
                 h3 { "Surge" }
-                (surge_part(&surge, &display))
+                (surge_part(surge, &display))
             }
             @if !report.sensors.is_empty() {
                 h3 { "Channels with several sensors" }
@@ -53,12 +53,12 @@ pub(crate) fn notes(page: &RunPage<'_>, units: &DisplayUnits) -> Markup {
     }
 }
 
-fn surge_part(surge: &SurgeReport<'_>, display: &Display) -> Markup {
+fn surge_part(surge: &SurgeReport, display: &Display) -> Markup {
     let cells = |row: Vec<String>| Row { step: None, cells: row.into_iter().map(Cell::text).collect() };
-    let rows: Vec<Row> = surge_rows(surge.marks, display).into_iter().map(cells).collect();
+    let rows: Vec<Row> = surge_rows(&surge.marks, display).into_iter().map(cells).collect();
     html! {
-        (data_table("Measured surge", &surge_heads(surge.marks, display), &rows))
-        @for remark in surge_remarks(surge.remarks, surge.surges) { p { (remark) } }
+        (data_table("Measured surge", &surge_heads(&surge.marks, display), &rows))
+        @for remark in surge_remarks(&surge.remarks, surge.surges) { p { (remark) } }
     }
 }
 

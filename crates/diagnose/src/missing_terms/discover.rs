@@ -1,6 +1,6 @@
 //! Searches for laws that explain the residual of a diagnosis, and locates their source terms.
 
-use crate::gap::best_fit::adequacy::adequacy;
+use crate::gap::best_fit::adequacy::{adequacy, misfit_of_steps};
 use crate::gap::best_fit::first_step::with_start_read;
 use crate::gap::best_fit::fit::{Effort, Fit, fit};
 use crate::gap::best_fit::selection::Selection;
@@ -14,7 +14,6 @@ use crate::gap::findings::report::{Law, MissingForce, Place, Verdict};
 use crate::gap::gap_reduction::how_far::channels_on;
 use crate::gap::residuals::study::{Study, members};
 use crate::missing_terms::laws::candidate::{Bench, Candidate, keep_determined, worth};
-use crate::missing_terms::laws::held_out::shrink;
 use crate::missing_terms::laws::script::script;
 use crate::missing_terms::laws::sentence::{LawDescription, tell};
 use crate::missing_terms::search::columns::{Base, Products};
@@ -364,4 +363,17 @@ fn reported_force(force: Force) -> MissingForce {
             .map(|(level, sigma)| [*level, level - 1.96 * sigma, level + 1.96 * sigma])
             .collect(),
     }
+}
+
+/// Gap reduction by a law on steps used neither to find nor to fit it:
+/// `1 - sum g_after+/sum g_before+` with `g = (|r|^2 - n)/n` over the held-out steps; over all steps if none is held out.
+fn shrink(study: &Study, before: &Fit, after: &Fit, held_out: &[usize]) -> f64 {
+    let all: Vec<usize> = (0..study.steps.len()).collect();
+    let steps = if held_out.is_empty() { &all } else { held_out };
+    let of = |fit: &Fit| {
+        let misfit = misfit_of_steps(study, &fit.residual);
+        steps.iter().map(|step| misfit[*step].max(0.0)).sum::<f64>()
+    };
+    let (before, after) = (of(before), of(after));
+    if before > 0.0 { 1.0 - after / before } else { 0.0 }
 }

@@ -7,7 +7,7 @@ use crate::drift::likelihood::refine::Refined;
 use crate::drift::report::CorrectedPoint;
 use crate::drift::runs::request::DriftRequest;
 use crate::drift::runs::time_axis::CampaignStep;
-use crate::drift::sensitivity::constant_effect::Constant;
+use crate::drift::sensitivity::readings::Constant;
 use mapper_core::{Channel, IdentifiedPoint, Recording};
 use mapper_identify::identify_each;
 use mapper_observe::averages::mean_reading::mean_between;

@@ -4,7 +4,6 @@ use crate::drift::causes::planted::Planted;
 use crate::drift::runs::request::DriftError;
 use crate::drift::runs::time_axis::{Block, CampaignStep};
 use crate::drift::sensitivity::knobs::{KNOBS, difference_step};
-use crate::drift::sensitivity::prediction::Prediction;
 use crate::drift::sensitivity::segment::{Followed, LEFT_OUT_S, Place, Stretch, carried, read_state};
 use mapper_core::{Channel, Recording};
 use mapper_numerics::parallel;
@@ -23,6 +22,26 @@ use mapper_physics::simulation::model::{Model, State};
 const SAMPLE_S: f64 = 2.5;
 /// Time before the start over which readings give the initial state, s.
 const BEFORE_START_S: f64 = 2.0;
+
+/// Model predictions for one run.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Prediction {
+    /// Means over the segments, [`OUTPUTS`] in each.
+    pub means: Vec<[f64; OUTPUTS.len()]>,
+    /// Highest position on the speed line within each segment; 1 is the surge line.
+    pub surge_position_ratio: Vec<f64>,
+    /// Efficiency and heat-transfer coefficient, W/(m2 K), at the end of each step.
+    pub step_ends: Vec<(f64, f64)>,
+}
+
+impl Prediction {
+    /// Appends the prediction of the next run.
+    fn append(&mut self, next: Prediction) {
+        self.means.extend(next.means);
+        self.surge_position_ratio.extend(next.surge_position_ratio);
+        self.step_ends.extend(next.step_ends);
+    }
+}
 
 /// One run, ready to be driven.
 pub(crate) struct Drive<'a> {
@@ -186,8 +205,8 @@ pub(crate) fn predict(
     drives: &mut [Drive<'_>],
     planted: &[Planted],
 ) -> Result<(Prediction, Vec<Prediction>), DriftError> {
-    let mut base = Prediction::empty();
-    let mut turned = vec![Prediction::empty(); KNOBS.len()];
+    let mut base = Prediction::default();
+    let mut turned = vec![Prediction::default(); KNOBS.len()];
     for (run, drive) in drives.iter_mut().enumerate() {
         let (own_base, own_turned) =
             drive.predict_all(planted).map_err(|source| DriftError::Drive { run, source })?;

@@ -1,9 +1,7 @@
 //! Model predictions for whole runs, and the sensitivity of readings to drift causes and constants.
 
-pub(crate) mod constant_effect;
 pub(crate) mod drive;
 pub(crate) mod knobs;
 pub(crate) mod nuisance;
-pub(crate) mod prediction;
 pub(crate) mod readings;
 pub(crate) mod segment;

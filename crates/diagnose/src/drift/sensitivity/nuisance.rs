@@ -1,9 +1,8 @@
 //! Constants of a campaign, each with its prior: they are not drift.
 
 use crate::drift::runs::time_axis::Block;
-use crate::drift::sensitivity::constant_effect::Constant;
 use crate::drift::sensitivity::knobs::{KNOBS, sigma};
-use crate::drift::sensitivity::readings::Readings;
+use crate::drift::sensitivity::readings::{Constant, Readings};
 use mapper_core::Channel;
 use mapper_observe::channels::OUTPUTS;
 use mapper_observe::declared::Declared;

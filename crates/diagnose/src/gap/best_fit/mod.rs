@@ -4,7 +4,6 @@ pub mod adequacy;
 pub mod coordinate;
 pub mod first_step;
 pub mod fit;
-pub(crate) mod misfit;
 pub mod normal;
 pub(crate) mod projector;
 pub mod selection;

@@ -2,8 +2,8 @@
 
 use crate::gap::best_fit::selection::{Selection, dot_over};
 use crate::gap::residuals::study::Study;
-use crate::gap::residuals::whiten::Linearised;
-use nalgebra::DMatrix;
+use crate::gap::residuals::whiten::{Linearised, dot};
+use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 
 /// Prior width of an effect's parameter, in typical steps.
@@ -48,4 +48,23 @@ pub(crate) fn normal_matrix(
         matrix[(n + j, n + j)] += 1e-6;
     }
     matrix
+}
+
+/// Squared residual of `difference` (whitened) after fitting `columns`; `precision` is the prior precision of their coefficients. `None` if
+/// the equations are singular.
+pub(crate) fn misfit(difference: &[f64], columns: &[Vec<f64>], precision: &DMatrix<f64>) -> Option<f64> {
+    let n = columns.len();
+    let mut matrix = precision.clone();
+    for i in 0..n {
+        for j in 0..=i {
+            let product = dot(&columns[i], &columns[j]);
+            matrix[(i, j)] += product;
+            if i != j {
+                matrix[(j, i)] += product;
+            }
+        }
+    }
+    let right = DVector::from_fn(n, |i, _| dot(&columns[i], difference));
+    let taken = right.dot(&matrix.cholesky()?.solve(&right));
+    Some((dot(difference, difference) - taken).max(0.0))
 }

@@ -5,7 +5,7 @@
 
 use crate::gap::best_fit::coordinate::{Coordinate, coordinates, parameters, set_parameter};
 use crate::gap::best_fit::fit::Fit;
-use crate::gap::best_fit::misfit::misfit;
+use crate::gap::best_fit::normal::misfit;
 use crate::gap::findings::experiment::AtRest;
 use crate::gap::residuals::study::{Hypothesis, Study};
 use mapper_core::Channel;

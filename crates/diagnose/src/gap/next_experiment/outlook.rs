@@ -3,7 +3,7 @@
 use crate::gap::best_fit::coordinate::coordinates;
 use crate::gap::best_fit::first_step::is_start;
 use crate::gap::best_fit::fit::{Fit, effect_changes};
-use crate::gap::best_fit::misfit::misfit;
+use crate::gap::best_fit::normal::misfit;
 use crate::gap::findings::experiment::{AllowedJump, AlsoChanged, Experiment};
 use crate::gap::next_experiment::at_rest::apart_at_rest;
 use crate::gap::residuals::actuators::Actuators;

@@ -1,5 +1,6 @@
 //! Conditions that prevent a diagnosis, reported instead of a wrong cause.
 
+use crate::gap::residuals::study::PredictError;
 use mapper_core::{Channel, step_number};
 use mapper_observe::plausible::Implausible;
 
@@ -92,4 +93,15 @@ pub enum Problem {
         /// Maximum allowed difference.
         within: f64,
     },
+}
+
+/// Why a recording cannot be diagnosed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum GapError {
+    /// The recording does not fit the campaign, or required data are missing.
+    #[error(transparent)]
+    Recording(#[from] Problem),
+    /// The nominal model cannot follow the recording.
+    #[error("the nominal model cannot follow this recording: {0}; is it of this machine?")]
+    Predict(#[from] PredictError),
 }

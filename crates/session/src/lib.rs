@@ -23,7 +23,7 @@
 //! let (campaign, text) = (mapper_campaign::load(file)?, mapper_campaign::read_text(file)?);
 //! let runs = tempfile::tempdir()?;
 //! let results = session.run(RunRequest::new(&campaign, &text, runs.path()))?.results?;
-//! for point in results.points.iter().map(|scored| &scored.point) {
+//! for point in results.identified.points_alone() {
 //!     if let (Some(eta), Some(h_w_m2k)) = (point.eta, point.h_w_m2k) {
 //!         println!("eta = {eta:.3}, h = {h_w_m2k:.0} W/(m2 K)");
 //!     }

@@ -58,10 +58,15 @@ fn seeds_err_as_forecast() {
     for seed in 1..=12 {
         let campaign = Campaign { seed, ..first.clone() };
         let folder = tempfile::tempdir().unwrap();
-        let results = session.run(RunRequest::new(&campaign, "", folder.path())).unwrap().results.unwrap();
+        let identified =
+            session.run(RunRequest::new(&campaign, "", folder.path())).unwrap().results.unwrap().identified;
         let parameters = ["alpha_area", "probe", "direction"].map(str::to_owned).to_vec();
-        assert!(results.remarks.contains(&ResultRemark::HeldFixed { parameters }), "{:?}", results.remarks);
-        for scored in &results.points {
+        assert!(
+            identified.remarks.contains(&ResultRemark::HeldFixed { parameters }),
+            "{:?}",
+            identified.remarks
+        );
+        for scored in &identified.points {
             if let (Some(eta), Some(truth)) = (scored.point.eta, &scored.truth) {
                 square += (eta - truth.eta).powi(2);
                 count += 1.0;
@@ -87,7 +92,7 @@ fn the_stated_error_is_that_of_the_intervals() {
     let registry = Registry { backends: vec![virtual_lab::PLUGIN], formats: FORMATS, ..Registry::default() };
     let folder = tempfile::tempdir().unwrap();
     let run = Session::new(&registry).run(RunRequest::new(&campaign, "", folder.path())).unwrap();
-    let points = run.results.unwrap().points;
+    let points = run.results.unwrap().identified.points;
     let sigmas = points
         .iter()
         .filter_map(|scored| Some(standard_error_of(scored.point.eta_low?, scored.point.eta_high?)));

@@ -45,7 +45,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     // Blind cases on the virtual lab, calibrations, the figures of the paper; above the application, like the program.
     ("mapper-validation", &["core", "chart", "numerics", "physics", "campaign", "runner", "recording", "observe", "identify", "diagnose", "history", "report", "session", "backends", "effects", "fleet"]),
     // The program lists the plug-ins; no package depends on the program.
-    ("mapper-cli",       &["core", "physics", "campaign", "driver-host", "planner", "recording", "observe", "identify", "diagnose", "history", "maps", "log-formats", "report", "session", "live", "backends", "effects", "formats", "fleet", "validation"]),
+    ("mapper-cli",       &["core", "physics", "campaign", "driver-host", "planner", "recording", "diagnose", "history", "maps", "log-formats", "report", "session", "live", "backends", "effects", "formats", "fleet", "validation"]),
     ("mapper-python",    &["core", "physics", "campaign", "recording", "maps", "log-formats", "session", "driver-host", "backends", "effects", "formats"]),
     // Drivers are separate programs: their common parts, and the libraries of each rig.
     ("mapper-driver",    &["core", "driver-host"]),

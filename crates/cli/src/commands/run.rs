@@ -152,7 +152,7 @@ impl Run {
     fn report_outcome(&self, campaign: &Campaign, outcome: RunOutcome) -> Result<(), Failure> {
         let RunOutcome { directory, recording, end, results } = outcome;
         let unusable = results.as_ref().is_ok_and(|results| {
-            results.points.iter().all(|scored| scored.point.verdict == Verdict::Unusable)
+            results.identified.points_alone().all(|point| point.verdict == Verdict::Unusable)
         });
         let unwritten = results.as_ref().ok().and_then(|results| results.unwritten.clone());
         let kept = "the rig is safe and the recording is kept";

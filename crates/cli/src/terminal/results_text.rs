@@ -1,15 +1,12 @@
 //! Results of a run or an identification, for a terminal.
 
 use mapper_campaign::campaign::DisplayUnits;
-use mapper_core::{CompressorMap, ThermalModel, Verdict};
-use mapper_identify::{TwoParameter, ZeroOutcome};
+use mapper_core::{CompressorMap, Verdict};
 use mapper_maps::RepeatedJump;
-use mapper_observe::FusedChannel;
 use mapper_report::{
-    Display, Paint, ScoredPoint, SurgeReport, disagreement_text, first_doubts_text, paint_verdict,
-    points_by_line_text, points_text, repeated_jumps_text, result_remark_text, sensors_text,
-    shared_errors_text, surge_columns_text, surge_text, thermal_text, truth_text, verdict_sentence, wrapped,
-    zero_text,
+    Display, Paint, disagreement_text, first_doubts_text, paint_verdict, points_by_line_text, points_text,
+    repeated_jumps_text, result_remark_text, sensors_text, shared_errors_text, surge_columns_text,
+    surge_text, thermal_text, truth_text, verdict_sentence, wrapped, zero_text,
 };
 use mapper_session::{Identified, Results};
 use std::fmt::Write;
@@ -30,14 +27,9 @@ pub struct Shown {
 
 /// Results of a run, or of identified recordings.
 struct ShownResults<'a> {
-    points: &'a [ScoredPoint],
-    two_parameter: &'a [TwoParameter],
+    identified: &'a Identified,
     map: Option<&'a CompressorMap>,
-    repeats: Vec<RepeatedJump>,
-    thermal: Option<&'a ThermalModel>,
-    sensors: &'a [FusedChannel],
-    zero: &'a ZeroOutcome,
-    surge: Option<&'a SurgeReport>,
+    repeats: &'a [RepeatedJump],
     remarks: Vec<String>,
     /// The command that shows the rest.
     more: &'a str,
@@ -48,15 +40,10 @@ pub fn results_text(units: &DisplayUnits, results: &Results, more: &str, shown: 
     let mut text = shown_results_text(
         units,
         &ShownResults {
-            points: &results.points,
-            two_parameter: &results.two_parameter,
+            identified: &results.identified,
             map: results.compressor_map.as_ref(),
-            repeats: results.repeats.clone(),
-            thermal: results.thermal.as_ref(),
-            sensors: &results.sensors,
-            zero: &results.zero,
-            surge: results.surge.as_ref(),
-            remarks: results.remarks.iter().map(result_remark_text).collect(),
+            repeats: &results.repeats,
+            remarks: results.identified.remarks.iter().map(result_remark_text).collect(),
             more,
         },
         shown,
@@ -84,14 +71,9 @@ pub fn identified_text(
 ) -> String {
     let warnings = warnings.iter().map(|warning| format!("recording: {warning}"));
     let found = ShownResults {
-        points: &identified.points,
-        two_parameter: &identified.two_parameter,
+        identified,
         map: None,
-        repeats: Vec::new(),
-        thermal: identified.thermal.as_ref(),
-        sensors: &identified.sensors,
-        zero: &identified.zero,
-        surge: identified.surge.as_ref(),
+        repeats: &[],
         remarks: identified.remarks.iter().map(result_remark_text).chain(warnings).collect(),
         more,
     };
@@ -100,9 +82,9 @@ pub fn identified_text(
 
 fn shown_results_text(units: &DisplayUnits, found: &ShownResults<'_>, shown: Shown) -> String {
     let mut text = if shown.full { full(units, found, shown) } else { short(units, found, shown) };
-    let has = |verdict| found.points.iter().any(|scored| scored.point.verdict == verdict);
+    let has = |verdict| found.identified.points_alone().any(|point| point.verdict == verdict);
     let worst = [Verdict::Unusable, Verdict::Doubtful].into_iter().find(|verdict| has(*verdict));
-    let words = verdict_sentence(found.points.iter().map(|scored| &scored.point));
+    let words = verdict_sentence(found.identified.points_alone());
     let words = paint_verdict(worst.unwrap_or(Verdict::Good), &words, shown.paint);
     let _ = writeln!(text, "\n{words}\n");
     text
@@ -110,21 +92,23 @@ fn shown_results_text(units: &DisplayUnits, found: &ShownResults<'_>, shown: Sho
 
 fn short(units: &DisplayUnits, found: &ShownResults<'_>, shown: Shown) -> String {
     let mut text = String::new();
-    if let Some(disagreement) = disagreement_text(found.points, found.two_parameter, units) {
+    if let Some(disagreement) =
+        disagreement_text(&found.identified.points, &found.identified.two_parameter, units)
+    {
         text.push_str(&wrapped(&disagreement, COLUMNS, 2));
         text.push('\n');
     }
-    text.push_str(&points_by_line_text(found.points, found.map, units, shown.truth, shown.paint));
+    text.push_str(&points_by_line_text(&found.identified.points, found.map, units, shown.truth, shown.paint));
     text.push('\n');
-    text.push_str(&first_doubts_text(found.points));
-    if let Some(truth) = truth_text(found.points).filter(|_| shown.truth) {
+    text.push_str(&first_doubts_text(&found.identified.points));
+    if let Some(truth) = truth_text(&found.identified.points).filter(|_| shown.truth) {
         text.push_str(&wrapped(&truth, COLUMNS, 2));
     }
-    if let Some(surge) = found.surge {
+    if let Some(surge) = &found.identified.surge {
         text.push_str(&surge_columns_text(&surge.marks, &surge.remarks, surge.surges, units, shown.truth));
     }
     // Omit sensors that all agree.
-    for fused in found.sensors.iter().filter(|fused| !fused.left_out.is_empty()) {
+    for fused in found.identified.sensors.iter().filter(|fused| !fused.left_out.is_empty()) {
         text.push_str(&wrapped(&fused.to_string(), COLUMNS, 2));
     }
     for remark in &found.remarks {
@@ -139,18 +123,19 @@ fn short(units: &DisplayUnits, found: &ShownResults<'_>, shown: Shown) -> String
 }
 
 fn full(units: &DisplayUnits, found: &ShownResults<'_>, shown: Shown) -> String {
-    let mut text = disagreement_text(found.points, found.two_parameter, units).unwrap_or_default();
-    text.push_str(&points_text(found.points, units, shown.truth));
-    if let Some(shared) = shared_errors_text(found.points.iter().map(|scored| &scored.point), units) {
+    let mut text = disagreement_text(&found.identified.points, &found.identified.two_parameter, units)
+        .unwrap_or_default();
+    text.push_str(&points_text(&found.identified.points, units, shown.truth));
+    if let Some(shared) = shared_errors_text(found.identified.points_alone(), units) {
         let _ = writeln!(text, "{shared}");
     }
-    text.push_str(&repeated_jumps_text(&found.repeats, &Display::new(units)));
-    if let Some(thermal) = found.thermal {
+    text.push_str(&repeated_jumps_text(found.repeats, &Display::new(units)));
+    if let Some(thermal) = &found.identified.thermal {
         text.push_str(&thermal_text(thermal));
     }
-    text.push_str(&sensors_text(found.sensors));
-    text.push_str(&zero_text(found.zero));
-    if let Some(surge) = found.surge {
+    text.push_str(&sensors_text(&found.identified.sensors));
+    text.push_str(&zero_text(&found.identified.zero));
+    if let Some(surge) = &found.identified.surge {
         let _ = write!(text, "\n{}", surge_text(&surge.marks, &surge.remarks, surge.surges, units));
     }
     for remark in &found.remarks {

@@ -27,6 +27,7 @@ use mapper_recording::score::{
 use mapper_recording::{AmbientPressure, Barometer, ChannelMap};
 use mapper_report::{SurgeReport, result_remark_text, with_messages};
 use mapper_runner::surge::SurgeMarks;
+use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -34,13 +35,16 @@ use std::path::{Path, PathBuf};
 const UNUSED_REST_S: f64 = 600.0;
 
 /// Identification result of a recording.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize)]
 pub struct Identified {
     /// The identified recording: joined from several files, with fused sensors and the isothermal zero subtracted.
+    #[serde(skip)]
     pub recording: Recording,
     /// Origin of each of its steps.
+    #[serde(skip)]
     pub origins: Vec<StepOrigin>,
     /// The identification settings.
+    #[serde(skip)]
     pub config: IdentifyConfig,
     /// The points, with the truth if the recording contains it.
     pub points: Vec<ScoredPoint>,
@@ -49,18 +53,23 @@ pub struct Identified {
     /// Two-parameter results for the same steps (joint method).
     pub two_parameter: Vec<TwoParameter>,
     /// Faults of sensors or machine that are needed to explain the recording.
+    #[serde(skip)]
     pub faults: Vec<FoundFault>,
     /// Uncertainty budgets of the points, in order.
+    #[serde(skip)]
     pub budgets: Vec<PointBudgets>,
     /// Result of sensor fusion.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sensors: Vec<FusedChannel>,
     /// Result of the zero.
     pub zero: ZeroOutcome,
     /// Errors of the points against the truth; `None` on a real rig.
     pub score: Option<ScoreSummary>,
     /// Surge-side limits of the map; `None` if there was no search.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub surge: Option<SurgeReport>,
     /// Efficiencies before and after a correction for the causes of a gap; empty without one.
+    #[serde(skip)]
     pub corrections: Vec<PointCorrection>,
     /// Other remarks.
     pub remarks: Vec<ResultRemark>,
@@ -69,8 +78,17 @@ pub struct Identified {
 impl Identified {
     /// Machine-readable output. `recording`: the first file; `warnings`: the reader's warnings.
     pub fn json(&self, recording: Option<&Path>, warnings: &[String]) -> Value {
+        let mut value = self.points_json();
+        value["recording"] = json!(recording);
+        value["score"] = json!(self.score);
+        value["recording_warnings"] = json!(warnings);
+        value["remarks"] = json!(self.remarks);
+        with_messages(value)
+    }
+
+    /// What the file of the points contains.
+    pub(crate) fn points_json(&self) -> Value {
         let mut value = json!({
-            "recording": recording,
             "reference": self.config.reference,
             "efficiency": self.config.air.efficiency,
             "points": self.points,
@@ -79,9 +97,6 @@ impl Identified {
             "faults": self.faults,
             "budgets": self.budgets,
             "zero": self.zero,
-            "score": self.score,
-            "recording_warnings": warnings,
-            "remarks": self.remarks,
         });
         if !self.sensors.is_empty() {
             value["sensors"] = json!(self.sensors);
@@ -89,7 +104,7 @@ impl Identified {
         if let Some(surge) = &self.surge {
             value["surge"] = json!(surge);
         }
-        with_messages(value)
+        value
     }
 
     /// The gases of compressor and turbine.

@@ -11,19 +11,13 @@ use mapper_campaign::campaign::Outputs;
 use mapper_campaign::units::Kind;
 use mapper_core::{
     CompressorMap, ExportError, IdentifiedPoint, MapUnits, Method, Plan, ResultRemark, RunEnding,
-    ThermalModel,
 };
-use mapper_identify::{T2Course, TwoParameter, ZeroOutcome, t2_course};
+use mapper_identify::{T2Course, t2_course};
 use mapper_maps::{MapFit, MapFitOptions, RepeatedJump};
-use mapper_observe::FusedChannel;
-use mapper_recording::score::{ScoreSummary, ScoredPoint};
 use mapper_recording::{ChannelMap, ReadOptions, ReadWarning, read_recording};
 use mapper_report::page::{OtherRun, RunPage, gap_part, run_page};
-use mapper_report::{
-    Display, PointsOrigin, ReportSource, RunReport, SurgeReport, instant, run_report, with_messages,
-};
+use mapper_report::{Display, PointsOrigin, ReportSource, RunReport, instant, run_report, with_messages};
 use serde::Serialize;
-use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -37,32 +31,17 @@ pub struct Results {
     /// The other recordings.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub further_recordings: Vec<PathBuf>,
-    /// Identified points, repeats included.
-    pub points: Vec<ScoredPoint>,
+    /// The identification, with every remark.
+    #[serde(flatten)]
+    pub identified: Identified,
     /// Files of the map by format.
     pub map: BTreeMap<String, PathBuf>,
     /// The test report.
     pub report: PathBuf,
     /// The extended report as a page for a browser.
     pub page: PathBuf,
-    /// Errors of the points against the truth; `None` on a real rig.
-    pub score: Option<ScoreSummary>,
     /// Jumps that were repeated.
     pub repeats: Vec<RepeatedJump>,
-    /// Parameters common to all points (joint method).
-    pub thermal: Option<ThermalModel>,
-    /// Two-parameter results for the same steps (joint method).
-    pub two_parameter: Vec<TwoParameter>,
-    /// Result of sensor fusion.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub sensors: Vec<FusedChannel>,
-    /// Result of the isothermal zero.
-    pub zero: ZeroOutcome,
-    /// Surge-side limits of the map; `None` if there was no search.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub surge: Option<SurgeReport>,
-    /// Other remarks.
-    pub remarks: Vec<ResultRemark>,
     /// Why a file of the results could not be written, and how to write it later; `None`: all were written.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unwritten: Option<String>,
@@ -263,7 +242,7 @@ impl Session<'_> {
     fn written(
         &self,
         origin: &Provenance,
-        identified: Identified,
+        mut identified: Identified,
         (recording_file, further_recordings): (PathBuf, Vec<PathBuf>),
         mut remarks: Vec<ResultRemark>,
         directory: &Path,
@@ -277,23 +256,8 @@ impl Session<'_> {
             }
             None => BTreeMap::new(),
         };
-        let mut points_file = json!({
-            "reference": identified.config.reference,
-            "efficiency": identified.config.air.efficiency,
-            "points": identified.points,
-            "thermal": identified.thermal,
-            "two_parameter": identified.two_parameter,
-            "faults": identified.faults,
-            "budgets": identified.budgets,
-            "zero": identified.zero,
-        });
-        if !identified.sensors.is_empty() {
-            points_file["sensors"] = json!(identified.sensors);
-        }
-        if let Some(surge) = &identified.surge {
-            points_file["surge"] = json!(surge);
-        }
-        files.write(run_directory::POINTS, json_text(&with_messages(points_file))?.as_bytes());
+        let points_file = with_messages(identified.points_json());
+        files.write(run_directory::POINTS, json_text(&points_file)?.as_bytes());
         if !identified.budgets.is_empty() {
             files.write(run_directory::BUDGET, &budget_csv(&identified.budgets)?);
         }
@@ -310,23 +274,16 @@ impl Session<'_> {
         );
         let report = files.write(run_directory::REPORT, run_report(&shown).as_bytes());
         let page = files.write(run_directory::PAGE, page_of(&identified, &shown, &[], None)?.as_bytes());
-        let Identified { points, thermal, two_parameter, sensors, zero, score, surge, .. } = identified;
+        identified.remarks = remarks;
         let results = Results {
             run: directory.to_owned(),
             recording: recording_file,
             further_recordings,
-            points,
+            identified,
             map,
             report,
             page,
-            score,
             repeats,
-            thermal,
-            two_parameter,
-            sensors,
-            zero,
-            surge,
-            remarks,
             unwritten: None,
             compressor_map,
         };

@@ -82,7 +82,6 @@ pub use plan::campaign_forecast::CampaignForecast;
 pub use plan::planning::{PlanInputs, nominal_model, plan, plan_of};
 pub use plan::rehearsal::{Rehearsal, rehearse};
 pub use plan::stored_plan::stored_plan;
-pub use plan::surge::{SurgeForecast, surge_forecast};
 pub use recording::files::{Existing, json_text, write_file, write_new};
 pub use recording::identification_config::{declared, identification};
 pub use recording::log_inspection::{LogInspection, inspect_log};

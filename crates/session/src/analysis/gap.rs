@@ -104,8 +104,9 @@ impl Session<'_> {
             self.send(SessionEvent::Progress { done_ratio, what: what.to_owned() });
         };
         progress(0.0, "drift");
-        let Prepared { recording, declared, model, linearised, drift, doubted, sensors, zero, off_at_rest } =
+        let Prepared { zeroed, model, linearised, drift, doubted, sensors } =
             self.prepared_for_gap(recorded, campaign, map)?;
+        let Zeroed { recording, declared, zero, off_at_rest } = zeroed;
         let before = healthy.map(|healthy| self.prepared_for_gap(healthy, campaign, map)).transpose()?;
         let between = |from: f64, to: f64| {
             move |done_ratio: f64, what: &str| progress(from + (to - from) * done_ratio, what)
@@ -118,8 +119,8 @@ impl Session<'_> {
             declared,
             healthy: before.as_ref().zip(healthy).map(|(before, healthy)| Healthy {
                 name: healthy.path.display().to_string(),
-                recording: &before.recording,
-                declared: before.declared.clone(),
+                recording: &before.zeroed.recording,
+                declared: before.zeroed.declared.clone(),
             }),
             tolerances_declared: campaign.tolerances_declared,
             experiments: experiments(self.registry, campaign, map, &model)?,
@@ -201,8 +202,7 @@ impl Session<'_> {
             Some(drift) => (ready(Some(&drift)), Some(drift), None),
             None => (as_it_is, None, None),
         };
-        let Zeroed { recording, declared, zero, off_at_rest } = zeroed;
-        Ok(Prepared { recording, declared, model, linearised, drift, doubted, sensors, zero, off_at_rest })
+        Ok(Prepared { zeroed, model, linearised, drift, doubted, sensors })
     }
 
     /// Validates the machine found by a diagnosis against an independent recording. Nothing is fitted.
@@ -217,8 +217,8 @@ impl Session<'_> {
         effects: Vec<Arc<dyn Effect>>,
         found: &Found,
     ) -> Result<Held, SessionError> {
-        let Prepared { recording, declared, model, .. } = self.prepared_for_gap(recorded, campaign, map)?;
-        Ok(hold(&study_of(&recording, campaign, declared, model, effects)?, found)?)
+        let Prepared { zeroed, model, .. } = self.prepared_for_gap(recorded, campaign, map)?;
+        Ok(hold(&study_of(&zeroed.recording, campaign, zeroed.declared, model, effects)?, found)?)
     }
 
     /// Expected readings of the diagnosed machine at the end of each planned step of a campaign.
@@ -293,13 +293,13 @@ struct Zeroed {
     recording: Recording,
     declared: Declared,
     zero: ZeroOutcome,
+    /// Remarks of the zero on sensors with offsets beyond their declaration.
     off_at_rest: Vec<OffsetAtRest>,
 }
 
 /// A recording prepared for the diagnosis.
 struct Prepared {
-    recording: Recording,
-    declared: Declared,
+    zeroed: Zeroed,
     model: Model,
     /// The recording linearised at the nominal model, if that is known.
     linearised: Option<Linearised>,
@@ -307,9 +307,6 @@ struct Prepared {
     /// A detected drift that was rejected.
     doubted: Option<String>,
     sensors: Vec<FusedChannel>,
-    zero: ZeroOutcome,
-    /// Remarks of the zero on sensors with offsets beyond their declaration.
-    off_at_rest: Vec<OffsetAtRest>,
 }
 
 /// Zero offset, in declared standard deviations, above which a sensor is reported.

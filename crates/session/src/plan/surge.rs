@@ -2,7 +2,7 @@
 
 use crate::recording::identification_config::declared;
 use mapper_campaign::Campaign;
-use mapper_core::{OperatingPoint, Plan, PlanRemark, Predicted, Recording, SurgeSearchSettings};
+use mapper_core::{OperatingPoint, Plan, PlanRemark, Predicted, Recording};
 use mapper_identify::IdentifyConfig;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::follow_outlet::hold_speed;
@@ -29,20 +29,9 @@ pub fn hold_near_surge(campaign: &Campaign, model: &Model, point: OperatingPoint
     })
 }
 
-/// Forecast of the search on the nominal machine.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SurgeForecast {
-    /// Speed lines.
-    pub lines: usize,
-    /// Steps.
-    pub steps: usize,
-    /// Rig time, s.
-    pub duration_s: f64,
-}
-
-/// Forecast of the search after a plan; `None` if the campaign has none.
-pub fn surge_forecast(campaign: &Campaign, model: &Model, plan: &Plan) -> Option<SurgeForecast> {
-    let seek = campaign.surge_search?;
+/// Adds the search, as forecast on the nominal machine, to a plan's duration and remarks.
+pub(crate) fn add_surge_search(campaign: &Campaign, model: &Model, plan: &mut Plan) {
+    let Some(seek) = campaign.surge_search else { return };
     let mut ends: Vec<OperatingPoint> = Vec::new();
     for step in &plan.steps {
         match ends.iter_mut().find(|end| (end.speed_rpm - step.to.speed_rpm).abs() < 1e-3) {
@@ -54,34 +43,15 @@ pub fn surge_forecast(campaign: &Campaign, model: &Model, plan: &Plan) -> Option
     let margin = |end: &OperatingPoint| {
         hold_near_surge(campaign, model, *end).map_or(1.0, |held| held.surge_margin_ratio)
     };
-    let approaches: usize =
-        ends.iter().map(|end| mapper_runner::surge::expected_readings(margin(end), &seek)).sum();
-    Some(SurgeForecast {
+    let approaches: usize = ends.iter().map(|end| surge::expected_readings(margin(end), &seek)).sum();
+    plan.surge_search_s = approaches as f64 * seek.dwell_s + ends.len() as f64 * SurgeSearch::AROUND_S;
+    plan.figures.minutes = plan.duration_s() / 60.0;
+    plan.remarks.push(PlanRemark::SurgeSearch {
         lines: ends.len(),
+        closest_margin_ratio: seek.closest_margin_ratio,
         steps: approaches + 2 * ends.len(),
-        duration_s: approaches as f64 * seek.dwell_s + ends.len() as f64 * SurgeSearch::AROUND_S,
-    })
-}
-
-impl SurgeForecast {
-    /// The remark of a plan.
-    fn remark(&self, seek: &SurgeSearchSettings) -> PlanRemark {
-        PlanRemark::SurgeSearch {
-            lines: self.lines,
-            closest_margin_ratio: seek.closest_margin_ratio,
-            steps: self.steps,
-            duration_s: self.duration_s,
-        }
-    }
-}
-
-/// Adds the search to a plan's duration and remarks.
-pub(crate) fn add_surge_search(campaign: &Campaign, model: &Model, plan: &mut Plan) {
-    if let Some((seek, forecast)) = campaign.surge_search.zip(surge_forecast(campaign, model, plan)) {
-        plan.surge_search_s = forecast.duration_s;
-        plan.figures.minutes = plan.duration_s() / 60.0;
-        plan.remarks.push(forecast.remark(&seek));
-    }
+        duration_s: plan.surge_search_s,
+    });
 }
 
 /// Finds the surge marks in the approaches of a recording.

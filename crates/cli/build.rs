@@ -12,9 +12,9 @@ fn git(arguments: &[&str]) -> Option<String> {
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
     // Of this tree, not of one that it has been copied into.
-    let own = git(&["rev-parse", "--show-toplevel"])
+    let repository = git(&["rev-parse", "--show-toplevel"])
         .filter(|top| Path::new(top).join("crates/cli/build.rs").is_file());
-    let commit = own.and_then(|_| git(&["rev-parse", "--short=12", "HEAD"]));
+    let commit = repository.and_then(|_| git(&["rev-parse", "--short=12", "HEAD"]));
     // Written with every commit; a file that is not there would build again each time.
     if let Some(log) = git(&["rev-parse", "--git-path", "logs/HEAD"]).filter(|log| Path::new(log).is_file()) {
         println!("cargo::rerun-if-changed={log}");

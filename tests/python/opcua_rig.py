@@ -5,7 +5,7 @@ reading and setpoint (p3, t3, valve, oil_temperature), air (Boolean), heartbeat 
 air by itself if the heartbeat stops. Values that no stand could bear are refused with BadOutOfRange.
 
 With --secure it takes signed and encrypted sessions alone, of the user `lab` with the password `hunter2` by default; the certificate is made in the directory
-if it has none yet, valid for a year or for N days. With --stamps it prints `SECONDS read RPM` for each speed that it hands out and `SECONDS told NAMES` for each set-point that it
+if it has none yet, valid for a year or for N days. With --stamps it prints `SECONDS read RPM` for each speed that it hands out and `SECONDS write NAMES` for each set-point that it
 takes, on the clock of time.monotonic(): behind its decryption, so that a session may be encrypted. With --sessions it holds so many sessions at a time and
 refuses others with BadTooManySessions, as small PLCs do: a session, also one without a successful login, is held until its client closes it.
 With --misdeed, from the first time that the air is on: `boolean`, T2 becomes a truth value; `future`, readings are stamped an hour ahead; the name of a status code, all of them have it. With --answers CODE writes of
@@ -174,7 +174,7 @@ def stamp(server, index):
         now = time.monotonic()
         names = [one.NodeId.Identifier for one in params.NodesToWrite if one.NodeId.NamespaceIndex == index]
         if commanded := [name for name in names if name in SETPOINTS or name == "air"]:
-            print(f"{now:.6f} told {','.join(commanded)}", flush=True)
+            print(f"{now:.6f} write {','.join(commanded)}", flush=True)
         return await write(params, user)
 
     service.read, service.write = stamped_read, stamped_write

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// The shipped campaign, as a user names it in the root of the repository.
 pub const SHIPPED: &str = "campaigns/turbo_a.yaml";
 
-/// Four points instead of all: parts of the shipped campaign and what to put in their place.
+/// Replacements in the shipped campaign that reduce it to four points.
 pub const SHORT_GRID: &[(&str, &str)] = &[
     (
         "speeds: [50 krpm, 65 krpm, 80 krpm, 95 krpm, 110 krpm, 125 krpm, 140 krpm, 155 krpm]",
@@ -18,8 +18,8 @@ pub const SHORT_GRID: &[(&str, &str)] = &[
     ("seed: 1 ", "repeats: off\nreturn_to_first: false\nseed: 1 "),
 ];
 
-/// The two-parameter method of the paper, each step by itself, and no rest before the run.
-pub const BY_ITSELF: &[(&str, &str)] = &[
+/// Replacements for the two-parameter method of the paper, which identifies each step separately, and no soak before the run.
+pub const SINGLE_STEP_METHOD: &[(&str, &str)] = &[
     ("zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}\n", ""),
     ("method: joint ", "method: dynamic "),
 ];
@@ -29,13 +29,13 @@ pub const BY_ITSELF: &[(&str, &str)] = &[
 pub struct CampaignFile {
     /// The file.
     pub path: PathBuf,
-    /// What is in it.
+    /// Its text.
     pub text: String,
     directory: tempfile::TempDir,
 }
 
 impl CampaignFile {
-    /// The shipped campaign with parts replaced, each of which must be in it once.
+    /// The shipped campaign with these replacements; each replaced part must occur exactly once.
     pub fn shipped_with(replacements: &[(&str, &str)]) -> Self {
         let mut text = std::fs::read_to_string(repository().join(SHIPPED)).unwrap();
         for (old, new) in replacements {
@@ -53,12 +53,12 @@ impl CampaignFile {
         CampaignFile { path, text, directory }
     }
 
-    /// A directory for runs of this campaign, next to it; not made yet.
+    /// The directory for runs of this campaign, next to it; it does not exist yet.
     pub fn runs(&self) -> PathBuf {
         self.directory.path().join("runs")
     }
 
-    /// The number of the line, from 1, that holds `part`.
+    /// Number of the line, from 1, that contains `part`.
     pub fn line_of(&self, part: &str) -> usize {
         1 + self.text.lines().position(|line| line.contains(part)).expect(part)
     }

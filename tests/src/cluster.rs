@@ -1,4 +1,4 @@
-//! Slurm on this machine alone, as root and without systemd, below a directory that goes away. Both daemons are children.
+//! Slurm on this computer only, as root and without systemd, in a temporary directory. Both daemons are child processes.
 
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
@@ -51,7 +51,7 @@ fn daemon(folder: &Path, name: &str, arguments: &[&str]) -> Child {
 }
 
 impl Cluster {
-    /// Starts it and waits until its node is idle.
+    /// Starts the cluster and waits until its node is idle.
     pub fn start(folder: &Path) -> Cluster {
         for name in ["state", "spool"] {
             std::fs::create_dir_all(folder.join(name)).unwrap();
@@ -64,16 +64,16 @@ impl Cluster {
         cluster
     }
 
-    /// The controller ends, as it does when a site changes its settings, and comes back with what it saved.
+    /// Restarts the controller with its saved state, as after a change of settings.
     pub fn restart_controller(&mut self) {
-        // In good order: what was not saved yet is lost with a kill, and Slurm drains the node.
+        // An orderly shutdown: a kill would lose unsaved state, and Slurm would drain the node.
         assert!(Command::new("kill").arg(self.controller.id().to_string()).status().unwrap().success());
         self.controller.wait().unwrap();
         self.controller = daemon(&self.folder, "slurmctld", &["-D"]);
         self.wait_for("the controller", || self.ask("scontrol", &["ping"]).contains(" UP"));
     }
 
-    /// A command whose Slurm is this one.
+    /// Makes a command use this Slurm cluster.
     pub fn on(&self, mut command: Command) -> Command {
         command.env("SLURM_CONF", self.folder.join("slurm.conf"));
         command
@@ -88,17 +88,17 @@ impl Cluster {
     }
 
     /// Waits for a condition: a real scheduler needs real time.
-    pub fn wait_for(&self, what: &str, is_so: impl Fn() -> bool) {
+    pub fn wait_for(&self, condition: &str, is_so: impl Fn() -> bool) {
         let started = Instant::now();
         while !is_so() {
             let log = || std::fs::read_to_string(self.folder.join("slurmctld.log")).unwrap_or_default();
-            assert!(started.elapsed() < LONGEST, "no {what} after {LONGEST:?}:\n{}", log());
+            assert!(started.elapsed() < LONGEST, "no {condition} after {LONGEST:?}:\n{}", log());
             std::thread::sleep(Duration::from_millis(50));
         }
     }
 }
 
-/// A machine on which much else runs is slow.
+/// Timeout for a loaded computer.
 const LONGEST: Duration = Duration::from_secs(300);
 
 impl Drop for Cluster {

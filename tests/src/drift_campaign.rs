@@ -1,6 +1,6 @@
 //! A campaign that repeats one jump on a rig with tolerances, so that drift is visible.
 
-use crate::{CampaignFile, made_once, repository};
+use crate::{CampaignFile, repository, shared_run};
 use std::path::PathBuf;
 
 /// Changes to the campaign of the gap rig.
@@ -16,7 +16,7 @@ pub struct DriftCampaign<'a> {
     pub every: u32,
     /// Further lines at the top level.
     pub more: &'a str,
-    /// Parts to be replaced besides.
+    /// Further replacements.
     pub replaced: &'a [(&'a str, &'a str)],
 }
 
@@ -59,8 +59,8 @@ impl DriftCampaign<'_> {
         CampaignFile::of(text)
     }
 
-    /// The recording of its run, which other tests may look at too.
+    /// The recording of its run, shared with other tests.
     pub fn recording(&self) -> PathBuf {
-        made_once(&self.write()).run.join("recording.mcap")
+        shared_run(&self.write()).run.join("recording.mcap")
     }
 }

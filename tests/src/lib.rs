@@ -5,17 +5,17 @@
 mod campaign;
 mod cluster;
 mod drift_campaign;
-mod made_once;
 mod program;
 mod python;
+mod shared_run;
 pub mod tree;
 
-pub use campaign::{BY_ITSELF, CampaignFile, SHIPPED, SHORT_GRID};
+pub use campaign::{CampaignFile, SHIPPED, SHORT_GRID, SINGLE_STEP_METHOD};
 pub use cluster::Cluster;
 pub use drift_campaign::DriftCampaign;
-pub use made_once::{MadeOnce, made_once};
 pub use program::{Finished, build_driver, build_drivers, mapper, mapper_command, mapper_in};
 pub use python::python;
+pub use shared_run::{SharedRun, shared_run};
 
 use std::path::{Path, PathBuf};
 
@@ -29,7 +29,7 @@ pub fn scratch() -> tempfile::TempDir {
     tempfile::tempdir().expect("a temporary directory can be made")
 }
 
-/// A directory for pictures that people look at after a test; it stays, below the target folder, until the next run of that test.
+/// A directory in the target folder for pictures that people inspect after a test. It remains until the next run of the test.
 pub fn pictures(name: &str) -> PathBuf {
     let folder = repository().join("target/looked-at").join(name);
     std::fs::create_dir_all(&folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));

@@ -9,8 +9,8 @@ use std::sync::OnceLock;
 
 /// The built program.
 ///
-/// A test of one package does not know where the binary of another is, and it may not be built yet: Cargo is asked to
-/// build it and reports where. `cargo xtask test` has built it with everything else, and says where.
+/// A test of one package does not know the path of another package's binary, so Cargo builds it and reports the path. `cargo xtask test`
+/// has already built it and passes the path.
 fn binary() -> &'static Path {
     static BINARY: OnceLock<PathBuf> = OnceLock::new();
     BINARY.get_or_init(|| {
@@ -25,12 +25,12 @@ fn binary() -> &'static Path {
     })
 }
 
-fn build(what: &[&str]) -> String {
+fn build(options: &[&str]) -> String {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut command = Command::new(cargo);
-    command.arg("build").args(what);
+    command.arg("build").args(options);
     command.arg("--message-format=json-render-diagnostics").current_dir(repository());
-    // Optimised where the tests are.
+    // Optimised if the tests are.
     if !cfg!(debug_assertions) {
         command.arg("--release");
     }
@@ -87,7 +87,7 @@ impl From<Output> for Finished {
 }
 
 impl Finished {
-    /// Asserts the exit code; shows the output if it is another.
+    /// Asserts the exit code; on failure, shows the output.
     #[track_caller]
     pub fn exits(self, code: i32) -> Self {
         assert_eq!(
@@ -101,12 +101,12 @@ impl Finished {
         self
     }
 
-    /// Whether these words are on standard error, however its lines are broken.
-    pub fn mentions(&self, words: &str) -> bool {
-        self.stderr.split_whitespace().collect::<Vec<_>>().join(" ").contains(words)
+    /// Whether standard error contains this text, ignoring line breaks.
+    pub fn mentions(&self, text: &str) -> bool {
+        self.stderr.split_whitespace().collect::<Vec<_>>().join(" ").contains(text)
     }
 
-    /// Standard output as the one JSON object that it must be.
+    /// Parses standard output, which must be one JSON object.
     #[track_caller]
     pub fn json(&self) -> Value {
         let value: Value = serde_json::from_str(&self.stdout).unwrap_or_else(|error| {

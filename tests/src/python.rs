@@ -5,10 +5,10 @@ use serde_json::Value;
 use std::ffi::OsStr;
 use std::process::Command;
 
-/// Runs a script of tests/python with the Python that `cargo xtask test` has prepared; gives what it prints as JSON.
+/// Runs a script of tests/python with the Python that `cargo xtask test` has prepared; returns its JSON output.
 ///
 /// # Panics
-/// Panics without such a Python: a test that calls this is marked ignored then, with the reason.
+/// Panics without such a Python. Tests that call this are then marked as ignored, with the reason.
 #[track_caller]
 pub fn python<S: AsRef<OsStr>>(script: &str, arguments: impl IntoIterator<Item = S>) -> Value {
     let Some(python) = option_env!("MAPPER_TEST_PYTHON") else {
@@ -17,7 +17,7 @@ pub fn python<S: AsRef<OsStr>>(script: &str, arguments: impl IntoIterator<Item =
     let output = Command::new(python)
         .arg(repository().join("tests/python").join(script))
         .args(arguments)
-        // Nothing is written next to the scripts.
+        // No bytecode is written next to the scripts.
         .env("PYTHONDONTWRITEBYTECODE", "1")
         .output()
         .unwrap_or_else(|error| panic!("{python}: {error}; run `cargo xtask test`"));

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-/// Why a chore could not be done.
+/// Why a developer command failed.
 #[derive(Debug)]
 pub enum Error {
     /// A program could not be started.
@@ -11,7 +11,7 @@ pub enum Error {
     Failed { command: String },
     /// A program that the tests need is missing, and this process may not install it.
     Missing { what: &'static str, used_for: &'static str, install: String },
-    /// The Python that was found is too old for the packages.
+    /// The installed Python is too old for the packages.
     OldPython { found: String, needed: &'static str },
     /// A file could not be read or written.
     File { path: PathBuf, source: std::io::Error },
@@ -19,9 +19,9 @@ pub enum Error {
     Steps { failed: Vec<&'static str> },
     /// The compiler or clippy printed warnings.
     Warnings { count: usize },
-    /// Tests were left out that had to run.
+    /// Required tests were skipped.
     LeftOut { count: usize },
-    /// Generated documents are not what the program makes now.
+    /// Generated documents are out of date.
     Stale { differences: Vec<String> },
 }
 

@@ -64,7 +64,7 @@ impl Steps {
         self.done.iter().all(|(.., well)| *well)
     }
 
-    /// Prints times and verdicts; an error where a step failed.
+    /// Prints times and results; an error if a step failed.
     pub fn finish(self) -> Result<(), Error> {
         say("\n");
         for (name, took, well) in &self.done {
@@ -96,14 +96,14 @@ pub fn run(mut command: Command) -> Result<(), Error> {
     }
 }
 
-/// Whether a command ends well; its output goes nowhere.
+/// Whether a command succeeds; its output is discarded.
 pub fn succeeds(program: &str, arguments: &[&str]) -> bool {
     let mut command = command(program, arguments);
     command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     command.status().is_ok_and(|status| status.success())
 }
 
-/// What a command prints, without the white space around it.
+/// The output of a command, trimmed.
 pub fn output(mut command: Command) -> Result<String, Error> {
     let text = line(&command);
     let output = command.stderr(Stdio::inherit()).output();
@@ -114,7 +114,7 @@ pub fn output(mut command: Command) -> Result<String, Error> {
     Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())
 }
 
-/// A command as one would type it.
+/// A command as typed in a shell.
 pub fn line(command: &Command) -> String {
     let words = std::iter::once(command.get_program()).chain(command.get_args());
     let words: Vec<_> = words

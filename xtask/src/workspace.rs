@@ -8,7 +8,7 @@ pub fn root() -> PathBuf {
     here.parent().unwrap_or(here).to_owned()
 }
 
-/// The directory of build products, as Cargo decides it.
+/// The target directory of Cargo.
 pub fn target_dir() -> PathBuf {
     match std::env::var_os("CARGO_TARGET_DIR") {
         Some(given) => root().join(given),
@@ -16,7 +16,7 @@ pub fn target_dir() -> PathBuf {
     }
 }
 
-/// The cargo that started this process.
+/// The Cargo program that started this process.
 pub fn cargo() -> String {
     std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned())
 }

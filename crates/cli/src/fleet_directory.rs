@@ -1,7 +1,7 @@
 //! Opens fleet directories, with this computer as the worker.
 
 use crate::output::failure::Failure;
-use crate::wall_clock::SystemWall;
+use crate::wall_clock::SystemClock;
 use crate::{interrupt, output::output_options, registry};
 use mapper_core::Wall;
 use mapper_fleet::{Engine, Fleet, FleetError, Kind, Machine};
@@ -12,7 +12,7 @@ use std::path::Path;
 pub fn with_machine<T>(
     then: impl FnOnce(&Registry, &[&dyn Kind], &Machine<'_>) -> Result<T, Failure>,
 ) -> Result<T, Failure> {
-    let (registry, wall) = (registry::registry(), SystemWall::new());
+    let (registry, wall) = (registry::registry(), SystemClock::new());
     let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
     let task = std::env::var("SLURM_JOB_ID").map_or_else(|_| String::new(), |id| format!(" job {id}"));
     let name = format!("{} process {}{task}", host.trim(), std::process::id());
@@ -41,7 +41,7 @@ pub fn with_fleet<T>(
 }
 
 /// Processor time of this thread on Linux; elsewhere the elapsed time.
-fn thread_s(wall: &SystemWall) -> f64 {
+fn thread_s(wall: &SystemClock) -> f64 {
     let counted = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
     let ns = counted.and_then(|line| line.split(' ').next()?.parse::<f64>().ok());
     ns.map_or_else(|| wall.now_s(), |ns| ns * 1e-9)

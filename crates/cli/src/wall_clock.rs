@@ -5,12 +5,12 @@ use mapper_core::Wall;
 use std::time::{Duration, Instant};
 
 /// The computer's monotonic clock.
-pub struct SystemWall(Instant);
+pub struct SystemClock(Instant);
 
-impl SystemWall {
+impl SystemClock {
     /// Begins now.
     pub fn new() -> Self {
-        SystemWall(Instant::now())
+        SystemClock(Instant::now())
     }
 }
 
@@ -19,7 +19,7 @@ pub fn today() -> Option<Date> {
     Date::from_epoch_ns(u64::try_from(jiff::Timestamp::now().as_nanosecond()).unwrap_or(0))
 }
 
-impl Wall for SystemWall {
+impl Wall for SystemClock {
     fn now_s(&self) -> f64 {
         self.0.elapsed().as_secs_f64()
     }

@@ -120,32 +120,32 @@ impl Misbehaving {
 
     /// Ten samples a second; the fault begins with the second poll.
     fn poll(&mut self, until_s: f64) {
-        let begun = self.sequence;
+        let first_sequence = self.sequence;
         let mut t_s = Vec::new();
         while self.sequence as f64 / 10.0 <= until_s {
             t_s.push(self.sequence as f64 / 10.0);
             self.sequence += 1;
         }
-        if begun == 0 {
-            return self.samples(begun, &t_s);
+        if first_sequence == 0 {
+            return self.samples(first_sequence, &t_s);
         }
         match self.fault.as_str() {
             "twice" => {
-                self.samples(begun, &t_s);
-                self.samples(begun, &t_s);
+                self.samples(first_sequence, &t_s);
+                self.samples(first_sequence, &t_s);
             }
             "reordered" => {
                 let half = t_s.len() / 2;
-                self.samples(begun + half as u64, &t_s[half..]);
-                self.samples(begun, &t_s[..half]);
+                self.samples(first_sequence + half as u64, &t_s[half..]);
+                self.samples(first_sequence, &t_s[..half]);
             }
             "backward" => {
                 let earlier: Vec<f64> = t_s.iter().map(|t_s| t_s - 1.0).collect();
-                self.samples(begun, &earlier);
+                self.samples(first_sequence, &earlier);
             }
             "no_numbers" => self.send(&Message::note("samples", json!({"t_s": "soon"}))),
             "flood" => {
-                let mut sequence = begun;
+                let mut sequence = first_sequence;
                 // More than any host keeps.
                 for _ in 0..300 {
                     let many: Vec<f64> = (0..10_000).map(|i| (sequence + i) as f64 / 10.0).collect();
@@ -153,7 +153,7 @@ impl Misbehaving {
                     sequence += 10_000;
                 }
             }
-            _ => self.samples(begun, &t_s),
+            _ => self.samples(first_sequence, &t_s),
         }
     }
 }

@@ -5,8 +5,8 @@ use crate::find::{Endpoint, PREFIX, SearchPath, file_name};
 use crate::lease::Lease;
 use crate::link::Link;
 use crate::protocol::{
-    Code, Configure, Described, Failure, Hello, MAGIC, Message, Poll, Samples, VERSION, Welcome, batch,
-    description, read_error, write_setpoints,
+    Code, Configure, DescribeResult, Failure, Hello, MAGIC, Message, Poll, Samples, VERSION, Welcome, batch,
+    read_description, read_error, write_setpoints,
 };
 use crate::sample_queue::{ROUNDING_S, SampleQueue};
 use crate::secrets::Secrets;
@@ -75,20 +75,25 @@ impl Driver {
     /// # Errors
     /// [`BackendError::Settings`] if the driver is missing, is not a driver, or refuses its settings.
     pub fn find(
-        places: &SearchPath,
+        search_path: &SearchPath,
         name: &str,
         settings: &Value,
         built_in: &str,
         hint: &str,
     ) -> Result<Driver, BackendError> {
         let setup_error = |error| settings_error(name, String::new(), error);
-        let Some(at) = places.find(name) else {
-            if let Some(program) = places.find_not_executable(name) {
+        let Some(endpoint) = search_path.find(name) else {
+            if let Some(program) = search_path.find_not_executable(name) {
                 return Err(setup_error(DriverError::NotExecutable { program }));
             }
-            let searched = match places.programs.len() {
+            let searched = match search_path.programs.len() {
                 0 => "any directory, since PATH is empty".to_owned(),
-                _ => places.programs.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", "),
+                _ => search_path
+                    .programs
+                    .iter()
+                    .map(|p| p.display().to_string())
+                    .collect::<Vec<_>>()
+                    .join(", "),
             };
             let program = file_name(name).unwrap_or_else(|| format!("{PREFIX}<name>"));
             return Err(setup_error(DriverError::NotFound {
@@ -100,10 +105,10 @@ impl Driver {
         };
         let variable = |name: &str| std::env::var(name).ok();
         // A driver that was already running has its own environment.
-        let needed = matches!(at, Endpoint::Program(_));
+        let needed = matches!(endpoint, Endpoint::Program(_));
         let secrets = Secrets::of(settings, &variable, needed)
             .map_err(|(path, error)| settings_error(name, path, error))?;
-        Driver::start(&at, name, settings, secrets, DEFAULT_TIMEOUTS)
+        Driver::start(&endpoint, name, settings, secrets, DEFAULT_TIMEOUTS)
     }
 
     /// Starts a driver program, without secrets.
@@ -133,7 +138,7 @@ impl Driver {
     }
 
     fn start(
-        at: &Endpoint,
+        endpoint: &Endpoint,
         name: &str,
         settings: &Value,
         secrets: Secrets,
@@ -142,7 +147,7 @@ impl Driver {
         let setup_error = |error| settings_error(name, String::new(), error);
         let mut driver = Driver {
             name: name.to_owned(),
-            link: match at {
+            link: match endpoint {
                 Endpoint::Program(program) => Link::start(program),
                 #[cfg(unix)]
                 Endpoint::Socket(socket) => Link::connect(socket),
@@ -169,9 +174,9 @@ impl Driver {
         let settings = Configure { settings: settings.clone() };
         driver.request("configure", &settings, timeouts.slow)?;
         let answer = driver.request("describe", &json!({}), timeouts.slow)?;
-        let described: Described = serde_json::from_value(answer)
+        let described: DescribeResult = serde_json::from_value(answer)
             .map_err(|error| driver.lost_error(DriverError::InvalidMessage(error.to_string())))?;
-        let rig = description(&described.description, name, &version)
+        let rig = read_description(&described.description, name, &version)
             .map_err(|error| driver.lost_error(error.into()))?;
         driver.description = Some(rig);
         Ok(driver)
@@ -192,20 +197,20 @@ impl Driver {
         let welcome: Welcome = serde_json::from_value(answer).map_err(|error| {
             setup_error(DriverError::NotADriver(format!("its hello is incomplete: {error}")))
         })?;
-        let theirs = welcome.hello;
-        if theirs.magic != MAGIC {
+        let driver_hello = welcome.hello;
+        if driver_hello.magic != MAGIC {
             return Err(setup_error(DriverError::NotADriver("its hello has another magic word".to_owned())));
         }
-        if theirs.protocol.major != VERSION.major {
-            return Err(setup_error(DriverError::Version { theirs: theirs.protocol, ours: VERSION }));
+        if driver_hello.protocol.major != VERSION.major {
+            return Err(setup_error(DriverError::Version { theirs: driver_hello.protocol, ours: VERSION }));
         }
-        if theirs.name != self.name {
-            return Err(setup_error(DriverError::Name(theirs.name)));
+        if driver_hello.name != self.name {
+            return Err(setup_error(DriverError::Name(driver_hello.name)));
         }
-        self.supports_hold = theirs.protocol.minor >= crate::protocol::HOLD_SINCE_MINOR;
-        self.link.limit_frames(theirs.frame_limit_bytes);
+        self.supports_hold = driver_hello.protocol.minor >= crate::protocol::HOLD_SINCE_MINOR;
+        self.link.limit_frames(driver_hello.frame_limit_bytes);
         self.session = Some(welcome.session);
-        Ok(theirs.version)
+        Ok(driver_hello.version)
     }
 
     fn rig(&self) -> Result<&RigDescription, BackendError> {
@@ -248,8 +253,8 @@ impl Driver {
             ..Message::default()
         };
         self.link
-            .outlet()
-            .and_then(|outlet| outlet.send(&request))
+            .sender()
+            .and_then(|sender| sender.send(&request))
             .map_err(|error| self.lost_error(error))?;
         if let Some(lease) = &self.armed {
             lease.record_call();
@@ -316,12 +321,12 @@ impl Driver {
                 self.sample_error = read().err();
             }
             Some("lost") => {
-                let words = params.get("message").and_then(Value::as_str).unwrap_or("the rig was lost");
-                self.sample_error = Some(DriverError::Message(words.to_owned()));
+                let reason = params.get("message").and_then(Value::as_str).unwrap_or("the rig was lost");
+                self.sample_error = Some(DriverError::Message(reason.to_owned()));
             }
             Some("note") => {
-                if let Some(words) = params.get("message").and_then(Value::as_str) {
-                    self.queue.note(self.now_s, &self.secrets.hide(words));
+                if let Some(reason) = params.get("message").and_then(Value::as_str) {
+                    self.queue.note(self.now_s, &self.secrets.hide(reason));
                 }
             }
             _ => {}
@@ -344,7 +349,7 @@ impl Driver {
         if let Some(lease) = &self.armed {
             lease.record_call();
         }
-        // The next sample would be later than that.
+        // The tolerance of nearly one period accepts the last sample before `until_s`.
         while !self.queue.has_reached(until_s - 0.999 * sample_s) && self.sample_error.is_none() {
             let left = end.map_or(Duration::MAX, |end| end.saturating_duration_since(Instant::now()));
             let Some(message) = self.link.receive(left).map_err(|error| self.lost_error(error))? else {
@@ -401,16 +406,21 @@ impl Backend for Driver {
             return Err(error);
         }
         let silence = (!self.simulated()).then_some(self.timeouts.silence);
-        let outlet = self.link.outlet().map_err(|error| self.lost_error(error))?.clone();
-        self.armed = Some(Lease::new(outlet, self.session.clone().unwrap_or_default(), silence)?);
+        let sender = self.link.sender().map_err(|error| self.lost_error(error))?.clone();
+        self.armed = Some(Lease::new(sender, self.session.clone().unwrap_or_default(), silence)?);
         Ok(())
     }
 
     fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError> {
         // Non-finite numbers cannot be written in a frame, whatever range the rig accepts.
-        let any = SetpointRange { low: f64::MIN, high: f64::MAX };
-        let all = SetpointRanges { p3_pa: any, t3_k: any, valve_opening_ratio: any, oil_temperature_k: any };
-        self.rig()?.accepts.unwrap_or(all).check(setpoints)?;
+        let unlimited_range = SetpointRange { low: f64::MIN, high: f64::MAX };
+        let unlimited = SetpointRanges {
+            p3_pa: unlimited_range,
+            t3_k: unlimited_range,
+            valve_opening_ratio: unlimited_range,
+            oil_temperature_k: unlimited_range,
+        };
+        self.rig()?.accepts.unwrap_or(unlimited).check(setpoints)?;
         self.require_armed("set")?;
         self.request("set", &write_setpoints(setpoints), self.timeouts.call).map(drop)
     }
@@ -435,9 +445,10 @@ impl Backend for Driver {
 
     fn hold(&mut self) -> Result<(), BackendError> {
         self.require_armed("hold")?;
-        match self.supports_hold {
-            true => self.request("hold", &json!({}), self.timeouts.call).map(drop),
-            false => Ok(()),
+        if self.supports_hold {
+            self.request("hold", &json!({}), self.timeouts.call).map(drop)
+        } else {
+            Ok(())
         }
     }
 

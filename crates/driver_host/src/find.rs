@@ -42,59 +42,65 @@ impl SearchPath {
         let on_path = path.map(|path| std::env::split_paths(path).collect::<Vec<_>>()).unwrap_or_default();
         let mut programs: Vec<PathBuf> = Vec::new();
         // A relative or empty entry would depend on the working directory.
-        for place in program_directory.into_iter().chain(on_path).filter(|place| place.is_absolute()) {
-            if !programs.contains(&place) {
-                programs.push(place);
+        for directory in
+            program_directory.into_iter().chain(on_path).filter(|directory| directory.is_absolute())
+        {
+            if !programs.contains(&directory) {
+                programs.push(directory);
             }
         }
-        SearchPath { programs, sockets: sockets.filter(|place| place.is_absolute()) }
+        SearchPath { programs, sockets: sockets.filter(|directory| directory.is_absolute()) }
     }
 
     /// The driver for `backend: NAME`.
     pub fn find(&self, name: &str) -> Option<Endpoint> {
         let file = file_name(name)?;
-        let socket = self.sockets.as_ref().map(|place| place.join(format!("{name}{SOCKET}")));
+        let socket = self.sockets.as_ref().map(|directory| directory.join(format!("{name}{SOCKET}")));
         let socket = socket.filter(|socket| is_socket(socket)).map(Endpoint::Socket);
-        let program =
-            || self.programs.iter().map(|place| place.join(&file)).find(|program| is_program(program));
+        let program = || {
+            self.programs.iter().map(|directory| directory.join(&file)).find(|program| is_program(program))
+        };
         socket.or_else(|| program().map(Endpoint::Program))
     }
 
     /// A file with the program's name that is not executable.
     pub(crate) fn find_not_executable(&self, name: &str) -> Option<PathBuf> {
         let file = file_name(name)?;
-        self.programs.iter().map(|place| place.join(&file)).find(|program| program.is_file())
+        self.programs.iter().map(|directory| directory.join(&file)).find(|program| program.is_file())
     }
 
-    /// All drivers by name; of several with one name, the one that would be used.
+    /// All drivers by name. If several have the same name, only the first in search order is listed.
     pub fn all(&self) -> Vec<DriverLocation> {
-        let mut found: Vec<DriverLocation> = Vec::new();
-        let inside = |place: &PathBuf| place.read_dir().into_iter().flatten().flatten();
-        for entry in self.sockets.iter().flat_map(inside) {
+        let mut drivers: Vec<DriverLocation> = Vec::new();
+        let entries = |directory: &PathBuf| directory.read_dir().into_iter().flatten().flatten();
+        for entry in self.sockets.iter().flat_map(entries) {
             let file = entry.file_name();
             let Some(name) = file.to_str().and_then(|file| file.strip_suffix(SOCKET)) else { continue };
             if file_name(name).is_some() && is_socket(&entry.path()) {
-                found.push(DriverLocation { name: name.to_owned(), at: Endpoint::Socket(entry.path()) });
+                drivers.push(DriverLocation { name: name.to_owned(), at: Endpoint::Socket(entry.path()) });
             }
         }
-        for entry in self.programs.iter().flat_map(inside) {
+        for entry in self.programs.iter().flat_map(entries) {
             let file = entry.file_name();
             let Some(name) = file.to_str().and_then(|file| file.strip_prefix(PREFIX)) else { continue };
             let name = name.strip_suffix(std::env::consts::EXE_SUFFIX).unwrap_or(name);
-            let there = found.iter().any(|found| found.name == name);
-            if !there && file_name(name).is_some_and(|whole| *whole == *file) && is_program(&entry.path()) {
-                found.push(DriverLocation { name: name.to_owned(), at: Endpoint::Program(entry.path()) });
+            let is_listed = drivers.iter().any(|driver| driver.name == name);
+            if !is_listed
+                && file_name(name).is_some_and(|expected| *expected == *file)
+                && is_program(&entry.path())
+            {
+                drivers.push(DriverLocation { name: name.to_owned(), at: Endpoint::Program(entry.path()) });
             }
         }
-        found.sort_by(|a, b| a.name.cmp(&b.name));
-        found
+        drivers.sort_by(|a, b| a.name.cmp(&b.name));
+        drivers
     }
 }
 
 /// The file name of a driver; `None` for an invalid name. The name comes from a campaign and must not lead to another directory.
 pub(crate) fn file_name(name: &str) -> Option<String> {
-    let right = |letter: char| letter.is_ascii_lowercase() || letter.is_ascii_digit() || letter == '_';
-    let is_name = !name.is_empty() && name.len() <= 64 && name.chars().all(right);
+    let is_allowed = |letter: char| letter.is_ascii_lowercase() || letter.is_ascii_digit() || letter == '_';
+    let is_name = !name.is_empty() && name.len() <= 64 && name.chars().all(is_allowed);
     is_name.then(|| format!("{PREFIX}{name}{}", std::env::consts::EXE_SUFFIX))
 }
 

@@ -23,12 +23,12 @@ type Incoming = Result<Message, DriverError>;
 
 /// Sends from any thread in the driver's own encoding. Before the first message from the driver it uses JSON, which every driver reads.
 #[derive(Clone)]
-pub(crate) struct Outlet {
+pub(crate) struct MessageSender {
     to_write: SyncSender<Vec<u8>>,
     uses_message_pack: Arc<AtomicBool>,
 }
 
-impl Outlet {
+impl MessageSender {
     /// Sends without waiting.
     pub(crate) fn send(&self, message: &Message) -> Result<(), DriverError> {
         let uses_message_pack = self.uses_message_pack.load(Ordering::Relaxed);
@@ -54,8 +54,8 @@ enum Peer {
 /// A connection to a driver.
 pub(crate) struct Link {
     peer: Peer,
-    outlet: Option<Outlet>,
-    inlet: Receiver<Incoming>,
+    sender: Option<MessageSender>,
+    received: Receiver<Incoming>,
     frame_limit: Arc<AtomicU32>,
     last_output: Arc<Mutex<Vec<u8>>>,
     /// Closed by the reading thread after the last message.
@@ -76,52 +76,44 @@ impl Link {
         else {
             return Err(not_started(std::io::Error::other("the pipes were not created")));
         };
-        Link::from_streams(stdin, stdout, Some(stderr), Peer::Program(child)).map_err(not_started)
+        Link::from_streams(stdin, stdout, stderr, Peer::Program(child)).map_err(not_started)
     }
 
     #[cfg(unix)]
     pub(crate) fn connect(socket: &Path) -> Result<Link, DriverError> {
-        let away = |source| DriverError::NotListening { socket: socket.to_owned(), source };
-        let stream = std::os::unix::net::UnixStream::connect(socket).map_err(away)?;
-        let both = || stream.try_clone().map_err(away);
-        let (input, output) = (HalfClosing(both()?), both()?);
-        Link::from_streams(input, output, None::<std::io::Empty>, Peer::Socket(stream)).map_err(away)
+        let not_listening = |source| DriverError::NotListening { socket: socket.to_owned(), source };
+        let stream = std::os::unix::net::UnixStream::connect(socket).map_err(not_listening)?;
+        let clone_stream = || stream.try_clone().map_err(not_listening);
+        let (input, output) = (SocketWriter(clone_stream()?), clone_stream()?);
+        Link::from_streams(input, output, std::io::empty(), Peer::Socket(stream)).map_err(not_listening)
     }
 
     fn from_streams(
         input: impl Write + Send + 'static,
         output: impl Read + Send + 'static,
-        stderr: Option<impl Read + Send + 'static>,
+        stderr: impl Read + Send + 'static,
         peer: Peer,
     ) -> std::io::Result<Link> {
         let frame_limit = Arc::new(AtomicU32::new(crate::protocol::FIRST_FRAME_LIMIT_BYTES));
         let (send, to_write) = sync_channel(QUEUE_LENGTH);
-        let (to_inlet, inlet) = sync_channel(QUEUE_LENGTH);
+        let (to_incoming, received) = sync_channel(QUEUE_LENGTH);
         let last_output = Arc::new(Mutex::new(Vec::new()));
         let uses_message_pack = Arc::new(AtomicBool::new(false));
         let (stderr_open, stderr_closed) = sync_channel::<()>(1);
-        let (limit, words, its) = (frame_limit.clone(), last_output.clone(), uses_message_pack.clone());
+        let (limit, stderr_tail, encoding_flag) =
+            (frame_limit.clone(), last_output.clone(), uses_message_pack.clone());
         // These threads are not joined: each ends with its pipe.
-        std::thread::Builder::new()
-            .name("to driver".to_owned())
-            .spawn(move || write_all(input, &to_write, &limit))
-            .and_then(|_| {
-                std::thread::Builder::new()
-                    .name("from driver".to_owned())
-                    .spawn(move || read_all(output, &to_inlet, &its))
-            })
-            .and_then(|_| {
-                std::thread::Builder::new().name("driver's words".to_owned()).spawn(move || {
-                    if let Some(stderr) = stderr {
-                        collect_stderr(stderr, &words);
-                    }
-                    drop(stderr_open);
-                })
-            })?;
+        let thread = |name: &str| std::thread::Builder::new().name(name.to_owned());
+        thread("to driver").spawn(move || write_all(input, &to_write, &limit))?;
+        thread("from driver").spawn(move || read_all(output, &to_incoming, &encoding_flag))?;
+        thread("driver stderr").spawn(move || {
+            collect_stderr(stderr, &stderr_tail);
+            drop(stderr_open);
+        })?;
         Ok(Link {
             peer,
-            outlet: Some(Outlet { to_write: send, uses_message_pack }),
-            inlet,
+            sender: Some(MessageSender { to_write: send, uses_message_pack }),
+            received,
             frame_limit,
             last_output,
             stderr_closed,
@@ -129,8 +121,8 @@ impl Link {
     }
 
     /// The sender.
-    pub(crate) fn outlet(&self) -> Result<&Outlet, DriverError> {
-        self.outlet.as_ref().ok_or_else(|| DriverError::Ended(String::new()))
+    pub(crate) fn sender(&self) -> Result<&MessageSender, DriverError> {
+        self.sender.as_ref().ok_or_else(|| DriverError::Ended(String::new()))
     }
 
     /// Sets the maximum frame size of the driver, bytes.
@@ -140,7 +132,7 @@ impl Link {
 
     /// The next message; `None` if none arrives in time.
     pub(crate) fn receive(&self, within: Duration) -> Result<Option<Message>, DriverError> {
-        match self.inlet.recv_timeout(within) {
+        match self.received.recv_timeout(within) {
             Ok(incoming) => incoming.map(Some),
             Err(RecvTimeoutError::Timeout) => Ok(None),
             Err(RecvTimeoutError::Disconnected) => Err(DriverError::Ended(self.last_error_line())),
@@ -151,27 +143,27 @@ impl Link {
     fn last_error_line(&self) -> String {
         // The output has ended, but the final error output may still be on its way.
         let _ = self.stderr_closed.recv_timeout(LAST_OUTPUT_TIMEOUT);
-        let Ok(words) = self.last_output.lock() else { return String::new() };
-        let text = String::from_utf8_lossy(&words);
+        let Ok(stderr_tail) = self.last_output.lock() else { return String::new() };
+        let text = String::from_utf8_lossy(&stderr_tail);
         let line = text.lines().map(str::trim).rfind(|line| !line.is_empty());
         line.map_or_else(String::new, |line| format!("; its last error output: {line}"))
     }
 
     /// Closes the driver's input, which ends the driver or, for a socket, its session. A driver that holds a rig is left to execute its safe
-    /// trajectory. Any other is killed or disconnected after this time.
+    /// trajectory. Any other driver is killed or disconnected after `within`.
     pub(crate) fn close(&mut self, holds_a_rig: bool, within: Duration) {
-        self.outlet = None;
+        self.sender = None;
         let end = Instant::now() + within;
         // The driver's output ends when it exits.
         while let Some(left) = end.checked_duration_since(Instant::now()) {
-            if matches!(self.inlet.recv_timeout(left), Err(RecvTimeoutError::Disconnected)) {
+            if matches!(self.received.recv_timeout(left), Err(RecvTimeoutError::Disconnected)) {
                 break;
             }
         }
         match &mut self.peer {
             Peer::Program(child) => {
                 if !holds_a_rig && !matches!(child.try_wait(), Ok(Some(_))) {
-                    // If its output is closed it is about to exit, so killing it is safe.
+                    // A driver whose output is closed is about to exit, so killing it is safe.
                     let _ = child.kill();
                     let _ = child.wait();
                 }
@@ -188,10 +180,10 @@ impl Link {
 
 /// The writing half of a socket. Dropping it closes that direction, as with a pipe, while the reading half stays open.
 #[cfg(unix)]
-struct HalfClosing(std::os::unix::net::UnixStream);
+struct SocketWriter(std::os::unix::net::UnixStream);
 
 #[cfg(unix)]
-impl Write for HalfClosing {
+impl Write for SocketWriter {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
         self.0.write(bytes)
     }
@@ -202,9 +194,9 @@ impl Write for HalfClosing {
 }
 
 #[cfg(unix)]
-impl Drop for HalfClosing {
+impl Drop for SocketWriter {
     fn drop(&mut self) {
-        // If the other side has gone there is nothing to close.
+        // This fails only if the other side is already closed.
         let _ = self.0.shutdown(std::net::Shutdown::Write);
     }
 }
@@ -217,7 +209,7 @@ fn write_all(mut stdin: impl Write, to_write: &Receiver<Vec<u8>>, limit: &Atomic
     }
 }
 
-fn read_all(mut stdout: impl Read, to_inlet: &SyncSender<Incoming>, uses_message_pack: &AtomicBool) {
+fn read_all(mut stdout: impl Read, to_incoming: &SyncSender<Incoming>, uses_message_pack: &AtomicBool) {
     loop {
         let incoming = match read_frame(&mut stdout, FRAME_LIMIT_BYTES) {
             Ok(Some(body)) => {
@@ -228,20 +220,20 @@ fn read_all(mut stdout: impl Read, to_inlet: &SyncSender<Incoming>, uses_message
             Err(error) => Err(error),
         };
         let incoming = incoming.map_err(|error: FrameError| DriverError::InvalidMessage(error.to_string()));
-        let lost = incoming.is_err();
+        let is_invalid = incoming.is_err();
         // After an invalid message the start of the next frame is unknown.
-        if to_inlet.send(incoming).is_err() || lost {
+        if to_incoming.send(incoming).is_err() || is_invalid {
             break;
         }
     }
 }
 
-fn collect_stderr(mut stderr: impl Read, words: &Mutex<Vec<u8>>) {
+fn collect_stderr(mut stderr: impl Read, stderr_tail: &Mutex<Vec<u8>>) {
     let mut piece = [0; 512];
     while let Ok(bytes @ 1..) = stderr.read(&mut piece) {
-        let Ok(mut words) = words.lock() else { break };
-        words.extend_from_slice(&piece[..bytes]);
-        let too_many = words.len().saturating_sub(LAST_OUTPUT_BYTES);
-        words.drain(..too_many);
+        let Ok(mut stderr_tail) = stderr_tail.lock() else { break };
+        stderr_tail.extend_from_slice(&piece[..bytes]);
+        let too_many = stderr_tail.len().saturating_sub(LAST_OUTPUT_BYTES);
+        stderr_tail.drain(..too_many);
     }
 }

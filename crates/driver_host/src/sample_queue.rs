@@ -38,8 +38,8 @@ impl SampleQueue {
             event.t_s = if event.t_s.is_finite() { event.t_s.min(latest_s) } else { latest_s };
         }
         self.events.append(&mut batch.events);
-        let words: usize = self.events.iter().map(|event| event.message.len()).sum();
-        if self.events.len() > MAX_EVENTS || self.values + words / 8 > MAX_VALUES {
+        let text: usize = self.events.iter().map(|event| event.message.len()).sum();
+        if self.events.len() > MAX_EVENTS || self.values + text / 8 > MAX_VALUES {
             return Err(InvalidData::TooMany);
         }
         let Some(first_s) = batch.t_s.first().copied() else { return Ok(()) };
@@ -60,9 +60,9 @@ impl SampleQueue {
     }
 
     /// Adds a note at this run time, s, to the next batch; only a few are kept.
-    pub(crate) fn note(&mut self, t_s: f64, words: &str) {
+    pub(crate) fn note(&mut self, t_s: f64, text: &str) {
         if self.events.len() < MAX_NOTES {
-            self.events.push(Event { t_s, kind: EventKind::Note, message: words.to_owned() });
+            self.events.push(Event { t_s, kind: EventKind::Note, message: text.to_owned() });
         }
     }
 
@@ -73,7 +73,7 @@ impl SampleQueue {
 
     /// Returns all samples up to `until_s` plus `rounding_s`, with a column for each of `channels`: NaN without a reading.
     pub(crate) fn take(&mut self, until_s: f64, rounding_s: f64, channels: &[Channel]) -> SampleBatch {
-        let mut whole = SampleBatch {
+        let mut merged = SampleBatch {
             first_sequence: self.next,
             columns: channels.iter().map(|c| ChannelColumn { channel: *c, values: Vec::new() }).collect(),
             ..SampleBatch::default()
@@ -96,18 +96,18 @@ impl SampleQueue {
             if later.t_s.is_empty() {
                 self.values = self.values.saturating_sub(name_values(&batch));
             }
-            whole.append(batch);
+            merged.append(batch);
             if !later.t_s.is_empty() {
                 self.batches.push_front(later);
                 break;
             }
         }
-        whole.columns.retain(|column| channels.contains(&column.channel));
-        self.next += whole.t_s.len() as u64;
+        merged.columns.retain(|column| channels.contains(&column.channel));
+        self.next += merged.t_s.len() as u64;
         let (now, later) =
             std::mem::take(&mut self.events).into_iter().partition(|e: &Event| e.t_s <= until_s);
-        (whole.events, self.events) = (now, later);
-        whole
+        (merged.events, self.events) = (now, later);
+        merged
     }
 }
 
@@ -151,11 +151,11 @@ mod tests {
             vec![Provenance { channel: T1, source_t_s: vec![0.1, 0.1], quality: vec![Quality::Bad; 2] }];
         pending.push(worse).unwrap();
         assert!(pending.has_reached(0.3) && !pending.has_reached(0.31));
-        let whole = pending.take(0.25, 0.0, &[T1, T2]);
-        assert_eq!((whole.first_sequence, &whole.t_s[..]), (0, &[0.0, 0.1, 0.2][..]));
-        assert_eq!(whole.column(T1), Some(&[0.0, 0.1, 0.2][..]));
-        assert!(whole.column(T2).unwrap()[2].is_nan());
-        let from = whole.provenance_of(T1).unwrap();
+        let merged = pending.take(0.25, 0.0, &[T1, T2]);
+        assert_eq!((merged.first_sequence, &merged.t_s[..]), (0, &[0.0, 0.1, 0.2][..]));
+        assert_eq!(merged.column(T1), Some(&[0.0, 0.1, 0.2][..]));
+        assert!(merged.column(T2).unwrap()[2].is_nan());
+        let from = merged.provenance_of(T1).unwrap();
         assert_eq!(from.source_t_s, [0.0, 0.1, 0.1]);
         assert_eq!(from.quality, [Quality::Good, Quality::Good, Quality::Bad]);
         let rest = pending.take(9.0, 0.0, &[T1, T2]);

@@ -70,9 +70,10 @@ impl Secrets {
     /// Replaces the secrets in a driver's text.
     pub(crate) fn hide(&self, text: &str) -> String {
         self.0.iter().fold(text.to_owned(), |text, secret| {
-            match secret.chars().count() < MIN_REPLACED_LENGTH {
-                true => hide_word(&text, secret),
-                false => text.replace(secret.as_str(), PLACEHOLDER),
+            if secret.chars().count() < MIN_REPLACED_LENGTH {
+                hide_word(&text, secret)
+            } else {
+                text.replace(secret.as_str(), PLACEHOLDER)
             }
         })
     }

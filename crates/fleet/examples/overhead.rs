@@ -5,7 +5,7 @@
 #![allow(clippy::print_stdout, missing_docs)]
 
 use mapper_fleet::{
-    CreatedStudy, Draft, Drafts, Engine, FleetError, ItemSelection, Kind, Machine, Output, Results,
+    CreatedStudy, Engine, FleetError, ItemDraft, ItemSelection, Kind, Machine, Output, Results, StudyDraft,
     StudyFile, WorkContext, WorkError, open_study,
 };
 use serde_json::{Value, json};
@@ -28,11 +28,11 @@ impl Kind for Nothing {
         "no work at all"
     }
 
-    fn items(&self, _: &StudyFile) -> Result<Drafts, FleetError> {
+    fn items(&self, _: &StudyFile) -> Result<StudyDraft, FleetError> {
         // As long as an item with its campaign.
         let campaign = "#".repeat(4000);
-        let item = |n| Draft { name: format!("{n}"), payload: json!({ "n": n, "campaign": campaign }) };
-        Ok(Drafts { items: (0..self.items).map(item).collect(), settings: Value::Null })
+        let item = |n| ItemDraft { name: format!("{n}"), payload: json!({ "n": n, "campaign": campaign }) };
+        Ok(StudyDraft { items: (0..self.items).map(item).collect(), settings: Value::Null })
     }
 
     fn work(&self, payload: &Value, _: WorkContext<'_>) -> Result<String, WorkError> {

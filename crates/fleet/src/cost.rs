@@ -76,20 +76,20 @@ impl Fleet {
         machine: &Machine<'_>,
     ) -> Result<CostEstimate, FleetError> {
         let done = self.status().done;
-        let mut why = String::new();
+        let mut reason = String::new();
         if done < count {
             // One at a time, so that time and memory belong to one item.
-            let one = Engine { jobs: Some(1), ..*engine };
-            let worked = self.work(kind, ItemSelection::First(count - done), false, &one, machine)?;
-            why = worked
+            let single = Engine { jobs: Some(1), ..*engine };
+            let outcome = self.work(kind, ItemSelection::First(count - done), false, &single, machine)?;
+            reason = outcome
                 .failed
                 .into_iter()
                 .next()
-                .map(|(name, why)| format!("{name}: {why}"))
+                .map(|(name, reason)| format!("{name}: {reason}"))
                 .unwrap_or_default();
         }
         let status = self.status();
-        let cost = self.cost(&status).ok_or(FleetError::UnknownCost { why })?;
+        let cost = self.cost(&status).ok_or(FleetError::UnknownCost { why: reason })?;
         Ok(CostEstimate { cost, status })
     }
 }

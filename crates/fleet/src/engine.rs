@@ -13,7 +13,7 @@ pub fn cores() -> usize {
 pub struct Engine<'a> {
     /// Maximum number of pieces at a time; `None` for the number of cores.
     pub jobs: Option<usize>,
-    /// Set from outside to start no further piece.
+    /// Set by the caller to start no further piece.
     pub stop: &'a AtomicBool,
     /// Receives the number of finished pieces and the total, from the first second on.
     pub on_progress: &'a (dyn Fn(usize, usize) + Sync),
@@ -25,7 +25,7 @@ impl Engine<'_> {
         self.jobs.unwrap_or_else(cores).clamp(1, pieces.max(1))
     }
 
-    /// Does `work` on every piece. Results are in the order of the pieces for any number of jobs. Concurrent pieces share the cores. After
+    /// Applies `work` to every piece. Results are in the order of the pieces for any number of jobs. Concurrent pieces share the cores. After
     /// an error or a stop no further piece starts; pieces that did not start because of a stop are `None`.
     ///
     /// # Errors

@@ -23,7 +23,7 @@ pub use directory::error::FleetError;
 pub use directory::fleet::Fleet;
 pub use directory::hash::Hash;
 pub use directory::item::Item;
-pub use directory::kind::{Draft, Drafts, Kind, Output, Results, WorkContext, WorkError};
+pub use directory::kind::{ItemDraft, Kind, Output, Results, StudyDraft, WorkContext, WorkError};
 pub use directory::kinds::kind_of;
 pub use directory::part::{Outcome, Part, PartRefusal};
 pub use directory::shared_files::Machine;

@@ -6,7 +6,7 @@ use crate::{Fleet, FleetError, Kind, Outcome, Output, PartRefusal};
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
-/// The outcome.
+/// Outcome of a merge.
 #[derive(Debug)]
 pub struct MergeOutcome {
     /// Progress of the study.
@@ -20,7 +20,7 @@ impl Fleet {
     /// time. Two concurrent merges write the same bytes.
     ///
     /// # Errors
-    /// [`FleetError`] if a file cannot be written, or a part's result is not what the kind makes.
+    /// [`FleetError`] if a file cannot be written, or a part's result has the wrong content for the kind.
     pub fn merge(
         &self,
         kind: &dyn Kind,
@@ -37,13 +37,13 @@ impl Fleet {
         let mut parts = self.study.items.iter().map(|item| {
             let result = match self.read_part(item) {
                 Some(Ok((part, body))) if part.outcome == Outcome::Done => Ok(body),
-                Some(Ok((_, why))) => Err(why),
+                Some(Ok((_, reason))) => Err(reason),
                 Some(Err(refusal)) => {
-                    let why = Some(refusal.to_string());
+                    let reason = Some(refusal.to_string());
                     damaged.borrow_mut().push(UnfinishedItem {
                         name: item.name.clone(),
                         hash: item.hash,
-                        why,
+                        why: reason,
                     });
                     Err(refusal.to_string())
                 }
@@ -55,20 +55,20 @@ impl Fleet {
         drop(parts);
         // Parts whose content was changed; their headers are intact.
         for changed in damaged.into_inner() {
-            self.set_changed_part_aside(&changed);
+            self.rename_changed_part(&changed);
             if !status.refused.contains(&changed) {
                 status.done -= 1;
                 status.refused.push(changed);
             }
         }
-        let whole = partial || status.unfinished() == 0;
+        let is_complete = partial || status.unfinished() == 0;
         let description = match description {
-            Ok(description) if whole => description,
+            Ok(description) if is_complete => description,
             other => {
                 let _ = std::fs::remove_dir_all(&new);
                 // Damaged parts are reported first, because they may have caused the failure.
                 return match other {
-                    Err(error) if whole => Err(error),
+                    Err(error) if is_complete => Err(error),
                     _ => Ok(MergeOutcome { status, result: None }),
                 };
             }
@@ -79,11 +79,9 @@ impl Fleet {
         installed?;
         Ok(MergeOutcome { status, result: Some((result, description)) })
     }
-}
 
-impl Fleet {
     /// Renames a part with changed content, which would otherwise count as done because its header is intact.
-    fn set_changed_part_aside(&self, changed: &UnfinishedItem) {
+    fn rename_changed_part(&self, changed: &UnfinishedItem) {
         let part = self.part(&changed.hash);
         let is_changed = changed.why.as_deref() == Some(PartRefusal::Checksum.to_string().as_str());
         if is_changed {
@@ -92,7 +90,7 @@ impl Fleet {
     }
 }
 
-/// Moves each file to its place and removes the files of an earlier merge.
+/// Moves each file to the result's directory and removes the files of an earlier merge.
 fn install(new: &Path, result: &Path) -> Result<(), FleetError> {
     make_directory(result.to_owned())?;
     let names = |folder: &Path| -> Result<Vec<_>, FleetError> {
@@ -103,8 +101,8 @@ fn install(new: &Path, result: &Path) -> Result<(), FleetError> {
     };
     let files = names(new)?;
     for name in &files {
-        let to = result.join(name);
-        std::fs::rename(new.join(name), &to).map_err(FleetError::file("write", &to))?;
+        let target = result.join(name);
+        std::fs::rename(new.join(name), &target).map_err(FleetError::file("write", &target))?;
     }
     for name in names(result)?.into_iter().filter(|name| files.binary_search(name).is_err()) {
         // Another merge may have removed it already.

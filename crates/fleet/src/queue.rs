@@ -70,8 +70,8 @@ pub(crate) fn run_submission(script: &Path, template: &Template) -> Result<Queue
         .map_err(|error| failed(format!("failed to start sh: {error}")))?;
     let printed = String::from_utf8_lossy(&output.stdout).into_owned();
     let answer = String::from_utf8_lossy(&output.stderr).trim().to_owned();
-    let words = printed.lines().filter_map(|line| line.trim().split_once(' '));
-    let mut ids: BTreeMap<String, String> = words
+    let fields = printed.lines().filter_map(|line| line.trim().split_once(' '));
+    let mut ids: BTreeMap<String, String> = fields
         .map(|(word, id)| (word.to_owned(), id.trim().to_owned()))
         .filter(|(_, id)| !id.is_empty() && !id.contains(char::is_whitespace))
         .collect();

@@ -49,7 +49,7 @@ impl Status {
     }
 
     /// Items that were started and have no part: in progress, or lost with their worker.
-    pub fn begun(&self) -> usize {
+    pub fn started_items(&self) -> usize {
         self.missing.iter().filter(|item| item.why.is_some()).count()
     }
 
@@ -68,7 +68,7 @@ impl Status {
 }
 
 /// Maximum number of unrelated files that are listed.
-const MAX_STRANGERS: usize = 1000;
+const MAX_FOREIGN_FILES: usize = 1000;
 
 impl Fleet {
     /// Determines the progress. Every part is read completely, because a damaged one does not count as done.
@@ -83,26 +83,26 @@ impl Fleet {
                 None => status.missing.push(unfinished(self.worker_of(item))),
             }
         }
-        status.strangers = self.strangers();
+        status.strangers = self.foreign_files();
         status
     }
 
     fn worker_of(&self, item: &ItemEntry) -> Option<String> {
-        let who =
+        let worker =
             crate::directory::shared_files::read_at_most(&self.progress_marker(&item.hash), 256).ok()?;
-        Some(String::from_utf8_lossy(&who).into_owned())
+        Some(String::from_utf8_lossy(&worker).into_owned())
     }
 
-    fn strangers(&self) -> Vec<String> {
+    fn foreign_files(&self) -> Vec<String> {
         let known: BTreeSet<String> = self.study.items.iter().map(|item| part_name(&item.hash)).collect();
         let Ok(entries) = std::fs::read_dir(self.parts()) else { return Vec::new() };
         let names = entries.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned());
         // A name with a leading dot is a part that is being written, or whose worker was killed.
-        let mut strangers: Vec<String> = names
+        let mut foreign: Vec<String> = names
             .filter(|name| !name.starts_with('.') && !known.contains(name))
-            .take(MAX_STRANGERS)
+            .take(MAX_FOREIGN_FILES)
             .collect();
-        strangers.sort();
-        strangers
+        foreign.sort();
+        foreign
     }
 }

@@ -114,7 +114,7 @@ impl Fleet {
         };
         let wanted_min = limits
             .time_min
-            .map_or(options.task_min, |most| options.task_min.min(most as f64 / TIME_SAFETY_FACTOR));
+            .map_or(options.task_min, |max| options.task_min.min(max as f64 / TIME_SAFETY_FACTOR));
         let most_tasks = limits.tasks.min(cost.left as u64).max(1);
         let fair = (cost.left_hours * 60.0 / options.cpus as f64 / wanted_min).ceil() as u64;
         let mut tasks = fair.clamp(1, most_tasks);
@@ -123,9 +123,9 @@ impl Fleet {
             tasks = (tasks + tasks.div_ceil(10)).min(most_tasks);
         }
         let longest_min = lasts_min(tasks);
-        if let Some(most) = limits.time_min.filter(|most| TIME_SAFETY_FACTOR * longest_min > *most as f64) {
+        if let Some(max) = limits.time_min.filter(|max| TIME_SAFETY_FACTOR * longest_min > *max as f64) {
             return refused(format!(
-                "the longest of {tasks} tasks takes about {longest_min:.1} min, but the time limit of {most} min must be at least \
+                "the longest of {tasks} tasks takes about {longest_min:.1} min, but the time limit of {max} min must be at least \
                  {TIME_SAFETY_FACTOR} times that; allow more tasks, cores or time"
             ));
         }
@@ -226,13 +226,13 @@ impl Fleet {
         make_directory(directory.join(LOGS))?;
         let word = |path: &Path| shell_quote(&path.to_string_lossy());
         let program = word(&submission.program);
-        let (cpus, tasks, here) = (submission.cpus, submission.tasks, word(&directory));
+        let (cpus, tasks, directory_word) = (submission.cpus, submission.tasks, word(&directory));
         // Limits the threads of each item to its share of the cores.
         let task = format!(
             "# One task: shard $1 of {tasks}.\nexport RAYON_NUM_THREADS={cpus}\n\
-             exec {program} fleet work {here} --shard \"$1/{tasks}\" --jobs {cpus} {again}\n"
+             exec {program} fleet work {directory_word} --shard \"$1/{tasks}\" --jobs {cpus} {again}\n"
         );
-        let merge = format!("exec {program} fleet merge {here}\n");
+        let merge = format!("exec {program} fleet merge {directory_word}\n");
         let write = |name: &str, text: &str| -> Result<PathBuf, FleetError> {
             let path = directory.join(name);
             write_whole(&path, &[text.as_bytes()], machine.name, Durability::Unsynced)?;
@@ -241,7 +241,7 @@ impl Fleet {
         let values = [
             ("NAME", shell_quote(&self.study.name)),
             ("ARRAY", shell_quote(&submission.array)),
-            ("AT_ONCE", submission.at_once.map_or_else(String::new, |most| most.to_string())),
+            ("AT_ONCE", submission.at_once.map_or_else(String::new, |max| max.to_string())),
             ("MINUTES", submission.minutes.to_string()),
             ("CPUS", cpus.to_string()),
             ("MEMORY_MB", submission.memory_mb.to_string()),
@@ -283,10 +283,10 @@ fn ranges(numbers: &[u64]) -> String {
             _ => ranges.push((*number, *number)),
         }
     }
-    let words = ranges
+    let fields = ranges
         .into_iter()
         .map(|(first, last)| if first == last { first.to_string() } else { format!("{first}-{last}") });
-    words.collect::<Vec<_>>().join(",")
+    fields.collect::<Vec<_>>().join(",")
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Does items. Each finished item leaves one complete part, even if a process is killed.
+//! Processes items. Each finished item leaves one complete part, even if a process is killed.
 
 use crate::directory::part::{Outcome, Part};
 use crate::directory::shared_files::Machine;
@@ -24,23 +24,23 @@ pub enum ItemSelection {
 /// Result of a call.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct WorkOutcome {
-    /// Items done now.
+    /// Items processed by this call.
     pub done: usize,
     /// Items that were already done.
-    pub there: usize,
-    /// Items that failed now or earlier and were not retried: name, and why.
+    pub already_done: usize,
+    /// Items that failed now or earlier and were not retried: name and reason.
     pub failed: Vec<(String, String)>,
 }
 
 /// Outcome of one item.
 enum ItemOutcome {
     Done,
-    There,
+    AlreadyDone,
     Failed(String),
 }
 
 impl Fleet {
-    /// Does the items that have no part yet, and with `again` those that failed. An interruption loses only the items in
+    /// Processes the items without a part, and with `again` also the failed ones. An interruption loses only the items in
     /// progress.
     ///
     /// # Errors
@@ -49,30 +49,30 @@ impl Fleet {
     pub fn work(
         &self,
         kind: &dyn Kind,
-        which: ItemSelection,
+        selection: ItemSelection,
         again: bool,
         engine: &Engine<'_>,
         machine: &Machine<'_>,
     ) -> Result<WorkOutcome, FleetError> {
-        let mut worked = WorkOutcome::default();
+        let mut counts = WorkOutcome::default();
         let mut items = Vec::new();
-        for item in self.select_items(which)? {
+        for item in self.select_items(selection)? {
             match self.read_part_header(item) {
-                Some(Ok(part)) if part.outcome == Outcome::Done => worked.there += 1,
-                Some(Ok(_)) if !again => worked.failed.push((item.name.clone(), self.failure_reason(item))),
+                Some(Ok(part)) if part.outcome == Outcome::Done => counts.already_done += 1,
+                Some(Ok(_)) if !again => counts.failed.push((item.name.clone(), self.failure_reason(item))),
                 // Files that do not belong to this study are replaced.
                 _ => items.push(item),
             }
         }
-        if let ItemSelection::First(count) = which {
+        if let ItemSelection::First(count) = selection {
             items.truncate(count);
         }
-        // An item that was started and has no part may have killed its worker, or is in progress elsewhere: do it last.
+        // An item that was started and has no part may have killed its worker, or is in progress elsewhere, so it comes last.
         items.sort_by_cached_key(|item| self.progress_marker(&item.hash).exists());
         let jobs = engine.parallel_jobs(items.len());
         let results = engine.each(&items, |_, item| {
             match self.do_item(kind, item, again, jobs, engine.stop, machine) {
-                Ok(one) => Ok(Some(one)),
+                Ok(item_outcome) => Ok(Some(item_outcome)),
                 Err(FleetError::Interrupted) => Ok(None),
                 Err(error) => Err(error),
             }
@@ -81,17 +81,17 @@ impl Fleet {
         for (item, result) in items.iter().zip(results) {
             match result.flatten() {
                 None => interrupted = true,
-                Some(ItemOutcome::Done) => worked.done += 1,
-                Some(ItemOutcome::There) => worked.there += 1,
-                Some(ItemOutcome::Failed(why)) => worked.failed.push((item.name.clone(), why)),
+                Some(ItemOutcome::Done) => counts.done += 1,
+                Some(ItemOutcome::AlreadyDone) => counts.already_done += 1,
+                Some(ItemOutcome::Failed(reason)) => counts.failed.push((item.name.clone(), reason)),
             }
         }
-        if interrupted { Err(FleetError::Interrupted) } else { Ok(worked) }
+        if interrupted { Err(FleetError::Interrupted) } else { Ok(counts) }
     }
 
-    fn select_items(&self, which: ItemSelection) -> Result<Vec<&ItemEntry>, FleetError> {
+    fn select_items(&self, selection: ItemSelection) -> Result<Vec<&ItemEntry>, FleetError> {
         let items = self.study.items.iter();
-        let mut chosen: Vec<&ItemEntry> = match which {
+        let mut selected: Vec<&ItemEntry> = match selection {
             ItemSelection::All | ItemSelection::First(_) => items.collect(),
             ItemSelection::Shard(shard) => items.filter(|item| shard.holds(&item.hash)).collect(),
             ItemSelection::Item(hash) => {
@@ -99,11 +99,11 @@ impl Fleet {
                 vec![found.ok_or(FleetError::NoItem { hash })?]
             }
         };
-        if let ItemSelection::First(_) = which {
+        if let ItemSelection::First(_) = selection {
             // Sorted by hash to get a random sample; the first items of a study may be similar.
-            chosen.sort_by_key(|item| item.hash);
+            selected.sort_by_key(|item| item.hash);
         }
-        Ok(chosen)
+        Ok(selected)
     }
 
     fn do_item(
@@ -119,12 +119,12 @@ impl Fleet {
         if let Some(Ok(part)) = self.read_part_header(listed)
             && (part.outcome == Outcome::Done || !again)
         {
-            return Ok(ItemOutcome::There);
+            return Ok(ItemOutcome::AlreadyDone);
         }
         let item = Item::read(&self.item(&listed.hash), &listed.hash)?;
-        let begun = self.progress_marker(&listed.hash);
+        let marker = self.progress_marker(&listed.hash);
         // For information only; work continues if the disk is full.
-        let _ = std::fs::write(&begun, machine.name);
+        let _ = std::fs::write(&marker, machine.name);
         // One core for each item, so that the processor time of the thread is the cost of the item.
         let (result, duration_s) = parallel::with_threads(1, || {
             let started_s = (machine.thread_s)();
@@ -133,20 +133,21 @@ impl Fleet {
         });
         let memory_bytes = (machine.peak_memory_bytes)().unwrap_or(0) / jobs as u64;
         let cost = (duration_s, memory_bytes);
-        let keep = |outcome: Outcome, body: &str| {
-            let of = (&listed.hash, &item);
-            Part::write(&self.part(&listed.hash), of, (outcome, body), cost, machine)
+        let write_part = |outcome: Outcome, body: &str| {
+            Part::write(&self.part(&listed.hash), (&listed.hash, &item), (outcome, body), cost, machine)
         };
-        let one = match result {
-            Ok(body) => keep(Outcome::Done, &body).map(|_| ItemOutcome::Done),
-            Err(WorkError::Failed(why)) => keep(Outcome::Failed, &why).map(|_| ItemOutcome::Failed(why)),
+        let item_outcome = match result {
+            Ok(body) => write_part(Outcome::Done, &body).map(|_| ItemOutcome::Done),
+            Err(WorkError::Failed(reason)) => {
+                write_part(Outcome::Failed, &reason).map(|_| ItemOutcome::Failed(reason))
+            }
             Err(WorkError::Interrupted) => Err(FleetError::Interrupted),
         };
-        let _ = std::fs::remove_file(&begun);
-        one
+        let _ = std::fs::remove_file(&marker);
+        item_outcome
     }
 
-    /// Why an item failed, from its part.
+    /// The reason for the failure of an item, from its part.
     pub(crate) fn failure_reason(&self, item: &ItemEntry) -> String {
         match self.read_part(item) {
             Some(Ok((_, body))) => body.chars().take(MAX_REASON_CHARS).collect(),
@@ -159,11 +160,11 @@ impl Fleet {
 /// Longest reason that is recorded, characters.
 const MAX_REASON_CHARS: usize = 400;
 
-/// Does an item in a directory of its own. A panic fails this item only.
+/// Processes an item in its own directory. A panic fails only this item.
 fn run_item(kind: &dyn Kind, item: &Item, stop: &AtomicBool) -> Result<String, WorkError> {
-    let room = std::env::temp_dir();
+    let temporary = std::env::temp_dir();
     let scratch = tempfile::Builder::new().prefix("mapper-fleet-").tempdir().map_err(|error| {
-        WorkError::Failed(format!("failed to create a directory in {}: {error}", room.display()))
+        WorkError::Failed(format!("failed to create a directory in {}: {error}", temporary.display()))
     })?;
     let work = |path: &Path| kind.work(&item.payload, WorkContext { scratch: path, stop });
     let result = catch_unwind(AssertUnwindSafe(|| work(scratch.path()))).unwrap_or_else(|panic| {

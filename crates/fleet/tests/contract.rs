@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
 use mapper_fleet::{
-    CreatedStudy, Draft, Drafts, Engine, Fleet, FleetError, ItemSelection, Kind, Limits, Machine,
-    MergeOutcome, Output, Results, Shard, StudyFile, SubmitOptions, Template, WorkContext, WorkError,
+    CreatedStudy, Engine, Fleet, FleetError, ItemDraft, ItemSelection, Kind, Limits, Machine, MergeOutcome,
+    Output, Results, Shard, StudyDraft, StudyFile, SubmitOptions, Template, WorkContext, WorkError,
     WorkOutcome, kind_of, open_study,
 };
 use schemars::JsonSchema;
@@ -20,7 +20,7 @@ const PROGRAM: &str = "mapper 1.2.3";
 #[derive(Default)]
 struct Squares {
     faults: AtomicBool,
-    worked: AtomicUsize,
+    calls: AtomicUsize,
 }
 
 #[derive(Deserialize, JsonSchema)]
@@ -43,15 +43,16 @@ impl Kind for Squares {
         "squares of numbers"
     }
 
-    fn items(&self, study: &StudyFile) -> Result<Drafts, FleetError> {
+    fn items(&self, study: &StudyFile) -> Result<StudyDraft, FleetError> {
         let numbers = study.read::<SquaresStudy>()?.numbers;
-        let items = (0..numbers).map(|n| Draft { name: format!("number {n}"), payload: json!(n) }).collect();
-        Ok(Drafts { items, settings: Value::Null })
+        let items =
+            (0..numbers).map(|n| ItemDraft { name: format!("number {n}"), payload: json!(n) }).collect();
+        Ok(StudyDraft { items, settings: Value::Null })
     }
 
     fn work(&self, payload: &Value, at: WorkContext<'_>) -> Result<String, WorkError> {
         let n = payload.as_u64().unwrap();
-        self.worked.fetch_add(1, Ordering::Relaxed);
+        self.calls.fetch_add(1, Ordering::Relaxed);
         assert!(at.scratch.is_dir());
         if self.faults.load(Ordering::Relaxed) {
             assert_ne!(n, 17, "seventeen");
@@ -126,7 +127,7 @@ fn any_number_of_shards_in_any_order_gives_the_same_bytes() {
             // A second time nothing is left to do.
             assert_eq!(work(&fleet, &kind, ItemSelection::Shard(shard), false).unwrap().done, 0);
         }
-        assert_eq!(kind.worked.load(Ordering::Relaxed), 100);
+        assert_eq!(kind.calls.load(Ordering::Relaxed), 100);
         assert!(merge(&fleet).result.is_some());
         assert_eq!(result(&fleet), expected);
         merge(&fleet);
@@ -163,8 +164,8 @@ fn what_fails_is_named_with_its_reason_and_done_again_when_asked() {
     let folder = tempfile::tempdir().unwrap();
     let fleet = made(folder.path(), 30, PROGRAM).unwrap().fleet;
     let kind = Squares { faults: AtomicBool::new(true), ..Squares::default() };
-    let worked = work(&fleet, &kind, ItemSelection::All, false).unwrap();
-    assert_eq!((worked.done, worked.failed.len()), (28, 2));
+    let outcome = work(&fleet, &kind, ItemSelection::All, false).unwrap();
+    assert_eq!((outcome.done, outcome.failed.len()), (28, 2));
     let merged = merge(&fleet);
     assert!(merged.result.is_none());
     let why: BTreeMap<&str, &str> =
@@ -172,8 +173,8 @@ fn what_fails_is_named_with_its_reason_and_done_again_when_asked() {
     assert_eq!(why["number 13"], "thirteen brings bad luck");
     assert!(why["number 17"].contains("panicked") && why["number 17"].contains("seventeen"), "{why:?}");
     // Reported again, not done again.
-    let worked = work(&fleet, &kind, ItemSelection::All, false).unwrap();
-    assert_eq!((worked.done, worked.there, worked.failed.len()), (0, 28, 2));
+    let outcome = work(&fleet, &kind, ItemSelection::All, false).unwrap();
+    assert_eq!((outcome.done, outcome.already_done, outcome.failed.len()), (0, 28, 2));
     fleet.merge(&kind, true, &machine("merger")).unwrap().result.expect("what there is");
     assert_eq!(result(&fleet), squares((0..30).filter(|n| ![13, 17].contains(n))));
     kind.faults.store(false, Ordering::Relaxed);
@@ -191,12 +192,12 @@ fn a_stop_keeps_what_is_done() {
     let stopped = Engine { jobs: Some(1), stop: &stop, on_progress: &report };
     let error = fleet.work(&kind, ItemSelection::All, false, &stopped, &machine("worker")).unwrap_err();
     assert!(matches!(error, FleetError::Interrupted), "{error}");
-    assert_eq!((fleet.status().done, fleet.status().begun()), (10, 0));
+    assert_eq!((fleet.status().done, fleet.status().started_items()), (10, 0));
     assert_eq!(
         work(&fleet, &kind, ItemSelection::All, false).unwrap(),
-        WorkOutcome { done: 30, there: 10, failed: vec![] }
+        WorkOutcome { done: 30, already_done: 10, failed: vec![] }
     );
-    assert_eq!(kind.worked.load(Ordering::Relaxed), 40);
+    assert_eq!(kind.calls.load(Ordering::Relaxed), 40);
 }
 
 /// Path of the part of item `n`.

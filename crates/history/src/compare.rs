@@ -110,28 +110,29 @@ fn compare_figures(run: &RunRow, before: &[&RunRow], moved: &mut Vec<MetricOutsi
 }
 
 /// Identity of a point from night to night: speed and opening bit for bit, because they come from the same file each night, and visit.
-type Place = (u64, u64, usize);
+type PointKey = (u64, u64, usize);
 
-fn place(point: &PointRow) -> Place {
+fn point_key(point: &PointRow) -> PointKey {
     (point.speed_rpm.to_bits(), point.valve_opening_ratio.to_bits(), point.visit)
 }
 
 fn compare_points(run: &RunRow, before: &[&RunRow], moved: &mut Vec<PointsOutsideBand>) {
-    let mut earlier: BTreeMap<Place, Vec<&PointRow>> = BTreeMap::new();
+    let mut earlier: BTreeMap<PointKey, Vec<&PointRow>> = BTreeMap::new();
     for point in before.iter().flat_map(|run| &run.points) {
-        earlier.entry(place(point)).or_default().push(point);
+        earlier.entry(point_key(point)).or_default().push(point);
     }
-    let tonight: BTreeMap<Place, &PointRow> = run.points.iter().map(|point| (place(point), point)).collect();
+    let tonight: BTreeMap<PointKey, &PointRow> =
+        run.points.iter().map(|point| (point_key(point), point)).collect();
     for quantity in PointQuantity::ALL {
         let (mut outside, mut missing, mut compared) = (0, 0, 0);
         let (mut shift_sum, mut level_sum) = (0.0, 0.0);
         let mut largest: Option<(f64, Shift)> = None;
-        for (place, points) in &earlier {
+        for (point_key, points) in &earlier {
             let values: Vec<f64> = points.iter().filter_map(|point| quantity.of(point)).collect();
             // A point with values in only a few nights is not compared.
             let is_usual = 2 * values.len() > before.len();
             let Some(band) = Band::of(&values, quantity.floor()).filter(|_| is_usual) else { continue };
-            let point = tonight.get(place);
+            let point = tonight.get(point_key);
             let Some((point, value)) = point.and_then(|point| Some((point, quantity.of(point)?))) else {
                 missing += 1;
                 continue;
@@ -145,7 +146,7 @@ fn compare_points(run: &RunRow, before: &[&RunRow], moved: &mut Vec<PointsOutsid
             }
             outside += 1;
             if largest.as_ref().is_none_or(|(size, _)| shift.abs() > *size) {
-                largest = Some((shift.abs(), Shift { place: point.place(), value, band }));
+                largest = Some((shift.abs(), Shift { place: point.label(), value, band }));
             }
         }
         if outside + missing > 0 {
@@ -172,20 +173,20 @@ fn conclusions(
     let mut sentences = changed_inputs(night, earlier);
     let campaigns: BTreeSet<&str> = night.runs.iter().map(|run| run.key.campaign.as_str()).collect();
     for campaign in campaigns {
-        for (truth, result, what) in [
+        for (truth, result, name) in [
             (PointQuantity::EtaTrue, PointQuantity::Eta, "efficiency"),
             (PointQuantity::HTrue, PointQuantity::H, "heat-transfer coefficient"),
         ] {
-            let of = |quantity| {
+            let moved_in = |quantity| {
                 comparison
                     .moved_points
                     .iter()
                     .filter(move |moved| moved.run.campaign == campaign && moved.quantity == quantity)
             };
-            let shown = |quantity: PointQuantity| {
+            let summarise = |quantity: PointQuantity| {
                 let (mut shift, mut level, mut points) = (0.0, 0.0, 0);
                 let mut methods = BTreeSet::new();
-                for moved in of(quantity) {
+                for moved in moved_in(quantity) {
                     let count = moved.compared as f64;
                     shift += count * moved.mean_shift;
                     level += count * moved.mean_level;
@@ -196,8 +197,8 @@ fn conclusions(
                 let methods = methods.into_iter().collect::<Vec<_>>().join(" and ");
                 (quantity.format_shift(shift / count, level / count), points, methods)
             };
-            let (truth_shift, truth_points, _) = shown(truth);
-            let (result_shift, result_points, methods) = shown(result);
+            let (truth_shift, truth_points, _) = summarise(truth);
+            let (result_shift, result_points, methods) = summarise(result);
             if truth_points > 0 {
                 let followed = if result_points > 0 {
                     format!("the results moved by {result_shift} with it")
@@ -205,11 +206,11 @@ fn conclusions(
                     "the results stayed".to_owned()
                 };
                 sentences.push(format!(
-                    "{campaign}: the true {what} moved by {truth_shift} on average over {truth_points} points, and {followed}: the simulated machine or its model changed."
+                    "{campaign}: the true {name} moved by {truth_shift} on average over {truth_points} points, and {followed}: the simulated machine or its model changed."
                 ));
             } else if result_points > 0 {
                 sentences.push(format!(
-                    "{campaign}: the identified {what} moved by {result_shift} on average over {result_points} points ({methods}), the true one stayed: planning, recording or identification changed."
+                    "{campaign}: the identified {name} moved by {result_shift} on average over {result_points} points ({methods}), the true one stayed: planning, recording or identification changed."
                 ));
             }
         }

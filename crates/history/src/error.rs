@@ -2,15 +2,15 @@
 
 use std::path::PathBuf;
 
-/// Why a history cannot be read or written.
+/// Errors when a history is read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum HistoryError {
-    /// The directory of the file cannot be made.
+    /// The directory of the file cannot be created.
     #[error("failed to create {}: {source}", .path.display())]
     Directory {
         /// The directory.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
     /// The file does not exist, and only reading was requested.
@@ -38,7 +38,7 @@ pub enum HistoryError {
     Sqlite {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: rusqlite::Error,
     },
 }

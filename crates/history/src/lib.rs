@@ -22,6 +22,6 @@ pub use mapper_numerics::statistics::median;
 pub use metric::Metric;
 pub use night::{Night, PointRow, RunKey, RunRow};
 pub use outlier::{DeviationPattern, MIN_MACHINES_FOR_OUTLIERS, Outlier};
-pub use production::{Drift, MS_PER_DAY, Place, Production, Spread, Stand, analyse_productions};
+pub use production::{Drift, MS_PER_DAY, Production, ProductionPoint, Spread, Stand, analyse_productions};
 pub use quantity::PointQuantity;
 pub use store::{DEFAULT_NIGHTS, Filter, History, ListedRun, ObservedPoint, StoredNight};

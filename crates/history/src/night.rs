@@ -44,7 +44,7 @@ pub struct PointRow {
 
 impl PointRow {
     /// The point in words.
-    pub fn place(&self) -> String {
+    pub fn label(&self) -> String {
         let visit = if self.visit == 0 { String::new() } else { format!(", visit {}", self.visit + 1) };
         format!("{} krpm at opening {}{visit}", self.speed_rpm / 1e3, self.valve_opening_ratio)
     }

@@ -80,8 +80,8 @@ struct DeviationParameters {
 }
 
 impl DeviationParameters {
-    fn of(self, sign: DeviationPattern) -> f64 {
-        match sign {
+    fn in_pattern(self, pattern: DeviationPattern) -> f64 {
+        match pattern {
             DeviationPattern::EfficiencyEverywhere => self.everywhere,
             DeviationPattern::EfficiencyAtLowSpeed => self.at_lowest,
             DeviationPattern::HeatTransfer => self.ln_h,
@@ -91,42 +91,46 @@ impl DeviationParameters {
 
 /// Machines that deviate by more than [`OUTLIER_SIGMAS`] in any pattern, largest deviation first; `None` if too few were measured.
 pub(crate) fn find_outliers(machines: &[String], places: &[Deviations]) -> Option<Vec<Outlier>> {
-    let lowest = places.iter().map(|place| place.speed_rpm).fold(f64::INFINITY, f64::min);
-    let signs: Vec<Option<DeviationParameters>> =
-        (0..machines.len()).map(|machine| fit_deviation(machine, places, lowest)).collect();
-    let known: Vec<(usize, DeviationParameters)> =
-        signs.iter().enumerate().filter_map(|(machine, signs)| Some((machine, (*signs)?))).collect();
+    let lowest_rpm = places.iter().map(|place| place.speed_rpm).fold(f64::INFINITY, f64::min);
+    let deviations: Vec<Option<DeviationParameters>> =
+        (0..machines.len()).map(|machine| fit_deviation(machine, places, lowest_rpm)).collect();
+    let known: Vec<(usize, DeviationParameters)> = deviations
+        .iter()
+        .enumerate()
+        .filter_map(|(machine, deviation)| Some((machine, (*deviation)?)))
+        .collect();
     if known.len() < MIN_MACHINES_FOR_OUTLIERS {
         return None;
     }
-    let mut usual = Vec::new();
-    for sign in DeviationPattern::ALL {
-        let values: Vec<f64> = known.iter().map(|(_, signs)| signs.of(sign)).collect();
-        let middle = median(&values)?;
-        usual.push((sign, middle, robust_sigma(values.iter().map(|value| value - middle))?));
+    let mut scatter = Vec::new();
+    for pattern in DeviationPattern::ALL {
+        let values: Vec<f64> = known.iter().map(|(_, deviation)| deviation.in_pattern(pattern)).collect();
+        let median = median(&values)?;
+        scatter.push((pattern, median, robust_sigma(values.iter().map(|value| value - median))?));
     }
-    let mut found: Vec<Outlier> = known
+    let mut outliers: Vec<Outlier> = known
         .into_iter()
-        .filter_map(|(machine, signs)| {
-            let sigmas = |(sign, middle, sigma): &(DeviationPattern, f64, f64)| {
-                let off = signs.of(*sign) - middle;
+        .filter_map(|(machine, deviation)| {
+            let sigmas = |(pattern, median, sigma): &(DeviationPattern, f64, f64)| {
+                let distance = deviation.in_pattern(*pattern) - median;
                 // Identical machines have no scatter.
-                (*sign, if *sigma > 0.0 { off / sigma } else { 0.0 })
+                (*pattern, if *sigma > 0.0 { distance / sigma } else { 0.0 })
             };
-            let (sign, sigmas) = usual.iter().map(sigmas).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+            let (pattern, sigmas) =
+                scatter.iter().map(sigmas).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
             (sigmas.abs() > OUTLIER_SIGMAS).then(|| Outlier {
                 machine: machines[machine].clone(),
-                sign,
+                sign: pattern,
                 sigmas,
-                eta: signs.eta,
-                eta_ratio: signs.everywhere,
-                eta_ratio_at_lowest_speed: signs.at_lowest,
-                h_ratio: signs.ln_h.exp_m1(),
+                eta: deviation.eta,
+                eta_ratio: deviation.everywhere,
+                eta_ratio_at_lowest_speed: deviation.at_lowest,
+                h_ratio: deviation.ln_h.exp_m1(),
             })
         })
         .collect();
-    found.sort_by(|a, b| b.sigmas.abs().total_cmp(&a.sigmas.abs()));
-    Some(found)
+    outliers.sort_by(|a, b| b.sigmas.abs().total_cmp(&a.sigmas.abs()));
+    Some(outliers)
 }
 
 /// Fits the relative deviations of efficiency by least squares to `a + b (lowest speed / speed)^2`.
@@ -140,15 +144,15 @@ fn fit_deviation(machine: usize, places: &[Deviations], lowest_rpm: f64) -> Opti
         .filter(|(_, ratio, _)| ratio.is_finite())
         .collect();
     let ln_h = mean(places.iter().filter_map(|place| *place.ln_h.get(machine)?));
-    let middle_x = mean(eta.iter().map(|(x, ..)| *x))?;
-    let middle_y = mean(eta.iter().map(|(_, y, _)| *y))?;
-    let spread: f64 = eta.iter().map(|(x, ..)| (x - middle_x).powi(2)).sum();
-    let across: f64 = eta.iter().map(|(x, y, _)| (x - middle_x) * (y - middle_y)).sum();
+    let mean_x = mean(eta.iter().map(|(x, ..)| *x))?;
+    let mean_y = mean(eta.iter().map(|(_, y, _)| *y))?;
+    let variance: f64 = eta.iter().map(|(x, ..)| (x - mean_x).powi(2)).sum();
+    let covariance: f64 = eta.iter().map(|(x, y, _)| (x - mean_x) * (y - mean_y)).sum();
     // One speed alone does not show a dependence on speed.
-    let at_lowest = if spread > 1e-6 { across / spread } else { 0.0 };
+    let at_lowest = if variance > 1e-6 { covariance / variance } else { 0.0 };
     Some(DeviationParameters {
         eta: mean(eta.iter().map(|(.., eta)| *eta))?,
-        everywhere: middle_y - at_lowest * middle_x,
+        everywhere: mean_y - at_lowest * mean_x,
         at_lowest,
         ln_h: ln_h.unwrap_or(0.0),
     })

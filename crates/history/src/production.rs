@@ -27,7 +27,7 @@ pub struct Production {
     /// Start times of the nights, ms since 1970-01-01 00:00 UTC, ascending.
     pub nights_ms: Vec<i64>,
     /// The points of the map by speed and opening, without outliers.
-    pub places: Vec<Place>,
+    pub places: Vec<ProductionPoint>,
     /// Effect of the stand on all machines, mean over the points; `None` for a single night.
     pub stand: Option<Stand>,
     /// Machines that deviate from the others, largest deviation first; `None` if there are too few machines.
@@ -36,7 +36,7 @@ pub struct Production {
 
 /// One point of the map over the production.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Place {
+pub struct ProductionPoint {
     /// Target speed, rpm.
     pub speed_rpm: f64,
     /// Valve opening relative to the nominal area.
@@ -97,8 +97,8 @@ pub fn analyse_productions(nights: &[StoredNight], points: &[ObservedPoint]) -> 
         .collect()
 }
 
-/// Observations of one place.
-struct PlaceObservations<'a> {
+/// Observations of one point of the map.
+struct PointObservations<'a> {
     points: Vec<&'a ObservedPoint>,
     machines: Vec<usize>,
     nights: Vec<usize>,
@@ -122,16 +122,16 @@ fn analyse_production(
     let first_ms = *nights_ms.first()?;
     let runs: BTreeSet<(i64, &str, u64)> =
         points.iter().map(|point| (point.night_id, point.key.machine.as_str(), point.key.seed)).collect();
-    let mut by_place: BTreeMap<(u64, u64), PlaceObservations<'_>> = BTreeMap::new();
+    let mut by_operating_point: BTreeMap<(u64, u64), PointObservations<'_>> = BTreeMap::new();
     for &point in points {
-        let place = (point.point.speed_rpm.to_bits(), point.point.valve_opening_ratio.to_bits());
+        let key = (point.point.speed_rpm.to_bits(), point.point.valve_opening_ratio.to_bits());
         let (Ok(machine), Some(start)) =
             (machines.binary_search(&point.key.machine), starts.get(&point.night_id))
         else {
             continue;
         };
         let Ok(night) = nights_ms.binary_search(start) else { continue };
-        let observed = by_place.entry(place).or_insert_with(|| PlaceObservations {
+        let observed = by_operating_point.entry(key).or_insert_with(|| PointObservations {
             points: Vec::new(),
             machines: Vec::new(),
             nights: Vec::new(),
@@ -142,16 +142,20 @@ fn analyse_production(
         observed.nights.push(night);
         observed.days.push((start - first_ms) as f64 / MS_PER_DAY);
     }
-    let all: Vec<PlaceObservations<'_>> = by_place.into_values().collect();
+    let observations: Vec<PointObservations<'_>> = by_operating_point.into_values().collect();
     let no_machines = BTreeSet::new();
-    let measured = fit_places(&all, machines.len(), &no_machines);
+    let measured = fit_places(&observations, machines.len(), &no_machines);
     let outliers = find_outliers(&machines, &measured.deviations);
-    let out: BTreeSet<usize> = outliers
+    let outlier_machines: BTreeSet<usize> = outliers
         .iter()
         .flatten()
         .filter_map(|outlier| machines.binary_search(&outlier.machine).ok())
         .collect();
-    let measured = if out.is_empty() { measured } else { fit_places(&all, machines.len(), &out) };
+    let measured = if outlier_machines.is_empty() {
+        measured
+    } else {
+        fit_places(&observations, machines.len(), &outlier_machines)
+    };
     Some(Production {
         campaign: campaign.to_owned(),
         method: method.to_owned(),
@@ -166,27 +170,31 @@ fn analyse_production(
 
 /// The fits of all points of the map.
 struct ProductionFit {
-    places: Vec<Place>,
+    places: Vec<ProductionPoint>,
     deviations: Vec<Deviations>,
-    eta: Vec<PlaceFit>,
-    h: Vec<PlaceFit>,
+    eta: Vec<PointFit>,
+    h: Vec<PointFit>,
 }
 
-fn fit_places(all: &[PlaceObservations<'_>], machines: usize, left_out: &BTreeSet<usize>) -> ProductionFit {
+fn fit_places(
+    observations: &[PointObservations<'_>],
+    machines: usize,
+    excluded: &BTreeSet<usize>,
+) -> ProductionFit {
     let mut measured =
         ProductionFit { places: Vec::new(), deviations: Vec::new(), eta: Vec::new(), h: Vec::new() };
-    for observed in all {
+    for observed in observations {
         let Some(first) = observed.points.first() else { continue };
-        let eta = fit_place(observed, PointQuantity::Eta, left_out, |eta| eta);
-        let h = fit_place(observed, PointQuantity::H, left_out, f64::ln);
+        let eta = fit_place(observed, PointQuantity::Eta, excluded, |eta| eta);
+        let h = fit_place(observed, PointQuantity::H, excluded, f64::ln);
         let (speed_rpm, valve_opening_ratio) = (first.point.speed_rpm, first.point.valve_opening_ratio);
         measured.deviations.push(Deviations {
             speed_rpm,
-            eta_mean: eta.as_ref().map_or(f64::NAN, PlaceFit::mean),
+            eta_mean: eta.as_ref().map_or(f64::NAN, PointFit::mean),
             eta: deviations(observed, PointQuantity::Eta, eta.as_ref(), machines, |eta| eta),
             ln_h: deviations(observed, PointQuantity::H, h.as_ref(), machines, f64::ln),
         });
-        measured.places.push(Place {
+        measured.places.push(ProductionPoint {
             speed_rpm,
             valve_opening_ratio,
             eta: eta.as_ref().map(|fitted| fitted.spread(fitted.mean())),
@@ -199,16 +207,16 @@ fn fit_places(all: &[PlaceObservations<'_>], machines: usize, left_out: &BTreeSe
 }
 
 /// A mixed model of one quantity at one point of the map.
-struct PlaceFit {
+struct PointFit {
     fit: MixedFit,
     /// Index of machines and of nights among the groups of the model.
     machines: Option<usize>,
     nights: Option<usize>,
     with_drift: bool,
-    middle_day: f64,
+    mean_day: f64,
 }
 
-impl PlaceFit {
+impl PointFit {
     fn mean(&self) -> f64 {
         self.fit.coefficients[0].value
     }
@@ -229,36 +237,37 @@ impl PlaceFit {
 
     /// Shift by the stand in one night.
     fn stand_shift(&self, night: usize, day: f64) -> f64 {
-        let scatter =
-            self.nights.map_or(0.0, |group| self.fit.effects[group].get(night).map_or(0.0, |one| one.value));
-        scatter + self.drift().map_or(0.0, |drift| drift.value * (day - self.middle_day))
+        let scatter = self
+            .nights
+            .map_or(0.0, |group| self.fit.effects[group].get(night).map_or(0.0, |effect| effect.value));
+        scatter + self.drift().map_or(0.0, |drift| drift.value * (day - self.mean_day))
     }
 }
 
 fn fit_place(
-    observed: &PlaceObservations<'_>,
+    observed: &PointObservations<'_>,
     quantity: PointQuantity,
-    left_out: &BTreeSet<usize>,
+    excluded: &BTreeSet<usize>,
     transform: fn(f64) -> f64,
-) -> Option<PlaceFit> {
+) -> Option<PointFit> {
     let kept: Vec<(usize, f64)> = (0..observed.points.len())
-        .filter(|i| !left_out.contains(&observed.machines[*i]))
+        .filter(|i| !excluded.contains(&observed.machines[*i]))
         .filter_map(|i| Some((i, transform(quantity.of(&observed.points[i].point)?))))
         .filter(|(_, value)| value.is_finite())
         .collect();
     let y: Vec<f64> = kept.iter().map(|(_, value)| *value).collect();
-    let of = |from: &[usize]| kept.iter().map(|(i, _)| from[*i]).collect::<Vec<usize>>();
-    let (machines, nights) = (of(&observed.machines), of(&observed.nights));
-    let different = |levels: &[usize]| levels.iter().collect::<BTreeSet<_>>().len();
+    let select_kept = |from: &[usize]| kept.iter().map(|(i, _)| from[*i]).collect::<Vec<usize>>();
+    let (machines, nights) = (select_kept(&observed.machines), select_kept(&observed.nights));
+    let count_distinct = |levels: &[usize]| levels.iter().collect::<BTreeSet<_>>().len();
     let days: Vec<f64> = kept.iter().map(|(i, _)| observed.days[*i]).collect();
-    let with_drift = different(&nights) >= MIN_NIGHTS_FOR_DRIFT;
-    let middle_day = mean(&days)?;
+    let with_drift = count_distinct(&nights) >= MIN_NIGHTS_FOR_DRIFT;
+    let mean_day = mean(&days)?;
     let fixed = DMatrix::from_fn(y.len(), 1 + usize::from(with_drift), |row, column| {
-        if column == 0 { 1.0 } else { days[row] - middle_day }
+        if column == 0 { 1.0 } else { days[row] - mean_day }
     });
     // With one measurement per machine, the deviation of a machine is indistinguishable from the residual.
-    let with_machines = different(&machines) < y.len() && different(&machines) > 1;
-    let with_nights = different(&nights) > 1 && different(&nights) < y.len();
+    let with_machines = count_distinct(&machines) < y.len() && count_distinct(&machines) > 1;
+    let with_nights = count_distinct(&nights) > 1 && count_distinct(&nights) < y.len();
     let mut groups: Vec<&[usize]> = Vec::new();
     let (mut of_machines, mut of_nights) = (None, None);
     if with_machines {
@@ -269,19 +278,19 @@ fn fit_place(
         of_nights = Some(groups.len());
         groups.push(&nights);
     }
-    let alone = vec![0; y.len()];
+    let single_group = vec![0; y.len()];
     if groups.is_empty() {
-        groups.push(&alone);
+        groups.push(&single_group);
     }
     let fit = MixedModel { y: &y, fixed, groups }.fit().ok()?;
-    Some(PlaceFit { fit, machines: of_machines, nights: of_nights, with_drift, middle_day })
+    Some(PointFit { fit, machines: of_machines, nights: of_nights, with_drift, mean_day })
 }
 
 /// Deviation of each machine from the average machine, after subtracting the shift by the stand; `None` if it was not measured.
 fn deviations(
-    observed: &PlaceObservations<'_>,
+    observed: &PointObservations<'_>,
     quantity: PointQuantity,
-    fitted: Option<&PlaceFit>,
+    fitted: Option<&PointFit>,
     machines: usize,
     transform: fn(f64) -> f64,
 ) -> Vec<Option<f64>> {
@@ -299,14 +308,14 @@ fn deviations(
 
 /// Effect of the stand, mean over all points. The points share its errors, so the standard error does not decrease with their number.
 fn stand(measured: &ProductionFit) -> Stand {
-    let drift = |fitted: &[PlaceFit]| {
-        let drifts: Vec<Effect> = fitted.iter().filter_map(PlaceFit::drift).collect();
+    let drift = |fitted: &[PointFit]| {
+        let drifts: Vec<Effect> = fitted.iter().filter_map(PointFit::drift).collect();
         let a_day = mean(drifts.iter().map(|drift| drift.value))?;
         let half = 1.96 * mean(drifts.iter().map(|drift| drift.standard_error))?;
         Some(Drift { a_day, low: a_day - half, high: a_day + half })
     };
-    let sigma = |fitted: &[PlaceFit]| {
-        mean(fitted.iter().filter_map(|one| one.nights.map(|group| one.fit.group_sigmas[group])))
+    let sigma = |fitted: &[PointFit]| {
+        mean(fitted.iter().filter_map(|effect| effect.nights.map(|group| effect.fit.group_sigmas[group])))
             .unwrap_or(0.0)
     };
     Stand {

@@ -78,7 +78,7 @@ impl History {
     /// Opens the history, creating it if it does not exist.
     ///
     /// # Errors
-    /// [`HistoryError`] if the file cannot be made, is not a history, or was written by a newer program.
+    /// [`HistoryError`] if the file cannot be created, is not a history, or was written by a newer program.
     pub fn open(path: &Path) -> Result<History, HistoryError> {
         if let Some(parent) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
             std::fs::create_dir_all(parent)
@@ -87,9 +87,11 @@ impl History {
         let mut history = Self::connect(path, OpenFlags::default())?;
         // Checked before the runs of a night, not only when their results are stored.
         let writable = history.prepare().and_then(|()| {
-            let begun = history.connection.transaction_with_behavior(TransactionBehavior::Immediate);
+            let transaction = history.connection.transaction_with_behavior(TransactionBehavior::Immediate);
             let path = path.to_owned();
-            begun.and_then(Transaction::rollback).map_err(|source| HistoryError::Sqlite { path, source })
+            transaction
+                .and_then(Transaction::rollback)
+                .map_err(|source| HistoryError::Sqlite { path, source })
         });
         match writable {
             Err(HistoryError::Sqlite { path, source }) if is_read_only(&source) => {
@@ -123,10 +125,10 @@ impl History {
     pub fn open_read_only(path: &Path) -> Result<History, HistoryError> {
         let flags =
             OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-        let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
         // Percent signs, question marks and hash marks have a meaning in a URI.
-        let named = whole.to_string_lossy().replace('%', "%25").replace('?', "%3f").replace('#', "%23");
-        let history = Self::connect(Path::new(&format!("file:{named}?immutable=1")), flags)?;
+        let escaped = absolute.to_string_lossy().replace('%', "%25").replace('?', "%3f").replace('#', "%23");
+        let history = Self::connect(Path::new(&format!("file:{escaped}?immutable=1")), flags)?;
         let mut history = History { path: path.to_owned(), ..history };
         history.prepare()?;
         Ok(history)
@@ -150,31 +152,22 @@ impl History {
         };
         let foreign = |reason: String| HistoryError::Foreign { path: path.clone(), reason };
         // SQLite reports busy at once if another process switches to WAL at the same time. The mode is stored in the file, so one success is enough.
-        let reads_only = self.connection.is_readonly("main").map_err(fail)?;
-        let switched = match reads_only {
-            true => Ok(()),
-            false => self.connection.pragma_update(None, "journal_mode", "WAL"),
-        };
+        let is_read_only = self.connection.is_readonly("main").map_err(fail)?;
+        let switched =
+            if is_read_only { Ok(()) } else { self.connection.pragma_update(None, "journal_mode", "WAL") };
         if let Err(error) = switched
             && error.sqlite_error_code() != Some(rusqlite::ErrorCode::DatabaseBusy)
         {
             return Err(fail(error));
         }
         self.connection.pragma_update(None, "foreign_keys", true).map_err(fail)?;
-        let application_id: i32 =
-            self.connection.pragma_query_value(None, "application_id", |row| row.get(0)).map_err(fail)?;
-        let layout: i32 =
-            self.connection.pragma_query_value(None, "user_version", |row| row.get(0)).map_err(fail)?;
-        if (application_id, layout) == (APPLICATION_ID, LAYOUT) {
+        if read_layout(&self.connection).map_err(fail)? == (APPLICATION_ID, LAYOUT) {
             return Ok(());
         }
         let transaction =
             self.connection.transaction_with_behavior(TransactionBehavior::Immediate).map_err(fail)?;
         // Checked again under the lock, because another process may have created the tables in the meantime.
-        let application_id: i32 =
-            transaction.pragma_query_value(None, "application_id", |row| row.get(0)).map_err(fail)?;
-        let layout: i32 =
-            transaction.pragma_query_value(None, "user_version", |row| row.get(0)).map_err(fail)?;
+        let (application_id, layout) = read_layout(&transaction).map_err(fail)?;
         let tables: i64 = transaction
             .query_row("SELECT count(*) FROM sqlite_schema", [], |row| row.get(0))
             .map_err(fail)?;
@@ -204,12 +197,12 @@ impl History {
 
     fn try_append(&mut self, night: &mut Night, nights: usize) -> rusqlite::Result<Comparison> {
         let transaction = self.connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
-        let mut taken = transaction.prepare("SELECT 1 FROM night WHERE started_ms = ?1")?;
-        while taken.exists([night.started_ms])? {
+        let mut same_start = transaction.prepare("SELECT 1 FROM night WHERE started_ms = ?1")?;
+        while same_start.exists([night.started_ms])? {
             night.started_ms += 1;
         }
-        drop(taken);
-        let earlier = earlier(&transaction, &night.name, nights)?;
+        drop(same_start);
+        let earlier = read_earlier_runs(&transaction, &night.name, nights)?;
         let comparison = compare(night, &earlier);
         let moved = !comparison.is_quiet() && !night.accepted;
         transaction.execute(
@@ -283,13 +276,11 @@ impl History {
                     accepted: row.get(5)?,
                     moved: row.get(6)?,
                 };
-                Ok(ListedRun { night, run: run_of(row, 7)? })
+                Ok(ListedRun { night, run: read_run_row(row, 7)? })
             })?
             .collect()
     }
-}
 
-impl History {
     /// The points of all runs that match a filter, and their nights, oldest first.
     ///
     /// # Errors
@@ -317,15 +308,21 @@ impl History {
                     method: row.get(3)?,
                     seed: row.get::<_, i64>(4)?.cast_unsigned(),
                 };
-                Ok(ObservedPoint { night_id: row.get(0)?, key, point: point_of(row, 5)? })
+                Ok(ObservedPoint { night_id: row.get(0)?, key, point: read_point_row(row, 5)? })
             })?
             .collect::<rusqlite::Result<_>>()?;
         Ok((nights, points))
     }
 }
 
+/// Application ID and layout version of a database.
+fn read_layout(connection: &Connection) -> rusqlite::Result<(i32, i32)> {
+    let read = |pragma| connection.pragma_query_value(None, pragma, |row| row.get(0));
+    Ok((read("application_id")?, read("user_version")?))
+}
+
 /// A point from the columns that begin at `first`.
-fn point_of(row: &rusqlite::Row<'_>, first: usize) -> rusqlite::Result<PointRow> {
+fn read_point_row(row: &rusqlite::Row<'_>, first: usize) -> rusqlite::Result<PointRow> {
     Ok(PointRow {
         speed_rpm: row.get(first)?,
         valve_opening_ratio: row.get(first + 1)?,
@@ -354,7 +351,7 @@ fn insert_run() -> String {
 }
 
 /// A run from the columns that begin at `first`.
-fn run_of(row: &rusqlite::Row<'_>, first: usize) -> rusqlite::Result<RunRow> {
+fn read_run_row(row: &rusqlite::Row<'_>, first: usize) -> rusqlite::Result<RunRow> {
     let mut figures = BTreeMap::new();
     for (index, figure) in Metric::ALL.into_iter().enumerate() {
         if let Some(value) = row.get::<_, Option<f64>>(first + 7 + index)? {
@@ -377,7 +374,7 @@ fn run_of(row: &rusqlite::Row<'_>, first: usize) -> rusqlite::Result<RunRow> {
 }
 
 /// The runs that the bands are based on, newest first: those of the last `nights` unmoved nights since the last accepted one.
-fn earlier(
+fn read_earlier_runs(
     transaction: &Transaction<'_>,
     name: &str,
     nights: usize,
@@ -398,9 +395,10 @@ fn earlier(
     let mut rows = select_runs.query(params![name, limit])?;
     while let Some(row) = rows.next()? {
         let run_id: i64 = row.get(0)?;
-        let mut run = run_of(row, 1)?;
-        run.points =
-            select_points.query_map([run_id], |row| point_of(row, 0))?.collect::<rusqlite::Result<_>>()?;
+        let mut run = read_run_row(row, 1)?;
+        run.points = select_points
+            .query_map([run_id], |row| read_point_row(row, 0))?
+            .collect::<rusqlite::Result<_>>()?;
         earlier.entry(run.key.clone()).or_default().push(run);
     }
     Ok(earlier)

@@ -3,7 +3,7 @@
 use crate::live_run::LiveRun;
 use crate::operator_commands::OperatorCommand;
 use crate::state::{
-    LoggedMessage, MAX_EVENTS, MAX_POINTS, Now, Reading, State, Step, TRACE_ROWS, TracedChannel,
+    CurrentValues, LoggedMessage, MAX_EVENTS, MAX_POINTS, Reading, State, Step, TRACE_ROWS, TracedChannel,
 };
 use mapper_campaign::Campaign;
 use mapper_core::{Channel, IdentifiedPoint, PlanStep, SignalGuard, StepMarker};
@@ -25,7 +25,7 @@ const TRACED: [Channel; 6] =
 
 /// Keeps the state and returns its changes.
 pub(crate) struct Feed {
-    kept: Mutex<FeedState>,
+    current: Mutex<FeedState>,
     display: Display,
     guards: Vec<SignalGuard>,
     plan: Vec<PlanStep>,
@@ -40,7 +40,7 @@ struct FeedState {
     state: State,
     /// Rows not yet sent to browsers.
     unsent: VecDeque<Vec<Option<f64>>>,
-    ticked: Option<Instant>,
+    last_tick: Option<Instant>,
     /// Excess of each step's actual duration over the planned one, s.
     overrun_s: Vec<f64>,
     /// Whether the operator held the current step: its duration must not influence the forecast.
@@ -79,14 +79,14 @@ impl Feed {
             points: Vec::new(),
             map: LiveMap::default(),
             events: VecDeque::new(),
-            now: Now { phase: "planned".to_owned(), ..Now::default() },
+            now: CurrentValues { phase: "planned".to_owned(), ..CurrentValues::default() },
             outcome: None,
             page: None,
         };
-        let kept = FeedState {
+        let current = FeedState {
             state,
             unsent: VecDeque::new(),
-            ticked: None,
+            last_tick: None,
             overrun_s: Vec::new(),
             held: false,
             started_steps: 0,
@@ -94,7 +94,7 @@ impl Feed {
             after_s: 0.0,
         };
         Feed {
-            kept: Mutex::new(kept),
+            current: Mutex::new(current),
             display,
             guards: run.campaign.guard_set().signals,
             plan: run.plan.steps.clone(),
@@ -107,9 +107,9 @@ impl Feed {
 
     /// The complete state.
     pub(crate) fn snapshot(&self) -> Arc<str> {
-        let Ok(mut kept) = self.kept.lock() else { return Arc::from("{}") };
-        self.update_operator_flags(&mut kept.state);
-        message("snapshot", json!(kept.state))
+        let Ok(mut current) = self.current.lock() else { return Arc::from("{}") };
+        self.update_operator_flags(&mut current.state);
+        message("snapshot", json!(current.state))
     }
 
     /// Processes an event and returns messages for the observers.
@@ -119,79 +119,83 @@ impl Feed {
             SessionEvent::PointEstimated(point) => self.map_with(point),
             _ => None,
         };
-        let Ok(mut kept) = self.kept.lock() else { return Vec::new() };
-        let kept = &mut *kept;
+        let Ok(mut current) = self.current.lock() else { return Vec::new() };
+        let current = &mut *current;
         match event {
             SessionEvent::RunStarted { steps, duration_s, .. } => {
-                (kept.state.steps, kept.state.duration_s) = (*steps, *duration_s);
-                kept.state.now.phase = match kept.soak_s > 0.0 {
-                    true => "at rest, for the zero of the sensors".to_owned(),
-                    false => "warming up at the first point".to_owned(),
+                (current.state.steps, current.state.duration_s) = (*steps, *duration_s);
+                current.state.now.phase = if current.soak_s > 0.0 {
+                    "at rest, for the zero of the sensors".to_owned()
+                } else {
+                    "warming up at the first point".to_owned()
                 };
-                vec![self.tick(kept)]
+                vec![self.tick(current)]
             }
             SessionEvent::RigTime { t_s } => {
-                kept.state.now.t_s = *t_s;
-                if kept.started_steps == 0 && kept.soak_s > 0.0 && *t_s > kept.soak_s {
-                    kept.state.now.phase = "warming up at the first point".to_owned();
+                current.state.now.t_s = *t_s;
+                if current.started_steps == 0 && current.soak_s > 0.0 && *t_s > current.soak_s {
+                    current.state.now.phase = "warming up at the first point".to_owned();
                 }
-                (kept.state.now.left_s, kept.state.now.left_half_s) = kept.left_s();
+                (current.state.now.left_s, current.state.now.left_half_s) = current.left_s();
                 Vec::new()
             }
             SessionEvent::Readings { t_s, values } => {
-                self.readings(&mut kept.state.now.readings, values);
+                self.readings(&mut current.state.now.readings, values);
                 let shown = |channel: &Channel| {
                     let found = values.iter().find(|(other, _)| other == channel);
                     found.map(|(_, value)| self.display.reading(*channel, *value))
                 };
                 let row: Vec<Option<f64>> =
                     std::iter::once(Some(*t_s)).chain(TRACED.iter().map(shown)).collect();
-                for rows in [&mut kept.state.rows, &mut kept.unsent] {
+                for rows in [&mut current.state.rows, &mut current.unsent] {
                     rows.push_back(row.clone());
                     while rows.len() > TRACE_ROWS {
                         rows.pop_front();
                     }
                 }
-                match kept.ticked.is_none_or(|at| at.elapsed() >= TICK) {
-                    true => vec![self.tick(kept)],
-                    false => Vec::new(),
+                if current.last_tick.is_none_or(|at| at.elapsed() >= TICK) {
+                    vec![self.tick(current)]
+                } else {
+                    Vec::new()
                 }
             }
             SessionEvent::StepStarted(marker) => {
-                self.step(kept, marker);
-                vec![self.tick(kept)]
+                self.step(current, marker);
+                vec![self.tick(current)]
             }
             SessionEvent::StepEnded(marker) => {
-                let held = std::mem::replace(&mut kept.held, self.operator.is_holding());
+                let held = std::mem::replace(&mut current.held, self.operator.is_holding());
                 let planned_s = self.plan.get(marker.index).filter(|_| !held).map(|step| step.dwell_s);
-                kept.overrun_s.extend(planned_s.map(|planned_s| marker.end_s - marker.start_s - planned_s));
+                current
+                    .overrun_s
+                    .extend(planned_s.map(|planned_s| marker.end_s - marker.start_s - planned_s));
                 Vec::new()
             }
             SessionEvent::Reported(event) => {
                 let entry = LoggedMessage { t_s: event.t_s, message: event.message.clone() };
-                let new = message("told", json!(entry));
-                kept.state.events.push_back(entry);
-                while kept.state.events.len() > MAX_EVENTS {
-                    kept.state.events.pop_front();
+                let new = message("event", json!(entry));
+                current.state.events.push_back(entry);
+                while current.state.events.len() > MAX_EVENTS {
+                    current.state.events.pop_front();
                 }
-                vec![new, self.tick(kept)]
+                vec![new, self.tick(current)]
             }
             SessionEvent::PointEstimated(point) => {
                 let shown = live_point(point, &self.display);
                 let new = message("point", json!(shown));
-                if kept.state.points.len() < MAX_POINTS {
-                    kept.state.points.push(shown);
+                if current.state.points.len() < MAX_POINTS {
+                    current.state.points.push(shown);
                 }
                 let drawn = map.map(|map| {
                     let new = message("map", json!({ "map": map }));
-                    kept.state.map = map;
+                    current.state.map = map;
                     new
                 });
                 std::iter::once(new).chain(drawn).collect()
             }
             SessionEvent::Progress { what, .. } => {
-                (kept.state.now.phase, kept.state.now.step) = (what.clone(), None);
-                vec![self.tick(kept)]
+                (current.state.now.phase, current.state.now.step) = (what.clone(), None);
+                vec![self.tick(current)]
             }
             SessionEvent::RigReleased
             | SessionEvent::PointIdentified(_)
@@ -209,11 +213,11 @@ impl Feed {
     }
 
     /// Shows a pressed button before the run has processed it.
-    pub(crate) fn show_command(&self, asked: OperatorCommand) {
-        if let Ok(mut kept) = self.kept.lock() {
-            kept.held |= asked == OperatorCommand::Hold;
-            let now = &mut kept.state.now;
-            match asked {
+    pub(crate) fn show_command(&self, command: OperatorCommand) {
+        if let Ok(mut current) = self.current.lock() {
+            current.held |= command == OperatorCommand::Hold;
+            let now = &mut current.state.now;
+            match command {
                 OperatorCommand::Hold => now.holds = true,
                 OperatorCommand::Continue => now.holds = false,
                 OperatorCommand::StopAfterStep | OperatorCommand::SafeNow => now.stops = true,
@@ -223,25 +227,25 @@ impl Feed {
 
     /// Shows the end of the run.
     pub(crate) fn show_end(&self, outcome: &str, page: Option<&Path>) -> Arc<str> {
-        let Ok(mut kept) = self.kept.lock() else { return Arc::from("{}") };
-        kept.state.outcome = Some(outcome.to_owned());
-        kept.state.page = page.map(|page| page.display().to_string());
-        let end = json!({ "outcome": kept.state.outcome, "page": kept.state.page });
+        let Ok(mut current) = self.current.lock() else { return Arc::from("{}") };
+        current.state.outcome = Some(outcome.to_owned());
+        current.state.page = page.map(|page| page.display().to_string());
+        let end = json!({ "outcome": current.state.outcome, "page": current.state.page });
         message("end", end)
     }
 
-    fn step(&self, kept: &mut FeedState, marker: &StepMarker) {
+    fn step(&self, current: &mut FeedState, marker: &StepMarker) {
         let forecast = self.plan.get(marker.index);
-        kept.started_steps = marker.number().unwrap_or(kept.started_steps);
+        current.started_steps = marker.number().unwrap_or(current.started_steps);
         if let Some(forecast) = forecast {
-            kept.after_s = kept.state.duration_s - kept.soak_s - forecast.start_s - forecast.dwell_s;
+            current.after_s = current.state.duration_s - current.soak_s - forecast.start_s - forecast.dwell_s;
         }
         let place = marker.to.map(|to| {
             let (_, opening) = to.shown();
             format!("{} {}, opening {opening}", self.display.speed(to.speed_rpm), self.display.units().speed)
         });
-        kept.state.now.phase = "step".to_owned();
-        kept.state.now.step = Some(Step {
+        current.state.now.phase = "step".to_owned();
+        current.state.now.step = Some(Step {
             step: marker.number(),
             place: place.unwrap_or_default(),
             start_s: marker.start_s,
@@ -277,11 +281,11 @@ impl Feed {
         state.now.stops = self.after_step.load(Ordering::SeqCst);
     }
 
-    fn tick(&self, kept: &mut FeedState) -> Arc<str> {
-        self.update_operator_flags(&mut kept.state);
-        kept.ticked = Some(Instant::now());
-        let rows: Vec<Vec<Option<f64>>> = kept.unsent.drain(..).collect();
-        message("tick", json!({ "now": kept.state.now, "rows": rows }))
+    fn tick(&self, current: &mut FeedState) -> Arc<str> {
+        self.update_operator_flags(&mut current.state);
+        current.last_tick = Some(Instant::now());
+        let rows: Vec<Vec<Option<f64>>> = current.unsent.drain(..).collect();
+        message("tick", json!({ "now": current.state.now, "rows": rows }))
     }
 }
 

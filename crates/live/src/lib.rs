@@ -7,19 +7,19 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod feed;
+#[cfg(feature = "foxglove")]
+mod foxglove_stream;
 mod live;
 mod live_error;
 mod live_run;
 mod observers;
 mod operator_commands;
 mod state;
-#[cfg(feature = "foxglove")]
-mod viewers;
 mod web_server;
 
+#[cfg(feature = "foxglove")]
+pub use foxglove_stream::{FoxgloveStream, FoxgloveStreamError};
 pub use live_error::LiveError;
 pub use live_run::LiveRun;
 pub use observers::{ObserverRequest, Observers};
-#[cfg(feature = "foxglove")]
-pub use viewers::{Viewers, ViewersError};
 pub use web_server::tls::{TlsError, TlsFiles};

@@ -6,7 +6,7 @@ use crate::live_run::LiveRun;
 use crate::operator_commands::OperatorCommand;
 use crate::web_server::access::Access;
 use crate::web_server::hub::Hub;
-use crate::web_server::server::{Served, serve};
+use crate::web_server::server::{ServedContent, serve};
 use crate::web_server::tls::{Tls, TlsFiles, read};
 use mapper_report::page::live_page;
 use mapper_session::SessionEvent;
@@ -24,7 +24,7 @@ pub struct Live {
     address: SocketAddr,
     token: Option<String>,
     tls: Option<Tls>,
-    started: OnceLock<(Arc<Feed>, Arc<Served>)>,
+    started: OnceLock<(Arc<Feed>, Arc<ServedContent>)>,
 }
 
 impl Live {
@@ -59,7 +59,7 @@ impl Live {
         )
     }
 
-    /// Starts to serve.
+    /// Starts the server.
     ///
     /// # Errors
     /// [`LiveError::Page`]: none in practice.
@@ -71,14 +71,14 @@ impl Live {
         let feed_for_snapshots = feed.clone();
         let (operator, after_step, now) = (run.operator.clone(), run.after_step.clone(), run.now.clone());
         let feed_for_commands = feed.clone();
-        let served = Arc::new(Served {
+        let served = Arc::new(ServedContent {
             page: live_page()?,
             access: Access::new(self.address, self.token.clone(), self.tls.is_some()),
             tls: self.tls.clone(),
             hub: Hub::default(),
             snapshot: Box::new(move || feed_for_snapshots.snapshot()),
-            ask: Box::new(move |asked| {
-                let what = match asked {
+            ask: Box::new(move |command| {
+                let effect = match command {
                     OperatorCommand::Hold => {
                         operator.hold();
                         "the step is held"
@@ -97,8 +97,8 @@ impl Live {
                         "the rig goes into its safe state now"
                     }
                 };
-                operator.add_message(format!("operator, on the live page: {what}"));
-                feed_for_commands.show_command(asked);
+                operator.add_message(format!("operator, on the live page: {effect}"));
+                feed_for_commands.show_command(command);
             }),
             connections: Arc::default(),
         });
@@ -120,13 +120,13 @@ impl Live {
         }
     }
 
-    /// Reports the outcome and the run's page, and gives browsers a moment to receive them.
+    /// Reports the outcome and the run's page, and waits briefly until browsers have received them.
     pub fn end(&self, outcome: &str, page: Option<&std::path::Path>) {
         let Some((feed, served)) = self.started.get() else { return };
         served.hub.publish(&feed.show_end(outcome, page));
         served.hub.close();
-        let until = Instant::now() + CLOSE_TIMEOUT;
-        while served.connections.any_open() && Instant::now() < until {
+        let deadline = Instant::now() + CLOSE_TIMEOUT;
+        while served.connections.any_open() && Instant::now() < deadline {
             std::thread::sleep(Duration::from_millis(5));
         }
     }

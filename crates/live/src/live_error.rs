@@ -29,8 +29,8 @@ pub enum LiveError {
     /// Certificate or key are unusable.
     #[error(transparent)]
     Tls(#[from] TlsError),
-    /// The stream for viewers cannot be served.
+    /// The Foxglove stream cannot be served.
     #[cfg(feature = "foxglove")]
     #[error(transparent)]
-    Viewers(#[from] crate::viewers::ViewersError),
+    Foxglove(#[from] crate::foxglove_stream::FoxgloveStreamError),
 }

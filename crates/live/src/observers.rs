@@ -1,10 +1,10 @@
-//! All observers of a run: browsers on its live page, and viewers of its readings.
+//! All observers of a run: browsers on its live page, and the Foxglove stream.
 
+#[cfg(feature = "foxglove")]
+use crate::foxglove_stream::FoxgloveStream;
 use crate::live::Live;
 use crate::live_error::LiveError;
 use crate::live_run::LiveRun;
-#[cfg(feature = "foxglove")]
-use crate::viewers::Viewers;
 use crate::web_server::tls::TlsFiles;
 use mapper_session::SessionEvent;
 use std::path::Path;
@@ -20,16 +20,16 @@ pub struct ObserverRequest<'a> {
     pub tls: Option<TlsFiles>,
     /// Address of the stream for Foxglove and Lichtblick.
     #[cfg(feature = "foxglove")]
-    pub viewers: Option<&'a str>,
+    pub foxglove: Option<&'a str>,
 }
 
 /// The observers, possibly none.
 pub struct Observers<'a> {
     page: Option<Live>,
     #[cfg(feature = "foxglove")]
-    viewers: OnceLock<Viewers>,
+    foxglove: OnceLock<FoxgloveStream>,
     // Without the feature only the page uses it.
-    #[cfg_attr(not(feature = "foxglove"), expect(dead_code, reason = "viewers use it"))]
+    #[cfg_attr(not(feature = "foxglove"), expect(dead_code, reason = "the Foxglove stream uses it"))]
     asked: ObserverRequest<'a>,
 }
 
@@ -43,7 +43,7 @@ impl<'a> Observers<'a> {
         Ok(Observers {
             page,
             #[cfg(feature = "foxglove")]
-            viewers: OnceLock::new(),
+            foxglove: OnceLock::new(),
             asked,
         })
     }
@@ -56,7 +56,7 @@ impl<'a> Observers<'a> {
     /// Whether any observer shows points as they are identified.
     pub fn show_points(&self) -> bool {
         #[cfg(feature = "foxglove")]
-        if self.asked.viewers.is_some() {
+        if self.asked.foxglove.is_some() {
             return true;
         }
         self.page.is_some()
@@ -74,11 +74,11 @@ impl<'a> Observers<'a> {
             lines.push(format!("live page: {}", page.url()));
         }
         #[cfg(feature = "foxglove")]
-        if let Some(address) = self.asked.viewers {
-            let viewers = Viewers::open(address, run.start_time_ns, run.channels)?;
-            lines.push(format!("for Foxglove and Lichtblick: {}", viewers.url()));
+        if let Some(address) = self.asked.foxglove {
+            let stream = FoxgloveStream::open(address, run.start_time_ns, run.channels)?;
+            lines.push(format!("for Foxglove and Lichtblick: {}", stream.url()));
             // This is the only start.
-            let _ = self.viewers.set(viewers);
+            let _ = self.foxglove.set(stream);
         }
         Ok(lines)
     }
@@ -89,8 +89,8 @@ impl<'a> Observers<'a> {
             page.show(event);
         }
         #[cfg(feature = "foxglove")]
-        if let Some(viewers) = self.viewers.get() {
-            viewers.show(event);
+        if let Some(stream) = self.foxglove.get() {
+            stream.show(event);
         }
     }
 

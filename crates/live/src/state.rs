@@ -33,7 +33,7 @@ pub(crate) struct State {
     /// Speed lines and contours of the points so far.
     pub(crate) map: LiveMap,
     pub(crate) events: VecDeque<LoggedMessage>,
-    pub(crate) now: Now,
+    pub(crate) now: CurrentValues,
     pub(crate) outcome: Option<String>,
     pub(crate) page: Option<String>,
 }
@@ -52,7 +52,7 @@ pub(crate) struct LoggedMessage {
 
 /// Values that change every second.
 #[derive(Debug, Clone, Default, Serialize)]
-pub(crate) struct Now {
+pub(crate) struct CurrentValues {
     pub(crate) t_s: f64,
     /// Current activity, in words.
     pub(crate) phase: String,

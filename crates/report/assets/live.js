@@ -144,7 +144,7 @@ const take = {
     page.map = m.map;
     drawMap();
   },
-  told: addEvent,
+  event: addEvent,
   end(e) { ended(e.outcome, e.page); },
 };
 

@@ -170,7 +170,7 @@ fn guards() -> Vec<Box<dyn Guard>> {
 fn run(guards: Vec<Box<dyn Guard>>) -> Result<(f64, u64, Hour), mapper_runner::RunError> {
     let (plan, mut seen) = (plan(), Counts::default());
     let mut rig = Hour { next: 0, violated: None, safe: None };
-    let begun = Instant::now();
+    let start = Instant::now();
     Runner {
         steps: &mut PlanSteps::new(&plan),
         backend: &mut rig,
@@ -181,7 +181,7 @@ fn run(guards: Vec<Box<dyn Guard>>) -> Result<(f64, u64, Hour), mapper_runner::R
         stop: &AtomicBool::new(false),
     }
     .run_under(&Protection { each_sample: true, ..Protection::default() })?;
-    Ok((begun.elapsed().as_secs_f64(), seen.0, rig))
+    Ok((start.elapsed().as_secs_f64(), seen.0, rig))
 }
 
 fn main() -> Result<(), mapper_runner::RunError> {

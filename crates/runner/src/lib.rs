@@ -14,7 +14,7 @@ pub mod surge;
 pub use backends::auxiliary_instruments::{AuxiliaryInstrument, RigWithInstruments};
 pub use backends::deadline::{DeadlineBackend, Deadlines};
 pub use guards::batch_watch::BatchWatch;
-pub use guards::guard::{Commanded, Guard, Trip};
+pub use guards::guard::{CommandedState, Guard, Trip};
 pub use guards::instrument_watch::{InstrumentChannel, InstrumentWatch};
 pub use guards::plausibility_watch::{PlausibilityWatch, ReadingBounds};
 pub use guards::rig_watch::RigWatch;

@@ -57,7 +57,7 @@ impl RunObserver for Answers {
     fn on_event(&mut self, _: &Event) -> Result<(), ObserverError> {
         // Later events have no receiver.
         let _ = self.sender.send(());
-        if self.fails { Err(ObserverError::of(std::io::Error::other("the disk is full"))) } else { Ok(()) }
+        if self.fails { Err(ObserverError::new(std::io::Error::other("the disk is full"))) } else { Ok(()) }
     }
 }
 

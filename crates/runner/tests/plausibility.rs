@@ -1,10 +1,11 @@
 //! Plausible readings of jumps, surge and standstill stay good; jumps faster than the sensor's lag are bad while they last.
 
 use mapper_core::{Channel, ChannelColumn, Element, ElementColumn, Quality, Reaction, SampleBatch};
-use mapper_runner::{Commanded, PlausibilityWatch, ReadingBounds, Trip};
+use mapper_runner::{CommandedState, PlausibilityWatch, ReadingBounds, Trip};
 
 const INTERVAL_S: f64 = 0.1;
-const RUNNING: Commanded = Commanded { running: true, step_since_s: None, aim: None, jumped_s: None };
+const RUNNING: CommandedState =
+    CommandedState { running: true, step_since_s: None, aim: None, jumped_s: None };
 
 /// A steady point: pressure ratio 1.8, efficiency 70 %.
 const STEADY: [(Channel, f64); 8] = [

@@ -100,7 +100,7 @@ impl RunObserver for Notebook {
         }
         match self.fail_at_s {
             Some(fail_s) if now_s >= fail_s => {
-                Err(ObserverError::of(std::io::Error::other("the disk is full")))
+                Err(ObserverError::new(std::io::Error::other("the disk is full")))
             }
             _ => Ok(()),
         }

@@ -253,9 +253,10 @@ fn run(text: &str, parent: &Path, real_time: bool, stop_at: usize, resume: Optio
     let steps = &prepared.plan().steps;
     LOG.lock().unwrap().steps =
         steps.iter().map(|step| (step.p3_pa, step.to.valve_opening_ratio, step.to.speed_rpm)).collect();
-    let outcome = match real_time {
-        true => prepared.run_paced(&session, &mut PacedClock::new(Clock(Instant::now()), 1.0), true),
-        false => prepared.run_paced(&session, &mut UnpacedClock, true),
+    let outcome = if real_time {
+        prepared.run_paced(&session, &mut PacedClock::new(Clock(Instant::now()), 1.0), true)
+    } else {
+        prepared.run_paced(&session, &mut UnpacedClock, true)
     }
     .unwrap();
     let (drive_cpu_s, drive_s) = *cost.lock().unwrap();

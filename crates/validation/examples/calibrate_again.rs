@@ -6,7 +6,7 @@
 
 #![allow(clippy::print_stdout)]
 
-use mapper_validation::studies::calibrated;
+use mapper_validation::studies::fit_calibration;
 use std::path::Path;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -15,7 +15,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         return Err("usage: calibrate_again OBSERVED MADE_BY OUT".into());
     };
     let observed = serde_json::from_str::<Vec<_>>(&std::fs::read_to_string(observed)?)?;
-    let made = calibrated(&observed, made_by.clone())?;
+    let made = fit_calibration(&observed, made_by.clone())?;
     for (name, text) in &made.files {
         std::fs::write(Path::new(out).join(name), text)?;
     }

@@ -1,4 +1,4 @@
-//! The source tree as the rules see it: packages, their production files, and the modules that name each other.
+//! The source tree for the rules of the repository: packages, production files, and dependencies between modules.
 
 mod files;
 mod modules;

@@ -1,4 +1,4 @@
-//! Dependencies between the files of a crate, and the circles among them.
+//! Dependencies between the files of a crate, and their cycles.
 
 use super::files::Package;
 use super::parsed::{Module, ModulePath, read_crate};
@@ -8,21 +8,21 @@ use petgraph::graphmap::DiGraphMap;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Files that need each other: none can be read, moved or tested without the rest.
+/// Files that depend on each other, so that none can be read, moved or tested alone.
 pub type Circle = Vec<String>;
 
-/// Imports that lead to imports that lead to imports: more is a circle of its own.
+/// Maximum length of a chain of re-exports; a longer chain is a cycle.
 const DEEPEST_IMPORT: usize = 16;
 
-/// Circles among the files of a package, each a sorted list of paths from its `src`.
+/// Cycles among the files of a package, each a sorted list of paths relative to its `src`.
 ///
-/// A file names another where it uses something that is defined there: what a `lib.rs` or `mod.rs` only passes on
-/// belongs to the file that defines it, and passing on is not using. Declaring a module is not using it either.
+/// A file depends on another if it uses something that is defined there. A re-export in `lib.rs` or `mod.rs` counts as a use of the file
+/// with the definition; the re-export itself and the declaration of a module are not uses.
 pub fn circles(package: &Package) -> Vec<Circle> {
     circles_below(&repository().join(&package.folder).join("src"), &package.roots)
 }
 
-/// As [`circles`], for any sources with these roots.
+/// As [`circles`], for sources with these root files.
 pub fn circles_below(src: &Path, roots: &[PathBuf]) -> Vec<Circle> {
     let mut circles = Vec::new();
     for root in roots {
@@ -44,13 +44,13 @@ pub fn circles_below(src: &Path, roots: &[PathBuf]) -> Vec<Circle> {
     circles
 }
 
-/// All pairs of files of which the first names something of the second.
+/// All pairs of files in which the first uses a definition of the second.
 fn edges(modules: &BTreeMap<ModulePath, Module>) -> Vec<(&Path, &Path)> {
     let mut edges = Vec::new();
     for (path, module) in modules {
         let imported = module.imports.iter().filter_map(|import| {
             let target = resolve(modules, path, &import.target, 0)?;
-            // Passing on what is below.
+            // A re-export of a submodule.
             let is_below = target.len() > path.len() && target.starts_with(path);
             (!(import.is_public && is_below)).then_some(target)
         });
@@ -65,7 +65,7 @@ fn edges(modules: &BTreeMap<ModulePath, Module>) -> Vec<(&Path, &Path)> {
     edges
 }
 
-/// The module that defines what is named; `None` for names of other crates.
+/// The module with the definition of a name; `None` for names of other crates.
 fn resolve(
     modules: &BTreeMap<ModulePath, Module>,
     from: &ModulePath,
@@ -73,9 +73,9 @@ fn resolve(
     depth: usize,
 ) -> Option<ModulePath> {
     let mut at = from.clone();
-    let mut rest = names;
+    let mut remaining = names;
     let mut is_here = false;
-    while let Some((first, others)) = rest.split_first() {
+    while let Some((first, others)) = remaining.split_first() {
         match first.as_str() {
             "crate" => at = Vec::new(),
             "self" => {}
@@ -85,9 +85,9 @@ fn resolve(
             _ => break,
         }
         is_here = true;
-        rest = others;
+        remaining = others;
     }
-    let Some((first, others)) = rest.split_first() else { return is_here.then_some(at) };
+    let Some((first, others)) = remaining.split_first() else { return is_here.then_some(at) };
     let module = modules.get(&at)?;
     let inner = [at.clone(), vec![first.clone()]].concat();
     if modules.contains_key(&inner) {
@@ -102,7 +102,7 @@ fn resolve(
     if depth == DEEPEST_IMPORT {
         return None;
     }
-    // An import of the same name from elsewhere would be found again and again: `use rand; rand::random()`.
+    // Without this condition, an external import of the same name would recurse endlessly: `use rand; rand::random()`.
     let named = module.imports.iter().filter(|import| import.alias.as_ref() == Some(first));
     for import in named.filter(|import| import.target.first() != Some(first) || import.target.len() > 1) {
         let target = [&import.target, others].concat();
@@ -111,5 +111,5 @@ fn resolve(
         }
     }
     let mut globs = module.imports.iter().filter(|import| import.alias.is_none());
-    globs.find_map(|glob| resolve(modules, &at, &[&glob.target[..], rest].concat(), depth + 1))
+    globs.find_map(|glob| resolve(modules, &at, &[&glob.target[..], remaining].concat(), depth + 1))
 }

@@ -1,4 +1,4 @@
-//! One crate read with `syn`: its modules, what each defines, imports and names. Tests are left out.
+//! A crate parsed with `syn`: its modules with their definitions, imports and references. Tests are omitted.
 
 use proc_macro2::{TokenStream, TokenTree};
 use quote::ToTokens;
@@ -13,22 +13,22 @@ pub(super) type ModulePath = Vec<String>;
 pub(super) struct Import {
     /// Its local name; `None` for a glob.
     pub alias: Option<String>,
-    /// What is written.
+    /// The path as written.
     pub target: Vec<String>,
-    /// Whether others see it through this module.
+    /// Whether the module exports it.
     pub is_public: bool,
 }
 
-/// A module, whether a file or written in one.
+/// A module: a file, or a module inside a file.
 pub(super) struct Module {
     pub file: PathBuf,
     pub items: BTreeSet<String>,
     pub imports: Vec<Import>,
-    /// Paths of two and more names in its code.
+    /// Paths with at least two names in its code.
     pub names: Vec<Vec<String>>,
 }
 
-/// Every module of the crate whose root is this file.
+/// All modules of the crate with this root file.
 pub(super) fn read_crate(root: &Path) -> BTreeMap<ModulePath, Module> {
     let mut modules = BTreeMap::new();
     let folder = root.parent().unwrap().to_owned();
@@ -36,7 +36,7 @@ pub(super) fn read_crate(root: &Path) -> BTreeMap<ModulePath, Module> {
     modules
 }
 
-/// `folder` is where the modules that the file declares lie.
+/// `folder`: location of the modules that the file declares.
 fn read_file(file: &Path, folder: &Path, path: ModulePath, modules: &mut BTreeMap<ModulePath, Module>) {
     let text = std::fs::read_to_string(file).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
     let parsed = syn::parse_file(&text).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
@@ -83,7 +83,7 @@ fn read_items(
     modules.insert(path, module);
 }
 
-/// Flattens a tree of imports.
+/// Flattens a tree of imports into single imports.
 fn imports(tree: &UseTree, before: &mut Vec<String>, is_public: bool, found: &mut Vec<Import>) {
     let mut import = |alias: Option<String>, target: Vec<String>| {
         found.push(Import { alias, target, is_public });
@@ -112,7 +112,7 @@ fn imports(tree: &UseTree, before: &mut Vec<String>, is_public: bool, found: &mu
     }
 }
 
-/// Paths in tokens, so that those in macros are seen too; imports in functions count as imports of their module.
+/// Collects paths from tokens, so that macros are included. Imports inside functions count as imports of their module.
 fn names(tokens: TokenStream, module: &mut Module) {
     let tokens: Vec<TokenTree> = tokens.into_iter().collect();
     let mut at = 0;

@@ -5,7 +5,8 @@ use crate::interrupted::Running;
 use mapper_core::EventKind;
 use mapper_recording::{ChannelMap, ReadOptions, read_recording};
 use mapper_tests::{
-    BY_ITSELF, CampaignFile, Finished, SHORT_GRID, build_drivers, made_once, mapper_command, repository,
+    CampaignFile, Finished, SHORT_GRID, SINGLE_STEP_METHOD, build_drivers, mapper_command, repository,
+    shared_run,
 };
 use notify::{RecursiveMode, Watcher};
 use serde_json::Value;
@@ -17,7 +18,7 @@ use std::time::{Duration, Instant};
 /// The shipped campaign on four points, each step by itself, with another backend.
 pub(crate) fn short(backend: &str) -> CampaignFile {
     let own = [("  virtual_lab: {}", backend)];
-    let replacements: Vec<_> = SHORT_GRID.iter().chain(BY_ITSELF).chain(&own).copied().collect();
+    let replacements: Vec<_> = SHORT_GRID.iter().chain(SINGLE_STEP_METHOD).chain(&own).copied().collect();
     CampaignFile::shipped_with(&replacements)
 }
 
@@ -64,7 +65,7 @@ fn check(name: &str, campaign: &CampaignFile) {
 fn the_lab_behind_its_driver_gives_the_points_of_the_lab() {
     let built_in = short("  virtual_lab: {}");
     let behind = lab(&built_in, "");
-    let (expected, found) = (made_once(&built_in).result, run(&behind));
+    let (expected, found) = (shared_run(&built_in).result, run(&behind));
     assert_eq!(expected["points"].as_array().unwrap().len(), 4);
     assert_eq!(found["points"], expected["points"]);
 }
@@ -93,7 +94,7 @@ fn a_driver_at_a_socket_is_found_and_gives_the_points_of_the_lab() {
     let runs = behind.runs();
     let run =
         ["run".as_ref(), behind.path.as_os_str(), "--json".as_ref(), "--out".as_ref(), runs.as_os_str()];
-    assert_eq!(with(&run).json()["points"], made_once(&built_in).result["points"]);
+    assert_eq!(with(&run).json()["points"], shared_run(&built_in).result["points"]);
     drop(listening);
 }
 
@@ -220,7 +221,7 @@ fn running_lab_at(rate: &str) -> (Running, CampaignFile, CampaignFile, std::path
     build_drivers();
     let built_in = short(&format!("  virtual_lab: {{sample_rate: {rate}}}"));
     let file = built_in.directory().join("commands.txt");
-    let campaign = lab(&built_in, &format!(", real_time: true, told: {}", file.display()));
+    let campaign = lab(&built_in, &format!(", real_time: true, command_log: {}", file.display()));
     let running = Running::start_with(&campaign, &[]);
     commands(&file, |text| text.contains("set air on"));
     (running, campaign, built_in, file)
@@ -263,7 +264,7 @@ fn a_resumed_runner_records_the_samples_that_it_missed() {
     running.signal("STOP");
     commands(&file, |text| text.contains("make safe"));
     running.signal("CONT");
-    let finished = running.finished();
+    let finished = running.wait();
     assert_eq!(finished.code, Some(5), "{}", finished.stderr);
     let recording = mapper_tests::only_run(&campaign.runs()).join("recording.mcap");
     let report = read_recording(&recording, &ChannelMap::native(), &ReadOptions::default()).unwrap();

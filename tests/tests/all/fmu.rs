@@ -1,6 +1,6 @@
 //! The machine as an FMU, run by FMPy.
 
-use mapper_tests::{CampaignFile, SHIPPED, SHORT_GRID, made_once, mapper, python, repository, scratch};
+use mapper_tests::{CampaignFile, SHIPPED, SHORT_GRID, mapper, python, repository, scratch, shared_run};
 use serde_json::Value;
 use std::ffi::OsStr;
 use std::path::Path;
@@ -48,7 +48,7 @@ fn fmpy_replays_the_reference_transients() {
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn an_identified_machine_reproduces_its_points() {
     let scratch = scratch();
-    let run = made_once(&CampaignFile::shipped_with(&[])).run;
+    let run = shared_run(&CampaignFile::shipped_with(&[])).run;
     let file = scratch.path().join("identified.fmu");
     let written = fmu(&run, &file, &["--compile", "--json"]).exits(0).json();
     assert!(written["origin"].as_str().unwrap().contains("heat transfer as identified"), "{written}");
@@ -97,7 +97,7 @@ fn invalid_machines_are_refused_with_a_reason() {
     let scratch = scratch();
     let out = scratch.path().join("x.fmu");
     // Four points are too few for a map.
-    let run = made_once(&CampaignFile::shipped_with(SHORT_GRID)).run;
+    let run = shared_run(&CampaignFile::shipped_with(SHORT_GRID)).run;
     let refused = fmu(&run, &out, &[]).exits(3);
     assert!(refused.stderr.contains("an FMU needs a map of the whole machine"), "{}", refused.stderr);
     assert!(!out.exists());

@@ -2,7 +2,7 @@
 
 use crate::fleet::{fleet, make, write_study};
 use mapper_tests::{
-    BY_ITSELF, CampaignFile, Finished, SHORT_GRID, mapper, mapper_command, only_run, scratch,
+    CampaignFile, Finished, SHORT_GRID, SINGLE_STEP_METHOD, mapper, mapper_command, only_run, scratch,
 };
 use std::process::Command;
 
@@ -19,7 +19,7 @@ exit $code
 #[cfg_attr(not(with_tmpfs), ignore = "mounts a small tmpfs: run `cargo xtask test` as root")]
 fn a_full_disk_is_reported_and_the_flushed_data_are_readable() {
     // Without the rest at the start, which alone would fill the disk.
-    let replacements: Vec<_> = SHORT_GRID.iter().chain(BY_ITSELF).copied().collect();
+    let replacements: Vec<_> = SHORT_GRID.iter().chain(SINGLE_STEP_METHOD).copied().collect();
     let campaign = CampaignFile::shipped_with(&replacements);
     let (disk, kept) = (campaign.directory().join("disk"), campaign.directory().join("kept"));
     std::fs::create_dir(&disk).unwrap();
@@ -50,7 +50,7 @@ fn a_full_disk_is_reported_and_the_flushed_data_are_readable() {
 #[test]
 #[cfg_attr(not(with_tmpfs), ignore = "mounts a small tmpfs: run `cargo xtask test` as root")]
 fn a_disk_that_fills_up_at_the_page_loses_only_the_page() {
-    let replacements: Vec<_> = SHORT_GRID.iter().chain(BY_ITSELF).copied().collect();
+    let replacements: Vec<_> = SHORT_GRID.iter().chain(SINGLE_STEP_METHOD).copied().collect();
     let campaign = CampaignFile::shipped_with(&replacements);
     let runs = campaign.runs();
     mapper(["run".as_ref(), campaign.path.as_os_str(), "--out".as_ref(), runs.as_os_str()]).exits(0);

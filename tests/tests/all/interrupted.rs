@@ -11,14 +11,14 @@ use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
-/// A day of the rig's time: far from over when the recording holds a few steps.
+/// A day of rig time: the run is far from its end when the recording has a few steps.
 const LONG: &[(&str, &str)] = &[
     ("warm_up: 2 min ", "warm_up: 60 s "),
-    // The order is not what is tried here, and its search would take most of the time.
+    // This test does not need an optimised order, and the search would take most of its time.
     ("order: thermal_gradient ", "order: listed "),
     ("dwell: 40 s ", "dwell: 10 min "),
 ];
-/// About fifty minutes of the rig's time, two steps of ten minutes.
+/// About fifty minutes of rig time with two steps of ten minutes.
 const SOME_STEPS_BYTES: u64 = 13_500_000;
 /// The test fails if the recording does not grow for this time: a run writes each second of its own clock, thousands of
 /// which take a second.
@@ -28,9 +28,9 @@ const LONGEST_SILENCE: Duration = Duration::from_secs(120);
 pub(crate) struct Running {
     child: Option<Child>,
     runs: PathBuf,
-    /// Ends the news where it is dropped.
+    /// Ends the events when it is dropped.
     _watcher: RecommendedWatcher,
-    news: Receiver<notify::Result<notify::Event>>,
+    file_events: Receiver<notify::Result<notify::Event>>,
 }
 
 impl Running {
@@ -40,8 +40,8 @@ impl Running {
 
     /// Starts a run with further options, with locks and latches of its own.
     pub(crate) fn start_with(campaign: &CampaignFile, more: &[&str]) -> Self {
-        // Watched before it starts, so that no news is missed.
-        let (sender, news) = channel();
+        // Watched before it starts, so that no event is missed.
+        let (sender, file_events) = channel();
         let mut watcher = notify::recommended_watcher(sender).unwrap();
         watcher.watch(campaign.directory(), RecursiveMode::Recursive).unwrap();
         let child = mapper_command(["run".as_ref(), campaign.path.as_os_str(), "--json".as_ref()])
@@ -53,13 +53,13 @@ impl Running {
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();
-        Running { child: Some(child), runs: campaign.runs(), _watcher: watcher, news }
+        Running { child: Some(child), runs: campaign.runs(), _watcher: watcher, file_events }
     }
 
     /// Waits until the recording has grown to `bytes`; the run must still be going on.
-    pub(crate) fn recorded(&mut self, bytes: u64) -> PathBuf {
+    pub(crate) fn wait_for_recording(&mut self, bytes: u64) -> PathBuf {
         loop {
-            self.news.recv_timeout(LONGEST_SILENCE).expect("the recording grows").unwrap();
+            self.file_events.recv_timeout(LONGEST_SILENCE).expect("the recording grows").unwrap();
             let ended = self.child.as_mut().unwrap().try_wait().unwrap();
             assert_eq!(ended, None, "the run was over before it could be stopped");
             let run = self.runs.read_dir().ok().and_then(|mut runs| runs.next()).and_then(Result::ok);
@@ -78,7 +78,7 @@ impl Running {
     }
 
     /// Waits until the process has a handler for SIGINT.
-    pub(crate) fn watches_for_signals(&self) {
+    pub(crate) fn wait_for_signal_handler(&self) {
         loop {
             let status = std::fs::read_to_string(format!("/proc/{}/status", self.id())).unwrap();
             let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap().trim();
@@ -96,13 +96,13 @@ impl Running {
         assert!(status.unwrap().success());
     }
 
-    /// Waits until the run prints these words on its standard error; what follows them stays there.
-    pub(crate) fn prints(&mut self, words: &str) {
+    /// Waits until the run prints this text on its standard error; the remaining output stays in the pipe.
+    pub(crate) fn wait_for_output(&mut self, text: &str) {
         let stderr = self.child.as_mut().unwrap().stderr.as_mut().unwrap();
         let (mut printed, mut byte) = (Vec::new(), [0]);
-        while !printed.ends_with(words.as_bytes()) {
+        while !printed.ends_with(text.as_bytes()) {
             let read = stderr.read_exact(&mut byte);
-            assert!(read.is_ok(), "`{words}` is not in {}", String::from_utf8_lossy(&printed));
+            assert!(read.is_ok(), "`{text}` is not in {}", String::from_utf8_lossy(&printed));
             printed.extend(byte);
         }
     }
@@ -114,7 +114,7 @@ impl Running {
         assert_eq!(status.code(), None, "the run ended by itself: {status}");
     }
 
-    pub(crate) fn finished(mut self) -> Finished {
+    pub(crate) fn wait(mut self) -> Finished {
         self.child.take().unwrap().wait_with_output().unwrap().into()
     }
 }
@@ -135,7 +135,7 @@ fn read(recording: &Path) -> ReadReport {
 fn killed_run() -> (CampaignFile, PathBuf) {
     let campaign = CampaignFile::shipped_with(LONG);
     let mut running = Running::start(&campaign);
-    let recording = running.recorded(SOME_STEPS_BYTES);
+    let recording = running.wait_for_recording(SOME_STEPS_BYTES);
     running.kill();
     (campaign, recording)
 }
@@ -169,9 +169,9 @@ fn the_recording_of_a_killed_run_is_readable_and_identified() {
 fn an_interrupt_makes_the_rig_safe_and_keeps_the_finished_steps() {
     let campaign = CampaignFile::shipped_with(LONG);
     let mut running = Running::start(&campaign);
-    let recording = running.recorded(SOME_STEPS_BYTES);
+    let recording = running.wait_for_recording(SOME_STEPS_BYTES);
     running.signal("INT");
-    let finished = running.finished().exits(130);
+    let finished = running.wait().exits(130);
     assert!(finished.stderr.contains("stopped by the operator"), "{}", finished.stderr);
     let result = finished.json();
     let points = result["points"].as_array().unwrap();
@@ -186,14 +186,14 @@ fn an_interrupt_makes_the_rig_safe_and_keeps_the_finished_steps() {
         .iter()
         .map(|event| serde_json::to_value(event.kind).unwrap().as_str().unwrap().to_owned())
         .collect();
-    let place = |kind: &str| events.iter().position(|event| event == kind);
+    let index_of = |kind: &str| events.iter().position(|event| event == kind);
     let asked = report
         .recording
         .events
         .iter()
         .position(|event| event.kind == EventKind::Note && event.message.contains("Ctrl-C"));
-    assert!(asked.is_some() && asked < place("interrupted"), "{:#?}", report.recording.events);
-    let (interrupted, safe) = (place("interrupted"), place("safe_state"));
+    assert!(asked.is_some() && asked < index_of("interrupted"), "{:#?}", report.recording.events);
+    let (interrupted, safe) = (index_of("interrupted"), index_of("safe_state"));
     assert!(interrupted.is_some() && safe.is_some(), "{events:?}");
     assert!(only_run(&campaign.runs()).join("points.json").is_file());
 }

@@ -1,6 +1,6 @@
 //! Logs of other programs, written with their own libraries, are inspected, mapped and identified.
 
-use mapper_tests::{CampaignFile, Finished, made_once, mapper, python, repository, scratch};
+use mapper_tests::{CampaignFile, Finished, mapper, python, repository, scratch, shared_run};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -25,7 +25,7 @@ impl Run {
             text = text.replace(old, new);
         }
         let (campaign, directory) = (CampaignFile::of(text), scratch());
-        let recording = made_once(&campaign).run.join("recording.mcap");
+        let recording = shared_run(&campaign).run.join("recording.mcap");
         Run { campaign, recording, directory }
     }
 

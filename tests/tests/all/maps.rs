@@ -1,6 +1,6 @@
 //! Commands on maps, as a user runs them.
 
-use mapper_tests::{CampaignFile, SHORT_GRID, made_once, mapper, python, repository, scratch};
+use mapper_tests::{CampaignFile, SHORT_GRID, mapper, python, repository, scratch, shared_run};
 use serde_json::Value;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -132,7 +132,7 @@ fn a_map_equals_itself() {
 #[test]
 fn a_run_gives_the_turbine_that_the_rig_has_and_its_pictures() {
     let scratch = scratch();
-    let recording = made_once(&CampaignFile::shipped_with(SHORT_GRID)).run;
+    let recording = shared_run(&CampaignFile::shipped_with(SHORT_GRID)).run;
     let out = scratch.path().join("rig");
     let arguments =
         || ["rig".as_ref(), recording.as_os_str(), "--out".as_ref(), out.as_os_str(), "--json".as_ref()];
@@ -187,7 +187,7 @@ fn a_hot_map_is_corrected_in_the_report_and_in_a_file() {
     let by_hand = correct(&sample(), &["--reference", "SAE", "--heat", "100", "--json"]).exits(0).json();
     assert_eq!(by_hand["correction"]["heat_w"], 100.0);
     correct(&sample(), &["--reference", "SAE", "--heat=-1"]).exits(3);
-    let joint = made_once(&CampaignFile::shipped_with(SHORT_GRID)).run.join("map.json");
+    let joint = shared_run(&CampaignFile::shipped_with(SHORT_GRID)).run.join("map.json");
     let refused = correct(&joint, &[]).exits(3);
     assert!(refused.stderr.contains("already exclude heat"), "{}", refused.stderr);
 }

@@ -4,7 +4,9 @@
 use crate::interrupted::Running;
 use mapper_core::{Channel, EventKind};
 use mapper_recording::{ChannelMap, ReadOptions, read_recording};
-use mapper_tests::{BY_ITSELF, CampaignFile, Finished, SHORT_GRID, mapper, mapper_command, only_run};
+use mapper_tests::{
+    CampaignFile, Finished, SHORT_GRID, SINGLE_STEP_METHOD, mapper, mapper_command, only_run,
+};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -87,7 +89,7 @@ fn a_rig_without_its_guards_is_refused() {
 fn soaking(campaign: &CampaignFile) -> (Running, PathBuf) {
     let mut running = Running::start_with(campaign, &["--pace", "50"]);
     // More than its header: the rig is armed.
-    let recording = running.recorded(80_000);
+    let recording = running.wait_for_recording(80_000);
     (running, recording)
 }
 
@@ -118,10 +120,10 @@ fn signals_make_the_rig_safe() {
         if signal == "TERM" {
             running.signal("TSTP");
             running.signal("TTOU");
-            running.recorded(recording.metadata().unwrap().len() + 100_000);
+            running.wait_for_recording(recording.metadata().unwrap().len() + 100_000);
         }
         running.signal(signal);
-        let finished = running.finished().exits(130);
+        let finished = running.wait().exits(130);
         assert!(finished.stderr.contains("stopped by the operator"), "{signal}: {}", finished.stderr);
         let kinds = kinds(&recording);
         assert_eq!(kinds, [EventKind::SoakStarted, EventKind::Interrupted, EventKind::SafeState], "{signal}");
@@ -136,7 +138,7 @@ fn points(result: &Value) -> Vec<&Value> {
 /// The directory of a run that was killed when its recording had so many bytes.
 fn killed_at(campaign: &CampaignFile, bytes: u64) -> PathBuf {
     let mut running = Running::start_with(campaign, &[]);
-    let recording = running.recorded(bytes);
+    let recording = running.wait_for_recording(bytes);
     running.kill();
     recording.parent().unwrap().to_owned()
 }
@@ -146,7 +148,8 @@ fn killed_at(campaign: &CampaignFile, bytes: u64) -> PathBuf {
 #[test]
 fn a_killed_run_is_resumed_with_each_point_once() {
     let campaign = || {
-        let slow: Vec<_> = BY_ITSELF.iter().copied().chain([("dwell: 120 s ", "dwell: 300 s ")]).collect();
+        let slow: Vec<_> =
+            SINGLE_STEP_METHOD.iter().copied().chain([("dwell: 120 s ", "dwell: 300 s ")]).collect();
         short(&slow)
     };
     let whole = done(run_of(&campaign(), &[])).exits(0).json();

@@ -1,6 +1,6 @@
 //! Pages that the program writes, in a browser.
 
-use mapper_tests::{CampaignFile, made_once, mapper, mapper_command, pictures, python, repository, scratch};
+use mapper_tests::{CampaignFile, mapper, mapper_command, pictures, python, repository, scratch, shared_run};
 use std::process::Command;
 
 /// Four points of the gap rig.
@@ -28,7 +28,7 @@ fn a_diagnosis_opens_in_a_browser_with_all_its_pictures() {
         text.replace(from, to)
     });
     let campaign = CampaignFile::of(text);
-    let run = made_once(&campaign).run;
+    let run = shared_run(&campaign).run;
     let scratch = scratch();
     let page = scratch.path().join("gap.html");
     let diagnosed = mapper([
@@ -102,7 +102,7 @@ const NINE_POINTS: &[(&str, &str)] = &[
 
 /// The directory of a run of them.
 fn run_of_nine_points() -> std::path::PathBuf {
-    made_once(&CampaignFile::shipped_with(NINE_POINTS)).run
+    shared_run(&CampaignFile::shipped_with(NINE_POINTS)).run
 }
 
 #[test]

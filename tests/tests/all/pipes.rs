@@ -1,12 +1,12 @@
 //! Output into a pipe: its reader may close it, and it is not a terminal.
 
-use mapper_tests::{BY_ITSELF, CampaignFile, SHORT_GRID, mapper, mapper_command};
+use mapper_tests::{CampaignFile, SHORT_GRID, SINGLE_STEP_METHOD, mapper, mapper_command};
 use std::io::{BufRead, BufReader};
 use std::process::Stdio;
 
 /// Four points: what is printed matters here, not what is searched for.
 fn campaign() -> CampaignFile {
-    CampaignFile::shipped_with(&[SHORT_GRID, BY_ITSELF].concat())
+    CampaignFile::shipped_with(&[SHORT_GRID, SINGLE_STEP_METHOD].concat())
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! The forecasts of a plan agree with runs on the virtual lab, for every order.
 
-use mapper_tests::{BY_ITSELF, CampaignFile, SHORT_GRID, mapper};
+use mapper_tests::{CampaignFile, SHORT_GRID, SINGLE_STEP_METHOD, mapper};
 use serde_json::Value;
 
 /// Six points of the shipped campaign, ordered by `order`.
@@ -18,7 +18,7 @@ fn campaign(order: &str, more: &[(&str, &str)]) -> CampaignFile {
                 },
             )
         })
-        .chain(BY_ITSELF.iter().copied())
+        .chain(SINGLE_STEP_METHOD.iter().copied())
         .chain([("order: thermal_gradient ", order.as_str())])
         .chain(more.iter().copied())
         .collect();

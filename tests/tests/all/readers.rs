@@ -4,8 +4,8 @@
 use mapper_core::{Channel, EventKind, Quality};
 use mapper_recording::{ChannelMap, ReadOptions, ReadReport, read_recording};
 use mapper_tests::{
-    BY_ITSELF, CampaignFile, Finished, SHORT_GRID, build_driver, made_once, mapper, mapper_command, only_run,
-    python,
+    CampaignFile, Finished, SHORT_GRID, SINGLE_STEP_METHOD, build_driver, mapper, mapper_command, only_run,
+    python, shared_run,
 };
 use std::io::{Read, Write};
 use std::net::TcpListener;
@@ -14,7 +14,7 @@ use std::path::Path;
 fn with_readers(readers: &str, more: &[(&str, &str)]) -> CampaignFile {
     let backend = format!("  virtual_lab: {{}}\nreaders:\n{readers}");
     let own = [("  virtual_lab: {}\n", backend.as_str())];
-    let all: Vec<_> = SHORT_GRID.iter().chain(BY_ITSELF).chain(more).chain(&own).copied().collect();
+    let all: Vec<_> = SHORT_GRID.iter().chain(SINGLE_STEP_METHOD).chain(more).chain(&own).copied().collect();
     CampaignFile::shipped_with(&all)
 }
 
@@ -36,7 +36,12 @@ fn a_channel_of_an_instrument_is_in_the_recording_and_the_points() {
     let first = with_readers("  none: {backend: {replay: {}}}\n", &[]);
     // Without the reader, on another seed.
     let plain = CampaignFile::shipped_with(
-        &SHORT_GRID.iter().chain(BY_ITSELF).chain(&[("seed: 1 ", "seed: 9 ")]).copied().collect::<Vec<_>>(),
+        &SHORT_GRID
+            .iter()
+            .chain(SINGLE_STEP_METHOD)
+            .chain(&[("seed: 1 ", "seed: 9 ")])
+            .copied()
+            .collect::<Vec<_>>(),
     );
     run(&plain).exits(0);
     let played = only_run(&plain.runs());
@@ -66,8 +71,9 @@ fn a_channel_of_an_instrument_is_in_the_recording_and_the_points() {
 /// Each mistake is reported with its position before the rig is touched.
 #[test]
 fn mistakes_in_readers_are_reported_with_their_lines() {
-    let other = CampaignFile::shipped_with(&SHORT_GRID.iter().chain(BY_ITSELF).copied().collect::<Vec<_>>());
-    let recording = made_once(&other).run.join("recording.mcap");
+    let other =
+        CampaignFile::shipped_with(&SHORT_GRID.iter().chain(SINGLE_STEP_METHOD).copied().collect::<Vec<_>>());
+    let recording = shared_run(&other).run.join("recording.mcap");
     let replay = format!("{{replay: {{recording: {}}}}}", recording.display());
     for (readers, words) in [
         ("  bench: {backend: {virtual_lab: {}}, channels: [T2]}\n".to_owned(), "is only read"),

@@ -3,7 +3,8 @@
 use mapper_core::{CHANNELS, Group, MODELLED_CHANNELS};
 use mapper_recording::{ChannelMap, ReadOptions, read_recording};
 use mapper_tests::{
-    BY_ITSELF, CampaignFile, SHORT_GRID, made_once, mapper, mapper_command, only_run, python, scratch,
+    CampaignFile, SHORT_GRID, SINGLE_STEP_METHOD, mapper, mapper_command, only_run, python, scratch,
+    shared_run,
 };
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -34,7 +35,7 @@ fn the_same_seed_gives_the_same_bytes_and_another_seed_others() {
         let result = run_into(campaign, &scratch.path().join(out));
         std::fs::read(recording_of(&result)).unwrap()
     };
-    let first = std::fs::read(recording_of(&made_once(&campaign).result)).unwrap();
+    let first = std::fs::read(recording_of(&shared_run(&campaign).result)).unwrap();
     assert!(first == bytes(&campaign.path, "second"), "two runs of one campaign differ");
     let mut replacements = SHORT_GRID.to_vec();
     replacements.push(("seed: 1 ", "seed: 2 "));
@@ -47,7 +48,7 @@ fn simultaneous_runs_have_separate_directories() {
     let scratch = scratch();
     let campaign = CampaignFile::shipped_with(SHORT_GRID);
     let out = scratch.path();
-    let earlier = std::fs::read(recording_of(&made_once(&campaign).result)).unwrap();
+    let earlier = std::fs::read(recording_of(&shared_run(&campaign).result)).unwrap();
     // Started together: at least two of them begin within one second.
     let started: Vec<_> = (0..4)
         .map(|_| {
@@ -77,9 +78,9 @@ fn simultaneous_runs_have_separate_directories() {
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn an_independent_reader_finds_what_the_run_recorded() {
-    let replacements: Vec<_> = SHORT_GRID.iter().chain(BY_ITSELF).copied().collect();
+    let replacements: Vec<_> = SHORT_GRID.iter().chain(SINGLE_STEP_METHOD).copied().collect();
     let campaign = CampaignFile::shipped_with(&replacements);
-    let recording = recording_of(&made_once(&campaign).result);
+    let recording = recording_of(&shared_run(&campaign).result);
     let seen = python("read_recording.py", [&recording]);
     assert_eq!(seen["complete"], true);
 
@@ -109,7 +110,7 @@ fn an_independent_reader_finds_what_the_run_recorded() {
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn an_independent_reader_sees_the_same_values() {
-    let recording = recording_of(&made_once(&CampaignFile::shipped_with(SHORT_GRID)).result);
+    let recording = recording_of(&shared_run(&CampaignFile::shipped_with(SHORT_GRID)).result);
     let theirs = python("columns.py", [&recording]);
     let ours = read_recording(&recording, &ChannelMap::native(), &ReadOptions::default()).unwrap();
     assert_eq!(ours.warnings, []);
@@ -134,7 +135,7 @@ fn an_independent_reader_sees_the_same_values() {
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn identification_does_not_read_the_truth() {
     let scratch = scratch();
-    let recording = recording_of(&made_once(&CampaignFile::shipped_with(SHORT_GRID)).result);
+    let recording = recording_of(&shared_run(&CampaignFile::shipped_with(SHORT_GRID)).result);
     let stripped = scratch.path().join("stripped.mcap");
     let copied = python("strip_truth.py", [&recording, &stripped]);
     assert!(copied["left_out"].as_u64().unwrap() > 5000, "{copied}");
@@ -155,7 +156,7 @@ fn scipy_finds_the_same_efficiency_and_heat_transfer() {
     let scratch = scratch();
     // Once as shipped, once with a share of the area before the wheel, so that eq. 1 counts.
     for (number, alpha) in ["alpha_area: 0  ", "alpha_area: 0.2"].into_iter().enumerate() {
-        let mut replacements: Vec<_> = SHORT_GRID.iter().chain(BY_ITSELF).copied().collect();
+        let mut replacements: Vec<_> = SHORT_GRID.iter().chain(SINGLE_STEP_METHOD).copied().collect();
         // The independent fit is one of dry air by the paper's definition.
         replacements.push(("humidity: 50 %", "humidity: 0 %"));
         replacements.push(("efficiency: enthalpy ", "efficiency: kappa_of_T1 "));
@@ -223,7 +224,7 @@ fn a_stored_plan_is_run_and_a_stale_one_refused() {
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn a_recording_of_another_program_gives_the_same_points() {
     let scratch = scratch();
-    let mut replacements: Vec<_> = SHORT_GRID.iter().chain(BY_ITSELF).copied().collect();
+    let mut replacements: Vec<_> = SHORT_GRID.iter().chain(SINGLE_STEP_METHOD).copied().collect();
     // A channel map alone has no humidity.
     replacements.push(("humidity: 50 %", "humidity: 0 %"));
     // The window that the shipped channel map names.

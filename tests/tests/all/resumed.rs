@@ -2,7 +2,7 @@
 #![cfg(unix)]
 
 use crate::interrupted::Running;
-use mapper_tests::{BY_ITSELF, CampaignFile, SHORT_GRID, mapper, only_run};
+use mapper_tests::{CampaignFile, SHORT_GRID, SINGLE_STEP_METHOD, mapper, only_run};
 use serde_json::Value;
 use std::io::Write;
 use std::path::Path;
@@ -34,7 +34,7 @@ fn assert_resumed(what: &str, campaign: impl Fn() -> CampaignFile) {
     for share in [0.4, 0.75] {
         let campaign = campaign();
         let mut running = Running::start_with(&campaign, &[]);
-        let recording = running.recorded((share * bytes as f64) as u64);
+        let recording = running.wait_for_recording((share * bytes as f64) as u64);
         running.kill();
         let run = recording.parent().unwrap();
         let arguments = ["run".as_ref(), "--resume".as_ref(), run.as_os_str()];
@@ -55,7 +55,7 @@ fn assert_resumed(what: &str, campaign: impl Fn() -> CampaignFile) {
 fn a_killed_script_is_resumed_at_its_step() {
     assert_resumed("sequence", || {
         let replaced = ("seed: 1 ", "sequence: steps/along.rhai\nseed: 1 ");
-        let campaign = short(&BY_ITSELF.iter().copied().chain([replaced]).collect::<Vec<_>>());
+        let campaign = short(&SINGLE_STEP_METHOD.iter().copied().chain([replaced]).collect::<Vec<_>>());
         let folder = campaign.directory().join("steps");
         std::fs::create_dir_all(&folder).unwrap();
         // What was measured decides how long the next one is visited.
@@ -69,19 +69,21 @@ fn a_killed_script_is_resumed_at_its_step() {
 #[test]
 fn a_killed_drift_watch_is_resumed_at_its_step() {
     let drift = ("repeats: off\n", "repeats: {every: 3}\ndrift: {on_drift: continue}\n");
-    assert_resumed("drift", || short(&BY_ITSELF.iter().copied().chain([drift]).collect::<Vec<_>>()));
+    assert_resumed("drift", || short(&SINGLE_STEP_METHOD.iter().copied().chain([drift]).collect::<Vec<_>>()));
 }
 
 #[test]
 fn a_killed_surge_search_restarts_its_line() {
     let search = ("seed: 1 ", "surge_search: {}\nseed: 1 ");
-    assert_resumed("surge_search", || short(&BY_ITSELF.iter().copied().chain([search]).collect::<Vec<_>>()));
+    assert_resumed("surge_search", || {
+        short(&SINGLE_STEP_METHOD.iter().copied().chain([search]).collect::<Vec<_>>())
+    });
 }
 
 /// A journal that names steps as recorded which the recording does not hold: the recording decides, and they are run.
 #[test]
 fn a_step_without_flushed_samples_is_run_again() {
-    let campaign = || short(BY_ITSELF);
+    let campaign = || short(SINGLE_STEP_METHOD);
     let whole = campaign();
     let runs = whole.runs();
     mapper(["run".as_ref(), whole.path.as_os_str(), "--out".as_ref(), runs.as_os_str()]).exits(0);
@@ -101,7 +103,7 @@ fn a_step_without_flushed_samples_is_run_again() {
     mapper(["identify".as_ref(), run.as_os_str()]).exits(3);
     let campaign = campaign();
     let mut running = Running::start_with(&campaign, &[]);
-    let recording = running.recorded((0.4 * bytes as f64) as u64);
+    let recording = running.wait_for_recording((0.4 * bytes as f64) as u64);
     running.kill();
     let run = recording.parent().unwrap();
     let mut journal = std::fs::OpenOptions::new().append(true).open(run.join("journal.jsonl")).unwrap();
@@ -119,7 +121,7 @@ fn a_step_without_flushed_samples_is_run_again() {
 fn a_run_in_progress_is_not_resumed() {
     let campaign = CampaignFile::shipped_with(&[("dwell: 40 s ", "dwell: 10 min ")]);
     let mut running = Running::start_with(&campaign, &[]);
-    let recording = running.recorded(1 << 20);
+    let recording = running.wait_for_recording(1 << 20);
     let run = recording.parent().unwrap();
     mapper(["run".as_ref(), "--resume".as_ref(), run.as_os_str()]).exits(4);
     assert!(!run.join("recording-2.mcap").exists());

@@ -1,7 +1,7 @@
 //! Several sensors of a channel, from the campaign's list to the points.
 
 use mapper_recording::{ChannelMap, ReadOptions, read_recording};
-use mapper_tests::{BY_ITSELF, CampaignFile, SHORT_GRID, mapper, python, scratch};
+use mapper_tests::{CampaignFile, SHORT_GRID, SINGLE_STEP_METHOD, mapper, python, scratch};
 use serde_json::Value;
 use std::path::Path;
 
@@ -17,7 +17,9 @@ fn campaign(sensors: &str, lab: &str) -> CampaignFile {
         ("  virtual_lab: {}\n", lab.as_str()),
         ("  alpha_area: 0       #", "  alpha_area_sigma: 0\n  alpha_area: 0       #"),
     ];
-    CampaignFile::shipped_with(&SHORT_GRID.iter().chain(BY_ITSELF).chain(&own).copied().collect::<Vec<_>>())
+    CampaignFile::shipped_with(
+        &SHORT_GRID.iter().chain(SINGLE_STEP_METHOD).chain(&own).copied().collect::<Vec<_>>(),
+    )
 }
 
 fn run(campaign: &CampaignFile, out: &Path) -> Value {

@@ -2,7 +2,7 @@
 
 use mapper_core::Channel;
 use mapper_recording::{ChannelMap, ReadOptions, read_recording};
-use mapper_tests::{BY_ITSELF, CampaignFile, Finished, SHORT_GRID, mapper, only_run, scratch};
+use mapper_tests::{CampaignFile, Finished, SHORT_GRID, SINGLE_STEP_METHOD, mapper, only_run, scratch};
 use serde_json::Value;
 use std::path::Path;
 
@@ -59,7 +59,7 @@ fn every_example_is_planned_and_run() {
 #[test]
 fn a_script_receives_the_results_of_the_recording() {
     let script = "for p in grid() { jump(p); }\nfor r in results() { note(`eta ${r.step} ${r.eta}`); }\n";
-    let campaign = scripted(script, BY_ITSELF);
+    let campaign = scripted(script, SINGLE_STEP_METHOD);
     let result = run_into(&campaign.path, &campaign.runs()).exits(0).json();
     let report = std::fs::read_to_string(only_run(&campaign.runs()).join("report.md")).unwrap();
     let points = result["points"].as_array().unwrap();

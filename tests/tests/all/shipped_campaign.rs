@@ -1,12 +1,12 @@
 //! The main job: the shipped campaign, from the file to the map.
 
-use mapper_tests::{CampaignFile, MadeOnce, SHIPPED, made_once, mapper};
+use mapper_tests::{CampaignFile, SHIPPED, SharedRun, mapper, shared_run};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-fn shipped() -> MadeOnce {
-    made_once(&CampaignFile::shipped_with(&[]))
+fn shipped() -> SharedRun {
+    shared_run(&CampaignFile::shipped_with(&[]))
 }
 
 /// Keys that scripts rely on, of the one object that `mapper run --json` prints.
@@ -30,7 +30,7 @@ const POINT_KEYS: &[&str] = &[
 
 #[test]
 fn the_shipped_campaign_gives_a_map() {
-    let MadeOnce { run, result, stderr } = shipped();
+    let SharedRun { run, result, stderr } = shipped();
     assert_eq!(stderr, "", "a run into a pipe is quiet");
     for key in RUN_KEYS {
         assert!(!result[key].is_null(), "{key}");
@@ -118,7 +118,7 @@ fn intervals_of_good_points_cover_the_truth_over_seeds() {
     let (mut good, mut right) = (0, 0);
     for seed in 1..=4 {
         let campaign = CampaignFile::shipped_with(&[("seed: 1 ", &format!("seed: {seed} "))]);
-        let result = made_once(&campaign).result;
+        let result = shared_run(&campaign).result;
         for point in result["points"].as_array().unwrap().iter().filter(|point| point["verdict"] == "good") {
             let [low, high] = ["eta_low", "eta_high"].map(|key| point[key].as_f64().unwrap());
             good += 1;
@@ -150,7 +150,7 @@ fn assert_lines_go_from_surge_to_choke(points: &[Value], lines: &BTreeSet<i64>) 
 
 #[test]
 fn identification_of_the_run_directory_gives_the_points_of_the_run() {
-    let MadeOnce { run, result: of_run, .. } = shipped();
+    let SharedRun { run, result: of_run, .. } = shipped();
     let of_directory = mapper(["identify".as_ref(), run.as_os_str(), "--json".as_ref()]).exits(0).json();
     assert_eq!(of_directory["points"], of_run["points"]);
     let file = run.join("recording.mcap");

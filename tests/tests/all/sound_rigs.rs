@@ -1,7 +1,7 @@
 //! Shipped campaigns on the virtual lab without any effect: their diagnosis is within tolerance. Of long ones every second or third point;
 //! `benches/shipped.py` has all points, and twenty seeds of each.
 
-use mapper_tests::{CampaignFile, made_once, mapper, repository};
+use mapper_tests::{CampaignFile, mapper, repository, shared_run};
 use std::path::Path;
 
 fn assert_no_finding(campaign: &str, fewer: &[(&str, &str)]) {
@@ -12,7 +12,7 @@ fn assert_no_finding(campaign: &str, fewer: &[(&str, &str)]) {
         text.replace(from, to)
     });
     let file = CampaignFile::of(text);
-    let recording = made_once(&file).result["recording"].as_str().unwrap().to_owned();
+    let recording = shared_run(&file).result["recording"].as_str().unwrap().to_owned();
     let arguments = ["gap", "diagnose", file.path.to_str().unwrap(), &recording, "--json"];
     let diagnosis = mapper(arguments.map(Path::new)).exits(0).json();
     assert_eq!(diagnosis["verdict"], "within_tolerance", "{campaign}: {}", diagnosis["candidates"][0]);

@@ -1,7 +1,7 @@
 //! Every output of a run uses the same step numbers, from 1.
 
 use mapper_recording::{ReadOptions, read_steps};
-use mapper_tests::{BY_ITSELF, CampaignFile, SHORT_GRID, mapper, only_run};
+use mapper_tests::{CampaignFile, SHORT_GRID, SINGLE_STEP_METHOD, mapper, only_run};
 use serde_json::Value;
 use std::path::Path;
 
@@ -28,7 +28,7 @@ fn in_tables(report: &str) -> Vec<u64> {
 
 #[test]
 fn all_files_of_a_run_use_the_same_step_numbers() {
-    let changes: Vec<(&str, &str)> = SHORT_GRID.iter().chain(BY_ITSELF).copied().collect();
+    let changes: Vec<(&str, &str)> = SHORT_GRID.iter().chain(SINGLE_STEP_METHOD).copied().collect();
     let campaign = CampaignFile::shipped_with(&changes);
     let path = campaign.path.as_os_str();
     let planned = mapper(["plan".as_ref(), path, "--json".as_ref()]).exits(0).json();

@@ -4,11 +4,11 @@
 use crate::interrupted::Running;
 use mapper_core::EventKind;
 use mapper_recording::{ChannelMap, ReadOptions, ReadReport, read_recording};
-use mapper_tests::{BY_ITSELF, CampaignFile, SHORT_GRID, mapper};
+use mapper_tests::{CampaignFile, SHORT_GRID, SINGLE_STEP_METHOD, mapper};
 use std::path::Path;
 
 fn short() -> CampaignFile {
-    CampaignFile::shipped_with(&SHORT_GRID.iter().chain(BY_ITSELF).copied().collect::<Vec<_>>())
+    CampaignFile::shipped_with(&SHORT_GRID.iter().chain(SINGLE_STEP_METHOD).copied().collect::<Vec<_>>())
 }
 
 fn read(recording: &Path) -> ReadReport {
@@ -22,14 +22,14 @@ fn ctrl_c_ends_the_run_after_its_step_and_a_second_one_at_once() {
         let campaign = short();
         let mut running = Running::start_with(&campaign, &["--pace", "30", "--progress", "lines"]);
         // The warm-up is over: the first step is under way.
-        let recording = running.recorded(400_000);
+        let recording = running.wait_for_recording(400_000);
         running.signal("INT");
         if times == 2 {
             // Signals of one kind that wait are one: the first has to be seen.
-            running.prints("stop requested");
+            running.wait_for_output("stop requested");
             running.signal("INT");
         }
-        running.finished().exits(130);
+        running.wait().exits(130);
         let report = read(&recording);
         let kinds: Vec<EventKind> = report.recording.events.iter().map(|event| event.kind).collect();
         assert!(kinds.ends_with(&[EventKind::Interrupted, EventKind::SafeState]), "{kinds:?}");
@@ -56,9 +56,9 @@ fn a_signal_while_planning_ends_the_run_before_it_touches_the_rig() {
             ("  openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", &openings),
         ]);
         let running = Running::start_with(&campaign, &[]);
-        running.watches_for_signals();
+        running.wait_for_signal_handler();
         running.signal(signal);
-        running.finished().exits(130);
+        running.wait().exits(130);
         assert!(!campaign.runs().exists(), "{signal}: nothing was touched");
     }
 }

@@ -1,11 +1,13 @@
 //! Output for users and programs during a run, at its end, and after a failure.
 
-use mapper_tests::{BY_ITSELF, CampaignFile, SHIPPED, SHORT_GRID, mapper, mapper_command, only_run, scratch};
+use mapper_tests::{
+    CampaignFile, SHIPPED, SHORT_GRID, SINGLE_STEP_METHOD, mapper, mapper_command, only_run, scratch,
+};
 use serde_json::Value;
 
 #[test]
 fn a_run_into_a_pipe_prints_a_line_per_step_within_80_columns() {
-    let campaign = CampaignFile::shipped_with(&[SHORT_GRID, BY_ITSELF].concat());
+    let campaign = CampaignFile::shipped_with(&[SHORT_GRID, SINGLE_STEP_METHOD].concat());
     let run = |more: &[&str]| {
         let out = scratch();
         let mut command = mapper_command(["run".as_ref(), campaign.path.as_os_str(), "--out".as_ref()]);

@@ -1,6 +1,6 @@
 //! Identification of finished recordings, single ones and several as one map.
 
-use mapper_tests::{CampaignFile, Finished, SHORT_GRID, made_once, mapper, scratch};
+use mapper_tests::{CampaignFile, Finished, SHORT_GRID, mapper, scratch, shared_run};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ const SPEEDS: &str = "speeds: [50 krpm, 65 krpm, 80 krpm, 95 krpm, 110 krpm, 125
 const OPENINGS: &str = "openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]";
 
 fn run(campaign: &CampaignFile) -> PathBuf {
-    made_once(campaign).run
+    shared_run(campaign).run
 }
 
 fn identify(recordings: &[&Path], more: &[&str]) -> Finished {

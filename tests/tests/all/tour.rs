@@ -1,7 +1,7 @@
 //! Runs every command of the tutorials in docs, in their order.
 
 use crate::pages::FOUR_POINTS;
-use mapper_tests::{CampaignFile, made_once, mapper_in, only_run, python, repository, scratch};
+use mapper_tests::{CampaignFile, mapper_in, only_run, python, repository, scratch, shared_run};
 use std::fs;
 use std::path::Path;
 
@@ -54,9 +54,10 @@ fn copy(from: &Path, to: &Path) {
     fs::create_dir_all(to).unwrap();
     for entry in fs::read_dir(from).unwrap().map(Result::unwrap) {
         let to = to.join(entry.file_name());
-        match entry.file_type().unwrap().is_dir() {
-            true => copy(&entry.path(), &to),
-            false => drop(fs::copy(entry.path(), to).unwrap()),
+        if entry.file_type().unwrap().is_dir() {
+            copy(&entry.path(), &to);
+        } else {
+            fs::copy(entry.path(), to).unwrap();
         }
     }
 }
@@ -74,7 +75,7 @@ const SMALLER: [(&str, &str); 2] = [
 fn run_of_a_day(folder: &Path, day: &str, seed: usize) {
     let seed = format!("seed: {seed} ");
     let campaign = CampaignFile::shipped_with(&[&SMALLER[..], &[("seed: 1 ", seed.as_str())]].concat());
-    copy(&made_once(&campaign).run, &folder.join("runs").join(day));
+    copy(&shared_run(&campaign).run, &folder.join("runs").join(day));
 }
 
 #[test]

@@ -15,7 +15,7 @@ const DECLARED_BY_MACRO: &[&str] =
 pub enum Mode {
     /// Format them.
     Write,
-    /// Fail where one is not formatted.
+    /// Fail if a file is not formatted.
     Check,
 }
 

@@ -19,7 +19,7 @@ pub fn check(offered: &Offered) -> Result<(), Error> {
     copy_files(&workspace::root().join("python/python/mapper"), &package)?;
     let library = workspace::target_dir().join("debug/lib_mapper.so");
     copy(&library, &package.join("_mapper.abi3.so"))?;
-    let of = |arguments: &[&str]| {
+    let python_command = |arguments: &[&str]| {
         let mut command = with_program(command(&offered.python, arguments));
         command
             .env("PYTHONPATH", &home)
@@ -28,27 +28,27 @@ pub fn check(offered: &Offered) -> Result<(), Error> {
         command
     };
     let tests = || {
-        run(of(&["-m", "ruff", "check", "."]))?;
-        run(of(&["-m", "mypy"]))?;
-        run(of(&["-m", "pytest", "--quiet", "-p", "no:cacheprovider"]))
+        run(python_command(&["-m", "ruff", "check", "."]))?;
+        run(python_command(&["-m", "mypy"]))?;
+        run(python_command(&["-m", "pytest", "--quiet", "-p", "no:cacheprovider"]))
     };
     // Run in parallel, because each uses only one processor.
     let (tested, executed) = std::thread::scope(|scope| {
         let tests = scope.spawn(tests);
-        let executed = execute_notebooks(&of);
+        let executed = execute_notebooks(&python_command);
         (tests.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)), executed)
     });
     tested.and(executed)
 }
 
 /// Runs every notebook in its directory; they write into temporary ones.
-fn execute_notebooks(of: &dyn Fn(&[&str]) -> Command) -> Result<(), Error> {
+fn execute_notebooks(python_command: &dyn Fn(&[&str]) -> Command) -> Result<(), Error> {
     let script = "import nbformat, nbclient, sys\n\
                   book = nbformat.read(sys.argv[1], as_version=4)\n\
                   nbclient.NotebookClient(book, timeout=600, kernel_name='python3').execute()";
     let notebooks = workspace::root().join("examples/notebooks");
     for notebook in files(&notebooks)? {
-        let mut execute = of(&["-c", script, &notebook.to_string_lossy()]);
+        let mut execute = python_command(&["-c", script, &notebook.to_string_lossy()]);
         execute.current_dir(&notebooks);
         run(execute)?;
     }

@@ -1,11 +1,11 @@
-//! Counts of tests, from what `cargo test` and `cargo nextest` print.
+//! Counts of tests, from the output of `cargo test` and `cargo nextest`.
 
 /// Sums over the closing lines of all test programs.
 #[derive(Debug, Default, PartialEq)]
 pub struct Tally {
-    /// Tests that held.
+    /// Tests that passed.
     pub passed: usize,
-    /// Tests that did not.
+    /// Tests that failed.
     pub failed: usize,
     /// Tests that were not run.
     pub ignored: usize,
@@ -25,10 +25,11 @@ impl Tally {
         };
         for part in counts.split(['.', ';', ',', '(']) {
             let mut words = part.split_whitespace();
-            let (Some(Ok(number)), Some(what)) = (words.next().map(str::parse::<usize>), words.next()) else {
+            let (Some(Ok(number)), Some(outcome)) = (words.next().map(str::parse::<usize>), words.next())
+            else {
                 continue;
             };
-            match what {
+            match outcome {
                 "passed" => self.passed += number,
                 "failed" | "timed" => self.failed += number,
                 "ignored" | "skipped" => self.ignored += number,

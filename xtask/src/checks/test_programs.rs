@@ -7,8 +7,7 @@ use crate::{environment::machine, workspace};
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Command, Stdio};
 
-/// The tests of the workspace: by nextest if it is installed, which runs them in parallel across all programs, and
-/// by `cargo test` otherwise. `profile` is one of `.config/nextest.toml`; `threads_of` gives its threads on so many cores.
+/// Runs the tests of the workspace with nextest, which runs them in parallel across all programs, or with `cargo test` if nextest is missing. `profile` is one of `.config/nextest.toml`; `threads_of` returns its number of threads for a number of cores.
 pub fn tests(profile: &str, threads_of: impl Fn(usize) -> usize) -> Command {
     if machine::has_nextest() {
         let arguments =
@@ -26,12 +25,12 @@ pub fn tests(profile: &str, threads_of: impl Fn(usize) -> usize) -> Command {
     }
 }
 
-/// The examples in the documentation.
+/// Runs the examples in the documentation.
 pub fn documentation_tests() -> Command {
     step::command(workspace::cargo(), &["test", "--workspace", "--all-features", "--doc", "--no-fail-fast"])
 }
 
-/// Runs a command with its output shown, and counts the tests in it. `Ok(false)` where some failed.
+/// Runs a command with its output shown, and counts the tests in it. `Ok(false)` if some failed.
 pub fn run(mut command: Command, tally: &mut Tally) -> Result<bool, Error> {
     let text = step::line(&command);
     say(&format!("$ {text}\n"));
@@ -47,7 +46,7 @@ pub fn run(mut command: Command, tally: &mut Tally) -> Result<bool, Error> {
         child.stdout.take().map(|stream| Box::new(stream) as _)
     };
     if let Some(report) = report {
-        // By bytes: a test may print anything.
+        // Read as bytes, because a test may print invalid UTF-8.
         for line in BufReader::new(report).split(b'\n').map_while(Result::ok) {
             let line = String::from_utf8_lossy(&line);
             tally.count(&line);

@@ -13,9 +13,9 @@ use std::process::Stdio;
 /// Whether documents are written or compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mode {
-    /// Write them.
+    /// Write the files.
     Write,
-    /// Compare them with what would be written.
+    /// Compare the files with newly generated ones.
     Check,
 }
 
@@ -84,13 +84,13 @@ pub fn docs(mode: Mode) -> Result<(), Error> {
     let names: BTreeSet<&PathBuf> = new.keys().chain(old.keys()).collect();
     let mut differences = Vec::new();
     for name in names {
-        let what = match (new.get(name), old.get(name)) {
+        let change = match (new.get(name), old.get(name)) {
             (Some(new), Some(old)) if new == old => continue,
             (Some(_), Some(_)) => "differs",
             (Some(_), None) => "is new",
             (None, _) => "is made no more",
         };
-        differences.push(format!("docs/{} {what}", name.display()));
+        differences.push(format!("docs/{} {change}", name.display()));
         let path = docs.join(name);
         match (mode, new.get(name)) {
             (Mode::Check, _) => {}
@@ -128,7 +128,7 @@ fn command_line(programs: &Programs) -> Result<String, Error> {
         let mut words: Vec<&str> = name.split(' ').skip(1).collect();
         words.push("--help");
         let mut help = command(&programs.mapper, &words);
-        // Lines as long as on a terminal of 100 columns, whatever this one has.
+        // Lines as on a terminal of 100 columns, independent of this terminal.
         let help = help.env("COLUMNS", "100").stdin(Stdio::null()).output();
         let help = help.map_err(|source| Error::Start { command: name.clone(), source })?.stdout;
         text.push_str(&format!(

@@ -10,10 +10,10 @@ use crate::{
     workspace,
 };
 
-/// Builds, and runs what concerns fleets: the contract, the studies and the commands, and a cluster of this one machine. Unlike
-/// `cargo xtask test` it does not leave the cluster out.
+/// Builds and runs the fleet tests: the contract, the studies, the commands, and a cluster on this computer. Unlike
+/// `cargo xtask test`, it always includes the cluster.
 pub fn fleet_test() -> Result<(), Error> {
-    machine::need_slurm()?;
+    machine::require_slurm()?;
     let offered = Offered::with(python_env::prepare()?);
     let mut steps = Steps::default();
     steps.run("building", || {

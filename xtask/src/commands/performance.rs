@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Rounds of each measurement; the median is quoted.
+/// Number of repetitions of each measurement; the page states the median.
 const ROUNDS: usize = 5;
 /// Integrations of the twelve transients in one round.
 const REPEATS: &str = "100";
@@ -27,7 +27,7 @@ pub fn performance() -> Result<(), Error> {
     transients(&mut page, &release.join("examples/transients"))?;
     whole_run(&mut page, &release.join("mapper"))?;
     identification(&mut page)?;
-    // Measured by hand: a release build from nothing takes minutes, and its parts need a judgement.
+    // Measured manually, because a clean release build takes minutes.
     page.push_str(include_str!("../build_time.md"));
     let path = workspace::root().join("docs/validation/performance.md");
     fs::write(&path, &page).map_err(|source| Error::File { path: path.clone(), source })?;
@@ -89,7 +89,7 @@ fn transients(page: &mut String, ours: &Path) -> Result<(), Error> {
     Ok(())
 }
 
-/// The peer, compiled; `None` where its tools are missing.
+/// Compiles the peer; `None` if its tools are missing.
 fn peer() -> Result<Option<PathBuf>, Error> {
     let folder = workspace::target_dir().join("peers");
     fs::create_dir_all(&folder).map_err(|source| Error::File { path: folder.clone(), source })?;
@@ -162,7 +162,7 @@ fn identification(page: &mut String) -> Result<(), Error> {
     Ok(())
 }
 
-/// The number that a program's line starts with; NaN where there is none.
+/// The number that a program's line starts with; NaN if there is none.
 fn leading_number(text: &str) -> f64 {
     text.split_whitespace().next().and_then(|word| word.parse().ok()).unwrap_or(f64::NAN)
 }

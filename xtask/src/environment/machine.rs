@@ -15,7 +15,7 @@ struct Tool {
 
 /// The origin of a program.
 enum Source {
-    /// Debian packages; installed where this process is root.
+    /// Debian packages; installed if this process is root.
     Debian(&'static [&'static str]),
     /// Components of the Rust toolchain.
     Rustup(&'static [&'static str]),
@@ -35,7 +35,7 @@ const TOOLS: &[Tool] = &[
 pub fn prepare() -> Result<(), Error> {
     let missing: Vec<&Tool> = TOOLS.iter().filter(|tool| !works(tool)).collect();
     if missing.is_empty() {
-        say("all there\n");
+        say("all tools are installed\n");
         return Ok(());
     }
     let mut packages_listed = false;
@@ -50,7 +50,7 @@ pub fn prepare() -> Result<(), Error> {
             }
         }
         if !works(tool) {
-            return Err(missing_tool(tool, by_hand(&tool.source)));
+            return Err(missing_tool(tool, install_command(&tool.source)));
         }
     }
     Ok(())
@@ -61,10 +61,10 @@ pub fn has_nextest() -> bool {
     step::succeeds(&workspace::cargo(), &["nextest", "--version"])
 }
 
-/// A Slurm cluster of only this computer.
+/// Slurm, for a cluster on this computer.
 const SLURM: Tool = Tool {
     name: "slurm",
-    used_for: "takes the tasks of a fleet",
+    used_for: "runs the tasks of a fleet",
     probe: &["slurmctld", "-V"],
     source: Source::Debian(&["slurm-wlm"]),
 };
@@ -80,18 +80,19 @@ pub fn has_slurm() -> bool {
 }
 
 /// Checks for Slurm; the error contains the remedy.
-pub fn need_slurm() -> Result<(), Error> {
+pub fn require_slurm() -> Result<(), Error> {
     if has_slurm() {
         return Ok(());
     }
-    let install = match is_root() {
-        true => by_hand(&SLURM.source),
-        false => "its daemons need root: sudo --preserve-env=PATH cargo xtask fleet-test".to_owned(),
+    let install = if is_root() {
+        install_command(&SLURM.source)
+    } else {
+        "its daemons need root: sudo --preserve-env=PATH cargo xtask fleet-test".to_owned()
     };
     Err(missing_tool(&SLURM, install))
 }
 
-/// Whether npm is there and reaches its registry. Nothing of the build needs it.
+/// Whether npm is installed and reaches its registry. The build does not need it.
 pub fn has_npm() -> bool {
     step::succeeds("npm", &["ping"])
 }
@@ -117,7 +118,7 @@ fn works(tool: &Tool) -> bool {
 
 fn install_debian(tool: &Tool, packages: &[&str], listed: &mut bool) -> Result<(), Error> {
     if !is_root() || !step::succeeds("apt-get", &["--version"]) {
-        return Err(missing_tool(tool, by_hand(&tool.source)));
+        return Err(missing_tool(tool, install_command(&tool.source)));
     }
     let apt_get = |arguments: &[&str]| {
         let mut command = step::command("apt-get", arguments);
@@ -131,7 +132,7 @@ fn install_debian(tool: &Tool, packages: &[&str], listed: &mut bool) -> Result<(
     apt_get(&[&["install", "--yes", "--quiet", "--no-install-recommends"], packages].concat())
 }
 
-fn by_hand(source: &Source) -> String {
+fn install_command(source: &Source) -> String {
     match source {
         Source::Debian(packages) => format!("sudo apt-get install {}", packages.join(" ")),
         Source::Rustup(components) => format!("rustup component add {}", components.join(" ")),

@@ -44,7 +44,7 @@ impl Backend {
     }
 
     fn list(&self) -> Result<(), Failure> {
-        let found = drivers::locations().all();
+        let installed = drivers::locations().all();
         let driver = |found: &DriverLocation| {
             let known = INCLUDED_DRIVERS.iter().find(|(name, ..)| *name == found.name);
             let summary = known.map_or("driver", |(_, summary, _)| summary);
@@ -52,34 +52,36 @@ impl Backend {
                 Endpoint::Program(program) => {
                     json!({"name": found.name, "summary": summary, "program": program})
                 }
-                Endpoint::Socket(socket) => json!({"name": found.name, "summary": summary, "socket": socket}),
+                Endpoint::Socket(socket) => {
+                    json!({"name": found.name, "summary": summary, "socket": socket})
+                }
             }
         };
         let absent =
-            INCLUDED_DRIVERS.iter().filter(|(name, ..)| !found.iter().any(|found| found.name == *name));
+            INCLUDED_DRIVERS.iter().filter(|(name, ..)| !installed.iter().any(|one| one.name == *name));
         let built_in = registry::registry().backends;
-        let all: Vec<Value> = built_in
+        let backends: Vec<Value> = built_in
             .iter()
             .map(|plugin| json!({"name": plugin.name, "summary": plugin.summary}))
-            .chain(found.iter().map(driver))
+            .chain(installed.iter().map(driver))
             .chain(
                 absent.map(|(name, summary, line)| json!({"name": name, "summary": summary, "build": line})),
             )
             .collect();
         if self.json {
-            return standard_output::print_json(&json!({ "backends": all }));
+            return standard_output::print_json(&json!({ "backends": backends }));
         }
         let mut table = mapper_report::with_heads(&["backend", "summary"]).with_texts([1]);
-        for one in &all {
-            let word = |key: &str| one[key].as_str();
-            let place = match (word("program"), word("socket"), word("build")) {
+        for entry in &backends {
+            let word = |key: &str| entry[key].as_str();
+            let location = match (word("program"), word("socket"), word("build")) {
                 (Some(program), ..) => format!("; {program}"),
                 (_, Some(socket), _) => format!("; at the socket {socket}"),
                 (.., Some(line)) => format!("; not found, built by: {line}"),
                 _ => String::new(),
             };
             let summary = word("summary").unwrap_or_default();
-            table.add_row([word("name").unwrap_or_default().to_owned(), format!("{summary}{place}")]);
+            table.add_row([word("name").unwrap_or_default().to_owned(), format!("{summary}{location}")]);
         }
         standard_output::print(&format!("{table}\n"))
     }
@@ -93,14 +95,14 @@ impl Backend {
             // it.
             if !registry.backends.iter().any(|plugin| plugin.name == name) {
                 let is_known = INCLUDED_DRIVERS.iter().any(|(known, ..)| *known == name);
-                let words = match is_known || drivers::locations().find(name).is_some() {
+                let message = match is_known || drivers::locations().find(name).is_some() {
                     false => format!("there is no backend `{name}`; `mapper backend list` shows all"),
                     true => format!(
                         "this campaign names `{named}`, not `{name}`, and has no settings for `{name}`; use `mapper backend check {named} --campaign {}`",
                         path.display()
                     ),
                 };
-                return Err(Failure::new(Code::BadInput, words));
+                return Err(Failure::new(Code::BadInput, message));
             }
             campaign.backend =
                 mapper_campaign::campaign::BackendChoice { name: name.to_owned(), settings: json!({}) };
@@ -129,27 +131,27 @@ impl Backend {
             oil_temperature_k: campaign.boundary.oil_temperature_k,
         };
         let candidate = Candidate { name, make: &make, setpoints, duration_s: None };
-        let found = check_rules(&candidate);
+        let results = check_rules(&candidate);
         if let Some(claim) = claim {
             claim.release()?;
         }
-        let found = found.map_err(|error| Failure::new(Code::Rig, error))?;
-        let broken = found.iter().filter(|(_, kept)| kept.is_err()).count();
+        let results = results.map_err(|error| Failure::new(Code::Rig, error))?;
+        let broken = results.iter().filter(|(_, kept)| kept.is_err()).count();
         if self.json {
-            let rules = found.iter().map(
+            let rules = results.iter().map(
                 |(rule, kept)| json!({"rule": rule, "kept": kept.is_ok(), "found": kept.as_ref().err()}),
             );
             standard_output::print_json(&json!({"backend": name, "rules": rules.collect::<Vec<_>>()}))?;
         } else {
-            let lines = found.iter().map(|(rule, kept)| match kept {
+            let lines = results.iter().map(|(rule, kept)| match kept {
                 Ok(()) => format!("kept    {rule}\n"),
-                Err(found) => format!("BROKEN  {rule}: {found}\n"),
+                Err(finding) => format!("BROKEN  {rule}: {finding}\n"),
             });
             standard_output::print(&lines.collect::<String>())?;
         }
         match broken {
             0 => Ok(()),
-            _ => Err(Failure::new(Code::Rig, format!("`{name}` breaks {broken} of {} rules", found.len()))),
+            _ => Err(Failure::new(Code::Rig, format!("`{name}` breaks {broken} of {} rules", results.len()))),
         }
     }
 }

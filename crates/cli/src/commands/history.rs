@@ -17,7 +17,7 @@ subcommands! { HistoryCommand:
 
 /// Selected runs of a history.
 #[derive(Debug, Args)]
-pub struct Chosen {
+pub struct RunSelection {
     /// The history
     #[arg(long, value_name = "FILE", default_value = "runs/history.db")]
     pub db: PathBuf,
@@ -40,7 +40,7 @@ pub struct History {
     #[command(subcommand)]
     command: Option<HistoryCommand>,
     #[command(flatten)]
-    pub chosen: Chosen,
+    pub selection: RunSelection,
     /// Show this figure instead of the default ones; may be given more than once
     #[arg(long, value_name = "FIGURE", value_parser = parse_metric)]
     pub figure: Vec<Metric>,
@@ -81,7 +81,7 @@ const DEFAULT_METRICS: [Metric; 6] = [
     Metric::HMedianError,
 ];
 
-impl Chosen {
+impl RunSelection {
     fn filter(&self) -> Filter {
         Filter {
             machine: self.machine.clone(),
@@ -91,8 +91,8 @@ impl Chosen {
     }
 }
 
-fn open_history(chosen: &Chosen) -> Result<mapper_history::History, Failure> {
-    Ok(mapper_history::History::open_existing(&chosen.db).map_err(SessionError::from)?)
+fn open_history(selection: &RunSelection) -> Result<mapper_history::History, Failure> {
+    Ok(mapper_history::History::open_existing(&selection.db).map_err(SessionError::from)?)
 }
 
 impl History {
@@ -100,16 +100,17 @@ impl History {
         if let Some(command) = &self.command {
             return command.run();
         }
-        let runs = open_history(&self.chosen)?.runs(&self.chosen.filter()).map_err(SessionError::from)?;
+        let runs =
+            open_history(&self.selection)?.runs(&self.selection.filter()).map_err(SessionError::from)?;
         let figures: Vec<Metric> =
             if self.figure.is_empty() { DEFAULT_METRICS.to_vec() } else { self.figure.clone() };
         if let Some(path) = &self.svg {
-            let report_of = |started_ms| night_report_link(path, &self.chosen.db, started_ms);
+            let report_of = |started_ms| night_report_link(path, &self.selection.db, started_ms);
             self.replace.write(path, history_svg(&runs, &figures, report_of).as_bytes())?;
         }
         if self.json {
             let runs: Vec<serde_json::Value> = runs.iter().map(mapper_report::listed_run_json).collect();
-            return standard_output::print_json(&json!({"history": self.chosen.db, "runs": runs}));
+            return standard_output::print_json(&json!({"history": self.selection.db, "runs": runs}));
         }
         standard_output::print(&if self.runs {
             runs_text(&runs, &figures)

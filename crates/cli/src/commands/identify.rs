@@ -1,7 +1,7 @@
 //! `mapper identify`: from recordings to points and a map, without a rig.
 
 use crate::command_line::shared_arguments::{channel_map, given_campaign};
-use crate::output::detail_options::ShownArguments;
+use crate::output::detail_options::DetailArguments;
 use crate::output::failure::Failure;
 use crate::terminal::{identified_text, results_text};
 use crate::{output::standard_output, registry};
@@ -29,7 +29,7 @@ pub struct Identify {
     #[arg(long, value_enum)]
     pub method: Option<MethodArgument>,
     #[command(flatten)]
-    pub shown: ShownArguments,
+    pub shown: DetailArguments,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
@@ -61,20 +61,20 @@ impl Identify {
                     &display,
                     &results,
                     FULL_COMMAND,
-                    self.shown.shown(),
+                    self.shown.detail_level(),
                 )),
             };
         }
-        let found = session.identify(recorded, &map, method)?;
-        found.has_points(&warnings)?;
+        let identified = session.identify(recorded, &map, method)?;
+        identified.has_points(&warnings)?;
         match self.json {
-            true => standard_output::print_json(&found.json(path.as_deref(), &warnings)),
+            true => standard_output::print_json(&identified.json(path.as_deref(), &warnings)),
             false => standard_output::print(&identified_text(
                 &display,
-                &found,
+                &identified,
                 FULL_COMMAND,
                 &warnings,
-                self.shown.shown(),
+                self.shown.detail_level(),
             )),
         }
     }

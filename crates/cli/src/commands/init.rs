@@ -142,6 +142,6 @@ fn parse_speed_rpm(text: &str) -> Result<f64, String> {
 }
 
 fn parse_reference(name: &str) -> Result<&'static NamedReference, String> {
-    let found = NAMED_REFERENCES.iter().find(|row| row.name.eq_ignore_ascii_case(name));
-    found.ok_or_else(|| "it is not one of SAE, Garrett, BorgWarner".to_owned())
+    let known = NAMED_REFERENCES.iter().find(|row| row.name.eq_ignore_ascii_case(name));
+    known.ok_or_else(|| "it is not one of SAE, Garrett, BorgWarner".to_owned())
 }

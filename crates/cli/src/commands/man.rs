@@ -24,9 +24,10 @@ impl Man {
             |error| Failure::new(Code::Failure, format!("failed to write {}: {error}", self.out.display()));
         std::fs::create_dir_all(&self.out).map_err(failed)?;
         clap_mangen::generate_to(output_options::commands(), &self.out).map_err(failed)?;
-        match self.json {
-            true => standard_output::print_json(&json!({ "directory": self.out })),
-            false => standard_output::print(&format!("manual pages in {}\n", self.out.display())),
+        if self.json {
+            standard_output::print_json(&json!({ "directory": self.out }))
+        } else {
+            standard_output::print(&format!("manual pages in {}\n", self.out.display()))
         }
     }
 }

@@ -73,9 +73,10 @@ impl Plan {
         let request = inputs.request(&campaign, &model);
         if let [from, to] = self.why.as_slice() {
             let jump = mapper_planner::explain_jump(&request, *from, *to).map_err(SessionError::from)?;
-            return match self.json {
-                true => standard_output::print_json(&jump_json(&jump)),
-                false => standard_output::print(&jump_text(&campaign, &jump)),
+            return if self.json {
+                standard_output::print_json(&jump_json(&jump))
+            } else {
+                standard_output::print(&jump_text(&campaign, &jump))
             };
         }
         let appended = match self.append.as_slice() {
@@ -84,10 +85,8 @@ impl Plan {
         };
         let request = PlanRequest { effort: self.effort.unwrap_or(request.effort), appended, ..request };
         let plan = plan_of(&campaign, &request)?;
-        let others = match self.compare {
-            true => Some(plan_other_orders(&request, &plan).map_err(SessionError::from)?),
-            false => None,
-        };
+        let others = self.compare.then(|| plan_other_orders(&request, &plan)).transpose();
+        let others = others.map_err(SessionError::from)?;
         self.store(&plan)?;
         if let Some(path) = &self.svg {
             let request = PlanRequest { order: VisitOrder::SpeedLines, appended: None, ..request.clone() };

@@ -1,10 +1,10 @@
 //! `mapper run`: runs a campaign and makes the map.
 
-use crate::output::detail_options::ShownArguments;
+use crate::output::detail_options::DetailArguments;
 use crate::output::exit_code::Code;
 use crate::output::failure::Failure;
 use crate::terminal::results_text;
-use crate::wall_clock::{SystemWall, today};
+use crate::wall_clock::{SystemClock, today};
 use crate::{
     interrupt,
     output::{output_options, standard_output},
@@ -58,7 +58,7 @@ pub struct Run {
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = "127.0.0.1:8765")]
     pub foxglove: Option<String>,
     #[command(flatten)]
-    pub shown: ShownArguments,
+    pub shown: DetailArguments,
     /// End with one JSON object on standard output
     #[arg(long)]
     pub json: bool,
@@ -66,8 +66,8 @@ pub struct Run {
 
 impl Run {
     pub fn run(&self) -> Result<(), Failure> {
-        let kept = self.resume.as_ref().map(|run| run.join(run_directory::CAMPAIGN));
-        let Some(file) = self.campaign.clone().or(kept) else { return Ok(()) };
+        let stored_campaign = self.resume.as_ref().map(|run| run.join(run_directory::CAMPAIGN));
+        let Some(file) = self.campaign.clone().or(stored_campaign) else { return Ok(()) };
         let (campaign, campaign_text) = load_on(&file, today()).map_err(Failure::of_campaign)?;
         let resume = self.resume.as_deref().map(InterruptedRun::read).transpose()?;
         if self.pace.is_some_and(|pace| !(pace.is_finite() && pace > 0.0)) {
@@ -129,7 +129,7 @@ impl Run {
         }
         let outcome = match pace {
             Some(pace) => {
-                prepared.run_paced(&session, &mut PacedClock::new(SystemWall::new(), pace), true)?
+                prepared.run_paced(&session, &mut PacedClock::new(SystemClock::new(), pace), true)?
             }
             None => prepared.run(&session)?,
         };
@@ -145,7 +145,7 @@ impl Run {
             page: self.live.as_deref(),
             tls: tls.map(|(certificate, key)| TlsFiles { certificate, key }),
             #[cfg(feature = "foxglove")]
-            viewers: self.foxglove.as_deref(),
+            foxglove: self.foxglove.as_deref(),
         })
     }
 
@@ -155,7 +155,7 @@ impl Run {
             results.identified.points_alone().all(|point| point.verdict == Verdict::Unusable)
         });
         let unwritten = results.as_ref().ok().and_then(|results| results.unwritten.clone());
-        let kept = "the rig is safe and the recording is kept";
+        const KEPT: &str = "the rig is safe and the recording is kept";
         let failure = match end {
             RunTermination::Completed if unwritten.is_some() => {
                 let unwritten = unwritten.unwrap_or_default();
@@ -172,10 +172,10 @@ impl Run {
             }
             RunTermination::Interrupted { t_s } => Some(Failure::new(
                 Code::Interrupted,
-                format!("stopped by the operator at {t_s:.0} s; {kept}"),
+                format!("stopped by the operator at {t_s:.0} s; {KEPT}"),
             )),
             RunTermination::Tripped { t_s, reason } => {
-                Some(Failure::new(Code::Rig, format!("stopped at {t_s:.1} s: {reason}; {kept}")))
+                Some(Failure::new(Code::Rig, format!("stopped at {t_s:.1} s: {reason}; {KEPT}")))
             }
             RunTermination::Failed(source) => {
                 let recording = recording.clone();
@@ -185,12 +185,12 @@ impl Run {
         match (results, &failure) {
             (Err(error), None) => return Err(error.into()),
             (Ok(results), _) if !self.json => {
-                let more = format!("`mapper identify {} --full`", results.run.display());
+                let full_command = format!("`mapper identify {} --full`", results.run.display());
                 standard_output::print(&results_text(
                     &campaign.display,
                     &results,
-                    &more,
-                    self.shown.shown(),
+                    &full_command,
+                    self.shown.detail_level(),
                 ))?;
             }
             // Without results, only the reason for the stop matters.

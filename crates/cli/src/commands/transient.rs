@@ -51,17 +51,17 @@ impl Transient {
         let registry = registry::registry();
         let recorded = Recorded::read(&registry, &self.recording, &map, given.as_ref())?;
         let effects = registry.effects_with(&self.effects)?;
-        let found =
+        let identified =
             Session::new(&registry).transient(&recorded, &map, self.side, self.fit_until, &effects)?;
         let machine = recorded.campaign.as_ref().map_or("", |campaign| &campaign.machine.name);
         let files = match &self.out {
-            Some(directory) => write_transient(&found, machine, directory, self.replace.existing())?,
+            Some(directory) => write_transient(&identified, machine, directory, self.replace.existing())?,
             None => Vec::new(),
         };
         if self.json {
-            return standard_output::print_json(&found);
+            return standard_output::print_json(&identified);
         }
-        let mut text = found.text();
+        let mut text = identified.text();
         text.extend(recorded.read.warnings.iter().map(|warning| format!("recording: {warning}\n")));
         text.extend(files.iter().map(|file| format!("{}\n", file.display())));
         standard_output::print(&text)

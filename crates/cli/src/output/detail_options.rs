@@ -1,12 +1,12 @@
 //! Level of detail of identified points.
 
 use crate::output::output_options;
-use crate::terminal::Shown;
+use crate::terminal::DetailLevel;
 use clap::Args;
 
 /// Options of commands that print identified points.
 #[derive(Debug, Args)]
-pub struct ShownArguments {
+pub struct DetailArguments {
     /// Show everything: wide tables, common parameters, repeats, sensors, the zero
     #[arg(long)]
     pub full: bool,
@@ -15,8 +15,8 @@ pub struct ShownArguments {
     pub truth: bool,
 }
 
-impl ShownArguments {
-    pub fn shown(&self) -> Shown {
-        Shown { full: self.full, truth: self.truth, paint: output_options::paint() }
+impl DetailArguments {
+    pub fn detail_level(&self) -> DetailLevel {
+        DetailLevel { full: self.full, truth: self.truth, paint: output_options::paint() }
     }
 }

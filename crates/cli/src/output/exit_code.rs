@@ -11,7 +11,7 @@ pub enum Code {
     BadInput = 3,
     /// There is no plan, or the plan given is stale.
     NoPlan = 4,
-    /// The rig failed or a guard tripped; the rig is safe and what was recorded is kept.
+    /// The rig failed or a guard tripped; the rig is safe and the recording is kept.
     Rig = 5,
     /// The recording lacks data that identification needs.
     BadRecording = 6,
@@ -19,7 +19,7 @@ pub enum Code {
     Moved = 7,
     /// Items of a fleet are missing or failed.
     Incomplete = 8,
-    /// Stopped by the operator; the rig is safe and what was recorded is kept.
+    /// Stopped by the operator; the rig is safe and the recording is kept.
     Interrupted = 130,
 }
 

@@ -9,7 +9,7 @@ use std::process::ExitCode;
 pub fn failed(failure: &Failure) -> ExitCode {
     let Some(code) = failure.report() else { return ExitCode::SUCCESS };
     if output_options::json() && !standard_output::has_printed() {
-        // A reader that has gone away receives nothing.
+        // If the reader has closed the pipe, the text is lost.
         let _ = standard_output::print_json(&failure.json());
     }
     code

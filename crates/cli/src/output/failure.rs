@@ -29,16 +29,16 @@ pub struct Failure {
     presentation: Presentation,
 }
 
-/// How a failure is reported.
+/// Presentation of a failure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Presentation {
-    /// In a sentence behind "mapper: ".
+    /// A sentence after "mapper: ".
     Sentence,
     /// The message has its own layout (a rendered list of mistakes).
     Rendered,
     /// It has been reported already; only the exit code remains.
     Printed,
-    /// The reader of standard output went away: a normal end without a message.
+    /// Standard output was closed by its reader: a normal end without a message.
     ClosedPipe,
 }
 

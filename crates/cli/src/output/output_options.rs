@@ -32,7 +32,7 @@ static COMMANDS: OnceLock<fn() -> clap::Command> = OnceLock::new();
 
 static CHOSEN: OnceLock<ChosenOptions> = OnceLock::new();
 
-fn chosen() -> ChosenOptions {
+fn chosen_options() -> ChosenOptions {
     CHOSEN.get().copied().unwrap_or_default()
 }
 
@@ -43,7 +43,7 @@ pub fn set_options(arguments: &OutputOptions, matches: &ArgMatches) {
         ColorChoice::Always => ColourChoice::Always,
         ColorChoice::Never => ColourChoice::Never,
     };
-    let progress = arguments.progress.as_deref().map(ProgressFormat::named);
+    let progress = arguments.progress.as_deref().map(ProgressFormat::from_name);
     let command = std::iter::successors(Some(matches), |of| of.subcommand().map(|(_, deeper)| deeper)).last();
     let json =
         command.is_some_and(|of| of.try_get_one::<bool>("json").ok().flatten().is_some_and(|json| *json));
@@ -54,15 +54,15 @@ pub fn set_options(arguments: &OutputOptions, matches: &ArgMatches) {
 
 /// Whether invalid arguments request JSON, and their choice of colours.
 pub fn scan_raw_arguments(arguments: &[OsString]) -> (bool, ColorChoice) {
-    let given = |words: &[&str]| arguments.windows(words.len()).any(|window| window == words);
-    let never = given(&["--color", "never"]) || given(&["--color=never"]);
-    let always = given(&["--color", "always"]) || given(&["--color=always"]);
+    let has_arguments = |words: &[&str]| arguments.windows(words.len()).any(|window| window == words);
+    let never = has_arguments(&["--color", "never"]) || has_arguments(&["--color=never"]);
+    let always = has_arguments(&["--color", "always"]) || has_arguments(&["--color=always"]);
     let colour = match (never, always) {
         (true, _) => ColorChoice::Never,
         (_, true) => ColorChoice::Always,
         _ => ColorChoice::Auto,
     };
-    (given(&["--json"]), colour)
+    (has_arguments(&["--json"]), colour)
 }
 
 /// Stores the list of commands for completions and manual pages.
@@ -77,12 +77,12 @@ pub fn commands() -> clap::Command {
 
 /// Whether results are one JSON object.
 pub fn json() -> bool {
-    chosen().json
+    chosen_options().json
 }
 
 /// Whether the command has an option to replace existing files.
 pub fn has_force() -> bool {
-    chosen().replaces
+    chosen_options().replaces
 }
 
 /// Colours of standard output.
@@ -101,15 +101,15 @@ fn shows_escapes(stream: &impl IsTerminal) -> bool {
 }
 
 fn coloured(terminal: bool) -> bool {
-    is_coloured(chosen().colour, terminal, std::env::var_os("NO_COLOR").as_deref())
+    is_coloured(chosen_options().colour, terminal, std::env::var_os("NO_COLOR").as_deref())
 }
 
 /// The display of progress.
 pub fn progress() -> Progress {
-    let usual = match (shows_escapes(&std::io::stderr()), json()) {
+    let default_format = match (shows_escapes(&std::io::stderr()), json()) {
         (true, _) => ProgressFormat::Bar,
         (false, true) => ProgressFormat::Quiet,
         (false, false) => ProgressFormat::Lines,
     };
-    Progress::new(chosen().progress.unwrap_or(usual))
+    Progress::new(chosen_options().progress.unwrap_or(default_format))
 }

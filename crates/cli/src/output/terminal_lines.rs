@@ -10,9 +10,10 @@ pub fn wrap_for_terminal(text: &str, size: Option<(Width, Height)>) -> String {
     let lines = text.split_inclusive('\n').map(|line| {
         // Coloured lines and rows of tables have their own layout.
         let is_prose = !line.contains('\x1b') && !line.trim().contains("   ");
-        match is_prose && line.trim_end().chars().count() > columns {
-            true => wrapped(line, columns, line.len() - line.trim_start().len() + 2),
-            false => line.to_owned(),
+        if is_prose && line.trim_end().chars().count() > columns {
+            wrapped(line, columns, line.len() - line.trim_start().len() + 2)
+        } else {
+            line.to_owned()
         }
     });
     lines.collect()

@@ -9,4 +9,4 @@ mod results_text;
 
 pub use colour::{ColourChoice, is_coloured, understands_escapes};
 pub use progress::{Progress, ProgressFormat};
-pub use results_text::{Shown, identified_text, results_text};
+pub use results_text::{DetailLevel, identified_text, results_text};

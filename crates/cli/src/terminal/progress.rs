@@ -39,8 +39,8 @@ impl ProgressFormat {
     /// As written on the command line.
     pub const NAMES: [&str; 4] = ["bar", "lines", "json", "off"];
 
-    /// The format of this name; an unknown name shows nothing.
-    pub fn named(name: &str) -> Self {
+    /// The format with this name; an unknown name disables progress.
+    pub fn from_name(name: &str) -> Self {
         match name {
             "bar" => ProgressFormat::Bar,
             "lines" => ProgressFormat::Lines,
@@ -98,7 +98,7 @@ impl Progress {
     /// Shows nothing before the first event.
     pub fn new(manner: ProgressFormat) -> Self {
         let (to, queued) = sync_channel(MAX_QUEUED_EVENTS);
-        // If the thread cannot be started, nothing is shown and the work continues.
+        // If the thread cannot be started, the work continues without progress.
         let started =
             std::thread::Builder::new().name("progress".to_owned()).spawn(move || show_all(manner, &queued));
         let manner = if started.is_ok() { manner } else { ProgressFormat::Quiet };
@@ -170,7 +170,7 @@ fn show_all(manner: ProgressFormat, queued: &Receiver<Queued>) {
 #[derive(Default)]
 struct State {
     /// Current style of the bar.
-    look: Option<&'static str>,
+    template: Option<&'static str>,
     /// Last line written to a pipe.
     last_line: String,
     /// Start of the first piece of work.
@@ -193,7 +193,7 @@ impl ProgressDisplay {
         match event {
             SessionEvent::RunStarted { steps, duration_s, .. } => {
                 (state.steps, state.duration_s, state.step) = (*steps, *duration_s, 0);
-                self.look(state, RUN_BAR, Some(duration_s.ceil() as u64));
+                self.set_style(state, RUN_BAR, Some(duration_s.ceil() as u64));
                 self.bar.set_prefix("soak, then warm-up");
             }
             SessionEvent::RigTime { t_s } => {
@@ -213,16 +213,16 @@ impl ProgressDisplay {
                 self.bar.println(terminal_text(&event_line(event.t_s, &event.message)))
             }
             SessionEvent::Progress { done_ratio, what } => {
-                if *done_ratio > 0.0 || state.look == Some(WORK_BAR) {
-                    self.look(state, WORK_BAR, Some(1000));
+                if *done_ratio > 0.0 || state.template == Some(WORK_BAR) {
+                    self.set_style(state, WORK_BAR, Some(1000));
                     self.bar.set_position((1000.0 * done_ratio) as u64);
                 } else {
-                    self.look(state, SPINNER, None);
+                    self.set_style(state, SPINNER, None);
                 }
                 self.bar.set_message(what.clone());
             }
             SessionEvent::PiecesDone { done, of } => {
-                self.look(state, PIECES_BAR, Some(*of as u64));
+                self.set_style(state, PIECES_BAR, Some(*of as u64));
                 self.bar.set_position(*done as u64);
                 if *done > 0 {
                     self.bar.set_message(format!(", {} left", short_duration(self.bar.eta().as_secs_f64())));
@@ -237,13 +237,13 @@ impl ProgressDisplay {
     }
 
     /// Sets the style and length of the bar if they changed; its clock shows that work continues.
-    fn look(&self, state: &mut State, look: &'static str, length: Option<u64>) {
-        if state.look == Some(look) {
+    fn set_style(&self, state: &mut State, template: &'static str, length: Option<u64>) {
+        if state.template == Some(template) {
             return;
         }
-        state.look = Some(look);
+        state.template = Some(template);
         // A template that does not parse leaves the plain style.
-        if let Ok(style) = ProgressStyle::with_template(look) {
+        if let Ok(style) = ProgressStyle::with_template(template) {
             self.bar.set_style(style.progress_chars("=> "));
         }
         self.bar.reset();

@@ -16,7 +16,7 @@ const COLUMNS: usize = 80;
 
 /// Level of detail.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Shown {
+pub struct DetailLevel {
     /// Everything, in tables as wide as they need to be.
     pub full: bool,
     /// The simulator's truth next to each value.
@@ -32,11 +32,11 @@ struct ShownResults<'a> {
     repeats: &'a [RepeatedJump],
     remarks: Vec<String>,
     /// The command that shows the rest.
-    more: &'a str,
+    command: &'a str,
 }
 
-/// The results of a run: a table, notes, verdict and files. `more`: the command that shows the rest, in words.
-pub fn results_text(units: &DisplayUnits, results: &Results, more: &str, shown: Shown) -> String {
+/// The results of a run: a table, notes, verdict and files. `command`: the command that shows the rest, in words.
+pub fn results_text(units: &DisplayUnits, results: &Results, command: &str, shown: DetailLevel) -> String {
     let mut text = shown_results_text(
         units,
         &ShownResults {
@@ -44,7 +44,7 @@ pub fn results_text(units: &DisplayUnits, results: &Results, more: &str, shown: 
             map: results.compressor_map.as_ref(),
             repeats: &results.repeats,
             remarks: results.identified.remarks.iter().map(result_remark_text).collect(),
-            more,
+            command,
         },
         shown,
     );
@@ -60,14 +60,14 @@ pub fn results_text(units: &DisplayUnits, results: &Results, more: &str, shown: 
     text
 }
 
-/// The results of an identification that wrote no files. `more`: the command that shows the rest, in words; `warnings`: problems of
+/// The results of an identification that wrote no files. `command`: the command that shows the rest, in sentence; `warnings`: problems of
 /// the recordings.
 pub fn identified_text(
     units: &DisplayUnits,
     identified: &Identified,
-    more: &str,
+    command: &str,
     warnings: &[String],
-    shown: Shown,
+    shown: DetailLevel,
 ) -> String {
     let warnings = warnings.iter().map(|warning| format!("recording: {warning}"));
     let found = ShownResults {
@@ -75,22 +75,22 @@ pub fn identified_text(
         map: None,
         repeats: &[],
         remarks: identified.remarks.iter().map(result_remark_text).chain(warnings).collect(),
-        more,
+        command,
     };
     shown_results_text(units, &found, shown)
 }
 
-fn shown_results_text(units: &DisplayUnits, found: &ShownResults<'_>, shown: Shown) -> String {
+fn shown_results_text(units: &DisplayUnits, found: &ShownResults<'_>, shown: DetailLevel) -> String {
     let mut text = if shown.full { full(units, found, shown) } else { short(units, found, shown) };
     let has = |verdict| found.identified.points_alone().any(|point| point.verdict == verdict);
     let worst = [Verdict::Unusable, Verdict::Doubtful].into_iter().find(|verdict| has(*verdict));
-    let words = verdict_sentence(found.identified.points_alone());
-    let words = paint_verdict(worst.unwrap_or(Verdict::Good), &words, shown.paint);
-    let _ = writeln!(text, "\n{words}\n");
+    let sentence = verdict_sentence(found.identified.points_alone());
+    let sentence = paint_verdict(worst.unwrap_or(Verdict::Good), &sentence, shown.paint);
+    let _ = writeln!(text, "\n{sentence}\n");
     text
 }
 
-fn short(units: &DisplayUnits, found: &ShownResults<'_>, shown: Shown) -> String {
+fn short(units: &DisplayUnits, found: &ShownResults<'_>, shown: DetailLevel) -> String {
     let mut text = String::new();
     if let Some(disagreement) =
         disagreement_text(&found.identified.points, &found.identified.two_parameter, units)
@@ -114,15 +114,15 @@ fn short(units: &DisplayUnits, found: &ShownResults<'_>, shown: Shown) -> String
     for remark in &found.remarks {
         text.push_str(&wrapped(remark, COLUMNS, 2));
     }
-    let more = format!(
+    let footer = format!(
         "+/- is half a 95 % interval. What all points share, repeats, sensors and the zero: {}, or the page of the run.",
-        found.more
+        found.command
     );
-    text.push_str(&wrapped(&more, COLUMNS, 2));
+    text.push_str(&wrapped(&footer, COLUMNS, 2));
     text
 }
 
-fn full(units: &DisplayUnits, found: &ShownResults<'_>, shown: Shown) -> String {
+fn full(units: &DisplayUnits, found: &ShownResults<'_>, shown: DetailLevel) -> String {
     let mut text = disagreement_text(&found.identified.points, &found.identified.two_parameter, units)
         .unwrap_or_default();
     text.push_str(&points_text(&found.identified.points, units, shown.truth));

@@ -177,19 +177,19 @@ impl<B: Backend> FaultyBackend<B> {
                 SampleBatch::default()
             }
             Fault::Late(_) if !self.delayed.is_empty() => {
-                let mut all = std::mem::take(&mut self.delayed).into_iter().chain([batch]);
-                let mut whole = all.next().unwrap_or_default();
-                for more in all {
-                    whole.t_s.extend(more.t_s);
-                    for (column, further) in whole.columns.iter_mut().zip(more.columns) {
+                let mut delayed_batches = std::mem::take(&mut self.delayed).into_iter().chain([batch]);
+                let mut full_batch = delayed_batches.next().unwrap_or_default();
+                for next_batch in delayed_batches {
+                    full_batch.t_s.extend(next_batch.t_s);
+                    for (column, further) in full_batch.columns.iter_mut().zip(next_batch.columns) {
                         column.values.extend(further.values);
                     }
-                    for (column, further) in whole.truth.iter_mut().zip(more.truth) {
+                    for (column, further) in full_batch.truth.iter_mut().zip(next_batch.truth) {
                         column.values.extend(further.values);
                     }
-                    whole.events.extend(more.events);
+                    full_batch.events.extend(next_batch.events);
                 }
-                whole
+                full_batch
             }
             Fault::Reordered => {
                 let mut batch = batch;

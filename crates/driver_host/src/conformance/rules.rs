@@ -25,12 +25,12 @@ pub const RULES: &[Rule] = &[
     ("at the end of its data it reports the loss of the rig, and can still be made safe", ends_with_its_loss),
 ];
 
-/// The rig cannot be armed, so no rule can be checked. Otherwise, rules without a call to the rig would seem to be kept.
+/// The rig cannot be armed, so no rule can be checked. Without this error, rules that never call the rig would pass.
 #[derive(Debug, thiserror::Error)]
-#[error("`{name}` cannot be armed, so none of the {} rules was checked: {why}", RULES.len())]
+#[error("`{name}` cannot be armed, so none of the {} rules was checked: {reason}", RULES.len())]
 pub struct NotArmed {
     name: String,
-    why: String,
+    reason: String,
 }
 
 /// Checks all rules, after one trial of arming and disarming.
@@ -50,7 +50,7 @@ pub fn check_rules(candidate: &Candidate<'_>) -> Result<Vec<(&'static str, Check
         other => other.to_string(),
     });
     match failure {
-        Some(why) => Err(NotArmed { name: candidate.name.to_owned(), why }),
+        Some(reason) => Err(NotArmed { name: candidate.name.to_owned(), reason }),
         None => {
             Ok(RULES.iter().map(|(rule, check)| (*rule, check_with_retries(candidate, *check))).collect())
         }
@@ -68,10 +68,7 @@ fn check_with_retries(candidate: &Candidate<'_>, check: fn(&Candidate<'_>) -> Ch
 
 macro_rules! ensure {
     ($condition:expr, $($message:tt)+) => {
-        match $condition {
-            true => {}
-            false => return Err(format!($($message)+)),
-        }
+        if $condition {} else { return Err(format!($($message)+)) }
     };
 }
 
@@ -114,7 +111,7 @@ fn can_be_guarded(candidate: &Candidate<'_>) -> CheckResult {
     let within_s = description.safe.within_s;
     ensure!(
         within_s > 0.0 && within_s <= 120.0,
-        "its safe shutdown takes up to {within_s} s; at most 120 s are allowed"
+        "its safe shutdown takes up to {within_s} s; 120 s are allowed"
     );
     if let Some(accepts) = description.accepts {
         require_success("check of the accepted setpoints", accepts.check(&candidate.setpoints))?;
@@ -193,8 +190,8 @@ fn polls_to_the_requested_time(candidate: &Candidate<'_>) -> CheckResult {
             until_s - last_s < 1.001 * sample_s,
             "polled to {until_s} s, the last sample is at {last_s} s"
         );
-        let early = batch.events.iter().all(|event| event.t_s <= until_s);
-        ensure!(early, "an event later than {until_s} s: {:?}", batch.events);
+        let in_time = batch.events.iter().all(|event| event.t_s <= until_s);
+        ensure!(in_time, "an event later than {until_s} s: {:?}", batch.events);
     }
     Ok(())
 }
@@ -208,23 +205,23 @@ fn polling_does_not_change_samples(candidate: &Candidate<'_>) -> CheckResult {
     if is_real_time(candidate)? {
         return Ok(());
     }
-    let whole = require_success("poll", candidate.create_running()?.poll(6.0))?;
+    let full_batch = require_success("poll", candidate.create_running()?.poll(6.0))?;
     let mut rig = candidate.create_running()?;
     let mut pieces = Vec::new();
     for until_s in [0.3, 0.3, 1.0, 5.95, 6.0] {
         pieces.push(require_success("poll", rig.poll(until_s))?);
     }
     let times: Vec<f64> = pieces.iter().flat_map(|batch| batch.t_s.clone()).collect();
-    ensure!(times == whole.t_s, "more frequent polls give other sample times");
-    for column in &whole.columns {
+    ensure!(times == full_batch.t_s, "more frequent polls give other sample times");
+    for column in &full_batch.columns {
         let of_piece = |piece: &mapper_core::SampleBatch| piece.column(column.channel).map(<[f64]>::to_vec);
         let cut = pieces.iter().flat_map(|piece| of_piece(piece).unwrap_or_default());
         let scale = column.values.iter().map(|value| value.abs()).fold(0.0, f64::max);
-        for ((t_s, cut), whole) in times.iter().zip(cut).zip(&column.values) {
+        for ((t_s, cut), value) in times.iter().zip(cut).zip(&column.values) {
             // A solver step ends at each poll, so pressures and speeds agree only to about its relative tolerance of 1e-6.
             // Near standstill a relative change of pressure changes the flow some hundred times as much.
-            let agrees = (cut - whole).abs() <= 3e-4 * scale || (cut.is_nan() && whole.is_nan());
-            ensure!(agrees, "{} at {t_s} s: {cut} in pieces, {whole} in one", column.channel);
+            let agrees = (cut - value).abs() <= 3e-4 * scale || (cut.is_nan() && value.is_nan());
+            ensure!(agrees, "{} at {t_s} s: {cut} in pieces, {value} in one", column.channel);
         }
     }
     Ok(())
@@ -236,9 +233,9 @@ fn repeats_itself(candidate: &Candidate<'_>) -> CheckResult {
     }
     let (mut first, mut second) = (candidate.create_running()?, candidate.create_running()?);
     for until_s in [0.5, 2.0, 2.01, 8.0] {
-        let (one, other) =
-            (require_success("poll", first.poll(until_s))?, require_success("poll", second.poll(until_s))?);
-        ensure!(bits(&one) == bits(&other), "two equal instances differ before {until_s} s");
+        let batches =
+            [require_success("poll", first.poll(until_s))?, require_success("poll", second.poll(until_s))?];
+        ensure!(bits(&batches[0]) == bits(&batches[1]), "two equal instances differ before {until_s} s");
     }
     Ok(())
 }
@@ -265,9 +262,9 @@ fn refuses_impossible_setpoints(candidate: &Candidate<'_>) -> CheckResult {
             Ok(()) => return Err(format!("{setpoints:?} was accepted")),
         }
     }
-    let one = require_success("poll", rig.poll(2.0))?;
+    let batch = require_success("poll", rig.poll(2.0))?;
     let same = is_real_time(candidate)?
-        || bits(&one) == bits(&require_success("poll", candidate.create_running()?.poll(2.0))?);
+        || bits(&batch) == bits(&require_success("poll", candidate.create_running()?.poll(2.0))?);
     ensure!(same, "a refused setpoint changed the samples");
     Ok(())
 }
@@ -324,9 +321,9 @@ fn can_be_restarted(candidate: &Candidate<'_>) -> CheckResult {
     require_success("disarm", rig.disarm())?;
     require_success("arm", rig.arm())?;
     require_success("set", rig.set(&candidate.setpoints))?;
-    let again = require_success("poll", rig.poll(2.0))?;
-    ensure!(again.t_s.first() == first.t_s.first(), "after rearming, its time does not start at 0");
-    let same = !rig.describe().simulated_time || bits(&again) == bits(&first);
+    let restarted = require_success("poll", rig.poll(2.0))?;
+    ensure!(restarted.t_s.first() == first.t_s.first(), "after rearming, its time does not start at 0");
+    let same = !rig.describe().simulated_time || bits(&restarted) == bits(&first);
     ensure!(same, "after rearming, its samples differ");
     Ok(())
 }

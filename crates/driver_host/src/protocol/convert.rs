@@ -1,6 +1,6 @@
 //! Conversion between messages and the types of the core.
 
-use crate::protocol::message::{ChannelDescription, Description, Mode, Ranges, SafeWay, Setpoints};
+use crate::protocol::message::{ChannelDescription, Description, Mode, Ranges, SafeShutdown, Setpoints};
 use mapper_core::{
     Channel, GuardName, RigDescription, RigMode, SafeTrajectory, SetpointRange, SetpointRanges,
     UnknownChannel,
@@ -61,7 +61,7 @@ pub enum InvalidData {
         t_s: f64,
     },
     /// Missing or repeated samples.
-    #[error("expected sample {expected}, received sample {found}{}", missing(*expected, *found))]
+    #[error("expected sample {expected}, received sample {found}{}", describe_missing(*expected, *found))]
     Sequence {
         /// Number of the next sample.
         expected: u64,
@@ -73,7 +73,7 @@ pub enum InvalidData {
     TooMany,
 }
 
-fn missing(expected: u64, found: u64) -> String {
+fn describe_missing(expected: u64, found: u64) -> String {
     match found.saturating_sub(expected) {
         0 => String::new(),
         count => format!("; {count} are missing, lost by the driver or not read in time"),
@@ -84,7 +84,11 @@ fn missing(expected: u64, found: u64) -> String {
 ///
 /// # Errors
 /// [`InvalidData`] for unknown channels or guards, and for impossible numbers.
-pub fn description(wire: &Description, backend: &str, version: &str) -> Result<RigDescription, InvalidData> {
+pub fn read_description(
+    wire: &Description,
+    backend: &str,
+    version: &str,
+) -> Result<RigDescription, InvalidData> {
     let mut channels = Vec::new();
     for described in &wire.channels {
         let channel: Channel = described.name.parse()?;
@@ -98,12 +102,12 @@ pub fn description(wire: &Description, backend: &str, version: &str) -> Result<R
     if different.len() < channels.len() {
         return Err(InvalidData::Duplicate("a channel".to_owned()));
     }
-    number("sample rate", wire.sample_rate_hz, "Hz", f64::MIN_POSITIVE..=MAX_RATE_HZ)?;
+    check_number("sample rate", wire.sample_rate_hz, "Hz", f64::MIN_POSITIVE..=MAX_RATE_HZ)?;
     let safe = &wire.safe;
-    number("duration of the safe shutdown", safe.within_s, "s", f64::MIN_POSITIVE..=600.0)?;
-    number("valve opening during the safe shutdown", safe.valve_opening_ratio, "", 0.0..=10.0)?;
+    check_number("duration of the safe shutdown", safe.within_s, "s", f64::MIN_POSITIVE..=600.0)?;
+    check_number("valve opening during the safe shutdown", safe.valve_opening_ratio, "", 0.0..=10.0)?;
     if let Some(slew_pa_s) = safe.p3_slew_pa_s {
-        number("slew of P3 during the safe shutdown", slew_pa_s, "Pa/s", f64::MIN_POSITIVE..=1e9)?;
+        check_number("slew of P3 during the safe shutdown", slew_pa_s, "Pa/s", f64::MIN_POSITIVE..=1e9)?;
     }
     let guard = |name: &String| {
         let known = serde_json::from_value::<GuardName>(serde_json::Value::String(name.clone()));
@@ -119,7 +123,7 @@ pub fn description(wire: &Description, backend: &str, version: &str) -> Result<R
         exclusive: wire.exclusive.clone(),
         reached_at: wire.reached_at.clone(),
         needs_guarded: wire.needs_guarded.iter().map(guard).collect::<Result<_, _>>()?,
-        accepts: wire.accepts.as_ref().map(ranges),
+        accepts: wire.accepts.as_ref().map(read_ranges),
         safe: SafeTrajectory {
             p3_slew_pa_s: safe.p3_slew_pa_s,
             valve_opening_ratio: safe.valve_opening_ratio,
@@ -128,7 +132,7 @@ pub fn description(wire: &Description, backend: &str, version: &str) -> Result<R
     })
 }
 
-fn number(
+fn check_number(
     name: &'static str,
     value: f64,
     unit: &'static str,
@@ -137,7 +141,7 @@ fn number(
     if range.contains(&value) { Ok(()) } else { Err(InvalidData::Number { name, value, unit }) }
 }
 
-fn ranges(wire: &Ranges) -> SetpointRanges {
+fn read_ranges(wire: &Ranges) -> SetpointRanges {
     let range = |(low, high): (f64, f64)| SetpointRange { low, high };
     SetpointRanges {
         p3_pa: range(wire.p3_pa),
@@ -169,7 +173,7 @@ pub fn write_description(rig: &RigDescription) -> Description {
             valve_opening_ratio: range(accepts.valve_opening_ratio),
             oil_temperature_k: range(accepts.oil_temperature_k),
         }),
-        safe: SafeWay {
+        safe: SafeShutdown {
             p3_slew_pa_s: rig.safe.p3_slew_pa_s,
             valve_opening_ratio: rig.safe.valve_opening_ratio,
             within_s: rig.safe.within_s,
@@ -192,7 +196,7 @@ pub fn write_setpoints(setpoints: &mapper_core::Setpoints) -> Setpoints {
 }
 
 /// Reads setpoints as a driver receives them.
-pub fn setpoints(wire: &Setpoints) -> mapper_core::Setpoints {
+pub fn read_setpoints(wire: &Setpoints) -> mapper_core::Setpoints {
     mapper_core::Setpoints {
         mode: match wire.mode {
             Mode::Standstill => RigMode::Standstill,

@@ -51,7 +51,7 @@ impl Message {
 pub struct Failure {
     /// Kind of the failure.
     pub code: Code,
-    /// One sentence for people: what is wrong, with value and unit, and what to do. No secrets.
+    /// One sentence for people: the fault with value and unit, and its remedy. No secrets.
     pub message: String,
     /// `settings`: key path below the driver's settings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -160,7 +160,7 @@ pub struct Configure {
 
 /// Answer to `describe`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Described {
+pub struct DescribeResult {
     /// The rig.
     pub description: Description,
     /// Any text that changes with the description; the helper libraries use SHA-256.
@@ -177,7 +177,7 @@ pub struct Description {
     /// Whether time is simulated: samples are then sent on `poll`, otherwise unrequested.
     pub simulated_time: bool,
     /// Whether setpoints have an effect.
-    #[serde(default = "yes")]
+    #[serde(default = "default_true")]
     pub controls: bool,
     /// Unique name of the rig; two runs cannot use it at the same time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -192,10 +192,10 @@ pub struct Description {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub accepts: Option<Ranges>,
     /// Its safe shutdown.
-    pub safe: SafeWay,
+    pub safe: SafeShutdown,
 }
 
-fn yes() -> bool {
+fn default_true() -> bool {
     true
 }
 
@@ -226,7 +226,7 @@ pub struct Ranges {
 
 /// The safe shutdown: the valve opens and the heater is switched off at once, P3 is lowered at a limited rate, then the air is cut.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct SafeWay {
+pub struct SafeShutdown {
     /// Rate at which P3 is lowered, Pa/s; `null`: the air is cut at once.
     #[serde(default)]
     pub p3_slew_pa_s: Option<f64>,

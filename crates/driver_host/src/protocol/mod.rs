@@ -8,14 +8,14 @@ mod message;
 mod samples;
 mod schema;
 
-pub use convert::{InvalidData, description, setpoints, write_description, write_setpoints};
+pub use convert::{InvalidData, read_description, read_setpoints, write_description, write_setpoints};
 pub use convert_error::{read_error, write_error};
 pub use frame::{Encoding, FrameError, decode, encode, read_frame, write_frame};
 pub use message::{
-    ChannelDescription, Code, Configure, Described, Description, Failure, Hello, LastSample, Message, Mode,
-    Note, Poll, Ranges, SafeWay, Setpoints, Version, Welcome,
+    ChannelDescription, Code, Configure, DescribeResult, Description, Failure, Hello, LastSample, Message,
+    Mode, Note, Poll, Ranges, SafeShutdown, Setpoints, Version, Welcome,
 };
-pub use samples::{Column, ElementSamples, Happened, Samples, TruthSamples, batch, split_batch};
+pub use samples::{Column, ElementSamples, RigEvent, Samples, TruthSamples, batch, split_batch};
 pub use schema::schema;
 
 /// Magic word in the hello of both sides.

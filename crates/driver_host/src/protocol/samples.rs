@@ -30,7 +30,7 @@ pub struct Samples {
     pub truth: Vec<TruthSamples>,
     /// Events.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub events: Vec<Happened>,
+    pub events: Vec<RigEvent>,
 }
 
 /// Values of a channel.
@@ -70,7 +70,7 @@ pub struct TruthSamples {
 
 /// An event.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Happened {
+pub struct RigEvent {
     /// Run time, s.
     pub t_s: f64,
     /// Kind, e.g. `rig_tripped`; an unknown kind is recorded as a note.
@@ -81,10 +81,6 @@ pub struct Happened {
 
 fn values_or_nan(values: Vec<Option<f64>>) -> Vec<f64> {
     values.into_iter().map(|value| value.unwrap_or(f64::NAN)).collect()
-}
-
-fn finite_value(value: f64) -> Option<f64> {
-    value.is_finite().then_some(value)
 }
 
 fn parse_quality(word: &str) -> Quality {
@@ -111,9 +107,12 @@ fn quality_name(quality: Quality) -> String {
 /// [`InvalidData`] if columns differ in length, or times do not increase.
 pub fn batch(samples: Samples, described: &[Channel]) -> Result<SampleBatch, InvalidData> {
     let count = samples.t_s.len();
-    let check_length = |name: &str, length: usize| match length == count {
-        true => Ok(()),
-        false => Err(InvalidData::ColumnLength { name: name.to_owned(), length, count }),
+    let check_length = |name: &str, length: usize| {
+        if length == count {
+            Ok(())
+        } else {
+            Err(InvalidData::ColumnLength { name: name.to_owned(), length, count })
+        }
     };
     if let Some(t_s) = samples.t_s.iter().find(|t_s| !t_s.is_finite()) {
         return Err(InvalidData::Time { before_s: *t_s, t_s: *t_s });
@@ -128,7 +127,7 @@ pub fn batch(samples: Samples, described: &[Channel]) -> Result<SampleBatch, Inv
         if !described.contains(&channel) {
             continue;
         }
-        if columns.iter().any(|there| there.channel == channel) {
+        if columns.iter().any(|known| known.channel == channel) {
             return Err(InvalidData::Duplicate(column.channel));
         }
         if column.source_t_s.is_some() || column.quality.is_some() {
@@ -159,7 +158,7 @@ pub fn batch(samples: Samples, described: &[Channel]) -> Result<SampleBatch, Inv
     }
     let kind =
         |word: String| serde_json::from_value(serde_json::Value::String(word)).unwrap_or(EventKind::Note);
-    let event = |event: Happened| Event { t_s: event.t_s, kind: kind(event.kind), message: event.message };
+    let event = |event: RigEvent| Event { t_s: event.t_s, kind: kind(event.kind), message: event.message };
     Ok(SampleBatch {
         first_sequence: samples.sequence,
         t_s: samples.t_s,
@@ -171,7 +170,7 @@ pub fn batch(samples: Samples, described: &[Channel]) -> Result<SampleBatch, Inv
     })
 }
 
-/// Splits a batch into messages that fit into frames of this size. An empty batch gives none.
+/// Splits a batch into messages that fit into frames of this size. An empty batch gives no message.
 pub fn split_batch(batch: &SampleBatch, frame_limit_bytes: u32) -> Vec<Samples> {
     // Source time and quality are two additional values.
     let width =
@@ -182,24 +181,29 @@ pub fn split_batch(batch: &SampleBatch, frame_limit_bytes: u32) -> Vec<Samples> 
     if starts.is_empty() && !batch.events.is_empty() {
         starts.push(0);
     }
-    let mut split_batch: Vec<Samples> =
+    let mut pieces: Vec<Samples> =
         starts.into_iter().map(|start| cut_batch(batch, start, count.min(start + max_samples))).collect();
-    if let Some(last) = split_batch.last_mut() {
+    if let Some(last) = pieces.last_mut() {
         let kind = |kind: EventKind| serde_json::to_value(kind).ok()?.as_str().map(str::to_owned);
-        let happened = |event: &Event| Happened {
+        let rig_event = |event: &Event| RigEvent {
             t_s: event.t_s,
             kind: kind(event.kind).unwrap_or_default(),
             message: event.message.clone(),
         };
-        last.events = batch.events.iter().map(happened).collect();
+        last.events = batch.events.iter().map(rig_event).collect();
     }
-    split_batch
+    pieces
 }
 
 fn cut_batch(batch: &SampleBatch, start: usize, end: usize) -> Samples {
     let cut = |values: &[f64]| values.get(start..end).unwrap_or_default().to_vec();
     let numbers = |values: &[f64]| {
-        values.get(start..end).unwrap_or_default().iter().map(|v| finite_value(*v)).collect()
+        values
+            .get(start..end)
+            .unwrap_or_default()
+            .iter()
+            .map(|value| value.is_finite().then_some(*value))
+            .collect()
     };
     let column = |column: &ChannelColumn| {
         let from = batch.provenance_of(column.channel);
@@ -212,7 +216,7 @@ fn cut_batch(batch: &SampleBatch, start: usize, end: usize) -> Samples {
                     .get(start..end)
                     .unwrap_or_default()
                     .iter()
-                    .map(|one| quality_name(*one))
+                    .map(|entry| quality_name(*entry))
                     .collect()
             }),
         }
@@ -225,15 +229,18 @@ fn cut_batch(batch: &SampleBatch, start: usize, end: usize) -> Samples {
         elements: batch
             .elements
             .iter()
-            .map(|one| ElementSamples { element: one.element.to_string(), values: numbers(&one.values) })
+            .map(|entry| ElementSamples {
+                element: entry.element.to_string(),
+                values: numbers(&entry.values),
+            })
             .collect(),
         truth: batch
             .truth
             .iter()
-            .map(|one| TruthSamples {
-                name: one.name.clone(),
-                unit: one.unit.clone(),
-                values: numbers(&one.values),
+            .map(|entry| TruthSamples {
+                name: entry.name.clone(),
+                unit: entry.unit.clone(),
+                values: numbers(&entry.values),
             })
             .collect(),
         events: Vec::new(),
@@ -253,7 +260,7 @@ mod tests {
         ) {
             let t_s: Vec<f64> = (0..values.len()).map(|i| i as f64 / 10.0).collect();
             let column = values_or_nan(values);
-            let whole = SampleBatch {
+            let full = SampleBatch {
                 first_sequence: 40,
                 columns: vec![ChannelColumn { channel: Channel::T2, values: column.clone() }],
                 provenance: vec![Provenance {
@@ -266,7 +273,7 @@ mod tests {
                 ..SampleBatch::default()
             };
             let (mut next, mut values, mut sources) = (40, Vec::new(), Vec::new());
-            let sent = split_batch(&whole, limit);
+            let sent = split_batch(&full, limit);
             prop_assert!(!sent.is_empty());
             for piece in sent {
                 let note = crate::protocol::Message::note("samples", serde_json::to_value(&piece).unwrap());
@@ -282,10 +289,10 @@ mod tests {
                 next += part.t_s.len() as u64;
                 values.extend(part.columns[0].values.iter().map(|value| value.to_bits()));
                 sources.extend(part.provenance[0].source_t_s.clone());
-                prop_assert!(part.provenance[0].quality.iter().all(|one| *one == Quality::Uncertain));
+                prop_assert!(part.provenance[0].quality.iter().all(|entry| *entry == Quality::Uncertain));
             }
             prop_assert_eq!(values, column.iter().map(|value| value.to_bits()).collect::<Vec<_>>());
-            prop_assert_eq!(sources, whole.t_s);
+            prop_assert_eq!(sources, full.t_s);
         }
     }
 

@@ -1,7 +1,7 @@
 //! The JSON schema of all messages, generated from the types that read and write them.
 
 use crate::protocol::{
-    Configure, Described, Failure, Hello, LastSample, Message, Note, Poll, Samples, Setpoints, Welcome,
+    Configure, DescribeResult, Failure, Hello, LastSample, Message, Note, Poll, Samples, Setpoints, Welcome,
 };
 use schemars::generate::SchemaSettings;
 use serde_json::{Value, json};
@@ -13,7 +13,7 @@ pub fn schema() -> Value {
     let methods = json!({
         "hello": {"params": generator.subschema_for::<Hello>(), "result": generator.subschema_for::<Welcome>()},
         "configure": {"params": generator.subschema_for::<Configure>(), "result": {}},
-        "describe": {"result": generator.subschema_for::<Described>()},
+        "describe": {"result": generator.subschema_for::<DescribeResult>()},
         "arm": {"result": {}},
         "set": {"params": generator.subschema_for::<Setpoints>(), "result": {}},
         "hold": {"result": {}},
@@ -89,11 +89,11 @@ mod tests {
             ("hello", "params") => serde_json::from_value::<Hello>(value).map(drop),
             ("hello", _) => serde_json::from_value::<Welcome>(value).map(drop),
             ("configure", _) => serde_json::from_value::<Configure>(value).map(drop),
-            ("describe", _) => serde_json::from_value::<Described>(value).map(|described| {
-                let _ = crate::protocol::description(&described.description, "x", "1");
+            ("describe", _) => serde_json::from_value::<DescribeResult>(value).map(|described| {
+                let _ = crate::protocol::read_description(&described.description, "x", "1");
             }),
             ("set", _) => serde_json::from_value::<Setpoints>(value).map(|wanted| {
-                let _ = crate::protocol::setpoints(&wanted);
+                let _ = crate::protocol::read_setpoints(&wanted);
             }),
             ("poll", "params") => serde_json::from_value::<Poll>(value).map(drop),
             ("poll", _) => serde_json::from_value::<LastSample>(value).map(drop),
@@ -106,17 +106,17 @@ mod tests {
     }
 
     fn validators() -> BTreeMap<(&'static str, &'static str), jsonschema::Validator> {
-        let whole = schema();
-        let of = |(method, part, _): (&'static str, &'static str, Value)| {
-            let mut schema = whole["x-methods"][method][part].clone();
-            schema["$defs"] = whole["$defs"].clone();
+        let definitions = schema();
+        let definition_of = |(method, part, _): (&'static str, &'static str, Value)| {
+            let mut schema = definitions["x-methods"][method][part].clone();
+            schema["$defs"] = definitions["$defs"].clone();
             ((method, part), jsonschema::validator_for(&schema).unwrap())
         };
-        examples().into_iter().map(of).collect()
+        examples().into_iter().map(definition_of).collect()
     }
 
     /// Lists the paths of a value and of everything inside it.
-    fn places(value: &Value, here: &str, all: &mut Vec<String>) {
+    fn collect_paths(value: &Value, here: &str, all: &mut Vec<String>) {
         all.push(here.to_owned());
         let inside: Vec<(String, &Value)> = match value {
             Value::Object(map) => map.iter().map(|(key, value)| (key.clone(), value)).collect(),
@@ -125,11 +125,11 @@ mod tests {
             }
             _ => Vec::new(),
         };
-        inside.into_iter().for_each(|(key, value)| places(value, &format!("{here}/{key}"), all));
+        inside.into_iter().for_each(|(key, value)| collect_paths(value, &format!("{here}/{key}"), all));
     }
 
     /// An arbitrary value. Numbers have a fraction, because a schema accepts 1.0 as an integer and the reader does not.
-    fn thing() -> impl Strategy<Value = Value> {
+    fn arbitrary_value() -> impl Strategy<Value = Value> {
         prop_oneof![
             Just(Value::Null),
             any::<bool>().prop_map(Value::from),
@@ -154,16 +154,16 @@ mod tests {
         /// Valid messages with up to four values changed or removed: nothing panics, and a message that matches the schema is read.
         #[test]
         fn messages_that_match_the_schema_are_read(
-            which in 0usize..9, changes in prop::collection::vec((any::<prop::sample::Index>(), prop::option::of(thing())), 0..4),
+            which in 0usize..9, changes in prop::collection::vec((any::<prop::sample::Index>(), prop::option::of(arbitrary_value())), 0..4),
         ) {
             thread_local! { static VALIDATORS: BTreeMap<(&'static str, &'static str), jsonschema::Validator> = validators(); }
             let (method, part, mut value) = examples()[which].clone();
-            for (at, thing) in changes {
+            for (at, replacement) in changes {
                 let mut all = Vec::new();
-                places(&value, "", &mut all);
+                collect_paths(&value, "", &mut all);
                 let place = at.get(&all).clone();
-                match (thing, place.rsplit_once('/')) {
-                    (Some(thing), _) => *value.pointer_mut(&place).unwrap() = thing,
+                match (replacement, place.rsplit_once('/')) {
+                    (Some(replacement), _) => *value.pointer_mut(&place).unwrap() = replacement,
                     (None, Some((above, key))) => {
                         if let Some(Value::Object(map)) = value.pointer_mut(above) {
                             map.remove(key);

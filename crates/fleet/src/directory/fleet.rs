@@ -1,6 +1,6 @@
 //! The directory of a study and its layout.
 
-use crate::directory::part::{Expected, Part, PartRefusal};
+use crate::directory::part::{Part, PartRefusal, PartRequirements};
 use crate::{FleetError, Hash, ItemEntry, Kind, Study};
 use std::path::{Path, PathBuf};
 
@@ -85,8 +85,8 @@ impl Fleet {
         Part::read(&self.part(&item.hash), self.expected(item))
     }
 
-    fn expected<'a>(&'a self, item: &'a ItemEntry) -> Expected<'a> {
-        Expected { hash: &item.hash, program: &self.study.program }
+    fn expected<'a>(&'a self, item: &'a ItemEntry) -> PartRequirements<'a> {
+        PartRequirements { hash: &item.hash, program: &self.study.program }
     }
 }
 

@@ -17,7 +17,7 @@ pub struct Item {
     pub name: String,
     /// Kind of the study.
     pub kind: String,
-    /// Program, version and commit that made the item; only they may do it.
+    /// Program, version and commit that made the item; only the same program may process it.
     pub program: String,
     /// Input of the kind: campaign, machine, seed, method or case.
     pub payload: Value,

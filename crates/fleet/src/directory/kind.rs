@@ -1,4 +1,4 @@
-//! Kinds of study: how a study is split into items, how an item is done, how parts are merged.
+//! Kinds of study: the split of a study into items, the work on an item, and the merge of its parts.
 
 use crate::{FleetError, StudyFile};
 use serde_json::Value;
@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 
 /// An item before it is written.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Draft {
+pub struct ItemDraft {
     /// Display name, unique within the study.
     pub name: String,
     /// Input of the work.
@@ -16,9 +16,9 @@ pub struct Draft {
 
 /// The items of a study, and the input of merging.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Drafts {
+pub struct StudyDraft {
     /// In the order of the result.
-    pub items: Vec<Draft>,
+    pub items: Vec<ItemDraft>,
     /// Input of merging in addition to the parts.
     pub settings: Value,
 }
@@ -28,7 +28,7 @@ pub struct Drafts {
 pub struct WorkContext<'a> {
     /// A temporary directory of its own.
     pub scratch: &'a Path,
-    /// Set from outside to stop.
+    /// Set by the caller to stop.
     pub stop: &'a AtomicBool,
 }
 
@@ -73,7 +73,7 @@ impl Output {
     }
 }
 
-/// Name and result of each item in the order of the study; `Err`: why an item has none.
+/// Name and result of each item in the order of the study; `Err`: the reason why an item has none.
 pub type Results<'a> = dyn Iterator<Item = (String, Result<String, String>)> + 'a;
 
 /// A kind of study.
@@ -88,16 +88,16 @@ pub trait Kind: Sync {
     ///
     /// # Errors
     /// [`FleetError::Kind`] with all mistakes of the study.
-    fn items(&self, study: &StudyFile) -> Result<Drafts, FleetError>;
+    fn items(&self, study: &StudyFile) -> Result<StudyDraft, FleetError>;
 
-    /// Does one item and returns JSON. Equal payloads give equal results on any computer.
+    /// Processes one item and returns JSON. Equal payloads give equal results on any computer.
     ///
     /// # Errors
     /// [`WorkError`].
     fn work(&self, payload: &Value, at: WorkContext<'_>) -> Result<String, WorkError>;
 
     /// Merges the parts, which come one by one in the order of the study, into the result. Returns a one-line description. Missing
-    /// and failed parts are left out.
+    /// and failed parts are omitted.
     ///
     /// # Errors
     /// [`FleetError`] if a file cannot be written, or a part's result was not made by [`Kind::work`].

@@ -1,4 +1,4 @@
-//! The outcome of an item: a header line, then the result or the reason why there is none.
+//! The outcome of an item: a header line, then the result, or the reason for its absence.
 
 use crate::directory::shared_files::{Durability, Machine, write_whole};
 use crate::{FleetError, Hash, Item};
@@ -34,7 +34,7 @@ pub struct Part {
     pub outcome: Outcome,
     /// How long it took on one core, s.
     pub duration_s: f64,
-    /// Peak memory of the process, over its workers, bytes; 0 if unknown.
+    /// Peak memory of the process divided by its number of workers, bytes; 0 if unknown.
     pub memory_bytes: u64,
     /// Length of the body, bytes.
     pub body_bytes: u64,
@@ -42,7 +42,7 @@ pub struct Part {
     pub body_sha256: Hash,
 }
 
-/// Why a file is not a valid part of the study.
+/// Reason why a file is not a valid part of the study.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PartRefusal {
     /// It cannot be read.
@@ -83,7 +83,7 @@ pub enum PartRefusal {
 
 /// Requirements of a part file.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Expected<'a> {
+pub(crate) struct PartRequirements<'a> {
     pub hash: &'a Hash,
     pub program: &'a str,
 }
@@ -92,33 +92,36 @@ impl Part {
     /// Writes the outcome of an item.
     pub(crate) fn write(
         path: &Path,
-        of: (&Hash, &Item),
-        outcome: (Outcome, &str),
-        cost: (f64, u64),
+        (hash, item): (&Hash, &Item),
+        (outcome, body): (Outcome, &str),
+        (duration_s, memory_bytes): (f64, u64),
         machine: &Machine<'_>,
     ) -> Result<Part, FleetError> {
         let part = Part {
-            item: *of.0,
-            program: of.1.program.clone(),
-            outcome: outcome.0,
+            item: *hash,
+            program: item.program.clone(),
+            outcome,
             // Zero if the clock went backwards.
-            duration_s: if cost.0.is_finite() { cost.0.max(0.0) } else { 0.0 },
-            memory_bytes: cost.1,
-            body_bytes: outcome.1.len() as u64,
-            body_sha256: Hash::of(outcome.1.as_bytes()),
+            duration_s: if duration_s.is_finite() { duration_s.max(0.0) } else { 0.0 },
+            memory_bytes,
+            body_bytes: body.len() as u64,
+            body_sha256: Hash::of(body.as_bytes()),
         };
-        let head = serde_json::to_vec(&part).map_err(FleetError::content(path, "a part"))?;
-        write_whole(path, &[&head, b"\n", outcome.1.as_bytes()], machine.name, Durability::Synced)?;
+        let header = serde_json::to_vec(&part).map_err(FleetError::content(path, "a part"))?;
+        write_whole(path, &[&header, b"\n", body.as_bytes()], machine.name, Durability::Synced)?;
         Ok(part)
     }
 
     /// A part with its body, whose checksum is checked; `None` without a file.
-    pub(crate) fn read(path: &Path, expected: Expected<'_>) -> Option<Result<(Part, String), PartRefusal>> {
+    pub(crate) fn read(
+        path: &Path,
+        expected: PartRequirements<'_>,
+    ) -> Option<Result<(Part, String), PartRefusal>> {
         match std::fs::symlink_metadata(path) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => None,
             Err(error) => Some(Err(PartRefusal::Unread(error.to_string()))),
-            // A pipe would hang, a link may lead anywhere.
-            Ok(found) if !found.is_file() => Some(Err(PartRefusal::NotAPart)),
+            // A pipe would hang, and a link may lead anywhere.
+            Ok(metadata) if !metadata.is_file() => Some(Err(PartRefusal::NotAPart)),
             Ok(_) => Some(read_body(path, expected)),
         }
     }
@@ -128,8 +131,8 @@ fn unread(error: impl std::fmt::Display) -> PartRefusal {
     PartRefusal::Unread(error.to_string())
 }
 
-/// The header, the rest of the file, and the part of the body already read.
-fn open(path: &Path, expected: Expected<'_>) -> Result<(Part, File, Vec<u8>), PartRefusal> {
+/// The header, the file, and the bytes of the body that were read with the header.
+fn open(path: &Path, expected: PartRequirements<'_>) -> Result<(Part, File, Vec<u8>), PartRefusal> {
     let mut file = File::open(path).map_err(unread)?;
     let length = file.metadata().map_err(unread)?.len();
     let mut bytes = Vec::with_capacity(MAX_HEADER_BYTES);
@@ -152,7 +155,7 @@ fn open(path: &Path, expected: Expected<'_>) -> Result<(Part, File, Vec<u8>), Pa
     Ok((part, file, bytes.split_off(end + 1)))
 }
 
-fn read_body(path: &Path, expected: Expected<'_>) -> Result<(Part, String), PartRefusal> {
+fn read_body(path: &Path, expected: PartRequirements<'_>) -> Result<(Part, String), PartRefusal> {
     let (part, file, mut body) = open(path, expected)?;
     file.take(MAX_BODY_BYTES + 1).read_to_end(&mut body).map_err(unread)?;
     if Hash::of(&body) != part.body_sha256 {

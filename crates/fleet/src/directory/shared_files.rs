@@ -16,12 +16,12 @@ pub struct Machine<'a> {
     pub peak_memory_bytes: &'a (dyn Fn() -> Option<u64> + Sync),
 }
 
-/// When a file is flushed to the disk.
+/// Whether a file is flushed to the disk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Durability {
-    /// Flushed before it gets its name: complete after a power cut, if it exists.
+    /// Flushed before it gets its name: after a power cut, an existing file is complete.
     Synced,
-    /// Whenever the system flushes it; the file can be made again.
+    /// Flushed by the system at some time; the file can be created again.
     Unsynced,
 }
 
@@ -54,7 +54,7 @@ pub(crate) fn write_whole(
     })
 }
 
-/// Reads a regular file of at most so many bytes. A pipe or a device is not opened: it could hang.
+/// Reads a regular file of at most `limit_bytes`. A pipe or a device is not opened: it could hang.
 pub(crate) fn read_at_most(path: &Path, limit_bytes: u64) -> Result<Vec<u8>, FleetError> {
     let read = || -> std::io::Result<Vec<u8>> {
         let mut bytes = Vec::new();
@@ -68,7 +68,7 @@ pub(crate) fn read_at_most(path: &Path, limit_bytes: u64) -> Result<Vec<u8>, Fle
     read().map_err(FleetError::file("read", path))
 }
 
-/// Makes a directory and its parents.
+/// Creates a directory and its parents.
 pub(crate) fn make_directory(path: PathBuf) -> Result<PathBuf, FleetError> {
     std::fs::create_dir_all(&path).map_err(FleetError::file("create", &path))?;
     Ok(path)

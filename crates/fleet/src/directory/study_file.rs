@@ -18,7 +18,7 @@ pub enum StudyFileError {
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
     /// The file has mistakes.

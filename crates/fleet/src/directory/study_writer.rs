@@ -3,7 +3,7 @@
 use crate::directory::fleet::{BEGUN, ITEMS, LOGS, PARTS, STUDY};
 use crate::directory::shared_files::{Durability, make_directory, write_whole};
 use crate::directory::study::{LAYOUT, MAX_ITEMS};
-use crate::{Drafts, Fleet, FleetError, Hash, Item, ItemEntry, Kind, Study, StudyFile};
+use crate::{Fleet, FleetError, Hash, Item, ItemEntry, Kind, Study, StudyDraft, StudyFile};
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -33,7 +33,7 @@ impl CreatedStudy {
         writer: &str,
     ) -> Result<CreatedStudy, FleetError> {
         let earlier = existing_items(study, directory, program)?;
-        let Drafts { items, settings } = kind.items(study)?;
+        let StudyDraft { items, settings } = kind.items(study)?;
         if !(1..=MAX_ITEMS).contains(&items.len()) {
             return Err(FleetError::Items { items: items.len(), most: MAX_ITEMS });
         }

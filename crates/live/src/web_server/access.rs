@@ -18,10 +18,10 @@ impl Access {
     /// Rules for a server at this address.
     pub(crate) fn new(address: SocketAddr, token: Option<String>, encrypted: bool) -> Self {
         let port = address.port();
-        let here = ["127.0.0.1", "localhost", "[::1]"].map(|name| format!("{name}:{port}"));
+        let local_names = ["127.0.0.1", "localhost", "[::1]"].map(|name| format!("{name}:{port}"));
         let hosts = (!address.ip().is_unspecified()).then(|| {
-            let own = address.to_string();
-            here.into_iter().filter(|_| address.ip().is_loopback()).chain([own]).collect()
+            let host_name = address.to_string();
+            local_names.into_iter().filter(|_| address.ip().is_loopback()).chain([host_name]).collect()
         });
         Access { token, hosts, scheme: if encrypted { "https" } else { "http" } }
     }
@@ -29,13 +29,15 @@ impl Access {
     /// Whether the request uses the server's own host name. This rejects pages that reach the address by DNS rebinding.
     pub(crate) fn has_own_host(&self, request: &Request) -> bool {
         let Some(host) = &request.host else { return false };
-        self.hosts.as_ref().is_none_or(|hosts| hosts.iter().any(|own| own.eq_ignore_ascii_case(host)))
+        self.hosts
+            .as_ref()
+            .is_none_or(|hosts| hosts.iter().any(|host_name| host_name.eq_ignore_ascii_case(host)))
     }
 
     /// Whether the request comes from the server's own page. Browsers report the origin with every request that changes something.
     pub(crate) fn is_of_own_page(&self, request: &Request) -> bool {
-        let own = request.host.as_ref().map(|host| format!("{}://{host}", self.scheme));
-        request.origin.is_some() && request.origin == own
+        let host_name = request.host.as_ref().map(|host| format!("{}://{host}", self.scheme));
+        request.origin.is_some() && request.origin == host_name
     }
 
     /// Whether the browser reports that a page of another origin sent the request.
@@ -46,11 +48,12 @@ impl Access {
     /// Whether the request has the token, if required. The comparison takes the same time for any token of the right length.
     pub(crate) fn has_token(&self, request: &Request) -> bool {
         let Some(token) = &self.token else { return true };
-        let given =
+        let received =
             request.authorization.as_deref().and_then(|text| text.strip_prefix("Bearer ")).unwrap_or("");
-        let differs = given.len() ^ token.len();
-        let differs = given.bytes().zip(token.bytes()).fold(differs, |d, (a, b)| d | usize::from(a ^ b));
-        differs == 0
+        let difference = received.len() ^ token.len();
+        let difference =
+            received.bytes().zip(token.bytes()).fold(difference, |d, (a, b)| d | usize::from(a ^ b));
+        difference == 0
     }
 }
 
@@ -70,26 +73,33 @@ mod tests {
 
     #[test]
     fn another_name_another_page_and_another_token_are_refused() {
-        let here = Access::new("127.0.0.1:7373".parse().unwrap(), None, false);
-        assert!(here.has_own_host(&request("localhost:7373", None, None)));
-        assert!(!here.has_own_host(&request("evil.example:7373", None, None)));
-        assert!(!here.has_own_host(&request("localhost:80", None, None)));
+        let local_names = Access::new("127.0.0.1:7373".parse().unwrap(), None, false);
+        assert!(local_names.has_own_host(&request("localhost:7373", None, None)));
+        assert!(!local_names.has_own_host(&request("evil.example:7373", None, None)));
+        assert!(!local_names.has_own_host(&request("localhost:80", None, None)));
         let from = |origin| request("127.0.0.1:7373", origin, None);
-        assert!(here.is_of_own_page(&from(Some("http://127.0.0.1:7373"))));
-        assert!(!here.is_of_own_page(&from(Some("http://evil.example"))));
-        assert!(!here.is_of_own_page(&from(Some("null"))) && !here.is_of_own_page(&from(None)));
-        assert!(here.has_token(&from(None)), "none is needed on this machine");
+        assert!(local_names.is_of_own_page(&from(Some("http://127.0.0.1:7373"))));
+        assert!(!local_names.is_of_own_page(&from(Some("http://evil.example"))));
+        assert!(!local_names.is_of_own_page(&from(Some("null"))) && !local_names.is_of_own_page(&from(None)));
+        assert!(local_names.has_token(&from(None)), "none is needed on this machine");
 
-        let there = Access::new("192.0.2.7:7373".parse().unwrap(), Some("abc".to_owned()), true);
-        assert!(!there.has_own_host(&request("localhost:7373", None, None)));
-        for (given, right) in
+        let remote_server = Access::new("192.0.2.7:7373".parse().unwrap(), Some("abc".to_owned()), true);
+        assert!(!remote_server.has_own_host(&request("localhost:7373", None, None)));
+        for (received, right) in
             [("Bearer abc", true), ("Bearer abd", false), ("Bearer ab", false), ("abc", false)]
         {
-            assert_eq!(there.has_token(&request("192.0.2.7:7373", None, Some(given))), right, "{given}");
+            assert_eq!(
+                remote_server.has_token(&request("192.0.2.7:7373", None, Some(received))),
+                right,
+                "{received}"
+            );
         }
-        assert!(!there.has_token(&request("192.0.2.7:7373", None, None)));
+        assert!(!remote_server.has_token(&request("192.0.2.7:7373", None, None)));
         let from = |origin| request("192.0.2.7:7373", Some(origin), None);
-        assert!(there.is_of_own_page(&from("https://192.0.2.7:7373")));
-        assert!(!there.is_of_own_page(&from("http://192.0.2.7:7373")), "a page in clear is another one");
+        assert!(remote_server.is_of_own_page(&from("https://192.0.2.7:7373")));
+        assert!(
+            !remote_server.is_of_own_page(&from("http://192.0.2.7:7373")),
+            "a page in clear is another one"
+        );
     }
 }

@@ -10,14 +10,14 @@ const MAX_BRIEF_CONNECTIONS: usize = 32;
 /// All open connections.
 #[derive(Debug, Default)]
 pub(crate) struct Connections {
-    open: Mutex<Vec<Open>>,
+    open: Mutex<Vec<OpenConnection>>,
 }
 
 #[derive(Debug)]
-struct Open {
+struct OpenConnection {
     number: u64,
     address: IpAddr,
-    /// Handle to end it from another thread; `None` for a stream, which the hub counts.
+    /// Handle to close a short connection from another thread; `None` for a stream of events, which the hub limits.
     brief: Option<TcpStream>,
 }
 
@@ -29,19 +29,23 @@ pub(crate) struct Connection {
 }
 
 impl Connections {
-    /// Adds a connection. If too many have no known purpose yet, the oldest one of the address with the most is closed. `None` if the connection
-    /// has already gone.
+    /// Adds a connection. If there are too many short connections, the oldest one of the address with the most of them is closed. `None` if the connection
+    /// is already closed.
     pub(crate) fn admit(self: &Arc<Connections>, stream: &TcpStream) -> Option<Connection> {
-        let (address, own) = (stream.peer_addr().ok()?.ip(), stream.try_clone().ok()?);
+        let (address, own_stream) = (stream.peer_addr().ok()?.ip(), stream.try_clone().ok()?);
         let mut open = self.lock();
-        let brief = |open: &[Open], of: Option<IpAddr>| {
-            let counts = |one: &&Open| one.brief.is_some() && of.is_none_or(|address| one.address == address);
+        let brief = |open: &[OpenConnection], of: Option<IpAddr>| {
+            let counts = |connection: &&OpenConnection| {
+                connection.brief.is_some() && of.is_none_or(|address| connection.address == address)
+            };
             open.iter().filter(counts).count()
         };
         if brief(&open, None) >= MAX_BRIEF_CONNECTIONS {
             // The first of equals is the oldest, because the list is in order of arrival.
-            let most = open.iter().map(|one| brief(&open, Some(one.address))).max();
-            let leaves = |one: &Open| one.brief.is_some() && Some(brief(&open, Some(one.address))) == most;
+            let most = open.iter().map(|connection| brief(&open, Some(connection.address))).max();
+            let leaves = |connection: &OpenConnection| {
+                connection.brief.is_some() && Some(brief(&open, Some(connection.address))) == most
+            };
             let position = open.iter().position(leaves)?;
             if let Some(stream) = open.remove(position).brief {
                 // Its thread notices the closed socket and ends.
@@ -49,7 +53,7 @@ impl Connections {
             }
         }
         let number = open.last().map_or(0, |last| last.number + 1);
-        open.push(Open { number, address, brief: Some(own) });
+        open.push(OpenConnection { number, address, brief: Some(own_stream) });
         Some(Connection { all: self.clone(), number })
     }
 
@@ -59,7 +63,7 @@ impl Connections {
     }
 
     /// A thread that panicked while it held the lock left the list valid.
-    fn lock(&self) -> MutexGuard<'_, Vec<Open>> {
+    fn lock(&self) -> MutexGuard<'_, Vec<OpenConnection>> {
         self.open.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
     }
 }
@@ -67,15 +71,15 @@ impl Connections {
 impl Connection {
     /// Marks an accepted stream, which is never replaced.
     pub(crate) fn mark_as_stream(&self) {
-        if let Some(own) = self.all.lock().iter_mut().find(|one| one.number == self.number) {
-            own.brief = None;
+        if let Some(open) = self.all.lock().iter_mut().find(|connection| connection.number == self.number) {
+            open.brief = None;
         }
     }
 }
 
 impl Drop for Connection {
     fn drop(&mut self) {
-        self.all.lock().retain(|one| one.number != self.number);
+        self.all.lock().retain(|connection| connection.number != self.number);
     }
 }
 

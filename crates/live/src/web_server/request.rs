@@ -22,7 +22,7 @@ pub(crate) struct Request {
 
 /// Reads the head of a request; the body is ignored. `None` if it is invalid, too long, or too slow.
 pub(crate) fn read_request(stream: &mut impl Read) -> Option<Request> {
-    let until = Instant::now() + REQUEST_TIMEOUT;
+    let deadline = Instant::now() + REQUEST_TIMEOUT;
     let (mut head, mut piece) = (Vec::new(), [0; 1024]);
     loop {
         let count = stream.read(&mut piece).ok().filter(|count| *count > 0)?;
@@ -30,15 +30,15 @@ pub(crate) fn read_request(stream: &mut impl Read) -> Option<Request> {
         let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
         let mut parsed = httparse::Request::new(&mut headers);
         if parsed.parse(&head).ok()?.is_complete() {
-            return request_of(&parsed);
+            return convert_request(&parsed);
         }
-        if head.len() > MAX_HEAD_BYTES || Instant::now() > until {
+        if head.len() > MAX_HEAD_BYTES || Instant::now() > deadline {
             return None;
         }
     }
 }
 
-fn request_of(parsed: &httparse::Request<'_, '_>) -> Option<Request> {
+fn convert_request(parsed: &httparse::Request<'_, '_>) -> Option<Request> {
     // A duplicate header is ambiguous, so neither is used.
     let header = |name: &str| {
         let mut values = parsed.headers.iter().filter(|header| header.name.eq_ignore_ascii_case(name));

@@ -4,8 +4,8 @@ use crate::operator_commands::OperatorCommand;
 use crate::web_server::access::Access;
 use crate::web_server::connections::{Connection, Connections};
 use crate::web_server::hub::Hub;
-use crate::web_server::request::{REQUEST_TIMEOUT, Request, read_request};
-use crate::web_server::tls::{Punctual, Tls};
+use crate::web_server::request::{REQUEST_TIMEOUT, read_request};
+use crate::web_server::tls::{DeadlineStream, Tls};
 use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::sync::Arc;
@@ -22,7 +22,7 @@ const HEADERS: &str = "Cache-Control: no-store\r\nX-Content-Type-Options: nosnif
                        X-Frame-Options: DENY\r\nConnection: close\r\n";
 
 /// The served content.
-pub(crate) struct Served {
+pub(crate) struct ServedContent {
     pub(crate) page: String,
     pub(crate) access: Access,
     pub(crate) hub: Hub,
@@ -37,30 +37,38 @@ pub(crate) struct Served {
 }
 
 /// Serves until the process ends.
-pub(crate) fn serve(listener: &TcpListener, served: &Arc<Served>) {
+pub(crate) fn serve(listener: &TcpListener, served: &Arc<ServedContent>) {
     for stream in listener.incoming().filter_map(Result::ok) {
         let Some(connection) = served.connections.admit(&stream) else { continue };
         let served = served.clone();
         // If no thread can be started, the connection is dropped with its closure.
         let _ = std::thread::Builder::new().name("live".to_owned()).spawn(move || {
-            // A browser that goes away ends only its own connection.
-            let _ = connected(stream, &served, &connection);
+            // A browser that disconnects ends only its own connection.
+            let _ = handle_connection(stream, &served, &connection);
         });
     }
 }
 
-fn connected(stream: TcpStream, served: &Served, connection: &Connection) -> std::io::Result<()> {
+fn handle_connection(
+    stream: TcpStream,
+    served: &ServedContent,
+    connection: &Connection,
+) -> std::io::Result<()> {
     stream.set_read_timeout(Some(IO_TIMEOUT))?;
     stream.set_write_timeout(Some(IO_TIMEOUT))?;
     stream.set_nodelay(true)?;
-    let mut stream = Punctual { stream, until: Instant::now() + REQUEST_TIMEOUT };
+    let mut stream = DeadlineStream { stream, until: Instant::now() + REQUEST_TIMEOUT };
     match &served.tls {
         None => answer(&mut stream, served, connection),
-        Some(tls) => tls.over(stream, |stream| answer(stream, served, connection)),
+        Some(tls) => tls.serve_over(stream, |stream| answer(stream, served, connection)),
     }
 }
 
-fn answer(stream: &mut (impl Read + Write), served: &Served, connection: &Connection) -> std::io::Result<()> {
+fn answer(
+    stream: &mut (impl Read + Write),
+    served: &ServedContent,
+    connection: &Connection,
+) -> std::io::Result<()> {
     let Some(request) = read_request(stream) else { return plain(stream, "400 Bad Request") };
     let access = &served.access;
     if !access.has_own_host(&request) || access.is_of_another_page(&request) {
@@ -71,11 +79,13 @@ fn answer(stream: &mut (impl Read + Write), served: &Served, connection: &Connec
         ("GET", "/") => page(stream, &served.page),
         ("GET", "/events") if !access.has_token(&request) => plain(stream, "401 Unauthorized"),
         ("GET", "/events") => events(stream, served, connection),
-        ("POST", path) => match asked(path) {
+        ("POST", path) => match command(path) {
             None => plain(stream, "404 Not Found"),
-            Some(_) if !may_ask(access, &request) => plain(stream, "403 Forbidden"),
-            Some(asked) => {
-                (served.ask)(asked);
+            Some(_) if !(access.is_of_own_page(&request) && access.has_token(&request)) => {
+                plain(stream, "403 Forbidden")
+            }
+            Some(command) => {
+                (served.ask)(command);
                 plain(stream, "204 No Content")
             }
         },
@@ -84,11 +94,7 @@ fn answer(stream: &mut (impl Read + Write), served: &Served, connection: &Connec
     }
 }
 
-fn may_ask(access: &Access, request: &Request) -> bool {
-    access.is_of_own_page(request) && access.has_token(request)
-}
-
-fn asked(path: &str) -> Option<OperatorCommand> {
+fn command(path: &str) -> Option<OperatorCommand> {
     match path {
         "/ask/hold" => Some(OperatorCommand::Hold),
         "/ask/go-on" => Some(OperatorCommand::Continue),
@@ -121,7 +127,7 @@ fn page(stream: &mut impl Write, page: &str) -> std::io::Result<()> {
 }
 
 /// Sends the complete state, then every message, until one side disconnects.
-fn events(stream: &mut impl Write, served: &Served, connection: &Connection) -> std::io::Result<()> {
+fn events(stream: &mut impl Write, served: &ServedContent, connection: &Connection) -> std::io::Result<()> {
     let Some(messages) = served.hub.join((served.snapshot)()) else {
         return plain(stream, "503 Service Unavailable");
     };
@@ -148,9 +154,9 @@ mod tests {
     fn a_button_gets_through_whoever_holds_lines_open() {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = listener.local_addr().unwrap();
-        let asked = Arc::new(AtomicUsize::new(0));
-        let of_ask = asked.clone();
-        let served = Arc::new(Served {
+        let command = Arc::new(AtomicUsize::new(0));
+        let of_ask = command.clone();
+        let served = Arc::new(ServedContent {
             page: "x".repeat(1 << 22),
             access: Access::new(address, None, false),
             hub: Hub::default(),
@@ -187,7 +193,7 @@ mod tests {
             let mut button = send(&format!("POST /ask/safe HTTP/1.1\r\n{origin}\r\n\r\n"));
             assert_eq!(first_line(&mut button), "HTTP/1.1 204 No Content", "round {round}");
         }
-        assert_eq!(asked.load(Ordering::SeqCst), 50);
+        assert_eq!(command.load(Ordering::SeqCst), 50);
         let mut page = send(&format!("GET / HTTP/1.1\r\nHost: {address}\r\n\r\n"));
         let mut read = Vec::new();
         page.read_to_end(&mut read).unwrap();

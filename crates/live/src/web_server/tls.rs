@@ -41,12 +41,12 @@ pub enum TlsError {
 }
 
 /// A connection with a deadline for its request, so that a slow sender does not keep its slot.
-pub(crate) struct Punctual {
+pub(crate) struct DeadlineStream {
     pub(crate) stream: TcpStream,
     pub(crate) until: Instant,
 }
 
-impl Read for Punctual {
+impl Read for DeadlineStream {
     fn read(&mut self, into: &mut [u8]) -> std::io::Result<usize> {
         if Instant::now() > self.until {
             return Err(std::io::ErrorKind::TimedOut.into());
@@ -55,7 +55,7 @@ impl Read for Punctual {
     }
 }
 
-impl Write for Punctual {
+impl Write for DeadlineStream {
     fn write(&mut self, from: &[u8]) -> std::io::Result<usize> {
         self.stream.write(from)
     }
@@ -72,7 +72,7 @@ pub(crate) use without::{Tls, read};
 
 #[cfg(feature = "tls")]
 mod with {
-    use super::{Punctual, TlsError, TlsFiles};
+    use super::{DeadlineStream, TlsError, TlsFiles};
     use rustls::crypto::ring;
     use rustls::pki_types::pem::PemObject;
     use rustls::pki_types::{CertificateDer, PrivateKeyDer};
@@ -109,10 +109,10 @@ mod with {
 
     impl Tls {
         /// Runs `answer` on a connection over TLS and closes it properly, so that the client knows that no data were cut off.
-        pub(crate) fn over(
+        pub(crate) fn serve_over(
             &self,
-            stream: Punctual,
-            answer: impl FnOnce(&mut StreamOwned<ServerConnection, Punctual>) -> std::io::Result<()>,
+            stream: DeadlineStream,
+            answer: impl FnOnce(&mut StreamOwned<ServerConnection, DeadlineStream>) -> std::io::Result<()>,
         ) -> std::io::Result<()> {
             let connection = ServerConnection::new(self.0.clone()).map_err(std::io::Error::other)?;
             let mut stream = StreamOwned::new(connection, stream);
@@ -126,7 +126,7 @@ mod with {
 
 #[cfg(not(feature = "tls"))]
 mod without {
-    use super::{Punctual, TlsError, TlsFiles};
+    use super::{DeadlineStream, TlsError, TlsFiles};
 
     /// Placeholder for builds without TLS.
     #[derive(Clone)]
@@ -137,10 +137,10 @@ mod without {
     }
 
     impl Tls {
-        pub(crate) fn over(
+        pub(crate) fn serve_over(
             &self,
-            _stream: Punctual,
-            _answer: impl FnOnce(&mut Punctual) -> std::io::Result<()>,
+            _stream: DeadlineStream,
+            _answer: impl FnOnce(&mut DeadlineStream) -> std::io::Result<()>,
         ) -> std::io::Result<()> {
             match *self {}
         }

@@ -7,7 +7,7 @@ use mapper_diagnose::drift::DriftReport;
 /// for its correction, `correction_` and its cause. A missing number is empty.
 ///
 /// # Errors
-/// None in practice: the writer's own, which memory never raises.
+/// None in practice: an error of the writer, and writing to memory never fails.
 pub fn corrected_csv(report: &DriftReport) -> std::io::Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let heads = [

@@ -33,14 +33,13 @@ pub(crate) fn correction_rows(points: &[PointCorrection]) -> Vec<[String; 6]> {
 
 /// The text, in lines of a terminal.
 pub fn correction_text(map: &CorrectedMap, diagnosis: &Diagnosis) -> String {
-    let line = |line: &str| match line.chars().count() > COLUMNS {
-        true => wrapped(line, COLUMNS, 0),
-        false => format!("{line}\n"),
+    let line = |line: &str| {
+        if line.chars().count() > COLUMNS { wrapped(line, COLUMNS, 0) } else { format!("{line}\n") }
     };
-    unwrapped(map, diagnosis).lines().map(line).collect()
+    build_text(map, diagnosis).lines().map(line).collect()
 }
 
-fn unwrapped(map: &CorrectedMap, diagnosis: &Diagnosis) -> String {
+fn build_text(map: &CorrectedMap, diagnosis: &Diagnosis) -> String {
     let mut text = format!("{}\n\n", headline(diagnosis));
     if let Some(refused) = &map.refused {
         text += &format!("Nothing was corrected: {}.\n", refusal(refused));

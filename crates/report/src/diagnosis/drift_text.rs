@@ -18,11 +18,13 @@ pub fn drift_text(report: &DriftReport) -> String {
             drift.cause.show(drift.high),
             drift.onset_low_s,
             drift.onset_high_s,
-            likely(&drift.alternatives).map(|others| format!("; or {others}")).unwrap_or_default()
+            list_likely_alternatives(&drift.alternatives)
+                .map(|others| format!("; or {others}"))
+                .unwrap_or_default()
         );
     }
     if report.drifts.is_empty()
-        && let Some(others) = likely(&report.alone)
+        && let Some(others) = list_likely_alternatives(&report.alone)
     {
         let _ = writeln!(text, "Not excluded: {others}.");
     }
@@ -51,15 +53,15 @@ pub fn drift_text(report: &DriftReport) -> String {
 }
 
 /// The most probable alternatives, no drift included, with their probabilities; `None` if no alternative is probable enough.
-fn likely(alternatives: &[Alternative]) -> Option<String> {
+fn list_likely_alternatives(alternatives: &[Alternative]) -> Option<String> {
     let named = |other: &Alternative| {
         let cause = other.cause.map_or_else(|| "no drift".to_owned(), Cause::name);
         format!("{cause} {}", probability_text(other.probability))
     };
     // Half a per cent would be rounded to zero.
     let likely_alternatives = alternatives.iter().filter(|other| (5e-3..0.5).contains(&other.probability));
-    let words: Vec<String> = likely_alternatives.take(4).map(named).collect();
-    (!words.is_empty()).then(|| words.join(", "))
+    let phrases: Vec<String> = likely_alternatives.take(4).map(named).collect();
+    (!phrases.is_empty()).then(|| phrases.join(", "))
 }
 
 /// Unit, factor and decimals of a channel's changes.

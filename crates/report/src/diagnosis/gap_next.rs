@@ -15,11 +15,11 @@ pub(crate) fn next_text(diagnosis: &Diagnosis) -> String {
         (Next::Jump { .. } | Next::Soak { .. }, Some(first)) => {
             text += &format!(
                 "  {}: {:.1} min, after which the true cause should reach {}\n",
-                named(first),
+                name_experiment(first),
                 first.minutes,
                 probability_text(first.expected_probability)
             );
-            text += &how(first);
+            text += &describe_experiment(first);
         }
         (Next::Jump { .. } | Next::Soak { .. }, None) => {}
     }
@@ -34,7 +34,7 @@ pub(crate) fn next_text(diagnosis: &Diagnosis) -> String {
             experiment.entropy_drop_bit / experiment.minutes,
             experiment.entropy_drop_bit,
             probability_text(experiment.probability_settled),
-            named(experiment),
+            name_experiment(experiment),
             experiment.minutes,
         );
     }
@@ -42,7 +42,7 @@ pub(crate) fn next_text(diagnosis: &Diagnosis) -> String {
 }
 
 /// The action, in words.
-pub(crate) fn named(experiment: &Suggestion) -> String {
+pub(crate) fn name_experiment(experiment: &Suggestion) -> String {
     let Suggestion { from, to, .. } = experiment;
     let at = format!("at {:.0} krpm and opening {}", to.speed_rpm / 1e3, to.valve);
     let celsius = |change: Option<[f64; 2]>| {
@@ -80,7 +80,7 @@ pub(crate) fn named(experiment: &Suggestion) -> String {
 }
 
 /// How to run it.
-fn how(experiment: &Suggestion) -> String {
+fn describe_experiment(experiment: &Suggestion) -> String {
     let Suggestion { from, to, .. } = experiment;
     match experiment.kind {
         Kind::Jump | Kind::ValveStep => format!(

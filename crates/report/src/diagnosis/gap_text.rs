@@ -19,7 +19,7 @@ const CAUSES: usize = 5;
 /// Maximum number of places shown.
 const PLACES: usize = 5;
 
-/// The answer that nothing is wrong.
+/// Name of the hypothesis without a cause.
 pub const NOTHING: &str = "nothing beyond tolerance";
 /// The answer that the cause is not in the library.
 pub const OUTSIDE: &str = "a cause outside the catalogue";
@@ -60,7 +60,7 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
         text += &wrapped(&format!("  inseparable in this recording: {parts}"), COLUMNS, 6);
     }
     if !diagnosis.smallest_seen.is_empty() {
-        text += &smallest_seen(&diagnosis.smallest_seen);
+        text += &list_smallest_detectable(&diagnosis.smallest_seen);
     }
     text += "\nwhich\n";
     for candidate in diagnosis.listed().take(CAUSES) {
@@ -69,16 +69,16 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
             text += &format!("           indistinguishable from {}\n", set.join(" + "));
         }
     }
-    for (probability, what) in
+    for (probability, target) in
         [(diagnosis.probability_none, NOTHING), (diagnosis.probability_outside, OUTSIDE)]
     {
-        text += &format!("  {:>7}  {what}\n", probability_text(probability));
+        text += &format!("  {:>7}  {target}\n", probability_text(probability));
     }
     for suspect in &diagnosis.suspects {
         text += &format!("  suspect: {}\n", suspect_text(suspect));
     }
     text += &laws(diagnosis);
-    text += &how_far(diagnosis);
+    text += &describe_gap_reduction(diagnosis);
     let actions = stand_actions(diagnosis);
     if !actions.is_empty() {
         text += "\ncheck at the stand\n";
@@ -100,7 +100,7 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
     text
 }
 
-/// A warning that what was found is not the best explanation, on lines of its own; empty without a doubt.
+/// A warning that the named cause is not the best explanation, on separate lines; empty if there is none.
 pub fn doubt_text(doubt: Option<&str>) -> String {
     doubt.map_or_else(String::new, |doubt| wrapped(&format!("warning: {doubt}"), COLUMNS, 2))
 }
@@ -108,7 +108,7 @@ pub fn doubt_text(doubt: Option<&str>) -> String {
 /// A tolerance outside its prior, in words.
 pub fn suspect_text(suspect: &Strained) -> String {
     format!(
-        "{} ends {:.1} sigma from what is declared ({})",
+        "{} ends {:.1} sigma from its declared value ({})",
         suspect.what,
         suspect.sigmas,
         four_figures(suspect.value)
@@ -140,7 +140,7 @@ fn laws(diagnosis: &Diagnosis) -> String {
             "\nlaw\n  {}\n  {}; {} on held-out steps\n",
             law.sentence,
             probability_text(law.probability),
-            removed(law)
+            describe_removed_residual(law)
         );
         if law.probability < NOT_THE_TRUTH {
             text += "  its residual is more than noise: its form is not the true one\n";
@@ -156,7 +156,7 @@ fn laws(diagnosis: &Diagnosis) -> String {
 }
 
 /// The effect of a closure term on the gap, in words.
-fn removed(law: &Law) -> String {
+fn describe_removed_residual(law: &Law) -> String {
     match law.worse.as_slice() {
         [] => format!("removes {:.0} % of the gap", 100.0 * law.shrink),
         worse => format!("the gap does not shrink: {} gets worse", worse.join(", ")),
@@ -175,7 +175,7 @@ pub fn headline(diagnosis: &Diagnosis) -> String {
         ),
         (Verdict::WithinTolerance, Some(first)) if first.probability > diagnosis.probability_none => format!(
             "nothing beyond the declared tolerances {seen} for certain; {} is suspected ({})",
-            named(first),
+            candidate_name(first),
             probability_text(first.probability)
         ),
         (Verdict::WithinTolerance, _) if !diagnosis.suspects.is_empty() => {
@@ -183,18 +183,18 @@ pub fn headline(diagnosis: &Diagnosis) -> String {
         }
         (Verdict::WithinTolerance, _) => format!("nothing beyond the declared tolerances {seen}"),
         (Verdict::Explained, Some(first)) if is_not_borne_out(&diagnosis.gap) => {
-            format!("{} is the most probable cause; held-out steps do not confirm it", named(first))
+            format!("{} is the most probable cause; held-out steps do not confirm it", candidate_name(first))
         }
         (Verdict::Explained, Some(first)) => {
             let verb = if first.effects.len() == 1 { "explains" } else { "explain" };
-            let what =
-                since.map_or_else(|| "the gap".to_owned(), |since| format!("what changed since {since}"));
-            format!("{} {verb} {what}", named(first))
+            let target =
+                since.map_or_else(|| "the gap".to_owned(), |since| format!("the change since {since}"));
+            format!("{} {verb} {target}", candidate_name(first))
         }
         _ => {
-            let of = since.map_or_else(String::new, |since| format!(" of what changed since {since}"));
+            let suffix = since.map_or_else(String::new, |since| format!(" of the change since {since}"));
             let outside = format!(
-                "{OUTSIDE} is the most probable{of} ({})",
+                "{OUTSIDE} is the most probable{suffix} ({})",
                 probability_text(diagnosis.probability_outside)
             );
             law_found(diagnosis).map_or_else(|| outside.clone(), |law| format!("{outside}: {}", law.sentence))
@@ -210,7 +210,7 @@ fn is_not_borne_out(gap: &Gap) -> bool {
 /// Effects in both recordings, which are not judged, if a reference recording was given.
 fn not_judged(since: &Since) -> String {
     let residuals = since.lacking.iter().map(|(channel, residual)| {
-        let (scale, unit) = in_people_s_unit(&residual.unit);
+        let (scale, unit) = display_scale(&residual.unit);
         format!("{channel} {}", with_unit(four_figures(scale * residual.size), unit))
     });
     format!(
@@ -221,7 +221,7 @@ fn not_judged(since: &Since) -> String {
 }
 
 /// Pressures have many pascals.
-fn in_people_s_unit(unit: &str) -> (f64, &str) {
+fn display_scale(unit: &str) -> (f64, &str) {
     if unit == "Pa" { (1e-3, "kPa") } else { (1.0, unit) }
 }
 
@@ -231,7 +231,7 @@ fn nearest(diagnosis: &Diagnosis) -> Option<String> {
     match diagnosis.verdict {
         Verdict::PartlyExplained => Some(format!(
             "nearest in the catalogue: {}, which leaves more than the declared tolerances",
-            named(first)
+            candidate_name(first)
         )),
         Verdict::Unexplained => Some("no effect of the catalogue comes near".to_owned()),
         Verdict::WithinTolerance | Verdict::Explained => None,
@@ -239,19 +239,19 @@ fn nearest(diagnosis: &Diagnosis) -> Option<String> {
 }
 
 /// Effects by their names, with ids and onset times.
-pub fn named(candidate: &Candidate) -> String {
-    let one = |(id, name): (&String, &String)| match candidate.onsets.get(id) {
+pub fn candidate_name(candidate: &Candidate) -> String {
+    let describe = |(id, name): (&String, &String)| match candidate.onsets.get(id) {
         Some(onset) if onset.grows => format!("{name} ({id}) growing from step {}", step_number(onset.step)),
         Some(onset) => format!("{name} ({id}) from step {} on", step_number(onset.step)),
         None => format!("{name} ({id})"),
     };
-    candidate.effects.iter().zip(&candidate.names).map(one).collect::<Vec<_>>().join(" + ")
+    candidate.effects.iter().zip(&candidate.names).map(describe).collect::<Vec<_>>().join(" + ")
 }
 
 /// A cause with its parameters.
 pub fn cause(candidate: &Candidate) -> String {
     let parameters: Vec<String> = candidate.parameters.iter().map(|(name, e)| parameter(name, e)).collect();
-    format!("{}: {}", named(candidate), parameters.join(", "))
+    format!("{}: {}", candidate_name(candidate), parameters.join(", "))
 }
 
 fn parameter(name: &str, estimate: &Estimate) -> String {
@@ -262,7 +262,7 @@ fn parameter(name: &str, estimate: &Estimate) -> String {
 }
 
 /// The smallest detectable size of each effect.
-fn smallest_seen(effects: &[SmallestSeen]) -> String {
+fn list_smallest_detectable(effects: &[SmallestSeen]) -> String {
     let mut text =
         "\nan effect would have been named, in 95 of 100 recordings like this one, from\n".to_owned();
     for seen in effects {
@@ -276,27 +276,26 @@ fn smallest_seen(effects: &[SmallestSeen]) -> String {
 const NAMED_SHARE: f64 = 0.2;
 
 /// Number of steps that support the cause, and the step that dominates the gap.
-fn carried_by(gap: &mapper_diagnose::gap::findings::report::Gap) -> String {
-    let all = gap.held_out_steps.len();
-    if all == 0 {
+fn describe_support(gap: &mapper_diagnose::gap::findings::report::Gap) -> String {
+    let count = gap.held_out_steps.len();
+    if count == 0 {
         return String::new();
     }
-    let mut text = format!("  {} of {all} steps show a gap", gap.steps_with_gap);
+    let mut text = format!("  {} of {count} steps show a gap", gap.steps_with_gap);
     if let Some(step) = gap.largest_step.filter(|_| gap.largest_share >= NAMED_SHARE) {
-        text +=
-            &format!("; step {} alone carries {:.0} % of it", step_number(step), 100.0 * gap.largest_share);
+        text += &format!("; step {} has {:.0} % of it", step_number(step), 100.0 * gap.largest_share);
     }
     text + "\n"
 }
 
-fn how_far(diagnosis: &Diagnosis) -> String {
+fn describe_gap_reduction(diagnosis: &Diagnosis) -> String {
     let gap = &diagnosis.gap;
     if let Some(law) = law_found(diagnosis) {
-        return how_far_by(diagnosis, law, gap.folds.iter().map(Vec::len).sum());
+        return describe_law_reduction(diagnosis, law, gap.folds.iter().map(Vec::len).sum());
     }
     let named = matches!(diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained);
     let mut text = match gap.folds.len() {
-        0 | 1 => "\nhow far, on the steps that were fitted: too few to hold any out\n".to_owned(),
+        0 | 1 => "\nhow far, on the fitted steps; there are too few to hold any out\n".to_owned(),
         folds => format!(
             "\nhow far, each of {} steps by a fit that did not see it ({folds} folds, each over all speeds and openings)\n",
             gap.held_out_steps.len()
@@ -314,21 +313,21 @@ fn how_far(diagnosis: &Diagnosis) -> String {
             (100.0 * gap.shrink_low).floor(),
             (100.0 * gap.shrink_high).ceil()
         );
-        text += &carried_by(gap);
+        text += &describe_support(gap);
     } else if !gap.worse.is_empty() {
         text += &format!("  the gap does not shrink: {} gets worse\n", gap.worse.join(", "));
     }
     text += &by_channel(diagnosis, &gap.channels, "with the cause", if named { 3 } else { 2 });
-    text += &touched(diagnosis);
+    text += &list_affected_points(diagnosis);
     if named {
-        text += &strained(gap);
+        text += &describe_strained_tolerance(gap);
         text += &points(&gap.points);
     }
     text
 }
 
 /// Points that a cause outside the library may touch, if no law describes it.
-fn touched(diagnosis: &Diagnosis) -> String {
+fn list_affected_points(diagnosis: &Diagnosis) -> String {
     let points = diagnosis.gap.points.iter().enumerate();
     let largest = points.max_by(|a, b| a.1.eta_residual.total_cmp(&b.1.eta_residual));
     let Some((step, point)) = largest.filter(|_| diagnosis.is_outside_without_law()) else {
@@ -346,12 +345,12 @@ fn touched(diagnosis: &Diagnosis) -> String {
 }
 
 /// If tolerances can replace the cause without a larger residual: the tolerance that would have to exceed its prior.
-fn strained(gap: &Gap) -> String {
+fn describe_strained_tolerance(gap: &Gap) -> String {
     let Some(strained) = gap.strained.as_ref().filter(|_| gap.shrink < STANDS_IN) else {
         return String::new();
     };
     format!(
-        "  tolerances can stand in for the cause, beyond what is declared: {} by {:.1} sigma\n",
+        "  tolerances can replace the cause, but exceed their declaration: {} by {:.1} sigma\n",
         strained.what, strained.sigmas
     )
 }
@@ -360,12 +359,12 @@ fn strained(gap: &Gap) -> String {
 const STANDS_IN: f64 = 0.5;
 
 /// The gap reduction of a closure term that resembles no effect of the library.
-fn how_far_by(diagnosis: &Diagnosis, law: &Law, steps: usize) -> String {
+fn describe_law_reduction(diagnosis: &Diagnosis, law: &Law, steps: usize) -> String {
     let seen = match law.held_out_steps {
-        0 => "on the steps that were fitted: too few to hold any out".to_owned(),
+        0 => "on the fitted steps; there are too few to hold any out".to_owned(),
         held => format!("on {held} of {steps} steps, used neither to find the law nor to fit it"),
     };
-    format!("\nhow far, {seen}\n  {}\n", removed(law))
+    format!("\nhow far, {seen}\n  {}\n", describe_removed_residual(law))
         + by_channel(diagnosis, &law.channels, "with the law", 3).as_str()
 }
 
@@ -383,7 +382,7 @@ fn by_channel(
     }
     text += "\n";
     for (channel, row) in channels {
-        let (scale, unit) = in_people_s_unit(&row.unit);
+        let (scale, unit) = display_scale(&row.unit);
         text += &format!("  {channel:4}");
         for value in [row.nominal, row.before, row.after].iter().take(columns) {
             text += &format!(" {:>18}", four_figures(scale * value));
@@ -395,8 +394,8 @@ fn by_channel(
 
 /// The effect of the cause on efficiency and heat transfer at equal speed and pressures.
 fn points(points: &[PointGap]) -> String {
-    let largest = |of: fn(&PointGap) -> f64| {
-        let changes = points.iter().map(of).filter(|d| d.is_finite());
+    let largest = |suffix: fn(&PointGap) -> f64| {
+        let changes = points.iter().map(suffix).filter(|d| d.is_finite());
         changes.fold(0.0f64, |most, d| if d.abs() > most.abs() { d } else { most })
     };
     let eta_points = 100.0 * largest(|p| p.eta_after - p.eta_before);

@@ -13,7 +13,7 @@ pub fn gap_warning_text(warning: &GapWarning) -> String {
             format!("{channel} is not recorded: the campaign's value is used")
         }
         GapWarning::GapsInRecording { gaps, missing_s } => format!(
-            "the recording has {gaps} gap(s), {missing_s:.1} s in total; blocks without samples are left out"
+            "the recording has {gaps} gap(s), {missing_s:.1} s in total; blocks without samples are omitted"
         ),
         GapWarning::AssumedNoise { channel, noise_sigma } => format!(
             "no noise is declared for {channel}: that of a typical sensor is used, {noise_sigma} {}",
@@ -36,7 +36,7 @@ pub fn gap_warning_text(warning: &GapWarning) -> String {
         ),
         GapWarning::DriftNotSubtracted { reason } => {
             format!(
-                "a drift was found and not subtracted, because nothing but noise is left without it: {reason}"
+                "a drift was found and not subtracted, because the residual without it is only noise: {reason}"
             )
         }
         GapWarning::RecordingIncomplete { reason } => reason.clone(),

@@ -96,7 +96,7 @@ const EFFECTS: [(&str, &str); 31] = [
     ),
 ];
 
-/// What to check where a cause acts that is not in the library.
+/// Checks for a cause outside the library, by the part of the machine where it acts.
 const PLACES: [(&str, &str); 19] = [
     ("actuator", "check the turbine inlet valve and its controller: set-point, position, pressure"),
     ("turbine_flow", "check for leaks before the turbine, its vanes and the turbine flow meter"),
@@ -137,7 +137,7 @@ const PLACES: [(&str, &str); 19] = [
     ),
 ];
 
-fn of(table: &[(&str, &'static str)], name: &str) -> Option<&'static str> {
+fn find_action(table: &[(&str, &'static str)], name: &str) -> Option<&'static str> {
     table.iter().find(|(known, _)| *known == name).map(|(_, action)| *action)
 }
 
@@ -151,15 +151,19 @@ pub fn stand_actions(diagnosis: &Diagnosis) -> Vec<String> {
         .enumerate()
         .filter(|(place, candidate)| candidate.probability >= WORTH_A_CHECK || (*place == 0 && named));
     if diagnosis.verdict == Verdict::WithinTolerance && diagnosis.off_at_rest.is_empty() {
-        actions.extend(open.flat_map(|(_, candidate)| &candidate.effects).filter_map(|id| of(&EFFECTS, id)));
+        actions.extend(
+            open.flat_map(|(_, candidate)| &candidate.effects).filter_map(|id| find_action(&EFFECTS, id)),
+        );
     } else {
         if diagnosis.verdict != Verdict::WithinTolerance {
             let sets = open
                 .flat_map(|(_, candidate)| std::iter::once(&candidate.effects).chain(&candidate.equivalent));
-            actions.extend(sets.flatten().filter_map(|id| of(&EFFECTS, id)));
+            actions.extend(sets.flatten().filter_map(|id| find_action(&EFFECTS, id)));
         }
         if diagnosis.verdict != Verdict::Explained || actions.is_empty() {
-            actions.extend(diagnosis.r#where.iter().take(2).filter_map(|place| of(&PLACES, &place.submodel)));
+            actions.extend(
+                diagnosis.r#where.iter().take(2).filter_map(|place| find_action(&PLACES, &place.submodel)),
+            );
         }
     }
     let mut once: Vec<String> = diagnosis
@@ -183,7 +187,7 @@ pub fn next_measurement(diagnosis: &Diagnosis) -> Option<String> {
         Next::Jump { .. } | Next::Soak { .. } => {
             format!(
                 "measure: {}, {} min",
-                crate::diagnosis::gap_next::named(first?),
+                crate::diagnosis::gap_next::name_experiment(first?),
                 number(Some(first?.minutes), 1)
             )
         }
@@ -192,7 +196,7 @@ pub fn next_measurement(diagnosis: &Diagnosis) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::{EFFECTS, PLACES, of};
+    use super::{EFFECTS, PLACES, find_action};
     use mapper_physics::rig::effect::Submodel;
 
     #[test]
@@ -206,6 +210,6 @@ mod tests {
         let unknown: Vec<&str> =
             EFFECTS.iter().map(|(id, _)| *id).filter(|id| !known.iter().any(|known| known == id)).collect();
         assert!(unknown.is_empty(), "no such effects: {unknown:?}");
-        assert!(Submodel::ALL.iter().all(|part| of(&PLACES, part.name()).is_some()));
+        assert!(Submodel::ALL.iter().all(|part| find_action(&PLACES, part.name()).is_some()));
     }
 }

@@ -31,7 +31,7 @@ impl Display {
             Kind::Temperature => &self.units.temperature,
             _ => return inside,
         };
-        Self::in_unit(kind, symbol, inside)
+        Self::convert_to_unit(kind, symbol, inside)
     }
 
     /// A reading of a channel converted to the display unit, for drawing.
@@ -75,28 +75,33 @@ impl Display {
         Some(shown).filter(|shown| shown.is_finite() && *shown != 0.0)
     }
 
-    fn in_unit(kind: Kind, symbol: &str, inside: f64) -> f64 {
+    fn convert_to_unit(kind: Kind, symbol: &str, inside: f64) -> f64 {
         // A checked campaign names only existing units; anything else is shown in SI.
         kind.unit(symbol).map_or(inside, |unit| unit.from_inside(inside))
     }
 
-    fn shown(kind: Kind, symbol: &str, value: f64, decimals: usize) -> String {
-        format!("{:.decimals$}", Self::in_unit(kind, symbol, value))
+    fn format_in_unit(kind: Kind, symbol: &str, value: f64, decimals: usize) -> String {
+        format!("{:.decimals$}", Self::convert_to_unit(kind, symbol, value))
     }
 
     /// Column head: name, and the unit of speeds.
-    pub fn speed_head(&self, what: &str) -> String {
-        format!("{what} {}", self.units.speed)
+    pub fn speed_head(&self, name: &str) -> String {
+        format!("{name} {}", self.units.speed)
     }
 
     /// A shaft speed.
     pub fn speed(&self, speed_rpm: f64) -> String {
-        Self::shown(Kind::Speed, &self.units.speed, speed_rpm, if self.units.speed == "krpm" { 2 } else { 0 })
+        Self::format_in_unit(
+            Kind::Speed,
+            &self.units.speed,
+            speed_rpm,
+            if self.units.speed == "krpm" { 2 } else { 0 },
+        )
     }
 
     /// The name of a speed line: its corrected speed in three figures.
     pub fn line_name(&self, speed_corrected_rpm: f64) -> String {
-        let speed = Self::in_unit(Kind::Speed, &self.units.speed, speed_corrected_rpm);
+        let speed = Self::convert_to_unit(Kind::Speed, &self.units.speed, speed_corrected_rpm);
         let exponent = if speed == 0.0 { 0 } else { speed.abs().log10().floor() as i32 };
         let last = 10f64.powi(exponent - 2);
         let text = format!("{:.*}", (2 - exponent).max(0) as usize, (speed / last).round() * last);
@@ -115,8 +120,8 @@ impl Display {
     }
 
     /// Column head: name, and the unit of pressures.
-    pub fn pressure_head(&self, what: &str) -> String {
-        format!("{what} {}", self.units.pressure)
+    pub fn pressure_head(&self, name: &str) -> String {
+        format!("{name} {}", self.units.pressure)
     }
 
     /// A pressure.
@@ -126,17 +131,17 @@ impl Display {
             "bar" => 4,
             _ => 2,
         };
-        Self::shown(Kind::Pressure, &self.units.pressure, pressure_pa, decimals)
+        Self::format_in_unit(Kind::Pressure, &self.units.pressure, pressure_pa, decimals)
     }
 
     /// Column head: name, and the unit of flows.
-    pub fn flow_head(&self, what: &str) -> String {
-        format!("{what} {}", self.units.flow)
+    pub fn flow_head(&self, name: &str) -> String {
+        format!("{name} {}", self.units.flow)
     }
 
     /// A mass flow.
     pub fn flow(&self, flow_kg_s: f64) -> String {
-        Self::shown(
+        Self::format_in_unit(
             Kind::MassFlow,
             &self.units.flow,
             flow_kg_s,
@@ -145,12 +150,12 @@ impl Display {
     }
 
     /// Column head: name, and the unit of temperatures.
-    pub fn temperature_head(&self, what: &str) -> String {
-        format!("{what} {}", self.units.temperature)
+    pub fn temperature_head(&self, name: &str) -> String {
+        format!("{name} {}", self.units.temperature)
     }
 
     /// A temperature.
     pub fn temperature(&self, temperature_k: f64) -> String {
-        Self::shown(Kind::Temperature, &self.units.temperature, temperature_k, 1)
+        Self::format_in_unit(Kind::Temperature, &self.units.temperature, temperature_k, 1)
     }
 }

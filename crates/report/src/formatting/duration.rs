@@ -24,7 +24,7 @@ mod tests {
 
     #[test]
     fn rounded_and_never_sixty_of_anything() {
-        for (seconds, words) in [
+        for (seconds, phrases) in [
             (0.4, "0 s"),
             (59.6, "1 min"),
             (90.0, "1 min 30 s"),
@@ -32,7 +32,7 @@ mod tests {
             (4959.0, "1 h 23 min"),
             (7199.0, "2 h 00 min"),
         ] {
-            assert_eq!(duration(seconds), words, "{seconds}");
+            assert_eq!(duration(seconds), phrases, "{seconds}");
         }
     }
 }

@@ -13,14 +13,14 @@ pub enum Paint {
 }
 
 /// Words in the colour of a verdict: green, yellow, red.
-pub fn paint_verdict(verdict: Verdict, words: &str, paint: Paint) -> String {
+pub fn paint_verdict(verdict: Verdict, text: &str, paint: Paint) -> String {
     let code = match verdict {
         Verdict::Good => 32,
         Verdict::Doubtful => 33,
         Verdict::Unusable => 31,
     };
     match paint {
-        Paint::Plain => words.to_owned(),
-        Paint::Coloured => format!("\u{1b}[{code}m{words}\u{1b}[0m"),
+        Paint::Plain => text.to_owned(),
+        Paint::Coloured => format!("\u{1b}[{code}m{text}\u{1b}[0m"),
     }
 }

@@ -70,9 +70,10 @@ impl TextTable {
         let texts = columns.iter().skip(1).filter(|column| self.texts.contains(*column));
         let widest = texts.max_by_key(|column| width(column)).copied();
         for (place, column) in columns.iter().enumerate() {
-            let constraint = match Some(*column) == widest {
-                true => ColumnConstraint::LowerBoundary(Width::Fixed(TEXT)),
-                false => ColumnConstraint::ContentWidth,
+            let constraint = if Some(*column) == widest {
+                ColumnConstraint::LowerBoundary(Width::Fixed(TEXT))
+            } else {
+                ColumnConstraint::ContentWidth
             };
             if let Some(laid_out) = table.column_mut(place) {
                 laid_out.set_constraint(constraint);
@@ -82,7 +83,7 @@ impl TextTable {
     }
 
     /// As many columns as fit, below each other.
-    fn in_parts(&self) -> Vec<String> {
+    fn split_into_parts(&self) -> Vec<String> {
         let part = |columns: &[usize]| {
             let text = lines(&self.laid_out(columns, NARROW));
             if fits(&text) { text } else { lines(&self.with_a_broken_text(columns)) }
@@ -112,12 +113,13 @@ fn fits(text: &str) -> bool {
 
 impl fmt::Display for TextTable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let all: Vec<usize> = (0..self.heads.len()).collect();
+        let every_column: Vec<usize> = (0..self.heads.len()).collect();
         let has_texts = self.texts.iter().any(|column| *column > 0);
         let widths = [COLUMNS, NARROW, NARROWEST].into_iter();
-        let text = widths.map(|width| lines(&self.laid_out(&all, width))).find(|text| fits(text));
-        let broken = || Some(lines(&self.with_a_broken_text(&all))).filter(|text| has_texts && fits(text));
-        f.write_str(&text.or_else(broken).unwrap_or_else(|| self.in_parts().join("\n\n")))
+        let text = widths.map(|width| lines(&self.laid_out(&every_column, width))).find(|text| fits(text));
+        let broken =
+            || Some(lines(&self.with_a_broken_text(&every_column))).filter(|text| has_texts && fits(text));
+        f.write_str(&text.or_else(broken).unwrap_or_else(|| self.split_into_parts().join("\n\n")))
     }
 }
 

@@ -9,8 +9,8 @@ pub fn wrapped(text: &str, columns: usize, indent: usize) -> String {
         let start = line.len() - line.trim_start().len();
         let mut length = start;
         lines.push_str(&line[..start]);
-        for (index, words) in with_their_units(line).into_iter().enumerate() {
-            let word = words.join(" ");
+        for (index, phrases) in with_their_units(line).into_iter().enumerate() {
+            let word = phrases.join(" ");
             let width = word.chars().count();
             if index > 0 && length + 1 + width > columns {
                 lines.push('\n');
@@ -36,9 +36,8 @@ fn with_their_units(line: &str) -> Vec<Vec<&str>> {
     let mut groups: Vec<Vec<&str>> = Vec::new();
     for word in line.split_whitespace() {
         let is_number = |word: &str| word.parse::<f64>().is_ok();
-        let belongs = |last: &&str| match is_number(word) {
-            true => *last == "+/-",
-            false => is_number(last) && word.len() <= UNIT,
+        let belongs = |last: &&str| {
+            if is_number(word) { *last == "+/-" } else { is_number(last) && word.len() <= UNIT }
         };
         match groups.last_mut().filter(|group| group.last().is_some_and(belongs)) {
             Some(group) => group.push(word),

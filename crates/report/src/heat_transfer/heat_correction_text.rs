@@ -16,7 +16,7 @@ pub fn heat_correction_text(correction: &HeatCorrection) -> String {
         _ => format!("heat       {:.0} W, as given\n", correction.heat_w),
     };
     if correction.heat_shown_w.is_some_and(|shown_w| shown_w <= 0.0) {
-        text += "           slow lines take no more work than fast ones: nothing is taken off\n";
+        text += "           slow lines do not need more work than fast ones: nothing is subtracted\n";
     }
     if correction.scatter_ratio.is_some_and(|ratio| ratio > ONE_CURVE_RATIO) {
         text += "           the lines do not become one curve: part of this is not heat, and slow lines come out too good\n";

@@ -66,9 +66,9 @@ impl ThermalExport<'_> {
             "# thermal model of {}\n# Nu = a Re^b Pr^(1/3) (mu/mu_wall)^0.14, Re = 4 m/(pi D mu), over the compressor's inner walls\n",
             one_line(self.machine)
         );
-        let law = self.found.and_then(|found| found.convection.as_ref());
-        let mut shared = |name: &str, unit: &str, found: Option<&SharedValue>, declared: f64| {
-            let (value, origin) = match found.and_then(|shared| Some((shared.value?, shared))) {
+        let law = self.found.and_then(|identified| identified.convection.as_ref());
+        let mut shared = |name: &str, unit: &str, identified: Option<&SharedValue>, declared: f64| {
+            let (value, origin) = match identified.and_then(|shared| Some((shared.value?, shared))) {
                 Some((value, shared)) => {
                     let (low, high) = shared.interval_95().unwrap_or((value, value));
                     let origin = match shared.origin {
@@ -87,7 +87,7 @@ impl ThermalExport<'_> {
         shared("alpha_area", "1", self.found.map(|f| &f.alpha_area_ratio), compressor.alpha_area_ratio);
         shared("t2_probe_diameter", "m", self.found.map(|f| &f.probe_diameter_m), params.t2_probe_diameter_m);
         shared("direction_factor", "1", self.found.map(|f| &f.direction_factor), 1.0);
-        if let Some(inlet) = self.found.and_then(|found| found.inlet) {
+        if let Some(inlet) = self.found.and_then(|identified| identified.inlet) {
             let _ =
                 writeln!(text, "inlet_diameter {} m # declared\n# {}", inlet.diameter_m, inlet_text(&inlet));
         }

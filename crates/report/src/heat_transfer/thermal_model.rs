@@ -38,7 +38,7 @@ pub fn thermal_text(thermal: &ThermalModel) -> String {
     if let Some(law) = &thermal.convection {
         let _ = writeln!(
             text,
-            "  the law holds from Re {:.0} to {:.0}; single points lie {:.1} % off it",
+            "  the law holds from Re {:.0} to {:.0}; single points deviate by {:.1} %",
             law.reynolds_range.0,
             law.reynolds_range.1,
             100.0 * law.deviation_ratio
@@ -50,7 +50,7 @@ pub fn thermal_text(thermal: &ThermalModel) -> String {
     for pair in &thermal.entangled {
         let _ = writeln!(
             text,
-            "  {} and {} are hardly distinguishable (correlation {:+.2})",
+            "  {} and {} are barely distinguishable (correlation {:+.2})",
             pair.first, pair.second, pair.correlation
         );
     }
@@ -62,24 +62,24 @@ pub fn thermal_text(thermal: &ThermalModel) -> String {
 
 /// The relation for h before the wheel, and whether the recording determines it, as one line without its end.
 pub(crate) fn inlet_text(inlet: &IdentifiedInlet) -> String {
-    let named = |convection: InletConvection| match convection {
+    let law_name = |convection: InletConvection| match convection {
         InletConvection::Shared => "that behind it".to_owned(),
         InletConvection::Own => format!("the same law at the inlet's {:.1} mm", 1e3 * inlet.diameter_m),
     };
-    let here = named(inlet.convection);
+    let law = law_name(inlet.convection);
     match (inlet.origin, inlet.alpha_area_otherwise_ratio) {
-        (Origin::Assumed, _) => format!("h before the wheel: {here} (declared)"),
+        (Origin::Assumed, _) => format!("h before the wheel: {law} (declared)"),
         (Origin::Fitted, _) => {
-            format!("h before the wheel: {here}, says the recording (probability {:.2})", inlet.probability)
+            format!("h before the wheel: {law}, says the recording (probability {:.2})", inlet.probability)
         }
         (Origin::NotIdentifiable, None) => format!(
-            "h before the wheel: {here}; the recording does not distinguish it from {} (probability {:.2}): the intervals contain both",
-            named(inlet.convection.other()),
+            "h before the wheel: {law}; the recording does not distinguish it from {} (probability {:.2}): the intervals contain both",
+            law_name(inlet.convection.other()),
             inlet.probability
         ),
         (Origin::NotIdentifiable, Some(alpha)) => format!(
-            "h before the wheel: {here}; the recording does not distinguish it from {}, with which alpha_A would be {alpha:.3} (probability {:.2}): the intervals contain both",
-            named(inlet.convection.other()),
+            "h before the wheel: {law}; the recording does not distinguish it from {}, with which alpha_A would be {alpha:.3} (probability {:.2}): the intervals contain both",
+            law_name(inlet.convection.other()),
             inlet.probability
         ),
     }
@@ -133,7 +133,7 @@ mod tests {
         let text = thermal_text(&thermal);
         assert!(!text.contains("before the wheel"), "what makes no difference is not reported: {text}");
         assert!(text.contains("not identifiable from the recording"), "{text}");
-        assert!(text.contains("alpha_A and direction factor are hardly distinguishable"), "{text}");
+        assert!(text.contains("alpha_A and direction factor are barely distinguishable"), "{text}");
         let json = serde_json::to_value(&thermal).unwrap_or_default();
         assert_eq!(json["entangled"][0]["correlation"], 0.97);
         assert_eq!(json["alpha_area_ratio"]["value"], serde_json::Value::Null);

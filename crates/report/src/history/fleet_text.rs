@@ -10,15 +10,15 @@ const SHOWN: usize = 20;
 /// Done, in progress, failed, missing, remaining time.
 pub fn status_text(name: &str, status: &Status, queue: Option<&BTreeMap<String, usize>>) -> String {
     let mut text = format!("{name}: {} of {} items done", status.done, status.items);
-    let begun = status.begun();
-    for (count, what) in [
+    let in_progress = status.started_items();
+    for (count, state) in [
         (status.failed.len(), "failed"),
-        (status.refused.len(), "with a part that is left out"),
-        (begun, "begun"),
-        (status.missing.len() - begun, "not begun"),
+        (status.refused.len(), "with an invalid part"),
+        (in_progress, "in progress"),
+        (status.missing.len() - in_progress, "not started"),
     ] {
         if count > 0 {
-            let _ = write!(text, ", {count} {what}");
+            let _ = write!(text, ", {count} {state}");
         }
     }
     text += "\n";
@@ -36,18 +36,18 @@ pub fn status_text(name: &str, status: &Status, queue: Option<&BTreeMap<String, 
 /// Every item without a result, and the files that were left out.
 fn lacking_text(status: &Status, shown: impl Fn(&UnfinishedItem) -> bool) -> String {
     let mut text = String::new();
-    for (items, what) in [(&status.failed, "failed"), (&status.refused, "left out, its part")] {
+    for (items, state) in [(&status.failed, "failed"), (&status.refused, "invalid, its part")] {
         list(&mut text, items, |item| {
-            format!("{what}: {} ({}): {}", item.name, item.hash.short(), item.why.as_deref().unwrap_or("-"))
+            format!("{state}: {} ({}): {}", item.name, item.hash.short(), item.why.as_deref().unwrap_or("-"))
         });
     }
     let missing: Vec<&UnfinishedItem> = status.missing.iter().filter(|item| shown(item)).collect();
     list(&mut text, &missing, |item| {
-        let begun = item.why.as_ref().map_or_else(String::new, |who| format!(", begun by {who}"));
-        format!("missing: {} ({}){begun}", item.name, item.hash.short())
+        let worker = item.why.as_ref().map_or_else(String::new, |who| format!(", started by {who}"));
+        format!("missing: {} ({}){worker}", item.name, item.hash.short())
     });
     list(&mut text, &status.strangers, |name| {
-        format!("left out: parts/{name} belongs to no item of this study")
+        format!("omitted: parts/{name} belongs to no item of this study")
     });
     text
 }
@@ -67,10 +67,10 @@ pub fn merged_text(merged: &MergeOutcome) -> String {
     let mut text = lacking_text(status, |_| true);
     match &merged.result {
         Some((path, description)) => {
-            let of = if status.unfinished() > 0 { " (incomplete)" } else { "" };
+            let note = if status.unfinished() > 0 { " (incomplete)" } else { "" };
             let _ = writeln!(
                 text,
-                "merged {} of {} items{of} in {}\n{description}",
+                "merged {} of {} items{note} in {}\n{description}",
                 status.done,
                 status.items,
                 path.display()

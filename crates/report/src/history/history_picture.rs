@@ -113,14 +113,14 @@ mod tests {
     #[test]
     fn dates_are_midnights_in_order_and_few() {
         let noon_ms = 20_000 * 86_400_000 + 43_200_000;
-        let of = |days: i64| dates(noon_ms, noon_ms + days * 86_400_000);
-        assert_eq!(of(0), [(0.0, "04 Oct".to_owned())]);
-        assert_eq!(of(2)[1..], [(0.5, "05 Oct".to_owned()), (1.5, "06 Oct".to_owned())]);
+        let dates_for = |days: i64| dates(noon_ms, noon_ms + days * 86_400_000);
+        assert_eq!(dates_for(0), [(0.0, "04 Oct".to_owned())]);
+        assert_eq!(dates_for(2)[1..], [(0.5, "05 Oct".to_owned()), (1.5, "06 Oct".to_owned())]);
         for days in [0, 1, 5, 6, 7, 100, 10_000] {
-            let dates = of(days);
+            let dates = dates_for(days);
             assert!((1..=DATES_MAX as usize + 1).contains(&dates.len()), "{days}: {}", dates.len());
             assert!(dates.windows(2).all(|pair| pair[0].0 < pair[1].0), "{days}");
         }
-        assert!(of(10_000)[0].1.starts_with("2024-"), "a year where there are several");
+        assert!(dates_for(10_000)[0].1.starts_with("2024-"), "a year where there are several");
     }
 }

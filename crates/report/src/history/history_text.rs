@@ -15,7 +15,7 @@ fn heads(first: &[&str], figures: &[Metric]) -> Vec<String> {
     first.iter().map(|head| (*head).to_owned()).chain(figure_heads).collect()
 }
 
-fn shown(figure: Metric, value: Option<f64>) -> String {
+fn format_metric(figure: Metric, value: Option<f64>) -> String {
     let decimals = match figure {
         Metric::GoodPoints | Metric::HMean | Metric::HTrueMean | Metric::RigMinutes => 1,
         _ => 3,
@@ -54,7 +54,10 @@ pub fn groups_text(runs: &[ListedRun], figures: &[Metric]) -> String {
             group.first().map(|listed| state(listed)).unwrap_or_default().to_owned(),
         ];
         row.extend(figures.iter().map(|figure| {
-            shown(*figure, median(group.iter().filter_map(|listed| listed.run.figures.get(figure).copied())))
+            format_metric(
+                *figure,
+                median(group.iter().filter_map(|listed| listed.run.figures.get(figure).copied())),
+            )
         }));
         table.add_row(row);
     }
@@ -79,7 +82,9 @@ pub fn runs_text(runs: &[ListedRun], figures: &[Metric]) -> String {
             key.seed.to_string(),
             state(listed).to_owned(),
         ];
-        row.extend(figures.iter().map(|figure| shown(*figure, listed.run.figures.get(figure).copied())));
+        row.extend(
+            figures.iter().map(|figure| format_metric(*figure, listed.run.figures.get(figure).copied())),
+        );
         table.add_row(row);
     }
     format!("{table}\n\n{failures}{} runs.\n", runs.len())

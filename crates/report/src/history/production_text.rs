@@ -3,15 +3,15 @@
 use crate::formatting::{number, table};
 use crate::history::history_text::time;
 use mapper_history::{
-    DeviationPattern, Drift, MIN_MACHINES_FOR_OUTLIERS, Outlier, Place, Production, Spread, Stand,
+    DeviationPattern, Drift, MIN_MACHINES_FOR_OUTLIERS, Outlier, Production, ProductionPoint, Spread, Stand,
 };
 
 /// Everything, a table and a few sentences for each campaign and method.
 pub fn production_text(productions: &[Production]) -> String {
-    productions.iter().map(one).collect::<Vec<_>>().join("\n")
+    productions.iter().map(describe_production).collect::<Vec<_>>().join("\n")
 }
 
-fn one(production: &Production) -> String {
+fn describe_production(production: &Production) -> String {
     let (machines, nights) = (production.machines.len(), production.nights_ms.len());
     let mut text = format!(
         "{} by {}: {machines} machines, {nights} {}, {} runs\n\n",
@@ -51,7 +51,7 @@ fn one(production: &Production) -> String {
         None => format!("fewer than {MIN_MACHINES_FOR_OUTLIERS} machines: outliers are not determined\n"),
         Some(outliers) if outliers.is_empty() => "no machine is an outlier\n".to_owned(),
         Some(outliers) => {
-            let lines: String = outliers.iter().map(of_outlier).collect();
+            let lines: String = outliers.iter().map(describe_outlier).collect();
             format!(
                 "{} of {machines} machines stand out; the table is without them:\n{lines}",
                 outliers.len()
@@ -61,17 +61,17 @@ fn one(production: &Production) -> String {
     text
 }
 
-fn row(place: &Place) -> Vec<String> {
+fn row(place: &ProductionPoint) -> Vec<String> {
     let mut row =
         vec![number::number(Some(place.speed_rpm / 1e3), 1), number::four_figures(place.valve_opening_ratio)];
     let sigmas = |spread: &Option<Spread>| {
-        let of = |read: fn(&Spread) -> Option<f64>| {
+        let range_of = |read: fn(&Spread) -> Option<f64>| {
             number::number(spread.as_ref().and_then(read).map(|sigma| 100.0 * sigma), 2)
         };
         [
-            of(|spread| spread.machine_sigma),
-            of(|spread| spread.night_sigma),
-            of(|spread| Some(spread.rest_sigma)),
+            range_of(|spread| spread.machine_sigma),
+            range_of(|spread| spread.night_sigma),
+            range_of(|spread| Some(spread.rest_sigma)),
         ]
     };
     row.push(number::number(place.eta.as_ref().map(|eta| 100.0 * eta.mean), 2));
@@ -102,7 +102,7 @@ fn of_stand(stand: &Stand, production: &Production) -> String {
     )
 }
 
-fn of_outlier(outlier: &Outlier) -> String {
+fn describe_outlier(outlier: &Outlier) -> String {
     let shown = match outlier.sign {
         DeviationPattern::EfficiencyEverywhere => {
             format!("efficiency {:+.2} % of it at all speeds", 100.0 * outlier.eta_ratio)

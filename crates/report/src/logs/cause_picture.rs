@@ -4,14 +4,14 @@ use mapper_chart::{Axis, Dash, Figure, Line, Panel, Rule, RuleAt, Scatter, Scatt
 use mapper_diagnose::driven::cause_search::{Diagnosis, Word};
 
 /// Two panels over time: the reading with both predictions, and both residuals.
-pub fn why_figure(name: &str, found: &Diagnosis) -> Figure {
-    let course = &found.course;
-    let channel = found.judged.first().copied().unwrap_or("");
+pub fn why_figure(name: &str, diagnosis: &Diagnosis) -> Figure {
+    let course = &diagnosis.course;
+    let channel = diagnosis.judged.first().copied().unwrap_or("");
     let over = |values: &mut dyn Iterator<Item = f64>| -> Vec<(f64, f64)> {
         course.t_s.iter().copied().zip(values).collect()
     };
     let rule = |panel: &mut Panel| {
-        if let Some(beyond) = &found.beyond {
+        if let Some(beyond) = &diagnosis.beyond {
             let at = Rule::new(RuleAt::X(beyond.from_s)).label("predicted from here on");
             panel.add(Rule { dash: Dash::Dashed, ..at });
         }
@@ -20,7 +20,7 @@ pub fn why_figure(name: &str, found: &Diagnosis) -> Figure {
         .title(format!("(a) {channel} as read and as predicted"));
     let celsius = |values: &[f64]| over(&mut values.iter().map(|k| k - 273.15));
     readings.add(Line::new(celsius(&course.before_k), palette::INK).label("without a cause"));
-    readings.add(Line::new(celsius(&course.after_k), palette::BLUE).label(named(found)));
+    readings.add(Line::new(celsius(&course.after_k), palette::BLUE).label(cause_label(diagnosis)));
     let dot = |(x, y): (f64, f64)| ScatterPoint { x, y, x_interval: None, y_interval: None };
     let dots = celsius(&course.read_k).into_iter().map(dot).collect();
     readings.add(Scatter::new(dots, palette::INK).size_px(2.0).label("read"));
@@ -31,19 +31,19 @@ pub fn why_figure(name: &str, found: &Diagnosis) -> Figure {
         over(&mut course.read_k.iter().zip(predicted).map(|(read, predicted)| read - predicted))
     };
     left.add(Line::new(off(&course.before_k), palette::INK).label("without a cause"));
-    left.add(Line::new(off(&course.after_k), palette::BLUE).label(named(found)));
+    left.add(Line::new(off(&course.after_k), palette::BLUE).label(cause_label(diagnosis)));
     rule(&mut left);
-    let side = found.side.name();
+    let side = diagnosis.side.name();
     Figure::new(format!("The {side} side of {name}, driven by its measured neighbours"))
-        .subtitle(format!("{} drive throughout.", found.driven_by.join(", ")))
+        .subtitle(format!("{} drive throughout.", diagnosis.driven_by.join(", ")))
         .panel(readings)
         .panel(left)
         .columns(2)
         .panel_size_px(520.0, 380.0)
 }
 
-fn named(found: &Diagnosis) -> String {
-    match (found.word, found.causes.first()) {
+fn cause_label(diagnosis: &Diagnosis) -> String {
+    match (diagnosis.word, diagnosis.causes.first()) {
         (Word::Named | Word::NotDistinguished, Some(cause)) => format!("with {}", cause.names.join(" and ")),
         _ => "no cause is named".to_owned(),
     }

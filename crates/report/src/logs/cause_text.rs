@@ -11,45 +11,52 @@ const FURTHER_ROWS: usize = 3;
 const NOT_WORTH: f64 = 0.005;
 
 /// The verdict, the causes, the residual that no fit examined, the question and its limits.
-pub fn why_text(found: &Diagnosis) -> String {
-    let first = found.judged.first().copied().unwrap_or("");
+pub fn why_text(diagnosis: &Diagnosis) -> String {
+    let first = diagnosis.judged.first().copied().unwrap_or("");
     // Writing to a String cannot fail.
     let mut text = format!(
         "Why: the {} side against the campaign's machine, driven by measured {}; judged: {}.\n\n",
-        found.side.name(),
-        found.driven_by.join(", "),
-        found.judged.join(", ")
+        diagnosis.side.name(),
+        diagnosis.driven_by.join(", "),
+        diagnosis.judged.join(", ")
     );
-    let _ = writeln!(text, "{}\n", headline(found));
-    causes(&mut text, found);
+    let _ = writeln!(text, "{}\n", headline(diagnosis));
+    causes(&mut text, diagnosis);
     let _ = writeln!(
         text,
-        "fitted    {first} is off by {:.2} K rms without a cause, by {:.2} K with what is named",
-        found.before_k, found.after_k
+        "fitted    {first} is off by {:.2} K rms without a cause, by {:.2} K with the named causes",
+        diagnosis.before_k, diagnosis.after_k
     );
-    match &found.held_out {
+    match &diagnosis.held_out {
         Some(held_out) => phases(&mut text, held_out, first),
         None => text.push_str("held out  nothing: the fitted part is a single phase\n"),
     }
-    if let Some(beyond) = &found.beyond {
-        let _ = writeln!(text, "behind    {}\n          {}", behind(beyond), verdict(beyond, found.word));
+    if let Some(beyond) = &diagnosis.beyond {
+        let _ = writeln!(
+            text,
+            "behind    {}\n          {}",
+            describe_delay(beyond),
+            verdict(beyond, diagnosis.word)
+        );
     }
-    if found.side == Which::Turbine {
-        unknowns(&mut text, found);
+    if diagnosis.side == Which::Turbine {
+        unknowns(&mut text, diagnosis);
     }
-    if !found.asked.is_empty() {
-        let sizes =
-            found.asked.iter().filter_map(|seen| Some(format!("{} {}", seen.effect, seen.size.as_deref()?)));
+    if !diagnosis.asked.is_empty() {
+        let sizes = diagnosis
+            .asked
+            .iter()
+            .filter_map(|seen| Some(format!("{} {}", seen.effect, seen.size.as_deref()?)));
         let sizes = sizes.collect::<Vec<_>>().join(", ");
         let _ = writeln!(
             text,
             "\nAsked, with the smallest size that a log like this one shows in 95 of 100: {sizes}."
         );
     }
-    if !found.not_asked.is_empty() {
+    if !diagnosis.not_asked.is_empty() {
         text.push_str("\nNot asked, for this side cannot say:\n");
         let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
-        for effect in &found.not_asked {
+        for effect in &diagnosis.not_asked {
             match reasons.iter_mut().find(|(reason, _)| *reason == effect.reason) {
                 Some((_, effects)) => effects.push(&effect.effect),
                 None => reasons.push((&effect.reason, vec![&effect.effect])),
@@ -62,48 +69,48 @@ pub fn why_text(found: &Diagnosis) -> String {
     text
 }
 
-fn headline(found: &Diagnosis) -> String {
-    let open = &found.causes[..found.open.min(found.causes.len())];
-    match found.word {
+fn headline(diagnosis: &Diagnosis) -> String {
+    let open = &diagnosis.causes[..diagnosis.open.min(diagnosis.causes.len())];
+    match diagnosis.word {
         Word::Named => format!(
             "{} explains it ({}).",
-            open.first().map_or_else(String::new, |cause| begun(&cause.names.join(" and "))),
+            open.first().map_or_else(String::new, |cause| capitalise(&cause.names.join(" and "))),
             open.first().map_or_else(String::new, |cause| probability_text(cause.probability))
         ),
         Word::NotDistinguished => format!(
             "{} explain it equally well and are indistinguishable.",
-            begun(&open.iter().map(|cause| cause.names.join(" and ")).collect::<Vec<_>>().join("; or "))
+            capitalise(&open.iter().map(|cause| cause.names.join(" and ")).collect::<Vec<_>>().join("; or "))
         ),
         Word::NotBorneOut => format!(
-            "No cause is named: {} would explain what was fitted, but phases that it did not see get no better.",
+            "No cause is named: {} would explain the fitted part, but the residual of other phases does not decrease.",
             open.first().map_or_else(String::new, |cause| cause.names.join(" and "))
         ),
         Word::WithinTolerance => format!(
             "Nothing is seen beyond the usual uncertainty of such a machine (no cause: {}).",
-            probability_text(found.probability_none)
+            probability_text(diagnosis.probability_none)
         ),
         Word::Outside => format!(
             "Nothing of the catalogue explains it: something outside it acts here ({}). The residual of the nearest cause is below.",
-            probability_text(found.probability_outside)
+            probability_text(diagnosis.probability_outside)
         ),
     }
 }
 
 /// With a capital first letter.
-fn begun(words: &str) -> String {
+fn capitalise(words: &str) -> String {
     let mut letters = words.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
-fn causes(text: &mut String, found: &Diagnosis) {
+fn causes(text: &mut String, diagnosis: &Diagnosis) {
     let shown = |(place, cause): &(usize, &Cause)| {
-        *place < found.open
+        *place < diagnosis.open
             || *place == 0
-            || (*place < found.open + FURTHER_ROWS && cause.probability > NOT_WORTH)
+            || (*place < diagnosis.open + FURTHER_ROWS && cause.probability > NOT_WORTH)
     };
     let heads = ["cause", "probability", "size", "95 % interval", "left, K"];
     let mut rows = table::with_heads(&heads).with_texts(2..4);
-    for (_, cause) in found.causes.iter().enumerate().filter(shown) {
+    for (_, cause) in diagnosis.causes.iter().enumerate().filter(shown) {
         let each = |of: &dyn Fn(&mapper_diagnose::gap::findings::report::Estimate) -> String| {
             cause.parameters.values().map(of).collect::<Vec<_>>().join("; ")
         };
@@ -130,9 +137,12 @@ fn causes(text: &mut String, found: &Diagnosis) {
         ]);
     }
     let _ = writeln!(text, "{rows}\n");
-    if found.causes[..found.open.min(found.causes.len())].iter().any(|cause| !cause.at_the_end.is_empty()) {
+    if diagnosis.causes[..diagnosis.open.min(diagnosis.causes.len())]
+        .iter()
+        .any(|cause| !cause.at_the_end.is_empty())
+    {
         text.push_str(
-            "A size at the end of its range is more than such an effect can be: rather something that the catalogue has not.\n\n",
+            "A value at the end of its range exceeds the possible size of such an effect: the true cause is probably not in the catalogue.\n\n",
         );
     }
 }
@@ -182,7 +192,7 @@ fn phases(text: &mut String, held_out: &HeldOut, channel: &str) {
     }
 }
 
-fn behind(beyond: &Beyond) -> String {
+fn describe_delay(beyond: &Beyond) -> String {
     format!(
         "{:.1} to {:.1} s, {} readings that were not fitted: {:.2} K rms without a cause, {:.2} K with; expected {:.2} K ({:.2} .. {:.2});\n          \
          intervals hold {:.0} % of the readings",
@@ -202,24 +212,24 @@ fn verdict(beyond: &Beyond, word: Word) -> &'static str {
     match (beyond.after_k > beyond.expected_high_k, word) {
         (false, _) => "the residual is within what the fitted part predicts",
         (true, Word::Named | Word::NotDistinguished) => {
-            "more is left than this cause lets expect: something else acts there too, or it is another one"
+            "the residual exceeds the expectation for this cause: another cause acts as well, or instead"
         }
         (true, _) => {
-            "more is left than the fitted part lets expect: something acts there that showed nowhere before"
+            "the residual exceeds the expectation from the fitted part: a cause acts there that has no effect elsewhere"
         }
     }
 }
 
-fn unknowns(text: &mut String, found: &Diagnosis) {
-    let heads = ["unknown", "value", "95 % interval", "unit", "known from", "what it is"];
+fn unknowns(text: &mut String, diagnosis: &Diagnosis) {
+    let heads = ["unknown", "value", "95 % interval", "unit", "known from", "description"];
     let mut rows = table::with_heads(&heads).with_texts(3..6);
-    for unknown in &found.unknowns {
+    for unknown in &diagnosis.unknowns {
         rows.add_row([
             unknown.name.to_owned(),
             format!("{:.3}", unknown.value),
             format!("{:.3} .. {:.3}", unknown.low, unknown.high),
             unknown.unit.to_owned(),
-            if unknown.identified { "the log" } else { "beforehand" }.to_owned(),
+            if unknown.identified { "the log" } else { "its prior" }.to_owned(),
             unknown.description.to_owned(),
         ]);
     }

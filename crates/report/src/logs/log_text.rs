@@ -14,7 +14,7 @@ const GAPS: usize = 5;
 /// Findings, columns, gaps, and the suggestion with its certain and uncertain parts.
 pub fn log_text(format: &str, layout: &Layout, survey: &Survey, proposal: &Proposal) -> String {
     let mut text = format!(
-        "{format}, {} columns. Found by looking (in brackets what overrides it, `--with KEY=VALUE`):\n",
+        "{format}, {} columns. Detected layout (in brackets: the option to override it, `--with KEY=VALUE`):\n",
         layout.columns.len()
     );
     for finding in &layout.findings {
@@ -55,13 +55,13 @@ fn columns(layout: &Layout, survey: &Survey, proposal: &Proposal) -> TextTable {
         head.insert(0, "group");
     }
     let texts =
-        (0..head.len()).filter(|place| ["unit", "trace", "channel", "column"].contains(&head[*place]));
+        (0..head.len()).filter(|index| ["unit", "trace", "channel", "column"].contains(&head[*index]));
     let mut table = with_heads(&head).with_texts(texts);
     for (index, (column, data)) in layout.columns.iter().zip(&survey.columns).enumerate() {
         let is_ambient =
             matches!(&proposal.ambient, Some(Ambient::Column { column, .. }) if *column == index);
-        let none = if is_ambient { "ambient pressure".to_owned() } else { String::new() };
-        let channel = proposal.channel_of_column(index).map_or(none, |proposed| {
+        let without_channel = if is_ambient { "ambient pressure".to_owned() } else { String::new() };
+        let channel = proposal.channel_of_column(index).map_or(without_channel, |proposed| {
             let mark = match proposed.certainty {
                 Certainty::Sure => "",
                 Certainty::Likely => " (likely)",
@@ -69,11 +69,11 @@ fn columns(layout: &Layout, survey: &Survey, proposal: &Proposal) -> TextTable {
             };
             format!("{}{mark}", proposed.channel.symbol())
         });
-        let all = data.count + data.missing;
+        let total = data.count + data.missing;
         let empty = match data.missing {
             0 => String::new(),
-            missing if missing == all => "all".to_owned(),
-            missing => format!("{:.1} %", 100.0 * missing as f64 / all as f64),
+            missing if missing == total => "all".to_owned(),
+            missing => format!("{:.1} %", 100.0 * missing as f64 / total as f64),
         };
         let mut row = vec![
             cut(&column.name),
@@ -95,7 +95,7 @@ fn columns(layout: &Layout, survey: &Survey, proposal: &Proposal) -> TextTable {
 /// The suggestion: channels with a remark, and the relations between channels.
 fn proposal_text(layout: &Layout, proposal: &Proposal) -> String {
     let mut text = String::new();
-    let by = |certainty: Certainty| -> Vec<&str> {
+    let symbols_of = |certainty: Certainty| -> Vec<&str> {
         proposal
             .channels
             .iter()
@@ -104,9 +104,9 @@ fn proposal_text(layout: &Layout, proposal: &Proposal) -> String {
             .collect()
     };
     let list = |names: Vec<&str>| if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-    let _ = writeln!(text, "\nProposed channel map\n  sure: {}", list(by(Certainty::Sure)));
-    let _ = writeln!(text, "  likely: {}", list(by(Certainty::Likely)));
-    let _ = writeln!(text, "  not sure, kept as comments: {}", list(by(Certainty::Unsure)));
+    let _ = writeln!(text, "\nProposed channel map\n  sure: {}", list(symbols_of(Certainty::Sure)));
+    let _ = writeln!(text, "  likely: {}", list(symbols_of(Certainty::Likely)));
+    let _ = writeln!(text, "  not sure, kept as comments: {}", list(symbols_of(Certainty::Unsure)));
     for proposed in proposal.channels.iter().filter(|proposed| !proposed.remarks.is_empty()) {
         let name = layout.columns.get(proposed.column).map_or("", |column| column.name.as_str());
         let _ = writeln!(text, "  {} (`{name}`): {}", proposed.channel, proposed.remarks_text());
@@ -126,8 +126,8 @@ fn proposal_text(layout: &Layout, proposal: &Proposal) -> String {
         Some(Ambient::Assumed) => {
             let _ = writeln!(
                 text,
-                "  gauge pressures: {}; the log does not hold the ambient pressure: 101.3 kPa is used in its place until you \
-                 write what the barometer read",
+                "  gauge pressures: {}; the log has no ambient pressure, so 101.3 kPa is assumed; write the reading of the \
+                 barometer",
                 gauge.join(", ")
             );
         }
@@ -144,7 +144,7 @@ fn cut(name: &str) -> String {
     if name.chars().count() > 40 { format!("{clean}...") } else { clean }
 }
 
-/// A number with this many significant digits; `-` for none.
+/// A number with this many significant digits; `-` for a missing one.
 fn significant(value: f64, digits: usize) -> String {
     if !value.is_finite() {
         return "-".to_owned();

@@ -11,7 +11,7 @@ const THICKEST_PROBE_MM: f64 = 6.0;
 pub fn transient_text(outcome: &DrivenOutcome) -> String {
     // Writing to a String cannot fail.
     let mut text = String::from(
-        "Compressor side driven by measured speed, flow, P1, P2 and T1; T2 is judged. Intervals are 95 %.\n\n",
+        "Compressor side driven by measured speed, flow, P1, P2 and T1; T2 is compared. Intervals are 95 %.\n\n",
     );
     let _ = writeln!(text, "fitted    {}", judged_text(&outcome.fitted));
     if let Some(held_out) = &outcome.held_out {
@@ -21,30 +21,30 @@ pub fn transient_text(outcome: &DrivenOutcome) -> String {
     if outcome.lost_rows > 0 {
         let _ = writeln!(
             text,
-            "{} readings of T2 were left out: a channel is missing there or impossible",
+            "{} readings of T2 were omitted, because a channel is missing or impossible there",
             outcome.lost_rows
         );
     }
-    let _ = writeln!(text, "\nWhat moves T2 while it is fitted (rms):");
+    let _ = writeln!(text, "\nContributions to T2 in the fitted part (rms):");
     let _ = writeln!(text, "  lag of the probe                 {}", moves_text(&outcome.probe_moves));
     let _ = writeln!(text, "  heat to and from the housing     {}", moves_text(&outcome.heat_moves));
-    let probe = outcome.parameters.iter().find(|found| found.parameter.name == "probe");
+    let probe = outcome.parameters.iter().find(|fitted| fitted.parameter.name == "probe");
     if probe.is_some_and(|probe| probe.value > THICKEST_PROBE_MM) {
         text.push_str(
-            "  No bare probe is that thick: rather a sheath around the sensor, or a sensor that the gas hardly reaches.\n",
+            "  No bare probe is that thick. The sensor probably has a sheath, or little contact with the gas.\n",
         );
     }
     text.push('\n');
-    let heads = ["parameter", "value", "95 % interval", "unit", "known from", "what it is"];
+    let heads = ["parameter", "value", "95 % interval", "unit", "known from", "description"];
     let mut rows = table::with_heads(&heads).with_texts(3..6);
-    for found in &outcome.parameters {
-        let parameter = &found.parameter;
+    for fitted in &outcome.parameters {
+        let parameter = &fitted.parameter;
         rows.add_row([
             parameter.name.to_owned(),
-            format!("{:.3}", found.value),
-            format!("{:.3} .. {:.3}", found.low, found.high),
+            format!("{:.3}", fitted.value),
+            format!("{:.3} .. {:.3}", fitted.low, fitted.high),
             parameter.unit.to_owned(),
-            if found.identified { "the log" } else { "beforehand" }.to_owned(),
+            if fitted.identified { "the log" } else { "its prior" }.to_owned(),
             parameter.description.to_owned(),
         ]);
     }
@@ -54,7 +54,7 @@ pub fn transient_text(outcome: &DrivenOutcome) -> String {
 
 fn judged_text(judged: &Judged) -> String {
     format!(
-        "{:.1} to {:.1} s, {} readings: {:.2} K rms; expected {:.2} K ({:.2} .. {:.2}); intervals hold {:.0} % of the readings",
+        "{:.1} to {:.1} s, {} readings: {:.2} K rms; expected {:.2} K ({:.2} .. {:.2}); intervals contain {:.0} % of the readings",
         judged.from_s,
         judged.until_s,
         judged.rows,
@@ -68,7 +68,7 @@ fn judged_text(judged: &Judged) -> String {
 
 fn verdict(held_out: &Judged) -> &'static str {
     if held_out.rms_k > held_out.expected_high_k {
-        "more is left than the fitted part allows: something acts there that this side has not, or that its readings do not show"
+        "the residual exceeds the expectation from the fitted part: a cause acts there that this side does not model, or that its readings do not show"
     } else {
         "the residual is within what the fitted part predicts"
     }

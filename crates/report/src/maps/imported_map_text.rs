@@ -4,11 +4,11 @@ use crate::formatting::table;
 use mapper_core::{ImportRemark, ImportedColumn, ImportedMap, MapPoint};
 use std::fmt::Write;
 
-/// The columns, the speed lines, and sentences on what was assumed.
-pub fn imported_map_text(found: &ImportedMap) -> String {
-    let map = &found.map;
+/// The columns, the speed lines, and a sentence for each assumption.
+pub fn imported_map_text(imported: &ImportedMap) -> String {
+    let map = &imported.map;
     let mut text = String::new();
-    text.push_str(&columns_text(&found.columns, "rpm, kg/s, Pa, K and as fractions"));
+    text.push_str(&columns_text(&imported.columns, "rpm, kg/s, Pa, K and as fractions"));
     let heads = ["corrected rpm", "points", "flow kg/s", "pressure ratio", "efficiency %"];
     let mut lines = table::with_heads(&heads);
     for line in &map.lines {
@@ -35,7 +35,7 @@ pub fn imported_map_text(found: &ImportedMap) -> String {
         Some(definition) => writeln!(text, "Efficiency: {}.", definition.description()),
         None => writeln!(text, "The file does not name the definition of its efficiency."),
     };
-    for remark in &found.remarks {
+    for remark in &imported.remarks {
         let _ = writeln!(text, "{}", import_remark_text(remark));
     }
     text
@@ -71,7 +71,7 @@ pub fn import_remark_text(remark: &ImportRemark) -> String {
             "The columns have no headings; taken as rpm, kg/s, pressure ratio and efficiency.".to_owned()
         }
         ImportRemark::FurtherColumns { count } => format!(
-            "{count} columns behind the efficiency have no headings and were left out; name them by `--with`, e.g. `--with efficiency=#5`."
+            "{count} columns after the efficiency have no headings and were omitted; name them by `--with`, e.g. `--with efficiency=#5`."
         ),
         ImportRemark::UnusedColumns { headings } => format!(
             "Columns that are not used: {}. `--with` selects another column for a quantity, e.g. `--with flow=#5`.",
@@ -100,7 +100,7 @@ pub fn import_remark_text(remark: &ImportRemark) -> String {
                 .to_owned()
         }
         ImportRemark::ExtrapolatedNodes { count } => {
-            format!("{count} extrapolated nodes of a fitted map were left out.")
+            format!("{count} extrapolated nodes of a fitted map were omitted.")
         }
     }
 }

@@ -70,7 +70,7 @@ pub fn map_fit_text(map: &CompressorMap, fitted: &FittedMap) -> String {
         );
     }
     let points = |line: &LeftOutLine| points_of(map, line.speed_corrected_rpm);
-    let held = |value: fn(&LeftOutLine) -> Option<f64>| {
+    let coverage = |value: fn(&LeftOutLine) -> Option<f64>| {
         let (mut sum, mut count) = (0.0, 0.0);
         for line in fitted.left_out.iter().filter(|l| !l.outermost) {
             if let Some(share) = value(line) {
@@ -79,7 +79,8 @@ pub fn map_fit_text(map: &CompressorMap, fitted: &FittedMap) -> String {
         }
         (count > 0.0).then(|| 100.0 * sum / count)
     };
-    if let (Some(distance), Some(eta)) = (held(|l| l.distance_held_ratio), held(|l| l.eta_held_ratio)) {
+    if let (Some(distance), Some(eta)) = (coverage(|l| l.distance_held_ratio), coverage(|l| l.eta_held_ratio))
+    {
         let _ = writeln!(
             text,
             "At inner lines that were left out, the 95 % intervals contain {distance:.0} % of the points' distances and {eta:.0} % of their efficiencies."

@@ -30,9 +30,9 @@ pub fn reduced_text(
             number(best.map(|(_, eta)| 100.0 * eta), 1),
             number(width, 2),
             flow(&ends.surge),
-            by(ends.surge.by).to_owned(),
+            evidence_text(ends.surge.by).to_owned(),
             flow(&ends.choke),
-            by(ends.choke.by).to_owned(),
+            evidence_text(ends.choke.by).to_owned(),
         ]);
     }
     let mut text = format!("{lines}\n\nCorrected to {}.\n", map.reference);
@@ -43,7 +43,7 @@ pub fn reduced_text(
     text
 }
 
-fn by(evidence: EndEvidence) -> &'static str {
+fn evidence_text(evidence: EndEvidence) -> &'static str {
     match evidence {
         EndEvidence::Named => "named",
         EndEvidence::ZeroSlope => "zero slope",

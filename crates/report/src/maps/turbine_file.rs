@@ -85,7 +85,7 @@ pub fn turbine_text(machine: &str, gases: &Gases, points: &[TurbinePoint]) -> St
     );
     let without = points.len() - rows.len();
     if without > 0 {
-        let _ = writeln!(text, "# {without} points without a compressor efficiency are left out");
+        let _ = writeln!(text, "# {without} points without a compressor efficiency are omitted");
     }
     text.push_str("# SP(rpm/sqrt(K)) mfp(kg-sqrt(K)/s-kPa) ER Eff\n");
     for (p, efficiency) in rows {

@@ -7,13 +7,13 @@ use mapper_core::{FittedTurbine, ImportedTurbine, TurbineMap, TurbineMapPoint, h
 use mapper_maps::{ReducedTurbinePoint, TurbineComparison};
 use std::fmt::Write;
 
-/// The columns, the speed lines, and sentences on what was assumed.
-pub fn imported_turbine_text(found: &ImportedTurbine) -> String {
+/// The columns, the speed lines, and a sentence for each assumption.
+pub fn imported_turbine_text(imported: &ImportedTurbine) -> String {
     let mut text =
-        columns_text(&found.columns, "rpm or rpm/K^0.5, kg/s or kg K^0.5/(s kPa), and as fractions");
+        columns_text(&imported.columns, "rpm or rpm/K^0.5, kg/s or kg K^0.5/(s kPa), and as fractions");
     let heads = ["vanes", "rpm/K^0.5", "points", "flow kg K^0.5/(s kPa)", "expansion ratio", "efficiency %"];
     let mut lines = table::with_heads(&heads);
-    for line in found.map.lines() {
+    for line in imported.map.lines() {
         let range = |value: fn(&TurbineMapPoint) -> Option<f64>, factor: f64, digits: usize| {
             let values = line.iter().filter_map(value);
             let (low, high) =
@@ -34,7 +34,7 @@ pub fn imported_turbine_text(found: &ImportedTurbine) -> String {
         text,
         "{lines}\n\nThe map of a turbine: speed and flow are reduced by the state at its inlet."
     );
-    for remark in &found.remarks {
+    for remark in &imported.remarks {
         let _ = writeln!(text, "{}", import_remark_text(remark));
     }
     text

@@ -5,7 +5,7 @@ use crate::{RunReport, disagreement_text, doubts, zero_words};
 use mapper_core::Verdict;
 use mapper_identify::ZeroOutcome;
 
-/// Whether the map can be used as it is.
+/// Whether the map can be used without corrections.
 pub(crate) fn is_clean(page: &RunPage<'_>) -> bool {
     let report = page.report;
     !report.points.is_empty()
@@ -14,29 +14,30 @@ pub(crate) fn is_clean(page: &RunPage<'_>) -> bool {
 }
 
 /// Recommended actions in order of importance, each a sentence.
-pub(crate) fn first_things(report: &RunReport<'_>) -> Vec<String> {
-    let mut things: Vec<String> = Vec::new();
+pub(crate) fn recommended_actions(report: &RunReport<'_>) -> Vec<String> {
+    let mut actions: Vec<String> = Vec::new();
     if !report.origin.is_complete() {
-        things.push(report.origin.sentence());
+        actions.push(report.origin.sentence());
     }
     if let Some(text) = disagreement_text(
         report.points,
         report.two_parameter,
         &report.campaign.map(|campaign| campaign.display.clone()).unwrap_or_default(),
     ) {
-        things.push(text.trim_end().to_owned());
+        actions.push(text.trim_end().to_owned());
     }
-    if let (ZeroOutcome::Refused(_), Some(words)) = (report.zero, zero_words(report.zero)) {
-        things.push(words);
+    if let (ZeroOutcome::Refused(_), Some(sentence)) = (report.zero, zero_words(report.zero)) {
+        actions.push(sentence);
     }
-    let of = |verdict| {
+    let points_with = |verdict| {
         report.points.iter().map(|scored| &scored.point).filter(move |point| point.verdict == verdict)
     };
     for verdict in [Verdict::Unusable, Verdict::Doubtful] {
         // Findings about the most steps come first. Three sentences are enough here; the rest is listed with the points.
-        let mut warnings = doubts(of(verdict));
+        let mut warnings = doubts(points_with(verdict));
         warnings.sort_by_key(|doubt| std::cmp::Reverse(doubt.count()));
-        things.extend(warnings.iter().take(3).map(|doubt| format!("{}: {}", doubt.steps(), doubt.message())));
+        actions
+            .extend(warnings.iter().take(3).map(|doubt| format!("{}: {}", doubt.steps(), doubt.message())));
     }
-    things
+    actions
 }

@@ -13,7 +13,7 @@ use serde::Serialize;
 
 /// Data of the script.
 #[derive(Serialize)]
-struct Drawn {
+struct PageData {
     units: DisplayUnits,
     points: Vec<DrawnPoint>,
     map: DrawnMap,
@@ -35,7 +35,7 @@ pub fn run_page(page: &RunPage<'_>) -> Result<String, serde_json::Error> {
     let report = page.report;
     let units = report.campaign.map(|campaign| campaign.display.clone()).unwrap_or_default();
     let display = Display::new(&units);
-    let drawn = Drawn {
+    let drawn = PageData {
         units: units.clone(),
         points: drawn_points(page, &display),
         map: page.report.map.map(|map| drawn_map(map, &display)).unwrap_or_default(),

@@ -57,8 +57,8 @@ pub(crate) struct DrawnPoint {
 pub(crate) fn drawn_points(page: &RunPage<'_>, display: &Display) -> Vec<DrawnPoint> {
     let line_of = |step: usize| {
         let lines = page.report.map.into_iter().flat_map(|map| &map.lines);
-        let own = lines.filter(|line| line.points.iter().any(|point| point.identified.step == step));
-        own.map(|line| line.speed_corrected_rpm).next()
+        let own_points = lines.filter(|line| line.points.iter().any(|point| point.identified.step == step));
+        own_points.map(|line| line.speed_corrected_rpm).next()
     };
     let points = page.report.points.iter().map(|scored| &scored.point);
     points

@@ -75,7 +75,7 @@ pub(crate) fn drawn_steps(page: &RunPage<'_>, display: &Display) -> Vec<DrawnSte
 
 fn drawn_step(recording: &Recording, marker: &StepMarker, display: &Display) -> DrawnStep {
     let width_s = (marker.end_s - marker.start_s) / ROWS as f64;
-    let middle = |row: usize| (row as f64 + 0.5) * width_s;
+    let middle_s = |row: usize| (row as f64 + 0.5) * width_s;
     let channels = CHANNELS.iter().filter_map(|(channel, name)| {
         let series = recording.series.get(channel)?;
         let values = (0..ROWS).map(|row| {
@@ -87,7 +87,7 @@ fn drawn_step(recording: &Recording, marker: &StepMarker, display: &Display) -> 
     });
     DrawnStep {
         step: marker.index,
-        t: (0..ROWS).map(|row| rounded(middle(row))).collect(),
+        t: (0..ROWS).map(|row| rounded(middle_s(row))).collect(),
         channels: channels.collect(),
         window: None,
         model: None,

@@ -17,57 +17,57 @@ use mapper_diagnose::gap::residuals::study::Study;
 use mapper_numerics::statistics::mean;
 use maud::{Markup, PreEscaped, html};
 
-/// The page. `machine` and `recording`: what was diagnosed.
+/// The page. `machine` and `recording` are names for its title.
 ///
 /// # Errors
 /// None in practice: JSON of numbers and strings can always be written.
-pub fn gap_page(machine: &str, recording: &str, done: &Diagnosed) -> Result<String, serde_json::Error> {
+pub fn gap_page(machine: &str, recording: &str, diagnosed: &Diagnosed) -> Result<String, serde_json::Error> {
     let title = format!("Gap between {machine} and its nominal model");
     let body = html! {
         header {
             h1 { (title) }
             p.under { "Recording: " (recording) }
-            section.verdict.clean[done.diagnosis.verdict == Verdict::WithinTolerance] aria-labelledby="verdict" {
-                h2 #verdict { (sentence(&headline(&done.diagnosis))) }
+            section.verdict.clean[diagnosed.diagnosis.verdict == Verdict::WithinTolerance] aria-labelledby="verdict" {
+                h2 #verdict { (sentence(&headline(&diagnosed.diagnosis))) }
             }
         }
-        main #gap { (sections(done, &|title| html! { h2 { (title) } })) }
+        main #gap { (sections(diagnosed, &|title| html! { h2 { (title) } })) }
     };
     shell(&title, &title, Purpose::Still, &(), &body)
 }
 
 /// The diagnosis as a section of another page, below a heading of its own: its headline and the full content of its page.
-pub fn gap_part(done: &Diagnosed) -> Markup {
+pub fn gap_part(diagnosed: &Diagnosed) -> Markup {
     html! {
-        p { b { (headline(&done.diagnosis)) } }
-        (sections(done, &|title| html! { h3 { (title) } }))
+        p { b { (headline(&diagnosed.diagnosis)) } }
+        (sections(diagnosed, &|title| html! { h3 { (title) } }))
     }
 }
 
-/// The findings and their evidence, each below a heading; at last what to do.
-fn sections(done: &Diagnosed, heading: &dyn Fn(&str) -> Markup) -> Markup {
-    let diagnosis = &done.diagnosis;
+/// The findings and their evidence, each below a heading, and the recommended actions.
+fn sections(diagnosed: &Diagnosed, heading: &dyn Fn(&str) -> Markup) -> Markup {
+    let diagnosis = &diagnosed.diagnosis;
     let (actions, measurement) = (stand_actions(diagnosis), next_measurement(diagnosis));
     // The nearest cause of a rig without a gap explains nothing.
-    let with_cause = done.with_cause.as_ref().filter(|_| diagnosis.verdict != Verdict::WithinTolerance);
+    let with_cause = diagnosed.with_cause.as_ref().filter(|_| diagnosis.verdict != Verdict::WithinTolerance);
     html! {
         // The closure term in the headline is not repeated.
         @for law in diagnosis.laws.iter().filter(|law| !headline(diagnosis).contains(&law.sentence)) {
-            p { "A law for what is missing in " (law.submodel) ": " b { (law.sentence) } }
+            p { "Closure term for " (law.submodel) ": " b { (law.sentence) } }
         }
         (heading("Causes"))
-        (causes(done))
+        (causes(diagnosed))
         @for suspect in &diagnosis.suspects { p { "Suspect: " (suspect_text(suspect)) "." } }
         (heading("Place in the machine"))
         @if diagnosis.r#where.is_empty() { p { "No part departs from the model by more than noise." } }
-        @else { (places(done)) }
+        @else { (places(diagnosed)) }
         @if !diagnosis.inseparable.is_empty() {
             p { "Inseparable in this recording: " (diagnosis.inseparable.join(", ")) "." }
         }
-        figure { (scrolling("where on the map", &PreEscaped(map_of_where(done)))) figcaption { "Ends of the steps, coloured by the difference between measured and computed readings." } }
+        figure { (scrolling("where on the map", &PreEscaped(residual_map(diagnosed)))) figcaption { "Ends of the steps, coloured by the difference between measured and computed readings." } }
         @if !diagnosis.forces.is_empty() {
             (heading("Missing heat, power or flow of each balance, if it alone has one"))
-            (forces(done))
+            (forces(diagnosed))
         }
         (heading("Difference between measured and computed readings"))
         p {
@@ -75,10 +75,10 @@ fn sections(done: &Diagnosed, heading: &dyn Fn(&str) -> Markup) -> Markup {
              Tolerances are fitted."
         }
         div.plots {
-            (heat_map(done, "without a cause", &done.without_cause.1))
-            @if let Some((what, fit)) = with_cause { (heat_map(done, &format!("with {what}"), &fit.residual)) }
+            (heat_map(diagnosed, "without a cause", &diagnosed.without_cause.1))
+            @if let Some((cause, fit)) = with_cause { (heat_map(diagnosed, &format!("with {cause}"), &fit.residual)) }
         }
-        @if with_cause.is_some() { figure { (scrolling("residuals over time", &PreEscaped(traces(done)))) } }
+        @if with_cause.is_some() { figure { (scrolling("residuals over time", &PreEscaped(traces(diagnosed)))) } }
         (heading("What to do"))
         @if actions.is_empty() && measurement.is_none() { p { "Nothing: the rig is as declared." } }
         @else {
@@ -96,8 +96,8 @@ fn sections(done: &Diagnosed, heading: &dyn Fn(&str) -> Markup) -> Markup {
 }
 
 /// The most probable causes with their probabilities as bars.
-fn causes(done: &Diagnosed) -> Markup {
-    let diagnosis = &done.diagnosis;
+fn causes(diagnosed: &Diagnosed) -> Markup {
+    let diagnosis = &diagnosed.diagnosis;
     let candidates = diagnosis.listed().take(8);
     let rows = candidates.map(|candidate| (cause(candidate), candidate.probability)).chain([
         (NOTHING.to_owned(), diagnosis.probability_none),
@@ -123,15 +123,15 @@ fn causes(done: &Diagnosed) -> Markup {
 }
 
 /// The residual source term of each balance at the end of each step, if that balance alone has one.
-fn forces(done: &Diagnosed) -> Markup {
-    let forces = &done.diagnosis.forces;
+fn forces(diagnosed: &Diagnosed) -> Markup {
+    let forces = &diagnosed.diagnosis.forces;
     let table = html! {
         table {
             tr {
                 th { "step" }
                 @for force in forces { th { (force.force) ", " (force.unit) } }
             }
-            @for step in 0..done.study.steps.len() {
+            @for step in 0..diagnosed.study.steps.len() {
                 tr {
                     td { (step_number(step)) }
                     @for [value, low, high] in forces.iter().filter_map(|force| force.steps.get(step)) {
@@ -145,11 +145,11 @@ fn forces(done: &Diagnosed) -> Markup {
 }
 
 /// The parts of the machine in order of their share of the gap.
-fn places(done: &Diagnosed) -> Markup {
+fn places(diagnosed: &Diagnosed) -> Markup {
     let table = html! {
         table {
             tr { @for head in ["part", "share", "sigma", "channel", "phase", "region"] { th { (head) } } }
-            @for place in &done.diagnosis.r#where {
+            @for place in &diagnosed.diagnosis.r#where {
                 tr {
                     td { (place.submodel) }
                     td { (format!("{:.0} %", 100.0 * place.share)) }
@@ -173,16 +173,16 @@ const CLASSES: [(f64, Colour, &str); 4] = [
 ];
 
 /// Ends of the steps on the compressor map, coloured by their residual, before and after.
-fn map_of_where(done: &Diagnosed) -> String {
+fn residual_map(diagnosed: &Diagnosed) -> String {
     let mut figure = Figure::new("Where on the map").columns(2).panel_size_px(430.0, 300.0);
-    let after = done.with_cause.as_ref().map(|(what, fit)| (format!("with {what}"), &fit.residual));
+    let after = diagnosed.with_cause.as_ref().map(|(cause, fit)| (format!("with {cause}"), &fit.residual));
     for (title, residual) in
-        [("without the cause".to_owned(), &done.without_cause.1)].into_iter().chain(after)
+        [("without the cause".to_owned(), &diagnosed.without_cause.1)].into_iter().chain(after)
     {
         let mut classes: [Vec<(f64, f64)>; CLASSES.len()] = Default::default();
-        for step in 0..done.study.steps.len() {
-            let Some(place) = place_on_map(&done.study, step) else { continue };
-            let here: Vec<f64> = done
+        for step in 0..diagnosed.study.steps.len() {
+            let Some(place) = place_on_map(&diagnosed.study, step) else { continue };
+            let whitened: Vec<f64> = diagnosed
                 .study
                 .groups
                 .iter()
@@ -190,7 +190,7 @@ fn map_of_where(done: &Diagnosed) -> String {
                 .flat_map(|group| &residual[group.rows.clone()])
                 .map(|r| r * r)
                 .collect();
-            let rms = (here.iter().sum::<f64>() / here.len().max(1) as f64).sqrt();
+            let rms = (whitened.iter().sum::<f64>() / whitened.len().max(1) as f64).sqrt();
             let class = CLASSES.iter().position(|(up_to, ..)| rms <= *up_to).unwrap_or(CLASSES.len() - 1);
             classes[class].push(place);
         }
@@ -219,16 +219,16 @@ fn place_on_map(study: &Study, step: usize) -> Option<(f64, f64)> {
 }
 
 /// Root mean square of the whitened residual of each step and channel, as a table of colours with its numbers.
-fn heat_map(done: &Diagnosed, caption: &str, residual: &[f64]) -> Markup {
+fn heat_map(diagnosed: &Diagnosed, caption: &str, residual: &[f64]) -> Markup {
     let table = html! {
         table {
             caption { (caption) }
             thead { tr { th { "step" } @for channel in OUTPUTS { th { (channel) } } } }
             tbody {
-                @for step in 0..done.study.steps.len() {
+                @for step in 0..diagnosed.study.steps.len() {
                     tr {
                         td { (step_number(step)) }
-                        @for output in 0..OUTPUTS.len() { (heat_cell(done, residual, step, output)) }
+                        @for output in 0..OUTPUTS.len() { (heat_cell(diagnosed, residual, step, output)) }
                     }
                 }
             }
@@ -237,11 +237,11 @@ fn heat_map(done: &Diagnosed, caption: &str, residual: &[f64]) -> Markup {
     scrolling(caption, &table)
 }
 
-fn heat_cell(done: &Diagnosed, residual: &[f64], step: usize, output: usize) -> Markup {
-    let group = done.study.groups.iter().find(|g| g.step == step && g.output == output);
+fn heat_cell(diagnosed: &Diagnosed, residual: &[f64], step: usize, output: usize) -> Markup {
+    let group = diagnosed.study.groups.iter().find(|g| g.step == step && g.output == output);
     let Some(group) = group else { return html! { td { "-" } } };
-    let here = &residual[group.rows.clone()];
-    let rms = (here.iter().map(|r| r * r).sum::<f64>() / here.len().max(1) as f64).sqrt();
+    let whitened = &residual[group.rows.clone()];
+    let rms = (whitened.iter().map(|r| r * r).sum::<f64>() / whitened.len().max(1) as f64).sqrt();
     // White at 1, red from 30 on, logarithmic.
     let heat = (rms.max(1.0).ln() / 30f64.ln()).clamp(0.0, 1.0);
     let fade = (255.0 * (1.0 - heat)) as u8;
@@ -252,23 +252,23 @@ fn heat_cell(done: &Diagnosed, residual: &[f64], step: usize, output: usize) -> 
 }
 
 /// Measured minus predicted over time, before and after, for the four channels with the largest gap.
-fn traces(done: &Diagnosed) -> String {
-    let Some((what, best)) = &done.with_cause else { return String::new() };
+fn traces(diagnosed: &Diagnosed) -> String {
+    let Some((cause, best)) = &diagnosed.with_cause else { return String::new() };
     let energy = |output: usize| {
-        let groups = done.study.groups.iter().filter(|g| g.output == output);
-        groups.flat_map(|g| &done.without_cause.1[g.rows.clone()]).map(|r| r * r).sum::<f64>()
+        let groups = diagnosed.study.groups.iter().filter(|g| g.output == output);
+        groups.flat_map(|g| &diagnosed.without_cause.1[g.rows.clone()]).map(|r| r * r).sum::<f64>()
     };
     let mut order: Vec<usize> = (0..OUTPUTS.len()).collect();
     order.sort_by(|a, b| energy(*b).total_cmp(&energy(*a)));
     let mut figure = Figure::new("Measured minus predicted").columns(1).panel_size_px(900.0, 180.0);
     for output in order.into_iter().take(4) {
         let points = |values: &[f64]| {
-            let of_output = done.study.groups.iter().filter(|g| g.output == output);
+            let of_output = diagnosed.study.groups.iter().filter(|g| g.output == output);
             of_output
                 .flat_map(|g| {
                     g.rows.clone().zip(&g.blocks).map(|(row, block)| {
-                        let t_s = done.study.steps[g.step].blocks[*block].mean_s;
-                        (t_s / 60.0, done.study.measured[row] - values[row])
+                        let t_s = diagnosed.study.steps[g.step].blocks[*block].mean_s;
+                        (t_s / 60.0, diagnosed.study.measured[row] - values[row])
                     })
                 })
                 .collect::<Vec<(f64, f64)>>()
@@ -276,10 +276,10 @@ fn traces(done: &Diagnosed) -> String {
         let channel = OUTPUTS[output];
         let panel = Panel::new(Axis::new("time, min"), Axis::new(format!("{channel}, {}", channel.unit())))
             .with(
-                Line::new(points(&done.without_cause.0.values), palette::VERMILLION)
+                Line::new(points(&diagnosed.without_cause.0.values), palette::VERMILLION)
                     .label("without the cause"),
             )
-            .with(Line::new(points(&best.prediction.values), palette::BLUE).label(format!("with {what}")));
+            .with(Line::new(points(&best.prediction.values), palette::BLUE).label(format!("with {cause}")));
         figure = figure.panel(panel);
     }
     figure.to_svg()

@@ -56,7 +56,7 @@ pub fn plan_remark_text(remark: &PlanRemark) -> String {
             let left = format!(
                 "the soak of {:.0} min leaves of the offsets (one standard deviation): {}",
                 soak_s / 60.0,
-                listed(offset_sigmas)
+                list_sigmas(offset_sigmas)
             );
             match longer_offset_sigmas.is_empty() {
                 true => left,
@@ -64,7 +64,7 @@ pub fn plan_remark_text(remark: &PlanRemark) -> String {
                     format!(
                         "{left}; {:.0} min would leave {}",
                         longer_soak_s / 60.0,
-                        listed(longer_offset_sigmas)
+                        list_sigmas(longer_offset_sigmas)
                     )
                 }
             }
@@ -74,7 +74,7 @@ pub fn plan_remark_text(remark: &PlanRemark) -> String {
     }
 }
 
-fn listed(sigmas: &BTreeMap<Channel, f64>) -> String {
+fn list_sigmas(sigmas: &BTreeMap<Channel, f64>) -> String {
     let named = |(channel, sigma): (&Channel, &f64)| {
         let digits = if channel.unit() == "K" { 3 } else { 1 };
         format!("{channel} {}", with_unit(format!("{sigma:.digits$}"), channel.unit()))

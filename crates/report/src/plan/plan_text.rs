@@ -167,7 +167,7 @@ fn total_gradient(plan: &Plan) -> String {
 }
 
 fn least_bound(plan: &Plan) -> String {
-    let of = |bound: &PlanBound| match (bound.proof_tolerance_percent, bound.gap_percent) {
+    let bound_text = |bound: &PlanBound| match (bound.proof_tolerance_percent, bound.gap_percent) {
         (Some(tolerance), _) => format!("; proven to be the best order within {tolerance:.1} %"),
         (None, Some(gap)) => {
             format!("; no order exceeds {:.1} K, so this one is within {gap:.1} %", bound.min_gradient_k)
@@ -177,5 +177,5 @@ fn least_bound(plan: &Plan) -> String {
     plan.bound
         .as_ref()
         .filter(|_| plan.objective == VisitOrder::MinGradient.name())
-        .map_or_else(String::new, of)
+        .map_or_else(String::new, bound_text)
 }

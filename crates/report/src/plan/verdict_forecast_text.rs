@@ -16,8 +16,8 @@ pub fn verdict_forecast_text(forecast: Option<VerdictForecast>, advice: &[Advice
                  (`identification.joint`).\n";
     }
     for Advice { change, forecast: after } in advice {
-        let more = duration(after.duration_s - forecast.duration_s);
-        text += &format!("  {} (+{more}): {}\n", change_text(*change), verdicts(after));
+        let additional_time = duration(after.duration_s - forecast.duration_s);
+        text += &format!("  {} (+{additional_time}): {}\n", change_text(*change), verdicts(after));
     }
     text
 }

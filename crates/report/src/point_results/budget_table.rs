@@ -91,12 +91,12 @@ fn table(budgets: &[(usize, &UncertaintyBudget)], scale: f64, digits: usize) -> 
     heads.extend(["combined".to_owned(), "k".to_owned(), "U".to_owned()]);
     let cell = |value: f64| format!("{:.digits$}", scale * value);
     let rows = budgets.iter().map(|(step, budget)| {
-        let of = |source: &&str| {
+        let share_of = |source: &&str| {
             let row = budget.rows.iter().find(|row| row.source == *source);
             row.map_or_else(|| "-".to_owned(), |row| cell(row.contribution.abs()))
         };
         let mut cells = vec![step_number(*step).to_string()];
-        cells.extend(sources.iter().map(of));
+        cells.extend(sources.iter().map(share_of));
         cells.push(cell(budget.combined_standard_uncertainty()));
         cells.push(format!("{:.2}", budget.coverage_factor));
         cells.push(cell(budget.expanded_uncertainty));

@@ -13,19 +13,19 @@ pub fn disagreement_text(
     units: &DisplayUnits,
 ) -> Option<String> {
     let display = Display::new(units);
-    let both = two_parameter.iter().filter_map(|other| {
+    let pairs = two_parameter.iter().filter_map(|other| {
         let point = points.iter().map(|scored| &scored.point).find(|point| point.step == other.step)?;
         Some((point, other, distance(point, other)?))
     });
-    let both: Vec<_> = both.collect();
-    let apart: Vec<_> = both.iter().filter(|(point, other, _)| disjoint(point, other)).collect();
-    let (point, other, distance) = apart.iter().max_by(|a, b| a.2.total_cmp(&b.2))?;
+    let pairs: Vec<_> = pairs.collect();
+    let disagreeing: Vec<_> = pairs.iter().filter(|(point, other, _)| are_disjoint(point, other)).collect();
+    let (point, other, distance) = disagreeing.iter().max_by(|a, b| a.2.total_cmp(&b.2))?;
     Some(format!(
         "Methods disagree: at {} of {} points the efficiency by `dynamic` lies outside both 95 % intervals of the one by `joint`, by up \
          to {:.1} points (step {}, {} {}, opening {}: {:.1} % against {:.1} %). `dynamic` takes alpha_A and the probe as declared and h \
          as constant in each step; `joint` finds them from all steps.\n",
-        apart.len(),
-        both.len(),
+        disagreeing.len(),
+        pairs.len(),
         100.0 * distance,
         step_number(point.step),
         display.speed(point.speed_rpm),
@@ -40,7 +40,7 @@ fn distance(point: &IdentifiedPoint, other: &TwoParameter) -> Option<f64> {
     Some((point.eta? - other.eta).abs())
 }
 
-fn disjoint(point: &IdentifiedPoint, other: &TwoParameter) -> bool {
+fn are_disjoint(point: &IdentifiedPoint, other: &TwoParameter) -> bool {
     let (Some(low), Some(high)) = (point.eta_low, point.eta_high) else { return false };
     other.eta_high < low || high < other.eta_low
 }

@@ -51,10 +51,10 @@ pub fn points_by_line_text(
     };
     let mut on_a_line = Vec::new();
     for (speed_rpm, steps) in speed_lines(points, map) {
-        let mut own: Vec<&ScoredPoint> =
+        let mut own_points: Vec<&ScoredPoint> =
             points.iter().filter(|scored| steps.contains(&scored.point.step)).collect();
-        own.sort_by(|a, b| a.point.flow_corrected_kg_s.total_cmp(&b.point.flow_corrected_kg_s));
-        for (index, scored) in own.into_iter().enumerate() {
+        own_points.sort_by(|a, b| a.point.flow_corrected_kg_s.total_cmp(&b.point.flow_corrected_kg_s));
+        for (index, scored) in own_points.into_iter().enumerate() {
             let name = if index == 0 { display.line_name(speed_rpm) } else { String::new() };
             add(name, scored);
             on_a_line.push(scored.point.step);
@@ -72,8 +72,8 @@ pub fn points_by_line_text(
     // Without lines, each point has its measured speed.
     let mut name = (!on_a_line.is_empty()).then(|| "no line".to_owned());
     for scored in others {
-        let own = || display.speed(scored.point.speed_corrected_rpm);
-        let name = if on_a_line.is_empty() { own() } else { name.take().unwrap_or_default() };
+        let own_points = || display.speed(scored.point.speed_corrected_rpm);
+        let name = if on_a_line.is_empty() { own_points() } else { name.take().unwrap_or_default() };
         add(name, scored);
     }
     let rendered = table.to_string();
@@ -142,9 +142,10 @@ pub fn first_doubts_text(points: &[ScoredPoint]) -> String {
         .collect();
     let remarks = doubts(first_only.iter());
     let named = |doubt: &Doubt<'_>| {
-        let steps = match doubt.count() == points.len() && points.len() > 1 {
-            true => "all steps".to_owned(),
-            false => doubt.steps(),
+        let steps = if doubt.count() == points.len() && points.len() > 1 {
+            "all steps".to_owned()
+        } else {
+            doubt.steps()
         };
         wrapped(&format!("{steps}: {}", doubt.message()), COLUMNS, 2)
     };

@@ -22,10 +22,10 @@ pub fn doubts<'a>(points: impl Iterator<Item = &'a IdentifiedPoint>) -> Vec<Doub
         let step = step_number(point.step);
         for warning in &point.warnings {
             let (code, sentence) = (warning.code(), sentence_of(warning));
-            let mut alike = merged
+            let mut same_sentence = merged
                 .iter_mut()
                 .filter_map(|known| (known.code == code && known.sentence.merge(&sentence)).then_some(known));
-            match alike.next() {
+            match same_sentence.next() {
                 Some(known) if known.steps.last() == Some(&step) => {}
                 Some(known) => known.steps.push(step),
                 None => merged.push(Doubt { steps: vec![step], code, sentence }),
@@ -48,7 +48,7 @@ impl Doubt<'_> {
 
     /// The steps as text: "step 3", "steps 2, 5 to 9".
     pub fn steps(&self) -> String {
-        let one = if self.steps.len() == 1 { "step" } else { "steps" };
+        let noun = if self.steps.len() == 1 { "step" } else { "steps" };
         let mut ranges: Vec<(usize, usize)> = Vec::new();
         for step in &self.steps {
             match ranges.last_mut() {
@@ -56,12 +56,12 @@ impl Doubt<'_> {
                 _ => ranges.push((*step, *step)),
             }
         }
-        let words = ranges.iter().map(|(first, last)| match last - first {
+        let numbers = ranges.iter().map(|(first, last)| match last - first {
             0 => first.to_string(),
             1 => format!("{first}, {last}"),
             _ => format!("{first} to {last}"),
         });
-        format!("{one} {}", words.collect::<Vec<_>>().join(", "))
+        format!("{noun} {}", numbers.collect::<Vec<_>>().join(", "))
     }
 }
 
@@ -71,10 +71,10 @@ mod tests {
 
     #[test]
     fn neighbours_are_a_range_and_pairs_are_not() {
-        let of = |steps: &[usize]| {
+        let steps_text = |steps: &[usize]| {
             Doubt { steps: steps.to_vec(), code: "", sentence: Sentence(Vec::new()) }.steps()
         };
-        assert_eq!(of(&[3]), "step 3");
-        assert_eq!(of(&[2, 5, 6, 7, 9, 10]), "steps 2, 5 to 7, 9, 10");
+        assert_eq!(steps_text(&[3]), "step 3");
+        assert_eq!(steps_text(&[2, 5, 6, 7, 9, 10]), "steps 2, 5 to 7, 9, 10");
     }
 }

@@ -5,7 +5,7 @@ use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{IdentifiedPoint, Verdict, half_width_95};
 use mapper_numerics::statistics::median;
 
-/// One sentence for the slowest speed and the others, since offsets count by one over the square of the speed; `None` if no
+/// One sentence for the slowest speed and the others, because the effect of offsets decreases with the square of the speed; `None` if no
 /// point has an interval with a common part.
 pub fn shared_errors_text<'a>(
     points: impl Iterator<Item = &'a IdentifiedPoint>,
@@ -21,21 +21,21 @@ pub fn shared_errors_text<'a>(
     // The speed along a line varies by a few per cent at most.
     let (slow, fast): (Vec<&IdentifiedPoint>, Vec<&IdentifiedPoint>) =
         usable.iter().copied().partition(|point| speed(point) <= 1.05 * slowest_rpm);
-    let of = |points: &[&IdentifiedPoint]| {
+    let describe = |points: &[&IdentifiedPoint]| {
         let half = |value: fn(&IdentifiedPoint) -> Option<f64>| {
             median(points.iter().filter_map(|point| value(point))).map(|x| 100.0 * x)
         };
-        let all = half(|point| Some(0.5 * (point.eta_high? - point.eta_low?)))?;
+        let total = half(|point| Some(0.5 * (point.eta_high? - point.eta_low?)))?;
         let common = half(|point| Some(half_width_95(point.common.eta_standard_error())))?;
-        Some(format!("{common:.2} of +/- {all:.2} points"))
+        Some(format!("{common:.2} of +/- {total:.2} points"))
     };
-    let first = format!("{} at {} {}", of(&slow)?, display.speed(slowest_rpm), units.speed);
-    let parts = match of(&fast) {
-        Some(rest) => format!("{first} and {rest} above"),
+    let first = format!("{} at {} {}", describe(&slow)?, display.speed(slowest_rpm), units.speed);
+    let parts = match describe(&fast) {
+        Some(others) => format!("{first} and {others} above"),
         None => first,
     };
     Some(format!(
-        "Common to all points (offsets, gains and what the method shares, which hit or miss them together): {parts}; in \
-         quadrature, the rest is each point's own. The map's files carry both parts."
+        "Common to all points (offsets, gains and shared parameters of the method, with the same error at every point): {parts}; in \
+         quadrature, the remainder is independent for each point. The map's files have both parts."
     ))
 }

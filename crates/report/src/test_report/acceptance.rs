@@ -112,8 +112,8 @@ pub(crate) fn acceptance_sections(report: JudgedPoints<'_>) -> String {
         let _ = writeln!(text, "\n## Energy balance\n\n{BALANCE_WORDS}\n");
         text.push_str(&markdown::table(&BALANCE_HEADS, Align::Right, balance));
     }
-    if let Some(words) = acceptance_words(report) {
-        let _ = writeln!(text, "\n## Acceptance\n\n{words}\n");
+    if let Some(sentence) = acceptance_words(report) {
+        let _ = writeln!(text, "\n## Acceptance\n\n{sentence}\n");
         text.push_str(&markdown::table(&ACCEPTANCE_HEADS, Align::Left, acceptance_rows(report)));
     }
     text

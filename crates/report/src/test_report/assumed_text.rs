@@ -13,7 +13,7 @@ pub fn assumed_sentence(campaign: &Campaign) -> Option<String> {
     if sizes.is_empty() {
         return None;
     }
-    let named: Vec<String> = sizes.iter().map(named).collect();
+    let named: Vec<String> = sizes.iter().map(size_name).collect();
     let wheel_mm = 1e3 * campaign.machine.params.compressor.wheel_diameter_m;
     let sigma_ratio = internal_area_sigma_ratio(sizes);
     let widened = if sigma_ratio > 0.0 {
@@ -49,16 +49,16 @@ pub fn first_campaign_text(
     if let Some(channels) = channels {
         text += &format!("channels   {}\n", channels.display());
     }
-    let words = format!(
+    let phrases = format!(
         "{} sizes of the machine are assumed from its wheel: they are listed in the campaign as comments. Correct the ones that you know.",
         assumed.len()
     );
-    text += &format!("\n{}\n", wrapped(&words, COLUMNS, 0).trim_end());
+    text += &format!("\n{}\n", wrapped(&phrases, COLUMNS, 0).trim_end());
     text += &format!("Next: mapper check {}\n", campaign.display());
     text
 }
 
-fn named(size: &AssumedSize) -> String {
+fn size_name(size: &AssumedSize) -> String {
     let unit = if size.unit.is_empty() { String::new() } else { format!(" {}", size.unit) };
     format!("{} {}{unit}", size.key, significant(size.value))
 }

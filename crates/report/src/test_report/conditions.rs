@@ -30,19 +30,19 @@ pub fn condition_rows(
         (Channel::TOil, "oil temperature", boundary.map(|b| b.oil_temperature_k).filter(|_| !follows.oil)),
         (Channel::TAmb, "ambient temperature", boundary.map(|b| b.ambient_temperature_k)),
     ];
-    let rows = conditions.into_iter().filter_map(|(channel, what, declared)| {
+    let rows = conditions.into_iter().filter_map(|(channel, name, declared)| {
         let read: Vec<f64> =
             recording.steps.iter().filter_map(|step| at_end(recording, step, channel)).collect();
         let average = mean(&read)?;
         let lowest = read.iter().copied().fold(f64::INFINITY, f64::min);
         let highest = read.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let shown = |value: f64| display.shown_reading(channel, value);
+        let format = |value: f64| display.shown_reading(channel, value);
         Some([
-            what.to_owned(),
-            declared.map_or_else(|| "-".to_owned(), shown),
-            shown(average),
-            shown(lowest),
-            shown(highest),
+            name.to_owned(),
+            declared.map_or_else(|| "-".to_owned(), format),
+            format(average),
+            format(lowest),
+            format(highest),
             display.unit_of(channel).to_owned(),
         ])
     });

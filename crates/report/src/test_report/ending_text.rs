@@ -1,4 +1,4 @@
-//! How a run ended, or how its points were made, in a sentence.
+//! The end of a run, or the origin of its points, as a sentence.
 
 use mapper_core::{Method, RunEnding};
 

@@ -30,15 +30,16 @@ pub fn instrument_rows(
     display: &Display,
 ) -> Vec<[String; 9]> {
     let row = |(channel, sensor): (&Channel, &mapper_campaign::campaign::SensorDeclaration)| {
-        let half =
-            |sigma: f64| display.difference(*channel, half_width_95(sigma)).map_or_else(dash, two_figures);
+        let half = |sigma: f64| {
+            display.difference(*channel, half_width_95(sigma)).map_or_else(dash_cell, two_figures)
+        };
         let declared = &sensor.declared;
-        let used = used.get(channel).map_or_else(dash, |used| half(used.offset_sigma));
+        let used = used.get(channel).map_or_else(dash_cell, |used| half(used.offset_sigma));
         let place = match (sensor.static_tap_pipe_diameter_m, sensor.probe_diameter_m) {
             (Some(pipe_m), _) => format!("static tap, pipe {:.1} mm", 1e3 * pipe_m),
             (None, tip_m) if tip_m > 0.0 => format!("probe {:.1} mm", 1e3 * tip_m),
             (None, _) if matches!(channel, Channel::P1 | Channel::P2) => "total".to_owned(),
-            _ => dash(),
+            _ => dash_cell(),
         };
         let several = sensor.redundant.as_ref().map(|_| " (several)").unwrap_or_default();
         let dates = sensor.calibrations.iter().flatten().map(|calibration| calibration.date);
@@ -51,7 +52,7 @@ pub fn instrument_rows(
             used,
             match half_width_95(declared.gain_sigma_ratio) {
                 gain if gain > 0.0 => two_figures(100.0 * gain),
-                _ => dash(),
+                _ => dash_cell(),
             },
             place,
             dates.max().map_or_else(|| "not stated".to_owned(), |date| date.to_string()),
@@ -69,22 +70,24 @@ pub fn register_rows(campaign: &Campaign, display: &Display) -> Vec<[String; 7]>
     let mut rows = Vec::new();
     for (&channel, declaration) in &campaign.sensors {
         for (_, sensor, calibration) in declaration.calibrated(channel) {
-            let Some(calibration) = calibration.filter(|one| one.is_certified()) else { continue };
-            let text = |value: &Option<String>| value.clone().unwrap_or_else(dash);
+            let Some(calibration) = calibration.filter(|certificate| certificate.is_certified()) else {
+                continue;
+            };
+            let text = |value: &Option<String>| value.clone().unwrap_or_else(dash_cell);
             let reading = |value: f64| display.shown_reading(channel, value);
             rows.push([
                 sensor,
                 text(&calibration.certificate),
                 text(&calibration.laboratory),
                 calibration.date.to_string(),
-                calibration.due.map_or_else(dash, |due| due.to_string()),
-                calibration.range.map_or_else(dash, |(min, max)| {
+                calibration.due.map_or_else(dash_cell, |due| due.to_string()),
+                calibration.range.map_or_else(dash_cell, |(min, max)| {
                     format!("{} to {} {}", reading(min), reading(max), display.unit_of(channel))
                 }),
                 calibration
                     .uncertainty
                     .and_then(|expanded| display.difference(channel, expanded))
-                    .map_or_else(dash, |expanded| {
+                    .map_or_else(dash_cell, |expanded| {
                         format!("{} {}", two_figures(expanded), display.difference_unit(channel))
                     }),
             ]);
@@ -93,14 +96,14 @@ pub fn register_rows(campaign: &Campaign, display: &Display) -> Vec<[String; 7]>
     rows
 }
 
-fn dash() -> String {
+fn dash_cell() -> String {
     "-".to_owned()
 }
 
 /// Two significant figures without an exponent, enough for an uncertainty.
 fn two_figures(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
-        return dash();
+        return dash_cell();
     }
     let decimals = (1.0 - value.abs().log10().floor()).clamp(0.0, 9.0) as usize;
     format!("{value:.decimals$}")

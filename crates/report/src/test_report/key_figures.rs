@@ -22,7 +22,7 @@ pub fn key_figures(
     let fastest = display.line_name(speeds().fold(f64::NEG_INFINITY, f64::max));
     let measured = map.lines.iter().flat_map(|line| &line.points);
     let highest = measured.map(|point| point.pressure_ratio).fold(f64::NEG_INFINITY, f64::max);
-    let mut words = match map.lines.len() {
+    let mut phrases = match map.lines.len() {
         0 => return None,
         1 => format!("The map has {on_map} points at {fastest} {} (corrected)", units.speed),
         lines => {
@@ -32,18 +32,18 @@ pub fn key_figures(
             )
         }
     };
-    words.push_str(&format!(", with pressure ratios up to {highest:.2}."));
+    phrases.push_str(&format!(", with pressure ratios up to {highest:.2}."));
     match all.saturating_sub(on_map) {
         0 => {}
-        1 => words.push_str(" One more point was measured to show drift."),
-        more => words.push_str(&format!(" {more} more points were measured to show drift.")),
+        1 => phrases.push_str(" One more point was measured to show drift."),
+        more => phrases.push_str(&format!(" {more} more points were measured to show drift.")),
     }
     let usable = |point: &&IdentifiedPoint| point.verdict != Verdict::Unusable;
     let best = points.iter().map(|scored| &scored.point).filter(usable);
     if let Some((best, eta)) =
         best.filter_map(|point| Some((point, point.eta?))).max_by(|a, b| a.1.total_cmp(&b.1))
     {
-        words.push_str(&format!(
+        phrases.push_str(&format!(
             " The best efficiency is {:.1} %, at {} {} and a pressure ratio of {:.2}.",
             100.0 * eta,
             display.line_name(best.speed_corrected_rpm),
@@ -52,17 +52,17 @@ pub fn key_figures(
         ));
     }
     if let Some(sure) = certainty(points.iter().map(|scored| &scored.point)) {
-        words.push_str(&sure);
+        phrases.push_str(&sure);
     }
     if let Some(plan) = plan {
         let rest_s = campaign.and_then(|campaign| campaign.zero).map_or(0.0, |zero| zero.duration_s);
-        words.push_str(&format!(" The test was planned for {}", duration(rest_s + plan.duration_s())));
+        phrases.push_str(&format!(" The test was planned for {}", duration(rest_s + plan.duration_s())));
         if rest_s > 0.0 {
-            words.push_str(&format!(", {} of it at rest", duration(rest_s)));
+            phrases.push_str(&format!(", {} of it at rest", duration(rest_s)));
         }
-        words.push('.');
+        phrases.push('.');
     }
-    Some(words)
+    Some(phrases)
 }
 
 /// Width of the intervals of usable points.
@@ -70,9 +70,9 @@ fn certainty<'a>(points: impl Iterator<Item = &'a IdentifiedPoint>) -> Option<St
     let usable = points.filter(|point| point.verdict != Verdict::Unusable);
     let halves: Vec<f64> =
         usable.filter_map(|point| Some(50.0 * (point.eta_high? - point.eta_low?))).collect();
-    let middle = median(halves.iter().copied())?;
+    let median_half_width = median(halves.iter().copied())?;
     let widest = halves.iter().copied().fold(0.0, f64::max);
     Some(format!(
-        " Its efficiencies are known within +/- {middle:.1} points (95 %) at half of the usable points, within +/- {widest:.1} at all of them."
+        " Its efficiencies are known within +/- {median_half_width:.1} points (95 %) at half of the usable points, within +/- {widest:.1} at all of them."
     ))
 }

@@ -59,7 +59,7 @@ pub struct RunReport<'a> {
     pub used: &'a BTreeMap<Channel, DeclaredUncertainty>,
     /// The identified recordings; empty for a run, whose directory has its recording.
     pub sources: &'a [ReportSource],
-    /// How the run ended, or how the points were made.
+    /// End of the run, or origin of the points.
     pub origin: PointsOrigin,
     /// Further remarks: on the recording, the method and the map.
     pub remarks: &'a [ResultRemark],
@@ -223,7 +223,7 @@ fn markdown_report(report: &RunReport<'_>) -> String {
         let sentences = repeated_jumps_text(repeats, &Display::new(&units));
         let _ = write!(
             text,
-            "\n## Drift\n\nRepeats are kept out of the map. Fixed offsets cancel in what changes between them.\n\n{}",
+            "\n## Drift\n\nRepeats are not part of the map. Fixed offsets cancel in the changes between them.\n\n{}",
             sentences.lines().map(|line| format!("- {line}\n")).collect::<String>()
         );
     }
@@ -262,7 +262,7 @@ fn facts(rows: &[(&'static str, String)]) -> String {
     markdown::table(&["", ""], Align::Left, rows)
 }
 
-/// For whom which machine was tested, where, when and by whom: name and value in words.
+/// Names and values of the cover: customer, machine, place, date and persons.
 pub fn cover_facts(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
     let Some(campaign) = report.campaign else {
         return vec![("machine", report.machine.to_owned()), ("tested", stated(report.tested_at))];

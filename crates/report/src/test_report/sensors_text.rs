@@ -3,7 +3,7 @@
 use mapper_campaign::Campaign;
 use mapper_observe::FusedChannel;
 
-/// A line for each channel that has several sensors: their combination, and which are left out and why; empty if no
+/// A line for each channel that has several sensors: their combination, and the omitted sensors with reasons; empty if no
 /// channel has several.
 pub fn sensors_text(channels: &[FusedChannel]) -> String {
     if channels.is_empty() {

@@ -63,9 +63,8 @@ pub fn surge_columns_text(
     units: &DisplayUnits,
     truth: bool,
 ) -> String {
-    let shown = |scored: &ScoredMark| match truth {
-        true => *scored,
-        false => ScoredMark { truth_flow_corrected_kg_s: None, ..*scored },
+    let shown = |scored: &ScoredMark| {
+        if truth { *scored } else { ScoredMark { truth_flow_corrected_kg_s: None, ..*scored } }
     };
     let marks: Vec<ScoredMark> = marks.iter().map(shown).collect();
     let marks = marks.as_slice();
@@ -108,7 +107,7 @@ pub fn surge_rows(marks: &[ScoredMark], display: &Display) -> Vec<Vec<String>> {
             number(Some(half_width_95(mark.pressure_ratio_standard_error)), 3),
             percent(Some(mark.closest_flow_corrected_kg_s / flow_kg_s - 1.0), 1),
             mark.steps.to_string(),
-            found_by(mark).to_owned(),
+            evidence_name(mark).to_owned(),
         ];
         if with_truth(marks) {
             row.push(percent(truth_flow_corrected_kg_s.map(|truth| flow_kg_s / truth - 1.0), 2));
@@ -121,12 +120,15 @@ pub fn surge_rows(marks: &[ScoredMark], display: &Display) -> Vec<Vec<String>> {
 fn times(surges: usize) -> String {
     match surges {
         0 => "The compressor did not go into surge on the way.".to_owned(),
-        1 => "The compressor went into surge once on the way; the valve opened at once.".to_owned(),
-        more => format!("The compressor went into surge {more} times on the way; the valve opened at once."),
+        1 => "The compressor went into surge once during the approach; the valve opened immediately."
+            .to_owned(),
+        more => format!(
+            "The compressor went into surge {more} times during the approach; the valve opened immediately."
+        ),
     }
 }
 
-fn found_by(mark: &SurgeMark) -> &'static str {
+fn evidence_name(mark: &SurgeMark) -> &'static str {
     match mark.found_by {
         SurgeFoundBy::Precursor => "variation",
         SurgeFoundBy::Surge => "surge",

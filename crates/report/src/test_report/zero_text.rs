@@ -8,7 +8,7 @@ use std::fmt::Write;
 /// Columns of [`zero_rows`].
 pub const ZERO_HEADS: [&str; 4] = ["sensor", "subtracted", "known within +/-", "unit"];
 
-/// The result, or why there was no zero; `None` if none was requested.
+/// A sentence with the result or the reason for its absence; `None` if no zero was requested.
 pub fn zero_words(zero: &ZeroOutcome) -> Option<String> {
     match zero {
         ZeroOutcome::NotAsked => None,
@@ -29,10 +29,11 @@ pub fn zero_rows(zero: &ZeroOutcome, display: &Display) -> Vec<[String; 4]> {
     let row = |(channel, offset): (&Channel, &f64)| {
         let shown = |value: f64| display.difference(*channel, value).unwrap_or(0.0);
         let half = shown(half_width_95(offset_sigma(zero, *channel)));
-        // As many decimals as the half width needs for two figures.
-        let decimals = match half > 0.0 && half.is_finite() {
-            true => (1.0 - half.log10().floor()).clamp(0.0, 6.0) as usize,
-            false => 2,
+        // Two significant digits of the half width.
+        let decimals = if half > 0.0 && half.is_finite() {
+            (1.0 - half.log10().floor()).clamp(0.0, 6.0) as usize
+        } else {
+            2
         };
         let unit = display.difference_unit(*channel).to_owned();
         [channel.to_string(), format!("{:+.decimals$}", shown(*offset)), format!("{half:.decimals$}"), unit]
@@ -44,7 +45,7 @@ fn offset_sigma(zero: &IsothermalZero, channel: Channel) -> f64 {
     zero.left_sigma.get(&channel).copied().unwrap_or(f64::NAN)
 }
 
-/// Offsets subtracted from the readings with their uncertainties, or why there are none; empty if none was requested.
+/// Offsets subtracted from the readings with their uncertainties, or the reason for their absence; empty if no zero was requested.
 pub fn zero_text(zero: &ZeroOutcome) -> String {
     match zero {
         ZeroOutcome::NotAsked => String::new(),

@@ -50,10 +50,10 @@ pub struct RigWithInstruments {
 
 /// An auxiliary instrument failed.
 #[derive(Debug, thiserror::Error)]
-#[error("the reader `{name}`: {words}")]
+#[error("the reader `{name}`: {message}")]
 struct InstrumentError {
     name: String,
-    words: String,
+    message: String,
 }
 
 impl RigWithInstruments {
@@ -67,13 +67,18 @@ impl RigWithInstruments {
         readers: Vec<AuxiliaryInstrument>,
         deadline: Duration,
     ) -> Result<Self, BackendError> {
-        let own = rig.describe();
-        let simulated_time =
-            own.simulated_time && readers.iter().all(|reader| reader.backend.describe().simulated_time);
-        let taken: Vec<Channel> = readers.iter().flat_map(|reader| reader.channels.clone()).collect();
-        let mut channels: Vec<Channel> =
-            own.channels.iter().copied().filter(|channel| !taken.contains(channel)).collect();
-        channels.extend(taken);
+        let rig_description = rig.describe();
+        let simulated_time = rig_description.simulated_time
+            && readers.iter().all(|reader| reader.backend.describe().simulated_time);
+        let instrument_channels: Vec<Channel> =
+            readers.iter().flat_map(|reader| reader.channels.clone()).collect();
+        let mut channels: Vec<Channel> = rig_description
+            .channels
+            .iter()
+            .copied()
+            .filter(|channel| !instrument_channels.contains(channel))
+            .collect();
+        channels.extend(instrument_channels);
         channels.sort();
         let source = |reader: AuxiliaryInstrument| {
             Ok(Source {
@@ -86,7 +91,7 @@ impl RigWithInstruments {
             })
         };
         Ok(RigWithInstruments {
-            description: RigDescription { channels, simulated_time, ..own },
+            description: RigDescription { channels, simulated_time, ..rig_description },
             rig,
             sources: readers.into_iter().map(source).collect::<Result<_, BackendError>>()?,
             next_sequence: 0,
@@ -111,11 +116,12 @@ impl RigWithInstruments {
         t_s.extend(&rig.t_s);
         t_s.sort_by(f64::total_cmp);
         t_s.dedup();
-        let taken = |channel: &Channel| self.sources.iter().any(|source| source.channels.contains(channel));
+        let instrument_channels =
+            |channel: &Channel| self.sources.iter().any(|source| source.channels.contains(channel));
         let mut merged = SampleBatch { first_sequence: self.next_sequence, ..SampleBatch::default() };
         // Only the rig provides truth.
         merged.truth = resample_truth(&rig, &t_s);
-        add_channels(&mut merged, rig, &t_s, &|channel| !taken(&channel));
+        add_channels(&mut merged, rig, &t_s, &|channel| !instrument_channels(&channel));
         for (source, part) in self.sources.iter().zip(parts) {
             add_channels(&mut merged, part, &t_s, &|channel| source.channels.contains(&channel));
         }
@@ -158,8 +164,8 @@ impl Source {
                     events.push(Event { t_s, kind: EventKind::Note, message });
                 }
                 // Readings from before the start of the run are dropped.
-                let early = batch.t_s.partition_point(|t_s| *t_s < 0.0);
-                let batch = batch.split_off(early);
+                let early_count = batch.t_s.partition_point(|t_s| *t_s < 0.0);
+                let batch = batch.split_off(early_count);
                 if is_valid(&batch, self.waiting.t_s.last().copied())
                     && self.waiting.t_s.len() + batch.t_s.len() <= MAX_WAITING
                 {
@@ -192,7 +198,7 @@ impl Backend for RigWithInstruments {
             let Some(source) = self.sources.get_mut(index) else { break };
             if let Err(error) = source.link.arm() {
                 let source =
-                    Box::new(InstrumentError { name: source.name.clone(), words: error.to_string() });
+                    Box::new(InstrumentError { name: source.name.clone(), message: error.to_string() });
                 self.disconnect();
                 return Err(BackendError::Lost { t_s: 0.0, source });
             }
@@ -266,8 +272,8 @@ fn is_valid(batch: &SampleBatch, last_s: Option<f64>) -> bool {
 /// Moves late readings behind `last_s`; they keep their source time.
 fn delay_late_readings(part: &mut SampleBatch, last_s: Option<f64>) {
     let Some(last_s) = last_s else { return };
-    let late = part.t_s.partition_point(|t_s| *t_s <= last_s);
-    if late == 0 {
+    let late_count = part.t_s.partition_point(|t_s| *t_s <= last_s);
+    if late_count == 0 {
         return;
     }
     for column in &part.columns {
@@ -276,14 +282,14 @@ fn delay_late_readings(part: &mut SampleBatch, last_s: Option<f64>) {
             part.provenance.push(Provenance { channel: column.channel, source_t_s, quality });
         }
     }
-    let mut behind_s = last_s;
+    let mut shifted_s = last_s;
     for t_s in &mut part.t_s {
-        if *t_s > behind_s {
+        if *t_s > shifted_s {
             break;
         }
         // A step of one microsecond, or of the last bit if that is larger.
-        behind_s = (behind_s + LATE_OFFSET_S).max(behind_s.next_up());
-        *t_s = behind_s;
+        shifted_s = (shifted_s + LATE_OFFSET_S).max(shifted_s.next_up());
+        *t_s = shifted_s;
     }
 }
 
@@ -292,9 +298,9 @@ fn resample<T: Copy>(values: &[T], own_s: &[f64], t_s: &[f64], absent: T) -> Vec
     if own_s.len() == t_s.len() {
         return values.to_vec();
     }
-    let mut own = own_s.iter().zip(values).peekable();
+    let mut samples = own_s.iter().zip(values).peekable();
     t_s.iter()
-        .map(|t_s| own.next_if(|(own_s, _)| **own_s == *t_s).map_or(absent, |(_, value)| *value))
+        .map(|t_s| samples.next_if(|(own_s, _)| **own_s == *t_s).map_or(absent, |(_, value)| *value))
         .collect()
 }
 
@@ -308,16 +314,21 @@ fn resample_truth(rig: &SampleBatch, t_s: &[f64]) -> Vec<TruthColumn> {
 }
 
 /// Adds the wanted channels of one source to the merged batch.
-fn add_channels(merged: &mut SampleBatch, part: SampleBatch, t_s: &[f64], wanted: &dyn Fn(Channel) -> bool) {
-    for column in part.columns.into_iter().filter(|column| wanted(column.channel)) {
+fn add_channels(
+    merged: &mut SampleBatch,
+    part: SampleBatch,
+    t_s: &[f64],
+    selected: &dyn Fn(Channel) -> bool,
+) {
+    for column in part.columns.into_iter().filter(|column| selected(column.channel)) {
         let values = resample(&column.values, &part.t_s, t_s, f64::NAN);
         merged.columns.push(ChannelColumn { values, ..column });
     }
-    for column in part.elements.into_iter().filter(|column| wanted(column.element.channel)) {
+    for column in part.elements.into_iter().filter(|column| selected(column.element.channel)) {
         let values = resample(&column.values, &part.t_s, t_s, f64::NAN);
         merged.elements.push(ElementColumn { values, ..column });
     }
-    for from in part.provenance.into_iter().filter(|from| wanted(from.channel)) {
+    for from in part.provenance.into_iter().filter(|from| selected(from.channel)) {
         let mut source_t_s = resample(&from.source_t_s, &part.t_s, t_s, f64::NAN);
         // A time without a reading of this source is not old.
         for (source_s, t_s) in source_t_s.iter_mut().zip(t_s).filter(|(source_s, _)| source_s.is_nan()) {

@@ -1,4 +1,4 @@
-//! A backend whose calls return within a deadline, whatever the rig does: a separate thread makes them.
+//! A backend whose calls return within a deadline, even if the rig hangs: a separate thread makes them.
 
 use crate::run_control::run::panic_message;
 use mapper_core::{Backend, BackendError, RigDescription, SampleBatch, Setpoints};

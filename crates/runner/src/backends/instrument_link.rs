@@ -35,8 +35,8 @@ pub(crate) enum InstrumentLink {
     },
 }
 
-fn lost_error(words: String) -> BackendError {
-    BackendError::Lost { t_s: 0.0, source: Box::new(ThreadEnded(words)) }
+fn lost_error(message: String) -> BackendError {
+    BackendError::Lost { t_s: 0.0, source: Box::new(ThreadEnded(message)) }
 }
 
 /// Contains a panic of an instrument: the run continues without the instrument.

@@ -1,6 +1,6 @@
 //! The guard for the sample stream itself: lost, repeated, disordered or impossible samples.
 
-use crate::guards::guard::{Commanded, Guard, Trip};
+use crate::guards::guard::{CommandedState, Guard, Trip};
 use mapper_core::{GuardName, Reaction, SampleBatch};
 
 /// How far a sample may lie beyond the requested time, s: the clocks of rig and program differ.
@@ -52,7 +52,7 @@ impl BatchWatch {
 }
 
 impl Guard for BatchWatch {
-    fn check(&mut self, batch: &SampleBatch, now_s: f64, _: &Commanded) -> Option<Trip> {
+    fn check(&mut self, batch: &SampleBatch, now_s: f64, _: &CommandedState) -> Option<Trip> {
         let reason = self.find_fault(batch, now_s).filter(|_| !self.tripped)?;
         self.tripped = true;
         Some(Trip { t_s: now_s, guard: GuardName::Signals, reaction: Reaction::Safe, reason })
@@ -72,7 +72,7 @@ mod tests {
             columns: vec![ChannelColumn { channel: Channel::T2, values: vec![300.0; values] }],
             ..SampleBatch::default()
         };
-        for (batch, words) in [
+        for (batch, message) in [
             (at(5, &[0.5, 0.6], 2), "3 samples were lost"),
             (at(1, &[0.1, 0.2], 2), "1 samples were sent twice"),
             (at(2, &[0.3, 0.2], 2), "time runs backward"),
@@ -82,14 +82,14 @@ mod tests {
             (at(2, &[0.3, 0.4], 3), "3 values for 2 times"),
         ] {
             let mut guard = BatchWatch::default();
-            assert_eq!(guard.check(&at(0, &[0.0, 0.1], 2), 0.1, &Commanded::default()), None);
+            assert_eq!(guard.check(&at(0, &[0.0, 0.1], 2), 0.1, &CommandedState::default()), None);
             // An empty batch is left to the age guards.
-            assert_eq!(guard.check(&SampleBatch::default(), 0.2, &Commanded::default()), None);
-            let trip = guard.check(&batch, 0.6, &Commanded::default()).unwrap();
-            assert!(trip.reason.contains(words), "{}", trip.reason);
+            assert_eq!(guard.check(&SampleBatch::default(), 0.2, &CommandedState::default()), None);
+            let trip = guard.check(&batch, 0.6, &CommandedState::default()).unwrap();
+            assert!(trip.reason.contains(message), "{}", trip.reason);
         }
         let mut guard = BatchWatch::default();
-        assert_eq!(guard.check(&at(0, &[0.0, 0.1], 2), 0.1, &Commanded::default()), None);
-        assert_eq!(guard.check(&at(2, &[0.2], 1), 0.2, &Commanded::default()), None);
+        assert_eq!(guard.check(&at(0, &[0.0, 0.1], 2), 0.1, &CommandedState::default()), None);
+        assert_eq!(guard.check(&at(2, &[0.2], 1), 0.2, &CommandedState::default()), None);
     }
 }

@@ -17,7 +17,7 @@ pub struct Trip {
 
 /// The commanded state of the rig, as far as guards need it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Commanded {
+pub struct CommandedState {
     /// Whether gas flows.
     pub running: bool,
     /// Start of the current step, s; `None` outside steps.
@@ -31,7 +31,7 @@ pub struct Commanded {
 /// Checks every sample and may trip.
 pub trait Guard: Send {
     /// Checks the samples of a poll up to `now_s` (possibly none). Each violation trips once.
-    fn check(&mut self, batch: &SampleBatch, now_s: f64, state: &Commanded) -> Option<Trip>;
+    fn check(&mut self, batch: &SampleBatch, now_s: f64, state: &CommandedState) -> Option<Trip>;
 
     /// Whether the violation continues: a hold ends when it does not.
     fn is_violated(&self) -> bool {
@@ -55,7 +55,7 @@ impl<'a> ActiveGuards<'a> {
     }
 
     /// All trips of these samples, the most severe first, then the earliest.
-    pub(crate) fn check(&mut self, batch: &SampleBatch, now_s: f64, state: &Commanded) -> Vec<Trip> {
+    pub(crate) fn check(&mut self, batch: &SampleBatch, now_s: f64, state: &CommandedState) -> Vec<Trip> {
         let mut trips: Vec<Trip> =
             self.guards.iter_mut().filter_map(|guard| guard.check(batch, now_s, state)).collect();
         trips.sort_by(|a, b| b.reaction.cmp(&a.reaction).then(a.t_s.total_cmp(&b.t_s)));

@@ -1,6 +1,6 @@
 //! The guard for channels of auxiliary instruments that no other guard checks: it reports a channel without readings.
 
-use crate::guards::guard::{Commanded, Guard, Trip};
+use crate::guards::guard::{CommandedState, Guard, Trip};
 use mapper_core::{Channel, GuardName, Reaction, SampleBatch};
 
 /// A channel of an auxiliary instrument.
@@ -30,22 +30,22 @@ impl InstrumentWatch {
 }
 
 impl Guard for InstrumentWatch {
-    fn check(&mut self, batch: &SampleBatch, now_s: f64, _: &Commanded) -> Option<Trip> {
+    fn check(&mut self, batch: &SampleBatch, now_s: f64, _: &CommandedState) -> Option<Trip> {
         let first_s = *self.first_poll_s.get_or_insert(batch.t_s.first().copied().unwrap_or(now_s));
         let mut trip: Option<Trip> = None;
-        for (of, last_s, reported) in &mut self.channels {
-            let readings = batch.column(of.channel).unwrap_or_default().iter().zip(&batch.t_s);
+        for (channel_of, last_s, reported) in &mut self.channels {
+            let readings = batch.column(channel_of.channel).unwrap_or_default().iter().zip(&batch.t_s);
             if let Some((_, t_s)) = readings.rev().find(|(value, _)| value.is_finite()) {
                 (*last_s, *reported) = (Some(*t_s), false);
             }
             let since_s = last_s.unwrap_or(first_s);
-            if now_s - since_s <= of.age_s || *reported {
+            if now_s - since_s <= channel_of.age_s || *reported {
                 continue;
             }
             *reported = true;
-            let needed = crate::guards::start_check::REQUIRED_CHANNELS.contains(&of.channel);
+            let needed = crate::guards::start_check::REQUIRED_CHANNELS.contains(&channel_of.channel);
             let reaction = if needed { Reaction::Safe } else { Reaction::Note };
-            let (reader, channel) = (&of.reader, of.channel);
+            let (reader, channel) = (&channel_of.reader, channel_of.channel);
             let reason = format!("the reader `{reader}` has given no {channel} since {since_s:.1} s");
             let found = Trip { t_s: now_s, guard: GuardName::Signals, reaction, reason };
             trip = match trip {
@@ -64,7 +64,7 @@ mod tests {
 
     #[test]
     fn loss_of_a_required_channel_ends_the_run_and_of_another_is_noted_once() {
-        let of = |channel| InstrumentChannel { reader: "bench".to_owned(), channel, age_s: 3.0 };
+        let channel_of = |channel| InstrumentChannel { reader: "bench".to_owned(), channel, age_s: 3.0 };
         let batch = |t_s: f64, flow: f64, air: f64| SampleBatch {
             t_s: vec![t_s],
             columns: vec![
@@ -73,9 +73,10 @@ mod tests {
             ],
             ..SampleBatch::default()
         };
-        let mut guard = InstrumentWatch::new(vec![of(Channel::CompressorFlow), of(Channel::TAmb)]);
+        let mut guard =
+            InstrumentWatch::new(vec![channel_of(Channel::CompressorFlow), channel_of(Channel::TAmb)]);
         let nan = f64::NAN;
-        let mut look = |t_s, flow, air| guard.check(&batch(t_s, flow, air), t_s, &Commanded::default());
+        let mut look = |t_s, flow, air| guard.check(&batch(t_s, flow, air), t_s, &CommandedState::default());
         assert_eq!(look(0.0, 0.1, 298.0), None);
         assert_eq!(look(3.0, 0.1, nan), None);
         let trip = look(3.1, 0.1, nan).unwrap();

@@ -20,7 +20,7 @@
 //! turbocharger (1 l) rises by up to 20 MPa/s. Flow in a pipe of 0.5 m changes by 200 kg/s2 at 100 kPa. A power of 30 kW accelerates the
 //! shaft (16e-6 kg m2) at 95 krpm by 1.8 Mrpm/s. At 10 Hz, each of these exceeds the measuring range within one sample.
 
-use crate::guards::guard::{Commanded, Trip};
+use crate::guards::guard::{CommandedState, Trip};
 use crate::guards::recent_minimum::RecentMinimum;
 use crate::guards::start_check::REQUIRED_CHANNELS;
 use mapper_core::{
@@ -77,7 +77,7 @@ pub struct ReadingBounds {
     pub noise_k: [f64; 3],
 }
 
-/// The reading of a channel (number 0), or one of its several sensors, from 1.
+/// A channel as a whole (number 0), or one of its redundant sensors (numbers from 1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Sensor {
     channel: Channel,
@@ -85,7 +85,7 @@ struct Sensor {
 }
 
 impl Sensor {
-    /// The reading of a channel.
+    /// A channel as a whole.
     fn of(channel: Channel) -> Sensor {
         Sensor { channel, number: 0 }
     }
@@ -105,7 +105,7 @@ struct Track {
     jumped: Option<(f64, f64)>,
 }
 
-/// The rules, in the order of their states.
+/// A rule, with the sensor that it checks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Rule {
     Range(Sensor),
@@ -163,7 +163,7 @@ pub struct PlausibilityWatch {
     isentropic_k: RecentMinimum,
     /// Minimum isentropic work over the delay of the outlet, J/kg.
     work_j_kg: RecentMinimum,
-    /// Minima of -P3, Pa, and -T3, K, over the delay of the outlet.
+    /// Minima of -P3, Pa, and -T3, K, over the delay of the outlet: the negative values turn minima into maxima.
     p3_pa: RecentMinimum,
     t3_k: RecentMinimum,
     /// Start of the period in which a compressing machine shows no flow, s.
@@ -186,7 +186,7 @@ impl PlausibilityWatch {
     }
 
     /// Marks the impossible readings of a batch. Trips on a violation that has lasted too long.
-    pub fn judge(&mut self, batch: &mut SampleBatch, state: &Commanded) -> Option<Trip> {
+    pub fn judge(&mut self, batch: &mut SampleBatch, state: &CommandedState) -> Option<Trip> {
         let mut marks: Vec<(Sensor, usize)> = Vec::new();
         let mut trip: Option<Trip> = None;
         for index in 0..batch.t_s.len() {
@@ -206,18 +206,18 @@ impl PlausibilityWatch {
         batch: &SampleBatch,
         index: usize,
         t_s: f64,
-        state: &Commanded,
+        state: &CommandedState,
     ) -> Vec<(Rule, String)> {
         let mut found: Vec<(Rule, String)> = Vec::new();
         let is_bad = |channel| {
             batch.provenance_of(channel).is_some_and(|from| from.quality.get(index) == Some(&Quality::Bad))
         };
-        let combined = batch.columns.iter().map(|one| (Sensor::of(one.channel), &one.values));
-        let each = batch.elements.iter().map(|one| {
-            let Element { channel, number } = one.element;
-            (Sensor { channel, number }, &one.values)
+        let per_channel = batch.columns.iter().map(|column| (Sensor::of(column.channel), &column.values));
+        let elements = batch.elements.iter().map(|column| {
+            let Element { channel, number } = column.element;
+            (Sensor { channel, number }, &column.values)
         });
-        for (sensor, values) in combined.chain(each) {
+        for (sensor, values) in per_channel.chain(elements) {
             let channel = sensor.channel;
             let value = values.get(index).copied().filter(|value| value.is_finite() && !is_bad(channel));
             let Some(value) = value else { continue };
@@ -371,7 +371,7 @@ impl PlausibilityWatch {
             }
         }
         let mut worst: Option<Trip> = None;
-        for violation in self.violations.iter_mut().filter(|one| !one.reported) {
+        for violation in self.violations.iter_mut().filter(|column| !column.reported) {
             // One microsecond covers the rounding of accumulated sample times.
             if t_s - violation.since_s < MIN_DURATION_S - 1e-6 {
                 continue;
@@ -404,21 +404,21 @@ fn format_value(channel: Channel, value: f64) -> String {
 
 /// Marks one reading as bad. A single sensor of several has no quality flag, so its reading is removed.
 fn mark_bad(batch: &mut SampleBatch, Sensor { channel, number }: Sensor, index: usize) {
-    let element = batch.elements.iter_mut().find(|one| one.element == Element { channel, number });
-    if let Some(value) = element.and_then(|one| one.values.get_mut(index)) {
+    let element = batch.elements.iter_mut().find(|column| column.element == Element { channel, number });
+    if let Some(value) = element.and_then(|column| column.values.get_mut(index)) {
         *value = f64::NAN;
         return;
     }
     if batch.column(channel).is_none() {
         return;
     }
-    let place = batch.provenance.iter().position(|from| from.channel == channel).unwrap_or_else(|| {
+    let index_of = batch.provenance.iter().position(|from| from.channel == channel).unwrap_or_else(|| {
         let source_t_s = batch.t_s.clone();
         let quality = vec![Quality::Good; source_t_s.len()];
         batch.provenance.push(Provenance { channel, source_t_s, quality });
         batch.provenance.len() - 1
     });
-    let quality = batch.provenance.get_mut(place).and_then(|from| from.quality.get_mut(index));
+    let quality = batch.provenance.get_mut(index_of).and_then(|from| from.quality.get_mut(index));
     if let Some(quality) = quality {
         *quality = Quality::Bad;
     }

@@ -17,12 +17,12 @@ impl RecentMinimum {
     /// Adds a value, and returns the lowest one of the last `window_s`, this one included.
     pub(crate) fn update(&mut self, t_s: f64, value: f64, window_s: f64) -> f64 {
         let mut kept_since_s = t_s;
-        while let Some((then_s, _)) = self.increasing.back().filter(|(_, then)| *then >= value) {
+        while let Some((then_s, _)) = self.increasing.back().filter(|(_, earlier)| *earlier >= value) {
             kept_since_s = *then_s;
             self.increasing.pop_back();
         }
-        let near = self.increasing.back().is_some_and(|(then_s, _)| t_s - then_s < SPACING_S);
-        if !near || kept_since_s < t_s {
+        let is_close = self.increasing.back().is_some_and(|(then_s, _)| t_s - then_s < SPACING_S);
+        if !is_close || kept_since_s < t_s {
             self.increasing.push_back((t_s, value));
         }
         let window_s = window_s.min(WINDOW_MAX_S);

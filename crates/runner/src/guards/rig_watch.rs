@@ -1,6 +1,6 @@
 //! The guard for the rig itself: a reported trip, or a shaft that is no longer driven.
 
-use crate::guards::guard::{Commanded, Guard, Trip};
+use crate::guards::guard::{CommandedState, Guard, Trip};
 use mapper_core::{Channel, EventKind, GuardName, Reaction, SampleBatch};
 
 /// Time after the start of a step in which the shaft may accelerate, s.
@@ -29,7 +29,7 @@ impl RigWatch {
 }
 
 impl Guard for RigWatch {
-    fn check(&mut self, batch: &SampleBatch, _: f64, state: &Commanded) -> Option<Trip> {
+    fn check(&mut self, batch: &SampleBatch, _: f64, state: &CommandedState) -> Option<Trip> {
         if let Some(event) = batch.events.iter().find(|event| event.kind == EventKind::RigTripped) {
             return self.trip(event.t_s, event.message.clone());
         }
@@ -65,7 +65,7 @@ mod tests {
     #[test]
     fn a_reported_trip_and_a_stopped_shaft_trip_once_and_latch() {
         let aim = Some(OperatingPoint { speed_rpm: 1e5, valve_opening_ratio: 0.7 });
-        let state = Commanded { running: true, step_since_s: Some(0.0), aim, jumped_s: None };
+        let state = CommandedState { running: true, step_since_s: Some(0.0), aim, jumped_s: None };
         let speeds = |from_s: f64, rpm: f64| {
             let t_s: Vec<f64> = (0..100).map(|i| from_s + 0.1 * f64::from(i)).collect();
             let values = vec![rpm; 100];

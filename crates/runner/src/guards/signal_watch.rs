@@ -1,6 +1,6 @@
 //! The guard for one channel: value, rate of change, age, quality, and a frozen reading.
 
-use crate::guards::guard::{Commanded, Guard, Trip};
+use crate::guards::guard::{CommandedState, Guard, Trip};
 use crate::guards::plausibility_watch::is_possible;
 use mapper_core::{Quality, Reaction, SampleBatch, SignalGuard, readable};
 use std::collections::VecDeque;
@@ -56,13 +56,13 @@ impl SignalWatch {
         }
     }
 
-    fn trip(&mut self, t_s: f64, reaction: Reaction, what: &str) -> Option<Trip> {
+    fn trip(&mut self, t_s: f64, reaction: Reaction, message: &str) -> Option<Trip> {
         if self.quiet_until_s.is_some_and(|quiet_s| t_s < quiet_s) {
             return None;
         }
         self.quiet_until_s = Some(t_s + REPEAT_TRIP_S);
         let channel = self.spec.channel;
-        let reason = format!("{} ({channel}) {what}", channel.info().description);
+        let reason = format!("{} ({channel}) {message}", channel.info().description);
         Some(Trip { t_s, guard: self.spec.name, reaction, reason })
     }
 
@@ -80,27 +80,28 @@ impl SignalWatch {
         }
     }
 
-    fn check_sample(&mut self, t_s: f64, value: f64, state: &Commanded) -> Option<Trip> {
+    fn check_sample(&mut self, t_s: f64, value: f64, state: &CommandedState) -> Option<Trip> {
         // The slope over a single sample would be noise.
         match self.anchor {
-            Some((then_s, then)) if t_s - then_s >= SLOPE_S => {
-                self.slope_per_s = (value - then) / (t_s - then_s);
+            Some((then_s, earlier)) if t_s - then_s >= SLOPE_S => {
+                self.slope_per_s = (value - earlier) / (t_s - then_s);
                 self.anchor = Some((t_s, value));
             }
             Some(_) => {}
             None => self.anchor = Some((t_s, value)),
         }
         self.last_good_s = Some(t_s);
-        let unchanged = |(_, there): &(f64, f64)| (value - there).abs() <= FROZEN_RATIO * there.abs();
+        let unchanged =
+            |(_, constant): &(f64, f64)| (value - constant).abs() <= FROZEN_RATIO * constant.abs();
         self.constant_since = self.constant_since.filter(unchanged).or(Some((t_s, value)));
         self.last_value = Some(value);
         // Hysteresis: after a violation, the value has to return past the bound by this amount.
         let slack = if self.beyond_since_s.is_some() { self.spec.hysteresis } else { 0.0 };
-        if let Some(what) = self.describe_violation(value, state.running, slack) {
+        if let Some(message) = self.describe_violation(value, state.running, slack) {
             let since_s = *self.beyond_since_s.get_or_insert(t_s);
             // One microsecond covers the rounding of accumulated sample times.
             if t_s - since_s >= self.spec.dwell_s - 1e-6 {
-                return self.trip(t_s, self.spec.reaction, &what);
+                return self.trip(t_s, self.spec.reaction, &message);
             }
         } else {
             self.beyond_since_s = None;
@@ -110,74 +111,76 @@ impl SignalWatch {
 
     /// Trips if the reading changes by more than the allowed change.
     fn check_change(&mut self, t_s: f64, value: f64) -> Option<Trip> {
-        let largest = self.spec.change?;
-        while self.recent.front().is_some_and(|(then_s, _)| t_s - then_s > largest.within_s) {
+        let limit = self.spec.change?;
+        while self.recent.front().is_some_and(|(then_s, _)| t_s - then_s > limit.within_s) {
             self.recent.pop_front();
         }
         let (low, high) = self
             .recent
             .iter()
-            .fold((value, value), |(low, high), (_, then)| (low.min(*then), high.max(*then)));
-        let apart_s = CHANGE_RESOLUTION_RATIO * largest.within_s;
-        if self.recent.back().is_none_or(|(then_s, _)| t_s - then_s >= apart_s) {
+            .fold((value, value), |(low, high), (_, earlier)| (low.min(*earlier), high.max(*earlier)));
+        let min_spacing_s = CHANGE_RESOLUTION_RATIO * limit.within_s;
+        if self.recent.back().is_none_or(|(then_s, _)| t_s - then_s >= min_spacing_s) {
             self.recent.push_back((t_s, value));
         }
         let change = (value - low).max(high - value);
-        if change <= largest.change {
+        if change <= limit.change {
             return None;
         }
         let unit = self.spec.channel.unit();
-        let what = format!(
+        let message = format!(
             "has changed by {change:.1} {unit} within {:.0} s, more than the {:.1} {unit} allowed",
-            largest.within_s, largest.change
+            limit.within_s, limit.change
         );
-        self.trip(t_s, self.spec.reaction, &what)
+        self.trip(t_s, self.spec.reaction, &message)
     }
 
     /// Trips if the reading has not moved although the setpoints have.
-    fn check_frozen(&mut self, t_s: f64, state: &Commanded) -> Option<Trip> {
-        let (frozen_s, (same_s, _), jumped_s) = (self.spec.frozen_s?, self.constant_since?, state.jumped_s?);
+    fn check_frozen(&mut self, t_s: f64, state: &CommandedState) -> Option<Trip> {
+        let (frozen_s, (constant_since_s, _), jumped_s) =
+            (self.spec.frozen_s?, self.constant_since?, state.jumped_s?);
         let since_jump_s = t_s - jumped_s;
         // The reading must be unchanged since before the jump.
-        if !state.running || since_jump_s < frozen_s || same_s > jumped_s {
+        if !state.running || since_jump_s < frozen_s || constant_since_s > jumped_s {
             return None;
         }
         let value = readable(self.last_value?, self.spec.channel.unit());
-        let what =
-            format!("is frozen: {value} since {same_s:.1} s, though the setpoints jumped at {jumped_s:.1} s");
-        self.trip(t_s, self.spec.reaction.max(Reaction::Safe), &what)
+        let message = format!(
+            "is frozen: {value} since {constant_since_s:.1} s, though the setpoints jumped at {jumped_s:.1} s"
+        );
+        self.trip(t_s, self.spec.reaction.max(Reaction::Safe), &message)
     }
 }
 
 impl Guard for SignalWatch {
-    fn check(&mut self, batch: &SampleBatch, now_s: f64, state: &Commanded) -> Option<Trip> {
+    fn check(&mut self, batch: &SampleBatch, now_s: f64, state: &CommandedState) -> Option<Trip> {
         let first_s = *self.first_poll_s.get_or_insert(batch.t_s.first().copied().unwrap_or(now_s));
         if let Some(values) = batch.column(self.spec.channel) {
             let provenance = batch.provenance_of(self.spec.channel);
-            let mut found: Option<Trip> = None;
+            let mut first_trip: Option<Trip> = None;
             for (index, (t_s, value)) in batch.t_s.iter().zip(values).enumerate() {
                 let bad = provenance.is_some_and(|from| from.quality.get(index) == Some(&Quality::Bad));
                 // A stale or repeated value is as old as its source time.
                 let source_s = provenance.and_then(|from| from.source_t_s.get(index)).copied();
-                let taken_s = source_s.map_or(*t_s, |source_s| source_s.min(*t_s));
-                let new = self.last_good_s.is_none_or(|last_s| taken_s > last_s);
+                let reading_s = source_s.map_or(*t_s, |source_s| source_s.min(*t_s));
+                let new = self.last_good_s.is_none_or(|last_s| reading_s > last_s);
                 // A value above its limit counts even if it is implausible.
                 let above = value.is_finite() && self.spec.above.is_some_and(|high| *value > high);
                 let read = above || is_possible(self.spec.channel, *value, state.running);
-                if read && taken_s.is_finite() && !bad && new {
-                    let trip = self.check_sample(taken_s, *value, state);
-                    found = found.or(trip);
+                if read && reading_s.is_finite() && !bad && new {
+                    let trip = self.check_sample(reading_s, *value, state);
+                    first_trip = first_trip.or(trip);
                 }
             }
-            if found.is_some() {
-                return found;
+            if first_trip.is_some() {
+                return first_trip;
             }
         }
         // Age counts from the first poll, even if no samples arrive.
         let since_s = self.last_good_s.unwrap_or(first_s);
         if now_s - since_s > self.spec.age_s {
-            let what = format!("has given no good reading since {since_s:.1} s");
-            return self.trip(now_s, self.spec.reaction.max(Reaction::Safe), &what);
+            let message = format!("has given no good reading since {since_s:.1} s");
+            return self.trip(now_s, self.spec.reaction.max(Reaction::Safe), &message);
         }
         None
     }
@@ -224,20 +227,20 @@ mod tests {
         }
     }
 
-    fn look(guard: &mut SignalWatch, batch: &SampleBatch, now_s: f64) -> Option<Trip> {
-        guard.check(batch, now_s, &Commanded { running: true, ..Commanded::default() })
+    fn check(guard: &mut SignalWatch, batch: &SampleBatch, now_s: f64) -> Option<Trip> {
+        guard.check(batch, now_s, &CommandedState { running: true, ..CommandedState::default() })
     }
 
     #[test]
     fn a_violation_trips_after_its_dwell_across_batches_despite_nan() {
         let mut guard = SignalWatch::new(SignalGuard { hysteresis: 0.0, ..spec() });
-        assert_eq!(look(&mut guard, &batch(0, &[401.0, 399.0, 401.0, f64::NAN]), 0.3), None);
+        assert_eq!(check(&mut guard, &batch(0, &[401.0, 399.0, 401.0, f64::NAN]), 0.3), None);
         assert!(guard.is_violated() && guard.is_alert());
-        let trip = look(&mut guard, &batch(4, &[401.5]), 0.4).unwrap();
+        let trip = check(&mut guard, &batch(4, &[401.5]), 0.4).unwrap();
         assert_eq!((trip.t_s, trip.reaction), (0.4, Reaction::Hold));
         assert!(trip.reason.contains("401.5 K") && trip.reason.contains("400.0 K"), "{}", trip.reason);
         // The violation was already reported.
-        assert_eq!(look(&mut guard, &batch(5, &[401.5; 5]), 0.9), None);
+        assert_eq!(check(&mut guard, &batch(5, &[401.5; 5]), 0.9), None);
     }
 
     #[test]
@@ -246,12 +249,12 @@ mod tests {
         let trips: Vec<Trip> = (0..50)
             .filter_map(|i| {
                 let value = if i % 2 == 0 { 400.5 } else { 399.5 };
-                look(&mut guard, &batch(i, &[value]), i as f64 * 0.1)
+                check(&mut guard, &batch(i, &[value]), i as f64 * 0.1)
             })
             .collect();
         assert_eq!(trips.len(), 1, "{trips:?}");
         assert!(guard.is_violated());
-        look(&mut guard, &batch(50, &[397.0]), 5.0);
+        check(&mut guard, &batch(50, &[397.0]), 5.0);
         assert!(!guard.is_violated());
     }
 
@@ -267,7 +270,7 @@ mod tests {
             }],
             ..batch(2, &[300.0; 10])
         };
-        for (what, later) in [
+        for (message, later) in [
             ("an empty batch", nothing.clone()),
             ("NaN", batch(2, &[f64::NAN; 10])),
             ("no column", SampleBatch { columns: Vec::new(), ..batch(2, &[300.0; 10]) }),
@@ -275,15 +278,15 @@ mod tests {
             ("an old source", bad(0.1, Quality::Good)),
         ] {
             let mut guard = SignalWatch::new(spec());
-            assert_eq!(look(&mut guard, &good, 0.1), None, "{what}");
-            let trip = look(&mut guard, &later, 1.1).unwrap_or_else(|| panic!("{what}"));
-            assert_eq!(trip.reaction, Reaction::Safe, "{what}");
-            assert!(trip.reason.contains("no good reading since 0.1 s"), "{what}: {}", trip.reason);
+            assert_eq!(check(&mut guard, &good, 0.1), None, "{message}");
+            let trip = check(&mut guard, &later, 1.1).unwrap_or_else(|| panic!("{message}"));
+            assert_eq!(trip.reaction, Reaction::Safe, "{message}");
+            assert!(trip.reason.contains("no good reading since 0.1 s"), "{message}: {}", trip.reason);
         }
         // A source that never delivered a reading.
         let mut guard = SignalWatch::new(spec());
-        assert_eq!(look(&mut guard, &nothing, 0.0), None);
-        assert!(look(&mut guard, &nothing, 0.6).is_some());
+        assert_eq!(check(&mut guard, &nothing, 0.0), None);
+        assert!(check(&mut guard, &nothing, 0.6).is_some());
     }
 
     /// A clock set back by an hour looks like a source without new readings; a clock set forward does not.
@@ -291,12 +294,12 @@ mod tests {
     fn a_source_clock_that_is_set_back_trips_and_one_set_forward_does_not() {
         for (step_s, trips) in [(-3600.0, true), (3600.0, false)] {
             let mut guard = SignalWatch::new(spec());
-            assert_eq!(look(&mut guard, &batch(0, &[300.0; 2]), 0.1), None);
+            assert_eq!(check(&mut guard, &batch(0, &[300.0; 2]), 0.1), None);
             let later = batch(2, &[300.0; 10]);
             let source_t_s = later.t_s.iter().map(|t_s| t_s + step_s).collect();
             let quality = vec![Quality::Good; 10];
             let provenance = vec![Provenance { channel: Channel::T2, source_t_s, quality }];
-            let trip = look(&mut guard, &SampleBatch { provenance, ..later }, 1.1);
+            let trip = check(&mut guard, &SampleBatch { provenance, ..later }, 1.1);
             assert_eq!(trip.is_some(), trips, "set by {step_s} s: {trip:?}");
         }
     }
@@ -317,13 +320,13 @@ mod tests {
                 ..batch(first, &vec![value; count])
             };
             let mut guard = SignalWatch::new(spec);
-            assert_eq!(look(&mut guard, &at(0, good, 20), 1.9), None, "{channel} {good}");
-            let trip = look(&mut guard, &at(20, wrong, 10), 2.9).unwrap();
+            assert_eq!(check(&mut guard, &at(0, good, 20), 1.9), None, "{channel} {good}");
+            let trip = check(&mut guard, &at(20, wrong, 10), 2.9).unwrap();
             assert_eq!(trip.reaction, Reaction::Safe, "{channel} {wrong}");
         }
         // A broken wire that reads 5000 K trips like a temperature above its limit.
         let mut guard = SignalWatch::new(spec());
-        let trip = look(&mut guard, &batch(0, &[5000.0; 3]), 0.2).unwrap();
+        let trip = check(&mut guard, &batch(0, &[5000.0; 3]), 0.2).unwrap();
         assert_eq!(trip.reaction, Reaction::Hold);
     }
 
@@ -331,11 +334,14 @@ mod tests {
     fn a_large_change_and_a_frozen_reading_trip() {
         let change = Some(LargestChange { change: 5.0, within_s: 1.0 });
         let mut guard = SignalWatch::new(SignalGuard { above: None, change, ..spec() });
-        assert_eq!(look(&mut guard, &batch(0, &[300.0, 301.0, 302.0, 303.0]), 0.3), None);
-        assert!(look(&mut guard, &batch(4, &[306.0]), 0.4).unwrap().reason.contains("6.0 K within 1 s"));
+        assert_eq!(check(&mut guard, &batch(0, &[300.0, 301.0, 302.0, 303.0]), 0.3), None);
+        assert!(check(&mut guard, &batch(4, &[306.0]), 0.4).unwrap().reason.contains("6.0 K within 1 s"));
         let mut guard = SignalWatch::new(SignalGuard { frozen_s: Some(2.0), ..spec() });
-        let after_jump =
-            |jumped_s| Commanded { running: true, jumped_s: Some(jumped_s), ..Commanded::default() };
+        let after_jump = |jumped_s| CommandedState {
+            running: true,
+            jumped_s: Some(jumped_s),
+            ..CommandedState::default()
+        };
         // Unchanged without a jump; moved after one; not moved.
         assert_eq!(guard.check(&batch(0, &[300.0; 100]), 9.9, &after_jump(9.5)), None);
         let mut moved = guard.clone();

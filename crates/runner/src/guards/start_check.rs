@@ -1,6 +1,6 @@
 //! Checks the first seconds of a run, before the machine is driven far: every channel alive, in range, and on time.
 
-use crate::guards::guard::{Commanded, Guard, Trip};
+use crate::guards::guard::{CommandedState, Guard, Trip};
 use mapper_core::{Channel, GuardName, Reaction, SampleBatch, measurable, with_unit};
 
 /// Duration of the check, s.
@@ -45,13 +45,13 @@ impl StartCheck {
                 None => faults.push((needed, format!("{channel} gives no reading"))),
                 Some(value) if !range.contains(value) => {
                     let (low, high, unit) = (range.start(), range.end(), channel.unit());
-                    let words = format!(
+                    let message = format!(
                         "{channel} reads {}, where a sensor reads {} to {}",
                         with_unit(format_bound(*value), unit),
                         format_bound(*low),
                         with_unit(format_bound(*high), unit)
                     );
-                    faults.push((needed, words));
+                    faults.push((needed, message));
                 }
                 Some(_) => {}
             }
@@ -73,7 +73,7 @@ fn format_bound(value: f64) -> String {
 }
 
 impl Guard for StartCheck {
-    fn check(&mut self, batch: &SampleBatch, now_s: f64, _: &Commanded) -> Option<Trip> {
+    fn check(&mut self, batch: &SampleBatch, now_s: f64, _: &CommandedState) -> Option<Trip> {
         if self.over {
             return None;
         }
@@ -92,12 +92,12 @@ impl Guard for StartCheck {
         self.over = true;
         let faults = self.list_faults();
         let needed = faults.iter().any(|(needed, _)| *needed);
-        let words: Vec<&str> = faults.iter().map(|(_, words)| words.as_str()).collect();
-        (!words.is_empty()).then(|| Trip {
+        let message: Vec<&str> = faults.iter().map(|(_, message)| message.as_str()).collect();
+        (!message.is_empty()).then(|| Trip {
             t_s: now_s,
             guard: GuardName::Signals,
             reaction: if needed { Reaction::Safe } else { Reaction::Note },
-            reason: format!("at the start {}", words.join(", ")),
+            reason: format!("at the start {}", message.join(", ")),
         })
     }
 }
@@ -123,7 +123,7 @@ mod tests {
                 t_s,
                 ..SampleBatch::default()
             };
-            StartCheck::new(vec![Channel::T2, Channel::T4]).check(&batch, 5.9, &Commanded::default())
+            StartCheck::new(vec![Channel::T2, Channel::T4]).check(&batch, 5.9, &CommandedState::default())
         };
         assert_eq!(look(300.0, 600.0, 0.0), None);
         let trip = look(f64::NAN, 600.0, 0.0).unwrap();

@@ -4,7 +4,7 @@
 //! at 10 Hz folds both into noise of the same size. The guard uses the median size of the second difference of three samples:
 //! it is insensitive to level and slope, and a jump of the operating point affects only a few of these differences.
 
-use crate::guards::guard::{Commanded, Guard, Trip};
+use crate::guards::guard::{CommandedState, Guard, Trip};
 use mapper_core::{Channel, GuardName, SampleBatch, SurgeVariation};
 use mapper_numerics::statistics::median;
 use std::collections::VecDeque;
@@ -68,7 +68,7 @@ impl SurgeWatch {
 }
 
 impl Guard for SurgeWatch {
-    fn check(&mut self, batch: &SampleBatch, _: f64, state: &Commanded) -> Option<Trip> {
+    fn check(&mut self, batch: &SampleBatch, _: f64, state: &CommandedState) -> Option<Trip> {
         if !state.running {
             self.samples.clear();
             (self.since_s, self.reported) = (None, false);
@@ -134,7 +134,7 @@ mod tests {
     /// Time of the trip, s, for a flow of 0.05 kg/s and P2 of 150 kPa at 100 Hz with these relative variations.
     fn trips_at_s(flow: impl Fn(f64) -> f64, p2: impl Fn(f64) -> f64) -> Option<f64> {
         let mut guard = SurgeWatch::new(SPEC);
-        let state = Commanded { running: true, ..Commanded::default() };
+        let state = CommandedState { running: true, ..CommandedState::default() };
         (0..60).find_map(|second| {
             let t_s: Vec<f64> = (0..100).map(|i| f64::from(second) + 0.01 * f64::from(i)).collect();
             let column = |channel, mean: f64, course: &dyn Fn(f64) -> f64| ChannelColumn {

@@ -12,7 +12,7 @@ pub struct ObserverError {
 
 impl ObserverError {
     /// Wraps the observer's own error.
-    pub fn of(error: impl std::error::Error + Send + Sync + 'static) -> Self {
+    pub fn new(error: impl std::error::Error + Send + Sync + 'static) -> Self {
         ObserverError { source: Box::new(error) }
     }
 }
@@ -27,7 +27,7 @@ pub trait RunObserver {
         Ok(())
     }
 
-    /// A step begins; its `end_s` is the planned one.
+    /// A step begins; `marker.end_s` is its planned end.
     ///
     /// # Errors
     /// [`ObserverError`].
@@ -59,7 +59,7 @@ pub trait RunObserver {
         Ok(())
     }
 
-    /// A step has ended; its `end_s` is the real one.
+    /// A step has ended; `marker.end_s` is its real end.
     ///
     /// # Errors
     /// [`ObserverError`].
@@ -76,7 +76,7 @@ pub trait RunObserver {
     }
 }
 
-/// Combines several observers; the first error ends the round.
+/// Calls each observer in turn; the first error skips the remaining ones.
 impl RunObserver for Vec<&mut dyn RunObserver> {
     fn on_start(&mut self, rig: &RigDescription) -> Result<(), ObserverError> {
         self.iter_mut().try_for_each(|observer| observer.on_start(rig))

@@ -1,6 +1,6 @@
 //! The run itself: soak, warm-up, steps, cool-down.
 
-use crate::guards::guard::{ActiveGuards, Commanded, Guard, Trip};
+use crate::guards::guard::{ActiveGuards, CommandedState, Guard, Trip};
 use crate::guards::plausibility_watch::PlausibilityWatch;
 use crate::guards::speed_history::SpeedHistory;
 use crate::run_control::observer::{ObserverError, RunObserver};
@@ -85,7 +85,7 @@ pub(crate) struct Run<'a, 'p> {
     pub(crate) now_s: f64,
     /// The most recent setpoints.
     pub(crate) sent: Option<Setpoints>,
-    pub(crate) commanded: Commanded,
+    pub(crate) commanded: CommandedState,
     sample_s: f64,
     speed_history: SpeedHistory,
     plausibility: Option<PlausibilityWatch>,
@@ -119,7 +119,7 @@ impl Runner<'_> {
             protection,
             now_s: 0.0,
             sent: None,
-            commanded: Commanded::default(),
+            commanded: CommandedState::default(),
             sample_s: if sample_s > 0.0 { sample_s.min(POLL_INTERVAL_S) } else { POLL_INTERVAL_S },
             speed_history: SpeedHistory::default(),
             plausibility: protection.readings.map(PlausibilityWatch::new),
@@ -175,7 +175,7 @@ impl Run<'_, '_> {
             self.pass_notes()?;
         }
         self.runner.backend.make_safe()?;
-        (self.sent, self.commanded) = (None, Commanded::default());
+        (self.sent, self.commanded) = (None, CommandedState::default());
         let end_s = self.now_s + self.runner.steps.cool_down_s();
         self.run_until(end_s, false, false)
     }
@@ -197,10 +197,10 @@ impl Run<'_, '_> {
     /// Executes one step, and repeats it once if a guard requests smaller steps.
     fn step(&mut self, step: &PlanStep) -> Result<(), Halt> {
         let before = self.sent;
-        let mut again = false;
+        let mut repeats = false;
         loop {
             let setpoints = self.begin_step(step);
-            if again && let Some(before) = before {
+            if repeats && let Some(before) = before {
                 self.approach(before, setpoints)?;
             }
             let mut marker = StepMarker {
@@ -244,13 +244,13 @@ impl Run<'_, '_> {
                 }
             };
             self.runner.observer.on_step_abandoned(&marker)?;
-            let (is_repeated, what) = match trip.reaction {
-                Reaction::SmallerSteps if !again && before.is_some() => {
+            let (is_repeated, response) = match trip.reaction {
+                Reaction::SmallerSteps if !repeats && before.is_some() => {
                     (true, "the step is repeated in smaller steps")
                 }
                 _ => (false, "the step is skipped"),
             };
-            self.report_trip(&trip, what)?;
+            self.report_trip(&trip, response)?;
             if !is_repeated {
                 self.skipped += 1;
                 if self.skipped > MAX_SKIPPED_STEPS {
@@ -261,7 +261,7 @@ impl Run<'_, '_> {
                 self.runner.steps.after_skipped_step(&marker)?;
                 return Ok(());
             }
-            again = true;
+            repeats = true;
         }
     }
 
@@ -328,8 +328,8 @@ impl Run<'_, '_> {
     }
 
     /// Reports a guard that does not end the run.
-    fn report_trip(&mut self, trip: &Trip, what: &str) -> Result<(), Halt> {
-        let message = format!("guard `{}`: {}; {what}", trip.guard, trip.reason);
+    fn report_trip(&mut self, trip: &Trip, response: &str) -> Result<(), Halt> {
+        let message = format!("guard `{}`: {}; {response}", trip.guard, trip.reason);
         let t_s = trip.t_s.max(self.now_s);
         Ok(self.runner.observer.on_event(&Event { t_s, kind: EventKind::GuardActed, message })?)
     }
@@ -445,12 +445,12 @@ impl Run<'_, '_> {
         in_step: bool,
     ) -> Result<(SampleBatch, Vec<Trip>), BackendError> {
         let end_s = (self.now_s + POLL_INTERVAL_S).min(until_s);
-        let mut whole: Option<SampleBatch> = None;
+        let mut merged: Option<SampleBatch> = None;
         loop {
             let alert = self.protection.each_sample || ActiveGuards::new(&mut self.runner.guards).is_alert();
             let next_s = if alert { (self.now_s + self.sample_s).min(end_s) } else { end_s };
             if !self.wait_until_or_stop(next_s, in_step) {
-                return Ok((whole.unwrap_or_default(), Vec::new()));
+                return Ok((merged.unwrap_or_default(), Vec::new()));
             }
             let mut batch = self.runner.backend.poll(next_s)?;
             self.now_s = next_s;
@@ -459,14 +459,14 @@ impl Run<'_, '_> {
             let judged =
                 self.plausibility.as_mut().and_then(|watch| watch.judge(&mut batch, &self.commanded));
             trips.extend(judged);
-            match &mut whole {
-                None => whole = Some(batch),
-                Some(whole) => whole.append(batch),
+            match &mut merged {
+                None => merged = Some(batch),
+                Some(merged) => merged.append(batch),
             }
             // Rounding: accumulated sample times fall slightly short of the full second.
             if !trips.is_empty() || end_s - self.now_s < 1e-9 * end_s.abs() {
                 self.now_s = if trips.is_empty() { end_s } else { self.now_s };
-                return Ok((whole.unwrap_or_default(), trips));
+                return Ok((merged.unwrap_or_default(), trips));
             }
         }
     }

@@ -1,6 +1,6 @@
 //! The safe shutdown after a fault: first the safe state, then the records of the reason.
 
-use crate::guards::guard::Commanded;
+use crate::guards::guard::CommandedState;
 use crate::run_control::protection::Protection;
 use crate::run_control::run::{Halt, Run, RunEnd, panic_message};
 use crate::run_control::run_error::RunError;
@@ -19,7 +19,7 @@ const PAUSE_S: f64 = 0.5;
 /// A panic of the backend, as its error.
 #[derive(Debug, thiserror::Error)]
 #[error("the backend failed: {0}")]
-struct Panicked(String);
+struct PanicError(String);
 
 /// Contains a panic of an observer, so that the shutdown continues.
 pub(crate) fn catch_panic(report: impl FnOnce() -> Result<(), RunError>) -> Result<(), RunError> {
@@ -34,7 +34,7 @@ impl Run<'_, '_> {
         // The first command is sent before anything is written: a disk may be slow.
         let start = self.begin_run_down();
         // A step that missed its speed does not count, whatever its duration.
-        let counts = !matches!(&halt, Halt::Tripped(trip, _) if trip.guard == GuardName::Speed);
+        let step_counts = !matches!(&halt, Halt::Tripped(trip, _) if trip.guard == GuardName::Speed);
         let (end, kind, message, unreported) = match halt {
             Halt::Interrupted => (
                 Ok(RunEnd::Interrupted { t_s: self.now_s }),
@@ -56,7 +56,7 @@ impl Run<'_, '_> {
             }
         };
         // The error that ended the run takes precedence over errors while reporting it.
-        let reported = catch_panic(|| self.report_reason(unreported.as_deref(), counts, kind, &message));
+        let reported = catch_panic(|| self.report_reason(unreported.as_deref(), step_counts, kind, &message));
         let safe = self.run_down(start).and_then(|()| self.cut_air());
         let reported = reported.and_then(|()| catch_panic(|| self.report_safe(safe.as_ref().err())));
         match (end, safe) {
@@ -73,7 +73,7 @@ impl Run<'_, '_> {
     fn report_reason(
         &mut self,
         unreported: Option<&SampleBatch>,
-        counts: bool,
+        step_counts: bool,
         kind: EventKind,
         message: &str,
     ) -> Result<(), RunError> {
@@ -81,7 +81,7 @@ impl Run<'_, '_> {
             self.runner.observer.on_batch(batch)?;
         }
         match self.open_step.take() {
-            Some(marker) if counts => self.runner.observer.on_step_end(&marker)?,
+            Some(marker) if step_counts => self.runner.observer.on_step_end(&marker)?,
             Some(marker) => self.runner.observer.on_step_abandoned(&marker)?,
             None => {}
         }
@@ -114,7 +114,7 @@ impl Run<'_, '_> {
     /// Sends the first command of the run-down. Returns the setpoints from which it starts, or `None` if the air is to be cut at once.
     fn begin_run_down(&mut self) -> Option<Setpoints> {
         let from = self.sent?;
-        self.commanded = Commanded::default();
+        self.commanded = CommandedState::default();
         let first = self.run_down_setpoints(&from, STEP_S)?;
         let sent = catch_unwind(AssertUnwindSafe(|| self.runner.backend.set(&first)));
         matches!(sent, Ok(Ok(()))).then_some(from)
@@ -153,7 +153,7 @@ impl Run<'_, '_> {
             }
             last =
                 catch_unwind(AssertUnwindSafe(|| self.runner.backend.make_safe())).unwrap_or_else(|panic| {
-                    let source = Box::new(Panicked(panic_message(&*panic)));
+                    let source = Box::new(PanicError(panic_message(&*panic)));
                     Err(BackendError::Lost { t_s: self.now_s, source })
                 });
             if last.is_ok() {

@@ -293,10 +293,10 @@ impl<'a> SpeedControl<'a> {
     pub fn end(&mut self, t_s: f64) -> Option<Event> {
         let hold = self.hold.as_ref()?;
         if hold.closed_s.is_some() {
-            let own = hold.deficit(hold.setpoint_pa);
+            let own_deficit = hold.deficit(hold.setpoint_pa);
             self.averaged_steps += 1;
             let weight = (1.0 / self.averaged_steps as f64).max(MIN_LEARNING_RATIO);
-            self.deficit += weight * (own - self.deficit);
+            self.deficit += weight * (own_deficit - self.deficit);
         }
         let (requested_rpm, reached_rpm) = (hold.target.speed_rpm, hold.reached_rpm()?);
         let off_ratio = reached_rpm / requested_rpm - 1.0;

@@ -15,12 +15,12 @@ use std::time::Duration;
 const STOP_CHECK_INTERVAL_S: f64 = 0.01;
 
 impl Runner<'_> {
-    /// Connects and arms the rig. A stop meanwhile is answered at once. No setpoint is sent before the rig is armed, and the safe command
-    /// is then the first one. The result inside is that of the answer: its failure must not leave an armed rig.
+    /// Connects and arms the rig. A stop request in the meantime is confirmed immediately. No setpoint is sent before the rig is armed, so
+    /// after a stop the safe command is the first one. The inner result is that of the confirmation: its failure must not leave an armed rig.
     pub(crate) fn arm(&mut self, protection: &Protection<'_>) -> Result<Result<(), RunError>, RunError> {
         let Runner { backend, observer, stop, .. } = self;
         let stops = || stop.load(Ordering::Relaxed) || protection.stop_after_step.load(Ordering::Relaxed);
-        let mut answered = None;
+        let mut confirmation = None;
         let armed = thread::scope(|scope| {
             let (done, ended) = channel();
             let arming = scope.spawn(move || {
@@ -32,18 +32,18 @@ impl Runner<'_> {
             while ended.recv_timeout(Duration::from_secs_f64(STOP_CHECK_INTERVAL_S))
                 == Err(RecvTimeoutError::Timeout)
             {
-                if answered.is_none() && stops() {
-                    let message = "asked to stop while the rig is being connected: it has no setpoint yet and is made safe as \
-                                   soon as it answers"
+                if confirmation.is_none() && stops() {
+                    let message = "stop requested while the rig is being connected: the rig has no setpoint yet and is made safe as \
+                                   soon as it is connected"
                         .to_owned();
                     let event = Event { t_s: 0.0, kind: EventKind::Note, message };
-                    answered = Some(catch_panic(|| Ok(observer.on_event(&event)?)));
+                    confirmation = Some(catch_panic(|| Ok(observer.on_event(&event)?)));
                 }
             }
             arming.join().unwrap_or_else(|panic| resume_unwind(panic))
         });
         armed.map_err(RunError::NotArmed)?;
-        Ok(answered.unwrap_or(Ok(())))
+        Ok(confirmation.unwrap_or(Ok(())))
     }
 }
 

@@ -12,7 +12,7 @@ pub struct StepSourceError {
 
 impl StepSourceError {
     /// Wraps the source's own error.
-    pub fn of(error: impl std::error::Error + Send + Sync + 'static) -> Self {
+    pub fn new(error: impl std::error::Error + Send + Sync + 'static) -> Self {
         StepSourceError { source: Box::new(error) }
     }
 }

@@ -64,7 +64,8 @@ impl SurgeEstimate {
                 read.zip(*level).is_some_and(|(read, level)| read.variance >= MIN_GROWTH_RATIO * level)
             })
         };
-        let grown = readings.iter().rev().take_while(|reading| is_significant(reading)).count();
+        let significant_readings =
+            readings.iter().rev().take_while(|reading| is_significant(reading)).count();
         let candidates = candidates(closest_flow_kg_s);
         let mut logs: Vec<(usize, f64)> = Vec::new();
         for (candidate, surge_kg_s) in candidates.iter().enumerate() {
@@ -91,26 +92,28 @@ impl SurgeEstimate {
         for (candidate, log) in logs {
             weights[candidate] += (log - best).exp();
         }
-        let all: f64 = weights.iter().sum();
-        let middle = candidates.iter().zip(&weights).map(|(flow, w)| flow * w).sum::<f64>() / all;
+        let total_weight: f64 = weights.iter().sum();
+        let mean_flow_kg_s =
+            candidates.iter().zip(&weights).map(|(flow, w)| flow * w).sum::<f64>() / total_weight;
         let variance =
-            candidates.iter().zip(&weights).map(|(flow, w)| (flow - middle).powi(2) * w).sum::<f64>() / all;
+            candidates.iter().zip(&weights).map(|(flow, w)| (flow - mean_flow_kg_s).powi(2) * w).sum::<f64>()
+                / total_weight;
         // Candidates are ordered from the highest flow to the lowest.
-        let mut above = 0.0;
+        let mut cumulated_weight = 0.0;
         let highest = candidates.iter().zip(&weights).find(|(_, weight)| {
-            above += **weight;
-            above >= 0.02 * all
+            cumulated_weight += **weight;
+            cumulated_weight >= 0.02 * total_weight
         });
         Some(SurgeEstimate {
-            flow_corrected_kg_s: middle,
+            flow_corrected_kg_s: mean_flow_kg_s,
             standard_error_kg_s: variance
                 .sqrt()
-                .hypot(flow_error_ratio * middle)
-                .hypot(LAW_ERROR_RATIO * (closest_flow_kg_s - middle)),
+                .hypot(flow_error_ratio * mean_flow_kg_s)
+                .hypot(LAW_ERROR_RATIO * (closest_flow_kg_s - mean_flow_kg_s)),
             highest_flow_kg_s: highest.map_or(closest_flow_kg_s, |(flow, _)| *flow),
             closest_flow_kg_s,
-            is_usable: grown >= MIN_GROWN && readings.last().is_some_and(has_large_growth),
-            has_growth: grown > 0,
+            is_usable: significant_readings >= MIN_GROWN && readings.last().is_some_and(has_large_growth),
+            has_growth: significant_readings > 0,
         })
     }
 

@@ -22,11 +22,11 @@ pub struct SurgeErrors {
 impl SurgeErrors {
     /// The declared errors of flow meter and pressures.
     pub fn of(declared: &BTreeMap<Channel, DeclaredUncertainty>) -> Self {
-        let of = |channel: Channel| declared.get(&channel).copied();
+        let declared_for = |channel: Channel| declared.get(&channel).copied();
         SurgeErrors {
-            flow_gain_ratio: of(Channel::CompressorFlow).map_or(0.0, |flow| flow.gain_sigma_ratio),
-            p1_offset_pa: of(Channel::P1).map_or(0.0, |p1| p1.offset_sigma),
-            p2_offset_pa: of(Channel::P2).map_or(0.0, |p2| p2.offset_sigma),
+            flow_gain_ratio: declared_for(Channel::CompressorFlow).map_or(0.0, |flow| flow.gain_sigma_ratio),
+            p1_offset_pa: declared_for(Channel::P1).map_or(0.0, |p1| p1.offset_sigma),
+            p2_offset_pa: declared_for(Channel::P2).map_or(0.0, |p2| p2.offset_sigma),
         }
     }
 }
@@ -136,8 +136,8 @@ fn mark_approach(
 
 /// Pressure ratio extrapolated linearly in flow from the last readings, with its standard error.
 fn pressure_ratio_at(readings: &[SurgeReading], last: &SurgeReading, flow_kg_s: f64) -> (f64, f64) {
-    const TAKEN: usize = 5;
-    let taken = &readings[readings.len().saturating_sub(TAKEN)..];
+    const LAST_READINGS: usize = 5;
+    let last_readings = &readings[readings.len().saturating_sub(LAST_READINGS)..];
     let point = |reading: &SurgeReading| {
         let factor = last.speed_corrected_rpm / reading.speed_corrected_rpm;
         let (flow, ratio) = mapper_physics::compressor_map::similarity::at_speed(
@@ -147,7 +147,7 @@ fn pressure_ratio_at(readings: &[SurgeReading], last: &SurgeReading, flow_kg_s: 
         );
         (flow, ratio)
     };
-    let points: Vec<(f64, f64)> = taken.iter().map(point).collect();
+    let points: Vec<(f64, f64)> = last_readings.iter().map(point).collect();
     let count = points.len() as f64;
     let (flow, ratio) =
         points.iter().fold((0.0, 0.0), |sum, point| (sum.0 + point.0 / count, sum.1 + point.1 / count));

@@ -51,7 +51,7 @@ pub fn expected_readings(margin_ratio: f64, seek: &SurgeSearchSettings) -> usize
     (readings + 3).min(seek.most_steps)
 }
 
-/// The next move after these readings, of which there is at least one. `nominal_margin_ratio`: surge margin of the nominal machine
+/// Chooses the next move; `readings` has at least one reading. `nominal_margin_ratio`: surge margin of the nominal machine
 /// at the last opening; `None` if unknown.
 pub fn choose_next_move(
     readings: &[SurgeReading],
@@ -90,6 +90,6 @@ pub fn choose_next_move(
     if step >= MIN_STEP_RATIO {
         return Move::To(opening * (1.0 - step));
     }
-    let here = readings.iter().rev().take_while(|reading| reading.valve_opening_ratio == opening).count();
-    if here < MAX_READINGS_AT_OPENING { Move::To(opening) } else { Move::Done(LineEnd::DistanceReached) }
+    let count = readings.iter().rev().take_while(|reading| reading.valve_opening_ratio == opening).count();
+    if count < MAX_READINGS_AT_OPENING { Move::To(opening) } else { Move::Done(LineEnd::DistanceReached) }
 }

@@ -24,12 +24,13 @@ impl SmoothedFlow {
             reading.flow_corrected_kg_s * last.speed_corrected_rpm / reading.speed_corrected_rpm
         };
         let measured: Vec<f64> = readings.iter().map(to_speed).collect();
-        let place = |reading: &SurgeReading| (reading.valve_opening_ratio / last.valve_opening_ratio).ln();
-        let taken = |reading: &SurgeReading| place(reading).abs() < REACH_RATIO.ln();
+        let log_distance =
+            |reading: &SurgeReading| (reading.valve_opening_ratio / last.valve_opening_ratio).ln();
+        let is_near = |reading: &SurgeReading| log_distance(reading).abs() < REACH_RATIO.ln();
         let (mut square, mut right) = (Matrix3::zeros(), Vector3::zeros());
         let mut count = 0usize;
-        for (reading, flow) in readings.iter().zip(&measured).filter(|(reading, _)| taken(reading)) {
-            let row = row(place(reading));
+        for (reading, flow) in readings.iter().zip(&measured).filter(|(reading, _)| is_near(reading)) {
+            let row = row(log_distance(reading));
             square += row * row.transpose();
             right += row * flow.ln();
             count += 1;
@@ -37,21 +38,21 @@ impl SmoothedFlow {
         let unsmoothed = SmoothedFlow { flows_kg_s: measured.clone(), flow_error_ratio: 0.0 };
         let (true, Some(inverse)) = (count >= 5, square.try_inverse()) else { return Some(unsmoothed) };
         let parabola = inverse * right;
-        let flow = |reading: &SurgeReading| row(place(reading)).dot(&parabola);
-        let pairs = || readings.iter().zip(&measured).filter(|(reading, _)| taken(reading));
+        let flow = |reading: &SurgeReading| row(log_distance(reading)).dot(&parabola);
+        let pairs = || readings.iter().zip(&measured).filter(|(reading, _)| is_near(reading));
         let residual: f64 = pairs().map(|(reading, measured)| (measured.ln() - flow(reading)).powi(2)).sum();
         let sigma_ratio = (residual / (count - 3).max(1) as f64).sqrt();
         let at_last = row(0.0);
         let flows_kg_s = readings
             .iter()
             .zip(&measured)
-            .map(|(reading, measured)| if taken(reading) { flow(reading).exp() } else { *measured })
+            .map(|(reading, measured)| if is_near(reading) { flow(reading).exp() } else { *measured })
             .collect();
         let flow_error_ratio = sigma_ratio * at_last.dot(&(inverse * at_last)).max(0.0).sqrt();
         Some(SmoothedFlow { flows_kg_s, flow_error_ratio })
     }
 }
 
-fn row(place: f64) -> Vector3<f64> {
-    Vector3::new(1.0, place, place * place)
+fn row(log_distance: f64) -> Vector3<f64> {
+    Vector3::new(1.0, log_distance, log_distance * log_distance)
 }

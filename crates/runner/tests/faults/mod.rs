@@ -361,13 +361,13 @@ fn attempts_to_make_the_rig_safe_are_half_a_second_apart() {
 fn the_run_down_follows_the_declared_trajectory() {
     let run = run_with_faults(&[(FAULT_S, Fault::Reads(Channel::T2, 600.0))], &default_guards());
     let RunEnd::Tripped(trip) = run.end.unwrap() else { panic!("not seen") };
-    let way: Vec<_> = run.rig.commands.iter().filter(|(_, sent)| sent.t3_k < 300.0).collect();
+    let run_down: Vec<_> = run.rig.commands.iter().filter(|(_, sent)| sent.t3_k < 300.0).collect();
     let before = run.rig.commands.iter().rev().find(|(_, sent)| sent.t3_k > 300.0).unwrap().1;
     let expected = ((before.p3_pa - 110e3) / 5e3).floor() as usize;
-    assert_eq!(way.len(), expected, "from {} Pa", before.p3_pa);
+    assert_eq!(run_down.len(), expected, "from {} Pa", before.p3_pa);
     // The first command follows the poll with the violation; a simulated rig is polled every second.
-    assert!(way[0].0 - trip.t_s < 1.01, "{} s after {} s", way[0].0, trip.t_s);
-    for (step, (_, sent)) in way.iter().enumerate() {
+    assert!(run_down[0].0 - trip.t_s < 1.01, "{} s after {} s", run_down[0].0, trip.t_s);
+    for (step, (_, sent)) in run_down.iter().enumerate() {
         assert!((sent.p3_pa - (before.p3_pa - 5e3 * (step + 1) as f64)).abs() < 1e-6);
         assert!(sent.valve_opening_ratio >= 1.0 && sent.valve_opening_ratio >= before.valve_opening_ratio);
     }

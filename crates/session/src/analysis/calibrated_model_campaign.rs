@@ -76,7 +76,7 @@ fn backend(twin: &Twin<'_>, catalogue: &[Arc<dyn Effect>]) -> Result<String, Ses
         "offset_of": offsets.collect::<Map<_, _>>(),
     });
     let block = serde_yaml::to_string(&json!({"backend": {"virtual_lab": lab}}))?;
-    Ok(format!("# The machine as found in {}; its covariance is there.\n{block}", twin.source.display()))
+    Ok(format!("# The machine diagnosed in {}, which has the covariance.\n{block}", twin.source.display()))
 }
 
 /// A campaign's text with its backend's block replaced.
@@ -84,11 +84,11 @@ fn with_backend(text: &str, block: &str) -> String {
     let mut written = String::new();
     let mut inside = false;
     // Comments and empty lines before a key belong to it.
-    let mut held = String::new();
+    let mut held_lines = String::new();
     for line in text.lines() {
         let top_level = line.chars().next().is_some_and(|c| !c.is_whitespace() && c != '#');
         if top_level {
-            written += &std::mem::take(&mut held);
+            written += &std::mem::take(&mut held_lines);
             inside = line.starts_with("backend:");
             if inside {
                 written += block;
@@ -97,10 +97,10 @@ fn with_backend(text: &str, block: &str) -> String {
         if inside {
             let loose = line.trim().is_empty() || line.starts_with('#');
             if loose {
-                held += line;
-                held.push('\n');
+                held_lines += line;
+                held_lines.push('\n');
             } else {
-                held.clear();
+                held_lines.clear();
             }
         } else {
             written += line;

@@ -1,6 +1,6 @@
 //! Checks whether the rig stayed the same over one or more recordings.
 
-use crate::recording::fusing::{Fused, fused, recordings, take_air_and_probe};
+use crate::recording::fusing::{FusedRecordings, fuse_sensors, recordings, take_air_and_probe};
 use crate::recording::identification_config::identification_with;
 use crate::recording::recording_file::{Recorded, attached_campaign, check_all_distinct, check_machine};
 use crate::{Session, SessionError, plan::planning};
@@ -46,13 +46,14 @@ impl Session<'_> {
         check_all_distinct(recorded)?;
         let mut model = planning::nominal_model(campaign)?;
         let config = identification_with(campaign, map);
-        let Fused { recordings, config, channels } = fused(recordings(recorded), config, Some(campaign), map);
+        let FusedRecordings { recordings, config, channels } =
+            fuse_sensors(recordings(recorded), config, Some(campaign), map);
         let sensors = channels.into_iter().next().unwrap_or_default();
         take_air_and_probe(&mut model, &config);
-        let (recordings, config, zero) = zeroed_alike(recordings, config, campaign);
+        let (recordings, config, zero) = subtract_first_zero(recordings, config, campaign);
         let fingerprints: Vec<Option<String>> = recorded.iter().map(fingerprint).collect();
         // Of a run that was resumed after its soak, the first recording has only that.
-        let directory = |place: usize| recorded.get(place).map(|one| one.path.parent());
+        let directory = |place: usize| recorded.get(place).map(|recorded_run| recorded_run.path.parent());
         let rests = |(place, recording): (usize, &Recording)| {
             recording.steps.is_empty() && directory(place) == directory(place + 1)
         };
@@ -78,7 +79,7 @@ impl Session<'_> {
 }
 
 /// Subtracts the zero of the first run from all runs. A separate zero for each run would hide drift between them.
-fn zeroed_alike(
+fn subtract_first_zero(
     recordings: Vec<Recording>,
     config: IdentifyConfig,
     campaign: &Campaign,

@@ -52,11 +52,14 @@ fn soak(campaign: &Campaign, map: &ChannelMap) -> Option<Experiment> {
         return None;
     }
     let settings = ZeroSettings::default();
-    let left =
+    let residual_sigma =
         expected_after_zero(identification_with(campaign, map), &settings, SOAK_S, campaign.boundary.p1_pa)
             .declared;
-    let left_sigma =
-        |channel| left.get(&channel).map_or(settings.temperature_sigma_k, |left| left.offset_sigma);
+    let left_sigma = |channel| {
+        residual_sigma
+            .get(&channel)
+            .map_or(settings.temperature_sigma_k, |residual_sigma| residual_sigma.offset_sigma)
+    };
     let soak = AtRest {
         duration_s: SOAK_S,
         left_sigma_k: std::array::from_fn(|place| left_sigma(AtRest::CHANNELS[place])),
@@ -109,7 +112,8 @@ fn temperature_steps(
     accepts: &SetpointRanges,
 ) -> Vec<Experiment> {
     let now = campaign.boundary;
-    let room = |to_k: &f64| campaign.limits.t3_max_k.is_none_or(|limit_k| *to_k <= limit_k - T3_ROOM_K);
+    let is_below_limit =
+        |to_k: &f64| campaign.limits.t3_max_k.is_none_or(|limit_k| *to_k <= limit_k - T3_ROOM_K);
     let held = |boundary: &BoundaryConditions| {
         let steady = reach(model, point, boundary, campaign.follow_outlet, &campaign.limits).ok()?;
         let BoundaryConditions { p3_pa, t3_k, oil_temperature_k, .. } = steady.boundary;
@@ -125,7 +129,7 @@ fn temperature_steps(
     };
     let (t3_k, oil_k) = (now.t3_k, now.oil_temperature_k);
     let t3_follows = campaign.follow_outlet.turbine_inlet;
-    let to_k = T3_STEPS_K.iter().filter(|_| !t3_follows).map(|by_k| t3_k + by_k).filter(room);
+    let to_k = T3_STEPS_K.iter().filter(|_| !t3_follows).map(|by_k| t3_k + by_k).filter(is_below_limit);
     let t3_steps = to_k.filter_map(|to_k| {
         Some(step(held(&BoundaryConditions { t3_k: to_k, ..now })?, AlsoChanged::T3 { from_k: t3_k, to_k }))
     });

@@ -3,7 +3,7 @@
 use crate::analysis::experiments::experiments;
 use crate::plan::planning::nominal_model;
 use crate::plan::planning::plan;
-use crate::recording::fusing::{Fused, fused, recordings, take_air_and_probe};
+use crate::recording::fusing::{FusedRecordings, fuse_sensors, recordings, take_air_and_probe};
 use crate::recording::identification_config::identification_with;
 use crate::recording::recording_file::{Recorded, check_machine};
 use crate::{Session, SessionError, SessionEvent};
@@ -61,8 +61,8 @@ impl Gap {
         let mut value = serde_json::to_value(&self.diagnosed.diagnosis)?;
         value["candidates"] = json!(self.diagnosed.diagnosis.listed().collect::<Vec<_>>());
         // An effect that is present in both recordings belongs to the rig; it does not describe a complete machine.
-        let whole = self.diagnosed.diagnosis.since.is_none();
-        value["found"] = json!(whole.then(|| Found::of(&self.diagnosed)).flatten());
+        let is_complete = self.diagnosed.diagnosis.since.is_none();
+        value["found"] = json!(is_complete.then(|| Found::of(&self.diagnosed)).flatten());
         value["drift"] = self.drift.as_ref().map_or(Value::Null, drift_json);
         value["zero"] = json!(self.zero);
         if !self.sensors.is_empty() {
@@ -71,7 +71,7 @@ impl Gap {
         Ok(value)
     }
 
-    /// The page of the diagnosis. `recording`: the name of what was diagnosed.
+    /// The page of the diagnosis. `recording`: its name for the title.
     ///
     /// # Errors
     /// [`SessionError::Json`]: none in practice.
@@ -104,10 +104,10 @@ impl Session<'_> {
             self.send(SessionEvent::Progress { done_ratio, what: what.to_owned() });
         };
         progress(0.0, "drift");
-        let Prepared { zeroed, model, linearised, drift, doubted, sensors } =
-            self.prepared_for_gap(recorded, campaign, map)?;
-        let Zeroed { recording, declared, zero, off_at_rest } = zeroed;
-        let before = healthy.map(|healthy| self.prepared_for_gap(healthy, campaign, map)).transpose()?;
+        let GapInput { zeroed, model, linearised, drift, doubted, sensors } =
+            self.prepare_for_gap(recorded, campaign, map)?;
+        let ZeroedRecording { recording, declared, zero, off_at_rest } = zeroed;
+        let before = healthy.map(|healthy| self.prepare_for_gap(healthy, campaign, map)).transpose()?;
         let between = |from: f64, to: f64| {
             move |done_ratio: f64, what: &str| progress(from + (to - from) * done_ratio, what)
         };
@@ -130,13 +130,13 @@ impl Session<'_> {
             linearised,
             progress: &in_catalogue,
         })?;
-        let found = discover(&diagnosed, &calibration, &beyond);
-        if let Some(law) = found.settled {
+        let discovery = discover(&diagnosed, &calibration, &beyond);
+        if let Some(law) = discovery.settled {
             diagnosed.accounted_by(law);
         }
         let diagnosis = &mut diagnosed.diagnosis;
-        (diagnosis.laws, diagnosis.forces) = (found.laws, found.forces);
-        if let Some(places) = found.places {
+        (diagnosis.laws, diagnosis.forces) = (discovery.laws, discovery.forces);
+        if let Some(places) = discovery.places {
             diagnosis.r#where = places;
             // The best extra sensor is one next to the location that was just found.
             if matches!(diagnosis.next, Some(Next::Sensor { .. })) {
@@ -161,29 +161,29 @@ impl Session<'_> {
     }
 
     /// A recording prepared for the diagnosis: sensor drift and zero offsets are subtracted.
-    fn prepared_for_gap(
+    fn prepare_for_gap(
         &self,
         recorded: &Recorded,
         campaign: &Campaign,
         map: &ChannelMap,
-    ) -> Result<Prepared, SessionError> {
+    ) -> Result<GapInput, SessionError> {
         check_machine(recorded, campaign)?;
         let mut model = nominal_model(campaign)?;
         // A recording that does not permit a drift search may still have a gap.
         let drift = self.drift(slice::from_ref(recorded), campaign, map).ok();
         let drift = drift.map(|drift| drift.report).filter(|report| !report.drifts.is_empty());
         let config = identification_with(campaign, map);
-        let Fused { recordings, config, channels } =
-            fused(recordings(slice::from_ref(recorded)), config, Some(campaign), map);
+        let FusedRecordings { recordings, config, channels } =
+            fuse_sensors(recordings(slice::from_ref(recorded)), config, Some(campaign), map);
         let sensors = channels.into_iter().next().unwrap_or_default();
         let raw = recordings.into_iter().next().unwrap_or_default();
         take_air_and_probe(&mut model, &config);
         let ready = |drift: Option<&DriftReport>| {
-            let recording = taken_off(raw.clone(), drift);
+            let recording = subtract_drift(raw.clone(), drift);
             // The zero reduces the offset uncertainty.
             let settings = |soak: Soak| ZeroSettings { allows_a_fault: true, ..soak.into() };
             let zero = ZeroOutcome::of(&recording, &config, campaign.zero.map(settings));
-            let off_at_rest = off_at_rest(&zero, &config.declared);
+            let off_at_rest = rest_offsets(&zero, &config.declared);
             let (recording, zeroed) = zero.take_off(recording, config.clone());
             let declared = Declared {
                 sensors: zeroed.declared,
@@ -192,17 +192,17 @@ impl Session<'_> {
                 nominal: campaign.boundary,
                 common_offsets: zero.found().map_or_else(Vec::new, |zero| zero.common.clone()),
             };
-            Zeroed { recording, declared, zero, off_at_rest }
+            ZeroedRecording { recording, declared, zero, off_at_rest }
         };
         let as_it_is = ready(None);
         let linearised =
-            drift.as_ref().and_then(|_| leaves_noise(&as_it_is, campaign, &model).ok().flatten());
+            drift.as_ref().and_then(|_| linearise_noise(&as_it_is, campaign, &model).ok().flatten());
         let (zeroed, drift, doubted) = match drift {
             Some(drift) if linearised.is_some() => (as_it_is, None, Some(drift.reason)),
             Some(drift) => (ready(Some(&drift)), Some(drift), None),
             None => (as_it_is, None, None),
         };
-        Ok(Prepared { zeroed, model, linearised, drift, doubted, sensors })
+        Ok(GapInput { zeroed, model, linearised, drift, doubted, sensors })
     }
 
     /// Validates the machine found by a diagnosis against an independent recording. Nothing is fitted.
@@ -217,7 +217,7 @@ impl Session<'_> {
         effects: Vec<Arc<dyn Effect>>,
         found: &Found,
     ) -> Result<Held, SessionError> {
-        let Prepared { zeroed, model, .. } = self.prepared_for_gap(recorded, campaign, map)?;
+        let GapInput { zeroed, model, .. } = self.prepare_for_gap(recorded, campaign, map)?;
         Ok(hold(&study_of(&zeroed.recording, campaign, zeroed.declared, model, effects)?, found)?)
     }
 
@@ -279,17 +279,21 @@ fn study_of(
 
 /// The linearised recording if tolerances alone explain it down to noise. In that case apparent drift in repeats is not subtracted, because the
 /// diagnosis is much more sensitive.
-fn leaves_noise(zeroed: &Zeroed, campaign: &Campaign, model: &Model) -> Result<Option<Linearised>, GapError> {
+fn linearise_noise(
+    zeroed: &ZeroedRecording,
+    campaign: &Campaign,
+    model: &Model,
+) -> Result<Option<Linearised>, GapError> {
     let study = study_of(&zeroed.recording, campaign, zeroed.declared.clone(), model.clone(), Vec::new())?;
     let linearised = Linearised::new(&study)?;
     let null = fit(&study, &linearised, &study.nothing(), &Selection::all(&study), Effort::default())?;
-    let left = adequacy(&study, &linearised, &null, 0.0);
-    let noise = Calibration::shipped().is_ok_and(|calibration| calibration.outside(left.features()) < 0.5);
+    let misfit = adequacy(&study, &linearised, &null, 0.0);
+    let noise = Calibration::shipped().is_ok_and(|calibration| calibration.outside(misfit.features()) < 0.5);
     Ok(noise.then_some(linearised))
 }
 
 /// A recording with its zero subtracted.
-struct Zeroed {
+struct ZeroedRecording {
     recording: Recording,
     declared: Declared,
     zero: ZeroOutcome,
@@ -298,8 +302,8 @@ struct Zeroed {
 }
 
 /// A recording prepared for the diagnosis.
-struct Prepared {
-    zeroed: Zeroed,
+struct GapInput {
+    zeroed: ZeroedRecording,
     model: Model,
     /// The recording linearised at the nominal model, if that is known.
     linearised: Option<Linearised>,
@@ -313,12 +317,12 @@ struct Prepared {
 const BEYOND_SIGMAS: f64 = 3.0;
 
 /// The sensors whose zero offset exceeds their declaration.
-fn off_at_rest(zero: &ZeroOutcome, declared: &BTreeMap<Channel, DeclaredUncertainty>) -> Vec<OffsetAtRest> {
+fn rest_offsets(zero: &ZeroOutcome, declared: &BTreeMap<Channel, DeclaredUncertainty>) -> Vec<OffsetAtRest> {
     let ZeroOutcome::Found(zero) = zero else { return Vec::new() };
     let beyond = zero.offsets.iter().filter_map(|(channel, offset)| {
         let declared_sigma = declared.get(channel).map_or(0.0, |declared| declared.offset_sigma);
-        let left = zero.left_sigma.get(channel).copied().unwrap_or(0.0);
-        (offset.abs() > BEYOND_SIGMAS * declared_sigma.hypot(left)).then_some(OffsetAtRest {
+        let residual_offset = zero.left_sigma.get(channel).copied().unwrap_or(0.0);
+        (offset.abs() > BEYOND_SIGMAS * declared_sigma.hypot(residual_offset)).then_some(OffsetAtRest {
             channel: *channel,
             offset: *offset,
             declared_sigma,
@@ -333,7 +337,7 @@ const DRIFT_SHARE: f64 = 0.15;
 const CATALOGUE_END: f64 = 0.7;
 
 /// The recording for the diagnosis, with sensor drift subtracted.
-pub(crate) fn taken_off(recording: Recording, drift: Option<&DriftReport>) -> Recording {
+pub(crate) fn subtract_drift(recording: Recording, drift: Option<&DriftReport>) -> Recording {
     drift.and_then(|drift| without_drift(&recording, drift)).unwrap_or(recording)
 }
 

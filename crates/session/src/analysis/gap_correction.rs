@@ -1,6 +1,6 @@
 //! A map corrected for the causes that a gap diagnosis names: identification of the readings without them.
 
-use crate::analysis::gap::{Gap, taken_off};
+use crate::analysis::gap::{Gap, subtract_drift};
 use crate::analysis::identification::Identified;
 use crate::recording::recording_file::Recorded;
 use crate::{Session, SessionError, SessionEvent};
@@ -48,12 +48,12 @@ impl Session<'_> {
         let identify = |recorded| quiet.identify(vec![recorded], map, method);
         let before = identify(recorded.clone())?;
         let refused = |gap: Gap, causes, why, mut before: Identified| {
-            let points = widened_by_residual(&mut before, &gap);
+            let points = widen_by_residual(&mut before, &gap);
             let map = CorrectedMap { causes, refused: Some(why), points };
             Ok(GapCorrection { gap, map, identified: before })
         };
         // As in the diagnosis, the drift of a sensor is subtracted first.
-        let undrifted = taken_off(recorded.read.recording.clone(), gap.drift.as_ref());
+        let undrifted = subtract_drift(recorded.read.recording.clone(), gap.drift.as_ref());
         let without = |hypothesis: &Hypothesis| -> Result<Identified, SessionError> {
             let changes = Changes::of(&gap.diagnosed.study, hypothesis).map_err(GapError::from)?;
             let mut recorded = recorded.clone();
@@ -81,7 +81,7 @@ impl Session<'_> {
         if let Some(why) = ambiguous(&identified, &after) {
             return refused(gap, named, why, before);
         }
-        let points = widened(&mut identified, &before, &moved, &after);
+        let points = widen_intervals(&mut identified, &before, &moved, &after);
         identified.corrections.clone_from(&points);
         identified.remarks.extend(named.iter().map(|cause| ResultRemark::Corrected {
             causes: cause.names.clone(),
@@ -92,14 +92,14 @@ impl Session<'_> {
         );
         if let Some(directory) = directory {
             let identified = identified.clone();
-            self.identified_into(vec![recorded.clone()], directory, |_| Ok(identified))?;
+            self.write_identification(vec![recorded.clone()], directory, |_| Ok(identified))?;
         }
         Ok(GapCorrection { gap, map: CorrectedMap { causes: named, refused: None, points }, identified })
     }
 }
 
 /// Adds the residual of T2 to every point that a cause outside the library may touch, if no law describes that cause.
-fn widened_by_residual(identified: &mut Identified, gap: &Gap) -> Vec<PointCorrection> {
+fn widen_by_residual(identified: &mut Identified, gap: &Gap) -> Vec<PointCorrection> {
     let (diagnosis, steps) = (&gap.diagnosed.diagnosis, &gap.diagnosed.study.steps);
     let residual = |step: usize| {
         let place = steps.iter().position(|other| other.marker.index == step)?;
@@ -117,7 +117,7 @@ fn widened_by_residual(identified: &mut Identified, gap: &Gap) -> Vec<PointCorre
 
 /// Adds the uncertainty of the correction to every point: `moved` are the results one standard deviation away in each direction, `others`
 /// those of causes that the recording does not distinguish.
-fn widened(
+fn widen_intervals(
     identified: &mut Identified,
     before: &Identified,
     moved: &[Identified],
@@ -150,9 +150,10 @@ fn ambiguous(best: &Identified, others: &[Identified]) -> Option<NotCorrected> {
     let differences =
         best.points_alone().filter(|point| point.verdict == mapper_core::Verdict::Good).filter_map(|point| {
             let (eta, half) = (point.eta?, 0.5 * (point.eta_high? - point.eta_low?));
-            let there = |other: &Identified| other.points_alone().find(|other| other.step == point.step)?.eta;
+            let same_step =
+                |other: &Identified| other.points_alone().find(|other| other.step == point.step)?.eta;
             let difference =
-                others.iter().filter_map(there).map(|other| (other - eta).abs()).reduce(f64::max)?;
+                others.iter().filter_map(same_step).map(|other| (other - eta).abs()).reduce(f64::max)?;
             Some((mapper_core::step_number(point.step), difference, half))
         });
     let (step, difference, half_interval) = differences.max_by(|a, b| (a.1 / a.2).total_cmp(&(b.1 / b.2)))?;

@@ -2,7 +2,7 @@
 
 use crate::plan::surge::find_surge_marks;
 use crate::recording::calibration_warnings;
-use crate::recording::fusing::{fused, take_air_and_probe};
+use crate::recording::fusing::{fuse_sensors, take_air_and_probe};
 use crate::recording::identification_config::{declared_conditions, identification_of, identification_with};
 use crate::recording::recording_file::{Recorded, check_all_distinct, check_machine};
 use crate::{Session, SessionError, SessionEvent};
@@ -169,8 +169,8 @@ impl Session<'_> {
         map: &ChannelMap,
         method: Option<Method>,
     ) -> Result<Identified, SessionError> {
-        let own = recorded.iter().filter(|one| may_have_truth(one));
-        let paths: Vec<PathBuf> = own.map(|one| one.path.clone()).collect();
+        let candidates = recorded.iter().filter(|part| may_have_truth(part));
+        let paths: Vec<PathBuf> = candidates.map(|part| part.path.clone()).collect();
         with_truths(&paths, |truths| self.identify_and_score(recorded, map, method, truths))
     }
 
@@ -194,10 +194,10 @@ impl Session<'_> {
         };
         let mut remarks = Vec::new();
         config.method = method.unwrap_or_else(|| {
-            let usual = config.method;
-            let found = recorded.iter().map(|one| method_for(&one.read.recording, usual));
+            let configured_method = config.method;
+            let choices = recorded.iter().map(|part| method_for(&part.read.recording, configured_method));
             let (method, why) =
-                found.reduce(|a, b| if a.1.is_some() { a } else { b }).unwrap_or((usual, None));
+                choices.reduce(|a, b| if a.1.is_some() { a } else { b }).unwrap_or((configured_method, None));
             remarks.extend(why);
             method
         });
@@ -209,13 +209,13 @@ impl Session<'_> {
         let day = recorded.first().and_then(|first| Date::from_epoch_ns(first.read.start_time_ns));
         let soak = campaign.and_then(|campaign| campaign.zero);
         let (mut recordings, mut sources) = (Vec::new(), Vec::new());
-        for one in recorded {
-            let may_have_truth = may_have_truth(&one);
-            let Recorded { read, approaches, .. } = one;
+        for part in recorded {
+            let may_have_truth = may_have_truth(&part);
+            let Recorded { read, approaches, .. } = part;
             sources.push(Source { steps: read.recording.steps.clone(), approaches, may_have_truth });
             recordings.push(read.recording);
         }
-        let fused = fused(recordings, config, campaign, map);
+        let fused = fuse_sensors(recordings, config, campaign, map);
         let sensors = fused.channels.into_iter().next().unwrap_or_default();
         let first = fused.recordings.first().ok_or(SessionError::NoRecording)?;
         let zero = ZeroOutcome::of(first, &fused.config, soak.map(Into::into));
@@ -234,18 +234,19 @@ impl Session<'_> {
             tolerances: &campaign.tolerances,
             conditions: &conditions,
         });
-        let found = identify_recording(&recording, &config, nominal)?;
-        let mut points: Vec<IdentifiedPoint> = found.points.into_iter().filter_map(Result::ok).collect();
+        let identified = identify_recording(&recording, &config, nominal)?;
+        let mut points: Vec<IdentifiedPoint> = identified.points.into_iter().filter_map(Result::ok).collect();
         if let Some(campaign) = campaign {
             calibration_warnings::warn(&mut points, &recording, campaign, day);
         }
         for point in &points {
             self.send(SessionEvent::PointIdentified(Box::new(point.clone())));
         }
-        let mut own = truths.wait()?.into_iter();
-        let truth = |source: &Source| source.may_have_truth.then(|| own.next()).flatten().unwrap_or_default();
+        let mut candidates = truths.wait()?.into_iter();
+        let truth =
+            |source: &Source| source.may_have_truth.then(|| candidates.next()).flatten().unwrap_or_default();
         let truths: Vec<Truth> = sources.iter().map(truth).collect();
-        let surge = sought(&sources, &truths, off, campaign, &config);
+        let surge = collect_surge_marks(&sources, &truths, off, campaign, &config);
         let points = scored(&sources, &truths, &recording, &origins, points);
         let score = mapper_recording::score::summarise(&points);
         Ok(Identified {
@@ -253,10 +254,10 @@ impl Session<'_> {
             origins,
             config,
             points,
-            thermal: found.thermal,
-            two_parameter: found.two_parameter,
-            faults: found.faults,
-            budgets: found.budgets,
+            thermal: identified.thermal,
+            two_parameter: identified.two_parameter,
+            faults: identified.faults,
+            budgets: identified.budgets,
             sensors,
             zero,
             score,
@@ -337,18 +338,18 @@ fn scored(
         });
         let (places, alone): (Vec<(usize, usize)>, Vec<IdentifiedPoint>) =
             theirs.map(|(place, step, point)| ((place, step), point)).unzip();
-        let found = score(truth, &source.steps, alone);
-        scored.extend(places.into_iter().zip(found).map(|((place, step), mut found)| {
-            found.point.step = step;
-            (place, found)
+        let alone = score(truth, &source.steps, alone);
+        scored.extend(places.into_iter().zip(alone).map(|((place, step), mut point)| {
+            point.point.step = step;
+            (place, point)
         }));
     }
     scored.sort_by_key(|(place, _)| *place);
-    scored.into_iter().map(|(_, found)| found).collect()
+    scored.into_iter().map(|(_, point)| point).collect()
 }
 
 /// The marks of all approaches with their truth; `None` if there was no surge search.
-fn sought(
+fn collect_surge_marks(
     sources: &[Source],
     truths: &[Truth],
     off: impl Fn(Recording) -> Recording,

@@ -35,7 +35,7 @@ pub enum PrintError {
         /// The system's error.
         source: io::Error,
     },
-    /// The browser made no PDF.
+    /// The browser wrote no PDF.
     #[error("{browser} made no PDF ({reason}); open the page and print it there")]
     NoPdf {
         /// Its name.
@@ -64,7 +64,7 @@ pub fn page_as_pdf(page: &str, directory: &Path) -> Result<Vec<u8>, PrintError> 
         "--print-to-pdf=page.pdf",
         "--user-data-dir=profile",
     ]);
-    if is_of_root(folder.path()) {
+    if is_owned_by_root(folder.path()) {
         // Chromium refuses to run as root with its sandbox; the page makes no requests and has no content of others.
         command.arg("--no-sandbox");
     }
@@ -105,11 +105,11 @@ fn is_on_path(name: &str) -> bool {
 }
 
 #[cfg(unix)]
-fn is_of_root(path: &Path) -> bool {
+fn is_owned_by_root(path: &Path) -> bool {
     std::fs::metadata(path).is_ok_and(|about| std::os::unix::fs::MetadataExt::uid(&about) == 0)
 }
 
 #[cfg(not(unix))]
-fn is_of_root(_: &Path) -> bool {
+fn is_owned_by_root(_: &Path) -> bool {
     false
 }

@@ -67,7 +67,8 @@ impl Provenance {
     pub(crate) fn of(recorded: &[Recorded]) -> Provenance {
         let campaign = recorded.first().and_then(|first| first.campaign.clone());
         // Recordings of one run have the same plan.
-        let plans: Vec<Option<&[u8]>> = recorded.iter().map(|one| one.read.plan_json.as_deref()).collect();
+        let plans: Vec<Option<&[u8]>> =
+            recorded.iter().map(|recording_part| recording_part.read.plan_json.as_deref()).collect();
         let plan = match plans.as_slice() {
             [Some(first), others @ ..] if others.iter().all(|other| *other == Some(*first)) => {
                 serde_json::from_slice(first).ok()
@@ -104,8 +105,8 @@ impl Provenance {
     }
 
     fn formats(&self) -> Vec<String> {
-        let usual = Outputs::default();
-        let outputs = self.campaign.as_ref().map_or(&usual, |campaign| &campaign.outputs);
+        let default = Outputs::default();
+        let outputs = self.campaign.as_ref().map_or(&default, |campaign| &campaign.outputs);
         outputs.formats.iter().map(|format| format.name().to_owned()).collect()
     }
 }
@@ -156,7 +157,7 @@ impl Session<'_> {
             sources: Vec::new(),
         };
         let (results, written) =
-            self.written(&origin, identified, (recording, further), remarks, directory)?;
+            self.write_results(&origin, identified, (recording, further), remarks, directory)?;
         let unwritten = written
             .err()
             .map(|error| format!("{error}; make room, then resume the run, which does not use the rig"));
@@ -175,11 +176,11 @@ impl Session<'_> {
         method: Option<Method>,
         directory: &Path,
     ) -> Result<Results, SessionError> {
-        self.identified_into(recorded, directory, |recorded| self.identify(recorded, map, method))
+        self.write_identification(recorded, directory, |recorded| self.identify(recorded, map, method))
     }
 
     /// The same for recordings that are identified in another way.
-    pub(crate) fn identified_into(
+    pub(crate) fn write_identification(
         &self,
         recorded: Vec<Recorded>,
         directory: &Path,
@@ -191,14 +192,18 @@ impl Session<'_> {
                 return Err(SessionError::file("write", &path)(std::io::ErrorKind::AlreadyExists.into()));
             }
         }
-        let remarks = recorded.iter().flat_map(|one| remarks_of(one, recorded.len() > 1)).collect();
-        let mut files = recorded.iter().map(|one| one.path.clone());
+        let remarks = recorded
+            .iter()
+            .flat_map(|recording_part| remarks_of(recording_part, recorded.len() > 1))
+            .collect();
+        let mut files = recorded.iter().map(|recording_part| recording_part.path.clone());
         let first = files.next().ok_or(SessionError::NoRecording)?;
         let further: Vec<PathBuf> = files.collect();
         let origin = Provenance::of(&recorded);
         let identified = identify(recorded)?;
         std::fs::create_dir_all(directory).map_err(SessionError::file("create", directory))?;
-        let (results, written) = self.written(&origin, identified, (first, further), remarks, directory)?;
+        let (results, written) =
+            self.write_results(&origin, identified, (first, further), remarks, directory)?;
         written.map(|()| results)
     }
 
@@ -215,7 +220,8 @@ impl Session<'_> {
     ) -> Result<String, SessionError> {
         let origin = Provenance::of(&shown);
         let several = shown.len() > 1;
-        let mut remarks: Vec<ResultRemark> = shown.iter().flat_map(|one| remarks_of(one, several)).collect();
+        let mut remarks: Vec<ResultRemark> =
+            shown.iter().flat_map(|recording_part| remarks_of(recording_part, several)).collect();
         let identified = self.identify(shown, channels, None)?;
         remarks.extend(identified.remarks.iter().cloned());
         let map = compressor_map(&origin.machine, &identified, &mut remarks);
@@ -239,7 +245,7 @@ impl Session<'_> {
     }
 
     /// Writes the files of an identification. A file that cannot be written costs the later ones, and not the results themselves.
-    fn written(
+    fn write_results(
         &self,
         origin: &Provenance,
         mut identified: Identified,

@@ -35,7 +35,7 @@ impl Transient {
     /// Text for people.
     pub fn text(&self) -> String {
         let identified =
-            self.identified.as_ref().map_or_else(String::new, |found| transient_text(found) + "\n");
+            self.identified.as_ref().map_or_else(String::new, |diagnosis| transient_text(diagnosis) + "\n");
         identified + why_text(&self.why).as_str()
     }
 }
@@ -93,19 +93,19 @@ impl Session<'_> {
 /// # Errors
 /// As [`write_file`].
 pub fn write_transient(
-    found: &Transient,
+    diagnosis: &Transient,
     machine: &str,
     directory: &Path,
     existing: Existing,
 ) -> Result<Vec<PathBuf>, SessionError> {
-    let figure = match &found.identified {
+    let figure = match &diagnosis.identified {
         Some(outcome) => transient_figure(machine, outcome),
-        None => why_figure(machine, &found.why),
+        None => why_figure(machine, &diagnosis.why),
     };
     let png = figure.to_png(2.0).map_err(ExportError::failed("png"))?;
     let contents: [(String, Vec<u8>); 4] = [
-        (format!("{STEM}.json"), json_text(&json!(found))?.into_bytes()),
-        (format!("{STEM}.txt"), found.text().into_bytes()),
+        (format!("{STEM}.json"), json_text(&json!(diagnosis))?.into_bytes()),
+        (format!("{STEM}.txt"), diagnosis.text().into_bytes()),
         (format!("{STEM}.svg"), figure.to_svg().into_bytes()),
         (format!("{STEM}.png"), png),
     ];

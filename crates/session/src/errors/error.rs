@@ -376,7 +376,7 @@ pub enum SessionError {
         source: io::Error,
     },
     /// A parent directory has too many runs.
-    #[error("{} already holds 999 runs from this second", .parent.display())]
+    #[error("{} already contains 999 runs from this second", .parent.display())]
     TooManyRuns {
         /// The directory.
         parent: PathBuf,

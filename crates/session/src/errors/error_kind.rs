@@ -1,4 +1,4 @@
-//! Error categories, by who or what has to act.
+//! Error categories by the necessary action.
 
 /// Category of an error, for exit codes and status pages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

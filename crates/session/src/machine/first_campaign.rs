@@ -93,9 +93,9 @@ pub fn first_campaign(
     })
 }
 
-/// The campaign of the text, or its mistakes.
+/// Checks the campaign, and returns it or its mistakes.
 fn check_campaign(text: &str, path: &Path, map: &FirstMap) -> Result<Campaign, SessionError> {
-    let files = |asked: &Path| match asked.file_name() {
+    let files = |path: &Path| match path.file_name() {
         Some(name) if name == map.file_name.as_str() => Ok(map.text.clone()),
         _ => Err(Error::from(ErrorKind::NotFound)),
     };
@@ -117,8 +117,8 @@ fn campaign_text(request: &FirstCampaignRequest, map: &FirstMap) -> String {
     };
     let tap = |diameter_m: Option<f64>, size: &str| match request.has_static_taps {
         true => {
-            let own = diameter_m.map(|m| 1e3 * m).or_else(|| similar_mm(request, size));
-            format!("static, pipe_diameter: {} mm", significant_digits(own.unwrap_or(0.0), 3))
+            let diameter_mm = diameter_m.map(|m| 1e3 * m).or_else(|| similar_mm(request, size));
+            format!("static, pipe_diameter: {} mm", significant_digits(diameter_mm.unwrap_or(0.0), 3))
         }
         false => "total".to_owned(),
     };

@@ -32,7 +32,7 @@ pub(crate) struct MapLines {
 
 impl MapLines {
     /// Evenly spaced speeds, rounded to 100 rpm inside the range.
-    fn even((low_rpm, high_rpm): (f64, f64)) -> Self {
+    fn evenly_spaced((low_rpm, high_rpm): (f64, f64)) -> Self {
         let step_rpm = (high_rpm - low_rpm) / (GRID_LINES - 1) as f64;
         let speed = |index: usize| (low_rpm + step_rpm * index as f64).clamp(low_rpm, high_rpm);
         MapLines { speeds_rpm: (0..GRID_LINES).map(|index| (speed(index) / 100.0).round() * 100.0).collect() }
@@ -72,7 +72,7 @@ impl FirstMap {
 
 /// The table of a nominal map, sampled from a smooth surface through the file's points, or the points themselves if no surface can be fitted.
 /// Linear interpolation between few points has kinks, which identification would mistake for heat transfer.
-fn resampled_table(
+fn resample_table(
     registry: &Registry,
     path: &Path,
     reference: ReferenceState,
@@ -86,12 +86,12 @@ fn resampled_table(
         text += &format!("{rpm:.1},{flow_kg_s:.6},{pressure_ratio:.5},{eta:.5}\n");
     };
     let speeds: Vec<f64> = map.lines.iter().map(|line| line.speed_corrected_rpm).collect();
-    let between = speeds.windows(2).flat_map(|pair| {
+    let inserted_rpm = speeds.windows(2).flat_map(|pair| {
         let step_rpm = (pair[1] - pair[0]) / (INTERPOLATED_LINES + 1) as f64;
         (1..=INTERPOLATED_LINES).map(move |index| pair[0] + step_rpm * index as f64)
     });
     let options = MapFitOptions {
-        further_speeds_rpm: Some(between.collect()),
+        further_speeds_rpm: Some(inserted_rpm.collect()),
         leave_one_out: false,
         ..MapFitOptions::default()
     };
@@ -120,17 +120,21 @@ fn map_from_file(
     path: &Path,
 ) -> Result<FirstMap, SessionError> {
     let reference = request.reference.state;
-    let text = resampled_table(registry, path, reference)?;
+    let text = resample_table(registry, path, reference)?;
     let map = nominal_table(&text, Some(reference))
         .map_err(|source| Box::new(FirstMapError::NotAMap { path: path.to_owned(), source }))?;
-    let in_map = map.speeds_corrected_rpm();
-    let map_rpm = (in_map.first().copied().unwrap_or(0.0), in_map.last().copied().unwrap_or(0.0));
+    let map_speeds_rpm = map.speeds_corrected_rpm();
+    let map_rpm =
+        (map_speeds_rpm.first().copied().unwrap_or(0.0), map_speeds_rpm.last().copied().unwrap_or(0.0));
     let requested_rpm = request.speeds_rpm.unwrap_or(map_rpm);
-    let within: Vec<f64> =
-        in_map.iter().copied().filter(|rpm| (requested_rpm.0..=requested_rpm.1).contains(rpm)).collect();
-    let lines = match (within.first(), within.last()) {
-        _ if MAP_LINE_COUNTS.contains(&within.len()) => MapLines { speeds_rpm: within },
-        (Some(low), Some(high)) if low < high => MapLines::even((*low, *high)),
+    let selected_rpm: Vec<f64> = map_speeds_rpm
+        .iter()
+        .copied()
+        .filter(|rpm| (requested_rpm.0..=requested_rpm.1).contains(rpm))
+        .collect();
+    let lines = match (selected_rpm.first(), selected_rpm.last()) {
+        _ if MAP_LINE_COUNTS.contains(&selected_rpm.len()) => MapLines { speeds_rpm: selected_rpm },
+        (Some(low), Some(high)) if low < high => MapLines::evenly_spaced((*low, *high)),
         _ => return Err(Box::new(FirstMapError::NoLines { requested_rpm, map_rpm }).into()),
     };
     let similar = ClosedFormMap { wheel_diameter_m: request.wheel_diameter_m };
@@ -149,8 +153,8 @@ fn similar_map(request: &FirstCampaignRequest) -> FirstMap {
     let map = ClosedFormMap { wheel_diameter_m };
     let reference = request.reference.state;
     let speed_factor = TURBO_A_WHEEL_M / wheel_diameter_m;
-    let usual = (speed_factor * TURBO_A_SPEEDS_RPM.0, speed_factor * TURBO_A_SPEEDS_RPM.1);
-    let lines = MapLines::even(request.speeds_rpm.unwrap_or(usual));
+    let default = (speed_factor * TURBO_A_SPEEDS_RPM.0, speed_factor * TURBO_A_SPEEDS_RPM.1);
+    let lines = MapLines::evenly_spaced(request.speeds_rpm.unwrap_or(default));
     let mut text = format!(
         "# Nominal map of a compressor with a {} mm wheel, geometrically similar to turbo_a. Replace it with your own map if you have one.\n\
          # Corrected to {} ({}).\n\
@@ -160,14 +164,14 @@ fn similar_map(request: &FirstCampaignRequest) -> FirstMap {
         request.reference.printed
     );
     for rpm in &lines.speeds_rpm {
-        let own_rpm = rpm * reference.speed_factor_to(ReferenceState::SAE);
+        let speed_sae_rpm = rpm * reference.speed_factor_to(ReferenceState::SAE);
         let (surge_pr, choke_pr) =
-            (map.surge_point(own_rpm).1, 1.0 + 0.15 * (map.surge_point(own_rpm).1 - 1.0));
+            (map.surge_point(speed_sae_rpm).1, 1.0 + 0.15 * (map.surge_point(speed_sae_rpm).1 - 1.0));
         for index in 0..POINTS_PER_LINE {
             // Close to surge the flow changes steeply with pressure.
             let from_surge = (index as f64 / (POINTS_PER_LINE - 1) as f64).powi(2);
             let pressure_ratio = surge_pr - from_surge * (surge_pr - choke_pr);
-            let point = map.evaluate(own_rpm, pressure_ratio);
+            let point = map.evaluate(speed_sae_rpm, pressure_ratio);
             let flow_kg_s = point.flow_corrected_kg_s * ReferenceState::SAE.flow_factor_to(reference);
             text += &format!("{rpm:.0},{flow_kg_s:.6},{pressure_ratio:.5},{:.5}\n", point.efficiency);
         }

@@ -182,7 +182,7 @@ fn start(export: &FmuExport, campaign: &Campaign) -> Result<SteadyState, SteadyE
             ..campaign.boundary
         };
         match hold_speed(&model, point.speed_rpm, &boundary) {
-            Ok(held) => return Ok(held),
+            Ok(steady_state) => return Ok(steady_state),
             Err(error) => refused = error,
         }
     }

@@ -13,7 +13,7 @@ use std::io::Read;
 use std::path::Path;
 
 impl Registry {
-    /// Reads a map file, or the map of a run directory. The extension selects the format; `given` is what the user states about it, or the
+    /// Reads a map file, or the map of a run directory. The extension selects the format; `user_description` is what the user states about it, or the
     /// reference state alone. A compressed file has the extension of its format before `.gz`.
     ///
     /// # Errors
@@ -21,9 +21,9 @@ impl Registry {
     pub fn read_map(
         &self,
         path: &Path,
-        given: impl Into<MapDescription>,
+        user_description: impl Into<MapDescription>,
     ) -> Result<CompressorMap, SessionError> {
-        Ok(self.inspect_map(path, given)?.map)
+        Ok(self.inspect_map(path, user_description)?.map)
     }
 
     /// The same, with the columns and what the reader assumed.
@@ -33,10 +33,12 @@ impl Registry {
     pub fn inspect_map(
         &self,
         path: &Path,
-        given: impl Into<MapDescription>,
+        user_description: impl Into<MapDescription>,
     ) -> Result<ImportedMap, SessionError> {
         let (format, bytes) = self.map_bytes(path)?;
-        format.read(&bytes, given).map_err(|source| SessionError::Import { path: path.to_owned(), source })
+        format
+            .read(&bytes, user_description)
+            .map_err(|source| SessionError::Import { path: path.to_owned(), source })
     }
 
     /// Reads the map of a turbine.
@@ -46,11 +48,11 @@ impl Registry {
     pub fn inspect_turbine(
         &self,
         path: &Path,
-        given: impl Into<MapDescription>,
+        user_description: impl Into<MapDescription>,
     ) -> Result<ImportedTurbine, SessionError> {
         let (format, bytes) = self.map_bytes(path)?;
         format
-            .read_turbine(&bytes, given)
+            .read_turbine(&bytes, user_description)
             .map_err(|source| SessionError::Import { path: path.to_owned(), source })
     }
 
@@ -58,9 +60,12 @@ impl Registry {
     fn map_bytes(&self, path: &Path) -> Result<(&'static MapFormat, Vec<u8>), SessionError> {
         let in_run = path.join("map.json");
         let path = if path.is_dir() { in_run.as_path() } else { path };
-        let of = |path: &Path| path.extension().map(|extension| extension.to_string_lossy().into_owned());
-        let extension = match of(path).unwrap_or_default() {
-            packed if packed.eq_ignore_ascii_case("gz") => of(&path.with_extension("")).unwrap_or_default(),
+        let extension_of =
+            |path: &Path| path.extension().map(|extension| extension.to_string_lossy().into_owned());
+        let extension = match extension_of(path).unwrap_or_default() {
+            packed if packed.eq_ignore_ascii_case("gz") => {
+                extension_of(&path.with_extension("")).unwrap_or_default()
+            }
             extension => extension,
         };
         let format = self.formats.read_from(&extension).ok_or_else(|| SessionError::UnknownExtension {
@@ -105,11 +110,11 @@ impl Registry {
     /// [`SessionError::UnknownOutputFormat`] if neither gives a format.
     pub fn format_of(&self, path: &Path, name: Option<&str>) -> Result<&'static MapFormat, SessionError> {
         let file = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
-        let found = match name {
+        let known_format = match name {
             Some(name) => self.written_format(name).ok(),
             None => self.formats.written_to(file),
         };
-        found.ok_or_else(|| SessionError::UnknownOutputFormat {
+        known_format.ok_or_else(|| SessionError::UnknownOutputFormat {
             path: path.to_owned(),
             known: self
                 .formats

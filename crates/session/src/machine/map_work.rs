@@ -65,11 +65,15 @@ impl Registry {
     ///
     /// # Errors
     /// As [`Registry::inspect_map`].
-    pub fn read_map_file(&self, path: &Path, given: &MapDescription) -> Result<MapFile, SessionError> {
-        match self.inspect_map(path, given) {
-            Ok(found) => Ok(MapFile::Compressor(found)),
+    pub fn read_map_file(
+        &self,
+        path: &Path,
+        user_description: &MapDescription,
+    ) -> Result<MapFile, SessionError> {
+        match self.inspect_map(path, user_description) {
+            Ok(imported) => Ok(MapFile::Compressor(imported)),
             Err(SessionError::Import { source: ImportError::Turbine { .. }, .. }) => {
-                self.inspect_turbine(path, given).map(MapFile::Turbine)
+                self.inspect_turbine(path, user_description).map(MapFile::Turbine)
             }
             Err(error) => Err(error),
         }
@@ -82,27 +86,27 @@ impl Registry {
     pub fn inspect_map_file(
         &self,
         path: &Path,
-        given: &MapDescription,
+        user_description: &MapDescription,
         description: Option<(&Path, Existing)>,
     ) -> Result<MapWork, SessionError> {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let (described, text, json) = match self.read_map_file(path, given)? {
-            MapFile::Compressor(found) => {
-                let lines = found.map.lines.iter().map(|line| {
+        let (described, text, json) = match self.read_map_file(path, user_description)? {
+            MapFile::Compressor(imported) => {
+                let lines = imported.map.lines.iter().map(|line| {
                     json!({"speed_corrected_rpm": line.speed_corrected_rpm, "points": line.points.len()})
                 });
                 let json = json!({
                     "machine": "compressor",
-                    "reference": found.map.reference,
-                    "efficiency": found.map.efficiency,
-                    "columns": found.columns,
-                    "remarks": found.remarks,
+                    "reference": imported.map.reference,
+                    "efficiency": imported.map.efficiency,
+                    "columns": imported.columns,
+                    "remarks": imported.remarks,
                     "lines": lines.collect::<Vec<_>>(),
                 });
-                (description_text(&name, &found, given), imported_map_text(&found), json)
+                (description_text(&name, &imported, user_description), imported_map_text(&imported), json)
             }
-            MapFile::Turbine(found) => {
-                let lines = found.map.lines().map(|line| {
+            MapFile::Turbine(imported) => {
+                let lines = imported.map.lines().map(|line| {
                     json!({
                         "vane_position": line.first().and_then(|point| point.vane_position),
                         "speed_parameter_rpm_sqrt_k": line.first().map(|point| point.speed_parameter_rpm_sqrt_k),
@@ -111,11 +115,15 @@ impl Registry {
                 });
                 let json = json!({
                     "machine": "turbine",
-                    "columns": found.columns,
-                    "remarks": found.remarks,
+                    "columns": imported.columns,
+                    "remarks": imported.remarks,
                     "lines": lines.collect::<Vec<_>>(),
                 });
-                (turbine_description_text(&name, &found, given), imported_turbine_text(&found), json)
+                (
+                    turbine_description_text(&name, &imported, user_description),
+                    imported_turbine_text(&imported),
+                    json,
+                )
             }
         };
         if let Some((file, existing)) = description {
@@ -131,15 +139,15 @@ impl Registry {
     pub fn fit_map_file(
         &self,
         path: &Path,
-        given: &MapDescription,
+        user_description: &MapDescription,
         options: &MapFitOptions,
         out: Option<MapOut<'_>>,
     ) -> Result<MapWork, SessionError> {
         let format = out.map(|out| Ok::<_, SessionError>((out, out.format(self)?))).transpose()?;
         let file = out.map(|out| out.path);
-        let (mut text, json, remarks) = match self.read_map_file(path, given)? {
-            MapFile::Compressor(found) => {
-                let map = fit_map(found.map, options)
+        let (mut text, json, remarks) = match self.read_map_file(path, user_description)? {
+            MapFile::Compressor(imported) => {
+                let map = fit_map(imported.map, options)
                     .map_err(|source| MapWorkError::NotFitted { path: path.to_owned(), source })?;
                 if let Some((out, format)) = format {
                     write_map(out.path, format, &map, out.existing)?;
@@ -147,17 +155,17 @@ impl Registry {
                 let json =
                     json!({"map": path, "reference": map.reference, "fitted": map.fitted, "file": file});
                 let text = map.fitted.as_ref().map(|fitted| map_fit_text(&map, fitted)).unwrap_or_default();
-                (text, json, found.remarks)
+                (text, json, imported.remarks)
             }
-            MapFile::Turbine(found) => {
-                let map = fit_turbine(found.map)
+            MapFile::Turbine(imported) => {
+                let map = fit_turbine(imported.map)
                     .map_err(|source| MapWorkError::TurbineNotFitted { path: path.to_owned(), source })?;
                 if let Some((out, format)) = format {
                     write_file(out.path, &format.write_turbine(&map)?, out.existing)?;
                 }
                 let json = json!({"map": path, "fitted": map.fitted, "file": file});
                 let text = map.fitted.as_ref().map(|fitted| turbine_fit_text(&map, fitted));
-                (text.unwrap_or_default(), json, found.remarks)
+                (text.unwrap_or_default(), json, imported.remarks)
             }
         };
         if let Some(file) = file {
@@ -173,7 +181,7 @@ impl Registry {
     pub fn convert_map_file(
         &self,
         path: &Path,
-        given: &MapDescription,
+        user_description: &MapDescription,
         out: MapOut<'_>,
         to_reference: Option<ReferenceState>,
         efficiencies: (Option<EfficiencyDefinition>, Option<EfficiencyDefinition>),
@@ -181,9 +189,9 @@ impl Registry {
         let format = out.format(self)?;
         let file = out.path.display();
         let note = |fitted| if fitted { "; the format is a table, so the map was fitted" } else { "" };
-        match self.read_map_file(path, given)? {
-            MapFile::Compressor(found) => {
-                let mut map = found.map;
+        match self.read_map_file(path, user_description)? {
+            MapFile::Compressor(imported) => {
+                let mut map = imported.map;
                 if let Some(reference) = to_reference {
                     map = map.at_reference(reference);
                 }
@@ -210,9 +218,9 @@ impl Registry {
                     "points": points,
                     "fitted": map.fitted.is_some(),
                 });
-                Ok(MapWork { text, json, warnings: warnings(path, &found.remarks) })
+                Ok(MapWork { text, json, warnings: warnings(path, &imported.remarks) })
             }
-            MapFile::Turbine(found) => {
+            MapFile::Turbine(imported) => {
                 let requested = [
                     (to_reference.is_some(), "reference state"),
                     (efficiencies.0.is_some() || efficiencies.1.is_some(), "definition of efficiency"),
@@ -220,7 +228,7 @@ impl Registry {
                 if let Some((_, property)) = requested.into_iter().find(|(requested, _)| *requested) {
                     return Err(MapWorkError::NotOfTurbine { path: path.to_owned(), property }.into());
                 }
-                let (map, fitted_here) = write_turbine_fitted_if_needed(path, out, format, found.map)?;
+                let (map, fitted_here) = write_turbine_fitted_if_needed(path, out, format, imported.map)?;
                 let (points, lines) = (map.points.len(), map.lines().count());
                 let text = format!(
                     "{file}: {}, turbine, {points} points on {lines} speed lines{}\n",
@@ -235,7 +243,7 @@ impl Registry {
                     "points": points,
                     "fitted": map.fitted.is_some(),
                 });
-                Ok(MapWork { text, json, warnings: warnings(path, &found.remarks) })
+                Ok(MapWork { text, json, warnings: warnings(path, &imported.remarks) })
             }
         }
     }
@@ -248,13 +256,13 @@ impl Registry {
     pub fn correct_map_file(
         &self,
         path: &Path,
-        given: &MapDescription,
+        user_description: &MapDescription,
         heat_w: Option<f64>,
         out: Option<MapOut<'_>>,
     ) -> Result<MapWork, SessionError> {
         let format = out.map(|out| out.format(self)).transpose()?;
-        let found = self.inspect_map(path, given)?;
-        let (map, correction) = correct_for_heat(found.map, heat_w)
+        let imported = self.inspect_map(path, user_description)?;
+        let (map, correction) = correct_for_heat(imported.map, heat_w)
             .map_err(|source| MapWorkError::NotCorrected { path: path.to_owned(), source })?;
         let mut text = heat_correction_text(&correction);
         if let Some((out, format)) = out.zip(format) {
@@ -262,7 +270,7 @@ impl Registry {
             text.push_str(&format!("map        {}\n", out.path.display()));
         }
         let json = json!({"map": path, "correction": correction, "file": out.map(|out| out.path)});
-        Ok(MapWork { text, json, warnings: warnings(path, &found.remarks) })
+        Ok(MapWork { text, json, warnings: warnings(path, &imported.remarks) })
     }
 
     /// Compares two maps of the same machine. `picture` is a new file that shows both.
@@ -284,15 +292,17 @@ impl Registry {
                     let png = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"));
                     let failed =
                         |error: &dyn std::fmt::Display| MapWorkError::Picture { problem: error.to_string() };
-                    let bytes = match png {
-                        true => figure.to_png(2.0).map_err(|error| failed(&error))?,
-                        false => figure.to_svg().into_bytes(),
+                    let bytes = if png {
+                        figure.to_png(2.0).map_err(|error| failed(&error))?
+                    } else {
+                        figure.to_svg().into_bytes()
                     };
                     write_file(path, &bytes, existing)?;
                 }
-                let warned = [warnings(paths[0], &a.remarks), warnings(paths[1], &b.remarks)].concat();
+                let warnings_of_both =
+                    [warnings(paths[0], &a.remarks), warnings(paths[1], &b.remarks)].concat();
                 let json = serde_json::to_value(&comparison)?;
-                Ok(MapWork { text: map_comparison_text(&comparison), json, warnings: warned })
+                Ok(MapWork { text: map_comparison_text(&comparison), json, warnings: warnings_of_both })
             }
             (MapFile::Turbine(a), MapFile::Turbine(b)) => {
                 if picture.is_some() {
@@ -301,9 +311,10 @@ impl Registry {
                 }
                 let comparison = compare_turbines(&a.map, &b.map)
                     .map_err(|source| MapWorkError::TurbineNotFitted { path: paths[0].to_owned(), source })?;
-                let warned = [warnings(paths[0], &a.remarks), warnings(paths[1], &b.remarks)].concat();
+                let warnings_of_both =
+                    [warnings(paths[0], &a.remarks), warnings(paths[1], &b.remarks)].concat();
                 let json = serde_json::to_value(&comparison)?;
-                Ok(MapWork { text: turbine_comparison_text(&comparison), json, warnings: warned })
+                Ok(MapWork { text: turbine_comparison_text(&comparison), json, warnings: warnings_of_both })
             }
             (MapFile::Turbine(_), _) => {
                 Err(MapWorkError::TwoMachines { turbine: paths[0].to_owned() }.into())

@@ -41,7 +41,7 @@ struct ThermalMachine {
     origin: String,
 }
 
-/// The part of `points.json` that is needed here.
+/// The required part of `points.json`.
 #[derive(Deserialize)]
 struct PointsFile {
     thermal: Option<ThermalModel>,
@@ -55,8 +55,8 @@ impl TestStand {
             declared: assumed_sensors(),
             ..IdentifyConfig::default()
         };
-        let remark = "No sensors are declared. Assumed are class A of IEC 60751 for temperatures, class 0.1 for pressures and 0.5 % for the \
-                      flow; declare yours in a campaign and give it as the machine.";
+        let remark = "No sensors are declared. The uncertainties are assumed: class A of IEC 60751 for temperatures, class 0.1 for pressures and 0.5 % for \
+                      the flow. Declare your sensors in a campaign and give it as the machine.";
         let name = table.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         TestStand { name, config, heat: None, remarks: vec![remark.to_owned()] }
     }
@@ -74,19 +74,22 @@ impl TestStand {
         Ok(TestStand::of(&campaign, path, file.thermal.as_ref()))
     }
 
-    fn of(campaign: &Campaign, path: &Path, found: Option<&ThermalModel>) -> TestStand {
+    fn of(campaign: &Campaign, path: &Path, identified: Option<&ThermalModel>) -> TestStand {
         let mut config = identification(campaign);
         let mut tolerances = campaign.tolerances;
         let declared = campaign.machine.params;
-        let law = found.and_then(|found| Some((found, found.convection.as_ref()?)));
+        let law = identified.and_then(|identified| Some((identified, identified.convection.as_ref()?)));
         let (params, origin) = match law {
-            Some((found, law)) => {
+            Some((identified, law)) => {
                 let a = &law.coefficient;
-                let of_a = a.value.map_or(0.0, |value| a.uncertainty.combined_standard_error() / value);
-                config.alpha_area_ratio = found.alpha_area_ratio.value.unwrap_or(config.alpha_area_ratio);
-                config.alpha_area_sigma_ratio = found.alpha_area_ratio.uncertainty.combined_standard_error();
-                tolerances.convection_ratio = of_a.hypot(law.deviation_ratio);
-                (with_identified(&declared, found), "identified")
+                let coefficient_ratio =
+                    a.value.map_or(0.0, |value| a.uncertainty.combined_standard_error() / value);
+                config.alpha_area_ratio =
+                    identified.alpha_area_ratio.value.unwrap_or(config.alpha_area_ratio);
+                config.alpha_area_sigma_ratio =
+                    identified.alpha_area_ratio.uncertainty.combined_standard_error();
+                tolerances.convection_ratio = coefficient_ratio.hypot(law.deviation_ratio);
+                (with_identified(&declared, identified), "identified")
             }
             None => (declared, "declared"),
         };
@@ -105,7 +108,7 @@ impl Registry {
     pub fn reduce_points(
         &self,
         path: &Path,
-        given: &MapDescription,
+        user_description: &MapDescription,
         machine: Option<&Path>,
         out: Option<MapOut<'_>>,
         budget: Option<(&Path, Existing)>,
@@ -118,24 +121,24 @@ impl Registry {
             PressureTap::Total => None,
         };
         let description = MapDescription {
-            reference: given.reference.or(machine.map(|_| config.reference)),
+            reference: user_description.reference.or(machine.map(|_| config.reference)),
             static_taps: StaticTaps {
-                inlet_diameter_m: given.static_taps.inlet_diameter_m.or(tap(config.inlet_tap)),
-                outlet_diameter_m: given.static_taps.outlet_diameter_m.or(tap(config.outlet_tap)),
+                inlet_diameter_m: user_description.static_taps.inlet_diameter_m.or(tap(config.inlet_tap)),
+                outlet_diameter_m: user_description.static_taps.outlet_diameter_m.or(tap(config.outlet_tap)),
             },
-            ..given.clone()
+            ..user_description.clone()
         };
-        let found = match self.inspect_map(path, &description) {
+        let table = match self.inspect_map(path, &description) {
             Err(SessionError::Import { source: ImportError::Turbine { .. }, .. }) if budget.is_none() => {
-                return self.reduce_turbine_points(path, given, machine, out);
+                return self.reduce_turbine_points(path, user_description, machine, out);
             }
-            found => found?,
+            table => table?,
         };
-        let measured = found.measured.as_slice();
+        let measured = table.measured.as_slice();
         if measured.is_empty() {
             return Err(MapWorkError::NotMeasured { path: path.to_owned() }.into());
         }
-        config.reference = found.map.reference;
+        config.reference = table.map.reference;
         config.thresholds.end_mean_s = config.thresholds.steady_mean_s;
         config.method = method_of_table(measured, heat.is_some());
         remarks.extend(apparent_efficiency_remark(measured, heat.is_some(), config.method));
@@ -172,7 +175,7 @@ impl Registry {
             text.push_str(&format!("map        {}\n", out.path.display()));
         }
         let assumed =
-            found.remarks.into_iter().filter(|remark| *remark != mapper_core::ImportRemark::Measured);
+            table.remarks.into_iter().filter(|remark| *remark != mapper_core::ImportRemark::Measured);
         Ok(MapWork { text, json, warnings: warnings(path, &assumed.collect::<Vec<_>>()) })
     }
 
@@ -183,25 +186,25 @@ impl Registry {
     pub fn reduce_turbine_points(
         &self,
         path: &Path,
-        given: &MapDescription,
+        user_description: &MapDescription,
         machine: Option<&Path>,
         out: Option<MapOut<'_>>,
     ) -> Result<MapWork, SessionError> {
         let format = out.map(|out| out.format(self)).transpose()?;
         let TestStand { name, config, remarks, .. } =
             machine.map_or_else(|| Ok(TestStand::unknown(path)), TestStand::read)?;
-        let found = self.inspect_turbine(path, given.clone())?;
-        if found.measured.is_empty() {
+        let table = self.inspect_turbine(path, user_description.clone())?;
+        if table.measured.is_empty() {
             return Err(MapWorkError::NotMeasured { path: path.to_owned() }.into());
         }
-        let points = reduce_turbine(&found.measured, &config.declared);
+        let points = reduce_turbine(&table.measured, &config.declared);
         let mut text = reduced_turbine_text(&points, &remarks);
         let json = json!({"points": path, "turbine": points, "efficiency": "apparent", "remarks": remarks, "file": out.map(|out| out.path)});
         if let Some((out, format)) = out.zip(format) {
-            write_turbine_fitted_if_needed(path, out, format, TurbineMap { machine: name, ..found.map })?;
+            write_turbine_fitted_if_needed(path, out, format, TurbineMap { machine: name, ..table.map })?;
             text.push_str(&format!("map        {}\n", out.path.display()));
         }
-        Ok(MapWork { text, json, warnings: warnings(path, &found.remarks) })
+        Ok(MapWork { text, json, warnings: warnings(path, &table.remarks) })
     }
 }
 
@@ -210,7 +213,7 @@ fn heat_balance_remark(measured: &[MeasuredPoint], method: Method) -> Option<Str
     let without_tc = measured.iter().filter(|point| point.tc_k.is_none()).count();
     (method == Method::Corrected && without_tc > 0).then(|| {
         format!(
-            "The housing temperature of {without_tc} of {} points is that of the machine's heat balance with T3 and oil; a measured one is surer.",
+            "The housing temperature of {without_tc} of {} points is that of the machine's heat balance with T3 and oil; a measured temperature is more reliable.",
             measured.len()
         )
     })

@@ -67,8 +67,8 @@ impl PreparedNight {
     /// # Errors
     /// [`SessionError::NightlyMismatch`] if a run is missing or belongs to another night.
     pub fn check_rows(&self, rows: Vec<RunRow>) -> Result<Vec<RunRow>, SessionError> {
-        let here = self.runs.iter().map(|run| &run.key);
-        if here.eq(rows.iter().map(|row| &row.key)) {
+        let expected_keys = self.runs.iter().map(|run| &run.key);
+        if expected_keys.eq(rows.iter().map(|row| &row.key)) {
             return Ok(rows);
         }
         let missing = self.runs.iter().find(|run| !rows.iter().any(|row| row.key == run.key));
@@ -106,17 +106,17 @@ impl Session<'_> {
         for run in runs.iter().filter(|run| run.machine.is_some()) {
             self.registry.make_sources(&run.campaign, &run.model)?;
         }
-        let room = std::env::temp_dir();
+        let temporary = std::env::temp_dir();
         let scratch = tempfile::Builder::new()
             .prefix("mapper-nightly-")
             .tempdir()
-            .map_err(SessionError::file("create a directory in", &room))?;
+            .map_err(SessionError::file("create a directory in", &temporary))?;
         let on_progress = |done, of| self.send(SessionEvent::PiecesDone { done, of });
         let engine = Engine { jobs, stop: self.stop, on_progress: &on_progress };
-        let one =
+        let run_one =
             |index: usize, run: &NightlyRun| self.nightly_run(run, &scratch.path().join(index.to_string()));
         // A missing row means that the operator stopped the night before this run.
-        engine.each(runs, one)?.into_iter().collect::<Option<_>>().ok_or(SessionError::Interrupted)
+        engine.each(runs, run_one)?.into_iter().collect::<Option<_>>().ok_or(SessionError::Interrupted)
     }
 
     /// Makes one run in a new directory and deletes it afterwards, because a night of recordings may not fit on the disk.

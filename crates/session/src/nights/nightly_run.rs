@@ -115,12 +115,12 @@ impl NightlyRun {
             Ok(recorded) => recorded.path,
             Err(stopped) => return Ok(Err(stopped)),
         };
-        let one = |method: &Method| -> Result<Value, SessionError> {
+        let identify_with = |method: &Method| -> Result<Value, SessionError> {
             let recorded = self.read(&recording)?;
             let identified = session.identify(vec![recorded], &ChannelMap::native(), Some(*method))?;
             Ok(serde_json::to_value(&identified.points)?)
         };
-        methods.iter().map(one).collect::<Result<_, _>>().map(Ok)
+        methods.iter().map(identify_with).collect::<Result<_, _>>().map(Ok)
     }
 
     /// Runs the campaign and reads the recording. The inner `Err` is the reason if a guard stopped the run.
@@ -156,7 +156,7 @@ impl NightlyRun {
         let end =
             drive(&self.campaign, &self.model, &mut steps, backend.as_mut(), &mut recorder, session.stop)
                 .map_err(|source| SessionError::Run { source, recording: recording.to_owned() })?;
-        // A night has no journal to keep it.
+        // Nightly runs have no journal.
         recorder.finish(RunEnding::Completed)?;
         Ok(end)
     }

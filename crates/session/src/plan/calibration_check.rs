@@ -34,9 +34,10 @@ pub fn load_on(path: &Path, day: Option<Date>) -> Result<(Campaign, String), Cam
     {
         concerns = calibration_concerns(&campaign, &model, day);
     }
-    match concerns.is_empty() {
-        true => Ok((campaign, text)),
-        false => Err(CampaignError::Mistakes(Box::new(mistakes(&text, path, concerns)))),
+    if concerns.is_empty() {
+        Ok((campaign, text))
+    } else {
+        Err(CampaignError::Mistakes(Box::new(mistakes(&text, path, concerns))))
     }
 }
 
@@ -48,6 +49,6 @@ fn remedy(warning: &Warning) -> &'static str {
         Warning::Calibration { defect: CalibrationDefect::Uncertainty { .. }, .. } => {
             "declare at least half of the certificate's expanded uncertainty"
         }
-        _ => "calibrate the sensor, then write what its new certificate states",
+        _ => "calibrate the sensor, then write the values of its new certificate",
     }
 }

@@ -168,8 +168,8 @@ fn settling_concern(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
     let joint = campaign.identification.method == Method::Joint;
     let needed_dwell_s = |step: &PlanStep| needed_dwell_s(step, joint);
     let measured = || plan.steps.iter().filter(|step| step.kind != StepKind::Repeat && step.from.is_some());
-    let late: Vec<_> = measured().filter(|step| needed_dwell_s(step) > step.dwell_s).collect();
-    let worst = late.iter().max_by(|a, b| needed_dwell_s(a).total_cmp(&needed_dwell_s(b)))?;
+    let late_steps: Vec<_> = measured().filter(|step| needed_dwell_s(step) > step.dwell_s).collect();
+    let worst = late_steps.iter().max_by(|a, b| needed_dwell_s(a).total_cmp(&needed_dwell_s(b)))?;
     let settles = worst.predicted.settle_s.map_or_else(
         || format!("does not settle within {:.0} s", worst.dwell_s),
         |settle_s| format!("settles {settle_s:.0} s after the jump to it"),
@@ -179,7 +179,7 @@ fn settling_concern(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
         format!(
             "{} of {} points will not have settled {:.0} s before the end of their dwell and will be doubtful \
              (`not_stabilised`); {} {settles}",
-            late.len(),
+            late_steps.len(),
             measured().count(),
             settled_time_s(worst.dwell_s, joint),
             worst.to
@@ -206,14 +206,14 @@ fn information_concern(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
 /// A required error that is not reached even with the longest dwell.
 fn required_error_concern(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
     let Dwell::RequiredSigmaEta(required) = campaign.timing.dwell else { return None };
-    let found = plan.figures.rms_error_eta?;
-    (found > required).then(|| {
+    let error_eta = plan.figures.rms_error_eta?;
+    (error_eta > required).then(|| {
         Concern::warning(
             &["timing", "required_sigma_eta"],
             format!(
                 "with the maximum dwell of {:.0} s, the expected rms error of the efficiency is {:.2} points; {:.2} points are required",
                 plan.steps.first().map_or(0.0, |step| step.dwell_s),
-                100.0 * found,
+                100.0 * error_eta,
                 100.0 * required
             ),
             "add a `zero`, or accept a larger error".to_owned(),

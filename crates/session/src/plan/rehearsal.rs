@@ -104,7 +104,7 @@ impl StepSource for RehearsalSteps {
 fn base_plan(campaign: &Campaign, model: &Model) -> Result<Plan, SessionError> {
     // The planner plans one point only; the script selects the others.
     let points = campaign.points.iter().copied().take(1).collect();
-    let one = Campaign {
+    let single_step = Campaign {
         sequence: None,
         repeats: None,
         points,
@@ -113,5 +113,5 @@ fn base_plan(campaign: &Campaign, model: &Model) -> Result<Plan, SessionError> {
         ..campaign.clone()
     };
     let (objective, made_from) = (OBJECTIVE.to_owned(), hash_inputs(campaign, model)?);
-    Ok(Plan { objective, made_from, ..plan(&one, model)? })
+    Ok(Plan { objective, made_from, ..plan(&single_step, model)? })
 }

@@ -120,7 +120,7 @@ impl StepSource for ScriptedSteps {
 }
 
 fn source_error(error: impl std::error::Error + Send + Sync + 'static) -> StepSourceError {
-    StepSourceError::of(error)
+    StepSourceError::new(error)
 }
 
 fn with_steps(mut plan: Plan, steps: Vec<PlanStep>) -> Plan {

@@ -15,17 +15,17 @@ use mapper_runner::{HoldConditions, SurgeSearch};
 /// campaign's limits.
 pub fn hold_near_surge(campaign: &Campaign, model: &Model, point: OperatingPoint) -> Option<HoldConditions> {
     let boundary = BoundaryConditions { valve_opening_ratio: point.valve_opening_ratio, ..campaign.boundary };
-    let held = hold_speed(model, point.speed_rpm, &boundary, campaign.follow_outlet).ok()?;
-    let (limits, outputs) = (&campaign.limits, &held.outputs);
-    let p3_pa = held.boundary.p3_pa;
+    let steady = hold_speed(model, point.speed_rpm, &boundary, campaign.follow_outlet).ok()?;
+    let (limits, outputs) = (&campaign.limits, &steady.outputs);
+    let p3_pa = steady.boundary.p3_pa;
     let within = (limits.p3_min_pa..=limits.p3_max_pa).contains(&p3_pa)
         && limits.t2_max_k.is_none_or(|limit_k| outputs.t2_k <= limit_k);
     within.then(|| HoldConditions {
         p3_pa,
-        t3_k: held.boundary.t3_k,
-        oil_temperature_k: held.boundary.oil_temperature_k,
+        t3_k: steady.boundary.t3_k,
+        oil_temperature_k: steady.boundary.oil_temperature_k,
         predicted: Predicted::settled(outputs.flow_kg_s, outputs.pressure_ratio, outputs.t2_k, 0.0),
-        surge_margin_ratio: held.surge_margin_ratio(model),
+        surge_margin_ratio: steady.surge_margin_ratio(model),
     })
 }
 
@@ -41,7 +41,7 @@ pub(crate) fn add_surge_search(campaign: &Campaign, model: &Model, plan: &mut Pl
         }
     }
     let margin = |end: &OperatingPoint| {
-        hold_near_surge(campaign, model, *end).map_or(1.0, |held| held.surge_margin_ratio)
+        hold_near_surge(campaign, model, *end).map_or(1.0, |steady| steady.surge_margin_ratio)
     };
     let approaches: usize = ends.iter().map(|end| surge::expected_readings(margin(end), &seek)).sum();
     plan.surge_search_s = approaches as f64 * seek.dwell_s + ends.len() as f64 * SurgeSearch::AROUND_S;

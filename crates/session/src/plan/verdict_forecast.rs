@@ -37,7 +37,7 @@ pub(crate) fn forecast_verdicts(campaign: &Campaign, plan: &Plan) -> Option<Verd
     for step in plan.steps.iter().filter(|step| step.kind != StepKind::Repeat) {
         let good = is_good(step);
         match best.iter_mut().find(|(point, _)| *point == step.to) {
-            Some((_, found)) => *found |= good && step.from.is_some(),
+            Some((_, has_good)) => *has_good |= good && step.from.is_some(),
             None => best.push((step.to, good)),
         }
     }
@@ -72,7 +72,7 @@ pub(crate) fn advise(
         for change in changes {
             let changed = with_change(campaign, change);
             let Some(forecast) = forecast_verdicts(&changed, &plan(&changed)?) else { continue };
-            if rank(forecast) > rank(best.map_or(now, |best| best.forecast)) {
+            if sort_key(forecast) > sort_key(best.map_or(now, |best| best.forecast)) {
                 best = Some(Advice { change, forecast });
             }
             if forecast.surely_good() == forecast.points {
@@ -86,7 +86,7 @@ pub(crate) fn advise(
 }
 
 /// Order of forecasts: by points that are surely good, then by those that are expected to be.
-fn rank(forecast: VerdictForecast) -> (usize, usize) {
+fn sort_key(forecast: VerdictForecast) -> (usize, usize) {
     (forecast.surely_good(), forecast.good)
 }
 

@@ -18,14 +18,20 @@ pub(crate) fn zero_remark(campaign: &Campaign) -> Option<PlanRemark> {
     let soak = campaign.zero?;
     let left_after = |soak_s: f64| -> BTreeMap<Channel, f64> {
         let settings = ZeroSettings::from(soak);
-        let left = expected_after_zero(identification(campaign), &settings, soak_s, campaign.boundary.p1_pa)
-            .declared;
-        CHANNELS.into_iter().filter_map(|channel| Some((channel, left.get(&channel)?.offset_sigma))).collect()
+        let expected_sigma =
+            expected_after_zero(identification(campaign), &settings, soak_s, campaign.boundary.p1_pa)
+                .declared;
+        CHANNELS
+            .into_iter()
+            .filter_map(|channel| Some((channel, expected_sigma.get(&channel)?.offset_sigma)))
+            .collect()
     };
     let longer_soak_s = LONGER_RATIO * soak.duration_s;
     let (offset_sigmas, mut longer_offset_sigmas) = (left_after(soak.duration_s), left_after(longer_soak_s));
     longer_offset_sigmas.retain(|channel, longer| {
-        offset_sigmas.get(channel).is_some_and(|left| *longer < (1.0 - WORTH_IT_RATIO) * left)
+        offset_sigmas
+            .get(channel)
+            .is_some_and(|expected_sigma| *longer < (1.0 - WORTH_IT_RATIO) * expected_sigma)
     });
     (!offset_sigmas.is_empty()).then_some(PlanRemark::OffsetsAfterSoak {
         soak_s: soak.duration_s,

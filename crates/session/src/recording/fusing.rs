@@ -11,7 +11,7 @@ use mapper_recording::ChannelMap;
 use std::collections::BTreeMap;
 
 /// Recordings with one reading per channel, the declared uncertainty of that reading, and the humidity of the first.
-pub(crate) struct Fused {
+pub(crate) struct FusedRecordings {
     pub(crate) recordings: Vec<Recording>,
     pub(crate) config: IdentifyConfig,
     /// Fusion result by recording; empty if every channel has one sensor.
@@ -19,15 +19,15 @@ pub(crate) struct Fused {
 }
 
 /// Fuses the sensors of recordings that are compared with each other. A sensor excluded from one is excluded from all.
-pub(crate) fn fused(
+pub(crate) fn fuse_sensors(
     recordings: Vec<Recording>,
     config: IdentifyConfig,
     campaign: Option<&Campaign>,
     map: &ChannelMap,
-) -> Fused {
+) -> FusedRecordings {
     let Some(first) = recordings.first().filter(|first| !first.elements.is_empty()) else {
         let channels = vec![Vec::new(); recordings.len()];
-        return Fused { config: of_first(&recordings, config), recordings, channels };
+        return FusedRecordings { config: of_first(&recordings, config), recordings, channels };
     };
     let declared = declared(first, campaign, map);
     let colour = config.noise_colour;
@@ -40,9 +40,9 @@ pub(crate) fn fused(
         .collect();
     let mut config = config;
     for fused in channels.iter().flatten() {
-        take_over(&mut config, fused, campaign);
+        copy_uncertainty(&mut config, fused, campaign);
     }
-    Fused { config: of_first(&recordings, config), recordings, channels }
+    FusedRecordings { config: of_first(&recordings, config), recordings, channels }
 }
 
 /// With the humidity that the first recording measured.
@@ -62,7 +62,7 @@ pub(crate) fn recordings(recorded: &[Recorded]) -> Vec<Recording> {
 }
 
 /// Copies the uncertainty of a fused channel into the configuration. For several recordings the largest applies.
-fn take_over(config: &mut IdentifyConfig, fused: &FusedChannel, campaign: Option<&Campaign>) {
+fn copy_uncertainty(config: &mut IdentifyConfig, fused: &FusedChannel, campaign: Option<&Campaign>) {
     let DeclaredUncertainty { noise_sigma, offset_sigma, gain_sigma_ratio } = fused.declared;
     if noise_sigma > 0.0 || offset_sigma > 0.0 || gain_sigma_ratio > 0.0 {
         let entry = config.declared.entry(fused.channel).or_default();
@@ -84,18 +84,20 @@ fn declared(
     map: &ChannelMap,
 ) -> BTreeMap<Channel, RedundantSensors> {
     let channels = recording.elements.keys().map(|element| element.channel);
-    let of = |channel: Channel| {
+    let sensors_of = |channel: Channel| {
         let count = element_count(recording, channel);
         let as_many = |declared: &&RedundantSensors| declared.elements.len() == count;
         let sensor = campaign.and_then(|campaign| campaign.sensors.get(&channel));
-        let each = map.sensors.get(&channel).copied().or(sensor.map(|sensor| sensor.declared));
-        let given = map.redundant.get(&channel).filter(as_many);
-        let given = given.or_else(|| {
+        let channel_declaration = map.sensors.get(&channel).copied().or(sensor.map(|sensor| sensor.declared));
+        let stated = map.redundant.get(&channel).filter(as_many);
+        let stated = stated.or_else(|| {
             sensor?.redundant.as_ref().filter(as_many).filter(|_| !map.sensors.contains_key(&channel))
         });
-        given.cloned().unwrap_or_else(|| RedundantSensors::alike(channel, count, each.unwrap_or_default()))
+        stated.cloned().unwrap_or_else(|| {
+            RedundantSensors::alike(channel, count, channel_declaration.unwrap_or_default())
+        })
     };
-    channels.map(|channel| (channel, of(channel))).collect()
+    channels.map(|channel| (channel, sensors_of(channel))).collect()
 }
 
 #[cfg(test)]
@@ -109,8 +111,8 @@ mod tests {
         let readings = [(Channel::RelativeHumidity, 0.75), (Channel::T1, 298.15), (Channel::P1, 100e3)];
         let steady = |(channel, value)| (channel, Series { t_s: vec![0.0, 1.0], values: vec![value; 2] });
         let recording = Recording { series: readings.map(steady).into(), ..Recording::default() };
-        let Fused { config, .. } =
-            fused(vec![recording], IdentifyConfig::default(), None, &ChannelMap::native());
+        let FusedRecordings { config, .. } =
+            fuse_sensors(vec![recording], IdentifyConfig::default(), None, &ChannelMap::native());
         let mut model = Model::nominal();
         take_air_and_probe(&mut model, &config);
         assert!((model.params.compressor.humidity_kg_kg / 0.015_21 - 1.0).abs() < 5e-3);

@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 
 /// Identification settings for the recordings of this campaign.
 pub fn identification(campaign: &Campaign) -> IdentifyConfig {
-    let chosen = &campaign.identification;
+    let settings = &campaign.identification;
     let tap = |channel: Channel| {
         let sensor = campaign.sensors.get(&channel);
         match sensor.and_then(|sensor| sensor.static_tap_pipe_diameter_m) {
@@ -22,16 +22,16 @@ pub fn identification(campaign: &Campaign) -> IdentifyConfig {
         }
     };
     IdentifyConfig {
-        method: chosen.method,
-        window: chosen.window,
-        settle_bands: chosen.settle_bands,
-        alpha_area_ratio: chosen.alpha_area_ratio,
-        alpha_area_sigma_ratio: chosen.alpha_area_sigma_ratio,
+        method: settings.method,
+        window: settings.window,
+        settle_bands: settings.settle_bands,
+        alpha_area_ratio: settings.alpha_area_ratio,
+        alpha_area_sigma_ratio: settings.alpha_area_sigma_ratio,
         inlet_convection: campaign.machine.params.compressor.inlet_convection,
         inlet_diameter_m: campaign.machine.params.compressor.inlet_diameter_m,
         outlet_diameter_m: campaign.machine.params.compressor.outlet_diameter_m,
         probe_diameter_m: campaign.machine.params.t2_probe_diameter_m,
-        joint: chosen.joint,
+        joint: settings.joint,
         internal_area_m2: campaign.machine.params.compressor.internal_area_m2,
         internal_area_sigma_ratio: internal_area_sigma_ratio(&campaign.machine.assumed),
         air: campaign.machine.params.compressor.air(),
@@ -117,8 +117,8 @@ fn with_barometer(mut config: IdentifyConfig, map: &ChannelMap) -> IdentifyConfi
         [Channel::P1, Channel::P2].into_iter().filter(|channel| map.is_gauge(*channel)).collect();
     match gauge.as_slice() {
         [_, _] => config.barometer_sigma_pa = barometer.sigma_pa,
-        [one] => {
-            let declared = config.declared.entry(*one).or_default();
+        [gauge_channel] => {
+            let declared = config.declared.entry(*gauge_channel).or_default();
             declared.offset_sigma = declared.offset_sigma.hypot(barometer.sigma_pa);
         }
         _ => {}
@@ -143,7 +143,7 @@ pub fn identification_with(campaign: &Campaign, map: &ChannelMap) -> IdentifyCon
 
 /// Identification settings for a recording that has a channel map but no campaign. A pipe diameter in the map always means a static tap.
 pub(crate) fn identification_of(machine: &MachineConstants, map: &ChannelMap) -> IdentifyConfig {
-    let usual = IdentifyConfig::default();
+    let defaults = IdentifyConfig::default();
     let tap = |diameter_m: Option<f64>| {
         diameter_m.map_or(PressureTap::Total, |pipe_diameter_m| PressureTap::Static { pipe_diameter_m })
     };
@@ -158,8 +158,8 @@ pub(crate) fn identification_of(machine: &MachineConstants, map: &ChannelMap) ->
         probe_diameter_m: machine.t2_probe_diameter_m,
         inlet_tap: tap(inlet_m),
         outlet_tap: tap(outlet_m),
-        inlet_diameter_m: inlet_m.unwrap_or(usual.inlet_diameter_m),
-        outlet_diameter_m: outlet_m.unwrap_or(usual.outlet_diameter_m),
+        inlet_diameter_m: inlet_m.unwrap_or(defaults.inlet_diameter_m),
+        outlet_diameter_m: outlet_m.unwrap_or(defaults.outlet_diameter_m),
         reference: map.reference.unwrap_or(ReferenceState::SAE),
         air: Air::DRY,
         window: map.window.map_or_else(WindowRule::default, |window| WindowRule::Fixed {
@@ -168,7 +168,7 @@ pub(crate) fn identification_of(machine: &MachineConstants, map: &ChannelMap) ->
         }),
         declared,
         noise_colour: map.noise_colour.unwrap_or_default(),
-        ..usual
+        ..defaults
     };
     with_barometer(config, map)
 }

@@ -36,11 +36,11 @@ pub fn inspect_log(
     options: Vec<(String, String)>,
     machine: Option<&Path>,
 ) -> Result<LogInspection, SessionError> {
-    let mut read_by = LogOptions::default();
+    let mut reader_options = LogOptions::default();
     for (key, value) in &options {
-        read_by.set(key, value)?;
+        reader_options.set(key, value)?;
     }
-    let (format, mut log) = registry.logs.open(&LogFile::from_path(path), &read_by)?;
+    let (format, mut log) = registry.logs.open(&LogFile::from_path(path), &reader_options)?;
     let survey = survey(log.as_mut())?;
     let layout = log.layout().clone();
     let model = match machine {

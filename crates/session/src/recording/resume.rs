@@ -43,9 +43,9 @@ impl InterruptedRun {
             let (steps, events) =
                 read_marks(&directory.join(&part.recording), &ReadOptions::default()).unwrap_or_default();
             part.soaked = events.iter().any(|event| event.kind == EventKind::SoakEnded);
-            let whole = steps.iter().filter(|step| step.end_s > step.start_s).map(|step| step.index);
-            let whole: BTreeSet<usize> = whole.collect();
-            part.saved.retain(|index| whole.contains(index));
+            let complete = steps.iter().filter(|step| step.end_s > step.start_s).map(|step| step.index);
+            let complete: BTreeSet<usize> = complete.collect();
+            part.saved.retain(|index| complete.contains(index));
         }
         Ok(InterruptedRun { directory: directory.to_owned(), parts })
     }
@@ -74,12 +74,14 @@ impl InterruptedRun {
         };
         let path = self.directory.join(&part.recording);
         let steps = read_steps(&path, &ReadOptions::default())?;
-        let holds = |step: &&StepMarker| step.index < FIRST_REPEAT_INDEX && part.saved.contains(&step.index);
-        let held: Vec<StepMarker> = steps.iter().filter(holds).copied().collect();
+        let is_complete =
+            |step: &&StepMarker| step.index < FIRST_REPEAT_INDEX && part.saved.contains(&step.index);
+        let complete_steps: Vec<StepMarker> = steps.iter().filter(is_complete).copied().collect();
         let speed = |step: &StepMarker| step.to.map(|to| to.speed_rpm.to_bits());
-        let line = held.last().and_then(speed);
+        let line = complete_steps.last().and_then(speed);
         let sought = |step: &&StepMarker| step.kind == StepKind::Approach && speed(step) == line;
-        let open: Vec<usize> = held.iter().rev().take_while(sought).map(|step| step.index).collect();
+        let open: Vec<usize> =
+            complete_steps.iter().rev().take_while(sought).map(|step| step.index).collect();
         part.saved.retain(|index| !open.contains(index));
         Ok(())
     }

@@ -109,8 +109,8 @@ pub(crate) fn no_recording_in(directory: &Path) -> std::io::Error {
     let entries = std::fs::read_dir(directory).into_iter().flatten().flatten();
     let runs = entries.map(|entry| entry.path()).filter(|path| path.join(RECORDING).exists());
     let why = match runs.max() {
-        Some(run) => format!("it holds no recording, but runs; give one of them, e.g. {}", run.display()),
-        None => format!("it holds no {RECORDING}; give the directory of a run, or a file"),
+        Some(run) => format!("it has no recording, but runs; give one of them, e.g. {}", run.display()),
+        None => format!("it has no {RECORDING}; give the directory of a run, or a file"),
     };
     std::io::Error::new(ErrorKind::NotFound, why)
 }

@@ -69,12 +69,12 @@ pub fn drive_paced(
 ) -> Result<RunEnd, RunError> {
     let rig = backend.describe();
     let guards = make_guards(campaign, &rig, pace.read);
-    let mut soaked;
+    let mut with_soak;
     let steps: &mut dyn StepSource = match campaign.zero {
         None => steps,
         Some(soak) => {
-            soaked = SoakSource::new(steps, soak);
-            &mut soaked
+            with_soak = SoakSource::new(steps, soak);
+            &mut with_soak
         }
     };
     let protection = Protection {
@@ -116,16 +116,20 @@ fn reading_bounds(campaign: &Campaign) -> ReadingBounds {
         let redundant = campaign.sensors.get(&channel).and_then(|sensor| sensor.redundant.as_ref());
         redundant.map(|redundant| redundant.elements.as_slice()).unwrap_or_default()
     };
-    let tips_m = redundant_sensors(Channel::T2).iter().map(|one| one.probe_diameter_m);
+    let tips_m = redundant_sensors(Channel::T2).iter().map(|declared| declared.probe_diameter_m);
     let tips_m = tips_m.chain([machine.params.t2_probe_diameter_m]);
     let lag_s = |flux_kg_m2s: f64, tip_m: f64| {
         let flow_kg_s = flux_kg_m2s * area_m2;
         thermocouple::time_constant_s(tip_m, compressor.outlet_diameter_m, flow_kg_s, PROBE_TEMPERATURE_K)
     };
     let noise_k = |channel| {
-        let all = campaign.sensors.get(&channel).map(|sensor| sensor.declared);
-        let each = redundant_sensors(channel).iter().map(|one| one.declared);
-        all.into_iter().chain(each).map(|one| one.noise_sigma).fold(0.0, f64::max)
+        let channel_sensor = campaign.sensors.get(&channel).map(|sensor| sensor.declared);
+        let single_sensors = redundant_sensors(channel).iter().map(|declared| declared.declared);
+        channel_sensor
+            .into_iter()
+            .chain(single_sensors)
+            .map(|declared| declared.noise_sigma)
+            .fold(0.0, f64::max)
     };
     let (min_tip_m, max_tip_m) =
         tips_m.fold((f64::INFINITY, 0.0_f64), |(low, high), tip_m| (tip_m.min(low), tip_m.max(high)));

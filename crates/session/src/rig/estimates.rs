@@ -69,9 +69,9 @@ pub(crate) fn retain_last_two_steps(recent: &mut Recording, marker: &StepMarker)
     }
     if let Some(before) = recent.steps.first().copied() {
         for series in recent.series.values_mut() {
-            let kept = series.t_s.partition_point(|t_s| *t_s < before.start_s);
-            series.t_s.drain(..kept);
-            series.values.drain(..kept);
+            let old_samples = series.t_s.partition_point(|t_s| *t_s < before.start_s);
+            series.t_s.drain(..old_samples);
+            series.values.drain(..old_samples);
         }
     }
     recent.steps.push(*marker);

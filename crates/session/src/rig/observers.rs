@@ -38,12 +38,12 @@ impl Recorder {
     fn write_flushed_entries(&mut self) -> Result<(), ObserverError> {
         let saved_s = self.writer.saved_until_s();
         if let Some(file) = &self.sync_handle {
-            file.sync_data().map_err(ObserverError::of)?;
+            file.sync_data().map_err(ObserverError::new)?;
         }
         let Some(journal) = &mut self.journal else { return Ok(()) };
         let done = self.pending.partition_point(|(_, before_s)| *before_s != saved_s);
         for (entry, _) in self.pending.drain(..done) {
-            journal.write(&entry).map_err(ObserverError::of)?;
+            journal.write(&entry).map_err(ObserverError::new)?;
         }
         Ok(())
     }
@@ -70,17 +70,17 @@ impl Recorder {
 
 impl RunObserver for Recorder {
     fn on_step_start(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
-        self.writer.write_step(marker, StepPhase::Start).map_err(ObserverError::of)
+        self.writer.write_step(marker, StepPhase::Start).map_err(ObserverError::new)
     }
 
     fn on_batch(&mut self, batch: &SampleBatch) -> Result<(), ObserverError> {
         // This also writes the batch's own events.
-        self.writer.write_batch(batch).map_err(ObserverError::of)?;
+        self.writer.write_batch(batch).map_err(ObserverError::new)?;
         self.write_flushed_entries()
     }
 
     fn on_event(&mut self, event: &Event) -> Result<(), ObserverError> {
-        self.writer.write_event(event).map_err(ObserverError::of)?;
+        self.writer.write_event(event).map_err(ObserverError::new)?;
         if event.kind == EventKind::SoakEnded {
             self.queue_entry(Entry::Soaked);
         }
@@ -88,11 +88,11 @@ impl RunObserver for Recorder {
     }
 
     fn on_step_abandoned(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
-        self.writer.write_step(marker, StepPhase::Abandoned).map_err(ObserverError::of)
+        self.writer.write_step(marker, StepPhase::Abandoned).map_err(ObserverError::new)
     }
 
     fn on_step_end(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
-        self.writer.write_step(marker, StepPhase::End).map_err(ObserverError::of)
+        self.writer.write_step(marker, StepPhase::End).map_err(ObserverError::new)
     }
 
     fn on_step_completed(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {

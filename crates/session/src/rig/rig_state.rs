@@ -213,7 +213,7 @@ impl RigStates {
     }
 
     /// Rigs that wait for acknowledgement.
-    fn awaiting(&self) -> Vec<String> {
+    fn unacknowledged_rigs(&self) -> Vec<String> {
         let waits = |status: &RigStatus| status.latch.is_some() || (status.owner.is_some() && !status.in_use);
         self.list().into_iter().filter(waits).map(|status| status.rig).collect()
     }
@@ -228,7 +228,7 @@ impl RigStates {
         if status.owner.is_none() && status.latch.is_none() && !status.in_use {
             return Err(SessionError::NothingToAcknowledge {
                 rig: rig.to_owned(),
-                awaiting: self.awaiting(),
+                awaiting: self.unacknowledged_rigs(),
             });
         }
         if status.in_use {
@@ -339,12 +339,12 @@ fn open_plain(path: &Path) -> io::Result<File> {
         options.custom_flags(i32::try_from(flags.bits()).unwrap_or_default());
     }
     let file = options.open(path)?;
-    let about = file.metadata()?;
+    let metadata = file.metadata()?;
     #[cfg(unix)]
-    let linked = std::os::unix::fs::MetadataExt::nlink(&about) > 1;
+    let linked = std::os::unix::fs::MetadataExt::nlink(&metadata) > 1;
     #[cfg(not(unix))]
     let linked = false;
-    if !about.is_file() || linked {
+    if !metadata.is_file() || linked {
         return Err(io::Error::other("it is a link or not a plain file; remove it"));
     }
     Ok(file)

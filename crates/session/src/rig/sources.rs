@@ -49,10 +49,10 @@ impl Registry {
         if campaign.readers.is_empty() {
             return Ok(Sources { backend: rig, read: Vec::new(), exclusive: Vec::new() });
         }
-        let own = rig.describe();
+        let rig_description = rig.describe();
         let age_s = campaign.guard_set().signals.first().map_or(DEFAULT_MAX_AGE_S, |guard| guard.age_s);
-        let mut taken: Vec<(Channel, Provider)> =
-            own.channels.iter().map(|channel| (*channel, Provider::Rig)).collect();
+        let mut providers: Vec<(Channel, Provider)> =
+            rig_description.channels.iter().map(|channel| (*channel, Provider::Rig)).collect();
         let (mut readers, mut read, mut exclusive) = (Vec::new(), Vec::new(), Vec::new());
         for choice in &campaign.readers {
             let at = format!("readers.{}.backend.{}", choice.name, choice.backend.name);
@@ -66,7 +66,7 @@ impl Registry {
             };
             let backend = self.make_named_backend(&choice.backend, campaign, model).map_err(wrong)?;
             let rig = backend.describe();
-            let channels = select_channels(choice, &rig, &mut taken)?;
+            let channels = select_channels(choice, &rig, &mut providers)?;
             let age_s = age_s.max(MAX_MISSED_SAMPLES / rig.sample_rate_hz.max(1e-3));
             let as_read = |channel: &Channel| InstrumentChannel {
                 reader: choice.name.clone(),
@@ -83,7 +83,7 @@ impl Registry {
     }
 }
 
-/// What delivers a channel.
+/// The source of a channel.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Provider {
     Rig,
@@ -104,7 +104,7 @@ impl std::fmt::Display for Provider {
 fn select_channels(
     choice: &ReaderChoice,
     rig: &RigDescription,
-    taken: &mut Vec<(Channel, Provider)>,
+    providers: &mut Vec<(Channel, Provider)>,
 ) -> Result<Vec<Channel>, SessionError> {
     let below = |key: &str| format!("readers.{}.{key}", choice.name);
     let wrong = |at: String, problem: ReaderProblem| {
@@ -113,8 +113,8 @@ fn select_channels(
     if rig.controls {
         return wrong(below("backend"), ReaderProblem::Controls(format!("`{}`", choice.backend.name)));
     }
-    let from = |channel: &Channel, taken: &[(Channel, Provider)]| {
-        taken.iter().find(|(known, _)| known == channel).map(|(_, other)| other.clone())
+    let from = |channel: &Channel, providers: &[(Channel, Provider)]| {
+        providers.iter().find(|(known, _)| known == channel).map(|(_, other)| other.clone())
     };
     match &choice.channels {
         Some(listed) => {
@@ -128,7 +128,7 @@ fn select_channels(
             }
             // A listed channel replaces the rig's own.
             for channel in listed {
-                if let Some(other) = from(channel, taken).filter(|other| *other != Provider::Rig) {
+                if let Some(other) = from(channel, providers).filter(|other| *other != Provider::Rig) {
                     return wrong(
                         below("channels"),
                         ReaderProblem::DuplicateChannel { channel: *channel, other: other.to_string() },
@@ -138,7 +138,7 @@ fn select_channels(
         }
         None => {
             for channel in &rig.channels {
-                if let Some(other) = from(channel, taken) {
+                if let Some(other) = from(channel, providers) {
                     return wrong(
                         below("backend"),
                         ReaderProblem::DuplicateChannel { channel: *channel, other: other.to_string() },
@@ -148,7 +148,7 @@ fn select_channels(
         }
     }
     let channels = choice.channels.clone().unwrap_or_else(|| rig.channels.clone());
-    taken.retain(|(channel, _)| !channels.contains(channel));
-    taken.extend(channels.iter().map(|channel| (*channel, Provider::Reader(choice.name.clone()))));
+    providers.retain(|(channel, _)| !channels.contains(channel));
+    providers.extend(channels.iter().map(|channel| (*channel, Provider::Reader(choice.name.clone()))));
     Ok(channels)
 }

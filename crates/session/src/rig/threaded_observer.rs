@@ -16,7 +16,7 @@ enum ObserverMessage {
     Event(Event),
     StepAbandoned(StepMarker),
     StepEnd(StepMarker),
-    StepHeld(StepMarker),
+    StepCompleted(StepMarker),
 }
 
 /// The observer accepts no more messages.
@@ -46,7 +46,7 @@ impl<'scope, O: RunObserver + Send + 'scope> ThreadedObserver<'scope, O> {
         ThreadedObserver { to_thread, thread, failed }
     }
 
-    /// Waits until the observer has processed all messages. Returns it with its error, if no call has returned that.
+    /// Waits until the observer has processed all messages. Returns the observer, and its error if no earlier call has returned that.
     pub(crate) fn end(self) -> (O, Result<(), ObserverError>) {
         drop(self.to_thread);
         let observer = self.thread.join().unwrap_or_else(|panicked| resume_unwind(panicked));
@@ -58,7 +58,7 @@ impl<O> ThreadedObserver<'_, O> {
     fn send(&mut self, message: ObserverMessage) -> Result<(), ObserverError> {
         match self.to_thread.send(message) {
             Ok(()) => Ok(()),
-            Err(_) => Err(self.failed.recv().unwrap_or_else(|_| ObserverError::of(ObserverStopped))),
+            Err(_) => Err(self.failed.recv().unwrap_or_else(|_| ObserverError::new(ObserverStopped))),
         }
     }
 }
@@ -70,7 +70,7 @@ fn observe(observer: &mut impl RunObserver, message: ObserverMessage) -> Result<
         ObserverMessage::Event(event) => observer.on_event(&event),
         ObserverMessage::StepAbandoned(marker) => observer.on_step_abandoned(&marker),
         ObserverMessage::StepEnd(marker) => observer.on_step_end(&marker),
-        ObserverMessage::StepHeld(marker) => observer.on_step_completed(&marker),
+        ObserverMessage::StepCompleted(marker) => observer.on_step_completed(&marker),
     }
 }
 
@@ -96,7 +96,7 @@ impl<O> RunObserver for ThreadedObserver<'_, O> {
     }
 
     fn on_step_completed(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
-        self.send(ObserverMessage::StepHeld(*marker))
+        self.send(ObserverMessage::StepCompleted(*marker))
     }
 }
 
@@ -142,7 +142,7 @@ mod tests {
     impl RunObserver for Counts {
         fn on_event(&mut self, event: &Event) -> Result<(), ObserverError> {
             if self.times.len() == self.fails_at {
-                return Err(ObserverError::of(io::Error::from(io::ErrorKind::StorageFull)));
+                return Err(ObserverError::new(io::Error::from(io::ErrorKind::StorageFull)));
             }
             self.times.push(event.t_s);
             Ok(())

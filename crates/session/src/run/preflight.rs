@@ -57,8 +57,8 @@ pub(crate) fn check_room(
 /// Free bytes of a file system for this user; `None` if unknown.
 #[cfg(unix)]
 fn free_bytes(directory: &Path) -> Option<f64> {
-    let found = rustix::fs::statvfs(directory).ok()?;
-    Some(found.f_bavail as f64 * found.f_frsize as f64)
+    let file_system = rustix::fs::statvfs(directory).ok()?;
+    Some(file_system.f_bavail as f64 * file_system.f_frsize as f64)
 }
 
 #[cfg(not(unix))]

@@ -95,12 +95,12 @@ pub struct RunOutcome {
     pub recording: PathBuf,
     /// How it ended.
     pub end: RunTermination,
-    /// The results, or the reason why there are none.
+    /// The results, or the reason for their absence.
     pub results: Result<Results, SessionError>,
 }
 
 impl RunOutcome {
-    /// One sentence on how it ended.
+    /// The end of the run in one sentence.
     pub fn sentence(&self) -> String {
         ending_sentence(&self.end.ending())
     }
@@ -257,7 +257,7 @@ impl PreparedRun<'_> {
     /// Removes the files of a run whose rig was not armed, and returns the error of the run.
     fn discard_unarmed_run(&self, error: RunError, directory: &Path) -> SessionError {
         if self.request.resume.is_none() && !error.leaves_rig_state_unknown() {
-            // If this fails, an empty run directory remains, which does no harm.
+            // A failure leaves an empty run directory, which is harmless.
             let _ = std::fs::remove_dir_all(directory);
         }
         SessionError::NotArmed(error)
@@ -296,10 +296,11 @@ impl PreparedRun<'_> {
     fn acquire_lease(&self, rig: &RigDescription) -> Result<RigLease, SessionError> {
         let default = self.request.parent.join(".rigs");
         let states = RigStates::new(self.request.rig_states.unwrap_or(&default));
-        let resumes = self.request.resume.as_ref().map(|interrupted| interrupted.directory.as_path());
+        let resumed_directory =
+            self.request.resume.as_ref().map(|interrupted| interrupted.directory.as_path());
         let address = rig.reached_at.iter().map(|address| format!("at {address}"));
         let shared: Vec<String> = self.sources.exclusive.iter().cloned().chain(address).collect();
-        RigLease::acquire(&states, rig.exclusive.as_deref(), &shared, resumes)
+        RigLease::acquire(&states, rig.exclusive.as_deref(), &shared, resumed_directory)
     }
 
     /// The run directory: a new one with the inputs of the run, or that of the resumed run.
@@ -349,17 +350,17 @@ impl PreparedRun<'_> {
         let mut planned = PlanSteps::new(&self.plan);
         let mut missing;
         // A resumed run uses its unchanged plan, or replays its data if later steps depend on them.
-        let resumes = self.request.resume.as_ref();
-        let replayed = resumes.filter(|_| depends_on_readings(self.request.campaign));
-        let by_plan = resumes.filter(|_| replayed.is_none());
+        let interrupted = self.request.resume.as_ref();
+        let replayed = interrupted.filter(|_| depends_on_readings(self.request.campaign));
+        let from_plan = interrupted.filter(|_| replayed.is_none());
         // A recorded soak applies to the whole run, so a resumed run does not repeat it.
         let without_soak;
         let mut campaign = self.request.campaign;
-        if resumes.is_some_and(InterruptedRun::has_soak) {
+        if interrupted.is_some_and(InterruptedRun::has_soak) {
             without_soak = Campaign { zero: None, ..campaign.clone() };
             campaign = &without_soak;
         }
-        let steps: &mut dyn StepSource = match (&mut self.scripted, by_plan) {
+        let steps: &mut dyn StepSource = match (&mut self.scripted, from_plan) {
             (Some(scripted), _) => scripted,
             (None, Some(interrupted)) => {
                 let saved = interrupted.saved();
@@ -373,8 +374,8 @@ impl PreparedRun<'_> {
         let mut search;
         let steps: &mut dyn StepSource = match campaign.surge_search {
             None => steps,
-            Some(seek) => {
-                search = SurgeSearch::new(steps, seek, campaign.reference, &hold);
+            Some(settings) => {
+                search = SurgeSearch::new(steps, settings, campaign.reference, &hold);
                 &mut search
             }
         };
@@ -387,9 +388,10 @@ impl PreparedRun<'_> {
         let (end, drifted, recorder) = std::thread::scope(|scope| {
             let start = || StepEstimator::start(scope, identification(campaign), session.on_event);
             let mut estimates = session.estimates.then(start);
-            let mut recorder = match pace.each_sample {
-                true => ObserverThread::Separate(ThreadedObserver::start(scope, recorder)),
-                false => ObserverThread::Calling(recorder),
+            let mut recorder = if pace.each_sample {
+                ObserverThread::Separate(ThreadedObserver::start(scope, recorder))
+            } else {
+                ObserverThread::Calling(recorder)
             };
             let mut observers: Vec<&mut dyn RunObserver> = vec![recorder.observer(), &mut forwarder];
             observers.extend(estimates.as_mut().map(|estimates| estimates as &mut dyn RunObserver));
@@ -450,10 +452,10 @@ fn move_earlier_results(run: &Path) -> Result<(), SessionError> {
         return Ok(());
     }
     let free = (1..).map(|number| run.join(format!("results-{number}"))).find(|path| !path.exists());
-    let Some(aside) = free else { return Ok(()) };
-    std::fs::create_dir(&aside).map_err(SessionError::file("create", &aside))?;
+    let Some(destination) = free else { return Ok(()) };
+    std::fs::create_dir(&destination).map_err(SessionError::file("create", &destination))?;
     for name in results {
-        let (from, to) = (run.join(&name), aside.join(&name));
+        let (from, to) = (run.join(&name), destination.join(&name));
         std::fs::rename(&from, &to).map_err(SessionError::file("move", &from))?;
     }
     Ok(())

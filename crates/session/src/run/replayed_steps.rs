@@ -39,7 +39,7 @@ pub(crate) fn drive_resumed(
     drive: impl FnOnce(&mut dyn StepSource) -> Result<RunEnd, RunError>,
 ) -> Result<RunEnd, RunError> {
     let Some(interrupted) = interrupted else { return drive(steps) };
-    let mut resumed = ResumedSteps::replay(interrupted, steps).map_err(StepSourceError::of)?;
+    let mut resumed = ResumedSteps::replay(interrupted, steps).map_err(StepSourceError::new)?;
     drive(&mut resumed)
 }
 

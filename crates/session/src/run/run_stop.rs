@@ -64,8 +64,8 @@ impl RunStop {
     pub fn handle_signal(&self, gentle: bool) -> SignalResponse {
         let phase = self.phase.load(Ordering::SeqCst);
         if phase == Phase::Rig as u8 {
-            let again = self.after_step.swap(true, Ordering::SeqCst);
-            if again || !gentle {
+            let is_second = self.after_step.swap(true, Ordering::SeqCst);
+            if is_second || !gentle {
                 self.now.store(true, Ordering::SeqCst);
             }
             SignalResponse::StopRequested
@@ -87,10 +87,10 @@ mod tests {
             let stop = RunStop::default();
             assert_eq!(stop.handle_signal(gentle), SignalResponse::MayExit);
             stop.enter(Phase::Rig);
-            for again in [false, true] {
+            for is_second in [false, true] {
                 assert_eq!(stop.handle_signal(gentle), SignalResponse::StopRequested);
                 assert!(stop.after_step.load(Ordering::SeqCst));
-                assert_eq!(stop.now.load(Ordering::SeqCst), again || !gentle);
+                assert_eq!(stop.now.load(Ordering::SeqCst), is_second || !gentle);
             }
             stop.enter(Phase::Results);
             assert_eq!(

@@ -7,7 +7,7 @@ use mapper_recording::RecordError;
 use mapper_runner::RunError;
 use std::path::PathBuf;
 
-/// Why cases cannot be made or scored.
+/// Errors when cases are created or scored.
 #[derive(Debug, thiserror::Error)]
 pub enum BlindError {
     /// A file or directory cannot be read or written.
@@ -15,17 +15,17 @@ pub enum BlindError {
     File {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
-    /// A file does not hold what it should.
+    /// A file has the wrong content.
     #[error("{} does not contain {what}: {source}", path.display())]
     Content {
         /// The file.
         path: PathBuf,
-        /// What it should hold.
+        /// The expected content.
         what: &'static str,
-        /// Why it does not.
+        /// The cause.
         source: serde_json::Error,
     },
     /// A file is larger than any of its kind.
@@ -33,7 +33,7 @@ pub enum BlindError {
     TooLarge {
         /// The file.
         path: PathBuf,
-        /// Largest size read, bytes.
+        /// Maximum size, bytes.
         limit: u64,
     },
     /// The answers are not those that were sealed.
@@ -44,9 +44,9 @@ pub enum BlindError {
     Seal {
         /// The file of answers.
         path: PathBuf,
-        /// Its hash.
+        /// Its current hash.
         found: String,
-        /// The hash it had.
+        /// The sealed hash.
         expected: String,
     },
     /// The lab stopped, or its data cannot be stored.
@@ -54,36 +54,36 @@ pub enum BlindError {
     Run {
         /// The case.
         name: String,
-        /// Why.
+        /// The cause.
         source: RunError,
     },
     /// A point of the campaign that the nominal model cannot hold.
     #[error(transparent)]
     Point(#[from] SteadyError),
-    /// An effect that cannot be put in; a fault of the draw.
+    /// An effect cannot be applied: a defect of the draw.
     #[error(transparent)]
     Effect(#[from] EffectError),
     /// A recording cannot be written.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// The campaign's map makes no nominal model.
+    /// The campaign's map gives no nominal model.
     #[error(transparent)]
     NominalModel(#[from] NominalTableError),
     /// No channel of the campaign's recording can be compared with the model.
-    #[error("the campaign records nothing to measure signatures by; declare sensors of speed, P2, T2 or Tc")]
+    #[error("the recording has no channel for signatures; declare sensors of speed, P2, T2 or Tc")]
     NothingRecorded,
     /// The diagnosis that measures signatures, or its calibration, failed.
     #[error("failed to measure signatures: {source}")]
     Signatures {
-        /// Why.
+        /// The cause.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
     /// Too many cases.
     #[error("{cases} cases were requested; 1 to {most} are allowed")]
     Cases {
-        /// Number asked for.
+        /// The requested number.
         cases: usize,
-        /// Maximum that can be made at once.
+        /// Maximum number in one directory.
         most: usize,
     },
 }

@@ -1,6 +1,6 @@
 //! Makes a directory of blind cases.
 
-use crate::blind::calibration::no_cause_study::StudyRuler;
+use crate::blind::calibration::no_cause_study::StudySignatureMeter;
 use crate::blind::cases::case::{Case, Draw};
 use crate::blind::cases::equations::Laboratory;
 use crate::blind::cases::truth::Truth;
@@ -19,44 +19,44 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// Maximum number of cases of one directory.
 const MAX_CASES: usize = 100_000;
 
-/// What was made.
+/// A new directory of cases.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Made {
+pub struct CreatedCases {
     /// Manifest of the directory.
     pub manifest: Manifest,
     /// Answers in the order of the cases; for calibration, which may know them.
     pub answers: Vec<Truth>,
 }
 
-/// Draws cases from `catalogue` and the outside causes, runs each on the virtual lab of `campaign`, and leaves in
-/// `directory`, which must not hold cases yet, NAME.mcap for each (and NAME.healthy.mcap where that is asked for), the answers, and a manifest with their hash.
+/// Draws cases from `catalogue` and the outside causes, runs each on the virtual lab of `campaign`, and writes to
+/// `directory`, which must not contain cases yet: NAME.mcap for each, NAME.healthy.mcap if requested, the answers, and a manifest with their hash.
 ///
 /// `done` receives the number of finished cases. Equal arguments give equal bytes.
 ///
 /// # Errors
-/// [`BlindError`] where the campaign has no nominal model, a point cannot be held, or a file cannot be written.
+/// [`BlindError`] if the campaign has no nominal model, a point cannot be held, or a file cannot be written.
 pub fn make(
     campaign: &Campaign,
     catalogue: &[Arc<dyn Effect>],
     draw: &Draw,
     directory: &Path,
     done: &(dyn Fn(usize) + Sync),
-) -> Result<Made, BlindError> {
-    let cases = drawn(campaign, catalogue, draw)?;
+) -> Result<CreatedCases, BlindError> {
+    let cases = draw_cases(campaign, catalogue, draw)?;
     let nominal = nominal_model(campaign)?;
-    // Strengths are measured on the model's own lab, so that equal seeds give equal causes on both.
+    // Strengths are always measured with the model's own equations, so that equal seeds give equal causes in both simulators.
     let schedule = Schedule::new(campaign, &nominal)?.on(draw.laboratory);
     std::fs::create_dir_all(directory).map_err(BlindError::file(directory))?;
     let answers = run_all(&schedule, campaign, &cases, draw.healthy, directory, done)?;
     let manifest = seal(&campaign.name, draw.laboratory, draw.healthy, &answers, directory)?;
-    Ok(Made { manifest, answers })
+    Ok(CreatedCases { manifest, answers })
 }
 
 /// Draws cases.
 ///
 /// # Errors
-/// [`BlindError`] where the campaign has no nominal model or cannot be run, or there are too many.
-pub fn drawn(
+/// [`BlindError`] if the campaign has no nominal model or cannot be run, or there are too many.
+pub fn draw_cases(
     campaign: &Campaign,
     catalogue: &[Arc<dyn Effect>],
     draw: &Draw,
@@ -68,14 +68,14 @@ pub fn drawn(
     let schedule = Schedule::new(campaign, &nominal)?;
     let mut known = catalogue.to_vec();
     known.extend(outside_kinds(draw.outside));
-    let ruler = StudyRuler::new(campaign, &schedule, &nominal, known, draw.seed)?;
-    Ok(draw.cases(catalogue, &ruler))
+    let meter = StudySignatureMeter::new(campaign, &schedule, &nominal, known, draw.seed)?;
+    Ok(draw.cases(catalogue, &meter))
 }
 
-/// Runs one case into a new recording, and gives its answer.
+/// Records one case in a new file and returns its answer.
 ///
 /// # Errors
-/// [`BlindError`] where the lab stops or the file cannot be written.
+/// [`BlindError`] if the lab stops, or the file cannot be written.
 pub fn record(
     campaign: &Campaign,
     case: &Case,

@@ -1,6 +1,6 @@
 //! Causes that are not candidates of the diagnosis: reserved ones for the check, other ones for calibration.
 //!
-//! They are effects like those of the catalogue and never part of it. Their ids begin with `X_`, which identifies them in
+//! They are effects like those of the catalogue, but never part of it. Their ids begin with `X_`, which identifies them in
 //! the answers.
 
 mod back_plate;
@@ -18,16 +18,16 @@ use mapper_physics::rig::effect::Effect;
 use mapper_physics::rig::effect_kind::effect_of;
 use std::sync::Arc;
 
-/// What an outside cause is for.
+/// Purpose of an outside cause.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OutsideUse {
-    /// Reserved for the check; never seen by anything that is tuned.
+    /// Reserved for the check; never used for tuning.
     Check,
     /// For tuning thresholds.
     Calibration,
 }
 
-/// The causes of one use.
+/// The causes with this purpose.
 pub fn outside_kinds(wanted: OutsideUse) -> Vec<Arc<dyn Effect>> {
     match wanted {
         OutsideUse::Check => vec![
@@ -47,5 +47,5 @@ pub fn outside_kinds(wanted: OutsideUse) -> Vec<Arc<dyn Effect>> {
     }
 }
 
-/// Source of all of them.
+/// Source of all outside causes.
 const WITHHELD: &str = "withheld from the diagnosis";

@@ -1,4 +1,4 @@
-//! Answers under seal: a hash printed before anything is diagnosed.
+//! Sealed answers: their hash is printed before the diagnosis.
 
 use crate::blind::cases::equations::Laboratory;
 use crate::blind::cases::truth::Truth;
@@ -14,13 +14,13 @@ pub const ANSWERS_NAME: &str = "answers.json";
 /// File that describes the content of the directory.
 pub const MANIFEST_NAME: &str = "manifest.json";
 
-/// Description of a directory of cases; of the answers it contains only the hash.
+/// Description of a directory of cases. It contains only the hash of the answers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
     /// Name of the campaign.
     pub campaign: String,
-    /// What the cases ran on.
+    /// The simulator of the cases.
     #[serde(default)]
     pub laboratory: Laboratory,
     /// Whether each rig was also recorded on a night without its causes, as NAME.healthy.mcap.
@@ -42,7 +42,7 @@ impl Manifest {
     /// Reads a manifest.
     ///
     /// # Errors
-    /// [`BlindError`] where there is none.
+    /// [`BlindError`] if it is missing or invalid.
     pub fn read(path: &Path) -> Result<Manifest, BlindError> {
         read_json(path, "manifest of blind cases")
     }
@@ -75,16 +75,16 @@ fn read(path: &Path) -> Result<Vec<u8>, BlindError> {
     Ok(bytes)
 }
 
-/// Opens the seal: the answers, if they are still those that were made.
+/// Reads the answers if they are unchanged.
 ///
 /// # Errors
-/// [`BlindError::Seal`] where they are not.
+/// [`BlindError::Seal`] if they were changed.
 pub(crate) fn open(directory: &Path, manifest: &Manifest) -> Result<Vec<Truth>, BlindError> {
     let path = directory.join(ANSWERS_NAME);
     let bytes = read(&path)?;
-    let found = sha256(&bytes);
-    if found != manifest.answers_sha256 {
-        return Err(BlindError::Seal { path, found, expected: manifest.answers_sha256.clone() });
+    let actual = sha256(&bytes);
+    if actual != manifest.answers_sha256 {
+        return Err(BlindError::Seal { path, found: actual, expected: manifest.answers_sha256.clone() });
     }
     serde_json::from_slice(&bytes).map_err(|source| BlindError::Content { path, what: "answers", source })
 }

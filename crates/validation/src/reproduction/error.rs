@@ -4,7 +4,7 @@ use mapper_identify::{IdentifyError, StepError};
 use mapper_physics::simulation::simulate::SimulationError;
 use mapper_physics::simulation::steady::SteadyError;
 
-/// Why a figure could not be redone.
+/// Why a figure could not be reproduced.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ReproduceError {
     /// A steady state does not exist.
@@ -16,10 +16,10 @@ pub enum ReproduceError {
     /// The recording could not be identified.
     #[error(transparent)]
     Identify(#[from] IdentifyError),
-    /// A step gave no point.
+    /// A step has no point.
     #[error(transparent)]
     Step(#[from] StepError),
-    /// A run holds no step or no sample in the window.
+    /// A run has no step, or no sample in the window.
     #[error("a simulated run has no step or no sample in the window")]
     NoStep,
 }

@@ -1,13 +1,13 @@
-//! A redone figure as data.
+//! A reproduced figure as data.
 
-/// One figure of the paper, redone.
+/// One reproduced figure of the paper.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FigureResult {
     /// Its number in the paper, e.g. `7`.
     pub number: String,
-    /// What it shows.
+    /// Its subject.
     pub title: String,
-    /// How it was redone here, in a few sentences.
+    /// The method of the reproduction, in a few sentences.
     pub method: String,
     /// The paper's statements, with the results here.
     pub statements: Vec<Statement>,
@@ -23,12 +23,12 @@ impl Statement {
     }
 }
 
-/// Whether a statement of the paper holds here.
+/// Verdict on a statement of the paper.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     /// It holds.
     Holds,
-    /// It holds with an exception that `here` names.
+    /// It holds with an exception, named in `here`.
     Partly,
     /// It does not hold.
     Differs,
@@ -53,20 +53,20 @@ impl std::fmt::Display for Verdict {
 /// A statement of the paper, and the result here.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Statement {
-    /// What the paper states.
+    /// The statement.
     pub paper: String,
-    /// What came out, with units.
+    /// The result, with units.
     pub here: String,
     /// Whether it holds.
     pub verdict: Verdict,
 }
 
-/// Numbers with their column heads; cells are already formatted.
+/// A table with formatted cells.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Table {
     /// Column heads, units included.
     pub head: Vec<String>,
-    /// Rows, as long as `head`.
+    /// Rows, each as long as `head`.
     pub rows: Vec<Vec<String>>,
 }
 

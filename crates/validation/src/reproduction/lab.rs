@@ -8,7 +8,7 @@ use mapper_physics::simulation::model::Model;
 use mapper_physics::simulation::simulate::{Simulator, Watch};
 use mapper_physics::simulation::steady::hold_speed;
 
-/// Table 1: from and to, rpm.
+/// Jumps of table 1: initial and target speed, rpm.
 pub(crate) const JUMPS: [(f64, f64); 4] = [(110e3, 50e3), (50e3, 110e3), (150e3, 90e3), (90e3, 150e3)];
 /// Valve openings of each jump, relative to the nominal area: from near surge to near choke.
 pub(crate) const OPENINGS: [f64; 5] = [0.5, 0.7, 1.0, 1.4, 2.0];
@@ -40,7 +40,7 @@ pub(crate) fn table_1() -> Vec<Jump> {
         .collect()
 }
 
-/// What the model alone knows, sample by sample.
+/// True values of the model at each sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Truth {
     pub(crate) t_s: f64,
@@ -51,11 +51,11 @@ pub(crate) struct Truth {
     pub(crate) flow_kg_s: f64,
     pub(crate) pressure_ratio: f64,
     pub(crate) probe_time_constant_s: f64,
-    /// Whether the housing is hotter than the gas behind the wheel.
+    /// Whether the housing is hotter than the gas after the wheel.
     pub(crate) heats_gas: bool,
 }
 
-/// A jump as recorded, with its truth.
+/// A recorded jump with its truth.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Run {
     pub(crate) jump: Jump,
@@ -144,14 +144,14 @@ pub(crate) fn run_lagged(
         },
         |_| {},
     )?;
-    let place = |speed_rpm| OperatingPoint { speed_rpm, valve_opening_ratio: jump.opening };
+    let operating_point = |speed_rpm| OperatingPoint { speed_rpm, valve_opening_ratio: jump.opening };
     recording.steps.push(StepMarker {
         index: 0,
         kind: StepKind::Point,
         start_s: 0.0,
         end_s: seconds,
-        from: Some(place(jump.from_rpm)),
-        to: Some(place(jump.to_rpm)),
+        from: Some(operating_point(jump.from_rpm)),
+        to: Some(operating_point(jump.to_rpm)),
         p3_pa: boundary.p3_pa,
         valve_opening_ratio: jump.opening,
     });

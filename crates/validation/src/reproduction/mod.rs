@@ -1,7 +1,6 @@
 //! Recomputes the simulated figures of the paper with the model of the virtual lab, and compares each with the statements of the paper.
 //!
-//! [`reproduce`] gives data and pictures. Nothing depends on time or machine:
-//! the same program gives the same bytes.
+//! [`reproduce`] returns data and pictures. The same program gives the same bytes at any time and on any computer.
 
 mod error;
 mod figure_data;
@@ -17,10 +16,10 @@ pub use error::ReproduceError;
 pub use figure_data::{FigureResult, Statement, Table, Verdict, picture_path};
 pub use page::{figure_json, reproduction_page};
 
-/// Numbers of the figures that [`reproduce`] redoes, in its order.
+/// Numbers of the reproduced figures, in order.
 pub const FIGURES: [&str; 8] = ["5", "6", "7", "8", "9", "10", "11", "12"];
 
-/// Redoes all figures; `progress` receives the figure's number before each is made.
+/// Reproduces all figures; `progress` receives the number of each figure before it is computed.
 ///
 /// # Errors
 /// [`ReproduceError`] if the model cannot be run or a recording cannot be identified.

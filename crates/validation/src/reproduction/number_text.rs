@@ -12,7 +12,7 @@ pub(crate) fn fixed(value: f64, decimals: usize) -> String {
     }
 }
 
-/// As [`fixed`] with the sign of what is above zero.
+/// As [`fixed`], with a plus sign for positive values.
 pub(crate) fn signed(value: f64, decimals: usize) -> String {
     let text = fixed(value, decimals);
     let zero = text.chars().all(|c| c == '0' || c == '.' || c == '-');
@@ -20,7 +20,7 @@ pub(crate) fn signed(value: f64, decimals: usize) -> String {
 }
 
 /// As [`signed`]; `-` for a missing value.
-pub(crate) fn maybe(value: Option<f64>, decimals: usize) -> String {
+pub(crate) fn signed_or_dash(value: Option<f64>, decimals: usize) -> String {
     value.map_or_else(|| "-".to_owned(), |value| signed(value, decimals))
 }
 
@@ -39,6 +39,6 @@ mod tests {
     #[test]
     fn zero_has_no_sign() {
         assert_eq!([fixed(-0.001, 2), signed(0.001, 2), signed(1.5, 1)], ["0.00", "0.00", "+1.5"]);
-        assert_eq!([signed(-1.25, 2), fixed(f64::NAN, 2), maybe(None, 1)], ["-1.25", "-", "-"]);
+        assert_eq!([signed(-1.25, 2), fixed(f64::NAN, 2), signed_or_dash(None, 1)], ["-1.25", "-", "-"]);
     }
 }

@@ -12,7 +12,7 @@ pub(crate) const WINDOW: WindowRule = WindowRule::Fixed { start_s: 10.0, end_s: 
 pub(crate) const RUN_S: f64 = 110.0;
 
 /// The dynamic method with an assumed alpha_A.
-pub(crate) fn assuming(alpha_area_ratio: f64) -> IdentifyConfig {
+pub(crate) fn dynamic_config(alpha_area_ratio: f64) -> IdentifyConfig {
     IdentifyConfig { window: WINDOW, alpha_area_ratio, ..IdentifyConfig::default() }
 }
 
@@ -54,19 +54,19 @@ impl Outcome {
 }
 
 /// Identifies a run.
-pub(crate) fn outcome(run: &Run, config: &IdentifyConfig) -> Result<Outcome, ReproduceError> {
-    outcome_of(run, &run.recording, config)
+pub(crate) fn identify_run(run: &Run, config: &IdentifyConfig) -> Result<Outcome, ReproduceError> {
+    identify_recording(run, &run.recording, config)
 }
 
 /// Identifies a recording that was made from a run (with noise, say).
-pub(crate) fn outcome_of(
+pub(crate) fn identify_recording(
     run: &Run,
     recording: &Recording,
     config: &IdentifyConfig,
 ) -> Result<Outcome, ReproduceError> {
     let mut points = identify_each(recording, config)?;
     let point = points.pop().ok_or(ReproduceError::NoStep)??;
-    let window = in_window(run, &config.window);
+    let window = truth_in_window(run, &config.window);
     let mean = |value: fn(&Truth) -> f64| statistics::mean(window.iter().map(value)).unwrap_or(f64::NAN);
     let last = window.last().ok_or(ReproduceError::NoStep)?;
     Ok(Outcome {
@@ -80,7 +80,7 @@ pub(crate) fn outcome_of(
 }
 
 /// The truth within a fixed window.
-pub(crate) fn in_window<'a>(run: &'a Run, window: &WindowRule) -> &'a [Truth] {
+pub(crate) fn truth_in_window<'a>(run: &'a Run, window: &WindowRule) -> &'a [Truth] {
     let (start_s, end_s) = match window {
         WindowRule::Fixed { start_s, end_s } => (*start_s, *end_s),
         WindowRule::Auto => (0.0, f64::INFINITY),
@@ -92,11 +92,11 @@ pub(crate) fn in_window<'a>(run: &'a Run, window: &WindowRule) -> &'a [Truth] {
 }
 
 /// Identifies every run.
-pub(crate) fn outcomes(runs: &[Run], config: &IdentifyConfig) -> Result<Vec<Outcome>, ReproduceError> {
-    runs.iter().map(|run| outcome(run, config)).collect()
+pub(crate) fn identify_runs(runs: &[Run], config: &IdentifyConfig) -> Result<Vec<Outcome>, ReproduceError> {
+    runs.iter().map(|run| identify_run(run, config)).collect()
 }
 
-/// Smallest and largest of the values that are there; `None` for none.
+/// Smallest and largest of the present values; `None` for none.
 pub(crate) fn extremes(values: impl IntoIterator<Item = Option<f64>>) -> Option<(f64, f64)> {
     values.into_iter().flatten().fold(None, |range, value| {
         let (low, high) = range.unwrap_or((value, value));
@@ -104,12 +104,12 @@ pub(crate) fn extremes(values: impl IntoIterator<Item = Option<f64>>) -> Option<
     })
 }
 
-/// Largest size of the values that are there; 0 for none.
+/// Largest size of the present values; 0 for none.
 pub(crate) fn worst(values: impl IntoIterator<Item = Option<f64>>) -> f64 {
     values.into_iter().flatten().fold(0.0, |worst, value| worst.max(value.abs()))
 }
 
-/// Root mean square of the values that are there; `None` for none.
+/// Root mean square of the present values; `None` for none.
 pub(crate) fn rms(values: impl IntoIterator<Item = Option<f64>>) -> Option<f64> {
     statistics::rms(values.into_iter().flatten())
 }

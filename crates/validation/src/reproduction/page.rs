@@ -44,7 +44,7 @@ exponent 1.13 of Appendix A (-0.2 to +0.3 %), not with the 0.8 of eq. 9 (1.6 to 
 Deviations: eq. 11 without its ratio of viscosities; k_bh constant at 47.5 W/(m K), the middle of Appendix A's 45 to 50.
 ";
 
-/// One figure for a program.
+/// One figure as JSON.
 pub fn figure_json(result: &FigureResult) -> serde_json::Value {
     serde_json::json!({
         "figure": result.number,

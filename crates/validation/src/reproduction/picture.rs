@@ -21,7 +21,7 @@ pub(crate) fn target_speeds_rpm() -> [f64; 4] {
     speeds
 }
 
-/// Points (model, identified) with colour, shape, whether hollow, and legend text.
+/// Points (model, identified) with colour, shape, hollow flag and legend text.
 pub(crate) type Series = (Vec<(f64, f64)>, Colour, Marker, bool, String);
 
 /// Identified against model values with the line of equality and, if given, a band of error around it.
@@ -51,12 +51,12 @@ pub(crate) fn equality_panel(
     panel
 }
 
-/// Efficiency in %: model (mean in the window) and identified, where it is.
+/// Efficiency in %: model (mean in the window) and identified, for outcomes with a result.
 pub(crate) fn efficiency_pair(outcome: &Outcome) -> Option<(f64, f64)> {
     Some((100.0 * outcome.eta_mean, 100.0 * outcome.point.eta?))
 }
 
-/// h in W/(m2 K): model (mean in the window) and identified, where it is.
+/// h in W/(m2 K): model (mean in the window) and identified, for outcomes with a result.
 pub(crate) fn h_pair(outcome: &Outcome) -> Option<(f64, f64)> {
     Some((outcome.h_mean_w_m2k, outcome.point.h_w_m2k?))
 }

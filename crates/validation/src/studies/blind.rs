@@ -1,12 +1,14 @@
-//! `study: blind`: cases drawn, recorded and diagnosed, the causes known to the score alone.
+//! `study: blind`: draws, records and diagnoses cases; only the score knows their causes.
 
 use crate::blind::scoring::score::score;
 use crate::blind::{
-    CaseKind, Draw, Laboratory, OutsideUse, SIGMA_RANGE, StoredCase, Truth, drawn, record, seal,
+    CaseKind, Draw, Laboratory, OutsideUse, SIGMA_RANGE, StoredCase, Truth, draw_cases, record, seal,
 };
 use crate::studies::error::StudyError;
 use crate::studies::source::CampaignSource;
-use mapper_fleet::{Draft, Drafts, FleetError, Kind, Output, Results, StudyFile, WorkContext, WorkError};
+use mapper_fleet::{
+    FleetError, ItemDraft, Kind, Output, Results, StudyDraft, StudyFile, WorkContext, WorkError,
+};
 use mapper_recording::ChannelMap;
 use mapper_session::{Recorded, Registry, Session, json_text};
 use schemars::JsonSchema;
@@ -38,10 +40,10 @@ struct BlindStudy {
     /// Number of cases.
     #[schemars(range(min = 1), example = 100)]
     cases: usize,
-    /// Kinds of cases (none, single, pair, outside, triple); the usual four if it is left out.
+    /// Kinds of cases (none, single, pair, outside, triple); the default is the first four.
     #[schemars(with = "Option<Vec<String>>", extend("examples" = [["single", "pair"]]))]
     kinds: Option<Vec<CaseKind>>,
-    /// Simulator that makes the recordings: virtual_lab (if it is left out) or other_lab, whose equations are not the model's.
+    /// Simulator that makes the recordings: virtual_lab (the default) or other_lab, whose equations are not the model's.
     #[serde(default)]
     #[schemars(with = "Option<String>", example = &"other_lab")]
     laboratory: Laboratory,
@@ -59,7 +61,7 @@ struct BlindItem {
     laboratory: Laboratory,
 }
 
-/// What became of it.
+/// Result of a case.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct BlindPart {
@@ -76,7 +78,7 @@ impl Kind for Blind<'_> {
         "cases with withheld causes, recorded, diagnosed and scored"
     }
 
-    fn items(&self, study: &StudyFile) -> Result<Drafts, FleetError> {
+    fn items(&self, study: &StudyFile) -> Result<StudyDraft, FleetError> {
         let file: BlindStudy = study.read()?;
         let (campaign, nominal) = CampaignSource::read(&study.sibling_path(&file.campaign), self.0)?;
         let sigma_range = file.sigmas.unwrap_or(SIGMA_RANGE);
@@ -92,8 +94,8 @@ impl Kind for Blind<'_> {
             laboratory: file.laboratory,
             ..Draw::new(file.seed, file.cases, OutsideUse::Check)
         };
-        let cases = drawn(&nominal, &self.0.effects, &draw).map_err(FleetError::kind)?;
-        let item = |case: &crate::blind::Case| Draft {
+        let cases = draw_cases(&nominal, &self.0.effects, &draw).map_err(FleetError::kind)?;
+        let item = |case: &crate::blind::Case| ItemDraft {
             name: case.name.clone(),
             payload: json!(BlindItem {
                 campaign: campaign.clone(),
@@ -101,7 +103,7 @@ impl Kind for Blind<'_> {
                 laboratory: file.laboratory
             }),
         };
-        Ok(Drafts {
+        Ok(StudyDraft {
             items: cases.iter().map(item).collect(),
             settings: json!({ "campaign": nominal.name, "laboratory": file.laboratory }),
         })
@@ -113,7 +115,7 @@ impl Kind for Blind<'_> {
         let case = case.case(&self.0.effects).map_err(StudyError::Cause)?;
         let file = at.scratch.join("case.mcap");
         let truth = record(&campaign, &case, laboratory, &file)?;
-        // As a user would diagnose it: from the file alone, which has no truth.
+        // The diagnosis reads the recording file, which has no truth, as for a user.
         let recorded = Recorded::read(self.0, &file, &ChannelMap::native(), Some(&campaign))?;
         let session = Session { stop: at.stop, ..Session::new(self.0) };
         let gap = session.diagnose_gap(
@@ -132,7 +134,7 @@ impl Kind for Blind<'_> {
             let Ok(body) = body else { continue };
             let spoilt = |source| StudyError::Content { name: name.clone(), source };
             let BlindPart { truth, diagnosis } = serde_json::from_str(&body).map_err(spoilt)?;
-            // It names a file: only as cases are named.
+            // The name becomes a file name, so only names of cases are accepted.
             if truth.name != name || !name.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_') {
                 return Err(spoilt(serde::de::Error::custom("it is another case")).into());
             }

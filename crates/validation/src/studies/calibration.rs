@@ -1,12 +1,14 @@
-//! `study: calibration`: the cases that turn scores into probabilities, as `mapper gap blind calibrate` draws them.
+//! `study: calibration`: the cases that `mapper gap blind calibrate` draws to convert scores into probabilities.
 
-use crate::blind::calibration::calibrate::{Calibrated, Observed, Plan, cases, fitted};
+use crate::blind::calibration::calibrate::{CalibrationSettings, DiagnosisSummary, Plan, cases, fitted};
 use crate::blind::scoring::reliability::{reliabilities, reliability_text};
 use crate::blind::{Case, StoredCase};
 use crate::studies::error::StudyError;
 use crate::studies::reliability_picture::reliability_svg;
 use crate::studies::source::CampaignSource;
-use mapper_fleet::{Draft, Drafts, FleetError, Kind, Output, Results, StudyFile, WorkContext, WorkError};
+use mapper_fleet::{
+    FleetError, ItemDraft, Kind, Output, Results, StudyDraft, StudyFile, WorkContext, WorkError,
+};
 use mapper_session::{Registry, json_text};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -59,41 +61,41 @@ impl Kind for Calibration<'_> {
         "the calibration of the diagnosis"
     }
 
-    fn items(&self, study: &StudyFile) -> Result<Drafts, FleetError> {
+    fn items(&self, study: &StudyFile) -> Result<StudyDraft, FleetError> {
         let file: CalibrationStudy = study.read()?;
         let path = study.sibling_path(&file.campaign);
         let (campaign, nominal) = CampaignSource::read(&path, self.0)?;
         let plan = Plan { seed: file.seed, nulls: file.nulls, others: file.cases };
         let drawn = cases(&nominal, &self.0.effects, &plan).map_err(FleetError::kind)?;
-        // Cases of both draws are counted from 0: distinguished by their place.
-        let item = |(place, case): (usize, &Case)| Draft {
+        // Both draws number their cases from 0; the position in the list distinguishes them.
+        let item = |(place, case): (usize, &Case)| ItemDraft {
             name: format!("{place:05} {}", case.kind.name()),
             payload: json!(CalibrationItem { campaign: campaign.clone(), case: StoredCase::from(case) }),
         };
         let items = drawn.iter().enumerate().map(item).collect();
         let settings = json!({ "made_by": plan.command(&path) });
-        Ok(Drafts { items, settings })
+        Ok(StudyDraft { items, settings })
     }
 
     fn work(&self, payload: &Value, _: WorkContext<'_>) -> Result<String, WorkError> {
         let CalibrationItem { campaign, case } = CalibrationItem::deserialize(payload)?;
         let campaign = campaign.campaign()?;
         let case = case.case(&self.0.effects).map_err(StudyError::Cause)?;
-        let observed = Calibrated::new(&campaign, &self.0.effects)?.observe(&case)?;
+        let observed = CalibrationSettings::new(&campaign, &self.0.effects)?.observe(&case)?;
         Ok(serde_json::to_string(&observed)?)
     }
 
     fn merge(&self, settings: &Value, parts: &mut Results<'_>, out: &Output) -> Result<String, FleetError> {
-        let mut observed: Vec<Observed> = Vec::new();
+        let mut observed: Vec<DiagnosisSummary> = Vec::new();
         for (name, body) in parts {
             let Ok(body) = body else { continue };
-            let found: Option<Observed> =
+            let found: Option<DiagnosisSummary> =
                 serde_json::from_str(&body).map_err(|source| StudyError::Content { name, source })?;
-            // What cannot be diagnosed is left out.
+            // Cases that cannot be diagnosed are omitted.
             observed.extend(found);
         }
         let made_by = settings["made_by"].as_str().unwrap_or_default().to_owned();
-        let made = calibrated(&observed, made_by)?;
+        let made = fit_calibration(&observed, made_by)?;
         for (name, text) in made.files {
             out.write(name, text.as_bytes())?;
         }
@@ -102,19 +104,22 @@ impl Kind for Calibration<'_> {
     }
 }
 
-/// What is made of the diagnoses of a study.
-pub struct Fitted {
+/// Result of a calibration study.
+pub struct CalibrationResult {
     /// Files by name: calibration, reliability and its picture.
     pub files: Vec<(&'static str, String)>,
     /// Their description.
     pub summary: String,
 }
 
-/// Fits the calibration to diagnoses, and says whether its probabilities hold.
+/// Fits the calibration to diagnoses, and checks the reliability of its probabilities.
 ///
 /// # Errors
-/// [`FleetError::Kind`] if the calibration that ships was spoilt.
-pub fn calibrated(observed: &[Observed], made_by: String) -> Result<Fitted, FleetError> {
+/// [`FleetError::Kind`] if the shipped calibration is damaged.
+pub fn fit_calibration(
+    observed: &[DiagnosisSummary],
+    made_by: String,
+) -> Result<CalibrationResult, FleetError> {
     let calibration = fitted(observed, made_by).map_err(FleetError::kind)?;
     let reliabilities = reliabilities(observed).map_err(FleetError::kind)?;
     let files = vec![
@@ -127,5 +132,5 @@ pub fn calibrated(observed: &[Observed], made_by: String) -> Result<Fitted, Flee
         observed.len(),
         reliability_text(&reliabilities).trim_end()
     );
-    Ok(Fitted { files, summary: description })
+    Ok(CalibrationResult { files, summary: description })
 }

@@ -1,4 +1,4 @@
-//! What only a kind finds wrong.
+//! Errors of the kinds of studies.
 
 use mapper_fleet::FleetError;
 use std::path::PathBuf;
@@ -7,7 +7,7 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
     /// The rig of a campaign is not simulated.
-    #[error("{}: its rig `{backend}` is not simulated; studies run on backends of this program alone", .campaign.display())]
+    #[error("{}: its rig `{backend}` is not simulated; studies run only on backends of this program", .campaign.display())]
     Rig {
         /// The campaign.
         campaign: PathBuf,
@@ -17,18 +17,18 @@ pub enum StudyError {
     /// A campaign that was checked when the study was made has mistakes now.
     #[error("the campaign of the item has mistakes: {0}")]
     Campaign(String),
-    /// An item asks for what the campaign may not name.
+    /// An item requests something that its campaign may not use.
     #[error("the item has no file {0}")]
     File(String),
     /// A cause that the program does not know.
     #[error("no effect `{0}` is in the catalogue")]
     Cause(String),
-    /// A part or an item does not hold what its kind writes.
-    #[error("{name} does not hold what it should: {source}")]
+    /// A part or an item has the wrong content for its kind.
+    #[error("{name} has the wrong content: {source}")]
     Content {
         /// The item.
         name: String,
-        /// Why.
+        /// The cause.
         source: serde_json::Error,
     },
 }

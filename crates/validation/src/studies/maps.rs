@@ -1,10 +1,12 @@
-//! `study: maps`: campaigns by seeds, each identified by methods and kept with all its points: coverage of intervals, tables
-//! over seeds, scatter compared with the prediction of the planner.
+//! `study: maps`: campaigns repeated with several seeds and identified by several methods. All points are kept, for the coverage of
+//! intervals, tables over seeds, and the scatter compared with the planner's prediction.
 
 use crate::studies::error::StudyError;
 use crate::studies::source::CampaignSource;
 use mapper_core::Method;
-use mapper_fleet::{Draft, Drafts, FleetError, Kind, Output, Results, StudyFile, WorkContext, WorkError};
+use mapper_fleet::{
+    FleetError, ItemDraft, Kind, Output, Results, StudyDraft, StudyFile, WorkContext, WorkError,
+};
 use mapper_session::{ErrorKind, NightlyRun, Registry, Session, SessionError, nominal_model};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -14,7 +16,7 @@ use std::path::PathBuf;
 /// Scored maps.
 pub struct Maps<'a>(pub &'a Registry);
 
-/// Maps of campaigns, each with seeds, each recording identified by methods.
+/// Maps of campaigns, for each seed and each identification method.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct MapsStudy {
@@ -29,10 +31,10 @@ struct MapsStudy {
     /// The campaigns, from this file.
     #[schemars(length(min = 1), extend("examples" = [["../turbo_a.yaml"]]))]
     campaigns: Vec<PathBuf>,
-    /// Seeds, whole numbers from 0; each campaign's own if they are left out.
+    /// Seeds, whole numbers from 0; the default is each campaign's own.
     #[schemars(extend("uniqueItems" = true, "examples" = [[1, 2, 3]]))]
     seeds: Option<Vec<u64>>,
-    /// Methods by which each recording is identified; each campaign's own if they are left out.
+    /// Methods by which each recording is identified; the default is each campaign's own.
     #[schemars(with = "Option<Vec<String>>", extend("uniqueItems" = true, "examples" = [["joint", "dynamic"]]))]
     methods: Option<Vec<Method>>,
 }
@@ -58,19 +60,19 @@ impl Kind for Maps<'_> {
         "campaigns by seeds and methods, with all points"
     }
 
-    fn items(&self, study: &StudyFile) -> Result<Drafts, FleetError> {
+    fn items(&self, study: &StudyFile) -> Result<StudyDraft, FleetError> {
         let file: MapsStudy = study.read()?;
         let mut items = Vec::new();
         for path in &file.campaigns {
             let (source, campaign) = CampaignSource::read(&study.sibling_path(path), self.0)?;
-            let own = campaign.identification.method;
+            let declared_method = campaign.identification.method;
             for seed in file.seeds.clone().unwrap_or_else(|| vec![campaign.seed]) {
-                let methods = file.methods.clone().unwrap_or_else(|| vec![own]);
+                let methods = file.methods.clone().unwrap_or_else(|| vec![declared_method]);
                 let payload = json!(MapsItem { campaign: source.clone(), seed, methods });
-                items.push(Draft { name: format!("{} seed {seed}", campaign.name), payload });
+                items.push(ItemDraft { name: format!("{} seed {seed}", campaign.name), payload });
             }
         }
-        Ok(Drafts { items, settings: Value::Null })
+        Ok(StudyDraft { items, settings: Value::Null })
     }
 
     fn work(&self, payload: &Value, at: WorkContext<'_>) -> Result<String, WorkError> {
@@ -91,7 +93,7 @@ impl Kind for Maps<'_> {
     }
 
     fn merge(&self, _: &Value, parts: &mut Results<'_>, out: &Output) -> Result<String, FleetError> {
-        // As text: points of ten thousand maps need not be in memory as values.
+        // Points are kept as text, because those of ten thousand maps would need too much memory as values.
         let mut text = String::from("[\n");
         let mut maps = 0;
         for (name, body) in parts {

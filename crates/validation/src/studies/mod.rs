@@ -12,7 +12,7 @@ mod source;
 use mapper_fleet::Kind;
 use mapper_session::Registry;
 
-pub use calibration::{Fitted, calibrated};
+pub use calibration::{CalibrationResult, fit_calibration};
 pub use nightly::rows_of;
 pub use program::program;
 

@@ -6,7 +6,7 @@ use crate::studies::source::CampaignSource;
 use mapper_campaign::load_nightly;
 use mapper_core::Method;
 use mapper_fleet::{
-    Draft, Drafts, Fleet, FleetError, Kind, Output, Results, StudyFile, WorkContext, WorkError,
+    Fleet, FleetError, ItemDraft, Kind, Output, Results, StudyDraft, StudyFile, WorkContext, WorkError,
 };
 use mapper_history::RunRow;
 use mapper_session::{
@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 /// Nightly maps.
 pub struct Nightly<'a>(pub &'a Registry);
 
-/// The runs of a nightly campaign, in many pieces.
+/// The runs of a nightly campaign, one item each.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct NightlyStudy {
@@ -61,7 +61,7 @@ impl Kind for Nightly<'_> {
         "the maps of a nightly campaign"
     }
 
-    fn items(&self, study: &StudyFile) -> Result<Drafts, FleetError> {
+    fn items(&self, study: &StudyFile) -> Result<StudyDraft, FleetError> {
         let file = study.sibling_path(&study.read::<NightlyStudy>()?.nightly);
         let nightly = load_nightly(&file).map_err(FleetError::kind)?;
         let night = PreparedNight::new(&nightly).map_err(FleetError::kind)?;
@@ -74,10 +74,10 @@ impl Kind for Nightly<'_> {
             let campaign = sources.get(&run.campaign.name)?.clone();
             let (method, seed) = (run.campaign.identification.method, run.campaign.seed);
             let payload = json!(NightlyItem { campaign, method, seed, machine: run.machine.clone() });
-            Some(Draft { name: run.key.to_string(), payload })
+            Some(ItemDraft { name: run.key.to_string(), payload })
         };
         let items = night.runs().iter().filter_map(item).collect();
-        Ok(Drafts { items, settings: json!({ "night": nightly.name }) })
+        Ok(StudyDraft { items, settings: json!({ "night": nightly.name }) })
     }
 
     fn work(&self, payload: &Value, at: WorkContext<'_>) -> Result<String, WorkError> {

@@ -1,4 +1,4 @@
-//! What items and parts carry as their program.
+//! Identification of the program in items and parts.
 
 use mapper_session::{Registry, program_and_commit};
 

@@ -1,4 +1,4 @@
-//! A campaign as an item carries it: its text, and those of the files that it names.
+//! A campaign inside an item: its text, and the text of the files that it names.
 
 use crate::studies::error::StudyError;
 use mapper_campaign::{Campaign, CampaignError, check_with, load, read_named_file, read_text};
@@ -10,23 +10,23 @@ use std::io::{Error, ErrorKind};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// Everything that a campaign is read from.
+/// All input files of a campaign.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CampaignSource {
     /// The file.
     text: String,
-    /// Files that it names, from its folder.
+    /// The files that it names, relative to its folder.
     files: BTreeMap<PathBuf, String>,
 }
 
 impl CampaignSource {
-    /// Reads a campaign, and keeps what was read.
+    /// Reads a campaign and its files.
     ///
     /// # Errors
-    /// [`FleetError::Kind`] with all mistakes of the campaign, or that its rig is not simulated.
+    /// [`FleetError::Kind`] with all mistakes of the campaign, or if its rig is not simulated.
     pub fn read(path: &Path, registry: &Registry) -> Result<(CampaignSource, Campaign), FleetError> {
-        // All mistakes, in the words of every other command.
+        // All mistakes, as every other command reports them.
         let campaign = load(path).map_err(FleetError::kind)?;
         let backend = &campaign.backend.name;
         if !registry.backends.iter().any(|plugin| plugin.name == backend) {
@@ -47,7 +47,7 @@ impl CampaignSource {
         Ok((CampaignSource { text, files }, campaign))
     }
 
-    /// The campaign. It was checked when the study was made; its points are not judged again.
+    /// Parses the campaign. Its points are not checked again, because they were checked when the study was made.
     ///
     /// # Errors
     /// [`StudyError::Campaign`].

@@ -5,7 +5,7 @@ use mapper_campaign::Campaign;
 use mapper_core::Channel;
 use mapper_recording::{ChannelMap, ReadOptions, read_recording};
 use mapper_validation::blind::{
-    ANSWERS_NAME, BlindError, Draw, Made, OutsideUse, Share, Truth, make, scoring::score,
+    ANSWERS_NAME, BlindError, CreatedCases, Draw, OutsideUse, Share, Truth, make, scoring::score,
 };
 use serde_json::json;
 use std::path::Path;
@@ -18,7 +18,7 @@ fn campaign() -> Campaign {
     campaign
 }
 
-fn made(seed: u64, cases: usize, directory: &Path) -> Made {
+fn made(seed: u64, cases: usize, directory: &Path) -> CreatedCases {
     let draw = Draw::new(seed, cases, OutsideUse::Check);
     make(&campaign(), &mapper_effects::catalogue(), &draw, directory, &|_| {}).unwrap()
 }

@@ -61,7 +61,7 @@ impl Instrument {
     /// Sends a request and reads its answer. A failure closes the connection: a late answer would be taken for the next one.
     fn request(&mut self, code: Code, channel: u8) -> Result<Answer, RequestError> {
         let within = Duration::from_secs_f64(self.settings.timeout_s());
-        let until = Instant::now() + within;
+        let deadline = Instant::now() + within;
         let mut stream = match self.stream.take() {
             Some(stream) => stream,
             None => TcpStream::connect_timeout(&self.settings.address, within)?,
@@ -70,7 +70,7 @@ impl Instrument {
         stream.write_all(&write_request(code, channel, ""))?;
         let (mut assembler, mut bytes) = (Assembler::default(), [0u8; 512]);
         loop {
-            let left = until.saturating_duration_since(Instant::now());
+            let left = deadline.saturating_duration_since(Instant::now());
             if left.is_zero() {
                 return Err(RequestError::Late(code));
             }
@@ -88,11 +88,11 @@ impl Instrument {
                 }
                 Err(error) => return Err(error.into()),
             };
-            let whole = bytes.iter().take(count).find_map(|byte| assembler.push(*byte));
-            if let Some(body) = whole {
-                let found = parse_answer(&body, code)?;
+            let complete = bytes.iter().take(count).find_map(|byte| assembler.push(*byte));
+            if let Some(body) = complete {
+                let answer = parse_answer(&body, code)?;
                 self.stream = Some(stream);
-                return Ok(found);
+                return Ok(answer);
             }
         }
     }
@@ -120,8 +120,8 @@ impl Backend for Instrument {
             return Err(BackendError::OutOfOrder { call: "arm", state: "armed", needed: "not armed" });
         }
         for (code, channel) in self.requests.keys().copied().collect::<Vec<_>>() {
-            let asked = self.request(code, channel);
-            asked.map_err(|error| BackendError::Lost { t_s: 0.0, source: Box::new(error) })?;
+            let requested = self.request(code, channel);
+            requested.map_err(|error| BackendError::Lost { t_s: 0.0, source: Box::new(error) })?;
         }
         self.armed = Some(Armed { sequence: 0, last_s: -1.0, error: 0 });
         Ok(())
@@ -141,12 +141,12 @@ impl Backend for Instrument {
         }
         (armed.last_s, armed.sequence) = (until_s, first_sequence + 1);
         let (mut values, mut error) = (BTreeMap::<Channel, f64>::new(), before);
-        for ((code, channel), places) in self.requests.clone() {
+        for ((code, channel), numbers) in self.requests.clone() {
             // If the instrument does not answer, the sample has no readings, and the guards count how long that lasts.
-            let Ok(found) = self.request(code, channel) else { continue };
-            error = found.error;
-            for (channel, place) in places {
-                let value = found.number(place.value).map(|number| number * place.scale + place.offset);
+            let Ok(answer) = self.request(code, channel) else { continue };
+            error = answer.error;
+            for (channel, entry) in numbers {
+                let value = answer.number(entry.value).map(|number| number * entry.scale + entry.offset);
                 values.insert(channel, value.filter(|value| value.is_finite()).unwrap_or(f64::NAN));
             }
         }

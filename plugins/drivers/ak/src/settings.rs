@@ -26,13 +26,13 @@ pub(crate) struct Settings {
     timeout: Option<Quantity<Duration>>,
     /// Location of each channel.
     #[serde(deserialize_with = "mapper_driver::by_channel")]
-    pub(crate) read: BTreeMap<Channel, Place>,
+    pub(crate) read: BTreeMap<Channel, AnswerNumber>,
 }
 
 /// A number in an answer; the SI value is the number times `scale` plus `offset`.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Place {
+pub(crate) struct AnswerNumber {
     /// Request code that begins with A, such as AKON.
     pub(crate) code: String,
     /// Channel of the instrument; 0 is the instrument as a whole.
@@ -41,7 +41,7 @@ pub(crate) struct Place {
     /// Position of the number in the answer, from 1.
     #[serde(default = "first")]
     pub(crate) value: usize,
-    #[serde(default = "one")]
+    #[serde(default = "default_scale")]
     pub(crate) scale: f64,
     #[serde(default)]
     pub(crate) offset: f64,
@@ -51,7 +51,7 @@ fn first() -> usize {
     1
 }
 
-fn one() -> f64 {
+fn default_scale() -> f64 {
     1.0
 }
 
@@ -82,13 +82,13 @@ pub(crate) enum SettingError {
     Nothing,
 }
 
-fn wrong(path: impl Into<String>, error: SettingError) -> BackendError {
+fn settings_error(path: impl Into<String>, error: SettingError) -> BackendError {
     BackendError::Settings { backend: NAME.to_owned(), path: path.into(), source: Box::new(error) }
 }
 
 fn within(path: &str, value: f64, unit: &'static str, low: f64, high: f64) -> Result<(), BackendError> {
     let error = SettingError::Outside { value, unit, low, high };
-    (low..=high).contains(&value).then_some(()).ok_or_else(|| wrong(path, error))
+    (low..=high).contains(&value).then_some(()).ok_or_else(|| settings_error(path, error))
 }
 
 impl Settings {
@@ -96,32 +96,35 @@ impl Settings {
     pub(crate) fn read(value: &Value) -> Result<(Settings, Requests), BackendError> {
         let settings: Settings = serde_path_to_error::deserialize(value).map_err(|error| {
             let path = error.path().to_string();
-            wrong(path.trim_start_matches('.'), SettingError::Form(error.into_inner()))
+            settings_error(path.trim_start_matches('.'), SettingError::Form(error.into_inner()))
         })?;
         within("rate", settings.rate_hz(), "Hz", 0.1, MAX_HZ)?;
         within("timeout", settings.timeout_s(), "s", 0.01, 0.8)?;
         let mut requests = Requests::new();
-        for (channel, place) in &settings.read {
+        for (channel, number) in &settings.read {
             let path = format!("read.{channel}");
-            if !(1e-12..=1e12).contains(&place.scale.abs()) {
-                return Err(wrong(format!("{path}.scale"), SettingError::Scale(place.scale)));
+            if !(1e-12..=1e12).contains(&number.scale.abs()) {
+                return Err(settings_error(format!("{path}.scale"), SettingError::Scale(number.scale)));
             }
-            within(&format!("{path}.value"), place.value as f64, "", 1.0, 1000.0)?;
-            let code: Code = place.code.parse().map_err(|error: TelegramError| wrong(&path, error.into()))?;
+            within(&format!("{path}.value"), number.value as f64, "", 1.0, 1000.0)?;
+            let code: Code =
+                number.code.parse().map_err(|error: TelegramError| settings_error(&path, error.into()))?;
             if !code.is_read_request() {
-                return Err(wrong(path, SettingError::Controls(code)));
+                return Err(settings_error(path, SettingError::Controls(code)));
             }
-            let asked = requests.entry((code, place.channel)).or_default();
-            if let Some((other, _)) = asked.iter().find(|(_, other)| other.value == place.value) {
-                return Err(wrong(path, SettingError::ReadTwice(*other)));
+            let channels_of_request = requests.entry((code, number.channel)).or_default();
+            if let Some((other, _)) =
+                channels_of_request.iter().find(|(_, other)| other.value == number.value)
+            {
+                return Err(settings_error(path, SettingError::ReadTwice(*other)));
             }
-            asked.push((*channel, place.clone()));
+            channels_of_request.push((*channel, number.clone()));
         }
         let rate_hz = settings.rate_hz();
         match requests.len() {
-            0 => Err(wrong("read", SettingError::Nothing)),
+            0 => Err(settings_error("read", SettingError::Nothing)),
             count if count as f64 * rate_hz > MAX_HZ => {
-                Err(wrong("rate", SettingError::TooMany { requests: count, rate_hz }))
+                Err(settings_error("rate", SettingError::TooMany { requests: count, rate_hz }))
             }
             _ => Ok((settings, requests)),
         }
@@ -139,4 +142,4 @@ impl Settings {
 }
 
 /// Code and channel of each request, and the position of each mapper channel in its answer.
-pub(crate) type Requests = BTreeMap<(Code, u8), Vec<(Channel, Place)>>;
+pub(crate) type Requests = BTreeMap<(Code, u8), Vec<(Channel, AnswerNumber)>>;

@@ -54,10 +54,10 @@ pub enum TelegramError {
     #[error("the instrument does not know {0}")]
     Unknown(Code),
     /// The answer belongs to another request.
-    #[error("the answer is to {found}, not to {asked}")]
+    #[error("the answer is to {found}, not to {requested}")]
     Other {
         /// The requested code.
-        asked: Code,
+        requested: Code,
         /// The code in the answer.
         found: String,
     },
@@ -89,8 +89,8 @@ pub struct Answer {
 
 impl Answer {
     /// The number at this position, from 1; `None` if it is missing or marked invalid by `#`.
-    pub fn number(&self, place: usize) -> Option<f64> {
-        let word = self.words.get(place.checked_sub(1)?)?;
+    pub fn number(&self, position: usize) -> Option<f64> {
+        let word = self.words.get(position.checked_sub(1)?)?;
         // Rust parses "inf" and "nan" as numbers, but instruments do not write them.
         let plain = word.bytes().all(|byte| byte.is_ascii_digit() || b"+-.eE".contains(&byte));
         word.parse::<f64>().ok().filter(|number| plain && number.is_finite())
@@ -101,16 +101,16 @@ impl Answer {
 ///
 /// # Errors
 /// [`TelegramError`] if the body is not an answer, or answers another request.
-pub fn parse_answer(body: &[u8], asked: Code) -> Result<Answer, TelegramError> {
+pub fn parse_answer(body: &[u8], requested: Code) -> Result<Answer, TelegramError> {
     let malformed = || TelegramError::Malformed(String::from_utf8_lossy(body).into_owned());
     let (Some(code), Some(b' '), Some(status)) = (body.get(1..5), body.get(5), body.get(6)) else {
         return Err(malformed());
     };
     if code == UNKNOWN {
-        return Err(TelegramError::Unknown(asked));
+        return Err(TelegramError::Unknown(requested));
     }
-    if code != asked.0 {
-        return Err(TelegramError::Other { asked, found: String::from_utf8_lossy(code).into_owned() });
+    if code != requested.0 {
+        return Err(TelegramError::Other { requested, found: String::from_utf8_lossy(code).into_owned() });
     }
     let data = body.get(7..).unwrap_or_default();
     let separated = data.first().is_none_or(|byte| b" \r\n".contains(byte));
@@ -207,7 +207,7 @@ mod tests {
     fn numbers_are_read_by_position() {
         let found = bodies(b"\x020AKON 3 12.5 -1.25E+02\r\n#7.0 0 inf\x03");
         let answer = parse_answer(&found[0], code("AKON")).unwrap();
-        let numbers: Vec<_> = (0..=6).map(|place| answer.number(place)).collect();
+        let numbers: Vec<_> = (0..=6).map(|position| answer.number(position)).collect();
         assert_eq!(numbers, [None, Some(12.5), Some(-125.0), None, Some(0.0), None, None]);
         assert_eq!(answer.error, 3);
     }
@@ -244,7 +244,7 @@ mod tests {
             let words: Vec<String> = numbers.iter().map(|number| number.to_string()).collect();
             let found = bodies(&write_answer(Some(code("AKON")), &words));
             let answer = parse_answer(&found[0], code("AKON")).unwrap();
-            let read: Vec<f64> = (1..=numbers.len()).filter_map(|place| answer.number(place)).collect();
+            let read: Vec<f64> = (1..=numbers.len()).filter_map(|position| answer.number(position)).collect();
             prop_assert_eq!(read, numbers);
         }
     }

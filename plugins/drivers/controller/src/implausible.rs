@@ -7,7 +7,7 @@ use mapper_core::{Channel, measurable};
 /// Readings that no sensor can deliver.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "{channel} reads {} {unit} from {place}; plausible are {} to {} {unit}{}. {remedy}. No setpoint was written",
+    "{channel} reads {} {unit} from {source_text}; plausible are {} to {} {unit}{}. {remedy}. No setpoint was written",
     format_short(*.value),
     format_short(*.low),
     format_short(*.high),
@@ -20,7 +20,7 @@ pub(crate) struct ImplausibleReading {
     unit: &'static str,
     low: f64,
     high: f64,
-    place: String,
+    source_text: String,
     /// The others.
     others: Vec<Channel>,
     remedy: String,
@@ -42,11 +42,12 @@ pub fn format_short(value: f64) -> String {
         0.0 => "0".to_owned(),
         size if (1e-3..1e7).contains(&size) => {
             // Digits before the decimal point are never rounded away.
-            let behind = (3.0 - size.log10().floor()).max(0.0);
-            let text = format!("{value:.0$}", behind as usize);
-            match text.contains('.') {
-                true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
-                false => text,
+            let decimals = (3.0 - size.log10().floor()).max(0.0);
+            let text = format!("{value:.0$}", decimals as usize);
+            if text.contains('.') {
+                text.trim_end_matches('0').trim_end_matches('.').to_owned()
+            } else {
+                text
             }
         }
         _ => format!("{value:.3e}"),
@@ -63,8 +64,8 @@ pub(crate) fn check(
     controller: &impl Controller,
     readings: impl Iterator<Item = (Channel, f64)>,
 ) -> Result<(), Box<ImplausibleReading>> {
-    let mut found = readings.filter(|(channel, value)| !is_plausible(*channel, *value));
-    let Some((channel, value)) = found.next() else { return Ok(()) };
+    let mut implausible = readings.filter(|(channel, value)| !is_plausible(*channel, *value));
+    let Some((channel, value)) = implausible.next() else { return Ok(()) };
     let range = measurable(channel.info().dimension);
     Err(Box::new(ImplausibleReading {
         channel,
@@ -72,8 +73,8 @@ pub(crate) fn check(
         unit: channel.unit(),
         low: *range.start(),
         high: *range.end(),
-        place: controller.place(channel),
-        others: found.map(|(channel, _)| channel).collect(),
+        source_text: controller.describe_source(channel),
+        others: implausible.map(|(channel, _)| channel).collect(),
         remedy: controller.remedy(),
     }))
 }
@@ -84,7 +85,7 @@ mod tests {
 
     #[test]
     fn numbers_are_printed_with_few_digits() {
-        for (value, words) in [
+        for (value, expected) in [
             (128_426_750.014_884_53, "1.284e8"),
             (2.26e-27, "2.260e-27"),
             (101_325.25, "101325"),
@@ -94,7 +95,7 @@ mod tests {
             (0.5, "0.5"),
             (0.0, "0"),
         ] {
-            assert_eq!(format_short(value), words);
+            assert_eq!(format_short(value), expected);
         }
     }
 }

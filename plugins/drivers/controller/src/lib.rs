@@ -12,7 +12,8 @@ mod rig;
 
 pub use implausible::{format_short, is_plausible};
 pub use limits::{
-    Accepts, LimitError, REQUIRED_GUARDS, Safe, Target, check_range, check_resolution, check_scale,
+    AcceptedRanges, LimitError, REQUIRED_GUARDS, SafeSettings, Target, check_range, check_resolution,
+    check_scale,
 };
 pub use rig::{Reading, Stand, rig};
 
@@ -40,7 +41,7 @@ pub trait Controller: Send {
     fn write(&mut self, values: &[(Target, f64)]) -> Result<(), Self::Error>;
 
     /// Address and number format of a channel, for messages.
-    fn place(&self, channel: Channel) -> String;
+    fn describe_source(&self, channel: Channel) -> String;
 
     /// Settings to check if the last readings are implausible; a sentence without its full stop.
     fn remedy(&self) -> String;

@@ -49,7 +49,7 @@ pub(crate) const MAX_HEARTBEAT: u16 = 9999;
 /// Setpoint ranges that a rig accepts.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Accepts {
+pub struct AcceptedRanges {
     /// Minimum and maximum.
     pub p3: [Quantity<Pressure>; 2],
     /// Minimum and maximum.
@@ -60,7 +60,7 @@ pub struct Accepts {
     pub oil_temperature: [Quantity<Temperature>; 2],
 }
 
-impl Accepts {
+impl AcceptedRanges {
     /// The permitted range, SI.
     pub fn range(&self, target: Target) -> SetpointRange {
         let (low, high) = match target {
@@ -88,7 +88,7 @@ impl Accepts {
 /// The safe trajectory.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Safe {
+pub struct SafeSettings {
     /// Maximum rate of fall of P3; without it the air is cut at once.
     pub pressure_slew: Option<Quantity<PressureRate>>,
     /// Valve opening during the run-down.
@@ -97,7 +97,7 @@ pub struct Safe {
     pub within: Quantity<Duration>,
 }
 
-impl Safe {
+impl SafeSettings {
     /// The trajectory for the rig's description.
     pub fn trajectory(&self) -> SafeTrajectory {
         SafeTrajectory {
@@ -152,10 +152,7 @@ const MAX_STEP_RATIO: f64 = 0.05;
 /// # Errors
 /// [`LimitError::Scale`], also for 0 and NaN.
 pub fn check_scale(scale: f64) -> Result<f64, LimitError> {
-    match (1e-12..=1e12).contains(&scale.abs()) {
-        true => Ok(scale),
-        false => Err(LimitError::Scale(scale)),
-    }
+    if (1e-12..=1e12).contains(&scale.abs()) { Ok(scale) } else { Err(LimitError::Scale(scale)) }
 }
 
 /// Checks the resolution of a setpoint that is written as a whole number; `step` is its increment, SI.
@@ -176,8 +173,9 @@ pub fn check_resolution(target: Target, step: f64, range: SetpointRange) -> Resu
 /// # Errors
 /// [`LimitError::Outside`], also for NaN.
 pub fn check_range(value: f64, unit: &'static str, low: f64, high: f64) -> Result<f64, LimitError> {
-    match (low..=high).contains(&value) {
-        true => Ok(value),
-        false => Err(LimitError::Outside { value, unit, low, high }),
+    if (low..=high).contains(&value) {
+        Ok(value)
+    } else {
+        Err(LimitError::Outside { value, unit, low, high })
     }
 }

@@ -1,6 +1,8 @@
 //! The rig behind a controller.
 
-use crate::limits::{Accepts, LimitError, MAX_HEARTBEAT, REQUIRED_GUARDS, Safe, Target, check_range};
+use crate::limits::{
+    AcceptedRanges, LimitError, MAX_HEARTBEAT, REQUIRED_GUARDS, SafeSettings, Target, check_range,
+};
 use crate::{Controller, implausible};
 use mapper_core::{
     Backend, BackendError, Channel, ChannelColumn, Event, EventKind, Provenance, Quality, RigDescription,
@@ -50,9 +52,9 @@ pub struct Stand {
     /// Channels to read.
     pub channels: Vec<Channel>,
     /// Accepted setpoints.
-    pub accepts: Accepts,
+    pub accepts: AcceptedRanges,
     /// The safe trajectory.
-    pub safe: Safe,
+    pub safe: SafeSettings,
 }
 
 impl Stand {
@@ -161,7 +163,13 @@ impl<C: Controller> Rig<C> {
     }
 
     fn channels(&self) -> Vec<Channel> {
-        self.stand.channels.iter().copied().filter(|one| !COMMANDS.contains(one)).chain(COMMANDS).collect()
+        self.stand
+            .channels
+            .iter()
+            .copied()
+            .filter(|measured| !COMMANDS.contains(measured))
+            .chain(COMMANDS)
+            .collect()
     }
 }
 
@@ -179,7 +187,7 @@ fn command(channel: Channel, setpoints: Option<Setpoints>) -> f64 {
 fn provenance(readings: &BTreeMap<Channel, Reading>, t_s: f64) -> Vec<Provenance> {
     let needs_provenance =
         |reading: &Reading| reading.source_t_s.is_some() || reading.quality != Quality::Good;
-    let of = |(channel, reading): (&Channel, &Reading)| Provenance {
+    let provenance_of = |(channel, reading): (&Channel, &Reading)| Provenance {
         channel: *channel,
         source_t_s: vec![reading.source_t_s.unwrap_or(t_s)],
         quality: vec![reading.quality],
@@ -187,7 +195,7 @@ fn provenance(readings: &BTreeMap<Channel, Reading>, t_s: f64) -> Vec<Provenance
     readings
         .iter()
         .filter(|(channel, reading)| needs_provenance(reading) && !COMMANDS.contains(channel))
-        .map(of)
+        .map(provenance_of)
         .collect()
 }
 
@@ -226,11 +234,11 @@ impl<C: Controller> Backend for Rig<C> {
         }
         let heater_off_k = self.heater_off_k();
         // A killed driver may have left the air on, and a heartbeat must not restore it.
-        let begun = self
+        let outputs_off = self
             .controller
             .write(&[(Target::Air, 0.0), (Target::T3, heater_off_k)])
             .and_then(|()| self.controller.write(&[(Target::Heartbeat, 0.0)]));
-        if let Err(error) = begun {
+        if let Err(error) = outputs_off {
             self.controller.close();
             return Err(self.lost(error));
         }
@@ -258,7 +266,7 @@ impl<C: Controller> Backend for Rig<C> {
             (Target::T3, if on { setpoints.t3_k } else { self.heater_off_k() }),
             (Target::OilTemperature, setpoints.oil_temperature_k),
         ];
-        // Air off goes first, air on last.
+        // Air off is written first, air on last.
         let off = (!on).then_some((Target::Air, 0.0));
         let on = on.then_some((Target::Air, 1.0));
         let values: Vec<_> = off.into_iter().chain(values).chain(on).collect();
@@ -280,9 +288,10 @@ impl<C: Controller> Backend for Rig<C> {
         // If the controller does not answer, the sample has no readings, and the guards count how long that lasts.
         let readings = self.controller.read(until_s);
         let column = |channel: Channel| {
-            let value = match COMMANDS.contains(&channel) {
-                true => command(channel, setpoints),
-                false => readings.get(&channel).map_or(f64::NAN, |reading| reading.value),
+            let value = if COMMANDS.contains(&channel) {
+                command(channel, setpoints)
+            } else {
+                readings.get(&channel).map_or(f64::NAN, |reading| reading.value)
             };
             ChannelColumn { channel, values: vec![value] }
         };

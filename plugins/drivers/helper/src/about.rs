@@ -36,8 +36,8 @@ impl About {
         };
         #[cfg(unix)]
         if argument == SOCKET {
-            let mut more = std::env::args_os().skip(2);
-            if let (Some(path), None) = (more.next(), more.next()) {
+            let mut arguments = std::env::args_os().skip(2);
+            if let (Some(path), None) = (arguments.next(), arguments.next()) {
                 return crate::serve_at(path.as_ref(), self.name, self.version, open);
             }
         }
@@ -45,13 +45,13 @@ impl About {
             Some("--help" | "-h" | "help") => print(&mut std::io::stdout(), &self.help()),
             Some("--version" | "-V") => print(&mut std::io::stdout(), &self.title()),
             _ => {
-                let words = format!(
+                let text = format!(
                     "error: mapper-backend-{} takes no argument `{}`\n\n{}",
                     self.name,
                     argument.display(),
                     self.help()
                 );
-                print(&mut std::io::stderr(), &words);
+                print(&mut std::io::stderr(), &text);
                 return ExitCode::from(WRONG_ARGUMENTS);
             }
         }
@@ -81,6 +81,6 @@ impl About {
 }
 
 /// Prints the text; if the stream is closed, it is lost.
-fn print(out: &mut impl Write, words: &str) {
-    let _ = writeln!(out, "{words}");
+fn print(out: &mut impl Write, text: &str) {
+    let _ = writeln!(out, "{text}");
 }

@@ -36,7 +36,7 @@ mod tests {
         let read = |value: Value| address(value).map_err(|error: serde_json::Error| error.to_string());
         assert_eq!(read(json!("127.0.0.1:5020")).unwrap(), SocketAddr::from(([127, 0, 0, 1], 5020)));
         assert!(read(json!("[::1]:5020")).unwrap().is_ipv6());
-        for (text, words) in [
+        for (text, expected) in [
             ("localhost:5021", "`localhost:5021` is a name"),
             ("localhost:5021", "here 127.0.0.1:5021"),
             ("plc.cell3:502", "`getent hosts plc.cell3`"),
@@ -44,7 +44,7 @@ mod tests {
             ("127.0.0.1:99999", "192.168.0.7:502"),
         ] {
             let message = read(json!(text)).unwrap_err();
-            assert!(message.contains(words), "{message}");
+            assert!(message.contains(expected), "{message}");
         }
     }
 }

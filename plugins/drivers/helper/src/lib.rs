@@ -25,7 +25,7 @@ mod address;
 mod armed;
 mod by_channel;
 mod descent;
-mod outlet;
+mod output_queue;
 mod pipes;
 mod refusal;
 mod secret;

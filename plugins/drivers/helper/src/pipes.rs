@@ -1,7 +1,7 @@
 //! Standard input and output.
 
 use crate::Open;
-use crate::outlet::Outlet;
+use crate::output_queue::OutputQueue;
 use crate::server::Server;
 use crate::serving::{QUEUE_LENGTH, forward_messages, forward_signals, new_session_name, serve_one};
 use std::io::Write;
@@ -15,8 +15,8 @@ pub fn serve(name: &'static str, version: &'static str, open: impl Open + 'stati
     if forward_messages(std::io::stdin(), sender.clone()).and_then(|()| forward_signals(sender)).is_err() {
         return ExitCode::FAILURE;
     }
-    let Ok(outlet) = frame_output().and_then(Outlet::into_pipe) else { return ExitCode::FAILURE };
-    serve_one(Server::new(name, version, new_session_name(), Box::new(open)), &events, &outlet);
+    let Ok(output) = frame_output().and_then(OutputQueue::into_pipe) else { return ExitCode::FAILURE };
+    serve_one(Server::new(name, version, new_session_name(), Box::new(open)), &events, &output);
     ExitCode::SUCCESS
 }
 

@@ -5,8 +5,8 @@ use crate::descent::{Descent, make_safe};
 use crate::refusal::{Refusal, call_author_code, missing_settings, read_params, refusal, write_result};
 use mapper_core::{Backend, BackendError, RigDescription};
 use mapper_driver_host::protocol::{
-    Code, Configure, Described, FRAME_LIMIT_BYTES, Hello, LEASE_S, LastSample, MAGIC, Message, Poll, VERSION,
-    Welcome, setpoints, split_batch, write_description, write_error,
+    Code, Configure, DescribeResult, FRAME_LIMIT_BYTES, Hello, LEASE_S, LastSample, MAGIC, Message, Poll,
+    VERSION, Welcome, read_setpoints, split_batch, write_description, write_error,
 };
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
@@ -91,15 +91,15 @@ impl Server {
     }
 
     fn hello(&mut self, params: &Value) -> Result<Value, Refusal> {
-        let theirs: Hello = read_params(params)?;
-        if theirs.magic != MAGIC || theirs.protocol.major != VERSION.major {
+        let host: Hello = read_params(params)?;
+        if host.magic != MAGIC || host.protocol.major != VERSION.major {
             let (major, minor) = (VERSION.major, VERSION.minor);
             let message = format!("this driver uses version {major}.{minor} of the protocol {MAGIC}");
             return Err(refusal(Code::Refused, message));
         }
         self.has_hello = true;
         self.frame_limit_bytes =
-            theirs.frame_limit_bytes.max(mapper_driver_host::protocol::FIRST_FRAME_LIMIT_BYTES);
+            host.frame_limit_bytes.max(mapper_driver_host::protocol::FIRST_FRAME_LIMIT_BYTES);
         let hello = Hello {
             magic: MAGIC.to_owned(),
             protocol: VERSION,
@@ -127,7 +127,7 @@ impl Server {
         let text =
             serde_json::to_vec(&description).map_err(|error| refusal(Code::Failed, error.to_string()))?;
         let identity = Sha256::digest(&text).iter().map(|byte| format!("{byte:02x}")).collect();
-        write_result(&Described { description, identity })
+        write_result(&DescribeResult { description, identity })
     }
 
     fn arm(&mut self, now_s: f64) -> Result<Value, Refusal> {
@@ -149,7 +149,7 @@ impl Server {
     }
 
     fn set(&mut self, params: &Value) -> Result<Value, Refusal> {
-        let wanted = setpoints(&read_params(params)?);
+        let wanted = read_setpoints(&read_params(params)?);
         let (rig, description, armed) = self.armed_rig()?;
         if armed.has_ended || armed.descent.is_some() {
             return Err(lease_ended_refusal());
@@ -234,7 +234,7 @@ impl Server {
         }
     }
 
-    /// Does what is due at this time of the driver's clock, s. Returns the time to the next task, s; `None`: no task.
+    /// Runs the tasks that are due at this time of the driver's clock, s. Returns the time to the next task, s; `None`: no task.
     pub(crate) fn tick(&mut self, now_s: f64) -> Option<f64> {
         self.start_clock(now_s);
         let Some(armed) = &self.armed else { return None };
@@ -326,8 +326,8 @@ mod tests {
     }
 
     impl LoggingRig {
-        fn write(&self, words: String) -> Result<(), BackendError> {
-            self.log.lock().unwrap().push(words);
+        fn write(&self, entry: String) -> Result<(), BackendError> {
+            self.log.lock().unwrap().push(entry);
             Ok(())
         }
     }
@@ -530,7 +530,7 @@ mod tests {
     }
 
     /// Values that no host sends, in addition to those that it does.
-    fn thing() -> impl Strategy<Value = Value> {
+    fn arbitrary_value() -> impl Strategy<Value = Value> {
         prop_oneof![
             Just(Value::Null),
             any::<f64>().prop_map(|number| json!(number)),
@@ -547,7 +547,7 @@ mod tests {
         /// Any messages in any order: one answer to each request, no panic, and a rig without a host becomes safe.
         #[test]
         fn no_messages_keep_a_rig_from_becoming_safe(
-            steps in prop::collection::vec((0usize..10, any::<bool>(), thing(), 0.0f64..3.0), 0..60), simulated: bool,
+            steps in prop::collection::vec((0usize..10, any::<bool>(), arbitrary_value(), 0.0f64..3.0), 0..60), simulated: bool,
         ) {
             const METHODS: [&str; 10] =
                 ["hello", "configure", "describe", "arm", "set", "poll", "make_safe", "disarm", "__class__", "hold"];

@@ -1,6 +1,6 @@
 //! Serves one host, from its first message until it disconnects and the rig is safe; signals, and the clock.
 
-use crate::outlet::Outlet;
+use crate::output_queue::OutputQueue;
 use crate::server::Server;
 use mapper_driver_host::protocol::{FRAME_LIMIT_BYTES, Message, decode, read_frame};
 use std::io::Read;
@@ -25,9 +25,9 @@ pub(crate) enum DriverEvent {
 }
 
 /// Serves this host. Returns whether a signal requested termination meanwhile.
-pub(crate) fn serve_one(mut server: Server, events: &Receiver<DriverEvent>, outlet: &Outlet) -> bool {
-    let begun = Instant::now();
-    let now_s = || begun.elapsed().as_secs_f64();
+pub(crate) fn serve_one(mut server: Server, events: &Receiver<DriverEvent>, output: &OutputQueue) -> bool {
+    let start = Instant::now();
+    let now_s = || start.elapsed().as_secs_f64();
     let mut terminate = false;
     let mut handle_event = |server: &mut Server, event: DriverEvent, now_s: f64| match event {
         DriverEvent::Message(message) => server.handle_message(now_s, *message),
@@ -46,14 +46,14 @@ pub(crate) fn serve_one(mut server: Server, events: &Receiver<DriverEvent>, outl
             handle_event(&mut server, event, now_s());
         }
         let next_s = server.tick(now_s());
-        send(&mut server, outlet);
+        send(&mut server, output);
         if server.is_over() {
             break;
         }
         if let Some(event) = wait_for_event(events, next_s) {
             handle_event(&mut server, event, now_s());
         }
-        send(&mut server, outlet);
+        send(&mut server, output);
     }
     terminate
 }
@@ -74,10 +74,10 @@ pub(crate) fn wait_for_event(events: &Receiver<DriverEvent>, next_s: Option<f64>
     }
 }
 
-fn send(server: &mut Server, outlet: &Outlet) {
+fn send(server: &mut Server, output: &OutputQueue) {
     let limit_bytes = server.frame_limit_bytes() as usize;
     for message in std::mem::take(&mut server.out) {
-        outlet.send(&message, limit_bytes);
+        output.send(&message, limit_bytes);
     }
 }
 
@@ -103,11 +103,11 @@ pub(crate) fn forward_messages(
 pub(crate) fn forward_signals(sender: SyncSender<DriverEvent>) -> std::io::Result<()> {
     use signal_hook::consts::*;
     // All that would end the process with the rig armed.
-    let ends = [
+    let ending_signals = [
         SIGTERM, SIGHUP, SIGINT, SIGQUIT, SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGIO, SIGXCPU,
         SIGXFSZ, SIGABRT,
     ];
-    let mut signals = signal_hook::iterator::Signals::new(ends)?;
+    let mut signals = signal_hook::iterator::Signals::new(ending_signals)?;
     let handle_event = move || {
         for _ in signals.forever() {
             if sender.send(DriverEvent::Terminate).is_err() {

@@ -1,7 +1,7 @@
 //! A local socket: the driver outlives its hosts and serves them one after the other.
 
 use crate::Open;
-use crate::outlet::Outlet;
+use crate::output_queue::OutputQueue;
 use crate::server::Server;
 use crate::serving::{
     DriverEvent, QUEUE_LENGTH, forward_messages, forward_signals, new_session_name, serve_one, wait_for_event,
@@ -34,7 +34,7 @@ pub fn serve_at(
 ) -> ExitCode {
     let (sender, events) = sync_channel(QUEUE_LENGTH);
     let busy = Arc::new(AtomicBool::new(false));
-    let begun = bind(path).and_then(|(listener, file)| {
+    let bound = bind(path).and_then(|(listener, file)| {
         forward_signals(sender.clone())?;
         let (sender, busy) = (sender.clone(), busy.clone());
         std::thread::Builder::new()
@@ -43,7 +43,7 @@ pub fn serve_at(
             .map(|_| file)
     });
     // The socket file is removed when the driver ends.
-    let _file = match begun {
+    let _file = match bound {
         Ok(file) => file,
         Err(error) => {
             // If standard error is closed, the message is lost.
@@ -76,9 +76,9 @@ fn serve_host(
     sender: SyncSender<DriverEvent>,
     events: &std::sync::mpsc::Receiver<DriverEvent>,
 ) -> std::io::Result<bool> {
-    let outlet = Outlet::into_pipe(host.try_clone()?)?;
+    let output = OutputQueue::into_pipe(host.try_clone()?)?;
     forward_messages(host.try_clone()?, sender)?;
-    Ok(serve_one(server, events, &outlet))
+    Ok(serve_one(server, events, &output))
 }
 
 fn accept_hosts(listener: &UnixListener, sender: &SyncSender<DriverEvent>, busy: &AtomicBool) {
@@ -106,8 +106,8 @@ fn refuse_host(mut host: UnixStream) {
     }
     let Ok(Some(body)) = read_frame(&mut host, FIRST_FRAME_LIMIT_BYTES) else { return };
     let Some(id) = decode(&body).ok().and_then(|message| message.id) else { return };
-    let words = "this driver serves another host, or is still making its rig safe; try again later";
-    let refusal = Message::answer(id, Err(Box::new(Failure::new(Code::Refused, words))));
+    let refusal_text = "this driver serves another host, or is still making its rig safe; try again later";
+    let refusal = Message::answer(id, Err(Box::new(Failure::new(Code::Refused, refusal_text))));
     if let Ok(body) = encode(&refusal, Encoding::MessagePack) {
         // If this fails, the host has disconnected.
         let _ = write_frame(&mut host, &body, FIRST_FRAME_LIMIT_BYTES);
@@ -129,8 +129,8 @@ fn bind(path: &Path) -> std::io::Result<(UnixListener, SocketFile)> {
     if let Some(directory) = path.parent().filter(|directory| !directory.as_os_str().is_empty()) {
         std::fs::DirBuilder::new().recursive(true).mode(0o700).create(directory)?;
     }
-    if let Ok(there) = path.symlink_metadata() {
-        if !there.file_type().is_socket() {
+    if let Ok(metadata) = path.symlink_metadata() {
+        if !metadata.file_type().is_socket() {
             return Err(Error::new(ErrorKind::AlreadyExists, "the file exists and is not a socket"));
         }
         if UnixStream::connect(path).is_ok() {

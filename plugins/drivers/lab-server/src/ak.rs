@@ -22,7 +22,7 @@ fn number(reading: Option<f64>) -> String {
 fn answer(stand: &Stand, body: &[u8]) -> Vec<u8> {
     let Ok((code, channel, _)) = parse_request(body) else { return write_answer(None, &[]) };
     let channels = measured();
-    let words = match (code.to_string().as_str(), usize::from(channel)) {
+    let text = match (code.to_string().as_str(), usize::from(channel)) {
         ("AKON", 0) => channels.iter().map(|channel| number(stand.reading(*channel))).collect(),
         ("AKON", n) => match channels.get(n - 1) {
             Some(channel) => vec![number(stand.reading(*channel))],
@@ -34,10 +34,10 @@ fn answer(stand: &Stand, body: &[u8]) -> Vec<u8> {
         }
         _ => return write_answer(None, &[]),
     };
-    write_answer(Some(code), &words)
+    write_answer(Some(code), &text)
 }
 
-async fn talk(mut stream: TcpStream, stand: Arc<Mutex<Stand>>) -> std::io::Result<()> {
+async fn serve_client(mut stream: TcpStream, stand: Arc<Mutex<Stand>>) -> std::io::Result<()> {
     let (mut assembler, mut bytes) = (Assembler::default(), [0; 512]);
     loop {
         let count = tokio::time::timeout(SILENCE, stream.read(&mut bytes)).await??;
@@ -61,15 +61,15 @@ async fn talk(mut stream: TcpStream, stand: Arc<Mutex<Stand>>) -> std::io::Resul
 /// # Errors
 /// An error of the listener.
 pub async fn serve(listener: TcpListener, stand: Arc<Mutex<Stand>>) -> std::io::Result<()> {
-    let places = Arc::new(tokio::sync::Semaphore::new(CONNECTIONS));
+    let permits = Arc::new(tokio::sync::Semaphore::new(CONNECTIONS));
     loop {
         let (stream, _) = listener.accept().await?;
-        let Ok(place) = places.clone().try_acquire_owned() else { continue };
+        let Ok(permit) = permits.clone().try_acquire_owned() else { continue };
         let stand = stand.clone();
         tokio::spawn(async move {
             // A failure means that the client has disconnected.
-            let _ = talk(stream, stand).await;
-            drop(place);
+            let _ = serve_client(stream, stand).await;
+            drop(permit);
         });
     }
 }

@@ -48,7 +48,7 @@ struct Arguments {
     /// Serve readings as AK telegrams at this address, e.g. 127.0.0.1:8888 (read only)
     #[arg(long, value_name = "ADDRESS")]
     ak: Option<SocketAddr>,
-    /// Print a line for each speed read and each set-point written over OPC UA: `SECONDS read RPM`, `SECONDS told NAME`. Times are on this
+    /// Print a line for each speed read and each set-point written over OPC UA: `SECONDS read RPM`, `SECONDS write NAME`. Times are on this
     /// computer's monotonic clock, after decryption, so that latency can be measured in an encrypted session
     #[arg(long, requires = "opcua")]
     stamps: bool,
@@ -94,9 +94,9 @@ fn main() -> ExitCode {
 }
 
 fn make(arguments: &Arguments) -> Result<Stand, LabError> {
-    let wrong = |words: String| LabError::Campaign(words);
+    let campaign_error = |message: String| LabError::Campaign(message);
     let mut campaign =
-        mapper_campaign::load(&arguments.campaign).map_err(|error| wrong(error.to_string()))?;
+        mapper_campaign::load(&arguments.campaign).map_err(|error| campaign_error(error.to_string()))?;
     if !BACKENDS.iter().any(|plugin| plugin.name == campaign.backend.name) {
         let name = mapper_backends::virtual_lab::NAME.to_owned();
         campaign.backend = BackendChoice { name, settings: serde_json::json!({}) };
@@ -108,8 +108,8 @@ fn make(arguments: &Arguments) -> Result<Stand, LabError> {
     }
     let registry =
         Registry { backends: BACKENDS.to_vec(), effects: mapper_effects::catalogue(), ..Registry::default() };
-    let model = nominal_model(&campaign).map_err(|error| wrong(error.to_string()))?;
-    let lab = registry.make_backend(&campaign, &model).map_err(|error| wrong(error.to_string()))?;
+    let model = nominal_model(&campaign).map_err(|error| campaign_error(error.to_string()))?;
+    let lab = registry.make_backend(&campaign, &model).map_err(|error| campaign_error(error.to_string()))?;
     Ok(Stand::new(lab, campaign.limits.speed_max_rpm, arguments.speed)?)
 }
 

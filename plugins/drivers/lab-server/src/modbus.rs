@@ -22,14 +22,14 @@ pub const UNITS: [u8; 2] = [255, 0];
 #[derive(Clone)]
 struct Registers(Arc<Mutex<Stand>>);
 
-fn words(value: f64) -> [u16; 2] {
+fn to_registers(value: f64) -> [u16; 2] {
     let bits = (value as f32).to_bits();
     [(bits >> 16) as u16, bits as u16]
 }
 
 impl Registers {
     fn register(stand: &Stand, at: u16) -> u16 {
-        let pair = |value: f64, at: u16| words(value)[usize::from(at % 2)];
+        let pair = |value: f64, at: u16| to_registers(value)[usize::from(at % 2)];
         match at {
             AIR => stand.commanded(Target::Air) as u16,
             HEARTBEAT => stand.commanded(Target::Heartbeat) as u16,
@@ -123,6 +123,6 @@ mod tests {
     /// 123456.0 as a single is 0x47F12000 (IEEE 754), with the high word first.
     #[test]
     fn a_single_is_two_registers() {
-        assert_eq!(words(123_456.0), [0x47f1, 0x2000]);
+        assert_eq!(to_registers(123_456.0), [0x47f1, 0x2000]);
     }
 }

@@ -46,17 +46,17 @@ pub struct Shared {
     pub stand: Arc<Mutex<Stand>>,
     /// Start of its time.
     pub begun: Instant,
-    /// Whether speed reads and set-point writes are printed on standard output, with their times.
+    /// Whether speed reads and setpoint writes are printed on standard output, with their times.
     pub stamps: bool,
 }
 
 impl Shared {
     /// A value of the stand with its timestamp.
-    fn value(&self, of: impl Fn(&Stand) -> Option<Variant>) -> Result<DataValue, StatusCode> {
+    fn value(&self, read: impl Fn(&Stand) -> Option<Variant>) -> Result<DataValue, StatusCode> {
         let stand = self.stand.lock().map_err(|_| StatusCode::BadInternalError)?;
         let age_s = (self.begun.elapsed().as_secs_f64() - stand.wall_s()).clamp(0.0, 60.0);
         let now = DateTime::now();
-        let value = of(&stand).ok_or(StatusCode::BadNoDataAvailable)?;
+        let value = read(&stand).ok_or(StatusCode::BadNoDataAvailable)?;
         Ok(DataValue {
             value: Some(value),
             status: Some(StatusCode::Good),
@@ -67,12 +67,12 @@ impl Shared {
     }
 
     /// Prints a timestamped line.
-    fn stamp(&self, words: impl std::fmt::Display) {
+    fn stamp(&self, message: impl std::fmt::Display) {
         if self.stamps {
             let now = rustix::time::clock_gettime(rustix::time::ClockId::Monotonic);
             let seconds = now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9;
             // If standard output is closed, the line is lost.
-            let _ = writeln!(std::io::stdout(), "{seconds:.6} {words}");
+            let _ = writeln!(std::io::stdout(), "{seconds:.6} {message}");
         }
     }
 
@@ -88,7 +88,7 @@ impl Shared {
             Ok(()) => {
                 drop(stand);
                 if target != Target::Heartbeat {
-                    self.stamp(format_args!("told {name}"));
+                    self.stamp(format_args!("write {name}"));
                 }
                 StatusCode::Good
             }
@@ -103,11 +103,11 @@ fn directory() -> Result<PathBuf, ServeError> {
         .or_else(|| variable("XDG_STATE_HOME").map(|state| state.join("mapper")))
         .or_else(|| variable("HOME").map(|home| home.join(".local/state/mapper")));
     let path = state.ok_or(ServeError::NoDirectory)?.join("lab-server");
-    let mut made = std::fs::DirBuilder::new();
-    made.recursive(true);
+    let mut builder = std::fs::DirBuilder::new();
+    builder.recursive(true);
     #[cfg(unix)]
-    std::os::unix::fs::DirBuilderExt::mode(&mut made, 0o700);
-    made.create(&path).map_err(|source| ServeError::File { path: path.clone(), source })?;
+    std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
+    builder.create(&path).map_err(|source| ServeError::File { path: path.clone(), source })?;
     Ok(path)
 }
 
@@ -159,9 +159,10 @@ fn builder(at: SocketAddr, pki: &Path, protection: Protection) -> Result<ServerB
         }
         _ => BTreeMap::new(),
     };
-    let describe_users: Vec<String> = match users.is_empty() {
-        true => vec![ANONYMOUS_USER_TOKEN_ID.to_owned()],
-        false => users.keys().cloned().collect(),
+    let user_ids: Vec<String> = if users.is_empty() {
+        vec![ANONYMOUS_USER_TOKEN_ID.to_owned()]
+    } else {
+        users.keys().cloned().collect()
     };
     let authenticator: Arc<dyn AuthManager> = Arc::new(DefaultAuthenticator::new(users.clone()));
     let mut builder = ServerBuilder::new()
@@ -184,17 +185,14 @@ fn builder(at: SocketAddr, pki: &Path, protection: Protection) -> Result<ServerB
         builder = builder.add_user_token(name, token);
     }
     let endpoints = match protection {
-        Protection::Clear => vec![("clear", ServerEndpoint::new_none("/", &describe_users))],
+        Protection::Clear => vec![("clear", ServerEndpoint::new_none("/", &user_ids))],
         Protection::Encrypted => vec![
-            ("basic256_sha256", ServerEndpoint::new_basic256sha256_sign_encrypt("/", &describe_users)),
+            ("basic256_sha256", ServerEndpoint::new_basic256sha256_sign_encrypt("/", &user_ids)),
             (
                 "aes128_sha256_rsa_oaep",
-                ServerEndpoint::new_aes128_sha256_rsaoaep_sign_encrypt("/", &describe_users),
+                ServerEndpoint::new_aes128_sha256_rsaoaep_sign_encrypt("/", &user_ids),
             ),
-            (
-                "aes256_sha256_rsa_pss",
-                ServerEndpoint::new_aes256_sha256_rsapss_sign_encrypt("/", &describe_users),
-            ),
+            ("aes256_sha256_rsa_pss", ServerEndpoint::new_aes256_sha256_rsapss_sign_encrypt("/", &user_ids)),
         ],
     };
     for (name, endpoint) in endpoints {
@@ -226,11 +224,11 @@ fn variant(kind: DataTypeId, value: f64) -> Variant {
 }
 
 fn add_nodes(handle: &ServerHandle, shared: &Shared) -> Result<(), ServeError> {
-    let wrong = |words: &str| ServeError::NotBuilt(words.to_owned());
+    let not_built = |message: &str| ServeError::NotBuilt(message.to_owned());
     let manager = handle.node_managers().get_of_type::<SimpleNodeManager>();
-    let manager = manager.ok_or_else(|| wrong("it has no nodes"))?;
+    let manager = manager.ok_or_else(|| not_built("it has no nodes"))?;
     if handle.get_namespace_index(NAMESPACE) != Some(INDEX) {
-        return Err(wrong("the namespace of the nodes is not ns=2"));
+        return Err(not_built("the namespace of the nodes is not ns=2"));
     }
     let folder = NodeId::new(INDEX, "stand");
     let add_variable = |name: &str, kind: DataTypeId, first: Variant, writes: bool| {

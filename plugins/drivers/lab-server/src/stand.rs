@@ -193,8 +193,8 @@ impl Stand {
                 self.readings.insert(column.channel, *value);
             }
         }
-        let own = batch.events.iter().find(|event| event.kind == EventKind::RigTripped);
-        if let Some(event) = own {
+        let rig_trip = batch.events.iter().find(|event| event.kind == EventKind::RigTripped);
+        if let Some(event) = rig_trip {
             self.trip(event.message.clone());
         }
         let rpm = self.reading(Channel::ShaftSpeed).unwrap_or(0.0);

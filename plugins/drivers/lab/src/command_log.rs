@@ -1,4 +1,4 @@
-//! A rig that logs its commands: after a rehearsal the file shows what reached it.
+//! A rig that logs its commands, to check them after a rehearsal.
 
 use mapper_core::{Backend, BackendError, RigDescription, RigMode, SampleBatch, Setpoints};
 use std::fs::File;
@@ -17,9 +17,9 @@ impl CommandLog {
         CommandLog { inner, file, now_s: 0.0 }
     }
 
-    fn write(&mut self, words: &str) {
+    fn write(&mut self, text: &str) {
         // A full disk must not block the rig's setpoints.
-        let _ = writeln!(self.file, "{:.1} s: {words}", self.now_s);
+        let _ = writeln!(self.file, "{:.1} s: {text}", self.now_s);
     }
 }
 

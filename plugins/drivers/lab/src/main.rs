@@ -1,5 +1,5 @@
 //! `mapper-backend-lab`: the virtual lab behind the driver protocol. It is the example of a driver in Rust. With `real_time` it also serves
-//! to rehearse a night; its commands are logged in a file.
+//! to rehearse a run, and `command_log` names a file for the commands.
 
 mod command_log;
 mod real_time;
@@ -12,7 +12,7 @@ fn main() -> std::process::ExitCode {
         name: settings::NAME,
         version: env!("CARGO_PKG_VERSION"),
         summary: "The virtual lab of another campaign behind the protocol of drivers, to rehearse on; an example of a driver.",
-        settings: r#"campaign: FILE; also real_time: true, told: FILE (the commands that it receives). docs/reference/protocol.md has the protocol"#,
+        settings: r#"campaign: FILE; also real_time: true, command_log: FILE (the commands that it receives). docs/reference/protocol.md has the protocol"#,
     };
     about.serve(open)
 }

@@ -22,14 +22,14 @@ struct Settings {
     #[serde(default)]
     real_time: bool,
     /// A file that gets a line for each command.
-    told: Option<PathBuf>,
+    command_log: Option<PathBuf>,
 }
 
-/// Why the lab cannot be made.
+/// Why the lab cannot be created.
 #[derive(Debug, thiserror::Error)]
 enum LabError {
     #[error(
-        "write {{campaign: FILE}}, a campaign whose machine the lab is; also: real_time: true, told: FILE. {0}"
+        "write {{campaign: FILE}}, a campaign whose machine the lab is; also: real_time: true, command_log: FILE. {0}"
     )]
     Form(serde_json::Error),
     #[error("{0}")]
@@ -40,13 +40,14 @@ enum LabError {
 
 /// The lab of a campaign.
 pub(crate) fn open(settings: &Value) -> Result<Box<dyn Backend>, BackendError> {
-    let wrong = |path: &str, error: LabError| BackendError::Settings {
+    let settings_error = |path: &str, error: LabError| BackendError::Settings {
         backend: NAME.to_owned(),
         path: path.to_owned(),
         source: Box::new(error),
     };
-    let settings = Settings::deserialize(settings).map_err(|error| wrong("", LabError::Form(error)))?;
-    let of_campaign = |words: String| wrong("campaign", LabError::Campaign(words));
+    let settings =
+        Settings::deserialize(settings).map_err(|error| settings_error("", LabError::Form(error)))?;
+    let of_campaign = |message: String| settings_error("campaign", LabError::Campaign(message));
     // A driver at a socket may run in another directory than the campaign, so the error shows the absolute path.
     let path = std::path::absolute(&settings.campaign).unwrap_or(settings.campaign);
     let campaign = mapper_campaign::load(&path).map_err(|error| of_campaign(error.to_string()))?;
@@ -55,11 +56,12 @@ pub(crate) fn open(settings: &Value) -> Result<Box<dyn Backend>, BackendError> {
     let model = nominal_model(&campaign).map_err(|error| of_campaign(error.to_string()))?;
     let lab = registry.make_backend(&campaign, &model).map_err(|error| of_campaign(error.to_string()))?;
     let lab: Box<dyn Backend> = if settings.real_time { Box::new(RealTime(lab)) } else { lab };
-    match settings.told {
+    match settings.command_log {
         None => Ok(lab),
         Some(path) => {
             let file = std::fs::File::create(&path);
-            let file = file.map_err(|source| wrong("told", LabError::CommandLog { path, source }))?;
+            let file =
+                file.map_err(|source| settings_error("command_log", LabError::CommandLog { path, source }))?;
             Ok(Box::new(CommandLog::new(lab, file)))
         }
     }

@@ -55,7 +55,7 @@ impl CommandFiles {
 
     fn settings(&self, file: &str) -> Value {
         let campaign = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../campaigns/turbo_a.yaml");
-        json!({"campaign": campaign, "real_time": true, "told": self.file(file)})
+        json!({"campaign": campaign, "real_time": true, "command_log": self.file(file)})
     }
 }
 
@@ -107,9 +107,9 @@ fn hosts_are_served_one_after_the_other_and_a_lost_host_leaves_a_safe_rig() {
     // As if a runner is killed: the connection ends without a message. The rig runs down and is disarmed, and the next host is served.
     drop(first);
     let commands = scratch.commands("first", "disarm");
-    let way: Vec<&str> = commands.lines().skip_while(|line| !line.contains("T3 293 K")).collect();
+    let run_down: Vec<&str> = commands.lines().skip_while(|line| !line.contains("T3 293 K")).collect();
     assert!(
-        commands.contains("hold") && way.len() > 3 && way[way.len() - 2].contains("make safe"),
+        commands.contains("hold") && run_down.len() > 3 && run_down[run_down.len() - 2].contains("make safe"),
         "{commands}"
     );
 
@@ -135,8 +135,8 @@ fn a_socket_without_a_listener_is_reported_and_can_be_reused() {
     drop(Listening::at(&socket, &scratch));
     assert!(socket.exists());
     let places = SearchPath { programs: Vec::new(), sockets: Some(scratch.directory.path().to_owned()) };
-    let away = Driver::find(&places, "lab", &Value::Null, "", "").err().unwrap().to_string();
-    assert!(away.contains("no driver listens at the socket") && away.contains("--socket"), "{away}");
+    let refusal = Driver::find(&places, "lab", &Value::Null, "", "").err().unwrap().to_string();
+    assert!(refusal.contains("no driver listens at the socket") && refusal.contains("--socket"), "{refusal}");
     let _again = Listening::at(&socket, &scratch);
     connect(&places, &scratch.settings("third"));
 }

@@ -49,7 +49,7 @@ impl Lab {
         std::fs::write(&campaign, text.replace("virtual_lab: {}", "virtual_lab: {sample_rate: 1000 Hz}"))
             .unwrap();
         let commands_file = scratch.path().join("commands.txt");
-        let settings = json!({"campaign": campaign, "real_time": true, "told": commands_file});
+        let settings = json!({"campaign": campaign, "real_time": true, "command_log": commands_file});
         let (sender, news) = channel();
         let mut watcher = notify::recommended_watcher(sender).unwrap();
         watcher.watch(scratch.path(), RecursiveMode::NonRecursive).unwrap();
@@ -73,10 +73,13 @@ impl Lab {
         let at_s = |line: &str| line.split_once(" s:").unwrap().0.parse::<f64>().unwrap();
         let lines: Vec<&str> = text.lines().collect();
         let set = lines.iter().position(|line| line.contains("set air on")).unwrap();
-        let way: Vec<&str> = lines[set + 1..].to_vec();
-        assert!(way.len() > 3 && way[..way.len() - 1].iter().all(|line| line.contains("T3 293 K")), "{text}");
-        assert!(way.last().unwrap().contains("make safe"), "{text}");
-        let steps_s: Vec<f64> = way.windows(2).map(|pair| at_s(pair[1]) - at_s(pair[0])).collect();
+        let run_down: Vec<&str> = lines[set + 1..].to_vec();
+        assert!(
+            run_down.len() > 3 && run_down[..run_down.len() - 1].iter().all(|line| line.contains("T3 293 K")),
+            "{text}"
+        );
+        assert!(run_down.last().unwrap().contains("make safe"), "{text}");
+        let steps_s: Vec<f64> = run_down.windows(2).map(|pair| at_s(pair[1]) - at_s(pair[0])).collect();
         // A tenth of a second each. The file resolves tenths, and a busy machine makes some steps longer.
         let mut sorted_s = steps_s.clone();
         sorted_s.sort_by(f64::total_cmp);
@@ -204,8 +207,8 @@ fn an_unread_pipe_does_not_delay_the_rig() {
     assert!((LEASE_S - 0.1..10.0).contains(&began_s), "{began_s} s");
     lab.assert_run_down();
     // Refused, since the lease has ended; the next requests are executed.
-    let again = pipes.send("set", serde_json::to_value(write_setpoints(&SETPOINTS)).unwrap());
-    let (mut answers, mut notes, mut unread) = (vec![set, again], Vec::new(), Duration::ZERO);
+    let repeated = pipes.send("set", serde_json::to_value(write_setpoints(&SETPOINTS)).unwrap());
+    let (mut answers, mut notes, mut unread) = (vec![set, repeated], Vec::new(), Duration::ZERO);
     let read = loop {
         let safe = pipes.send("make_safe", json!({}));
         answers.push(safe);
@@ -224,8 +227,12 @@ fn an_unread_pipe_does_not_delay_the_rig() {
     assert!(notes.iter().any(|words| words.contains("lease")), "{notes:?}");
     // Queue, pipe, one in the writer's hands, and the extra places: three answers and the note.
     let per_message = read.bytes_before / read.messages_before;
-    let most = QUEUE + PIPE_BYTES / per_message + 1 + 4;
-    assert!((QUEUE..=most).contains(&read.messages_before), "{} of {most}", read.messages_before);
+    let max_messages = QUEUE + PIPE_BYTES / per_message + 1 + 4;
+    assert!(
+        (QUEUE..=max_messages).contains(&read.messages_before),
+        "{} of {max_messages}",
+        read.messages_before
+    );
     pipes.ask("disarm", json!({}));
 }
 

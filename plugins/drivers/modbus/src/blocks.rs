@@ -23,10 +23,11 @@ pub(crate) fn group_registers(pieces: &[Block]) -> Vec<Block> {
         let end = u32::from(piece.start) + u32::from(piece.count);
         if let Some(last) = blocks.last_mut() {
             let last_end = u32::from(last.start) + u32::from(last.count);
-            let together = end.max(last_end) - u32::from(last.start);
-            if u32::from(piece.start) <= last_end + u32::from(MAX_GAP) && together <= u32::from(MAX_REGISTERS)
+            let merged_count = end.max(last_end) - u32::from(last.start);
+            if u32::from(piece.start) <= last_end + u32::from(MAX_GAP)
+                && merged_count <= u32::from(MAX_REGISTERS)
             {
-                last.count = u16::try_from(together).unwrap_or(MAX_REGISTERS);
+                last.count = u16::try_from(merged_count).unwrap_or(MAX_REGISTERS);
                 continue;
             }
         }
@@ -50,12 +51,12 @@ mod tests {
                 prop_assert!(block.count <= MAX_REGISTERS && u32::from(block.start) + u32::from(block.count) <= 65_536);
             }
             for piece in &pieces {
-                let whole = blocks.iter().any(|block| {
+                let is_covered = blocks.iter().any(|block| {
                     block.start <= piece.start
                         && u32::from(piece.start) + u32::from(piece.count)
                             <= u32::from(block.start) + u32::from(block.count)
                 });
-                prop_assert!(whole, "{piece:?} in {blocks:?}");
+                prop_assert!(is_covered, "{piece:?} in {blocks:?}");
             }
         }
     }

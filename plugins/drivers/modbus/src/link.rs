@@ -18,11 +18,11 @@ pub(crate) enum LinkError {
     #[error("{address} did not answer within {} ms (`timeout`, at most 800 ms; slower controllers are not supported)", within.as_millis())]
     Late { address: SocketAddr, within: Duration },
     /// The connection failed.
-    #[error("{address}: {words}")]
-    Failed { address: SocketAddr, words: String },
+    #[error("{address}: {reason}")]
+    Failed { address: SocketAddr, reason: String },
     /// The controller refuses.
-    #[error("{address} refuses {what}: {words}")]
-    Refused { address: SocketAddr, what: String, code: ExceptionCode, words: String },
+    #[error("{address} refuses {operation}: {reason}")]
+    Refused { address: SocketAddr, operation: String, code: ExceptionCode, reason: String },
 }
 
 impl LinkError {
@@ -55,7 +55,7 @@ pub(crate) struct Link {
     unit: u8,
     within: Duration,
     /// Deadline of the current group of writes.
-    until: Option<Instant>,
+    deadline: Option<Instant>,
     connection: Option<Context>,
 }
 
@@ -63,7 +63,7 @@ impl Link {
     /// Does not connect yet.
     pub(crate) fn new(address: SocketAddr, unit: u8, within: Duration) -> std::io::Result<Link> {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-        Ok(Link { runtime, address, unit, within, until: None, connection: None })
+        Ok(Link { runtime, address, unit, within, deadline: None, connection: None })
     }
 
     /// Drops the connection.
@@ -74,15 +74,15 @@ impl Link {
     /// Makes a group of writes with one deadline, retries and new connections included, since the caller of the
     /// group waits no longer.
     pub(crate) fn write_group<T>(&mut self, within: Duration, writes: impl FnOnce(&mut Link) -> T) -> T {
-        self.until = Instant::now().checked_add(within);
+        self.deadline = Instant::now().checked_add(within);
         let done = writes(self);
-        self.until = None;
+        self.deadline = None;
         done
     }
 
     /// Time left for a request, at most its own timeout.
     fn time_left(&self) -> Duration {
-        let left = self.until.map(|until| until.saturating_duration_since(Instant::now()));
+        let left = self.deadline.map(|deadline| deadline.saturating_duration_since(Instant::now()));
         left.map_or(self.within, |left| left.min(self.within))
     }
 
@@ -110,16 +110,16 @@ impl Link {
             return Ok(registers);
         }
         self.connection = None;
-        let words = format!("{} registers received, {count} requested", registers.len());
-        Err(LinkError::Failed { address: self.address, words })
+        let reason = format!("{} registers received, {count} requested", registers.len());
+        Err(LinkError::Failed { address: self.address, reason })
     }
 
     /// Writes registers; retries once, if necessary on a new connection, since writing the same value twice does no harm. A busy
     /// controller is retried until the timeout of the request.
     pub(crate) fn write(&mut self, start: u16, registers: &[u16]) -> Result<(), LinkError> {
-        let until = Instant::now() + self.time_left();
+        let deadline = Instant::now() + self.time_left();
         let mut answer = self.write_once(start, registers);
-        while answer.as_ref().is_err_and(LinkError::is_busy) && Instant::now() + RETRY_DELAY < until {
+        while answer.as_ref().is_err_and(LinkError::is_busy) && Instant::now() + RETRY_DELAY < deadline {
             self.pause();
             answer = self.write_once(start, registers);
         }
@@ -134,7 +134,7 @@ impl Link {
         let request = || Request::WriteMultipleRegisters(start, registers.into());
         let answer =
             self.call(format!("a value for register {start}"), async |link| link.call(request()).await)?;
-        let words = match answer {
+        let reason = match answer {
             Response::WriteMultipleRegisters(address, count)
                 if address == start && usize::from(count) == registers.len() =>
             {
@@ -147,7 +147,7 @@ impl Link {
             other => format!("a write was answered with {other:?}"),
         };
         self.connection = None;
-        Err(LinkError::Failed { address: self.address, words })
+        Err(LinkError::Failed { address: self.address, reason })
     }
 
     /// A short delay for a busy controller.
@@ -157,7 +157,7 @@ impl Link {
     }
 
     /// Describes an exception with its number, as manuals list it, and with the unit if that is the cause.
-    fn words(&self, code: ExceptionCode) -> String {
+    fn describe_exception(&self, code: ExceptionCode) -> String {
         let number = u8::from(code);
         match code {
             ExceptionCode::GatewayPathUnavailable | ExceptionCode::GatewayTargetDevice => {
@@ -169,7 +169,7 @@ impl Link {
 
     fn call<T>(
         &mut self,
-        what: String,
+        operation: String,
         request: impl AsyncFnOnce(&mut Context) -> tokio_modbus::Result<T>,
     ) -> Result<T, LinkError> {
         let (address, within) = (self.address, self.time_left());
@@ -178,18 +178,23 @@ impl Link {
             Some(connection) => connection,
             None => {
                 let connect = tcp::connect_slave(address, Slave(self.unit));
-                let made = self.runtime.block_on(in_time(within, connect)).ok_or(late)?;
-                made.map_err(|error| LinkError::Failed { address, words: error.to_string() })?
+                let connected = self.runtime.block_on(in_time(within, connect)).ok_or(late)?;
+                connected.map_err(|error| LinkError::Failed { address, reason: error.to_string() })?
             }
         };
         let within = self.time_left();
         let answer = self.runtime.block_on(in_time(within, request(&mut connection)));
         match answer {
             None => Err(LinkError::Late { address, within }),
-            Some(Err(error)) => Err(LinkError::Failed { address, words: error.to_string() }),
+            Some(Err(error)) => Err(LinkError::Failed { address, reason: error.to_string() }),
             Some(Ok(answer)) => {
                 self.connection = Some(connection);
-                answer.map_err(|code| LinkError::Refused { address, what, code, words: self.words(code) })
+                answer.map_err(|code| LinkError::Refused {
+                    address,
+                    operation,
+                    code,
+                    reason: self.describe_exception(code),
+                })
             }
         }
     }
@@ -211,12 +216,12 @@ mod tests {
     fn a_group_of_writes_keeps_its_deadline() {
         let mute = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
         let mut link = Link::new(mute.local_addr().unwrap(), 255, Duration::from_millis(800)).unwrap();
-        let begun = Instant::now();
+        let began = Instant::now();
         let failed = link.write_group(Duration::from_millis(1500), |link| {
             (0..3).filter(|register| link.write(*register, &[0]).is_err()).count()
         });
         assert_eq!(failed, 3);
-        let took_s = begun.elapsed().as_secs_f64();
+        let took_s = began.elapsed().as_secs_f64();
         // Six separate attempts would take 4.8 s; the rest is for a busy machine.
         assert!((1.4..4.0).contains(&took_s), "{took_s} s");
         // The next request has its full timeout.

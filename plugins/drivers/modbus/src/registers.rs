@@ -5,7 +5,7 @@ use serde::Deserialize;
 /// Number format in registers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(crate) enum Form {
+pub(crate) enum NumberFormat {
     U16,
     I16,
     U32,
@@ -36,30 +36,30 @@ impl Order {
     }
 }
 
-impl Form {
+impl NumberFormat {
     /// As campaigns write it.
     pub(crate) fn key(self) -> &'static str {
         match self {
-            Form::U16 => "u16",
-            Form::I16 => "i16",
-            Form::U32 => "u32",
-            Form::I32 => "i32",
-            Form::F32 => "f32",
-            Form::F64 => "f64",
+            NumberFormat::U16 => "u16",
+            NumberFormat::I16 => "i16",
+            NumberFormat::U32 => "u32",
+            NumberFormat::I32 => "i32",
+            NumberFormat::F32 => "f32",
+            NumberFormat::F64 => "f64",
         }
     }
 
     /// Whether it is an integer format.
     pub(crate) fn is_whole(self) -> bool {
-        !matches!(self, Form::F32 | Form::F64)
+        !matches!(self, NumberFormat::F32 | NumberFormat::F64)
     }
 
     /// Number of registers.
     pub(crate) fn count(self) -> u16 {
         match self {
-            Form::U16 | Form::I16 => 1,
-            Form::U32 | Form::I32 | Form::F32 => 2,
-            Form::F64 => 4,
+            NumberFormat::U16 | NumberFormat::I16 => 1,
+            NumberFormat::U32 | NumberFormat::I32 | NumberFormat::F32 => 2,
+            NumberFormat::F64 => 4,
         }
     }
 
@@ -75,25 +75,29 @@ impl Form {
         });
         // Each cast reinterprets the same bits.
         Some(match self {
-            Form::U16 | Form::U32 => bits as f64,
-            Form::I16 => f64::from(bits as u16 as i16),
-            Form::I32 => f64::from(bits as u32 as i32),
-            Form::F32 => f64::from(f32::from_bits(bits as u32)),
-            Form::F64 => f64::from_bits(bits),
+            NumberFormat::U16 | NumberFormat::U32 => bits as f64,
+            NumberFormat::I16 => f64::from(bits as u16 as i16),
+            NumberFormat::I32 => f64::from(bits as u32 as i32),
+            NumberFormat::F32 => f64::from(f32::from_bits(bits as u32)),
+            NumberFormat::F64 => f64::from_bits(bits),
         })
     }
 
     /// The registers for a number; `None` if it does not fit.
     pub(crate) fn registers(self, number: f64, words: Order, bytes: Order) -> Option<Vec<u16>> {
-        let whole = number.round();
-        let within = |low: f64, high: f64| (low..=high).contains(&whole);
+        let rounded = number.round();
+        let within = |low: f64, high: f64| (low..=high).contains(&rounded);
         let bits = match self {
-            Form::U16 if within(0.0, f64::from(u16::MAX)) => whole as u64,
-            Form::U32 if within(0.0, f64::from(u32::MAX)) => whole as u64,
-            Form::I16 if within(f64::from(i16::MIN), f64::from(i16::MAX)) => whole as i16 as u16 as u64,
-            Form::I32 if within(f64::from(i32::MIN), f64::from(i32::MAX)) => whole as i32 as u32 as u64,
-            Form::F32 if (number as f32).is_finite() => u64::from((number as f32).to_bits()),
-            Form::F64 if number.is_finite() => number.to_bits(),
+            NumberFormat::U16 if within(0.0, f64::from(u16::MAX)) => rounded as u64,
+            NumberFormat::U32 if within(0.0, f64::from(u32::MAX)) => rounded as u64,
+            NumberFormat::I16 if within(f64::from(i16::MIN), f64::from(i16::MAX)) => {
+                rounded as i16 as u16 as u64
+            }
+            NumberFormat::I32 if within(f64::from(i32::MIN), f64::from(i32::MAX)) => {
+                rounded as i32 as u32 as u64
+            }
+            NumberFormat::F32 if (number as f32).is_finite() => u64::from((number as f32).to_bits()),
+            NumberFormat::F64 if number.is_finite() => number.to_bits(),
             _ => return None,
         };
         let mut registers: Vec<u16> =
@@ -122,14 +126,14 @@ mod tests {
             (Order::Big, Order::Little, [0xf147, 0x0020]),
             (Order::Little, Order::Little, [0x0020, 0xf147]),
         ] {
-            assert_eq!(Form::F32.number(&registers, words, bytes), Some(123_456.0));
-            assert_eq!(Form::F32.registers(123_456.0, words, bytes).unwrap(), registers);
+            assert_eq!(NumberFormat::F32.number(&registers, words, bytes), Some(123_456.0));
+            assert_eq!(NumberFormat::F32.registers(123_456.0, words, bytes).unwrap(), registers);
         }
-        assert_eq!(Form::I16.number(&[0xffff], Order::Big, Order::Big), Some(-1.0));
-        assert_eq!(Form::I32.number(&[0xffff, 0xfffe], Order::Big, Order::Big), Some(-2.0));
-        assert_eq!(Form::F32.number(&[1], Order::Big, Order::Big), None);
-        assert!(Form::U16.registers(65_536.0, Order::Big, Order::Big).is_none());
-        assert!(Form::F32.registers(f64::NAN, Order::Big, Order::Big).is_none());
+        assert_eq!(NumberFormat::I16.number(&[0xffff], Order::Big, Order::Big), Some(-1.0));
+        assert_eq!(NumberFormat::I32.number(&[0xffff, 0xfffe], Order::Big, Order::Big), Some(-2.0));
+        assert_eq!(NumberFormat::F32.number(&[1], Order::Big, Order::Big), None);
+        assert!(NumberFormat::U16.registers(65_536.0, Order::Big, Order::Big).is_none());
+        assert!(NumberFormat::F32.registers(f64::NAN, Order::Big, Order::Big).is_none());
     }
 
     proptest! {
@@ -137,7 +141,7 @@ mod tests {
         fn written_numbers_are_read_back(value in -30_000i16..30_000, little_words in any::<bool>(), little_bytes in any::<bool>()) {
             let order = |little| if little { Order::Little } else { Order::Big };
             let (words, bytes) = (order(little_words), order(little_bytes));
-            for form in [Form::I16, Form::I32, Form::F32, Form::F64] {
+            for form in [NumberFormat::I16, NumberFormat::I32, NumberFormat::F32, NumberFormat::F64] {
                 let registers = form.registers(f64::from(value), words, bytes).unwrap();
                 prop_assert_eq!(form.number(&registers, words, bytes), Some(f64::from(value)));
             }

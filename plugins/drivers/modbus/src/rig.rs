@@ -3,7 +3,7 @@
 use crate::blocks::{Block, group_registers};
 use crate::link::{Link, LinkError, Table};
 use crate::registers::Order;
-use crate::settings::{Place, SettingError, Settings, wrong};
+use crate::settings::{RegisterSettings, SettingError, Settings, settings_error};
 use mapper_controller::{Controller, Reading, Target, is_plausible, rig};
 use mapper_core::{Backend, BackendError, Channel};
 use serde_json::Value;
@@ -15,11 +15,11 @@ pub(crate) fn open(value: &Value) -> Result<Box<dyn Backend>, BackendError> {
     let settings = Settings::read(value)?;
     let within = Duration::from_secs_f64(settings.timeout_s());
     let link = Link::new(settings.address, settings.unit, within)
-        .map_err(|error| wrong("", SettingError::Form(serde::de::Error::custom(error))))?;
+        .map_err(|error| settings_error("", SettingError::Form(serde::de::Error::custom(error))))?;
     let tables = [Table::Holding, Table::Input];
     let pieces = |table: Table| {
-        let of_table = settings.read.values().filter(move |place| place.table == table);
-        let pieces = of_table.map(|place| Block { start: place.register, count: place.form.count() });
+        let of_table = settings.read.values().filter(move |entry| entry.table == table);
+        let pieces = of_table.map(|entry| Block { start: entry.register, count: entry.form.count() });
         group_registers(&pieces.collect::<Vec<_>>()).into_iter().map(move |block| (table, block))
     };
     let blocks = tables.into_iter().flat_map(pieces).collect();
@@ -42,9 +42,9 @@ struct Registers {
 }
 
 impl Registers {
-    fn words(&self, place: &Place) -> Vec<u16> {
-        (place.register..place.register + place.form.count())
-            .filter_map(|at| self.last.get(&(place.table, at)).copied())
+    fn last_words(&self, entry: &RegisterSettings) -> Vec<u16> {
+        (entry.register..entry.register + entry.form.count())
+            .filter_map(|at| self.last.get(&(entry.table, at)).copied())
             .collect()
     }
 
@@ -72,8 +72,8 @@ impl Registers {
         let both = [Order::Big, Order::Little];
         let orders = both.into_iter().flat_map(|words| both.map(|bytes| (words, bytes)));
         let fits = |(words, bytes): &(Order, Order)| {
-            self.settings.read.iter().all(|(channel, place)| {
-                let value = place.value(&self.words(place), *words, *bytes);
+            self.settings.read.iter().all(|(channel, entry)| {
+                let value = entry.value(&self.last_words(entry), *words, *bytes);
                 value.is_finite() && is_plausible(*channel, value)
             })
         };
@@ -142,8 +142,8 @@ impl Controller for Registers {
         }
         self.last = all;
         self.note(failed);
-        let reading = |(channel, place): (&Channel, &Place)| {
-            (*channel, Reading::good(self.settings.value(place, &self.words(place))))
+        let reading = |(channel, entry): (&Channel, &RegisterSettings)| {
+            (*channel, Reading::good(self.settings.value(entry, &self.last_words(entry))))
         };
         self.settings.read.iter().map(reading).collect()
     }
@@ -152,28 +152,28 @@ impl Controller for Registers {
         let settings = &self.settings;
         self.link.write_group(WRITES_WITHIN, |link| {
             for (target, value) in values {
-                let place = settings.place(*target);
-                let registers = settings.registers(&place, *value);
+                let entry = settings.register_settings(*target);
+                let registers = settings.registers(&entry, *value);
                 let registers = registers.ok_or(SettingError::DoesNotFit { value: *value })?;
                 let refused = |source| RegisterError::of_write(source, *target, *value, &registers);
-                link.write(place.register, &registers).map_err(refused)?;
+                link.write(entry.register, &registers).map_err(refused)?;
             }
             Ok(())
         })
     }
 
-    fn place(&self, channel: Channel) -> String {
-        let Some(place) = self.settings.read.get(&channel) else { return "no register".to_owned() };
+    fn describe_source(&self, channel: Channel) -> String {
+        let Some(entry) = self.settings.read.get(&channel) else { return "no register".to_owned() };
         let (words, bytes) = (self.settings.words.key(), self.settings.bytes.key());
         let order = format!("`words: {words}`, `bytes: {bytes}`");
-        let holds: Vec<_> = self.words(place).iter().map(|word| format!("{word:#06x}")).collect();
+        let holds: Vec<_> = self.last_words(entry).iter().map(|word| format!("{word:#06x}")).collect();
         format!(
             "register {} ({}, as {} with {order}, scale {}, offset {})",
-            place.register,
+            entry.register,
             holds.join(" "),
-            place.form.key(),
-            place.scale,
-            place.offset
+            entry.form.key(),
+            entry.scale,
+            entry.offset
         )
     }
 

@@ -1,9 +1,9 @@
 //! The settings of the driver as a campaign writes them below `modbus`.
 
 use crate::link::Table;
-use crate::registers::{Form, Order};
+use crate::registers::{NumberFormat, Order};
 use mapper_controller::{
-    Accepts, LimitError, Safe, Stand, Target, check_range, check_resolution, check_scale,
+    AcceptedRanges, LimitError, SafeSettings, Stand, Target, check_range, check_resolution, check_scale,
 };
 use mapper_core::{BackendError, Channel};
 use mapper_yaml::units::{Duration, Frequency, Quantity};
@@ -39,13 +39,13 @@ pub(crate) struct Settings {
     pub(crate) bytes: Order,
     /// Location of each channel.
     #[serde(deserialize_with = "mapper_driver::by_channel")]
-    pub(crate) read: BTreeMap<Channel, Place>,
+    pub(crate) read: BTreeMap<Channel, RegisterSettings>,
     /// Location of each setpoint.
-    pub(crate) write: Writes,
+    pub(crate) write: WriteSettings,
     /// Accepted setpoints.
-    pub(crate) accepts: Accepts,
+    pub(crate) accepts: AcceptedRanges,
     /// The safe trajectory.
-    pub(crate) safe: Safe,
+    pub(crate) safe: SafeSettings,
 }
 
 fn own_unit() -> u8 {
@@ -55,12 +55,12 @@ fn own_unit() -> u8 {
 /// A number in registers; the SI value is the number times `scale` plus `offset`.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Place {
+pub(crate) struct RegisterSettings {
     /// Address of the first register, from 0 as on the wire: 40001 of a manual is holding register 0.
     pub(crate) register: u16,
     #[serde(default, rename = "type")]
-    pub(crate) form: Form,
-    #[serde(default = "one")]
+    pub(crate) form: NumberFormat,
+    #[serde(default = "default_scale")]
     pub(crate) scale: f64,
     #[serde(default)]
     pub(crate) offset: f64,
@@ -68,7 +68,7 @@ pub(crate) struct Place {
     pub(crate) table: Table,
 }
 
-fn one() -> f64 {
+fn default_scale() -> f64 {
     1.0
 }
 
@@ -78,15 +78,15 @@ fn holding() -> Table {
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Writes {
-    pub(crate) p3: Place,
-    pub(crate) t3: Place,
-    pub(crate) valve: Place,
-    pub(crate) oil_temperature: Place,
+pub(crate) struct WriteSettings {
+    pub(crate) p3: RegisterSettings,
+    pub(crate) t3: RegisterSettings,
+    pub(crate) valve: RegisterSettings,
+    pub(crate) oil_temperature: RegisterSettings,
     /// 1: air on, 0: off.
-    pub(crate) air: Place,
+    pub(crate) air: RegisterSettings,
     /// Counts up twice a second; the controller cuts the air if it stops.
-    pub(crate) heartbeat: Place,
+    pub(crate) heartbeat: RegisterSettings,
 }
 
 /// Why settings are rejected.
@@ -110,12 +110,12 @@ pub(crate) enum SettingError {
     ReadsSetpoint { register: u16, key: &'static str },
 }
 
-pub(crate) fn wrong(path: impl Into<String>, error: SettingError) -> BackendError {
+pub(crate) fn settings_error(path: impl Into<String>, error: SettingError) -> BackendError {
     BackendError::Settings { backend: NAME.to_owned(), path: path.into(), source: Box::new(error) }
 }
 
 fn bound(path: &str, value: f64, unit: &'static str, low: f64, high: f64) -> Result<f64, BackendError> {
-    check_range(value, unit, low, high).map_err(|error| wrong(path, error.into()))
+    check_range(value, unit, low, high).map_err(|error| settings_error(path, error.into()))
 }
 
 impl Settings {
@@ -123,7 +123,7 @@ impl Settings {
     pub(crate) fn read(value: &Value) -> Result<Settings, BackendError> {
         let settings: Settings = serde_path_to_error::deserialize(value).map_err(|error| {
             let path = error.path().to_string();
-            wrong(path.trim_start_matches('.'), SettingError::Form(error.into_inner()))
+            settings_error(path.trim_start_matches('.'), SettingError::Form(error.into_inner()))
         })?;
         settings.check()?;
         Ok(settings)
@@ -135,7 +135,7 @@ impl Settings {
     }
 
     /// Location of a target.
-    pub(crate) fn place(&self, target: Target) -> Place {
+    pub(crate) fn register_settings(&self, target: Target) -> RegisterSettings {
         match target {
             Target::P3 => self.write.p3,
             Target::T3 => self.write.t3,
@@ -163,33 +163,33 @@ impl Settings {
 
     fn check(&self) -> Result<(), BackendError> {
         bound("timeout", self.timeout_s(), "s", 0.01, 0.8)?;
-        self.stand().check().map_err(|(path, error)| wrong(path, error.into()))?;
-        for (channel, place) in &self.read {
-            self.check_place(&format!("read.{channel}"), place)?;
+        self.stand().check().map_err(|(path, error)| settings_error(path, error.into()))?;
+        for (channel, entry) in &self.read {
+            self.check_register(&format!("read.{channel}"), entry)?;
         }
         self.check_read_registers()?;
-        let mut taken: Vec<u16> = Vec::new();
+        let mut used: Vec<u16> = Vec::new();
         for target in Target::ALL {
-            let (path, place) = (format!("write.{}", target.key()), self.place(target));
-            if place.table != Table::Holding {
-                return Err(wrong(format!("{path}.table"), SettingError::NotWritten));
+            let (path, entry) = (format!("write.{}", target.key()), self.register_settings(target));
+            if entry.table != Table::Holding {
+                return Err(settings_error(format!("{path}.table"), SettingError::NotWritten));
             }
-            self.check_place(&path, &place)?;
+            self.check_register(&path, &entry)?;
             let range = self.accepts.range(target);
-            if place.form.is_whole() {
-                check_resolution(target, place.scale, range)
-                    .map_err(|error| wrong(path.clone(), error.into()))?;
+            if entry.form.is_whole() {
+                check_resolution(target, entry.scale, range)
+                    .map_err(|error| settings_error(path.clone(), error.into()))?;
             }
             for value in [range.low, range.high] {
-                if self.registers(&place, value).is_none() {
-                    return Err(wrong(path, SettingError::DoesNotFit { value }));
+                if self.registers(&entry, value).is_none() {
+                    return Err(settings_error(path, SettingError::DoesNotFit { value }));
                 }
             }
-            for register in place.registers() {
-                if taken.contains(&register) {
-                    return Err(wrong(path, SettingError::Shared(register)));
+            for register in entry.registers() {
+                if used.contains(&register) {
+                    return Err(settings_error(path, SettingError::Shared(register)));
                 }
-                taken.push(register);
+                used.push(register);
             }
         }
         Ok(())
@@ -197,18 +197,19 @@ impl Settings {
 
     /// Each channel has its own register, which is not a written one.
     fn check_read_registers(&self) -> Result<(), BackendError> {
-        let mut taken: BTreeMap<(Table, u16), Channel> = BTreeMap::new();
-        for (channel, place) in &self.read {
-            let at = |error| wrong(format!("read.{channel}.register"), error);
-            for register in place.registers() {
-                if let Some(other) = taken.insert((place.table, register), *channel)
+        let mut used: BTreeMap<(Table, u16), Channel> = BTreeMap::new();
+        for (channel, entry) in &self.read {
+            let at = |error| settings_error(format!("read.{channel}.register"), error);
+            for register in entry.registers() {
+                if let Some(other) = used.insert((entry.table, register), *channel)
                     && other != *channel
                 {
                     return Err(at(SettingError::ReadTwice { register, other }));
                 }
-                let goes_to = |target: &Target| self.place(*target).registers().contains(&register);
+                let goes_to =
+                    |target: &Target| self.register_settings(*target).registers().contains(&register);
                 if let Some(target) =
-                    Target::ALL.into_iter().find(goes_to).filter(|_| place.table == Table::Holding)
+                    Target::ALL.into_iter().find(goes_to).filter(|_| entry.table == Table::Holding)
                 {
                     return Err(at(SettingError::ReadsSetpoint { register, key: target.key() }));
                 }
@@ -217,24 +218,24 @@ impl Settings {
         Ok(())
     }
 
-    fn check_place(&self, path: &str, place: &Place) -> Result<(), BackendError> {
-        check_scale(place.scale).map_err(|error| wrong(format!("{path}.scale"), error.into()))?;
-        bound(&format!("{path}.register"), f64::from(place.register), "", 0.0, f64::from(u16::MAX - 4))
+    fn check_register(&self, path: &str, entry: &RegisterSettings) -> Result<(), BackendError> {
+        check_scale(entry.scale).map_err(|error| settings_error(format!("{path}.scale"), error.into()))?;
+        bound(&format!("{path}.register"), f64::from(entry.register), "", 0.0, f64::from(u16::MAX - 4))
             .map(drop)
     }
 
     /// The register contents for a value, SI.
-    pub(crate) fn registers(&self, place: &Place, value: f64) -> Option<Vec<u16>> {
-        place.form.registers((value - place.offset) / place.scale, self.words, self.bytes)
+    pub(crate) fn registers(&self, entry: &RegisterSettings, value: f64) -> Option<Vec<u16>> {
+        entry.form.registers((value - entry.offset) / entry.scale, self.words, self.bytes)
     }
 
     /// The value in registers, SI; NaN without a value.
-    pub(crate) fn value(&self, place: &Place, registers: &[u16]) -> f64 {
-        place.value(registers, self.words, self.bytes)
+    pub(crate) fn value(&self, entry: &RegisterSettings, registers: &[u16]) -> f64 {
+        entry.value(registers, self.words, self.bytes)
     }
 }
 
-impl Place {
+impl RegisterSettings {
     /// Its registers.
     pub(crate) fn registers(&self) -> std::ops::Range<u16> {
         self.register..self.register.saturating_add(self.form.count())

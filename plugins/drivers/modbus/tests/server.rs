@@ -85,9 +85,9 @@ impl Stand {
         let mut answer = [0; 12];
         stream.read_exact(&mut answer).unwrap();
         assert_eq!(answer, request);
-        let begun = Instant::now();
+        let began = Instant::now();
         while self.registers(151, 1) != [u16::from(how)] {
-            assert!(begun.elapsed().as_secs() < 60, "the server does not take it");
+            assert!(began.elapsed().as_secs() < 60, "the server does not take it");
         }
     }
 
@@ -109,14 +109,14 @@ const SETPOINTS: Setpoints = Setpoints {
 
 /// Polls every half second until `reached`; returns the duration.
 fn poll_until(rig: &mut Driver, t_s: &mut f64, reached: impl Fn(&SampleBatch) -> bool) -> f64 {
-    let begun = Instant::now();
+    let began = Instant::now();
     loop {
         *t_s += 0.5;
         let batch = rig.poll(*t_s).unwrap();
         if reached(&batch) {
-            return begun.elapsed().as_secs_f64();
+            return began.elapsed().as_secs_f64();
         }
-        assert!(begun.elapsed().as_secs() < 60, "nothing came of it in a minute");
+        assert!(began.elapsed().as_secs() < 60, "nothing came of it in a minute");
     }
 }
 
@@ -175,10 +175,10 @@ fn a_server_that_is_gone_for_good_is_reported_in_time() {
     poll_until(&mut rig, &mut t_s, reads);
     stand.kill();
     // The driver reports it: the host's deadline is longer here.
-    let begun = Instant::now();
+    let began = Instant::now();
     let lost = rig.make_safe().unwrap_err();
     assert!(matches!(lost, BackendError::Lost { .. }), "{lost}");
-    assert!(begun.elapsed() < SLOW_TIMEOUTS.call / 2, "{:?}", begun.elapsed());
+    assert!(began.elapsed() < SLOW_TIMEOUTS.call / 2, "{:?}", began.elapsed());
     poll_until(&mut rig, &mut t_s, reads_nothing);
     // A rig is not disarmed until its safe state is confirmed.
     assert!(matches!(rig.disarm(), Err(BackendError::Lost { .. })));

@@ -86,7 +86,7 @@ fn trust(store: &Store, endpoint: &str, wanted: Option<String>, replace: bool) -
     }
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     let offered = runtime.block_on(endpoints(store, endpoint))?;
-    let der = offered.iter().map(|one| one.server_certificate.as_ref()).find(|der| !der.is_empty());
+    let der = offered.iter().map(|offer| offer.server_certificate.as_ref()).find(|der| !der.is_empty());
     let der = der.ok_or_else(|| CommandError::NoCertificate(endpoint.to_owned()))?;
     let certificate = X509::from_der(der).map_err(|_| CommandError::NoCertificate(endpoint.to_owned()))?;
     let found = fingerprint(der);
@@ -100,8 +100,8 @@ fn trust(store: &Store, endpoint: &str, wanted: Option<String>, replace: bool) -
     if let Some(wanted) = wanted.filter(|wanted| plain(wanted) != plain(&found)) {
         return Err(CommandError::OtherFingerprint { found, wanted });
     }
-    if let Some(there) = store.trusted(endpoint)? {
-        let pinned = fingerprint(&crate::link::der(&there));
+    if let Some(pinned_certificate) = store.trusted(endpoint)? {
+        let pinned = fingerprint(&crate::link::der(&pinned_certificate));
         if pinned != found && !replace {
             return Err(StoreError::Changed { server: endpoint.to_owned(), found, pinned }.into());
         }

@@ -39,30 +39,30 @@ pub(crate) enum LinkError {
     Late { server: String, within: Duration },
     #[error("{server} did not answer a read within {} ms (`timeout`, at most 800 ms; slower controllers are not supported)", within.as_millis())]
     Slow { server: String, within: Duration },
-    #[error("{server}: {words}")]
-    Failed { server: String, words: String },
+    #[error("{server}: {message}")]
+    Failed { server: String, message: String },
     #[error(
-        "{server} refuses the login: {words}. Check user and password, and whether the server trusts {own}"
+        "{server} refuses the login: {message}. Check user and password, and whether the server trusts {certificate_path}"
     )]
-    LoginRefused { server: String, words: String, own: String },
+    LoginRefused { server: String, message: String, certificate_path: String },
     #[error(
         "no server answers at {server}: {source}. Check that the server runs, and its address and port (`mapper-lab-server --opcua` prints its own)"
     )]
     NotReachable { server: String, source: std::io::Error },
     #[error(
-        "{server} has no session left: {words}. Close the programs that use its sessions, wait until the server drops abandoned ones (a minute \
+        "{server} has no session left: {message}. Close the programs that use its sessions, wait until the server drops abandoned ones (a minute \
                  to an hour), or restart it"
     )]
-    NoSessionLeft { server: String, words: String },
+    NoSessionLeft { server: String, message: String },
     #[error("{server} has no endpoint with {policy}; it offers {offered}")]
     NoEndpoint { server: String, policy: String, offered: String },
-    #[error("the node {node} {words}")]
-    Node { node: NodeId, words: String },
+    #[error("the node {node} {message}")]
+    Node { node: NodeId, message: String },
     #[error(
-        "{server} refuses {value} for the node {node}: {words}. Check its `unit`, or `scale` and `offset`, below `write`, and the range that the \
+        "{server} refuses {value} for the node {node}: {message}. Check its `unit`, or `scale` and `offset`, below `write`, and the range that the \
                  server accepts"
     )]
-    Refused { server: String, node: NodeId, value: f64, words: String },
+    Refused { server: String, node: NodeId, value: f64, message: String },
     #[error("the node {node} cannot hold {value}")]
     DoesNotFit { node: NodeId, value: f64 },
     #[error("the type of {} is not known yet", .0.key())]
@@ -139,13 +139,16 @@ fn client(store: &Store, tries: i32) -> Result<Client, String> {
 
 /// The endpoints of a server.
 pub(crate) async fn endpoints(store: &Store, endpoint: &str) -> Result<Vec<EndpointDescription>, LinkError> {
-    let failed = |words: String| LinkError::Failed { server: server(endpoint).to_owned(), words };
+    let failed = |message: String| LinkError::Failed { server: server(endpoint).to_owned(), message };
     let client = client(store, 0).map_err(failed)?;
-    let late = || LinkError::Late { server: server(endpoint).to_owned(), within: CONNECT_TIMEOUT };
-    let away = |source| LinkError::NotReachable { server: server(endpoint).to_owned(), source };
-    timeout(CONNECT_TIMEOUT, check_reachable(server(endpoint))).await.map_err(|_| late())?.map_err(away)?;
-    let asked = timeout(CONNECT_TIMEOUT, client.get_server_endpoints_from_url(endpoint));
-    asked.await.map_err(|_| late())?.map_err(|error| failed(error.to_string()))
+    let late_error = || LinkError::Late { server: server(endpoint).to_owned(), within: CONNECT_TIMEOUT };
+    let not_reachable = |source| LinkError::NotReachable { server: server(endpoint).to_owned(), source };
+    timeout(CONNECT_TIMEOUT, check_reachable(server(endpoint)))
+        .await
+        .map_err(|_| late_error())?
+        .map_err(not_reachable)?;
+    let endpoints_request = timeout(CONNECT_TIMEOUT, client.get_server_endpoints_from_url(endpoint));
+    endpoints_request.await.map_err(|_| late_error())?.map_err(|error| failed(error.to_string()))
 }
 
 /// Status codes for a refused login: a retry could lock the account.
@@ -182,8 +185,8 @@ impl Link {
         server(&self.endpoint).to_owned()
     }
 
-    fn failed(&self, words: impl Into<String>) -> LinkError {
-        LinkError::Failed { server: self.server(), words: words.into() }
+    fn failed(&self, message: impl Into<String>) -> LinkError {
+        LinkError::Failed { server: self.server(), message: message.into() }
     }
 
     /// The endpoint with the requested security and the pinned certificate.
@@ -212,9 +215,9 @@ impl Link {
         let mut found = found.clone();
         if self.security != Security::None {
             let pinned = store.pinned(&self.endpoint)?;
-            let (there, pinned) = (found.server_certificate.as_ref().to_vec(), der(&pinned));
-            if there != pinned {
-                let (found, pinned) = (fingerprint(&there), fingerprint(&pinned));
+            let (offered, pinned) = (found.server_certificate.as_ref().to_vec(), der(&pinned));
+            if offered != pinned {
+                let (found, pinned) = (fingerprint(&offered), fingerprint(&pinned));
                 return Err(StoreError::Changed { server: self.endpoint.clone(), found, pinned }.into());
             }
         }
@@ -228,13 +231,13 @@ impl Link {
         self.close();
         let until = Instant::now() + OPEN_TIMEOUT;
         let store = Store::of_environment()?;
-        let own = match self.security {
+        let certificate_path = match self.security {
             Security::None => None,
             _ => Some(store.own()?),
         };
         let offered = self.runtime.block_on(endpoints(&store, &self.endpoint))?;
         let endpoint = self.choose(&store, offered)?;
-        let client = client(&store, -1).map_err(|words| self.failed(words))?;
+        let client = client(&store, -1).map_err(|message| self.failed(message))?;
         let identity = self.user.as_ref().map_or(IdentityToken::Anonymous, |user| {
             IdentityToken::new_user_name(user.name.as_str(), user.password.as_str())
         });
@@ -242,7 +245,7 @@ impl Link {
         let tried = try_login(&client, &endpoint, identity.clone());
         match self.runtime.block_on(async { timeout(left, tried).await }) {
             Ok(Ok(())) => {}
-            Ok(Err(error)) => return Err(self.login_error(error.status(), own)),
+            Ok(Err(error)) => return Err(self.login_error(error.status(), certificate_path)),
             Err(_) => return Err(LinkError::Late { server: self.server(), within: left }),
         }
         let built = client
@@ -273,22 +276,25 @@ impl Link {
         connected.map_err(|error| {
             self.close();
             match error {
-                Some(status) => self.login_error(status, own),
+                Some(status) => self.login_error(status, certificate_path),
                 None => LinkError::Late { server: self.server(), within: left },
             }
         })
     }
 
     /// Why the session was refused.
-    fn login_error(&self, status: StatusCode, own: Option<PathBuf>) -> LinkError {
-        let (server, words) = (self.server(), describe_status(status));
+    fn login_error(&self, status: StatusCode, certificate_path: Option<PathBuf>) -> LinkError {
+        let (server, message) = (self.server(), describe_status(status));
         match status {
-            StatusCode::BadTooManySessions => LinkError::NoSessionLeft { server, words },
+            StatusCode::BadTooManySessions => LinkError::NoSessionLeft { server, message },
             status if is_refusal(status) => {
-                let own = own.map_or_else(|| "it".to_owned(), |own| own.display().to_string());
-                LinkError::LoginRefused { server, words, own }
+                let certificate_path = certificate_path.map_or_else(
+                    || "it".to_owned(),
+                    |certificate_path| certificate_path.display().to_string(),
+                );
+                LinkError::LoginRefused { server, message, certificate_path }
             }
-            _ => LinkError::Failed { server, words },
+            _ => LinkError::Failed { server, message },
         }
     }
 
@@ -345,8 +351,8 @@ impl Link {
                 match values.len() == nodes.len() {
                     true => Ok(Answer { values, sent: answer.response_header.timestamp }),
                     false => {
-                        let words = format!("{} values received, {} requested", values.len(), nodes.len());
-                        Err(self.failed(words))
+                        let message = format!("{} values received, {} requested", values.len(), nodes.len());
+                        Err(self.failed(message))
                     }
                 }
             }
@@ -355,14 +361,14 @@ impl Link {
         answer
     }
 
-    fn update_connection(&mut self, there: bool) {
-        match (there, self.lost_at) {
+    fn update_connection(&mut self, is_connected: bool) {
+        match (is_connected, self.lost_at) {
             (false, None) => self.lost_at = Some(Instant::now()),
             (true, Some(since)) => {
                 self.lost_at = None;
-                let words =
+                let message =
                     format!("{} answers again after {:.1} s", self.server(), since.elapsed().as_secs_f64());
-                self.remark = Some(words);
+                self.remark = Some(message);
             }
             _ => {}
         }
@@ -428,7 +434,7 @@ impl Link {
                 server: self.server(),
                 node: node.clone(),
                 value: *value,
-                words: describe_status(*status),
+                message: describe_status(*status),
             }),
         }
     }

@@ -1,7 +1,7 @@
 //! The nodes of the rig.
 
 use crate::link::{Link, LinkError};
-use crate::settings::{CheckedSettings, SettingError, Settings, Timestamps, wrong};
+use crate::settings::{CheckedSettings, SettingError, Settings, Timestamps, settings_error};
 use crate::value::{describe_status, is_number, is_whole, number, quality, same_type, type_name};
 use mapper_controller::{Controller, Reading, Target, check_resolution, rig};
 use mapper_core::{Backend, BackendError, Channel, Quality};
@@ -21,7 +21,7 @@ pub(crate) fn open(value: &Value) -> Result<Box<dyn Backend>, BackendError> {
     let within = Duration::from_secs_f64(checked.settings.timeout_s());
     let (endpoint, user) = (checked.settings.endpoint.clone(), checked.user.take());
     let link = Link::new(endpoint, checked.settings.security, user, within)
-        .map_err(|error| wrong("", SettingError::Store(error.to_string())))?;
+        .map_err(|error| settings_error("", SettingError::Store(error.to_string())))?;
     let nodes = checked.reads.iter().map(|(_, node, _)| node.clone()).collect();
     Ok(rig(checked.settings.stand(), Nodes { checked, link, nodes, types: BTreeMap::new(), remark: None }))
 }
@@ -72,8 +72,11 @@ impl Nodes {
 
     /// When the source took a value, s since arming, for a sample at `t_s`. The age of the value is taken by the server's own clock.
     fn source_t_s(&self, value: &DataValue, sent: &DateTime, t_s: f64) -> Option<f64> {
-        let taken = value.source_timestamp.as_ref().filter(|taken| !taken.is_null() && !sent.is_null())?;
-        (self.checked.settings.timestamps == Timestamps::Source).then(|| t_s - between_s(taken, sent))
+        let source_time = value
+            .source_timestamp
+            .as_ref()
+            .filter(|source_time| !source_time.is_null() && !sent.is_null())?;
+        (self.checked.settings.timestamps == Timestamps::Source).then(|| t_s - between_s(source_time, sent))
     }
 
     /// Whether a value is stamped later than the server's own answer; its age is unknown then.
@@ -87,7 +90,7 @@ impl Nodes {
         if let Some(status) = value.status.filter(|status| is_permanent(*status)) {
             return Err(LinkError::Node {
                 node: node.clone(),
-                words: format!("cannot be read: {}", describe_status(status)),
+                message: format!("cannot be read: {}", describe_status(status)),
             });
         }
         match &value.value {
@@ -99,7 +102,7 @@ impl Nodes {
             Some(value) if !value.is_empty() => {
                 return Err(LinkError::Node {
                     node: node.clone(),
-                    words: format!("holds no number: {value}"),
+                    message: format!("holds no number: {value}"),
                 });
             }
             _ => {}
@@ -124,30 +127,30 @@ impl Nodes {
             Some(9) => Variant::UInt64(0),
             Some(10) => Variant::Float(0.0),
             Some(11) => Variant::Double(0.0),
-            _ => return Err(LinkError::Node { node: node.clone(), words: "holds no number".to_owned() }),
+            _ => return Err(LinkError::Node { node: node.clone(), message: "holds no number".to_owned() }),
         })
     }
 
     /// Whether this type can hold every accepted setpoint.
-    fn check_node_range(&self, target: Target, node: &NodeId, there: &Variant) -> Result<(), LinkError> {
-        let wrong = |words: String| Err(LinkError::Node { node: node.clone(), words });
+    fn check_node_range(&self, target: Target, node: &NodeId, variant: &Variant) -> Result<(), LinkError> {
+        let node_error = |message: String| Err(LinkError::Node { node: node.clone(), message });
         let Some((_, scale)) = self.checked.write(target) else { return Err(LinkError::Unknown(target)) };
         let range = self.checked.settings.accepts.range(target);
         let key = target.key();
-        let name = type_name(there);
+        let name = type_name(variant);
         // Only air may be a Boolean.
-        let is_bool = matches!(there, Variant::Boolean(_)) && target != Target::Air;
+        let is_bool = matches!(variant, Variant::Boolean(_)) && target != Target::Air;
         if let Some(value) = [range.high, range.low]
             .into_iter()
-            .find(|value| is_bool || same_type(there, scale.outside(*value)).is_none())
+            .find(|value| is_bool || same_type(variant, scale.outside(*value)).is_none())
         {
-            return wrong(format!(
+            return node_error(format!(
                 "({name}) cannot hold {} for `write.{key}`; check the node and its `unit`, or `scale` and `offset`",
                 scale.outside(value)
             ));
         }
         match check_resolution(target, scale.step(), range) {
-            Err(error) if is_whole(there) => wrong(format!("({name}, `write.{key}`) {error}")),
+            Err(error) if is_whole(variant) => node_error(format!("({name}, `write.{key}`) {error}")),
             _ => Ok(()),
         }
     }
@@ -159,9 +162,9 @@ impl Nodes {
         let nodes: Vec<NodeId> = written.iter().map(|(_, node)| node.clone()).collect();
         let values = self.link.read(&nodes, AttributeId::Value)?.values;
         for ((target, node), value) in written.into_iter().zip(values) {
-            let there = self.type_of(&node, &value)?;
-            self.check_node_range(target, &node, &there)?;
-            self.types.insert(target, there);
+            let variant = self.type_of(&node, &value)?;
+            self.check_node_range(target, &node, &variant)?;
+            self.types.insert(target, variant);
         }
         let levels = self.link.read(&nodes, AttributeId::UserAccessLevel)?.values;
         let locked = nodes
@@ -171,15 +174,15 @@ impl Nodes {
         match locked {
             None => Ok(()),
             Some((node, _)) => {
-                let words = "is not writable for this user".to_owned();
-                Err(LinkError::Node { node: node.clone(), words })
+                let message = "is not writable for this user".to_owned();
+                Err(LinkError::Node { node: node.clone(), message })
             }
         }
     }
 }
 
 /// Targets of equal rank go into one request: the valve before pressures, the air last.
-fn rank(target: Target) -> u8 {
+fn write_rank(target: Target) -> u8 {
     match target {
         Target::Valve => 0,
         Target::P3 | Target::T3 | Target::OilTemperature => 1,
@@ -197,12 +200,12 @@ impl Controller for Nodes {
         self.compare_clocks(&answer.sent);
         for ((channel, node, _), value) in self.checked.reads.iter().zip(answer.values) {
             if let Some(status) = value.status.filter(|status| is_permanent(*status)) {
-                let words = format!("cannot be read: {}", describe_status(status));
-                return Err(LinkError::Node { node: node.clone(), words });
+                let message = format!("cannot be read: {}", describe_status(status));
+                return Err(LinkError::Node { node: node.clone(), message });
             }
-            if let Some(there) = value.value.filter(|there| !there.is_empty() && !is_number(there)) {
-                let words = format!("holds no number, as `read.{channel}` needs: {there}");
-                return Err(LinkError::Node { node: node.clone(), words });
+            if let Some(variant) = value.value.filter(|variant| !variant.is_empty() && !is_number(variant)) {
+                let message = format!("holds no number, as `read.{channel}` needs: {variant}");
+                return Err(LinkError::Node { node: node.clone(), message });
             }
         }
         self.read_types()
@@ -219,18 +222,18 @@ impl Controller for Nodes {
                     .filter(|_| quality != Quality::Good)
                     .unwrap_or_default();
                 // A node may change its type at run time: a Boolean is not a reading.
-                let there = value.value.as_ref().filter(|there| is_number(there));
-                let inside = there.map_or(f64::NAN, |there| scale.inside(number(there)));
+                let variant = value.value.as_ref().filter(|variant| is_number(variant));
+                let inside = variant.map_or(f64::NAN, |variant| scale.inside(number(variant)));
                 let from_the_future = self.is_from_the_future(&value, &answer.sent);
                 if inside.is_nan() || from_the_future {
                     quality = Quality::Bad;
                 }
                 if reason.is_empty() && from_the_future {
                     reason = "its source timestamp is later than the server's clock".to_owned();
-                } else if let Some(there) =
-                    value.value.as_ref().filter(|there| reason.is_empty() && !is_number(there))
+                } else if let Some(variant) =
+                    value.value.as_ref().filter(|variant| reason.is_empty() && !is_number(variant))
                 {
-                    reason = format!("no number: {}", type_name(there));
+                    reason = format!("no number: {}", type_name(variant));
                 }
                 (
                     *channel,
@@ -247,16 +250,16 @@ impl Controller for Nodes {
 
     fn write(&mut self, values: &[(Target, f64)]) -> Result<(), LinkError> {
         let until = self.link.deadline(values.iter().all(|(target, _)| *target == Target::Heartbeat));
-        for together in values.chunk_by(|(a, _), (b, _)| rank(*a) == rank(*b)) {
-            let mut request = Vec::with_capacity(together.len());
-            for (target, value) in together {
-                let Some(((node, scale), there)) = self.checked.write(*target).zip(self.types.get(target))
+        for group in values.chunk_by(|(a, _), (b, _)| write_rank(*a) == write_rank(*b)) {
+            let mut request = Vec::with_capacity(group.len());
+            for (target, value) in group {
+                let Some(((node, scale), variant)) = self.checked.write(*target).zip(self.types.get(target))
                 else {
                     // Every target has a node, and a type once the rig is armed.
                     return Err(LinkError::Unknown(*target));
                 };
                 let outside = scale.outside(*value);
-                let fits = same_type(there, outside);
+                let fits = same_type(variant, outside);
                 let fits =
                     fits.ok_or_else(|| LinkError::DoesNotFit { node: node.clone(), value: outside })?;
                 request.push((node.clone(), fits, outside));
@@ -270,7 +273,7 @@ impl Controller for Nodes {
         self.remark.take().or_else(|| self.link.remark())
     }
 
-    fn place(&self, channel: Channel) -> String {
+    fn describe_source(&self, channel: Channel) -> String {
         let node = self.checked.reads.iter().find(|(one, ..)| *one == channel);
         let Some((_, node, _)) = node else { return "no node".to_owned() };
         format!("the node {node} (with {})", self.checked.unit(channel))

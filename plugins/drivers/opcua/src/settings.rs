@@ -1,6 +1,6 @@
 //! The settings of the driver as a campaign writes them below `opcua`.
 
-use mapper_controller::{Accepts, LimitError, Safe, Stand, Target, check_range, check_scale};
+use mapper_controller::{AcceptedRanges, LimitError, SafeSettings, Stand, Target, check_range, check_scale};
 use mapper_core::{BackendError, Channel, Dimension};
 use mapper_driver::{SecretError, secret};
 use mapper_yaml::units::{Duration, Frequency, Kind, Quantity};
@@ -39,13 +39,13 @@ pub(crate) struct Settings {
     pub(crate) timestamps: Timestamps,
     /// Location of each channel.
     #[serde(deserialize_with = "mapper_driver::by_channel")]
-    pub(crate) read: BTreeMap<Channel, Place>,
+    pub(crate) read: BTreeMap<Channel, NodeSettings>,
     /// Location of each setpoint.
-    pub(crate) write: Writes,
+    pub(crate) write: WriteSettings,
     /// Accepted setpoints.
-    pub(crate) accepts: Accepts,
+    pub(crate) accepts: AcceptedRanges,
     /// The safe trajectory.
-    pub(crate) safe: Safe,
+    pub(crate) safe: SafeSettings,
 }
 
 /// Whether this is a valid server address.
@@ -82,7 +82,7 @@ pub(crate) enum Timestamps {
 /// A node; its SI value is its value times `scale` plus `offset`, or it is in `unit`.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Place {
+pub(crate) struct NodeSettings {
     /// As `ns=2;s=Stand.P3` or `ns=3;i=1001`.
     #[serde(deserialize_with = "node_id")]
     pub(crate) node: NodeId,
@@ -95,22 +95,23 @@ pub(crate) struct Place {
 fn node_id<'de, D: serde::Deserializer<'de>>(from: D) -> Result<NodeId, D::Error> {
     let text = String::deserialize(from)?;
     NodeId::from_str(&text).map_err(|_| {
-        let words = format!("`{text}` is not a node id; they are written as ns=2;s=Stand.P3 or ns=3;i=1001");
-        serde::de::Error::custom(words)
+        let message =
+            format!("`{text}` is not a node id; they are written as ns=2;s=Stand.P3 or ns=3;i=1001");
+        serde::de::Error::custom(message)
     })
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Writes {
-    p3: Place,
-    t3: Place,
-    valve: Place,
-    oil_temperature: Place,
+pub(crate) struct WriteSettings {
+    p3: NodeSettings,
+    t3: NodeSettings,
+    valve: NodeSettings,
+    oil_temperature: NodeSettings,
     /// 1 or true: air on.
-    air: Place,
+    air: NodeSettings,
     /// Counts up twice a second; the controller cuts the air if it stops.
-    heartbeat: Place,
+    heartbeat: NodeSettings,
 }
 
 /// Why settings are rejected.
@@ -144,7 +145,7 @@ pub(crate) enum SettingError {
     Store(String),
 }
 
-pub(crate) fn wrong(path: impl Into<String>, error: impl Into<SettingError>) -> BackendError {
+pub(crate) fn settings_error(path: impl Into<String>, error: impl Into<SettingError>) -> BackendError {
     BackendError::Settings { backend: NAME.to_owned(), path: path.into(), source: Box::new(error.into()) }
 }
 
@@ -181,7 +182,7 @@ fn kind(channel: Channel) -> Option<Kind> {
     }
 }
 
-impl Place {
+impl NodeSettings {
     /// Conversion of a node's number to the value of a channel.
     fn scale(&self, channel: Channel) -> Result<Scale, SettingError> {
         let Some(unit) = &self.unit else {
@@ -193,12 +194,12 @@ impl Place {
             return Err(SettingError::TwoScales);
         }
         let kind = kind(channel);
-        let Some(found) = kind.and_then(|kind| kind.unit(unit)) else {
+        let Some(known_unit) = kind.and_then(|kind| kind.unit(unit)) else {
             let units = kind.map_or_else(|| "none".to_owned(), Kind::unit_list);
             return Err(SettingError::Unit { channel, unit: unit.clone(), units });
         };
-        let offset = found.to_inside(0.0);
-        Ok(Scale { scale: found.to_inside(1.0) - offset, offset })
+        let offset = known_unit.to_inside(0.0);
+        Ok(Scale { scale: known_unit.to_inside(1.0) - offset, offset })
     }
 }
 
@@ -221,37 +222,38 @@ impl Settings {
     pub(crate) fn read(value: &Value) -> Result<CheckedSettings, BackendError> {
         let settings: Settings = serde_path_to_error::deserialize(value).map_err(|error| {
             let path = error.path().to_string();
-            wrong(path.trim_start_matches('.'), SettingError::Form(error.into_inner()))
+            settings_error(path.trim_start_matches('.'), SettingError::Form(error.into_inner()))
         })?;
         settings.check()
     }
 
     fn check(self) -> Result<CheckedSettings, BackendError> {
         if !is_endpoint(&self.endpoint) {
-            return Err(wrong("endpoint", SettingError::Endpoint(self.endpoint.clone())));
+            return Err(settings_error("endpoint", SettingError::Endpoint(self.endpoint.clone())));
         }
-        check_range(self.timeout_s(), "s", 0.01, 0.8).map_err(|error| wrong("timeout", error))?;
-        self.stand().check().map_err(|(path, error)| wrong(path, error))?;
-        let user = secret(&self.user).map_err(|error| wrong("user", error))?;
-        let password = secret(&self.password).map_err(|error| wrong("password", error))?;
+        check_range(self.timeout_s(), "s", 0.01, 0.8).map_err(|error| settings_error("timeout", error))?;
+        self.stand().check().map_err(|(path, error)| settings_error(path, error))?;
+        let user = secret(&self.user).map_err(|error| settings_error("user", error))?;
+        let password = secret(&self.password).map_err(|error| settings_error("password", error))?;
         let user = match (user, password) {
             (None, None) => None,
             (Some(name), Some(password)) => Some(User { name, password }),
-            _ => return Err(wrong("user", SettingError::IncompleteUser)),
+            _ => return Err(settings_error("user", SettingError::IncompleteUser)),
         };
         if user.is_some() && self.security == Security::None {
-            return Err(wrong("security", SettingError::PasswordInClear));
+            return Err(settings_error("security", SettingError::PasswordInClear));
         }
         let mut reads: Vec<(Channel, NodeId, Scale)> = Vec::new();
-        for (channel, place) in &self.read {
-            let scale = place.scale(*channel).map_err(|error| wrong(format!("read.{channel}"), error))?;
-            let node = place.node.clone();
-            let at = |error: SettingError| wrong(format!("read.{channel}.node"), error);
-            if let Some((other, ..)) = reads.iter().find(|(_, there, _)| *there == node) {
+        for (channel, entry) in &self.read {
+            let scale =
+                entry.scale(*channel).map_err(|error| settings_error(format!("read.{channel}"), error))?;
+            let node = entry.node.clone();
+            let at = |error: SettingError| settings_error(format!("read.{channel}.node"), error);
+            if let Some((other, ..)) = reads.iter().find(|(_, other_node, _)| *other_node == node) {
                 return Err(at(SettingError::ReadTwice { node, other: *other }));
             }
             if let Some(target) =
-                Target::ALL.into_iter().find(|target| self.write.place(*target).0.node == node)
+                Target::ALL.into_iter().find(|target| self.write.node(*target).0.node == node)
             {
                 return Err(at(SettingError::ReadsSetpoint { node, key: target.key() }));
             }
@@ -259,13 +261,13 @@ impl Settings {
         }
         let mut writes: BTreeMap<Target, (NodeId, Scale)> = BTreeMap::new();
         for target in Target::ALL {
-            let (place, like) = self.write.place(target);
+            let (entry, unit_channel) = self.write.node(target);
             let path = format!("write.{}", target.key());
-            let scale = place.scale(like).map_err(|error| wrong(path.clone(), error))?;
-            if writes.values().any(|(node, _)| *node == place.node) {
-                return Err(wrong(path, SettingError::Shared(place.node.clone())));
+            let scale = entry.scale(unit_channel).map_err(|error| settings_error(path.clone(), error))?;
+            if writes.values().any(|(node, _)| *node == entry.node) {
+                return Err(settings_error(path, SettingError::Shared(entry.node.clone())));
             }
-            writes.insert(target, (place.node.clone(), scale));
+            writes.insert(target, (entry.node.clone(), scale));
         }
         Ok(CheckedSettings { settings: self, user, reads, writes })
     }
@@ -290,9 +292,9 @@ impl Settings {
     }
 }
 
-impl Writes {
+impl WriteSettings {
     /// Location of a target, and the channel that defines its permitted units.
-    fn place(&self, target: Target) -> (&Place, Channel) {
+    fn node(&self, target: Target) -> (&NodeSettings, Channel) {
         match target {
             Target::P3 => (&self.p3, Channel::P3),
             Target::T3 => (&self.t3, Channel::T3),
@@ -307,11 +309,11 @@ impl Writes {
 impl CheckedSettings {
     /// Unit of a channel, as written in the campaign.
     pub(crate) fn unit(&self, channel: Channel) -> String {
-        let Some(place) = self.settings.read.get(&channel) else { return String::new() };
-        match &place.unit {
+        let Some(entry) = self.settings.read.get(&channel) else { return String::new() };
+        match &entry.unit {
             Some(unit) => format!("`unit: {unit}`"),
             None => {
-                format!("scale {}, offset {}", place.scale.unwrap_or(1.0), place.offset.unwrap_or(0.0))
+                format!("scale {}, offset {}", entry.scale.unwrap_or(1.0), entry.offset.unwrap_or(0.0))
             }
         }
     }

@@ -25,8 +25,8 @@ pub(crate) fn number(value: &Variant) -> f64 {
 pub(crate) fn type_name(value: &Variant) -> String {
     match value.type_id() {
         VariantTypeId::Empty => "empty".to_owned(),
-        VariantTypeId::Scalar(one) => format!("{one:?}"),
-        VariantTypeId::Array(one, _) => format!("array of {one:?}"),
+        VariantTypeId::Scalar(scalar) => format!("{scalar:?}"),
+        VariantTypeId::Array(scalar, _) => format!("array of {scalar:?}"),
     }
 }
 
@@ -41,12 +41,12 @@ pub(crate) fn is_whole(value: &Variant) -> bool {
     !matches!(value, Variant::Float(_) | Variant::Double(_))
 }
 
-/// The number as a value of the same type as `there`; `None` if it does not fit.
-pub(crate) fn same_type(there: &Variant, number: f64) -> Option<Variant> {
-    let whole = number.round();
-    let within = |low: f64, high: f64| (low..=high).contains(&whole).then_some(whole);
+/// The number as a value of the same type as `variant`; `None` if it does not fit.
+pub(crate) fn same_type(variant: &Variant, number: f64) -> Option<Variant> {
+    let rounded = number.round();
+    let within = |low: f64, high: f64| (low..=high).contains(&rounded).then_some(rounded);
     // Each cast is of a whole number within the range of its type.
-    Some(match there {
+    Some(match variant {
         Variant::Boolean(_) => Variant::Boolean(within(0.0, 1.0)? == 1.0),
         Variant::SByte(_) => Variant::SByte(within(f64::from(i8::MIN), f64::from(i8::MAX))? as i8),
         Variant::Byte(_) => Variant::Byte(within(0.0, f64::from(u8::MAX))? as u8),
@@ -113,7 +113,7 @@ mod tests {
     /// Round trip of each type; a value that does not fit is not written.
     #[test]
     fn numbers_keep_the_type_of_the_node() {
-        for there in [
+        for variant in [
             Variant::SByte(0),
             Variant::Byte(0),
             Variant::Int16(0),
@@ -125,10 +125,10 @@ mod tests {
             Variant::Float(0.0),
             Variant::Double(0.0),
         ] {
-            let value = same_type(&there, 101.0).unwrap();
-            assert_eq!(value.type_id(), there.type_id());
+            let value = same_type(&variant, 101.0).unwrap();
+            assert_eq!(value.type_id(), variant.type_id());
             assert_eq!(number(&value), 101.0);
-            assert_eq!(same_type(&there, f64::NAN), None, "{there:?}");
+            assert_eq!(same_type(&variant, f64::NAN), None, "{variant:?}");
         }
         assert_eq!(same_type(&Variant::Boolean(false), 1.0), Some(Variant::Boolean(true)));
         assert_eq!(same_type(&Variant::Boolean(false), 2.0), None);

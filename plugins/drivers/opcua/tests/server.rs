@@ -159,14 +159,14 @@ fn setpoints(p3_pa: f64) -> Setpoints {
 
 /// Polls every half second until `reached`; returns the duration.
 fn poll_until(rig: &mut Driver, t_s: &mut f64, reached: impl Fn(&SampleBatch) -> bool) -> f64 {
-    let begun = Instant::now();
+    let start = Instant::now();
     loop {
         *t_s += 0.5;
         let batch = rig.poll(*t_s).unwrap();
         if reached(&batch) {
-            return begun.elapsed().as_secs_f64();
+            return start.elapsed().as_secs_f64();
         }
-        assert!(begun.elapsed().as_secs() < 60, "nothing came of it in a minute");
+        assert!(start.elapsed().as_secs() < 60, "nothing came of it in a minute");
     }
 }
 
@@ -189,7 +189,7 @@ fn reads_nothing(batch: &SampleBatch) -> bool {
     batch.last(Channel::T2).is_some_and(f64::is_nan)
 }
 
-fn words(error: BackendError) -> String {
+fn error_text(error: BackendError) -> String {
     let words = error.to_string();
     assert!(!words.contains(PASSWORD), "{words}");
     words
@@ -200,7 +200,7 @@ fn words(error: BackendError) -> String {
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn a_trusted_server_is_read_and_written() {
     let mut stand = Stand::new();
-    let refused = words(stand.driver(PASSWORD).arm().unwrap_err());
+    let refused = error_text(stand.driver(PASSWORD).arm().unwrap_err());
     assert!(refused.contains(&format!("mapper-backend-opcua trust {}", stand.endpoint())), "{refused}");
     let other = stand.command(&["trust", &stand.endpoint(), "--fingerprint", "00:11"]);
     assert!(!other.status.success() && String::from_utf8_lossy(&other.stderr).contains("nothing was pinned"));
@@ -220,7 +220,7 @@ fn a_trusted_server_is_read_and_written() {
 
     // The server returns with another certificate.
     stand.restart("other");
-    let changed = words(rig.arm().unwrap_err());
+    let changed = error_text(rig.arm().unwrap_err());
     assert!(changed.contains("another certificate than the trusted one"), "{changed}");
     let kept = stand.command(&["trust", &stand.endpoint()]);
     assert!(!kept.status.success() && String::from_utf8_lossy(&kept.stderr).contains("--replace"));
@@ -240,7 +240,7 @@ fn a_server_with_an_expired_certificate_is_refused() {
     let pin = pins.join(format!("127.0.0.1_{}.der", stand.port));
     assert!(!pin.exists());
     std::fs::copy(stand.scratch.path().join("expired/cert.der"), pin).unwrap();
-    let refused = words(stand.driver(PASSWORD).arm().unwrap_err());
+    let refused = error_text(stand.driver(PASSWORD).arm().unwrap_err());
     assert!(
         refused.contains("is not valid now (until 2") && refused.contains("give the server a new one"),
         "{refused}"
@@ -252,13 +252,13 @@ fn a_server_with_an_expired_certificate_is_refused() {
 fn a_wrong_password_and_a_refused_setpoint_are_reported_with_their_codes() {
     let stand = Stand::new();
     stand.trust();
-    let refused = words(stand.driver("wrong").arm().unwrap_err());
+    let refused = error_text(stand.driver("wrong").arm().unwrap_err());
     assert!(
         refused.contains("BadUserAccessDenied") || refused.contains("BadIdentityTokenRejected"),
         "{refused}"
     );
     let mut rig = stand.armed();
-    let refused = words(rig.set(&setpoints(800e3)).unwrap_err());
+    let refused = error_text(rig.set(&setpoints(800e3)).unwrap_err());
     assert!(refused.contains("BadOutOfRange") && refused.contains("ns=2;s=p3"), "{refused}");
     rig.make_safe().unwrap();
     rig.disarm().unwrap();
@@ -320,10 +320,10 @@ fn a_server_that_is_gone_for_good_is_reported_in_time() {
     poll_until(&mut rig, &mut t_s, reads);
     stand.kill();
     // The driver reports it: the host's deadline is longer here.
-    let begun = Instant::now();
+    let start = Instant::now();
     let lost = rig.make_safe().unwrap_err();
     assert!(matches!(lost, BackendError::Lost { .. }), "{lost}");
-    assert!(begun.elapsed() < SLOW_TIMEOUTS.call / 2, "{:?}", begun.elapsed());
+    assert!(start.elapsed() < SLOW_TIMEOUTS.call / 2, "{:?}", start.elapsed());
     poll_until(&mut rig, &mut t_s, reads_nothing);
     // A rig is not disarmed until its safe state is confirmed.
     assert!(matches!(rig.disarm(), Err(BackendError::Lost { .. })));
@@ -339,7 +339,7 @@ fn implausible_readings_are_refused_with_their_node_and_unit() {
     settings["read"]["P2"]["unit"] = json!("kPa");
     let mut rig =
         Driver::start_program(&stand.program(PASSWORD), "opcua", &settings, DEFAULT_TIMEOUTS).unwrap();
-    let refused = words(rig.arm().unwrap_err());
+    let refused = error_text(rig.arm().unwrap_err());
     // 1 bar within its noise, a thousand times: few digits, and the plausible range.
     let (_, message) = refused.split_once("at `read.P2`: P2 reads ").unwrap();
     let (number, rest) = message.split_once(" Pa from the node ns=2;s=P2 (with `unit: kPa`)").unwrap();
@@ -368,7 +368,7 @@ fn nodes_of_another_type_are_refused_before_anything_is_written() {
         settings[of][key]["node"] = json!(format!("ns=2;s={node}"));
         let mut rig =
             Driver::start_program(&stand.program(PASSWORD), "opcua", &settings, DEFAULT_TIMEOUTS).unwrap();
-        let refused = words(rig.arm().unwrap_err());
+        let refused = error_text(rig.arm().unwrap_err());
         assert!(parts.iter().all(|part| refused.contains(part)), "{node}: {refused}");
     }
     // Integers are accepted if they are fine enough.
@@ -391,14 +391,14 @@ fn wrong_passwords_use_up_no_sessions() {
     stand.trust();
     let mut wrong = stand.driver("wrong");
     for _ in 0..7 {
-        let refused = words(wrong.arm().unwrap_err());
+        let refused = error_text(wrong.arm().unwrap_err());
         assert!(
             refused.contains("BadUserAccessDenied") && refused.contains("user and password"),
             "{refused}"
         );
     }
     let mut rigs = [stand.armed(), stand.armed()];
-    let refused = words(stand.driver(PASSWORD).arm().unwrap_err());
+    let refused = error_text(stand.driver(PASSWORD).arm().unwrap_err());
     assert!(refused.contains("no session left: BadTooManySessions (0x80560000)"), "{refused}");
     for rig in &mut rigs {
         rig.make_safe().unwrap();
@@ -433,7 +433,7 @@ fn only_the_status_good_confirms_a_write() {
     for code in ["GoodClamped", "GoodCompletesAsynchronously"] {
         let stand = Stand::with(&["--answers", code]);
         stand.trust();
-        let lost = words(stand.driver(PASSWORD).arm().unwrap_err());
+        let lost = error_text(stand.driver(PASSWORD).arm().unwrap_err());
         assert!(lost.contains(code), "{lost}");
     }
 }

@@ -5,6 +5,7 @@ use crate::output::exit_code::Code;
 use crate::output::failure::Failure;
 use crate::output::standard_output;
 use clap::Args;
+use mapper_fleet::MergeOutcome;
 use mapper_report::merged_text;
 use serde_json::json;
 use std::path::PathBuf;
@@ -27,16 +28,26 @@ impl Merge {
         let merged = with_fleet(&self.directory, None, |fleet, kind, _, machine| {
             fleet.merge(kind, self.partial, machine)
         })?;
-        let result = merged.result.as_ref().map(|(path, _)| path);
-        if self.json {
-            standard_output::print_json(&json!({ "status": merged.status, "result": result }))?;
-        } else {
-            standard_output::print(&merged_text(&merged))?;
-        }
-        if merged.status.unfinished() == 0 {
-            return Ok(());
-        }
-        let why = "items are missing or failed; submit them again with `mapper fleet retry`, or run them here with `mapper fleet run --again`";
-        Err(if self.json { Failure::printed(Code::Incomplete) } else { Failure::new(Code::Incomplete, why) })
+        let reason = "items are missing or failed; submit them again with `mapper fleet retry`, or run them here with `mapper fleet run --again`";
+        print_merged(&merged, self.json, merged.status.unfinished() == 0, reason)
     }
+}
+
+/// Prints a merge; fails with `reason` if it is incomplete.
+pub fn print_merged(
+    merged: &MergeOutcome,
+    json: bool,
+    is_complete: bool,
+    reason: &str,
+) -> Result<(), Failure> {
+    if json {
+        let result = merged.result.as_ref().map(|(path, _)| path);
+        standard_output::print_json(&json!({ "status": merged.status, "result": result }))?;
+    } else {
+        standard_output::print(&merged_text(merged))?;
+    }
+    if is_complete {
+        return Ok(());
+    }
+    Err(if json { Failure::printed(Code::Incomplete) } else { Failure::new(Code::Incomplete, reason) })
 }

@@ -1,13 +1,10 @@
 //! `mapper fleet run`: runs a whole study on this computer.
 
+use crate::commands::fleet::merge::print_merged;
 use crate::fleet_directory::with_fleet;
-use crate::output::exit_code::Code;
 use crate::output::failure::Failure;
-use crate::output::standard_output;
 use clap::Args;
 use mapper_fleet::ItemSelection;
-use mapper_report::merged_text;
-use serde_json::json;
 use std::path::PathBuf;
 
 /// Do the remaining items of a study on this computer and merge it; after a stop, the same command continues
@@ -33,16 +30,7 @@ impl Run {
                 fleet.work(kind, ItemSelection::All, self.again, engine, machine)?;
                 fleet.merge(kind, false, machine)
             })?;
-        let result = merged.result.as_ref().map(|(path, _)| path);
-        if self.json {
-            standard_output::print_json(&json!({ "status": merged.status, "result": result }))?;
-        } else {
-            standard_output::print(&merged_text(&merged))?;
-        }
-        if result.is_some() {
-            return Ok(());
-        }
-        let why = "items are missing or failed; repeat the failed ones with `--again`";
-        Err(if self.json { Failure::printed(Code::Incomplete) } else { Failure::new(Code::Incomplete, why) })
+        let reason = "items are missing or failed; repeat the failed ones with `--again`";
+        print_merged(&merged, self.json, merged.result.is_some(), reason)
     }
 }

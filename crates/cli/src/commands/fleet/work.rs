@@ -39,24 +39,24 @@ impl Work {
             // clap requires one of them.
             (None, None) => ItemSelection::All,
         };
-        let worked =
+        let outcome =
             with_fleet(&self.directory, self.jobs.map(usize::from), |fleet, kind, engine, machine| {
                 fleet.work(kind, which, self.again, engine, machine)
             })?;
         if self.json {
             standard_output::print_json(
-                &json!({ "done": worked.done, "there": worked.there, "failed": worked.failed }),
+                &json!({ "done": outcome.done, "there": outcome.already_done, "failed": outcome.failed }),
             )?;
         } else {
-            let failed = worked.failed.iter().map(|(name, why)| format!("failed: {name}: {why}\n"));
+            let failed = outcome.failed.iter().map(|(name, why)| format!("failed: {name}: {why}\n"));
             let failed: String = failed.collect();
-            let (done, there) = (worked.done, worked.there);
+            let (done, there) = (outcome.done, outcome.already_done);
             standard_output::print(&format!("{failed}{done} done, {there} were already done\n"))?;
         }
-        if worked.failed.is_empty() {
+        if outcome.failed.is_empty() {
             return Ok(());
         }
-        let message = format!("{} items failed; repeat them with `--again`", worked.failed.len());
+        let message = format!("{} items failed; repeat them with `--again`", outcome.failed.len());
         Err(if self.json {
             Failure::printed(Code::Incomplete)
         } else {

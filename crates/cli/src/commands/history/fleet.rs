@@ -1,6 +1,6 @@
 //! `mapper history fleet`: statistics of a production.
 
-use crate::commands::history::{Chosen, open_history};
+use crate::commands::history::{RunSelection, open_history};
 use crate::output::failure::Failure;
 use crate::output::standard_output;
 use clap::Args;
@@ -13,7 +13,7 @@ use serde_json::json;
 #[derive(Debug, Args)]
 pub struct Fleet {
     #[command(flatten)]
-    chosen: Chosen,
+    selection: RunSelection,
     /// Print one JSON object on standard output
     #[arg(long)]
     json: bool,
@@ -22,11 +22,11 @@ pub struct Fleet {
 impl Fleet {
     pub fn run(&self) -> Result<(), Failure> {
         let (nights, points) =
-            open_history(&self.chosen)?.points(&self.chosen.filter()).map_err(SessionError::from)?;
+            open_history(&self.selection)?.points(&self.selection.filter()).map_err(SessionError::from)?;
         let productions = analyse_productions(&nights, &points);
         if self.json {
             return standard_output::print_json(
-                &json!({"history": self.chosen.db, "productions": productions}),
+                &json!({"history": self.selection.db, "productions": productions}),
             );
         }
         standard_output::print(&production_text(&productions))

@@ -33,14 +33,14 @@ pub struct Inspect {
 impl Inspect {
     pub fn run(&self) -> Result<(), Failure> {
         let registry = registry::registry();
-        let found = inspect_log(&registry, &self.log, self.with.clone(), self.machine.as_deref())?;
+        let log = inspect_log(&registry, &self.log, self.with.clone(), self.machine.as_deref())?;
         if let Some(file) = &self.write_channels {
-            self.replace.write(file, found.channel_map().as_bytes())?;
+            self.replace.write(file, log.channel_map().as_bytes())?;
         }
         if self.json {
-            return standard_output::print_json(&found.json());
+            return standard_output::print_json(&log.json());
         }
-        let mut text = log_text(found.format, &found.layout, &found.survey, &found.proposal);
+        let mut text = log_text(log.format, &log.layout, &log.survey, &log.proposal);
         match &self.write_channels {
             Some(file) => text.push_str(&format!("\nThe channel map is in {}.\n", file.display())),
             None => text.push_str("\nSave it with `--write-channels FILE`.\n"),

@@ -41,9 +41,9 @@ impl Convert {
         let to_reference = reference(self.to_reference.as_deref())?;
         let out = self.replace.map(&self.out, self.to.as_deref());
         let efficiencies = (self.efficiency, self.to_efficiency);
-        let given = self.reading.description()?;
-        let work =
-            registry::registry().convert_map_file(&self.map, &given, out, to_reference, efficiencies)?;
+        let description = self.reading.description()?;
+        let registry = registry::registry();
+        let work = registry.convert_map_file(&self.map, &description, out, to_reference, efficiencies)?;
         standard_output::print_map_work(&work, self.json)
     }
 }

@@ -23,8 +23,9 @@ pub struct Correct {
 
 impl Correct {
     pub fn run(&self) -> Result<(), Failure> {
-        let given = self.reading.description()?;
-        let work = registry::registry().correct_map_file(&self.map, &given, self.heat, self.target.map())?;
+        let description = self.reading.description()?;
+        let work =
+            registry::registry().correct_map_file(&self.map, &description, self.heat, self.target.map())?;
         standard_output::print_map_work(&work, self.target.json)
     }
 }

@@ -35,8 +35,8 @@ impl Fit {
             nodes: usize::from(self.nodes),
             leave_one_out: !self.no_leave_out,
         };
-        let given = self.reading.description()?;
-        let work = registry::registry().fit_map_file(&self.map, &given, &options, self.target.map())?;
+        let description = self.reading.description()?;
+        let work = registry::registry().fit_map_file(&self.map, &description, &options, self.target.map())?;
         standard_output::print_map_work(&work, self.target.json)
     }
 }

@@ -30,13 +30,14 @@ pub struct Reduce {
 
 impl Reduce {
     pub fn run(&self) -> Result<(), Failure> {
-        let (given, target) = (self.reading.description()?, &self.target);
+        let (description, target) = (self.reading.description()?, &self.target);
         let budget = self.budget.as_deref().map(|file| (file, target.replace.existing()));
         let machine = self.machine.as_deref();
         let registry = registry::registry();
-        let work = match self.turbine {
-            true => registry.reduce_turbine_points(&self.points, &given, machine, target.map())?,
-            false => registry.reduce_points(&self.points, &given, machine, target.map(), budget)?,
+        let work = if self.turbine {
+            registry.reduce_turbine_points(&self.points, &description, machine, target.map())?
+        } else {
+            registry.reduce_points(&self.points, &description, machine, target.map(), budget)?
         };
         standard_output::print_map_work(&work, target.json)
     }

@@ -25,8 +25,8 @@ pub(crate) fn conditions(page: &RunPage<'_>, display: &Display) -> Markup {
                 (facts("Test", &condition_facts(report)))
                 @if !read.is_empty() { (words_table("Conditions read at the ends of the steps", &CONDITION_HEADS, &read)) }
             }
-            @if let Some(words) = acceptance_words(judged) {
-                p { (prose(&words)) }
+            @if let Some(sentence) = acceptance_words(judged) {
+                p { (prose(&sentence)) }
                 (words_table("Acceptance", &ACCEPTANCE_HEADS, &acceptance))
             }
             @if !balance.is_empty() {

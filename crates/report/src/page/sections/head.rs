@@ -1,6 +1,6 @@
 //! Verdict and the most important actions.
 
-use crate::page::advice::{first_things, is_clean};
+use crate::page::advice::{is_clean, recommended_actions};
 use crate::page::prose::sentence;
 use crate::page::run_page::RunPage;
 use crate::{cover_facts, key_figures, verdict_sentence};
@@ -8,7 +8,7 @@ use maud::{Markup, html};
 
 pub(crate) fn head(page: &RunPage<'_>) -> Markup {
     let report = page.report;
-    let (clean, things) = (is_clean(page), first_things(report));
+    let (clean, actions) = (is_clean(page), recommended_actions(report));
     html! {
         header {
             h1 { "Compressor map of " (report.machine) }
@@ -19,13 +19,13 @@ pub(crate) fn head(page: &RunPage<'_>) -> Markup {
             }
             section.verdict.clean[clean] aria-labelledby="verdict" {
                 h2 #verdict { (verdict_sentence(report.points.iter().map(|scored| &scored.point))) }
-                @if let Some(words) = key_figures(report.map, report.points, report.campaign, report.plan) { p { (words) } }
-                @if things.is_empty() && clean {
+                @if let Some(figures) = key_figures(report.map, report.points, report.campaign, report.plan) { p { (figures) } }
+                @if actions.is_empty() && clean {
                     p { "Nothing needs attention before the map is used." }
                 }
-                @if !things.is_empty() {
+                @if !actions.is_empty() {
                     p { "Before the map is used:" }
-                    ul { @for thing in &things { li { (sentence(thing)) } } }
+                    ul { @for action in &actions { li { (sentence(action)) } } }
                 }
             }
             nav aria-label="Sections" {

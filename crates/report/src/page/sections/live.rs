@@ -4,12 +4,12 @@ use maud::{Markup, html};
 
 /// Buttons: request, label, confirmation question.
 const BUTTONS: [(&str, &str, &str); 4] = [
-    ("hold", "Hold", "Stay at this step until the operator lets it go on?"),
+    ("hold", "Hold", "Stay at this step until the operator continues?"),
     ("go-on", "Go on", "Let the held step end as planned?"),
     (
         "stop",
         "Stop at the end of the step",
-        "Stop the run at the end of this step, and identify what was measured?",
+        "Stop the run at the end of this step, and identify the measured steps?",
     ),
     ("safe", "Safe now", "Bring the rig into its safe state now? The step that is under way is lost."),
 ];

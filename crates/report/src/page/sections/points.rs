@@ -9,8 +9,8 @@ use maud::{Markup, html};
 
 pub(crate) fn points(page: &RunPage<'_>, display: &Display) -> Markup {
     let report = page.report;
-    let all = || report.points.iter().map(|scored| &scored.point);
-    let groups = point_groups(report.map, all(), display);
+    let identified = || report.points.iter().map(|scored| &scored.point);
+    let groups = point_groups(report.map, identified(), display);
     let heads = point_heads(display);
     html! {
         section #points aria-labelledby="points-head" {
@@ -20,13 +20,13 @@ pub(crate) fn points(page: &RunPage<'_>, display: &Display) -> Markup {
                  the housing is not; the uncertainty of readings is given with the instruments. The intervals of flow and pressure ratio are those \
                  of their sensors."
             }
-            @if let Some(shared) = shared_errors_text(all(), display.units()) { p { (shared) } }
+            @if let Some(shared) = shared_errors_text(identified(), display.units()) { p { (shared) } }
             @for group in &groups {
                 @let rows: Vec<Row> = group.points.iter().map(|point| row(page, display, point)).collect();
                 (data_table(&group.caption, &heads, &rows))
             }
             @if !report.corrections.is_empty() {
-                @let rows: Vec<Row> = correction_rows(report.corrections).into_iter().map(corrected).collect();
+                @let rows: Vec<Row> = correction_rows(report.corrections).into_iter().map(corrected_row).collect();
                 (data_table(&format!("Before and after the correction: {CORRECTION_CAPTION}"), &CORRECTION_HEADS.map(str::to_owned), &rows))
             }
         }
@@ -43,7 +43,7 @@ fn row(page: &RunPage<'_>, display: &Display, point: &IdentifiedPoint) -> Row {
     Row { step: Some(point.step), cells: cells.into_iter().enumerate().map(cell).collect() }
 }
 
-fn corrected(cells: [String; 6]) -> Row {
+fn corrected_row(cells: [String; 6]) -> Row {
     Row { step: None, cells: cells.into_iter().map(Cell::text).collect() }
 }
 

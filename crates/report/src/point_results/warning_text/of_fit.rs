@@ -15,8 +15,8 @@ pub(crate) fn sentence_of(warning: &Warning) -> Option<Sentence> {
             needed_dt2_k.to_string(),
             number(100.0 * eta_sigma, 1)
         ),
-        Warning::OffsetsDominate(interval) => wide(interval, true),
-        Warning::NoiseDominates(interval) => wide(interval, false),
+        Warning::OffsetsDominate(interval) => describe_wide_interval(interval, true),
+        Warning::NoiseDominates(interval) => describe_wide_interval(interval, false),
         Warning::RestsOnDeclaration { eta_error } => sentence!(
             "the recording alone determines the efficiencies only to {} points; the remainder depends on the declared alpha_A, probe and \
                  direction factor: record longer steps or larger gradients, or hold fixed what is known (`identification.joint`)",
@@ -29,7 +29,7 @@ pub(crate) fn sentence_of(warning: &Warning) -> Option<Sentence> {
             number(100.0 * eta_sigma, 1)
         ),
         Warning::NothingDeclared => {
-            sentence!("no sensor uncertainty is declared: the interval contains noise alone")
+            sentence!("no sensor uncertainty is declared: the interval contains only noise")
         }
         Warning::HeatCorrected(HeatCorrected::Corrected { apparent_eta }) => sentence!(
             "corrected from an apparent {} % by one heat for the whole map; the interval assumes it known to half its size",
@@ -39,7 +39,7 @@ pub(crate) fn sentence_of(warning: &Warning) -> Option<Sentence> {
             "without a heat of {} W its efficiency would be above 95 %: it did not take up that much",
             number(*heat_w, 0)
         ),
-        Warning::LeftOut(reason) => left_out(reason),
+        Warning::LeftOut(reason) => describe_left_out(reason),
         Warning::OffTheLaw { h_deviation_ratio } => sentence!(
             "h lies {} % off the law that the other points follow",
             signed(100.0 * h_deviation_ratio, 1)
@@ -49,7 +49,7 @@ pub(crate) fn sentence_of(warning: &Warning) -> Option<Sentence> {
     })
 }
 
-fn wide(interval: &WideInterval, from_offsets: bool) -> Sentence {
+fn describe_wide_interval(interval: &WideInterval, from_offsets: bool) -> Sentence {
     let WideInterval { eta_noise_sigma, eta_bias_sigma, signal } = interval;
     let all = number(100.0 * eta_noise_sigma.hypot(*eta_bias_sigma), 1);
     let (cause, other, other_sigma) = match (from_offsets, signal) {
@@ -88,7 +88,7 @@ fn wide(interval: &WideInterval, from_offsets: bool) -> Sentence {
     })
 }
 
-fn left_out(reason: &LeftOut) -> Sentence {
+fn describe_left_out(reason: &LeftOut) -> Sentence {
     match reason {
         LeftOut::PoorFit => {
             sentence!("this step fits far worse than the others and is excluded from the shared parameters")

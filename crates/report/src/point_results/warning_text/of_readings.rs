@@ -22,7 +22,7 @@ pub(crate) fn sentence_of(warning: &Warning) -> Option<Sentence> {
             number(*to_s, 0)
         ),
         Warning::Stuck { channel, duration_s } => sentence!(
-            "{} shows the same value for {} s though noise is declared: these samples are left out",
+            "{} shows the same value for {} s though noise is declared: these samples are omitted",
             *channel,
             number(*duration_s, 0)
         ),
@@ -33,8 +33,8 @@ pub(crate) fn sentence_of(warning: &Warning) -> Option<Sentence> {
             with_unit(four_figures(*noise), channel.unit()),
             with_unit(four_figures(*declared_noise), channel.unit())
         ),
-        Warning::ScaledChannel(evidence) => scaled(evidence),
-        Warning::SwappedChannels(evidence) => swapped(evidence),
+        Warning::ScaledChannel(evidence) => describe_scaled_sensor(evidence),
+        Warning::SwappedChannels(evidence) => describe_swapped_sensors(evidence),
         Warning::LateChannel { channel, lag_s, jumps } => sentence!(
             "{} moves {}{} the other channels at the jumps (all {} together): its clock or filter is another; correct its times",
             *channel,
@@ -47,10 +47,10 @@ pub(crate) fn sentence_of(warning: &Warning) -> Option<Sentence> {
         }
         Warning::StepsContradict(conflict) => steps_contradict(conflict),
         Warning::LostSamples { lost, samples } => {
-            sentence!("{} of {} samples in the window were lost and are left out", *lost, *samples)
+            sentence!("{} of {} samples in the window were lost and are omitted", *lost, *samples)
         }
         Warning::Outliers { count } => {
-            sentence!("samples far from their neighbours, left out: {}", *count)
+            sentence!("samples far from their neighbours, omitted: {}", *count)
         }
         Warning::Calibration { channel, sensor, defect } => calibration(*channel, sensor, defect),
         Warning::EndState { channel, lost_before_end_s } => sentence!(
@@ -97,7 +97,7 @@ fn calibration(channel: Channel, sensor: &str, defect: &CalibrationDefect) -> Se
     }
 }
 
-fn scaled(evidence: &Scaled) -> Sentence {
+fn describe_scaled_sensor(evidence: &Scaled) -> Sentence {
     match evidence {
         Scaled::SpecificSpeed { speed_rpm, flow_kg_s, pressure_ratio, specific_speed } => sentence!(
             "N, m_c and P2/P1 do not match: {} krpm, {} g/s and a pressure ratio of {} (medians) make a specific speed of {}, and radial \
@@ -131,7 +131,7 @@ fn scaled(evidence: &Scaled) -> Sentence {
     }
 }
 
-fn swapped(evidence: &Swapped) -> Sentence {
+fn describe_swapped_sensors(evidence: &Swapped) -> Sentence {
     match evidence {
         Swapped::P2BelowP1 { points, of, p1_pa, p2_pa } => sentence!(
             "P2 lies below P1 at {} of {} points (medians {} and {} kPa): the channels are exchanged, P2 is a gauge pressure, or one of \
@@ -159,7 +159,7 @@ fn contradiction(faults: &[SuspectedFault]) -> Sentence {
         sentence!("conditions, valve, head, heat of the housing and efficiencies do not agree unless ");
     let with_faults = faults.iter().enumerate().fold(start, |text, (index, fault)| {
         let joint = if index == 0 { "" } else { ", and " };
-        text.then(joint.to_owned().into()).then(suspected(fault))
+        text.then(joint.to_owned().into()).then(describe_suspected_fault(fault))
     });
     with_faults.then(match faults.iter().any(|fault| fault.touches_points) {
         true => sentence!(": compare the channels at standstill (`zero`) and with the barometer, and repair the sensor, declare its \
@@ -168,7 +168,7 @@ fn contradiction(faults: &[SuspectedFault]) -> Sentence {
     })
 }
 
-fn suspected(fault: &SuspectedFault) -> Sentence {
+fn describe_suspected_fault(fault: &SuspectedFault) -> Sentence {
     let (scale, unit) = match fault.unit.as_str() {
         "1" => (100.0, "%"),
         "Pa" => (1e-3, "kPa"),

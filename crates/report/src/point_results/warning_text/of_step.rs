@@ -73,7 +73,7 @@ pub(crate) fn sentence_of(warning: &Warning) -> Option<Sentence> {
             sentence!("least squares for efficiency and heat-transfer coefficient did not converge")
         }
         Warning::FitFailed(FitFailure::AllSteps) => {
-            sentence!("least squares over all steps did not converge: this step was identified by itself")
+            sentence!("least squares over all steps did not converge: this step was identified separately")
         }
         Warning::FitFailed(FitFailure::NotFinite) => {
             sentence!("the fit gives no finite number for this step")

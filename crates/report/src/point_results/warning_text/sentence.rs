@@ -78,14 +78,14 @@ impl Sentence {
 
     /// Widens the numbers to those of another sentence; false, without a change, if anything else differs.
     pub(crate) fn merge(&mut self, other: &Sentence) -> bool {
-        let alike = |pair: (&Part, &Part)| match pair {
+        let can_merge = |pair: (&Part, &Part)| match pair {
             (Part::Words(a), Part::Words(b)) => a == b,
             (Part::Number { decimals: a, signed: b, .. }, Part::Number { decimals: c, signed: d, .. }) => {
                 (a, b) == (c, d)
             }
             _ => false,
         };
-        if self.0.len() != other.0.len() || !self.0.iter().zip(&other.0).all(alike) {
+        if self.0.len() != other.0.len() || !self.0.iter().zip(&other.0).all(can_merge) {
             return false;
         }
         for (part, other) in self.0.iter_mut().zip(&other.0) {
@@ -110,9 +110,8 @@ impl fmt::Display for Sentence {
         self.0.iter().try_for_each(|part| match part {
             Part::Words(words) => f.write_str(words),
             Part::Number { low, high, decimals, signed } => {
-                let text = |value: f64| match signed {
-                    true => format!("{value:+.decimals$}"),
-                    false => format!("{value:.decimals$}"),
+                let text = |value: f64| {
+                    if *signed { format!("{value:+.decimals$}") } else { format!("{value:.decimals$}") }
                 };
                 match (text(*low), text(*high)) {
                     (low, high) if low == high => f.write_str(&low),

@@ -2,7 +2,7 @@
 //! that convert scores into probabilities.
 
 use crate::blind::calibration::logistic::{Row, logistic};
-use crate::blind::calibration::no_cause_study::{StudyRuler, declared};
+use crate::blind::calibration::no_cause_study::{StudySignatureMeter, declared};
 use crate::blind::cases::case::{Case, Draw};
 use crate::blind::cases::kind::CaseKind;
 use crate::blind::error::BlindError;
@@ -28,7 +28,7 @@ use std::sync::Arc;
 /// The cases of a calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Plan {
-    /// Seed of everything.
+    /// Seed of all random draws.
     pub seed: u64,
     /// Cases without a cause, which set the threshold.
     pub nulls: usize,
@@ -49,10 +49,10 @@ impl Plan {
     }
 }
 
-/// The result of one diagnosis that the calibration needs.
+/// The values of one diagnosis that the calibration needs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Observed {
-    /// What the case is a case of.
+pub struct DiagnosisSummary {
+    /// Kind of the case.
     pub kind: CaseKind,
     /// Ids of its causes.
     pub causes: BTreeSet<String>,
@@ -70,32 +70,32 @@ pub struct Observed {
     pub errors_sigma: Vec<f64>,
 }
 
-impl Observed {
+impl DiagnosisSummary {
     /// Score of the best cause minus that of no cause.
     fn margin(&self) -> f64 {
         self.candidates.iter().map(|(_, score)| *score).fold(f64::NEG_INFINITY, f64::max) - self.nothing
     }
 }
 
-/// Draws the cases, diagnoses them, several at a time, and fits; `None` where the operator stopped it.
+/// Draws the cases, diagnoses them, several at a time, and fits the constants; `None` if the operator stopped the run.
 ///
 /// # Errors
-/// [`BlindError`] where a case cannot be run; a recording that cannot be diagnosed is left out.
+/// [`BlindError`] if a case cannot be run; a recording that cannot be diagnosed is omitted.
 pub fn calibrate(
     campaign: &Campaign,
     catalogue: &[Arc<dyn Effect>],
     plan: &Plan,
     made_by: String,
     engine: &Engine<'_>,
-) -> Result<Option<(Calibration, Vec<Observed>)>, BlindError> {
+) -> Result<Option<(Calibration, Vec<DiagnosisSummary>)>, BlindError> {
     // Drawing takes some seconds: show progress from the start.
     (engine.on_progress)(0, plan.nulls + plan.others);
     let cases = cases(campaign, catalogue, plan)?;
-    let diagnosis = Calibrated::new(campaign, catalogue)?;
+    let diagnosis = CalibrationSettings::new(campaign, catalogue)?;
     let observed = engine.each(&cases, |_, case| diagnosis.observe(case))?;
     // Cases that were not started mean a stop by the operator; cases that could not be diagnosed are omitted.
     let Some(observed) = observed.into_iter().collect::<Option<Vec<_>>>() else { return Ok(None) };
-    let observed: Vec<Observed> = observed.into_iter().flatten().collect();
+    let observed: Vec<DiagnosisSummary> = observed.into_iter().flatten().collect();
     Ok(Some((fit(&shipped()?, &observed, made_by), observed)))
 }
 
@@ -103,10 +103,10 @@ pub(crate) fn shipped() -> Result<Calibration, BlindError> {
     Calibration::shipped().map_err(BlindError::signatures)
 }
 
-/// The cases that calibrate.
+/// The cases of a calibration.
 ///
 /// # Errors
-/// [`BlindError`] where the campaign has no nominal model or cannot be run.
+/// [`BlindError`] if the campaign has no nominal model or cannot be run.
 pub fn cases(
     campaign: &Campaign,
     catalogue: &[Arc<dyn Effect>],
@@ -116,36 +116,36 @@ pub fn cases(
     let schedule = Schedule::new(campaign, &nominal)?;
     let mut known = catalogue.to_vec();
     known.extend(outside_kinds(OutsideUse::Calibration));
-    let ruler = StudyRuler::new(campaign, &schedule, &nominal, known, plan.seed)?;
+    let meter = StudySignatureMeter::new(campaign, &schedule, &nominal, known, plan.seed)?;
     let draw = |cases, kinds, seed| Draw { kinds, ..Draw::new(seed, cases, OutsideUse::Calibration) };
     let others = vec![CaseKind::Single, CaseKind::Pair, CaseKind::Outside];
-    let mut cases = draw(plan.others, others, plan.seed).cases(catalogue, &ruler);
-    cases.extend(draw(plan.nulls, vec![CaseKind::None], plan.seed.wrapping_add(1)).cases(catalogue, &ruler));
+    let mut cases = draw(plan.others, others, plan.seed).cases(catalogue, &meter);
+    cases.extend(draw(plan.nulls, vec![CaseKind::None], plan.seed.wrapping_add(1)).cases(catalogue, &meter));
     Ok(cases)
 }
 
 /// The settings with which every case of a calibration is diagnosed.
-pub struct Calibrated<'a> {
+pub struct CalibrationSettings<'a> {
     campaign: &'a Campaign,
     catalogue: &'a [Arc<dyn Effect>],
     nominal: Model,
     before: Calibration,
 }
 
-impl<'a> Calibrated<'a> {
-    /// With the calibration that ships.
+impl<'a> CalibrationSettings<'a> {
+    /// Settings with the shipped calibration.
     ///
     /// # Errors
-    /// [`BlindError`] where the campaign has no nominal model.
+    /// [`BlindError`] if the campaign has no nominal model.
     pub fn new(campaign: &'a Campaign, catalogue: &'a [Arc<dyn Effect>]) -> Result<Self, BlindError> {
-        Ok(Calibrated { campaign, catalogue, nominal: nominal_model(campaign)?, before: shipped()? })
+        Ok(CalibrationSettings { campaign, catalogue, nominal: nominal_model(campaign)?, before: shipped()? })
     }
 
-    /// Runs and diagnoses a case; `None` where its recording cannot be diagnosed.
+    /// Runs and diagnoses a case; `None` if its recording cannot be diagnosed.
     ///
     /// # Errors
-    /// [`BlindError`] where it cannot be run.
-    pub fn observe(&self, case: &Case) -> Result<Option<Observed>, BlindError> {
+    /// [`BlindError`] if it cannot be run.
+    pub fn observe(&self, case: &Case) -> Result<Option<DiagnosisSummary>, BlindError> {
         let recording = Schedule::new(self.campaign, &self.nominal)?.record(case)?;
         let diagnosed = diagnose(Question {
             tolerances_declared: true,
@@ -163,14 +163,14 @@ impl<'a> Calibrated<'a> {
     }
 }
 
-fn observe(case: &Case, calibration: &Calibration, diagnosed: &Diagnosed) -> Observed {
+fn observe(case: &Case, calibration: &Calibration, diagnosed: &Diagnosed) -> DiagnosisSummary {
     let Diagnosed { study, null, fits, adequacy, diagnosis, .. } = diagnosed;
     let causes: BTreeSet<String> = case.causes.iter().map(|c| c.effect.info().id.to_string()).collect();
     let names = |fit: &Fit| -> BTreeSet<String> {
         members(&fit.hypothesis).into_iter().map(|i| study.effects[i].info().id.to_string()).collect()
     };
     let named = fits.first().filter(|fit| names(fit) == causes);
-    Observed {
+    DiagnosisSummary {
         kind: case.kind,
         causes,
         verdict: diagnosis.verdict,
@@ -202,9 +202,9 @@ fn errors_sigma(case: &Case, study: &Study, fit: &Fit) -> Vec<f64> {
     errors
 }
 
-/// How much each case counts, 1 on average. The threshold needs many cases without a cause; together they count only as much as the
+/// Weight of each case, 1 on average. The threshold needs many cases without a cause; together they count only as much as the
 /// prior probability of no cause, so that the fitted and judged probabilities are those that the user reads.
-pub(crate) fn weights(calibration: &Calibration, observed: &[Observed]) -> Vec<f64> {
+pub(crate) fn weights(calibration: &Calibration, observed: &[DiagnosisSummary]) -> Vec<f64> {
     let all = observed.len() as f64;
     let nothing = observed.iter().filter(|o| o.kind == CaseKind::None).count() as f64;
     if nothing == 0.0 || nothing == all {
@@ -222,19 +222,20 @@ const MIN_THRESHOLD: f64 = 3.0;
 /// The calibration that fits the observed cases, based on the shipped one.
 ///
 /// # Errors
-/// [`BlindError::Signatures`] where the one that ships was spoilt.
-pub fn fitted(observed: &[Observed], made_by: String) -> Result<Calibration, BlindError> {
+/// [`BlindError::Signatures`] if the shipped calibration is damaged.
+pub fn fitted(observed: &[DiagnosisSummary], made_by: String) -> Result<Calibration, BlindError> {
     Ok(fit(&shipped()?, observed, made_by))
 }
 
 /// Fits the calibration to all observed cases, weak signatures included: a hardly visible outside cause is mistaken for an effect of the
 /// catalogue, and the probabilities must reflect how often that happens.
-pub fn fit(before: &Calibration, observed: &[Observed], made_by: String) -> Calibration {
-    let margins = observed.iter().filter(|o| o.kind == CaseKind::None).map(Observed::margin);
+pub fn fit(before: &Calibration, observed: &[DiagnosisSummary], made_by: String) -> Calibration {
+    let margins = observed.iter().filter(|o| o.kind == CaseKind::None).map(DiagnosisSummary::margin);
     let quiet = quantile(margins, QUIET).map_or(before.threshold, |margin| margin.max(MIN_THRESHOLD));
     let weights = weights(before, observed);
     let weighted = || observed.iter().zip(weights.iter().copied());
-    let inside: Vec<(&Observed, f64)> = weighted().filter(|(o, _)| o.kind != CaseKind::Outside).collect();
+    let inside: Vec<(&DiagnosisSummary, f64)> =
+        weighted().filter(|(o, _)| o.kind != CaseKind::Outside).collect();
     let rows: Vec<Row> = weighted()
         .map(|(o, weight)| Row { features: o.features, outside: o.kind == CaseKind::Outside, weight })
         .collect();
@@ -255,9 +256,9 @@ pub fn fit(before: &Calibration, observed: &[Observed], made_by: String) -> Cali
 const TEMPERATURE_SPREAD: f64 = 0.3;
 
 /// The temperature with the largest posterior probability of the true causes, with `before` as prior.
-fn temperature(cases: &[(&Observed, f64)], before: f64) -> f64 {
+fn temperature(cases: &[(&DiagnosisSummary, f64)], before: f64) -> f64 {
     let cost = |temperature: f64| -> f64 {
-        let away = (temperature / before).ln() / TEMPERATURE_SPREAD;
+        let deviation = (temperature / before).ln() / TEMPERATURE_SPREAD;
         let misses: f64 = cases
             .iter()
             .filter_map(|(case, weight)| {
@@ -271,7 +272,7 @@ fn temperature(cases: &[(&Observed, f64)], before: f64) -> f64 {
                 truth.map(|score| weight * (sum.ln() - (score - top) / temperature))
             })
             .sum();
-        misses + 0.5 * away * away
+        misses + 0.5 * deviation * deviation
     };
     let grid = (0..=60).map(|i| 1.0 * 30f64.powf(f64::from(i) / 60.0));
     grid.min_by(|a, b| cost(*a).total_cmp(&cost(*b))).unwrap_or(1.0)
@@ -281,9 +282,9 @@ fn temperature(cases: &[(&Observed, f64)], before: f64) -> f64 {
 mod tests {
     use super::*;
 
-    fn observed(kind: CaseKind, truth: f64, rival: f64) -> Observed {
+    fn observed(kind: CaseKind, truth: f64, rival: f64) -> DiagnosisSummary {
         let set = |id: &str| BTreeSet::from([id.to_owned()]);
-        Observed {
+        DiagnosisSummary {
             kind,
             causes: if kind == CaseKind::None { BTreeSet::new() } else { set("a") },
             verdict: Verdict::Explained,
@@ -299,22 +300,24 @@ mod tests {
     /// which the better has probability s, x/ln(s/(1-s)).
     #[test]
     fn the_temperature_is_that_of_the_share_that_is_right() {
-        let mut cases: Vec<Observed> = (0..80).map(|_| observed(CaseKind::Single, 40.0, 36.0)).collect();
+        let mut cases: Vec<DiagnosisSummary> =
+            (0..80).map(|_| observed(CaseKind::Single, 40.0, 36.0)).collect();
         cases.extend((0..20).map(|_| observed(CaseKind::Single, 36.0, 40.0)));
         let expected = 4.0 / 4f64.ln();
-        let found = temperature(&cases.iter().map(|case| (case, 1.0)).collect::<Vec<_>>(), expected);
+        let fitted = temperature(&cases.iter().map(|case| (case, 1.0)).collect::<Vec<_>>(), expected);
         // The grid's own steps are 6 %.
-        assert!((found / expected - 1.0).abs() < 0.06, "{found} for {expected}");
+        assert!((fitted / expected - 1.0).abs() < 0.06, "{fitted} for {expected}");
     }
 
     /// 90 cases without and 10 with a cause count according to the priors, and on average 1.
     #[test]
     fn cases_of_nothing_count_as_the_prior_says() {
         let before = Calibration { prior_none: 0.3, ..Calibration::shipped().unwrap() };
-        let of = |kind, count| (0..count).map(move |_| observed(kind, 0.0, 0.0));
-        let cases: Vec<Observed> = of(CaseKind::None, 90).chain(of(CaseKind::Single, 10)).collect();
-        let found = weights(&before, &cases);
-        let [nothing, causes] = [&found[..90], &found[90..]].map(|part| part.iter().sum::<f64>());
+        let cases_of = |kind, count| (0..count).map(move |_| observed(kind, 0.0, 0.0));
+        let cases: Vec<DiagnosisSummary> =
+            cases_of(CaseKind::None, 90).chain(cases_of(CaseKind::Single, 10)).collect();
+        let fitted = weights(&before, &cases);
+        let [nothing, causes] = [&fitted[..90], &fitted[90..]].map(|part| part.iter().sum::<f64>());
         assert!((nothing - 30.0).abs() < 1e-9 && (causes - 70.0).abs() < 1e-9, "{nothing} {causes}");
         assert_eq!(weights(&before, &cases[90..]), vec![1.0; 10]);
     }
@@ -322,10 +325,10 @@ mod tests {
     #[test]
     fn the_threshold_lets_most_effect_free_cases_pass() {
         let before = Calibration::shipped().unwrap();
-        let cases: Vec<Observed> =
+        let cases: Vec<DiagnosisSummary> =
             (0..200).map(|i| observed(CaseKind::None, f64::from(i) / 20.0, -50.0)).collect();
-        let found = fit(&before, &cases, String::new());
-        let alarms = cases.iter().filter(|case| case.margin() > found.threshold).count();
+        let fitted = fit(&before, &cases, String::new());
+        let alarms = cases.iter().filter(|case| case.margin() > fitted.threshold).count();
         // 1.5 % of 200.
         assert_eq!(alarms, 3);
     }

@@ -5,7 +5,7 @@ use mapper_numerics::minimise::minimise;
 
 /// Maximum number of iterations of coordinate descent; about fifty are needed.
 const ROUNDS: usize = 300;
-/// Prior of the slopes, and its precision: about ten cases outweigh it.
+/// Prior mean of the slopes, and its precision: about ten cases outweigh the prior.
 const EXPECTED: f64 = 1.0;
 const PRIOR: f64 = 0.25;
 /// Minimum slopes: a larger misfit never contradicts an outside cause. The slope of the smooth misfit is at least half of that from noise
@@ -22,22 +22,22 @@ pub(crate) struct Row {
     pub weight: f64,
 }
 
-/// Offset and slopes of the logistic that separates outside causes from the others. `None` where one of the classes is empty.
+/// Offset and slopes of the logistic that separates outside causes from the others. `None` if one of the classes is empty.
 pub(crate) fn logistic(rows: &[Row]) -> Option<[f64; 4]> {
     if rows.iter().all(|row| row.outside) || rows.iter().all(|row| !row.outside) {
         return None;
     }
     let rows: Vec<Row> = rows.iter().map(|row| Row { features: counted(row.features), ..*row }).collect();
     let loss = |weights: &[f64; 4]| -> f64 {
-        let away: f64 = weights[1..].iter().map(|slope| 0.5 * PRIOR * (slope - EXPECTED).powi(2)).sum();
+        let penalty: f64 = weights[1..].iter().map(|slope| 0.5 * PRIOR * (slope - EXPECTED).powi(2)).sum();
         let miss = |row: &Row| {
             let x = argument(weights, &row.features);
             row.weight * if row.outside { (-x).exp().ln_1p() } else { x.exp().ln_1p() }
         };
-        away + rows.iter().map(miss).sum::<f64>()
+        penalty + rows.iter().map(miss).sum::<f64>()
     };
     let mut weights = [-5.0, EXPECTED, EXPECTED, EXPECTED];
-    // Coordinate by coordinate, each between its bounds: the loss is convex.
+    // Coordinate descent within bounds converges because the loss is convex.
     for _ in 0..ROUNDS {
         let last = weights;
         for place in 0..weights.len() {
@@ -85,7 +85,7 @@ mod tests {
         assert!(logistic(&[row([1.0; 3], true)]).is_none());
     }
 
-    /// Cases that went astray do not teach that a gross misfit is nothing.
+    /// Failed searches do not remove the effect of a gross misfit.
     #[test]
     fn a_gross_misfit_is_never_nothing() {
         let rows: Vec<Row> =

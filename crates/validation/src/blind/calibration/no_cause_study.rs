@@ -3,7 +3,7 @@
 use crate::blind::cases::case::Case;
 use crate::blind::cases::cause::Cause;
 use crate::blind::cases::kind::CaseKind;
-use crate::blind::cases::strength::Ruler;
+use crate::blind::cases::strength::SignatureMeter;
 use crate::blind::error::BlindError;
 use crate::blind::virtual_runs::case_run::Schedule;
 use mapper_campaign::{Campaign, nominal_model};
@@ -18,30 +18,30 @@ use mapper_physics::simulation::model::Model;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// A recording of the campaign that has noise, offsets, tolerances and weather, and no cause, made ready with `effects`; equal
+/// Records the campaign with noise, offsets, tolerances and weather but without a cause, and linearises the study for `effects`. Equal
 /// seeds give equal recordings.
 ///
 /// # Errors
-/// [`BlindError`] where the campaign has no nominal model or cannot be run.
+/// [`BlindError`] if the campaign has no nominal model or cannot be run.
 pub fn study_without_causes(
     campaign: &Campaign,
     effects: Vec<Arc<dyn Effect>>,
     seed: u64,
 ) -> Result<(Study, Linearised), BlindError> {
     let nominal = nominal_model(campaign)?;
-    let StudyRuler { study, linearised } =
-        StudyRuler::new(campaign, &Schedule::new(campaign, &nominal)?, &nominal, effects, seed)?;
+    let StudySignatureMeter { study, linearised } =
+        StudySignatureMeter::new(campaign, &Schedule::new(campaign, &nominal)?, &nominal, effects, seed)?;
     Ok((study, linearised))
 }
 
-/// Measures signatures on one recording of the campaign that has noise, offsets, tolerances and weather, and no cause.
-/// Those of other recordings of the same campaign differ by the weather, some per cent.
-pub(crate) struct StudyRuler {
+/// Measures signatures on one recording of the campaign with noise, offsets, tolerances and weather but
+/// without a cause. Other weather changes the signatures by a few per cent.
+pub(crate) struct StudySignatureMeter {
     study: Study,
     linearised: Linearised,
 }
 
-/// The declarations of the campaign.
+/// The uncertainties and tolerances that the campaign declares.
 pub(crate) fn declared(campaign: &Campaign) -> Declared {
     let sensors = campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared));
     Declared {
@@ -53,15 +53,15 @@ pub(crate) fn declared(campaign: &Campaign) -> Declared {
     }
 }
 
-impl StudyRuler {
-    /// Records a case without causes, and makes it ready.
+impl StudySignatureMeter {
+    /// Records a case without causes and linearises its study.
     pub(crate) fn new(
         campaign: &Campaign,
         schedule: &Schedule<'_>,
         nominal: &Model,
         effects: Vec<Arc<dyn Effect>>,
         seed: u64,
-    ) -> Result<StudyRuler, BlindError> {
+    ) -> Result<StudySignatureMeter, BlindError> {
         let case = Case {
             name: "ruler".to_owned(),
             kind: CaseKind::None,
@@ -73,17 +73,17 @@ impl StudyRuler {
         let table = Table::new(&recording).ok_or(BlindError::NothingRecorded)?;
         let study = Study::new(&recording, table, declared(campaign), nominal.clone(), effects);
         let linearised = Linearised::new(&study).map_err(BlindError::signatures)?;
-        Ok(StudyRuler { study, linearised })
+        Ok(StudySignatureMeter { study, linearised })
     }
 }
 
-impl Ruler for StudyRuler {
+impl SignatureMeter for StudySignatureMeter {
     fn lengths(&self, causes: &[Cause]) -> Vec<f64> {
-        let place = |cause: &Cause| {
+        let index_of = |cause: &Cause| {
             self.study.effects.iter().position(|effect| effect.info().id == cause.effect.info().id)
         };
         let values: Option<EffectValues> =
-            causes.iter().map(|cause| Some((place(cause)?, cause.values.clone()))).collect();
+            causes.iter().map(|cause| Some((index_of(cause)?, cause.values.clone()))).collect();
         let measured = values.and_then(|values| lengths(&self.study, &self.linearised, &values).ok());
         measured.unwrap_or_else(|| vec![0.0; causes.len()])
     }

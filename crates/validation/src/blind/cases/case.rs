@@ -3,7 +3,7 @@
 use crate::blind::cases::cause::Cause;
 use crate::blind::cases::equations::Laboratory;
 use crate::blind::cases::kind::CaseKind;
-use crate::blind::cases::strength::{Ruler, shows, strength};
+use crate::blind::cases::strength::{SignatureMeter, shows, strength};
 use crate::blind::outside::{OutsideUse, outside_kinds};
 use mapper_physics::rig::effect::Effect;
 use rand::seq::SliceRandom;
@@ -16,7 +16,7 @@ use std::sync::Arc;
 pub struct Case {
     /// Name of its files.
     pub name: String,
-    /// What it is a case of.
+    /// Its kind.
     pub kind: CaseKind,
     /// Its causes.
     pub causes: Vec<Cause>,
@@ -26,16 +26,16 @@ pub struct Case {
     pub seed: u64,
 }
 
-/// How cases are drawn.
+/// Settings of the random draw.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Draw {
-    /// Seed of everything.
+    /// Seed of all random draws.
     pub seed: u64,
     /// Number of cases.
     pub cases: usize,
-    /// Kinds to draw from; the usual ones where empty.
+    /// Kinds to draw from; if empty, [`CaseKind::USUAL`].
     pub kinds: Vec<CaseKind>,
-    /// Which outside causes are drawn from.
+    /// The set of outside causes to draw from.
     pub outside: OutsideUse,
     /// Weakest and strongest signature of a single cause, in sigmas.
     pub sigma_range: [f64; 2],
@@ -49,7 +49,7 @@ pub struct Draw {
 pub const SIGMA_RANGE: [f64; 2] = [6.0, 400.0];
 
 impl Draw {
-    /// The usual draw: all kinds, strengths from barely visible to gross.
+    /// The default draw: all kinds, strengths from barely visible to gross.
     pub fn new(seed: u64, cases: usize, outside: OutsideUse) -> Draw {
         Draw {
             seed,
@@ -62,13 +62,13 @@ impl Draw {
         }
     }
 
-    /// The cases: kinds in random order, causes dealt so that each effect and each sign of it comes before any comes again,
-    /// lengths of the signatures even in their logarithm. Equal draws give equal cases.
-    pub fn cases(&self, catalogue: &[Arc<dyn Effect>], ruler: &dyn Ruler) -> Vec<Case> {
+    /// Draws the cases. Kinds are in random order. Causes are dealt like cards: each effect with each sign occurs once before any repeats.
+    /// Signature lengths are uniform in their logarithm. Equal settings give equal cases.
+    pub fn cases(&self, catalogue: &[Arc<dyn Effect>], meter: &dyn SignatureMeter) -> Vec<Case> {
         let mut random = Pcg64::seed_from_u64(self.seed);
-        // An effect that this machine cannot show (convection before the wheel without area there) is not a cause.
+        // Effects without influence on this machine are not causes, e.g. convection before the wheel without area there.
         let placed: Vec<Arc<dyn Effect>> =
-            catalogue.iter().filter(|effect| shows(effect, ruler)).cloned().collect();
+            catalogue.iter().filter(|effect| shows(effect, meter)).cloned().collect();
         let mut catalogue = Deck::new(&placed);
         let mut outside = Deck::new(&outside_kinds(self.outside));
         let kinds = if self.kinds.is_empty() { &CaseKind::USUAL[..] } else { &self.kinds[..] };
@@ -88,11 +88,11 @@ impl Draw {
                     if causes.iter().all(|cause| cause.effect.info().id != effect.info().id) {
                         let [weak, strong] = self.sigma_range;
                         let sigma = weak * (strong / weak).powf(random.random());
-                        let values = strength(&effect, sign, sigma, ruler, &mut random);
+                        let values = strength(&effect, sign, sigma, meter, &mut random);
                         causes.push(Cause { effect, values });
                     }
                 }
-                let sigmas = ruler.lengths(&causes);
+                let sigmas = meter.lengths(&causes);
                 // A separate seed from the whole range, so that no two draws have the same noise.
                 Case { name: format!("case_{index:04}"), kind, causes, sigmas, seed: random.random() }
             })
@@ -100,7 +100,7 @@ impl Draw {
     }
 }
 
-/// Effects with each sign they have, dealt without repeats until none is left.
+/// All effects with each of their signs, dealt like cards: none repeats until the deck is empty.
 struct Deck {
     effects: Vec<Arc<dyn Effect>>,
     left: Vec<(usize, f64)>,
@@ -126,7 +126,7 @@ impl Deck {
     }
 }
 
-/// Directions, along its typical step and against it, in which an effect can go.
+/// Signs that an effect can have relative to its typical step.
 fn signs(effect: &Arc<dyn Effect>) -> Vec<f64> {
     let [parameter] = effect.info().parameters.as_slice() else { return vec![1.0] };
     let has = |sign: &f64| {
@@ -144,7 +144,7 @@ mod tests {
     /// A rig on which every typical step is 50 sigmas long.
     struct Even;
 
-    impl Ruler for Even {
+    impl SignatureMeter for Even {
         fn lengths(&self, causes: &[Cause]) -> Vec<f64> {
             let of = |cause: &Cause| {
                 let parameter = &cause.effect.info().parameters[0];
@@ -172,7 +172,7 @@ mod tests {
                 assert!((parameter.low..=parameter.high).contains(value) && *value != parameter.neutral);
             }
         }
-        // Dealt, not drawn: as many singles as there are effects with a sign hold every effect of the catalogue.
+        // The deck ensures that as many single cases as there are signed effects contain every effect of the catalogue.
         let dealt = catalogue.iter().map(|effect| signs(effect).len()).sum();
         let singles =
             Draw { kinds: vec![CaseKind::Single], cases: dealt, ..Draw::new(5, 1, OutsideUse::Check) }
@@ -182,7 +182,7 @@ mod tests {
         assert_eq!(seen.len(), catalogue.len());
     }
 
-    /// What is reserved is not a candidate, and what calibrates is not what is checked.
+    /// Reserved causes are not candidates, and calibration and check use different causes.
     #[test]
     fn outside_causes_are_apart_from_the_catalogue_and_from_each_other() {
         let ids = |kinds: Vec<Arc<dyn Effect>>| -> Vec<String> {

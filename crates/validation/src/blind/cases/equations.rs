@@ -28,7 +28,7 @@ impl Laboratory {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("no laboratory `{name}` makes blind cases: virtual_lab and other_lab do")]
 pub struct UnknownLaboratory {
-    /// What was asked for.
+    /// The given name.
     pub name: String,
 }
 

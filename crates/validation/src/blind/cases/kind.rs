@@ -14,12 +14,12 @@ pub enum CaseKind {
     Pair,
     /// A cause that is not a candidate.
     Outside,
-    /// Three effects of the catalogue; drawn only where asked for.
+    /// Three effects of the catalogue; drawn only on request.
     Triple,
 }
 
 impl CaseKind {
-    /// Kinds that are drawn where none is asked for.
+    /// Default kinds of a draw.
     pub const USUAL: [CaseKind; 4] = [CaseKind::None, CaseKind::Single, CaseKind::Pair, CaseKind::Outside];
 
     /// Its name in files and tables.
@@ -38,7 +38,7 @@ impl CaseKind {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("no blind case is `{name}`: none, single, pair, outside and triple are")]
 pub struct UnknownKind {
-    /// What was asked for.
+    /// The given name.
     pub name: String,
 }
 

@@ -8,13 +8,13 @@ use mapper_physics::rig::effect::Effect;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// A case whose causes are named.
+/// A case whose causes are stored by their ids.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StoredCase {
     /// Name of its files.
     pub name: String,
-    /// What it is a case of.
+    /// Its kind.
     pub kind: CaseKind,
     /// Id and values of each cause.
     pub causes: Vec<(String, Vec<f64>)>,
@@ -38,8 +38,10 @@ impl From<&Case> for StoredCase {
 }
 
 impl StoredCase {
-    /// The case, its causes found in the catalogue and among all outside causes; `Err`: the id of one that is in neither, or
-    /// has other parameters.
+    /// The case with its causes looked up in the catalogue and among all outside causes.
+    ///
+    /// # Errors
+    /// The id of a cause that is in neither, or has other parameters.
     ///
     /// # Errors
     /// The id of the cause.

@@ -7,34 +7,34 @@ use rand_pcg::Pcg64;
 use std::sync::Arc;
 
 /// Measures the signatures of causes in a recording.
-pub trait Ruler {
-    /// Length of each cause's signature in the presence of the others, in sigmas; 0 where the rig cannot run with them.
+pub trait SignatureMeter {
+    /// Length of each cause's signature in the presence of the others, in sigmas; 0 if the rig cannot run with them.
     fn lengths(&self, causes: &[Cause]) -> Vec<f64>;
 }
 
 /// Relative tolerance of the length.
 const NEAR_RATIO: f64 = 0.1;
 /// Maximum number of iterations for a strength.
-const LOOKS: usize = 6;
+const MAX_ITERATIONS: usize = 6;
 /// Share of the housing that an inner wall takes.
 const INNER_SHARE: std::ops::Range<f64> = 0.15..0.6;
 
-/// Weakest and strongest draw in the effect's typical steps, whatever its signature: from the weakest that a user
-/// might look for to one that breaks a test.
+/// Limits of a strength in the effect's typical steps, independent of its signature: from the weakest effect of interest to a user, to
+/// one that makes a test impossible.
 const STEPS: std::ops::RangeInclusive<f64> = 0.02..=4.0;
 
-/// Values of an effect in the direction `sign` of its typical step whose signature alone is `sigma` long, or as long as its
-/// range allows.
+/// Parameter values of an effect whose signature alone has the length `sigma`, or the maximum within its range. `sign` is the direction
+/// relative to the typical step.
 pub(crate) fn strength(
     effect: &Arc<dyn Effect>,
     sign: f64,
     sigma: f64,
-    ruler: &dyn Ruler,
+    meter: &dyn SignatureMeter,
     random: &mut Pcg64,
 ) -> Vec<f64> {
     let length = |values: Vec<f64>| {
         let cause = Cause { effect: effect.clone(), values };
-        ruler.lengths(std::slice::from_ref(&cause)).first().copied().unwrap_or(0.0)
+        meter.lengths(std::slice::from_ref(&cause)).first().copied().unwrap_or(0.0)
     };
     let parameters = &effect.info().parameters;
     if let [phi, conductance] = parameters.as_slice() {
@@ -43,8 +43,8 @@ pub(crate) fn strength(
         let values = |resistance_k_w: f64| {
             vec![phi, (1.0 / resistance_k_w).clamp(conductance.low, 0.9 * conductance.high)]
         };
-        let found = search(0.05, sigma, |resistance_k_w| length(values(resistance_k_w)));
-        return values(found);
+        let solution = search(0.05, sigma, |resistance_k_w| length(values(resistance_k_w)));
+        return values(solution);
     }
     let [parameter] = parameters.as_slice() else {
         return parameters.iter().map(|p| value_at(p, sign * 0.5)).collect();
@@ -54,31 +54,31 @@ pub(crate) fn strength(
     vec![value_at(parameter, sign * steps)]
 }
 
-/// Whether an effect does anything to the machine that the ruler measures.
-pub(crate) fn shows(effect: &Arc<dyn Effect>, ruler: &dyn Ruler) -> bool {
-    // Where the rig cannot run with half a step it can with less.
+/// Whether an effect has any influence on the measured machine.
+pub(crate) fn shows(effect: &Arc<dyn Effect>, meter: &dyn SignatureMeter) -> bool {
+    // If the rig cannot run with half a step, it can with less.
     [0.5, 0.1].into_iter().any(|steps| {
         let values = effect.info().parameters.iter().map(|parameter| value_at(parameter, steps)).collect();
         let cause = Cause { effect: effect.clone(), values };
-        ruler.lengths(std::slice::from_ref(&cause)).iter().any(|length| *length > 0.0)
+        meter.lengths(std::slice::from_ref(&cause)).iter().any(|length| *length > 0.0)
     })
 }
 
-/// The value so many typical steps from neutral, within the range.
+/// The value at this number of typical steps from neutral, within the range.
 fn value_at(parameter: &EffectParameter, steps: f64) -> f64 {
     (parameter.neutral + steps * parameter.typical_step).clamp(parameter.low, parameter.high)
 }
 
-/// The size at which `length`, which grows with size and nearly in proportion, is `wanted`.
+/// Finds the size at which `length` is `wanted`; the length increases nearly in proportion to the size.
 fn search(start: f64, wanted: f64, length: impl Fn(f64) -> f64) -> f64 {
     let mut size = start;
-    for _ in 0..LOOKS {
-        let found = length(size);
-        if (found / wanted - 1.0).abs() < NEAR_RATIO {
+    for _ in 0..MAX_ITERATIONS {
+        let solution = length(size);
+        if (solution / wanted - 1.0).abs() < NEAR_RATIO {
             break;
         }
         // A rig that cannot run so strongly has length 0.
-        size *= if found > 0.0 { (wanted / found).clamp(0.05, 5.0) } else { 0.4 };
+        size *= if solution > 0.0 { (wanted / solution).clamp(0.05, 5.0) } else { 0.4 };
     }
     size
 }
@@ -91,9 +91,9 @@ mod tests {
     fn a_length_that_bends_is_found() {
         // A square root and a square: neither in proportion.
         for (power, wanted) in [(0.5, 30.0), (1.5, 200.0)] {
-            let found = search(0.5, wanted, |size| 40.0 * f64::powf(size, power));
-            let reached = 40.0 * f64::powf(found, power);
-            // Six looks at most; within a third for powers this far from 1.
+            let solution = search(0.5, wanted, |size| 40.0 * f64::powf(size, power));
+            let reached = 40.0 * f64::powf(solution, power);
+            // At most six iterations; within a third for powers this far from 1.
             assert!((reached / wanted).ln().abs() < 0.3, "{power}: {reached} for {wanted}");
         }
     }

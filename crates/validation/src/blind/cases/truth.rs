@@ -10,12 +10,12 @@ use std::collections::BTreeMap;
 pub struct Truth {
     /// Name of the case.
     pub name: String,
-    /// Cause by cause its strength: a number, an object by parameter, or for outside causes a sentence.
+    /// Strength of each cause: a number, an object with one number per parameter, or a sentence for an outside cause.
     pub effects: Map<String, Value>,
     /// Length of each cause's signature in the presence of the others, in sigmas, on a recording of the same campaign.
     #[serde(default)]
     pub sigmas: BTreeMap<String, f64>,
-    /// The points in order.
+    /// The points, in order of their steps.
     pub points: Vec<TruthPoint>,
 }
 

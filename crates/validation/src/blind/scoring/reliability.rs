@@ -1,6 +1,6 @@
 //! Reliability of the probabilities: an answer given with probability p should be right in a share p of the cases.
 
-use crate::blind::calibration::calibrate::{Observed, fit, shipped, weights};
+use crate::blind::calibration::calibrate::{DiagnosisSummary, fit, shipped, weights};
 use crate::blind::cases::kind::CaseKind;
 use crate::blind::error::BlindError;
 use crate::blind::scoring::interval::{Share, clopper_pearson_95};
@@ -10,9 +10,9 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::Path;
 
-/// Classes of equal width from 0 to 1.
+/// Number of probability classes of equal width.
 const BINS: usize = 10;
-/// Parts of the cases: each is judged by a calibration that was fitted to the others.
+/// Number of folds of the cross-validation: each part is judged by a calibration fitted to the others.
 const FOLDS: usize = 5;
 
 /// Cases whose first answer has a probability in the same class.
@@ -22,17 +22,17 @@ pub struct Bin {
     pub from: f64,
     /// Highest probability of the class.
     pub to: f64,
-    /// Share of all cases, by how much they count.
+    /// Weighted share of all cases.
     pub share: f64,
-    /// Mean of the probabilities that were given.
+    /// Mean of the predicted probabilities.
     pub said: f64,
-    /// How often the first answer was right, each case counting once.
+    /// Number of correct first answers, unweighted.
     pub right: Share,
-    /// The share that is right, by how much the cases count.
+    /// Weighted share of correct first answers.
     pub right_share: f64,
-    /// 95 % interval of that share (Clopper and Pearson), as of [so many](Bin::effective_cases) equal cases.
+    /// 95 % interval of that share (Clopper and Pearson), for [`Bin::effective_cases`] equal cases.
     pub right_low: f64,
-    /// Its other end.
+    /// Upper end of the interval.
     pub right_high: f64,
     /// Number of equally weighted cases with the same information (Kish 1965): squared sum of the weights over the sum of their squares.
     pub effective_cases: f64,
@@ -50,21 +50,21 @@ struct Answer {
 /// Reliability of the first answer, by one calibration.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Reliability {
-    /// Which calibration gave the probabilities.
+    /// The calibration of the probabilities.
     pub calibration: String,
-    /// The classes that hold cases, from small probabilities to large ones.
+    /// The classes with cases, in ascending order of probability.
     pub bins: Vec<Bin>,
-    /// Expected calibration error: how far the share that is right is from the mean probability of a class, on average over all
-    /// cases, fraction (Naeini, Cooper and Hauskrecht 2015); `None` without cases.
+    /// Expected calibration error: the mean distance over all cases between the share of correct answers in a class and its mean
+    /// probability, fraction (Naeini, Cooper and Hauskrecht 2015); `None` without cases.
     pub expected_calibration_error: Option<f64>,
     /// The error expected by chance if all probabilities are correct.
     pub expected_by_chance: Option<f64>,
-    /// Cases whose truth was not among the answers that have a probability.
+    /// Cases whose true cause was not among the candidates.
     pub truth_not_listed: usize,
 }
 
 /// The first answer: its probability, and whether it is right. `None` without any score.
-fn first_answer(case: &Observed, calibration: &Calibration) -> Option<(f64, bool)> {
+fn first_answer(case: &DiagnosisSummary, calibration: &Calibration) -> Option<(f64, bool)> {
     let outside = calibration.outside(case.features);
     let scores = || case.candidates.iter().map(|(_, score)| *score).chain([case.nothing]);
     let top = scores().reduce(f64::max)?;
@@ -72,7 +72,7 @@ fn first_answer(case: &Observed, calibration: &Calibration) -> Option<(f64, bool
     let total: f64 = scores().map(weight).sum();
     let inside = |score: f64| (1.0 - outside) * weight(score) / total;
     let is_outside = case.kind == CaseKind::Outside;
-    // A hypothesis that only adds effects to a better one counts as the better one, as in the diagnosis.
+    // As in the diagnosis, a hypothesis that only adds effects to a better one is merged with that one.
     let mut shown: Vec<(&BTreeSet<String>, f64)> = Vec::new();
     for (causes, score) in &case.candidates {
         match shown.iter_mut().find(|(better, _)| better.is_subset(causes)) {
@@ -90,14 +90,14 @@ fn first_answer(case: &Observed, calibration: &Calibration) -> Option<(f64, bool
         .max_by(|a, b| a.0.total_cmp(&b.0))
 }
 
-/// Whether the truth has a probability at all.
-fn is_listed(case: &Observed) -> bool {
+/// Whether the true cause is among the candidates.
+fn is_listed(case: &DiagnosisSummary) -> bool {
     matches!(case.kind, CaseKind::None | CaseKind::Outside)
         || case.candidates.iter().any(|(causes, _)| *causes == case.causes)
 }
 
 /// Classes, and their expected calibration error.
-fn reliability(calibration: &str, cases: &[Observed], answers: &[Answer]) -> Reliability {
+fn reliability(calibration: &str, cases: &[DiagnosisSummary], answers: &[Answer]) -> Reliability {
     let all: f64 = answers.iter().map(|answer| answer.weight).sum();
     let bins: Vec<Bin> = (0..BINS)
         .filter_map(|index| {
@@ -111,7 +111,7 @@ fn reliability(calibration: &str, cases: &[Observed], answers: &[Answer]) -> Rel
         (!bins.is_empty()).then(|| bins.iter().map(|bin| bin.share * error(bin)).sum::<f64>())
     };
     let missed = |bin: &Bin| (bin.right_share - bin.said).abs();
-    // Mean absolute deviation of a share about its expectation, by the normal law: sqrt(2/pi) sigma.
+    // Mean absolute deviation of a share about its expectation, by the normal distribution: sqrt(2/pi) sigma.
     let by_chance = |bin: &Bin| {
         (2.0 / std::f64::consts::PI * bin.said * (1.0 - bin.said) / bin.effective_cases).max(0.0).sqrt()
     };
@@ -149,27 +149,28 @@ fn bin(index: usize, members: &[&Answer], all: f64) -> Option<Bin> {
     })
 }
 
-/// Reliability by the calibration that ships, which may have seen the cases, and by the one that they fit, each case judged by
-/// a fit to the others (five parts).
+/// Reliability by the shipped calibration, which may have been fitted to these cases, and by a five-fold
+/// cross-validation.
 ///
 /// # Errors
-/// [`BlindError::Signatures`] where the one that ships was spoilt.
-pub fn reliabilities(observed: &[Observed]) -> Result<[Reliability; 2], BlindError> {
-    Ok(both(&shipped()?, observed))
+/// [`BlindError::Signatures`] if the shipped calibration is damaged.
+pub fn reliabilities(observed: &[DiagnosisSummary]) -> Result<[Reliability; 2], BlindError> {
+    Ok(before_and_after(&shipped()?, observed))
 }
 
-fn both(before: &Calibration, observed: &[Observed]) -> [Reliability; 2] {
+fn before_and_after(before: &Calibration, observed: &[DiagnosisSummary]) -> [Reliability; 2] {
     let weights = weights(before, observed);
-    let by = |calibration: &Calibration, (case, weight): (&Observed, f64)| {
+    let by = |calibration: &Calibration, (case, weight): (&DiagnosisSummary, f64)| {
         first_answer(case, calibration).map(|(probability, right)| Answer { probability, right, weight })
     };
-    let weighted: Vec<(&Observed, f64)> = observed.iter().zip(weights.iter().copied()).collect();
+    let weighted: Vec<(&DiagnosisSummary, f64)> = observed.iter().zip(weights.iter().copied()).collect();
     let shipped: Vec<Answer> = weighted.iter().filter_map(|case| by(before, *case)).collect();
     let mut held_out = Vec::new();
     for fold in 0..FOLDS {
-        let of_fold = |(index, _): &(usize, &(&Observed, f64))| index % FOLDS == fold;
+        let of_fold = |(index, _): &(usize, &(&DiagnosisSummary, f64))| index % FOLDS == fold;
         let (judged, fitted): (Vec<_>, Vec<_>) = weighted.iter().enumerate().partition(of_fold);
-        let fitted: Vec<Observed> = fitted.into_iter().map(|(_, (case, _))| (*case).clone()).collect();
+        let fitted: Vec<DiagnosisSummary> =
+            fitted.into_iter().map(|(_, (case, _))| (*case).clone()).collect();
         let calibration = fit(before, &fitted, String::new());
         held_out.extend(judged.iter().filter_map(|(_, case)| by(&calibration, **case)));
     }
@@ -185,11 +186,11 @@ pub fn calibrated_text(diagnoses: usize, file: &Path, reliabilities: &[Reliabili
     format!("calibration from {diagnoses} diagnoses in {}\n{reliability}", file.display())
 }
 
-/// A sentence for each.
+/// One sentence for each result.
 pub fn reliability_text(reliabilities: &[Reliability]) -> String {
     let mut text = String::new();
-    for one in reliabilities {
-        let cases: usize = one.bins.iter().map(|bin| bin.right.trials).sum();
+    for row in reliabilities {
+        let cases: usize = row.bins.iter().map(|bin| bin.right.trials).sum();
         let percent =
             |share: Option<f64>| share.map_or("-".to_owned(), |share| format!("{:.1} %", 100.0 * share));
         // Writing to a String cannot fail.
@@ -197,10 +198,10 @@ pub fn reliability_text(reliabilities: &[Reliability]) -> String {
             text,
             "calibration {}: expected calibration error {} over {cases} diagnoses ({} by chance alone where every probability \
              holds); the truth was not among the answers in {}",
-            one.calibration,
-            percent(one.expected_calibration_error),
-            percent(one.expected_by_chance),
-            one.truth_not_listed,
+            row.calibration,
+            percent(row.expected_calibration_error),
+            percent(row.expected_by_chance),
+            row.truth_not_listed,
         );
     }
     text
@@ -211,11 +212,11 @@ mod tests {
     use super::*;
     use mapper_diagnose::gap::findings::report::Verdict;
 
-    /// A case whose first candidate leads by the score that gives it `probability`, right or not.
-    fn case(probability: f64, right: bool) -> Observed {
+    /// A case whose first candidate has this `probability`; `right`: whether it is the true cause.
+    fn case(probability: f64, right: bool) -> DiagnosisSummary {
         let set = |id: &str| BTreeSet::from([id.to_owned()]);
         let lead = (probability / (1.0 - probability)).ln();
-        Observed {
+        DiagnosisSummary {
             kind: CaseKind::Single,
             causes: set(if right { "a" } else { "b" }),
             verdict: Verdict::Explained,
@@ -232,8 +233,8 @@ mod tests {
         Calibration { temperature: 1.0, outside: [-50.0, 0.0, 0.0, 0.0], ..Calibration::shipped().unwrap() }
     }
 
-    fn judged(cases: &[Observed]) -> Reliability {
-        let [before, _] = both(&plain(), cases);
+    fn reliability_of(cases: &[DiagnosisSummary]) -> Reliability {
+        let [before, _] = before_and_after(&plain(), cases);
         before
     }
 
@@ -241,21 +242,21 @@ mod tests {
     fn what_is_right_as_often_as_it_says_has_no_error() {
         // 0.8 is right in 80 of 100 cases, 0.6 in 60 of 100.
         let of = |p: f64, hits: usize| (0..100).map(move |i| case(p, i < hits));
-        let honest: Vec<Observed> = of(0.8, 80).chain(of(0.6, 60)).collect();
-        let found = judged(&honest);
-        assert!(found.expected_calibration_error.unwrap() < 1e-9, "{found:?}");
-        assert_eq!(found.bins.len(), 2);
+        let honest: Vec<DiagnosisSummary> = of(0.8, 80).chain(of(0.6, 60)).collect();
+        let result = reliability_of(&honest);
+        assert!(result.expected_calibration_error.unwrap() < 1e-9, "{result:?}");
+        assert_eq!(result.bins.len(), 2);
         // sqrt(2/pi 0.8 0.2/100) = 3.2 % and sqrt(2/pi 0.6 0.4/100) = 3.9 %, half of the cases each.
-        assert!((found.expected_by_chance.unwrap() - 0.0355).abs() < 1e-3, "{found:?}");
+        assert!((result.expected_by_chance.unwrap() - 0.0355).abs() < 1e-3, "{result:?}");
     }
 
     #[test]
     fn too_sure_by_a_fifth_is_an_error_of_a_fifth() {
-        let boasting: Vec<Observed> = (0..100).map(|i| case(0.95, i < 75)).collect();
-        let found = judged(&boasting);
-        assert!((found.expected_calibration_error.unwrap() - 0.2).abs() < 1e-9, "{found:?}");
-        let [bin] = found.bins.as_slice() else { panic!("{found:?}") };
+        let boasting: Vec<DiagnosisSummary> = (0..100).map(|i| case(0.95, i < 75)).collect();
+        let result = reliability_of(&boasting);
+        assert!((result.expected_calibration_error.unwrap() - 0.2).abs() < 1e-9, "{result:?}");
+        let [bin] = result.bins.as_slice() else { panic!("{result:?}") };
         assert!(bin.right_low < 0.75 && 0.75 < bin.right_high && bin.right_high < bin.said);
-        assert_eq!(judged(&[]).expected_calibration_error, None);
+        assert_eq!(reliability_of(&[]).expected_calibration_error, None);
     }
 }

@@ -61,17 +61,17 @@ struct Gap {
 pub struct ScoredCase {
     /// Its name.
     pub name: String,
-    /// What it is a case of.
+    /// Its kind.
     pub kind: CaseKind,
     /// Its causes.
     pub causes: BTreeSet<String>,
     /// Verdict of the diagnosis; `None` without a diagnosis.
     pub verdict: Option<String>,
-    /// The causes it named.
+    /// The causes in the diagnosis.
     pub named: BTreeSet<String>,
-    /// Probability it gave to them.
+    /// Their probability.
     pub probability: Option<f64>,
-    /// Whether that is right.
+    /// Whether the diagnosis is correct.
     pub right: bool,
     /// Length of the weakest cause's signature in the presence of the others, in sigmas; `None` without causes, and if the
     /// answers do not contain it.
@@ -101,13 +101,13 @@ pub struct SigmaClass {
 /// The table, as `score.py` prints it.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Score {
-    /// Case by case.
+    /// Result of each case.
     pub cases: Vec<ScoredCase>,
     /// The cases by the signature length of their weakest cause.
     pub classes: [SigmaClass; CLASSES_SIGMA.len()],
-    /// Recordings without effect that were left alone.
+    /// Recordings without effect in which no cause was named.
     pub none: Share,
-    /// Recordings without effect in which one was named.
+    /// Recordings without effect in which a cause was named.
     pub none_named: Share,
     /// Single effects that were named, in a set of at most three.
     pub single: Share,
@@ -123,15 +123,15 @@ pub struct Score {
     pub outside: Share,
     /// Outside causes that were explained by the catalogue.
     pub falsely_explained: Share,
-    /// Effects whose place was among the first two.
+    /// Effects whose part of the machine was among the first two.
     pub place: Share,
-    /// Parameters whose 95 % interval holds the truth.
+    /// Parameters whose 95 % interval contains the true value.
     pub covered: Share,
-    /// Median error of a parameter over its distance from neutral; `None` where none was named.
+    /// Median error of a parameter over its distance from neutral; `None` if none was named.
     pub parameter_error_median: Option<f64>,
-    /// Median share of the gap that was removed; `None` where nothing was named.
+    /// Median share of the gap that was removed; `None` if nothing was named.
     pub shrink_median: Option<f64>,
-    /// Mean of the squared miss of the probability given to the truth; `None` without cases.
+    /// Brier score: mean squared difference between 1 and the probability of the true cause; `None` without cases.
     pub squared_miss_mean: Option<f64>,
     /// Mean number of indistinguishable explanations; `None` without diagnoses.
     pub set_size_mean: Option<f64>,
@@ -140,8 +140,8 @@ pub struct Score {
 /// Opens the seal of `directory` and compares NAME.diagnosis.json of each case with its answer.
 ///
 /// # Errors
-/// [`BlindError`] where the directory holds no cases or the answers have been changed. A missing or broken diagnosis is
-/// a wrong one, not an error.
+/// [`BlindError`] if the directory has no cases, or the answers have been changed. A missing or broken diagnosis is
+/// counted as wrong, and is not an error.
 pub fn score(directory: &Path) -> Result<Score, BlindError> {
     let manifest = Manifest::read(&directory.join(MANIFEST_NAME))?;
     let truths = open(directory, &manifest)?;
@@ -153,7 +153,7 @@ pub fn score(directory: &Path) -> Result<Score, BlindError> {
 /// Writes NAME.truth.json of each answer next to its recording, for `score.py`.
 ///
 /// # Errors
-/// As [`score`], and where a file cannot be written.
+/// As [`score`], and if a file cannot be written.
 pub fn open_answers(directory: &Path) -> Result<usize, BlindError> {
     let manifest = Manifest::read(&directory.join(MANIFEST_NAME))?;
     let truths = open(directory, &manifest)?;
@@ -187,7 +187,7 @@ fn kind_of(truth: &Truth) -> CaseKind {
 
 fn score_truths(truths: &[Truth], diagnosis_of: impl Fn(&str) -> Option<Diagnosis>) -> Score {
     let catalogue = catalogue();
-    // Several places are right if neighbours share a balance.
+    // Several parts are correct if neighbours share a balance.
     let shows_in = |id: &str, submodel: &str| {
         catalogue.iter().any(|effect| effect.info().id == id && effect.info().shows_in(submodel))
     };
@@ -207,7 +207,7 @@ fn score_truths(truths: &[Truth], diagnosis_of: impl Fn(&str) -> Option<Diagnosi
         let causes: BTreeSet<String> = truth.effects.keys().cloned().collect();
         let kind = kind_of(truth);
         let diagnosis = diagnosis_of(&truth.name);
-        let judged = diagnosis.as_ref().map(|diagnosis| Judged::new(kind, &causes, diagnosis));
+        let judged = diagnosis.as_ref().map(|diagnosis| ComparedDiagnosis::new(kind, &causes, diagnosis));
         let right = judged.as_ref().is_some_and(|judged| judged.right);
         let verdict = diagnosis.as_ref().map(|diagnosis| diagnosis.verdict.as_str());
         let sigma = truth.sigmas.values().copied().reduce(f64::min);
@@ -224,12 +224,12 @@ fn score_truths(truths: &[Truth], diagnosis_of: impl Fn(&str) -> Option<Diagnosi
                 class.single.count(right);
             }
             CaseKind::Pair => {
-                let one = judged.as_ref().is_some_and(|judged| !judged.named.is_disjoint(&causes));
+                let finds_one = judged.as_ref().is_some_and(|judged| !judged.named.is_disjoint(&causes));
                 for (both, at_least) in
                     [(&mut score.pair, &mut score.one_of_pair), (&mut class.pair, &mut class.one_of_pair)]
                 {
                     both.count(right);
-                    at_least.count(one);
+                    at_least.count(finds_one);
                 }
             }
             CaseKind::Triple => {
@@ -289,7 +289,7 @@ fn score_truths(truths: &[Truth], diagnosis_of: impl Fn(&str) -> Option<Diagnosi
             sigma,
         });
     }
-    // Of an even number the upper of the two middle values, as `score.py` takes it.
+    // For an even number, the upper of the two middle values, as in `score.py`.
     score.parameter_error_median = nearest_rank(&errors, 0.5);
     score.shrink_median = nearest_rank(&shrinks, 0.5);
     score.squared_miss_mean = mean(&squared_misses);
@@ -298,14 +298,14 @@ fn score_truths(truths: &[Truth], diagnosis_of: impl Fn(&str) -> Option<Diagnosi
 }
 
 /// A diagnosis compared with the truth.
-struct Judged {
+struct ComparedDiagnosis {
     named: BTreeSet<String>,
     set_size: usize,
     right: bool,
     p_truth: f64,
 }
 
-impl Judged {
+impl ComparedDiagnosis {
     fn new(kind: CaseKind, causes: &BTreeSet<String>, diagnosis: &Diagnosis) -> Self {
         let verdict = diagnosis.verdict.as_str();
         let first = diagnosis.candidates.first();
@@ -331,14 +331,14 @@ impl Judged {
                 .map(|candidate| candidate.probability)
                 .sum(),
         };
-        Judged { named, set_size, right, p_truth }
+        ComparedDiagnosis { named, set_size, right, p_truth }
     }
 }
 
-/// A diagnosis as JSON, read as scoring reads it; for tests of what diagnoses.
+/// Reads a diagnosis as scoring does, for tests of the diagnosis output.
 ///
 /// # Errors
-/// What is missing or of the wrong type.
+/// The missing field, or the field with the wrong type.
 pub fn check_diagnosis(value: &Value) -> Result<(), String> {
     serde_json::from_value::<Diagnosis>(value.clone()).map(drop).map_err(|error| error.to_string())
 }

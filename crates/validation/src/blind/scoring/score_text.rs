@@ -5,7 +5,7 @@ use crate::blind::scoring::score::{CLASSES_SIGMA, Score, ScoredCase};
 use std::collections::BTreeSet;
 
 impl Score {
-    /// The classes of signature length: a heading, and a row each.
+    /// A heading and a row for each class of signature length.
     pub fn class_rows(&self) -> Vec<[String; 6]> {
         let heading =
             ["signature", "single", "both of two", "one of two", "outside, said so", "falsely explained"];
@@ -32,7 +32,7 @@ impl Score {
         };
         let percent = self.parameter_error_median.map(|error| 100.0 * error);
         vec![
-            ("no effect, left alone", self.none.to_string()),
+            ("no effect, none named", self.none.to_string()),
             ("  an effect named", self.none_named.to_string()),
             ("single effect named", self.single.to_string()),
             ("both of two named", self.pair.to_string()),
@@ -67,11 +67,11 @@ impl Score {
         self.cases.iter().map(line).collect()
     }
 
-    /// The table with a further column for other cases, e.g. the same causes on another laboratory, in Markdown.
-    pub fn beside(&self, heads: [&str; 2], other: &Score) -> String {
+    /// The table in Markdown with a second column for other cases, e.g. the same causes in another simulator.
+    pub fn compare_with(&self, heads: [&str; 2], other: &Score) -> String {
         let mut text = format!("| | {} | {} |\n|---|---|---|\n", heads[0], heads[1]);
-        for ((label, here), (_, there)) in self.rows().into_iter().zip(other.rows()) {
-            text += &format!("| {} | {here} | {there} |\n", label.trim());
+        for ((label, own_shares), (_, other_shares)) in self.rows().into_iter().zip(other.rows()) {
+            text += &format!("| {} | {own_shares} | {other_shares} |\n", label.trim());
         }
         text
     }

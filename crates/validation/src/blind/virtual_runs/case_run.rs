@@ -4,7 +4,7 @@ use crate::blind::cases::case::Case;
 use crate::blind::cases::equations::Laboratory;
 use crate::blind::cases::truth::Truth;
 use crate::blind::error::BlindError;
-use crate::blind::virtual_runs::destination::{ToFile, ToMemory};
+use crate::blind::virtual_runs::destination::{FileDestination, MemoryDestination};
 use crate::blind::virtual_runs::steps::{StepsOfCase, steps_of_case};
 use mapper_backends::other_lab::{self, OtherStructure};
 use mapper_backends::virtual_lab::{
@@ -50,7 +50,7 @@ impl<'a> Schedule<'a> {
         Schedule { laboratory, ..self }
     }
 
-    /// The lab of a case: nominal machine, drawn tolerances, then the causes; noise and weather of `night_seed`.
+    /// The lab of a case: the nominal machine with random tolerances and the causes; `night_seed` determines noise and weather.
     fn lab(&self, case: &Case, night_seed: u64) -> Result<VirtualLab, BlindError> {
         let mut rig = Rig::new(self.nominal.clone());
         draw_tolerances(&mut rig, &self.campaign.tolerances, case.seed);
@@ -78,11 +78,11 @@ impl<'a> Schedule<'a> {
         Ok(VirtualLab::new(settings))
     }
 
-    /// Noise and drawn offsets as declared.
+    /// Noise and random offsets as declared.
     fn sensors(&self, seed: u64) -> std::collections::BTreeMap<Channel, SensorErrors> {
         let colour = NoiseColour::default();
         let white_share = (1.0 - colour.first_order_share_ratio.powi(2)).sqrt();
-        // A stream that nothing else of the lab uses.
+        // A random stream that no other part of the lab uses.
         let mut random = Pcg64::seed_from_u64(seed ^ 0x5851_F42D_4C95_7F2D);
         let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
         declared(self.campaign, &ChannelMap::native())
@@ -100,7 +100,7 @@ impl<'a> Schedule<'a> {
             .collect()
     }
 
-    /// Runs a case into a recording without truth, and gives the truth.
+    /// Records a case without its truth, and returns the truth.
     ///
     /// # Errors
     /// If the lab stops or the file cannot be written.
@@ -110,7 +110,7 @@ impl<'a> Schedule<'a> {
         file: &Path,
         header: &RecordingHeader,
     ) -> Result<Truth, BlindError> {
-        let mut kept = ToFile::new(RecordingWriter::create(file, header)?);
+        let mut kept = FileDestination::new(RecordingWriter::create(file, header)?);
         self.drive(case, case.seed, &mut kept)?;
         Ok(Truth::new(case, kept.finish()?))
     }
@@ -125,19 +125,19 @@ impl<'a> Schedule<'a> {
         file: &Path,
         header: &RecordingHeader,
     ) -> Result<(), BlindError> {
-        let mut kept = ToFile::new(RecordingWriter::create(file, header)?);
+        let mut kept = FileDestination::new(RecordingWriter::create(file, header)?);
         let healthy = Case { causes: Vec::new(), sigmas: Vec::new(), ..case.clone() };
         self.drive(&healthy, case.seed ^ ANOTHER_NIGHT, &mut kept)?;
         kept.finish()?;
         Ok(())
     }
 
-    /// Runs a case into memory.
+    /// Records a case in memory.
     ///
     /// # Errors
     /// If the lab stops.
     pub(crate) fn record(&self, case: &Case) -> Result<Recording, BlindError> {
-        let mut kept = ToMemory::default();
+        let mut kept = MemoryDestination::default();
         self.drive(case, case.seed, &mut kept)?;
         Ok(kept.recording)
     }

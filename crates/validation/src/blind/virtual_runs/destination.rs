@@ -6,32 +6,32 @@ use mapper_recording::{RecordError, RecordingWriter, StepPhase};
 use mapper_runner::{ObserverError, RunObserver};
 
 /// Writes the recording, and collects the truth at the end of each step for the answers.
-pub(crate) struct ToFile {
+pub(crate) struct FileDestination {
     writer: RecordingWriter,
     last: SampleBatch,
     points: Vec<TruthPoint>,
 }
 
-impl ToFile {
+impl FileDestination {
     pub(crate) fn new(writer: RecordingWriter) -> Self {
-        ToFile { writer, last: SampleBatch::default(), points: Vec::new() }
+        FileDestination { writer, last: SampleBatch::default(), points: Vec::new() }
     }
 
-    /// Ends the file; the truth point by point.
+    /// Finishes the file and returns the truth of each point.
     pub(crate) fn finish(self) -> Result<Vec<TruthPoint>, RecordError> {
         self.writer.finish()?;
         Ok(self.points)
     }
 }
 
-impl RunObserver for ToFile {
+impl RunObserver for FileDestination {
     fn on_step_start(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
-        self.writer.write_step(marker, StepPhase::Start).map_err(ObserverError::of)
+        self.writer.write_step(marker, StepPhase::Start).map_err(ObserverError::new)
     }
 
     fn on_batch(&mut self, batch: &SampleBatch) -> Result<(), ObserverError> {
         let without_truth = SampleBatch { truth: Vec::new(), ..batch.clone() };
-        self.writer.write_batch(&without_truth).map_err(ObserverError::of)?;
+        self.writer.write_batch(&without_truth).map_err(ObserverError::new)?;
         self.last = batch.clone();
         Ok(())
     }
@@ -47,17 +47,17 @@ impl RunObserver for ToFile {
             eta: last("eta"),
             h: last("h_w_m2k"),
         });
-        self.writer.write_step(marker, StepPhase::End).map_err(ObserverError::of)
+        self.writer.write_step(marker, StepPhase::End).map_err(ObserverError::new)
     }
 }
 
-/// Keeps the recording, and no truth.
+/// Keeps the recording in memory without the truth.
 #[derive(Default)]
-pub(crate) struct ToMemory {
+pub(crate) struct MemoryDestination {
     pub(crate) recording: Recording,
 }
 
-impl RunObserver for ToMemory {
+impl RunObserver for MemoryDestination {
     fn on_batch(&mut self, batch: &SampleBatch) -> Result<(), ObserverError> {
         for column in &batch.columns {
             let series = self.recording.series.entry(column.channel).or_default();

@@ -5,10 +5,10 @@ use mapper_campaign::Campaign;
 use mapper_core::{OperatingPoint, PlanStep, Predicted, StepKind};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::model::Model;
-use mapper_physics::simulation::steady::{self, SteadyState};
+use mapper_physics::simulation::steady;
 use mapper_runner::{StepSource, StepSourceError};
 
-/// One step a point, P3 as the nominal model needs it; only the steady state is predicted.
+/// One step for each point with the P3 that the nominal model needs. Only the steady state is predicted.
 pub(crate) fn steps_of_case(campaign: &Campaign, nominal: &Model) -> Result<Vec<PlanStep>, BlindError> {
     let (timing, dwell_s) = (&campaign.timing, campaign.timing.dwell.fixed_or_usual_s());
     let mut from: Option<OperatingPoint> = None;
@@ -17,29 +17,30 @@ pub(crate) fn steps_of_case(campaign: &Campaign, nominal: &Model) -> Result<Vec<
         .map(|(index, point)| {
             let boundary =
                 BoundaryConditions { valve_opening_ratio: point.valve_opening_ratio, ..campaign.boundary };
-            let held = steady::hold_speed(nominal, point.speed_rpm, &boundary)?;
+            let steady_state = steady::hold_speed(nominal, point.speed_rpm, &boundary)?;
+            let outputs = &steady_state.outputs;
             Ok(PlanStep {
                 index,
                 kind: StepKind::Point,
                 from: from.replace(*point),
                 to: *point,
-                p3_pa: held.boundary.p3_pa,
+                p3_pa: steady_state.boundary.p3_pa,
                 t3_k: boundary.t3_k,
                 oil_temperature_k: boundary.oil_temperature_k,
                 dwell_s,
                 start_s: timing.warm_up_s + index as f64 * dwell_s,
-                predicted: at_rest(&held, dwell_s),
+                predicted: Predicted::settled(
+                    outputs.flow_kg_s,
+                    outputs.pressure_ratio,
+                    outputs.t2_k,
+                    dwell_s,
+                ),
             })
         })
         .collect()
 }
 
-fn at_rest(held: &SteadyState, dwell_s: f64) -> Predicted {
-    let outputs = &held.outputs;
-    Predicted::settled(outputs.flow_kg_s, outputs.pressure_ratio, outputs.t2_k, dwell_s)
-}
-
-/// Yields them.
+/// Yields these steps.
 pub(crate) struct StepsOfCase<'a> {
     left: std::slice::Iter<'a, PlanStep>,
     warm_up_s: f64,

@@ -2,7 +2,7 @@
 
 use crate::reproduction::lab::{JUMPS, Run, run_all};
 use crate::reproduction::number_text::{fixed, range};
-use crate::reproduction::outcome::{Outcome, RUN_S, assuming, extremes, outcomes, rms, worst};
+use crate::reproduction::outcome::{Outcome, RUN_S, dynamic_config, extremes, identify_runs, rms, worst};
 use crate::reproduction::picture::{at_speed, efficiency_pair, efficiency_panel, h_pair, h_panel};
 use crate::reproduction::{FigureResult, ReproduceError, Statement, Table, Verdict};
 use mapper_chart::{Figure, Marker, palette};
@@ -31,7 +31,7 @@ fn cases() -> Result<Vec<Case>, ReproduceError> {
             machine.params.bearing.oil_conductance_w_k *= oil_scale;
             let runs = run_all(&machine, RUN_S)?;
             let tc_end_k = runs.iter().filter_map(tc_end_k).collect();
-            Ok(Case { oil_scale, outcomes: outcomes(&runs, &assuming(0.0))?, tc_end_k })
+            Ok(Case { oil_scale, outcomes: identify_runs(&runs, &dynamic_config(0.0))?, tc_end_k })
         })
         .collect()
 }
@@ -42,7 +42,7 @@ pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
     let rms_of = |case: &Case| rms(case.outcomes.iter().map(Outcome::eta_error_points));
     let worst_range = extremes(cases.iter().map(|case| Some(worst_of(case))));
     let rms_range = extremes(cases.iter().map(rms_of));
-    // The housing at the first jump's first opening: what the oil changes.
+    // The influence of the oil on the housing temperature, at the first opening of the first jump.
     let tc_range = extremes(cases.iter().map(|case| case.tc_end_k.first().map(|tc| tc - 273.15)));
     let statements = vec![Statement::new(
         "At five levels of heat from the turbine the accuracy of the identified efficiency is similar.",

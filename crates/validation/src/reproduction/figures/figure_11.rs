@@ -1,17 +1,19 @@
-//! Figure 11 (b): the heat-transfer coefficient where gas heats the housing and where the housing heats the gas.
+//! Figure 11 (b): the heat-transfer coefficient when the gas heats the housing and when the housing heats the gas.
 
 use crate::reproduction::lab::{Run, run_all};
 use crate::reproduction::number_text::{fixed, range};
-use crate::reproduction::outcome::{Outcome, RUN_S, WINDOW, assuming, extremes, in_window, outcome};
+use crate::reproduction::outcome::{
+    Outcome, RUN_S, WINDOW, dynamic_config, extremes, identify_run, truth_in_window,
+};
 use crate::reproduction::picture::{h_pair, h_panel};
 use crate::reproduction::{FigureResult, ReproduceError, Statement, Table, Verdict};
 use mapper_chart::{Axis, Figure, Marker, Panel, Scatter, palette};
 use mapper_physics::simulation::model::Model;
 
-/// Factor of h where the housing heats the gas. The paper does not print its second correlation.
+/// Factor of h when the housing heats the gas. The paper does not print its second correlation.
 const HOT_METAL_RATIO: f64 = 0.65;
 
-/// A jump, identified, with the share of the window in which the housing is hotter than the gas behind the wheel.
+/// An identified jump, and the share of the window in which the housing is hotter than the gas after the wheel.
 struct Case {
     outcome: Outcome,
     cooling_ratio: f64,
@@ -25,11 +27,11 @@ impl Case {
 }
 
 fn case(run: &Run) -> Result<Case, ReproduceError> {
-    let window = in_window(run, &WINDOW);
+    let window = truth_in_window(run, &WINDOW);
     let cooling = window.iter().filter(|truth| truth.heats_gas).count();
     let flow_kg_s = window.last().ok_or(ReproduceError::NoStep)?.flow_kg_s;
     let cooling_ratio = cooling as f64 / window.len() as f64;
-    Ok(Case { outcome: outcome(run, &assuming(0.0))?, cooling_ratio, flow_kg_s })
+    Ok(Case { outcome: identify_run(run, &dynamic_config(0.0))?, cooling_ratio, flow_kg_s })
 }
 
 pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
@@ -37,8 +39,8 @@ pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
     machine.params.compressor.hot_metal_h_ratio = HOT_METAL_RATIO;
     let cases = run_all(&machine, RUN_S)?.iter().map(case).collect::<Result<Vec<Case>, _>>()?;
     let errors = |cooling: bool| {
-        let of = cases.iter().filter(move |case| case.is_cooling() == cooling);
-        extremes(of.map(|case| case.outcome.h_error_percent()))
+        let selected = cases.iter().filter(move |case| case.is_cooling() == cooling);
+        extremes(selected.map(|case| case.outcome.h_error_percent()))
     };
     let (heating, cooling) = (errors(false), errors(true));
     let size = |range: Option<(f64, f64)>| range.map_or(f64::NAN, |(low, high)| low.abs().max(high.abs()));
@@ -106,20 +108,21 @@ fn picture(cases: &[Case]) -> String {
         (false, palette::BLUE, Marker::Circle, "gas heats housing"),
         (true, palette::ORANGE, Marker::Triangle, "housing heats gas"),
     ];
-    let of = |cooling: bool| cases.iter().filter(move |case| case.is_cooling() == cooling);
+    let selected = |cooling: bool| cases.iter().filter(move |case| case.is_cooling() == cooling);
     let mut over_flow =
         Panel::new(Axis::new("flow, kg/s").from(0.0), Axis::new("h, W/(m2 K)")).title("(a) h over the flow");
     for (cooling, colour, marker, label) in groups {
-        let model = of(cooling).map(|case| (case.flow_kg_s, case.outcome.h_mean_w_m2k)).collect();
-        let found =
-            of(cooling).filter_map(|case| Some((case.flow_kg_s, case.outcome.point.h_w_m2k?))).collect();
+        let model = selected(cooling).map(|case| (case.flow_kg_s, case.outcome.h_mean_w_m2k)).collect();
+        let points = selected(cooling)
+            .filter_map(|case| Some((case.flow_kg_s, case.outcome.point.h_w_m2k?)))
+            .collect();
         over_flow.add(Scatter::new(model, colour).marker(marker).label(format!("{label}: model")));
         over_flow
-            .add(Scatter::new(found, colour).marker(marker).label(format!("{label}: identified")).hollow());
+            .add(Scatter::new(points, colour).marker(marker).label(format!("{label}: identified")).hollow());
     }
     let series = groups.map(|(cooling, colour, marker, label)| {
         (
-            of(cooling).filter_map(|case| h_pair(&case.outcome)).collect(),
+            selected(cooling).filter_map(|case| h_pair(&case.outcome)).collect(),
             colour,
             marker,
             true,

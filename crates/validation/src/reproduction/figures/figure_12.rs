@@ -2,7 +2,7 @@
 
 use crate::reproduction::lab::{Jump, Run, run_lagged};
 use crate::reproduction::number_text::fixed;
-use crate::reproduction::outcome::{Outcome, RUN_S, assuming, outcome_of, rms};
+use crate::reproduction::outcome::{Outcome, RUN_S, dynamic_config, identify_recording, rms};
 use crate::reproduction::{FigureResult, ReproduceError, Statement, Table, Verdict};
 use mapper_chart::{Axis, Figure, Marker, Panel, Rule, RuleAt, Scatter, palette};
 use mapper_core::{Channel, Recording, Verdict as PointVerdict, Warning};
@@ -15,11 +15,11 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
 const TARGETS_RPM: [f64; 5] = [50e3, 70e3, 90e3, 110e3, 150e3];
-/// Jumps to each target from this far off, as long as the from-speed lies within [`FROM_RPM`].
+/// Distances of the initial speed from each target speed; the initial speed must lie within [`FROM_RPM`].
 const STEPS_RPM: [f64; 10] = [-100e3, -60e3, -40e3, -20e3, -5e3, 5e3, 20e3, 40e3, 60e3, 100e3];
 const FROM_RPM: std::ops::RangeInclusive<f64> = 45e3..=155e3;
 const OPENINGS: [f64; 3] = [0.5, 0.7, 1.0];
-/// Campaigns: each has its own offsets; each of its runs has its own noise.
+/// Number of campaigns: each has its own offsets, and each run its own noise.
 const SEEDS: u64 = 6;
 
 /// A good rig: one-sigma noise at 10 Hz, fixed offset, gain; SI units.
@@ -32,7 +32,7 @@ const RIG: [(Channel, f64, f64, f64); 7] = [
     (Channel::T2, 0.1, 0.25, 0.0),
     (Channel::Tc, 0.15, 0.3, 0.0),
 ];
-/// Diameter of the paper's probes, m; the method takes them for ideal.
+/// Diameter of the paper's probes, m; the method assumes ideal probes.
 const PROBE_M: f64 = 1.5e-3;
 /// Lag of P3, s. Judgement: the paper's rig changes it "somewhat slower" than its model, which steps it.
 const P3_LAG_S: f64 = 2.0;
@@ -40,7 +40,7 @@ const P3_LAG_S: f64 = 2.0;
 const BINS_K: [(f64, f64); 5] = [(0.0, 2.0), (2.0, 5.0), (5.0, 10.0), (10.0, 15.0), (15.0, f64::INFINITY)];
 
 fn config() -> IdentifyConfig {
-    let mut config = assuming(0.0);
+    let mut config = dynamic_config(0.0);
     for (channel, noise_sigma, offset_sigma, gain_sigma_ratio) in RIG {
         config.declared.insert(channel, DeclaredUncertainty { noise_sigma, offset_sigma, gain_sigma_ratio });
     }
@@ -48,7 +48,7 @@ fn config() -> IdentifyConfig {
 }
 
 /// White noise with 0.8 and first-order noise (2 s) with 0.6 of each sigma; offsets and gains as given.
-fn as_measured(clean: &Recording, errors: &[(f64, f64)], rng: &mut impl Rng) -> Recording {
+fn add_sensor_errors(clean: &Recording, errors: &[(f64, f64)], rng: &mut impl Rng) -> Recording {
     let mut measured = clean.clone();
     for ((channel, sigma, ..), (offset, gain)) in RIG.into_iter().zip(errors) {
         let Some(series) = measured.series.get_mut(&channel) else { continue };
@@ -82,7 +82,7 @@ fn runs() -> Result<Vec<Run>, ReproduceError> {
 
 fn measured() -> Result<Vec<Outcome>, ReproduceError> {
     let (runs, config) = (runs()?, config());
-    let mut found = Vec::new();
+    let mut all_outcomes = Vec::new();
     for seed in 0..SEEDS {
         let mut rng = Pcg64::seed_from_u64(seed);
         let errors: Vec<(f64, f64)> = RIG
@@ -93,10 +93,14 @@ fn measured() -> Result<Vec<Outcome>, ReproduceError> {
             })
             .collect();
         for run in &runs {
-            found.push(outcome_of(run, &as_measured(&run.recording, &errors, &mut rng), &config)?);
+            all_outcomes.push(identify_recording(
+                run,
+                &add_sensor_errors(&run.recording, &errors, &mut rng),
+                &config,
+            )?);
         }
     }
-    Ok(found)
+    Ok(all_outcomes)
 }
 
 fn dt2_k(outcome: &Outcome) -> f64 {
@@ -114,10 +118,10 @@ struct Bin<'a> {
 }
 
 impl<'a> Bin<'a> {
-    fn of(found: &'a [Outcome], (low, high): (f64, f64)) -> Self {
+    fn of(all_outcomes: &'a [Outcome], (low, high): (f64, f64)) -> Self {
         let name =
             if high.is_finite() { format!("{low:.0} to {high:.0}") } else { format!("above {low:.0}") };
-        Bin { name, members: found.iter().filter(|o| (low..high).contains(&dt2_k(o))).collect() }
+        Bin { name, members: all_outcomes.iter().filter(|o| (low..high).contains(&dt2_k(o))).collect() }
     }
 
     fn rms(&self) -> Option<f64> {
@@ -131,18 +135,18 @@ impl<'a> Bin<'a> {
 }
 
 pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
-    let found = measured()?;
-    let bins: Vec<Bin<'_>> = BINS_K.into_iter().map(|bin| Bin::of(&found, bin)).collect();
+    let all_outcomes = measured()?;
+    let bins: Vec<Bin<'_>> = BINS_K.into_iter().map(|bin| Bin::of(&all_outcomes, bin)).collect();
     let moved =
         |o: &Outcome| o.point.warnings.iter().any(|warning| matches!(warning, Warning::FlowMoved { .. }));
-    let of = |from_k: f64, to_k: f64, steady: bool| {
+    let selected = |from_k: f64, to_k: f64, steady: bool| {
         let wanted = |o: &&Outcome| (from_k..to_k).contains(&dt2_k(o)) && !(steady && moved(o));
-        rms(found.iter().filter(wanted).map(Outcome::eta_error_points)).unwrap_or(f64::NAN)
+        rms(all_outcomes.iter().filter(wanted).map(Outcome::eta_error_points)).unwrap_or(f64::NAN)
     };
-    let (small, large) = (of(0.0, 2.0, false), of(15.0, f64::INFINITY, false));
-    let (small_steady, large_steady) = (of(0.0, 2.0, true), of(15.0, f64::INFINITY, true));
-    let mid = || found.iter().filter(|o| [90e3, 110e3].contains(&o.jump.to_rpm) && dt2_k(o) >= 5.0);
-    let slow = || found.iter().filter(|o| o.jump.to_rpm == 50e3);
+    let (small, large) = (selected(0.0, 2.0, false), selected(15.0, f64::INFINITY, false));
+    let (small_steady, large_steady) = (selected(0.0, 2.0, true), selected(15.0, f64::INFINITY, true));
+    let mid = || all_outcomes.iter().filter(|o| [90e3, 110e3].contains(&o.jump.to_rpm) && dt2_k(o) >= 5.0);
+    let slow = || all_outcomes.iter().filter(|o| o.jump.to_rpm == 50e3);
     let share = |outcomes: &mut dyn Iterator<Item = &Outcome>, limit: f64| {
         let (mut inside, mut all) = (0u32, 0u32);
         for outcome in outcomes {
@@ -151,11 +155,11 @@ pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
         }
         100.0 * f64::from(inside) / f64::from(all.max(1))
     };
-    let good: Vec<&Outcome> = found.iter().filter(|o| o.point.verdict == PointVerdict::Good).collect();
+    let good: Vec<&Outcome> = all_outcomes.iter().filter(|o| o.point.verdict == PointVerdict::Good).collect();
     let good_worst = good.iter().filter_map(|o| o.eta_error_points()).map(f64::abs).fold(0.0, f64::max);
-    let intervals: Vec<bool> = found.iter().filter_map(within).collect();
+    let intervals: Vec<bool> = all_outcomes.iter().filter_map(within).collect();
     let good_intervals: Vec<bool> = good.iter().filter_map(|o| within(o)).collect();
-    let held = |intervals: &[bool]| {
+    let coverage = |intervals: &[bool]| {
         100.0 * intervals.iter().filter(|inside| **inside).count() as f64 / intervals.len().max(1) as f64
     };
     let mid_rms = rms(mid().map(Outcome::eta_error_points)).unwrap_or(f64::NAN);
@@ -200,12 +204,12 @@ pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
             format!(
                 "{} of {} points are called good; the worst of these is {} points off. The 95 % intervals hold the model's final efficiency in {} % of all points, {} % of the good ones.",
                 good.len(),
-                found.len(),
+                all_outcomes.len(),
                 fixed(good_worst, 1),
-                fixed(held(&intervals), 0),
-                fixed(held(&good_intervals), 0)
+                fixed(coverage(&intervals), 0),
+                fixed(coverage(&good_intervals), 0)
             ),
-            Verdict::holds_if(held(&good_intervals) > 90.0),
+            Verdict::holds_if(coverage(&good_intervals) > 90.0),
         ),
     ];
     let mut table = Table::new([
@@ -228,7 +232,7 @@ pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
             fixed(bin.quantile(0.5), 2),
             fixed(bin.quantile(0.95), 2),
             good.to_string(),
-            fixed(held(&inside), 0),
+            fixed(coverage(&inside), 0),
             bin.members.iter().filter(|o| o.point.eta.is_none()).count().to_string(),
         ]);
     }
@@ -244,12 +248,12 @@ pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
         ),
         statements,
         table,
-        svg: picture(&found),
+        svg: picture(&all_outcomes),
     })
 }
 
-fn picture(found: &[Outcome]) -> String {
-    // Errors beyond the picture stand on its edge.
+fn picture(all_outcomes: &[Outcome]) -> String {
+    // Errors beyond the axis are drawn at its end.
     const EDGE_POINTS: f64 = 10.0;
     let panel = |title: &str, keep: &dyn Fn(&Outcome) -> bool| {
         let mut panel = Panel::new(
@@ -262,7 +266,7 @@ fn picture(found: &[Outcome]) -> String {
             (PointVerdict::Doubtful, palette::ORANGE, Marker::Triangle, true, "called doubtful"),
             (PointVerdict::Good, palette::BLUE, Marker::Circle, false, "called good"),
         ] {
-            let points: Vec<(f64, f64)> = found
+            let points: Vec<(f64, f64)> = all_outcomes
                 .iter()
                 .filter(|o| keep(o) && o.point.verdict == verdict)
                 .filter_map(|o| Some((dt2_k(o), o.eta_error_points()?.clamp(-EDGE_POINTS, EDGE_POINTS))))

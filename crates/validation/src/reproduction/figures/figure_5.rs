@@ -1,6 +1,6 @@
 //! Figure 5: conventional mapping; apparent efficiency of settled points at several turbine inlet temperatures.
 
-use crate::reproduction::number_text::{fixed, maybe, range};
+use crate::reproduction::number_text::{fixed, range, signed_or_dash};
 use crate::reproduction::outcome::{extremes, worst};
 use crate::reproduction::picture::{krpm, speed_colour, target_speeds_rpm};
 use crate::reproduction::{FigureResult, ReproduceError, Statement, Table, Verdict};
@@ -149,11 +149,11 @@ pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
             fixed(place.opening, 2),
             fixed(place.flow_corrected_kg_s, 4),
             fixed(100.0 * place.eta, 2),
-            maybe(place.adiabatic.map(|a| 100.0 * (a - place.eta)), 2),
-            maybe(place.error_points(0), 2),
-            maybe(place.error_points(1), 2),
-            maybe(place.error_points(2), 2),
-            maybe(place.error_points(3), 2),
+            signed_or_dash(place.adiabatic.map(|a| 100.0 * (a - place.eta)), 2),
+            signed_or_dash(place.error_points(0), 2),
+            signed_or_dash(place.error_points(1), 2),
+            signed_or_dash(place.error_points(2), 2),
+            signed_or_dash(place.error_points(3), 2),
         ]);
     }
     Ok(FigureResult {

@@ -2,8 +2,10 @@
 
 use crate::reproduction::figures::figure_5::apparent_eta;
 use crate::reproduction::lab::Run;
-use crate::reproduction::number_text::{fixed, maybe, range, signed};
-use crate::reproduction::outcome::{Outcome, WINDOW, assuming, extremes, in_window, outcomes, rms, worst};
+use crate::reproduction::number_text::{fixed, range, signed, signed_or_dash};
+use crate::reproduction::outcome::{
+    Outcome, WINDOW, dynamic_config, extremes, identify_runs, rms, truth_in_window, worst,
+};
 use crate::reproduction::picture::{
     at_speed, equality_panel, eta_pairs, h_pairs, krpm, speed_colour, target_speeds_rpm,
 };
@@ -15,7 +17,7 @@ use mapper_physics::simulation::model::Model;
 use mapper_physics::simulation::steady::hold_speed;
 
 pub(crate) fn figure(runs: &[Run]) -> Result<FigureResult, ReproduceError> {
-    let found = outcomes(runs, &assuming(0.0))?;
+    let found = identify_runs(runs, &dynamic_config(0.0))?;
     let steady_hot = found.iter().map(steady_hot).collect::<Result<Vec<_>, _>>()?;
     let eta_worst = worst(found.iter().map(Outcome::eta_error_points));
     let eta_end_worst = worst(found.iter().map(Outcome::eta_end_error_points));
@@ -23,12 +25,12 @@ pub(crate) fn figure(runs: &[Run]) -> Result<FigureResult, ReproduceError> {
     let h_range = extremes(found.iter().map(Outcome::h_error_percent));
     let (nrmse_range, nrmse_mean) = nrmse_percent(&found);
     let t2_range = extremes(runs.iter().map(|run| {
-        let window = in_window(run, &WINDOW);
+        let window = truth_in_window(run, &WINDOW);
         extremes(window.iter().map(|t| Some(t.t2_k))).map(|(low, high)| high - low)
     }));
     let drift = |value: fn(&crate::reproduction::lab::Truth) -> f64| {
         extremes(runs.iter().map(|run| {
-            let window = in_window(run, &WINDOW);
+            let window = truth_in_window(run, &WINDOW);
             let (low, high) = extremes(window.iter().map(|t| Some(value(t))))?;
             Some(100.0 * (high - low) / value(window.last()?))
         }))
@@ -93,11 +95,19 @@ pub(crate) fn figure(runs: &[Run]) -> Result<FigureResult, ReproduceError> {
             fixed(o.jump.opening, 1),
             format!("{}, {}", fixed(100.0 * o.eta_mean, 2), fixed(100.0 * o.eta_end, 2)),
             fixed(100.0 * o.point.eta.unwrap_or(f64::NAN), 2),
-            format!("{}, {}", maybe(o.eta_error_points(), 2), maybe(o.eta_end_error_points(), 2)),
+            format!(
+                "{}, {}",
+                signed_or_dash(o.eta_error_points(), 2),
+                signed_or_dash(o.eta_end_error_points(), 2)
+            ),
             signed(100.0 * (hot - o.eta_end), 2),
             format!("{}, {}", fixed(o.h_mean_w_m2k, 0), fixed(o.h_end_w_m2k, 0)),
             fixed(o.point.h_w_m2k.unwrap_or(f64::NAN), 0),
-            format!("{}, {}", maybe(o.h_error_percent(), 1), maybe(o.h_end_error_percent(), 1)),
+            format!(
+                "{}, {}",
+                signed_or_dash(o.h_error_percent(), 1),
+                signed_or_dash(o.h_end_error_percent(), 1)
+            ),
         ]);
     }
     Ok(FigureResult {

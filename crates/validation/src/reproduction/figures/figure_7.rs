@@ -2,7 +2,7 @@
 
 use crate::reproduction::lab::Run;
 use crate::reproduction::number_text::fixed;
-use crate::reproduction::outcome::{Outcome, outcomes, rms, worst};
+use crate::reproduction::outcome::{Outcome, identify_runs, rms, worst};
 use crate::reproduction::picture::{at_speed, krpm, speed_colour, target_speeds_rpm};
 use crate::reproduction::{FigureResult, ReproduceError, Statement, Table, Verdict};
 use mapper_chart::{Axis, Dash, Figure, Line, Panel, Rule, RuleAt, palette};
@@ -52,7 +52,7 @@ fn cases(
             let (start_s, duration_s) = window(*value_s);
             let window = WindowRule::Fixed { start_s, end_s: start_s + duration_s };
             let config = IdentifyConfig { window, ..IdentifyConfig::default() };
-            Ok(Case { value_s: *value_s, outcomes: outcomes(runs, &config)? })
+            Ok(Case { value_s: *value_s, outcomes: identify_runs(runs, &config)? })
         })
         .collect()
 }
@@ -82,7 +82,7 @@ pub(crate) fn figure(runs: &[Run]) -> Result<FigureResult, ReproduceError> {
                 fixed(eta(&durations, 100.0), 2),
                 fixed(eta(&durations, 200.0), 2)
             ),
-            // It improves as stated; that it goes on improving is better than stated.
+            // The paper states an improvement; a longer one than stated also supports it.
             if eta(&durations, 5.0) > eta(&durations, 100.0)
                 && eta(&durations, 200.0) <= eta(&durations, 100.0)
             {

@@ -2,7 +2,7 @@
 
 use crate::reproduction::lab::{JUMPS, run_all};
 use crate::reproduction::number_text::{fixed, range};
-use crate::reproduction::outcome::{Outcome, RUN_S, assuming, extremes, outcomes, rms, worst};
+use crate::reproduction::outcome::{Outcome, RUN_S, dynamic_config, extremes, identify_runs, rms, worst};
 use crate::reproduction::picture::{
     at_speed, efficiency_pair, efficiency_panel, h_pair, h_panel, krpm, speed_colour, target_speeds_rpm,
 };
@@ -32,20 +32,20 @@ fn cases() -> Result<Vec<Case>, ReproduceError> {
             let mut machine = Model::nominal();
             machine.params.compressor.alpha_area_ratio = alpha;
             let runs = run_all(&machine, RUN_S)?;
-            let right = outcomes(&runs, &assuming(alpha))?;
-            Ok(Case { alpha, right, wrong: outcomes(&runs, &assuming(0.0))? })
+            let right = identify_runs(&runs, &dynamic_config(alpha))?;
+            Ok(Case { alpha, right, wrong: identify_runs(&runs, &dynamic_config(0.0))? })
         })
         .collect()
 }
 
-/// The machine of figure 8 whose h before the wheel follows the inlet's own diameter (Appendix A), identified with the one h
-/// of eqs. 1 and 3, as the paper does, and with that law.
+/// A machine whose h before the wheel follows from the diameter of the inlet (Appendix A), identified with a single h in eqs. 1 and 3 as in
+/// the paper, and with the correlation of Appendix A.
 struct OwnInlet {
-    /// alpha_A known, one h.
+    /// Known alpha_A, a single h.
     right: Vec<Outcome>,
-    /// alpha_A taken for 0, one h.
+    /// alpha_A assumed to be 0, a single h.
     wrong: Vec<Outcome>,
-    /// alpha_A and the law before the wheel known.
+    /// Known alpha_A and correlation before the wheel.
     with_law: Vec<Outcome>,
 }
 
@@ -54,22 +54,27 @@ fn own_inlet() -> Result<OwnInlet, ReproduceError> {
     machine.params.compressor.alpha_area_ratio = SHOWN;
     machine.params.compressor.inlet_convection = InletConvection::Own;
     let runs = run_all(&machine, RUN_S)?;
-    let with_law = IdentifyConfig { inlet_convection: InletConvection::Own, ..assuming(SHOWN) };
+    let with_law = IdentifyConfig { inlet_convection: InletConvection::Own, ..dynamic_config(SHOWN) };
     Ok(OwnInlet {
-        right: outcomes(&runs, &assuming(SHOWN))?,
-        wrong: outcomes(&runs, &assuming(0.0))?,
-        with_law: outcomes(&runs, &with_law)?,
+        right: identify_runs(&runs, &dynamic_config(SHOWN))?,
+        wrong: identify_runs(&runs, &dynamic_config(0.0))?,
+        with_law: identify_runs(&runs, &with_law)?,
     })
 }
 
 /// Statements of the paper on figure 8 (b), for both machines.
-fn on_h(right: &[Outcome], wrong: &[Outcome], nothing_before: &[Outcome], own: &OwnInlet) -> [Statement; 3] {
+fn statements_on_h(
+    right: &[Outcome],
+    wrong: &[Outcome],
+    nothing_before: &[Outcome],
+    own_inlet_fit: &OwnInlet,
+) -> [Statement; 3] {
     let span = |outcomes: &[Outcome]| extremes(outcomes.iter().map(Outcome::h_error_percent));
     let off = |outcomes: &[Outcome]| rms(outcomes.iter().map(Outcome::h_error_percent)).unwrap_or(f64::NAN);
     let errors_text =
         |outcomes: &[Outcome]| format!("{} % (rms {} %)", range(span(outcomes), 1), fixed(off(outcomes), 1));
     let grows = |right: &[Outcome], wrong: &[Outcome]| off(wrong) / off(right);
-    let (shared_grows, own_grows) = (grows(right, wrong), grows(&own.right, &own.wrong));
+    let (shared_grows, own_grows) = (grows(right, wrong), grows(&own_inlet_fit.right, &own_inlet_fit.wrong));
     let slightly = |ratio: f64| ratio > 1.0 && ratio < SLIGHTLY_RATIO;
     let worse = |outcomes: &[Outcome]| off(outcomes) > 1.2 * off(nothing_before);
     let nearer = |to_own: bool| {
@@ -84,14 +89,14 @@ fn on_h(right: &[Outcome], wrong: &[Outcome], nothing_before: &[Outcome], own: &
                 errors_text(right),
                 errors_text(wrong),
                 fixed(shared_grows, 1),
-                errors_text(&own.right),
-                errors_text(&own.wrong),
+                errors_text(&own_inlet_fit.right),
+                errors_text(&own_inlet_fit.wrong),
                 fixed(own_grows, 1),
                 nearer((own_grows - 1.0).abs() < (shared_grows - 1.0).abs())
             ),
             match (slightly(shared_grows), slightly(own_grows)) {
                 (true, _) => Verdict::Holds,
-                // With what Appendix A has and eqs. 1 and 3 have not.
+                // With the correlation of Appendix A, which eqs. 1 and 3 omit.
                 (false, true) => Verdict::Partly,
                 (false, false) => Verdict::Differs,
             },
@@ -101,11 +106,11 @@ fn on_h(right: &[Outcome], wrong: &[Outcome], nothing_before: &[Outcome], own: &
             format!(
                 "rms {} % with one h shared, {} % with its own before the wheel; the 20 % lie between, {} points nearer to {}.",
                 fixed(off(wrong), 1),
-                fixed(off(&own.wrong), 1),
-                fixed((to_20(wrong) - to_20(&own.wrong)).abs(), 1),
-                nearer(to_20(&own.wrong) < to_20(wrong))
+                fixed(off(&own_inlet_fit.wrong), 1),
+                fixed((to_20(wrong) - to_20(&own_inlet_fit.wrong)).abs(), 1),
+                nearer(to_20(&own_inlet_fit.wrong) < to_20(wrong))
             ),
-            if off(&own.wrong) < SAID_PERCENT && SAID_PERCENT < off(wrong) {
+            if off(&own_inlet_fit.wrong) < SAID_PERCENT && SAID_PERCENT < off(wrong) {
                 Verdict::Partly
             } else {
                 Verdict::Differs
@@ -117,15 +122,15 @@ fn on_h(right: &[Outcome], wrong: &[Outcome], nothing_before: &[Outcome], own: &
                 "Without area before the wheel (figure 6) rms {} %. With alpha_A = 0.2 right {} % on the machine that shares one h; {} % on that with its own, and {} % there once identified with the same law. The remark is that of {}.",
                 fixed(off(nothing_before), 1),
                 fixed(off(right), 1),
-                fixed(off(&own.right), 1),
-                fixed(off(&own.with_law), 1),
-                match (worse(right), worse(&own.right)) {
+                fixed(off(&own_inlet_fit.right), 1),
+                fixed(off(&own_inlet_fit.with_law), 1),
+                match (worse(right), worse(&own_inlet_fit.right)) {
                     (false, true) => nearer(true),
                     (true, false) => nearer(false),
                     _ => "either machine",
                 }
             ),
-            Verdict::holds_if(worse(&own.right) && !worse(right)),
+            Verdict::holds_if(worse(&own_inlet_fit.right) && !worse(right)),
         ),
     ]
 }
@@ -143,7 +148,7 @@ pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
         .find(|case| case.alpha == SHOWN)
         .map_or((&nothing, &nothing), |case| (&case.right, &case.wrong));
     let nothing_before = cases.first().map_or(&nothing, |case| &case.right);
-    let own = own_inlet()?;
+    let own_inlet_fit = own_inlet()?;
     let wrong_errors = || wrong.iter().map(Outcome::eta_error_points);
     let three = |o: &&Outcome| o.jump.opening <= 1.0;
     let wrong_three = extremes(wrong.iter().filter(three).map(Outcome::eta_error_points));
@@ -184,7 +189,7 @@ pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
             Verdict::holds_if(right_worst < 1.3),
         ),
     ];
-    statements.extend(on_h(right, wrong, nothing_before, &own));
+    statements.extend(statements_on_h(right, wrong, nothing_before, &own_inlet_fit));
     let mut table = Table::new([
         "alpha_A",
         "jump, krpm",
@@ -226,19 +231,19 @@ pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
         ),
         statements,
         table,
-        svg: picture(&cases, right, wrong, &own),
+        svg: picture(&cases, right, wrong, &own_inlet_fit),
     })
 }
 
-fn picture(cases: &[Case], right: &[Outcome], wrong: &[Outcome], own: &OwnInlet) -> String {
+fn picture(cases: &[Case], right: &[Outcome], wrong: &[Outcome], own_inlet_fit: &OwnInlet) -> String {
     let series_of = |right: &[Outcome], wrong: &[Outcome], value: fn(&Outcome) -> Option<(f64, f64)>| {
         let mut series = Vec::new();
-        for (outcomes, marker, hollow, what) in
+        for (outcomes, marker, hollow, name) in
             [(right, Marker::Circle, false, "known"), (wrong, Marker::Diamond, true, "0 assumed")]
         {
             for speed_rpm in target_speeds_rpm() {
                 let points = at_speed(outcomes, speed_rpm).filter_map(value).collect();
-                let label = format!("{what}, {}", krpm(speed_rpm));
+                let label = format!("{name}, {}", krpm(speed_rpm));
                 series.push((points, speed_colour(speed_rpm), marker, hollow, label));
             }
         }
@@ -274,6 +279,6 @@ fn picture(cases: &[Case], right: &[Outcome], wrong: &[Outcome], own: &OwnInlet)
         .panel(efficiency_panel(series(efficiency_pair)))
         .panel(h_panel(series(h_pair)))
         .panel(over_alpha)
-        .panel(h_panel(series_of(&own.right, &own.wrong, h_pair)).title("(d) h, its own before the wheel"))
+        .panel(h_panel(series_of(&own_inlet_fit.right, &own_inlet_fit.wrong, h_pair)).title("(d) h, its own before the wheel"))
         .to_svg()
 }

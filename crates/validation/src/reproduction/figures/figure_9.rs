@@ -2,7 +2,9 @@
 
 use crate::reproduction::lab::{JUMPS, run_all};
 use crate::reproduction::number_text::{fixed, range};
-use crate::reproduction::outcome::{Outcome, RUN_S, WINDOW, assuming, extremes, in_window, outcomes, worst};
+use crate::reproduction::outcome::{
+    Outcome, RUN_S, WINDOW, dynamic_config, extremes, identify_runs, truth_in_window, worst,
+};
 use crate::reproduction::picture::{
     at_speed, efficiency_pair, efficiency_panel, h_pair, h_panel, krpm, speed_colour, target_speeds_rpm,
 };
@@ -26,9 +28,9 @@ fn cases() -> Result<Vec<Case>, ReproduceError> {
             let mut machine = Model::nominal();
             machine.params.t2_probe_diameter_m = diameter_mm * 1e-3;
             let runs = run_all(&machine, RUN_S)?;
-            let taus = runs.iter().flat_map(|run| in_window(run, &WINDOW).iter());
+            let taus = runs.iter().flat_map(|run| truth_in_window(run, &WINDOW).iter());
             let time_constants_s = extremes(taus.map(|truth| Some(truth.probe_time_constant_s)));
-            Ok(Case { diameter_mm, outcomes: outcomes(&runs, &assuming(0.0))?, time_constants_s })
+            Ok(Case { diameter_mm, outcomes: identify_runs(&runs, &dynamic_config(0.0))?, time_constants_s })
         })
         .collect()
 }

@@ -56,20 +56,20 @@ impl Calibrate {
         let report = |done, of| progress.pieces(done, of);
         let engine = Engine { jobs: self.jobs, stop: &stop, on_progress: &report };
         let made_by = plan.command(&self.campaign);
-        let found = calibrate(&campaign, &registry::registry().effects, &plan, made_by, &engine);
+        let fitted = calibrate(&campaign, &registry::registry().effects, &plan, made_by, &engine);
         progress.clear();
         let stopped = || Failure::new(Code::Interrupted, "stopped; `mapper fleet` keeps finished cases");
-        let (calibration, observed) = found?.ok_or_else(stopped)?;
+        let (calibration, observed) = fitted?.ok_or_else(stopped)?;
         self.replace.write(&self.out, json_text(&calibration)?.as_bytes())?;
         if let Some(file) = &self.observed {
             self.replace.write(file, json_text(&observed)?.as_bytes())?;
         }
-        let (found, made) = (reliabilities(&observed)?, observed.len());
+        let (fitted, made) = (reliabilities(&observed)?, observed.len());
         match self.json {
             true => standard_output::print_json(
-                &json!({"calibration": self.out, "diagnoses": made, "reliability": found}),
+                &json!({"calibration": self.out, "diagnoses": made, "reliability": fitted}),
             ),
-            false => standard_output::print(&calibrated_text(made, &self.out, &found)),
+            false => standard_output::print(&calibrated_text(made, &self.out, &fitted)),
         }
     }
 }

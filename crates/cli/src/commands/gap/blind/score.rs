@@ -36,7 +36,7 @@ impl Score {
         if let Some(other) = &self.beside {
             let title = |of: &Path| Manifest::read(&of.join(MANIFEST_NAME)).map(|it| it.title());
             let (this, that) = (title(&self.directory)?, title(other)?);
-            return standard_output::print(&scored.beside([&this, &that], &score(other)?));
+            return standard_output::print(&scored.compare_with([&this, &that], &score(other)?));
         }
         let mut text = scored.case_lines() + "\n";
         for (label, value) in scored.rows() {

@@ -1,4 +1,4 @@
-//! Runs shared by several tests: the first test that needs one makes it, and the others read it from the target folder.
+//! Runs shared by several tests: the first test that needs a run makes it, and the others read it from the target folder.
 //!
 //! Each test is a process, so nothing in memory is shared. A test of the run itself makes its own run.
 
@@ -10,17 +10,17 @@ use std::path::{Path, PathBuf};
 
 /// A finished run; read only.
 #[derive(Debug)]
-pub struct MadeOnce {
+pub struct SharedRun {
     /// Its directory.
     pub run: PathBuf,
-    /// What it printed with `--json`.
+    /// Its output with `--json`.
     pub result: Value,
     /// Its messages on standard error.
     pub stderr: String,
 }
 
-/// The run of this campaign, which names no files, by this program. It has to end well.
-pub fn made_once(campaign: &CampaignFile) -> MadeOnce {
+/// Runs the campaign, which must not refer to other files, or returns its earlier run by the same program. The run must succeed.
+pub fn shared_run(campaign: &CampaignFile) -> SharedRun {
     let program = hash(|hasher| {
         let program = mapper_command([""; 0]).get_program().to_owned();
         let built = fs::metadata(&program).unwrap();
@@ -36,7 +36,7 @@ pub fn made_once(campaign: &CampaignFile) -> MadeOnce {
     lock.lock().unwrap();
     let (runs, printed, messages) =
         (folder.join("runs"), folder.join("printed.json"), folder.join("messages.txt"));
-    // What is printed is kept last.
+    // The output is written last, because it marks a complete run.
     if !printed.exists() {
         let _ = fs::remove_dir_all(&runs);
         let file = folder.join("campaign.yaml");
@@ -44,7 +44,7 @@ pub fn made_once(campaign: &CampaignFile) -> MadeOnce {
         let arguments =
             ["run".as_ref(), file.as_os_str(), "--json".as_ref(), "--out".as_ref(), runs.as_os_str()];
         let mut command = mapper_command(arguments);
-        // Locks and latches of its own.
+        // Its own locks and lockouts.
         command.env("MAPPER_STATE_DIR", folder.join("states"));
         let finished = Finished::from(command.output().unwrap()).exits(0);
         fs::write(&messages, finished.stderr).unwrap();
@@ -52,7 +52,7 @@ pub fn made_once(campaign: &CampaignFile) -> MadeOnce {
         fs::write(&unfinished, finished.stdout).unwrap();
         fs::rename(&unfinished, &printed).unwrap();
     }
-    MadeOnce {
+    SharedRun {
         run: only_run(&runs),
         result: serde_json::from_slice(&fs::read(&printed).unwrap()).unwrap(),
         stderr: fs::read_to_string(&messages).unwrap(),
@@ -65,10 +65,10 @@ fn hash(of: impl FnOnce(&mut DefaultHasher)) -> String {
     format!("{:016x}", hasher.finish())
 }
 
-/// The results of earlier programs are of no use any more.
+/// Removes the results of earlier programs.
 fn remove_others(all: &Path, ours: &Path) {
     for entry in fs::read_dir(all).unwrap().flatten().filter(|entry| entry.path() != ours) {
-        // Another test may be removing it.
+        // Another test may remove it at the same time.
         let _ = fs::remove_dir_all(entry.path());
     }
 }

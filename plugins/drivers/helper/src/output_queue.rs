@@ -13,14 +13,14 @@ const QUEUE_LENGTH: usize = 256;
 const RESERVED: usize = 64;
 
 /// The queue before the pipe to the host.
-pub(crate) struct Outlet {
+pub(crate) struct OutputQueue {
     to_write: SyncSender<Vec<u8>>,
     waiting: Arc<AtomicUsize>,
 }
 
-impl Outlet {
+impl OutputQueue {
     /// Writes to `pipe` on a thread of its own, which ends with the pipe.
-    pub(crate) fn into_pipe(mut pipe: impl Write + Send + 'static) -> std::io::Result<Outlet> {
+    pub(crate) fn into_pipe(mut pipe: impl Write + Send + 'static) -> std::io::Result<OutputQueue> {
         let (to_write, bodies) = sync_channel::<Vec<u8>>(QUEUE_LENGTH + RESERVED);
         let waiting = Arc::new(AtomicUsize::new(0));
         let counted = waiting.clone();
@@ -32,7 +32,7 @@ impl Outlet {
                 }
             }
         })?;
-        Ok(Outlet { to_write, waiting })
+        Ok(OutputQueue { to_write, waiting })
     }
 
     /// Sends without waiting. A message is dropped if the queue is full or the frame exceeds this limit. The loss shows as a

@@ -1,4 +1,4 @@
-//! Publishes the topics of the recording during the run, to viewers with Foxglove's WebSocket protocol.
+//! Publishes the topics of the recording during the run with Foxglove's WebSocket protocol.
 //!
 //! The library keeps a queue for each viewer and drops the oldest message if the viewer is slow, so publishing never waits. Viewers have no
 //! write access: the server offers no services, parameters or client topics.
@@ -33,12 +33,12 @@ const POINT_FIELDS: [(&str, &str, &str); 9] = [
     ("residual_rms_k", "K", "T2 residual of the fit"),
 ];
 
-/// Why the stream for viewers cannot be served.
+/// Why the stream cannot be served.
 #[derive(Debug, thiserror::Error)]
-pub enum ViewersError {
+pub enum FoxgloveStreamError {
     /// The address is not a local one.
     #[error(
-        "`{text}` is not a local address, such as 127.0.0.1:8765, which is required because viewers send no token; other computers can connect \
+        "`{text}` is not a local address, such as 127.0.0.1:8765, which is required because Foxglove sends no token; other computers can connect \
          by a tunnel (`ssh -L 8765:127.0.0.1:8765 STAND`)"
     )]
     Address {
@@ -46,7 +46,7 @@ pub enum ViewersError {
         text: String,
     },
     /// The library cannot serve.
-    #[error("viewers cannot be served at {address}: {source}; choose another address")]
+    #[error("the Foxglove stream cannot be served at {address}: {source}; choose another address")]
     Serve {
         /// The address.
         address: SocketAddr,
@@ -55,8 +55,8 @@ pub enum ViewersError {
     },
 }
 
-/// A stream of readings for viewers.
-pub struct Viewers {
+/// A stream of readings for Foxglove and Lichtblick.
+pub struct FoxgloveStream {
     address: SocketAddr,
     start_time_ns: u64,
     topics: BTreeMap<&'static str, Arc<RawChannel>>,
@@ -64,17 +64,21 @@ pub struct Viewers {
     _context: Arc<Context>,
 }
 
-impl Viewers {
+impl FoxgloveStream {
     /// Serves readings of these channels at a local address, e.g. `127.0.0.1:8765`. `start_time_ns`: epoch time of run time 0, as in the
     /// recording.
     ///
     /// # Errors
-    /// [`ViewersError`] if the address is not local or is in use.
-    pub fn open(text: &str, start_time_ns: u64, channels: &[Channel]) -> Result<Viewers, ViewersError> {
-        let bad = || ViewersError::Address { text: text.to_owned() };
-        let mut address: SocketAddr = text.parse().map_err(|_| bad())?;
+    /// [`FoxgloveStreamError`] if the address is not local or is in use.
+    pub fn open(
+        text: &str,
+        start_time_ns: u64,
+        channels: &[Channel],
+    ) -> Result<FoxgloveStream, FoxgloveStreamError> {
+        let not_local = || FoxgloveStreamError::Address { text: text.to_owned() };
+        let mut address: SocketAddr = text.parse().map_err(|_| not_local())?;
         if !address.ip().is_loopback() {
-            return Err(bad());
+            return Err(not_local());
         }
         let context = Context::new();
         // All topics must exist before a viewer connects. The library announces a new topic slightly before it accepts subscriptions, and a fast
@@ -92,10 +96,10 @@ impl Viewers {
             .message_backlog_size(MAX_QUEUED_MESSAGES)
             .context(&context)
             .start_blocking()
-            .map_err(|source| ViewersError::Serve { address, source })?;
+            .map_err(|source| FoxgloveStreamError::Serve { address, source })?;
         // The server lives until the process ends.
         address.set_port(server.port());
-        Ok(Viewers { address, start_time_ns, topics, _context: context })
+        Ok(FoxgloveStream { address, start_time_ns, topics, _context: context })
     }
 
     /// URL for a viewer.
@@ -143,7 +147,7 @@ impl Viewers {
     }
 }
 
-/// Defines a topic for viewers; `None` if the library refuses it.
+/// Defines a topic; `None` if the library refuses it.
 fn define_topic(context: &Arc<Context>, topic: Topic) -> Option<Arc<RawChannel>> {
     let name = topic.name.trim_start_matches('/').replace('/', ".");
     ChannelBuilder::new(topic.name)
@@ -156,8 +160,8 @@ fn define_topic(context: &Arc<Context>, topic: Topic) -> Option<Arc<RawChannel>>
 }
 
 fn point_topic() -> Topic {
-    let property = |(name, unit, what): (&str, &str, &str)| {
-        (name.to_owned(), json!({"type": "number", "description": what, "unit": unit}))
+    let property = |(name, unit, description): (&str, &str, &str)| {
+        (name.to_owned(), json!({"type": "number", "description": description, "unit": unit}))
     };
     let properties: serde_json::Map<String, Value> = POINT_FIELDS.into_iter().map(property).collect();
     let schema = json!({"title": "point", "type": "object", "properties": properties});
@@ -186,10 +190,10 @@ mod tests {
     #[test]
     fn only_this_machine_is_served() {
         for text in ["0.0.0.0:0", "192.0.2.7:8765", "nonsense", "[::]:0"] {
-            let error = Viewers::open(text, 0, &[]).err().unwrap();
+            let error = FoxgloveStream::open(text, 0, &[]).err().unwrap();
             assert!(error.to_string().contains("tunnel"), "{error}");
         }
-        let viewers = Viewers::open("127.0.0.1:0", 0, &[]).unwrap();
-        assert!(viewers.url().starts_with("ws://127.0.0.1:") && !viewers.url().ends_with(":0"));
+        let stream = FoxgloveStream::open("127.0.0.1:0", 0, &[]).unwrap();
+        assert!(stream.url().starts_with("ws://127.0.0.1:") && !stream.url().ends_with(":0"));
     }
 }

@@ -103,7 +103,9 @@ fn recordings_without_comparable_repeats_get_a_reason_and_no_verdict() {
             change: &|recording| {
                 let opening = |index: usize| 0.5 + 0.03 * index as f64;
                 for index in &repeats {
-                    recording.steps[index - 1].valve_opening_ratio = opening(*index);
+                    let before = &mut recording.steps[index - 1];
+                    before.valve_opening_ratio = opening(*index);
+                    before.to.as_mut().unwrap().valve_opening_ratio = opening(*index);
                 }
             },
             word: "different jumps",

@@ -75,7 +75,7 @@ fn impossible_machines_are_reported_before_anything_runs() {
     assert!(missing.contains("deviations.valve_area"), "{missing}");
     write(scratch.path(), "machines: machines.csv, drawn_machines: 3");
     let both = mapper_in(scratch.path(), ["nightly", "nightly.yaml"]).exits(3).stderr;
-    assert!(both.contains("keep `machines` or `drawn_machines`"), "{both}");
+    assert!(both.contains("`machines` and `drawn_machines`"), "{both}");
 }
 
 /// A drawn machine is the same every night, whatever the seed of the noise.

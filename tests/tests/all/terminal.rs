@@ -92,7 +92,7 @@ fn failures_of_every_kind_have_the_same_form() {
         (6, &["drift", &junk]),
         (1, &["nightly", "nosuch.yaml"]),
         (3, &["map", "fit", &table]),
-        (3, &["map", "convert", "nosuch.csv", &there]),
+        (1, &["map", "convert", "nosuch.csv", &there]),
         (6, &["log", "inspect", &empty]),
         (3, &["fleet", "status", "nosuch"]),
         (1, &["man", "--out", "/proc/nosuch"]),

@@ -36,16 +36,14 @@ pub(crate) fn objections(
 
 /// Whether the operating point changes between any steps.
 fn moves(ends: &[Option<Ends>]) -> bool {
-    let read: [(Channel, fn(&Ends) -> f64); 3] = [
-        (Channel::ShaftSpeed, |end| end.speed_rpm),
-        (Channel::CompressorFlow, |end| end.flow_kg_s),
-        (Channel::P2, |end| end.p2_pa),
-    ];
-    read.into_iter().any(|(channel, read)| {
+    let moves = |channel, read: fn(&Ends) -> f64| {
         let ends = || ends.iter().flatten().map(read);
         let (low, high) = (ends().fold(f64::INFINITY, f64::min), ends().fold(f64::NEG_INFINITY, f64::max));
         high > low * (1.0 + jump_ratio(channel))
-    })
+    };
+    moves(Channel::ShaftSpeed, |end| end.speed_rpm)
+        || moves(Channel::CompressorFlow, |end| end.flow_kg_s)
+        || moves(Channel::P2, |end| end.p2_pa)
 }
 
 fn of_channel(

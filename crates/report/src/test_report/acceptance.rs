@@ -24,7 +24,6 @@ pub const BALANCE_WORDS: &str = "Means of the last 2 s of each step, half widths
 pub const ACCEPTANCE_HEADS: [&str; 5] = ["criterion", "limit, %", "largest, %", "result", "steps that fail"];
 
 /// The points and their readings.
-#[derive(Clone, Copy)]
 pub struct JudgedPoints<'a> {
     /// Its criteria; `None` for a log without a campaign.
     pub campaign: Option<&'a Campaign>,
@@ -38,7 +37,7 @@ pub struct JudgedPoints<'a> {
     pub used: &'a BTreeMap<Channel, DeclaredUncertainty>,
 }
 
-fn balances<'a>(report: JudgedPoints<'a>) -> Vec<(&'a StepMarker, EnergyBalance)> {
+fn balances<'a>(report: &JudgedPoints<'a>) -> Vec<(&'a StepMarker, EnergyBalance)> {
     let steps = report
         .points
         .iter()
@@ -51,7 +50,7 @@ fn balances<'a>(report: JudgedPoints<'a>) -> Vec<(&'a StepMarker, EnergyBalance)
 }
 
 /// A row for each point; none if the power of the turbine was not measured.
-pub fn balance_rows(report: JudgedPoints<'_>) -> Vec<[String; 6]> {
+pub fn balance_rows(report: &JudgedPoints<'_>) -> Vec<[String; 6]> {
     let balances = balances(report);
     if balances.iter().all(|(_, balance)| balance.turbine.is_none()) {
         return Vec::new();
@@ -69,7 +68,7 @@ pub fn balance_rows(report: JudgedPoints<'_>) -> Vec<[String; 6]> {
 }
 
 /// A row for each criterion of the campaign; none without criteria.
-pub fn acceptance_rows(report: JudgedPoints<'_>) -> Vec<[String; 5]> {
+pub fn acceptance_rows(report: &JudgedPoints<'_>) -> Vec<[String; 5]> {
     let criteria = report.campaign.and_then(|campaign| campaign.acceptance.as_ref());
     let Some(criteria) = criteria else { return Vec::new() };
     let row = |judged: CriterionResult| {
@@ -95,7 +94,7 @@ pub fn acceptance_rows(report: JudgedPoints<'_>) -> Vec<[String; 5]> {
 }
 
 /// Name, source and window of the campaign's criteria, a sentence.
-pub fn acceptance_words(report: JudgedPoints<'_>) -> Option<String> {
+pub fn acceptance_words(report: &JudgedPoints<'_>) -> Option<String> {
     let criteria = report.campaign?.acceptance.as_ref()?;
     Some(format!(
         "{} ({}). Judged over the last {} s of each step; a fluctuation is the highest minus the lowest reading over the mean.",
@@ -104,7 +103,7 @@ pub fn acceptance_words(report: JudgedPoints<'_>) -> Option<String> {
 }
 
 /// Both sections; empty if there is nothing to show.
-pub(crate) fn acceptance_sections(report: JudgedPoints<'_>) -> String {
+pub(crate) fn acceptance_sections(report: &JudgedPoints<'_>) -> String {
     let mut text = String::new();
     let balance = balance_rows(report);
     // Writing to a String cannot fail.

@@ -211,7 +211,7 @@ fn markdown_report(report: &RunReport<'_>) -> String {
         text.push_str(&markdown::table(&CORRECTION_HEADS, Align::Right, correction_rows(report.corrections)));
     }
     text.push_str(&budget_section(report.budgets));
-    text.push_str(&acceptance_sections(report.judged_points()));
+    text.push_str(&acceptance_sections(&report.judged_points()));
     if let Some(SurgeReport { marks, remarks, surges }) = surge {
         let _ = write!(text, "\n## Surge\n\n{}", surge_text(marks, remarks, *surges, &units));
     }

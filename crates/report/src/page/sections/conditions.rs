@@ -17,7 +17,7 @@ pub(crate) fn conditions(page: &RunPage<'_>, display: &Display) -> Markup {
         report.campaign.map(|campaign| instrument_rows(campaign, report.used, display)).unwrap_or_default();
     let register = report.campaign.map(|campaign| register_rows(campaign, display)).unwrap_or_default();
     let judged = report.judged_points();
-    let (balance, acceptance) = (balance_rows(judged), acceptance_rows(judged));
+    let (balance, acceptance) = (balance_rows(&judged), acceptance_rows(&judged));
     html! {
         section #conditions aria-labelledby="conditions-head" {
             h2 #conditions-head { "Conditions and instruments" }
@@ -25,7 +25,7 @@ pub(crate) fn conditions(page: &RunPage<'_>, display: &Display) -> Markup {
                 (facts("Test", &condition_facts(report)))
                 @if !read.is_empty() { (words_table("Conditions read at the ends of the steps", &CONDITION_HEADS, &read)) }
             }
-            @if let Some(sentence) = acceptance_words(judged) {
+            @if let Some(sentence) = acceptance_words(&judged) {
                 p { (prose(&sentence)) }
                 (words_table("Acceptance", &ACCEPTANCE_HEADS, &acceptance))
             }

@@ -1028,7 +1028,7 @@ fn lines_that_have_no_points_are_refused_at_their_place() {
             "{speed_corrected: 110 krpm, spacing: 100 g/s}",
             Kind::Unreachable,
             "100 g/s",
-            "leaves one point",
+            "gives one point",
             "smaller spacing",
         ),
         (
@@ -1042,7 +1042,7 @@ fn lines_that_have_no_points_are_refused_at_their_place() {
             "{speed_corrected: 110 krpm, points: 3, widest_opening: 0.3}",
             Kind::Unreachable,
             "3, widest",
-            "has no room",
+            "has no points",
             "raise `widest_opening`",
         ),
     ] {

@@ -187,9 +187,11 @@ fn a_killed_run_is_resumed_with_each_point_once() {
 #[test]
 fn a_recording_that_is_given_twice_is_refused() {
     let campaign = short(&[]);
-    let run = killed_at(&campaign, 1_000_000);
+    let result = done(run_of(&campaign, &[])).exits(0).json();
+    let recording = PathBuf::from(result["recording"].as_str().unwrap());
+    let run = recording.parent().unwrap();
     let copy = run.join("copy.mcap");
-    let bytes = std::fs::read(run.join("recording.mcap")).unwrap();
+    let bytes = std::fs::read(&recording).unwrap();
     std::fs::write(&copy, &bytes[..bytes.len() / 10 * 9]).unwrap();
     for command in ["identify", "drift"] {
         mapper([command.as_ref(), run.as_os_str(), copy.as_os_str()]).exits(3);

@@ -183,7 +183,12 @@ fn missing_and_repeated_keys_and_wrong_types_are_refused_at_their_place() {
             "a list is given where text or a plain number is needed",
         ),
         ("channels: {}", Kind::Range, (1, 1), "the mapping is empty"),
-        ("channels: &a {T2: {topic: /a, field: x}}", Kind::Unsupported, (1, 11), "not allowed in a channel map"),
+        (
+            "channels: &a {T2: {topic: /a, field: x}}",
+            Kind::Unsupported,
+            (1, 11),
+            "not allowed in a channel map",
+        ),
         ("", Kind::MissingKey, (1, 1), "the file is empty"),
     ] {
         let findings = mistakes(text);

@@ -5,7 +5,7 @@ const page = JSON.parse(document.getElementById("data").textContent);
 const style = name => getComputedStyle(root).getPropertyValue(name).trim();
 const byId = id => document.getElementById(id);
 const half = (low, high) => low == null || high == null ? null : (high - low) / 2;
-const shown = (value, digits, unit = "") => value == null ? "-" : value.toFixed(digits) + unit;
+const shown = (value, digits, unit = "") => value == null ? "-" : value.toFixed(digits).replace(/^-(0\.?0*)$/, "$1") + unit;
 const short = d3.format(".3~g");
 const widthOf = element => Math.max(280, Math.min(720, element.clientWidth || 600));
 

@@ -255,10 +255,12 @@ pub fn cause(candidate: &Candidate) -> String {
 }
 
 fn parameter(name: &str, estimate: &Estimate) -> String {
-    let written = with_unit(four_figures(estimate.value), &estimate.unit);
+    let value = with_unit(four_figures(estimate.value), &estimate.unit);
     let (low, high) = (four_figures(estimate.low), four_figures(estimate.high));
-    let size = if written == estimate.size { String::new() } else { format!(", {}", estimate.size) };
-    format!("{name} = {written} ({low} .. {high}){size}")
+    // The size is rounded, and often in a clearer unit.
+    let same_unit = estimate.size.ends_with(&format!(" {}", estimate.unit));
+    let size = if same_unit { String::new() } else { format!(", {}", estimate.size) };
+    format!("{name} = {value} ({low} .. {high}){size}")
 }
 
 /// The smallest detectable size of each effect.

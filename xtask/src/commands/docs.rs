@@ -52,15 +52,21 @@ standard error, as JSON lines with `--progress json`. Ctrl-C brings the rig into
 measurements; press it again to stop immediately.
 ";
 
-/// Writes or checks everything that is generated.
+/// Builds the program, and writes or checks everything that is generated.
 pub fn docs(mode: Mode) -> Result<(), Error> {
+    build()?;
+    generated(mode)
+}
+
+/// Writes or checks everything that is generated, with the program that has been built: a build would replace the one that tests run.
+pub fn generated(mode: Mode) -> Result<(), Error> {
     // The documents are made in another directory and compared by content, independently of git.
     let made = workspace::target_dir().join("xtask-docs");
     let docs = workspace::root().join("docs");
     if made.exists() {
         fs::remove_dir_all(&made).map_err(at(&made))?;
     }
-    let programs = build()?;
+    let programs = programs();
     // In parallel, because each uses one core.
     let (reproduced, others) = std::thread::scope(|scope| {
         let others = scope.spawn(|| {
@@ -182,16 +188,19 @@ struct Programs {
 }
 
 /// Builds them with the profile of the tests: results are identical in every profile, and most of the build usually exists already.
-fn build() -> Result<Programs, Error> {
+fn build() -> Result<(), Error> {
     // Names the whole workspace and one test, so that libraries have the same features as in the tests. With all tests, those that depend
     // on capabilities of the computer would be rebuilt.
     let arguments =
         ["build", "--quiet", "--workspace", "--all-features", "--test", "turbine", "--bin", "mapper"];
     let examples = ["--example", EXAMPLE];
-    run(lints::linting(command(workspace::cargo(), &[&arguments[..], &examples].concat())))?;
+    run(lints::linting(command(workspace::cargo(), &[&arguments[..], &examples].concat())))
+}
+
+fn programs() -> Programs {
     let built = workspace::target_dir().join("debug");
     let program = |name: &str| built.join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
-    Ok(Programs { mapper: program("mapper"), reference_docs: program(&format!("examples/{EXAMPLE}")) })
+    Programs { mapper: program("mapper"), reference_docs: program(&format!("examples/{EXAMPLE}")) }
 }
 
 fn write(path: &Path, content: &[u8]) -> Result<(), Error> {

@@ -53,7 +53,7 @@ pub fn test() -> Result<(), Error> {
         || tests(&offered),
         vec![
             ("Python package", Box::new(|| python_package::check(&offered))),
-            ("generated documents", Box::new(|| docs::docs(docs::Mode::Check))),
+            ("generated documents", Box::new(|| docs::generated(docs::Mode::Check))),
         ],
     );
     let result = steps.finish();

@@ -65,7 +65,7 @@ pub fn wheel() -> Result<(), Error> {
         }
     }
     let folder = wheels.to_string_lossy();
-    let pip = ["-m", "pip", "wheel", "--quiet", "--no-build-isolation", "--no-deps", "--wheel-dir", &folder];
+    let pip = ["-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", &folder];
     run(command(&python, &[&pip[..], &["./python"]].concat()))?;
     run(command("python3", &["-m", "venv", &empty.to_string_lossy()]))?;
     let mut install: Command = command(empty.join("bin/python"), &["-m", "pip", "install", "--quiet"]);

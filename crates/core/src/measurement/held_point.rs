@@ -75,7 +75,8 @@ pub struct StepPoint {
     pub(crate) held: Option<HeldPoint>,
 }
 
-/// Tolerance of the commands within which steps of logs without targets are at the same point.
+/// Tolerance of the commands within which steps of logs without targets are at the same point: a third of the smallest jump ([`JUMPS`]), and
+/// more than loggers round.
 const SAME_COMMAND_RATIO: f64 = 5e-3;
 
 impl StepPoint {

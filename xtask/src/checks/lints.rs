@@ -39,12 +39,13 @@ pub fn no_warnings(mut build: Command) -> Result<(), Error> {
 }
 
 /// Lets the tests of the documentation also make the documentation: with the libraries of the tests, which `cargo doc` would check again.
-pub fn documenting(mut tests: Command) -> Result<Command, Error> {
-    let own =
-        std::env::current_exe().map_err(|source| Error::Start { command: "xtask".to_owned(), source })?;
-    tests.env("RUSTDOC", own);
+///
+/// The build of the workspace has replaced the file that this process was started from: the new one stands in.
+pub fn documenting(mut tests: Command) -> Command {
+    let program = format!("xtask{}", std::env::consts::EXE_SUFFIX);
+    tests.env("RUSTDOC", workspace::target_dir().join("debug").join(program));
     tests.env(REAL_RUSTDOC, Path::new(&workspace::cargo()).with_file_name("rustdoc"));
-    Ok(tests)
+    tests
 }
 
 /// Runs as the rustdoc of [`documenting`], if this process is it: the tests, then the documentation with warnings denied.

@@ -86,7 +86,7 @@ fn tests(offered: &Offered) -> Result<(), Error> {
     let mut tally = Tally::default();
     let mut well = true;
     let programs = test_programs::tests("full", |cores| 2 * cores + 2);
-    for tests in [programs, lints::documenting(test_programs::documentation_tests())?] {
+    for tests in [programs, lints::documenting(test_programs::documentation_tests())] {
         well &= test_programs::run(with_program(lints::linting(offered.to(tests))), &mut tally)?;
     }
     test_programs::close(&tally, well);

@@ -70,7 +70,7 @@ pub fn surge_to_choke(line: &SpeedLine, (flow_span, ratio_span): (f64, f64)) -> 
     points
 }
 
-/// Sorts the points of a line from surge to choke; see [`surge_to_choke`].
+/// Sorts the points of a line from surge to choke by flow minus pressure ratio, each divided by its span over the map.
 pub fn points_surge_to_choke<'a>(map: &CompressorMap, line: &'a SpeedLine) -> Vec<&'a MapPoint> {
     surge_to_choke(line, spans(map).unwrap_or((1.0, 1.0)))
 }

@@ -169,18 +169,15 @@ pub struct PointCorrection {
 }
 
 impl Diagnosed {
-    /// The causes that a map may be corrected by, with their fits: the most probable first, as many as it takes to
-    /// [`NEEDED_PROBABILITY`].
-    ///
-    /// # Errors
-    /// [`NotCorrected`] if none is named, or if all together are less probable.
-    pub fn causes_to_correct(&self) -> Result<Vec<(&Candidate, &Fit)>, NotCorrected> {
-        if !matches!(self.diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained) {
-            return Err(NotCorrected::NoCause);
-        }
-        let id = |index: &usize| self.study.effects[*index].info().id.to_string();
+    /// The open causes with their fits: the most probable first, as many as it takes to [`NEEDED_PROBABILITY`], and their probability
+    /// together. None if the diagnosis names no cause of its library.
+    pub fn open_causes(&self) -> (Vec<(&Candidate, &Fit)>, f64) {
         let mut causes: Vec<(&Candidate, &Fit)> = Vec::new();
         let mut probability = 0.0;
+        if !matches!(self.diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained) {
+            return (causes, probability);
+        }
+        let id = |index: &usize| self.study.effects[*index].info().id.to_string();
         for candidate in &self.diagnosis.candidates {
             if probability >= NEEDED_PROBABILITY {
                 break;
@@ -193,9 +190,6 @@ impl Diagnosed {
             probability += candidate.probability;
             causes.push((candidate, fit));
         }
-        if causes.is_empty() || probability < NEEDED_PROBABILITY {
-            return Err(NotCorrected::Improbable { probability });
-        }
-        Ok(causes)
+        (causes, probability)
     }
 }

@@ -189,6 +189,16 @@ fn a_probe_of_two_millimetres_is_named_measured_and_closes_the_gap() {
     assert!(diagnosis.gap.channels["T2"].after < 0.2 * diagnosis.gap.channels["T2"].before);
 }
 
+/// A tolerance of the same sensor fits the readings as well as the cause, but far beyond its declaration: the gap is what tolerances within
+/// three standard deviations leave, and on held-out steps the cause removes it down to noise.
+#[test]
+fn an_offset_beyond_its_tolerance_is_a_gap_that_its_cause_removes() {
+    let cause = mapper_effects::find("t2_offset").unwrap();
+    let gap = ask_with(&record(&[("t2_offset", &[2.5])], 6), Some(cause)).unwrap().diagnosis.gap;
+    assert!(gap.strained.is_some());
+    assert!(gap.shrink > 0.9 && gap.steps_with_gap == gap.held_out_steps.len(), "{gap:?}");
+}
+
 /// Neither hides the other, and each reduces the misfit by the square of its signature length.
 #[test]
 fn two_effects_are_both_named_and_each_takes_off_the_square_of_its_signature() {

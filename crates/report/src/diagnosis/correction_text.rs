@@ -46,10 +46,15 @@ fn build_text(map: &CorrectedMap, diagnosis: &Diagnosis) -> String {
         for cause_of_map in &map.causes {
             text += &format!("  {}\n", cause(cause_of_map));
         }
-        if diagnosis.is_outside_without_law() {
-            let largest = map.points.iter().map(|point| point.correction_sigma).fold(0.0, f64::max);
+        let largest = map.points.iter().map(|point| point.correction_sigma).fold(0.0, f64::max);
+        if largest > 0.0 {
+            let source = if diagnosis.is_outside_without_law() {
+                "No law describes the cause: it may touch every point, and the residual of T2 widens"
+            } else {
+                "What a correction would change, weighted with its probability, widens"
+            };
             text += &format!(
-                "No law describes the cause: it may touch every point, and the residual of T2, up to {:.2} points, widens their intervals.\n",
+                "{source} the intervals of all points, by a standard uncertainty of up to {:.2} points.\n",
                 100.0 * largest
             );
         }

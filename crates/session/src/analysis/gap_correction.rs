@@ -7,7 +7,7 @@ use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::Campaign;
 use mapper_core::{BudgetRow, IdentifiedPoint, Method, ResultRemark, UncertaintyBudget, half_width_95};
 use mapper_diagnose::gap::correction::{
-    Changes, CorrectedMap, NotCorrected, PointCorrection, one_sigma_away,
+    Changes, CorrectedMap, NEEDED_PROBABILITY, NotCorrected, PointCorrection, one_sigma_away,
 };
 use mapper_diagnose::gap::diagnose::GapError;
 use mapper_diagnose::gap::findings::report::Candidate;
@@ -46,12 +46,7 @@ impl Session<'_> {
         self.send(SessionEvent::Progress { done_ratio: 1.0, what: "identification".to_owned() });
         let quiet = Session::new(self.registry);
         let identify = |recorded| quiet.identify(vec![recorded], map, method);
-        let before = identify(recorded.clone())?;
-        let refused = |gap: Gap, causes, why, mut before: Identified| {
-            let points = widen_by_residual(&mut before, &gap);
-            let map = CorrectedMap { causes, refused: Some(why), points };
-            Ok(GapCorrection { gap, map, identified: before })
-        };
+        let mut before = identify(recorded.clone())?;
         // As in the diagnosis, the drift of a sensor is subtracted first.
         let undrifted = subtract_drift(recorded.read.recording.clone(), gap.drift.as_ref());
         let without = |hypothesis: &Hypothesis| -> Result<Identified, SessionError> {
@@ -60,27 +55,34 @@ impl Session<'_> {
             recorded.read.recording = changes.subtracted_from(undrifted.clone());
             identify(recorded)
         };
-        let causes = match gap.diagnosed.causes_to_correct() {
-            Ok(causes) => causes,
-            Err(why) => return refused(gap, Vec::new(), why, before),
-        };
+        let (causes, probability) = gap.diagnosed.open_causes();
         let named: Vec<Candidate> = causes.iter().map(|(candidate, _)| (*candidate).clone()).collect();
         let mut after = Vec::with_capacity(causes.len());
         for (_, fit) in &causes {
             after.push(without(&fit.hypothesis)?);
         }
-        let Some(hypotheses) = one_sigma_away(&gap.diagnosed.study, causes[0].1) else {
-            return refused(gap, named, NotCorrected::Undetermined, before);
+        let (refused, moved) = match causes.first() {
+            None => (Some(NotCorrected::NoCause), None),
+            Some(_) if probability < NEEDED_PROBABILITY => {
+                (Some(NotCorrected::Improbable { probability }), None)
+            }
+            Some((_, fit)) => match one_sigma_away(&gap.diagnosed.study, fit) {
+                None => (Some(NotCorrected::Undetermined), None),
+                moved => (ambiguous(&after[0], &after[1..]), moved),
+            },
         };
+        if refused.is_some() {
+            let points = widen_by_open_causes(&mut before, &gap, &named, &after);
+            let map = CorrectedMap { causes: named, refused, points };
+            return Ok(GapCorrection { gap, map, identified: before });
+        }
+        let hypotheses = moved.unwrap_or_default();
         let mut moved = Vec::with_capacity(hypotheses.len());
         for hypothesis in &hypotheses {
             moved.push(without(hypothesis)?);
         }
-        // There is at least one cause.
+        // Nothing is refused: there is a cause.
         let mut identified = after.remove(0);
-        if let Some(why) = ambiguous(&identified, &after) {
-            return refused(gap, named, why, before);
-        }
         let points = widen_intervals(&mut identified, &before, &moved, &after);
         identified.corrections.clone_from(&points);
         identified.remarks.extend(named.iter().map(|cause| ResultRemark::Corrected {
@@ -98,8 +100,14 @@ impl Session<'_> {
     }
 }
 
-/// Adds the residual of T2 to every point that a cause outside the library may touch, if no law describes that cause.
-fn widen_by_residual(identified: &mut Identified, gap: &Gap) -> Vec<PointCorrection> {
+/// Widens the intervals of a map that is not corrected: by what a correction for each open cause would change, `after`, squared and
+/// weighted with its probability, and by the residual of T2 if no law describes a cause outside the library.
+fn widen_by_open_causes(
+    identified: &mut Identified,
+    gap: &Gap,
+    causes: &[Candidate],
+    after: &[Identified],
+) -> Vec<PointCorrection> {
     let (diagnosis, steps) = (&gap.diagnosed.diagnosis, &gap.diagnosed.study.steps);
     let residual = |step: usize| {
         let place = steps.iter().position(|other| other.marker.index == step)?;
@@ -108,11 +116,23 @@ fn widen_by_residual(identified: &mut Identified, gap: &Gap) -> Vec<PointCorrect
     let mut points = Vec::with_capacity(identified.points.len());
     for scored in &mut identified.points {
         let recorded = scored.point.clone();
-        let eta_sigma = residual(recorded.step).unwrap_or(0.0);
-        widen(&mut scored.point, eta_sigma, 0.0);
+        let sigma = |read: fn(&IdentifiedPoint) -> Option<f64>| {
+            let changes = causes.iter().zip(after).filter_map(|(cause, other)| {
+                Some(cause.probability * (read(same_step(other, recorded.step)?)? - read(&recorded)?).powi(2))
+            });
+            changes.sum::<f64>().sqrt()
+        };
+        let eta_sigma = sigma(|point| point.eta).hypot(residual(recorded.step).unwrap_or(0.0));
+        let h_sigma_w_m2k = sigma(|point| point.h_w_m2k);
+        widen(&mut scored.point, eta_sigma, h_sigma_w_m2k);
         points.push(correction_of(Some(&recorded), None, eta_sigma));
     }
     points
+}
+
+/// The point of a step.
+fn same_step(identified: &Identified, step: usize) -> Option<&IdentifiedPoint> {
+    identified.points_alone().find(|point| point.step == step)
 }
 
 /// Adds the uncertainty of the correction to every point: `moved` are the results one standard deviation away in each direction, `others`
@@ -126,10 +146,9 @@ fn widen_intervals(
     let mut points = Vec::new();
     for scored in &mut identified.points {
         let step = scored.point.step;
-        let at = |other: &Identified| other.points_alone().find(|point| point.step == step).cloned();
         let sigma = |read: fn(&IdentifiedPoint) -> Option<f64>| {
             let here = read(&scored.point)?;
-            let square = |other: &Identified| Some((read(&at(other)?)? - here).powi(2));
+            let square = |other: &Identified| Some((read(same_step(other, step)?)? - here).powi(2));
             let by_size: f64 = moved.iter().filter_map(square).sum();
             Some((by_size + others.iter().filter_map(square).fold(0.0, f64::max)).sqrt())
         };
@@ -140,7 +159,7 @@ fn widen_intervals(
             add_row(&mut budgets.eta, eta_sigma, "");
             add_row(&mut budgets.h_w_m2k, h_sigma_w_m2k, "W/(m2 K)");
         }
-        points.push(correction_of(at(before).as_ref(), Some(&scored.point), eta_sigma));
+        points.push(correction_of(same_step(before, step), Some(&scored.point), eta_sigma));
     }
     points
 }
@@ -150,10 +169,9 @@ fn ambiguous(best: &Identified, others: &[Identified]) -> Option<NotCorrected> {
     let differences =
         best.points_alone().filter(|point| point.verdict == mapper_core::Verdict::Good).filter_map(|point| {
             let (eta, half) = (point.eta?, 0.5 * (point.eta_high? - point.eta_low?));
-            let same_step =
-                |other: &Identified| other.points_alone().find(|other| other.step == point.step)?.eta;
+            let eta_of = |other: &Identified| same_step(other, point.step)?.eta;
             let difference =
-                others.iter().filter_map(same_step).map(|other| (other - eta).abs()).reduce(f64::max)?;
+                others.iter().filter_map(eta_of).map(|other| (other - eta).abs()).reduce(f64::max)?;
             Some((mapper_core::step_number(point.step), difference, half))
         });
     let (step, difference, half_interval) = differences.max_by(|a, b| (a.1 / a.2).total_cmp(&(b.1 / b.2)))?;

@@ -5,9 +5,11 @@
 //! is always that of the model itself.
 
 use crate::gap::best_fit::coordinate::{Coordinate, coordinates, parameters, set_parameter};
+use crate::gap::best_fit::first_step::is_start;
 use crate::gap::best_fit::normal::{PRIOR_STEPS, normal_matrix, nuisance_products};
 use crate::gap::best_fit::selection::{Selection, dot_over};
 use crate::gap::residuals::hypothesis::Course;
+use crate::gap::residuals::nuisance::NuisanceKind;
 use crate::gap::residuals::study::{Hypothesis, PredictError, Prediction, Study};
 use crate::gap::residuals::whiten::{Linearised, rows_of_step};
 use mapper_inference::descent::{End, Model, Normal, Reach, Until, descend, room_within};
@@ -48,12 +50,21 @@ pub struct Effort {
     /// Maximum number of sigmas that a nuisance may move: few while an effect is far from its best, so that tolerances do not run into
     /// its place.
     pub most_sigmas: f64,
+    /// Maximum number of sigmas of a tolerance of the rig; those of initial state, clocks and the shape of the map do not count.
+    pub most_sigmas_of_rig: f64,
+}
+
+impl Effort {
+    /// Maximum number of sigmas that a nuisance may move.
+    pub fn most_sigmas_of(&self, kind: NuisanceKind) -> f64 {
+        if is_of_rig(kind) { self.most_sigmas.min(self.most_sigmas_of_rig) } else { self.most_sigmas }
+    }
 }
 
 impl Default for Effort {
     fn default() -> Self {
         let Until { iterations, enough } = Until::default();
-        Effort { iterations, enough, most_sigmas: MAX_SIGMAS }
+        Effort { iterations, enough, most_sigmas: MAX_SIGMAS, most_sigmas_of_rig: MAX_SIGMAS }
     }
 }
 
@@ -153,7 +164,7 @@ pub fn fit_from(
         rows: selection.rows(study),
         nuisance_products: nuisance_products(study, linearised, selection),
         coordinates,
-        most_sigmas: effort.most_sigmas,
+        most_sigmas: study.nuisances.iter().map(|nuisance| effort.most_sigmas_of(nuisance.kind)).collect(),
         columns_known: !columns.is_empty(),
         effect_columns: columns.iter().map(|column| column.values(study)).collect(),
         last: None,
@@ -194,7 +205,8 @@ struct Fitted<'a> {
     rows: Vec<Range<usize>>,
     nuisance_products: DMatrix<f64>,
     coordinates: Vec<Coordinate>,
-    most_sigmas: f64,
+    /// Maximum number of sigmas of each nuisance.
+    most_sigmas: Vec<f64>,
     /// Whitened changes for a unit of each effect's coordinate.
     effect_columns: Vec<Vec<f64>>,
     /// Whether they were known at the start, and are only corrected since.
@@ -249,8 +261,10 @@ impl Model for Fitted<'_> {
 
     fn at(&self, unknowns: &DVector<f64>) -> Option<Point> {
         let mut hypothesis = self.start.clone();
-        for (nuisance, sigmas) in hypothesis.nuisances.iter_mut().zip(unknowns.iter()) {
-            *nuisance = sigmas.clamp(-self.most_sigmas, self.most_sigmas);
+        for ((nuisance, sigmas), most) in
+            hypothesis.nuisances.iter_mut().zip(unknowns.iter()).zip(&self.most_sigmas)
+        {
+            *nuisance = sigmas.clamp(-most, *most);
         }
         let n = hypothesis.nuisances.len();
         for (place, coordinate) in self.coordinates.iter().enumerate() {
@@ -285,7 +299,8 @@ impl Model for Fitted<'_> {
 
     fn room(&self, unknowns: &DVector<f64>) -> Vec<(f64, f64)> {
         let n = unknowns.len() - self.coordinates.len();
-        let of_nuisances = unknowns.iter().take(n).map(|u| (-self.most_sigmas - u, self.most_sigmas - u));
+        let of_nuisances =
+            unknowns.iter().take(n).zip(&self.most_sigmas).map(|(u, most)| (-most - u, most - u));
         let of_effects = self.coordinates.iter().zip(unknowns.iter().skip(n)).map(|(coordinate, at)| {
             let (low, high) = coordinate.ends();
             room_within(low, high, *at)
@@ -337,6 +352,12 @@ pub(crate) fn changes_near(
             }
         })
         .collect()
+}
+
+/// Whether a nuisance is a tolerance of the rig: initial metal state and clock errors are none, and a deviation of one corner of the map
+/// is plausible.
+pub fn is_of_rig(kind: NuisanceKind) -> bool {
+    !matches!(kind, NuisanceKind::Delay(_) | NuisanceKind::Shape(_)) && !is_start(kind)
 }
 
 /// Limit of a nuisance in declared sigmas: a larger deviation does not count as a tolerance.

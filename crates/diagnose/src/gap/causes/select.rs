@@ -1,7 +1,7 @@
 //! Which effects explain a recording best: the causes of [`mapper_inference::search`], fitted by runs of the model.
 
 use crate::gap::best_fit::coordinate::Coordinate;
-use crate::gap::best_fit::fit::{Effort, Fit, Start, fit, fit_from};
+use crate::gap::best_fit::fit::{Effort, Fit, MAX_SIGMAS, Start, fit, fit_from};
 use crate::gap::best_fit::selection::Selection;
 use crate::gap::causes::additions::{Addition, additions, onset_additions};
 use crate::gap::causes::calibration::Calibration;
@@ -42,9 +42,9 @@ pub const MIN_SHRINK: f64 = 0.5;
 /// What one more iteration may promise in the cost of a fit that is at its best: well below what any cause is named for.
 const UNFINISHED: f64 = 1.0;
 
-const QUICK: Effort = Effort { iterations: 3, enough: 1.0, most_sigmas: 3.0 };
+const QUICK: Effort = Effort { iterations: 3, enough: 1.0, most_sigmas: 3.0, most_sigmas_of_rig: 3.0 };
 const EFFORT: Effort =
-    Effort { iterations: 6, enough: 0.3, most_sigmas: crate::gap::best_fit::fit::MAX_SIGMAS };
+    Effort { iterations: 6, enough: 0.3, most_sigmas: MAX_SIGMAS, most_sigmas_of_rig: MAX_SIGMAS };
 
 /// All sets that were fitted.
 #[derive(Debug)]

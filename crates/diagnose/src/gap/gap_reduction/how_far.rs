@@ -2,7 +2,7 @@
 
 use crate::gap::best_fit::adequacy::misfit_of_steps;
 use crate::gap::best_fit::first_step::with_start_read;
-use crate::gap::best_fit::fit::{Effort, Fit, Start, fit_from};
+use crate::gap::best_fit::fit::{Effort, Fit, MAX_SIGMAS, Start, fit_from};
 use crate::gap::best_fit::selection::{Selection, dot_over};
 use crate::gap::findings::report::{ChannelGap, Gap, PointGap};
 use crate::gap::gap_reduction::folds::Folds;
@@ -39,9 +39,23 @@ struct Unseen {
     values: Vec<f64>,
 }
 
-/// Effort of a fit without some of the steps; it starts at the best fit to all steps.
+/// Effort of a fit without some of the steps; it starts at the best fit to all steps. A tolerance beyond this limit is a suspect
+/// ([`beyond_prior`]), and what it alone removes is part of the gap.
 const EFFORT: Effort =
-    Effort { iterations: 5, enough: 0.2, most_sigmas: crate::gap::best_fit::fit::MAX_SIGMAS };
+    Effort { iterations: 5, enough: 0.2, most_sigmas: MAX_SIGMAS, most_sigmas_of_rig: DOUBT_SIGMAS };
+
+/// The start of a fit without some of the steps: the best fit to all steps, its tolerances within [`EFFORT`].
+fn start_within_limits(study: &Study, fit: &Fit) -> Start {
+    let mut start = Start::from(fit);
+    for (sigmas, nuisance) in start.hypothesis.nuisances.iter_mut().zip(&study.nuisances) {
+        let limit = EFFORT.most_sigmas_of(nuisance.kind);
+        if sigmas.abs() > limit {
+            *sigmas = limit.copysign(*sigmas);
+            start.prediction = None;
+        }
+    }
+    start
+}
 
 /// Compares tolerances alone with the best cause on held-out steps. Each fold selects among the first few causes and refits, without its
 /// own steps.
@@ -105,7 +119,7 @@ fn unseen(compared: Compared<'_>, folds: &Folds) -> (Unseen, Unseen) {
             Some(cause) => (at_best, causes[cause]),
         };
         // If a fold cannot be fitted, it keeps the fit to all steps.
-        let fitted = fit_from(study, linearised, &Start::from(whole), &selection, EFFORT);
+        let fitted = fit_from(study, linearised, &start_within_limits(study, whole), &selection, EFFORT);
         let fitted = fitted.unwrap_or_else(|_| whole.clone());
         if selection.steps[0] { fitted } else { with_start_read(study, linearised, fitted) }
     });

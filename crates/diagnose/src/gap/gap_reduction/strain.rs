@@ -1,20 +1,17 @@
 //! Tolerances that end outside their prior.
 
-use crate::gap::best_fit::first_step::is_start;
-use crate::gap::best_fit::fit::{Effort, Fit, MAX_SIGMAS, fit_from};
+use crate::gap::best_fit::fit::{Effort, Fit, MAX_SIGMAS, fit_from, is_of_rig};
 use crate::gap::best_fit::selection::Selection;
 use crate::gap::findings::report::Strained;
-use crate::gap::residuals::nuisance::NuisanceKind;
 use crate::gap::residuals::study::Study;
 use crate::gap::residuals::whiten::Linearised;
 use mapper_numerics::statistics::DOUBT_SIGMAS;
 
 /// Continues a fit that ends at the limit of a tolerance without that limit, which stands for none.
-const UNLIMITED: Effort = Effort { iterations: 8, enough: 0.5, most_sigmas: 1e3 };
+const UNLIMITED: Effort = Effort { iterations: 8, enough: 0.5, most_sigmas: 1e3, most_sigmas_of_rig: 1e3 };
 
 /// Tolerances of a fit beyond three sigmas of their prior, furthest first, with the size that the recording asks for: [`MAX_SIGMAS`] limits
-/// the search for causes, not this report. Initial metal state and clock errors are no rig properties, and a deviation of one corner of the map is
-/// plausible: they are excluded.
+/// the search for causes, not this report.
 pub fn beyond_prior(study: &Study, linearised: &Linearised, fitted: &Fit) -> Vec<Strained> {
     let limited = fitted.hypothesis.nuisances.iter().any(|sigmas| sigmas.abs() > 0.999 * MAX_SIGMAS);
     let freed = limited
@@ -25,10 +22,7 @@ pub fn beyond_prior(study: &Study, linearised: &Linearised, fitted: &Fit) -> Vec
         .nuisances
         .iter()
         .zip(nuisances)
-        .filter(|(n, sigmas)| {
-            let of_rig = !matches!(n.kind, NuisanceKind::Delay(_) | NuisanceKind::Shape(_));
-            sigmas.abs() > DOUBT_SIGMAS && of_rig && !is_start(n.kind)
-        })
+        .filter(|(nuisance, sigmas)| sigmas.abs() > DOUBT_SIGMAS && is_of_rig(nuisance.kind))
         .map(|(nuisance, sigmas)| Strained {
             what: nuisance.kind.to_string(),
             sigmas: sigmas.abs(),

@@ -18,6 +18,9 @@ ResultRemark {
     "unused_rest" UnusedRest { start_s: f64, end_s: f64 },
     /// The points are corrected for a cause that the diagnosis names.
     "corrected" Corrected { causes: Vec<String>, probability: f64 },
+    /// The intervals contain what causes of a gap would change for which the points are not corrected; largest standard uncertainty of an
+    /// efficiency.
+    "widened_by_gap" WidenedByGap { causes: Vec<String>, largest_sigma: f64 },
     /// The drift of a sensor was subtracted.
     "drift_subtracted" DriftSubtracted { reason: String },
     /// No map can be made from the points.

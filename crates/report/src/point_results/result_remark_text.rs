@@ -38,6 +38,12 @@ pub fn result_remark_text(remark: &ResultRemark) -> String {
             causes.join(" + "),
             probability_text(*probability)
         ),
+        ResultRemark::WidenedByGap { causes, largest_sigma } => format!(
+            "not corrected for {}: every interval contains what {} may change, a standard uncertainty of up to {:.2} points",
+            if causes.is_empty() { "a cause outside the catalogue".to_owned() } else { causes.join(" or ") },
+            if causes.len() > 1 { "they" } else { "it" },
+            100.0 * largest_sigma
+        ),
         ResultRemark::DriftSubtracted { reason } => format!("the drift of a sensor was subtracted: {reason}"),
         ResultRemark::NoMap { reason } => format!("there is no map: {reason}"),
         ResultRemark::MapNotFitted { reason } => format!("the map is not fitted: {reason}"),

@@ -23,14 +23,14 @@ pub struct GapCorrection {
     pub gap: Gap,
     /// Before and after, point by point.
     pub map: CorrectedMap,
-    /// Identification of the corrected readings, the uncertainty of the correction in its intervals; that of the readings as recorded if
-    /// nothing was corrected.
+    /// Identification of the corrected readings, the uncertainty of the correction in its intervals; that of the readings as recorded, what
+    /// the open causes would change in its intervals, if nothing was corrected.
     pub identified: Identified,
 }
 
 impl Session<'_> {
-    /// Diagnoses a recording and identifies it again without the causes found. With `directory`, the corrected results are written there as
-    /// those of an identification.
+    /// Diagnoses a recording and identifies it again without the causes found. With `directory`, the results are written there as those of an
+    /// identification.
     ///
     /// # Errors
     /// As [`Session::diagnose_gap`], [`Session::identify`] and [`Session::identify_into`].
@@ -71,33 +71,44 @@ impl Session<'_> {
                 moved => (ambiguous(&after[0], &after[1..]), moved),
             },
         };
-        if refused.is_some() {
+        let (identified, points) = if refused.is_some() {
             let points = widen_by_open_causes(&mut before, &gap, &named, &after);
-            let map = CorrectedMap { causes: named, refused, points };
-            return Ok(GapCorrection { gap, map, identified: before });
-        }
-        let hypotheses = moved.unwrap_or_default();
-        let mut moved = Vec::with_capacity(hypotheses.len());
-        for hypothesis in &hypotheses {
-            moved.push(without(hypothesis)?);
-        }
-        // Nothing is refused: there is a cause.
-        let mut identified = after.remove(0);
-        let points = widen_intervals(&mut identified, &before, &moved, &after);
-        identified.corrections.clone_from(&points);
-        identified.remarks.extend(named.iter().map(|cause| ResultRemark::Corrected {
-            causes: cause.names.clone(),
-            probability: cause.probability,
-        }));
-        identified.remarks.extend(
-            gap.drift.as_ref().map(|drift| ResultRemark::DriftSubtracted { reason: drift.reason.clone() }),
-        );
+            before.remarks.extend(widened_remark(&named, &points));
+            (before, points)
+        } else {
+            let hypotheses = moved.unwrap_or_default();
+            let mut moved = Vec::with_capacity(hypotheses.len());
+            for hypothesis in &hypotheses {
+                moved.push(without(hypothesis)?);
+            }
+            // Nothing is refused: there is a cause.
+            let mut identified = after.remove(0);
+            let points = widen_intervals(&mut identified, &before, &moved, &after);
+            identified.corrections.clone_from(&points);
+            identified.remarks.extend(named.iter().map(|cause| ResultRemark::Corrected {
+                causes: cause.names.clone(),
+                probability: cause.probability,
+            }));
+            identified.remarks.extend(
+                gap.drift
+                    .as_ref()
+                    .map(|drift| ResultRemark::DriftSubtracted { reason: drift.reason.clone() }),
+            );
+            (identified, points)
+        };
         if let Some(directory) = directory {
             let identified = identified.clone();
             self.write_identification(vec![recorded.clone()], directory, |_| Ok(identified))?;
         }
-        Ok(GapCorrection { gap, map: CorrectedMap { causes: named, refused: None, points }, identified })
+        Ok(GapCorrection { gap, map: CorrectedMap { causes: named, refused, points }, identified })
     }
+}
+
+/// States that intervals are wider because of causes that the map is not corrected for; `None` if none is.
+fn widened_remark(causes: &[Candidate], points: &[PointCorrection]) -> Option<ResultRemark> {
+    let largest_sigma = points.iter().map(|point| point.correction_sigma).fold(0.0, f64::max);
+    let causes = causes.iter().map(|cause| cause.names.join(" + ")).collect();
+    (largest_sigma > 0.0).then_some(ResultRemark::WidenedByGap { causes, largest_sigma })
 }
 
 /// Widens the intervals of a map that is not corrected: by what a correction for each open cause would change, `after`, squared and

@@ -19,7 +19,7 @@ pub struct Correct {
     pub campaign: PathBuf,
     /// Run directory, MCAP file, or log of another program
     pub recording: PathBuf,
-    /// Write the corrected points, map, pictures and report to this directory; existing files are not replaced
+    /// Write points, map, pictures and report to this directory, corrected if a correction is allowed; existing files are not replaced
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Channel map: where a recording made by another program holds the rig's channels (YAML)

@@ -1,6 +1,6 @@
 //! Statistics of lists of numbers.
 //!
-//! No function skips values silently. The result is `None` if there are no values, and NaN if one of them is NaN, as in numpy. To ignore
+//! No function except [`range`] skips values silently. The result is `None` if there are no values, and NaN if one of them is NaN, as in numpy. To ignore
 //! gaps, filter them first.
 
 mod bounded_normal;
@@ -15,5 +15,5 @@ pub use distributions::{
     normal_quantile, share_interval_95, student_quantile,
 };
 pub use moments::{mean, rms, standard_deviation};
-pub use order::{median, median_of_sorted, nearest_rank, quantile};
+pub use order::{median, median_of_sorted, nearest_rank, quantile, range};
 pub use robust::{MEDIAN_SIZE_TO_SIGMA, robust_sigma};

@@ -24,6 +24,13 @@ pub fn median<T: Borrow<f64>>(values: impl IntoIterator<Item = T>) -> Option<f64
     Some(midpoint(lower, upper))
 }
 
+/// The smallest and the largest value; infinity and minus infinity without values. NaN does not count.
+pub fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
+    values
+        .into_iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
+}
+
 /// [`median`] of sorted values without NaN, e.g. those of a sliding window.
 pub fn median_of_sorted(sorted: &[f64]) -> Option<f64> {
     let upper = sorted.get(sorted.len() / 2)?;

@@ -29,7 +29,7 @@ pub enum BlindError {
         source: serde_json::Error,
     },
     /// A file is larger than any of its kind.
-    #[error("{} has more than the {limit} bytes that are read", path.display())]
+    #[error("{} is larger than {limit} bytes, the maximum of its kind", path.display())]
     TooLarge {
         /// The file.
         path: PathBuf,
@@ -38,14 +38,14 @@ pub enum BlindError {
     },
     /// The answers are not those that were sealed.
     #[error(
-        "{} has SHA-256 {found}, but {expected} was printed when the cases were made: the answers have been changed",
+        "{} has SHA-256 {actual}, but {expected} was printed when the cases were made: the answers have been changed",
         path.display()
     )]
     Seal {
         /// The file of answers.
         path: PathBuf,
         /// Its current hash.
-        found: String,
+        actual: String,
         /// The sealed hash.
         expected: String,
     },
@@ -79,12 +79,12 @@ pub enum BlindError {
         source: Box<dyn std::error::Error + Send + Sync>,
     },
     /// Too many cases.
-    #[error("{cases} cases were requested; 1 to {most} are allowed")]
+    #[error("{cases} cases were requested; 1 to {max} are allowed")]
     Cases {
         /// The requested number.
         cases: usize,
         /// Maximum number in one directory.
-        most: usize,
+        max: usize,
     },
 }
 

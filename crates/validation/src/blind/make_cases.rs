@@ -62,7 +62,7 @@ pub fn draw_cases(
     draw: &Draw,
 ) -> Result<Vec<Case>, BlindError> {
     if !(1..=MAX_CASES).contains(&draw.cases) {
-        return Err(BlindError::Cases { cases: draw.cases, most: MAX_CASES });
+        return Err(BlindError::Cases { cases: draw.cases, max: MAX_CASES });
     }
     let nominal = nominal_model(campaign)?;
     let schedule = Schedule::new(campaign, &nominal)?;
@@ -133,7 +133,7 @@ fn run_all(
         let truth = schedule.run(case, &directory.join(format!("{}.mcap", case.name)), &header);
         if healthy && truth.is_ok() {
             let file = directory.join(format!("{}.healthy.mcap", case.name));
-            schedule.run_healthy(case, &file, &header)?;
+            schedule.run_reference(case, &file, &header)?;
         }
         done(finished.fetch_add(1, Ordering::Relaxed) + 1);
         truth

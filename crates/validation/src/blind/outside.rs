@@ -3,19 +3,12 @@
 //! They are effects like those of the catalogue, but never part of it. Their ids begin with `X_`, which identifies them in
 //! the answers.
 
-mod back_plate;
-mod clearance;
-mod coolant_passage;
-mod coulomb_friction;
-mod flow_dependent_htc;
-mod mount_conduction;
-mod outlet_duct;
-mod slow_housing_probe;
-mod slow_pressure_line;
-mod speed_gain;
-
-use mapper_physics::rig::effect::Effect;
-use mapper_physics::rig::effect_kind::effect_of;
+use mapper_core::Channel;
+use mapper_physics::effect_parameters;
+use mapper_physics::gas::air;
+use mapper_physics::machine::hooks::{Hooks, Site, TooManyExtraStates};
+use mapper_physics::rig::effect::{Effect, Rig, Submodel};
+use mapper_physics::rig::effect_kind::{EffectKind, EffectText, effect_of};
 use std::sync::Arc;
 
 /// Purpose of an outside cause.
@@ -31,21 +24,271 @@ pub enum OutsideUse {
 pub fn outside_kinds(wanted: OutsideUse) -> Vec<Arc<dyn Effect>> {
     match wanted {
         OutsideUse::Check => vec![
-            effect_of::<coolant_passage::CoolantPassage>(),
-            effect_of::<outlet_duct::OutletDuct>(),
-            effect_of::<clearance::Clearance>(),
-            effect_of::<back_plate::BackPlate>(),
-            effect_of::<slow_pressure_line::SlowPressureLine>(),
+            effect_of::<CoolantPassage>(),
+            effect_of::<OutletDuct>(),
+            effect_of::<Clearance>(),
+            effect_of::<BackPlate>(),
+            effect_of::<SlowPressureLine>(),
         ],
         OutsideUse::Calibration => vec![
-            effect_of::<mount_conduction::MountConduction>(),
-            effect_of::<coulomb_friction::CoulombFriction>(),
-            effect_of::<flow_dependent_htc::FlowDependentHtc>(),
-            effect_of::<slow_housing_probe::SlowHousingProbe>(),
-            effect_of::<speed_gain::SpeedGain>(),
+            effect_of::<MountConduction>(),
+            effect_of::<CoulombFriction>(),
+            effect_of::<FlowDependentHtc>(),
+            effect_of::<SlowHousingProbe>(),
+            effect_of::<SpeedGain>(),
         ],
     }
 }
 
-/// Source of all outside causes.
-const WITHHELD: &str = "withheld from the diagnosis";
+/// Declares a cause: id, name, description, equation, submodel, and the function that adds it to a rig.
+macro_rules! outside_cause {
+    ($cause:ident, $id:literal, $name:literal, $description:literal, $equation:literal, $submodel:ident, $add:expr) => {
+        impl EffectKind for $cause {
+            const ABOUT: EffectText = EffectText {
+                id: $id,
+                name: $name,
+                description: $description,
+                equation: $equation,
+                source: "withheld from the diagnosis",
+                submodel: Submodel::$submodel,
+                also_shows_in: &[],
+            };
+
+            fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
+                ($add)(rig, self)
+            }
+        }
+    };
+}
+
+effect_parameters! {
+    /// Water flows through the compressor housing.
+    #[derive(Debug)]
+    struct CoolantPassage {
+        /// Conductance to the water, W/K.
+        conductance_w_k = "G" ["W/K"] 0.0 .. 20.0, neutral 0.0, step 1.5;
+    }
+}
+
+outside_cause! {
+    CoolantPassage, "X_coolant_passage", "coolant passage in the compressor housing",
+    "a coolant passage from the compressor housing to water at 85 degC",
+    "G (358.15 K - Tc) to the compressor housing", CompressorHousing, Rig::hook
+}
+
+/// Temperature of the water, K.
+const WATER_K: f64 = 358.15;
+
+impl Hooks for CoolantPassage {
+    fn heat_to_compressor_w(&self, site: &Site<'_>) -> f64 {
+        self.conductance_w_k * (WATER_K - site.state.tc_k)
+    }
+}
+
+effect_parameters! {
+    /// The duct between compressor and T2 probe has its own mass.
+    #[derive(Debug)]
+    struct OutletDuct {
+        /// Conductance from gas to duct, W/K.
+        conductance_w_k = "UA" ["W/K"] 0.0 .. 60.0, neutral 0.0, step 8.0;
+    }
+}
+
+outside_cause! {
+    OutletDuct, "X_outlet_duct", "outlet duct with its own mass",
+    "an outlet duct with a mass of its own before the T2 probe",
+    "T2 leaves a duct of 250 J/K at T_d + (T2 - T_d) exp(-UA/(m cp)); 1 W/K of it to the cell", CompressorGas, Rig::hook
+}
+
+/// Heat capacity of the duct, J/K.
+const DUCT_J_K: f64 = 250.0;
+/// Conductance from the duct to the cell, W/K.
+const DUCT_TO_CELL_W_K: f64 = 1.0;
+
+impl Hooks for OutletDuct {
+    fn gas_outlet_k(&self, site: &Site<'_>, t2_k: f64) -> f64 {
+        let capacity_w_k = site.flow_kg_s * air::heat_capacity_j_kgk(t2_k);
+        let duct_k = site.extra_k.first().copied().unwrap_or(t2_k);
+        duct_k + (t2_k - duct_k) * (-self.conductance_w_k / capacity_w_k).exp()
+    }
+
+    fn extra_states(&self) -> usize {
+        1
+    }
+
+    fn extra_rates_k_s(&self, site: &Site<'_>, rates: &mut [f64]) {
+        // The gas temperature behind the duct is known here; the heat that it gave off follows from the same exponential.
+        let (Some(rate), Some(duct_k)) = (rates.first_mut(), site.extra_k.first()) else { return };
+        let capacity_w_k = site.flow_kg_s * air::heat_capacity_j_kgk(site.t2_k);
+        let given_w = capacity_w_k * (site.t2_k - duct_k) * (self.conductance_w_k / capacity_w_k).exp_m1();
+        let lost_w = DUCT_TO_CELL_W_K * (duct_k - site.boundary.ambient_temperature_k);
+        *rate = (given_w - lost_w) / DUCT_J_K;
+    }
+}
+
+effect_parameters! {
+    /// The clearance over the wheel grows with the housing's temperature.
+    #[derive(Debug)]
+    struct Clearance {
+        /// Loss of efficiency per 100 K, ratio.
+        loss_ratio = "k" ["1"] -0.5 .. 0.5, neutral 0.0, step 0.06;
+    }
+}
+
+outside_cause! {
+    Clearance, "X_clearance", "clearance that grows with heat",
+    "a clearance that grows as the compressor housing gets hotter than 320 K",
+    "eta (1 - k (Tc - 320 K)/100 K)", CompressorGas, Rig::hook
+}
+
+impl Hooks for Clearance {
+    fn efficiency(&self, site: &Site<'_>, efficiency: f64) -> f64 {
+        efficiency * (1.0 - self.loss_ratio * (site.state.tc_k - 320.0) / 100.0)
+    }
+}
+
+effect_parameters! {
+    /// Heat goes from the bearing housing through the back plate into the compressed gas.
+    #[derive(Debug)]
+    struct BackPlate {
+        /// Conductance from the bearing side to the gas, W/K.
+        conductance_w_k = "G" ["W/K"] 0.0 .. 5.0, neutral 0.0, step 0.5;
+    }
+}
+
+outside_cause! {
+    BackPlate, "X_back_plate", "heat through the back plate",
+    "heat from the bearing side through the back plate into the gas behind the wheel",
+    "T2' rises by G (Tt - T2')/(m cp), taken from the turbine housing", CompressorGas, Rig::hook
+}
+
+impl Hooks for BackPlate {
+    fn gas_after_k(&self, site: &Site<'_>, t2_prime_k: f64) -> f64 {
+        // As eq. 3, so that the gas never passes the metal's temperature.
+        let transfer_units = self.conductance_w_k / (site.flow_kg_s * air::heat_capacity_j_kgk(t2_prime_k));
+        (t2_prime_k + transfer_units * site.state.tt_k) / (1.0 + transfer_units)
+    }
+
+    fn heat_to_turbine_w(&self, site: &Site<'_>) -> f64 {
+        // Behind the plate already: T2' after the hook above.
+        self.conductance_w_k * (site.t2_prime_k - site.state.tt_k)
+    }
+}
+
+effect_parameters! {
+    /// A long thin line delays the P2 sensor.
+    #[derive(Debug)]
+    struct SlowPressureLine {
+        /// Time constant of the line, s.
+        lag_s = "tau" ["s"] 0.0 .. 60.0, neutral 0.0, step 4.0;
+    }
+}
+
+outside_cause! {
+    SlowPressureLine, "X_slow_pressure_line", "slow pressure line",
+    "a slow pressure line to the P2 sensor", "dP2_read/dt = (P2 - P2_read)/tau", P2Sensor,
+    |rig: &mut Rig, cause: Self| {
+        rig.instruments.path_mut(Channel::P2).lag_s += cause.lag_s;
+        Ok(())
+    }
+}
+
+effect_parameters! {
+    /// The compressor housing is attached to a cold mount.
+    #[derive(Debug)]
+    struct MountConduction {
+        /// Conductance to the mount, W/K.
+        conductance_w_k = "G" ["W/K"] 0.0 .. 20.0, neutral 0.0, step 1.5;
+    }
+}
+
+outside_cause! {
+    MountConduction, "X_mount_conduction", "conduction to the mount",
+    "the compressor housing conducts to a mount at 20 degC",
+    "G (293.15 K - Tc) to the compressor housing", CompressorHousing, Rig::hook
+}
+
+impl Hooks for MountConduction {
+    fn heat_to_compressor_w(&self, site: &Site<'_>) -> f64 {
+        self.conductance_w_k * (293.15 - site.state.tc_k)
+    }
+}
+
+effect_parameters! {
+    /// The shaft rubs with a torque that does not depend on speed.
+    #[derive(Debug)]
+    struct CoulombFriction {
+        /// Torque, N m.
+        torque_nm = "M" ["N m"] 0.0 .. 0.2, neutral 0.0, step 0.012;
+    }
+}
+
+outside_cause! {
+    CoulombFriction, "X_coulomb_friction", "rubbing shaft",
+    "the shaft rubs with a constant torque", "-M on the shaft", Shaft, Rig::hook
+}
+
+impl Hooks for CoulombFriction {
+    fn shaft_torque_nm(&self, _site: &Site<'_>) -> f64 {
+        -self.torque_nm
+    }
+}
+
+effect_parameters! {
+    /// Convection depends on flow otherwise than in the correlation.
+    #[derive(Debug)]
+    struct FlowDependentHtc {
+        /// Excess of the exponent.
+        exponent = "e" ["1"] -1.0 .. 1.0, neutral 0.0, step 0.25;
+    }
+}
+
+outside_cause! {
+    FlowDependentHtc, "X_flow_dependent_htc", "other exponent of convection",
+    "the exponent of the flow in the convection is other than the correlation's",
+    "h (m/0.06 kg/s)^e", CompressorGas, Rig::hook
+}
+
+impl Hooks for FlowDependentHtc {
+    fn h_w_m2k(&self, site: &Site<'_>, h_w_m2k: f64) -> f64 {
+        h_w_m2k * (site.flow_kg_s / 0.06).powf(self.exponent)
+    }
+}
+
+effect_parameters! {
+    /// The probe in the housing is slow.
+    #[derive(Debug)]
+    struct SlowHousingProbe {
+        /// Time constant of the probe, s.
+        lag_s = "tau" ["s"] 0.0 .. 120.0, neutral 0.0, step 12.0;
+    }
+}
+
+outside_cause! {
+    SlowHousingProbe, "X_slow_housing_probe", "slow housing probe",
+    "a slow probe in the compressor housing", "dTc_read/dt = (Tc - Tc_read)/tau", TcProbe,
+    |rig: &mut Rig, cause: Self| {
+        rig.instruments.path_mut(Channel::Tc).lag_s += cause.lag_s;
+        Ok(())
+    }
+}
+
+effect_parameters! {
+    /// The speed pick-up reads high or low.
+    #[derive(Debug)]
+    struct SpeedGain {
+        /// Error of the gain, ratio.
+        error_ratio = "g" ["1"] -0.1 .. 0.1, neutral 0.0, step 0.01;
+    }
+}
+
+outside_cause! {
+    SpeedGain, "X_speed_gain", "speed sensor reads in proportion",
+    "the speed sensor reads high or low in proportion", "N_read = (1 + g) N", Shaft, Rig::hook
+}
+
+impl Hooks for SpeedGain {
+    fn reading(&self, _site: &Site<'_>, channel: Channel, value: f64) -> f64 {
+        if channel == Channel::ShaftSpeed { value * (1.0 + self.error_ratio) } else { value }
+    }
+}

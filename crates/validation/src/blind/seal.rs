@@ -48,8 +48,8 @@ impl Manifest {
     }
 }
 
-/// Largest file that is read, bytes: far more than any number of answers.
-const LARGEST_BYTES: u64 = 256 << 20;
+/// Maximum size of a file that is read, bytes: far more than any number of answers.
+const MAX_BYTES: u64 = 256 << 20;
 
 pub(crate) fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
@@ -68,9 +68,9 @@ pub(crate) fn read_json<T: DeserializeOwned>(path: &Path, what: &'static str) ->
 fn read(path: &Path) -> Result<Vec<u8>, BlindError> {
     let mut bytes = Vec::new();
     let file = std::fs::File::open(path).map_err(BlindError::file(path))?;
-    file.take(LARGEST_BYTES + 1).read_to_end(&mut bytes).map_err(BlindError::file(path))?;
-    if bytes.len() as u64 > LARGEST_BYTES {
-        return Err(BlindError::TooLarge { path: path.to_owned(), limit: LARGEST_BYTES });
+    file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(BlindError::file(path))?;
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(BlindError::TooLarge { path: path.to_owned(), limit: MAX_BYTES });
     }
     Ok(bytes)
 }
@@ -84,7 +84,7 @@ pub(crate) fn open(directory: &Path, manifest: &Manifest) -> Result<Vec<Truth>, 
     let bytes = read(&path)?;
     let actual = sha256(&bytes);
     if actual != manifest.answers_sha256 {
-        return Err(BlindError::Seal { path, found: actual, expected: manifest.answers_sha256.clone() });
+        return Err(BlindError::Seal { path, actual, expected: manifest.answers_sha256.clone() });
     }
     serde_json::from_slice(&bytes).map_err(|source| BlindError::Content { path, what: "answers", source })
 }

@@ -3,6 +3,7 @@
 use crate::reproduction::lab::JUMPS;
 use crate::reproduction::outcome::Outcome;
 use mapper_chart::{Axis, Colour, Dash, Line, Marker, Panel, Scatter, palette};
+use mapper_numerics::statistics::range;
 
 /// Colour of a target speed: ordered, slow to fast.
 pub(crate) fn speed_colour(speed_rpm: f64) -> Colour {
@@ -25,15 +26,8 @@ pub(crate) fn target_speeds_rpm() -> [f64; 4] {
 pub(crate) type Series = (Vec<(f64, f64)>, Colour, Marker, bool, String);
 
 /// Identified against model values with the line of equality and, if given, a band of error around it.
-pub(crate) fn equality_panel(
-    title: &str,
-    axis: (&str, &str),
-    band: Option<(f64, &str)>,
-    series: Vec<Series>,
-) -> Panel {
-    let all = series.iter().flat_map(|(points, ..)| points.iter().copied());
-    let (low, high) =
-        all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (x, _)| (low.min(x), high.max(x)));
+fn equality_panel(title: &str, axis: (&str, &str), band: Option<(f64, &str)>, series: Vec<Series>) -> Panel {
+    let (low, high) = range(series.iter().flat_map(|(points, ..)| points.iter().map(|(x, _)| *x)));
     let margin = 0.06 * (high - low);
     let ends = [low - margin, high + margin];
     let mut panel = Panel::new(Axis::new(axis.0), Axis::new(axis.1)).title(title);
@@ -73,14 +67,17 @@ pub(crate) fn h_panel(series: Vec<Series>) -> Panel {
     equality_panel("(b) heat-transfer coefficient", axis, None, series)
 }
 
-/// Identified against model efficiency (mean in the window) of the outcomes that have one.
-pub(crate) fn eta_pairs<'a>(outcomes: impl IntoIterator<Item = &'a Outcome>) -> Vec<(f64, f64)> {
-    outcomes.into_iter().filter_map(|o| Some((o.eta_mean, o.point.eta?))).collect()
-}
-
-/// Identified against model h (mean in the window) of the outcomes that have one.
-pub(crate) fn h_pairs<'a>(outcomes: impl IntoIterator<Item = &'a Outcome>) -> Vec<(f64, f64)> {
-    outcomes.into_iter().filter_map(|o| Some((o.h_mean_w_m2k, o.point.h_w_m2k?))).collect()
+/// One series per target speed.
+pub(crate) fn series_by_speed(
+    outcomes: &[Outcome],
+    value: fn(&Outcome) -> Option<(f64, f64)>,
+    (marker, is_hollow, name): (Marker, bool, &str),
+) -> Vec<Series> {
+    let series = |speed_rpm: f64| {
+        let points = at_speed(outcomes, speed_rpm).filter_map(value).collect();
+        (points, speed_colour(speed_rpm), marker, is_hollow, format!("{name}, {}", krpm(speed_rpm)))
+    };
+    target_speeds_rpm().map(series).to_vec()
 }
 
 /// The outcomes at one target speed.

@@ -132,11 +132,11 @@ impl Kind for Blind<'_> {
         let mut truths = Vec::new();
         for (name, body) in parts {
             let Ok(body) = body else { continue };
-            let spoilt = |source| StudyError::Content { name: name.clone(), source };
-            let BlindPart { truth, diagnosis } = serde_json::from_str(&body).map_err(spoilt)?;
+            let invalid = |source| StudyError::Content { name: name.clone(), source };
+            let BlindPart { truth, diagnosis } = serde_json::from_str(&body).map_err(invalid)?;
             // The name becomes a file name, so only names of cases are accepted.
             if truth.name != name || !name.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_') {
-                return Err(spoilt(serde::de::Error::custom("it is another case")).into());
+                return Err(invalid(serde::de::Error::custom("it is another case")).into());
             }
             let text = json_text(&diagnosis).map_err(FleetError::kind)?;
             out.write(&format!("{name}.diagnosis.json"), text.as_bytes())?;

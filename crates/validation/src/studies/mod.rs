@@ -5,16 +5,19 @@ mod calibration;
 mod error;
 mod maps;
 mod nightly;
-mod program;
 mod reliability_picture;
 mod source;
 
 use mapper_fleet::Kind;
-use mapper_session::Registry;
+use mapper_session::{Registry, program_and_commit};
 
 pub use calibration::{CalibrationResult, fit_calibration};
 pub use nightly::rows_of;
-pub use program::program;
+
+/// Name, version and commit of the program, which items and parts record.
+pub fn program(registry: &Registry) -> String {
+    program_and_commit(registry.commit)
+}
 
 /// All kinds, with the plug-ins that they may use.
 pub fn kinds(registry: &Registry) -> Vec<Box<dyn Kind + '_>> {

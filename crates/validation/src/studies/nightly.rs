@@ -1,7 +1,7 @@
 //! `study: nightly`: the runs of a nightly campaign.
 
 use crate::studies::error::StudyError;
-use crate::studies::program::program;
+use crate::studies::program;
 use crate::studies::source::CampaignSource;
 use mapper_campaign::load_nightly;
 use mapper_core::Method;

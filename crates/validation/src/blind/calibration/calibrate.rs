@@ -133,7 +133,7 @@ pub struct CalibrationSettings<'a> {
 }
 
 impl<'a> CalibrationSettings<'a> {
-    /// Settings with the shipped calibration.
+    /// The settings with the shipped calibration.
     ///
     /// # Errors
     /// [`BlindError`] if the campaign has no nominal model.
@@ -215,10 +215,11 @@ pub(crate) fn weights(calibration: &Calibration, observed: &[DiagnosisSummary]) 
     observed.iter().map(|o| if o.kind == CaseKind::None { of_nothing } else { of_causes }).collect()
 }
 
-/// Share of the effect-free cases that stay below the threshold.
-const QUIET: f64 = 0.985;
-/// Minimum threshold: odds of e^3 for the cause, whatever the effect-free cases suggest.
+/// Share of the cases without a cause that stay below the threshold.
+const QUIET_SHARE: f64 = 0.985;
+/// Minimum threshold: odds of e^3 for the cause, even if the cases without a cause would permit less.
 const MIN_THRESHOLD: f64 = 3.0;
+
 /// The calibration that fits the observed cases, based on the shipped one.
 ///
 /// # Errors
@@ -231,7 +232,8 @@ pub fn fitted(observed: &[DiagnosisSummary], made_by: String) -> Result<Calibrat
 /// catalogue, and the probabilities must reflect how often that happens.
 pub fn fit(before: &Calibration, observed: &[DiagnosisSummary], made_by: String) -> Calibration {
     let margins = observed.iter().filter(|o| o.kind == CaseKind::None).map(DiagnosisSummary::margin);
-    let quiet = quantile(margins, QUIET).map_or(before.threshold, |margin| margin.max(MIN_THRESHOLD));
+    let threshold =
+        quantile(margins, QUIET_SHARE).map_or(before.threshold, |margin| margin.max(MIN_THRESHOLD));
     let weights = weights(before, observed);
     let weighted = || observed.iter().zip(weights.iter().copied());
     let inside: Vec<(&DiagnosisSummary, f64)> =
@@ -242,7 +244,7 @@ pub fn fit(before: &Calibration, observed: &[DiagnosisSummary], made_by: String)
     let errors = observed.iter().flat_map(|o| &o.errors_sigma).map(|z| z.abs());
     Calibration {
         made_by,
-        threshold: quiet,
+        threshold,
         temperature: temperature(&inside, before.temperature),
         // Never narrower than the standard errors of the fit, because a few cases do not justify more confidence.
         interval_factor: quantile(errors, 0.95).map_or(before.interval_factor, |z| (z / NORMAL_975).max(1.0)),
@@ -299,7 +301,7 @@ mod tests {
     /// Two candidates whose scores differ by x are right in a share s of the cases: the likeliest temperature is that at
     /// which the better has probability s, x/ln(s/(1-s)).
     #[test]
-    fn the_temperature_is_that_of_the_share_that_is_right() {
+    fn the_temperature_reproduces_the_share_of_correct_answers() {
         let mut cases: Vec<DiagnosisSummary> =
             (0..80).map(|_| observed(CaseKind::Single, 40.0, 36.0)).collect();
         cases.extend((0..20).map(|_| observed(CaseKind::Single, 36.0, 40.0)));
@@ -311,7 +313,7 @@ mod tests {
 
     /// 90 cases without and 10 with a cause count according to the priors, and on average 1.
     #[test]
-    fn cases_of_nothing_count_as_the_prior_says() {
+    fn cases_without_a_cause_count_in_proportion_to_their_prior() {
         let before = Calibration { prior_none: 0.3, ..Calibration::shipped().unwrap() };
         let cases_of = |kind, count| (0..count).map(move |_| observed(kind, 0.0, 0.0));
         let cases: Vec<DiagnosisSummary> =

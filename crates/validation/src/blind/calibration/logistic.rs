@@ -6,12 +6,12 @@ use mapper_numerics::minimise::minimise;
 /// Maximum number of iterations of coordinate descent; about fifty are needed.
 const ROUNDS: usize = 300;
 /// Prior mean of the slopes, and its precision: about ten cases outweigh the prior.
-const EXPECTED: f64 = 1.0;
-const PRIOR: f64 = 0.25;
+const PRIOR_SLOPE: f64 = 1.0;
+const PRIOR_PRECISION: f64 = 0.25;
 /// Minimum slopes: a larger misfit never contradicts an outside cause. The slope of the smooth misfit is at least half of that from noise
 /// for any cases: a failed search with the right cause leaves a residual of thousands of sigmas, and a few such cases would otherwise make
 /// a gross misfit meaningless.
-const MIN: [f64; 3] = [0.5, 0.0, 0.0];
+const MIN_SLOPES: [f64; 3] = [0.5, 0.0, 0.0];
 
 /// A case.
 #[derive(Debug, Clone, Copy)]
@@ -29,19 +29,20 @@ pub(crate) fn logistic(rows: &[Row]) -> Option<[f64; 4]> {
     }
     let rows: Vec<Row> = rows.iter().map(|row| Row { features: counted(row.features), ..*row }).collect();
     let loss = |weights: &[f64; 4]| -> f64 {
-        let penalty: f64 = weights[1..].iter().map(|slope| 0.5 * PRIOR * (slope - EXPECTED).powi(2)).sum();
+        let penalty: f64 =
+            weights[1..].iter().map(|slope| 0.5 * PRIOR_PRECISION * (slope - PRIOR_SLOPE).powi(2)).sum();
         let miss = |row: &Row| {
             let x = argument(weights, &row.features);
             row.weight * if row.outside { (-x).exp().ln_1p() } else { x.exp().ln_1p() }
         };
         penalty + rows.iter().map(miss).sum::<f64>()
     };
-    let mut weights = [-5.0, EXPECTED, EXPECTED, EXPECTED];
+    let mut weights = [-5.0, PRIOR_SLOPE, PRIOR_SLOPE, PRIOR_SLOPE];
     // Coordinate descent within bounds converges because the loss is convex.
     for _ in 0..ROUNDS {
         let last = weights;
         for place in 0..weights.len() {
-            let (low, high) = if place == 0 { (-30.0, 30.0) } else { (MIN[place - 1], 10.0) };
+            let (low, high) = if place == 0 { (-30.0, 30.0) } else { (MIN_SLOPES[place - 1], 10.0) };
             weights[place] = minimise(low, high, 1e-9, |value| {
                 let mut tried = weights;
                 tried[place] = value;
@@ -57,7 +58,7 @@ pub(crate) fn logistic(rows: &[Row]) -> Option<[f64; 4]> {
     Some(weights)
 }
 
-/// Of counted features.
+/// Argument of the logistic for features that [`counted`] has limited.
 fn argument(weights: &[f64; 4], features: &[f64; 3]) -> f64 {
     // Beyond 500 an exponential is infinite.
     let x = weights[0] + weights[1..].iter().zip(features).map(|(w, f)| w * f).sum::<f64>();
@@ -87,7 +88,7 @@ mod tests {
 
     /// Failed searches do not remove the effect of a gross misfit.
     #[test]
-    fn a_gross_misfit_is_never_nothing() {
+    fn a_gross_misfit_stays_evidence_of_an_outside_cause() {
         let rows: Vec<Row> =
             (0..80).map(|i| row([if i % 8 == 0 { 1e4 } else { 0.0 }, 0.0, 3.0], i % 8 == 1)).collect();
         let weights = logistic(&rows).unwrap();

@@ -63,7 +63,7 @@ impl StudySignatureMeter {
         seed: u64,
     ) -> Result<StudySignatureMeter, BlindError> {
         let case = Case {
-            name: "ruler".to_owned(),
+            name: "without_causes".to_owned(),
             kind: CaseKind::None,
             causes: Vec::new(),
             sigmas: Vec::new(),

@@ -3,7 +3,7 @@
 use crate::blind::cases::cause::Cause;
 use crate::blind::cases::equations::Laboratory;
 use crate::blind::cases::kind::CaseKind;
-use crate::blind::cases::strength::{SignatureMeter, shows, strength};
+use crate::blind::cases::strength::{SignatureMeter, has_influence, strength};
 use crate::blind::outside::{OutsideUse, outside_kinds};
 use mapper_physics::rig::effect::Effect;
 use rand::seq::SliceRandom;
@@ -67,9 +67,9 @@ impl Draw {
     pub fn cases(&self, catalogue: &[Arc<dyn Effect>], meter: &dyn SignatureMeter) -> Vec<Case> {
         let mut random = Pcg64::seed_from_u64(self.seed);
         // Effects without influence on this machine are not causes, e.g. convection before the wheel without area there.
-        let placed: Vec<Arc<dyn Effect>> =
-            catalogue.iter().filter(|effect| shows(effect, meter)).cloned().collect();
-        let mut catalogue = Deck::new(&placed);
+        let influential: Vec<Arc<dyn Effect>> =
+            catalogue.iter().filter(|effect| has_influence(effect, meter)).cloned().collect();
+        let mut catalogue = Deck::new(&influential);
         let mut outside = Deck::new(&outside_kinds(self.outside));
         let kinds = if self.kinds.is_empty() { &CaseKind::USUAL[..] } else { &self.kinds[..] };
         (0..self.cases)
@@ -142,9 +142,9 @@ mod tests {
     use std::collections::BTreeSet;
 
     /// A rig on which every typical step is 50 sigmas long.
-    struct Even;
+    struct EqualSteps;
 
-    impl SignatureMeter for Even {
+    impl SignatureMeter for EqualSteps {
         fn lengths(&self, causes: &[Cause]) -> Vec<f64> {
             let of = |cause: &Cause| {
                 let parameter = &cause.effect.info().parameters[0];
@@ -157,7 +157,7 @@ mod tests {
     #[test]
     fn cases_are_repeatable_within_range_and_never_neutral() {
         let catalogue = mapper_effects::catalogue();
-        let drawn = |seed| Draw::new(seed, 400, OutsideUse::Check).cases(&catalogue, &Even);
+        let drawn = |seed| Draw::new(seed, 400, OutsideUse::Check).cases(&catalogue, &EqualSteps);
         let cases = drawn(3);
         let print = |cases: &[Case]| format!("{cases:?}");
         assert_eq!(print(&cases), print(&drawn(3)));
@@ -176,7 +176,7 @@ mod tests {
         let dealt = catalogue.iter().map(|effect| signs(effect).len()).sum();
         let singles =
             Draw { kinds: vec![CaseKind::Single], cases: dealt, ..Draw::new(5, 1, OutsideUse::Check) }
-                .cases(&catalogue, &Even);
+                .cases(&catalogue, &EqualSteps);
         let seen: BTreeSet<String> =
             singles.iter().map(|c| c.causes[0].effect.info().id.to_string()).collect();
         assert_eq!(seen.len(), catalogue.len());

@@ -26,7 +26,7 @@ impl Laboratory {
 
 /// A name that no laboratory has.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("no laboratory `{name}` makes blind cases: virtual_lab and other_lab do")]
+#[error("`{name}` is not a laboratory for blind cases; the laboratories are virtual_lab and other_lab")]
 pub struct UnknownLaboratory {
     /// The given name.
     pub name: String,

@@ -36,7 +36,7 @@ impl CaseKind {
 
 /// A name that no kind has.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("no blind case is `{name}`: none, single, pair, outside and triple are")]
+#[error("`{name}` is not a kind of blind case; the kinds are none, single, pair, outside and triple")]
 pub struct UnknownKind {
     /// The given name.
     pub name: String,

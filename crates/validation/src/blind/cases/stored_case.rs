@@ -42,9 +42,6 @@ impl StoredCase {
     ///
     /// # Errors
     /// The id of a cause that is in neither, or has other parameters.
-    ///
-    /// # Errors
-    /// The id of the cause.
     pub fn case(&self, catalogue: &[Arc<dyn Effect>]) -> Result<Case, String> {
         let mut known = catalogue.to_vec();
         known.extend([OutsideUse::Check, OutsideUse::Calibration].into_iter().flat_map(outside_kinds));

@@ -13,7 +13,7 @@ pub trait SignatureMeter {
 }
 
 /// Relative tolerance of the length.
-const NEAR_RATIO: f64 = 0.1;
+const LENGTH_TOLERANCE_RATIO: f64 = 0.1;
 /// Maximum number of iterations for a strength.
 const MAX_ITERATIONS: usize = 6;
 /// Share of the housing that an inner wall takes.
@@ -55,8 +55,8 @@ pub(crate) fn strength(
 }
 
 /// Whether an effect has any influence on the measured machine.
-pub(crate) fn shows(effect: &Arc<dyn Effect>, meter: &dyn SignatureMeter) -> bool {
-    // If the rig cannot run with half a step, it can with less.
+pub(crate) fn has_influence(effect: &Arc<dyn Effect>, meter: &dyn SignatureMeter) -> bool {
+    // A rig that cannot run with half a typical step may run with a tenth of one.
     [0.5, 0.1].into_iter().any(|steps| {
         let values = effect.info().parameters.iter().map(|parameter| value_at(parameter, steps)).collect();
         let cause = Cause { effect: effect.clone(), values };
@@ -73,12 +73,12 @@ fn value_at(parameter: &EffectParameter, steps: f64) -> f64 {
 fn search(start: f64, wanted: f64, length: impl Fn(f64) -> f64) -> f64 {
     let mut size = start;
     for _ in 0..MAX_ITERATIONS {
-        let solution = length(size);
-        if (solution / wanted - 1.0).abs() < NEAR_RATIO {
+        let reached = length(size);
+        if (reached / wanted - 1.0).abs() < LENGTH_TOLERANCE_RATIO {
             break;
         }
         // A rig that cannot run so strongly has length 0.
-        size *= if solution > 0.0 { (wanted / solution).clamp(0.05, 5.0) } else { 0.4 };
+        size *= if reached > 0.0 { (wanted / reached).clamp(0.05, 5.0) } else { 0.4 };
     }
     size
 }
@@ -88,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_length_that_bends_is_found() {
+    fn the_search_reaches_the_length_although_it_is_not_in_proportion() {
         // A square root and a square: neither in proportion.
         for (power, wanted) in [(0.5, 30.0), (1.5, 200.0)] {
             let solution = search(0.5, wanted, |size| 40.0 * f64::powf(size, power));

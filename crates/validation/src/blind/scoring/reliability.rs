@@ -107,18 +107,18 @@ fn reliability(calibration: &str, cases: &[DiagnosisSummary], answers: &[Answer]
             bin(index, &members, all)
         })
         .collect();
-    let over = |error: &dyn Fn(&Bin) -> f64| {
+    let weighted_mean = |error: &dyn Fn(&Bin) -> f64| {
         (!bins.is_empty()).then(|| bins.iter().map(|bin| bin.share * error(bin)).sum::<f64>())
     };
-    let missed = |bin: &Bin| (bin.right_share - bin.said).abs();
+    let error = |bin: &Bin| (bin.right_share - bin.said).abs();
     // Mean absolute deviation of a share about its expectation, by the normal distribution: sqrt(2/pi) sigma.
     let by_chance = |bin: &Bin| {
         (2.0 / std::f64::consts::PI * bin.said * (1.0 - bin.said) / bin.effective_cases).max(0.0).sqrt()
     };
     Reliability {
         calibration: calibration.to_owned(),
-        expected_calibration_error: over(&missed),
-        expected_by_chance: over(&by_chance),
+        expected_calibration_error: weighted_mean(&error),
+        expected_by_chance: weighted_mean(&by_chance),
         truth_not_listed: cases.iter().filter(|case| !is_listed(case)).count(),
         bins,
     }
@@ -155,10 +155,10 @@ fn bin(index: usize, members: &[&Answer], all: f64) -> Option<Bin> {
 /// # Errors
 /// [`BlindError::Signatures`] if the shipped calibration is damaged.
 pub fn reliabilities(observed: &[DiagnosisSummary]) -> Result<[Reliability; 2], BlindError> {
-    Ok(before_and_after(&shipped()?, observed))
+    Ok(shipped_and_cross_validated(&shipped()?, observed))
 }
 
-fn before_and_after(before: &Calibration, observed: &[DiagnosisSummary]) -> [Reliability; 2] {
+fn shipped_and_cross_validated(before: &Calibration, observed: &[DiagnosisSummary]) -> [Reliability; 2] {
     let weights = weights(before, observed);
     let by = |calibration: &Calibration, (case, weight): (&DiagnosisSummary, f64)| {
         first_answer(case, calibration).map(|(probability, right)| Answer { probability, right, weight })
@@ -196,8 +196,8 @@ pub fn reliability_text(reliabilities: &[Reliability]) -> String {
         // Writing to a String cannot fail.
         let _ = writeln!(
             text,
-            "calibration {}: expected calibration error {} over {cases} diagnoses ({} by chance alone where every probability \
-             holds); the truth was not among the answers in {}",
+            "calibration {}: expected calibration error {} over {cases} diagnoses ({} by chance alone if every probability \
+             is correct); the truth was not among the answers in {}",
             row.calibration,
             percent(row.expected_calibration_error),
             percent(row.expected_by_chance),
@@ -234,12 +234,12 @@ mod tests {
     }
 
     fn reliability_of(cases: &[DiagnosisSummary]) -> Reliability {
-        let [before, _] = before_and_after(&plain(), cases);
+        let [before, _] = shipped_and_cross_validated(&plain(), cases);
         before
     }
 
     #[test]
-    fn what_is_right_as_often_as_it_says_has_no_error() {
+    fn probabilities_that_match_the_shares_have_no_error() {
         // 0.8 is right in 80 of 100 cases, 0.6 in 60 of 100.
         let of = |p: f64, hits: usize| (0..100).map(move |i| case(p, i < hits));
         let honest: Vec<DiagnosisSummary> = of(0.8, 80).chain(of(0.6, 60)).collect();
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn too_sure_by_a_fifth_is_an_error_of_a_fifth() {
+    fn overconfidence_of_a_fifth_is_an_error_of_a_fifth() {
         let boasting: Vec<DiagnosisSummary> = (0..100).map(|i| case(0.95, i < 75)).collect();
         let result = reliability_of(&boasting);
         assert!((result.expected_calibration_error.unwrap() - 0.2).abs() < 1e-9, "{result:?}");

@@ -8,7 +8,6 @@ use crate::blind::seal::{MANIFEST_NAME, Manifest, open, read_json};
 use mapper_effects::catalogue;
 use mapper_numerics::statistics::{mean, nearest_rank};
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -187,7 +186,7 @@ fn kind_of(truth: &Truth) -> CaseKind {
 
 fn score_truths(truths: &[Truth], diagnosis_of: impl Fn(&str) -> Option<Diagnosis>) -> Score {
     let catalogue = catalogue();
-    // Several parts are correct if neighbours share a balance.
+    // Neighbours that share a balance may both show the gap.
     let shows_in = |id: &str, submodel: &str| {
         catalogue.iter().any(|effect| effect.info().id == id && effect.info().shows_in(submodel))
     };
@@ -207,58 +206,60 @@ fn score_truths(truths: &[Truth], diagnosis_of: impl Fn(&str) -> Option<Diagnosi
         let causes: BTreeSet<String> = truth.effects.keys().cloned().collect();
         let kind = kind_of(truth);
         let diagnosis = diagnosis_of(&truth.name);
-        let judged = diagnosis.as_ref().map(|diagnosis| ComparedDiagnosis::new(kind, &causes, diagnosis));
-        let right = judged.as_ref().is_some_and(|judged| judged.right);
+        let compared = diagnosis.as_ref().map(|diagnosis| ComparedDiagnosis::new(kind, &causes, diagnosis));
+        let right = compared.as_ref().is_some_and(|compared| compared.right);
         let verdict = diagnosis.as_ref().map(|diagnosis| diagnosis.verdict.as_str());
         let sigma = truth.sigmas.values().copied().reduce(f64::min);
-        let mut unstated = SigmaClass::default();
+        let mut unclassified = SigmaClass::default();
         let of_class = sigma.and_then(|sigma| CLASSES_SIGMA.iter().position(|end| sigma < *end));
-        let class = of_class.map_or(&mut unstated, |place| &mut score.classes[place]);
+        let class = of_class.map_or(&mut unclassified, |place| &mut score.classes[place]);
         match kind {
             CaseKind::None => {
                 score.none.count(right);
-                score.none_named.count(judged.as_ref().is_some_and(|judged| !judged.named.is_empty()));
+                score.none_named.count(compared.as_ref().is_some_and(|compared| !compared.named.is_empty()));
             }
             CaseKind::Single => {
                 score.single.count(right);
                 class.single.count(right);
             }
             CaseKind::Pair => {
-                let finds_one = judged.as_ref().is_some_and(|judged| !judged.named.is_disjoint(&causes));
+                let names_one =
+                    compared.as_ref().is_some_and(|compared| !compared.named.is_disjoint(&causes));
                 for (both, at_least) in
                     [(&mut score.pair, &mut score.one_of_pair), (&mut class.pair, &mut class.one_of_pair)]
                 {
                     both.count(right);
-                    at_least.count(finds_one);
+                    at_least.count(names_one);
                 }
             }
             CaseKind::Triple => {
                 score.triple.count(right);
-                let named = judged.as_ref().map_or(0, |judged| judged.named.intersection(&causes).count());
+                let named =
+                    compared.as_ref().map_or(0, |compared| compared.named.intersection(&causes).count());
                 score.two_of_triple.count(named >= 2);
             }
             CaseKind::Outside => {
-                let falsely = verdict == Some("explained");
+                let is_falsely_explained = verdict == Some("explained");
                 for (recognised, explained) in [
                     (&mut score.outside, &mut score.falsely_explained),
                     (&mut class.outside, &mut class.falsely_explained),
                 ] {
                     recognised.count(right);
-                    explained.count(falsely);
+                    explained.count(is_falsely_explained);
                 }
             }
         }
-        let p_truth = judged.as_ref().map_or(0.0, |judged| judged.p_truth);
+        let p_truth = compared.as_ref().map_or(0.0, |compared| compared.p_truth);
         squared_misses.push((1.0 - p_truth.min(1.0)).powi(2));
-        if let (Some(diagnosis), Some(judged)) = (&diagnosis, &judged) {
-            set_sizes.push(judged.set_size as f64);
+        if let (Some(diagnosis), Some(compared)) = (&diagnosis, &compared) {
+            set_sizes.push(compared.set_size as f64);
             if matches!(kind, CaseKind::Single | CaseKind::Pair | CaseKind::Triple) {
                 let first_two = diagnosis.places.iter().take(2);
                 let right = first_two
                     .flat_map(|place| causes.iter().map(|id| shows_in(id, &place.submodel)))
                     .any(|right| right);
                 score.place.count(right);
-                if judged.named == causes {
+                if compared.named == causes {
                     let estimates = diagnosis.candidates.first().map(|first| &first.parameters);
                     for (id, value) in &truth.effects {
                         let estimate = estimates.and_then(|estimates| estimates.get(id));
@@ -284,7 +285,7 @@ fn score_truths(truths: &[Truth], diagnosis_of: impl Fn(&str) -> Option<Diagnosi
             probability: diagnosis
                 .as_ref()
                 .and_then(|diagnosis| Some(diagnosis.candidates.first()?.probability)),
-            named: judged.map_or_else(BTreeSet::new, |judged| judged.named),
+            named: compared.map_or_else(BTreeSet::new, |compared| compared.named),
             right,
             sigma,
         });
@@ -333,12 +334,4 @@ impl ComparedDiagnosis {
         };
         ComparedDiagnosis { named, set_size, right, p_truth }
     }
-}
-
-/// Reads a diagnosis as scoring does, for tests of the diagnosis output.
-///
-/// # Errors
-/// The missing field, or the field with the wrong type.
-pub fn check_diagnosis(value: &Value) -> Result<(), String> {
-    serde_json::from_value::<Diagnosis>(value.clone()).map(drop).map_err(|error| error.to_string())
 }

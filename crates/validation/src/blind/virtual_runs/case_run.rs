@@ -32,7 +32,7 @@ pub(crate) struct Schedule<'a> {
 }
 
 /// Converts the seed of a case into the seed of its reference recording; no other draw uses it.
-const ANOTHER_NIGHT: u64 = 0x3C6E_F372_FE94_F82B;
+const REFERENCE_NIGHT: u64 = 0x3C6E_F372_FE94_F82B;
 
 impl<'a> Schedule<'a> {
     /// The points in the campaign's own order, P3 commanded open loop.
@@ -45,7 +45,7 @@ impl<'a> Schedule<'a> {
         })
     }
 
-    /// The same on another simulator.
+    /// The same schedule on another simulator.
     pub(crate) fn on(self, laboratory: Laboratory) -> Self {
         Schedule { laboratory, ..self }
     }
@@ -57,15 +57,15 @@ impl<'a> Schedule<'a> {
         for cause in &case.causes {
             effect::add(&mut rig, cause.effect.as_ref(), &cause.values)?;
         }
-        let at_once = ActuatorDynamics { lag_s: 0.0, slew_per_s: f64::INFINITY };
+        let immediate = ActuatorDynamics { lag_s: 0.0, slew_per_s: f64::INFINITY };
         let p3_actuator =
             ActuatorDynamics { lag_s: self.campaign.tolerances.actuator_lag_s, slew_per_s: f64::INFINITY };
         let mut settings = LabSettings {
             start: Start::Settled,
             p3_actuator,
-            t3_actuator: at_once,
-            valve_actuator: at_once,
-            oil_actuator: at_once,
+            t3_actuator: immediate,
+            valve_actuator: immediate,
+            oil_actuator: immediate,
             weather: Weather::draw(night_seed),
             seed: night_seed,
             ..LabSettings::ideal(self.nominal.clone(), self.campaign.boundary)
@@ -110,25 +110,25 @@ impl<'a> Schedule<'a> {
         file: &Path,
         header: &RecordingHeader,
     ) -> Result<Truth, BlindError> {
-        let mut kept = FileDestination::new(RecordingWriter::create(file, header)?);
-        self.drive(case, case.seed, &mut kept)?;
-        Ok(Truth::new(case, kept.finish()?))
+        let mut destination = FileDestination::new(RecordingWriter::create(file, header)?);
+        self.drive(case, case.seed, &mut destination)?;
+        Ok(Truth::new(case, destination.finish()?))
     }
 
     /// Runs the rig of a case without its causes on another night: the same offsets and tolerances, other noise and weather.
     ///
     /// # Errors
     /// If the lab stops or the file cannot be written.
-    pub(crate) fn run_healthy(
+    pub(crate) fn run_reference(
         &self,
         case: &Case,
         file: &Path,
         header: &RecordingHeader,
     ) -> Result<(), BlindError> {
-        let mut kept = FileDestination::new(RecordingWriter::create(file, header)?);
-        let healthy = Case { causes: Vec::new(), sigmas: Vec::new(), ..case.clone() };
-        self.drive(&healthy, case.seed ^ ANOTHER_NIGHT, &mut kept)?;
-        kept.finish()?;
+        let mut destination = FileDestination::new(RecordingWriter::create(file, header)?);
+        let without_causes = Case { causes: Vec::new(), sigmas: Vec::new(), ..case.clone() };
+        self.drive(&without_causes, case.seed ^ REFERENCE_NIGHT, &mut destination)?;
+        destination.finish()?;
         Ok(())
     }
 
@@ -137,9 +137,9 @@ impl<'a> Schedule<'a> {
     /// # Errors
     /// If the lab stops.
     pub(crate) fn record(&self, case: &Case) -> Result<Recording, BlindError> {
-        let mut kept = MemoryDestination::default();
-        self.drive(case, case.seed, &mut kept)?;
-        Ok(kept.recording)
+        let mut destination = MemoryDestination::default();
+        self.drive(case, case.seed, &mut destination)?;
+        Ok(destination.recording)
     }
 
     /// Uses the runner of all campaigns without guards, because a virtual machine cannot be damaged.

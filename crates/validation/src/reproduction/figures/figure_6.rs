@@ -7,7 +7,7 @@ use crate::reproduction::outcome::{
     Outcome, WINDOW, dynamic_config, extremes, identify_runs, rms, truth_in_window, worst,
 };
 use crate::reproduction::picture::{
-    at_speed, equality_panel, eta_pairs, h_pairs, krpm, speed_colour, target_speeds_rpm,
+    efficiency_pair, efficiency_panel, h_pair, h_panel, series_by_speed, speed_colour, target_speeds_rpm,
 };
 use crate::reproduction::{FigureResult, ReproduceError, Statement, Table, Verdict};
 use mapper_chart::{Figure, Marker};
@@ -17,13 +17,13 @@ use mapper_physics::simulation::model::Model;
 use mapper_physics::simulation::steady::hold_speed;
 
 pub(crate) fn figure(runs: &[Run]) -> Result<FigureResult, ReproduceError> {
-    let found = identify_runs(runs, &dynamic_config(0.0))?;
-    let steady_hot = found.iter().map(steady_hot).collect::<Result<Vec<_>, _>>()?;
-    let eta_worst = worst(found.iter().map(Outcome::eta_error_points));
-    let eta_end_worst = worst(found.iter().map(Outcome::eta_end_error_points));
-    let within = found.iter().filter(|o| o.eta_error_points().is_some_and(|e| e.abs() < 0.3)).count();
-    let h_range = extremes(found.iter().map(Outcome::h_error_percent));
-    let (nrmse_range, nrmse_mean) = nrmse_percent(&found);
+    let outcomes = identify_runs(runs, &dynamic_config(0.0))?;
+    let steady_hot = outcomes.iter().map(steady_hot).collect::<Result<Vec<_>, _>>()?;
+    let eta_worst = worst(outcomes.iter().map(Outcome::eta_error_points));
+    let eta_end_worst = worst(outcomes.iter().map(Outcome::eta_end_error_points));
+    let within = outcomes.iter().filter(|o| o.eta_error_points().is_some_and(|e| e.abs() < 0.3)).count();
+    let h_range = extremes(outcomes.iter().map(Outcome::h_error_percent));
+    let (nrmse_range, nrmse_mean) = nrmse_percent(&outcomes);
     let t2_range = extremes(runs.iter().map(|run| {
         let window = truth_in_window(run, &WINDOW);
         extremes(window.iter().map(|t| Some(t.t2_k))).map(|(low, high)| high - low)
@@ -42,7 +42,7 @@ pub(crate) fn figure(runs: &[Run]) -> Result<FigureResult, ReproduceError> {
                 "Worst {} points against the mean in the window, {} against its end; {within} of {} below 0.3 points.",
                 fixed(eta_worst, 2),
                 fixed(eta_end_worst, 2),
-                found.len()
+                outcomes.len()
             ),
             if eta_end_worst < 1.0 {
                 Verdict::Holds
@@ -89,7 +89,7 @@ pub(crate) fn figure(runs: &[Run]) -> Result<FigureResult, ReproduceError> {
         "dynamic h, W/(m2 K)",
         "error (mean, end), %",
     ]);
-    for (o, hot) in found.iter().zip(&steady_hot) {
+    for (o, hot) in outcomes.iter().zip(&steady_hot) {
         table.row([
             o.jump.name().replace(" krpm", ""),
             fixed(o.jump.opening, 1),
@@ -121,7 +121,7 @@ pub(crate) fn figure(runs: &[Run]) -> Result<FigureResult, ReproduceError> {
         ),
         statements,
         table,
-        svg: picture(&found, &steady_hot),
+        svg: picture(&outcomes, &steady_hot),
     })
 }
 
@@ -133,34 +133,18 @@ fn steady_hot(outcome: &Outcome) -> Result<f64, ReproduceError> {
 }
 
 /// Root mean square error of h over its range and over its mean, %.
-fn nrmse_percent(found: &[Outcome]) -> (f64, f64) {
-    let error = rms(found.iter().map(|o| Some(o.point.h_w_m2k? - o.h_mean_w_m2k))).unwrap_or(f64::NAN);
-    let (low, high) = extremes(found.iter().map(|o| Some(o.h_mean_w_m2k))).unwrap_or((f64::NAN, f64::NAN));
-    let mean = mean(found.iter().map(|o| o.h_mean_w_m2k)).unwrap_or(f64::NAN);
+fn nrmse_percent(outcomes: &[Outcome]) -> (f64, f64) {
+    let error = rms(outcomes.iter().map(|o| Some(o.point.h_w_m2k? - o.h_mean_w_m2k))).unwrap_or(f64::NAN);
+    let (low, high) = extremes(outcomes.iter().map(|o| Some(o.h_mean_w_m2k))).unwrap_or((f64::NAN, f64::NAN));
+    let mean = mean(outcomes.iter().map(|o| o.h_mean_w_m2k)).unwrap_or(f64::NAN);
     (100.0 * error / (high - low), 100.0 * error / mean)
 }
 
-fn picture(found: &[Outcome], steady_hot: &[f64]) -> String {
-    let speeds = target_speeds_rpm();
-    let dynamic = |pairs: fn(Vec<&Outcome>) -> Vec<(f64, f64)>, scale: f64| {
-        speeds
-            .iter()
-            .map(|speed_rpm| {
-                let points = pairs(at_speed(found, *speed_rpm).collect());
-                let points = points.into_iter().map(|(x, y)| (scale * x, scale * y)).collect();
-                (
-                    points,
-                    speed_colour(*speed_rpm),
-                    Marker::Circle,
-                    false,
-                    format!("dynamic, {}", krpm(*speed_rpm)),
-                )
-            })
-            .collect::<Vec<_>>()
-    };
-    let mut eta = dynamic(|outcomes| eta_pairs(outcomes), 100.0);
-    for speed_rpm in speeds {
-        let points = found
+fn picture(outcomes: &[Outcome], steady_hot: &[f64]) -> String {
+    let style = (Marker::Circle, false, "dynamic");
+    let mut eta = series_by_speed(outcomes, efficiency_pair, style);
+    for speed_rpm in target_speeds_rpm() {
+        let points = outcomes
             .iter()
             .zip(steady_hot)
             .filter(|(o, _)| o.jump.to_rpm == speed_rpm)
@@ -169,22 +153,11 @@ fn picture(found: &[Outcome], steady_hot: &[f64]) -> String {
         let label = "settled, 500 degC".to_owned();
         eta.push((points, speed_colour(speed_rpm), Marker::Diamond, true, label));
     }
-    let h = dynamic(|outcomes| h_pairs(outcomes), 1.0);
     Figure::new("Figure 6: dynamic identification against the model")
         .subtitle(
             "window 10 to 110 s after the jump, alpha_A = 0, no noise; model values: mean in the window",
         )
-        .panel(equality_panel(
-            "(a) efficiency",
-            ("model efficiency, %", "identified efficiency, %"),
-            Some((1.0, "1 point off")),
-            eta,
-        ))
-        .panel(equality_panel(
-            "(b) heat-transfer coefficient",
-            ("model h, W/(m2 K)", "identified h, W/(m2 K)"),
-            None,
-            h,
-        ))
+        .panel(efficiency_panel(eta))
+        .panel(h_panel(series_by_speed(outcomes, h_pair, style)))
         .to_svg()
 }

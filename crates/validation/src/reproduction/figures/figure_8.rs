@@ -4,7 +4,8 @@ use crate::reproduction::lab::{JUMPS, run_all};
 use crate::reproduction::number_text::{fixed, range};
 use crate::reproduction::outcome::{Outcome, RUN_S, dynamic_config, extremes, identify_runs, rms, worst};
 use crate::reproduction::picture::{
-    at_speed, efficiency_pair, efficiency_panel, h_pair, h_panel, krpm, speed_colour, target_speeds_rpm,
+    at_speed, efficiency_pair, efficiency_panel, h_pair, h_panel, krpm, series_by_speed, speed_colour,
+    target_speeds_rpm,
 };
 use crate::reproduction::{FigureResult, ReproduceError, Statement, Table, Verdict};
 use mapper_chart::{Axis, Dash, Figure, Line, Marker, Panel, Rule, RuleAt};
@@ -75,12 +76,12 @@ fn statements_on_h(
         |outcomes: &[Outcome]| format!("{} % (rms {} %)", range(span(outcomes), 1), fixed(off(outcomes), 1));
     let grows = |right: &[Outcome], wrong: &[Outcome]| off(wrong) / off(right);
     let (shared_grows, own_grows) = (grows(right, wrong), grows(&own_inlet_fit.right, &own_inlet_fit.wrong));
-    let slightly = |ratio: f64| ratio > 1.0 && ratio < SLIGHTLY_RATIO;
+    let slightly = |ratio: f64| ratio > 1.0 && ratio < MAX_SLIGHT_RATIO;
     let worse = |outcomes: &[Outcome]| off(outcomes) > 1.2 * off(nothing_before);
     let nearer = |to_own: bool| {
         if to_own { "the machine with its own h before the wheel" } else { "the machine that shares one h" }
     };
-    let to_20 = |outcomes: &[Outcome]| (off(outcomes) - SAID_PERCENT).abs();
+    let to_20 = |outcomes: &[Outcome]| (off(outcomes) - ABSTRACT_PERCENT).abs();
     [
         Statement::new(
             "Figure 8 (b): a wrong alpha_A has little effect on the heat-transfer coefficient; the errors are slightly larger.",
@@ -110,7 +111,7 @@ fn statements_on_h(
                 fixed((to_20(wrong) - to_20(&own_inlet_fit.wrong)).abs(), 1),
                 nearer(to_20(&own_inlet_fit.wrong) < to_20(wrong))
             ),
-            if off(&own_inlet_fit.wrong) < SAID_PERCENT && SAID_PERCENT < off(wrong) {
+            if off(&own_inlet_fit.wrong) < ABSTRACT_PERCENT && ABSTRACT_PERCENT < off(wrong) {
                 Verdict::Partly
             } else {
                 Verdict::Differs
@@ -136,9 +137,9 @@ fn statements_on_h(
 }
 
 /// Error of h that the paper's abstract gives for a wrong alpha_A, %.
-const SAID_PERCENT: f64 = 20.0;
-/// Largest growth of an error that counts as slight, ratio.
-const SLIGHTLY_RATIO: f64 = 1.5;
+const ABSTRACT_PERCENT: f64 = 20.0;
+/// Maximum growth of an error that counts as slight, ratio.
+const MAX_SLIGHT_RATIO: f64 = 1.5;
 
 pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
     let cases = cases()?;
@@ -237,16 +238,8 @@ pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
 
 fn picture(cases: &[Case], right: &[Outcome], wrong: &[Outcome], own_inlet_fit: &OwnInlet) -> String {
     let series_of = |right: &[Outcome], wrong: &[Outcome], value: fn(&Outcome) -> Option<(f64, f64)>| {
-        let mut series = Vec::new();
-        for (outcomes, marker, hollow, name) in
-            [(right, Marker::Circle, false, "known"), (wrong, Marker::Diamond, true, "0 assumed")]
-        {
-            for speed_rpm in target_speeds_rpm() {
-                let points = at_speed(outcomes, speed_rpm).filter_map(value).collect();
-                let label = format!("{name}, {}", krpm(speed_rpm));
-                series.push((points, speed_colour(speed_rpm), marker, hollow, label));
-            }
-        }
+        let mut series = series_by_speed(right, value, (Marker::Circle, false, "known"));
+        series.extend(series_by_speed(wrong, value, (Marker::Diamond, true, "0 assumed")));
         series
     };
     let series = |value| series_of(right, wrong, value);

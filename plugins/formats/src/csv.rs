@@ -8,10 +8,9 @@ use mapper_core::MapFormat;
 pub(crate) const FORMAT: MapFormat = MapFormat {
     name: "csv",
     extension: "csv",
-    further_extensions: &[],
     description: "one row a point, units in the column names, reference state and method in `#` lines",
     write: Some(write::write),
-    draw: None,
     read: Some(read::read),
     turbine: crate::turbine::CSV,
+    ..MapFormat::NONE
 };

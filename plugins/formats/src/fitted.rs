@@ -6,12 +6,10 @@ use mapper_core::{CompressorMap, ExportError, FittedLine, FittedMap, FittedNode,
 pub(crate) const FORMAT: MapFormat = MapFormat {
     name: "fitted",
     extension: "fitted.csv",
-    further_extensions: &[],
     description: "the fitted lines with standard errors, each node marked measured or extrapolated",
     write: Some(write),
-    draw: None,
-    read: None,
     turbine: crate::turbine::FITTED,
+    ..MapFormat::NONE
 };
 
 /// Column names, in order.

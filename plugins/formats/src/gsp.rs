@@ -3,18 +3,16 @@
 
 use crate::heading::heading;
 use crate::simulation_table::SimulationTable;
-use mapper_core::{CompressorMap, ExportError, MapFormat, TurbineFormat};
+use mapper_core::{CompressorMap, ExportError, MapFormat};
 use std::fmt::Write;
 
 pub(crate) const FORMAT: MapFormat = MapFormat {
     name: "gsp",
     extension: "gsp.map",
-    further_extensions: &[],
     description: "GSP and GasTurb tables of flow, pressure ratio and efficiency over beta and corrected speed",
     write: Some(write),
-    draw: None,
     read: Some(mapper_maps::table::read_any_bytes),
-    turbine: TurbineFormat::NONE,
+    ..MapFormat::NONE
 };
 
 const NUMBERS_PER_LINE: usize = 5;

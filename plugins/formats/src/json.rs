@@ -10,12 +10,11 @@ use serde_json::{Value, json};
 pub(crate) const FORMAT: MapFormat = MapFormat {
     name: "json",
     extension: "json",
-    further_extensions: &[],
     description: "the whole map with every point's uncertainty, warnings and window",
     write: Some(write),
-    draw: None,
     read: Some(read),
     turbine: crate::turbine::JSON,
+    ..MapFormat::NONE
 };
 
 /// Layout 2 numbers steps from 1. Files of version 0.1.0 have no `format`, and their steps count from 0.

@@ -13,7 +13,7 @@ mod turbine;
 
 pub use map_picture::map_figure;
 pub use mapper_chart::efficiency_mesh::efficiency_surface;
-pub use mapper_maps::table::{MAX_POINTS, parse_reference};
+pub use mapper_maps::table::parse_reference;
 
 use mapper_core::MapFormats;
 

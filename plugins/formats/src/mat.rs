@@ -5,17 +5,14 @@
 
 use crate::heading::heading;
 use crate::simulation_table::SimulationTable;
-use mapper_core::{CompressorMap, ExportError, MapFormat, TurbineFormat};
+use mapper_core::{CompressorMap, ExportError, MapFormat};
 
 pub(crate) const FORMAT: MapFormat = MapFormat {
     name: "mat",
     extension: "mat",
-    further_extensions: &[],
     description: "MATLAB data (level 4): the tables of the format simscape over corrected speed and beta, and the points",
     write: Some(write),
-    draw: None,
-    read: None,
-    turbine: TurbineFormat::NONE,
+    ..MapFormat::NONE
 };
 
 /// Numbers in 64 bits, the least significant byte first.

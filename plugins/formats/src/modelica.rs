@@ -2,7 +2,7 @@
 //! reads its compressor maps.
 //!
 //! Modelica Standard Library 4.0, `Modelica.Blocks.Tables`: text files begin with `#1`; a table is
-//! `double name(rows, columns)`, its first row the values of u2 behind one unused number, its first column those of u1.
+//! `double name(rows, columns)`. Its first row has one unused number and the values of u2, its first column the values of u1.
 
 use crate::heading::heading;
 use crate::simulation_table::{SimulationTable, joined};
@@ -12,12 +12,11 @@ use std::fmt::Write;
 pub(crate) const FORMAT: MapFormat = MapFormat {
     name: "modelica",
     extension: "modelica.txt",
-    further_extensions: &[],
     description: "tables over corrected speed and beta for Modelica.Blocks.Tables.CombiTable2Ds",
     write: Some(write),
-    draw: None,
     read: Some(mapper_maps::table::read_any_bytes),
     turbine: crate::turbine::MODELICA,
+    ..MapFormat::NONE
 };
 
 fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {

@@ -1,7 +1,7 @@
 //! The picture as pixels.
 
 use crate::map_picture::map_figure;
-use mapper_core::{CompressorMap, ExportError, MapFormat, MapUnits, TurbineFormat};
+use mapper_core::{CompressorMap, ExportError, MapFormat, MapUnits};
 
 /// Pixels per unit of the picture: sharp on paper and on high-resolution screens.
 const SCALE: f32 = 2.0;
@@ -9,12 +9,10 @@ const SCALE: f32 = 2.0;
 pub(crate) const FORMAT: MapFormat = MapFormat {
     name: "png",
     extension: "png",
-    further_extensions: &[],
     description: "the picture as pixels",
     write: Some(write),
     draw: Some(draw),
-    read: None,
-    turbine: TurbineFormat::NONE,
+    ..MapFormat::NONE
 };
 
 fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {

@@ -5,18 +5,16 @@
 
 use crate::heading::heading;
 use crate::simulation_table::{SimulationTable, joined};
-use mapper_core::{CompressorMap, ExportError, MapFormat, TurbineFormat};
+use mapper_core::{CompressorMap, ExportError, MapFormat};
 use std::fmt::Write;
 
 pub(crate) const FORMAT: MapFormat = MapFormat {
     name: "pycycle",
     extension: "py",
-    further_extensions: &[],
     description: "Python module with a pyCycle map: [alpha][Nc][Rline]",
     write: Some(write),
-    draw: None,
     read: Some(mapper_maps::table::read_any_bytes),
-    turbine: TurbineFormat::NONE,
+    ..MapFormat::NONE
 };
 
 fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {

@@ -15,9 +15,9 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     further_extensions: &["map", "sae", "dat", "cmp", "tsv", "prn"],
     description: "SAE text: corrected rpm, corrected kg/s, pressure ratio, efficiency, from choke to surge",
     write: Some(write),
-    draw: None,
     read: Some(read_any_bytes),
     turbine: crate::turbine::TEXT,
+    ..MapFormat::NONE
 };
 
 fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {

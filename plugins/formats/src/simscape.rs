@@ -12,12 +12,11 @@ const RATIOS: usize = 25;
 pub(crate) const FORMAT: MapFormat = MapFormat {
     name: "simscape",
     extension: "m",
-    further_extensions: &[],
     description: "MATLAB script: tables over corrected speed and beta, and over corrected speed and pressure ratio",
     write: Some(write),
-    draw: None,
     read: Some(mapper_maps::table::read_any_bytes),
     turbine: crate::turbine::SIMSCAPE,
+    ..MapFormat::NONE
 };
 
 fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {

@@ -1,17 +1,14 @@
 //! The measured surge-side ends as CSV: one row per speed line.
 
 use crate::heading::heading;
-use mapper_core::{CompressorMap, ExportError, MapFormat, SurgeFoundBy, SurgeMark, TurbineFormat};
+use mapper_core::{CompressorMap, ExportError, MapFormat, SurgeFoundBy, SurgeMark};
 
 pub(crate) const FORMAT: MapFormat = MapFormat {
     name: "surge",
     extension: "surge.csv",
-    further_extensions: &[],
     description: "the surge-side ends that were sought, with standard errors",
     write: Some(write),
-    draw: None,
-    read: None,
-    turbine: TurbineFormat::NONE,
+    ..MapFormat::NONE
 };
 
 /// Column names, in order.

@@ -1,17 +1,15 @@
 //! The map as a picture.
 
 use crate::map_picture::map_figure;
-use mapper_core::{CompressorMap, ExportError, MapFormat, MapUnits, TurbineFormat};
+use mapper_core::{CompressorMap, ExportError, MapFormat, MapUnits};
 
 pub(crate) const FORMAT: MapFormat = MapFormat {
     name: "svg",
     extension: "svg",
-    further_extensions: &[],
     description: "picture: speed lines with efficiency contours, and efficiency with its 95 % interval",
     write: Some(write),
     draw: Some(draw),
-    read: None,
-    turbine: TurbineFormat::NONE,
+    ..MapFormat::NONE
 };
 
 fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {

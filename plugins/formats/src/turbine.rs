@@ -16,7 +16,7 @@ pub(crate) const FITTED: TurbineFormat = TurbineFormat { write: Some(write_fitte
 pub(crate) const SIMSCAPE: TurbineFormat = TurbineFormat { write: Some(write_simscape), read: None };
 pub(crate) const MODELICA: TurbineFormat = TurbineFormat { write: Some(write_modelica), read: None };
 
-/// What distinguishes the JSON of a turbine map.
+/// Value of `kind` in the JSON of a turbine map.
 pub(crate) const KIND: &str = "turbine";
 
 /// Name and units in comment lines that begin with `mark`.

@@ -7,8 +7,7 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     extension: "xlsx",
     further_extensions: &["xlsm", "xls"],
     description: "workbook of Excel with a table of points",
-    write: None,
-    draw: None,
     read: Some(mapper_maps::table::read_workbook),
     turbine: crate::turbine::WORKBOOK,
+    ..MapFormat::NONE
 };

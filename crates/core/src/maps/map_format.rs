@@ -84,6 +84,18 @@ pub struct MapFormat {
 }
 
 impl MapFormat {
+    /// A format that can neither be written nor read: the values of the fields that a format does not set.
+    pub const NONE: MapFormat = MapFormat {
+        name: "",
+        extension: "",
+        further_extensions: &[],
+        description: "",
+        write: None,
+        draw: None,
+        read: None,
+        turbine: TurbineFormat::NONE,
+    };
+
     /// All extensions of its files.
     fn extensions(&self) -> impl Iterator<Item = &'static str> + use<> {
         std::iter::once(self.extension).chain(self.further_extensions.iter().copied())

@@ -6,6 +6,7 @@ use crate::{AssembleError, Grouping};
 use mapper_core::{
     CompressorMap, IdentifiedPoint, MapPoint, Method, ReferenceState, SpeedLine, SpeedShift, Verdict,
 };
+use mapper_numerics::statistics::range;
 use mapper_physics::compressor_map::similarity::at_speed;
 
 /// Assembles a map from identified points.
@@ -40,7 +41,7 @@ pub fn assemble(
         return Err(AssembleError::NoPoints);
     }
     points.iter().try_for_each(|point| check_point(point, method))?;
-    let mut lines: Vec<SpeedLine> = group_by_speed(points, &grouping).iter().map(assemble_line).collect();
+    let mut lines: Vec<SpeedLine> = group_by_speed(points, &grouping).iter().map(line_of_group).collect();
     lines.sort_by(|a, b| a.speed_corrected_rpm.total_cmp(&b.speed_corrected_rpm));
     Ok(CompressorMap {
         machine: machine.to_owned(),
@@ -65,37 +66,37 @@ fn check_point(point: &IdentifiedPoint, method: Method) -> Result<(), AssembleEr
         ("corrected speed", point.speed_corrected_rpm, "rpm"),
     ] {
         if !value.is_finite() {
-            return Err(AssembleError::NoPlace { step, quantity, value, unit });
+            return Err(AssembleError::NotFinite { step, quantity, value, unit });
         }
     }
     Ok(())
 }
 
-fn assemble_line(group: &Group<'_>) -> SpeedLine {
-    let speeds_rpm = || group.points.iter().map(|point| point.speed_corrected_rpm);
-    let lowest_rpm = speeds_rpm().fold(f64::INFINITY, f64::min);
-    let highest_rpm = speeds_rpm().fold(f64::NEG_INFINITY, f64::max);
-    let speed_corrected_rpm = speeds_rpm().sum::<f64>() / group.points.len() as f64;
-    let mut points: Vec<MapPoint> =
-        group.points.iter().map(|point| map_point(point, speed_corrected_rpm)).collect();
+fn line_of_group(group: &Group<'_>) -> SpeedLine {
+    let speeds_rpm = group.points.iter().map(|point| point.speed_corrected_rpm);
+    let mean_rpm = speeds_rpm.sum::<f64>() / group.points.len() as f64;
+    let points = group.points.iter().map(|point| move_to_speed(point, mean_rpm)).collect();
+    SpeedLine { target_speed_rpm: group.target_speed_rpm, ..line(mean_rpm, points) }
+}
+
+/// A speed line with its points in order of flow.
+pub fn line(speed_corrected_rpm: f64, mut points: Vec<MapPoint>) -> SpeedLine {
+    let (slowest_rpm, fastest_rpm) = range(points.iter().map(|point| point.identified.speed_corrected_rpm));
     points.sort_by(|a, b| {
         let by_flow = a.flow_corrected_kg_s.total_cmp(&b.flow_corrected_kg_s);
         by_flow.then(b.pressure_ratio.total_cmp(&a.pressure_ratio))
     });
-    SpeedLine {
-        speed_corrected_rpm,
-        speed_spread_rpm: highest_rpm - lowest_rpm,
-        target_speed_rpm: group.target_speed_rpm,
-        points,
-    }
+    let speed_spread_rpm = fastest_rpm - slowest_rpm;
+    SpeedLine { speed_corrected_rpm, speed_spread_rpm, target_speed_rpm: None, points }
 }
 
-fn map_point(point: &IdentifiedPoint, line_speed_rpm: f64) -> MapPoint {
+/// Converts a point to the speed of its line by similarity.
+pub(crate) fn move_to_speed(point: &IdentifiedPoint, line_speed_rpm: f64) -> MapPoint {
     let (flow_kg_s, pressure_ratio) = (point.flow_corrected_kg_s, point.pressure_ratio);
     let shift_rpm = line_speed_rpm - point.speed_corrected_rpm;
     // Similarity is undefined for a shaft at rest.
-    let moved = shift_rpm != 0.0 && point.speed_corrected_rpm > 0.0 && pressure_ratio > 0.0;
-    let (flow_at_line_kg_s, ratio_at_line) = if moved {
+    let is_moved = shift_rpm != 0.0 && point.speed_corrected_rpm > 0.0 && pressure_ratio > 0.0;
+    let (flow_at_line_kg_s, ratio_at_line) = if is_moved {
         at_speed(flow_kg_s, pressure_ratio, line_speed_rpm / point.speed_corrected_rpm)
     } else {
         (flow_kg_s, pressure_ratio)
@@ -105,7 +106,7 @@ fn map_point(point: &IdentifiedPoint, line_speed_rpm: f64) -> MapPoint {
         pressure_ratio: ratio_at_line,
         eta: point.eta.filter(|eta| point.verdict != Verdict::Unusable && eta.is_finite()),
         identified: point.clone(),
-        shift: moved.then_some(SpeedShift {
+        shift: is_moved.then_some(SpeedShift {
             speed_corrected_rpm: shift_rpm,
             flow_corrected_kg_s: flow_at_line_kg_s - flow_kg_s,
             pressure_ratio: ratio_at_line - pressure_ratio,

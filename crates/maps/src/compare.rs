@@ -6,9 +6,12 @@ use mapper_core::{CompressorMap, FittedLine, FittedNode, confidence_interval_95}
 use mapper_numerics::polyline::NearestOnPolyline;
 use serde::Serialize;
 
-const NODES: usize = 25;
-/// Maximum difference of the end lines' speeds that still count as equal, ratio: stands hold a speed within 1 %.
-const END_SLACK: f64 = 0.01;
+/// Compared places on each line.
+const PLACES: usize = 25;
+/// Nodes of the fitted lines for each compared place.
+const NODES_PER_PLACE: usize = 4;
+/// Maximum relative difference between the speeds of end lines that count as equal: stands hold a speed within 1 %.
+const END_TOLERANCE_RATIO: f64 = 0.01;
 
 /// A place of the second map compared with the nearest place of the first at equal corrected speed. Differences: second minus
 /// first.
@@ -37,16 +40,17 @@ pub struct PlaceComparison {
 impl PlaceComparison {
     /// Whether the 95 % interval of the distance excludes 0.
     pub fn line_differs(&self) -> bool {
-        exceeds_interval(self.distance_ratio, self.distance_standard_error_ratio)
+        excludes_zero(self.distance_ratio, self.distance_standard_error_ratio)
     }
 
     /// Whether the 95 % interval of the difference of efficiency excludes 0.
     pub fn eta_differs(&self) -> bool {
-        exceeds_interval(self.eta_difference, self.eta_standard_error)
+        excludes_zero(self.eta_difference, self.eta_standard_error)
     }
 }
 
-fn exceeds_interval(difference: f64, standard_error: f64) -> bool {
+/// Whether the 95 % interval of a difference excludes 0.
+pub(crate) fn excludes_zero(difference: f64, standard_error: f64) -> bool {
     let (low, high) = confidence_interval_95(difference, standard_error);
     low > 0.0 || high < 0.0
 }
@@ -98,17 +102,20 @@ pub fn compare(first: &CompressorMap, second: &CompressorMap) -> Result<MapCompa
     let (low, high) = (bounds[0].0.max(bounds[1].0), bounds[0].1.min(bounds[1].1));
     let within = |speed: &f64| *speed >= low && *speed <= high;
     // An end line slightly beyond the other map's is compared at the other map's end.
-    let to_common = |speed: &f64| {
+    let snap_to_end = |speed: &f64| {
         let nearest = speed.max(low).min(high);
-        if (speed - nearest).abs() <= END_SLACK * nearest { nearest } else { *speed }
+        if (speed - nearest).abs() <= END_TOLERANCE_RATIO * nearest { nearest } else { *speed }
     };
-    let mut all: Vec<f64> = speeds.iter().flatten().map(to_common).collect();
+    let mut all: Vec<f64> = speeds.iter().flatten().map(snap_to_end).collect();
     all.sort_by(f64::total_cmp);
     // Measured lines less than half a percent apart are one line.
     all.dedup_by(|b, a| *b <= *a * 1.005);
     let (common, not_compared_rpm): (Vec<f64>, Vec<f64>) = all.into_iter().partition(within);
-    let options =
-        MapFitOptions { further_speeds_rpm: Some(common.clone()), nodes: 4 * NODES, leave_one_out: false };
+    let options = MapFitOptions {
+        further_speeds_rpm: Some(common.clone()),
+        nodes: NODES_PER_PLACE * PLACES,
+        leave_one_out: false,
+    };
     let tables = [fits[0].table(&options)?, fits[1].table(&options)?];
     let line_at = |lines: &[FittedLine], speed: f64| {
         let near = |line: &&FittedLine| (line.speed_corrected_rpm - speed).abs();
@@ -153,9 +160,9 @@ fn compare_lines(first: &FittedLine, second: &FittedLine) -> Vec<PlaceComparison
     let known: Vec<&FittedNode> = first.nodes.iter().filter(|n| !n.extrapolated).collect();
     let flow_scale_kg_s = known.iter().map(|n| n.flow_corrected_kg_s).fold(1e-12, f64::max);
     let ratio_scale = known.iter().map(|n| n.pressure_ratio - 1.0).fold(1e-6, f64::max);
-    let known = ReferenceLine { nodes: &known, flow_scale_kg_s, ratio_scale };
-    let nodes = second.nodes.iter().step_by(4).filter(|node| !node.extrapolated);
-    nodes.filter_map(|node| known.compare_place(node)).collect()
+    let line = ReferenceLine { nodes: &known, flow_scale_kg_s, ratio_scale };
+    let nodes = second.nodes.iter().step_by(NODES_PER_PLACE).filter(|node| !node.extrapolated);
+    nodes.filter_map(|node| line.compare_place(node)).collect()
 }
 
 /// Deviation of a node of the second map from the nearest place of the first line.
@@ -177,7 +184,7 @@ struct ReferenceLine<'a> {
 }
 
 impl ReferenceLine<'_> {
-    /// `None` if the nearest place is the end of the line: only the other map covers the node.
+    /// Deviation from the nearest place; `None` if that is an end of the line, since only the other map covers the node then.
     fn nearest(&self, node: &FittedNode) -> Option<NearestDeviation<'_>> {
         let scaled = |n: &FittedNode| {
             (n.flow_corrected_kg_s / self.flow_scale_kg_s, n.pressure_ratio / self.ratio_scale)
@@ -202,21 +209,21 @@ impl ReferenceLine<'_> {
     }
 
     fn compare_place(&self, node: &FittedNode) -> Option<PlaceComparison> {
-        let found = self.nearest(node)?;
+        let deviation = self.nearest(node)?;
         let across = |n: &FittedNode| {
             (n.flow_standard_error_kg_s / self.flow_scale_kg_s)
                 .hypot(n.pressure_ratio_standard_error / self.ratio_scale)
         };
         let (mut distance, mut eta) = (
-            across(node).hypot(across(found.before)),
-            node.eta_standard_error.hypot(found.before.eta_standard_error),
+            across(node).hypot(across(deviation.before)),
+            node.eta_standard_error.hypot(deviation.before.eta_standard_error),
         );
         // A gain or offset common to all flows or pressure ratios of a map moves the place across the line.
         let flow_kg_s =
-            node.flow_common_standard_error_kg_s.hypot(found.before.flow_common_standard_error_kg_s);
+            node.flow_common_standard_error_kg_s.hypot(deviation.before.flow_common_standard_error_kg_s);
         let pressure_ratio = node
             .pressure_ratio_common_standard_error
-            .hypot(found.before.pressure_ratio_common_standard_error);
+            .hypot(deviation.before.pressure_ratio_common_standard_error);
         for (flow_kg_s, pressure_ratio) in [(flow_kg_s, 0.0), (0.0, pressure_ratio)] {
             let moved = [1.0, -1.0].into_iter().find_map(|sign| {
                 self.nearest(&FittedNode {
@@ -226,19 +233,19 @@ impl ReferenceLine<'_> {
                 })
             });
             if let Some(moved) = moved {
-                distance = distance.hypot(moved.distance_ratio - found.distance_ratio);
-                eta = eta.hypot(moved.eta_difference - found.eta_difference);
+                distance = distance.hypot(moved.distance_ratio - deviation.distance_ratio);
+                eta = eta.hypot(moved.eta_difference - deviation.eta_difference);
             }
         }
         Some(PlaceComparison {
             flow_corrected_kg_s: node.flow_corrected_kg_s,
             pressure_ratio: node.pressure_ratio,
             eta: node.eta,
-            flow_difference_kg_s: found.flow_difference_kg_s,
-            pressure_ratio_difference: found.pressure_ratio_difference,
-            distance_ratio: found.distance_ratio,
+            flow_difference_kg_s: deviation.flow_difference_kg_s,
+            pressure_ratio_difference: deviation.pressure_ratio_difference,
+            distance_ratio: deviation.distance_ratio,
             distance_standard_error_ratio: distance,
-            eta_difference: found.eta_difference,
+            eta_difference: deviation.eta_difference,
             eta_standard_error: eta,
         })
     }

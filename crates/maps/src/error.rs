@@ -14,7 +14,7 @@ pub enum AssembleError {
         step_number(*step),
         with_unit(value, unit)
     )]
-    NoPlace {
+    NotFinite {
         /// Index of the step, from 0.
         step: usize,
         /// Name of the coordinate.

@@ -26,15 +26,15 @@ pub(crate) struct Group<'a> {
 
 /// Groups points with a target by its speed, and all others by gaps in corrected speed. Every point is in exactly one group.
 pub(crate) fn group_by_speed<'a>(points: &'a [IdentifiedPoint], grouping: &Grouping) -> Vec<Group<'a>> {
-    let (mut aimed, mut free): (Vec<_>, Vec<_>) =
+    let (mut with_target, mut without_target): (Vec<_>, Vec<_>) =
         points.iter().partition(|point| target_speed_rpm(point).is_some());
     // Stable sorts: equal points stay in the order of measurement.
-    aimed.sort_by(|a, b| {
+    with_target.sort_by(|a, b| {
         let key = |p: &IdentifiedPoint| target_speed_rpm(p).unwrap_or_default();
         key(a).total_cmp(&key(b))
     });
-    free.sort_by(|a, b| a.speed_corrected_rpm.total_cmp(&b.speed_corrected_rpm));
-    let mut groups = split(aimed, |a, b| {
+    without_target.sort_by(|a, b| a.speed_corrected_rpm.total_cmp(&b.speed_corrected_rpm));
+    let mut groups = split(with_target, |a, b| {
         let (a, b) = (target_speed_rpm(a).unwrap_or_default(), target_speed_rpm(b).unwrap_or_default());
         // Targets are setpoints: they differ by rounding only.
         b - a > 1e-6 * a.abs()
@@ -42,7 +42,7 @@ pub(crate) fn group_by_speed<'a>(points: &'a [IdentifiedPoint], grouping: &Group
     for group in &mut groups {
         group.target_speed_rpm = group.points.first().and_then(|point| target_speed_rpm(point));
     }
-    groups.extend(split(free, |a, b| {
+    groups.extend(split(without_target, |a, b| {
         b.speed_corrected_rpm - a.speed_corrected_rpm > grouping.speed_gap_ratio * a.speed_corrected_rpm.abs()
     }));
     groups
@@ -52,15 +52,15 @@ fn target_speed_rpm(point: &IdentifiedPoint) -> Option<f64> {
     point.target.map(|target| target.speed_rpm).filter(|speed_rpm| speed_rpm.is_finite())
 }
 
-/// Splits a sorted list where `apart(previous, next)`.
+/// Splits a sorted list at each point that starts a new line after the previous one.
 fn split<'a>(
     points: Vec<&'a IdentifiedPoint>,
-    apart: impl Fn(&IdentifiedPoint, &IdentifiedPoint) -> bool,
+    starts_line: impl Fn(&IdentifiedPoint, &IdentifiedPoint) -> bool,
 ) -> Vec<Group<'a>> {
     let mut groups: Vec<Group<'a>> = Vec::new();
     for point in points {
         match groups.last_mut() {
-            Some(group) if !group.points.last().is_some_and(|last| apart(last, point)) => {
+            Some(group) if !group.points.last().is_some_and(|last| starts_line(last, point)) => {
                 group.points.push(point)
             }
             _ => groups.push(Group { target_speed_rpm: None, points: vec![point] }),

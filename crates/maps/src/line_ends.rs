@@ -35,9 +35,9 @@ pub struct LineEnds {
     pub choke: DetectedEnd,
 }
 
-/// Detects the ends of every line, and marks their points. `named` gives the end that a table names for the row of a step.
+/// Detects the ends of every line, and marks their points. `named` returns the end that the table states for a step.
 pub fn mark_line_ends(map: &mut CompressorMap, named: impl Fn(usize) -> Option<LineEnd>) -> Vec<LineEnds> {
-    let mut found = Vec::new();
+    let mut ends = Vec::new();
     for line in &mut map.lines {
         let place =
             |end: LineEnd| line.points.iter().position(|point| named(point.identified.step) == Some(end));
@@ -56,18 +56,18 @@ pub fn mark_line_ends(map: &mut CompressorMap, named: impl Fn(usize) -> Option<L
             Some(DetectedEnd { flow_corrected_kg_s, pressure_ratio, by })
         };
         let Some((surge, choke)) = end(surge_at, surge_by).zip(end(choke_at, choke_by)) else { continue };
-        found.push(LineEnds { speed_corrected_rpm: line.speed_corrected_rpm, surge, choke });
+        ends.push(LineEnds { speed_corrected_rpm: line.speed_corrected_rpm, surge, choke });
         mark(line.points.get_mut(surge_at), surge_by, |evidence| Warning::SurgeEnd { evidence });
         mark(line.points.get_mut(choke_at), choke_by, |evidence| Warning::ChokeEnd { evidence });
     }
-    found
+    ends
 }
 
 fn surge_evidence(line: &SpeedLine) -> EndEvidence {
     let Some(first) = line.points.first() else { return EndEvidence::NotReached };
-    let apart =
+    let is_next =
         |point: &&MapPoint| point.flow_corrected_kg_s > (1.0 + REPEAT_RATIO) * first.flow_corrected_kg_s;
-    match line.points.iter().find(apart) {
+    match line.points.iter().find(is_next) {
         Some(next) if first.pressure_ratio <= next.pressure_ratio => EndEvidence::ZeroSlope,
         _ => EndEvidence::NotReached,
     }
@@ -83,11 +83,12 @@ fn choke_evidence(line: &SpeedLine) -> Option<(usize, EndEvidence)> {
         if at > peak && best >= MAX_CHOKE_ETA && point.eta.is_some_and(|eta| eta < MAX_CHOKE_ETA) {
             return Some((at, EndEvidence::Efficiency));
         }
-        let lost = |other: &MapPoint| (other.pressure_ratio - point.pressure_ratio) / (top - 1.0);
+        let loss_ratio = |other: &MapPoint| (other.pressure_ratio - point.pressure_ratio) / (top - 1.0);
         let above =
-            line.points.get(..at)?.iter().rev().find(|other| lost(other) >= MIN_PRESSURE_LOSS_RATIO)?;
-        let more_flow = point.flow_corrected_kg_s / above.flow_corrected_kg_s - 1.0;
-        (more_flow < MAX_VERTICAL_SLOPE_RATIO * lost(above)).then_some((at, EndEvidence::Vertical))
+            line.points.get(..at)?.iter().rev().find(|other| loss_ratio(other) >= MIN_PRESSURE_LOSS_RATIO)?;
+        let flow_rise_ratio = point.flow_corrected_kg_s / above.flow_corrected_kg_s - 1.0;
+        (flow_rise_ratio < MAX_VERTICAL_SLOPE_RATIO * loss_ratio(above))
+            .then_some((at, EndEvidence::Vertical))
     };
     line.points.iter().enumerate().find_map(evidence)
 }

@@ -32,8 +32,8 @@ pub fn repeated_jumps(markers: &[StepMarker], points: &[IdentifiedPoint]) -> Vec
     jumps
         .into_iter()
         .filter_map(|(from, to)| {
-            let made = markers.iter().filter(|marker| (marker.from, marker.to) == (Some(from), Some(to)));
-            let found: Vec<(&IdentifiedPoint, f64)> = made
+            let steps = markers.iter().filter(|marker| (marker.from, marker.to) == (Some(from), Some(to)));
+            let found: Vec<(&IdentifiedPoint, f64)> = steps
                 .filter_map(|marker| {
                     let point = points.iter().find(|point| point.step == marker.index)?;
                     Some((point, point.eta?))

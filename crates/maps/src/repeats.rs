@@ -8,7 +8,7 @@ use mapper_core::{IdentifiedPoint, StepKind, Verdict};
 /// 95 % interval. The first point of a campaign has no jump before it, so only the joint method gives it an efficiency. If it is visited
 /// again for that reason, the better visit by the same rule counts: a mean would claim too small an interval, since the visits share errors.
 pub fn points_for_map(points: &[IdentifiedPoint]) -> Vec<IdentifiedPoint> {
-    let again = || {
+    let repeats = || {
         points.iter().filter(|point| point.kind != StepKind::Point && point.target.is_some() && usable(point))
     };
     let order = |a: &&IdentifiedPoint, b: &&IdentifiedPoint| {
@@ -18,10 +18,12 @@ pub fn points_for_map(points: &[IdentifiedPoint]) -> Vec<IdentifiedPoint> {
         .iter()
         .filter(|point| point.kind == StepKind::Point)
         .map(|point| {
-            let lost = !usable(point);
-            again()
-                .filter(|other| other.target == point.target && (lost || other.kind == StepKind::Return))
-                .chain((!lost).then_some(point))
+            let is_unusable = !usable(point);
+            repeats()
+                .filter(|other| {
+                    other.target == point.target && (is_unusable || other.kind == StepKind::Return)
+                })
+                .chain((!is_unusable).then_some(point))
                 .min_by(order)
                 .unwrap_or(point)
                 .clone()

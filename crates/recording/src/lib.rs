@@ -33,9 +33,7 @@ pub use mapper_yaml::Findings;
 pub use mapper_yaml::units::{Kind, Unit, UnitError};
 pub use mcap::chunk::ChunkError;
 pub use reading::read_options::ReadOptions;
-pub use reading::recording_reader::{
-    ReadReport, read_marks, read_recording, read_recording_from, read_steps,
-};
+pub use reading::recording_reader::{ReadReport, read_marks, read_recording, read_recording_from};
 pub use warning::{DamagedPart, ReadWarning};
 pub use writing::recording_file::RecordingHeader;
 pub use writing::topics::{StepPhase, Topic, event_message, readings_message, step_message};

@@ -85,7 +85,7 @@ pub enum ReadWarning {
     },
     /// The map and the recording disagree about a unit.
     #[error(
-        "{channel}: the channel map says {mapped}, the recording says {recorded}; the channel map is used"
+        "the channel map gives {channel} in {mapped}, the recording in {recorded}; the channel map is used"
     )]
     UnitContradiction {
         /// Channel.

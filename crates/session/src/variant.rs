@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn both_separators_remarks_and_gaps_are_read() {
+    fn separators_comments_and_empty_cells_are_read() {
         let comma = read("# production of May\nserial_number,deviations.convection\nA,+5 %\nB,\n").unwrap();
         let semicolon = read("serial_number; deviations.convection\nA; +5 %\nB;\n").unwrap();
         assert_eq!(comma, semicolon);
@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_say_their_line() {
+    fn mistakes_are_reported_with_their_line() {
         for (text, expected) in [
             ("name,x\nA,1\n", "no column is called `serial_number`"),
             (
@@ -255,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn settings_come_to_their_place_and_leave_the_others() {
+    fn settings_replace_only_their_own_keys() {
         let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../campaigns/grid18.yaml"));
         let mut campaign = mapper_campaign::load(path).unwrap();
         campaign.backend.settings = json!({"noise": "none", "deviations": {"valve_area": "1 %"}});

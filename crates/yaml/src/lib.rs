@@ -9,6 +9,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod document;
+pub mod keys;
 mod mistakes;
 mod schema_check;
 pub mod units;

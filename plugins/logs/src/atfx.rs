@@ -5,7 +5,7 @@
 
 use crate::columns::table_head::MAX_COLUMNS;
 use crate::notation::instant::{Instant, parse_instant};
-use crate::tables::column_log::{ColumnTable, column_log};
+use crate::tables::column_log::{ColumnTable, check_columns_file, column_log};
 use crate::tables::column_rows::Chunk;
 use mapper_recording::logs::limits::MAX_UNPACKED_BYTES;
 use mapper_recording::logs::{DateOrder, Log, LogError, LogFile, LogFinding, LogFormat, LogOptions};
@@ -65,12 +65,8 @@ struct Contents {
 }
 
 fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
-    let wrong = |why: String| file.content_error(NAME, why);
-    options.allow_only(&["time", "time_unit", "date_order", "rate", "missing"]).map_err(wrong)?;
-    if file.size_bytes()? > MAX_UNPACKED_BYTES {
-        return Err(wrong(format!("it has more than {} MiB; export it in parts", MAX_UNPACKED_BYTES >> 20)));
-    }
-    let contents = contents(file).map_err(wrong)?;
+    check_columns_file(file, NAME, options)?;
+    let contents = contents(file).map_err(|why| file.content_error(NAME, why))?;
     let mut binaries = Binaries { file, contents: &contents, read: HashMap::new(), left: MAX_UNPACKED_BYTES };
     let (mut tables, mut problems): (Vec<(String, ColumnTable)>, Vec<LogFinding>) = (Vec::new(), Vec::new());
     for column in &contents.columns {
@@ -101,12 +97,8 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
         else {
             continue;
         };
-        table.rows = table.rows.max(match &chunk {
-            Chunk::Numbers(values) => values.len(),
-            Chunk::Instants(values) => values.len(),
-            Chunk::Texts(values) => values.len(),
-        });
-        // If several are independent, the names decide.
+        table.rows = table.rows.max(chunk.len());
+        // If several columns are independent, their names decide.
         if column.text("independent") == "1" {
             table.clock = if table.clock.is_none() { Some(name.clone()) } else { Some(String::new()) };
         }
@@ -281,9 +273,9 @@ impl Binaries<'_> {
         };
         let given = written.as_deref().unwrap_or(&parameters);
         let mut values = match (column.text("sequence_representation"), given) {
-            ("implicit_constant" | "1", [constant, ..]) => vec![*constant; self.room(rows)?],
+            ("implicit_constant" | "1", [constant, ..]) => vec![*constant; self.reserve(rows)?],
             ("implicit_linear" | "2", [start, step, ..]) => {
-                (0..self.room(rows)?).map(|row| start + row as f64 * step).collect()
+                (0..self.reserve(rows)?).map(|row| start + row as f64 * step).collect()
             }
             ("explicit" | "external_component" | "0" | "7", _) => written.ok_or("it has no numbers here")?,
             ("raw_linear" | "raw_linear_external" | "4" | "8", _) => match parameters.as_slice() {
@@ -306,7 +298,8 @@ impl Binaries<'_> {
         Ok(Chunk::Numbers(values))
     }
 
-    fn room(&mut self, rows: Option<usize>) -> Result<usize, String> {
+    /// Reserves memory for the values of that many rows.
+    fn reserve(&mut self, rows: Option<usize>) -> Result<usize, String> {
         let rows = rows.ok_or("its number of rows is missing")?;
         let bytes = u64::try_from(rows).unwrap_or(u64::MAX).saturating_mul(VALUE_BYTES);
         self.left = self.left.checked_sub(bytes).ok_or("its rows exceed the memory of a log")?;
@@ -324,7 +317,7 @@ impl Binaries<'_> {
     /// Values in a binary file: blocks with some values at their offsets.
     fn component(&mut self, tags: &HashMap<String, String>) -> Result<Vec<f64>, String> {
         let number = |tag: &str| tags.get(tag).and_then(|text| text.parse::<usize>().ok());
-        let count = self.room(number("length"))?;
+        let count = self.reserve(number("length"))?;
         let datatype = tags.get("datatype").map_or("", String::as_str);
         let (start, per_block) =
             (number("inioffset").unwrap_or(0), number("valperblock").unwrap_or(1).max(1));
@@ -339,7 +332,7 @@ impl Binaries<'_> {
         let value = |index: usize| {
             let offset = offsets.get(index % per_block).or(offsets.first())?;
             let at = start.checked_add((index / per_block).checked_mul(block)?)?.checked_add(*offset)?;
-            decoded(bytes.get(at..)?, datatype)
+            decode(bytes.get(at..)?, datatype)
         };
         let values: Option<Vec<f64>> = (0..count).map(value).collect();
         values.ok_or_else(|| format!("its binary file ends early, or has values of the type `{datatype}`"))
@@ -366,10 +359,10 @@ impl Binaries<'_> {
     }
 }
 
-/// The number at the start of the bytes.
-fn decoded(bytes: &[u8], datatype: &str) -> Option<f64> {
+/// Decodes the number at the start of the bytes.
+fn decode(bytes: &[u8], datatype: &str) -> Option<f64> {
     let (kind, is_big) = datatype.strip_suffix("_beo").map_or((datatype, false), |kind| (kind, true));
-    let ordered = |size: usize| {
+    let integer = |size: usize| {
         let mut number = [0u8; 8];
         let found = bytes.get(..size)?;
         number.get_mut(..size)?.copy_from_slice(found);
@@ -379,15 +372,15 @@ fn decoded(bytes: &[u8], datatype: &str) -> Option<f64> {
         Some(u64::from_le_bytes(number))
     };
     Some(match kind {
-        "dt_boolean" | "dt_byte" => ordered(1)? as u8 as f64,
-        "dt_sbyte" => ordered(1)? as u8 as i8 as f64,
-        "dt_short" => ordered(2)? as u16 as i16 as f64,
-        "dt_ushort" => ordered(2)? as u16 as f64,
-        "dt_long" => ordered(4)? as u32 as i32 as f64,
-        "dt_ulong" => ordered(4)? as u32 as f64,
-        "dt_longlong" => ordered(8)?.cast_signed() as f64,
-        "ieeefloat4" => f64::from(f32::from_bits(ordered(4)? as u32)),
-        "ieeefloat8" => f64::from_bits(ordered(8)?),
+        "dt_boolean" | "dt_byte" => integer(1)? as u8 as f64,
+        "dt_sbyte" => integer(1)? as u8 as i8 as f64,
+        "dt_short" => integer(2)? as u16 as i16 as f64,
+        "dt_ushort" => integer(2)? as u16 as f64,
+        "dt_long" => integer(4)? as u32 as i32 as f64,
+        "dt_ulong" => integer(4)? as u32 as f64,
+        "dt_longlong" => integer(8)?.cast_signed() as f64,
+        "ieeefloat4" => f64::from(f32::from_bits(integer(4)? as u32)),
+        "ieeefloat8" => f64::from_bits(integer(8)?),
         _ => return None,
     })
 }

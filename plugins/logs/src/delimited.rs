@@ -19,7 +19,7 @@ const NAME: &str = "CSV";
 /// Size of the sample of a file, bytes.
 const HEAD_BYTES: usize = 1 << 18;
 
-/// Text of more than one word.
+/// Text without control characters that has a separator or a line end.
 fn recognises(head: &[u8]) -> bool {
     let (encoding, _) = TextEncoding::guess(head);
     let control =
@@ -43,7 +43,7 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
     let head = file.head(HEAD_BYTES)?;
     let (found, mark) = TextEncoding::guess(&head);
     let encoding = options.encoding.unwrap_or(found);
-    let whole = head.len() < HEAD_BYTES;
+    let is_whole_file = head.len() < HEAD_BYTES;
     let rows_by = |separator: u8| -> Result<Vec<Vec<String>>, LogError> {
         let dialect = Dialect { encoding, mark, separator, decimal: b'.' };
         let mut stream = RowStream::over(file, Box::new(Cursor::new(head.clone())), dialect);
@@ -53,7 +53,7 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
             spans.push(stream.spans());
         }
         // The last line of the sample may be truncated.
-        if !whole && rows.len() < HEAD_ROWS && rows.len() > 1 {
+        if !is_whole_file && rows.len() < HEAD_ROWS && rows.len() > 1 {
             rows.pop();
         }
         if separator == b' ' {
@@ -80,7 +80,7 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
             },
         ));
     };
-    let (found_decimal, seen) = decimal(&rows);
+    let (found_decimal, is_seen) = decimal(&rows);
     let decimal = options.decimal.and_then(|sign| u8::try_from(sign).ok()).unwrap_or(found_decimal);
     let mut table = Table::analyse(&rows, decimal, options, Origin::Rows)
         .map_err(|message| file.content_error(NAME, message))?;
@@ -96,7 +96,7 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
     let found = LogFinding::Dialect {
         separator: char::from(separator),
         decimal: char::from(decimal),
-        is_decimal_assumed: !seen && options.decimal.is_none(),
+        is_decimal_assumed: !is_seen && options.decimal.is_none(),
         encoding: encoding.name().to_owned(),
     };
     table.layout.findings.insert(0, found);

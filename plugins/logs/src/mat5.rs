@@ -4,7 +4,7 @@
 //! sparse numbers are left out.
 
 use crate::columns::table_head::MAX_COLUMNS;
-use crate::tables::column_log::{ColumnTable, column_log};
+use crate::tables::column_log::{ColumnTable, check_columns_file, column_log};
 use crate::tables::column_rows::Chunk;
 use mapper_recording::logs::limits::MAX_UNPACKED_BYTES;
 use mapper_recording::logs::{Log, LogError, LogFile, LogFinding, LogFormat, LogOptions};
@@ -28,7 +28,7 @@ const NUMBERS: std::ops::RangeInclusive<u8> = 6..=15;
 /// Flag of a complex array.
 const COMPLEX: u8 = 8;
 
-/// Octave and SciPy write the same first words.
+/// The first words of the header; Octave and SciPy write the same.
 fn recognises(head: &[u8]) -> bool {
     head.starts_with(b"MATLAB 5.0 MAT-file")
 }
@@ -36,11 +36,7 @@ fn recognises(head: &[u8]) -> bool {
 type NamedColumn = (String, Vec<f64>);
 
 fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
-    let wrong = |why: String| file.content_error(NAME, why);
-    options.allow_only(&["time", "time_unit", "date_order", "rate", "missing"]).map_err(wrong)?;
-    if file.size_bytes()? > MAX_UNPACKED_BYTES {
-        return Err(wrong(format!("it has more than {} MiB; export it in parts", MAX_UNPACKED_BYTES >> 20)));
-    }
+    check_columns_file(file, NAME, options)?;
     let bytes = file.head(usize::try_from(MAX_UNPACKED_BYTES).unwrap_or(usize::MAX))?;
     let mut reader =
         Reader { is_big: bytes.get(126) == Some(&b'M'), left: MAX_UNPACKED_BYTES, ..Reader::default() };
@@ -60,7 +56,7 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
             .push(LogFinding::left_out(reader.left_out, "texts, cells, objects, complex or single numbers"));
     }
     let tables = tables.into_iter().map(|mut table| {
-        without_common_prefix(&mut table);
+        remove_common_prefix(&mut table);
         let rows = table.first().map_or(0, |(_, values)| values.len());
         let (names, columns) = table.into_iter().map(|(name, values)| (name, Chunk::Numbers(values))).unzip();
         ColumnTable { title: format!("{rows} values"), head: vec![names], rows, columns, clock: None }
@@ -68,8 +64,8 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
     column_log(file, (NAME, "vectors"), tables.collect(), problems, options)
 }
 
-/// `log.t`, `log.T2` of one structure are `t` and `T2`.
-fn without_common_prefix(table: &mut [NamedColumn]) {
+/// Shortens the names of one structure: `log.t`, `log.T2` become `t`, `T2`.
+fn remove_common_prefix(table: &mut [NamedColumn]) {
     let prefix = |name: &str| name.rfind('.').map(|at| name[..=at].to_owned());
     let Some(first) = table.first().and_then(|(name, _)| prefix(name)) else { return };
     if table.iter().all(|(name, _)| prefix(name).as_deref() == Some(&first)) {
@@ -112,11 +108,11 @@ impl Reader {
         Ok(())
     }
 
-    /// Type and data of an element, and what follows it.
+    /// Type and data of the first element, and the bytes after it.
     fn element<'a>(&self, bytes: &'a [u8]) -> Result<(u32, &'a [u8], &'a [u8]), String> {
         let cut = || "an element is cut short".to_owned();
         let (kind, size) = (self.word(bytes, 0).ok_or_else(cut)?, self.word(bytes, 4).ok_or_else(cut)?);
-        // Up to four bytes of data may stand in the tag itself.
+        // The tag itself may contain up to four bytes of data.
         let (kind, start, size, end): (u32, usize, usize, usize) = match kind >> 16 {
             0 => {
                 let size = size as usize;
@@ -161,7 +157,7 @@ impl Reader {
                         values.len()
                     ));
                 }
-                self.take(&name, values, *rows, *columns)
+                self.add(&name, values, *rows, *columns)
             }
             [rows, columns] if class == STRUCTURE => {
                 let count = rows.saturating_mul(*columns);
@@ -197,7 +193,7 @@ impl Reader {
         Ok(())
     }
 
-    fn take(&mut self, name: &str, values: Vec<f64>, rows: usize, columns: usize) -> Result<(), String> {
+    fn add(&mut self, name: &str, values: Vec<f64>, rows: usize, columns: usize) -> Result<(), String> {
         let count = if rows == 1 || columns == 1 { 1 } else { columns };
         if values.len() / count.max(1) < 2 {
             self.left_out += 1;

@@ -1,10 +1,11 @@
 //! ASAM MDF, version 4: the format of measuring systems on engine test beds.
 
+use crate::mdf_layout::{check_channel_count, column, forward_rows, wanted_channels};
 use crate::mdf_source::MdfSource;
 use falcon_mdf::{Channel, ChannelGroup, Conversion, Mf4File, OpenOptions, Signal};
 use mapper_recording::logs::limits::{MAX_BLOCK_BYTES, max_unpacked_bytes};
 use mapper_recording::logs::{
-    Column, Group, Kind, Layout, Log, LogError, LogFile, LogFinding, LogFormat, LogOptions, Row, RowSink,
+    Group, Kind, Layout, Log, LogError, LogFile, LogFinding, LogFormat, LogOptions, RowSink,
 };
 use std::collections::BTreeSet;
 
@@ -14,8 +15,6 @@ const NAME: &str = "MDF4";
 
 /// Rows decoded at once.
 const CHUNK: usize = 4096;
-
-const MAX_CHANNELS: usize = 10_000;
 
 /// Size of a decoded value, bytes.
 const VALUE_BYTES: u64 = 8;
@@ -39,12 +38,7 @@ fn open(path: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
     options.allow_only(&["time", "time_unit", "missing"]).map_err(|why| path.content_error(NAME, why))?;
     let limits = OpenOptions { max_decompressed: MAX_BLOCK_BYTES + 1, ..OpenOptions::default() };
     let file = Mf4File::from_source_with_options(MdfSource::open(path, NAME)?, limits).map_err(failed)?;
-    if file.channel_count() > MAX_CHANNELS {
-        return Err(path.content_error(
-            NAME,
-            format!("it has {} channels; at most {MAX_CHANNELS} are read", file.channel_count()),
-        ));
-    }
+    check_channel_count(path, NAME, file.channel_count())?;
     let mut log = Mdf4 {
         path: path.clone(),
         layout: Layout::default(),
@@ -96,20 +90,16 @@ fn open(path: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
         }
         let number = log.layout.groups.len();
         log.layout.groups.push(Group { name: name_of(group, index), clock: describe_clock(clock) });
-        let mut names: BTreeSet<String> = BTreeSet::new();
-        for channel in &columns {
-            log.layout.columns.push(Column {
-                name: distinct(&mut names, &channel.name),
-                header: channel.name.clone(),
-                unit: Some(channel.unit.trim().to_owned()).filter(|unit| !unit.is_empty()),
-                description: channel.comment.chars().take(200).collect(),
-                group: number,
-            });
-        }
+        let mut names = BTreeSet::new();
+        log.layout.columns.extend(
+            columns.iter().map(|channel| {
+                column(&mut names, [&*channel.name, &*channel.unit, &*channel.comment], number)
+            }),
+        );
         log.masters.push((clock.clone(), options.time_unit_s.or(unit_s(clock)).unwrap_or(1.0)));
         log.channels.extend(columns);
     }
-    distinct_names(&mut log.layout);
+    number_group_names(&mut log.layout);
     let findings = &mut log.layout.findings;
     findings.push(LogFinding::Clocks { groups: log.masters.len() });
     if has_frames {
@@ -153,19 +143,8 @@ fn describe_clock(clock: &Channel) -> String {
     if unit.is_empty() { format!("`{}`", clock.name) } else { format!("`{}`, counts {unit}", clock.name) }
 }
 
-/// The name of a channel, numbered if the group already has it.
-fn distinct(names: &mut BTreeSet<String>, name: &str) -> String {
-    let mut distinct = name.to_owned();
-    let mut number = 1usize;
-    while !names.insert(distinct.clone()) {
-        number += 1;
-        distinct = format!("{name} ({number})");
-    }
-    distinct
-}
-
 /// Makes the names of groups distinct; a single group has none.
-fn distinct_names(layout: &mut Layout) {
+fn number_group_names(layout: &mut Layout) {
     if let [only] = layout.groups.as_mut_slice() {
         only.name = String::new();
     }
@@ -187,15 +166,11 @@ impl Log for Mdf4 {
     fn rows(&mut self, wanted: &[usize], sink: &mut RowSink<'_>) -> Result<(), LogError> {
         let failed = |error: falcon_mdf::error::Mf4Error| self.path.content_error(NAME, error.to_string());
         for (group, (master, unit_s)) in self.masters.iter().enumerate() {
-            let mut channels: Vec<&Channel> = vec![master];
-            let of_group = |column: &&usize| {
-                self.layout.columns.get(**column).is_some_and(|column| column.group == group)
-            };
-            channels.extend(wanted.iter().filter(of_group).filter_map(|column| self.channels.get(*column)));
-            if channels.len() == 1 {
+            let mut channels = wanted_channels(&self.layout, wanted, &self.channels, group);
+            if channels.is_empty() {
                 continue;
             }
-            let mut values: Vec<f64> = Vec::new();
+            channels.insert(0, master);
             for chunk in self.file.signals_chunks(&channels, CHUNK).map_err(failed)? {
                 let columns: Vec<Vec<f64>> = chunk
                     .map_err(failed)?
@@ -203,15 +178,9 @@ impl Log for Mdf4 {
                     .map(valid_values)
                     .collect::<Result<_, _>>()
                     .map_err(failed)?;
-                let Some((times_s, columns)) = columns.split_first() else { continue };
-                for (row, t_s) in times_s.iter().enumerate() {
-                    values.clear();
-                    values.extend(columns.iter().map(|column| {
-                        let value = column.get(row).copied().unwrap_or(f64::NAN);
-                        if self.missing.contains(&value) { f64::NAN } else { value }
-                    }));
-                    sink(Row { group, t_s: t_s * unit_s, values: &values })?;
-                }
+                let Some((counts, columns)) = columns.split_first() else { continue };
+                let times_s = counts.iter().map(|count| count * unit_s);
+                forward_rows(group, times_s, columns, &self.missing, sink)?;
             }
         }
         Ok(())

@@ -27,16 +27,19 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
 }
 
 fn batches(file: &LogFile) -> Result<(Schema, Batches), LogError> {
-    let most = max_unpacked_bytes(file.size_bytes()?);
+    let limit_bytes = max_unpacked_bytes(file.size_bytes()?);
     let failed = |error: ParquetError| file.content_error(NAME, error.to_string());
     macro_rules! reader_of {
         ($source:expr) => {{
             let builder = ParquetRecordBatchReaderBuilder::try_new($source).map_err(failed)?;
             let rows = u64::try_from(builder.metadata().file_metadata().num_rows()).unwrap_or(u64::MAX);
-            if rows.saturating_mul(VALUE_BYTES) > most {
+            if rows.saturating_mul(VALUE_BYTES) > limit_bytes {
                 return Err(file.content_error(
                     NAME,
-                    format!("it states {rows} rows; a file of this size may have {}", most / VALUE_BYTES),
+                    format!(
+                        "it states {rows} rows; a file of this size may have {}",
+                        limit_bytes / VALUE_BYTES
+                    ),
                 ));
             }
             let schema = builder.schema().as_ref().clone();

@@ -3,6 +3,7 @@
 use crate::columns::sample::HEAD_ROWS;
 use crate::columns::table_head::MAX_COLUMNS;
 use crate::notation::instant::Instant;
+use crate::tables::column_log::COLUMN_OPTIONS;
 use crate::tables::column_rows::{Chunk, Chunks, ColumnRows};
 use crate::tables::joined_tables::{Part, join_tables};
 use crate::tables::table_log::{Origin, Table};
@@ -96,13 +97,11 @@ struct Tdms {
 }
 
 fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
-    options
-        .allow_only(&["time", "time_unit", "date_order", "rate", "missing"])
-        .map_err(|why| file.content_error(NAME, why))?;
+    options.allow_only(&COLUMN_OPTIONS).map_err(|why| file.content_error(NAME, why))?;
     let mut bytes = file.open()?;
     let size = bytes.seek(SeekFrom::End(0)).map_err(|error| file.read_error(error))?;
     let mut source = TdmsFile::new(bytes).map_err(|error| failed(file, &error))?;
-    let names: Vec<String> = source.list_groups().map(plain).collect();
+    let names: Vec<String> = source.list_groups().map(unquoted).collect();
     let (mut found, mut problems, mut channels) = (Vec::new(), Vec::new(), Vec::new());
     let (mut empty, mut seen) = (0usize, 0usize);
     for name in &names {
@@ -144,13 +143,13 @@ fn failed(file: &LogFile, error: &TdmsError) -> LogError {
     file.content_error(NAME, error.to_string())
 }
 
-/// A name without the file's doubled quotes.
-fn plain(name: &str) -> String {
+/// A name without its quotes.
+fn unquoted(name: &str) -> String {
     name.trim_matches('\'').replace("''", "'")
 }
 
-/// The channel if it holds numbers, or an error if it holds an unsupported type. The library assumes half the true length of a
-/// date, and would read the following channels at wrong positions.
+/// Reads the properties of a channel; `None` if it is empty. An unsupported type is an error: the library assumes half the true length
+/// of a date, and would read the following channels at wrong positions.
 fn channel(source: &mut Source, path: ChannelPath, file_bytes: u64) -> Result<Option<Channel>, String> {
     let Some(length) = source.channel_length(&path).filter(|length| *length > 0) else { return Ok(None) };
     let Some((value_bytes, read)) = READERS.into_iter().find(|(_, read)| read(source, &path, 0, 1).is_ok())

@@ -5,15 +5,14 @@ mod check;
 use crate::columns::sample::HEAD_ROWS;
 use crate::columns::table_head::MAX_COLUMNS;
 use crate::notation::instant::{Instant, NS_PER_DAY};
-use crate::notation::number::number_in;
 use crate::notation::separator::decimal;
-use crate::notation::table_row::{Cells, Rows};
+use crate::notation::table_row::{Cell, Cells, Rows};
 use crate::notation::typed_cell::Value;
 use crate::tables::joined_tables::{Part, join_tables};
 use crate::tables::table_log::{Origin, Table};
 use calamine::{DataRef, DataType, Reader, SheetVisible, Xlsx};
 use mapper_recording::logs::{
-    DateOrder, Layout, Log, LogError, LogFile, LogFinding, LogFormat, LogOptions, ReadSeek, Row, RowSink,
+    Layout, Log, LogError, LogFile, LogFinding, LogFormat, LogOptions, ReadSeek, Row, RowSink,
 };
 
 pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
@@ -65,7 +64,7 @@ impl Book {
                 mapper_workbook::read_xls(file.open()?).map_err(|why| file.content_error(NAME, why))?;
             return Ok(Book::Xls(sheets));
         }
-        check::check(file)?;
+        check::check_size(file)?;
         let book = Xlsx::new(file.open()?);
         book.map(|book| Book::Xlsx(Box::new(book)))
             .map_err(|error| file.content_error(NAME, error.to_string()))
@@ -109,7 +108,7 @@ impl Book {
                         let value = match cell {
                             mapper_workbook::Cell::Number(value) => Value::Number(*value),
                             mapper_workbook::Cell::Days(days) => instant(*days),
-                            mapper_workbook::Cell::Text(text) => Value::Text(start(text)),
+                            mapper_workbook::Cell::Text(text) => Value::Text(truncated(text)),
                         };
                         (u32::from(*row), usize::from(*column), value)
                     }))
@@ -239,15 +238,15 @@ fn value_of(data: &DataRef<'_>) -> Value {
     match data {
         DataRef::DateTime(date) => instant(date.as_f64()),
         DataRef::String(text) | DataRef::DateTimeIso(text) | DataRef::DurationIso(text) => {
-            Value::Text(start(text))
+            Value::Text(truncated(text))
         }
-        DataRef::SharedString(text) => Value::Text(start(text)),
+        DataRef::SharedString(text) => Value::Text(truncated(text)),
         data => data.as_f64().filter(|value| value.is_finite()).map_or(Value::Empty, Value::Number),
     }
 }
 
-/// The stored start of a text.
-fn start(text: &str) -> String {
+/// The start of a text, which is stored.
+fn truncated(text: &str) -> String {
     let text = text.trim();
     text.get(..text.floor_char_boundary(MAX_TEXT_BYTES)).unwrap_or_default().to_owned()
 }
@@ -290,21 +289,17 @@ impl<'a> SheetRows<'a> {
 }
 
 impl Cells for SheetRows<'_> {
-    fn number(&self, column: usize) -> f64 {
-        self.row.get(column).map_or(f64::NAN, |value| value.number(self.decimal))
-    }
-
-    fn number_in(&self, column: usize, unit: &str) -> f64 {
+    fn cell(&self, column: usize) -> Cell<'_> {
         match self.row.get(column) {
-            Some(Value::Text(text)) => number_in(text, self.decimal, unit),
-            // Some cells of such a column may have the number without the unit.
-            Some(value) => value.number(self.decimal),
-            None => f64::NAN,
+            Some(Value::Number(value)) => Cell::Number(*value),
+            Some(Value::Text(text)) => Cell::Text(text.as_bytes()),
+            Some(Value::Instant(instant)) => Cell::Instant(*instant),
+            Some(Value::Empty) | None => Cell::Empty,
         }
     }
 
-    fn instant(&self, column: usize, order: DateOrder) -> Option<Instant> {
-        self.row.get(column)?.instant(order)
+    fn decimal(&self) -> u8 {
+        self.decimal
     }
 }
 

@@ -1,6 +1,6 @@
 //! Every output of a run uses the same step numbers, from 1.
 
-use mapper_recording::{ReadOptions, read_steps};
+use mapper_recording::{ReadOptions, read_marks};
 use mapper_tests::{CampaignFile, SHORT_GRID, SINGLE_STEP_METHOD, mapper, only_run};
 use serde_json::Value;
 use std::path::Path;
@@ -76,7 +76,7 @@ fn all_files_of_a_run_use_the_same_step_numbers() {
         assert!(page.contains(&format!("data-step=\"{number}\"")), "{number}");
     }
     assert!(!page.contains("data-step=\"0\""));
-    let steps = read_steps(&run.join("recording.mcap"), &ReadOptions::default()).unwrap();
+    let (steps, _) = read_marks(&run.join("recording.mcap"), &ReadOptions::default()).unwrap();
     let recorded: Vec<u64> =
         steps.iter().filter_map(|step| step.number()).map(|number| number as u64).collect();
     assert_eq!(recorded, all);

@@ -62,20 +62,20 @@ pub fn correct_for_heat(
     if matches!(map.method, Method::Dynamic | Method::Joint | Method::Corrected) {
         return Err(HeatCorrectionError::Adiabatic { method: map.method });
     }
-    let used = work_points(&map);
-    let found = match given_w {
+    let points = work_points(&map);
+    let estimate = match given_w {
         Some(heat_w) if !(heat_w.is_finite() && heat_w >= 0.0) => {
             return Err(HeatCorrectionError::Heat { heat_w });
         }
         Some(_) => None,
-        None => Some(estimate_heat(&used)?),
+        None => Some(estimate_heat(&points)?),
     };
     // A negative estimate means that slow lines take less work than fast ones: there is no heat to subtract.
-    let heat_w = given_w.or(found.map(|found| found.heat_w.max(0.0))).unwrap_or(0.0);
-    let scatter_w = found.map_or(0.0, |found| found.standard_error_w);
+    let heat_w = given_w.or(estimate.map(|estimate| estimate.heat_w.max(0.0))).unwrap_or(0.0);
+    let scatter_w = estimate.map_or(0.0, |estimate| estimate.standard_error_w);
     let heat_error_w = scatter_w.hypot(HEAT_STANDARD_ERROR_RATIO * heat_w);
     let (reference, air) = (map.reference, air_of(&map));
-    let shared = map
+    let shared_errors = map
         .lines
         .iter()
         .flat_map(|line| &line.points)
@@ -87,15 +87,15 @@ pub fn correct_for_heat(
         let (mut before, mut after, mut points, mut lost) = (0.0, 0.0, 0, 0);
         for point in &mut line.points {
             let flow_kg_s = point.flow_corrected_kg_s;
-            let compresses = point.pressure_ratio > 1.0 && flow_kg_s > 0.0;
-            let Some(apparent) = point.eta.filter(|eta| *eta > 0.0 && compresses) else { continue };
+            let is_compressing = point.pressure_ratio > 1.0 && flow_kg_s > 0.0;
+            let Some(apparent) = point.eta.filter(|eta| *eta > 0.0 && is_compressing) else { continue };
             points += 1;
             let work_j_kg = isentropic_work_j_kg(reference, point.pressure_ratio, air);
             match efficiency_without_heat(apparent, work_j_kg, heat_w / flow_kg_s) {
                 Some(eta) => {
                     // Derivative of eta by heat, times the heat's error.
                     let change = eta * eta / work_j_kg * heat_error_w / flow_kg_s;
-                    set_efficiency(point, apparent, eta, change, shared);
+                    set_efficiency(point, apparent, eta, change, shared_errors);
                     before += apparent;
                     after += eta;
                 }
@@ -119,10 +119,10 @@ pub fn correct_for_heat(
     map.fitted = None;
     let correction = HeatCorrection {
         heat_w,
-        heat_shown_w: found.map(|found| found.heat_w),
-        heat_standard_error_w: found.map(|found| found.standard_error_w),
-        scatter_ratio: found.map(|found| found.scatter_ratio),
-        points_used: used.len(),
+        heat_shown_w: estimate.map(|estimate| estimate.heat_w),
+        heat_standard_error_w: estimate.map(|estimate| estimate.standard_error_w),
+        scatter_ratio: estimate.map(|estimate| estimate.scatter_ratio),
+        points_used: points.len(),
         lines,
     };
     Ok((map, correction))
@@ -135,9 +135,9 @@ fn efficiency_without_heat(apparent: f64, isentropic_work_j_kg: f64, heat_j_kg: 
     (work_j_kg > 0.0 && eta <= MAX_EFFICIENCY.max(apparent)).then_some(eta)
 }
 
-fn set_efficiency(point: &mut MapPoint, apparent: f64, eta: f64, heat_change: f64, shared: usize) {
+fn set_efficiency(point: &mut MapPoint, apparent: f64, eta: f64, heat_change: f64, shared_errors: usize) {
     let identified = &mut point.identified;
-    let own =
+    let before =
         identified.eta_low.zip(identified.eta_high).map_or(0.0, |(low, high)| standard_error_of(low, high));
     let uncertainty = identified.eta_uncertainty.unwrap_or_default();
     let added = heat_change.hypot(MODEL_STANDARD_ERROR);
@@ -145,9 +145,9 @@ fn set_efficiency(point: &mut MapPoint, apparent: f64, eta: f64, heat_change: f6
         bias_standard_error: uncertainty.bias_standard_error.hypot(added),
         ..uncertainty
     });
-    let (low, high) = confidence_interval_95(eta, own.hypot(added));
-    // Entry k of every point is error k of the map: the errors shared from here on follow all others.
-    identified.common.eta_changes.resize(shared, 0.0);
+    let (low, high) = confidence_interval_95(eta, before.hypot(added));
+    // Entry k of every point belongs to error k of the map, so the new errors follow the entries of all points.
+    identified.common.eta_changes.resize(shared_errors, 0.0);
     identified.common.eta_changes.extend([heat_change, MODEL_STANDARD_ERROR]);
     (identified.eta_low, identified.eta_high) = (Some(low), Some(high));
     identified.eta = Some(eta);

@@ -26,7 +26,7 @@ pub struct HeatEstimate {
     pub scatter_ratio: f64,
 }
 
-/// Estimates the heat.
+/// Estimates the heat of a map from its work coefficients.
 pub fn estimate_heat(points: &[WorkPoint]) -> Result<HeatEstimate, HeatCorrectionError> {
     let mut lines: Vec<usize> = points.iter().map(|point| point.line).collect();
     lines.dedup();
@@ -54,7 +54,7 @@ pub fn estimate_heat(points: &[WorkPoint]) -> Result<HeatEstimate, HeatCorrectio
     Ok(HeatEstimate { heat_w, standard_error_w: ((count - 1.0) / count * spread).sqrt(), scatter_ratio })
 }
 
-/// Heat, W, and scatter, ratio.
+/// Fits the heat, W, and the scatter about the curve, ratio.
 fn fit_heat(points: &[WorkPoint]) -> Option<(f64, f64)> {
     // Relative residuals: every row over its own work coefficient.
     let mut rows = DMatrix::from_fn(points.len(), 4, |row, column| {
@@ -76,7 +76,7 @@ fn fit_heat(points: &[WorkPoint]) -> Option<(f64, f64)> {
         rows.column_mut(column).scale_mut(1.0 / size);
     }
     let mut weights = vec![1.0; points.len()];
-    let mut found = None;
+    let mut estimate = None;
     for _ in 0..ROUNDS {
         let root = |row: usize| f64::sqrt(weights[row]);
         let weighted = DMatrix::from_fn(points.len(), 4, |row, column| root(row) * rows[(row, column)]);
@@ -87,14 +87,14 @@ fn fit_heat(points: &[WorkPoint]) -> Option<(f64, f64)> {
         }
         let solution = svd.solve(&right, 0.0).ok()?;
         let residuals = &rows * &solution - DVector::from_element(points.len(), 1.0);
-        let mut sizes_of: Vec<f64> = residuals.iter().map(|residual| residual.abs()).collect();
-        sizes_of.sort_by(f64::total_cmp);
-        // The median of a normal variable's size is 0.6745 standard deviations.
-        let scatter = (sizes_of.get(sizes_of.len() / 2)? / 0.6745).max(1e-9);
+        let mut sorted: Vec<f64> = residuals.iter().map(|residual| residual.abs()).collect();
+        sorted.sort_by(f64::total_cmp);
+        // The median of a normal variable's absolute value is 0.6745 standard deviations.
+        let scatter = (sorted.get(sorted.len() / 2)? / 0.6745).max(1e-9);
         for (weight, residual) in weights.iter_mut().zip(residuals.iter()) {
             *weight = (HUBER_THRESHOLD * scatter / residual.abs().max(1e-300)).min(1.0);
         }
-        found = Some((solution[3] / sizes[3], scatter));
+        estimate = Some((solution[3] / sizes[3], scatter));
     }
-    found.filter(|(heat_w, _)| heat_w.is_finite())
+    estimate.filter(|(heat_w, _)| heat_w.is_finite())
 }

@@ -11,8 +11,8 @@ const UNIT_SPEED_RPM: f64 = 100_000.0;
 const REACTION: f64 = 0.6;
 /// Density over temperature along the wheel: 1/(n - 1) of a polytrope with n = 1.5.
 const DENSITY_EXPONENT: f64 = 2.0;
-/// Minimum efficiency of a point on the choke side, over the best of its line: beyond, inlet choking determines the work.
-const MIN_FLOW_OF_BEST_RATIO: f64 = 0.85;
+/// Minimum efficiency of a point on the choke side, over the best of its line: below, inlet choking determines the work.
+const MIN_EFFICIENCY_OF_BEST_RATIO: f64 = 0.85;
 
 /// Work and flow coefficients of a point at the map's reference state.
 #[derive(Debug, Clone, Copy)]
@@ -65,7 +65,7 @@ pub fn work_points(map: &CompressorMap) -> Vec<WorkPoint> {
         let Some((best, best_eta)) = best else { continue };
         for (point, eta) in usable() {
             let flow_kg_s = point.flow_corrected_kg_s;
-            if flow_kg_s > best.flow_corrected_kg_s && eta < MIN_FLOW_OF_BEST_RATIO * best_eta {
+            if flow_kg_s > best.flow_corrected_kg_s && eta < MIN_EFFICIENCY_OF_BEST_RATIO * best_eta {
                 continue;
             }
             let speed_ratio = line.speed_corrected_rpm / UNIT_SPEED_RPM;

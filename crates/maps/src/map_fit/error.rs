@@ -20,18 +20,16 @@ pub enum MapFitError {
         with_eta: usize,
     },
     /// Too many points or lines.
-    #[error(
-        "the map has {points} points on {lines} lines; a fit takes at most {most_points} on {most_lines}"
-    )]
+    #[error("the map has {points} points on {lines} lines; a fit takes at most {max_points} on {max_lines}")]
     TooMany {
         /// Points.
         points: usize,
         /// Lines.
         lines: usize,
         /// Limit of points.
-        most_points: usize,
+        max_points: usize,
         /// Limit of lines.
-        most_lines: usize,
+        max_lines: usize,
     },
     /// No point lies above pressure ratio 1.
     #[error(

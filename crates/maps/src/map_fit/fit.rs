@@ -24,14 +24,14 @@ impl MapFit {
         Ok(MapFit::of(Observations::of(map)?, None)?.widened(&[End::Slow, End::Fast]))
     }
 
-    /// As [`MapFit::new`], without widened errors beyond the measured speeds. `near`: a fit of nearly the same points, from which the search
+    /// As [`MapFit::new`], without widened errors beyond the measured speeds. `start`: a fit of nearly the same points, from which the search
     /// starts.
-    pub(crate) fn of(data: Observations, near: Option<&Solution>) -> Result<Self, MapFitError> {
+    pub(crate) fn of(data: Observations, start: Option<&Solution>) -> Result<Self, MapFitError> {
         let mut best: Option<(usize, MapFit)> = None;
         for stiffness in STIFFNESSES {
-            let fit = MapFit { solution: solve(&data, stiffness, near)?, data: data.clone() };
+            let fit = MapFit { solution: solve(&data, stiffness, start)?, data: data.clone() };
             let crossings = count_crossings(&fit.lines_for_check());
-            if best.as_ref().is_none_or(|(least, _)| crossings < *least) {
+            if best.as_ref().is_none_or(|(min, _)| crossings < *min) {
                 best = Some((crossings, fit));
             }
             if crossings == 0 {
@@ -41,7 +41,7 @@ impl MapFit {
         best.map(|(_, fit)| fit).ok_or(MapFitError::Singular)
     }
 
-    /// Measured and a few extrapolated lines with few nodes, for the check for crossings.
+    /// Measured and a few extrapolated lines with few nodes, to count crossings.
     fn lines_for_check(&self) -> Vec<FittedLine> {
         let options = MapFitOptions { further_speeds_rpm: None, nodes: 41, leave_one_out: false };
         table(self, &options).map(|table| table.lines).unwrap_or_default()

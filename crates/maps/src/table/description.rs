@@ -5,6 +5,7 @@ use mapper_core::{
     DescribedColumn, ImportRemark, ImportedColumn, ImportedMap, ImportedTurbine, MapDescription,
     ReferenceState,
 };
+use mapper_yaml::keys::{self, Key, KeyError, store};
 use mapper_yaml::units::{Kind, parse};
 use mapper_yaml::{Document, FindingKind, Findings, Schema, Source, steps};
 use serde_json::{Map, Value, json};
@@ -19,154 +20,113 @@ const MAX_BYTES: usize = 1 << 16;
 static DOCUMENT: Document = Document { name: "map description", example: "docs/reference/files.md" };
 static SCHEMA: LazyLock<Schema> = LazyLock::new(|| Schema::new(schema()));
 
-/// One key of a map description.
-#[derive(Debug, Clone, Copy)]
-pub struct DescriptionKey {
-    /// Name in the file, and in the options of the commands.
-    pub name: &'static str,
-    /// Description in one line.
-    pub description: &'static str,
-    /// Example of a value.
-    pub example: &'static str,
-    set: Set,
+/// A column, which takes its heading, number or unit.
+macro_rules! column {
+    ($name:literal, $example:literal) => {
+        Key {
+            name: $name,
+            description: "Column by its heading (`X [lb/min]`) or number (`#2 [kg/s]`), or the unit alone.",
+            example: $example,
+            set: |given, text| set_column(given, $name, text),
+        }
+    };
 }
 
-#[derive(Debug, Clone, Copy)]
-enum Set {
-    Column,
-    Value(fn(&mut MapDescription, &str) -> Option<()>),
-}
-
-const fn column(name: &'static str, example: &'static str) -> DescriptionKey {
-    DescriptionKey {
-        name,
-        description: "Column by its heading (`X [lb/min]`) or number (`#2 [kg/s]`), or the unit alone.",
-        example,
-        set: Set::Column,
-    }
-}
-
-/// Every key.
-pub const DESCRIPTION_KEYS: [DescriptionKey; 30] = [
-    DescriptionKey {
+const KEYS: [Key<MapDescription>; 30] = [
+    Key {
         name: "reference",
         description: "Reference state of the corrected quantities: SAE, Garrett, BorgWarner, or temperature and pressure.",
         example: "298 K, 100 kPa",
-        set: Set::Value(|given, text| set(&mut given.reference, parse_reference(text).ok())),
+        set: |given, text| store(&mut given.reference, parse_reference(text).ok()),
     },
-    DescriptionKey {
+    Key {
         name: "sheet",
         description: "Sheet of a workbook; the first visible one with numbers if none is named.",
         example: "Map",
-        set: Set::Value(|given, text| set(&mut given.sheet, Some(text.to_owned()))),
+        set: |given, text| store(&mut given.sheet, Some(text.to_owned())),
     },
-    DescriptionKey {
+    Key {
         name: "design_speed",
         description: "Corrected speed of the design point, for files with relative speeds.",
         example: "150000 rpm",
-        set: Set::Value(|given, text| {
-            set(&mut given.design.speed_corrected_rpm, positive(Kind::Speed, text))
-        }),
+        set: |given, text| store(&mut given.design.speed_corrected_rpm, positive(Kind::Speed, text)),
     },
-    DescriptionKey {
+    Key {
         name: "design_flow",
         description: "Corrected flow of the design point; the flows of the file are scaled to it.",
         example: "0.2 kg/s",
-        set: Set::Value(|given, text| {
-            set(&mut given.design.flow_corrected_kg_s, positive(Kind::MassFlow, text))
-        }),
+        set: |given, text| store(&mut given.design.flow_corrected_kg_s, positive(Kind::MassFlow, text)),
     },
-    DescriptionKey {
+    Key {
         name: "design_pressure_ratio",
         description: "Pressure ratio of the design point.",
         example: "2.4",
-        set: Set::Value(|given, text| {
+        set: |given, text| {
             let ratio = text.parse().ok().filter(|ratio: &f64| *ratio > 1.0 && ratio.is_finite());
-            set(&mut given.design.pressure_ratio, ratio)
-        }),
+            store(&mut given.design.pressure_ratio, ratio)
+        },
     },
-    DescriptionKey {
+    Key {
         name: "design_efficiency",
         description: "Efficiency of the design point.",
         example: "74 %",
-        set: Set::Value(|given, text| {
+        set: |given, text| {
             let eta = positive(Kind::Fraction, text).or_else(|| text.parse().ok());
-            set(&mut given.design.eta, eta.filter(|eta| *eta > 0.0 && *eta <= 1.0))
-        }),
+            store(&mut given.design.eta, eta.filter(|eta| *eta > 0.0 && *eta <= 1.0))
+        },
     },
-    DescriptionKey {
+    Key {
         name: "inlet_pipe",
         description: "Inner diameter of the pipe at P1, if P1 is a static pressure.",
         example: "45 mm",
-        set: Set::Value(|given, text| {
-            set(&mut given.static_taps.inlet_diameter_m, positive(Kind::Length, text))
-        }),
+        set: |given, text| store(&mut given.static_taps.inlet_diameter_m, positive(Kind::Length, text)),
     },
-    DescriptionKey {
+    Key {
         name: "outlet_pipe",
         description: "Inner diameter of the pipe at P2, if P2 is a static pressure.",
         example: "38 mm",
-        set: Set::Value(|given, text| {
-            set(&mut given.static_taps.outlet_diameter_m, positive(Kind::Length, text))
-        }),
+        set: |given, text| store(&mut given.static_taps.outlet_diameter_m, positive(Kind::Length, text)),
     },
-    DescriptionKey {
+    Key {
         name: "barometer",
         description: "Ambient pressure, if P1 or P2 are gauge pressures and no column has it.",
         example: "98.6 kPa",
-        set: Set::Value(|given, text| set(&mut given.ambient_pa, positive(Kind::Pressure, text))),
+        set: |given, text| store(&mut given.ambient_pa, positive(Kind::Pressure, text)),
     },
-    column("speed", "N [krpm]"),
-    column("reduced_speed", "N/sqrt(T) [rpm/K^0.5]"),
-    column("flow", "lb/min"),
-    column("volume_flow", "V [m3/h]"),
-    column("reduced_flow", "kg/s*K^0.5/kPa"),
-    column("pressure_ratio", "Y"),
-    column("efficiency", "#4 [%]"),
-    column("vane", "VGT [%]"),
-    column("p1", "P1 [kPa]"),
-    column("p2", "P2 [kPa]"),
-    column("t1", "T1 [degC]"),
-    column("t2", "T2 [degC]"),
-    column("tc", "Tc [degC]"),
-    column("humidity", "RH [%]"),
-    column("ambient_pressure", "p_amb [mbar]"),
-    column("p3", "P3 [kPa]"),
-    column("p4", "P4 [kPa]"),
-    column("t3", "T3 [degC]"),
-    column("t4", "T4 [degC]"),
-    column("turbine_flow", "m_t [kg/s]"),
-    column("oil_temperature", "T_oil [degC]"),
+    column!("speed", "N [krpm]"),
+    column!("reduced_speed", "N/sqrt(T) [rpm/K^0.5]"),
+    column!("flow", "lb/min"),
+    column!("volume_flow", "V [m3/h]"),
+    column!("reduced_flow", "kg/s*K^0.5/kPa"),
+    column!("pressure_ratio", "Y"),
+    column!("efficiency", "#4 [%]"),
+    column!("vane", "VGT [%]"),
+    column!("p1", "P1 [kPa]"),
+    column!("p2", "P2 [kPa]"),
+    column!("t1", "T1 [degC]"),
+    column!("t2", "T2 [degC]"),
+    column!("tc", "Tc [degC]"),
+    column!("humidity", "RH [%]"),
+    column!("ambient_pressure", "p_amb [mbar]"),
+    column!("p3", "P3 [kPa]"),
+    column!("p4", "P4 [kPa]"),
+    column!("t3", "T3 [degC]"),
+    column!("t4", "T4 [degC]"),
+    column!("turbine_flow", "m_t [kg/s]"),
+    column!("oil_temperature", "T_oil [degC]"),
 ];
-
-fn set<T>(place: &mut Option<T>, value: Option<T>) -> Option<()> {
-    *place = Some(value?);
-    Some(())
-}
 
 fn positive(kind: Kind, text: &str) -> Option<f64> {
     parse(kind, text).ok().filter(|value| *value > 0.0)
 }
 
-/// An unknown key, or an invalid value.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum KeyError {
-    /// No such key.
-    #[error("there is no key `{key}`; the keys are {}", DESCRIPTION_KEYS.map(|key| key.name).join(", "))]
-    Key {
-        /// The unknown key.
-        key: String,
-    },
-    /// Not a value of the key.
-    #[error("`{value}` is not a value of `{key}`; write e.g. `{example}`")]
-    Value {
-        /// The key.
-        key: &'static str,
-        /// The invalid value.
-        value: String,
-        /// A valid one.
-        example: &'static str,
-    },
+fn set_column(description: &mut MapDescription, quantity: &'static str, text: &str) -> Option<()> {
+    if text.is_empty() {
+        return None;
+    }
+    description.columns.retain(|column| column.quantity != quantity);
+    description.columns.push(DescribedColumn { quantity, text: text.to_owned() });
+    Some(())
 }
 
 /// Adds a statement to a description.
@@ -174,20 +134,7 @@ pub enum KeyError {
 /// # Errors
 /// [`KeyError`] for an unknown key and for a value that is not valid for it.
 pub fn set_key(description: &mut MapDescription, key: &str, value: &str) -> Result<(), KeyError> {
-    let row = DESCRIPTION_KEYS.iter().find(|row| row.name == key);
-    let row = row.ok_or_else(|| KeyError::Key { key: key.chars().take(60).collect() })?;
-    let done = match row.set {
-        Set::Value(set) => set(description, value.trim()),
-        Set::Column => (!value.trim().is_empty()).then(|| {
-            description.columns.retain(|column| column.quantity != row.name);
-            description.columns.push(DescribedColumn { quantity: row.name, text: value.trim().to_owned() });
-        }),
-    };
-    done.ok_or_else(|| KeyError::Value {
-        key: row.name,
-        value: value.chars().take(60).collect(),
-        example: row.example,
-    })
+    keys::set_key(&KEYS, description, key, value.trim())
 }
 
 /// Why a map description cannot be read.
@@ -198,7 +145,7 @@ pub enum DescriptionError {
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: io::Error,
     },
     /// The file has mistakes.
@@ -232,8 +179,7 @@ pub fn description_from_yaml(text: &str, origin: &Path) -> Result<MapDescription
             let number = || tree.get(&steps).and_then(Value::as_f64).map(|number| number.to_string());
             let text = tree.text(&steps).map(str::to_owned).or_else(number).unwrap_or_default();
             let Err(error) = set_key(&mut description, key, &text) else { continue };
-            let remedy =
-                DESCRIPTION_KEYS.iter().find(|row| row.name == key).map_or("", |row| row.description);
+            let remedy = KEYS.iter().find(|row| row.name == key).map_or("", |row| row.description);
             notes.push(tree.finding(FindingKind::WrongValue, &steps, error.to_string(), remedy));
         }
     }
@@ -241,12 +187,12 @@ pub fn description_from_yaml(text: &str, origin: &Path) -> Result<MapDescription
 }
 
 fn schema() -> Value {
-    let property = |key: &DescriptionKey| {
+    let property = |key: &Key<MapDescription>| {
         let value =
             json!({"type": ["string", "number"], "description": key.description, "examples": [key.example]});
         (key.name.to_owned(), value)
     };
-    let properties: Map<String, Value> = DESCRIPTION_KEYS.iter().map(property).collect();
+    let properties: Map<String, Value> = KEYS.iter().map(property).collect();
     json!({"type": "object", "minProperties": 1, "properties": properties, "additionalProperties": false})
 }
 
@@ -337,7 +283,7 @@ mod tests {
 
     #[test]
     fn every_example_is_a_value_of_its_key_and_nonsense_is_none() {
-        for key in DESCRIPTION_KEYS {
+        for key in KEYS {
             set_key(&mut MapDescription::default(), key.name, key.example).unwrap();
         }
         for (key, value) in

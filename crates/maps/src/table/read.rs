@@ -28,25 +28,25 @@ use mapper_yaml::units::{Kind, header_unit};
 ///
 /// # Errors
 /// [`ImportError`] with the line of the file.
-pub fn read_text(text: &str, given: &MapDescription) -> Result<ImportedMap, ImportError> {
-    read(&Grid::of_text(text)?, given)
+pub fn read_text(text: &str, description: &MapDescription) -> Result<ImportedMap, ImportError> {
+    read(&Grid::of_text(text)?, description)
 }
 
 /// The map of a text in any layout: tables of NPSS or Modelica, arrays of a script, or a table of points.
 ///
 /// # Errors
 /// [`ImportError`] with the line of the file.
-pub fn read_any_text(text: &str, given: &MapDescription) -> Result<ImportedMap, ImportError> {
+pub fn read_any_text(text: &str, description: &MapDescription) -> Result<ImportedMap, ImportError> {
     if text.contains(NPSS_TABLE) {
-        read_nested(text, given)
+        read_nested(text, description)
     } else if text.lines().next() == Some("#1") && text.contains("\ndouble ") {
-        read_modelica(text, given)
+        read_modelica(text, description)
     } else if text.lines().take(GSP_HEAD).any(|line| line.trim_start().starts_with("Reynolds:")) {
-        read_gsp(text, given)
+        read_gsp(text, description)
     } else if has_arrays(text) {
-        read_arrays(text, given)
+        read_arrays(text, description)
     } else {
-        read_text(text, given)
+        read_text(text, description)
     }
 }
 
@@ -54,8 +54,8 @@ pub fn read_any_text(text: &str, given: &MapDescription) -> Result<ImportedMap, 
 ///
 /// # Errors
 /// As [`read_any_text`], and [`ImportError::NotText`].
-pub fn read_any_bytes(bytes: &[u8], given: &MapDescription) -> Result<ImportedMap, ImportError> {
-    read_any_text(&text_of(bytes)?, given)
+pub fn read_any_bytes(bytes: &[u8], description: &MapDescription) -> Result<ImportedMap, ImportError> {
+    read_any_text(&text_of(bytes)?, description)
 }
 
 /// Start of every table of an NPSS map.
@@ -73,8 +73,8 @@ fn has_arrays(text: &str) -> bool {
 ///
 /// # Errors
 /// [`ImportError`] with the row of the sheet.
-pub fn read_workbook(bytes: &[u8], given: &MapDescription) -> Result<ImportedMap, ImportError> {
-    read(&grid_of_workbook(bytes, given.sheet.as_deref())?, given)
+pub fn read_workbook(bytes: &[u8], description: &MapDescription) -> Result<ImportedMap, ImportError> {
+    read(&grid_of_workbook(bytes, description.sheet.as_deref())?, description)
 }
 
 /// Information from the rows outside the table.
@@ -86,10 +86,10 @@ pub(super) struct Notes {
 }
 
 fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedMap, ImportError> {
-    let given = DescribedColumns::of(description, Machine::Compressor)?;
-    let of_matrices = points_of_matrices(grid);
-    let grid = of_matrices.as_ref().unwrap_or(grid);
-    let (grid, layout) = layout::detect_layout(grid, &given)?;
+    let described = DescribedColumns::of(description, Machine::Compressor)?;
+    let points_grid = points_of_matrices(grid);
+    let grid = points_grid.as_ref().unwrap_or(grid);
+    let (grid, layout) = layout::detect_layout(grid, &described)?;
     let grid = grid.as_ref();
     if layout.is_turbine_alone() {
         let heading = layout.first_row.checked_sub(1).and_then(|row| grid.rows.get(row));
@@ -105,7 +105,7 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedMap, Import
         remarks.push(ImportRemark::ReducedQuantities { reference: ReferenceState::SAE });
     }
     let reference = reference?;
-    let points = points(grid, &given, &layout, &mut remarks)?;
+    let points = points(grid, &described, &layout, &mut remarks)?;
     let columns = columns(&layout, &points, Some(reference));
     let in_percent = efficiency_in_percent(&layout, &points);
     if in_percent {
@@ -125,9 +125,9 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedMap, Import
     for point in &points {
         let mut row = row(point, &layout, reference, in_percent)?;
         if layout.is_measured() {
-            let as_measured = measured_point(point, &row, reference, description)?;
-            correct(&mut row, &as_measured, reference);
-            measured.push(as_measured);
+            let readings = measured_point(point, &row, reference, description)?;
+            correct(&mut row, &readings, reference);
+            measured.push(readings);
         }
         rows.push(row);
     }
@@ -182,14 +182,14 @@ fn row(
         |quantities: &[Quantity]| quantities.iter().find_map(|quantity| point.value(*quantity, reference));
     let own_speed = any(&[Quantity::Speed, Quantity::ReducedSpeed]);
     let flow = any(&[Quantity::Flow, Quantity::VolumeFlow, Quantity::ReducedFlow]);
-    let ratio = any(&[Quantity::PressureRatio]);
     Ok(Row {
         at: point.at,
         speed_corrected_rpm: require(point, Quantity::Speed, own_speed.or(point.speed))?,
         flow_corrected_kg_s: require(point, Quantity::Flow, flow)?,
-        pressure_ratio: match layout.is_measured() {
-            true => f64::NAN,
-            false => require(point, Quantity::PressureRatio, ratio)?,
+        pressure_ratio: if layout.is_measured() {
+            f64::NAN
+        } else {
+            require(point, Quantity::PressureRatio, any(&[Quantity::PressureRatio]))?
         },
         eta: any(&[Quantity::Efficiency]).map(|eta| if in_percent { 0.01 * eta } else { eta }),
     })
@@ -200,14 +200,14 @@ fn measured_point(
     point: &Point<'_>,
     row: &Row,
     reference: ReferenceState,
-    given: &MapDescription,
+    description: &MapDescription,
 ) -> Result<MeasuredPoint, ImportError> {
     let value = |quantity: Quantity| point.value(quantity, reference);
-    let of = |quantity: Quantity| require(point, quantity, value(quantity));
     let flow_kg_s = row.flow_corrected_kg_s;
-    let (t1_k, t2_k) = (of(Quantity::T1)?, value(Quantity::T2));
-    let taps = given.static_taps;
-    let pressure = |quantity: Quantity| require(point, quantity, pressure_pa(point, quantity, given)?);
+    let t1_k = require(point, Quantity::T1, value(Quantity::T1))?;
+    let t2_k = value(Quantity::T2);
+    let taps = description.static_taps;
+    let pressure = |quantity: Quantity| require(point, quantity, pressure_pa(point, quantity, description)?);
     let (mut p1_pa, mut p2_pa) = (pressure(Quantity::P1)?, pressure(Quantity::P2)?);
     if let Some(diameter_m) = taps.inlet_diameter_m {
         p1_pa = static_to_total_pa(p1_pa, flow_kg_s, t1_k, diameter_m);
@@ -215,7 +215,7 @@ fn measured_point(
     if let Some(diameter_m) = taps.outlet_diameter_m {
         p2_pa = static_to_total_pa(p2_pa, flow_kg_s, require(point, Quantity::T2, t2_k)?, diameter_m);
     }
-    let humidity = point.of(Quantity::Humidity).map(|(column, written)| match column.is_relative() {
+    let humidity = point.cell(Quantity::Humidity).map(|(column, written)| match column.is_relative() {
         true if column.unit.is_empty() => humidity_kg_kg(0.01 * written, t1_k, p1_pa),
         true => humidity_kg_kg(column.as_stated(written), t1_k, p1_pa),
         false => column.as_stated(written),
@@ -240,8 +240,8 @@ fn measured_point(
         humidity_kg_kg: humidity,
         turbine: TurbineReadings {
             t3_k: value(Quantity::T3),
-            p3_pa: pressure_pa(point, Quantity::P3, given)?,
-            p4_pa: pressure_pa(point, Quantity::P4, given)?,
+            p3_pa: pressure_pa(point, Quantity::P3, description)?,
+            p4_pa: pressure_pa(point, Quantity::P4, description)?,
             oil_k: value(Quantity::Oil),
         },
         end: point.end,
@@ -255,14 +255,14 @@ fn measured_point(
 pub(super) fn pressure_pa(
     point: &Point<'_>,
     quantity: Quantity,
-    given: &MapDescription,
+    description: &MapDescription,
 ) -> Result<Option<f64>, ImportError> {
-    let Some((column, value)) = point.of(quantity) else { return Ok(None) };
+    let Some((column, value)) = point.cell(quantity) else { return Ok(None) };
     if !column.is_gauge {
         return Ok(Some(column.as_stated(value)));
     }
-    let ambient = point.of(Quantity::Ambient).map(|(column, value)| column.as_stated(value));
-    match ambient.or(given.ambient_pa) {
+    let ambient = point.cell(Quantity::Ambient).map(|(column, value)| column.as_stated(value));
+    match ambient.or(description.ambient_pa) {
         Some(ambient_pa) => Ok(Some(column.as_stated(value) + ambient_pa)),
         None => {
             let missing = "ambient pressure, which is added to a gauge pressure (or give the `barometer`)";
@@ -271,7 +271,7 @@ pub(super) fn pressure_pa(
     }
 }
 
-/// Saturated air of 50 degC at 100 kPa has 0.088 kg/kg.
+/// Maximum humidity: saturated air of 50 degC at 100 kPa has 0.088 kg/kg.
 const MAX_HUMIDITY_KG_KG: f64 = 0.1;
 
 /// Corrects a measured point; its efficiency is the apparent one if the table has none.
@@ -322,9 +322,9 @@ fn parse_reference_line(grid: &Grid, text: &str) -> Option<ReferenceState> {
         words.iter().enumerate().find_map(|(index, word)| {
             // `298K`, `298 K`.
             let end = word.find(|c: char| c.is_alphabetic() || c == '°').unwrap_or(word.len());
-            let behind = if end < word.len() { word.get(end..) } else { words.get(index + 1).copied() };
-            // Rankine is never written so in a heading of a column.
-            let unit = behind.map(|unit| if matches!(unit, "R" | "°R") { "degR" } else { unit })?;
+            let unit = if end < word.len() { word.get(end..) } else { words.get(index + 1).copied() };
+            // In the heading of a column `R` is not a unit of temperature.
+            let unit = unit.map(|unit| if matches!(unit, "R" | "°R") { "degR" } else { unit })?;
             let unit = header_unit(unit).filter(|unit| unit.kind == kind)?;
             Some(unit.unit.to_inside(grid.number(word.get(..end)?)?))
         })

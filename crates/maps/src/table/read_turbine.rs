@@ -20,24 +20,27 @@ use mapper_physics::laws::compression::apparent_efficiency;
 ///
 /// # Errors
 /// [`ImportError`] with the line of the file.
-pub fn read_turbine_text(text: &str, given: &MapDescription) -> Result<ImportedTurbine, ImportError> {
-    read(&Grid::of_text(text)?, given)
+pub fn read_turbine_text(text: &str, description: &MapDescription) -> Result<ImportedTurbine, ImportError> {
+    read(&Grid::of_text(text)?, description)
 }
 
 /// The turbine map of a workbook.
 ///
 /// # Errors
 /// [`ImportError`] with the row of the sheet.
-pub fn read_turbine_workbook(bytes: &[u8], given: &MapDescription) -> Result<ImportedTurbine, ImportError> {
-    read(&grid_of_workbook(bytes, given.sheet.as_deref())?, given)
+pub fn read_turbine_workbook(
+    bytes: &[u8],
+    description: &MapDescription,
+) -> Result<ImportedTurbine, ImportError> {
+    read(&grid_of_workbook(bytes, description.sheet.as_deref())?, description)
 }
 
 /// Maximum speed parameter; larger values are corrected speeds. 200 krpm at 1000 K is 6300 rpm/K^0.5, and no map ends at 10 krpm.
 const MAX_SPEED_PARAMETER: f64 = 10_000.0;
 
 fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedTurbine, ImportError> {
-    let given = DescribedColumns::of(description, Machine::Turbine)?;
-    let (grid, layout) = layout::detect_layout(grid, &given)?;
+    let described = DescribedColumns::of(description, Machine::Turbine)?;
+    let (grid, layout) = layout::detect_layout(grid, &described)?;
     let grid = grid.as_ref();
     let notes = read_notes(grid, layout.first_row);
     let mut remarks = layout.remarks.clone();
@@ -52,9 +55,11 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedTurbine, Im
     if all().any(|column| is_flow(column.quantity) && !column.has_unit()) {
         remarks.push(ImportRemark::FlowUnitAssumed);
     }
-    let points = points(grid, &given, &layout, &mut remarks)?;
+    let points = points(grid, &described, &layout, &mut remarks)?;
     let measured = match layout.is_measured() {
-        true => points.iter().map(|point| as_measured(point, description)).collect::<Result<Vec<_>, _>>()?,
+        true => {
+            points.iter().map(|point| measured_point(point, description)).collect::<Result<Vec<_>, _>>()?
+        }
         false => Vec::new(),
     };
     let fastest = points.iter().filter_map(speed_of).fold(0.0, f64::max);
@@ -63,12 +68,12 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedTurbine, Im
     if speed_is_reduced && all().any(|column| column.quantity == Quantity::Speed) {
         remarks.push(ImportRemark::SpeedParameterAssumed);
     }
-    let corrected = measured.is_empty()
+    let is_corrected = measured.is_empty()
         && (all().any(|column| is_flow(column.quantity))
             || !speed_is_reduced && all().any(|column| column.quantity == Quantity::Speed));
     let reference = match reference::resolve_reference(notes.reference, description.reference) {
-        Err(ImportError::NoReference) if !corrected => None,
-        settled => Some(settled?),
+        Err(ImportError::NoReference) if !is_corrected => None,
+        resolved => Some(resolved?),
     };
     if !measured.is_empty() {
         remarks.push(ImportRemark::Measured);
@@ -99,14 +104,15 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedTurbine, Im
     })
 }
 
-/// SAE's name of the flow parameter stands for kg K^0.5/(s kPa).
+/// Whether a column has SAE's flow parameter MFP, which is in kg K^0.5/(s kPa).
 fn is_sae(column: &Column) -> bool {
     column.heading.eq_ignore_ascii_case("mfp")
 }
 
 /// The speed of a point in the unit of its column, or of its block.
 fn speed_of(point: &Point<'_>) -> Option<f64> {
-    let found = [Quantity::Speed, Quantity::ReducedSpeed].into_iter().find_map(|quantity| point.of(quantity));
+    let found =
+        [Quantity::Speed, Quantity::ReducedSpeed].into_iter().find_map(|quantity| point.cell(quantity));
     found.map(|(column, value)| column.as_stated(value)).or(point.speed)
 }
 
@@ -116,7 +122,7 @@ fn row(
     speed_is_reduced: bool,
     in_percent: bool,
 ) -> Result<TurbineMapPoint, ImportError> {
-    let value = |quantity: Quantity| point.of(quantity).map(|(column, value)| column.as_stated(value));
+    let value = |quantity: Quantity| point.cell(quantity).map(|(column, value)| column.as_stated(value));
     let needed = |value: Option<f64>, quantity: Quantity| require(point, quantity, value);
     let root = reference.t_ref_k.sqrt();
     let speed = needed(speed_of(point), Quantity::Speed)?;
@@ -142,10 +148,13 @@ fn is_flow(quantity: Quantity) -> bool {
 }
 
 /// The measured values of a point.
-fn as_measured(point: &Point<'_>, given: &MapDescription) -> Result<MeasuredTurbinePoint, ImportError> {
-    let value = |quantity: Quantity| point.of(quantity).map(|(column, value)| column.as_stated(value));
+fn measured_point(
+    point: &Point<'_>,
+    description: &MapDescription,
+) -> Result<MeasuredTurbinePoint, ImportError> {
+    let value = |quantity: Quantity| point.cell(quantity).map(|(column, value)| column.as_stated(value));
     let of = |quantity: Quantity, value: Option<f64>| require(point, quantity, value);
-    let pressure = |quantity: Quantity| of(quantity, pressure_pa(point, quantity, given)?);
+    let pressure = |quantity: Quantity| of(quantity, pressure_pa(point, quantity, description)?);
     let measured = MeasuredTurbinePoint {
         line: point.at,
         vane_position: value(Quantity::Vane).or(point.vane),
@@ -165,10 +174,10 @@ fn as_measured(point: &Point<'_>, given: &MapDescription) -> Result<MeasuredTurb
     Ok(measured)
 }
 
-/// A measured point reduced by its inlet. Its efficiency is that of the temperatures, heat loss included.
+/// Reduces a measured point by the state of the inlet. The efficiency follows from the temperatures, heat loss included.
 pub fn reduced_turbine_point(point: &MeasuredTurbinePoint) -> TurbineMapPoint {
     let (root, expansion_ratio) = (point.t3_k.sqrt(), point.p3_pa / point.p4_pa);
-    // Both ratios of an expansion are those of a compression from T3 by 1/ER, the other way round.
+    // An expansion is a compression from T3 by 1/ER; its efficiency is the inverse.
     let efficiency = |t4_k: f64| 1.0 / apparent_efficiency(1.0 / expansion_ratio, point.t3_k, t4_k, Air::DRY);
     TurbineMapPoint {
         vane_position: point.vane_position,
@@ -179,6 +188,8 @@ pub fn reduced_turbine_point(point: &MeasuredTurbinePoint) -> TurbineMapPoint {
     }
 }
 
+/// Checks the values of a point.
+///
 /// # Errors
 /// [`ImportError::Value`] for a value that is impossible for a turbine.
 fn check(line: usize, row: TurbineMapPoint) -> Result<TurbineMapPoint, ImportError> {
@@ -208,7 +219,7 @@ fn check(line: usize, row: TurbineMapPoint) -> Result<TurbineMapPoint, ImportErr
     Ok(row)
 }
 
-/// In order of vane position, speed and expansion ratio.
+/// Sorts by vane position, speed and expansion ratio.
 fn sort(rows: &mut [TurbineMapPoint]) {
     let vane = |point: &TurbineMapPoint| point.vane_position.unwrap_or(f64::NEG_INFINITY);
     rows.sort_by(|a, b| {

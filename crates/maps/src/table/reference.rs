@@ -1,9 +1,9 @@
 //! Parses reference states, and resolves those of the file and of the user.
 
 use mapper_core::{ImportError, ReferenceState};
+use mapper_yaml::units::{Kind, parse, parse_with};
 
-/// A reference state from a name (`SAE`, `Garrett`, `BorgWarner`) or `"T, P"` with units: K, degC, degR, degF; Pa, kPa,
-/// hPa, bar, psi.
+/// A reference state from a name (`SAE`, `Garrett`, `BorgWarner`) or `"T, P"` with units, as in `298 K, 100 kPa`.
 ///
 /// # Errors
 /// [`ImportError::Reference`].
@@ -13,37 +13,13 @@ pub fn parse_reference(text: &str) -> Result<ReferenceState, ImportError> {
         return Ok(state);
     }
     let (temperature, pressure) = text.split_once(',').ok_or_else(wrong)?;
-    let t_ref_k = quantity(temperature, TEMPERATURES).ok_or_else(wrong)?;
-    let p_ref_pa = quantity(pressure, PRESSURES).ok_or_else(wrong)?;
-    let state = ReferenceState { t_ref_k, p_ref_pa };
+    // In a reference state `psi` can only be absolute.
+    let pressure_unit = |unit: &str| Kind::Pressure.unit(if unit == "psi" { "psia" } else { unit });
+    let state = ReferenceState {
+        t_ref_k: parse(Kind::Temperature, temperature).map_err(|_| wrong())?,
+        p_ref_pa: parse_with(Kind::Pressure, pressure, pressure_unit).map_err(|_| wrong())?,
+    };
     if state.is_plausible() { Ok(state) } else { Err(wrong()) }
-}
-
-/// Unit, factor, offset before the factor.
-type Units = &'static [(&'static str, f64, f64)];
-const TEMPERATURES: Units =
-    &[("K", 1.0, 0.0), ("degC", 1.0, 273.15), ("degR", 5.0 / 9.0, 0.0), ("degF", 5.0 / 9.0, 459.67)];
-const PRESSURES: Units = &[
-    ("Pa", 1.0, 0.0),
-    ("kPa", 1e3, 0.0),
-    ("hPa", 1e2, 0.0),
-    ("mbar", 1e2, 0.0),
-    ("bar", 1e5, 0.0),
-    ("psia", PSI_PA, 0.0),
-    ("psi", PSI_PA, 0.0),
-];
-/// Pound-force per square inch, exactly as in [`ReferenceState::GARRETT`].
-const PSI_PA: f64 = 4.448_221_615_260_5 / 0.000_645_16;
-
-fn quantity(text: &str, units: Units) -> Option<f64> {
-    let text = text.trim();
-    let digits =
-        text.find(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | '-' | '+'))).unwrap_or(text.len());
-    let unit = text[digits..].trim();
-    let (_, factor, offset) = units.iter().find(|(name, ..)| *name == unit)?;
-    let value: f64 = text[..digits].trim().parse().ok()?;
-    // No conversion if the factor is 1, so that written values are read back to the bit.
-    Some(if *factor == 1.0 && *offset == 0.0 { value } else { (value + offset) * factor })
 }
 
 /// The reference state in a comment after the word "reference" and a colon.

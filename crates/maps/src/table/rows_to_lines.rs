@@ -1,12 +1,12 @@
 //! Groups rows of a table into speed lines.
 
+use crate::assemble::{line, move_to_speed};
 use crate::table::reference;
 use mapper_core::{
-    CommonErrors, CompressorMap, IdentifiedPoint, ImportError, MapPoint, Method, ReferenceState, SpeedLine,
-    SpeedShift, StepKind, Verdict,
+    CommonErrors, CompressorMap, IdentifiedPoint, ImportError, Method, ReferenceState, StepKind, Verdict,
 };
+use mapper_numerics::statistics::range;
 use mapper_physics::compressor_map::inlet_limit::{MIN_TOP_SPEED_RPM, max_flow_kg_s};
-use mapper_physics::compressor_map::similarity::at_speed;
 
 /// Maximum number of points.
 pub const MAX_POINTS: usize = 100_000;
@@ -14,7 +14,7 @@ pub const MAX_POINTS: usize = 100_000;
 /// Maximum relative difference of speed within a line: it varies by 1 %, and lines of maps are at least 5 % apart.
 const MAX_LINE_SPEED_DIFFERENCE_RATIO: f64 = 0.015;
 
-/// The four numbers of a row, common to all maps.
+/// The four numbers that every map has for a point.
 #[derive(Debug, Clone, Copy)]
 pub struct Row {
     /// Line of the file, from 1.
@@ -136,11 +136,11 @@ pub fn map_of_rows(
             b.speed_corrected_rpm <= a.speed_corrected_rpm * (1.0 + MAX_LINE_SPEED_DIFFERENCE_RATIO)
         })
         .map(|members| {
-            let speeds = || members.iter().map(|point| point.speed_corrected_rpm);
-            let (low, high) = speeds().fold((f64::INFINITY, 0.0f64), |r, v| (r.0.min(v), r.1.max(v)));
+            let speeds_rpm = || members.iter().map(|point| point.speed_corrected_rpm);
+            let (low, high) = range(speeds_rpm());
             // Rounding may move the mean of equal numbers away from them.
-            let mean = if low == high { low } else { speeds().sum::<f64>() / members.len() as f64 };
-            line(mean, members.iter().map(|point| on_line(point, mean)).collect())
+            let mean = if low == high { low } else { speeds_rpm().sum::<f64>() / members.len() as f64 };
+            line(mean, members.iter().map(|point| move_to_speed(point, mean)).collect())
         })
         .collect();
     Ok(CompressorMap {
@@ -153,37 +153,6 @@ pub fn map_of_rows(
         surge: Vec::new(),
         fitted: None,
     })
-}
-
-/// A speed line with its points in order of flow.
-pub fn line(speed_corrected_rpm: f64, mut points: Vec<MapPoint>) -> SpeedLine {
-    let speeds = || points.iter().map(|point| point.identified.speed_corrected_rpm);
-    let (low, high) = speeds().fold((f64::INFINITY, 0.0f64), |r, v| (r.0.min(v), r.1.max(v)));
-    points.sort_by(|a, b| {
-        let by_flow = a.flow_corrected_kg_s.total_cmp(&b.flow_corrected_kg_s);
-        by_flow.then(b.pressure_ratio.total_cmp(&a.pressure_ratio))
-    });
-    SpeedLine { speed_corrected_rpm, speed_spread_rpm: high - low, target_speed_rpm: None, points }
-}
-
-/// Converts a point to the speed of its line by similarity.
-fn on_line(point: &IdentifiedPoint, line_speed_rpm: f64) -> MapPoint {
-    let shift_rpm = line_speed_rpm - point.speed_corrected_rpm;
-    let (flow, ratio) = (point.flow_corrected_kg_s, point.pressure_ratio);
-    let moved = shift_rpm != 0.0;
-    let (flow_there, ratio_there) =
-        if moved { at_speed(flow, ratio, line_speed_rpm / point.speed_corrected_rpm) } else { (flow, ratio) };
-    MapPoint {
-        flow_corrected_kg_s: flow_there,
-        pressure_ratio: ratio_there,
-        eta: point.eta,
-        identified: point.clone(),
-        shift: moved.then_some(SpeedShift {
-            speed_corrected_rpm: shift_rpm,
-            flow_corrected_kg_s: flow_there - flow,
-            pressure_ratio: ratio_there - ratio,
-        }),
-    }
 }
 
 /// Refuses a file with too many rows.

@@ -4,7 +4,7 @@ use crate::table::columns::column::{is_dimensionless, is_known_unit};
 
 /// Headings with the units from a row of their own below them: `flow` and `g/s` become `flow [g/s]`. `None` if the row below is
 /// not a row of units. A heading with a unit keeps it.
-pub(super) fn merge_units_row(headings: &[&str], below: &[&str]) -> Option<Vec<String>> {
+pub(super) fn merge_units_row(headings: &[String], below: &[String]) -> Option<Vec<String>> {
     let bare = |text: &str| text.trim().trim_matches(['[', ']', '(', ')']).trim().to_owned();
     let units: Vec<String> = below.iter().map(|text| bare(text)).collect();
     let all_known = units.iter().all(|unit| is_dimensionless(unit) || is_known_unit(unit));
@@ -16,7 +16,7 @@ pub(super) fn merge_units_row(headings: &[&str], below: &[&str]) -> Option<Vec<S
         Some(unit) if !is_dimensionless(unit) && !heading.contains(['[', '(']) => {
             format!("{heading} [{unit}]")
         }
-        _ => (*heading).to_owned(),
+        _ => heading.clone(),
     });
     Some(joined.collect())
 }
@@ -27,11 +27,11 @@ mod tests {
 
     #[test]
     fn units_may_have_a_row_of_their_own() {
-        let names = ["speed", "flow", "PR", "eta (is)"];
-        let joined = merge_units_row(&names, &["[krpm]", "g/s", "-", "%"]).unwrap();
+        let names = ["speed", "flow", "PR", "eta (is)"].map(str::to_owned);
+        let joined = merge_units_row(&names, &["[krpm]", "g/s", "-", "%"].map(str::to_owned)).unwrap();
         assert_eq!(joined, ["speed [krpm]", "flow [g/s]", "PR", "eta (is)"]);
         for none in [["60", "38", "1.2", "70"], ["krpm", "slugs", "-", "%"], ["", "-", "", ""]] {
-            assert_eq!(merge_units_row(&names, &none), None);
+            assert_eq!(merge_units_row(&names, &none.map(str::to_owned)), None);
         }
     }
 }

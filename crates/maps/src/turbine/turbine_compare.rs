@@ -1,7 +1,8 @@
 //! Compares two turbine maps: each measured point of the second with the surface of the first.
 
+use crate::compare::excludes_zero;
 use crate::turbine::turbine_fit::{TurbineFit, TurbineFitError};
-use mapper_core::{TurbineMap, TurbineMapPoint, confidence_interval_95};
+use mapper_core::{TurbineMap, TurbineMapPoint};
 use mapper_numerics::statistics::{mean, rms};
 use serde::Serialize;
 
@@ -53,8 +54,8 @@ pub fn compare_turbines(
     let places = second.points.iter().map(|point| {
         (point, fit.at(point.vane_position, point.speed_parameter_rpm_sqrt_k, point.expansion_ratio))
     });
-    let (beyond, within): (Vec<_>, Vec<_>) = places.partition(|(_, place)| place.extrapolated);
-    let points: Vec<TurbinePointComparison> = within
+    let (outside, inside): (Vec<_>, Vec<_>) = places.partition(|(_, place)| place.extrapolated);
+    let points: Vec<TurbinePointComparison> = inside
         .into_iter()
         .map(|(point, place)| {
             // The standard error is that of a measurement, so it includes the scatter of the second map.
@@ -71,25 +72,21 @@ pub fn compare_turbines(
         .collect();
     let flows = || points.iter().map(|point| point.flow_difference_ratio);
     let efficiencies = || points.iter().filter_map(|point| point.efficiency_difference);
-    let differs = |(difference, error): (f64, f64)| {
-        let (low, high) = confidence_interval_95(difference, error);
-        low > 0.0 || high < 0.0
-    };
     let share = |pairs: Vec<(f64, f64)>| {
-        let count = pairs.len().max(1) as f64;
-        pairs.into_iter().filter(|pair| differs(*pair)).count() as f64 / count
+        let differs = |(difference, error): &&(f64, f64)| excludes_zero(*difference, *error);
+        pairs.iter().filter(differs).count() as f64 / pairs.len().max(1) as f64
     };
     let flow_pairs = points.iter().map(|p| (p.flow_difference_ratio, p.flow_standard_error_ratio)).collect();
-    let pairs =
+    let efficiency_pairs =
         points.iter().filter_map(|p| p.efficiency_difference.zip(p.efficiency_standard_error)).collect();
     Ok(TurbineComparison {
-        not_compared: beyond.len(),
+        not_compared: outside.len(),
         flow_difference_mean_ratio: mean(flows()),
         flow_difference_rms_ratio: rms(flows()),
         efficiency_difference_mean: mean(efficiencies()),
         efficiency_difference_rms: rms(efficiencies()),
         flow_differs_ratio: share(flow_pairs),
-        efficiency_differs_ratio: share(pairs),
+        efficiency_differs_ratio: share(efficiency_pairs),
         points,
     })
 }

@@ -6,6 +6,7 @@
 
 use crate::turbine::turbine_surface::{Observation, Place, Surface, Term};
 use mapper_core::{FittedTurbine, FittedTurbineLine, FittedTurbineNode, TurbineMap, TurbineMapPoint};
+use mapper_numerics::statistics::range;
 use mapper_physics::gas::air::Air;
 use mapper_physics::laws::turbine::SWALLOWING_EXPONENT;
 
@@ -73,7 +74,7 @@ struct LineEnds {
 }
 
 /// Maximum relative distance outside the measured range that does not count as extrapolated: stands hold speeds and pressures within 1 %.
-const END_SLACK: f64 = 0.01;
+const END_TOLERANCE_RATIO: f64 = 0.01;
 
 fn vane(point: &TurbineMapPoint) -> f64 {
     point.vane_position.unwrap_or(0.0)
@@ -139,7 +140,7 @@ impl TurbineFit {
             efficiency: efficiency.map(|(value, _)| value),
             efficiency_low: efficiency.map(|(value, half)| value - half),
             efficiency_high: efficiency.map(|(value, half)| value + half),
-            extrapolated: self.is_beyond(vane, speed, expansion_ratio),
+            extrapolated: self.is_extrapolated(vane, speed, expansion_ratio),
         }
     }
 
@@ -152,23 +153,24 @@ impl TurbineFit {
     }
 
     /// Whether a place is outside the ranges of the lines at the nearest vane position, which are linear between their speeds.
-    fn is_beyond(&self, vane_position: f64, speed: f64, expansion_ratio: f64) -> bool {
+    fn is_extrapolated(&self, vane_position: f64, speed: f64, expansion_ratio: f64) -> bool {
         let distance = |ends: &LineEnds| (ends.vane_position - vane_position).abs();
         let vanes = || self.ends.iter().map(|ends| ends.vane_position);
-        let (low, high) = vanes().fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| (r.0.min(v), r.1.max(v)));
+        let (low, high) = range(vanes());
         if vane_position < low || vane_position > high {
             return true;
         }
         let nearest = self.ends.iter().map(distance).fold(f64::INFINITY, f64::min);
         let lines: Vec<&LineEnds> = self.ends.iter().filter(|ends| distance(ends) <= nearest).collect();
-        let below = lines.iter().rev().find(|ends| ends.speed <= speed * (1.0 + END_SLACK));
-        let above = lines.iter().find(|ends| ends.speed >= speed * (1.0 - END_SLACK));
+        let below = lines.iter().rev().find(|ends| ends.speed <= speed * (1.0 + END_TOLERANCE_RATIO));
+        let above = lines.iter().find(|ends| ends.speed >= speed * (1.0 - END_TOLERANCE_RATIO));
         let (Some(below), Some(above)) = (below, above) else { return true };
         let span = above.speed - below.speed;
         let share = if span > 0.0 { ((speed - below.speed) / span).clamp(0.0, 1.0) } else { 0.0 };
         let lowest = below.lowest_ratio + share * (above.lowest_ratio - below.lowest_ratio);
         let highest = below.highest_ratio + share * (above.highest_ratio - below.highest_ratio);
-        expansion_ratio < lowest * (1.0 - END_SLACK) || expansion_ratio > highest * (1.0 + END_SLACK)
+        expansion_ratio < lowest * (1.0 - END_TOLERANCE_RATIO)
+            || expansion_ratio > highest * (1.0 + END_TOLERANCE_RATIO)
     }
 
     /// The surface as a table over the measured speeds and evenly spaced expansion ratios.
@@ -195,13 +197,8 @@ impl TurbineFit {
 fn line_ends(points: &[TurbineMapPoint]) -> Option<LineEnds> {
     let speed =
         points.iter().map(|point| point.speed_parameter_rpm_sqrt_k).sum::<f64>() / points.len() as f64;
-    let ratios = || points.iter().map(|point| point.expansion_ratio);
-    Some(LineEnds {
-        vane_position: vane(points.first()?),
-        speed,
-        lowest_ratio: ratios().fold(f64::INFINITY, f64::min),
-        highest_ratio: ratios().fold(0.0, f64::max),
-    })
+    let (lowest_ratio, highest_ratio) = range(points.iter().map(|point| point.expansion_ratio));
+    Some(LineEnds { vane_position: vane(points.first()?), speed, lowest_ratio, highest_ratio })
 }
 
 /// The map with its fitted table.

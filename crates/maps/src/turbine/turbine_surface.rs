@@ -1,6 +1,6 @@
 //! A quantity of a turbine map as a polynomial over vane position, speed and one coordinate of the expansion, by linear least squares.
 
-use mapper_numerics::statistics::student_quantile;
+use mapper_numerics::statistics::{range, student_quantile};
 use nalgebra::{DMatrix, DVector};
 
 /// Vane position, speed, coordinate of the expansion.
@@ -46,8 +46,8 @@ impl Surface {
             .filter(|term| (0..3).all(|axis| (term[axis] as usize) < distinct(observations, axis)))
             .copied()
             .collect();
-        let most = usable.len().min(observations.len() / MIN_POINTS_PER_TERM);
-        let fitted = (1..=most).filter_map(|count| {
+        let max_terms = usable.len().min(observations.len() / MIN_POINTS_PER_TERM);
+        let fitted = (1..=max_terms).filter_map(|count| {
             let terms = usable.get(..count)?.to_vec();
             Surface::of_terms(observations, terms, centre, half_range)
         });
@@ -72,8 +72,7 @@ impl Surface {
             left_out_rms: f64::INFINITY,
         };
         let mut squares = Vec::new();
-        let inner = inner_lines(observations, lines);
-        for line in inner {
+        for line in inner_lines(observations, lines) {
             let (left_out, kept): (Vec<Observation>, Vec<Observation>) =
                 observations.iter().partition(|observation| observation.line == line);
             // With few lines the rest cannot be fitted: single points are left out below instead.
@@ -84,10 +83,10 @@ impl Surface {
         surface.solve(observations)?;
         if squares.is_empty() {
             // The residual of a left-out point is its residual over 1 minus its leverage.
-            let without = |o: &Observation| {
+            let left_out = |o: &Observation| {
                 ((o.value - surface.value(o.place)) / (1.0 - surface.leverage(o.place))).powi(2)
             };
-            squares = observations.iter().map(without).collect();
+            squares = observations.iter().map(left_out).collect();
         }
         let freedom =
             observations.len().checked_sub(surface.terms.len()).filter(|freedom| *freedom > 0)? as f64;
@@ -156,8 +155,7 @@ fn ranges(observations: &[Observation]) -> Option<(Place, Place)> {
     let mut centre = [0.0; 3];
     let mut half_range = [1.0; 3];
     for axis in 0..3 {
-        let values = || observations.iter().map(|observation| observation.place[axis]);
-        let (low, high) = values().fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| (r.0.min(v), r.1.max(v)));
+        let (low, high) = range(observations.iter().map(|observation| observation.place[axis]));
         if low > high {
             return None;
         }
@@ -171,8 +169,7 @@ fn ranges(observations: &[Observation]) -> Option<(Place, Place)> {
 
 /// The lines with both slower and faster neighbours, since leaving an outer line out would test extrapolation. All lines if there are few.
 fn inner_lines(observations: &[Observation], lines: usize) -> Vec<usize> {
-    let speeds = || observations.iter().map(|observation| observation.place[1]);
-    let (low, high) = speeds().fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| (r.0.min(v), r.1.max(v)));
+    let (low, high) = range(observations.iter().map(|observation| observation.place[1]));
     let is_outermost = |line: &usize| {
         let mut own = observations.iter().filter(|observation| observation.line == *line);
         own.any(|observation| {
@@ -187,11 +184,11 @@ fn inner_lines(observations: &[Observation], lines: usize) -> Vec<usize> {
 /// Maximum relative difference of speed within a line.
 const MAX_LINE_SPEED_DIFFERENCE_RATIO: f64 = 0.015;
 
-/// Number of places along an axis that are more than 2 % of the largest apart: a controlled speed is one place.
+/// Number of distinct coordinates along an axis. Those less than 2 % of the largest apart count as one, such as a controlled speed.
 fn distinct(observations: &[Observation], axis: usize) -> usize {
     let mut values: Vec<f64> = observations.iter().map(|observation| observation.place[axis]).collect();
     values.sort_by(f64::total_cmp);
-    let largest = values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+    let largest = values.iter().map(|value| value.abs()).fold(0.0, f64::max);
     let mut count = 0;
     let mut last = f64::NEG_INFINITY;
     for value in values {

@@ -4,9 +4,10 @@
 //! may, and a ratio may be written without a unit. [`crate::channel_mapping::channel_map_yaml`] parses them.
 
 use crate::channel_mapping::channel_map::UNKNOWN_WORD;
-use crate::logs::OPTION_KEYS;
+use crate::logs::{LogOptions, OPTION_KEYS};
 use mapper_core::{CHANNELS, MAX_ELEMENTS, NAMED_REFERENCES};
 use mapper_yaml::Schema;
+use mapper_yaml::keys::Key;
 use serde_json::{Map, Value, json};
 use std::sync::LazyLock;
 
@@ -86,7 +87,7 @@ fn ambient_pressure() -> Value {
 
 /// Settings of a log: the keys that its formats know.
 fn log() -> Value {
-    let key = |key: &crate::logs::OptionKey| (key.name.to_owned(), quantity(key.description, key.example));
+    let key = |key: &Key<LogOptions>| (key.name.to_owned(), quantity(key.description, key.example));
     let keys: Map<String, Value> = OPTION_KEYS.iter().map(key).collect();
     closed(&[], keys.into())
 }

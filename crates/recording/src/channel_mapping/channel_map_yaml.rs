@@ -4,9 +4,10 @@ use crate::channel_mapping::channel_map::UNKNOWN_WORD;
 use crate::channel_mapping::channel_map_schema::SCHEMA;
 use crate::format::TRUTH_PREFIX;
 use crate::logs::units::{difference, kind_of, parse_quantity, remedy, unit};
-use crate::logs::{LogOptions, OPTION_KEYS, OptionError};
+use crate::logs::{LogOptions, OPTION_KEYS};
 use crate::{AmbientPressure, Barometer, ChannelMap, ChannelSource, MachineConstants, WindowLimits};
 use mapper_core::{Channel, DeclaredUncertainty, Element, NoiseColour, RedundantSensors, ReferenceState};
+use mapper_yaml::keys::KeyError;
 use mapper_yaml::units::{Kind, UnitError};
 use mapper_yaml::{Document, FindingKind, Findings, Notes, Source, Step, Tree, steps};
 use serde_json::Value;
@@ -177,7 +178,7 @@ impl<'a> Reader<'a> {
             let here = steps!["log", key];
             let Some(text) = self.text_or_number(&here) else { continue };
             // The check against the schema has already reported an unknown key.
-            if let Err(error @ OptionError::Value { .. }) = options.set(key, &text) {
+            if let Err(error @ KeyError::Value { .. }) = options.set(key, &text) {
                 let remedy =
                     OPTION_KEYS.iter().find(|known| known.name == key).map_or("", |known| known.description);
                 self.note(FindingKind::WrongValue, &here, error.to_string(), remedy);

@@ -25,6 +25,12 @@ impl MappedQuantity {
     }
 }
 
+/// All channels and sensors of the map, with their sources.
+pub(crate) fn sources(map: &ChannelMap) -> impl Iterator<Item = (MappedQuantity, &ChannelSource)> {
+    let channels = map.channels.iter().map(|(channel, source)| (MappedQuantity::Channel(*channel), source));
+    channels.chain(map.elements.iter().map(|(element, source)| (MappedQuantity::Element(*element), source)))
+}
+
 /// Topic and field of a channel or sensor in the map.
 pub(crate) fn source_of(map: &ChannelMap, reads: MappedQuantity) -> Option<&ChannelSource> {
     match reads {
@@ -51,11 +57,8 @@ pub(crate) fn map_topic(
     warnings: &mut Vec<ReadWarning>,
 ) -> Result<Option<MappedTopic>, RecordError> {
     let mut mapped = MappedTopic { topic: definition.topic.clone(), fields: Vec::new(), outputs: Vec::new() };
-    let channels = map.channels.iter().map(|(channel, source)| (MappedQuantity::Channel(*channel), source));
-    let elements = map.elements.iter().map(|(element, source)| (MappedQuantity::Element(*element), source));
-    let sources = channels.chain(elements).filter(|(_, source)| source.topic == definition.topic);
     let schema: Value = serde_json::from_slice(&definition.schema).unwrap_or(Value::Null);
-    for (reads, source) in sources {
+    for (reads, source) in sources(map).filter(|(_, source)| source.topic == definition.topic) {
         if map.is_native() && !definition.metadata.contains_key(&source.field) {
             // The run did not measure this field.
             continue;

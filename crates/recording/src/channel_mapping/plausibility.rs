@@ -84,10 +84,10 @@ pub(crate) fn check_ambient(
     unit_used: Option<&'static Unit>,
     mistakes: &mut MapMistakes,
 ) {
-    let (least, most) = AMBIENT_RANGE_PA;
-    let allowed = format!("it lies between {:.0} and {:.0} kPa", least / 1e3, most / 1e3);
+    let (min_pa, max_pa) = AMBIENT_RANGE_PA;
+    let allowed = format!("it lies between {:.0} and {:.0} kPa", min_pa / 1e3, max_pa / 1e3);
     match (ambient, column.and_then(trimmed_range)) {
-        (AmbientPressure::Constant(barometer), _) if !(least..=most).contains(&barometer.pressure_pa) => {
+        (AmbientPressure::Constant(barometer), _) if !(min_pa..=max_pa).contains(&barometer.pressure_pa) => {
             let message = format!(
                 "the ambient pressure is {} kPa, which is impossible",
                 short(barometer.pressure_pa / 1e3)
@@ -95,7 +95,7 @@ pub(crate) fn check_ambient(
             let remedy = format!("{allowed}: write the barometer's reading");
             mistakes.add(FindingKind::Implausible, &steps!["ambient_pressure"], message, remedy);
         }
-        (AmbientPressure::Source(source), Some((low, high))) if low < least || high > most => {
+        (AmbientPressure::Source(source), Some((low, high))) if low < min_pa || high > max_pa => {
             let written = |inside: f64| unit_used.map_or(inside, |unit| unit.from_inside(inside));
             let symbol = unit_used.map_or("Pa", Unit::symbol);
             let message = format!(
@@ -105,7 +105,7 @@ pub(crate) fn check_ambient(
                 short(written(high))
             );
             let fitting = |unit: &&'static Unit| {
-                unit.to_inside(written(low)) >= least && unit.to_inside(written(high)) <= most
+                unit.to_inside(written(low)) >= min_pa && unit.to_inside(written(high)) <= max_pa
             };
             let right: Vec<String> = Kind::Pressure
                 .units()

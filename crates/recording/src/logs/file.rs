@@ -27,7 +27,7 @@ impl LogFile {
         LogFile { path: path.to_owned(), bytes: None }
     }
 
-    /// Bytes in memory; `name` stands for the file in messages.
+    /// Bytes in memory; messages call them `name`.
     pub fn from_bytes(name: &Path, bytes: &[u8]) -> Self {
         LogFile { path: name.to_owned(), bytes: Some(bytes.into()) }
     }

@@ -47,6 +47,12 @@ impl Layout {
         self.findings.extend(finding.filter(is_new));
     }
 
+    /// The columns of `wanted` that belong to a group.
+    pub fn members(&self, group: usize, wanted: &[usize]) -> Vec<usize> {
+        let belongs = |index: &usize| self.columns.get(*index).is_some_and(|column| column.group == group);
+        wanted.iter().copied().filter(belongs).collect()
+    }
+
     /// Columns of that name, or with that header as a whole, in a group of that name (any if `topic` is empty).
     pub fn find(&self, topic: &str, field: &str) -> Vec<usize> {
         let in_group = |column: &Column| {

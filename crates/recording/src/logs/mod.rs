@@ -23,6 +23,6 @@ pub use format::{Log, LogFormat, LogFormats, OpenLog, Row, RowSink};
 pub use layout::{Column, Group, Layout};
 pub use mapper_core::{TextEncoding, is_missing_mark};
 pub use mapper_yaml::units::{HeaderUnit, Kind, Reference, Unit, header_unit, split_unit};
-pub use options::{DateOrder, LogOptions, OPTION_KEYS, OptionError, OptionKey};
+pub use options::{DateOrder, LogOptions, OPTION_KEYS};
 pub use survey::{ColumnSurvey, Gap, GroupSurvey, Survey, survey};
 pub use trace::{Trace, sparkline};

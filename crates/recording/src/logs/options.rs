@@ -1,6 +1,7 @@
 //! The user's options for a log, for properties that automatic detection gets wrong.
 
 use mapper_core::TextEncoding;
+use mapper_yaml::keys::{Key, KeyError, set_key, store};
 use mapper_yaml::units::{Kind, parse};
 
 /// The order of the parts of a date.
@@ -17,7 +18,7 @@ pub enum DateOrder {
 /// Properties of a log that the user states; the reader detects the others.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct LogOptions {
-    /// Character between the cells of a line; a blank stands for any number of blanks.
+    /// Character between the cells of a line; a blank matches any number of blanks.
     pub separator: Option<char>,
     /// Decimal sign: `.` or `,`.
     pub decimal: Option<char>,
@@ -43,123 +44,87 @@ pub struct LogOptions {
     pub missing: Vec<f64>,
 }
 
-/// One key of the options.
-#[derive(Debug, Clone, Copy)]
-pub struct OptionKey {
-    /// Name in a channel map, and in the options of the commands.
-    pub name: &'static str,
-    /// Description in one line.
-    pub description: &'static str,
-    /// Example of a value.
-    pub example: &'static str,
-    set: fn(&mut LogOptions, &str) -> Option<()>,
-}
-
-/// An unknown key, or an invalid value.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum OptionError {
-    /// No such key.
-    #[error("there is no key `{key}`; the keys are {}", known_keys())]
-    Key {
-        /// The unknown key.
-        key: String,
-    },
-    /// Not a value of the key.
-    #[error("`{value}` is not a value of `{key}`; write e.g. `{example}`")]
-    Value {
-        /// The key.
-        key: &'static str,
-        /// The invalid value.
-        value: String,
-        /// A valid one.
-        example: &'static str,
-    },
-}
-
-fn known_keys() -> String {
-    let names: Vec<&str> = OPTION_KEYS.iter().map(|key| key.name).collect();
-    names.join(", ")
-}
-
 /// Every key.
-pub const OPTION_KEYS: [OptionKey; 12] = [
-    OptionKey {
+pub const OPTION_KEYS: [Key<LogOptions>; 12] = [
+    Key {
         name: "separator",
         description: "Character between the cells of a line: a character, `tab` or `blank`.",
         example: ";",
-        set: |options, text| set(&mut options.separator, separator(text)),
+        set: |options, text| store(&mut options.separator, separator(text)),
     },
-    OptionKey {
+    Key {
         name: "decimal",
         description: "Decimal sign: `.` or `,`.",
         example: ",",
         set: |options, text| {
-            set(&mut options.decimal, one_char(text).filter(|sign| [',', '.'].contains(sign)))
+            store(&mut options.decimal, one_char(text).filter(|sign| [',', '.'].contains(sign)))
         },
     },
-    OptionKey {
+    Key {
         name: "encoding",
-        description: "How letters are stored: utf-8, latin-1, utf-16le or utf-16be.",
+        description: "Character encoding: utf-8, latin-1, utf-16le or utf-16be.",
         example: "latin-1",
-        set: |options, text| set(&mut options.encoding, TextEncoding::of_name(text)),
+        set: |options, text| store(&mut options.encoding, TextEncoding::of_name(text)),
     },
-    OptionKey {
+    Key {
         name: "names_row",
         description: "Row of the names, from 1; empty rows do not count.",
         example: "1",
-        set: |options, text| set(&mut options.names_row, text.parse().ok().filter(|row| *row > 0)),
+        set: |options, text| store(&mut options.names_row, text.parse().ok().filter(|row| *row > 0)),
     },
-    OptionKey {
+    Key {
         name: "units_row",
-        description: "Row of the units, from 1; 0 where there is none.",
+        description: "Row of the units, from 1; 0 if there is none.",
         example: "2",
-        set: |options, text| set(&mut options.units_row, text.parse().ok()),
+        set: |options, text| store(&mut options.units_row, text.parse().ok()),
     },
-    OptionKey {
+    Key {
         name: "data_row",
         description: "First row of data, from 1; empty rows do not count.",
         example: "3",
-        set: |options, text| set(&mut options.data_row, text.parse().ok().filter(|row| *row > 0)),
+        set: |options, text| store(&mut options.data_row, text.parse().ok().filter(|row| *row > 0)),
     },
-    OptionKey {
+    Key {
         name: "time",
-        description: "Column of the clock; two with ` + ` between them where date and time of day stand apart.",
+        description: "Column of the clock; a column of dates and one of times of day with ` + ` between them.",
         example: "Date + Time",
         set: |options, text| {
             options.time = text.split(" + ").map(|name| name.trim().to_owned()).collect();
             options.time.iter().all(|name| !name.is_empty()).then_some(())
         },
     },
-    OptionKey {
+    Key {
         name: "time_unit",
         description: "Unit of a clock that counts: s, ms, min or h.",
         example: "ms",
-        set: |options, text| set(&mut options.time_unit_s, parse(Kind::Duration, &format!("1 {text}")).ok()),
+        set: |options, text| {
+            store(&mut options.time_unit_s, parse(Kind::Duration, &format!("1 {text}")).ok())
+        },
     },
-    OptionKey {
+    Key {
         name: "date_order",
         description: "Order of the parts of a date: day_first, month_first or year_first.",
         example: "day_first",
-        set: |options, text| set(&mut options.date_order, date_order(text)),
+        set: |options, text| store(&mut options.date_order, date_order(text)),
     },
-    OptionKey {
+    Key {
         name: "rate",
         description: "Samples per second of a log without a clock.",
         example: "10 Hz",
         set: |options, text| {
             let rate_hz = parse(Kind::Frequency, text).ok().filter(|rate| *rate > 0.0);
-            set(&mut options.rate_hz, rate_hz)
+            store(&mut options.rate_hz, rate_hz)
         },
     },
-    OptionKey {
+    Key {
         name: "sheet",
-        description: "Sheet of a workbook; all of them where none is given.",
+        description: "Sheet of a workbook; all sheets if none is named.",
         example: "Data",
-        set: |options, text| set(&mut options.sheet, Some(text.to_owned())),
+        set: |options, text| store(&mut options.sheet, Some(text.to_owned())),
     },
-    OptionKey {
+    Key {
         name: "missing",
-        description: "Values that stand for none, with blanks between them.",
+        description: "Values that mark missing readings, with blanks between them.",
         example: "-9999",
         set: |options, text| {
             let values: Option<Vec<f64>> = text.split_whitespace().map(|word| word.parse().ok()).collect();
@@ -168,11 +133,6 @@ pub const OPTION_KEYS: [OptionKey; 12] = [
         },
     },
 ];
-
-fn set<T>(place: &mut Option<T>, value: Option<T>) -> Option<()> {
-    *place = Some(value?);
-    Some(())
-}
 
 fn one_char(text: &str) -> Option<char> {
     let mut chars = text.chars();
@@ -200,15 +160,9 @@ impl LogOptions {
     /// Sets one key.
     ///
     /// # Errors
-    /// [`OptionError`] for an unknown key and for a value that is not valid for it.
-    pub fn set(&mut self, key: &str, value: &str) -> Result<(), OptionError> {
-        let row = OPTION_KEYS.iter().find(|row| row.name == key);
-        let row = row.ok_or_else(|| OptionError::Key { key: key.to_owned() })?;
-        (row.set)(self, value).ok_or_else(|| OptionError::Value {
-            key: row.name,
-            value: value.to_owned(),
-            example: row.example,
-        })
+    /// [`KeyError`] for an unknown key and for a value that is not valid for it.
+    pub fn set(&mut self, key: &str, value: &str) -> Result<(), KeyError> {
+        set_key(&OPTION_KEYS, self, key, value)
     }
 
     fn keys_set(&self) -> Vec<&'static str> {

@@ -16,11 +16,11 @@ pub const AMBIENT_RANGE_PA: (f64, f64) = (5e4, 1.1e5);
 /// Whether readings between `low` and `high` (SI, without the trimmed share at each end) are possible for a channel.
 pub fn is_plausible(channel: Channel, low: f64, high: f64) -> bool {
     let running = plausible(channel).running;
-    let (least, most) = (*running.start(), *running.end());
+    let (min, max) = (*running.start(), *running.end());
     match kind_of(channel) {
         // 0 at rest, but not all the time. A channel that is always 0 is dead: its unit may be right.
-        Kind::Speed | Kind::MassFlow => high <= most && (high >= least || high == 0.0 && low == 0.0),
-        _ => low >= least && high <= most,
+        Kind::Speed | Kind::MassFlow => high <= max && (high >= min || high == 0.0 && low == 0.0),
+        _ => low >= min && high <= max,
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::logs::trace::Trace;
 use crate::logs::{Log, LogError, Row};
+use mapper_numerics::statistics::nearest_rank;
 use serde::Serialize;
 
 const MAX_INTERVALS: usize = 4096;
@@ -84,10 +85,8 @@ impl Default for ColumnSurvey {
 impl ColumnSurvey {
     /// The quantile of the trace at a share of 0 to 1; NaN without values.
     pub fn quantile(&self, share: f64) -> f64 {
-        let mut values: Vec<f64> = self.trace.means().into_iter().filter(|value| value.is_finite()).collect();
-        values.sort_by(f64::total_cmp);
-        let at = (share.clamp(0.0, 1.0) * values.len().saturating_sub(1) as f64).round() as usize;
-        values.get(at).copied().unwrap_or(f64::NAN)
+        let values = self.trace.means().into_iter().filter(|value| value.is_finite());
+        nearest_rank(values, share).unwrap_or(f64::NAN)
     }
 
     /// Whether there is any value.
@@ -132,15 +131,16 @@ impl GroupSurvey {
         if self.interval_s.is_finite() && settled {
             return self.interval_s;
         }
-        let mut intervals = self.intervals.clone();
-        intervals.sort_by(f64::total_cmp);
-        self.interval_s = intervals.get(intervals.len() / 2).copied().unwrap_or(f64::NAN);
+        self.interval_s = self.median_interval_s();
         self.interval_s
     }
 
+    fn median_interval_s(&self) -> f64 {
+        nearest_rank(&self.intervals, 0.5).unwrap_or(f64::NAN)
+    }
+
     fn finish(&mut self) {
-        self.intervals.sort_by(f64::total_cmp);
-        self.interval_s = self.intervals.get(self.intervals.len() / 2).copied().unwrap_or(f64::NAN);
+        self.interval_s = self.median_interval_s();
         self.intervals = Vec::new();
     }
 }
@@ -164,10 +164,8 @@ pub fn survey(log: &mut dyn Log) -> Result<Survey, LogError> {
         columns: vec![ColumnSurvey::default(); layout.columns.len()],
     };
     let wanted: Vec<usize> = (0..layout.columns.len()).collect();
-    let of_group = |group: usize| -> Vec<usize> {
-        wanted.iter().copied().filter(|column| layout.columns[*column].group == group).collect()
-    };
-    let members: Vec<Vec<usize>> = (0..layout.groups.len()).map(of_group).collect();
+    let members: Vec<Vec<usize>> =
+        (0..layout.groups.len()).map(|group| layout.members(group, &wanted)).collect();
     let mut take = |row: Row<'_>| {
         if let Some(group) = survey.groups.get_mut(row.group).filter(|_| row.t_s.is_finite()) {
             group.add_time(row.t_s);

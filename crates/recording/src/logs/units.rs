@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_quantity_is_refused() {
+    fn text_that_is_not_a_quantity_is_refused() {
         for (kind, text) in [
             (Kind::Fraction, ""),
             (Kind::Pressure, "abc"),

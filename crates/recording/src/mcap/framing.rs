@@ -1,7 +1,7 @@
 //! Records of an MCAP file or chunk, one after the other: opcode, length, body.
 //!
 //! The framing is read here rather than by `mcap`'s readers because those stop at the first fault, and because
-//! wrong lengths must neither allocate nor overflow. `mcap` parses the bodies.
+//! wrong lengths must neither allocate nor overflow.
 
 use std::io::{self, Read};
 

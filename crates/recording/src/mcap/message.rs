@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn what_python_writes_for_nan_reads_as_nan() {
+    fn nan_as_python_writes_it_is_nan() {
         let values =
             fields(r#"{"s":"NaN \" NaN","a":NaN,"b":-Infinity,"c":null}"#, &["a", "b", "c", "s"]).unwrap();
         assert!(values[..3].iter().all(|v| matches!(v, FieldValue::Number(x) if x.is_nan())), "{values:?}");
@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_object_is_refused() {
+    fn messages_that_are_not_objects_are_refused() {
         for message in ["", "[1]", "{", "{\"a\":}", "{\"a\":1} x", "\u{fffd}"] {
             assert_eq!(fields(message, &["a"]), None, "{message}");
         }

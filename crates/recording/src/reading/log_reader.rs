@@ -1,7 +1,7 @@
 //! Reads a log of another program with a channel map.
 
 use crate::channel_mapping::channel_map_mistakes::MapMistakes;
-use crate::channel_mapping::mapped_topics::{MappedQuantity, source_of};
+use crate::channel_mapping::mapped_topics::{MappedQuantity, source_of, sources};
 use crate::logs::units::{kind_of, remedy, unit};
 use crate::logs::{Kind, Layout, LogFile, Reference, Row, Unit, header_unit};
 use crate::samples::log_blocks::BlockAverager;
@@ -59,14 +59,8 @@ pub(crate) fn read_log(
     let mut columns: Vec<usize> = wanted.iter().map(|wanted| wanted.column).collect();
     columns.sort_unstable();
     columns.dedup();
-    let of_group = |group: usize| -> Vec<usize> {
-        columns
-            .iter()
-            .copied()
-            .filter(|column| layout.columns.get(*column).is_some_and(|c| c.group == group))
-            .collect()
-    };
-    let members: Vec<Vec<usize>> = (0..layout.groups.len()).map(of_group).collect();
+    let members: Vec<Vec<usize>> =
+        (0..layout.groups.len()).map(|group| layout.members(group, &columns)).collect();
     // Index of each wanted column among the values of its group.
     let places: Vec<Vec<(usize, Target, &'static Unit)>> = members
         .iter()
@@ -161,25 +155,21 @@ fn describe_restart(restart: Restart, layout: &Layout, group: usize) -> String {
 fn resolve_columns(map: &ChannelMap, layout: &Layout) -> Result<Vec<WantedColumn>, RecordError> {
     let mut mistakes = MapMistakes::default();
     let mut list = Vec::new();
-    let channels = map.channels.iter().map(|(channel, source)| (MappedQuantity::Channel(*channel), source));
-    let elements = map.elements.iter().map(|(element, source)| (MappedQuantity::Element(*element), source));
-    for (reads, source) in channels.chain(elements) {
-        let channel = reads.channel();
-        let at = |key: &str| steps!["channels", channel.symbol(), key].to_vec();
-        let found = column_of(layout, source, &at, &mut mistakes).and_then(|column| {
-            Some((column, unit_of(layout, column, source, Some(channel), &at, &mut mistakes)?))
-        });
-        list.extend(found.map(|(column, unit)| WantedColumn {
-            target: Target::MappedQuantity(reads),
-            column,
-            unit,
-        }));
+    let mut add = |target: Target, source: &ChannelSource, at: &dyn Fn(&str) -> Vec<Step>| {
+        let Some(column) = column_of(layout, source, at, &mut mistakes) else { return };
+        let channel = match target {
+            Target::MappedQuantity(quantity) => Some(quantity.channel()),
+            Target::Ambient => None,
+        };
+        let unit = unit_of(layout, column, source, channel, at, &mut mistakes);
+        list.extend(unit.map(|unit| WantedColumn { target, column, unit }));
+    };
+    for (quantity, source) in sources(map) {
+        let symbol = quantity.channel().symbol();
+        add(Target::MappedQuantity(quantity), source, &|key| steps!["channels", symbol, key].to_vec());
     }
     if let Some(AmbientPressure::Source(source)) = &map.ambient_pressure {
-        let at = |key: &str| steps!["ambient_pressure", key].to_vec();
-        let found = column_of(layout, source, &at, &mut mistakes)
-            .and_then(|column| Some((column, unit_of(layout, column, source, None, &at, &mut mistakes)?)));
-        list.extend(found.map(|(column, unit)| WantedColumn { target: Target::Ambient, column, unit }));
+        add(Target::Ambient, source, &|key| steps!["ambient_pressure", key].to_vec());
     }
     mistakes.into_result(map)?;
     Ok(list)
@@ -224,11 +214,8 @@ fn column_of(
         );
         return None;
     }
-    let message;
-    let remedy;
-    if columns.is_empty() {
+    let (message, remedy) = if columns.is_empty() {
         let names: Vec<&str> = layout.columns.iter().map(|column| column.name.as_str()).collect();
-        message = format!("the log has no column `{}`", source.field);
         let guess = closest(&source.field, &names).map(|name| format!("did you mean `{name}`? "));
         let shown: Vec<&str> = names.iter().copied().take(30).collect();
         let more = if names.len() > shown.len() {
@@ -236,16 +223,21 @@ fn column_of(
         } else {
             String::new()
         };
-        remedy = format!("{}its columns are {}{more}", guess.unwrap_or_default(), shown.join(", "));
+        (
+            format!("the log has no column `{}`", source.field),
+            format!("{}its columns are {}{more}", guess.unwrap_or_default(), shown.join(", ")),
+        )
     } else {
         let groups: Vec<&str> = columns
             .iter()
             .filter_map(|column| layout.groups.get(layout.columns.get(*column)?.group))
             .map(|group| group.name.as_str())
             .collect();
-        message = format!("the log has `{}` in several groups", source.field);
-        remedy = format!("name one with `topic`: {}", groups.join(", "));
-    }
+        (
+            format!("the log has `{}` in several groups", source.field),
+            format!("name one with `topic`: {}", groups.join(", ")),
+        )
+    };
     mistakes.add(FindingKind::WrongValue, &at("field"), message, remedy);
     None
 }
@@ -278,23 +270,18 @@ fn unit_of(
         mistakes.add(FindingKind::Unit, &at("field"), message, format!("add e.g. `unit: {example}`"));
         return None;
     };
-    let known = header_unit(recorded);
-    match known.filter(|known| known.kind == kind) {
-        Some(known) => Some(known.unit),
-        None => match unit(kind, recorded) {
-            Ok(unit) => Some(unit),
-            Err(error) => {
-                let message =
-                    format!("the log gives {name} in `{recorded}`, which is not a unit of {}", kind.name());
-                mistakes.add(
-                    FindingKind::Unit,
-                    &at("field"),
-                    message,
-                    format!("{}; write `unit`", remedy(kind, &error)),
-                );
-                None
-            }
-        },
+    if let Some(known) = header_unit(recorded).filter(|known| known.kind == kind) {
+        return Some(known.unit);
+    }
+    match unit(kind, recorded) {
+        Ok(unit) => Some(unit),
+        Err(error) => {
+            let message =
+                format!("the log gives {name} in `{recorded}`, which is not a unit of {}", kind.name());
+            let remedy = format!("{}; write `unit`", remedy(kind, &error));
+            mistakes.add(FindingKind::Unit, &at("field"), message, remedy);
+            None
+        }
     }
 }
 

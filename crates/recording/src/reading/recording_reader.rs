@@ -1,7 +1,7 @@
 //! Reads a recording of this or another program.
 
 use crate::channel_mapping::channel_map_mistakes::MapMistakes;
-use crate::channel_mapping::mapped_topics::{MappedQuantity, source_of};
+use crate::channel_mapping::mapped_topics::{MappedQuantity, source_of, sources};
 use crate::channel_mapping::plausibility::Readings;
 use crate::logs::{LogError, LogFile, Unit};
 use crate::reading::log_reader::{is_mcap, log_of_path, read_log};
@@ -66,16 +66,8 @@ pub fn read_recording(
     }
 }
 
-/// Reads only the steps of a recording of this program, from their markers. A step without an end and without a following step ends
-/// where it begins.
-///
-/// # Errors
-/// As [`read_recording`].
-pub fn read_steps(path: &Path, options: &ReadOptions) -> Result<Vec<StepMarker>, RecordError> {
-    Ok(read_marks(path, options)?.0)
-}
-
-/// Reads only the steps and the events of a recording of this program.
+/// Reads only the steps, from their markers, and the events of a recording of this program. A step without an end and without a
+/// following step ends where it begins.
 ///
 /// # Errors
 /// As [`read_recording`].
@@ -85,7 +77,7 @@ pub fn read_marks(path: &Path, options: &ReadOptions) -> Result<(Vec<StepMarker>
     Ok((recording.steps, recording.events))
 }
 
-/// Reads a recording from memory; `name` stands for the file in messages. Otherwise as [`read_recording`].
+/// Reads a recording from memory; messages call it `name`. Otherwise as [`read_recording`].
 ///
 /// # Errors
 /// As [`read_recording`].
@@ -262,11 +254,6 @@ fn find_missing_fields(
         field: source.field.clone(),
     };
     absent.map(warning).collect()
-}
-
-fn sources(map: &ChannelMap) -> impl Iterator<Item = (MappedQuantity, &ChannelSource)> {
-    let channels = map.channels.iter().map(|(channel, source)| (MappedQuantity::Channel(*channel), source));
-    channels.chain(map.elements.iter().map(|(element, source)| (MappedQuantity::Element(*element), source)))
 }
 
 /// The series of a recording.

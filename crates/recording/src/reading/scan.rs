@@ -94,17 +94,13 @@ fn pass<S: Sink>(
                 scanned.warnings.push(ReadWarning::Truncated { offset: end });
                 break;
             }
-            Frame::Record { offset, opcode: op::CHUNK, body } if joins => {
-                end = offset + 9 + body.len() as u64;
-                batch.push(offset, body);
-            }
-            Frame::Record { offset, opcode: op::CHUNK, body } => {
-                end = offset + 9 + body.len() as u64;
-                scanned.chunk(offset, body, options, &mut unpacker, sink);
-            }
             Frame::Record { offset, opcode, body } => {
                 end = offset + 9 + body.len() as u64;
-                scanned.record(offset, opcode, body, options, sink);
+                match opcode {
+                    op::CHUNK if joins => batch.push(offset, body),
+                    op::CHUNK => scanned.chunk(offset, body, options, &mut unpacker, sink),
+                    _ => scanned.record(offset, opcode, body, options, sink),
+                }
             }
         }
         if scanned.records > options.max_messages {

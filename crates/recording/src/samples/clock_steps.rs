@@ -43,7 +43,7 @@ pub(crate) fn repair_set_back(
             .values()
             .filter(on_both_sides)
             .map(|builder| {
-                builder.breaks().iter().find(same).filter(|found| builder.goes_on_from(found)).copied()
+                builder.breaks().iter().find(same).filter(|found| builder.continues_from(found)).copied()
             })
             .collect();
         let Some(breaks) =

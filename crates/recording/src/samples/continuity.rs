@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 const SIDE_SAMPLES: usize = 20;
 const MIN_SIDE_SAMPLES: usize = 8;
 
-/// Maximum number of gaps that are judged: a clock is set once or twice.
+/// Maximum number of gaps that are checked: a clock is set once or twice.
 const MAX_GAPS: usize = 100;
 
 /// Standard errors within which two levels, or two slopes, are equal.
@@ -47,8 +47,8 @@ impl LineFit {
         if samples.len() < MIN_SIDE_SAMPLES || spread <= 0.0 {
             return None;
         }
-        let together: f64 = samples.iter().map(|(t_s, value)| (t_s - mean_s) * (value - mean_value)).sum();
-        let slope_per_s = together / spread;
+        let cross_sum: f64 = samples.iter().map(|(t_s, value)| (t_s - mean_s) * (value - mean_value)).sum();
+        let slope_per_s = cross_sum / spread;
         let level = mean_value - slope_per_s * mean_s;
         let residual = |(t_s, value): &(f64, f64)| (value - level - slope_per_s * t_s).powi(2);
         let sigma = (samples.iter().map(residual).sum::<f64>() / (count - 2.0)).sqrt();
@@ -73,14 +73,18 @@ enum GapEvidence {
     Nothing,
 }
 
-fn judge_gap(builder: &SeriesBuilder, (from_ns, to_ns): (u64, u64), interval_s: f64) -> Option<GapEvidence> {
+fn gap_evidence(
+    builder: &SeriesBuilder,
+    (from_ns, to_ns): (u64, u64),
+    interval_s: f64,
+) -> Option<GapEvidence> {
     let (before, after) = builder.sides(from_ns, to_ns, SIDE_SAMPLES)?;
     let (before, after) = (LineFit::through(&before)?, LineFit::through(&after)?);
-    let off = after.level - (before.level + before.slope_per_s * interval_s);
+    let jump = after.level - (before.level + before.slope_per_s * interval_s);
     let tolerance = EQUAL_SIGMAS * before.level_sigma.hypot(after.level_sigma);
     let slope_sigma = before.slope_sigma_per_s.hypot(after.slope_sigma_per_s);
     let gap_s = to_ns.saturating_sub(from_ns) as f64 / 1e9;
-    if off.abs() > tolerance {
+    if jump.abs() > tolerance {
         return Some(GapEvidence::Paused);
     }
     let moves = before.slope_per_s.abs() > MIN_SLOPE_SIGMAS * slope_sigma
@@ -106,7 +110,7 @@ pub(crate) fn repair_gaps<'a>(
     }
 }
 
-/// The first gap that a set clock has made, and its excess over the usual interval, ns.
+/// The first gap that is due to a clock that was set, and its excess over the usual interval, ns.
 fn find_clock_step(builders: &BTreeMap<MappedQuantity, SeriesBuilder>) -> Option<((u64, u64), u64)> {
     // Late messages cause gaps as well.
     if !builders.values().all(SeriesBuilder::is_in_order) {
@@ -118,7 +122,7 @@ fn find_clock_step(builders: &BTreeMap<MappedQuantity, SeriesBuilder>) -> Option
     let limit_s = MAX_BACK_S.max(MAX_BACK_INTERVALS * interval_s);
     reference.gaps(limit_s).take(MAX_GAPS).find_map(|gap| {
         let all: Vec<GapEvidence> =
-            builders.values().filter_map(|builder| judge_gap(builder, gap, interval_s)).collect();
+            builders.values().filter_map(|builder| gap_evidence(builder, gap, interval_s)).collect();
         let set = all.contains(&GapEvidence::Set) && !all.contains(&GapEvidence::Paused);
         set.then(|| (gap, (gap.1 - gap.0).saturating_sub((interval_s * 1e9).round() as u64)))
     })

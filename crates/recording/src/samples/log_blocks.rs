@@ -1,5 +1,8 @@
 //! Averages a fast log to the rate of the identification.
 
+use crate::samples::log_clock::TakeRow;
+use mapper_numerics::statistics::nearest_rank;
+
 /// Rate of the means, Hz: that of this program's own recordings. Identification evaluates transients of seconds.
 const RATE_HZ: f64 = 10.0;
 
@@ -22,20 +25,21 @@ pub(crate) struct BlockAverager {
 #[derive(Debug, Default)]
 enum State {
     #[default]
-    Looking,
-    AsItIs(Pace),
+    /// The rate is not known yet.
+    Undecided,
+    Unchanged(RecentIntervals),
     Averaging(Block),
 }
 
 /// The latest intervals of a slow log.
 #[derive(Debug)]
-struct Pace {
+struct RecentIntervals {
     last_s: f64,
     /// A bit for each interval, set if it was short.
     short: u64,
 }
 
-impl Pace {
+impl RecentIntervals {
     /// Whether most of the intervals have become short.
     fn becomes_fast(&mut self, t_s: f64) -> bool {
         let step_s = t_s - self.last_s;
@@ -55,21 +59,18 @@ struct Block {
     sums: Vec<(f64, f64)>,
 }
 
-/// Receives time and values; NaN for an empty cell.
-pub(crate) type TakeRow<'a> = dyn FnMut(f64, &[f64]) + 'a;
-
 impl BlockAverager {
     pub(crate) fn push(&mut self, t_s: f64, values: &[f64], take: &mut TakeRow<'_>) {
         match &mut self.state {
-            State::AsItIs(pace) => {
-                if pace.becomes_fast(t_s) {
+            State::Unchanged(intervals) => {
+                if intervals.becomes_fast(t_s) {
                     self.state = State::Averaging(Block::default());
                     return self.push(t_s, values, take);
                 }
                 take(t_s, values);
             }
             State::Averaging(block) => block.push(t_s, values, take),
-            State::Looking => {
+            State::Undecided => {
                 self.first.push((t_s, values.to_owned()));
                 if self.first.len() >= RATE_ROWS {
                     self.decide(take);
@@ -80,7 +81,7 @@ impl BlockAverager {
 
     /// Returns the remaining rows.
     pub(crate) fn finish(&mut self, take: &mut TakeRow<'_>) {
-        if matches!(self.state, State::Looking) {
+        if matches!(self.state, State::Undecided) {
             self.decide(take);
         }
         if let State::Averaging(block) = &mut self.state {
@@ -94,13 +95,13 @@ impl BlockAverager {
     }
 
     fn decide(&mut self, take: &mut TakeRow<'_>) {
-        let mut intervals_s: Vec<f64> =
-            self.first.windows(2).map(|pair| pair[1].0 - pair[0].0).filter(|step| *step > 0.0).collect();
-        intervals_s.sort_by(f64::total_cmp);
-        let typical_s = intervals_s.get(intervals_s.len() / 2).copied().unwrap_or(f64::INFINITY);
-        let fast = typical_s * MAX_UNAVERAGED_HZ < 1.0;
-        let slow = || State::AsItIs(Pace { last_s: f64::NAN, short: 0 });
-        self.state = if fast { State::Averaging(Block::default()) } else { slow() };
+        let intervals_s = self.first.windows(2).map(|pair| pair[1].0 - pair[0].0).filter(|step| *step > 0.0);
+        let typical_s = nearest_rank(intervals_s, 0.5).unwrap_or(f64::INFINITY);
+        self.state = if typical_s * MAX_UNAVERAGED_HZ < 1.0 {
+            State::Averaging(Block::default())
+        } else {
+            State::Unchanged(RecentIntervals { last_s: f64::NAN, short: 0 })
+        };
         for (t_s, values) in std::mem::take(&mut self.first) {
             self.push(t_s, &values, take);
         }
@@ -150,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fast_log_comes_at_ten_hertz_with_the_means_of_times_and_values() {
+    fn a_fast_log_is_averaged_to_ten_hertz() {
         let out = through(100.0, 1000);
         assert_eq!(out.len(), 100);
         for (index, (t_s, values)) in out.iter().enumerate() {
@@ -176,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slow_log_stays_as_it_is() {
+    fn a_slow_log_is_not_changed() {
         let out = through(10.0, 300);
         assert_eq!(out.len(), 300);
         assert!(

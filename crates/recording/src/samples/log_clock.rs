@@ -36,7 +36,7 @@ pub(crate) struct LogClock {
     pub(crate) stray_s: f64,
 }
 
-/// Receives the time and the values of a row.
+/// Receives the time and the values of a row; an empty cell is NaN.
 pub(crate) type TakeRow<'a> = dyn FnMut(f64, &[f64]) + 'a;
 
 impl LogClock {
@@ -50,40 +50,42 @@ impl LogClock {
             self.stray(t_s);
             return Ok(());
         }
-        let mut place = Vec::new();
-        if let Some((held_s, pending)) = self.pending.take() {
+        let mut row_values = Vec::new();
+        if let Some((pending_s, pending_values)) = self.pending.take() {
             match self.last_s {
                 // The very first row: the next one shows whether it is valid.
-                None if (t_s - held_s).abs() > STRAY_S => self.stray(held_s),
-                Some(last_s) if self.goes_back(last_s, held_s) => {
+                None if (t_s - pending_s).abs() > STRAY_S => self.stray(pending_s),
+                Some(last_s) if self.goes_back(last_s, pending_s) => {
                     if self.goes_back(last_s, t_s) {
-                        return Err(Restart { row: self.rows - 1, from_s: last_s, to_s: held_s });
+                        return Err(Restart { row: self.rows - 1, from_s: last_s, to_s: pending_s });
                     }
-                    self.stray(held_s);
+                    self.stray(pending_s);
                 }
                 Some(last_s)
-                    if held_s - last_s > STRAY_S
-                        && held_s - t_s > STRAY_S
+                    if pending_s - last_s > STRAY_S
+                        && pending_s - t_s > STRAY_S
                         && !self.goes_back(last_s, t_s) =>
                 {
-                    self.stray(held_s);
+                    self.stray(pending_s);
                 }
-                _ => self.accept(held_s, &pending, take),
+                _ => self.accept(pending_s, &pending_values, take),
             }
-            place = pending;
+            row_values = pending_values;
         }
-        place.clear();
-        place.extend_from_slice(values);
-        self.pending = Some((t_s, place));
+        row_values.clear();
+        row_values.extend_from_slice(values);
+        self.pending = Some((t_s, row_values));
         Ok(())
     }
 
     /// Forwards the last row.
     pub(crate) fn finish(&mut self, take: &mut TakeRow<'_>) {
-        let Some((held_s, pending)) = self.pending.take() else { return };
+        let Some((pending_s, pending_values)) = self.pending.take() else { return };
         match self.last_s {
-            Some(last_s) if held_s - last_s > STRAY_S || self.goes_back(last_s, held_s) => self.stray(held_s),
-            _ => self.accept(held_s, &pending, take),
+            Some(last_s) if pending_s - last_s > STRAY_S || self.goes_back(last_s, pending_s) => {
+                self.stray(pending_s)
+            }
+            _ => self.accept(pending_s, &pending_values, take),
         }
     }
 
@@ -147,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_that_starts_again_says_where() {
+    fn a_clock_that_starts_again_is_reported_with_its_row() {
         let run = || (0..100).map(|row| f64::from(row) / 10.0);
         let times_s: Vec<f64> = run().chain(run()).collect();
         let restart = through(&times_s).2.unwrap();

@@ -71,7 +71,7 @@ impl SeriesBuilder {
     }
 
     /// Whether times continue from a break without a jump forward until they have caught up; after a late message they jump.
-    pub(crate) fn goes_on_from(&self, found: &ClockBreak) -> bool {
+    pub(crate) fn continues_from(&self, found: &ClockBreak) -> bool {
         let Some(before_ns) = found.index.checked_sub(1).and_then(|at| self.times_ns.get(at)) else {
             return false;
         };

@@ -2,6 +2,7 @@
 
 use crate::ReadWarning;
 use mapper_core::{Channel, JUMPS, Series, StepKind, StepMarker, VALVE_JUMP_RATIO};
+use mapper_numerics::statistics::{self, nearest_rank};
 use std::collections::BTreeMap;
 
 /// Time over which means are compared before and after, s.
@@ -56,7 +57,7 @@ pub(crate) fn steps_from_jumps(
     };
     let starts_s: Vec<f64> = std::iter::once(first_s).chain(grid.jumps_s()).collect();
     let ends_s = starts_s.iter().skip(1).map(|next_s| next_s - grid.interval_s).chain([last_s]);
-    let held = |channel: Channel, start_s: f64, end_s: f64| {
+    let median_at_end = |channel: Channel, start_s: f64, end_s: f64| {
         series.get(&channel).map_or(f64::NAN, |series| median(series, 0.5 * (start_s + end_s), end_s))
     };
     let steps: Vec<StepMarker> = starts_s
@@ -70,8 +71,8 @@ pub(crate) fn steps_from_jumps(
             end_s: end_s.max(*start_s),
             from: None,
             to: None,
-            p3_pa: held(Channel::P3, *start_s, end_s),
-            valve_opening_ratio: held(Channel::ValveCommand, *start_s, end_s),
+            p3_pa: median_at_end(Channel::P3, *start_s, end_s),
+            valve_opening_ratio: median_at_end(Channel::ValveCommand, *start_s, end_s),
         })
         .collect();
     let channels: Vec<&str> = grid.signals.iter().map(|signal| signal.channel.symbol()).collect();
@@ -83,22 +84,22 @@ pub(crate) fn steps_from_jumps(
 /// Removes the steps in which the shaft is at rest: a soak before the first point, the end of a run. Renumbers the others.
 pub(crate) fn drop_rest_steps(steps: Vec<StepMarker>, series: &BTreeMap<Channel, Series>) -> Vec<StepMarker> {
     let Some(speed) = series.get(&Channel::ShaftSpeed) else { return steps };
-    let rests = |step: &StepMarker| median(speed, step.start_s, step.end_s) < MAX_REST_RPM;
-    if steps.iter().all(rests) {
+    let is_at_rest = |step: &StepMarker| median(speed, step.start_s, step.end_s) < MAX_REST_RPM;
+    if steps.iter().all(is_at_rest) {
         // A dead sensor, or a file without a run: neither shows when the machine is at rest.
         return steps;
     }
-    let turning = steps.into_iter().filter(|step| !rests(step));
+    let turning = steps.into_iter().filter(|step| !is_at_rest(step));
     turning.enumerate().map(|(index, step)| StepMarker { index, ..step }).collect()
 }
 
 /// NaN without readings.
 fn median(series: &Series, start_s: f64, end_s: f64) -> f64 {
     let values = series.slice(start_s, end_s).1.iter().filter(|value| value.is_finite());
-    mapper_numerics::statistics::median(values).unwrap_or(f64::NAN)
+    statistics::median(values).unwrap_or(f64::NAN)
 }
 
-/// Means of the signals over equal intervals; empty intervals are left out, so that a jump in a gap appears after it.
+/// Means of the signals over equal intervals, without the empty ones: a jump in a gap appears after the gap.
 struct Grid {
     interval_s: f64,
     t_s: Vec<f64>,
@@ -126,10 +127,8 @@ impl Grid {
             })
             .collect();
         let typical_s = |series: &Series| {
-            let mut steps: Vec<f64> =
-                series.t_s.windows(2).take(4096).map(|pair| pair[1] - pair[0]).collect();
-            steps.sort_unstable_by(f64::total_cmp);
-            steps.get(steps.len() / 2).copied().unwrap_or(GRID_S)
+            let intervals_s = series.t_s.windows(2).take(4096).map(|pair| pair[1] - pair[0]);
+            nearest_rank(intervals_s, 0.5).unwrap_or(GRID_S)
         };
         let first_s = found.iter().filter_map(|(.., s)| s.t_s.first().copied()).fold(f64::INFINITY, f64::min);
         let last_s =
@@ -150,12 +149,12 @@ impl Grid {
         }
         let t_s: Vec<f64> = bins.keys().map(|bin| first_s + *bin as f64 * interval_s).collect();
         let signals = found.iter().enumerate().map(|(index, (channel, ratio, _))| {
-            let mut held = f64::NAN;
+            let mut mean = f64::NAN;
             let mut values: Vec<f64> = Vec::with_capacity(bins.len());
             for bin in bins.values() {
                 let (sum, count) = bin.get(index).copied().unwrap_or_default();
-                held = if count > 0.0 { sum / count } else { held };
-                values.push(held);
+                mean = if count > 0.0 { sum / count } else { mean };
+                values.push(mean);
             }
             // Before its first reading a signal has its first value.
             let first = values.iter().copied().find(|value| value.is_finite()).unwrap_or(0.0);
@@ -304,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_loop_corrects_behind_a_jump_is_no_jump_of_its_own() {
+    fn corrections_of_a_speed_controller_after_a_jump_are_not_jumps() {
         let found = starts(&run(&[(0.0, 125e3), (60.0, 78e3), (66.0, 80e3), (120.0, 83e3)], 180.0));
         assert_eq!(found.len(), 3, "{found:?}");
         assert!((found[1] - 60.0).abs() <= 1.0 && (found[2] - 120.0).abs() <= 1.0, "{found:?}");

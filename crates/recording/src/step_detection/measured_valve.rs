@@ -29,12 +29,12 @@ pub(crate) fn reversal_share(command: &Series) -> Option<f64> {
 
 /// The command reconstructed from the position: for each step, the opening at its end.
 pub(crate) fn hold_at_step_ends(position: &mut Series, steps: &[StepMarker]) {
-    let mut held = Vec::with_capacity(position.values.len());
+    let mut openings = Vec::with_capacity(position.values.len());
     for t_s in &position.t_s {
         let at = steps.partition_point(|step| step.start_s <= *t_s).max(1) - 1;
-        held.push(steps.get(at).map_or(f64::NAN, |step| step.valve_opening_ratio));
+        openings.push(steps.get(at).map_or(f64::NAN, |step| step.valve_opening_ratio));
     }
-    position.values = held;
+    position.values = openings;
 }
 
 #[cfg(test)]

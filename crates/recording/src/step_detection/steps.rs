@@ -115,7 +115,7 @@ pub(crate) fn steps_from_commands(
         .zip(ends_s)
         .enumerate()
         .map(|(index, ((start_s, settled_s), end_s))| {
-            let held = |command: Option<&Series>| command.and_then(|c| held_number(c, *settled_s));
+            let command_value = |command: Option<&Series>| command.and_then(|c| held_number(c, *settled_s));
             // For a rig without a P3 command: the P3 that it reached.
             let reached = || {
                 let p3 = series.get(&Channel::P3)?;
@@ -128,14 +128,17 @@ pub(crate) fn steps_from_commands(
                 end_s,
                 from: None,
                 to: None,
-                p3_pa: commands[0].1.map_or_else(reached, |_| held(commands[0].1)).unwrap_or(f64::NAN),
-                valve_opening_ratio: held(commands[1].1).unwrap_or(f64::NAN),
+                p3_pa: commands[0]
+                    .1
+                    .map_or_else(reached, |_| command_value(commands[0].1))
+                    .unwrap_or(f64::NAN),
+                valve_opening_ratio: command_value(commands[1].1).unwrap_or(f64::NAN),
             }
         })
         .collect()
 }
 
-/// Steps that are mostly a gap in the readings. A pause and a clock that was set at rest look alike.
+/// Steps that are mostly a gap in the readings: the log paused, or its clock was set at rest.
 pub(crate) fn hollow_steps(
     steps: &[StepMarker],
     series: &BTreeMap<Channel, Series>,
@@ -213,8 +216,9 @@ fn find_changes(command: &Series) -> Vec<Change> {
     let mut current: Option<f64> = None;
     let mut changes = Vec::new();
     for (t_s, value) in command.t_s.iter().zip(&command.values).filter(|(_, value)| value.is_finite()) {
-        let before = current
-            .filter(|held| (value - held).abs() > COMMAND_TOLERANCE_RATIO * value.abs().max(held.abs()));
+        let before = current.filter(|before| {
+            (value - before).abs() > COMMAND_TOLERANCE_RATIO * value.abs().max(before.abs())
+        });
         changes.extend(before.map(|before| Change { t_s: *t_s, before, after: *value }));
         if before.is_some() || current.is_none() {
             current = Some(*value);

@@ -1,4 +1,4 @@
-//! Quality and source time of readings: a message if either is unusual. The normal case is a good reading taken when it arrived.
+//! Quality and source time of readings. Only unusual ones are recorded: the others are good and were taken on arrival.
 
 use crate::format::PROVENANCE_TOPIC;
 use crate::writing::recording_file::{McapFile, add_channel};
@@ -14,10 +14,10 @@ const TIME_TOLERANCE_S: f64 = 1e-4;
 /// Unusual provenance of one reading.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Origin {
-    /// Run time at which the source took it, s; none: on arrival.
+    /// Run time of the reading at its source, s; `None`: on arrival.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     source_t_s: Option<f64>,
-    /// None: good.
+    /// `None`: good.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     quality: Option<Quality>,
 }
@@ -45,8 +45,8 @@ impl ProvenanceWriter {
             let source_t_s = from.source_t_s.get(index).copied();
             let source_t_s = source_t_s
                 .filter(|source_s| source_s.is_finite() && (source_s - t_s).abs() > TIME_TOLERANCE_S);
-            let says = quality.is_some() || source_t_s.is_some();
-            says.then_some((from.channel, Origin { source_t_s, quality }))
+            let is_unusual = quality.is_some() || source_t_s.is_some();
+            is_unusual.then_some((from.channel, Origin { source_t_s, quality }))
         };
         let message: BTreeMap<Channel, Origin> = batch.provenance.iter().filter_map(origin_of).collect();
         if message.is_empty() { None } else { serde_json::to_value(message).ok() }

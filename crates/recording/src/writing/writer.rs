@@ -9,14 +9,13 @@ use crate::{BatchError, RecordError};
 use mapper_core::{Channel, Event, Group, SampleBatch, StepMarker};
 use mcap::McapResult;
 use mcap::records::MessageHeader;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// A topic of numeric fields that is being written. Every batch has the same ones, and making schemas again for
-/// each would cost more than writing the samples.
-struct Layout {
+/// A topic of numeric fields in the file. All batches have the same topics: a schema for each batch would cost more than the samples.
+struct TopicLayout {
     topic: &'static str,
     /// Names and units of the fields.
     fields: Vec<(String, String)>,
@@ -25,7 +24,7 @@ struct Layout {
     prefixes: Vec<Vec<u8>>,
 }
 
-/// Columns of one batch that go into one topic.
+/// Columns of one batch for one topic.
 struct Table<'a> {
     /// Position in the writer's layouts.
     layout: usize,
@@ -53,7 +52,7 @@ pub struct RecordingWriter {
     event_channel: u16,
     steps_written: u32,
     events_written: u32,
-    layouts: Vec<Layout>,
+    layouts: Vec<TopicLayout>,
     line: Vec<u8>,
     /// Fields without a reading are not written at all.
     omit_absent: bool,
@@ -148,9 +147,7 @@ impl RecordingWriter {
             if let Some(message) = self.provenance.message(batch, index) {
                 let channel_id = self.provenance.channel(&mut self.mcap);
                 let channel_id = self.check_write(channel_id)?;
-                self.line.clear();
-                self.line.extend_from_slice(message.to_string().as_bytes());
-                self.write_line(channel_id, sequence, log_time)?;
+                self.write_json(channel_id, sequence, log_time, &message)?;
             }
             self.last_sample_s = Some(*t_s);
         }
@@ -163,11 +160,9 @@ impl RecordingWriter {
     /// As [`write_batch`](Self::write_batch).
     pub fn write_event(&mut self, event: &Event) -> Result<(), RecordError> {
         let log_time = self.advance(event.t_s)?;
-        self.line.clear();
-        self.line.extend_from_slice(event_message(event).to_string().as_bytes());
         let sequence = self.events_written;
         self.events_written = sequence.wrapping_add(1);
-        self.write_line(self.event_channel, sequence, log_time)
+        self.write_json(self.event_channel, sequence, log_time, &event_message(event))
     }
 
     /// Writes the start or the end of a step.
@@ -177,11 +172,9 @@ impl RecordingWriter {
     pub fn write_step(&mut self, step: &StepMarker, phase: StepPhase) -> Result<(), RecordError> {
         let (t_s, message) = step_message(step, phase);
         let log_time = self.advance(t_s)?;
-        self.line.clear();
-        self.line.extend_from_slice(message.to_string().as_bytes());
         let sequence = self.steps_written;
         self.steps_written = sequence.wrapping_add(1);
-        self.write_line(self.step_channel, sequence, log_time)
+        self.write_json(self.step_channel, sequence, log_time, &message)
     }
 
     /// Writes index and summary, and hands the file to the operating system.
@@ -189,27 +182,30 @@ impl RecordingWriter {
     /// # Errors
     /// [`RecordError::Write`] as the system reports; flushed data stay readable.
     pub fn finish(mut self) -> Result<(), RecordError> {
-        self.refuse_after_failure()?;
-        let flushed = self.mcap.flush();
-        self.check_write(flushed)?;
-        self.saved_until_s = self.last_sample_s;
+        self.flush()?;
         // Ends with a flush of the file.
         let finished = self.mcap.finish();
         self.check_write(finished).map(drop)
     }
 
-    /// Ends the chunk and hands it to the operating system when the clock enters a new second. Returns `log_time`.
+    /// Flushes the chunk when the clock enters a new second. Returns `log_time`.
     fn advance(&mut self, t_s: f64) -> Result<u64, RecordError> {
         let log_time = self.log_time_ns(t_s)?;
         let second = t_s.floor() as i64;
         if self.second.is_some_and(|open| second != open) {
-            self.refuse_after_failure()?;
-            let flushed = self.mcap.flush();
-            self.check_write(flushed)?;
-            self.saved_until_s = self.last_sample_s;
+            self.flush()?;
         }
         self.second = Some(second);
         Ok(log_time)
+    }
+
+    /// Ends the chunk and hands it to the operating system.
+    fn flush(&mut self) -> Result<(), RecordError> {
+        self.refuse_after_failure()?;
+        let flushed = self.mcap.flush();
+        self.check_write(flushed)?;
+        self.saved_until_s = self.last_sample_s;
+        Ok(())
     }
 
     fn log_time_ns(&self, t_s: f64) -> Result<u64, RecordError> {
@@ -219,6 +215,18 @@ impl RecordingWriter {
             Ok(log_time) if t_s.is_finite() => Ok(log_time),
             _ => Err(self.input_error(BatchError::Time { t_s })),
         }
+    }
+
+    fn write_json(
+        &mut self,
+        channel_id: u16,
+        sequence: u32,
+        log_time: u64,
+        message: &Value,
+    ) -> Result<(), RecordError> {
+        self.line.clear();
+        self.line.extend_from_slice(message.to_string().as_bytes());
+        self.write_line(channel_id, sequence, log_time)
     }
 
     fn write_line(&mut self, channel_id: u16, sequence: u32, log_time: u64) -> Result<(), RecordError> {
@@ -369,7 +377,7 @@ impl RecordingWriter {
             })
             .collect();
         let fields = fields.iter().map(|field| (field.name.to_owned(), field.unit.to_owned())).collect();
-        self.layouts.push(Layout { topic, fields, channel_id, prefixes });
+        self.layouts.push(TopicLayout { topic, fields, channel_id, prefixes });
         Ok(self.layouts.len() - 1)
     }
 }

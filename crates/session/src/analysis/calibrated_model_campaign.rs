@@ -95,8 +95,8 @@ fn with_backend(text: &str, block: &str) -> String {
             }
         }
         if inside {
-            let loose = line.trim().is_empty() || line.starts_with('#');
-            if loose {
+            let is_blank_or_comment = line.trim().is_empty() || line.starts_with('#');
+            if is_blank_or_comment {
                 held_lines += line;
                 held_lines.push('\n');
             } else {

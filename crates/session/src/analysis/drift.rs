@@ -52,16 +52,16 @@ impl Session<'_> {
         take_air_and_probe(&mut model, &config);
         let (recordings, config, zero) = subtract_first_zero(recordings, config, campaign);
         let fingerprints: Vec<Option<String>> = recorded.iter().map(fingerprint).collect();
-        // Of a run that was resumed after its soak, the first recording has only that.
+        // The first recording of a run that was resumed after its soak contains only the soak.
         let directory = |place: usize| recorded.get(place).map(|recorded_run| recorded_run.path.parent());
-        let rests = |(place, recording): (usize, &Recording)| {
+        let is_soak_only = |(place, recording): (usize, &Recording)| {
             recording.steps.is_empty() && directory(place) == directory(place + 1)
         };
         let runs: Vec<RecordedRun<'_>> = recordings
             .iter()
             .zip(&fingerprints)
             .enumerate()
-            .filter(|(place, (recording, _))| !rests((*place, recording)))
+            .filter(|(place, (recording, _))| !is_soak_only((*place, recording)))
             .map(|(_, (recording, fingerprint))| RecordedRun {
                 recording,
                 fingerprint: fingerprint.as_deref(),
@@ -87,8 +87,8 @@ fn subtract_first_zero(
     let zero = recordings.first().map_or(ZeroOutcome::NotAsked, |first| {
         ZeroOutcome::of(first, &config, campaign.zero.map(Into::into))
     });
-    let off = |recording: Recording| zero.take_off(recording, config.clone()).0;
-    let recordings = recordings.into_iter().map(off).collect();
+    let recordings =
+        recordings.into_iter().map(|recording| zero.take_off(recording, config.clone()).0).collect();
     // Declared offsets are kept: they are not drift. The zero determines them far better than the model, whose own errors would appear as
     // changes.
     (recordings, config, zero)

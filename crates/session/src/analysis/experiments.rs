@@ -19,7 +19,7 @@ const MAX_POINTS: usize = 40;
 const T3_STEPS_K: [f64; 3] = [100.0, 50.0, -100.0];
 const OIL_STEPS_K: [f64; 2] = [40.0, -20.0];
 /// Margin to the maximum T3, K. The test cell fluctuates, sensors may read high, and a guard watches this limit.
-const T3_ROOM_K: f64 = 15.0;
+const T3_MARGIN_K: f64 = 15.0;
 /// Duration of such a step, s. Housings need minutes to respond.
 const DWELL_S: f64 = 300.0;
 /// Duration of a soak, s, as in the shipped campaigns.
@@ -55,14 +55,14 @@ fn soak(campaign: &Campaign, map: &ChannelMap) -> Option<Experiment> {
     let residual_sigma =
         expected_after_zero(identification_with(campaign, map), &settings, SOAK_S, campaign.boundary.p1_pa)
             .declared;
-    let left_sigma = |channel| {
+    let offset_sigma_k = |channel| {
         residual_sigma
             .get(&channel)
             .map_or(settings.temperature_sigma_k, |residual_sigma| residual_sigma.offset_sigma)
     };
     let soak = AtRest {
         duration_s: SOAK_S,
-        left_sigma_k: std::array::from_fn(|place| left_sigma(AtRest::CHANNELS[place])),
+        left_sigma_k: std::array::from_fn(|place| offset_sigma_k(AtRest::CHANNELS[place])),
     };
     let rest =
         OperatingPoint { speed_rpm: 0.0, valve_opening_ratio: campaign.points.first()?.valve_opening_ratio };
@@ -113,7 +113,7 @@ fn temperature_steps(
 ) -> Vec<Experiment> {
     let now = campaign.boundary;
     let is_below_limit =
-        |to_k: &f64| campaign.limits.t3_max_k.is_none_or(|limit_k| *to_k <= limit_k - T3_ROOM_K);
+        |to_k: &f64| campaign.limits.t3_max_k.is_none_or(|limit_k| *to_k <= limit_k - T3_MARGIN_K);
     let held = |boundary: &BoundaryConditions| {
         let steady = reach(model, point, boundary, campaign.follow_outlet, &campaign.limits).ok()?;
         let BoundaryConditions { p3_pa, t3_k, oil_temperature_k, .. } = steady.boundary;

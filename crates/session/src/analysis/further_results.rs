@@ -1,6 +1,6 @@
 //! Results in addition to the compressor map: thermal model, turbine, pictures of h and of errors.
 
-use crate::recording::files::{json_text, write_new};
+use crate::recording::files::{Existing, json_text, write_files};
 use crate::recording::recording_file::Recorded;
 use crate::{Session, SessionError};
 use mapper_chart::Figure;
@@ -60,18 +60,12 @@ impl Session<'_> {
             contents.push(("error.svg", figure.to_svg().into_bytes()));
             contents.push(("error.png", png(&figure)?));
         }
-        std::fs::create_dir_all(out).map_err(SessionError::file("create", out))?;
-        let mut files = Vec::new();
-        for (name, bytes) in &contents {
-            let path = out.join(name);
-            write_new(&path, bytes)?;
-            files.push(path);
-        }
+        let files = write_files(out, &contents, Existing::Kept)?;
         Ok(RigFiles { files, turbine, thermal: identified.thermal })
     }
 }
 
-fn png(figure: &Figure) -> Result<Vec<u8>, SessionError> {
+pub(crate) fn png(figure: &Figure) -> Result<Vec<u8>, SessionError> {
     Ok(figure.to_png(2.0).map_err(ExportError::failed("png"))?)
 }
 

@@ -86,7 +86,7 @@ impl Identified {
         with_messages(value)
     }
 
-    /// What the file of the points contains.
+    /// Content of the points file.
     pub(crate) fn points_json(&self) -> Value {
         let mut value = json!({
             "reference": self.config.reference,
@@ -313,7 +313,7 @@ fn same_campaign(recorded: &[Recorded]) -> Result<Option<&Campaign>, SessionErro
     Ok(Some(campaign))
 }
 
-/// Whether the file is worth a look for truth: a log of another program has none, and a recording in memory has no file.
+/// Whether the file may contain truth: a log of another program does not.
 fn may_have_truth(recorded: &Recorded) -> bool {
     recorded.read.format.is_some()
 }

@@ -16,10 +16,10 @@ const BROWSERS: [&str; 7] = [
     "msedge",
     "microsoft-edge",
 ];
-/// Longest wait for the browser: a page of 60 points takes it 3 s.
-const PATIENCE: Duration = Duration::from_secs(60);
-/// Interval between two looks at whether it has ended.
-const INTERVAL: Duration = Duration::from_millis(50);
+/// Maximum time of the browser: a page of 60 points takes 3 s.
+const MAX_DURATION: Duration = Duration::from_secs(60);
+/// Interval of the checks whether it has ended.
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Why a page could not be printed.
 #[derive(Debug, thiserror::Error)]
@@ -40,13 +40,13 @@ pub enum PrintError {
     NoPdf {
         /// Its name.
         browser: &'static str,
-        /// How it ended, and its last words.
+        /// How it ended, and the last line of its log.
         reason: String,
     },
 }
 
-/// The PDF of a page. `directory`: where the browser may read and write for a moment; one that is packed as a snap sees no others than those of
-/// the user.
+/// The PDF of a page. `directory` is for temporary files of the browser, which as a snap package has access only to the user's own
+/// directories.
 ///
 /// # Errors
 /// [`PrintError`].
@@ -70,12 +70,13 @@ pub fn page_as_pdf(page: &str, directory: &Path) -> Result<Vec<u8>, PrintError> 
     }
     command.arg("page.html").current_dir(folder.path()).stdin(Stdio::null()).stdout(Stdio::null());
     command.stderr(File::create(at("log")).map_err(failed)?);
-    let ended = ended_within_patience(&mut command).map_err(failed)?;
+    let ended = run_until_deadline(&mut command).map_err(failed)?;
     match (std::fs::read(at("page.pdf")), ended) {
         (Ok(pdf), Some(status)) if status.success() && pdf.starts_with(b"%PDF") => Ok(pdf),
-        (_, None) => {
-            Err(PrintError::NoPdf { browser, reason: format!("not ready after {} s", PATIENCE.as_secs()) })
-        }
+        (_, None) => Err(PrintError::NoPdf {
+            browser,
+            reason: format!("not ready after {} s", MAX_DURATION.as_secs()),
+        }),
         (_, Some(status)) => {
             let log = std::fs::read(at("log")).unwrap_or_default();
             let log = String::from_utf8_lossy(&log);
@@ -85,14 +86,14 @@ pub fn page_as_pdf(page: &str, directory: &Path) -> Result<Vec<u8>, PrintError> 
     }
 }
 
-/// Waits for the end of a command; `None` if it had to be ended.
-fn ended_within_patience(command: &mut Command) -> io::Result<Option<ExitStatus>> {
-    let (mut child, began) = (command.spawn()?, Instant::now());
-    while began.elapsed() < PATIENCE {
+/// Runs a command, and kills it after [`MAX_DURATION`]; `None` if it was killed.
+fn run_until_deadline(command: &mut Command) -> io::Result<Option<ExitStatus>> {
+    let (mut child, start) = (command.spawn()?, Instant::now());
+    while start.elapsed() < MAX_DURATION {
         if let Some(status) = child.try_wait()? {
             return Ok(Some(status));
         }
-        std::thread::sleep(INTERVAL);
+        std::thread::sleep(POLL_INTERVAL);
     }
     child.kill()?;
     child.wait().map(|_| None)

@@ -244,7 +244,7 @@ impl Session<'_> {
         page_of(&identified, &report, &others, gap)
     }
 
-    /// Writes the files of an identification. A file that cannot be written costs the later ones, and not the results themselves.
+    /// Writes the files of an identification. After a file that cannot be written, the others are not written; the results are still returned.
     fn write_results(
         &self,
         origin: &Provenance,
@@ -300,7 +300,7 @@ impl Session<'_> {
 /// The files of an identification in their directory.
 struct ResultFiles<'a> {
     directory: &'a Path,
-    /// Why the first file that could not be written could not; none is written after it.
+    /// The error of the first file that could not be written; none is written after it.
     failed: Result<(), SessionError>,
 }
 

@@ -1,11 +1,11 @@
 //! Analyses one side of a machine from a log without steps: its parameters, and the cause that explains the residual.
 
+use crate::analysis::further_results::png;
 use crate::plan::planning::nominal_model;
-use crate::recording::files::{Existing, json_text, write_file};
+use crate::recording::files::{Existing, json_text, write_files};
 use crate::recording::identification_config::declared;
 use crate::recording::recording_file::{Recorded, check_machine};
 use crate::{Session, SessionError};
-use mapper_core::ExportError;
 use mapper_diagnose::driven::cause_search::{Ask, Diagnosis, Which, diagnose};
 use mapper_diagnose::driven::{DrivenOutcome, Rows, identify};
 use mapper_diagnose::gap::causes::calibration::Calibration;
@@ -17,9 +17,6 @@ use serde::Serialize;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-/// Name of the report's files.
-const STEM: &str = "transient";
 
 /// Result of a log without steps for one side.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -91,7 +88,7 @@ impl Session<'_> {
 /// Writes text, JSON and pictures of the result to a directory. Creates it if missing and returns the files.
 ///
 /// # Errors
-/// As [`write_file`].
+/// As [`write_file`](crate::write_file).
 pub fn write_transient(
     diagnosis: &Transient,
     machine: &str,
@@ -102,19 +99,11 @@ pub fn write_transient(
         Some(outcome) => transient_figure(machine, outcome),
         None => why_figure(machine, &diagnosis.why),
     };
-    let png = figure.to_png(2.0).map_err(ExportError::failed("png"))?;
-    let contents: [(String, Vec<u8>); 4] = [
-        (format!("{STEM}.json"), json_text(&json!(diagnosis))?.into_bytes()),
-        (format!("{STEM}.txt"), diagnosis.text().into_bytes()),
-        (format!("{STEM}.svg"), figure.to_svg().into_bytes()),
-        (format!("{STEM}.png"), png),
+    let contents = [
+        ("transient.json", json_text(&json!(diagnosis))?.into_bytes()),
+        ("transient.txt", diagnosis.text().into_bytes()),
+        ("transient.svg", figure.to_svg().into_bytes()),
+        ("transient.png", png(&figure)?),
     ];
-    std::fs::create_dir_all(directory).map_err(SessionError::file("create", directory))?;
-    let mut files = Vec::new();
-    for (name, bytes) in &contents {
-        let path = directory.join(name);
-        write_file(&path, bytes, existing)?;
-        files.push(path);
-    }
-    Ok(files)
+    write_files(directory, &contents, existing)
 }

@@ -13,10 +13,11 @@ use mapper_identify::IdentifyError;
 use mapper_maps::table::DescriptionError;
 use mapper_observe::OtherMachine;
 use mapper_planner::PlanError;
-use mapper_recording::logs::{LogError, OptionError};
+use mapper_recording::logs::LogError;
 use mapper_recording::{ChannelMapError, RecordError};
 use mapper_runner::{RunError, StepSourceError};
 use mapper_sequence::SequenceError;
+use mapper_yaml::keys::KeyError;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -266,7 +267,7 @@ pub enum SessionError {
     Log(#[from] LogError),
     /// A log option is wrong.
     #[error(transparent)]
-    LogOption(#[from] OptionError),
+    LogOption(#[from] KeyError),
     /// The channel map cannot be read or has mistakes.
     #[error(transparent)]
     ChannelMap(#[from] ChannelMapError),

@@ -1,7 +1,8 @@
 //! Why a command on map files ended early.
 
-use mapper_maps::table::{DescriptionError, KeyError};
+use mapper_maps::table::DescriptionError;
 use mapper_maps::{AssembleError, HeatCorrectionError, MapFitError, TurbineFitError};
+use mapper_yaml::keys::KeyError;
 use std::path::PathBuf;
 
 /// Errors of commands on map files.

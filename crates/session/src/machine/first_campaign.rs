@@ -1,6 +1,6 @@
 //! The first campaign of a machine: a commented file, its nominal map and a channel map, made from the wheel diameter.
 
-use crate::machine::first_map::{FirstMap, MapLines};
+use crate::machine::first_map::FirstMap;
 use crate::machine::first_request::{FirstCampaignRequest, FirstRig, significant_digits};
 use crate::recording::files::write_new;
 use crate::{Registry, SessionError};
@@ -16,7 +16,7 @@ const CHANNELS: &str = include_str!("../../templates/channels.yaml");
 const ZERO: &str = include_str!("../../templates/zero.yaml");
 /// Noise of the flow meter of campaigns/turbo_a.yaml, whose wheel has 52 mm, kg/s; meters are chosen by their full scale.
 const FLOW_NOISE_KG_S: f64 = 1.5e-4;
-/// Speed limit over the highest speed of the grid. Judgement: room for the overshoot of a jump; your machine's own limit replaces it.
+/// Speed limit over the highest speed of the grid: room for the overshoot of a jump, until the user writes the machine's own limit.
 const SPEED_LIMIT_RATIO: f64 = 1.1;
 /// Points of a speed line.
 const POINTS: usize = 6;
@@ -133,20 +133,26 @@ fn campaign_text(request: &FirstCampaignRequest, map: &FirstMap) -> String {
         ("inlet_tap", tap(request.inlet_diameter_m, "compressor.inlet_diameter")),
         ("outlet_tap", tap(request.outlet_diameter_m, "compressor.outlet_diameter")),
         ("probe", format!("{} mm", significant_digits(1e3 * request.probe_diameter_m.unwrap_or(0.0), 3))),
-        ("lines", lines(&map.lines)),
+        ("lines", lines(&map.speeds_rpm)),
         // A log contains its own standstill, if there was one.
         ("zero", if request.rig == FirstRig::Log { String::new() } else { ZERO.to_owned() }),
-        ("speed_limit", format!("{} krpm", (SPEED_LIMIT_RATIO * map.lines.highest_rpm() / 1e3).ceil())),
+        (
+            "speed_limit",
+            format!(
+                "{} krpm",
+                (SPEED_LIMIT_RATIO * map.speeds_rpm.last().copied().unwrap_or(0.0) / 1e3).ceil()
+            ),
+        ),
     ];
     // The backend has placeholders of its own.
     fill_template(&CAMPAIGN.replace("{{backend}}\n", request.rig.backend()), &values)
 }
 
-fn lines(lines: &MapLines) -> String {
+fn lines(speeds_rpm: &[f64]) -> String {
     let line = |rpm: &f64| {
         format!("    - {{speed_corrected: {} krpm, points: {POINTS}}}", significant_digits(rpm / 1e3, 6))
     };
-    lines.speeds_rpm.iter().map(line).collect::<Vec<_>>().join("\n")
+    speeds_rpm.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
 /// A size of the similar machine in mm.

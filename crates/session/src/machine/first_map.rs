@@ -23,25 +23,11 @@ const INTERPOLATED_LINES: usize = 3;
 /// Points of a line in the table of a similar compressor. They are densest near surge, where the flow changes most with pressure.
 const POINTS_PER_LINE: usize = 13;
 
-/// Corrected speeds of a grid.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct MapLines {
-    /// In order, rpm.
-    pub speeds_rpm: Vec<f64>,
-}
-
-impl MapLines {
-    /// Evenly spaced speeds, rounded to 100 rpm inside the range.
-    fn evenly_spaced((low_rpm, high_rpm): (f64, f64)) -> Self {
-        let step_rpm = (high_rpm - low_rpm) / (GRID_LINES - 1) as f64;
-        let speed = |index: usize| (low_rpm + step_rpm * index as f64).clamp(low_rpm, high_rpm);
-        MapLines { speeds_rpm: (0..GRID_LINES).map(|index| (speed(index) / 100.0).round() * 100.0).collect() }
-    }
-
-    /// The highest speed, rpm.
-    pub fn highest_rpm(&self) -> f64 {
-        self.speeds_rpm.last().copied().unwrap_or(0.0)
-    }
+/// Evenly spaced speeds, rounded to 100 rpm inside the range.
+fn evenly_spaced_rpm((low_rpm, high_rpm): (f64, f64)) -> Vec<f64> {
+    let step_rpm = (high_rpm - low_rpm) / (GRID_LINES - 1) as f64;
+    let speed = |index: usize| (low_rpm + step_rpm * index as f64).clamp(low_rpm, high_rpm);
+    (0..GRID_LINES).map(|index| (speed(index) / 100.0).round() * 100.0).collect()
 }
 
 /// The nominal map of a first campaign.
@@ -51,8 +37,8 @@ pub(crate) struct FirstMap {
     pub file_name: String,
     /// The file's text.
     pub text: String,
-    /// Speeds of the grid.
-    pub lines: MapLines,
+    /// Corrected speeds of the grid in order, rpm.
+    pub speeds_rpm: Vec<f64>,
     /// Choke flow of the machine's own map over that of a similar compressor at equal speed; `None` without an own map.
     pub flow_ratio: Option<f64>,
 }
@@ -62,7 +48,7 @@ impl FirstMap {
     ///
     /// # Errors
     /// [`FirstMapError`] if the machine's own map cannot be read, or has no line in the speed range.
-    pub fn of(registry: &Registry, request: &FirstCampaignRequest) -> Result<Self, SessionError> {
+    pub(crate) fn of(registry: &Registry, request: &FirstCampaignRequest) -> Result<Self, SessionError> {
         match &request.map {
             Some(path) => map_from_file(registry, request, path),
             None => Ok(similar_map(request)),
@@ -132,9 +118,9 @@ fn map_from_file(
         .copied()
         .filter(|rpm| (requested_rpm.0..=requested_rpm.1).contains(rpm))
         .collect();
-    let lines = match (selected_rpm.first(), selected_rpm.last()) {
-        _ if MAP_LINE_COUNTS.contains(&selected_rpm.len()) => MapLines { speeds_rpm: selected_rpm },
-        (Some(low), Some(high)) if low < high => MapLines::evenly_spaced((*low, *high)),
+    let speeds_rpm = match (selected_rpm.first(), selected_rpm.last()) {
+        _ if MAP_LINE_COUNTS.contains(&selected_rpm.len()) => selected_rpm,
+        (Some(low), Some(high)) if low < high => evenly_spaced_rpm((*low, *high)),
         _ => return Err(Box::new(FirstMapError::NoLines { requested_rpm, map_rpm }).into()),
     };
     let similar = ClosedFormMap { wheel_diameter_m: request.wheel_diameter_m };
@@ -143,7 +129,7 @@ fn map_from_file(
         file_name: format!("{}_map.csv", request.name),
         flow_ratio: Some(choke(&map) / choke(&similar)),
         text,
-        lines,
+        speeds_rpm,
     })
 }
 
@@ -154,7 +140,7 @@ fn similar_map(request: &FirstCampaignRequest) -> FirstMap {
     let reference = request.reference.state;
     let speed_factor = TURBO_A_WHEEL_M / wheel_diameter_m;
     let default = (speed_factor * TURBO_A_SPEEDS_RPM.0, speed_factor * TURBO_A_SPEEDS_RPM.1);
-    let lines = MapLines::evenly_spaced(request.speeds_rpm.unwrap_or(default));
+    let speeds_rpm = evenly_spaced_rpm(request.speeds_rpm.unwrap_or(default));
     let mut text = format!(
         "# Nominal map of a compressor with a {} mm wheel, geometrically similar to turbo_a. Replace it with your own map if you have one.\n\
          # Corrected to {} ({}).\n\
@@ -163,7 +149,7 @@ fn similar_map(request: &FirstCampaignRequest) -> FirstMap {
         request.reference.name,
         request.reference.printed
     );
-    for rpm in &lines.speeds_rpm {
+    for rpm in &speeds_rpm {
         let speed_sae_rpm = rpm * reference.speed_factor_to(ReferenceState::SAE);
         let (surge_pr, choke_pr) =
             (map.surge_point(speed_sae_rpm).1, 1.0 + 0.15 * (map.surge_point(speed_sae_rpm).1 - 1.0));
@@ -176,5 +162,5 @@ fn similar_map(request: &FirstCampaignRequest) -> FirstMap {
             text += &format!("{rpm:.0},{flow_kg_s:.6},{pressure_ratio:.5},{:.5}\n", point.efficiency);
         }
     }
-    FirstMap { file_name: format!("{}_map.csv", request.name), text, lines, flow_ratio: None }
+    FirstMap { file_name: format!("{}_map.csv", request.name), text, speeds_rpm, flow_ratio: None }
 }

@@ -131,14 +131,16 @@ fn soak_concern(campaign: &Campaign, model: &Model) -> Option<Concern> {
         let middle_k = |from_s: f64| tc_k(from_s + 0.5 * third_s);
         (middle_k(duration_s - third_s) - middle_k(duration_s - 3.0 * third_s)) / (2.0 * third_s / 60.0)
     };
-    let enough = |duration_s: f64| {
+    let is_enough = |duration_s: f64| {
         drift_k_min(duration_s).abs() <= settings.drift_k_min && tc_k(duration_s) - ambient_k <= 0.5 * WARM_K
     };
-    if enough(soak.duration_s) {
+    if is_enough(soak.duration_s) {
         return None;
     }
-    let longer =
-        (1..).map(|i| SOAK_STEP_S * f64::from(i)).take_while(|s| *s <= LONGEST_SOAK_S).find(|s| enough(*s));
+    let longer = (1..)
+        .map(|i| SOAK_STEP_S * f64::from(i))
+        .take_while(|s| *s <= LONGEST_SOAK_S)
+        .find(|s| is_enough(*s));
     let remedy = longer.map_or_else(
         || "a soak of a day is not long enough; check that oil and cell have the same temperature, and the masses of the machine".to_owned(),
         |s| format!("soak {:.0} min or longer", s / 60.0),

@@ -6,7 +6,7 @@ use crate::recording::identification_config::identification;
 use crate::rig::estimates::{append_samples, config_for_single_steps, retain_last_two_steps};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::SequenceSource;
-use mapper_core::{Plan, PlanStep, Recording, SampleBatch, StepMarker, step_number};
+use mapper_core::{IdentifiedPoint, Plan, PlanStep, Recording, SampleBatch, StepMarker, step_number};
 use mapper_identify::{IdentifyConfig, identify_each};
 use mapper_physics::simulation::model::Model;
 use mapper_runner::{StepSource, StepSourceError};
@@ -67,7 +67,7 @@ impl StepSource for ScriptedSteps {
     }
 
     fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError> {
-        let next = self.script.next_step(self.finished.take()).map_err(source_error)?;
+        let next = self.script.next_step(self.finished.take()).map_err(StepSourceError::new)?;
         let Some(next) = next else { return Ok(None) };
         self.settling = match next.end {
             EndCondition::Dwell => None,
@@ -85,15 +85,8 @@ impl StepSource for ScriptedSteps {
     fn after_step(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
         let Some(mut step) = self.current_step.take() else { return Ok(()) };
         retain_last_two_steps(&mut self.recent, marker);
-        let identified = identify_each(&self.recent, &self.config).map_err(source_error)?.pop();
-        self.finished = Some(StepResult {
-            number: step_number(step.index),
-            target: step.to,
-            from: step.from,
-            start_s: marker.start_s,
-            end_s: marker.end_s,
-            identified: identified.and_then(Result::ok),
-        });
+        let identified = identify_each(&self.recent, &self.config).map_err(StepSourceError::new)?.pop();
+        self.finished = Some(result_of(&step, marker, identified.and_then(Result::ok)));
         (step.start_s, step.dwell_s) = (marker.start_s, marker.end_s - marker.start_s);
         step.predicted.minutes = step.dwell_s / 60.0;
         self.done.push(step);
@@ -103,14 +96,7 @@ impl StepSource for ScriptedSteps {
     /// Reports to the script that a result is missing.
     fn after_skipped_step(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
         let Some(step) = self.current_step.take() else { return Ok(()) };
-        self.finished = Some(StepResult {
-            number: step_number(step.index),
-            target: step.to,
-            from: step.from,
-            start_s: marker.start_s,
-            end_s: marker.end_s,
-            identified: None,
-        });
+        self.finished = Some(result_of(&step, marker, None));
         Ok(())
     }
 
@@ -119,8 +105,15 @@ impl StepSource for ScriptedSteps {
     }
 }
 
-fn source_error(error: impl std::error::Error + Send + Sync + 'static) -> StepSourceError {
-    StepSourceError::new(error)
+fn result_of(step: &PlanStep, marker: &StepMarker, identified: Option<IdentifiedPoint>) -> StepResult {
+    StepResult {
+        number: step_number(step.index),
+        target: step.to,
+        from: step.from,
+        start_s: marker.start_s,
+        end_s: marker.end_s,
+        identified,
+    }
 }
 
 fn with_steps(mut plan: Plan, steps: Vec<PlanStep>) -> Plan {

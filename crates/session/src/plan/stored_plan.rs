@@ -2,6 +2,7 @@
 
 use crate::SessionError;
 use crate::recording::files::read_at_most;
+use crate::recording::journal::both_known_and_differ;
 use mapper_campaign::Campaign;
 use mapper_core::{OperatingPoint, Plan, PlanInputHashes, PlanStep, step_number};
 use std::path::Path;
@@ -31,15 +32,12 @@ pub fn stored_plan(path: &Path, now: &PlanInputHashes, campaign: &Campaign) -> R
     let stored: Plan = serde_json::from_slice(&bytes)
         .map_err(|source| SessionError::NotAPlan { path: path.to_owned(), source })?;
     let then = &stored.made_from;
-    // A plan made without a rig may be run on any rig.
-    let differ = |then: &Option<String>, now: &Option<String>| {
-        then.as_ref().zip(now.as_ref()).is_some_and(|(then, now)| then != now)
-    };
     let changed: Vec<&str> = [
         ("the campaign", then.campaign_sha256 != now.campaign_sha256),
         ("the nominal model", then.model_sha256 != now.model_sha256),
         ("the sequence script", then.script_sha256 != now.script_sha256),
-        ("the description of the rig", differ(&then.rig_sha256, &now.rig_sha256)),
+        // A plan made without a rig may be run on any rig.
+        ("the description of the rig", both_known_and_differ(&then.rig_sha256, &now.rig_sha256)),
     ]
     .into_iter()
     .filter_map(|(what, changed)| changed.then_some(what))

@@ -11,7 +11,7 @@ const CHANNELS: [Channel; 5] = [Channel::T1, Channel::T2, Channel::Tc, Channel::
 /// Duration ratio of the longer soak to the planned one.
 const LONGER_RATIO: f64 = 2.0;
 /// Minimum relative reduction of an offset by a longer soak that is reported.
-const WORTH_IT_RATIO: f64 = 0.3;
+const MIN_REDUCTION_RATIO: f64 = 0.3;
 
 /// The remark of a plan; `None` without a zero or without declared offsets.
 pub(crate) fn zero_remark(campaign: &Campaign) -> Option<PlanRemark> {
@@ -31,7 +31,7 @@ pub(crate) fn zero_remark(campaign: &Campaign) -> Option<PlanRemark> {
     longer_offset_sigmas.retain(|channel, longer| {
         offset_sigmas
             .get(channel)
-            .is_some_and(|expected_sigma| *longer < (1.0 - WORTH_IT_RATIO) * expected_sigma)
+            .is_some_and(|expected_sigma| *longer < (1.0 - MIN_REDUCTION_RATIO) * expected_sigma)
     });
     (!offset_sigmas.is_empty()).then_some(PlanRemark::OffsetsAfterSoak {
         soak_s: soak.duration_s,

@@ -3,6 +3,7 @@
 use mapper_campaign::campaign::{CalibrationRule, Date};
 use mapper_campaign::{CalibrationWarning, Campaign};
 use mapper_core::{Channel, IdentifiedPoint, Recording, Verdict};
+use mapper_numerics::statistics::range;
 
 /// Adds the defects of the sensors' calibrations to each point. If the campaign requires calibrations, the point is unusable.
 pub(crate) fn warn(
@@ -15,9 +16,7 @@ pub(crate) fn warn(
         let Some(step) = recording.steps.iter().find(|step| step.index == point.step) else { continue };
         let readings = |channel: Channel| {
             let values = recording.series.get(&channel)?.slice(step.start_s, step.end_s).1;
-            let finite = || values.iter().copied().filter(|value| value.is_finite());
-            let (low, high) =
-                (finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max));
+            let (low, high) = range(values.iter().copied().filter(|value| value.is_finite()));
             (low <= high).then_some((low, high))
         };
         for CalibrationWarning { warning, .. } in campaign.calibration_warnings(day, readings) {

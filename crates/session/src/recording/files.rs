@@ -3,7 +3,7 @@
 use crate::SessionError;
 use serde::Serialize;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
 /// Treatment of an existing file.
@@ -32,6 +32,25 @@ pub fn write_file(path: &Path, bytes: &[u8], existing: Existing) -> Result<(), S
         .and_then(|file| file.persist(path).map_err(|error| error.error))
         .map(drop)
         .map_err(SessionError::file("write", path))
+}
+
+/// Writes files to a directory, which is created if it is missing, and returns their paths.
+///
+/// # Errors
+/// As [`write_file`]; [`SessionError::File`] if the directory cannot be created.
+pub(crate) fn write_files(
+    directory: &Path,
+    contents: &[(&str, Vec<u8>)],
+    existing: Existing,
+) -> Result<Vec<PathBuf>, SessionError> {
+    std::fs::create_dir_all(directory).map_err(SessionError::file("create", directory))?;
+    let mut files = Vec::with_capacity(contents.len());
+    for (name, bytes) in contents {
+        let path = directory.join(name);
+        write_file(&path, bytes, existing)?;
+        files.push(path);
+    }
+    Ok(files)
 }
 
 /// Writes a file under a temporary name in the same directory, so that the final name never belongs to an incomplete file, even if the disk is
@@ -88,7 +107,7 @@ mod tests {
         assert_eq!(read_at_most(&path, 9).unwrap(), b"first");
         write_file(&path, b"third", Existing::Replaced).unwrap();
         assert_eq!(read_at_most(&path, 9).unwrap(), b"third");
-        // Nothing else is left in the directory.
+        // No temporary file remains in the directory.
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 

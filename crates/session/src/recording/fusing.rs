@@ -1,4 +1,4 @@
-//! Fuses several sensors of a channel into one reading, and takes the humidity over that was measured. All commands use the same procedure.
+//! Fuses several sensors of a channel into one reading, and uses the measured humidity. All commands use the same procedure.
 
 use crate::recording::recording_file::Recorded;
 use mapper_campaign::Campaign;

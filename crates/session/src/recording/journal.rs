@@ -71,21 +71,23 @@ impl Identity {
 
     /// Names of the properties that differ.
     pub fn differences(&self, now: &Identity) -> Vec<&'static str> {
-        let differ = |then: &Option<String>, now: &Option<String>| {
-            then.as_ref().zip(now.as_ref()).is_some_and(|(then, now)| then != now)
-        };
         [
             ("the machine", self.machine != now.machine || self.serial_number != now.serial_number),
             ("the campaign", self.campaign_sha256 != now.campaign_sha256),
             ("the nominal model", self.model_sha256 != now.model_sha256),
             ("the plan", self.plan_sha256 != now.plan_sha256),
             ("the backend", self.backend != now.backend || self.settings_sha256 != now.settings_sha256),
-            ("the description of the rig", differ(&self.rig_sha256, &now.rig_sha256)),
+            ("the description of the rig", both_known_and_differ(&self.rig_sha256, &now.rig_sha256)),
         ]
         .into_iter()
         .filter_map(|(what, differs)| differs.then_some(what))
         .collect()
     }
+}
+
+/// Whether two hashes differ; an unknown one does not.
+pub(crate) fn both_known_and_differ(then: &Option<String>, now: &Option<String>) -> bool {
+    then.as_ref().zip(now.as_ref()).is_some_and(|(then, now)| then != now)
 }
 
 /// One journal entry.
@@ -225,7 +227,7 @@ mod tests {
 
     /// Cuts the journal at every byte: all complete lines are read, and the journal can be continued.
     #[test]
-    fn a_journal_cut_anywhere_holds_what_was_written_before() {
+    fn a_journal_cut_anywhere_keeps_the_complete_lines() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("journal");
         let mut journal = Journal::open(&path, false).unwrap();
@@ -273,7 +275,7 @@ mod tests {
 
     /// A journal that names a soak: the recording decides whether there was one.
     #[test]
-    fn a_soak_counts_only_if_the_recording_holds_it() {
+    fn a_soak_counts_only_if_the_recording_contains_it() {
         use mapper_core::{Event, EventKind};
         for (recorded, soaked) in [(EventKind::SoakStarted, false), (EventKind::SoakEnded, true)] {
             let directory = tempfile::tempdir().unwrap();
@@ -298,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn anything_else_is_no_journal_and_no_panic() {
+    fn files_without_journal_lines_have_no_parts() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("journal");
         for bytes in [

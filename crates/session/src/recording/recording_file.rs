@@ -48,7 +48,7 @@ impl Recorded {
         Recorded::described(file, read, map, given)
     }
 
-    /// Same as [`read`](Recorded::read), from memory; `name` stands for the file in messages.
+    /// Same as [`read`](Recorded::read), from memory; messages call it `name`.
     ///
     /// # Errors
     /// As [`read`](Recorded::read).

@@ -4,7 +4,7 @@ use crate::recording::journal::{Identity, JournalPart, read_journal};
 use crate::{SessionError, recording::run_directory};
 use mapper_campaign::Campaign;
 use mapper_core::{EventKind, Plan, PlanStep, StepKind, StepMarker};
-use mapper_recording::{ReadOptions, read_marks, read_steps};
+use mapper_recording::{ReadOptions, read_marks};
 use mapper_runner::{StepSource, StepSourceError};
 use std::collections::{BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
@@ -73,7 +73,7 @@ impl InterruptedRun {
             return Ok(());
         };
         let path = self.directory.join(&part.recording);
-        let steps = read_steps(&path, &ReadOptions::default())?;
+        let (steps, _) = read_marks(&path, &ReadOptions::default())?;
         let is_complete =
             |step: &&StepMarker| step.index < FIRST_REPEAT_INDEX && part.saved.contains(&step.index);
         let complete_steps: Vec<StepMarker> = steps.iter().filter(is_complete).copied().collect();

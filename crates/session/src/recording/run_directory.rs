@@ -104,12 +104,14 @@ pub fn recording_of(path: &Path) -> PathBuf {
     if path.is_dir() { path.join(RECORDING) } else { path.to_owned() }
 }
 
-/// Why a directory is no run, and a run that it holds, if any.
+/// The error of a directory without a recording; it names a run in the directory, if any.
 pub(crate) fn no_recording_in(directory: &Path) -> std::io::Error {
     let entries = std::fs::read_dir(directory).into_iter().flatten().flatten();
     let runs = entries.map(|entry| entry.path()).filter(|path| path.join(RECORDING).exists());
     let why = match runs.max() {
-        Some(run) => format!("it has no recording, but runs; give one of them, e.g. {}", run.display()),
+        Some(run) => {
+            format!("it contains runs, but no recording; give one of the runs, e.g. {}", run.display())
+        }
         None => format!("it has no {RECORDING}; give the directory of a run, or a file"),
     };
     std::io::Error::new(ErrorKind::NotFound, why)
@@ -120,7 +122,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_directory_of_runs_names_its_last_run() {
+    fn the_error_of_a_directory_of_runs_names_the_last_run() {
         let parent = tempfile::tempdir().unwrap();
         assert!(!no_recording_in(parent.path()).to_string().contains("e.g."));
         for day in [24, 25] {

@@ -62,7 +62,7 @@ mod tests {
 
     /// Two campaigns may give one controller different names.
     #[test]
-    fn one_controller_is_one_rig_whatever_it_is_called() {
+    fn one_controller_under_two_names_is_one_rig() {
         let directory = tempfile::tempdir().unwrap();
         let states = RigStates::new(directory.path());
         let place = ["at 10.0.0.3:502 unit 255".to_owned()];

@@ -399,7 +399,7 @@ mod tests {
     }
 
     #[test]
-    fn one_runner_has_a_rig_and_one_that_died_is_explained() {
+    fn a_rig_has_one_runner_and_an_abandoned_run_is_reported() {
         let directory = tempfile::tempdir().unwrap();
         let states = RigStates::new(directory.path());
         let mut first = states.claim("opc.tcp://bench:4840", None).unwrap();
@@ -439,7 +439,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_read_locks_out() {
+    fn an_unreadable_entry_locks_the_rig_out() {
         let directory = tempfile::tempdir().unwrap();
         let states = RigStates::new(directory.path());
         for (file, bytes) in [
@@ -484,9 +484,9 @@ mod tests {
         }
     }
 
-    /// Whoever acknowledges and whoever begins a run at the same time cannot both succeed in having the lock file.
+    /// Otherwise a run that starts during an acknowledgement could lock a file that is then removed.
     #[test]
-    fn acknowledging_leaves_the_lock_in_its_place() {
+    fn acknowledging_keeps_the_lock_file() {
         let directory = tempfile::tempdir().unwrap();
         let states = RigStates::new(directory.path());
         let mut first = states.claim("bench", None).unwrap();

@@ -7,26 +7,19 @@ use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::thread::{Scope, ScopedJoinHandle};
 
 /// Queue length: some seconds of samples. If the queue is full the run waits, so no data are lost.
-const MAX_WAITING_MESSAGES: usize = 32;
+const MAX_WAITING_CALLS: usize = 32;
 
-/// Message to an observer.
-enum ObserverMessage {
-    StepStart(StepMarker),
-    Batch(SampleBatch),
-    Event(Event),
-    StepAbandoned(StepMarker),
-    StepEnd(StepMarker),
-    StepCompleted(StepMarker),
-}
+/// A call of an observer, to be made on its thread.
+type Call<'scope, O> = Box<dyn FnOnce(&mut O) -> Result<(), ObserverError> + Send + 'scope>;
 
 /// The observer accepts no more messages.
 #[derive(Debug, thiserror::Error)]
 #[error("recording stopped after an error that was reported before")]
 struct ObserverStopped;
 
-/// Forwards messages in order to an observer on another thread until that observer fails. The next call returns its error; all later calls fail.
+/// Makes all calls, in order, on another thread until its observer fails. The next call returns the error; all later calls fail.
 pub(crate) struct ThreadedObserver<'scope, O> {
-    to_thread: SyncSender<ObserverMessage>,
+    to_thread: SyncSender<Call<'scope, O>>,
     thread: ScopedJoinHandle<'scope, O>,
     failed: Receiver<ObserverError>,
 }
@@ -34,11 +27,11 @@ pub(crate) struct ThreadedObserver<'scope, O> {
 impl<'scope, O: RunObserver + Send + 'scope> ThreadedObserver<'scope, O> {
     /// Starts the thread.
     pub(crate) fn start<'env>(scope: &'scope Scope<'scope, 'env>, mut observer: O) -> Self {
-        let (to_thread, messages) = sync_channel(MAX_WAITING_MESSAGES);
+        let (to_thread, calls) = sync_channel::<Call<'scope, O>>(MAX_WAITING_CALLS);
         let (fail, failed) = channel();
         let thread = scope.spawn(move || {
             // The error must be stored before the end of the thread becomes visible.
-            if let Err(error) = messages.iter().try_for_each(|message| observe(&mut observer, message)) {
+            if let Err(error) = calls.iter().try_for_each(|call| call(&mut observer)) {
                 let _ = fail.send(error);
             }
             observer
@@ -46,57 +39,53 @@ impl<'scope, O: RunObserver + Send + 'scope> ThreadedObserver<'scope, O> {
         ThreadedObserver { to_thread, thread, failed }
     }
 
-    /// Waits until the observer has processed all messages. Returns the observer, and its error if no earlier call has returned that.
+    /// Waits for the end of all calls. Returns the observer, and its error if no earlier call has returned that.
     pub(crate) fn end(self) -> (O, Result<(), ObserverError>) {
         drop(self.to_thread);
         let observer = self.thread.join().unwrap_or_else(|panicked| resume_unwind(panicked));
         (observer, self.failed.try_recv().map_or(Ok(()), Err))
     }
-}
 
-impl<O> ThreadedObserver<'_, O> {
-    fn send(&mut self, message: ObserverMessage) -> Result<(), ObserverError> {
-        match self.to_thread.send(message) {
+    fn send(
+        &mut self,
+        call: impl FnOnce(&mut O) -> Result<(), ObserverError> + Send + 'scope,
+    ) -> Result<(), ObserverError> {
+        match self.to_thread.send(Box::new(call)) {
             Ok(()) => Ok(()),
             Err(_) => Err(self.failed.recv().unwrap_or_else(|_| ObserverError::new(ObserverStopped))),
         }
     }
 }
 
-fn observe(observer: &mut impl RunObserver, message: ObserverMessage) -> Result<(), ObserverError> {
-    match message {
-        ObserverMessage::StepStart(marker) => observer.on_step_start(&marker),
-        ObserverMessage::Batch(batch) => observer.on_batch(&batch),
-        ObserverMessage::Event(event) => observer.on_event(&event),
-        ObserverMessage::StepAbandoned(marker) => observer.on_step_abandoned(&marker),
-        ObserverMessage::StepEnd(marker) => observer.on_step_end(&marker),
-        ObserverMessage::StepCompleted(marker) => observer.on_step_completed(&marker),
-    }
-}
-
-impl<O> RunObserver for ThreadedObserver<'_, O> {
+impl<'scope, O: RunObserver + Send + 'scope> RunObserver for ThreadedObserver<'scope, O> {
     fn on_step_start(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
-        self.send(ObserverMessage::StepStart(*marker))
+        let marker = *marker;
+        self.send(move |observer| observer.on_step_start(&marker))
     }
 
     fn on_batch(&mut self, batch: &SampleBatch) -> Result<(), ObserverError> {
-        self.send(ObserverMessage::Batch(batch.clone()))
+        let batch = batch.clone();
+        self.send(move |observer| observer.on_batch(&batch))
     }
 
     fn on_event(&mut self, event: &Event) -> Result<(), ObserverError> {
-        self.send(ObserverMessage::Event(event.clone()))
+        let event = event.clone();
+        self.send(move |observer| observer.on_event(&event))
     }
 
     fn on_step_abandoned(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
-        self.send(ObserverMessage::StepAbandoned(*marker))
+        let marker = *marker;
+        self.send(move |observer| observer.on_step_abandoned(&marker))
     }
 
     fn on_step_end(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
-        self.send(ObserverMessage::StepEnd(*marker))
+        let marker = *marker;
+        self.send(move |observer| observer.on_step_end(&marker))
     }
 
     fn on_step_completed(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
-        self.send(ObserverMessage::StepCompleted(*marker))
+        let marker = *marker;
+        self.send(move |observer| observer.on_step_completed(&marker))
     }
 }
 
@@ -133,7 +122,7 @@ mod tests {
     use std::io;
     use std::thread::scope;
 
-    /// Counts messages and fails at a given count.
+    /// Keeps the times of events, and fails at a given number of them.
     struct Counts {
         times: Vec<f64>,
         fails_at: usize,
@@ -154,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn all_is_seen_in_order_before_the_end() {
+    fn all_events_arrive_in_order_before_the_end() {
         let times: Vec<f64> = (0..1000).map(f64::from).collect();
         let (observer, error) = scope(|scope| {
             let mut threaded =
@@ -168,14 +157,14 @@ mod tests {
 
     /// For a failure at any call, the error is returned once, and no later message counts as observed.
     #[test]
-    fn an_error_is_reported_and_nothing_after_it_passes() {
+    fn an_error_is_reported_and_later_events_are_not_observed() {
         for fails_at in [0, 1, 50, 99] {
             let (observer, errors) = scope(|scope| {
                 let mut threaded = ThreadedObserver::start(scope, Counts { times: Vec::new(), fails_at });
                 let results: Vec<_> = (0..100).map(|t_s| threaded.on_event(&event(f64::from(t_s)))).collect();
-                let (observer, untold) = threaded.end();
+                let (observer, at_end) = threaded.end();
                 let errors =
-                    results.into_iter().chain([untold]).skip_while(Result::is_ok).collect::<Vec<_>>();
+                    results.into_iter().chain([at_end]).skip_while(Result::is_ok).collect::<Vec<_>>();
                 (observer, errors)
             });
             assert_eq!(observer.times.len(), fails_at);
@@ -190,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn an_observer_that_panics_is_not_written_on() {
+    fn the_panic_of_an_observer_reaches_the_caller() {
         struct Panics;
         impl RunObserver for Panics {
             fn on_event(&mut self, _event: &Event) -> Result<(), ObserverError> {

@@ -52,13 +52,13 @@ impl<'a> ResumedSteps<'a> {
         let mut replay = Replay { inner, interrupted, offset_s: 0.0, last: None, replayed_steps: 0 };
         for part in &interrupted.parts {
             let path = interrupted.directory.join(&part.recording);
-            let holds = |index: usize| index < FIRST_REPEAT_INDEX && part.saved.contains(&index);
-            if !part.saved.iter().any(|index| holds(*index)) {
+            let is_saved = |index: usize| index < FIRST_REPEAT_INDEX && part.saved.contains(&index);
+            if !part.saved.iter().any(|index| is_saved(*index)) {
                 continue;
             }
             let read = read_recording(&path, &ChannelMap::native(), &ReadOptions::default())?;
             let steps: Vec<StepMarker> =
-                read.recording.steps.iter().filter(|step| holds(step.index)).copied().collect();
+                read.recording.steps.iter().filter(|step| is_saved(step.index)).copied().collect();
             replay.replay_part(read.recording, &steps)?;
         }
         let Replay { inner, offset_s, last, replayed_steps, .. } = replay;
@@ -79,10 +79,11 @@ impl<'a> ResumedSteps<'a> {
         );
         Ok(ResumedSteps { inner, repeat, repeating: false, offset_s, notes: vec![note] })
     }
+}
 
-    fn shifted(&self, marker: &StepMarker) -> StepMarker {
-        StepMarker { start_s: marker.start_s + self.offset_s, end_s: marker.end_s + self.offset_s, ..*marker }
-    }
+/// A marker on another clock.
+fn shift(marker: &StepMarker, offset_s: f64) -> StepMarker {
+    StepMarker { start_s: marker.start_s + offset_s, end_s: marker.end_s + offset_s, ..*marker }
 }
 
 impl StepSource for ResumedSteps<'_> {
@@ -105,8 +106,7 @@ impl StepSource for ResumedSteps<'_> {
 
     fn before_step(&mut self, marker: &StepMarker) {
         if !self.repeating {
-            let shifted = self.shifted(marker);
-            self.inner.before_step(&shifted);
+            self.inner.before_step(&shift(marker, self.offset_s));
         }
     }
 
@@ -119,13 +119,11 @@ impl StepSource for ResumedSteps<'_> {
     }
 
     fn after_step(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
-        let shifted = self.shifted(marker);
-        if self.repeating { Ok(()) } else { self.inner.after_step(&shifted) }
+        if self.repeating { Ok(()) } else { self.inner.after_step(&shift(marker, self.offset_s)) }
     }
 
     fn after_skipped_step(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
-        let shifted = self.shifted(marker);
-        if self.repeating { Ok(()) } else { self.inner.after_skipped_step(&shifted) }
+        if self.repeating { Ok(()) } else { self.inner.after_skipped_step(&shift(marker, self.offset_s)) }
     }
 
     fn take_notes(&mut self) -> Vec<String> {
@@ -148,11 +146,7 @@ impl Replay<'_, '_> {
     fn replay_part(&mut self, recording: Recording, steps: &[StepMarker]) -> Result<(), SessionError> {
         let mut batches = BatchReplay::new(recording, self.offset_s);
         for step in steps {
-            let shifted = StepMarker {
-                start_s: step.start_s + self.offset_s,
-                end_s: step.end_s + self.offset_s,
-                ..*step
-            };
+            let shifted = shift(step, self.offset_s);
             // Before the first step, the source has already handed out its step, as in the original run.
             self.advance_to(&shifted)?;
             batches.replay_until(self.inner, shifted.start_s);

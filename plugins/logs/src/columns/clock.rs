@@ -47,7 +47,7 @@ impl Clock {
         match self {
             Clock::Count { column, unit_s } => Some(cells.number(*column))
                 .filter(|value| value.is_finite())
-                .map(|value| scaled(value, *unit_s)),
+                .map(|value| count_to_s(value, *unit_s)),
             _ => None,
         }
     }
@@ -72,14 +72,14 @@ impl Clock {
     }
 }
 
-/// Divides milliseconds, so that 100 ms is exactly the f64 0.1 s.
-fn scaled(value: f64, unit_s: f64) -> f64 {
+/// Converts a count to seconds. Milliseconds are divided, so that 100 ms is exactly the f64 0.1 s.
+fn count_to_s(value: f64, unit_s: f64) -> f64 {
     if unit_s < 1.0 { value / (1.0 / unit_s).round() } else { value * unit_s }
 }
 
 /// Reads a clock row by row.
 #[derive(Debug)]
-pub(crate) struct ClockHand {
+pub(crate) struct ClockReader {
     clock: GroupClock,
     rows: u64,
     /// Offset because the readings restarted, ns.
@@ -88,18 +88,26 @@ pub(crate) struct ClockHand {
     last_s: f64,
     shared: usize,
     /// Whether a reading with a date went back by an hour.
-    hour_back: bool,
+    has_hour_back: bool,
 }
 
-impl ClockHand {
+impl ClockReader {
     pub(crate) fn new(clock: GroupClock) -> Self {
         let shared = clock.spread.map_or(0, |spread| spread.missing_at_start);
-        ClockHand { clock, rows: 0, added_ns: 0, last_ns: None, last_s: f64::NAN, shared, hour_back: false }
+        ClockReader {
+            clock,
+            rows: 0,
+            added_ns: 0,
+            last_ns: None,
+            last_s: f64::NAN,
+            shared,
+            has_hour_back: false,
+        }
     }
 
     /// A remark if local time went back at the end of daylight saving.
     pub(crate) fn remark(&self) -> Option<LogFinding> {
-        self.hour_back.then_some(LogFinding::HourBack)
+        self.has_hour_back.then_some(LogFinding::HourBack)
     }
 
     /// The row's time, s; `None` if the group has no sample in it.
@@ -114,7 +122,7 @@ impl ClockHand {
                 let ns = self.clock.clock.instant_ns(cells)?;
                 let last_ns = self.last_ns.replace(ns);
                 let added_ns = last_ns.map_or(0, |last| restart_offset_ns(last, ns, *period_ns));
-                self.hour_back |= added_ns > 0 && ns >= MIN_DATED_NS;
+                self.has_hour_back |= added_ns > 0 && ns >= MIN_DATED_NS;
                 self.added_ns = self.added_ns.saturating_add(added_ns);
                 ns.saturating_add(self.added_ns).saturating_sub(self.clock.zero_ns) as f64 / 1e9
             }
@@ -135,9 +143,9 @@ pub(crate) const NS_PER_HOUR: i64 = NS_PER_DAY / 24;
 /// Offset to add from here on because a clock's readings restarted, ns: a period if they have no date, an hour if local time goes back at
 /// the end of daylight saving, else 0.
 pub(crate) fn restart_offset_ns(last_ns: i64, ns: i64, period_ns: i64) -> i64 {
-    let dated = ns >= MIN_DATED_NS;
+    let is_dated = ns >= MIN_DATED_NS;
     let back_ns = last_ns.saturating_sub(ns);
-    match dated {
+    match is_dated {
         false if back_ns > period_ns / 2 => period_ns,
         // The step is an hour minus the time between two rows.
         true if (NS_PER_HOUR - NS_PER_MINUTE..NS_PER_HOUR).contains(&back_ns) => NS_PER_HOUR,

@@ -53,13 +53,13 @@ impl Candidate {
     }
 
     /// Whether the readings increase, except for a few restarts, or would do so in order of time.
-    fn runs(&self) -> bool {
+    fn is_running(&self) -> bool {
         let readings: Vec<f64> = self.present().collect();
         // A clock with a resolution of seconds may be constant over these rows; a constant number is not a clock.
-        let moves = readings.len() < 2 || readings.first() < readings.last();
-        let runs = MIN_ROWS_PER_RESTART * self.reversal_count() <= readings.len()
-            && (moves || matches!(self.clock, Clock::Instant { .. }));
-        runs || self.is_disordered()
+        let is_moving = readings.len() < 2 || readings.first() < readings.last();
+        let is_running = MIN_ROWS_PER_RESTART * self.reversal_count() <= readings.len()
+            && (is_moving || matches!(self.clock, Clock::Instant { .. }));
+        is_running || self.is_disordered()
     }
 
     /// Number of readings below the previous one.
@@ -98,7 +98,7 @@ impl Candidate {
     }
 
     /// Whether the other has readings in the same rows at the same pace.
-    fn runs_with(&self, other: &Candidate) -> bool {
+    fn has_pace_of(&self, other: &Candidate) -> bool {
         let tolerance_s = 1.01 * self.resolution_s().max(other.resolution_s()).min(60.0);
         self.readings_s.iter().zip(&other.readings_s).all(|pair| match pair {
             (Some(a), Some(b)) => ((a - self.first_s()) - (b - other.first_s())).abs() <= tolerance_s,
@@ -108,8 +108,8 @@ impl Candidate {
     }
 }
 
-/// Finds the clocks.
-pub(crate) fn choose(sample: &Sample<'_>, options: &LogOptions) -> Result<Clocks, String> {
+/// Finds the clocks of a table.
+pub(crate) fn choose_clocks(sample: &Sample<'_>, options: &LogOptions) -> Result<Clocks, String> {
     let mut clocks = Clocks { group_of: vec![Some(0); sample.columns.len()], ..Clocks::default() };
     let candidates = match (options.time.as_slice(), options.rate_hz) {
         ([], Some(rate_hz)) => {
@@ -135,7 +135,7 @@ pub(crate) fn choose(sample: &Sample<'_>, options: &LogOptions) -> Result<Clocks
     // Clocks with the same pace belong to one group.
     let mut groups: Vec<Vec<&Candidate>> = vec![vec![first]];
     for candidate in &candidates[1..] {
-        match groups.iter_mut().find(|group| group[0].runs_with(candidate)) {
+        match groups.iter_mut().find(|group| group[0].has_pace_of(candidate)) {
             Some(group) => group.push(candidate),
             None => groups.push(vec![candidate]),
         }
@@ -218,8 +218,7 @@ pub(crate) fn choose(sample: &Sample<'_>, options: &LogOptions) -> Result<Clocks
 
 /// Time 0 of dates to the nanosecond: that of the first row.
 fn exact_zero_ns(candidate: &Candidate, sample: &Sample<'_>, near_ns: f64) -> i64 {
-    let rows = sample.rows.iter().map(|row| SampleRow(row, sample.decimal));
-    let first = rows.filter_map(|row| candidate.clock.instant_ns(&row)).next();
+    let first = sample.rows().find_map(|row| candidate.clock.instant_ns(&row));
     first.filter(|ns| (*ns as f64 - near_ns).abs() < 1e6).unwrap_or(near_ns as i64)
 }
 
@@ -252,19 +251,18 @@ fn spread(candidate: &Candidate) -> Option<Spread> {
 }
 
 fn candidate(clock: Clock, at: usize, sample: &Sample<'_>, dated: bool) -> Candidate {
-    let rows = sample.rows.iter().map(|row| SampleRow(row, sample.decimal));
     let reading = |row: SampleRow<'_>| match &clock {
         Clock::Instant { .. } => clock.instant_ns(&row).map(|ns| ns as f64 / 1e9),
         _ => clock.count_s(&row),
     };
-    let mut readings_s: Vec<Option<f64>> = rows.map(reading).collect();
+    let mut readings_s: Vec<Option<f64>> = sample.rows().map(reading).collect();
     if let Clock::Instant { period_ns, .. } = clock {
         add_restart_offsets(&mut readings_s, period_ns);
     }
     Candidate { clock, at, readings_s, dated }
 }
 
-/// Adds the offsets of [`restart_offset_ns`].
+/// Adds the offsets of [`restart_offset_ns`] to the readings.
 fn add_restart_offsets(readings_s: &mut [Option<f64>], period_ns: i64) {
     let (mut added_ns, mut last_ns) = (0, None);
     for reading in readings_s.iter_mut().flatten() {
@@ -292,7 +290,7 @@ fn named_clock(names: &[String], sample: &Sample<'_>, options: &LogOptions) -> R
     };
     let columns: Vec<usize> = names.iter().map(find).collect::<Result<_, _>>()?;
     let order = options.date_order.unwrap_or_else(|| order_of(columns[0], sample).0);
-    let made = match columns.as_slice() {
+    let clock = match columns.as_slice() {
         [date, time] => {
             let (date, time) =
                 if date_and_time_in(*time, sample, order).0 { (*time, *date) } else { (*date, *time) };
@@ -303,7 +301,7 @@ fn named_clock(names: &[String], sample: &Sample<'_>, options: &LogOptions) -> R
                 true,
             )
         }
-        [column] if share(*column, sample, order) > 0.5 => candidate(
+        [column] if instant_share(*column, sample, order) > 0.5 => candidate(
             Clock::Instant { date: None, time: *column, order, period_ns: period_ns(*column, sample) },
             *column,
             sample,
@@ -315,13 +313,13 @@ fn named_clock(names: &[String], sample: &Sample<'_>, options: &LogOptions) -> R
         }
         _ => return Err("`time` names one column, or a date and a time of day".to_owned()),
     };
-    if made.present().next().is_none() {
+    if clock.present().next().is_none() {
         return Err(format!(
             "`{}`, which `time` names, contains neither numbers nor times",
             names.join(" + ")
         ));
     }
-    Ok(made)
+    Ok(clock)
 }
 
 fn find_candidates(
@@ -334,7 +332,7 @@ fn find_candidates(
     for (at, column) in sample.columns.iter().enumerate() {
         let (guessed, sure) = order_of(at, sample);
         let order = options.date_order.unwrap_or(guessed);
-        if share(at, sample, order) > 0.8 {
+        if instant_share(at, sample, order) > 0.8 {
             let (has_date, has_time) = date_and_time_in(at, sample, order);
             if has_date && !sure && options.date_order.is_none() {
                 findings.push(LogFinding::AmbiguousDate { column: column.name.clone() });
@@ -359,7 +357,7 @@ fn find_candidates(
             }
         }
     }
-    candidates.retain(Candidate::runs);
+    candidates.retain(Candidate::is_running);
     candidates.truncate(MAX_CLOCKS);
     candidates
 }
@@ -369,7 +367,7 @@ fn order_of(column: usize, sample: &Sample<'_>) -> (DateOrder, bool) {
 }
 
 /// Share of cells with dates or times.
-fn share(column: usize, sample: &Sample<'_>, order: DateOrder) -> f64 {
+fn instant_share(column: usize, sample: &Sample<'_>, order: DateOrder) -> f64 {
     let (mut instants, mut all) = (0.0, 0.0);
     for cell in cells(column, sample) {
         all += 1.0;

@@ -1,10 +1,8 @@
 //! The first rows of a table, from which its clocks are found.
 
 use crate::columns::table_head::HeadColumn;
-use crate::notation::instant::{Instant, parse_instant};
-use crate::notation::number::{number_in, read_number};
-use crate::notation::table_row::Cells;
-use mapper_recording::logs::DateOrder;
+use crate::notation::number::read_number;
+use crate::notation::table_row::{Cell, Cells};
 
 /// Maximum number of rows of a table in its sample.
 pub(crate) const HEAD_ROWS: usize = 400;
@@ -16,19 +14,30 @@ pub(crate) struct Sample<'a> {
     pub(crate) decimal: u8,
 }
 
-pub(crate) struct SampleRow<'a>(pub(crate) &'a [String], pub(crate) u8);
+/// A row of the sample.
+pub(crate) struct SampleRow<'a> {
+    cells: &'a [String],
+    decimal: u8,
+}
+
+impl Sample<'_> {
+    pub(crate) fn rows(&self) -> impl Iterator<Item = SampleRow<'_>> {
+        self.rows.iter().map(|cells| SampleRow { cells, decimal: self.decimal })
+    }
+}
 
 impl Cells for SampleRow<'_> {
+    fn cell(&self, column: usize) -> Cell<'_> {
+        self.cells.get(column).map_or(Cell::Empty, |text| Cell::Text(text.as_bytes()))
+    }
+
+    fn decimal(&self) -> u8 {
+        self.decimal
+    }
+
+    // The units in cells are not known yet.
     fn number(&self, column: usize) -> f64 {
-        self.0.get(column).and_then(|cell| read_number(cell, self.1)).unwrap_or(f64::NAN)
-    }
-
-    fn number_in(&self, column: usize, unit: &str) -> f64 {
-        self.0.get(column).map_or(f64::NAN, |cell| number_in(cell, self.1, unit))
-    }
-
-    fn instant(&self, column: usize, order: DateOrder) -> Option<Instant> {
-        parse_instant(self.0.get(column)?, order)
+        self.cells.get(column).and_then(|cell| read_number(cell, self.decimal)).unwrap_or(f64::NAN)
     }
 }
 

@@ -49,9 +49,10 @@ pub(crate) fn analyse_head(
     };
     let group_row = group_row(rows, &header, length);
     // Names have letters, unless no row has any.
-    let named = header.iter().any(|row| Some(*row) != units_row && has_words(&rows[*row]));
-    let others =
-        || header.iter().copied().filter(|row| Some(*row) != units_row && (!named || has_words(&rows[*row])));
+    let has_names = header.iter().any(|row| Some(*row) != units_row && has_words(&rows[*row]));
+    let others = || {
+        header.iter().copied().filter(|row| Some(*row) != units_row && (!has_names || has_words(&rows[*row])))
+    };
     let names_row = options.names_row.map(|row| row - 1).or_else(|| names_row(rows, others().collect()));
     let width = rows.get(data_row..).unwrap_or_default().iter().map(Vec::len).max().unwrap_or(0).max(length);
     if width > MAX_COLUMNS {
@@ -84,9 +85,9 @@ pub(crate) fn analyse_head(
                 if own_unit.is_empty() && unit.is_some() { (name, unit) } else { (header.clone(), None) };
             unit = unit.or(Some(own_unit.to_owned()).filter(|unit| !unit.is_empty()));
         }
-        if let Some(behind) = unit_in_cells(rows.get(data_row..).unwrap_or_default(), column, decimal) {
-            unit = unit.or(Some(behind.clone()));
-            cell_units.insert(column, behind);
+        if let Some(cell_unit) = unit_in_cells(rows.get(data_row..).unwrap_or_default(), column, decimal) {
+            unit = unit.or(Some(cell_unit.clone()));
+            cell_units.insert(column, cell_unit);
         }
         unit = unit.or_else(|| {
             Some(cell(distant_units, column).to_owned()).filter(|unit| header_unit(unit).is_some())
@@ -198,7 +199,7 @@ fn without_comment_signs(rows: &[Vec<String>], data_row: usize, length: usize) -
     rows
 }
 
-/// The row of groups above the header: words that stand apart, each over the first of its columns.
+/// The row of groups above the header: words with empty cells between them, each above the first column of its group.
 fn group_row(rows: &[Vec<String>], header: &[usize], length: usize) -> Option<usize> {
     let row = header.first()?.checked_sub(1)?;
     let cells = rows.get(row)?;
@@ -234,7 +235,7 @@ fn unit_in_cells(rows: &[Vec<String>], column: usize, decimal: u8) -> Option<Str
     unit.filter(|_| 2 * with > all).map(str::to_owned)
 }
 
-/// Cells of a row of labels; a row of groups, which is sparse or above repeated names, names only the first column of each.
+/// The label of a column in a row. A row of groups, which is sparse or above repeated names, labels only the first column of a group.
 fn label(rows: &[Vec<String>], row: usize, column: usize, is_repeated: bool) -> &str {
     let Some(cells) = rows.get(row) else { return "" };
     let sparse = 2 * cells.iter().filter(|cell| !cell.is_empty()).count() < cells.len();
@@ -245,7 +246,7 @@ fn label(rows: &[Vec<String>], row: usize, column: usize, is_repeated: bool) -> 
     cells.get(..column).unwrap_or_default().iter().rfind(|cell| !cell.is_empty()).map_or("", String::as_str)
 }
 
-/// The first of the full rows with the most names: later ones have long names, and merged cells above leave blanks.
+/// The first full row with nearly the maximum number of distinct names: later rows have long names, and rows above have merged cells.
 fn names_row(rows: &[Vec<String>], mut candidates: Vec<usize>) -> Option<usize> {
     let filled =
         |row: &usize| rows.get(*row).map_or(0, |row| row.iter().filter(|cell| !cell.is_empty()).count());
@@ -294,10 +295,11 @@ fn has_words(row: &[String]) -> bool {
 fn first_data_row(rows: &[Vec<String>], length: usize, decimal: u8) -> Option<usize> {
     let mut data: Vec<bool> = rows.iter().map(|row| is_data(row, length, decimal)).collect();
     // Rows of a preamble may have numbers after a name, but the table's rows start with a number or a time.
-    let valued: Vec<bool> = (0..length).map(|column| holds_values(rows, &data, column, decimal)).collect();
+    let has_values: Vec<bool> =
+        (0..length).map(|column| is_value_column(rows, &data, column, decimal)).collect();
     for (row, is) in rows.iter().zip(&mut data) {
         let word = |(column, cell): (usize, &String)| {
-            valued.get(column) == Some(&true) && !is_missing(cell.as_bytes()) && !is_value(cell, decimal)
+            has_values.get(column) == Some(&true) && !is_missing(cell.as_bytes()) && !is_value(cell, decimal)
         };
         *is &= !row.iter().enumerate().any(word);
     }
@@ -308,7 +310,7 @@ fn first_data_row(rows: &[Vec<String>], length: usize, decimal: u8) -> Option<us
 }
 
 /// Whether nearly all rows of data have a number or a time in a column.
-fn holds_values(rows: &[Vec<String>], data: &[bool], column: usize, decimal: u8) -> bool {
+fn is_value_column(rows: &[Vec<String>], data: &[bool], column: usize, decimal: u8) -> bool {
     let cells = rows.iter().zip(data).filter(|(_, is)| **is).filter_map(|(row, _)| row.get(column));
     let (mut values, mut all) = (0usize, 0usize);
     for cell in cells.filter(|cell| !is_missing(cell.as_bytes())) {

@@ -192,11 +192,12 @@ pub(crate) fn minutes_and_seconds(text: &str) -> Option<i64> {
 pub(crate) fn guess_order<'a>(dates: impl Iterator<Item = &'a str>) -> (DateOrder, bool) {
     let mut doubtful = None;
     for text in dates {
-        let Some((parts, sign)) = date_parts(text.trim().split([' ', 'T', '_']).next().unwrap_or_default())
+        let Some((parts, separator)) =
+            date_parts(text.trim().split([' ', 'T', '_']).next().unwrap_or_default())
         else {
             continue;
         };
-        match (parts[0], parts[1], sign) {
+        match (parts[0], parts[1], separator) {
             (first, ..) if first > 31 => return (DateOrder::YearFirst, true),
             (.., '.') => return (DateOrder::DayFirst, true),
             (first, ..) if first > 12 => return (DateOrder::DayFirst, true),
@@ -209,15 +210,15 @@ pub(crate) fn guess_order<'a>(dates: impl Iterator<Item = &'a str>) -> (DateOrde
 }
 
 fn date_parts(text: &str) -> Option<([i64; 3], char)> {
-    let sign = text.chars().find(|c| ['.', '/', '-'].contains(c))?;
-    let mut parts = text.split(sign);
+    let separator = text.chars().find(|c| ['.', '/', '-'].contains(c))?;
+    let mut parts = text.split(separator);
     let mut next = || {
         let part = parts.next()?;
         let whole = (1..=4).contains(&part.len()) && part.bytes().all(|byte| byte.is_ascii_digit());
         part.parse::<i64>().ok().filter(|_| whole)
     };
     let found = [next()?, next()?, next()?];
-    parts.next().is_none().then_some((found, sign))
+    parts.next().is_none().then_some((found, separator))
 }
 
 fn date(text: &str, order: DateOrder) -> Option<i64> {

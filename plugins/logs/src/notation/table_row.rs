@@ -1,18 +1,52 @@
 //! One row of a table, independent of its storage.
 
-use crate::notation::instant::Instant;
+use crate::notation::instant::{Instant, parse_instant};
+use crate::notation::number::{NO_READING, number_in, parse_number};
 use mapper_recording::logs::{DateOrder, LogError};
+
+/// The content of a cell.
+pub(crate) enum Cell<'a> {
+    Empty,
+    Number(f64),
+    /// Text in UTF-8, not necessarily valid.
+    Text(&'a [u8]),
+    Instant(Instant),
+}
 
 /// The cells of a row.
 pub(crate) trait Cells {
-    /// The number in a cell; NaN without a number.
-    fn number(&self, column: usize) -> f64;
+    fn cell(&self, column: usize) -> Cell<'_>;
 
-    /// The number of a cell with this unit after it; NaN without a number, or with another unit.
-    fn number_in(&self, column: usize, unit: &str) -> f64;
+    /// Decimal sign of numbers in texts.
+    fn decimal(&self) -> u8 {
+        b'.'
+    }
+
+    /// The number in a cell; NaN without a number.
+    fn number(&self, column: usize) -> f64 {
+        match self.cell(column) {
+            Cell::Number(value) if value.abs() < NO_READING => value,
+            Cell::Text(text) => parse_number(text, self.decimal()).unwrap_or(f64::NAN),
+            _ => f64::NAN,
+        }
+    }
+
+    /// The number of a cell with this unit after it, or of a cell with a number alone; else NaN.
+    fn number_in(&self, column: usize, unit: &str) -> f64 {
+        match self.cell(column) {
+            Cell::Text(text) => number_in(&String::from_utf8_lossy(text), self.decimal(), unit),
+            _ => self.number(column),
+        }
+    }
 
     /// The date or time of day in a cell.
-    fn instant(&self, column: usize, order: DateOrder) -> Option<Instant>;
+    fn instant(&self, column: usize, order: DateOrder) -> Option<Instant> {
+        match self.cell(column) {
+            Cell::Instant(instant) => Some(instant),
+            Cell::Text(text) => parse_instant(&String::from_utf8_lossy(text), order),
+            _ => None,
+        }
+    }
 }
 
 /// Rows one after the other.

@@ -1,10 +1,8 @@
 //! A cell in a table with typed cells.
 
-use crate::notation::instant::{Instant, NS_PER_DAY, parse_instant};
-use crate::notation::number::{NO_READING, parse_number};
+use crate::notation::instant::{Instant, NS_PER_DAY};
 use jiff::ToSpan;
 use jiff::civil::{Date, Time};
-use mapper_recording::logs::DateOrder;
 
 /// The contents of a cell.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,27 +22,9 @@ impl Value {
         }
     }
 
-    /// The number in it; NaN without a number, and for marks of missing values.
-    pub(crate) fn number(&self, decimal: u8) -> f64 {
-        match self {
-            Value::Number(value) if value.abs() < NO_READING => *value,
-            Value::Text(text) => parse_number(text.as_bytes(), decimal).unwrap_or(f64::NAN),
-            _ => f64::NAN,
-        }
-    }
-
     /// Size of its text, bytes.
     pub(crate) fn size(&self) -> usize {
         size_of::<Value>() + if let Value::Text(text) = self { text.len() } else { 0 }
-    }
-
-    /// The date or time of day in it.
-    pub(crate) fn instant(&self, order: DateOrder) -> Option<Instant> {
-        match self {
-            Value::Instant(instant) => Some(*instant),
-            Value::Text(text) => parse_instant(text, order),
-            _ => None,
-        }
     }
 
     /// Its text as in a cell of a text file.

@@ -4,6 +4,7 @@ use crate::columns::sample::HEAD_ROWS;
 use crate::tables::column_rows::{Chunk, Chunks, ColumnRows};
 use crate::tables::joined_tables::{Part, join_tables};
 use crate::tables::table_log::{Origin, Table};
+use mapper_recording::logs::limits::MAX_UNPACKED_BYTES;
 use mapper_recording::logs::{Layout, Log, LogError, LogFile, LogFinding, LogOptions, Row, RowSink};
 
 /// Columns of equal length.
@@ -24,6 +25,23 @@ impl ColumnTable {
     }
 }
 
+/// Options of formats whose files name their columns.
+pub(crate) const COLUMN_OPTIONS: [&str; 5] = ["time", "time_unit", "date_order", "rate", "missing"];
+
+/// Refuses options that do not apply to columns, and a file that does not fit into memory.
+pub(crate) fn check_columns_file(
+    file: &LogFile,
+    name: &'static str,
+    options: &LogOptions,
+) -> Result<(), LogError> {
+    options.allow_only(&COLUMN_OPTIONS).map_err(|why| file.content_error(name, why))?;
+    if file.size_bytes()? > MAX_UNPACKED_BYTES {
+        let message = format!("it has more than {} MiB; export it in parts", MAX_UNPACKED_BYTES >> 20);
+        return Err(file.content_error(name, message));
+    }
+    Ok(())
+}
+
 struct ColumnLog {
     layout: Layout,
     parts: Vec<Part>,
@@ -41,21 +59,22 @@ pub(crate) fn column_log(
     mut problems: Vec<LogFinding>,
     options: &LogOptions,
 ) -> Result<Box<dyn Log>, LogError> {
-    let (mut found, mut kept) = (Vec::new(), Vec::new());
+    let (mut analysed, mut readable) = (Vec::new(), Vec::new());
     for table in tables {
         let head = table.rows().texts(HEAD_ROWS)?;
         let own = LogOptions { time: table.clock.iter().cloned().collect(), ..options.clone() };
         let options = if options.time.is_empty() { &own } else { options };
         match Table::analyse(&head, b'.', options, Origin::Columns) {
-            Ok(looked) => {
-                found.push((table.title.clone(), looked));
-                kept.push(table);
+            Ok(analysis) => {
+                analysed.push((table.title.clone(), analysis));
+                readable.push(table);
             }
             Err(problem) => problems.push(LogFinding::skipped(word, &table.title, problem)),
         }
     }
-    let (layout, parts) = join_tables(word, found, problems).map_err(|why| file.content_error(name, why))?;
-    Ok(Box::new(ColumnLog { layout, parts, tables: kept }))
+    let (layout, parts) =
+        join_tables(word, analysed, problems).map_err(|why| file.content_error(name, why))?;
+    Ok(Box::new(ColumnLog { layout, parts, tables: readable }))
 }
 
 impl Log for ColumnLog {

@@ -1,12 +1,11 @@
-//! Columns stored one after the other, presented as rows of a table.
+//! Rows of a table that is stored by columns.
 
-use crate::notation::instant::{Instant, parse_instant};
-use crate::notation::number::{NO_READING, number_in, parse_number};
-use crate::notation::table_row::{Cells, Rows};
+use crate::notation::instant::Instant;
+use crate::notation::table_row::{Cell, Cells, Rows};
 use crate::notation::typed_cell::Value;
-use mapper_recording::logs::{DateOrder, LogError};
+use mapper_recording::logs::LogError;
 
-/// Rows of a column; rows after its end are empty.
+/// Some rows of a column; those after its end are empty.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(not(feature = "parquet"), allow(dead_code, reason = "MATLAB data have numbers only"))]
 pub(crate) enum Chunk {
@@ -16,6 +15,14 @@ pub(crate) enum Chunk {
 }
 
 impl Chunk {
+    pub(crate) fn len(&self) -> usize {
+        match self {
+            Chunk::Numbers(values) => values.len(),
+            Chunk::Instants(values) => values.len(),
+            Chunk::Texts(values) => values.len(),
+        }
+    }
+
     fn value(&self, row: usize) -> Value {
         let found = match self {
             Chunk::Numbers(values) => {
@@ -37,7 +44,7 @@ pub(crate) trait Chunks {
     fn next_chunk(&mut self) -> Result<Option<(usize, Vec<Chunk>)>, LogError>;
 }
 
-/// Presents columns as rows of a table, after the header as rows of text.
+/// Rows of a table that is stored by columns: the header rows as text, then the data.
 pub(crate) struct ColumnRows<C> {
     chunks: C,
     head: Vec<Vec<String>>,
@@ -45,7 +52,7 @@ pub(crate) struct ColumnRows<C> {
     head_at: usize,
     chunk: Vec<Chunk>,
     count: usize,
-    /// The current row of the chunk, from 1; 0 before the first.
+    /// The current row of the chunk, from 1; 0 before the first row.
     at: usize,
 }
 
@@ -70,36 +77,17 @@ impl<C: Chunks> ColumnRows<C> {
     fn head_row(&self) -> Option<&Vec<String>> {
         if self.at > 0 { None } else { self.head.get(self.head_at.checked_sub(1)?) }
     }
-
-    fn row(&self) -> Option<usize> {
-        self.at.checked_sub(1)
-    }
 }
 
 impl<C: Chunks> Cells for ColumnRows<C> {
-    fn number(&self, column: usize) -> f64 {
-        let found = self.row().zip(self.chunk.get(column)).and_then(|(row, chunk)| match chunk {
-            Chunk::Numbers(values) => values.get(row).copied().filter(|value| value.abs() < NO_READING),
-            Chunk::Texts(values) => parse_number(values.get(row)?.trim().as_bytes(), b'.'),
-            Chunk::Instants(_) => None,
+    fn cell(&self, column: usize) -> Cell<'_> {
+        let row = self.at.wrapping_sub(1);
+        let cell = self.chunk.get(column).and_then(|chunk| match chunk {
+            Chunk::Numbers(values) => values.get(row).map(|value| Cell::Number(*value)),
+            Chunk::Texts(values) => values.get(row).map(|text| Cell::Text(text.trim().as_bytes())),
+            Chunk::Instants(values) => values.get(row).copied().flatten().map(Cell::Instant),
         });
-        found.unwrap_or(f64::NAN)
-    }
-
-    fn number_in(&self, column: usize, unit: &str) -> f64 {
-        let found = self.row().zip(self.chunk.get(column)).and_then(|(row, chunk)| match chunk {
-            Chunk::Texts(values) => Some(number_in(values.get(row)?, b'.', unit)),
-            _ => None,
-        });
-        found.unwrap_or(f64::NAN)
-    }
-
-    fn instant(&self, column: usize, order: DateOrder) -> Option<Instant> {
-        match self.chunk.get(column)? {
-            Chunk::Instants(values) => values.get(self.row()?).copied().flatten(),
-            Chunk::Texts(values) => parse_instant(values.get(self.row()?)?, order),
-            Chunk::Numbers(_) => None,
-        }
+        cell.unwrap_or(Cell::Empty)
     }
 }
 

@@ -11,7 +11,7 @@ pub(crate) struct Part {
     first_group: usize,
     first_column: usize,
     /// Time 0 minus that of the earliest table, s.
-    later_s: f64,
+    offset_s: f64,
 }
 
 impl Part {
@@ -26,7 +26,7 @@ impl Part {
     }
 
     pub(crate) fn forward_row(&self, row: Row<'_>, sink: &mut RowSink<'_>) -> Result<(), LogError> {
-        sink(Row { group: row.group + self.first_group, t_s: row.t_s + self.later_s, ..row })
+        sink(Row { group: row.group + self.first_group, t_s: row.t_s + self.offset_s, ..row })
     }
 }
 
@@ -40,7 +40,7 @@ pub(crate) fn join_tables(
     if found.is_empty() {
         let problems: Vec<String> = problems.iter().map(LogFinding::to_string).collect();
         return Err(if problems.is_empty() {
-            format!("no {word} holds anything")
+            format!("no {word} contains data")
         } else {
             problems.join("; ")
         });
@@ -73,8 +73,8 @@ pub(crate) fn join_tables(
         }));
         // If one table has no date, all are assumed to start together.
         let start = starts.as_ref().and_then(|starts| starts.get(index)).copied();
-        let later_s = start.zip(layout.start_time_ns).map_or(0.0, |(own, first)| (own - first) as f64 / 1e9);
-        parts.push(Part { name, table, first_group, first_column, later_s });
+        let offset_s = start.zip(layout.start_time_ns).map_or(0.0, |(own, first)| (own - first) as f64 / 1e9);
+        parts.push(Part { name, table, first_group, first_column, offset_s });
     }
     layout.findings.extend(problems);
     Ok((layout, parts))

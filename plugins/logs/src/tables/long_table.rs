@@ -1,11 +1,10 @@
 //! Tables in long form, whose rows have a time, the name of a quantity and its value: read as if each quantity had a column.
 
-use crate::notation::instant::{Instant, parse_instant};
-use crate::notation::number::{is_missing, number_in, read_number};
-use crate::notation::table_row::{Cells, Rows};
+use crate::notation::number::{is_missing, read_number};
+use crate::notation::table_row::{Cell, Cells, Rows};
 use crate::tables::row_stream::RowStream;
 use crate::tables::table_log::Table;
-use mapper_recording::logs::{DateOrder, LogError, LogFinding, header_unit};
+use mapper_recording::logs::{LogError, LogFinding, header_unit};
 use std::collections::BTreeSet;
 
 const MAX_NAMES: usize = 1000;
@@ -96,7 +95,7 @@ impl LongForm {
         for row in rows.get(self.data_row..).unwrap_or_default() {
             wide.extend(gathered.take(self, row));
         }
-        wide.extend(gathered.rest());
+        wide.extend(gathered.finish());
         wide
     }
 }
@@ -119,7 +118,7 @@ impl WideRow {
         let time = form.clock.iter().map(|clock| cell(*clock)).collect::<Vec<_>>().join(" ");
         let begins =
             self.row.first() != Some(&time) || self.row.get(at).is_some_and(|value| !value.is_empty());
-        let done = if begins { self.rest() } else { None };
+        let done = if begins { self.finish() } else { None };
         if let Some(place) = self.row.first_mut() {
             *place = time;
         }
@@ -130,8 +129,8 @@ impl WideRow {
         done
     }
 
-    /// The last row, if there is any.
-    fn rest(&mut self) -> Option<Vec<String>> {
+    /// Takes the last row, if there is any.
+    fn finish(&mut self) -> Option<Vec<String>> {
         let empty = vec![String::new(); self.row.len()];
         let row = std::mem::replace(&mut self.row, empty);
         std::mem::take(&mut self.filled).then_some(row)
@@ -155,23 +154,15 @@ impl LongRows {
         let gathered = WideRow::new(&form);
         LongRows { stream, gathered, row: Vec::new(), before: None, ended: false, form, decimal }
     }
-
-    fn cell(&self, column: usize) -> &str {
-        self.row.get(column).map_or("", String::as_str)
-    }
 }
 
 impl Cells for LongRows {
-    fn number(&self, column: usize) -> f64 {
-        crate::notation::number::parse_number(self.cell(column).as_bytes(), self.decimal).unwrap_or(f64::NAN)
+    fn cell(&self, column: usize) -> Cell<'_> {
+        self.row.get(column).map_or(Cell::Empty, |text| Cell::Text(text.as_bytes()))
     }
 
-    fn number_in(&self, column: usize, unit: &str) -> f64 {
-        number_in(self.cell(column), self.decimal, unit)
-    }
-
-    fn instant(&self, column: usize, order: DateOrder) -> Option<Instant> {
-        parse_instant(self.cell(column), order)
+    fn decimal(&self) -> u8 {
+        self.decimal
     }
 }
 
@@ -196,7 +187,7 @@ impl Rows for LongRows {
                 return Ok(true);
             }
         }
-        match self.gathered.rest() {
+        match self.gathered.finish() {
             Some(row) => self.row = row,
             None => return Ok(false),
         }

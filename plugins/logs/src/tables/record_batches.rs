@@ -3,6 +3,7 @@
 use crate::columns::sample::HEAD_ROWS;
 use crate::columns::table_head::MAX_COLUMNS;
 use crate::notation::instant::{Instant, NS_PER_DAY};
+use crate::tables::column_log::COLUMN_OPTIONS;
 use crate::tables::column_rows::{Chunk, Chunks, ColumnRows};
 use crate::tables::table_log::{Origin, Table};
 use arrow_array::cast::AsArray;
@@ -39,9 +40,7 @@ pub(crate) fn open_log(
     options: &LogOptions,
     open: OpenBatches,
 ) -> Result<Box<dyn Log>, LogError> {
-    options
-        .allow_only(&["time", "time_unit", "date_order", "rate", "missing"])
-        .map_err(|why| file.content_error(name, why))?;
+    options.allow_only(&COLUMN_OPTIONS).map_err(|why| file.content_error(name, why))?;
     let (schema, batches) = catch_panic(name, file, || open(file))?;
     let columns = schema.fields().len();
     if columns > MAX_COLUMNS {

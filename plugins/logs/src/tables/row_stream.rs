@@ -1,11 +1,9 @@
 //! Reads the lines of a delimited file one after the other.
 
 use crate::notation::encoding::DecodingReader;
-use crate::notation::instant::{Instant, parse_instant};
-use crate::notation::number::{number_in, parse_number};
-use crate::notation::table_row::{Cells, Rows};
-use mapper_recording::logs::{DateOrder, LogError, LogFile, TextEncoding};
-use std::cell::Cell;
+use crate::notation::table_row::{Cell, Cells, Rows};
+use mapper_recording::logs::{LogError, LogFile, TextEncoding};
+use std::cell;
 use std::io::{self, Read};
 use std::ops::Range;
 use std::rc::Rc;
@@ -26,7 +24,7 @@ pub(crate) struct Dialect {
 /// Counts bytes since the last complete line.
 struct LineLimiter<R> {
     inner: R,
-    left: Rc<Cell<usize>>,
+    left: Rc<cell::Cell<usize>>,
 }
 
 impl<R: Read> Read for LineLimiter<R> {
@@ -44,7 +42,7 @@ impl<R: Read> Read for LineLimiter<R> {
 pub(crate) struct RowStream {
     file: LogFile,
     reader: csv::Reader<Box<dyn Read>>,
-    left: Rc<Cell<usize>>,
+    left: Rc<cell::Cell<usize>>,
     dialect: Dialect,
     record: csv::ByteRecord,
     /// With blanks as separators, the cells that are not empty.
@@ -58,7 +56,7 @@ impl RowStream {
 
     /// The rows in a range of the file.
     pub(crate) fn over(file: &LogFile, mut bytes: Box<dyn Read>, dialect: Dialect) -> Self {
-        let left = Rc::new(Cell::new(MAX_LINE_BYTES));
+        let left = Rc::new(cell::Cell::new(MAX_LINE_BYTES));
         let mark = u64::try_from(dialect.mark).unwrap_or(0);
         // An error in the mark appears at the first line.
         drop(io::copy(&mut bytes.by_ref().take(mark), &mut io::sink()));
@@ -83,7 +81,7 @@ impl RowStream {
         }
     }
 
-    fn cell(&self, column: usize) -> &[u8] {
+    fn bytes(&self, column: usize) -> &[u8] {
         let at = if self.dialect.separator == b' ' { self.filled.get(column).copied() } else { Some(column) };
         at.and_then(|at| self.record.get(at)).unwrap_or_default()
     }
@@ -104,21 +102,17 @@ impl RowStream {
     /// The cells of the row as text.
     pub(crate) fn texts(&self) -> Vec<String> {
         let count = if self.dialect.separator == b' ' { self.filled.len() } else { self.record.len() };
-        (0..count).map(|column| String::from_utf8_lossy(self.cell(column)).trim().to_owned()).collect()
+        (0..count).map(|column| String::from_utf8_lossy(self.bytes(column)).trim().to_owned()).collect()
     }
 }
 
 impl Cells for RowStream {
-    fn number(&self, column: usize) -> f64 {
-        parse_number(self.cell(column), self.dialect.decimal).unwrap_or(f64::NAN)
+    fn cell(&self, column: usize) -> Cell<'_> {
+        Cell::Text(self.bytes(column))
     }
 
-    fn number_in(&self, column: usize, unit: &str) -> f64 {
-        number_in(&String::from_utf8_lossy(self.cell(column)), self.dialect.decimal, unit)
-    }
-
-    fn instant(&self, column: usize, order: DateOrder) -> Option<Instant> {
-        parse_instant(&String::from_utf8_lossy(self.cell(column)), order)
+    fn decimal(&self) -> u8 {
+        self.dialect.decimal
     }
 }
 

@@ -1,18 +1,18 @@
 //! A table as a log: its clocks, its columns, and its stream of rows.
 
-use crate::columns::clock::ClockHand;
-use crate::columns::clock_choice::{Clocks, choose};
+use crate::columns::clock::ClockReader;
+use crate::columns::clock_choice::{Clocks, choose_clocks};
 use crate::columns::sample::Sample;
 use crate::columns::table_head::{TableHead, analyse_head};
-use crate::notation::instant::Instant;
-use crate::notation::table_row::{Cells, Rows};
+use crate::notation::table_row::{Cell, Cells, Rows};
 use crate::tables::row_sorter::RowSorter;
-use mapper_recording::logs::{Column, DateOrder, Layout, LogError, LogFinding, LogOptions, Row, RowSink};
+use mapper_recording::logs::{Column, Layout, LogError, LogFinding, LogOptions, Row, RowSink};
 use std::collections::BTreeMap;
 
+/// Reads the rows of one group.
 struct GroupReader {
     group: usize,
-    hand: ClockHand,
+    clock: ClockReader,
     sorter: Option<RowSorter>,
     sources: Vec<usize>,
     values: Vec<f64>,
@@ -25,19 +25,19 @@ struct CellsWithUnits<'a> {
 }
 
 impl Cells for CellsWithUnits<'_> {
+    fn cell(&self, column: usize) -> Cell<'_> {
+        self.row.cell(column)
+    }
+
+    fn decimal(&self) -> u8 {
+        self.row.decimal()
+    }
+
     fn number(&self, column: usize) -> f64 {
         match self.units.get(&column) {
             None => self.row.number(column),
             Some(unit) => self.row.number_in(column, unit),
         }
-    }
-
-    fn number_in(&self, column: usize, unit: &str) -> f64 {
-        self.row.number_in(column, unit)
-    }
-
-    fn instant(&self, column: usize, order: DateOrder) -> Option<Instant> {
-        self.row.instant(column, order)
     }
 }
 
@@ -78,7 +78,7 @@ impl Table {
             findings.retain(|finding| !matches!(finding, LogFinding::Header { .. }));
         }
         let sample = Sample { columns: &columns, rows: rows.get(data_row..).unwrap_or_default(), decimal };
-        let mut clocks = choose(&sample, options)?;
+        let mut clocks = choose_clocks(&sample, options)?;
         if origin != Origin::Waveform {
             findings.append(&mut clocks.findings);
         }
@@ -133,19 +133,14 @@ impl Table {
         }
         let mut groups: Vec<GroupReader> = Vec::new();
         for (index, (_, clock)) in self.clocks.groups.iter().enumerate() {
-            let of_group = |column: &&usize| {
-                self.layout.columns.get(**column).is_some_and(|column| column.group == index)
-            };
-            let sources: Vec<usize> = wanted
-                .iter()
-                .filter(of_group)
-                .filter_map(|column| self.sources.get(*column).copied())
-                .collect();
+            let members = self.layout.members(index, wanted);
+            let sources: Vec<usize> =
+                members.into_iter().filter_map(|column| self.sources.get(column).copied()).collect();
             if !sources.is_empty() {
                 groups.push(GroupReader {
                     group: index,
                     sorter: clock.disordered.then(RowSorter::default),
-                    hand: ClockHand::new(clock.clone()),
+                    clock: ClockReader::new(clock.clone()),
                     sources,
                     values: Vec::new(),
                 });
@@ -153,28 +148,28 @@ impl Table {
         }
         while rows.advance()? {
             let row = CellsWithUnits { row: &*rows, units: &self.cell_units };
-            for rolling in &mut groups {
-                let Some(t_s) = rolling.hand.time_s(&row) else { continue };
-                rolling.values.clear();
-                for source in &rolling.sources {
+            for reader in &mut groups {
+                let Some(t_s) = reader.clock.time_s(&row) else { continue };
+                reader.values.clear();
+                for source in &reader.sources {
                     let value = row.number(*source);
-                    rolling.values.push(if self.missing.contains(&value) { f64::NAN } else { value });
+                    reader.values.push(if self.missing.contains(&value) { f64::NAN } else { value });
                 }
-                match &mut rolling.sorter {
-                    None => sink(Row { group: rolling.group, t_s, values: &rolling.values })?,
+                match &mut reader.sorter {
+                    None => sink(Row { group: reader.group, t_s, values: &reader.values })?,
                     Some(sorter) => {
-                        if let Some((t_s, values)) = sorter.exchange(t_s, &rolling.values) {
-                            sink(Row { group: rolling.group, t_s, values: &values })?;
+                        if let Some((t_s, values)) = sorter.exchange(t_s, &reader.values) {
+                            sink(Row { group: reader.group, t_s, values: &values })?;
                         }
                     }
                 }
             }
         }
         let mut remark = None;
-        for rolling in groups {
-            remark = remark.or(rolling.hand.remark());
-            for (t_s, values) in rolling.sorter.unwrap_or_default().rest() {
-                sink(Row { group: rolling.group, t_s, values: &values })?;
+        for reader in groups {
+            remark = remark.or(reader.clock.remark());
+            for (t_s, values) in reader.sorter.unwrap_or_default().rest() {
+                sink(Row { group: reader.group, t_s, values: &values })?;
             }
         }
         Ok(remark)

@@ -59,7 +59,7 @@ impl Kind {
 }
 
 /// Refuses a workbook that would exceed the memory when unpacked.
-pub(super) fn check(file: &LogFile) -> Result<(), LogError> {
+pub(super) fn check_size(file: &LogFile) -> Result<(), LogError> {
     let refused = |message: String| file.content_error(NAME, message);
     let wrong = |error: zip::result::ZipError| refused(error.to_string());
     let mut archive = zip::ZipArchive::new(file.open()?).map_err(wrong)?;
@@ -188,15 +188,16 @@ impl PieceChecker {
         if self.kind != Kind::SharedStrings || tag.local_name().as_ref() != "sst" {
             return Ok(before);
         }
-        let mut most = before;
+        let mut count = before;
         for attribute in tag.attributes().with_checks(false) {
             let attribute = attribute.map_err(|error| format!("is not XML: {error}"))?;
             if attribute.key.local_name().as_ref() == "uniqueCount" {
-                let count = attribute.value.trim().parse();
-                most = most.max(count.map_err(|_| format!("claims `{}` strings", short(&attribute.value)))?);
+                let stated = attribute.value.trim().parse();
+                count =
+                    count.max(stated.map_err(|_| format!("claims `{}` strings", short(&attribute.value)))?);
             }
         }
-        Ok(most)
+        Ok(count)
     }
 }
 

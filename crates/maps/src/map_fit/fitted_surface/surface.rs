@@ -51,7 +51,7 @@ impl MapFit {
         let error = LineErrors::new(&self.solution, speed_ratio).at(foot.angle_rad, scales);
         NearestPlace {
             distance_ratio: x.hypot(y),
-            eta: self.limit_efficiency(foot.place.eta, self.outside(speed_ratio)),
+            eta: self.limit_efficiency(foot.place.eta, self.is_outside(speed_ratio)),
             distance_standard_error_ratio: error.distance_ratio,
             eta_standard_error: error.eta,
         }
@@ -66,7 +66,7 @@ impl MapFit {
     }
 
     /// Whether a speed is outside the measured range.
-    pub(crate) fn outside(&self, speed_ratio: f64) -> bool {
+    pub(crate) fn is_outside(&self, speed_ratio: f64) -> bool {
         self.solution.splines.shape.outside(speed_ratio) > 1e-9
     }
 

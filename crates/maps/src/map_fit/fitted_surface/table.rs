@@ -78,9 +78,9 @@ pub(crate) fn table(fit: &MapFit, options: &MapFitOptions) -> Result<FittedMap, 
     })
 }
 
-/// End angles of the lines, as angles over speed.
+/// End angles of the lines over speed, rad.
 struct LineEndAngles {
-    /// Smooth surge-side end.
+    /// Spline of the smooth surge-side end, with its knot values.
     spline: SpeedSpline,
     surge: DVector<f64>,
     /// For each measured line.
@@ -176,9 +176,9 @@ fn line_nodes(fit: &MapFit, ends: &LineEndAngles, speed_corrected_rpm: f64, coun
     let speed_ratio = fit.speed_ratio(speed_corrected_rpm);
     let shape = fit.solution.shape(speed_ratio);
     let surge = ends.surge_rad(speed_ratio);
-    let bottom = choke_end(&shape, speed_ratio, surge);
+    let choke = choke_end(&shape, speed_ratio, surge);
     let walk: Vec<f64> =
-        (0..=WALK_STEPS).map(|i| bottom + (surge - bottom) * i as f64 / WALK_STEPS as f64).collect();
+        (0..=WALK_STEPS).map(|i| choke + (surge - choke) * i as f64 / WALK_STEPS as f64).collect();
     let places: Vec<(f64, f64)> = walk
         .iter()
         .map(|angle| {
@@ -186,8 +186,8 @@ fn line_nodes(fit: &MapFit, ends: &LineEndAngles, speed_corrected_rpm: f64, coun
             (place.flow_kg_s, place.pressure_ratio)
         })
         .collect();
-    let largest = |value: fn(&(f64, f64)) -> f64| places.iter().map(value).fold(f64::MIN, f64::max);
-    let scales = Scales { flow_kg_s: largest(|p| p.0).max(1e-12), ratio: (largest(|p| p.1) - 1.0).max(1e-6) };
+    let max = |value: fn(&(f64, f64)) -> f64| places.iter().map(value).fold(f64::MIN, f64::max);
+    let scales = Scales { flow_kg_s: max(|p| p.0).max(1e-12), ratio: (max(|p| p.1) - 1.0).max(1e-6) };
     let mut length = vec![0.0];
     for pair in places.windows(2) {
         let step = ((pair[1].0 - pair[0].0) / scales.flow_kg_s).hypot((pair[1].1 - pair[0].1) / scales.ratio);

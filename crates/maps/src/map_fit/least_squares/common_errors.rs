@@ -42,17 +42,17 @@ impl CommonErrorField {
 
     /// Errors at a place: mean over the points with weights that fall with the square of the distance.
     pub(crate) fn at(&self, speed_ratio: f64, flow_ratio: f64) -> PlaceCommonErrors {
-        let most = self.points.iter().map(|point| point.common.eta_changes.len()).max().unwrap_or(0);
-        let mut eta = vec![0.0; most];
+        let error_count = self.points.iter().map(|point| point.common.eta_changes.len()).max().unwrap_or(0);
+        let mut eta = vec![0.0; error_count];
         let (mut all, mut with_eta) = (0.0, 0.0);
-        let mut found = PlaceCommonErrors::default();
+        let mut errors = PlaceCommonErrors::default();
         for Entry { speed_ratio: speed, flow_ratio: flow, common } in &self.points {
             let square = ((speed_ratio - speed).powi(2) + (flow_ratio - flow).powi(2))
                 / (HALF_WEIGHT_DISTANCE_RATIO * HALF_WEIGHT_DISTANCE_RATIO);
             let weight = 1.0 / (1.0 + square * square);
             all += weight;
-            found.flow_standard_error_ratio += weight * common.flow_corrected_standard_error_ratio;
-            found.pressure_ratio_standard_error += weight * common.pressure_ratio_standard_error;
+            errors.flow_standard_error_ratio += weight * common.flow_corrected_standard_error_ratio;
+            errors.pressure_ratio_standard_error += weight * common.pressure_ratio_standard_error;
             if !common.eta_changes.is_empty() {
                 with_eta += weight;
                 for (sum, change) in eta.iter_mut().zip(&common.eta_changes) {
@@ -61,12 +61,12 @@ impl CommonErrorField {
             }
         }
         if all > 0.0 {
-            found.flow_standard_error_ratio /= all;
-            found.pressure_ratio_standard_error /= all;
+            errors.flow_standard_error_ratio /= all;
+            errors.pressure_ratio_standard_error /= all;
         }
         if with_eta > 0.0 {
-            found.eta_standard_error = eta.iter().map(|sum| (sum / with_eta).powi(2)).sum::<f64>().sqrt();
+            errors.eta_standard_error = eta.iter().map(|sum| (sum / with_eta).powi(2)).sum::<f64>().sqrt();
         }
-        found
+        errors
     }
 }

@@ -50,7 +50,7 @@ pub(crate) struct Observations {
     /// Corrected speeds of the lines, rpm, rising.
     pub lines_rpm: Vec<f64>,
     pub points: Vec<Observation>,
-    /// Errors common to all points, which the fit cannot show.
+    /// Errors common to all points, which the residuals do not show.
     pub common: CommonErrorField,
 }
 
@@ -75,8 +75,8 @@ impl Observations {
             return Err(MapFitError::TooMany {
                 points: count,
                 lines: lines.len(),
-                most_points: MAX_POINTS,
-                most_lines: MAX_LINES,
+                max_points: MAX_POINTS,
+                max_lines: MAX_LINES,
             });
         }
         let nominal_speed_rpm = lines.get(lines.len() / 2).map_or(1.0, |line| line.0);

@@ -9,10 +9,12 @@ pub(crate) const ROBUST_SIGMAS: f64 = 3.0;
 /// errors beyond the measured lines too small.
 pub(crate) const ROUGHNESS_PRECISION_RANGE: [f64; 2] = [0.03, 20.0];
 
-/// Variance components, as precisions.
+/// Variance components.
 pub(crate) struct Precisions {
+    /// Precision of the roughness of each parameter over speed.
     pub(crate) rough: Parameters,
+    /// Precision of each line offset.
     pub(crate) lines: [f64; 3],
-    /// Scales of distance and efficiency.
+    /// Scales of the residuals of distance and efficiency.
     pub(crate) scales: [f64; 2],
 }

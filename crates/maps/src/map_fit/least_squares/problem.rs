@@ -7,7 +7,8 @@ use crate::map_fit::MapFitError;
 use crate::map_fit::least_squares::observations::{Observation, Observations};
 use crate::map_fit::least_squares::precisions::{Precisions, ROBUST_SIGMAS};
 use crate::map_fit::speed_lines::line_shape::{
-    CHOKE_FLOW, EXPONENTS, FlowFrame, LineShape, PARAMETERS, Parameters, WORK, ZERO_SLOPE_HEAD,
+    CHOKE_FLOW, CHOKE_HEAD, EXPONENTS, FlowFrame, LineShape, PARAMETERS, Parameters, WORK, ZERO_SLOPE_FLOW,
+    ZERO_SLOPE_HEAD,
 };
 use crate::map_fit::speed_lines::nearest::{Foot, Scales, nearest, normal};
 use crate::map_fit::speed_lines::splines::{Rows, Splines};
@@ -52,21 +53,21 @@ impl<'a> Problem<'a> {
     }
 
     /// Maximum of a value over the points of each line.
-    pub(crate) fn line_maxima(&self, value: impl Fn(&Observation) -> f64) -> Vec<f64> {
-        let mut largest = vec![f64::MIN; self.data.lines_rpm.len()];
+    fn line_maxima(&self, value: impl Fn(&Observation) -> f64) -> Vec<f64> {
+        let mut maxima = vec![f64::MIN; self.data.lines_rpm.len()];
         for point in &self.data.points {
-            largest[point.line] = largest[point.line].max(value(point));
+            maxima[point.line] = maxima[point.line].max(value(point));
         }
-        largest
+        maxima
     }
 
-    pub(crate) fn starting_level(&self) -> Parameters {
+    fn starting_level(&self) -> Parameters {
         let mean = |values: &[f64]| mean(values).unwrap_or(f64::NAN);
         let mut level = [0.0; PARAMETERS];
         level[CHOKE_FLOW] = (1.03 * mean(&self.line_maxima(Observation::flow))).ln();
         level[ZERO_SLOPE_HEAD] = mean(&self.line_maxima(Observation::head)).max(1e-9).ln();
-        level[crate::map_fit::speed_lines::line_shape::ZERO_SLOPE_FLOW] = -0.8;
-        level[crate::map_fit::speed_lines::line_shape::CHOKE_HEAD] = 0.1;
+        level[ZERO_SLOPE_FLOW] = -0.8;
+        level[CHOKE_HEAD] = 0.1;
         // Exponents near 2: an ellipse.
         EXPONENTS.iter().for_each(|i| level[*i] = -0.05);
         level
@@ -242,7 +243,7 @@ impl<'a> Problem<'a> {
         sum
     }
 
-    pub(crate) fn level_precision(&self, parameter: usize) -> f64 {
+    fn level_precision(&self, parameter: usize) -> f64 {
         1.0 / (LEVEL_SD[parameter].powi(2) * self.splines.len() as f64)
     }
 

@@ -61,10 +61,11 @@ impl Solution {
         let (rows, knots) = (self.splines.rows(speed_ratio), self.splines.len());
         // Student's quantile over the normal one, squared, for the number of second differences that estimated the roughness.
         let freedom = knots.saturating_sub(2).max(1) as f64;
-        let few = student_quantile(0.975, freedom).map_or(1.0, |quantile| (quantile / NORMAL_975).powi(2));
-        let open =
+        let small_sample =
+            student_quantile(0.975, freedom).map_or(1.0, |quantile| (quantile / NORMAL_975).powi(2));
+        let prior_variances =
             (self.splines.shape.prior_variance(speed_ratio), self.splines.work.prior_variance(speed_ratio));
-        let beyond = self.widening_at(speed_ratio);
+        let widening = self.widening_at(speed_ratio);
         let trends = [
             self.splines.shape.straight_minus_damped(speed_ratio),
             self.splines.work.straight_minus_damped(speed_ratio),
@@ -75,13 +76,18 @@ impl Solution {
                 let block = self.covariance.view((a * knots, b * knots), (knots, knots));
                 out[(a, b)] = (rows.of(a).transpose() * block * rows.of(b))[(0, 0)];
             }
-            let (open, trend, widened) =
-                if a < WORK { (open.0, &trends[0], beyond.shape) } else { (open.1, &trends[1], beyond.work) };
-            let died_away = self.values.row(a).transpose().dot(trend);
-            out[(a, a)] += widened * (open * self.roughness_variance[a] * few + died_away * died_away / 3.0);
+            let (prior_variance, trend, factor) = if a < WORK {
+                (prior_variances.0, &trends[0], widening.shape)
+            } else {
+                (prior_variances.1, &trends[1], widening.work)
+            };
+            let difference = self.values.row(a).transpose().dot(trend);
+            out[(a, a)] += factor
+                * (prior_variance * self.roughness_variance[a] * small_sample
+                    + difference * difference / 3.0);
         }
-        for (index, together) in LINE_OFFSETS.iter().enumerate() {
-            for (a, b) in together.iter().flat_map(|a| together.iter().map(move |b| (*a, *b))) {
+        for (index, parameters) in LINE_OFFSETS.iter().enumerate() {
+            for (a, b) in parameters.iter().flat_map(|a| parameters.iter().map(move |b| (*a, *b))) {
                 out[(a, b)] += self.line_scatter[index].powi(2);
             }
         }

@@ -39,8 +39,8 @@ const DAMPING: DampingRule = DampingRule {
 enum Start<'a> {
     /// From the points alone, with this scale of the residuals.
     Scale(f64),
-    /// The result of another fit.
-    Near(&'a Solution),
+    /// From the result of another fit.
+    Fit(&'a Solution),
 }
 
 /// Phase of the fit.
@@ -58,18 +58,18 @@ enum Phase {
 /// If the residuals stay large, the estimation may have taken shape for scatter or points for outliers. It is then repeated from other
 /// scales, and the most probable result counts.
 ///
-/// `near`: a fit of nearly the same points, from which the search starts.
+/// `start`: a fit of nearly the same points, from which the search starts.
 pub(crate) fn solve(
     data: &Observations,
     stiffness: f64,
-    near: Option<&Solution>,
+    start: Option<&Solution>,
 ) -> Result<Solution, MapFitError> {
-    let frame = near.map(|near| near.frame);
+    let frame = start.map(|fit| fit.frame);
     let from = |start: Start<'_>| solve_from(data, stiffness, frame, start);
     let [first, others @ ..] = START_SCALES.map(Start::Scale);
-    let mut best = from(near.map_or(first, Start::Near))?;
+    let mut best = from(start.map_or(first, Start::Fit))?;
     if best.rms[0] > MAX_RMS || best.rms[1] > MAX_RMS {
-        for start in near.map(|_| first).into_iter().chain(others) {
+        for start in start.map(|_| first).into_iter().chain(others) {
             if let Ok(other) = from(start)
                 && other.deviance < best.deviance
             {
@@ -97,15 +97,15 @@ fn solve_from(
             lines: [1.0 / START_LINE_SCATTER.powi(2); 3],
             scales: [scale; 2],
         },
-        Start::Near(near) => {
-            unknowns.values = problem.splines.values(|speed_ratio| near.parameters(speed_ratio));
+        Start::Fit(fit) => {
+            unknowns.values = problem.splines.values(|speed_ratio| fit.parameters(speed_ratio));
             Precisions {
                 rough: std::array::from_fn(|q| {
-                    let [least, most] = ROUGHNESS_PRECISION_RANGE.map(|ratio| ratio * start_rough[q]);
-                    (1.0 / near.roughness_variance[q]).clamp(least, most)
+                    let [min, max] = ROUGHNESS_PRECISION_RANGE.map(|ratio| ratio * start_rough[q]);
+                    (1.0 / fit.roughness_variance[q]).clamp(min, max)
                 }),
-                lines: near.line_scatter.map(|sigma| 1.0 / (sigma * sigma)),
-                scales: near.scales,
+                lines: fit.line_scatter.map(|sigma| 1.0 / (sigma * sigma)),
+                scales: fit.scales,
             }
         }
     };

@@ -11,7 +11,7 @@ use crate::map_fit::speed_lines::line_shape::{PARAMETERS, Parameters};
 use nalgebra::DMatrix;
 
 impl Problem<'_> {
-    /// [`Solution::improbability`] without the determinant of the information.
+    /// The deviance of the solution without the determinant of the information.
     pub(crate) fn deviance(
         &self,
         unknowns: &Unknowns,
@@ -37,7 +37,7 @@ impl Problem<'_> {
         sum - precisions.lines.iter().map(|p| self.data.lines_rpm.len() as f64 * p.ln()).sum::<f64>()
     }
 
-    /// One step of the variance components; the largest relative change of one.
+    /// Updates the variance components once; returns the largest relative change.
     pub(crate) fn update(
         &self,
         precisions: &mut Precisions,
@@ -60,8 +60,8 @@ impl Problem<'_> {
             let free = (knots.saturating_sub(2) as f64 - used).max(1e-2);
             let wanted = free / (values.dot(&(&self.splines.of(q).penalty * &values)) + 1e-9);
             let step = (wanted / precisions.rough[q]).clamp(0.3, 3.0);
-            let [least, most] = ROUGHNESS_PRECISION_RANGE.map(|ratio| ratio * start);
-            let next = (precisions.rough[q] * step).clamp(least, most);
+            let [min, max] = ROUGHNESS_PRECISION_RANGE.map(|ratio| ratio * start);
+            let next = (precisions.rough[q] * step).clamp(min, max);
             set(&mut precisions.rough[q], next);
         }
         for (index, precision) in precisions.lines.iter_mut().enumerate() {

@@ -6,7 +6,7 @@ use crate::map_fit::least_squares::observations::Observation;
 /// A deviation and its standard error: of the line, of a point about it, and of the point itself.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Deviation {
-    pub by: f64,
+    pub size: f64,
     pub standard_error: f64,
 }
 
@@ -30,11 +30,11 @@ impl MapFit {
         );
         Deviations {
             distance: Deviation {
-                by: place.distance_ratio,
+                size: place.distance_ratio,
                 standard_error: place.distance_standard_error_ratio.hypot(distance_rms),
             },
             eta: point.eta.map(|eta| Deviation {
-                by: (eta - place.eta).abs(),
+                size: (eta - place.eta).abs(),
                 standard_error: place.eta_standard_error.hypot(eta_rms).hypot(point.eta_error),
             }),
         }

@@ -1,8 +1,7 @@
 //! Widens the errors of a fit beyond the measured speeds.
 //!
-//! Between lines the roughness of each parameter limits the shape of a line that was not measured. Beyond them that is
-//! not enough: choke flow at low speed and work at high Mach numbers bend towards one end, and are smooth in the middle, which determines the
-//! roughness. The outermost line is therefore left out, and the variance beyond the other lines is increased until it explains the deviation
+//! Between lines the roughness of each parameter limits the shape of an unmeasured line. Beyond them that limit is
+//! too tight: choke flow at low speed and work at high Mach numbers bend towards one end, but the smooth middle determines the roughness. The outermost line is therefore left out, and the variance beyond the other lines is increased until it explains the deviation
 //! of that line. It is never decreased: one line does not justify smaller errors.
 
 use crate::map_fit::fitted_surface::surface::MapFit;
@@ -44,9 +43,9 @@ fn estimate_widening<'a>(
         rest.solution.widening = EndWidenings::both(Widening { shape, work });
         let [mut distance, mut eta] = [Sums::default(); 2];
         for point in points.clone() {
-            let miss = rest.deviations(point);
-            distance.take(miss.distance);
-            miss.eta.into_iter().for_each(|off| eta.take(off));
+            let deviations = rest.deviations(point);
+            distance.add(deviations.distance);
+            deviations.eta.into_iter().for_each(|deviation| eta.add(deviation));
         }
         (distance, eta)
     };
@@ -58,20 +57,20 @@ fn estimate_widening<'a>(
 /// Sums of squares over the points of a line.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sums {
-    off: f64,
-    explained: f64,
+    deviations: f64,
+    standard_errors: f64,
 }
 
 impl Sums {
-    fn take(&mut self, off: Deviation) {
-        self.off += off.by * off.by;
-        self.explained += off.standard_error * off.standard_error;
+    fn add(&mut self, deviation: Deviation) {
+        self.deviations += deviation.size * deviation.size;
+        self.standard_errors += deviation.standard_error * deviation.standard_error;
     }
 }
 
 /// Factor, at least 1, on the part of the variance beyond the ends, that explains the deviations.
-fn factor(without: Sums, with: Sums) -> f64 {
-    let beyond = with.explained - without.explained;
-    let factor = (with.off - without.explained) / beyond;
+fn factor(not_widened: Sums, widened: Sums) -> f64 {
+    let added = widened.standard_errors - not_widened.standard_errors;
+    let factor = (widened.deviations - not_widened.standard_errors) / added;
     if factor.is_finite() { factor.max(1.0) } else { 1.0 }
 }

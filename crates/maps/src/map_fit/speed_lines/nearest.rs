@@ -49,8 +49,8 @@ pub(crate) fn nearest(
         None => search_grid(&squared),
     };
     // Gauss-Newton in one variable; a step that does not reduce the distance is halved.
-    let mut foot = describe(shape, speed_ratio, start, offset, scales);
-    let mut least = squared(start);
+    let mut foot = foot_at(shape, speed_ratio, start, offset, scales);
+    let mut min = squared(start);
     for _ in 0..8 {
         let (x, y) = offset(foot.angle_rad);
         let [sx, sy, _] = foot.slope;
@@ -60,15 +60,15 @@ pub(crate) fn nearest(
         }
         let mut step = (foot.angle_rad + (x * sx + y * sy) / length).clamp(low, high) - foot.angle_rad;
         let mut value = squared(foot.angle_rad + step);
-        while value >= least && step.abs() > 1e-8 {
+        while value >= min && step.abs() > 1e-8 {
             step *= 0.5;
             value = squared(foot.angle_rad + step);
         }
-        if value >= least {
+        if value >= min {
             break;
         }
-        least = value;
-        foot = describe(shape, speed_ratio, foot.angle_rad + step, offset, scales);
+        min = value;
+        foot = foot_at(shape, speed_ratio, foot.angle_rad + step, offset, scales);
         if step.abs() < 1e-7 {
             break;
         }
@@ -83,12 +83,12 @@ fn search_grid(squared: &impl Fn(f64) -> f64) -> (f64, f64, f64) {
     // The first grid distinguishes the flat from the steep part.
     for mesh in [48, 10] {
         let step = (high - low) / f64::from(mesh);
-        let mut least = f64::INFINITY;
+        let mut min = f64::INFINITY;
         for i in 0..=mesh {
             let angle = low + step * f64::from(i);
             let value = squared(angle);
-            if value < least {
-                (least, best) = (value, angle);
+            if value < min {
+                (min, best) = (value, angle);
             }
         }
         (low, high) = (best - step, best + step);
@@ -96,7 +96,7 @@ fn search_grid(squared: &impl Fn(f64) -> f64) -> (f64, f64, f64) {
     (best, low, high)
 }
 
-fn describe(
+fn foot_at(
     shape: &LineShape,
     speed_ratio: f64,
     angle_rad: f64,

@@ -15,7 +15,7 @@ const DAMPING_LENGTH_RATIO: f64 = 0.5;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Coordinate {
     Speed,
-    Slowness,
+    InverseSpeed,
 }
 
 impl Coordinate {
@@ -23,7 +23,7 @@ impl Coordinate {
         match self {
             Coordinate::Speed => speed_ratio,
             // Increases with speed, like the other.
-            Coordinate::Slowness => -1.0 / speed_ratio,
+            Coordinate::InverseSpeed => -1.0 / speed_ratio,
         }
     }
 }
@@ -191,7 +191,7 @@ mod tests {
         /// A straight line through two knots, a third value in their middle at distance h: the curvature is spread over
         /// two parabola halves, integral of g''^2 = 3 d^2 / h^3 for a rise d: Green and Silverman, ch. 2.
         #[test]
-        fn what_lies_between_two_knots_is_open(h in 0.05..2.0f64) {
+        fn the_prior_variance_between_knots_is_that_of_an_integrated_random_walk(h in 0.05..2.0f64) {
             let spline = SpeedSpline::new(Coordinate::Speed, &[0.0, 2.0 * h]);
             let exact = h.powi(3) / 6.0;
             prop_assert!((spline.prior_variance(h) / exact - 1.0).abs() < 1e-9);

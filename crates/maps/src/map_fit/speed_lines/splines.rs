@@ -16,7 +16,7 @@ impl Splines {
     pub(crate) fn new(speed_ratios: &[f64]) -> Self {
         Splines {
             shape: SpeedSpline::new(Coordinate::Speed, speed_ratios),
-            work: SpeedSpline::new(Coordinate::Slowness, speed_ratios),
+            work: SpeedSpline::new(Coordinate::InverseSpeed, speed_ratios),
             speed_ratios: speed_ratios.to_vec(),
         }
     }

@@ -131,9 +131,8 @@ pub(crate) fn column(index: usize, heading: &str, machine: Machine) -> Result<Op
     let (name, unit) = parts(heading);
     let plain: String =
         name.to_lowercase().chars().filter(|c| c.is_alphanumeric() || "/√η^.".contains(*c)).collect();
-    let shown = || heading.chars().take(60).collect::<String>();
     if machine == Machine::Compressor && is_turbine(&plain) {
-        return Err(ColumnError::Turbine { heading: shown() });
+        return Err(ColumnError::Turbine { heading: heading.chars().take(60).collect() });
     }
     // `flow_low` is an end of an interval.
     let words = name.to_lowercase();
@@ -201,25 +200,27 @@ fn bracket_is_in_name(name: &str, inside: &str) -> bool {
     (root.ends_with("sqrt") || root.ends_with('√')) && inside.len() <= 4
 }
 
-/// Whether a bracket has words other than a unit, such as total or static.
+/// Whether a bracket contains words other than a unit, such as total or static.
 fn is_ratio_kind(inside: &str) -> bool {
     let plain: String = inside.to_lowercase().chars().filter(|c| c.is_alphanumeric()).collect();
-    matches!(
-        plain.as_str(),
-        "ts" | "tt"
-            | "cc"
-            | "ss"
-            | "corr"
-            | "corrected"
-            | "red"
-            | "reduced"
-            | "is"
-            | "isentropic"
-            | "total"
-            | "korr"
-            | "t"
-            | "s"
-    ) || is_dimensionless(inside)
+    const KINDS: [&str; 14] = [
+        "ts",
+        "tt",
+        "cc",
+        "ss",
+        "corr",
+        "corrected",
+        "red",
+        "reduced",
+        "is",
+        "isentropic",
+        "total",
+        "korr",
+        "t",
+        "s",
+    ];
+    KINDS.contains(&plain.as_str())
+        || is_dimensionless(inside)
         || ColumnName::read(inside).measured() == Some(Measured::PressureRatio)
 }
 
@@ -304,7 +305,8 @@ fn scale(quantity: Quantity, unit: &str) -> Option<Scale> {
 
 /// The unit of a kind in any spelling of headings. A map has absolute pressures.
 fn unit_of(kind: Kind, text: &str) -> Option<&'static Unit> {
-    let named =
-        || header_unit(text).filter(|found| found.kind == kind && found.reference != Reference::Gauge);
-    kind.unit(text).or_else(|| Some(named()?.unit))
+    kind.unit(text).or_else(|| {
+        let found = header_unit(text)?;
+        (found.kind == kind && found.reference != Reference::Gauge).then_some(found.unit)
+    })
 }

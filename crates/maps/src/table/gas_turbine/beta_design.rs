@@ -2,7 +2,7 @@
 
 use crate::table::columns::column::flow_unit_kg_s;
 use crate::table::gas_turbine::design_point::MapDesign;
-use mapper_core::{DesignPoint, ImportError, MapDescription};
+use mapper_core::{ImportError, MapDescription};
 
 /// Occurrences of a name as a whole word, each with the text after its quotes and brackets.
 fn occurrences<'a>(code: &'a str, name: &'a str) -> impl Iterator<Item = &'a str> {
@@ -33,14 +33,14 @@ fn flow_unit_in(code: &str) -> Option<f64> {
     ["WcMap", "WcArray", "Wc"].iter().find_map(|name| occurrences(code, name).find_map(unit))
 }
 
-/// The design point of the tables, without its values.
+/// The design point of the tables, without the values there.
 pub(crate) fn design_of(code: &str) -> MapDesign {
-    let usual = MapDesign::default();
+    let default = MapDesign::default();
     MapDesign {
         speed: number(code, &["NcMapDes", "NcDes", "NcMap"])
             .filter(|speed| *speed > 0.0)
-            .unwrap_or(usual.speed),
-        rline: number(code, &["RlineMapDes", "RlineDes", "RlineMap"]).unwrap_or(usual.rline),
+            .unwrap_or(default.speed),
+        rline: number(code, &["RlineMapDes", "RlineDes", "RlineMap"]).unwrap_or(default.rline),
         values: None,
     }
 }
@@ -49,8 +49,8 @@ pub(crate) fn design_of(code: &str) -> MapDesign {
 ///
 /// # Errors
 /// [`ImportError::Description`] for an unknown unit.
-pub(crate) fn flow_unit(code: &str, given: &MapDescription) -> Result<Option<f64>, ImportError> {
-    let Some(column) = given.columns.iter().find(|column| column.quantity == "flow") else {
+pub(crate) fn flow_unit(code: &str, description: &MapDescription) -> Result<Option<f64>, ImportError> {
+    let Some(column) = description.columns.iter().find(|column| column.quantity == "flow") else {
         return Ok(flow_unit_in(code));
     };
     let wrong = || ImportError::Description {
@@ -81,9 +81,4 @@ fn locate(rising: &[f64], wanted: f64) -> Option<(usize, f64)> {
     }
     let index = rising.windows(2).position(|pair| pair[0] < wanted && wanted < pair[1])?;
     Some((index, (wanted - rising[index]) / (rising[index + 1] - rising[index])))
-}
-
-/// Whether the flow of the design point is stated, so that the flow unit of the tables does not matter.
-pub(crate) fn scales_flow(design: DesignPoint) -> bool {
-    design.flow_corrected_kg_s.is_some()
 }

@@ -2,7 +2,7 @@
 //! Python, nested tables of NPSS.
 
 use crate::table::efficiency_comment::efficiency_in_comment;
-use crate::table::gas_turbine::beta_design::{design_of, flow_unit, interpolate, scales_flow};
+use crate::table::gas_turbine::beta_design::{design_of, flow_unit, interpolate};
 use crate::table::gas_turbine::design_point::{MapDesign, scale_to_design};
 use crate::table::reference::reference_in_comment;
 use crate::table::rows_to_lines::{Row, check_point_count, map_of_rows};
@@ -22,12 +22,8 @@ struct BetaTables {
 const MAX_NUMBERS: usize = 4 * crate::table::rows_to_lines::MAX_POINTS;
 
 /// The map of a script with arrays: `name = [1 2; 3 4]` or `name = np.array([[1, 2], [3, 4]])`.
-pub(crate) fn read_arrays(text: &str, given: &MapDescription) -> Result<ImportedMap, ImportError> {
-    let code: String = text
-        .lines()
-        .map(|line| line.split(['%', '#']).next().unwrap_or_default())
-        .collect::<Vec<_>>()
-        .join("\n");
+pub(crate) fn read_arrays(text: &str, description: &MapDescription) -> Result<ImportedMap, ImportError> {
+    let code = without_comments(text, &["%", "#"]);
     let mut tables = BetaTables::default();
     for (at, _) in code.match_indices('=') {
         let name =
@@ -42,18 +38,15 @@ pub(crate) fn read_arrays(text: &str, given: &MapDescription) -> Result<Imported
             *place = bracketed_numbers(value, ('[', ']'), line_of(&code, at))?;
         }
     }
-    tables.map(text, &code, given)
+    tables.map(text, &code, description)
 }
 
 /// The map of nested tables: `NcorrMap = 0.5 { RlineMap = {1, 2} WcMap = {0.1, 0.2} }`.
-pub(crate) fn read_nested(text: &str, given: &MapDescription) -> Result<ImportedMap, ImportError> {
-    let code: String =
-        text.lines().map(|line| line.split("//").next().unwrap_or_default()).collect::<Vec<_>>().join("\n");
+pub(crate) fn read_nested(text: &str, description: &MapDescription) -> Result<ImportedMap, ImportError> {
+    let code = without_comments(text, &["//"]);
     let mut tables = BetaTables::default();
     let (mut speeds, mut by_beta) = (Vec::new(), false);
-    let starts: Vec<usize> = code.match_indices("Table ").map(|(at, _)| at).collect();
-    for (index, start) in starts.iter().enumerate() {
-        let part = &code[*start..starts.get(index + 1).copied().unwrap_or(code.len())];
+    for (start, part) in parts_from(&code, "Table ") {
         // Only the first vane angle counts.
         let angles: Vec<usize> = part
             .match_indices("alphaMap")
@@ -61,7 +54,7 @@ pub(crate) fn read_nested(text: &str, given: &MapDescription) -> Result<Imported
             .filter(|at| part[*at..].trim_start_matches("alphaMap").trim_start().starts_with('='))
             .collect();
         let part = &part[..angles.get(1).copied().unwrap_or(part.len())];
-        let mut of_table = Vec::new();
+        let mut table_speeds = Vec::new();
         let mut is_known = false;
         for (at, _) in part.match_indices('=') {
             let line = line_of(&code, start + at);
@@ -72,13 +65,13 @@ pub(crate) fn read_nested(text: &str, given: &MapDescription) -> Result<Imported
             if is_speed && is_list {
                 // Each value of beta has one list over all speeds.
                 by_beta = true;
-                if of_table.is_empty() {
-                    of_table = bracketed_numbers(value, ('{', '}'), line)?;
+                if table_speeds.is_empty() {
+                    table_speeds = bracketed_numbers(value, ('{', '}'), line)?;
                 }
             } else if is_speed {
                 let end =
                     value.find(|c: char| !(c.is_ascii_digit() || "+-.eE".contains(c))).unwrap_or(value.len());
-                of_table.extend(value[..end].parse::<f64>().ok());
+                table_speeds.extend(value[..end].parse::<f64>().ok());
             } else if is_list && let Some(place) = tables.array_of(name) {
                 let numbers = bracketed_numbers(value, ('{', '}'), line)?;
                 // The coordinate of the columns is repeated at every speed.
@@ -91,30 +84,27 @@ pub(crate) fn read_nested(text: &str, given: &MapDescription) -> Result<Imported
             }
         }
         if is_known && speeds.is_empty() {
-            speeds = of_table;
+            speeds = table_speeds;
         }
     }
     tables.speeds = speeds;
     if by_beta {
         tables.transpose();
     }
-    tables.map(text, &code, given)
+    tables.map(text, &code, description)
 }
 
 /// The map of text tables of Modelica: `double name(rows, columns)`, the first row the auxiliary coordinate after one unused number, the
 /// first column the speeds.
-pub(crate) fn read_modelica(text: &str, given: &MapDescription) -> Result<ImportedMap, ImportError> {
-    let code: String =
-        text.lines().map(|line| line.split('#').next().unwrap_or_default()).collect::<Vec<_>>().join("\n");
+pub(crate) fn read_modelica(text: &str, description: &MapDescription) -> Result<ImportedMap, ImportError> {
+    let code = without_comments(text, &["#"]);
     let mut tables = BetaTables::default();
-    let starts: Vec<usize> = code.match_indices("double ").map(|(at, _)| at).collect();
-    for (index, start) in starts.iter().enumerate() {
-        let part = &code[*start..starts.get(index + 1).copied().unwrap_or(code.len())];
+    for (start, part) in parts_from(&code, "double ") {
         let Some((head, body)) = part.split_once(')') else { continue };
         let Some((name, size)) = head.trim_start_matches("double ").split_once('(') else { continue };
         let columns = size.split(',').nth(1).and_then(|columns| columns.trim().parse::<usize>().ok());
         let Some(columns) = columns.filter(|columns| *columns > 1) else { continue };
-        let numbers = bracketed_numbers(body, ('[', ']'), line_of(&code, *start))?;
+        let numbers = bracketed_numbers(body, ('[', ']'), line_of(&code, start))?;
         let rows: Vec<&[f64]> = numbers.chunks(columns).collect();
         let Some(place) = tables.array_of(name.trim()) else { continue };
         let (beta, lines) = rows.split_first().map_or((&[][..], &[][..]), |(first, rest)| (*first, rest));
@@ -122,12 +112,12 @@ pub(crate) fn read_modelica(text: &str, given: &MapDescription) -> Result<Import
         tables.beta = beta.iter().skip(1).copied().collect();
         tables.speeds = lines.iter().filter_map(|line| line.first()).copied().collect();
     }
-    tables.map(text, &code, given)
+    tables.map(text, &code, description)
 }
 
 /// The tables of GSP and GasTurb: below the name of a quantity `10.021` is a table of 10 rows and 21 columns, the first row the auxiliary
 /// coordinate, the first column the speeds; a row may fill several lines (as GSPy reads them, github.com/wvisser1958/GSPy).
-pub(crate) fn read_gsp(text: &str, given: &MapDescription) -> Result<ImportedMap, ImportError> {
+pub(crate) fn read_gsp(text: &str, description: &MapDescription) -> Result<ImportedMap, ImportError> {
     let mut tables = BetaTables::default();
     let mut sections: Vec<(&str, usize, Vec<f64>)> = Vec::new();
     for (index, line) in text.lines().enumerate() {
@@ -152,7 +142,20 @@ pub(crate) fn read_gsp(text: &str, given: &MapDescription) -> Result<ImportedMap
         tables.beta = beta.to_vec();
         tables.speeds = lines.chunks(columns).filter_map(|line| line.first()).copied().collect();
     }
-    tables.map(text, text, given)
+    tables.map(text, text, description)
+}
+
+/// The text without the comments that begin with one of the marks; lines keep their numbers.
+fn without_comments(text: &str, marks: &[&str]) -> String {
+    let end = |line: &str| marks.iter().filter_map(|mark| line.find(mark)).min().unwrap_or(line.len());
+    text.lines().map(|line| &line[..end(line)]).collect::<Vec<_>>().join("\n")
+}
+
+/// The parts of a text, each with its position, that begin with a keyword.
+fn parts_from<'a>(code: &'a str, keyword: &'a str) -> impl Iterator<Item = (usize, &'a str)> {
+    let starts: Vec<usize> = code.match_indices(keyword).map(|(at, _)| at).collect();
+    let ends: Vec<usize> = starts.iter().skip(1).copied().chain([code.len()]).collect();
+    starts.into_iter().zip(ends).map(|(start, end)| (start, &code[start..end]))
 }
 
 /// Line of a position in a text, from 1.
@@ -228,10 +231,10 @@ impl BetaTables {
         }
     }
 
-    fn map(&self, text: &str, code: &str, given: &MapDescription) -> Result<ImportedMap, ImportError> {
+    fn map(&self, text: &str, code: &str, description: &MapDescription) -> Result<ImportedMap, ImportError> {
         let mut rows = self.rows()?;
         let mut remarks = Vec::new();
-        let unit_kg_s = flow_unit(code, given)?;
+        let unit_kg_s = flow_unit(code, description)?;
         for row in &mut rows {
             row.flow_corrected_kg_s *= unit_kg_s.unwrap_or(1.0);
         }
@@ -242,10 +245,10 @@ impl BetaTables {
                 [Some(flow), Some(ratio), Some(eta)] => Some([unit_kg_s.unwrap_or(1.0) * flow, ratio, eta]),
                 _ => None,
             };
-        let is_relative = scale_to_design(&mut rows, design, given.design, &mut remarks)?;
-        // Files of `mapper` have kg/s.
+        let is_relative = scale_to_design(&mut rows, design, description.design, &mut remarks)?;
+        // Files of `mapper` have kg/s. A stated design flow scales the flows, so that their unit does not matter.
         let machine = text.lines().find_map(|line| line.split_once("compressor map of "));
-        if unit_kg_s.is_none() && !scales_flow(given.design) && machine.is_none() {
+        if unit_kg_s.is_none() && description.design.flow_corrected_kg_s.is_none() && machine.is_none() {
             if is_relative {
                 return Err(ImportError::FlowUnit);
             }
@@ -255,7 +258,7 @@ impl BetaTables {
         let found = text.lines().find_map(reference_in_comment);
         let machine = machine.map(|(_, name)| name.trim().chars().take(200).collect());
         let efficiency = text.lines().find_map(efficiency_in_comment);
-        let map = map_of_rows(machine.unwrap_or_default(), &rows, found, given.reference)?;
+        let map = map_of_rows(machine.unwrap_or_default(), &rows, found, description.reference)?;
         Ok(ImportedMap {
             map: CompressorMap { efficiency, ..map },
             columns: Vec::new(),

@@ -47,15 +47,16 @@ pub fn scale_to_design(
             rpm / map.speed
         }
     };
-    let asked = [design.flow_corrected_kg_s, design.pressure_ratio, design.eta];
+    let design_values = [design.flow_corrected_kg_s, design.pressure_ratio, design.eta];
     let mut factors = [1.0; 3];
-    for (index, wanted) in asked.into_iter().enumerate() {
+    for (index, wanted) in design_values.into_iter().enumerate() {
         let Some(wanted) = wanted else { continue };
         let missing = ImportError::DesignPoint { speed: map.speed, rline: map.rline };
         let own = map.values.and_then(|values| values.get(index).copied()).ok_or(missing)?;
-        let above = if index == 1 { 1.0 } else { 0.0 };
+        // Pressure ratios scale from 1.
+        let zero = if index == 1 { 1.0 } else { 0.0 };
         if let Some(factor) = factors.get_mut(index) {
-            *factor = (wanted - above) / (own - above);
+            *factor = (wanted - zero) / (own - zero);
         }
     }
     let [flow, ratio, eta] = factors;

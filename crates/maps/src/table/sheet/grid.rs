@@ -25,9 +25,9 @@ impl GridRow {
 pub(crate) struct Grid {
     pub(crate) rows: Vec<GridRow>,
     /// Whether numbers have a decimal comma.
-    pub(crate) decimal_comma: bool,
+    pub(crate) has_decimal_comma: bool,
     /// Whether blanks separate the cells, so that no cell can be empty.
-    pub(crate) by_blanks: bool,
+    pub(crate) is_blank_separated: bool,
     /// Thousands separator; `None` for a workbook, since its texts may have another decimal sign.
     thousands: Option<char>,
 }
@@ -57,12 +57,12 @@ pub fn text_of(bytes: &[u8]) -> Result<String, ImportError> {
 impl Grid {
     /// The rows of a workbook.
     pub(crate) fn of_rows(rows: Vec<GridRow>) -> Grid {
-        Grid { rows, decimal_comma: false, by_blanks: false, thousands: None }
+        Grid { rows, has_decimal_comma: false, is_blank_separated: false, thousands: None }
     }
 
     /// Other rows with the same notation of numbers.
     pub(crate) fn with_rows(&self, rows: Vec<GridRow>) -> Grid {
-        Grid { rows, by_blanks: false, ..*self }
+        Grid { rows, is_blank_separated: false, ..*self }
     }
 
     /// The cells of a text.
@@ -84,9 +84,9 @@ impl Grid {
                 .count()
         };
         let separators = ['\t', ';', '|', ',', ' '];
-        let best = |count: &dyn Fn(char) -> usize| {
+        let most_rows = |count: &dyn Fn(char) -> usize| {
             let counts = separators.into_iter().map(|separator| (count(separator), separator));
-            // The first of equals.
+            // Of equals the first wins.
             counts.rev().max_by_key(|(rows, _)| *rows).filter(|(rows, _)| *rows > 0)
         };
         // A column of text does not exclude a separator, except blanks, which occur in any text.
@@ -97,7 +97,8 @@ impl Grid {
             };
             lines().take(SEPARATOR_LINES).filter(|(_, line)| is_point(line)).count()
         };
-        let separator = best(&count).or_else(|| best(&with_text)).map_or(' ', |(_, separator)| separator);
+        let separator =
+            most_rows(&count).or_else(|| most_rows(&with_text)).map_or(' ', |(_, separator)| separator);
         // Of cells between blanks, headings with blanks of their own are apart by at least two.
         let number_row = |line: &str| {
             let cells = split(split_comment(line).0, ' ');
@@ -128,9 +129,9 @@ impl Grid {
                 rows.push(GridRow { at, cells, is_comment });
             }
         }
-        let decimal_comma = separator != ',' && decimal[1] > decimal[0];
-        let thousands = Some(if decimal_comma { '.' } else { ',' });
-        Ok(Grid { rows, decimal_comma, by_blanks: separator == ' ', thousands })
+        let has_decimal_comma = separator != ',' && decimal[1] > decimal[0];
+        let thousands = Some(if has_decimal_comma { '.' } else { ',' });
+        Ok(Grid { rows, has_decimal_comma, is_blank_separated: separator == ' ', thousands })
     }
 
     /// The cells with rows and columns exchanged; `None` for a table with more rows than quantities.
@@ -139,12 +140,12 @@ impl Grid {
         let rows: Vec<&GridRow> = self.rows.iter().filter(|row| !row.is_comment).collect();
         let width = rows.iter().map(|row| row.cells.len()).max().filter(|_| rows.len() <= MAX_QUANTITIES)?;
         let cell = |row: &&GridRow, column: usize| row.cells.get(column).cloned().unwrap_or_default();
-        let turned = |column: usize| GridRow {
+        let transposed_row = |column: usize| GridRow {
             at: column + 1,
             cells: rows.iter().map(|row| cell(row, column)).collect(),
             is_comment: false,
         };
-        Some(Grid { rows: (0..width).map(turned).collect(), ..*self })
+        Some(Grid { rows: (0..width).map(transposed_row).collect(), ..*self })
     }
 
     /// The cells as CSV.
@@ -169,7 +170,7 @@ impl Grid {
         };
         let thousands = self.thousands.and_then(|mark| without_thousands(text, mark));
         let text = thousands.as_deref().unwrap_or(text);
-        let value = if self.decimal_comma {
+        let value = if self.has_decimal_comma {
             comma_number(text).or_else(|| plain_number(text))
         } else {
             plain_number(text)
@@ -237,16 +238,16 @@ fn split(line: &str, separator: char) -> Vec<String> {
     if comma.iter().filter(|word| comma_number(word).is_some()).count() >= 2 { comma } else { cells }
 }
 
-pub(crate) fn count_number_cells(cells: &[String], decimal_comma: bool) -> usize {
-    let is_number = |cell: &&String| count_numbers(std::slice::from_ref(*cell), decimal_comma) == 1;
+pub(crate) fn count_number_cells(cells: &[String], has_decimal_comma: bool) -> usize {
+    let is_number = |cell: &&String| count_numbers(std::slice::from_ref(*cell), has_decimal_comma) == 1;
     cells.iter().filter(is_number).count()
 }
 
 /// Number of cells that are numbers; 0 if any cell is text.
-fn count_numbers(cells: &[String], decimal_comma: bool) -> usize {
+fn count_numbers(cells: &[String], has_decimal_comma: bool) -> usize {
     let bare = |cell: &str| cell.trim_end_matches('%').trim_end().to_owned();
     let number =
-        |cell: &str| plain_number(cell).or_else(|| decimal_comma.then(|| comma_number(cell)).flatten());
+        |cell: &str| plain_number(cell).or_else(|| has_decimal_comma.then(|| comma_number(cell)).flatten());
     let filled: Vec<&String> = cells.iter().filter(|cell| !is_missing_mark(cell)).collect();
     if filled.iter().all(|cell| number(&bare(cell)).is_some()) { filled.len() } else { 0 }
 }

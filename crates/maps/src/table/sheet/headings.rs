@@ -17,23 +17,20 @@ pub(crate) struct Headings {
 
 impl Headings {
     pub(crate) fn of(grid: &Grid, index: usize, row: &GridRow) -> Headings {
-        fn texts(cells: &[String]) -> Vec<&str> {
-            cells.iter().map(String::as_str).collect()
-        }
         let above = index.checked_sub(1).and_then(|above| grid.rows.get(above));
         let names = above
-            .filter(|above| !grid.by_blanks && is_row_of_groups(above, row))
+            .filter(|above| !grid.is_blank_separated && is_row_of_groups(above, row))
             .map_or_else(|| row.cells.clone(), |above| with_groups(&above.cells, &row.cells));
         let below = grid.rows.get(index + 1);
-        let joined = below.and_then(|below| merge_units_row(&texts(&names), &texts(&below.cells)));
+        let joined = below.and_then(|below| merge_units_row(&names, &below.cells));
         let first_row = index + 1 + usize::from(joined.is_some());
         Headings { cells: joined.unwrap_or_else(|| names.clone()), names, first_row }
     }
 
     /// A remark that names the columns outside `used`, if there are any.
     pub(crate) fn unused(&self, used: &[usize]) -> Option<ImportRemark> {
-        let is_unused = |(index, cell): &(usize, &String)| !cell.is_empty() && !used.contains(index);
-        let unused = self.cells.iter().enumerate().filter(is_unused);
+        let unused =
+            self.cells.iter().enumerate().filter(|(index, cell)| !cell.is_empty() && !used.contains(index));
         let headings: Vec<String> =
             unused.map(|(_, cell)| cell.chars().take(60).collect()).take(MAX_NAMED).collect();
         (!headings.is_empty()).then_some(ImportRemark::UnusedColumns { headings })

@@ -88,11 +88,12 @@ impl Layout {
 
     /// Whether the columns are those of a turbine alone.
     pub(crate) fn is_turbine_alone(&self) -> bool {
-        let without_own_flow =
-            |group: &Group| !group.has(&[Quantity::Flow, Quantity::VolumeFlow, Quantity::ReducedFlow]);
-        let is_turbine = |group: &Group| match group.is_measured() {
-            true => !group.has_compressor(),
-            false => without_own_flow(group),
+        let is_turbine = |group: &Group| {
+            if group.is_measured() {
+                !group.has_compressor()
+            } else {
+                !group.has(&[Quantity::Flow, Quantity::VolumeFlow, Quantity::ReducedFlow])
+            }
         };
         self.groups.iter().any(is_turbine)
     }
@@ -111,17 +112,17 @@ impl Layout {
 /// As [`layout`], and [`ImportError::Empty`].
 pub(crate) fn detect_layout<'a>(
     grid: &'a Grid,
-    given: &DescribedColumns,
+    described: &DescribedColumns,
 ) -> Result<(Cow<'a, Grid>, Layout), ImportError> {
-    let found = layout(grid, given);
+    let found = layout(grid, described);
     if let Ok(Some(layout)) = found {
         return Ok((Cow::Borrowed(grid), layout));
     }
-    if let Some(turned) = grid.transposed()
-        && let Ok(Some(layout)) = layout(&turned, given)
+    if let Some(transposed) = grid.transposed()
+        && let Ok(Some(layout)) = layout(&transposed, described)
         && layout.groups.iter().all(|group| group.bare_cells == 0)
     {
-        return Ok((Cow::Owned(turned), layout));
+        return Ok((Cow::Owned(transposed), layout));
     }
     Err(found.err().unwrap_or(ImportError::Empty))
 }
@@ -130,59 +131,60 @@ pub(crate) fn detect_layout<'a>(
 ///
 /// # Errors
 /// [`ImportError`] if flow or pressure ratio has no heading, a unit is unknown, or the map is a turbine's.
-fn layout(grid: &Grid, given: &DescribedColumns) -> Result<Option<Layout>, ImportError> {
-    if let Some(layout) = numbered(grid, given)? {
+fn layout(grid: &Grid, described: &DescribedColumns) -> Result<Option<Layout>, ImportError> {
+    if let Some(layout) = layout_by_column_numbers(grid, described)? {
         return Ok(Some(layout));
     }
-    let mut near: Option<(usize, usize)> = None;
+    // The row with the most columns that is not a complete heading: number of columns and index.
+    let mut incomplete: Option<(usize, usize)> = None;
     for (index, row) in grid.rows.iter().enumerate() {
-        if given.machine == Machine::Compressor && is_turbine_title(row) {
+        if described.machine == Machine::Compressor && is_turbine_title(row) {
             return Err(ImportError::Turbine { line: row.at, text: row.text().chars().take(60).collect() });
         }
         let headings = Headings::of(grid, index, row);
-        if let Some(groups) = side_by_side(grid, given, index, &headings.cells)
-            .or_else(|| by_speed(grid, given, index, &headings.cells))
+        if let Some(groups) = side_by_side(grid, described, index, &headings.cells)
+            .or_else(|| by_speed(grid, described, index, &headings.cells))
         {
             return Ok(Some(Layout::below(&headings, groups)));
         }
-        let known = match columns(given, &headings.names) {
+        let known = match columns(described, &headings.names) {
             Ok(known) => known,
             // Only a row of headings can have a wrong unit.
-            Err(error) if is_reported(given, row, &error) => return Err(wrong(row, error)),
+            Err(error) if is_reported(described, row, &error) => return Err(column_error(row, error)),
             Err(_) => continue,
         };
         let group = Group { columns: known, ..Group::default() };
         if group.is_complete() && (!row.is_comment || group.columns.len() >= 3) {
-            return with_heading(grid, given, index, headings, group).map(Some);
+            return with_heading(grid, described, index, headings, group).map(Some);
         }
-        if group.columns.len() >= 2 && near.is_none_or(|(count, _)| group.columns.len() > count) {
-            near = Some((group.columns.len(), index));
+        if group.columns.len() >= 2 && incomplete.is_none_or(|(count, _)| group.columns.len() > count) {
+            incomplete = Some((group.columns.len(), index));
         }
     }
-    let heading = near.and_then(|(_, index)| grid.rows.get(index));
-    if let Some(layout) = heading_in_usual_order(grid, given, near) {
+    let heading = incomplete.and_then(|(_, index)| grid.rows.get(index));
+    if let Some(layout) = heading_in_usual_order(grid, described, incomplete) {
         return Ok(Some(layout));
     }
     if let Some(row) = heading.filter(|row| !row.is_comment) {
         return Err(ImportError::NoColumn {
             line: row.at,
-            missing: missing(given, row),
+            missing: missing_quantity(described, row),
             found: row.cells.join(", ").chars().take(120).collect(),
         });
     }
-    bare(grid, given)
+    layout_without_headings(grid, described)
 }
 
 /// A heading above rows of four numbers that names only the first columns of the usual order.
 fn heading_in_usual_order(
     grid: &Grid,
-    given: &DescribedColumns,
-    near: Option<(usize, usize)>,
+    described: &DescribedColumns,
+    incomplete: Option<(usize, usize)>,
 ) -> Option<Layout> {
-    let mut layout = bare(grid, given).ok().flatten()?;
-    let (_, index) = near?;
+    let mut layout = layout_without_headings(grid, described).ok().flatten()?;
+    let (_, index) = incomplete?;
     let group = layout.groups.first_mut()?;
-    let named = columns(given, &grid.rows.get(index)?.cells).ok()?;
+    let named = columns(described, &grid.rows.get(index)?.cells).ok()?;
     let in_order = named
         .iter()
         .zip(&group.columns)
@@ -197,15 +199,16 @@ fn heading_in_usual_order(
 }
 
 /// Whether to report a mistake in a row: a comment may contain any words.
-fn is_reported(given: &DescribedColumns, row: &GridRow, error: &ColumnError) -> bool {
+fn is_reported(described: &DescribedColumns, row: &GridRow, error: &ColumnError) -> bool {
     let of_turbine = matches!(error, ColumnError::Turbine { .. });
-    match row.is_comment {
-        true => of_turbine && is_heading(given, row),
-        false => of_turbine || is_heading(given, row),
+    if row.is_comment {
+        of_turbine && is_heading(described, row)
+    } else {
+        of_turbine || is_heading(described, row)
     }
 }
 
-fn wrong(row: &GridRow, error: ColumnError) -> ImportError {
+fn column_error(row: &GridRow, error: ColumnError) -> ImportError {
     match error {
         ColumnError::Turbine { heading } => ImportError::Turbine { line: row.at, text: heading },
         error @ ColumnError::Unit { .. } => ImportError::Row { line: row.at, source: Box::new(error) },
@@ -226,12 +229,12 @@ fn is_turbine_title(row: &GridRow) -> bool {
 
 /// The columns with recognised headings. Of two with the same quantity a map needs the total or corrected one, a table of measured points
 /// the total or measured one; else the first counts.
-fn columns(given: &DescribedColumns, cells: &[String]) -> Result<Vec<Column>, ColumnError> {
+fn columns(described: &DescribedColumns, cells: &[String]) -> Result<Vec<Column>, ColumnError> {
     let mut all: Vec<Column> = Vec::new();
     for (index, cell) in
         cells.iter().enumerate().filter(|(_, cell)| cell.contains(char::is_alphabetic) || cell.contains('%'))
     {
-        all.extend(given.column(index, cell)?);
+        all.extend(described.column(index, cell)?);
     }
     let is_map = all.iter().any(|column| column.quantity == Quantity::PressureRatio);
     let rank = |column: &Column| (column.is_static(), column.is_corrected() != is_map);
@@ -247,9 +250,9 @@ fn columns(given: &DescribedColumns, cells: &[String]) -> Result<Vec<Column>, Co
 }
 
 /// Whether a row names columns.
-pub(crate) fn is_heading(given: &DescribedColumns, row: &GridRow) -> bool {
+pub(crate) fn is_heading(described: &DescribedColumns, row: &GridRow) -> bool {
     let named = |cell: &&String| {
-        cell.contains(char::is_alphabetic) && !matches!(column(0, cell, given.machine), Ok(None))
+        cell.contains(char::is_alphabetic) && !matches!(column(0, cell, described.machine), Ok(None))
     };
     // `Speed line 60,000 rpm` is a title.
     let is_number =
@@ -258,8 +261,8 @@ pub(crate) fn is_heading(given: &DescribedColumns, row: &GridRow) -> bool {
     !has_number && row.cells.iter().filter(named).count() >= 2
 }
 
-fn missing(given: &DescribedColumns, row: &GridRow) -> &'static str {
-    let known = columns(given, &row.cells).unwrap_or_default();
+fn missing_quantity(described: &DescribedColumns, row: &GridRow) -> &'static str {
+    let known = columns(described, &row.cells).unwrap_or_default();
     let group = Group { columns: known, ..Group::default() };
     if group.has_flow() { "pressure ratio (or P1, P2 and T1)" } else { "flow" }
 }
@@ -267,22 +270,22 @@ fn missing(given: &DescribedColumns, row: &GridRow) -> &'static str {
 /// The layout below a heading: its units may be in a row of their own; without a speed column each block has its speed in a title.
 fn with_heading(
     grid: &Grid,
-    given: &DescribedColumns,
+    described: &DescribedColumns,
     index: usize,
     headings: Headings,
     mut group: Group,
 ) -> Result<Layout, ImportError> {
     if let Some(below) = grid.rows.get(index + 1).filter(|_| headings.first_row > index + 1) {
-        group.columns = columns(given, &headings.cells).map_err(|error| wrong(below, error))?;
+        group.columns = columns(described, &headings.cells).map_err(|error| column_error(below, error))?;
     }
     let title_above = index
         .checked_sub(1)
         .and_then(|above| grid.rows.get(above))
-        .and_then(|above| speed_of_title(grid, given, above, &group));
+        .and_then(|above| speed_of_title(grid, described, above, &group));
     if group.speed_column().is_none() {
         let mut below = grid.rows.iter().skip(headings.first_row);
-        let titled = below.any(|row| speed_of_title(grid, given, row, &group).is_some());
-        if title_above.is_none() && !titled {
+        let has_title = below.any(|row| speed_of_title(grid, described, row, &group).is_some());
+        if title_above.is_none() && !has_title {
             return Err(ImportError::NoColumn {
                 line: grid.rows.get(index).map_or(1, |row| row.at),
                 missing: "corrected speed",
@@ -297,23 +300,23 @@ fn with_heading(
 /// Lines side by side: pairs of flow and pressure ratio (X and Y in files of digitisers), each with its speed above.
 fn side_by_side(
     grid: &Grid,
-    given: &DescribedColumns,
+    described: &DescribedColumns,
     index: usize,
     headings: &[String],
 ) -> Option<Vec<Group>> {
-    let letters = |cell: &String| matches!(cell.to_lowercase().as_str(), "x" | "y");
+    let is_letter = |cell: &String| matches!(cell.to_lowercase().as_str(), "x" | "y");
     let filled: Vec<(usize, &String)> =
         headings.iter().enumerate().filter(|(_, cell)| !cell.is_empty()).collect();
-    let by_letter = filled.len() >= 2 && filled.iter().all(|(_, cell)| letters(cell));
+    let by_letter = filled.len() >= 2 && filled.iter().all(|(_, cell)| is_letter(cell));
     let quantity = |index: usize, cell: &String| {
         let letter = match cell.to_lowercase().as_str() {
             "x" if by_letter => Some(Quantity::Flow),
             "y" if by_letter => Some(Quantity::PressureRatio),
             _ => None,
         };
-        let described = given.column(index, cell).ok().flatten();
-        let by_letter = || given.with_unit(Column::bare(index, letter?)).ok();
-        described.or_else(by_letter)
+        let column = described.column(index, cell).ok().flatten();
+        let by_letter = || described.with_unit(Column::bare(index, letter?)).ok();
+        column.or_else(by_letter)
     };
     let mut groups: Vec<Group> = Vec::new();
     for (index, cell) in &filled {
@@ -339,17 +342,22 @@ fn side_by_side(
 }
 
 /// One group of columns for each speed, which the headings or the row above them hold; columns without a speed belong to all.
-fn by_speed(grid: &Grid, given: &DescribedColumns, index: usize, headings: &[String]) -> Option<Vec<Group>> {
+fn by_speed(
+    grid: &Grid,
+    described: &DescribedColumns,
+    index: usize,
+    headings: &[String],
+) -> Option<Vec<Group>> {
     let above = index.checked_sub(1).and_then(|above| grid.rows.get(above));
-    let (mut shared, mut groups, mut carried) = (Vec::new(), Vec::<Group>::new(), None);
+    let (mut shared, mut groups, mut title_speed) = (Vec::new(), Vec::<Group>::new(), None);
     for (place, heading) in headings.iter().enumerate() {
         let title = above.and_then(|row| row.cells.get(place)).filter(|cell| !cell.is_empty());
-        carried = title.map_or(carried, |cell| speed_in(grid, cell));
+        title_speed = title.map_or(title_speed, |cell| speed_in(grid, cell));
         let (name, speed_rpm) = match without_speed(grid, heading) {
             Some((name, own)) => (name, Some(own)),
-            None => (heading.clone(), carried),
+            None => (heading.clone(), title_speed),
         };
-        match (given.column(place, &name).ok()?, speed_rpm) {
+        match (described.column(place, &name).ok()?, speed_rpm) {
             (None, _) => {}
             (Some(column), None) => shared.push(column),
             (Some(column), Some(speed_rpm)) => {
@@ -364,10 +372,10 @@ fn by_speed(grid: &Grid, given: &DescribedColumns, index: usize, headings: &[Str
         }
     }
     for group in &mut groups {
-        let of_all =
+        let shared_columns =
             shared.iter().filter(|column| !group.has(&[column.quantity])).cloned().collect::<Vec<_>>();
-        group.shared = of_all.len();
-        group.columns.extend(of_all);
+        group.shared = shared_columns.len();
+        group.columns.extend(shared_columns);
     }
     let is_line = |group: &Group| group.is_complete() && group.speed_column().is_none();
     (groups.len() > 1 && groups.iter().all(is_line)).then_some(groups)
@@ -376,11 +384,14 @@ fn by_speed(grid: &Grid, given: &DescribedColumns, index: usize, headings: &[Str
 /// The speed in the title of a block, rpm: `N = 60000 rpm`, `60 krpm`, or a number alone.
 pub(crate) fn speed_of_title(
     grid: &Grid,
-    given: &DescribedColumns,
+    described: &DescribedColumns,
     row: &GridRow,
     group: &Group,
 ) -> Option<f64> {
-    if group.speed_column().is_some() || is_heading(given, row) || vane_of_title(grid, given, row).is_some() {
+    if group.speed_column().is_some()
+        || is_heading(described, row)
+        || vane_of_title(grid, described, row).is_some()
+    {
         return None;
     }
     let filled: Vec<&String> = row.cells.iter().filter(|cell| !is_missing_mark(cell)).collect();
@@ -389,13 +400,12 @@ pub(crate) fn speed_of_title(
 }
 
 /// The vane position in the title of a block of a turbine map: `VGT position 40 %`.
-pub(crate) fn vane_of_title(grid: &Grid, given: &DescribedColumns, row: &GridRow) -> Option<f64> {
-    if given.machine == Machine::Compressor || is_heading(given, row) {
+pub(crate) fn vane_of_title(grid: &Grid, described: &DescribedColumns, row: &GridRow) -> Option<f64> {
+    if described.machine == Machine::Compressor || is_heading(described, row) {
         return None;
     }
     let text = row.text().replace('%', " %");
-    let is_vane =
-        |word: &str| matches!(given.column(0, word), Ok(Some(column)) if column.quantity == Quantity::Vane);
+    let is_vane = |word: &str| matches!(described.column(0, word), Ok(Some(column)) if column.quantity == Quantity::Vane);
     let words: Vec<&str> = text
         .split(|c: char| c.is_whitespace() || matches!(c, '=' | ':' | '[' | ']' | '(' | ')'))
         .filter(|word| !word.is_empty())
@@ -407,8 +417,12 @@ pub(crate) fn vane_of_title(grid: &Grid, given: &DescribedColumns, row: &GridRow
 }
 
 /// The layout of a table whose columns are described by their numbers.
-fn numbered(grid: &Grid, given: &DescribedColumns) -> Result<Option<Layout>, ImportError> {
-    let columns = given.numbered().map_err(|error| ImportError::Row { line: 1, source: Box::new(error) })?;
+fn layout_by_column_numbers(
+    grid: &Grid,
+    described: &DescribedColumns,
+) -> Result<Option<Layout>, ImportError> {
+    let columns =
+        described.numbered().map_err(|error| ImportError::Row { line: 1, source: Box::new(error) })?;
     let group = Group { columns, ..Group::default() };
     if !group.is_complete() || group.speed_column().is_none() {
         return Ok(None);
@@ -426,7 +440,7 @@ fn numbered(grid: &Grid, given: &DescribedColumns) -> Result<Option<Layout>, Imp
 const MAX_BARE_CELLS: usize = 6;
 
 /// The layout without headings: corrected rpm, corrected kg/s, pressure ratio, and the efficiency if there is a fourth column.
-fn bare(grid: &Grid, given: &DescribedColumns) -> Result<Option<Layout>, ImportError> {
+fn layout_without_headings(grid: &Grid, described: &DescribedColumns) -> Result<Option<Layout>, ImportError> {
     let numbers = |row: &GridRow| row.cells.iter().filter(|cell| grid.number(cell).is_some()).count();
     let first = grid
         .rows
@@ -453,7 +467,7 @@ fn bare(grid: &Grid, given: &DescribedColumns) -> Result<Option<Layout>, ImportE
         });
     }
     let columns = order.into_iter().enumerate();
-    let columns = columns.map(|(index, quantity)| given.with_unit(Column::bare(index, quantity)));
+    let columns = columns.map(|(index, quantity)| described.with_unit(Column::bare(index, quantity)));
     let columns: Result<_, _> = columns.collect();
     let columns = columns.map_err(|error| ImportError::Row { line: 1, source: Box::new(error) })?;
     let group = Group { columns, bare_cells: row.len(), ..Group::default() };

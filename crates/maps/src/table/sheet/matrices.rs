@@ -10,9 +10,9 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 /// Quantities that a matrix may hold.
-const OF_MATRIX: [Quantity; 3] = [Quantity::PressureRatio, Quantity::Efficiency, Quantity::Flow];
+const MATRIX_QUANTITIES: [Quantity; 3] = [Quantity::PressureRatio, Quantity::Efficiency, Quantity::Flow];
 
-/// Speeds of turbochargers, rpm: what tells the axis of the speed from that of the flow.
+/// Speeds of turbochargers, rpm: they distinguish the axis of speed from that of flow.
 const SPEEDS_RPM: Range<f64> = 5e3..1e6;
 
 /// Rows between the title of a matrix and its values: names of the axes, units.
@@ -21,7 +21,7 @@ const MAX_HEAD_ROWS: usize = 4;
 /// The quantity that a title names.
 pub(crate) fn quantity_of_title(cell: &str) -> Option<Column> {
     let found = column(0, cell, Machine::Compressor).ok().flatten();
-    found.filter(|found| OF_MATRIX.contains(&found.quantity))
+    found.filter(|found| MATRIX_QUANTITIES.contains(&found.quantity))
 }
 
 /// A matrix with the row and column of each value.
@@ -56,8 +56,9 @@ pub(crate) fn points_of_matrices(grid: &Grid) -> Option<Grid> {
             matrices.extend(matrix(grid, index, *start..end, title));
         }
     }
-    let of = |quantity| matrices.iter().find(|matrix| matrix.title.quantity == quantity);
-    let (ratios, etas, flows) = (of(Quantity::PressureRatio)?, of(Quantity::Efficiency), of(Quantity::Flow));
+    let matrix_of = |quantity| matrices.iter().find(|matrix| matrix.title.quantity == quantity);
+    let (ratios, etas, flows) =
+        (matrix_of(Quantity::PressureRatio)?, matrix_of(Quantity::Efficiency), matrix_of(Quantity::Flow));
     let value = |matrix: Option<&Matrix>, speed: f64, other: f64| {
         let cell = matrix.and_then(|matrix| matrix.cells.get(&[speed.to_bits(), other.to_bits()]));
         cell.cloned().unwrap_or_default()
@@ -81,7 +82,7 @@ pub(crate) fn points_of_matrices(grid: &Grid) -> Option<Grid> {
     rows.push(GridRow { at, cells: names, is_comment: false });
     let decimal = |value: f64| {
         let text = value.to_string();
-        if grid.decimal_comma { text.replace('.', ",") } else { text }
+        if grid.has_decimal_comma { text.replace('.', ",") } else { text }
     };
     for speed in &ratios.speeds {
         for other in &ratios.others {

@@ -7,6 +7,7 @@ use crate::table::rows_to_lines::check_point_count;
 use crate::table::sheet::grid::{Grid, GridRow};
 use crate::table::sheet::layout::{self, Layout};
 use mapper_core::{ImportError, ImportRemark, ImportedColumn, LineEnd, ReferenceState, is_missing_mark};
+use mapper_numerics::statistics::range;
 
 /// The values of a point by column, as written.
 pub(crate) struct Point<'a> {
@@ -23,14 +24,15 @@ pub(crate) struct Point<'a> {
 }
 
 impl Point<'_> {
-    pub(crate) fn of(&self, quantity: Quantity) -> Option<(&Column, f64)> {
+    /// The column of a quantity, with the value as written.
+    pub(crate) fn cell(&self, quantity: Quantity) -> Option<(&Column, f64)> {
         let position = self.group.columns.iter().position(|column| column.quantity == quantity)?;
         Some((self.group.columns.get(position)?, self.values.get(position).copied().flatten()?))
     }
 
     /// A value in SI and rpm, corrected to a reference state.
     pub(crate) fn value(&self, quantity: Quantity, reference: ReferenceState) -> Option<f64> {
-        let (column, value) = self.of(quantity)?;
+        let (column, value) = self.cell(quantity)?;
         Some(column.to_corrected_si(value, reference))
     }
 }
@@ -44,15 +46,15 @@ const EXTRAPOLATED: &str = "extrapolated";
 /// [`ImportError`] with the line of a cell that is not a number, or of a row that is cut short.
 pub(crate) fn points<'a>(
     grid: &Grid,
-    given: &DescribedColumns,
+    described: &DescribedColumns,
     layout: &'a Layout,
     remarks: &mut Vec<ImportRemark>,
 ) -> Result<Vec<Point<'a>>, ImportError> {
     let mut points = Vec::new();
-    let (mut carried, mut extrapolated) = (false, 0);
+    let (mut has_carried_speed, mut extrapolated) = (false, 0);
     // The title of the first block may be above the headings, which may have a row of units.
     let above = grid.rows.iter().take(layout.first_row).rev().take(3);
-    let mut vane = above.filter_map(|row| layout::vane_of_title(grid, given, row)).next();
+    let mut vane = above.filter_map(|row| layout::vane_of_title(grid, described, row)).next();
     for group in &layout.groups {
         let (mut speed, mut last_speed) = (group.speed_rpm, None);
         for row in grid.rows.iter().skip(layout.first_row).filter(|row| !row.is_comment) {
@@ -63,7 +65,7 @@ pub(crate) fn points<'a>(
             if is_empty && !is_title {
                 continue;
             }
-            if let Some(position) = layout::vane_of_title(grid, given, row) {
+            if let Some(position) = layout::vane_of_title(grid, described, row) {
                 vane = Some(position);
                 continue;
             }
@@ -71,20 +73,20 @@ pub(crate) fn points<'a>(
             if is_empty && group.speed_column().is_some() {
                 continue;
             }
-            if let Some(title_rpm) = layout::speed_of_title(grid, given, row, group) {
+            if let Some(title_rpm) = layout::speed_of_title(grid, described, row, group) {
                 speed = Some(title_rpm);
                 continue;
             }
             // Each block may repeat the row of units.
             let above = layout.first_row.checked_sub(1).and_then(|above| grid.rows.get(above));
-            if layout::is_heading(given, row) || above.is_some_and(|above| above.cells == row.cells) {
+            if layout::is_heading(described, row) || above.is_some_and(|above| above.cells == row.cells) {
                 continue;
             }
             if row.cells.iter().any(|cell| cell == EXTRAPOLATED) {
                 extrapolated += 1;
                 continue;
             }
-            // A mean or the name of the author below the table.
+            // A mean or the author's name below the table is not a point.
             let has_point = group.columns.iter().any(|column| {
                 column.quantity != Quantity::Efficiency
                     && !column.quantity.is_optional()
@@ -102,7 +104,7 @@ pub(crate) fn points<'a>(
                 match place {
                     Some(own) => last_speed = Some(*own),
                     None => {
-                        carried = true;
+                        has_carried_speed = true;
                         *place = last_speed;
                     }
                 }
@@ -113,7 +115,7 @@ pub(crate) fn points<'a>(
     if extrapolated > 0 {
         remarks.push(ImportRemark::ExtrapolatedNodes { count: extrapolated });
     }
-    if carried {
+    if has_carried_speed {
         remarks.push(ImportRemark::SpeedOfRowAbove);
     }
     Ok(points)
@@ -137,7 +139,7 @@ fn values(grid: &Grid, row: &GridRow, group: &layout::Group) -> Result<Vec<Optio
     let filled = row.cells.iter().filter(|cell| !cell.is_empty()).count();
     // Without headings all columns are required, and between blanks no cell can be empty: a shorter row is a mistake.
     let needed = group.columns.iter().map(|column| column.index + 1).max().unwrap_or(0);
-    if group.bare_cells > 0 && filled != group.bare_cells || grid.by_blanks && filled < needed {
+    if group.bare_cells > 0 && filled != group.bare_cells || grid.is_blank_separated && filled < needed {
         let text = row.text().chars().take(60).collect();
         return Err(ImportError::RowForm { line: row.at, text, form: ROW_FORM });
     }
@@ -183,14 +185,14 @@ pub(crate) fn columns(
     let mut columns: Vec<ImportedColumn> = Vec::new();
     for column in layout.groups.first().iter().flat_map(|group| &group.columns) {
         let value = |point: &Point<'_>| {
-            let (column, value) = point.of(column.quantity)?;
+            let (column, value) = point.cell(column.quantity)?;
             Some(reference.map_or_else(
                 || column.as_stated(value),
                 |reference| column.to_corrected_si(value, reference),
             ))
         };
         let values = points.iter().filter_map(value);
-        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| (r.0.min(v), r.1.max(v)));
+        let (low, high) = range(values);
         columns.push(ImportedColumn {
             heading: column.heading.clone(),
             number: column.index + 1,

@@ -4,10 +4,11 @@ use crate::table::sheet::grid::Grid;
 use mapper_yaml::units::{Kind, Unit, header_unit};
 use std::ops::RangeInclusive;
 
-/// Numbers without a unit in a heading that are speeds, rpm: below are diameters in mm, temperatures and pressures in mbar, above are dates.
+/// Range of a number without a unit that is a speed, rpm. Smaller numbers are diameters in mm, temperatures or pressures in mbar, larger
+/// ones dates.
 const BARE_RPM: RangeInclusive<f64> = 5e3..=1e6;
 
-fn separates(c: char) -> bool {
+fn is_separator(c: char) -> bool {
     c.is_whitespace() || matches!(c, '=' | ':' | '[' | ']' | '(' | ')')
 }
 
@@ -17,7 +18,7 @@ fn speed_unit(text: &str) -> Option<&'static Unit> {
 
 /// The one number of a text with its unit of speed; rpm if it names none.
 pub(crate) fn speed_in(grid: &Grid, text: &str) -> Option<f64> {
-    let words = || text.split(separates).filter(|word| !word.is_empty());
+    let words = || text.split(is_separator).filter(|word| !word.is_empty());
     let mut speeds = words().filter_map(|word| {
         let digits = word.find(|c: char| c.is_alphabetic()).unwrap_or(word.len());
         grid.number(&word[..digits]).map(|value| (value, &word[digits..]))
@@ -32,15 +33,15 @@ pub(crate) fn speed_in(grid: &Grid, text: &str) -> Option<f64> {
 
 /// A heading without the speed in it, and the speed in rpm.
 pub(crate) fn without_speed(grid: &Grid, heading: &str) -> Option<(String, f64)> {
-    let is_inside = |c: char| c.is_ascii_digit() || matches!(c, '.' | ',');
+    let is_number_char = |c: char| c.is_ascii_digit() || matches!(c, '.' | ',');
     let mut from = 0;
     while let Some(start) = heading[from..].find(|c: char| c.is_ascii_digit()).map(|at| from + at) {
-        let length = heading[start..].find(|c: char| !is_inside(c)).unwrap_or(heading.len() - start);
+        let length = heading[start..].find(|c: char| !is_number_char(c)).unwrap_or(heading.len() - start);
         from = start + length;
         let number = heading[start..from].trim_end_matches(['.', ',']);
-        let behind = heading[from..].trim_start_matches([' ', '_', '[', '(']);
-        let end = behind.find(|c: char| c.is_whitespace() || "|_:;)]".contains(c)).unwrap_or(behind.len());
-        let (unit, rest) = behind.split_at(end);
+        let after = heading[from..].trim_start_matches([' ', '_', '[', '(']);
+        let end = after.find(|c: char| c.is_whitespace() || "|_:;)]".contains(c)).unwrap_or(after.len());
+        let (unit, rest) = after.split_at(end);
         let is_bracket = heading[from..].trim_start().starts_with(['[', '(']);
         let Some(value) = grid.number(number) else { continue };
         let (speed_rpm, rest) = match speed_unit(unit) {
@@ -52,9 +53,10 @@ pub(crate) fn without_speed(grid: &Grid, heading: &str) -> Option<(String, f64)>
         };
         let mut before = &heading[..start];
         loop {
-            let cut = before
-                .trim_end_matches(|c: char| separates(c) && !matches!(c, ']' | ')') || "@|_-,".contains(c));
-            let word = cut.rfind(|c: char| separates(c) || "@|_-".contains(c)).map_or(0, |at| at + 1);
+            let cut = before.trim_end_matches(|c: char| {
+                is_separator(c) && !matches!(c, ']' | ')') || "@|_-,".contains(c)
+            });
+            let word = cut.rfind(|c: char| is_separator(c) || "@|_-".contains(c)).map_or(0, |at| at + 1);
             match cut.get(word..).map(str::to_lowercase).as_deref() {
                 Some("n" | "nc" | "at" | "bei" | "speed" | "drehzahl" | "line") => before = &cut[..word],
                 _ => {

@@ -10,57 +10,57 @@ use std::io::{Cursor, Read};
 ///
 /// # Errors
 /// [`ImportError::Workbook`] if it is not a workbook, unpacks to more than a map needs, or has no such sheet.
-pub(crate) fn grid_of_workbook(bytes: &[u8], sheet: Option<&str>) -> Result<Grid, ImportError> {
+pub(crate) fn grid_of_workbook(bytes: &[u8], wanted: Option<&str>) -> Result<Grid, ImportError> {
     let mut sheets = sheets_of(bytes)?;
-    let has_table = |known: &&mut Sheet| {
-        known.rows.iter().filter(|row| count_number_cells(&row.cells, true) >= 3).count() >= 2
+    let has_table = |sheet: &&mut Sheet| {
+        sheet.rows.iter().filter(|row| count_number_cells(&row.cells, true) >= 3).count() >= 2
     };
-    let grid = |known: &mut Sheet| Grid::of_rows(std::mem::take(&mut known.rows));
-    let is_read = |known: &&mut Sheet| match sheet {
-        Some(name) => known.name == name,
-        None => !known.is_hidden,
+    let grid = |sheet: &mut Sheet| Grid::of_rows(std::mem::take(&mut sheet.rows));
+    let is_wanted = |sheet: &&mut Sheet| match wanted {
+        Some(name) => sheet.name == name,
+        None => !sheet.is_hidden,
     };
     // A sheet for each speed line, named after its speed.
-    let speed_rpm = |known: &Sheet| {
-        let (rest, speed_rpm) = without_speed(&Grid::of_rows(Vec::new()), &known.name)?;
-        (rest.is_empty() || known.name.to_lowercase().contains("rpm")).then_some(speed_rpm)
+    let speed_rpm = |sheet: &Sheet| {
+        let (rest, speed_rpm) = without_speed(&Grid::of_rows(Vec::new()), &sheet.name)?;
+        (rest.is_empty() || sheet.name.to_lowercase().contains("rpm")).then_some(speed_rpm)
     };
-    let visible = sheets.iter_mut().filter(|known| !known.is_hidden).filter(has_table);
+    let visible = sheets.iter_mut().filter(|sheet| !sheet.is_hidden).filter(has_table);
     let mut lines: Vec<(f64, &mut Sheet)> =
-        visible.filter_map(|known| Some((speed_rpm(known)?, known))).collect();
-    if sheet.is_none() && lines.len() > 1 {
+        visible.filter_map(|sheet| Some((speed_rpm(sheet)?, sheet))).collect();
+    if wanted.is_none() && lines.len() > 1 {
         let title = |rpm: f64| GridRow { at: 1, cells: vec![format!("{rpm} rpm")], is_comment: false };
-        let rows = lines.iter_mut().flat_map(|(rpm, known)| {
-            std::iter::once(title(*rpm)).chain(std::mem::take(&mut known.rows)).collect::<Vec<_>>()
+        let rows = lines.iter_mut().flat_map(|(rpm, sheet)| {
+            std::iter::once(title(*rpm)).chain(std::mem::take(&mut sheet.rows)).collect::<Vec<_>>()
         });
         return Ok(Grid::of_rows(rows.collect()));
     }
     // A sheet for each quantity, named after it.
-    if sheet.is_none() {
+    if wanted.is_none() {
         let matrices =
-            sheets.iter().filter(|known| !known.is_hidden && quantity_of_title(&known.name).is_some());
-        let titled = matrices.flat_map(|known| {
-            let title = GridRow { at: 1, cells: vec![known.name.clone()], is_comment: false };
-            std::iter::once(title).chain(known.rows.iter().cloned())
+            sheets.iter().filter(|sheet| !sheet.is_hidden && quantity_of_title(&sheet.name).is_some());
+        let titled = matrices.flat_map(|sheet| {
+            let title = GridRow { at: 1, cells: vec![sheet.name.clone()], is_comment: false };
+            std::iter::once(title).chain(sheet.rows.iter().cloned())
         });
         let joined = Grid::of_rows(titled.collect());
         if points_of_matrices(&joined).is_some() {
             return Ok(joined);
         }
     }
-    if let Some(known) = sheets.iter_mut().filter(is_read).find(has_table) {
-        return Ok(grid(known));
+    if let Some(sheet) = sheets.iter_mut().filter(is_wanted).find(has_table) {
+        return Ok(grid(sheet));
     }
     // Hidden sheets usually have obsolete data: one counts only if it is named, or has the only table.
     let mut hidden: Vec<&mut Sheet> =
-        sheets.iter_mut().filter(|known| known.is_hidden).filter(has_table).collect();
-    if let (None, [only]) = (sheet, hidden.as_mut_slice()) {
+        sheets.iter_mut().filter(|sheet| sheet.is_hidden).filter(has_table).collect();
+    if let (None, [only]) = (wanted, hidden.as_mut_slice()) {
         return Ok(grid(only));
     }
-    let hidden: Vec<String> = hidden.iter().map(|known| known.name.clone()).collect();
-    let list: Vec<&str> = sheets.iter().map(|known| known.name.as_str()).collect();
-    let which = sheet.map_or("no visible sheet".to_owned(), |name| format!("no sheet `{name}`"));
-    let mut problem = format!("{which} has rows of at least three numbers; sheets: {}", list.join(", "));
+    let hidden: Vec<String> = hidden.iter().map(|sheet| sheet.name.clone()).collect();
+    let names: Vec<&str> = sheets.iter().map(|sheet| sheet.name.as_str()).collect();
+    let missing = wanted.map_or("no visible sheet".to_owned(), |name| format!("no sheet `{name}`"));
+    let mut problem = format!("{missing} has rows of at least three numbers; sheets: {}", names.join(", "));
     if !hidden.is_empty() {
         problem += &format!("; hidden ones with such rows: {} (name one with `sheet`)", hidden.join(", "));
     }
@@ -80,15 +80,15 @@ const MAX_SHEET_CELLS: usize = 40 * MAX_ROWS;
 /// All sheets of a workbook.
 fn sheets_of(bytes: &[u8]) -> Result<Vec<Sheet>, ImportError> {
     let failed = |problem: String| ImportError::Workbook { problem };
-    let mut known = Vec::new();
+    let mut sheets = Vec::new();
     let mut add = |name: String, is_hidden: bool, cells: Vec<PositionedCell>| {
         let rows = rows_of_cells(cells).map_err(|why| failed(format!("sheet `{name}` {why}")))?;
-        known.push(Sheet { name, is_hidden, rows });
+        sheets.push(Sheet { name, is_hidden, rows });
         Ok::<(), ImportError>(())
     };
     // Limits the memory: many cells may share one long text.
     let mut left = MAX_UNPACKED_BYTES as usize;
-    let mut kept = |text: &str| {
+    let mut trimmed = |text: &str| {
         let text = text.trim();
         left = left.checked_sub(text.len()).ok_or_else(|| failed(too_large()))?;
         Ok::<String, ImportError>(text.to_owned())
@@ -99,15 +99,15 @@ fn sheets_of(bytes: &[u8]) -> Result<Vec<Sheet>, ImportError> {
             for (row, column, cell) in sheet.cells {
                 let text = match cell {
                     mapper_workbook::Cell::Number(value) | mapper_workbook::Cell::Days(value) => {
-                        kept(&value.to_string())?
+                        trimmed(&value.to_string())?
                     }
-                    mapper_workbook::Cell::Text(text) => kept(&text)?,
+                    mapper_workbook::Cell::Text(text) => trimmed(&text)?,
                 };
                 cells.push((u32::from(row), usize::from(column), text));
             }
             add(sheet.name, sheet.is_hidden, cells)?;
         }
-        return Ok(known);
+        return Ok(sheets);
     }
     check_size(bytes)?;
     let book = calamine::Reader::new(Cursor::new(bytes));
@@ -119,14 +119,14 @@ fn sheets_of(bytes: &[u8]) -> Result<Vec<Sheet>, ImportError> {
         while let Some(cell) = reader.next_cell().map_err(|error| failed(error.to_string()))? {
             let (row, column) = cell.get_position();
             let text = match cell.get_value() {
-                calamine::DataRef::SharedString(text) => kept(text)?,
-                value => kept(&calamine::Data::from(value.clone()).to_string())?,
+                calamine::DataRef::SharedString(text) => trimmed(text)?,
+                value => trimmed(&calamine::Data::from(value.clone()).to_string())?,
             };
             cells.push((row, column as usize, text));
         }
         add(sheet.name, sheet.visible != calamine::SheetVisible::Visible, cells)?;
     }
-    Ok(known)
+    Ok(sheets)
 }
 
 /// A cell with its row and column from 0.

@@ -33,7 +33,7 @@ fn channel_at(measured: Measured, place: Place) -> Option<Channel> {
     }
 }
 
-/// Kind of the units of a quantity, and the quantity that a unit of this kind means in a name without one.
+/// Kinds of units, and the quantity that a unit of each kind implies if the name has none.
 const KINDS: [(Kind, Measured); 5] = [
     (Kind::Temperature, Measured::Temperature),
     (Kind::Pressure, Measured::Pressure),
@@ -84,10 +84,11 @@ pub(crate) fn channels_of(
     if own.is_other() {
         return Vec::new();
     }
-    let whole = format!("{group} {about} {}", if own.is_tag() { "" } else { name });
-    let whole = ColumnName::read(&whole);
+    let full_name = format!("{group} {about} {}", if own.is_tag() { "" } else { name });
+    let full_name = ColumnName::read(&full_name);
     let is_command = own.is_command() || ColumnName::read(group).is_command();
-    let described = channels_of_name(&whole, kind).into_iter().map(|(channel, weight)| (channel, 9 * weight));
+    let described =
+        channels_of_name(&full_name, kind).into_iter().map(|(channel, weight)| (channel, 9 * weight));
     let named = channels_of_name(&own, kind).into_iter().map(|(channel, weight)| (channel, 10 * weight));
     let mut found: Vec<(Channel, Weight)> = Vec::new();
     for (channel, weight) in named.chain(described) {

@@ -31,11 +31,11 @@ pub(super) struct Agreement {
 }
 
 /// Checks the proposal and adds remarks.
-pub(super) fn judge(proposal: &mut Proposal, layout: &Layout, survey: &Survey) -> Agreement {
+pub(super) fn check(proposal: &mut Proposal, layout: &Layout, survey: &Survey) -> Agreement {
     let mut agreement = Agreement::default();
     decide_bare_housing(proposal, layout, survey);
-    let course = |proposal: &Proposal, channel: Channel| Readings::of(proposal, channel, layout, survey);
-    let running: Option<Readings> = course(proposal, Channel::ShaftSpeed);
+    let readings = |proposal: &Proposal, channel: Channel| Readings::of(proposal, channel, layout, survey);
+    let running: Option<Readings> = readings(proposal, Channel::ShaftSpeed);
     let raised = [
         (Channel::P2, Channel::P1),
         (Channel::T2, Channel::T1),
@@ -43,7 +43,9 @@ pub(super) fn judge(proposal: &mut Proposal, layout: &Layout, survey: &Survey) -
         (Channel::T3, Channel::T4),
     ];
     for (higher, lower) in raised {
-        let (Some(high), Some(low)) = (course(proposal, higher), course(proposal, lower)) else { continue };
+        let (Some(high), Some(low)) = (readings(proposal, higher), readings(proposal, lower)) else {
+            continue;
+        };
         let turning =
             |t_s: f64| running.as_ref().is_none_or(|speed| speed.at(t_s).is_none_or(|rpm| rpm > 2000.0));
         let pairs: Vec<(f64, f64)> = high
@@ -75,7 +77,7 @@ pub(super) fn judge(proposal: &mut Proposal, layout: &Layout, survey: &Survey) -
     if let Some(max_rpm) = fastest_rpm.filter(|rpm| *rpm < MAX_ENGINE_RPM) {
         doubt(proposal, &[Channel::ShaftSpeed], &Remark::EngineSpeed { max_rpm });
     }
-    if let (Some(speed), Some(flow)) = (running, course(proposal, Channel::CompressorFlow)) {
+    if let (Some(speed), Some(flow)) = (running, readings(proposal, Channel::CompressorFlow)) {
         let pairs: Vec<(f64, f64)> =
             speed.samples().filter_map(|(t_s, rpm)| Some((rpm, flow.at(t_s)?))).collect();
         match correlation(&pairs) {
@@ -129,8 +131,8 @@ fn decide_bare_housing(proposal: &mut Proposal, layout: &Layout, survey: &Survey
         proposal.entry(channel).is_some_and(|found| found.certainty > Certainty::Unsure)
     };
     let range = |proposal: &Proposal, channel: Channel| {
-        let course = Readings::of(proposal, channel, layout, survey)?;
-        let values = || course.samples().map(|(_, value)| value);
+        let readings = Readings::of(proposal, channel, layout, survey)?;
+        let values = || readings.samples().map(|(_, value)| value);
         Some((values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max)))
     };
     if certain(proposal, Channel::T2) || !certain(proposal, Channel::P2) {

@@ -88,12 +88,12 @@ fn propose_with_numbering(
     // Best matches first, so that a column that fits two channels goes to the better one.
     let named: Vec<Vec<(Channel, Weight)>> =
         (0..layout.columns.len()).map(|column| channels_by_name(column, layout, &units, numbers)).collect();
-    let mut wishes: Vec<(Channel, Vec<Candidate>)> = CHANNELS
+    let mut proposals: Vec<(Channel, Vec<Candidate>)> = CHANNELS
         .iter()
         .map(|row| (row.channel, rank_candidates(row.channel, &named, layout, survey, &units)))
         .collect();
-    wishes.sort_by_key(|(_, list)| std::cmp::Reverse(list.first().map_or(0, |best| best.weight)));
-    for (channel, list) in wishes {
+    proposals.sort_by_key(|(_, list)| std::cmp::Reverse(list.first().map_or(0, |best| best.weight)));
+    for (channel, list) in proposals {
         let free: Vec<&Candidate> = list.iter().filter(|candidate| !taken[candidate.column]).collect();
         let Some((best, others)) = free.split_first() else { continue };
         taken[best.column] = true;
@@ -129,7 +129,7 @@ fn propose_with_numbering(
     shared_units::infer_units(&mut proposal, layout, survey);
     decide_gauge(&mut proposal, layout, survey, &units);
     shared_units::infer_flow_unit(&mut proposal, layout, survey, nominal);
-    let agreement = physics::judge(&mut proposal, layout, survey);
+    let agreement = physics::check(&mut proposal, layout, survey);
     (proposal, agreement)
 }
 
@@ -391,8 +391,8 @@ fn decide_gauge(proposal: &mut Proposal, layout: &Layout, survey: &Survey, units
         let named =
             [&column.name, &column.description].iter().any(|name| ColumnName::read(name).has(Word::Ambient));
         let median_pa = unit.unit.to_inside(survey.columns[index].quantile(0.5));
-        let (least, most) = AMBIENT_RANGE_PA;
-        (named && (least..=most).contains(&median_pa))
+        let (min_pa, max_pa) = AMBIENT_RANGE_PA;
+        (named && (min_pa..=max_pa).contains(&median_pa))
             .then_some(Ambient::Column { column: index, unit: unit.unit.symbol() })
     });
     proposal.ambient = Some(ambient.unwrap_or(Ambient::Assumed));

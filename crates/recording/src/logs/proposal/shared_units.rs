@@ -16,21 +16,22 @@ const MAX_PRESSURE_RATIO: f64 = 8.0;
 /// Looks for one unit that fits all channels of a kind that have none.
 pub(super) fn infer_units(proposal: &mut Proposal, layout: &Layout, survey: &Survey) {
     for kind in [Kind::Temperature, Kind::Pressure, Kind::Speed] {
-        let bare = |proposed: &ProposedChannel| {
+        let lacks_unit = |proposed: &ProposedChannel| {
             kind_of(proposed.channel) == kind
                 && layout.columns.get(proposed.column).is_some_and(|column| column.unit.is_none())
         };
         let channels: Vec<(Channel, f64, f64)> = proposal
             .channels
             .iter()
-            .filter(|proposed| bare(proposed))
+            .filter(|proposed| lacks_unit(proposed))
             .filter_map(|proposed| {
                 let data = survey.columns.get(proposed.column)?;
                 Some((proposed.channel, data.quantile(TRIMMED_SHARE), data.quantile(1.0 - TRIMMED_SHARE)))
             })
             .collect();
         // If another column of the kind has a unit, the stand uses that one.
-        let written = proposal.channels.iter().filter(|other| kind_of(other.channel) == kind && !bare(other));
+        let written =
+            proposal.channels.iter().filter(|other| kind_of(other.channel) == kind && !lacks_unit(other));
         let written: Vec<&str> = written.filter_map(|other| other.unit).collect();
         let fits_all = |unit: &&'static Unit| {
             let is_plausible = |(channel, low, high): &(Channel, f64, f64)| {
@@ -47,7 +48,7 @@ pub(super) fn infer_units(proposal: &mut Proposal, layout: &Layout, survey: &Sur
             common = kind.units().iter().filter(|unit| unit.symbol() == "degF").collect();
         }
         let [unit] = common.as_slice() else { continue };
-        for proposed in proposal.channels.iter_mut().filter(|proposed| bare(proposed)) {
+        for proposed in proposal.channels.iter_mut().filter(|proposed| lacks_unit(proposed)) {
             proposed.unit = Some(unit.symbol());
             proposed.certainty = Certainty::Likely;
             proposed.remarks = vec![if unit.symbol() == "degF" {
@@ -69,14 +70,14 @@ fn is_imperial(layout: &Layout) -> bool {
     layout.columns.iter().any(|column| column.unit.as_deref().is_some_and(imperial))
 }
 
-/// Inlet of a compressor that no test cell reaches, K. Behind another stage it may be as warm.
-const TOO_WARM_K: f64 = 323.15;
+/// Inlet temperature that no test cell exceeds, K. The inlet of a second stage may.
+const MAX_INLET_K: f64 = 323.15;
 
 /// Whether the only unit of the temperatures is degC, and the inlet would be too warm in it.
 fn inlet_is_too_warm(channels: &[(Channel, f64, f64)], common: &[&'static Unit]) -> bool {
     let [unit] = common else { return false };
     let is_warm = |(channel, low, _): &(Channel, f64, f64)| {
-        *channel == Channel::T1 && unit.to_inside(*low) > TOO_WARM_K
+        *channel == Channel::T1 && unit.to_inside(*low) > MAX_INLET_K
     };
     unit.symbol() == "degC" && channels.iter().any(is_warm)
 }
@@ -105,13 +106,13 @@ pub(super) fn infer_flow_unit(
     survey: &Survey,
     nominal: Option<NominalFlows<'_>>,
 ) {
-    let top = |channel: Channel, share: f64| -> Option<f64> {
+    let value_at = |channel: Channel, share: f64| -> Option<f64> {
         let proposed = proposal.entry(channel).filter(|proposed| proposed.certainty > Certainty::Unsure)?;
         let unit = crate::logs::units::unit(kind_of(channel), proposed.unit?).ok()?;
-        let over_pa = if proposed.gauge { STANDARD_ATMOSPHERE_PA } else { 0.0 };
-        Some(unit.to_inside(survey.columns.get(proposed.column)?.quantile(share)) + over_pa)
+        let offset_pa = if proposed.gauge { STANDARD_ATMOSPHERE_PA } else { 0.0 };
+        Some(unit.to_inside(survey.columns.get(proposed.column)?.quantile(share)) + offset_pa)
     };
-    let Some(speed_rpm) = top(Channel::ShaftSpeed, 1.0 - TRIMMED_SHARE).filter(|rpm| *rpm > 0.0) else {
+    let Some(speed_rpm) = value_at(Channel::ShaftSpeed, 1.0 - TRIMMED_SHARE).filter(|rpm| *rpm > 0.0) else {
         return;
     };
     let (low_kg_s, high_kg_s, why): (f64, f64, Box<dyn Fn(String) -> Remark>) = match nominal {
@@ -121,8 +122,8 @@ pub(super) fn infer_flow_unit(
             (surge_kg_s / NOMINAL_FACTOR, choke_kg_s * NOMINAL_FACTOR, Box::new(why))
         }
         None => {
-            let Some(outlet_pa) = top(Channel::P2, 1.0 - TRIMMED_SHARE) else { return };
-            let ratio = outlet_pa / top(Channel::P1, TRIMMED_SHARE).unwrap_or(STANDARD_ATMOSPHERE_PA);
+            let Some(outlet_pa) = value_at(Channel::P2, 1.0 - TRIMMED_SHARE) else { return };
+            let ratio = outlet_pa / value_at(Channel::P1, TRIMMED_SHARE).unwrap_or(STANDARD_ATMOSPHERE_PA);
             let head_j_kg = CP_J_KGK * INLET_K * (ratio.max(1.0).powf(EXPONENT) - 1.0);
             let tip_m_s = (head_j_kg / HEAD_COEFFICIENT).sqrt();
             let diameter_m = 60.0 * tip_m_s / (PI * speed_rpm);
@@ -135,8 +136,8 @@ pub(super) fn infer_flow_unit(
         let Some(proposed) = proposal.channels.iter_mut().find(|proposed| proposed.channel == channel) else {
             continue;
         };
-        let bare = layout.columns.get(proposed.column).is_some_and(|column| column.unit.is_none());
-        let Some(data) = survey.columns.get(proposed.column).filter(|_| bare) else { continue };
+        let lacks_unit = layout.columns.get(proposed.column).is_some_and(|column| column.unit.is_none());
+        let Some(data) = survey.columns.get(proposed.column).filter(|_| lacks_unit) else { continue };
         let (low, high) = (data.quantile(TRIMMED_SHARE), data.quantile(1.0 - TRIMMED_SHARE));
         let fitting = fitting_units(channel, low, high, 0.0);
         if !fitting.iter().any(|unit| Some(unit.symbol()) == proposed.unit) || fitting.len() < 2 {

@@ -1,4 +1,4 @@
-//! Parquet.
+//! Logs in Apache Parquet.
 
 use crate::tables::record_batches::{Batches, open_log};
 use arrow_schema::Schema;

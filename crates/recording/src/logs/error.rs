@@ -14,12 +14,12 @@ pub enum LogError {
         /// Error of the system.
         source: io::Error,
     },
-    /// No format knows the file.
+    /// No format recognises the file.
     #[error("failed to read `{}`: {found}; logs are read from {known}", path.display())]
     Unknown {
         /// The file.
         path: PathBuf,
-        /// What it is, and what to do.
+        /// What the file is instead, and what to do.
         found: String,
         /// The formats that are read.
         known: String,

@@ -6,7 +6,7 @@ use crate::mcap::records::{op, parse_message};
 use crate::mcap::sink::Sink;
 use mapper_numerics::parallel;
 
-/// Maximum total size of a batch, unpacked: enough to share out, and small compared with a recording.
+/// Maximum total size of a batch, unpacked: enough work for all cores, and small compared with a recording.
 const MAX_BATCH_BYTES: u64 = 4 << 20;
 /// Maximum number of chunks of a batch: with small chunks, a larger batch would only delay the first messages.
 const MAX_BATCH_CHUNKS: usize = 1024;
@@ -17,7 +17,7 @@ const PARTS: usize = 16;
 pub(crate) enum Item<T> {
     /// A message on a topic that was known before the batch; `None` if the topic is not wanted.
     Message { channel_id: u16, log_time_ns: u64, message: Option<T> },
-    /// Any other record, to be read in its turn.
+    /// Any other record; it is read after the records before it.
     Record { opcode: u8, body: Vec<u8> },
     /// The chunk ends within a record.
     Cut,

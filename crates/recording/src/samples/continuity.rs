@@ -1,7 +1,7 @@
 //! Repairs logs without step markers whose clock was set forward: across the gap every reading continues as if no time had passed.
 //!
 //! While a logger pauses the machine continues, so changing readings differ after the gap. If they continue from their last value at the
-//! same slope, the clock was set. Constant readings decide nothing.
+//! same slope, the clock was set. A constant reading is no evidence.
 
 use crate::ReadWarning;
 use crate::channel_mapping::mapped_topics::MappedQuantity;
@@ -20,7 +20,7 @@ const MAX_GAPS: usize = 100;
 /// Standard errors within which two levels, or two slopes, are equal.
 const EQUAL_SIGMAS: f64 = 5.0;
 
-/// Minimum slope in standard errors, and minimum change over a pause in tolerances, for a reading that decides.
+/// Minimum slope in standard errors, and minimum change over a pause in tolerances, for a reading that is evidence.
 const MIN_SLOPE_SIGMAS: f64 = 8.0;
 const MIN_MOVE_RATIO: f64 = 10.0;
 
@@ -87,11 +87,11 @@ fn gap_evidence(
     if jump.abs() > tolerance {
         return Some(GapEvidence::Paused);
     }
-    let moves = before.slope_per_s.abs() > MIN_SLOPE_SIGMAS * slope_sigma
+    let is_moving = before.slope_per_s.abs() > MIN_SLOPE_SIGMAS * slope_sigma
         && before.slope_per_s.abs() * gap_s > MIN_MOVE_RATIO * tolerance;
-    let same = (after.slope_per_s - before.slope_per_s).abs()
+    let is_same_slope = (after.slope_per_s - before.slope_per_s).abs()
         <= EQUAL_SIGMAS * slope_sigma + 0.5 * before.slope_per_s.abs();
-    Some(if moves && same { GapEvidence::Set } else { GapEvidence::Nothing })
+    Some(if is_moving && is_same_slope { GapEvidence::Set } else { GapEvidence::Nothing })
 }
 
 /// Closes the gaps of a clock that was set forward, in all channels.

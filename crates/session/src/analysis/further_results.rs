@@ -65,6 +65,7 @@ impl Session<'_> {
     }
 }
 
+/// The figure as PNG, with two pixels per unit.
 pub(crate) fn png(figure: &Figure) -> Result<Vec<u8>, SessionError> {
     Ok(figure.to_png(2.0).map_err(ExportError::failed("png"))?)
 }

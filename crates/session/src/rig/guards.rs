@@ -12,7 +12,7 @@ use mapper_runner::{
 pub fn make_guards(
     campaign: &Campaign,
     rig: &RigDescription,
-    read: &[InstrumentChannel],
+    instruments: &[InstrumentChannel],
 ) -> Vec<Box<dyn Guard>> {
     let set = campaign.guard_set();
     let mut guards: Vec<Box<dyn Guard>> = vec![Box::new(BatchWatch::default())];
@@ -23,8 +23,8 @@ pub fn make_guards(
         }
     }
     guards.extend(set.surge.map(|spec| Box::new(SurgeWatch::new(spec)) as Box<dyn Guard>));
-    if !read.is_empty() {
-        guards.push(Box::new(InstrumentWatch::new(read.to_vec())));
+    if !instruments.is_empty() {
+        guards.push(Box::new(InstrumentWatch::new(instruments.to_vec())));
     }
     if rig.controls {
         guards.push(Box::new(RigWatch::default()));

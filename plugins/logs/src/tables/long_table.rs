@@ -1,4 +1,4 @@
-//! Tables in long form, whose rows have a time, the name of a quantity and its value: read as if each quantity had a column.
+//! Tables in long form, whose rows have a time, the name of a quantity and its value. They become tables with a column for each quantity.
 
 use crate::notation::number::{is_missing, read_number};
 use crate::notation::table_row::{Cell, Cells, Rows};
@@ -68,17 +68,17 @@ impl LongForm {
         }
         let unit = words.iter().copied().find(|at| is_unit(*at) && column(*at).next().is_some());
         let mut names: Vec<String> = Vec::new();
-        let mut heads: Vec<String> =
+        let mut wide_header: Vec<String> =
             vec![clock.iter().filter_map(|at| header.get(*at)).cloned().collect::<Vec<_>>().join(" ")];
         for row in data {
             let Some(name) = row.get(name).filter(|name| !name.is_empty() && !names.contains(name)) else {
                 continue;
             };
             let unit = unit.and_then(|unit| row.get(unit)).filter(|unit| !unit.is_empty());
-            heads.push(unit.map_or(name.clone(), |unit| format!("{name} [{unit}]")));
+            wide_header.push(unit.map_or(name.clone(), |unit| format!("{name} [{unit}]")));
             names.push(name.clone());
         }
-        Some(LongForm { clock, name, value, data_row, header: heads, names })
+        Some(LongForm { clock, name, value, data_row, header: wide_header, names })
     }
 
     /// Describes the form.
@@ -116,9 +116,9 @@ impl WideRow {
         let cell = |at: usize| row.get(at).map_or("", String::as_str);
         let at = form.names.iter().position(|name| name == cell(form.name))? + 1;
         let time = form.clock.iter().map(|clock| cell(*clock)).collect::<Vec<_>>().join(" ");
-        let begins =
+        let is_new_row =
             self.row.first() != Some(&time) || self.row.get(at).is_some_and(|value| !value.is_empty());
-        let done = if begins { self.finish() } else { None };
+        let done = if is_new_row { self.finish() } else { None };
         if let Some(place) = self.row.first_mut() {
             *place = time;
         }

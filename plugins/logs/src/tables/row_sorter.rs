@@ -2,8 +2,8 @@
 
 use std::collections::VecDeque;
 
-/// Number of buffered rows: a row that is later by more stays out of order. Loggers that send packets mix up some dozens; the buffer takes
-/// 6 MB for a hundred columns.
+/// Number of buffered rows: a row that is late by more rows stays out of order. Loggers that send packets mix up some dozens. The buffer
+/// takes 6 MB for a hundred columns.
 const BUFFERED_ROWS: usize = 8192;
 
 /// A buffer that returns rows in order of time.

@@ -16,7 +16,7 @@ pub(crate) struct Solution {
     pub(crate) values: DMatrix<f64>,
     /// Covariance of all unknowns, parameters first (parameter by parameter, knot by knot).
     pub(crate) covariance: DMatrix<f64>,
-    /// One over the penalty: variance of the roughness.
+    /// Variance of the roughness: the inverse of its penalty.
     pub(crate) roughness_variance: Parameters,
     /// Widening of the errors beyond the measured speeds.
     pub(crate) widening: EndWidenings,
@@ -61,7 +61,7 @@ impl Solution {
         let (rows, knots) = (self.splines.rows(speed_ratio), self.splines.len());
         // Student's quantile over the normal one, squared, for the number of second differences that estimated the roughness.
         let freedom = knots.saturating_sub(2).max(1) as f64;
-        let small_sample =
+        let small_sample_factor =
             student_quantile(0.975, freedom).map_or(1.0, |quantile| (quantile / NORMAL_975).powi(2));
         let prior_variances =
             (self.splines.shape.prior_variance(speed_ratio), self.splines.work.prior_variance(speed_ratio));
@@ -83,7 +83,7 @@ impl Solution {
             };
             let difference = self.values.row(a).transpose().dot(trend);
             out[(a, a)] += factor
-                * (prior_variance * self.roughness_variance[a] * small_sample
+                * (prior_variance * self.roughness_variance[a] * small_sample_factor
                     + difference * difference / 3.0);
         }
         for (index, parameters) in LINE_OFFSETS.iter().enumerate() {

@@ -37,7 +37,10 @@ pub fn stored_plan(path: &Path, now: &PlanInputHashes, campaign: &Campaign) -> R
         ("the nominal model", then.model_sha256 != now.model_sha256),
         ("the sequence script", then.script_sha256 != now.script_sha256),
         // A plan made without a rig may be run on any rig.
-        ("the description of the rig", both_known_and_differ(&then.rig_sha256, &now.rig_sha256)),
+        (
+            "the description of the rig",
+            both_known_and_differ(then.rig_sha256.as_deref(), now.rig_sha256.as_deref()),
+        ),
     ]
     .into_iter()
     .filter_map(|(what, changed)| changed.then_some(what))

@@ -77,7 +77,10 @@ impl Identity {
             ("the nominal model", self.model_sha256 != now.model_sha256),
             ("the plan", self.plan_sha256 != now.plan_sha256),
             ("the backend", self.backend != now.backend || self.settings_sha256 != now.settings_sha256),
-            ("the description of the rig", both_known_and_differ(&self.rig_sha256, &now.rig_sha256)),
+            (
+                "the description of the rig",
+                both_known_and_differ(self.rig_sha256.as_deref(), now.rig_sha256.as_deref()),
+            ),
         ]
         .into_iter()
         .filter_map(|(what, differs)| differs.then_some(what))
@@ -86,8 +89,8 @@ impl Identity {
 }
 
 /// Whether two hashes differ; an unknown one does not.
-pub(crate) fn both_known_and_differ(then: &Option<String>, now: &Option<String>) -> bool {
-    then.as_ref().zip(now.as_ref()).is_some_and(|(then, now)| then != now)
+pub(crate) fn both_known_and_differ(then: Option<&str>, now: Option<&str>) -> bool {
+    then.zip(now).is_some_and(|(then, now)| then != now)
 }
 
 /// One journal entry.

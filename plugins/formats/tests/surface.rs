@@ -83,6 +83,19 @@ fn ends_of_a_line_without_efficiency_are_not_supported_and_a_hole_inside_is_brid
     assert_eq!(known(5), grid.columns());
 }
 
+/// A slow line is a small part of the map: its points near choke are close together, but not repeats.
+#[test]
+fn a_slow_line_keeps_its_ends() {
+    let map = exact(&[1.0, 0.9, 0.7, 0.4, 0.12, 0.06, 0.0]);
+    let grid = efficiency_surface(&map).unwrap();
+    let points = &map.lines[0].points;
+    for (column, point) in [(0, &points[0]), (grid.columns() - 1, &points[6])] {
+        let expected = [point.flow_corrected_kg_s, point.pressure_ratio, point.eta.unwrap()];
+        let node = grid.node(0, column).unwrap();
+        assert!(node.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9), "{node:?} {expected:?}");
+    }
+}
+
 #[test]
 fn too_little_gives_no_surface() {
     let mut map = exact(&[0.9, 0.5]);

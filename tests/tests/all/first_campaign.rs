@@ -109,7 +109,7 @@ fn a_suppliers_map_is_converted() {
         init(scratch.path(), &["--wheel", "70mm", "--map", map.to_str().unwrap()]).exits(0);
         let checked = mapper_in(scratch.path(), ["check", "own.yaml", "--json"]).exits(0).json();
         assert_eq!(checked["points"], 48);
-        // The surface stays within the map, 0.03 to 0.301 kg/s.
+        // Monotone cubics stay within the map, 0.03 to 0.301 kg/s.
         let table = std::fs::read_to_string(scratch.path().join("own_map.csv")).unwrap();
         let flow = |row: &str| row.split(',').nth(1).unwrap().parse::<f64>().unwrap();
         let flows: Vec<f64> = table.lines().skip(2).map(flow).collect();

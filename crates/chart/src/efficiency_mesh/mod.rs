@@ -9,5 +9,6 @@ mod surface;
 pub use fitted::fitted_surface;
 pub use levels::contour_levels;
 pub use surface::{
-    SUBDIVISIONS, efficiency_surface, interpolate_between_lines, points_surge_to_choke, speed_curve,
+    InterpolatedLine, SUBDIVISIONS, efficiency_surface, interpolate_between_lines, interpolated_lines,
+    points_surge_to_choke, speed_curve,
 };

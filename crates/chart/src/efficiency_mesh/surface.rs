@@ -1,4 +1,5 @@
-//! Efficiency between the measured points, only for pictures and only inside the measured region.
+//! Flow, pressure ratio and efficiency between the points of a map, only inside the measured region: for pictures, and for the table of a
+//! machine's own map.
 //!
 //! Each speed line is a row of a structured grid. Along a line the position runs from 0 at its surge-side point to 1
 //! at its choke-side point, by length on the map with both axes scaled to the map's spans; flow, pressure ratio and
@@ -8,7 +9,7 @@
 //!
 //! The efficiency is NaN before the first and after the last point of a line with an efficiency, and between two lines at positions where
 //! one of them is NaN. Points without an efficiency between others are bridged. Lines with fewer than two distinct points are not used.
-//! Points closer than 1 % of the map's diagonal (repeats) are replaced by their mean.
+//! Points closer than 1 % of the diagonal of their line (repeats) are replaced by their mean.
 
 use super::monotone::Monotone;
 use crate::StructuredGrid;
@@ -18,43 +19,57 @@ use mapper_core::{CompressorMap, MapPoint, SpeedLine};
 const COLUMNS: usize = 49;
 /// Rows of the mesh from one line to the next.
 pub const SUBDIVISIONS: usize = 8;
-/// Distance below which points are merged, as a fraction of the map's diagonal.
+/// Distance below which points are merged, as a fraction of the line's diagonal: a slow line is a small part of the map.
 const MERGE_DISTANCE: f64 = 0.01;
 
-/// Efficiency (fraction) over corrected flow (x, kg/s) and pressure ratio (y) inside the measured region, as
-/// described in the source of this module; NaN outside it. `None` if fewer than two lines can be used.
-pub fn efficiency_surface(map: &CompressorMap) -> Option<StructuredGrid> {
-    let spans = spans(map)?;
-    let mut rows: Vec<Row> = map.lines.iter().filter_map(|line| row(line, spans)).collect();
+/// A speed line on the interpolating surface.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InterpolatedLine {
+    /// Corrected speed, rpm.
+    pub speed_corrected_rpm: f64,
+    /// Corrected flow (kg/s), pressure ratio and efficiency (fraction; NaN where it is not measured) from surge to choke side.
+    pub nodes: Vec<[f64; 3]>,
+}
+
+/// The measured lines, with [`SUBDIVISIONS`] - 1 lines between two of them, as described in the source of this module. `None` if fewer than
+/// two lines can be used.
+pub fn interpolated_lines(map: &CompressorMap) -> Option<Vec<InterpolatedLine>> {
+    let spans = spans(&map.lines)?;
+    let mut rows: Vec<InterpolatedLine> = map.lines.iter().filter_map(|line| row(line, spans)).collect();
     // Speeds must rise strictly; the first of two lines with equal speed is used.
     rows.dedup_by(|b, a| b.speed_corrected_rpm <= a.speed_corrected_rpm);
     if rows.len() < 2 {
         return None;
     }
     let speeds: Vec<f64> = rows.iter().map(|row| row.speed_corrected_rpm).collect();
-    let row_count = (rows.len() - 1) * SUBDIVISIONS + 1;
-    let [mut x, mut y, mut z] = [(); 3].map(|()| vec![f64::NAN; row_count * COLUMNS]);
+    let mut lines: Vec<InterpolatedLine> = (interpolate_between_lines(&speeds, &speeds).into_iter())
+        .map(|speed_corrected_rpm| InterpolatedLine {
+            speed_corrected_rpm,
+            nodes: vec![[f64::NAN; 3]; COLUMNS],
+        })
+        .collect();
     for column in 0..COLUMNS {
-        let pick = |field: usize| rows.iter().map(|row| row.nodes[column][field]).collect::<Vec<f64>>();
-        for (field, out) in [&mut x, &mut y, &mut z].into_iter().enumerate() {
-            for (r, value) in interpolate_between_lines(&speeds, &pick(field)).into_iter().enumerate() {
-                out[r * COLUMNS + column] = value;
+        for field in 0..3 {
+            let values: Vec<f64> = rows.iter().map(|row| row.nodes[column][field]).collect();
+            for (line, value) in lines.iter_mut().zip(interpolate_between_lines(&speeds, &values)) {
+                line.nodes[column][field] = value;
             }
         }
     }
-    StructuredGrid::new(row_count, COLUMNS, x, y, z).ok()
+    Some(lines)
 }
 
-/// A resampled speed line: flow, pressure ratio and efficiency at equal steps of position.
-struct Row {
-    speed_corrected_rpm: f64,
-    nodes: Vec<[f64; 3]>,
+/// Efficiency (fraction) over corrected flow (x, kg/s) and pressure ratio (y) inside the measured region: [`interpolated_lines`] as a grid.
+pub fn efficiency_surface(map: &CompressorMap) -> Option<StructuredGrid> {
+    let lines = interpolated_lines(map)?;
+    let field = |field: usize| lines.iter().flat_map(|line| &line.nodes).map(|node| node[field]).collect();
+    StructuredGrid::new(lines.len(), COLUMNS, field(0), field(1), field(2)).ok()
 }
 
-/// Spans of flow (kg/s) and pressure ratio over the map, above 0.
-fn spans(map: &CompressorMap) -> Option<(f64, f64)> {
+/// Spans of flow (kg/s) and pressure ratio over the lines, above 0.
+fn spans(lines: &[SpeedLine]) -> Option<(f64, f64)> {
     let span = |value: fn(&MapPoint) -> f64| {
-        let all = map.lines.iter().flat_map(|line| &line.points).map(value).filter(|v| v.is_finite());
+        let all = lines.iter().flat_map(|line| &line.points).map(value).filter(|v| v.is_finite());
         let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| (r.0.min(v), r.1.max(v)));
         (high > low).then_some(high - low)
     };
@@ -72,14 +87,14 @@ pub fn surge_to_choke(line: &SpeedLine, (flow_span, ratio_span): (f64, f64)) -> 
 
 /// Sorts the points of a line from surge to choke by flow minus pressure ratio, each divided by its span over the map.
 pub fn points_surge_to_choke<'a>(map: &CompressorMap, line: &'a SpeedLine) -> Vec<&'a MapPoint> {
-    surge_to_choke(line, spans(map).unwrap_or((1.0, 1.0)))
+    surge_to_choke(line, spans(&map.lines).unwrap_or((1.0, 1.0)))
 }
 
 /// The curve of a speed line for drawing: (corrected flow, kg/s; pressure ratio) from surge to choke side, on the surface.
 ///
 /// If the surface does not use the line, the curve consists of the measured points.
 pub fn speed_curve(map: &CompressorMap, line: &SpeedLine) -> Vec<(f64, f64)> {
-    match spans(map).and_then(|spans| row(line, spans)) {
+    match spans(&map.lines).and_then(|spans| row(line, spans)) {
         Some(row) => row.nodes.iter().map(|node| (node[0], node[1])).collect(),
         None => points_surge_to_choke(map, line)
             .iter()
@@ -95,7 +110,7 @@ struct Place {
     eta: Option<f64>,
 }
 
-fn row(line: &SpeedLine, spans: (f64, f64)) -> Option<Row> {
+fn row(line: &SpeedLine, spans: (f64, f64)) -> Option<InterpolatedLine> {
     let places = places(line, spans);
     let mut position = vec![0.0];
     for pair in places.windows(2) {
@@ -117,18 +132,19 @@ fn row(line: &SpeedLine, spans: (f64, f64)) -> Option<Row> {
             [flow.at(s), ratio.at(s), eta.as_ref().and_then(|eta| eta.at(s))].map(|v| v.unwrap_or(f64::NAN))
         })
         .collect();
-    Some(Row { speed_corrected_rpm: line.speed_corrected_rpm, nodes })
+    Some(InterpolatedLine { speed_corrected_rpm: line.speed_corrected_rpm, nodes })
 }
 
 fn places(line: &SpeedLine, spans: (f64, f64)) -> Vec<Place> {
     let points = surge_to_choke(line, spans);
     let finite =
         points.into_iter().filter(|p| p.flow_corrected_kg_s.is_finite() && p.pressure_ratio.is_finite());
+    let own = self::spans(std::slice::from_ref(line)).unwrap_or(spans);
     let mut clusters: Vec<Vec<&MapPoint>> = Vec::new();
     for point in finite {
         let near = |other: &&MapPoint| {
-            let flow = (point.flow_corrected_kg_s - other.flow_corrected_kg_s) / spans.0;
-            let ratio = (point.pressure_ratio - other.pressure_ratio) / spans.1;
+            let flow = (point.flow_corrected_kg_s - other.flow_corrected_kg_s) / own.0;
+            let ratio = (point.pressure_ratio - other.pressure_ratio) / own.1;
             flow.hypot(ratio) < MERGE_DISTANCE * std::f64::consts::SQRT_2
         };
         match clusters.last_mut() {

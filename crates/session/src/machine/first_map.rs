@@ -4,8 +4,8 @@ use crate::errors::first_map_error::FirstMapError;
 use crate::machine::first_request::{FirstCampaignRequest, significant_digits};
 use crate::{Registry, SessionError};
 use mapper_campaign::nominal_table;
+use mapper_chart::efficiency_mesh::{InterpolatedLine, SUBDIVISIONS, interpolated_lines};
 use mapper_core::{ReferenceState, one_line};
-use mapper_maps::{MapFit, MapFitOptions};
 use mapper_physics::compressor_map::characteristic::CompressorCharacteristic;
 use mapper_physics::compressor_map::closed_form_map::{ClosedFormMap, TURBO_A_WHEEL_M};
 use std::path::Path;
@@ -17,9 +17,9 @@ const GRID_LINES: usize = 8;
 /// A map with this many lines is measured on all of them. Fewer lines have too few steps to determine alpha_A and the probe: the forecast for
 /// 24 steps on four lines is doubtful. More lines take longer than a night.
 const MAP_LINE_COUNTS: std::ops::RangeInclusive<usize> = 7..=10;
-/// Lines inserted between two measured ones. With three, linear interpolation deviates from the smooth surface by a sixteenth as much as
-/// without.
-const INTERPOLATED_LINES: usize = 3;
+/// Every so many interpolated lines become lines of the table: three between two measured ones. Linear interpolation then deviates from the
+/// cubic by a sixteenth as much as without.
+const LINE_STRIDE: usize = SUBDIVISIONS / 4;
 /// Points of a line in the table of a similar compressor. They are densest near surge, where the flow changes most with pressure.
 const POINTS_PER_LINE: usize = 13;
 
@@ -56,8 +56,9 @@ impl FirstMap {
     }
 }
 
-/// The table of a nominal map, sampled from a smooth surface through the file's points, or the points themselves if no surface can be fitted.
-/// Linear interpolation between few points has kinks, which identification would mistake for heat transfer.
+/// The table of a nominal map: monotone cubics through the file's points, on its lines and on others between them, or the points themselves if
+/// there are too few. Linear interpolation between few points has kinks, which identification would mistake for heat transfer; a fitted surface
+/// would not pass through the points.
 fn resample_table(
     registry: &Registry,
     path: &Path,
@@ -65,31 +66,21 @@ fn resample_table(
 ) -> Result<String, SessionError> {
     let map = registry.read_map(path, Some(reference))?;
     let mut text = format!(
-        "# Smooth surface through the points of {}.\nspeed [rpm],flow [kg/s],pressure ratio,efficiency\n",
+        "# Monotone cubics through the points of {}.\nspeed [rpm],flow [kg/s],pressure ratio,efficiency\n",
         one_line(&path.display().to_string())
     );
     let mut row = |rpm: f64, flow_kg_s: f64, pressure_ratio: f64, eta: f64| {
         text += &format!("{rpm:.1},{flow_kg_s:.6},{pressure_ratio:.5},{eta:.5}\n");
     };
-    let speeds: Vec<f64> = map.lines.iter().map(|line| line.speed_corrected_rpm).collect();
-    let inserted_rpm = speeds.windows(2).flat_map(|pair| {
-        let step_rpm = (pair[1] - pair[0]) / (INTERPOLATED_LINES + 1) as f64;
-        (1..=INTERPOLATED_LINES).map(move |index| pair[0] + step_rpm * index as f64)
-    });
-    let options = MapFitOptions {
-        further_speeds_rpm: Some(inserted_rpm.collect()),
-        leave_one_out: false,
-        ..MapFitOptions::default()
-    };
-    match MapFit::new(&map).and_then(|fit| fit.table(&options)) {
-        Ok(fitted) => {
-            for line in &fitted.lines {
-                for node in line.nodes.iter().filter(|node| !node.extrapolated) {
-                    row(line.speed_corrected_rpm, node.flow_corrected_kg_s, node.pressure_ratio, node.eta);
+    match interpolated_lines(&map) {
+        Some(lines) => {
+            for InterpolatedLine { speed_corrected_rpm, nodes } in lines.iter().step_by(LINE_STRIDE) {
+                for [flow_kg_s, pressure_ratio, eta] in nodes.iter().filter(|node| node[2].is_finite()) {
+                    row(*speed_corrected_rpm, *flow_kg_s, *pressure_ratio, *eta);
                 }
             }
         }
-        Err(_) => {
+        None => {
             for line in &map.lines {
                 for (point, eta) in line.points.iter().filter_map(|point| Some((point, point.eta?))) {
                     row(line.speed_corrected_rpm, point.flow_corrected_kg_s, point.pressure_ratio, eta);

@@ -16,7 +16,7 @@ mod common;
 
 use common::{Planted, campaign, draw, drift_reading, identification, judge, judge_by};
 use mapper_core::{Channel, Method};
-use mapper_diagnose::drift::{Cause, Course, CourseKind, RateOrStep};
+use mapper_diagnose::drift::{Cause, RateOrStep, TimeHistory, TimeHistoryKind};
 use mapper_identify::{IdentifyConfig, identify_each};
 use std::collections::BTreeMap;
 
@@ -101,7 +101,7 @@ fn pairs(campaigns: usize, first: u64, limits: &BTreeMap<Cause, f64>) {
         let span_s = common::HOLD_S + 26.0 * common::DWELL_S;
         let causes = [sensors[one], sensors[other]];
         for cause in causes {
-            let course = Course { kind: CourseKind::Ramp, onset_s: 0.4 * draw() * span_s };
+            let course = TimeHistory { kind: TimeHistoryKind::Ramp, onset_s: 0.4 * draw() * span_s };
             let sign = if draw() < 0.5 { 1.0 } else { -1.0 };
             let size = sign * 3.0 * (1.0 + draw()) * limits[&cause] / course.at(span_s);
             cause.channels().iter().for_each(|channel| drift_reading(&mut recording, *channel, course, size));
@@ -136,13 +136,13 @@ fn one(
 ) -> Row {
     let mut draw = draw(seed ^ 0xd21f);
     let planted = cause.map(|cause| {
-        let kind = if draw() < 1.0 / 3.0 { CourseKind::Step } else { CourseKind::Ramp };
+        let kind = if draw() < 1.0 / 3.0 { TimeHistoryKind::Step } else { TimeHistoryKind::Ramp };
         let span_s = common::HOLD_S + 26.0 * common::DWELL_S;
         let share = match kind {
-            CourseKind::Ramp => 0.4 * draw() * f64::from(u8::from(draw() < 0.7)),
-            CourseKind::Step => 0.25 + 0.5 * draw(),
+            TimeHistoryKind::Ramp => 0.4 * draw() * f64::from(u8::from(draw() < 0.7)),
+            TimeHistoryKind::Step => 0.25 + 0.5 * draw(),
         };
-        let course = Course { kind, onset_s: share * span_s };
+        let course = TimeHistory { kind, onset_s: share * span_s };
         let sign = if draw() < 0.5 || cause == Cause::BearingFriction { 1.0 } else { -1.0 };
         let sign = if cause == Cause::Fouling { -1.0 } else { sign };
         let change = sign * factor * (1.0 + draw()) * limits[&cause];
@@ -192,15 +192,15 @@ fn one(
             main.is_some_and(|found| {
                 let same_kind = matches!(
                     (found.size, planted.course.kind),
-                    (RateOrStep::RatePerH(_), CourseKind::Ramp) | (RateOrStep::Step(_), CourseKind::Step)
+                    (RateOrStep::RatePerH(_), TimeHistoryKind::Ramp)
+                        | (RateOrStep::Step(_), TimeHistoryKind::Step)
                 );
                 same_kind && (found.low..=found.high).contains(&planted.size)
             })
         }),
         size_ratio: planted.and_then(|planted| match (main?.size, planted.course.kind) {
-            (RateOrStep::RatePerH(size), CourseKind::Ramp) | (RateOrStep::Step(size), CourseKind::Step) => {
-                Some(size / planted.size)
-            }
+            (RateOrStep::RatePerH(size), TimeHistoryKind::Ramp)
+            | (RateOrStep::Step(size), TimeHistoryKind::Step) => Some(size / planted.size),
             _ => None,
         }),
         shrink: [shrink(&fitted, &start), shrink(&identified, &start), shrink(&identified, &undrifted)],

@@ -1,12 +1,13 @@
-//! The report as text and numbers.
+//! The report, with its reason in words.
 
 use crate::drift::causes::cause::{Cause, CauseKind};
-use crate::drift::causes::time_history::CourseKind;
+use crate::drift::causes::drift::Drift;
+use crate::drift::causes::time_history::TimeHistoryKind;
 use crate::drift::correction::corrected::{corrected_points, identified};
 use crate::drift::correction::visits::group;
-use crate::drift::likelihood::decide::{Decision, FoundDrifts};
+use crate::drift::likelihood::decide::{Decision, DetectedCause};
 use crate::drift::likelihood::fit::Fit;
-use crate::drift::likelihood::refine::Refined;
+use crate::drift::likelihood::refinement::Refinement;
 use crate::drift::report::{DriftReport, DriftVerdict, FoundDrift, RateOrStep};
 use crate::drift::runs::request::DriftRequest;
 use mapper_core::{IdentifiedPoint, Recording, probability_text};
@@ -14,7 +15,7 @@ use mapper_core::{IdentifiedPoint, Recording, probability_text};
 pub(crate) fn conclude(
     request: &DriftRequest<'_>,
     recordings: &[&Recording],
-    refined: &Refined,
+    refined: &Refinement,
     groups: &[Vec<usize>],
 ) -> DriftReport {
     let decision = &refined.decision;
@@ -23,7 +24,7 @@ pub(crate) fn conclude(
     let groups =
         groups.iter().map(|visits| group(request, recordings, &refined.readings, &points, visits)).collect();
     let drifts: Vec<FoundDrift> =
-        decision.found.iter().zip(&refined.fits.drifts).map(|(found, fit)| drift(found, fit)).collect();
+        decision.detected.iter().zip(&refined.fits.drifts).map(|(cause, fit)| drift(cause, fit)).collect();
     let verdict = verdict(&drifts);
     let corrected_points =
         if drifts.is_empty() { Vec::new() } else { corrected_points(request, recordings, refined, &points) };
@@ -38,21 +39,22 @@ pub(crate) fn conclude(
     }
 }
 
-fn drift(found: &FoundDrifts, fit: &Fit) -> FoundDrift {
+fn drift(detected: &DetectedCause, fit: &Fit) -> FoundDrift {
+    let Drift { cause, history, size } = fit.drift;
     FoundDrift {
-        cause: found.cause,
-        probability: found.probability,
-        alternatives: found.alternatives.clone(),
-        onset_s: fit.course.onset_s,
+        cause,
+        probability: detected.probability,
+        alternatives: detected.alternatives.clone(),
+        onset_s: history.onset_s,
         onset_low_s: fit.onset_low_s,
         onset_high_s: fit.onset_high_s,
-        size: match fit.course.kind {
-            CourseKind::Ramp => RateOrStep::RatePerH(fit.size),
-            CourseKind::Step => RateOrStep::Step(fit.size),
+        size: match history.kind {
+            TimeHistoryKind::Ramp => RateOrStep::RatePerH(size),
+            TimeHistoryKind::Step => RateOrStep::Step(size),
         },
         low: fit.low,
         high: fit.high,
-        unit: found.cause.unit(),
+        unit: cause.unit(),
     }
 }
 
@@ -71,7 +73,7 @@ fn reason(decision: &Decision, drifts: &[FoundDrift], verdict: DriftVerdict) -> 
     let left_out = match decision.left_out {
         (0, _) => String::new(),
         (count, all) => {
-            format!(" {count} of {all} stretches are left out because the model cannot follow them.")
+            format!(" {count} of {all} segments are left out because the model cannot follow them.")
         }
     };
     if verdict == DriftVerdict::None {
@@ -82,18 +84,18 @@ fn reason(decision: &Decision, drifts: &[FoundDrift], verdict: DriftVerdict) -> 
             probability_text(probability)
         );
     }
-    let what: Vec<String> = drifts.iter().map(described).collect();
-    let corrected: Vec<String> = drifts.iter().map(|drift| correction(drift.cause)).collect();
-    let (what, corrected) = (what.join("; "), corrected.join(" "));
+    let descriptions: Vec<String> = drifts.iter().map(describe).collect();
+    let corrections: Vec<String> = drifts.iter().map(|drift| describe_correction(drift.cause)).collect();
+    let (drifts, corrections) = (descriptions.join("; "), corrections.join(" "));
     match verdict {
         DriftVerdict::Unclear => format!(
-            "Something drifted, but the recording does not show what; most probable: {what}. {corrected}{left_out}"
+            "Something drifted, but the recording does not show what; most probable: {drifts}. {corrections}{left_out}"
         ),
-        _ => format!("{what}. {corrected}{left_out}"),
+        _ => format!("{drifts}. {corrections}{left_out}"),
     }
 }
 
-fn described(drift: &FoundDrift) -> String {
+fn describe(drift: &FoundDrift) -> String {
     let size = match drift.size {
         RateOrStep::RatePerH(rate) => format!("drifts by {} per hour from", drift.cause.show(rate)),
         RateOrStep::Step(step) => format!("steps by {} at", drift.cause.show(step)),
@@ -106,10 +108,10 @@ fn described(drift: &FoundDrift) -> String {
     )
 }
 
-fn correction(cause: Cause) -> String {
+fn describe_correction(cause: Cause) -> String {
     match cause {
         Cause::Sensors(_) => format!(
-            "The corrected points have this subtracted from the reading of {cause}; the recording is unchanged."
+            "For the corrected points this is subtracted from the reading of {cause}; the recording is unchanged."
         ),
         Cause::Fouling => {
             "The efficiency of the corrected points is that of the machine at the campaign's start."

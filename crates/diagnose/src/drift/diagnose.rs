@@ -1,27 +1,28 @@
 //! Diagnoses drift from recordings.
 
 use crate::drift::conclude::conclude;
-use crate::drift::likelihood::refine::Refined;
+use crate::drift::likelihood::refinement::Refinement;
 use crate::drift::report::DriftReport;
 use crate::drift::runs::repeats;
 use crate::drift::runs::request::{DriftError, DriftRequest, Unsolvable};
-use crate::drift::runs::time_axis::{self, Block, CampaignStep, mean_variance_ratio};
+use crate::drift::runs::time_axis::{self, CampaignStep, Segment, mean_variance_ratio};
 use crate::drift::runs::usable::usable;
 use crate::drift::sensitivity::drive::{Drive, predict};
-use crate::drift::sensitivity::readings::Readings;
+use crate::drift::sensitivity::readings::{Readings, Response, SegmentMeans};
 use crate::gap::residuals::whiten::NEAR_SURGE;
 use mapper_core::{Channel, Recording};
+use mapper_numerics::statistics::mean;
 use mapper_observe::channels::{DRIVERS, OUTPUTS};
 use mapper_observe::declared::Declared;
 use mapper_observe::perturbation::Perturbation;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
-/// Start of each run that is left out, s: the rig's earlier history is unknown, and rigs are still settling.
-const FIRST_S: f64 = 30.0;
-/// Average model error over a segment, relative to the noise of one sample.
-const MODEL_FLOOR: f64 = 0.15;
+/// Time at the start of each run that is left out, s: the rig may still be settling from an unknown state.
+const SETTLING_S: f64 = 30.0;
+/// Model error of a segment's mean, relative to the noise of one sample.
+const MODEL_ERROR_RATIO: f64 = 0.15;
 
-/// Reports whether anything drifted, and what.
+/// Finds the causes of drift.
 ///
 /// # Errors
 /// [`DriftError`] if a recording has no steps or too few channels, or the model cannot follow it. A valid recording without enough information
@@ -39,7 +40,7 @@ pub fn diagnose(request: &DriftRequest<'_>) -> Result<DriftReport, DriftError> {
     let (readings, mut drives) = read(request, &recordings, steps)?;
     let declared = request.declared();
     let own = own_covariances(&recordings, &readings, &declared);
-    let refined = Refined::new(readings, &own, &mut drives, &declared)?;
+    let refined = Refinement::new(readings, &own, &mut drives, &declared)?;
     Ok(conclude(request, &recordings, &refined, &groups))
 }
 
@@ -55,82 +56,74 @@ fn read<'a>(
     let columns: Vec<usize> = (0..OUTPUTS.len())
         .filter(|output| recordings.iter().all(|recording| recording.require(OUTPUTS[*output]).is_ok()))
         .collect();
-    let all_blocks = time_axis::blocks(&steps);
+    let segments = time_axis::segments(&steps);
     let mut drives: Vec<Drive<'a>> = recordings
         .iter()
         .enumerate()
         .map(|(run, recording)| {
-            Drive::new(run, recording, request.model, &request.boundary, &steps, &all_blocks)
+            Drive::new(run, recording, request.model, &request.boundary, &steps, &segments)
         })
         .collect::<Result<_, _>>()?;
-    let (base, turned) = predict(&mut drives, &[])?;
-    let all: Vec<_> = all_blocks
+    let (base, perturbed) = predict(&mut drives, &[])?;
+    let all: Vec<SegmentMeans> = segments
         .iter()
         .zip(&base.means)
-        .map(|(block, model)| {
-            let recording = recordings[steps[block.step].run];
-            (*block, OUTPUTS.map(|channel| time_axis::mean(recording, channel, block)), *model)
+        .map(|(segment, nominal)| {
+            let recording = recordings[steps[segment.step].run];
+            let measured = OUTPUTS.map(|channel| time_axis::mean(recording, channel, segment));
+            SegmentMeans { segment: *segment, measured, nominal: *nominal }
         })
         .collect();
     let kept: Vec<usize> = (0..all.len())
         .filter(|index| {
-            let step = &steps[all[*index].0.step];
-            let begins = step.from.is_none() && all[*index].0.start_s < step.start_s + FIRST_S;
-            !begins
+            let SegmentMeans { segment, measured, nominal } = &all[*index];
+            let step = &steps[segment.step];
+            let is_settling = step.from.is_none() && segment.start_s < step.start_s + SETTLING_S;
+            !is_settling
                 && base.surge_position_ratio[*index] < NEAR_SURGE
-                && columns
-                    .iter()
-                    .all(|column| all[*index].1[*column].is_some() && all[*index].2[*column].is_finite())
+                && columns.iter().all(|column| measured[*column].is_some() && nominal[*column].is_finite())
         })
         .collect();
     if kept.is_empty() {
         return Err(DriftError::NothingComparable);
     }
-    let input_levels = DRIVERS
-        .iter()
-        .map(|channel| {
-            let values: Vec<f64> = recordings
-                .iter()
-                .filter_map(|r| r.series.get(channel))
-                .flat_map(|s| s.values.iter().copied())
-                .collect();
-            if values.is_empty() { 0.0 } else { values.iter().sum::<f64>() / values.len() as f64 }
-        })
-        .collect();
-    let frame = Readings {
+    let level = |channel: Channel| {
+        let series = recordings.iter().filter_map(|recording| recording.series.get(&channel));
+        Some((channel, mean(series.flat_map(|series| &series.values))?))
+    };
+    let unpredicted = Readings {
         runs: recordings.len(),
-        blocks: kept.iter().map(|index| all_blocks[*index]).collect(),
-        difference: Vec::new(),
-        model: Vec::new(),
-        answers: Vec::new(),
-        step_ends: Vec::new(),
-        input_levels,
+        segments: kept.iter().map(|index| segments[*index]).collect(),
+        difference: DMatrix::zeros(0, 1),
+        model: Response::zeros(0),
+        responses: Vec::new(),
+        input_levels: DRIVERS.into_iter().filter_map(level).collect(),
         columns,
         steps,
         kept,
         all,
     };
-    let readings = frame.around(base, &turned).ok_or(Unsolvable::NotFinite)?;
+    let readings = unpredicted.with_prediction(&base, &perturbed).ok_or(Unsolvable::NotFinite)?;
     Ok((readings, drives))
 }
 
-/// Covariance of the readings of each segment: the sensors' noise, and that of the inputs through the model.
+/// Covariance of the readings of each segment from the noise of their sensors, and from that of the inputs through the model.
 fn own_covariances(recordings: &[&Recording], readings: &Readings, declared: &Declared) -> Vec<DMatrix<f64>> {
     let count = readings.columns.len();
-    let of_block = |(index, block): (usize, &Block)| {
-        let recording = recordings[readings.steps[block.step].run];
-        let ratio = mean_variance_ratio(declared.noise_colour, recording, Channel::T2, block);
+    let of_segment = |(index, segment): (usize, &Segment)| {
+        let recording = recordings[readings.steps[segment.step].run];
+        let ratio = mean_variance_ratio(declared.noise_colour, recording, Channel::T2, segment);
         let mut covariance = DMatrix::zeros(count, count);
         for (position, column) in readings.columns.iter().enumerate() {
-            covariance[(position, position)] =
-                declared.noise_sigma(OUTPUTS[*column]).powi(2) * (ratio + MODEL_FLOOR * MODEL_FLOOR);
+            covariance[(position, position)] = declared.noise_sigma(OUTPUTS[*column]).powi(2)
+                * (ratio + MODEL_ERROR_RATIO * MODEL_ERROR_RATIO);
         }
         for channel in DRIVERS {
-            let Some(answer) = readings.answer(Perturbation::Input(channel)) else { continue };
-            let of_block = DVector::from_column_slice(&answer.readings[index * count..(index + 1) * count]);
-            covariance.ger(declared.noise_sigma(channel).powi(2) * ratio, &of_block, &of_block, 1.0);
+            let Some(response) = readings.response(Perturbation::Input(channel)) else { continue };
+            let response = response.rows(index * count, count);
+            covariance.ger(declared.noise_sigma(channel).powi(2) * ratio, &response, &response, 1.0);
         }
         covariance
     };
-    readings.blocks.iter().enumerate().map(of_block).collect()
+    readings.segments.iter().enumerate().map(of_segment).collect()
 }

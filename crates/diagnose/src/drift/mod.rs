@@ -1,4 +1,4 @@
-//! Checks whether the rig changed while a map was measured, and if so, which sensor or machine part changed, since when and how fast.
+//! Checks whether the rig changed while a map was measured: which sensor or machine part, since when and how fast.
 //!
 //! The recorded boundary conditions drive the nominal model through all steps. Constants over the campaign explain part of the residual:
 //! declared tolerances and offsets, and a deviation of each operating point that its repeats share. The most probable set of causes, each with
@@ -15,7 +15,7 @@ mod runs;
 mod sensitivity;
 
 pub use causes::cause::{Cause, CauseKind};
-pub use causes::time_history::{Course, CourseKind};
+pub use causes::time_history::{TimeHistory, TimeHistoryKind};
 pub use correction::subtract_drift::without_drift;
 pub use diagnose::diagnose;
 pub use report::{

@@ -1,7 +1,7 @@
 //! The report, printed and written as JSON.
 
 use crate::drift::causes::cause::Cause;
-use crate::drift::causes::time_history::{Course, CourseKind};
+use crate::drift::causes::time_history::{TimeHistory, TimeHistoryKind};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ pub enum DriftVerdict {
     Machine,
     /// The machine changes and a sensor drifts.
     SensorAndMachine,
-    /// Either the recording cannot identify the drift, or it cannot show whether there is one: see `reason`.
+    /// The recording cannot identify the drift, or cannot show whether there is one: see `reason`.
     #[default]
     Unclear,
 }
@@ -57,7 +57,7 @@ pub struct DetectionLimit {
 pub struct VisitChannel {
     /// Mean reading over the end of the step, SI.
     pub end: f64,
-    /// The same minus the model's, SI: removes the effect of wandering boundary conditions.
+    /// The same minus the model's, SI: without the effect of changing boundary conditions.
     pub end_less_model: f64,
     /// Mean reading over the transient minus the model's, SI; `None` if the step is too short.
     pub transient_less_model: Option<f64>,
@@ -155,7 +155,7 @@ pub struct FoundDrift {
 }
 
 impl FoundDrift {
-    /// Whether it is more probable than all its alternatives.
+    /// Whether it is more probable than all its alternatives together.
     pub fn is_clear(&self) -> bool {
         self.probability >= 0.5
     }
@@ -163,10 +163,10 @@ impl FoundDrift {
     /// Its size at a campaign time, s; unit of the cause.
     pub fn at(&self, t_s: f64) -> f64 {
         let (kind, size) = match self.size {
-            RateOrStep::RatePerH(rate) => (CourseKind::Ramp, rate),
-            RateOrStep::Step(step) => (CourseKind::Step, step),
+            RateOrStep::RatePerH(rate) => (TimeHistoryKind::Ramp, rate),
+            RateOrStep::Step(step) => (TimeHistoryKind::Step, step),
         };
-        size * Course { kind, onset_s: self.onset_s }.at(t_s)
+        size * TimeHistory { kind, onset_s: self.onset_s }.at(t_s)
     }
 }
 
@@ -179,7 +179,7 @@ pub struct DriftReport {
     pub drifts: Vec<FoundDrift>,
     /// No drift, and each cause as the only one, most probable first; sums to 1. Empty without a verdict.
     pub alone: Vec<Alternative>,
-    /// Sentences: the reason for a missing verdict, the causes found, the corrections made.
+    /// Sentences: why there is no verdict, or the causes and the corrections.
     pub reason: String,
     /// Smallest detectable drift, per cause.
     pub detection_limits: Vec<DetectionLimit>,
@@ -190,7 +190,7 @@ pub struct DriftReport {
 }
 
 impl DriftReport {
-    /// A recording without enough information, with the reason.
+    /// The report of a recording without enough information, with the reason.
     pub fn without_verdict(reason: String) -> Self {
         DriftReport { reason, ..DriftReport::default() }
     }

@@ -1,6 +1,6 @@
 //! Possible causes of drift.
 
-use crate::drift::causes::time_history::CourseKind;
+use crate::drift::causes::time_history::TimeHistoryKind;
 use mapper_core::{Channel, Dimension, with_unit};
 use mapper_physics::laws::bearing_friction::at_150_krpm;
 use mapper_physics::rig::sensor_fault::drifts;
@@ -9,29 +9,29 @@ use serde::{Serialize, Serializer};
 /// A possible cause of drift.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Cause {
-    /// One or several sensors have a growing common error: in K or Pa, for flow and speed as a ratio to the reading.
+    /// The error of one or several sensors changes: in K or Pa; for flow and speed as a ratio to the reading.
     Sensors(&'static [Channel]),
-    /// The compressor fouls: its efficiency changes by the rate, and its map's flow by 0.6 of that.
+    /// The compressor fouls: its efficiency changes by the size of the drift, the flow of its map by 0.6 of it.
     Fouling,
     /// The bearing takes power c omega^2 from the shaft.
     BearingFriction,
 }
 
-/// Sensor or machine.
+/// Whether a sensor or the machine drifts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CauseKind {
-    /// The measured quantity is unchanged, but its reading drifts.
+    /// Only the reading changes, not the measured quantity.
     Sensor,
-    /// The machine itself changes.
+    /// The machine changes.
     Machine,
 }
 
-/// Ratio of the change of map flow to that of efficiency in fouling.
+/// Change of the map's flow by fouling, over the change of its efficiency.
 pub(crate) const FOULING_FLOW_SHARE: f64 = 0.6;
 
 impl Cause {
-    /// All causes considered: the drifts of the catalogue of sensor faults, and those of the machine.
+    /// All causes that the diagnosis considers: the drifts in the library of sensor faults, and those of the machine.
     pub fn all() -> Vec<Cause> {
         let sensors = drifts().map(|fault| Cause::Sensors(fault.channels));
         sensors.chain([Cause::Fouling, Cause::BearingFriction]).collect()
@@ -48,7 +48,7 @@ impl Cause {
         }
     }
 
-    /// Sensor or machine.
+    /// Whether a sensor or the machine drifts.
     pub fn kind(self) -> CauseKind {
         match self {
             Cause::Sensors(_) => CauseKind::Sensor,
@@ -76,7 +76,7 @@ impl Cause {
         }
     }
 
-    /// A size for display, SI: a ratio without a unit, friction also as its power at 150 krpm.
+    /// A size as text, SI. Friction also as its power at 150 krpm, which is easier to judge.
     pub fn show(self, size: f64) -> String {
         match self {
             Cause::BearingFriction => format!("{size:.2e} {} ({})", self.unit(), at_150_krpm(size)),
@@ -84,28 +84,28 @@ impl Cause {
         }
     }
 
-    /// Prior size of its drift over a campaign, one standard deviation, unit of the cause.
-    fn sigma(self) -> f64 {
+    /// Prior standard deviation of its change over a campaign, in the unit of the cause.
+    fn sigma_of_change(self) -> f64 {
         match self {
             Cause::Sensors(channels) => {
                 drifts().find(|fault| fault.channels == channels).map_or(0.0, |fault| fault.sigma)
             }
             // Judgement: a compressor that has lost 2 % of its efficiency is cleaned.
             Cause::Fouling => 0.02,
-            // Judgement: it takes 185 W at 130 krpm.
+            // Judgement: 185 W at 130 krpm.
             Cause::BearingFriction => 1e-6,
         }
     }
 
-    /// The same for a time history of this kind over a campaign of this length, s: a rate per hour, or a step.
-    pub(crate) fn sigma_of(self, kind: CourseKind, campaign_s: f64) -> f64 {
+    /// Prior standard deviation of its rate per hour, or of its step, in a campaign of this length, s.
+    pub(crate) fn prior_sigma(self, kind: TimeHistoryKind, campaign_s: f64) -> f64 {
         match kind {
-            CourseKind::Ramp => self.sigma() * 3600.0 / campaign_s,
-            CourseKind::Step => self.sigma(),
+            TimeHistoryKind::Ramp => self.sigma_of_change() * 3600.0 / campaign_s,
+            TimeHistoryKind::Step => self.sigma_of_change(),
         }
     }
 
-    /// Whether it cannot be negative: a bearing takes power but never gives any.
+    /// Whether its size cannot be negative: a bearing takes power and never gives any.
     pub(crate) fn is_at_least_zero(self) -> bool {
         self == Cause::BearingFriction
     }

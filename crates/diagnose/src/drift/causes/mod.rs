@@ -1,5 +1,5 @@
-//! Possible causes and time histories of drift, and the model with a detected drift for the next fit.
+//! Possible causes of drift, their time histories, and their effects on the model.
 
 pub(crate) mod cause;
-pub(crate) mod planted;
+pub(crate) mod drift;
 pub(crate) mod time_history;

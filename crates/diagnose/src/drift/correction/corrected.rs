@@ -1,13 +1,13 @@
-//! The map points corrected for the drift.
+//! Map points corrected for the drift.
 
 use crate::drift::causes::cause::{Cause, CauseKind};
 use crate::drift::correction::subtract_drift::without_drifts;
 use crate::drift::likelihood::fit::Fit;
-use crate::drift::likelihood::refine::Refined;
+use crate::drift::likelihood::refinement::Refinement;
 use crate::drift::report::CorrectedPoint;
 use crate::drift::runs::request::DriftRequest;
 use crate::drift::runs::time_axis::CampaignStep;
-use crate::drift::sensitivity::readings::Constant;
+use crate::drift::sensitivity::readings::Response;
 use mapper_core::{Channel, IdentifiedPoint, Recording};
 use mapper_identify::identify_each;
 use mapper_observe::averages::mean_reading::mean_between;
@@ -31,17 +31,17 @@ pub(crate) fn point_of<'a>(
 pub(crate) fn corrected_points(
     request: &DriftRequest<'_>,
     recordings: &[&Recording],
-    refined: &Refined,
+    refined: &Refinement,
     points: &[Vec<IdentifiedPoint>],
 ) -> Vec<CorrectedPoint> {
-    let Refined { readings, constants, fits, .. } = refined;
+    let Refinement { readings, constants, fits, .. } = refined;
     let drifts = &fits.drifts;
-    let of_sensors = drifts.iter().any(|fit| fit.cause.kind() == CauseKind::Sensor);
-    let signatures: Vec<(&Fit, Constant)> =
-        drifts.iter().filter_map(|fit| Some((fit, readings.signature(fit.cause)?))).collect();
+    let has_sensor_drift = drifts.iter().any(|fit| fit.drift.cause.kind() == CauseKind::Sensor);
+    let signatures: Vec<(&Fit, Response)> =
+        drifts.iter().filter_map(|fit| Some((fit, readings.signature(fit.drift.cause)?))).collect();
     let corrected: Vec<Vec<IdentifiedPoint>> = (0..recordings.len())
         .map(|run| {
-            if !of_sensors {
+            if !has_sensor_drift {
                 return points[run].clone();
             }
             let offset_s =
@@ -54,22 +54,29 @@ pub(crate) fn corrected_points(
         .iter()
         .enumerate()
         .filter_map(|(position, step)| {
-            let at = |fit: &Fit| fit.drift_at(step.end_s + step.offset_s);
+            let at_end = |fit: &Fit| fit.drift.at(step.end_s + step.offset_s);
+            let positions = readings.point_positions(position);
+            let [eta, h_w_m2k] = positions.map(|position| {
+                let mut value = readings.model[position];
+                for (constant, size) in constants.iter().zip(fits.constants.iter()) {
+                    value += constant[position] * size;
+                }
+                for (fit, signature) in &signatures {
+                    value += signature[position] * at_end(fit);
+                }
+                value
+            });
             // A step that the model cannot follow gives no point.
-            let (mut eta, mut h_w_m2k) =
-                *readings.step_ends.get(position).filter(|(eta, _)| eta.is_finite())?;
-            for (constant, size) in constants.iter().zip(fits.constants.iter()) {
-                eta += constant.eta[position] * size;
-                h_w_m2k += constant.h_w_m2k[position] * size;
+            if !eta.is_finite() {
+                return None;
             }
-            for (fit, signature) in &signatures {
-                eta += signature.eta[position] * at(fit);
-                h_w_m2k += signature.h_w_m2k[position] * at(fit);
-            }
-            // Refers to the machine at the start of the campaign, at this operating point.
-            let fouling = drifts.iter().find(|fit| fit.cause == Cause::Fouling);
-            let fouled = 1.0 + fouling.map_or(0.0, at);
-            let weights = DVector::from_iterator(constants.len(), constants.iter().map(|c| c.eta[position]));
+            // The corrected efficiency is that of the machine at the start of the campaign.
+            let fouling = drifts.iter().find(|fit| fit.drift.cause == Cause::Fouling);
+            let fouled = 1.0 + fouling.map_or(0.0, at_end);
+            let weights = DVector::from_iterator(
+                constants.len(),
+                constants.iter().map(|constant| constant[positions[0]]),
+            );
             let identified = point_of(&corrected, step).and_then(|point| point.eta);
             let recorded = point_of(points, step);
             Some(CorrectedPoint {
@@ -85,7 +92,7 @@ pub(crate) fn corrected_points(
                 h_w_m2k,
                 eta_identified: identified.map(|eta| eta / fouled),
                 eta_uncorrected: recorded.and_then(|point| point.eta),
-                corrections: drifts.iter().map(at).collect(),
+                corrections: drifts.iter().map(at_end).collect(),
             })
         })
         .collect()

@@ -16,7 +16,7 @@ pub(crate) fn group(
     points: &[Vec<IdentifiedPoint>],
     visits: &[usize],
 ) -> RepeatGroup {
-    let in_words = |step: Option<&CampaignStep>| {
+    let describe = |step: Option<&CampaignStep>| {
         let speed = |step: &CampaignStep| end_speed_rpm(request, recordings[step.run], step);
         step.map_or_else(String::new, |step| {
             let speed =
@@ -28,8 +28,8 @@ pub(crate) fn group(
     let before =
         first.and_then(|position| position.checked_sub(1)).and_then(|position| readings.steps.get(position));
     let mut group = RepeatGroup {
-        from: in_words(before),
-        to: in_words(first.and_then(|position| readings.steps.get(position))),
+        from: describe(before),
+        to: describe(first.and_then(|position| readings.steps.get(position))),
         visits: Vec::new(),
     };
     for position in visits {
@@ -61,19 +61,19 @@ fn visit_channels(
     readings: &Readings,
     position: usize,
 ) -> BTreeMap<&'static str, VisitChannel> {
-    let own: Vec<_> = readings.all.iter().filter(|(block, ..)| block.step == position).collect();
+    let own: Vec<_> = readings.all.iter().filter(|means| means.segment.step == position).collect();
     let (Some(transient), Some(end)) = (own.first(), own.last()) else { return BTreeMap::new() };
     let recording = recordings[readings.steps[position].run];
     let declared = request.declared();
     let entry = |(column, channel): (usize, &Channel)| {
-        let value = end.1[column]?;
-        let ratio = mean_variance_ratio(declared.noise_colour, recording, *channel, &end.0);
+        let value = end.measured[column]?;
+        let ratio = mean_variance_ratio(declared.noise_colour, recording, *channel, &end.segment);
         let read = VisitChannel {
             end: value,
-            end_less_model: value - end.2[column],
-            transient_less_model: transient.1[column]
+            end_less_model: value - end.nominal[column],
+            transient_less_model: transient.measured[column]
                 .filter(|_| own.len() > 1)
-                .map(|value| value - transient.2[column]),
+                .map(|value| value - transient.nominal[column]),
             sigma: declared.noise_sigma(*channel) * ratio.sqrt(),
         };
         Some((channel.symbol(), read))

@@ -1,106 +1,102 @@
 //! All causes with all their time histories, as hypotheses of one likelihood.
 
 use crate::drift::causes::cause::Cause;
-use crate::drift::causes::time_history::{Course, CourseKind};
+use crate::drift::causes::time_history::{TimeHistory, TimeHistoryKind};
 use crate::drift::likelihood::low_rank::LowRank;
 use crate::drift::runs::request::Unsolvable;
-use crate::drift::sensitivity::readings::Readings;
+use crate::drift::sensitivity::readings::{Readings, Response};
 use mapper_inference::hypotheses::{Hypothesis, Likelihood, Priors};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
-/// Prior probability of drift: one campaign in two has one. Judgement: repeats are made if drift is expected.
+/// Prior probability of a drift in a campaign. Judgement: repeats are made if drift is expected.
 const EXPECTED_DRIFTS: f64 = 0.5;
-/// Prior weight of rare causes relative to the others: judgement. Sensors at the compressor, its machine and the flow meters drift. The other
-/// sensors are better maintained, and few sensors share a common part that drifts.
-const SELDOM: f64 = 0.25;
+/// Prior weight of a rare cause, relative to the others. Judgement: the compressor, its sensors and the flow meters drift; the other sensors are better
+/// maintained, and few sensors share a part that drifts.
+const RARE_CAUSE_WEIGHT: f64 = 0.25;
 
-/// Onsets for one of the grid, a grid step to either side of a detected cause: a step of P2 dated 40 s late leaves twenty standard errors in
-/// one segment, which other causes would absorb.
-const CLOSER: usize = 8;
+/// Number of fine onsets in a step of the grid, tried up to one grid step to either side of a detected cause: a step of P2 dated 40 s late leaves a
+/// residual of twenty standard errors in one segment, which other causes would absorb.
+const FINE_PER_GRID: usize = 8;
 
-/// Number of onsets tried over a campaign: the fit refines the onset of a detected cause.
+/// Number of onsets in the grid over a campaign. The fit refines the onset of a detected cause.
 pub(crate) const ONSETS: usize = 36;
-/// Number of onsets on the fine grid of a detected cause: closer than the compared segments.
-pub(crate) const FINE_ONSETS: usize = ONSETS * CLOSER;
+/// Number of onsets of the fit over a campaign: closer than the compared segments.
+pub(crate) const FINE_ONSETS: usize = ONSETS * FINE_PER_GRID;
 
 /// A cause, by its position among the observable ones, with a time history.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Candidate {
     pub cause: usize,
-    pub course: Course,
+    pub history: TimeHistory,
 }
 
 /// The observable causes, and all their time histories.
 pub(crate) struct Candidates {
     pub causes: Vec<Cause>,
     pub all: Vec<Candidate>,
-    /// Effect of each on the readings at size 1 (rate per hour, or step), a column each.
-    pub shown: DMatrix<f64>,
-    /// Their priors.
+    /// Change of the readings by each at size 1 (rate per hour, or step), a column each.
+    pub columns: DMatrix<f64>,
     pub priors: Priors,
 }
 
 impl Candidates {
-    /// All causes with `onsets` onsets over the campaign, and closer ones about those that are `known`.
-    pub fn new(
-        readings: &Readings,
-        onsets: usize,
-        known: &[(Cause, Course)],
-    ) -> Result<Candidates, Unsolvable> {
-        let shows = |cause: Cause| Some((cause, readings.signature(cause)?.readings));
-        let shown: Vec<(Cause, Vec<f64>)> = Cause::all().into_iter().filter_map(shows).collect();
+    /// All causes with the onsets of the grid, and finer onsets about those that are `known`.
+    pub fn new(readings: &Readings, known: &[(Cause, TimeHistory)]) -> Result<Candidates, Unsolvable> {
+        let observable: Vec<(Cause, Response)> =
+            Cause::all().into_iter().filter_map(|cause| Some((cause, readings.signature(cause)?))).collect();
         let (start_s, end_s) = readings.span_s();
-        let courses = courses(start_s, end_s, onsets);
-        let mut all: Vec<Candidate> = (0..shown.len())
-            .flat_map(|cause| courses.iter().map(move |course| Candidate { cause, course: *course }))
+        let histories = time_histories(start_s, end_s, ONSETS);
+        let mut all: Vec<Candidate> = (0..observable.len())
+            .flat_map(|cause| histories.iter().map(move |history| Candidate { cause, history: *history }))
             .collect();
         let on_grid = all.len();
-        let spacing_s = (end_s - start_s) / onsets as f64;
-        for (known, course) in known {
-            let Some(cause) = shown.iter().position(|(cause, _)| cause == known) else { continue };
-            let closer = (0..2 * CLOSER).map(|part| ((part as f64 + 0.5) / CLOSER as f64 - 1.0) * spacing_s);
-            let onsets_s = closer.map(|by_s| course.onset_s + by_s).chain([course.onset_s]);
+        let spacing_s = (end_s - start_s) / ONSETS as f64;
+        for (known, history) in known {
+            let Some(cause) = observable.iter().position(|(cause, _)| cause == known) else { continue };
+            let fine = FINE_PER_GRID as f64;
+            let shifts_s = (0..2 * FINE_PER_GRID).map(|part| ((part as f64 + 0.5) / fine - 1.0) * spacing_s);
+            let onsets_s = shifts_s.map(|by_s| history.onset_s + by_s).chain([history.onset_s]);
             let within = onsets_s.filter(|onset_s| (start_s..end_s).contains(onset_s));
-            all.extend(within.map(|onset_s| Candidate { cause, course: Course { onset_s, ..*course } }));
+            all.extend(
+                within.map(|onset_s| Candidate { cause, history: TimeHistory { onset_s, ..*history } }),
+            );
         }
         if all.is_empty() {
             return Err(Unsolvable::NothingShows);
         }
-        let weight = |cause: &Cause| if is_seldom(*cause) { SELDOM } else { 1.0 };
-        let weights: f64 = shown.iter().map(|(cause, _)| weight(cause)).sum();
-        let hypothesis = |(place, Candidate { cause: family, course }): (usize, &Candidate)| {
-            let cause = shown[*family].0;
-            let sigma = cause.sigma_of(course.kind, end_s - start_s);
-            // Onsets next to one of the grid share its prior.
-            let share = if place < on_grid { 1.0 } else { 0.5 / CLOSER as f64 };
-            let prior = share * EXPECTED_DRIFTS * weight(&cause) / weights / courses.len() as f64;
+        let weight = |cause: &Cause| if is_rare(*cause) { RARE_CAUSE_WEIGHT } else { 1.0 };
+        let weights: f64 = observable.iter().map(|(cause, _)| weight(cause)).sum();
+        let hypothesis = |(position, candidate): (usize, &Candidate)| {
+            let cause = observable[candidate.cause].0;
+            // Fine onsets share the prior of their onset of the grid.
+            let share = if position < on_grid { 1.0 } else { 0.5 / FINE_PER_GRID as f64 };
+            let prior = share * EXPECTED_DRIFTS * weight(&cause) / weights / histories.len() as f64;
             Hypothesis {
-                family: *family,
-                sigma,
+                family: candidate.cause,
+                sigma: cause.prior_sigma(candidate.history.kind, end_s - start_s),
                 ln_prior: prior.ln(),
                 at_least_zero: cause.is_at_least_zero(),
             }
         };
         let hypotheses = all.iter().enumerate().map(hypothesis).collect();
-        let value = |row: usize, column: usize| {
-            let Candidate { cause, course } = all[column];
-            shown[cause].1[row] * mean_of(readings, row, course)
-        };
+        let column =
+            |Candidate { cause, history }: &Candidate| readings.column(&observable[*cause].1, *history);
+        let columns: Vec<DVector<f64>> = all.iter().map(column).collect();
         Ok(Candidates {
-            shown: DMatrix::from_fn(readings.difference.len(), all.len(), value),
-            causes: shown.iter().map(|(cause, _)| *cause).collect(),
+            columns: DMatrix::from_columns(&columns),
+            causes: observable.iter().map(|(cause, _)| *cause).collect(),
             priors: Priors { always: Vec::new(), hypotheses },
             all,
         })
     }
 
-    /// Evidence of the readings for them, in addition to noise and constants.
+    /// Likelihood of the readings for all candidates, under this noise with its constants.
     pub fn likelihood(&self, noise: &LowRank, difference: &DMatrix<f64>) -> Likelihood {
-        let shown = noise.whiten(self.shown.clone());
-        let inverse = noise.inverse_times(&shown);
+        let columns = noise.whiten(self.columns.clone());
+        let inverse = noise.inverse_times(&columns);
         let pull = inverse.tr_mul(&noise.whiten(difference.clone()));
-        // Not `tr_mul`, which computes dot products one by one: five times as slow for a thousand columns.
-        Likelihood::of(shown.transpose() * &inverse, pull.column(0).into_owned())
+        // `tr_mul` computes dot products one by one: five times as slow for a thousand columns.
+        Likelihood::of(columns.transpose() * &inverse, pull.column(0).into_owned())
     }
 
     pub fn cause(&self, index: usize) -> Cause {
@@ -108,7 +104,7 @@ impl Candidates {
     }
 }
 
-fn is_seldom(cause: Cause) -> bool {
+fn is_rare(cause: Cause) -> bool {
     use mapper_core::Channel::{CompressorFlow, P2, T1, T2, Tc, TurbineFlow};
     match cause {
         Cause::Sensors([channel]) => ![T1, T2, Tc, P2, CompressorFlow, TurbineFlow].contains(channel),
@@ -117,25 +113,19 @@ fn is_seldom(cause: Cause) -> bool {
     }
 }
 
-/// Ramps from the start on, steps from after it; both until the remaining time is too short to detect them.
-pub(crate) fn courses(start_s: f64, end_s: f64, count: usize) -> Vec<Course> {
+/// Ramps and steps with `count` onsets, as long as the remaining time suffices to detect them.
+pub(crate) fn time_histories(start_s: f64, end_s: f64, count: usize) -> Vec<TimeHistory> {
     let length_s = end_s - start_s;
-    let mut courses = Vec::new();
+    let mut histories = Vec::new();
     for index in 0..count {
         let share = index as f64 / count as f64;
         if share <= 0.88 {
-            courses.push(Course { kind: CourseKind::Ramp, onset_s: start_s + share * length_s });
+            histories.push(TimeHistory { kind: TimeHistoryKind::Ramp, onset_s: start_s + share * length_s });
         }
         // A step at the very start is a constant.
         if (0.04..=0.97).contains(&share) {
-            courses.push(Course { kind: CourseKind::Step, onset_s: start_s + share * length_s });
+            histories.push(TimeHistory { kind: TimeHistoryKind::Step, onset_s: start_s + share * length_s });
         }
     }
-    courses
-}
-
-pub(crate) fn mean_of(readings: &Readings, row: usize, course: Course) -> f64 {
-    let block = &readings.blocks[row / readings.columns.len()];
-    let offset_s = readings.steps[block.step].offset_s;
-    course.mean(block.start_s + offset_s, block.end_s + offset_s)
+    histories
 }

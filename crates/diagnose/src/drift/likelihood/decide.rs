@@ -1,8 +1,8 @@
 //! Selects the most probable set of causes and time histories, in addition to constants.
 
 use crate::drift::causes::cause::Cause;
-use crate::drift::causes::time_history::{Course, CourseKind};
-use crate::drift::likelihood::candidates::{Candidates, ONSETS};
+use crate::drift::causes::time_history::{TimeHistory, TimeHistoryKind};
+use crate::drift::likelihood::candidates::Candidates;
 use crate::drift::likelihood::low_rank::LowRank;
 use crate::drift::likelihood::residuals::{inflate, leave_out};
 use crate::drift::report::{Alternative, DetectionLimit};
@@ -11,28 +11,20 @@ use crate::drift::sensitivity::readings::Readings;
 use mapper_inference::hypotheses::Member;
 use nalgebra::DMatrix;
 
-/// A detected cause, before its time history is fitted closely.
+/// A detected cause, before the fit of its size and onset.
 #[derive(Debug, Clone)]
-pub(crate) struct FoundDrifts {
+pub(crate) struct DetectedCause {
     pub cause: Cause,
-    pub course: Course,
+    pub history: TimeHistory,
     /// Its probability relative to alternatives and to none in its place.
     pub probability: f64,
     /// The alternatives, most probable first.
     pub alternatives: Vec<Alternative>,
 }
 
-impl Decision {
-    /// The detected causes, with their time histories.
-    pub fn courses(&self) -> Vec<(Cause, Course)> {
-        self.found.iter().map(|found| (found.cause, found.course)).collect()
-    }
-}
-
-/// Result of the decision.
 pub(crate) struct Decision {
     /// Empty if nothing drifts.
-    pub found: Vec<FoundDrifts>,
+    pub detected: Vec<DetectedCause>,
     /// No drift and each single cause, most probable first.
     pub alone: Vec<Alternative>,
     pub limits: Vec<DetectionLimit>,
@@ -42,29 +34,29 @@ pub(crate) struct Decision {
     pub own: Vec<DMatrix<f64>>,
 }
 
-/// `own` is the declared covariance of each segment; onsets near those already `known` are tried more closely.
+/// `own` is the declared covariance of each segment, `constants` the responses to the constants, a column each. Onsets near `known` drifts are
+/// tried on a finer grid.
 pub(crate) fn decide(
     readings: &Readings,
     mut own: Vec<DMatrix<f64>>,
-    columns: &DMatrix<f64>,
-    known: &[(Cause, Course)],
+    constants: &DMatrix<f64>,
+    known: &[(Cause, TimeHistory)],
 ) -> Result<Decision, DriftError> {
-    let candidates = Candidates::new(readings, ONSETS, known)?;
-    let difference = DMatrix::from_column_slice(readings.difference.len(), 1, &readings.difference);
-    let (left_out, noise, left) = leave_out(&mut own, readings, columns, &difference, &candidates)?;
+    let candidates = Candidates::new(readings, known)?;
+    let (left_out, noise, residual) = leave_out(&mut own, readings, constants, &candidates)?;
     // The residual of the best explanation shows how much noise exceeds its declaration.
-    inflate(&mut own, readings, &noise, &left);
-    let noise = LowRank::new(&own, columns)?;
+    inflate(&mut own, readings, &noise, &residual);
+    let noise = LowRank::new(&own, constants)?;
 
-    let likelihood = candidates.likelihood(&noise, &difference);
+    let likelihood = candidates.likelihood(&noise, &readings.difference);
     let explanation = likelihood.explain(&candidates.priors).ok_or(Unsolvable::NotFinite)?;
     let alone =
         explanation.alone.iter().map(|(family, ln_odds)| (Some(candidates.causes[*family]), *ln_odds));
-    let found = explanation.members.iter().map(|member| found(&candidates, member)).collect();
+    let detected = explanation.members.iter().map(|member| detected(&candidates, member)).collect();
     let (start_s, end_s) = readings.span_s();
-    let whole = |index: &usize| {
-        let Course { kind, onset_s } = candidates.all[*index].course;
-        kind == CourseKind::Ramp && onset_s <= start_s
+    let is_steady = |index: &usize| {
+        let TimeHistory { kind, onset_s } = candidates.all[*index].history;
+        kind == TimeHistoryKind::Ramp && onset_s <= start_s
     };
     let limit = |index: usize| {
         let rate_per_h = likelihood.smallest_seen(&candidates.priors, index)?;
@@ -73,15 +65,15 @@ pub(crate) fn decide(
         change.is_finite().then(|| DetectionLimit { cause, change, unit: cause.unit() })
     };
     Ok(Decision {
-        found,
+        detected,
         alone: probabilities(alone.chain([(None, 0.0)]).collect()),
-        limits: (0..candidates.all.len()).filter(whole).filter_map(limit).collect(),
-        left_out: (left_out, readings.blocks.len()),
+        limits: (0..candidates.all.len()).filter(is_steady).filter_map(limit).collect(),
+        left_out: (left_out, readings.segments.len()),
         own,
     })
 }
 
-fn found(candidates: &Candidates, member: &Member) -> FoundDrifts {
+fn detected(candidates: &Candidates, member: &Member) -> DetectedCause {
     let cause = candidates.cause(member.index);
     let others = member
         .alternatives
@@ -89,15 +81,15 @@ fn found(candidates: &Candidates, member: &Member) -> FoundDrifts {
         .map(|(family, relative)| (Some(candidates.causes[*family]), relative.ln()));
     let all = probabilities(others.chain([(Some(cause), 0.0), (None, -member.ln_odds)]).collect());
     let (own, alternatives): (Vec<_>, Vec<_>) = all.into_iter().partition(|one| one.cause == Some(cause));
-    FoundDrifts {
+    DetectedCause {
         cause,
-        course: candidates.all[member.index].course,
+        history: candidates.all[member.index].history,
         probability: own.first().map_or(0.0, |own| own.probability),
         alternatives,
     }
 }
 
-/// Probabilities from ln of the odds, most probable first; they sum to 1.
+/// Probabilities from ln of the odds, most probable first.
 fn probabilities(ln_odds: Vec<(Option<Cause>, f64)>) -> Vec<Alternative> {
     let largest = ln_odds.iter().map(|(_, ln_odds)| *ln_odds).fold(f64::NEG_INFINITY, f64::max);
     let sum: f64 = ln_odds.iter().map(|(_, ln_odds)| (ln_odds - largest).exp()).sum();

@@ -3,12 +3,12 @@
 use crate::drift::runs::request::Unsolvable;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// Whitened by D's Cholesky factors; U is stored whitened too.
+/// Noise with covariance D + U U'.
 #[derive(Debug, Clone)]
 pub(crate) struct LowRank {
     /// Lower Cholesky factor of each segment's own covariance.
     factors: Vec<DMatrix<f64>>,
-    /// Constants, whitened; a column each, scaled by its standard deviation.
+    /// U, whitened by D: one column for each constant, scaled by its standard deviation.
     columns: DMatrix<f64>,
     /// I + U'U.
     inner: Cholesky<f64, Dyn>,

@@ -4,5 +4,5 @@ pub(crate) mod candidates;
 pub(crate) mod decide;
 pub(crate) mod fit;
 pub(crate) mod low_rank;
-pub(crate) mod refine;
+pub(crate) mod refinement;
 pub(crate) mod residuals;

@@ -1,4 +1,4 @@
-//! Finds repeated jumps, and checks whether they suffice for a judgement.
+//! Finds repeated jumps, and checks whether they suffice for a verdict.
 
 use crate::drift::runs::request::RecordedRun;
 use crate::drift::runs::time_axis::CampaignStep;
@@ -6,16 +6,16 @@ use mapper_core::{Channel, Recording, step_number};
 use mapper_identify::LONGEST_BRIDGE_S;
 use std::collections::BTreeMap;
 
-/// Minimum number of visits of one jump: two show a difference, only a third shows whether it persists or grows.
+/// Minimum number of visits by one jump: two show a difference, a third shows whether it persists or grows.
 const VISITS_NEEDED: usize = 3;
-/// Longest total time of all steps that the model is driven through, s.
+/// Longest total time of all steps, s: beyond it a time in the log is wrong.
 const LONGEST_S: f64 = 30.0 * 86_400.0;
 
 /// All visits of each repeated jump, by position among the steps; most visits first.
 pub(crate) fn groups(steps: &[CampaignStep]) -> Vec<Vec<usize>> {
     let mut by_jump: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
     for (position, step) in steps.iter().enumerate() {
-        // A change within the tolerance of one operating point is not a jump.
+        // A change within one operating point is not a jump.
         if let Some(from) = step.from.filter(|from| *from != step.condition) {
             by_jump.entry((from, step.condition)).or_default().push(position);
         }
@@ -25,7 +25,7 @@ pub(crate) fn groups(steps: &[CampaignStep]) -> Vec<Vec<usize>> {
     groups
 }
 
-/// Reason why no judgement is possible; `None` if it is.
+/// Why no verdict is possible; `None` if one is.
 pub(crate) fn refusal(
     runs: &[RecordedRun<'_>],
     steps: &[CampaignStep],
@@ -35,15 +35,15 @@ pub(crate) fn refusal(
         && let Some(other) = runs.iter().position(|run| run.fingerprint != first.fingerprint)
     {
         return Some(format!(
-            "No verdict: recording {} was made with another campaign or machine than recording 1 (their fingerprints \
-             differ), so differences between them need not be drift. Compare runs of one campaign on one machine.",
+            "No verdict: the campaign or machine of recording {} differs from that of recording 1 (other fingerprint), so \
+             their differences need not be drift. Compare runs of one campaign on one machine.",
             other + 1
         ));
     }
     if let Some(step) = steps.iter().find(|step| !step.valve_opening_ratio.is_finite()) {
         return Some(format!(
-            "No verdict: recording {} does not say how far the valve was open, and the model is driven with that. Map it as \
-             `valve_command`, as commanded or as measured, or give it among `constants`.",
+            "No verdict: recording {} has no valve opening, which drives the model. Map the commanded or measured opening as \
+             `valve_command`, or give it among `constants`.",
             step.run + 1
         ));
     }
@@ -52,8 +52,8 @@ pub(crate) fn refusal(
     let longest = steps.iter().max_by(|a, b| length_s(a).total_cmp(&length_s(b)));
     if let Some(step) = longest.filter(|_| whole_s > LONGEST_S) {
         return Some(format!(
-            "No verdict: step {} of recording {} lasts {:.1} h of {:.1} h in total; the steps of a campaign last up to {:.0} h. A \
-             wrong time in the log would do that.",
+            "No verdict: step {} of recording {} lasts {:.1} h of {:.1} h in total; a campaign lasts at most {:.0} h. Look for a \
+             wrong time in the log.",
             step_number(step.index),
             step.run + 1,
             length_s(step) / 3600.0,
@@ -64,21 +64,21 @@ pub(crate) fn refusal(
     for (index, run) in runs.iter().enumerate() {
         if let Some((channel, from_s, to_s)) = gap(run.recording) {
             return Some(format!(
-                "No verdict: recording {} has a gap, {} is silent from {from_s:.1} s to {to_s:.1} s. What happened to the \
-                 machine meanwhile is not known; give the parts before and after it as recordings of their own.",
+                "No verdict: recording {} has a gap: {} has no samples from {from_s:.1} s to {to_s:.1} s, so the state of the \
+                 machine there is unknown. Give the parts before and after the gap as separate recordings.",
                 index + 1,
                 channel.symbol()
             ));
         }
     }
-    let most = groups.first().map_or(0, Vec::len);
-    if most >= VISITS_NEEDED {
+    let max_visits = groups.first().map_or(0, Vec::len);
+    if max_visits >= VISITS_NEEDED {
         return None;
     }
-    if most == 2 {
+    if max_visits == 2 {
         return Some(
-            "No verdict: only one repeat. A jump that is made twice shows a difference, but not whether it is chance, a \
-             step or a steady change; repeat the reference jump at least twice more."
+            "No verdict: only one repeat. Two visits show a difference, but not whether it is chance, a step or a steady \
+             change; repeat the reference jump at least once more."
                 .to_owned(),
         );
     }
@@ -87,15 +87,15 @@ pub(crate) fn refusal(
         *visits.entry(step.condition).or_default() += 1;
     }
     Some(if visits.values().any(|count| *count > 1) {
-        "No verdict: points are visited again, but by different jumps. Each transient carries what came before it, so that \
-         only visits by the same jump can be compared; repeat the jump, not only the point."
+        "No verdict: points are repeated, but by different jumps. A transient depends on the point before it, so only visits \
+         by the same jump can be compared; repeat the jump, not only the point."
             .to_owned()
     } else {
         "No verdict: no repeats. No jump of this campaign is made twice; plan some (`repeats` in the campaign).".to_owned()
     })
 }
 
-/// A channel with a gap within the steps, with start and end of the gap.
+/// A channel with a gap within the steps; start and end of the gap, s.
 fn gap(recording: &Recording) -> Option<(Channel, f64, f64)> {
     let (start_s, end_s) = (recording.steps.first()?.start_s, recording.steps.last()?.end_s);
     let measured = |channel: &Channel| {
@@ -114,12 +114,11 @@ fn gap(recording: &Recording) -> Option<(Channel, f64, f64)> {
             return Some((*channel, start_s, end_s));
         };
         let inner = times.windows(2).map(|pair| (pair[0], pair[1]));
-        let mut all = inner.chain([(start_s, *first), (*last, end_s)]);
-        // A slow logger is not a gap: compare with the channel's own sample interval.
-        let usual_s = (last - first) / times.len().max(2) as f64;
-        if let Some((from_s, to_s)) =
-            all.find(|(from_s, to_s)| to_s - from_s > LONGEST_BRIDGE_S.max(20.0 * usual_s))
-        {
+        let mut intervals = inner.chain([(start_s, *first), (*last, end_s)]);
+        // A long sample interval is not a gap.
+        let interval_s = (last - first) / times.len().max(2) as f64;
+        let longest_s = LONGEST_BRIDGE_S.max(20.0 * interval_s);
+        if let Some((from_s, to_s)) = intervals.find(|(from_s, to_s)| to_s - from_s > longest_s) {
             return Some((*channel, from_s, to_s));
         }
     }

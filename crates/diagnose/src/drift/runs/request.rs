@@ -27,7 +27,7 @@ pub struct DriftRequest<'a> {
     pub model: &'a Model,
     /// Boundary conditions for channels that are not recorded.
     pub boundary: BoundaryConditions,
-    /// Tolerances of the nominal machine, within which it has not drifted.
+    /// Tolerances of the nominal machine: a constant deviation within them is not drift.
     pub tolerances: ModelTolerances,
     /// Declared uncertainty, window, geometry.
     pub identification: &'a IdentifyConfig,
@@ -46,29 +46,29 @@ impl DriftRequest<'_> {
     }
 }
 
-/// Why a recording cannot be examined at all.
+/// Why recordings cannot be diagnosed at all.
 #[derive(Debug, thiserror::Error)]
 pub enum DriftError {
     /// No recording was given.
     #[error("no recording was given")]
     NoRun,
-    /// Nothing was commanded.
-    #[error("recording {}: it has no steps; commands that change make steps", .run + 1)]
+    /// No command changes.
+    #[error("recording {} has no steps: P3_command and valve_command are constant or missing; map them", .run + 1)]
     NoSteps {
         /// Which recording, from 0.
         run: usize,
     },
-    /// Missing channels that are needed to judge drift.
-    #[error("recording {}: it has no {}; drift is judged by all of N, P2, T1 and T2", .run + 1, symbols(.channels))]
+    /// Channels that the diagnosis needs are missing.
+    #[error("recording {} has no {}; the drift diagnosis needs N, P2, T1 and T2", .run + 1, symbols(.channels))]
     MissingChannels {
         /// Which recording, from 0.
         run: usize,
         /// The missing channels.
         channels: Vec<Channel>,
     },
-    /// A channel with many invalid readings.
+    /// A channel has many invalid readings.
     #[error(
-        "recording {}: {missing} of {all} readings of {channel} are not numbers; repair the channel, or record again",
+        "recording {}: {missing} of {all} readings of {channel} are not numbers; repair the channel, or repeat the recording",
         .run + 1
     )]
     NotNumbers {
@@ -90,7 +90,7 @@ pub enum DriftError {
         source: Implausible,
     },
     /// The boundary conditions cannot drive the model.
-    #[error("recording {}: its inputs cannot be used: {source}", .run + 1)]
+    #[error("recording {}: its inputs cannot drive the model: {source}", .run + 1)]
     Inputs {
         /// Which recording, from 0.
         run: usize,
@@ -99,12 +99,12 @@ pub enum DriftError {
     },
     /// No segments remain for the comparison.
     #[error(
-        "no stretch of the recordings can be compared with the model: readings are missing or not numbers, or all of them lie at the surge line. Look at the channels and their units, and whether the campaign names the machine"
+        "no segment of the recordings can be compared with the model: readings are missing or not numbers, or all points lie at the surge line. Check the channels, their units, and the machine of the campaign"
     )]
     NothingComparable,
     /// The model cannot be driven by the recording.
     #[error(
-        "the nominal model cannot follow recording {}: {source}. Does the campaign name the machine that was recorded?",
+        "the nominal model cannot follow recording {}: {source}. Check that it is a recording of the campaign's machine",
         .run + 1
     )]
     Drive {
@@ -122,19 +122,19 @@ pub enum DriftError {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum Unsolvable {
     /// A covariance is not positive definite.
-    #[error("the noise of a channel is declared as 0 or is not a number; declare the noise it has")]
+    #[error("the declared noise of a channel is 0 or not a number; declare its noise")]
     NoNoise,
     /// Readings or predictions are not finite.
-    #[error("a reading or the model's answer to a parameter is not finite")]
+    #[error("a reading, or the model's response to a parameter, is not finite")]
     NotFinite,
     /// Constants cannot be distinguished.
     #[error("constants of the campaign are not independent")]
     Dependent,
-    /// No cause has an effect on what is recorded.
-    #[error("no cause shows in the channels recorded")]
+    /// No cause has an effect on a recorded channel.
+    #[error("no cause of drift changes a recorded channel")]
     NothingShows,
-    /// This cause has no effect on what is recorded.
-    #[error("{cause} does not show in the channels recorded")]
+    /// This cause has no effect on a recorded channel.
+    #[error("{cause} does not change any recorded channel")]
     Hidden {
         /// The cause.
         cause: Cause,

@@ -1,12 +1,12 @@
-//! Steps of all runs on one time axis, and the segments of them over which readings are averaged.
+//! Steps of all runs on one time axis, and their segments, over which readings are averaged.
 
 use mapper_core::{Channel, NoiseColour, Recording, StepPoint};
 use mapper_numerics::coloured_noise::ColouredNoise;
 use mapper_observe::averages::mean_reading::{BEFORE_S, mean_between};
 use mapper_observe::averages::schedule::Schedule;
 
-/// From 5 s after a jump on, with increasing length.
-const STRETCHES: Schedule = Schedule {
+/// Lengths of the segments of a step: from 5 s after a jump on, increasing.
+const SEGMENTS: Schedule = Schedule {
     first_s: 5.0,
     lengths_s: &[(15.0, 10.0), (35.0, 20.0), (95.0, 30.0), (f64::INFINITY, 60.0)],
     shortest_s: 5.0,
@@ -17,16 +17,16 @@ const STRETCHES: Schedule = Schedule {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CampaignStep {
     pub run: usize,
-    /// Number within its run, as its marker has it.
+    /// Number within its run, from its marker.
     pub index: usize,
     /// Run time, s.
     pub start_s: f64,
     pub end_s: f64,
     /// Offset from run time to campaign time, s.
     pub offset_s: f64,
-    /// Number of its operating point among all.
+    /// Number of its operating point.
     pub condition: usize,
-    /// Operating point before it; `None` for the first step of a run.
+    /// Number of the operating point before it; `None` for the first step of a run.
     pub from: Option<usize>,
     pub valve_opening_ratio: f64,
     pub p3_pa: f64,
@@ -34,7 +34,7 @@ pub(crate) struct CampaignStep {
 
 /// A segment of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Block {
+pub(crate) struct Segment {
     /// Position of its step among all steps.
     pub step: usize,
     /// Run time, s.
@@ -42,7 +42,7 @@ pub(crate) struct Block {
     pub end_s: f64,
 }
 
-impl Block {
+impl Segment {
     pub fn length_s(&self) -> f64 {
         self.end_s - self.start_s
     }
@@ -82,17 +82,17 @@ pub(crate) fn steps(runs: &[&Recording]) -> Vec<CampaignStep> {
 }
 
 /// The segments of all steps.
-pub(crate) fn blocks(steps: &[CampaignStep]) -> Vec<Block> {
+pub(crate) fn segments(steps: &[CampaignStep]) -> Vec<Segment> {
     let of_step = |(position, step): (usize, &CampaignStep)| {
-        let segments = STRETCHES.segments(step.start_s, step.end_s, 0.0);
-        segments.into_iter().map(move |(start_s, end_s)| Block { step: position, start_s, end_s })
+        let segments = SEGMENTS.segments(step.start_s, step.end_s, 0.0);
+        segments.into_iter().map(move |(start_s, end_s)| Segment { step: position, start_s, end_s })
     };
     steps.iter().enumerate().flat_map(of_step).collect()
 }
 
 /// Mean of a channel over a segment; `None` if it has fewer than three samples.
-pub(crate) fn mean(recording: &Recording, channel: Channel, block: &Block) -> Option<f64> {
-    mean_between(recording, channel, block.start_s, block.end_s, 3)
+pub(crate) fn mean(recording: &Recording, channel: Channel, segment: &Segment) -> Option<f64> {
+    mean_between(recording, channel, segment.start_s, segment.end_s, 3)
 }
 
 /// Ratio of the variance of a channel's mean over a segment to that of one reading.
@@ -100,12 +100,12 @@ pub(crate) fn mean_variance_ratio(
     colour: NoiseColour,
     recording: &Recording,
     channel: Channel,
-    block: &Block,
+    segment: &Segment,
 ) -> f64 {
     let samples = recording
         .series
         .get(&channel)
-        .map_or(1, |series| series.range(block.start_s, block.end_s - BEFORE_S).len());
+        .map_or(1, |series| series.range(segment.start_s, segment.end_s - BEFORE_S).len());
     ColouredNoise::new(colour.first_order_share_ratio, colour.time_constant_s)
-        .variance_of_mean(samples, block.length_s())
+        .variance_of_mean(samples, segment.length_s())
 }

@@ -1,4 +1,4 @@
-//! Checks whether a recording can be examined, before the model is driven by it.
+//! Checks a recording before it drives the model.
 
 use crate::drift::runs::request::DriftError;
 use mapper_core::{Channel, Recording};
@@ -6,18 +6,15 @@ use mapper_numerics::statistics::median;
 use mapper_observe::channels::{DRIVERS, OUTPUTS};
 use mapper_observe::plausible::check_running;
 
-/// Channels needed to judge drift.
+/// Channels that the diagnosis needs.
 const NEEDED: [Channel; 4] = [Channel::ShaftSpeed, Channel::P2, Channel::T2, Channel::T1];
 
-/// Checks the model inputs and the compared channels, within the steps. `lost_ratio`: maximum share of readings that are not numbers.
-///
-/// # Errors
-/// [`DriftError`] with the missing or wrong input.
+/// Checks the inputs and the compared channels within the steps. `lost_ratio`: maximum share of readings that are not numbers.
 pub(crate) fn usable(run: usize, recording: &Recording, lost_ratio: f64) -> Result<(), DriftError> {
-    let missing: Vec<Channel> =
+    let channels: Vec<Channel> =
         NEEDED.into_iter().filter(|channel| recording.require(*channel).is_err()).collect();
-    if !missing.is_empty() {
-        return Err(DriftError::MissingChannels { run, channels: missing });
+    if !channels.is_empty() {
+        return Err(DriftError::MissingChannels { run, channels });
     }
     let (Some(first), Some(last)) = (recording.steps.first(), recording.steps.last()) else {
         return Err(DriftError::NoSteps { run });

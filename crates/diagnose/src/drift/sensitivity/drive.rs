@@ -1,10 +1,12 @@
-//! Runs the nominal model through whole runs, and computes the sensitivity of its readings to each perturbation.
+//! Drives the nominal model through whole runs, with and without each perturbation.
 
-use crate::drift::causes::planted::Planted;
+use crate::drift::causes::drift::Drift;
 use crate::drift::runs::request::DriftError;
-use crate::drift::runs::time_axis::{Block, CampaignStep};
-use crate::drift::sensitivity::knobs::{KNOBS, difference_step};
-use crate::drift::sensitivity::segment::{Followed, LEFT_OUT_S, Place, Stretch, carried, read_state};
+use crate::drift::runs::time_axis::{CampaignStep, Segment};
+use crate::drift::sensitivity::driven_step::{
+    Coverage, DrivenStep, SKIPPED_S, Target, measured_state, state_after,
+};
+use crate::drift::sensitivity::perturbations::{PERTURBATIONS, difference_step};
 use mapper_core::{Channel, Recording};
 use mapper_numerics::parallel;
 use mapper_observe::averages::mean_reading::{BEFORE_S, mean_between};
@@ -23,10 +25,10 @@ const SAMPLE_S: f64 = 2.5;
 /// Time before the start over which readings give the initial state, s.
 const BEFORE_START_S: f64 = 2.0;
 
-/// Model predictions for one run.
+/// Model predictions for one run, or for all.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Prediction {
-    /// Means over the segments, [`OUTPUTS`] in each.
+    /// Means of [`OUTPUTS`] over the segments.
     pub means: Vec<[f64; OUTPUTS.len()]>,
     /// Highest position on the speed line within each segment; 1 is the surge line.
     pub surge_position_ratio: Vec<f64>,
@@ -43,24 +45,24 @@ impl Prediction {
     }
 }
 
-/// One run, ready to be driven.
+/// The model of one run with its inputs.
 pub(crate) struct Drive<'a> {
     model: &'a Model,
     inputs: AveragedInputs,
     start: State,
-    stretches: Vec<Stretch>,
-    blocks: usize,
+    steps: Vec<DrivenStep>,
+    segment_count: usize,
 }
 
 impl<'a> Drive<'a> {
-    /// Prepares run `run`; `steps` and `blocks` are all of the campaign.
+    /// Prepares run `run`; `steps` and `segments` are those of the whole campaign.
     pub fn new(
         run: usize,
         recording: &Recording,
         model: &'a Model,
         nominal: &BoundaryConditions,
         steps: &[CampaignStep],
-        blocks: &[Block],
+        segments: &[Segment],
     ) -> Result<Self, DriftError> {
         let of_run: Vec<(usize, &CampaignStep)> =
             steps.iter().enumerate().filter(|(_, step)| step.run == run).collect();
@@ -72,95 +74,95 @@ impl<'a> Drive<'a> {
         let inputs = AveragedInputs::read(recording, nominal, &jumps, last.end_s)
             .map_err(|source| DriftError::Inputs { run, source })?;
         let start = start_state(run, recording, model, &inputs, first.start_s)?;
-        let mut block_count = 0;
-        let mut stretches = Vec::new();
+        let mut segment_count = 0;
+        let mut driven_steps = Vec::new();
         for (position, step) in &of_run {
-            let mut stretch = Stretch {
+            let mut driven = DrivenStep {
                 step: **step,
                 start_s: step.start_s,
                 end_s: step.end_s,
-                read_first: read_state(recording, nominal, step.start_s - 0.6),
-                read_later: read_state(recording, nominal, step.start_s + LEFT_OUT_S),
-                read_last: read_state(recording, nominal, step.end_s - 1.0),
-                followed: Followed::Whole,
+                before_jump: measured_state(recording, nominal, step.start_s - 0.6),
+                after_jump: measured_state(recording, nominal, step.start_s + SKIPPED_S),
+                at_end: measured_state(recording, nominal, step.end_s - 1.0),
+                coverage: Coverage::Whole,
                 times_s: Vec::new(),
-                places: Vec::new(),
+                targets: Vec::new(),
             };
-            for block in blocks.iter().filter(|block| block.step == *position) {
-                let count = (block.length_s() / SAMPLE_S).round().max(1.0) as usize;
+            for segment in segments.iter().filter(|segment| segment.step == *position) {
+                let count = (segment.length_s() / SAMPLE_S).round().max(1.0) as usize;
                 for index in 0..count {
                     let share = (index as f64 + 0.5) / count as f64;
-                    stretch.times_s.push(block.start_s + share * block.length_s());
-                    stretch.places.push(Place::Block(block_count));
+                    driven.times_s.push(segment.start_s + share * segment.length_s());
+                    driven.targets.push(Target::Segment(segment_count));
                 }
-                block_count += 1;
+                segment_count += 1;
             }
-            stretch.times_s.push(step.end_s - 1e-3);
-            stretch.places.push(Place::StepEnd);
-            stretches.push(stretch);
+            driven.times_s.push(step.end_s - 1e-3);
+            driven.targets.push(Target::StepEnd);
+            driven_steps.push(driven);
         }
-        Ok(Drive { model, inputs, start, stretches, blocks: block_count })
+        Ok(Drive { model, inputs, start, steps: driven_steps, segment_count })
     }
 
-    /// The run with at most one perturbation, in addition to the planted drift. An error names the segment that the model could not follow.
+    /// The run with drifts and at most one perturbation. An error has the position of the step that the model could not follow.
     fn predict(
         &self,
-        planted: &[Planted],
-        turned: Option<(Perturbation, f64)>,
+        drifts: &[Drift],
+        perturbed: Option<(Perturbation, f64)>,
     ) -> Result<Prediction, (usize, DriveError)> {
         let mut state = self.start;
-        if let Some((knob, by)) = turned {
-            knob.start(&mut state, by);
+        if let Some((perturbation, by)) = perturbed {
+            perturbation.start(&mut state, by);
         }
         let mut prediction = Prediction {
-            means: vec![[0.0; OUTPUTS.len()]; self.blocks],
-            surge_position_ratio: vec![f64::NEG_INFINITY; self.blocks],
-            step_ends: vec![(f64::NAN, f64::NAN); self.stretches.len()],
+            means: vec![[0.0; OUTPUTS.len()]; self.segment_count],
+            surge_position_ratio: vec![f64::NEG_INFINITY; self.segment_count],
+            step_ends: vec![(f64::NAN, f64::NAN); self.steps.len()],
         };
-        let mut counts = vec![0_usize; self.blocks];
-        for (index, stretch) in self.stretches.iter().enumerate() {
-            let mut start_s = stretch.start_s;
-            match (stretch.followed, stretch.read_later, stretch.read_last) {
-                (Followed::AfterJump, Some(read), _) => {
-                    start_s += LEFT_OUT_S;
-                    state = carried(state, stretch.read_first, read);
+        let mut counts = vec![0_usize; self.segment_count];
+        for (index, step) in self.steps.iter().enumerate() {
+            let mut start_s = step.start_s;
+            match (step.coverage, step.after_jump, step.at_end) {
+                (Coverage::AfterJump, Some(measured), _) => {
+                    start_s += SKIPPED_S;
+                    state = state_after(state, step.before_jump, measured);
                 }
-                (Followed::No, _, Some(read)) => {
-                    state = carried(state, stretch.read_first, read);
+                (Coverage::None, _, Some(measured)) => {
+                    state = state_after(state, step.before_jump, measured);
                     continue;
                 }
                 _ => {}
             }
-            let offset_s = stretch.step.offset_s;
-            let inputs = Undrifted {
-                inputs: ShiftedInputs { inputs: &self.inputs, shifts: turned.as_slice() },
-                planted,
+            let offset_s = step.step.offset_s;
+            let inputs = DriftFreeInputs {
+                inputs: ShiftedInputs { inputs: &self.inputs, shifts: perturbed.as_slice() },
+                drifts,
                 offset_s,
             };
-            let nodes = stretch.nodes_s(start_s);
-            for (from_s, to_s) in stretch.parts(start_s, planted) {
+            let nodes = step.nodes_s(start_s);
+            for (from_s, to_s) in step.parts(start_s, drifts) {
                 let mut model = self.model.clone();
-                if let Some((knob, by)) = turned {
-                    knob.turn(&mut model.params, by);
+                if let Some((perturbation, by)) = perturbed {
+                    perturbation.turn(&mut model.params, by);
                 }
-                for planted in planted {
-                    planted.drift_machine(&mut model.params, from_s + offset_s, to_s + offset_s);
+                for drift in drifts {
+                    drift.apply_to(&mut model.params, from_s + offset_s, to_s + offset_s);
                 }
-                let before = stretch.times_s.partition_point(|t_s| *t_s < from_s);
-                let times_s = &stretch.times_s[before..];
+                let before = step.times_s.partition_point(|t_s| *t_s < from_s);
+                let times_s = &step.times_s[before..];
                 let times_s = &times_s[..times_s.partition_point(|t_s| *t_s < to_s)];
                 let grid = FrozenGrid::new(from_s, to_s, &[], &nodes);
                 let step_ends = &mut prediction.step_ends;
                 let (means, highest) = (&mut prediction.means, &mut prediction.surge_position_ratio);
                 state = drive(&model, &inputs, state, &grid, times_s, |reading, prepared, state, outputs| {
-                    match stretch.places[before + reading] {
-                        Place::StepEnd => step_ends[index] = (outputs.efficiency, outputs.h_w_m2k),
-                        Place::Block(block) => {
-                            for (sum, channel) in means[block].iter_mut().zip(OUTPUTS) {
+                    match step.targets[before + reading] {
+                        Target::StepEnd => step_ends[index] = (outputs.efficiency, outputs.h_w_m2k),
+                        Target::Segment(segment) => {
+                            for (sum, channel) in means[segment].iter_mut().zip(OUTPUTS) {
                                 *sum += true_value(channel, prepared, state, outputs).unwrap_or(f64::NAN);
                             }
-                            highest[block] = highest[block].max(outputs.surge_position_ratio);
-                            counts[block] += 1;
+                            highest[segment] = highest[segment].max(outputs.surge_position_ratio);
+                            counts[segment] += 1;
                         }
                     }
                 })
@@ -168,55 +170,55 @@ impl<'a> Drive<'a> {
             }
         }
         for (means, count) in prediction.means.iter_mut().zip(counts) {
-            // A segment that was not followed has no prediction.
+            // A segment that the model did not follow becomes NaN.
             means.iter_mut().for_each(|sum| *sum /= count as f64);
         }
         Ok(prediction)
     }
 
-    /// The run with the planted drift, and with each perturbation added to it, over all cores.
-    pub fn predict_all(&mut self, planted: &[Planted]) -> Result<(Prediction, Vec<Prediction>), DriveError> {
+    /// The run with drifts, and with each of [`PERTURBATIONS`] in addition.
+    fn predict_all(&mut self, drifts: &[Drift]) -> Result<(Prediction, Vec<Prediction>), DriveError> {
         loop {
-            // Segments left out of one run are left out of all, so that their differences stay smooth.
-            let (index, error) = match self.try_all(planted) {
+            // A part that one of these runs cannot follow is left out of all, so that their differences stay smooth.
+            let (index, error) = match self.try_all(drifts) {
                 Ok(predictions) => return Ok(predictions),
                 Err(failed) => failed,
             };
-            let Some(stretch) = self.stretches.get_mut(index) else { return Err(error) };
-            stretch.followed = match stretch.followed {
-                Followed::Whole if stretch.read_later.is_some() => Followed::AfterJump,
-                Followed::Whole | Followed::AfterJump if stretch.read_last.is_some() => Followed::No,
+            let Some(step) = self.steps.get_mut(index) else { return Err(error) };
+            step.coverage = match step.coverage {
+                Coverage::Whole if step.after_jump.is_some() => Coverage::AfterJump,
+                Coverage::Whole | Coverage::AfterJump if step.at_end.is_some() => Coverage::None,
                 _ => return Err(error),
             };
         }
     }
 
-    fn try_all(&self, planted: &[Planted]) -> Result<(Prediction, Vec<Prediction>), (usize, DriveError)> {
-        let base = self.predict(planted, None)?;
-        let turned =
-            parallel::map(&KNOBS, |knob| self.predict(planted, Some((*knob, difference_step(*knob)))));
-        let turned = turned.into_iter().collect::<Result<_, _>>()?;
-        Ok((base, turned))
+    fn try_all(&self, drifts: &[Drift]) -> Result<(Prediction, Vec<Prediction>), (usize, DriveError)> {
+        let base = self.predict(drifts, None)?;
+        let perturbed = parallel::map(&PERTURBATIONS, |perturbation| {
+            self.predict(drifts, Some((*perturbation, difference_step(*perturbation))))
+        });
+        Ok((base, perturbed.into_iter().collect::<Result<_, _>>()?))
     }
 }
 
-/// Model predictions of all runs with the planted drift, and with each perturbation added to it.
+/// Model predictions of all runs with drifts, and with each of [`PERTURBATIONS`] in addition.
 pub(crate) fn predict(
     drives: &mut [Drive<'_>],
-    planted: &[Planted],
+    drifts: &[Drift],
 ) -> Result<(Prediction, Vec<Prediction>), DriftError> {
     let mut base = Prediction::default();
-    let mut turned = vec![Prediction::default(); KNOBS.len()];
+    let mut perturbed = vec![Prediction::default(); PERTURBATIONS.len()];
     for (run, drive) in drives.iter_mut().enumerate() {
-        let (own_base, own_turned) =
-            drive.predict_all(planted).map_err(|source| DriftError::Drive { run, source })?;
+        let (own_base, own_perturbed) =
+            drive.predict_all(drifts).map_err(|source| DriftError::Drive { run, source })?;
         base.append(own_base);
-        turned.iter_mut().zip(own_turned).for_each(|(all, own)| all.append(own));
+        perturbed.iter_mut().zip(own_perturbed).for_each(|(all, own)| all.append(own));
     }
-    Ok((base, turned))
+    Ok((base, perturbed))
 }
 
-/// State at the start: as measured just before it, or steady under the first inputs without earlier readings.
+/// State at the start: as measured just before it; without such readings, steady under the first inputs.
 fn start_state(
     run: usize,
     recording: &Recording,
@@ -233,24 +235,25 @@ fn start_state(
         return Ok(guess);
     }
     let settled = settle(model, &boundary, guess).map_err(|source| DriftError::Drive { run, source })?;
-    let metal = [Channel::Tc, Channel::Tt].map(|channel| recording.series.contains_key(&channel));
+    let is_metal_measured =
+        [Channel::Tc, Channel::Tt].iter().all(|channel| recording.series.contains_key(channel));
     let State { tc_k, tt_k, .. } = guess;
-    Ok(if metal == [true; 2] { State { tc_k, inner_k: tc_k, tt_k, ..settled } } else { settled })
+    Ok(if is_metal_measured { State { tc_k, inner_k: tc_k, tt_k, ..settled } } else { settled })
 }
 
-/// Inputs with the drift of a sensor subtracted.
-struct Undrifted<'a> {
+/// Inputs without the drift of their sensors.
+struct DriftFreeInputs<'a> {
     inputs: ShiftedInputs<'a, AveragedInputs>,
-    planted: &'a [Planted],
+    drifts: &'a [Drift],
     /// Offset from run time to campaign time, s.
     offset_s: f64,
 }
 
-impl Inputs for Undrifted<'_> {
+impl Inputs for DriftFreeInputs<'_> {
     fn at(&self, t_s: f64) -> BoundaryConditions {
         let mut boundary = self.inputs.at(t_s);
-        for planted in self.planted {
-            planted.undrift(&mut boundary, t_s + self.offset_s);
+        for drift in self.drifts {
+            drift.subtract_from(&mut boundary, t_s + self.offset_s);
         }
         boundary
     }
@@ -260,6 +263,6 @@ impl Inputs for Undrifted<'_> {
     }
 
     fn is_constant_after(&self, t_s: f64) -> bool {
-        !self.planted.iter().any(Planted::input_drifts) && self.inputs.is_constant_after(t_s)
+        !self.drifts.iter().any(Drift::acts_on_inputs) && self.inputs.is_constant_after(t_s)
     }
 }

@@ -1,7 +1,7 @@
-//! Model predictions for whole runs, and the sensitivity of readings to drift causes and constants.
+//! Model predictions for whole runs, and the responses of readings to causes of drift and to constants.
 
+pub(crate) mod constants;
 pub(crate) mod drive;
-pub(crate) mod knobs;
-pub(crate) mod nuisance;
+pub(crate) mod driven_step;
+pub(crate) mod perturbations;
 pub(crate) mod readings;
-pub(crate) mod segment;

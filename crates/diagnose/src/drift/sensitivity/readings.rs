@@ -1,79 +1,81 @@
-//! All readings compared with the model.
+//! The readings of all runs compared with the model, and their responses to perturbations and causes.
 
 use crate::drift::causes::cause::{Cause, FOULING_FLOW_SHARE, is_relative};
-use crate::drift::runs::time_axis::{Block, CampaignStep};
+use crate::drift::causes::drift::Drift;
+use crate::drift::causes::time_history::TimeHistory;
+use crate::drift::runs::time_axis::{CampaignStep, Segment};
 use crate::drift::sensitivity::drive::Prediction;
-use crate::drift::sensitivity::knobs::{KNOBS, difference_step};
+use crate::drift::sensitivity::perturbations::{PERTURBATIONS, difference_step};
 use mapper_core::Channel;
 use mapper_observe::channels::{DRIVERS, OUTPUTS};
 use mapper_observe::perturbation::Perturbation;
+use nalgebra::{DMatrix, DVector};
+use std::collections::BTreeMap;
 
-/// Effect of a constant of one standard deviation on readings and points.
+/// Change of readings and points: the compared means, segment by segment, then the efficiency (fraction) at the end of each step, then the
+/// heat-transfer coefficient there, W/(m2 K).
+pub(crate) type Response = DVector<f64>;
+
+/// Means of [`OUTPUTS`] over a segment, measured and by the nominal model.
 #[derive(Debug, Clone)]
-pub(crate) struct Constant {
-    /// Readings, segment by segment.
-    pub readings: Vec<f64>,
-    /// Efficiency at the end of each step, fraction.
-    pub eta: Vec<f64>,
-    /// Heat-transfer coefficient at the end of each step, W/(m2 K).
-    pub h_w_m2k: Vec<f64>,
-}
-
-impl Constant {
-    /// The same, scaled by this factor.
-    pub fn times(&self, factor: f64) -> Constant {
-        let times = |values: &[f64]| values.iter().map(|value| factor * value).collect();
-        Constant { readings: times(&self.readings), eta: times(&self.eta), h_w_m2k: times(&self.h_w_m2k) }
-    }
-
-    /// The sum of both.
-    pub fn plus(mut self, other: Constant) -> Constant {
-        let add = |into: &mut Vec<f64>, from: &[f64]| {
-            into.iter_mut().zip(from).for_each(|(into, from)| *into += from);
-        };
-        add(&mut self.readings, &other.readings);
-        add(&mut self.eta, &other.eta);
-        add(&mut self.h_w_m2k, &other.h_w_m2k);
-        self
-    }
+pub(crate) struct SegmentMeans {
+    pub segment: Segment,
+    pub measured: [Option<f64>; OUTPUTS.len()],
+    pub nominal: [f64; OUTPUTS.len()],
 }
 
 /// All readings compared with the model.
+#[derive(Clone)]
 pub(crate) struct Readings {
     pub runs: usize,
     pub steps: Vec<CampaignStep>,
-    /// Number of compared segments.
-    pub blocks: Vec<Block>,
+    /// The compared segments.
+    pub segments: Vec<Segment>,
     /// Compared channels, as positions in [`OUTPUTS`].
     pub columns: Vec<usize>,
-    /// Reading minus model, channel by channel, segment by segment.
-    pub difference: Vec<f64>,
-    /// The model, in the same order.
-    pub model: Vec<f64>,
-    /// Sensitivity of readings and points to each of [`KNOBS`], per unit.
-    pub answers: Vec<Constant>,
-    /// Efficiency and heat-transfer coefficient of the model at the end of each step.
-    pub step_ends: Vec<(f64, f64)>,
-    /// Mean of each of [`DRIVERS`].
-    pub input_levels: Vec<f64>,
-    /// Positions of the compared segments among all.
+    /// Reading minus model, channel by channel, segment by segment; one column.
+    pub difference: DMatrix<f64>,
+    /// Readings and points of the model; NaN for the points of steps that it cannot follow.
+    pub model: Response,
+    /// Response to each of [`PERTURBATIONS`], per unit.
+    pub responses: Vec<Response>,
+    /// Mean of each recorded input.
+    pub input_levels: BTreeMap<Channel, f64>,
+    /// Positions of the compared segments in `all`.
     pub kept: Vec<usize>,
-    /// Every segment with its readings and the nominal model's, including those not compared.
-    pub all: Vec<(Block, [Option<f64>; OUTPUTS.len()], [f64; OUTPUTS.len()])>,
+    pub all: Vec<SegmentMeans>,
 }
 
 impl Readings {
-    pub fn answer(&self, knob: Perturbation) -> Option<&Constant> {
-        KNOBS.iter().position(|other| *other == knob).and_then(|index| self.answers.get(index))
+    /// Number of compared means; each is a row.
+    pub fn row_count(&self) -> usize {
+        self.segments.len() * self.columns.len()
     }
 
-    pub fn input_level(&self, channel: Channel) -> f64 {
-        DRIVERS
-            .iter()
-            .position(|input| *input == channel)
-            .and_then(|index| self.input_levels.get(index))
-            .copied()
-            .unwrap_or(0.0)
+    /// Positions of a step's efficiency and heat-transfer coefficient in a [`Response`].
+    pub fn point_positions(&self, step: usize) -> [usize; 2] {
+        let eta = self.row_count() + step;
+        [eta, eta + self.steps.len()]
+    }
+
+    /// Step that an element of a [`Response`] belongs to.
+    pub fn step_of(&self, position: usize) -> usize {
+        match position.checked_sub(self.row_count()) {
+            Some(point) => point % self.steps.len(),
+            None => self.segments[position / self.columns.len()].step,
+        }
+    }
+
+    /// A response of the readings alone: `value` of each row and of its channel's position in [`OUTPUTS`].
+    pub fn response_of_rows(&self, value: impl Fn(usize, usize) -> f64) -> Response {
+        let rows = self.row_count();
+        Response::from_fn(rows + 2 * self.steps.len(), |position, _| {
+            if position < rows { value(position, self.columns[position % self.columns.len()]) } else { 0.0 }
+        })
+    }
+
+    pub fn response(&self, perturbation: Perturbation) -> Option<&Response> {
+        self.responses.get(PERTURBATIONS.iter().position(|other| *other == perturbation)?)
     }
 
     /// Start of the campaign and end of its last step, campaign time, s.
@@ -83,116 +85,97 @@ impl Readings {
         (start, end)
     }
 
-    /// Effect of a constant cause of unit size on readings and points; `None` if it has no effect.
-    pub fn signature(&self, cause: Cause) -> Option<Constant> {
-        match cause {
-            Cause::Sensors(channels) => {
-                self.sum(channels.iter().filter_map(|channel| self.of_sensor(*channel)))
-            }
+    /// Response to a constant cause of unit size; `None` if no reading responds.
+    pub fn signature(&self, cause: Cause) -> Option<Response> {
+        self.signature_of(cause, |_| true)
+    }
+
+    /// The part of a signature that a model run with the drift contains: all but the drift of output sensors.
+    pub fn model_signature(&self, cause: Cause) -> Option<Response> {
+        self.signature_of(cause, |channel| DRIVERS.contains(channel))
+    }
+
+    fn signature_of(&self, cause: Cause, counts: impl Fn(&Channel) -> bool) -> Option<Response> {
+        let signature = match cause {
+            Cause::Sensors(channels) => channels
+                .iter()
+                .filter(|channel| counts(channel))
+                .filter_map(|channel| self.sensor_signature(*channel))
+                .reduce(|sum, other| sum + other)?,
             Cause::Fouling => {
-                let of = |knob, factor| Some(self.answer(knob)?.times(factor));
-                self.sum(
-                    [of(Perturbation::Efficiency, 1.0)?, of(Perturbation::Flow, FOULING_FLOW_SHARE)?]
-                        .into_iter(),
-                )
+                self.response(Perturbation::Efficiency)?
+                    + self.response(Perturbation::Flow)? * FOULING_FLOW_SHARE
             }
-            Cause::BearingFriction => self.answer(Perturbation::Friction).cloned(),
-        }
+            Cause::BearingFriction => self.response(Perturbation::Friction)?.clone(),
+        };
+        signature.iter().take(self.row_count()).any(|value| *value != 0.0).then_some(signature)
     }
 
-    /// The part of a signature that the model includes once the cause is planted: all but the drift of output sensors.
-    pub fn planted_signature(&self, cause: Cause) -> Option<Constant> {
-        match cause {
-            Cause::Sensors(channels) => {
-                let inputs = channels.iter().filter(|channel| DRIVERS.contains(channel));
-                self.sum(inputs.filter_map(|channel| self.of_sensor(*channel)))
-            }
-            Cause::Fouling | Cause::BearingFriction => self.signature(cause),
-        }
-    }
-
-    fn of_sensor(&self, channel: Channel) -> Option<Constant> {
+    fn sensor_signature(&self, channel: Channel) -> Option<Response> {
         // An input that reads too high drives the model too high: the true value is lower.
         if DRIVERS.contains(&channel) {
-            return Some(self.answer(Perturbation::Input(channel))?.times(-1.0));
+            return Some(self.response(Perturbation::Input(channel))? * -1.0);
         }
-        let output = OUTPUTS.iter().position(|output| *output == channel)?;
-        let column = self.columns.iter().position(|column| *column == output)?;
-        let count = self.columns.len();
-        let of_row = |row: usize| match row % count == column {
-            true if is_relative(channel) => self.model[row],
-            true => 1.0,
-            false => 0.0,
-        };
-        let steps = self.steps.len();
-        let readings = (0..self.difference.len()).map(of_row).collect();
-        Some(Constant { readings, eta: vec![0.0; steps], h_w_m2k: vec![0.0; steps] })
-    }
-
-    /// `None` if there is nothing to add, or it has no effect.
-    fn sum(&self, parts: impl Iterator<Item = Constant>) -> Option<Constant> {
-        parts.reduce(Constant::plus).filter(|sum| sum.readings.iter().any(|value| *value != 0.0))
-    }
-
-    /// The same readings with another prediction; `None` if it covers less than the first one.
-    pub fn around(&self, base: Prediction, turned: &[Prediction]) -> Option<Readings> {
-        let columns = &self.columns;
-        let rows = |values: &dyn Fn(usize, usize) -> f64| -> Vec<f64> {
-            self.kept
-                .iter()
-                .flat_map(|block| columns.iter().map(move |column| values(*block, *column)))
-                .collect()
-        };
-        let answers = KNOBS
-            .iter()
-            .zip(turned)
-            .map(|(knob, turned)| Constant {
-                readings: rows(&|block, column| {
-                    (turned.means[block][column] - base.means[block][column]) / difference_step(*knob)
-                }),
-                eta: (0..self.steps.len())
-                    .map(|step| {
-                        finite((turned.step_ends[step].0 - base.step_ends[step].0) / difference_step(*knob))
-                    })
-                    .collect(),
-                h_w_m2k: (0..self.steps.len())
-                    .map(|step| {
-                        finite((turned.step_ends[step].1 - base.step_ends[step].1) / difference_step(*knob))
-                    })
-                    .collect(),
+        let is_compared = self.columns.iter().any(|column| OUTPUTS[*column] == channel);
+        is_compared.then(|| {
+            self.response_of_rows(|row, output| match OUTPUTS[output] == channel {
+                true if is_relative(channel) => self.model[row],
+                true => 1.0,
+                false => 0.0,
             })
-            .collect();
-        let readings = Readings {
-            runs: self.runs,
-            steps: self.steps.clone(),
-            blocks: self.blocks.clone(),
-            columns: self.columns.clone(),
-            difference: rows(&|block, column| {
-                self.all[block].1[column].unwrap_or(f64::NAN) - base.means[block][column]
-            }),
-            model: rows(&|block, column| base.means[block][column]),
-            answers,
-            step_ends: base.step_ends,
-            input_levels: self.input_levels.clone(),
-            kept: self.kept.clone(),
-            all: self.all.clone(),
+        })
+    }
+
+    /// Mean of a time history over the segment of a row.
+    pub fn mean_of(&self, row: usize, history: TimeHistory) -> f64 {
+        let segment = &self.segments[row / self.columns.len()];
+        let offset_s = self.steps[segment.step].offset_s;
+        history.mean(segment.start_s + offset_s, segment.end_s + offset_s)
+    }
+
+    /// Change of the readings by a cause of size 1 with this signature and time history.
+    pub fn column(&self, signature: &Response, history: TimeHistory) -> DVector<f64> {
+        DVector::from_fn(self.row_count(), |row, _| signature[row] * self.mean_of(row, history))
+    }
+
+    /// The same readings with another prediction; `None` if it does not cover all compared segments.
+    pub fn with_prediction(&self, base: &Prediction, perturbed: &[Prediction]) -> Option<Readings> {
+        let rows = self.row_count();
+        let model = self.response_to(base);
+        let response = |(perturbation, prediction): (&Perturbation, &Prediction)| {
+            let mut response = (self.response_to(prediction) - &model) / difference_step(*perturbation);
+            // Steps that the model cannot follow give no point.
+            response.iter_mut().skip(rows).filter(|value| !value.is_finite()).for_each(|value| *value = 0.0);
+            response
         };
-        readings.difference.iter().all(|value| value.is_finite()).then_some(readings)
+        let columns = self.columns.len();
+        let measured = |row: usize| self.all[self.kept[row / columns]].measured[self.columns[row % columns]];
+        let difference = DMatrix::from_fn(rows, 1, |row, _| measured(row).unwrap_or(f64::NAN) - model[row]);
+        let is_complete = difference.iter().all(|value| value.is_finite());
+        let responses = PERTURBATIONS.iter().zip(perturbed).map(response).collect();
+        is_complete.then(|| Readings { difference, model, responses, ..self.clone() })
     }
 
-    /// Subtracts a linear effect from the model: `of_rows` in the readings, `of_steps` at the steps' ends.
-    pub fn give_back(&mut self, part: &Constant, of_rows: &[f64], of_steps: &[f64]) {
-        for ((difference, shown), size) in self.difference.iter_mut().zip(&part.readings).zip(of_rows) {
-            *difference += shown * size;
+    /// Readings and points of a prediction.
+    fn response_to(&self, prediction: &Prediction) -> Response {
+        let (rows, columns, steps) = (self.row_count(), self.columns.len(), self.steps.len());
+        Response::from_fn(rows + 2 * steps, |position, _| match position.checked_sub(rows) {
+            None => prediction.means[self.kept[position / columns]][self.columns[position % columns]],
+            Some(point) if point < steps => prediction.step_ends[point].0,
+            Some(point) => prediction.step_ends[point - steps].1,
+        })
+    }
+
+    /// Subtracts the linear effect of a drift with this signature from the model.
+    pub fn subtract_from_model(&mut self, signature: &Response, drift: &Drift) {
+        for row in 0..self.row_count() {
+            self.difference[row] += signature[row] * (drift.size * self.mean_of(row, drift.history));
         }
-        for (step, ((eta, h_w_m2k), size)) in self.step_ends.iter_mut().zip(of_steps).enumerate() {
-            *eta -= part.eta[step] * size;
-            *h_w_m2k -= part.h_w_m2k[step] * size;
+        for step in 0..self.steps.len() {
+            let end_s = self.steps[step].end_s + self.steps[step].offset_s;
+            for position in self.point_positions(step) {
+                self.model[position] -= signature[position] * drift.at(end_s);
+            }
         }
     }
-}
-
-/// 0 for steps that the model cannot follow; they give no point.
-fn finite(value: f64) -> f64 {
-    if value.is_finite() { value } else { 0.0 }
 }

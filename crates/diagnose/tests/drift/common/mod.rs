@@ -6,7 +6,7 @@ use mapper_core::{
     Channel, DeclaredUncertainty, ModelTolerances, NoiseColour, Recording, ReferenceState, Series, StepKind,
     StepMarker,
 };
-use mapper_diagnose::drift::{Cause, Course, DriftReport, DriftRequest, RecordedRun, diagnose};
+use mapper_diagnose::drift::{Cause, DriftReport, DriftRequest, RecordedRun, TimeHistory, diagnose};
 use mapper_identify::{IdentifyConfig, WindowRule};
 use mapper_observe::declared_uncertainties;
 use mapper_physics::compressor_map::characteristic::{CharacteristicPoint, CompressorCharacteristic};
@@ -31,7 +31,7 @@ pub const SAMPLE_S: f64 = 0.1;
 #[derive(Debug, Clone, Copy)]
 pub struct Planted {
     pub cause: Cause,
-    pub course: Course,
+    pub course: TimeHistory,
     /// Per hour, or step; unit of the cause.
     pub size: f64,
 }
@@ -331,7 +331,7 @@ pub fn draw(seed: u64) -> impl FnMut() -> f64 {
 }
 
 /// Puts another sensor's drift into the readings of a campaign.
-pub fn drift_reading(recording: &mut Recording, channel: Channel, course: Course, size: f64) {
+pub fn drift_reading(recording: &mut Recording, channel: Channel, course: TimeHistory, size: f64) {
     let series = recording.series.get_mut(&channel).unwrap();
     let relative = matches!(channel, Channel::CompressorFlow | Channel::TurbineFlow);
     for (t_s, value) in series.t_s.iter().zip(&mut series.values) {

@@ -1,10 +1,9 @@
-//! Perturbations of the model, to find the sensitivity of the readings.
+//! Perturbations of the model that give the responses of the readings by finite differences.
 
 use mapper_core::{Channel, Dimension, ModelTolerances};
 use mapper_observe::perturbation::Perturbation;
 
-/// All perturbations.
-pub(crate) const KNOBS: [Perturbation; 19] = [
+pub(crate) const PERTURBATIONS: [Perturbation; 19] = [
     Perturbation::Input(Channel::T1),
     Perturbation::Input(Channel::P1),
     Perturbation::Input(Channel::P3),
@@ -26,9 +25,9 @@ pub(crate) const KNOBS: [Perturbation; 19] = [
     Perturbation::StartTt,
 ];
 
-/// Size of a perturbation for the difference: small compared with curvature, large compared with rounding.
-pub(crate) fn difference_step(knob: Perturbation) -> f64 {
-    match knob {
+/// Size of a perturbation: small enough for curvature, large enough for rounding errors.
+pub(crate) fn difference_step(perturbation: Perturbation) -> f64 {
+    match perturbation {
         Perturbation::Input(channel) if channel.info().dimension == Dimension::Pressure => 100.0,
         Perturbation::Input(_) | Perturbation::Ambient | Perturbation::StartTc | Perturbation::StartTt => 0.5,
         Perturbation::Friction => 5e-8,
@@ -36,13 +35,13 @@ pub(crate) fn difference_step(knob: Perturbation) -> f64 {
     }
 }
 
-/// Factor on declared constant deviations: a constant is not drift, whatever its size, and repeats distinguish the two.
-const WIDER: f64 = 2.0;
-/// A larger factor for the turbine housing at the start: its initial state takes an hour to decay.
-const WIDER_TT: f64 = 4.0;
+/// Factor on declared tolerances: repeats distinguish a constant from drift whatever its size, so a wide prior costs nothing.
+const TOLERANCE_FACTOR: f64 = 2.0;
+/// The factor for the turbine housing at the start: its initial state takes an hour to decay.
+const START_TT_FACTOR: f64 = 4.0;
 
-/// One standard deviation of a perturbation over the whole campaign, in addition to declared offsets of inputs.
-pub(crate) fn sigma(knob: Perturbation, tolerances: &ModelTolerances) -> f64 {
-    let wider = if knob == Perturbation::StartTt { WIDER_TT } else { WIDER };
-    wider * knob.tolerance(tolerances)
+/// Prior standard deviation of a perturbation that is constant over the campaign. Inputs have declared offsets instead.
+pub(crate) fn sigma(perturbation: Perturbation, tolerances: &ModelTolerances) -> f64 {
+    let factor = if perturbation == Perturbation::StartTt { START_TT_FACTOR } else { TOLERANCE_FACTOR };
+    factor * perturbation.tolerance(tolerances)
 }

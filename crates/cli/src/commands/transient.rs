@@ -5,7 +5,7 @@ use crate::output::failure::Failure;
 use crate::output::standard_output::Replace;
 use crate::{output::standard_output, registry};
 use clap::Args;
-use mapper_session::{Recorded, Session, Which, write_transient};
+use mapper_session::{Recorded, Session, Side, write_transient};
 use std::path::PathBuf;
 
 /// Identify and diagnose one side of a machine from a log without steps, driven by its measured speed, flow, pressures and inlet temperature
@@ -24,7 +24,7 @@ pub struct Transient {
     pub fit_until: Option<f64>,
     /// Side of the machine
     #[arg(long, default_value = "compressor")]
-    pub side: Which,
+    pub side: Side,
     /// Also try a suspected effect written in rhai; may be repeated
     #[arg(long = "effect", value_name = "FILE")]
     pub effects: Vec<PathBuf>,

@@ -1,18 +1,19 @@
 //! Compressor side driven by its measured neighbours: eqs. 1-3, one housing node, and the probe.
 
-use crate::driven::{Rows, Values};
+use crate::driven::Rows;
+use crate::driven::parameters::Values;
 use mapper_numerics::statistics::mean;
 use mapper_physics::laws::compression::{CompressionInputs, compress, compressed_k, isentropic_rise_ratio};
 use mapper_physics::laws::housing::compressor_capacity_j_k;
 use mapper_physics::laws::{nusselt, thermocouple};
 use mapper_physics::machine::params::Params;
 
-/// Limits of the efficiency polynomial; outside them it does not describe a working compressor.
+/// Limits of the efficiency polynomial: outside them it does not describe a working compressor.
 pub(crate) const EFFICIENCY: (f64, f64) = (0.25, 0.90);
 
 /// Declared machine, and the middle of the log as reference of its efficiency.
 #[derive(Debug, Clone, Copy)]
-pub struct Declared {
+pub(crate) struct Declared {
     /// Geometry, masses and correlations.
     pub params: Params,
     /// Speed at which the relative speed is 0, rpm.
@@ -22,7 +23,7 @@ pub struct Declared {
 }
 
 impl Declared {
-    /// Reference at the geometric means of the rows.
+    /// With the geometric means of the rows as the reference of the efficiency.
     pub fn new(params: Params, rows: &Rows) -> Self {
         let (middle_speed_rpm, middle_flow) = middles(rows);
         Declared { params, middle_speed_rpm, middle_flow }
@@ -42,9 +43,8 @@ pub(crate) fn flow_coefficient(speed_rpm: f64, flow_kg_s: f64, p1_pa: f64, t1_k:
     flow_kg_s * t1_k / (p1_pa * speed_rpm)
 }
 
-/// Predicted sensor readings.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Predicted {
+pub(crate) struct Predicted {
     /// T2 as measured by the probe, K.
     pub t2_k: Vec<f64>,
     /// Housing, K.
@@ -54,7 +54,7 @@ pub struct Predicted {
 }
 
 /// Simulates the first `count` rows.
-pub fn predict(rows: &Rows, declared: &Declared, values: &Values, count: usize) -> Predicted {
+pub(crate) fn predict(rows: &Rows, declared: &Declared, values: &Values, count: usize) -> Predicted {
     let [
         eta,
         eta_speed,
@@ -113,21 +113,16 @@ pub fn predict(rows: &Rows, declared: &Declared, values: &Values, count: usize) 
             },
             None,
         );
-        // State of the next row: exact exponential relaxation towards the current equilibrium.
-        let elapsed_s = rows.t_s.get(i + 1).map_or(0.0, |next_s| next_s - rows.t_s[i]);
+        let elapsed_s = rows.elapsed_s(i);
         let lag_s =
             thermocouple::time_constant_s(1e-3 * probe_mm, compressor.outlet_diameter_m, flow_kg_s, gas.t2_k);
-        if state.is_none() {
-            // The probe starts at its reading.
-            reading_k = t2_k[i] - t2_offset_k;
-        }
         predicted.t2_k.push(reading_k + t2_offset_k);
         predicted.tc_k.push(tc_k);
         predicted.efficiency.push(efficiency);
         let keep = if lag_s > 0.0 { (-elapsed_s / lag_s).exp() } else { 0.0 };
         reading_k = gas.t2_k + (reading_k - gas.t2_k) * keep;
         let capacity_j_k = capacity_ratio * compressor_capacity_j_k(&declared.params, tc_k);
-        // Exponential Euler: exact for constant gas and surroundings, and bounded over any gap in the log.
+        // Exact for constant gas and surroundings, and bounded over a gap in the log.
         let conductance_w_k = h_w_m2k * compressor.internal_area_m2 + loss_w_k;
         let net_w = gas.q1_w + gas.q2_w - loss_w_k * (tc_k - surroundings_k);
         tc_k += net_w / conductance_w_k * (1.0 - (-conductance_w_k * elapsed_s / capacity_j_k).exp());

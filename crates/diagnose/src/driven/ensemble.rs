@@ -1,4 +1,4 @@
-//! Ensemble sampler of all parameter values that agree with a log; walkers take their steps from each other.
+//! Samples a density by an ensemble of walkers that take their steps from each other.
 //!
 //! The stretch move of Goodman and Weare (Comm. App. Math. Comp. Sci. 5, 65-80 (2010)), in halves that move in parallel as in
 //! Foreman-Mackey et al. (PASP 125, 306 (2013)). It needs no derivatives or tuning and is insensitive to parameter correlations.
@@ -14,8 +14,8 @@ const WALKERS: usize = 64;
 const MOVES: (usize, usize) = (1000, 600);
 /// Thinning: moves between kept samples.
 const KEEP_EVERY: usize = 20;
-/// Walkers whose log density is below the median by more than this are stuck: 14 normal numbers scatter by 2.6 about their mean.
-const LOST: f64 = 40.0;
+/// Distance of the log density below the median at which a walker is stuck: that of 14 normal numbers scatters by 2.6.
+const STUCK: f64 = 40.0;
 /// Stretch parameter `a`.
 const STRETCH: f64 = 2.0;
 
@@ -27,7 +27,7 @@ pub(crate) fn draws<const N: usize>(
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     let mut walkers: Vec<([f64; N], f64)> = (0..WALKERS)
         .map(|_| {
-            // Start nearer to the middle than the prior, whose tails agree with no log.
+            // Closer to the middle than the prior: its tails agree with no log.
             let place: [f64; N] = std::array::from_fn(|_| {
                 let z: f64 = StandardNormal.sample(&mut random);
                 0.5 * z
@@ -39,7 +39,7 @@ pub(crate) fn draws<const N: usize>(
     let half = WALKERS / 2;
     for step in 0..MOVES.0 + MOVES.1 {
         if step == MOVES.0 / 3 || step == 2 * MOVES.0 / 3 {
-            bring_back(&mut walkers);
+            move_stuck(&mut walkers);
         }
         for first in [0, half] {
             let others = half - first;
@@ -68,14 +68,14 @@ pub(crate) fn draws<const N: usize>(
     kept
 }
 
-/// Moves stuck walkers in a negligible local maximum to the positions of the others, in turn; their moves separate them again.
-fn bring_back<const N: usize>(walkers: &mut [([f64; N], f64)]) {
+/// Moves walkers that are stuck at a negligible local maximum to the positions of others. Later moves separate them again.
+fn move_stuck<const N: usize>(walkers: &mut [([f64; N], f64)]) {
     let mut densities: Vec<f64> = walkers.iter().map(|(_, density)| *density).collect();
     densities.sort_by(f64::total_cmp);
-    let floor = densities[densities.len() / 2] - LOST;
+    let floor = densities[densities.len() / 2] - STUCK;
     let good: Vec<_> = walkers.iter().copied().filter(|(_, density)| *density >= floor).collect();
-    let lost = walkers.iter_mut().filter(|(_, density)| *density < floor);
-    for (walker, place) in lost.zip(good.into_iter().cycle()) {
+    let stuck = walkers.iter_mut().filter(|(_, density)| *density < floor);
+    for (walker, place) in stuck.zip(good.into_iter().cycle()) {
         *walker = place;
     }
 }

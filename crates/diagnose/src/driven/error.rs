@@ -10,8 +10,8 @@ pub enum DrivenError {
     Channel(#[from] RecordingError),
     /// There are too few rows.
     #[error(
-        "only {rows} complete rows lie before {until_s:.1} s (speed, flow, P1, P2, T1 and T2 at once, with the compressor working); at \
-         least {needed} are needed"
+        "the log has {rows} complete rows before {until_s:.1} s, with all driving channels and the machine at work; at least {needed} \
+         are needed"
     )]
     TooFewRows {
         /// Complete rows.
@@ -23,7 +23,7 @@ pub enum DrivenError {
     },
     /// The nominal machine has no solution.
     #[error(
-        "the campaign's machine gives no temperatures under what drives it in this log: check its geometry, and the units of the \
+        "the model of the campaign's machine has no solution under the readings of this log: check its geometry and the units in the \
          channel map"
     )]
     NoAnswer,

@@ -5,32 +5,30 @@ use mapper_core::{Channel, Recording};
 use mapper_identify::DECLARED_INTERVAL_S;
 use mapper_observe::plausible::is_reading;
 
-/// Maximum number of rows, spread over the whole of a longer log: five minutes at 10 Hz. The sampler evaluates them some hundred thousand
-/// times.
+/// Maximum number of rows, evenly spread over a longer log: five minutes at 10 Hz. The sampler evaluates them some hundred thousand times.
 const MAX_ROWS: usize = 3_000;
 
-/// Channels that a side needs.
+/// The channels of one side of the machine.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Wanted<'a> {
-    /// Driving channels.
+pub(crate) struct SideChannels<'a> {
     pub(crate) drives: &'a [Channel],
-    /// Judged channels; the first is required and its times define the rows.
+    /// Judged channels. The first is required, and its times define the rows.
     pub(crate) judged: &'a [Channel],
-    /// Whether the side's equations apply at these values of `drives`.
-    pub(crate) works: fn(&[f64]) -> bool,
+    /// Whether the equations of the side apply at these values of `drives`.
+    pub(crate) is_usable: fn(&[f64]) -> bool,
 }
 
-/// Pressure ratio below which a compressor or turbine does hardly any work, so that its temperatures do not show its efficiency.
-pub(crate) const WORKING_RATIO: f64 = 1.02;
-/// Minimum flow at which the gas path is evaluated, kg/s (its equations divide by it).
-pub(crate) const SMALLEST_FLOW_KG_S: f64 = 1e-3;
-/// Channels that the compressor side needs.
-pub(crate) const COMPRESSOR: Wanted<'_> = Wanted {
+/// Minimum pressure ratio of compressor or turbine: below it the work is so small that temperatures do not show the efficiency.
+pub(crate) const MIN_PRESSURE_RATIO: f64 = 1.02;
+/// Minimum flow, kg/s: the equations of the gas path divide by it.
+pub(crate) const MIN_FLOW_KG_S: f64 = 1e-3;
+/// The channels of the compressor side.
+pub(crate) const COMPRESSOR: SideChannels<'_> = SideChannels {
     drives: &[Channel::ShaftSpeed, Channel::CompressorFlow, Channel::P1, Channel::P2, Channel::T1],
     judged: &[Channel::T2, Channel::Tc],
-    works: |row| {
+    is_usable: |row| {
         let [speed_rpm, flow_kg_s, p1_pa, p2_pa, _] = *row else { return false };
-        p2_pa >= WORKING_RATIO * p1_pa && flow_kg_s >= SMALLEST_FLOW_KG_S && speed_rpm > 0.0
+        p2_pa >= MIN_PRESSURE_RATIO * p1_pa && flow_kg_s >= MIN_FLOW_KG_S && speed_rpm > 0.0
     },
 };
 
@@ -45,7 +43,7 @@ pub struct Rows {
     pub(crate) rates: Vec<Vec<f64>>,
     /// Judged channels, in the requested order; NaN if not measured (never for the first).
     pub(crate) judged: Vec<(Channel, Vec<f64>)>,
-    /// Omitted rows of the first judged channel.
+    /// Number of times of the first judged channel without a complete row.
     pub(crate) lost: usize,
 }
 
@@ -64,24 +62,21 @@ impl Rows {
     }
 
     /// Rows of a recording at the times of the first judged channel.
-    ///
-    /// # Errors
-    /// [`DrivenError::Channel`] if a driving channel or the first judged one is missing.
-    pub(crate) fn read(recording: &Recording, wanted: Wanted<'_>) -> Result<Self, DrivenError> {
-        let Some(first) = wanted.judged.first() else {
+    pub(crate) fn read(recording: &Recording, channels: SideChannels<'_>) -> Result<Self, DrivenError> {
+        let Some(first) = channels.judged.first() else {
             return Ok(Rows::default());
         };
         let judged = recording.require(*first)?;
-        let mut series = Vec::with_capacity(wanted.drives.len());
-        for channel in wanted.drives {
+        let mut series = Vec::with_capacity(channels.drives.len());
+        for channel in channels.drives {
             series.push((*channel, recording.require(*channel)?));
         }
         let span_s =
             judged.t_s.last().zip(judged.t_s.first()).map_or(0.0, |(last_s, first_s)| last_s - first_s);
         let spacing_s = DECLARED_INTERVAL_S.max(span_s / MAX_ROWS as f64);
-        let columns = |channels: &[Channel]| channels.iter().map(|channel| (*channel, Vec::new())).collect();
+        let empty = |channels: &[Channel]| channels.iter().map(|channel| (*channel, Vec::new())).collect();
         let mut rows =
-            Rows { drives: columns(wanted.drives), judged: columns(wanted.judged), ..Rows::default() };
+            Rows { drives: empty(channels.drives), judged: empty(channels.judged), ..Rows::default() };
         let mut row = Vec::with_capacity(series.len());
         for (t_s, value) in judged.t_s.iter().zip(&judged.values) {
             if rows.t_s.last().is_some_and(|last_s| t_s - last_s < 0.999 * spacing_s) {
@@ -93,7 +88,7 @@ impl Rows {
                 let inside = series.t_s.first() <= Some(t_s) && series.t_s.last() >= Some(t_s);
                 series.interpolate(*t_s).filter(|value| inside && is_reading(*channel, *value))
             }));
-            if row.len() < series.len() || !is_reading(*first, *value) || !(wanted.works)(&row) {
+            if row.len() < series.len() || !is_reading(*first, *value) || !(channels.is_usable)(&row) {
                 rows.lost += 1;
                 continue;
             }
@@ -125,9 +120,20 @@ impl Rows {
         self.drives.iter().find(|(of, _)| *of == channel).map_or(&[], |(_, column)| column)
     }
 
-    /// Every `n`-th row, so that at most `most` remain.
-    pub(crate) fn thinned(&self, most: usize) -> Rows {
-        let every = self.len().div_ceil(most.max(1)).max(1);
+    /// First reading of a judged channel; `None` if it was not measured.
+    pub(crate) fn first_judged(&self, channel: Channel) -> Option<f64> {
+        let (_, column) = self.judged.iter().find(|(of, _)| *of == channel)?;
+        column.iter().copied().find(|reading| reading.is_finite())
+    }
+
+    /// Time from a row to the next one, s; 0 for the last.
+    pub(crate) fn elapsed_s(&self, row: usize) -> f64 {
+        self.t_s.get(row + 1).map_or(0.0, |next_s| next_s - self.t_s[row])
+    }
+
+    /// Every `n`-th row, so that at most `max_rows` remain.
+    pub(crate) fn thinned(&self, max_rows: usize) -> Rows {
+        let every = self.len().div_ceil(max_rows.max(1)).max(1);
         let thin = |column: &[f64]| column.iter().copied().step_by(every).collect::<Vec<f64>>();
         let each = |columns: &[(Channel, Vec<f64>)]| columns.iter().map(|(c, v)| (*c, thin(v))).collect();
         let rates = self.rates.iter().map(|column| thin(column)).collect();

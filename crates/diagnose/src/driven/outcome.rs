@@ -1,9 +1,10 @@
 //! Result of the identification from a log without steps, and its error on held-out rows.
 
-use crate::driven::density::log_density;
+use crate::driven::compressor_side::{Declared, Predicted, predict};
+use crate::driven::density::{CORRELATION_S, CorrelatedNoise, log_density};
 use crate::driven::ensemble::draws;
-use crate::driven::parameters::{COUNT, PARAMETERS, Parameter};
-use crate::driven::{Declared, DrivenError, Predicted, Rows, Values, predict};
+use crate::driven::parameters::{COUNT, PARAMETERS, Parameter, Values};
+use crate::driven::{DrivenError, Rows};
 use mapper_inference::interval::IDENTIFIED_RATIO;
 use mapper_numerics::statistics::{mean, quantile, rms};
 use mapper_physics::gas::air::Air;
@@ -47,11 +48,11 @@ pub struct Judged {
     pub expected_low_k: f64,
     /// Its upper end, K.
     pub expected_high_k: f64,
-    /// Share of the rows with the reading inside its 95 % interval, ratio.
+    /// Share of the readings within their 95 % interval.
     pub inside_ratio: f64,
 }
 
-/// Influence of something on the T2 reading over the fitted part, K rms: median and 95 % interval.
+/// Influence of a parameter on the T2 reading over the fitted part, K rms: median and 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Moves {
     /// Median, K.
@@ -77,7 +78,7 @@ pub struct Trace {
     pub high_k: Vec<f64>,
     /// Isentropic efficiency, mean, fraction.
     pub efficiency: Vec<f64>,
-    /// Apparent efficiency `T1 (PR^kappa - 1)/(T2 - T1)` of the readings, fraction; misleading, for comparison only.
+    /// Apparent efficiency of the readings, `T1 (PR^kappa - 1)/(T2 - T1)`, fraction: for comparison only, since heat and lag distort it.
     pub apparent_efficiency: Vec<f64>,
 }
 
@@ -128,16 +129,16 @@ pub fn identify(
     let noisy = with_noise(&sample, &predicted, rows, seed);
     let trace = trace(params.compressor.air(), rows, &predicted, &noisy);
     let judged = |from: usize, until: usize| judged(rows, &trace, &noisy, from, until);
-    let without = |name: &str| moves(&sample, &predicted, rows, &declared, fitted, name);
+    let influence = |name: &str| influence(&sample, &predicted, rows, &declared, fitted, name);
     Ok(DrivenOutcome {
         fitted_until_s: fit_until_s,
         parameters: PARAMETERS
             .iter()
             .enumerate()
-            .map(|(i, parameter)| found(*parameter, i, &sample))
+            .map(|(i, parameter)| posterior(*parameter, i, &sample))
             .collect(),
-        probe_moves: without("probe"),
-        heat_moves: without("h"),
+        probe_moves: influence("probe"),
+        heat_moves: influence("h"),
         fitted: judged(0, fitted),
         held_out: (fitted < rows.len()).then(|| judged(fitted, rows.len())),
         trace,
@@ -145,7 +146,7 @@ pub fn identify(
     })
 }
 
-fn found(parameter: Parameter, place: usize, sample: &[Values]) -> FoundParameter {
+fn posterior(parameter: Parameter, place: usize, sample: &[Values]) -> FoundParameter {
     let at = |share: f64| quantile(sample.iter().map(|values| values.0[place]), share).unwrap_or(f64::NAN);
     let (low, high) = (at(0.025), at(0.975));
     let prior = |z: f64| {
@@ -157,7 +158,7 @@ fn found(parameter: Parameter, place: usize, sample: &[Values]) -> FoundParamete
     FoundParameter { parameter, value: at(0.5), low, high, identified }
 }
 
-/// Each draw with its own noise, as if it were the truth.
+/// Simulated readings of each draw, each with noise of its own.
 fn with_noise(sample: &[Values], predicted: &[Predicted], rows: &Rows, seed: u64) -> Vec<Vec<f64>> {
     let mut random = Pcg64Mcg::seed_from_u64(seed.wrapping_add(1));
     sample
@@ -165,27 +166,18 @@ fn with_noise(sample: &[Values], predicted: &[Predicted], rows: &Rows, seed: u64
         .zip(predicted)
         .map(|(values, predicted)| {
             let [.., sigma_k] = values.0;
-            let mut noise_k: Option<(f64, f64)> = None;
-            let noisy = predicted.t2_k.iter().zip(&rows.t_s).map(|(t2_k, t_s)| {
-                let z: f64 = StandardNormal.sample(&mut random);
-                let keep =
-                    noise_k.map_or(0.0, |(at_s, _)| (-(t_s - at_s) / crate::driven::density::ALIKE_S).exp());
-                let before_k = noise_k.map_or(0.0, |(_, noise_k)| noise_k);
-                let now_k = keep * before_k + sigma_k * (1.0 - keep * keep).sqrt() * z;
-                noise_k = Some((*t_s, now_k));
-                t2_k + now_k
-            });
-            noisy.collect()
+            let mut noise_k = CorrelatedNoise::new(sigma_k, CORRELATION_S);
+            let rows = predicted.t2_k.iter().zip(&rows.t_s);
+            rows.map(|(t2_k, t_s)| t2_k + noise_k.next(*t_s, StandardNormal.sample(&mut random))).collect()
         })
         .collect()
 }
 
 fn trace(air: Air, rows: &Rows, predicted: &[Predicted], noisy: &[Vec<f64>]) -> Trace {
-    let over = |i: usize, pick: &dyn Fn(&Predicted) -> &[f64]| {
+    let mean_at = |i: usize, pick: &dyn Fn(&Predicted) -> &[f64]| {
         mean(predicted.iter().map(|one| pick(one)[i])).unwrap_or(f64::NAN)
     };
     let end = |i: usize, share: f64| quantile(noisy.iter().map(|one| one[i]), share).unwrap_or(f64::NAN);
-    let every = || 0..rows.len();
     let ([_, _, p1_pa, p2_pa, t1_k], t2_k) = (rows.drives(), &rows.judged[0].1);
     let apparent = |i: usize| {
         let air = air.between(p1_pa[i], p2_pa[i]);
@@ -194,11 +186,11 @@ fn trace(air: Air, rows: &Rows, predicted: &[Predicted], noisy: &[Vec<f64>]) -> 
     Trace {
         t_s: rows.t_s.clone(),
         read_k: t2_k.clone(),
-        predicted_k: every().map(|i| over(i, &|one| &one.t2_k)).collect(),
-        low_k: every().map(|i| end(i, 0.025)).collect(),
-        high_k: every().map(|i| end(i, 0.975)).collect(),
-        efficiency: every().map(|i| over(i, &|one| &one.efficiency)).collect(),
-        apparent_efficiency: every().map(apparent).collect(),
+        predicted_k: (0..rows.len()).map(|i| mean_at(i, &|one| &one.t2_k)).collect(),
+        low_k: (0..rows.len()).map(|i| end(i, 0.025)).collect(),
+        high_k: (0..rows.len()).map(|i| end(i, 0.975)).collect(),
+        efficiency: (0..rows.len()).map(|i| mean_at(i, &|one| &one.efficiency)).collect(),
+        apparent_efficiency: (0..rows.len()).map(apparent).collect(),
     }
 }
 
@@ -223,8 +215,8 @@ fn judged(rows: &Rows, trace: &Trace, noisy: &[Vec<f64>], from: usize, until: us
     }
 }
 
-/// Influence of a parameter: change of T2 when it is set to 0.
-fn moves(
+/// Influence of a parameter: change of T2 if it is 0.
+fn influence(
     sample: &[Values],
     predicted: &[Predicted],
     rows: &Rows,

@@ -1,7 +1,7 @@
 //! Unknown parameters of the compressor side, with their priors.
 //!
-//! Priors describe passenger-car and lorry turbochargers: efficiency from published maps, heat from Burke et al., Appendix A, scaled to the
-//! declared machine. They are wide; a parameter that the log does not identify stays as wide.
+//! The priors cover turbochargers of cars and lorries: efficiency from published maps, heat from Burke et al., Appendix A, scaled to the declared
+//! machine. They are wide, and a parameter that the log does not identify keeps its prior width.
 
 use serde::Serialize;
 
@@ -32,31 +32,28 @@ pub struct Parameter {
     pub spread: Spread,
 }
 
-const fn normal(
-    name: &'static str,
-    unit: &'static str,
-    middle: f64,
-    width: f64,
-    description: &'static str,
-) -> Parameter {
+type Text = &'static str;
+
+/// A parameter with a normal prior.
+pub(crate) const fn normal(name: Text, unit: Text, middle: f64, width: f64, description: Text) -> Parameter {
     Parameter { name, description, unit, middle, width, spread: Spread::Normal }
 }
 
-const fn log_normal(
-    name: &'static str,
-    unit: &'static str,
+/// A parameter with a log-normal prior.
+pub(crate) const fn log_normal(
+    name: Text,
+    unit: Text,
     middle: f64,
     width: f64,
-    description: &'static str,
+    description: Text,
 ) -> Parameter {
     Parameter { name, description, unit, middle, width, spread: Spread::LogNormal }
 }
 
-/// Number of parameters.
-pub const COUNT: usize = PARAMETERS.len();
+pub(crate) const COUNT: usize = PARAMETERS.len();
 
 /// All parameters, in the order of [`Values`].
-pub const PARAMETERS: [Parameter; 14] = [
+pub(crate) const PARAMETERS: [Parameter; 14] = [
     normal("eta", "", 0.70, 0.06, "isentropic efficiency, total to total, at middle speed and flow"),
     normal("eta_speed", "", 0.0, 0.08, "its change per unit of relative speed"),
     normal("eta_speed_2", "", -0.10, 0.12, "its curvature over relative speed"),
@@ -71,23 +68,17 @@ pub const PARAMETERS: [Parameter; 14] = [
     ),
     normal("alpha_A", "", 0.1, 0.1, "share of the internal area before compression"),
     log_normal("capacity", "", 1.0, 0.5, "heat capacity of the housing, over the declared one"),
-    log_normal(
-        "loss",
-        "W/K",
-        2.0,
-        1.0,
-        "conductance from the housing to what surrounds it: oil, turbine, engine bay",
-    ),
-    normal("surroundings", "K", 345.0, 25.0, "temperature of what surrounds the housing"),
-    normal("housing_start", "K", 0.0, 20.0, "housing at the start, over the mean of T1 and T2 there"),
+    log_normal("loss", "W/K", 2.0, 1.0, "conductance from the housing to oil, turbine and engine bay"),
+    normal("surroundings", "K", 345.0, 25.0, "temperature of the surroundings of the housing"),
+    normal("housing_start", "K", 0.0, 20.0, "housing minus the mean of T1 and T2, at the start"),
     log_normal("probe", "mm", 2.5, 0.6, "diameter of the T2 probe's tip (eqs. 11-12)"),
-    normal("t2_offset", "K", 0.0, 1.0, "fixed offset of T2 less that of T1"),
-    log_normal("noise", "K", 0.4, 0.8, "what neither noise nor model explains, one standard deviation"),
+    normal("t2_offset", "K", 0.0, 1.0, "constant offset of T2 minus that of T1"),
+    log_normal("noise", "K", 0.4, 0.8, "residual beyond noise and model, one standard deviation"),
 ];
 
 /// Values of all parameters, in the order of [`PARAMETERS`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Values(pub [f64; COUNT]);
+pub(crate) struct Values(pub(crate) [f64; COUNT]);
 
 impl Parameter {
     /// Value at this number of prior standard deviations above the middle.

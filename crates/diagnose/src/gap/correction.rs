@@ -1,15 +1,15 @@
-//! Readings as they would have been without the causes that a diagnosis names.
+//! Subtracts the effect of the named causes from the readings.
 //!
-//! The model with the fitted causes and the same model without them follow the recording under the same true inputs. The difference of their
-//! readings is subtracted from the measured readings, so that an efficiency identified from the result is that of the machine alone. The
-//! difference depends on the model's map only as far as a cause depends on the operating point.
+//! The model with the fitted causes and the model without them run under the same true inputs. The difference of their readings is subtracted from the
+//! measured readings, so that an efficiency identified from the result is that of the machine alone. The difference depends on the map of the model only
+//! as far as a cause depends on the operating point.
 
-use crate::gap::best_fit::coordinate::{coordinates, parameters, set_parameter};
+use crate::gap::best_fit::coordinate::{coordinates, hypothesis_at, infos, unknowns};
 use crate::gap::best_fit::fit::Fit;
 use crate::gap::diagnose::Diagnosed;
 use crate::gap::findings::report::{Candidate, Verdict};
 use crate::gap::residuals::nuisance::{Circumstances, OUTPUTS};
-use crate::gap::residuals::study::{Hypothesis, PredictError, Study, members};
+use crate::gap::residuals::study::{Hypothesis, PredictError, Study};
 use mapper_core::{Channel, Recording, Series};
 use mapper_observe::channels::{DRIVERS, boundary_condition};
 use mapper_physics::machine::params::BoundaryConditions;
@@ -18,17 +18,17 @@ use mapper_physics::simulation::inputs::Inputs;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// What causes add to the readings of a recording.
+/// Effect of causes on the readings of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Changes {
-    /// Start of the first step, s: at rest before it, a zero has been taken from the readings as they are.
+    /// Start of the first step, s. Earlier readings, from which a zero may have been taken, stay unchanged.
     start_s: f64,
-    /// For each channel its change along the recording, in the channel's unit.
+    /// Change of each channel along the recording, in its unit.
     channels: BTreeMap<Channel, Series>,
 }
 
 impl Changes {
-    /// What the effects of a hypothesis add to the readings of its study.
+    /// The changes of a study's readings by the effects of a hypothesis.
     ///
     /// # Errors
     /// [`PredictError`] if the model cannot follow.
@@ -36,7 +36,7 @@ impl Changes {
         let (start_s, end_s) = study.followed_s();
         let times_s = study.table.t_s[study.table.range(start_s, end_s)].to_vec();
         let with = |step: usize| study.rig(hypothesis, step);
-        // The inputs are what they were: an error of their sensors is known, and does not act on the machine.
+        // An error of an input sensor does not act on the machine: the true inputs are equal in both runs.
         let bare = Hypothesis { effects: Vec::new(), ..hypothesis.clone() };
         let without = |step: usize| -> Result<(Rig, Circumstances), EffectError> {
             let (rig, circumstances) = study.rig(&bare, step)?;
@@ -51,7 +51,7 @@ impl Changes {
             changes[output][index] -= reading;
         })?;
         let series = |values: Vec<f64>| Series { t_s: times_s.clone(), values };
-        // P3 is an input as well: only an error of its sensor counts.
+        // P3 is also an input, of which only the error of its sensor counts.
         let outputs = OUTPUTS.iter().zip(changes).filter(|(channel, _)| !DRIVERS.contains(channel));
         let mut channels: BTreeMap<Channel, Series> =
             outputs.map(|(channel, values)| (*channel, series(values))).collect();
@@ -76,8 +76,8 @@ impl Changes {
         Ok(Changes { start_s, channels })
     }
 
-    /// The recording without these changes. Readings before the first step stay; where the model does not follow, at the start of the first
-    /// step and the end of the last, the changes are the nearest.
+    /// The recording without these changes. At the start of the first step and the end of the last, which the model does not follow, the nearest change is
+    /// used.
     pub fn subtracted_from(&self, mut recording: Recording) -> Recording {
         for (channel, change) in &self.channels {
             let own = recording.series.get_mut(channel).into_iter();
@@ -92,28 +92,25 @@ impl Changes {
     }
 }
 
-/// For each independent direction of the uncertainty of a fit's effects the hypothesis one standard deviation away; `None` if the recording
-/// does not determine them.
+/// The hypotheses one standard deviation away, in each independent direction of the uncertainty of a fit's effects; `None` if the recording does not
+/// determine the effects.
 pub fn one_sigma_away(study: &Study, fit: &Fit) -> Option<Vec<Hypothesis>> {
     let coordinates = coordinates(&study.effects, &fit.hypothesis);
-    let values = parameters(&fit.hypothesis);
+    let mode = unknowns(&fit.hypothesis, &coordinates);
+    let nuisances = fit.hypothesis.nuisances.len();
     let root = fit.covariance.clone().cholesky()?.l();
-    let count = coordinates.len().min(root.nrows());
-    let moved = (0..count)
-        .map(|direction| {
-            let mut moved = fit.hypothesis.clone();
-            for (place, (coordinate, value)) in coordinates.iter().zip(&values).enumerate().take(count) {
-                let by = root[(place, direction)];
-                set_parameter(&mut moved, place, coordinate.value(coordinate.of(*value) + by));
-            }
-            moved
-        })
-        .collect();
-    Some(moved)
+    let moved = root.column_iter().map(|direction| {
+        let mut moved = mode.clone();
+        for (index, by) in direction.iter().enumerate() {
+            moved[nuisances + index] += by;
+        }
+        hypothesis_at(&fit.hypothesis, &coordinates, &moved)
+    });
+    Some(moved.collect())
 }
 
-/// Probability below which no map is corrected by a cause. Judgement: of the diagnoses that give more than this, 94 % are right on 2000
-/// simulated campaigns (docs/validation/gap.md).
+/// Minimum probability of the causes by which a map is corrected. Judgement: of the diagnoses with a higher probability, 94 % are right on 2000 simulated
+/// campaigns (docs/validation/gap.md).
 pub const NEEDED_PROBABILITY: f64 = 0.9;
 
 /// A map before and after its correction for causes.
@@ -135,12 +132,12 @@ pub enum NotCorrected {
     NoCause,
     /// The open causes together are less probable than [`NEEDED_PROBABILITY`].
     Improbable {
-        /// Their probability.
+        /// Probability of all causes together.
         probability: f64,
     },
     /// The recording does not determine how large the causes are.
     Undetermined,
-    /// Causes that the recording does not distinguish correct differently by more than the interval.
+    /// The corrections for causes that the recording does not distinguish differ by more than the interval.
     Ambiguous {
         /// Number of the step where they differ most, relative to its interval.
         step: usize,
@@ -169,24 +166,24 @@ pub struct PointCorrection {
 }
 
 impl Diagnosed {
-    /// The open causes with their fits: the most probable first, as many as it takes to [`NEEDED_PROBABILITY`], and their probability
-    /// together. None if the diagnosis names no cause of its library.
+    /// The open causes with their fits, and their total probability: the most probable ones that together reach [`NEEDED_PROBABILITY`]. None if the
+    /// diagnosis names no cause of the library.
     pub fn open_causes(&self) -> (Vec<(&Candidate, &Fit)>, f64) {
         let mut causes: Vec<(&Candidate, &Fit)> = Vec::new();
         let mut probability = 0.0;
         if !matches!(self.diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained) {
             return (causes, probability);
         }
-        let id = |index: &usize| self.study.effects[*index].info().id.to_string();
         for candidate in &self.diagnosis.candidates {
             if probability >= NEEDED_PROBABILITY {
                 break;
             }
-            let is_its = |fit: &&Fit| {
-                let ids: Vec<String> = members(&fit.hypothesis).iter().map(id).collect();
-                ids.len() == candidate.effects.len() && ids.iter().all(|id| candidate.effects.contains(id))
+            let is_of_candidate = |fit: &&Fit| {
+                let mut ids = infos(&self.study.effects, &fit.hypothesis).map(|info| &info.id);
+                fit.hypothesis.effects.len() == candidate.effects.len()
+                    && ids.all(|id| candidate.effects.iter().any(|effect| effect == id))
             };
-            let Some(fit) = self.fits.iter().find(is_its) else { break };
+            let Some(fit) = self.fits.iter().find(is_of_candidate) else { break };
             probability += candidate.probability;
             causes.push((candidate, fit));
         }

@@ -8,7 +8,7 @@ use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::place::{Gain, places};
 use crate::gap::causes::select::{MIN_SHRINK, Search, ranked, refit, search, search_onsets, supported};
 use crate::gap::causes::smallest_seen::smallest_seen;
-use crate::gap::causes::weigh::{alike, rivals, suspicions, weigh, weight};
+use crate::gap::causes::weigh::{rivals, suspicions, weigh, weight};
 use crate::gap::findings::experiment::Experiment;
 use crate::gap::findings::report::{Diagnosis, Verdict};
 use crate::gap::findings::warning::GapWarning;
@@ -19,81 +19,75 @@ use crate::gap::next_experiment::best_experiment::{Suggested, next, sensor_near}
 use crate::gap::preconditions::default_tolerances::assumed;
 use crate::gap::preconditions::machine_mismatch::another_machine;
 pub use crate::gap::preconditions::problem::GapError;
-use crate::gap::preconditions::problem::Problem;
-use crate::gap::preconditions::usable::usable;
+use crate::gap::preconditions::usable::checked_study;
 use crate::gap::reference::healthy::Healthy;
-use crate::gap::residuals::actuators::Actuators;
 use crate::gap::residuals::study::{Hypothesis, Prediction, Study, members};
 use crate::gap::residuals::whiten::Linearised;
 use mapper_core::Recording;
-use mapper_observe::averages::time_table::Table;
 use mapper_observe::declared::Declared;
 use mapper_observe::model_inputs::step_timing::with_command_times;
-use mapper_physics::rig::effect::Effect;
-use mapper_physics::rig::effect::Submodel;
+use mapper_physics::rig::effect::{Effect, Submodel};
 use mapper_physics::simulation::model::Model;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-/// What a diagnosis starts from.
-pub struct Question<'a> {
-    /// What was recorded.
+/// Input of a diagnosis.
+pub struct GapRequest<'a> {
+    /// The recording to explain.
     pub recording: &'a Recording,
-    /// What is declared.
+    /// Declared tolerances, noise and conditions.
     pub declared: Declared,
-    /// A recording of the same rig and steps in which nothing was wrong: what is asked then is what changed since.
+    /// A fault-free recording of the same rig and steps; the diagnosis then explains the changes since.
     pub healthy: Option<Healthy<'a>>,
     /// The nominal machine.
     pub model: Model,
     /// Candidate effects.
     pub effects: Vec<Arc<dyn Effect>>,
-    /// Whether the campaign declares its tolerances; where it does not, the usual ones hold, and its actuators follow as the
-    /// recording says.
+    /// Whether the campaign declares tolerances. If not, default tolerances hold, and the actuator responses are estimated from the recording.
     pub tolerances_declared: bool,
-    /// Experiments allowed on this machine to distinguish causes; if they contain no jump, those of the recording.
+    /// Experiments allowed on this machine to distinguish causes; if they contain no jump, the recorded jumps are allowed.
     pub experiments: Vec<Experiment>,
-    /// Numbers behind the probabilities.
+    /// Constants of the probabilities.
     pub calibration: Calibration,
-    /// The recording without effects linearised at the nominal model, if that is known.
+    /// Linearisation of the recording at the nominal model without effects, if it is already available.
     pub linearised: Option<Linearised>,
-    /// Receives the share done and the name of the next stage.
+    /// Receives the completed share and the name of the next stage.
     pub progress: &'a (dyn Fn(f64, &str) + Sync),
 }
 
-/// A diagnosis with what it was made from, for pictures and calibration.
+/// A diagnosis with its fits, for figures and calibration.
 #[derive(Debug)]
 pub struct Diagnosed {
     /// The diagnosis.
     pub diagnosis: Diagnosis,
-    /// The recording made ready.
+    /// The prepared recording.
     pub study: Study,
-    /// Tolerances alone, on all steps.
+    /// Fit of the tolerances alone, on all steps.
     pub null: Fit,
-    /// Prediction and whitened residual of the nominal model with the tolerances of the best fit, but without its cause:
-    /// in [`Diagnosed::null`] tolerances are strained to stand in for it. The null itself where no cause is named.
+    /// Prediction and whitened residual of the nominal model with the tolerances of the best fit, but without its cause. In
+    /// [`Diagnosed::null`] the tolerances imitate the cause. Equal to the null if no cause is named.
     pub without_cause: (Prediction, Vec<f64>),
     /// Best fits on all steps, best first.
     pub fits: Vec<Fit>,
-    /// The best fit, or that of a law that [accounts](Diagnosed::accounted_by) for the gap, with what people call it; `None`
-    /// where nothing was fitted.
+    /// The best fit, or the fit of a [law](Diagnosed::explain_by) that explains the gap, with its name for people; `None` without a fit.
     pub with_cause: Option<(&'static str, Fit)>,
-    /// What the best leaves.
+    /// Tests of the residual of the best fit.
     pub adequacy: Adequacy,
     /// Whitening and derivatives.
     pub linearised: Linearised,
 }
 
-/// Fits of the search that are made again on all steps.
+/// Number of fits of the search that are refitted on all steps.
 const FINALISTS: usize = 7;
-/// Of these, beyond the first three, a fit this far behind the best in the logarithm of the evidence is left out.
+/// Difference of the log evidence from the best above which a finalist after the third is dropped.
 const HOPELESS: f64 = 60.0;
 
 /// Diagnoses a recording.
 ///
 /// # Errors
-/// [`GapError`] with a clear word where no diagnosis can be made.
-pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
-    let Question {
+/// [`GapError`] if no diagnosis is possible.
+pub fn diagnose(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
+    let GapRequest {
         recording,
         declared,
         healthy,
@@ -104,14 +98,11 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         calibration,
         linearised,
         progress,
-    } = question;
+    } = request;
     progress(0.0, "reading");
     let recording = &with_command_times(recording);
-    let table = Table::new(recording).ok_or(Problem::Empty)?;
-    let mut warnings = usable(recording, &table, &declared)?;
-    let actuators = Actuators::of(&table, recording, &declared, tolerances_declared);
     let (nominal, mut since) = (model.clone(), None);
-    let mut study = Study::with_actuators(recording, table, declared, model, effects, actuators);
+    let (mut study, mut warnings) = checked_study(recording, declared, model, effects, tolerances_declared)?;
     if let Some(healthy) = healthy {
         progress(0.01, "the healthy recording");
         let changed = study.since(healthy, nominal, tolerances_declared)?;
@@ -129,20 +120,15 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         None => Linearised::new(&study)?,
     };
     another_machine(&study, &linearised.base.values)?;
-    // Hold-outs are chosen by place, before anything is fitted.
+    // Held-out steps are selected before any fit.
     let folds = Folds::of(&study);
     let everywhere = Selection::all(&study);
-    let at = |linearised| Search {
-        study: &study,
-        linearised,
-        selection: &everywhere,
-        calibration: &calibration,
-        onsets: false,
-    };
+    let (selection, calibration) = (&everywhere, &calibration);
+    let at = |linearised| Search { study: &study, linearised, selection, calibration, onsets: false };
     let found = search(at(&linearised), progress)?;
     progress(0.65, "closest causes");
     let null = found.null;
-    let at_best = found.refound.as_ref().map_or(&linearised, |(linearised, _)| linearised);
+    let at_best = found.relinearised.as_ref().map_or(&linearised, |(linearised, _)| linearised);
     let hopeless = |f: &&Fit| found.fits.first().is_some_and(|best| best.score - f.score > HOPELESS);
     let mut finalists: Vec<&Fit> = found
         .fits
@@ -152,7 +138,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         .filter(|(place, f)| *place < 3 || !hopeless(f))
         .map(|(_, f)| f)
         .collect();
-    // Whatever a pair adds, its members alone must have lost likewise.
+    // A pair is only compared fairly if its members alone are refitted, too.
     if let Some(best) = found.fits.first() {
         for effect in members(&best.hypothesis) {
             let alone = found.fits.iter().find(|f| members(&f.hypothesis) == [effect]);
@@ -162,14 +148,14 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     let effort = Effort { iterations: 5, enough: 0.1, ..Effort::default() };
     let mut fits = refit(&at(at_best), &finalists, effort);
     // Close candidates are compared with the linearisation at the best fit, not at the nominal point.
-    let refound = match (fits.first(), &found.refound) {
+    let relinearised = match (fits.first(), &found.relinearised) {
         (Some(best), Some((_, there))) if members(&best.hypothesis) != *there => {
             linearised.at(&study, &best.hypothesis).ok()
         }
         _ => None,
     };
-    let at_best = refound.as_ref().unwrap_or(at_best);
-    if refound.is_some() {
+    let at_best = relinearised.as_ref().unwrap_or(at_best);
+    if relinearised.is_some() {
         let (closest, others) = fits.split_at(fits.len().min(4));
         let again = refit(&at(at_best), &closest.iter().collect::<Vec<_>>(), effort);
         fits = ranked(&at(at_best), again.iter().chain(closest).chain(others));
@@ -181,13 +167,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     if calibration.outside(left.features()) > 0.5 && folds.steps.len() > 1 {
         progress(0.8, "causes that begin");
         study.add_onsets();
-        let at = Search {
-            study: &study,
-            linearised: at_best,
-            selection: &everywhere,
-            calibration: &calibration,
-            onsets: true,
-        };
+        let at = Search { study: &study, linearised: at_best, selection, calibration, onsets: true };
         search_onsets(at, &null, &mut fits);
         fits.truncate(FINALISTS);
         fits = supported(&at, fits);
@@ -198,18 +178,14 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     progress(0.88, "residual");
     let best = fits.first().unwrap_or(&null);
     let left_by_null = adequacy(&study, &linearised, &null, 0.0);
-    let posterior = weigh(&study, &calibration, &null, &fits, &left);
+    let posterior = weigh(&study, calibration, &null, &fits, &left);
     let named = posterior.named;
-    let weight = |fit: &Fit| weight(&calibration, &study, fit);
-    // Causes that the data do not distinguish: each fold chooses among them again, and they share the place.
-    let alike: Vec<&Fit> = if named { alike(&posterior, &calibration, &fits, &weight) } else { Vec::new() };
-    let compared = Compared {
-        study: &study,
-        linearised: [&linearised, at_best],
-        null: &null,
-        causes: &alike,
-        weight: &weight,
-    };
+    let weight = |fit: &Fit| weight(calibration, &study, fit);
+    // Each fold chooses among the causes that the data do not distinguish, and they share the location.
+    let alike: Vec<&Fit> = posterior.alike.iter().map(|place| &fits[*place]).collect();
+    let linearisations = [&linearised, at_best];
+    let compared =
+        Compared { study: &study, linearised: linearisations, null: &null, causes: &alike, weight: &weight };
     let gap = how_far(compared, &folds);
     let verdict = if !named {
         if posterior.outside > 0.5 { Verdict::Unexplained } else { Verdict::WithinTolerance }
@@ -254,7 +230,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
             .unwrap_or_default(),
     };
     let smallest_seen = if verdict == Verdict::WithinTolerance {
-        smallest_seen(&study, &linearised, &calibration)
+        smallest_seen(&study, &linearised, calibration)
     } else {
         Vec::new()
     };
@@ -285,8 +261,8 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
 }
 
 impl Diagnosed {
-    /// From here on pictures show what a law that was found leaves, not what the nearest of the catalogue does.
-    pub fn accounted_by(&mut self, law: Fit) {
+    /// Replaces the cause by a fitted law, for figures.
+    pub fn explain_by(&mut self, law: Fit) {
         if let Some(without) = without_cause(&self.study, &self.linearised, Some(&law)) {
             self.without_cause = without;
         }
@@ -294,14 +270,14 @@ impl Diagnosed {
     }
 }
 
-/// Maximum that one more effect takes off the misfit of the best. The release of a strained tolerance does not count: it is a suspect of its
-/// own, and no evidence of a cause outside the library.
+/// Maximum decrease of the misfit by one additional effect. The part that relieves a strained tolerance does not count: the tolerance is already a
+/// suspect.
 fn most_gain(study: &Study, linearised: &Linearised, selection: &Selection, base: &Fit) -> f64 {
     let most = additions(study, linearised, selection, base).into_iter().map(|a| a.gain).fold(0.0, f64::max);
     (most - cost_beyond_prior(base)).max(0.0)
 }
 
-/// Parts that only some of the indistinguishable causes have.
+/// Machine parts of some, but not all, of the indistinguishable causes.
 fn inseparable(study: &Study, named: &[&Fit]) -> Vec<String> {
     let parts = |fit: &Fit| -> BTreeSet<Submodel> {
         members(&fit.hypothesis).iter().map(|effect| study.effects[*effect].info().submodel).collect()

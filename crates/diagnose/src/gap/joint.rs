@@ -4,8 +4,7 @@
 //! mode `x_i` and a precision `P_i` with nuisance priors `D`, starts integrated out. The joint solution is `P = sum (P_i - D) + D`, `P x =
 //! sum P_i x_i`, so shared information is counted once.
 
-use crate::gap::best_fit::coordinate::{Coordinate, coordinates, parameters};
-use crate::gap::best_fit::first_step::is_start;
+use crate::gap::best_fit::coordinate::{Coordinate, coordinates, infos, parameters, unknowns};
 use crate::gap::best_fit::fit::{Effort, Fit, fit};
 use crate::gap::best_fit::selection::Selection;
 use crate::gap::causes::calibration::Calibration;
@@ -195,30 +194,21 @@ fn refitted(diagnosed: &Diagnosed, effects: &EffectValues) -> Option<(Fit, Vec<b
 }
 
 fn neutral_coordinates(study: &Study, hypothesis: &Hypothesis, at: &[Coordinate]) -> Vec<f64> {
-    let parameters =
-        hypothesis.effects.iter().flat_map(|(index, _)| &study.effects[*index].info().parameters);
+    let parameters = infos(&study.effects, hypothesis).flat_map(|info| &info.parameters);
     parameters.zip(at).map(|(parameter, coordinate)| coordinate.of(parameter.neutral)).collect()
 }
 
 /// Joint coordinate of one parameter over several recordings, and its standard error.
 fn together(study: &Study, fits: Vec<&Fit>, at: &[Coordinate], wanted: usize) -> Option<(f64, f64)> {
     let starts: Vec<usize> =
-        study.nuisances.iter().enumerate().filter(|(_, n)| is_start(n.kind)).map(|(i, _)| i).collect();
+        study.nuisances.iter().enumerate().filter(|(_, n)| n.kind.is_start()).map(|(i, _)| i).collect();
     let nuisances = study.nuisances.len();
     let kept: Vec<usize> = (0..nuisances + at.len()).filter(|i| !starts.contains(i)).collect();
     let shared = kept.iter().filter(|i| **i < nuisances).count();
     let n = kept.len();
     let (mut precision, mut right) = (DMatrix::zeros(n, n), DVector::zeros(n));
     for fit in fits {
-        let values = parameters(&fit.hypothesis);
-        let mode = DVector::from_fn(n, |i, _| {
-            let place = kept[i];
-            if place < nuisances {
-                fit.hypothesis.nuisances[place]
-            } else {
-                at[place - nuisances].of(values[place - nuisances])
-            }
-        });
+        let mode = unknowns(&fit.hypothesis, at).select_rows(&kept);
         let part = |rows: &[usize], columns: &[usize]| {
             DMatrix::from_fn(rows.len(), columns.len(), |i, j| fit.precision[(rows[i], columns[j])])
         };

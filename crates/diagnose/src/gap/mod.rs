@@ -6,7 +6,7 @@ pub mod causes;
 pub mod correction;
 pub mod diagnose;
 pub mod findings;
-pub mod gap_reduction;
+pub(crate) mod gap_reduction;
 pub mod joint;
 pub mod next_experiment;
 pub mod preconditions;

@@ -1,12 +1,12 @@
 //! Calibrated model: machine, effects and tolerances from a diagnosis, its forecasts, and their verification.
 
-use crate::gap::best_fit::coordinate::coordinates;
-use crate::gap::best_fit::fit::{Fit, changes_near, effect_changes};
+use crate::gap::best_fit::coordinate::{coordinates, infos};
+use crate::gap::best_fit::fit::{changes_near, effect_changes};
 use crate::gap::diagnose::Diagnosed;
 use crate::gap::findings::report::Verdict;
-use crate::gap::next_experiment::outlook::{Alike, COARSE_S, imagined_steps};
-use crate::gap::residuals::nuisance::{OFFSET_PREFIX, OUTPUTS};
-use crate::gap::residuals::study::{Hypothesis, Study};
+use crate::gap::next_experiment::outlook::{COARSE_S, SimulatedRig, simulated_steps};
+use crate::gap::residuals::nuisance::{Nuisance, OFFSET_PREFIX, OUTPUTS};
+use crate::gap::residuals::study::{Hypothesis, PredictError, Study};
 use crate::gap::residuals::whiten::{Linearised, dot, nuisance_changes};
 use mapper_core::{Channel, StepMarker, half_width_95};
 use mapper_inference::descent::FINE;
@@ -30,7 +30,7 @@ pub struct FoundEffect {
 pub struct FoundTolerance {
     /// Name of the tolerance.
     pub name: String,
-    /// Fitted value, in the unit of what it changes; ratios for gains and scales.
+    /// Fitted value, in the unit of the changed quantity; ratios for gains and scales.
     pub value: f64,
     /// Prior standard deviation.
     pub sigma: f64,
@@ -64,7 +64,7 @@ pub struct Found {
 pub enum TwinError {
     /// The nuisance parameters differ.
     #[error(
-        "the diagnosis knows other tolerances than this campaign and recording ({theirs} and {ours}): take the campaign, channels and sensors of the diagnosis"
+        "the diagnosis has {theirs} tolerances, this campaign and recording have {ours} or others: use the campaign, channels and sensors of the diagnosis"
     )]
     Tolerances {
         /// In the diagnosis.
@@ -73,54 +73,42 @@ pub enum TwinError {
         ours: usize,
     },
     /// An unknown effect.
-    #[error("effect `{0}` of the diagnosis is not in the catalogue; give it with --effect")]
+    #[error("effect `{0}` of the diagnosis is not in the effect library; add it with --effect")]
     Effect(String),
     /// Invalid covariance.
-    #[error("the covariance of the diagnosis is not one of its {0} tolerances and parameters")]
+    #[error(
+        "the covariance of the diagnosis does not have {0} rows and columns, one for each tolerance and parameter"
+    )]
     Covariance(usize),
     /// The model cannot follow the recording.
     #[error(transparent)]
-    Predict(#[from] crate::gap::residuals::study::PredictError),
-}
-
-fn is_start(name: &str) -> bool {
-    name == "StartTc" || name == "StartTt"
+    Predict(#[from] PredictError),
 }
 
 impl Found {
     /// Result of a diagnosis; `None` if the covariance cannot be formed.
     pub fn of(diagnosed: &Diagnosed) -> Option<Found> {
         let named = matches!(diagnosed.diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained);
-        let best = diagnosed.fits.first().filter(|_| named).unwrap_or(&diagnosed.null);
-        let found = Found::of_fit(&diagnosed.study, best)?;
-        Some(Found { doubt: diagnosed.diagnosis.doubt(), ..found })
-    }
-
-    fn of_fit(study: &Study, fit: &Fit) -> Option<Found> {
+        let fit = diagnosed.fits.first().filter(|_| named).unwrap_or(&diagnosed.null);
+        let (study, Hypothesis { nuisances, effects }) = (&diagnosed.study, &fit.hypothesis);
         let covariance = fit.precision.clone().cholesky()?.inverse();
-        let tolerance =
-            |(nuisance, sigmas): (&crate::gap::residuals::nuisance::Nuisance, &f64)| FoundTolerance {
-                name: nuisance.kind.to_string(),
-                value: nuisance.value(*sigmas),
-                sigma: nuisance.sigma,
-            };
+        let tolerance = |(nuisance, sigmas): (&Nuisance, &f64)| FoundTolerance {
+            name: nuisance.kind.to_string(),
+            value: nuisance.value(*sigmas),
+            sigma: nuisance.sigma,
+        };
+        let ids = infos(&study.effects, &fit.hypothesis).map(|info| info.id.to_string());
+        let effects =
+            ids.zip(effects).map(|(id, (_, values))| FoundEffect { id, values: values.clone() }).collect();
         Some(Found {
-            effects: fit
-                .hypothesis
-                .effects
-                .iter()
-                .map(|(index, values)| FoundEffect {
-                    id: study.effects[*index].info().id.to_string(),
-                    values: values.clone(),
-                })
-                .collect(),
-            tolerances: study.nuisances.iter().zip(&fit.hypothesis.nuisances).map(tolerance).collect(),
+            effects,
+            tolerances: study.nuisances.iter().zip(nuisances).map(tolerance).collect(),
             covariance: covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
-            doubt: None,
+            doubt: diagnosed.diagnosis.doubt(),
         })
     }
 
-    /// Hypothesis of a calibrated model for another recording, with its covariance; that recording's start is still unknown.
+    /// The hypothesis for another recording, whose initial state is unknown, with its covariance.
     fn hypothesis(&self, study: &Study) -> Result<(Hypothesis, DMatrix<f64>), TwinError> {
         let same = study.nuisances.len() == self.tolerances.len()
             && study
@@ -145,7 +133,7 @@ impl Found {
         let mut covariance = DMatrix::from_fn(n, n, |i, j| self.covariance[i][j]);
         let mut nuisances = Vec::with_capacity(self.tolerances.len());
         for (i, found) in self.tolerances.iter().enumerate() {
-            if is_start(&found.name) {
+            if study.nuisances[i].kind.is_start() {
                 covariance.row_mut(i).fill(0.0);
                 covariance.column_mut(i).fill(0.0);
                 covariance[(i, i)] = 1.0;
@@ -184,8 +172,8 @@ pub struct Held {
     pub channels: BTreeMap<String, HeldChannel>,
 }
 
-/// Compares a calibrated model with a recording it was not fitted to, driven by the recorded inputs. Values are decorrelated block means
-/// within a step; each band includes noise and the model's uncertainty.
+/// Compares a calibrated model, driven by the recorded inputs, with a recording to which it was not fitted. The compared values are block means,
+/// decorrelated within each step; their bands include the noise and the uncertainty of the model.
 ///
 /// # Errors
 /// [`TwinError`].
@@ -195,7 +183,7 @@ pub fn hold(study: &Study, found: &Found) -> Result<Held, TwinError> {
     let there = nominal.at(study, &hypothesis)?;
     let at = coordinates(&study.effects, &hypothesis);
     let mut columns = there.columns.clone();
-    columns.extend(effect_changes(study, &nominal, &hypothesis, &there.base, &at));
+    columns.extend(effect_changes(study, &nominal, &hypothesis, &there.base, &at, FINE));
     let residual = nominal.residual(study, &there.base);
     let spread = |row: usize| {
         let j = DVector::from_fn(columns.len(), |i, _| columns[i][row]);
@@ -242,24 +230,21 @@ pub struct Expected {
     pub channels: BTreeMap<String, [f64; 2]>,
 }
 
-/// Forecasts the ends of planned steps with the campaign's inputs.
+/// Forecasts the ends of planned steps under the campaign's inputs.
 ///
 /// # Errors
 /// [`TwinError`]; no steps if the nominal machine cannot settle at the first.
 pub fn forecast_steps(
-    like: Alike,
+    rig: SimulatedRig,
     steps: Vec<StepMarker>,
     found: &Found,
 ) -> Result<Vec<Expected>, TwinError> {
     let rest = steps.first().and_then(|step| step.to);
-    let study = rest.and_then(|rest| imagined_steps(like, steps, &rest, COARSE_S, |_| None));
+    let study = rest.and_then(|rest| simulated_steps(rig, steps, &rest, COARSE_S, |_| None));
     study.map_or_else(|| Ok(Vec::new()), |study| forecast(&study, found))
 }
 
 /// Forecasts the ends of a study's steps; the bands include model uncertainty and the noise of a reading.
-///
-/// # Errors
-/// [`TwinError`].
 fn forecast(study: &Study, found: &Found) -> Result<Vec<Expected>, TwinError> {
     let (hypothesis, covariance) = found.hypothesis(study)?;
     let here = study.predict(&hypothesis)?;

@@ -8,19 +8,19 @@ use crate::gap::causes::additions::additions;
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::place::{BEND, Explanation, Gain, Part, RARITY, of_fits, places_of, signature};
 use crate::gap::causes::select::MIN_SHRINK;
-use crate::gap::causes::weigh::{MAX_EQUIVALENT, distinguishing, weight};
+use crate::gap::causes::weigh::{MAX_EQUIVALENT, evidence_resolution, weight};
 use crate::gap::diagnose::Diagnosed;
 use crate::gap::findings::report::{Law, MissingForce, Place, Verdict};
 use crate::gap::gap_reduction::how_far::channels_on;
 use crate::gap::residuals::study::{Study, members};
-use crate::missing_terms::laws::candidate::{Bench, Candidate, keep_determined, worth};
+use crate::missing_terms::laws::candidate::{Bench, Candidate, keep_determined, promising};
 use crate::missing_terms::laws::script::script;
 use crate::missing_terms::laws::sentence::{LawDescription, tell};
 use crate::missing_terms::search::columns::{Base, Products};
 use crate::missing_terms::search::onset::begun;
 use crate::missing_terms::search::residual_source::{Force, forces};
 use crate::missing_terms::search::select::{Choice, choices};
-use crate::missing_terms::terms::balance::Balance;
+use crate::missing_terms::terms::balance::{Balance, Properties};
 use crate::missing_terms::terms::library::library;
 
 /// Results outside the effect library.
@@ -58,9 +58,7 @@ pub fn discover(
     }
     let nothing = Base::nothing(study, linearised);
     let mut bench = Bench { study: study.clone(), library };
-    let mut found = found(&mut bench, &nothing, &training, &everywhere, &|fit| {
-        adequacy(study, linearised, fit, 0.0).may_be_noise()
-    });
+    let mut found = found(&mut bench, diagnosed, &nothing, &training, &everywhere);
     progress(0.4, "a law together with a cause");
     let left = found.as_ref().is_none_or(|found| !found.adequate);
     if left
@@ -72,7 +70,7 @@ pub fn discover(
         let better = found.as_ref().is_none_or(|alone| score(&both) > score(alone) + RARITY);
         found = if better { Some(both) } else { found };
     }
-    progress(0.6, "what a law leaves");
+    progress(0.6, "residual of the law");
     let laws = propose(diagnosed, calibration, &bench, found.as_ref(), &training);
     // If a law leaves only noise, linear gains of other parts are irrelevant.
     let settled = laws.first().filter(|law| law.probability > 0.5);
@@ -80,7 +78,8 @@ pub fn discover(
     let settled_fit = settled.and(best).map(|best| best.fit.clone());
     let bend = if settled.is_some() { 0.0 } else { BEND };
     progress(0.7, "missing forces");
-    let here = |balance: &Balance| settled.is_none_or(|law| law.submodel == balance.submodel().name());
+    let here =
+        |balance: &Balance| settled.is_none_or(|law| law.submodel == balance.properties().submodel.name());
     let forces = forces(&nothing, &everywhere.steps, &here);
     let places = places(diagnosed, &bench, found.as_ref(), &forces, null, bend);
     progress(1.0, "done");
@@ -107,7 +106,6 @@ pub fn wanted(diagnosed: &Diagnosed) -> bool {
             && diagnosed.diagnosis.probability_outside > 0.5)
 }
 
-/// Fitted laws.
 struct FittedLaws {
     /// Fits to the training steps, best first.
     trained: Vec<Candidate>,
@@ -129,18 +127,18 @@ fn together_with_cause(
 ) -> Option<FittedLaws> {
     let Diagnosed { study, linearised, .. } = diagnosed;
     let there = linearised.at(study, &best.hypothesis).ok()?;
-    let base = Base::beside(study, &there, best);
-    found(bench, &base, training, everywhere, &|fit| adequacy(study, linearised, fit, 0.0).may_be_noise())
+    found(bench, diagnosed, &Base::at_fit(study, &there, best), training, everywhere)
 }
 
 /// Searches the term library from a base: in closed form, then with model runs.
 fn found(
     bench: &mut Bench,
+    diagnosed: &Diagnosed,
     base: &Base<'_>,
     training: &Selection,
     everywhere: &Selection,
-    adequate: &dyn Fn(&Fit) -> bool,
 ) -> Option<FittedLaws> {
+    let adequate = |fit: &Fit| adequacy(&diagnosed.study, &diagnosed.linearised, fit, 0.0).may_be_noise();
     let changes = base.changes(&bench.library);
     let usable: Vec<usize> = (0..changes.len()).filter(|place| changes[*place].is_some()).collect();
     let columns: Vec<Vec<f64>> = changes.into_iter().flatten().collect();
@@ -154,7 +152,7 @@ fn found(
         })
         .collect();
     let in_folds: Vec<Vec<Choice>> = folds.iter().filter_map(|counts| of(counts)).collect();
-    let chosen = worth(&bench.library, &on_training);
+    let chosen = promising(&bench.library, &on_training);
     let found = fitted(bench, base, &chosen, training, everywhere)?;
     let (trained, fitted_best) = (found.0.first()?, found.1.first()?);
     let part = |choice: &Choice| bench.library[choice.terms[0]].submodel();
@@ -194,15 +192,16 @@ fn fitted(
     everywhere: &Selection,
 ) -> Option<(Vec<Candidate>, Vec<Candidate>)> {
     let quick = Effort { iterations: 3, enough: 1.0, ..Effort::default() };
-    let mut trained = bench.fit(&base.hypothesis, base.linearised, chosen, training, quick);
+    let starts: Vec<_> = chosen.iter().map(|choice| bench.start(&base.hypothesis, choice)).collect();
+    let mut trained = bench.fit(starts.into_iter(), base.linearised, training, quick);
     keep_determined(&bench.library, &mut trained);
     trained.truncate(1 + MAX_EQUIVALENT);
     // Tolerances act differently in the presence of a strong term.
     let at_trained = base.linearised.at(&bench.study, &trained.first()?.fit.hypothesis).ok();
     let linearised = at_trained.as_ref().unwrap_or(base.linearised);
     let effort = Effort { iterations: 5, enough: 0.2, ..Effort::default() };
-    let trained = bench.refit(&trained, linearised, training, effort);
-    let mut fitted = bench.refit(&trained, linearised, everywhere, effort);
+    let trained = bench.fit(trained.iter().map(Candidate::restart), linearised, training, effort);
+    let mut fitted = bench.fit(trained.iter().map(Candidate::restart), linearised, everywhere, effort);
     keep_determined(&bench.library, &mut fitted);
     Some((trained, fitted))
 }
@@ -257,7 +256,7 @@ fn propose(
         .map(|addition| addition.gain)
         .fold(0.0, f64::max);
     let left = calibration.outside(adequacy(&bench.study, linearised, &best.fit, one_more).features());
-    let near = |other: &&Candidate| best.score() - other.score() < distinguishing(calibration);
+    let near = |other: &&Candidate| best.score() - other.score() < evidence_resolution(calibration);
     let weights: f64 = found
         .fitted
         .iter()
@@ -335,7 +334,7 @@ fn places(
     let linear_null = 0.5 * (null.cost - linear_cost(diagnosed));
     for force in forces.iter().filter(|force| force.gain > 0.0) {
         let part = Part {
-            submodel: force.balance.submodel(),
+            submodel: force.balance.properties().submodel,
             gain: 2.0 * force.gain,
             signature: Box::new(move || Some(force.signature.clone())),
         };
@@ -352,10 +351,11 @@ fn linear_cost(diagnosed: &Diagnosed) -> f64 {
 }
 
 fn reported_force(force: Force) -> MissingForce {
+    let Properties { submodel, words, unit, .. } = force.balance.properties();
     MissingForce {
-        submodel: force.balance.submodel().name().to_owned(),
-        force: force.balance.words(),
-        unit: force.balance.unit().to_owned(),
+        submodel: submodel.name().to_owned(),
+        force: words,
+        unit: unit.to_owned(),
         evidence: force.gain,
         steps: force
             .levels

@@ -5,15 +5,15 @@
 use crate::driven::common::{self, Course, ELEMENT_LAG, declared, engine, healthy};
 use mapper_core::{Channel, Recording};
 use mapper_diagnose::driven::DrivenError;
-use mapper_diagnose::driven::cause_search::{Ask, Diagnosis, Which, Word, diagnose};
+use mapper_diagnose::driven::cause_search::{Diagnosis, Side, SideRequest, SideVerdict, diagnose};
 use mapper_diagnose::gap::causes::calibration::Calibration;
 use mapper_effects::catalogue;
 use mapper_physics::rig::effect::Rig;
 use mapper_physics::rig::sensor_fault::{is_only_on_stands, log_effects};
 use mapper_physics::simulation::model::Model;
 
-fn diagnosis(recording: &Recording, side: Which, fit_until_s: f64) -> Diagnosis {
-    let ask = Ask {
+fn diagnosis(recording: &Recording, side: Side, fit_until_s: f64) -> Diagnosis {
+    let ask = SideRequest {
         recording,
         nominal: &Rig::new(Model::nominal()),
         effects: &catalogue(),
@@ -25,7 +25,7 @@ fn diagnosis(recording: &Recording, side: Which, fit_until_s: f64) -> Diagnosis 
     diagnose(&ask, side).unwrap()
 }
 
-const COMPRESSOR: Which = Which::Compressor;
+const COMPRESSOR: Side = Side::Compressor;
 /// One; docs/validation/real-data.md has ten.
 fn seeds() -> u64 {
     std::env::var("MAPPER_WHY_SEEDS").map_or(1, |seeds| seeds.parse().unwrap())
@@ -37,17 +37,11 @@ fn open(found: &Diagnosis) -> Vec<String> {
 }
 
 /// Diagnoses an engine of each seed with a planted cause, fitted to the whole log. `without` is not recorded.
-fn all_of(side: Which, course: &Course, planted: &[(&str, f64)], without: &[Channel]) -> Vec<Diagnosis> {
+fn all_of(side: Side, course: &Course, planted: &[(&str, f64)], without: &[Channel]) -> Vec<Diagnosis> {
     (0..seeds()).map(|seed| one_of(seed, side, course, planted, without)).collect()
 }
 
-fn one_of(
-    seed: u64,
-    side: Which,
-    course: &Course,
-    planted: &[(&str, f64)],
-    without: &[Channel],
-) -> Diagnosis {
+fn one_of(seed: u64, side: Side, course: &Course, planted: &[(&str, f64)], without: &[Channel]) -> Diagnosis {
     let (mut recording, _) = engine(seed, course, planted, healthy);
     recording.series.retain(|channel, _| !without.contains(channel));
     diagnosis(&recording, side, f64::INFINITY)
@@ -70,7 +64,7 @@ fn count(found: &[Diagnosis], right: impl Fn(&Diagnosis) -> bool) -> usize {
 }
 
 fn is_named(found: &Diagnosis, effect: &str) -> bool {
-    found.word == Word::Named && open(found) == [effect]
+    found.word == SideVerdict::Named && open(found) == [effect]
 }
 
 /// One seed of several may fail.
@@ -80,9 +74,9 @@ fn almost_all() -> usize {
 
 #[test]
 fn without_a_cause_none_is_named() {
-    let nothing = |found: &Diagnosis| found.word == Word::WithinTolerance && found.open == 0;
+    let nothing = |found: &Diagnosis| found.word == SideVerdict::WithinTolerance && found.open == 0;
     for (course, without) in [(Course::brake(), &[][..]), (Course::hills(), &[Channel::Tc, Channel::Tt])] {
-        for side in [COMPRESSOR, Which::Turbine] {
+        for side in [COMPRESSOR, Side::Turbine] {
             let found = all_of(side, &course, &[], without);
             assert!(count(&found, nothing) >= almost_all(), "{side:?} {without:?}");
         }
@@ -158,7 +152,7 @@ fn what_four_minutes_show_is_named_or_reported_to_be_alike() {
         .map(|seed| one_of(seed, COMPRESSOR, &hills, &[("t2_offset", 10.0)], no_tc))
         .collect();
     let alike = |found: &Diagnosis| {
-        found.word == Word::NotDistinguished && open(found).contains(&"t2_offset".to_owned())
+        found.word == SideVerdict::NotDistinguished && open(found).contains(&"t2_offset".to_owned())
     };
     assert!(count(&found, alike) >= almost_all());
 }
@@ -210,7 +204,7 @@ fn a_cause_outside_the_catalogue_is_reported_to_be_outside() {
         diagnosis(&recording, COMPRESSOR, f64::INFINITY)
     });
     let outside: Vec<Diagnosis> = outside.collect();
-    assert!(count(&outside, |found| found.word == Word::Outside) >= almost_all());
+    assert!(count(&outside, |found| found.word == SideVerdict::Outside) >= almost_all());
 }
 
 #[test]
@@ -219,13 +213,13 @@ fn slow_probes_of_the_turbine_side_are_named() {
     let near = |found: &Diagnosis, effect: &str, share: f64| {
         found.causes[0].parameters.get(effect).is_some_and(|s| (s.value / 1.5 - 1.0).abs() < share)
     };
-    let found = all_of(Which::Turbine, &Course::hills(), &[("t4_lag", 1.5)], without);
+    let found = all_of(Side::Turbine, &Course::hills(), &[("t4_lag", 1.5)], without);
     assert!(count(&found, |found| is_named(found, "t4_lag") && near(found, "t4_lag", 0.05)) >= almost_all());
     // T3 is an input: its lag cannot be corrected completely, and the residual looks like an additional short lag of T4.
-    let found = all_of(Which::Turbine, &Course::hills(), &[("t3_lag", 1.5)], without);
+    let found = all_of(Side::Turbine, &Course::hills(), &[("t3_lag", 1.5)], without);
     assert!(count(&found, |found| found.open == 1 && near(found, "t3_lag", 0.15)) >= almost_all());
     // Only the difference of the two probes is observable.
-    let found = all_of(Which::Turbine, &Course::hills(), &[("t4_offset", 30.0)], without);
+    let found = all_of(Side::Turbine, &Course::hills(), &[("t4_offset", 30.0)], without);
     let alike = |found: &Diagnosis| {
         let mut open = open(found);
         open.sort();
@@ -233,7 +227,7 @@ fn slow_probes_of_the_turbine_side_are_named() {
     };
     assert!(count(&found, alike) >= almost_all(), "{without:?}");
     // A flow gain is equivalent to another heat transfer.
-    let found = all_of(Which::Turbine, &Course::hills(), &[("turbine_flow_gain", 1.2)], without);
+    let found = all_of(Side::Turbine, &Course::hills(), &[("turbine_flow_gain", 1.2)], without);
     assert!(count(&found, |found| found.open == 0) >= almost_all(), "{without:?}");
     for found in &found {
         assert!(found.not_asked.iter().any(|one| one.effect == "turbine_flow_gain"), "{found:?}");
@@ -248,7 +242,7 @@ fn the_turbine_is_identified() {
     let mut held = 0;
     for seed in 0..seeds() {
         let (recording, truth) = engine(seed, &Course::hills(), &[], healthy);
-        let found = diagnosis(&recording, Which::Turbine, f64::INFINITY);
+        let found = diagnosis(&recording, Side::Turbine, f64::INFINITY);
         let eta = found.unknowns.iter().find(|unknown| unknown.name == "eta_t").unwrap();
         let ratio = truth.turbine.peak_efficiency / Model::nominal().params.turbine.peak_efficiency;
         held += usize::from((eta.low..=eta.high).contains(&ratio));
@@ -263,11 +257,11 @@ fn equal_seeds_give_equal_answers_and_too_little_is_refused() {
     let twice = [(); 2].map(|()| diagnosis(&recording, COMPRESSOR, common::BRAKE_S));
     assert_eq!(twice[0], twice[1]);
     recording.series.remove(&Channel::T4);
-    let ask = |fit_until_s: f64, side: Which| {
+    let ask = |fit_until_s: f64, side: Side| {
         let (nominal, effects) = (Rig::new(Model::nominal()), catalogue());
         let calibration = Calibration::shipped().unwrap();
         let declared = declared();
-        let ask = Ask {
+        let ask = SideRequest {
             recording: &recording,
             nominal: &nominal,
             effects: &effects,
@@ -279,6 +273,6 @@ fn equal_seeds_give_equal_answers_and_too_little_is_refused() {
         diagnose(&ask, side)
     };
     assert!(matches!(ask(2.0, COMPRESSOR), Err(DrivenError::TooFewRows { .. })));
-    let missing = ask(f64::INFINITY, Which::Turbine).unwrap_err();
+    let missing = ask(f64::INFINITY, Side::Turbine).unwrap_err();
     assert!(missing.to_string().contains("T4"), "{missing}");
 }

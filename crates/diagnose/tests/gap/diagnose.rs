@@ -5,7 +5,7 @@
 use crate::gap::common::{self, Visits, boundary, declared};
 use mapper_core::{Channel, Dimension, OperatingPoint, Recording, Series};
 use mapper_diagnose::gap::causes::calibration::Calibration;
-use mapper_diagnose::gap::diagnose::{Diagnosed, GapError, Question, diagnose};
+use mapper_diagnose::gap::diagnose::{Diagnosed, GapError, GapRequest, diagnose};
 use mapper_diagnose::gap::findings::experiment::{AllowedJump, Experiment};
 use mapper_diagnose::gap::findings::report::Verdict;
 use mapper_diagnose::gap::findings::warning::GapWarning;
@@ -79,7 +79,7 @@ fn ask_with(recording: &Recording, more: Option<Arc<dyn Effect>>) -> Result<Diag
     let candidates = ["tip_diameter", "stem_conduction", "bearing_friction", "flowmeter_gain"];
     let effects: Vec<Arc<dyn Effect>> =
         candidates.iter().map(|id| mapper_effects::find(id).unwrap()).chain(more).collect();
-    diagnose(Question {
+    diagnose(GapRequest {
         tolerances_declared: true,
         experiments: Vec::new(),
         recording,
@@ -353,7 +353,7 @@ fn convection_before_the_wheel_is_never_ruled_out_for_its_area() {
     let mut rig = Rig::new(model.clone());
     add(&mut rig, mapper_effects::find("inlet_htc").unwrap().as_ref(), &[1.6]).unwrap();
     let effects = |ids: &[&str]| ids.iter().map(|id| mapper_effects::find(id).unwrap()).collect();
-    let question = |recording, model, ids: &[&str]| Question {
+    let question = |recording, model, ids: &[&str]| GapRequest {
         tolerances_declared: true,
         experiments: Vec::new(),
         recording,

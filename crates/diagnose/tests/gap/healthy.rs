@@ -5,7 +5,7 @@
 use crate::gap::common::{Visits, declared, record_another_night, record_of};
 use mapper_core::{Channel, Recording};
 use mapper_diagnose::gap::causes::calibration::Calibration;
-use mapper_diagnose::gap::diagnose::{Diagnosed, GapError, Question, diagnose};
+use mapper_diagnose::gap::diagnose::{Diagnosed, GapError, GapRequest, diagnose};
 use mapper_diagnose::gap::findings::report::Verdict;
 use mapper_diagnose::gap::findings::warning::GapWarning;
 use mapper_diagnose::gap::preconditions::problem::Problem;
@@ -17,7 +17,7 @@ const VISITS: Visits = Visits { speeds_rpm: &[90e3, 140e3, 60e3, 120e3, 70e3, 13
 
 fn ask(recording: &Recording, healthy: Option<&Recording>) -> Result<Diagnosed, GapError> {
     let candidates = ["tip_diameter", "bearing_friction", "flowmeter_gain"];
-    diagnose(Question {
+    diagnose(GapRequest {
         tolerances_declared: true,
         experiments: Vec::new(),
         recording,

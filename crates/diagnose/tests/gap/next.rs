@@ -6,7 +6,7 @@ use crate::gap::common::{self, Visits, boundary, declared};
 use mapper_core::{Channel, OperatingPoint, Recording, StepKind, StepMarker};
 use mapper_diagnose::gap::best_fit::fit::Fit;
 use mapper_diagnose::gap::causes::calibration::Calibration;
-use mapper_diagnose::gap::diagnose::{Diagnosed, Question, diagnose};
+use mapper_diagnose::gap::diagnose::{Diagnosed, GapRequest, diagnose};
 use mapper_diagnose::gap::findings::experiment::{AllowedJump, AlsoChanged, AtRest, Experiment};
 use mapper_diagnose::gap::findings::report::{Kind, Next};
 use mapper_diagnose::gap::next_experiment::best_experiment::{Rivals, Suggested, next};
@@ -33,7 +33,7 @@ fn ask(truth: (&str, f64), candidates: &[&str]) -> Diagnosed {
     let recording = common::record_of(&rig, &VISITS, 3);
     let effects: Vec<Arc<dyn Effect>> =
         candidates.iter().map(|id| mapper_effects::find(id).unwrap()).collect();
-    diagnose(Question {
+    diagnose(GapRequest {
         tolerances_declared: true,
         experiments: Vec::new(),
         recording: &recording,

@@ -4,7 +4,7 @@
 
 use crate::gap::common::{Visits, declared};
 use mapper_diagnose::gap::causes::calibration::Calibration;
-use mapper_diagnose::gap::diagnose::{Diagnosed, Question, diagnose};
+use mapper_diagnose::gap::diagnose::{Diagnosed, GapRequest, diagnose};
 use mapper_diagnose::gap::findings::report::Verdict;
 use mapper_diagnose::gap::residuals::study::{Hypothesis, Study};
 use mapper_diagnose::gap::residuals::whiten::Linearised;
@@ -18,7 +18,7 @@ use mapper_diagnose::missing_terms::terms::expression::Expression;
 use mapper_diagnose::missing_terms::terms::law_effect::LawEffect;
 use mapper_diagnose::missing_terms::terms::library::library;
 use mapper_diagnose::missing_terms::terms::term::{Role, Term};
-use mapper_diagnose::missing_terms::terms::time_history::{Course, Shape};
+use mapper_diagnose::missing_terms::terms::time_history::{Shape, TimeHistory};
 use mapper_effects::ScriptEffect;
 use mapper_numerics::parallel;
 use mapper_observe::averages::time_table::Table;
@@ -34,7 +34,7 @@ fn ask(rig: &Rig, seed: u64) -> Diagnosed {
     let recording = crate::gap::common::record_of(rig, &VISITS, seed);
     // Candidates unrelated to the planted law.
     let candidates = ["tip_diameter", "flowmeter_gain"];
-    diagnose(Question {
+    diagnose(GapRequest {
         tolerances_declared: true,
         experiments: Vec::new(),
         recording: &recording,
@@ -116,7 +116,7 @@ fn nothing_has_no_law() {
 fn a_force_comes_back_in_its_step() {
     let mut planted = study(&VISITS, Vec::new());
     let begin_s = planted.steps[4].marker.start_s;
-    let course = Course { shape: Shape::Level, spans_s: vec![(begin_s, begin_s + VISITS.dwell_s)] };
+    let course = TimeHistory { shape: Shape::Level, spans_s: vec![(begin_s, begin_s + VISITS.dwell_s)] };
     let term = Term {
         acts_on: vec![(Balance::CompressorHousing, Expression::InTime(course))],
         unit: "W",

@@ -1,7 +1,7 @@
 //! The judged quantity of one side of a machine, compared with the model without and with the most probable cause.
 
 use mapper_chart::{Axis, Dash, Figure, Line, Panel, Rule, RuleAt, Scatter, ScatterPoint, palette};
-use mapper_diagnose::driven::cause_search::{Diagnosis, Word};
+use mapper_diagnose::driven::cause_search::{Diagnosis, SideVerdict};
 
 /// Two panels over time: the reading with both predictions, and both residuals.
 pub fn why_figure(name: &str, diagnosis: &Diagnosis) -> Figure {
@@ -44,7 +44,9 @@ pub fn why_figure(name: &str, diagnosis: &Diagnosis) -> Figure {
 
 fn cause_label(diagnosis: &Diagnosis) -> String {
     match (diagnosis.word, diagnosis.causes.first()) {
-        (Word::Named | Word::NotDistinguished, Some(cause)) => format!("with {}", cause.names.join(" and ")),
+        (SideVerdict::Named | SideVerdict::NotDistinguished, Some(cause)) => {
+            format!("with {}", cause.names.join(" and "))
+        }
         _ => "no cause is named".to_owned(),
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::formatting::table;
 use mapper_core::probability_text;
-use mapper_diagnose::driven::cause_search::{Beyond, Cause, Diagnosis, HeldOut, Which, Word};
+use mapper_diagnose::driven::cause_search::{Beyond, Cause, Diagnosis, HeldOut, Side, SideVerdict};
 use std::fmt::Write;
 
 /// Maximum number of causes shown in addition to the undecided ones.
@@ -39,7 +39,7 @@ pub fn why_text(diagnosis: &Diagnosis) -> String {
             verdict(beyond, diagnosis.word)
         );
     }
-    if diagnosis.side == Which::Turbine {
+    if diagnosis.side == Side::Turbine {
         unknowns(&mut text, diagnosis);
     }
     if !diagnosis.asked.is_empty() {
@@ -72,24 +72,24 @@ pub fn why_text(diagnosis: &Diagnosis) -> String {
 fn headline(diagnosis: &Diagnosis) -> String {
     let open = &diagnosis.causes[..diagnosis.open.min(diagnosis.causes.len())];
     match diagnosis.word {
-        Word::Named => format!(
+        SideVerdict::Named => format!(
             "{} explains it ({}).",
             open.first().map_or_else(String::new, |cause| capitalise(&cause.names.join(" and "))),
             open.first().map_or_else(String::new, |cause| probability_text(cause.probability))
         ),
-        Word::NotDistinguished => format!(
+        SideVerdict::NotDistinguished => format!(
             "{} explain it equally well and are indistinguishable.",
             capitalise(&open.iter().map(|cause| cause.names.join(" and ")).collect::<Vec<_>>().join("; or "))
         ),
-        Word::NotBorneOut => format!(
+        SideVerdict::NotBorneOut => format!(
             "No cause is named: {} would explain the fitted part, but the residual of other phases does not decrease.",
             open.first().map_or_else(String::new, |cause| cause.names.join(" and "))
         ),
-        Word::WithinTolerance => format!(
+        SideVerdict::WithinTolerance => format!(
             "Nothing is seen beyond the usual uncertainty of such a machine (no cause: {}).",
             probability_text(diagnosis.probability_none)
         ),
-        Word::Outside => format!(
+        SideVerdict::Outside => format!(
             "Nothing of the catalogue explains it: something outside it acts here ({}). The residual of the nearest cause is below.",
             probability_text(diagnosis.probability_outside)
         ),
@@ -208,10 +208,10 @@ fn describe_delay(beyond: &Beyond) -> String {
     )
 }
 
-fn verdict(beyond: &Beyond, word: Word) -> &'static str {
+fn verdict(beyond: &Beyond, word: SideVerdict) -> &'static str {
     match (beyond.after_k > beyond.expected_high_k, word) {
         (false, _) => "the residual is within what the fitted part predicts",
-        (true, Word::Named | Word::NotDistinguished) => {
+        (true, SideVerdict::Named | SideVerdict::NotDistinguished) => {
             "the residual exceeds the expectation for this cause: another cause acts as well, or instead"
         }
         (true, _) => {

@@ -14,13 +14,12 @@ use mapper_diagnose::gap::best_fit::adequacy::adequacy;
 use mapper_diagnose::gap::best_fit::fit::{Effort, fit};
 use mapper_diagnose::gap::best_fit::selection::Selection;
 use mapper_diagnose::gap::causes::calibration::Calibration;
-use mapper_diagnose::gap::diagnose::{Diagnosed, GapError, Question, diagnose};
+use mapper_diagnose::gap::diagnose::{Diagnosed, GapError, GapRequest, diagnose};
 use mapper_diagnose::gap::findings::report::{Diagnosis, Next, Verdict, law_found};
 use mapper_diagnose::gap::findings::warning::{GapWarning, OffsetAtRest};
 use mapper_diagnose::gap::next_experiment::best_experiment::sensor_near;
-use mapper_diagnose::gap::next_experiment::outlook::Alike;
-use mapper_diagnose::gap::preconditions::problem::Problem;
-use mapper_diagnose::gap::preconditions::usable::usable;
+use mapper_diagnose::gap::next_experiment::outlook::SimulatedRig;
+use mapper_diagnose::gap::preconditions::usable::checked_study;
 use mapper_diagnose::gap::reference::healthy::Healthy;
 use mapper_diagnose::gap::residuals::actuators::Actuators;
 use mapper_diagnose::gap::residuals::study::Study;
@@ -28,7 +27,6 @@ use mapper_diagnose::gap::residuals::whiten::Linearised;
 use mapper_diagnose::gap::twin::{Expected, Found, Held, forecast_steps, hold};
 use mapper_diagnose::missing_terms::discover::discover;
 use mapper_identify::{ZeroOutcome, ZeroSettings};
-use mapper_observe::averages::time_table::Table;
 use mapper_observe::model_inputs::lagged_command::Response;
 use mapper_observe::{Declared, FusedChannel};
 use mapper_physics::rig::effect::Effect;
@@ -114,7 +112,7 @@ impl Session<'_> {
         let (in_catalogue, beyond) = (between(DRIFT_SHARE, CATALOGUE_END), between(CATALOGUE_END, 1.0));
         progress(DRIFT_SHARE, "steps that are allowed");
         let calibration = Calibration::shipped().map_err(SessionError::Calibration)?;
-        let mut diagnosed = diagnose(Question {
+        let mut diagnosed = diagnose(GapRequest {
             recording: &recording,
             declared,
             healthy: before.as_ref().zip(healthy).map(|(before, healthy)| Healthy {
@@ -132,7 +130,7 @@ impl Session<'_> {
         })?;
         let discovery = discover(&diagnosed, &calibration, &beyond);
         if let Some(law) = discovery.settled {
-            diagnosed.accounted_by(law);
+            diagnosed.explain_by(law);
         }
         let diagnosis = &mut diagnosed.diagnosis;
         (diagnosis.laws, diagnosis.forces) = (discovery.laws, discovery.forces);
@@ -236,7 +234,7 @@ impl Session<'_> {
         let plan = plan(campaign, &model)?;
         let sensors = identification_with(campaign, map).declared;
         let lag = Response::lag(campaign.tolerances.actuator_lag_s);
-        let like = Alike {
+        let like = SimulatedRig {
             channels: sensors.keys().copied().collect(),
             declared: Declared {
                 sensors,
@@ -271,10 +269,7 @@ fn study_of(
     model: Model,
     effects: Vec<Arc<dyn Effect>>,
 ) -> Result<Study, GapError> {
-    let table = Table::new(recording).ok_or(GapError::from(Problem::Empty))?;
-    usable(recording, &table, &declared)?;
-    let actuators = Actuators::of(&table, recording, &declared, campaign.tolerances_declared);
-    Ok(Study::with_actuators(recording, table, declared, model, effects, actuators))
+    Ok(checked_study(recording, declared, model, effects, campaign.tolerances_declared)?.0)
 }
 
 /// The linearised recording if tolerances alone explain it down to noise. In that case apparent drift in repeats is not subtracted, because the

@@ -6,7 +6,7 @@ use crate::recording::files::{Existing, json_text, write_files};
 use crate::recording::identification_config::declared;
 use crate::recording::recording_file::{Recorded, check_machine};
 use crate::{Session, SessionError};
-use mapper_diagnose::driven::cause_search::{Ask, Diagnosis, Which, diagnose};
+use mapper_diagnose::driven::cause_search::{Diagnosis, Side, SideRequest, diagnose};
 use mapper_diagnose::driven::{DrivenOutcome, Rows, identify};
 use mapper_diagnose::gap::causes::calibration::Calibration;
 use mapper_observe::Declared;
@@ -48,7 +48,7 @@ impl Session<'_> {
         &self,
         recorded: &Recorded,
         map: &ChannelMap,
-        side: Which,
+        side: Side,
         fit_until_s: Option<f64>,
         effects: &[Arc<dyn Effect>],
     ) -> Result<Transient, SessionError> {
@@ -57,14 +57,14 @@ impl Session<'_> {
         let recording = &recorded.read.recording;
         let fit_until_s = fit_until_s.unwrap_or(f64::INFINITY);
         let identified = match side {
-            Which::Compressor => {
+            Side::Compressor => {
                 let rows = Rows::of_compressor(recording)?;
                 Some(identify(&rows, campaign.machine.params, fit_until_s, campaign.seed)?)
             }
-            Which::Turbine => None,
+            Side::Turbine => None,
         };
         let why = diagnose(
-            &Ask {
+            &SideRequest {
                 recording,
                 nominal: &Rig::new(nominal_model(campaign)?),
                 effects,

@@ -3,7 +3,7 @@
 
 use mapper_core::Recording;
 use mapper_diagnose::gap::causes::calibration::Calibration;
-use mapper_diagnose::gap::diagnose::{Question, diagnose};
+use mapper_diagnose::gap::diagnose::{GapRequest, diagnose};
 use mapper_diagnose::gap::findings::report::{Diagnosis, Verdict};
 use mapper_diagnose::gap::reference::healthy::Healthy;
 use mapper_physics::rig::effect::Effect;
@@ -40,7 +40,7 @@ fn a_healthy_recording_separates_a_cause_from_structure() {
         let recording = read(&format!("{folder}/case_0000.mcap"));
         let healthy = read(&format!("{folder}/case_0000.healthy.mcap"));
         let ask = |healthy: Option<&Recording>| -> Diagnosis {
-            let question = Question {
+            let question = GapRequest {
                 recording: &recording,
                 declared: declared.clone(),
                 healthy: healthy.map(|recording| Healthy {

@@ -60,7 +60,7 @@ impl Effects {
         let campaign = mapper_campaign::load(campaign).map_err(Failure::of_campaign)?;
         let (study, linearised) = study_without_causes(&campaign, effects, campaign.seed)?;
         let matrix = signatures(&study, &linearised);
-        let names: Vec<String> = matrix.balances.iter().map(|balance| balance.words()).collect();
+        let names: Vec<String> = matrix.balances.iter().map(|balance| balance.properties().words).collect();
         if self.json {
             let rows: Vec<_> = matrix
                 .effects

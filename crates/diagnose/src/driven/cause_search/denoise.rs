@@ -1,8 +1,7 @@
 //! Denoises the driving channels.
 //!
-//! A side driven by noisy readings fits better the less it responds to them, so noise would favour causes that dull the response. Each
-//! reading is therefore replaced by a straight line through as many neighbours as lie on one within the sensor's noise. If a drive
-//! bends, these are few.
+//! A model driven by noisy readings fits better the less it responds to them, so noise would favour causes that reduce the response. Each reading is
+//! therefore replaced by the straight line through as many neighbours as lie on one within the noise of the sensor, so few are used where a drive changes its slope.
 
 use crate::driven::log_rows::Rows;
 use mapper_observe::Declared;
@@ -10,22 +9,22 @@ use std::ops::Range;
 
 /// Numbers of neighbours tried on each side.
 const NEIGHBOURS: [usize; 5] = [12, 8, 5, 3, 2];
-/// Readings count as a line if their mean square is below this multiple of the sensor's variance; one in twenty sets of six pure-noise
-/// readings fails.
-const ON_A_LINE: f64 = 1.5;
+/// Readings lie on a line if their mean squared distance is below this multiple of the variance of the noise. One in twenty sets of six readings fails by
+/// chance.
+const LINE_RATIO: f64 = 1.5;
 /// Half the time span over which rates are computed, s.
 const RATE_S: f64 = 0.305;
 /// Maximum distance of a neighbour, s.
-const FURTHEST_S: f64 = 2.0;
+const MAX_DISTANCE_S: f64 = 2.0;
 
-/// Rows with denoised drives and their rates.
-pub(crate) fn calm(rows: &Rows, declared: &Declared) -> Rows {
-    let mut calm = rows.clone();
-    calm.rates.clear();
-    for (channel, column) in &mut calm.drives {
+/// Rows with denoised drives and the rates of these.
+pub(crate) fn denoised(rows: &Rows, declared: &Declared) -> Rows {
+    let mut denoised = rows.clone();
+    denoised.rates.clear();
+    for (channel, column) in &mut denoised.drives {
         let sigma = declared.noise_sigma(*channel);
         let read = rows.drive(*channel);
-        let values: Vec<f64> = (0..rows.len()).map(|i| calm_at(&rows.t_s, read, i, sigma)).collect();
+        let values: Vec<f64> = (0..rows.len()).map(|i| denoised_at(&rows.t_s, read, i, sigma)).collect();
         let rate = |i: usize| {
             let near = |t_s: &f64| (t_s - rows.t_s[i]).abs() <= RATE_S;
             let before =
@@ -35,23 +34,23 @@ pub(crate) fn calm(rows: &Rows, declared: &Declared) -> Rows {
             let elapsed_s = rows.t_s[after] - rows.t_s[before];
             if elapsed_s > 0.0 { (values[after] - values[before]) / elapsed_s } else { 0.0 }
         };
-        calm.rates.push((0..rows.len()).map(rate).collect());
+        denoised.rates.push((0..rows.len()).map(rate).collect());
         *column = values;
     }
-    calm
+    denoised
 }
 
-fn calm_at(t_s: &[f64], read: &[f64], i: usize, sigma: f64) -> f64 {
+fn denoised_at(t_s: &[f64], read: &[f64], i: usize, sigma: f64) -> f64 {
     for count in NEIGHBOURS {
         let (first, last) = (i.saturating_sub(count), (i + count).min(read.len() - 1));
-        // Both sides; at a bend, one side only with the same number of readings.
+        // Both sides, or one side only with as many readings.
         let ranges =
             [first..last + 1, i.saturating_sub(2 * count)..i + 1, i..(i + 2 * count).min(read.len() - 1) + 1];
         for range in ranges {
-            if range.len() < 4 || t_s[range.end - 1] - t_s[range.start] > 2.0 * FURTHEST_S {
+            if range.len() < 4 || t_s[range.end - 1] - t_s[range.start] > 2.0 * MAX_DISTANCE_S {
                 continue;
             }
-            if let Some(value) = on_a_line(t_s, read, i, range, sigma) {
+            if let Some(value) = line_value(t_s, read, i, range, sigma) {
                 return value;
             }
         }
@@ -60,7 +59,7 @@ fn calm_at(t_s: &[f64], read: &[f64], i: usize, sigma: f64) -> f64 {
 }
 
 /// Value at `i` of the straight line through a range; `None` if the readings do not lie on it.
-fn on_a_line(t_s: &[f64], read: &[f64], i: usize, range: Range<usize>, sigma: f64) -> Option<f64> {
+fn line_value(t_s: &[f64], read: &[f64], i: usize, range: Range<usize>, sigma: f64) -> Option<f64> {
     let n = range.len() as f64;
     let mean = |values: &[f64]| values[range.clone()].iter().sum::<f64>() / n;
     let (t0, v0) = (mean(t_s), mean(read));
@@ -69,8 +68,8 @@ fn on_a_line(t_s: &[f64], read: &[f64], i: usize, range: Range<usize>, sigma: f6
         (tt + t * t, tv + t * (read[k] - v0))
     });
     let slope = if tt > 0.0 { tv / tt } else { 0.0 };
-    let off: f64 = range.map(|k| (read[k] - v0 - slope * (t_s[k] - t0)).powi(2)).sum();
-    (off <= ON_A_LINE * (n - 2.0) * sigma * sigma).then(|| v0 + slope * (t_s[i] - t0))
+    let squares: f64 = range.map(|k| (read[k] - v0 - slope * (t_s[k] - t0)).powi(2)).sum();
+    (squares <= LINE_RATIO * (n - 2.0) * sigma * sigma).then(|| v0 + slope * (t_s[i] - t0))
 }
 
 #[cfg(test)]
@@ -107,9 +106,9 @@ mod tests {
             nominal: Default::default(),
             common_offsets: Vec::new(),
         };
-        let calm = calm(&rows, &declared);
+        let denoised = denoised(&rows, &declared);
         let off = |range: Range<usize>| {
-            let squares = range.clone().map(|i| (calm.drives[0].1[i] - truth[i]).powi(2)).sum::<f64>();
+            let squares = range.clone().map(|i| (denoised.drives[0].1[i] - truth[i]).powi(2)).sum::<f64>();
             (squares / range.len() as f64).sqrt()
         };
         assert!(off(0..75) < 0.4 * sigma && off(105..200) < 0.4 * sigma, "{} {}", off(0..75), off(105..200));

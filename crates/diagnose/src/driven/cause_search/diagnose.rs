@@ -1,17 +1,18 @@
 //! Diagnosis of one side of a machine from a log without steps.
 
 use crate::driven::DrivenError;
-use crate::driven::cause_search::denoise::calm;
-use crate::driven::cause_search::detectable::{audible, smallest};
-use crate::driven::cause_search::fit::{Fit, Question};
-use crate::driven::cause_search::held_out::{beyond, held_out, ids, off_k};
+use crate::driven::cause_search::denoise::denoised;
+use crate::driven::cause_search::detectable::{diagnosable, smallest};
+use crate::driven::cause_search::fit::{Fit, SideProblem};
+use crate::driven::cause_search::held_out::{beyond, held_out, ids, residual_rms_k};
 use crate::driven::cause_search::phases::phases;
 use crate::driven::cause_search::search::{search, weigh};
-use crate::driven::cause_search::side_diagnosis::{Cause, Course, Diagnosis, Unknown, Word};
+use crate::driven::cause_search::side_diagnosis::{Cause, ChannelTrace, Diagnosis, SideVerdict, Unknown};
 use crate::driven::cause_search::sides::compressor::CompressorSide;
-use crate::driven::cause_search::sides::side::{Side, Which};
+use crate::driven::cause_search::sides::side::{Side, SideModel};
 use crate::driven::cause_search::sides::turbine::TurbineSide;
 use crate::driven::log_rows::Rows;
+use crate::gap::best_fit::coordinate::infos;
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::weigh::{estimates, name_of};
 use crate::gap::findings::report::EXCLUDED;
@@ -27,11 +28,11 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 use std::sync::Arc;
 
-/// Maximum number of rows; more add no information, because the model error is correlated over seconds.
+/// Maximum number of rows. More add no information, because the model error is correlated over seconds.
 const MAX_ROWS: usize = 800;
 
 /// Inputs of a diagnosis.
-pub struct Ask<'a> {
+pub struct SideRequest<'a> {
     /// The log.
     pub recording: &'a Recording,
     /// The nominal machine with ideal sensors.
@@ -53,39 +54,39 @@ pub struct Ask<'a> {
 /// # Errors
 /// [`DrivenError::Channel`] if a required channel is missing, [`DrivenError::TooFewRows`] if there are too few rows to fit,
 /// [`DrivenError::NoAnswer`] if the nominal machine has no solution under the driving channels.
-pub fn diagnose(ask: &Ask<'_>, side: Which) -> Result<Diagnosis, DrivenError> {
-    let asked = ask.effects.iter().filter(|effect| !is_only_on_stands(&effect.info().id)).cloned();
-    let effects: Vec<_> = asked.chain(log_effects(side == Which::Compressor)).collect();
-    let ask = &Ask { effects: &effects, ..*ask };
+pub fn diagnose(request: &SideRequest<'_>, side: Side) -> Result<Diagnosis, DrivenError> {
+    let effects = request.effects.iter().filter(|effect| !is_only_on_stands(&effect.info().id)).cloned();
+    let effects: Vec<_> = effects.chain(log_effects(side == Side::Compressor)).collect();
+    let request = &SideRequest { effects: &effects, ..*request };
     match side {
-        Which::Compressor => of_side::<CompressorSide>(ask),
-        Which::Turbine => of_side::<TurbineSide>(ask),
+        Side::Compressor => diagnose_side::<CompressorSide>(request),
+        Side::Turbine => diagnose_side::<TurbineSide>(request),
     }
 }
 
-fn of_side<S: Side>(ask: &Ask<'_>) -> Result<Diagnosis, DrivenError> {
-    let all = Rows::read(ask.recording, S::wanted())?;
-    let (calibration, lost_rows) = (ask.calibration, all.lost);
-    let rows = calm(&all, ask.declared).thinned(MAX_ROWS);
-    let fitted = rows.t_s.partition_point(|t_s| *t_s < ask.fit_until_s);
+fn diagnose_side<S: SideModel>(request: &SideRequest<'_>) -> Result<Diagnosis, DrivenError> {
+    let all = Rows::read(request.recording, S::channels())?;
+    let (calibration, lost_rows) = (request.calibration, all.lost);
+    let rows = denoised(&all, request.declared).thinned(MAX_ROWS);
+    let fitted = rows.t_s.partition_point(|t_s| *t_s < request.fit_until_s);
     // Twice the unknowns.
     let needed = 2 * S::unknowns().len();
     if fitted < needed {
-        let (rows, until_s) = (fitted, ask.fit_until_s);
+        let (rows, until_s) = (fitted, request.fit_until_s);
         return Err(DrivenError::TooFewRows { rows, until_s, needed });
     }
     let counts: Vec<bool> = (0..rows.len()).map(|i| i < fitted).collect();
     let side = S::of(rows);
-    let mut question =
-        Question { side: &side, nominal: ask.nominal, effects: ask.effects, white_k: Vec::new() };
-    question.white_k = white_k(&question, &all, ask).ok_or(DrivenError::NoAnswer)?;
-    let (asked, mut not_asked) = audible(&question);
-    let found = search(&question, &asked, &counts, calibration).ok_or(DrivenError::NoAnswer)?;
-    let posterior = weigh(calibration, asked.len(), &found);
+    let mut problem =
+        SideProblem { side: &side, nominal: request.nominal, effects: request.effects, white_k: Vec::new() };
+    problem.white_k = white_k(&problem, &all, request).ok_or(DrivenError::NoAnswer)?;
+    let (diagnosable, mut not_diagnosable) = diagnosable(&problem);
+    let found = search(&problem, &diagnosable, &counts, calibration).ok_or(DrivenError::NoAnswer)?;
+    let posterior = weigh(calibration, diagnosable.len(), &found);
     let fit_of = |place: usize| &found.fits[posterior.causes[place].0];
     let listed = |(_, probability): &&(usize, f64)| *probability >= EXCLUDED;
     let causes = posterior.causes.iter().take_while(listed).count().max(posterior.open);
-    // The named cause before the comparison with an unmodelled one; held-out phases judge it.
+    // Held-out phases test it, even if a cause outside the library is more probable.
     let likeliest = if posterior.named && causes > 0 { fit_of(0) } else { &found.null };
     let open = posterior.open;
     let choices: Vec<&Fit> = (0..if posterior.named { causes.min(RIVALS) } else { 0 }).map(fit_of).collect();
@@ -93,43 +94,44 @@ fn of_side<S: Side>(ask: &Ask<'_>) -> Result<Diagnosis, DrivenError> {
         .flat_map(|place| fit_of(place).hypothesis.effects.iter().map(|(effect, _)| *effect))
         .collect();
     let rows = side.rows();
-    let drives = [S::wanted().drives[0], S::PRESSURE];
+    let drives = [S::channels().drives[0], S::PRESSURE];
     let phases = phases(rows, fitted, &drives);
-    let held_out = held_out(&question, &phases, &found.null, &choices, calibration, asked.len());
-    // Noise steps of the drives can imitate an effect in the fitted part, but not in held-out phases.
-    let borne_out = held_out.as_ref().is_none_or(|phases| phases.after_k < phases.before_k);
+    let held_out = held_out(&problem, &phases, &found.null, &choices, calibration, diagnosable.len());
+    // Noise of the drives can imitate an effect in the fitted part, but not in held-out phases.
+    let is_confirmed = held_out.as_ref().is_none_or(|phases| phases.after_k < phases.before_k);
     let word = match open {
-        _ if posterior.outside > 0.5 => Word::Outside,
-        0 => Word::WithinTolerance,
-        _ if !borne_out => Word::NotBorneOut,
-        1 => Word::Named,
-        _ => Word::NotDistinguished,
+        _ if posterior.outside > 0.5 => SideVerdict::Outside,
+        0 => SideVerdict::WithinTolerance,
+        _ if !is_confirmed => SideVerdict::NotBorneOut,
+        1 => SideVerdict::Named,
+        _ => SideVerdict::NotDistinguished,
     };
-    let (asked_for, silent) = smallest(&question, &asked, likeliest, &open_effects, &counts, calibration);
-    not_asked.extend(silent);
+    let (asked, undetectable) =
+        smallest(&problem, &diagnosable, likeliest, &open_effects, &counts, calibration);
+    not_diagnosable.extend(undetectable);
     let symbols =
         |columns: &[(Channel, Vec<f64>)]| columns.iter().map(|(channel, _)| channel.symbol()).collect();
     let measured = |(_, column): &&(Channel, Vec<f64>)| column.iter().any(|k| k.is_finite());
     Ok(Diagnosis {
-        side: S::WHICH,
+        side: S::SIDE,
         driven_by: symbols(&rows.drives),
         judged: rows.judged.iter().filter(measured).map(|(channel, _)| channel.symbol()).collect(),
-        fitted_until_s: ask.fit_until_s,
+        fitted_until_s: request.fit_until_s,
         word,
         probability_none: posterior.none,
         probability_outside: posterior.outside,
         causes: (0..causes)
-            .map(|place| cause(&question, calibration, fit_of(place), posterior.causes[place].1))
+            .map(|place| cause(&problem, calibration, fit_of(place), posterior.causes[place].1))
             .collect(),
         open,
-        before_k: off_k(&question, &found.null.predicted, 0..fitted),
-        after_k: off_k(&question, &likeliest.predicted, 0..fitted),
+        before_k: residual_rms_k(&problem, &found.null.predicted, 0..fitted),
+        after_k: residual_rms_k(&problem, &likeliest.predicted, 0..fitted),
         held_out,
-        beyond: beyond(&question, fitted, &found.null, likeliest, ask.seed),
-        asked: asked_for,
-        not_asked,
+        beyond: beyond(&problem, fitted, &found.null, likeliest, request.seed),
+        asked,
+        not_asked: not_diagnosable,
         unknowns: unknowns::<S>(likeliest),
-        course: Course {
+        course: ChannelTrace {
             t_s: rows.t_s.clone(),
             read_k: rows.judged[0].1.clone(),
             before_k: found.null.predicted[0].clone(),
@@ -139,11 +141,15 @@ fn of_side<S: Side>(ask: &Ask<'_>) -> Result<Diagnosis, DrivenError> {
     })
 }
 
-/// White noise of each judged channel: the sensor's, and the response to the drives' residual noise.
-fn white_k<S: Side>(question: &Question<'_, S>, all: &Rows, ask: &Ask<'_>) -> Option<Vec<f64>> {
-    let declared = ask.declared;
-    let mut random = Pcg64Mcg::seed_from_u64(ask.seed.wrapping_add(2));
-    let mut noisy = calm(all, declared);
+/// White noise of each judged channel, K: of its sensor, and of the denoised drives through the model.
+fn white_k<S: SideModel>(
+    problem: &SideProblem<'_, S>,
+    all: &Rows,
+    request: &SideRequest<'_>,
+) -> Option<Vec<f64>> {
+    let declared = request.declared;
+    let mut random = Pcg64Mcg::seed_from_u64(request.seed.wrapping_add(2));
+    let mut noisy = denoised(all, declared);
     for (channel, column) in &mut noisy.drives {
         let sigma = declared.noise_sigma(*channel);
         for value in column {
@@ -151,30 +157,28 @@ fn white_k<S: Side>(question: &Question<'_, S>, all: &Rows, ask: &Ask<'_>) -> Op
             *value += sigma * z;
         }
     }
-    let noisy = calm(&noisy, declared).thinned(MAX_ROWS);
-    let there = Question { side: &S::of(noisy), white_k: Vec::new(), ..*question };
-    let (quiet, noisy) = (question.predict(&question.nothing())?, there.predict(&question.nothing())?);
-    let judged = question.side.rows().judged.iter();
-    let of_channel = |((channel, _), (quiet, noisy)): (&(Channel, _), (&Vec<f64>, &Vec<f64>))| {
-        let by_drives_k = rms(quiet.iter().zip(noisy).map(|(q, n)| n - q)).unwrap_or(0.0);
+    let noisy = denoised(&noisy, declared).thinned(MAX_ROWS);
+    let with_noise = SideProblem { side: &S::of(noisy), white_k: Vec::new(), ..*problem };
+    let (quiet, noisy) = (problem.predict(&problem.nothing())?, with_noise.predict(&problem.nothing())?);
+    let sigma_k = |(index, (channel, _)): (usize, &(Channel, Vec<f64>))| {
+        let by_drives_k = rms(quiet[index].iter().zip(&noisy[index]).map(|(q, n)| n - q)).unwrap_or(0.0);
         declared.noise_sigma(*channel).hypot(by_drives_k)
     };
-    Some(judged.zip(quiet.iter().zip(&noisy)).map(of_channel).collect())
+    Some(problem.side.rows().judged.iter().enumerate().map(sigma_k).collect())
 }
 
-fn cause<S: Side>(
-    question: &Question<'_, S>,
+fn cause<S: SideModel>(
+    problem: &SideProblem<'_, S>,
     calibration: &Calibration,
     fit: &Fit,
     probability: f64,
 ) -> Cause {
-    let infos: Vec<_> =
-        fit.hypothesis.effects.iter().map(|(index, _)| question.effects[*index].info()).collect();
+    let infos: Vec<_> = infos(problem.effects, &fit.hypothesis).collect();
     let unknowns = fit.hypothesis.nuisances.len();
     let inverse = fit.precision.clone().cholesky().map(|cholesky| cholesky.inverse());
     let covariance = inverse.map(|all| all.remove_rows(0, unknowns).remove_columns(0, unknowns));
     let effects = &fit.hypothesis.effects;
-    let parameters = estimates(calibration, question.effects, effects, covariance.as_ref());
+    let parameters = estimates(calibration, problem.effects, effects, covariance.as_ref());
     let with_values = infos.iter().zip(effects).flat_map(|(info, (_, values))| {
         info.parameters.iter().zip(values).map(move |(parameter, value)| (info, parameter, value))
     });
@@ -183,7 +187,7 @@ fn cause<S: Side>(
         .map(|(info, parameter, _)| name_of(info, parameter))
         .collect();
     Cause {
-        effects: ids(question, &fit.hypothesis),
+        effects: ids(problem, &fit.hypothesis),
         names: infos.iter().map(|info| info.name.to_string()).collect(),
         probability,
         parameters,
@@ -192,7 +196,7 @@ fn cause<S: Side>(
     }
 }
 
-fn unknowns<S: Side>(fit: &Fit) -> Vec<Unknown> {
+fn unknowns<S: SideModel>(fit: &Fit) -> Vec<Unknown> {
     let covariance = fit.precision.clone().cholesky().map(|cholesky| cholesky.inverse());
     let each = S::unknowns().iter().zip(&fit.hypothesis.nuisances).enumerate();
     each.map(|(place, (unknown, z))| {

@@ -1,10 +1,11 @@
 //! Gap reduction on held-out data: phase by phase, and after the fitted part.
 
-use crate::driven::cause_search::fit::{Fit, Question};
+use crate::driven::cause_search::fit::{Columns, Fit, SideProblem};
 use crate::driven::cause_search::search::weight;
 use crate::driven::cause_search::side_diagnosis::{Beyond, HeldOut, Phase};
-use crate::driven::cause_search::sides::side::Side;
-use crate::gap::best_fit::coordinate::{coordinates, parameters, set_parameter};
+use crate::driven::cause_search::sides::side::SideModel;
+use crate::driven::density::CorrelatedNoise;
+use crate::gap::best_fit::coordinate::{coordinates, hypothesis_at, infos, unknowns};
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::residuals::study::Hypothesis;
 use mapper_core::Channel;
@@ -20,23 +21,26 @@ use std::ops::Range;
 const DRAWS: usize = 300;
 
 /// Root mean square of the first judged channel minus its prediction, K.
-pub(crate) fn off_k<S: Side>(question: &Question<'_, S>, predicted: &[Vec<f64>], rows: Range<usize>) -> f64 {
-    let read = &question.side.rows().judged[0].1;
+pub(crate) fn residual_rms_k<S: SideModel>(
+    problem: &SideProblem<'_, S>,
+    predicted: &Columns,
+    rows: Range<usize>,
+) -> f64 {
+    let read = &problem.side.rows().judged[0].1;
     rms(rows.map(|i| read[i] - predicted[0][i])).unwrap_or(f64::NAN)
 }
 
-/// Predicts each phase from fits to the others: without a cause, and with the one of `causes` that they select. `causes` is empty if none
-/// is named.
-pub(crate) fn held_out<S: Side>(
-    question: &Question<'_, S>,
+/// Predicts each phase from fits to the other phases: without a cause, and with the cause that they select. `causes` is empty if none is named.
+pub(crate) fn held_out<S: SideModel>(
+    problem: &SideProblem<'_, S>,
     phases: &[Range<usize>],
     null: &Fit,
     causes: &[&Fit],
     calibration: &Calibration,
-    asked: usize,
+    effects: usize,
 ) -> Option<HeldOut> {
     let last = phases.last()?.end;
-    let rows = question.side.rows();
+    let rows = problem.side.rows();
     let jobs: Vec<(usize, Option<usize>)> = (0..phases.len())
         .flat_map(|phase| {
             std::iter::once((phase, None)).chain((0..causes.len()).map(move |c| (phase, Some(c))))
@@ -45,7 +49,7 @@ pub(crate) fn held_out<S: Side>(
     let fitted = parallel::map(&jobs, |(phase, cause)| {
         let counts: Vec<bool> = (0..rows.len()).map(|i| i < last && !phases[*phase].contains(&i)).collect();
         let start = cause.map_or(null, |cause| causes[cause]);
-        question.fit(&start.hypothesis, &counts)
+        problem.fit(&start.hypothesis, &counts)
     });
     let mut found = Vec::with_capacity(phases.len());
     for (place, phase) in phases.iter().enumerate() {
@@ -54,27 +58,27 @@ pub(crate) fn held_out<S: Side>(
         let chosen = of_phase()
             .filter(|((_, cause), _)| cause.is_some())
             .filter_map(|(_, fit)| fit.as_ref())
-            .max_by(|a, b| weight(calibration, asked, a).total_cmp(&weight(calibration, asked, b)));
+            .max_by(|a, b| weight(calibration, effects, a).total_cmp(&weight(calibration, effects, b)));
         let speed_rpm = rows.drive(Channel::ShaftSpeed);
         found.push(Phase {
             from_s: rows.t_s[phase.start],
             until_s: rows.t_s[phase.end - 1],
             from_rpm: speed_rpm[phase.start],
             until_rpm: speed_rpm[phase.end - 1],
-            before_k: off_k(question, &bare.predicted, phase.clone()),
-            after_k: off_k(question, &chosen.unwrap_or(bare).predicted, phase.clone()),
-            chosen: chosen.map_or_else(Vec::new, |fit| ids(question, &fit.hypothesis)),
+            before_k: residual_rms_k(problem, &bare.predicted, phase.clone()),
+            after_k: residual_rms_k(problem, &chosen.unwrap_or(bare).predicted, phase.clone()),
+            chosen: chosen.map_or_else(Vec::new, |fit| ids(problem, &fit.hypothesis)),
         });
     }
     let whole = |of: &dyn Fn(&Phase) -> f64| {
         let squares = found.iter().zip(phases).map(|(phase, rows)| of(phase).powi(2) * rows.len() as f64);
         (squares.sum::<f64>() / phases.iter().map(|rows| rows.len() as f64).sum::<f64>()).sqrt()
     };
-    let taken: Vec<f64> = found.iter().map(|phase| phase.before_k - phase.after_k).collect();
-    let shrink_k = mean(&taken)?;
-    let samples = taken.len() as f64;
+    let reductions: Vec<f64> = found.iter().map(|phase| phase.before_k - phase.after_k).collect();
+    let shrink_k = mean(&reductions)?;
+    let samples = reductions.len() as f64;
     let half_k = student_quantile(0.975, samples - 1.0).unwrap_or(f64::INFINITY)
-        * standard_deviation(&taken).unwrap_or(f64::INFINITY)
+        * standard_deviation(&reductions).unwrap_or(f64::INFINITY)
         / samples.sqrt();
     Some(HeldOut {
         before_k: whole(&|phase| phase.before_k),
@@ -87,51 +91,51 @@ pub(crate) fn held_out<S: Side>(
 }
 
 /// Ids of a hypothesis' effects.
-pub(crate) fn ids<S: Side>(question: &Question<'_, S>, hypothesis: &Hypothesis) -> Vec<String> {
-    hypothesis.effects.iter().map(|(index, _)| question.effects[*index].info().id.to_string()).collect()
+pub(crate) fn ids<S: SideModel>(problem: &SideProblem<'_, S>, hypothesis: &Hypothesis) -> Vec<String> {
+    infos(problem.effects, hypothesis).map(|info| info.id.to_string()).collect()
 }
 
-/// Compares the rows after the fitted part with the expectation of `after`.
-pub(crate) fn beyond<S: Side>(
-    question: &Question<'_, S>,
+/// Compares the rows after the fitted part with the prediction of `after`.
+pub(crate) fn beyond<S: SideModel>(
+    problem: &SideProblem<'_, S>,
     fitted: usize,
     before: &Fit,
     after: &Fit,
     seed: u64,
 ) -> Option<Beyond> {
-    let rows = question.side.rows();
-    let behind = fitted..rows.len();
-    if behind.is_empty() {
+    let rows = problem.side.rows();
+    let later = fitted..rows.len();
+    if later.is_empty() {
         return None;
     }
-    let drawn = draws(question, after, seed);
+    let drawn = draws(problem, after, seed);
     let predicted = &after.predicted[0];
-    let off: Vec<f64> =
-        drawn.iter().filter_map(|draw| rms(behind.clone().map(|i| draw[i] - predicted[i]))).collect();
-    let at = |share: f64| quantile(&off, share).unwrap_or(f64::NAN);
-    let holds = |i: &usize| {
+    let expected: Vec<f64> =
+        drawn.iter().filter_map(|draw| rms(later.clone().map(|i| draw[i] - predicted[i]))).collect();
+    let at = |share: f64| quantile(&expected, share).unwrap_or(f64::NAN);
+    let is_inside = |i: &usize| {
         let end = |share: f64| quantile(drawn.iter().map(|draw| draw[*i]), share).unwrap_or(f64::NAN);
         (end(0.025)..=end(0.975)).contains(&rows.judged[0].1[*i])
     };
     Some(Beyond {
-        from_s: rows.t_s[behind.start],
-        until_s: rows.t_s[behind.end - 1],
-        rows: behind.len(),
-        before_k: off_k(question, &before.predicted, behind.clone()),
-        after_k: off_k(question, &after.predicted, behind.clone()),
+        from_s: rows.t_s[later.start],
+        until_s: rows.t_s[later.end - 1],
+        rows: later.len(),
+        before_k: residual_rms_k(problem, &before.predicted, later.clone()),
+        after_k: residual_rms_k(problem, &after.predicted, later.clone()),
         expected_k: at(0.5),
         expected_low_k: at(0.025),
         expected_high_k: at(0.975),
-        inside_ratio: behind.clone().filter(holds).count() as f64 / behind.len() as f64,
+        inside_ratio: later.clone().filter(is_inside).count() as f64 / later.len() as f64,
     })
 }
 
-/// Simulated readings of the first judged channel for posterior draws of a fit, each with its own noise.
-fn draws<S: Side>(question: &Question<'_, S>, fit: &Fit, seed: u64) -> Vec<Vec<f64>> {
+/// Simulated readings of the first judged channel for posterior draws of a fit, each with noise of its own.
+fn draws<S: SideModel>(problem: &SideProblem<'_, S>, fit: &Fit, seed: u64) -> Vec<Vec<f64>> {
     let Some(cholesky) = fit.precision.clone().cholesky() else { return Vec::new() };
-    let unknowns = fit.hypothesis.nuisances.len();
-    let coordinates = coordinates(question.effects, &fit.hypothesis);
-    let (t_s, alike_s) = (&question.side.rows().t_s, S::smooth()[0].alike_s);
+    let coordinates = coordinates(problem.effects, &fit.hypothesis);
+    let mode = unknowns(&fit.hypothesis, &coordinates);
+    let (t_s, correlation_s) = (&problem.side.rows().t_s, S::model_errors()[0].correlation_s);
     let numbers: Vec<u64> = (0..DRAWS as u64).collect();
     let drawn = parallel::map(&numbers, |number| {
         let mut random = Pcg64Mcg::seed_from_u64(seed.wrapping_mul(DRAWS as u64).wrapping_add(*number));
@@ -139,22 +143,13 @@ fn draws<S: Side>(question: &Question<'_, S>, fit: &Fit, seed: u64) -> Vec<Vec<f
         let unit = DVector::from_fn(fit.precision.nrows(), |_, _| normal());
         // With precision L L', L'^-1 times unit noise has the inverse precision as its covariance.
         let off = cholesky.l().transpose().solve_upper_triangular(&unit)?;
-        let mut there = fit.hypothesis.clone();
-        for (z, by) in there.nuisances.iter_mut().zip(off.iter()) {
-            *z += by;
+        let there = hypothesis_at(&fit.hypothesis, &coordinates, &(&mode + off));
+        let mut readings_k = problem.predict(&there)?.swap_remove(0);
+        let mut model_error = CorrelatedNoise::new(fit.left_k[0], correlation_s);
+        for (reading_k, t_s) in readings_k.iter_mut().zip(t_s) {
+            *reading_k += model_error.next(*t_s, normal()) + problem.white_k[0] * normal();
         }
-        for (place, (coordinate, value)) in coordinates.iter().zip(parameters(&fit.hypothesis)).enumerate() {
-            set_parameter(&mut there, place, coordinate.value(coordinate.of(value) + off[unknowns + place]));
-        }
-        let mut predicted = question.predict(&there)?.swap_remove(0);
-        let (mut smooth_k, mut before_s): (f64, Option<f64>) = (0.0, None);
-        for (reading_k, t_s) in predicted.iter_mut().zip(t_s) {
-            let keep = before_s.map_or(0.0, |before_s| (-(t_s - before_s) / alike_s).exp());
-            smooth_k = keep * smooth_k + fit.left_k[0] * (1.0 - keep * keep).sqrt() * normal();
-            before_s = Some(*t_s);
-            *reading_k += smooth_k + question.white_k[0] * normal();
-        }
-        Some(predicted)
+        Some(readings_k)
     });
     drawn.into_iter().flatten().collect()
 }

@@ -11,6 +11,8 @@ mod search;
 mod side_diagnosis;
 mod sides;
 
-pub use diagnose::{Ask, diagnose};
-pub use side_diagnosis::{Beyond, Cause, Course, Diagnosis, HeldOut, NotAsked, Phase, Unknown, Word};
-pub use sides::side::{NoSide, Which};
+pub use diagnose::{SideRequest, diagnose};
+pub use side_diagnosis::{
+    Beyond, Cause, ChannelTrace, Diagnosis, HeldOut, NotDiagnosable, Phase, SideVerdict, Unknown,
+};
+pub use sides::side::{Side, UnknownSide};

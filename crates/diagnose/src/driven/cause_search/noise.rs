@@ -6,28 +6,27 @@
 /// Filter gains for one channel.
 #[derive(Debug, Clone)]
 pub(crate) struct Whitening {
-    /// For each row: the state's decay since the previous row, its gain, and the inverse spread of the innovation; `None` for an unused
-    /// row.
+    /// For each row: decay of the state since the previous row, and, if the row is used, gain and inverse spread of the innovation.
     rows: Vec<(f64, Option<(f64, f64)>)>,
     /// Sum of the log spreads of the innovations.
     pub(crate) ln_spreads: f64,
 }
 
 impl Whitening {
-    /// For rows at `t_s` selected by `counts`; white noise, correlated noise and its correlation time.
-    pub(crate) fn new(t_s: &[f64], counts: &[bool], white: f64, smooth: f64, alike_s: f64) -> Self {
-        let (white, smooth) = (white.max(1e-6).powi(2), smooth.powi(2));
-        let mut variance = smooth;
+    /// For rows at `t_s`, of which `used` count; standard deviations of the white and the correlated noise, and its correlation time, s.
+    pub(crate) fn new(t_s: &[f64], used: &[bool], white: f64, correlated: f64, correlation_s: f64) -> Self {
+        let (white, correlated) = (white.max(1e-6).powi(2), correlated.powi(2));
+        let mut variance = correlated;
         let mut ln_spreads = 0.0;
         let mut before_s: Option<f64> = None;
         let rows = t_s
             .iter()
-            .zip(counts)
-            .map(|(t_s, counts)| {
-                let keep = before_s.map_or(0.0, |before_s| (-(t_s - before_s) / alike_s).exp());
+            .zip(used)
+            .map(|(t_s, used)| {
+                let keep = before_s.map_or(0.0, |before_s| (-(t_s - before_s) / correlation_s).exp());
                 before_s = Some(*t_s);
-                variance = keep * keep * variance + (1.0 - keep * keep) * smooth;
-                if !counts {
+                variance = keep * keep * variance + (1.0 - keep * keep) * correlated;
+                if !used {
                     return (keep, None);
                 }
                 let spread = variance + white;
@@ -47,9 +46,9 @@ impl Whitening {
             state *= keep;
             *value = match row {
                 Some((gain, over_spread)) => {
-                    let news = *value - state;
-                    state += gain * news;
-                    news * over_spread
+                    let innovation = *value - state;
+                    state += gain * innovation;
+                    innovation * over_spread
                 }
                 None => 0.0,
             };

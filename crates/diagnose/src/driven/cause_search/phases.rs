@@ -7,8 +7,8 @@ use std::ops::Range;
 
 /// Minimum length of a phase, s.
 const SHORTEST_S: f64 = 1.0;
-/// Two neighbours are merged if one line for both costs less than this share of the total variation.
-const ALIKE_RATIO: f64 = 0.01;
+/// Two neighbours are merged if one line for both increases the misfit by less than this share of the total variation.
+const MERGE_RATIO: f64 = 0.01;
 /// Minimum and maximum number of phases; each is predicted by fits to the others.
 const PHASES: (usize, usize) = (3, 8);
 
@@ -17,7 +17,7 @@ pub(crate) fn phases(rows: &Rows, count: usize, drives: &[Channel]) -> Vec<Range
     let count = count.min(rows.len());
     let sums: Vec<Sums> =
         drives.iter().map(|channel| Sums::new(&rows.t_s[..count], rows.drive(*channel))).collect();
-    let cost = |range: &Range<usize>| sums.iter().map(|sums| sums.off_a_line(range)).sum::<f64>();
+    let cost = |range: &Range<usize>| sums.iter().map(|sums| sums.line_misfit(range)).sum::<f64>();
     let mut phases: Vec<Range<usize>> = Vec::new();
     let mut from = 0;
     for i in 0..count {
@@ -31,13 +31,14 @@ pub(crate) fn phases(rows: &Rows, count: usize, drives: &[Channel]) -> Vec<Range
         None => return Vec::new(),
     }
     loop {
-        let dearer = |i: usize| {
+        let added_cost = |i: usize| {
             let both = phases[i].start..phases[i + 1].end;
             cost(&both) - cost(&phases[i]) - cost(&phases[i + 1])
         };
-        let next = (0..phases.len().saturating_sub(1)).min_by(|a, b| dearer(*a).total_cmp(&dearer(*b)));
+        let next =
+            (0..phases.len().saturating_sub(1)).min_by(|a, b| added_cost(*a).total_cmp(&added_cost(*b)));
         let Some(next) = next.filter(|_| phases.len() > PHASES.0) else { break };
-        if phases.len() <= PHASES.1 && dearer(next) > ALIKE_RATIO * drives.len() as f64 {
+        if phases.len() <= PHASES.1 && added_cost(next) > MERGE_RATIO * drives.len() as f64 {
             break;
         }
         let after = phases.remove(next + 1);
@@ -46,7 +47,7 @@ pub(crate) fn phases(rows: &Rows, count: usize, drives: &[Channel]) -> Vec<Range
     if phases.len() < 2 { Vec::new() } else { phases }
 }
 
-/// Cumulative sums for the misfit of a straight line over any segment; values are scaled by their spread.
+/// Cumulative sums that give the misfit of a straight line over any range. Values are scaled by their spread.
 struct Sums {
     /// Sums of 1, t, v, t t, t v, v v before each row.
     before: Vec<[f64; 6]>,
@@ -72,7 +73,7 @@ impl Sums {
         Sums { before }
     }
 
-    fn off_a_line(&self, range: &Range<usize>) -> f64 {
+    fn line_misfit(&self, range: &Range<usize>) -> f64 {
         let [n, t, v, tt, tv, vv] =
             std::array::from_fn(|i| self.before[range.end][i] - self.before[range.start][i]);
         if n < 2.0 {

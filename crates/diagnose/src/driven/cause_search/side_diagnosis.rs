@@ -1,6 +1,6 @@
 //! Result of the diagnosis of one side.
 
-use crate::driven::cause_search::sides::side::Which;
+use crate::driven::cause_search::sides::side::Side;
 use crate::gap::findings::report::{Estimate, SmallestSeen};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 /// Overall verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Word {
+pub enum SideVerdict {
     /// Nothing exceeds the prior uncertainty of such a machine.
     WithinTolerance,
     /// One cause explains it.
@@ -40,7 +40,7 @@ pub struct Cause {
 
 /// An effect that cannot be diagnosed here.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct NotAsked {
+pub struct NotDiagnosable {
     /// Id of the effect.
     pub effect: String,
     /// Display name.
@@ -129,7 +129,7 @@ pub struct Unknown {
 
 /// The first judged channel over time, K.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Course {
+pub struct ChannelTrace {
     /// Times, s.
     pub t_s: Vec<f64>,
     /// Measured.
@@ -144,7 +144,7 @@ pub struct Course {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Diagnosis {
     /// The side.
-    pub side: Which,
+    pub side: Side,
     /// Symbols of the driving channels.
     pub driven_by: Vec<&'static str>,
     /// Symbols of the judged channels, most important first.
@@ -153,7 +153,7 @@ pub struct Diagnosis {
     #[serde(skip_serializing_if = "infinite")]
     pub fitted_until_s: f64,
     /// Overall verdict.
-    pub word: Word,
+    pub word: SideVerdict,
     /// Probability of no cause beyond the prior uncertainty.
     pub probability_none: f64,
     /// Probability of a cause outside the effect library.
@@ -173,11 +173,11 @@ pub struct Diagnosis {
     /// Diagnosable effects with their smallest detectable size.
     pub asked: Vec<SmallestSeen>,
     /// Library effects that cannot be diagnosed here.
-    pub not_asked: Vec<NotAsked>,
+    pub not_asked: Vec<NotDiagnosable>,
     /// Unknowns of the side under the likeliest explanation.
     pub unknowns: Vec<Unknown>,
     /// The first judged channel over time.
-    pub course: Course,
+    pub course: ChannelTrace,
     /// Unusable rows.
     pub lost_rows: usize,
 }

@@ -1,5 +1,5 @@
-//! Tests whether the residual of a fit is noise. A misfit is smooth, so the test uses a few smooth directions; thousands of noisy values
-//! would hide it.
+//! Tests whether the residual of a fit is noise. A misfit is smooth, so the test uses a few smooth directions: among thousands of noisy values
+//! the misfit would be invisible.
 
 use crate::gap::best_fit::fit::Fit;
 use crate::gap::best_fit::selection::Selection;

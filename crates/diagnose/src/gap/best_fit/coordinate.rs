@@ -1,7 +1,8 @@
-//! Search coordinates of effect parameters.
+//! Search coordinates of effect parameters, and hypotheses as vectors of unknowns.
 
 use crate::gap::residuals::study::Hypothesis;
-use mapper_physics::rig::effect::{Effect, EffectParameter};
+use mapper_physics::rig::effect::{Effect, EffectInfo, EffectParameter};
+use nalgebra::DVector;
 use std::sync::Arc;
 
 /// Search coordinate of a parameter: its value in typical steps, or its logarithm if it spans decades.
@@ -37,11 +38,11 @@ impl Coordinate {
         (ends.0.min(ends.1), ends.0.max(ends.1))
     }
 
-    /// A value next to another one, on the side where there is room, and the coordinate's change.
+    /// A value at this distance from another one, on the side that is within the range, and the coordinate's change.
     pub fn next_to(&self, value: f64, distance: f64) -> (f64, f64) {
         let at = self.of(value);
-        let fits = |x: &f64| (self.of(self.value(*x)) - x).abs() < 1e-9;
-        let away = [at + distance, at - distance].into_iter().find(fits).unwrap_or(at - distance);
+        let is_in_range = |x: &f64| (self.of(self.value(*x)) - x).abs() < 1e-9;
+        let away = [at + distance, at - distance].into_iter().find(is_in_range).unwrap_or(at - distance);
         let moved = self.value(away);
         (moved, self.of(moved) - at)
     }
@@ -53,20 +54,72 @@ impl Coordinate {
     }
 }
 
-/// Coordinates of all parameters of a hypothesis' effects, in order.
-pub fn coordinates(effects: &[Arc<dyn Effect>], hypothesis: &Hypothesis) -> Vec<Coordinate> {
-    let parameters = hypothesis.effects.iter().flat_map(|(index, _)| &effects[*index].info().parameters);
-    parameters.map(Coordinate::new).collect()
+/// Descriptions of a hypothesis' effects, in order.
+pub(crate) fn infos<'a>(
+    effects: &'a [Arc<dyn Effect>],
+    hypothesis: &'a Hypothesis,
+) -> impl Iterator<Item = &'a EffectInfo> {
+    hypothesis.effects.iter().map(|(index, _)| effects[*index].info())
 }
 
-/// Sets the `place`-th parameter of all effects to a value.
-pub fn set_parameter(hypothesis: &mut Hypothesis, place: usize, value: f64) {
-    if let Some(slot) = hypothesis.effects.iter_mut().flat_map(|(_, values)| values.iter_mut()).nth(place) {
-        *slot = value;
-    }
+/// Coordinates of all parameters of a hypothesis' effects, in order.
+pub fn coordinates(effects: &[Arc<dyn Effect>], hypothesis: &Hypothesis) -> Vec<Coordinate> {
+    infos(effects, hypothesis).flat_map(|info| &info.parameters).map(Coordinate::new).collect()
 }
 
 /// Values of all effects' parameters, in order.
 pub fn parameters(hypothesis: &Hypothesis) -> Vec<f64> {
     hypothesis.effects.iter().flat_map(|(_, values)| values.iter().copied()).collect()
+}
+
+/// A hypothesis as a vector of unknowns: its nuisances, then the coordinates of its effects.
+pub(crate) fn unknowns(hypothesis: &Hypothesis, coordinates: &[Coordinate]) -> DVector<f64> {
+    let of_effects = coordinates.iter().zip(parameters(hypothesis)).map(|(c, value)| c.of(value));
+    let count = hypothesis.nuisances.len() + coordinates.len();
+    DVector::from_iterator(count, hypothesis.nuisances.iter().copied().chain(of_effects))
+}
+
+/// The hypothesis of a vector of unknowns, with the effects of `start`. Parameters stay within their ranges.
+pub(crate) fn hypothesis_at(
+    start: &Hypothesis,
+    coordinates: &[Coordinate],
+    unknowns: &DVector<f64>,
+) -> Hypothesis {
+    let mut hypothesis = start.clone();
+    let count = hypothesis.nuisances.len();
+    hypothesis.nuisances.copy_from_slice(&unknowns.as_slice()[..count]);
+    let values = hypothesis.effects.iter_mut().flat_map(|(_, values)| values);
+    for ((value, coordinate), unknown) in values.zip(coordinates).zip(unknowns.iter().skip(count)) {
+        *value = coordinate.value(*unknown);
+    }
+    hypothesis
+}
+
+/// The neighbours of a hypothesis along each of its nuisances, with the change of the nuisance.
+pub(crate) fn nuisance_neighbours(
+    hypothesis: &Hypothesis,
+    distance: f64,
+) -> impl Iterator<Item = (Hypothesis, f64)> {
+    (0..hypothesis.nuisances.len()).map(move |index| {
+        let mut moved = hypothesis.clone();
+        moved.nuisances[index] += distance;
+        (moved, distance)
+    })
+}
+
+/// The neighbours of a hypothesis along each coordinate of its effects, with the change of the coordinate.
+pub(crate) fn effect_neighbours(
+    hypothesis: &Hypothesis,
+    coordinates: &[Coordinate],
+    distance: f64,
+) -> impl Iterator<Item = (Hypothesis, f64)> {
+    let values = coordinates.iter().zip(parameters(hypothesis)).enumerate();
+    values.map(move |(index, (coordinate, value))| {
+        let (next, change) = coordinate.next_to(value, distance);
+        let mut moved = hypothesis.clone();
+        if let Some(value) = moved.effects.iter_mut().flat_map(|(_, values)| values).nth(index) {
+            *value = next;
+        }
+        (moved, change)
+    })
 }

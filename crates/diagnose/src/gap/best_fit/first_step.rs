@@ -1,24 +1,17 @@
-//! The initial metal temperature is not a machine property: a fit without the first step takes it from there.
+//! The initial metal temperature is not a machine property. A fit without the first step still takes it from that step.
 
 use crate::gap::best_fit::fit::{Fit, MAX_SIGMAS};
 use crate::gap::best_fit::selection::dot_over;
-use crate::gap::residuals::nuisance::NuisanceKind;
 use crate::gap::residuals::study::Study;
 use crate::gap::residuals::whiten::{Linearised, rows_of_step};
-use mapper_observe::perturbation::Perturbation;
 use nalgebra::{DMatrix, DVector};
 
-/// Whether a nuisance is the initial metal temperature.
-pub(crate) fn is_start(kind: NuisanceKind) -> bool {
-    matches!(kind, NuisanceKind::Perturbation(Perturbation::StartTc | Perturbation::StartTt))
-}
-
-/// Refits only the initial state to the first step. Otherwise a held-out first step would count an unknowable start temperature as a
-/// machine misfit, a hundred times too large. Returns the fit unchanged if the misfit of the first step does not fall.
+/// Refits only the initial state to the first step. Otherwise the unknown start temperature would count as a machine misfit of a held-out first
+/// step, a hundred times too large. Returns the fit unchanged if the misfit of the first step does not fall.
 pub fn with_start_read(study: &Study, linearised: &Linearised, fit: Fit) -> Fit {
     let rows = [rows_of_step(study, 0)];
     let starts: Vec<usize> =
-        study.nuisances.iter().enumerate().filter(|(_, n)| is_start(n.kind)).map(|(i, _)| i).collect();
+        study.nuisances.iter().enumerate().filter(|(_, n)| n.kind.is_start()).map(|(i, _)| i).collect();
     let column = |place: usize| &linearised.columns[starts[place]];
     let n = starts.len();
     let matrix =

@@ -2,9 +2,9 @@
 
 pub mod adequacy;
 pub mod coordinate;
-pub mod first_step;
+pub(crate) mod first_step;
 pub mod fit;
-pub mod normal;
+pub(crate) mod normal;
 pub(crate) mod projector;
 pub mod selection;
 pub mod signature;

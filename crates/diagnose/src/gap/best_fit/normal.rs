@@ -44,7 +44,7 @@ pub(crate) fn normal_matrix(
             matrix[(n + l, n + j)] = product;
             matrix[(n + j, n + l)] = product;
         }
-        // Tiny regularisation that keeps the equations solvable if a parameter has no influence.
+        // Keeps the equations solvable if a parameter has no influence.
         matrix[(n + j, n + j)] += 1e-6;
     }
     matrix
@@ -52,7 +52,7 @@ pub(crate) fn normal_matrix(
 
 /// Squared residual of `difference` (whitened) after fitting `columns`; `precision` is the prior precision of their coefficients. `None` if
 /// the equations are singular.
-pub(crate) fn misfit(difference: &[f64], columns: &[Vec<f64>], precision: &DMatrix<f64>) -> Option<f64> {
+fn misfit(difference: &[f64], columns: &[Vec<f64>], precision: &DMatrix<f64>) -> Option<f64> {
     let n = columns.len();
     let mut matrix = precision.clone();
     for i in 0..n {
@@ -65,6 +65,21 @@ pub(crate) fn misfit(difference: &[f64], columns: &[Vec<f64>], precision: &DMatr
         }
     }
     let right = DVector::from_fn(n, |i, _| dot(&columns[i], difference));
-    let taken = right.dot(&matrix.cholesky()?.solve(&right));
-    Some((dot(difference, difference) - taken).max(0.0))
+    let explained = right.dot(&matrix.cholesky()?.solve(&right));
+    Some((dot(difference, difference) - explained).max(0.0))
+}
+
+/// Prediction of a fit for an experiment, its derivatives, and the prior precision of the fit's parameters; all whitened.
+pub(crate) type ExpectedFit = (Vec<f64>, Vec<Vec<f64>>, DMatrix<f64>);
+
+/// Misfit of each fit (column) after a refit to an experiment, if another fit (row) is true, in squared sigmas.
+pub(crate) fn misfit_increases(fits: &[ExpectedFit]) -> Option<Vec<Vec<f64>>> {
+    let of_truth = |truth: &Vec<f64>| -> Option<Vec<f64>> {
+        let of_rival = |(predicted, columns, precision): &ExpectedFit| {
+            let difference: Vec<f64> = truth.iter().zip(predicted).map(|(a, b)| a - b).collect();
+            misfit(&difference, columns, precision)
+        };
+        fits.iter().map(of_rival).collect()
+    };
+    fits.iter().map(|(truth, ..)| of_truth(truth)).collect()
 }

@@ -30,20 +30,11 @@ const OFF_NEUTRAL: f64 = 0.1;
 
 /// Every further effect added to a fit, in closed form from one run each; effects with interacting parameters use several starts.
 pub fn additions(study: &Study, linearised: &Linearised, selection: &Selection, base: &Fit) -> Vec<Addition> {
-    of_kind(study, linearised, selection, base, false)
+    additions_of(study, linearised, selection, base, false)
 }
 
-/// The same for the study's candidates with an onset, as if nothing before the onset changed and nothing persisted.
-pub(crate) fn onset_additions(
-    study: &Study,
-    linearised: &Linearised,
-    selection: &Selection,
-    base: &Fit,
-) -> Vec<Addition> {
-    of_kind(study, linearised, selection, base, true)
-}
-
-fn of_kind(
+/// The same, or for `onsets` the study's candidates with an onset, as if nothing before the onset changed and nothing persisted.
+pub(crate) fn additions_of(
     study: &Study,
     linearised: &Linearised,
     selection: &Selection,
@@ -108,8 +99,8 @@ impl FitNeighbourhood<'_> {
         let mut start = self.with(effect, vec![value]);
         if by != 0.0 && by.is_finite() {
             start.columns = self.columns.clone();
-            let course = self.study.courses[effect];
-            start.columns.push(Column { change: change.clone(), units: by, course });
+            let history = self.study.histories[effect];
+            start.columns.push(Column { change: change.clone(), units: by, history });
         }
         start
     }
@@ -146,11 +137,11 @@ impl FitNeighbourhood<'_> {
         let of_steps: Vec<Share> =
             self.rows.iter().map(|rows| self.projector.share(rows, &change, &self.base.residual)).collect();
         let from = |late: usize| {
-            let course = self.study.courses[late];
+            let history = self.study.histories[late];
             let mut right = DVector::zeros(self.right_residual.len());
             let (mut own, mut seen) = (0.0, 0.0);
             for (step, of_step) in of_steps.iter().enumerate() {
-                let share = course.share(step, of_steps.len());
+                let share = history.share(step, of_steps.len());
                 right.axpy(share, &of_step.right, 1.0);
                 own += share * share * of_step.own;
                 seen += share * of_step.seen;

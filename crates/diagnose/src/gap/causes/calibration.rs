@@ -1,5 +1,4 @@
-//! Constants that convert scores into probabilities, calibrated on simulated campaigns. The data file records the seed and the command that
-//! made it.
+//! Constants that convert scores into probabilities, calibrated on simulated campaigns. The data file records the command that produced it.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,7 +6,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Calibration {
-    /// The command that made it, with its seed.
+    /// Command that produced the constants, with its seed.
     pub made_by: String,
     /// Minimum score above that of no cause for a cause to be named.
     pub threshold: f64,
@@ -27,7 +26,6 @@ pub struct Calibration {
     pub outside: [f64; 4],
 }
 
-/// The data file.
 const TEXT: &str = include_str!("../../../calibration.json");
 
 impl Calibration {
@@ -47,7 +45,7 @@ impl Calibration {
     }
 }
 
-/// Upper limit of half the squared misfit: above it, misfits are equally gross.
+/// Upper limit of half the squared misfit, above which all misfits count as equally large.
 const MAX: f64 = 500.0;
 
 /// Transforms the features of an unmodelled cause for its logistic model. Smooth misfit enters as half its square, the negative

@@ -2,7 +2,7 @@
 
 pub mod additions;
 pub mod calibration;
-pub mod place;
-pub mod select;
-pub mod smallest_seen;
+pub(crate) mod place;
+pub(crate) mod select;
+pub(crate) mod smallest_seen;
 pub mod weigh;

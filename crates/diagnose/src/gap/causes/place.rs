@@ -2,7 +2,7 @@
 //!
 //! Each explanation (a fitted cause, a law, a source term in one balance) has a score and parts. A part's share of an explanation is its
 //! additional misfit reduction given the other parts. Its share of the gap is the probability-weighted mean over the explanations, so
-//! shares add up to 1. A fault-free part has no share, because another part explains the gap better than any reading of its sensors would.
+//! shares add up to 1. A fault-free part has no share, because another part explains the gap better.
 
 use crate::gap::best_fit::fit::Fit;
 use crate::gap::findings::report::Place;
@@ -24,7 +24,6 @@ const PHASES: [(&str, f64); 3] = [("0-5 s", 0.0), ("5-30 s", 5.0), ("30-110 s", 
 /// A fit with its reduction of the misfit of all steps.
 #[derive(Debug)]
 pub struct Gain<'a> {
-    /// The fit.
     pub fit: &'a Fit,
     /// Null cost minus its own cost; scaled up proportionally for a fit to some of the steps.
     pub gain: f64,
@@ -32,7 +31,6 @@ pub struct Gain<'a> {
 
 /// Contribution of a machine part to an explanation.
 pub struct Part<'a> {
-    /// The part.
     pub submodel: Submodel,
     /// Its additional misfit reduction given the other parts, squared sigmas.
     pub gain: f64,
@@ -44,7 +42,6 @@ pub struct Part<'a> {
 pub struct Explanation<'a> {
     /// Log evidence relative to no cause.
     pub score: f64,
-    /// Its parts.
     pub parts: Vec<Part<'a>>,
 }
 
@@ -76,8 +73,8 @@ pub fn signature(study: &Study, fit: &Fit, effect: usize) -> Option<Vec<f64>> {
     Some(fit.prediction.values.iter().zip(&there.values).map(|(with, without)| with - without).collect())
 }
 
-/// Locations of the gap, largest first. `fits` are single effects and pairs, best first; if `named` is set, so many of the first are the
-/// causes that the data do not distinguish.
+/// Locations of the gap, largest first. `fits` are single effects and pairs, best first; `named` is the number of the first ones that the data do not
+/// distinguish, if a cause is named.
 pub fn places(
     study: &Study,
     linearised: &Linearised,

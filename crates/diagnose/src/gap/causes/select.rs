@@ -1,9 +1,9 @@
-//! Which effects explain a recording best: the causes of [`mapper_inference::search`], fitted by runs of the model.
+//! Searches the effects that explain a recording best, by [`mapper_inference::search`] with fits by model runs.
 
 use crate::gap::best_fit::coordinate::Coordinate;
-use crate::gap::best_fit::fit::{Effort, Fit, MAX_SIGMAS, Start, fit, fit_from};
+use crate::gap::best_fit::fit::{Effort, Fit, MAX_SIGMAS, Start, fit};
 use crate::gap::best_fit::selection::Selection;
-use crate::gap::causes::additions::{Addition, additions, onset_additions};
+use crate::gap::causes::additions::{Addition, additions, additions_of};
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::weigh::{prior, weight};
 use crate::gap::residuals::study::{PredictError, Study, members};
@@ -13,58 +13,53 @@ use mapper_inference::descent::ROUNDS;
 use mapper_inference::hypotheses::MAX_MEMBERS;
 use mapper_inference::search::{Causes, Known, Limits, Offer, climb, extend};
 
-/// What the search works with.
 #[derive(Clone, Copy)]
 pub struct Search<'a> {
-    /// The recording.
     pub study: &'a Study,
-    /// Linearised at the start of the fits: at the nominal point, or at the best so far.
+    /// Linearised where the fits start: at the nominal model, or at the best fit so far.
     pub linearised: &'a Linearised,
     /// Steps that count.
     pub selection: &'a Selection,
-    /// Numbers behind the probabilities.
+    /// Constants of the probabilities.
     pub calibration: &'a Calibration,
-    /// Whether to search for causes that begin with a step, in addition to what is known, or for those that act throughout.
+    /// Whether to search causes that begin with a step instead of those that act throughout.
     pub onsets: bool,
 }
 
-/// Judgement: bounds the time. The slack is the evidence that a cause has to have over nothing.
+/// Judgement: limits the time. The slack is the evidence that a cause must have over no cause.
 const LIMITS: Limits = Limits { members: MAX_MEMBERS, starts: 2, fits: 6, slack: 3.0 };
-/// If a single takes at least this off the cost, nuisances are linearised again at its fit: tolerances of what an
-/// effect changes act otherwise there than at the nominal point.
+/// Decrease of the cost by a single effect above which nuisances are linearised again at its fit: their derivatives differ there from those at the
+/// nominal point.
 const STRONG: f64 = 30.0;
-/// Starts with the most linear gain that are fitted as a single: bounds the time. Judgement: half of the library, since strong effects bend.
+/// Number of single effects that are fitted, those with the largest linear gain. Judgement: half of the library limits the time, although strong effects
+/// are nonlinear.
 const SINGLES: usize = 26;
-/// Share of the misfit that a cause must remove to explain it in part, also on steps that its fit did not see. A further effect that removes
-/// less is one of many that chip at a cause of another kind: nothing is built upon it.
+/// Share of the misfit that a cause must remove to explain it in part, also on held-out steps. An additional effect that removes less probably imitates a
+/// cause outside the library, so the search does not extend that set.
 pub const MIN_SHRINK: f64 = 0.5;
 
-/// What one more iteration may promise in the cost of a fit that is at its best: well below what any cause is named for.
+/// Predicted decrease of the cost above which a fit is unfinished: well below the evidence that names a cause.
 const UNFINISHED: f64 = 1.0;
 
-const QUICK: Effort = Effort { iterations: 3, enough: 1.0, most_sigmas: 3.0, most_sigmas_of_rig: 3.0 };
+const QUICK: Effort = Effort { iterations: 3, enough: 1.0, max_sigmas: 3.0, max_sigmas_of_rig: 3.0 };
 const EFFORT: Effort =
-    Effort { iterations: 6, enough: 0.3, most_sigmas: MAX_SIGMAS, most_sigmas_of_rig: MAX_SIGMAS };
+    Effort { iterations: 6, enough: 0.3, max_sigmas: MAX_SIGMAS, max_sigmas_of_rig: MAX_SIGMAS };
 
-/// All sets that were fitted.
 #[derive(Debug)]
 pub struct SearchResult {
-    /// Nothing but tolerances.
+    /// Fit of tolerances alone.
     pub null: Fit,
-    /// Sets of effects, most probable first.
+    /// Fits of sets of effects, most probable first.
     pub fits: Vec<Fit>,
-    /// Linearised at the best single, or at nothing but tolerances, where the nominal point is far from it, and that set.
-    pub refound: Option<(Linearised, Vec<usize>)>,
+    /// Linearised at the best single effect, or at tolerances alone, if the nominal point is far from it; with that set.
+    pub relinearised: Option<(Linearised, Vec<usize>)>,
 }
 
-/// Searches all effects of the catalogue on the steps of the selection.
-///
-/// # Errors
-/// [`PredictError`] where the nominal model cannot follow the recording.
+/// Searches all effects of the library on the selected steps.
 pub fn search(search: Search<'_>, progress: &dyn Fn(f64, &str)) -> Result<SearchResult, PredictError> {
     let Search { study, selection, .. } = search;
     let mut null = fit(study, search.linearised, &study.nothing(), selection, Effort::default())?;
-    // Tolerances that act differently at the fit than where they were linearised stop it short.
+    // A fit ends too early if the derivatives of the tolerances changed; linearise them again there.
     let mut at_null = None;
     for _ in 0..ROUNDS {
         if null.promised < UNFINISHED {
@@ -77,7 +72,7 @@ pub fn search(search: Search<'_>, progress: &dyn Fn(f64, &str)) -> Result<Search
     let linearised = at_null.as_ref().unwrap_or(search.linearised);
     let search = Search { linearised, ..search };
     progress(0.15, "single effects");
-    // From where nothing is off, not from the null's nuisances, which may have bent far to stand in for an effect.
+    // Not from the nuisances of the null fit, which may imitate an effect.
     let untouched = fit(study, linearised, &study.nothing(), selection, Effort { iterations: 1, ..QUICK })?;
     let mut singles = additions(study, linearised, selection, &untouched);
     singles.sort_by(|a, b| b.gain.total_cmp(&a.gain));
@@ -85,26 +80,30 @@ pub fn search(search: Search<'_>, progress: &dyn Fn(f64, &str)) -> Result<Search
     let mut known = Known::default();
     known.keep(&search, null.clone());
     known.fit_all(&search, &singles);
-    again(&search, &mut known, 7, EFFORT);
-    let refound =
+    refit_best(&search, &mut known, 7, EFFORT);
+    let relinearised =
         known.ranked(&search).first().filter(|best| null.cost - best.cost > STRONG).and_then(|best| {
             let at_best = linearised.at(study, &best.hypothesis).ok()?;
             Some((at_best, members(&best.hypothesis)))
         });
-    let search = match &refound {
+    let search = match &relinearised {
         Some((at_best, _)) => Search { linearised: at_best, ..search },
         None => search,
     };
-    if refound.is_some() {
-        again(&search, &mut known, 4, Effort::default());
+    if relinearised.is_some() {
+        refit_best(&search, &mut known, 4, Effort::default());
     }
     progress(0.4, "several effects");
     extend(&search, &mut known, LIMITS);
     let fits = known.ranked(&search);
-    Ok(SearchResult { null, fits, refound: refound.or(at_null.map(|linearised| (linearised, Vec::new()))) })
+    Ok(SearchResult {
+        null,
+        fits,
+        relinearised: relinearised.or(at_null.map(|linearised| (linearised, Vec::new()))),
+    })
 }
 
-/// Adds sets with effects that begin with a step, for which the study has candidates by now.
+/// Adds fits of sets with effects that begin with a step; see [`Study::add_onsets`].
 pub fn search_onsets(search: Search<'_>, null: &Fit, fits: &mut Vec<Fit>) {
     let mut known = Known::default();
     std::iter::once(null).chain(fits.iter()).for_each(|fit| known.keep(&search, fit.clone()));
@@ -112,18 +111,18 @@ pub fn search_onsets(search: Search<'_>, null: &Fit, fits: &mut Vec<Fit>) {
     *fits = known.ranked(&search);
 }
 
-/// Fits the best few again, more thoroughly.
-fn again(search: &Search<'_>, known: &mut Known<Fit>, count: usize, effort: Effort) {
+/// Fits the best `count` sets again, with more effort.
+fn refit_best(search: &Search<'_>, known: &mut Known<Fit>, count: usize, effort: Effort) {
     let best: Vec<(Start, Effort)> =
         known.ranked(search).iter().take(count).map(|fit| (Start::from(fit), effort)).collect();
     known.fit_all(search, &best);
 }
 
-/// Fits of these hypotheses again, most probable first; of the same effects the more probable one.
+/// Fits these hypotheses again with new derivatives. Returns the more probable fit of each set, most probable first.
 pub fn refit(search: &Search<'_>, fits: &[&Fit], effort: Effort) -> Vec<Fit> {
     let mut known = Known::default();
-    let afresh = |fit: &&Fit| Start { columns: Vec::new(), ..Start::from(*fit) };
-    let starts: Vec<(Start, Effort)> = fits.iter().map(|fit| (afresh(fit), effort)).collect();
+    let start = |fit: &Fit| Start { columns: Vec::new(), ..Start::from(fit) };
+    let starts: Vec<(Start, Effort)> = fits.iter().map(|fit| (start(fit), effort)).collect();
     known.fit_all(search, &starts);
     known.ranked(search)
 }
@@ -161,8 +160,8 @@ impl Causes for Search<'_> {
                 start: (addition.start, EFFORT),
             }
         };
-        let look = if self.onsets { onset_additions } else { additions };
-        look(self.study, self.linearised, self.selection, base).into_iter().map(offer).collect()
+        let Search { study, linearised, selection, onsets, .. } = *self;
+        additions_of(study, linearised, selection, base, onsets).into_iter().map(offer).collect()
     }
 
     fn without(&self, fit: &Fit, cause: usize) -> (Start, Effort) {
@@ -180,8 +179,8 @@ impl Causes for Search<'_> {
     }
 
     fn fit(&self, (start, effort): &(Start, Effort)) -> Option<Fit> {
-        let fitted = fit_from(self.study, self.linearised, start, self.selection, *effort).ok()?;
-        does_something(self.study, &fitted).then_some(fitted)
+        let fitted = fit(self.study, self.linearised, start.clone(), self.selection, *effort).ok()?;
+        all_effects_act(self.study, &fitted).then_some(fitted)
     }
 
     fn goes_on(&self, from: &Fit, to: &Fit) -> bool {
@@ -191,8 +190,8 @@ impl Causes for Search<'_> {
     }
 }
 
-/// Fits without what the recording does not support: members of a set whose 95 % interval contains neutral, and onsets without evidence
-/// against the same effect throughout.
+/// Removes members of sets that the recording does not support: effects whose 95 % interval contains neutral, and onsets without evidence against the
+/// same effect throughout.
 pub fn supported(search: &Search<'_>, fits: Vec<Fit>) -> Vec<Fit> {
     let simpler = |fit: &Fit| -> Option<Fit> {
         let study = search.study;
@@ -201,12 +200,11 @@ pub fn supported(search: &Search<'_>, fits: Vec<Fit>) -> Vec<Fit> {
         {
             return search.fit(&search.without(fit, member));
         }
-        let onset =
-            fit.hypothesis.effects.iter().position(|(index, _)| study.courses[*index].onset().is_some());
         let mut hypothesis = fit.hypothesis.clone();
-        hypothesis.effects[onset?].0 = study.family(hypothesis.effects[onset?].0);
-        let start = Start { hypothesis, prediction: None, columns: Vec::new() };
-        let throughout = search.fit(&(start, EFFORT))?;
+        let mut effects = hypothesis.effects.iter_mut();
+        let (member, _) = effects.find(|(index, _)| study.histories[*index].onset().is_some())?;
+        *member = study.family(*member);
+        let throughout = search.fit(&(Start::from(&hypothesis), EFFORT))?;
         (search.ln_odds(fit) - search.ln_odds(&throughout) < search.calibration.threshold)
             .then_some(throughout)
     };
@@ -221,7 +219,7 @@ pub fn supported(search: &Search<'_>, fits: Vec<Fit>) -> Vec<Fit> {
     ranked(search, kept.iter())
 }
 
-/// The first effect of a fit with all its parameters within their 95 % interval of neutral.
+/// The first effect of a fit whose 95 % intervals all contain neutral.
 fn undetermined(search: &Search<'_>, fit: &Fit) -> Option<usize> {
     let mut place = 0;
     for (index, values) in &fit.hypothesis.effects {
@@ -240,9 +238,9 @@ fn undetermined(search: &Search<'_>, fit: &Fit) -> Option<usize> {
     None
 }
 
-/// Whether each effect of a fit does something: one that the fit left at its neutral value, or that this machine has no place
-/// for (convection before the wheel without area there), explains nothing, and a pair with it is not a pair.
-fn does_something(study: &Study, fitted: &Fit) -> bool {
+/// Whether every effect of a fit changes the prediction. An effect at its neutral value, or one that this machine cannot have (convection before the wheel
+/// without area there), explains nothing.
+fn all_effects_act(study: &Study, fitted: &Fit) -> bool {
     let mut columns = fitted.effect_columns.as_slice();
     fitted.hypothesis.effects.iter().all(|(index, values)| {
         let (own, rest) = columns.split_at(values.len().min(columns.len()));
@@ -255,5 +253,5 @@ fn does_something(study: &Study, fitted: &Fit) -> bool {
     })
 }
 
-/// This near to neutral, in typical steps, an effect is not there.
+/// Distance from neutral, in typical steps, below which an effect is absent.
 const NEUTRAL_STEPS: f64 = 1e-3;

@@ -19,10 +19,10 @@ use mapper_physics::rig::effect::{EffectInfo, EffectParameter};
 const LOOKS: usize = 6;
 const NEAR: f64 = 0.1;
 
-/// The size from which a recording shows an effect.
+/// Smallest size at which a recording shows an effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SmallestSize {
-    /// It, as the parameter's value; `None` if it lies outside the parameter's range.
+    /// The size as a value of the parameter; `None` if it lies outside the parameter's range.
     pub value: Option<f64>,
     /// The value in the range that is furthest from neutral.
     pub furthest: f64,
@@ -35,8 +35,8 @@ pub fn evidence_needed(calibration: &Calibration, count: usize) -> f64 {
     calibration.threshold + prior_of_number(calibration, count, 0) - prior_of_number(calibration, count, 1)
 }
 
-/// Smallest size, on the side of the typical step, that would be named in 95 of 100 recordings. `length`: of the signature of a value, in
-/// sigmas; `against`: [`evidence_needed`]. `None` if a length is.
+/// Smallest size, on the side of the typical step, that is named in 95 of 100 recordings. `length`: length of the signature of a value, in sigmas;
+/// `against`: [`evidence_needed`]. `None` if `length` returns `None`.
 pub fn smallest_size(
     parameter: &EffectParameter,
     against: f64,
@@ -71,7 +71,7 @@ pub fn smallest_size(
         if (sigma / wanted).ln().abs() < NEAR {
             break;
         }
-        // Interpolates logarithms with the power law of two runs, because effects are nonlinear.
+        // Effects are nonlinear: interpolate with the power law of two runs.
         let power = before.map_or(1.0, |(there, length): (f64, f64)| {
             ((sigma / length).ln() / (here / there).ln()).clamp(0.6, 3.0)
         });

@@ -1,13 +1,13 @@
 //! Converts scores into probabilities and describes each cause.
 
 use crate::gap::best_fit::adequacy::Adequacy;
-use crate::gap::best_fit::coordinate::Coordinate;
+use crate::gap::best_fit::coordinate::{Coordinate, infos};
 use crate::gap::best_fit::fit::Fit;
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::findings::in_words;
 use crate::gap::findings::report::{Candidate, Estimate, Onset};
 use crate::gap::next_experiment::best_experiment::{Rivals, SETTLED};
-use crate::gap::residuals::hypothesis::Course;
+use crate::gap::residuals::hypothesis::TimeHistory;
 use crate::gap::residuals::study::{EffectValues, Hypothesis, Study};
 use mapper_core::half_width_95;
 use mapper_inference::interval::COVERAGE;
@@ -16,12 +16,13 @@ use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Probabilities of the causes.
 pub(crate) struct CauseProbabilities {
     /// Causes, best first, without supersets of a better one.
     pub candidates: Vec<Candidate>,
     /// For each candidate, the index of its fit.
     pub shown: Vec<usize>,
+    /// The fits of the named cause and of those that the data do not distinguish from it, by index; empty if no cause is named.
+    pub alike: Vec<usize>,
     /// Probability that everything is within tolerance.
     pub none: f64,
     /// Probability of an unmodelled cause, from the residual of the best fit.
@@ -38,7 +39,8 @@ const LATE_RATIO: f64 = 0.005;
 /// rarer still, and may begin with any step.
 pub(crate) fn prior(calibration: &Calibration, study: &Study, hypothesis: &Hypothesis) -> f64 {
     let of_number = prior_of_number(calibration, study.catalogue, hypothesis.effects.len());
-    let late = hypothesis.effects.iter().filter(|(index, _)| study.courses[*index] != Course::Throughout);
+    let late =
+        hypothesis.effects.iter().filter(|(index, _)| study.histories[*index] != TimeHistory::Throughout);
     of_number + late.count() as f64 * (LATE_RATIO / (2.0 * study.steps.len().max(1) as f64)).ln()
 }
 
@@ -62,7 +64,7 @@ pub fn weight(calibration: &Calibration, study: &Study, fit: &Fit) -> f64 {
 }
 
 /// Whether `whole` includes all effects of `part`, regardless of their onset.
-fn holds(study: &Study, whole: &Fit, part: &Fit) -> bool {
+fn includes(study: &Study, whole: &Fit, part: &Fit) -> bool {
     let whole = ids(study, whole);
     ids(study, part).iter().all(|effect| whole.contains(effect))
 }
@@ -72,7 +74,7 @@ pub(crate) fn weigh(
     calibration: &Calibration,
     null: &Fit,
     fits: &[Fit],
-    left: &Adequacy,
+    adequacy: &Adequacy,
 ) -> CauseProbabilities {
     let scores: Vec<f64> =
         std::iter::once(null).chain(fits).map(|fit| weight(calibration, study, fit)).collect();
@@ -81,7 +83,7 @@ pub(crate) fn weigh(
     let total: f64 = weights.iter().sum();
     let best_cause = scores.iter().skip(1).copied().fold(f64::NEG_INFINITY, f64::max);
     let named = best_cause - scores[0] > calibration.threshold;
-    let outside = calibration.outside(left.features());
+    let outside = calibration.outside(adequacy.features());
     // If no cause is named, an inadequate fit also supports an unmodelled cause.
     let inside = 1.0 - outside;
     let none = inside * weights[0] / total;
@@ -90,7 +92,7 @@ pub(crate) fn weigh(
     let mut probabilities: Vec<f64> = Vec::new();
     for (place, fit) in fits.iter().enumerate() {
         let probability = inside * weights[place + 1] / total;
-        match shown.iter().position(|better| holds(study, fit, &fits[*better])) {
+        match shown.iter().position(|better| includes(study, fit, &fits[*better])) {
             Some(better) => probabilities[better] += probability,
             None => {
                 shown.push(place);
@@ -98,49 +100,37 @@ pub(crate) fn weigh(
             }
         }
     }
-    let candidates = shown
-        .iter()
-        .zip(probabilities)
-        .map(|(place, probability)| {
-            let fit = &fits[*place];
-            Candidate {
-                effects: ids(study, fit),
-                names: names(study, fit),
-                probability,
-                parameters: estimates(
-                    calibration,
-                    &study.effects,
-                    &fit.hypothesis.effects,
-                    Some(&fit.covariance),
-                ),
-                onsets: onsets(study, fit),
-                equivalent: if *place == 0 && named {
-                    equivalents(study, calibration, fits, &scores, &shown)
-                } else {
-                    Vec::new()
-                },
-            }
-        })
-        .collect();
-    CauseProbabilities { candidates, shown, none, outside, named }
+    let near = |place: &usize| named && scores[1] - scores[*place + 1] < evidence_resolution(calibration);
+    let alike: Vec<usize> = shown.iter().copied().filter(near).take(1 + MAX_EQUIVALENT).collect();
+    let candidate = |(place, probability): (&usize, f64)| {
+        let fit = &fits[*place];
+        let (effects, covariance) = (&fit.hypothesis.effects, Some(&fit.covariance));
+        let others = if *place == 0 { alike.get(1..).unwrap_or_default() } else { &[] };
+        Candidate {
+            effects: ids(study, fit),
+            names: infos(&study.effects, &fit.hypothesis).map(|info| info.name.to_string()).collect(),
+            probability,
+            parameters: estimates(calibration, &study.effects, effects, covariance),
+            onsets: onsets(study, fit),
+            equivalent: others.iter().map(|place| ids(study, &fits[*place])).collect(),
+        }
+    };
+    let candidates = shown.iter().zip(probabilities).map(candidate).collect();
+    CauseProbabilities { candidates, shown, alike, none, outside, named }
 }
 
 fn ids(study: &Study, fit: &Fit) -> Vec<String> {
-    fit.hypothesis.effects.iter().map(|(index, _)| study.effects[*index].info().id.to_string()).collect()
-}
-
-fn names(study: &Study, fit: &Fit) -> Vec<String> {
-    fit.hypothesis.effects.iter().map(|(index, _)| study.effects[*index].info().name.to_string()).collect()
+    infos(&study.effects, &fit.hypothesis).map(|info| info.id.to_string()).collect()
 }
 
 fn onsets(study: &Study, fit: &Fit) -> BTreeMap<String, Onset> {
     let begun = fit.hypothesis.effects.iter().filter_map(|(index, _)| {
-        let course = study.courses[*index];
-        let step = course.onset()?;
+        let history = study.histories[*index];
+        let step = history.onset()?;
         let onset = Onset {
             step,
             t_s: study.steps.get(step)?.marker.start_s,
-            grows: matches!(course, Course::Growing(_)),
+            grows: matches!(history, TimeHistory::Growing(_)),
         };
         Some((study.effects[*index].info().id.to_string(), onset))
     });
@@ -149,39 +139,10 @@ fn onsets(study: &Study, fit: &Fit) -> BTreeMap<String, Onset> {
 
 /// Maximum number of alternatives named with the first cause; a longer list does not help.
 pub const MAX_EQUIVALENT: usize = 2;
+
 /// Difference in evidence below which data do not distinguish causes: the odds at which an interval excludes a value.
-pub fn distinguishing(calibration: &Calibration) -> f64 {
+pub fn evidence_resolution(calibration: &Calibration) -> f64 {
     -(1.0 - COVERAGE).ln() * calibration.temperature
-}
-
-/// The named cause and those that the data do not distinguish from it, as in [`Candidate::equivalent`].
-pub(crate) fn alike<'a>(
-    posterior: &CauseProbabilities,
-    calibration: &Calibration,
-    fits: &'a [Fit],
-    weight: &dyn Fn(&Fit) -> f64,
-) -> Vec<&'a Fit> {
-    let shown = || posterior.shown.iter().map(|place| &fits[*place]);
-    let best = shown().next().map_or(f64::NEG_INFINITY, weight);
-    let near = |fit: &&Fit| best - weight(fit) < distinguishing(calibration);
-    shown().filter(near).take(1 + MAX_EQUIVALENT).collect()
-}
-
-/// Causes whose scores the data cannot distinguish from the best, nearest first, without supersets of a better cause.
-fn equivalents(
-    study: &Study,
-    calibration: &Calibration,
-    fits: &[Fit],
-    scores: &[f64],
-    shown: &[usize],
-) -> Vec<Vec<String>> {
-    shown
-        .iter()
-        .skip(1)
-        .filter(|place| scores[1] - scores[**place + 1] < distinguishing(calibration))
-        .map(|place| ids(study, &fits[*place]))
-        .take(MAX_EQUIVALENT)
-        .collect()
 }
 
 /// Parameters of effects with 95 % intervals, computed in the search coordinate so that they stay within range. `covariance`: of the search

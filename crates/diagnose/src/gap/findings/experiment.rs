@@ -22,11 +22,11 @@ pub struct AllowedJump {
 pub struct Experiment {
     /// Start, target and dwell; equal points if only a temperature changes. P3 is the value that holds the target. Unused for a soak.
     pub jump: AllowedJump,
-    /// What changes in addition to the jump.
+    /// Additional change.
     pub also: AlsoChanged,
 }
 
-/// What changes in addition to P3 and the valve.
+/// A change in addition to P3 and the valve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum AlsoChanged {
     /// Nothing.

@@ -251,7 +251,7 @@ pub struct Strained {
     pub what: String,
     /// Absolute deviation in declared sigmas, above 3.
     pub sigmas: f64,
-    /// Deviation, in the unit of what it changes; ratios for gains and scales.
+    /// Deviation, in the unit of the changed quantity; ratios for gains and scales.
     pub value: f64,
 }
 

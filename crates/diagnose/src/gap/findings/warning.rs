@@ -1,4 +1,4 @@
-//! What limits a diagnosis: missing, late and lost data, and offsets at rest.
+//! Limits of a diagnosis: missing, late and lost data, and offsets at rest.
 
 use mapper_core::{Channel, coded_enum};
 use serde::Serialize;
@@ -10,24 +10,24 @@ GapWarning {
     "channel_not_recorded" ChannelNotRecorded { channel: Channel },
     /// The campaign's value replaces the readings of an input.
     "input_not_recorded" InputNotRecorded { channel: Channel },
-    /// Blocks without samples are left out.
+    /// Blocks without samples are omitted.
     "gaps_in_recording" GapsInRecording { gaps: usize, missing_s: f64 },
     /// The noise of a typical sensor is used, in the unit of the channel.
     "assumed_noise" AssumedNoise { channel: Channel, noise_sigma: f64 },
-    /// The times of the samples scatter, so that readings that move count less.
+    /// The sample times scatter, so changing readings have less weight.
     "uncertain_times" UncertainTimes { scatter_s: f64 },
     /// A limit of the healthy recording.
     "healthy_recording" HealthyRecording { warning: Box<GapWarning> },
-    /// Something drifted while the recording was made: `subtracted` from a sensor's readings, or the machine, so that no cause is named.
+    /// A drift during the recording: `subtracted` from a sensor's readings, or of the machine, so that no cause is named.
     "drift" Drift { reason: String, subtracted: bool },
-    /// A drift was found and not subtracted: without it nothing but noise is left.
+    /// A detected drift was not subtracted, because tolerances alone explain the recording down to noise.
     "drift_not_subtracted" DriftNotSubtracted { reason: String },
-    /// A recording could be read in parts only.
+    /// Only parts of a recording are readable.
     "recording_incomplete" RecordingIncomplete { reason: String },
 }
 }
 
-/// What a sensor read too much at rest, beyond its declaration; subtracted before the diagnosis. In the unit of the channel.
+/// Offset of a sensor at rest beyond its declaration, in the unit of the channel; subtracted before the diagnosis.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct OffsetAtRest {
     /// The channel.

@@ -17,12 +17,12 @@ impl Folds {
     /// too few steps.
     pub fn of(study: &Study) -> Folds {
         let places = study.steps.iter().map(|step| (step.marker.valve_opening_ratio, step.marker.p3_pa));
-        Folds::dealt(&places.collect::<Vec<_>>())
+        Folds::latin_square(&places.collect::<Vec<_>>())
     }
 
-    /// Assigns steps to folds like a Latin square: along each opening in order of pressure (and so speed), starting with a different fold
+    /// Assigns steps to folds: along each opening in order of pressure (and so speed), starting with a different fold
     /// at each opening.
-    fn dealt(places: &[(f64, f64)]) -> Folds {
+    fn latin_square(places: &[(f64, f64)]) -> Folds {
         if places.len() < 2 * FOLDS {
             return Folds { steps: vec![(0..places.len()).collect()] };
         }
@@ -31,16 +31,16 @@ impl Folds {
         openings.dedup_by(|a, b| (*a - *b).abs() < 1e-6);
         let mut steps = vec![Vec::new(); FOLDS];
         // A single step at an opening continues the order of the previous opening.
-        let mut dealt_before = 0;
+        let mut assigned = 0;
         for (row, opening) in openings.iter().enumerate() {
             let mut here: Vec<usize> =
                 (0..places.len()).filter(|i| (places[*i].0 - opening).abs() < 1e-6).collect();
             here.sort_by(|a, b| places[*a].1.total_cmp(&places[*b].1).then(a.cmp(b)));
-            let first = if here.len() < FOLDS { dealt_before } else { row };
+            let first = if here.len() < FOLDS { assigned } else { row };
             for (rank, step) in here.iter().enumerate() {
                 steps[(first + rank) % FOLDS].push(*step);
             }
-            dealt_before += here.len();
+            assigned += here.len();
         }
         for fold in &mut steps {
             fold.sort_unstable();
@@ -62,7 +62,7 @@ mod tests {
                 places.push((opening, 1e3 * speed * (1.0 + 0.1 * opening)));
             }
         }
-        let folds = Folds::dealt(&places).steps;
+        let folds = Folds::latin_square(&places).steps;
         assert_eq!(folds.iter().map(Vec::len).collect::<Vec<_>>(), [6, 6, 6]);
         for fold in &folds {
             for opening in [0.5, 0.7, 1.0] {
@@ -77,6 +77,6 @@ mod tests {
         assert_eq!(all, (0..18).collect::<Vec<_>>());
         // One step per opening still gives three folds of two.
         let single: Vec<(f64, f64)> = (0..6).map(|i| (0.5 + 0.1 * f64::from(i), 1e5)).collect();
-        assert!(Folds::dealt(&single).steps.iter().all(|fold| fold.len() == 2));
+        assert!(Folds::latin_square(&single).steps.iter().all(|fold| fold.len() == 2));
     }
 }

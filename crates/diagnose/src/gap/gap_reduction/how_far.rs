@@ -2,11 +2,11 @@
 
 use crate::gap::best_fit::adequacy::misfit_of_steps;
 use crate::gap::best_fit::first_step::with_start_read;
-use crate::gap::best_fit::fit::{Effort, Fit, MAX_SIGMAS, Start, fit_from};
+use crate::gap::best_fit::fit::{Effort, Fit, MAX_SIGMAS, Start, fit};
 use crate::gap::best_fit::selection::{Selection, dot_over};
 use crate::gap::findings::report::{ChannelGap, Gap, PointGap};
 use crate::gap::gap_reduction::folds::Folds;
-use crate::gap::gap_reduction::gap_distribution::{StepMisfit, carried};
+use crate::gap::gap_reduction::gap_distribution::{StepMisfit, gap_reduction};
 use crate::gap::gap_reduction::strain::beyond_prior;
 use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::study::{Hypothesis, Study};
@@ -18,10 +18,8 @@ use mapper_physics::simulation::inputs::Inputs;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// Fits to compare.
 #[derive(Clone, Copy)]
 pub struct Compared<'a> {
-    /// The recording.
     pub study: &'a Study,
     /// Linearised at the nominal model, and at the best cause.
     pub linearised: [&'a Linearised; 2],
@@ -33,22 +31,33 @@ pub struct Compared<'a> {
     pub weight: &'a (dyn Fn(&Fit) -> f64 + Sync),
 }
 
-/// Whitened residuals and predicted values of all steps, each from a fit to other steps.
-struct Unseen {
+/// Whitened residuals and predicted values of all steps.
+struct Predicted {
     residual: Vec<f64>,
     values: Vec<f64>,
 }
 
+impl Predicted {
+    fn of(fit: &Fit) -> Predicted {
+        Predicted { residual: fit.residual.clone(), values: fit.prediction.values.clone() }
+    }
+
+    fn nominal(study: &Study, linearised: &Linearised) -> Predicted {
+        let base = &linearised.base;
+        Predicted { residual: linearised.residual(study, base), values: base.values.clone() }
+    }
+}
+
 /// Effort of a fit without some of the steps; it starts at the best fit to all steps. A tolerance beyond this limit is a suspect
-/// ([`beyond_prior`]), and what it alone removes is part of the gap.
+/// ([`beyond_prior`]), and its own reduction of the gap does not count.
 const EFFORT: Effort =
-    Effort { iterations: 5, enough: 0.2, most_sigmas: MAX_SIGMAS, most_sigmas_of_rig: DOUBT_SIGMAS };
+    Effort { iterations: 5, enough: 0.2, max_sigmas: MAX_SIGMAS, max_sigmas_of_rig: DOUBT_SIGMAS };
 
 /// The start of a fit without some of the steps: the best fit to all steps, its tolerances within [`EFFORT`].
 fn start_within_limits(study: &Study, fit: &Fit) -> Start {
     let mut start = Start::from(fit);
     for (sigmas, nuisance) in start.hypothesis.nuisances.iter_mut().zip(&study.nuisances) {
-        let limit = EFFORT.most_sigmas_of(nuisance.kind);
+        let limit = EFFORT.max_sigmas_of(nuisance.kind);
         if sigmas.abs() > limit {
             *sigmas = limit.copysign(*sigmas);
             start.prediction = None;
@@ -61,36 +70,31 @@ fn start_within_limits(study: &Study, fit: &Fit) -> Start {
 /// own steps.
 pub fn how_far(compared: Compared<'_>, folds: &Folds) -> Gap {
     let Compared { study, linearised: [nominal, _], null, .. } = compared;
-    let (before, after) = unseen(compared, folds);
+    let (before, after) = predict_held_out(compared, folds);
     let steps: Vec<usize> = (0..study.steps.len()).collect();
-    let (g_before, g_after) =
-        (misfit_of_steps(study, &before.residual), misfit_of_steps(study, &after.residual));
-    let mean = |g: &[f64]| g.iter().sum::<f64>() / g.len().max(1) as f64;
-    let misfits: Vec<StepMisfit> = g_before
-        .iter()
-        .zip(&g_after)
-        .enumerate()
-        .map(|(step, (before, after))| {
-            let values = rows_of_step(study, step).len();
-            StepMisfit { before: *before, after: *after, values }
-        })
-        .collect();
-    let carried = carried(&misfits);
-    let (low, high) = carried.interval;
-    let bare =
-        Unseen { residual: nominal.residual(study, &nominal.base), values: nominal.base.values.clone() };
+    let misfit = |predicted: &Predicted| misfit_of_steps(study, &predicted.residual);
+    let (misfit_before, misfit_after) = (misfit(&before), misfit(&after));
+    let mean = |misfits: &[f64]| misfits.iter().sum::<f64>() / misfits.len().max(1) as f64;
+    let of_step = |step: &usize| StepMisfit {
+        before: misfit_before[*step],
+        after: misfit_after[*step],
+        values: rows_of_step(study, *step).len(),
+    };
+    let reduction = gap_reduction(&steps.iter().map(of_step).collect::<Vec<_>>());
+    let bare = Predicted::nominal(study, nominal);
     let (channels, worse) = by_channel(study, [&bare, &before, &after], &steps);
-    let claimed = worse.is_empty() && !compared.causes.is_empty();
+    let is_reduced = worse.is_empty() && !compared.causes.is_empty();
+    let (low, high) = if is_reduced { reduction.interval } else { (0.0, 0.0) };
     Gap {
-        nominal: mean(&misfit_of_steps(study, &bare.residual)),
-        before: mean(&g_before),
-        after: mean(&g_after),
-        shrink: if claimed { carried.removed } else { 0.0 },
-        shrink_low: if claimed { low } else { 0.0 },
-        shrink_high: if claimed { high } else { 0.0 },
-        steps_with_gap: carried.steps,
-        largest_step: carried.largest.map(|(step, _)| step),
-        largest_share: carried.largest.map_or(0.0, |(_, share)| share),
+        nominal: mean(&misfit(&bare)),
+        before: mean(&misfit_before),
+        after: mean(&misfit_after),
+        shrink: if is_reduced { reduction.removed } else { 0.0 },
+        shrink_low: low,
+        shrink_high: high,
+        steps_with_gap: reduction.steps,
+        largest_step: reduction.largest.map(|(step, _)| step),
+        largest_share: reduction.largest.map_or(0.0, |(_, share)| share),
         strained: beyond_prior(study, nominal, null).into_iter().next(),
         worse,
         held_out_steps: if folds.steps.len() > 1 { steps } else { Vec::new() },
@@ -100,13 +104,13 @@ pub fn how_far(compared: Compared<'_>, folds: &Folds) -> Gap {
     }
 }
 
-fn unseen(compared: Compared<'_>, folds: &Folds) -> (Unseen, Unseen) {
+/// Predictions without and with a cause, of each step from fits to the other folds.
+fn predict_held_out(compared: Compared<'_>, folds: &Folds) -> (Predicted, Predicted) {
     let Compared { study, linearised: [nominal, at_best], null, causes, weight } = compared;
-    let whole = |fit: &Fit| Unseen { residual: fit.residual.clone(), values: fit.prediction.values.clone() };
     if folds.steps.len() < 2 {
-        return (whole(null), whole(causes.first().unwrap_or(&null)));
+        return (Predicted::of(null), Predicted::of(causes.first().unwrap_or(&null)));
     }
-    // Fits the null and each cause in every fold.
+    // The null and each cause in every fold.
     let jobs: Vec<(usize, usize)> =
         (0..folds.steps.len()).flat_map(|fold| (0..=causes.len()).map(move |which| (fold, which))).collect();
     let fitted = parallel::map(&jobs, |(fold, which)| {
@@ -119,11 +123,11 @@ fn unseen(compared: Compared<'_>, folds: &Folds) -> (Unseen, Unseen) {
             Some(cause) => (at_best, causes[cause]),
         };
         // If a fold cannot be fitted, it keeps the fit to all steps.
-        let fitted = fit_from(study, linearised, &start_within_limits(study, whole), &selection, EFFORT);
-        let fitted = fitted.unwrap_or_else(|_| whole.clone());
+        let start = start_within_limits(study, whole);
+        let fitted = fit(study, linearised, start, &selection, EFFORT).unwrap_or_else(|_| whole.clone());
         if selection.steps[0] { fitted } else { with_start_read(study, linearised, fitted) }
     });
-    let (mut before, mut after) = (whole(null), whole(null));
+    let (mut before, mut after) = (Predicted::of(null), Predicted::of(null));
     for (fold, steps) in folds.steps.iter().enumerate() {
         let of_fold: Vec<&Fit> =
             jobs.iter().zip(&fitted).filter(|((f, _), _)| *f == fold).map(|(_, fit)| fit).collect();
@@ -148,12 +152,8 @@ pub fn channels_on(
     [before, after]: [&Fit; 2],
     steps: &[usize],
 ) -> (BTreeMap<String, ChannelGap>, Vec<String>) {
-    let nominal = Unseen {
-        residual: linearised.residual(study, &linearised.base),
-        values: linearised.base.values.clone(),
-    };
-    let of = |fit: &Fit| Unseen { residual: fit.residual.clone(), values: fit.prediction.values.clone() };
-    by_channel(study, [&nominal, &of(before), &of(after)], steps)
+    let nominal = Predicted::nominal(study, linearised);
+    by_channel(study, [&nominal, &Predicted::of(before), &Predicted::of(after)], steps)
 }
 
 /// Number of blocks at the end of a step whose mean residual counts for its point: half a minute.
@@ -165,7 +165,7 @@ const WORSE_RATIO: f64 = 1.1;
 /// cause. Also returns the channels that the cause makes worse.
 fn by_channel(
     study: &Study,
-    [nominal, before, after]: [&Unseen; 3],
+    [nominal, before, after]: [&Predicted; 3],
     steps: &[usize],
 ) -> (BTreeMap<String, ChannelGap>, Vec<String>) {
     let (mut channels, mut worse) = (BTreeMap::new(), Vec::new());
@@ -176,7 +176,7 @@ fn by_channel(
         if count == 0 {
             continue;
         }
-        let rms = |predicted: &Unseen| {
+        let rms = |predicted: &Predicted| {
             let off: Vec<f64> = study.measured.iter().zip(&predicted.values).map(|(m, v)| m - v).collect();
             (dot_over(&rows, &off, &off) / count as f64).sqrt()
         };

@@ -1,28 +1,27 @@
 //! Tolerances that end outside their prior.
 
-use crate::gap::best_fit::fit::{Effort, Fit, MAX_SIGMAS, fit_from, is_of_rig};
+use crate::gap::best_fit::fit::{Effort, Fit, MAX_SIGMAS, fit};
 use crate::gap::best_fit::selection::Selection;
 use crate::gap::findings::report::Strained;
 use crate::gap::residuals::study::Study;
 use crate::gap::residuals::whiten::Linearised;
 use mapper_numerics::statistics::DOUBT_SIGMAS;
 
-/// Continues a fit that ends at the limit of a tolerance without that limit, which stands for none.
-const UNLIMITED: Effort = Effort { iterations: 8, enough: 0.5, most_sigmas: 1e3, most_sigmas_of_rig: 1e3 };
+/// Effort of a fit whose tolerances have no limit; this one has no effect.
+const UNLIMITED: Effort = Effort { iterations: 8, enough: 0.5, max_sigmas: 1e3, max_sigmas_of_rig: 1e3 };
 
-/// Tolerances of a fit beyond three sigmas of their prior, furthest first, with the size that the recording asks for: [`MAX_SIGMAS`] limits
-/// the search for causes, not this report.
+/// Tolerances of a fit beyond three sigmas of their prior, furthest first. A tolerance at [`MAX_SIGMAS`], which limits the search for causes, is fitted
+/// again without that limit.
 pub fn beyond_prior(study: &Study, linearised: &Linearised, fitted: &Fit) -> Vec<Strained> {
     let limited = fitted.hypothesis.nuisances.iter().any(|sigmas| sigmas.abs() > 0.999 * MAX_SIGMAS);
-    let freed = limited
-        .then(|| fit_from(study, linearised, &fitted.into(), &Selection::all(study), UNLIMITED).ok())
-        .flatten();
+    let freed =
+        limited.then(|| fit(study, linearised, fitted, &Selection::all(study), UNLIMITED).ok()).flatten();
     let nuisances = &freed.as_ref().unwrap_or(fitted).hypothesis.nuisances;
     let mut beyond: Vec<Strained> = study
         .nuisances
         .iter()
         .zip(nuisances)
-        .filter(|(nuisance, sigmas)| sigmas.abs() > DOUBT_SIGMAS && is_of_rig(nuisance.kind))
+        .filter(|(nuisance, sigmas)| sigmas.abs() > DOUBT_SIGMAS && nuisance.kind.is_of_rig())
         .map(|(nuisance, sigmas)| Strained {
             what: nuisance.kind.to_string(),
             sigmas: sigmas.abs(),
@@ -33,8 +32,8 @@ pub fn beyond_prior(study: &Study, linearised: &Linearised, fitted: &Fit) -> Vec
     beyond
 }
 
-/// Cost of the tolerances of a fit beyond three sigmas of their prior: what an effect that releases them can gain at most without a better
-/// fit to the readings.
+/// Cost of the tolerances of a fit beyond three sigmas of their prior: an effect that replaces them gains at most this without a better fit to the
+/// readings.
 pub fn cost_beyond_prior(fitted: &Fit) -> f64 {
     fitted.hypothesis.nuisances.iter().filter(|sigmas| sigmas.abs() > DOUBT_SIGMAS).map(|u| u * u).sum()
 }

@@ -80,10 +80,8 @@ pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[Experiment], tempe
     }
     if let Some(jump) = close.first().filter(|experiment| experiment.also == AlsoChanged::Nothing) {
         let missing = OUTPUTS.into_iter().filter(|c| *c != Channel::P3 && study.table.column(*c).is_none());
-        let added: Vec<Experiment> = missing
-            .map(|channel| Experiment { jump: jump.jump, also: AlsoChanged::Sensor(channel) })
-            .collect();
-        close.extend(added);
+        let jump = jump.jump;
+        close.extend(missing.map(|channel| Experiment { jump, also: AlsoChanged::Sensor(channel) }));
     }
     let looked = parallel::map(&close, |experiment| {
         let apart = apart(study, experiment, &rivals.fits)?;
@@ -112,7 +110,7 @@ pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[Experiment], tempe
         Some(Next::Sensor {
             sensor: sensor_for(study.effects[*effect].info().submodel).to_owned(),
             reason: format!(
-                "none of the {} {among} steps answers more than {:.0} % of what is open between the first candidates",
+                "none of the {} {among} steps resolves more than {:.0} % of the open question between the first candidates",
                 all.len(),
                 100.0 * most
             ),
@@ -123,25 +121,19 @@ pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[Experiment], tempe
 
 fn suggestion(kind: Kind, experiment: &Experiment, odds: &Odds, open_bit: f64) -> Suggestion {
     let (from, to) = (experiment.jump.from, experiment.jump.to);
+    let (t3_k, oil_temperature_k, sensor) = match experiment.also {
+        AlsoChanged::T3 { from_k, to_k } => (Some([from_k, to_k]), None, None),
+        AlsoChanged::Oil { from_k, to_k } => (None, Some([from_k, to_k]), None),
+        AlsoChanged::Sensor(channel) => (None, None, Some(channel.symbol().to_owned())),
+        AlsoChanged::Nothing | AlsoChanged::Soak(_) => (None, None, None),
+    };
     Suggestion {
         kind,
         from: point(from),
         to: point(to),
-        t3_k: if let AlsoChanged::T3 { from_k, to_k } = experiment.also {
-            Some([from_k, to_k])
-        } else {
-            None
-        },
-        oil_temperature_k: if let AlsoChanged::Oil { from_k, to_k } = experiment.also {
-            Some([from_k, to_k])
-        } else {
-            None
-        },
-        sensor: if let AlsoChanged::Sensor(channel) = experiment.also {
-            Some(channel.symbol().to_owned())
-        } else {
-            None
-        },
+        t3_k,
+        oil_temperature_k,
+        sensor,
         minutes: experiment.minutes(),
         probability_settled: odds.settles,
         expected_probability: odds.share,
@@ -181,7 +173,7 @@ pub fn sensor_near(places: &[Place]) -> Next {
     let place = places.first();
     let part = place.and_then(|place| Submodel::ALL.into_iter().find(|part| part.name() == place.submodel));
     let (sensor, lies) = match part {
-        Some(part) => (sensor_for(part), format!("most of it lies in {}", part.name())),
+        Some(part) => (sensor_for(part), format!("most of the gap lies in {}", part.name())),
         None => {
             ("a second thermocouple in the compressor housing, near the gas", "no part dominates".to_owned())
         }
@@ -189,7 +181,7 @@ pub fn sensor_near(places: &[Place]) -> Next {
     Next::Sensor {
         sensor: sensor.to_owned(),
         reason: format!(
-            "no effect of the catalogue explains all of the gap, and {lies}: write a suspected effect in rhai and give it with --effect, or measure there"
+            "no effect of the catalogue explains the whole gap, and {lies}: write a suspected effect in rhai and give it with --effect, or add this sensor"
         ),
     }
 }

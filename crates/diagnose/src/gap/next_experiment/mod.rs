@@ -2,5 +2,5 @@
 
 pub(crate) mod at_rest;
 pub mod best_experiment;
-pub mod odds;
+pub(crate) mod odds;
 pub mod outlook;

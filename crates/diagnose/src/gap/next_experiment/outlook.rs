@@ -1,9 +1,8 @@
-//! Predicted outcome of an experiment that was not run: the candidates' predictions, and their separation after refitting each.
+//! Predicts the result of an experiment: how far it separates the candidates, before and after a refit of each.
 
 use crate::gap::best_fit::coordinate::coordinates;
-use crate::gap::best_fit::first_step::is_start;
 use crate::gap::best_fit::fit::{Fit, effect_changes};
-use crate::gap::best_fit::normal::misfit;
+use crate::gap::best_fit::normal::misfit_increases;
 use crate::gap::findings::experiment::{AllowedJump, AlsoChanged, Experiment};
 use crate::gap::next_experiment::at_rest::apart_at_rest;
 use crate::gap::residuals::actuators::Actuators;
@@ -12,6 +11,7 @@ use crate::gap::residuals::study::{Hypothesis, Study};
 use crate::gap::residuals::whiten::Linearised;
 use mapper_core::{Channel, OperatingPoint, Recording, Series, StepKind, StepMarker};
 use mapper_identify::DECLARED_INTERVAL_S;
+use mapper_inference::descent::FINE;
 use mapper_observe::averages::time_table::Table;
 use mapper_observe::declared::Declared;
 use mapper_physics::machine::params::BoundaryConditions;
@@ -21,16 +21,16 @@ use mapper_physics::simulation::steady::hold_speed;
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// Time at the start point before a jump that is also simulated, s.
+/// Simulated time at the start point before a jump, s.
 const HOLD_S: f64 = 30.0;
 /// Sample interval of the first pass, s.
 pub(crate) const COARSE_S: f64 = 0.5;
 /// Maximum time at the target that is simulated, s; longer dwells are cut.
 const MAX_S: f64 = 600.0;
 
-/// Properties that simulated steps share with a recording.
+/// The rig of a recording, for steps that are only simulated.
 #[derive(Debug, Clone)]
-pub struct Alike {
+pub struct SimulatedRig {
     /// Declared tolerances and noise.
     pub declared: Declared,
     /// The nominal machine.
@@ -43,10 +43,10 @@ pub struct Alike {
     pub actuators: Actuators,
 }
 
-/// Simulated steps prepared like a recording that contains only inputs. `rest` is the initial state; `driven` is an input that departs from
-/// the campaign's value, at the given times.
-pub(crate) fn imagined_steps(
-    like: Alike,
+/// A study of simulated steps, whose recording contains only inputs. The machine has settled at `rest`; `driven` is an input that departs from the
+/// campaign's value, at the given times.
+pub(crate) fn simulated_steps(
+    rig: SimulatedRig,
     steps: Vec<StepMarker>,
     rest: &OperatingPoint,
     interval_s: f64,
@@ -54,10 +54,10 @@ pub(crate) fn imagined_steps(
 ) -> Option<Study> {
     let end_s = steps.last()?.end_s;
     let t_s: Vec<f64> = (0..(end_s / interval_s) as usize).map(|i| interval_s * i as f64).collect();
-    // Initial guess of the start; the inputs are the campaign's.
+    // Initial guess of the start under the campaign's inputs.
     let boundary =
-        BoundaryConditions { valve_opening_ratio: rest.valve_opening_ratio, ..like.declared.nominal };
-    let held = hold_speed(&like.model, rest.speed_rpm, &boundary).ok()?.state;
+        BoundaryConditions { valve_opening_ratio: rest.valve_opening_ratio, ..rig.declared.nominal };
+    let held = hold_speed(&rig.model, rest.speed_rpm, &boundary).ok()?.state;
     let level = |channel: Channel| match channel {
         Channel::ShaftSpeed => rest.speed_rpm,
         Channel::P2 => held.p2_pa,
@@ -68,20 +68,20 @@ pub(crate) fn imagined_steps(
     };
     let series =
         |channel: Channel| (channel, Series { t_s: t_s.clone(), values: vec![level(channel); t_s.len()] });
-    // Inputs come from the campaign except for the changed one; the channels the rig measured are measured again.
+    // Only the changed input is recorded: the others come from the campaign.
     let measured =
-        OUTPUTS.into_iter().filter(|channel| *channel != Channel::P3 && like.channels.contains(channel));
+        OUTPUTS.into_iter().filter(|channel| *channel != Channel::P3 && rig.channels.contains(channel));
     let recording = Recording {
         series: measured.map(series).chain(driven(&t_s)).collect(),
         steps,
         ..Recording::default()
     };
     let table = Table::new(&recording)?;
-    Some(Study::with_actuators(&recording, table, like.declared, like.model, like.effects, like.actuators))
+    Some(Study::with_actuators(&recording, table, rig.declared, rig.model, rig.effects, rig.actuators))
 }
 
-/// A simulated experiment prepared like a recording, with the settled start and its dwell. Effects that began in the recording are active.
-fn imagined(recorded: &Study, experiment: &Experiment, interval_s: f64) -> Option<Study> {
+/// A study of a simulated experiment: the settled start, then the step. Effects that began in the recording act.
+fn simulated_experiment(recorded: &Study, experiment: &Experiment, interval_s: f64) -> Option<Study> {
     let jump = &experiment.jump;
     let dwell_s = jump.dwell_s.clamp(10.0, MAX_S);
     let marker = |index: usize, from: f64, to: f64, p3_pa: f64, point: OperatingPoint| StepMarker {
@@ -99,7 +99,7 @@ fn imagined(recorded: &Study, experiment: &Experiment, interval_s: f64) -> Optio
         marker(1, HOLD_S, HOLD_S + dwell_s, jump.to_p3_pa, jump.to),
     ];
     let added = if let AlsoChanged::Sensor(channel) = experiment.also { Some(channel) } else { None };
-    let like = Alike {
+    let rig = SimulatedRig {
         declared: recorded.declared.clone(),
         model: recorded.nominal.model.clone(),
         effects: recorded.effects.clone(),
@@ -107,26 +107,24 @@ fn imagined(recorded: &Study, experiment: &Experiment, interval_s: f64) -> Optio
         actuators: recorded.actuators,
     };
     let driven = |t_s: &[f64]| experiment.driven(t_s, HOLD_S);
-    let mut study = imagined_steps(like, steps, &jump.from, interval_s, driven)?;
+    let mut study = simulated_steps(rig, steps, &jump.from, interval_s, driven)?;
     study.catalogue = recorded.catalogue;
     study.nuisances.clone_from(&recorded.nuisances);
     Some(study)
 }
 
-/// A fit's hypothesis with a new, unknown start.
-fn refound(study: &Study, fit: &Fit) -> Hypothesis {
+/// The hypothesis of a fit with an unknown initial state.
+fn with_unknown_start(study: &Study, fit: &Fit) -> Hypothesis {
     let mut hypothesis = fit.hypothesis.clone();
     for (nuisance, sigmas) in study.nuisances.iter().zip(&mut hypothesis.nuisances) {
-        if is_start(nuisance.kind) {
+        if nuisance.kind.is_start() {
             *sigmas = 0.0;
         }
     }
     hypothesis
 }
 
-/// First-pass separation of two candidates' predictions of an experiment, in squared sigmas of the noise alone.
-///
-/// `None` if the model cannot run the step.
+/// Separation of the predictions of each two candidates before a refit, in squared sigmas of the noise; `None` if the model cannot run the step.
 pub fn apart_at_first_sight(
     recorded: &Study,
     experiment: &Experiment,
@@ -135,59 +133,49 @@ pub fn apart_at_first_sight(
     if let AlsoChanged::Soak(soak) = experiment.also {
         return apart_at_rest(recorded, &soak, fits);
     }
-    let study = imagined(recorded, experiment, COARSE_S)?;
+    let study = simulated_experiment(recorded, experiment, COARSE_S)?;
     let linearised = Linearised::of_noise_alone(&study).ok()?;
-    let predictions: Option<Vec<Vec<f64>>> = fits
+    let predictions = fits
         .iter()
         .map(|fit| {
-            let mut values = study.predict(&refound(&study, fit)).ok()?.values;
+            let mut values = study.predict(&with_unknown_start(&study, fit)).ok()?.values;
             linearised.whiten(&study, &mut values);
             Some(values)
         })
-        .collect();
-    let predictions = predictions?;
+        .collect::<Option<Vec<Vec<f64>>>>()?;
     let distance = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum();
     Some(predictions.iter().map(|a| predictions.iter().map(|b| distance(a, b)).collect()).collect())
 }
 
-/// Separation after refitting each rival to the experiment: entry `k`, `j` is the misfit increase of `j` if `k` is true, squared sigmas.
+/// Separation after a refit of each candidate to the experiment: entry `k`, `j` is the misfit increase of `j` if `k` is true, squared sigmas.
 ///
-/// `D` is the difference of the predictions and `J` the derivatives of `j`'s prediction with respect to its nuisances and parameters. `L`
-/// is their precision from the recording. Result: `D'D - D'J (L + J'J)^-1 J'D`, all whitened.
+/// It is `D'D - D'J (L + J'J)^-1 J'D`, whitened, with the difference `D` of the predictions, the derivatives `J` of the prediction of `j` with respect to
+/// its nuisances and parameters, and their precision `L` from the recording.
 pub fn apart(recorded: &Study, experiment: &Experiment, fits: &[&Fit]) -> Option<Vec<Vec<f64>>> {
     if let AlsoChanged::Soak(soak) = experiment.also {
         return apart_at_rest(recorded, &soak, fits);
     }
-    let study = imagined(recorded, experiment, DECLARED_INTERVAL_S)?;
+    let study = simulated_experiment(recorded, experiment, DECLARED_INTERVAL_S)?;
     let nominal = Linearised::new(&study).ok()?;
     let mut predicted = Vec::new();
     for fit in fits {
-        let hypothesis = refound(&study, fit);
+        let hypothesis = with_unknown_start(&study, fit);
         let here = nominal.at(&study, &hypothesis).ok()?;
         let mut values = here.base.values.clone();
         nominal.whiten(&study, &mut values);
         let coordinates = coordinates(&study.effects, &hypothesis);
         let mut columns = here.columns.clone();
-        columns.extend(effect_changes(&study, &nominal, &hypothesis, &here.base, &coordinates));
+        columns.extend(effect_changes(&study, &nominal, &hypothesis, &here.base, &coordinates, FINE));
         predicted.push((values, columns, precision(&study, fit)));
     }
-    let mut rows = Vec::new();
-    for (truth, ..) in &predicted {
-        let mut row = Vec::new();
-        for (values, columns, precision) in &predicted {
-            let difference: Vec<f64> = truth.iter().zip(values).map(|(a, b)| a - b).collect();
-            row.push(misfit(&difference, columns, precision)?);
-        }
-        rows.push(row);
-    }
-    Some(rows)
+    misfit_increases(&predicted)
 }
 
-/// Precision of a fit from the recording; the new start is as uncertain as the first one was.
+/// Precision of a fit from the recording, without its initial state.
 fn precision(study: &Study, fit: &Fit) -> DMatrix<f64> {
     let mut precision = fit.precision.clone();
     for (index, nuisance) in study.nuisances.iter().enumerate() {
-        if is_start(nuisance.kind) {
+        if nuisance.kind.is_start() {
             precision.row_mut(index).fill(0.0);
             precision.column_mut(index).fill(0.0);
             precision[(index, index)] = 1.0;

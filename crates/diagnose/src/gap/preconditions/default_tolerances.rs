@@ -17,8 +17,8 @@ pub(crate) fn assumed(study: &Study) -> Vec<String> {
         ("external convection", t.external_convection_ratio),
         ("conductance to the oil", t.oil_conductance_ratio),
     ]
-    .map(|(what, ratio)| format!("{what} {} %", 100.0 * ratio));
-    let follows = |response: Response, scale: f64, unit: &str| {
+    .map(|(tolerance, ratio)| format!("{tolerance} {} %", 100.0 * ratio));
+    let lag_and_rate = |response: Response, scale: f64, unit: &str| {
         let lag = format!("a lag of {:.2} s", response.lag_s);
         if response.slew_per_s.is_finite() {
             format!("{lag} and at most {:.3} {unit}", scale * response.slew_per_s)
@@ -27,11 +27,14 @@ pub(crate) fn assumed(study: &Study) -> Vec<String> {
         }
     };
     vec![
-        format!("the campaign declares no tolerances; the usual ones, one sigma: {}", tolerances.join(", ")),
         format!(
-            "how the actuators follow is as the recording has it, and is not judged: P3 with {}, the valve with {}",
-            follows(study.actuators.p3, 1e-3, "kPa/s"),
-            follows(study.actuators.valve, 1.0, "openings/s"),
+            "the campaign declares no tolerances; default tolerances, one sigma: {}",
+            tolerances.join(", ")
+        ),
+        format!(
+            "the responses of the actuators are estimated from the recording and not diagnosed: P3 has {}, the valve {}",
+            lag_and_rate(study.actuators.p3, 1e-3, "kPa/s"),
+            lag_and_rate(study.actuators.valve, 1.0, "openings/s"),
         ),
     ]
 }

@@ -7,12 +7,12 @@ use mapper_observe::plausible::Implausible;
 /// Condition that prevents a diagnosis.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Problem {
-    /// Nothing measured.
+    /// No measured channel.
     #[error("the recording has no measured channel with samples; check its channel map")]
     Empty,
-    /// No steps.
+    /// Too few jumps.
     #[error(
-        "the recording has {steps} step(s), and no jump of P3 or valve is seen: a diagnosis needs jumps between at least 3 points; record a campaign, and map P3_command and valve_command"
+        "the recording has {steps} step(s) and too few jumps of P3 or valve: a diagnosis needs jumps between at least 3 points; record a campaign, and map P3_command and valve_command"
     )]
     NoJumps {
         /// Steps found.
@@ -20,7 +20,7 @@ pub enum Problem {
     },
     /// Too few outputs.
     #[error(
-        "too little is measured: of N, m_c, P2, T2, Tc, m_t, T4 and Tt only {present}; at least N, P2 and T2 are needed"
+        "too few channels are measured: of N, m_c, P2, T2, Tc, m_t, T4 and Tt only {present}; record at least N, P2 and T2"
     )]
     TooFewOutputs {
         /// Measured outputs.
@@ -28,7 +28,7 @@ pub enum Problem {
     },
     /// Far from the nominal machine under the recorded inputs.
     #[error(
-        "{channel} lies {percent:.0} % off what the nominal machine gives under the recorded P3, T3 and valve, at half of the steps or more: this is a recording of another machine, or a scale is wrong; check machine and map of the campaign"
+        "{channel} deviates by {percent:.0} % from the nominal machine under the recorded P3, T3 and valve, in at least half of the steps: the recording is of another machine, or a scale is wrong; check machine and map of the campaign"
     )]
     OtherMachine {
         /// The channel with the largest deviation.
@@ -40,14 +40,14 @@ pub enum Problem {
     #[error(transparent)]
     Implausible(#[from] Implausible),
     /// A required input is missing.
-    #[error("{channel} ({}) drives the model and is not recorded; without it no cause can be identified", .channel.info().description)]
+    #[error("{channel} ({}) drives the model and is not recorded: record it and map its column", .channel.info().description)]
     NoDriver {
         /// The channel.
         channel: Channel,
     },
     /// The valve opening is unknown.
     #[error(
-        "the recording does not say how far the valve was open at step {}, and the model is driven with that: map it as `valve_command`, as commanded or as measured, or give it among `constants`; without it `mapper transient` diagnoses the compressor side from its measured neighbours",
+        "the valve opening of step {} is not recorded, but it drives the model: map the commanded or measured opening as `valve_command`, or give it among `constants`; without it, `mapper transient` diagnoses the compressor side from its measured neighbours",
         step_number(*step)
     )]
     NoValve {
@@ -66,7 +66,7 @@ pub enum Problem {
     },
     /// The reference recording has a different number of steps.
     #[error(
-        "the healthy recording has {healthy} step(s), the one under diagnosis {recorded}: only the same steps can be compared; record a healthy run of the same plan"
+        "the healthy recording has {healthy} step(s), the recording under diagnosis {recorded}, but only equal steps can be compared: record a healthy run of the same plan"
     )]
     OtherSteps {
         /// In the reference recording.
@@ -76,7 +76,7 @@ pub enum Problem {
     },
     /// A step differs between the recordings.
     #[error(
-        "step {} of the healthy recording is another one: {what} {healthy:.3} {unit}, where the recording under diagnosis has {recorded:.3} {unit} (more than {within:.3} apart); record a healthy run of the same plan",
+        "step {} of the healthy recording differs: its {what} is {healthy:.3} {unit}, that of the recording under diagnosis {recorded:.3} {unit} (allowed difference {within:.3} {unit}); record a healthy run of the same plan",
         step_number(*step)
     )]
     OtherStep {
@@ -102,6 +102,8 @@ pub enum GapError {
     #[error(transparent)]
     Recording(#[from] Problem),
     /// The nominal model cannot follow the recording.
-    #[error("the nominal model cannot follow this recording: {0}; is it of this machine?")]
+    #[error(
+        "the nominal model cannot follow this recording: {0}; check that the recording is of this machine"
+    )]
     Predict(#[from] PredictError),
 }

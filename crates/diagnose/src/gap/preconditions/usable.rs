@@ -1,14 +1,36 @@
 //! Checks whether a recording can be diagnosed, before any fit.
 
 use crate::gap::findings::warning::GapWarning;
-use crate::gap::preconditions::problem::Problem;
+use crate::gap::preconditions::problem::{GapError, Problem};
+use crate::gap::residuals::actuators::Actuators;
 use crate::gap::residuals::nuisance::OUTPUTS;
+use crate::gap::residuals::study::Study;
 use mapper_core::{Channel, Recording};
 use mapper_numerics::statistics::median;
 use mapper_observe::averages::time_table::Table;
 use mapper_observe::channels::DRIVERS;
 use mapper_observe::declared::Declared;
 use mapper_observe::plausible::check_running;
+use mapper_physics::rig::effect::Effect;
+use mapper_physics::simulation::model::Model;
+use std::sync::Arc;
+
+/// Checks a recording and prepares its study; returns warnings for tolerable defects.
+///
+/// # Errors
+/// [`GapError`] if the recording is unusable.
+pub fn checked_study(
+    recording: &Recording,
+    declared: Declared,
+    model: Model,
+    effects: Vec<Arc<dyn Effect>>,
+    tolerances_declared: bool,
+) -> Result<(Study, Vec<GapWarning>), GapError> {
+    let table = Table::new(recording).ok_or(Problem::Empty)?;
+    let warnings = usable(recording, &table, &declared)?;
+    let actuators = Actuators::of(&table, recording, &declared, tolerances_declared);
+    Ok((Study::with_actuators(recording, table, declared, model, effects, actuators), warnings))
+}
 
 /// Checks a recording; returns warnings for tolerable defects.
 ///

@@ -63,12 +63,12 @@ pub(crate) fn elsewhere(study: &Study, changed: &[f64]) -> Vec<f64> {
     (0..shares.len()).map(|step| shares[step].max(shares[step.saturating_sub(1)])).collect()
 }
 
-/// Covariance within a step of errors proportional to each of `courses`, correlated over time.
-pub(crate) fn covariance_of_errors(since_jump_s: &[f64], courses: [&[f64]; 2]) -> DMatrix<f64> {
+/// Covariance within a step of errors proportional to each of `histories`, correlated over time.
+pub(crate) fn covariance_of_errors(since_jump_s: &[f64], histories: [&[f64]; 2]) -> DMatrix<f64> {
     let n = since_jump_s.len();
     let at: Vec<f64> = since_jump_s.iter().map(|t_s| (t_s.max(0.0) + AT_ONCE_S).ln()).collect();
     DMatrix::from_fn(n, n, |i, j| {
-        let sum: f64 = courses.iter().map(|course| course[i] * course[j]).sum();
+        let sum: f64 = histories.iter().map(|history| history[i] * history[j]).sum();
         sum * (-(at[i] - at[j]).abs()).exp()
     })
 }

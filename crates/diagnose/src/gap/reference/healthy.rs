@@ -4,25 +4,22 @@
 //! block by block: readings `m_h` minus the model `f_h` with its fitted tolerances `u_h`. The diagnosis uses `m - (m_h - f_h(u_h))` with
 //! noise `C + C_h`, unsmoothed because smoothing needs its time history. Each recording has its own inputs, so ambient changes do not count.
 
-use crate::gap::best_fit::first_step::is_start;
 use crate::gap::best_fit::fit::MAX_SIGMAS;
 use crate::gap::best_fit::normal::nuisance_products;
 use crate::gap::best_fit::selection::{Selection, dot_over};
 use crate::gap::findings::warning::GapWarning;
 use crate::gap::preconditions::machine_mismatch::another_machine;
-use crate::gap::preconditions::problem::{GapError, Problem};
-use crate::gap::preconditions::usable::usable;
+use crate::gap::preconditions::problem::GapError;
+use crate::gap::preconditions::usable::checked_study;
 use crate::gap::reference::baseline_assumptions::{Lacking, Since};
 use crate::gap::reference::errors_of_change::{covariance_of_errors, elsewhere, errors_of_change};
 use crate::gap::reference::same_steps::same_steps;
-use crate::gap::residuals::actuators::Actuators;
 use crate::gap::residuals::hypothesis::Hypothesis;
 use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::study::{Group, PredictError, Study};
 use crate::gap::residuals::whiten::{Linearised, dot};
 use mapper_core::{Channel, Recording};
 use mapper_inference::descent::ROUNDS;
-use mapper_observe::averages::time_table::Table;
 use mapper_observe::declared::Declared;
 use mapper_observe::model_inputs::step_timing::with_command_times;
 use mapper_physics::simulation::model::Model;
@@ -50,9 +47,6 @@ pub(crate) struct Changed {
 
 impl Study {
     /// Turns this study into one of the changes since a reference recording.
-    ///
-    /// # Errors
-    /// [`GapError`] if the reference recording is unusable or has other steps.
     pub(crate) fn since(
         self,
         healthy: Healthy<'_>,
@@ -61,10 +55,7 @@ impl Study {
     ) -> Result<Changed, GapError> {
         let Healthy { name, recording, declared } = healthy;
         let recording = &with_command_times(recording);
-        let table = Table::new(recording).ok_or(Problem::Empty)?;
-        let warnings = usable(recording, &table, &declared)?;
-        let actuators = Actuators::of(&table, recording, &declared, tolerances_declared);
-        let before = Study::with_actuators(recording, table, declared, model, Vec::new(), actuators);
+        let (before, warnings) = checked_study(recording, declared, model, Vec::new(), tolerances_declared)?;
         same_steps(&before, &self)?;
         let linearised = Linearised::new(&before)?;
         another_machine(&before, &linearised.base.values)?;
@@ -84,7 +75,7 @@ impl Study {
         for nuisance in &mut study.nuisances {
             let was =
                 before.nuisances.iter().zip(&tolerances.nuisances).find(|(was, _)| was.kind == nuisance.kind);
-            if let Some((was, sigmas)) = was.filter(|_| !is_start(nuisance.kind)) {
+            if let Some((was, sigmas)) = was.filter(|_| !nuisance.kind.is_start()) {
                 nuisance.centre = was.value(*sigmas);
             }
         }

@@ -11,9 +11,6 @@ const LENGTH_S: f64 = 1.0;
 const T3_K: f64 = 10.0;
 
 /// Rejects a reference recording with steps other than those of the recording under diagnosis.
-///
-/// # Errors
-/// [`Problem::OtherSteps`] and [`Problem::OtherStep`].
 pub(crate) fn same_steps(healthy: &Study, study: &Study) -> Result<(), Problem> {
     if healthy.steps.len() != study.steps.len() {
         return Err(Problem::OtherSteps { healthy: healthy.steps.len(), recorded: study.steps.len() });

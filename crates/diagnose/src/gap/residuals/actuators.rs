@@ -19,30 +19,13 @@ pub struct Actuators {
 }
 
 impl Actuators {
-    /// By whether the campaign declares tolerances.
-    pub fn of(
-        table: &Table,
-        recording: &Recording,
-        declared: &Declared,
-        tolerances_declared: bool,
-    ) -> Actuators {
-        let read = if tolerances_declared { Actuators::declared } else { Actuators::undeclared };
-        read(table, recording, declared)
-    }
-
-    /// For a campaign with declared tolerances: measured P3 drives the model and is compared with its declared lag; the valve follows at
-    /// once.
-    pub fn declared(table: &Table, recording: &Recording, declared: &Declared) -> Actuators {
-        let p3 = timed_p3(table, recording, declared).0;
-        Actuators { p3, valve: Response::lag(0.0), judged: true }
-    }
-
-    /// For a campaign without declarations: both responses are estimated from the recording.
-    pub fn undeclared(table: &Table, recording: &Recording, declared: &Declared) -> Actuators {
+    /// With declared tolerances, measured P3 drives the model and is compared with its declared lag, and the valve follows at once. Without
+    /// them, both responses are estimated from the recording.
+    pub fn of(table: &Table, recording: &Recording, declared: &Declared, judged: bool) -> Actuators {
         let (p3, timed) = timed_p3(table, recording, declared);
-        let valve = measured_valve_response(table, &timed, declared.nominal.p1_pa);
-        let valve = valve.unwrap_or(Response::lag(0.0));
-        Actuators { p3, valve, judged: false }
+        let valve =
+            if judged { None } else { measured_valve_response(table, &timed, declared.nominal.p1_pa) };
+        Actuators { p3, valve: valve.unwrap_or(Response::lag(0.0)), judged }
     }
 }
 

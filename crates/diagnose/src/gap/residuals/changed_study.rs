@@ -1,6 +1,6 @@
 //! A study with further effects (laws, and effects that begin with a step), or with some of its values.
 
-use crate::gap::residuals::hypothesis::Course;
+use crate::gap::residuals::hypothesis::TimeHistory;
 use crate::gap::residuals::machine_run::acts_on_machine;
 use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::study::{Group, Study};
@@ -12,7 +12,7 @@ impl Study {
     pub fn add(&mut self, effect: Arc<dyn Effect>) -> usize {
         self.on_machine.push(acts_on_machine(&self.nominal, effect.as_ref()));
         self.effects.push(effect);
-        self.courses.push(Course::Throughout);
+        self.histories.push(TimeHistory::Throughout);
         self.effects.len() - 1
     }
 
@@ -21,12 +21,14 @@ impl Study {
         let last = self.steps.len().saturating_sub(1);
         for effect in 0..self.catalogue {
             // Growth over a single step equals an onset there.
-            let courses =
-                (1..=last).map(Course::From).chain((1..last).map(Course::Growing)).collect::<Vec<_>>();
-            for course in courses {
+            let histories = (1..=last)
+                .map(TimeHistory::From)
+                .chain((1..last).map(TimeHistory::Growing))
+                .collect::<Vec<_>>();
+            for history in histories {
                 self.effects.push(self.effects[effect].clone());
                 self.on_machine.push(self.on_machine[effect]);
-                self.courses.push(course);
+                self.histories.push(history);
             }
         }
     }
@@ -34,7 +36,7 @@ impl Study {
     /// Candidates with an onset of one library effect.
     pub(crate) fn onsets_of(&self, effect: usize) -> impl Iterator<Item = usize> {
         let is_one = move |index: &usize| {
-            self.courses[*index].onset().is_some()
+            self.histories[*index].onset().is_some()
                 && Arc::ptr_eq(&self.effects[*index], &self.effects[effect])
         };
         (self.catalogue..self.effects.len()).filter(is_one)

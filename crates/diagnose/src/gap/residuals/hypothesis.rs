@@ -21,7 +21,7 @@ pub fn members(hypothesis: &Hypothesis) -> Vec<usize> {
 
 /// Onset and growth of an effect within a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Course {
+pub enum TimeHistory {
     /// Present throughout.
     Throughout,
     /// From the step with this index on.
@@ -30,22 +30,22 @@ pub enum Course {
     Growing(usize),
 }
 
-impl Course {
+impl TimeHistory {
     /// Share of the full size in a step of a recording with `steps` steps, 0..1.
     pub fn share(self, step: usize, steps: usize) -> f64 {
         match self {
-            Course::Throughout => 1.0,
-            Course::From(first) => f64::from(u8::from(step >= first)),
-            Course::Growing(first) if step < first || steps <= first => 0.0,
-            Course::Growing(first) => (step - first + 1) as f64 / (steps - first) as f64,
+            TimeHistory::Throughout => 1.0,
+            TimeHistory::From(first) => f64::from(u8::from(step >= first)),
+            TimeHistory::Growing(first) if step < first || steps <= first => 0.0,
+            TimeHistory::Growing(first) => (step - first + 1) as f64 / (steps - first) as f64,
         }
     }
 
     /// The step with which it begins; `None` if it is always present.
     pub fn onset(self) -> Option<usize> {
         match self {
-            Course::Throughout => None,
-            Course::From(first) | Course::Growing(first) => Some(first),
+            TimeHistory::Throughout => None,
+            TimeHistory::From(first) | TimeHistory::Growing(first) => Some(first),
         }
     }
 }
@@ -56,9 +56,9 @@ mod tests {
 
     #[test]
     fn what_grows_begins_with_its_step_and_is_whole_in_the_last() {
-        let shares = |course: Course| (0..5).map(|step| course.share(step, 5)).collect::<Vec<f64>>();
-        assert_eq!(shares(Course::Throughout), [1.0; 5]);
-        assert_eq!(shares(Course::From(3)), [0.0, 0.0, 0.0, 1.0, 1.0]);
-        assert_eq!(shares(Course::Growing(1)), [0.0, 0.25, 0.5, 0.75, 1.0]);
+        let shares = |history: TimeHistory| (0..5).map(|step| history.share(step, 5)).collect::<Vec<f64>>();
+        assert_eq!(shares(TimeHistory::Throughout), [1.0; 5]);
+        assert_eq!(shares(TimeHistory::From(3)), [0.0, 0.0, 0.0, 1.0, 1.0]);
+        assert_eq!(shares(TimeHistory::Growing(1)), [0.0, 0.25, 0.5, 0.75, 1.0]);
     }
 }

@@ -2,13 +2,13 @@
 
 pub mod actuators;
 pub(crate) mod changed_study;
-pub mod hypothesis;
+pub(crate) mod hypothesis;
 pub(crate) mod initial_state;
 pub(crate) mod machine_run;
 pub mod nuisance;
-pub mod point_state;
+pub(crate) mod point_state;
 pub(crate) mod prediction;
-pub mod shape;
+pub(crate) mod shape;
 pub mod study;
 pub(crate) mod true_inputs;
 pub mod whiten;

@@ -38,6 +38,18 @@ pub enum NuisanceKind {
     Delay(usize),
 }
 
+impl NuisanceKind {
+    /// Whether it is the initial metal temperature.
+    pub(crate) fn is_start(self) -> bool {
+        matches!(self, NuisanceKind::Perturbation(Perturbation::StartTc | Perturbation::StartTt))
+    }
+
+    /// Whether it is a tolerance of the rig: initial metal state and clock errors are none, and a deviation of one corner of the map is plausible.
+    pub(crate) fn is_of_rig(self) -> bool {
+        !matches!(self, NuisanceKind::Delay(_) | NuisanceKind::Shape(_)) && !self.is_start()
+    }
+}
+
 impl std::fmt::Display for NuisanceKind {
     /// Name in files and messages.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -69,9 +81,9 @@ impl std::fmt::Display for NuisanceKind {
 pub struct Nuisance {
     /// Kind.
     pub kind: NuisanceKind,
-    /// Prior mean, in the unit of what it changes: 0 for the nominal rig, or the value from an earlier recording of this rig.
+    /// Prior mean, in the unit of the changed quantity: 0 for the nominal rig, or the value from an earlier recording of this rig.
     pub centre: f64,
-    /// One sigma, in the unit of what it changes.
+    /// One sigma, in the unit of the changed quantity.
     pub sigma: f64,
 }
 
@@ -135,7 +147,7 @@ pub struct Circumstances {
     pub delay_s: [f64; OUTPUTS.len()],
 }
 
-/// Applies one nuisance of size `value` (in the unit of what it changes) to a rig.
+/// Applies one nuisance of size `value` (in the unit of the changed quantity) to a rig.
 pub fn apply(
     declared: &Declared,
     kind: NuisanceKind,

@@ -2,7 +2,7 @@
 
 use crate::gap::residuals::nuisance::Circumstances;
 use crate::gap::residuals::study::{Hypothesis, PredictError, Study};
-use crate::gap::residuals::true_inputs::{MEASURED, SurroundingsCourse, TrueInputs};
+use crate::gap::residuals::true_inputs::{MEASURED, SurroundingsHistory, TrueInputs};
 use mapper_core::Channel;
 use mapper_physics::rig::effect::Rig;
 use mapper_physics::rig::instruments::{ChannelPath, Surroundings};
@@ -36,31 +36,31 @@ impl Study {
     /// The inputs without the errors that these circumstances give their sensors.
     pub(crate) fn true_inputs<'a>(&'a self, circumstances: &'a Circumstances) -> TrueInputs<'a> {
         let depends = circumstances.paths.iter().any(ChannelPath::depends_on_surroundings);
-        let course = depends.then(|| self.surroundings.get_or_init(|| self.surroundings_course()));
-        TrueInputs { recorded: &self.inputs, circumstances, course }
+        let history = depends.then(|| self.surroundings.get_or_init(|| self.surroundings_history()));
+        TrueInputs { recorded: &self.inputs, circumstances, history }
     }
 
     /// Walls and flows along the recording, as measured, or as the nominal machine has them; empty if that cannot follow.
-    fn surroundings_course(&self) -> SurroundingsCourse {
-        let mut course = SurroundingsCourse { t_s: self.times_s.clone(), rows: Vec::new() };
+    fn surroundings_history(&self) -> SurroundingsHistory {
+        let mut history = SurroundingsHistory { t_s: self.times_s.clone(), rows: Vec::new() };
         let drive = self.drive(&self.nothing(), &self.times_s, |_, _, state, outputs| {
-            course.rows.push([state.tc_k, outputs.flow_kg_s, state.tt_k, outputs.turbine_flow_kg_s]);
+            history.rows.push([state.tc_k, outputs.flow_kg_s, state.tt_k, outputs.turbine_flow_kg_s]);
         });
         if drive.is_err() {
-            return SurroundingsCourse::default();
+            return SurroundingsHistory::default();
         }
         for (place, channel) in MEASURED.into_iter().enumerate() {
             // Readings that never change belong to an experiment that is only planned.
             let column = self.table.column(channel).filter(|c| c.windows(2).any(|pair| pair[0] != pair[1]));
-            for index in 0..course.rows.len() {
-                let row = &mut course.rows[index][place];
+            for index in 0..history.rows.len() {
+                let row = &mut history.rows[index][place];
                 *row = column.and_then(|column| mean_near(self, column, index)).unwrap_or(*row);
                 if [Channel::CompressorFlow, Channel::TurbineFlow].contains(&channel) {
                     *row = Surroundings::flow_ratio(&self.nominal.model.params, channel, *row);
                 }
             }
         }
-        course
+        history
     }
 
     /// For each step, its blocks' times after its start, s, and their position on the speed line (beyond 1: surge).
@@ -79,18 +79,12 @@ impl Study {
     }
 
     /// Model state at the end of each step.
-    ///
-    /// # Errors
-    /// [`PredictError`].
     pub fn points(&self, hypothesis: &Hypothesis) -> Result<Vec<PointState>, PredictError> {
         Ok(self.points_with_others(hypothesis, &[])?.into_iter().map(|(point, _)| point).collect())
     }
 
     /// Model state at the end of each step, and the efficiency and h of other hypotheses' models at the same speed, pressures and metal
     /// temperatures.
-    ///
-    /// # Errors
-    /// [`PredictError`].
     pub fn points_with_others(
         &self,
         hypothesis: &Hypothesis,

@@ -34,7 +34,7 @@ impl Study {
     fn segments(&self, hypothesis: &Hypothesis) -> Vec<usize> {
         let shares = |step: usize| {
             let effects = hypothesis.effects.iter();
-            effects.map(move |(index, _)| self.courses[*index].share(step, self.steps.len()))
+            effects.map(move |(index, _)| self.histories[*index].share(step, self.steps.len()))
         };
         (0..self.steps.len().max(1))
             .filter(|step| *step == 0 || !shares(*step).eq(shares(step - 1)))
@@ -136,8 +136,7 @@ impl Study {
             let command = LaggedCommand::new(self.inputs.command.levels().to_vec(), p3, self.actuators.valve);
             let paths = OUTPUTS.map(|channel| *rig.instruments.path(channel));
             followers.iter_mut().zip(paths).for_each(|(follower, path)| follower.turn_to(path));
-            let end_s =
-                segments.get(place + 1).map_or(f64::INFINITY, |next| self.steps[*next].marker.start_s);
+            let end_s = self.segment_end_s(&segments, place);
             let until = times_s.partition_point(|t| *t <= end_s);
             // No sample lies behind the end of the followed part.
             let followed = times_s.iter().zip(samples).enumerate().take(until).skip(done);
@@ -174,10 +173,7 @@ impl Study {
     }
 
     /// The same, with the run of another prediction if both have the same machine.
-    ///
-    /// # Errors
-    /// As [`Study::predict`].
-    pub fn predict_near(
+    pub(crate) fn predict_near(
         &self,
         hypothesis: &Hypothesis,
         other: &Prediction,

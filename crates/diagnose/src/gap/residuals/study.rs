@@ -1,13 +1,13 @@
 //! One prepared recording: residual layout, whitening, and model predictions for any hypothesis.
 
 use crate::gap::residuals::actuators::Actuators;
-use crate::gap::residuals::hypothesis::Course;
+use crate::gap::residuals::hypothesis::TimeHistory;
 pub use crate::gap::residuals::hypothesis::{EffectValues, Hypothesis, members};
 use crate::gap::residuals::initial_state::rested;
 use crate::gap::residuals::machine_run::{MachineRun, acts_on_machine};
 use crate::gap::residuals::nuisance::{Circumstances, Nuisance, OUTPUTS, apply, nuisances};
 use crate::gap::residuals::shape::{SHAPES, ShapedMap};
-use crate::gap::residuals::true_inputs::SurroundingsCourse;
+use crate::gap::residuals::true_inputs::SurroundingsHistory;
 use mapper_core::{Channel, Recording, StepMarker};
 use mapper_observe::averages::block::{Block, block_mean, blocks};
 use mapper_observe::averages::schedule::Schedule;
@@ -82,7 +82,7 @@ pub struct Study {
     /// Candidate effects.
     pub effects: Vec<Arc<dyn Effect>>,
     /// When each effect acts.
-    pub courses: Vec<Course>,
+    pub histories: Vec<TimeHistory>,
     /// Whether each effect changes the machine or its inputs, and not only sensors of its outputs.
     pub(crate) on_machine: Vec<bool>,
     /// Number of library effects; they are followed by candidates that begin with a step.
@@ -110,7 +110,7 @@ pub struct Study {
     pub(crate) rows: Vec<Vec<[Option<u32>; OUTPUTS.len()]>>,
     /// For each group the noise of the subtracted values, unit squared; empty if nothing was subtracted.
     pub(crate) other_noise: Vec<DMatrix<f64>>,
-    pub(crate) surroundings: OnceLock<SurroundingsCourse>,
+    pub(crate) surroundings: OnceLock<SurroundingsHistory>,
 }
 
 /// The first step counts from this time before the first jump, s. The rig's earlier history is unknown, and the metal's start is fitted
@@ -143,7 +143,7 @@ impl Study {
         model: Model,
         effects: Vec<Arc<dyn Effect>>,
     ) -> Study {
-        let actuators = Actuators::declared(&table, recording, &declared);
+        let actuators = Actuators::of(&table, recording, &declared, true);
         Study::with_actuators(recording, table, declared, model, effects, actuators)
     }
 
@@ -231,7 +231,7 @@ impl Study {
         let (times_s, places): (Vec<f64>, Vec<_>) = reads.into_iter().unzip();
         Study {
             nuisances: nuisances(&declared),
-            courses: vec![Course::Throughout; effects.len()],
+            histories: vec![TimeHistory::Throughout; effects.len()],
             on_machine: effects.iter().map(|effect| acts_on_machine(&nominal, effect.as_ref())).collect(),
             catalogue: effects.len(),
             actuators,
@@ -274,7 +274,7 @@ impl Study {
         let mut rig = self.nominal.clone();
         let mut circumstances = Circumstances::default();
         for (index, values) in &hypothesis.effects {
-            let share = self.courses[*index].share(step, self.steps.len());
+            let share = self.histories[*index].share(step, self.steps.len());
             if share == 1.0 {
                 add(&mut rig, self.effects[*index].as_ref(), values)?;
             } else if share > 0.0 {

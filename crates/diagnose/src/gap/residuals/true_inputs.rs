@@ -10,7 +10,7 @@ use mapper_physics::simulation::inputs::Inputs;
 
 /// Walls and flows along a recording: they scale the errors of sensors.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct SurroundingsCourse {
+pub(crate) struct SurroundingsHistory {
     pub(crate) t_s: Vec<f64>,
     /// Values of [`MEASURED`]; flows as ratios.
     pub(crate) rows: Vec<[f64; MEASURED.len()]>,
@@ -20,8 +20,8 @@ pub(crate) struct SurroundingsCourse {
 pub(crate) const MEASURED: [Channel; 4] =
     [Channel::Tc, Channel::CompressorFlow, Channel::Tt, Channel::TurbineFlow];
 
-impl SurroundingsCourse {
-    /// Surroundings of a sensor at a time; `None` without a course.
+impl SurroundingsHistory {
+    /// Surroundings of a sensor at a time; `None` without a history.
     fn at(&self, channel: Channel, t_s: f64, opening_ratio: f64) -> Option<Surroundings> {
         let after = self.t_s.partition_point(|t| *t <= t_s).min(self.rows.len().checked_sub(1)?);
         let before = after.saturating_sub(1);
@@ -36,12 +36,11 @@ impl SurroundingsCourse {
 /// The inputs of a recording without the errors that its circumstances give their sensors.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TrueInputs<'a> {
-    /// As recorded.
     pub(crate) recorded: &'a SmoothedInputs,
     /// Errors of their sensors.
     pub(crate) circumstances: &'a Circumstances,
-    /// What acts on the sensors; `None` if no error depends on it.
-    pub(crate) course: Option<&'a SurroundingsCourse>,
+    /// Quantities that act on the sensors; `None` if no error depends on them.
+    pub(crate) history: Option<&'a SurroundingsHistory>,
 }
 
 impl TrueInputs<'_> {
@@ -55,7 +54,7 @@ impl TrueInputs<'_> {
         opening_ratio: f64,
     ) -> f64 {
         let at_sensor = (read - path.offset) / path.gain_ratio;
-        let around = self.course.and_then(|course| course.at(channel, t_s, opening_ratio));
+        let around = self.history.and_then(|history| history.at(channel, t_s, opening_ratio));
         around.map_or(at_sensor, |around| path.behind(at_sensor, &around))
     }
 }

@@ -19,7 +19,6 @@ pub struct Linearised {
     hypothesis: Hypothesis,
     /// Prediction there.
     pub base: Prediction,
-    /// Noise model.
     noise: Noise,
     /// Whitened change for one sigma of each nuisance.
     pub columns: Vec<Vec<f64>>,
@@ -67,10 +66,7 @@ impl Linearised {
     }
 
     /// Whitening by the noise of the outputs alone, without derivatives.
-    ///
-    /// # Errors
-    /// [`PredictError`] if the nominal model cannot follow the recording.
-    pub fn of_noise_alone(study: &Study) -> Result<Linearised, PredictError> {
+    pub(crate) fn of_noise_alone(study: &Study) -> Result<Linearised, PredictError> {
         let nothing = study.nothing();
         let base = study.predict(&nothing)?;
         let noise = Noise::new(covariances(study, &nothing, &base, &[]));
@@ -159,10 +155,11 @@ impl Linearised {
     }
 
     /// Predicts and returns the whitened residual.
-    ///
-    /// # Errors
-    /// [`PredictError`].
-    pub fn residual_of(&self, study: &Study, hypothesis: &Hypothesis) -> Result<Vec<f64>, PredictError> {
+    pub(crate) fn residual_of(
+        &self,
+        study: &Study,
+        hypothesis: &Hypothesis,
+    ) -> Result<Vec<f64>, PredictError> {
         Ok(self.residual(study, &study.predict(hypothesis)?))
     }
 }

@@ -1,6 +1,6 @@
 //! A law as a hypothesis: its coefficients are fitted by model runs, together with tolerances and any other effects.
 
-use crate::gap::best_fit::fit::{Effort, Fit, fit, fit_from};
+use crate::gap::best_fit::fit::{Effort, Fit, Start, fit};
 use crate::gap::best_fit::selection::Selection;
 use crate::gap::causes::weigh::MAX_EQUIVALENT;
 use crate::gap::residuals::study::{Hypothesis, Study};
@@ -20,17 +20,24 @@ pub struct Candidate {
     pub choice: Choice,
     /// Index of the law's effect in the study.
     pub effect: usize,
-    /// Best fit.
     pub fit: Fit,
 }
 
+/// A law to fit: its choice, the index of its effect, and the start values.
+type LawStart = (Choice, usize, Start);
+
 impl Candidate {
+    /// A start from the current values.
+    pub fn restart(&self) -> LawStart {
+        (self.choice.clone(), self.effect, Start::from(&self.fit))
+    }
+
     /// Logarithm of the evidence, including the rarity.
     pub fn score(&self) -> f64 {
         self.fit.score - self.choice.rarity
     }
 
-    /// Whether every coefficient differs significantly from 0; the level that accompanies a slope may have any value.
+    /// Whether every coefficient differs significantly from 0. The level that accompanies a slope may have any value.
     pub fn is_determined(&self, library: &[Term]) -> bool {
         let covariance = &self.fit.covariance;
         let terms: Vec<&Term> = self.choice.terms.iter().map(|place| &library[*place]).collect();
@@ -43,58 +50,37 @@ impl Candidate {
         })
     }
 
-    /// The law's coefficients.
     pub fn coefficients(&self) -> &[f64] {
         let own = self.fit.hypothesis.effects.iter().find(|(index, _)| *index == self.effect);
         own.map_or(&[], |(_, values)| values)
     }
 }
 
-/// A study to which laws are added as effects.
+/// A study with laws as additional effects.
 #[derive(Debug)]
 pub struct Bench {
     /// The recording, with the library effects followed by the laws.
     pub study: Study,
-    /// The term library.
     pub library: Vec<Term>,
 }
 
 impl Bench {
-    /// Fits choices from their linear estimate, together with the effects of the base.
+    /// Fits from all starts in parallel; best first.
     pub fn fit(
-        &mut self,
-        base_hypothesis: &Hypothesis,
+        &self,
+        starts: impl Iterator<Item = LawStart>,
         linearised: &Linearised,
-        choices: &[Choice],
         selection: &Selection,
         effort: Effort,
     ) -> Vec<Candidate> {
-        let starts: Vec<(Choice, usize, Hypothesis)> =
-            choices.iter().map(|choice| self.start(base_hypothesis, choice)).collect();
+        let starts: Vec<LawStart> = starts.collect();
         let fitted = parallel::map(&starts, |(choice, effect, start)| {
-            let fit = fit(&self.study, linearised, start, selection, effort).ok()?;
+            let fit = fit(&self.study, linearised, start.clone(), selection, effort).ok()?;
             Some(Candidate { choice: choice.clone(), effect: *effect, fit })
         });
-        let mut found: Vec<Candidate> = fitted.into_iter().flatten().collect();
-        sort(&mut found);
-        found
-    }
-
-    /// Refits candidates from their current values.
-    pub fn refit(
-        &self,
-        candidates: &[Candidate],
-        linearised: &Linearised,
-        selection: &Selection,
-        effort: Effort,
-    ) -> Vec<Candidate> {
-        let fitted = parallel::map(candidates, |candidate| {
-            let fit = fit_from(&self.study, linearised, &(&candidate.fit).into(), selection, effort).ok()?;
-            Some(Candidate { fit, ..candidate.clone() })
-        });
-        let mut found: Vec<Candidate> = fitted.into_iter().flatten().collect();
-        sort(&mut found);
-        found
+        let mut candidates: Vec<Candidate> = fitted.into_iter().flatten().collect();
+        candidates.sort_by(|a, b| b.score().total_cmp(&a.score()));
+        candidates
     }
 
     /// A candidate's fit in a study with only the library effects and its own law, without the other laws tried.
@@ -108,7 +94,8 @@ impl Bench {
         (own, fit)
     }
 
-    fn start(&mut self, base: &Hypothesis, choice: &Choice) -> (Choice, usize, Hypothesis) {
+    /// Adds the law of a choice to the study, to be fitted together with the effects of the base from its linear estimate.
+    pub fn start(&mut self, base: &Hypothesis, choice: &Choice) -> LawStart {
         let terms: Vec<Term> = choice.terms.iter().map(|place| self.library[*place].clone()).collect();
         let law = LawEffect::new(terms);
         let parameters = &law.info().parameters;
@@ -120,7 +107,7 @@ impl Bench {
         let effect = self.study.add(Arc::new(law));
         let mut start = base.clone();
         start.effects.push((effect, values));
-        (choice.clone(), effect, start)
+        (choice.clone(), effect, Start::from(&start))
     }
 }
 
@@ -131,22 +118,17 @@ pub fn keep_determined(library: &[Term], candidates: &mut Vec<Candidate>) {
     }
 }
 
-/// Sorts best first.
-pub fn sort(candidates: &mut [Candidate]) {
-    candidates.sort_by(|a, b| b.score().total_cmp(&a.score()));
-}
-
 /// Selects the choices to fit: the best ones, and the best of every machine part with a sufficient linear gain.
-pub fn worth(library: &[Term], choices: &[Choice]) -> Vec<Choice> {
+pub fn promising(library: &[Term], choices: &[Choice]) -> Vec<Choice> {
     let Some(best) = choices.first() else { return Vec::new() };
     let mut selected: Vec<Choice> = Vec::new();
     let part = |choice: &Choice| library[choice.terms[0]].submodel();
-    // With a strong term present, the linearisation is less accurate.
-    let least = PROMISE * best.gain;
-    for choice in choices.iter().filter(|choice| choice.gain > least) {
+    // A strong term makes the linearisation less accurate.
+    let min_gain = MIN_GAIN_RATIO * best.gain;
+    for choice in choices.iter().filter(|choice| choice.gain > min_gain) {
         let of_part = selected.iter().filter(|other| part(other) == part(choice)).count();
         let parts = if part(choice) == part(best) { 1 + MAX_EQUIVALENT } else { 1 };
-        if of_part < parts && selected.len() < MAX {
+        if of_part < parts && selected.len() < MAX_LAWS {
             selected.push(choice.clone());
         }
     }
@@ -154,6 +136,6 @@ pub fn worth(library: &[Term], choices: &[Choice]) -> Vec<Choice> {
 }
 
 /// Minimum linear gain of another machine part, as a share of the best gain.
-const PROMISE: f64 = 0.3;
+const MIN_GAIN_RATIO: f64 = 0.3;
 /// Maximum number of fitted laws.
-const MAX: usize = 6;
+const MAX_LAWS: usize = 6;

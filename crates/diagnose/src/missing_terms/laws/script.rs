@@ -63,7 +63,7 @@ pub fn script_of(terms: &[&Term], description: &LawDescription) -> Option<String
     write!(text, "\n// Found, with 95 % intervals: {}.\n// `at` is the machine at one instant, `p` the parameters; SI.\n", found.join("; ")).ok()?;
     let mut gas = false;
     for (balance, texts) in &sums {
-        let name = balance.hook_name()?;
+        let name = balance.properties().hook_name?;
         let sum = texts.join(" + ");
         let (arguments, body) = match balance {
             Balance::CompressorHousing | Balance::TurbineHousing | Balance::Shaft | Balance::Outlet => {

@@ -42,7 +42,7 @@ impl<'a> Base<'a> {
     }
 
     /// A fitted cause.
-    pub fn beside(study: &'a Study, linearised: &'a Linearised, fit: &Fit) -> Base<'a> {
+    pub fn at_fit(study: &'a Study, linearised: &'a Linearised, fit: &Fit) -> Base<'a> {
         Base {
             study,
             linearised,

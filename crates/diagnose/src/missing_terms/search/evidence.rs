@@ -59,8 +59,6 @@ pub fn weigh_process(
 pub struct Posterior {
     /// Log evidence relative to no process.
     pub gain: f64,
-    /// Mean.
     pub mean: DVector<f64>,
-    /// Covariance.
     pub covariance: DMatrix<f64>,
 }

@@ -1,7 +1,7 @@
 //! Search for missing terms: residual source term of each balance, and closed-form evidence of library terms.
 
 pub mod columns;
-pub mod evidence;
-pub mod onset;
+pub(crate) mod evidence;
+pub(crate) mod onset;
 pub mod residual_source;
-pub mod select;
+pub(crate) mod select;

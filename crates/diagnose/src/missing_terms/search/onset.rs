@@ -8,7 +8,7 @@ use crate::missing_terms::search::residual_source::in_each_step;
 use crate::missing_terms::search::select::Choice;
 use crate::missing_terms::terms::expression::{Expression, product};
 use crate::missing_terms::terms::term::{Role, Term};
-use crate::missing_terms::terms::time_history::{Course, Shape};
+use crate::missing_terms::terms::time_history::{Shape, TimeHistory};
 use mapper_core::step_number;
 use nalgebra::DMatrix;
 
@@ -121,7 +121,7 @@ pub fn begun(
 fn from(term: &Term, begin_s: f64, step: usize) -> Term {
     let mut later = term.clone();
     for (_, formula) in &mut later.acts_on {
-        *formula = product(Expression::InTime(Course::from(begin_s)), formula.clone());
+        *formula = product(Expression::InTime(TimeHistory::from(begin_s)), formula.clone());
     }
     // Level and slope form separate laws now: each sentence includes its own onset.
     later.role = Role::Other;
@@ -132,10 +132,10 @@ fn from(term: &Term, begin_s: f64, step: usize) -> Term {
 /// Whitened changes for one step of a term's coefficient, for an onset at each step of the recording: a term with an onset is the sum of its
 /// parts in each later step.
 fn from_each_step(base: &Base<'_>, term: &Term) -> Vec<Vec<f64>> {
-    let during = |course: Course| {
+    let during = |history: TimeHistory| {
         let mut during = term.clone();
         for (_, formula) in &mut during.acts_on {
-            *formula = product(Expression::InTime(course.clone()), formula.clone());
+            *formula = product(Expression::InTime(history.clone()), formula.clone());
         }
         during
     };

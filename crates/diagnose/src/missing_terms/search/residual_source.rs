@@ -9,10 +9,10 @@ use crate::gap::residuals::study::Study;
 use crate::gap::residuals::whiten::rows_of_step;
 use crate::missing_terms::search::columns::{Base, Products};
 use crate::missing_terms::search::evidence::{Posterior, weigh_process};
-use crate::missing_terms::terms::balance::Balance;
+use crate::missing_terms::terms::balance::{Balance, Properties};
 use crate::missing_terms::terms::expression::Expression;
 use crate::missing_terms::terms::term::{Role, Term};
-use crate::missing_terms::terms::time_history::{Course, Shape};
+use crate::missing_terms::terms::time_history::{Shape, TimeHistory};
 use mapper_core::Channel;
 use mapper_numerics::parallel;
 use nalgebra::{DMatrix, DVector};
@@ -69,18 +69,18 @@ pub fn forces(base: &Base<'_>, counts: &[bool], wanted: &dyn Fn(&Balance) -> boo
 
 /// Changes due to a typical source term in one step each, in the channels' units: levels first, then the decaying parts.
 pub fn columns(base: &Base<'_>, balance: Balance) -> Vec<Vec<f64>> {
-    let size = balance.plain_size();
-    let term = |course: Course| Term {
-        acts_on: vec![(balance, Expression::InTime(course))],
-        unit: balance.unit(),
-        step: size,
+    let Properties { plain_size: step, unit, .. } = balance.properties();
+    let term = |history: TimeHistory| Term {
+        acts_on: vec![(balance, Expression::InTime(history))],
+        unit,
+        step,
         words: String::new(),
         role: Role::Other,
         positive: false,
     };
     let of_shape = |shape: Shape| {
         let columns = match balance {
-            Balance::Reading(channel) => read(base.study, channel, shape, size),
+            Balance::Reading(channel) => read(base.study, channel, shape, step),
             _ => in_each_step(base, shape, term, |terms| base.raw_changes(terms)),
         };
         // Nothing decays in the first step, which has no jump.
@@ -109,7 +109,7 @@ fn read(study: &Study, channel: Channel, shape: Shape, size: f64) -> Vec<Vec<f64
 pub fn in_each_step(
     base: &Base<'_>,
     shape: Shape,
-    term: impl Fn(Course) -> Term,
+    term: impl Fn(TimeHistory) -> Term,
     changes: impl Fn(&[Term]) -> Vec<Option<Vec<f64>>>,
 ) -> Vec<Vec<f64>> {
     let study = base.study;
@@ -119,8 +119,8 @@ pub fn in_each_step(
         (begin_s, study.steps.get(step + 1).map_or(f64::INFINITY, |next| next.marker.start_s))
     };
     let members = |colour: usize| (colour..steps).step_by(APART);
-    let course = |colour: usize| Course { shape, spans_s: members(colour).map(span).collect() };
-    let terms: Vec<Term> = (0..APART.min(steps)).map(|colour| term(course(colour))).collect();
+    let history = |colour: usize| TimeHistory { shape, spans_s: members(colour).map(span).collect() };
+    let terms: Vec<Term> = (0..APART.min(steps)).map(|colour| term(history(colour))).collect();
     let mut columns = vec![vec![0.0; study.measured.len()]; steps];
     for (colour, change) in changes(&terms).into_iter().enumerate() {
         let Some(change) = change else { continue };
@@ -167,7 +167,7 @@ fn force(
         }
     }
     let best = best?;
-    let size = balance.plain_size();
+    let size = balance.properties().plain_size;
     let levels = (0..study.steps.len())
         .map(|step| (size * best.mean[step], size * best.covariance[(step, step)].max(0.0).sqrt()))
         .collect();

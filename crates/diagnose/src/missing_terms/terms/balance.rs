@@ -32,105 +32,70 @@ pub enum Balance {
     Lag(Channel),
 }
 
-impl Balance {
+/// Properties of a balance.
+pub struct Properties {
     /// Part of the machine to which it belongs.
-    pub fn submodel(self) -> Submodel {
-        match self {
-            Balance::CompressorHousing => Submodel::CompressorHousing,
-            Balance::TurbineHousing => Submodel::TurbineHousing,
-            Balance::Shaft => Submodel::Shaft,
-            Balance::Outlet => Submodel::Outlet,
-            Balance::GasBefore
-            | Balance::GasAfter
-            | Balance::GasOutlet
-            | Balance::Work
-            | Balance::Convection => Submodel::CompressorGas,
-            Balance::MapFlow => Submodel::CompressorFlow,
-            Balance::Reading(channel) | Balance::Lag(channel) => submodel_of_sensor(channel),
-        }
-    }
-
+    pub submodel: Submodel,
     /// Unit of the source term.
-    pub fn unit(self) -> &'static str {
-        match self {
-            Balance::CompressorHousing
-            | Balance::TurbineHousing
-            | Balance::GasBefore
-            | Balance::GasAfter
-            | Balance::GasOutlet => "W",
-            Balance::Shaft => "N m",
-            Balance::Outlet => "kg/s",
-            Balance::Work | Balance::Convection | Balance::MapFlow => "1",
-            Balance::Reading(channel) => channel.unit(),
-            Balance::Lag(_) => "s",
-        }
-    }
-
+    pub unit: &'static str,
     /// A clearly significant size of the source term, for a machine of some kilowatts.
-    pub fn plain_size(self) -> f64 {
-        match self {
-            Balance::CompressorHousing | Balance::TurbineHousing => 50.0,
-            Balance::GasBefore | Balance::GasAfter | Balance::GasOutlet => 50.0,
-            Balance::Shaft => 0.01,
-            Balance::Outlet => 1e-3,
-            Balance::Work | Balance::MapFlow => 0.03,
-            Balance::Convection => 0.1,
-            Balance::Reading(channel) => match channel {
-                Channel::ShaftSpeed => 500.0,
-                Channel::CompressorFlow | Channel::TurbineFlow => 1e-3,
-                Channel::P2 => 500.0,
-                _ => 2.0,
-            },
-            Balance::Lag(_) => 3.0,
-        }
-    }
-
+    pub plain_size: f64,
     /// Name of the source term, for sentences.
-    pub fn words(self) -> String {
-        match self {
-            Balance::Shaft => "torque on the shaft".to_owned(),
-            Balance::Outlet => "flow into the outlet volume".to_owned(),
-            Balance::CompressorHousing
-            | Balance::TurbineHousing
-            | Balance::GasBefore
-            | Balance::GasAfter
-            | Balance::GasOutlet => format!("heat to {}", self.place_words()),
-            Balance::Work => "efficiency".to_owned(),
-            Balance::Convection => "h".to_owned(),
-            Balance::MapFlow => "the map's flow".to_owned(),
-            Balance::Reading(channel) => format!("the reading of {channel}"),
-            Balance::Lag(channel) => format!("a lag of the reading of {channel}"),
-        }
-    }
-
+    pub words: String,
     /// Name of what it acts on, for sentences.
-    pub fn place_words(self) -> String {
-        match self {
-            Balance::CompressorHousing => "the compressor housing".to_owned(),
-            Balance::TurbineHousing => "the turbine housing".to_owned(),
-            Balance::GasBefore => "the gas before the wheel".to_owned(),
-            Balance::GasAfter => "the gas behind the wheel".to_owned(),
-            Balance::GasOutlet => "the gas at the outlet".to_owned(),
-            _ => self.words(),
-        }
-    }
-
+    pub place_words: String,
     /// The script function that applies it; `None` if a script cannot.
-    pub fn hook_name(self) -> Option<String> {
-        Some(match self {
-            Balance::CompressorHousing => "heat_to_compressor_w".to_owned(),
-            Balance::TurbineHousing => "heat_to_turbine_w".to_owned(),
-            Balance::Shaft => "shaft_torque_nm".to_owned(),
-            Balance::Outlet => "flow_to_outlet_kg_s".to_owned(),
-            Balance::GasBefore => "gas_before_k".to_owned(),
-            Balance::GasAfter => "gas_after_k".to_owned(),
-            Balance::GasOutlet => "gas_outlet_k".to_owned(),
-            Balance::Work => "efficiency".to_owned(),
-            Balance::Convection => "h_w_m2k".to_owned(),
-            Balance::MapFlow => "flow_kg_s".to_owned(),
-            Balance::Reading(channel) => format!("reading_{}", channel.symbol()),
-            Balance::Lag(_) => return None,
-        })
+    pub hook_name: Option<String>,
+}
+
+impl Balance {
+    /// Its properties.
+    pub fn properties(self) -> Properties {
+        let term = |submodel, unit, plain_size, words: &str, hook_name: &str| Properties {
+            submodel,
+            unit,
+            plain_size,
+            words: words.to_owned(),
+            place_words: words.to_owned(),
+            hook_name: Some(hook_name.to_owned()),
+        };
+        let heat = |submodel, place: &str, hook_name: &str| Properties {
+            words: format!("heat to {place}"),
+            ..term(submodel, "W", 50.0, place, hook_name)
+        };
+        let gas = Submodel::CompressorGas;
+        match self {
+            Balance::CompressorHousing => {
+                heat(Submodel::CompressorHousing, "the compressor housing", "heat_to_compressor_w")
+            }
+            Balance::TurbineHousing => {
+                heat(Submodel::TurbineHousing, "the turbine housing", "heat_to_turbine_w")
+            }
+            Balance::GasBefore => heat(gas, "the gas before the wheel", "gas_before_k"),
+            Balance::GasAfter => heat(gas, "the gas behind the wheel", "gas_after_k"),
+            Balance::GasOutlet => heat(gas, "the gas at the outlet", "gas_outlet_k"),
+            Balance::Shaft => term(Submodel::Shaft, "N m", 0.01, "torque on the shaft", "shaft_torque_nm"),
+            Balance::Outlet => {
+                term(Submodel::Outlet, "kg/s", 1e-3, "flow into the outlet volume", "flow_to_outlet_kg_s")
+            }
+            Balance::Work => term(gas, "1", 0.03, "efficiency", "efficiency"),
+            Balance::Convection => term(gas, "1", 0.1, "h", "h_w_m2k"),
+            Balance::MapFlow => term(Submodel::CompressorFlow, "1", 0.03, "the map's flow", "flow_kg_s"),
+            Balance::Reading(channel) => {
+                let plain_size = match channel {
+                    Channel::ShaftSpeed | Channel::P2 => 500.0,
+                    Channel::CompressorFlow | Channel::TurbineFlow => 1e-3,
+                    _ => 2.0,
+                };
+                let words = format!("the reading of {channel}");
+                let hook_name = format!("reading_{}", channel.symbol());
+                term(submodel_of_sensor(channel), channel.unit(), plain_size, &words, &hook_name)
+            }
+            Balance::Lag(channel) => {
+                let words = format!("a lag of the reading of {channel}");
+                Properties { hook_name: None, ..term(submodel_of_sensor(channel), "s", 3.0, &words, "") }
+            }
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Formulas that can be both evaluated and written as script.
 
 use crate::missing_terms::terms::quantity::Quantity;
-use crate::missing_terms::terms::time_history::Course;
+use crate::missing_terms::terms::time_history::TimeHistory;
 use mapper_physics::machine::hooks::Site;
 use std::fmt::{Display, Formatter, Result};
 
@@ -23,7 +23,7 @@ pub enum Expression {
     /// The natural logarithm.
     Ln(Box<Expression>),
     /// A time history.
-    InTime(Course),
+    InTime(TimeHistory),
 }
 
 use Expression::{InTime, Ln, Minus, Number, Of, Power, Times, Value};
@@ -39,7 +39,7 @@ impl Expression {
             Times(a, b) => a.of(site, value) * b.of(site, value),
             Power(base, exponent) => base.of(site, value).powf(*exponent),
             Ln(of) => of.of(site, value).ln(),
-            InTime(course) => course.at(site.t_s),
+            InTime(history) => history.at(site.t_s),
         }
     }
 }
@@ -55,7 +55,7 @@ impl Display for Expression {
             Times(a, b) => write!(f, "{a} * {b}"),
             Power(base, exponent) => write!(f, "({base}) ** {}", number(*exponent)),
             Ln(of) => write!(f, "({of}).ln()"),
-            InTime(course) => write!(f, "{course}"),
+            InTime(history) => write!(f, "{history}"),
         }
     }
 }
@@ -70,18 +70,23 @@ pub fn number(value: f64) -> String {
 }
 
 /// `a - b`.
+pub fn minus(a: Expression, b: Expression) -> Expression {
+    Minus(Box::new(a), Box::new(b))
+}
+
+/// `a - b`.
 pub fn difference(a: Quantity, b: Quantity) -> Expression {
-    Minus(Box::new(Of(a)), Box::new(Of(b)))
+    minus(Of(a), Of(b))
 }
 
 /// `quantity - number`.
 pub fn above(quantity: Quantity, number: f64) -> Expression {
-    Minus(Box::new(Of(quantity)), Box::new(Number(number)))
+    minus(Of(quantity), Number(number))
 }
 
 /// `number - of`.
 pub fn below(number: f64, of: Expression) -> Expression {
-    Minus(Box::new(Number(number)), Box::new(of))
+    minus(Number(number), of)
 }
 
 /// `factor * of`.
@@ -101,5 +106,5 @@ pub fn power(quantity: Quantity, scale: f64, exponent: f64) -> Expression {
 
 /// `a^4 - b^4`.
 pub fn fourth_powers(a: Quantity, b: Quantity) -> Expression {
-    Minus(Box::new(power(a, 1.0, 4.0)), Box::new(power(b, 1.0, 4.0)))
+    minus(power(a, 1.0, 4.0), power(b, 1.0, 4.0))
 }

@@ -38,7 +38,6 @@ quantities! {
     P3 "p3_pa" "P3" |site| site.boundary.p3_pa;
     P4 "p4_pa" "P4" |site| site.boundary.p4_pa;
     T1 "t1_k" "the gas at the compressor inlet" |site| site.boundary.t1_k;
-    T1Prime "t1_prime_k" "the gas before the wheel" |site| site.t1_prime_k;
     T2Prime "t2_prime_k" "the gas behind the wheel" |site| site.t2_prime_k;
     T2 "t2_k" "the gas at the compressor outlet" |site| site.t2_k;
     T3 "t3_k" "the gas at the turbine inlet" |site| site.boundary.t3_k;
@@ -48,6 +47,5 @@ quantities! {
     Oil "oil_k" "the oil" |site| site.boundary.oil_temperature_k;
     Ambient "ambient_k" "the cell" |site| site.boundary.ambient_temperature_k;
     Flow "flow_kg_s" "the compressor's flow" |site| site.flow_kg_s;
-    Convection "h_w_m2k" "h" |site| site.h_w_m2k;
     PressureRatio "pressure_ratio" "the pressure ratio" |site| site.pressure_ratio;
 }

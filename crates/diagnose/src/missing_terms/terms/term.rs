@@ -63,12 +63,12 @@ impl Term {
 
     /// Name of what it acts on, for sentences.
     pub fn words_of_place(&self) -> String {
-        self.balance().place_words()
+        self.balance().properties().place_words
     }
 
     /// The machine part in which it acts.
     pub fn submodel(&self) -> Submodel {
-        self.balance().submodel()
+        self.balance().properties().submodel
     }
 }
 

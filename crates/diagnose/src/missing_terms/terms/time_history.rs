@@ -26,17 +26,17 @@ impl Shape {
 
 /// A shape during some time spans.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Course {
+pub struct TimeHistory {
     /// Time history within a span.
     pub shape: Shape,
     /// Start and end of each, s; a start at minus infinity precedes the recording.
     pub spans_s: Vec<(f64, f64)>,
 }
 
-impl Course {
+impl TimeHistory {
     /// Zero before a time, s, and 1 from then on.
-    pub fn from(begin_s: f64) -> Course {
-        Course { shape: Shape::Level, spans_s: vec![(begin_s, f64::INFINITY)] }
+    pub fn from(begin_s: f64) -> TimeHistory {
+        TimeHistory { shape: Shape::Level, spans_s: vec![(begin_s, f64::INFINITY)] }
     }
 
     /// Its value at a time; NaN means the soak before the recording.
@@ -52,7 +52,7 @@ impl Course {
 }
 
 /// Written as in an effect's script; only a level can be written.
-impl Display for Course {
+impl Display for TimeHistory {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
         let begin_s = self.spans_s.first().map_or(f64::NEG_INFINITY, |(begin_s, _)| *begin_s);
         write!(f, "(if at.t_s < {begin_s:?} {{ 0.0 }} else {{ 1.0 }})")

@@ -13,7 +13,7 @@ use mapper_diagnose::gap::best_fit::coordinate::coordinates;
 use mapper_diagnose::gap::best_fit::fit::Fit;
 use mapper_diagnose::gap::causes::calibration::Calibration;
 use mapper_diagnose::gap::causes::weigh::weight;
-use mapper_diagnose::gap::diagnose::{Diagnosed, Question, diagnose};
+use mapper_diagnose::gap::diagnose::{Diagnosed, GapRequest, diagnose};
 use mapper_diagnose::gap::findings::report::Verdict;
 use mapper_diagnose::gap::residuals::study::{Study, members};
 use mapper_fleet::Engine;
@@ -147,7 +147,7 @@ impl<'a> CalibrationSettings<'a> {
     /// [`BlindError`] if it cannot be run.
     pub fn observe(&self, case: &Case) -> Result<Option<DiagnosisSummary>, BlindError> {
         let recording = Schedule::new(self.campaign, &self.nominal)?.record(case)?;
-        let diagnosed = diagnose(Question {
+        let diagnosed = diagnose(GapRequest {
             tolerances_declared: true,
             experiments: Vec::new(),
             recording: &recording,

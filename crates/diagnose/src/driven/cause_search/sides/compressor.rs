@@ -1,11 +1,10 @@
-//! Compressor side of the model with all effects. Flow and efficiency come from measurement and free parameters instead of the map.
+//! Compressor side of the model with all effects. Flow is measured and efficiency is fitted; the map is not used.
 
-use crate::driven::cause_search::sides::side::{Side, Smooth, Which, truth};
+use crate::driven::cause_search::sides::side::{ModelError, Side, SideModel, relaxed_k, true_drive};
 use crate::driven::compressor_side::{EFFICIENCY, flow_coefficient, middles};
-use crate::driven::density::{ALIKE_S, HOUSING_ALIKE_S, HOUSING_SIGMA_K};
-use crate::driven::log_rows::{COMPRESSOR, Rows, Wanted};
-use crate::driven::parameters::Spread;
-use crate::driven::{PARAMETERS, Parameter};
+use crate::driven::density::{CORRELATION_S, HOUSING_CORRELATION_S, HOUSING_SIGMA_K};
+use crate::driven::log_rows::{COMPRESSOR, Rows, SideChannels};
+use crate::driven::parameters::{PARAMETERS, Parameter, Spread};
 use mapper_core::Channel;
 use mapper_physics::compressor_map::one_point_map::OnePointMap;
 use mapper_physics::laws::housing::compressor_capacity_j_k;
@@ -15,9 +14,8 @@ use mapper_physics::rig::instruments::ChannelFollower;
 use mapper_physics::simulation::model::{State, rad_s_of_rpm};
 use std::sync::Arc;
 
-/// Free parameters of a diagnosis, in the order of [`CompressorSide::predict`]. Parameters of library causes (area split, probe) keep their
-/// declared values. The efficiency prior is wider than in identification and includes map shapes beyond a parabola, so that no cause is
-/// named for a good compressor.
+/// Unknowns, in the order of [`CompressorSide::predict`]. The area split and the probe keep their declared values, because they are library causes. The
+/// prior of the efficiency is wider than in identification and includes map shapes beyond a parabola, so that no cause is named for a good compressor.
 static UNKNOWNS: [Parameter; 16] = {
     let p = PARAMETERS;
     const FURTHER: f64 = 0.15;
@@ -44,18 +42,17 @@ static UNKNOWNS: [Parameter; 16] = {
     ]
 };
 
-/// The compressor side.
 pub(crate) struct CompressorSide {
     rows: Rows,
     middle_speed_rpm: f64,
     middle_flow: f64,
 }
 
-impl Side for CompressorSide {
-    const WHICH: Which = Which::Compressor;
+impl SideModel for CompressorSide {
+    const SIDE: Side = Side::Compressor;
     const PRESSURE: Channel = Channel::P2;
 
-    fn wanted() -> Wanted<'static> {
+    fn channels() -> SideChannels<'static> {
         COMPRESSOR
     }
 
@@ -63,11 +60,11 @@ impl Side for CompressorSide {
         &UNKNOWNS
     }
 
-    fn smooth() -> &'static [Smooth] {
+    fn model_errors() -> &'static [ModelError] {
         // T2: error of a polynomial map and a single housing node. Tc: one thermocouple for a whole housing.
         &[
-            Smooth { median_k: 0.18, width: 0.25, alike_s: ALIKE_S },
-            Smooth { median_k: HOUSING_SIGMA_K, width: 0.0, alike_s: HOUSING_ALIKE_S },
+            ModelError { median_k: 0.18, width: 0.25, correlation_s: CORRELATION_S },
+            ModelError { median_k: HOUSING_SIGMA_K, width: 0.0, correlation_s: HOUSING_CORRELATION_S },
         ]
     }
 
@@ -104,7 +101,7 @@ impl Side for CompressorSide {
         else {
             return columns;
         };
-        let read = |channel: Channel| truth(rows, rig, channel);
+        let read = |channel: Channel| true_drive(rows, rig, channel);
         let [speeds_rpm, flows_kg_s, p1s_pa, p2s_pa, t1s_k] = [
             read(Channel::ShaftSpeed),
             read(Channel::CompressorFlow),
@@ -124,7 +121,7 @@ impl Side for CompressorSide {
         let mut state = self.start(rig, start_k, t2_offset_k);
         let mut tip = Tip { start_k: state.t2_tip_k, last: None };
         for i in 0..rows.len() {
-            // The turbine does not matter; it has some flow so that the model has a solution.
+            // Any turbine flow with which the model has a solution.
             let (p1_pa, t1_k) = (p1s_pa[i], t1s_k[i]);
             let boundary = BoundaryConditions { t1_k, p1_pa, p3_pa: 150e3, ..BoundaryConditions::default() };
             // With recirculation, the flow through the wheel exceeds the outlet flow.
@@ -150,11 +147,8 @@ impl Side for CompressorSide {
                 tip.follow(rows.t_s[i], outputs.t2_probe_target_k, outputs.t2_probe_time_constant_s);
             columns[0].push(t2_probe.read(rows.t_s[i], state.t2_tip_k) + t2_offset_k);
             columns[1].push(tc_probe.read(rows.t_s[i], state.tc_k));
-            // Exact exponential relaxation towards the current equilibrium: bounded over any gap in the log.
-            let elapsed_s = rows.t_s.get(i + 1).map_or(0.0, |next_s| next_s - rows.t_s[i]);
-            let towards = |from_k: f64, net_w: f64, conductance_w_k: f64, capacity_j_k: f64| {
-                let share = -(-conductance_w_k * elapsed_s / capacity_j_k).exp_m1();
-                from_k + net_w / conductance_w_k * share
+            let next_k = |from_k: f64, net_w: f64, conductance_w_k: f64, capacity_j_k: f64| {
+                relaxed_k(from_k, net_w, conductance_w_k, capacity_j_k, rows.elapsed_s(i))
             };
             let gas_w_k = outputs.h_w_m2k * compressor.internal_area_m2 + compressor.inlet_conductance_w_k;
             let gas_w = outputs.compressor_heat_w + outputs.added.inner_heat_w;
@@ -163,54 +157,51 @@ impl Side for CompressorSide {
             if model.has_inner_wall() {
                 let tie_w_k = compressor.inner_conductance_w_k;
                 let inner_w = gas_w - outputs.inner_heat_w;
-                let inner_k = towards(state.inner_k, inner_w, gas_w_k + tie_w_k, inner_ratio * capacity_j_k);
+                let inner_k = next_k(state.inner_k, inner_w, gas_w_k + tie_w_k, inner_ratio * capacity_j_k);
                 let outer_w = outputs.inner_heat_w - lost_w;
                 state.tc_k =
-                    towards(state.tc_k, outer_w, loss_w_k + tie_w_k, (1.0 - inner_ratio) * capacity_j_k);
+                    next_k(state.tc_k, outer_w, loss_w_k + tie_w_k, (1.0 - inner_ratio) * capacity_j_k);
                 state.inner_k = inner_k;
             } else {
-                state.tc_k = towards(state.tc_k, gas_w - lost_w, gas_w_k + loss_w_k, capacity_j_k);
+                state.tc_k = next_k(state.tc_k, gas_w - lost_w, gas_w_k + loss_w_k, capacity_j_k);
             }
         }
         columns
     }
 
-    fn free(effect: &str) -> Option<&'static str> {
+    fn covered(effect: &str) -> Option<&'static str> {
         match effect {
             "efficiency_scale" => {
-                Some("efficiency is free here, whatever a map says: it stands among the unknowns (eta)")
+                Some("the unknown eta covers it: the efficiency is fitted, and no map is used")
             }
-            "htc_scale" => Some("h is free here within a factor of 1.6: it stands among the unknowns (h)"),
+            "htc_scale" => Some("the unknown h covers it: h is fitted within a factor of 1.6"),
             _ => None,
         }
     }
 
-    fn silent(&self, submodel: Submodel) -> &'static str {
+    fn why_silent(&self, submodel: Submodel) -> &'static str {
         match submodel {
-            Submodel::CompressorFlow => "flow is as measured here: no map is asked",
-            Submodel::Actuator | Submodel::Outlet => {
-                "P2 and flow are as measured here: nobody set P3 or a valve"
-            }
-            Submodel::Shaft => "speed is as measured here: no balance of powers is asked",
+            Submodel::CompressorFlow => "the flow is measured: no map is used",
+            Submodel::Actuator | Submodel::Outlet => "P2 and flow are measured: P3 and valve are not used",
+            Submodel::Shaft => "the speed is measured: the balance of powers is not used",
             Submodel::TurbineFlow | Submodel::TurbineHousing => {
-                "it acts on the other side, or on the heat between housing and surroundings, which is free here"
+                "it acts on the turbine side, or on the heat between housing and surroundings, which is fitted as an unknown"
             }
-            Submodel::CompressorHousing => "the heat between housing and surroundings is free here",
+            Submodel::CompressorHousing => {
+                "the heat between housing and surroundings is fitted as an unknown"
+            }
             Submodel::TcProbe => "Tc is not recorded",
-            _ => "nothing that is judged changes with it in this log",
+            _ => "no judged channel changes with it in this log",
         }
     }
 }
 
 impl CompressorSide {
-    /// Probe at its reading; housing at its reading if measured, otherwise near the mean of inlet and outlet.
+    /// Initial state: the probe at its reading, the housing at its reading or, if it is not measured, at the mean of inlet and outlet.
     fn start(&self, rig: &Rig, start_over_k: f64, t2_offset_k: f64) -> State {
         let rows = &self.rows;
-        let first = |channel: Channel| {
-            let column = rows.judged.iter().find(|(of, _)| *of == channel);
-            let read = column.and_then(|(_, column)| column.iter().copied().find(|k| k.is_finite()));
-            read.map(|k| k - rig.instruments.path(channel).offset)
-        };
+        let first =
+            |channel: Channel| Some(rows.first_judged(channel)? - rig.instruments.path(channel).offset);
         let t1_k = rows.drive(Channel::T1).first().copied().unwrap_or(f64::NAN);
         let t2_k = first(Channel::T2).unwrap_or(t1_k) - t2_offset_k;
         let tc_k = first(Channel::Tc).unwrap_or(0.5 * (t1_k + t2_k)) + start_over_k;
@@ -218,7 +209,7 @@ impl CompressorSide {
     }
 }
 
-/// Probe tip between rows: its target is a straight line, for which the lag is exact.
+/// Tip of the probe. Between rows its target is a straight line, for which the lag is exact.
 struct Tip {
     /// First reading, K.
     start_k: f64,
@@ -230,7 +221,7 @@ impl Tip {
     fn follow(&mut self, t_s: f64, target_k: f64, tau_s: f64) -> f64 {
         let tip_k = match self.last {
             _ if tau_s <= 0.0 => target_k,
-            // A slow tip starts at its reading; a fast tip forgets it.
+            // A slow tip starts at its reading, a fast tip at its target.
             None => target_k + (self.start_k - target_k) * tau_s / (tau_s + FAST_S),
             Some((before_s, before_k, tip_k)) => {
                 let elapsed_s = t_s - before_s;

@@ -1,7 +1,7 @@
 //! Interface between the diagnosis and the sides of a machine.
 
 use crate::driven::Parameter;
-use crate::driven::log_rows::{Rows, Wanted};
+use crate::driven::log_rows::{Rows, SideChannels};
 use mapper_core::Channel;
 use mapper_physics::rig::effect::{Rig, Submodel};
 use serde::{Deserialize, Serialize};
@@ -10,95 +10,102 @@ use std::str::FromStr;
 /// One side of a machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Which {
-    /// Compressor: speed, flow, P1, P2 and T1 drive, T2 and Tc are judged.
+pub enum Side {
+    /// Speed, flow, P1, P2 and T1 drive it; T2 and Tc are judged.
     Compressor,
-    /// Turbine: speed, turbine flow, P3, T3 and P4 drive, T4 and Tt are judged.
+    /// Speed, turbine flow, P3, T3 and P4 drive it; T4 and Tt are judged.
     Turbine,
 }
 
-impl Which {
+impl Side {
     /// Display name.
     pub fn name(self) -> &'static str {
         match self {
-            Which::Compressor => "compressor",
-            Which::Turbine => "turbine",
+            Side::Compressor => "compressor",
+            Side::Turbine => "turbine",
         }
     }
 }
 
 /// An unknown side.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("a machine has a compressor and a turbine side; `{name}` is none")]
-pub struct NoSide {
+#[error("`{name}` is not a side of the machine; the sides are compressor and turbine")]
+pub struct UnknownSide {
     /// The requested name.
     pub name: String,
 }
 
-impl FromStr for Which {
-    type Err = NoSide;
+impl FromStr for Side {
+    type Err = UnknownSide;
 
-    fn from_str(name: &str) -> Result<Self, NoSide> {
-        let found = [Which::Compressor, Which::Turbine].into_iter().find(|which| which.name() == name);
-        found.ok_or_else(|| NoSide { name: name.to_owned() })
+    fn from_str(name: &str) -> Result<Self, UnknownSide> {
+        let found = [Side::Compressor, Side::Turbine].into_iter().find(|which| which.name() == name);
+        found.ok_or_else(|| UnknownSide { name: name.to_owned() })
     }
 }
 
-/// Model error of a judged channel, in addition to sensor noise: correlated in time, with a fitted size.
+/// Prior of the model error of a judged channel. It is correlated in time, and its size is fitted.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Smooth {
-    /// Prior median of its standard deviation, K.
+pub(crate) struct ModelError {
+    /// Median of its standard deviation, K.
     pub(crate) median_k: f64,
-    /// Prior width of its logarithm; 0 if fixed.
+    /// Standard deviation of its logarithm; 0 if fixed.
     pub(crate) width: f64,
     /// Correlation time, s.
-    pub(crate) alike_s: f64,
+    pub(crate) correlation_s: f64,
 }
 
 /// One side of a machine, driven by its measured neighbours.
-pub(crate) trait Side: Sync + Sized {
-    /// Identifier.
-    const WHICH: Which;
+pub(crate) trait SideModel: Sync + Sized {
+    const SIDE: Side;
 
-    /// The pressure that shows its phases, in addition to the speed.
+    /// The pressure whose changes separate the phases of a log, in addition to the speed.
     const PRESSURE: Channel;
 
-    /// Channels that it needs from a log.
-    fn wanted() -> Wanted<'static>;
+    fn channels() -> SideChannels<'static>;
 
-    /// Unknowns, independent of the cause.
+    /// Unknown parameters that are fitted with or without a cause.
     fn unknowns() -> &'static [Parameter];
 
     /// Model error of each judged channel.
-    fn smooth() -> &'static [Smooth];
+    fn model_errors() -> &'static [ModelError];
 
-    /// The side for these rows.
     fn of(rows: Rows) -> Self;
 
-    /// Its rows.
     fn rows(&self) -> &Rows;
 
     /// Predicted readings of a rig with these unknowns, one column per judged channel.
     fn predict(&self, rig: &Rig, unknowns: &[f64]) -> Vec<Vec<f64>>;
 
-    /// Why an effect with this id is not a candidate: an unknown already covers it.
-    fn free(effect: &str) -> Option<&'static str>;
+    /// Why the effect with this id is not a candidate: an unknown covers it.
+    fn covered(effect: &str) -> Option<&'static str>;
 
-    /// Why an effect in this machine part cannot be diagnosed here, if it changes no judged channel.
-    fn silent(&self, submodel: Submodel) -> &'static str;
+    /// Why an effect in this machine part changes no judged channel.
+    fn why_silent(&self, submodel: Submodel) -> &'static str;
 }
 
-/// True drives of a log, given a rig's sensors: corrects the lag, gain and offset of a sensor.
-pub(crate) fn truth(rows: &Rows, rig: &Rig, channel: Channel) -> Vec<f64> {
+/// A temperature, K, after `elapsed_s` with this heat flow and conductance at its start: the exact exponential, which stays bounded over a gap in the log.
+pub(crate) fn relaxed_k(
+    from_k: f64,
+    heat_w: f64,
+    conductance_w_k: f64,
+    capacity_j_k: f64,
+    elapsed_s: f64,
+) -> f64 {
+    from_k + heat_w / conductance_w_k * -(-conductance_w_k * elapsed_s / capacity_j_k).exp_m1()
+}
+
+/// True values of a driving channel: its readings without lag, gain and offset of the rig's sensor.
+pub(crate) fn true_drive(rows: &Rows, rig: &Rig, channel: Channel) -> Vec<f64> {
     let path = rig.instruments.path(channel);
     let read = rows.drive(channel);
-    let straight = |value: f64| (value - path.offset) / path.gain_ratio;
+    let correct = |value: f64| (value - path.offset) / path.gain_ratio;
     let place = rows.drives.iter().position(|(of, _)| *of == channel);
     match place.and_then(|place| rows.rates.get(place)) {
-        // For a lag: y + lag dy/dt.
+        // A lagging reading y has the input y + lag dy/dt.
         Some(rates) if path.lag_s > 0.0 => {
-            read.iter().zip(rates).map(|(value, rate)| straight(value + path.lag_s * rate)).collect()
+            read.iter().zip(rates).map(|(value, rate)| correct(value + path.lag_s * rate)).collect()
         }
-        _ => read.iter().map(|value| straight(*value)).collect(),
+        _ => read.iter().map(|value| correct(*value)).collect(),
     }
 }

@@ -5,6 +5,7 @@ pub use mapper_core::{DeclaredUncertainty, NoiseColour};
 use mapper_numerics::coloured_noise::ColouredNoise;
 use mapper_physics::gas::air::Air;
 use mapper_physics::gas::mixture::Gas;
+use mapper_physics::gas::pressure_tap::static_to_total_pa;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -96,6 +97,16 @@ impl IdentifyConfig {
     pub(crate) fn corrected_flow_kg_s(&self, flow_kg_s: f64, t1_k: f64, p1_pa: f64) -> f64 {
         self.reference.corrected_flow_kg_s(flow_kg_s * self.air.dry_flow_ratio(), t1_k, p1_pa)
     }
+
+    /// Declared uncertainty of a sensor.
+    pub(crate) fn sensor(&self, channel: Channel) -> DeclaredUncertainty {
+        self.declared.get(&channel).copied().unwrap_or_default()
+    }
+
+    /// The declared noise in the form that the numerics use.
+    pub(crate) fn noise(&self) -> ColouredNoise {
+        ColouredNoise::new(self.noise_colour.first_order_share_ratio, self.noise_colour.time_constant_s)
+    }
 }
 
 /// The pressure that a tap measures.
@@ -110,6 +121,18 @@ pub enum PressureTap {
         /// Inner diameter of the pipe at the tap, m, > 0.
         pipe_diameter_m: f64,
     },
+}
+
+impl PressureTap {
+    /// Total pressure at the tap.
+    pub(crate) fn total_pa(self, read_pa: f64, flow_kg_s: f64, total_temperature_k: f64) -> f64 {
+        match self {
+            PressureTap::Total => read_pa,
+            PressureTap::Static { pipe_diameter_m } => {
+                static_to_total_pa(read_pa, flow_kg_s, total_temperature_k, pipe_diameter_m)
+            }
+        }
+    }
 }
 
 /// Limits for doubtful and unusable points.
@@ -156,9 +179,4 @@ impl Default for Thresholds {
             end_mean_s: 2.0,
         }
     }
-}
-
-/// The declared noise in the form that the numerics use.
-pub(crate) fn coloured(colour: NoiseColour) -> ColouredNoise {
-    ColouredNoise::new(colour.first_order_share_ratio, colour.time_constant_s)
 }

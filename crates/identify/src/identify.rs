@@ -62,7 +62,7 @@ pub struct Identified {
     pub faults: Vec<FoundFault>,
     /// One standard error of the size of each possible fault, in the fault's unit; infinite if the recording does not determine it. A fault of
     /// six standard errors is found in 95 of 100 recordings.
-    pub tells: Vec<(Suspect, f64)>,
+    pub detectable: Vec<(Suspect, f64)>,
     /// Uncertainty budgets of the points, in order.
     pub budgets: Vec<PointBudgets>,
 }
@@ -116,11 +116,11 @@ pub fn identify_recording(
     let mut balances = likelihood(None);
     let mut faults = balances.as_ref().map(find).unwrap_or_default();
     let known: Vec<Option<EndState>> = states.iter().map(|state| state.as_ref().ok().copied()).collect();
-    let condemned = faults.iter().any(|fault| fault.touches_points)
+    let is_refused = faults.iter().any(|fault| fault.touches_points)
         || (0..known.len()).all(|step| objections.iter().any(|objection| objection.steps.contains(&step)));
     let together = |findings: &mut [Findings], alone: Vec<Estimate>, own_findings: Vec<Findings>| {
         let known = without_the_refused(known.clone(), &objections, findings);
-        joint::estimate(recording, &known, (alone, own_findings), config, condemned, findings)
+        joint::estimate(recording, &known, (alone, own_findings), config, is_refused, findings)
     };
     let (mut thermal, mut two_parameter, mut fitted) = (None, Vec::new(), None);
     let mut estimates: Vec<Estimate> = match config.method {
@@ -170,8 +170,8 @@ pub fn identify_recording(
     }
     let (points, budgets) = points_with_budgets(recording, states, &estimates, findings, config);
     let standard_errors = balances.map(|(likelihood, priors)| faults::standard_errors(&likelihood, &priors));
-    let tells = standard_errors.unwrap_or_default();
-    Ok(Identified { points, thermal, two_parameter, faults, tells, budgets })
+    let detectable = standard_errors.unwrap_or_default();
+    Ok(Identified { points, thermal, two_parameter, faults, detectable, budgets })
 }
 
 /// The points, and the budgets of those that there are.
@@ -311,7 +311,7 @@ pub(crate) fn point(
 /// Common errors of all points: of their numbers as the method reports them, of their position as declared.
 fn common_errors(state: &EndState, estimate: &Estimate, config: &IdentifyConfig) -> CommonErrors {
     let relative = |channel: Channel, reading: f64| {
-        let declared = config.declared.get(&channel).copied().unwrap_or_default();
+        let declared = config.sensor(channel);
         let relative = (declared.offset_sigma / reading).hypot(
             declared.gain_sigma_ratio * gain_error(channel, reading, config.rest_pressure_pa) / reading,
         );

@@ -34,7 +34,7 @@ pub use mapper_core::{Choice, JointSettings, SettleBands, WindowRule};
 pub use needs::{method_for, needs};
 pub use reduce::{KnownHeat, method_of_table, reduce};
 pub use single_step::expected::{DECLARED_INTERVAL_S, expected, expected_steady};
-pub use single_step::t2_course::{T2Course, t2_course};
+pub use single_step::t2_history::{T2History, t2_history};
 pub use step_data::humidity::with_measured_humidity;
 pub use step_data::samples::LONGEST_BRIDGE_S;
 pub use step_outcome::error::{IdentifyError, StepError};

@@ -1,9 +1,8 @@
-//! Points of a table of steady ones: the apparent efficiency, or the adiabatic one of a machine whose convection is known. A housing whose
-//! temperature was not measured has that of its heat balance, if T3 was.
+//! Identifies the points of a table of steady measurements: the apparent efficiency, or the adiabatic efficiency of a machine whose convection is
+//! known. A housing temperature that was not measured is that of the heat balance, if T3 was measured.
 //!
-//! Each source of uncertainty is moved by one standard deviation to both sides, and the efficiency is computed again.
+//! Each source of uncertainty is changed by one standard deviation to both sides, and the efficiency is computed again.
 
-use crate::config::coloured;
 use crate::identify::point;
 use crate::single_step::dynamic::{Estimate, judge_assumption};
 use crate::single_step::expected::DECLARED_INTERVAL_S;
@@ -12,8 +11,8 @@ use crate::step_data::end_state::EndState;
 use crate::step_outcome::findings::Findings;
 use crate::{IdentifyConfig, IdentifyError, single_step::budgets, step_outcome::interval_width};
 use mapper_core::{
-    BudgetRow, Channel, EstimateUncertainty, EtaSignal, IdentifiedPoint, MeasuredPoint, Method,
-    ModelTolerances, NoCompression, PointBudgets, ReferenceState, StepKind, StepMarker, Warning,
+    Channel, EstimateUncertainty, EtaSignal, IdentifiedPoint, MeasuredPoint, Method, ModelTolerances,
+    NoCompression, PointBudgets, ReferenceState, StepKind, StepMarker, Warning,
 };
 use mapper_numerics::root::root_between;
 use mapper_physics::compressor_map::one_point_map::OnePointMap;
@@ -32,7 +31,7 @@ pub struct KnownHeat<'a> {
     pub params: &'a Params,
     /// Standard uncertainties of its heat transfer and of the conditions around it.
     pub tolerances: ModelTolerances,
-    /// Conditions around it that a table may leave open: oil, cell, P4.
+    /// Conditions around it that a table may omit: oil, cell, P4.
     pub boundary: &'a BoundaryConditions,
     /// Origin of the law, for people: "declared in a.yaml".
     pub origin: &'a str,
@@ -53,7 +52,7 @@ pub fn reduce(
     Ok(measured.iter().enumerate().map(|(index, measured)| of_point(index, measured, heat, config)).collect())
 }
 
-/// What the points of a table allow: heat can be removed where the housing temperature, or T3 for its heat balance, was measured at every point.
+/// Method for the points of a table: heat is removed if the housing temperature, or T3 for its heat balance, was measured at every point.
 pub fn method_of_table(measured: &[MeasuredPoint], has_heat: bool) -> Method {
     match has_heat && measured.iter().all(|point| point.tc_k.or(point.turbine.t3_k).is_some()) {
         true => Method::Corrected,
@@ -134,7 +133,7 @@ fn estimate(
     let (mut rows, mut known_square) = (Vec::new(), 0.0_f64);
     for source in inputs.sources(heat, config) {
         let contribution = inputs.change(&source, eta);
-        if matches!(source.what, Moved::AlphaArea) {
+        if matches!(source.input, Input::AlphaArea) {
             judge_assumption(contribution, config, findings);
         } else {
             known_square += contribution * contribution;
@@ -147,14 +146,8 @@ fn estimate(
         if source.is_shared {
             estimate.common[0].push(contribution);
         }
-        rows.push(BudgetRow {
-            source: source.name,
-            standard_uncertainty: source.sigma,
-            unit: source.unit.to_owned(),
-            sensitivity: contribution / source.sigma,
-            contribution,
-            degrees_of_freedom: None,
-        });
+        let Source { name, sigma, unit, .. } = source;
+        rows.push(budgets::row(name, sigma, unit, contribution / sigma, contribution));
     }
     if known_square.sqrt() > config.thresholds.sigma_eta {
         let signal = EtaSignal::Settled { rise_k: t2_k - measured.t1_k };
@@ -180,7 +173,7 @@ fn estimate(
     estimate
 }
 
-/// All that the efficiency of a point depends on.
+/// Inputs of the efficiency of a point.
 #[derive(Debug, Clone, Copy)]
 struct Inputs {
     point: MeasuredPoint,
@@ -197,19 +190,19 @@ struct Machine {
     boundary: BoundaryConditions,
 }
 
-/// A source of uncertainty, one standard deviation.
+/// A source of uncertainty.
 struct Source {
     name: String,
     sigma: f64,
     unit: &'static str,
     /// Whether all points share the error.
     is_shared: bool,
-    what: Moved,
+    input: Input,
 }
 
-/// What an error moves.
+/// An input with an error.
 #[derive(Debug, Clone, Copy)]
-enum Moved {
+enum Input {
     Reading(Channel),
     /// By a ratio.
     Gain(Channel),
@@ -221,7 +214,7 @@ enum Moved {
     /// By a ratio: conduction to the oil and through the bearing housing.
     Bearing,
     /// By a ratio.
-    ExternalConvection,
+    CellConvection,
     OilTemperature,
     AmbientTemperature,
 }
@@ -248,13 +241,13 @@ impl Inputs {
         };
         // No balance holds far below the apparent efficiency, where the compressor takes more than the turbine can give.
         let lowest = match self.point.tc_k {
-            Some(_) => [ETA_BOUNDS.0; 1].to_vec(),
+            Some(_) => vec![ETA_BOUNDS.0],
             None => [0.95, 0.8, 0.6, 0.4].map(|share| (share * apparent).max(ETA_BOUNDS.0)).to_vec(),
         };
         lowest.into_iter().find_map(|lowest| root_between(lowest, ETA_BOUNDS.1, 1e-10, excess_k))
     }
 
-    /// The state of the machine with its housings at rest; `None` if they find no balance.
+    /// The state of the machine with settled housings; `None` if they do not settle.
     fn housing(&self, machine: &Machine, eta: f64) -> Option<State> {
         let MeasuredPoint { speed_rpm, p2_pa, tc_k, turbine, .. } = self.point;
         let at = |tc_k: f64| State::new(rad_s_of_rpm(speed_rpm), p2_pa, tc_k, tc_k, self.t2_k);
@@ -276,7 +269,7 @@ impl Inputs {
         (compressor.humidity_kg_kg, compressor.efficiency) = (self.air.humidity_kg_kg(), self.air.efficiency);
         (compressor.flow_scale_ratio, compressor.efficiency_scale_ratio) = (1.0, 1.0);
         let map = OnePointMap {
-            // At the state of the inlet itself corrected flow is measured flow; the wheel pumps what recirculates, too.
+            // At the state of the inlet itself corrected flow equals measured flow. The wheel also pumps the recirculated flow.
             reference: ReferenceState { t_ref_k: self.point.t1_k, p_ref_pa: self.point.p1_pa },
             flow_corrected_kg_s: self.point.flow_kg_s
                 * self.air.dry_flow_ratio()
@@ -290,63 +283,57 @@ impl Inputs {
 
     /// Change of the efficiency by one standard deviation of a source: mean of both sides, if both have an efficiency.
     fn change(&self, source: &Source, eta: f64) -> f64 {
-        let moved = |by: f64| self.moved(source.what, by).efficiency();
-        // An area of a share below 0 has no meaning: towards the middle, as all methods do.
+        let moved = |by: f64| self.moved(source.input, by).efficiency();
+        // A share below 0 has no meaning: change it towards the middle, as all methods do.
         let alpha = self.machine.map(|machine| machine.params.compressor.alpha_area_ratio);
-        let (above, below) = match source.what {
-            Moved::AlphaArea if alpha.is_some_and(|alpha| alpha > 0.5) => (None, moved(-source.sigma)),
-            Moved::AlphaArea => (moved(source.sigma), None),
+        let (above, below) = match source.input {
+            Input::AlphaArea if alpha.is_some_and(|alpha| alpha > 0.5) => (None, moved(-source.sigma)),
+            Input::AlphaArea => (moved(source.sigma), None),
             _ => (moved(source.sigma), moved(-source.sigma)),
         };
         match (above, below) {
             (Some(above), Some(below)) => 0.5 * (above - below),
             (Some(above), None) => above - eta,
             (None, Some(below)) => eta - below,
-            // An error that leaves no efficiency says nothing of it.
+            // No efficiency on either side: the error has no bound but the search range.
             (None, None) => ETA_BOUNDS.1,
         }
     }
 
     fn sources(&self, heat: Option<KnownHeat<'_>>, config: &IdentifyConfig) -> Vec<Source> {
         let mut sources = Vec::new();
-        let mut push = |name: String, sigma: f64, unit: &'static str, is_shared: bool, what: Moved| {
+        let mut push = |name: String, sigma: f64, unit: &'static str, is_shared: bool, input: Input| {
             if sigma > 0.0 {
-                sources.push(Source { name, sigma, unit, is_shared, what });
+                sources.push(Source { name, sigma, unit, is_shared, input });
             }
         };
-        let averaging = coloured(config.noise_colour)
-            .variance_of_mean(samples(config), config.thresholds.steady_mean_s)
-            .sqrt();
+        let averaging =
+            config.noise().variance_of_mean(samples(config), config.thresholds.steady_mean_s).sqrt();
         let is_balance = heat.is_some() && self.point.tc_k.is_none();
         let mut channels = vec![Channel::T1, Channel::T2, Channel::P1, Channel::P2];
         channels.extend(heat.is_some().then_some(Channel::CompressorFlow));
         channels.extend(heat.is_some().then_some(if is_balance { Channel::T3 } else { Channel::Tc }));
         for channel in channels {
-            let declared = config.declared.get(&channel).copied().unwrap_or_default();
+            let declared = config.sensor(channel);
             let unit = channel.unit();
-            push(format!("offset of {channel}"), declared.offset_sigma, unit, true, Moved::Reading(channel));
-            push(format!("gain of {channel}"), declared.gain_sigma_ratio, "1", true, Moved::Gain(channel));
+            push(format!("offset of {channel}"), declared.offset_sigma, unit, true, Input::Reading(channel));
+            push(format!("gain of {channel}"), declared.gain_sigma_ratio, "1", true, Input::Gain(channel));
             let noise = averaging * declared.noise_sigma;
-            push(format!("noise of {channel}"), noise, unit, false, Moved::Reading(channel));
+            push(format!("noise of {channel}"), noise, unit, false, Input::Reading(channel));
         }
-        push("barometer".to_owned(), config.barometer_sigma_pa, "Pa", true, Moved::Barometer);
+        push("barometer".to_owned(), config.barometer_sigma_pa, "Pa", true, Input::Barometer);
         if self.point.humidity_kg_kg.is_none() {
-            push("humidity".to_owned(), config.humidity_sigma_kg_kg, "kg/kg", true, Moved::Humidity);
+            push("humidity".to_owned(), config.humidity_sigma_kg_kg, "kg/kg", true, Input::Humidity);
         }
         if let Some(heat) = heat {
             let tolerances = heat.tolerances;
-            push("convection law".to_owned(), tolerances.convection_ratio, "1", true, Moved::Convection);
-            push("alpha_A".to_owned(), config.alpha_area_sigma_ratio, "1", true, Moved::AlphaArea);
+            push("convection law".to_owned(), tolerances.convection_ratio, "1", true, Input::Convection);
+            push("alpha_A".to_owned(), config.alpha_area_sigma_ratio, "1", true, Input::AlphaArea);
             for (name, sigma, unit, moved) in [
-                ("conduction to the oil", tolerances.oil_conductance_ratio, "1", Moved::Bearing),
-                (
-                    "convection to the cell",
-                    tolerances.external_convection_ratio,
-                    "1",
-                    Moved::ExternalConvection,
-                ),
-                ("oil temperature", tolerances.oil_temperature_k, "K", Moved::OilTemperature),
-                ("ambient temperature", tolerances.ambient_temperature_k, "K", Moved::AmbientTemperature),
+                ("conduction to the oil", tolerances.oil_conductance_ratio, "1", Input::Bearing),
+                ("convection to the cell", tolerances.external_convection_ratio, "1", Input::CellConvection),
+                ("oil temperature", tolerances.oil_temperature_k, "K", Input::OilTemperature),
+                ("ambient temperature", tolerances.ambient_temperature_k, "K", Input::AmbientTemperature),
             ] {
                 if is_balance {
                     push(name.to_owned(), sigma, unit, true, moved);
@@ -356,23 +343,23 @@ impl Inputs {
         sources
     }
 
-    fn moved(&self, what: Moved, by: f64) -> Inputs {
+    fn moved(&self, input: Input, by: f64) -> Inputs {
         let mut moved = *self;
-        let reading = match what {
-            Moved::Reading(channel) | Moved::Gain(channel) => moved.reading(channel),
+        let reading = match input {
+            Input::Reading(channel) | Input::Gain(channel) => moved.reading(channel),
             _ => None,
         };
-        match (what, reading) {
-            (Moved::Reading(_), Some(reading)) => *reading += by,
-            (Moved::Gain(_), Some(reading)) => *reading *= 1.0 + by,
-            (Moved::Barometer, _) => {
+        match (input, reading) {
+            (Input::Reading(_), Some(reading)) => *reading += by,
+            (Input::Gain(_), Some(reading)) => *reading *= 1.0 + by,
+            (Input::Barometer, _) => {
                 moved.point.p1_pa += by;
                 moved.point.p2_pa += by;
             }
-            (Moved::Humidity, _) => moved.air = moved.air.with_humidity(moved.air.humidity_kg_kg() + by),
-            (what, _) => {
+            (Input::Humidity, _) => moved.air = moved.air.with_humidity(moved.air.humidity_kg_kg() + by),
+            (input, _) => {
                 if let Some(machine) = &mut moved.machine {
-                    machine.move_by(what, by);
+                    machine.move_by(input, by);
                 }
             }
         }
@@ -394,23 +381,23 @@ impl Inputs {
 }
 
 impl Machine {
-    fn move_by(&mut self, what: Moved, by: f64) {
+    fn move_by(&mut self, input: Input, by: f64) {
         let Machine { params, boundary } = self;
-        match what {
+        match input {
             // One law of both housings.
-            Moved::Convection => {
+            Input::Convection => {
                 params.compressor.nusselt_coefficient *= 1.0 + by;
                 params.turbine.nusselt_coefficient *= 1.0 + by;
             }
-            Moved::AlphaArea => params.compressor.alpha_area_ratio += by,
-            Moved::Bearing => {
+            Input::AlphaArea => params.compressor.alpha_area_ratio += by,
+            Input::Bearing => {
                 params.bearing.conductivity_w_mk *= 1.0 + by;
                 params.bearing.oil_conductance_w_k *= 1.0 + by;
             }
-            Moved::ExternalConvection => params.external_convection_ratio *= 1.0 + by,
-            Moved::OilTemperature => boundary.oil_temperature_k += by,
-            Moved::AmbientTemperature => boundary.ambient_temperature_k += by,
-            Moved::Reading(_) | Moved::Gain(_) | Moved::Barometer | Moved::Humidity => {}
+            Input::CellConvection => params.external_convection_ratio *= 1.0 + by,
+            Input::OilTemperature => boundary.oil_temperature_k += by,
+            Input::AmbientTemperature => boundary.ambient_temperature_k += by,
+            Input::Reading(_) | Input::Gain(_) | Input::Barometer | Input::Humidity => {}
         }
     }
 }

@@ -126,7 +126,7 @@ fn faults_are_found_and_named_and_none_is_invented() {
         let drawn = drawn(*seed);
         let fault_free = found(&drawn, &drawn.recording);
         let tellable: Vec<(usize, Suspect, f64)> = fault_free
-            .tells
+            .detectable
             .iter()
             .enumerate()
             .filter(|(index, _)| *index < additive().count())

@@ -1,7 +1,6 @@
 //! Readings at the end of a step, and derivatives with respect to them.
 
 use crate::IdentifyConfig;
-use crate::config::coloured;
 use crate::objections::ends::Ends;
 use mapper_core::{Channel, Recording};
 use mapper_physics::gas::air::Air;
@@ -114,9 +113,9 @@ impl Readings {
 
 /// Standard errors of the readings at a step's end from the declared noise, [`CHANNELS`].
 pub(crate) fn noise(config: &IdentifyConfig, recording: &Recording) -> PerChannel {
-    let (colour, last_s) = (coloured(config.noise_colour), config.thresholds.steady_mean_s);
+    let (colour, last_s) = (config.noise(), config.thresholds.steady_mean_s);
     CHANNELS.map(|channel| {
-        let sigma = config.declared.get(&channel).map_or(0.0, |declared| declared.noise_sigma);
+        let sigma = config.sensor(channel).noise_sigma;
         let samples =
             recording.series.get(&channel).zip(recording.steps.last()).map_or(1, |(series, step)| {
                 series.range((step.end_s - last_s).max(step.start_s), step.end_s).len()

@@ -46,9 +46,27 @@ pub(crate) fn likelihood(
     config: &IdentifyConfig,
     nominal: Option<&NominalRig<'_>>,
 ) -> Option<(Likelihood, Priors)> {
+    let all = all_readings(recording, ends, config.rest_pressure_pa)?;
+    let readings: Vec<Readings> = all.iter().flatten().copied().collect();
+    let opening = |(end, readings): (&Option<Ends>, &Option<Readings>)| {
+        Some((end.as_ref()?.valve_opening_ratio, (*readings)?))
+    };
+    let opened: Vec<(f64, Readings)> = ends.iter().zip(&all).filter_map(opening).collect();
+    let noise = end_readings::noise(config, recording);
+    let reference = config.reference;
+    let mut balances: Vec<Rows> = Vec::new();
+    balances.extend(balances::valve::rows(&opened, &noise, nominal));
+    balances.extend(balances::head::rows(&readings, &noise, reference, nominal));
+    let used: Vec<bool> = all.iter().map(Option::is_some).collect();
+    balances.extend(balances::housing::rows(recording, config, &used));
+    balances.extend(fitted.and_then(|fitted| balances::efficiency::rows(fitted, &all, reference, nominal)));
+    if let Some(nominal) = nominal {
+        balances.extend(fitted.and_then(|fitted| balances::convection::rows(fitted, &all, config, nominal)));
+        balances.extend(balances::conditions::rows(recording, &all, config, nominal));
+    }
     let priors = priors(config, nominal);
     let mut likelihood = Likelihood::new(priors.always.len() + priors.hypotheses.len());
-    for rows in balances(recording, ends, fitted, config, nominal)? {
+    for rows in balances {
         // A balance without a density gives no evidence.
         let _ = likelihood.add(&rows.balance());
     }
@@ -129,38 +147,8 @@ pub(crate) fn all_readings(
     Some(ends.iter().enumerate().map(of).collect())
 }
 
-fn balances(
-    recording: &Recording,
-    ends: &[Option<Ends>],
-    fitted: Option<&FittedEfficiencies>,
-    config: &IdentifyConfig,
-    nominal: Option<&NominalRig<'_>>,
-) -> Option<Vec<Rows>> {
-    let all = all_readings(recording, ends, config.rest_pressure_pa)?;
-    let readings: Vec<Readings> = all.iter().flatten().copied().collect();
-    let used = ends.iter().zip(&all).filter_map(|(end, readings)| Some((end.as_ref()?, (*readings)?)));
-    let opened: Vec<(f64, Readings)> =
-        used.map(|(end, readings)| (end.valve_opening_ratio, readings)).collect();
-    let noise = end_readings::noise(config, recording);
-    let reference = config.reference;
-    let mut balances: Vec<Rows> = Vec::new();
-    balances.extend(balances::valve::rows(&opened, &noise, nominal));
-    balances.extend(balances::head::rows(&readings, &noise, reference, nominal));
-    balances.extend(balances::housing::rows(
-        recording,
-        config,
-        &all.iter().map(Option::is_some).collect::<Vec<_>>(),
-    ));
-    balances.extend(fitted.and_then(|fitted| balances::efficiency::rows(fitted, &all, reference, nominal)));
-    if let Some(nominal) = nominal {
-        balances.extend(fitted.and_then(|fitted| balances::convection::rows(fitted, &all, config, nominal)));
-        balances.extend(balances::conditions::rows(recording, &all, config, nominal));
-    }
-    Some(balances)
-}
-
 fn priors(config: &IdentifyConfig, nominal: Option<&NominalRig<'_>>) -> Priors {
-    let declared = |channel: &Channel| config.declared.get(channel).copied().unwrap_or_default();
+    let declared = |channel: &Channel| config.sensor(*channel);
     let gain = |channel: &Channel| match (declared(channel).gain_sigma_ratio, nominal) {
         (0.0, Some(nominal)) if *channel == Channel::CompressorFlow => {
             nominal.tolerances.flow_meter_gain_ratio

@@ -65,7 +65,7 @@ impl Places {
     }
 }
 
-/// Whether a point has a position at all.
+/// Whether the coefficients of a point are valid.
 pub(crate) fn is_on_a_map(readings: &Readings) -> bool {
     let (flow, head) = coefficients(readings);
     flow > 0.0 && head > 0.0 && (flow + head).is_finite()

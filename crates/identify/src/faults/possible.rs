@@ -1,8 +1,8 @@
 //! Widens intervals by the faults that the balances neither show nor exclude.
 //!
-//! If no fault is found, each fault still has a probability, and a size if it is true. The interval of a number covers what it is without a fault
-//! and what it is with each single fault that is not excluded. Where the balances determine a fault well, nothing changes. Without a declared
-//! machine they determine few, and the intervals are valid for sensors as declared.
+//! Even if no fault is found, each fault has a probability and a size. The interval of a number covers its value without a fault and its value
+//! with each single fault that is not excluded. A fault that the balances determine well changes nothing. Without a declared machine they
+//! determine few faults, and the intervals are valid for sensors as declared.
 
 use crate::IdentifyConfig;
 use crate::faults::balance_rows::Rows;
@@ -22,7 +22,7 @@ use mapper_inference::singles::Single;
 use nalgebra::DVector;
 
 /// A fault that is not excluded.
-struct Possible {
+struct PossibleFault {
     /// Its size: mean and standard deviation.
     size: (f64, f64),
     /// Its effects on efficiency and on ln h, per unit of the size.
@@ -42,12 +42,12 @@ pub(crate) fn widen(
     let possible = |single: Single| {
         let Suspect::Sensor(fault) = suspect(single.index) else { return None };
         let effect = |rows: &Rows| rows.by_fault(&fault);
-        (single.odds > MIN_WEIGHT).then(|| Possible {
+        (single.odds > MIN_WEIGHT).then(|| PossibleFault {
             size: (single.value, single.sigma),
             effects: [effect(&etas), effect(&ln_hs)],
         })
     };
-    let possible: Vec<Possible> = likelihood.singles(priors)?.into_iter().filter_map(possible).collect();
+    let possible: Vec<PossibleFault> = likelihood.singles(priors)?.into_iter().filter_map(possible).collect();
     let positions = fitted.positions.iter().filter(|position| readings[**position].is_some());
     for (row, position) in positions.enumerate() {
         widen_one(estimates.get_mut(*position)?, &possible, row);
@@ -55,7 +55,7 @@ pub(crate) fn widen(
     Some(())
 }
 
-fn widen_one(estimate: &mut Estimate, possible: &[Possible], row: usize) -> Option<()> {
+fn widen_one(estimate: &mut Estimate, possible: &[PossibleFault], row: usize) -> Option<()> {
     let intervals = estimate.intervals?;
     let (eta, h_w_m2k) = (estimate.eta.as_mut()?, estimate.h_w_m2k.as_mut()?);
     let mut widened = intervals;
@@ -81,11 +81,8 @@ fn widen_one(estimate: &mut Estimate, possible: &[Possible], row: usize) -> Opti
         estimate.common[which].push(added.copysign(shift));
         if added > 0.0 {
             let unit = ["1", "W/(m2 K)"][which];
-            estimate.budgets[which].push(own_row(
-                "faults that are not excluded",
-                added.copysign(shift),
-                unit,
-            ));
+            let row = own_row("faults that are not excluded", added.copysign(shift), unit);
+            estimate.budgets[which].push(row);
         }
         widened[which] = after;
     }

@@ -24,7 +24,7 @@ pub(crate) const ANY_ROUGHNESS: f64 = 4e-3;
 pub(crate) struct At {
     /// Corrected speed, scaled to the points, -1 to 1.
     pub(crate) speed: f64,
-    /// Angle from the axis of heads, likewise.
+    /// Angle from the axis of heads, scaled to the points, -1 to 1.
     pub(crate) angle: f64,
     /// `(middle speed/speed)^2 - 1`.
     pub(crate) slowness: f64,

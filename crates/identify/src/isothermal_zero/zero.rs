@@ -6,7 +6,6 @@
 //! diagnosis of the whole machine.
 
 use crate::IdentifyConfig;
-use crate::config::coloured;
 use crate::isothermal_zero::relaxation;
 use crate::single_step::expected::DECLARED_INTERVAL_S;
 use mapper_core::{Channel, DeclaredUncertainty, Recording, Series, Soak, StepMarker};
@@ -157,7 +156,7 @@ pub fn isothermal_zero(
                     limit_k_min: settings.drift_k_min,
                 });
             }
-            let declared = config.declared.get(channel).copied().unwrap_or_default();
+            let declared = config.sensor(*channel);
             let mut mean = reading.mean;
             let mut own = sigma.hypot(sigma_of_mean(declared.noise_sigma, end_s - start_s, config));
             // The housing reaches the cell's temperature last, and its drift is below the threshold.
@@ -245,11 +244,11 @@ pub fn expected_after_zero(
     pressure_pa: f64,
 ) -> IdentifyConfig {
     config.rest_pressure_pa = pressure_pa;
-    let stretch_s = soak_s.min(settings.longest_s);
+    let used_s = soak_s.min(settings.longest_s);
     for (channels, sigma) in groups(settings) {
         for channel in channels {
             let Some(declared) = config.declared.get(channel).copied() else { continue };
-            let averaged = sigma_of_mean(declared.noise_sigma, stretch_s, &config);
+            let averaged = sigma_of_mean(declared.noise_sigma, used_s, &config);
             let error = match channel {
                 Channel::Tc => {
                     expected_limit_error(declared.noise_sigma, soak_s, &config, settings).unwrap_or(averaged)
@@ -263,12 +262,11 @@ pub fn expected_after_zero(
     config
 }
 
-/// Standard error of the mean over `stretch_s` of a reading with the standard deviation `noise_sigma`. The white part of the noise averages
+/// Standard error of the mean over `used_s` of a reading with the standard deviation `noise_sigma`. The white part of the noise averages
 /// over hundreds of samples.
-fn sigma_of_mean(noise_sigma: f64, stretch_s: f64, config: &IdentifyConfig) -> f64 {
-    let colour = coloured(config.noise_colour);
-    noise_sigma
-        * variance_of_mean(colour.first_order_variance_ratio(), stretch_s, colour.time_constant_s).sqrt()
+fn sigma_of_mean(noise_sigma: f64, used_s: f64, config: &IdentifyConfig) -> f64 {
+    let colour = config.noise();
+    noise_sigma * variance_of_mean(colour.first_order_variance_ratio(), used_s, colour.time_constant_s).sqrt()
 }
 
 /// Channels that read the same at standstill, and the non-uniformity of each group.
@@ -312,14 +310,13 @@ fn housing_limit(
     for block in 0..((end_s - first_s) / BLOCK_S) as usize {
         let from_s = first_s + block as f64 * BLOCK_S;
         let (_, values) = series.slice(from_s, from_s + BLOCK_S);
-        let usable: Vec<f64> =
-            values.iter().copied().filter(|value| is_reading(Channel::Tc, *value)).collect();
+        let usable = usable(Channel::Tc, values);
         let Some(mean) = mean(&usable) else { continue };
         t_s.push(from_s + 0.5 * BLOCK_S);
         means.push(mean);
         fewest = fewest.min(usable.len());
     }
-    let variance = coloured(config.noise_colour).variance_of_mean(fewest, BLOCK_S);
+    let variance = config.noise().variance_of_mean(fewest, BLOCK_S);
     relaxation::limit(&t_s, &means, noise_sigma * variance.sqrt())
 }
 
@@ -338,7 +335,7 @@ fn expected_limit_error(
         .map(|block| soak_s - used_s + (block as f64 + 0.5) * BLOCK_S)
         .collect();
     let samples = (BLOCK_S / DECLARED_INTERVAL_S) as usize;
-    let variance = coloured(config.noise_colour).variance_of_mean(samples, BLOCK_S);
+    let variance = config.noise().variance_of_mean(samples, BLOCK_S);
     let relaxing: Vec<f64> = t_s.iter().map(|t_s| relaxation::usual_k(*t_s)).collect();
     relaxation::limit(&t_s, &relaxing, noise_sigma * variance.sqrt()).map(|(_, error)| error)
 }
@@ -360,6 +357,11 @@ fn common(readings: &[Reading]) -> f64 {
     readings.iter().map(|reading| reading.mean * reading.total.powi(-2)).sum::<f64>() / weight
 }
 
+/// The plausible readings among some values.
+fn usable(channel: Channel, values: &[f64]) -> Vec<f64> {
+    values.iter().copied().filter(|value| is_reading(channel, *value)).collect()
+}
+
 struct SoakMean {
     mean: f64,
     drift_per_min: f64,
@@ -369,11 +371,7 @@ struct SoakMean {
 fn soak_mean(recording: &Recording, channel: Channel, start_s: f64, end_s: f64) -> Option<SoakMean> {
     let series: &Series = recording.series.get(&channel)?;
     let third_s = (end_s - start_s) / 3.0;
-    let of = |start_s: f64, end_s: f64| {
-        let (_, values) = series.slice(start_s, end_s);
-        let usable: Vec<f64> = values.iter().copied().filter(|value| is_reading(channel, *value)).collect();
-        mean(&usable)
-    };
+    let of = |start_s: f64, end_s: f64| mean(&usable(channel, series.slice(start_s, end_s).1));
     let (early, late) = (of(start_s, start_s + third_s)?, of(end_s - third_s, end_s)?);
     Some(SoakMean { mean: of(start_s, end_s)?, drift_per_min: (late - early) / (2.0 * third_s / 60.0) })
 }

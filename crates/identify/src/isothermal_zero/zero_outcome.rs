@@ -14,13 +14,13 @@ pub enum ZeroOutcome {
     Refused(NoZero),
     /// No zero was requested.
     #[default]
-    NotAsked,
+    NotRequested,
 }
 
 impl ZeroOutcome {
     /// Searches for the zero of a recording, if one was requested.
     pub fn of(recording: &Recording, config: &IdentifyConfig, settings: Option<ZeroSettings>) -> Self {
-        let Some(settings) = settings else { return ZeroOutcome::NotAsked };
+        let Some(settings) = settings else { return ZeroOutcome::NotRequested };
         isothermal_zero(recording, config, &settings).map_or_else(ZeroOutcome::Refused, ZeroOutcome::Found)
     }
 
@@ -31,10 +31,10 @@ impl ZeroOutcome {
 
     /// Subtracts the offsets from a recording, and declares their remaining uncertainty in the configuration; both are unchanged if no zero
     /// was found.
-    pub fn take_off(&self, recording: Recording, config: IdentifyConfig) -> (Recording, IdentifyConfig) {
+    pub fn subtract(&self, recording: Recording, config: IdentifyConfig) -> (Recording, IdentifyConfig) {
         match self {
             ZeroOutcome::Found(zero) => zeroed(recording, config, zero),
-            ZeroOutcome::Refused(_) | ZeroOutcome::NotAsked => (recording, config),
+            ZeroOutcome::Refused(_) | ZeroOutcome::NotRequested => (recording, config),
         }
     }
 }
@@ -49,7 +49,7 @@ impl Serialize for ZeroOutcome {
         match self {
             ZeroOutcome::Found(zero) => zero.serialize(serializer),
             ZeroOutcome::Refused(reason) => Refused { refused: reason.to_string() }.serialize(serializer),
-            ZeroOutcome::NotAsked => serializer.serialize_unit(),
+            ZeroOutcome::NotRequested => serializer.serialize_unit(),
         }
     }
 }

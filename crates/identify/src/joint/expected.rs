@@ -4,7 +4,6 @@
 //! and everything that the steps share: the Fisher information of all steps together.
 
 use crate::IdentifyConfig;
-use crate::config::coloured;
 use crate::joint::Fitted;
 use crate::joint::fit::start::{self, START_S};
 use crate::joint::step_model::rows::{COARSER, Row, StepRows, block_s_after, place};
@@ -96,5 +95,5 @@ fn row(expected: &ForecastRow, noise: BlockNoise, config: &IdentifyConfig) -> Ro
 }
 
 fn noise(block_s: f64, config: &IdentifyConfig) -> BlockNoise {
-    BlockNoise::of_mean(coloured(config.noise_colour), block_s / DECLARED_INTERVAL_S, block_s)
+    BlockNoise::of_mean(config.noise(), block_s / DECLARED_INTERVAL_S, block_s)
 }

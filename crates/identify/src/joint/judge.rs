@@ -3,7 +3,7 @@
 use crate::IdentifyConfig;
 use crate::joint::fit::solve::{Member, Problem};
 use crate::joint::step_model::parameters::{ETA, LN_DEVIATION};
-use crate::joint::uncertainty::smoothness::{Judged, Smoothed};
+use crate::joint::uncertainty::smoothness::{Smoothed, SmoothedValue};
 use crate::step_outcome::findings::Findings;
 use crate::step_outcome::interval_width;
 use mapper_core::{EstimateUncertainty, LeftOut, ModelDoubt, ModelEvidence, PoorFit, Warning};
@@ -102,7 +102,7 @@ pub(crate) fn doubts(problem: &Problem<'_>, smoothed: &Smoothed, config: &Identi
     if scatter > LAW_SCATTER_RATIO {
         doubts.push(ModelEvidence::Scatter { scatter_ratio: scatter });
     }
-    let above = |judged: &&Judged| {
+    let above = |judged: &&SmoothedValue| {
         judged.value - HINT_SIGMAS * judged.uncertainty.combined_standard_error() > HIGHEST_EFFICIENCY
     };
     let above = smoothed.eta.iter().filter(above).count();

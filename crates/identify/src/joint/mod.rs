@@ -16,7 +16,8 @@ use crate::faults::balances::efficiency::FittedEfficiencies;
 use crate::joint::fit::refinements::{Gain, Refinements};
 use crate::joint::fit::solve::{Covariance, Problem};
 use crate::joint::step_model::parameters::{INLET, PROBE_MM2, SHARED};
-use crate::joint::uncertainty::smoothness::{Judged, Smoothed};
+use crate::joint::step_model::rows::{Row, StepRows};
+use crate::joint::uncertainty::smoothness::{Smoothed, SmoothedValue};
 use crate::single_step::dynamic::Estimate;
 use crate::step_data::end_state::EndState;
 use crate::step_outcome::findings::Findings;
@@ -49,13 +50,13 @@ pub(crate) struct Joint {
 }
 
 /// Identifies all steps. `end_states` and `findings`: one for each step; a step without an end state gets no estimate. `alone`: each step fitted
-/// alone, with its findings. `condemned`: the readings are refused already, so other explanations are not searched.
+/// alone, with its findings. `is_refused`: the readings are refused already, so other explanations are not searched.
 pub(crate) fn estimate(
     recording: &Recording,
     end_states: &[Option<EndState>],
     alone: (Vec<Estimate>, Vec<Findings>),
     config: &IdentifyConfig,
-    condemned: bool,
+    is_refused: bool,
     findings: &mut [Findings],
 ) -> Joint {
     let (alone, own_findings) = alone;
@@ -68,7 +69,7 @@ pub(crate) fn estimate(
     }
     let steps = fit::start::steps(recording, end_states, config, findings);
     let attempt = match Attempt::new(&steps, &alone, config, &[]) {
-        Some(first) if !condemned && !first.thermal.doubts.is_empty() => {
+        Some(first) if !is_refused && !first.thermal.doubts.is_empty() => {
             Some(first.without_a_region(&steps, &alone, config).unwrap_or(first))
         }
         first => first,
@@ -87,7 +88,7 @@ pub(crate) fn estimate(
     let mut estimates = vec![Estimate::default(); recording.steps.len()];
     for (i, (member, step)) in problem.members.iter().zip(&steps).enumerate() {
         let own = &mut findings[step.position];
-        let (Judged { value: eta, uncertainty: eta_error, interval, .. }, ln_h) =
+        let (SmoothedValue { value: eta, uncertainty: eta_error, interval, .. }, ln_h) =
             (smoothed.eta[i], smoothed.ln_h[i]);
         let fitted_h_w_m2k = problem.setting.h_at_end(&step.end, &problem.shared, &member.local).0;
         let h_w_m2k = fitted_h_w_m2k * ln_h.value.exp();
@@ -101,9 +102,7 @@ pub(crate) fn estimate(
             continue;
         }
         let (first, last) = (step.rows.first(), step.rows.last());
-        let change = |read: fn(&step_model::rows::Row) -> f64| {
-            first.zip(last).map(|(first, last)| read(last) - read(first))
-        };
+        let change = |read: fn(&Row) -> f64| first.zip(last).map(|(first, last)| read(last) - read(first));
         let prediction =
             problem.setting.predict(&member.course, &problem.shared, &member.local, &[false; SHARED], false);
         let residual =
@@ -163,7 +162,7 @@ struct Attempt<'a> {
 impl<'a> Attempt<'a> {
     /// `barred`: indices of steps excluded from the shared parameters.
     fn new(
-        steps: &'a [step_model::rows::StepRows],
+        steps: &'a [StepRows],
         alone: &[Estimate],
         config: &IdentifyConfig,
         barred: &[usize],
@@ -185,7 +184,7 @@ impl<'a> Attempt<'a> {
     /// The fit without the region of the map that disagrees most, if any.
     fn without_a_region(
         &self,
-        steps: &'a [step_model::rows::StepRows],
+        steps: &'a [StepRows],
         alone: &[Estimate],
         config: &IdentifyConfig,
     ) -> Option<Self> {
@@ -219,15 +218,11 @@ struct Fitted {
 }
 
 /// Fits, estimates noise and spreads from the fit, excludes steps that fit far worse, fits again, and evaluates the parameters with a prior.
-fn fitted(
-    problem: &mut Problem<'_>,
-    steps: &[step_model::rows::StepRows],
-    config: &IdentifyConfig,
-) -> Option<Fitted> {
+fn fitted(problem: &mut Problem<'_>, steps: &[StepRows], config: &IdentifyConfig) -> Option<Fitted> {
     for _ in 0..ROUNDS {
         problem.minimise_roughly()?;
         fit::start::refine(problem, steps, config)?;
-        problem.explained = fit::input_noise::explained(problem, steps, config);
+        problem.input_noise = fit::input_noise::input_noise(problem, steps, config);
         judge::exclude(problem, config);
         // A probe on its bound may leave it with better weights.
         problem.active[PROBE_MM2] = problem.probe_fitted;
@@ -251,12 +246,7 @@ impl Fitted {
     }
 
     /// The numbers of all points of the problem, with their errors.
-    fn smoothed(
-        &self,
-        problem: &Problem<'_>,
-        steps: &[step_model::rows::StepRows],
-        config: &IdentifyConfig,
-    ) -> Smoothed {
+    fn smoothed(&self, problem: &Problem<'_>, steps: &[StepRows], config: &IdentifyConfig) -> Smoothed {
         let known = self.refined.as_ref().map(|(refinements, gain)| (refinements, gain));
         uncertainty::smoothness::smoothed(problem, &self.covariance, known, steps, config.reference)
     }

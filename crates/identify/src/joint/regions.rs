@@ -1,7 +1,7 @@
-//! Finds a region of the map whose steps disagree with the others on the shared parameters, so that it does not condemn the recording.
+//! Finds a region of the map whose steps disagree with the others on the shared parameters, so that they do not invalidate the recording.
 //!
-//! It runs if the fit of all steps has warnings. A region is one end of the map (near choke, near surge, slowest, fastest). It is left out if
-//! the warnings disappear without it, and if the shared parameters change by more than their own uncertainty explains. Without an error,
+//! The search runs if the fit of all steps has warnings. A region is one end of the map (near choke, near surge, slowest, fastest). It is excluded if
+//! the warnings disappear without it and the shared parameters change by more than their own uncertainty explains. Without an error,
 //! the remaining steps only carry less information: the variance of the difference is then the difference of the variances (Hausman,
 //! Econometrica 46, 1978, eq. 2.10).
 
@@ -13,7 +13,7 @@ use crate::joint::step_model::surface::SurfaceScale;
 use mapper_core::{MapRegion, ReferenceState};
 use mapper_numerics::statistics::{EXCLUDE_SIGMAS, MIN_VALUES};
 
-/// Shares of the steps in a region; the smallest one that helps is left out.
+/// Shares of the steps in a region; the smallest one that helps is excluded.
 const SHARES: [f64; 2] = [1.0 / 6.0, 1.0 / 3.0];
 
 /// Steps at one end of the map.
@@ -48,9 +48,9 @@ pub(crate) fn regions(steps: &[StepRows], reference: ReferenceState) -> Vec<Vec<
     let of_size = |share: f64| {
         let count = (share * steps.len() as f64).ceil() as usize;
         ends.iter()
-            .map(|(region, of)| Region {
-                region: *region,
-                steps: sorted(*of).into_iter().take(count).collect(),
+            .map(|(region, of)| {
+                let steps = sorted(*of).into_iter().take(count).collect();
+                Region { region: *region, steps }
             })
             .collect()
     };

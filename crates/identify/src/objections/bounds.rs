@@ -33,11 +33,11 @@ pub(crate) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
         return found;
     }
     let apparent = |end: &Ends| end.isentropic_rise_k() / (end.t2_k - end.t1_k);
-    // A turbine may be driven by cold gas, or by gas as warm as the compressor's outlet. Hot gas that is read as T2 is warmer than any
-    // compressor makes it.
-    let exchanged =
+    // A turbine may be driven by cold gas, or by gas as warm as the compressor's outlet. Hot gas that is read as T2 is warmer than the
+    // outlet of any compressor.
+    let swapped =
         |end: &&&Ends| end.t3_k.is_some_and(|t3_k| end.t2_k > t3_k) && apparent(end) < *MIDDLE.start();
-    if 2 * known.iter().filter(exchanged).count() > known.len() {
+    if 2 * known.iter().filter(swapped).count() > known.len() {
         found.push(Objection::new(Warning::SwappedChannels(Swapped::T2AboveT3), all()));
     }
     let judged: Vec<&&Ends> = known.iter().filter(|end| end.isentropic_rise_k() > MIN_RISE_K).collect();

@@ -55,7 +55,7 @@ pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
         lags_s.iter().filter(|(_, lag_s)| (lag_s - middle_s).abs() > LATE_S).map(|(channel, lag_s)| {
             let (lag_s, jumps) = (lag_s - middle_s, jumps_s.len());
             let late = Warning::LateChannel { channel: *channel, lag_s, jumps };
-            Objection::new(late, (0..steps.len()).collect())
+            Objection::to_all(late, recording)
         });
     found.extend(late);
     found
@@ -70,7 +70,7 @@ fn housing_jumps(recording: &Recording, jumps_s: &[f64]) -> Option<Objection> {
     let (t2_k, tc_k) = (jump_k(Channel::T2)?, jump_k(Channel::Tc)?);
     (tc_k > 2.0 * t2_k).then(|| {
         let swapped = Swapped::TcBeforeT2 { tc_jump_k: tc_k, t2_jump_k: t2_k };
-        Objection::new(Warning::SwappedChannels(swapped), (0..recording.steps.len()).collect())
+        Objection::to_all(Warning::SwappedChannels(swapped), recording)
     })
 }
 

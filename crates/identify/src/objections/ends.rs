@@ -1,6 +1,6 @@
 //! The readings at the end of each step, when everything but the housing has settled.
 
-use crate::{IdentifyConfig, step_data::taps};
+use crate::IdentifyConfig;
 use mapper_core::{Channel, Recording};
 use mapper_numerics::statistics::median;
 use mapper_observe::plausible::is_reading;
@@ -52,8 +52,8 @@ pub(crate) fn ends(recording: &Recording, config: &IdentifyConfig) -> Vec<Option
                 median(values.iter().filter(|value| is_reading(channel, **value)))
             };
             let (flow_kg_s, t1_k, t2_k) = (at(Channel::CompressorFlow)?, at(Channel::T1)?, at(Channel::T2)?);
-            let p1_pa = taps::total_pa(config.inlet_tap, at(Channel::P1)?, flow_kg_s, t1_k);
-            let p2_pa = taps::total_pa(config.outlet_tap, at(Channel::P2)?, flow_kg_s, t2_k);
+            let p1_pa = config.inlet_tap.total_pa(at(Channel::P1)?, flow_kg_s, t1_k);
+            let p2_pa = config.outlet_tap.total_pa(at(Channel::P2)?, flow_kg_s, t2_k);
             let end = Ends {
                 position,
                 end_s: step.end_s,

@@ -59,7 +59,7 @@ fn of_channel(
     let pairs = series.values.len().saturating_sub(1);
     let equal = series.values.windows(2).filter(|pair| pair[0] == pair[1]).count();
     let coarse = (equal - in_runs) as f64 > COARSE_SHARE * (pairs - in_runs).max(1) as f64;
-    let noisy = config.declared.get(&channel).is_some_and(|declared| declared.noise_sigma > 0.0);
+    let noisy = config.sensor(channel).noise_sigma > 0.0;
     // Controlled inlet conditions may be constant.
     let inlet = matches!(channel, Channel::P1 | Channel::T1);
     let over_a_jump = |run: &Run| {

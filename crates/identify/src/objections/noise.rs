@@ -32,7 +32,7 @@ pub(crate) fn objections(recording: &Recording, config: &IdentifyConfig) -> Vec<
                 return None;
             }
             let noisy = Warning::NoisyChannel { channel, noise: found, declared_noise: declared };
-            Some(Objection::new(noisy, (0..recording.steps.len()).collect()))
+            Some(Objection::to_all(noisy, recording))
         })
         .collect()
 }

@@ -1,6 +1,6 @@
 //! A failed check of the readings.
 
-use mapper_core::Warning;
+use mapper_core::{Recording, Warning};
 
 /// A failed check of the readings, and the steps that depend on them.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,5 +16,10 @@ pub(crate) struct Objection {
 impl Objection {
     pub(crate) fn new(warning: Warning, steps: Vec<usize>) -> Self {
         Objection { warning, steps, samples_left_out: false }
+    }
+
+    /// An objection to all steps of a recording.
+    pub(crate) fn to_all(warning: Warning, recording: &Recording) -> Self {
+        Objection::new(warning, (0..recording.steps.len()).collect())
     }
 }

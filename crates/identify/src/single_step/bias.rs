@@ -36,23 +36,15 @@ pub(crate) fn declared_effect(
     for channel in Row::CHANNELS {
         let Some(declared) = config.declared.get(&channel) else { continue };
         let sensitivity = sensitivity(fit, samples, geometry, channel);
-        let read = |change_k: Vec<f64>| {
-            // The probe's lag does not act on its own offset.
-            let change_k = if channel == Channel::T2 { change_k } else { fit.read(change_k) };
-            fit.response(&change_k)
-        };
-        let responses = [
-            read(sensitivity.iter().map(|s| s * declared.offset_sigma).collect()),
-            read(
-                sensitivity
-                    .iter()
-                    .zip(&samples.rows)
-                    .map(|(s, row)| s * row.read(channel) * declared.gain_sigma_ratio)
-                    .collect(),
-            ),
-        ];
-        for (response, sigma) in responses.into_iter().zip([declared.offset_sigma, declared.gain_sigma_ratio])
+        let rows = || sensitivity.iter().zip(&samples.rows);
+        let by_offset_k = rows().map(|(s, _)| s * declared.offset_sigma).collect();
+        let by_gain_k = rows().map(|(s, row)| s * row.read(channel) * declared.gain_sigma_ratio).collect();
+        for (change_k, sigma) in
+            [(by_offset_k, declared.offset_sigma), (by_gain_k, declared.gain_sigma_ratio)]
         {
+            // The probe's lag does not act on its own offset.
+            let change_k: Vec<f64> = if channel == Channel::T2 { change_k } else { fit.read(change_k) };
+            let response = fit.response(&change_k);
             squares[0] += response[0] * response[0];
             squares[1] += response[1] * response[1];
             if sigma > 0.0 {
@@ -82,7 +74,7 @@ pub(crate) fn declared_effect(
         effect.push(response);
     }
     if config.internal_area_sigma_ratio > 0.0 {
-        // h times the area is what the recording determines.
+        // A recording determines only h times the area.
         let by_area = -config.internal_area_sigma_ratio * fit.h_w_m2k;
         squares[1] += by_area * by_area;
         effect.push([0.0, by_area]);

@@ -1,23 +1,27 @@
 //! Uncertainty budgets of a point.
 
 use crate::IdentifyConfig;
-use crate::config::coloured;
 use crate::single_step::dynamic::Estimate;
 use mapper_core::{
     BudgetRow, Channel, EstimateUncertainty, IdentifiedPoint, PointBudgets, UncertaintyBudget, half_width_95,
 };
 use mapper_physics::rig::sensor_fault::gain_error;
 
-/// A source that is known in the unit of the number only.
-pub(crate) fn own_row(source: &str, contribution: f64, unit: &str) -> BudgetRow {
+/// A source with its standard uncertainty in its unit.
+pub(crate) fn row(source: String, sigma: f64, unit: &str, sensitivity: f64, contribution: f64) -> BudgetRow {
     BudgetRow {
-        source: source.to_owned(),
-        standard_uncertainty: contribution.abs(),
+        source,
+        standard_uncertainty: sigma,
         unit: unit.to_owned(),
-        sensitivity: 1.0_f64.copysign(contribution),
+        sensitivity,
         contribution,
         degrees_of_freedom: None,
     }
+}
+
+/// A source that is known in the unit of the number only.
+pub(crate) fn own_row(source: &str, contribution: f64, unit: &str) -> BudgetRow {
+    row(source.to_owned(), contribution.abs(), unit, 1.0_f64.copysign(contribution), contribution)
 }
 
 /// The budgets of a point from its estimate. `samples`: number of samples that its state is the mean of.
@@ -59,20 +63,13 @@ fn pressure_ratio(
     let mut rows = Vec::new();
     let mut push = |source: String, sigma: f64, unit: &str, sensitivity: f64| {
         if sigma > 0.0 {
-            rows.push(BudgetRow {
-                source,
-                standard_uncertainty: sigma,
-                unit: unit.to_owned(),
-                sensitivity,
-                contribution: sensitivity * sigma,
-                degrees_of_freedom: None,
-            });
+            rows.push(row(source, sigma, unit, sensitivity, sensitivity * sigma));
         }
     };
     for (channel, reading_pa, by_reading) in
         [(Channel::P1, p1_pa, -ratio / p1_pa), (Channel::P2, p2_pa, ratio / p2_pa)]
     {
-        let declared = config.declared.get(&channel).copied().unwrap_or_default();
+        let declared = config.sensor(channel);
         push(format!("offset of {channel}"), declared.offset_sigma, "Pa", by_reading);
         push(
             format!("gain of {channel}"),
@@ -80,8 +77,7 @@ fn pressure_ratio(
             "1",
             by_reading * gain_error(channel, reading_pa, config.rest_pressure_pa),
         );
-        let colour = coloured(config.noise_colour);
-        let mean = colour.variance_of_mean(samples(channel), config.thresholds.end_mean_s).sqrt();
+        let mean = config.noise().variance_of_mean(samples(channel), config.thresholds.end_mean_s).sqrt();
         push(format!("noise of {channel}"), declared.noise_sigma * mean, "Pa", by_reading);
     }
     push("barometer".to_owned(), config.barometer_sigma_pa, "Pa", (1.0 - ratio) / p1_pa);

@@ -6,9 +6,8 @@
 //! in the result.
 
 use crate::NoiseColour;
-use crate::config::coloured;
 use crate::single_step::fit::{Fit, dot, products};
-use mapper_numerics::coloured_noise::correlate;
+use mapper_numerics::coloured_noise::{ColouredNoise, correlate};
 use nalgebra::Matrix2;
 
 /// Variances of the two parts of the residual, K2.
@@ -20,8 +19,7 @@ pub(crate) struct NoiseVariances {
 
 impl NoiseVariances {
     /// Splits a total variance, K2, as declared.
-    pub(crate) fn split(total_k2: f64, colour: NoiseColour) -> Self {
-        let noise = coloured(colour);
+    pub(crate) fn split(total_k2: f64, noise: ColouredNoise) -> Self {
         NoiseVariances {
             white_k2: noise.white_variance_ratio() * total_k2,
             first_order_k2: noise.first_order_variance_ratio() * total_k2,

@@ -1,6 +1,5 @@
 //! The dynamic method (Burke et al., section 3): efficiency and heat-transfer coefficient from the transient.
 
-use crate::config::coloured;
 use crate::single_step::bias::{DeclaredEffect, declared_effect};
 use crate::single_step::covariance::{Correlation, NoiseVariances};
 use crate::single_step::fit::{Fit, Geometry, fit};
@@ -142,8 +141,7 @@ fn uncertainties(
     let correlation = Correlation::of(fit, &samples.times_s(), config.noise_colour);
     let found = correlation.standard_errors();
     // A short residual may have less noise than the sensors.
-    let expected =
-        correlation.standard_errors_for(NoiseVariances::split(declared.noise_k2, config.noise_colour));
+    let expected = correlation.standard_errors_for(NoiseVariances::split(declared.noise_k2, config.noise()));
     let moving = drift.map_or([0.0; 2], |drift| [drift.eta, drift.h_w_m2k]);
     let assumed = [0, 1].map(|i| moving[i].hypot(declared.assumed_alpha[i]));
     [0, 1].map(|i| EstimateUncertainty {
@@ -205,7 +203,7 @@ fn judge_residual(view: &View<'_>, dt2_k: Option<f64>, findings: &mut Findings) 
     }
     let (rms_k, slow_k) = (fit.residual_rms_k(), slow_rms_k(fit, view.samples));
     // Three standard deviations of the noise that remains in block means.
-    let colour = coloured(view.config.noise_colour);
+    let colour = view.config.noise();
     let remains =
         variance_of_mean(colour.first_order_variance_ratio(), STRUCTURE_BLOCK_S, colour.time_constant_s);
     let structure_k = DOUBT_SIGMAS * remains.sqrt() * noise_k;

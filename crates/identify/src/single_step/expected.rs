@@ -22,7 +22,7 @@ pub fn expected(rows: &[ForecastRow], interval_s: f64, config: &IdentifyConfig) 
     let geometry = Geometry::of(config);
     let fit = fit(&samples, geometry)?;
     let declared = declared_effect(&fit, &samples, geometry, config);
-    let mut noise = NoiseVariances::split(declared.noise_k2, config.noise_colour);
+    let mut noise = NoiseVariances::split(declared.noise_k2, config.noise());
     noise.white_k2 *= (DECLARED_INTERVAL_S / interval_s).min(1.0);
     let [eta, h] = Correlation::of(&fit, &samples.times_s(), config.noise_colour).standard_errors_for(noise);
     let [offset_eta, offset_h] = declared.bias_standard_errors;

@@ -2,7 +2,7 @@
 //! with eqs. 1-3 of the paper and the measured T1, Tc, flow and pressure ratio, read through the declared probe.
 
 use crate::IdentifyConfig;
-use crate::single_step::probe_reading::{Followed, Probe};
+use crate::single_step::probe_reading::{Probe, ProbeResponse};
 use crate::step_data::samples::{Row, Samples};
 use mapper_core::{Bound, InletConvection};
 use mapper_numerics::least_squares::{Damping, DampingRule, MAX_ITERATIONS};
@@ -66,7 +66,7 @@ pub(crate) struct Fit {
     /// Derivative of the gas's own T2 by h, K m2 K/W.
     pub(crate) gas_by_h: Vec<f64>,
     /// Response of the probe to the gas; `None` without inertia.
-    pub(crate) followed: Option<Followed>,
+    pub(crate) probe_response: Option<ProbeResponse>,
     /// `(J'J)^-1`.
     pub(crate) inverse_normal: Matrix2<f64>,
 }
@@ -74,8 +74,8 @@ pub(crate) struct Fit {
 impl Fit {
     /// The probe's response to a change of the gas's T2.
     pub(crate) fn read(&self, gas_change_k: Vec<f64>) -> Vec<f64> {
-        match &self.followed {
-            Some(followed) => followed.read(&gas_change_k),
+        match &self.probe_response {
+            Some(probe_response) => probe_response.read(&gas_change_k),
             None => gas_change_k,
         }
     }
@@ -125,14 +125,14 @@ pub(crate) fn t2_k(geometry: Geometry, row: &Row, eta: f64, h_w_m2k: f64) -> f64
 fn residual_k(
     samples: &Samples,
     geometry: Geometry,
-    followed: Option<&Followed>,
+    probe_response: Option<&ProbeResponse>,
     [eta, h_w_m2k]: [f64; 2],
 ) -> Vec<f64> {
     let gas_k: Vec<f64> = samples.rows.iter().map(|row| t2_k(geometry, row, eta, h_w_m2k)).collect();
-    let read_k = followed.map_or_else(|| gas_k.clone(), |followed| followed.read(&gas_k));
+    let read_k = probe_response.map_or_else(|| gas_k.clone(), |probe_response| probe_response.read(&gas_k));
     let mut residual_k: Vec<f64> = samples.rows.iter().zip(&read_k).map(|(row, b)| row.t2_k - b).collect();
-    if let Some(followed) = followed {
-        followed.without_first_reading(&mut residual_k);
+    if let Some(probe_response) = probe_response {
+        probe_response.without_first_reading(&mut residual_k);
     }
     residual_k
 }
@@ -142,10 +142,10 @@ pub(crate) fn fit(samples: &Samples, geometry: Geometry) -> Option<Fit> {
     if samples.len() < 3 {
         return None;
     }
-    let followed = Followed::of(samples, geometry.probe);
-    let residual = |at: [f64; 2]| residual_k(samples, geometry, followed.as_ref(), at);
+    let probe_response = ProbeResponse::of(samples, geometry.probe);
+    let residual = |at: [f64; 2]| residual_k(samples, geometry, probe_response.as_ref(), at);
     let at = start(samples, geometry);
-    let mut best = linearised(samples, geometry, followed.clone(), at, residual(at))?;
+    let mut best = linearised(samples, geometry, probe_response.clone(), at, residual(at))?;
     let mut damping = Damping::new(DampingRule::GOOD_START);
     for _ in 0..MAX_ITERATIONS {
         let cost = square(&best.residual_k);
@@ -163,7 +163,7 @@ pub(crate) fn fit(samples: &Samples, geometry: Geometry) -> Option<Fit> {
         };
         let Some((to, there)) = damping.search(trial) else { break };
         let decrease = cost - square(&there);
-        best = linearised(samples, geometry, followed.clone(), to, there)?;
+        best = linearised(samples, geometry, probe_response.clone(), to, there)?;
         if decrease <= ROUNDING * cost {
             break;
         }
@@ -192,7 +192,7 @@ fn right(jacobian: &[Vec<f64>; 2], column: &[f64]) -> Vector2<f64> {
 fn linearised(
     samples: &Samples,
     geometry: Geometry,
-    followed: Option<Followed>,
+    probe_response: Option<ProbeResponse>,
     [eta, h_w_m2k]: [f64; 2],
     residual_k: Vec<f64>,
 ) -> Option<Fit> {
@@ -210,14 +210,14 @@ fn linearised(
         jacobian[1].push(by_h);
     }
     let gas_by_h = jacobian[1].clone();
-    if let Some(followed) = &followed {
+    if let Some(probe_response) = &probe_response {
         for column in &mut jacobian {
-            *column = followed.read(column);
-            followed.without_first_reading(column);
+            *column = probe_response.read(column);
+            probe_response.without_first_reading(column);
         }
     }
     let inverse_normal = inverted(products(&jacobian, &jacobian))?;
-    Some(Fit { eta, h_w_m2k, residual_k, jacobian, gas_by_h, followed, inverse_normal })
+    Some(Fit { eta, h_w_m2k, residual_k, jacobian, gas_by_h, probe_response, inverse_normal })
 }
 
 /// Inverse of a symmetric positive definite matrix; `None` if it is numerically singular.

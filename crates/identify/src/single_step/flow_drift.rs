@@ -18,7 +18,7 @@ pub(crate) struct FlowDrift {
     pub(crate) h_w_m2k: f64,
 }
 
-/// Estimates the error of a fit with constant h if h really followed the correlation of Appendix A: the fit's response to the T2 change from
+/// Estimates the error of a fit with constant h if h follows the correlation of Appendix A: the fit's response to the T2 change from
 /// the variable h. Only the change of h matters, not the level of the correlation.
 pub(crate) fn flow_drift(fit: &Fit, samples: &Samples, end_s: f64) -> Option<FlowDrift> {
     let rows = &samples.rows;

@@ -10,4 +10,4 @@ pub(crate) mod flow_drift;
 pub(crate) mod probe;
 pub(crate) mod probe_reading;
 pub(crate) mod steady;
-pub(crate) mod t2_course;
+pub(crate) mod t2_history;

@@ -18,7 +18,7 @@ pub(crate) struct Probe {
 
 /// The probe response over the rows of a window.
 #[derive(Debug, Clone)]
-pub(crate) struct Followed {
+pub(crate) struct ProbeResponse {
     lags: Vec<Lag>,
     /// Remaining share of the first reading at each row.
     memory: Vec<f64>,
@@ -26,7 +26,7 @@ pub(crate) struct Followed {
     memory_square: f64,
 }
 
-impl Followed {
+impl ProbeResponse {
     /// `None` for a probe without inertia, which reads the gas temperature.
     pub(crate) fn of(samples: &Samples, probe: Probe) -> Option<Self> {
         if probe.diameter_m <= 0.0 || samples.len() < 2 {
@@ -36,7 +36,7 @@ impl Followed {
         let lags = lags(rows, probe.diameter_m, probe.pipe_diameter_m);
         let memory = follow(&lags, 1.0, &vec![0.0; samples.len()]);
         let memory_square = memory.iter().map(|share| share * share).sum();
-        Some(Followed { lags, memory, memory_square })
+        Some(ProbeResponse { lags, memory, memory_square })
     }
 
     /// Response of the probe to a time history of the gas, without the contribution of its first reading.

@@ -3,7 +3,6 @@
 //! Heat between gas and housing counts as work here. The dynamic method avoids the resulting error of the adiabatic efficiency (fig. 5 of the
 //! paper).
 
-use crate::config::coloured;
 use crate::single_step::dynamic::{Estimate, enough};
 use crate::step_data::cleaning::without_spikes;
 use crate::step_data::samples::{Row, Samples, slope_per_s};
@@ -127,7 +126,7 @@ pub(crate) fn uncertainty(
     let scatter = standard_deviation(&etas).unwrap_or(0.0).powi(2);
     let ends = samples.rows.first().zip(samples.rows.last());
     let span_s = ends.map_or(0.0, |(first, last)| last.t_s - first.t_s);
-    let averaging = coloured(config.noise_colour).variance_of_mean(etas.len(), span_s);
+    let averaging = config.noise().variance_of_mean(etas.len(), span_s);
     let noise_square = scatter.max(declared_square) * averaging;
     let bias_square: f64 = common.iter().map(|change: &f64| change * change).sum();
     let uncertainty = EstimateUncertainty {

@@ -34,7 +34,7 @@ pub(crate) fn cleaned(mut samples: Samples, config: &IdentifyConfig, findings: &
             spikes += usize::from(kept[index]);
             kept[index] = false;
         }
-        let noisy = config.declared.get(&channel).is_some_and(|declared| declared.noise_sigma > 0.0);
+        let noisy = config.sensor(channel).noise_sigma > 0.0;
         if !noisy {
             continue;
         }

@@ -1,24 +1,24 @@
 //! The commands of a step: whether they begin with a jump, and when they settle.
 //!
-//! A closed loop that holds the speed keeps moving P3 a little. That counts neither as a jump nor as unsettled.
+//! A closed loop that holds the speed changes P3 slightly all the time. Such a change is no jump, and the command counts as settled.
 
 use mapper_core::{Channel, Recording, StepMarker};
 use mapper_numerics::ROUNDING;
 
-/// Share of the final P3 within which a loop is holding it: the housings' slow warming needs no more.
+/// Share of the final P3 within which a loop holds it: larger than the correction for the slow warming of the housings.
 const TRIM_RATIO: f64 = 5e-3;
 
 /// Gap to the previous step above which the previous command is not the starting point, s.
-const LEADS_ON_S: f64 = 60.0;
+const MAX_GAP_S: f64 = 60.0;
 
 /// Whether a command changes by more than rounding; an unknown one does not.
 fn changed(before: f64, after: f64) -> bool {
     (after - before).abs() > ROUNDING * before.abs().max(after.abs())
 }
 
-/// Whether the step at `position` of `steps` begins with a change of what was commanded.
+/// Whether the step at `position` of `steps` begins with a change of a command.
 ///
-/// The first step has none, unless its marker has the previous command.
+/// The first step does so only if its marker has the previous command.
 pub(crate) fn begins_with_jump(steps: &[StepMarker], position: usize) -> bool {
     let Some(step) = steps.get(position) else { return false };
     if let (Some(from), Some(to)) = (step.from, step.to) {
@@ -26,7 +26,7 @@ pub(crate) fn begins_with_jump(steps: &[StepMarker], position: usize) -> bool {
     }
     let before = position.checked_sub(1).and_then(|before| steps.get(before));
     before.is_some_and(|before| {
-        step.start_s - before.end_s <= LEADS_ON_S
+        step.start_s - before.end_s <= MAX_GAP_S
             && (changed(before.p3_pa, step.p3_pa)
                 || changed(before.valve_opening_ratio, step.valve_opening_ratio))
     })
@@ -34,7 +34,7 @@ pub(crate) fn begins_with_jump(steps: &[StepMarker], position: usize) -> bool {
 
 /// Time of the last change of P3 and valve commands within the step (its start if none is recorded), s. Changes of P3 count until it stays
 /// within [`TRIM_RATIO`] of its last value.
-pub(crate) fn at_rest_s(recording: &Recording, step: &StepMarker) -> f64 {
+pub(crate) fn settled_s(recording: &Recording, step: &StepMarker) -> f64 {
     let mut settled_s = step.start_s;
     for channel in [Channel::P3Command, Channel::ValveCommand] {
         let Some(series) = recording.series.get(&channel) else { continue };

@@ -2,7 +2,7 @@
 
 use crate::step_data::cleaning::SPIKE_SIGMAS;
 use crate::step_outcome::findings::Findings;
-use crate::{IdentifyConfig, StepError, step_data::taps};
+use crate::{IdentifyConfig, StepError};
 use mapper_core::{Channel, Recording, Series, StepMarker, Warning};
 use mapper_numerics::statistics::{mean, median, robust_sigma};
 use mapper_observe::plausible::is_reading;
@@ -24,12 +24,13 @@ pub(crate) fn end_state(
     config: &IdentifyConfig,
     findings: &mut Findings,
 ) -> Result<EndState, StepError> {
+    let no_state =
+        |channel| StepError::NoState { step: step.index, start_s: step.start_s, end_s: step.end_s, channel };
     let mut at = |channel: Channel| -> Result<f64, StepError> {
         let series = recording.series.get(&channel);
         let seconds = config.thresholds.end_mean_s;
-        let (value, last_s) = series.and_then(|series| last_mean(channel, series, step, seconds)).ok_or(
-            StepError::NoState { step: step.index, start_s: step.start_s, end_s: step.end_s, channel },
-        )?;
+        let last = series.and_then(|series| last_mean(channel, series, step, seconds));
+        let (value, last_s) = last.ok_or_else(|| no_state(channel))?;
         if last_s < step.end_s - 2.0 * seconds {
             findings.doubt(Warning::EndState { channel, lost_before_end_s: step.end_s - last_s });
         }
@@ -37,18 +38,13 @@ pub(crate) fn end_state(
     };
     let (speed_rpm, flow_kg_s) = (at(Channel::ShaftSpeed)?, at(Channel::CompressorFlow)?);
     let (t1_k, t2_k) = (at(Channel::T1)?, at(Channel::T2)?);
-    let p1_pa = taps::total_pa(config.inlet_tap, at(Channel::P1)?, flow_kg_s, t1_k);
-    let p2_pa = taps::total_pa(config.outlet_tap, at(Channel::P2)?, flow_kg_s, t2_k);
+    let p1_pa = config.inlet_tap.total_pa(at(Channel::P1)?, flow_kg_s, t1_k);
+    let p2_pa = config.outlet_tap.total_pa(at(Channel::P2)?, flow_kg_s, t2_k);
     let state = EndState { speed_rpm, flow_kg_s, t1_k, p1_pa, pressure_ratio: p2_pa / p1_pa };
     // The correction of a static tap is unbounded.
     for (channel, value) in [(Channel::P1, p1_pa), (Channel::P2, p2_pa)] {
         if !is_reading(channel, value) {
-            return Err(StepError::NoState {
-                step: step.index,
-                start_s: step.start_s,
-                end_s: step.end_s,
-                channel,
-            });
+            return Err(no_state(channel));
         }
     }
     Ok(state)

@@ -15,7 +15,7 @@ pub fn with_measured_humidity(recording: &Recording, config: &IdentifyConfig) ->
         let values = &recording.series.get(&channel)?.values;
         let running: Vec<f64> =
             values.iter().copied().filter(|value| check_running(channel, *value).is_ok()).collect();
-        let declared = config.declared.get(&channel).copied().unwrap_or_default();
+        let declared = config.sensor(channel);
         let value = mean(running.iter().copied())?;
         let noise = declared.noise_sigma / (running.len() as f64).sqrt();
         Some((value, noise.hypot(declared.offset_sigma).hypot(declared.gain_sigma_ratio * value)))

@@ -5,5 +5,4 @@ pub(crate) mod commands;
 pub(crate) mod end_state;
 pub(crate) mod humidity;
 pub(crate) mod samples;
-pub(crate) mod taps;
 pub(crate) mod window;

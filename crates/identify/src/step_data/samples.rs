@@ -1,7 +1,6 @@
 //! The samples of a window on one time base, total pressures, complete rows only.
 
 use crate::IdentifyConfig;
-use crate::step_data::taps;
 use mapper_core::{Channel, Recording, Series, Window};
 use mapper_numerics::statistics::mean;
 use mapper_observe::plausible::is_reading;
@@ -109,8 +108,8 @@ impl Samples {
         let flow_kg_s = column(Channel::CompressorFlow);
         for i in 0..t_s.len() {
             let (t1_k, tc_k, flow_kg_s, t2_k) = (t1_k[i], tc_k[i], flow_kg_s[i], t2_k[i]);
-            let p1_pa = taps::total_pa(config.inlet_tap, p1_pa[i], flow_kg_s, t1_k);
-            let p2_pa = taps::total_pa(config.outlet_tap, p2_pa[i], flow_kg_s, t2_k);
+            let p1_pa = config.inlet_tap.total_pa(p1_pa[i], flow_kg_s, t1_k);
+            let p2_pa = config.outlet_tap.total_pa(p2_pa[i], flow_kg_s, t2_k);
             let rise_ratio = f64::NAN;
             let row = Row { t_s: t_s[i], t1_k, t2_k, tc_k, p1_pa, p2_pa, flow_kg_s, rise_ratio };
             let row = row.compressing(config.air);

@@ -21,10 +21,10 @@ pub(crate) fn choose(
 }
 
 fn fixed(step: &StepMarker, start_s: f64, end_s: f64, findings: &mut Findings) -> Option<Window> {
-    let asked_end_s = step.start_s + end_s;
-    let window = Window { start_s: step.start_s + start_s, end_s: asked_end_s.min(step.end_s) };
+    let wanted_s = step.start_s + end_s;
+    let window = Window { start_s: step.start_s + start_s, end_s: wanted_s.min(step.end_s) };
     // A millisecond of tolerance: step times of other loggers are rounded.
-    if window.end_s + 1e-3 < asked_end_s {
+    if window.end_s + 1e-3 < wanted_s {
         let step_s = step.end_s - step.start_s;
         findings.remark(Warning::WindowCut { requested_end_s: end_s, step_s });
     }
@@ -37,7 +37,7 @@ fn settled(
     bands: &SettleBands,
     findings: &mut Findings,
 ) -> Option<Window> {
-    let Rest { slowest, settled_s, earliest_s, whole } = rest(recording, step, bands)?;
+    let Settling { slowest, settled_s, earliest_s, whole } = settling(recording, step, bands)?;
     let end_s = step.end_s;
     let start_s = if whole { earliest_s } else { end_s - settled_s };
     if end_s - start_s >= WindowRule::SHORTEST_S {
@@ -54,7 +54,7 @@ fn settled(
 }
 
 /// Settling of an operating point.
-pub(crate) struct Rest {
+pub(crate) struct Settling {
     /// The quantity that settles last.
     pub(crate) slowest: &'static str,
     /// How long it has been settled at the step's end, s.
@@ -66,13 +66,13 @@ pub(crate) struct Rest {
 }
 
 /// Checks a step from its end backwards; `None` for a step that ends before the earliest time.
-pub(crate) fn rest(recording: &Recording, step: &StepMarker, bands: &SettleBands) -> Option<Rest> {
-    let earliest_s = commands::at_rest_s(recording, step) + WindowRule::EARLIEST_S;
+pub(crate) fn settling(recording: &Recording, step: &StepMarker, bands: &SettleBands) -> Option<Settling> {
+    let earliest_s = commands::settled_s(recording, step) + WindowRule::EARLIEST_S;
     let end_s = step.end_s;
     if end_s.is_nan() || earliest_s.is_nan() || earliest_s >= end_s {
         return None;
     }
-    // Absurd step times have no more blocks than samples.
+    // Limits the number of blocks if the step times are wrong.
     let samples = recording.series.get(&Channel::ShaftSpeed).map_or(1, |series| series.t_s.len());
     let block_count = (((end_s - earliest_s) / BLOCK_S).floor() as usize).clamp(1, samples.max(1));
     let blocks = |channel| block_medians(recording.series.get(&channel), end_s, block_count);
@@ -88,7 +88,7 @@ pub(crate) fn rest(recording: &Recording, step: &StepMarker, bands: &SettleBands
         })
         .min_by_key(|(_, blocks)| *blocks)?;
     let settled_s = settled_blocks as f64 * BLOCK_S;
-    Some(Rest { slowest, settled_s, earliest_s, whole: settled_blocks == block_count })
+    Some(Settling { slowest, settled_s, earliest_s, whole: settled_blocks == block_count })
 }
 
 /// Medians over blocks counted backwards from `end_s`; NaN for a block without values.

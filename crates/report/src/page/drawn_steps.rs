@@ -5,7 +5,7 @@ use crate::page::drawn_map::rounded;
 use crate::page::run_page::RunPage;
 use mapper_campaign::units::Kind;
 use mapper_core::{Channel, Recording, StepMarker};
-use mapper_identify::T2Course;
+use mapper_identify::T2History;
 use mapper_numerics::statistics::{mean, rms};
 use serde::Serialize;
 
@@ -94,7 +94,7 @@ fn drawn_step(recording: &Recording, marker: &StepMarker, display: &Display) -> 
     }
 }
 
-fn drawn_model(course: &T2Course, marker: &StepMarker, display: &Display) -> DrawnModel {
+fn drawn_model(course: &T2History, marker: &StepMarker, display: &Display) -> DrawnModel {
     let rows = course.t_s.len().min(ROWS);
     let bin = |row: usize| row * course.t_s.len() / rows.max(1)..(row + 1) * course.t_s.len() / rows.max(1);
     let column = |values: &[f64]| -> Vec<f64> {

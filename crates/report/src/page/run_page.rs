@@ -2,7 +2,7 @@
 
 use crate::RunReport;
 use mapper_core::CompressorMap;
-use mapper_identify::T2Course;
+use mapper_identify::T2History;
 use maud::Markup;
 
 /// The content of the page.
@@ -10,7 +10,7 @@ pub struct RunPage<'a> {
     /// The content that it shares with the Markdown report.
     pub report: &'a RunReport<'a>,
     /// T2 computed from the numbers of each point.
-    pub courses: &'a [T2Course],
+    pub courses: &'a [T2History],
     /// The diagnosis of the gap to the nominal model, if there is one.
     pub gap: Option<Markup>,
     /// Maps for comparison.

@@ -11,7 +11,7 @@ pub const ZERO_HEADS: [&str; 4] = ["sensor", "subtracted", "known within +/-", "
 /// A sentence with the result or the reason for its absence; `None` if no zero was requested.
 pub fn zero_words(zero: &ZeroOutcome) -> Option<String> {
     match zero {
-        ZeroOutcome::NotAsked => None,
+        ZeroOutcome::NotRequested => None,
         ZeroOutcome::Refused(reason) => {
             Some(format!("No isothermal zero: {reason}. The declared offsets stand."))
         }
@@ -48,7 +48,7 @@ fn offset_sigma(zero: &IsothermalZero, channel: Channel) -> f64 {
 /// Offsets subtracted from the readings with their uncertainties, or the reason for their absence; empty if no zero was requested.
 pub fn zero_text(zero: &ZeroOutcome) -> String {
     match zero {
-        ZeroOutcome::NotAsked => String::new(),
+        ZeroOutcome::NotRequested => String::new(),
         ZeroOutcome::Refused(reason) => {
             format!("\nno isothermal zero: {reason}. The declared offsets stand.\n")
         }

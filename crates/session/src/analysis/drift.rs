@@ -39,7 +39,7 @@ impl Session<'_> {
                 return Ok(Drift {
                     report: DriftReport::without_verdict(reason),
                     sensors: Vec::new(),
-                    zero: ZeroOutcome::NotAsked,
+                    zero: ZeroOutcome::NotRequested,
                 });
             }
         }
@@ -84,11 +84,11 @@ fn subtract_first_zero(
     config: IdentifyConfig,
     campaign: &Campaign,
 ) -> (Vec<Recording>, IdentifyConfig, ZeroOutcome) {
-    let zero = recordings.first().map_or(ZeroOutcome::NotAsked, |first| {
+    let zero = recordings.first().map_or(ZeroOutcome::NotRequested, |first| {
         ZeroOutcome::of(first, &config, campaign.zero.map(Into::into))
     });
     let recordings =
-        recordings.into_iter().map(|recording| zero.take_off(recording, config.clone()).0).collect();
+        recordings.into_iter().map(|recording| zero.subtract(recording, config.clone()).0).collect();
     // Declared offsets are kept: they are not drift. The zero determines them far better than the model, whose own errors would appear as
     // changes.
     (recordings, config, zero)

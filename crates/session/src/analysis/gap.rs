@@ -182,7 +182,7 @@ impl Session<'_> {
             let settings = |soak: Soak| ZeroSettings { allows_a_fault: true, ..soak.into() };
             let zero = ZeroOutcome::of(&recording, &config, campaign.zero.map(settings));
             let off_at_rest = rest_offsets(&zero, &config.declared);
-            let (recording, zeroed) = zero.take_off(recording, config.clone());
+            let (recording, zeroed) = zero.subtract(recording, config.clone());
             let declared = Declared {
                 sensors: zeroed.declared,
                 noise_colour: map.noise_colour.unwrap_or_default(),

@@ -220,8 +220,8 @@ impl Session<'_> {
         let first = fused.recordings.first().ok_or(SessionError::NoRecording)?;
         let zero = ZeroOutcome::of(first, &fused.config, soak.map(Into::into));
         remarks.extend(campaign.filter(|_| soak.is_none()).and_then(|_| unused_rest(first, &fused.config)));
-        let (_, config) = zero.take_off(Recording::default(), fused.config.clone());
-        let off = |recording: Recording| zero.take_off(recording, fused.config.clone()).0;
+        let (_, config) = zero.subtract(Recording::default(), fused.config.clone());
+        let off = |recording: Recording| zero.subtract(recording, fused.config.clone()).0;
         let (recording, origins) = join_recordings(fused.recordings.into_iter().map(off).collect());
         let config = with_measured_humidity(&recording, &config);
         let declared = campaign.filter(|campaign| campaign.tolerances_declared);

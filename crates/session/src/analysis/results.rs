@@ -12,7 +12,7 @@ use mapper_campaign::units::Kind;
 use mapper_core::{
     CompressorMap, ExportError, IdentifiedPoint, MapUnits, Method, Plan, ResultRemark, RunEnding,
 };
-use mapper_identify::{T2Course, t2_course};
+use mapper_identify::{T2History, t2_history};
 use mapper_maps::{MapFit, MapFitOptions, RepeatedJump};
 use mapper_recording::{ChannelMap, ReadOptions, ReadWarning, read_recording};
 use mapper_report::page::{OtherRun, RunPage, gap_part, run_page};
@@ -374,8 +374,8 @@ fn page_of(
     others: &[OtherRun<'_>],
     gap: Option<&Gap>,
 ) -> Result<String, SessionError> {
-    let course = |point: &IdentifiedPoint| t2_course(&identified.recording, point, &identified.config);
-    let courses: Vec<T2Course> = identified.points_alone().filter_map(course).collect();
+    let course = |point: &IdentifiedPoint| t2_history(&identified.recording, point, &identified.config);
+    let courses: Vec<T2History> = identified.points_alone().filter_map(course).collect();
     let gap = gap.map(|gap| gap_part(&gap.diagnosed));
     Ok(run_page(&RunPage { report, courses: &courses, gap, others })?)
 }

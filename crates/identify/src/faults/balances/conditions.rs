@@ -57,7 +57,7 @@ pub(crate) fn rows(
         let offset_sigma = match CHANNELS.contains(&channel) {
             // These are parameters of all balances.
             true => 0.0,
-            false => config.declared.get(&channel).map_or(0.0, |declared| declared.offset_sigma),
+            false => config.sensor(channel).offset_sigma,
         };
         let by_reading = CHANNELS.map(|other| f64::from(u8::from(other == channel)));
         (count > 0).then(|| Rows {

@@ -12,7 +12,6 @@
 //! uncertainty.
 
 use crate::IdentifyConfig;
-use crate::config::coloured;
 use crate::faults::balance_rows::{Rows, common, own};
 use crate::faults::end_readings::{CHANNELS, MAX_STEPS, PerChannel, Readings, span_s};
 use crate::step_data::samples::{Row, Samples, slope_per_s};
@@ -27,7 +26,7 @@ const MAX_PARTS: usize = 8;
 /// Usable range of the share of T2 that follows the housing.
 const SHARES: std::ops::RangeInclusive<f64> = 0.02..=0.95;
 /// Closure error of a balance, W.
-const LACKS_W: f64 = 10.0;
+const CLOSURE_ERROR_W: f64 = 10.0;
 /// Difference of T2 and Tc in a housing with more than one temperature, one standard deviation, K: 1 K is three of it.
 const UNEVEN_K: f64 = 0.35;
 /// The same for the part that develops over the run as it warms up, K: a housing of two walls makes up to 3 K.
@@ -53,7 +52,7 @@ struct Part {
 impl Part {
     /// Effect of area before the wheel in addition to its distance from T1, per share of it, K: compression amplifies that heat, and the slope
     /// of T2 over Tc includes it with the heat after the wheel.
-    fn carried_on_k(&self) -> f64 {
+    fn inlet_gain_k(&self) -> f64 {
         (self.t2_k - self.t1_k) / self.t1_k * (self.t2_k - self.tc_k)
     }
 }
@@ -91,14 +90,14 @@ pub(crate) fn rows(recording: &Recording, config: &IdentifyConfig, used: &[bool]
         (column(&|part| part.tc_k - middle_k), ANY_LOSS_W_K),
         (column(&|_| 1.0), ANY_LOSS_W),
         (column(&|part| part.conductance_w_k * (part.tc_k - part.t1_k)), ANY_SHARE),
-        (column(&|part| part.conductance_w_k * part.carried_on_k()), ANY_SHARE),
+        (column(&|part| part.conductance_w_k * part.inlet_gain_k()), ANY_SHARE),
         (column(&|part| part.conductance_w_k), UNEVEN_K),
         (column(&|part| part.conductance_w_k * (run_ratio(part) - 0.5)), UNEVEN_DRIFT_K),
     ];
     let covariance = any
         .iter()
         .map(|(column, sigma)| common(column, *sigma))
-        .fold(own(parts.iter().map(|_| LACKS_W)), |sum, one| sum + one);
+        .fold(own(parts.iter().map(|_| CLOSURE_ERROR_W)), |sum, one| sum + one);
     let by_conductance = column(&|part| part.conductance_error_w_k * (part.t2_k - part.tc_k));
     let of_the_same_step = common(&by_conductance, 1.0)
         .map_with_location(|i, j, shared| if step_of[i] == step_of[j] { shared } else { 0.0 });
@@ -135,7 +134,7 @@ pub(crate) fn rows(recording: &Recording, config: &IdentifyConfig, used: &[bool]
     })
 }
 
-/// At most `most` parts of a step; none if T2 does not determine how far it follows the housing.
+/// At most `most` parts of a step; none if T2 does not determine the share by which it follows the housing.
 fn parts(recording: &Recording, start_s: f64, end_s: f64, config: &IdentifyConfig, most: usize) -> Vec<Part> {
     if end_s - start_s < PART_S {
         return Vec::new();
@@ -189,10 +188,10 @@ fn kept_ratio(samples: &Samples, config: &IdentifyConfig) -> Option<(f64, f64)> 
     let determinant = aa * bb - ab * ab;
     let (kept, of_rise) = ((bb * ay - ab * by) / determinant, (aa * by - ab * ay) / determinant);
     let left: f64 = rows().map(|(a, b, y)| (y - kept * a - of_rise * b).powi(2)).sum();
-    // Samples that count as one: twice the correlation time of the coloured part of the noise.
+    // Number of samples per independent one: twice the correlation time of the coloured part of the noise.
     let interval_s = (samples.rows.last()?.t_s - samples.rows.first()?.t_s) / (count - 1) as f64;
-    let colour = coloured(config.noise_colour);
-    let alike = 1.0 + 2.0 * colour.first_order_variance_ratio() * colour.time_constant_s / interval_s;
-    let variance = alike * left / count as f64 * bb / determinant;
+    let colour = config.noise();
+    let correlated = 1.0 + 2.0 * colour.first_order_variance_ratio() * colour.time_constant_s / interval_s;
+    let variance = correlated * left / count as f64 * bb / determinant;
     (kept.is_finite() && variance.is_finite() && variance > 0.0).then(|| (kept, variance.sqrt()))
 }

@@ -5,7 +5,7 @@
 //! by a few percent over a map, with the gas temperature after the wheel, and a recording can distinguish the laws only by this variation. A
 //! map steeper than the fitted surface has favoured the wrong model by odds of hundreds to one. So both models are fitted and compared under
 //! the roughness of any map. If alpha_A is fixed as declared, the models differ by some hundredths of it. Small model errors can cause the
-//! same change, so such a recording decides nothing. What is not decided becomes an error of everything that it moves.
+//! same change, so such a recording does not distinguish the models. The undecided difference becomes an error of every dependent quantity.
 
 use crate::faults::smooth::ANY_ROUGHNESS;
 use crate::joint::fit::solve::{Covariance, Problem};
@@ -39,16 +39,16 @@ pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<Option<f64>> {
         return Some(None);
     }
     let tight = problem.surface_sigma;
-    let moved_to = |problem: &mut Problem<'_>, surface_sigma: f64| {
+    let refit_with = |problem: &mut Problem<'_>, surface_sigma: f64| {
         problem.surface_sigma = surface_sigma;
         problem.active[PROBE_MM2] = problem.probe_fitted;
         problem.minimise()
     };
     if tight < ANY_ROUGHNESS {
-        moved_to(problem, ANY_ROUGHNESS)?;
+        refit_with(problem, ANY_ROUGHNESS)?;
     }
     let left_open = compared(problem)?;
-    moved_to(problem, tight)?;
+    refit_with(problem, tight)?;
     Some(left_open)
 }
 
@@ -61,7 +61,7 @@ fn compared(problem: &mut Problem<'_>) -> Option<Option<f64>> {
         alpha_area_otherwise_ratio: None,
     };
     problem.inlet = Some(declared);
-    let Some(mut other) = problem.inlet_sought.then(|| otherwise(problem)).flatten() else {
+    let Some(mut other) = problem.inlet_sought.then(|| with_other_model(problem)).flatten() else {
         return Some(None);
     };
     let seen = if problem.active[ALPHA] { 0.5 * (problem.square() - other.square()) } else { 0.0 };
@@ -127,7 +127,7 @@ fn nonlinearity(problem: &Problem<'_>, other: &Problem<'_>, covariance: &Covaria
 }
 
 /// The problem at its minimum with the other model; `None` if the fit does not converge.
-fn otherwise<'a>(problem: &Problem<'a>) -> Option<Problem<'a>> {
+fn with_other_model<'a>(problem: &Problem<'a>) -> Option<Problem<'a>> {
     let mut other = problem.clone();
     other.shared[INLET] = 1.0 - problem.shared[INLET];
     let alpha = problem.shared[ALPHA];

@@ -6,7 +6,7 @@
 //! Models, ch. 7). It comes from noise with the declared statistics that passes through the same smoothing, model, probe and whitening.
 
 use crate::IdentifyConfig;
-use crate::joint::fit::input_noise_spline::Explained;
+use crate::joint::fit::input_noise_spline::InputNoiseSpline;
 use crate::joint::fit::solve::{Member, Problem};
 use crate::joint::step_model::model::Setting;
 use crate::joint::step_model::parameters::{PROBE_MM2, SHARED, SharedVector};
@@ -25,7 +25,11 @@ const DIAMETERS_MM: [f64; 10] = [0.0, 0.25, 0.5, 0.8, 1.2, 1.7, 2.3, 3.2, 4.5, 7
 const DRAWS: usize = 16;
 
 /// Computes it at the current parameters; `None` without a fitted probe or declared noise.
-pub(crate) fn explained(problem: &Problem<'_>, steps: &[StepRows], config: &IdentifyConfig) -> Explained {
+pub(crate) fn input_noise(
+    problem: &Problem<'_>,
+    steps: &[StepRows],
+    config: &IdentifyConfig,
+) -> InputNoiseSpline {
     let noisy: Vec<(usize, f64)> =
         [Channel::T1, Channel::T2, Channel::Tc, Channel::P1, Channel::P2, Channel::CompressorFlow]
             .iter()
@@ -35,7 +39,7 @@ pub(crate) fn explained(problem: &Problem<'_>, steps: &[StepRows], config: &Iden
             .filter(|(_, sigma)| *sigma > 0.0)
             .collect();
     if !problem.probe_fitted || noisy.is_empty() {
-        return Explained::default();
+        return InputNoiseSpline::default();
     }
     let squares_mm2: Vec<f64> = DIAMETERS_MM.iter().map(|diameter| diameter * diameter).collect();
     let mut draws = vec![vec![0.0; squares_mm2.len()]; DRAWS];
@@ -60,7 +64,7 @@ pub(crate) fn explained(problem: &Problem<'_>, steps: &[StepRows], config: &Iden
             }
         }
     }
-    Explained::new(squares_mm2, &draws)
+    InputNoiseSpline::new(squares_mm2, &draws)
 }
 
 fn ideal_gas(setting: &Setting, member: &Member<'_>, shared: &SharedVector) -> Vec<f64> {

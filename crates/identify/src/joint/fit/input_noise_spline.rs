@@ -3,8 +3,8 @@
 
 /// Expected sum of squares as a function of the square of the diameter.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Explained {
-    /// Second derivatives of a natural cubic spline, with its knots.
+pub(crate) struct InputNoiseSpline {
+    /// Knots, with the values and the second derivatives of the spline.
     squares_mm2: Vec<f64>,
     sums: Vec<f64>,
     curvatures: Vec<f64>,
@@ -12,7 +12,7 @@ pub(crate) struct Explained {
     slope_variances: Vec<f64>,
 }
 
-impl Explained {
+impl InputNoiseSpline {
     /// Builds the spline from the sums of each noise sequence at increasing squares of diameters, mm2.
     pub(crate) fn new(squares_mm2: Vec<f64>, draws: &[Vec<f64>]) -> Self {
         let count = (draws.len() as f64).max(1.0);
@@ -40,7 +40,7 @@ impl Explained {
         for i in (0..n.saturating_sub(1)).rev() {
             curvatures[i] = curvatures[i] * curvatures[i + 1] + carried[i];
         }
-        Explained { squares_mm2, sums, curvatures, slope_variances }
+        InputNoiseSpline { squares_mm2, sums, curvatures, slope_variances }
     }
 
     /// Variance of half the slope: the effect of the recording's own noise on the probe, in addition to least squares.

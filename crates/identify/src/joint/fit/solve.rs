@@ -1,7 +1,7 @@
 //! Levenberg-Marquardt on the joint fit's normal equations. Their matrix has arrow shape: a step's own parameters couple only with themselves
 //! and the shared ones, so they are eliminated step by step.
 
-use crate::joint::fit::input_noise_spline::Explained;
+use crate::joint::fit::input_noise_spline::InputNoiseSpline;
 use crate::joint::step_model::model::{Course, Setting};
 use crate::joint::step_model::parameters::{
     ETA, LOCAL, LocalVector, OFFSETS, PROBE_MM2, Prior, REFINEMENTS, SHARED, SURFACE, SharedVector,
@@ -46,7 +46,7 @@ pub(crate) struct Problem<'a> {
     /// Spread of a point's efficiency about the surface, one standard deviation; infinite without a surface.
     pub(crate) surface_sigma: f64,
     /// Contribution of noise in T1, Tc, flow and pressures to the sum of squares, as a function of the probe.
-    pub(crate) explained: Explained,
+    pub(crate) input_noise: InputNoiseSpline,
     /// Whether the probe is fitted, even if it is currently on its bound.
     pub(crate) probe_fitted: bool,
     /// Whether the recording is to decide which law h before the wheel follows.
@@ -155,7 +155,7 @@ impl Problem<'_> {
             .iter()
             .map(|i| self.priors[*i].weight() * (shared[*i] - self.priors[*i].mean).powi(2))
             .sum();
-        priors - self.explained.at(shared[PROBE_MM2]).0
+        priors - self.input_noise.at(shared[PROBE_MM2]).0
     }
 
     fn normal(&self, fitted: &[usize]) -> Normal {
@@ -174,7 +174,7 @@ impl Problem<'_> {
             equations.shared[(row, row)] += prior.weight();
             equations.right[row] += prior.weight() * (prior.mean - self.shared[*index]);
             if *index == PROBE_MM2 {
-                equations.right[row] += 0.5 * self.explained.at(self.shared[PROBE_MM2]).1;
+                equations.right[row] += 0.5 * self.input_noise.at(self.shared[PROBE_MM2]).1;
             }
         }
         let surface_weight = 1.0 / (self.surface_sigma * self.surface_sigma);
@@ -404,7 +404,7 @@ impl Problem<'_> {
             let pulled = inverse.column(row).into_owned();
             if *index == PROBE_MM2 {
                 inverse +=
-                    self.explained.pull_variance(self.shared[PROBE_MM2]) * &pulled * pulled.transpose();
+                    self.input_noise.pull_variance(self.shared[PROBE_MM2]) * &pulled * pulled.transpose();
             }
         }
         let inverse = inverse;

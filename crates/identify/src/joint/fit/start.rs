@@ -2,7 +2,7 @@
 
 use crate::faults::smooth::ANY_ROUGHNESS;
 use crate::joint::fit::inlet;
-use crate::joint::fit::input_noise_spline::Explained;
+use crate::joint::fit::input_noise_spline::InputNoiseSpline;
 use crate::joint::fit::solve::{Member, Problem};
 use crate::joint::step_model::model::{Course, Setting};
 use crate::joint::step_model::parameters::{
@@ -81,7 +81,7 @@ fn rows_of(
 ) -> Option<StepRows> {
     let step = recording.steps.get(position)?;
     let after_s = if config.declared.is_empty() { START_S } else { START_WITH_NOISE_S };
-    let start_s = commands::at_rest_s(recording, step).max(step.start_s) + after_s;
+    let start_s = commands::settled_s(recording, step).max(step.start_s) + after_s;
     let window = Window { start_s, end_s: step.end_s };
     if start_s.is_nan() || start_s >= step.end_s {
         let late = TooFew::LateCommands { before_end_s: step.end_s - start_s };
@@ -94,15 +94,13 @@ fn rows_of(
     }
     if !config.declared.is_empty() {
         // The fit follows changes within the step, but the point is the settled end of the step.
-        let rest = window::rest(recording, step, &config.settle_bands);
         let needed_s = WindowRule::settled_end_s(step.end_s - step.start_s);
-        if let Some(rest) = rest.filter(|rest| !rest.whole && rest.settled_s < needed_s.floor()) {
-            own.doubt(Warning::NotStabilised {
-                quantity: rest.slowest.to_owned(),
-                settled_s: rest.settled_s,
-                needed_s,
-                used_s: None,
-            });
+        if let Some(window::Settling { slowest, settled_s, whole: false, .. }) =
+            window::settling(recording, step, &config.settle_bands)
+            && settled_s < needed_s.floor()
+        {
+            let quantity = slowest.to_owned();
+            own.doubt(Warning::NotStabilised { quantity, settled_s, needed_s, used_s: None });
         }
     }
     condensed(recording, position, &samples, end_state, config)
@@ -159,26 +157,20 @@ pub(crate) fn problem<'a>(
     priors[LN_AREA] = Prior { mean: 0.0, sigma: config.internal_area_sigma_ratio };
     active[LN_AREA] = config.internal_area_sigma_ratio > 0.0;
     if choice.offsets == Choice::Fitted {
-        for (i, channel) in OFFSET_CHANNELS.iter().enumerate() {
-            let sigma = config.declared.get(channel).map_or(0.0, |declared| declared.offset_sigma);
-            priors[OFFSETS + i] = Prior { mean: 0.0, sigma };
-            active[OFFSETS + i] = sigma > 0.0;
-            priors[BENDS + i] = priors[OFFSETS + i];
-            active[BENDS + i] = sigma > 0.0;
+        let mut fit_error = |index: usize, sigma: f64| {
+            priors[index] = Prior { mean: 0.0, sigma };
+            active[index] = sigma > 0.0;
+        };
+        for (i, channel) in OFFSET_CHANNELS.into_iter().enumerate() {
+            fit_error(OFFSETS + i, config.sensor(channel).offset_sigma);
+            fit_error(BENDS + i, config.sensor(channel).offset_sigma);
         }
-        let sigma =
-            config.declared.get(&Channel::CompressorFlow).map_or(0.0, |declared| declared.gain_sigma_ratio);
-        priors[FLOW_GAIN] = Prior { mean: 0.0, sigma };
-        active[FLOW_GAIN] = sigma > 0.0;
-        for (i, channel) in GAIN_CHANNELS.iter().enumerate() {
-            let sigma = config.declared.get(channel).map_or(0.0, |declared| declared.gain_sigma_ratio);
-            priors[GAINS + i] = Prior { mean: 0.0, sigma };
-            active[GAINS + i] = sigma > 0.0;
+        for (i, channel) in GAIN_CHANNELS.into_iter().enumerate() {
+            fit_error(GAINS + i, config.sensor(channel).gain_sigma_ratio);
         }
-        priors[BAROMETER] = Prior { mean: 0.0, sigma: config.barometer_sigma_pa };
-        active[BAROMETER] = config.barometer_sigma_pa > 0.0;
-        priors[HUMIDITY] = Prior { mean: 0.0, sigma: config.humidity_sigma_kg_kg };
-        active[HUMIDITY] = config.humidity_sigma_kg_kg > 0.0;
+        fit_error(FLOW_GAIN, config.sensor(Channel::CompressorFlow).gain_sigma_ratio);
+        fit_error(BAROMETER, config.barometer_sigma_pa);
+        fit_error(HUMIDITY, config.humidity_sigma_kg_kg);
     }
     let etas: Vec<f64> = steps
         .iter()
@@ -202,7 +194,7 @@ pub(crate) fn problem<'a>(
         active,
         lowest,
         surface_sigma: ANY_ROUGHNESS,
-        explained: Explained::default(),
+        input_noise: InputNoiseSpline::default(),
         probe_fitted: choice.probe == Choice::Fitted,
         inlet_sought: choice.inlet_h == Choice::Fitted,
         inlet: None,
@@ -334,10 +326,7 @@ pub(crate) fn coupled(slopes: &[f64; 6], by_eta: f64) -> Option<[f64; OFFSET_CHA
 /// Sets the noise of each step and the sensitivity of its efficiency to offsets, at the current parameters.
 pub(crate) fn set_weights(problem: &mut Problem<'_>, steps: &[StepRows], config: &IdentifyConfig) {
     let channels = [Channel::T1, Channel::T2, Channel::Tc, Channel::P1, Channel::P2, Channel::CompressorFlow];
-    let declared: Vec<f64> = channels
-        .iter()
-        .map(|channel| config.declared.get(channel).map_or(0.0, |declared| declared.noise_sigma))
-        .collect();
+    let declared: Vec<f64> = channels.iter().map(|channel| config.sensor(*channel).noise_sigma).collect();
     for (i, step) in steps.iter().enumerate().take(problem.members.len()) {
         let member = &problem.members[i];
         let slopes = problem.setting.sensitivities(&step.end, &problem.shared, &member.local);

@@ -1,7 +1,6 @@
 //! One step condensed to block means, with the map position of each block.
 
 use crate::IdentifyConfig;
-use crate::config::coloured;
 use crate::joint::step_model::smoothing::Smoother;
 use crate::step_data::end_state::EndState;
 use crate::step_data::samples::{self, Samples};
@@ -80,7 +79,7 @@ pub(crate) fn condensed(
             p2_pa: of(|row| row.p2_pa),
             flow_kg_s,
             place: place(config, speed_rpm, flow_kg_s, t1_k, p1_pa),
-            noise: BlockNoise::of_mean(coloured(config.noise_colour), count, block_s),
+            noise: BlockNoise::of_mean(config.noise(), count, block_s),
         });
         start = end;
     }

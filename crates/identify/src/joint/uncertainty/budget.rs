@@ -2,8 +2,8 @@
 //!
 //! The posterior is linearised at the fit. Declared errors of readings are independent of each other and of everything else, so each contributes
 //! its sensitivity, as the smoothness prior leaves it, times its declared size. alpha_A, probe and direction factor are correlated: each
-//! contributes what the ones before it do not explain (Cholesky factor of their covariance). The step's own noise, with the scatter of its h
-//! about the law, comes next. The rest is due to the shared law of h and the shape of the map, which the noise of all steps leaves open.
+//! contributes the part that the previous ones do not explain (Cholesky factor of their covariance). The step's own noise and the scatter of its
+//! h about the law come next. The remainder is due to the shared law of h and the shape of the map, which the noise of all steps limits.
 
 use crate::joint::fit::refinements::{Gain, Refinements};
 use crate::joint::fit::solve::Covariance;
@@ -12,6 +12,7 @@ use crate::joint::step_model::parameters::{
     symbol,
 };
 use crate::joint::uncertainty::quantity::Quantity;
+use crate::single_step::budgets;
 use mapper_core::BudgetRow;
 use nalgebra::DVector;
 
@@ -27,7 +28,7 @@ const OWN_UNIT: &str = "of the number";
 pub(crate) type Pull = (f64, DVector<f64>);
 
 /// A number with its error after smoothing: without the excess of the interval over the mixture, and that excess.
-pub(crate) struct Stated {
+pub(crate) struct ReportedError {
     pub(crate) error: f64,
     pub(crate) added: f64,
     /// Degrees of freedom of the step's noise.
@@ -40,21 +41,15 @@ pub(crate) fn rows(
     refined: Option<(&Refinements, &Gain)>,
     (quantity, etas, step): (&Quantity, &[Quantity], usize),
     pulls: &[Pull],
-    stated: &Stated,
+    reported: &ReportedError,
 ) -> Vec<BudgetRow> {
     let mut rows = Vec::new();
-    let mut left = stated.error * stated.error;
+    let mut left = reported.error * reported.error;
     let mut push = |source: String, sigma: f64, unit: &str, contribution: f64, freedom: Option<f64>| {
         left = (left - contribution * contribution).max(0.0);
         if sigma > 0.0 && contribution != 0.0 {
-            rows.push(BudgetRow {
-                source,
-                standard_uncertainty: sigma,
-                unit: unit.to_owned(),
-                sensitivity: contribution / sigma,
-                contribution,
-                degrees_of_freedom: freedom,
-            });
+            let row = budgets::row(source, sigma, unit, contribution / sigma, contribution);
+            rows.push(BudgetRow { degrees_of_freedom: freedom, ..row });
         }
         left
     };
@@ -79,9 +74,9 @@ pub(crate) fn rows(
     let own = if pulls.is_empty() { quantity.own_variance } else { own };
     let before = push(String::new(), 0.0, "", 0.0, None);
     let noise = own.clamp(0.0, before).sqrt();
-    let rest = push(NOISE.to_owned(), noise, OWN_UNIT, noise, Some(stated.degrees_of_freedom)).sqrt();
+    let rest = push(NOISE.to_owned(), noise, OWN_UNIT, noise, Some(reported.degrees_of_freedom)).sqrt();
     push(LAW.to_owned(), rest, OWN_UNIT, rest, None);
-    push(NEUTRAL.to_owned(), stated.added.abs(), OWN_UNIT, stated.added, None);
+    push(NEUTRAL.to_owned(), reported.added.abs(), OWN_UNIT, reported.added, None);
     rows
 }
 
@@ -90,11 +85,14 @@ pub(crate) fn in_unit(row: BudgetRow, number: f64, unit: &str) -> BudgetRow {
     let (scale, unit) = if row.unit == OWN_UNIT { (number, unit.to_owned()) } else { (1.0, row.unit) };
     let (standard_uncertainty, contribution) = (scale * row.standard_uncertainty, number * row.contribution);
     BudgetRow {
-        standard_uncertainty,
-        contribution,
-        sensitivity: contribution / standard_uncertainty,
-        unit,
-        ..row
+        degrees_of_freedom: row.degrees_of_freedom,
+        ..budgets::row(
+            row.source,
+            standard_uncertainty,
+            &unit,
+            contribution / standard_uncertainty,
+            contribution,
+        )
     }
 }
 

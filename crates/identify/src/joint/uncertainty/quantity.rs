@@ -38,16 +38,8 @@ pub(crate) fn of_shared(covariance: &Covariance, row: usize) -> Quantity {
     let variance = covariance.shared[(row, row)];
     let mut answer = DVector::zeros(by_shared.len());
     answer[row] = 1.0;
-    Quantity {
-        value: 0.0,
-        by_eta,
-        by_smooth,
-        variance,
-        by_shared,
-        answer,
-        own_variance: 0.0,
-        own_with_eta: 0.0,
-    }
+    let (value, own_variance, own_with_eta) = (0.0, 0.0, 0.0);
+    Quantity { value, by_eta, by_smooth, variance, by_shared, answer, own_variance, own_with_eta }
 }
 
 /// Covariance of a quantity with every point's efficiency, through the offsets alone.
@@ -87,17 +79,9 @@ pub(crate) fn quantities(
             let mut by_smooth = by_offsets(covariance, &by_shared);
             let own_variance = alone(covariance, i, ETA, ETA);
             by_smooth[i] += own_variance;
-            let value = problem.members[i].local[ETA];
-            Quantity {
-                value,
-                by_eta,
-                by_smooth,
-                variance: own[(ETA, ETA)],
-                by_shared,
-                answer: answers[i].clone(),
-                own_variance,
-                own_with_eta: own_variance,
-            }
+            let (value, variance) = (problem.members[i].local[ETA], own[(ETA, ETA)]);
+            let (answer, own_with_eta) = (answers[i].clone(), own_variance);
+            Quantity { value, by_eta, by_smooth, variance, by_shared, answer, own_variance, own_with_eta }
         })
         .collect();
     let ln_hs = (0..count)
@@ -131,16 +115,10 @@ pub(crate) fn quantities(
             let mut by_smooth = by_offsets(covariance, &by_shared);
             let own_with_eta = alone(covariance, i, ETA, LN_DEVIATION);
             by_smooth[i] += own_with_eta;
-            Quantity {
-                value: 0.0,
-                by_eta,
-                by_smooth,
-                variance,
-                by_shared,
-                answer: covariance.answers[i].row(LN_DEVIATION).transpose() + &weights,
-                own_variance: alone(covariance, i, LN_DEVIATION, LN_DEVIATION),
-                own_with_eta,
-            }
+            let answer = covariance.answers[i].row(LN_DEVIATION).transpose() + &weights;
+            let own_variance = alone(covariance, i, LN_DEVIATION, LN_DEVIATION);
+            let value = 0.0;
+            Quantity { value, by_eta, by_smooth, variance, by_shared, answer, own_variance, own_with_eta }
         })
         .collect();
     (etas, ln_hs)

@@ -15,7 +15,7 @@ use crate::joint::fit::start::SURFACE_SIGMA;
 use crate::joint::step_model::parameters::{FLOW_GAIN, LOCAL, OFFSET_CHANNELS, OFFSETS, SURFACE};
 use crate::joint::step_model::rows::StepRows;
 use crate::joint::step_model::surface::{SLOW_LOSS, SurfaceScale};
-use crate::joint::uncertainty::budget::{self, Pull, Stated};
+use crate::joint::uncertainty::budget::{self, Pull, ReportedError};
 use crate::joint::uncertainty::common_part::common_part;
 use crate::joint::uncertainty::quantity::{Quantity, is_offset, of_shared, quantities};
 use mapper_core::{BudgetRow, Channel, EstimateUncertainty, ReferenceState, confidence_interval_95};
@@ -35,7 +35,7 @@ const ROUGHNESSES: [f64; 2] = [SURFACE_SIGMA, ANY_ROUGHNESS];
 
 /// A number with its error by origin.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct Judged {
+pub(crate) struct SmoothedValue {
     pub(crate) value: f64,
     pub(crate) uncertainty: EstimateUncertainty,
     /// Its 95 % interval: symmetric about the value for a normal distribution, otherwise the shortest one.
@@ -48,9 +48,9 @@ pub(crate) struct Judged {
 /// The numbers of all points, and the offsets.
 #[derive(Debug, Clone)]
 pub(crate) struct Smoothed {
-    pub(crate) eta: Vec<Judged>,
+    pub(crate) eta: Vec<SmoothedValue>,
     /// ln of h at the step's end, relative to the fitted value.
-    pub(crate) ln_h: Vec<Judged>,
+    pub(crate) ln_h: Vec<SmoothedValue>,
     /// Effect of each common error of the points on every point's efficiency, and on its ln h.
     pub(crate) common: [Vec<Vec<f64>>; 2],
     /// Shift and resulting standard error of each shared parameter that was fitted or propagated.
@@ -197,7 +197,7 @@ fn judged(
             })
             .sum()
     };
-    let judge = |quantity: &Quantity| -> Judged {
+    let judge = |quantity: &Quantity| -> SmoothedValue {
         let parts: Vec<(f64, f64, f64, f64)> = if solved.is_empty() {
             vec![(1.0, quantity.value, quantity.variance, bias_of(quantity, None))]
         } else {
@@ -224,7 +224,7 @@ fn judged(
             noise_standard_error: (variance + added * added - bias).max(0.0).sqrt(),
             bias_standard_error: bias.max(0.0).sqrt(),
         };
-        Judged { value, uncertainty, interval, error, added }
+        SmoothedValue { value, uncertainty, interval, error, added }
     };
     let shared: Vec<(f64, f64)> = shared
         .iter()
@@ -255,13 +255,14 @@ fn budgets(
 ) -> Vec<[Vec<BudgetRow>; 2]> {
     let steps: Vec<(usize, &StepRows)> = steps.iter().enumerate().collect();
     parallel::map(&steps, |(i, step)| {
-        let of = |quantities: &[Quantity], judged: &[Judged]| {
+        let of = |quantities: &[Quantity], judged: &[SmoothedValue]| {
             let quantity = &quantities[*i];
             let pulls: Vec<Pull> =
                 solved.iter().map(|one| (one.weight, one.factors.solve(&quantity.by_smooth))).collect();
             let degrees_of_freedom = step.rows.len().saturating_sub(LOCAL).max(1) as f64;
-            let stated = Stated { error: judged[*i].error, added: judged[*i].added, degrees_of_freedom };
-            budget::rows(covariance, refined, (quantity, etas, *i), &pulls, &stated)
+            let reported =
+                ReportedError { error: judged[*i].error, added: judged[*i].added, degrees_of_freedom };
+            budget::rows(covariance, refined, (quantity, etas, *i), &pulls, &reported)
         };
         [of(etas, &smoothed.eta), of(ln_hs, &smoothed.ln_h)]
     })

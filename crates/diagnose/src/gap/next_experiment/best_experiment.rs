@@ -50,7 +50,7 @@ pub struct Suggested {
 ///
 /// A first pass scores every `allowed` experiment with the fitted candidates: `U = sum over k, j of p_k p_j d_kj^2 / minutes`. Here
 /// `d_kj^2` is the misfit increase of a refitted `j` if `k` were true. The most promising of each kind are evaluated with every rival
-/// refitted, and ranked by the expected share of the open question resolved per minute ([`odds`]). Without allowed jumps, repeats of the
+/// refitted, and ranked by the expected share of the open question resolved per minute. Without allowed jumps, repeats of the
 /// recorded jumps are used. Unrecorded model channels are tried with the most promising jump. If no experiment resolves enough, the
 /// function names a sensor for the first candidate's part. `temperature` is the diagnosis'.
 pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[Experiment], temperature: f64) -> Suggested {

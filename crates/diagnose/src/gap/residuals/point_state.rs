@@ -79,13 +79,13 @@ impl Study {
     }
 
     /// Model state at the end of each step.
-    pub fn points(&self, hypothesis: &Hypothesis) -> Result<Vec<PointState>, PredictError> {
+    pub(crate) fn points(&self, hypothesis: &Hypothesis) -> Result<Vec<PointState>, PredictError> {
         Ok(self.points_with_others(hypothesis, &[])?.into_iter().map(|(point, _)| point).collect())
     }
 
     /// Model state at the end of each step, and the efficiency and h of other hypotheses' models at the same speed, pressures and metal
     /// temperatures.
-    pub fn points_with_others(
+    pub(crate) fn points_with_others(
         &self,
         hypothesis: &Hypothesis,
         others: &[&Hypothesis],

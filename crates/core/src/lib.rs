@@ -95,6 +95,6 @@ pub use test_plan::verdict_forecast::{Advice, CampaignChange, VerdictForecast};
 pub use test_plan::visit_order::VisitOrder;
 pub use text::one_line::one_line;
 pub use text::probability_text::probability_text;
-pub use text::terminal_text::terminal_text;
+pub use text::terminal_text::{coloured_text, terminal_json, terminal_text};
 pub use text::text_encoding::TextEncoding;
 pub use text::with_unit::{readable, temperature, with_unit};

@@ -1,7 +1,8 @@
 //! Reports a failure at the end of the program.
 
 use crate::output::failure::Failure;
-use crate::output::{output_options, standard_output};
+use crate::output::{output_options, standard_error, standard_output};
+use mapper_core::terminal_text;
 use serde_json::json;
 use std::process::ExitCode;
 
@@ -15,11 +16,19 @@ pub fn failed(failure: &Failure) -> ExitCode {
     code
 }
 
-/// Arguments that could not be read, as an object on standard output and as usual on standard error.
-pub fn wrong_arguments(error: &clap::Error) -> ExitCode {
-    let _ = error.print();
+/// Arguments that could not be read: as usual on standard error, and with `--json` as an object on standard output.
+pub fn wrong_arguments(error: &clap::Error, json: bool) -> ExitCode {
     let text = error.to_string();
-    let mut parts = text.trim_start_matches("error: ").splitn(2, "\n\n").map(str::trim);
-    let _ = standard_output::print_json(&json!({ "code": 2, "message": parts.next(), "help": parts.next() }));
+    // The colours of clap would let those of an argument pass.
+    if terminal_text(&text) == text {
+        let _ = error.print();
+    } else {
+        standard_error::say(&text);
+    }
+    if json {
+        let mut parts = text.trim_start_matches("error: ").splitn(2, "\n\n").map(str::trim);
+        let value = json!({ "code": 2, "message": parts.next(), "help": parts.next() });
+        let _ = standard_output::print_json(&value);
+    }
     ExitCode::from(2)
 }

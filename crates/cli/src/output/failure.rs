@@ -166,11 +166,10 @@ impl Failure {
 /// Maximum length of a message, characters: a file could put thousands of names into one.
 const MAX_MESSAGE_CHARS: usize = 4000;
 
-/// Shortens a message to a few screens, and replaces escape characters, which can only come from file contents.
+/// Shortens a message to a few screens.
 fn shorten(message: &str) -> String {
-    let message = message.replace('\u{1b}', "\u{fffd}");
     match message.char_indices().nth(MAX_MESSAGE_CHARS) {
-        None => message,
+        None => message.to_owned(),
         Some((end, _)) => format!("{} ... (and {} bytes more)", &message[..end], message.len() - end),
     }
 }

@@ -5,7 +5,7 @@ use crate::output::failure::Failure;
 use crate::output::standard_error;
 use crate::output::terminal_lines::wrap_for_terminal;
 use clap::Args;
-use mapper_core::terminal_text;
+use mapper_core::{terminal_json, terminal_text};
 use mapper_report::with_messages;
 use mapper_session::{Existing, MapOut, MapWork, SessionError, write_file};
 use serde::Serialize;
@@ -91,9 +91,8 @@ pub fn print_map_work(work: &MapWork, as_json: bool) -> Result<(), Failure> {
 
 /// Writes one JSON object and a line end to standard output; warnings get their sentences.
 pub fn print_json(value: &impl Serialize) -> Result<(), Failure> {
-    // JSON escapes control characters itself, so programs get the text unchanged.
     let value = serde_json::to_value(value).map_err(SessionError::from)?;
-    write(&mapper_session::json_text(&with_messages(value))?)?;
+    write(&terminal_json(&mapper_session::json_text(&with_messages(value))?))?;
     PRINTED.store(true, Ordering::Relaxed);
     Ok(())
 }

@@ -1,11 +1,11 @@
 //! Progress on standard error: a bar, lines, or JSON.
 
+use crate::output::standard_error::say;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use mapper_core::{StepMarker, terminal_text};
+use mapper_core::{StepMarker, terminal_json, terminal_text};
 use mapper_report::{progress_text, short_duration, with_messages, wrapped};
 use mapper_session::SessionEvent;
 use serde_json::json;
-use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::time::{Duration, Instant};
@@ -219,7 +219,7 @@ impl ProgressDisplay {
                 } else {
                     self.set_style(state, SPINNER, None);
                 }
-                self.bar.set_message(what.clone());
+                self.bar.set_message(terminal_text(what));
             }
             SessionEvent::PiecesDone { done, of } => {
                 self.set_style(state, PIECES_BAR, Some(*of as u64));
@@ -302,7 +302,7 @@ fn say_lines(event: &SessionEvent, state: &mut State) {
     if let SessionEvent::Progress { what, .. } = event {
         state.last_line.clone_from(what);
     }
-    say(&line);
+    say(&format!("{line}\n"));
 }
 
 /// Maximum number of lines about finished pieces.
@@ -347,12 +347,8 @@ fn print_json(event: &SessionEvent, state: &mut State) {
         _ => {}
     }
     let value = serde_json::to_value(event).map(with_messages);
-    say(&value.unwrap_or_else(|error| json!({ "event": "error", "message": error.to_string() })).to_string());
-}
-
-/// A closed pipe, as with `tee` on Ctrl-C, must not cause a panic.
-fn say(line: &str) {
-    let _ = writeln!(std::io::stderr().lock(), "{line}");
+    let value = value.unwrap_or_else(|error| json!({ "event": "error", "message": error.to_string() }));
+    say(&terminal_json(&format!("{value}\n")));
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Terminal colours for verdicts.
 
-use mapper_core::Verdict;
+use mapper_core::{Verdict, coloured_text};
 
 /// Whether words are coloured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -8,7 +8,7 @@ pub enum Paint {
     /// Uncoloured.
     #[default]
     Plain,
-    /// By ANSI escapes, in the terminal's own colours.
+    /// In the terminal's own colours.
     Coloured,
 }
 
@@ -21,6 +21,6 @@ pub fn paint_verdict(verdict: Verdict, text: &str, paint: Paint) -> String {
     };
     match paint {
         Paint::Plain => text.to_owned(),
-        Paint::Coloured => format!("\u{1b}[{code}m{text}\u{1b}[0m"),
+        Paint::Coloured => coloured_text(text, code),
     }
 }

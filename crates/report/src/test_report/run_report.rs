@@ -132,7 +132,7 @@ const PICTURE: &str = "![map](map.svg)\n\n";
 
 /// The report as Markdown. Names and messages from outside are in it, but neither HTML, links nor colours.
 pub fn run_report(report: &RunReport<'_>) -> String {
-    let text = terminal_text(&markdown_report(report)).replace('\u{1b}', "\u{fffd}");
+    let text = terminal_text(&markdown_report(report));
     let inert = markdown::without_html_and_links;
     inert(&text).replacen(&inert(PICTURE), PICTURE, 1)
 }

@@ -4,6 +4,7 @@ use crate::link::{LinkError, endpoints};
 use crate::settings::{SettingError, is_endpoint};
 use crate::store::{Store, StoreError, fingerprint, valid};
 use clap::{Parser, Subcommand};
+use mapper_core::terminal_text;
 use opcua::crypto::X509;
 use std::io::Write;
 use std::process::ExitCode;
@@ -58,7 +59,7 @@ pub(crate) fn run() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             // If standard error is closed, the message is lost.
-            let _ = writeln!(std::io::stderr(), "error: {error}");
+            let _ = writeln!(std::io::stderr(), "error: {}", terminal_text(&error.to_string()));
             ExitCode::FAILURE
         }
     }
@@ -77,7 +78,8 @@ impl Command {
 }
 
 fn print(words: &str) -> Result<(), CommandError> {
-    Ok(writeln!(std::io::stdout(), "{words}")?)
+    // The names in a certificate are those of the server.
+    Ok(writeln!(std::io::stdout(), "{}", terminal_text(words))?)
 }
 
 fn trust(store: &Store, endpoint: &str, wanted: Option<String>, replace: bool) -> Result<(), CommandError> {

@@ -4,13 +4,12 @@ use mapper_campaign::Campaign;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// Column of the serial number.
 const SERIAL_NUMBER_COLUMN: &str = "serial_number";
 /// Maximum size of a table of machines, bytes.
-const MAX_TABLE_BYTES: u64 = 10_000_000;
+const MAX_TABLE_BYTES: usize = 10_000_000;
 /// Maximum number of settings of one machine.
 const MAX_COLUMNS: usize = 64;
 /// First seed of drawn machines, far above those of campaigns. A machine keeps its own seed for any number of drawn machines.
@@ -36,14 +35,6 @@ pub enum VariantError {
         path: PathBuf,
         /// The reason.
         source: std::io::Error,
-    },
-    /// The table is too large.
-    #[error("{} has {bytes} bytes; a table of machines has at most {MAX_TABLE_BYTES}", .path.display())]
-    TooLarge {
-        /// The table.
-        path: PathBuf,
-        /// Its size.
-        bytes: u64,
     },
     /// A row has the wrong form.
     #[error("{}: {source}", .path.display())]
@@ -83,12 +74,8 @@ impl Variant {
     /// [`VariantError`] with the line.
     pub fn read(path: &Path) -> Result<Vec<Variant>, VariantError> {
         let unread = |source| VariantError::Read { path: path.to_owned(), source };
-        let bytes = std::fs::metadata(path).map_err(unread)?.len();
-        if bytes > MAX_TABLE_BYTES {
-            return Err(VariantError::TooLarge { path: path.to_owned(), bytes });
-        }
-        let mut text = String::new();
-        mapper_yaml::open_file(path).and_then(|mut file| file.read_to_string(&mut text)).map_err(unread)?;
+        let bytes = mapper_yaml::read_limited(path, MAX_TABLE_BYTES).map_err(unread)?;
+        let text = String::from_utf8(bytes).map_err(|error| unread(std::io::Error::other(error)))?;
         Self::from_text(&text, path)
     }
 

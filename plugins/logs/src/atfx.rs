@@ -7,7 +7,7 @@ use crate::columns::table_head::MAX_COLUMNS;
 use crate::notation::instant::{Instant, parse_instant};
 use crate::tables::column_log::{ColumnTable, check_columns_file, column_log};
 use crate::tables::column_rows::Chunk;
-use mapper_recording::logs::limits::MAX_UNPACKED_BYTES;
+use mapper_recording::logs::limits::{MAX_UNPACKED_BYTES, max_memory_bytes};
 use mapper_recording::logs::{DateOrder, Log, LogError, LogFile, LogFinding, LogFormat, LogOptions};
 use quick_xml::Reader;
 use quick_xml::events::Event;
@@ -67,7 +67,8 @@ struct Contents {
 fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
     check_columns_file(file, NAME, options)?;
     let contents = contents(file).map_err(|why| file.content_error(NAME, why))?;
-    let mut binaries = Binaries { file, contents: &contents, read: HashMap::new(), left: MAX_UNPACKED_BYTES };
+    let left = max_memory_bytes(file.size_bytes()?);
+    let mut binaries = Binaries { file, contents: &contents, read: HashMap::new(), left };
     let (mut tables, mut problems): (Vec<(String, ColumnTable)>, Vec<LogFinding>) = (Vec::new(), Vec::new());
     for column in &contents.columns {
         let quantity = contents.quantities.get(column.text("measurement_quantity"));
@@ -351,7 +352,8 @@ impl Binaries<'_> {
                 |error: LogError| format!("its values are in `{name}`, which cannot be read: {error}");
             let file = LogFile::from_path(&self.file.path().with_file_name(name));
             let size = file.size_bytes().map_err(failed)?;
-            self.left = self.left.checked_sub(size).ok_or(format!("`{name}` exceeds the memory of a log"))?;
+            let whole = self.left.saturating_add(max_memory_bytes(size)).min(MAX_UNPACKED_BYTES);
+            self.left = whole.checked_sub(size).ok_or(format!("`{name}` exceeds the memory of a log"))?;
             let bytes = file.head(usize::try_from(size).unwrap_or(usize::MAX)).map_err(failed)?;
             self.read.insert(identifier.to_owned(), bytes);
         }

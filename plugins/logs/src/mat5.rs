@@ -6,7 +6,7 @@
 use crate::columns::table_head::MAX_COLUMNS;
 use crate::tables::column_log::{ColumnTable, check_columns_file, column_log};
 use crate::tables::column_rows::Chunk;
-use mapper_recording::logs::limits::MAX_UNPACKED_BYTES;
+use mapper_recording::logs::limits::{MAX_UNPACKED_BYTES, max_memory_bytes};
 use mapper_recording::logs::{Log, LogError, LogFile, LogFinding, LogFormat, LogOptions};
 use std::io::Read;
 
@@ -37,9 +37,10 @@ type NamedColumn = (String, Vec<f64>);
 
 fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
     check_columns_file(file, NAME, options)?;
+    let size = file.size_bytes()?;
     let bytes = file.head(usize::try_from(MAX_UNPACKED_BYTES).unwrap_or(usize::MAX))?;
     let mut reader =
-        Reader { is_big: bytes.get(126) == Some(&b'M'), left: MAX_UNPACKED_BYTES, ..Reader::default() };
+        Reader { is_big: bytes.get(126) == Some(&b'M'), left: max_memory_bytes(size), ..Reader::default() };
     reader
         .elements(bytes.get(HEADER..).unwrap_or_default(), "", 0)
         .map_err(|why| file.content_error(NAME, format!("it is damaged: {why}; save it again")))?;
@@ -82,6 +83,13 @@ struct Reader {
 }
 
 impl Reader {
+    /// Counts memory.
+    fn charge(&mut self, bytes: usize) -> Result<(), String> {
+        let left = self.left.checked_sub(bytes as u64);
+        self.left = left.ok_or("it unpacks to more than a file of its size may; export it in parts")?;
+        Ok(())
+    }
+
     fn elements(&mut self, mut bytes: &[u8], prefix: &str, depth: usize) -> Result<(), String> {
         while !bytes.is_empty() {
             let (kind, data, rest) = self.element(bytes)?;
@@ -92,10 +100,7 @@ impl Reader {
                     let unpacking =
                         flate2::read::ZlibDecoder::new(data).take(self.left + 1).read_to_end(&mut unpacked);
                     unpacking.map_err(|error| error.to_string())?;
-                    self.left = self
-                        .left
-                        .checked_sub(unpacked.len() as u64)
-                        .ok_or_else(|| format!("it unpacks to more than {} MiB", MAX_UNPACKED_BYTES >> 20))?;
+                    self.charge(unpacked.len())?;
                     if depth >= MAX_DEPTH {
                         return Err("it is packed several times".to_owned());
                     }
@@ -214,9 +219,10 @@ impl Reader {
     }
 
     #[allow(clippy::unnecessary_cast, reason = "one of the types is f64 already")]
-    fn numbers(&self, kind: u32, data: &[u8]) -> Result<Vec<f64>, String> {
+    fn numbers(&mut self, kind: u32, data: &[u8]) -> Result<Vec<f64>, String> {
         macro_rules! of {
-            ($number:ty) => {
+            ($number:ty) => {{
+                self.charge(data.len() / size_of::<$number>() * size_of::<f64>())?;
                 data.chunks_exact(size_of::<$number>())
                     .filter_map(|bytes| {
                         let bytes = bytes.try_into().ok()?;
@@ -228,7 +234,7 @@ impl Reader {
                         Some(value as f64)
                     })
                     .collect()
-            };
+            }};
         }
         Ok(match kind {
             1 => of!(i8),

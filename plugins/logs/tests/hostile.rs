@@ -145,6 +145,42 @@ fn files() -> &'static [Vec<u8>; 3] {
     FILES.get_or_init(|| [csv(), mdf4(), xlsx()])
 }
 
+/// An element of MATLAB data of level 5: type, size, data.
+fn element(kind: u32, data: &[u8]) -> Vec<u8> {
+    let size = u32::try_from(data.len()).unwrap();
+    let mut element = [kind.to_le_bytes(), size.to_le_bytes()].concat();
+    element.extend(data);
+    element.resize(element.len().next_multiple_of(8), 0);
+    element
+}
+
+/// Small files whose content would fill the memory: each is refused, or loses the column.
+#[test]
+fn what_a_small_file_unpacks_to_is_limited() {
+    let zeros = vec![0; 65 << 20];
+    let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    packed.write_all(&zeros).unwrap();
+    let gz = packed.finish().unwrap();
+    // Bytes, which become numbers of eight bytes each.
+    let count = 9 << 20;
+    let (flags, size) = (element(6, &[9, 0, 0, 0, 0, 0, 0, 0]), element(5, &[0, 0, 0x90, 0, 1, 0, 0, 0]));
+    let array = [flags, size, element(1, b"a"), element(2, &zeros[..count])].concat();
+    let mut packed = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
+    packed.write_all(&element(14, &array)).unwrap();
+    let mut mat = b"MATLAB 5.0 MAT-file".to_vec();
+    mat.resize(124, 0);
+    mat.extend(b"\0\x01IM");
+    mat.extend(element(15, &packed.finish().unwrap()));
+    let mut sheets = parts(HEADER, SHARED_STRINGS);
+    sheets.last_mut().unwrap().1 =
+        format!("<worksheet><sheetData>{}</sheetData></worksheet>", "<row/>".repeat((1 << 20) + 1));
+    for (bytes, named) in [(gz, "64 MiB"), (mat, "unpacks"), (workbook(&sheets), "rows")] {
+        let file = LogFile::from_bytes(Path::new("log"), &bytes);
+        let error = LOG_FORMATS.open(&file, &LogOptions::default()).err().expect(named).to_string();
+        assert!(error.contains(named), "{error}");
+    }
+}
+
 #[test]
 fn the_files_themselves_are_read() {
     for (bytes, name) in files().iter().zip(["CSV", "MDF4", "Excel"]) {

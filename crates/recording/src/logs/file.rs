@@ -1,7 +1,7 @@
 //! A log as a file or as bytes in memory.
 
 use crate::logs::LogError;
-use crate::logs::limits::{MAX_UNPACKED_BYTES, max_unpacked_bytes};
+use crate::logs::limits::max_memory_bytes;
 use std::io::{self, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -40,7 +40,7 @@ impl LogFile {
         if self.head(GZIP.len())? != GZIP {
             return Ok(None);
         }
-        let limit = max_unpacked_bytes(self.size_bytes()?).min(MAX_UNPACKED_BYTES);
+        let limit = max_memory_bytes(self.size_bytes()?);
         let mut content = Vec::new();
         flate2::read::MultiGzDecoder::new(self.open()?)
             .take(limit + 1)

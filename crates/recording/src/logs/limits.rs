@@ -9,6 +9,9 @@ pub const MAX_UNPACKED_BYTES: u64 = 1 << 30;
 /// Maximum unpacked over packed size of a larger file: noisy readings compress to a fifth at best, the text of a sheet to a fifteenth.
 pub const MAX_UNPACKED_RATIO: u64 = 20;
 
+/// Maximum unpacked size of a small file whose content is kept in memory, bytes: an hour at 10 Hz with 100 columns of text, 16 bytes each.
+const MIN_MEMORY_BYTES: u64 = 64 << 20;
+
 /// Maximum unpacked size of one block, bytes; a reader holds two at a time. The MDF standard recommends 4 MiB.
 pub const MAX_BLOCK_BYTES: u64 = 32 << 20;
 
@@ -21,6 +24,11 @@ pub const MAX_FORMULA_OPERATORS: usize = 1000;
 /// Maximum unpacked size of a file of this size, bytes.
 pub fn max_unpacked_bytes(file_bytes: u64) -> u64 {
     MAX_UNPACKED_BYTES.max(MAX_UNPACKED_RATIO.saturating_mul(file_bytes))
+}
+
+/// Maximum unpacked size of a file of this size whose content is kept in memory, bytes.
+pub fn max_memory_bytes(file_bytes: u64) -> u64 {
+    MAX_UNPACKED_RATIO.saturating_mul(file_bytes).clamp(MIN_MEMORY_BYTES, MAX_UNPACKED_BYTES)
 }
 
 /// Whether a formula is nested too deeply for recursion. The parser recurses, and so does the evaluation of chains such as `X+X+X`.
@@ -62,5 +70,6 @@ mod tests {
         assert_eq!(max_unpacked_bytes(1000), MAX_UNPACKED_BYTES);
         assert_eq!(max_unpacked_bytes(1 << 30), 20 << 30);
         assert_eq!(max_unpacked_bytes(u64::MAX), u64::MAX);
+        assert_eq!([0, 10 << 20, u64::MAX].map(max_memory_bytes), [64 << 20, 200 << 20, 1 << 30]);
     }
 }

@@ -5,7 +5,7 @@ use crate::analysis::budget_file::budget_csv;
 use crate::analysis::identification::with_gas;
 use crate::machine::fmu_file::with_identified;
 use crate::machine::map_work::{MapOut, MapWork, warnings, write_turbine_fitted_if_needed};
-use crate::recording::files::Existing;
+use crate::recording::files::{Existing, read_at_most};
 use crate::recording::identification_config::{assumed_sensors, identification};
 use crate::{
     MapWorkError, Registry, SessionError, recording::run_directory, write_file, write_map_fitted_if_needed,
@@ -41,6 +41,9 @@ struct ThermalMachine {
     origin: String,
 }
 
+/// Maximum size of `points.json`, bytes: a thousand points have some 10 MB.
+const POINTS_MAX_BYTES: u64 = 256 << 20;
+
 /// The required part of `points.json`.
 #[derive(Deserialize)]
 struct PointsFile {
@@ -68,7 +71,7 @@ impl TestStand {
         }
         let campaign = mapper_campaign::load(&path.join(run_directory::CAMPAIGN))?;
         let points = path.join(run_directory::POINTS);
-        let bytes = std::fs::read(&points).map_err(SessionError::file("read", &points))?;
+        let bytes = read_at_most(&points, POINTS_MAX_BYTES)?;
         let file: PointsFile = serde_json::from_slice(&bytes)
             .map_err(|error| SessionError::file("read", &points)(error.into()))?;
         Ok(TestStand::of(&campaign, path, file.thermal.as_ref()))

@@ -26,6 +26,9 @@ const MAX_STYLE_PIECE_BYTES: u64 = 1 << 12;
 /// Maximum nesting of elements: a cell of rich text has ten levels.
 const MAX_DEPTH: usize = 64;
 
+/// Rows of a sheet in Excel itself.
+const MAX_ROWS: u32 = 1 << 20;
+
 /// Minimum size of a shared string in bytes, `<si/>`.
 const SHARED_STRING_BYTES: u64 = 5;
 
@@ -147,7 +150,7 @@ impl PieceChecker {
         let (mut buffer, mut depth) = (Vec::new(), 0usize);
         // Depth of the current cell: texts of several pieces are joined there.
         let mut cell: Option<usize> = None;
-        let mut strings = 0;
+        let (mut strings, mut rows) = (0, 0);
         loop {
             buffer.clear();
             if cell.is_none() {
@@ -157,6 +160,12 @@ impl PieceChecker {
                 quick_xml::Error::Io(error) => error.to_string(),
                 error => format!("is not XML: {error}"),
             })?;
+            if let Event::Start(tag) | Event::Empty(tag) = &event {
+                rows += u32::from(self.kind == Kind::Sheet && tag.local_name().as_ref() == "row");
+            }
+            if rows > MAX_ROWS {
+                return Err(format!("has more than the {MAX_ROWS} rows of Excel"));
+            }
             match event {
                 Event::Start(tag) => {
                     depth += 1;

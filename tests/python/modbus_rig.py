@@ -9,6 +9,7 @@ itself if the heartbeat stops. Register 150 sets how the server misbehaves from 
 import asyncio
 import importlib.machinery
 import importlib.util
+import math
 import pathlib
 import struct
 import sys
@@ -25,9 +26,12 @@ ALL_DEVICES = 0
 WATCHDOG_S = 2.0
 MISDEED = 150
 # Of writes below register 150: acknowledges another register, fewer registers, is busy each other time (exception 6); of all: closes the
-# connection after each answer; from 100 on writes, from 200 on reads are refused for ever with the exception of the rest.
-MISDEEDS = HONEST, OTHER_REGISTER, FEWER_REGISTERS, BUSY_ONCE, CLOSES = range(5)
+# connection after each answer, or answers with another unit, transaction or function, or one byte short; of reads: T2 is NaN or infinite; of
+# heartbeats: refuses them; from 100 on writes, from 200 on reads are refused for ever with the exception of the rest.
+MISDEEDS = HONEST, OTHER_REGISTER, FEWER_REGISTERS, BUSY_ONCE, CLOSES, OTHER_UNIT, OTHER_TRANSACTION, OTHER_FUNCTION, NAN, INFINITE, NO_HEARTBEAT = range(11)
 OF_WRITES, OF_READS = 100, 200
+# Byte of a frame, and how it is changed.
+OF_FRAMES = {OTHER_UNIT: 6, OTHER_TRANSACTION: 1, OTHER_FUNCTION: 7}
 
 root = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(root / "plugins/drivers/python"))
@@ -59,8 +63,12 @@ class Misdeeds:
         # The test itself reads one register at a time.
         if self.kind >= OF_READS and pdu.function_code == READ_HOLDING and len(pdu.registers) > 1:
             return self.refusal(pdu, self.kind - OF_READS)
+        if self.kind in (NAN, INFINITE) and pdu.function_code == READ_HOLDING and len(pdu.registers) == 2:
+            pdu.registers = words(math.nan if self.kind == NAN else math.inf)
         if pdu.function_code != WRITE_HOLDING or pdu.address >= MISDEED:
             return pdu
+        if self.kind == NO_HEARTBEAT and pdu.address == 111:
+            return self.refusal(pdu, 2)
         self.writes += 1
         if self.kind == OTHER_REGISTER:
             pdu.address += 1
@@ -71,6 +79,14 @@ class Misdeeds:
         elif OF_WRITES <= self.kind < OF_READS:
             return self.refusal(pdu, self.kind - OF_WRITES)
         return pdu
+
+    def trace_bytes(self, sending, frame):
+        # The test itself writes by function 6, and reads one register at a time.
+        if not sending or self.kind not in OF_FRAMES or len(frame) < 12 or frame[7] == 6:
+            return frame
+        changed = bytearray(frame)
+        changed[OF_FRAMES[self.kind]] ^= 7
+        return bytes(changed)
 
     @staticmethod
     def refusal(pdu, code):
@@ -118,7 +134,7 @@ async def main():
     device = SimDevice(id=ALL_DEVICES, simdata=SimData(0, values=registers, datatype=DataType.REGISTERS))
     address = ("127.0.0.1", int(sys.argv[1]) if len(sys.argv) > 1 else 0)
     misdeeds = Misdeeds()
-    server = misdeeds.server = ModbusTcpServer(device, address=address, trace_pdu=misdeeds.trace)
+    server = misdeeds.server = ModbusTcpServer(device, address=address, trace_pdu=misdeeds.trace, trace_packet=misdeeds.trace_bytes)
     await server.serve_forever(background=True)
     filled = asyncio.Event()
     living = asyncio.create_task(live(server, filled, misdeeds))

@@ -1,6 +1,6 @@
 """The small rig of plugins/drivers/python in real time behind asyncua, an OPC UA server that shares no code with the driver.
 
-Usage: opcua_rig.py [PORT] [--secure DIRECTORY [--user NAME] [--password WORD] [--days N]] [--seed N] [--stamps] [--sessions N] [--misdeed KIND] [--answers CODE]. Prints the port, then serves until standard input is closed. Nodes: ns=2;s=NAME for each
+Usage: opcua_rig.py [PORT] [--secure DIRECTORY [--user NAME] [--password WORD] [--days N]] [--seed N] [--stamps] [--sessions N] [--misdeeds NAME=KIND,...] [--answers CODE]. Prints the port, then serves until standard input is closed. Nodes: ns=2;s=NAME for each
 reading and setpoint (p3, t3, valve, oil_temperature), air (Boolean), heartbeat (UInt32), tripped (Boolean); text, flag, table, whole (of other types). As a PLC has to, it cuts the
 air by itself if the heartbeat stops. Values that no stand could bear are refused with BadOutOfRange.
 
@@ -8,7 +8,8 @@ With --secure it takes signed and encrypted sessions alone, of the user `lab` wi
 if it has none yet, valid for a year or for N days. With --stamps it prints `SECONDS read RPM` for each speed that it hands out and `SECONDS write NAMES` for each set-point that it
 takes, on the clock of time.monotonic(): behind its decryption, so that a session may be encrypted. With --sessions it holds so many sessions at a time and
 refuses others with BadTooManySessions, as small PLCs do: a session, also one without a successful login, is held until its client closes it.
-With --misdeed, from the first time that the air is on: `boolean`, T2 becomes a truth value; `future`, readings are stamped an hour ahead; the name of a status code, all of them have it. With --answers CODE writes of
+With --misdeeds, from the first time that the air is on, readings become: `boolean`, a truth value; `int64`, a whole number; `text`; `null`; `inf`; `future`, `past`, stamped an hour off;
+`unstamped`; a number, with that status code; the name of a status code, with it. With --answers CODE writes of
 setpoints are answered with that status.
 """
 
@@ -18,6 +19,7 @@ import datetime
 import importlib.machinery
 import importlib.util
 import logging
+import math
 import pathlib
 import socket
 import sys
@@ -100,7 +102,7 @@ async def make(arguments):
     for name in [*SETPOINTS, "air", "heartbeat", "flag", "whole"]:
         await nodes[name].set_writable()
     refuse_what_is_too_much(server, index, arguments.answers)
-    if arguments.misdeed == "boolean":
+    if arguments.misdeeds:
         # asyncua keeps the type of a node; not every PLC does.
         server.iserver.aspace._is_expected_variant_type = lambda *_: True
     if arguments.sessions is not None:
@@ -180,15 +182,18 @@ def stamp(server, index):
     service.read, service.write = stamped_read, stamped_write
 
 
-async def live(server, nodes, seed, filled, misdeed):
+async def live(server, nodes, seed, filled, misdeeds):
     """The rig follows its nodes, and fills them; says when it has done so first."""
 
     async def put(name, value, kind, misdeed=None):
         now = datetime.datetime.now(datetime.timezone.utc)
-        taken = now + datetime.timedelta(hours=1) if misdeed == "future" else now
-        status = ua.StatusCode(getattr(ua.StatusCodes, misdeed or "Good", ua.StatusCodes.Good))
-        if misdeed == "boolean" and name == "T2":
-            value, kind = True, ua.VariantType.Boolean
+        hour = datetime.timedelta(hours=1)
+        taken = {"future": now + hour, "past": now - hour, "unstamped": None}.get(misdeed, now)
+        number = int(misdeed, 16) if (misdeed or "").startswith("0x") else None
+        status = ua.StatusCode(number or getattr(ua.StatusCodes, misdeed or "Good", ua.StatusCodes.Good))
+        changed = {"boolean": (True, ua.VariantType.Boolean), "int64": (int(value), ua.VariantType.Int64), "text": (str(value), ua.VariantType.String),
+                   "null": (None, ua.VariantType.Null), "inf": (math.inf, ua.VariantType.Double)}
+        value, kind = changed.get(misdeed, (value, kind))
         stamped = ua.DataValue(ua.Variant(value, kind), status, SourceTimestamp=taken, ServerTimestamp=now)
         await server.write_attribute_value(nodes[name].nodeid, stamped)
 
@@ -213,7 +218,7 @@ async def live(server, nodes, seed, filled, misdeed):
         times, columns, _ = rig.poll(now - begun)
         if times:
             for name in CHANNELS:
-                await put(name, columns[name][-1], ua.VariantType.Double, misdeed if misbehaves else None)
+                await put(name, columns[name][-1], ua.VariantType.Double, misdeeds.get(name) if misbehaves else None)
             filled.set()
         await asyncio.sleep(0.02)
 
@@ -228,10 +233,11 @@ async def main():
     parser.add_argument("--password", default="hunter2")
     parser.add_argument("--days", type=int, default=365)
     parser.add_argument("--sessions", type=int)
-    parser.add_argument("--misdeed")
+    parser.add_argument("--misdeeds")
     parser.add_argument("--answers")
     arguments = parser.parse_args()
     logging.disable(logging.ERROR)
+    misdeeds = dict(one.split("=") for one in arguments.misdeeds.split(",")) if arguments.misdeeds else {}
     if not arguments.port:
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
@@ -239,7 +245,7 @@ async def main():
     server, nodes = await make(arguments)
     async with server:
         filled = asyncio.Event()
-        living = asyncio.create_task(live(server, nodes, arguments.seed, filled, arguments.misdeed))
+        living = asyncio.create_task(live(server, nodes, arguments.seed, filled, misdeeds))
         # Whoever arms it looks at its readings first.
         await filled.wait()
         print(arguments.port, flush=True)

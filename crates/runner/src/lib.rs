@@ -15,11 +15,11 @@ pub use backends::auxiliary_instruments::{AuxiliaryInstrument, RigWithInstrument
 pub use backends::deadline::{DeadlineBackend, Deadlines};
 pub use guards::batch_watch::BatchWatch;
 pub use guards::guard::{CommandedState, Guard, Trip};
-pub use guards::instrument_watch::{InstrumentChannel, InstrumentWatch};
 pub use guards::plausibility_watch::{PlausibilityWatch, ReadingBounds};
 pub use guards::rig_watch::RigWatch;
 pub use guards::signal_watch::SignalWatch;
-pub use guards::start_check::StartCheck;
+pub use guards::silence_watch::{SilenceWatch, UnguardedChannel};
+pub use guards::start_check::{REQUIRED_CHANNELS, StartCheck};
 pub use guards::surge_watch::SurgeWatch;
 pub use run_control::observer::{ObserverError, RunObserver};
 pub use run_control::operator::Operator;

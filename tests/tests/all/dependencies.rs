@@ -51,7 +51,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-driver",    &["core", "driver-host"]),
     ("mapper-backend-lab", &["core", "campaign", "session", "backends", "effects", "driver"]),
     // Common part of drivers for controllers.
-    ("mapper-controller", &["core", "yaml"]),
+    ("mapper-controller", &["core", "yaml", "driver"]),
     ("mapper-backend-ak", &["core", "yaml", "driver"]),
     ("mapper-backend-modbus", &["core", "yaml", "driver", "controller"]),
     ("mapper-backend-opcua", &["core", "yaml", "driver", "controller"]),

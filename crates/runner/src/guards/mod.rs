@@ -2,11 +2,11 @@
 
 pub(crate) mod batch_watch;
 pub(crate) mod guard;
-pub(crate) mod instrument_watch;
 pub(crate) mod plausibility_watch;
 pub(crate) mod recent_minimum;
 pub(crate) mod rig_watch;
 pub(crate) mod signal_watch;
+pub(crate) mod silence_watch;
 pub(crate) mod speed_history;
 pub(crate) mod start_check;
 pub(crate) mod surge_watch;

@@ -8,6 +8,7 @@
 //! | range | [`plausible`]: no machine of any size reads beyond it |
 //! | jump | a sensor with a first-order lag covers at most `1 - exp(-dt/lag)` of the distance to the end of its range |
 //! | T2 | compression heats the gas at least isentropically; the housing cools it by at most half of the difference to its own temperature |
+//! | P2 | a driven compressor does not expand its gas |
 //! | N | a wheel transfers at most the square of its tip speed as specific work (Euler, without pre-swirl) |
 //! | m_c | a compressor at a pressure ratio delivers flow; backflow in surge is shorter than a surge cycle |
 //! | P3, T3 | expansion lowers pressure and temperature; only the housing heats the gas |
@@ -60,7 +61,7 @@ const SENSOR_OFFSETS_K: f64 = 3.0;
 const HEAD_MAX_RATIO: f64 = 1.5;
 /// Maximum duration of backflow in surge, s: surge cycles of turbochargers are shorter.
 const MAX_BACKFLOW_S: f64 = 1.0;
-/// Minimum ratio of P3 to P4, offsets and taps included.
+/// Minimum ratio of P3 to P4 and of P2 to P1, offsets and taps included.
 const MIN_EXPANSION_RATIO: f64 = 0.9;
 /// Noise that a jump must exceed: two readings with six standard deviations each, and the resolution of a logger, K.
 const NOISE_SIGMAS: f64 = 12.0;
@@ -113,6 +114,7 @@ enum Rule {
     /// One of several T2 sensors.
     OutletProbe(Sensor),
     OutletTemperature,
+    OutletPressure,
     Head,
     Flow,
     TurbinePressure,
@@ -126,6 +128,7 @@ impl Rule {
         let channels = match self {
             Rule::Range(sensor) | Rule::Jump(sensor) | Rule::OutletProbe(sensor) => return vec![sensor],
             Rule::OutletTemperature => vec![C::P1, C::T1, C::P2, C::T2],
+            Rule::OutletPressure => vec![C::P1, C::P2],
             Rule::Head => vec![C::ShaftSpeed, C::P1, C::T1, C::P2],
             Rule::Flow => vec![C::CompressorFlow],
             Rule::TurbinePressure => vec![C::P3, C::P4],
@@ -293,6 +296,11 @@ impl PlausibilityWatch {
         let read = (self.latest(C::P1, t_s), self.latest(C::T1, t_s), self.latest(C::P2, t_s));
         let (Some(p1_pa), Some(t1_k), Some(p2_pa)) = read else { return found };
         let pr = p2_pa / p1_pa;
+        if pr < MIN_EXPANSION_RATIO {
+            let (p1, p2) = (format_value(C::P1, p1_pa), format_value(C::P2, p2_pa));
+            let reason = format!("P2 reads {p2} and P1 {p1}, although a compressor does not expand its gas");
+            found.push((Rule::OutletPressure, reason));
+        }
         let min_pr = (pr / TAP_RATIO).max(1.0);
         let isentropic_k = t1_k * min_pr.powf(ISENTROPIC_EXPONENT);
         let at = || format!("P2/P1 = {pr:.2} and T1 = {}", format_value(C::T1, t1_k));

@@ -8,7 +8,7 @@ const CHECK_DURATION_S: f64 = 5.0;
 /// Allowed offset of a source's clock, s.
 const MAX_CLOCK_OFFSET_S: f64 = 1.0;
 /// Channels that identification requires: a fault in one ends the run, faults in others are noted.
-pub(crate) const REQUIRED_CHANNELS: [Channel; 7] = [
+pub const REQUIRED_CHANNELS: [Channel; 7] = [
     Channel::ShaftSpeed,
     Channel::CompressorFlow,
     Channel::P1,

@@ -164,6 +164,7 @@ fn readings_that_contradict_physics_end_the_run() {
         (Fault::Shifted(T2, -50.0), T2),
         (Fault::Scaled(P2, 1e-3), P2),
         (Fault::Scaled(P2, 2.5), P2),
+        (Fault::Scaled(P2, 0.4), P2),
         (Fault::Scaled(P1, 1e-3), P1),
         (Fault::Scaled(P1, 0.5), P1),
         (Fault::Shifted(T1, -273.15), T1),

@@ -8,8 +8,8 @@ use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::speed_response::speed_response;
 use mapper_physics::simulation::model::Model;
 use mapper_runner::{
-    InstrumentChannel, Operator, Protection, ReadingBounds, RunEnd, RunError, RunObserver, Runner,
-    SoakSource, SpeedControl, SpeedControlLimits, StepSource,
+    Operator, Protection, ReadingBounds, RunEnd, RunError, RunObserver, Runner, SoakSource, SpeedControl,
+    SpeedControlLimits, StepSource, UnguardedChannel,
 };
 use std::sync::atomic::AtomicBool;
 
@@ -52,7 +52,7 @@ pub struct Pace<'a> {
     /// Other operator requests.
     pub operator: Option<&'a Operator>,
     /// Channels of auxiliary instruments; a guard watches that their data arrive.
-    pub read: &'a [InstrumentChannel],
+    pub read: &'a [UnguardedChannel],
 }
 
 /// Same as [`drive`], at a given pace.

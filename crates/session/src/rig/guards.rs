@@ -1,10 +1,11 @@
 //! Guards that end a step or a run before damage.
 
 use crate::SessionError;
-use mapper_campaign::Campaign;
-use mapper_core::{GuardName, RigDescription};
+use mapper_campaign::{Campaign, DEFAULT_MAX_AGE_S};
+use mapper_core::{Channel, GuardName, RigDescription};
 use mapper_runner::{
-    BatchWatch, Guard, InstrumentChannel, InstrumentWatch, RigWatch, SignalWatch, StartCheck, SurgeWatch,
+    BatchWatch, Guard, REQUIRED_CHANNELS, RigWatch, SignalWatch, SilenceWatch, StartCheck, SurgeWatch,
+    UnguardedChannel,
 };
 
 /// Makes the guards for a run of this campaign on this rig. A default guard is omitted if the rig does not deliver its signal. Declared and
@@ -12,9 +13,10 @@ use mapper_runner::{
 pub fn make_guards(
     campaign: &Campaign,
     rig: &RigDescription,
-    instruments: &[InstrumentChannel],
+    read: &[UnguardedChannel],
 ) -> Vec<Box<dyn Guard>> {
     let set = campaign.guard_set();
+    let guarded: Vec<Channel> = set.signals.iter().map(|spec| spec.channel).collect();
     let mut guards: Vec<Box<dyn Guard>> = vec![Box::new(BatchWatch::default())];
     for spec in set.signals {
         let required = campaign.guards.is_some() || rig.needs_guarded.contains(&spec.name);
@@ -23,14 +25,31 @@ pub fn make_guards(
         }
     }
     guards.extend(set.surge.map(|spec| Box::new(SurgeWatch::new(spec)) as Box<dyn Guard>));
-    if !instruments.is_empty() {
-        guards.push(Box::new(InstrumentWatch::new(instruments.to_vec())));
-    }
     if rig.controls {
+        let mut watched = read.to_vec();
+        let is_new = |channel: &&Channel| {
+            !guarded.contains(channel) && !read.iter().any(|other| other.channel == **channel)
+        };
+        let required = REQUIRED_CHANNELS.iter().filter(|channel| rig.channels.contains(channel));
+        watched.extend(required.filter(is_new).map(|channel| UnguardedChannel {
+            source: rig.backend.clone(),
+            channel: *channel,
+            age_s: max_age_s(campaign, rig),
+        }));
+        guards.push(Box::new(SilenceWatch::new(watched)));
         guards.push(Box::new(RigWatch::default()));
         guards.push(Box::new(StartCheck::new(rig.channels.clone())));
     }
     guards
+}
+
+/// Number of samples that a source may miss before it counts as silent.
+const MAX_MISSED_SAMPLES: f64 = 3.0;
+
+/// Age after which a channel of this source is silent, s.
+pub(crate) fn max_age_s(campaign: &Campaign, source: &RigDescription) -> f64 {
+    let age_s = campaign.guard_set().signals.first().map_or(DEFAULT_MAX_AGE_S, |guard| guard.age_s);
+    age_s.max(MAX_MISSED_SAMPLES / source.sample_rate_hz.max(1e-3))
 }
 
 /// Checks that every guard the rig requires is present, and that its channel is delivered.

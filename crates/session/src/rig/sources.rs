@@ -1,17 +1,16 @@
 //! The data sources of a campaign: the rig and auxiliary instruments.
 
+use crate::rig::guards::max_age_s;
 use crate::{Registry, SessionError};
+use mapper_campaign::Campaign;
 use mapper_campaign::campaign::ReaderChoice;
-use mapper_campaign::{Campaign, DEFAULT_MAX_AGE_S};
 use mapper_core::{Backend, BackendError, Channel, RigDescription};
 use mapper_physics::simulation::model::Model;
-use mapper_runner::{AuxiliaryInstrument, InstrumentChannel, RigWithInstruments};
+use mapper_runner::{AuxiliaryInstrument, RigWithInstruments, UnguardedChannel};
 use std::time::Duration;
 
 /// Connection timeout of an auxiliary instrument, equal to that of a rig.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(11);
-/// An instrument counts as silent after this number of missed samples, if its data are also older than the allowed signal age.
-const MAX_MISSED_SAMPLES: f64 = 3.0;
 
 /// Why a source cannot serve as an auxiliary instrument.
 #[derive(Debug, thiserror::Error)]
@@ -33,7 +32,7 @@ pub struct Sources {
     /// All sources combined into one backend.
     pub backend: Box<dyn Backend>,
     /// Every channel of an auxiliary instrument.
-    pub read: Vec<InstrumentChannel>,
+    pub read: Vec<UnguardedChannel>,
     /// Names of instruments that only one run may use at a time.
     pub exclusive: Vec<String>,
 }
@@ -50,7 +49,6 @@ impl Registry {
             return Ok(Sources { backend: rig, read: Vec::new(), exclusive: Vec::new() });
         }
         let rig_description = rig.describe();
-        let age_s = campaign.guard_set().signals.first().map_or(DEFAULT_MAX_AGE_S, |guard| guard.age_s);
         let mut providers: Vec<(Channel, Provider)> =
             rig_description.channels.iter().map(|channel| (*channel, Provider::Rig)).collect();
         let (mut readers, mut read, mut exclusive) = (Vec::new(), Vec::new(), Vec::new());
@@ -67,9 +65,9 @@ impl Registry {
             let backend = self.make_named_backend(&choice.backend, campaign, model).map_err(wrong)?;
             let rig = backend.describe();
             let channels = select_channels(choice, &rig, &mut providers)?;
-            let age_s = age_s.max(MAX_MISSED_SAMPLES / rig.sample_rate_hz.max(1e-3));
-            let as_read = |channel: &Channel| InstrumentChannel {
-                reader: choice.name.clone(),
+            let age_s = max_age_s(campaign, &rig);
+            let as_read = |channel: &Channel| UnguardedChannel {
+                source: choice.name.clone(),
                 channel: *channel,
                 age_s,
             };

@@ -6,6 +6,7 @@ use mapper_core::{
     Backend, BackendError, Channel, ChannelColumn, Event, EventKind, RigDescription, SafeTrajectory,
     SampleBatch, SetpointRange, SetpointRanges, Setpoints,
 };
+use mapper_driver::Outage;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::io::{Read, Write};
@@ -44,6 +45,7 @@ struct Armed {
     last_s: f64,
     /// The last reported error status.
     error: u8,
+    silent: Outage,
 }
 
 struct Instrument {
@@ -123,7 +125,7 @@ impl Backend for Instrument {
             let requested = self.request(code, channel);
             requested.map_err(|error| BackendError::Lost { t_s: 0.0, source: Box::new(error) })?;
         }
-        self.armed = Some(Armed { sequence: 0, last_s: -1.0, error: 0 });
+        self.armed = Some(Armed { sequence: 0, last_s: -1.0, error: 0, silent: Outage::default() });
         Ok(())
     }
 
@@ -140,19 +142,27 @@ impl Backend for Instrument {
             return Ok(SampleBatch { first_sequence, ..SampleBatch::default() });
         }
         (armed.last_s, armed.sequence) = (until_s, first_sequence + 1);
-        let (mut values, mut error) = (BTreeMap::<Channel, f64>::new(), before);
+        let (mut values, mut error, mut failure) = (BTreeMap::<Channel, f64>::new(), before, None);
         for ((code, channel), numbers) in self.requests.clone() {
             // If the instrument does not answer, the sample has no readings, and the guards count how long that lasts.
-            let Ok(answer) = self.request(code, channel) else { continue };
+            let answer = match self.request(code, channel) {
+                Ok(answer) => answer,
+                Err(error) => {
+                    failure = Some(error.to_string());
+                    continue;
+                }
+            };
             error = answer.error;
             for (channel, entry) in numbers {
                 let value = answer.number(entry.value).map(|number| number * entry.scale + entry.offset);
                 values.insert(channel, value.filter(|value| value.is_finite()).unwrap_or(f64::NAN));
             }
         }
-        self.armed("poll")?.error = error;
-        let message = format!("{}: error status {error}", self.settings.address);
-        let note = (error != before).then_some(Event { t_s: until_s, kind: EventKind::Note, message });
+        let armed = self.armed("poll")?;
+        armed.error = error;
+        let silent = armed.silent.update("missing readings", until_s, failure);
+        let status = (error != before).then(|| format!("{}: error status {error}", self.settings.address));
+        let note = |message| Event { t_s: until_s, kind: EventKind::Note, message };
         let column = |channel: &Channel| ChannelColumn {
             channel: *channel,
             values: vec![values.get(channel).copied().unwrap_or(f64::NAN)],
@@ -161,7 +171,7 @@ impl Backend for Instrument {
             first_sequence,
             t_s: vec![until_s],
             columns: self.settings.read.keys().map(column).collect(),
-            events: note.into_iter().collect(),
+            events: silent.into_iter().chain(status).map(note).collect(),
             ..SampleBatch::default()
         })
     }

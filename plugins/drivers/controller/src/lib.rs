@@ -31,8 +31,8 @@ pub trait Controller: Send {
     /// If the controller cannot be reached, or a channel cannot be read.
     fn open(&mut self) -> Result<(), Self::Error>;
 
-    /// Reads all channels for the sample at `t_s`, s since arming, and omits a channel that could not be read.
-    fn read(&mut self, t_s: f64) -> BTreeMap<Channel, Reading>;
+    /// Reads all channels for the sample at `t_s`, s since arming. Omits a channel that could not be read, and returns the reason.
+    fn read(&mut self, t_s: f64) -> (BTreeMap<Channel, Reading>, Option<Self::Error>);
 
     /// Writes these values, SI, one after the other in this order.
     ///

@@ -8,10 +8,13 @@ use mapper_core::{
     Backend, BackendError, Channel, ChannelColumn, Event, EventKind, Provenance, Quality, RigDescription,
     RigMode, SampleBatch, Setpoints,
 };
+use mapper_driver::Outage;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Interval of the heartbeat count, s.
 const HEARTBEAT_S: f64 = 0.5;
+/// Time without an accepted heartbeat after which the air counts as cut, s: twice the time of the watchdog (docs/how-to/rig.md, duties of the PLC).
+const HEARTBEAT_LOST_S: f64 = 4.0;
 /// The commands, as channels.
 const COMMANDS: [Channel; 4] =
     [Channel::P3Command, Channel::T3Command, Channel::ValveCommand, Channel::TOilCommand];
@@ -33,6 +36,17 @@ impl Reading {
     /// A good reading with its time of arrival.
     pub fn good(value: f64) -> Reading {
         Reading { value, source_t_s: None, quality: Quality::Good, reason: String::new() }
+    }
+
+    /// Marks a value that is not a finite number as bad.
+    fn judge(&mut self) {
+        if !self.value.is_finite() {
+            self.quality = Quality::Bad;
+            if self.reason.is_empty() {
+                self.reason = format!("no number: {}", self.value);
+            }
+            self.value = f64::NAN;
+        }
     }
 }
 
@@ -107,6 +121,10 @@ struct Armed {
     last_heartbeat_s: f64,
     /// Readings already reported as not good, with the reason.
     reported: BTreeSet<(Channel, Quality, String)>,
+    unread: Outage,
+    unsent_heartbeats: Outage,
+    /// Time of the last heartbeat that the controller accepted, s; `None` once its loss was reported.
+    accepted_heartbeat_s: Option<f64>,
 }
 
 impl<C: Controller> Rig<C> {
@@ -123,19 +141,31 @@ impl<C: Controller> Rig<C> {
         self.controller.write(values).map_err(|error| self.lost(error))
     }
 
-    fn send_heartbeat(&mut self, until_s: f64) {
-        let Some(armed) = self.armed.as_mut().filter(|armed| until_s - armed.last_heartbeat_s >= HEARTBEAT_S)
-        else {
-            return;
-        };
+    /// Sends the heartbeat if it is due. If it does not arrive, the controller cuts the air, as intended.
+    fn send_heartbeat(&mut self, until_s: f64) -> Option<String> {
+        let armed = self.armed.as_mut().filter(|armed| until_s - armed.last_heartbeat_s >= HEARTBEAT_S)?;
         armed.last_heartbeat_s = until_s;
         armed.heartbeat = (armed.heartbeat + 1) % (MAX_HEARTBEAT + 1);
-        let count = f64::from(armed.heartbeat);
-        // If it does not arrive, the controller cuts the air, as intended.
-        let _ = self.write(&[(Target::Heartbeat, count)]);
+        let sent = self.controller.write(&[(Target::Heartbeat, f64::from(armed.heartbeat))]);
+        if sent.is_ok() {
+            armed.accepted_heartbeat_s = Some(until_s);
+        }
+        let failure = sent.err().map(|error| error.to_string());
+        armed.unsent_heartbeats.update("heartbeats that the controller did not accept", until_s, failure)
     }
 
-    /// Reports the channels that the controller does not mark as good, once for each quality and reason.
+    /// Reports once that the watchdog of the controller has cut the air.
+    fn report_trip(&mut self, until_s: f64) -> Option<Event> {
+        let armed = self.armed.as_mut()?;
+        let since_s = armed.accepted_heartbeat_s.filter(|since_s| until_s - since_s > HEARTBEAT_LOST_S)?;
+        armed.accepted_heartbeat_s = None;
+        let message = format!(
+            "no heartbeat was accepted since {since_s:.1} s, so that the controller's watchdog cuts the air"
+        );
+        Some(Event { t_s: until_s, kind: EventKind::RigTripped, message })
+    }
+
+    /// Reports the channels whose readings are not good, once for each quality and reason.
     fn report_bad_readings(&mut self, readings: &BTreeMap<Channel, Reading>) -> Option<String> {
         let reported = &mut self.armed.as_mut()?.reported;
         let bad_readings = readings.iter().filter(|(_, reading)| reading.quality != Quality::Good);
@@ -151,7 +181,7 @@ impl<C: Controller> Rig<C> {
             .collect();
         (!new.is_empty()).then(|| {
             format!(
-                "the controller reports bad or uncertain readings: {}; check these sensors (the recording has the quality of each reading)",
+                "bad or uncertain readings: {}; check these sensors (the recording has the quality of each reading)",
                 new.join(", ")
             )
         })
@@ -225,7 +255,7 @@ impl<C: Controller> Backend for Rig<C> {
             return Err(self.lost(error));
         }
         // A wrong word order or scale would also be wrong in every write.
-        let readings = self.controller.read(0.0);
+        let (readings, _) = self.controller.read(0.0);
         let readings = readings.iter().map(|(channel, reading)| (*channel, reading.value));
         if let Err(implausible) = implausible::check(&self.controller, readings) {
             self.controller.close();
@@ -250,6 +280,9 @@ impl<C: Controller> Backend for Rig<C> {
             heartbeat: 0,
             last_heartbeat_s: 0.0,
             reported: BTreeSet::new(),
+            unread: Outage::default(),
+            unsent_heartbeats: Outage::default(),
+            accepted_heartbeat_s: Some(0.0),
         });
         Ok(())
     }
@@ -284,9 +317,12 @@ impl<C: Controller> Backend for Rig<C> {
         }
         armed.last_s = until_s;
         armed.sequence += 1;
-        self.send_heartbeat(until_s);
+        let heartbeat = self.send_heartbeat(until_s);
         // If the controller does not answer, the sample has no readings, and the guards count how long that lasts.
-        let readings = self.controller.read(until_s);
+        let (mut readings, failure) = self.controller.read(until_s);
+        readings.values_mut().for_each(Reading::judge);
+        let unread = &mut self.armed("poll")?.unread;
+        let unread = unread.update("missing readings", until_s, failure.map(|error| error.to_string()));
         let column = |channel: Channel| {
             let value = if COMMANDS.contains(&channel) {
                 command(channel, setpoints)
@@ -295,14 +331,20 @@ impl<C: Controller> Backend for Rig<C> {
             };
             ChannelColumn { channel, values: vec![value] }
         };
-        let report_bad_readings = self.report_bad_readings(&readings);
+        let bad = self.report_bad_readings(&readings);
+        let trip = self.report_trip(until_s);
         let note = |message| Event { t_s: until_s, kind: EventKind::Note, message };
         Ok(SampleBatch {
             first_sequence,
             t_s: vec![until_s],
             columns: self.channels().into_iter().map(column).collect(),
             provenance: provenance(&readings, until_s),
-            events: self.controller.remark().into_iter().chain(report_bad_readings).map(note).collect(),
+            events: [self.controller.remark(), heartbeat, unread, bad]
+                .into_iter()
+                .flatten()
+                .map(note)
+                .chain(trip)
+                .collect(),
             ..SampleBatch::default()
         })
     }

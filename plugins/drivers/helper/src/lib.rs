@@ -25,6 +25,7 @@ mod address;
 mod armed;
 mod by_channel;
 mod descent;
+mod outage;
 mod output_queue;
 mod pipes;
 mod refusal;
@@ -37,6 +38,7 @@ mod socket;
 pub use about::{About, SOCKET};
 pub use address::address;
 pub use by_channel::by_channel;
+pub use outage::Outage;
 pub use pipes::serve;
 pub use secret::{SecretError, secret};
 #[cfg(unix)]

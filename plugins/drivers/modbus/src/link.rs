@@ -4,12 +4,14 @@
 
 use crate::blocks::Block;
 use std::future::Future;
+use std::io::ErrorKind;
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 use tokio::runtime::Runtime;
 use tokio::time::timeout;
+use tokio_modbus::ProtocolError;
 use tokio_modbus::client::{Client, Context, tcp};
-use tokio_modbus::prelude::{ExceptionCode, Reader, Request, Response, Slave};
+use tokio_modbus::prelude::{ExceptionCode, Request, Response, Slave};
 
 /// Why a call failed.
 #[derive(Debug, thiserror::Error)]
@@ -101,16 +103,24 @@ impl Link {
 
     fn read_once(&mut self, table: Table, block: Block) -> Result<Vec<u16>, LinkError> {
         let Block { start, count } = block;
-        let registers =
-            self.call(format!("registers {start} to {}", start + (count - 1)), async |link| match table {
-                Table::Holding => link.read_holding_registers(start, count).await,
-                Table::Input => link.read_input_registers(start, count).await,
-            })?;
-        if registers.len() == usize::from(count) {
-            return Ok(registers);
-        }
+        let request = || match table {
+            Table::Holding => Request::ReadHoldingRegisters(start, count),
+            Table::Input => Request::ReadInputRegisters(start, count),
+        };
+        let operation = format!("registers {start} to {}", start + (count - 1));
+        // The reading functions of the library would panic on a wrong number of registers.
+        let reason = match self.call(operation, async |link| link.call(request()).await)? {
+            Response::ReadHoldingRegisters(registers) | Response::ReadInputRegisters(registers)
+                if registers.len() == usize::from(count) =>
+            {
+                return Ok(registers);
+            }
+            Response::ReadHoldingRegisters(registers) | Response::ReadInputRegisters(registers) => {
+                format!("{} registers received, {count} requested", registers.len())
+            }
+            other => format!("a read was answered with function {}", other.function_code()),
+        };
         self.connection = None;
-        let reason = format!("{} registers received, {count} requested", registers.len());
         Err(LinkError::Failed { address: self.address, reason })
     }
 
@@ -144,7 +154,7 @@ impl Link {
                 "{} registers from {start} on were written, and {count} from {address} on acknowledged",
                 registers.len()
             ),
-            other => format!("a write was answered with {other:?}"),
+            other => format!("a write was answered with function {}", other.function_code()),
         };
         self.connection = None;
         Err(LinkError::Failed { address: self.address, reason })
@@ -186,7 +196,7 @@ impl Link {
         let answer = self.runtime.block_on(in_time(within, request(&mut connection)));
         match answer {
             None => Err(LinkError::Late { address, within }),
-            Some(Err(error)) => Err(LinkError::Failed { address, reason: error.to_string() }),
+            Some(Err(error)) => Err(LinkError::Failed { address, reason: describe_failure(&error) }),
             Some(Ok(answer)) => {
                 self.connection = Some(connection);
                 answer.map_err(|code| LinkError::Refused {
@@ -197,6 +207,25 @@ impl Link {
                 })
             }
         }
+    }
+}
+
+/// Describes a failure without the registers of a wrong answer, which differ each time.
+fn describe_failure(error: &tokio_modbus::Error) -> String {
+    match error {
+        tokio_modbus::Error::Protocol(ProtocolError::HeaderMismatch { .. }) => {
+            "an answer has another transaction or unit than its request".to_owned()
+        }
+        tokio_modbus::Error::Protocol(ProtocolError::FunctionCodeMismatch { request, .. }) => {
+            format!("an answer to function {request} has another function code")
+        }
+        // The library reports a closed connection as the last error of the thread, whatever that was.
+        tokio_modbus::Error::Transport(error)
+            if error.raw_os_error().is_some() && error.kind() != ErrorKind::ConnectionReset =>
+        {
+            "the controller closed the connection".to_owned()
+        }
+        tokio_modbus::Error::Transport(error) => error.to_string(),
     }
 }
 

@@ -23,10 +23,7 @@ pub(crate) fn open(value: &Value) -> Result<Box<dyn Backend>, BackendError> {
         group_registers(&pieces.collect::<Vec<_>>()).into_iter().map(move |block| (table, block))
     };
     let blocks = tables.into_iter().flat_map(pieces).collect();
-    Ok(rig(
-        settings.stand(),
-        Registers { settings, link, blocks, last: BTreeMap::new(), failing: None, remark: None },
-    ))
+    Ok(rig(settings.stand(), Registers { settings, link, blocks, last: BTreeMap::new() }))
 }
 
 struct Registers {
@@ -35,10 +32,6 @@ struct Registers {
     blocks: Vec<(Table, Block)>,
     /// Register contents of the last read.
     last: BTreeMap<(Table, u16), u16>,
-    /// Why registers cannot be read, and the number of affected samples; `None` while all can be read.
-    failing: Option<(String, usize)>,
-    /// The message about it that is still to be sent.
-    remark: Option<String>,
 }
 
 impl Registers {
@@ -46,25 +39,6 @@ impl Registers {
         (entry.register..entry.register + entry.form.count())
             .filter_map(|at| self.last.get(&(entry.table, at)).copied())
             .collect()
-    }
-
-    /// Reports once why registers cannot be read, and once they can, how many samples were affected.
-    fn note(&mut self, failed: Option<LinkError>) {
-        match (failed.map(|error| error.to_string()), &mut self.failing) {
-            (None, None) => {}
-            (None, Some((_, samples))) => {
-                self.remark = Some(format!(
-                    "all registers are read again, after {samples} samples with registers missing"
-                ));
-                self.failing = None;
-            }
-            (Some(why), Some((known, samples))) if why == *known => *samples += 1,
-            (Some(why), failing) => {
-                let before = failing.as_ref().map_or(0, |(_, samples)| *samples);
-                self.remark = Some(format!("registers are missing from the samples: {why}"));
-                *failing = Some((why, before + 1));
-            }
-        }
     }
 
     /// An order that makes all readings of the last read plausible.
@@ -101,7 +75,8 @@ enum RegisterError {
 impl RegisterError {
     /// A controller may rightly refuse a value, so the error shows what was written.
     fn of_write(source: LinkError, target: Target, value: f64, registers: &[u16]) -> RegisterError {
-        if !matches!(source, LinkError::Refused { .. }) {
+        // The number of a heartbeat does not matter.
+        if !matches!(source, LinkError::Refused { .. }) || target == Target::Heartbeat {
             return source.into();
         }
         let registers: Vec<_> = registers.iter().map(|word| format!("{word:#06x}")).collect();
@@ -124,7 +99,7 @@ impl Controller for Registers {
         Ok(())
     }
 
-    fn read(&mut self, _: f64) -> BTreeMap<Channel, Reading> {
+    fn read(&mut self, _: f64) -> (BTreeMap<Channel, Reading>, Option<RegisterError>) {
         let mut all = BTreeMap::new();
         let mut failed = None;
         for (table, block) in self.blocks.clone() {
@@ -141,11 +116,12 @@ impl Controller for Registers {
             }
         }
         self.last = all;
-        self.note(failed);
         let reading = |(channel, entry): (&Channel, &RegisterSettings)| {
-            (*channel, Reading::good(self.settings.value(entry, &self.last_words(entry))))
+            let words = self.last_words(entry);
+            let is_whole = words.len() == usize::from(entry.form.count());
+            is_whole.then(|| (*channel, Reading::good(self.settings.value(entry, &words))))
         };
-        self.settings.read.iter().map(reading).collect()
+        (self.settings.read.iter().filter_map(reading).collect(), failed.map(RegisterError::from))
     }
 
     fn write(&mut self, values: &[(Target, f64)]) -> Result<(), RegisterError> {
@@ -186,10 +162,6 @@ impl Controller for Registers {
             None => "Check `words` and `bytes`, and `register`, `type`, `scale` and `offset` of the channel"
                 .to_owned(),
         }
-    }
-
-    fn remark(&mut self) -> Option<String> {
-        self.remark.take()
     }
 
     fn close(&mut self) {

@@ -244,8 +244,7 @@ impl RegisterSettings {
     /// The value in registers of this order, SI; NaN without a value.
     pub(crate) fn value(&self, registers: &[u16], words: Order, bytes: Order) -> f64 {
         let number = self.form.number(registers, words, bytes).unwrap_or(f64::NAN);
-        let value = number * self.scale + self.offset;
-        if value.is_finite() { value } else { f64::NAN }
+        number * self.scale + self.offset
     }
 }
 

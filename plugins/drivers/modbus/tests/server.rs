@@ -228,6 +228,12 @@ const OTHER_REGISTER: u8 = 1;
 const FEWER_REGISTERS: u8 = 2;
 const BUSY_ONCE: u8 = 3;
 const CLOSES: u8 = 4;
+const OTHER_UNIT: u8 = 5;
+const OTHER_TRANSACTION: u8 = 6;
+const OTHER_FUNCTION: u8 = 7;
+const NAN: u8 = 8;
+const INFINITE: u8 = 9;
+const NO_HEARTBEAT: u8 = 10;
 /// Plus the number of the exception.
 const WRITES_REFUSED: u8 = 100;
 const READS_REFUSED: u8 = 200;
@@ -246,7 +252,8 @@ fn a_wrong_acknowledgement_is_an_error() {
         other => panic!("{other:?}"),
     };
     let refused = EXCEPTIONS.map(|code| WRITES_REFUSED + code);
-    for misdeed in [OTHER_REGISTER, FEWER_REGISTERS].into_iter().chain(refused) {
+    let wrong = [OTHER_REGISTER, FEWER_REGISTERS, OTHER_UNIT, OTHER_TRANSACTION, OTHER_FUNCTION];
+    for misdeed in wrong.into_iter().chain(refused) {
         stand.misbehave(misdeed);
         lost(rig.make_safe());
         let message = lost(rig.set(&SETPOINTS));
@@ -256,19 +263,30 @@ fn a_wrong_acknowledgement_is_an_error() {
         stand.misbehave(HONEST);
         rig.set(&SETPOINTS).unwrap();
     }
-    // A refused read is a sample without readings, and the note has the number.
+    // A wrong answer to a read is a sample without readings, and each cause is noted.
     let mut t_s = 0.0;
-    for code in [2, 11] {
+    for (misdeed, cause) in [
+        (READS_REFUSED + 2, "exception 2,"),
+        (READS_REFUSED + 11, "exception 11,"),
+        (OTHER_TRANSACTION, "transaction"),
+        (OTHER_FUNCTION, "function"),
+        (NAN, "NaN"),
+        (INFINITE, "inf"),
+    ] {
         let noted = std::cell::Cell::new(false);
-        stand.misbehave(READS_REFUSED + code);
+        stand.misbehave(misdeed);
         poll_until(&mut rig, &mut t_s, |batch| {
-            let number = format!("exception {code}");
-            noted.set(noted.get() || batch.events.iter().any(|event| event.message.contains(&number)));
+            noted.set(noted.get() || batch.events.iter().any(|event| event.message.contains(cause)));
             reads_nothing(batch) && noted.get()
         });
         stand.misbehave(HONEST);
         poll_until(&mut rig, &mut t_s, reads);
     }
+    // Without heartbeats the controller cuts the air; the note has their register.
+    stand.misbehave(NO_HEARTBEAT);
+    poll_until(&mut rig, &mut t_s, |batch| {
+        batch.events.iter().any(|event| event.message.contains("register 111"))
+    });
     stand.misbehave(BUSY_ONCE);
     rig.set(&SETPOINTS).unwrap();
     rig.make_safe().unwrap();

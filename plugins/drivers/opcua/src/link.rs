@@ -101,9 +101,6 @@ pub(crate) struct Link {
     user: Option<User>,
     within: Duration,
     open: Option<Open>,
-    /// Time at which the connection was lost.
-    lost_at: Option<Instant>,
-    remark: Option<String>,
 }
 
 pub(crate) fn policy(security: Security) -> SecurityPolicy {
@@ -178,7 +175,7 @@ impl Link {
     ) -> std::io::Result<Link> {
         // The session has its own thread: keep-alives and reconnections do not wait for the next sample.
         let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build()?;
-        Ok(Link { runtime, endpoint, security, user, within, open: None, lost_at: None, remark: None })
+        Ok(Link { runtime, endpoint, security, user, within, open: None })
     }
 
     fn server(&self) -> String {
@@ -343,7 +340,7 @@ impl Link {
             .max_age(0.0)
             .send(session.channel());
         let read = async { timeout(within, read).await };
-        let answer = match self.runtime.block_on(read) {
+        match self.runtime.block_on(read) {
             Err(_) => Err(LinkError::Slow { server: self.server(), within }),
             Ok(Err(error)) => Err(self.failed(error.to_string())),
             Ok(Ok(answer)) => {
@@ -356,27 +353,7 @@ impl Link {
                     }
                 }
             }
-        };
-        self.update_connection(answer.is_ok());
-        answer
-    }
-
-    fn update_connection(&mut self, is_connected: bool) {
-        match (is_connected, self.lost_at) {
-            (false, None) => self.lost_at = Some(Instant::now()),
-            (true, Some(since)) => {
-                self.lost_at = None;
-                let message =
-                    format!("{} answers again after {:.1} s", self.server(), since.elapsed().as_secs_f64());
-                self.remark = Some(message);
-            }
-            _ => {}
         }
-    }
-
-    /// A message about a change of the connection, once.
-    pub(crate) fn remark(&mut self) -> Option<String> {
-        self.remark.take()
     }
 
     /// Writes values in one request, so in no defined order. Waits for a connection that is coming back, and retries.
@@ -452,7 +429,6 @@ impl Link {
                 .block_on(async { timeout(Duration::from_secs(1), open.session.disconnect()).await });
             open.task.abort();
         }
-        self.lost_at = None;
     }
 }
 

@@ -1,6 +1,6 @@
 //! The nodes of the rig.
 
-use crate::link::{Link, LinkError};
+use crate::link::{Answer, Link, LinkError};
 use crate::settings::{CheckedSettings, SettingError, Settings, Timestamps, settings_error};
 use crate::value::{describe_status, is_number, is_whole, number, quality, same_type, type_name};
 use mapper_controller::{Controller, Reading, Target, check_resolution, rig};
@@ -23,7 +23,9 @@ pub(crate) fn open(value: &Value) -> Result<Box<dyn Backend>, BackendError> {
     let link = Link::new(endpoint, checked.settings.security, user, within)
         .map_err(|error| settings_error("", SettingError::Store(error.to_string())))?;
     let nodes = checked.reads.iter().map(|(_, node, _)| node.clone()).collect();
-    Ok(rig(checked.settings.stand(), Nodes { checked, link, nodes, types: BTreeMap::new(), remark: None }))
+    let stand = checked.settings.stand();
+    let (types, kinds) = (BTreeMap::new(), BTreeMap::new());
+    Ok(rig(stand, Nodes { checked, link, nodes, types, kinds, remark: None }))
 }
 
 struct Nodes {
@@ -33,9 +35,13 @@ struct Nodes {
     nodes: Vec<NodeId>,
     /// Types of the written nodes.
     types: BTreeMap<Target, Variant>,
+    /// Type of the first number of each node that is read.
+    kinds: BTreeMap<Channel, String>,
     remark: Option<String>,
 }
 
+/// Age of a reading above which it is uncertain, s: by default, guards take an older one for none.
+const MAX_AGE_S: f64 = 3.0;
 /// Maximum lead of a source timestamp over the answer, s: clocks of controllers on one network agree within milliseconds to some tenths
 /// (NTP), and a reading must not be older than 3 s.
 const MAX_LEAD_S: f64 = 1.0;
@@ -79,10 +85,39 @@ impl Nodes {
         (self.checked.settings.timestamps == Timestamps::Source).then(|| t_s - between_s(source_time, sent))
     }
 
-    /// Whether a value is stamped later than the server's own answer; its age is unknown then.
-    fn is_from_the_future(&self, value: &DataValue, sent: &DateTime) -> bool {
-        let age_s = self.source_t_s(value, sent, 0.0).map_or(0.0, |source_t_s| -source_t_s);
-        age_s < -MAX_LEAD_S
+    /// Quality of a value, and its reason if it is not good. `first`: the type of the node's first number.
+    fn judge(&self, value: &DataValue, first: Option<String>, sent: &DateTime) -> (Quality, String) {
+        let kind = value.value.as_ref().map_or_else(|| "empty".to_owned(), type_name);
+        let by_type = match first {
+            None => Some((Quality::Bad, format!("no number: {kind}"))),
+            Some(first) if first != kind => {
+                Some((Quality::Bad, format!("its type changed from {first} to {kind}")))
+            }
+            Some(_) => None,
+        };
+        let is_stamped = self.checked.settings.timestamps == Timestamps::Source && !sent.is_null();
+        let by_time = match self.source_t_s(value, sent, 0.0) {
+            Some(source_t_s) if source_t_s > MAX_LEAD_S => {
+                Some((Quality::Bad, "its source timestamp is later than the server's clock".to_owned()))
+            }
+            Some(source_t_s) if source_t_s < -MAX_AGE_S => {
+                Some((Quality::Uncertain, format!("its source timestamp is more than {MAX_AGE_S} s old")))
+            }
+            None if is_stamped => {
+                let reason = "no source timestamp; `timestamps: arrival` does without";
+                Some((Quality::Uncertain, reason.to_owned()))
+            }
+            _ => None,
+        };
+        // Of equal qualities the first has the reason.
+        let by_status = match quality(value) {
+            Quality::Good => (Quality::Good, String::new()),
+            quality => (quality, value.status.map(describe_status).unwrap_or_default()),
+        };
+        [by_type, by_time]
+            .into_iter()
+            .flatten()
+            .fold(by_status, |worst, other| if other.0 > worst.0 { other } else { worst })
     }
 
     /// The type of a node that is written: values of another type would be refused.
@@ -196,6 +231,7 @@ impl Controller for Nodes {
 
     fn open(&mut self) -> Result<(), LinkError> {
         self.link.open()?;
+        self.kinds.clear();
         let answer = self.link.read(&self.nodes, AttributeId::Value)?;
         self.compare_clocks(&answer.sent);
         for ((channel, node, _), value) in self.checked.reads.iter().zip(answer.values) {
@@ -211,45 +247,28 @@ impl Controller for Nodes {
         self.read_types()
     }
 
-    fn read(&mut self, t_s: f64) -> BTreeMap<Channel, Reading> {
-        let Ok(answer) = self.link.read(&self.nodes, AttributeId::Value) else { return BTreeMap::new() };
-        let reading =
-            |((channel, _, scale), value): (&(Channel, NodeId, crate::settings::Scale), DataValue)| {
-                let mut quality = quality(&value);
-                let mut reason = value
-                    .status
-                    .map(describe_status)
-                    .filter(|_| quality != Quality::Good)
-                    .unwrap_or_default();
-                // A node may change its type at run time: a Boolean is not a reading.
-                let variant = value.value.as_ref().filter(|variant| is_number(variant));
-                let inside = variant.map_or(f64::NAN, |variant| scale.inside(number(variant)));
-                let from_the_future = self.is_from_the_future(&value, &answer.sent);
-                if inside.is_nan() || from_the_future {
-                    quality = Quality::Bad;
-                }
-                if reason.is_empty() && from_the_future {
-                    reason = "its source timestamp is later than the server's clock".to_owned();
-                } else if let Some(variant) =
-                    value.value.as_ref().filter(|variant| reason.is_empty() && !is_number(variant))
-                {
-                    reason = format!("no number: {}", type_name(variant));
-                }
-                (
-                    *channel,
-                    Reading {
-                        value: inside,
-                        source_t_s: self.source_t_s(&value, &answer.sent, t_s),
-                        quality,
-                        reason,
-                    },
-                )
-            };
-        self.checked.reads.iter().zip(answer.values).map(reading).collect()
+    fn read(&mut self, t_s: f64) -> (BTreeMap<Channel, Reading>, Option<LinkError>) {
+        let Answer { values, sent } = match self.link.read(&self.nodes, AttributeId::Value) {
+            Ok(answer) => answer,
+            Err(error) => return (BTreeMap::new(), Some(error)),
+        };
+        let mut readings = BTreeMap::new();
+        for (index, value) in values.into_iter().enumerate() {
+            let Some((channel, _, scale)) = self.checked.reads.get(index) else { break };
+            let (channel, scale) = (*channel, *scale);
+            let kind = value.value.as_ref().filter(|variant| is_number(variant)).map(type_name);
+            let first = kind.map(|kind| self.kinds.entry(channel).or_insert(kind).clone());
+            let (quality, reason) = self.judge(&value, first, &sent);
+            let number = value.value.as_ref().filter(|variant| is_number(variant)).map_or(f64::NAN, number);
+            let source_t_s = self.source_t_s(&value, &sent, t_s);
+            readings.insert(channel, Reading { value: scale.inside(number), source_t_s, quality, reason });
+        }
+        (readings, None)
     }
 
     fn write(&mut self, values: &[(Target, f64)]) -> Result<(), LinkError> {
-        let until = self.link.deadline(values.iter().all(|(target, _)| *target == Target::Heartbeat));
+        let is_heartbeat = values.iter().all(|(target, _)| *target == Target::Heartbeat);
+        let until = self.link.deadline(is_heartbeat);
         for group in values.chunk_by(|(a, _), (b, _)| write_rank(*a) == write_rank(*b)) {
             let mut request = Vec::with_capacity(group.len());
             for (target, value) in group {
@@ -264,13 +283,19 @@ impl Controller for Nodes {
                     fits.ok_or_else(|| LinkError::DoesNotFit { node: node.clone(), value: outside })?;
                 request.push((node.clone(), fits, outside));
             }
-            self.link.write(&request, until)?;
+            self.link.write(&request, until).map_err(|error| match error {
+                // The number of a heartbeat does not matter.
+                LinkError::Refused { server, node, message, .. } if is_heartbeat => {
+                    LinkError::Failed { server, message: format!("refuses the node {node}: {message}") }
+                }
+                error => error,
+            })?;
         }
         Ok(())
     }
 
     fn remark(&mut self) -> Option<String> {
-        self.remark.take().or_else(|| self.link.remark())
+        self.remark.take()
     }
 
     fn describe_source(&self, channel: Channel) -> String {

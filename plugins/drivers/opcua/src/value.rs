@@ -1,7 +1,7 @@
 //! Numbers in OPC UA values.
 
 use mapper_core::Quality;
-use opcua::types::{DataValue, StatusCode, Variant, VariantTypeId};
+use opcua::types::{DataValue, StatusCode, StatusCodeLimit, Variant, VariantTypeId};
 
 /// The number in a value; NaN if it is not a number. A Boolean is 1 or 0.
 pub(crate) fn number(value: &Variant) -> f64 {
@@ -85,10 +85,15 @@ const STATUSES: [(StatusCode, Quality); 10] = [
 ];
 
 /// Quality of a value, from its status: an absent status means good. Any other code of severity Good, such as `GoodClamped`, limits
-/// what the number means.
+/// what the number means; so does a value at a limit of its sensor. A value that cannot vary, or whose unit or type has changed, is not a reading.
 pub(crate) fn quality(value: &DataValue) -> Quality {
     let Some(status) = value.status else { return Quality::Good };
+    let limit = status.limit();
+    if status.structure_changed() || status.semantics_changed() || limit == StatusCodeLimit::Constant {
+        return Quality::Bad;
+    }
     match STATUSES.iter().find(|(listed, _)| code(*listed) == code(status)) {
+        Some((_, Quality::Good)) if limit != StatusCodeLimit::None => Quality::Uncertain,
         Some((_, quality)) => *quality,
         None if status.is_good() || status.is_uncertain() => Quality::Uncertain,
         None => Quality::Bad,
@@ -98,7 +103,7 @@ pub(crate) fn quality(value: &DataValue) -> Quality {
 /// Whether a value was written exactly: only `Good` confirms that. `GoodClamped` means that another value was written, and
 /// `GoodCompletesAsynchronously` that the result is still open.
 pub(crate) fn is_written(status: StatusCode) -> bool {
-    code(status) == StatusCode::Good.bits()
+    status == StatusCode::Good
 }
 
 /// A status with its code, for look-up: `BadOutOfRange (0x803C0000)`.

@@ -7,6 +7,8 @@
 use mapper_core::{Backend, BackendError, Channel, Quality, RigMode, SampleBatch, Setpoints};
 use mapper_driver_host::{DEFAULT_TIMEOUTS, Driver, Timeouts};
 use serde_json::{Value, json};
+use std::cell::RefCell;
+use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
@@ -438,42 +440,59 @@ fn only_the_status_good_confirms_a_write() {
     }
 }
 
-/// Changes of a node at run time: a Boolean, readings from the future, and values that are not measurements are missing; uncertain ones are
-/// readings, marked as uncertain. The status is noted.
+/// Changes of a node at run time: values that are no numbers, of another type, from the future, or not measured now are no readings; others that may
+/// be wrong are uncertain. Each is noted with its cause.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn bad_readings_are_dropped_and_uncertain_ones_are_reported() {
-    for (misdeed, expected, noted_as) in [
-        ("boolean", Quality::Bad, "Boolean"),
-        ("future", Quality::Bad, "later than the server's clock"),
-        ("UncertainSensorNotAccurate", Quality::Uncertain, "UncertainSensorNotAccurate"),
-        ("GoodLocalOverride", Quality::Bad, "GoodLocalOverride"),
-    ] {
-        let stand = Stand::with(&["--misdeed", misdeed]);
-        stand.trust();
-        let (noted, marked) = (std::cell::Cell::new(false), std::cell::Cell::new(false));
-        let seen = |batch: &SampleBatch| {
-            // 1 is what a Boolean would be as a number.
-            assert_ne!(batch.last(Channel::T2), Some(1.0));
-            let of_t2 = batch.provenance.iter().find(|one| one.channel == Channel::T2);
-            marked.set(marked.get() || of_t2.is_some_and(|of_t2| of_t2.quality.last() == Some(&expected)));
-            let notes = batch.events.iter().any(|event| event.message.contains(noted_as));
-            noted.set(noted.get() || notes);
-            noted.get() && marked.get()
-        };
-        assert!(
-            (0..CONNECTIONS).any(|_| observe_over_a_connection(&stand, seen)),
-            "{misdeed}: neither marked nor noted"
-        );
+    use Channel as C;
+    let cases = [
+        (C::CompressorFlow, "boolean", Quality::Bad, "Boolean"),
+        (C::P1, "int64", Quality::Bad, "Int64"),
+        (C::T1, "text", Quality::Bad, "String"),
+        (C::P2, "null", Quality::Bad, "empty"),
+        (C::T2, "inf", Quality::Bad, "inf"),
+        (C::Tc, "future", Quality::Bad, "later than the server's clock"),
+        (C::TurbineFlow, "GoodLocalOverride", Quality::Bad, "GoodLocalOverride"),
+        (C::T3, "BadSensorFailure", Quality::Bad, "BadSensorFailure"),
+        // Constant, and a changed unit: additional bits of Good.
+        (C::P4, "0x00000700", Quality::Bad, "(0x00000700)"),
+        (C::T4, "0x00004400", Quality::Bad, "(0x00004400)"),
+        (C::Tt, "past", Quality::Uncertain, "old"),
+        (C::TOil, "unstamped", Quality::Uncertain, "`timestamps: arrival`"),
+        (C::TAmb, "UncertainSensorNotAccurate", Quality::Uncertain, "UncertainSensorNotAccurate"),
+    ];
+    let misdeeds = cases.map(|(channel, misdeed, ..)| format!("{}={misdeed}", channel.symbol())).join(",");
+    let stand = Stand::with(&["--misdeeds", &misdeeds]);
+    stand.trust();
+    let mut settings = stand.settings();
+    for (channel, ..) in cases {
+        settings["read"][channel.symbol()] = json!({"node": format!("ns=2;s={}", channel.symbol())});
     }
+    let (noted, marked) = (RefCell::new(BTreeSet::new()), RefCell::new(BTreeSet::new()));
+    let seen = |batch: &SampleBatch| {
+        for (channel, _, quality, cause) in cases {
+            let has_cause = |message: &str| message.contains(cause) && message.contains(channel.symbol());
+            if batch.events.iter().any(|event| has_cause(&event.message)) {
+                noted.borrow_mut().insert(channel);
+            }
+            if batch.provenance_of(channel).is_some_and(|from| from.quality.last() == Some(&quality)) {
+                marked.borrow_mut().insert(channel);
+            }
+        }
+        noted.borrow().len() == cases.len() && marked.borrow().len() == cases.len()
+    };
+    let found = (0..CONNECTIONS).any(|_| observe_over_a_connection(&stand, &settings, seen));
+    assert!(found, "noted {noted:?}, marked {marked:?}");
 }
 
 /// On a busy machine, a connection may break at the driver's deadline of 0.8 s, which is not what the test is about: maximum number of new ones.
 const CONNECTIONS: usize = 5;
 
 /// Polls every half second until `seen`; `false` if the connection broke or nothing was seen in ten seconds of the rig's time.
-fn observe_over_a_connection(stand: &Stand, seen: impl Fn(&SampleBatch) -> bool) -> bool {
-    let mut rig = stand.driver(PASSWORD);
+fn observe_over_a_connection(stand: &Stand, settings: &Value, seen: impl Fn(&SampleBatch) -> bool) -> bool {
+    let program = stand.program(PASSWORD);
+    let mut rig = Driver::start_program(&program, "opcua", settings, SLOW_TIMEOUTS).unwrap();
     if rig.arm().and_then(|()| rig.set(&setpoints(150e3))).is_err() {
         return false;
     }

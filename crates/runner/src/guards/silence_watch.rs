@@ -1,52 +1,57 @@
-//! The guard for channels of auxiliary instruments that no other guard checks: it reports a channel without readings.
+//! The guard for channels that no other guard checks, of the rig and of auxiliary instruments: it reports a channel that falls silent.
 
 use crate::guards::guard::{CommandedState, Guard, Trip};
-use mapper_core::{Channel, GuardName, Reaction, SampleBatch};
+use mapper_core::{Channel, GuardName, Quality, Reaction, SampleBatch};
 
-/// A channel of an auxiliary instrument.
+/// A channel without a guard of its own.
 #[derive(Debug, Clone, PartialEq)]
-pub struct InstrumentChannel {
-    /// Display name of the instrument.
-    pub reader: String,
+pub struct UnguardedChannel {
+    /// Display name of its rig or instrument.
+    pub source: String,
     /// The channel.
     pub channel: Channel,
     /// Time without a reading after which the channel is reported, s.
     pub age_s: f64,
 }
 
-/// Reports a channel of an instrument without readings. If identification requires the channel, the run ends.
+/// Reports a channel that falls silent. If identification requires it, the run ends. The check of the first seconds reports a channel that was never read.
 #[derive(Debug, Clone)]
-pub struct InstrumentWatch {
-    channels: Vec<(InstrumentChannel, Option<f64>, bool)>,
-    first_poll_s: Option<f64>,
+pub struct SilenceWatch {
+    /// With the time of the last reading, s, and whether its silence was reported.
+    channels: Vec<(UnguardedChannel, Option<f64>, bool)>,
 }
 
-impl InstrumentWatch {
+impl SilenceWatch {
     /// Creates a guard for these channels.
-    pub fn new(channels: Vec<InstrumentChannel>) -> Self {
+    pub fn new(channels: Vec<UnguardedChannel>) -> Self {
         let channels = channels.into_iter().map(|channel| (channel, None, false)).collect();
-        InstrumentWatch { channels, first_poll_s: None }
+        SilenceWatch { channels }
     }
 }
 
-impl Guard for InstrumentWatch {
+impl Guard for SilenceWatch {
     fn check(&mut self, batch: &SampleBatch, now_s: f64, _: &CommandedState) -> Option<Trip> {
-        let first_s = *self.first_poll_s.get_or_insert(batch.t_s.first().copied().unwrap_or(now_s));
         let mut trip: Option<Trip> = None;
         for (channel_of, last_s, reported) in &mut self.channels {
-            let readings = batch.column(channel_of.channel).unwrap_or_default().iter().zip(&batch.t_s);
-            if let Some((_, t_s)) = readings.rev().find(|(value, _)| value.is_finite()) {
-                (*last_s, *reported) = (Some(*t_s), false);
+            let from = batch.provenance_of(channel_of.channel);
+            let values = batch.column(channel_of.channel).unwrap_or_default().iter().zip(&batch.t_s);
+            for (index, (_, t_s)) in values.enumerate().filter(|(_, (value, _))| value.is_finite()) {
+                let quality = from.and_then(|from| from.quality.get(index));
+                // A repeated reading is as old as its source time.
+                let source_s = from.and_then(|from| from.source_t_s.get(index)).unwrap_or(t_s).min(*t_s);
+                if quality != Some(&Quality::Bad) && last_s.is_none_or(|last_s| source_s > last_s) {
+                    (*last_s, *reported) = (Some(source_s), false);
+                }
             }
-            let since_s = last_s.unwrap_or(first_s);
+            let Some(since_s) = *last_s else { continue };
             if now_s - since_s <= channel_of.age_s || *reported {
                 continue;
             }
             *reported = true;
             let needed = crate::guards::start_check::REQUIRED_CHANNELS.contains(&channel_of.channel);
             let reaction = if needed { Reaction::Safe } else { Reaction::Note };
-            let (reader, channel) = (&channel_of.reader, channel_of.channel);
-            let reason = format!("the reader `{reader}` has given no {channel} since {since_s:.1} s");
+            let UnguardedChannel { source, channel, .. } = channel_of;
+            let reason = format!("`{source}` has given no {channel} since {since_s:.1} s");
             let found = Trip { t_s: now_s, guard: GuardName::Signals, reaction, reason };
             trip = match trip {
                 Some(before) if before.reaction >= found.reaction => Some(before),
@@ -64,7 +69,7 @@ mod tests {
 
     #[test]
     fn loss_of_a_required_channel_ends_the_run_and_of_another_is_noted_once() {
-        let channel_of = |channel| InstrumentChannel { reader: "bench".to_owned(), channel, age_s: 3.0 };
+        let channel_of = |channel| UnguardedChannel { source: "bench".to_owned(), channel, age_s: 3.0 };
         let batch = |t_s: f64, flow: f64, air: f64| SampleBatch {
             t_s: vec![t_s],
             columns: vec![
@@ -74,7 +79,7 @@ mod tests {
             ..SampleBatch::default()
         };
         let mut guard =
-            InstrumentWatch::new(vec![channel_of(Channel::CompressorFlow), channel_of(Channel::TAmb)]);
+            SilenceWatch::new(vec![channel_of(Channel::CompressorFlow), channel_of(Channel::TAmb)]);
         let nan = f64::NAN;
         let mut look = |t_s, flow, air| guard.check(&batch(t_s, flow, air), t_s, &CommandedState::default());
         assert_eq!(look(0.0, 0.1, 298.0), None);

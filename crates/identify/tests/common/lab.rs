@@ -2,17 +2,22 @@
 #![allow(dead_code, reason = "each user takes its own part")]
 
 use super::common::add_noise;
-use mapper_core::{Channel, InletConvection, OperatingPoint, Recording, StepKind, StepMarker};
+use mapper_core::{
+    Channel, InletConvection, OperatingPoint, Recording, ReferenceState, StepKind, StepMarker,
+};
 use mapper_identify::DeclaredUncertainty;
+use mapper_physics::compressor_map::characteristic::{CharacteristicPoint, CompressorCharacteristic};
+use mapper_physics::compressor_map::closed_form_map::ClosedFormMap;
 use mapper_physics::gas::air::Air;
 use mapper_physics::laws::compression::{CompressionInputs, compress, isentropic_rise_ratio};
-use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::machine::params::{BoundaryConditions, Params};
 use mapper_physics::simulation::model::Model;
 use mapper_physics::simulation::simulate::{Simulator, Watch};
 use mapper_physics::simulation::steady;
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// True values at the end of a step.
 #[derive(Debug, Clone, Copy)]
@@ -40,6 +45,56 @@ pub struct Machine {
     pub humidity_kg_kg: f64,
     /// Efficiency, flow, convection and valve area over those of the nominal machine.
     pub scales: [f64; 4],
+    /// Diameter of the wheel over that of the nominal machine; all lengths are in proportion.
+    pub size: f64,
+    /// Efficiency lost at low speed, fraction: multiplies the square of middle over corrected speed, minus 1.
+    pub low_speed_loss: f64,
+    /// Efficiency lost at choke, fraction.
+    pub choke_loss: f64,
+    /// Pressure and temperature at the inlet, Pa and K.
+    pub inlet_air: (f64, f64),
+}
+
+/// A map with further losses of efficiency.
+#[derive(Debug)]
+struct Lossy {
+    map: ClosedFormMap,
+    machine: Machine,
+}
+
+impl CompressorCharacteristic for Lossy {
+    fn reference(&self) -> ReferenceState {
+        self.map.reference()
+    }
+
+    fn evaluate(&self, speed_corrected_rpm: f64, pressure_ratio: f64) -> CharacteristicPoint {
+        self.evaluate_scaled(speed_corrected_rpm, pressure_ratio, 1.0)
+    }
+
+    fn evaluate_scaled(
+        &self,
+        speed_corrected_rpm: f64,
+        pressure_ratio: f64,
+        flow: f64,
+    ) -> CharacteristicPoint {
+        let point = self.map.evaluate_scaled(speed_corrected_rpm, pressure_ratio, flow);
+        let slowness = (100e3 / (self.machine.size * speed_corrected_rpm)).powi(2) - 1.0;
+        let choke = (1.0 - point.surge_position_ratio).max(0.0).powi(3);
+        let lost = self.machine.low_speed_loss * slowness + self.machine.choke_loss * choke;
+        CharacteristicPoint { efficiency: point.efficiency - lost, ..point }
+    }
+
+    fn surge_point(&self, speed_corrected_rpm: f64) -> (f64, f64) {
+        self.map.surge_point(speed_corrected_rpm)
+    }
+
+    fn choke_flow_corrected_kg_s(&self, speed_corrected_rpm: f64) -> f64 {
+        self.map.choke_flow_corrected_kg_s(speed_corrected_rpm)
+    }
+
+    fn fingerprint(&self) -> String {
+        format!("{self:?}")
+    }
 }
 
 impl Default for Machine {
@@ -51,6 +106,10 @@ impl Default for Machine {
             inlet: InletConvection::Shared,
             humidity_kg_kg: 0.0,
             scales: [1.0; 4],
+            size: 1.0,
+            low_speed_loss: 0.0,
+            choke_loss: 0.0,
+            inlet_air: (100e3, 298.15),
         }
     }
 }
@@ -67,16 +126,57 @@ impl Machine {
         model.params.compressor.flow_scale_ratio = flow;
         model.params.compressor.nusselt_coefficient *= convection;
         model.params.outlet.valve_area_m2 *= valve;
+        self.resize(&mut model.params);
+        if self.size != 1.0 || self.low_speed_loss != 0.0 || self.choke_loss != 0.0 {
+            let wheel_diameter_m = model.params.compressor.wheel_diameter_m;
+            model.map = Arc::new(Lossy { map: ClosedFormMap { wheel_diameter_m }, machine: *self });
+        }
         model
+    }
+
+    fn resize(&self, params: &mut Params) {
+        let (compressor, turbine) = (&mut params.compressor, &mut params.turbine);
+        for length_m in [
+            &mut compressor.wheel_diameter_m,
+            &mut compressor.outlet_diameter_m,
+            &mut compressor.inlet_diameter_m,
+            &mut turbine.inlet_diameter_m,
+            &mut turbine.wheel_radius_m,
+        ] {
+            *length_m *= self.size;
+        }
+        for area in [
+            &mut compressor.internal_area_m2,
+            &mut compressor.external_area_m2,
+            &mut turbine.internal_area_m2,
+            &mut turbine.external_area_m2,
+            &mut turbine.choked_flow_kg_s,
+            &mut params.outlet.valve_area_m2,
+        ] {
+            *area *= self.size.powi(2);
+        }
+        for mass in
+            [&mut compressor.housing_mass_kg, &mut turbine.housing_mass_kg, &mut params.outlet.volume_m3]
+        {
+            *mass *= self.size.powi(3);
+        }
+        params.shaft_inertia_kgm2 *= self.size.powi(5);
     }
 }
 
 /// Visits the points in the given order, `dwell_s` each, from the settled first one; 10 Hz, no noise. The turbine inlet pressure is the one
 /// that holds the speed on the nominal machine.
 pub fn campaign(points: &[(f64, f64)], dwell_s: f64, machine: Machine) -> Campaign {
-    let (model, nominal) = (machine.model(), Model::nominal());
-    let at = |valve: f64| BoundaryConditions { valve_opening_ratio: valve, ..BoundaryConditions::default() };
-    let held = |(valve, speed): (f64, f64)| steady::hold_speed(&nominal, speed, &at(valve)).unwrap().boundary;
+    let (size, inlet_air) = (machine.size, machine.inlet_air);
+    let (model, nominal) = (machine.model(), Machine { size, inlet_air, ..Machine::default() }.model());
+    let at = |valve: f64| BoundaryConditions {
+        valve_opening_ratio: valve,
+        p1_pa: inlet_air.0,
+        t1_k: inlet_air.1,
+        ..BoundaryConditions::default()
+    };
+    let held =
+        |(valve, speed): (f64, f64)| steady::hold_speed(&nominal, speed / size, &at(valve)).unwrap().boundary;
     let first = held(points[0]);
     let start = steady::settle_under(&model, &first).unwrap();
     let mut simulator = Simulator::new(&model, 0.0, start.state, 1e-8, Watch::default());
@@ -127,7 +227,10 @@ pub fn campaign(points: &[(f64, f64)], dwell_s: f64, machine: Machine) -> Campai
                 |_| {},
             )
             .unwrap();
-        let op = |(valve, speed): (f64, f64)| OperatingPoint { speed_rpm: speed, valve_opening_ratio: valve };
+        let op = |(valve, speed): (f64, f64)| OperatingPoint {
+            speed_rpm: speed / size,
+            valve_opening_ratio: valve,
+        };
         recording.steps.push(StepMarker {
             index,
             kind: StepKind::Point,

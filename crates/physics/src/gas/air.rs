@@ -279,7 +279,7 @@ mod tests {
     }
 
     proptest! {
-        /// The two inverses, and the entropy of an isentrope, to rounding.
+        /// Monotone; the two inverses, and the entropy of an isentrope, to rounding.
         #[test]
         fn enthalpy_and_entropy_are_consistent(
             t_k in 250.0..330.0f64, ratio in 0.9..6.0f64, rise_j_kg in -20e3..250e3f64, w in 0.0..0.04f64,
@@ -288,6 +288,8 @@ mod tests {
             let heated_k = air.heated_k(t_k, rise_j_kg);
             prop_assert!((air.enthalpy_rise_j_kg(t_k, heated_k) - rise_j_kg).abs() < 1e-4);
             let end_k = air.isentropic_k(t_k, ratio);
+            prop_assert!(air.isentropic_k(t_k, 1.001 * ratio) > end_k);
+            prop_assert!(air.enthalpy_rise_j_kg(t_k, heated_k + 0.1) > rise_j_kg);
             // Back along the same isentrope. From 550 K the start is 2 % off, the second step of Newton's method 1e-9.
             prop_assert!((air.isentropic_k(end_k, 1.0 / ratio) / t_k - 1.0).abs() < 1e-8);
             // dh = v dp: Simpson's rule over ln p in 2000 parts.

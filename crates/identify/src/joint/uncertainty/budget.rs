@@ -1,9 +1,10 @@
 //! Contributions of the sources of uncertainty to a number of the joint fit.
 //!
 //! The posterior is linearised at the fit. Declared errors of readings are independent of each other and of everything else, so each contributes
-//! its sensitivity, as the smoothness prior leaves it, times its declared size. alpha_A, probe and direction factor are correlated: each
-//! contributes the part that the previous ones do not explain (Cholesky factor of their covariance). The step's own noise and the scatter of its
-//! h about the law come next. The remainder is due to the shared law of h and the shape of the map, which the noise of all steps limits.
+//! its sensitivity, as the smoothness prior leaves it, times its declared size. So does the loss of efficiency at low speed, which looks like
+//! an offset and limits what smoothness corrects. alpha_A, probe and direction factor are correlated: each contributes the part that the
+//! previous ones do not explain (Cholesky factor of their covariance). The step's own noise and the scatter of its h about the law come next.
+//! The remainder is due to the shared law of h and the shape of the map, which the noise of all steps limits.
 
 use crate::joint::fit::refinements::{Gain, Refinements};
 use crate::joint::fit::solve::Covariance;
@@ -11,6 +12,7 @@ use crate::joint::step_model::parameters::{
     BAROMETER, FLOW_GAIN, GAINS, HUMIDITY, INLET, LN_AREA, OFFSET_CHANNELS, OFFSETS, PROBE_MM2, SURFACE,
     symbol,
 };
+use crate::joint::step_model::surface::SLOW_LOSS;
 use crate::joint::uncertainty::quantity::Quantity;
 use crate::single_step::budgets;
 use mapper_core::BudgetRow;
@@ -18,6 +20,7 @@ use nalgebra::DVector;
 
 /// Names of the sources that are not shared parameters.
 const NOISE: &str = "noise of the step, scatter about the law of h";
+const SLOW: &str = "efficiency lost at low speed";
 const LAW: &str = "law of h and shape of the map";
 const NEUTRAL: &str = "alpha_A, probe and direction factor taken for neutral";
 
@@ -40,7 +43,7 @@ pub(crate) fn rows(
     covariance: &Covariance,
     refined: Option<(&Refinements, &Gain)>,
     (quantity, etas, step): (&Quantity, &[Quantity], usize),
-    pulls: &[Pull],
+    (pulls, slowness): (&[Pull], &[f64]),
     reported: &ReportedError,
 ) -> Vec<BudgetRow> {
     let mut rows = Vec::new();
@@ -56,13 +59,17 @@ pub(crate) fn rows(
     for (row, index) in covariance.fitted.iter().enumerate() {
         if (OFFSETS..SURFACE).contains(index) {
             let sigma = covariance.shared[(row, row)].sqrt();
-            let contribution = through(quantity, etas, pulls, |of| of.by_shared[row] / sigma);
+            let of = |quantity: &Quantity| quantity.by_shared[row] / sigma;
+            let contribution = through(pulls, of(quantity), etas.iter().map(of));
             push(symbol(*index), sigma, unit(*index), contribution, None);
         }
     }
     for (name, sigma, contribution, unit) in refinement_rows(refined, quantity) {
         push(name, sigma, unit, contribution, None);
     }
+    // The fitted efficiencies have the loss, as the true ones do.
+    let slow = through(pulls, 0.0, slowness.iter().map(|slowness| SLOW_LOSS * slowness));
+    push(SLOW.to_owned(), SLOW_LOSS, "1", slow, None);
     let own = pulls
         .iter()
         .map(|(weight, pull)| {
@@ -96,18 +103,11 @@ pub(crate) fn in_unit(row: BudgetRow, number: f64, unit: &str) -> BudgetRow {
     }
 }
 
-/// A linear function of a number after smoothing, rms over the choices of the prior, with the sign of the mean.
-fn through(quantity: &Quantity, etas: &[Quantity], pulls: &[Pull], of: impl Fn(&Quantity) -> f64) -> f64 {
-    if pulls.is_empty() {
-        return of(quantity);
-    }
-    let all: Vec<f64> = etas.iter().map(&of).collect();
-    let after = |pull: &DVector<f64>| of(quantity) - pull.iter().zip(&all).map(|(a, b)| a * b).sum::<f64>();
-    let (mean, square) = pulls.iter().fold((0.0, 0.0), |(mean, square), (weight, pull)| {
-        let share = after(pull);
-        (mean + weight * share, square + weight * share * share)
-    });
-    square.sqrt().copysign(mean)
+/// Change of a number after smoothing, from its change before and that of each point's efficiency: the mean over the choices of the prior.
+fn through(pulls: &[Pull], change: f64, of_etas: impl Iterator<Item = f64> + Clone) -> f64 {
+    let pulled =
+        |(weight, pull): &Pull| weight * pull.iter().zip(of_etas.clone()).map(|(a, b)| a * b).sum::<f64>();
+    change - pulls.iter().map(pulled).sum::<f64>()
 }
 
 /// Name, standard uncertainty, contribution and unit of each parameter that may be neutral.

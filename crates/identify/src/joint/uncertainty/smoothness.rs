@@ -89,6 +89,8 @@ pub(crate) fn smoothed(
     let scale = SurfaceScale::of(&places, reference);
     // With more, the computation would take minutes: offsets keep their declared spread.
     let few = etas.len() <= MAX_STEPS;
+    let slowness: Vec<f64> =
+        scale.iter().flat_map(|scale| places.iter().map(|place| scale.slowness(*place))).collect();
     let solved = match scale.filter(|_| few && carried) {
         None => Vec::new(),
         Some(scale) => {
@@ -103,7 +105,8 @@ pub(crate) fn smoothed(
         }
     };
     let mut smoothed = judged(covariance, refined, &etas, &ln_hs, &solved);
-    smoothed.budgets = budgets((covariance, refined), &smoothed, (&etas, &ln_hs), &solved, steps);
+    smoothed.budgets =
+        budgets((covariance, refined), &smoothed, (&etas, &ln_hs), (&solved, &slowness), steps);
     smoothed
 }
 
@@ -250,7 +253,7 @@ fn budgets(
     (covariance, refined): (&Covariance, Option<(&Refinements, &Gain)>),
     smoothed: &Smoothed,
     (etas, ln_hs): (&[Quantity], &[Quantity]),
-    solved: &[Solved],
+    (solved, slowness): (&[Solved], &[f64]),
     steps: &[StepRows],
 ) -> Vec<[Vec<BudgetRow>; 2]> {
     let steps: Vec<(usize, &StepRows)> = steps.iter().enumerate().collect();
@@ -262,7 +265,7 @@ fn budgets(
             let degrees_of_freedom = step.rows.len().saturating_sub(LOCAL).max(1) as f64;
             let reported =
                 ReportedError { error: judged[*i].error, added: judged[*i].added, degrees_of_freedom };
-            budget::rows(covariance, refined, (quantity, etas, *i), &pulls, &reported)
+            budget::rows(covariance, refined, (quantity, etas, *i), (&pulls, slowness), &reported)
         };
         [of(etas, &smoothed.eta), of(ln_hs, &smoothed.ln_h)]
     })

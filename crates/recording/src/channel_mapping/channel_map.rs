@@ -1,6 +1,5 @@
 //! Maps a recording's topics and fields onto the rig's channels, and adds data that the recording does not contain.
 
-use crate::channel_mapping::mapped_topics::sources;
 use crate::format::ELEMENTS_TOPIC;
 use crate::logs::LogOptions;
 use crate::logs::plausible::STANDARD_ATMOSPHERE_PA;
@@ -157,7 +156,9 @@ impl ChannelMap {
 
     /// Whether a channel is mapped as a gauge pressure.
     pub fn is_gauge(&self, channel: Channel) -> bool {
-        sources(self).any(|(quantity, source)| quantity.channel() == channel && source.gauge)
+        let elements = self.elements.iter().filter(|(element, _)| element.channel == channel);
+        let own = self.channels.get(&channel).into_iter();
+        own.chain(elements.map(|(_, source)| source)).any(|source| source.gauge)
     }
 
     /// Whether this is [`ChannelMap::native`]: missing channels are then expected.

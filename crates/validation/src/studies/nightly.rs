@@ -1,7 +1,6 @@
 //! `study: nightly`: the runs of a nightly campaign.
 
 use crate::studies::error::StudyError;
-use crate::studies::program;
 use crate::studies::source::CampaignSource;
 use mapper_campaign::load_nightly;
 use mapper_core::Method;
@@ -11,6 +10,7 @@ use mapper_fleet::{
 use mapper_history::RunRow;
 use mapper_session::{
     ErrorKind, NightlyRun, PreparedNight, Registry, Session, SessionError, Variant, json_text, nominal_model,
+    program_and_commit,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -113,7 +113,7 @@ impl Kind for Nightly<'_> {
 /// # Errors
 /// [`FleetError`] if the result is missing or is not of a night.
 pub fn rows_of(directory: &Path, registry: &Registry) -> Result<Vec<RunRow>, FleetError> {
-    let fleet = Fleet::open(directory, &program(registry))?;
+    let fleet = Fleet::open(directory, &program_and_commit(registry.commit))?;
     let path = fleet.result().join(RUNS);
     let text = merged_text(&path)?;
     serde_json::from_str(&text)

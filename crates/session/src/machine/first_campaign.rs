@@ -10,7 +10,7 @@ use serde::Serialize;
 use std::io::{Error, ErrorKind};
 use std::path::{Path, PathBuf};
 
-/// Template of the campaign. Its steps dwell 60 s: the machines of `benches/first_campaign.py` then have at least 80 % good points.
+/// Template of the campaign. Its steps dwell 60 s: most machines of `benches/first_campaign.py` then have at least 80 % good points.
 const CAMPAIGN: &str = include_str!("../../templates/campaign.yaml");
 const CHANNELS: &str = include_str!("../../templates/channels.yaml");
 const ZERO: &str = include_str!("../../templates/zero.yaml");

@@ -78,7 +78,8 @@ impl CompressorCharacteristic for Lossy {
         flow: f64,
     ) -> CharacteristicPoint {
         let point = self.map.evaluate_scaled(speed_corrected_rpm, pressure_ratio, flow);
-        let slowness = (100e3 / (self.machine.size * speed_corrected_rpm)).powi(2) - 1.0;
+        // Slower lines are passed only while a state is sought.
+        let slowness = (100e3 / (self.machine.size * speed_corrected_rpm)).powi(2).min(5.0) - 1.0;
         let choke = (1.0 - point.surge_position_ratio).max(0.0).powi(3);
         let lost = self.machine.low_speed_loss * slowness + self.machine.choke_loss * choke;
         CharacteristicPoint { efficiency: point.efficiency - lost, ..point }

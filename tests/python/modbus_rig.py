@@ -26,7 +26,7 @@ ALL_DEVICES = 0
 WATCHDOG_S = 2.0
 MISDEED = 150
 # Of writes below register 150: acknowledges another register, fewer registers, is busy each other time (exception 6); of all: closes the
-# connection after each answer, or answers with another unit, transaction or function, or one byte short; of reads: T2 is NaN or infinite; of
+# connection after each answer, or answers with another unit, transaction or function, or one byte short; of reads: every number is NaN or infinite; of
 # heartbeats: refuses them; from 100 on writes, from 200 on reads are refused for ever with the exception of the rest.
 MISDEEDS = HONEST, OTHER_REGISTER, FEWER_REGISTERS, BUSY_ONCE, CLOSES, OTHER_UNIT, OTHER_TRANSACTION, OTHER_FUNCTION, NAN, INFINITE, NO_HEARTBEAT = range(11)
 OF_WRITES, OF_READS = 100, 200
@@ -63,8 +63,8 @@ class Misdeeds:
         # The test itself reads one register at a time.
         if self.kind >= OF_READS and pdu.function_code == READ_HOLDING and len(pdu.registers) > 1:
             return self.refusal(pdu, self.kind - OF_READS)
-        if self.kind in (NAN, INFINITE) and pdu.function_code == READ_HOLDING and len(pdu.registers) == 2:
-            pdu.registers = words(math.nan if self.kind == NAN else math.inf)
+        if self.kind in (NAN, INFINITE) and pdu.function_code == READ_HOLDING and len(pdu.registers) > 1:
+            pdu.registers = words(math.nan if self.kind == NAN else math.inf) * (len(pdu.registers) // 2)
         if pdu.function_code != WRITE_HOLDING or pdu.address >= MISDEED:
             return pdu
         if self.kind == NO_HEARTBEAT and pdu.address == 111:

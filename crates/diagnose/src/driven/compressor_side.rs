@@ -24,9 +24,9 @@ pub(crate) struct Declared {
 
 impl Declared {
     /// With the geometric means of the rows as the reference of the efficiency.
-    pub fn new(params: Params, rows: &Rows) -> Self {
+    pub fn new(params: &Params, rows: &Rows) -> Self {
         let (middle_speed_rpm, middle_flow) = middles(rows);
-        Declared { params, middle_speed_rpm, middle_flow }
+        Declared { params: *params, middle_speed_rpm, middle_flow }
     }
 }
 

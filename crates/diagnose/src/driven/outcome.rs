@@ -119,7 +119,7 @@ pub fn identify(
     if fitted < needed {
         return Err(DrivenError::TooFewRows { rows: fitted, until_s: fit_until_s, needed });
     }
-    let declared = Declared::new(params, rows);
+    let declared = Declared::new(&params, rows);
     let sample: Vec<Values> = draws(|standard| log_density(standard, rows, &declared, fitted), seed)
         .iter()
         .map(Values::of_standard)

@@ -371,7 +371,7 @@ struct SoakMean {
 fn soak_mean(recording: &Recording, channel: Channel, start_s: f64, end_s: f64) -> Option<SoakMean> {
     let series: &Series = recording.series.get(&channel)?;
     let third_s = (end_s - start_s) / 3.0;
-    let of = |start_s: f64, end_s: f64| mean(&usable(channel, series.slice(start_s, end_s).1));
+    let of = |start_s: f64, end_s: f64| mean(usable(channel, series.slice(start_s, end_s).1));
     let (early, late) = (of(start_s, start_s + third_s)?, of(end_s - third_s, end_s)?);
     Some(SoakMean { mean: of(start_s, end_s)?, drift_per_min: (late - early) / (2.0 * third_s / 60.0) })
 }

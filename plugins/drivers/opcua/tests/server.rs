@@ -451,7 +451,7 @@ fn bad_readings_are_dropped_and_uncertain_ones_are_reported() {
         (C::P1, "int64", Quality::Bad, "Int64"),
         (C::T1, "text", Quality::Bad, "String"),
         (C::P2, "null", Quality::Bad, "empty"),
-        (C::T2, "inf", Quality::Bad, "inf"),
+        (C::T2, "inf", Quality::Bad, "T2 bad (no number"),
         (C::Tc, "future", Quality::Bad, "later than the server's clock"),
         (C::TurbineFlow, "GoodLocalOverride", Quality::Bad, "GoodLocalOverride"),
         (C::T3, "BadSensorFailure", Quality::Bad, "BadSensorFailure"),

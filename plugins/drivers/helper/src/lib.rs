@@ -21,26 +21,24 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod about;
-mod address;
 mod armed;
-mod by_channel;
 mod descent;
 mod outage;
 mod output_queue;
 mod pipes;
 mod refusal;
-mod secret;
 mod server;
 mod serving;
+mod settings;
 #[cfg(unix)]
 mod socket;
 
 pub use about::{About, SOCKET};
-pub use address::address;
-pub use by_channel::by_channel;
 pub use outage::Outage;
 pub use pipes::serve;
-pub use secret::{SecretError, secret};
+pub use settings::address::address;
+pub use settings::by_channel::by_channel;
+pub use settings::secret::{SecretError, secret};
 #[cfg(unix)]
 pub use socket::serve_at;
 

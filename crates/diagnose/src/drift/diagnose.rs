@@ -19,7 +19,8 @@ use nalgebra::DMatrix;
 
 /// Time at the start of each run that is left out, s: the rig may still be settling from an unknown state.
 const SETTLING_S: f64 = 30.0;
-/// Model error of a segment's mean, relative to the noise of one sample.
+/// Model error of a segment's mean, relative to the noise of one sample: that of a mean of 44 independent samples, so that a longer segment
+/// gains no more weight. Judgement.
 const MODEL_ERROR_RATIO: f64 = 0.15;
 
 /// Finds the causes of drift.

@@ -9,7 +9,8 @@ use mapper_numerics::statistics::median;
 use mapper_observe::perturbation::UNINFORMATIVE;
 use nalgebra::{DMatrix, DVector};
 
-/// Distance from the model, relative to the median segment, above which a segment is an outlier.
+/// Distance from the model, relative to the median segment, above which a segment is an outlier: five standard deviations of a normal
+/// distribution occur once in two million.
 const OUTLIER_RATIO: f64 = 5.0;
 
 /// Excludes segments that are outliers even for the best explanation: the model cannot follow the machine there (surge, a valve at its stop).

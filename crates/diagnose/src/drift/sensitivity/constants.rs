@@ -77,9 +77,11 @@ fn declared_error(declared: &Declared, channel: Channel, reading: f64) -> f64 {
     declared.offset_sigma.hypot(declared.gain_sigma_ratio * reading)
 }
 
-/// Knot distance of slow variations, s.
+/// Knot distance of slow variations, s. Judgement: several steps of a minute, so that variations explain no single step, and a fraction of the
+/// hour for which turbine housings remember.
 const KNOT_S: f64 = 480.0;
-/// Slow variation of the air around the housings, which is seldom recorded, K.
+/// Slow variation of the air around the housings, which is seldom recorded, one standard deviation, K: air conditioning that cycles by 2 K from
+/// peak to peak.
 const AMBIENT_VARIATION_K: f64 = 0.7;
 /// Slow variation of the turbine side, K: model errors of its housing take an hour to decay.
 const TURBINE_VARIATION: [(Channel, f64); 2] = [(Channel::Tt, 0.2), (Channel::T4, 0.1)];

@@ -14,7 +14,8 @@ const TIME_STEPS_S: [(f64, f64); 5] =
 /// Time after a jump that is left out if the model cannot follow the jump (deep beyond the surge line), s. Shaft and outlet then start from their
 /// readings, the metal from the change of its readings.
 pub(crate) const SKIPPED_S: f64 = 5.0;
-/// Longest time for which a drifting machine is taken as constant, s.
+/// Longest time for which a drifting machine is taken as constant, s: a drift of 1 K in an hour changes by 0.01 K in it, below any sensor's
+/// resolution.
 const PART_S: f64 = 30.0;
 
 /// One step of a run.

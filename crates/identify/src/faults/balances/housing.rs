@@ -19,7 +19,7 @@ use mapper_core::{Channel, Recording, StepKind, StepMarker, Window, WindowRule};
 use mapper_numerics::statistics::{MIN_VALUES, mean};
 use mapper_physics::rig::sensor_fault::FaultKind;
 
-/// Length of a part over which the housing's slope is taken, s.
+/// Length of a part over which the housing's slope is taken, s: noise of 0.15 K at 10 Hz leaves 0.002 K/s, and a step of a minute has three.
 const PART_S: f64 = 18.0;
 /// Maximum number of parts of a step.
 const MAX_PARTS: usize = 8;

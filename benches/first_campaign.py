@@ -4,8 +4,8 @@ Usage: first_campaign.py PROGRAM MACHINES
 
 Wheels of 35 to 90 mm; the machine's own map is that of a similar compressor (medium), with 20 % less flow and 2 points less efficiency
 (narrow), or with 25 % more flow (wide). Each machine is run once with its own seed, and differs from its campaign by what identification
-assumes about an undeclared machine: alpha_A, probe and heating/cooling ratio (none to all three, sizes by `REFINEMENTS`), internal area
-(`SCALED_AREA_SIGMA_RATIO`) and humidity (from dry to saturated). The sizes are read from the code.
+assumes about an undeclared machine: alpha_A, probe and heating/cooling ratio (none to all three, sizes by `REFINEMENTS`), the law of h before the
+wheel (either one), internal area (`SCALED_AREA_SIGMA_RATIO`) and humidity (from dry to saturated). The sizes are read from the code.
 """
 
 import json
@@ -78,6 +78,9 @@ def stand_of(text, number):
     scale = max(draw.gauss(1, area), 0.2)
     area_m2 = re.search(r"# internal_area: ([\d.e-]+) m", text)
     text = text.replace(area_m2[0][:-1], f"internal_area: {scale * float(area_m2[1]):.5g} ", 1)
+    if draw.random() < 0.5:
+        text = text.replace("    compressor:\n", "    compressor:\n      inlet_convection: own\n", 1)
+        effects.append("own law of h before the wheel")
     return f"{text}\nreport: {{humidity: {draw.uniform(0, 100):.1f} %}}\n", ", ".join(effects) or "as declared"
 
 

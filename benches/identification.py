@@ -22,7 +22,10 @@ from pathlib import Path
 from machines import ROOT, error_of, half, held, replaced, write_table
 from orders import OTHER_HOUSING
 
-# Undeclared effects, other replacements, with a zero, order.
+# What identification cannot know either: the law of h before the wheel.
+OWN_INLET = [("      alpha_area: 0 ", "      inlet_convection: own\n      alpha_area: 0 ")]
+
+# Undeclared effects, other replacements, with a zero, order. Of the classes in `WITH_EITHER_LAW` every second seed has its own law at the inlet.
 CLASSES = {
     "as declared": ("", [], True, "thermal_gradient"),
     "alpha_A 0.03": ("area_split: 0.03", [], True, "thermal_gradient"),
@@ -44,9 +47,16 @@ CLASSES = {
     "mix 1, lines": ("area_split: 0.05, directional_htc: 0.9, tip_diameter: 0.7 mm", [], True, "speed_lines"),
 }
 
+WITH_EITHER_LAW = {name for name, (effects, *_) in CLASSES.items() if "area_split" in effects}
+
 
 def slug(name):
     return re.sub("[^a-z0-9]+", "_", name.lower())
+
+
+def declared_campaign(run):
+    """The campaign with which a run is identified."""
+    return run.with_name(f"{run.name}.declared.yaml")
 
 
 def record(mapper, directory, name, seed):
@@ -66,6 +76,10 @@ def record(mapper, directory, name, seed):
     if effects:
         text = replaced(text, "virtual_lab: {}", f"virtual_lab: {{effects: {{{effects}}}}}")
     folder.mkdir(parents=True, exist_ok=True)
+    declared_campaign(kept).write_text(text)
+    if name in WITH_EITHER_LAW and seed % 2:
+        for old, new in OWN_INLET:
+            text = replaced(text, old, new)
     for file, loss, steepness in (("bent.csv", 0.06, 0.0), ("steep.csv", 0.02, 1.2)):
         if not (folder / file).exists():
             partial = folder / f"{file}.{seed}"
@@ -83,7 +97,7 @@ def record(mapper, directory, name, seed):
 
 
 def identified(mapper, run):
-    done = subprocess.run([mapper, "identify", str(run), "--json"], capture_output=True, text=True)
+    done = subprocess.run([mapper, "identify", str(run), "--campaign", str(declared_campaign(run)), "--truth", "--json"], capture_output=True, text=True)
     if not done.stdout:
         raise SystemExit(f"{run}: {done.stderr.strip()[-2000:]}")
     found = json.loads(done.stdout)

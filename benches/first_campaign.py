@@ -1,6 +1,6 @@
 """Random machines from `mapper init` to a map on the virtual lab: share of good points and coverage.
 
-Usage: first_campaign.py PROGRAM MACHINES
+Usage: first_campaign.py PROGRAM MACHINES [FIRST]
 
 Wheels of 35 to 90 mm; the machine's own map is that of a similar compressor (medium), with 20 % less flow and 2 points less efficiency
 (narrow), or with 25 % more flow (wide). Each machine is run once with its own seed, and differs from its campaign by what identification
@@ -109,8 +109,9 @@ def counted(points):
 
 def main():
     program, machines = str(Path(sys.argv[1]).resolve()), int(sys.argv[2])
+    first = int(sys.argv[3]) if len(sys.argv) > 3 else 0
     passed, total, total_good = 0, 0, 0
-    for number in range(machines):
+    for number in range(first, first + machines):
         wheel_mm, shape, points, remark = machine(program, number)
         if points is None:
             print(f"{number:3} {wheel_mm:5.1f} mm {remark}", flush=True)

@@ -12,10 +12,10 @@ use mapper_diagnose::gap::best_fit::signature::lengths;
 use mapper_diagnose::gap::residuals::study::{EffectValues, Study};
 use mapper_diagnose::gap::residuals::whiten::Linearised;
 use mapper_observe::averages::time_table::Table;
-use mapper_observe::{Declared, declared_uncertainties};
+use mapper_observe::Declared;
 use mapper_physics::rig::effect::Effect;
 use mapper_physics::simulation::model::Model;
-use std::collections::BTreeMap;
+use mapper_recording::ChannelMap;
 use std::sync::Arc;
 
 /// Records the campaign with noise, offsets, tolerances and weather but without a cause, and linearises the study for `effects`. Equal
@@ -41,11 +41,10 @@ pub(crate) struct StudySignatureMeter {
     linearised: Linearised,
 }
 
-/// The uncertainties and tolerances that the campaign declares.
+/// The uncertainties and tolerances that the campaign declares: those from which the lab of a case draws.
 pub(crate) fn declared(campaign: &Campaign) -> Declared {
-    let sensors = campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared));
     Declared {
-        sensors: declared_uncertainties(&sensors.collect(), &campaign.tolerances, &BTreeMap::new()),
+        sensors: mapper_session::declared(campaign, &ChannelMap::native()),
         noise_colour: NoiseColour::default(),
         tolerances: campaign.tolerances,
         nominal: campaign.boundary,

@@ -35,7 +35,6 @@ pub fn outside_kinds(wanted: OutsideUse) -> Vec<Arc<dyn Effect>> {
             effect_of::<CoulombFriction>(),
             effect_of::<FlowDependentHtc>(),
             effect_of::<SlowHousingProbe>(),
-            effect_of::<SpeedGain>(),
         ],
     }
 }
@@ -270,25 +269,5 @@ outside_cause! {
     |rig: &mut Rig, cause: Self| {
         rig.instruments.path_mut(Channel::Tc).lag_s += cause.lag_s;
         Ok(())
-    }
-}
-
-effect_parameters! {
-    /// The speed pick-up reads high or low.
-    #[derive(Debug)]
-    struct SpeedGain {
-        /// Error of the gain, ratio.
-        error_ratio = "g" ["1"] -0.1 .. 0.1, neutral 0.0, step 0.01;
-    }
-}
-
-outside_cause! {
-    SpeedGain, "X_speed_gain", "speed sensor reads in proportion",
-    "the speed sensor reads high or low in proportion", "N_read = (1 + g) N", Shaft, Rig::hook
-}
-
-impl Hooks for SpeedGain {
-    fn reading(&self, _site: &Site<'_>, channel: Channel, value: f64) -> f64 {
-        if channel == Channel::ShaftSpeed { value * (1.0 + self.error_ratio) } else { value }
     }
 }

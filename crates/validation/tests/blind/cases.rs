@@ -59,7 +59,7 @@ fn recordings_hold_the_schedule_and_nothing_of_the_truth() {
         assert!(!bytes.windows(6).any(|window| window == b"/truth"));
         // The true speed at the end of a step is what the sensor says there, within its noise of 30 rpm, five times.
         let speed = &recording.series[&Channel::ShaftSpeed];
-        let gained = truth.effects.contains_key("X_speed_gain");
+        let gained = truth.effects.contains_key("speed_gain");
         assert!(gained || (speed.values.last().unwrap() - truth.points[1].speed_rpm).abs() < 150.0);
     }
 }

@@ -4,6 +4,7 @@ use crate::{Comparison, HistoryError, Metric, Night, PointRow, RunKey, RunRow, c
 use rusqlite::{Connection, OpenFlags, Transaction, TransactionBehavior, params};
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -74,6 +75,17 @@ pub struct History {
     path: PathBuf,
 }
 
+/// Rejects a pipe or a device, which SQLite would wait for.
+fn check_plain(path: &Path) -> Result<(), HistoryError> {
+    match mapper_yaml::open_file(path) {
+        Err(error) if error.kind() == ErrorKind::InvalidInput => {
+            Err(HistoryError::Foreign { path: path.to_owned(), reason: error.to_string() })
+        }
+        // SQLite reports any other problem.
+        _ => Ok(()),
+    }
+}
+
 impl History {
     /// Opens the history, creating it if it does not exist.
     ///
@@ -84,6 +96,7 @@ impl History {
             std::fs::create_dir_all(parent)
                 .map_err(|source| HistoryError::Directory { path: parent.to_owned(), source })?;
         }
+        check_plain(path)?;
         let mut history = Self::connect(path, OpenFlags::default())?;
         // Checked before the runs of a night, not only when their results are stored.
         let writable = history.prepare().and_then(|()| {
@@ -109,6 +122,7 @@ impl History {
         if !path.exists() {
             return Err(HistoryError::Missing { path: path.to_owned() });
         }
+        check_plain(path)?;
         // A WAL database may need its side files to be created even for reading, so a read-only connection would fail after a crash.
         let mut history =
             Self::connect(path, OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX)?;

@@ -6,7 +6,6 @@ use mapper_recording::logs::limits::max_unpacked_bytes;
 use mapper_recording::logs::{Log, LogError, LogFile, LogFormat, LogOptions};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::errors::ParquetError;
-use std::fs::File;
 
 pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
 
@@ -49,6 +48,6 @@ fn batches(file: &LogFile) -> Result<(Schema, Batches), LogError> {
     }
     Ok(match file.bytes() {
         Some(bytes) => reader_of!(bytes::Bytes::copy_from_slice(bytes)),
-        None => reader_of!(File::open(file.path()).map_err(|error| file.read_error(error))?),
+        None => reader_of!(file.open_path()?),
     })
 }

@@ -29,7 +29,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-inference", &["numerics"]),
     ("mapper-identify",  &["core", "inference", "numerics", "physics", "observe"]),
     ("mapper-diagnose",  &["core", "numerics", "physics", "observe", "inference", "identify"]),
-    ("mapper-history",   &["numerics"]),
+    ("mapper-history",   &["numerics", "yaml"]),
     // Plug-ins do not depend on each other.
     // A backend may read recordings: replay does.
     ("mapper-backends",  &["core", "numerics", "physics", "recording", "yaml"]),
@@ -41,9 +41,9 @@ const ALLOWED: &[(&str, &[&str])] = &[
     // The application as a library. The caller passes the plug-ins.
     ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "recording", "observe", "identify", "diagnose", "history", "maps", "report", "numerics", "fleet", "fmu", "yaml"]),
     // The live page of a run.
-    ("mapper-live",      &["core", "campaign", "recording", "report", "session"]),
+    ("mapper-live",      &["core", "campaign", "recording", "report", "session", "yaml"]),
     // Blind cases on the virtual lab, calibrations, the figures of the paper; above the application, like the program.
-    ("mapper-validation", &["core", "chart", "numerics", "physics", "campaign", "runner", "recording", "observe", "identify", "diagnose", "history", "report", "session", "backends", "effects", "fleet"]),
+    ("mapper-validation", &["core", "chart", "numerics", "physics", "campaign", "runner", "recording", "observe", "identify", "diagnose", "history", "report", "session", "backends", "effects", "fleet", "yaml"]),
     // The program lists the plug-ins; no package depends on the program.
     ("mapper-cli",       &["core", "physics", "campaign", "driver-host", "planner", "recording", "diagnose", "history", "maps", "log-formats", "report", "session", "live", "backends", "effects", "formats", "fleet", "validation"]),
     ("mapper-python",    &["core", "physics", "campaign", "recording", "maps", "log-formats", "session", "driver-host", "backends", "effects", "formats"]),

@@ -71,3 +71,41 @@ fn each_output_is_written_in_one_place() {
     // A rule about a word that is not in use any more would hold for ever.
     assert!(seen.iter().all(|count| *count > 0), "{seen:?}");
 }
+
+/// Where files that this program makes, and the kernel's own, are opened directly.
+const OPENED_DIRECTLY: &[&str] = &[
+    "crates/yaml/src/document/file.rs",
+    // A page and its log in a temporary directory; the recording that was just created.
+    "crates/session/src/analysis/pdf.rs",
+    "crates/session/src/run/prepared_run.rs",
+];
+
+/// A pipe, a device or a file of the kernel may hang or have no end, so that one function opens files.
+#[test]
+fn files_are_opened_in_one_place() {
+    let root = mapper_tests::repository();
+    let mut files = Vec::new();
+    ["crates", "plugins", "python"].iter().for_each(|folder| rust_files(&root.join(folder), &mut files));
+    let mut wrong = Vec::new();
+    let mut seen = 0;
+    for file in &files {
+        let place = file.strip_prefix(&root).unwrap().to_string_lossy().replace('\\', "/");
+        if !place.contains("/src/") {
+            continue;
+        }
+        let text = std::fs::read_to_string(file).unwrap();
+        let production = text.split("#[cfg(test)]\nmod tests").next().unwrap();
+        let opens = |line: &str| {
+            ["File::open(", "fs::read(", "fs::read_to_string("].iter().any(|call| line.contains(call))
+        };
+        for (at, line) in production.lines().enumerate().filter(|(_, line)| opens(line)) {
+            let line_is_allowed = line.contains("\"/proc/") || line.contains("CompoundFile::open(");
+            seen += 1;
+            if !line_is_allowed && !OPENED_DIRECTLY.contains(&place.as_str()) {
+                wrong.push(format!("{place}:{}: use mapper_yaml::open_file or read_limited", at + 1));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
+    assert!(seen >= OPENED_DIRECTLY.len(), "{seen}");
+}

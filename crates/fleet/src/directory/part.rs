@@ -133,7 +133,7 @@ fn unread(error: impl std::fmt::Display) -> PartRefusal {
 
 /// The header, the file, and the bytes of the body that were read with the header.
 fn open(path: &Path, expected: PartRequirements<'_>) -> Result<(Part, File, Vec<u8>), PartRefusal> {
-    let mut file = File::open(path).map_err(unread)?;
+    let mut file = mapper_yaml::open_file(path).map_err(unread)?;
     let length = file.metadata().map_err(unread)?.len();
     let mut bytes = Vec::with_capacity(MAX_HEADER_BYTES);
     (&mut file).take(MAX_HEADER_BYTES as u64).read_to_end(&mut bytes).map_err(unread)?;

@@ -80,6 +80,9 @@ mod with {
     use std::io::Write;
     use std::sync::Arc;
 
+    /// Maximum size of a certificate chain or key, bytes: a certificate has some kilobytes, a chain some certificates.
+    const MAX_PEM_BYTES: usize = 1 << 20;
+
     /// TLS configuration of the server.
     #[derive(Clone)]
     pub(crate) struct Tls(Arc<ServerConfig>);
@@ -90,14 +93,17 @@ mod with {
             |path: &std::path::Path, what, why: String| TlsError::File { path: path.to_owned(), what, why };
         let certificate = |why| file(&files.certificate, "certificate", why);
         let pair = |source: rustls::Error| TlsError::Pair { files: files.clone(), why: source.to_string() };
-        let chain: Vec<CertificateDer<'static>> = CertificateDer::pem_file_iter(&files.certificate)
-            .and_then(Iterator::collect)
+        let read = |path| mapper_yaml::read_limited(path, MAX_PEM_BYTES).map_err(|source| source.to_string());
+        let pem = read(&files.certificate).map_err(certificate)?;
+        let chain: Vec<CertificateDer<'static>> = CertificateDer::pem_slice_iter(&pem)
+            .collect::<Result<_, _>>()
             .map_err(|source| certificate(source.to_string()))?;
         if chain.is_empty() {
             return Err(certificate("no certificate in it".to_owned()));
         }
-        let key = PrivateKeyDer::from_pem_file(&files.key)
-            .map_err(|source| file(&files.key, "private key", source.to_string()))?;
+        let key = read(&files.key)
+            .and_then(|pem| PrivateKeyDer::from_pem_slice(&pem).map_err(|source| source.to_string()))
+            .map_err(|why| file(&files.key, "private key", why))?;
         let config = ServerConfig::builder_with_provider(Arc::new(ring::default_provider()))
             .with_safe_default_protocol_versions()
             .map_err(pair)?

@@ -2,6 +2,7 @@
 
 use crate::logs::LogError;
 use crate::logs::limits::max_memory_bytes;
+use std::fs::File;
 use std::io::{self, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -71,8 +72,16 @@ impl LogFile {
     pub fn open(&self) -> Result<Box<dyn ReadSeek>, LogError> {
         match &self.bytes {
             Some(bytes) => Ok(Box::new(Cursor::new(bytes.clone()))),
-            None => Ok(Box::new(mapper_yaml::open_file(&self.path).map_err(|error| self.read_error(error))?)),
+            None => Ok(Box::new(self.open_path()?)),
         }
+    }
+
+    /// The file on disk.
+    ///
+    /// # Errors
+    /// [`LogError::Read`] if it is not a plain file or cannot be opened.
+    pub fn open_path(&self) -> Result<File, LogError> {
+        mapper_yaml::open_file(&self.path).map_err(|error| self.read_error(error))
     }
 
     /// Its size, bytes.

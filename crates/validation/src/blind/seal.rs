@@ -67,7 +67,7 @@ pub(crate) fn read_json<T: DeserializeOwned>(path: &Path, what: &'static str) ->
 
 fn read(path: &Path) -> Result<Vec<u8>, BlindError> {
     let mut bytes = Vec::new();
-    let file = std::fs::File::open(path).map_err(BlindError::file(path))?;
+    let file = mapper_yaml::open_file(path).map_err(BlindError::file(path))?;
     file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(BlindError::file(path))?;
     if bytes.len() as u64 > MAX_BYTES {
         return Err(BlindError::TooLarge { path: path.to_owned(), limit: MAX_BYTES });

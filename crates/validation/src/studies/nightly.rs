@@ -16,6 +16,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// Nightly maps.
@@ -121,9 +122,8 @@ pub fn rows_of(directory: &Path, registry: &Registry) -> Result<Vec<RunRow>, Fle
 }
 
 fn merged_text(path: &Path) -> Result<String, FleetError> {
-    std::fs::read_to_string(path).map_err(|source| FleetError::File {
-        action: "read the merged runs in",
-        path: path.to_owned(),
-        source,
-    })
+    let mut text = String::new();
+    mapper_yaml::open_file(path).and_then(|mut file| file.read_to_string(&mut text)).map(|_| text).map_err(
+        |source| FleetError::File { action: "read the merged runs in", path: path.to_owned(), source },
+    )
 }

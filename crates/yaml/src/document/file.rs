@@ -3,22 +3,47 @@
 use crate::mistakes::finding::FindingKind;
 use crate::mistakes::findings::Findings;
 use crate::mistakes::source::{Document, Source};
-use std::fs::File;
-use std::io::{self, Read};
+use std::fs::{File, OpenOptions};
+use std::io::{self, ErrorKind, Read, Seek};
 use std::path::Path;
 
-/// Opens a plain file. A pipe or a device is not opened: reading it may hang or never end.
+/// Opens a plain file: the one place where files that a user names are opened. A pipe or a device is not opened: reading it may hang or never end.
 ///
 /// # Errors
 /// The system's error; [`io::ErrorKind::InvalidInput`] with a remedy if it is not a file.
 pub fn open_file(path: &Path) -> io::Result<File> {
-    let found = std::fs::metadata(path)?;
-    let refused = |why: &str| Err(io::Error::new(io::ErrorKind::InvalidInput, why));
-    match found {
-        found if found.is_file() => File::open(path),
-        found if found.is_dir() => refused("it is a directory; name a file in it"),
-        _ => refused("it is a pipe or a device, not a file; write its content to a file first"),
+    let refused = |why: &str| Err(io::Error::new(ErrorKind::InvalidInput, why));
+    let mut options = OpenOptions::new();
+    options.read(true);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::OpenOptionsExt;
+        // Files of the kernel that wait for data, such as /proc/kmsg, look like plain ones. NONBLOCK: they and pipes fail at once.
+        options.custom_flags(i32::try_from(rustix::fs::OFlags::NONBLOCK.bits()).unwrap_or_default());
     }
+    // Opening a device may have an effect.
+    let found = std::fs::metadata(path)?;
+    if found.is_dir() {
+        return refused("it is a directory; name a file in it");
+    }
+    let not_a_file = "it is a pipe or a device, not a file; write its content to a file first";
+    if !found.is_file() {
+        return refused(not_a_file);
+    }
+    let mut file = options.open(path)?;
+    let found = file.metadata()?;
+    if !found.is_file() {
+        return refused(not_a_file);
+    }
+    // Files of the kernel have no size, with content or without. A file may just be written.
+    if found.len() == 0 {
+        match file.read(&mut [0]) {
+            Ok(0) => {}
+            Ok(_) if file.metadata()?.len() > 0 => file.rewind()?,
+            _ => return refused(not_a_file),
+        }
+    }
+    Ok(file)
 }
 
 /// Whether this is a descriptor that the caller has opened: `/dev/stdin`, or a shell's `<(command)`.
@@ -32,11 +57,12 @@ fn is_descriptor(path: &Path) -> bool {
 /// The system's error; [`io::ErrorKind::FileTooLarge`] for a larger file.
 pub fn read_limited(path: &Path, limit_bytes: usize) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    let file = if is_descriptor(path) { File::open(path)? } else { open_file(path)? };
+    let is_stream = is_descriptor(path) && !std::fs::metadata(path)?.is_file();
+    let file = if is_stream { File::open(path)? } else { open_file(path)? };
     file.take(limit_bytes as u64 + 1).read_to_end(&mut bytes)?;
     if bytes.len() > limit_bytes {
         return Err(io::Error::new(
-            io::ErrorKind::FileTooLarge,
+            ErrorKind::FileTooLarge,
             format!("it is larger than the {limit_bytes} bytes that are read"),
         ));
     }
@@ -59,4 +85,33 @@ pub fn open(
         let remedy = "save the file as UTF-8".to_owned();
         Findings::single(source, FindingKind::Syntax, at, "this is not UTF-8".to_owned(), remedy)
     }))
+}
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    use super::*;
+    use std::path::PathBuf;
+
+    /// Kernel files that wait for data look like plain ones; only root may open this one.
+    #[test]
+    fn what_may_hang_or_has_no_end_is_not_opened() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name| folder.path().join(name);
+        let made = std::process::Command::new("mkfifo").arg(at("fifo")).status().unwrap();
+        assert!(made.success());
+        let _listener = std::os::unix::net::UnixListener::bind(at("socket")).unwrap();
+        std::os::unix::fs::symlink("/dev/zero", at("link")).unwrap();
+        let mut special = vec![at("fifo"), at("socket"), at("link"), folder.path().to_owned()];
+        special.extend(["/proc/kmsg", "/proc/self/limits"].map(PathBuf::from));
+        for path in &special {
+            let error = open_file(path).unwrap_err();
+            let expected = [ErrorKind::InvalidInput, ErrorKind::PermissionDenied];
+            assert!(expected.contains(&error.kind()), "{}: {error}", path.display());
+            assert!(read_limited(path, 10).is_err(), "{}", path.display());
+        }
+        std::fs::write(at("empty"), "").unwrap();
+        std::fs::write(at("full"), "content").unwrap();
+        assert_eq!(read_limited(&at("empty"), 10).unwrap(), b"");
+        assert_eq!(read_limited(&at("full"), 10).unwrap(), b"content");
+    }
 }

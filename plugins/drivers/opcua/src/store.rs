@@ -4,6 +4,9 @@ use opcua::crypto::{CertificateStore, X509, X509Data};
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
+/// Maximum size of a certificate in DER, bytes: usual ones have one or two kilobytes.
+const MAX_CERTIFICATE_BYTES: usize = 1 << 16;
+
 /// Our application URI in OPC UA, which our certificate contains.
 pub(crate) const APPLICATION_URI: &str = "urn:mapper:backend:opcua";
 /// Validity of our own certificate, days.
@@ -108,7 +111,8 @@ impl Store {
         if !path.exists() {
             return Ok(None);
         }
-        let der = std::fs::read(&path).map_err(|source| StoreError::File { path: path.clone(), source })?;
+        let der = mapper_yaml::read_limited(&path, MAX_CERTIFICATE_BYTES)
+            .map_err(|source| StoreError::File { path: path.clone(), source })?;
         X509::from_der(&der).map(Some).map_err(|_| StoreError::NotACertificate(path))
     }
 

@@ -1,7 +1,5 @@
 //! Excel workbooks, with a table on each sheet.
 
-mod check;
-
 use crate::columns::sample::HEAD_ROWS;
 use crate::columns::table_head::MAX_COLUMNS;
 use crate::notation::instant::{Instant, NS_PER_DAY};
@@ -11,9 +9,11 @@ use crate::notation::typed_cell::Value;
 use crate::tables::joined_tables::{Part, join_tables};
 use crate::tables::table_log::{Origin, Table};
 use calamine::{DataRef, DataType, Reader, SheetVisible, Xlsx};
+use mapper_recording::logs::limits::{max_memory_bytes, max_unpacked_bytes};
 use mapper_recording::logs::{
     Layout, Log, LogError, LogFile, LogFinding, LogFormat, LogOptions, ReadSeek, Row, RowSink,
 };
+use mapper_workbook::{XlsxLimits, check_xlsx};
 
 pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
 
@@ -64,7 +64,12 @@ impl Book {
                 mapper_workbook::read_xls(file.open()?).map_err(|why| file.content_error(NAME, why))?;
             return Ok(Book::Xls(sheets));
         }
-        check::check_size(file)?;
+        let size_bytes = file.size_bytes()?;
+        let limits = XlsxLimits {
+            unpacked_bytes: max_unpacked_bytes(size_bytes),
+            memory_bytes: max_memory_bytes(size_bytes),
+        };
+        check_xlsx(file.open()?, limits).map_err(|why| file.content_error(NAME, why))?;
         let book = Xlsx::new(file.open()?);
         book.map(|book| Book::Xlsx(Box::new(book)))
             .map_err(|error| file.content_error(NAME, error.to_string()))

@@ -128,12 +128,15 @@ fn parts(header: &str, shared_strings: &str) -> Vec<(String, String)> {
 }
 
 fn workbook(parts: &[(String, String)]) -> Vec<u8> {
+    packed_workbook(parts, zip::CompressionMethod::Stored)
+}
+
+fn packed_workbook(parts: &[(String, String)], method: zip::CompressionMethod) -> Vec<u8> {
     let mut bytes = std::io::Cursor::new(Vec::new());
     let mut archive = zip::ZipWriter::new(&mut bytes);
     for (name, text) in parts {
-        let stored =
-            zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
-        archive.start_file(name.as_str(), stored).unwrap();
+        let options = zip::write::SimpleFileOptions::default().compression_method(method);
+        archive.start_file(name.as_str(), options).unwrap();
         archive.write_all(text.as_bytes()).unwrap();
     }
     archive.finish().unwrap();
@@ -288,6 +291,26 @@ fn a_workbook_that_claims_more_strings_than_it_has_room_for_is_refused() {
         let strings = SHARED_STRINGS.replace("uniqueCount=\"1\"", &format!("uniqueCount=\"{count}\""));
         let error = refusal(&workbook(&parts(HEADER, &strings)));
         assert!(error.contains("sharedStrings.xml claims"), "{error}");
+    }
+}
+
+/// Each element takes memory although it has few bytes in the file.
+#[test]
+fn a_workbook_of_many_small_elements_is_refused() {
+    let replaced = |part: &str, text: &str, by: String| {
+        let mut parts = parts(HEADER, SHARED_STRINGS);
+        let found = parts.iter_mut().find(|(name, _)| name.ends_with(part)).unwrap();
+        assert!(found.1.contains(text), "{part}: {}", found.1);
+        found.1 = found.1.replace(text, &by);
+        refusal(&packed_workbook(&parts, zip::CompressionMethod::Deflated))
+    };
+    let names = "<definedName name=\"a\">b</definedName>".repeat(300_000);
+    for (part, text, by) in [
+        ("sharedStrings.xml", "</sst>", "<si/>".repeat(1_200_000) + "</sst>"),
+        ("xl/workbook.xml", "<sheets>", format!("<definedNames>{names}</definedNames><sheets>")),
+    ] {
+        let error = replaced(part, text, by);
+        assert!(error.contains("more texts, formats or names"), "{part}: {error}");
     }
 }
 

@@ -4,7 +4,8 @@ use crate::table::sheet::grid::{Grid, GridRow, MAX_CELLS, MAX_ROWS, count_number
 use crate::table::sheet::matrices::{points_of_matrices, quantity_of_title};
 use crate::table::sheet::speed_heading::without_speed;
 use mapper_core::ImportError;
-use std::io::{Cursor, Read};
+use mapper_workbook::{XlsxLimits, check_xlsx};
+use std::io::Cursor;
 
 /// The cells of the named sheet, else of the first visible sheet with a table of numbers, else of a hidden one.
 ///
@@ -109,7 +110,8 @@ fn sheets_of(bytes: &[u8]) -> Result<Vec<Sheet>, ImportError> {
         }
         return Ok(sheets);
     }
-    check_size(bytes)?;
+    let limits = XlsxLimits { unpacked_bytes: MAX_UNPACKED_BYTES, memory_bytes: MAX_UNPACKED_BYTES };
+    check_xlsx(Cursor::new(bytes), limits).map_err(failed)?;
     let book = calamine::Reader::new(Cursor::new(bytes));
     let mut book: calamine::Xlsx<_> = book.map_err(|error: calamine::XlsxError| failed(error.to_string()))?;
     for sheet in calamine::Reader::sheets_metadata(&book).to_vec() {
@@ -162,21 +164,4 @@ const MAX_UNPACKED_BYTES: u64 = 64 << 20;
 
 fn too_large() -> String {
     format!("it unpacks to more than {} MB; no map needs that", MAX_UNPACKED_BYTES >> 20)
-}
-
-/// Unpacks a workbook once within a limit, since the library has none.
-fn check_size(bytes: &[u8]) -> Result<(), ImportError> {
-    let failed = |problem: String| ImportError::Workbook { problem };
-    let mut parts = zip::ZipArchive::new(Cursor::new(bytes)).map_err(|error| failed(error.to_string()))?;
-    let mut left = MAX_UNPACKED_BYTES;
-    for index in 0..parts.len() {
-        let part = parts.by_index(index).map_err(|error| failed(error.to_string()))?;
-        let read = std::io::copy(&mut part.take(left + 1), &mut std::io::sink());
-        let read = read.map_err(|error| failed(error.to_string()))?;
-        if read > left {
-            return Err(failed(too_large()));
-        }
-        left -= read;
-    }
-    Ok(())
 }

@@ -1,15 +1,12 @@
-//! Checks the unpacked size of a workbook, since the library unpacks it without limits.
+//! Checks a workbook of Excel 2007 and later before `calamine` reads it, since the library unpacks it without limits.
 
-use super::NAME;
-use mapper_recording::logs::limits::max_unpacked_bytes;
-use mapper_recording::logs::{LogError, LogFile};
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 use std::cell::Cell;
-use std::io::{self, BufReader, Read};
+use std::io::{self, BufReader, Read, Seek};
 use std::rc::Rc;
 
-/// Maximum unpacked size of a part other than a sheet, bytes: the library holds all of it in memory.
+/// Maximum unpacked size of a part that is not listed here, bytes.
 const MAX_PART_BYTES: u64 = 128 << 20;
 
 /// Maximum unpacked size of the part with cell formats, bytes: each format copies its strings.
@@ -32,12 +29,29 @@ const MAX_ROWS: u32 = 1 << 20;
 /// Minimum size of a shared string in bytes, `<si/>`.
 const SHARED_STRING_BYTES: u64 = 5;
 
+/// Memory of a shared string next to its text, bytes: 24 for its place in a list that grows by doubling, 16 at least for the text.
+const STRING_MEMORY_BYTES: u64 = 64;
+
+/// Memory of a format, a name or a relation, bytes: two strings in a table that grows by doubling. Formats take 150, names 110.
+const ENTRY_MEMORY_BYTES: u64 = 256;
+
+/// What a workbook may unpack to, bytes.
+#[derive(Debug, Clone, Copy)]
+pub struct XlsxLimits {
+    /// All parts together.
+    pub unpacked_bytes: u64,
+    /// What the library keeps in memory: texts, formats, names and relations.
+    pub memory_bytes: u64,
+}
+
 /// Kinds of parts that are checked: calamine limits none of them.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Sheet,
     SharedStrings,
     Styles,
+    /// Names and relations.
+    Entries,
     Other,
 }
 
@@ -48,6 +62,7 @@ impl Kind {
             name if name.ends_with("sharedstrings.xml") => Kind::SharedStrings,
             name if name.ends_with("styles.xml") => Kind::Styles,
             name if name.starts_with("xl/worksheets/") && name.ends_with(".xml") => Kind::Sheet,
+            name if name.ends_with("workbook.xml") || name.ends_with(".rels") => Kind::Entries,
             _ => Kind::Other,
         }
     }
@@ -56,44 +71,52 @@ impl Kind {
         match self {
             Kind::Sheet => u64::MAX,
             Kind::Styles => MAX_STYLES_BYTES,
-            Kind::SharedStrings | Kind::Other => MAX_PART_BYTES,
+            Kind::SharedStrings | Kind::Entries | Kind::Other => MAX_PART_BYTES,
+        }
+    }
+
+    /// Memory of an element with this name, bytes.
+    fn memory_bytes(self, name: &str) -> u64 {
+        match self {
+            Kind::SharedStrings if name == "si" => STRING_MEMORY_BYTES,
+            Kind::Styles | Kind::Entries => ENTRY_MEMORY_BYTES,
+            Kind::Sheet | Kind::SharedStrings | Kind::Other => 0,
         }
     }
 }
 
-/// Refuses a workbook that would exceed the memory when unpacked.
-pub(super) fn check_size(file: &LogFile) -> Result<(), LogError> {
-    let refused = |message: String| file.content_error(NAME, message);
-    let wrong = |error: zip::result::ZipError| refused(error.to_string());
-    let mut archive = zip::ZipArchive::new(file.open()?).map_err(wrong)?;
+/// Refuses a workbook that would exceed these limits when unpacked.
+///
+/// # Errors
+/// A clause with the problem, about the file.
+pub fn check_xlsx(file: impl Read + Seek, limits: XlsxLimits) -> Result<(), String> {
+    let wrong = |error: zip::result::ZipError| error.to_string();
+    let mut archive = zip::ZipArchive::new(file).map_err(wrong)?;
     if archive.len() > MAX_PARTS {
-        return Err(refused(format!("it has {} parts; at most {MAX_PARTS} are read", archive.len())));
+        return Err(format!("it has {} parts; at most {MAX_PARTS} are read", archive.len()));
     }
     if archive.has_overlapping_files().map_err(wrong)? {
-        return Err(refused("its parts overlap: the same bytes are unpacked several times".to_owned()));
+        return Err("its parts overlap: the same bytes are unpacked several times".to_owned());
     }
-    let whole = max_unpacked_bytes(file.size_bytes()?);
-    let mut left = whole;
+    let mut left = limits.unpacked_bytes;
+    let memory = Rc::new(Cell::new(limits.memory_bytes));
     for index in 0..archive.len() {
         let part = archive.by_index(index).map_err(wrong)?;
         let name = part.name().map_err(wrong)?.into_owned();
         let kind = Kind::of(&name);
-        let read = check_part(part, kind, left).map_err(|why| refused(format!("{name} {why}")))?;
+        let read = check_part(part, kind, left, &memory).map_err(|why| format!("{name} {why}"))?;
         if read > kind.limit() {
-            return Err(refused(format!("{name} unpacks to more than {} MiB", kind.limit() >> 20)));
+            return Err(format!("{name} unpacks to more than {} MiB", kind.limit() >> 20));
         }
         left = left.checked_sub(read).ok_or_else(|| {
-            refused(format!(
-                "its parts unpack to more than the {} MiB that a file of this size may have",
-                whole >> 20
-            ))
+            format!("its parts unpack to more than the {} MiB that are read", limits.unpacked_bytes >> 20)
         })?;
     }
     Ok(())
 }
 
 /// The unpacked size of a part in bytes, one more than its limit if it is larger; or its error.
-fn check_part(part: impl Read, kind: Kind, left: u64) -> Result<u64, String> {
+fn check_part(part: impl Read, kind: Kind, left: u64, memory: &Rc<Cell<u64>>) -> Result<u64, String> {
     let limit = kind.limit().min(left);
     let read = Rc::new(Cell::new(0));
     let piece = Rc::new(Cell::new(0));
@@ -104,7 +127,8 @@ fn check_part(part: impl Read, kind: Kind, left: u64) -> Result<u64, String> {
     } else {
         // Bytes that the buffer read ahead do not belong to a piece.
         let buffer = 1 << 13;
-        let pieces = PieceChecker { kind, read: read.clone(), piece, buffer: buffer as u64 };
+        let pieces =
+            PieceChecker { kind, read: read.clone(), piece, buffer: buffer as u64, memory: memory.clone() };
         let found = pieces.check(Reader::from_reader(BufReader::with_capacity(buffer, counted)));
         if read.get() <= limit {
             found?;
@@ -137,6 +161,8 @@ struct PieceChecker {
     read: Rc<Cell<u64>>,
     piece: Rc<Cell<u64>>,
     buffer: u64,
+    /// What is left of the memory, bytes.
+    memory: Rc<Cell<u64>>,
 }
 
 impl PieceChecker {
@@ -144,6 +170,7 @@ impl PieceChecker {
         let piece_limit = match self.kind {
             Kind::Sheet => MAX_PIECE_BYTES,
             Kind::Styles => MAX_STYLE_PIECE_BYTES,
+            Kind::Entries => MAX_PIECE_BYTES,
             // Shared strings are truncated where they are used.
             Kind::SharedStrings | Kind::Other => MAX_PART_BYTES,
         };
@@ -160,9 +187,16 @@ impl PieceChecker {
                 quick_xml::Error::Io(error) => error.to_string(),
                 error => format!("is not XML: {error}"),
             })?;
-            if let Event::Start(tag) | Event::Empty(tag) = &event {
-                rows += u32::from(self.kind == Kind::Sheet && tag.local_name().as_ref() == "row");
-            }
+            let memory_bytes = match &event {
+                Event::Start(tag) | Event::Empty(tag) => {
+                    rows += u32::from(self.kind == Kind::Sheet && tag.local_name().as_ref() == "row");
+                    self.kind.memory_bytes(tag.local_name().as_ref())
+                }
+                Event::Text(text) if self.kind == Kind::SharedStrings => text.len() as u64,
+                _ => 0,
+            };
+            let left = self.memory.get().checked_sub(memory_bytes);
+            self.memory.set(left.ok_or("has more texts, formats or names than a file of this size may")?);
             if rows > MAX_ROWS {
                 return Err(format!("has more than the {MAX_ROWS} rows of Excel"));
             }

@@ -97,4 +97,4 @@ pub use text::one_line::one_line;
 pub use text::probability_text::probability_text;
 pub use text::terminal_text::{coloured_text, terminal_json, terminal_text};
 pub use text::text_encoding::TextEncoding;
-pub use text::with_unit::{readable, temperature, with_unit};
+pub use text::with_unit::{readable, shorten_numbers, temperature, with_unit};

@@ -98,7 +98,7 @@ impl ScriptError {
             line,
             column: at.position(),
             source_line: source_line.chars().take(LINE_LIMIT).map(harmless).collect(),
-            message: message
+            message: mapper_core::shorten_numbers(&message)
                 .chars()
                 .take(MESSAGE_LIMIT)
                 .map(|c| if c == '\n' { c } else { harmless(c) })

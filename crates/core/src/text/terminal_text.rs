@@ -1,5 +1,6 @@
 //! Makes text safe for terminals, which interpret control characters.
 
+use crate::text::with_unit::shorten_numbers;
 use std::fmt::Write;
 use std::hash::{BuildHasher, RandomState};
 use std::sync::LazyLock;
@@ -25,7 +26,7 @@ fn is_interpreted(c: char) -> bool {
 /// messages of drivers, are foreign text and could otherwise control the terminal or hide text.
 pub fn terminal_text(text: &str) -> String {
     let safe = text.replace("\r\n", "\n").replace(is_interpreted, "\u{fffd}");
-    safe.replace(OWN_ESCAPE.as_str(), "\u{1b}")
+    shorten_numbers(&safe).replace(OWN_ESCAPE.as_str(), "\u{1b}")
 }
 
 /// The same JSON without characters that a terminal interprets: JSON itself escapes only those below U+0020.

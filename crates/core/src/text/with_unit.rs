@@ -29,9 +29,44 @@ pub fn readable(value: f64, unit: &str) -> String {
     }
 }
 
+/// Length above which a decimal number is written with a power of ten, characters: a double in full has 17 digits.
+const MAX_PLAIN_LENGTH: usize = 40;
+
+/// Replaces decimal numbers that are too long to read, such as 1e300 in full, by the same with a power of ten.
+pub fn shorten_numbers(text: &str) -> String {
+    let is_part = |c: char| c.is_ascii_digit() || c == '.';
+    let (mut short, mut rest) = (String::with_capacity(text.len()), text);
+    while let Some(start) = rest.find(is_part) {
+        let (before, from) = rest.split_at(start);
+        let (run, after) = from.split_at(from.find(|c| !is_part(c)).unwrap_or(from.len()));
+        short.push_str(before);
+        let number = run.trim_end_matches('.');
+        // Digits within a word are a hash.
+        let is_word = short.ends_with(char::is_alphanumeric) || after.starts_with(char::is_alphanumeric);
+        match number.parse::<f64>() {
+            Ok(value) if number.len() > MAX_PLAIN_LENGTH && value.is_finite() && !is_word => {
+                short += &format!("{value:e}{}", run.split_at(number.len()).1);
+            }
+            _ => short.push_str(run),
+        }
+        rest = after;
+    }
+    short + rest
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_that_nobody_can_read_have_a_power_of_ten() {
+        let (large, small, hash) = (1e300, 2.5e-300, "4".repeat(64));
+        let text = format!("from -{large:.1} s to {large} s. Not {small}, 1.25 of 3 or {hash}f.");
+        assert_eq!(
+            shorten_numbers(&text),
+            format!("from -1e300 s to 1e300 s. Not 2.5e-300, 1.25 of 3 or {hash}f.")
+        );
+    }
 
     #[test]
     fn readings_have_the_units_of_limits() {

@@ -58,6 +58,13 @@ fn a_rig_trip_ends_the_run_and_locks_the_rig() {
     let speed = &report.recording.series[&Channel::ShaftSpeed];
     let tripped_s =
         report.recording.events.iter().find(|event| event.kind == EventKind::RigTripped).unwrap().t_s;
+    let events = report.recording.events.iter();
+    let of_trip = |kind| events.clone().find(|event| event.kind == kind).unwrap().message.clone();
+    assert_ne!(
+        of_trip(EventKind::RigTripped),
+        of_trip(EventKind::GuardTripped),
+        "the reason is reported once"
+    );
     // A poll of a second, the way down and the five seconds that are watched.
     assert!(speed.t_s.last().unwrap() - tripped_s < 1.0 + 20.0 + 5.1);
 

@@ -85,6 +85,10 @@ impl Run<'_, '_> {
             Some(marker) => self.runner.observer.on_step_abandoned(&marker)?,
             None => {}
         }
+        // The rig has reported its own trip in the batch.
+        let was_reported =
+            unreported.is_some_and(|batch| batch.events.iter().any(|event| event.message == message));
+        let message = if was_reported { "the run ends, because the rig tripped" } else { message };
         self.runner.observer.on_event(&Event { t_s: self.now_s, kind, message: message.to_owned() })?;
         Ok(self.pass_notes()?)
     }

@@ -77,7 +77,8 @@ pub use rig::backend::{
 };
 pub use rig::clock::{Clock, PacedClock, UnpacedClock, Wall};
 pub use rig::guard::{
-    GuardName, GuardSet, LargestChange, Reaction, SafeTrajectory, SignalGuard, SpeedBand, SurgeVariation,
+    FrozenLimit, GuardName, GuardSet, LargestChange, Reaction, SafeTrajectory, SignalGuard, SpeedBand,
+    SurgeVariation,
 };
 pub use rig::limits::{Limits, SURGE_ALLOWED_S};
 pub use rig::on_drift::OnDrift;

@@ -146,7 +146,7 @@ fn guards() -> Vec<Box<dyn Guard>> {
             hysteresis: 0.0,
             dwell_s: 0.0,
             age_s: 3.0,
-            frozen_s: Some(20.0),
+            frozen: Some(mapper_core::FrozenLimit { after_s: 20.0, band: 0.0 }),
             reaction: Reaction::Safe,
         })) as Box<dyn Guard>
     };

@@ -199,7 +199,7 @@ fn overspeed(dwell_s: f64) -> SignalWatch {
         hysteresis: 0.0,
         dwell_s,
         age_s: 3.0,
-        frozen_s: None,
+        frozen: None,
         reaction: Reaction::Safe,
     })
 }

@@ -82,6 +82,15 @@ pub struct LargestChange {
     pub within_s: f64,
 }
 
+/// A reading is frozen if it has stayed within its band since before a jump of the setpoints.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FrozenLimit {
+    /// Time after the jump, s, > 0.
+    pub after_s: f64,
+    /// Half width of the band, unit of the channel, >= 0.
+    pub band: f64,
+}
+
 /// A guard of one channel. Without bounds it checks only that the channel delivers readings.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SignalGuard {
@@ -101,8 +110,8 @@ pub struct SignalGuard {
     pub dwell_s: f64,
     /// The guard trips after this time without a good reading, s, > 0.
     pub age_s: f64,
-    /// The guard trips if the reading has not changed at all for this time after a jump of the setpoints, s; `None`: not checked.
-    pub frozen_s: Option<f64>,
+    /// The guard trips if the reading is frozen; `None`: not checked.
+    pub frozen: Option<FrozenLimit>,
     /// Reaction to a bound; a missing signal ends the run in any case.
     pub reaction: Reaction,
 }
@@ -138,6 +147,8 @@ pub struct GuardSet {
     pub surge: Option<SurgeVariation>,
     /// Guard of the speed.
     pub speed: Option<SpeedBand>,
+    /// When the flow, which has no guard of its own, counts as frozen; `None`: not checked.
+    pub frozen_flow: Option<FrozenLimit>,
 }
 
 impl GuardSet {

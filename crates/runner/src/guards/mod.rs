@@ -1,6 +1,7 @@
 //! Guards that end a step or a run before damage: signals, sample stream, plausibility, surge, and the rig itself.
 
 pub(crate) mod batch_watch;
+pub(crate) mod frozen_reading;
 pub(crate) mod guard;
 pub(crate) mod plausibility_watch;
 pub(crate) mod recent_minimum;

@@ -1,5 +1,6 @@
 //! The guard for one channel: value, rate of change, age, quality, and a frozen reading.
 
+use crate::guards::frozen_reading::FrozenReading;
 use crate::guards::guard::{CommandedState, Guard, Trip};
 use crate::guards::plausibility_watch::is_possible;
 use mapper_core::{Quality, Reaction, SampleBatch, SignalGuard, readable};
@@ -11,9 +12,6 @@ const REPEAT_TRIP_S: f64 = 10.0;
 const NEAR_RATIO: f64 = 0.03;
 /// Time over which the slope is computed, s.
 const SLOPE_S: f64 = 0.5;
-/// A reading is frozen if it moves by no more than this ratio (4 mK of 400 K, 2 Pa of 200 kPa). The noise of thermocouple and
-/// pressure amplifiers is larger, and a jump of the setpoints moves a reading a hundred times as far.
-const FROZEN_RATIO: f64 = 1e-5;
 /// Minimum spacing of the readings kept for a change, as a share of its time. It bounds the memory for fast rigs.
 const CHANGE_RESOLUTION_RATIO: f64 = 1e-3;
 
@@ -35,8 +33,7 @@ pub struct SignalWatch {
     quiet_until_s: Option<f64>,
     /// Times and readings within the window of the change limit.
     recent: VecDeque<(f64, f64)>,
-    /// Start of the period of constant readings, s, and their value.
-    constant_since: Option<(f64, f64)>,
+    frozen: Option<FrozenReading>,
 }
 
 impl SignalWatch {
@@ -52,7 +49,7 @@ impl SignalWatch {
             beyond_since_s: None,
             quiet_until_s: None,
             recent: VecDeque::new(),
-            constant_since: None,
+            frozen: spec.frozen.map(FrozenReading::new),
         }
     }
 
@@ -91,9 +88,8 @@ impl SignalWatch {
             None => self.anchor = Some((t_s, value)),
         }
         self.last_good_s = Some(t_s);
-        let unchanged =
-            |(_, constant): &(f64, f64)| (value - constant).abs() <= FROZEN_RATIO * constant.abs();
-        self.constant_since = self.constant_since.filter(unchanged).or(Some((t_s, value)));
+        let channel = self.spec.channel;
+        let frozen = self.frozen.as_mut().and_then(|frozen| frozen.check(t_s, value, channel, state));
         self.last_value = Some(value);
         // Hysteresis: after a violation, the value has to return past the bound by this amount.
         let slack = if self.beyond_since_s.is_some() { self.spec.hysteresis } else { 0.0 };
@@ -106,7 +102,10 @@ impl SignalWatch {
         } else {
             self.beyond_since_s = None;
         }
-        self.check_change(t_s, value).or_else(|| self.check_frozen(t_s, state))
+        self.check_change(t_s, value).or_else(|| {
+            let frozen = frozen?;
+            self.trip(t_s, self.spec.reaction.max(Reaction::Safe), &frozen)
+        })
     }
 
     /// Trips if the reading changes by more than the allowed change.
@@ -133,22 +132,6 @@ impl SignalWatch {
             limit.within_s, limit.change
         );
         self.trip(t_s, self.spec.reaction, &message)
-    }
-
-    /// Trips if the reading has not moved although the setpoints have.
-    fn check_frozen(&mut self, t_s: f64, state: &CommandedState) -> Option<Trip> {
-        let (frozen_s, (constant_since_s, _), jumped_s) =
-            (self.spec.frozen_s?, self.constant_since?, state.jumped_s?);
-        let since_jump_s = t_s - jumped_s;
-        // The reading must be unchanged since before the jump.
-        if !state.running || since_jump_s < frozen_s || constant_since_s > jumped_s {
-            return None;
-        }
-        let value = readable(self.last_value?, self.spec.channel.unit());
-        let message = format!(
-            "is frozen: {value} since {constant_since_s:.1} s, though the setpoints jumped at {jumped_s:.1} s"
-        );
-        self.trip(t_s, self.spec.reaction.max(Reaction::Safe), &message)
     }
 }
 
@@ -201,7 +184,7 @@ impl Guard for SignalWatch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mapper_core::{Channel, ChannelColumn, GuardName, LargestChange, Provenance};
+    use mapper_core::{Channel, ChannelColumn, FrozenLimit, GuardName, LargestChange, Provenance};
 
     fn spec() -> SignalGuard {
         SignalGuard {
@@ -213,7 +196,7 @@ mod tests {
             hysteresis: 2.0,
             dwell_s: 0.2,
             age_s: 0.5,
-            frozen_s: None,
+            frozen: None,
             reaction: Reaction::Hold,
         }
     }
@@ -336,7 +319,10 @@ mod tests {
         let mut guard = SignalWatch::new(SignalGuard { above: None, change, ..spec() });
         assert_eq!(check(&mut guard, &batch(0, &[300.0, 301.0, 302.0, 303.0]), 0.3), None);
         assert!(check(&mut guard, &batch(4, &[306.0]), 0.4).unwrap().reason.contains("6.0 K within 1 s"));
-        let mut guard = SignalWatch::new(SignalGuard { frozen_s: Some(2.0), ..spec() });
+        let mut guard = SignalWatch::new(SignalGuard {
+            frozen: Some(FrozenLimit { after_s: 2.0, band: 0.01 }),
+            ..spec()
+        });
         let after_jump = |jumped_s| CommandedState {
             running: true,
             jumped_s: Some(jumped_s),
@@ -349,7 +335,7 @@ mod tests {
         let trip = guard.clone().check(&batch(100, &[300.0; 30]), 12.9, &after_jump(9.5)).unwrap();
         assert_eq!(trip.reaction, Reaction::Safe);
         // A flickering last digit is not movement.
-        let flicker: Vec<f64> = (0..30).map(|i| 300.0 + 1e-3 * f64::from(i % 2)).collect();
+        let flicker: Vec<f64> = (0..30).map(|i| 300.0 + 9e-3 * f64::from(i % 2)).collect();
         assert!(guard.check(&batch(100, &flicker), 12.9, &after_jump(9.5)).is_some());
         assert!((trip.t_s - 11.5).abs() < 0.11 && trip.reason.contains("frozen"), "{trip:?}");
     }

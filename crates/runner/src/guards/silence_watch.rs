@@ -1,7 +1,8 @@
-//! The guard for channels that no other guard checks, of the rig and of auxiliary instruments: it reports a channel that falls silent.
+//! The guard for channels that no other guard checks, of the rig and of auxiliary instruments: it reports a channel that falls silent or freezes.
 
+use crate::guards::frozen_reading::FrozenReading;
 use crate::guards::guard::{CommandedState, Guard, Trip};
-use mapper_core::{Channel, GuardName, Quality, Reaction, SampleBatch};
+use mapper_core::{Channel, FrozenLimit, GuardName, Quality, Reaction, SampleBatch};
 
 /// A channel without a guard of its own.
 #[derive(Debug, Clone, PartialEq)]
@@ -12,46 +13,68 @@ pub struct UnguardedChannel {
     pub channel: Channel,
     /// Time without a reading after which the channel is reported, s.
     pub age_s: f64,
+    /// When the channel counts as frozen; `None`: not checked.
+    pub frozen: Option<FrozenLimit>,
 }
 
-/// Reports a channel that falls silent. If identification requires it, the run ends. The check of the first seconds reports a channel that was never read.
+/// Reports a channel that falls silent or freezes. If identification requires it, the run ends. The check of the first seconds reports a channel that was never read.
 #[derive(Debug, Clone)]
 pub struct SilenceWatch {
-    /// With the time of the last reading, s, and whether its silence was reported.
-    channels: Vec<(UnguardedChannel, Option<f64>, bool)>,
+    channels: Vec<Watched>,
+}
+
+#[derive(Debug, Clone)]
+struct Watched {
+    of: UnguardedChannel,
+    /// Time of the last reading, s.
+    last_s: Option<f64>,
+    frozen: Option<FrozenReading>,
+    /// Whether its silence was reported, or that it is frozen.
+    reported: bool,
 }
 
 impl SilenceWatch {
     /// Creates a guard for these channels.
     pub fn new(channels: Vec<UnguardedChannel>) -> Self {
-        let channels = channels.into_iter().map(|channel| (channel, None, false)).collect();
-        SilenceWatch { channels }
+        let watched = |of: UnguardedChannel| {
+            let frozen = of.frozen.map(FrozenReading::new);
+            Watched { of, last_s: None, frozen, reported: false }
+        };
+        SilenceWatch { channels: channels.into_iter().map(watched).collect() }
     }
 }
 
 impl Guard for SilenceWatch {
-    fn check(&mut self, batch: &SampleBatch, now_s: f64, _: &CommandedState) -> Option<Trip> {
+    fn check(&mut self, batch: &SampleBatch, now_s: f64, state: &CommandedState) -> Option<Trip> {
         let mut trip: Option<Trip> = None;
-        for (channel_of, last_s, reported) in &mut self.channels {
-            let from = batch.provenance_of(channel_of.channel);
-            let values = batch.column(channel_of.channel).unwrap_or_default().iter().zip(&batch.t_s);
-            for (index, (_, t_s)) in values.enumerate().filter(|(_, (value, _))| value.is_finite()) {
+        for Watched { of, last_s, frozen, reported } in &mut self.channels {
+            let UnguardedChannel { source, channel, age_s, .. } = of;
+            let from = batch.provenance_of(*channel);
+            let values = batch.column(*channel).unwrap_or_default().iter().zip(&batch.t_s);
+            let mut fault = None;
+            for (index, (value, t_s)) in values.enumerate().filter(|(_, (value, _))| value.is_finite()) {
                 let quality = from.and_then(|from| from.quality.get(index));
                 // A repeated reading is as old as its source time.
                 let source_s = from.and_then(|from| from.source_t_s.get(index)).unwrap_or(t_s).min(*t_s);
                 if quality != Some(&Quality::Bad) && last_s.is_none_or(|last_s| source_s > last_s) {
-                    (*last_s, *reported) = (Some(source_s), false);
+                    *last_s = Some(source_s);
+                    fault = frozen.as_mut().and_then(|one| one.check(source_s, *value, *channel, state));
+                    *reported &= fault.is_some();
                 }
             }
             let Some(since_s) = *last_s else { continue };
-            if now_s - since_s <= channel_of.age_s || *reported {
+            let reason = match fault {
+                Some(fault) => format!("{} ({channel}) {fault}", channel.info().description),
+                None if now_s - since_s > *age_s => {
+                    format!("`{source}` has given no {channel} since {since_s:.1} s")
+                }
+                None => continue,
+            };
+            if std::mem::replace(reported, true) {
                 continue;
             }
-            *reported = true;
-            let needed = crate::guards::start_check::REQUIRED_CHANNELS.contains(&channel_of.channel);
+            let needed = crate::guards::start_check::REQUIRED_CHANNELS.contains(channel);
             let reaction = if needed { Reaction::Safe } else { Reaction::Note };
-            let UnguardedChannel { source, channel, .. } = channel_of;
-            let reason = format!("`{source}` has given no {channel} since {since_s:.1} s");
             let found = Trip { t_s: now_s, guard: GuardName::Signals, reaction, reason };
             trip = match trip {
                 Some(before) if before.reaction >= found.reaction => Some(before),
@@ -69,7 +92,8 @@ mod tests {
 
     #[test]
     fn loss_of_a_required_channel_ends_the_run_and_of_another_is_noted_once() {
-        let channel_of = |channel| UnguardedChannel { source: "bench".to_owned(), channel, age_s: 3.0 };
+        let channel_of =
+            |channel| UnguardedChannel { source: "bench".to_owned(), channel, age_s: 3.0, frozen: None };
         let batch = |t_s: f64, flow: f64, air: f64| SampleBatch {
             t_s: vec![t_s],
             columns: vec![

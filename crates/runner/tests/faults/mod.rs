@@ -9,13 +9,13 @@ use super::{Notebook, Recorded, plan};
 use faulty_driver::{FAULT_S, lab};
 use mapper_backends::virtual_lab::VirtualLab;
 use mapper_core::{
-    Backend, Channel, EventKind, GuardName, GuardSet, Plan, Reaction, SafeTrajectory, SignalGuard, SpeedBand,
-    SurgeVariation, UnpacedClock,
+    Backend, Channel, EventKind, FrozenLimit, GuardName, GuardSet, Plan, Reaction, SafeTrajectory,
+    SignalGuard, SpeedBand, SurgeVariation, UnpacedClock,
 };
 use mapper_driver_host::conformance::{Fault, FaultyBackend};
 use mapper_runner::{
     BatchWatch, Guard, PlanSteps, Protection, ReadingBounds, RigWatch, RunEnd, RunError, Runner, SignalWatch,
-    SurgeWatch,
+    SilenceWatch, SurgeWatch, UnguardedChannel,
 };
 use std::sync::atomic::AtomicBool;
 
@@ -28,6 +28,8 @@ fn plan_of_minutes() -> Plan {
     plan
 }
 
+const FROZEN: FrozenLimit = FrozenLimit { after_s: 20.0, band: 0.0 };
+
 fn guard(name: GuardName, channel: Channel, above: Option<f64>) -> SignalGuard {
     SignalGuard {
         name,
@@ -39,7 +41,7 @@ fn guard(name: GuardName, channel: Channel, above: Option<f64>) -> SignalGuard {
         dwell_s: 0.2,
         age_s: 3.0,
         // P3 has no noise here, and may stay constant.
-        frozen_s: (channel != Channel::P3).then_some(20.0),
+        frozen: (channel != Channel::P3).then_some(FROZEN),
         reaction: Reaction::Safe,
     }
 }
@@ -60,6 +62,8 @@ fn default_guards() -> GuardSet {
             reaction: Reaction::Safe,
         }),
         speed: Some(SpeedBand { band_ratio: 0.05, reaction: Reaction::Safe }),
+        // Without noise, a flow of zero is constant.
+        frozen_flow: None,
     }
 }
 
@@ -86,6 +90,12 @@ fn run_on(rig: &mut dyn Backend, set: &GuardSet) -> (Result<RunEnd, RunError>, N
     let mut guards: Vec<Box<dyn Guard>> =
         vec![Box::new(BatchWatch::default()), Box::new(RigWatch::default())];
     guards.extend(set.signals.iter().map(|spec| Box::new(SignalWatch::new(*spec)) as Box<dyn Guard>));
+    guards.push(Box::new(SilenceWatch::new(vec![UnguardedChannel {
+        source: "lab".to_owned(),
+        channel: Channel::CompressorFlow,
+        age_s: 3.0,
+        frozen: set.frozen_flow,
+    }])));
     guards.extend(set.surge.map(|spec| Box::new(SurgeWatch::new(spec)) as Box<dyn Guard>));
     let protection = Protection {
         safe: SafeTrajectory { p3_slew_pa_s: Some(50e3), valve_opening_ratio: 1.0, within_s: 20.0 },
@@ -204,15 +214,20 @@ fn readings_that_contradict_physics_end_the_run() {
 }
 
 /// A sensor that froze before the jump at 70 s is detected 20 s after it, with a polling interval of one second; N and T2 earlier, since they
-/// then contradict the pressure ratio.
+/// then contradict the pressure ratio. So is the flow, which no other guard checks.
 #[test]
 fn a_frozen_sensor_is_detected_after_the_next_jump() {
-    for (channel, at_s) in
-        [(Channel::P2, 90.0..91.5), (Channel::T2, 71.0..85.0), (Channel::ShaftSpeed, 71.0..85.0)]
-    {
-        let run = run_with_faults(&[(40.0, Fault::Frozen(channel))], &default_guards());
+    for (channel, at_s) in [
+        (Channel::P2, 90.0..91.5),
+        (Channel::CompressorFlow, 90.0..91.5),
+        (Channel::T2, 71.0..85.0),
+        (Channel::ShaftSpeed, 71.0..85.0),
+    ] {
+        let guards = GuardSet { frozen_flow: Some(FROZEN), ..default_guards() };
+        let run = run_with_faults(&[(40.0, Fault::Frozen(channel))], &guards);
         let RunEnd::Tripped(trip) = run.end.unwrap() else { panic!("{channel}") };
-        assert_eq!(trip.reason.contains("frozen"), channel == Channel::P2, "{}", trip.reason);
+        let is_late = at_s.start == 90.0;
+        assert_eq!(trip.reason.contains("frozen"), is_late, "{}", trip.reason);
         assert!(trip.reason.contains(channel.symbol()), "{}", trip.reason);
         assert!(at_s.contains(&trip.t_s), "{channel}: {}", trip.t_s);
     }

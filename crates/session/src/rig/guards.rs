@@ -35,7 +35,11 @@ pub fn make_guards(
             source: rig.backend.clone(),
             channel: *channel,
             age_s: max_age_s(campaign, rig),
+            frozen: None,
         }));
+        for one in watched.iter_mut().filter(|one| one.channel == Channel::CompressorFlow) {
+            one.frozen = set.frozen_flow;
+        }
         guards.push(Box::new(SilenceWatch::new(watched)));
         guards.push(Box::new(RigWatch::default()));
         guards.push(Box::new(StartCheck::new(rig.channels.clone())));

@@ -70,6 +70,7 @@ impl Registry {
                 source: choice.name.clone(),
                 channel: *channel,
                 age_s,
+                frozen: None,
             };
             read.extend(channels.iter().map(as_read));
             exclusive.extend(rig.exclusive);

@@ -8,8 +8,8 @@ use crate::units::{
     TemperatureDifference,
 };
 use mapper_core::{
-    Channel, GuardName, GuardSet, LargestChange, Limits, Reaction, SURGE_ALLOWED_S, SignalGuard, SpeedBand,
-    SurgeVariation,
+    Channel, FrozenLimit, GuardName, GuardSet, LargestChange, Limits, Reaction, SURGE_ALLOWED_S, SignalGuard,
+    SpeedBand, SurgeVariation,
 };
 use mapper_yaml::{FindingKind, steps};
 use schemars::JsonSchema;
@@ -199,6 +199,9 @@ const DEFAULT_DWELL_S: f64 = 0.2;
 pub const DEFAULT_MAX_AGE_S: f64 = 3.0;
 /// Default time without any change before a channel counts as frozen, s: 200 samples at 10 Hz without noise.
 const DEFAULT_FROZEN_S: f64 = 20.0;
+/// Movement below which a channel counts as frozen, as a share of its declared noise: 200 samples of a working sensor cover five standard
+/// deviations, and a tenth of them if its noise was declared ten times too large.
+const FROZEN_NOISE_RATIO: f64 = 0.1;
 /// Default time beyond an oil limit before a trip, s. Judgement: ten samples at 10 Hz.
 const DEFAULT_OIL_DWELL_S: f64 = 1.0;
 const DEFAULT_CHANGE_WITHIN_S: f64 = 10.0;
@@ -213,8 +216,10 @@ impl GuardsFile {
         let GuardInputs { limits, sensors, dwell_s, speed_is_held } = *by;
         let age_s = value_or(self.signals.age, DEFAULT_MAX_AGE_S);
         let frozen_s = value_or(self.signals.frozen, DEFAULT_FROZEN_S);
-        let noisy = |channel| {
-            sensors.get(&channel).is_some_and(|sensor: &SensorDeclaration| sensor.declared.noise_sigma > 0.0)
+        let frozen = |channel| {
+            let noise =
+                sensors.get(&channel).map(|sensor: &SensorDeclaration| sensor.declared.noise_sigma)?;
+            (noise > 0.0).then_some(FrozenLimit { after_s: frozen_s, band: FROZEN_NOISE_RATIO * noise })
         };
         let guard = |name, channel: Channel, reaction: Reaction| SignalGuard {
             name,
@@ -225,10 +230,10 @@ impl GuardsFile {
             hysteresis: 0.0,
             dwell_s: DEFAULT_DWELL_S,
             age_s,
-            frozen_s: [Channel::ShaftSpeed, Channel::P2, Channel::T2]
+            frozen: [Channel::ShaftSpeed, Channel::P2, Channel::T2]
                 .contains(&channel)
-                .then_some(frozen_s)
-                .filter(|_| noisy(channel)),
+                .then(|| frozen(channel))
+                .flatten(),
             reaction,
         };
         let overspeed = self.overspeed;
@@ -309,6 +314,7 @@ impl GuardsFile {
                 band_ratio: value_or(self.speed.band, band),
                 reaction: self.speed.reaction.unwrap_or(Reaction::Safe),
             }),
+            frozen_flow: frozen(Channel::CompressorFlow),
         }
     }
 }

@@ -108,7 +108,7 @@ pub enum ReadWarning {
         repeated: usize,
     },
     /// The clock was set while it recorded.
-    #[error("the clock was set by {by_s:+.1} s during the recording: the later times were corrected")]
+    #[error("the clock was set by {by_s:+.1} s during the recording, or before it: the times were corrected")]
     ClockSet {
         /// By how much, s; positive: forward.
         by_s: f64,

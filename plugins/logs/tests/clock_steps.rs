@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
 use mapper_core::Channel;
-use mapper_recording::{ChannelMap, ReadOptions, ReadWarning, read_recording_from};
+use mapper_recording::{ChannelMap, ReadOptions, ReadReport, ReadWarning, read_recording_from};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -13,8 +13,14 @@ fn kelvin(row: usize) -> f64 {
     300.0 + row as f64 / 16.0
 }
 
-/// A recording of two topics at 10 Hz with these times, s, of its rows:
+/// A recording of two topics at 10 Hz with these times of its rows.
 fn read(times_ns: &[u64]) -> (BTreeMap<Channel, mapper_core::Series>, Vec<ReadWarning>) {
+    let report = read_marked(times_ns, None, &[]);
+    (report.recording.series, report.warnings)
+}
+
+/// The same with the start of the run and step markers: time in the file, and time of the run, s.
+fn read_marked(times_ns: &[u64], start_ns: Option<u64>, markers: &[(u64, f64)]) -> ReadReport {
     let mut file = std::io::Cursor::new(Vec::new());
     let mut writer = mcap::WriteOptions::new().compression(None).create(&mut file).unwrap();
     let schema = writer.add_schema("rig", "jsonschema", b"{}").unwrap();
@@ -31,14 +37,27 @@ fn read(times_ns: &[u64]) -> (BTreeMap<Channel, mapper_core::Series>, Vec<ReadWa
             writer.write_to_known_channel(&header, format!("{{\"x\": {}}}", kelvin(row)).as_bytes()).unwrap();
         }
     }
+    if let Some(start_ns) = start_ns {
+        let metadata = [("format", "2".to_owned()), ("start_time_ns", start_ns.to_string())];
+        let metadata = metadata.map(|(key, value)| (key.to_owned(), value)).into();
+        let name = "mapper.recording".to_owned();
+        writer.write_metadata(&mcap::records::Metadata { name, metadata }).unwrap();
+        let channel_id = writer.add_channel(schema, "/step", "json", &BTreeMap::new()).unwrap();
+        for (step, (log_time, t_s)) in (1..).zip(markers) {
+            let (log_time, publish_time) = (*log_time, *log_time);
+            let header = mcap::records::MessageHeader { channel_id, sequence: 0, log_time, publish_time };
+            let marker =
+                format!("{{\"step\": {step}, \"kind\": \"point\", \"phase\": \"start\", \"t_s\": {t_s}}}");
+            writer.write_to_known_channel(&header, marker.as_bytes()).unwrap();
+        }
+    }
     writer.finish().unwrap();
     drop(writer);
     let map = "channels:\n  T2: {topic: /a, field: x, unit: K}\n  T3: {topic: /b, field: x, unit: K}\n\
                constants: {T_amb: 25 degC}\n";
     let map = ChannelMap::from_yaml(map, Path::new("map.yaml")).unwrap();
     let file = file.into_inner();
-    let report = read_recording_from(&file, Path::new("test.mcap"), &map, &ReadOptions::default()).unwrap();
-    (report.recording.series, report.warnings)
+    read_recording_from(&file, Path::new("test.mcap"), &map, &ReadOptions::default()).unwrap()
 }
 
 fn set_by(warnings: &[ReadWarning]) -> Vec<f64> {
@@ -126,5 +145,40 @@ fn late_messages_are_no_set_clock() {
         // The last row is where it was.
         let series = &series[&Channel::T2];
         assert_eq!(series.values.last(), Some(&kelvin(3999)), "{what}");
+    }
+}
+
+/// Step markers have the time of the run, samples that of the clock: wherever it was set forward, they belong together again.
+#[test]
+fn samples_stay_at_their_steps_wherever_the_clock_was_set() {
+    let start_ns = 10_000 * S;
+    for (what, sets) in [
+        ("before the first step", vec![(10.0, 600.0)]),
+        ("at the first sample", vec![(0.05, 600.0)]),
+        ("before the first sample, forward", vec![(0.0, 600.0)]),
+        ("before the first sample, back", vec![(0.0, -600.0)]),
+        ("three times in a step", vec![(35.05, 600.0), (40.05, 60.0), (45.05, 600.0)]),
+        ("twice", vec![(10.05, 600.0), (75.05, 30.0)]),
+    ] {
+        let clock_ns = |run_s: f64| {
+            let set_s: f64 = sets.iter().filter(|(at_s, _)| run_s >= *at_s).map(|(_, by_s)| by_s).sum();
+            start_ns.checked_add_signed(((run_s + set_s) * 1e9) as i64).unwrap()
+        };
+        let times: Vec<u64> = (0..1200).map(|row| clock_ns(f64::from(row) / 10.0)).collect();
+        let report = read_marked(&times, Some(start_ns), &[30.0, 60.0, 90.0].map(|t_s| (clock_ns(t_s), t_s)));
+        let found_s: f64 = set_by(&report.warnings).iter().sum();
+        let set_s: f64 = sets.iter().map(|(_, by_s)| by_s).sum();
+        assert!((found_s - set_s).abs() < 0.5, "{what}: {:?}", report.warnings);
+        let starts: Vec<f64> = report.recording.steps.iter().map(|step| step.start_s).collect();
+        assert_eq!(starts, [30.0, 60.0, 90.0], "{what}");
+        let series = &report.recording.series[&Channel::T2];
+        assert_eq!(series.t_s.len(), 1200, "{what}");
+        for (row, (t_s, value)) in series.t_s.iter().zip(&series.values).enumerate() {
+            // A gap is closed to one interval, which may have been another one.
+            assert!(
+                (t_s - row as f64 / 10.0).abs() < 0.25 && *value == kelvin(row),
+                "{what}: {row} at {t_s}"
+            );
+        }
     }
 }

@@ -193,7 +193,7 @@ fn report(
         warnings.extend(find_missing_fields(map, &builders));
     }
     repair_set_back(&mut builders, &mut sink.steps, &mut sink.events, &mut warnings);
-    if let Some(start_time_ns) = sink.start_time_ns {
+    if let Some(start_time_ns) = &mut sink.start_time_ns {
         repair_set_forward(&mut builders, &mut sink.steps, start_time_ns, &mut warnings);
     }
     if sink.steps.is_empty() {

@@ -69,34 +69,49 @@ fn move_messages<T>(messages: &mut [PositionedMessage<T>], from: u64, shift_ns: 
     }
 }
 
-/// Repairs times after a clock was set forward, in recordings whose step markers have the time of the run as well.
+/// Repairs times after a clock was set forward, in recordings whose step markers have the time of the run as well. If all times are off
+/// against the markers, moves the start of the run.
 pub(crate) fn repair_set_forward(
     builders: &mut Builders,
     steps: &mut [PositionedMessage<StepMessage>],
-    start_time_ns: u64,
+    start_time_ns: &mut u64,
     warnings: &mut Vec<ReadWarning>,
 ) {
-    let ahead_ns = |step: &PositionedMessage<StepMessage>| {
+    let first_ns = builders.values().filter_map(SeriesBuilder::first_time_ns).min();
+    let (Some(first_ns), Some(first)) = (first_ns, steps.first()) else { return };
+    let ahead_ns = |step: &PositionedMessage<StepMessage>, start_time_ns: u64| {
         let run_ns = (step.message.t_s * 1e9) as i128;
         i64::try_from(i128::from(step.log_time_ns) - i128::from(start_time_ns) - run_ns).unwrap_or(0)
     };
-    let near = |step: &PositionedMessage<StepMessage>| ahead_ns(step).unsigned_abs() <= TOLERANCE_NS;
-    if !steps.first().is_some_and(near) {
-        return;
-    }
-    for at in 1..steps.len() {
-        let (Some(before), Some(step)) = (steps.get(at - 1), steps.get(at)) else { continue };
-        let by_ns = u64::try_from(ahead_ns(step)).unwrap_or(0);
-        if by_ns <= TOLERANCE_NS {
-            continue;
-        }
-        let (from_ns, to_ns) = (before.log_time_ns, step.log_time_ns);
-        for builder in builders.values_mut() {
-            builder.close_gap(from_ns, to_ns, by_ns, TOLERANCE_NS);
-        }
-        for step in steps.iter_mut().skip(at) {
-            step.log_time_ns = step.log_time_ns.saturating_sub(by_ns);
-        }
+    let by_ns = ahead_ns(first, *start_time_ns);
+    let was_set =
+        u64::try_from(by_ns).is_ok_and(|by_ns| has_gap(builders, (first_ns, first.log_time_ns), by_ns));
+    if by_ns.unsigned_abs() > TOLERANCE_NS && !was_set {
+        *start_time_ns = start_time_ns.saturating_add_signed(by_ns);
         warnings.push(ReadWarning::ClockSet { by_s: by_ns as f64 / 1e9 });
     }
+    let mut from_ns = first_ns;
+    for at in 0..steps.len() {
+        let Some(step) = steps.get(at) else { continue };
+        let (by_ns, to_ns) = (u64::try_from(ahead_ns(step, *start_time_ns)).unwrap_or(0), step.log_time_ns);
+        if by_ns > TOLERANCE_NS {
+            for builder in builders.values_mut() {
+                // A channel that begins later has no gap.
+                if !builder.close_gap(from_ns, to_ns, by_ns, TOLERANCE_NS) {
+                    builder.move_earlier(to_ns, by_ns);
+                }
+            }
+            for step in steps.iter_mut().skip(at) {
+                step.log_time_ns = step.log_time_ns.saturating_sub(by_ns);
+            }
+            warnings.push(ReadWarning::ClockSet { by_s: by_ns as f64 / 1e9 });
+        }
+        from_ns = steps.get(at).map_or(from_ns, |step| step.log_time_ns);
+    }
+}
+
+/// Whether the channel with the most samples has gaps of this size between two times.
+fn has_gap(builders: &Builders, (from_ns, to_ns): (u64, u64), by_ns: u64) -> bool {
+    let reference = builders.values().max_by_key(|builder| builder.len());
+    reference.is_some_and(|builder| builder.clone().close_gap(from_ns, to_ns, by_ns, TOLERANCE_NS))
 }

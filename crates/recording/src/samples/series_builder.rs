@@ -30,7 +30,7 @@ pub(crate) struct ClockBreak {
 pub(crate) type Sides = (Vec<(f64, f64)>, Vec<(f64, f64)>);
 
 /// Collects the samples of one channel.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct SeriesBuilder {
     times_ns: Vec<u64>,
     values: Vec<f64>,
@@ -106,15 +106,39 @@ impl SeriesBuilder {
         }
     }
 
-    /// Moves the samples behind a gap of at least `by_ns` between two times back by it.
-    pub(crate) fn close_gap(&mut self, from_ns: u64, to_ns: u64, by_ns: u64, tolerance_ns: u64) {
-        let gap = |pair: &[u64]| {
-            pair[0] >= from_ns.saturating_sub(tolerance_ns)
-                && pair[1] <= to_ns.saturating_add(tolerance_ns)
-                && pair[1].saturating_sub(pair[0]) + tolerance_ns >= by_ns
-        };
-        let Some(before) = self.times_ns.windows(2).position(gap) else { return };
-        for time_ns in self.times_ns.iter_mut().skip(before + 1) {
+    /// Moves the samples behind the gaps between two times back, until the gaps amount to `by_ns`; returns false, without a change, if they
+    /// amount to less.
+    pub(crate) fn close_gap(&mut self, from_ns: u64, to_ns: u64, by_ns: u64, tolerance_ns: u64) -> bool {
+        let (from_ns, to_ns) = (from_ns.saturating_sub(tolerance_ns), to_ns.saturating_add(tolerance_ns));
+        let is_within = |pair: &[u64]| pair[0] >= from_ns && pair[1] <= to_ns;
+        // Several gaps count only if no single one suffices: the others may be pauses.
+        let largest = self.times_ns.windows(2).filter(|pair| is_within(pair));
+        let largest_ns = largest.map(|pair| pair[1].saturating_sub(pair[0])).max().unwrap_or(0);
+        let is_single = largest_ns + tolerance_ns >= by_ns;
+        let min_gap_ns = if is_single { by_ns.saturating_sub(tolerance_ns) } else { tolerance_ns };
+        let mut moved_ns = self.times_ns.clone();
+        let (mut closed_ns, mut interval_ns) = (0, None);
+        for (pair, moved_ns) in self.times_ns.windows(2).zip(moved_ns.iter_mut().skip(1)) {
+            let step_ns = pair[1].saturating_sub(pair[0]);
+            // A sample that is missing is not a gap, nor is the interval of a slow channel.
+            let gap_ns = step_ns.saturating_sub(interval_ns.unwrap_or(0));
+            if gap_ns > min_gap_ns && is_within(pair) {
+                closed_ns += gap_ns.min(by_ns - closed_ns);
+            } else {
+                interval_ns = Some(step_ns);
+            }
+            *moved_ns = moved_ns.saturating_sub(closed_ns);
+        }
+        let is_closed = closed_ns + tolerance_ns >= by_ns;
+        if is_closed {
+            self.times_ns = moved_ns;
+        }
+        is_closed
+    }
+
+    /// Moves all samples from a time on back.
+    pub(crate) fn move_earlier(&mut self, from_ns: u64, by_ns: u64) {
+        for time_ns in self.times_ns.iter_mut().filter(|time_ns| **time_ns >= from_ns) {
             *time_ns = time_ns.saturating_sub(by_ns);
         }
     }

@@ -86,7 +86,7 @@ pub use recording::files::{Existing, json_text, write_file, write_new};
 pub use recording::identification_config::{declared, identification};
 pub use recording::log_inspection::{LogInspection, inspect_log};
 pub use recording::program::{PROGRAM, program_and_commit};
-pub use recording::recording_file::{Recorded, channel_map};
+pub use recording::recording_file::{Recorded, channel_map, check_all_distinct};
 pub use recording::resume::InterruptedRun;
 pub use registry::{MakeDriver, ReadEffect, Registry};
 pub use rig::drive::{Pace, drive, drive_paced, soak_s};

@@ -203,6 +203,8 @@ fn a_recording_that_is_given_twice_is_refused() {
     for command in ["identify", "drift"] {
         mapper([command.as_ref(), run.as_os_str(), copy.as_os_str()]).exits(3);
     }
+    let path = campaign.path.as_os_str();
+    mapper(["gap".as_ref(), "diagnose".as_ref(), path, run.as_os_str(), copy.as_os_str()]).exits(3);
 }
 
 #[test]

@@ -110,8 +110,15 @@ fn a_step_without_flushed_samples_is_run_again() {
     for step in 1..=99 {
         writeln!(journal, "{{\"step_saved\":{step}}}").unwrap();
     }
+    // A second part that ended before its first flush.
+    let first =
+        std::fs::read_to_string(run.join("journal.jsonl")).unwrap().lines().next().unwrap().to_owned();
+    writeln!(journal, "{}", first.replace("recording.mcap", "recording-2.mcap")).unwrap();
+    std::fs::write(run.join("recording-2.mcap"), "").unwrap();
     drop(journal);
+    mapper(["identify".as_ref(), run.as_os_str()]).exits(0);
     mapper(["run".as_ref(), "--resume".as_ref(), run.as_os_str()]).exits(0);
+    mapper(["identify".as_ref(), run.as_os_str()]).exits(0);
     let targets = |points: &[Value]| points.iter().map(|point| point["target"].clone()).collect::<Vec<_>>();
     assert_eq!(targets(&points(run)), targets(&expected));
 }

@@ -135,10 +135,14 @@ impl Session<'_> {
         directory: &Path,
         parts: &[RunPart],
     ) -> Result<Results, SessionError> {
+        // A part of which nothing is used may be damaged.
+        let has_data =
+            |part: &&RunPart| part.soaked || part.saved.as_ref().is_none_or(|saved| !saved.is_empty());
+        let parts: Vec<&RunPart> = parts.iter().filter(has_data).collect();
         let paths: Vec<PathBuf> = parts.iter().map(|part| part.recording.clone()).collect();
         let mut remarks = Vec::new();
         let mut all = Vec::new();
-        for RunPart { recording, .. } in parts {
+        for RunPart { recording, .. } in &parts {
             let read = read_recording(recording, &ChannelMap::native(), &ReadOptions::default())?;
             remarks.extend(read.warnings.iter().map(|warning| incomplete(None, warning)));
             all.push(Recorded::of(recording.clone(), read, Some(campaign.clone())));

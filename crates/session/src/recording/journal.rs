@@ -170,6 +170,15 @@ pub struct JournalPart {
     pub saved: BTreeSet<usize>,
     /// Whether it reached the end of the run's steps.
     pub completed: bool,
+    /// Whether the recording of these steps, or of the soak, cannot be read.
+    pub lost: bool,
+}
+
+impl JournalPart {
+    /// Whether the run needs nothing of its recording, which may then be damaged: its first flush may have failed.
+    pub(crate) fn is_empty(&self) -> bool {
+        !self.soaked && self.saved.is_empty()
+    }
 }
 
 /// Reads the parts of a run. Unreadable lines are skipped: a step not known to be saved is run again.
@@ -194,6 +203,7 @@ pub fn read_journal(path: &Path) -> std::io::Result<Vec<JournalPart>> {
                     soaked: false,
                     saved: BTreeSet::new(),
                     completed: false,
+                    lost: false,
                 });
             }
             (Ok(Entry::Soaked), Some(part)) => part.soaked = true,

@@ -93,13 +93,21 @@ impl Recorded {
         let Some(mut interrupted) = resumed_run(path)? else {
             return Ok(vec![Recorded::read(registry, path, map, given)?]);
         };
-        let files = interrupted.parts.iter().map(|part| path.join(&part.recording));
-        let read = files.map(|file| Recorded::read(registry, &file, map, given));
-        let read = read.collect::<Result<Vec<_>, _>>()?;
-        if let Some(campaign) = read.first().and_then(|first| first.campaign.as_ref()) {
+        let mut recorded = Vec::new();
+        for (place, part) in interrupted.parts.iter().enumerate() {
+            match Recorded::read(registry, &path.join(&part.recording), map, given) {
+                Err(_) if part.is_empty() && !part.lost => {}
+                read => recorded.push((place, read?)),
+            }
+        }
+        if let Some(campaign) = recorded.first().and_then(|(_, first)| first.campaign.as_ref()) {
             interrupted.discard_superseded_steps(campaign)?;
         }
-        Ok(merge_parts(interrupted.parts.iter().map(|part| (part.soaked, Some(&part.saved))).zip(read)))
+        let parts = &interrupted.parts;
+        let with_parts = recorded.into_iter().map(|(place, recorded)| {
+            (parts.get(place).map_or((false, None), |part| (part.soaked, Some(&part.saved))), recorded)
+        });
+        Ok(merge_parts(with_parts))
     }
 
     /// The contents of a file, with the surge approaches separated.
@@ -159,7 +167,8 @@ fn resumed_run(path: &Path) -> Result<Option<InterruptedRun>, SessionError> {
 ///
 /// # Errors
 /// [`SessionError::SameRecording`] with both paths.
-pub(crate) fn check_all_distinct(recorded: &[Recorded]) -> Result<(), SessionError> {
+pub fn check_all_distinct<'a>(recorded: impl IntoIterator<Item = &'a Recorded>) -> Result<(), SessionError> {
+    let recorded: Vec<&Recorded> = recorded.into_iter().collect();
     if recorded.len() < 2 {
         return Ok(());
     }
@@ -170,7 +179,7 @@ pub(crate) fn check_all_distinct(recorded: &[Recorded]) -> Result<(), SessionErr
     for (second, first) in
         (0..recorded.len()).flat_map(|second| (0..second).map(move |first| (second, first)))
     {
-        let (a, b) = (&recorded[first], &recorded[second]);
+        let (a, b) = (recorded[first], recorded[second]);
         let common = || rows[first].intersection(&rows[second]).count();
         let same = a.read.recording.series == b.read.recording.series && !b.read.recording.series.is_empty();
         let of_one_run = a.path != b.path && part_of(a).is_some() && part_of(a) == part_of(b);

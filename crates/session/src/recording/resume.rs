@@ -38,14 +38,21 @@ impl InterruptedRun {
         if parts.is_empty() {
             return Err(not_resumable("its journal contains no run".to_owned()));
         }
-        for part in parts.iter_mut().filter(|part| part.soaked || !part.saved.is_empty()) {
+        let promised: Vec<BTreeSet<usize>> = parts.iter().map(|part| part.saved.clone()).collect();
+        for part in parts.iter_mut().filter(|part| !part.is_empty()) {
             // A step or soak that is in the journal but not completely in the recording is repeated.
-            let (steps, events) =
-                read_marks(&directory.join(&part.recording), &ReadOptions::default()).unwrap_or_default();
+            let marks = read_marks(&directory.join(&part.recording), &ReadOptions::default());
+            part.lost = marks.is_err();
+            let (steps, events) = marks.unwrap_or_default();
             part.soaked = events.iter().any(|event| event.kind == EventKind::SoakEnded);
             let complete = steps.iter().filter(|step| step.end_s > step.start_s).map(|step| step.index);
             let complete: BTreeSet<usize> = complete.collect();
             part.saved.retain(|index| complete.contains(index));
+        }
+        let recorded: BTreeSet<usize> = parts.iter().flat_map(|part| part.saved.iter().copied()).collect();
+        // Lost steps may have been repeated since.
+        for (part, promised) in parts.iter_mut().zip(&promised) {
+            part.lost &= !promised.is_subset(&recorded);
         }
         Ok(InterruptedRun { directory: directory.to_owned(), parts })
     }

@@ -14,7 +14,7 @@ use mapper_diagnose::gap::diagnose::Diagnosed;
 use mapper_diagnose::gap::findings::report::Law;
 use mapper_diagnose::gap::joint::over_recordings;
 use mapper_report::{gap_text, headline, recordings_text, sensors_text, zero_text};
-use mapper_session::{Gap, Recorded, Session, SessionError, SessionEvent};
+use mapper_session::{Gap, Recorded, Session, SessionError, SessionEvent, check_all_distinct};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -67,6 +67,7 @@ impl Diagnose {
         let recordings = self.recordings.iter().chain(&self.named).map(read_run);
         let recordings: Vec<Recorded> =
             recordings.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
+        check_all_distinct(recordings.iter().chain(&healthy))?;
         if (self.html.is_some() || self.laws.is_some()) && recordings.len() > 1 {
             let message = "--html and --laws need exactly one recording (a resumed run has several)";
             return Err(Failure::new(Code::BadInput, message));

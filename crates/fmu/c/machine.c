@@ -25,7 +25,7 @@ static Gas with_vapour(const Gas *dry, double fraction) {
     gas.constant = dry->constant + fraction * (VAPOUR.constant - dry->constant);
     x = fraction * VAPOUR.constant / gas.constant;
     for (i = 0; i < 7; i++) gas.cp[i] = dry->cp[i] + fraction * (VAPOUR.cp[i] - dry->cp[i]);
-    for (i = 0; i < 4; i++) {
+    for (i = 0; i < 5; i++) {
         gas.virial[i] = dry->is_real ? (1.0 - x) * ((1.0 - x) * dry->virial[i] + 2.0 * x * dry->virial_with_vapour[i])
                                            + x * x * VAPOUR.virial[i]
                                      : 0.0;
@@ -43,20 +43,26 @@ static double heat_capacity(const Gas *gas, double t_k) {
     return sum;
 }
 
+/* The term of the second virial coefficient in x^8, over x^3, with x = 1/T. */
+static double steep_term(const Gas *gas, double x) { return gas->virial[4] * x * (x * x) * (x * x); }
+
 /* What a pressure adds to the enthalpy in J/kg, the entropy and the heat capacity in J/(kg K) of a perfect gas. */
 static double enthalpy_departure(const Gas *gas, double t_k, double p_pa) {
     const double *b = gas->virial, x = 1.0 / t_k;
-    return p_pa * gas->constant / MOLAR_GAS_CONSTANT * (b[0] + x * (2.0 * b[1] + x * (3.0 * b[2] + x * 4.0 * b[3])));
+    return p_pa * gas->constant / MOLAR_GAS_CONSTANT
+           * (b[0] + x * (2.0 * b[1] + x * (3.0 * b[2] + x * (4.0 * b[3] + 9.0 * steep_term(gas, x)))));
 }
 
 static double entropy_departure(const Gas *gas, double t_k, double p_pa) {
     const double *b = gas->virial, x = 1.0 / t_k;
-    return p_pa * gas->constant / MOLAR_GAS_CONSTANT * x * x * (b[1] + x * (2.0 * b[2] + x * 3.0 * b[3]));
+    return p_pa * gas->constant / MOLAR_GAS_CONSTANT * x * x
+           * (b[1] + x * (2.0 * b[2] + x * (3.0 * b[3] + 8.0 * steep_term(gas, x))));
 }
 
 static double heat_capacity_departure(const Gas *gas, double t_k, double p_pa) {
     const double *b = gas->virial, x = 1.0 / t_k;
-    return -p_pa * gas->constant / MOLAR_GAS_CONSTANT * x * x * (2.0 * b[1] + x * (6.0 * b[2] + x * 12.0 * b[3]));
+    return -p_pa * gas->constant / MOLAR_GAS_CONSTANT * x * x
+           * (2.0 * b[1] + x * (6.0 * b[2] + x * (12.0 * b[3] + 72.0 * steep_term(gas, x))));
 }
 
 /* Specific enthalpy, J/kg. */

@@ -75,7 +75,7 @@ fn constants(text: &mut String, reference: ReferenceState) -> Result<(), FmuErro
 /// The gases of both sides, and the vapour that `compressor.humidity` adds.
 fn gases(text: &mut String, params: &Params) -> Result<(), FmuError> {
     text.push_str(
-        "typedef struct {\n    double constant, cp[7];\n    int is_real;\n    double virial[4], virial_with_vapour[4];\n} Gas;\n",
+        "typedef struct {\n    double constant, cp[7];\n    int is_real;\n    double virial[5], virial_with_vapour[5];\n} Gas;\n",
     );
     for (name, gas) in [
         ("COMPRESSOR_GAS", params.compressor.gas),
@@ -87,7 +87,7 @@ fn gases(text: &mut String, params: &Params) -> Result<(), FmuError> {
                 values.iter().map(|value| number(name, *value)).collect();
             numbers.map(|numbers| format!("{{{}}}", numbers.join(", ")))
         };
-        let virials = gas.virials.unwrap_or(Virials { own: [0.0; 4], with_vapour: [0.0; 4] });
+        let virials = gas.virials.unwrap_or(Virials { own: [0.0; 5], with_vapour: [0.0; 5] });
         // Writing to a String cannot fail.
         let _ = writeln!(
             text,

@@ -1,9 +1,9 @@
 //! Gas mixtures: heat capacity, enthalpy and entropy as functions of temperature and pressure.
 //!
 //! The heat capacity of the ideal gas is a polynomial in temperature; the dependence on pressure is the second virial coefficient, by
-//! Tsonopoulos (AIChE J. 20, 1974), with the mixing rules of Prausnitz without binary parameters. For pressure ratios up to 5 from 100 kPa
-//! efficiencies are within 0.02 points, and specific works within 0.05 %, of CoolProp's real gases (`tests/tests/all/gases.rs`); without the virial term
-//! the differences are 0.04 points and 0.07 %. Pure gases from 253 to 323 K: N2, O2, Ar 0.03 points and 0.04 %, H2, CO2, CH4 0.06 and 0.07 %.
+//! Tsonopoulos (AIChE J. 20, 1974), with the mixing rules of Prausnitz without binary parameters, and fitted for water vapour. For pressure ratios
+//! up to 5 from 100 kPa efficiencies are within 0.02 points, and specific works within 0.05 %, of CoolProp's real gases and moist air
+//! (`tests/tests/all/gases.rs`). Pure gases from 253 to 323 K: N2, O2, Ar 0.03 points and 0.04 %, H2, CO2, CH4 0.06 and 0.07 %.
 
 use super::species::{Species, SpeciesData};
 use serde::{Deserialize, Serialize};
@@ -12,11 +12,15 @@ use serde::{Deserialize, Serialize};
 pub const MOLAR_GAS_CONSTANT_J_MOLK: f64 = 8.314_462_618;
 /// Powers of T/1000 K in a heat capacity.
 const HEAT_CAPACITY_TERMS: usize = 7;
-/// Powers of 1/T in a second virial coefficient.
-const VIRIAL_TERMS: usize = 4;
 
-/// Second virial coefficient, m3/mol, in powers of 1/T.
-pub type SecondVirial = [f64; VIRIAL_TERMS];
+/// Second virial coefficient, m3/mol, in the powers 0, 1, 2, 3 and 8 of 1/T, those of Tsonopoulos.
+pub type SecondVirial = [f64; 5];
+
+/// Second virial coefficient of water vapour: IAPWS-95 within 1 cm3/mol from 290 to 1400 K (`benches/gas_properties.py`).
+const WATER: SecondVirial = [2.2189313e-5, -0.024108941, -4.8790009, -14_339.179, -3.664_435_2e16];
+/// Cross coefficient of water vapour with air: Harvey and Huang (Int. J. Thermophys. 28, 2007) within 0.1 cm3/mol (`benches/gas_properties.py`).
+/// The mixing rules give three times as much at 335 K.
+const WATER_AND_AIR: SecondVirial = [2.658_144e-5, -0.0050084905, -4.9949763, 455.157_88, -5.076_069e13];
 
 /// Second virial coefficients of a gas: its own, and that with water vapour.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -84,26 +88,23 @@ impl Gas {
     /// assert!((nitrogen.heat_capacity_j_kgk(300.0) / 1039.6 - 1.0).abs() < 5e-4);
     /// ```
     pub fn of_mole_fractions(fractions: impl IntoIterator<Item = (Species, f64)>) -> Gas {
-        let parts: Vec<(SpeciesData, f64)> =
-            fractions.into_iter().map(|(species, fraction)| (species.data(), fraction)).collect();
+        let parts: Vec<(Species, f64)> = fractions.into_iter().collect();
         let total: f64 = parts.iter().map(|(_, fraction)| fraction).sum();
-        let mole_mean = |of: &dyn Fn(&SpeciesData) -> f64| {
-            parts.iter().map(|(data, x)| x * of(data)).sum::<f64>() / total
+        let mole_mean = |of: &dyn Fn(Species) -> f64| {
+            parts.iter().map(|(species, x)| x * of(*species)).sum::<f64>() / total
         };
-        let gas_constant_j_kgk = MOLAR_GAS_CONSTANT_J_MOLK / mole_mean(&|data| data.molar_mass_kg_mol);
-        let vapour = Species::H2O.data();
-        let with = |other: &SpeciesData| {
-            std::array::from_fn(|power| mole_mean(&|data| cross_virial(data, other)[power]))
+        let gas_constant_j_kgk =
+            MOLAR_GAS_CONSTANT_J_MOLK / mole_mean(&|species| species.data().molar_mass_kg_mol);
+        let with = |other: Species| -> SecondVirial {
+            std::array::from_fn(|term| mole_mean(&|species| cross_virial(species, other)[term]))
         };
-        let own = std::array::from_fn(|power| {
-            parts.iter().map(|(data, x)| x * with(data)[power]).sum::<f64>() / total
-        });
+        let own = std::array::from_fn(|term| mole_mean(&|species| with(species)[term]));
         Gas {
             gas_constant_j_kgk,
             heat_capacity: std::array::from_fn(|power| {
-                gas_constant_j_kgk * mole_mean(&|data| data.heat_capacity[power])
+                gas_constant_j_kgk * mole_mean(&|species| species.data().heat_capacity[power])
             }),
-            virials: Some(Virials { own, with_vapour: with(&vapour) }),
+            virials: Some(Virials { own, with_vapour: with(Species::H2O) }),
         }
     }
 
@@ -140,17 +141,11 @@ impl Gas {
             heat_capacity: std::array::from_fn(|power| {
                 mix(self.heat_capacity[power], vapour_j_kgk * vapour.heat_capacity[power])
             }),
-            virials: self.virials.map(|Virials { own, with_vapour }| {
-                let pure = cross_virial(&vapour, &vapour);
-                Virials {
-                    own: std::array::from_fn(|power| {
-                        (1.0 - x) * ((1.0 - x) * own[power] + 2.0 * x * with_vapour[power])
-                            + x * x * pure[power]
-                    }),
-                    with_vapour: std::array::from_fn(|power| {
-                        (1.0 - x) * with_vapour[power] + x * pure[power]
-                    }),
-                }
+            virials: self.virials.map(|Virials { own, with_vapour }| Virials {
+                own: std::array::from_fn(|term| {
+                    (1.0 - x) * ((1.0 - x) * own[term] + 2.0 * x * with_vapour[term]) + x * x * WATER[term]
+                }),
+                with_vapour: std::array::from_fn(|term| (1.0 - x) * with_vapour[term] + x * WATER[term]),
             }),
         }
     }
@@ -190,14 +185,17 @@ impl Gas {
     /// Departure from the perfect gas at a pressure: enthalpy in J/kg, entropy and heat capacity in J/(kg K).
     #[inline]
     pub(crate) fn departure(&self, temperature_k: f64, pressure_pa: f64) -> Departure {
-        let Some(Virials { own: [b0, b1, b2, b3], .. }) = self.virials else { return Departure::default() };
+        let Some(Virials { own: [b0, b1, b2, b3, b8], .. }) = self.virials else {
+            return Departure::default();
+        };
         let per_kg = pressure_pa * self.gas_constant_j_kgk / MOLAR_GAS_CONSTANT_J_MOLK;
         let x = 1.0 / temperature_k;
+        let b8 = b8 * x * (x * x) * (x * x);
         Departure {
             // (B - T dB/dT) p, -dB/dT p and -T d2B/dT2 p.
-            enthalpy_j_kg: per_kg * (b0 + x * (2.0 * b1 + x * (3.0 * b2 + x * 4.0 * b3))),
-            entropy_j_kgk: per_kg * x * x * (b1 + x * (2.0 * b2 + x * 3.0 * b3)),
-            heat_capacity_j_kgk: -per_kg * x * x * (2.0 * b1 + x * (6.0 * b2 + x * 12.0 * b3)),
+            enthalpy_j_kg: per_kg * (b0 + x * (2.0 * b1 + x * (3.0 * b2 + x * (4.0 * b3 + 9.0 * b8)))),
+            entropy_j_kgk: per_kg * x * x * (b1 + x * (2.0 * b2 + x * (3.0 * b3 + 8.0 * b8))),
+            heat_capacity_j_kgk: -per_kg * x * x * (2.0 * b1 + x * (6.0 * b2 + x * (12.0 * b3 + 72.0 * b8))),
         }
     }
 }
@@ -214,9 +212,16 @@ pub(crate) struct Departure {
     pub(crate) heat_capacity_j_kgk: f64,
 }
 
-/// Second virial coefficient of a pair of species (Tsonopoulos 1974; Prausnitz's mixing rules). The term in Tr^-8 is neglected: it matters
-/// only for pairs of water, where it is a fifth of the coefficient at 300 K.
-fn cross_virial(one: &SpeciesData, other: &SpeciesData) -> SecondVirial {
+/// Second virial coefficient of a pair of species. For pairs without fitted coefficients that of Tsonopoulos and Prausnitz, whose term in Tr^-8
+/// matters for water only.
+fn cross_virial(one: Species, other: Species) -> SecondVirial {
+    let in_air = |species: Species| matches!(species, Species::N2 | Species::O2 | Species::Ar);
+    match (one, other) {
+        (Species::H2O, Species::H2O) => return WATER,
+        (Species::H2O, air) | (air, Species::H2O) if in_air(air) => return WATER_AND_AIR,
+        _ => {}
+    }
+    let (one, other) = (&one.data(), &other.data());
     let critical_k = (one.critical_k * other.critical_k).sqrt();
     let volume_m3_mol = (0.5 * (one.critical_m3_mol.cbrt() + other.critical_m3_mol.cbrt())).powi(3);
     let compressibility = |data: &SpeciesData| {
@@ -230,6 +235,7 @@ fn cross_virial(one: &SpeciesData, other: &SpeciesData) -> SecondVirial {
         -0.330,
         -0.1385 + 0.331 * acentric_factor,
         -0.0121 - 0.423 * acentric_factor,
+        0.0,
     ];
     let mut scale = scale_m3_mol;
     terms.map(|term| {

@@ -17,11 +17,12 @@ pub fn map_figure(map: &CompressorMap, units: &MapUnits) -> Figure {
     let machine = if map.machine.is_empty() { "unnamed machine" } else { &map.machine };
     Figure::new(format!("Compressor map of {machine}"))
         .subtitle(format!(
-            "Corrected to {}. Method: {} (isentropic efficiency total to total, {}). {points} points on {} speed lines; \
-             {}.",
+            "Corrected to {}. Method: {} (isentropic efficiency total to total, {}{}).{} {points} points on {} speed lines; {}.",
             map.reference,
             map.method,
             efficiency_name(map.method),
+            map.efficiency.map(|definition| format!("; {}", definition.description())).unwrap_or_default(),
+            map.gas.as_ref().map(|gas| format!(" Gas: {gas}.")).unwrap_or_default(),
             map.lines.len(),
             match &map.fitted {
                 None => "contours between measured points only".to_owned(),

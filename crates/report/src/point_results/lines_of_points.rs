@@ -78,10 +78,17 @@ pub fn points_by_line_text(
     }
     let rendered = table.to_string();
     let mut text = format!(
-        "Points by corrected speed in {}, corrected flow in {}, h in W/(m2 K).\n\n",
+        "Points by corrected speed in {}, corrected flow in {}, h in W/(m2 K).\n",
         display.units().speed,
         display.units().flow
     );
+    if let Some(map) = map {
+        let definition = map.efficiency.map(|definition| format!("; eta: {}", definition.description()));
+        let gas = map.gas.as_ref().map(|gas| format!("; gas: {gas}"));
+        let [definition, gas] = [definition, gas].map(Option::unwrap_or_default);
+        text.push_str(&wrapped(&format!("Corrected to {}{definition}{gas}.", map.reference), COLUMNS, 2));
+    }
+    text.push('\n');
     for (index, line) in rendered.lines().enumerate() {
         text.push_str(line);
         // A good point needs no remark.

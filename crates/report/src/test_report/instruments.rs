@@ -65,8 +65,8 @@ pub fn instrument_rows(
 pub const REGISTER_HEADS: [&str; 7] =
     ["sensor", "certificate", "laboratory", "calibrated", "due", "range", "U (k = 2)"];
 
-/// A row for each sensor whose calibration states more than its day.
-pub fn register_rows(campaign: &Campaign, display: &Display) -> Vec<[String; 7]> {
+/// A row for each sensor whose calibration states more than its day. `tested_at`: start of the test, from its day on.
+pub fn register_rows(campaign: &Campaign, tested_at: Option<&str>, display: &Display) -> Vec<[String; 7]> {
     let mut rows = Vec::new();
     for (&channel, declaration) in &campaign.sensors {
         for (_, sensor, calibration) in declaration.calibrated(channel) {
@@ -80,7 +80,11 @@ pub fn register_rows(campaign: &Campaign, display: &Display) -> Vec<[String; 7]>
                 text(&calibration.certificate),
                 text(&calibration.laboratory),
                 calibration.date.to_string(),
-                calibration.due.map_or_else(dash_cell, |due| due.to_string()),
+                calibration.due.map_or_else(dash_cell, |due| {
+                    let due = due.to_string();
+                    let is_past = tested_at.is_some_and(|at| at.get(..due.len()) > Some(due.as_str()));
+                    if is_past { format!("{due}, expired") } else { due }
+                }),
                 calibration.range.map_or_else(dash_cell, |(min, max)| {
                     format!("{} to {} {}", reading(min), reading(max), display.unit_of(channel))
                 }),

@@ -193,7 +193,7 @@ fn markdown_report(report: &RunReport<'_>) -> String {
         text.push('\n');
     }
     if let Some(campaign) = campaign {
-        text.push_str(&instruments_section(campaign, report.used, &display));
+        text.push_str(&instruments_section(campaign, report, &display));
     }
     if !sensors.is_empty() {
         let lines: String = sensors.iter().map(|fused| format!("- {fused}\n")).collect();
@@ -360,16 +360,12 @@ fn whole_duration(campaign: &Campaign, plan: &Plan) -> String {
     }
 }
 
-fn instruments_section(
-    campaign: &Campaign,
-    used: &BTreeMap<Channel, DeclaredUncertainty>,
-    display: &Display,
-) -> String {
-    let rows = instrument_rows(campaign, used, display);
+fn instruments_section(campaign: &Campaign, report: &RunReport<'_>, display: &Display) -> String {
+    let rows = instrument_rows(campaign, report.used, display);
     let mut text = format!("## Instruments\n\n{INSTRUMENT_WORDS}\n\n");
     text.push_str(&markdown::table(&INSTRUMENT_HEADS, Align::Left, &rows));
     text.push('\n');
-    let register = register_rows(campaign, display);
+    let register = register_rows(campaign, report.tested_at, display);
     if !register.is_empty() {
         text.push_str("### Calibration register\n\n");
         text.push_str(&markdown::table(&REGISTER_HEADS, Align::Left, &register));

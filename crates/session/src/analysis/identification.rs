@@ -91,6 +91,7 @@ impl Identified {
         let mut value = json!({
             "reference": self.config.reference,
             "efficiency": self.config.air.efficiency,
+            "gas": self.config.air.description(),
             "points": self.points,
             "thermal": self.thermal,
             "two_parameter": self.two_parameter,

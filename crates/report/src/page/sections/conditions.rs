@@ -15,7 +15,10 @@ pub(crate) fn conditions(page: &RunPage<'_>, display: &Display) -> Markup {
     let read = condition_rows(report.campaign, report.recording, display);
     let instruments =
         report.campaign.map(|campaign| instrument_rows(campaign, report.used, display)).unwrap_or_default();
-    let register = report.campaign.map(|campaign| register_rows(campaign, display)).unwrap_or_default();
+    let register = report
+        .campaign
+        .map(|campaign| register_rows(campaign, report.tested_at, display))
+        .unwrap_or_default();
     let judged = report.judged_points();
     let (balance, acceptance) = (balance_rows(&judged), acceptance_rows(&judged));
     html! {

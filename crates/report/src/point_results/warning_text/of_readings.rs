@@ -91,8 +91,8 @@ fn calibration(channel: Channel, sensor: &str, defect: &CalibrationDefect) -> Se
         CalibrationDefect::Uncertainty { certified, declared } => sentence!(
             "the certificate of {} has a standard uncertainty of {}, and offset and gain are declared as {}",
             sensor,
-            with_unit(format!("{certified:.2e}"), channel.unit()),
-            with_unit(format!("{declared:.2e}"), channel.unit())
+            with_unit(four_figures(*certified), channel.unit()),
+            with_unit(four_figures(*declared), channel.unit())
         ),
     }
 }

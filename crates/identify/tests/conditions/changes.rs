@@ -62,13 +62,24 @@ fn drift(recording: &mut Recording, channels: &[Channel], error: f64) {
     add(recording, channels, |share, _| share * error);
 }
 
+/// A temperature in degF that is taken for one in degC.
+fn fahrenheit(recording: &mut Recording, channel: Channel) {
+    add(recording, &[channel], |_, value| 0.8 * (value - 273.15) + 32.0);
+}
+
+fn swap(recording: &mut Recording, one: Channel, other: Channel) {
+    let of_one = recording.series.remove(&one).unwrap();
+    let of_other = recording.series.insert(other, of_one).unwrap();
+    recording.series.insert(one, of_other);
+}
+
 const fn change(name: &'static str, apply: fn(&mut Recording)) -> Change {
     Change { name, apply }
 }
 
 #[rustfmt::skip]
 pub const CHANGES: &[Change] = {
-    use Channel::{CompressorFlow, P1, P2, ShaftSpeed, T1, T2, Tc};
+    use Channel::{CompressorFlow, P1, P2, ShaftSpeed, T1, T2, T3, T4, Tc, TurbineFlow};
     &[
         change("none", |_| {}),
         change("P1 and P2 +1 kPa", |r| offset(r, &[P1, P2], 1e3)),
@@ -101,6 +112,15 @@ pub const CHANGES: &[Change] = {
         change("10 % stem conduction, T1 +1.5 K", |r| { stem(r, 0.1); offset(r, &[T1], 1.5) }),
         change("flow +3 %, all pressures -2 kPa", |r| { gain(r, &[CompressorFlow], 0.03); barometer(r, -2e3) }),
         change("10 % stem conduction, all pressures +1 kPa", |r| { stem(r, 0.1); barometer(r, 1e3) }),
+        change("T1 +1 % of reading in K", |r| gain(r, &[T1], 0.01)),
+        change("Tc drifts by 4 K", |r| drift(r, &[Tc], 4.0)),
+        change("P2 +0.5 % of reading", |r| gain(r, &[P2], 0.005)),
+        change("P2 +1.325 kPa", |r| offset(r, &[P2], 1325.0)),
+        change("flow +7.3 %", |r| gain(r, &[CompressorFlow], 0.0732)),
+        change("m_c and m_t +2 %", |r| gain(r, &[CompressorFlow, TurbineFlow], 0.02)),
+        change("T3 in degF", |r| fahrenheit(r, T3)),
+        change("T3 and T4 swapped", |r| swap(r, T3, T4)),
+        change("T1 and T2 swapped", |r| swap(r, T1, T2)),
         change("T2 -2 K, P2 +1.5 kPa", |r| { offset(r, &[T2], -2.0); offset(r, &[P2], 1.5e3) }),
     ]
 };

@@ -10,23 +10,31 @@ use mapper_physics::simulation::model::Model;
 use mapper_yaml::{Step, steps};
 use serde::Serialize;
 
+/// Whether a limit is probably wrong, and not what exceeds it. Judgement: from half of the lines or points on, one message at the limit is clearer
+/// than one for each of them.
+pub(crate) fn limit_is_wrong(exceeding: usize, all: usize) -> bool {
+    exceeding > 0 && 2 * exceeding >= all
+}
+
 /// Adds the points of the speed lines to the campaign, or reports the mistakes of the lines.
 pub(crate) fn resolve(campaign: &mut Campaign, model: &Model) -> Result<(), Vec<Concern>> {
     let (mut points, mut concerns) = (Vec::new(), Vec::new());
     let limit_rpm = campaign.limits.speed_max_rpm;
-    let lowest_rpm =
-        campaign.lines.iter().map(|line| physical_speed_rpm(line, campaign)).fold(f64::INFINITY, f64::min);
-    if campaign.lines.len() > 1 && lowest_rpm > limit_rpm {
+    let speeds_rpm = campaign.lines.iter().map(|line| physical_speed_rpm(line, campaign));
+    let above_rpm: Vec<f64> = speeds_rpm.filter(|rpm| *rpm > limit_rpm).collect();
+    if campaign.lines.len() > 1 && limit_is_wrong(above_rpm.len(), campaign.lines.len()) {
         return Err(vec![Concern {
             is_error: true,
             at: steps!["limits", "speed"].to_vec(),
             message: format!(
-                "the limit, {} krpm, is below every line of the grid; the slowest has {:.2} krpm at T1 = {:.2} K",
+                "the limit, {} krpm, is below {} of {} lines of the grid, the slowest of them with {:.2} krpm at T1 = {:.2} K",
                 limit_rpm / 1e3,
-                lowest_rpm / 1e3,
+                above_rpm.len(),
+                campaign.lines.len(),
+                above_rpm.iter().copied().fold(f64::INFINITY, f64::min) / 1e3,
                 campaign.boundary.t1_k
             ),
-            remedy: "raise the limit to what the machine allows".to_owned(),
+            remedy: "raise the limit to what the machine allows, or remove these lines".to_owned(),
         }]);
     }
     for (index, line) in campaign.lines.iter().enumerate() {

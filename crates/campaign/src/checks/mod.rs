@@ -3,5 +3,6 @@
 pub(crate) mod calibration;
 pub(crate) mod concern;
 pub(crate) mod consistency;
+pub(crate) mod map_misfit;
 pub(crate) mod reachable_points;
 pub(crate) mod unusual_settings;

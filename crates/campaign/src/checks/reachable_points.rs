@@ -18,6 +18,8 @@ pub struct UnreachablePoint {
     pub reason: String,
     /// The remedy.
     pub remedy: String,
+    /// Key of the limit below `limits` that is in the way, if one is.
+    pub limit: Option<&'static [&'static str]>,
 }
 
 /// The nominal model of a campaign, on its map.
@@ -43,6 +45,7 @@ pub fn unreachable_points(campaign: &Campaign, model: &Model) -> Vec<Unreachable
             point: index,
             reason: format!("{krpm} krpm at opening {opening} {}", describe_obstacles(&obstacles)),
             remedy: obstacles.first()?.remedy().to_owned(),
+            limit: obstacles.first()?.limit(),
         })
     };
     campaign.points.iter().enumerate().filter_map(check_point).collect()

@@ -7,9 +7,10 @@ use crate::checks::reachable_points::{self, UnreachablePoint};
 use crate::checks::unusual_settings;
 use crate::files::schema::SCHEMA;
 use crate::machine_sizes;
-use crate::resolved;
+use crate::resolved::{self, limit_is_wrong};
 use mapper_maps::table::file_text;
 use mapper_yaml::{Document, FindingKind, Findings, Notes, Source, Step, Tree, steps};
+use std::collections::BTreeSet;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -87,8 +88,8 @@ pub fn check_with(
         return Err(Findings::single(source, FindingKind::TooLarge, 0, message, remedy));
     }
     let (tree, mut notes) = read(text, origin)?;
-    if let Some(concern) = find_other_file_kind(&tree) {
-        note(&tree, &mut notes, FindingKind::WrongValue, concern);
+    if let Some(finding) = tree.find_other_kind("campaign", &SCHEMA.keys()) {
+        notes.push(finding);
         return Err(tree.findings(notes));
     }
     SCHEMA.check(&tree, &mut notes);
@@ -174,30 +175,6 @@ pub fn mistakes(text: &str, origin: &Path, concerns: Vec<Concern>) -> Findings {
     tree.findings(notes)
 }
 
-/// Files of other commands, by a key that occurs only in them.
-const OTHER_FILES: [(&str, &str, &str); 2] = [
-    ("nightly", "this file describes nightly runs, not a campaign", "use `mapper nightly FILE`"),
-    (
-        "channels",
-        "this file maps the channels of a log, it is not a campaign",
-        "use it as the channel map of `mapper identify`",
-    ),
-];
-
-/// Recognises a file of another command, which is one mistake instead of one for each key.
-fn find_other_file_kind(tree: &Tree) -> Option<Concern> {
-    if tree.get(&steps!["campaign"]).is_some() {
-        return None;
-    }
-    let (key, message, remedy) = OTHER_FILES.iter().find(|(key, ..)| tree.get(&steps![*key]).is_some())?;
-    Some(Concern {
-        is_error: true,
-        at: vec![Step::from(*key)],
-        message: (*message).to_owned(),
-        remedy: (*remedy).to_owned(),
-    })
-}
-
 fn note(tree: &Tree, notes: &mut Notes, kind: FindingKind, concern: Concern) {
     let Concern { at, message, remedy, .. } = concern;
     notes.push(tree.finding(kind, &at, message, remedy));
@@ -249,11 +226,36 @@ fn deserialise(
     if !notes.is_empty() {
         return None;
     }
-    for UnreachablePoint { point, reason, remedy } in unreachable(&campaign) {
+    let mut unreachable = unreachable(&campaign);
+    report_wrong_limits(tree, notes, &mut unreachable, campaign.points.len());
+    for UnreachablePoint { point, reason, remedy, .. } in unreachable {
         let steps = point_paths.get(point).map(Vec::as_slice).unwrap_or_default();
         notes.push(tree.finding(FindingKind::Unreachable, steps, reason, remedy));
     }
     notes.is_empty().then_some(campaign)
+}
+
+/// Reports each limit that puts many points out of reach once, and takes these points off the list.
+fn report_wrong_limits(
+    tree: &Tree,
+    notes: &mut Notes,
+    unreachable: &mut Vec<UnreachablePoint>,
+    points: usize,
+) {
+    let limits: BTreeSet<_> = unreachable.iter().filter_map(|point| point.limit).collect();
+    for limit in limits {
+        let (of_limit, others): (Vec<_>, Vec<_>) =
+            unreachable.iter().cloned().partition(|point| point.limit == Some(limit));
+        let [first, _, ..] = of_limit.as_slice() else { continue };
+        if limit_is_wrong(of_limit.len(), points) {
+            let steps: Vec<Step> =
+                std::iter::once(&"limits").chain(limit).map(|key| Step::from(*key)).collect();
+            let message = format!("{} of {points} points are out of reach: {}", of_limit.len(), first.reason);
+            let remedy = "correct the limit and its unit, or the points";
+            notes.push(tree.finding(FindingKind::Unreachable, &steps, message, remedy));
+            *unreachable = others;
+        }
+    }
 }
 
 /// A file that a campaign names, as text: of a workbook its first visible sheet with numbers, of a compressed file its content.

@@ -127,7 +127,12 @@ pub fn load_nightly(path: &Path) -> Result<Nightly, NightlyError> {
 
 fn check(text: &str, path: &Path) -> Result<Nightly, Findings> {
     let (tree, mut notes) = mapper_yaml::read(Source::new(&DOCUMENT, path, text))?;
-    Schema::of::<NightlyFile>().check(&tree, &mut notes);
+    let schema = Schema::of::<NightlyFile>();
+    if let Some(finding) = tree.find_other_kind("nightly", &schema.keys()) {
+        notes.push(finding);
+        return Err(tree.findings(notes));
+    }
+    schema.check(&tree, &mut notes);
     if notes.is_empty() {
         match tree.deserialise().map(|file| resolve(file, path.parent().unwrap_or(Path::new("")))) {
             Ok(Ok(nightly)) => return Ok(nightly),

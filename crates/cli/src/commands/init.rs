@@ -72,7 +72,7 @@ impl Init {
     pub fn run(&self) -> Result<(), Failure> {
         let named = self.name.chars().all(|c| c.is_ascii_alphanumeric() || "_-".contains(c));
         if !named || self.name.is_empty() || self.name.len() > 64 || self.name.starts_with(['-', '_']) {
-            let message = "the name becomes part of file names; use at most 64 letters, digits, `_` and `-`";
+            let message = "the name becomes part of file names; use at most 64 letters from a to z, digits, `_` and `-`";
             return Err(Failure::new(Code::BadInput, message));
         }
         let request = FirstCampaignRequest {

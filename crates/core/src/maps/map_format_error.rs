@@ -234,6 +234,19 @@ pub enum ImportError {
         /// Largest flow of an inlet, kg/s.
         limit_kg_s: f64,
     },
+    /// Flow and pressure ratio in each other's column.
+    #[error(
+        "line {line}: a flow of {flow_corrected_kg_s} kg/s at a pressure ratio of {pressure_ratio}: if these columns are exchanged, correct their \
+         headings; otherwise write their units there"
+    )]
+    Exchanged {
+        /// Line, from 1.
+        line: usize,
+        /// Corrected flow, kg/s.
+        flow_corrected_kg_s: f64,
+        /// Total pressure ratio.
+        pressure_ratio: f64,
+    },
     /// A field that holds something other than a number.
     #[error("line {line}: the {quantity} is `{text}`, not a number")]
     NotANumber {

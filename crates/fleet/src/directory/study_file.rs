@@ -80,7 +80,10 @@ pub fn open_study(path: &Path) -> Result<StudyFile, StudyFileError> {
     let text = mapper_yaml::open(&DOCUMENT, path, MAX_FILE_BYTES)
         .map_err(|source| StudyFileError::Read { path: path.to_owned(), source })?
         .map_err(mistakes)?;
-    let (tree, notes) = mapper_yaml::read(Source::new(&DOCUMENT, path, &text)).map_err(mistakes)?;
+    let (tree, mut notes) = mapper_yaml::read(Source::new(&DOCUMENT, path, &text)).map_err(mistakes)?;
+    if let Some(finding) = tree.find_other_kind("fleet", &["fleet", "study"]) {
+        notes.push(finding);
+    }
     if !notes.is_empty() {
         return Err(mistakes(tree.findings(notes)));
     }

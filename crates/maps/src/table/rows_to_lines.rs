@@ -11,6 +11,9 @@ use mapper_physics::compressor_map::inlet_limit::{MIN_TOP_SPEED_RPM, max_flow_kg
 /// Maximum number of points.
 pub const MAX_POINTS: usize = 100_000;
 
+/// Minimum pressure ratio of a compressor's map, far beyond choke: half the inlet pressure is that of a choked pipe.
+const MIN_PRESSURE_RATIO: f64 = 0.5;
+
 /// Maximum relative difference of speed within a line: it varies by 1 %, and lines of maps are at least 5 % apart.
 const MAX_LINE_SPEED_DIFFERENCE_RATIO: f64 = 0.015;
 
@@ -65,6 +68,13 @@ impl Row {
             }
         }
         let limit_kg_s = max_flow_kg_s(self.speed_corrected_rpm);
+        if self.flow_corrected_kg_s > limit_kg_s && self.pressure_ratio < MIN_PRESSURE_RATIO {
+            return Err(ImportError::Exchanged {
+                line: self.at,
+                flow_corrected_kg_s: self.flow_corrected_kg_s,
+                pressure_ratio: self.pressure_ratio,
+            });
+        }
         if self.flow_corrected_kg_s > limit_kg_s {
             return Err(ImportError::Flow {
                 line: self.at,

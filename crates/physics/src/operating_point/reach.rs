@@ -90,6 +90,19 @@ pub enum Obstacle {
 }
 
 impl Obstacle {
+    /// Key of the limit below `limits`; `None` for an obstacle of the machine or the valve.
+    pub fn limit(&self) -> Option<&'static [&'static str]> {
+        match self {
+            Obstacle::Opening { .. } | Obstacle::NoSteadyState(_) | Obstacle::Surge { .. } => None,
+            Obstacle::Speed { .. } => Some(&["speed"]),
+            Obstacle::SurgeMargin { .. } => Some(&["surge_margin"]),
+            Obstacle::HighP3 { .. } => Some(&["turbine_inlet_pressure", "max"]),
+            Obstacle::LowP3 { .. } => Some(&["turbine_inlet_pressure", "min"]),
+            Obstacle::T2 { .. } => Some(&["compressor_outlet_temperature"]),
+            Obstacle::T3 { .. } => Some(&["turbine_inlet_temperature"]),
+        }
+    }
+
     /// The remedy.
     pub fn remedy(&self) -> &'static str {
         match self {

@@ -1,11 +1,20 @@
 //! Errors of the nominal map of a first campaign.
 
-use mapper_campaign::NominalTableError;
+use mapper_campaign::{MapMisfit, NominalTableError, USUAL_WHEEL_DIAMETERS_M};
 use std::path::PathBuf;
 
 /// Why a first campaign cannot get its nominal map.
 #[derive(Debug, thiserror::Error)]
 pub enum FirstMapError {
+    /// A wheel of no turbocharger.
+    #[error(
+        "a compressor wheel of {} mm is unusual: turbochargers have {:.0} to {:.0} mm; give its diameter at the exit, with its unit",
+        (1e7 * .wheel_m).round() / 1e4, 1e3 * USUAL_WHEEL_DIAMETERS_M.0, 1e3 * USUAL_WHEEL_DIAMETERS_M.1
+    )]
+    Wheel {
+        /// Its diameter, m.
+        wheel_m: f64,
+    },
     /// The file is not a map.
     #[error(
         "the file {} is not a map: {source}; write a table of corrected speed, corrected flow, pressure ratio and efficiency, with units \
@@ -16,6 +25,14 @@ pub enum FirstMapError {
         path: PathBuf,
         /// The reason.
         source: NominalTableError,
+    },
+    /// The map is not that of a compressor with this wheel.
+    #[error("the map {}: {misfit}; {}", .path.display(), .misfit.remedy())]
+    Misfit {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        misfit: MapMisfit,
     },
     /// The speed range does not overlap with the map.
     #[error(

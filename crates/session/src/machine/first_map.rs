@@ -3,7 +3,7 @@
 use crate::errors::first_map_error::FirstMapError;
 use crate::machine::first_request::{FirstCampaignRequest, significant_digits};
 use crate::{Registry, SessionError};
-use mapper_campaign::nominal_table;
+use mapper_campaign::{MapMisfit, USUAL_WHEEL_DIAMETERS_M, find_map_misfit, nominal_table};
 use mapper_chart::efficiency_mesh::{InterpolatedLine, SUBDIVISIONS, interpolated_lines};
 use mapper_core::{ReferenceState, one_line};
 use mapper_physics::compressor_map::characteristic::CompressorCharacteristic;
@@ -49,6 +49,10 @@ impl FirstMap {
     /// # Errors
     /// [`FirstMapError`] if the machine's own map cannot be read, or has no line in the speed range.
     pub(crate) fn of(registry: &Registry, request: &FirstCampaignRequest) -> Result<Self, SessionError> {
+        let (wheel_m, (low_m, high_m)) = (request.wheel_diameter_m, USUAL_WHEEL_DIAMETERS_M);
+        if !(low_m..=high_m).contains(&wheel_m) {
+            return Err(Box::new(FirstMapError::Wheel { wheel_m }).into());
+        }
         match &request.map {
             Some(path) => map_from_file(registry, request, path),
             None => Ok(similar_map(request)),
@@ -65,6 +69,11 @@ fn resample_table(
     reference: ReferenceState,
 ) -> Result<String, SessionError> {
     let map = registry.read_map(path, Some(reference))?;
+    let misfit = |misfit| FirstMapError::Misfit { path: path.to_owned(), misfit };
+    let efficiencies = map.lines.iter().flat_map(|line| &line.points).filter_map(|point| point.eta);
+    if let Some(poor) = efficiencies.reduce(f64::max).and_then(MapMisfit::of_peak_efficiency) {
+        return Err(Box::new(misfit(poor)).into());
+    }
     let mut text = format!(
         "# Monotone cubics through the points of {}.\nspeed [rpm],flow [kg/s],pressure ratio,efficiency\n",
         one_line(&path.display().to_string())
@@ -100,6 +109,9 @@ fn map_from_file(
     let text = resample_table(registry, path, reference)?;
     let map = nominal_table(&text, Some(reference))
         .map_err(|source| Box::new(FirstMapError::NotAMap { path: path.to_owned(), source }))?;
+    if let Some(misfit) = find_map_misfit(&map, request.wheel_diameter_m) {
+        return Err(Box::new(FirstMapError::Misfit { path: path.to_owned(), misfit }).into());
+    }
     let map_speeds_rpm = map.speeds_corrected_rpm();
     let map_rpm =
         (map_speeds_rpm.first().copied().unwrap_or(0.0), map_speeds_rpm.last().copied().unwrap_or(0.0));

@@ -9,7 +9,7 @@ use mapper_core::{
 };
 use mapper_maps::table::{read_description, set_key, unpack};
 use mapper_maps::{MapFitOptions, fit_map};
-use std::io::Read;
+use std::io::{Error, ErrorKind, Read};
 use std::path::Path;
 
 impl Registry {
@@ -60,6 +60,13 @@ impl Registry {
     fn map_bytes(&self, path: &Path) -> Result<(&'static MapFormat, Vec<u8>), SessionError> {
         let in_run = path.join("map.json");
         let path = if path.is_dir() { in_run.as_path() } else { path };
+        if !path.exists() {
+            let why = match path == in_run {
+                true => "the directory has no map; name a map file or the directory of a run",
+                false => "there is no such file",
+            };
+            return Err(SessionError::file("read", path)(Error::new(ErrorKind::NotFound, why)));
+        }
         let extension_of =
             |path: &Path| path.extension().map(|extension| extension.to_string_lossy().into_owned());
         let extension = match extension_of(path).unwrap_or_default() {

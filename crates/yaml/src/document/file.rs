@@ -78,7 +78,12 @@ pub fn open(
     path: &Path,
     limit_bytes: usize,
 ) -> io::Result<Result<String, Findings>> {
-    let bytes = read_limited(path, limit_bytes)?;
+    let bytes = read_limited(path, limit_bytes).map_err(|error| {
+        let with_ending = path.with_extension("yaml");
+        let is_meant = error.kind() == io::ErrorKind::NotFound && with_ending.is_file();
+        let message = || format!("there is no such file; did you mean `{}`?", with_ending.display());
+        if is_meant { io::Error::new(io::ErrorKind::NotFound, message()) } else { error }
+    })?;
     Ok(String::from_utf8(bytes).map_err(|error| {
         let at = error.utf8_error().valid_up_to();
         let source = Source::new(document, path, &String::from_utf8_lossy(error.as_bytes()));

@@ -152,7 +152,17 @@ impl Walk<'_> {
             (place < end).then(|| (place, error.to_string()))
         });
         let (at, reason) = located.unwrap_or_else(|| (at, error.info().to_owned()));
-        self.note(FindingKind::Syntax, at..at, format!("this is not YAML: {reason}"), SYNTAX_REMEDY);
+        let document = self.source.document;
+        let is_yaml = self
+            .source
+            .origin
+            .extension()
+            .is_none_or(|ending| ["yaml", "yml", "json"].iter().any(|of| ending == *of));
+        let remedy = match is_yaml {
+            true => SYNTAX_REMEDY.to_owned(),
+            false => format!("a {} is a YAML file, e.g. `{}`", document.name, document.example),
+        };
+        self.note(FindingKind::Syntax, at..at, format!("this is not YAML: {reason}"), &remedy);
         Stop
     }
 

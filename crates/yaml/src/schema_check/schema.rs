@@ -1,5 +1,6 @@
 //! A JSON schema generated from a type, for editors and for the checks of files.
 
+use crate::schema_check::messages::keys_of;
 use schemars::transform::{Transform, transform_subschemas};
 use schemars::{JsonSchema, generate::SchemaSettings};
 use serde_json::{Map, Value};
@@ -19,6 +20,11 @@ impl Schema {
     /// A schema from its JSON value.
     pub fn new(value: Value) -> Self {
         Schema { value }
+    }
+
+    /// The keys of the file.
+    pub fn keys(&self) -> Vec<&str> {
+        self.value.as_object().map(keys_of).unwrap_or_default()
     }
 }
 

@@ -62,6 +62,11 @@ fn check_tip_speed(campaign: &Campaign, speed_rpm: f64) -> Vec<Concern> {
     wheels.into_iter().filter_map(check_wheel).collect()
 }
 
+/// A speed in krpm; below 10 krpm, where a unit may be wrong, with more digits.
+fn krpm(rpm: f64) -> String {
+    format!("{:.*}", if rpm < 10e3 { 3 } else { 1 }, rpm / 1e3)
+}
+
 /// Compares the speed range of the grid with that of the nominal table.
 fn check_table_range(campaign: &Campaign, [slowest, fastest]: [(f64, Vec<Step>); 2]) -> Vec<Concern> {
     let MapSource::Table { named, reference, .. } = &campaign.machine.map else { return Vec::new() };
@@ -76,11 +81,11 @@ fn check_table_range(campaign: &Campaign, [slowest, fastest]: [(f64, Vec<Step>);
             is_error: beyond > MAX_EXTRAPOLATION_RATIO || !campaign.lines.is_empty(),
             at,
             message: format!(
-                "the grid goes to {:.1} krpm ({:.1} krpm corrected), but the nominal map `{named}` {verb} at {:.1} krpm: \
+                "the grid goes to {} krpm ({} krpm corrected), but the nominal map `{named}` {verb} at {} krpm: \
                  forecast and plan would be unreliable there",
-                rpm / 1e3,
-                corrected_rpm / 1e3,
-                edge_rpm / 1e3
+                krpm(rpm),
+                krpm(corrected_rpm),
+                krpm(edge_rpm)
             ),
             remedy: "remove these speeds, or give a map that contains them (`map: closed_form` if there is none)"
                 .to_owned(),

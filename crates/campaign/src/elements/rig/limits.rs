@@ -73,9 +73,11 @@ pub(crate) fn check(check: &mut Check<'_>) {
         let message = format!("`{high}` is not above the lowest pressure, `{low}`");
         check.note(FindingKind::Conflict, &high_path, message, "`max` must be above `min`");
     }
+    let is_range = low.zip(high).is_none_or(|((low_pa, _), (high_pa, _))| low_pa < high_pa);
     let outlet = check.quantity(Kind::Pressure, &steps!["boundary", "turbine_outlet_pressure"]);
     if let (Some((outlet_pa, outlet)), Some((high_pa, high))) = (outlet, high)
         && outlet_pa >= high_pa
+        && is_range
     {
         let message =
             format!("`{high}` is not above the turbine outlet pressure, `{outlet}`: the turbine never turns");

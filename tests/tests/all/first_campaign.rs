@@ -1,6 +1,8 @@
 //! From a wheel's diameter to a map: `mapper init`, and the files that it writes.
 
 use mapper_tests::{Finished, mapper_in, scratch};
+use serde_json::Value;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 fn init(directory: &Path, further: &[&str]) -> Finished {
@@ -10,7 +12,7 @@ fn init(directory: &Path, further: &[&str]) -> Finished {
 /// The first campaign of a machine runs on the virtual lab, and at least 80 % of its points are good.
 #[test]
 fn a_wheel_diameter_is_sufficient_for_a_first_map() {
-    // `the_forecast_verdicts_match_a_run` has 60 mm.
+    // `the_first_advice_of_check_helps_as_forecast` has 42 and 60 mm.
     for wheel in ["35mm", "90mm"] {
         let scratch = scratch();
         init(scratch.path(), &["--wheel", wheel]).exits(0);
@@ -23,35 +25,50 @@ fn a_wheel_diameter_is_sufficient_for_a_first_map() {
     }
 }
 
-/// Verdicts come out as `check` forecasts them, before and after its advice to soak. Shares of good points may differ by 15 %: some of the
-/// standard errors are near their limit, and steps that repeat a point count among the measured ones.
+/// The verdicts are within the forecast of `check`, and after its first advice as many points are good as it promises at least.
 #[test]
-fn the_forecast_verdicts_match_a_run() {
-    let scratch = scratch();
-    init(scratch.path(), &["--wheel", "60mm"]).exits(0);
-    let path = scratch.path().join("own.yaml");
-    let written = std::fs::read_to_string(&path).unwrap();
-    let without: String =
-        written.lines().filter(|line| !line.starts_with("zero:")).map(|line| format!("{line}\n")).collect();
-    let holds = |text: &str| {
-        std::fs::write(&path, text).unwrap();
-        let checked = mapper_in(scratch.path(), ["check", "own.yaml", "--json"]).exits(0).json();
-        let expected = &checked["expected"];
-        let expected = expected["good"].as_f64().unwrap() / expected["points"].as_f64().unwrap();
-        let run =
-            mapper_in(scratch.path(), ["run", "own.yaml", "--json", "--progress", "off"]).exits(0).json();
-        let points = run["points"].as_array().unwrap();
-        let good = points.iter().filter(|point| point["verdict"] == "good").count() as f64;
-        let share = good / points.len() as f64;
-        assert!((share - expected).abs() <= 0.15, "{share} good, {expected} expected");
-        (share, checked)
-    };
-    let (before, checked) = holds(&without);
-    let mut advice = checked["advice"].as_array().unwrap().iter();
-    let soak_s = advice.find_map(|advice| advice["change"]["soak_s"].as_f64()).unwrap();
-    let (after, _) = holds(&format!("{without}zero: {{soak: {soak_s} s}}\n"));
-    assert!(after >= 0.8, "{after} good");
-    assert!(after > before, "{after} after the advice, {before} before");
+fn the_first_advice_of_check_helps_as_forecast() {
+    // Without a zero, noise and offsets are too large at low speed; with half the dwell as well, all points depend on the declaration.
+    for (wheel, dwell) in [("60mm", "60 s"), ("42mm", "30 s")] {
+        let scratch = scratch();
+        init(scratch.path(), &["--wheel", wheel]).exits(0);
+        let path = scratch.path().join("own.yaml");
+        let written = std::fs::read_to_string(&path).unwrap();
+        let is_zero = |line: &&str| line.starts_with("zero:");
+        let without: String =
+            written.lines().filter(|line| !is_zero(line)).map(|line| format!("{line}\n")).collect();
+        let flawed = without.replace("dwell: 60 s", &format!("dwell: {dwell}"));
+        let holds = |text: &str, forecast: Option<&Value>| {
+            std::fs::write(&path, text).unwrap();
+            let checked = mapper_in(scratch.path(), ["check", "own.yaml", "--json"]).exits(0).json();
+            let run = ["run", "own.yaml", "--json", "--progress", "off"];
+            let good = good_points(&mapper_in(scratch.path(), run).exits(0).json());
+            let forecast = forecast.unwrap_or(&checked["expected"]);
+            let [low, high] = ["good_low", "good_high"].map(|key| forecast[key].as_u64().unwrap());
+            assert!((low..=high).contains(&good), "{wheel}: {good} good, {forecast} expected");
+            checked
+        };
+        let checked = holds(&flawed, None);
+        let advice = &checked["advice"][0];
+        let surely_good = |forecast: &Value| forecast["good_low"].as_u64().unwrap();
+        assert!(surely_good(&advice["forecast"]) > surely_good(&checked["expected"]), "{checked}");
+        let change = &advice["change"];
+        let followed = match (change["soak_s"].as_f64(), change["dwell_s"].as_f64()) {
+            (Some(soak_s), _) => format!("{flawed}zero: {{soak: {soak_s} s}}\n"),
+            (_, Some(dwell_s)) => without.replace("dwell: 60 s", &format!("dwell: {dwell_s} s")),
+            _ => panic!("{change}"),
+        };
+        holds(&followed, Some(&advice["forecast"]));
+    }
+}
+
+/// Good points of a map as `check` counts them: without repeats, and of two visits the better one.
+fn good_points(run: &Value) -> u64 {
+    let mut best: BTreeMap<String, bool> = BTreeMap::new();
+    for point in run["points"].as_array().unwrap().iter().filter(|point| point["kind"] != "repeat") {
+        *best.entry(point["target"].to_string()).or_default() |= point["verdict"] == "good";
+    }
+    best.into_values().filter(|is_good| *is_good).count() as u64
 }
 
 #[test]
@@ -117,11 +134,68 @@ fn a_suppliers_map_is_converted() {
     }
 }
 
+/// A map whose columns are in other units or exchanged, and limits of another machine, are one mistake each: for `check`, and for `init`.
+#[test]
+fn a_wrong_map_or_limit_is_one_mistake() {
+    let scratch = scratch();
+    init(scratch.path(), &["--wheel", "60mm"]).exits(0);
+    let read = |name: &str| std::fs::read_to_string(scratch.path().join(name)).unwrap();
+    let (text, table) = (read("own.yaml"), read("own_map.csv"));
+    let write = |change: fn([f64; 4]) -> [f64; 4]| {
+        let row = |line: &str| {
+            let fields: Vec<f64> = line.split(',').map(str::parse).collect::<Result<_, _>>().ok()?;
+            Some(change(fields.try_into().ok()?).map(|x| x.to_string()).join(","))
+        };
+        let rows = table.lines().map(|line| row(line).unwrap_or_else(|| line.to_owned()));
+        std::fs::write(scratch.path().join("own_map.csv"), rows.collect::<Vec<_>>().join("\n")).unwrap();
+    };
+    let is_one_mistake = |what: &str| {
+        let found = mapper_in(scratch.path(), ["check", "own.yaml", "--json"]).exits(3).json();
+        assert_eq!(found["findings"].as_array().unwrap().len(), 1, "{what}: {found}");
+    };
+    let changes: [(&str, fn([f64; 4]) -> [f64; 4]); 7] = [
+        ("flow in lb/min", |[n, flow, pr, eta]| [n, 132.277 * flow, pr, eta]),
+        ("flow in kg/h", |[n, flow, pr, eta]| [n, 3600.0 * flow, pr, eta]),
+        ("speed in 1/s", |[n, flow, pr, eta]| [n / 60.0, flow, pr, eta]),
+        ("speed in rad/s", |[n, flow, pr, eta]| [0.10472 * n, flow, pr, eta]),
+        ("pressure ratio minus 1", |[n, flow, pr, eta]| [n, flow, pr - 1.0, eta]),
+        ("flow and pressure ratio exchanged", |[n, flow, pr, eta]| [n, pr, flow, eta]),
+        ("flow and efficiency exchanged", |[n, flow, pr, eta]| [n, eta, pr, flow]),
+    ];
+    for (what, change) in changes {
+        write(change);
+        is_one_mistake(what);
+        let message = init(scratch.path(), &["--wheel", "60mm", "--map", "own_map.csv", "--out", "other"]);
+        let message = message.exits(3).stderr;
+        assert!(!message.contains("own.yaml") && message.contains("own_map.csv"), "{what}: {message}");
+    }
+    std::fs::write(scratch.path().join("own_map.csv"), &table).unwrap();
+    for (right, wrong) in [
+        ("wheel_diameter: 60 mm", "wheel_diameter: 60 in"),
+        ("wheel_diameter: 60 mm", "wheel_diameter: 2.36 mm"),
+        ("  speed: 148 krpm", "  speed: 90 krpm"),
+        ("max: 500 kPa", "max: 5 kPa"),
+        ("compressor_outlet_temperature: 300 degC", "compressor_outlet_temperature: 300 K"),
+    ] {
+        assert!(text.contains(right), "{right}");
+        std::fs::write(scratch.path().join("own.yaml"), text.replace(right, wrong)).unwrap();
+        is_one_mistake(wrong);
+    }
+}
+
 /// A file for another command is also reported once.
 #[test]
-fn a_nightly_file_is_named_as_such() {
-    let file = mapper_tests::repository().join("campaigns/nightly.yaml");
-    let found =
-        mapper_in(&mapper_tests::repository(), ["check".as_ref(), file.as_os_str(), "--json".as_ref()]);
-    assert_eq!(found.exits(3).json()["findings"].as_array().unwrap().len(), 1);
+fn a_file_of_another_kind_is_named_as_such() {
+    let repository = mapper_tests::repository();
+    for (command, file) in [
+        ("check", "campaigns/nightly.yaml"),
+        ("run", "campaigns/fleet/blind.yaml"),
+        ("plan", "examples/channels/gap_rig.yaml"),
+        ("check", "examples/effects/coolant_passage.rhai"),
+        ("check", "plugins/formats/tests/tables/german.csv"),
+        ("nightly", "campaigns/turbo_a.yaml"),
+    ] {
+        let found = mapper_in(&repository, [command, file, "--json"]).exits(3).json();
+        assert_eq!(found["findings"].as_array().unwrap().len(), 1, "{command} {file}: {found}");
+    }
 }

@@ -9,19 +9,16 @@ pub struct VerdictForecast {
     pub points: usize,
     /// Points with the expected verdict `good`.
     pub good: usize,
+    /// Points that are good even if the errors are larger than expected.
+    pub good_low: usize,
+    /// Points that are good if the errors are smaller than expected.
+    pub good_high: usize,
     /// Whether the steps may contain too little information to check the declared parameters, which would make all points doubtful.
     pub near_limit: bool,
     /// Expected standard error of efficiency, root mean square over the points, fraction; `None` if the steps cannot check the declared parameters.
     pub eta_standard_error: Option<f64>,
     /// Rig time, s.
     pub duration_s: f64,
-}
-
-impl VerdictForecast {
-    /// Points that are good even if the steps contain less information than expected.
-    pub fn surely_good(&self) -> usize {
-        if self.near_limit { 0 } else { self.good }
-    }
 }
 
 /// A change of a campaign.

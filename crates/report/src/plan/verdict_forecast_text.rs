@@ -11,7 +11,7 @@ pub fn verdict_forecast_text(forecast: Option<VerdictForecast>, advice: &[Advice
         text += "These steps contain hardly enough information on alpha_A, probe and heating/cooling ratio: all points may\n\
                  turn out doubtful (`rests_on_declaration`).\n";
     }
-    if forecast.surely_good() < forecast.points && advice.is_empty() {
+    if forecast.good_low < forecast.points && advice.is_empty() {
         text += "Neither a longer dwell nor a longer soak makes more of them good; add points, or hold what is known\n\
                  (`identification.joint`).\n";
     }
@@ -23,12 +23,13 @@ pub fn verdict_forecast_text(forecast: Option<VerdictForecast>, advice: &[Advice
 }
 
 fn verdicts(forecast: &VerdictForecast) -> String {
-    let VerdictForecast { points, good, .. } = forecast;
+    let VerdictForecast { points, good, good_low, good_high, .. } = forecast;
+    let range = if good_low < good_high { format!(" ({good_low} to {good_high})") } else { String::new() };
     let error = forecast.eta_standard_error.filter(|_| *good > 0);
     let error = error.map_or_else(String::new, |sigma| {
         format!(", efficiency +/- {:.2} points (95 %)", 100.0 * half_width_95(sigma))
     });
-    format!("{good} of {points} points good{error}")
+    format!("{good} of {points} points good{range}{error}")
 }
 
 fn change_text(change: CampaignChange) -> String {

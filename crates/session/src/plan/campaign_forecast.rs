@@ -77,7 +77,7 @@ impl Session<'_> {
         let calibrations = calibration_concerns(campaign, model, day);
         let verdicts = forecast_verdicts(campaign, &plan);
         let advice = match verdicts {
-            Some(now) if now.surely_good() < now.points => {
+            Some(now) if now.good_low < now.points => {
                 advise(campaign, now, |changed| plan_of_sample(changed, model, every))?
             }
             _ => Vec::new(),
@@ -197,7 +197,7 @@ fn information_concern(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
     unpredicted.then(|| {
         Concern::warning(
             &["timing"],
-            "the steps contain too little information on alpha_A, probe and heating/cooling ratio; the points will be doubtful \
+            "the steps contain too little information on alpha_A, probe and heating/cooling ratio; the points will probably be doubtful \
              (`rests_on_declaration`)"
                 .to_owned(),
             "lengthen the dwell, add points, or fix known parameters (`identification.joint`)".to_owned(),

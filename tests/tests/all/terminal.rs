@@ -2,6 +2,7 @@
 
 use mapper_tests::{
     CampaignFile, SHIPPED, SHORT_GRID, SINGLE_STEP_METHOD, mapper, mapper_command, only_run, scratch,
+    shared_run,
 };
 use serde_json::Value;
 
@@ -33,6 +34,25 @@ fn a_run_into_a_pipe_prints_a_line_per_step_within_80_columns() {
         [of("run_started"), of("step_started"), of("step_ended"), of("point_identified")],
         [1, 4, 4, 4]
     );
+}
+
+/// A parameter that is held fixed is stated next to the verdict, before the figures: on the page, in the report and at the end of the output.
+#[test]
+fn what_all_results_depend_on_is_next_to_the_verdict() {
+    let fixed = (
+        "  method: joint ",
+        "  joint: {alpha_area: fixed, probe: fixed, direction: fixed}\n  method: joint ",
+    );
+    let campaign = CampaignFile::shipped_with(&[SHORT_GRID, &[fixed]].concat());
+    let run = shared_run(&campaign).run;
+    let read = |name: &str| std::fs::read_to_string(run.join(name)).unwrap();
+    let key = "identification.joint";
+    let page = read("report.html");
+    assert!(page.split("<nav").next().unwrap().contains(key));
+    assert!(read("report.md").split("## Conditions").next().unwrap().contains(key));
+    let shown = mapper(["identify".as_ref(), run.as_os_str()]).exits(0).stdout;
+    let (_, after_the_legend) = shown.rsplit_once("--full").unwrap();
+    assert!(after_the_legend.contains(key), "{shown}");
 }
 
 #[test]

@@ -43,7 +43,7 @@ pub fn results_text(units: &DisplayUnits, results: &Results, command: &str, show
             identified: &results.identified,
             map: results.compressor_map.as_ref(),
             repeats: &results.repeats,
-            remarks: results.identified.remarks.iter().map(result_remark_text).collect(),
+            remarks: remarks(&results.identified, false).collect(),
             command,
         },
         shown,
@@ -74,10 +74,16 @@ pub fn identified_text(
         identified,
         map: None,
         repeats: &[],
-        remarks: identified.remarks.iter().map(result_remark_text).chain(warnings).collect(),
+        remarks: remarks(identified, false).chain(warnings).collect(),
         command,
     };
     shown_results_text(units, &found, shown)
+}
+
+/// Sentences of the remarks that concern all points, or of the others.
+fn remarks(identified: &Identified, concern_all: bool) -> impl Iterator<Item = String> {
+    let remarks = identified.remarks.iter();
+    remarks.filter(move |remark| remark.concerns_all_points() == concern_all).map(result_remark_text)
 }
 
 fn shown_results_text(units: &DisplayUnits, found: &ShownResults<'_>, shown: DetailLevel) -> String {
@@ -86,7 +92,8 @@ fn shown_results_text(units: &DisplayUnits, found: &ShownResults<'_>, shown: Det
     let worst = [Verdict::Unusable, Verdict::Doubtful].into_iter().find(|verdict| has(*verdict));
     let sentence = verdict_sentence(found.identified.points_alone());
     let sentence = paint_verdict(worst.unwrap_or(Verdict::Good), &sentence, shown.paint);
-    let _ = writeln!(text, "\n{sentence}\n");
+    let premises = remarks(found.identified, true).map(|premise| wrapped(&premise, COLUMNS, 2));
+    let _ = writeln!(text, "\n{sentence}\n{}", premises.collect::<String>());
     text
 }
 

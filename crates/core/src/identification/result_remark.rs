@@ -33,3 +33,21 @@ ResultRemark {
     "nothing_to_compare" NothingToCompare { run: String },
 }
 }
+
+impl ResultRemark {
+    /// Whether all efficiencies depend on it, so that it is shown next to their verdict.
+    pub fn concerns_all_points(&self) -> bool {
+        use ResultRemark::{
+            ConventionalMapping, Corrected, DriftSubtracted, HeldFixed, UnknownAmbientPressure, WidenedByGap,
+        };
+        matches!(
+            self,
+            ConventionalMapping { .. }
+                | HeldFixed { .. }
+                | UnknownAmbientPressure { .. }
+                | Corrected { .. }
+                | WidenedByGap { .. }
+                | DriftSubtracted { .. }
+        )
+    }
+}

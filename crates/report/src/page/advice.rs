@@ -5,12 +5,13 @@ use crate::{RunReport, disagreement_text, doubts, zero_words};
 use mapper_core::Verdict;
 use mapper_identify::ZeroOutcome;
 
-/// Whether the map can be used without corrections.
+/// Whether the map can be used as it is, without a condition.
 pub(crate) fn is_clean(page: &RunPage<'_>) -> bool {
     let report = page.report;
     !report.points.is_empty()
         && report.points.iter().all(|scored| scored.point.verdict == Verdict::Good)
-        && page.report.map.is_some()
+        && report.map.is_some()
+        && !report.remarks.iter().any(mapper_core::ResultRemark::concerns_all_points)
 }
 
 /// Recommended actions in order of importance, each a sentence.

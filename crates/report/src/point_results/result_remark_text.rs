@@ -1,6 +1,6 @@
 //! Sentences of the remarks on results.
 
-use mapper_core::{Method, ResultRemark, probability_text};
+use mapper_core::{Method, ResultRemark, half_width_95, probability_text};
 
 /// The sentence of a remark, with values and units.
 pub fn result_remark_text(remark: &ResultRemark) -> String {
@@ -18,7 +18,7 @@ pub fn result_remark_text(remark: &ResultRemark) -> String {
             )
         }
         ResultRemark::HeldFixed { parameters } => format!(
-            "held fixed as declared (`identification.joint`): {}. Every efficiency and every interval depends on it",
+            "held fixed as declared (`identification.joint`): {}; if the declaration is wrong, all efficiencies and intervals are wrong",
             parameters.join(", ")
         ),
         ResultRemark::UnknownAmbientPressure { pressure_pa, sigma_pa } => format!(
@@ -39,10 +39,10 @@ pub fn result_remark_text(remark: &ResultRemark) -> String {
             probability_text(*probability)
         ),
         ResultRemark::WidenedByGap { causes, largest_sigma } => format!(
-            "not corrected for {}: every interval contains what {} may change, a standard uncertainty of up to {:.2} points",
-            if causes.is_empty() { "a cause outside the catalogue".to_owned() } else { causes.join(" or ") },
-            if causes.len() > 1 { "they" } else { "it" },
-            100.0 * largest_sigma
+            "the rig departs from its model, and the cause is not certain ({}): the efficiencies are not corrected, and every interval is \
+             wider by what the cause may change, up to +/- {:.1} points",
+            if causes.is_empty() { "none of the catalogue".to_owned() } else { causes.join(" or ") },
+            100.0 * half_width_95(*largest_sigma)
         ),
         ResultRemark::DriftSubtracted { reason } => format!("the drift of a sensor was subtracted: {reason}"),
         ResultRemark::NoMap { reason } => format!("there is no map: {reason}"),

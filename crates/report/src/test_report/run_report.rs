@@ -164,14 +164,19 @@ fn markdown_report(report: &RunReport<'_>) -> String {
     }
     let verdict = verdict_sentence(points.iter().map(|scored| &scored.point));
     let _ = writeln!(text, "**{verdict}** {}\n", origin.sentence());
+    let remark_texts = |concerns_all: bool| {
+        let those = remarks.iter().filter(|remark| remark.concerns_all_points() == concerns_all);
+        those.map(result_remark_text).collect::<Vec<_>>()
+    };
+    let (premises, others) = (remark_texts(true), remark_texts(false));
+    for premise in premises {
+        let _ = writeln!(text, "**All efficiencies depend on this:** {premise}.\n");
+    }
     if let Some(words) = key_figures(report.map, points, campaign, report.plan) {
         let _ = writeln!(text, "{words}\n");
     }
-    for remark in remarks {
-        let _ = writeln!(text, "- {}", result_remark_text(remark));
-    }
-    if !remarks.is_empty() {
-        text.push('\n');
+    if !others.is_empty() {
+        let _ = writeln!(text, "{}", others.iter().map(|remark| format!("- {remark}\n")).collect::<String>());
     }
     if has_picture {
         text.push_str(PICTURE);

@@ -3,12 +3,13 @@
 use crate::page::advice::{is_clean, recommended_actions};
 use crate::page::prose::sentence;
 use crate::page::run_page::RunPage;
-use crate::{cover_facts, key_figures, verdict_sentence};
+use crate::{cover_facts, key_figures, result_remark_text, verdict_sentence};
 use maud::{Markup, html};
 
 pub(crate) fn head(page: &RunPage<'_>) -> Markup {
     let report = page.report;
     let (clean, actions) = (is_clean(page), recommended_actions(report));
+    let premises = report.remarks.iter().filter(|remark| remark.concerns_all_points());
     html! {
         header {
             h1 { "Compressor map of " (report.machine) }
@@ -19,6 +20,7 @@ pub(crate) fn head(page: &RunPage<'_>) -> Markup {
             }
             section.verdict.clean[clean] aria-labelledby="verdict" {
                 h2 #verdict { (verdict_sentence(report.points.iter().map(|scored| &scored.point))) }
+                @for premise in premises { p { strong { (sentence(&result_remark_text(premise))) } } }
                 @if let Some(figures) = key_figures(report.map, report.points, report.campaign, report.plan) { p { (figures) } }
                 @if actions.is_empty() && clean {
                     p { "Nothing needs attention before the map is used." }

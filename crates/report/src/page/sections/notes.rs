@@ -15,12 +15,14 @@ pub(crate) fn notes(page: &RunPage<'_>, units: &DisplayUnits) -> Markup {
     let display = Display::new(units);
     let zero = zero_rows(report.zero, &display);
     let warnings = doubts(report.points.iter().map(|scored| &scored.point));
+    // The others are next to the verdict.
+    let remarks: Vec<_> = report.remarks.iter().filter(|remark| !remark.concerns_all_points()).collect();
     html! {
         section #notes aria-labelledby="notes-head" {
             h2 #notes-head { "Notes" }
             h3 { "Outcome" }
             p { (prose(&report.origin.sentence())) }
-            @if !report.remarks.is_empty() { ul { @for remark in report.remarks { li { (prose(&result_remark_text(remark))) } } } }
+            @if !remarks.is_empty() { ul { @for remark in &remarks { li { (sentence(&result_remark_text(remark))) } } } }
             @if let Some(score) = report.score {
                 h3 { "Comparison with the simulator's truth" }
                 (sentences(&score_text(score)))

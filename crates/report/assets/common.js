@@ -7,7 +7,8 @@ const byId = id => document.getElementById(id);
 const half = (low, high) => low == null || high == null ? null : (high - low) / 2;
 const shown = (value, digits, unit = "") => value == null ? "-" : value.toFixed(digits).replace(/^-(0\.?0*)$/, "$1") + unit;
 const short = d3.format(".3~g");
-const widthOf = element => Math.max(280, Math.min(720, element.clientWidth || 600));
+// On paper a drawing is scaled to its column: a narrower one has larger letters.
+const widthOf = element => "print" in root.dataset ? 400 : Math.max(280, Math.min(720, element.clientWidth || 600));
 
 // Colours of speed lines from slow to fast: viridis, whose ends are cut where they vanish on white and on black.
 let lineNames = page.lines ?? [...new Set(page.points.map(p => p.line))].sort((a, b) => a - b);

@@ -5,6 +5,7 @@ const TRACE_ROWS = 300, EVENTS = 200, SILENCE = 5000, AGAIN = 500, TRACES_EVERY 
 const token = new URLSearchParams(location.hash.slice(1)).get("token");
 const headers = token ? { Authorization: `Bearer ${token}` } : {};
 const text = (id, words) => { if (byId(id).textContent !== words) byId(id).textContent = words; };
+const capital = words => words[0].toUpperCase() + words.slice(1);
 const pause = ms => new Promise(done => setTimeout(done, ms));
 
 function lasting(s) {
@@ -43,8 +44,8 @@ function showNow() {
   showButtons();
   if (!now) return;
   const step = now.step;
-  text("phase", over ? "The run has ended" : step ? `${step.step ? `Step ${step.step} of ${Math.max(steps, step.step)}` : "A step once more"}: ${step.place}` : now.phase);
-  text("where", over || !step ? "" : `${waits(step)[0].toUpperCase()}${waits(step).slice(1)}.`);
+  text("phase", over ? "The run has ended" : step ? `${step.step ? `Step ${step.step} of ${Math.max(steps, step.step)}` : "A step once more"}: ${step.place}` : capital(now.phase));
+  text("where", over || !step ? "" : `${capital(waits(step))}.`);
   byId("bar").value = over ? 1 : duration ? Math.min(1, now.t_s / (now.t_s + now.left_s || 1)) : 0;
   const paced = pace ? now.left_s / pace : null;
   const half = now.left_half_s >= 0.5 ? ` ± ${lasting(now.left_half_s)}` : "";
@@ -79,7 +80,7 @@ function drawTraces() {
     caption.textContent = reads ? `${channel.name} ${reads.shown} ${channel.unit}, ${reads.what}` : `${channel.name}, ${channel.unit}`;
     const seen = rows.filter(row => row[i + 1] != null);
     put(holder, Plot.plot({
-      width: widthOf(holder), height: 160, marginLeft: 56, marginBottom: 40, style: { background: "transparent", color: style("--ink"), fontSize: "12px" },
+      width: widthOf(holder), height: 172, marginTop: 28, marginLeft: 56, marginBottom: 40, style: { background: "transparent", color: style("--ink"), fontSize: "12px" },
       x: { label: "rig time, min" }, y: { label: channel.unit, nice: true },
       marks: [Plot.gridY({ stroke: style("--grid"), strokeOpacity: 1 }), Plot.line(seen, { x: row => row[0] / 60, y: row => row[i + 1], stroke: style("--accent") })],
     }), `${channel.name} over the last minutes, in ${channel.unit}`);
@@ -89,7 +90,7 @@ function drawTraces() {
 function addPoint(p) {
   const row = byId("points").insertRow(0);
   row.dataset.step = p.step;
-  cells(row, [p.name, p.line, shown(p.flow, 2), shown(p.pr, 4), shown(p.eta, 2), shown(half(p.eta_low, p.eta_high), 2), shown(p.h, 0), p.verdict, p.warnings[0] ?? ""]);
+  cells(row, [p.name, p.line, shown(p.flow, 2), shown(p.pr, 4), shown(p.eta, 2), shown(half(p.eta_low, p.eta_high), 2), shown(p.h, 0), p.verdict, (p.warnings[0] ?? "").replaceAll("`", "")]);
   row.cells[7].className = p.verdict;
   row.addEventListener("click", () => choose(p.step));
 }

@@ -1,6 +1,8 @@
 // The map and the efficiency over flow, with layers, zoom and a click on a point.
 const layer = name => document.querySelector(`input[name=layer][value=${name}]`)?.checked ?? false;
 const zoomed = { map: null };
+// Drawings are narrower on paper.
+const small = () => "print" in root.dataset ? 8.5 : 10;
 
 function words(p) {
   const lines = [
@@ -36,21 +38,22 @@ function mapMarks() {
   const path = (data, options) => marks.push(Plot.line(data, { x: d => d[0] ?? d.flow, y: d => d[1] ?? d.pr, clip: true, ...options }));
   const ink = style("--ink"), soft = style("--soft");
   if (layer("contours")) {
-    for (const contour of page.map.contours) {
+    page.map.contours.forEach((contour, index) => {
       for (const line of contour.paths) path(line, { stroke: style("--accent"), strokeOpacity: 0.55, strokeWidth: 0.9, className: "contour" });
       const longest = d3.greatest(contour.paths, line => line.length);
       // A contour that is hardly longer than its number says more without it.
-      if (longest.length < 12) continue;
-      const at = longest[Math.floor(longest.length / 2)];
-      marks.push(Plot.text([at], { x: d => d[0], y: d => d[1], text: () => `${contour.eta}`, fill: style("--accent"), stroke: style("--ground"), strokeWidth: 3, fontSize: 10, clip: true }));
-    }
+      if (longest.length < 12) return;
+      // Numbers of neighbours are not next to each other.
+      const at = longest[Math.floor((index % 2 ? 0.4 : 0.6) * longest.length)];
+      marks.push(Plot.text([at], { x: d => d[0], y: d => d[1], text: () => `${contour.eta}`, fill: style("--accent"), stroke: style("--ground"), strokeWidth: 3, fontSize: small(), clip: true }));
+    });
   }
   if (layer("lines")) {
     for (const line of page.map.lines.filter(line => line.measured || layer("extrapolated"))) {
       for (const piece of runs(line.nodes, false)) path(piece, { stroke: line.measured ? ink : soft, strokeWidth: 1.2 });
       if (layer("extrapolated")) for (const piece of runs(line.nodes, true)) path(piece, { stroke: soft, strokeDasharray: "4 3", strokeWidth: 1 });
       const end = line.nodes.find(node => !node.out);
-      if (end) marks.push(Plot.text([end], { x: "flow", y: "pr", text: () => line.speed, dx: 5, dy: 7, textAnchor: "start", fill: ink, stroke: style("--ground"), strokeWidth: 3, fontSize: 10 }));
+      if (end) marks.push(Plot.text([end], { x: "flow", y: "pr", text: () => line.speed, dx: 4, dy: 13, textAnchor: "start", fill: ink, stroke: style("--ground"), strokeWidth: 3, fontSize: small() }));
     }
     path(page.map.surge, { stroke: style("--bad"), strokeDasharray: "6 3", strokeWidth: 1.6 });
     path(page.map.choke, { stroke: style("--doubt"), strokeDasharray: "2 3", strokeWidth: 1.6 });
@@ -134,9 +137,10 @@ function drawEta() {
       const name = d3.least(lineNames, n => Math.abs(n - line.speed));
       marks.push(Plot.areaY(nodes, { x: "flow", y1: n => n.eta - n.half, y2: n => n.eta + n.half, fill: lineColour(name), fillOpacity: 0.15, clip: true }));
       marks.push(Plot.line(nodes, { x: "flow", y: "eta", stroke: lineColour(name), clip: true }));
-      // Its speed is written where the line ends towards choke, or where it leaves what is drawn.
-      const end = d3.greatest(nodes, n => n.flow);
-      if (end) marks.push(Plot.text([end], { x: "flow", y: "eta", text: () => line.speed, dy: 14, textAnchor: "middle", fill: style("--ink"), stroke: style("--ground"), strokeWidth: 3, fontSize: 10 }));
+      // Its speed is written below its last point towards choke, or where the line leaves what is drawn.
+      const end = d3.greatest(nodes, n => n.flow), last = d3.greatest(data.filter(p => p.line === name), p => p.flow);
+      const eta = end && last ? Math.max(low, Math.min(end.eta, last.eta_low ?? last.eta)) : end?.eta;
+      if (end) marks.push(Plot.text([{ flow: end.flow, eta }], { x: "flow", y: "eta", text: () => line.speed, dy: 14, textAnchor: "middle", fill: style("--ink"), stroke: style("--ground"), strokeWidth: 3, fontSize: small() }));
     }
   if (layer("intervals")) marks.push(Plot.ruleX(data.filter(p => p.eta_low != null), { x: "flow", y1: "eta_low", y2: "eta_high", stroke: p => lineColour(p.line) }));
   if (layer("dynamic")) {
@@ -152,7 +156,7 @@ function drawEta() {
   marks.push(...pointMarks(data, "eta"));
   const plot = Plot.plot({
     width, height, marginLeft: 48, marginBottom: 42, style: { background: "transparent", color: style("--ink"), fontSize: "12px" },
-    x: { label: `corrected flow, ${page.units.flow}`, domain: flows.length ? d3.extent(flows) : undefined, nice: true, inset: 8 }, y: { domain: low == null ? undefined : [Math.max(0, low - 2), high + 2], label: "efficiency, %" }, marks,
+    x: { label: `corrected flow, ${page.units.flow}`, domain: flows.length ? d3.extent(flows) : undefined, nice: true, inset: 8 }, y: { domain: low == null ? [0, 100] : [Math.max(0, low - 2), high + 2], label: "efficiency, %" }, marks,
   });
   clickable(plot, data);
   put(element, plot, `Efficiency over corrected flow of ${data.length} points, between ${shown(low, 1)} and ${shown(high, 1)} %.`);
@@ -177,8 +181,13 @@ function drawPlan() {
   // A number that would stand on another one is left to the table.
   const height = Math.round(0.6 * width), boxes = [];
   const pixel = p => [(p.flow - d3.min(stops, q => q.flow)) / flowSpan * (width - 96), (d3.max(stops, q => q.pr) - p.pr) / prSpan * (height - 90)];
+  const lowest = d3.max(places, p => pixel(p)[1]);
   for (const p of places) {
-    const [x, y] = pixel(p), wide = 3.4 * p.steps.join(", ").length;
+    const wide = 3.4 * p.steps.join(", ").length, [place, level] = pixel(p);
+    // A row of numbers stays inside the drawing; the lowest one is below its point, where no other point is.
+    p.dx = Math.max(wide - 60, Math.min(width - 64 - wide, place)) - place;
+    p.dy = level === lowest ? 12 : -9;
+    const [x, y] = [place + p.dx, level + p.dy];
     p.named = boxes.every(([left, right, at]) => Math.abs(at - y) > 10 || x - wide > right || x + wide < left);
     if (p.named) boxes.push([x - wide, x + wide, y]);
   }
@@ -188,7 +197,7 @@ function drawPlan() {
     marks: [
       Plot.arrow([...jumps].reverse(), { x1: d => d.from.flow, y1: d => d.from.pr, x2: d => d.to.flow, y2: d => d.to.pr, stroke: d => shade(d.i), strokeWidth: d => (d.i < 5 ? 2 : 1), bend: 12, inset: 5, headLength: 6 }),
       Plot.dot(places, { x: "flow", y: "pr", fill: style("--ground"), stroke: style("--ink"), r: 3.5 }),
-      Plot.text(places.filter(p => p.named), { x: "flow", y: "pr", text: p => p.steps.join(", "), dy: -9, fontSize: 10, fill: style("--ink"), stroke: style("--ground"), strokeWidth: 3 }),
+      ...places.filter(p => p.named).map(p => Plot.text([p], { x: "flow", y: "pr", text: p => p.steps.join(", "), dx: p.dx, dy: p.dy, fontSize: 10, fill: style("--ink"), stroke: style("--ground"), strokeWidth: 3 })),
     ],
   });
   put(element, plot, `The ${jumps.length} jumps of the plan in their order; the table below lists them.`);

@@ -58,8 +58,8 @@ fn a_diagnosis_opens_in_a_browser_with_all_its_pictures() {
     let (dom, log) = (String::from_utf8_lossy(&browsed.stdout), String::from_utf8_lossy(&browsed.stderr));
     assert!(browsed.status.success(), "{log}");
     assert!(!log.contains("CONSOLE"), "the page complains: {log}");
-    // The map of where, and the traces; the parser of a browser leaves out what is not an SVG.
-    assert_eq!(dom.matches("<svg").count(), 2, "{dom}");
+    // Two maps of where, and four traces; the parser of a browser leaves out what is not an SVG.
+    assert_eq!(dom.matches("<svg").count(), 6, "{dom}");
     assert!(dom.matches("<polyline").count() + dom.matches("<path").count() > 8);
 
     // The same on the page of the run.
@@ -76,7 +76,7 @@ fn a_diagnosis_opens_in_a_browser_with_all_its_pictures() {
     }
     let text = std::fs::read_to_string(whole).unwrap();
     let section = text.split("id=\"gap\"").nth(1).unwrap();
-    assert!(section.contains("(stem_conduction) explains the gap") && section.matches("<svg").count() == 2);
+    assert!(section.contains("(stem_conduction) explains the gap") && section.matches("<svg").count() == 6);
     for heading in
         ["Causes", "Place in the machine", "Difference between measured and computed readings", "What to do"]
     {

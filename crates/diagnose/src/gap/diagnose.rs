@@ -234,7 +234,7 @@ pub fn diagnose(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
     } else {
         Vec::new()
     };
-    progress(1.0, "done");
+    progress(1.0, "summary");
     let diagnosis = Diagnosis {
         verdict,
         since,

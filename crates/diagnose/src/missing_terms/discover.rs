@@ -82,7 +82,6 @@ pub fn discover(
         |balance: &Balance| settled.is_none_or(|law| law.submodel == balance.properties().submodel.name());
     let forces = forces(&nothing, &everywhere.steps, &here);
     let places = places(diagnosed, &bench, found.as_ref(), &forces, null, bend);
-    progress(1.0, "done");
     Discovered {
         laws,
         forces: forces.into_iter().take(1 + MAX_EQUIVALENT).map(reported_force).collect(),

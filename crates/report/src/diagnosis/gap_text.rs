@@ -43,7 +43,7 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
         for place in diagnosis.r#where.iter().take(PLACES) {
             let place = format!(
                 "  {}: {:.0} % of the gap, {:.0} sigma; largest in {}, {} after the jump, {}: {} {}",
-                place.submodel,
+                part_name(&place.submodel),
                 100.0 * place.share,
                 place.sigma,
                 place.channel,
@@ -64,7 +64,9 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
     }
     text += "\nwhich\n";
     for candidate in diagnosis.listed().take(CAUSES) {
-        text += &format!("  {:>7}  {}\n", probability_text(candidate.probability), cause(candidate));
+        let lines = wrapped(&cause(candidate), COLUMNS - 11, 0);
+        let lines = lines.trim_end().replace('\n', "\n           ");
+        text += &format!("  {:>7}  {lines}\n", probability_text(candidate.probability));
         for set in &candidate.equivalent {
             text += &format!("           indistinguishable from {}\n", set.join(" + "));
         }
@@ -82,19 +84,19 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
     let actions = stand_actions(diagnosis);
     if !actions.is_empty() {
         text += "\ncheck at the stand\n";
-        text += &actions.iter().map(|action| format!("  {action}\n")).collect::<String>();
+        text += &actions.iter().map(|action| wrapped(&format!("  {action}"), COLUMNS, 4)).collect::<String>();
     }
     text += &next_text(diagnosis);
     if !diagnosis.assumed.is_empty() {
         text += "\nassumed\n";
         for assumption in &diagnosis.assumed {
-            text += &format!("  {assumption}\n");
+            text += &wrapped(&format!("  {assumption}"), COLUMNS, 4);
         }
     }
     if !diagnosis.warnings.is_empty() {
         text += "\nlimits of this diagnosis\n";
         for warning in &diagnosis.warnings {
-            text += &format!("  {}\n", gap_warning_text(warning));
+            text += &wrapped(&format!("  {}", gap_warning_text(warning)), COLUMNS, 4);
         }
     }
     text
@@ -220,9 +222,22 @@ fn not_judged(since: &Since) -> String {
     )
 }
 
-/// Pressures have many pascals.
-fn display_scale(unit: &str) -> (f64, &str) {
-    if unit == "Pa" { (1e-3, "kPa") } else { (1.0, unit) }
+/// Factor to the unit in which residuals are shown, and that unit.
+pub(crate) fn display_scale(unit: &str) -> (f64, &str) {
+    match unit {
+        "Pa" => (1e-3, "kPa"),
+        "kg/s" => (1e3, "g/s"),
+        unit => (1.0, unit),
+    }
+}
+
+/// Name of a part of the machine in words, e.g. `T2 probe` for `t2_probe`.
+pub(crate) fn part_name(submodel: &str) -> String {
+    let word = |word: &str| match word.as_bytes() {
+        [b't' | b'p', b'c' | b'0'..=b'9'] => word[..1].to_uppercase() + &word[1..],
+        _ => word.to_owned(),
+    };
+    submodel.split('_').map(word).collect::<Vec<_>>().join(" ")
 }
 
 /// The effect of the library that is closest to an unmodelled cause.
@@ -255,6 +270,13 @@ pub fn cause(candidate: &Candidate) -> String {
 }
 
 fn parameter(name: &str, estimate: &Estimate) -> String {
+    // A ratio that is shown in per cent has its interval in per cent.
+    let percent = estimate.size.strip_suffix(" %").and_then(|size| size.parse::<f64>().ok());
+    if percent.is_some_and(|percent| (percent - 100.0 * estimate.value).abs() <= 0.01 * percent.abs()) {
+        let [value, low, high] =
+            [estimate.value, estimate.low, estimate.high].map(|ratio| four_figures(100.0 * ratio));
+        return format!("{name} = {value} % ({low} .. {high} %)");
+    }
     let value = with_unit(four_figures(estimate.value), &estimate.unit);
     let (low, high) = (four_figures(estimate.low), four_figures(estimate.high));
     // The size is rounded, and often in a clearer unit.
@@ -299,7 +321,7 @@ fn describe_gap_reduction(diagnosis: &Diagnosis) -> String {
     let mut text = match gap.folds.len() {
         0 | 1 => "\nhow far, on the fitted steps; there are too few to hold any out\n".to_owned(),
         folds => format!(
-            "\nhow far, each of {} steps by a fit that did not see it ({folds} folds, each over all speeds and openings)\n",
+            "\nhow far, each of {} steps by a fit that did not see it ({folds} folds)\n",
             gap.held_out_steps.len()
         ),
     };
@@ -402,8 +424,9 @@ fn points(points: &[PointGap]) -> String {
     };
     let eta_points = 100.0 * largest(|p| p.eta_after - p.eta_before);
     let h_w_m2k = largest(|p| p.h_after_w_m2k - p.h_before_w_m2k);
-    format!(
+    let line = format!(
         "  at equal speed and pressures, the cause changes the wheel's own efficiency by up to {eta_points:+.2} points and h by up to \
-         {h_w_m2k:+.0} W/(m2 K); `mapper gap correct` gives its effect on the identified efficiencies\n"
-    )
+         {h_w_m2k:+.0} W/(m2 K); `mapper gap correct` gives its effect on the identified efficiencies"
+    );
+    wrapped(&line, COLUMNS, 4)
 }

@@ -9,17 +9,23 @@ pub fn thermal_text(thermal: &ThermalModel) -> String {
     let mut text = String::from("\nshared by all points (+/- 95 %):\n");
     let mut line = |name: &str, value: &SharedValue, scale: f64, unit: &str, decimals: usize| {
         let half = half_width_95(scale * value.uncertainty.combined_standard_error());
+        let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+        // Rounded to zero, a number has no sign.
+        let rounded = |number: f64| {
+            let unsigned = (scale * number).abs() < 0.5 * 0.1f64.powi(decimals as i32);
+            if unsigned { 0.0 } else { scale * number }
+        };
         let _ = match (value.value, value.origin) {
             (Some(number), Origin::Assumed) => {
-                writeln!(text, "  {name:<34} {:.decimals$} {unit} (assumed)", scale * number)
+                writeln!(text, "  {name:<34} {:.decimals$}{unit} (assumed)", rounded(number))
             }
             (Some(number), _) => {
-                writeln!(text, "  {name:<34} {:.decimals$} +/- {half:.decimals$} {unit}", scale * number)
+                writeln!(text, "  {name:<34} {:.decimals$} +/- {half:.decimals$}{unit}", rounded(number))
             }
             (None, _) => {
                 writeln!(
                     text,
-                    "  {name:<34} not identifiable from the recording (+/- {half:.decimals$} {unit})"
+                    "  {name:<34} not identifiable from the recording (+/- {half:.decimals$}{unit})"
                 )
             }
         };
@@ -30,7 +36,7 @@ pub fn thermal_text(thermal: &ThermalModel) -> String {
     }
     line("alpha_A", &thermal.alpha_area_ratio, 1.0, "", 3);
     line("T2 probe diameter", &thermal.probe_diameter_m, 1e3, "mm", 2);
-    line("direction factor of h", &thermal.direction_factor, 1.0, "", 3);
+    line("heating/cooling ratio of h", &thermal.direction_factor, 1.0, "", 3);
     for (channel, offset) in &thermal.offsets {
         let decimals = if channel.unit() == "Pa" { 0 } else { 2 };
         line(&format!("offset of {channel}"), offset, 1.0, channel.unit(), decimals);
@@ -125,7 +131,7 @@ mod tests {
             offsets: std::collections::BTreeMap::new(),
             entangled: vec![CorrelatedPair {
                 first: "alpha_A".to_owned(),
-                second: "direction factor".to_owned(),
+                second: "heating/cooling ratio".to_owned(),
                 correlation: 0.97,
             }],
             doubts: Vec::new(),
@@ -133,7 +139,7 @@ mod tests {
         let text = thermal_text(&thermal);
         assert!(!text.contains("before the wheel"), "what makes no difference is not reported: {text}");
         assert!(text.contains("not identifiable from the recording"), "{text}");
-        assert!(text.contains("alpha_A and direction factor are barely distinguishable"), "{text}");
+        assert!(text.contains("alpha_A and heating/cooling ratio are barely distinguishable"), "{text}");
         let json = serde_json::to_value(&thermal).unwrap_or_default();
         assert_eq!(json["entangled"][0]["correlation"], 0.97);
         assert_eq!(json["alpha_area_ratio"]["value"], serde_json::Value::Null);

@@ -1,6 +1,6 @@
 //! A diagnosis as a page with pictures: one self-contained HTML file.
 
-use crate::diagnosis::gap_text::cause;
+use crate::diagnosis::gap_text::{cause, display_scale, part_name};
 use crate::page::prose::sentence;
 use crate::page::shell::{Purpose, shell};
 use crate::page::table::scrolling;
@@ -64,7 +64,7 @@ fn sections(diagnosed: &Diagnosed, heading: &dyn Fn(&str) -> Markup) -> Markup {
         @if !diagnosis.inseparable.is_empty() {
             p { "Inseparable in this recording: " (diagnosis.inseparable.join(", ")) "." }
         }
-        figure { (scrolling("where on the map", &PreEscaped(residual_map(diagnosed)))) figcaption { "Ends of the steps, coloured by the difference between measured and computed readings." } }
+        (pictures("Ends of the steps on the map, coloured by the difference between measured and computed readings.", residual_maps(diagnosed)))
         @if !diagnosis.forces.is_empty() {
             (heading("Missing heat, power or flow of each balance, if it alone has one"))
             (forces(diagnosed))
@@ -78,7 +78,9 @@ fn sections(diagnosed: &Diagnosed, heading: &dyn Fn(&str) -> Markup) -> Markup {
             (heat_map(diagnosed, "without a cause", &diagnosed.without_cause.1))
             @if let Some((cause, fit)) = with_cause { (heat_map(diagnosed, &format!("with {cause}"), &fit.residual)) }
         }
-        @if with_cause.is_some() { figure { (scrolling("residuals over time", &PreEscaped(traces(diagnosed)))) } }
+        @if with_cause.is_some() {
+            (pictures("Measured minus computed readings over time, of the four channels with the largest gap.", traces(diagnosed)))
+        }
         (heading("What to do"))
         @if actions.is_empty() && measurement.is_none() { p { "Nothing: the rig is as declared." } }
         @else {
@@ -91,6 +93,16 @@ fn sections(diagnosed: &Diagnosed, heading: &dyn Fn(&str) -> Markup) -> Markup {
         details {
             summary { "All results as text" }
             pre tabindex="0" role="region" aria-label="the diagnosis as text" { (gap_text(diagnosis)) }
+        }
+    }
+}
+
+/// Pictures next to each other, on a phone below each other.
+fn pictures(caption: &str, svgs: Vec<String>) -> Markup {
+    html! {
+        figure {
+            div.plots { @for svg in svgs { div { (PreEscaped(svg)) } } }
+            figcaption { (caption) }
         }
     }
 }
@@ -148,10 +160,10 @@ fn forces(diagnosed: &Diagnosed) -> Markup {
 fn places(diagnosed: &Diagnosed) -> Markup {
     let table = html! {
         table {
-            tr { @for head in ["part", "share", "sigma", "channel", "phase", "region"] { th { (head) } } }
+            tr { @for head in ["part", "share", "sigma", "channel", "after the jump", "region"] { th { (head) } } }
             @for place in &diagnosed.diagnosis.r#where {
                 tr {
-                    td { (place.submodel) }
+                    td { (part_name(&place.submodel)) }
                     td { (format!("{:.0} %", 100.0 * place.share)) }
                     td { (format!("{:.0}", place.sigma)) }
                     td { (place.channel) }
@@ -173,8 +185,8 @@ const CLASSES: [(f64, Colour, &str); 4] = [
 ];
 
 /// Ends of the steps on the compressor map, coloured by their residual, before and after.
-fn residual_map(diagnosed: &Diagnosed) -> String {
-    let mut figure = Figure::new("Where on the map").columns(2).panel_size_px(430.0, 300.0);
+fn residual_maps(diagnosed: &Diagnosed) -> Vec<String> {
+    let mut pictures = Vec::new();
     let after = diagnosed.with_cause.as_ref().map(|(cause, fit)| (format!("with {cause}"), &fit.residual));
     for (title, residual) in
         [("without the cause".to_owned(), &diagnosed.without_cause.1)].into_iter().chain(after)
@@ -201,9 +213,9 @@ fn residual_map(diagnosed: &Diagnosed) -> String {
                 panel.add(Scatter::new(points, *colour).size_px(9.0).label(*name));
             }
         }
-        figure = figure.panel(panel);
+        pictures.push(Figure::new("").columns(1).panel_size_px(430.0, 300.0).panel(panel).to_svg());
     }
-    figure.to_svg()
+    pictures
 }
 
 /// Flow in g/s and pressure ratio as measured in the last 10 s of a step.
@@ -252,35 +264,35 @@ fn heat_cell(diagnosed: &Diagnosed, residual: &[f64], step: usize, output: usize
 }
 
 /// Measured minus predicted over time, before and after, for the four channels with the largest gap.
-fn traces(diagnosed: &Diagnosed) -> String {
-    let Some((cause, best)) = &diagnosed.with_cause else { return String::new() };
+fn traces(diagnosed: &Diagnosed) -> Vec<String> {
+    let Some((cause, best)) = &diagnosed.with_cause else { return Vec::new() };
     let energy = |output: usize| {
         let groups = diagnosed.study.groups.iter().filter(|g| g.output == output);
         groups.flat_map(|g| &diagnosed.without_cause.1[g.rows.clone()]).map(|r| r * r).sum::<f64>()
     };
     let mut order: Vec<usize> = (0..OUTPUTS.len()).collect();
     order.sort_by(|a, b| energy(*b).total_cmp(&energy(*a)));
-    let mut figure = Figure::new("Measured minus predicted").columns(1).panel_size_px(900.0, 180.0);
-    for output in order.into_iter().take(4) {
+    let picture = |output: usize| {
+        let channel = OUTPUTS[output];
+        let (scale, unit) = display_scale(channel.unit());
         let points = |values: &[f64]| {
             let of_output = diagnosed.study.groups.iter().filter(|g| g.output == output);
             of_output
                 .flat_map(|g| {
                     g.rows.clone().zip(&g.blocks).map(|(row, block)| {
                         let t_s = diagnosed.study.steps[g.step].blocks[*block].mean_s;
-                        (t_s / 60.0, diagnosed.study.measured[row] - values[row])
+                        (t_s / 60.0, scale * (diagnosed.study.measured[row] - values[row]))
                     })
                 })
                 .collect::<Vec<(f64, f64)>>()
         };
-        let channel = OUTPUTS[output];
-        let panel = Panel::new(Axis::new("time, min"), Axis::new(format!("{channel}, {}", channel.unit())))
+        let panel = Panel::new(Axis::new("time, min"), Axis::new(format!("{channel}, {unit}")))
             .with(
                 Line::new(points(&diagnosed.without_cause.0.values), palette::VERMILLION)
                     .label("without the cause"),
             )
             .with(Line::new(points(&best.prediction.values), palette::BLUE).label(format!("with {cause}")));
-        figure = figure.panel(panel);
-    }
-    figure.to_svg()
+        Figure::new("").columns(1).panel_size_px(430.0, 180.0).panel(panel).to_svg()
+    };
+    order.into_iter().take(4).map(picture).collect()
 }

@@ -7,13 +7,17 @@ use std::path::Path;
 /// Width of the text, columns.
 const COLUMNS: usize = 80;
 
-/// The assumed sizes in one sentence; `None` if the campaign gives all of them.
+/// The assumed sizes in one sentence, by name; `None` if the campaign gives all of them.
 pub fn assumed_sentence(campaign: &Campaign) -> Option<String> {
+    sentence_with(campaign, |size| size.name)
+}
+
+fn sentence_with(campaign: &Campaign, name: fn(&AssumedSize) -> &str) -> Option<String> {
     let sizes = &campaign.machine.assumed;
     if sizes.is_empty() {
         return None;
     }
-    let named: Vec<String> = sizes.iter().map(size_name).collect();
+    let named: Vec<String> = sizes.iter().map(|size| size_text(name(size), size)).collect();
     let wheel_mm = 1e3 * campaign.machine.params.compressor.wheel_diameter_m;
     let sigma_ratio = internal_area_sigma_ratio(sizes);
     let widened = if sigma_ratio > 0.0 {
@@ -31,9 +35,10 @@ pub fn assumed_sentence(campaign: &Campaign) -> Option<String> {
     ))
 }
 
-/// [`assumed_sentence`] with a line for each 80 columns; empty if there is none.
+/// The same by keys of the campaign, with a line for each 80 columns; empty if there is none.
 pub fn assumed_text(campaign: &Campaign) -> String {
-    assumed_sentence(campaign).map_or_else(String::new, |sentence| wrapped(&sentence, COLUMNS, 2))
+    sentence_with(campaign, |size| &size.key)
+        .map_or_else(String::new, |sentence| wrapped(&sentence, COLUMNS, 2))
 }
 
 /// The files of a first campaign, and the next commands.
@@ -58,9 +63,9 @@ pub fn first_campaign_text(
     text
 }
 
-fn size_name(size: &AssumedSize) -> String {
+fn size_text(name: &str, size: &AssumedSize) -> String {
     let unit = if size.unit.is_empty() { String::new() } else { format!(" {}", size.unit) };
-    format!("{} {}{unit}", size.key, significant(size.value))
+    format!("{name} {}{unit}", significant(size.value))
 }
 
 /// Three significant digits, without trailing zeros.

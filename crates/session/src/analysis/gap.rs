@@ -129,6 +129,7 @@ impl Session<'_> {
             progress: &in_catalogue,
         })?;
         let discovery = discover(&diagnosed, &calibration, &beyond);
+        progress(1.0, "done");
         if let Some(law) = discovery.settled {
             diagnosed.explain_by(law);
         }

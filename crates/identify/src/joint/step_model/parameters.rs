@@ -91,7 +91,7 @@ pub(crate) fn symbol(index: usize) -> String {
         EXPONENT => "Nusselt exponent".to_owned(),
         ALPHA => "alpha_A".to_owned(),
         PROBE_MM2 => "probe diameter".to_owned(),
-        LN_DIRECTION => "direction factor".to_owned(),
+        LN_DIRECTION => "heating/cooling ratio".to_owned(),
         FLOW_GAIN => "gain of m_c".to_owned(),
         BAROMETER => "barometer".to_owned(),
         HUMIDITY => "humidity".to_owned(),

@@ -2,7 +2,7 @@
 //!
 //! The posterior is linearised at the fit. Declared errors of readings are independent of each other and of everything else, so each contributes
 //! its sensitivity, as the smoothness prior leaves it, times its declared size. So does the loss of efficiency at low speed, which looks like
-//! an offset and limits what smoothness corrects. alpha_A, probe and direction factor are correlated: each contributes the part that the
+//! an offset and limits what smoothness corrects. alpha_A, probe and heating/cooling ratio are correlated: each contributes the part that the
 //! previous ones do not explain (Cholesky factor of their covariance). The step's own noise and the scatter of its h about the law come next.
 //! The remainder is due to the shared law of h and the shape of the map, which the noise of all steps limits.
 
@@ -22,7 +22,7 @@ use nalgebra::DVector;
 const NOISE: &str = "noise of the step, scatter about the law of h";
 const SLOW: &str = "efficiency lost at low speed";
 const LAW: &str = "law of h and shape of the map";
-const NEUTRAL: &str = "alpha_A, probe and direction factor taken for neutral";
+const NEUTRAL: &str = "alpha_A, probe and heating/cooling ratio taken for neutral";
 
 /// Unit of a source that is given in the unit of the number.
 const OWN_UNIT: &str = "of the number";

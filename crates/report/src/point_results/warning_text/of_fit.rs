@@ -19,7 +19,7 @@ pub(crate) fn sentence_of(warning: &Warning) -> Option<Sentence> {
         Warning::NoiseDominates(interval) => describe_wide_interval(interval, false),
         Warning::RestsOnDeclaration { eta_error } => sentence!(
             "the recording alone determines the efficiencies only to {} points; the remainder depends on the declared alpha_A, probe and \
-                 direction factor: record longer steps or larger gradients, or hold fixed what is known (`identification.joint`)",
+                 heating/cooling ratio: record longer steps or larger gradients, or hold fixed what is known (`identification.joint`)",
             number(100.0 * eta_error, 1)
         ),
         Warning::AssumedAlpha { alpha_area_ratio, alpha_area_sigma_ratio, eta_sigma } => sentence!(

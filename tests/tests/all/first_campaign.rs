@@ -134,6 +134,9 @@ fn a_suppliers_map_is_converted() {
     }
 }
 
+/// Changes the speed, flow, pressure ratio and efficiency of a row.
+type Change = fn([f64; 4]) -> [f64; 4];
+
 /// A map whose columns are in other units or exchanged, and limits of another machine, are one mistake each: for `check`, and for `init`.
 #[test]
 fn a_wrong_map_or_limit_is_one_mistake() {
@@ -141,7 +144,7 @@ fn a_wrong_map_or_limit_is_one_mistake() {
     init(scratch.path(), &["--wheel", "60mm"]).exits(0);
     let read = |name: &str| std::fs::read_to_string(scratch.path().join(name)).unwrap();
     let (text, table) = (read("own.yaml"), read("own_map.csv"));
-    let write = |change: fn([f64; 4]) -> [f64; 4]| {
+    let write = |change: Change| {
         let row = |line: &str| {
             let fields: Vec<f64> = line.split(',').map(str::parse).collect::<Result<_, _>>().ok()?;
             Some(change(fields.try_into().ok()?).map(|x| x.to_string()).join(","))
@@ -153,7 +156,7 @@ fn a_wrong_map_or_limit_is_one_mistake() {
         let found = mapper_in(scratch.path(), ["check", "own.yaml", "--json"]).exits(3).json();
         assert_eq!(found["findings"].as_array().unwrap().len(), 1, "{what}: {found}");
     };
-    let changes: [(&str, fn([f64; 4]) -> [f64; 4]); 7] = [
+    let changes: [(&str, Change); 7] = [
         ("flow in lb/min", |[n, flow, pr, eta]| [n, 132.277 * flow, pr, eta]),
         ("flow in kg/h", |[n, flow, pr, eta]| [n, 3600.0 * flow, pr, eta]),
         ("speed in 1/s", |[n, flow, pr, eta]| [n / 60.0, flow, pr, eta]),

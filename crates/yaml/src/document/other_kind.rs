@@ -17,8 +17,9 @@ impl Tree {
     /// Finding about a file that is not of its kind: it has the key of another kind instead of its `own`, or none of the `known` keys.
     pub fn find_other_kind(&self, own: &str, known: &[&str]) -> Option<Finding> {
         let has = |key: &str| self.value().get(key).is_some();
-        // A study names its campaign, too.
-        if has(own) && known.iter().filter(|key| has(key)).count() > 1 {
+        let keys = self.value().as_object().map_or(0, |keys| keys.len());
+        // A study has the key `campaign` too, but few others of a campaign.
+        if has(own) && 2 * known.iter().filter(|key| has(key)).count() >= keys {
             return None;
         }
         let name = self.source().document.name;

@@ -17,11 +17,16 @@ fn steps_of(keys: &[&str]) -> Vec<Step> {
 pub(crate) fn find_concerns(campaign: &Campaign, places: &[Vec<Step>]) -> Vec<Concern> {
     let mut concerns = dwell::find_concerns(campaign);
     concerns.extend(sizes::find_concerns(campaign));
-    concerns.extend(speeds::find_concerns(campaign, places));
-    // A wrong wheel explains a map that does not fit it.
-    let is_wrong = |concern: &Concern, at: &[&str]| concern.is_error && concern.at.iter().eq(&steps_of(at));
-    if concerns.iter().any(|concern| is_wrong(concern, &sizes::WHEEL)) {
-        concerns.retain(|concern| !is_wrong(concern, &sizes::MAP_FILE));
+    let speeds = speeds::find_concerns(campaign, places);
+    let has_error = |concerns: &[Concern], at: &[&str]| {
+        concerns.iter().any(|concern| concern.is_error && concern.at == steps_of(at))
+    };
+    // A wrong wheel explains a map that does not fit it, and such a map explains speeds that it does not have.
+    if has_error(&concerns, &sizes::WHEEL) || has_error(&speeds, &sizes::WHEEL) {
+        concerns.retain(|concern| concern.at != steps_of(&sizes::MAP_FILE));
+        concerns.extend(speeds);
+    } else if !has_error(&concerns, &sizes::MAP_FILE) {
+        concerns.extend(speeds);
     }
     concerns
 }

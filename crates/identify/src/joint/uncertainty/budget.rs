@@ -27,8 +27,8 @@ const NEUTRAL: &str = "alpha_A, probe and heating/cooling ratio taken for neutra
 /// Unit of a source that is given in the unit of the number.
 const OWN_UNIT: &str = "of the number";
 
-/// What the smoothness prior does to a number: weight, and the pull of each point's efficiency.
-pub(crate) type Pull = (f64, DVector<f64>);
+/// Change of a number by changes of the points' efficiencies, which a shared parameter causes.
+pub(crate) type Correction<'a> = dyn Fn(&DVector<f64>, Option<usize>) -> f64 + 'a;
 
 /// A number with its error after smoothing: without the excess of the interval over the mixture, and that excess.
 pub(crate) struct ReportedError {
@@ -38,12 +38,13 @@ pub(crate) struct ReportedError {
     pub(crate) degrees_of_freedom: f64,
 }
 
-/// The rows of a number. `step`: its position among `etas`.
+/// The rows of a number. `step`: its position among `etas`. `correction`: change of the smoothness prior's correction by changes of the points'
+/// efficiencies that a shared parameter, or the true efficiency, causes; `pull`: the same per change of the step's own.
 pub(crate) fn rows(
     covariance: &Covariance,
     refined: Option<(&Refinements, &Gain)>,
     (quantity, etas, step): (&Quantity, &[Quantity], usize),
-    (pulls, slowness): (&[Pull], &[f64]),
+    (correction, pull, slowness): (&Correction<'_>, f64, &[f64]),
     reported: &ReportedError,
 ) -> Vec<BudgetRow> {
     let mut rows = Vec::new();
@@ -60,7 +61,8 @@ pub(crate) fn rows(
         if (OFFSETS..SURFACE).contains(index) {
             let sigma = covariance.shared[(row, row)].sqrt();
             let of = |quantity: &Quantity| quantity.by_shared[row] / sigma;
-            let contribution = through(pulls, of(quantity), etas.iter().map(of));
+            let changes = DVector::from_iterator(etas.len(), etas.iter().map(of));
+            let contribution = of(quantity) - correction(&changes, Some(*index));
             push(symbol(*index), sigma, unit(*index), contribution, None);
         }
     }
@@ -68,19 +70,13 @@ pub(crate) fn rows(
         push(name, sigma, unit, contribution, None);
     }
     // The fitted efficiencies have the loss, as the true ones do.
-    let slow = through(pulls, 0.0, slowness.iter().map(|slowness| SLOW_LOSS * slowness));
-    push(SLOW.to_owned(), SLOW_LOSS, "1", slow, None);
-    let own = pulls
-        .iter()
-        .map(|(weight, pull)| {
-            let pull = pull[step];
-            let moved = pull * (pull * etas[step].own_variance - 2.0 * quantity.own_with_eta);
-            weight * (quantity.own_variance + moved)
-        })
-        .sum::<f64>();
-    let own = if pulls.is_empty() { quantity.own_variance } else { own };
+    if slowness.len() == etas.len() {
+        let changes = SLOW_LOSS * DVector::from_column_slice(slowness);
+        push(SLOW.to_owned(), SLOW_LOSS, "1", -correction(&changes, None), None);
+    }
+    let pulled = pull * (pull * etas[step].own_variance - 2.0 * quantity.own_with_eta);
     let before = push(String::new(), 0.0, "", 0.0, None);
-    let noise = own.clamp(0.0, before).sqrt();
+    let noise = (quantity.own_variance + pulled).clamp(0.0, before).sqrt();
     let rest = push(NOISE.to_owned(), noise, OWN_UNIT, noise, Some(reported.degrees_of_freedom)).sqrt();
     push(LAW.to_owned(), rest, OWN_UNIT, rest, None);
     push(NEUTRAL.to_owned(), reported.added.abs(), OWN_UNIT, reported.added, None);
@@ -101,13 +97,6 @@ pub(crate) fn in_unit(row: BudgetRow, number: f64, unit: &str) -> BudgetRow {
             contribution,
         )
     }
-}
-
-/// Change of a number after smoothing, from its change before and that of each point's efficiency: the mean over the choices of the prior.
-fn through(pulls: &[Pull], change: f64, of_etas: impl Iterator<Item = f64> + Clone) -> f64 {
-    let pulled =
-        |(weight, pull): &Pull| weight * pull.iter().zip(of_etas.clone()).map(|(a, b)| a * b).sum::<f64>();
-    change - pulls.iter().map(pulled).sum::<f64>()
 }
 
 /// Name, standard uncertainty, contribution and unit of each parameter that may be neutral.

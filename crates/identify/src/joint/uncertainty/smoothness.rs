@@ -15,10 +15,12 @@ use crate::joint::fit::start::SURFACE_SIGMA;
 use crate::joint::step_model::parameters::{FLOW_GAIN, LOCAL, OFFSET_CHANNELS, OFFSETS, SURFACE};
 use crate::joint::step_model::rows::StepRows;
 use crate::joint::step_model::surface::{SLOW_LOSS, SurfaceScale};
-use crate::joint::uncertainty::budget::{self, Pull, ReportedError};
+use crate::joint::uncertainty::budget::{self, ReportedError};
 use crate::joint::uncertainty::common_part::common_part;
 use crate::joint::uncertainty::quantity::{Quantity, is_offset, of_shared, quantities};
-use mapper_core::{BudgetRow, Channel, EstimateUncertainty, ReferenceState, confidence_interval_95};
+use mapper_core::{
+    BudgetRow, Channel, Dimension, EstimateUncertainty, ReferenceState, confidence_interval_95,
+};
 use mapper_inference::mixture::MIN_WEIGHT;
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::{EXCLUDE_SIGMAS, mean, median};
@@ -73,6 +75,8 @@ struct Solved {
     factors: Cholesky<f64, Dyn>,
     /// Inverse covariance times the deviation of the points from the mean.
     drive: DVector<f64>,
+    /// Change of ln of the weight per change of each point's efficiency.
+    ln_weight: DVector<f64>,
 }
 
 /// Corrects all numbers; returns the fitted ones if no offset is propagated or the map does not support it.
@@ -260,15 +264,82 @@ fn budgets(
     parallel::map(&steps, |(i, step)| {
         let of = |quantities: &[Quantity], judged: &[SmoothedValue]| {
             let quantity = &quantities[*i];
-            let pulls: Vec<Pull> =
-                solved.iter().map(|one| (one.weight, one.factors.solve(&quantity.by_smooth))).collect();
             let degrees_of_freedom = step.rows.len().saturating_sub(LOCAL).max(1) as f64;
             let reported =
                 ReportedError { error: judged[*i].error, added: judged[*i].added, degrees_of_freedom };
-            budget::rows(covariance, refined, (quantity, etas, *i), (&pulls, slowness), &reported)
+            let pulls = Pulls::of(covariance, (quantity, etas), solved);
+            let correction = |changes: &DVector<f64>, source: Option<usize>| {
+                // Efficiency that is lost is a higher rise.
+                pulls.correction(etas, changes, source.is_none_or(is_of_rise))
+            };
+            budget::rows(
+                covariance,
+                refined,
+                (quantity, etas, *i),
+                (&correction, pulls.pull[*i], slowness),
+                &reported,
+            )
         };
         [of(etas, &smoothed.eta), of(ln_hs, &smoothed.ln_h)]
     })
+}
+
+/// Response of the correction of a quantity to changes of the points' efficiencies.
+struct Pulls {
+    /// Change per change of each point's efficiency, with the sensitivities to the offsets as they are.
+    pull: DVector<f64>,
+    /// For each declared error: whether it is one of the measured rise, and the changes of the correction per relative change of each point's
+    /// sensitivity to it.
+    by_sensitivity: Vec<(bool, DVector<f64>)>,
+}
+
+impl Pulls {
+    fn of(covariance: &Covariance, (quantity, etas): (&Quantity, &[Quantity]), solved: &[Solved]) -> Self {
+        let count = etas.len();
+        let correction = |one: &Solved| quantity.by_smooth.dot(&one.drive);
+        let mean: f64 = solved.iter().map(|one| one.weight * correction(one)).sum();
+        let choices: Vec<DVector<f64>> =
+            solved.iter().map(|one| one.factors.solve(&quantity.by_smooth)).collect();
+        let pull = solved.iter().zip(&choices).fold(DVector::zeros(count), |sum, (one, choice)| {
+            // An error that makes the points less smooth also moves weight to rougher choices, which correct it less.
+            sum + one.weight * (choice + (correction(one) - mean) * &one.ln_weight)
+        });
+        let rows = (0..covariance.fitted.len()).filter(|row| is_offset(covariance.fitted[*row]));
+        let by_sensitivity = rows
+            .map(|row| {
+                let sigma2 = covariance.shared[(row, row)];
+                let of = |quantity: &Quantity| quantity.by_shared[row] / sigma2;
+                let sensitivity = DVector::from_iterator(count, etas.iter().map(of));
+                let mut changes = DVector::zeros(count);
+                for (one, choice) in solved.iter().zip(&choices) {
+                    let left = of(quantity) - choice.dot(&sensitivity);
+                    let implied = sensitivity.dot(&one.drive);
+                    let weight = one.weight * sigma2;
+                    changes += weight * (left * &one.drive - implied * choice);
+                }
+                changes.component_mul_assign(&sensitivity);
+                (is_of_rise(covariance.fitted[row]), changes)
+            })
+            .collect();
+        Pulls { pull, by_sensitivity }
+    }
+
+    /// Change of the correction by changes of the efficiencies. Efficiency is the isentropic over the measured rise: a change of the measured rise
+    /// changes the sensitivities in proportion to the efficiency, and those to errors of the measured rise by twice as much; a change of the
+    /// isentropic rise, only those.
+    fn correction(&self, etas: &[Quantity], changes: &DVector<f64>, is_of_rise: bool) -> f64 {
+        let relative = etas.iter().zip(changes.iter()).map(|(eta, change)| change / eta.value);
+        let relative = DVector::from_iterator(etas.len(), relative);
+        let power = |to_rise: bool| f64::from(u8::from(is_of_rise) + u8::from(to_rise));
+        let by_sensitivity = self.by_sensitivity.iter();
+        self.pull.dot(changes)
+            + by_sensitivity.map(|(to_rise, by)| power(*to_rise) * by.dot(&relative)).sum::<f64>()
+    }
+}
+
+/// Whether a declared error is one of the measured temperature rise; otherwise of the isentropic one.
+fn is_of_rise(index: usize) -> bool {
+    channel_of(index).is_some_and(|channel| channel.info().dimension == Dimension::Temperature)
 }
 
 /// Covariance of a quantity over all steps after the correction by the best choice, and the part of its diagonal that is each step's own.
@@ -312,25 +383,26 @@ fn solve(etas: &[Quantity], coordinates: &[(f64, f64, f64)], problem: &Problem<'
     let every = (used.len() as f64 / most).ceil().max(1.0) as usize;
     loop {
         let sample: Vec<usize> = (0..used.len()).filter(|i| used[*i]).step_by(every).collect();
-        let evidence = parallel::map(&choices, |choice| {
-            evidence((etas, level), coordinates, &sample, choice).unwrap_or(f64::NEG_INFINITY)
-        });
-        let best = evidence.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let found = parallel::map(&choices, |choice| evidence((etas, level), coordinates, &sample, choice));
+        let best = found.iter().flatten().map(|(evidence, _)| *evidence).fold(f64::NEG_INFINITY, f64::max);
         if !best.is_finite() {
             return Vec::new();
         }
-        let relative: Vec<f64> = evidence.iter().map(|evidence| (evidence - best).exp()).collect();
-        let total: f64 = relative.iter().sum();
+        let relative = |evidence: f64| (evidence - best).exp();
+        let total: f64 = found.iter().flatten().map(|(evidence, _)| relative(*evidence)).sum();
         let solved: Option<Vec<Solved>> = choices
             .iter()
-            .zip(&relative)
-            .filter(|(_, weight)| **weight > MIN_WEIGHT * total)
-            .map(|(choice, weight)| {
+            .zip(&found)
+            .filter_map(|(choice, found)| Some((choice, found.as_ref()?)))
+            .filter(|(_, (evidence, _))| relative(*evidence) > MIN_WEIGHT * total)
+            .map(|(choice, (evidence, drive))| {
                 // Excluded points get an error so large that they have no weight.
                 let matrix = matrix(etas, coordinates, &(0..etas.len()).collect::<Vec<_>>(), choice, &used);
                 let factors = matrix.cholesky()?;
                 let off = DVector::from_iterator(etas.len(), etas.iter().map(|eta| eta.value - level));
-                Some(Solved { weight: *weight, drive: factors.solve(&off), factors })
+                let mut ln_weight = DVector::zeros(etas.len());
+                sample.iter().zip(drive.iter()).for_each(|(place, drive)| ln_weight[*place] = -drive);
+                Some(Solved { weight: relative(*evidence), drive: factors.solve(&off), factors, ln_weight })
             })
             .collect();
         let Some(mut solved) = solved else { return Vec::new() };
@@ -380,15 +452,16 @@ fn matrix(
     })
 }
 
-/// Log density of the points under a choice, up to a constant.
+/// Log density of the points under a choice, up to a constant, and inverse covariance times the deviation of the points from the mean.
 fn evidence(
     (etas, level): (&[Quantity], f64),
     coordinates: &[(f64, f64, f64)],
     points: &[usize],
     choice: &[f64; 4],
-) -> Option<f64> {
+) -> Option<(f64, DVector<f64>)> {
     let factors = matrix(etas, coordinates, points, choice, &vec![true; etas.len()]).cholesky()?;
     let off = DVector::from_iterator(points.len(), points.iter().map(|i| etas[*i].value - level));
     let ln_determinant: f64 = factors.l_dirty().diagonal().iter().map(|x| x.ln()).sum();
-    Some(-0.5 * off.dot(&factors.solve(&off)) - ln_determinant)
+    let drive = factors.solve(&off);
+    Some((-0.5 * off.dot(&drive) - ln_determinant, drive))
 }

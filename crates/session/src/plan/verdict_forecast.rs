@@ -18,7 +18,8 @@ const SOAKS_S: [f64; 2] = [1800.0, 3600.0];
 /// Measured over forecast error that rests on the declaration: 0.9 to 1.3 in 13 of 14 campaigns of `benches/advice.py` with a dwell of 12
 /// to 18 s; a tenth is added at both ends.
 const RESTING_RATIOS: (f64, f64) = (0.8, 1.4);
-/// Measured over forecast standard error of an efficiency: 0.80 to 1.20 at nine of ten points of 18 campaigns of `benches/advice.py`.
+/// Measured over forecast standard error of an efficiency: 0.80 to 1.20 at nine of ten points of 18 campaigns like those
+/// of `benches/first_campaign.py`.
 const ERROR_RATIOS: (f64, f64) = (0.8, 1.25);
 /// Gain of the advice that is listed, relative to the largest. Judgement: a cheap change that makes few points good is not worth a second run.
 const MIN_GAIN_RATIO: f64 = 0.5;

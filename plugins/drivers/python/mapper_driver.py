@@ -375,7 +375,17 @@ def serve(name, version, open_rig):
     os.dup2(2, 1)
     sys.stdout = sys.stderr
     for number in (signal.SIGTERM, signal.SIGINT, getattr(signal, "SIGHUP", signal.SIGTERM)):
-        signal.signal(number, lambda *_: threading.Thread(target=news.put, args=(TERMINATE,), daemon=True).start())
+        signal.signal(number, lambda *_: None)
+    # The interpreter runs handlers in the main thread, and not if the signal comes just before that thread begins to wait for `news`.
+    signalled, wakes = os.pipe()
+    os.set_blocking(wakes, False)
+    signal.set_wakeup_fd(wakes, warn_on_full_buffer=False)
+
+    def forward_signals():
+        while os.read(signalled, 1):
+            news.put(TERMINATE)
+
+    threading.Thread(target=forward_signals, daemon=True).start()
 
     def write(frame):
         frames.write(frame)

@@ -15,7 +15,7 @@ use crate::items::{Annotation, Dash, Item, Line, LineEnd, Rule, RuleAt, Scatter,
 use crate::markers::{MarkerStyle, draw_arrow, draw_marker};
 use crate::palette::{INK, LIGHT_GREY};
 use crate::text::{cut, width_px};
-use crate::{Contours, Figure};
+use crate::{Contours, Figure, Panel};
 
 const LABEL_PX: f64 = 11.0;
 const MAX_LEVELS: usize = 100;
@@ -31,12 +31,8 @@ struct LateText {
 
 pub(crate) fn draw_figure(figure: &Figure) -> Drawing {
     let sheet = layout(figure);
-    let mut drawing = Drawing {
-        width_px: sheet.width,
-        height_px: sheet.height,
-        title: figure.title.clone(),
-        shapes: Vec::new(),
-    };
+    let mut drawing =
+        Drawing { width_px: sheet.width, height_px: sheet.height, title: name(figure), shapes: Vec::new() };
     let mut y = MARGIN_PX + 10.0;
     for line in &sheet.title {
         drawing.text((MARGIN_PX, y), line, &TextStyle::new(TITLE_PX, INK, TextAnchor::Start).bold());
@@ -331,5 +327,20 @@ fn add_annotation(frame: &Frame, item: &Annotation, late: &mut Vec<LateText>) {
     if at.0.is_finite() && at.1.is_finite() && frame.rect.contains(at) {
         let style = TextStyle::new(LABEL_PX, item.colour, item.anchor).halo();
         late.push(LateText { at, text: item.text.clone(), style, at_line_end: false });
+    }
+}
+
+/// What a screen reader calls the figure: its title, otherwise that of its first panel or the panel's axes.
+fn name(figure: &Figure) -> String {
+    let of_panel = |panel: &Panel| {
+        if panel.title.is_empty() {
+            format!("{} over {}", panel.y.title, panel.x.title)
+        } else {
+            panel.title.clone()
+        }
+    };
+    match figure.panels.first() {
+        Some(panel) if figure.title.is_empty() => of_panel(panel),
+        _ => figure.title.clone(),
     }
 }

@@ -23,7 +23,8 @@ impl Tree {
             return None;
         }
         let name = self.source().document.name;
-        if let Some((key, kind, remedy)) = KINDS.iter().find(|(key, ..)| has(key) && !known.contains(key)) {
+        let is_other = |key: &str| has(key) && !known.contains(&key) && !(key == "campaign" && has(own));
+        if let Some((key, kind, remedy)) = KINDS.iter().find(|(key, ..)| is_other(key)) {
             let message = format!("this is {kind}, not a {name}");
             return Some(self.finding(FindingKind::WrongValue, &[Step::from(*key)], message, *remedy));
         }

@@ -190,7 +190,7 @@ mod tests {
         };
         let (check, calibration) =
             (ids(outside_kinds(OutsideUse::Check)), ids(outside_kinds(OutsideUse::Calibration)));
-        assert!(check.len() >= 5 && calibration.len() >= 5);
+        assert!(check.len() >= 4 && calibration.len() >= 4);
         for id in check.iter().chain(&calibration) {
             assert!(id.starts_with("X_") && mapper_effects::find(id).is_none());
         }

@@ -22,4 +22,4 @@ pub use mistakes::findings::Findings;
 pub use mistakes::notes::Notes;
 pub use mistakes::source::{Document, Source};
 pub use schema_check::schema::{Schema, json_schema_of};
-pub use schema_check::suggestion::closest;
+pub use mistakes::suggestion::closest;

@@ -43,7 +43,7 @@ pub fn unreachable_points(campaign: &Campaign, model: &Model) -> Vec<Unreachable
         let (krpm, opening) = point.shown();
         Some(UnreachablePoint {
             point: index,
-            reason: format!("{krpm} krpm at opening {opening} {}", describe_obstacles(&obstacles)),
+            reason: format!("{krpm:.2} krpm at opening {opening} {}", describe_obstacles(&obstacles)),
             remedy: obstacles.first()?.remedy().to_owned(),
             limit: obstacles.first()?.limit(),
         })

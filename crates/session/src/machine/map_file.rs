@@ -63,7 +63,7 @@ impl Registry {
         if !path.exists() {
             let why = match path == in_run {
                 true => "the directory has no map; name a map file or the directory of a run",
-                false => "there is no such file",
+                false => "the file does not exist",
             };
             return Err(SessionError::file("read", path)(Error::new(ErrorKind::NotFound, why)));
         }

@@ -3,6 +3,7 @@
 use crate::mistakes::finding::FindingKind;
 use crate::mistakes::findings::Findings;
 use crate::mistakes::source::{Document, Source};
+use crate::mistakes::suggestion::closest;
 use std::fs::{File, OpenOptions};
 use std::io::{self, ErrorKind, Read, Seek};
 use std::path::Path;
@@ -69,6 +70,26 @@ pub fn read_limited(path: &Path, limit_bytes: usize) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
+/// That a file does not exist, with the file of the same directory that was probably meant.
+fn not_found_text(path: &Path) -> String {
+    let with_ending = path.with_extension("yaml");
+    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let names: Vec<String> = std::fs::read_dir(directory)
+        .into_iter()
+        .flatten()
+        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+        .filter(|name| [".yaml", ".yml"].iter().any(|ending| name.ends_with(ending)))
+        .collect();
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let written = path.file_name().unwrap_or_default().to_string_lossy();
+    let meant = match closest(&written, &names) {
+        _ if with_ending.is_file() => Some(with_ending),
+        name => name.map(|name| path.with_file_name(name)),
+    };
+    let guess = meant.map(|meant| format!("; did you mean `{}`?", meant.display()));
+    format!("it does not exist{}", guess.unwrap_or_default())
+}
+
 /// Reads a file as text.
 ///
 /// # Errors
@@ -78,11 +99,9 @@ pub fn open(
     path: &Path,
     limit_bytes: usize,
 ) -> io::Result<Result<String, Findings>> {
-    let bytes = read_limited(path, limit_bytes).map_err(|error| {
-        let with_ending = path.with_extension("yaml");
-        let is_meant = error.kind() == io::ErrorKind::NotFound && with_ending.is_file();
-        let message = || format!("there is no such file; did you mean `{}`?", with_ending.display());
-        if is_meant { io::Error::new(io::ErrorKind::NotFound, message()) } else { error }
+    let bytes = read_limited(path, limit_bytes).map_err(|error| match error.kind() {
+        ErrorKind::NotFound => io::Error::new(ErrorKind::NotFound, not_found_text(path)),
+        _ => error,
     })?;
     Ok(String::from_utf8(bytes).map_err(|error| {
         let at = error.utf8_error().valid_up_to();

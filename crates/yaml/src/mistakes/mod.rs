@@ -5,3 +5,4 @@ pub(crate) mod findings;
 pub(crate) mod notes;
 pub(crate) mod render;
 pub(crate) mod source;
+pub(crate) mod suggestion;

@@ -13,7 +13,7 @@ use crate::schema_check::messages::{
 use crate::schema_check::quantity_check::{self, Message};
 use crate::schema_check::rules::{Rule, Violation, find_violations};
 use crate::schema_check::schema::Schema;
-use crate::schema_check::suggestion::{closest, guess};
+use crate::mistakes::suggestion::{closest, guess};
 use serde_json::{Map, Value};
 use std::collections::HashSet;
 

@@ -3,7 +3,7 @@
 use crate::mistakes::finding::FindingKind;
 use crate::schema_check::quantity_check::{Message, name_of};
 use crate::schema_check::rules::Rule;
-use crate::schema_check::suggestion::guess;
+use crate::mistakes::suggestion::guess;
 use serde_json::{Map, Value};
 
 /// The message for a violated rule about a value itself; `None` for rules about keys and alternative forms, which need other positions.

@@ -5,4 +5,3 @@ pub(crate) mod messages;
 pub(crate) mod quantity_check;
 pub(crate) mod rules;
 pub(crate) mod schema;
-pub(crate) mod suggestion;

@@ -5,7 +5,7 @@ use crate::elements::points::opening::Opening;
 use crate::units::{Fraction, Kind, MassFlow, Quantity, Speed};
 use mapper_core::{Limits, OperatingPoint, ReferenceState};
 use mapper_physics::operating_point::line_points::{LineRequest, Spread};
-use mapper_yaml::{FindingKind, steps};
+use mapper_yaml::{FindingKind, Step, steps};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::Value;
@@ -72,8 +72,10 @@ impl LineFile {
 
 /// Checks that each line defines its points in one way, and that no line appears twice.
 pub(crate) fn check(check: &mut Check<'_>) {
+    check_margin(check, &steps!["grid", "surge_margin"]);
     let mut seen = HashSet::new();
     for index in 0..check.count(&steps!["grid", "lines"]) {
+        check_margin(check, &steps!["grid", "lines", index, "surge_margin"]);
         let path = steps!["grid", "lines", index];
         let has = |key: &str| check.get(&steps!["grid", "lines", index, key]).is_some();
         match (has("points"), has("spacing")) {
@@ -96,6 +98,18 @@ pub(crate) fn check(check: &mut Check<'_>) {
             let message = format!("the line `{text}` appears twice");
             check.note(FindingKind::Duplicate, &speed, message, "remove one of the two");
         }
+    }
+}
+
+/// Checks that a margin leaves the last points within the limits: otherwise each of them would be a mistake.
+fn check_margin(check: &mut Check<'_>, path: &[Step]) {
+    let limit = check.quantity(Kind::Fraction, &steps!["limits", "surge_margin"]);
+    let (lowest, text) = limit.unwrap_or((0.0, "0 %"));
+    if let Some((margin, written)) = check.quantity(Kind::Fraction, path)
+        && margin < lowest
+    {
+        let message = format!("`{written}` is below `limits.surge_margin`, `{text}`");
+        check.note(FindingKind::Conflict, path, message, "raise it, or lower the limit");
     }
 }
 

@@ -65,8 +65,10 @@ pub enum SettingProblem {
         unit: String,
     },
     /// An effect that is not in the library.
-    #[error("unknown effect; the effects are {known}")]
+    #[error("unknown effect{guess}; the effects are {known}")]
     UnknownEffect {
+        /// The effect that was probably meant: a question after a semicolon, or empty.
+        guess: String,
         /// Ids of the available effects.
         known: String,
     },

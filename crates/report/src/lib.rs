@@ -58,6 +58,7 @@ pub use maps::turbine_file::{TurbinePoint, turbine_points, turbine_text};
 pub use maps::turbine_map_text::{
     imported_turbine_text, reduced_turbine_text, turbine_comparison_text, turbine_fit_text,
 };
+pub use plan::campaign_check_text::campaign_check_text;
 pub use plan::comparison_text::{comparison_json, comparison_text};
 pub use plan::jump_text::{jump_json, jump_text};
 pub use plan::plan_picture::plan_svg;

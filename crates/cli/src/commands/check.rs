@@ -9,7 +9,9 @@ use crate::{
 };
 use clap::Args;
 use mapper_campaign::{CampaignError, campaign::Date};
-use mapper_report::{assumed_text, declared_sensors_text, duration, lines_text, verdict_forecast_text};
+use mapper_report::{
+    assumed_text, campaign_check_text, declared_sensors_text, lines_text, verdict_forecast_text,
+};
 use mapper_session::{Session, nominal_model};
 use serde_json::json;
 use std::path::PathBuf;
@@ -74,23 +76,15 @@ impl Check {
         if warnings.count() > 0 {
             standard_output::warn(&warnings.render(output_options::is_stderr_coloured()));
         }
-        let forecast_by = match &campaign.sequence {
-            Some(_) => " by its script on the nominal machine",
-            None => "",
-        };
-        let at_most = if forecast.is_planned { "" } else { "at most " };
-        let number = match warnings.count() {
-            0 => String::new(),
-            1 => ", 1 warning".to_owned(),
-            count => format!(", {count} warnings"),
-        };
         standard_output::print(&format!(
-            "{}: no mistakes{number}. {} points in {at_most}{} steps on `{}` in {} of rig time{forecast_by}.\n{}{}{}{}",
-            self.campaign.display(),
-            campaign.points.len(),
-            forecast.steps,
-            campaign.backend.name,
-            duration(forecast.duration_s),
+            "{}{}{}{}{}",
+            campaign_check_text(
+                &self.campaign,
+                &campaign,
+                (forecast.steps, forecast.is_planned),
+                forecast.duration_s,
+                warnings.count()
+            ),
             verdict_forecast_text(forecast.verdicts, &forecast.advice),
             declared_sensors_text(&campaign),
             assumed_text(&campaign),

@@ -8,8 +8,7 @@ pub fn verdict_forecast_text(forecast: Option<VerdictForecast>, advice: &[Advice
     let Some(forecast) = forecast else { return String::new() };
     let mut text = format!("Expected: {}\n", verdicts(&forecast));
     if forecast.near_limit {
-        text += "These steps contain hardly enough information on alpha_A, probe and heating/cooling ratio: all points may\n\
-                 turn out doubtful (`rests_on_declaration`).\n";
+        text += &near_limit_text(&forecast);
     }
     if forecast.good_low < forecast.points && advice.is_empty() {
         text += "Neither a longer dwell nor a longer soak makes more of them good; add points, or hold what is known\n\
@@ -22,9 +21,25 @@ pub fn verdict_forecast_text(forecast: Option<VerdictForecast>, advice: &[Advice
     text
 }
 
+/// The other outcome of a forecast near the limit: all points depend on it together, so a range from 0 would say less.
+fn near_limit_text(forecast: &VerdictForecast) -> String {
+    let steps = "these steps determine alpha_A, probe and heating/cooling ratio";
+    match forecast.good {
+        0 => format!(
+            "Near a limit: if {steps} a little better than\nforecast, up to {} points are good; otherwise all are doubtful \
+             (`rests_on_declaration`).\n",
+            forecast.good_high
+        ),
+        _ => format!(
+            "Near a limit: if {steps} a little worse than\nforecast, all points are doubtful (`rests_on_declaration`).\n"
+        ),
+    }
+}
+
 fn verdicts(forecast: &VerdictForecast) -> String {
-    let VerdictForecast { points, good, good_low, good_high, .. } = forecast;
-    let range = if good_low < good_high { format!(" ({good_low} to {good_high})") } else { String::new() };
+    let VerdictForecast { points, good, good_low, good_high, near_limit, .. } = forecast;
+    let has_range = good_low < good_high && !near_limit;
+    let range = if has_range { format!(" ({good_low} to {good_high})") } else { String::new() };
     let error = forecast.eta_standard_error.filter(|_| *good > 0);
     let error = error.map_or_else(String::new, |sigma| {
         format!(", efficiency +/- {:.2} points (95 %)", 100.0 * half_width_95(sigma))

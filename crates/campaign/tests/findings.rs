@@ -1066,6 +1066,15 @@ fn lines_that_have_no_points_are_refused_at_their_place() {
         "belongs to `lines`",
         "remove it",
     );
+    // One mistake, although it would put the last point of each line beyond the surge line.
+    one(
+        grid,
+        "  lines: [{speed_corrected: 90 krpm, points: 3}, {speed_corrected: 110 krpm, points: 3}]\n  surge_margin: -10 %\n",
+        Kind::Conflict,
+        "-10 %",
+        "below `limits.surge_margin`, `0 %`",
+        "lower the limit",
+    );
 }
 
 /// The table begins at 80 krpm, corrected: 2.5 % below it openings are believed with a warning, the ends of a line are not.

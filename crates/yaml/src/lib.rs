@@ -21,5 +21,5 @@ pub use mistakes::finding::{Finding, FindingKind};
 pub use mistakes::findings::Findings;
 pub use mistakes::notes::Notes;
 pub use mistakes::source::{Document, Source};
-pub use schema_check::schema::{Schema, json_schema_of};
 pub use mistakes::suggestion::closest;
+pub use schema_check::schema::{Schema, json_schema_of};

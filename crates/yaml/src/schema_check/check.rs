@@ -6,6 +6,7 @@ use crate::document::path::{Step, path_text};
 use crate::document::tree::Tree;
 use crate::mistakes::finding::{Finding, FindingKind};
 use crate::mistakes::notes::Notes;
+use crate::mistakes::suggestion::{closest, guess};
 use crate::schema_check::messages::{
     describe_violation, example_of, example_sentence, keys_of, quote, replacement, shorten, with_description,
     wrong_name,
@@ -13,7 +14,6 @@ use crate::schema_check::messages::{
 use crate::schema_check::quantity_check::{self, Message};
 use crate::schema_check::rules::{Rule, Violation, find_violations};
 use crate::schema_check::schema::Schema;
-use crate::mistakes::suggestion::{closest, guess};
 use serde_json::{Map, Value};
 use std::collections::HashSet;
 

@@ -35,7 +35,7 @@ pub(crate) fn apply_effects(
         let key = format!("effects.{id}");
         let Some(effect) = known.iter().find(|effect| effect.info().id == id.as_str()) else {
             let ids: Vec<&str> = known.iter().map(|effect| effect.info().id.as_ref()).collect();
-            let guess = mapper_yaml::closest(id, &ids).map(|guess| format!("; did you mean `{guess}`?"));
+            let guess = mapper_yaml::closest(id, &ids).map(|guess| format!(" Did you mean `{guess}`?"));
             let (guess, known) = (guess.unwrap_or_default(), ids.join(", "));
             return Err(SettingProblem::UnknownEffect { guess, known }.at(key));
         };

@@ -65,9 +65,9 @@ pub enum SettingProblem {
         unit: String,
     },
     /// An effect that is not in the library.
-    #[error("unknown effect{guess}; the effects are {known}")]
+    #[error("unknown effect.{guess} The effects are {known}")]
     UnknownEffect {
-        /// The effect that was probably meant: a question after a semicolon, or empty.
+        /// The effect that was probably meant: a question after a blank, or empty.
         guess: String,
         /// Ids of the available effects.
         known: String,

@@ -1,6 +1,8 @@
 //! The forecast of verdicts as lines for a terminal.
 
 use crate::formatting::duration::duration;
+use crate::formatting::table::COLUMNS;
+use crate::formatting::wrapped::wrapped;
 use mapper_core::{Advice, CampaignChange, VerdictForecast, half_width_95};
 
 /// The expected verdicts in a line, and below it a line for each change that improves them; empty without a forecast.
@@ -23,17 +25,17 @@ pub fn verdict_forecast_text(forecast: Option<VerdictForecast>, advice: &[Advice
 
 /// The other outcome of a forecast near the limit: all points depend on it together, so a range from 0 would say less.
 fn near_limit_text(forecast: &VerdictForecast) -> String {
-    let steps = "these steps determine alpha_A, probe and heating/cooling ratio";
-    match forecast.good {
+    let steps = "these steps determine alpha_A, probe and heating/cooling ratio a little";
+    let text = match forecast.good {
         0 => format!(
-            "Near a limit: if {steps} a little better than\nforecast, up to {} points are good; otherwise all are doubtful \
-             (`rests_on_declaration`).\n",
+            "Near a limit: if {steps} better than forecast, up to {} points are good; otherwise all are doubtful (`rests_on_declaration`).",
             forecast.good_high
         ),
         _ => format!(
-            "Near a limit: if {steps} a little worse than\nforecast, all points are doubtful (`rests_on_declaration`).\n"
+            "Near a limit: if {steps} worse than forecast, all points are doubtful (`rests_on_declaration`)."
         ),
-    }
+    };
+    wrapped(&text, COLUMNS, 2)
 }
 
 fn verdicts(forecast: &VerdictForecast) -> String {

@@ -42,7 +42,7 @@ fn main() -> ExitCode {
                 Err(failure) => output::exit_report::failed(&failure),
             }
         }
-        Err(error) if error.use_stderr() => output::exit_report::wrong_arguments(&error, json),
+        Err(error) if error.use_stderr() => output::exit_report::wrong_arguments(error, json),
         Err(error) => error.exit(),
     }
 }

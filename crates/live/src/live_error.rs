@@ -7,7 +7,9 @@ use std::net::SocketAddr;
 #[derive(Debug, thiserror::Error)]
 pub enum LiveError {
     /// The address is invalid.
-    #[error("`{text}` is not an address; write e.g. 127.0.0.1:7373, or 0.0.0.0:7373 for other machines too")]
+    #[error(
+        "`{text}` is not an address; write a port, e.g. 7373, or 127.0.0.1:7373, or 0.0.0.0:7373 for other machines too"
+    )]
     Address {
         /// The given text.
         text: String,

@@ -3,7 +3,7 @@
 use crate::output::failure::Failure;
 use crate::{output::standard_output, rig_states};
 use clap::{Args, Subcommand};
-use mapper_session::{RigStates, RigStatus};
+use mapper_session::{RigStates, RigStatus, since_text};
 use std::path::PathBuf;
 
 /// Show the lock and the lockout of a rig, and acknowledge that it is safe to run again
@@ -74,7 +74,7 @@ fn status_text(status: &RigStatus, cleared: bool) -> String {
         (None, _) => lines.push("not in use".to_owned()),
     }
     if let Some(latch) = &status.latch {
-        lines.push(format!("locked out since the run {}: {}", latch.run.display(), latch.reason));
+        lines.push(format!("locked out{}: {}", since_text(&latch.run), latch.reason));
     }
     if cleared {
         lines.push("acknowledged: the next run may start".to_owned());

@@ -11,8 +11,8 @@ use mapper_numerics::statistics::median;
 use mapper_observe::plausible::check_running;
 use mapper_physics::gas::air::Air;
 
-/// Limits for the ratio of compressor to turbine power of the median point: upper, and lower. A turbine housing that loses as much as it
-/// delivers is far below every gas stand.
+/// Limits for the ratio of compressor to turbine power: upper, and lower. A turbine housing that loses as much as it delivers is far below
+/// every gas stand.
 const POSSIBLE: std::ops::RangeInclusive<f64> = 0.2..=1.15;
 
 pub(crate) fn objections(ends: &[Option<Ends>]) -> Option<Objection> {
@@ -30,15 +30,15 @@ pub(crate) fn objections(ends: &[Option<Ends>]) -> Option<Objection> {
             (given > 0.0).then_some((taken, given))
         })
         .collect();
-    let middle = median(powers_w.iter().map(|(taken, given)| taken / given))?;
-    if POSSIBLE.contains(&middle) || 2 * powers_w.len() < ends.len() {
+    let of_points = median(powers_w.iter().map(|(taken, given)| taken / given))?;
+    let of = |read: fn(&(f64, f64)) -> f64| median(powers_w.iter().map(read)).unwrap_or(f64::NAN);
+    let (compressor_w, turbine_w) = (of(|powers| powers.0), of(|powers| powers.1));
+    // The ratio of few points, as early in a run, may be that of a cooling housing at low power; a wrong scale shows in both.
+    let power_ratio = compressor_w / turbine_w;
+    let is_possible = [of_points, power_ratio].iter().any(|ratio| POSSIBLE.contains(ratio));
+    if is_possible || 2 * powers_w.len() < ends.len() {
         return None;
     }
-    let of = |read: fn(&(f64, f64)) -> f64| median(powers_w.iter().map(read)).unwrap_or(f64::NAN);
-    let scaled = Scaled::ShaftPower {
-        compressor_w: of(|powers| powers.0),
-        turbine_w: of(|powers| powers.1),
-        power_ratio: middle,
-    };
+    let scaled = Scaled::ShaftPower { compressor_w, turbine_w, power_ratio };
     Some(Objection::new(Warning::ScaledChannel(scaled), (0..ends.len()).collect()))
 }

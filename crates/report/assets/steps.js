@@ -1,5 +1,5 @@
-// The transient of the chosen point.
-let chosen = page.points[0]?.step ?? null;
+// The transient of the chosen point; at first that of the first jump, because the first step has none.
+let chosen = (page.points[1] ?? page.points[0])?.step ?? null;
 
 function frame(element, options) {
   const width = widthOf(element);

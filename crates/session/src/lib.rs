@@ -59,7 +59,7 @@ pub use analysis::identification::Identified;
 pub use analysis::pdf::{PrintError, page_as_pdf};
 pub use analysis::results::{Results, compressor_map};
 pub use analysis::transient::{Transient, write_transient};
-pub use errors::error::SessionError;
+pub use errors::error::{SessionError, since_text};
 pub use errors::error_kind::ErrorKind;
 pub use errors::first_map_error::FirstMapError;
 pub use errors::fmu_error::FmuExportError;

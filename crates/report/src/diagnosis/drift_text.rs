@@ -42,8 +42,7 @@ pub fn drift_text(report: &DriftReport) -> String {
                 _ if limit.cause == Cause::BearingFriction => {
                     write!(text, " {} {},", limit.cause, limit.cause.show(limit.change))
                 }
-                unit if limit.change < 1e-3 => write!(text, " {} {:.1e} {unit},", limit.cause, limit.change),
-                unit => write!(text, " {} {:.3} {unit},", limit.cause, limit.change),
+                unit => write!(text, " {} {} {unit},", limit.cause, number::three_figures(limit.change)),
             };
         }
         text.pop();

@@ -12,6 +12,12 @@ pub fn percent(fraction: Option<f64>, decimals: usize) -> String {
     number(fraction.map(|fraction| 100.0 * fraction), decimals)
 }
 
+/// Three significant digits, without trailing zeros.
+pub fn three_figures(value: f64) -> String {
+    let rounded: f64 = format!("{value:.2e}").parse().unwrap_or(value);
+    if rounded != 0.0 && rounded.abs() < 1e-3 { format!("{rounded:e}") } else { rounded.to_string() }
+}
+
 /// A number with four significant figures.
 pub fn four_figures(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {

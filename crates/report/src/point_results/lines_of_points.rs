@@ -166,9 +166,9 @@ pub fn verdict_sentence<'a>(points: impl Iterator<Item = &'a IdentifiedPoint>) -
     match (verdicts.len(), count(Verdict::Good)) {
         (0, _) => "No point was identified.".to_owned(),
         (1, 1) => "The point is good.".to_owned(),
-        (all, good) if all == good => format!("All {all} points are good."),
+        (all, good) if all == good => format!("The points of all {all} steps are good."),
         (all, good) => format!(
-            "{good} of {all} points are good, {} doubtful, {} unusable.",
+            "The points of {good} of {all} steps are good, {} doubtful, {} unusable.",
             count(Verdict::Doubtful),
             count(Verdict::Unusable)
         ),

@@ -1,5 +1,6 @@
 //! Sizes of the machine that a campaign assumes, and the files of a first campaign.
 
+use crate::formatting::number::three_figures;
 use crate::formatting::wrapped::wrapped;
 use mapper_campaign::{AssumedSize, Campaign, internal_area_sigma_ratio};
 use std::path::Path;
@@ -30,7 +31,7 @@ fn sentence_with(campaign: &Campaign, name: fn(&AssumedSize) -> &str) -> Option<
     };
     Some(format!(
         "assumed, from the machine of Burke et al. scaled to a wheel of {} mm: {}{widened}",
-        significant(wheel_mm),
+        three_figures(wheel_mm),
         named.join(", ")
     ))
 }
@@ -65,11 +66,5 @@ pub fn first_campaign_text(
 
 fn size_text(name: &str, size: &AssumedSize) -> String {
     let unit = if size.unit.is_empty() { String::new() } else { format!(" {}", size.unit) };
-    format!("{name} {}{unit}", significant(size.value))
-}
-
-/// Three significant digits, without trailing zeros.
-fn significant(value: f64) -> String {
-    let rounded: f64 = format!("{value:.2e}").parse().unwrap_or(value);
-    if rounded != 0.0 && rounded.abs() < 1e-3 { format!("{rounded:e}") } else { rounded.to_string() }
+    format!("{name} {}{unit}", three_figures(size.value))
 }

@@ -341,8 +341,11 @@ impl Run<'_, '_> {
             oil_temperature_k: soak.oil_temperature_k,
             ..setpoints(first)
         })?;
-        let message =
-            format!("soak for {:.0} s: air off, oil at {:.2} K", soak.duration_s, soak.oil_temperature_k);
+        let message = format!(
+            "soak for {:.1} min: air off, oil at {}",
+            soak.duration_s / 60.0,
+            mapper_core::temperature(soak.oil_temperature_k)
+        );
         let (t_s, kind) = (self.now_s, EventKind::SoakStarted);
         self.runner.observer.on_event(&Event { t_s, kind, message })?;
         self.run_until(self.now_s + soak.duration_s, false, false)?;

@@ -168,7 +168,7 @@ pub enum SessionError {
     },
     /// The rig is locked out, and the lockout has not been acknowledged.
     #[error(
-        "the rig `{rig}` has been locked out since the run {}: {reason}. Inspect the rig; then acknowledge that it is safe", .run.display()
+        "the rig `{rig}` has been locked out{}: {reason}. Inspect the rig; then acknowledge that it is safe", since_text(.run)
     )]
     RigLockedOut {
         /// The rig.
@@ -394,6 +394,11 @@ pub enum SessionError {
 }
 
 /// The rigs that wait for acknowledgement.
+/// The run of a lockout; empty if it is unknown, because the entry cannot be read.
+pub fn since_text(run: &Path) -> String {
+    if run.as_os_str().is_empty() { String::new() } else { format!(" since the run {}", run.display()) }
+}
+
 fn awaiting_text(rigs: &[String]) -> String {
     match rigs {
         [] => "no rig waits for one".to_owned(),

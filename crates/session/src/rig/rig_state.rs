@@ -59,7 +59,7 @@ impl std::fmt::Display for Owner {
 pub struct Lockout {
     /// What happened.
     pub reason: String,
-    /// Directory of the run.
+    /// Directory of the run; empty if it is unknown.
     pub run: PathBuf,
 }
 

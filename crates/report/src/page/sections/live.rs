@@ -42,7 +42,7 @@ pub(crate) fn live() -> Markup {
             section aria-labelledby="map-head" {
                 h2 #map-head { "Map so far" }
                 p { "Rings: expected points. Each point is preliminary: it is identified by itself at the end of its step, before the zero is subtracted. At the end of the \
-                     run all points are identified together, with narrower intervals." }
+                     run all points are identified together, with narrower intervals and final verdicts." }
                 fieldset.layers.screen {
                     legend { "Show" }
                     @for (name, words) in [("lines", "speed lines"), ("contours", "efficiency contours"), ("intervals", "95 % intervals"), ("repeats", "repeats")] {

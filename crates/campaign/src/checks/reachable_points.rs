@@ -41,9 +41,10 @@ pub fn unreachable_points(campaign: &Campaign, model: &Model) -> Vec<Unreachable
         let (boundary, limits) = (&campaign.boundary, &campaign.limits);
         let obstacles = reach(model, *point, boundary, campaign.follow_outlet, limits).err()?;
         let (krpm, opening) = point.shown();
+        let krpm = (krpm * 1e2).round() / 1e2;
         Some(UnreachablePoint {
             point: index,
-            reason: format!("{krpm:.2} krpm at opening {opening} {}", describe_obstacles(&obstacles)),
+            reason: format!("{krpm} krpm at opening {opening} {}", describe_obstacles(&obstacles)),
             remedy: obstacles.first()?.remedy().to_owned(),
             limit: obstacles.first()?.limit(),
         })

@@ -9,9 +9,7 @@ use crate::{
 };
 use clap::Args;
 use mapper_campaign::{CampaignError, campaign::Date};
-use mapper_report::{
-    assumed_text, campaign_check_text, declared_sensors_text, lines_text, verdict_forecast_text,
-};
+use mapper_report::{assumed_text, declared_sensors_text, lines_text, verdict_forecast_text};
 use mapper_session::{Session, nominal_model};
 use serde_json::json;
 use std::path::PathBuf;
@@ -76,15 +74,10 @@ impl Check {
         if warnings.count() > 0 {
             standard_output::warn(&warnings.render(output_options::is_stderr_coloured()));
         }
+        let (steps, count) = ((forecast.steps, forecast.is_planned), warnings.count());
         standard_output::print(&format!(
             "{}{}{}{}{}",
-            campaign_check_text(
-                &self.campaign,
-                &campaign,
-                (forecast.steps, forecast.is_planned),
-                forecast.duration_s,
-                warnings.count()
-            ),
+            mapper_report::campaign_check_text(&self.campaign, &campaign, steps, forecast.duration_s, count),
             verdict_forecast_text(forecast.verdicts, &forecast.advice),
             declared_sensors_text(&campaign),
             assumed_text(&campaign),

@@ -23,9 +23,7 @@ fn with_own_tip(mut error: clap::Error) -> clap::Error {
     let tip = match word.as_str() {
         "--seed" => "the seed is a key of the campaign, e.g. `seed: 2`",
         option if option.starts_with('-') => "`--help` lists the options of the command",
-        _ => {
-            "quote a value with blanks, e.g. \"60 mm\"; write an optional value after `=`, e.g. `--live=9999`"
-        }
+        _ => "quote a value with blanks, e.g. \"60 mm\"; write an optional one after `=`, e.g. `--live=9999`",
     };
     if error.kind() == ErrorKind::UnknownArgument && error.get(ContextKind::SuggestedArg).is_none() {
         error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.to_owned().into()]));

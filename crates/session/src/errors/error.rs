@@ -1,6 +1,7 @@
 //! Errors of a session.
 
 use crate::errors::error_kind::ErrorKind;
+use crate::errors::lockout_text::since_text;
 use crate::errors::map_work_error::MapWorkError;
 use crate::variant::VariantError;
 use mapper_campaign::{CampaignError, NightlyError};
@@ -394,11 +395,6 @@ pub enum SessionError {
 }
 
 /// The rigs that wait for acknowledgement.
-/// The run of a lockout; empty if it is unknown, because the entry cannot be read.
-pub fn since_text(run: &Path) -> String {
-    if run.as_os_str().is_empty() { String::new() } else { format!(" since the run {}", run.display()) }
-}
-
 fn awaiting_text(rigs: &[String]) -> String {
     match rigs {
         [] => "no rig waits for one".to_owned(),

@@ -7,4 +7,5 @@ pub(crate) mod error_kind;
 
 pub(crate) mod first_map_error;
 pub(crate) mod fmu_error;
+pub(crate) mod lockout_text;
 pub(crate) mod map_work_error;

@@ -27,7 +27,7 @@ pub use identification::identified::{
 };
 pub use identification::inlet_convection::InletConvection;
 pub use identification::joint_settings::{ALPHA_AREA_SIGMA_RATIO, Choice, JointSettings};
-pub use identification::model_tolerances::ModelTolerances;
+pub use identification::model_tolerances::{ModelTolerances, StructureTolerances};
 pub use identification::result_remark::ResultRemark;
 pub use identification::settle_bands::SettleBands;
 pub use identification::thermal_model::{

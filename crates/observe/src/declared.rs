@@ -1,6 +1,6 @@
 //! Declared uncertainty of rig and model: noise, offsets, gains and tolerances.
 
-use mapper_core::{Channel, DeclaredUncertainty, Dimension, ModelTolerances, NoiseColour};
+use mapper_core::{Channel, DeclaredUncertainty, Dimension, ModelTolerances, NoiseColour, StructureTolerances};
 use mapper_physics::machine::params::BoundaryConditions;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -69,6 +69,13 @@ impl Declared {
     /// The declaration of a channel; zero if there is none.
     pub fn of(&self, channel: Channel) -> DeclaredUncertainty {
         self.sensors.get(&channel).copied().unwrap_or_default()
+    }
+
+    /// The same without declared errors of the model's equations: a reference recording measures them.
+    #[must_use]
+    pub fn with_exact_equations(mut self) -> Self {
+        self.tolerances.structure = StructureTolerances::default();
+        self
     }
 
     /// Pressure from which gain errors of the pressure sensors count, Pa.

@@ -1,5 +1,6 @@
 //! Declared tolerances of the nominal model.
 
+use crate::Channel;
 use serde::{Deserialize, Serialize};
 
 /// One-sigma tolerances of the nominal model (ratios to the nominal value) and of the rig's boundary conditions. A deviation within these
@@ -37,6 +38,47 @@ pub struct ModelTolerances {
     pub ambient_temperature_k: f64,
     /// Declared lag of P3 behind its command, s: a value, not a tolerance.
     pub actuator_lag_s: f64,
+    /// Error of the model's equations.
+    pub structure: StructureTolerances,
+}
+
+/// Share of each output's variation over a recording that the model's equations may miss, one sigma; 0 if they are those of the machine.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct StructureTolerances {
+    /// Shaft speed.
+    pub shaft_speed_ratio: f64,
+    /// Compressor mass flow.
+    pub compressor_flow_ratio: f64,
+    /// P2.
+    pub p2_ratio: f64,
+    /// T2.
+    pub t2_ratio: f64,
+    /// Tc.
+    pub tc_ratio: f64,
+    /// Turbine mass flow.
+    pub turbine_flow_ratio: f64,
+    /// T4.
+    pub t4_ratio: f64,
+    /// Tt.
+    pub tt_ratio: f64,
+}
+
+impl StructureTolerances {
+    /// The share of a channel; 0 for a channel that is no output of the model.
+    pub fn of(&self, channel: Channel) -> f64 {
+        match channel {
+            Channel::ShaftSpeed => self.shaft_speed_ratio,
+            Channel::CompressorFlow => self.compressor_flow_ratio,
+            Channel::P2 => self.p2_ratio,
+            Channel::T2 => self.t2_ratio,
+            Channel::Tc => self.tc_ratio,
+            Channel::TurbineFlow => self.turbine_flow_ratio,
+            Channel::T4 => self.t4_ratio,
+            Channel::Tt => self.tt_ratio,
+            _ => 0.0,
+        }
+    }
 }
 
 impl Default for ModelTolerances {
@@ -58,6 +100,7 @@ impl Default for ModelTolerances {
             oil_temperature_k: 5.0,
             ambient_temperature_k: 5.0,
             actuator_lag_s: 0.3,
+            structure: StructureTolerances::default(),
         }
     }
 }

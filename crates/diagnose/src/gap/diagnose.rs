@@ -102,6 +102,7 @@ pub fn diagnose(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
     progress(0.0, "reading");
     let recording = &with_command_times(recording);
     let (nominal, mut since) = (model.clone(), None);
+    let declared = if healthy.is_some() { declared.with_exact_equations() } else { declared };
     let (mut study, mut warnings) = checked_study(recording, declared, model, effects, tolerances_declared)?;
     if let Some(healthy) = healthy {
         progress(0.01, "the healthy recording");

@@ -7,3 +7,4 @@ mod diagnose;
 mod healthy;
 mod near_surge;
 mod next;
+mod structure;

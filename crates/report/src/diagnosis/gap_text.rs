@@ -213,10 +213,12 @@ fn is_not_borne_out(gap: &Gap) -> bool {
 fn not_judged(since: &Since) -> String {
     let residuals = since.lacking.iter().map(|(channel, residual)| {
         let (scale, unit) = display_scale(&residual.unit);
-        format!("{channel} {}", with_unit(four_figures(scale * residual.size), unit))
+        let share = 100.0 * residual.share;
+        format!("{channel} {} ({share:.1} %)", with_unit(four_figures(scale * residual.size), unit))
     });
     format!(
-        "only the change since {} is reported; the residual already present there is not judged: {}\n",
+        "only the change since {} is reported; the residual already present there is not judged (in parentheses, the share of the \
+         channel's variation that the model misses, as in `tolerances: structure`): {}\n",
         since.recording,
         residuals.collect::<Vec<_>>().join(", ")
     )

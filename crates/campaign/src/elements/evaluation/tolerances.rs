@@ -2,7 +2,7 @@
 
 use crate::si_values::si;
 use crate::units::{Duration, Fraction, PressureDifference, Quantity, TemperatureDifference};
-use mapper_core::ModelTolerances;
+use mapper_core::{ModelTolerances, StructureTolerances};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer};
 
@@ -70,6 +70,49 @@ pub(crate) struct TolerancesElement {
     #[serde(rename = "actuator_lag", deserialize_with = "si::<Duration, _>")]
     #[schemars(with = "Quantity<Duration>", extend("x-min" = "0 s", "x-max" = "60 s"), example = &"0.3 s")]
     actuator_lag_s: f64,
+    /// Share of each output's variation over a recording that the model's equations may miss.
+    #[serde(deserialize_with = "StructureElement::deserialize")]
+    #[schemars(with = "StructureElement")]
+    structure: StructureTolerances,
+}
+
+/// Share of each output's variation over a recording that the model's equations may miss; 0 if none is given. With a fault-free recording
+/// `mapper gap diagnose --healthy` measures it.
+#[derive(Default, Deserialize, JsonSchema)]
+#[serde(remote = "StructureTolerances", default, deny_unknown_fields)]
+pub(crate) struct StructureElement {
+    /// Shaft speed.
+    #[serde(rename = "N", deserialize_with = "si::<Fraction, _>")]
+    #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "100 %"))]
+    shaft_speed_ratio: f64,
+    /// Compressor mass flow.
+    #[serde(rename = "m_c", deserialize_with = "si::<Fraction, _>")]
+    #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "100 %"))]
+    compressor_flow_ratio: f64,
+    /// Compressor outlet pressure.
+    #[serde(rename = "P2", deserialize_with = "si::<Fraction, _>")]
+    #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "100 %"))]
+    p2_ratio: f64,
+    /// Compressor outlet temperature.
+    #[serde(rename = "T2", deserialize_with = "si::<Fraction, _>")]
+    #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "100 %"), example = &"12 %")]
+    t2_ratio: f64,
+    /// Compressor housing temperature.
+    #[serde(rename = "Tc", deserialize_with = "si::<Fraction, _>")]
+    #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "100 %"))]
+    tc_ratio: f64,
+    /// Turbine mass flow.
+    #[serde(rename = "m_t", deserialize_with = "si::<Fraction, _>")]
+    #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "100 %"))]
+    turbine_flow_ratio: f64,
+    /// Turbine outlet temperature.
+    #[serde(rename = "T4", deserialize_with = "si::<Fraction, _>")]
+    #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "100 %"))]
+    t4_ratio: f64,
+    /// Turbine housing temperature.
+    #[serde(rename = "Tt", deserialize_with = "si::<Fraction, _>")]
+    #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "100 %"))]
+    tt_ratio: f64,
 }
 
 impl TolerancesElement {
@@ -94,6 +137,11 @@ mod tests {
         assert_eq!(read("{}").unwrap(), default);
         let convection = ModelTolerances { convection_ratio: 0.05, ..default };
         assert_eq!(read("{convection: 5 %}").unwrap(), convection);
+        let structure = StructureTolerances { t2_ratio: 0.12, ..StructureTolerances::default() };
+        assert_eq!(
+            read("{structure: {T2: 12 %}}").unwrap(),
+            ModelTolerances { structure, ..default }
+        );
         assert!(read("{convection: 0.05}").is_err() && read("{actuator_lag: 3 %}").is_err());
     }
 
@@ -104,7 +152,7 @@ mod tests {
         let default = serde_json::to_value(ModelTolerances::default()).unwrap();
         let properties = schema.get("properties").unwrap().as_object().unwrap();
         assert_eq!(properties.len(), default.as_object().unwrap().len());
-        for (key, property) in properties {
+        for (key, property) in properties.iter().filter(|(key, _)| *key != "structure") {
             let description = property["description"].as_str().unwrap();
             let (_, named) = description.rsplit_once("; ").unwrap();
             let text = named.strip_suffix(" if none is given.").unwrap();

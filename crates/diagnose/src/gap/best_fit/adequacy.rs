@@ -8,7 +8,7 @@ use crate::gap::residuals::whiten::{Linearised, dot, rows_of_step};
 use mapper_numerics::statistics::DOUBT_SIGMAS;
 
 /// Time constants of the smooth basis after a jump, s: a step, and the ranges of probe, gas, housing and turbine housing.
-const BASIS_S: [f64; 5] = [f64::INFINITY, 5.0, 20.0, 60.0, 200.0];
+pub(crate) const BASIS_S: [f64; 5] = [f64::INFINITY, 5.0, 20.0, 60.0, 200.0];
 
 /// Weight of scatter from step to step relative to smooth misfit: scatter grows with the strength of an effect, even of a correct one.
 const SCATTER_COUNTS: f64 = 0.25;

@@ -55,6 +55,7 @@ impl Study {
     ) -> Result<Changed, GapError> {
         let Healthy { name, recording, declared } = healthy;
         let recording = &with_command_times(recording);
+        let declared = declared.with_exact_equations();
         let (before, warnings) = checked_study(recording, declared, model, Vec::new(), tolerances_declared)?;
         same_steps(&before, &self)?;
         let linearised = Linearised::new(&before)?;

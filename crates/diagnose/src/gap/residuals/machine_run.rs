@@ -69,7 +69,7 @@ impl NuisanceKind {
     /// Whether it changes the machine or its inputs, and not only sensors of outputs.
     pub(crate) fn is_on_machine(self) -> bool {
         match self {
-            NuisanceKind::TurbineDrop | NuisanceKind::Delay(_) => false,
+            NuisanceKind::TurbineDrop | NuisanceKind::Delay(_) | NuisanceKind::Structure(..) => false,
             NuisanceKind::Offset(channel) | NuisanceKind::Gain(channel) => DRIVERS.contains(&channel),
             NuisanceKind::CommonOffset(_) | NuisanceKind::Perturbation(_) | NuisanceKind::Shape(_) => true,
         }

@@ -9,6 +9,7 @@ pub mod nuisance;
 pub(crate) mod point_state;
 pub(crate) mod prediction;
 pub(crate) mod shape;
+pub(crate) mod structure;
 pub mod study;
 pub(crate) mod true_inputs;
 pub mod whiten;

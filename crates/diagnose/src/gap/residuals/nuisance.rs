@@ -2,6 +2,7 @@
 //! size as the prior.
 
 use crate::gap::residuals::shape::SHAPES;
+use crate::gap::residuals::structure;
 use mapper_core::{Channel, Dimension};
 use mapper_observe::channels::{self, DRIVERS};
 use mapper_observe::declared::Declared;
@@ -36,6 +37,8 @@ pub enum NuisanceKind {
     Shape(usize),
     /// Clock error of one output, by its index in [`OUTPUTS`].
     Delay(usize),
+    /// A part of an output that the model's equations miss in every step: the output's index in [`OUTPUTS`], and the part's.
+    Structure(usize, usize),
 }
 
 impl NuisanceKind {
@@ -46,7 +49,8 @@ impl NuisanceKind {
 
     /// Whether it is a tolerance of the rig: initial metal state and clock errors are none, and a deviation of one corner of the map is plausible.
     pub(crate) fn is_of_rig(self) -> bool {
-        !matches!(self, NuisanceKind::Delay(_) | NuisanceKind::Shape(_)) && !self.is_start()
+        !matches!(self, NuisanceKind::Delay(_) | NuisanceKind::Shape(_) | NuisanceKind::Structure(..))
+            && !self.is_start()
     }
 }
 
@@ -72,6 +76,7 @@ impl std::fmt::Display for NuisanceKind {
             NuisanceKind::TurbineDrop => f.write_str("turbine_drop"),
             NuisanceKind::Shape(i) => write!(f, "efficiency_shape {i}"),
             NuisanceKind::Delay(output) => write!(f, "delay of {}", OUTPUTS[*output]),
+            NuisanceKind::Structure(output, part) => write!(f, "structure of {} {part}", OUTPUTS[*output]),
         }
     }
 }
@@ -125,7 +130,11 @@ pub fn nuisances(declared: &Declared) -> Vec<Nuisance> {
     all.extend(declared.common_offsets.iter().filter_map(|common| {
         Some((K::CommonOffset(common.channels.first()?.info().dimension), common.sigma))
     }));
-    all.extend((0..OUTPUTS.len()).map(|i| (K::Delay(i), DELAY_SIGMA_S)));
+    all.extend(
+        (0..OUTPUTS.len()).map(|i| (K::Delay(i), DELAY_SIGMA_S.hypot(structure::delay_s(declared, i)))),
+    );
+    let parts = (0..OUTPUTS.len()).flat_map(|i| (0..structure::PARTS).map(move |part| (i, part)));
+    all.extend(parts.map(|(i, part)| (K::Structure(i, part), structure::share(declared, i))));
     all.into_iter()
         .filter(|(_, sigma)| *sigma > 0.0)
         .map(|(kind, sigma)| Nuisance { kind, centre: 0.0, sigma })
@@ -145,6 +154,8 @@ pub struct Circumstances {
     pub shape: [f64; SHAPES],
     /// Clock delay of each output, s.
     pub delay_s: [f64; OUTPUTS.len()],
+    /// Missed share of each output's parts.
+    pub missed_ratio: [[f64; structure::PARTS]; OUTPUTS.len()],
 }
 
 /// Applies one nuisance of size `value` (in the unit of the changed quantity) to a rig.
@@ -178,5 +189,6 @@ pub fn apply(
         K::TurbineDrop => circumstances.t4_drop_ratio += value,
         K::Shape(i) => circumstances.shape[i] += value,
         K::Delay(i) => circumstances.delay_s[i] += value,
+        K::Structure(output, part) => circumstances.missed_ratio[output][part] += value,
     }
 }

@@ -4,6 +4,7 @@ use crate::gap::residuals::hypothesis::Hypothesis;
 use crate::gap::residuals::initial_state::with_metal_held;
 use crate::gap::residuals::machine_run::{MachineRun, Sample};
 use crate::gap::residuals::nuisance::{Circumstances, OUTPUTS};
+use crate::gap::residuals::structure::{PARTS, repeating_part};
 use crate::gap::residuals::study::{PredictError, Prediction, Study};
 use mapper_core::Channel;
 use mapper_observe::averages::mean_reading::mean_reading;
@@ -192,6 +193,7 @@ impl Study {
     ) -> Result<Prediction, PredictError> {
         let mut values = vec![0.0; self.measured.len()];
         let mut delay_s = [0.0; OUTPUTS.len()];
+        let mut missed_ratio = [[0.0; PARTS]; OUTPUTS.len()];
         let rig_in = |step| self.rig(hypothesis, step);
         self.sense(
             &run.samples,
@@ -200,6 +202,7 @@ impl Study {
             &self.times_s,
             |index, output, reading, circumstances| {
                 delay_s = circumstances.delay_s;
+                missed_ratio = circumstances.missed_ratio;
                 let Some((step, block)) = self.places[index] else { return };
                 let Some(row) = self.rows[step][block][output] else { return };
                 let single = self.steps[step].blocks[block].spread_s == 0.0;
@@ -212,6 +215,13 @@ impl Study {
             if delay_s != 0.0 {
                 for row in group.rows.clone() {
                     values[row] -= delay_s * slopes[row];
+                }
+            }
+        }
+        for (output, parts) in missed_ratio.iter().enumerate() {
+            for (part, missed_ratio) in parts.iter().enumerate().filter(|(_, ratio)| **ratio != 0.0) {
+                for (row, whole) in repeating_part(self, output, part) {
+                    values[row] += missed_ratio * whole;
                 }
             }
         }

@@ -1,6 +1,7 @@
 //! Residuals scaled by the noise and the uncertainty of the inputs.
 
 use crate::gap::residuals::nuisance::{NuisanceKind, OUTPUTS};
+use crate::gap::residuals::structure::{repeating_part, step_errors};
 use crate::gap::residuals::study::{Hypothesis, PredictError, Prediction, Study};
 use mapper_core::Channel;
 use mapper_numerics::coloured_noise::{ColouredNoise, WhiteningFactor, covariance_of_means};
@@ -178,6 +179,13 @@ pub(crate) fn nuisance_changes(study: &Study, here: &Hypothesis, base: &Predicti
             }
             return change;
         }
+        if let NuisanceKind::Structure(output, part) = nuisance.kind {
+            let mut change = vec![0.0; base.values.len()];
+            for (row, whole) in repeating_part(study, output, part) {
+                change[row] = nuisance.sigma * whole;
+            }
+            return change;
+        }
         let mut moved = here.clone();
         // Step towards the centre, so that a nuisance at its limit stays within it.
         let step = if here.nuisances[*index] > 0.0 { -1.0 } else { 1.0 };
@@ -222,7 +230,7 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
 /// used in it.
 pub(crate) const NEAR_SURGE: f64 = 0.975;
 /// Length of a jump, s.
-const JUMP_S: f64 = 3.0;
+pub(crate) const JUMP_S: f64 = 3.0;
 /// Time after the last surge cycle in which no reading counts, s: its end is chaotic, and the shaft takes some seconds to recover.
 const AFTER_SURGE_S: f64 = 15.0;
 
@@ -252,6 +260,7 @@ fn covariances(
     changes: &[Vec<f64>],
 ) -> Vec<DMatrix<f64>> {
     let lost_to_surge = lost_to_surge(study, nothing);
+    let structural = step_errors(study, &base.slopes);
     // Response of every value to a unit of each input, from the response to its offset.
     let responses: Vec<(InputNoise, &Vec<f64>, f64)> = DRIVERS
         .iter()
@@ -305,7 +314,7 @@ fn covariances(
             for (i, _) in blocks.iter().enumerate().filter(|(_, block)| block.since_jump_s < lost_s) {
                 covariance[(i, i)] += (UNINFORMATIVE * sigma).powi(2);
             }
-            if let Some(more) = study.other_noise.get(place) {
+            for more in [&study.other_noise, &structural].into_iter().filter_map(|errors| errors.get(place)) {
                 covariance += more;
             }
             covariance

@@ -1,0 +1,74 @@
+//! Declared errors of the model's equations: the share `k` of each output's variation over a recording that they may miss.
+//!
+//! Equations that are not those of the machine are wrong in the same way in every step: they miss `k` of an output's level, `k` of its change
+//! after a jump at each time constant, and `k` of the time of its fast changes. These repeating parts are nuisance parameters. Another
+//! part of the same size differs from step to step, because the error depends on the state: a Gaussian process over ln of the time since the
+//! jump, which enters the covariance (the discrepancy of Kennedy and O'Hagan, J. R. Stat. Soc. B 63:425, 2001).
+
+use crate::gap::best_fit::adequacy::BASIS_S;
+use crate::gap::reference::errors_of_change::covariance_of_errors;
+use crate::gap::residuals::nuisance::OUTPUTS;
+use crate::gap::residuals::study::{Group, Study};
+use crate::gap::residuals::whiten::JUMP_S;
+use mapper_numerics::statistics::mean;
+use mapper_observe::declared::Declared;
+use nalgebra::DMatrix;
+
+/// Number of repeating parts of an output besides its delay.
+pub(crate) const PARTS: usize = BASIS_S.len();
+
+/// Declared share of an output's variation that the model may miss.
+pub(crate) fn share(declared: &Declared, output: usize) -> f64 {
+    declared.tolerances.structure.of(OUTPUTS[output])
+}
+
+/// Error of the time of an output's fast changes, s.
+pub(crate) fn delay_s(declared: &Declared, output: usize) -> f64 {
+    share(declared, output) * JUMP_S
+}
+
+/// Mean and standard deviation of an output's readings over the recording.
+fn variation(study: &Study, output: usize) -> Option<(f64, f64)> {
+    let groups = || study.groups.iter().filter(move |group| group.output == output);
+    let readings = || groups().flat_map(|group| &study.measured[group.rows.clone()]);
+    let middle = mean(readings())?;
+    Some((middle, mean(readings().map(|reading| (reading - middle).powi(2)))?.sqrt()))
+}
+
+/// A repeating part of an output as a whole: its rows, and the reading's share in them. The first is the level, the others are the changes after
+/// each jump that decay with a time constant of [`BASIS_S`].
+pub(crate) fn repeating_part(study: &Study, output: usize, part: usize) -> Vec<(usize, f64)> {
+    let Some((middle, _)) = variation(study, output) else { return Vec::new() };
+    let mut before = None;
+    let mut whole = Vec::new();
+    for group in study.groups.iter().filter(|group| group.output == output) {
+        let level = study.measured[group.rows.end - 1];
+        let jump = level - before.replace(level).unwrap_or(level);
+        let blocks = &study.steps[group.step].blocks;
+        whole.extend(group.rows.clone().zip(&group.blocks).map(|(row, block)| {
+            let decayed = (-blocks[*block].since_jump_s.max(0.0) / BASIS_S[part]).exp();
+            (row, if BASIS_S[part].is_infinite() { level - middle } else { jump * decayed })
+        }));
+    }
+    whole
+}
+
+/// Covariance of each group's error that differs from step to step, unit squared; empty if no error is declared. `slopes` are those of
+/// the predicted readings.
+pub(crate) fn step_errors(study: &Study, slopes: &[f64]) -> Vec<DMatrix<f64>> {
+    let sizes: [f64; OUTPUTS.len()] = std::array::from_fn(|output| {
+        let share = share(&study.declared, output);
+        if share > 0.0 { variation(study, output).map_or(0.0, |(_, sigma)| share * sigma) } else { 0.0 }
+    });
+    if sizes == [0.0; OUTPUTS.len()] {
+        return Vec::new();
+    }
+    let of_group = |group: &Group| {
+        let blocks = &study.steps[group.step].blocks;
+        let since_jump_s: Vec<f64> = group.blocks.iter().map(|block| blocks[*block].since_jump_s).collect();
+        let delay_s = delay_s(&study.declared, group.output);
+        let late: Vec<f64> = slopes[group.rows.clone()].iter().map(|slope| delay_s * slope).collect();
+        covariance_of_errors(&since_jump_s, [&vec![sizes[group.output]; late.len()], &late])
+    };
+    study.groups.iter().map(of_group).collect()
+}

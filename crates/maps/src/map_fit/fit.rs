@@ -9,6 +9,7 @@ use crate::map_fit::least_squares::solve::solve;
 use crate::map_fit::speed_lines::crossing::count_crossings;
 use crate::map_fit::speed_lines::ends::End;
 use mapper_core::{CompressorMap, FittedLine};
+use std::collections::BTreeMap;
 
 /// Factors on the smallest penalty that are tried until no lines cross.
 const STIFFNESSES: [f64; 3] = [1.0, 30.0, 1000.0];
@@ -29,7 +30,8 @@ impl MapFit {
     pub(crate) fn of(data: Observations, start: Option<&Solution>) -> Result<Self, MapFitError> {
         let mut best: Option<(usize, MapFit)> = None;
         for stiffness in STIFFNESSES {
-            let fit = MapFit { solution: solve(&data, stiffness, start)?, data: data.clone() };
+            let solution = solve(&data, stiffness, start)?;
+            let fit = MapFit { solution, data: data.clone(), without_line: BTreeMap::new() };
             let crossings = count_crossings(&fit.lines_for_check());
             if best.as_ref().is_none_or(|(min, _)| crossings < *min) {
                 best = Some((crossings, fit));
@@ -39,6 +41,14 @@ impl MapFit {
             }
         }
         best.map(|(_, fit)| fit).ok_or(MapFitError::Singular)
+    }
+
+    /// The fit of the other lines, searched from this one; `None` if they cannot be fitted.
+    pub(crate) fn fit_without_line(&self, line: usize) -> Option<MapFit> {
+        if let Some(known) = self.without_line.get(&line) {
+            return Some(known.clone());
+        }
+        MapFit::of(self.data.without_line(line).ok()?, Some(&self.solution)).ok()
     }
 
     /// Measured and a few extrapolated lines with few nodes, to count crossings.

@@ -5,6 +5,7 @@ use crate::map_fit::least_squares::observations::Observations;
 use crate::map_fit::least_squares::solution::Solution;
 use crate::map_fit::speed_lines::line_shape::LineShape;
 use crate::map_fit::speed_lines::nearest::{Scales, nearest};
+use std::collections::BTreeMap;
 
 /// Minimum and maximum speed of a fit, over the slowest and the fastest measured speed.
 pub(crate) const SPEED_RANGE_RATIO: (f64, f64) = (0.1, 1.3);
@@ -14,6 +15,8 @@ pub(crate) const SPEED_RANGE_RATIO: (f64, f64) = (0.1, 1.3);
 pub struct MapFit {
     pub(crate) data: Observations,
     pub(crate) solution: Solution,
+    /// Fits without an outermost line, by that line, as far as they were needed.
+    pub(crate) without_line: BTreeMap<usize, MapFit>,
 }
 
 /// The place on a fitted line nearest to a point.

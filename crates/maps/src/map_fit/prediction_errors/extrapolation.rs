@@ -8,26 +8,24 @@ use crate::map_fit::fitted_surface::surface::MapFit;
 use crate::map_fit::least_squares::observations::Observation;
 use crate::map_fit::prediction_errors::deviation::Deviation;
 use crate::map_fit::speed_lines::ends::{End, EndWidenings, Widening};
+use mapper_numerics::parallel;
 
 impl MapFit {
     /// The fit with errors beyond its ends that explain the outermost lines.
     pub(crate) fn widened(mut self, ends: &[End]) -> MapFit {
-        for end in ends {
-            let line = match end {
-                End::Slow => 0,
-                End::Fast => self.data.lines_rpm.len() - 1,
-            };
-            let rest = self
-                .data
-                .without_line(line)
-                .ok()
-                .and_then(|data| MapFit::of(data, Some(&self.solution)).ok());
-            let Some(rest) = rest else { continue };
-            let factors = estimate_widening(rest, self.data.points.iter().filter(|point| point.line == line));
+        let line_of = |end: &End| match end {
+            End::Slow => 0,
+            End::Fast => self.data.lines_rpm.len() - 1,
+        };
+        let rests = parallel::map(ends, |end| Some((line_of(end), self.fit_without_line(line_of(end))?)));
+        for (end, (line, rest)) in ends.iter().zip(rests).filter_map(|(end, rest)| Some((end, rest?))) {
+            let points = self.data.points.iter().filter(|point| point.line == line);
+            let factors = estimate_widening(rest.clone(), points);
             match end {
                 End::Slow => self.solution.widening.slow = factors,
                 End::Fast => self.solution.widening.fast = factors,
             }
+            self.without_line.insert(line, rest);
         }
         self
     }

@@ -25,8 +25,7 @@ pub fn leave_out(fit: &MapFit) -> Vec<LeftOutLine> {
 /// Errors of the fit without a line at that line; `end`: the end of the measured speeds at which it lies.
 fn errors_without_line(all: &MapFit, line: usize, end: Option<End>) -> Option<LeftOutLine> {
     let data = &all.data;
-    let rest = MapFit::of(data.without_line(line).ok()?, Some(&all.solution)).ok()?;
-    let rest = rest.widened(end.as_slice());
+    let rest = all.fit_without_line(line)?.widened(end.as_slice());
     let (mut distances, mut errors) = (Vec::new(), Vec::new());
     let (mut distances_covered, mut errors_covered) = (0usize, 0usize);
     let covered = |deviation: Deviation| usize::from(deviation.size <= NORMAL_975 * deviation.standard_error);

@@ -33,47 +33,51 @@ pub(crate) fn nearest(
     scales: Scales,
     guess_rad: Option<f64>,
 ) -> Foot {
-    let offset = |angle: f64| {
+    let at = |angle: f64| {
         let place = shape.physical(angle, speed_ratio);
-        (
+        let offset = (
             (flow_kg_s - place.flow_kg_s) / scales.flow_kg_s,
             (pressure_ratio - place.pressure_ratio) / scales.ratio,
-        )
-    };
-    let squared = |angle: f64| {
-        let (x, y) = offset(angle);
-        x * x + y * y
+        );
+        Trial { place, offset, square: offset.0 * offset.0 + offset.1 * offset.1 }
     };
     let (start, low, high) = match guess_rad {
         Some(guess) => (guess, guess - MAX_STEP_RAD, guess + MAX_STEP_RAD),
-        None => search_grid(&squared),
+        None => search_grid(&|angle| at(angle).square),
     };
     // Gauss-Newton in one variable; a step that does not reduce the distance is halved.
-    let mut foot = foot_at(shape, speed_ratio, start, offset, scales);
-    let mut min = squared(start);
+    let mut best = at(start);
+    let mut foot = foot_at(shape, speed_ratio, start, &best, scales);
     for _ in 0..8 {
-        let (x, y) = offset(foot.angle_rad);
+        let (x, y) = best.offset;
         let [sx, sy, _] = foot.slope;
         let length = sx * sx + sy * sy;
         if length.is_nan() || length <= 1e-12 {
             break;
         }
         let mut step = (foot.angle_rad + (x * sx + y * sy) / length).clamp(low, high) - foot.angle_rad;
-        let mut value = squared(foot.angle_rad + step);
-        while value >= min && step.abs() > 1e-8 {
+        let mut trial = at(foot.angle_rad + step);
+        while trial.square >= best.square && step.abs() > 1e-8 {
             step *= 0.5;
-            value = squared(foot.angle_rad + step);
+            trial = at(foot.angle_rad + step);
         }
-        if value >= min {
+        if trial.square >= best.square {
             break;
         }
-        min = value;
-        foot = foot_at(shape, speed_ratio, foot.angle_rad + step, offset, scales);
+        best = trial;
+        foot = foot_at(shape, speed_ratio, foot.angle_rad + step, &best, scales);
         if step.abs() < 1e-7 {
             break;
         }
     }
     foot
+}
+
+/// A place on the line, with the point's offset from it in scales and the square of their distance.
+struct Trial {
+    place: PhysicalPlace,
+    offset: (f64, f64),
+    square: f64,
 }
 
 /// The best angle of ever finer grids over the whole line, with its neighbours on the last grid.
@@ -100,10 +104,9 @@ fn foot_at(
     shape: &LineShape,
     speed_ratio: f64,
     angle_rad: f64,
-    offset: impl Fn(f64) -> (f64, f64),
+    &Trial { place, offset: (x, y), .. }: &Trial,
     scales: Scales,
 ) -> Foot {
-    let place = shape.physical(angle_rad, speed_ratio);
     let (before, after) = (
         shape.physical(angle_rad - DIFFERENCE_STEP_RAD, speed_ratio),
         shape.physical(angle_rad + DIFFERENCE_STEP_RAD, speed_ratio),
@@ -113,7 +116,6 @@ fn foot_at(
         (after.pressure_ratio - before.pressure_ratio) / scales.ratio / (2.0 * DIFFERENCE_STEP_RAD),
         (after.eta - before.eta) / (2.0 * DIFFERENCE_STEP_RAD),
     ];
-    let (x, y) = offset(angle_rad);
     let (nx, ny) = normal(&slope);
     Foot { angle_rad, place, slope, distance: x * nx + y * ny }
 }

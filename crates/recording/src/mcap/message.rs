@@ -21,11 +21,52 @@ pub(crate) fn read_fields(message: &[u8], names: &[String], values: &mut Vec<Fie
     let read = |message: &[u8], values: &mut Vec<FieldValue>| {
         values.clear();
         values.resize(names.len(), FieldValue::Absent);
-        let mut deserializer = serde_json::Deserializer::from_slice(message);
+        // Of a slice, serde_json would check the UTF-8 of each number.
+        let Ok(text) = std::str::from_utf8(message) else { return false };
+        if read_plain(text, names, values).is_some() {
+            return true;
+        }
+        values.fill(FieldValue::Absent);
+        let mut deserializer = serde_json::Deserializer::from_str(text);
         deserializer.deserialize_map(FieldsVisitor { names, values }).is_ok() && deserializer.end().is_ok()
     };
     // Python's json writes NaN and Infinity, which JSON does not have.
     read(message, values) || null_for_nonfinite(message).is_some_and(|message| read(&message, values))
+}
+
+/// Reads a message as our writer makes it, in half the time: plain keys and numbers without spaces. `None` for any other.
+fn read_plain(message: &str, names: &[String], values: &mut [FieldValue]) -> Option<()> {
+    let until = |text: &str, ends: &[u8]| text.bytes().position(|byte| ends.contains(&byte));
+    let mut rest = message.strip_prefix('{')?;
+    let mut expected = 0;
+    loop {
+        rest = rest.strip_prefix('"')?;
+        let (key, after) = rest.split_at(until(rest, b"\"\\")?);
+        let after = after.strip_prefix("\":")?;
+        let (number, after) = after.split_at(until(after, b",}")?);
+        // `parse` would also take -inf.
+        let is_finite = number.ends_with(|last: char| last.is_ascii_digit());
+        let value = match parse(number) {
+            value @ FieldValue::Number(_) if is_finite || number == "null" => value,
+            _ => return None,
+        };
+        if let Some(index) = position(names, expected, key) {
+            values[index] = value;
+            expected = index + 1;
+        }
+        if after == "}" {
+            return Some(());
+        }
+        rest = after.strip_prefix(',')?;
+    }
+}
+
+/// The place of a key among the names; messages usually keep the order of the names.
+fn position(names: &[String], expected: usize, key: &str) -> Option<usize> {
+    if names.get(expected).is_some_and(|name| name == key) {
+        return Some(expected);
+    }
+    names.iter().position(|name| name == key)
 }
 
 struct FieldsVisitor<'a> {
@@ -63,7 +104,7 @@ fn parse(raw: &str) -> FieldValue {
     }
 }
 
-/// Finds a key among the names; messages usually keep the order of the names.
+/// Finds a key among the names.
 struct KeySeed<'a> {
     names: &'a [String],
     expected: usize,
@@ -85,10 +126,7 @@ impl Visitor<'_> for KeySeed<'_> {
     }
 
     fn visit_str<E>(self, key: &str) -> Result<Option<usize>, E> {
-        if self.names.get(self.expected).is_some_and(|name| name == key) {
-            return Ok(Some(self.expected));
-        }
-        Ok(self.names.iter().position(|name| name == key))
+        Ok(position(self.names, self.expected, key))
     }
 }
 

@@ -44,6 +44,14 @@ pub struct Report {
 
 impl Report {
     pub fn run(&self) -> Result<(), Failure> {
+        let out = self.out.clone().unwrap_or_else(|| match self.runs.as_slice() {
+            [run] if run.is_dir() => run.join("report.html"),
+            _ => PathBuf::from("report.html"),
+        });
+        // The page of a run directory is made from its recording, so it may be replaced.
+        let is_own = self.out.is_none() && out.parent().is_some_and(|parent| !parent.as_os_str().is_empty());
+        let replace = Replace { force: self.replace.force || is_own };
+        replace.existing().check(&out)?;
         let map = channel_map(self.channels.as_deref())?;
         let given = given_campaign(self.campaign.as_deref())?;
         let registry = registry::registry();
@@ -54,13 +62,6 @@ impl Report {
         let first = shown.first().ok_or(SessionError::NoRecording)?;
         let gap = self.gap.as_deref().map(|file| diagnose(file, &registry, first, &map)).transpose()?;
         let page = Session::new(&registry).page(shown, others, &map, gap.as_ref())?;
-        let out = self.out.clone().unwrap_or_else(|| match self.runs.as_slice() {
-            [run] if run.is_dir() => run.join("report.html"),
-            _ => PathBuf::from("report.html"),
-        });
-        // The page of a run directory is made from its recording, so it may be replaced.
-        let is_own = self.out.is_none() && out.parent().is_some_and(|parent| !parent.as_os_str().is_empty());
-        let replace = Replace { force: self.replace.force || is_own };
         replace.write(&out, page.as_bytes())?;
         let mut files = vec![("page", out.clone())];
         if self.pdf {

@@ -16,6 +16,17 @@ pub enum Existing {
     Replaced,
 }
 
+impl Existing {
+    /// Refuses a file that exists and must be kept, before the work for its content.
+    ///
+    /// # Errors
+    /// [`SessionError::Exists`].
+    pub fn check(self, path: &Path) -> Result<(), SessionError> {
+        let is_kept = self == Existing::Kept && path.exists();
+        if is_kept { Err(SessionError::Exists { path: path.to_owned() }) } else { Ok(()) }
+    }
+}
+
 /// Writes a file.
 ///
 /// # Errors

@@ -54,6 +54,7 @@ pub struct Diagnose {
 impl Diagnose {
     /// Diagnoses one recording, or several and compares their causes.
     pub fn run(&self) -> Result<(), Failure> {
+        self.html.iter().try_for_each(|file| self.replace.existing().check(file))?;
         let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
         let map = channel_map(self.channels.as_deref())?;
         let registry = registry::registry();

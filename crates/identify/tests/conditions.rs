@@ -177,7 +177,14 @@ fn no_good_point_has_an_interval_that_a_changed_reading_made_wrong() {
         "| change | good points | eta outside | h outside | either | largest error of eta, points | half interval |"
     );
     println!("|---|---:|---:|---:|---:|---:|---:|");
-    let changes: Vec<&Change> = CHANGES.iter().filter(|change| change.name.contains(&only)).collect();
+    // Every third change (neighbours are of one kind); all of them if machines are asked for.
+    let is_whole = std::env::var_os("MAPPER_CONDITIONS_MACHINES").is_some() || !only.is_empty();
+    let changes: Vec<&Change> = CHANGES
+        .iter()
+        .enumerate()
+        .filter(|(row, change)| change.name.contains(&only) && (is_whole || row.is_multiple_of(3)))
+        .map(|(_, change)| change)
+        .collect();
     let all = parallel::map(&changes, |change| {
         cases.iter().map(|case| score(case, change)).collect::<Vec<Score>>()
     });

@@ -43,14 +43,14 @@ fn without_noise_the_law_before_the_wheel_is_identified() {
 }
 
 /// With a rig's noise it does not decide. Both models, and the truth, then lie in the interval of alpha_A, and the intervals of eta and h
-/// cover the truth for either machine. Six campaigns of each; the common errors of a campaign are one draw, and of six intervals at 95 % five
-/// and more cover it in 97 % of the cases.
+/// cover the truth for either machine. Three campaigns of each; the common errors of a campaign are one draw, and of three intervals at 95 %
+/// two and more cover it in 99 % of the cases.
 #[test]
 fn with_noise_either_law_before_the_wheel_lies_in_the_intervals() {
     for inlet in [InletConvection::Shared, InletConvection::Own] {
         let campaign = campaign(&eighteen(), 120.0, Machine { alpha: 0.2, inlet, ..Machine::default() });
         let (mut eta, mut h, mut alphas) = (Honesty::default(), Honesty::default(), 0);
-        for seed in 0..6 {
+        for seed in 0..3 {
             let mut rng = Pcg64::seed_from_u64(seed);
             let (recording, declared) = measured(&campaign.recording, 1.0, 1.0, &mut rng);
             let (points, thermal) = found(&recording, &IdentifyConfig { declared, ..joint() });
@@ -65,9 +65,9 @@ fn with_noise_either_law_before_the_wheel_lies_in_the_intervals() {
                 h.add(point.h_w_m2k, point.h_low_w_m2k, point.h_high_w_m2k, truth.h_w_m2k);
             }
         }
-        assert!(alphas >= 5, "{inlet:?}: {alphas} of 6");
-        // The points of a campaign cover the truth or miss it together: five of six again.
-        assert!(eta.held() > 0.8 && h.held() > 0.8, "{inlet:?}: {} {}", eta.held(), h.held());
+        assert!(alphas >= 2, "{inlet:?}: {alphas} of 3");
+        // The points of a campaign cover the truth or miss it together: two of three again.
+        assert!(eta.held() > 0.64 && h.held() > 0.64, "{inlet:?}: {} {}", eta.held(), h.held());
     }
 }
 
@@ -116,14 +116,11 @@ fn with_a_held_share_the_intervals_reach_to_the_other_law_before_the_wheel() {
 #[test]
 fn without_a_share_before_the_wheel_its_law_makes_no_difference() {
     let campaign = campaign(&eighteen(), 120.0, Machine::default());
-    for seed in 0..3 {
-        let mut rng = Pcg64::seed_from_u64(seed);
-        let (recording, declared) = measured(&campaign.recording, 1.0, 1.0, &mut rng);
-        let asked = IdentifyConfig { declared, ..joint() };
-        let fixed = JointSettings { inlet_h: Choice::Fixed, ..JointSettings::default() };
-        let unasked = IdentifyConfig { joint: fixed, ..asked.clone() };
-        let (asked, unasked) = (found(&recording, &asked), found(&recording, &unasked));
-        assert_eq!(asked.1.inlet, None);
-        assert_eq!(asked, unasked, "seed {seed}");
-    }
+    let (recording, declared) = measured(&campaign.recording, 1.0, 1.0, &mut Pcg64::seed_from_u64(0));
+    let asked = IdentifyConfig { declared, ..joint() };
+    let fixed = JointSettings { inlet_h: Choice::Fixed, ..JointSettings::default() };
+    let unasked = IdentifyConfig { joint: fixed, ..asked.clone() };
+    let (asked, unasked) = (found(&recording, &asked), found(&recording, &unasked));
+    assert_eq!(asked.1.inlet, None);
+    assert_eq!(asked, unasked);
 }

@@ -46,8 +46,8 @@ fn too_few_steps_have_no_expected_error() {
     assert!(held.rms_error_eta.unwrap() < stated);
 }
 
-/// The rms of the errors is the forecast's, within what the draws of what all points share know of it: of 12 a standard
-/// deviation to 20 %, three of which are six tenths. `benches/orders.py` has forty seeds.
+/// The rms of the errors is the forecast's, within what the draws of what all points share know of it: of 5 a standard
+/// deviation to 32 %, 2.5 of which are eight tenths. `benches/orders.py` has forty seeds.
 #[test]
 fn seeds_err_as_forecast() {
     let first = Campaign { order: VisitOrder::SpeedLines, ..small(&[AS_DECLARED]) };
@@ -55,7 +55,7 @@ fn seeds_err_as_forecast() {
     let registry = Registry { backends: vec![virtual_lab::PLUGIN], formats: FORMATS, ..Registry::default() };
     let session = Session::new(&registry);
     let (mut square, mut count) = (0.0, 0.0);
-    for seed in 1..=12 {
+    for seed in 1..=5 {
         let campaign = Campaign { seed, ..first.clone() };
         let folder = tempfile::tempdir().unwrap();
         let identified =
@@ -74,7 +74,7 @@ fn seeds_err_as_forecast() {
         }
     }
     let ratio = f64::sqrt(square / count) / forecast;
-    assert!(count >= 12.0 * 12.0 && (0.4..1.6).contains(&ratio), "{ratio} of {forecast}");
+    assert!(count >= 5.0 * 12.0 && (0.2..1.8).contains(&ratio), "{ratio} of {forecast}");
 }
 
 /// The stated error is that of a run's intervals. With area before the wheel they contain both laws of h there, which the recording does not

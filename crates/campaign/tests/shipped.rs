@@ -15,7 +15,8 @@ fn directory() -> PathBuf {
 #[test]
 fn every_shipped_campaign_is_right() {
     let mut count = 0;
-    for entry in std::fs::read_dir(directory()).unwrap() {
+    let entries = [directory(), directory().join("nightly")].map(|folder| std::fs::read_dir(folder).unwrap());
+    for entry in entries.into_iter().flatten() {
         let path = entry.unwrap().path();
         // A nightly file lists campaigns and is none.
         let nightly = path.file_stem().is_some_and(|stem| stem == "nightly");

@@ -12,33 +12,20 @@ fn drift(recordings: &[&Path]) -> Value {
     mapper(["drift".as_ref(), "--json".as_ref()].into_iter().chain(paths)).exits(0).json()
 }
 
-/// One drift: cause, course with size per hour or step, and onset are as planted.
-fn is_found(report: &Value, verdict: &str, cause: &str, (course, size): (&str, f64), onset_s: f64) {
+#[test]
+fn a_planted_drift_is_detected() {
+    // At four to six times the printed limit. Steps, fouling and friction: `crates/diagnose/tests/drift`.
+    let planted = "{cause: T2, change: 0.5 K, over: 1 h, from: 10 min}";
+    let report =
+        drift(&[&DriftCampaign { drift: planted, seed: 22, ..DriftCampaign::default() }.recording()]);
     let reason = &report["reason"];
     let drifts = report["drifts"].as_array().unwrap();
-    assert_eq!((report["verdict"].as_str(), drifts.len()), (Some(verdict), 1), "{reason}");
-    let drift = &drifts[0];
-    let number = |key: &str| drift[key].as_f64().unwrap_or_else(|| panic!("{key} in {reason}"));
-    assert_eq!(drift["cause"], cause, "{reason}");
-    assert!(drift[course].is_number(), "{reason}");
-    let (low, high) = (number("low"), number("high"));
-    assert!(low <= size && size <= high, "{size} is not in {low} to {high}");
-    assert!((number("onset_s") - onset_s).abs() < TWO_REPEATS_S, "{reason}");
-}
-
-#[test]
-fn planted_drifts_are_detected_without_false_alarms() {
-    let judge = |drift_key: &str, seed: u32| {
-        drift(&[&DriftCampaign { drift: drift_key, seed, ..DriftCampaign::default() }.recording()])
-    };
-    let none = judge("", 21);
-    assert_eq!((&none["verdict"], &none["drifts"]), (&"none".into(), &json!([])), "{}", none["reason"]);
-    // At four to six times the printed limit.
-    let t2 = judge("{cause: T2, change: 0.5 K, over: 1 h, from: 10 min}", 22);
-    is_found(&t2, "sensor", "T2", ("rate_per_h", 0.5), 600.0);
-    let fouling = judge("{cause: fouling, change: -0.6 %, over: 1 h}", 24);
-    is_found(&fouling, "machine", "fouling", ("rate_per_h", -0.006), 0.0);
-    // Steps and friction: `crates/diagnose/tests/drift`.
+    assert_eq!((&report["verdict"], drifts.len()), (&"sensor".into(), 1), "{reason}");
+    let number = |key: &str| drifts[0][key].as_f64().unwrap_or_else(|| panic!("{key} in {reason}"));
+    assert_eq!(drifts[0]["cause"], "T2", "{reason}");
+    assert!(drifts[0]["rate_per_h"].is_number(), "{reason}");
+    assert!(number("low") <= 0.5 && 0.5 <= number("high"), "{reason}");
+    assert!((number("onset_s") - 600.0).abs() < TWO_REPEATS_S, "{reason}");
 }
 
 #[test]
@@ -66,14 +53,13 @@ fn drift_compares_several_nights_and_refuses_another_machine() {
     // The first night has no drift.
     assert_eq!(drift(&[&first])["verdict"], "none");
 
-    // A rebuilt machine is another machine, and so is one of another name.
-    let rebuilt = night(
-        33,
-        "",
-        &[("  map: closed_form\n", "  map: closed_form\n  geometry: {bearing: {oil_conductance: 9 W/K}}\n")],
-    );
-    let renamed = night(34, "", &[("  serial_number: TA-0001\n", "  serial_number: TA-0002\n")]);
-    for other in [rebuilt, renamed] {
+    // A rebuilt machine is another machine, and so is one of another name, before any reading is compared.
+    let short = ("openings: [0.55, 0.7, 1.0]", "openings: [0.7]");
+    let rebuilt =
+        ("  map: closed_form\n", "  map: closed_form\n  geometry: {bearing: {oil_conductance: 9 W/K}}\n");
+    let renamed = ("  serial_number: TA-0001\n", "  serial_number: TA-0002\n");
+    for (seed, change) in [(33, rebuilt), (34, renamed)] {
+        let other = night(seed, "", &[short, change]);
         let refused = drift(&[&first, &other]);
         assert_eq!((&refused["verdict"], &refused["drifts"]), (&"unclear".into(), &json!([])));
         let reason = refused["reason"].as_str().unwrap();

@@ -67,8 +67,9 @@ struct Case<'a> {
 #[test]
 fn recordings_without_comparable_repeats_get_a_reason_and_no_verdict() {
     let scratch = scratch();
-    // The fault-free one of `drift.rs`.
-    let campaign = DriftCampaign { seed: 21, ..DriftCampaign::default() };
+    // Half an hour with four visits of the jump.
+    let speeds = "[90 krpm, 130 krpm, 70 krpm]";
+    let campaign = DriftCampaign { seed: 21, speeds, every: 4, ..DriftCampaign::default() };
     let file = campaign.write();
     let own = campaign.recording();
     let whole = read_recording(&own, &ChannelMap::native(), &ReadOptions::default()).unwrap().recording;

@@ -17,6 +17,8 @@ impl Run {
         for (old, new) in [
             ("[90 krpm, 150 krpm, 50 krpm, 130 krpm, 70 krpm, 110 krpm]", "[90 krpm, 130 krpm]"),
             ("openings: [0.5, 0.7, 1.0]", "openings: [0.7, 1.0]"),
+            ("dwell: 120 s", "dwell: 60 s"),
+            ("end: 110 s}", "end: 55 s}"),
             // Each jump by itself: a common fit of four points ends within its own tolerance only, not to the last digit of a log, and
             // influences the first step, whose begin no jump marks.
             ("method: joint ", "method: dynamic "),

@@ -136,7 +136,7 @@ fn a_killed_night_leaves_the_history_intact() {
     };
     let mut before = runs();
     assert_eq!(before, 2);
-    for wait in 0..4_u64 {
+    for wait in 0..3_u64 {
         let mut killed =
             mapper_command(arguments(folder)).stdout(std::process::Stdio::null()).spawn().unwrap();
         // Written is at the very end: the log next to the history grows from then on, and the process is killed on sight
@@ -145,7 +145,7 @@ fn a_killed_night_leaves_the_history_intact() {
         let size = || std::fs::metadata(&log).map_or(0, |file| file.len());
         let mut spins = 0;
         let opened = size();
-        while killed.try_wait().unwrap().is_none() && (size() <= opened || spins < wait * 20) {
+        while killed.try_wait().unwrap().is_none() && (size() <= opened || spins < wait * 30) {
             spins += u64::from(size() > opened);
             std::thread::yield_now();
         }
@@ -210,7 +210,8 @@ fn the_shipped_nightly_files_refer_to_existing_files() {
     let nightly = repository().join("campaigns/nightly.yaml");
     let text = std::fs::read_to_string(&nightly).unwrap();
     for campaign in text.lines().filter_map(|line| line.trim().strip_prefix("- campaign: ")) {
-        mapper(["check", nightly.with_file_name(campaign).to_str().unwrap()]).exits(0);
+        // Their contents: `every_shipped_campaign_is_right`.
+        assert!(nightly.with_file_name(campaign).is_file(), "{campaign}");
     }
     let folder = repository().join("examples/nightly");
     let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();

@@ -92,8 +92,8 @@ fn orders_and_dwells_improve_what_they_are_chosen_for() {
     assert!(figure(&required, "minutes") < figure(&total, "minutes"));
 }
 
-/// The standard error that the plan states is the scatter of what is found: 32 seeds draw noise and offsets again. The
-/// standard deviation of 32 is itself known to 12.7 %; three of that, in addition to 4 % by which the prediction may be off: over 300
+/// The standard error that the plan states is the scatter of what is found: 12 seeds draw noise and offsets again. The
+/// standard deviation of 12 is itself known to 21 %; three of that, in addition to 4 % by which the prediction may be off: over 300
 /// seeds the ratios were 0.95 and 0.95, which are known to 4 % themselves.
 #[test]
 fn predicted_errors_match_the_scatter_of_seeded_runs() {
@@ -107,7 +107,7 @@ fn predicted_errors_match_the_scatter_of_seeded_runs() {
     };
     let planned = plan(&text(1));
     let mut found: Vec<Vec<f64>> = vec![Vec::new(); 3];
-    for seed in 1..=32 {
+    for seed in 1..=12 {
         for (step, point) in run(&text(seed))["points"].as_array().unwrap().iter().enumerate().skip(1) {
             found[step].push(number(&point["eta"]));
         }
@@ -116,7 +116,7 @@ fn predicted_errors_match_the_scatter_of_seeded_runs() {
         let mean = etas.iter().sum::<f64>() / etas.len() as f64;
         let square = etas.iter().map(|eta| (eta - mean).powi(2)).sum::<f64>() / (etas.len() as f64 - 1.0);
         let ratio = square.sqrt() / number(&planned["steps"][step]["predicted"]["sigma_eta"]);
-        assert!((ratio - 1.0).abs() < 0.42, "step {step}: the scatter is {ratio} of the prediction");
+        assert!((ratio - 1.0).abs() < 0.67, "step {step}: the scatter is {ratio} of the prediction");
     }
 }
 

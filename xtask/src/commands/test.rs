@@ -54,6 +54,7 @@ pub fn test() -> Result<(), Error> {
         vec![
             ("Python package", Box::new(|| python_package::check(&offered))),
             ("generated documents", Box::new(|| docs::generated(docs::Mode::Check))),
+            ("documentation", Box::new(|| documentation(&offered))),
         ],
     );
     let result = steps.finish();
@@ -81,14 +82,11 @@ pub fn build(offered: &Offered) -> Command {
     lints::linting(offered.to(command(workspace::cargo(), &all)))
 }
 
-/// All tests and documentation tests. Only the tests that mount a file system may be skipped, which is reported at the end.
+/// All test programs. Only the tests that mount a file system may be skipped, which is reported at the end.
 fn tests(offered: &Offered) -> Result<(), Error> {
     let mut tally = Tally::default();
-    let mut well = true;
     let programs = test_programs::tests("full", |cores| 2 * cores + 2);
-    for tests in [programs, lints::documenting(test_programs::documentation_tests())] {
-        well &= test_programs::run(with_program(lints::linting(offered.to(tests))), &mut tally)?;
-    }
+    let well = test_programs::run(with_program(lints::linting(offered.to(programs))), &mut tally)?;
     test_programs::close(&tally, well);
     if !well {
         return Err(Error::Failed { command: "the tests".to_owned() });
@@ -96,4 +94,15 @@ fn tests(offered: &Offered) -> Result<(), Error> {
     let allowed = MOUNTING_TESTS * usize::from(!offered.mountable) + usize::from(!offered.slurm);
     let left_out = tally.ignored.saturating_sub(allowed);
     if left_out > 0 { Err(Error::LeftOut { count: left_out }) } else { Ok(()) }
+}
+
+/// Runs the examples in the documentation of the crates, and makes it: one crate after the other, so beside tests that use both cores.
+fn documentation(offered: &Offered) -> Result<(), Error> {
+    let examples = lints::documenting(test_programs::documentation_tests());
+    let mut tally = Tally::default();
+    match test_programs::run(with_program(lints::linting(offered.to(examples))), &mut tally)? {
+        true if tally.ignored == 0 => Ok(()),
+        true => Err(Error::LeftOut { count: tally.ignored }),
+        false => Err(Error::Failed { command: "the documentation".to_owned() }),
+    }
 }

@@ -45,8 +45,6 @@ pub use history::production_text::production_text;
 pub use logs::cause_picture::why_figure;
 pub use logs::cause_text::why_text;
 pub use logs::log_text::log_text;
-pub use logs::transient_picture::transient_figure;
-pub use logs::transient_text::transient_text;
 /// A point with its truth, if known.
 pub use mapper_recording::score::ScoredPoint;
 pub use maps::imported_map_text::{import_remark_text, imported_map_text};

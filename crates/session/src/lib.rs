@@ -58,7 +58,7 @@ pub use analysis::gap_correction::GapCorrection;
 pub use analysis::identification::Identified;
 pub use analysis::pdf::{PrintError, page_as_pdf};
 pub use analysis::results::{Results, compressor_map};
-pub use analysis::transient::{Transient, write_transient};
+pub use analysis::transient::write_transient;
 pub use errors::error::SessionError;
 pub use errors::error_kind::ErrorKind;
 pub use errors::first_map_error::FirstMapError;

@@ -1,10 +1,11 @@
-//! `mapper transient`: identifies a log without steady steps.
+//! `mapper transient`: diagnoses a log without steady steps.
 
 use crate::command_line::shared_arguments::{channel_map, given_campaign};
 use crate::output::failure::Failure;
 use crate::output::standard_output::Replace;
 use crate::{output::standard_output, registry};
 use clap::Args;
+use mapper_report::why_text;
 use mapper_session::{Recorded, Session, Side, write_transient};
 use std::path::PathBuf;
 
@@ -51,17 +52,17 @@ impl Transient {
         let registry = registry::registry();
         let recorded = Recorded::read(&registry, &self.recording, &map, given.as_ref())?;
         let effects = registry.effects_with(&self.effects)?;
-        let identified =
+        let diagnosis =
             Session::new(&registry).transient(&recorded, &map, self.side, self.fit_until, &effects)?;
         let machine = recorded.campaign.as_ref().map_or("", |campaign| &campaign.machine.name);
         let files = match &self.out {
-            Some(directory) => write_transient(&identified, machine, directory, self.replace.existing())?,
+            Some(directory) => write_transient(&diagnosis, machine, directory, self.replace.existing())?,
             None => Vec::new(),
         };
         if self.json {
-            return standard_output::print_json(&identified);
+            return standard_output::print_json(&diagnosis);
         }
-        let mut text = identified.text();
+        let mut text = why_text(&diagnosis);
         text.extend(recorded.read.warnings.iter().map(|warning| format!("recording: {warning}\n")));
         text.extend(files.iter().map(|file| format!("{}\n", file.display())));
         standard_output::print(&text)

@@ -5,7 +5,7 @@ use mapper_core::{Channel, Recording};
 use mapper_identify::DECLARED_INTERVAL_S;
 use mapper_observe::plausible::is_reading;
 
-/// Maximum number of rows, evenly spread over a longer log: five minutes at 10 Hz. The sampler evaluates them some hundred thousand times.
+/// Maximum number of rows, evenly spread over a longer log: five minutes at 10 Hz.
 const MAX_ROWS: usize = 3_000;
 
 /// The channels of one side of the machine.
@@ -22,21 +22,12 @@ pub(crate) struct SideChannels<'a> {
 pub(crate) const MIN_PRESSURE_RATIO: f64 = 1.02;
 /// Minimum flow, kg/s: the equations of the gas path divide by it.
 pub(crate) const MIN_FLOW_KG_S: f64 = 1e-3;
-/// The channels of the compressor side.
-pub(crate) const COMPRESSOR: SideChannels<'_> = SideChannels {
-    drives: &[Channel::ShaftSpeed, Channel::CompressorFlow, Channel::P1, Channel::P2, Channel::T1],
-    judged: &[Channel::T2, Channel::Tc],
-    is_usable: |row| {
-        let [speed_rpm, flow_kg_s, p1_pa, p2_pa, _] = *row else { return false };
-        p2_pa >= MIN_PRESSURE_RATIO * p1_pa && flow_kg_s >= MIN_FLOW_KG_S && speed_rpm > 0.0
-    },
-};
 
 /// Complete rows, as columns of equal length. SI units.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Rows {
+pub(crate) struct Rows {
     /// Time, s, rising.
-    pub t_s: Vec<f64>,
+    pub(crate) t_s: Vec<f64>,
     /// Driving channels, in the requested order.
     pub(crate) drives: Vec<(Channel, Vec<f64>)>,
     /// Their rates of change, per second; empty if not requested.
@@ -48,19 +39,6 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// Rows of the compressor side at the times of T2.
-    ///
-    /// # Errors
-    /// [`DrivenError::Channel`] if speed, flow, P1, P2, T1 or T2 is missing.
-    pub fn of_compressor(recording: &Recording) -> Result<Self, DrivenError> {
-        Rows::read(recording, COMPRESSOR)
-    }
-
-    /// The driving channels, in the requested order.
-    pub(crate) fn drives<const N: usize>(&self) -> [&[f64]; N] {
-        std::array::from_fn(|place| self.drives.get(place).map_or(&[][..], |(_, column)| column))
-    }
-
     /// Rows of a recording at the times of the first judged channel.
     pub(crate) fn read(recording: &Recording, channels: SideChannels<'_>) -> Result<Self, DrivenError> {
         let Some(first) = channels.judged.first() else {
@@ -110,8 +88,7 @@ impl Rows {
     }
 
     /// Number of rows.
-    #[expect(clippy::len_without_is_empty, reason = "nothing asks whether there are rows")]
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.t_s.len()
     }
 
@@ -144,5 +121,31 @@ impl Rows {
             judged: each(&self.judged),
             lost: self.lost,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mapper_core::Series;
+
+    /// A day at 10 Hz is read to its end, but thinned to the maximum number of rows; a missing driving channel is an error.
+    #[test]
+    fn a_long_log_is_thinned() {
+        let channels = SideChannels {
+            drives: &[Channel::ShaftSpeed, Channel::P2],
+            judged: &[Channel::T2],
+            is_usable: |row| row[1] > 0.0,
+        };
+        let t_s: Vec<f64> = (0..864_000).map(|i| 0.1 * f64::from(i)).collect();
+        let series = [(Channel::ShaftSpeed, 1e5), (Channel::P2, 2e5), (Channel::T2, 380.0)];
+        let series =
+            series.map(|(of, value)| (of, Series { t_s: t_s.clone(), values: vec![value; t_s.len()] }));
+        let mut recording = Recording { series: series.into(), ..Recording::default() };
+        let rows = Rows::read(&recording, channels).unwrap();
+        assert!((2_000..=3_001).contains(&rows.len()), "{}", rows.len());
+        assert!(rows.t_s.last().unwrap() > &86_000.0);
+        recording.series.remove(&Channel::P2);
+        assert!(matches!(Rows::read(&recording, channels), Err(DrivenError::Channel(_))));
     }
 }

@@ -1,5 +1,4 @@
 //! Integration tests of the module `driven`.
 
 mod common;
-mod engine;
 mod why;

@@ -2,7 +2,7 @@
 
 use crate::formatting::table;
 use mapper_core::probability_text;
-use mapper_diagnose::driven::cause_search::{Beyond, Cause, Diagnosis, HeldOut, Side, SideVerdict};
+use mapper_diagnose::driven::cause_search::{Beyond, Cause, Diagnosis, HeldOut, SideVerdict};
 use std::fmt::Write;
 
 /// Maximum number of causes shown in addition to the undecided ones.
@@ -39,9 +39,14 @@ pub fn why_text(diagnosis: &Diagnosis) -> String {
             verdict(beyond, diagnosis.word)
         );
     }
-    if diagnosis.side == Side::Turbine {
-        unknowns(&mut text, diagnosis);
+    if diagnosis.lost_rows > 0 {
+        let _ = writeln!(
+            text,
+            "{} readings of {first} were omitted, because a channel is missing or impossible there",
+            diagnosis.lost_rows
+        );
     }
+    unknowns(&mut text, diagnosis);
     if !diagnosis.asked.is_empty() {
         let sizes = diagnosis
             .asked

@@ -1,4 +1,4 @@
-//! Analyses one side of a machine from a log without steps: its parameters, and the cause that explains the residual.
+//! Analyses one side of a machine from a log without steps: the cause that explains the residual, and the parameters.
 
 use crate::analysis::further_results::png;
 use crate::plan::planning::nominal_model;
@@ -7,35 +7,14 @@ use crate::recording::identification_config::declared;
 use crate::recording::recording_file::{Recorded, check_machine};
 use crate::{Session, SessionError};
 use mapper_diagnose::driven::cause_search::{Diagnosis, Side, SideRequest, diagnose};
-use mapper_diagnose::driven::{DrivenOutcome, Rows, identify};
 use mapper_diagnose::gap::causes::calibration::Calibration;
 use mapper_observe::Declared;
 use mapper_physics::rig::effect::{Effect, Rig};
 use mapper_recording::ChannelMap;
-use mapper_report::{transient_figure, transient_text, why_figure, why_text};
-use serde::Serialize;
+use mapper_report::{why_figure, why_text};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-/// Result of a log without steps for one side.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Transient {
-    /// Findings independent of the cause; compressor side only.
-    #[serde(flatten)]
-    pub identified: Option<DrivenOutcome>,
-    /// The diagnosis of the cause, relative to the campaign's machine.
-    pub why: Diagnosis,
-}
-
-impl Transient {
-    /// Text for people.
-    pub fn text(&self) -> String {
-        let identified =
-            self.identified.as_ref().map_or_else(String::new, |diagnosis| transient_text(diagnosis) + "\n");
-        identified + why_text(&self.why).as_str()
-    }
-}
 
 impl Session<'_> {
     /// Analyses a log without steps of one side of its campaign's machine, and determines which of `effects` explains it. Fits the data before
@@ -51,21 +30,12 @@ impl Session<'_> {
         side: Side,
         fit_until_s: Option<f64>,
         effects: &[Arc<dyn Effect>],
-    ) -> Result<Transient, SessionError> {
+    ) -> Result<Diagnosis, SessionError> {
         let campaign = recorded.require_campaign()?;
         check_machine(recorded, campaign)?;
-        let recording = &recorded.read.recording;
-        let fit_until_s = fit_until_s.unwrap_or(f64::INFINITY);
-        let identified = match side {
-            Side::Compressor => {
-                let rows = Rows::of_compressor(recording)?;
-                Some(identify(&rows, campaign.machine.params, fit_until_s, campaign.seed)?)
-            }
-            Side::Turbine => None,
-        };
-        let why = diagnose(
+        Ok(diagnose(
             &SideRequest {
-                recording,
+                recording: &recorded.read.recording,
                 nominal: &Rig::new(nominal_model(campaign)?),
                 effects,
                 declared: &Declared {
@@ -76,12 +46,11 @@ impl Session<'_> {
                     common_offsets: Vec::new(),
                 },
                 calibration: &Calibration::shipped().map_err(SessionError::Calibration)?,
-                fit_until_s,
+                fit_until_s: fit_until_s.unwrap_or(f64::INFINITY),
                 seed: campaign.seed,
             },
             side,
-        )?;
-        Ok(Transient { identified, why })
+        )?)
     }
 }
 
@@ -90,18 +59,15 @@ impl Session<'_> {
 /// # Errors
 /// As [`write_file`](crate::write_file).
 pub fn write_transient(
-    diagnosis: &Transient,
+    diagnosis: &Diagnosis,
     machine: &str,
     directory: &Path,
     existing: Existing,
 ) -> Result<Vec<PathBuf>, SessionError> {
-    let figure = match &diagnosis.identified {
-        Some(outcome) => transient_figure(machine, outcome),
-        None => why_figure(machine, &diagnosis.why),
-    };
+    let figure = why_figure(machine, diagnosis);
     let contents = [
         ("transient.json", json_text(&json!(diagnosis))?.into_bytes()),
-        ("transient.txt", diagnosis.text().into_bytes()),
+        ("transient.txt", why_text(diagnosis).into_bytes()),
         ("transient.svg", figure.to_svg().into_bytes()),
         ("transient.png", png(&figure)?),
     ];

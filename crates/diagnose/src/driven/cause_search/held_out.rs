@@ -1,10 +1,10 @@
 //! Gap reduction on held-out data: phase by phase, and after the fitted part.
 
 use crate::driven::cause_search::fit::{Columns, Fit, SideProblem};
+use crate::driven::cause_search::noise::CorrelatedNoise;
 use crate::driven::cause_search::search::weight;
 use crate::driven::cause_search::side_diagnosis::{Beyond, HeldOut, Phase};
 use crate::driven::cause_search::sides::side::SideModel;
-use crate::driven::density::CorrelatedNoise;
 use crate::gap::best_fit::coordinate::{coordinates, hypothesis_at, infos, unknowns};
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::residuals::study::Hypothesis;

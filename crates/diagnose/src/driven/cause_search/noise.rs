@@ -1,4 +1,4 @@
-//! Whitens residuals: white sensor noise plus correlated model error.
+//! White sensor noise plus correlated model error: whitens residuals, and draws the model error.
 //!
 //! The model error is a first-order process observed through white noise; the Kalman filter's innovations divided by their spread are
 //! independent with unit variance. The gains depend only on times and spreads, so they are computed once and used for residuals and slopes.
@@ -53,6 +53,29 @@ impl Whitening {
                 None => 0.0,
             };
         }
+    }
+}
+
+/// First-order noise along the rows of a log.
+pub(crate) struct CorrelatedNoise {
+    sigma: f64,
+    correlation_s: f64,
+    /// Time, s, and value of the previous row.
+    last: Option<(f64, f64)>,
+}
+
+impl CorrelatedNoise {
+    pub(crate) fn new(sigma: f64, correlation_s: f64) -> Self {
+        CorrelatedNoise { sigma, correlation_s, last: None }
+    }
+
+    /// The noise at the next row, from a standard normal number.
+    pub(crate) fn next(&mut self, t_s: f64, z: f64) -> f64 {
+        let (keep, before) =
+            self.last.map_or((0.0, 0.0), |(at_s, noise)| ((-(t_s - at_s) / self.correlation_s).exp(), noise));
+        let noise = keep * before + self.sigma * (1.0 - keep * keep).sqrt() * z;
+        self.last = Some((t_s, noise));
+        noise
     }
 }
 

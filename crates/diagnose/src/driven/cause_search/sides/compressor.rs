@@ -1,11 +1,12 @@
 //! Compressor side of the model with all effects. Flow is measured and efficiency is fitted; the map is not used.
 
-use crate::driven::cause_search::sides::side::{ModelError, Side, SideModel, relaxed_k, true_drive};
-use crate::driven::compressor_side::{EFFICIENCY, flow_coefficient, middles};
-use crate::driven::density::{CORRELATION_S, HOUSING_CORRELATION_S, HOUSING_SIGMA_K};
-use crate::driven::log_rows::{COMPRESSOR, Rows, SideChannels};
-use crate::driven::parameters::{PARAMETERS, Parameter, Spread};
+use crate::driven::cause_search::sides::side::{
+    CORRELATION_S, HOUSING_CORRELATION_S, ModelError, Side, SideModel, relaxed_k, true_drive,
+};
+use crate::driven::log_rows::{MIN_FLOW_KG_S, MIN_PRESSURE_RATIO, Rows, SideChannels};
+use crate::driven::parameters::{Parameter, log_normal, normal};
 use mapper_core::Channel;
+use mapper_numerics::statistics::mean;
 use mapper_physics::compressor_map::one_point_map::OnePointMap;
 use mapper_physics::laws::housing::compressor_capacity_j_k;
 use mapper_physics::machine::params::{BoundaryConditions, MODEL_REFERENCE};
@@ -15,25 +16,29 @@ use mapper_physics::simulation::model::{State, rad_s_of_rpm};
 use std::sync::Arc;
 
 /// Unknowns, in the order of [`CompressorSide::predict`]. The area split and the probe keep their declared values, because they are library causes. The
-/// prior of the efficiency is wider than in identification and includes map shapes beyond a parabola, so that no cause is named for a good compressor.
+/// prior of the efficiency is wide and includes map shapes beyond a parabola, so that no cause is named for a good compressor.
 static UNKNOWNS: [Parameter; 16] = {
-    let p = PARAMETERS;
-    const FURTHER: f64 = 0.15;
     const fn further(name: &'static str, description: &'static str) -> Parameter {
-        Parameter { name, description, unit: "", middle: 0.0, width: FURTHER, spread: Spread::Normal }
+        normal(name, "", 0.0, 0.15, description)
     }
     [
-        Parameter { middle: 0.72, width: 0.10, ..p[0] },
-        Parameter { width: 0.12, ..p[1] },
-        p[2],
-        p[3],
-        p[4],
-        p[5],
-        p[7],
-        p[8],
-        p[9],
-        p[10],
-        p[12],
+        normal("eta", "", 0.72, 0.10, "isentropic efficiency, total to total, at middle speed and flow"),
+        normal("eta_speed", "", 0.0, 0.12, "its change per unit of relative speed"),
+        normal("eta_speed_2", "", -0.10, 0.12, "its curvature over relative speed"),
+        normal("eta_flow", "", 0.0, 0.12, "its change per unit of the logarithm of the flow coefficient"),
+        normal("eta_flow_2", "", -0.5, 0.3, "its curvature over the logarithm of the flow coefficient"),
+        log_normal(
+            "h",
+            "",
+            1.0,
+            0.5,
+            "heat transfer inside the housing, over Appendix A's law on the declared area",
+        ),
+        log_normal("capacity", "", 1.0, 0.5, "heat capacity of the housing, over the declared one"),
+        log_normal("loss", "W/K", 2.0, 1.0, "conductance from the housing to oil, turbine and engine bay"),
+        normal("surroundings", "K", 345.0, 25.0, "temperature of the surroundings of the housing"),
+        normal("housing_start", "K", 0.0, 20.0, "housing minus the mean of T1 and T2, at the start"),
+        normal("t2_offset", "K", 0.0, 1.0, "constant offset of T2 minus that of T1"),
         further("eta_speed_flow", "change of the efficiency with speed times flow coefficient, logarithms"),
         further("eta_speed_3", "cube of the efficiency over relative speed"),
         further("eta_speed_2_flow", "change of the efficiency with speed squared times flow coefficient"),
@@ -41,6 +46,24 @@ static UNKNOWNS: [Parameter; 16] = {
         further("eta_flow_3", "cube of the efficiency over the logarithm of the flow coefficient"),
     ]
 };
+
+/// Limits of the efficiency polynomial: outside them it does not describe a working compressor.
+const EFFICIENCY: (f64, f64) = (0.25, 0.90);
+
+/// Geometric means of speed, rpm, and flow coefficient over the rows; 1 without any.
+fn middles(rows: &Rows) -> (f64, f64) {
+    let of = |channel: Channel| rows.drive(channel);
+    let [speed_rpm, flow_kg_s, p1_pa, t1_k] =
+        [Channel::ShaftSpeed, Channel::CompressorFlow, Channel::P1, Channel::T1].map(of);
+    let flow = |i: usize| flow_coefficient(speed_rpm[i], flow_kg_s[i], p1_pa[i], t1_k[i]).ln();
+    let geometric = |mean: Option<f64>| mean.map_or(1.0, f64::exp);
+    (geometric(mean(speed_rpm.iter().map(|rpm| rpm.ln()))), geometric(mean((0..rows.len()).map(flow))))
+}
+
+/// Flow over speed at inlet density, kg K/(s Pa rpm): the flow coefficient without wheel size and gas constant.
+fn flow_coefficient(speed_rpm: f64, flow_kg_s: f64, p1_pa: f64, t1_k: f64) -> f64 {
+    flow_kg_s * t1_k / (p1_pa * speed_rpm)
+}
 
 pub(crate) struct CompressorSide {
     rows: Rows,
@@ -53,7 +76,14 @@ impl SideModel for CompressorSide {
     const PRESSURE: Channel = Channel::P2;
 
     fn channels() -> SideChannels<'static> {
-        COMPRESSOR
+        SideChannels {
+            drives: &[Channel::ShaftSpeed, Channel::CompressorFlow, Channel::P1, Channel::P2, Channel::T1],
+            judged: &[Channel::T2, Channel::Tc],
+            is_usable: |row| {
+                let [speed_rpm, flow_kg_s, p1_pa, p2_pa, _] = *row else { return false };
+                p2_pa >= MIN_PRESSURE_RATIO * p1_pa && flow_kg_s >= MIN_FLOW_KG_S && speed_rpm > 0.0
+            },
+        }
     }
 
     fn unknowns() -> &'static [Parameter] {
@@ -64,7 +94,7 @@ impl SideModel for CompressorSide {
         // T2: error of a polynomial map and a single housing node. Tc: one thermocouple for a whole housing.
         &[
             ModelError { median_k: 0.18, width: 0.25, correlation_s: CORRELATION_S },
-            ModelError { median_k: HOUSING_SIGMA_K, width: 0.0, correlation_s: HOUSING_CORRELATION_S },
+            ModelError { median_k: 3.0, width: 0.0, correlation_s: HOUSING_CORRELATION_S },
         ]
     }
 
@@ -237,26 +267,3 @@ impl Tip {
 
 /// Time constant of a tip that starts halfway between reading and target, s.
 const FAST_S: f64 = 0.3;
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_free_parameters_are_those_that_the_side_takes() {
-        let names: Vec<&str> = UNKNOWNS.iter().map(|parameter| parameter.name).collect();
-        let first = [
-            "eta",
-            "eta_speed",
-            "eta_speed_2",
-            "eta_flow",
-            "eta_flow_2",
-            "h",
-            "capacity",
-            "loss",
-            "surroundings",
-        ];
-        assert_eq!(names[..9], first);
-        assert_eq!(names[9..11], ["housing_start", "t2_offset"]);
-    }
-}

@@ -1,7 +1,7 @@
 //! Interface between the diagnosis and the sides of a machine.
 
-use crate::driven::Parameter;
 use crate::driven::log_rows::{Rows, SideChannels};
+use crate::driven::parameters::Parameter;
 use mapper_core::Channel;
 use mapper_physics::rig::effect::{Rig, Submodel};
 use serde::{Deserialize, Serialize};
@@ -43,6 +43,11 @@ impl FromStr for Side {
         found.ok_or_else(|| UnknownSide { name: name.to_owned() })
     }
 }
+
+/// Correlation time of model and sensor errors, s: a probe's own time constant.
+pub(crate) const CORRELATION_S: f64 = 2.0;
+/// Correlation time of the housing's error, s.
+pub(crate) const HOUSING_CORRELATION_S: f64 = 60.0;
 
 /// Prior of the model error of a judged channel. It is correlated in time, and its size is fitted.
 #[derive(Debug, Clone, Copy)]

@@ -1,10 +1,10 @@
 //! Turbine side of the model. Flow, pressures and speed are measured; efficiency, heat transfer and housing are free parameters.
 
-use crate::driven::Parameter;
-use crate::driven::cause_search::sides::side::{ModelError, Side, SideModel, relaxed_k, true_drive};
-use crate::driven::density::{CORRELATION_S, HOUSING_CORRELATION_S};
+use crate::driven::cause_search::sides::side::{
+    CORRELATION_S, HOUSING_CORRELATION_S, ModelError, Side, SideModel, relaxed_k, true_drive,
+};
 use crate::driven::log_rows::{MIN_FLOW_KG_S, MIN_PRESSURE_RATIO, Rows, SideChannels};
-use crate::driven::parameters::{log_normal, normal};
+use crate::driven::parameters::{Parameter, log_normal, normal};
 use mapper_core::Channel;
 use mapper_physics::laws::housing::turbine_capacity_j_k;
 use mapper_physics::laws::turbine::TurbineInlet;

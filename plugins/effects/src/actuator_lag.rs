@@ -1,35 +1,18 @@
 //! Lag of P3 behind its command.
 
-use mapper_physics::effect_parameters;
-use mapper_physics::machine::hooks::TooManyExtraStates;
-use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
+use mapper_physics::effect;
 use mapper_physics::rig::instruments::NOMINAL_P3_LAG_S;
 
-effect_parameters! {
-    /// Lag of P3 behind its command.
-    #[derive(Debug)]
-    pub(crate) struct ActuatorLag {
-        /// Time constant of the lag, s.
-        lag_s = "actuator_lag" ["s"] 0.0 .. 10.0, neutral 0.3, step 0.7;
-    }
-}
-
-impl EffectKind for ActuatorLag {
-    const ABOUT: EffectText = EffectText {
-        id: "actuator_lag",
-        name: "slow P3 actuator",
-        description: "the turbine inlet pressure follows its command more slowly or faster",
-        equation: "dP3/dt = (P3_command - P3)/tau",
-        source: "first-order actuator",
-        submodel: Submodel::Actuator,
-        also_shows_in: &[],
-    };
-
-    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
-        rig.instruments.p3_lag_s += self.lag_s - NOMINAL_P3_LAG_S;
-        Ok(())
-    }
+effect! {
+    pub(crate) struct ActuatorLag "actuator_lag";
+    name: "slow P3 actuator",
+    description: "the turbine inlet pressure follows its command more slowly or faster",
+    equation: "dP3/dt = (P3_command - P3)/tau",
+    source: "first-order actuator",
+    submodel: Actuator, also_shows_in: [];
+    /// Time constant of the lag, s.
+    lag_s = "actuator_lag" ["s"] 0.0 .. 10.0, neutral 0.3, step 0.7;
+    |effect, rig| rig.instruments.p3_lag_s += effect.lag_s - NOMINAL_P3_LAG_S
 }
 
 #[cfg(test)]

@@ -1,34 +1,17 @@
 //! Part of the heat enters the gas before the wheel.
 
-use mapper_physics::effect_parameters;
-use mapper_physics::machine::hooks::TooManyExtraStates;
-use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
+use mapper_physics::effect;
 
-effect_parameters! {
-    /// Part of the heat enters the gas before the wheel.
-    #[derive(Debug)]
-    pub(crate) struct AreaSplit {
-        /// Share alpha_A of the internal area that meets the gas before compression.
-        before_ratio = "area_split" ["1"] 0.0 .. 0.6, neutral 0.0, step 0.1;
-    }
-}
-
-impl EffectKind for AreaSplit {
-    const ABOUT: EffectText = EffectText {
-        id: "area_split",
-        name: "area before the wheel",
-        description: "part of the housing's internal area meets the gas before compression",
-        equation: "q1 = h alpha_A A_c (T1 - Tc) before, q2 = h (1 - alpha_A) A_c (T2 - Tc) after compression",
-        source: "Burke et al., eqs. 1 and 3",
-        submodel: Submodel::CompressorGas,
-        also_shows_in: &[Submodel::CompressorHousing],
-    };
-
-    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
-        rig.model.params.compressor.alpha_area_ratio += self.before_ratio;
-        Ok(())
-    }
+effect! {
+    pub(crate) struct AreaSplit "area_split";
+    name: "area before the wheel",
+    description: "part of the housing's internal area meets the gas before compression",
+    equation: "q1 = h alpha_A A_c (T1 - Tc) before, q2 = h (1 - alpha_A) A_c (T2 - Tc) after compression",
+    source: "Burke et al., eqs. 1 and 3",
+    submodel: CompressorGas, also_shows_in: [CompressorHousing];
+    /// Share alpha_A of the internal area that meets the gas before compression.
+    before_ratio = "area_split" ["1"] 0.0 .. 0.6, neutral 0.0, step 0.1;
+    |effect, rig| rig.model.params.compressor.alpha_area_ratio += effect.before_ratio
 }
 
 #[cfg(test)]

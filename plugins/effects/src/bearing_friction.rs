@@ -1,34 +1,17 @@
 //! Additional friction power in the bearings.
 
-use mapper_physics::effect_parameters;
-use mapper_physics::machine::hooks::TooManyExtraStates;
-use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
+use mapper_physics::effect;
 
-effect_parameters! {
-    /// Additional friction power in the bearings.
-    #[derive(Debug)]
-    pub(crate) struct BearingFriction {
-        /// Friction c of c omega^2, W s^2/rad^2.
-        friction_w_s2 = "bearing_friction" ["W s2/rad2"] 0.0 .. 2e-05, neutral 0.0, step 1.5e-06;
-    }
-}
-
-impl EffectKind for BearingFriction {
-    const ABOUT: EffectText = EffectText {
-        id: "bearing_friction",
-        name: "bearing friction",
-        description: "the bearings take power from the shaft",
-        equation: "I omega domega/dt = W_t - W_c - c omega^2",
-        source: "viscous friction of journal bearings (Petroff)",
-        submodel: Submodel::Shaft,
-        also_shows_in: &[],
-    };
-
-    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
-        rig.model.params.bearing_friction_w_s2 += self.friction_w_s2;
-        Ok(())
-    }
+effect! {
+    pub(crate) struct BearingFriction "bearing_friction";
+    name: "bearing friction",
+    description: "the bearings take power from the shaft",
+    equation: "I omega domega/dt = W_t - W_c - c omega^2",
+    source: "viscous friction of journal bearings (Petroff)",
+    submodel: Shaft, also_shows_in: [];
+    /// Friction c of c omega^2, W s^2/rad^2.
+    friction_w_s2 = "bearing_friction" ["W s2/rad2"] 0.0 .. 2e-05, neutral 0.0, step 1.5e-06;
+    |effect, rig| rig.model.params.bearing_friction_w_s2 += effect.friction_w_s2
 }
 
 #[cfg(test)]

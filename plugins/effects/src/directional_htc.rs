@@ -1,34 +1,17 @@
 //! Convection depends on the direction of the heat flow.
 
-use mapper_physics::effect_parameters;
-use mapper_physics::machine::hooks::TooManyExtraStates;
-use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
+use mapper_physics::effect;
 
-effect_parameters! {
-    /// Convection depends on the direction of the heat flow.
-    #[derive(Debug)]
-    pub(crate) struct DirectionalHtc {
-        /// Factor f of h if the metal is hotter than its gas.
-        hot_metal_ratio = "directional_htc" ["1"] 0.2 .. 3.0, neutral 1.0, step -0.3;
-    }
-}
-
-impl EffectKind for DirectionalHtc {
-    const ABOUT: EffectText = EffectText {
-        id: "directional_htc",
-        name: "convection that depends on direction",
-        description: "convection differs between metal that heats the gas and gas that heats the metal",
-        equation: "h f where the metal is hotter than the gas it touches (T1 before, T2' after compression), h elsewhere",
-        source: "wall-temperature dependence beyond the viscosity ratio: Sieder and Tate (1936)",
-        submodel: Submodel::CompressorGas,
-        also_shows_in: &[Submodel::CompressorHousing],
-    };
-
-    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
-        rig.model.params.compressor.hot_metal_h_ratio *= self.hot_metal_ratio;
-        Ok(())
-    }
+effect! {
+    pub(crate) struct DirectionalHtc "directional_htc";
+    name: "convection that depends on direction",
+    description: "convection differs between metal that heats the gas and gas that heats the metal",
+    equation: "h f where the metal is hotter than the gas it touches (T1 before, T2' after compression), h elsewhere",
+    source: "wall-temperature dependence beyond the viscosity ratio: Sieder and Tate (1936)",
+    submodel: CompressorGas, also_shows_in: [CompressorHousing];
+    /// Factor f of h if the metal is hotter than its gas.
+    hot_metal_ratio = "directional_htc" ["1"] 0.2 .. 3.0, neutral 1.0, step -0.3;
+    |effect, rig| rig.model.params.compressor.hot_metal_h_ratio *= effect.hot_metal_ratio
 }
 
 #[cfg(test)]

@@ -1,34 +1,17 @@
 //! The compressor delivers more or less flow.
 
-use mapper_physics::effect_parameters;
-use mapper_physics::machine::hooks::TooManyExtraStates;
-use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
+use mapper_physics::effect;
 
-effect_parameters! {
-    /// The compressor delivers more or less flow.
-    #[derive(Debug)]
-    pub(crate) struct FlowMapScale {
-        /// Corrected flow over the map's.
-        scale_ratio = "flow_map_scale" ["1"] 0.7 .. 1.3, neutral 1.0, step 0.03;
-    }
-}
-
-impl EffectKind for FlowMapScale {
-    const ABOUT: EffectText = EffectText {
-        id: "flow_map_scale",
-        name: "compressor flow",
-        description: "the compressor delivers more or less flow at equal speed and pressure ratio",
-        equation: "m_corr = s m(N, PR), eta(N, m_corr): the efficiency is that of the map at the delivered flow",
-        source: "worn or fouled compressor, other trim",
-        submodel: Submodel::CompressorFlow,
-        also_shows_in: &[],
-    };
-
-    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
-        rig.model.params.compressor.flow_scale_ratio *= self.scale_ratio;
-        Ok(())
-    }
+effect! {
+    pub(crate) struct FlowMapScale "flow_map_scale";
+    name: "compressor flow",
+    description: "the compressor delivers more or less flow at equal speed and pressure ratio",
+    equation: "m_corr = s m(N, PR), eta(N, m_corr): the efficiency is that of the map at the delivered flow",
+    source: "worn or fouled compressor, other trim",
+    submodel: CompressorFlow, also_shows_in: [];
+    /// Corrected flow over the map's.
+    scale_ratio = "flow_map_scale" ["1"] 0.7 .. 1.3, neutral 1.0, step 0.03;
+    |effect, rig| rig.model.params.compressor.flow_scale_ratio *= effect.scale_ratio
 }
 
 #[cfg(test)]

@@ -1,34 +1,17 @@
 //! The compressor takes in moist air.
 
-use mapper_physics::effect_parameters;
-use mapper_physics::machine::hooks::TooManyExtraStates;
-use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
+use mapper_physics::effect;
 
-effect_parameters! {
-    /// The compressor takes in moist air.
-    #[derive(Debug)]
-    pub(crate) struct Humidity {
-        /// Water per dry air, kg/kg.
-        water_kg_kg = "humidity" ["kg/kg"] 0.0 .. 0.06, neutral 0.0, step 0.012;
-    }
-}
-
-impl EffectKind for Humidity {
-    const ABOUT: EffectText = EffectText {
-        id: "humidity",
-        name: "moist air",
-        description: "the compressor takes in moist air",
-        equation: "R (1 + 0.6078 w), cp (1 + 0.84 w), flow times sqrt(287.05/R) on the compressor side",
-        source: "mixture of ideal gases; cp of vapour 1850 J/(kg K)",
-        submodel: Submodel::CompressorFlow,
-        also_shows_in: &[Submodel::CompressorGas],
-    };
-
-    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
-        rig.model.params.compressor.humidity_kg_kg += self.water_kg_kg;
-        Ok(())
-    }
+effect! {
+    pub(crate) struct Humidity "humidity";
+    name: "moist air",
+    description: "the compressor takes in moist air",
+    equation: "R (1 + 0.6078 w), cp (1 + 0.84 w), flow times sqrt(287.05/R) on the compressor side",
+    source: "mixture of ideal gases; cp of vapour 1850 J/(kg K)",
+    submodel: CompressorFlow, also_shows_in: [CompressorGas];
+    /// Water per dry air, kg/kg.
+    water_kg_kg = "humidity" ["kg/kg"] 0.0 .. 0.06, neutral 0.0, step 0.012;
+    |effect, rig| rig.model.params.compressor.humidity_kg_kg += effect.water_kg_kg
 }
 
 #[cfg(test)]

@@ -1,34 +1,17 @@
 //! The heat transfer coefficient before the wheel differs from that after it.
 
-use mapper_physics::effect_parameters;
-use mapper_physics::machine::hooks::TooManyExtraStates;
-use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
+use mapper_physics::effect;
 
-effect_parameters! {
-    /// The heat transfer coefficient before the wheel differs from that after it.
-    #[derive(Debug)]
-    pub(crate) struct InletHtc {
-        /// h before the wheel over that of the nominal model; Appendix A's 40 mm before 35 mm give 0.75.
-        inlet_ratio = "inlet_htc" ["1"] 0.2 .. 3.0, neutral 1.0, step -0.25;
-    }
-}
-
-impl EffectKind for InletHtc {
-    const ABOUT: EffectText = EffectText {
-        id: "inlet_htc",
-        name: "convection before the wheel",
-        description: "convection before the wheel differs from that after it, as in an inlet of another diameter; shows only where alpha_A is above 0",
-        equation: "q1 = s h alpha_A A_c (T1 - Tc); by the law of the inlet's own diameter s is about (d_out/d_in)^(1 + b)",
-        source: "Burke et al., section 5.2 and Appendix A (inlet diameter)",
-        submodel: Submodel::CompressorGas,
-        also_shows_in: &[Submodel::CompressorHousing],
-    };
-
-    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
-        rig.model.params.compressor.inlet_h_ratio *= self.inlet_ratio;
-        Ok(())
-    }
+effect! {
+    pub(crate) struct InletHtc "inlet_htc";
+    name: "convection before the wheel",
+    description: "convection before the wheel differs from that after it, as in an inlet of another diameter; shows only where alpha_A is above 0",
+    equation: "q1 = s h alpha_A A_c (T1 - Tc); by the law of the inlet's own diameter s is about (d_out/d_in)^(1 + b)",
+    source: "Burke et al., section 5.2 and Appendix A (inlet diameter)",
+    submodel: CompressorGas, also_shows_in: [CompressorHousing];
+    /// h before the wheel over that of the nominal model; Appendix A's 40 mm before 35 mm give 0.75.
+    inlet_ratio = "inlet_htc" ["1"] 0.2 .. 3.0, neutral 1.0, step -0.25;
+    |effect, rig| rig.model.params.compressor.inlet_h_ratio *= effect.inlet_ratio
 }
 
 #[cfg(test)]

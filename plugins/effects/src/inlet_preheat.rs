@@ -1,34 +1,17 @@
 //! The gas is heated between its probe and the wheel.
 
-use mapper_physics::effect_parameters;
-use mapper_physics::machine::hooks::TooManyExtraStates;
-use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
+use mapper_physics::effect;
 
-effect_parameters! {
-    /// The gas is heated between its probe and the wheel.
-    #[derive(Debug)]
-    pub(crate) struct InletPreheat {
-        /// Conductance UA from housing to gas, W/K.
-        conductance_w_k = "inlet_preheat" ["W/K"] 0.0 .. 10.0, neutral 0.0, step 1.0;
-    }
-}
-
-impl EffectKind for InletPreheat {
-    const ABOUT: EffectText = EffectText {
-        id: "inlet_preheat",
-        name: "gas heated in the inlet",
-        description: "the housing heats the gas between the T1 probe and the wheel",
-        equation: "T1 rises by UA (Tc - T1)/(m cp); the housing gives UA (Tc - T1)",
-        source: "inlet duct as a conductance",
-        submodel: Submodel::CompressorGas,
-        also_shows_in: &[Submodel::CompressorHousing],
-    };
-
-    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
-        rig.model.params.compressor.inlet_conductance_w_k += self.conductance_w_k;
-        Ok(())
-    }
+effect! {
+    pub(crate) struct InletPreheat "inlet_preheat";
+    name: "gas heated in the inlet",
+    description: "the housing heats the gas between the T1 probe and the wheel",
+    equation: "T1 rises by UA (Tc - T1)/(m cp); the housing gives UA (Tc - T1)",
+    source: "inlet duct as a conductance",
+    submodel: CompressorGas, also_shows_in: [CompressorHousing];
+    /// Conductance UA from housing to gas, W/K.
+    conductance_w_k = "inlet_preheat" ["W/K"] 0.0 .. 10.0, neutral 0.0, step 1.0;
+    |effect, rig| rig.model.params.compressor.inlet_conductance_w_k += effect.conductance_w_k
 }
 
 #[cfg(test)]

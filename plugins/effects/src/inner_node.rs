@@ -1,41 +1,23 @@
 //! The inner wall of the compressor housing has its own temperature.
 
-use mapper_physics::effect_parameters;
-use mapper_physics::machine::hooks::TooManyExtraStates;
-use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
+use mapper_physics::effect;
 
-effect_parameters! {
-    /// The inner wall of the compressor housing has its own temperature.
-    ///
-    /// At a fixed G the effect does not vanish as phi goes to 0 (the resistance 1/G of the wall remains): it vanishes as 1/G does.
-    /// phi = 0 itself is one node.
-    #[derive(Debug)]
-    pub(crate) struct InnerNode {
-        /// Share phi of the inner wall in the housing's heat capacity.
-        share_ratio = "phi" ["1"] 0.0 .. 0.9, neutral 0.0, step 0.3;
-        /// Conductance G between the inner wall and the outer part, W/K.
-        conductance_w_k = "G" ["W/K"] 1.0 .. 500.0, neutral 500.0, step -480.0;
-    }
-}
-
-impl EffectKind for InnerNode {
-    const ABOUT: EffectText = EffectText {
-        id: "inner_node",
-        name: "inner wall of the compressor housing",
-        description: "the inner wall of the compressor housing has its own temperature",
-        equation: "phi M c dT_i/dt = q1 + q2 - G (T_i - Tc), (1 - phi) M c dTc/dt = G (T_i - Tc) + bearing - outside",
-        source: "two-node wall",
-        submodel: Submodel::CompressorHousing,
-        also_shows_in: &[Submodel::CompressorGas],
-    };
-
-    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
-        if self.share_ratio > 0.0 {
-            rig.model.params.compressor.inner_capacity_ratio = self.share_ratio;
-            rig.model.params.compressor.inner_conductance_w_k = self.conductance_w_k;
-        }
-        Ok(())
+effect! {
+    // At a fixed G the effect does not vanish as phi goes to 0 (the resistance 1/G of the wall remains): it vanishes as 1/G does.
+    // phi = 0 itself is one node.
+    pub(crate) struct InnerNode "inner_node";
+    name: "inner wall of the compressor housing",
+    description: "the inner wall of the compressor housing has its own temperature",
+    equation: "phi M c dT_i/dt = q1 + q2 - G (T_i - Tc), (1 - phi) M c dTc/dt = G (T_i - Tc) + bearing - outside",
+    source: "two-node wall",
+    submodel: CompressorHousing, also_shows_in: [CompressorGas];
+    /// Share phi of the inner wall in the housing's heat capacity.
+    share_ratio = "phi" ["1"] 0.0 .. 0.9, neutral 0.0, step 0.3;
+    /// Conductance G between the inner wall and the outer part, W/K.
+    conductance_w_k = "G" ["W/K"] 1.0 .. 500.0, neutral 500.0, step -480.0;
+    |effect, rig| if effect.share_ratio > 0.0 {
+        rig.model.params.compressor.inner_capacity_ratio = effect.share_ratio;
+        rig.model.params.compressor.inner_conductance_w_k = effect.conductance_w_k;
     }
 }
 

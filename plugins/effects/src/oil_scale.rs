@@ -1,34 +1,17 @@
 //! The oil removes more or less heat from the bearing housing.
 
-use mapper_physics::effect_parameters;
-use mapper_physics::machine::hooks::TooManyExtraStates;
-use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
+use mapper_physics::effect;
 
-effect_parameters! {
-    /// The oil removes more or less heat from the bearing housing.
-    #[derive(Debug)]
-    pub(crate) struct OilScale {
-        /// Conductance to the oil over the nominal one.
-        scale_ratio = "oil_scale" ["1"] 0.1 .. 5.0, neutral 1.0, step 0.4;
-    }
-}
-
-impl EffectKind for OilScale {
-    const ABOUT: EffectText = EffectText {
-        id: "oil_scale",
-        name: "heat to the oil",
-        description: "the oil takes more or less heat from the bearing housing",
-        equation: "G_oil = s G_oil,nominal",
-        source: "flow and viscosity of the oil: Burke et al., Appendix A, bearing housing",
-        submodel: Submodel::TurbineHousing,
-        also_shows_in: &[Submodel::CompressorHousing],
-    };
-
-    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
-        rig.model.params.bearing.oil_conductance_w_k *= self.scale_ratio;
-        Ok(())
-    }
+effect! {
+    pub(crate) struct OilScale "oil_scale";
+    name: "heat to the oil",
+    description: "the oil takes more or less heat from the bearing housing",
+    equation: "G_oil = s G_oil,nominal",
+    source: "flow and viscosity of the oil: Burke et al., Appendix A, bearing housing",
+    submodel: TurbineHousing, also_shows_in: [CompressorHousing];
+    /// Conductance to the oil over the nominal one.
+    scale_ratio = "oil_scale" ["1"] 0.1 .. 5.0, neutral 1.0, step 0.4;
+    |effect, rig| rig.model.params.bearing.oil_conductance_w_k *= effect.scale_ratio
 }
 
 #[cfg(test)]

@@ -1,34 +1,17 @@
 //! Part of the gas recirculates through the wheel.
 
-use mapper_physics::effect_parameters;
-use mapper_physics::machine::hooks::TooManyExtraStates;
-use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
+use mapper_physics::effect;
 
-effect_parameters! {
-    /// Part of the gas recirculates through the wheel.
-    #[derive(Debug)]
-    pub(crate) struct Recirculation {
-        /// Recirculated share r of the delivered flow.
-        recirculation_ratio = "recirculation" ["1"] 0.0 .. 0.3, neutral 0.0, step 0.03;
-    }
-}
-
-impl EffectKind for Recirculation {
-    const ABOUT: EffectText = EffectText {
-        id: "recirculation",
-        name: "recirculation",
-        description: "part of the flow recirculates, hot, from the outlet of the wheel to its inlet",
-        equation: "the wheel pumps (1 + r) m, the map's flow; T2' = T1' (1 + X)/(1 - r X), X = (PR^kappa - 1)/eta",
-        source: "mixing balance of a ported shroud or backflow",
-        submodel: Submodel::CompressorFlow,
-        also_shows_in: &[Submodel::CompressorGas],
-    };
-
-    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
-        rig.model.params.compressor.recirculation_ratio += self.recirculation_ratio;
-        Ok(())
-    }
+effect! {
+    pub(crate) struct Recirculation "recirculation";
+    name: "recirculation",
+    description: "part of the flow recirculates, hot, from the outlet of the wheel to its inlet",
+    equation: "the wheel pumps (1 + r) m, the map's flow; T2' = T1' (1 + X)/(1 - r X), X = (PR^kappa - 1)/eta",
+    source: "mixing balance of a ported shroud or backflow",
+    submodel: CompressorFlow, also_shows_in: [CompressorGas];
+    /// Recirculated share r of the delivered flow.
+    recirculation_ratio = "recirculation" ["1"] 0.0 .. 0.3, neutral 0.0, step 0.03;
+    |effect, rig| rig.model.params.compressor.recirculation_ratio += effect.recirculation_ratio
 }
 
 #[cfg(test)]

@@ -1,34 +1,17 @@
 //! The T2 probe does not recover the whole total temperature.
 
-use mapper_physics::effect_parameters;
-use mapper_physics::machine::hooks::TooManyExtraStates;
-use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
+use mapper_physics::effect;
 
-effect_parameters! {
-    /// The T2 probe does not recover the whole total temperature.
-    #[derive(Debug)]
-    pub(crate) struct Recovery {
-        /// Recovery factor r of the probe.
-        recovery_ratio = "recovery" ["1"] 0.0 .. 1.5, neutral 1.0, step -0.3;
-    }
-}
-
-impl EffectKind for Recovery {
-    const ABOUT: EffectText = EffectText {
-        id: "recovery",
-        name: "recovery of the T2 probe",
-        description: "the T2 probe recovers only part of the gas's kinetic energy",
-        equation: "T_tip tends to T2 - (1 - r) v^2/(2 cp), v = m/(rho A) in the outlet pipe",
-        source: "recovery factor of a probe: Moffat, Gas temperature measurement (1962)",
-        submodel: Submodel::T2Probe,
-        also_shows_in: &[],
-    };
-
-    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
-        rig.model.params.t2_probe_recovery_ratio += self.recovery_ratio - 1.0;
-        Ok(())
-    }
+effect! {
+    pub(crate) struct Recovery "recovery";
+    name: "recovery of the T2 probe",
+    description: "the T2 probe recovers only part of the gas's kinetic energy",
+    equation: "T_tip tends to T2 - (1 - r) v^2/(2 cp), v = m/(rho A) in the outlet pipe",
+    source: "recovery factor of a probe: Moffat, Gas temperature measurement (1962)",
+    submodel: T2Probe, also_shows_in: [];
+    /// Recovery factor r of the probe.
+    recovery_ratio = "recovery" ["1"] 0.0 .. 1.5, neutral 1.0, step -0.3;
+    |effect, rig| rig.model.params.t2_probe_recovery_ratio += effect.recovery_ratio - 1.0
 }
 
 #[cfg(test)]

@@ -1,34 +1,17 @@
 //! The tip of the T2 probe has its own thermal mass.
 
-use mapper_physics::effect_parameters;
-use mapper_physics::machine::hooks::TooManyExtraStates;
-use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
+use mapper_physics::effect;
 
-effect_parameters! {
-    /// The tip of the T2 probe has its own thermal mass.
-    #[derive(Debug)]
-    pub(crate) struct TipDiameter {
-        /// Diameter of the tip, m.
-        diameter_m = "tip_diameter" ["m"] 0.0 .. 0.006, neutral 0.0, step 0.0015;
-    }
-}
-
-impl EffectKind for TipDiameter {
-    const ABOUT: EffectText = EffectText {
-        id: "tip_diameter",
-        name: "slow T2 probe",
-        description: "the T2 probe's tip has a mass and follows the gas with a lag",
-        equation: "dT_tip/dt = (T2 - T_tip)/tau, tau = rho c d^2/(6 Nu k)",
-        source: "Burke et al., eqs. 11 and 12",
-        submodel: Submodel::T2Probe,
-        also_shows_in: &[],
-    };
-
-    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
-        rig.model.params.t2_probe_diameter_m += self.diameter_m;
-        Ok(())
-    }
+effect! {
+    pub(crate) struct TipDiameter "tip_diameter";
+    name: "slow T2 probe",
+    description: "the T2 probe's tip has a mass and follows the gas with a lag",
+    equation: "dT_tip/dt = (T2 - T_tip)/tau, tau = rho c d^2/(6 Nu k)",
+    source: "Burke et al., eqs. 11 and 12",
+    submodel: T2Probe, also_shows_in: [];
+    /// Diameter of the tip, m.
+    diameter_m = "tip_diameter" ["m"] 0.0 .. 0.006, neutral 0.0, step 0.0015;
+    |effect, rig| rig.model.params.t2_probe_diameter_m += effect.diameter_m
 }
 
 #[cfg(test)]

@@ -1,34 +1,17 @@
 //! The turbine swallows more or less gas.
 
-use mapper_physics::effect_parameters;
-use mapper_physics::machine::hooks::TooManyExtraStates;
-use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
+use mapper_physics::effect;
 
-effect_parameters! {
-    /// The turbine swallows more or less gas.
-    #[derive(Debug)]
-    pub(crate) struct TurbineCapacity {
-        /// Choked flow over the nominal one.
-        scale_ratio = "turbine_capacity" ["1"] 0.7 .. 1.3, neutral 1.0, step -0.03;
-    }
-}
-
-impl EffectKind for TurbineCapacity {
-    const ABOUT: EffectText = EffectText {
-        id: "turbine_capacity",
-        name: "flow capacity of the turbine",
-        description: "the turbine swallows more or less gas at every expansion ratio",
-        equation: "m_t = s m_t,nominal",
-        source: "deposits on vanes or volute, or another volute",
-        submodel: Submodel::TurbineFlow,
-        also_shows_in: &[Submodel::Shaft],
-    };
-
-    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
-        rig.model.params.turbine.choked_flow_kg_s *= self.scale_ratio;
-        Ok(())
-    }
+effect! {
+    pub(crate) struct TurbineCapacity "turbine_capacity";
+    name: "flow capacity of the turbine",
+    description: "the turbine swallows more or less gas at every expansion ratio",
+    equation: "m_t = s m_t,nominal",
+    source: "deposits on vanes or volute, or another volute",
+    submodel: TurbineFlow, also_shows_in: [Shaft];
+    /// Choked flow over the nominal one.
+    scale_ratio = "turbine_capacity" ["1"] 0.7 .. 1.3, neutral 1.0, step -0.03;
+    |effect, rig| rig.model.params.turbine.choked_flow_kg_s *= effect.scale_ratio
 }
 
 #[cfg(test)]

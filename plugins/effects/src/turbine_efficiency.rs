@@ -1,34 +1,17 @@
 //! The turbine delivers more or less power.
 
-use mapper_physics::effect_parameters;
-use mapper_physics::machine::hooks::TooManyExtraStates;
-use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
+use mapper_physics::effect;
 
-effect_parameters! {
-    /// The turbine delivers more or less power.
-    #[derive(Debug)]
-    pub(crate) struct TurbineEfficiency {
-        /// Turbine efficiency over the nominal one.
-        scale_ratio = "turbine_efficiency" ["1"] 0.5 .. 1.3, neutral 1.0, step -0.04;
-    }
-}
-
-impl EffectKind for TurbineEfficiency {
-    const ABOUT: EffectText = EffectText {
-        id: "turbine_efficiency",
-        name: "turbine efficiency",
-        description: "the turbine's efficiency is higher or lower everywhere",
-        equation: "eta_t = s eta_t,nominal",
-        source: "worn or fouled turbine",
-        submodel: Submodel::Shaft,
-        also_shows_in: &[],
-    };
-
-    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
-        rig.model.params.turbine.peak_efficiency *= self.scale_ratio;
-        Ok(())
-    }
+effect! {
+    pub(crate) struct TurbineEfficiency "turbine_efficiency";
+    name: "turbine efficiency",
+    description: "the turbine's efficiency is higher or lower everywhere",
+    equation: "eta_t = s eta_t,nominal",
+    source: "worn or fouled turbine",
+    submodel: Shaft, also_shows_in: [];
+    /// Turbine efficiency over the nominal one.
+    scale_ratio = "turbine_efficiency" ["1"] 0.5 .. 1.3, neutral 1.0, step -0.04;
+    |effect, rig| rig.model.params.turbine.peak_efficiency *= effect.scale_ratio
 }
 
 #[cfg(test)]

@@ -1,33 +1,20 @@
 //! Gas bypasses the turbine wheel.
 
 use mapper_core::Channel;
-use mapper_physics::effect_parameters;
-use mapper_physics::machine::hooks::{Hooks, Site, TooManyExtraStates};
-use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
+use mapper_physics::effect;
+use mapper_physics::machine::hooks::{Hooks, Site};
 
-effect_parameters! {
-    /// Gas bypasses the turbine wheel.
-    #[derive(Debug, Clone, Copy)]
-    pub(crate) struct TurbineLeak {
-        /// Leak flow over the wheel's flow.
-        leak_ratio = "turbine_leak" ["1"] 0.0 .. 0.3, neutral 0.0, step 0.03;
-    }
-}
-
-impl EffectKind for TurbineLeak {
-    const ABOUT: EffectText = EffectText {
-        id: "turbine_leak",
-        name: "leak past the turbine wheel",
-        description: "hot gas flows past the turbine wheel and mixes with the gas after it",
-        equation: "the meter reads (1 + r) m_t; T4 = (T4,wheel + r T3)/(1 + r)",
-        source: "mixing balance of a waste gate that does not close",
-        submodel: Submodel::TurbineFlow,
-        also_shows_in: &[Submodel::TurbineHousing],
-    };
-
-    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
-        if self.leak_ratio == 0.0 { Ok(()) } else { rig.hook(self) }
+effect! {
+    pub(crate) struct TurbineLeak "turbine_leak";
+    name: "leak past the turbine wheel",
+    description: "hot gas flows past the turbine wheel and mixes with the gas after it",
+    equation: "the meter reads (1 + r) m_t; T4 = (T4,wheel + r T3)/(1 + r)",
+    source: "mixing balance of a waste gate that does not close",
+    submodel: TurbineFlow, also_shows_in: [TurbineHousing];
+    /// Leak flow over the wheel's flow.
+    leak_ratio = "turbine_leak" ["1"] 0.0 .. 0.3, neutral 0.0, step 0.03;
+    |effect, rig| if effect.leak_ratio != 0.0 {
+        rig.hook(effect)?;
     }
 }
 

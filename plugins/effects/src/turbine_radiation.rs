@@ -1,34 +1,17 @@
 //! The turbine housing radiates to the compressor housing.
 
-use mapper_physics::effect_parameters;
-use mapper_physics::machine::hooks::TooManyExtraStates;
-use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
+use mapper_physics::effect;
 
-effect_parameters! {
-    /// The turbine housing radiates to the compressor housing.
-    #[derive(Debug)]
-    pub(crate) struct TurbineRadiation {
-        /// View factor times area FA, m2.
-        view_area_m2 = "turbine_radiation" ["m2"] 0.0 .. 0.1, neutral 0.0, step 0.01;
-    }
-}
-
-impl EffectKind for TurbineRadiation {
-    const ABOUT: EffectText = EffectText {
-        id: "turbine_radiation",
-        name: "radiation between the housings",
-        description: "the turbine housing radiates to the compressor housing",
-        equation: "Q = FA sigma (Tt^4 - Tc^4)",
-        source: "two-surface exchange: Incropera, 13.2",
-        submodel: Submodel::TurbineHousing,
-        also_shows_in: &[Submodel::CompressorHousing],
-    };
-
-    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
-        rig.model.params.radiation_area_m2 += self.view_area_m2;
-        Ok(())
-    }
+effect! {
+    pub(crate) struct TurbineRadiation "turbine_radiation";
+    name: "radiation between the housings",
+    description: "the turbine housing radiates to the compressor housing",
+    equation: "Q = FA sigma (Tt^4 - Tc^4)",
+    source: "two-surface exchange: Incropera, 13.2",
+    submodel: TurbineHousing, also_shows_in: [CompressorHousing];
+    /// View factor times area FA, m2.
+    view_area_m2 = "turbine_radiation" ["m2"] 0.0 .. 0.1, neutral 0.0, step 0.01;
+    |effect, rig| rig.model.params.radiation_area_m2 += effect.view_area_m2
 }
 
 #[cfg(test)]

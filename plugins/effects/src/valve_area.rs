@@ -1,34 +1,17 @@
 //! The back-pressure valve is wider or narrower.
 
-use mapper_physics::effect_parameters;
-use mapper_physics::machine::hooks::TooManyExtraStates;
-use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
+use mapper_physics::effect;
 
-effect_parameters! {
-    /// The back-pressure valve is wider or narrower.
-    #[derive(Debug)]
-    pub(crate) struct ValveArea {
-        /// Area of the valve over the nominal one.
-        scale_ratio = "valve_area" ["1"] 0.7 .. 1.4, neutral 1.0, step 0.04;
-    }
-}
-
-impl EffectKind for ValveArea {
-    const ABOUT: EffectText = EffectText {
-        id: "valve_area",
-        name: "valve area",
-        description: "the back-pressure valve is wider or narrower than its opening says",
-        equation: "CdA = s CdA,nominal",
-        source: "calibration of the valve",
-        submodel: Submodel::Outlet,
-        also_shows_in: &[],
-    };
-
-    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
-        rig.model.params.outlet.valve_area_m2 *= self.scale_ratio;
-        Ok(())
-    }
+effect! {
+    pub(crate) struct ValveArea "valve_area";
+    name: "valve area",
+    description: "the back-pressure valve is wider or narrower than its opening says",
+    equation: "CdA = s CdA,nominal",
+    source: "calibration of the valve",
+    submodel: Outlet, also_shows_in: [];
+    /// Area of the valve over the nominal one.
+    scale_ratio = "valve_area" ["1"] 0.7 .. 1.4, neutral 1.0, step 0.04;
+    |effect, rig| rig.model.params.outlet.valve_area_m2 *= effect.scale_ratio
 }
 
 #[cfg(test)]

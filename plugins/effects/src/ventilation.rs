@@ -1,34 +1,17 @@
 //! Air moves in the cell.
 
-use mapper_physics::effect_parameters;
-use mapper_physics::machine::hooks::TooManyExtraStates;
-use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{EffectKind, EffectText};
+use mapper_physics::effect;
 
-effect_parameters! {
-    /// Air moves in the cell.
-    #[derive(Debug)]
-    pub(crate) struct Ventilation {
-        /// Convection to the cell over the nominal one.
-        convection_ratio = "ventilation" ["1"] 0.1 .. 5.0, neutral 1.0, step 0.6;
-    }
-}
-
-impl EffectKind for Ventilation {
-    const ABOUT: EffectText = EffectText {
-        id: "ventilation",
-        name: "air around the housings",
-        description: "air moves around the housings: convection to the cell is stronger or weaker",
-        equation: "Q_ext = A_ext (s 1.25 |T - T_amb|^(1/3) (T - T_amb) + eps sigma (T^4 - T_amb^4)), both housings",
-        source: "Burke et al., Appendix A, external convection",
-        submodel: Submodel::TurbineHousing,
-        also_shows_in: &[Submodel::CompressorHousing],
-    };
-
-    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
-        rig.model.params.external_convection_ratio *= self.convection_ratio;
-        Ok(())
-    }
+effect! {
+    pub(crate) struct Ventilation "ventilation";
+    name: "air around the housings",
+    description: "air moves around the housings: convection to the cell is stronger or weaker",
+    equation: "Q_ext = A_ext (s 1.25 |T - T_amb|^(1/3) (T - T_amb) + eps sigma (T^4 - T_amb^4)), both housings",
+    source: "Burke et al., Appendix A, external convection",
+    submodel: TurbineHousing, also_shows_in: [CompressorHousing];
+    /// Convection to the cell over the nominal one.
+    convection_ratio = "ventilation" ["1"] 0.1 .. 5.0, neutral 1.0, step 0.6;
+    |effect, rig| rig.model.params.external_convection_ratio *= effect.convection_ratio
 }
 
 #[cfg(test)]

@@ -1,46 +1,20 @@
 //! An effect as a struct of its own parameters, with its description and its change to a rig.
 
 use crate::machine::hooks::TooManyExtraStates;
-use crate::rig::effect::{Effect, EffectError, EffectInfo, EffectParameter, NamedValues, Rig, Submodel};
-use std::borrow::Cow;
+use crate::rig::effect::{Effect, EffectError, EffectInfo, NamedValues, Rig};
 use std::marker::PhantomData;
 use std::sync::Arc;
 
-/// A row of a table of effects, without the parameters.
-#[derive(Debug, Clone, Copy)]
-pub struct EffectText {
-    /// Name: lower case, digits and `_`.
-    pub id: &'static str,
-    /// Display name, a noun that can be the subject of a sentence.
-    pub name: &'static str,
-    /// A one-line description.
-    pub description: &'static str,
-    /// The equation, in the symbols of `docs/reference/model.md`.
-    pub equation: &'static str,
-    /// Source of the equation.
-    pub source: &'static str,
-    /// Submodel.
-    pub submodel: Submodel,
-    /// Submodels in which its gap may also appear: neighbours that share a balance with it.
-    pub also_shows_in: &'static [Submodel],
-}
-
-/// The parameters of an effect, by their names. [`effect_parameters!`](crate::effect_parameters) implements it.
-pub trait EffectNumbers: Sized {
-    /// Every parameter with its range.
-    fn parameters() -> Vec<EffectParameter>;
+/// An effect whose parameters are the fields of `Self`. [`effect!`](crate::effect) implements it.
+pub trait EffectKind: std::fmt::Debug + Send + Sync + Sized + 'static {
+    /// Description and parameters.
+    fn info() -> EffectInfo;
 
     /// Takes each parameter by its name.
     ///
     /// # Errors
     /// [`EffectError::NoParameter`] if a name is missing.
     fn from_values(values: &NamedValues<'_>) -> Result<Self, EffectError>;
-}
-
-/// An effect whose parameters are the fields of `Self`.
-pub trait EffectKind: EffectNumbers + std::fmt::Debug + Send + Sync + 'static {
-    /// Description.
-    const ABOUT: EffectText;
 
     /// Adds the effect to a rig. Neutral values change nothing.
     ///
@@ -51,18 +25,7 @@ pub trait EffectKind: EffectNumbers + std::fmt::Debug + Send + Sync + 'static {
 
 /// The effect of a kind, for effect libraries.
 pub fn effect_of<K: EffectKind>() -> Arc<dyn Effect> {
-    let EffectText { id, name, description, equation, source, submodel, also_shows_in } = K::ABOUT;
-    let info = EffectInfo {
-        id: Cow::Borrowed(id),
-        name: Cow::Borrowed(name),
-        description: Cow::Borrowed(description),
-        equation: Cow::Borrowed(equation),
-        source: Cow::Borrowed(source),
-        submodel,
-        also_shows_in: also_shows_in.to_vec(),
-        parameters: K::parameters(),
-    };
-    Arc::new(KindEffect::<K> { info, kind: PhantomData })
+    Arc::new(KindEffect::<K> { info: K::info(), kind: PhantomData })
 }
 
 /// A kind with its row of text.
@@ -82,54 +45,82 @@ impl<K: EffectKind> Effect for KindEffect<K> {
     }
 }
 
-/// Declares the struct of an effect's parameters, in the form that scripts use: a field, its name in files and reports,
-/// `[unit] low .. high, neutral value, step value`.
+/// Declares an effect: its id, the texts of [`EffectInfo`], its parameters in the form that scripts use (a field, its name in files and
+/// reports, `[unit] low .. high, neutral value, step value`), and its change to a rig.
 ///
 /// ```
-/// use mapper_physics::rig::effect_kind::EffectNumbers;
+/// use mapper_physics::rig::effect_kind::EffectKind;
 ///
-/// mapper_physics::effect_parameters! {
-///     /// A wall with its own temperature.
-///     #[derive(Debug)]
-///     struct Wall {
-///         /// Conductance to the rest, W/K.
-///         conductance_w_k = "G" ["W/K"] 1.0 .. 500.0, neutral 500.0, step -480.0;
-///     }
+/// mapper_physics::effect! {
+///     struct Wall "wall";
+///     name: "inner wall",
+///     description: "the inner wall has its own temperature",
+///     equation: "dT/dt = G (Tc - T)/C",
+///     source: "two-node wall",
+///     submodel: CompressorHousing, also_shows_in: [CompressorGas];
+///     /// Conductance to the rest, W/K.
+///     conductance_w_k = "G" ["W/K"] 1.0 .. 500.0, neutral 500.0, step -480.0;
+///     |effect, rig| rig.model.params.compressor.inner_conductance_w_k = effect.conductance_w_k
 /// }
-/// let [parameter]: [_; 1] = Wall::parameters().try_into().unwrap();
+/// let [parameter]: [_; 1] = Wall::info().parameters.try_into().unwrap();
 /// assert_eq!((parameter.name.as_ref(), parameter.high, parameter.typical_step), ("G", 500.0, -480.0));
 /// ```
 #[macro_export]
-macro_rules! effect_parameters {
+macro_rules! effect {
     (
-        $(#[$meta:meta])* $vis:vis struct $kind:ident {
-            $(
-                $(#[$field_meta:meta])*
-                $field:ident = $name:literal [$unit:literal] $low:literal .. $high:literal, neutral $neutral:literal, step $step:literal;
-            )+
-        }
+        $vis:vis struct $kind:ident $id:literal;
+        name: $name:literal,
+        description: $description:literal,
+        equation: $equation:literal,
+        source: $source:literal,
+        submodel: $submodel:ident, also_shows_in: [$($neighbour:ident),*];
+        $(
+            $(#[$field_meta:meta])*
+            $field:ident = $parameter:literal [$unit:literal] $low:literal .. $high:literal, neutral $neutral:literal, step $step:literal;
+        )+
+        |$effect:ident, $rig:ident| $change:expr
     ) => {
-        $(#[$meta])*
+        #[doc = $description]
+        #[derive(Debug, Clone, Copy)]
         $vis struct $kind {
             $($(#[$field_meta])* $vis $field: f64,)+
         }
 
-        impl $crate::rig::effect_kind::EffectNumbers for $kind {
-            fn parameters() -> Vec<$crate::rig::effect::EffectParameter> {
-                vec![$($crate::rig::effect::EffectParameter {
+        impl $crate::rig::effect_kind::EffectKind for $kind {
+            fn info() -> $crate::rig::effect::EffectInfo {
+                use $crate::rig::effect::{EffectParameter, Submodel};
+                $crate::rig::effect::EffectInfo {
+                    id: $id.into(),
                     name: $name.into(),
-                    unit: $unit.into(),
-                    low: $low,
-                    high: $high,
-                    neutral: $neutral,
-                    typical_step: $step,
-                }),+]
+                    description: $description.into(),
+                    equation: $equation.into(),
+                    source: $source.into(),
+                    submodel: Submodel::$submodel,
+                    also_shows_in: vec![$(Submodel::$neighbour),*],
+                    parameters: vec![$(EffectParameter {
+                        name: $parameter.into(),
+                        unit: $unit.into(),
+                        low: $low,
+                        high: $high,
+                        neutral: $neutral,
+                        typical_step: $step,
+                    }),+],
+                }
             }
 
             fn from_values(
                 values: &$crate::rig::effect::NamedValues<'_>,
             ) -> Result<Self, $crate::rig::effect::EffectError> {
-                Ok($kind { $($field: values.get($name)?),+ })
+                Ok($kind { $($field: values.get($parameter)?),+ })
+            }
+
+            fn put_into(
+                self,
+                $rig: &mut $crate::rig::effect::Rig,
+            ) -> Result<(), $crate::machine::hooks::TooManyExtraStates> {
+                let $effect = self;
+                $change;
+                Ok(())
             }
         }
     };

@@ -4,11 +4,11 @@
 //! the answers.
 
 use mapper_core::Channel;
-use mapper_physics::effect_parameters;
+use mapper_physics::effect;
 use mapper_physics::gas::air;
-use mapper_physics::machine::hooks::{Hooks, Site, TooManyExtraStates};
-use mapper_physics::rig::effect::{Effect, Rig, Submodel};
-use mapper_physics::rig::effect_kind::{EffectKind, EffectText, effect_of};
+use mapper_physics::machine::hooks::{Hooks, Site};
+use mapper_physics::rig::effect::Effect;
+use mapper_physics::rig::effect_kind::effect_of;
 use std::sync::Arc;
 
 /// Purpose of an outside cause.
@@ -39,40 +39,16 @@ pub fn outside_kinds(wanted: OutsideUse) -> Vec<Arc<dyn Effect>> {
     }
 }
 
-/// Declares a cause: id, name, description, equation, submodel, and the function that adds it to a rig.
-macro_rules! outside_cause {
-    ($cause:ident, $id:literal, $name:literal, $description:literal, $equation:literal, $submodel:ident, $add:expr) => {
-        impl EffectKind for $cause {
-            const ABOUT: EffectText = EffectText {
-                id: $id,
-                name: $name,
-                description: $description,
-                equation: $equation,
-                source: "withheld from the diagnosis",
-                submodel: Submodel::$submodel,
-                also_shows_in: &[],
-            };
-
-            fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
-                ($add)(rig, self)
-            }
-        }
-    };
-}
-
-effect_parameters! {
-    /// Water flows through the compressor housing.
-    #[derive(Debug)]
-    struct CoolantPassage {
-        /// Conductance to the water, W/K.
-        conductance_w_k = "G" ["W/K"] 0.0 .. 20.0, neutral 0.0, step 1.5;
-    }
-}
-
-outside_cause! {
-    CoolantPassage, "X_coolant_passage", "coolant passage in the compressor housing",
-    "a coolant passage from the compressor housing to water at 85 degC",
-    "G (358.15 K - Tc) to the compressor housing", CompressorHousing, Rig::hook
+effect! {
+    struct CoolantPassage "X_coolant_passage";
+    name: "coolant passage in the compressor housing",
+    description: "a coolant passage from the compressor housing to water at 85 degC",
+    equation: "G (358.15 K - Tc) to the compressor housing",
+    source: "withheld from the diagnosis",
+    submodel: CompressorHousing, also_shows_in: [];
+    /// Conductance to the water, W/K.
+    conductance_w_k = "G" ["W/K"] 0.0 .. 20.0, neutral 0.0, step 1.5;
+    |cause, rig| rig.hook(cause)?
 }
 
 /// Temperature of the water, K.
@@ -84,19 +60,16 @@ impl Hooks for CoolantPassage {
     }
 }
 
-effect_parameters! {
-    /// The duct between compressor and T2 probe has its own mass.
-    #[derive(Debug)]
-    struct OutletDuct {
-        /// Conductance from gas to duct, W/K.
-        conductance_w_k = "UA" ["W/K"] 0.0 .. 60.0, neutral 0.0, step 8.0;
-    }
-}
-
-outside_cause! {
-    OutletDuct, "X_outlet_duct", "outlet duct with its own mass",
-    "an outlet duct with a mass of its own before the T2 probe",
-    "T2 leaves a duct of 250 J/K at T_d + (T2 - T_d) exp(-UA/(m cp)); 1 W/K of it to the cell", CompressorGas, Rig::hook
+effect! {
+    struct OutletDuct "X_outlet_duct";
+    name: "outlet duct with its own mass",
+    description: "an outlet duct with a mass of its own before the T2 probe",
+    equation: "T2 leaves a duct of 250 J/K at T_d + (T2 - T_d) exp(-UA/(m cp)); 1 W/K of it to the cell",
+    source: "withheld from the diagnosis",
+    submodel: CompressorGas, also_shows_in: [];
+    /// Conductance from gas to duct, W/K.
+    conductance_w_k = "UA" ["W/K"] 0.0 .. 60.0, neutral 0.0, step 8.0;
+    |cause, rig| rig.hook(cause)?
 }
 
 /// Heat capacity of the duct, J/K.
@@ -125,19 +98,16 @@ impl Hooks for OutletDuct {
     }
 }
 
-effect_parameters! {
-    /// The clearance over the wheel grows with the housing's temperature.
-    #[derive(Debug)]
-    struct Clearance {
-        /// Loss of efficiency per 100 K, ratio.
-        loss_ratio = "k" ["1"] -0.5 .. 0.5, neutral 0.0, step 0.06;
-    }
-}
-
-outside_cause! {
-    Clearance, "X_clearance", "clearance that grows with heat",
-    "a clearance that grows as the compressor housing gets hotter than 320 K",
-    "eta (1 - k (Tc - 320 K)/100 K)", CompressorGas, Rig::hook
+effect! {
+    struct Clearance "X_clearance";
+    name: "clearance that grows with heat",
+    description: "a clearance that grows as the compressor housing gets hotter than 320 K",
+    equation: "eta (1 - k (Tc - 320 K)/100 K)",
+    source: "withheld from the diagnosis",
+    submodel: CompressorGas, also_shows_in: [];
+    /// Loss of efficiency per 100 K, ratio.
+    loss_ratio = "k" ["1"] -0.5 .. 0.5, neutral 0.0, step 0.06;
+    |cause, rig| rig.hook(cause)?
 }
 
 impl Hooks for Clearance {
@@ -146,19 +116,16 @@ impl Hooks for Clearance {
     }
 }
 
-effect_parameters! {
-    /// Heat goes from the bearing housing through the back plate into the compressed gas.
-    #[derive(Debug)]
-    struct BackPlate {
-        /// Conductance from the bearing side to the gas, W/K.
-        conductance_w_k = "G" ["W/K"] 0.0 .. 5.0, neutral 0.0, step 0.5;
-    }
-}
-
-outside_cause! {
-    BackPlate, "X_back_plate", "heat through the back plate",
-    "heat from the bearing side through the back plate into the gas behind the wheel",
-    "T2' rises by G (Tt - T2')/(m cp), taken from the turbine housing", CompressorGas, Rig::hook
+effect! {
+    struct BackPlate "X_back_plate";
+    name: "heat through the back plate",
+    description: "heat from the bearing side through the back plate into the gas behind the wheel",
+    equation: "T2' rises by G (Tt - T2')/(m cp), taken from the turbine housing",
+    source: "withheld from the diagnosis",
+    submodel: CompressorGas, also_shows_in: [];
+    /// Conductance from the bearing side to the gas, W/K.
+    conductance_w_k = "G" ["W/K"] 0.0 .. 5.0, neutral 0.0, step 0.5;
+    |cause, rig| rig.hook(cause)?
 }
 
 impl Hooks for BackPlate {
@@ -174,37 +141,28 @@ impl Hooks for BackPlate {
     }
 }
 
-effect_parameters! {
-    /// A long thin line delays the P2 sensor.
-    #[derive(Debug)]
-    struct SlowPressureLine {
-        /// Time constant of the line, s.
-        lag_s = "tau" ["s"] 0.0 .. 60.0, neutral 0.0, step 4.0;
-    }
+effect! {
+    struct SlowPressureLine "X_slow_pressure_line";
+    name: "slow pressure line",
+    description: "a slow pressure line to the P2 sensor",
+    equation: "dP2_read/dt = (P2 - P2_read)/tau",
+    source: "withheld from the diagnosis",
+    submodel: P2Sensor, also_shows_in: [];
+    /// Time constant of the line, s.
+    lag_s = "tau" ["s"] 0.0 .. 60.0, neutral 0.0, step 4.0;
+    |cause, rig| rig.instruments.path_mut(Channel::P2).lag_s += cause.lag_s
 }
 
-outside_cause! {
-    SlowPressureLine, "X_slow_pressure_line", "slow pressure line",
-    "a slow pressure line to the P2 sensor", "dP2_read/dt = (P2 - P2_read)/tau", P2Sensor,
-    |rig: &mut Rig, cause: Self| {
-        rig.instruments.path_mut(Channel::P2).lag_s += cause.lag_s;
-        Ok(())
-    }
-}
-
-effect_parameters! {
-    /// The compressor housing is attached to a cold mount.
-    #[derive(Debug)]
-    struct MountConduction {
-        /// Conductance to the mount, W/K.
-        conductance_w_k = "G" ["W/K"] 0.0 .. 20.0, neutral 0.0, step 1.5;
-    }
-}
-
-outside_cause! {
-    MountConduction, "X_mount_conduction", "conduction to the mount",
-    "the compressor housing conducts to a mount at 20 degC",
-    "G (293.15 K - Tc) to the compressor housing", CompressorHousing, Rig::hook
+effect! {
+    struct MountConduction "X_mount_conduction";
+    name: "conduction to the mount",
+    description: "the compressor housing conducts to a mount at 20 degC",
+    equation: "G (293.15 K - Tc) to the compressor housing",
+    source: "withheld from the diagnosis",
+    submodel: CompressorHousing, also_shows_in: [];
+    /// Conductance to the mount, W/K.
+    conductance_w_k = "G" ["W/K"] 0.0 .. 20.0, neutral 0.0, step 1.5;
+    |cause, rig| rig.hook(cause)?
 }
 
 impl Hooks for MountConduction {
@@ -213,18 +171,16 @@ impl Hooks for MountConduction {
     }
 }
 
-effect_parameters! {
-    /// The shaft rubs with a torque that does not depend on speed.
-    #[derive(Debug)]
-    struct CoulombFriction {
-        /// Torque, N m.
-        torque_nm = "M" ["N m"] 0.0 .. 0.2, neutral 0.0, step 0.012;
-    }
-}
-
-outside_cause! {
-    CoulombFriction, "X_coulomb_friction", "rubbing shaft",
-    "the shaft rubs with a constant torque", "-M on the shaft", Shaft, Rig::hook
+effect! {
+    struct CoulombFriction "X_coulomb_friction";
+    name: "rubbing shaft",
+    description: "the shaft rubs with a constant torque",
+    equation: "-M on the shaft",
+    source: "withheld from the diagnosis",
+    submodel: Shaft, also_shows_in: [];
+    /// Torque, N m.
+    torque_nm = "M" ["N m"] 0.0 .. 0.2, neutral 0.0, step 0.012;
+    |cause, rig| rig.hook(cause)?
 }
 
 impl Hooks for CoulombFriction {
@@ -233,19 +189,16 @@ impl Hooks for CoulombFriction {
     }
 }
 
-effect_parameters! {
-    /// Convection depends on flow otherwise than in the correlation.
-    #[derive(Debug)]
-    struct FlowDependentHtc {
-        /// Excess of the exponent.
-        exponent = "e" ["1"] -1.0 .. 1.0, neutral 0.0, step 0.25;
-    }
-}
-
-outside_cause! {
-    FlowDependentHtc, "X_flow_dependent_htc", "other exponent of convection",
-    "the exponent of the flow in the convection is other than the correlation's",
-    "h (m/0.06 kg/s)^e", CompressorGas, Rig::hook
+effect! {
+    struct FlowDependentHtc "X_flow_dependent_htc";
+    name: "other exponent of convection",
+    description: "the exponent of the flow in the convection is other than the correlation's",
+    equation: "h (m/0.06 kg/s)^e",
+    source: "withheld from the diagnosis",
+    submodel: CompressorGas, also_shows_in: [];
+    /// Excess of the exponent.
+    exponent = "e" ["1"] -1.0 .. 1.0, neutral 0.0, step 0.25;
+    |cause, rig| rig.hook(cause)?
 }
 
 impl Hooks for FlowDependentHtc {
@@ -254,20 +207,14 @@ impl Hooks for FlowDependentHtc {
     }
 }
 
-effect_parameters! {
-    /// The probe in the housing is slow.
-    #[derive(Debug)]
-    struct SlowHousingProbe {
-        /// Time constant of the probe, s.
-        lag_s = "tau" ["s"] 0.0 .. 120.0, neutral 0.0, step 12.0;
-    }
-}
-
-outside_cause! {
-    SlowHousingProbe, "X_slow_housing_probe", "slow housing probe",
-    "a slow probe in the compressor housing", "dTc_read/dt = (Tc - Tc_read)/tau", TcProbe,
-    |rig: &mut Rig, cause: Self| {
-        rig.instruments.path_mut(Channel::Tc).lag_s += cause.lag_s;
-        Ok(())
-    }
+effect! {
+    struct SlowHousingProbe "X_slow_housing_probe";
+    name: "slow housing probe",
+    description: "a slow probe in the compressor housing",
+    equation: "dTc_read/dt = (Tc - Tc_read)/tau",
+    source: "withheld from the diagnosis",
+    submodel: TcProbe, also_shows_in: [];
+    /// Time constant of the probe, s.
+    lag_s = "tau" ["s"] 0.0 .. 120.0, neutral 0.0, step 12.0;
+    |cause, rig| rig.instruments.path_mut(Channel::Tc).lag_s += cause.lag_s
 }

@@ -6,7 +6,7 @@ use crate::lease::Lease;
 use crate::link::Link;
 use crate::protocol::{
     Code, Configure, DescribeResult, Failure, Hello, MAGIC, Message, Poll, Samples, VERSION, Welcome, batch,
-    read_description, read_error, write_setpoints,
+    read_description, read_error,
 };
 use crate::sample_queue::{ROUNDING_S, SampleQueue};
 use crate::secrets::Secrets;
@@ -422,7 +422,7 @@ impl Backend for Driver {
         };
         self.rig()?.accepts.unwrap_or(unlimited).check(setpoints)?;
         self.require_armed("set")?;
-        self.request("set", &write_setpoints(setpoints), self.timeouts.call).map(drop)
+        self.request("set", setpoints, self.timeouts.call).map(drop)
     }
 
     fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError> {

@@ -1,11 +1,13 @@
 //! The interface between the program and a gas stand, real or simulated.
 
 use crate::{Channel, GuardName, SafeTrajectory, SampleBatch, with_unit};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Whether gas flows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
+#[schemars(rename = "Mode")]
 pub enum RigMode {
     /// Air off, shaft at rest; for soaks and zeros.
     Standstill,
@@ -13,8 +15,8 @@ pub enum RigMode {
     Running,
 }
 
-/// All setpoints of a rig.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+/// All setpoints of a rig, effective at once.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Setpoints {
     /// Air on or off.
     pub mode: RigMode,

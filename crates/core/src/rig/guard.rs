@@ -168,9 +168,11 @@ impl GuardSet {
 }
 
 /// The safe shutdown: open the valve and switch the heater off at once, reduce the turbine inlet pressure at its slew rate, cut the air.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(rename = "SafeShutdown")]
 pub struct SafeTrajectory {
-    /// Rate at which P3 goes down, Pa/s, > 0; `None`: the air is cut at once.
+    /// Rate at which P3 goes down, Pa/s, > 0; `null`: the air is cut at once.
+    #[serde(default)]
     pub p3_slew_pa_s: Option<f64>,
     /// Opening of the back-pressure valve during the shutdown, ratio; a step with a larger opening keeps it.
     pub valve_opening_ratio: f64,

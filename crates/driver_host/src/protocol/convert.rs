@@ -1,10 +1,7 @@
 //! Conversion between messages and the types of the core.
 
-use crate::protocol::message::{ChannelDescription, Description, Mode, Ranges, SafeShutdown, Setpoints};
-use mapper_core::{
-    Channel, GuardName, RigDescription, RigMode, SafeTrajectory, SetpointRange, SetpointRanges,
-    UnknownChannel,
-};
+use crate::protocol::message::{ChannelDescription, Description, Ranges};
+use mapper_core::{Channel, GuardName, RigDescription, SetpointRange, SetpointRanges, UnknownChannel};
 use std::collections::BTreeSet;
 
 /// Maximum sample rate of a rig, Hz: a hundred times that of the fastest logs of gas stands, and a second of it fits into memory.
@@ -124,11 +121,7 @@ pub fn read_description(
         reached_at: wire.reached_at.clone(),
         needs_guarded: wire.needs_guarded.iter().map(guard).collect::<Result<_, _>>()?,
         accepts: wire.accepts.as_ref().map(read_ranges),
-        safe: SafeTrajectory {
-            p3_slew_pa_s: safe.p3_slew_pa_s,
-            valve_opening_ratio: safe.valve_opening_ratio,
-            within_s: safe.within_s,
-        },
+        safe: wire.safe,
     })
 }
 
@@ -173,38 +166,6 @@ pub fn write_description(rig: &RigDescription) -> Description {
             valve_opening_ratio: range(accepts.valve_opening_ratio),
             oil_temperature_k: range(accepts.oil_temperature_k),
         }),
-        safe: SafeShutdown {
-            p3_slew_pa_s: rig.safe.p3_slew_pa_s,
-            valve_opening_ratio: rig.safe.valve_opening_ratio,
-            within_s: rig.safe.within_s,
-        },
-    }
-}
-
-/// Writes setpoints as a host sends them.
-pub fn write_setpoints(setpoints: &mapper_core::Setpoints) -> Setpoints {
-    Setpoints {
-        mode: match setpoints.mode {
-            RigMode::Standstill => Mode::Standstill,
-            RigMode::Running => Mode::Running,
-        },
-        p3_pa: setpoints.p3_pa,
-        t3_k: setpoints.t3_k,
-        valve_opening_ratio: setpoints.valve_opening_ratio,
-        oil_temperature_k: setpoints.oil_temperature_k,
-    }
-}
-
-/// Reads setpoints as a driver receives them.
-pub fn read_setpoints(wire: &Setpoints) -> mapper_core::Setpoints {
-    mapper_core::Setpoints {
-        mode: match wire.mode {
-            Mode::Standstill => RigMode::Standstill,
-            Mode::Running => RigMode::Running,
-        },
-        p3_pa: wire.p3_pa,
-        t3_k: wire.t3_k,
-        valve_opening_ratio: wire.valve_opening_ratio,
-        oil_temperature_k: wire.oil_temperature_k,
+        safe: rig.safe,
     }
 }

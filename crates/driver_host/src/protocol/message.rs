@@ -1,5 +1,6 @@
 //! The messages. SI units; the name of a number contains its unit. Unknown fields are ignored.
 
+use mapper_core::SafeTrajectory;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -192,7 +193,7 @@ pub struct Description {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub accepts: Option<Ranges>,
     /// Its safe shutdown.
-    pub safe: SafeShutdown,
+    pub safe: SafeTrajectory,
 }
 
 fn default_true() -> bool {
@@ -222,43 +223,6 @@ pub struct Ranges {
     pub valve_opening_ratio: (f64, f64),
     /// Oil inlet temperature, K.
     pub oil_temperature_k: (f64, f64),
-}
-
-/// The safe shutdown: the valve opens and the heater is switched off at once, P3 is lowered at a limited rate, then the air is cut.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct SafeShutdown {
-    /// Rate at which P3 is lowered, Pa/s; `null`: the air is cut at once.
-    #[serde(default)]
-    pub p3_slew_pa_s: Option<f64>,
-    /// Opening of the valve during the shutdown, ratio.
-    pub valve_opening_ratio: f64,
-    /// Maximum duration of the shutdown, s.
-    pub within_s: f64,
-}
-
-/// Whether gas flows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Mode {
-    /// Air off, shaft at rest.
-    Standstill,
-    /// Air on.
-    Running,
-}
-
-/// `set`: all commands to the rig, effective at once.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Setpoints {
-    /// Air.
-    pub mode: Mode,
-    /// Turbine inlet total pressure, Pa.
-    pub p3_pa: f64,
-    /// Turbine inlet total temperature, K.
-    pub t3_k: f64,
-    /// Opening of the back-pressure valve, ratio.
-    pub valve_opening_ratio: f64,
-    /// Oil inlet temperature, K.
-    pub oil_temperature_k: f64,
 }
 
 /// `poll`: advances simulated time. The samples are sent as notes before the answer.

@@ -8,12 +8,12 @@ mod message;
 mod samples;
 mod schema;
 
-pub use convert::{InvalidData, read_description, read_setpoints, write_description, write_setpoints};
+pub use convert::{InvalidData, read_description, write_description};
 pub use convert_error::{read_error, write_error};
 pub use frame::{Encoding, FrameError, decode, encode, read_frame, write_frame};
 pub use message::{
     ChannelDescription, Code, Configure, DescribeResult, Description, Failure, Hello, LastSample, Message,
-    Mode, Note, Poll, Ranges, SafeShutdown, Setpoints, Version, Welcome,
+    Note, Poll, Ranges, Version, Welcome,
 };
 pub use samples::{Column, ElementSamples, RigEvent, Samples, TruthSamples, batch, split_batch};
 pub use schema::schema;

@@ -3,10 +3,10 @@
 use crate::armed::Armed;
 use crate::descent::{Descent, make_safe};
 use crate::refusal::{Refusal, call_author_code, missing_settings, read_params, refusal, write_result};
-use mapper_core::{Backend, BackendError, RigDescription};
+use mapper_core::{Backend, BackendError, RigDescription, Setpoints};
 use mapper_driver_host::protocol::{
     Code, Configure, DescribeResult, FRAME_LIMIT_BYTES, Hello, LEASE_S, LastSample, MAGIC, Message, Poll,
-    VERSION, Welcome, read_setpoints, split_batch, write_description, write_error,
+    VERSION, Welcome, split_batch, write_description, write_error,
 };
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
@@ -149,7 +149,7 @@ impl Server {
     }
 
     fn set(&mut self, params: &Value) -> Result<Value, Refusal> {
-        let wanted = read_setpoints(&read_params(params)?);
+        let wanted: Setpoints = read_params(params)?;
         let (rig, description, armed) = self.armed_rig()?;
         if armed.has_ended || armed.descent.is_some() {
             return Err(lease_ended_refusal());
@@ -307,7 +307,7 @@ fn lease_ended_refusal() -> Refusal {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mapper_core::{Channel, ChannelColumn, RigMode, SafeTrajectory, SampleBatch, Setpoints};
+    use mapper_core::{Channel, ChannelColumn, RigMode, SafeTrajectory, SampleBatch};
     use mapper_driver_host::protocol::Failure;
     use proptest::prelude::*;
     use std::sync::{Arc, Mutex};
@@ -420,7 +420,7 @@ mod tests {
             valve_opening_ratio: 0.7,
             oil_temperature_k: 323.15,
         };
-        serde_json::to_value(mapper_driver_host::protocol::write_setpoints(&setpoints)).unwrap()
+        serde_json::to_value(setpoints).unwrap()
     }
 
     fn ask(server: &mut Server, now_s: f64, method: &str, params: Value) -> Option<Failure> {

@@ -6,7 +6,6 @@
 use mapper_core::{Backend, BackendError, RigMode, Setpoints};
 use mapper_driver_host::protocol::{
     Encoding, FRAME_LIMIT_BYTES, LEASE_S, MAGIC, Message, VERSION, decode, encode, read_frame, write_frame,
-    write_setpoints,
 };
 use mapper_driver_host::{DEFAULT_TIMEOUTS, Driver, Timeouts};
 use notify::{RecommendedWatcher, RecursiveMode, Watcher};
@@ -198,7 +197,7 @@ impl Read {
 fn an_unread_pipe_does_not_delay_the_rig() {
     let lab = Lab::new();
     let mut pipes = Pipes::to(&lab.settings);
-    let set = pipes.send("set", serde_json::to_value(write_setpoints(&SETPOINTS)).unwrap());
+    let set = pipes.send("set", serde_json::to_value(SETPOINTS).unwrap());
     lab.commands("set air on");
     let last_word = Instant::now();
     lab.commands("T3 293 K");
@@ -207,7 +206,7 @@ fn an_unread_pipe_does_not_delay_the_rig() {
     assert!((LEASE_S - 0.1..10.0).contains(&began_s), "{began_s} s");
     lab.assert_run_down();
     // Refused, since the lease has ended; the next requests are executed.
-    let repeated = pipes.send("set", serde_json::to_value(write_setpoints(&SETPOINTS)).unwrap());
+    let repeated = pipes.send("set", serde_json::to_value(SETPOINTS).unwrap());
     let (mut answers, mut notes, mut unread) = (vec![set, repeated], Vec::new(), Duration::ZERO);
     let read = loop {
         let safe = pipes.send("make_safe", json!({}));
@@ -241,7 +240,7 @@ fn an_unread_pipe_does_not_delay_the_rig() {
 fn a_driver_with_a_full_pipe_ends_without_its_host() {
     let lab = Lab::new();
     let mut pipes = Pipes::to(&lab.settings);
-    pipes.send("set", serde_json::to_value(write_setpoints(&SETPOINTS)).unwrap());
+    pipes.send("set", serde_json::to_value(SETPOINTS).unwrap());
     lab.assert_run_down();
     // Its output stays open and full.
     drop(std::mem::replace(

@@ -13,6 +13,7 @@ mod coded_enum;
 mod identification;
 mod maps;
 mod measurement;
+mod named_enum;
 mod names;
 mod rig;
 mod schema;
@@ -68,6 +69,7 @@ pub use measurement::recording::{ReadingOrigin, Recording, RecordingError, Serie
 pub use measurement::redundant::{DeclaredElement, Element, MAX_ELEMENTS, RedundantSensors, UnknownElement};
 pub use measurement::sample::{ChannelColumn, ElementColumn, Provenance, Quality, SampleBatch, TruthColumn};
 pub use measurement::step_marker::StepMarker;
+pub use named_enum::UnknownName;
 pub use names::column_name::{Clarity, ColumnName, Place};
 pub use names::measured::Measured;
 pub use names::missing::is_missing_mark;

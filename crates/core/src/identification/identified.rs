@@ -1,33 +1,22 @@
 //! Identification result of one point, with its uncertainty.
 
+use crate::named_enum::named_enum;
 use crate::{CommonErrors, OperatingPoint, StepKind, Warning};
 use serde::{Deserialize, Serialize};
 
-/// Method that identified a point.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Method {
-    /// Apparent efficiency from the temperature rise at the end of the step (conventional mapping).
-    Steady,
-    /// Efficiency and heat-transfer coefficient from the transient (Burke et al., eqs. 1-3).
-    Dynamic,
-    /// All points of a campaign together: like `Dynamic`, with shared parameters fitted over all of them.
-    Joint,
-    /// Steady points, with the heat to the measured housing removed by eqs. 1-3 and a known law of convection.
-    Corrected,
-    /// Read from a map that does not state its method.
-    Imported,
-}
-
-impl std::fmt::Display for Method {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Method::Steady => "steady",
-            Method::Dynamic => "dynamic",
-            Method::Joint => "joint",
-            Method::Corrected => "corrected",
-            Method::Imported => "imported",
-        })
+named_enum! {
+    /// Method that identified a point.
+    pub enum Method {
+        /// Apparent efficiency from the temperature rise at the end of the step (conventional mapping).
+        Steady = "steady",
+        /// Efficiency and heat-transfer coefficient from the transient (Burke et al., eqs. 1-3).
+        Dynamic = "dynamic",
+        /// All points of a campaign together: like `Dynamic`, with shared parameters fitted over all of them.
+        Joint = "joint",
+        /// Steady points, with the heat to the measured housing removed by eqs. 1-3 and a known law of convection.
+        Corrected = "corrected",
+        /// Read from a map that does not state its method.
+        Imported = "imported",
     }
 }
 

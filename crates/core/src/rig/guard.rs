@@ -1,49 +1,33 @@
 //! Guards of a run: the terms that campaigns, rigs and runner share.
 
 use crate::Channel;
+use crate::named_enum::named_enum;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A guard, by its key in campaigns.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum GuardName {
-    /// Shaft speed.
-    Overspeed,
-    /// Compressor outlet temperature, T2.
-    CompressorOutletTemperature,
-    /// Turbine inlet temperature, T3.
-    TurbineInletTemperature,
-    /// Turbine inlet pressure, P3.
-    TurbineInletPressure,
-    /// Oil inlet temperature.
-    OilTemperature,
-    /// Change of the compressor housing.
-    HousingGradient,
-    /// Variation of pressure and flow.
-    Surge,
-    /// A target speed that is missed at the end of the step.
-    Speed,
-    /// Samples in order, in time, and not frozen.
-    Signals,
-    /// The state that the rig reports.
-    Rig,
-}
-
-impl std::fmt::Display for GuardName {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            GuardName::Overspeed => "overspeed",
-            GuardName::CompressorOutletTemperature => "compressor_outlet_temperature",
-            GuardName::TurbineInletTemperature => "turbine_inlet_temperature",
-            GuardName::TurbineInletPressure => "turbine_inlet_pressure",
-            GuardName::OilTemperature => "oil_temperature",
-            GuardName::HousingGradient => "housing_gradient",
-            GuardName::Surge => "surge",
-            GuardName::Speed => "speed",
-            GuardName::Signals => "signals",
-            GuardName::Rig => "rig",
-        })
+named_enum! {
+    /// A guard, by its key in campaigns.
+    pub enum GuardName {
+        /// Shaft speed.
+        Overspeed = "overspeed",
+        /// Compressor outlet temperature, T2.
+        CompressorOutletTemperature = "compressor_outlet_temperature",
+        /// Turbine inlet temperature, T3.
+        TurbineInletTemperature = "turbine_inlet_temperature",
+        /// Turbine inlet pressure, P3.
+        TurbineInletPressure = "turbine_inlet_pressure",
+        /// Oil inlet temperature.
+        OilTemperature = "oil_temperature",
+        /// Change of the compressor housing.
+        HousingGradient = "housing_gradient",
+        /// Variation of pressure and flow.
+        Surge = "surge",
+        /// A target speed that is missed at the end of the step.
+        Speed = "speed",
+        /// Samples in order, in time, and not frozen.
+        Signals = "signals",
+        /// The state that the rig reports.
+        Rig = "rig",
     }
 }
 

@@ -106,10 +106,7 @@ pub fn read_description(
     if let Some(slew_pa_s) = safe.p3_slew_pa_s {
         check_number("slew of P3 during the safe shutdown", slew_pa_s, "Pa/s", f64::MIN_POSITIVE..=1e9)?;
     }
-    let guard = |name: &String| {
-        let known = serde_json::from_value::<GuardName>(serde_json::Value::String(name.clone()));
-        known.map_err(|_| InvalidData::Guard(name.clone()))
-    };
+    let guard = |name: &String| name.parse::<GuardName>().map_err(|_| InvalidData::Guard(name.clone()));
     Ok(RigDescription {
         backend: backend.to_owned(),
         version: version.to_owned(),

@@ -3,8 +3,8 @@
 use crate::machine::hooks::{Hooks, TooManyExtraStates};
 use crate::rig::instruments::Instruments;
 use crate::simulation::model::Model;
-use mapper_core::with_unit;
-use serde::{Deserialize, Serialize};
+use mapper_core::{named_enum, with_unit};
+use serde::Serialize;
 use std::borrow::Cow;
 use std::sync::Arc;
 
@@ -32,97 +32,47 @@ impl Rig {
     }
 }
 
-/// The parts of a rig in which a gap can originate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Submodel {
-    /// Response of P3 to its command.
-    Actuator,
-    /// Flow that the turbine swallows.
-    TurbineFlow,
-    /// Speed from the balance of powers.
-    Shaft,
-    /// Flow from speed and pressure ratio.
-    CompressorFlow,
-    /// The meter of the compressor's flow.
-    FlowMeter,
-    /// Volume and back-pressure valve.
-    Outlet,
-    /// Gas temperature through the compressor.
-    CompressorGas,
-    /// Probe before the compressor.
-    T1Probe,
-    /// Probe after the compressor.
-    T2Probe,
-    /// Probe in the compressor housing.
-    TcProbe,
-    /// Pressure sensor after the compressor.
-    P2Sensor,
-    /// Pressure sensor before the compressor.
-    P1Sensor,
-    /// Pressure sensor before the turbine.
-    P3Sensor,
-    /// Probe before the turbine.
-    T3Probe,
-    /// Pressure sensor after the turbine.
-    P4Sensor,
-    /// Probe of the oil's temperature.
-    OilProbe,
-    /// Sensor of the shaft speed.
-    SpeedSensor,
-    /// Metal of the compressor.
-    CompressorHousing,
-    /// Metal of the turbine.
-    TurbineHousing,
-}
-
-impl Submodel {
-    /// All submodels, in the order of the flow.
-    pub const ALL: [Submodel; 19] = [
-        Submodel::Actuator,
-        Submodel::TurbineFlow,
-        Submodel::Shaft,
-        Submodel::CompressorFlow,
-        Submodel::FlowMeter,
-        Submodel::Outlet,
-        Submodel::CompressorGas,
-        Submodel::T1Probe,
-        Submodel::T2Probe,
-        Submodel::TcProbe,
-        Submodel::P2Sensor,
-        Submodel::P1Sensor,
-        Submodel::P3Sensor,
-        Submodel::T3Probe,
-        Submodel::P4Sensor,
-        Submodel::OilProbe,
-        Submodel::SpeedSensor,
-        Submodel::CompressorHousing,
-        Submodel::TurbineHousing,
-    ];
-
-    /// Name in files and reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Submodel::Actuator => "actuator",
-            Submodel::TurbineFlow => "turbine_flow",
-            Submodel::Shaft => "shaft",
-            Submodel::CompressorFlow => "compressor_flow",
-            Submodel::FlowMeter => "flow_meter",
-            Submodel::Outlet => "outlet",
-            Submodel::CompressorGas => "compressor_gas",
-            Submodel::T1Probe => "t1_probe",
-            Submodel::T2Probe => "t2_probe",
-            Submodel::TcProbe => "tc_probe",
-            Submodel::P2Sensor => "p2_sensor",
-            Submodel::P1Sensor => "p1_sensor",
-            Submodel::P3Sensor => "p3_sensor",
-            Submodel::T3Probe => "t3_probe",
-            Submodel::P4Sensor => "p4_sensor",
-            Submodel::OilProbe => "oil_probe",
-            Submodel::SpeedSensor => "speed_sensor",
-            Submodel::CompressorHousing => "compressor_housing",
-            Submodel::TurbineHousing => "turbine_housing",
-        }
+named_enum! {
+    /// The parts of a rig in which a gap can originate.
+    pub enum Submodel {
+        /// Response of P3 to its command.
+        Actuator = "actuator",
+        /// Flow that the turbine swallows.
+        TurbineFlow = "turbine_flow",
+        /// Speed from the balance of powers.
+        Shaft = "shaft",
+        /// Flow from speed and pressure ratio.
+        CompressorFlow = "compressor_flow",
+        /// The meter of the compressor's flow.
+        FlowMeter = "flow_meter",
+        /// Volume and back-pressure valve.
+        Outlet = "outlet",
+        /// Gas temperature through the compressor.
+        CompressorGas = "compressor_gas",
+        /// Probe before the compressor.
+        T1Probe = "t1_probe",
+        /// Probe after the compressor.
+        T2Probe = "t2_probe",
+        /// Probe in the compressor housing.
+        TcProbe = "tc_probe",
+        /// Pressure sensor after the compressor.
+        P2Sensor = "p2_sensor",
+        /// Pressure sensor before the compressor.
+        P1Sensor = "p1_sensor",
+        /// Pressure sensor before the turbine.
+        P3Sensor = "p3_sensor",
+        /// Probe before the turbine.
+        T3Probe = "t3_probe",
+        /// Pressure sensor after the turbine.
+        P4Sensor = "p4_sensor",
+        /// Probe of the oil's temperature.
+        OilProbe = "oil_probe",
+        /// Sensor of the shaft speed.
+        SpeedSensor = "speed_sensor",
+        /// Metal of the compressor.
+        CompressorHousing = "compressor_housing",
+        /// Metal of the turbine.
+        TurbineHousing = "turbine_housing",
     }
 }
 

@@ -1,5 +1,7 @@
 //! A reproduced figure as data.
 
+use mapper_core::named_enum;
+
 /// One reproduced figure of the paper.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FigureResult {
@@ -23,30 +25,21 @@ impl Statement {
     }
 }
 
-/// Verdict on a statement of the paper.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verdict {
-    /// It holds.
-    Holds,
-    /// It holds with an exception, named in `here`.
-    Partly,
-    /// It does not hold.
-    Differs,
+named_enum! {
+    /// Verdict on a statement of the paper.
+    pub enum Verdict {
+        /// It holds.
+        Holds = "holds",
+        /// It holds with an exception, named in `here`.
+        Partly = "partly",
+        /// It does not hold.
+        Differs = "differs",
+    }
 }
 
 impl Verdict {
     pub(crate) fn holds_if(condition: bool) -> Self {
         if condition { Verdict::Holds } else { Verdict::Differs }
-    }
-}
-
-impl std::fmt::Display for Verdict {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Verdict::Holds => "holds",
-            Verdict::Partly => "partly",
-            Verdict::Differs => "differs",
-        })
     }
 }
 

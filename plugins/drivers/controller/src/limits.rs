@@ -1,6 +1,6 @@
 //! Setpoint limits and safe state of a stand, as campaigns write them.
 
-use mapper_core::{Channel, GuardName, SafeTrajectory, SetpointRange, SetpointRanges};
+use mapper_core::{Channel, GuardName, SafeTrajectory, SetpointRange, SetpointRanges, named_enum};
 use mapper_yaml::units::{Duration, Pressure, PressureRate, Quantity, Temperature};
 use serde::Deserialize;
 
@@ -8,38 +8,21 @@ use serde::Deserialize;
 pub const REQUIRED_GUARDS: [(GuardName, Channel); 2] =
     [(GuardName::Overspeed, Channel::ShaftSpeed), (GuardName::TurbineInletPressure, Channel::P3)];
 
-/// A quantity that the driver writes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Target {
-    /// Turbine inlet total pressure, Pa.
-    P3,
-    /// Turbine inlet total temperature, K.
-    T3,
-    /// Opening of the back-pressure valve, ratio.
-    Valve,
-    /// Oil inlet temperature, K.
-    OilTemperature,
-    /// 1: air on, 0: off.
-    Air,
-    /// Counts up twice a second; the controller cuts the air if it stops.
-    Heartbeat,
-}
-
-impl Target {
-    /// All, in the order of campaigns.
-    pub const ALL: [Target; 6] =
-        [Target::P3, Target::T3, Target::Valve, Target::OilTemperature, Target::Air, Target::Heartbeat];
-
-    /// Its key in campaigns.
-    pub fn key(self) -> &'static str {
-        match self {
-            Target::P3 => "p3",
-            Target::T3 => "t3",
-            Target::Valve => "valve",
-            Target::OilTemperature => "oil_temperature",
-            Target::Air => "air",
-            Target::Heartbeat => "heartbeat",
-        }
+named_enum! {
+    /// A quantity that the driver writes.
+    pub enum Target {
+        /// Turbine inlet total pressure, Pa.
+        P3 = "p3",
+        /// Turbine inlet total temperature, K.
+        T3 = "t3",
+        /// Opening of the back-pressure valve, ratio.
+        Valve = "valve",
+        /// Oil inlet temperature, K.
+        OilTemperature = "oil_temperature",
+        /// 1: air on, 0: off.
+        Air = "air",
+        /// Counts up twice a second; the controller cuts the air if it stops.
+        Heartbeat = "heartbeat",
     }
 }
 

@@ -91,7 +91,7 @@ impl Stand {
         }
         for target in Target::ALL {
             let range = self.accepts.range(target);
-            let path = format!("accepts.{}", target.key());
+            let path = format!("accepts.{}", target.name());
             check_range(range.high - range.low, "", 0.0, f64::MAX).map_err(at(&path))?;
         }
         let opening = self.accepts.range(Target::Valve);

@@ -1,54 +1,34 @@
 //! Numbers in 16-bit registers.
 
-use serde::Deserialize;
+use mapper_core::named_enum;
 
-/// Number format in registers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub(crate) enum NumberFormat {
-    U16,
-    I16,
-    U32,
-    I32,
-    #[default]
-    F32,
-    F64,
+named_enum! {
+    /// Number format in registers.
+    #[derive(Default)]
+    pub(crate) enum NumberFormat {
+        U16 = "u16",
+        I16 = "i16",
+        U32 = "u32",
+        I32 = "i32",
+        #[default]
+        F32 = "f32",
+        F64 = "f64",
+    }
 }
 
-/// Order of words, or of bytes in a word.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub(crate) enum Order {
-    /// Most significant first, the Modbus default.
-    #[default]
-    Big,
-    /// Least significant first.
-    Little,
-}
-
-impl Order {
-    /// As campaigns write it.
-    pub(crate) fn key(self) -> &'static str {
-        match self {
-            Order::Big => "big",
-            Order::Little => "little",
-        }
+named_enum! {
+    /// Order of words, or of bytes in a word.
+    #[derive(Default)]
+    pub(crate) enum Order {
+        /// Most significant first, the Modbus default.
+        #[default]
+        Big = "big",
+        /// Least significant first.
+        Little = "little",
     }
 }
 
 impl NumberFormat {
-    /// As campaigns write it.
-    pub(crate) fn key(self) -> &'static str {
-        match self {
-            NumberFormat::U16 => "u16",
-            NumberFormat::I16 => "i16",
-            NumberFormat::U32 => "u32",
-            NumberFormat::I32 => "i32",
-            NumberFormat::F32 => "f32",
-            NumberFormat::F64 => "f64",
-        }
-    }
-
     /// Whether it is an integer format.
     pub(crate) fn is_whole(self) -> bool {
         !matches!(self, NumberFormat::F32 | NumberFormat::F64)

@@ -82,7 +82,7 @@ impl RegisterError {
         let registers: Vec<_> = registers.iter().map(|word| format!("{word:#06x}")).collect();
         RegisterError::Written {
             source: Box::new(source),
-            key: target.key(),
+            key: target.name(),
             value,
             registers: registers.join(" "),
         }
@@ -140,14 +140,14 @@ impl Controller for Registers {
 
     fn describe_source(&self, channel: Channel) -> String {
         let Some(entry) = self.settings.read.get(&channel) else { return "no register".to_owned() };
-        let (words, bytes) = (self.settings.words.key(), self.settings.bytes.key());
+        let (words, bytes) = (self.settings.words.name(), self.settings.bytes.name());
         let order = format!("`words: {words}`, `bytes: {bytes}`");
         let holds: Vec<_> = self.last_words(entry).iter().map(|word| format!("{word:#06x}")).collect();
         format!(
             "register {} ({}, as {} with {order}, scale {}, offset {})",
             entry.register,
             holds.join(" "),
-            entry.form.key(),
+            entry.form.name(),
             entry.scale,
             entry.offset
         )
@@ -156,7 +156,7 @@ impl Controller for Registers {
     fn remedy(&self) -> String {
         match self.find_plausible_order() {
             Some((words, bytes)) => {
-                let (words, bytes) = (words.key(), bytes.key());
+                let (words, bytes) = (words.name(), bytes.name());
                 format!("With `words: {words}` and `bytes: {bytes}` all channels are plausible")
             }
             None => "Check `words` and `bytes`, and `register`, `type`, `scale` and `offset` of the channel"

@@ -170,7 +170,7 @@ impl Settings {
         self.check_read_registers()?;
         let mut used: Vec<u16> = Vec::new();
         for target in Target::ALL {
-            let (path, entry) = (format!("write.{}", target.key()), self.register_settings(target));
+            let (path, entry) = (format!("write.{}", target.name()), self.register_settings(target));
             if entry.table != Table::Holding {
                 return Err(settings_error(format!("{path}.table"), SettingError::NotWritten));
             }
@@ -211,7 +211,7 @@ impl Settings {
                 if let Some(target) =
                     Target::ALL.into_iter().find(goes_to).filter(|_| entry.table == Table::Holding)
                 {
-                    return Err(at(SettingError::ReadsSetpoint { register, key: target.key() }));
+                    return Err(at(SettingError::ReadsSetpoint { register, key: target.name() }));
                 }
             }
         }

@@ -65,7 +65,7 @@ pub(crate) enum LinkError {
     Refused { server: String, node: NodeId, value: f64, message: String },
     #[error("the node {node} cannot hold {value}")]
     DoesNotFit { node: NodeId, value: f64 },
-    #[error("the type of {} is not known yet", .0.key())]
+    #[error("the type of {} is not known yet", .0.name())]
     Unknown(Target),
     #[error(transparent)]
     Store(#[from] StoreError),

@@ -171,7 +171,7 @@ impl Nodes {
         let node_error = |message: String| Err(LinkError::Node { node: node.clone(), message });
         let Some((_, scale)) = self.checked.write(target) else { return Err(LinkError::Unknown(target)) };
         let range = self.checked.settings.accepts.range(target);
-        let key = target.key();
+        let key = target.name();
         let name = type_name(variant);
         // Only air may be a Boolean.
         let is_bool = matches!(variant, Variant::Boolean(_)) && target != Target::Air;

@@ -255,14 +255,14 @@ impl Settings {
             if let Some(target) =
                 Target::ALL.into_iter().find(|target| self.write.node(*target).0.node == node)
             {
-                return Err(at(SettingError::ReadsSetpoint { node, key: target.key() }));
+                return Err(at(SettingError::ReadsSetpoint { node, key: target.name() }));
             }
             reads.push((*channel, node, scale));
         }
         let mut writes: BTreeMap<Target, (NodeId, Scale)> = BTreeMap::new();
         for target in Target::ALL {
             let (entry, unit_channel) = self.write.node(target);
-            let path = format!("write.{}", target.key());
+            let path = format!("write.{}", target.name());
             let scale = entry.scale(unit_channel).map_err(|error| settings_error(path.clone(), error))?;
             if writes.values().any(|(node, _)| *node == entry.node) {
                 return Err(settings_error(path, SettingError::Shared(entry.node.clone())));

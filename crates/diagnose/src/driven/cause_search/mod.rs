@@ -15,4 +15,4 @@ pub use diagnose::{SideRequest, diagnose};
 pub use side_diagnosis::{
     Beyond, Cause, ChannelTrace, Diagnosis, HeldOut, NotDiagnosable, Phase, SideVerdict, Unknown,
 };
-pub use sides::side::{Side, UnknownSide};
+pub use sides::side::Side;

@@ -2,45 +2,16 @@
 
 use crate::driven::log_rows::{Rows, SideChannels};
 use crate::driven::parameters::Parameter;
-use mapper_core::Channel;
+use mapper_core::{Channel, named_enum};
 use mapper_physics::rig::effect::{Rig, Submodel};
-use serde::{Deserialize, Serialize};
-use std::str::FromStr;
 
-/// One side of a machine.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Side {
-    /// Speed, flow, P1, P2 and T1 drive it; T2 and Tc are judged.
-    Compressor,
-    /// Speed, turbine flow, P3, T3 and P4 drive it; T4 and Tt are judged.
-    Turbine,
-}
-
-impl Side {
-    /// Display name.
-    pub fn name(self) -> &'static str {
-        match self {
-            Side::Compressor => "compressor",
-            Side::Turbine => "turbine",
-        }
-    }
-}
-
-/// An unknown side.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("`{name}` is not a side of the machine; the sides are compressor and turbine")]
-pub struct UnknownSide {
-    /// The requested name.
-    pub name: String,
-}
-
-impl FromStr for Side {
-    type Err = UnknownSide;
-
-    fn from_str(name: &str) -> Result<Self, UnknownSide> {
-        let found = [Side::Compressor, Side::Turbine].into_iter().find(|which| which.name() == name);
-        found.ok_or_else(|| UnknownSide { name: name.to_owned() })
+named_enum! {
+    /// One side of a machine.
+    pub enum Side {
+        /// Speed, flow, P1, P2 and T1 drive it; T2 and Tc are judged.
+        Compressor = "compressor",
+        /// Speed, turbine flow, P3, T3 and P4 drive it; T4 and Tt are judged.
+        Turbine = "turbine",
     }
 }
 

@@ -81,9 +81,9 @@ impl Metric {
         }
     }
 
-    /// The figure of this name.
+    /// The metric of this name.
     pub fn find(name: &str) -> Option<Metric> {
-        Metric::ALL.into_iter().find(|figure| figure.name() == name)
+        Metric::ALL.into_iter().find(|metric| metric.name() == name)
     }
 
     /// Display unit, and the factor from the stored value to it.

@@ -2,6 +2,7 @@
 
 use super::error::HeatCorrectionError;
 use super::work::WorkPoint;
+use mapper_numerics::statistics::mean;
 use nalgebra::{DMatrix, DVector};
 
 /// Robust standard deviations beyond which a residual loses weight (Huber).
@@ -49,7 +50,7 @@ pub fn estimate_heat(points: &[WorkPoint]) -> Result<HeatEstimate, HeatCorrectio
         return Err(HeatCorrectionError::Singular);
     }
     let count = left_out.len() as f64;
-    let mean_w = left_out.iter().sum::<f64>() / count;
+    let mean_w = mean(&left_out).ok_or(HeatCorrectionError::Singular)?;
     let spread = left_out.iter().map(|heat_w| (heat_w - mean_w).powi(2)).sum::<f64>();
     Ok(HeatEstimate { heat_w, standard_error_w: ((count - 1.0) / count * spread).sqrt(), scatter_ratio })
 }

@@ -126,6 +126,15 @@ fn max_difference(
     used().filter_map(|(_, mean)| Some(((*mean)? - fused).abs())).fold(0.0, f64::max)
 }
 
+/// A sensor in use.
+struct Member {
+    weight: f64,
+    /// Declared error of one reading, one standard deviation.
+    sigma: f64,
+    /// Readings at the times of the fused channel.
+    values: Vec<f64>,
+}
+
 /// The fused reading at each time; `None` if no sensor is in use.
 fn fused_values(
     channel: Channel,
@@ -135,19 +144,19 @@ fn fused_values(
     t_s: &[f64],
 ) -> Option<Vec<f64>> {
     let interval_s = median(t_s.windows(2).map(|pair| pair[1] - pair[0])).unwrap_or(0.0);
-    let mut members: Vec<(f64, f64, Vec<f64>)> = Vec::new();
+    let mut members: Vec<Member> = Vec::new();
     for ((weight, sensor), element) in weights.iter().zip(sensors).zip(&declared.elements) {
         let Some(series) = sensor.filter(|_| *weight > 0.0) else { continue };
         let sigma = element.declared.noise_sigma.hypot(element.declared.offset_sigma);
-        members.push((*weight, sigma, resample(series, t_s, interval_s)));
+        members.push(Member { weight: *weight, sigma, values: resample(series, t_s, interval_s) });
     }
-    let sum: f64 = members.iter().map(|(weight, ..)| weight).sum();
+    let sum: f64 = members.iter().map(|member| member.weight).sum();
     if sum <= 0.0 {
         return None;
     }
     let complete_mean = |row: usize| {
-        let read = |(weight, _, values): &(f64, f64, Vec<f64>)| {
-            is_reading(channel, values[row]).then(|| weight * values[row] / sum)
+        let read = |member: &Member| {
+            is_reading(channel, member.values[row]).then(|| member.weight * member.values[row] / sum)
         };
         members.iter().map(read).sum::<Option<f64>>()
     };
@@ -156,14 +165,14 @@ fn fused_values(
     let mut rows = 0.0;
     for (row, mean) in (0..t_s.len()).filter_map(|row| Some((row, complete_mean(row)?))) {
         rows += 1.0;
-        for (difference, (.., values)) in differences.iter_mut().zip(&members) {
-            *difference += values[row] - mean;
+        for (difference, member) in differences.iter_mut().zip(&members) {
+            *difference += member.values[row] - mean;
         }
     }
     differences.iter_mut().for_each(|difference| *difference /= f64::max(rows, 1.0));
     let mut aligned_values: Vec<f64> = Vec::with_capacity(members.len());
     let values = (0..t_s.len()).map(|row| {
-        let aligned = |(difference, (.., values)): (&f64, &(f64, f64, Vec<f64>))| values[row] - difference;
+        let aligned = |(difference, member): (&f64, &Member)| member.values[row] - difference;
         aligned_values.clear();
         aligned_values.extend(
             differences.iter().zip(&members).map(aligned).filter(|value| is_reading(channel, *value)),
@@ -171,7 +180,7 @@ fn fused_values(
         aligned_values.sort_by(f64::total_cmp);
         let Some(median) = median_of_sorted(&aligned_values) else { return f64::NAN };
         let (mut weighted, mut weight_sum) = (0.0, 0.0);
-        for (difference, (weight, sigma, values)) in differences.iter().zip(&members) {
+        for (difference, Member { weight, sigma, values }) in differences.iter().zip(&members) {
             let value = values[row] - difference;
             let is_spike =
                 aligned_values.len() > 2 && *sigma > 0.0 && (value - median).abs() > SPIKE_SIGMAS * sigma;

@@ -98,17 +98,17 @@ pub(crate) fn find_rejections(
 ) -> Vec<Rejection> {
     let limits = &request.limits;
     let mut found = Vec::new();
-    if forecast.longest_surge_s > SURGE_ALLOWED_S {
-        found.push(Rejection::Surge { longest_s: forecast.longest_surge_s, allowed_s: SURGE_ALLOWED_S });
+    if forecast.step.longest_surge_s > SURGE_ALLOWED_S {
+        found.push(Rejection::Surge { longest_s: forecast.step.longest_surge_s, allowed_s: SURGE_ALLOWED_S });
     }
-    if forecast.highest_speed_rpm > limits.speed_max_rpm {
+    if forecast.step.highest_speed_rpm > limits.speed_max_rpm {
         found.push(Rejection::Overspeed {
-            highest_rpm: forecast.highest_speed_rpm,
+            highest_rpm: forecast.step.highest_speed_rpm,
             limit_rpm: limits.speed_max_rpm,
         });
     }
-    if let Some(limit_k) = limits.t2_max_k.filter(|limit_k| forecast.highest_t2_k > *limit_k) {
-        found.push(Rejection::OutletTemperature { highest_k: forecast.highest_t2_k, limit_k });
+    if let Some(limit_k) = limits.t2_max_k.filter(|limit_k| forecast.step.highest_t2_k > *limit_k) {
+        found.push(Rejection::OutletTemperature { highest_k: forecast.step.highest_t2_k, limit_k });
     }
     if let Some(limit_k) = limits.t3_max_k.filter(|limit_k| t3_k > *limit_k) {
         found.push(Rejection::TurbineInletTemperature { t3_k, limit_k });
@@ -140,9 +140,9 @@ pub(crate) fn forecast_jump(
         from,
         to,
         predicted: forecast.predicted,
-        longest_surge_s: forecast.longest_surge_s,
-        highest_speed_rpm: forecast.highest_speed_rpm,
-        highest_t2_k: forecast.highest_t2_k,
+        longest_surge_s: forecast.step.longest_surge_s,
+        highest_speed_rpm: forecast.step.highest_speed_rpm,
+        highest_t2_k: forecast.step.highest_t2_k,
         p3_pa: target.boundary.p3_pa,
         p3_change_pa,
         rejections: find_rejections(request, &forecast, p3_change_pa, target.boundary.t3_k, dwell_s),

@@ -55,7 +55,7 @@ pub(crate) fn walk(
             VisitOrder::Conventional => stable_after_s(request, to, state, target)?.max(dwell_s),
             _ => dwell_s,
         };
-        let Forecast { predicted, end, rows: of_step, .. } = {
+        let Forecast { predicted, step } = {
             let step_forecast =
                 forecast(request, state, &target.boundary, dwell_s, now.is_some()).map_err(fail)?;
             if let Some((_, from)) = now {
@@ -82,8 +82,8 @@ pub(crate) fn walk(
             predicted,
         });
         start_s += dwell_s;
-        now = Some((end, visit.index));
-        rows.push(of_step);
+        now = Some((step.end, visit.index));
+        rows.push(step.rows);
     }
     let predicted = steps.iter_mut().map(|step| &mut step.predicted);
     let parameter_error =

@@ -205,11 +205,11 @@ mod tests {
         fn brute_force_agrees(weights in prop::collection::vec(0.0..30.0f64, 49), n in 2usize..=7) {
             let mut chain = Fixed { weights: weights[..n * n].to_vec(), n, has_return: false };
             let best = best_of_all(&chain, &mut Vec::new());
-                        // The problem is so small that the search must find the optimum.
+            // The problem is so small that the search must find the optimum.
             let given: Vec<usize> = (0..n).collect();
             let found = search(&chain, &given, Objective::Sum, Effort { moves: 20_000, starts: 2 }, 7).swap_remove(0);
             prop_assert!((Objective::Sum.figure(&chain, &found) - best).abs() < 1e-9);
-                        // Include the return to the first point.
+            // Include the return to the first point.
             chain.has_return = true;
             let best = best_of_all(&chain, &mut Vec::new());
             let found = search(&chain, &given, Objective::Sum, Effort { moves: 20_000, starts: 2 }, 7).swap_remove(0);

@@ -13,17 +13,11 @@ use mapper_physics::simulation::simulate::SimulationError;
 /// represents the campaign.
 const MAX_FORECAST_STEPS: usize = 400;
 
-/// Forecast of a step.
+/// Forecast of a step, with the errors of its identification.
 #[derive(Debug, Clone)]
 pub(crate) struct Forecast {
     pub(crate) predicted: Predicted,
-    pub(crate) end: State,
-    pub(crate) highest_speed_rpm: f64,
-    pub(crate) highest_t2_k: f64,
-    /// Longest period beyond the surge line, s.
-    pub(crate) longest_surge_s: f64,
-    /// The step from its jump to its end.
-    pub(crate) rows: Vec<ForecastRow>,
+    pub(crate) step: StepForecast,
 }
 
 /// Forecasts the step from `state` to `boundary`. The first step of a campaign has no jump and therefore no gradients.
@@ -41,14 +35,7 @@ pub(crate) fn forecast(
     } else if has_jump {
         add_single_step_error(request, &step, dwell_s, &mut predicted);
     }
-    Ok(Forecast {
-        predicted,
-        end: step.end,
-        highest_speed_rpm: step.highest_speed_rpm,
-        highest_t2_k: step.highest_t2_k,
-        longest_surge_s: step.longest_surge_s,
-        rows: step.rows,
-    })
+    Ok(Forecast { predicted, step })
 }
 
 /// Adds the error of the efficiency that conventional mapping measures at the end of the step.

@@ -207,7 +207,7 @@ fn simulate_response(
         for (j, state) in pair.into_iter().enumerate() {
             let forecast = forecast(request, state, &target.boundary, dwell_s, true)?;
             gradient_k[i][j] = forecast.predicted.dtc_k.unwrap_or(0.0);
-            let [tc, tt, _] = scale.scaled(&forecast.end);
+            let [tc, tt, _] = scale.scaled(&forecast.step.end);
             (end[0][i][j], end[1][i][j]) = (tc, tt);
         }
     }

@@ -44,11 +44,12 @@ pub fn fitting_units(channel: Channel, low: f64, high: f64, offset: f64) -> Vec<
 /// Whether pressures in this range (Pa) look like gauge readings: too low for absolute ones, and plausible after the ambient pressure
 /// is added.
 pub fn looks_like_gauge(channel: Channel, low_pa: f64, high_pa: f64) -> bool {
-    const AMBIENT: f64 = 1e5;
+    // Only the size matters here.
+    const AMBIENT_PA: f64 = 1e5;
     kind_of(channel) == Kind::Pressure
         && !is_plausible(channel, low_pa, high_pa)
-        && is_plausible(channel, low_pa + AMBIENT, high_pa + AMBIENT)
-        && low_pa > -0.7 * AMBIENT
+        && is_plausible(channel, low_pa + AMBIENT_PA, high_pa + AMBIENT_PA)
+        && low_pa > -0.7 * AMBIENT_PA
 }
 
 #[cfg(test)]

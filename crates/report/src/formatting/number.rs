@@ -1,5 +1,7 @@
 //! Numbers as text.
 
+use mapper_numerics::statistics::range;
+
 /// A number, or a dash if there is none.
 pub fn number(value: Option<f64>, decimals: usize) -> String {
     value
@@ -16,6 +18,16 @@ pub fn percent(fraction: Option<f64>, decimals: usize) -> String {
 pub fn three_figures(value: f64) -> String {
     let rounded: f64 = format!("{value:.2e}").parse().unwrap_or(value);
     if rounded != 0.0 && rounded.abs() < 1e-3 { format!("{rounded:e}") } else { rounded.to_string() }
+}
+
+/// `low to high` of values times a factor, or a dash without values.
+pub(crate) fn range_text(values: impl Iterator<Item = f64>, factor: f64, digits: usize) -> String {
+    let (low, high) = range(values);
+    if low > high {
+        number(None, digits)
+    } else {
+        format!("{:.digits$} to {:.digits$}", factor * low, factor * high)
+    }
 }
 
 /// A number with four significant figures.

@@ -1,5 +1,6 @@
 //! How a map file was understood, as text.
 
+use crate::formatting::number::range_text;
 use crate::formatting::table;
 use mapper_core::{ImportRemark, ImportedColumn, ImportedMap, MapPoint};
 use std::fmt::Write;
@@ -12,15 +13,8 @@ pub fn imported_map_text(imported: &ImportedMap) -> String {
     let heads = ["corrected rpm", "points", "flow kg/s", "pressure ratio", "efficiency %"];
     let mut lines = table::with_heads(&heads);
     for line in &map.lines {
-        let range = |value: fn(&MapPoint) -> Option<f64>, factor: f64, digits: usize| {
-            let values = line.points.iter().filter_map(value);
-            let (low, high) =
-                values.fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| (r.0.min(v), r.1.max(v)));
-            if low > high {
-                "-".to_owned()
-            } else {
-                format!("{:.digits$} to {:.digits$}", factor * low, factor * high)
-            }
+        let range = |value: fn(&MapPoint) -> Option<f64>, factor, digits| {
+            range_text(line.points.iter().filter_map(value), factor, digits)
         };
         lines.add_row(vec![
             format!("{:.0}", line.speed_corrected_rpm),

@@ -3,7 +3,8 @@
 use crate::formatting::number::number;
 use crate::formatting::table;
 use mapper_core::half_width_95;
-use mapper_maps::{MapComparison, PlaceComparison, SpeedLineComparison};
+use mapper_maps::{MapComparison, PlaceComparison};
+use mapper_numerics::statistics::mean;
 use std::fmt::Write;
 
 /// A row for each line and sentences below.
@@ -22,7 +23,7 @@ pub fn map_comparison_text(comparison: &MapComparison) -> String {
     ];
     let mut table = table::with_heads(&heads);
     for line in &comparison.lines {
-        let mean = |value: fn(&PlaceComparison) -> f64| mean(line, value);
+        let mean = |value: fn(&PlaceComparison) -> f64| mean(line.places.iter().map(value));
         let share = |differs: fn(&PlaceComparison) -> bool| {
             let count = line.places.iter().filter(|p| differs(p)).count();
             (!line.places.is_empty()).then(|| 100.0 * count as f64 / line.places.len() as f64)
@@ -58,9 +59,4 @@ pub fn map_comparison_text(comparison: &MapComparison) -> String {
         let _ = writeln!(text, "Only one of the maps reaches {} rpm: not compared.", speeds.join(", "));
     }
     text
-}
-
-fn mean(line: &SpeedLineComparison, value: fn(&PlaceComparison) -> f64) -> Option<f64> {
-    let count = line.places.len();
-    (count > 0).then(|| line.places.iter().map(value).sum::<f64>() / count as f64)
 }

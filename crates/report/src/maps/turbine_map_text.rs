@@ -1,6 +1,6 @@
 //! Turbine maps as text: how a file was understood, the fit, the comparison of two.
 
-use crate::formatting::number::number;
+use crate::formatting::number::{number, range_text};
 use crate::formatting::table;
 use crate::maps::imported_map_text::{columns_text, import_remark_text};
 use mapper_core::{FittedTurbine, ImportedTurbine, TurbineMap, TurbineMapPoint, half_width_95};
@@ -14,12 +14,8 @@ pub fn imported_turbine_text(imported: &ImportedTurbine) -> String {
     let heads = ["vanes", "rpm/K^0.5", "points", "flow kg K^0.5/(s kPa)", "expansion ratio", "efficiency %"];
     let mut lines = table::with_heads(&heads);
     for line in imported.map.lines() {
-        let range = |value: fn(&TurbineMapPoint) -> Option<f64>, factor: f64, digits: usize| {
-            let values = line.iter().filter_map(value);
-            let (low, high) =
-                values.fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| (r.0.min(v), r.1.max(v)));
-            let shown = |value: f64| format!("{:.digits$}", factor * value);
-            if low > high { "-".to_owned() } else { format!("{} to {}", shown(low), shown(high)) }
+        let range = |value: fn(&TurbineMapPoint) -> Option<f64>, factor, digits| {
+            range_text(line.iter().filter_map(value), factor, digits)
         };
         lines.add_row(vec![
             number(line.first().and_then(|point| point.vane_position), 3),

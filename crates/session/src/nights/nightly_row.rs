@@ -2,15 +2,12 @@
 
 use mapper_core::{Plan, Verdict};
 use mapper_history::{Metric, PointRow};
+use mapper_numerics::statistics::mean;
 use mapper_recording::score::ScoredPoint;
 use std::collections::BTreeMap;
 
 /// The monitored metrics; those without a value are omitted.
 pub(crate) fn metrics(points: &[ScoredPoint], plan: &Plan) -> BTreeMap<Metric, f64> {
-    let mean = |values: Vec<f64>| {
-        let count = values.len() as f64;
-        (count > 0.0).then(|| values.iter().sum::<f64>() / count)
-    };
     let score = mapper_recording::score::summarise(points);
     let good = points.iter().filter(|scored| scored.point.verdict == Verdict::Good).count();
     // Means of the truth use the same points as means of the results.
@@ -18,25 +15,21 @@ pub(crate) fn metrics(points: &[ScoredPoint], plan: &Plan) -> BTreeMap<Metric, f
     let with_eta: Vec<&ScoredPoint> = points.iter().filter(both).collect();
     Metric::ALL
         .into_iter()
-        .filter_map(|figure| {
-            let value = match figure {
+        .filter_map(|metric| {
+            let value = match metric {
                 Metric::GoodPoints => Some(good as f64),
-                Metric::EtaMean => mean(with_eta.iter().filter_map(|scored| scored.point.eta).collect()),
-                Metric::EtaTrueMean => {
-                    mean(with_eta.iter().filter_map(|scored| Some(scored.truth?.eta)).collect())
-                }
+                Metric::EtaMean => mean(with_eta.iter().filter_map(|scored| scored.point.eta)),
+                Metric::EtaTrueMean => mean(with_eta.iter().filter_map(|scored| Some(scored.truth?.eta))),
                 Metric::EtaMedianError => score.map(|score| score.eta_median_error),
                 Metric::EtaWorstError => score.map(|score| score.eta_worst_error),
                 Metric::EtaCoverage => score.map(|score| score.eta_coverage_ratio),
-                Metric::HMean => mean(with_eta.iter().filter_map(|scored| scored.point.h_w_m2k).collect()),
-                Metric::HTrueMean => {
-                    mean(with_eta.iter().filter_map(|scored| Some(scored.truth?.h_w_m2k)).collect())
-                }
+                Metric::HMean => mean(with_eta.iter().filter_map(|scored| scored.point.h_w_m2k)),
+                Metric::HTrueMean => mean(with_eta.iter().filter_map(|scored| Some(scored.truth?.h_w_m2k))),
                 Metric::HMedianError => score.and_then(|score| score.h_median_error_ratio),
                 Metric::HWorstError => score.and_then(|score| score.h_worst_error_ratio),
                 Metric::RigMinutes => Some(plan.duration_s() / 60.0),
             };
-            Some((figure, value.filter(|value| value.is_finite())?))
+            Some((metric, value.filter(|value| value.is_finite())?))
         })
         .collect()
 }

@@ -1,7 +1,8 @@
 //! Common parts of the pictures.
 
 use crate::reproduction::lab::JUMPS;
-use crate::reproduction::outcome::Outcome;
+use crate::reproduction::number_text;
+use crate::reproduction::outcome::{Outcome, extremes};
 use mapper_chart::{Axis, Colour, Dash, Line, Marker, Panel, Scatter, palette};
 use mapper_numerics::statistics::range;
 
@@ -78,6 +79,33 @@ pub(crate) fn series_by_speed(
         (points, speed_colour(speed_rpm), marker, is_hollow, format!("{name}, {}", krpm(speed_rpm)))
     };
     target_speeds_rpm().map(series).to_vec()
+}
+
+/// One series for each of several cases, with its label.
+pub(crate) fn series_by_case<'a>(
+    cases: impl Iterator<Item = (&'a Vec<Outcome>, String)>,
+    markers: [Marker; 5],
+    is_hollow: fn(usize) -> bool,
+    value: fn(&Outcome) -> Option<(f64, f64)>,
+) -> Vec<Series> {
+    cases
+        .zip(markers)
+        .enumerate()
+        .map(|(index, ((outcomes, label), marker))| {
+            let points = outcomes.iter().filter_map(value).collect();
+            (points, palette::categorical(index), marker, is_hollow(index), label)
+        })
+        .collect()
+}
+
+/// Smallest and largest value of the outcomes at one target speed, as text.
+pub(crate) fn span_at_speed(
+    outcomes: &[Outcome],
+    speed_rpm: f64,
+    value: fn(&Outcome) -> Option<f64>,
+    decimals: usize,
+) -> String {
+    number_text::range(extremes(at_speed(outcomes, speed_rpm).map(value)), decimals)
 }
 
 /// The outcomes at one target speed.

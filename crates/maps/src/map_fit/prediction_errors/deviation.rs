@@ -3,7 +3,7 @@
 use crate::map_fit::fitted_surface::surface::MapFit;
 use crate::map_fit::least_squares::observations::Observation;
 
-/// A deviation and its standard error: of the line, of a point about it, and of the point itself.
+/// A deviation and its standard error, which combines the errors of the line, of points about a line, and of the point itself.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Deviation {
     pub size: f64,

@@ -3,9 +3,11 @@
 use crate::reproduction::lab::{JUMPS, Run, run_all};
 use crate::reproduction::number_text::{fixed, range};
 use crate::reproduction::outcome::{Outcome, RUN_S, dynamic_config, extremes, identify_runs, rms, worst};
-use crate::reproduction::picture::{at_speed, efficiency_pair, efficiency_panel, h_pair, h_panel};
+use crate::reproduction::picture::{
+    efficiency_pair, efficiency_panel, h_pair, h_panel, series_by_case, span_at_speed,
+};
 use crate::reproduction::{FigureResult, ReproduceError, Statement, Table, Verdict};
-use mapper_chart::{Figure, Marker, palette};
+use mapper_chart::{Figure, Marker};
 use mapper_core::Channel;
 use mapper_physics::simulation::model::Model;
 
@@ -66,7 +68,7 @@ pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
     for case in &cases {
         for (from_rpm, to_rpm) in JUMPS {
             let span = |value: fn(&Outcome) -> Option<f64>, decimals| {
-                range(extremes(at_speed(&case.outcomes, to_rpm).map(value)), decimals)
+                span_at_speed(&case.outcomes, to_rpm, value, decimals)
             };
             table.row([
                 fixed(case.oil_scale, 2),
@@ -79,18 +81,8 @@ pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
     }
     let markers = [Marker::Circle, Marker::Square, Marker::Triangle, Marker::Diamond, Marker::Cross];
     let series = |value: fn(&Outcome) -> Option<(f64, f64)>| {
-        let all = cases.iter().zip(markers).enumerate();
-        all.map(|(index, (case, marker))| {
-            let points = case.outcomes.iter().filter_map(value).collect();
-            (
-                points,
-                palette::categorical(index),
-                marker,
-                true,
-                format!("oil conductance x {}", case.oil_scale),
-            )
-        })
-        .collect::<Vec<_>>()
+        let all = cases.iter().map(|case| (&case.outcomes, format!("oil conductance x {}", case.oil_scale)));
+        series_by_case(all, markers, |_| true, value)
     };
     let svg = Figure::new("Figure 10: heat from the turbine, varied by the oil's cooling")
         .subtitle("model values: mean in the window")

@@ -4,8 +4,8 @@ use crate::reproduction::lab::{JUMPS, run_all};
 use crate::reproduction::number_text::{fixed, range};
 use crate::reproduction::outcome::{Outcome, RUN_S, dynamic_config, extremes, identify_runs, rms, worst};
 use crate::reproduction::picture::{
-    at_speed, efficiency_pair, efficiency_panel, h_pair, h_panel, krpm, series_by_speed, speed_colour,
-    target_speeds_rpm,
+    at_speed, efficiency_pair, efficiency_panel, h_pair, h_panel, krpm, series_by_speed, span_at_speed,
+    speed_colour, target_speeds_rpm,
 };
 use crate::reproduction::{FigureResult, ReproduceError, Statement, Table, Verdict};
 use mapper_chart::{Axis, Dash, Figure, Line, Marker, Panel, Rule, RuleAt};
@@ -204,7 +204,7 @@ pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
     for case in &cases {
         for (from_rpm, to_rpm) in JUMPS {
             let span = |outcomes: &[Outcome], value: fn(&Outcome) -> Option<f64>, decimals| {
-                range(extremes(at_speed(outcomes, to_rpm).map(value)), decimals)
+                span_at_speed(outcomes, to_rpm, value, decimals)
             };
             table.row([
                 fixed(case.alpha, 1),

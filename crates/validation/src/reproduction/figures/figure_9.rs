@@ -6,10 +6,11 @@ use crate::reproduction::outcome::{
     Outcome, RUN_S, WINDOW, dynamic_config, extremes, identify_runs, truth_in_window, worst,
 };
 use crate::reproduction::picture::{
-    at_speed, efficiency_pair, efficiency_panel, h_pair, h_panel, krpm, speed_colour, target_speeds_rpm,
+    at_speed, efficiency_pair, efficiency_panel, h_pair, h_panel, krpm, series_by_case, span_at_speed,
+    speed_colour, target_speeds_rpm,
 };
 use crate::reproduction::{FigureResult, ReproduceError, Statement, Table, Verdict};
-use mapper_chart::{Axis, Figure, Line, Marker, Panel, Rule, RuleAt, palette};
+use mapper_chart::{Axis, Figure, Line, Marker, Panel, Rule, RuleAt};
 use mapper_core::Verdict as PointVerdict;
 use mapper_physics::simulation::model::Model;
 
@@ -115,7 +116,7 @@ pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
     for case in &cases {
         for (from_rpm, to_rpm) in JUMPS {
             let span = |value: fn(&Outcome) -> Option<f64>, decimals| {
-                range(extremes(at_speed(&case.outcomes, to_rpm).map(value)), decimals)
+                span_at_speed(&case.outcomes, to_rpm, value, decimals)
             };
             let failed = at_speed(&case.outcomes, to_rpm).filter(|o| o.point.eta.is_none()).count();
             table.row([
@@ -144,13 +145,8 @@ pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
 fn picture(cases: &[Case]) -> String {
     let markers = [Marker::Circle, Marker::Plus, Marker::Square, Marker::Triangle, Marker::Diamond];
     let series = |value: fn(&Outcome) -> Option<(f64, f64)>| {
-        let all = cases.iter().zip(markers).enumerate();
-        all.map(|(index, (case, marker))| {
-            let points = case.outcomes.iter().filter_map(value).collect();
-            let label = format!("{} mm", case.diameter_mm);
-            (points, palette::categorical(index), marker, index > 0, label)
-        })
-        .collect::<Vec<_>>()
+        let all = cases.iter().map(|case| (&case.outcomes, format!("{} mm", case.diameter_mm)));
+        series_by_case(all, markers, |index| index > 0, value)
     };
     let mut worst_panel = Panel::new(
         Axis::new("probe diameter, mm"),

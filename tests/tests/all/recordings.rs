@@ -46,7 +46,7 @@ fn the_same_seed_gives_the_same_bytes_and_another_seed_others() {
 #[test]
 fn simultaneous_runs_have_separate_directories() {
     let scratch = scratch();
-    let campaign = CampaignFile::shipped_with(SHORT_GRID);
+    let campaign = CampaignFile::shipped_with(&[SHORT_GRID, SINGLE_STEP_METHOD].concat());
     let out = scratch.path();
     let earlier = std::fs::read(recording_of(&shared_run(&campaign).result)).unwrap();
     // Started together: at least two of them begin within one second.

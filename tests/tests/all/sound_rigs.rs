@@ -27,6 +27,12 @@ fn a_fault_free_gap_rig_has_no_finding() {
 fn a_fault_free_turbo_a_has_no_finding() {
     assert_no_finding(
         "turbo_a",
-        &[("openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [0.5, 1.0, 2.0]")],
+        &[
+            (
+                "speeds: [50 krpm, 65 krpm, 80 krpm, 95 krpm, 110 krpm, 125 krpm, 140 krpm, 155 krpm]",
+                "speeds: [50 krpm, 80 krpm, 110 krpm, 140 krpm]",
+            ),
+            ("openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [0.5, 1.0, 2.0]"),
+        ],
     );
 }

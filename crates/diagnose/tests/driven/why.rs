@@ -146,9 +146,8 @@ fn what_four_minutes_show_is_named_or_reported_to_be_alike() {
     assert!(count(&found, |found| open(found).contains(&"area_split".to_owned())) >= almost_all());
     // Offsets of T2, of T1 (opposite sign) and of P2 are indistinguishable if the efficiency is free. Held-out phases confirm it with the
     // second seed, but not with the first.
-    let found: Vec<Diagnosis> = (1..=seeds())
-        .map(|seed| one_of(seed, COMPRESSOR, &hills, &[("t2_offset", 10.0)], no_tc))
-        .collect();
+    let found: Vec<Diagnosis> =
+        (1..=seeds()).map(|seed| one_of(seed, COMPRESSOR, &hills, &[("t2_offset", 10.0)], no_tc)).collect();
     let alike = |found: &Diagnosis| {
         found.word == SideVerdict::NotDistinguished && open(found).contains(&"t2_offset".to_owned())
     };

@@ -1,6 +1,8 @@
 //! Declared uncertainty of rig and model: noise, offsets, gains and tolerances.
 
-use mapper_core::{Channel, DeclaredUncertainty, Dimension, ModelTolerances, NoiseColour, StructureTolerances};
+use mapper_core::{
+    Channel, DeclaredUncertainty, Dimension, ModelTolerances, NoiseColour, StructureTolerances,
+};
 use mapper_physics::machine::params::BoundaryConditions;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

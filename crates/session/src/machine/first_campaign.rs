@@ -16,8 +16,10 @@ const CHANNELS: &str = include_str!("../../templates/channels.yaml");
 const ZERO: &str = include_str!("../../templates/zero.yaml");
 /// Noise of the flow meter of campaigns/turbo_a.yaml, whose wheel has 52 mm, kg/s; meters are chosen by their full scale.
 const FLOW_NOISE_KG_S: f64 = 1.5e-4;
-/// Speed limit over the highest speed of the grid: room for the overshoot of a jump, until the user writes the machine's own limit.
+/// Speed limit over the highest speed of the grid, until the user writes the machine's own limit: room for the overshoot of a jump. Pressure
+/// and valve of the virtual lab move at once, and a jump between lines of a narrow map overshoots by up to 18 %.
 const SPEED_LIMIT_RATIO: f64 = 1.1;
+const SPEED_LIMIT_IN_LAB_RATIO: f64 = 1.2;
 /// Points of a speed line.
 const POINTS: usize = 6;
 
@@ -122,6 +124,8 @@ fn campaign_text(request: &FirstCampaignRequest, map: &FirstMap) -> String {
         }
         false => "total".to_owned(),
     };
+    let in_lab = request.rig == FirstRig::VirtualLab;
+    let speed_limit_ratio = if in_lab { SPEED_LIMIT_IN_LAB_RATIO } else { SPEED_LIMIT_RATIO };
     let values = [
         ("title", request.rig.title().to_owned()),
         ("commands", commands),
@@ -140,7 +144,7 @@ fn campaign_text(request: &FirstCampaignRequest, map: &FirstMap) -> String {
             "speed_limit",
             format!(
                 "{} krpm",
-                (SPEED_LIMIT_RATIO * map.speeds_rpm.last().copied().unwrap_or(0.0) / 1e3).ceil()
+                (speed_limit_ratio * map.speeds_rpm.last().copied().unwrap_or(0.0) / 1e3).ceil()
             ),
         ),
     ];

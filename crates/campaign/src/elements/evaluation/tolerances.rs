@@ -138,10 +138,7 @@ mod tests {
         let convection = ModelTolerances { convection_ratio: 0.05, ..default };
         assert_eq!(read("{convection: 5 %}").unwrap(), convection);
         let structure = StructureTolerances { t2_ratio: 0.12, ..StructureTolerances::default() };
-        assert_eq!(
-            read("{structure: {T2: 12 %}}").unwrap(),
-            ModelTolerances { structure, ..default }
-        );
+        assert_eq!(read("{structure: {T2: 12 %}}").unwrap(), ModelTolerances { structure, ..default });
         assert!(read("{convection: 0.05}").is_err() && read("{actuator_lag: 3 %}").is_err());
     }
 

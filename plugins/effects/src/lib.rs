@@ -1,6 +1,6 @@
 //! The effect library of `mapper`: deviations of a rig from the nominal model, one file each, listed in `effects`.
 //!
-//! To add one, write its file (a struct of its parameters, its description, its changes to the model), and its line below. Faults of sensors
+//! To add one, write its file (one `effect!`: description, parameters, change to the rig), and its line below. Faults of sensors
 //! are rows of [`mapper_physics::rig::sensor_fault`].
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]

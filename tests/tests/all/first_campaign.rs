@@ -175,7 +175,7 @@ fn a_wrong_map_or_limit_is_one_mistake() {
     for (right, wrong) in [
         ("wheel_diameter: 60 mm", "wheel_diameter: 60 in"),
         ("wheel_diameter: 60 mm", "wheel_diameter: 2.36 mm"),
-        ("  speed: 148 krpm", "  speed: 90 krpm"),
+        ("  speed: 162 krpm", "  speed: 90 krpm"),
         ("max: 500 kPa", "max: 5 kPa"),
         ("compressor_outlet_temperature: 300 degC", "compressor_outlet_temperature: 300 K"),
     ] {

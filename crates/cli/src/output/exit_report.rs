@@ -17,23 +17,18 @@ pub fn failed(failure: &Failure) -> ExitCode {
     code
 }
 
-/// A tip for an argument that no option takes; that of clap would pass an option as the name of a file.
-fn with_own_tip(mut error: clap::Error) -> clap::Error {
-    let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidArg) else { return error };
-    let tip = match word.as_str() {
-        "--seed" => "the seed is a key of the campaign, e.g. `seed: 2`",
-        option if option.starts_with('-') => "`--help` lists the options of the command",
+/// Arguments that could not be read: as usual on standard error, and with `--json` as an object on standard output. Clap's own tip for an
+/// argument that no option takes would pass an option as the name of a file.
+pub fn wrong_arguments(mut error: clap::Error, json: bool) -> ExitCode {
+    let tip = match error.get(ContextKind::InvalidArg) {
+        Some(ContextValue::String(word)) if word == "--seed" => {
+            "the seed is a key of the campaign, e.g. `seed: 2`"
+        }
         _ => "quote a value with blanks, e.g. \"60 mm\"; write an optional one after `=`, e.g. `--live=9999`",
     };
     if error.kind() == ErrorKind::UnknownArgument && error.get(ContextKind::SuggestedArg).is_none() {
         error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.to_owned().into()]));
     }
-    error
-}
-
-/// Arguments that could not be read: as usual on standard error, and with `--json` as an object on standard output.
-pub fn wrong_arguments(error: clap::Error, json: bool) -> ExitCode {
-    let error = with_own_tip(error);
     let text = error.to_string();
     // The colours of clap would let those of an argument pass.
     if terminal_text(&text) == text {

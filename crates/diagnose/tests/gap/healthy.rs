@@ -8,8 +8,8 @@ use mapper_diagnose::gap::causes::calibration::Calibration;
 use mapper_diagnose::gap::diagnose::{Diagnosed, GapError, GapRequest, diagnose};
 use mapper_diagnose::gap::findings::report::Verdict;
 use mapper_diagnose::gap::findings::warning::GapWarning;
+use mapper_diagnose::gap::model_error::healthy::Healthy;
 use mapper_diagnose::gap::preconditions::problem::Problem;
-use mapper_diagnose::gap::reference::healthy::Healthy;
 use mapper_physics::rig::effect::{Rig, add};
 use mapper_physics::simulation::model::Model;
 

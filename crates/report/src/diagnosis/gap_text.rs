@@ -11,7 +11,7 @@ use mapper_diagnose::gap::findings::report::{
     Candidate, ChannelGap, Diagnosis, Estimate, Gap, Law, PointGap, SmallestSeen, Strained, Verdict,
     law_found,
 };
-use mapper_diagnose::gap::reference::baseline_assumptions::Since;
+use mapper_diagnose::gap::model_error::baseline_assumptions::Since;
 use std::collections::BTreeMap;
 
 /// Maximum number of causes shown.

@@ -5,7 +5,7 @@ use mapper_core::Recording;
 use mapper_diagnose::gap::causes::calibration::Calibration;
 use mapper_diagnose::gap::diagnose::{GapRequest, diagnose};
 use mapper_diagnose::gap::findings::report::{Diagnosis, Verdict};
-use mapper_diagnose::gap::reference::healthy::Healthy;
+use mapper_diagnose::gap::model_error::healthy::Healthy;
 use mapper_physics::rig::effect::Effect;
 use mapper_recording::{ChannelMap, ReadOptions, read_recording};
 use mapper_validation::blind::{CaseKind, Draw, Laboratory, OutsideUse, make, study_without_causes};

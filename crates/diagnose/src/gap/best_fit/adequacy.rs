@@ -3,12 +3,10 @@
 
 use crate::gap::best_fit::fit::Fit;
 use crate::gap::best_fit::selection::Selection;
+use crate::gap::residuals::nuisance::RESPONSES_S;
 use crate::gap::residuals::study::Study;
 use crate::gap::residuals::whiten::{Linearised, dot, rows_of_step};
 use mapper_numerics::statistics::DOUBT_SIGMAS;
-
-/// Time constants of the smooth basis after a jump, s: a step, and the ranges of probe, gas, housing and turbine housing.
-pub(crate) const BASIS_S: [f64; 5] = [f64::INFINITY, 5.0, 20.0, 60.0, 200.0];
 
 /// Weight of scatter from step to step relative to smooth misfit: scatter grows with the strength of an effect, even of a correct one.
 const SCATTER_COUNTS: f64 = 0.25;
@@ -49,7 +47,7 @@ pub fn smooth_energies(study: &Study, linearised: &Linearised, residual: &[f64])
         .map(|(index, group)| {
             let here = &residual[group.rows.clone()];
             let mut directions: Vec<Vec<f64>> = Vec::new();
-            for decay_s in BASIS_S.iter().take(here.len()) {
+            for decay_s in RESPONSES_S.iter().take(here.len()) {
                 let since_s = |block: &usize| study.steps[group.step].blocks[*block].since_jump_s;
                 let mut direction: Vec<f64> =
                     group.blocks.iter().map(|block| (-since_s(block) / decay_s).exp()).collect();
@@ -74,7 +72,7 @@ pub fn smooth_energies(study: &Study, linearised: &Linearised, residual: &[f64])
 /// Evaluates the residual of a fit on all steps. `one_more` is the largest gain of a further effect.
 pub fn adequacy(study: &Study, linearised: &Linearised, fit: &Fit, one_more: f64) -> Adequacy {
     let energies = smooth_energies(study, linearised, &fit.residual);
-    let expected: f64 = study.groups.iter().map(|group| BASIS_S.len().min(group.rows.len()) as f64).sum();
+    let expected: f64 = study.groups.iter().map(|group| RESPONSES_S.len().min(group.rows.len()) as f64).sum();
     let smooth_excess = energies.iter().sum::<f64>() - expected;
     let everywhere = Selection::all(study);
     let mut scatter_sigma: f64 = 0.0;

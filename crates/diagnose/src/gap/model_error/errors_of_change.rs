@@ -10,10 +10,6 @@ use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::study::Study;
 use crate::gap::residuals::whiten::Linearised;
 use mapper_observe::perturbation::UNINFORMATIVE;
-use nalgebra::DMatrix;
-
-/// Values within this time after a jump are fully correlated, s.
-const AT_ONCE_S: f64 = 0.3;
 
 /// Relative model error of each output's variation over a recording; 0 if noise accounts for it. `model_error` is measured minus predicted.
 pub(crate) fn errors_of_change(
@@ -61,14 +57,4 @@ pub(crate) fn elsewhere(study: &Study, changed: &[f64]) -> Vec<f64> {
         shares[group.step] = shares[group.step].max(by);
     }
     (0..shares.len()).map(|step| shares[step].max(shares[step.saturating_sub(1)])).collect()
-}
-
-/// Covariance within a step of errors proportional to each of `histories`, correlated over time.
-pub(crate) fn covariance_of_errors(since_jump_s: &[f64], histories: [&[f64]; 2]) -> DMatrix<f64> {
-    let n = since_jump_s.len();
-    let at: Vec<f64> = since_jump_s.iter().map(|t_s| (t_s.max(0.0) + AT_ONCE_S).ln()).collect();
-    DMatrix::from_fn(n, n, |i, j| {
-        let sum: f64 = histories.iter().map(|history| history[i] * history[j]).sum();
-        sum * (-(at[i] - at[j]).abs()).exp()
-    })
 }

@@ -5,27 +5,11 @@
 //! part of the same size differs from step to step, because the error depends on the state: a Gaussian process over ln of the time since the
 //! jump, which enters the covariance (the discrepancy of Kennedy and O'Hagan, J. R. Stat. Soc. B 63:425, 2001).
 
-use crate::gap::best_fit::adequacy::BASIS_S;
-use crate::gap::reference::errors_of_change::covariance_of_errors;
-use crate::gap::residuals::nuisance::OUTPUTS;
+use crate::gap::model_error::log_time::covariance_of_errors;
+use crate::gap::residuals::nuisance::{OUTPUTS, RESPONSES_S, structure_delay_s, structure_ratio};
 use crate::gap::residuals::study::{Group, Study};
-use crate::gap::residuals::whiten::JUMP_S;
 use mapper_numerics::statistics::mean;
-use mapper_observe::declared::Declared;
 use nalgebra::DMatrix;
-
-/// Number of repeating parts of an output besides its delay.
-pub(crate) const PARTS: usize = BASIS_S.len();
-
-/// Declared share of an output's variation that the model may miss.
-pub(crate) fn share(declared: &Declared, output: usize) -> f64 {
-    declared.tolerances.structure.of(OUTPUTS[output])
-}
-
-/// Error of the time of an output's fast changes, s.
-pub(crate) fn delay_s(declared: &Declared, output: usize) -> f64 {
-    share(declared, output) * JUMP_S
-}
 
 /// Mean and standard deviation of an output's readings over the recording.
 fn variation(study: &Study, output: usize) -> Option<(f64, f64)> {
@@ -36,7 +20,7 @@ fn variation(study: &Study, output: usize) -> Option<(f64, f64)> {
 }
 
 /// A repeating part of an output as a whole: its rows, and the reading's share in them. The first is the level, the others are the changes after
-/// each jump that decay with a time constant of [`BASIS_S`].
+/// each jump that decay with a time constant of [`RESPONSES_S`].
 pub(crate) fn repeating_part(study: &Study, output: usize, part: usize) -> Vec<(usize, f64)> {
     let Some((middle, _)) = variation(study, output) else { return Vec::new() };
     let mut before = None;
@@ -46,8 +30,8 @@ pub(crate) fn repeating_part(study: &Study, output: usize, part: usize) -> Vec<(
         let jump = level - before.replace(level).unwrap_or(level);
         let blocks = &study.steps[group.step].blocks;
         whole.extend(group.rows.clone().zip(&group.blocks).map(|(row, block)| {
-            let decayed = (-blocks[*block].since_jump_s.max(0.0) / BASIS_S[part]).exp();
-            (row, if BASIS_S[part].is_infinite() { level - middle } else { jump * decayed })
+            let decayed = (-blocks[*block].since_jump_s.max(0.0) / RESPONSES_S[part]).exp();
+            (row, if RESPONSES_S[part].is_infinite() { level - middle } else { jump * decayed })
         }));
     }
     whole
@@ -57,8 +41,8 @@ pub(crate) fn repeating_part(study: &Study, output: usize, part: usize) -> Vec<(
 /// the predicted readings.
 pub(crate) fn step_errors(study: &Study, slopes: &[f64]) -> Vec<DMatrix<f64>> {
     let sizes: [f64; OUTPUTS.len()] = std::array::from_fn(|output| {
-        let share = share(&study.declared, output);
-        if share > 0.0 { variation(study, output).map_or(0.0, |(_, sigma)| share * sigma) } else { 0.0 }
+        let ratio = structure_ratio(&study.declared, output);
+        if ratio > 0.0 { variation(study, output).map_or(0.0, |(_, sigma)| ratio * sigma) } else { 0.0 }
     });
     if sizes == [0.0; OUTPUTS.len()] {
         return Vec::new();
@@ -66,7 +50,7 @@ pub(crate) fn step_errors(study: &Study, slopes: &[f64]) -> Vec<DMatrix<f64>> {
     let of_group = |group: &Group| {
         let blocks = &study.steps[group.step].blocks;
         let since_jump_s: Vec<f64> = group.blocks.iter().map(|block| blocks[*block].since_jump_s).collect();
-        let delay_s = delay_s(&study.declared, group.output);
+        let delay_s = structure_delay_s(&study.declared, group.output);
         let late: Vec<f64> = slopes[group.rows.clone()].iter().map(|slope| delay_s * slope).collect();
         covariance_of_errors(&since_jump_s, [&vec![sizes[group.output]; late.len()], &late])
     };

@@ -9,7 +9,6 @@ pub mod nuisance;
 pub(crate) mod point_state;
 pub(crate) mod prediction;
 pub(crate) mod shape;
-pub(crate) mod structure;
 pub mod study;
 pub(crate) mod true_inputs;
 pub mod whiten;

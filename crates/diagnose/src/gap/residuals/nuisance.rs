@@ -2,7 +2,6 @@
 //! size as the prior.
 
 use crate::gap::residuals::shape::SHAPES;
-use crate::gap::residuals::structure;
 use mapper_core::{Channel, Dimension};
 use mapper_observe::channels::{self, DRIVERS};
 use mapper_observe::declared::Declared;
@@ -104,6 +103,21 @@ const TURBINE_DROP_RATIO: f64 = 0.03;
 /// Clocks of one rig agree within a fraction of a sample, s.
 const DELAY_SIGMA_S: f64 = 0.02;
 
+/// Length of a jump, s.
+pub(crate) const JUMP_S: f64 = 3.0;
+/// Time constants of the outputs after a jump, s: a step, and the ranges of probe, gas, housing and turbine housing.
+pub(crate) const RESPONSES_S: [f64; 5] = [f64::INFINITY, 5.0, 20.0, 60.0, 200.0];
+
+/// Declared share of an output's variation that the model's equations may miss.
+pub(crate) fn structure_ratio(declared: &Declared, output: usize) -> f64 {
+    declared.tolerances.structure.of(OUTPUTS[output])
+}
+
+/// The resulting error of the time of an output's fast changes, s.
+pub(crate) fn structure_delay_s(declared: &Declared, output: usize) -> f64 {
+    structure_ratio(declared, output) * JUMP_S
+}
+
 /// All nuisances of a rig; undeclared ones are omitted.
 pub fn nuisances(declared: &Declared) -> Vec<Nuisance> {
     use NuisanceKind as K;
@@ -131,10 +145,10 @@ pub fn nuisances(declared: &Declared) -> Vec<Nuisance> {
         Some((K::CommonOffset(common.channels.first()?.info().dimension), common.sigma))
     }));
     all.extend(
-        (0..OUTPUTS.len()).map(|i| (K::Delay(i), DELAY_SIGMA_S.hypot(structure::delay_s(declared, i)))),
+        (0..OUTPUTS.len()).map(|i| (K::Delay(i), DELAY_SIGMA_S.hypot(structure_delay_s(declared, i)))),
     );
-    let parts = (0..OUTPUTS.len()).flat_map(|i| (0..structure::PARTS).map(move |part| (i, part)));
-    all.extend(parts.map(|(i, part)| (K::Structure(i, part), structure::share(declared, i))));
+    let parts = (0..OUTPUTS.len()).flat_map(|i| (0..RESPONSES_S.len()).map(move |part| (i, part)));
+    all.extend(parts.map(|(i, part)| (K::Structure(i, part), structure_ratio(declared, i))));
     all.into_iter()
         .filter(|(_, sigma)| *sigma > 0.0)
         .map(|(kind, sigma)| Nuisance { kind, centre: 0.0, sigma })
@@ -155,7 +169,7 @@ pub struct Circumstances {
     /// Clock delay of each output, s.
     pub delay_s: [f64; OUTPUTS.len()],
     /// Missed share of each output's parts.
-    pub missed_ratio: [[f64; structure::PARTS]; OUTPUTS.len()],
+    pub missed_ratio: [[f64; RESPONSES_S.len()]; OUTPUTS.len()],
 }
 
 /// Applies one nuisance of size `value` (in the unit of the changed quantity) to a rig.

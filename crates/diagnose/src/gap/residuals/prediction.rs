@@ -1,10 +1,10 @@
 //! Runs of the model through the recording, and the readings that they predict.
 
+use crate::gap::model_error::structure::repeating_part;
 use crate::gap::residuals::hypothesis::Hypothesis;
 use crate::gap::residuals::initial_state::with_metal_held;
 use crate::gap::residuals::machine_run::{MachineRun, Sample};
-use crate::gap::residuals::nuisance::{Circumstances, OUTPUTS};
-use crate::gap::residuals::structure::{PARTS, repeating_part};
+use crate::gap::residuals::nuisance::{Circumstances, OUTPUTS, RESPONSES_S};
 use crate::gap::residuals::study::{PredictError, Prediction, Study};
 use mapper_core::Channel;
 use mapper_observe::averages::mean_reading::mean_reading;
@@ -193,7 +193,7 @@ impl Study {
     ) -> Result<Prediction, PredictError> {
         let mut values = vec![0.0; self.measured.len()];
         let mut delay_s = [0.0; OUTPUTS.len()];
-        let mut missed_ratio = [[0.0; PARTS]; OUTPUTS.len()];
+        let mut missed_ratio = [[0.0; RESPONSES_S.len()]; OUTPUTS.len()];
         let rig_in = |step| self.rig(hypothesis, step);
         self.sense(
             &run.samples,

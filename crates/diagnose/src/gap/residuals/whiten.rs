@@ -1,7 +1,7 @@
 //! Residuals scaled by the noise and the uncertainty of the inputs.
 
-use crate::gap::residuals::nuisance::{NuisanceKind, OUTPUTS};
-use crate::gap::residuals::structure::{repeating_part, step_errors};
+use crate::gap::model_error::structure::{repeating_part, step_errors};
+use crate::gap::residuals::nuisance::{JUMP_S, NuisanceKind, OUTPUTS};
 use crate::gap::residuals::study::{Hypothesis, PredictError, Prediction, Study};
 use mapper_core::Channel;
 use mapper_numerics::coloured_noise::{ColouredNoise, WhiteningFactor, covariance_of_means};
@@ -229,8 +229,6 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
 /// Position on the speed line beyond which a jump runs along or across the surge line: flow and outlet pressure are then too sensitive to be
 /// used in it.
 pub(crate) const NEAR_SURGE: f64 = 0.975;
-/// Length of a jump, s.
-pub(crate) const JUMP_S: f64 = 3.0;
 /// Time after the last surge cycle in which no reading counts, s: its end is chaotic, and the shaft takes some seconds to recover.
 const AFTER_SURGE_S: f64 = 15.0;
 

@@ -1,0 +1,8 @@
+//! Errors of the model's equations: declared by the campaign, or measured by a fault-free reference recording of the same rig.
+
+pub mod baseline_assumptions;
+pub(crate) mod errors_of_change;
+pub mod healthy;
+pub(crate) mod log_time;
+pub(crate) mod same_steps;
+pub(crate) mod structure;

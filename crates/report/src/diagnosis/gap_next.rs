@@ -11,7 +11,13 @@ pub(crate) fn next_text(diagnosis: &Diagnosis) -> String {
     let Some(next) = &diagnosis.next else { return String::new() };
     let mut text = "\nwhat next\n".to_owned();
     match (next, diagnosis.experiments.first()) {
-        (Next::Sensor { sensor, reason }, _) => text += &format!("  {sensor}: {reason}\n"),
+        (Next::Sensor { sensor, reason }, _) => {
+            text += &format!("  {sensor}: {reason}\n");
+            if diagnosis.since.is_none() {
+                text += "  if the model's equations only approximate this rig: give a fault-free recording with --healthy, or declare what they may \
+                         miss under `tolerances: structure`\n";
+            }
+        }
         (Next::Jump { .. } | Next::Soak { .. }, Some(first)) => {
             text += &format!(
                 "  {}: {:.1} min, after which the true cause should reach {}\n",

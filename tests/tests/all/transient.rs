@@ -54,5 +54,5 @@ fn a_time_without_its_unit_and_too_little_to_fit_are_refused() {
     let bare = transient(&["--fit-until", "13.2"]).exits(2);
     assert!(bare.stderr.contains("13.2"), "{}", bare.stderr);
     let short = transient(&["--fit-until", "1.5 s"]).exits(6);
-    assert!(short.stderr.contains("at least 32 are needed"), "{}", short.stderr);
+    assert!(short.stderr.contains("32"), "{}", short.stderr);
 }

@@ -96,7 +96,7 @@ fn tests(offered: &Offered) -> Result<(), Error> {
     if left_out > 0 { Err(Error::LeftOut { count: left_out }) } else { Ok(()) }
 }
 
-/// Runs the examples in the documentation of the crates, and makes it: one crate after the other, so beside tests that use both cores.
+/// Runs the examples in the documentation of the crates, and makes it: one crate after the other, in parallel with the tests.
 fn documentation(offered: &Offered) -> Result<(), Error> {
     let examples = lints::documenting(test_programs::documentation_tests());
     let mut tally = Tally::default();

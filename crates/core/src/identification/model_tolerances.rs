@@ -65,7 +65,7 @@ pub struct StructureTolerances {
 }
 
 impl StructureTolerances {
-    /// The share of a channel; 0 for a channel that is no output of the model.
+    /// The share of a channel; 0 for a channel that the model does not predict.
     pub fn of(&self, channel: Channel) -> f64 {
         match channel {
             Channel::ShaftSpeed => self.shaft_speed_ratio,

@@ -59,7 +59,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_that_nobody_can_read_have_a_power_of_ten() {
+    fn very_long_numbers_have_a_power_of_ten() {
         let (large, small, hash) = (1e300, 2.5e-300, "4".repeat(64));
         let text = format!("from -{large:.1} s to {large} s. Not {small}, 1.25 of 3 or {hash}f.");
         assert_eq!(

@@ -16,9 +16,10 @@ const CHANNELS: &str = include_str!("../../templates/channels.yaml");
 const ZERO: &str = include_str!("../../templates/zero.yaml");
 /// Noise of the flow meter of campaigns/turbo_a.yaml, whose wheel has 52 mm, kg/s; meters are chosen by their full scale.
 const FLOW_NOISE_KG_S: f64 = 1.5e-4;
-/// Speed limit over the highest speed of the grid, until the user writes the machine's own limit: room for the overshoot of a jump. Pressure
-/// and valve of the virtual lab move at once, and a jump between lines of a narrow map overshoots by up to 18 %.
+/// Speed limit over the highest speed of the grid, until the user writes the machine's own limit: room for the overshoot of a jump.
 const SPEED_LIMIT_RATIO: f64 = 1.1;
+/// The same on the virtual lab, whose pressure and valve move at once: with the narrow maps of a 52 mm wheel jumps overshoot by
+/// up to 18 %.
 const SPEED_LIMIT_IN_LAB_RATIO: f64 = 1.2;
 /// Points of a speed line.
 const POINTS: usize = 6;

@@ -72,7 +72,7 @@ fn write_temporary(path: &Path, bytes: &[u8]) -> std::io::Result<NamedTempFile> 
     builder.prefix(".mapper-");
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    // The library adds the path of the temporary file, which nobody asked for.
+    // The library adds the path of the temporary file, which is of no use here.
     let mut file = builder.tempfile_in(directory).map_err(|error| std::io::Error::from(error.kind()))?;
     file.write_all(bytes)?;
     Ok(file)

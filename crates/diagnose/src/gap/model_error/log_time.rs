@@ -3,7 +3,7 @@
 
 use nalgebra::DMatrix;
 
-/// Values within this time after a jump are fully correlated, s.
+/// Values within this time after a jump are fully correlated, s: the usual lag of P3 behind its command.
 const AT_ONCE_S: f64 = 0.3;
 
 /// Covariance within a step of errors proportional to each of `histories`, correlated over time.

@@ -103,7 +103,7 @@ const TURBINE_DROP_RATIO: f64 = 0.03;
 /// Clocks of one rig agree within a fraction of a sample, s.
 const DELAY_SIGMA_S: f64 = 0.02;
 
-/// Length of a jump, s.
+/// Length of a jump, s: ten times the usual lag of P3 behind its command (0.3 s), after which 5e-5 of the jump is left.
 pub(crate) const JUMP_S: f64 = 3.0;
 /// Time constants of the outputs after a jump, s: a step, and the ranges of probe, gas, housing and turbine housing.
 pub(crate) const RESPONSES_S: [f64; 5] = [f64::INFINITY, 5.0, 20.0, 60.0, 200.0];

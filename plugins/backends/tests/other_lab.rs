@@ -84,21 +84,22 @@ fn at_rest_the_energy_closes() {
     let model = Model::nominal();
     let mut boundary = BoundaryConditions { valve_opening_ratio: OPENING, ..Default::default() };
     boundary.p3_pa = setpoints(110e3).p3_pa;
-    let structure = OtherStructure::default();
-    let mut machine = structure.settled(&model, 0.0, &boundary, Watch::default()).unwrap();
-    let mut checked = 0;
     let inputs = mapper_backends::virtual_lab::LabInputs::constant(&boundary);
-    let mut on_sample = |_: f64, _: &_, outputs: &mapper_physics::simulation::model::Outputs| {
-        let to_metal_w = outputs.compressor_heat_w + outputs.turbine.heat_w;
-        let to_oil_w =
-            model.params.bearing.oil_conductance_w_k * (outputs.bearing_k - boundary.oil_temperature_k);
-        let to_cell_w = outputs.compressor_external_heat_w + outputs.turbine_external_heat_w;
-        let left_w = to_metal_w - to_oil_w - to_cell_w;
-        assert!(left_w.abs() < 1e-3, "{left_w} W of {to_metal_w} W");
-        let flows = [outputs.flow_kg_s, outputs.valve_flow_kg_s];
-        assert!((flows[0] / flows[1] - 1.0).abs() < 1e-6, "{flows:?}");
-        checked += 1;
-    };
-    machine.run_to(1.0, &inputs, &mut [0.0, 0.5, 1.0].into_iter(), &mut on_sample, &mut |_| {}).unwrap();
-    assert_eq!(checked, 3);
+    for structure in [OtherStructure::default(), OtherStructure::two_masses()] {
+        let mut machine = structure.settled(&model, 0.0, &boundary, Watch::default()).unwrap();
+        let mut checked = 0;
+        let mut on_sample = |_: f64, _: &_, outputs: &mapper_physics::simulation::model::Outputs| {
+            let to_metal_w = outputs.compressor_heat_w + outputs.turbine.heat_w;
+            let to_oil_w =
+                model.params.bearing.oil_conductance_w_k * (outputs.bearing_k - boundary.oil_temperature_k);
+            let to_cell_w = outputs.compressor_external_heat_w + outputs.turbine_external_heat_w;
+            let left_w = to_metal_w - to_oil_w - to_cell_w;
+            assert!(left_w.abs() < 1e-3, "{left_w} W of {to_metal_w} W");
+            let flows = [outputs.flow_kg_s, outputs.valve_flow_kg_s];
+            assert!((flows[0] / flows[1] - 1.0).abs() < 1e-6, "{flows:?}");
+            checked += 1;
+        };
+        machine.run_to(1.0, &inputs, &mut [0.0, 0.5, 1.0].into_iter(), &mut on_sample, &mut |_| {}).unwrap();
+        assert_eq!(checked, 3);
+    }
 }

@@ -43,7 +43,7 @@ struct BlindStudy {
     /// Kinds of cases (none, single, pair, outside, triple); the default is the first four.
     #[schemars(with = "Option<Vec<String>>", extend("examples" = [["single", "pair"]]))]
     kinds: Option<Vec<CaseKind>>,
-    /// Simulator that makes the recordings: virtual_lab (the default) or other_lab, whose equations are not the model's.
+    /// Simulator that makes the recordings: virtual_lab (the default), or other_lab or two_masses, whose equations are not the model's.
     #[serde(default)]
     #[schemars(with = "Option<String>", example = &"other_lab")]
     laboratory: Laboratory,

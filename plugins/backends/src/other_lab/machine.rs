@@ -7,17 +7,20 @@ use super::passage::{
     AREA_SHARES, BACK_NODE, CAPACITY_SHARES, EXTERNAL_SHARES, FLANGE_NODE, NODES, PROBE_NODE, h_ratios,
     heat_nodes,
 };
-use super::structure::OtherStructure;
+use super::structure::{CONVECTION_FLOW_KG_S, OtherStructure, TURBINE_EXPANSION_RATIO, TURBINE_JOINT_W_K};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::model::{Model, Outputs, State};
 use mapper_physics::{
     gas::air,
-    laws::{compression, housing, orifice},
+    laws::{
+        compression, housing, orifice,
+        turbine::{TurbineInlet, TurbineState},
+    },
 };
 
 /// Shaft, two pressures, duct flow, turbine housing, probe tip, gas of the first volume, separation, nodes, their inner
-/// walls, hidden temperatures of hooks.
-pub(super) const STATES: usize = 18;
+/// walls, hidden temperatures of hooks, inner mass of the turbine housing.
+pub(super) const STATES: usize = 19;
 const SHAFT: usize = 0;
 const P_FIRST: usize = 1;
 const DUCT_FLOW: usize = 2;
@@ -29,10 +32,11 @@ const SEPARATION: usize = 7;
 const OUTER: usize = 8;
 const INNER: usize = 12;
 const EXTRA: usize = 16;
+const TURBINE_INNER: usize = 18;
 
 /// Typical magnitudes of the states.
 pub(super) const SIZES: [f64; STATES] =
-    [1e4, 1e5, 0.1, 1e5, 5e2, 3e2, 3e2, 1.0, 3e2, 3e2, 3e2, 3e2, 3e2, 3e2, 3e2, 3e2, 3e2, 3e2];
+    [1e4, 1e5, 0.1, 1e5, 5e2, 3e2, 3e2, 1.0, 3e2, 3e2, 3e2, 3e2, 3e2, 3e2, 3e2, 3e2, 3e2, 3e2, 5e2];
 
 /// Specific heat ratio of air in the volumes.
 const GAMMA: f64 = 1.4;
@@ -63,7 +67,8 @@ pub(super) fn start(model: &Model, boundary: &BoundaryConditions, state: &State)
     y[GAS] = outputs.t2_k;
     y[SEPARATION] = 0.0;
     y[INNER..EXTRA].fill(state.inner_k);
-    y[EXTRA..].copy_from_slice(&state.extra_k);
+    y[EXTRA..TURBINE_INNER].copy_from_slice(&state.extra_k);
+    y[TURBINE_INNER] = state.tt_k;
     y
 }
 
@@ -124,7 +129,8 @@ pub(super) fn evaluate(
     let rise_ratio = compression::isentropic_rise_ratio(lumped.pressure_ratio, boundary.t1_k, air);
     let bulk_k = compression::compressed_k(boundary.t1_k, rise_ratio, lumped.efficiency, air);
     let cp2_j_kgk = air.heat_capacity_j_kgk(bulk_k);
-    let whole_w_k = lumped.h_w_m2k * compressor.internal_area_m2;
+    outputs.h_w_m2k *= (flow_kg_s / CONVECTION_FLOW_KG_S).powf(structure.convection_exponent_change);
+    let whole_w_k = outputs.h_w_m2k * compressor.internal_area_m2;
     let directed_w_k =
         |wall_k: f64, gas_k: f64| whole_w_k * if wall_k > gas_k { compressor.hot_metal_h_ratio } else { 1.0 };
     let after_wheel_w_k =
@@ -139,7 +145,8 @@ pub(super) fn evaluate(
         flow_kg_s,
         cp2_j_kgk,
     );
-    let one_wall_w_k = after_wheel_w_k(lumped.wall_k, lumped.t2_prime_k);
+    let one_wall_w_k =
+        after_wheel_w_k(lumped.wall_k, lumped.t2_prime_k) * lumped.h_w_m2k / outputs.h_w_m2k;
     let (one_wall_w, one_wall_k) =
         compression::after_wheel(one_wall_w_k, lumped.t2_prime_k, lumped.wall_k, flow_kg_s, cp2_j_kgk);
     // Keeps the change that hooks make to the outlet gas.
@@ -232,17 +239,45 @@ pub(super) fn evaluate(
             + share * lumped.added.compressor_heat_w)
             / ((1.0 - phi) * capacity_j_k(outer_k[node]));
     }
+    let inner_ratio = structure.turbine_inner_ratio;
+    let gas_side_k = if inner_ratio > 0.0 { y[TURBINE_INNER] } else { y[TURBINE] };
+    let at_model_efficiency = TurbineInlet::new(&params.turbine, boundary).at(gas_side_k, y[SHAFT]);
+    outputs.turbine = other_turbine(structure, at_model_efficiency, boundary);
+    let turbine_w = prepared.turbine_housing_balance_w(&wheel, &outputs);
+    let turbine_capacity_j_k = housing::turbine_capacity_j_k(params, y[TURBINE]);
+    let inner_w = if inner_ratio > 0.0 {
+        outputs.turbine.heat_w - TURBINE_JOINT_W_K * (y[TURBINE_INNER] - y[TURBINE])
+    } else {
+        0.0
+    };
+    rates[TURBINE] = (turbine_w - inner_w) / ((1.0 - inner_ratio) * turbine_capacity_j_k);
+    rates[TURBINE_INNER] =
+        if inner_ratio > 0.0 { inner_w / (inner_ratio * turbine_capacity_j_k) } else { 0.0 };
     rates[SHAFT] = prepared.shaft_balance_w(&outputs) / (params.shaft_inertia_kgm2 * y[SHAFT]);
     rates[P_FIRST] = p_first_rate;
     rates[DUCT_FLOW] = duct_rate;
     rates[P_SECOND] = p_second_rate;
-    rates[TURBINE] = prepared.turbine_housing_balance_w(&wheel, &outputs)
-        / housing::turbine_capacity_j_k(params, y[TURBINE]);
     rates[TIP] = if tau_s > 0.0 { (outputs.t2_probe_target_k - y[TIP]) / tau_s } else { 0.0 };
     rates[GAS] = gas_rate;
     rates[SEPARATION] = separation_rate(structure, lumped.surge_position_ratio, y[SEPARATION]);
-    rates[EXTRA..].copy_from_slice(&lumped.added.extra_rates_k_s);
+    rates[EXTRA..TURBINE_INNER].copy_from_slice(&lumped.added.extra_rates_k_s);
     Evaluation { state: lumped_state(y), outputs, rates }
+}
+
+/// The turbine with the efficiency of this machine.
+fn other_turbine(
+    structure: &OtherStructure,
+    turbine: TurbineState,
+    boundary: &BoundaryConditions,
+) -> TurbineState {
+    let away = (boundary.p3_pa / boundary.p4_pa / TURBINE_EXPANSION_RATIO).ln();
+    let ratio = 1.0 + structure.turbine_efficiency_slope * away;
+    TurbineState {
+        t4_k: turbine.t3_prime_k - ratio * (turbine.t3_prime_k - turbine.t4_k),
+        power_w: ratio * turbine.power_w,
+        efficiency: ratio * turbine.efficiency,
+        ..turbine
+    }
 }
 
 /// Two stable states between the two thresholds: attached flow separates at the upper one, separated flow reattaches

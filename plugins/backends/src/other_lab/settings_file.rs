@@ -28,6 +28,12 @@ struct StructureFile {
     hysteresis: Option<Quantity<Fraction>>,
     /// Factor on the natural frequencies of the sensors; default 1.
     sensor_speed: Option<f64>,
+    /// Change of the exponent of the law of convection; default 0.
+    convection_exponent: Option<f64>,
+    /// Share of the turbine housing that meets the gas; default 0 %, one mass.
+    turbine_inner: Option<Quantity<Fraction>>,
+    /// Change of the turbine's efficiency with ln(P3/P4), ratio; default 0.
+    turbine_slope: Option<f64>,
 }
 
 /// Reads a campaign's settings for this lab.
@@ -76,6 +82,13 @@ impl StructureFile {
                 .map_or(defaults.volume_share_ratio, |quantity| quantity.value),
             hysteresis_ratio: self.hysteresis.map_or(defaults.hysteresis_ratio, |quantity| quantity.value),
             sensor_speed_ratio: self.sensor_speed.unwrap_or(defaults.sensor_speed_ratio),
+            convection_exponent_change: self
+                .convection_exponent
+                .unwrap_or(defaults.convection_exponent_change),
+            turbine_inner_ratio: self
+                .turbine_inner
+                .map_or(defaults.turbine_inner_ratio, |quantity| quantity.value),
+            turbine_efficiency_slope: self.turbine_slope.unwrap_or(defaults.turbine_efficiency_slope),
         };
         for (key, value, unit, range) in [
             ("housing_coupling", structure.housing_coupling_w_k, "W/K", 0.1..=1e6),
@@ -85,6 +98,9 @@ impl StructureFile {
             ("volume_share", 100.0 * structure.volume_share_ratio, "%", 2.0..=90.0),
             ("hysteresis", 100.0 * structure.hysteresis_ratio, "%", 0.0..=10.0),
             ("sensor_speed", structure.sensor_speed_ratio, "", 0.1..=100.0),
+            ("convection_exponent", structure.convection_exponent_change, "", -0.7..=0.7),
+            ("turbine_inner", 100.0 * structure.turbine_inner_ratio, "%", 0.0..=90.0),
+            ("turbine_slope", structure.turbine_efficiency_slope, "", -0.5..=0.5),
         ] {
             check_range(value, unit, range).map_err(|problem| problem.at(format!("structure.{key}")))?;
         }

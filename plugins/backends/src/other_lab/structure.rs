@@ -27,7 +27,20 @@ pub struct OtherStructure {
     pub hysteresis_ratio: f64,
     /// Factor on the natural frequencies of all sensors; infinity for sensors without lag.
     pub sensor_speed_ratio: f64,
+    /// Added to the exponent of the compressor's law of convection, `h ~ m^n`; h is unchanged at [`CONVECTION_FLOW_KG_S`].
+    pub convection_exponent_change: f64,
+    /// Share of the turbine housing's mass that meets the gas; the other part has the Tt probe and all losses. 0: one mass.
+    pub turbine_inner_ratio: f64,
+    /// Relative change of the turbine's efficiency for a change of ln(P3/P4) by 1, unchanged at P3/P4 = 2.
+    pub turbine_efficiency_slope: f64,
 }
+
+/// Flow at which the other law of convection meets that of the model, kg/s: the middle of the map.
+pub(super) const CONVECTION_FLOW_KG_S: f64 = 0.05;
+/// Expansion ratio at which both turbines have equal efficiency: the middle of their range.
+pub(super) const TURBINE_EXPANSION_RATIO: f64 = 2.0;
+/// Conductance between the two masses of the turbine housing, W/K: a flange of 40 cm2, 4000 W/(m2 K) at its joint.
+pub(super) const TURBINE_JOINT_W_K: f64 = 16.0;
 
 impl Default for OtherStructure {
     fn default() -> Self {
@@ -40,6 +53,9 @@ impl Default for OtherStructure {
             volume_share_ratio: 0.3,
             hysteresis_ratio: 0.01,
             sensor_speed_ratio: 1.0,
+            convection_exponent_change: 0.0,
+            turbine_inner_ratio: 0.0,
+            turbine_efficiency_slope: 0.0,
         }
     }
 }
@@ -57,6 +73,25 @@ impl OtherStructure {
             volume_share_ratio: 0.02,
             hysteresis_ratio: 0.0,
             sensor_speed_ratio: f64::INFINITY,
+            ..Self::default()
+        }
+    }
+
+    /// Another machine: a turbine housing of two masses, a flatter law of convection, a turbine that gains efficiency with expansion, a
+    /// compressor housing of loosely coupled nodes, a short duct, slow sensors, no hysteresis.
+    pub fn two_masses() -> Self {
+        OtherStructure {
+            housing_coupling_w_k: 2.0,
+            uneven_h_ratio: 0.2,
+            mixed_gas: true,
+            duct_length_m: 0.1,
+            duct_loss_ratio: 0.5,
+            volume_share_ratio: 0.5,
+            hysteresis_ratio: 0.0,
+            sensor_speed_ratio: 0.5,
+            convection_exponent_change: -0.2,
+            turbine_inner_ratio: 0.4,
+            turbine_efficiency_slope: 0.1,
         }
     }
 

@@ -11,5 +11,7 @@ named_enum! {
         VirtualLab = "virtual_lab",
         /// Other equations: no model of the catalogue has the right structure, whatever its parameters.
         OtherLab = "other_lab",
+        /// Other equations again, those of [`mapper_backends::other_lab::OtherStructure::two_masses`].
+        TwoMasses = "two_masses",
     }
 }

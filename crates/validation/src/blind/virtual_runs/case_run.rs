@@ -72,8 +72,10 @@ impl<'a> Schedule<'a> {
         };
         settings.take(rig);
         settings.sensors = self.sensors(case.seed);
-        if self.laboratory == Laboratory::OtherLab {
-            other_lab::apply_structure(&mut settings, OtherStructure::default());
+        match self.laboratory {
+            Laboratory::VirtualLab => {}
+            Laboratory::OtherLab => other_lab::apply_structure(&mut settings, OtherStructure::default()),
+            Laboratory::TwoMasses => other_lab::apply_structure(&mut settings, OtherStructure::two_masses()),
         }
         Ok(VirtualLab::new(settings))
     }

@@ -1,7 +1,8 @@
 //! The recorded boundary conditions as model inputs, without their noise.
 //!
-//! P3 is its command with a first-order lag, whose time constant is fitted to the measured P3, plus a smooth remainder. Other quantities may
-//! jump with P3 (P4 does, because of the flow): regression gives that share, and the remainder is smooth. Jumps are not smoothed.
+//! P3 is its command with a first-order lag, whose time constant is fitted to the measured P3, plus a remainder. The remainder and other
+//! quantities may jump with P3 (P4 does, because of the flow; the remainder, by the gain error of the transducer): regression gives that
+//! share, and what is left is smooth. Jumps are not smoothed.
 
 use crate::averages::time_table::Table;
 use crate::channels::{DRIVERS, boundary_condition};
@@ -28,7 +29,8 @@ pub struct SmoothedInputs {
     pub command: LaggedCommand,
     /// Starts of the steps, s. Changes within a step by a speed-control loop are too small to interrupt an integration.
     jumps_s: Vec<f64>,
-    p3_residual: TimeHistory,
+    /// P3 less its command.
+    p3_remainder: Driver,
     /// Every other boundary condition by its channel.
     drivers: Vec<(Channel, Driver)>,
     nominal: BoundaryConditions,
@@ -55,26 +57,25 @@ impl SmoothedInputs {
         let command = LaggedCommand::of_recording(recording, p3, valve);
         let commanded_p3: Vec<f64> = table.t_s.iter().map(|t| command.p3_pa(*t)).collect();
         let jumps_s: Vec<f64> = recording.steps.iter().map(|step| step.start_s).collect();
-        let smoothed = |channel: Channel, values: &[f64]| {
-            smooth(&table.t_s, values, declared.noise_sigma(channel), declared.noise_colour, &jumps_s)
-        };
-        let p3_residual = table.column(Channel::P3).and_then(|values| {
-            let residual: Vec<f64> =
-                values.iter().zip(&commanded_p3).map(|(p3, commanded)| p3 - commanded).collect();
-            smoothed(Channel::P3, &residual)
-        });
-        let driver = |channel: Channel| {
-            let values = table.column(channel)?;
-            let per_p3 =
-                change_per_pascal(table, values, (&command, &commanded_p3), declared.noise_sigma(channel));
-            let residual: Vec<f64> =
+        let driver = |channel: Channel, values: &[f64]| {
+            let noise_sigma = declared.noise_sigma(channel);
+            let per_p3 = change_per_pascal(table, values, (&command, &commanded_p3), noise_sigma);
+            let rest: Vec<f64> =
                 values.iter().zip(&commanded_p3).map(|(value, p3)| value - per_p3 * p3).collect();
-            Some((channel, Driver { history: smoothed(channel, &residual)?, per_p3 }))
+            let history = smooth(&table.t_s, &rest, noise_sigma, declared.noise_colour, &jumps_s)?;
+            Some(Driver { history, per_p3 })
         };
+        let p3_remainder = table.column(Channel::P3).and_then(|values| {
+            let remainder: Vec<f64> =
+                values.iter().zip(&commanded_p3).map(|(p3, commanded)| p3 - commanded).collect();
+            driver(Channel::P3, &remainder)
+        });
+        let other = |channel: Channel| Some((channel, driver(channel, table.column(channel)?)?));
         let others = DRIVERS.into_iter().filter(|channel| *channel != Channel::P3);
         SmoothedInputs {
-            p3_residual: p3_residual.unwrap_or_else(|| TimeHistory::constant(0.0)),
-            drivers: others.chain([Channel::TAmb]).filter_map(driver).collect(),
+            p3_remainder: p3_remainder
+                .unwrap_or_else(|| Driver { history: TimeHistory::constant(0.0), per_p3: 0.0 }),
+            drivers: others.chain([Channel::TAmb]).filter_map(other).collect(),
             nominal: declared.nominal,
             jumps_s,
             command,
@@ -85,7 +86,7 @@ impl SmoothedInputs {
     pub fn noise(&self) -> [Option<InputNoise>; DRIVERS.len()] {
         DRIVERS.map(|channel| {
             let history = match channel {
-                Channel::P3 => &self.p3_residual,
+                Channel::P3 => &self.p3_remainder.history,
                 _ => &self.drivers.iter().find(|(other, _)| *other == channel)?.1.history,
             };
             Some(InputNoise { sigma: history.sigma, correlation_s: history.correlation_s })
@@ -96,14 +97,15 @@ impl SmoothedInputs {
 impl Inputs for SmoothedInputs {
     fn at(&self, t_s: f64) -> BoundaryConditions {
         let commanded_p3_pa = self.command.p3_pa(t_s);
+        let of = |driver: &Driver| driver.history.at(t_s) + driver.per_p3 * commanded_p3_pa;
         let mut boundary = BoundaryConditions {
-            p3_pa: commanded_p3_pa + self.p3_residual.at(t_s),
+            p3_pa: commanded_p3_pa + of(&self.p3_remainder),
             valve_opening_ratio: self.command.valve_opening_ratio(t_s),
             ..self.nominal
         };
         for (channel, driver) in &self.drivers {
             if let Some(value) = boundary_condition(&mut boundary, *channel) {
-                *value = driver.history.at(t_s) + driver.per_p3 * commanded_p3_pa;
+                *value = of(driver);
             }
         }
         boundary
@@ -122,8 +124,8 @@ impl Inputs for SmoothedInputs {
 /// Length of the segments before and after a jump that give its height, s.
 const LEVEL_WINDOW_S: f64 = 8.0;
 
-/// Change of `values` per pascal of P3, by regression of their jumps on those of P3; 0 if it is not significant. `commanded_p3` is P3 according
-/// to its command.
+/// Change of `values` per pascal of P3, by regression of their jumps on those of P3, shrunk by its uncertainty (positive-part James-Stein
+/// estimate: Efron and Morris, J. Am. Stat. Assoc. 68:117, 1973). `commanded_p3` is P3 according to its command.
 fn change_per_pascal(
     table: &Table,
     values: &[f64],
@@ -154,7 +156,7 @@ fn change_per_pascal(
     let scatter = pairs.iter().map(|(x, y)| (y - share * x).powi(2)).sum::<f64>() / (pairs.len() - 1) as f64;
     // The noise limits the scatter from below.
     let error = (scatter.max(noise_sigma * noise_sigma * 0.1) / sum_xx).sqrt();
-    if share.abs() > 6.0 * error { share } else { 0.0 }
+    if share == 0.0 { 0.0 } else { share * (1.0 - (error / share).powi(2)).max(0.0) }
 }
 
 /// A line through the values between two times, evaluated at `at_s`.

@@ -3,18 +3,17 @@
 use crate::gap::best_fit::adequacy::{Adequacy, adequacy};
 use crate::gap::best_fit::fit::{Effort, Fit};
 use crate::gap::best_fit::selection::Selection;
-use crate::gap::causes::additions::additions;
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::place::{Gain, places};
 use crate::gap::causes::select::{MIN_SHRINK, Search, ranked, refit, search, search_onsets, supported};
 use crate::gap::causes::smallest_seen::smallest_seen;
-use crate::gap::causes::weigh::{rivals, suspicions, weigh, weight};
+use crate::gap::causes::weigh::{ln_odds, rivals, suspicions, weigh, weight};
 use crate::gap::findings::experiment::Experiment;
 use crate::gap::findings::report::{Diagnosis, Verdict};
 use crate::gap::findings::warning::GapWarning;
 use crate::gap::gap_reduction::folds::Folds;
 use crate::gap::gap_reduction::how_far::{Compared, how_far};
-use crate::gap::gap_reduction::strain::{beyond_prior, cost_beyond_prior};
+use crate::gap::gap_reduction::strain::beyond_prior;
 use crate::gap::model_error::healthy::Healthy;
 use crate::gap::next_experiment::best_experiment::{Suggested, next, sensor_near};
 use crate::gap::preconditions::default_tolerances::assumed;
@@ -162,23 +161,20 @@ pub fn diagnose(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
         fits = ranked(&at(at_best), again.iter().chain(closest).chain(others));
     }
     fits = supported(&at(at_best), fits);
-    progress(0.75, "what one more would do");
-    let mut one_more = most_gain(&study, at_best, &everywhere, fits.first().unwrap_or(&null));
-    let mut left = adequacy(&study, &linearised, fits.first().unwrap_or(&null), one_more);
-    if calibration.outside(left.features()) > 0.5 && folds.steps.len() > 1 {
+    let mut left = adequacy(&study, &linearised, fits.first().unwrap_or(&null));
+    let odds = ln_odds(calibration, &study, &null, &fits);
+    if calibration.outside(left.features(odds)) > 0.5 && folds.steps.len() > 1 {
         progress(0.8, "causes that begin");
         study.add_onsets();
         let at = Search { study: &study, linearised: at_best, selection, calibration, onsets: true };
         search_onsets(at, &null, &mut fits);
         fits.truncate(FINALISTS);
         fits = supported(&at, fits);
-        let best = fits.first().unwrap_or(&null);
-        one_more = most_gain(&study, at_best, &everywhere, best);
-        left = adequacy(&study, &linearised, best, one_more);
+        left = adequacy(&study, &linearised, fits.first().unwrap_or(&null));
     }
     progress(0.88, "residual");
     let best = fits.first().unwrap_or(&null);
-    let left_by_null = adequacy(&study, &linearised, &null, 0.0);
+    let left_by_null = adequacy(&study, &linearised, &null);
     let posterior = weigh(&study, calibration, &null, &fits, &left);
     let named = posterior.named;
     let weight = |fit: &Fit| weight(calibration, &study, fit);
@@ -269,13 +265,6 @@ impl Diagnosed {
         }
         self.with_cause = Some(("the law", law));
     }
-}
-
-/// Maximum decrease of the misfit by one additional effect. The part that relieves a strained tolerance does not count: the tolerance is already a
-/// suspect.
-fn most_gain(study: &Study, linearised: &Linearised, selection: &Selection, base: &Fit) -> f64 {
-    let most = additions(study, linearised, selection, base).into_iter().map(|a| a.gain).fold(0.0, f64::max);
-    (most - cost_beyond_prior(base)).max(0.0)
 }
 
 /// Machine parts of some, but not all, of the indistinguishable causes.

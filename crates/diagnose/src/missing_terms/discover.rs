@@ -4,7 +4,6 @@ use crate::gap::best_fit::adequacy::{adequacy, misfit_of_steps};
 use crate::gap::best_fit::first_step::with_start_read;
 use crate::gap::best_fit::fit::{Effort, Fit, fit};
 use crate::gap::best_fit::selection::Selection;
-use crate::gap::causes::additions::additions;
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::place::{BEND, Explanation, Gain, Part, RARITY, of_fits, places_of, signature};
 use crate::gap::causes::select::MIN_SHRINK;
@@ -137,7 +136,7 @@ fn found(
     training: &Selection,
     everywhere: &Selection,
 ) -> Option<FittedLaws> {
-    let adequate = |fit: &Fit| adequacy(&diagnosed.study, &diagnosed.linearised, fit, 0.0).may_be_noise();
+    let adequate = |fit: &Fit| adequacy(&diagnosed.study, &diagnosed.linearised, fit).may_be_noise();
     let changes = base.changes(&bench.library);
     let usable: Vec<usize> = (0..changes.len()).filter(|place| changes[*place].is_some()).collect();
     let columns: Vec<Vec<f64>> = changes.into_iter().flatten().collect();
@@ -248,13 +247,8 @@ fn propose(
     if !worse.is_empty() {
         return Vec::new();
     }
-    let everywhere = Selection::all(study);
-    let (own, own_fit) = bench.alone(study, best);
-    let one_more = additions(&own, linearised, &everywhere, &own_fit)
-        .into_iter()
-        .map(|addition| addition.gain)
-        .fold(0.0, f64::max);
-    let left = calibration.outside(adequacy(&bench.study, linearised, &best.fit, one_more).features());
+    let odds = best.score() - weight(calibration, study, null);
+    let left = calibration.outside(adequacy(&bench.study, linearised, &best.fit).features(odds));
     let near = |other: &&Candidate| best.score() - other.score() < evidence_resolution(calibration);
     let weights: f64 = found
         .fitted

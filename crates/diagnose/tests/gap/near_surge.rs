@@ -113,10 +113,10 @@ fn an_exact_recording_near_surge_has_no_cause() {
     let null = fit(&study, &linearised, &study.nothing(), &all, Effort::default()).unwrap();
     let found = additions(&study, &linearised, &all, &null);
     let most = found.iter().max_by(|a, b| a.gain.total_cmp(&b.gain)).unwrap();
-    let left = adequacy(&study, &linearised, &null, most.gain);
+    let left = adequacy(&study, &linearised, &null);
     assert!(null.cost < 10.0, "{} of {} values", null.cost, study.measured.len());
     // The best of 26 effects on noise alone has a gain of some units.
     assert!(most.gain < 1.0, "{:?} {}", most.start.hypothesis.effects, most.gain);
-    let outside = Calibration::shipped().unwrap().outside(left.features());
+    let outside = Calibration::shipped().unwrap().outside(left.features(f64::MIN));
     assert!(outside < 0.05, "{outside} {left:?}");
 }

@@ -20,8 +20,6 @@ pub struct Adequacy {
     pub smooth_excess: f64,
     /// Scatter of the effect's parameters from step to step above its expectation, in standard deviations; 0 without effects.
     pub scatter_sigma: f64,
-    /// Largest cost reduction that one more library effect could achieve.
-    pub one_more: f64,
     /// Mean squared whitened residual.
     pub mean_square: f64,
 }
@@ -32,9 +30,9 @@ impl Adequacy {
         self.smooth_sigma + SCATTER_COUNTS * self.scatter_sigma < DOUBT_SIGMAS
     }
 
-    /// Features for the probability of an unmodelled cause.
-    pub fn features(&self) -> [f64; 3] {
-        [self.smooth_sigma, self.scatter_sigma, self.one_more]
+    /// Features for the probability of an unmodelled cause; `ln_odds`: logarithm of the odds of the best cause against none.
+    pub fn features(&self, ln_odds: f64) -> [f64; 3] {
+        [self.smooth_sigma, self.scatter_sigma, ln_odds]
     }
 }
 
@@ -69,8 +67,8 @@ pub fn smooth_energies(study: &Study, linearised: &Linearised, residual: &[f64])
         .collect()
 }
 
-/// Evaluates the residual of a fit on all steps. `one_more` is the largest gain of a further effect.
-pub fn adequacy(study: &Study, linearised: &Linearised, fit: &Fit, one_more: f64) -> Adequacy {
+/// Evaluates the residual of a fit on all steps.
+pub fn adequacy(study: &Study, linearised: &Linearised, fit: &Fit) -> Adequacy {
     let energies = smooth_energies(study, linearised, &fit.residual);
     let expected: f64 = study.groups.iter().map(|group| RESPONSES_S.len().min(group.rows.len()) as f64).sum();
     let smooth_excess = energies.iter().sum::<f64>() - expected;
@@ -94,7 +92,6 @@ pub fn adequacy(study: &Study, linearised: &Linearised, fit: &Fit, one_more: f64
         smooth_sigma: smooth_excess / (2.0 * expected.max(1.0)).sqrt(),
         smooth_excess,
         scatter_sigma,
-        one_more,
         mean_square,
     }
 }

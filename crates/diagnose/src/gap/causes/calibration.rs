@@ -22,8 +22,8 @@ pub struct Calibration {
     pub prior_triple: f64,
     /// Factor on the parameters' standard errors.
     pub interval_factor: f64,
-    /// Logistic model of an unmodelled cause: offset, and slopes of the [`counted`] misfit, scatter and gain of one more effect.
-    pub outside: [f64; 4],
+    /// Logistic model of an unmodelled cause: offset, and slopes of the [`counted`] features.
+    pub outside: [f64; 5],
 }
 
 const TEXT: &str = include_str!("../../../calibration.json");
@@ -37,7 +37,8 @@ impl Calibration {
         serde_json::from_str(TEXT)
     }
 
-    /// Probability of an unmodelled cause, given the residual features of the best fit.
+    /// Probability of an unmodelled cause, given its features: smooth misfit and scatter of the best fit, in standard deviations, and the
+    /// logarithm of the odds of the best cause against none.
     pub fn outside(&self, features: [f64; 3]) -> f64 {
         let [offset, slopes @ ..] = self.outside;
         let x = offset + slopes.iter().zip(counted(features)).map(|(slope, x)| slope * x).sum::<f64>();
@@ -48,10 +49,14 @@ impl Calibration {
 /// Upper limit of half the squared misfit, above which all misfits count as equally large.
 const MAX: f64 = 500.0;
 
-/// Transforms the features of an unmodelled cause for its logistic model. Smooth misfit enters as half its square, the negative
-/// log-probability under noise. Scatter and gain enter by order of magnitude: they grow with any cause, which linearised models follow only
-/// to a few per cent.
-pub fn counted([smooth_sigma, scatter_sigma, one_more]: [f64; 3]) -> [f64; 3] {
+/// Transforms the features of an unmodelled cause for its logistic model.
+///
+/// Smooth misfit enters as half its square, the negative log-probability under noise. Scatter enters by order of magnitude: it grows with any
+/// cause, which linearised models follow only to a few per cent. Where a cause is found, its strength in sigmas enters by order of
+/// magnitude: the stronger an unmodelled cause, the smaller the chance that the catalogue imitates it within noise.
+pub fn counted([smooth_sigma, scatter_sigma, ln_odds]: [f64; 3]) -> [f64; 4] {
     let unlikely = 0.5 * smooth_sigma.max(0.0).powi(2);
-    [unlikely.min(MAX), scatter_sigma.max(0.0).asinh(), one_more.max(0.0).asinh()]
+    let found = 1.0 / (1.0 + (-ln_odds).exp());
+    let strength_sigma = (2.0 * ln_odds.max(0.0)).sqrt();
+    [unlikely.min(MAX), scatter_sigma.max(0.0).asinh(), found, found * strength_sigma.asinh()]
 }

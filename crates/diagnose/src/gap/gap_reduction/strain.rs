@@ -31,9 +31,3 @@ pub fn beyond_prior(study: &Study, linearised: &Linearised, fitted: &Fit) -> Vec
     beyond.sort_by(|a, b| b.sigmas.total_cmp(&a.sigmas));
     beyond
 }
-
-/// Cost of the tolerances of a fit beyond three sigmas of their prior: an effect that replaces them gains at most this without a better fit to the
-/// readings.
-pub fn cost_beyond_prior(fitted: &Fit) -> f64 {
-    fitted.hypothesis.nuisances.iter().filter(|sigmas| sigmas.abs() > DOUBT_SIGMAS).map(|u| u * u).sum()
-}

@@ -83,17 +83,6 @@ impl Bench {
         candidates
     }
 
-    /// A candidate's fit in a study with only the library effects and its own law, without the other laws tried.
-    pub fn alone(&self, catalogue: &Study, candidate: &Candidate) -> (Study, Fit) {
-        let mut own = catalogue.clone();
-        let law = own.add(self.study.effects[candidate.effect].clone());
-        let mut fit = candidate.fit.clone();
-        for (index, _) in &mut fit.hypothesis.effects {
-            *index = if *index == candidate.effect { law } else { *index };
-        }
-        (own, fit)
-    }
-
     /// Adds the law of a choice to the study, to be fitted together with the effects of the base from its linear estimate.
     pub fn start(&mut self, base: &Hypothesis, choice: &Choice) -> LawStart {
         let terms: Vec<Term> = choice.terms.iter().map(|place| self.library[*place].clone()).collect();

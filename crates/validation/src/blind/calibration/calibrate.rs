@@ -12,7 +12,7 @@ use mapper_campaign::{Campaign, nominal_model};
 use mapper_diagnose::gap::best_fit::coordinate::coordinates;
 use mapper_diagnose::gap::best_fit::fit::Fit;
 use mapper_diagnose::gap::causes::calibration::Calibration;
-use mapper_diagnose::gap::causes::weigh::weight;
+use mapper_diagnose::gap::causes::weigh::{ln_odds, weight};
 use mapper_diagnose::gap::diagnose::{Diagnosed, GapRequest, diagnose};
 use mapper_diagnose::gap::findings::report::Verdict;
 use mapper_diagnose::gap::residuals::study::{Study, members};
@@ -177,7 +177,7 @@ fn observe(case: &Case, calibration: &Calibration, diagnosed: &Diagnosed) -> Dia
         sigma: case.sigmas.iter().copied().reduce(f64::min),
         nothing: weight(calibration, study, null),
         candidates: fits.iter().map(|fit| (names(fit), weight(calibration, study, fit))).collect(),
-        features: adequacy.features(),
+        features: adequacy.features(ln_odds(calibration, study, null, fits)),
         errors_sigma: named.map_or_else(Vec::new, |fit| errors_sigma(case, study, fit)),
     }
 }

@@ -1,17 +1,20 @@
-//! A logistic regression with three features.
+//! A logistic regression of unmodelled causes.
 
 use mapper_diagnose::gap::causes::calibration::counted;
 use mapper_numerics::minimise::minimise;
 
-/// Maximum number of iterations of coordinate descent; about fifty are needed.
-const ROUNDS: usize = 300;
-/// Prior mean of the slopes, and its precision: about ten cases outweigh the prior.
-const PRIOR_SLOPE: f64 = 1.0;
+/// Maximum number of iterations of coordinate descent; some hundred are needed.
+const ROUNDS: usize = 2000;
+/// Prior mean of the offset: the share of unmodelled causes, 15 %, before anything is known.
+const PRIOR_OFFSET: f64 = -1.7;
+/// Prior means of the slopes. A cause is imitated within noise with a probability in inverse proportion to its strength.
+const PRIOR_SLOPES: [f64; 4] = [1.0, 1.0, 0.0, -1.0];
+/// Precision of both: about ten cases outweigh the prior.
 const PRIOR_PRECISION: f64 = 0.25;
-/// Minimum slopes: a larger misfit never contradicts an outside cause. The slope of the smooth misfit is at least half of that from noise
-/// for any cases: a failed search with the right cause leaves a residual of thousands of sigmas, and a few such cases would otherwise make
-/// a gross misfit meaningless.
-const MIN_SLOPES: [f64; 3] = [0.5, 0.0, 0.0];
+/// Ranges of the slopes: a larger misfit never contradicts an unmodelled cause, and a larger strength never supports one. The slope of the smooth
+/// misfit is at least half of that from noise for any cases: a failed search with the right cause leaves a residual of thousands of sigmas,
+/// and a few such cases would otherwise make a gross misfit meaningless.
+const SLOPES: [(f64, f64); 4] = [(0.5, 10.0), (0.0, 10.0), (-30.0, 30.0), (-10.0, 0.0)];
 
 /// A case.
 #[derive(Debug, Clone, Copy)]
@@ -23,26 +26,28 @@ pub(crate) struct Row {
 }
 
 /// Offset and slopes of the logistic that separates outside causes from the others. `None` if one of the classes is empty.
-pub(crate) fn logistic(rows: &[Row]) -> Option<[f64; 4]> {
+pub(crate) fn logistic(rows: &[Row]) -> Option<[f64; 5]> {
     if rows.iter().all(|row| row.outside) || rows.iter().all(|row| !row.outside) {
         return None;
     }
-    let rows: Vec<Row> = rows.iter().map(|row| Row { features: counted(row.features), ..*row }).collect();
-    let loss = |weights: &[f64; 4]| -> f64 {
+    let rows: Vec<(Row, [f64; 4])> = rows.iter().map(|row| (*row, counted(row.features))).collect();
+    let loss = |weights: &[f64; 5]| -> f64 {
+        let means = std::iter::once(PRIOR_OFFSET).chain(PRIOR_SLOPES);
         let penalty: f64 =
-            weights[1..].iter().map(|slope| 0.5 * PRIOR_PRECISION * (slope - PRIOR_SLOPE).powi(2)).sum();
-        let miss = |row: &Row| {
-            let x = argument(weights, &row.features);
+            weights.iter().zip(means).map(|(w, mean)| 0.5 * PRIOR_PRECISION * (w - mean).powi(2)).sum();
+        let miss = |(row, terms): &(Row, [f64; 4])| {
+            let x = argument(weights, terms);
             row.weight * if row.outside { (-x).exp().ln_1p() } else { x.exp().ln_1p() }
         };
         penalty + rows.iter().map(miss).sum::<f64>()
     };
-    let mut weights = [-5.0, PRIOR_SLOPE, PRIOR_SLOPE, PRIOR_SLOPE];
+    let [a, b, c, d] = PRIOR_SLOPES;
+    let mut weights = [PRIOR_OFFSET, a, b, c, d];
     // Coordinate descent within bounds converges because the loss is convex.
     for _ in 0..ROUNDS {
         let last = weights;
         for place in 0..weights.len() {
-            let (low, high) = if place == 0 { (-30.0, 30.0) } else { (MIN_SLOPES[place - 1], 10.0) };
+            let (low, high) = if place == 0 { (-30.0, 30.0) } else { SLOPES[place - 1] };
             weights[place] = minimise(low, high, 1e-9, |value| {
                 let mut tried = weights;
                 tried[place] = value;
@@ -59,7 +64,7 @@ pub(crate) fn logistic(rows: &[Row]) -> Option<[f64; 4]> {
 }
 
 /// Argument of the logistic for features that [`counted`] has limited.
-fn argument(weights: &[f64; 4], features: &[f64; 3]) -> f64 {
+fn argument(weights: &[f64; 5], features: &[f64; 4]) -> f64 {
     // Beyond 500 an exponential is infinite.
     let x = weights[0] + weights[1..].iter().zip(features).map(|(w, f)| w * f).sum::<f64>();
     x.clamp(-500.0, 500.0)

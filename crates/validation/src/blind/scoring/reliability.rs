@@ -230,7 +230,11 @@ mod tests {
 
     /// Temperature 1 and nothing outside: the probabilities are those of the scores.
     fn plain() -> Calibration {
-        Calibration { temperature: 1.0, outside: [-50.0, 0.0, 0.0, 0.0], ..Calibration::shipped().unwrap() }
+        Calibration {
+            temperature: 1.0,
+            outside: [-50.0, 0.0, 0.0, 0.0, 0.0],
+            ..Calibration::shipped().unwrap()
+        }
     }
 
     fn reliability_of(cases: &[DiagnosisSummary]) -> Reliability {

@@ -111,23 +111,26 @@ pub fn extend<C: Causes>(causes: &C, known: &mut Known<C::Fit>, limits: Limits) 
     let is_plausible = |fit: &C::Fit| causes.ln_odds(fit) > null - limits.slack;
     let ranked = known.ranked(causes).into_iter();
     let singles: Vec<C::Fit> = ranked.filter(is_plausible).take(limits.starts).collect();
+    let mut reduced = BTreeMap::new();
     for single in &singles {
-        climb_beyond(causes, known, single, limits, BTreeSet::from([Vec::new()]));
+        climb_beyond(causes, known, single, limits, BTreeSet::from([Vec::new()]), &mut reduced);
     }
 }
 
 /// Changes one cause at a time, from `start` until no change makes the set more probable. `known` gets every fit.
 pub fn climb<C: Causes>(causes: &C, known: &mut Known<C::Fit>, start: &C::Fit, limits: Limits) {
-    climb_beyond(causes, known, start, limits, BTreeSet::new());
+    climb_beyond(causes, known, start, limits, BTreeSet::new(), &mut BTreeMap::new());
 }
 
-/// Like [`climb`]; the sets with one cause more than a set in `extended` are known already.
+/// Like [`climb`]; the sets with one cause more than a set in `extended` are known already. `reduced` has the sets whose subsets are fitted, with
+/// the ln of odds (in bits) of the fit from which they were.
 fn climb_beyond<C: Causes>(
     causes: &C,
     known: &mut Known<C::Fit>,
     start: &C::Fit,
     limits: Limits,
     mut extended: BTreeSet<Vec<usize>>,
+    reduced: &mut BTreeMap<Vec<usize>, u64>,
 ) {
     let mut best = start.clone();
     let mut may_grow = true;
@@ -137,8 +140,11 @@ fn climb_beyond<C: Causes>(
         let members = causes.members(&best);
         // Refit each set without one cause, from this fit: otherwise a set may look useful because its subsets were fitted badly.
         let removable = if members.len() > 1 { members.as_slice() } else { &[] };
-        let subsets: Vec<C::Start> = removable.iter().map(|cause| causes.without(&best, *cause)).collect();
-        known.fit_all(causes, &subsets);
+        let from = causes.ln_odds(&best).to_bits();
+        if reduced.insert(members.clone(), from) != Some(from) {
+            let without = removable.iter().map(|cause| causes.without(&best, *cause));
+            known.fit_all(causes, &without.collect::<Vec<_>>());
+        }
         let subsets = members.iter().map(|cause| without(&members, *cause));
         let full_set = (may_grow && members.len() < limits.members).then(|| members.clone());
         let bases: Vec<Vec<usize>> =

@@ -5,7 +5,9 @@ use crate::gap::best_fit::fit::{Effort, Fit};
 use crate::gap::best_fit::selection::Selection;
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::place::{Gain, places};
-use crate::gap::causes::select::{MIN_SHRINK, Search, ranked, refit, search, search_onsets, supported};
+use crate::gap::causes::select::{
+    HOPELESS, MIN_SHRINK, Search, close, ranked, refit, search, search_onsets, supported,
+};
 use crate::gap::causes::smallest_seen::smallest_seen;
 use crate::gap::causes::weigh::{ln_odds, rivals, suspicions, weigh, weight};
 use crate::gap::findings::experiment::Experiment;
@@ -78,8 +80,6 @@ pub struct Diagnosed {
 
 /// Number of fits of the search that are refitted on all steps.
 const FINALISTS: usize = 7;
-/// Difference of the log evidence from the best above which a finalist after the third is dropped.
-const HOPELESS: f64 = 60.0;
 
 /// Diagnoses a recording.
 ///
@@ -156,7 +156,7 @@ pub fn diagnose(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
     };
     let at_best = relinearised.as_ref().unwrap_or(at_best);
     if relinearised.is_some() {
-        let (closest, others) = fits.split_at(fits.len().min(4));
+        let (closest, others) = fits.split_at(close(&fits[..fits.len().min(4)], HOPELESS).len());
         let again = refit(&at(at_best), &closest.iter().collect::<Vec<_>>(), effort);
         fits = ranked(&at(at_best), again.iter().chain(closest).chain(others));
     }

@@ -11,7 +11,7 @@ use crate::gap::residuals::hypothesis::TimeHistory;
 use crate::gap::residuals::nuisance::NuisanceKind;
 use crate::gap::residuals::study::{Hypothesis, PredictError, Prediction, Study};
 use crate::gap::residuals::whiten::{Linearised, rows_of_step};
-use mapper_inference::descent::{End, Model, Normal, Reach, Until, descend, room_within};
+use mapper_inference::descent::{End, FINE, Model, Normal, Reach, Until, descend, room_within};
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 use std::sync::Arc;
@@ -259,8 +259,13 @@ impl Model for Objective<'_> {
 
     fn normal(&mut self, unknowns: &DVector<f64>, point: &Point, reach: Reach) -> Normal {
         let Point { hypothesis, prediction, residual } = point;
-        // Near surge the cost has small steps, which a longer difference averages.
-        if reach == Reach::Coarse || !self.columns_known {
+        // Slopes are known to within the distance of their differences. Near surge the cost has small steps, which a longer difference averages.
+        let is_near = |(before, _): &(DVector<f64>, Vec<f64>)| {
+            let step = unknowns - before;
+            step.iter().skip(hypothesis.nuisances.len()).all(|by| by.abs() < FINE)
+        };
+        let known = self.columns_known || self.last.as_ref().is_some_and(is_near);
+        if reach == Reach::Coarse || !known {
             let Objective { study, linearised, coordinates, .. } = self;
             let distance = reach.distance();
             self.effect_columns =

@@ -38,6 +38,9 @@ const SINGLES: usize = 26;
 /// cause outside the library, so the search does not extend that set.
 pub const MIN_SHRINK: f64 = 0.5;
 
+/// Difference of the log evidence from the best above which a fit is not improved further: no linearisation changes it by so much.
+pub const HOPELESS: f64 = 60.0;
+
 /// Predicted decrease of the cost above which a fit is unfinished: well below the evidence that names a cause.
 const UNFINISHED: f64 = 1.0;
 
@@ -80,7 +83,7 @@ pub fn search(search: Search<'_>, progress: &dyn Fn(f64, &str)) -> Result<Search
     let mut known = Known::default();
     known.keep(&search, null.clone());
     known.fit_all(&search, &singles);
-    refit_best(&search, &mut known, 7, EFFORT);
+    refit_best(&search, &mut known, 7, f64::INFINITY, EFFORT);
     let relinearised =
         known.ranked(&search).first().filter(|best| null.cost - best.cost > STRONG).and_then(|best| {
             let at_best = linearised.at(study, &best.hypothesis).ok()?;
@@ -91,7 +94,7 @@ pub fn search(search: Search<'_>, progress: &dyn Fn(f64, &str)) -> Result<Search
         None => search,
     };
     if relinearised.is_some() {
-        refit_best(&search, &mut known, 4, Effort::default());
+        refit_best(&search, &mut known, 4, HOPELESS, Effort::default());
     }
     progress(0.4, "several effects");
     extend(&search, &mut known, LIMITS);
@@ -111,11 +114,18 @@ pub fn search_onsets(search: Search<'_>, null: &Fit, fits: &mut Vec<Fit>) {
     *fits = known.ranked(&search);
 }
 
-/// Fits the best `count` sets again, with more effort.
-fn refit_best(search: &Search<'_>, known: &mut Known<Fit>, count: usize, effort: Effort) {
-    let best: Vec<(Start, Effort)> =
-        known.ranked(search).iter().take(count).map(|fit| (Start::from(fit), effort)).collect();
-    known.fit_all(search, &best);
+/// Fits the best `count` sets again, with more effort; none that is further than `within` behind the best.
+fn refit_best(search: &Search<'_>, known: &mut Known<Fit>, count: usize, within: f64, effort: Effort) {
+    let ranked = known.ranked(search);
+    let close = close(&ranked[..count.min(ranked.len())], within);
+    let starts: Vec<(Start, Effort)> = close.iter().map(|fit| (Start::from(fit), effort)).collect();
+    known.fit_all(search, &starts);
+}
+
+/// The first of these fits, and those that follow it with at most this difference of the log evidence.
+pub fn close(fits: &[Fit], within: f64) -> &[Fit] {
+    let behind = |fit: &Fit| fits[0].score - fit.score;
+    &fits[..fits.iter().take_while(|fit| behind(fit) <= within).count()]
 }
 
 /// Fits these hypotheses again with new derivatives. Returns the more probable fit of each set, most probable first.

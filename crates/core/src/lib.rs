@@ -62,7 +62,7 @@ pub use measurement::channel::{
 };
 pub use measurement::declared_uncertainty::{DeclaredUncertainty, NoiseColour};
 pub use measurement::event::{Event, EventKind};
-pub use measurement::held_point::{JUMPS, StepPoint, VALVE_JUMP_RATIO, jump_ratio};
+pub use measurement::held_point::{JUMPS, SAME_COMMAND_RATIO, StepPoint, VALVE_JUMP_RATIO, jump_ratio};
 pub use measurement::joined_recordings::{StepOrigin, join_recordings};
 pub use measurement::plausible::{Plausible, measurable, plausible};
 pub use measurement::recording::{ReadingOrigin, Recording, RecordingError, Series};

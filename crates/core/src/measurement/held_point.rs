@@ -77,7 +77,7 @@ pub struct StepPoint {
 
 /// Tolerance of the commands within which steps of logs without targets are at the same point: a third of the smallest jump ([`JUMPS`]), and
 /// more than loggers round.
-const SAME_COMMAND_RATIO: f64 = 5e-3;
+pub const SAME_COMMAND_RATIO: f64 = 5e-3;
 
 impl StepPoint {
     /// The point of a step.

@@ -8,7 +8,8 @@
 use crate::IdentifyConfig;
 use crate::isothermal_zero::relaxation;
 use crate::single_step::expected::DECLARED_INTERVAL_S;
-use mapper_core::{Channel, DeclaredUncertainty, Recording, Series, Soak, StepMarker};
+use crate::step_data::samples::TREND_BLOCK_S;
+use mapper_core::{Channel, DeclaredUncertainty, Recording, Series, Soak, StepMarker, plausible};
 use mapper_numerics::coloured_noise::variance_of_mean;
 use mapper_numerics::statistics::{EXCLUDE_SIGMAS, mean};
 use mapper_observe::declared::{CommonOffset, rest_pressure_pa};
@@ -59,11 +60,6 @@ impl From<Soak> for ZeroSettings {
         }
     }
 }
-
-/// Shaft speed below which the machine is at standstill, rpm: far below any idle, far above any sensor's noise.
-const AT_REST_RPM: f64 = 1000.0;
-/// Length of the segments over which readings are averaged to estimate the limit of a relaxing one, s.
-const BLOCK_S: f64 = 30.0;
 
 /// The estimated offsets and their segment.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -275,17 +271,22 @@ fn groups(settings: &ZeroSettings) -> [(&'static [Channel], f64); 2] {
     [(temperatures, settings.temperature_sigma_k), (pressures, settings.pressure_sigma_pa)]
 }
 
+/// Whether a shaft is slower than any running machine's, and hence at standstill.
+fn is_at_rest(speed_rpm: f64) -> bool {
+    speed_rpm.abs() < *plausible(Channel::ShaftSpeed).running.start()
+}
+
 /// The last standstill before the first step with a running machine. If steps were detected from the readings, the soak may count as a step.
 fn at_rest(recording: &Recording) -> (f64, f64) {
     let runs = |step: &&StepMarker| {
         let speed = recording.series.get(&Channel::ShaftSpeed);
         let last = speed.and_then(|speed| speed.slice(step.start_s, step.end_s).1.last());
-        last.is_none_or(|speed_rpm| speed_rpm.abs() >= AT_REST_RPM)
+        last.is_none_or(|speed_rpm| !is_at_rest(*speed_rpm))
     };
     let first_s = recording.steps.iter().find(runs).map_or(f64::INFINITY, |step| step.start_s);
     let Some(speed) = recording.series.get(&Channel::ShaftSpeed) else { return (0.0, 0.0) };
     let before = speed.t_s.partition_point(|t| *t < first_s);
-    let rests = |i: usize| speed.values.get(i).is_some_and(|value| value.abs() < AT_REST_RPM);
+    let rests = |i: usize| speed.values.get(i).is_some_and(|speed_rpm| is_at_rest(*speed_rpm));
     let Some(last) = (0..before).rev().find(|i| rests(*i)) else { return (0.0, 0.0) };
     let first = (0..last).rev().find(|i| !rests(*i)).map_or(0, |i| i + 1);
     // The last sample at standstill may already belong to the start of the machine.
@@ -307,16 +308,16 @@ fn housing_limit(
     }
     let series = recording.series.get(&Channel::Tc)?;
     let (mut t_s, mut means, mut fewest) = (Vec::new(), Vec::new(), usize::MAX);
-    for block in 0..((end_s - first_s) / BLOCK_S) as usize {
-        let from_s = first_s + block as f64 * BLOCK_S;
-        let (_, values) = series.slice(from_s, from_s + BLOCK_S);
+    for block in 0..((end_s - first_s) / TREND_BLOCK_S) as usize {
+        let from_s = first_s + block as f64 * TREND_BLOCK_S;
+        let (_, values) = series.slice(from_s, from_s + TREND_BLOCK_S);
         let usable = usable(Channel::Tc, values);
         let Some(mean) = mean(&usable) else { continue };
-        t_s.push(from_s + 0.5 * BLOCK_S);
+        t_s.push(from_s + 0.5 * TREND_BLOCK_S);
         means.push(mean);
         fewest = fewest.min(usable.len());
     }
-    let variance = config.noise().variance_of_mean(fewest, BLOCK_S);
+    let variance = config.noise().variance_of_mean(fewest, TREND_BLOCK_S);
     relaxation::limit(&t_s, &means, noise_sigma * variance.sqrt())
 }
 
@@ -331,11 +332,11 @@ fn expected_limit_error(
         return None;
     }
     let used_s = 2.0 / 3.0 * soak_s;
-    let t_s: Vec<f64> = (0..(used_s / BLOCK_S) as usize)
-        .map(|block| soak_s - used_s + (block as f64 + 0.5) * BLOCK_S)
+    let t_s: Vec<f64> = (0..(used_s / TREND_BLOCK_S) as usize)
+        .map(|block| soak_s - used_s + (block as f64 + 0.5) * TREND_BLOCK_S)
         .collect();
-    let samples = (BLOCK_S / DECLARED_INTERVAL_S) as usize;
-    let variance = config.noise().variance_of_mean(samples, BLOCK_S);
+    let samples = (TREND_BLOCK_S / DECLARED_INTERVAL_S) as usize;
+    let variance = config.noise().variance_of_mean(samples, TREND_BLOCK_S);
     let relaxing: Vec<f64> = t_s.iter().map(|t_s| relaxation::usual_k(*t_s)).collect();
     relaxation::limit(&t_s, &relaxing, noise_sigma * variance.sqrt()).map(|(_, error)| error)
 }

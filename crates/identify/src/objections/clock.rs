@@ -7,19 +7,15 @@
 use crate::objections::objection::Objection;
 use crate::step_data::commands::begins_with_jump;
 use crate::step_data::samples::slope_per_s;
-use mapper_core::{Channel, Recording, Series, Swapped, Warning};
-use mapper_numerics::statistics::{mean, median};
+use mapper_core::{Channel, Recording, Series, Swapped, Warning, WindowRule};
+use mapper_numerics::statistics::{MIN_VALUES, mean, median};
 
 /// Averaging time of a level before and after a moment, s; twice as long for a slope. Moments lie a quarter of it apart.
 const LEVEL_S: f64 = 2.0;
-/// Range of moments around the jump, s.
-const BEFORE_S: f64 = 10.0;
+/// Last moment after a jump, s; the first is as long before it as a window begins after it.
 const AFTER_S: f64 = 40.0;
 /// Lag behind the others above which a channel is late, s: a probe of 4 mm and a shaft that runs up make 2 s.
 const LATE_S: f64 = 3.5;
-/// Minimum number of jumps for an average.
-const MIN: usize = 4;
-
 /// Whether a channel changes its level or its slope at a jump.
 const WATCHED: [(Channel, bool); 5] = [
     (Channel::ShaftSpeed, false),
@@ -34,10 +30,10 @@ pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
     let jumps_s: Vec<f64> = (0..steps.len())
         .filter(|position| begins_with_jump(steps, *position))
         // The window after the last moment must not include the next jump.
-        .filter(|position| steps[*position].end_s - steps[*position].start_s > AFTER_S + BEFORE_S)
+        .filter(|position| steps[*position].end_s - steps[*position].start_s > AFTER_S + WindowRule::EARLIEST_S)
         .map(|position| steps[position].start_s)
         .collect();
-    if jumps_s.len() < MIN {
+    if jumps_s.len() < MIN_VALUES {
         return Vec::new();
     }
     let mut found: Vec<Objection> = housing_jumps(recording, &jumps_s).into_iter().collect();
@@ -77,12 +73,12 @@ fn housing_jumps(recording: &Recording, jumps_s: &[f64]) -> Option<Objection> {
 /// Time after the jumps at which a channel changes most, s; `None` if it does not change.
 fn lag_s(series: &Series, jumps_s: &[f64], slope: bool) -> Option<f64> {
     let every_s = 0.25 * LEVEL_S;
-    let moments = ((BEFORE_S + AFTER_S) / every_s) as usize;
+    let moments = ((WindowRule::EARLIEST_S + AFTER_S) / every_s) as usize;
     let mut squares = vec![0.0; moments + 1];
     for jump_s in jumps_s {
         let changes: Vec<f64> = (0..=moments)
             .map(|k| {
-                let moment_s = jump_s - BEFORE_S + k as f64 * every_s;
+                let moment_s = jump_s - WindowRule::EARLIEST_S + k as f64 * every_s;
                 change(series, moment_s, slope).unwrap_or(0.0).powi(2)
             })
             .collect();
@@ -93,7 +89,7 @@ fn lag_s(series: &Series, jumps_s: &[f64], slope: bool) -> Option<f64> {
     let (at, largest) = squares.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
     // Pure noise has no peak.
     let clear = *largest > 4.0 * mean(&squares)?;
-    clear.then_some(at as f64 * every_s - BEFORE_S)
+    clear.then_some(at as f64 * every_s - WindowRule::EARLIEST_S)
 }
 
 /// Change of level or slope at a moment.

@@ -7,14 +7,13 @@ use crate::IdentifyConfig;
 use crate::needs::needs;
 use crate::objections::ends::Ends;
 use crate::objections::objection::Objection;
+use crate::step_data::commands::FOLLOWED_S;
 use mapper_core::{Channel, Recording, Series, Warning, jump_ratio};
 use mapper_numerics::statistics::MIN_VALUES;
 use mapper_physics::rig::sensor_fault::repeats_s;
 
 /// Share of equal neighbours outside the long runs above which a logger counts as coarse.
 const COARSE_SHARE: f64 = 0.3;
-/// Time after a jump within which every channel but those of the inlet has moved, s.
-const AFTER_JUMP_S: f64 = 15.0;
 
 /// A run of one repeated value.
 struct Run {
@@ -65,7 +64,7 @@ fn of_channel(
     let over_a_jump = |run: &Run| {
         let (from_s, to_s) = (series.t_s[run.first], series.t_s[run.last]);
         let mut later = recording.steps.iter().skip(1);
-        moves && !inlet && later.any(|step| from_s < step.start_s && step.start_s + AFTER_JUMP_S < to_s)
+        moves && !inlet && later.any(|step| from_s < step.start_s && step.start_s + FOLLOWED_S < to_s)
     };
     if coarse || !noisy {
         long.retain(over_a_jump);

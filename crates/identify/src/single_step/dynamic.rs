@@ -5,7 +5,7 @@ use crate::single_step::covariance::{Correlation, NoiseVariances};
 use crate::single_step::fit::{Fit, Geometry, fit};
 use crate::single_step::flow_drift::{FlowDrift, flow_drift};
 use crate::step_data::cleaning::without_spikes;
-use crate::step_data::samples::Samples;
+use crate::step_data::samples::{Samples, TREND_BLOCK_S};
 use crate::step_data::window;
 use crate::step_outcome::findings::Findings;
 use crate::{IdentifyConfig, step_data::commands, step_outcome::interval_width};
@@ -15,11 +15,6 @@ use mapper_core::{
 use mapper_numerics::coloured_noise::variance_of_mean;
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::{DOUBT_SIGMAS, mean};
-
-/// Ratio of isentropic temperature rise to inlet temperature below which the machine does not compress.
-const SMALLEST_RISE_RATIO: f64 = 1e-3;
-/// Block length over which the residual is averaged to detect a trend, s.
-const STRUCTURE_BLOCK_S: f64 = 10.0;
 
 /// Result of a method for one step.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -82,7 +77,7 @@ pub(crate) fn estimate(
     estimate.dt2_k = samples.change(|row| row.t2_k, limits.end_mean_s);
     estimate.dtc_k = samples.change(|row| row.tc_k, limits.end_mean_s);
     let rise_ratio = samples.mean(|row| row.rise_ratio).unwrap_or(0.0);
-    if rise_ratio < SMALLEST_RISE_RATIO {
+    if rise_ratio <= 0.0 {
         findings.refuse(Warning::NoCompression(NoCompression::NoPressureRise));
         return estimate;
     }
@@ -205,12 +200,12 @@ fn judge_residual(view: &View<'_>, dt2_k: Option<f64>, findings: &mut Findings) 
     // Three standard deviations of the noise that remains in block means.
     let colour = view.config.noise();
     let remains =
-        variance_of_mean(colour.first_order_variance_ratio(), STRUCTURE_BLOCK_S, colour.time_constant_s);
+        variance_of_mean(colour.first_order_variance_ratio(), TREND_BLOCK_S, colour.time_constant_s);
     let structure_k = DOUBT_SIGMAS * remains.sqrt() * noise_k;
     if noise_k > 0.0 && rms_k > limits.residual_over_noise_ratio * noise_k {
         findings.doubt(Warning::PoorFit(PoorFit::Noise { residual_k: rms_k, noise_k }));
     } else if slow_k > (limits.structure_ratio * dt2_k.abs()).max(structure_k) {
-        let shape = PoorFit::Shape { residual_k: slow_k, block_s: STRUCTURE_BLOCK_S, dt2_k };
+        let shape = PoorFit::Shape { residual_k: slow_k, block_s: TREND_BLOCK_S, dt2_k };
         findings.doubt(Warning::PoorFit(shape));
     }
     findings.remark_undeclared(view.config);
@@ -220,7 +215,7 @@ fn judge_residual(view: &View<'_>, dt2_k: Option<f64>, findings: &mut Findings) 
 fn slow_rms_k(fit: &Fit, samples: &Samples) -> f64 {
     let (mut start, mut sum, mut blocks) = (0, 0.0, 0.0);
     while start < samples.len() {
-        let end_s = samples.rows[start].t_s + STRUCTURE_BLOCK_S;
+        let end_s = samples.rows[start].t_s + TREND_BLOCK_S;
         // At least one sample, so that the loop ends for any times.
         let end = samples.rows.partition_point(|row| row.t_s < end_s).max(start + 1);
         let block = mean(&fit.residual_k[start..end]).unwrap_or(0.0);

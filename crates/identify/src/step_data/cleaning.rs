@@ -5,10 +5,8 @@ use crate::step_data::samples::{Row, Samples};
 use crate::step_outcome::findings::Findings;
 use mapper_core::{Channel, Warning};
 use mapper_numerics::statistics::{MIN_VALUES, median_of_sorted, robust_sigma};
+use mapper_observe::redundant_sensors::fuse::SPIKE_SIGMAS;
 use mapper_physics::rig::sensor_fault::repeats_s;
-
-/// Robust standard deviations beyond which a sample is a spike.
-pub(crate) const SPIKE_SIGMAS: f64 = 8.0;
 
 /// The samples without spikes; reports removals in `findings`.
 pub(crate) fn without_spikes(samples: Samples, findings: &mut Findings) -> Samples {

@@ -2,11 +2,11 @@
 //!
 //! A closed loop that holds the speed changes P3 slightly all the time. Such a change is no jump, and the command counts as settled.
 
-use mapper_core::{Channel, Recording, StepMarker};
+use mapper_core::{Channel, Recording, SAME_COMMAND_RATIO, StepMarker};
 use mapper_numerics::ROUNDING;
 
-/// Share of the final P3 within which a loop holds it: larger than the correction for the slow warming of the housings.
-const TRIM_RATIO: f64 = 5e-3;
+/// Time after a jump from which only the housings still change, s: several settling times of probe and speed.
+pub(crate) const FOLLOWED_S: f64 = 20.0;
 
 /// Gap to the previous step above which the previous command is not the starting point, s.
 const MAX_GAP_S: f64 = 60.0;
@@ -33,7 +33,7 @@ pub(crate) fn begins_with_jump(steps: &[StepMarker], position: usize) -> bool {
 }
 
 /// Time of the last change of P3 and valve commands within the step (its start if none is recorded), s. Changes of P3 count until it stays
-/// within [`TRIM_RATIO`] of its last value.
+/// within [`SAME_COMMAND_RATIO`] of its last value, as a loop trims it while the housings warm up.
 pub(crate) fn settled_s(recording: &Recording, step: &StepMarker) -> f64 {
     let mut settled_s = step.start_s;
     for channel in [Channel::P3Command, Channel::ValveCommand] {
@@ -44,7 +44,7 @@ pub(crate) fn settled_s(recording: &Recording, step: &StepMarker) -> f64 {
         let last = inside.clone().next_back().map(|i| series.values[i]);
         let trimmed = |value: f64| {
             channel == Channel::P3Command
-                && last.is_some_and(|last| (value - last).abs() <= TRIM_RATIO * last.abs())
+                && last.is_some_and(|last| (value - last).abs() <= SAME_COMMAND_RATIO * last.abs())
         };
         for i in inside {
             let before = i.checked_sub(1).map(|before| series.values[before]);

@@ -1,11 +1,11 @@
 //! The position on the map at which a step ended: means over its last seconds.
 
-use crate::step_data::cleaning::SPIKE_SIGMAS;
 use crate::step_outcome::findings::Findings;
 use crate::{IdentifyConfig, StepError};
 use mapper_core::{Channel, Recording, Series, StepMarker, Warning};
 use mapper_numerics::statistics::{mean, median, robust_sigma};
 use mapper_observe::plausible::is_reading;
+use mapper_observe::redundant_sensors::fuse::SPIKE_SIGMAS;
 
 /// The operating point at the end of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,6 +2,7 @@
 
 use crate::IdentifyConfig;
 use crate::joint::step_model::smoothing::Smoother;
+use crate::step_data::commands::FOLLOWED_S;
 use crate::step_data::end_state::EndState;
 use crate::step_data::samples::{self, Samples};
 use mapper_core::{Channel, Recording, Window};
@@ -11,11 +12,9 @@ use mapper_numerics::statistics::mean;
 /// Length of the blocks over which samples are averaged before the fit, s: a quarter of the correlation time of sensor noise, and far below
 /// any time scale in a window.
 const BLOCK_S: f64 = 0.5;
-/// Factor on this length for noisy data once only the housing still changes, and in a forecast: it costs a few percent of the information.
-/// Without noise it would cost a thousandth of alpha_A behind a slow probe.
+/// Factor on this length for noisy data from [`FOLLOWED_S`] after the first sample on, and in a forecast: it costs a few percent of the
+/// information. Without noise it would cost a thousandth of alpha_A behind a slow probe.
 pub(crate) const COARSER: f64 = 2.0;
-/// Time from the first sample after which that applies, s: several settling times of probe and speed.
-const LATE_S: f64 = 20.0;
 
 /// Means over one block.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -106,7 +105,7 @@ pub(crate) fn condensed(
 
 /// Length of a block that starts at this time after the first sample, s.
 pub(crate) fn block_s_after(elapsed_s: f64, config: &IdentifyConfig) -> f64 {
-    let late = !config.declared.is_empty() && elapsed_s >= LATE_S;
+    let late = !config.declared.is_empty() && elapsed_s >= FOLLOWED_S;
     if late { COARSER * BLOCK_S } else { BLOCK_S }
 }
 

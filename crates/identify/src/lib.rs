@@ -32,6 +32,7 @@ pub use joint::expected::expected_together;
 pub use joint::step_model::surface::EfficiencySurface;
 pub use mapper_core::{Choice, JointSettings, SettleBands, WindowRule};
 pub use needs::{method_for, needs};
+pub use objections::bounds::EFFICIENCY;
 pub use reduce::{KnownHeat, method_of_table, reduce};
 pub use single_step::expected::{DECLARED_INTERVAL_S, expected, expected_steady};
 pub use single_step::t2_history::{T2History, t2_history};

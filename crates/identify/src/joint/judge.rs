@@ -4,20 +4,18 @@ use crate::IdentifyConfig;
 use crate::joint::fit::solve::{Member, Problem};
 use crate::joint::step_model::parameters::{ETA, LN_DEVIATION};
 use crate::joint::uncertainty::smoothness::{Smoothed, SmoothedValue};
+use crate::objections::bounds::EFFICIENCY;
+use crate::step_data::samples::TREND_BLOCK_S;
 use crate::step_outcome::findings::Findings;
 use crate::step_outcome::interval_width;
 use mapper_core::{EstimateUncertainty, LeftOut, ModelDoubt, ModelEvidence, PoorFit, Warning};
 use mapper_numerics::statistics::{HINT_SIGMAS, mean, median, rms};
 
-/// Mean square of the sums over [`SEGMENT_ROWS`] whitened rows of all steps above which the model itself is doubtful: smoothed inputs and
+/// Mean square of the sums over segments of [`TREND_BLOCK_S`] whitened residual of all steps above which the model itself is doubtful: smoothed inputs and
 /// fitted parameters reduce it from 1 to about 0.8 if the model fits the rig.
 const SLOW_SQUARE: f64 = 1.3;
-/// Rows of a segment, 5 to 10 s: model errors are slower than noise.
-const SEGMENT_ROWS: usize = 10;
 /// Scatter of the points about the convection law above which the law does not apply, ratio.
 const LAW_SCATTER_RATIO: f64 = 0.06;
-/// Isentropic efficiency, total to total, above that of any turbocharger compressor (the best stay below 0.85).
-const HIGHEST_EFFICIENCY: f64 = 0.88;
 
 /// Mean square of a step's whitened residual.
 pub(crate) fn mean_square(problem: &Problem<'_>, member: &Member<'_>) -> f64 {
@@ -28,9 +26,11 @@ pub(crate) fn mean_square(problem: &Problem<'_>, member: &Member<'_>) -> f64 {
 /// Mean square of segment sums of a step's whitened residual, relative to that of independent residuals.
 fn slow_square(problem: &Problem<'_>, member: &Member<'_>) -> Option<f64> {
     let (residual, _) = problem.residual(member, &problem.shared, &member.local, None);
-    let segments: Vec<f64> = residual
-        .chunks(SEGMENT_ROWS)
-        .map(|segment| segment.iter().sum::<f64>().powi(2) / segment.len() as f64)
+    let rows: Vec<(f64, f64)> = member.course.rows.iter().map(|row| row.t_s).zip(residual).collect();
+    let block = |t_s: f64| ((t_s - rows[0].0) / TREND_BLOCK_S).floor();
+    let segments: Vec<f64> = rows
+        .chunk_by(|a, b| block(a.0) == block(b.0))
+        .map(|segment| segment.iter().map(|(_, r)| r).sum::<f64>().powi(2) / segment.len() as f64)
         .collect();
     mean(&segments)
 }
@@ -103,11 +103,11 @@ pub(crate) fn doubts(problem: &Problem<'_>, smoothed: &Smoothed, config: &Identi
         doubts.push(ModelEvidence::Scatter { scatter_ratio: scatter });
     }
     let above = |judged: &&SmoothedValue| {
-        judged.value - HINT_SIGMAS * judged.uncertainty.combined_standard_error() > HIGHEST_EFFICIENCY
+        judged.value - HINT_SIGMAS * judged.uncertainty.combined_standard_error() > *EFFICIENCY.end()
     };
     let above = smoothed.eta.iter().filter(above).count();
     if above > 0 {
-        doubts.push(ModelEvidence::Eta { points: above, max_eta: HIGHEST_EFFICIENCY });
+        doubts.push(ModelEvidence::Eta { points: above, max_eta: *EFFICIENCY.end() });
     }
     doubts.into_iter().map(|evidence| ModelDoubt { evidence }).collect()
 }

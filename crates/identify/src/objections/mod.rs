@@ -4,7 +4,7 @@
 //! One file for each check, with its reason. A check examines the whole recording and names the channel as far as physics allows. All points
 //! that depend on the channel get the same sentence and are not good.
 
-mod bounds;
+pub(crate) mod bounds;
 mod clock;
 pub(crate) mod ends;
 mod frozen;

@@ -15,16 +15,18 @@ pub(crate) mod smooth;
 
 use crate::IdentifyConfig;
 use crate::faults::balance_rows::{MACHINE, Machine, Rows};
+use crate::faults::balances::conditions;
 use crate::faults::balances::efficiency::FittedEfficiencies;
 use crate::faults::end_readings::{CHANNELS, MAX_STEPS, Readings, span_s};
 use crate::faults::found_fault::{FoundFault, Suspect};
 use crate::faults::nominal_rig::NominalRig;
 use crate::objections::ends::Ends;
 use crate::objections::objection::Objection;
-use mapper_core::{Channel, Method, Recording, SuspectedFault, Warning};
+use mapper_core::{Channel, Method, ModelTolerances, Recording, SuspectedFault, Warning};
 use mapper_inference::hypotheses::{Likelihood, Member, Priors};
 use mapper_inference::interval::COVERAGE;
 use mapper_inference::mixture::MIN_WEIGHT;
+use mapper_numerics::statistics::EXCLUDE_SIGMAS;
 use mapper_physics::rig::sensor_fault::additive;
 
 /// Prior probability of a fault: one recording in ten has one. Judgement; docs/validation/faults.md uses the same value.
@@ -33,9 +35,6 @@ const EXPECTED_FAULTS: f64 = 0.1;
 const OTHER_MACHINE_RATIO: f64 = 0.05;
 /// The same of convection: correlations of heat transfer in pipes scatter by that much (Incropera, ch. 8.5).
 const OTHER_CONVECTION_RATIO: f64 = 0.2;
-/// The same of the conditions: weather and altitude, a cell that is hot, another test.
-const OTHER_PRESSURE_PA: f64 = 3e3;
-const OTHER_TEMPERATURE_K: f64 = 10.0;
 
 /// All balances of a recording, and the prior of the parameters. `ends`: of the usable steps. `fitted`: efficiencies of the joint fit, if
 /// available.
@@ -156,11 +155,12 @@ fn priors(config: &IdentifyConfig, nominal: Option<&NominalRig<'_>>) -> Priors {
         (declared, _) => declared,
     };
     let offsets = CHANNELS.iter().map(|channel| declared(channel).offset_sigma);
+    let tolerances = nominal.map_or_else(ModelTolerances::default, |nominal| *nominal.tolerances);
     let machine = MACHINE.iter().map(|machine| match machine {
         Machine::Convection => OTHER_CONVECTION_RATIO,
-        Machine::Condition(Channel::P1) => OTHER_PRESSURE_PA,
-        Machine::Condition(_) => OTHER_TEMPERATURE_K,
-        _ => OTHER_MACHINE_RATIO,
+        // Weather, altitude, another test: more than the tolerance of a condition explains.
+        Machine::Condition(channel) => EXCLUDE_SIGMAS * conditions::tolerance(*channel, &tolerances).unwrap_or(1.0),
+        Machine::FlowCapacity | Machine::Efficiency | Machine::ValveArea => OTHER_MACHINE_RATIO,
     });
     let sigmas: Vec<f64> = additive().map(|fault| fault.sigma).chain(machine).collect();
     let always = offsets.chain(CHANNELS.iter().map(gain)).chain([config.barometer_sigma_pa]).collect();

@@ -9,7 +9,7 @@ use mapper_numerics::statistics::median;
 use mapper_observe::plausible::is_reading;
 
 /// Tolerance of a condition, in the channel's unit; `None` if the channel is not a condition.
-fn tolerance(channel: Channel, tolerances: &ModelTolerances) -> Option<f64> {
+pub(crate) fn tolerance(channel: Channel, tolerances: &ModelTolerances) -> Option<f64> {
     Some(match channel {
         Channel::P1 => tolerances.inlet_pressure_pa,
         Channel::T1 => tolerances.inlet_temperature_k,

@@ -16,26 +16,17 @@ use crate::faults::balance_rows::{Rows, common, own};
 use crate::faults::end_readings::{CHANNELS, MAX_STEPS, PerChannel, Readings, span_s};
 use crate::step_data::samples::{Row, Samples, slope_per_s};
 use mapper_core::{Channel, Recording, StepKind, StepMarker, Window, WindowRule};
-use mapper_numerics::statistics::{MIN_VALUES, mean};
+use mapper_numerics::statistics::{DOUBT_SIGMAS, MIN_VALUES, mean, rms};
 use mapper_physics::rig::sensor_fault::FaultKind;
 
 /// Length of a part over which the housing's slope is taken, s: noise of 0.15 K at 10 Hz leaves 0.002 K/s, and a step of a minute has three.
 const PART_S: f64 = 18.0;
-/// Maximum number of parts of a step.
-const MAX_PARTS: usize = 8;
-/// Usable range of the share of T2 that follows the housing.
-const SHARES: std::ops::RangeInclusive<f64> = 0.02..=0.95;
 /// Closure error of a balance, W.
 const CLOSURE_ERROR_W: f64 = 10.0;
 /// Difference of T2 and Tc in a housing with more than one temperature, one standard deviation, K: 1 K is three of it.
 const UNEVEN_K: f64 = 0.35;
 /// The same for the part that develops over the run as it warms up, K: a housing of two walls makes up to 3 K.
 const UNEVEN_DRIFT_K: f64 = 1.0;
-/// Heat capacity of the housing, J/K, its loss, W/K and W, and alpha_A: the range of turbochargers, one standard deviation each.
-const ANY_CAPACITY_J_K: f64 = 3e3;
-const ANY_LOSS_W_K: f64 = 50.0;
-const ANY_LOSS_W: f64 = 3e3;
-const ANY_SHARE: f64 = 0.5;
 
 /// A part of a step.
 struct Part {
@@ -59,7 +50,7 @@ impl Part {
 
 pub(crate) fn rows(recording: &Recording, config: &IdentifyConfig, used: &[bool]) -> Option<Rows> {
     let count = used.iter().filter(|used| **used).count();
-    let most = (MAX_STEPS / count.max(1)).clamp(1, MAX_PARTS);
+    let most = (MAX_STEPS / count.max(1)).max(1);
     let steps: Vec<Vec<Part>> = recording
         .steps
         .iter()
@@ -85,17 +76,27 @@ pub(crate) fn rows(recording: &Recording, config: &IdentifyConfig, used: &[bool]
     let column = |of: &dyn Fn(&Part) -> f64| parts.iter().map(|part| of(part)).collect::<Vec<f64>>();
     // Losses count from the mean, so that the constants stay small.
     let middle_k = mean(parts.iter().map(|part| part.tc_k))?;
-    let any = [
-        (column(&|part| part.slope_k_s), ANY_CAPACITY_J_K),
-        (column(&|part| part.tc_k - middle_k), ANY_LOSS_W_K),
-        (column(&|_| 1.0), ANY_LOSS_W),
-        (column(&|part| part.conductance_w_k * (part.tc_k - part.t1_k)), ANY_SHARE),
-        (column(&|part| part.conductance_w_k * part.inlet_gain_k()), ANY_SHARE),
+    let heat_w = column(&|part| part.conductance_w_k * (part.t2_k - part.tc_k));
+    // Heat capacity, loss per kelvin, constant loss and alpha_A of an unknown housing: each may be as large as the heat itself.
+    let unknown = [
+        column(&|part| part.slope_k_s),
+        column(&|part| part.tc_k - middle_k),
+        column(&|_| 1.0),
+        column(&|part| part.conductance_w_k * (part.tc_k - part.t1_k)),
+        column(&|part| part.conductance_w_k * part.inlet_gain_k()),
+    ];
+    let as_large_as_the_heat = |column: Vec<f64>| {
+        let sigma = rms(&heat_w).zip(rms(&column)).map_or(0.0, |(heat, one)| heat / one.max(f64::MIN_POSITIVE));
+        (column, sigma)
+    };
+    let uneven = [
         (column(&|part| part.conductance_w_k), UNEVEN_K),
         (column(&|part| part.conductance_w_k * (run_ratio(part) - 0.5)), UNEVEN_DRIFT_K),
     ];
-    let covariance = any
+    let covariance = unknown
+        .map(as_large_as_the_heat)
         .iter()
+        .chain(&uneven)
         .map(|(column, sigma)| common(column, *sigma))
         .fold(own(parts.iter().map(|_| CLOSURE_ERROR_W)), |sum, one| sum + one);
     let by_conductance = column(&|part| part.conductance_error_w_k * (part.t2_k - part.tc_k));
@@ -124,7 +125,7 @@ pub(crate) fn rows(recording: &Recording, config: &IdentifyConfig, used: &[bool]
         }
     };
     Some(Rows {
-        residual: column(&|part| part.conductance_w_k * (part.t2_k - part.tc_k)),
+        residual: heat_w,
         covariance,
         readings: parts.iter().map(readings).collect(),
         by_reading: parts.iter().map(by_reading).collect(),
@@ -141,7 +142,8 @@ fn parts(recording: &Recording, start_s: f64, end_s: f64, config: &IdentifyConfi
     }
     let samples = Samples::of(recording, Window { start_s, end_s }, config, true);
     let Some((kept, error)) = kept_ratio(&samples, config) else { return Vec::new() };
-    if !SHARES.contains(&(1.0 - kept)) {
+    // The gas keeps some of its temperature and loses some.
+    if kept.min(1.0 - kept) < DOUBT_SIGMAS * error {
         return Vec::new();
     }
     let count = (((end_s - start_s) / PART_S).floor() as usize).min(most);

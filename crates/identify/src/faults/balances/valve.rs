@@ -7,6 +7,7 @@ use crate::faults::balance_rows::{Machine, Rows, common, errors, own};
 use crate::faults::end_readings::{PerChannel, Readings};
 use crate::faults::nominal_rig::NominalRig;
 use mapper_numerics::statistics::EXCLUDE_SIGMAS;
+use mapper_observe::perturbation::UNINFORMATIVE;
 use mapper_physics::laws::orifice;
 use nalgebra::DMatrix;
 
@@ -19,8 +20,6 @@ const DISCHARGE_RATIO: f64 = 0.02;
 const DISCHARGE_LENGTH: f64 = 0.5;
 /// Repeatability of a valve's area, one standard deviation. Judgement: a positioner resolves some tenths of a per cent of the travel.
 const SET_AGAIN_RATIO: f64 = 0.005;
-/// Area of an unknown opening, one standard deviation of its logarithm: uninformative.
-const ANY: f64 = 3.0;
 
 pub(crate) fn rows(
     steps: &[(f64, Readings)],
@@ -61,7 +60,8 @@ pub(crate) fn rows(
         None => {
             let same = |i: usize, j: usize| (openings[i] - openings[j]).abs() < 1e-6;
             covariance += discharge;
-            covariance += DMatrix::from_fn(count, count, |i, j| if same(i, j) { ANY * ANY } else { 0.0 });
+            let any = UNINFORMATIVE * SET_AGAIN_RATIO;
+            covariance += DMatrix::from_fn(count, count, |i, j| if same(i, j) { any * any } else { 0.0 });
             let middle = readings.iter().map(ln_area).sum::<f64>() / count as f64;
             vec![middle; count]
         }

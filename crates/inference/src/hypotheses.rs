@@ -15,10 +15,8 @@ use mapper_numerics::ROUNDING;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use std::collections::BTreeMap;
 
-/// Maximum number of members of an explanation: bounds the search. Judgement.
+/// Maximum number of members of an explanation, and of single causes from which the search starts: bounds the search. Judgement.
 pub const MAX_MEMBERS: usize = 4;
-/// Maximum number of sets from which the search starts, in addition to the empty one: bounds its time. Judgement.
-const MAX_STARTS: usize = 6;
 
 /// Residuals and their sensitivities to the parameters.
 #[derive(Debug, Clone, PartialEq)]
@@ -215,7 +213,7 @@ impl Likelihood {
         let mut starts: Vec<Offer> =
             search.offers(&[]).into_values().filter(|offer| offer.ln_total > 0.0).collect();
         starts.sort_by(|a, b| b.ln_total.total_cmp(&a.ln_total));
-        let starts = starts.iter().take(MAX_STARTS).map(|offer| vec![offer.index]);
+        let starts = starts.iter().take(MAX_MEMBERS).map(|offer| vec![offer.index]);
         let ends = starts.chain([Vec::new()]).map(|start| search.climb(start));
         let best = ends.max_by(|a, b| search.ln_odds(a).total_cmp(&search.ln_odds(b)))?;
         search.explanation(&best)

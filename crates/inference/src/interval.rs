@@ -9,8 +9,12 @@ const MAX_CELLS: f64 = 4096.0;
 
 /// Coverage of all reported intervals.
 pub const COVERAGE: f64 = 0.95;
-/// A parameter is identified if its interval is narrower than this fraction of its prior's interval; otherwise the prior dominates. Judgement.
-pub const IDENTIFIED_RATIO: f64 = 0.7;
+
+/// Whether data carry more information about a parameter than its prior, from the widths (or errors) after and before them; otherwise the prior
+/// dominates. Precisions add up, so the width falls to less than the root of a half.
+pub fn is_identified(after: f64, before: f64) -> bool {
+    2.0 * after * after < before * before
+}
 
 /// Shortest interval that contains `coverage` of the mixture of normal distributions about `centres` (weight, value), each with the
 /// standard deviation `sigma`. `None` if there are no centres or a number is not finite.

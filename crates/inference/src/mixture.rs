@@ -7,11 +7,11 @@
 //! multiple comparisons (Scott and Berger, Ann. Stat. 38:2587, 2010). A machine that differs in one respect from its declaration
 //! is then more likely to differ in another.
 
-use mapper_numerics::statistics::BoundedNormal;
+use mapper_numerics::statistics::{BoundedNormal, normal_quantile};
 use nalgebra::{DMatrix, DVector};
 
-/// Number of draws of each set: means and probabilities then agree with sums over a grid to some thousandths (tested below).
-const DRAWS: usize = 128;
+/// Number of draws of each set, and of a posterior: means and probabilities then agree with sums over a grid to some thousandths (tested below).
+pub const DRAWS: usize = 128;
 /// Minimum probability of a set that gets draws: a fiftieth of the probability outside a 95 % interval.
 pub const MIN_WEIGHT: f64 = 1e-3;
 /// Bases of the Halton sequence, one for each parameter.
@@ -232,6 +232,14 @@ fn draw_within_ranges(
         (mass, values)
     };
     Some((0..DRAWS).map(point).collect())
+}
+
+/// Points of a standard normal distribution in at most 8 dimensions, evenly spread (a Halton sequence): a mean over them replaces one over many
+/// random draws.
+pub fn normal_points(dimensions: usize) -> Vec<Vec<f64>> {
+    let coordinate = |index: usize, base: &usize| normal_quantile(halton_point(index, *base)).unwrap_or(0.0);
+    let point = |index: usize| BASES.iter().take(dimensions).map(|base| coordinate(index, base)).collect();
+    (0..DRAWS).map(point).collect()
 }
 
 /// The radical inverse of `index` + 1, between 0 and 1 (Halton, Numer. Math. 2:84, 1960).

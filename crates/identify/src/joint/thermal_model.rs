@@ -12,7 +12,7 @@ use crate::joint::step_model::rows::StepRows;
 use crate::joint::uncertainty::quantity::is_offset;
 use crate::joint::uncertainty::smoothness::Smoothed;
 use mapper_core::{ConvectionLaw, CorrelatedPair, EstimateUncertainty, Origin, SharedValue, ThermalModel};
-use mapper_inference::interval::IDENTIFIED_RATIO;
+use mapper_inference::interval::is_identified;
 
 /// Correlation above which two parameters count as entangled.
 const ENTANGLED: f64 = 0.95;
@@ -106,7 +106,7 @@ fn value(
     let beforehand = problem.priors[index].sigma;
     // For a parameter with a prior, use the error from the recording alone.
     let known = refinements.and_then(|refinements| refinements.free(index)).map_or(sigma, |(_, error)| error);
-    let uninformed = known > IDENTIFIED_RATIO * beforehand;
+    let uninformed = !is_identified(known, beforehand);
     let is_offset = is_offset(index);
     // The coefficient is that of the declared area, as h is.
     let area =
@@ -142,7 +142,7 @@ fn probe(problem: &Problem<'_>, covariance: &Covariance) -> SharedValue {
     };
     let error_m = 1e-3 * ((square + sigma).sqrt() - square.sqrt());
     SharedValue {
-        value: (sigma < IDENTIFIED_RATIO * problem.priors[PROBE_MM2].sigma).then_some(1e-3 * square.sqrt()),
+        value: is_identified(sigma, problem.priors[PROBE_MM2].sigma).then_some(1e-3 * square.sqrt()),
         uncertainty: EstimateUncertainty { noise_standard_error: error_m, bias_standard_error: 0.0 },
         origin: Origin::Fitted,
     }

@@ -3,6 +3,7 @@
 //! A model driven by noisy readings fits better the less it responds to them, so noise would favour causes that reduce the response. Each reading is
 //! therefore replaced by the straight line through as many neighbours as lie on one within the noise of the sensor, so few are used where a drive changes its slope.
 
+use crate::driven::cause_search::sides::side::CORRELATION_S;
 use crate::driven::log_rows::Rows;
 use mapper_observe::Declared;
 use std::ops::Range;
@@ -12,10 +13,6 @@ const NEIGHBOURS: [usize; 5] = [12, 8, 5, 3, 2];
 /// Readings lie on a line if their mean squared distance is below this multiple of the variance of the noise. One in twenty sets of six readings fails by
 /// chance.
 const LINE_RATIO: f64 = 1.5;
-/// Half the time span over which rates are computed, s.
-const RATE_S: f64 = 0.305;
-/// Maximum distance of a neighbour, s.
-const MAX_DISTANCE_S: f64 = 2.0;
 
 /// Rows with denoised drives and the rates of these.
 pub(crate) fn denoised(rows: &Rows, declared: &Declared) -> Rows {
@@ -24,42 +21,37 @@ pub(crate) fn denoised(rows: &Rows, declared: &Declared) -> Rows {
     for (channel, column) in &mut denoised.drives {
         let sigma = declared.noise_sigma(*channel);
         let read = rows.drive(*channel);
-        let values: Vec<f64> = (0..rows.len()).map(|i| denoised_at(&rows.t_s, read, i, sigma)).collect();
-        let rate = |i: usize| {
-            let near = |t_s: &f64| (t_s - rows.t_s[i]).abs() <= RATE_S;
-            let before =
-                (0..i).rev().take_while(|k| near(&rows.t_s[*k])).last().unwrap_or(i.saturating_sub(1));
-            let later = (i + 1..values.len()).take_while(|k| near(&rows.t_s[*k])).last();
-            let after = later.unwrap_or((i + 1).min(values.len() - 1));
-            let elapsed_s = rows.t_s[after] - rows.t_s[before];
-            if elapsed_s > 0.0 { (values[after] - values[before]) / elapsed_s } else { 0.0 }
-        };
-        denoised.rates.push((0..rows.len()).map(rate).collect());
+        let lines = (0..rows.len()).map(|i| denoised_at(&rows.t_s, read, i, sigma));
+        let (values, rates) = lines.unzip();
         *column = values;
+        denoised.rates.push(rates);
     }
     denoised
 }
 
-fn denoised_at(t_s: &[f64], read: &[f64], i: usize, sigma: f64) -> f64 {
+/// Value and rate of the line through the neighbours of a reading, per second.
+fn denoised_at(t_s: &[f64], read: &[f64], i: usize, sigma: f64) -> (f64, f64) {
     for count in NEIGHBOURS {
         let (first, last) = (i.saturating_sub(count), (i + count).min(read.len() - 1));
         // Both sides, or one side only with as many readings.
         let ranges =
             [first..last + 1, i.saturating_sub(2 * count)..i + 1, i..(i + 2 * count).min(read.len() - 1) + 1];
         for range in ranges {
-            if range.len() < 4 || t_s[range.end - 1] - t_s[range.start] > 2.0 * MAX_DISTANCE_S {
+            if range.len() < 4 || t_s[range.end - 1] - t_s[range.start] > 2.0 * CORRELATION_S {
                 continue;
             }
-            if let Some(value) = line_value(t_s, read, i, range, sigma) {
-                return value;
+            if let Some(line) = line(t_s, read, i, range, sigma) {
+                return line;
             }
         }
     }
-    read[i]
+    let (before, after) = (i.saturating_sub(1), (i + 1).min(read.len() - 1));
+    let elapsed_s = t_s[after] - t_s[before];
+    (read[i], if elapsed_s > 0.0 { (read[after] - read[before]) / elapsed_s } else { 0.0 })
 }
 
-/// Value at `i` of the straight line through a range; `None` if the readings do not lie on it.
-fn line_value(t_s: &[f64], read: &[f64], i: usize, range: Range<usize>, sigma: f64) -> Option<f64> {
+/// Value at `i` of the straight line through a range, and its slope; `None` if the readings do not lie on it.
+fn line(t_s: &[f64], read: &[f64], i: usize, range: Range<usize>, sigma: f64) -> Option<(f64, f64)> {
     let n = range.len() as f64;
     let mean = |values: &[f64]| values[range.clone()].iter().sum::<f64>() / n;
     let (t0, v0) = (mean(t_s), mean(read));
@@ -69,7 +61,7 @@ fn line_value(t_s: &[f64], read: &[f64], i: usize, range: Range<usize>, sigma: f
     });
     let slope = if tt > 0.0 { tv / tt } else { 0.0 };
     let squares: f64 = range.map(|k| (read[k] - v0 - slope * (t_s[k] - t0)).powi(2)).sum();
-    (squares <= LINE_RATIO * (n - 2.0) * sigma * sigma).then(|| v0 + slope * (t_s[i] - t0))
+    (squares <= LINE_RATIO * (n - 2.0) * sigma * sigma).then(|| (v0 + slope * (t_s[i] - t0), slope))
 }
 
 #[cfg(test)]

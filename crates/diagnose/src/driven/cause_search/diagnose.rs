@@ -15,10 +15,9 @@ use crate::driven::log_rows::Rows;
 use crate::gap::best_fit::coordinate::infos;
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::weigh::{estimates, name_of};
-use crate::gap::findings::report::EXCLUDED;
-use crate::gap::next_experiment::best_experiment::RIVALS;
+use crate::gap::findings::report::{EXCLUDED, MAX_EQUIVALENT};
 use mapper_core::{Channel, Recording};
-use mapper_inference::interval::IDENTIFIED_RATIO;
+use mapper_inference::interval::is_identified;
 use mapper_numerics::statistics::{NORMAL_975, rms};
 use mapper_observe::Declared;
 use mapper_physics::rig::effect::{Effect, Rig};
@@ -89,7 +88,7 @@ fn diagnose_side<S: SideModel>(request: &SideRequest<'_>) -> Result<Diagnosis, D
     // Held-out phases test it, even if a cause outside the library is more probable.
     let likeliest = if posterior.named && causes > 0 { fit_of(0) } else { &found.null };
     let open = posterior.open;
-    let choices: Vec<&Fit> = (0..if posterior.named { causes.min(RIVALS) } else { 0 }).map(fit_of).collect();
+    let choices: Vec<&Fit> = (0..if posterior.named { causes.min(1 + MAX_EQUIVALENT) } else { 0 }).map(fit_of).collect();
     let open_effects: Vec<usize> = (0..open)
         .flat_map(|place| fit_of(place).hypothesis.effects.iter().map(|(effect, _)| *effect))
         .collect();
@@ -205,7 +204,7 @@ fn unknowns<S: SideModel>(fit: &Fit) -> Vec<Unknown> {
             (unknown.at(middle - NORMAL_975 * sigma), unknown.at(middle + NORMAL_975 * sigma))
         };
         let ((low, high), (prior_low, prior_high)) = (ends(*z, sigma), ends(0.0, 1.0));
-        let identified = high - low < IDENTIFIED_RATIO * (prior_high - prior_low);
+        let identified = is_identified(high - low, prior_high - prior_low);
         let (name, description, unit) = (unknown.name, unknown.description, unknown.unit);
         Unknown { name, description, unit, value: unknown.at(*z), low, high, identified }
     })

@@ -13,6 +13,7 @@ use crate::gap::best_fit::normal::PRIOR_STEPS;
 use crate::gap::residuals::study::Hypothesis;
 use mapper_inference::descent::{End, FINE, Model, Normal, Reach, Until, descend, room_within};
 use mapper_numerics::minimise::minimise;
+use mapper_numerics::statistics::HINT_SIGMAS;
 use mapper_physics::rig::effect::{Effect, Rig, add};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use std::sync::Arc;
@@ -48,8 +49,6 @@ pub(crate) struct Fit {
 
 /// Model error if the cause is outside the library, over that of the model.
 const OUTSIDE_RATIO: f64 = 12.0;
-/// Smallest model error, in prior widths below its median: a fit that happens to be closer is chance.
-const MIN_LEFT: f64 = -2.0;
 
 /// Median, K, and width of the logarithm of a channel's model error: its prior.
 type ErrorPrior = (f64, f64);
@@ -126,7 +125,8 @@ impl<S: SideModel> SideProblem<'_, S> {
         if width == 0.0 {
             return (median_k, misfit(0.0), 0.0);
         }
-        let best = minimise(MIN_LEFT, 9.0, 1e-3, misfit);
+        // A fit that happens to be closer is chance.
+        let best = minimise(-HINT_SIGMAS, 9.0, 1e-3, misfit);
         let step = 0.1;
         let curvature = (misfit(best.at + step) + misfit(best.at - step) - 2.0 * best.value) / (step * step);
         (median_k * (width * best.at).exp(), best.value, -0.5 * curvature.max(0.1).ln())

@@ -9,6 +9,7 @@ use crate::gap::best_fit::coordinate::{coordinates, hypothesis_at, infos, unknow
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::residuals::study::Hypothesis;
 use mapper_core::Channel;
+use mapper_inference::mixture::DRAWS;
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::{mean, quantile, rms, standard_deviation, student_quantile};
 use nalgebra::DVector;
@@ -16,9 +17,6 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 use std::ops::Range;
-
-/// Number of posterior draws.
-const DRAWS: usize = 300;
 
 /// Root mean square of the first judged channel minus its prediction, K.
 pub(crate) fn residual_rms_k<S: SideModel>(

@@ -1,12 +1,11 @@
 //! Phases of a log without steps: segments in which the driving speed and pressure follow straight lines.
 
+use crate::driven::cause_search::sides::side::CORRELATION_S;
 use crate::driven::log_rows::Rows;
 use mapper_core::Channel;
 use mapper_numerics::statistics::MIN_VALUES;
 use std::ops::Range;
 
-/// Minimum length of a phase, s.
-const SHORTEST_S: f64 = 1.0;
 /// Two neighbours are merged if one line for both increases the misfit by less than this share of the total variation.
 const MERGE_RATIO: f64 = 0.01;
 /// Minimum and maximum number of phases; each is predicted by fits to the others.
@@ -21,7 +20,8 @@ pub(crate) fn phases(rows: &Rows, count: usize, drives: &[Channel]) -> Vec<Range
     let mut phases: Vec<Range<usize>> = Vec::new();
     let mut from = 0;
     for i in 0..count {
-        if rows.t_s[i] - rows.t_s[from] >= SHORTEST_S && i - from >= MIN_VALUES {
+        // Within the correlation time of the errors a phase is hardly independent of its neighbours.
+        if rows.t_s[i] - rows.t_s[from] >= CORRELATION_S && i - from >= MIN_VALUES {
             phases.push(from..i);
             from = i;
         }

@@ -6,6 +6,7 @@ use crate::driven::cause_search::sides::side::{
 use crate::driven::log_rows::{MIN_FLOW_KG_S, MIN_PRESSURE_RATIO, Rows, SideChannels};
 use crate::driven::parameters::{Parameter, log_normal, normal};
 use mapper_core::Channel;
+use mapper_identify::{DECLARED_INTERVAL_S, EFFICIENCY};
 use mapper_numerics::statistics::mean;
 use mapper_physics::compressor_map::one_point_map::OnePointMap;
 use mapper_physics::laws::housing::compressor_capacity_j_k;
@@ -46,9 +47,6 @@ static UNKNOWNS: [Parameter; 16] = {
         further("eta_flow_3", "cube of the efficiency over the logarithm of the flow coefficient"),
     ]
 };
-
-/// Limits of the efficiency polynomial: outside them it does not describe a working compressor.
-const EFFICIENCY: (f64, f64) = (0.25, 0.90);
 
 /// Geometric means of speed, rpm, and flow coefficient over the rows; 1 without any.
 fn middles(rows: &Rows) -> (f64, f64) {
@@ -165,7 +163,7 @@ impl SideModel for CompressorSide {
                 + speed * flow * (sf + ssf * speed + sff * flow)
                 + sss * speed.powi(3)
                 + fff * flow.powi(3))
-            .clamp(EFFICIENCY.0, EFFICIENCY.1);
+            .clamp(*EFFICIENCY.start(), *EFFICIENCY.end());
             let flow_corrected_kg_s =
                 wheel_kg_s * dry_flow_ratio / MODEL_REFERENCE.physical_flow_kg_s(1.0, t1s_k[i], p1s_pa[i]);
             model.map = Arc::new(OnePointMap { reference: MODEL_REFERENCE, flow_corrected_kg_s, efficiency });
@@ -251,8 +249,8 @@ impl Tip {
     fn follow(&mut self, t_s: f64, target_k: f64, tau_s: f64) -> f64 {
         let tip_k = match self.last {
             _ if tau_s <= 0.0 => target_k,
-            // A slow tip starts at its reading, a fast tip at its target.
-            None => target_k + (self.start_k - target_k) * tau_s / (tau_s + FAST_S),
+            // A slow tip starts at its reading, one that follows within a sample at its target.
+            None => target_k + (self.start_k - target_k) * tau_s / (tau_s + DECLARED_INTERVAL_S),
             Some((before_s, before_k, tip_k)) => {
                 let elapsed_s = t_s - before_s;
                 let slope = (target_k - before_k) / elapsed_s.max(1e-9);
@@ -265,5 +263,3 @@ impl Tip {
     }
 }
 
-/// Time constant of a tip that starts halfway between reading and target, s.
-const FAST_S: f64 = 0.3;

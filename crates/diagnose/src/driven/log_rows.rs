@@ -5,6 +5,9 @@ use mapper_core::{Channel, Recording};
 use mapper_identify::DECLARED_INTERVAL_S;
 use mapper_observe::plausible::is_reading;
 
+/// Maximum number of rows, evenly spread over a longer log: five minutes at 10 Hz.
+const MAX_ROWS: usize = 3_000;
+
 /// The channels of one side of the machine.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SideChannels<'a> {
@@ -46,12 +49,15 @@ impl Rows {
         for channel in channels.drives {
             series.push((*channel, recording.require(*channel)?));
         }
+        let span_s =
+            judged.t_s.last().zip(judged.t_s.first()).map_or(0.0, |(last_s, first_s)| last_s - first_s);
+        let spacing_s = DECLARED_INTERVAL_S.max(span_s / MAX_ROWS as f64);
         let empty = |channels: &[Channel]| channels.iter().map(|channel| (*channel, Vec::new())).collect();
         let mut rows =
             Rows { drives: empty(channels.drives), judged: empty(channels.judged), ..Rows::default() };
         let mut row = Vec::with_capacity(series.len());
         for (t_s, value) in judged.t_s.iter().zip(&judged.values) {
-            if rows.t_s.last().is_some_and(|last_s| t_s - last_s < 0.999 * DECLARED_INTERVAL_S) {
+            if rows.t_s.last().is_some_and(|last_s| t_s - last_s < 0.999 * spacing_s) {
                 continue;
             }
             row.clear();
@@ -63,6 +69,10 @@ impl Rows {
             if row.len() < series.len() || !is_reading(*first, *value) || !(channels.is_usable)(&row) {
                 rows.lost += 1;
                 continue;
+            }
+            // Spacing over the whole log may give one row too many.
+            if rows.t_s.len() > MAX_ROWS {
+                break;
             }
             rows.t_s.push(*t_s);
             for ((_, column), value) in rows.drives.iter_mut().zip(&row) {

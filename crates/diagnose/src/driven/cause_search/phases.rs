@@ -1,6 +1,5 @@
 //! Phases of a log without steps: segments in which the driving speed and pressure follow straight lines.
 
-use crate::driven::cause_search::sides::side::CORRELATION_S;
 use crate::driven::log_rows::Rows;
 use mapper_core::Channel;
 use mapper_numerics::statistics::MIN_VALUES;
@@ -20,8 +19,7 @@ pub(crate) fn phases(rows: &Rows, count: usize, drives: &[Channel]) -> Vec<Range
     let mut phases: Vec<Range<usize>> = Vec::new();
     let mut from = 0;
     for i in 0..count {
-        // Within the correlation time of the errors a phase is hardly independent of its neighbours.
-        if rows.t_s[i] - rows.t_s[from] >= CORRELATION_S && i - from >= MIN_VALUES {
+        if i - from >= MIN_VALUES {
             phases.push(from..i);
             from = i;
         }

@@ -14,8 +14,10 @@ use mapper_numerics::statistics::median;
 const MIN_RISE_K: f64 = 20.0;
 /// Isentropic efficiencies, total to total, of turbocharger compressors: the best stay below 0.85, poor ones near choke have a third.
 pub const EFFICIENCY: std::ops::RangeInclusive<f64> = 0.25..=0.88;
-/// Apparent efficiencies, which include the heat of a housing far from the gas.
+/// Apparent efficiencies of single points, which include the heat of a housing far from the gas, and that of the median point, where the housing
+/// is warmer than the gas before compression and colder than the gas after it.
 const APPARENT: std::ops::RangeInclusive<f64> = 0.2..=1.3;
+const MIDDLE: std::ops::RangeInclusive<f64> = 0.35..=1.0;
 
 pub(crate) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
     let known: Vec<&Ends> = ends.iter().flatten().collect();
@@ -37,7 +39,7 @@ pub(crate) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
     // A turbine may be driven by cold gas, or by gas as warm as the compressor's outlet. Hot gas that is read as T2 is warmer than the
     // outlet of any compressor.
     let swapped =
-        |end: &&&Ends| end.t3_k.is_some_and(|t3_k| end.t2_k > t3_k) && apparent(end) < *EFFICIENCY.start();
+        |end: &&&Ends| end.t3_k.is_some_and(|t3_k| end.t2_k > t3_k) && apparent(end) < *MIDDLE.start();
     if 2 * known.iter().filter(swapped).count() > known.len() {
         found.push(Objection::new(Warning::SwappedChannels(Swapped::T2AboveT3), all()));
     }
@@ -47,7 +49,7 @@ pub(crate) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
     let Some(middle) = median(judged.iter().map(|end| value(end))) else { return found };
     let impossible: Vec<usize> =
         judged.iter().filter(|end| !APPARENT.contains(&value(end))).map(|end| end.position).collect();
-    if 2 * impossible.len() > judged.len() {
+    if !MIDDLE.contains(&middle) || 2 * impossible.len() > judged.len() {
         let of = |read: fn(&Ends) -> f64| median(judged.iter().map(|end| read(end))).unwrap_or(f64::NAN);
         let scaled = Scaled::ApparentEfficiency {
             rise_k: of(|end| end.t2_k - end.t1_k),

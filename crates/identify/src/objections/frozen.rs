@@ -69,12 +69,12 @@ fn of_channel(
     if coarse || !noisy {
         long.retain(over_a_jump);
     }
-    let rests = |(position, step): (usize, &mapper_core::StepMarker)| {
+    let affected = |(position, step): (usize, &mapper_core::StepMarker)| {
         let shared_s =
             |run: &Run| series.t_s[run.last].min(step.end_s) - series.t_s[run.first].max(step.start_s);
         long.iter().any(|run| shared_s(run) >= 0.5 * shortest_s).then_some(position)
     };
-    let steps: Vec<usize> = recording.steps.iter().enumerate().filter_map(rests).collect();
+    let steps: Vec<usize> = recording.steps.iter().enumerate().filter_map(affected).collect();
     let longest = long.iter().max_by(|a, b| {
         let of = |run: &Run| series.t_s[run.last] - series.t_s[run.first];
         of(a).total_cmp(&of(b))
@@ -91,9 +91,9 @@ fn of_channel(
 fn runs(series: &Series, shortest_s: f64) -> Vec<Run> {
     let mut runs = Vec::new();
     let mut first = 0;
-    for stretch in series.values.chunk_by(|a, b| a == b) {
-        let last = first + stretch.len() - 1;
-        if stretch.len() >= MIN_VALUES && series.t_s[last] - series.t_s[first] >= shortest_s {
+    for segment in series.values.chunk_by(|a, b| a == b) {
+        let last = first + segment.len() - 1;
+        if segment.len() >= MIN_VALUES && series.t_s[last] - series.t_s[first] >= shortest_s {
             runs.push(Run { first, last });
         }
         first = last + 1;

@@ -50,14 +50,14 @@ impl Part {
 
 pub(crate) fn rows(recording: &Recording, config: &IdentifyConfig, used: &[bool]) -> Option<Rows> {
     let count = used.iter().filter(|used| **used).count();
-    let most = (MAX_STEPS / count.max(1)).max(1);
+    let max_parts = (MAX_STEPS / count.max(1)).max(1);
     let steps: Vec<Vec<Part>> = recording
         .steps
         .iter()
         .zip(used)
         .map(|(step, used)| {
             if *used {
-                parts(recording, step.start_s + WindowRule::EARLIEST_S, step.end_s, config, most)
+                parts(recording, step.start_s + WindowRule::EARLIEST_S, step.end_s, config, max_parts)
             } else {
                 Vec::new()
             }
@@ -135,8 +135,14 @@ pub(crate) fn rows(recording: &Recording, config: &IdentifyConfig, used: &[bool]
     })
 }
 
-/// At most `most` parts of a step; none if T2 does not determine the share by which it follows the housing.
-fn parts(recording: &Recording, start_s: f64, end_s: f64, config: &IdentifyConfig, most: usize) -> Vec<Part> {
+/// At most `max_parts` parts of a step; none if T2 does not determine the share by which it follows the housing.
+fn parts(
+    recording: &Recording,
+    start_s: f64,
+    end_s: f64,
+    config: &IdentifyConfig,
+    max_parts: usize,
+) -> Vec<Part> {
     if end_s - start_s < PART_S {
         return Vec::new();
     }
@@ -146,7 +152,7 @@ fn parts(recording: &Recording, start_s: f64, end_s: f64, config: &IdentifyConfi
     if kept.min(1.0 - kept) < DOUBT_SIGMAS * error {
         return Vec::new();
     }
-    let count = (((end_s - start_s) / PART_S).floor() as usize).min(most);
+    let count = (((end_s - start_s) / PART_S).floor() as usize).min(max_parts);
     let whole = samples.len();
     let part = |place: usize| {
         let range = place * whole / count..(place + 1) * whole / count;

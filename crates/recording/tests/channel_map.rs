@@ -72,6 +72,20 @@ sensors: {T2: {noise: 0.1 K, offset: 0.24 K, common_offset: 0.16 K}}
 }
 
 #[test]
+fn two_quantities_of_one_side_are_never_one_column() {
+    let found = mistakes("channels:\n  P1: {field: p_in, unit: kPa}\n  P2: {field: p_in, unit: kPa}\n");
+    assert_eq!(places(&found), [(3, 15, "channels.P2.field")], "{found}");
+    assert!(matches!(found.list[0].kind, Kind::Conflict));
+    // A stand that draws its air from the cell may have one sensor for both; groups of a log have columns of equal names.
+    for same in [
+        "  T1: {field: t, unit: K}\n  T_amb: {field: t, unit: K}\n",
+        "  P1: {topic: in, field: p, unit: Pa}\n  P2: {topic: out, field: p, unit: Pa}\n",
+    ] {
+        read(&format!("channels:\n{same}")).unwrap_or_else(|mistakes| panic!("{mistakes}"));
+    }
+}
+
+#[test]
 fn gain_and_colour_of_noise_are_read_with_their_units() {
     let text = "\
 channels: {m_c: {topic: /a, field: x, unit: kg/hr}}

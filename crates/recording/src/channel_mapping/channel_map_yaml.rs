@@ -73,6 +73,8 @@ struct Reader<'a> {
 impl<'a> Reader<'a> {
     fn map(&mut self) -> ChannelMap {
         let (mut channels, mut elements) = (BTreeMap::new(), BTreeMap::new());
+        // Channel, topic and field. Two quantities of one side are never one column: P2 from the column of P1 would make each pressure ratio 1.
+        let mut used: Vec<(Channel, String, String)> = Vec::new();
         for channel in self.channels_below("channels") {
             let (topic, unit, gauge) = self.topic_unit_and_gauge(channel);
             let source = |field: &String| ChannelSource {
@@ -82,6 +84,24 @@ impl<'a> Reader<'a> {
                 gauge,
             };
             let fields = self.fields(channel);
+            for field in &fields {
+                let is_same = |(other, of_topic, of_field): &&(Channel, String, String)| {
+                    *other != channel
+                        && other.info().group == channel.info().group
+                        && (of_topic, of_field) == (&topic, field)
+                };
+                if let Some((other, ..)) = used.iter().find(is_same) {
+                    let message = format!("`{field}` is already the field of {other}; {channel} has its own");
+                    let here = steps!["channels", channel.symbol(), "field"];
+                    self.note(
+                        FindingKind::Conflict,
+                        &here,
+                        message,
+                        "name the field that contains this quantity",
+                    );
+                }
+                used.push((channel, topic.clone(), field.clone()));
+            }
             if let [field] = fields.as_slice() {
                 channels.insert(channel, source(field));
             }

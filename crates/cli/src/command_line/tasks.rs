@@ -46,5 +46,5 @@ pub fn by_task(command: Command) -> Command {
     let template = format!(
         "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{text}Options:\n{{options}}\n\n{EXAMPLES}{{after-help}}\n"
     );
-    command.help_template(template)
+    command.help_template(template).term_width(COLUMNS.1)
 }

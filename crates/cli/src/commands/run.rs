@@ -42,7 +42,7 @@ pub struct Run {
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Pace of the rig's time: 1 is real time, 10 ten times as fast [default: real time; as fast as possible for a simulated rig]
-    #[arg(long, value_name = "FACTOR", hide_short_help = true)]
+    #[arg(long, value_name = "FACTOR", value_parser = parse_pace, hide_short_help = true)]
     pub pace: Option<f64>,
     /// Serve a live page with buttons to hold and to stop; other computers need the printed token
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = "127.0.0.1:7373")]
@@ -64,15 +64,17 @@ pub struct Run {
     pub json: bool,
 }
 
+fn parse_pace(text: &str) -> Result<f64, String> {
+    let pace = text.parse().ok().filter(|pace: &f64| pace.is_finite() && *pace > 0.0);
+    pace.ok_or_else(|| "write a number above 0: 1 is real time, 10 ten times as fast".to_owned())
+}
+
 impl Run {
     pub fn run(&self) -> Result<(), Failure> {
         let stored_campaign = self.resume.as_ref().map(|run| run.join(run_directory::CAMPAIGN));
         let Some(file) = self.campaign.clone().or(stored_campaign) else { return Ok(()) };
         let (campaign, campaign_text) = load_on(&file, today()).map_err(Failure::of_campaign)?;
         let resume = self.resume.as_deref().map(InterruptedRun::read).transpose()?;
-        if self.pace.is_some_and(|pace| !(pace.is_finite() && pace > 0.0)) {
-            return Err(Failure::new(Code::BadInput, "--pace takes a number above 0"));
-        }
         let parent = self.out.clone().unwrap_or_else(|| expand_home(&campaign.outputs.directory));
         let started = jiff::Timestamp::now();
         let (registry, stop, progress) =

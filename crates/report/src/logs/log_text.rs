@@ -1,6 +1,7 @@
 //! The content of a log as a table, and a suggested channel map.
 
-use crate::formatting::table::{TextTable, with_heads};
+use crate::formatting::table::{COLUMNS, TextTable, with_heads};
+use crate::formatting::wrapped::wrapped;
 use mapper_recording::logs::proposal::{Ambient, Certainty, Proposal};
 use mapper_recording::logs::{Layout, Survey, sparkline};
 use std::fmt::Write;
@@ -20,6 +21,7 @@ pub fn log_text(format: &str, layout: &Layout, survey: &Survey, proposal: &Propo
     for finding in &layout.findings {
         let _ = writeln!(text, "  {finding}");
     }
+    text = wrapped(&text, COLUMNS, 4);
     for (index, (group, data)) in layout.groups.iter().zip(&survey.groups).enumerate() {
         let several = layout.groups.len() > 1;
         let name = if several { format!("Group {} `{}`", index + 1, group.name) } else { "Rows".to_owned() };
@@ -44,7 +46,7 @@ pub fn log_text(format: &str, layout: &Layout, survey: &Survey, proposal: &Propo
         }
     }
     let _ = writeln!(text, "\n{}", columns(layout, survey, proposal));
-    text.push_str(&proposal_text(layout, proposal));
+    text.push_str(&wrapped(&proposal_text(layout, proposal), COLUMNS, 4));
     text
 }
 

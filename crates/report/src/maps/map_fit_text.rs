@@ -2,6 +2,7 @@
 
 use crate::formatting::number::number;
 use crate::formatting::table;
+use crate::formatting::wrapped::wrapped;
 use mapper_core::{CompressorMap, FittedLine, FittedMap, LeftOutLine, half_width_95};
 use std::fmt::Write;
 
@@ -18,7 +19,7 @@ pub fn map_fit_text(map: &CompressorMap, fitted: &FittedMap) -> String {
         "eta points",
         "",
     ];
-    let mut table = table::with_heads(&heads);
+    let mut rows = table::with_heads(&heads);
     for line in &fitted.lines {
         let left_out = fitted.left_out.iter().find(|l| l.speed_corrected_rpm == line.speed_corrected_rpm);
         // If the line is supported at all, its best efficiency is supported too.
@@ -26,7 +27,7 @@ pub fn map_fit_text(map: &CompressorMap, fitted: &FittedMap) -> String {
         let known = line.nodes.iter().filter(|n| !(supported && n.extrapolated));
         let best = known.max_by(|a, b| a.eta.total_cmp(&b.eta));
         let surge = line.nodes.last();
-        table.add_row(vec![
+        rows.add_row(vec![
             format!("{:.0}", line.speed_corrected_rpm),
             number(surge.map(|n| n.flow_corrected_kg_s), 4),
             number(surge.map(|n| n.pressure_ratio), 3),
@@ -43,7 +44,7 @@ pub fn map_fit_text(map: &CompressorMap, fitted: &FittedMap) -> String {
             },
         ]);
     }
-    let mut text = format!("{table}\n\nCorrected to {}. ", map.reference);
+    let mut text = format!("Corrected to {}. ", map.reference);
     let _ = writeln!(
         text,
         "Points lie {:.2} % (distance in flow over the line's largest flow and PR - 1 over its largest) and {:.2} points of \
@@ -95,7 +96,7 @@ pub fn map_fit_text(map: &CompressorMap, fitted: &FittedMap) -> String {
     } else {
         text.push_str("No speed lines cross.\n");
     }
-    text
+    format!("{rows}\n\n{}", wrapped(&text, table::COLUMNS, 2))
 }
 
 /// Points of a line, by its speed.

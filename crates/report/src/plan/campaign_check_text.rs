@@ -1,6 +1,8 @@
 //! The outcome of the check of a campaign, in a sentence.
 
 use crate::formatting::duration::duration;
+use crate::formatting::table::COLUMNS;
+use crate::formatting::wrapped::wrapped;
 use mapper_campaign::Campaign;
 use std::path::Path;
 
@@ -17,13 +19,14 @@ pub fn campaign_check_text(
         1 => ", 1 warning".to_owned(),
         count => format!(", {count} warnings"),
     };
-    format!(
-        "{}: no mistakes{number}. {} points in {}{steps} steps on `{}` in {} of rig time{}.\n",
+    let text = format!(
+        "{}: no mistakes{number}. {} points in {}{steps} steps on `{}` in {} of rig time{}.",
         file.display(),
         campaign.points.len(),
         if is_planned { "" } else { "at most " },
         campaign.backend.name,
         duration(duration_s),
         if campaign.sequence.is_some() { " by its script on the nominal machine" } else { "" },
-    )
+    );
+    wrapped(&text, COLUMNS, 2)
 }

@@ -34,7 +34,7 @@ pub fn lines_text(campaign: &Campaign, lines: &[ResolvedLine]) -> String {
         ]);
     }
     format!(
-        "{rows}\nThe lines on the nominal machine, from choke to surge; corrected to {}.\n\
+        "{rows}\nThe lines on the nominal machine, from choke to surge, corrected to\n{}. \
          `mapper plan` shows every point.\n",
         campaign.reference
     )

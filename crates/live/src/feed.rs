@@ -8,7 +8,7 @@ use crate::state::{
 use mapper_campaign::Campaign;
 use mapper_core::{Channel, IdentifiedPoint, PlanStep, SignalGuard, StepMarker};
 use mapper_report::Display;
-use mapper_report::page::{LiveMap, live_map, live_point, planned};
+use mapper_report::page::{LiveMap, live_map, live_point, planned, target_line_name};
 use mapper_session::{Operator, SessionEvent, soak_s};
 use serde_json::{Value, json};
 use std::collections::VecDeque;
@@ -58,7 +58,8 @@ impl Feed {
         let soak_s = soak_s(run.campaign);
         let mut speeds_rpm: Vec<f64> = run.plan.steps.iter().map(|step| step.to.speed_rpm).collect();
         speeds_rpm.sort_by(f64::total_cmp);
-        let mut lines: Vec<String> = speeds_rpm.iter().map(|rpm| display.line_name(*rpm)).collect();
+        let mut lines: Vec<String> =
+            speeds_rpm.iter().map(|rpm| target_line_name(*rpm, run.campaign, &display)).collect();
         lines.dedup();
         let state = State {
             machine: run.campaign.machine.name.clone(),
@@ -181,7 +182,7 @@ impl Feed {
                 vec![new, self.tick(current)]
             }
             SessionEvent::PointEstimated(point) => {
-                let shown = live_point(point, &self.display);
+                let shown = live_point(point, &self.campaign, &self.display);
                 let new = message("point", json!(shown));
                 if current.state.points.len() < MAX_POINTS {
                     current.state.points.push(shown);
@@ -242,7 +243,8 @@ impl Feed {
         }
         let place = marker.to.map(|to| {
             let (_, opening) = to.shown();
-            format!("{} {}, opening {opening}", self.display.speed(to.speed_rpm), self.display.units().speed)
+            let line = target_line_name(to.speed_rpm, &self.campaign, &self.display);
+            format!("{line} {}, opening {opening}", self.display.units().speed)
         });
         current.state.now.phase = "step".to_owned();
         current.state.now.step = Some(Step {

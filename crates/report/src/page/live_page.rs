@@ -62,9 +62,14 @@ pub fn live_page() -> Result<String, serde_json::Error> {
 }
 
 /// A single identified point, on the line of its target.
-pub fn live_point(point: &IdentifiedPoint, display: &Display) -> LivePoint {
+pub fn live_point(point: &IdentifiedPoint, campaign: &Campaign, display: &Display) -> LivePoint {
     let speed_rpm = point.target.map_or(point.speed_rpm, |target| target.speed_rpm);
-    LivePoint(drawn_point(point, display.line_name(speed_rpm), None, display))
+    LivePoint(drawn_point(point, target_line_name(speed_rpm, campaign, display), None, display))
+}
+
+/// The name of the speed line of a target: its speed corrected with the campaign's T1, as the grid has it.
+pub fn target_line_name(speed_rpm: f64, campaign: &Campaign, display: &Display) -> String {
+    display.line_name(campaign.reference.corrected_speed_rpm(speed_rpm, campaign.boundary.t1_k))
 }
 
 /// The map of the points so far: contours between lines that have two points each, by the mesh of the finished map. Empty

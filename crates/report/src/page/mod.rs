@@ -19,5 +19,7 @@ mod table;
 
 pub use document::run_page;
 pub use gap_page::{gap_page, gap_part};
-pub use live_page::{LiveMap, LivePoint, Planned, live_map, live_page, live_point, planned};
+pub use live_page::{
+    LiveMap, LivePoint, Planned, live_map, live_page, live_point, planned, target_line_name,
+};
 pub use run_page::{OtherRun, RunPage};

@@ -159,7 +159,9 @@ fn priors(config: &IdentifyConfig, nominal: Option<&NominalRig<'_>>) -> Priors {
     let machine = MACHINE.iter().map(|machine| match machine {
         Machine::Convection => OTHER_CONVECTION_RATIO,
         // Weather, altitude, another test: more than the tolerance of a condition explains.
-        Machine::Condition(channel) => EXCLUDE_SIGMAS * conditions::tolerance(*channel, &tolerances).unwrap_or(1.0),
+        Machine::Condition(channel) => {
+            EXCLUDE_SIGMAS * conditions::tolerance(*channel, &tolerances).unwrap_or(1.0)
+        }
         Machine::FlowCapacity | Machine::Efficiency | Machine::ValveArea => OTHER_MACHINE_RATIO,
     });
     let sigmas: Vec<f64> = additive().map(|fault| fault.sigma).chain(machine).collect();

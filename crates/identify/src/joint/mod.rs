@@ -30,7 +30,6 @@ use mapper_core::{
 use mapper_inference::descent::ROUNDS;
 use mapper_numerics::statistics::rms;
 
-
 /// Maximum error of the efficiencies, fraction, that only the declaration of alpha_A, probe and heating/cooling ratio excludes: above it, a
 /// machine not as declared could pass for one that is.
 pub const MAX_RESTING_ETA: f64 = 0.0125;

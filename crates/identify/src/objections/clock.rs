@@ -30,7 +30,9 @@ pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
     let jumps_s: Vec<f64> = (0..steps.len())
         .filter(|position| begins_with_jump(steps, *position))
         // The window after the last moment must not include the next jump.
-        .filter(|position| steps[*position].end_s - steps[*position].start_s > AFTER_S + WindowRule::EARLIEST_S)
+        .filter(|position| {
+            steps[*position].end_s - steps[*position].start_s > AFTER_S + WindowRule::EARLIEST_S
+        })
         .map(|position| steps[position].start_s)
         .collect();
     if jumps_s.len() < MIN_VALUES {

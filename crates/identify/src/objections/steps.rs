@@ -14,7 +14,8 @@ pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
     let mut furthest: Option<usize> = None;
     for &position in &by_time {
         let step = &steps[position];
-        if let Some(before) = furthest.filter(|before| steps[*before].end_s > step.start_s + LONGEST_BRIDGE_S) {
+        if let Some(before) = furthest.filter(|before| steps[*before].end_s > step.start_s + LONGEST_BRIDGE_S)
+        {
             let overlap = StepConflict::Overlap {
                 first: step_number(steps[before].index),
                 first_start_s: steps[before].start_s,

@@ -14,8 +14,8 @@ use crate::driven::cause_search::sides::turbine::TurbineSide;
 use crate::driven::log_rows::Rows;
 use crate::gap::best_fit::coordinate::infos;
 use crate::gap::causes::calibration::Calibration;
-use crate::gap::causes::weigh::{estimates, name_of};
-use crate::gap::findings::report::{EXCLUDED, MAX_EQUIVALENT};
+use crate::gap::causes::weigh::{MAX_EQUIVALENT, estimates, name_of};
+use crate::gap::findings::report::EXCLUDED;
 use mapper_core::{Channel, Recording};
 use mapper_inference::interval::is_identified;
 use mapper_numerics::statistics::{NORMAL_975, rms};
@@ -88,7 +88,8 @@ fn diagnose_side<S: SideModel>(request: &SideRequest<'_>) -> Result<Diagnosis, D
     // Held-out phases test it, even if a cause outside the library is more probable.
     let likeliest = if posterior.named && causes > 0 { fit_of(0) } else { &found.null };
     let open = posterior.open;
-    let choices: Vec<&Fit> = (0..if posterior.named { causes.min(1 + MAX_EQUIVALENT) } else { 0 }).map(fit_of).collect();
+    let choices: Vec<&Fit> =
+        (0..if posterior.named { causes.min(1 + MAX_EQUIVALENT) } else { 0 }).map(fit_of).collect();
     let open_effects: Vec<usize> = (0..open)
         .flat_map(|place| fit_of(place).hypothesis.effects.iter().map(|(effect, _)| *effect))
         .collect();

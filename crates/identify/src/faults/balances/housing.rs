@@ -86,7 +86,8 @@ pub(crate) fn rows(recording: &Recording, config: &IdentifyConfig, used: &[bool]
         column(&|part| part.conductance_w_k * part.inlet_gain_k()),
     ];
     let as_large_as_the_heat = |column: Vec<f64>| {
-        let sigma = rms(&heat_w).zip(rms(&column)).map_or(0.0, |(heat, one)| heat / one.max(f64::MIN_POSITIVE));
+        let sigma =
+            rms(&heat_w).zip(rms(&column)).map_or(0.0, |(heat, one)| heat / one.max(f64::MIN_POSITIVE));
         (column, sigma)
     };
     let uneven = [

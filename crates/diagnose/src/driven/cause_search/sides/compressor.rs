@@ -262,4 +262,3 @@ impl Tip {
         tip_k
     }
 }
-

@@ -49,6 +49,9 @@ impl Calibration {
 /// Upper limit of half the squared misfit, above which all misfits count as equally large.
 const MAX: f64 = 500.0;
 
+/// Origin of the strength of causes, sigmas: the middle of the signatures that a calibration draws, 6 to 300.
+const MIDDLE_SIGMA: f64 = 40.0;
+
 /// Transforms the features of an unmodelled cause for its logistic model.
 ///
 /// Smooth misfit enters as half its square, the negative log-probability under noise. Scatter enters by order of magnitude: it grows with any
@@ -58,5 +61,10 @@ pub fn counted([smooth_sigma, scatter_sigma, ln_odds]: [f64; 3]) -> [f64; 4] {
     let unlikely = 0.5 * smooth_sigma.max(0.0).powi(2);
     let found = 1.0 / (1.0 + (-ln_odds).exp());
     let strength_sigma = (2.0 * ln_odds.max(0.0)).sqrt();
-    [unlikely.min(MAX), scatter_sigma.max(0.0).asinh(), found, found * strength_sigma.asinh()]
+    [
+        unlikely.min(MAX),
+        scatter_sigma.max(0.0).asinh(),
+        found,
+        found * (strength_sigma.asinh() - MIDDLE_SIGMA.asinh()),
+    ]
 }

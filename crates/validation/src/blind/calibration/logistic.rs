@@ -3,8 +3,8 @@
 use mapper_diagnose::gap::causes::calibration::counted;
 use mapper_numerics::minimise::minimise;
 
-/// Maximum number of iterations of coordinate descent; some hundred are needed.
-const ROUNDS: usize = 2000;
+/// Maximum number of iterations of coordinate descent; about fifty are needed.
+const ROUNDS: usize = 300;
 /// Prior mean of the offset: the share of unmodelled causes, 15 %, before anything is known.
 const PRIOR_OFFSET: f64 = -1.7;
 /// Prior means of the slopes. A cause is imitated within noise with a probability in inverse proportion to its strength.

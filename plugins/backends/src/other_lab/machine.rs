@@ -145,8 +145,7 @@ pub(super) fn evaluate(
         flow_kg_s,
         cp2_j_kgk,
     );
-    let one_wall_w_k =
-        after_wheel_w_k(lumped.wall_k, lumped.t2_prime_k) * lumped.h_w_m2k / outputs.h_w_m2k;
+    let one_wall_w_k = after_wheel_w_k(lumped.wall_k, lumped.t2_prime_k) * lumped.h_w_m2k / outputs.h_w_m2k;
     let (one_wall_w, one_wall_k) =
         compression::after_wheel(one_wall_w_k, lumped.t2_prime_k, lumped.wall_k, flow_kg_s, cp2_j_kgk);
     // Keeps the change that hooks make to the outlet gas.

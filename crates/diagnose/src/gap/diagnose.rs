@@ -9,7 +9,7 @@ use crate::gap::causes::select::{
     HOPELESS, MIN_SHRINK, Search, close, ranked, refit, search, search_onsets, supported,
 };
 use crate::gap::causes::smallest_seen::smallest_seen;
-use crate::gap::causes::weigh::{ln_odds, rivals, suspicions, weigh, weight};
+use crate::gap::causes::weigh::{rivals, suspicions, weigh, weight};
 use crate::gap::findings::experiment::Experiment;
 use crate::gap::findings::report::{Diagnosis, Verdict};
 use crate::gap::findings::warning::GapWarning;
@@ -162,8 +162,7 @@ pub fn diagnose(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
     }
     fits = supported(&at(at_best), fits);
     let mut left = adequacy(&study, &linearised, fits.first().unwrap_or(&null));
-    let odds = ln_odds(calibration, &study, &null, &fits);
-    if calibration.outside(left.features(odds)) > 0.5 && folds.steps.len() > 1 {
+    if calibration.outside(left.features()) > 0.5 && folds.steps.len() > 1 {
         progress(0.8, "causes that begin");
         study.add_onsets();
         let at = Search { study: &study, linearised: at_best, selection, calibration, onsets: true };

@@ -247,8 +247,7 @@ fn propose(
     if !worse.is_empty() {
         return Vec::new();
     }
-    let odds = best.score() - weight(calibration, study, null);
-    let left = calibration.outside(adequacy(&bench.study, linearised, &best.fit).features(odds));
+    let left = calibration.outside(adequacy(&bench.study, linearised, &best.fit).features());
     let near = |other: &&Candidate| best.score() - other.score() < evidence_resolution(calibration);
     let weights: f64 = found
         .fitted

@@ -117,6 +117,6 @@ fn an_exact_recording_near_surge_has_no_cause() {
     assert!(null.cost < 10.0, "{} of {} values", null.cost, study.measured.len());
     // The best of 26 effects on noise alone has a gain of some units.
     assert!(most.gain < 1.0, "{:?} {}", most.start.hypothesis.effects, most.gain);
-    let outside = Calibration::shipped().unwrap().outside(left.features(f64::MIN));
+    let outside = Calibration::shipped().unwrap().outside(left.features());
     assert!(outside < 0.05, "{outside} {left:?}");
 }

@@ -284,8 +284,7 @@ fn linearise_noise(
     let linearised = Linearised::new(&study)?;
     let null = fit(&study, &linearised, &study.nothing(), &Selection::all(&study), Effort::default())?;
     let misfit = adequacy(&study, &linearised, &null);
-    let noise =
-        Calibration::shipped().is_ok_and(|calibration| calibration.outside(misfit.features(f64::MIN)) < 0.5);
+    let noise = Calibration::shipped().is_ok_and(|calibration| calibration.outside(misfit.features()) < 0.5);
     Ok(noise.then_some(linearised))
 }
 

@@ -30,9 +30,9 @@ impl Adequacy {
         self.smooth_sigma + SCATTER_COUNTS * self.scatter_sigma < DOUBT_SIGMAS
     }
 
-    /// Features for the probability of an unmodelled cause; `ln_odds`: logarithm of the odds of the best cause against none.
-    pub fn features(&self, ln_odds: f64) -> [f64; 3] {
-        [self.smooth_sigma, self.scatter_sigma, ln_odds]
+    /// Features for the probability of an unmodelled cause.
+    pub fn features(&self) -> [f64; 2] {
+        [self.smooth_sigma, self.scatter_sigma]
     }
 }
 

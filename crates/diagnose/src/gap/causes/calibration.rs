@@ -23,7 +23,7 @@ pub struct Calibration {
     /// Factor on the parameters' standard errors.
     pub interval_factor: f64,
     /// Logistic model of an unmodelled cause: offset, and slopes of the [`counted`] features.
-    pub outside: [f64; 5],
+    pub outside: [f64; 3],
 }
 
 const TEXT: &str = include_str!("../../../calibration.json");
@@ -37,9 +37,8 @@ impl Calibration {
         serde_json::from_str(TEXT)
     }
 
-    /// Probability of an unmodelled cause, given its features: smooth misfit and scatter of the best fit, in standard deviations, and the
-    /// logarithm of the odds of the best cause against none.
-    pub fn outside(&self, features: [f64; 3]) -> f64 {
+    /// Probability of an unmodelled cause, given smooth misfit and scatter of the best fit, in standard deviations.
+    pub fn outside(&self, features: [f64; 2]) -> f64 {
         let [offset, slopes @ ..] = self.outside;
         let x = offset + slopes.iter().zip(counted(features)).map(|(slope, x)| slope * x).sum::<f64>();
         1.0 / (1.0 + (-x).exp())
@@ -49,22 +48,10 @@ impl Calibration {
 /// Upper limit of half the squared misfit, above which all misfits count as equally large.
 const MAX: f64 = 500.0;
 
-/// Origin of the strength of causes, sigmas: the middle of the signatures that a calibration draws, 6 to 300.
-const MIDDLE_SIGMA: f64 = 40.0;
-
-/// Transforms the features of an unmodelled cause for its logistic model.
-///
-/// Smooth misfit enters as half its square, the negative log-probability under noise. Scatter enters by order of magnitude: it grows with any
-/// cause, which linearised models follow only to a few per cent. Where a cause is found, its strength in sigmas enters by order of
-/// magnitude: the stronger an unmodelled cause, the smaller the chance that the catalogue imitates it within noise.
-pub fn counted([smooth_sigma, scatter_sigma, ln_odds]: [f64; 3]) -> [f64; 4] {
+/// Transforms the features of an unmodelled cause for its logistic model. Smooth misfit enters as half its square, the negative
+/// log-probability under noise. Scatter enters by order of magnitude: it grows with any cause, which linearised models follow only to a few per
+/// cent.
+pub fn counted([smooth_sigma, scatter_sigma]: [f64; 2]) -> [f64; 2] {
     let unlikely = 0.5 * smooth_sigma.max(0.0).powi(2);
-    let found = 1.0 / (1.0 + (-ln_odds).exp());
-    let strength_sigma = (2.0 * ln_odds.max(0.0)).sqrt();
-    [
-        unlikely.min(MAX),
-        scatter_sigma.max(0.0).asinh(),
-        found,
-        found * (strength_sigma.asinh() - MIDDLE_SIGMA.asinh()),
-    ]
+    [unlikely.min(MAX), scatter_sigma.max(0.0).asinh()]
 }

@@ -63,12 +63,6 @@ pub fn weight(calibration: &Calibration, study: &Study, fit: &Fit) -> f64 {
     fit.score + prior(calibration, study, &fit.hypothesis)
 }
 
-/// Logarithm of the odds of the best of `fits` against no cause.
-pub fn ln_odds(calibration: &Calibration, study: &Study, null: &Fit, fits: &[Fit]) -> f64 {
-    let weight = |fit: &Fit| weight(calibration, study, fit);
-    fits.iter().map(weight).fold(f64::MIN, f64::max) - weight(null)
-}
-
 /// Whether `whole` includes all effects of `part`, regardless of their onset.
 fn includes(study: &Study, whole: &Fit, part: &Fit) -> bool {
     let whole = ids(study, whole);
@@ -89,7 +83,7 @@ pub(crate) fn weigh(
     let total: f64 = weights.iter().sum();
     let best_cause = scores.iter().skip(1).copied().fold(f64::NEG_INFINITY, f64::max);
     let named = best_cause - scores[0] > calibration.threshold;
-    let outside = calibration.outside(adequacy.features(best_cause - scores[0]));
+    let outside = calibration.outside(adequacy.features());
     // If no cause is named, an inadequate fit also supports an unmodelled cause.
     let inside = 1.0 - outside;
     let none = inside * weights[0] / total;

@@ -12,7 +12,7 @@ use mapper_campaign::{Campaign, nominal_model};
 use mapper_diagnose::gap::best_fit::coordinate::coordinates;
 use mapper_diagnose::gap::best_fit::fit::Fit;
 use mapper_diagnose::gap::causes::calibration::Calibration;
-use mapper_diagnose::gap::causes::weigh::{ln_odds, weight};
+use mapper_diagnose::gap::causes::weigh::weight;
 use mapper_diagnose::gap::diagnose::{Diagnosed, GapRequest, diagnose};
 use mapper_diagnose::gap::findings::report::Verdict;
 use mapper_diagnose::gap::residuals::study::{Study, members};
@@ -65,7 +65,7 @@ pub struct DiagnosisSummary {
     /// Each candidate with its score, prior included.
     pub candidates: Vec<(BTreeSet<String>, f64)>,
     /// Features of the logistic of an outside cause.
-    pub features: [f64; 3],
+    pub features: [f64; 2],
     /// Error of each parameter in its own standard errors, where the causes were found.
     pub errors_sigma: Vec<f64>,
 }
@@ -177,7 +177,7 @@ fn observe(case: &Case, calibration: &Calibration, diagnosed: &Diagnosed) -> Dia
         sigma: case.sigmas.iter().copied().reduce(f64::min),
         nothing: weight(calibration, study, null),
         candidates: fits.iter().map(|fit| (names(fit), weight(calibration, study, fit))).collect(),
-        features: adequacy.features(ln_odds(calibration, study, null, fits)),
+        features: adequacy.features(),
         errors_sigma: named.map_or_else(Vec::new, |fit| errors_sigma(case, study, fit)),
     }
 }
@@ -293,7 +293,7 @@ mod tests {
             sigma: (kind != CaseKind::None).then_some(30.0),
             nothing: 0.0,
             candidates: vec![(set("a"), truth), (set("b"), rival)],
-            features: [0.0; 3],
+            features: [0.0; 2],
             errors_sigma: Vec::new(),
         }
     }

@@ -223,18 +223,14 @@ mod tests {
             sigma: Some(30.0),
             nothing: f64::NEG_INFINITY,
             candidates: vec![(set("a"), lead), (set("b"), 0.0)],
-            features: [-1e9; 3],
+            features: [-1e9; 2],
             errors_sigma: Vec::new(),
         }
     }
 
     /// Temperature 1 and nothing outside: the probabilities are those of the scores.
     fn plain() -> Calibration {
-        Calibration {
-            temperature: 1.0,
-            outside: [-50.0, 0.0, 0.0, 0.0, 0.0],
-            ..Calibration::shipped().unwrap()
-        }
+        Calibration { temperature: 1.0, outside: [-50.0, 0.0, 0.0], ..Calibration::shipped().unwrap() }
     }
 
     fn reliability_of(cases: &[DiagnosisSummary]) -> Reliability {

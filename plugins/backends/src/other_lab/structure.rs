@@ -27,7 +27,7 @@ pub struct OtherStructure {
     pub hysteresis_ratio: f64,
     /// Factor on the natural frequencies of all sensors; infinity for sensors without lag.
     pub sensor_speed_ratio: f64,
-    /// Added to the exponent of the compressor's law of convection, `h ~ m^n`; h is unchanged at [`CONVECTION_FLOW_KG_S`].
+    /// Added to the exponent of the compressor's law of convection, `h ~ m^n`; h is unchanged at 0.05 kg/s.
     pub convection_exponent_change: f64,
     /// Share of the turbine housing's mass that meets the gas; the other part has the Tt probe and all losses. 0: one mass.
     pub turbine_inner_ratio: f64,

@@ -15,9 +15,6 @@ pub(crate) struct Smooth {
     pub(crate) lengths: (f64, f64),
 }
 
-/// Expected deviation of the points of a machine from a smooth law, ratio: of efficiencies from a surface, of h from its law, of readings from a
-/// declared map, at the end of a step that is not fully settled. Judgement: half the usual tolerance of a map, 0.5 %.
-pub(crate) const ROUGHNESS: f64 = 2e-3;
 /// Deviation of any map from such a function, ratio: with it the chi-squares of a public measured map (TurboTools, 93 points) are 95 for the
 /// efficiencies and 118 for the heads.
 pub(crate) const ANY_ROUGHNESS: f64 = 4e-3;

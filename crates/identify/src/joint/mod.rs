@@ -30,6 +30,9 @@ use mapper_core::{
 use mapper_inference::descent::ROUNDS;
 use mapper_numerics::statistics::rms;
 
+/// Growth of the points' standard errors above which leaving a region out costs more than it gains.
+const MAX_LOST_RATIO: f64 = 2.0;
+
 /// Maximum error of the efficiencies, fraction, that only the declaration of alpha_A, probe and heating/cooling ratio excludes: above it, a
 /// machine not as declared could pass for one that is.
 pub const MAX_RESTING_ETA: f64 = 0.0125;
@@ -193,7 +196,9 @@ impl<'a> Attempt<'a> {
                     (&self.problem, &self.covariance),
                     (&rest.problem, &rest.covariance),
                 )?;
-                undoubted.then_some((region, rest, sigmas))
+                // The remaining steps must still determine the shared parameters.
+                let knows = rest.smoothed.middle_error() < MAX_LOST_RATIO * self.smoothed.middle_error();
+                (undoubted && knows).then_some((region, rest, sigmas))
             });
             let (region, mut rest, sigmas) = rests.max_by(|a, b| a.2.total_cmp(&b.2))?;
             let doubts = self.thermal.doubts.clone();

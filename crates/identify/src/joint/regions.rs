@@ -5,8 +5,8 @@
 //! the remaining steps only carry less information: the variance of the difference is then the difference of the variances (Hausman,
 //! Econometrica 46, 1978, eq. 2.10).
 
-use crate::faults::smooth::ROUGHNESS;
 use crate::joint::fit::solve::{Covariance, Problem};
+use crate::joint::fit::start::LAW_SIGMA;
 use crate::joint::step_model::parameters::{EXPONENT, LN_COEFFICIENT, REFINEMENTS};
 use crate::joint::step_model::rows::StepRows;
 use crate::joint::step_model::surface::SurfaceScale;
@@ -69,7 +69,7 @@ pub(crate) fn disagreement(
     // Small model errors change a parameter by as much, and the spread of the points about the law changes the law.
     let with_priors = REFINEMENTS.into_iter().map(|(index, _, _, model_error)| (index, model_error));
     with_priors
-        .chain([(EXPONENT, ROUGHNESS), (LN_COEFFICIENT, ROUGHNESS)])
+        .chain([(EXPONENT, LAW_SIGMA), (LN_COEFFICIENT, LAW_SIGMA)])
         .filter_map(|(index, floor)| {
             let (of_all, of_rest) = (error(all, index)?, error(rest, index)?);
             let variance = (of_rest * of_rest - of_all * of_all).max(0.0) + floor * floor;

@@ -5,10 +5,11 @@
 //! does not depend on the map position.
 
 use crate::faults::balance_rows::{Machine, Rows, common, own};
+use crate::faults::balances::head::ROUGHNESS;
 use crate::faults::end_readings::{CHANNELS, PerChannel, Readings};
 use crate::faults::nominal_rig::NominalRig;
 use crate::faults::places::{Places, is_on_a_map};
-use crate::faults::smooth::{ANY_ROUGHNESS, At, ROUGHNESS, Smooth};
+use crate::faults::smooth::{ANY_ROUGHNESS, At, Smooth};
 use crate::single_step::fit::ETA_BOUNDS;
 use mapper_core::{Channel, ReferenceState};
 use mapper_physics::laws::compression::{actual_rise_k, compressed_k, isentropic_rise_ratio};

@@ -7,7 +7,7 @@ use crate::faults::balance_rows::{Machine, Rows, common, errors, own};
 use crate::faults::end_readings::{PerChannel, Readings};
 use crate::faults::nominal_rig::NominalRig;
 use crate::faults::places::{Places, is_on_a_map};
-use crate::faults::smooth::{ANY_ROUGHNESS, At, ROUGHNESS, Smooth};
+use crate::faults::smooth::{ANY_ROUGHNESS, At, Smooth};
 use mapper_core::ReferenceState;
 use nalgebra::DVector;
 
@@ -35,6 +35,8 @@ const ANY_CURVE: Smooth = Smooth {
 };
 /// Smooth error of a declared map, in units of its declared tolerance of flow: the remaining error is a common factor.
 const DECLARED_HEAD: Smooth = Smooth { terms: &[], slow: 0.0, amplitude: 1.0, lengths: (0.7, 0.7) };
+/// Deviation of the rig from a declared map, ratio: readings at the end of a step that is not fully settled. Judgement: half the usual tolerance of a map, 0.5 %.
+pub(crate) const ROUGHNESS: f64 = 2e-3;
 
 pub(crate) fn rows(
     readings: &[Readings],

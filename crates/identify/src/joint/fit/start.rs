@@ -1,6 +1,6 @@
 //! Prepares a recording for the fit, and estimates noise and spreads from the fit.
 
-use crate::faults::smooth::{ANY_ROUGHNESS, ROUGHNESS};
+use crate::faults::smooth::ANY_ROUGHNESS;
 use crate::joint::fit::inlet;
 use crate::joint::fit::input_noise_spline::InputNoiseSpline;
 use crate::joint::fit::solve::{Member, Problem};
@@ -27,12 +27,19 @@ use mapper_observe::declared::usual_noise_sigma;
 use mapper_physics::gas::air;
 use nalgebra::DVector;
 
-/// Start of the used part of a step after the last command change, s: h and efficiency are modelled while the operating point settles. Noise
-/// looks like a slow probe but for the seconds right after the jump, where the two differ by tens of kelvin. Inputs are smoothed over 3 s at
-/// first: starting at 1.5 s made a probe of 0.7 mm 0.026 mm too small, from 2 s on it is within its error (mean of 20 seeds).
-pub(crate) const START_S: f64 = 2.0;
+/// Start of the used part of a step after the last command change, s: h and efficiency are modelled while the operating point settles. If
+/// noise could look like a slow probe, the fit needs the seconds right after the jump, where the two differ by tens of kelvin. Without noise
+/// they only show where the surface is wrong. Inputs are smoothed over 3 s at first: starting at 1.5 s made a probe of 0.7 mm 0.026 mm too
+/// small, from 2 s on it is within its error (mean of 20 seeds).
+pub(crate) const START_S: f64 = 3.0;
+pub(crate) const START_WITH_NOISE_S: f64 = 2.0;
+/// Expected spread of the points' efficiencies about the surface, fraction: maps are not polynomials. The recordings of
+/// `benches/identification.py` have 0.0006, those of a machine with a map that drops steeply at choke 0.005.
+pub(crate) const SURFACE_SIGMA: f64 = 1e-3;
 /// Relative error of the surface's effect on a prediction: surfaces through a few points bend differently from maps.
 const SHAPE_ERROR_RATIO: f64 = 0.03;
+/// Expected spread of the points' h about the law, ratio. The recordings of `benches/identification.py` have 0.0022 to 0.003.
+pub(crate) const LAW_SIGMA: f64 = 3e-3;
 /// Weight of the expected spread, in points: small next to the dozens of points of a campaign, sufficient without any.
 const PRIOR_WEIGHT: f64 = 4.0;
 /// Logarithms, in tenths, of the spreads that are tried over the expected one: from a thirtieth to thirty times.
@@ -73,7 +80,8 @@ fn rows_of(
     own: &mut Findings,
 ) -> Option<StepRows> {
     let step = recording.steps.get(position)?;
-    let start_s = commands::settled_s(recording, step).max(step.start_s) + START_S;
+    let after_s = if config.declared.is_empty() { START_S } else { START_WITH_NOISE_S };
+    let start_s = commands::settled_s(recording, step).max(step.start_s) + after_s;
     let window = Window { start_s, end_s: step.end_s };
     if start_s.is_nan() || start_s >= step.end_s {
         let late = TooFew::LateCommands { before_end_s: step.end_s - start_s };
@@ -272,9 +280,9 @@ pub(crate) fn refine(problem: &mut Problem<'_>, steps: &[StepRows], config: &Ide
     let off_law: Vec<(f64, f64)> = of_steps()
         .map(|(member, (own, _))| (member.local[LN_DEVIATION], own[(LN_DEVIATION, LN_DEVIATION)]))
         .collect();
-    problem.surface_sigma = spread(&off_surface, problem.surface_sigma);
-    let before = problem.members.first().map_or(ROUGHNESS, |member| member.priors[LN_DEVIATION].sigma);
-    let sigma = spread(&off_law, before);
+    problem.surface_sigma = spread(&off_surface, problem.surface_sigma, SURFACE_SIGMA);
+    let before = problem.members.first().map_or(LAW_SIGMA, |member| member.priors[LN_DEVIATION].sigma);
+    let sigma = spread(&off_law, before, LAW_SIGMA);
     for member in &mut problem.members {
         member.priors[LN_DEVIATION].sigma = sigma;
     }
@@ -282,8 +290,8 @@ pub(crate) fn refine(problem: &mut Problem<'_>, steps: &[StepRows], config: &Ide
 }
 
 /// Standard deviation of a zero-mean normal distribution, from posterior means and variances found with another one, `under_sigma`. Returns
-/// the most probable value under an inverse chi-square prior about [`ROUGHNESS`].
-fn spread(posteriors: &[(f64, f64)], under_sigma: f64) -> f64 {
+/// the most probable value under an inverse chi-square prior about `expected`.
+fn spread(posteriors: &[(f64, f64)], under_sigma: f64, expected: f64) -> f64 {
     // Values and variances from the recording alone.
     let seen: Vec<(f64, f64)> = posteriors
         .iter()
@@ -298,14 +306,14 @@ fn spread(posteriors: &[(f64, f64)], under_sigma: f64) -> f64 {
             // A bad step must not widen its own tolerance.
             -0.5 * (total.ln() + (value * value / total).min(DOUBT_SIGMAS * DOUBT_SIGMAS))
         };
-        let prior = -PRIOR_WEIGHT * (sigma.ln() + 0.5 * (ROUGHNESS / sigma).powi(2));
+        let prior = -PRIOR_WEIGHT * (sigma.ln() + 0.5 * (expected / sigma).powi(2));
         seen.iter().map(of_point).sum::<f64>() + prior
     };
     // Bad steps give the density several maxima.
     SPREAD_RATIOS_LN
-        .map(|tenths| ROUGHNESS * (0.1 * f64::from(tenths)).exp())
+        .map(|tenths| expected * (0.1 * f64::from(tenths)).exp())
         .max_by(|a, b| ln_density(*a).total_cmp(&ln_density(*b)))
-        .unwrap_or(ROUGHNESS)
+        .unwrap_or(expected)
 }
 
 /// Sensitivity of the fitted efficiency to the offsets, from the sensitivities of T2 to the readings and to the efficiency; `None` if T2 does

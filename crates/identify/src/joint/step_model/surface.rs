@@ -8,26 +8,26 @@
 use mapper_core::ReferenceState;
 use mapper_physics::compressor_map::efficiency_shape::EfficiencyShape;
 
-/// Powers of u, v and [`SurfaceScale::slowness`] of each term, with the prior standard deviation of its coefficient. Maps bend, but less at higher
-/// order (efficiency varies by some 0.3 over a map, |u|, |v| <= 1).
-const TERMS: [(i32, i32, i32, f64); 12] = [
-    (0, 0, 0, 1.0),
-    (1, 0, 0, 0.3),
-    (0, 1, 0, 0.3),
-    (2, 0, 0, 0.2),
-    (1, 1, 0, 0.2),
-    (0, 2, 0, 0.2),
-    (1, 2, 0, 0.1),
-    (2, 1, 0, 0.1),
-    (3, 0, 0, 0.1),
-    (0, 3, 0, 0.05),
-    (2, 2, 0, 0.05),
-    (0, 0, 1, SLOW_LOSS),
+/// Powers of u and v of each term but the last, lowest first, with the prior standard deviation of its coefficient. Maps bend, but less at
+/// higher order (efficiency varies by some 0.3 over a map, |u|, |v| <= 1).
+const POWERS: [(i32, i32, f64); TERM_COUNT - 1] = [
+    (0, 0, 1.0),
+    (1, 0, 0.3),
+    (0, 1, 0.3),
+    (2, 0, 0.2),
+    (1, 1, 0.2),
+    (0, 2, 0.2),
+    (1, 2, 0.1),
+    (2, 1, 0.1),
+    (3, 0, 0.1),
+    (0, 3, 0.05),
+    (2, 2, 0.05),
 ];
-/// Additional loss of efficiency at small Reynolds numbers and by leakage, fraction, one standard deviation, per [`SurfaceScale::slowness`]. Published maps fall by 2 to 10 points from their peak to a third of full speed, where it is about 3.
+/// Additional loss of efficiency at small Reynolds numbers and by leakage, fraction: one standard deviation of the last term, which multiplies
+/// [`SurfaceScale::slowness`]. Published maps fall by 2 to 10 points from their peak to a third of full speed, where it is about 3.
 pub(crate) const SLOW_LOSS: f64 = 1e-2;
 /// Number of coefficients.
-pub(crate) const TERM_COUNT: usize = TERMS.len();
+pub(crate) const TERM_COUNT: usize = 12;
 
 /// Position and scale of the surface on the map.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -81,13 +81,12 @@ impl SurfaceScale {
     /// The terms at a position.
     pub(crate) fn terms(&self, place: Place) -> [f64; TERM_COUNT] {
         let (u, v) = self.coordinates(place);
-        let slowness = self.slowness(place);
-        TERMS.map(|(i, j, k, _)| u.powi(i) * v.powi(j) * slowness.powi(k))
+        with_last(POWERS.map(|(i, j, _)| u.powi(i) * v.powi(j)), self.slowness(place))
     }
 
     /// Prior standard deviations of the coefficients.
     pub(crate) fn prior_sigmas() -> [f64; TERM_COUNT] {
-        TERMS.map(|(.., sigma)| sigma)
+        with_last(POWERS.map(|(_, _, sigma)| sigma), SLOW_LOSS)
     }
 }
 
@@ -126,6 +125,10 @@ impl EfficiencyShape for EfficiencySurface {
     fn efficiency(&self, speed_corrected_rpm: f64, flow_corrected_kg_s: f64) -> f64 {
         dot(&self.scale.terms((speed_corrected_rpm, flow_corrected_kg_s)), &self.coefficients)
     }
+}
+
+fn with_last(first: [f64; TERM_COUNT - 1], last: f64) -> [f64; TERM_COUNT] {
+    std::array::from_fn(|k| first.get(k).copied().unwrap_or(last))
 }
 
 pub(crate) fn dot(a: &[f64; TERM_COUNT], b: &[f64; TERM_COUNT]) -> f64 {

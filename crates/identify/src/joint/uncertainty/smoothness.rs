@@ -8,9 +8,10 @@
 
 use crate::faults::balances::efficiency::{FittedEfficiencies, FittedQuantity};
 use crate::faults::end_readings::{CHANNELS, MAX_STEPS};
-use crate::faults::smooth::{ANY_ROUGHNESS, ROUGHNESS};
+use crate::faults::smooth::ANY_ROUGHNESS;
 use crate::joint::fit::refinements::{Gain, Refinements};
 use crate::joint::fit::solve::{Covariance, Problem};
+use crate::joint::fit::start::SURFACE_SIGMA;
 use crate::joint::step_model::parameters::{FLOW_GAIN, LOCAL, OFFSET_CHANNELS, OFFSETS, SURFACE};
 use crate::joint::step_model::rows::StepRows;
 use crate::joint::step_model::surface::{SLOW_LOSS, SurfaceScale};
@@ -22,16 +23,17 @@ use mapper_core::{
 };
 use mapper_inference::mixture::MIN_WEIGHT;
 use mapper_numerics::parallel;
-use mapper_numerics::statistics::{EXCLUDE_SIGMAS, mean};
+use mapper_numerics::statistics::{EXCLUDE_SIGMAS, mean, median};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// Standard deviations of the efficiencies about their mean, fraction: the range of compressor maps along a valve opening and across.
 const AMPLITUDES: [f64; 3] = [0.05, 0.1, 0.2];
-/// Correlation lengths of efficiency over speed, and over flow at equal speed, in halves of the range of the points: from a bend between
-/// neighbouring lines to none over the map.
-const LENGTHS: [f64; 4] = [0.35, 0.7, 1.0, 2.0];
+/// Correlation lengths of efficiency over speed, in halves of the range of the points.
+const SPEED_LENGTHS: [f64; 4] = [0.7, 1.0, 1.4, 2.0];
+/// The same over flow at equal speed.
+const FLOW_LENGTHS: [f64; 5] = [0.35, 0.5, 0.7, 1.0, 2.0];
 /// Deviation from any smooth function, fraction: of machines in simulation, and of a measured map.
-const ROUGHNESSES: [f64; 2] = [ROUGHNESS, ANY_ROUGHNESS];
+const ROUGHNESSES: [f64; 2] = [SURFACE_SIGMA, ANY_ROUGHNESS];
 
 /// A number with its error by origin.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -57,6 +59,14 @@ pub(crate) struct Smoothed {
     pub(crate) shared: Vec<(f64, f64)>,
     /// Sources of the uncertainty of each point's efficiency and of its ln h.
     pub(crate) budgets: Vec<[Vec<BudgetRow>; 2]>,
+}
+
+impl Smoothed {
+    /// Median standard error of the efficiencies, fraction; infinite without any.
+    pub(crate) fn middle_error(&self) -> f64 {
+        let errors = self.eta.iter().map(|judged| judged.uncertainty.combined_standard_error());
+        median(errors).unwrap_or(f64::INFINITY)
+    }
 }
 
 /// Solution for one choice of amplitude and lengths.
@@ -362,8 +372,8 @@ fn solve(etas: &[Quantity], coordinates: &[(f64, f64, f64)], problem: &Problem<'
     let level = mean(etas.iter().map(|eta| eta.value)).unwrap_or(0.0);
     let mut choices = Vec::new();
     for amplitude in AMPLITUDES {
-        for speed_length in LENGTHS {
-            for flow_length in LENGTHS {
+        for speed_length in SPEED_LENGTHS {
+            for flow_length in FLOW_LENGTHS {
                 choices.extend(ROUGHNESSES.map(|rough| [amplitude, speed_length, flow_length, rough]));
             }
         }

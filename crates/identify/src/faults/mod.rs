@@ -158,7 +158,7 @@ fn priors(config: &IdentifyConfig, nominal: Option<&NominalRig<'_>>) -> Priors {
     let tolerances = nominal.map_or_else(ModelTolerances::default, |nominal| *nominal.tolerances);
     let machine = MACHINE.iter().map(|machine| match machine {
         Machine::Convection => OTHER_CONVECTION_RATIO,
-        // Weather, altitude, another test: more than the tolerance of a condition explains.
+        // Weather, altitude, another test: more than the tolerance of a condition explains. Each of these has one.
         Machine::Condition(channel) => {
             EXCLUDE_SIGMAS * conditions::tolerance(*channel, &tolerances).unwrap_or(1.0)
         }

@@ -11,8 +11,8 @@ use crate::step_outcome::interval_width;
 use mapper_core::{EstimateUncertainty, LeftOut, ModelDoubt, ModelEvidence, PoorFit, Warning};
 use mapper_numerics::statistics::{HINT_SIGMAS, mean, median, rms};
 
-/// Mean square of the sums over segments of [`TREND_BLOCK_S`] whitened residual of all steps above which the model itself is doubtful: smoothed inputs and
-/// fitted parameters reduce it from 1 to about 0.8 if the model fits the rig.
+/// Mean square of the whitened residual's sums over segments of [`TREND_BLOCK_S`], of all steps, above which the model itself is doubtful:
+/// smoothed inputs and fitted parameters reduce it from 1 to about 0.8 if the model fits the rig.
 const SLOW_SQUARE: f64 = 1.3;
 /// Scatter of the points about the convection law above which the law does not apply, ratio.
 const LAW_SCATTER_RATIO: f64 = 0.06;

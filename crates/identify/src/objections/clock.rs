@@ -12,7 +12,7 @@ use mapper_numerics::statistics::{MIN_VALUES, mean, median};
 
 /// Averaging time of a level before and after a moment, s; twice as long for a slope. Moments lie a quarter of it apart.
 const LEVEL_S: f64 = 2.0;
-/// Last moment after a jump, s; the first is as long before it as a window begins after it.
+/// Latest moment after a jump that is considered, s; the earliest is [`WindowRule::EARLIEST_S`] before it.
 const AFTER_S: f64 = 40.0;
 /// Lag behind the others above which a channel is late, s: a probe of 4 mm and a shaft that runs up make 2 s.
 const LATE_S: f64 = 3.5;

@@ -10,6 +10,10 @@ use crate::step_data::samples::LONGEST_BRIDGE_S;
 use mapper_core::{Recording, Warning};
 use mapper_numerics::statistics::robust_sigma;
 
+/// Ratio of a sample's standard deviation to the declared one above which intervals are far too narrow. Judgement; noise with a time constant
+/// only reduces the difference between samples.
+const MAX_RATIO: f64 = 3.0;
+
 pub(crate) fn objections(recording: &Recording, config: &IdentifyConfig) -> Vec<Objection> {
     needs(config.method)
         .into_iter()
@@ -25,9 +29,7 @@ pub(crate) fn objections(recording: &Recording, config: &IdentifyConfig) -> Vec<
                 .map(|(_, values)| (values[1] - values[0]) / std::f64::consts::SQRT_2)
                 .collect();
             let found = robust_sigma(&differences)?;
-            // Far more than makes a fit poor; noise with a time constant only reduces the difference between samples.
-            let max_ratio = config.thresholds.residual_over_noise_ratio.powi(2);
-            if !(declared > 0.0 && found > max_ratio * declared) {
+            if !(declared > 0.0 && found > MAX_RATIO * declared) {
                 return None;
             }
             let noisy = Warning::NoisyChannel { channel, noise: found, declared_noise: declared };

@@ -1,10 +1,12 @@
 //! Detects impossible steps: a rig is at one operating point at a time, and a number identifies one step.
 
 use crate::objections::objection::Objection;
-use crate::step_data::samples::LONGEST_BRIDGE_S;
 use mapper_core::{Recording, StepConflict, Warning, step_number};
 
-/// Steps that overlap in time, by more than the times of slow loggers are rounded, or share a number.
+/// Overlap that the rounded times of other loggers explain, s: half of their second.
+const ROUNDED_S: f64 = 0.5;
+
+/// Steps that overlap in time or share a number.
 pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
     let steps = &recording.steps;
     let mut found = Vec::new();
@@ -14,8 +16,7 @@ pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
     let mut furthest: Option<usize> = None;
     for &position in &by_time {
         let step = &steps[position];
-        if let Some(before) = furthest.filter(|before| steps[*before].end_s > step.start_s + LONGEST_BRIDGE_S)
-        {
+        if let Some(before) = furthest.filter(|before| steps[*before].end_s > step.start_s + ROUNDED_S) {
             let overlap = StepConflict::Overlap {
                 first: step_number(steps[before].index),
                 first_start_s: steps[before].start_s,

@@ -1,5 +1,6 @@
 //! Input and errors of planning.
 
+use crate::jumps::rejection::Rejection;
 use crate::method::PredictedMethod;
 use mapper_core::{Jump, Limits, OperatingPoint, Repeats, SettleBands, Timing, VisitOrder, WindowRule};
 use mapper_physics::machine::params::BoundaryConditions;
@@ -92,10 +93,16 @@ pub enum PlanError {
     NoPredictedError,
     /// Every order of the points contains a forbidden jump.
     #[error(
-                "every order that was tried contains a forbidden jump: {}; widen the limits or remove points",
-        .0.join("; ")
+        "every order that was tried contains a forbidden jump ({jumps} were found); the worst of each limit: {}; widen the limits or \
+         remove points",
+        worst.iter().map(|(jump, reason)| format!("{} to {}: {reason}", jump.from, jump.to)).collect::<Vec<_>>().join("; ")
     )]
-    NoAdmissibleOrder(Vec<String>),
+    NoAdmissibleOrder {
+        /// Number of forbidden jumps.
+        jumps: usize,
+        /// For each violated limit, the jump that exceeds it most.
+        worst: Vec<(Jump, Rejection)>,
+    },
     /// The simulation of a step failed.
     #[error("the forecast of the step to {to} failed: {source}")]
     Forecast {

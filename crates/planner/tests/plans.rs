@@ -84,7 +84,9 @@ fn a_forbidden_jump_has_a_reason_and_is_avoided() {
     let plan = make_plan(&limited).unwrap();
     assert!(plan.steps.iter().all(|step| step.predicted.dtc_k.unwrap_or(0.0).abs() <= 15.0));
     limited.limits.housing_gradient_max_k = Some(0.01);
-    assert!(matches!(make_plan(&limited), Err(PlanError::NoAdmissibleOrder(_))));
+    let Err(PlanError::NoAdmissibleOrder { jumps, worst }) = make_plan(&limited) else { panic!("a plan") };
+    let exceeds = |reason: &Rejection| matches!(reason, Rejection::HousingGradient { gradient_k, limit_k } if gradient_k.abs() > *limit_k);
+    assert!(jumps >= 1 && worst.len() == 1 && exceeds(&worst[0].1), "{worst:?}");
 }
 
 #[test]

@@ -3,67 +3,13 @@
 //! An edge of the graph costs one simulation. A plan therefore simulates only its own jumps and forbids the rejected ones in the
 //! next search. The complete graph, with its `n (n - 1)` simulations, is built only on request.
 
+use crate::jumps::rejection::Rejection;
 use crate::request::{PlanError, PlanRequest};
 use crate::targets::solve_steady_states;
 use crate::thermal_memory::forecast::{Forecast, forecast};
-use mapper_core::{OperatingPoint, Predicted, SURGE_ALLOWED_S, readable, temperature};
+use mapper_core::{OperatingPoint, Predicted, SURGE_ALLOWED_S};
 use mapper_physics::simulation::steady::SteadyState;
 use petgraph::graph::DiGraph;
-
-/// Reason why a jump is not allowed.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum Rejection {
-    /// The compressor stays beyond the surge line for too long.
-    #[error("it stays {longest_s:.1} s beyond the surge line; {allowed_s:.1} s are allowed")]
-    Surge {
-        /// Longest period, s.
-        longest_s: f64,
-        /// Allowed, s.
-        allowed_s: f64,
-    },
-    /// The shaft overshoots its limit.
-    #[error("the shaft reaches {}; its limit is {}", readable(*.highest_rpm, "rpm"), readable(*.limit_rpm, "rpm"))]
-    Overspeed {
-        /// Highest speed during the jump, rpm.
-        highest_rpm: f64,
-        /// Limit, rpm.
-        limit_rpm: f64,
-    },
-    /// The outlet gets too hot.
-    #[error("T2 reaches {}; its limit is {}", temperature(*.highest_k), temperature(*.limit_k))]
-    OutletTemperature {
-        /// Highest temperature during the jump, K.
-        highest_k: f64,
-        /// Limit, K.
-        limit_k: f64,
-    },
-    /// The turbine inlet is too hot.
-    #[error("T3 is {}; its limit is {}", temperature(*.t3_k), temperature(*.limit_k))]
-    TurbineInletTemperature {
-        /// T3, K.
-        t3_k: f64,
-        /// Limit, K.
-        limit_k: f64,
-    },
-    /// The housing temperature changes too much.
-    #[error(
-        "the housing temperature changes by {gradient_k:.1} K in the window; its limit is {limit_k:.1} K"
-    )]
-    HousingGradient {
-        /// Change in the window, K.
-        gradient_k: f64,
-        /// Limit, K.
-        limit_k: f64,
-    },
-    /// The rig cannot change P3 before the window begins.
-    #[error("P3 takes {needed_s:.1} s to reach its new value; the window begins after {available_s:.1} s")]
-    Slew {
-        /// Time P3 takes, s.
-        needed_s: f64,
-        /// Time until the window, s.
-        available_s: f64,
-    },
-}
 
 /// An edge: the forecast of a jump from the steady state of one point to another point.
 #[derive(Debug, Clone, PartialEq)]

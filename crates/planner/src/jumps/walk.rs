@@ -1,6 +1,7 @@
 //! Simulates the steps of an order with the full model.
 
 use crate::jumps::graph::find_rejections;
+use crate::jumps::rejection::Rejection;
 use crate::jumps::visits::Visit;
 use crate::request::{PlanError, PlanRequest};
 use crate::thermal_memory::forecast::{Forecast, ParameterError, add_joint_errors, forecast};
@@ -21,7 +22,7 @@ const MAX_WAIT_S: f64 = 3600.0;
 pub(crate) struct ForbiddenJump {
     pub(crate) from: usize,
     pub(crate) to: usize,
-    pub(crate) reasons: String,
+    pub(crate) reasons: Vec<Rejection>,
 }
 
 /// The simulated steps, and the forbidden jumps among them.
@@ -63,7 +64,6 @@ pub(crate) fn walk(
                 let reasons =
                     find_rejections(request, &step_forecast, p3_change_pa, target.boundary.t3_k, dwell_s);
                 if !reasons.is_empty() {
-                    let reasons = reasons.iter().map(ToString::to_string).collect::<Vec<_>>().join(", and ");
                     forbidden.push(ForbiddenJump { from, to: visit.index, reasons });
                 }
             }

@@ -31,6 +31,6 @@ pub fn plan_other_orders(request: &PlanRequest<'_>, plan: &Plan) -> Result<Vec<P
     };
     parallel::map(&others, make)
         .into_iter()
-        .filter(|plan| !matches!(plan, Err(PlanError::NoAdmissibleOrder(_))))
+        .filter(|plan| !matches!(plan, Err(PlanError::NoAdmissibleOrder { .. })))
         .collect()
 }

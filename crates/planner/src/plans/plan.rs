@@ -30,7 +30,9 @@ pub fn make_plan(request: &PlanRequest<'_>) -> Result<Plan, PlanError> {
     }
     let targets = solve_steady_states(request, request.points)?;
     let plan = plan_with_repeats(request, &targets);
-    let (true, Err(PlanError::NoAdmissibleOrder(_))) = (request.return_to_first, &plan) else { return plan };
+    let (true, Err(PlanError::NoAdmissibleOrder { .. })) = (request.return_to_first, &plan) else {
+        return plan;
+    };
     // Only the return may be forbidden. It is a default, not a request, so the plan is made without it.
     let mut plan = plan_with_repeats(&PlanRequest { return_to_first: false, ..request.clone() }, &targets)?;
     plan.remarks.push(PlanRemark::NoWayBack);
@@ -47,7 +49,7 @@ fn plan_with_repeats(request: &PlanRequest<'_>, targets: &[SteadyState]) -> Resu
     for jump in propose_repeated_jumps(request, targets)?.into_iter().take(MAX_REPEATED_JUMPS_TRIED) {
         match plan_with_jump(request, targets, Some((repeats, jump))) {
             // The jump may be allowed from a steady state, but not from the housing temperatures of the plan: try the next one.
-            Err(error @ PlanError::NoAdmissibleOrder(_)) => no_order = Some(error),
+            Err(error @ PlanError::NoAdmissibleOrder { .. }) => no_order = Some(error),
             result => return result,
         }
     }

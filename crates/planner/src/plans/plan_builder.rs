@@ -1,5 +1,6 @@
 //! Builds a plan for a given dwell: order, repeats, appended jump, figures, bound and remarks.
 
+use crate::jumps::rejection::Rejection;
 use crate::jumps::visits::{
     Visit, append_jump, append_return, insert_repeats, repeat_count, value, visits_of_points,
 };
@@ -19,6 +20,8 @@ use mapper_core::{
 };
 use mapper_physics::simulation::steady::SteadyState;
 use std::borrow::Cow;
+use std::collections::BTreeSet;
+use std::mem::discriminant;
 
 /// Maximum number of searches: each forbids the jumps that the full simulation rejected in the previous order.
 const MAX_REORDERINGS: usize = 25;
@@ -101,7 +104,8 @@ impl<'a> PlanBuilder<'a> {
         let mut housing = Housing::new(request, &self.points, &self.targets, dwell_s)?;
         housing.has_return = request.return_to_first;
         let mut given: Vec<usize> = (0..request.points.len()).collect();
-        let mut forbidden_jumps: Vec<String> = Vec::new();
+        let mut forbidden_jumps: BTreeSet<(usize, usize)> = BTreeSet::new();
+        let mut worst: Vec<(Jump, Rejection)> = Vec::new();
         for round in 0..MAX_REORDERINGS {
             let effort = if round == 0 { request.effort } else { REORDER_EFFORT_RATIO * request.effort };
             let orders =
@@ -124,18 +128,17 @@ impl<'a> PlanBuilder<'a> {
             }
             let before = forbidden_jumps.len();
             for ForbiddenJump { from, to, reasons } in forbidden {
-                let text = format!("{} to {}: {reasons}", self.points[from], self.points[to]);
-                if !forbidden_jumps.contains(&text) {
-                    forbidden_jumps.push(text);
-                }
+                forbidden_jumps.insert((from, to));
                 housing.forbid(from, to);
+                let jump = Jump { from: self.points[from], to: self.points[to] };
+                reasons.into_iter().for_each(|reason| keep_worst(&mut worst, jump, reason));
             }
             given = ordered.order;
             if forbidden_jumps.len() == before || !request.order.is_searched() {
                 break;
             }
         }
-        Err(PlanError::NoAdmissibleOrder(forbidden_jumps))
+        Err(PlanError::NoAdmissibleOrder { jumps: forbidden_jumps.len(), worst })
     }
 
     /// The order with the highest value including repeats, its visits, and whether they end with a return to the first point.
@@ -303,5 +306,14 @@ impl<'a> PlanBuilder<'a> {
             });
         }
         remarks
+    }
+}
+
+/// Adds a reason, or replaces the one of the same limit that is exceeded less.
+fn keep_worst(worst: &mut Vec<(Jump, Rejection)>, jump: Jump, reason: Rejection) {
+    match worst.iter_mut().find(|(_, known)| discriminant(known) == discriminant(&reason)) {
+        Some((_, known)) if known.ratio() >= reason.ratio() => {}
+        Some(known) => *known = (jump, reason),
+        None => worst.push((jump, reason)),
     }
 }

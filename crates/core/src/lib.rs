@@ -94,7 +94,7 @@ pub use test_plan::plan::{Plan, PlanBound, PlanFigures, PlanInputHashes, PlanSte
 pub use test_plan::plan_remark::{NoBound, PlanRemark};
 pub use test_plan::step_number::step_number;
 pub use test_plan::timing::{Dwell, Timing};
-pub use test_plan::verdict_forecast::{Advice, CampaignChange, VerdictForecast};
+pub use test_plan::verdict_forecast::{Advice, CampaignChange, UndeclaredForecast, VerdictForecast};
 pub use test_plan::visit_order::VisitOrder;
 pub use text::one_line::one_line;
 pub use text::probability_text::probability_text;

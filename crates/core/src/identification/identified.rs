@@ -185,6 +185,9 @@ pub struct MethodResults {
     /// Standard error of each efficiency that the method reports after such a recording, fraction: it includes the values of alpha_A, probe,
     /// heating/cooling ratio and h before the wheel that these steps cannot exclude.
     pub reported_sigma_eta: Vec<Option<f64>>,
+    /// The same on a machine whose alpha_A, probe and heating/cooling ratio each differ from the declaration by one standard deviation of
+    /// such machines; empty if all of them are fixed.
+    pub undeclared_sigma_eta: Vec<Option<f64>>,
     /// Efficiency error (rms, one sigma, fraction) that remains if the method has to identify the model parameters from these steps
     /// instead of relying on their declared values.
     pub parameter_error_eta: f64,

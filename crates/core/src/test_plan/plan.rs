@@ -42,6 +42,9 @@ pub struct Predicted {
     /// heating/cooling ratio that the recording cannot exclude. `None` if it was not forecast.
     #[serde(default)]
     pub reported_sigma_eta: Option<f64>,
+    /// The same if these parameters differ from the declaration by one standard deviation of such machines.
+    #[serde(default)]
+    pub undeclared_sigma_eta: Option<f64>,
     /// Relative standard error of the heat-transfer coefficient; `None` if it was not forecast.
     pub sigma_h_rel: Option<f64>,
     /// Error of the identification method itself in the efficiency, without noise (fraction, signed): its
@@ -71,6 +74,7 @@ impl Predicted {
             dtc_k: None,
             sigma_eta: None,
             reported_sigma_eta: None,
+            undeclared_sigma_eta: None,
             sigma_h_rel: None,
             bias_eta: None,
             bias_h_rel: None,

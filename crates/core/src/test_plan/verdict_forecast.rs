@@ -17,8 +17,19 @@ pub struct VerdictForecast {
     pub near_limit: bool,
     /// Expected standard error of efficiency, root mean square over the points, fraction; `None` if the steps cannot check the declared parameters.
     pub eta_standard_error: Option<f64>,
+    /// Expectation for a machine that is not as declared; `None` if nothing is searched for, or nothing can be determined.
+    pub undeclared: Option<UndeclaredForecast>,
     /// Rig time, s.
     pub duration_s: f64,
+}
+
+/// Expected verdicts if alpha_A, probe and heating/cooling ratio differ from the declaration by one standard deviation of such machines.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct UndeclaredForecast {
+    /// Points with the expected verdict `good`.
+    pub good: usize,
+    /// Expected standard error of efficiency, root mean square over the points, fraction.
+    pub eta_standard_error: f64,
 }
 
 /// A change of a campaign.

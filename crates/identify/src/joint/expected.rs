@@ -5,7 +5,9 @@
 
 use crate::IdentifyConfig;
 use crate::joint::Fitted;
+use crate::joint::fit::solve::{Member, Problem};
 use crate::joint::fit::start::{self, START_S};
+use crate::joint::step_model::parameters::SHARED;
 use crate::joint::step_model::rows::{COARSER, Row, StepRows, block_s_after, place};
 use crate::joint::{MAX_RESTING_ETA, fit::refinements, uncertainty::smoothness};
 use crate::single_step::dynamic::Estimate;
@@ -32,12 +34,18 @@ pub fn expected_together(steps: &[&[ForecastRow]], config: &IdentifyConfig) -> O
     start::refine(&mut problem, &condensed, config)?;
     problem.minimise_roughly()?;
     let parameter_error_eta = refinements::resting_on_declaration(&problem, None)?;
-    let mut reported_sigma_eta = vec![None; steps.len()];
-    let mut open = problem.clone();
-    let reported = Fitted::of(&mut open)?.smoothed(&open, &condensed, config);
-    for (eta, step) in reported.eta.iter().zip(&condensed) {
-        reported_sigma_eta[step.position] = Some(eta.uncertainty.combined_standard_error());
-    }
+    let reported = |problem: &Problem<'_>| -> Option<Vec<Option<f64>>> {
+        let mut open = problem.clone();
+        let found = Fitted::of(&mut open)?.smoothed(&open, &condensed, config);
+        let mut sigmas = vec![None; steps.len()];
+        for (eta, step) in found.eta.iter().zip(&condensed) {
+            sigmas[step.position] = Some(eta.uncertainty.combined_standard_error());
+        }
+        Some(sigmas)
+    };
+    let reported_sigma_eta = reported(&problem)?;
+    let undeclared_sigma_eta =
+        undeclared(&problem).and_then(|problem| reported(&problem)).unwrap_or_default();
     refinements::hold(&mut problem);
     problem.minimise_roughly()?;
     let smoothed = smoothness::smoothed(&problem, &problem.covariance()?, None, &condensed, config.reference);
@@ -58,9 +66,24 @@ pub fn expected_together(steps: &[&[ForecastRow]], config: &IdentifyConfig) -> O
     Some(MethodResults {
         steps: found,
         reported_sigma_eta,
+        undeclared_sigma_eta,
         parameter_error_eta,
         max_parameter_error_eta: MAX_RESTING_ETA,
     })
+}
+
+/// The fit of a machine whose alpha_A, probe and heating/cooling ratio each differ from the declaration by one standard deviation of their
+/// slab; `None` if all of them are fixed.
+fn undeclared<'a>(problem: &Problem<'a>) -> Option<Problem<'a>> {
+    let mut off = problem.clone();
+    let sought = refinements::sought(problem);
+    for (index, _, slab_sigma, _) in &sought {
+        off.shared[*index] = off.priors[*index].mean + slab_sigma;
+    }
+    for Member { course, measured_k, local, .. } in &mut off.members {
+        *measured_k = off.setting.predict(course, &off.shared, local, &[false; SHARED], false).t2_k;
+    }
+    (!sought.is_empty()).then_some(off)
 }
 
 /// The rows to which the method would condense the samples of a recording.

@@ -95,11 +95,14 @@ pub(crate) fn add_joint_errors<'a>(
         reported_eta: rms(found.reported_sigma_eta.iter().flatten().copied())?,
     };
     if parameter_error.eta <= parameter_error.max_eta {
-        let results = found.steps.into_iter().zip(found.reported_sigma_eta);
-        for ((predicted, rows), (found, reported)) in predicted.step_by(every).zip(&sample).zip(results) {
+        let undeclared = found.undeclared_sigma_eta.into_iter().chain(std::iter::repeat(None));
+        let results = found.steps.into_iter().zip(found.reported_sigma_eta).zip(undeclared);
+        for ((predicted, rows), ((found, reported), undeclared)) in
+            predicted.step_by(every).zip(&sample).zip(results)
+        {
             if let (Some(found), Some(end)) = (found, rows.last()) {
                 set_error(predicted, &found, end.efficiency, end.h_w_m2k);
-                predicted.reported_sigma_eta = reported;
+                (predicted.reported_sigma_eta, predicted.undeclared_sigma_eta) = (reported, undeclared);
             }
         }
     }

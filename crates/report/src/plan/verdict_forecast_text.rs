@@ -3,12 +3,20 @@
 use crate::formatting::duration::duration;
 use crate::formatting::table::COLUMNS;
 use crate::formatting::wrapped::wrapped;
-use mapper_core::{Advice, CampaignChange, VerdictForecast, half_width_95};
+use mapper_core::{Advice, CampaignChange, UndeclaredForecast, VerdictForecast, half_width_95};
 
 /// The expected verdicts in a line, and below it a line for each change that improves them; empty without a forecast.
 pub fn verdict_forecast_text(forecast: Option<VerdictForecast>, advice: &[Advice]) -> String {
     let Some(forecast) = forecast else { return String::new() };
-    let mut text = format!("Expected: {}\n", verdicts(&forecast));
+    let mut text = format!("Expected if the machine is as declared: {}\n", verdicts(&forecast));
+    if let Some(UndeclaredForecast { good, eta_standard_error }) = forecast.undeclared {
+        let error = points_95(eta_standard_error);
+        let rare = format!(
+            "If alpha_A, probe and heating/cooling ratio are one standard deviation off: {good} of {} good, {error}",
+            forecast.points
+        );
+        text += &wrapped(&rare, COLUMNS, 2);
+    }
     if forecast.near_limit {
         text += &near_limit_text(&forecast);
     }
@@ -18,7 +26,8 @@ pub fn verdict_forecast_text(forecast: Option<VerdictForecast>, advice: &[Advice
     }
     for Advice { change, forecast: after } in advice {
         let additional_time = duration(after.duration_s - forecast.duration_s);
-        text += &format!("  {} (+{additional_time}): {}\n", change_text(*change), verdicts(after));
+        let line = format!("  {} (+{additional_time}): {}", change_text(*change), verdicts(after));
+        text += &wrapped(&line, COLUMNS, 4);
     }
     text
 }
@@ -43,10 +52,12 @@ fn verdicts(forecast: &VerdictForecast) -> String {
     let has_range = good_low < good_high && !near_limit;
     let range = if has_range { format!(" ({good_low} to {good_high})") } else { String::new() };
     let error = forecast.eta_standard_error.filter(|_| *good > 0);
-    let error = error.map_or_else(String::new, |sigma| {
-        format!(", efficiency +/- {:.2} points (95 %)", 100.0 * half_width_95(sigma))
-    });
+    let error = error.map_or_else(String::new, |sigma| format!(", efficiency {} (95 %)", points_95(sigma)));
     format!("{good} of {points} points good{range}{error}")
+}
+
+fn points_95(sigma: f64) -> String {
+    format!("+/- {:.2} points", 100.0 * half_width_95(sigma))
 }
 
 fn change_text(change: CampaignChange) -> String {

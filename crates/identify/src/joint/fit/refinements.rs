@@ -31,7 +31,7 @@ pub(crate) struct Refinements {
 pub(crate) struct Gain(pub(crate) DMatrix<f64>);
 
 /// The parameters that a problem searches for.
-fn sought(problem: &Problem<'_>) -> Vec<(usize, f64, f64, f64)> {
+pub(crate) fn sought(problem: &Problem<'_>) -> Vec<(usize, f64, f64, f64)> {
     let looked_for =
         |index: usize| if index == PROBE_MM2 { problem.probe_fitted } else { problem.active[index] };
     REFINEMENTS.into_iter().filter(|(index, ..)| looked_for(*index)).collect()

@@ -60,7 +60,7 @@ pub use plan::campaign_check_text::campaign_check_text;
 pub use plan::comparison_text::{comparison_json, comparison_text};
 pub use plan::jump_text::{jump_json, jump_text};
 pub use plan::plan_picture::plan_svg;
-pub use plan::plan_remark_text::plan_remark_text;
+pub use plan::plan_remark_text::{guard_trip_text, plan_remark_text};
 pub use plan::plan_text::plan_text;
 pub use plan::speed_lines_text::lines_text;
 pub use plan::verdict_forecast_text::verdict_forecast_text;

@@ -12,9 +12,7 @@ use mapper_core::{Jump, OperatingPoint, Plan as StepPlan, VisitOrder};
 use mapper_physics::simulation::model::Model;
 use mapper_planner::{PlanRequest, make_plan, plan_other_orders};
 use mapper_report::{comparison_json, comparison_text, jump_json, jump_text, plan_svg, plan_text};
-use mapper_session::{
-    PlanInputs, Rehearsal, Session, SessionError, json_text, nominal_model, plan_of, rehearse,
-};
+use mapper_session::{PlanInputs, Session, SessionError, json_text, nominal_model, plan_of, rehearse};
 use std::path::PathBuf;
 
 /// Show the steps of a campaign: order, turbine pressure, expected results, duration
@@ -66,8 +64,10 @@ impl Plan {
     pub fn run(&self) -> Result<(), Failure> {
         let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
         let model = nominal_model(&campaign)?;
+        let (registry, stop) = (registry::registry(), interrupt::stop_flag()?);
+        let session = Session { stop: &stop, ..Session::new(&registry) };
         if let Some(source) = &campaign.sequence {
-            return self.run_script(&campaign, &model, source);
+            return self.run_script(&session, &campaign, &model, source);
         }
         let inputs = PlanInputs::of(&campaign)?;
         let request = inputs.request(&campaign, &model);
@@ -79,12 +79,10 @@ impl Plan {
                 standard_output::print(&jump_text(&campaign, &jump))
             };
         }
-        let appended = match self.append.as_slice() {
-            [from, to] => Some(Jump { from: *from, to: *to }),
-            _ => None,
-        };
+        let appended = self.append.first().zip(self.append.get(1)).map(|(&from, &to)| Jump { from, to });
         let request = PlanRequest { effort: self.effort.unwrap_or(request.effort), appended, ..request };
-        let plan = plan_of(&campaign, &request)?;
+        let mut plan = plan_of(&campaign, &request)?;
+        plan.remarks.extend(session.forecast_guard_trip(&campaign, &model, &plan)?);
         let others = self.compare.then(|| plan_other_orders(&request, &plan)).transpose();
         let others = others.map_err(SessionError::from)?;
         self.store(&plan)?;
@@ -101,22 +99,23 @@ impl Plan {
             }
             return standard_output::print_json(&value);
         }
-        let mut text = plan_text(&campaign, &plan);
-        if let Some(others) = &others {
-            text.push_str(&comparison_text(&plan, others));
-        }
-        standard_output::print(&text)
+        let comparison = others.map_or_else(String::new, |others| comparison_text(&plan, &others));
+        standard_output::print(&(plan_text(&campaign, &plan) + comparison.as_str()))
     }
 
     /// Rehearses a script and prints the forecast plan.
-    fn run_script(&self, campaign: &Campaign, model: &Model, source: &SequenceSource) -> Result<(), Failure> {
+    fn run_script(
+        &self,
+        session: &Session<'_>,
+        campaign: &Campaign,
+        model: &Model,
+        source: &SequenceSource,
+    ) -> Result<(), Failure> {
         if !(self.why.is_empty() && self.append.is_empty()) {
             let message = "--why and --append need a campaign with a grid, but the steps of this campaign come from its script; add the jump to the script";
             return Err(Failure::new(Code::BadInput, message));
         }
-        let (registry, stop) = (registry::registry(), interrupt::stop_flag()?);
-        let session = Session { stop: &stop, ..Session::new(&registry) };
-        let Rehearsal { plan, notes } = rehearse(&session, campaign, model, source)?;
+        let mapper_session::Rehearsal { plan, notes } = rehearse(session, campaign, model, source)?;
         self.store(&plan)?;
         if self.json {
             let mut value = plan_json(campaign, &plan)?;

@@ -1,7 +1,7 @@
 //! Remarks for the operator of a plan.
 
 use crate::coded_enum::coded_enum;
-use crate::{Channel, OperatingPoint};
+use crate::{Channel, GuardName, OperatingPoint};
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -27,6 +27,9 @@ PlanRemark {
     "required_error_not_reached" RequiredErrorNotReached { dwell_s: f64, eta_sigma: f64, required_eta_sigma: f64 },
     /// The search for surge after the steps.
     "surge_search" SurgeSearch { lines: usize, closest_margin_ratio: f64, steps: usize, duration_s: f64 },
+    /// A guard ends the rehearsal on the nominal machine in the step to this point: its report, and the highest speed of all steps if the
+    /// guard is that of the speed.
+    "guard_trip" GuardTrip { guard: GuardName, to: OperatingPoint, reason: String, highest_speed_rpm: Option<f64> },
     /// Offsets that remain after the soak, in the channels' units, and those after a longer soak that would clearly reduce them.
     "offsets_after_soak" OffsetsAfterSoak {
         soak_s: f64, offset_sigmas: BTreeMap<Channel, f64>, longer_soak_s: f64, longer_offset_sigmas: BTreeMap<Channel, f64>

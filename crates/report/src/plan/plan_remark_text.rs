@@ -52,6 +52,10 @@ pub fn plan_remark_text(remark: &PlanRemark) -> String {
             100.0 * closest_margin_ratio,
             duration_s / 60.0
         ),
+        PlanRemark::GuardTrip { .. } => {
+            let (trip, remedy) = guard_trip_text(remark);
+            format!("{trip}; {remedy}")
+        }
         PlanRemark::OffsetsAfterSoak { soak_s, offset_sigmas, longer_soak_s, longer_offset_sigmas } => {
             let left = format!(
                 "the soak of {:.0} min leaves of the offsets (one standard deviation): {}",
@@ -72,6 +76,28 @@ pub fn plan_remark_text(remark: &PlanRemark) -> String {
         PlanRemark::Other { message, .. } => message.clone(),
         other => other.code().to_owned(),
     }
+}
+
+/// The sentence of a forecast guard trip, and its remedy.
+pub fn guard_trip_text(remark: &PlanRemark) -> (String, String) {
+    let PlanRemark::GuardTrip { guard, to, reason, highest_speed_rpm } = remark else {
+        return (plan_remark_text(remark), String::new());
+    };
+    let trip = format!(
+        "the guard `{guard}` will probably end the run in the step to {}: in a rehearsal on the nominal machine, {reason}",
+        place(to)
+    );
+    let remedy = match highest_speed_rpm {
+        Some(rpm) => format!(
+            "if the machine permits it, raise `limits.speed` above {:.1} krpm, the highest speed of the rehearsal; otherwise lower the \
+             fastest lines",
+            1e-3 * rpm
+        ),
+        None => format!(
+            "if the machine permits it, raise the limit of `{guard}`; otherwise leave out the points beyond it"
+        ),
+    };
+    (trip, remedy)
 }
 
 fn list_sigmas(sigmas: &BTreeMap<Channel, f64>) -> String {

@@ -15,6 +15,7 @@ use mapper_physics::laws::standstill::{StandstillState, relax};
 use mapper_physics::laws::thermocouple::time_constant_s;
 use mapper_physics::simulation::model::Model;
 use mapper_planner::{PlanRequest, max_steps};
+use mapper_report::guard_trip_text;
 
 /// Assumed temperature difference between cold housings and test cell, K. The zero uses the same value to find the limit that Tc relaxes to.
 const WARM_K: f64 = 3.0;
@@ -30,7 +31,7 @@ const PROBE_TIME_CONSTANTS: f64 = 5.0;
 /// forecast takes seconds.
 const MAX_SIMULATED_POINTS: usize = 200;
 
-/// Effort of the search for the simulated order; concerns hardly depend on the order.
+/// Effort of the search for the order after a change that is tried: the expected verdicts hardly depend on the order.
 const QUICK_EFFORT: f64 = 0.05;
 
 /// Forecast of a campaign.
@@ -64,7 +65,7 @@ impl Session<'_> {
     ) -> Result<CampaignForecast, SessionError> {
         let every = campaign.points.len().div_ceil(MAX_SIMULATED_POINTS).max(1);
         let plan = match &campaign.sequence {
-            None => plan_of_sample(campaign, model, every)?,
+            None => plan_of_sample(campaign, model, every, 1.0)?,
             Some(source) => rehearse(self, campaign, model, source)?.plan,
         };
         let concerns = [
@@ -72,13 +73,14 @@ impl Session<'_> {
             settling_concern(campaign, &plan),
             probe_concern(campaign, &plan),
             required_error_concern(campaign, &plan),
+            self.guard_concern(campaign, model, &plan)?,
             information_concern(campaign, &plan),
         ];
         let calibrations = calibration_concerns(campaign, model, day);
         let verdicts = forecast_verdicts(campaign, &plan);
         let advice = match verdicts {
             Some(now) if now.good_low < now.points => {
-                advise(campaign, now, |changed| plan_of_sample(changed, model, every))?
+                advise(campaign, now, |changed| plan_of_sample(changed, model, every, QUICK_EFFORT))?
             }
             _ => Vec::new(),
         };
@@ -102,10 +104,35 @@ impl Session<'_> {
     }
 }
 
+impl Session<'_> {
+    /// A guard that would end the run.
+    fn guard_concern(
+        &self,
+        campaign: &Campaign,
+        model: &Model,
+        plan: &Plan,
+    ) -> Result<Option<Concern>, SessionError> {
+        // The rehearsal of a script has already passed the guards.
+        if campaign.sequence.is_some() {
+            return Ok(None);
+        }
+        let trip = self.forecast_guard_trip(campaign, model, plan)?;
+        Ok(trip.map(|remark| {
+            let (trip, remedy) = guard_trip_text(&remark);
+            Concern::warning(&["limits"], trip, remedy)
+        }))
+    }
+}
+
 /// The plan of every n-th point, without its error bound.
-fn plan_of_sample(campaign: &Campaign, model: &Model, every: usize) -> Result<Plan, SessionError> {
+fn plan_of_sample(
+    campaign: &Campaign,
+    model: &Model,
+    every: usize,
+    effort: f64,
+) -> Result<Plan, SessionError> {
     let inputs = PlanInputs::of(campaign)?;
-    let mut request = PlanRequest { bound: false, effort: QUICK_EFFORT, ..inputs.request(campaign, model) };
+    let mut request = PlanRequest { bound: false, effort, ..inputs.request(campaign, model) };
     if let Dwell::TimeBudget(budget_s) = request.timing.dwell {
         let share = max_steps(&request) as f64;
         let fixed_s = request.timing.warm_up_s + request.timing.cool_down_s;

@@ -1,4 +1,4 @@
-//! Rehearses a sequence script on the nominal machine, so that its errors never reach the rig.
+//! Rehearses a sequence script, or the jumps of a plan, on the nominal machine, so that errors never reach the rig.
 
 use crate::plan::planning::{hash_inputs, plan};
 use crate::plan::scripted_steps::ScriptedSteps;
@@ -7,14 +7,21 @@ use crate::rig::drive::drive;
 use crate::{Session, SessionError};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::{BackendChoice, SequenceSource};
-use mapper_core::{Plan, PlanStep, StepMarker, VisitOrder};
+use mapper_core::{
+    Channel, GuardName, GuardSet, OperatingPoint, Plan, PlanRemark, PlanStep, SampleBatch, StepMarker,
+    VisitOrder,
+};
 use mapper_physics::simulation::model::Model;
-use mapper_runner::{RunEnd, RunError, RunObserver, StepSource, StepSourceError};
+use mapper_runner::{ObserverError, PlanSteps, RunEnd, RunError, RunObserver, StepSource, StepSourceError};
 
 /// Objective recorded in the plan of a script.
 const OBJECTIVE: &str = "sequence";
 /// The backend of the rehearsal.
 const REHEARSAL_BACKEND: &str = "virtual_lab";
+/// Rehearsed time of each step of a plan, s: the lab's valve takes 2.5 s from end to end, and shafts follow within seconds.
+const JUMP_S: f64 = 10.0;
+/// Ratio by which the speed limit is raised to find the highest speed. Judgement: no jump overshoots by half.
+const UNLIMITED_RATIO: f64 = 1.5;
 
 /// Result of a rehearsal.
 pub struct Rehearsal {
@@ -58,6 +65,81 @@ pub fn rehearse(
     }
     add_surge_search(campaign, model, &mut plan);
     Ok(Rehearsal { plan, notes: steps.notes })
+}
+
+impl Session<'_> {
+    /// Rehearses the jumps of a plan on the virtual lab of the nominal machine, and returns the first guard trip that would end the run. In
+    /// the lab, pressure and valve move at finite rates, at once in the planner's forecast: a pressure that rises before the valve has closed
+    /// lets the speed overshoot. `None` too if the rehearsal fails, since it says nothing about the campaign then.
+    ///
+    /// # Errors
+    /// [`SessionError`] if it is interrupted, or there is no virtual lab.
+    pub fn forecast_guard_trip(
+        &self,
+        campaign: &Campaign,
+        model: &Model,
+        plan: &Plan,
+    ) -> Result<Option<PlanRemark>, SessionError> {
+        let (end, progress) = self.rehearse_jumps(campaign, model, plan)?;
+        let (Ok(RunEnd::Tripped(trip)), Some(to)) = (end, progress.to) else { return Ok(None) };
+        let mut highest_speed_rpm = None;
+        if trip.guard == GuardName::Overspeed {
+            let mut unlimited = Campaign { guards: None, ..campaign.clone() };
+            unlimited.limits.speed_max_rpm *= UNLIMITED_RATIO;
+            highest_speed_rpm = Some(self.rehearse_jumps(&unlimited, model, plan)?.1.highest_rpm);
+        }
+        Ok(Some(PlanRemark::GuardTrip { guard: trip.guard, to, reason: trip.reason, highest_speed_rpm }))
+    }
+
+    /// Runs the first seconds of each step.
+    fn rehearse_jumps(
+        &self,
+        campaign: &Campaign,
+        model: &Model,
+        plan: &Plan,
+    ) -> Result<(Result<RunEnd, RunError>, Progress), SessionError> {
+        let mut settings = serde_json::json!({});
+        if campaign.backend.name == REHEARSAL_BACKEND
+            && let Some(actuators) = campaign.backend.settings.get("actuators")
+        {
+            settings["actuators"] = actuators.clone();
+        }
+        // A step that is cut short does not reach its speed.
+        let guards = Some(GuardSet { speed: None, ..campaign.guard_set() });
+        let backend = BackendChoice { name: REHEARSAL_BACKEND.to_owned(), settings };
+        let nominal = Campaign { backend, zero: None, guards, ..campaign.clone() };
+        let mut backend = self.registry.make_backend(&nominal, model)?;
+        let mut jumps = Plan { cool_down_s: 0.0, ..plan.clone() };
+        for step in &mut jumps.steps {
+            step.dwell_s = step.dwell_s.min(JUMP_S);
+        }
+        let mut progress = Progress::default();
+        let mut steps = PlanSteps::new(&jumps);
+        match drive(&nominal, model, &mut steps, backend.as_mut(), &mut progress, self.stop) {
+            Ok(RunEnd::Interrupted { .. }) => Err(SessionError::Interrupted),
+            end => Ok((end, progress)),
+        }
+    }
+}
+
+/// The current step of a rehearsal, and the highest speed so far.
+#[derive(Debug, Default)]
+struct Progress {
+    to: Option<OperatingPoint>,
+    highest_rpm: f64,
+}
+
+impl RunObserver for Progress {
+    fn on_step_start(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        self.to = marker.to;
+        Ok(())
+    }
+
+    fn on_batch(&mut self, batch: &SampleBatch) -> Result<(), ObserverError> {
+        let speeds = batch.column(Channel::ShaftSpeed).unwrap_or_default();
+        self.highest_rpm = speeds.iter().copied().fold(self.highest_rpm, f64::max);
+        Ok(())
+    }
 }
 
 struct NoObserver;

@@ -21,7 +21,7 @@ pub use diagnosis::corrected_points::corrected_csv;
 pub use diagnosis::correction_text::correction_text;
 pub use diagnosis::drift_text::drift_text;
 pub use diagnosis::gap_text::{
-    NOTHING, OUTSIDE, candidate_name, doubt_text, gap_text, headline, suspect_text,
+    NOTHING, OUTSIDE, UNLISTED, candidate_name, doubt_text, gap_text, headline, suspect_text,
 };
 pub use diagnosis::prediction_check_text::held_text;
 pub use diagnosis::recordings_text::recordings_text;

@@ -239,6 +239,7 @@ pub fn diagnose(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
         inseparable,
         candidates: posterior.candidates,
         probability_none: posterior.none,
+        probability_unlisted: posterior.unlisted,
         probability_outside: posterior.outside,
         laws: Vec::new(),
         forces: Vec::new(),

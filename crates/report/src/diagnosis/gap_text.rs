@@ -21,6 +21,8 @@ const PLACES: usize = 5;
 
 /// Name of the hypothesis without a cause.
 pub const NOTHING: &str = "nothing beyond tolerance";
+/// Causes of the catalogue that the list does not contain.
+pub const UNLISTED: &str = "other causes of the catalogue";
 /// The answer that the cause is not in the library.
 pub const OUTSIDE: &str = "a cause outside the catalogue";
 
@@ -71,9 +73,11 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
             text += &format!("           indistinguishable from {}\n", set.join(" + "));
         }
     }
-    for (probability, target) in
-        [(diagnosis.probability_none, NOTHING), (diagnosis.probability_outside, OUTSIDE)]
-    {
+    for (probability, target) in [
+        (diagnosis.probability_none, NOTHING),
+        (diagnosis.probability_unlisted, UNLISTED),
+        (diagnosis.probability_outside, OUTSIDE),
+    ] {
         text += &format!("  {:>7}  {target}\n", probability_text(probability));
     }
     for suspect in &diagnosis.suspects {

@@ -5,7 +5,8 @@ use crate::page::prose::sentence;
 use crate::page::shell::{Purpose, shell};
 use crate::page::table::scrolling;
 use crate::{
-    NOTHING, OUTSIDE, four_figures, gap_text, headline, next_measurement, stand_actions, suspect_text,
+    NOTHING, OUTSIDE, UNLISTED, four_figures, gap_text, headline, next_measurement, stand_actions,
+    suspect_text,
 };
 use mapper_chart::palette::{self, Colour};
 use mapper_chart::{Axis, Figure, Line, Panel, Scatter};
@@ -113,6 +114,7 @@ fn causes(diagnosed: &Diagnosed) -> Markup {
     let candidates = diagnosis.listed().take(8);
     let rows = candidates.map(|candidate| (cause(candidate), candidate.probability)).chain([
         (NOTHING.to_owned(), diagnosis.probability_none),
+        (UNLISTED.to_owned(), diagnosis.probability_unlisted),
         (OUTSIDE.to_owned(), diagnosis.probability_outside),
     ]);
     let mut rows: Vec<(String, f64)> = rows.collect();

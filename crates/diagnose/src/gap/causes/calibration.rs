@@ -22,6 +22,8 @@ pub struct Calibration {
     pub prior_triple: f64,
     /// Factor on the parameters' standard errors.
     pub interval_factor: f64,
+    /// Share of recordings with causes of the catalogue in which these are not among the candidates.
+    pub unlisted: f64,
     /// Logistic model of an unmodelled cause: offset, and slopes of the [`counted`] features.
     pub outside: [f64; 3],
 }

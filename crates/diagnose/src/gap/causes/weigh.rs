@@ -25,6 +25,8 @@ pub(crate) struct CauseProbabilities {
     pub alike: Vec<usize>,
     /// Probability that everything is within tolerance.
     pub none: f64,
+    /// Probability of causes of the catalogue that are not among the candidates.
+    pub unlisted: f64,
     /// Probability of an unmodelled cause, from the residual of the best fit.
     pub outside: f64,
     /// Whether a cause is named.
@@ -87,11 +89,13 @@ pub(crate) fn weigh(
     // If no cause is named, an inadequate fit also supports an unmodelled cause.
     let inside = 1.0 - outside;
     let none = inside * weights[0] / total;
+    let unlisted = calibration.unlisted * (inside - none);
+    let listed = inside * (1.0 - calibration.unlisted);
     // A superset of a better cause counts as that cause with an additional effect too weak to detect.
     let mut shown: Vec<usize> = Vec::new();
     let mut probabilities: Vec<f64> = Vec::new();
     for (place, fit) in fits.iter().enumerate() {
-        let probability = inside * weights[place + 1] / total;
+        let probability = listed * weights[place + 1] / total;
         match shown.iter().position(|better| includes(study, fit, &fits[*better])) {
             Some(better) => probabilities[better] += probability,
             None => {
@@ -116,7 +120,7 @@ pub(crate) fn weigh(
         }
     };
     let candidates = shown.iter().zip(probabilities).map(candidate).collect();
-    CauseProbabilities { candidates, shown, alike, none, outside, named }
+    CauseProbabilities { candidates, shown, alike, none, unlisted, outside, named }
 }
 
 fn ids(study: &Study, fit: &Fit) -> Vec<String> {

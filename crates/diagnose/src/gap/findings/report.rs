@@ -39,6 +39,8 @@ pub struct Diagnosis {
     pub inseparable: Vec<String>,
     /// Probability that nothing is beyond tolerance.
     pub probability_none: f64,
+    /// Probability of causes of the effect library that are not among the candidates.
+    pub probability_unlisted: f64,
     /// Probability that the cause is not in the effect library.
     pub probability_outside: f64,
     /// Laws for the gap that the effect library does not explain, best first; empty if none is proposed.

@@ -83,17 +83,12 @@ fn first_answer(case: &DiagnosisSummary, calibration: &Calibration) -> Option<(f
     let is_right = |causes: &BTreeSet<String>| {
         !matches!(case.kind, CaseKind::None | CaseKind::Outside) && *causes == case.causes
     };
-    let named = shown.into_iter().map(|(causes, probability)| (probability, is_right(causes)));
+    let listed = 1.0 - calibration.unlisted;
+    let named = shown.into_iter().map(|(causes, probability)| (listed * probability, is_right(causes)));
     named
         .chain([(inside(case.nothing), case.kind == CaseKind::None), (outside, is_outside)])
         .filter(|(probability, _)| probability.is_finite())
         .max_by(|a, b| a.0.total_cmp(&b.0))
-}
-
-/// Whether the true cause is among the candidates.
-fn is_listed(case: &DiagnosisSummary) -> bool {
-    matches!(case.kind, CaseKind::None | CaseKind::Outside)
-        || case.candidates.iter().any(|(causes, _)| *causes == case.causes)
 }
 
 /// Classes, and their expected calibration error.
@@ -119,7 +114,7 @@ fn reliability(calibration: &str, cases: &[DiagnosisSummary], answers: &[Answer]
         calibration: calibration.to_owned(),
         expected_calibration_error: weighted_mean(&error),
         expected_by_chance: weighted_mean(&by_chance),
-        truth_not_listed: cases.iter().filter(|case| !is_listed(case)).count(),
+        truth_not_listed: cases.iter().filter(|case| !case.is_listed()).count(),
         bins,
     }
 }
@@ -230,7 +225,12 @@ mod tests {
 
     /// Temperature 1 and nothing outside: the probabilities are those of the scores.
     fn plain() -> Calibration {
-        Calibration { temperature: 1.0, outside: [-50.0, 0.0, 0.0], ..Calibration::shipped().unwrap() }
+        Calibration {
+            temperature: 1.0,
+            unlisted: 0.0,
+            outside: [-50.0, 0.0, 0.0],
+            ..Calibration::shipped().unwrap()
+        }
     }
 
     fn reliability_of(cases: &[DiagnosisSummary]) -> Reliability {

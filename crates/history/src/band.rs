@@ -10,7 +10,7 @@ const WIDTH_SIGMAS: f64 = 4.0;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Floor {
-    /// In the unit of the figure.
+    /// In the unit of the metric.
     Absolute(f64),
     /// As a ratio of the absolute value of the median.
     Relative(f64),

@@ -64,7 +64,7 @@ function drawStep() {
       marks.push(Plot.line(rows, { x: "t", y: "v", z: "name", stroke: d => (d.name === channels[0].name ? style("--accent") : style("--doubt")) }));
       if (channels.length > 1) marks.push(Plot.text(rows, Plot.selectLast({ x: "t", y: "v", z: "name", text: "name", dx: -12, dy: -8, fill: style("--ink") })));
     }
-    put(holder, Plot.plot(frame(holder, { x: { label: "time after the change of set-points, s" }, y: { label: extra === "left" ? "K" : channels[0].unit, nice: true }, marks })), `${title}, step ${point.name}`);
+    put(holder, Plot.plot(frame(holder, { x: { label: "time after the change of setpoints, s" }, y: { label: extra === "left" ? "K" : channels[0].unit, nice: true }, marks })), `${title}, step ${point.name}`);
   }
 }
 

@@ -68,7 +68,7 @@ pub fn read_xls(file: impl Read + Seek) -> Result<Vec<Sheet>, String> {
     places.sort_unstable();
     places.dedup();
     if places.len() < globals.sheets.len() {
-        return Err("two of its sheets are at the same place".to_owned());
+        return Err("two of its sheets are at the same offset".to_owned());
     }
     let mut sheets = Vec::new();
     for (at, name, is_hidden) in &globals.sheets {
@@ -200,7 +200,7 @@ fn single(record: Record<'_>, format: u16, globals: &Globals) -> Option<Cell> {
         // Number, Rk
         0x0203 => Some(number(record.f64(6)?, format, globals)),
         0x027E => Some(number(unpacked(record.u32(6)?), format, globals)),
-        // Formula: its value, unless the last two bytes mark a text, a truth value, an error or none
+        // Formula: its value, unless the last two bytes mark a text, a Boolean, an error or no value
         0x0006 => (record.u16(12)? != 0xFFFF).then_some(number(record.f64(6)?, format, globals)),
         // LabelSst
         0x00FD => globals.strings.get(usize::try_from(record.u32(6)?).ok()?).cloned().map(Cell::Text),

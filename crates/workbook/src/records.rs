@@ -28,7 +28,7 @@ impl Record<'_> {
     }
 }
 
-/// The records from the start of a stream; the first that is not whole ends them.
+/// The records from the start of a stream; they end at the first incomplete one.
 pub(crate) struct Records<'a>(pub(crate) &'a [u8]);
 
 impl<'a> Iterator for Records<'a> {

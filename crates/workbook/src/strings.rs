@@ -1,12 +1,12 @@
-//! Texts: a count of letters, a byte of flags, and letters of one or two bytes, which may go on in the next record.
+//! Texts: a count of characters, a byte of flags, and characters of one or two bytes, which may continue in the next record.
 
 use std::rc::Rc;
 
-/// Set if letters have two bytes.
+/// Set if characters have two bytes.
 const WIDE: u8 = 0x01;
-/// Set if a list of fonts lies behind the letters.
+/// Set if a list of fonts follows the characters.
 const RICH: u8 = 0x08;
-/// Set if phonetic data lie behind the letters.
+/// Set if phonetic data follow the characters.
 const EXTENDED: u8 = 0x04;
 
 /// Bytes in one record and those that continue it.
@@ -40,8 +40,8 @@ impl<'a> Bytes<'a> {
         (0..bytes).try_fold(0, |sum, place| Some(sum | u32::from(self.byte()?) << (8 * place)))
     }
 
-    /// Letters with their flags before them; a record that continues them begins with flags of its own.
-    fn letters(&mut self, count: u32, mut flags: u8) -> Option<String> {
+    /// Characters; a record that continues them begins with flags of its own.
+    fn characters(&mut self, count: u32, mut flags: u8) -> Option<String> {
         let mut units = Vec::new();
         for index in 0..count {
             if index > 0 && self.at_end_of_piece() {
@@ -53,13 +53,13 @@ impl<'a> Bytes<'a> {
         Some(String::from_utf16_lossy(&units))
     }
 
-    /// A text whose count of letters has `count_bytes`. Before Excel 97 it has no flags, and letters of one byte.
+    /// A text whose count of characters has `count_bytes`. Before Excel 97 it has no flags, and characters of one byte.
     pub(crate) fn text(&mut self, count_bytes: u32, has_flags: bool) -> Option<String> {
         let count = self.number(count_bytes)?;
         let flags = if has_flags { self.byte()? } else { 0 };
         let fonts = if flags & RICH != 0 { self.number(2)? } else { 0 };
         let phonetic = if flags & EXTENDED != 0 { self.number(4)? } else { 0 };
-        let text = self.letters(count, flags)?;
+        let text = self.characters(count, flags)?;
         for _ in 0..4 * u64::from(fonts) + u64::from(phonetic) {
             self.byte()?;
         }
@@ -67,7 +67,7 @@ impl<'a> Bytes<'a> {
     }
 }
 
-/// The texts that cells refer to, as many as are whole.
+/// The texts that cells refer to, up to the first incomplete one.
 pub(crate) fn shared(pieces: Vec<&[u8]>) -> Vec<Rc<str>> {
     let mut bytes = Bytes::new(pieces);
     // The number of all references, and the number of texts.

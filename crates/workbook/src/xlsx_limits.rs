@@ -14,10 +14,10 @@ const MAX_STYLES_BYTES: u64 = 8 << 20;
 
 const MAX_PARTS: usize = 10_000;
 
-/// Maximum length of a tag, of a piece between two tags and of a cell, bytes: Excel's own limit of a cell is 32 767 letters.
+/// Maximum length of a tag, of a piece between two tags and of a cell, bytes: Excel's own limit of a cell is 32 767 characters.
 const MAX_PIECE_BYTES: u64 = 1 << 20;
 
-/// Maximum length of a tag among the formats of cells, bytes: Excel's own limit of a number format is 255 letters.
+/// Maximum length of a tag among the formats of cells, bytes: Excel's own limit of a number format is 255 characters.
 const MAX_STYLE_PIECE_BYTES: u64 = 1 << 12;
 
 /// Maximum nesting of elements: a cell of rich text has ten levels.

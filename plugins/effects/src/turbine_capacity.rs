@@ -1,11 +1,11 @@
-//! The turbine swallows more or less gas.
+//! The swallowing capacity of the turbine is higher or lower.
 
 use mapper_physics::effect;
 
 effect! {
     pub(crate) struct TurbineCapacity "turbine_capacity";
     name: "flow capacity of the turbine",
-    description: "the turbine swallows more or less gas at every expansion ratio",
+    description: "the swallowing capacity of the turbine is higher or lower at every expansion ratio",
     equation: "m_t = s m_t,nominal",
     source: "deposits on vanes or volute, or another volute",
     submodel: TurbineFlow, also_shows_in: [Shaft];

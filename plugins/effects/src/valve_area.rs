@@ -5,7 +5,7 @@ use mapper_physics::effect;
 effect! {
     pub(crate) struct ValveArea "valve_area";
     name: "valve area",
-    description: "the back-pressure valve is wider or narrower than its opening says",
+    description: "the area of the back-pressure valve differs from that of its opening",
     equation: "CdA = s CdA,nominal",
     source: "calibration of the valve",
     submodel: Outlet, also_shows_in: [];

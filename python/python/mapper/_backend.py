@@ -29,7 +29,7 @@ class Backend:
     sample_rate_hz : float
         Samples per second, Hz.
     accepts : mapping
-        Smallest and largest set-point: ``p3_pa``, ``t3_k``, ``valve_opening_ratio``, ``oil_temperature_k``.
+        Smallest and largest setpoint: ``p3_pa``, ``t3_k``, ``valve_opening_ratio``, ``oil_temperature_k``.
     safe : mapping
         The way to the safe state: ``p3_slew_pa_s``, ``valve_opening_ratio`` and ``within_s``.
     needs_guarded : sequence of str
@@ -51,7 +51,7 @@ class Backend:
         """Arm the rig: time 0."""
 
     def set(self, setpoints: dict[str, Any]) -> None:
-        """Take new set-points.
+        """Take new setpoints.
 
         Parameters
         ----------

@@ -78,7 +78,7 @@ impl Check {
         standard_output::print(&format!(
             "{}{}{}{}{}",
             mapper_report::campaign_check_text(&self.campaign, &campaign, steps, forecast.duration_s, count),
-            verdict_forecast_text(forecast.verdicts, &forecast.advice),
+            verdict_forecast_text(&campaign, forecast.verdicts, &forecast.advice),
             declared_sensors_text(&campaign),
             assumed_text(&campaign),
             lines_text(&campaign, &lines),

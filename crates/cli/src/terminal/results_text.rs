@@ -122,7 +122,7 @@ fn short(units: &DisplayUnits, found: &ShownResults<'_>, shown: DetailLevel) -> 
         text.push_str(&wrapped(remark, COLUMNS, 2));
     }
     let footer = format!(
-        "+/- is half a 95 % interval. What all points share, repeats, sensors and the zero: {}, or the page of the run.",
+        "+/- is half a 95 % interval. Common errors, repeats, sensors and zero: {}, or the page of the run.",
         found.command
     );
     text.push_str(&wrapped(&footer, COLUMNS, 2));

@@ -213,7 +213,7 @@ pub fn diagnose(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
     } else {
         places(&study, &linearised, &null, &gains, named.then_some(alike.len()))
     };
-    progress(0.95, "what next");
+    progress(0.95, "next experiment");
     let Suggested { next, experiments } = match verdict {
         Verdict::WithinTolerance => suspicions(&posterior, &fits, &null)
             .map(|rivals| next(&study, rivals, &experiments, calibration.temperature))

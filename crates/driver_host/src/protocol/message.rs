@@ -8,7 +8,7 @@ use serde_json::Value;
 /// One message: a request (`id` and `method`), its answer (`id` and `result` or `error`), or a note (`method` alone).
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Message {
-    /// Number of a request and of its answer; the sender of requests counts it up.
+    /// Number of a request and of its answer; the sender increments it with each request.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub id: Option<u64>,
     /// The session, as named in the driver's hello; required in every later message of the host.

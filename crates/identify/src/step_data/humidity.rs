@@ -7,7 +7,7 @@ use mapper_numerics::statistics::mean;
 use mapper_observe::plausible::check_running;
 use mapper_physics::gas::air::humidity_kg_kg;
 
-/// The configuration with the humidity that was measured, the mean over the recording. The air of a hygrometer is that of the cell, or of the
+/// The configuration with the humidity that was measured, the mean over the recording. A hygrometer is assumed to be in the air of the cell, or of the
 /// inlet if the cell's temperature was not recorded. Without a plausible reading the declared humidity stays.
 pub fn with_measured_humidity(recording: &Recording, config: &IdentifyConfig) -> IdentifyConfig {
     let mut config = config.clone();

@@ -4,7 +4,7 @@ use crate::IdentifyConfig;
 use crate::step_outcome::findings::Findings;
 use mapper_core::{EstimateUncertainty, EtaSignal, Warning, WideInterval};
 
-/// Doubts an efficiency for the width of its interval, or refuses it. `dt2_k`: change of T2 in the window; `shared`: whether shared parameters
+/// Marks an efficiency as doubtful or unusable if its interval is too wide. `dt2_k`: change of T2 in the window; `shared`: whether shared parameters
 /// contribute to its errors.
 pub(crate) fn judge(
     eta: EstimateUncertainty,

@@ -2,7 +2,7 @@
 //!
 //! P3 is its command with a first-order lag, whose time constant is fitted to the measured P3, plus a remainder. The remainder and other
 //! quantities may jump with P3 (P4 does, because of the flow; the remainder, by the gain error of the transducer): regression gives that
-//! share, and what is left is smooth. Jumps are not smoothed.
+//! share, and the remainder is smooth. Jumps are not smoothed.
 
 use crate::averages::time_table::Table;
 use crate::channels::{DRIVERS, boundary_condition};
@@ -29,7 +29,7 @@ pub struct SmoothedInputs {
     pub command: LaggedCommand,
     /// Starts of the steps, s. Changes within a step by a speed-control loop are too small to interrupt an integration.
     jumps_s: Vec<f64>,
-    /// P3 less its command.
+    /// P3 minus its command.
     p3_remainder: Driver,
     /// Every other boundary condition by its channel.
     drivers: Vec<(Channel, Driver)>,

@@ -9,7 +9,7 @@ const ZERO_C_K: f64 = 273.15;
 /// The chapter; empty if nothing remains to be decided.
 pub(crate) fn next_text(diagnosis: &Diagnosis) -> String {
     let Some(next) = &diagnosis.next else { return String::new() };
-    let mut text = "\nwhat next\n".to_owned();
+    let mut text = "\nnext experiment\n".to_owned();
     match (next, diagnosis.experiments.first()) {
         (Next::Sensor { sensor, reason }, _) => {
             text += &format!("  {sensor}: {reason}\n");

@@ -24,7 +24,7 @@ pub const NOTHING: &str = "nothing beyond tolerance";
 /// Causes of the catalogue that the list does not contain.
 pub const UNLISTED: &str = "other causes of the catalogue";
 /// The answer that the cause is not in the library.
-pub const OUTSIDE: &str = "a cause outside the catalogue";
+pub const OUTSIDE: &str = "a cause outside the effect library";
 
 /// The page.
 pub fn gap_text(diagnosis: &Diagnosis) -> String {
@@ -41,7 +41,7 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
         }
     }
     if !diagnosis.r#where.is_empty() {
-        text += "\nwhere\n";
+        text += "\nlocation\n";
         for place in diagnosis.r#where.iter().take(PLACES) {
             let place = format!(
                 "  {}: {:.0} % of the gap, {:.0} sigma; largest in {}, {} after the jump, {}: {} {}",
@@ -64,7 +64,7 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
     if !diagnosis.smallest_seen.is_empty() {
         text += &list_smallest_detectable(&diagnosis.smallest_seen);
     }
-    text += "\nwhich\n";
+    text += "\ncauses\n";
     for candidate in diagnosis.listed().take(CAUSES) {
         let lines = wrapped(&cause(candidate), COLUMNS - 11, 0);
         let lines = lines.trim_end().replace('\n', "\n           ");
@@ -135,7 +135,7 @@ fn laws(diagnosis: &Diagnosis) -> String {
                 (low.min(*value), high.max(*value))
             });
         text += &format!(
-            "\nmissing\n  {}: {} .. {} over the steps\n",
+            "\nresidual source term\n  {}: {} .. {} over the steps\n",
             force.force,
             four_figures(low),
             with_unit(four_figures(high), &force.unit)
@@ -143,7 +143,7 @@ fn laws(diagnosis: &Diagnosis) -> String {
     }
     for law in &diagnosis.laws {
         text += &format!(
-            "\nlaw\n  {}\n  {}; {} on held-out steps\n",
+            "\nclosure term\n  {}\n  {}; {} on held-out steps\n",
             law.sentence,
             probability_text(law.probability),
             describe_removed_residual(law)
@@ -251,10 +251,10 @@ fn nearest(diagnosis: &Diagnosis) -> Option<String> {
     let first = diagnosis.candidates.first()?;
     match diagnosis.verdict {
         Verdict::PartlyExplained => Some(format!(
-            "nearest in the catalogue: {}, which leaves more than the declared tolerances",
+            "nearest in the effect library: {}, whose residual exceeds the declared tolerances",
             candidate_name(first)
         )),
-        Verdict::Unexplained => Some("no effect of the catalogue comes near".to_owned()),
+        Verdict::Unexplained => Some("no effect of the library comes near".to_owned()),
         Verdict::WithinTolerance | Verdict::Explained => None,
     }
 }
@@ -325,9 +325,9 @@ fn describe_gap_reduction(diagnosis: &Diagnosis) -> String {
     }
     let named = matches!(diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained);
     let mut text = match gap.folds.len() {
-        0 | 1 => "\nhow far, on the fitted steps; there are too few to hold any out\n".to_owned(),
+        0 | 1 => "\ngap reduction, on the fitted steps; there are too few to hold any out\n".to_owned(),
         folds => format!(
-            "\nhow far, each of {} steps by a fit that did not see it ({folds} folds)\n",
+            "\ngap reduction, on {} held-out steps ({folds}-fold cross-validation)\n",
             gap.held_out_steps.len()
         ),
     };
@@ -338,7 +338,7 @@ fn describe_gap_reduction(diagnosis: &Diagnosis) -> String {
         };
     } else if named && gap.worse.is_empty() {
         text += &format!(
-            "  {:.1} % of the gap removed; of steps like these {:.0} .. {:.0} %\n",
+            "  {:.1} % of the gap removed (95 % interval for similar steps: {:.0} .. {:.0} %)\n",
             100.0 * gap.shrink,
             (100.0 * gap.shrink_low).floor(),
             (100.0 * gap.shrink_high).ceil()
@@ -365,7 +365,7 @@ fn list_affected_points(diagnosis: &Diagnosis) -> String {
     };
     wrapped(
         &format!(
-            "  no law describes the cause: it may change the efficiency of every point; by the residual of T2, up to +/- {:.2} points (step {})",
+            "  no closure term describes the cause: it may change the efficiency of every point; by the residual of T2, up to +/- {:.2} points (step {})",
             100.0 * point.eta_residual,
             step_number(step)
         ),
@@ -392,10 +392,10 @@ const STANDS_IN: f64 = 0.5;
 fn describe_law_reduction(diagnosis: &Diagnosis, law: &Law, steps: usize) -> String {
     let seen = match law.held_out_steps {
         0 => "on the fitted steps; there are too few to hold any out".to_owned(),
-        held => format!("on {held} of {steps} steps, used neither to find the law nor to fit it"),
+        held => format!("on {held} of {steps} steps, used neither to find the closure term nor to fit it"),
     };
-    format!("\nhow far, {seen}\n  {}\n", describe_removed_residual(law))
-        + by_channel(diagnosis, &law.channels, "with the law", 3).as_str()
+    format!("\ngap reduction, {seen}\n  {}\n", describe_removed_residual(law))
+        + by_channel(diagnosis, &law.channels, "with the term", 3).as_str()
 }
 
 /// The residual of each channel in the first so many columns.
@@ -405,8 +405,8 @@ fn by_channel(
     with: &str,
     columns: usize,
 ) -> String {
-    let mut text = format!("  {:4}", "");
-    let bare = if diagnosis.since.is_some() { "as healthy" } else { "nominal" };
+    let mut text = "  rms residual\n      ".to_owned();
+    let bare = if diagnosis.since.is_some() { "reference" } else { "nominal" };
     for head in [bare, "tolerances fitted", with].iter().take(columns) {
         text += &format!(" {head:>18}");
     }

@@ -20,11 +20,11 @@ pub fn gap_warning_text(warning: &GapWarning) -> String {
             channel.unit()
         ),
         GapWarning::UncertainTimes { scatter_s } => format!(
-            "the times of the samples are off by {:.0} ms, as P3 shows where it jumps: readings that move count for as much less",
+            "the times of the samples are off by {:.0} ms, as P3 shows where it jumps: readings that change have accordingly less weight",
             1e3 * scatter_s
         ),
         GapWarning::HealthyRecording { warning } => {
-            format!("the healthy recording: {}", gap_warning_text(warning))
+            format!("the reference recording: {}", gap_warning_text(warning))
         }
         GapWarning::Drift { reason, subtracted: true } => {
             format!(

@@ -98,7 +98,7 @@ const EFFECTS: [(&str, &str); 31] = [
 
 /// Checks for a cause outside the library, by the part of the machine where it acts.
 const PLACES: [(&str, &str); 19] = [
-    ("actuator", "check the turbine inlet valve and its controller: set-point, position, pressure"),
+    ("actuator", "check the turbine inlet valve and its controller: setpoint, position, pressure"),
     ("turbine_flow", "check for leaks before the turbine, its vanes and the turbine flow meter"),
     ("shaft", "check the oil supply, the bearings, and whether another power is taken from the shaft"),
     (

@@ -44,7 +44,7 @@ pub fn thermal_text(thermal: &ThermalModel) -> String {
     if let Some(law) = &thermal.convection {
         let _ = writeln!(
             text,
-            "  the law holds from Re {:.0} to {:.0}; single points deviate by {:.1} %",
+            "  fitted from Re {:.0} to {:.0}; single points deviate by {:.1} %",
             law.reynolds_range.0,
             law.reynolds_range.1,
             100.0 * law.deviation_ratio

@@ -27,7 +27,7 @@ pub fn status_text(name: &str, status: &Status, queue: Option<&BTreeMap<String, 
     }
     if let Some(states) = queue {
         let states: Vec<String> = states.iter().map(|(state, count)| format!("{count} {state}")).collect();
-        let states = if states.is_empty() { "no task any more".to_owned() } else { states.join(", ") };
+        let states = if states.is_empty() { "no tasks left".to_owned() } else { states.join(", ") };
         let _ = writeln!(text, "the queue has {states}");
     }
     text + lacking_text(status, |item| item.why.is_some()).as_str()
@@ -36,7 +36,7 @@ pub fn status_text(name: &str, status: &Status, queue: Option<&BTreeMap<String, 
 /// Every item without a result, and the files that were left out.
 fn lacking_text(status: &Status, shown: impl Fn(&UnfinishedItem) -> bool) -> String {
     let mut text = String::new();
-    for (items, state) in [(&status.failed, "failed"), (&status.refused, "invalid, its part")] {
+    for (items, state) in [(&status.failed, "failed"), (&status.refused, "invalid part")] {
         list(&mut text, items, |item| {
             format!("{state}: {} ({}): {}", item.name, item.hash.short(), item.why.as_deref().unwrap_or("-"))
         });
@@ -106,7 +106,7 @@ pub fn cost_text(cost: &Cost) -> String {
 /// Job numbers, tasks, limits.
 pub fn submission_text(submission: &Submission) -> String {
     let merge = match (&submission.merge, &submission.merge_refused) {
-        (Some(id), _) => format!(", merge behind it: job {id}"),
+        (Some(id), _) => format!(", then the merge: job {id}"),
         (None, Some(why)) => format!(
             "\nthe queue refused the merge job: {}\nrun `mapper fleet merge` when the tasks have ended",
             why.lines().next_back().unwrap_or("no reason given")

@@ -1,6 +1,7 @@
 //! The cause of a deviation on one side of a machine, for a terminal and a report.
 
-use crate::formatting::table;
+use crate::formatting::table::{self, COLUMNS};
+use crate::formatting::wrapped::wrapped;
 use mapper_core::probability_text;
 use mapper_diagnose::driven::cause_search::{Beyond, Cause, Diagnosis, HeldOut, SideVerdict};
 use std::fmt::Write;
@@ -10,17 +11,18 @@ const FURTHER_ROWS: usize = 3;
 /// Causes less likely than this are not shown.
 const NOT_WORTH: f64 = 0.005;
 
-/// The verdict, the causes, the residual that no fit examined, the question and its limits.
+/// The verdict, the causes, the held-out residual, and what was and could not be tested.
 pub fn why_text(diagnosis: &Diagnosis) -> String {
     let first = diagnosis.judged.first().copied().unwrap_or("");
     // Writing to a String cannot fail.
     let mut text = format!(
-        "Why: the {} side against the campaign's machine, driven by measured {}; judged: {}.\n\n",
+        "The {} side compared with the campaign's machine, driven by measured {}; judged: {}.\n\n",
         diagnosis.side.name(),
         diagnosis.driven_by.join(", "),
         diagnosis.judged.join(", ")
     );
-    let _ = writeln!(text, "{}\n", headline(diagnosis));
+    text += &wrapped(&headline(diagnosis), COLUMNS, 2);
+    text.push('\n');
     causes(&mut text, diagnosis);
     let _ = writeln!(
         text,
@@ -34,7 +36,7 @@ pub fn why_text(diagnosis: &Diagnosis) -> String {
     if let Some(beyond) = &diagnosis.beyond {
         let _ = writeln!(
             text,
-            "behind    {}\n          {}",
+            "predicted {}\n          {}",
             describe_delay(beyond),
             verdict(beyond, diagnosis.word)
         );
@@ -53,13 +55,17 @@ pub fn why_text(diagnosis: &Diagnosis) -> String {
             .iter()
             .filter_map(|seen| Some(format!("{} {}", seen.effect, seen.size.as_deref()?)));
         let sizes = sizes.collect::<Vec<_>>().join(", ");
-        let _ = writeln!(
-            text,
-            "\nAsked, with the smallest size that a log like this one shows in 95 of 100: {sizes}."
+        text.push('\n');
+        text += &wrapped(
+            &format!(
+                "Tested, with the smallest size that is detected in 95 of 100 logs like this one: {sizes}."
+            ),
+            COLUMNS,
+            2,
         );
     }
     if !diagnosis.not_asked.is_empty() {
-        text.push_str("\nNot asked, for this side cannot say:\n");
+        text.push_str("\nNot testable on this side:\n");
         let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
         for effect in &diagnosis.not_asked {
             match reasons.iter_mut().find(|(reason, _)| *reason == effect.reason) {
@@ -68,7 +74,7 @@ pub fn why_text(diagnosis: &Diagnosis) -> String {
             }
         }
         for (reason, effects) in reasons {
-            let _ = writeln!(text, "  {}: {reason}", effects.join(", "));
+            text += &wrapped(&format!("  {}: {reason}", effects.join(", ")), COLUMNS, 4);
         }
     }
     text
@@ -95,7 +101,7 @@ fn headline(diagnosis: &Diagnosis) -> String {
             probability_text(diagnosis.probability_none)
         ),
         SideVerdict::Outside => format!(
-            "Nothing of the catalogue explains it: something outside it acts here ({}). The residual of the nearest cause is below.",
+            "No effect of the library explains it: the cause is unmodelled ({}). The residual of the nearest effect is below.",
             probability_text(diagnosis.probability_outside)
         ),
     }
@@ -113,7 +119,7 @@ fn causes(text: &mut String, diagnosis: &Diagnosis) {
             || *place == 0
             || (*place < diagnosis.open + FURTHER_ROWS && cause.probability > NOT_WORTH)
     };
-    let heads = ["cause", "probability", "size", "95 % interval", "left, K"];
+    let heads = ["cause", "probability", "size", "95 % interval", "residual, K"];
     let mut rows = table::with_heads(&heads).with_texts(2..4);
     for (_, cause) in diagnosis.causes.iter().enumerate().filter(shown) {
         let each = |of: &dyn Fn(&mapper_diagnose::gap::findings::report::Estimate) -> String| {
@@ -147,7 +153,7 @@ fn causes(text: &mut String, diagnosis: &Diagnosis) {
         .any(|cause| !cause.at_the_end.is_empty())
     {
         text.push_str(
-            "A value at the end of its range exceeds the possible size of such an effect: the true cause is probably not in the catalogue.\n\n",
+            "A value at the end of its range exceeds the possible size of such an effect: the true cause is probably not in the effect library.\n\n",
         );
     }
 }
@@ -164,8 +170,8 @@ fn significant(value: f64) -> String {
 fn phases(text: &mut String, held_out: &HeldOut, channel: &str) {
     let _ = writeln!(
         text,
-        "held out  {channel} of each phase by fits to the others: {:.2} K rms without a cause, {:.2} K with what these choose;\n          \
-         taken off a phase: {:.2} K on average ({:.2} .. {:.2}, {} phases)",
+        "held out  {channel} of each phase, predicted by fits to the others: {:.2} K rms without a cause,\n          \
+         {:.2} K with the cause that they choose; {:.2} K less on average ({:.2} .. {:.2}, {} phases)",
         held_out.before_k,
         held_out.after_k,
         held_out.shrink_k,
@@ -175,11 +181,9 @@ fn phases(text: &mut String, held_out: &HeldOut, channel: &str) {
     );
     let named = held_out.phases.iter().any(|phase| !phase.chosen.is_empty());
     if named && held_out.after_k >= held_out.before_k {
-        text.push_str(
-            "          no shrink is claimed: on phases that it did not see the cause does not help\n",
-        );
+        text.push_str("          the cause does not reduce the residual of held-out phases\n");
     } else if named && held_out.shrink_low_k <= 0.0 {
-        text.push_str("          so few phases do not show by themselves that it is more than chance\n");
+        text.push_str("          too few phases to exclude chance\n");
     }
     for phase in &held_out.phases {
         let chosen =
@@ -200,7 +204,7 @@ fn phases(text: &mut String, held_out: &HeldOut, channel: &str) {
 fn describe_delay(beyond: &Beyond) -> String {
     format!(
         "{:.1} to {:.1} s, {} readings that were not fitted: {:.2} K rms without a cause, {:.2} K with; expected {:.2} K ({:.2} .. {:.2});\n          \
-         intervals hold {:.0} % of the readings",
+         intervals contain {:.0} % of the readings",
         beyond.from_s,
         beyond.until_s,
         beyond.rows,

@@ -36,7 +36,7 @@ pub fn plan_remark_text(remark: &PlanRemark) -> String {
         PlanRemark::RestsOnDeclaration { eta_error, max_eta_error } => format!(
             "no expected error is stated, and the points will be doubtful (`rests_on_declaration`): these steps determine the efficiencies \
              only to {:.1} points if alpha_A, probe and heating/cooling ratio have to be found, and {:.2} are needed; lengthen the \
-             dwell, add points, or hold what is known (`identification.joint`)",
+             dwell, add points, or set known ones to `fixed` in `identification.joint`",
             100.0 * eta_error,
             100.0 * max_eta_error
         ),
@@ -48,7 +48,7 @@ pub fn plan_remark_text(remark: &PlanRemark) -> String {
         ),
         PlanRemark::SurgeSearch { lines, closest_margin_ratio, steps, duration_s } => format!(
             "a search for surge follows at the ends of {lines} speed lines, no nearer than a margin of {:.1} %: about {steps} steps, \
-             {:.0} min, counted in",
+             {:.0} min, included in the rig time",
             100.0 * closest_margin_ratio,
             duration_s / 60.0
         ),
@@ -58,7 +58,7 @@ pub fn plan_remark_text(remark: &PlanRemark) -> String {
         }
         PlanRemark::OffsetsAfterSoak { soak_s, offset_sigmas, longer_soak_s, longer_offset_sigmas } => {
             let left = format!(
-                "the soak of {:.0} min leaves of the offsets (one standard deviation): {}",
+                "offsets that remain after the soak of {:.0} min (one standard deviation): {}",
                 soak_s / 60.0,
                 list_sigmas(offset_sigmas)
             );
@@ -66,7 +66,7 @@ pub fn plan_remark_text(remark: &PlanRemark) -> String {
                 true => left,
                 false => {
                     format!(
-                        "{left}; {:.0} min would leave {}",
+                        "{left}; after {:.0} min: {}",
                         longer_soak_s / 60.0,
                         list_sigmas(longer_offset_sigmas)
                     )
@@ -112,9 +112,9 @@ fn list_sigmas(sigmas: &BTreeMap<Channel, f64>) -> String {
 pub(crate) fn no_bound_text(reason: NoBound) -> &'static str {
     match reason {
         NoBound::OrderNotSearched => "the order was not searched for",
-        NoBound::AppendedJump => "none: a jump was put behind the points",
+        NoBound::AppendedJump => "none: a jump was appended to the points",
         NoBound::TooLarge => {
-            "none: more points than its table takes, or a housing whose states stay within no box"
+            "none: too many points for its table, or the states of the housing are unbounded"
         }
     }
 }

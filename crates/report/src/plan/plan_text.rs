@@ -112,7 +112,7 @@ fn summary(campaign: &Campaign, plan: &Plan, soak_s: f64) -> String {
     });
     let reported = figures.rms_error_reported_eta.map(|error| {
         format!(
-            "the intervals will state {} rms, because they also contain other values of alpha_A, probe and heating/cooling ratio",
+            "the intervals will state {} rms, because they also cover the uncertainty of alpha_A, probe and heating/cooling ratio",
             percent(Some(error), 2)
         )
     });
@@ -123,10 +123,13 @@ fn summary(campaign: &Campaign, plan: &Plan, soak_s: f64) -> String {
     lines.extend(plan.bound_remark.iter().map(|reason| ("bound", no_bound_text(*reason).to_owned())));
     lines.extend(plan.remarks.iter().map(|remark| ("note", plan_remark_text(remark))));
     if !campaign.machine.assumed.is_empty() {
-        let count = campaign.machine.assumed.len();
+        let sizes = match campaign.machine.assumed.len() {
+            1 => "1 size".to_owned(),
+            count => format!("{count} sizes"),
+        };
         lines.push((
             "assumed",
-            format!("{count} sizes of the machine, from its wheel: `mapper check` lists them"),
+            format!("{sizes} of the machine, scaled from its wheel; `mapper check` gives the values"),
         ));
     }
     let made_from = &plan.made_from;

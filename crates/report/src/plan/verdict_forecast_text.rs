@@ -3,12 +3,18 @@
 use crate::formatting::duration::duration;
 use crate::formatting::table::COLUMNS;
 use crate::formatting::wrapped::wrapped;
-use mapper_core::{Advice, CampaignChange, UndeclaredForecast, VerdictForecast, half_width_95};
+use mapper_campaign::Campaign;
+use mapper_core::{Advice, CampaignChange, Channel, UndeclaredForecast, VerdictForecast, half_width_95};
 
 /// The expected verdicts in a line, and below it a line for each change that improves them; empty without a forecast.
-pub fn verdict_forecast_text(forecast: Option<VerdictForecast>, advice: &[Advice]) -> String {
+pub fn verdict_forecast_text(
+    campaign: &Campaign,
+    forecast: Option<VerdictForecast>,
+    advice: &[Advice],
+) -> String {
     let Some(forecast) = forecast else { return String::new() };
-    let mut text = format!("Expected if the machine is as declared: {}\n", verdicts(&forecast));
+    let declared = format!("Expected if the machine is as declared: {}", verdicts(&forecast));
+    let mut text = wrapped(&declared, COLUMNS, 2);
     if let Some(UndeclaredForecast { good, eta_standard_error }) = forecast.undeclared {
         let error = points_95(eta_standard_error);
         let rare = format!(
@@ -17,12 +23,18 @@ pub fn verdict_forecast_text(forecast: Option<VerdictForecast>, advice: &[Advice
         );
         text += &wrapped(&rare, COLUMNS, 2);
     }
+    let is_measured = |channel| campaign.sensors.contains_key(&channel);
+    if campaign.report.humidity_ratio.is_none()
+        && ![Channel::RelativeHumidity, Channel::DewPoint].into_iter().any(is_measured)
+    {
+        text += "  plus the unknown humidity: write `report: {humidity: 50 %}`, or record `RH`\n";
+    }
     if forecast.near_limit {
         text += &near_limit_text(&forecast);
     }
     if forecast.good_low < forecast.points && advice.is_empty() {
-        text += "Neither a longer dwell nor a longer soak makes more of them good; add points, or hold what is known\n\
-                 (`identification.joint`).\n";
+        text += "Neither a longer dwell nor a longer soak makes more of them good; add points, or set known\n\
+                 parameters to `fixed` in `identification.joint`.\n";
     }
     for Advice { change, forecast: after } in advice {
         let additional_time = duration(after.duration_s - forecast.duration_s);

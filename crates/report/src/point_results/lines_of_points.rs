@@ -77,11 +77,12 @@ pub fn points_by_line_text(
         add(name, scored);
     }
     let rendered = table.to_string();
-    let mut text = format!(
-        "Points by corrected speed in {}, corrected flow in {}, h in W/(m2 K).\n",
+    let legend = format!(
+        "Points by corrected speed in {} and opening of the back-pressure valve, corrected flow in {}, h in W/(m2 K).",
         display.units().speed,
         display.units().flow
     );
+    let mut text = wrapped(&legend, COLUMNS, 2);
     if let Some(map) = map {
         let definition = map.efficiency.map(|definition| format!("; eta: {}", definition.description()));
         let gas = map.gas.as_ref().map(|gas| format!("; gas: {gas}"));

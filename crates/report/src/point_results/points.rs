@@ -49,8 +49,8 @@ pub fn truth_text(points: &[ScoredPoint]) -> Option<String> {
 pub fn score_text(score: &ScoreSummary) -> String {
     let mut text = format!(
         "Against the simulator's truth ({} points): median error of efficiency {:.2} points, {:.2} at worst, {:.0} % \
-         within 1 point; the 95 % interval contains the truth at {:.0} % (points share the offsets of their sensors: their \
-         intervals hold together or miss together).\n",
+         within 1 point; the 95 % interval contains the truth at {:.0} % (points share the offsets of their sensors, so \
+         that their intervals are right or wrong together).\n",
         score.points,
         100.0 * score.eta_median_error,
         100.0 * score.eta_worst_error,

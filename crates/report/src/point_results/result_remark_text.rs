@@ -39,9 +39,8 @@ pub fn result_remark_text(remark: &ResultRemark) -> String {
             probability_text(*probability)
         ),
         ResultRemark::WidenedByGap { causes, largest_sigma } => format!(
-            "the rig departs from its model, and the cause is not certain ({}): the efficiencies are not corrected, and every interval is \
-             wider by what the cause may change, up to +/- {:.1} points",
-            if causes.is_empty() { "none of the catalogue".to_owned() } else { causes.join(" or ") },
+            "the rig departs from its model, and the cause is not certain ({}): the efficiencies are not corrected, and every interval is widened by the possible effect of the cause, up to +/- {:.1} points",
+            if causes.is_empty() { "not in the effect library".to_owned() } else { causes.join(" or ") },
             100.0 * half_width_95(*largest_sigma)
         ),
         ResultRemark::DriftSubtracted { reason } => format!("the drift of a sensor was subtracted: {reason}"),

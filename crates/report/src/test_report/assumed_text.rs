@@ -23,7 +23,7 @@ fn sentence_with(campaign: &Campaign, name: fn(&AssumedSize) -> &str) -> Option<
     let sigma_ratio = internal_area_sigma_ratio(sizes);
     let widened = if sigma_ratio > 0.0 {
         format!(
-            "; the intervals of h contain {:.0} % for the internal area of the compressor",
+            "; the intervals of h include an uncertainty of {:.0} % (1 sigma) of the internal area of the compressor",
             100.0 * sigma_ratio
         )
     } else {

@@ -383,8 +383,8 @@ fn points_section(text: &mut String, units: &DisplayUnits, report: &RunReport<'_
     let display = Display::new(units);
     let points = || report.points.iter().map(|scored| &scored.point);
     text.push_str(
-        "## Points by speed line\n\nIntervals are 95 %: noise, declared sensor offsets, and what moving flow is estimated to cost \
-         the method. T2, P2 and T3 are means over the last 2 s of the step, when the gas is settled and the housing is not.\n\n",
+        "## Points by speed line\n\nIntervals are 95 %: noise, declared sensor offsets, and the estimated error of the method while \
+         the flow changes. T2, P2 and T3 are means over the last 2 s of the step, when the gas has settled and the housing has not.\n\n",
     );
     if let Some(shared) = shared_errors_text(points(), units) {
         let _ = writeln!(text, "{shared}\n");

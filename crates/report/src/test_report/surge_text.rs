@@ -50,7 +50,7 @@ pub fn surge_heads(marks: &[ScoredMark], display: &Display) -> Vec<String> {
         "found by".to_owned(),
     ];
     if with_truth(marks) {
-        heads.push("off the truth, %".to_owned());
+        heads.push("error, %".to_owned());
     }
     heads
 }
@@ -73,17 +73,17 @@ pub fn surge_columns_text(
         .map(str::to_owned)
         .to_vec();
     if with_truth(marks) {
-        heads.push("off %".to_owned());
+        heads.push("error %".to_owned());
     }
     let mut table = with_heads(&heads);
     for row in surge_rows(marks, &display) {
         table.add_row(row);
     }
-    let words = "Surge-side ends that were sought: corrected speed and flow, half widths of 95 % intervals, how far above it the \
-                 nearest point was, openings that were tried.";
+    let words = "Surge-side ends of the lines: corrected speed and flow, half widths of 95 % intervals, distance of the nearest \
+                 point above in flow, number of openings tried.";
     let mut text = format!("{}\n{table}\n\n", wrapped(words, COLUMNS, 0));
     if with_truth(marks) {
-        text.push_str("off: from the simulator's truth.\n");
+        text.push_str("error: difference from the simulator's truth.\n");
     }
     for remark in surge_remarks(remarks, surges) {
         text.push_str(&wrapped(&remark, COLUMNS, 2));
@@ -119,7 +119,7 @@ pub fn surge_rows(marks: &[ScoredMark], display: &Display) -> Vec<Vec<String>> {
 
 fn times(surges: usize) -> String {
     match surges {
-        0 => "The compressor did not go into surge on the way.".to_owned(),
+        0 => "The compressor did not go into surge during the approach.".to_owned(),
         1 => "The compressor went into surge once during the approach; the valve opened immediately."
             .to_owned(),
         more => format!(

@@ -8,7 +8,7 @@ use mapper_physics::simulation::model::Model;
 use mapper_report::warning_text;
 use std::path::Path;
 
-/// Concerns about the calibrations on the day of a run; grave if the campaign requires them.
+/// Concerns about the calibrations on the day of a run; errors if the campaign requires them.
 pub(crate) fn calibration_concerns(campaign: &Campaign, model: &Model, day: Option<Date>) -> Vec<Concern> {
     let warnings = forecast_calibration_warnings(campaign, model, day).into_iter();
     let concern = warnings.map(|one| Concern {

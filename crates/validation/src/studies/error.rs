@@ -21,7 +21,7 @@ pub enum StudyError {
     #[error("the item has no file {0}")]
     File(String),
     /// A cause that the program does not know.
-    #[error("no effect `{0}` is in the catalogue")]
+    #[error("the effect library has no effect `{0}`")]
     Cause(String),
     /// A part or an item has the wrong content for its kind.
     #[error("{name} has the wrong content: {source}")]

@@ -48,7 +48,7 @@ struct Arguments {
     /// Serve readings as AK telegrams at this address, e.g. 127.0.0.1:8888 (read only)
     #[arg(long, value_name = "ADDRESS")]
     ak: Option<SocketAddr>,
-    /// Print a line for each speed read and each set-point written over OPC UA: `SECONDS read RPM`, `SECONDS write NAME`. Times are on this
+    /// Print a line for each speed read and each setpoint written over OPC UA: `SECONDS read RPM`, `SECONDS write NAME`. Times are on this
     /// computer's monotonic clock, after decryption, so that latency can be measured in an encrypted session
     #[arg(long, requires = "opcua")]
     stamps: bool,

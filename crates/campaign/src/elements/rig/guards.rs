@@ -180,7 +180,7 @@ struct SignalsFile {
     /// The run ends if a guarded signal has no good reading for this time; 3 s if none is given.
     #[schemars(extend("x-above" = "0 s", "x-max" = "10 s"), example = &"3 s")]
     age: Option<Quantity<Duration>>,
-    /// N, P2 and T2 count as frozen if they have not changed by a bit for this time after a jump of the setpoints; 20 s if none is given.
+    /// N, P2 and T2 count as frozen if their readings stay constant for this time after a jump of the setpoints; 20 s if none is given.
     #[schemars(extend("x-min" = "2 s", "x-max" = "10 min"), example = &"20 s")]
     frozen: Option<Quantity<Duration>>,
 }

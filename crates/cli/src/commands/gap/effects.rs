@@ -35,20 +35,20 @@ impl Effects {
             let list: Vec<_> = effects.iter().map(|effect| effect.info().clone()).collect();
             return standard_output::print_json(&json!({ "effects": list }));
         }
-        let heads = ["effect", "where", "parameter", "unit", "neutral", "range"];
+        let heads = ["effect", "part", "unit", "neutral", "range"];
         let mut table = with_heads(&heads);
         let mut legend = String::new();
         for effect in &effects {
             let info = effect.info();
             legend += &format!("{}: {}\n", info.id, info.description);
             for parameter in &info.parameters {
+                let name = if parameter.name == info.id { "" } else { &*parameter.name };
                 table.add_row([
-                    info.id.to_string(),
+                    format!("{} {name}", info.id).trim_end().to_owned(),
                     info.submodel.name().to_owned(),
-                    parameter.name.to_string(),
                     if parameter.unit == "1" { "-".to_owned() } else { parameter.unit.to_string() },
                     parameter.neutral.to_string(),
-                    format!("{}..{}", parameter.low, parameter.high),
+                    format!("{} .. {}", parameter.low, parameter.high),
                 ]);
             }
         }

@@ -78,7 +78,7 @@ fn declared_error(declared: &Declared, channel: Channel, reading: f64) -> f64 {
 }
 
 /// Knot distance of slow variations, s. Judgement: several steps of a minute, so that variations explain no single step, and a fraction of the
-/// hour for which turbine housings remember.
+/// hour in which turbine housings settle.
 const KNOT_S: f64 = 480.0;
 /// Slow variation of the air around the housings, which is seldom recorded, one standard deviation, K: air conditioning that cycles by 2 K from
 /// peak to peak.

@@ -472,7 +472,7 @@ impl Diagnosis {
             .collect();
         match self.verdict {
             Verdict::PartlyExplained | Verdict::Unexplained => Some(format!(
-                "a cause outside the catalogue is the most probable ({}), and its effect is not included",
+                "a cause outside the effect library is the most probable ({}), and its effect is not included",
                 probability_text(self.probability_outside)
             )),
             Verdict::Explained if !others.is_empty() => {

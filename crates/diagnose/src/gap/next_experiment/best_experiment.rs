@@ -181,7 +181,7 @@ pub fn sensor_near(places: &[Place]) -> Next {
     Next::Sensor {
         sensor: sensor.to_owned(),
         reason: format!(
-            "no effect of the catalogue explains the whole gap, and {lies}: write a suspected effect in rhai and give it with --effect, or add this sensor"
+            "no effect of the library explains the whole gap, and {lies}: write a suspected effect in rhai and give it with --effect, or add this sensor"
         ),
     }
 }

@@ -24,8 +24,8 @@ const FLOW_KG_S: f64 = 0.06;
 /// Pressure scale, Pa.
 const PRESSURE_PA: f64 = 1e5;
 
-/// Powers of the speed, and the words that follow "growing with the speed".
-const GROWTHS: [(f64, &str); 3] = [(1.0, ""), (2.0, "'s square"), (3.0, "'s cube")];
+/// Powers of the speed, and the words that follow "growing with the".
+const GROWTHS: [(f64, &str); 3] = [(1.0, "speed"), (2.0, "square of the speed"), (3.0, "cube of the speed")];
 
 /// All terms.
 pub fn library() -> Vec<Term> {
@@ -51,7 +51,7 @@ fn add_housings(all: &mut Vec<Term>) {
         let radiation = times(STEFAN_BOLTZMANN_W_M2K4, fourth_powers(Ambient, metal));
         add(radiation, "m2", 0.05, "radiation over {} between <place> and the cell");
         for (exponent, growing) in GROWTHS {
-            let words = format!("{{}} at 100 krpm, growing with the speed{growing}, to <place>");
+            let words = format!("{{}} at 100 krpm, growing with the {growing}, to <place>");
             add(power(Speed, SPEED_RAD_S, exponent), "W", 50.0, &words);
         }
         add(power(Flow, FLOW_KG_S, 1.0), "W", 50.0, "{} at 60 g/s, growing with the flow, to <place>");
@@ -78,9 +78,9 @@ fn add_shaft(all: &mut Vec<Term>) {
     for (formula, step, words) in [
         (Number(-1.0), 0.01, "a constant torque of {} against the shaft"),
         (speed(1.0), 0.01, "a torque of {} at 100 krpm, growing with the speed"),
-        (speed(2.0), 0.01, "a torque of {} at 100 krpm, growing with the speed's square"),
+        (speed(2.0), 0.01, "a torque of {} at 100 krpm, growing with the square of the speed"),
         (speed(-1.0), 0.01, "a torque of {} at 100 krpm, a constant power"),
-        (oil, 0.03, "a torque of {} at 100 krpm for each 100 K of the oil"),
+        (oil, 0.03, "a torque of {} at 100 krpm for each 100 K that the oil is above 50 degC"),
         (per_bar(1.0, P3, P4), 0.01, "a torque of {} for each bar across the turbine"),
         (per_bar(1.0, P2, P1), 0.01, "a torque of {} for each bar across the compressor"),
     ] {
@@ -92,10 +92,13 @@ fn add_outlet(all: &mut Vec<Term>) {
     let root = Expression::Power(Box::new(per_bar(1.0, P2, P1)), 0.5);
     let choked = times(-1.0, power(P2, PRESSURE_PA, 1.0));
     for (formula, words) in [
-        (Number(-1.0), "a constant loss of {} behind the compressor"),
-        (per_bar(-1.0, P2, P1), "a leak of {} for each bar behind the compressor"),
-        (times(-1.0, root), "a leak of {} at one bar behind the compressor, with its root"),
-        (choked, "a choked leak of {} for each bar behind the compressor"),
+        (Number(-1.0), "a constant leak of {} after the compressor"),
+        (per_bar(-1.0, P2, P1), "a leak of {} after the compressor for each bar of P2 - P1"),
+        (
+            times(-1.0, root),
+            "a leak of {} after the compressor at P2 - P1 of one bar, growing with the square root of P2 - P1",
+        ),
+        (choked, "a choked leak of {} after the compressor for each bar of P2"),
     ] {
         all.push(term(Balance::Outlet, formula, "kg/s", 1e-3, words));
     }
@@ -111,7 +114,7 @@ fn add_gas(all: &mut Vec<Term>) {
             add(minus(Of(other), Value), "W/K", 0.5, &words);
         }
         for (exponent, growing) in &GROWTHS[1..] {
-            let words = format!("{{}} at 100 krpm, growing with the speed{growing}, to <place>");
+            let words = format!("{{}} at 100 krpm, growing with the {growing}, to <place>");
             add(power(Speed, SPEED_RAD_S, *exponent), "W", 50.0, &words);
         }
         // A housing loses the heat that the gas gains.

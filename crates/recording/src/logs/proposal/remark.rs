@@ -95,7 +95,7 @@ impl fmt::Display for ProposalRemark {
                 write!(f, "the log gives no unit; only {unit} is plausible")
             }
             Remark::OneUnitFits { unit, columns } => {
-                write!(f, "the log gives no unit; only in {unit} all {columns} columns of the kind are plausible")
+                write!(f, "the log gives no unit; only in {unit} all {columns} columns of this kind are plausible")
             }
             Remark::NoUnitFits { min, max } => write!(
                 f,

@@ -19,7 +19,7 @@ pub(crate) fn sentence_of(warning: &Warning) -> Option<Sentence> {
         Warning::NoiseDominates(interval) => describe_wide_interval(interval, false),
         Warning::RestsOnDeclaration { eta_error } => sentence!(
             "the recording alone determines the efficiencies only to {} points; the remainder depends on the declared alpha_A, probe and \
-                 heating/cooling ratio: record longer steps or larger gradients, or hold fixed what is known (`identification.joint`)",
+                 heating/cooling ratio: record longer steps or larger gradients, or set known ones to `fixed` in `identification.joint`",
             number(100.0 * eta_error, 1)
         ),
         Warning::AssumedAlpha { alpha_area_ratio, alpha_area_sigma_ratio, eta_sigma } => sentence!(
@@ -76,9 +76,9 @@ fn describe_wide_interval(interval: &WideInterval, from_offsets: bool) -> Senten
     }
     .then(match (from_offsets, signal) {
         (true, EtaSignal::Transient { shared: true, .. }) => sentence!(
-            ": begin with a `zero`; after one, hold fixed what is known (`identification.joint`), or declare less"
+            ": begin with a `zero`; after one, set known parameters to `fixed` in `identification.joint`, or calibrate and declare smaller offsets"
         ),
-        (true, _) => sentence!(": begin with a `zero`, or calibrate and declare less"),
+        (true, _) => sentence!(": begin with a `zero`, or calibrate and declare smaller offsets"),
         (false, EtaSignal::Transient { .. }) => {
             sentence!(": longer dwell, or come to this point by a larger jump")
         }

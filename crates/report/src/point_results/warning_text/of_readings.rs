@@ -27,8 +27,7 @@ pub(crate) fn sentence_of(warning: &Warning) -> Option<Sentence> {
             number(*duration_s, 0)
         ),
         Warning::NoisyChannel { channel, noise, declared_noise } => sentence!(
-            "{} scatters by {} from sample to sample (one standard deviation), and {} is declared: repair the channel, or declare the \
-                 noise that it has",
+            "{} scatters by {} from sample to sample (one standard deviation), but {} is declared: repair the channel, or declare its noise",
             *channel,
             with_unit(four_figures(*noise), channel.unit()),
             with_unit(four_figures(*declared_noise), channel.unit())
@@ -36,7 +35,7 @@ pub(crate) fn sentence_of(warning: &Warning) -> Option<Sentence> {
         Warning::ScaledChannel(evidence) => describe_scaled_sensor(evidence),
         Warning::SwappedChannels(evidence) => describe_swapped_sensors(evidence),
         Warning::LateChannel { channel, lag_s, jumps } => sentence!(
-            "{} moves {}{} the other channels at the jumps (all {} together): its clock or filter is another; correct its times",
+            "{} moves {}{} the other channels at the jumps (all {} together): its clock or filter differs; correct its times",
             *channel,
             number(lag_s.abs(), 1),
             if *lag_s > 0.0 { " s after" } else { " s before" },
@@ -100,8 +99,7 @@ fn calibration(channel: Channel, sensor: &str, defect: &CalibrationDefect) -> Se
 fn describe_scaled_sensor(evidence: &Scaled) -> Sentence {
     match evidence {
         Scaled::SpecificSpeed { speed_rpm, flow_kg_s, pressure_ratio, specific_speed } => sentence!(
-            "N, m_c and P2/P1 do not match: {} krpm, {} g/s and a pressure ratio of {} (medians) make a specific speed of {}, and radial \
-                 compressors have 0.3 to 2: check the units of N (rpm, not 1/s) and m_c, and that P1 and P2 are absolute",
+            "N, m_c and P2/P1 do not match: {} krpm, {} g/s and a pressure ratio of {} (medians) make a specific speed of {}; radial compressors have 0.3 to 2: check the units of N (rpm, not 1/s) and m_c, and that P1 and P2 are absolute",
             number(speed_rpm / 1e3, 4),
             number(flow_kg_s * 1e3, 4),
             number(*pressure_ratio, 3),
@@ -110,7 +108,7 @@ fn describe_scaled_sensor(evidence: &Scaled) -> Sentence {
         Scaled::ApparentEfficiency { rise_k, t1_k, pressure_ratio, isentropic_rise_k, efficiency } => {
             sentence!(
                 "T2 - T1 is {} K; compression from {} K by a pressure ratio of {} takes {} K without losses (medians). This is an \
-                     apparent efficiency of {}, and compressors have 0.3 to 0.85: T1, T2, P1 or P2 is scaled, exchanged or in another unit",
+                     apparent efficiency of {}; compressors have 0.3 to 0.85: T1, T2, P1 or P2 is scaled, exchanged or in another unit",
                 number(*rise_k, 1),
                 number(*t1_k, 1),
                 number(*pressure_ratio, 3),
@@ -119,7 +117,7 @@ fn describe_scaled_sensor(evidence: &Scaled) -> Sentence {
             )
         }
         Scaled::SomePoints => sentence!(
-            "no compressor makes this T2 - T1 of the pressure ratio (apparent efficiency outside 0.2 to 1.6): T1, T2, P1 or P2 failed there"
+            "no compressor has this T2 - T1 at this pressure ratio (apparent efficiency outside 0.2 to 1.6): T1, T2, P1 or P2 failed there"
         ),
         Scaled::ShaftPower { compressor_w, turbine_w, power_ratio } => sentence!(
             "the compressor takes {} kW and the exhaust gas gives {} kW (medians; the ratio is {}, usually 0.5 to 1): m_c, T1 or T2, or \
@@ -142,11 +140,11 @@ fn describe_swapped_sensors(evidence: &Swapped) -> Sentence {
             number(p1_pa / 1e3, 1)
         ),
         Swapped::T2AboveT3 => sentence!(
-            "T2 is hotter at most points than T3 and than the pressure ratio makes the gas: the channels are exchanged; correct the \
+            "at most points T2 is above T3 and above the temperature that the pressure ratio can produce: the channels are exchanged; correct the \
                  channel map"
         ),
         Swapped::TcBeforeT2 { tc_jump_k, t2_jump_k } => sentence!(
-            "Tc changes by {} K within some seconds of a jump and T2 by {} K (medians), and no housing is faster than its gas: the \
+            "Tc changes by {} K within some seconds of a jump and T2 by {} K (medians), but no housing is faster than its gas: the \
                  channels are exchanged; correct the channel map",
             number(*tc_jump_k, 1),
             number(*t2_jump_k, 1)

@@ -27,7 +27,7 @@ pub(crate) fn sentence_of(warning: &Warning) -> Option<Sentence> {
         ),
         Warning::NotStabilised { quantity, settled_s, needed_s, used_s } => {
             let varies = sentence!(
-                "the {} still varies beyond its limit {} s before the step's end (needed: {} s)",
+                "the {} still varies beyond its limit {} s before the step's end; it must settle {} s before the end: a longer dwell",
                 quantity.clone(),
                 number(*settled_s, 0),
                 number(*needed_s, 0)
@@ -130,11 +130,11 @@ fn no_compression(reason: &NoCompression) -> Sentence {
 fn poor_fit(evidence: &PoorFit) -> Sentence {
     match evidence {
         PoorFit::Eta { eta } => sentence!(
-            "the fitted efficiency is {}, which no compressor has: something outside the model has an influence",
+            "the fitted efficiency is {}, which no compressor has: an unmodelled effect acts",
             number(*eta, 3)
         ),
         PoorFit::NoiseRatio { residual_ratio } => sentence!(
-            "the residual of T2 is {} times the declared noise: something disturbed it, or more noise is to be declared",
+            "the residual of T2 is {} times the declared noise: something disturbed it, or declare more noise",
             number(*residual_ratio, 1)
         ),
         PoorFit::Noise { residual_k, noise_k } => sentence!(

@@ -200,7 +200,7 @@ pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
             if slow_rms > 2.0 * mid_rms { Verdict::Partly } else { Verdict::Differs },
         ),
         Statement::new(
-            "(beyond the paper) Points say themselves how far they can be trusted.",
+            "(beyond the paper) Verdicts and intervals tell which points can be trusted.",
             format!(
                 "{} of {} points are called good; the worst of these is {} points off. The 95 % intervals hold the model's final efficiency in {} % of all points, {} % of the good ones.",
                 good.len(),

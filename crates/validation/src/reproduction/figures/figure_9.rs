@@ -71,7 +71,7 @@ pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
         Statement::new(
             "3 mm at 50 krpm: the efficiency cannot be identified.",
             format!(
-                "{} points off from near choke to near surge; {slow_failed} of {} are given up, {slow_bad} are called unusable or doubtful, the others good.",
+                "{} points off from near choke to near surge; {slow_failed} of {} fits failed, {slow_bad} are called unusable or doubtful, the others good.",
                 range(slow_range, 1),
                 slow.len()
             ),

@@ -37,7 +37,7 @@ pub struct Make {
     /// Draw outside causes from those kept for calibration, not from those reserved for the check
     #[arg(long)]
     pub calibration: bool,
-    /// Simulator of the rig: virtual_lab, or other_lab or two_masses, whose equations no model of the catalogue has
+    /// Simulator of the rig: virtual_lab, or other_lab or two_masses, whose equations no effect of the library has
     #[arg(long, value_name = "NAME", default_value = "virtual_lab")]
     laboratory: Laboratory,
     /// Also record each rig on another night without its causes, for `run` to give to the diagnosis with --healthy

@@ -31,7 +31,7 @@ pub struct Status {
     /// Items without a part; `why`: the worker that started it.
     pub missing: Vec<UnfinishedItem>,
     /// Part files that belong to no item; left out.
-    pub strangers: Vec<String>,
+    pub unrelated_parts: Vec<String>,
     /// Total time of the finished items on one core, s.
     pub spent_s: f64,
     /// Longest time of an item, s.
@@ -83,7 +83,7 @@ impl Fleet {
                 None => status.missing.push(unfinished(self.worker_of(item))),
             }
         }
-        status.strangers = self.foreign_files();
+        status.unrelated_parts = self.foreign_files();
         status
     }
 

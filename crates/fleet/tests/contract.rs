@@ -155,7 +155,7 @@ fn items_come_and_go_and_parts_stay() {
         "equal studies, equal bytes"
     );
     let merged = merge(&fewer.fleet);
-    assert_eq!(merged.status.strangers.len(), 10, "parts of no item are named");
+    assert_eq!(merged.status.unrelated_parts.len(), 10, "parts of no item are named");
     assert_eq!(result(&fewer.fleet), squares(0..20));
 }
 
@@ -255,7 +255,7 @@ fn hostile_parts_are_named_and_left_out() {
         let reason = why.get(format!("number {number}").as_str()).copied().unwrap_or("nothing");
         assert!(reason.contains(word), "{number}: {reason}");
     }
-    assert_eq!(merged.status.strangers, ["notes.txt"]);
+    assert_eq!(merged.status.unrelated_parts, ["notes.txt"]);
     assert!(merge(&fleet).result.is_none());
     // They are replaced by what belongs there.
     work(&fleet, &kind, ItemSelection::All, false).unwrap();

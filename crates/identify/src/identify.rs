@@ -4,8 +4,8 @@ use crate::faults::balances::efficiency::FittedEfficiencies;
 use crate::faults::found_fault::{FoundFault, Suspect};
 use crate::faults::nominal_rig::NominalRig;
 use crate::needs::missing;
-use crate::objections::objection::Objection;
-use crate::objections::objections;
+use crate::reading_checks::failed_check::FailedCheck;
+use crate::reading_checks::failed_checks;
 use crate::single_step::dynamic::Estimate;
 use crate::step_data::end_state::{EndState, end_state};
 use crate::step_data::humidity::with_measured_humidity;
@@ -106,9 +106,9 @@ pub fn identify_recording(
     } else {
         Default::default()
     };
-    let (mut objections, ends) = objections(recording, config);
+    let (mut failed_checks, ends) = failed_checks(recording, config);
     // If half of the recording is already refused, the remainder contradicts itself for that reason.
-    let whole = objections.iter().all(|objection| 2 * objection.steps.len() <= ends.len());
+    let whole = failed_checks.iter().all(|failed_check| 2 * failed_check.steps.len() <= ends.len());
     let likelihood = |fitted: Option<&FittedEfficiencies>| {
         whole.then(|| faults::likelihood(recording, &ends, fitted, config, nominal.as_ref()))?
     };
@@ -117,9 +117,10 @@ pub fn identify_recording(
     let mut faults = balances.as_ref().map(find).unwrap_or_default();
     let known: Vec<Option<EndState>> = states.iter().map(|state| state.as_ref().ok().copied()).collect();
     let is_refused = faults.iter().any(|fault| fault.touches_points)
-        || (0..known.len()).all(|step| objections.iter().any(|objection| objection.steps.contains(&step)));
+        || (0..known.len())
+            .all(|step| failed_checks.iter().any(|failed_check| failed_check.steps.contains(&step)));
     let together = |findings: &mut [Findings], alone: Vec<Estimate>, own_findings: Vec<Findings>| {
-        let known = without_the_refused(known.clone(), &objections, findings);
+        let known = without_the_refused(known.clone(), &failed_checks, findings);
         joint::estimate(recording, &known, (alone, own_findings), config, is_refused, findings)
     };
     let (mut thermal, mut two_parameter, mut fitted) = (None, Vec::new(), None);
@@ -158,14 +159,14 @@ pub fn identify_recording(
         // Without a density of the balances nothing is known of faults.
         let _ = faults::possible::widen(&mut estimates, fitted, &readings, balances, config);
     }
-    objections.extend(faults::objection(&faults, ends.len()));
+    failed_checks.extend(faults::failed_check(&faults, ends.len()));
     if let Some(remark) = faults::remark(&faults) {
         findings.iter_mut().for_each(|findings| findings.remark(remark.clone()));
     }
     // Doubts about the readings come first: all other findings depend on them.
-    for objection in objections.iter().rev() {
-        for position in &objection.steps {
-            findings[*position].doubt_first(objection.warning.clone());
+    for failed_check in failed_checks.iter().rev() {
+        for position in &failed_check.steps {
+            findings[*position].doubt_first(failed_check.warning.clone());
         }
     }
     let (points, budgets) = points_with_budgets(recording, states, &estimates, findings, config);
@@ -207,12 +208,12 @@ fn points_with_budgets(
 /// channel are omitted, and the rest of the step is used.
 fn without_the_refused(
     mut known: Vec<Option<EndState>>,
-    objections: &[Objection],
+    failed_checks: &[FailedCheck],
     findings: &mut [Findings],
 ) -> Vec<Option<EndState>> {
     let mut refused = vec![false; known.len()];
-    let whole = objections.iter().filter(|objection| !objection.samples_left_out);
-    whole.flat_map(|objection| &objection.steps).for_each(|position| refused[*position] = true);
+    let whole = failed_checks.iter().filter(|failed_check| !failed_check.samples_left_out);
+    whole.flat_map(|failed_check| &failed_check.steps).for_each(|position| refused[*position] = true);
     let few = refused.iter().any(|refused| !refused);
     for (position, _) in refused.iter().enumerate().filter(|(_, refused)| few && **refused) {
         if known[position].take().is_some() {

@@ -219,7 +219,7 @@ fn of_draw(seed: u64, clean: &Campaign) -> Vec<String> {
 }
 
 /// Warnings about readings.
-const OBJECTIONS: [&str; 9] = [
+const CODES: [&str; 9] = [
     "frozen_channel",
     "dead_channel",
     "scaled_channel",
@@ -234,14 +234,14 @@ const OBJECTIONS: [&str; 9] = [
 /// Draws of noise and offsets, on two machines: as declared, and with an undeclared tenth of its area before the wheel and an undeclared slow
 /// probe.
 #[test]
-fn fault_free_recordings_get_no_objections() {
+fn fault_free_recordings_get_no_warnings() {
     let (model, tolerances) = (Model::nominal(), ModelTolerances::default());
     let nominal = NominalRig { model: &model, tolerances: &tolerances, conditions: &BTreeMap::new() };
     let other = Machine { alpha: 0.1, probe_m: 2e-3, ..Machine::default() };
     for (machine, nominal) in [(Machine::default(), Some(nominal)), (other, None)] {
         let clean = campaign(&grid(), 100.0, machine);
         let seeds: Vec<u64> = (40..44).collect();
-        let objections = mapper_numerics::parallel::map(&seeds, |seed| {
+        let warnings_found = mapper_numerics::parallel::map(&seeds, |seed| {
             let (recording, declared) =
                 measured(&clean.recording, 1.0, 1.0, &mut Pcg64::seed_from_u64(*seed));
             METHODS.map(|method| {
@@ -249,11 +249,11 @@ fn fault_free_recordings_get_no_objections() {
                     IdentifyConfig { method, declared: declared.clone(), ..IdentifyConfig::default() };
                 let found = identify_recording(&recording, &config, nominal).unwrap();
                 let warnings = found.points.into_iter().flatten().flat_map(|point| point.warnings);
-                warnings.filter(|warning| OBJECTIONS.contains(&warning.code())).collect::<Vec<Warning>>()
+                warnings.filter(|warning| CODES.contains(&warning.code())).collect::<Vec<Warning>>()
             })
         });
-        let objections: Vec<&Warning> = objections.iter().flatten().flatten().collect();
+        let warnings_found: Vec<&Warning> = warnings_found.iter().flatten().flatten().collect();
         // Three standard deviations of an offset occur in one draw of 370.
-        assert!(objections.is_empty(), "{objections:?}");
+        assert!(warnings_found.is_empty(), "{warnings_found:?}");
     }
 }

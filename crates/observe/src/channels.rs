@@ -16,7 +16,7 @@ pub const OUTPUTS: [Channel; 8] = [
 ];
 
 /// Recorded boundary conditions that drive the model.
-pub const DRIVERS: [Channel; 6] =
+pub const INPUT_CHANNELS: [Channel; 6] =
     [Channel::T1, Channel::P1, Channel::P3, Channel::T3, Channel::P4, Channel::TOil];
 
 /// The boundary condition that a channel measures; `None` for channels that are not inputs.

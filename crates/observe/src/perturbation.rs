@@ -68,7 +68,7 @@ impl Perturbation {
     }
 
     /// Adjusts the machine.
-    pub fn turn(self, params: &mut Params, by: f64) {
+    pub fn adjust_machine(self, params: &mut Params, by: f64) {
         match self {
             Perturbation::Efficiency => params.compressor.efficiency_scale_ratio *= 1.0 + by,
             Perturbation::Flow => params.compressor.flow_scale_ratio *= 1.0 + by,
@@ -88,7 +88,7 @@ impl Perturbation {
     }
 
     /// Adjusts the boundary conditions.
-    pub fn shift(self, boundary: &mut BoundaryConditions, by: f64) {
+    pub fn adjust_boundary(self, boundary: &mut BoundaryConditions, by: f64) {
         let channel = match self {
             Perturbation::Input(channel) => channel,
             Perturbation::Ambient => Channel::TAmb,
@@ -100,7 +100,7 @@ impl Perturbation {
     }
 
     /// Adjusts the initial state.
-    pub fn start(self, state: &mut State, by_k: f64) {
+    pub fn adjust_initial_state(self, state: &mut State, by_k: f64) {
         match self {
             Perturbation::StartTc => {
                 state.tc_k += by_k;
@@ -125,7 +125,7 @@ impl<I: Inputs> Inputs for ShiftedInputs<'_, I> {
     fn at(&self, t_s: f64) -> BoundaryConditions {
         let mut boundary = self.inputs.at(t_s);
         for (perturbation, by) in self.shifts {
-            perturbation.shift(&mut boundary, *by);
+            perturbation.adjust_boundary(&mut boundary, *by);
         }
         boundary
     }
@@ -166,15 +166,15 @@ mod tests {
         let mut seen = Vec::new();
         for perturbation in MACHINE {
             let mut params = Params::default();
-            perturbation.turn(&mut params, 0.25);
+            perturbation.adjust_machine(&mut params, 0.25);
             assert_ne!(params, Params::default(), "{perturbation:?}");
             assert!(!seen.contains(&params), "{perturbation:?}");
             seen.push(params);
         }
         let mut boundary = BoundaryConditions::default();
-        for channel in crate::channels::DRIVERS {
+        for channel in crate::channels::INPUT_CHANNELS {
             let before = boundary;
-            Perturbation::Input(channel).shift(&mut boundary, 1.0);
+            Perturbation::Input(channel).adjust_boundary(&mut boundary, 1.0);
             assert_ne!(boundary, before, "{channel}");
         }
     }

@@ -23,7 +23,7 @@ pub use diagnosis::drift_text::drift_text;
 pub use diagnosis::gap_text::{
     NOTHING, OUTSIDE, UNLISTED, candidate_name, doubt_text, gap_text, headline, suspect_text,
 };
-pub use diagnosis::prediction_check_text::held_text;
+pub use diagnosis::prediction_check_text::forecast_check_text;
 pub use diagnosis::recordings_text::recordings_text;
 pub use diagnosis::stand_actions::{next_measurement, stand_actions};
 pub use formatting::bar_text::{progress_text, short_duration};

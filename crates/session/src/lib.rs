@@ -49,7 +49,7 @@ mod run;
 mod session;
 mod variant;
 
-pub use analysis::calibrated_model_campaign::{Twin, twin_campaign};
+pub use analysis::calibrated_model_campaign::{CalibratedModel, calibrated_model_campaign};
 pub use analysis::calibrated_model_files::{SealedForecast, found_in};
 pub use analysis::drift::Drift;
 pub use analysis::further_results::RigFiles;

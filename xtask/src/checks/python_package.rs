@@ -1,6 +1,6 @@
 //! The Python package: its tests on the library that was built with everything else, and the wheel.
 
-use crate::environment::machine_offers::{Offered, with_program};
+use crate::environment::capabilities::{Capabilities, with_program};
 use crate::error::Error;
 use crate::step::{command, run, say};
 use crate::{environment::python_env, workspace};
@@ -10,7 +10,7 @@ use std::process::Command;
 
 /// Checks types, style, tests and notebooks of the package, assembled from its Python files and the debug build. The wheel differs only in
 /// optimisation, and building it would double the time.
-pub fn check(offered: &Offered) -> Result<(), Error> {
+pub fn check(capabilities: &Capabilities) -> Result<(), Error> {
     let home = workspace::target_dir().join("python-package");
     let package = home.join("mapper");
     if package.exists() {
@@ -20,7 +20,7 @@ pub fn check(offered: &Offered) -> Result<(), Error> {
     let library = workspace::target_dir().join("debug/lib_mapper.so");
     copy(&library, &package.join("_mapper.abi3.so"))?;
     let python_command = |arguments: &[&str]| {
-        let mut command = with_program(command(&offered.python, arguments));
+        let mut command = with_program(command(&capabilities.python, arguments));
         command
             .env("PYTHONPATH", &home)
             .env("MPLBACKEND", "agg")

@@ -1,7 +1,7 @@
 //! `cargo xtask fleet-test`: only the fleet tests, including the cluster test.
 
 use crate::checks::tally::Tally;
-use crate::environment::machine_offers::{Offered, with_program};
+use crate::environment::capabilities::{Capabilities, with_program};
 use crate::error::Error;
 use crate::step::{Steps, command, run};
 use crate::{
@@ -14,11 +14,11 @@ use crate::{
 /// `cargo xtask test`, it always includes the cluster.
 pub fn fleet_test() -> Result<(), Error> {
     machine::require_slurm()?;
-    let offered = Offered::with(python_env::prepare()?);
+    let capabilities = Capabilities::with(python_env::prepare()?);
     let mut steps = Steps::default();
     steps.run("building", || {
         let all = ["build", "--workspace", "--all-features", "--bins", "--tests", "--quiet"];
-        run(offered.to(command(workspace::cargo(), &all)))
+        run(capabilities.to(command(workspace::cargo(), &all)))
     });
     steps.run("tests", || {
         let (mut tally, mut well) = (Tally::default(), true);
@@ -27,7 +27,7 @@ pub fn fleet_test() -> Result<(), Error> {
             &["-p", "mapper-tests", "--test", "all", "fleet"],
         ] {
             let arguments = [&["test", "--all-features", "--no-fail-fast"], tests].concat();
-            let tests = with_program(offered.to(command(workspace::cargo(), &arguments)));
+            let tests = with_program(capabilities.to(command(workspace::cargo(), &arguments)));
             well &= test_programs::run(tests, &mut tally)?;
         }
         test_programs::close(&tally, well);

@@ -12,7 +12,7 @@ use crate::drift::sensitivity::readings::{Readings, Response, SegmentMeans};
 use crate::gap::residuals::whiten::NEAR_SURGE;
 use mapper_core::{Channel, Recording};
 use mapper_numerics::statistics::mean;
-use mapper_observe::channels::{DRIVERS, OUTPUTS};
+use mapper_observe::channels::{INPUT_CHANNELS, OUTPUTS};
 use mapper_observe::declared::Declared;
 use mapper_observe::perturbation::Perturbation;
 use nalgebra::DMatrix;
@@ -98,7 +98,7 @@ fn read<'a>(
         difference: DMatrix::zeros(0, 1),
         model: Response::zeros(0),
         responses: Vec::new(),
-        input_levels: DRIVERS.into_iter().filter_map(level).collect(),
+        input_levels: INPUT_CHANNELS.into_iter().filter_map(level).collect(),
         columns,
         steps,
         kept,
@@ -119,7 +119,7 @@ fn own_covariances(recordings: &[&Recording], readings: &Readings, declared: &De
             covariance[(position, position)] = declared.noise_sigma(OUTPUTS[*column]).powi(2)
                 * (ratio + MODEL_ERROR_RATIO * MODEL_ERROR_RATIO);
         }
-        for channel in DRIVERS {
+        for channel in INPUT_CHANNELS {
             let Some(response) = readings.response(Perturbation::Input(channel)) else { continue };
             let response = response.rows(index * count, count);
             covariance.ger(declared.noise_sigma(channel).powi(2) * ratio, &response, &response, 1.0);

@@ -11,7 +11,7 @@ use crate::gap::findings::report::{Candidate, Verdict};
 use crate::gap::residuals::nuisance::{Circumstances, OUTPUTS};
 use crate::gap::residuals::study::{Hypothesis, PredictError, Study};
 use mapper_core::{Channel, Recording, Series};
-use mapper_observe::channels::{DRIVERS, boundary_condition};
+use mapper_observe::channels::{INPUT_CHANNELS, boundary_condition};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::rig::effect::{EffectError, Rig};
 use mapper_physics::simulation::inputs::Inputs;
@@ -40,8 +40,8 @@ impl Changes {
         let bare = Hypothesis { effects: Vec::new(), ..hypothesis.clone() };
         let without = |step: usize| -> Result<(Rig, Circumstances), EffectError> {
             let (rig, circumstances) = study.rig(&bare, step)?;
-            let Circumstances { knobs, paths, .. } = with(step)?.1;
-            Ok((rig, Circumstances { knobs, paths, ..circumstances }))
+            let Circumstances { perturbations, paths, .. } = with(step)?.1;
+            Ok((rig, Circumstances { perturbations, paths, ..circumstances }))
         };
         let mut changes = vec![vec![0.0; times_s.len()]; OUTPUTS.len()];
         study.read(hypothesis, with, &times_s, |index, output, reading, _| {
@@ -52,25 +52,26 @@ impl Changes {
         })?;
         let series = |values: Vec<f64>| Series { t_s: times_s.clone(), values };
         // P3 is also an input, of which only the error of its sensor counts.
-        let outputs = OUTPUTS.iter().zip(changes).filter(|(channel, _)| !DRIVERS.contains(channel));
+        let outputs = OUTPUTS.iter().zip(changes).filter(|(channel, _)| !INPUT_CHANNELS.contains(channel));
         let mut channels: BTreeMap<Channel, Series> =
             outputs.map(|(channel, values)| (*channel, series(values))).collect();
-        let mut of_inputs = DRIVERS.map(|_| Vec::with_capacity(times_s.len()));
+        let mut of_inputs = INPUT_CHANNELS.map(|_| Vec::with_capacity(times_s.len()));
         for t_s in &times_s {
             let step = study.steps.iter().rposition(|step| step.marker.start_s <= *t_s).unwrap_or(0);
             let inputs = |hypothesis: &Hypothesis| -> Result<BoundaryConditions, EffectError> {
                 Ok(study.true_inputs(&study.rig(hypothesis, step)?.1).at(*t_s))
             };
             let (mut with, mut without) = (inputs(hypothesis)?, inputs(&bare)?);
-            for (channel, values) in DRIVERS.into_iter().zip(&mut of_inputs) {
+            for (channel, values) in INPUT_CHANNELS.into_iter().zip(&mut of_inputs) {
                 let value = |boundary: &mut BoundaryConditions| {
                     boundary_condition(boundary, channel).map_or(0.0, |value| *value)
                 };
                 values.push(value(&mut without) - value(&mut with));
             }
         }
-        channels
-            .extend(DRIVERS.into_iter().zip(of_inputs).map(|(channel, values)| (channel, series(values))));
+        channels.extend(
+            INPUT_CHANNELS.into_iter().zip(of_inputs).map(|(channel, values)| (channel, series(values))),
+        );
         channels.retain(|_, change| change.values.iter().any(|value| *value != 0.0));
         let start_s = study.steps.first().map_or(start_s, |first| first.marker.start_s);
         Ok(Changes { start_s, channels })

@@ -5,17 +5,17 @@ use crate::gap::best_fit::fit::{Effort, Fit};
 use crate::gap::best_fit::selection::Selection;
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::place::{Gain, places};
+use crate::gap::causes::probabilities::{cause_probabilities, rivals, suspicions, weight};
 use crate::gap::causes::select::{
     HOPELESS, MIN_SHRINK, Search, close, ranked, refit, search, search_onsets, supported,
 };
 use crate::gap::causes::smallest_seen::smallest_seen;
-use crate::gap::causes::weigh::{rivals, suspicions, weigh, weight};
 use crate::gap::findings::experiment::Experiment;
 use crate::gap::findings::report::{Diagnosis, Verdict};
 use crate::gap::findings::warning::GapWarning;
+use crate::gap::gap_reduction::beyond_prior::beyond_prior;
 use crate::gap::gap_reduction::folds::Folds;
-use crate::gap::gap_reduction::how_far::{Compared, how_far};
-use crate::gap::gap_reduction::strain::beyond_prior;
+use crate::gap::gap_reduction::held_out_gap::{Compared, held_out_gap};
 use crate::gap::model_error::healthy::Healthy;
 use crate::gap::next_experiment::best_experiment::{Suggested, next, sensor_near};
 use crate::gap::preconditions::default_tolerances::assumed;
@@ -174,7 +174,7 @@ pub fn diagnose(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
     progress(0.88, "residual");
     let best = fits.first().unwrap_or(&null);
     let left_by_null = adequacy(&study, &linearised, &null);
-    let posterior = weigh(&study, calibration, &null, &fits, &left);
+    let posterior = cause_probabilities(&study, calibration, &null, &fits, &left);
     let named = posterior.named;
     let weight = |fit: &Fit| weight(calibration, &study, fit);
     // Each fold chooses among the causes that the data do not distinguish, and they share the location.
@@ -182,7 +182,7 @@ pub fn diagnose(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
     let linearisations = [&linearised, at_best];
     let compared =
         Compared { study: &study, linearised: linearisations, null: &null, causes: &alike, weight: &weight };
-    let gap = how_far(compared, &folds);
+    let gap = held_out_gap(compared, &folds);
     let verdict = if !named {
         if posterior.outside > 0.5 { Verdict::Unexplained } else { Verdict::WithinTolerance }
     } else if posterior.outside <= 0.5 {

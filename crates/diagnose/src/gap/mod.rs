@@ -2,6 +2,7 @@
 //! the method and its limits.
 
 pub mod best_fit;
+pub mod calibrated_model;
 pub mod causes;
 pub mod correction;
 pub mod diagnose;
@@ -12,4 +13,3 @@ pub mod model_error;
 pub mod next_experiment;
 pub mod preconditions;
 pub mod residuals;
-pub mod twin;

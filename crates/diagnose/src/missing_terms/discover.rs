@@ -6,18 +6,18 @@ use crate::gap::best_fit::fit::{Effort, Fit, fit};
 use crate::gap::best_fit::selection::Selection;
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::place::{BEND, Explanation, Gain, Part, RARITY, of_fits, places_of, signature};
+use crate::gap::causes::probabilities::{MAX_EQUIVALENT, evidence_resolution, weight};
 use crate::gap::causes::select::MIN_SHRINK;
-use crate::gap::causes::weigh::{MAX_EQUIVALENT, evidence_resolution, weight};
 use crate::gap::diagnose::Diagnosed;
-use crate::gap::findings::report::{Law, MissingForce, Place, Verdict};
-use crate::gap::gap_reduction::how_far::channels_on;
+use crate::gap::findings::report::{Law, MissingSource, Place, Verdict};
+use crate::gap::gap_reduction::held_out_gap::channels_on;
 use crate::gap::residuals::study::{Study, members};
 use crate::missing_terms::laws::candidate::{Bench, Candidate, keep_determined, promising};
 use crate::missing_terms::laws::script::script;
 use crate::missing_terms::laws::sentence::{LawDescription, tell};
 use crate::missing_terms::search::columns::{Base, Products};
 use crate::missing_terms::search::onset::begun;
-use crate::missing_terms::search::residual_source::{Force, forces};
+use crate::missing_terms::search::residual_source::{ResidualSource, residual_sources};
 use crate::missing_terms::search::select::{Choice, choices};
 use crate::missing_terms::terms::balance::{Balance, Properties};
 use crate::missing_terms::terms::library::library;
@@ -28,7 +28,7 @@ pub struct Discovered {
     /// Proposed laws, best first; usually one or none.
     pub laws: Vec<Law>,
     /// Residual source term of each balance, most probable first.
-    pub forces: Vec<MissingForce>,
+    pub forces: Vec<MissingSource>,
     /// Locations of the gap; `None` if the diagnosis' locations remain valid.
     pub places: Option<Vec<Place>>,
     /// The first law fitted to all steps, if it is more probable than not.
@@ -76,14 +76,14 @@ pub fn discover(
     let best = found.as_ref().and_then(|found| found.fitted.first());
     let settled_fit = settled.and(best).map(|best| best.fit.clone());
     let bend = if settled.is_some() { 0.0 } else { BEND };
-    progress(0.7, "missing forces");
+    progress(0.7, "residual source terms");
     let here =
         |balance: &Balance| settled.is_none_or(|law| law.submodel == balance.properties().submodel.name());
-    let forces = forces(&nothing, &everywhere.steps, &here);
+    let forces = residual_sources(&nothing, &everywhere.steps, &here);
     let places = places(diagnosed, &bench, found.as_ref(), &forces, null, bend);
     Discovered {
         laws,
-        forces: forces.into_iter().take(1 + MAX_EQUIVALENT).map(reported_force).collect(),
+        forces: forces.into_iter().take(1 + MAX_EQUIVALENT).map(reported_source).collect(),
         places: Some(places),
         settled: settled_fit,
     }
@@ -291,7 +291,7 @@ fn places(
     diagnosed: &Diagnosed,
     bench: &Bench,
     found: Option<&FittedLaws>,
-    forces: &[Force],
+    forces: &[ResidualSource],
     null: &Fit,
     bend: f64,
 ) -> Vec<Place> {
@@ -342,9 +342,9 @@ fn linear_cost(diagnosed: &Diagnosed) -> f64 {
     Products::new(&base, &[]).projected(&everywhere.steps).map_or(diagnosed.null.cost, |left| left[(0, 0)])
 }
 
-fn reported_force(force: Force) -> MissingForce {
+fn reported_source(force: ResidualSource) -> MissingSource {
     let Properties { submodel, words, unit, .. } = force.balance.properties();
-    MissingForce {
+    MissingSource {
         submodel: submodel.name().to_owned(),
         force: words,
         unit: unit.to_owned(),

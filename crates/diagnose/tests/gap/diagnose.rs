@@ -4,6 +4,7 @@
 
 use crate::gap::common::{self, Visits, boundary, declared};
 use mapper_core::{Channel, Dimension, OperatingPoint, Recording, Series};
+use mapper_diagnose::gap::calibrated_model::{Found, check_forecast};
 use mapper_diagnose::gap::causes::calibration::Calibration;
 use mapper_diagnose::gap::diagnose::{Diagnosed, GapError, GapRequest, diagnose};
 use mapper_diagnose::gap::findings::experiment::{AllowedJump, Experiment};
@@ -15,7 +16,6 @@ use mapper_diagnose::gap::preconditions::problem::Problem;
 use mapper_diagnose::gap::preconditions::usable::usable;
 use mapper_diagnose::gap::residuals::nuisance::NuisanceKind;
 use mapper_diagnose::gap::residuals::study::Study;
-use mapper_diagnose::gap::twin::{Found, hold};
 use mapper_observe::averages::time_table::Table;
 use mapper_observe::declared::CommonOffset;
 use mapper_physics::rig::effect::{Effect, Rig, add};
@@ -395,10 +395,10 @@ fn the_twin_of_one_night_forecasts_the_next() {
     let next = next_night(&truth, 21);
     let table = Table::new(&next).unwrap();
     let study = Study::new(&next, table, declared(), Model::nominal(), first.study.effects.clone());
-    let held = hold(&study, &found).unwrap();
+    let held = check_forecast(&study, &found).unwrap();
     assert!(held.ratio < 1.2 && (0.92..0.99).contains(&held.inside), "{held:?}");
     let nominal = Found { effects: Vec::new(), ..found };
-    assert!(hold(&study, &nominal).is_err(), "its covariance is of another machine");
+    assert!(check_forecast(&study, &nominal).is_err(), "its covariance is of another machine");
 }
 
 /// Two recordings of a rig with a slow probe, and a third with a new probe and a rubbing bearing: each cause has its fate. Two recordings

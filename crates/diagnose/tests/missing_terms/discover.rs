@@ -12,7 +12,7 @@ use mapper_diagnose::missing_terms::discover::discover;
 use mapper_diagnose::missing_terms::laws::script::script_of;
 use mapper_diagnose::missing_terms::laws::sentence::{LawDescription, sink};
 use mapper_diagnose::missing_terms::search::columns::Base;
-use mapper_diagnose::missing_terms::search::residual_source::forces;
+use mapper_diagnose::missing_terms::search::residual_source::residual_sources;
 use mapper_diagnose::missing_terms::terms::balance::Balance;
 use mapper_diagnose::missing_terms::terms::expression::Expression;
 use mapper_diagnose::missing_terms::terms::law_effect::LawEffect;
@@ -135,7 +135,7 @@ fn a_force_comes_back_in_its_step() {
     let linearised = Linearised::new(&planted).unwrap();
     let base = Base::nothing(&planted, &linearised);
     let counts = vec![true; planted.steps.len()];
-    let found = forces(&base, &counts, &|_| true);
+    let found = residual_sources(&base, &counts, &|_| true);
     assert_eq!(found[0].balance, Balance::CompressorHousing);
     for (step, (level, sigma)) in found[0].levels.iter().enumerate() {
         let truth = if step == 4 { 60.0 } else { 0.0 };

@@ -1,7 +1,7 @@
 //! Readings at the end of a step, and derivatives with respect to them.
 
 use crate::IdentifyConfig;
-use crate::objections::ends::Ends;
+use crate::reading_checks::ends::Ends;
 use mapper_core::{Channel, Recording};
 use mapper_physics::gas::air::Air;
 

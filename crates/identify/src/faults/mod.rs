@@ -20,8 +20,8 @@ use crate::faults::balances::efficiency::FittedEfficiencies;
 use crate::faults::end_readings::{CHANNELS, MAX_STEPS, Readings, span_s};
 use crate::faults::found_fault::{FoundFault, Suspect};
 use crate::faults::nominal_rig::NominalRig;
-use crate::objections::ends::Ends;
-use crate::objections::objection::Objection;
+use crate::reading_checks::ends::Ends;
+use crate::reading_checks::failed_check::FailedCheck;
 use mapper_core::{Channel, Method, ModelTolerances, Recording, SuspectedFault, Warning};
 use mapper_inference::hypotheses::{Likelihood, Member, Priors};
 use mapper_inference::interval::COVERAGE;
@@ -100,7 +100,7 @@ fn touches_points(suspect: Suspect, method: Method) -> bool {
 }
 
 /// Warnings for all points if there are faults that affect them.
-pub(crate) fn objection(faults: &[FoundFault], steps: usize) -> Option<Objection> {
+pub(crate) fn failed_check(faults: &[FoundFault], steps: usize) -> Option<FailedCheck> {
     faults.iter().any(|fault| fault.touches_points).then_some(())?;
     let sensors = faults.iter().any(|fault| matches!(fault.suspect, Suspect::Sensor(_)));
     let faults = faults.iter().map(SuspectedFault::from).collect();
@@ -108,7 +108,7 @@ pub(crate) fn objection(faults: &[FoundFault], steps: usize) -> Option<Objection
         true => Warning::ContradictedChannel { faults },
         false => Warning::OffTheNominalMap { faults },
     };
-    Some(Objection::new(warning, (0..steps).collect()))
+    Some(FailedCheck::new(warning, (0..steps).collect()))
 }
 
 /// A remark on faults that do not affect the points.

@@ -4,7 +4,7 @@ use crate::IdentifyConfig;
 use crate::joint::fit::solve::{Member, Problem};
 use crate::joint::step_model::parameters::{ETA, LN_DEVIATION};
 use crate::joint::uncertainty::smoothness::{Smoothed, SmoothedValue};
-use crate::objections::bounds::EFFICIENCY;
+use crate::reading_checks::bounds::EFFICIENCY;
 use crate::step_data::samples::TREND_BLOCK_S;
 use crate::step_outcome::findings::Findings;
 use crate::step_outcome::interval_width;
@@ -26,7 +26,7 @@ pub(crate) fn mean_square(problem: &Problem<'_>, member: &Member<'_>) -> f64 {
 /// Mean square of segment sums of a step's whitened residual, relative to that of independent residuals.
 fn slow_square(problem: &Problem<'_>, member: &Member<'_>) -> Option<f64> {
     let (residual, _) = problem.residual(member, &problem.shared, &member.local, None);
-    let rows: Vec<(f64, f64)> = member.course.rows.iter().map(|row| row.t_s).zip(residual).collect();
+    let rows: Vec<(f64, f64)> = member.history.rows.iter().map(|row| row.t_s).zip(residual).collect();
     let block = |t_s: f64| ((t_s - rows[0].0) / TREND_BLOCK_S).floor();
     let segments: Vec<f64> = rows
         .chunk_by(|a, b| block(a.0) == block(b.0))

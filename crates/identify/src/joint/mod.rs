@@ -104,7 +104,7 @@ pub(crate) fn estimate(
         let (first, last) = (step.rows.first(), step.rows.last());
         let change = |read: fn(&Row) -> f64| first.zip(last).map(|(first, last)| read(last) - read(first));
         let prediction =
-            problem.setting.predict(&member.course, &problem.shared, &member.local, &[false; SHARED], false);
+            problem.setting.predict(&member.history, &problem.shared, &member.local, &[false; SHARED], false);
         let residual =
             member.measured_k.iter().zip(&prediction.t2_k).map(|(measured, found)| measured - found);
         let [eta_rows, ln_h_rows] = smoothed.budgets[i].clone();

@@ -49,11 +49,11 @@ pub(crate) fn lags(
 }
 
 /// The probe's reading along a gas temperature history, from its reading at the first row on.
-pub(crate) fn follow(lags: &[Lag], first: f64, course: &[f64]) -> Vec<f64> {
+pub(crate) fn follow(lags: &[Lag], first: f64, history: &[f64]) -> Vec<f64> {
     let mut reading = first;
-    let mut readings = Vec::with_capacity(course.len());
+    let mut readings = Vec::with_capacity(history.len());
     readings.push(reading);
-    for (lag, pair) in lags.iter().zip(course.windows(2)) {
+    for (lag, pair) in lags.iter().zip(history.windows(2)) {
         reading = lag.next(reading, pair[0], pair[1]);
         readings.push(reading);
     }

@@ -6,7 +6,7 @@
 use crate::averages::mean_reading::BEFORE_S;
 use crate::averages::schedule::Schedule;
 use crate::averages::time_table::Table;
-use crate::channels::{DRIVERS, boundary_condition};
+use crate::channels::{INPUT_CHANNELS, boundary_condition};
 use crate::model_inputs::lagged_command::{LaggedCommand, Level, Response, measured_valve_response};
 use mapper_core::{Channel, Recording};
 use mapper_numerics::statistics::mean;
@@ -155,7 +155,7 @@ impl Nodes<'_> {
         if let Some(p3_pa) = self.recording.series.get(&Channel::P3Command).and_then(|c| c.held(start_s)) {
             row.p3_pa = p3_pa;
         }
-        for channel in DRIVERS.into_iter().chain([Channel::TAmb]) {
+        for channel in INPUT_CHANNELS.into_iter().chain([Channel::TAmb]) {
             let (Some(series), Some(value)) =
                 (self.recording.series.get(&channel), boundary_condition(&mut row, channel))
             else {

@@ -5,7 +5,7 @@
 //! share, and the remainder is smooth. Jumps are not smoothed.
 
 use crate::averages::time_table::Table;
-use crate::channels::{DRIVERS, boundary_condition};
+use crate::channels::{INPUT_CHANNELS, boundary_condition};
 use crate::declared::Declared;
 use crate::model_inputs::lagged_command::{LaggedCommand, Response};
 use crate::model_inputs::smoother::{TimeHistory, smooth};
@@ -15,7 +15,7 @@ use mapper_physics::simulation::inputs::Inputs;
 
 /// A recorded quantity without its noise: a smooth part, plus a part proportional to P3.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Driver {
+pub struct SmoothInput {
     /// The smooth part.
     pub history: TimeHistory,
     /// Change per pascal of P3.
@@ -30,9 +30,9 @@ pub struct SmoothedInputs {
     /// Starts of the steps, s. Changes within a step by a speed-control loop are too small to interrupt an integration.
     jumps_s: Vec<f64>,
     /// P3 minus its command.
-    p3_remainder: Driver,
+    p3_remainder: SmoothInput,
     /// Every other boundary condition by its channel.
-    drivers: Vec<(Channel, Driver)>,
+    inputs: Vec<(Channel, SmoothInput)>,
     nominal: BoundaryConditions,
 }
 
@@ -57,37 +57,37 @@ impl SmoothedInputs {
         let command = LaggedCommand::of_recording(recording, p3, valve);
         let commanded_p3: Vec<f64> = table.t_s.iter().map(|t| command.p3_pa(*t)).collect();
         let jumps_s: Vec<f64> = recording.steps.iter().map(|step| step.start_s).collect();
-        let driver = |channel: Channel, values: &[f64]| {
+        let input = |channel: Channel, values: &[f64]| {
             let noise_sigma = declared.noise_sigma(channel);
             let per_p3 = change_per_pascal(table, values, (&command, &commanded_p3), noise_sigma);
             let rest: Vec<f64> =
                 values.iter().zip(&commanded_p3).map(|(value, p3)| value - per_p3 * p3).collect();
             let history = smooth(&table.t_s, &rest, noise_sigma, declared.noise_colour, &jumps_s)?;
-            Some(Driver { history, per_p3 })
+            Some(SmoothInput { history, per_p3 })
         };
         let p3_remainder = table.column(Channel::P3).and_then(|values| {
             let remainder: Vec<f64> =
                 values.iter().zip(&commanded_p3).map(|(p3, commanded)| p3 - commanded).collect();
-            driver(Channel::P3, &remainder)
+            input(Channel::P3, &remainder)
         });
-        let other = |channel: Channel| Some((channel, driver(channel, table.column(channel)?)?));
-        let others = DRIVERS.into_iter().filter(|channel| *channel != Channel::P3);
+        let other = |channel: Channel| Some((channel, input(channel, table.column(channel)?)?));
+        let others = INPUT_CHANNELS.into_iter().filter(|channel| *channel != Channel::P3);
         SmoothedInputs {
             p3_remainder: p3_remainder
-                .unwrap_or_else(|| Driver { history: TimeHistory::constant(0.0), per_p3: 0.0 }),
-            drivers: others.chain([Channel::TAmb]).filter_map(other).collect(),
+                .unwrap_or_else(|| SmoothInput { history: TimeHistory::constant(0.0), per_p3: 0.0 }),
+            inputs: others.chain([Channel::TAmb]).filter_map(other).collect(),
             nominal: declared.nominal,
             jumps_s,
             command,
         }
     }
 
-    /// Uncertainty of each of [`DRIVERS`] in addition to its fixed offset; `None` for those that are not recorded.
-    pub fn noise(&self) -> [Option<InputNoise>; DRIVERS.len()] {
-        DRIVERS.map(|channel| {
+    /// Uncertainty of each of [`INPUT_CHANNELS`] in addition to its fixed offset; `None` for those that are not recorded.
+    pub fn noise(&self) -> [Option<InputNoise>; INPUT_CHANNELS.len()] {
+        INPUT_CHANNELS.map(|channel| {
             let history = match channel {
                 Channel::P3 => &self.p3_remainder.history,
-                _ => &self.drivers.iter().find(|(other, _)| *other == channel)?.1.history,
+                _ => &self.inputs.iter().find(|(other, _)| *other == channel)?.1.history,
             };
             Some(InputNoise { sigma: history.sigma, correlation_s: history.correlation_s })
         })
@@ -97,15 +97,15 @@ impl SmoothedInputs {
 impl Inputs for SmoothedInputs {
     fn at(&self, t_s: f64) -> BoundaryConditions {
         let commanded_p3_pa = self.command.p3_pa(t_s);
-        let of = |driver: &Driver| driver.history.at(t_s) + driver.per_p3 * commanded_p3_pa;
+        let of = |input: &SmoothInput| input.history.at(t_s) + input.per_p3 * commanded_p3_pa;
         let mut boundary = BoundaryConditions {
             p3_pa: commanded_p3_pa + of(&self.p3_remainder),
             valve_opening_ratio: self.command.valve_opening_ratio(t_s),
             ..self.nominal
         };
-        for (channel, driver) in &self.drivers {
+        for (channel, input) in &self.inputs {
             if let Some(value) = boundary_condition(&mut boundary, *channel) {
-                *value = of(driver);
+                *value = of(input);
             }
         }
         boundary

@@ -8,7 +8,7 @@ use crate::formatting::table::COLUMNS;
 use crate::formatting::wrapped::wrapped;
 use mapper_core::{probability_text, step_number, with_unit};
 use mapper_diagnose::gap::findings::report::{
-    Candidate, ChannelGap, Diagnosis, Estimate, Gap, Law, PointGap, SmallestSeen, Strained, Verdict,
+    BeyondPrior, Candidate, ChannelGap, Diagnosis, Estimate, Gap, Law, PointGap, SmallestSeen, Verdict,
     law_found,
 };
 use mapper_diagnose::gap::model_error::baseline_assumptions::Since;
@@ -112,7 +112,7 @@ pub fn doubt_text(doubt: Option<&str>) -> String {
 }
 
 /// A tolerance outside its prior, in words.
-pub fn suspect_text(suspect: &Strained) -> String {
+pub fn suspect_text(suspect: &BeyondPrior) -> String {
     format!(
         "{} ends {:.1} sigma from its declared value ({})",
         suspect.what,

@@ -1,10 +1,10 @@
 //! Evaluation of a pre-registered prediction, as a page for a terminal.
 
 use crate::formatting::number::four_figures;
-use mapper_diagnose::gap::twin::Held;
+use mapper_diagnose::gap::calibrated_model::ForecastCheck;
 
 /// The page.
-pub fn held_text(held: &Held, seal: &str) -> String {
+pub fn forecast_check_text(held: &ForecastCheck, seal: &str) -> String {
     let mut text = format!(
         "forecast {seal}\n{} values, nothing fitted: residual {:.2} times the noise, {:.1} % within the 95 % band\n\n",
         held.values,

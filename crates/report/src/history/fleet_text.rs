@@ -46,7 +46,7 @@ fn lacking_text(status: &Status, shown: impl Fn(&UnfinishedItem) -> bool) -> Str
         let worker = item.why.as_ref().map_or_else(String::new, |who| format!(", started by {who}"));
         format!("missing: {} ({}){worker}", item.name, item.hash.short())
     });
-    list(&mut text, &status.strangers, |name| {
+    list(&mut text, &status.unrelated_parts, |name| {
         format!("omitted: parts/{name} belongs to no item of this study")
     });
     text

@@ -63,11 +63,11 @@ pub(crate) fn drawn_steps(page: &RunPage<'_>, display: &Display) -> Vec<DrawnSte
                 .iter()
                 .map(|scored| &scored.point)
                 .find(|point| point.step == marker.index)?;
-            let course = page.courses.iter().find(|course| course.step == marker.index);
+            let history = page.t2_histories.iter().find(|history| history.step == marker.index);
             let window = point
                 .window
                 .map(|window| [window.start_s, window.end_s].map(|t_s| rounded(t_s - marker.start_s)));
-            let model = course.map(|course| drawn_model(course, marker, display));
+            let model = history.map(|history| drawn_model(history, marker, display));
             Some(DrawnStep { window, model, ..drawn_step(page.report.recording, marker, display) })
         })
         .collect()
@@ -94,24 +94,24 @@ fn drawn_step(recording: &Recording, marker: &StepMarker, display: &Display) -> 
     }
 }
 
-fn drawn_model(course: &T2History, marker: &StepMarker, display: &Display) -> DrawnModel {
-    let rows = course.t_s.len().min(ROWS);
-    let bin = |row: usize| row * course.t_s.len() / rows.max(1)..(row + 1) * course.t_s.len() / rows.max(1);
+fn drawn_model(history: &T2History, marker: &StepMarker, display: &Display) -> DrawnModel {
+    let rows = history.t_s.len().min(ROWS);
+    let bin = |row: usize| row * history.t_s.len() / rows.max(1)..(row + 1) * history.t_s.len() / rows.max(1);
     let column = |values: &[f64]| -> Vec<f64> {
         (0..rows).map(|row| values.get(bin(row)).and_then(finite_mean).unwrap_or(f64::NAN)).collect()
     };
     let left_k: Vec<f64> =
-        course.read_k.iter().zip(&course.model_k).map(|(read, model)| read - model).collect();
+        history.read_k.iter().zip(&history.model_k).map(|(read, model)| read - model).collect();
     let rms_k = rms(&left_k).unwrap_or(0.0);
     DrawnModel {
-        t: column(&course.t_s).into_iter().map(|t_s| rounded(t_s - marker.start_s)).collect(),
-        t2: column(&course.model_k)
+        t: column(&history.t_s).into_iter().map(|t_s| rounded(t_s - marker.start_s)).collect(),
+        t2: column(&history.model_k)
             .into_iter()
             .map(|k| rounded(display.number(Kind::Temperature, k)))
             .collect(),
         left_k: column(&left_k).into_iter().map(rounded).collect(),
         rms_k: rounded(rms_k),
-        shift_k: rounded(course.shift_k),
+        shift_k: rounded(history.shift_k),
     }
 }
 

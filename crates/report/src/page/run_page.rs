@@ -10,7 +10,7 @@ pub struct RunPage<'a> {
     /// The content that it shares with the Markdown report.
     pub report: &'a RunReport<'a>,
     /// T2 computed from the numbers of each point.
-    pub courses: &'a [T2History],
+    pub t2_histories: &'a [T2History],
     /// The diagnosis of the gap to the nominal model, if there is one.
     pub gap: Option<Markup>,
     /// Maps for comparison.

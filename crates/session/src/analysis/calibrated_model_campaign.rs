@@ -1,7 +1,7 @@
 //! Converts a diagnosed machine into the virtual lab of a campaign.
 
 use crate::SessionError;
-use mapper_diagnose::gap::twin::{Found, TwinError};
+use mapper_diagnose::gap::calibrated_model::{CalibratedModelError, Found};
 use mapper_physics::rig::effect::{Effect, EffectParameter};
 use serde_json::{Map, Value, json};
 use std::path::Path;
@@ -20,7 +20,7 @@ const DEVIATIONS: [&str; 8] = [
 ];
 
 /// Settings of the virtual lab.
-pub struct Twin<'a> {
+pub struct CalibratedModel<'a> {
     /// The identified machine.
     pub found: &'a Found,
     /// File of its diagnosis.
@@ -32,21 +32,21 @@ pub struct Twin<'a> {
 /// A campaign's text with its backend replaced by a virtual lab of the identified machine.
 ///
 /// # Errors
-/// [`TwinError::Effect`] if an effect is not in the library.
-pub fn twin_campaign(
+/// [`CalibratedModelError::Effect`] if an effect is not in the library.
+pub fn calibrated_model_campaign(
     campaign_text: &str,
-    twin: &Twin<'_>,
+    calibrated: &CalibratedModel<'_>,
     catalogue: &[Arc<dyn Effect>],
 ) -> Result<String, SessionError> {
-    Ok(with_backend(campaign_text, &backend(twin, catalogue)?))
+    Ok(with_backend(campaign_text, &backend(calibrated, catalogue)?))
 }
 
 /// The backend block.
-fn backend(twin: &Twin<'_>, catalogue: &[Arc<dyn Effect>]) -> Result<String, SessionError> {
+fn backend(calibrated: &CalibratedModel<'_>, catalogue: &[Arc<dyn Effect>]) -> Result<String, SessionError> {
     let mut effects = Map::new();
-    for effect in &twin.found.effects {
+    for effect in &calibrated.found.effects {
         let known = catalogue.iter().find(|known| known.info().id == effect.id.as_str());
-        let known = known.ok_or_else(|| TwinError::Effect(effect.id.clone()))?;
+        let known = known.ok_or_else(|| CalibratedModelError::Effect(effect.id.clone()))?;
         let value = |(parameter, value): (&EffectParameter, &f64)| match parameter.unit.as_ref() {
             "1" | "kg/kg" => (parameter.name.to_string(), json!(value)),
             unit => (parameter.name.to_string(), json!(format!("{value} {unit}"))),
@@ -57,7 +57,7 @@ fn backend(twin: &Twin<'_>, catalogue: &[Arc<dyn Effect>]) -> Result<String, Ses
         let single = single.and_then(|parameter| values.remove(parameter.name.as_ref()));
         effects.insert(effect.id.clone(), single.unwrap_or(Value::Object(values)));
     }
-    let tolerances = &twin.found.tolerances;
+    let tolerances = &calibrated.found.tolerances;
     let deviations = tolerances.iter().filter(|t| DEVIATIONS.contains(&t.name.as_str()));
     let deviations = deviations.map(|t| (t.name.clone(), json!(format!("{:.4} %", 100.0 * t.value))));
     let offsets = tolerances.iter().filter_map(|t| {
@@ -68,7 +68,7 @@ fn backend(twin: &Twin<'_>, catalogue: &[Arc<dyn Effect>]) -> Result<String, Ses
         "start": "settled",
         // As in the diagnosis: P3 follows with its declared lag, the valve without lag.
         "actuators": {
-            "turbine_inlet_pressure": {"lag": format!("{} s", twin.p3_lag_s), "slew": "1000 bar/s"},
+            "turbine_inlet_pressure": {"lag": format!("{} s", calibrated.p3_lag_s), "slew": "1000 bar/s"},
             "valve": {"lag": "0 s", "slew": "1000 1/s"},
         },
         "effects": effects,
@@ -76,7 +76,10 @@ fn backend(twin: &Twin<'_>, catalogue: &[Arc<dyn Effect>]) -> Result<String, Ses
         "offset_of": offsets.collect::<Map<_, _>>(),
     });
     let block = serde_yaml::to_string(&json!({"backend": {"virtual_lab": lab}}))?;
-    Ok(format!("# The machine diagnosed in {}, which has the covariance.\n{block}", twin.source.display()))
+    Ok(format!(
+        "# The machine diagnosed in {}, which has the covariance.\n{block}",
+        calibrated.source.display()
+    ))
 }
 
 /// A campaign's text with its backend's block replaced.
@@ -113,7 +116,7 @@ fn with_backend(text: &str, block: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mapper_diagnose::gap::twin::{FoundEffect, FoundTolerance};
+    use mapper_diagnose::gap::calibrated_model::{FoundEffect, FoundTolerance};
 
     /// Every effect of the library, and tolerances of both kinds, arrive in the campaign as numbers or values with units.
     #[test]
@@ -133,9 +136,11 @@ mod tests {
             covariance: Vec::new(),
             doubt: None,
         };
-        let twin = Twin { found: &found, source: Path::new("first.json"), p3_lag_s: 0.4 };
+        let calibrated = CalibratedModel { found: &found, source: Path::new("first.json"), p3_lag_s: 0.4 };
         let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../campaigns/grid18.yaml"));
-        let text = twin_campaign(&std::fs::read_to_string(path).unwrap(), &twin, &catalogue).unwrap();
+        let text =
+            calibrated_model_campaign(&std::fs::read_to_string(path).unwrap(), &calibrated, &catalogue)
+                .unwrap();
         let campaign = mapper_campaign::check(&text, path, &mapper_campaign::read_text).unwrap();
         let lab = campaign.backend.settings;
         assert_eq!(lab["deviations"], json!({"valve_area": "-2.0000 %"}));

@@ -2,7 +2,7 @@
 
 use crate::SessionError;
 use crate::recording::files::{json_text, read_at_most, write_new};
-use mapper_diagnose::gap::twin::{Expected, Found};
+use mapper_diagnose::gap::calibrated_model::{Expected, Found};
 use mapper_planner::sha256_hex;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -19,7 +19,7 @@ struct Diagnosis {
 /// The identified machine, from the JSON of a diagnosis.
 ///
 /// # Errors
-/// [`SessionError::File`] if it cannot be read, [`SessionError::TwinFile`] if it is not a diagnosis.
+/// [`SessionError::File`] if it cannot be read, [`SessionError::CalibratedModelFile`] if it is not a diagnosis.
 pub fn found_in(path: &Path) -> Result<Found, SessionError> {
     let diagnosis: Diagnosis = serde_json::from_str(&text_of(path)?)
         .map_err(|error| wrong(path, format!("not a diagnosis: {error}")))?;
@@ -58,7 +58,7 @@ impl SealedForecast {
     /// Reads a prediction and its SHA-256. `wanted`: the required hash, in digits of either case.
     ///
     /// # Errors
-    /// [`SessionError::File`] if it cannot be read, [`SessionError::TwinFile`] if it has another hash or is not a prediction.
+    /// [`SessionError::File`] if it cannot be read, [`SessionError::CalibratedModelFile`] if it has another hash or is not a prediction.
     pub fn read(path: &Path, wanted: Option<&str>) -> Result<(SealedForecast, String), SessionError> {
         let text = text_of(path)?;
         let seal = sha256_hex(&text);
@@ -78,5 +78,5 @@ fn text_of(path: &Path) -> Result<String, SessionError> {
 }
 
 fn wrong(path: &Path, why: String) -> SessionError {
-    SessionError::TwinFile { path: path.to_owned(), why }
+    SessionError::CalibratedModelFile { path: path.to_owned(), why }
 }

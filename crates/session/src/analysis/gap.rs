@@ -13,6 +13,9 @@ use mapper_diagnose::drift::{CauseKind, DriftReport, without_drift};
 use mapper_diagnose::gap::best_fit::adequacy::adequacy;
 use mapper_diagnose::gap::best_fit::fit::{Effort, fit};
 use mapper_diagnose::gap::best_fit::selection::Selection;
+use mapper_diagnose::gap::calibrated_model::{
+    Expected, ForecastCheck, Found, check_forecast, forecast_steps,
+};
 use mapper_diagnose::gap::causes::calibration::Calibration;
 use mapper_diagnose::gap::diagnose::{Diagnosed, GapError, GapRequest, diagnose};
 use mapper_diagnose::gap::findings::report::{Diagnosis, Next, Verdict, law_found};
@@ -24,7 +27,6 @@ use mapper_diagnose::gap::preconditions::usable::checked_study;
 use mapper_diagnose::gap::residuals::actuators::Actuators;
 use mapper_diagnose::gap::residuals::study::Study;
 use mapper_diagnose::gap::residuals::whiten::Linearised;
-use mapper_diagnose::gap::twin::{Expected, Found, Held, forecast_steps, hold};
 use mapper_diagnose::missing_terms::discover::discover;
 use mapper_identify::{ZeroOutcome, ZeroSettings};
 use mapper_observe::model_inputs::lagged_command::Response;
@@ -207,7 +209,7 @@ impl Session<'_> {
     /// Validates the machine found by a diagnosis against an independent recording. Nothing is fitted.
     ///
     /// # Errors
-    /// As [`Session::diagnose_gap`], and [`SessionError::Twin`] if diagnosis and recording do not belong together.
+    /// As [`Session::diagnose_gap`], and [`SessionError::CalibratedModel`] if diagnosis and recording do not belong together.
     pub fn hold_twin(
         &self,
         recorded: &Recorded,
@@ -215,9 +217,9 @@ impl Session<'_> {
         map: &ChannelMap,
         effects: Vec<Arc<dyn Effect>>,
         found: &Found,
-    ) -> Result<Held, SessionError> {
+    ) -> Result<ForecastCheck, SessionError> {
         let GapInput { zeroed, model, .. } = self.prepare_for_gap(recorded, campaign, map)?;
-        Ok(hold(&study_of(&zeroed.recording, campaign, zeroed.declared, model, effects)?, found)?)
+        Ok(check_forecast(&study_of(&zeroed.recording, campaign, zeroed.declared, model, effects)?, found)?)
     }
 
     /// Expected readings of the diagnosed machine at the end of each planned step of a campaign.

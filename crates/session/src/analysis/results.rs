@@ -378,10 +378,10 @@ fn page_of(
     others: &[OtherRun<'_>],
     gap: Option<&Gap>,
 ) -> Result<String, SessionError> {
-    let course = |point: &IdentifiedPoint| t2_history(&identified.recording, point, &identified.config);
-    let courses: Vec<T2History> = identified.points_alone().filter_map(course).collect();
+    let history = |point: &IdentifiedPoint| t2_history(&identified.recording, point, &identified.config);
+    let t2_histories: Vec<T2History> = identified.points_alone().filter_map(history).collect();
     let gap = gap.map(|gap| gap_part(&gap.diagnosed));
-    Ok(run_page(&RunPage { report, courses: &courses, gap, others })?)
+    Ok(run_page(&RunPage { report, t2_histories: &t2_histories, gap, others })?)
 }
 
 /// Source entry of a recording in a report.

@@ -7,8 +7,8 @@ use crate::variant::VariantError;
 use mapper_campaign::{CampaignError, NightlyError};
 use mapper_core::{BackendError, ExportError, ImportError};
 use mapper_diagnose::drift::DriftError;
+use mapper_diagnose::gap::calibrated_model::CalibratedModelError;
 use mapper_diagnose::gap::diagnose::GapError;
-use mapper_diagnose::gap::twin::TwinError;
 use mapper_history::HistoryError;
 use mapper_identify::IdentifyError;
 use mapper_maps::table::DescriptionError;
@@ -295,7 +295,7 @@ pub enum SessionError {
     Gap(#[from] GapError),
     /// A diagnosis cannot be validated against a recording.
     #[error(transparent)]
-    Twin(#[from] TwinError),
+    CalibratedModel(#[from] CalibratedModelError),
     /// The built-in calibration cannot be read.
     #[error("failed to read the calibration of the diagnosis: {0}")]
     Calibration(#[source] serde_json::Error),
@@ -307,7 +307,7 @@ pub enum SessionError {
     Export(#[from] ExportError),
     /// The file is not a diagnosis or forecast, or has another hash than the pre-registered one.
     #[error("{}: {why}", .path.display())]
-    TwinFile {
+    CalibratedModelFile {
         /// The file.
         path: PathBuf,
         /// What is wrong with it.
@@ -479,7 +479,7 @@ impl SessionError {
                 ErrorKind::Failure
             }
             E::Log(_) | E::NoPoints { .. } => ErrorKind::BadRecording,
-            E::LogOption(_) | E::Twin(_) | E::TwinFile { .. } => ErrorKind::BadInput,
+            E::LogOption(_) | E::CalibratedModel(_) | E::CalibratedModelFile { .. } => ErrorKind::BadInput,
             E::Record(_) | E::Driven(_) | E::OtherMachine(_) | E::Identify(_) | E::Drift(_) | E::Gap(_) => {
                 ErrorKind::BadRecording
             }

@@ -1,4 +1,4 @@
-//! On a rig of other equations: everything is outside the catalogue, until a healthy recording shows the rig's behaviour.
+//! On a rig of other equations: everything is outside the effect library, until a healthy recording shows the rig's behaviour.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_core::Recording;
@@ -12,7 +12,7 @@ use mapper_validation::blind::{CaseKind, Draw, Laboratory, OutsideUse, make, stu
 use std::path::Path;
 use std::sync::Arc;
 
-/// Nothing changed: within tolerance. A cause came: it is named. Without the healthy recording it is outside the catalogue.
+/// Nothing changed: within tolerance. A cause came: it is named. Without the healthy recording it is outside the effect library.
 #[test]
 fn a_healthy_recording_separates_a_cause_from_structure() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../campaigns/gap_rig.yaml");

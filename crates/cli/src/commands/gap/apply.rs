@@ -5,7 +5,7 @@ use crate::output::failure::Failure;
 use crate::{output::standard_output, registry};
 use clap::Args;
 use mapper_report::doubt_text;
-use mapper_session::{Twin, found_in, twin_campaign, write_new};
+use mapper_session::{CalibratedModel, calibrated_model_campaign, found_in, write_new};
 use std::path::PathBuf;
 
 /// Write a campaign whose virtual lab is the diagnosed machine, with its effects and deviations
@@ -27,9 +27,9 @@ impl Apply {
         let text = mapper_campaign::read_text(&self.campaign)
             .map_err(|error| Failure::new(Code::Failure, format!("{}: {error}", self.campaign.display())))?;
         let found = found_in(&self.diagnosis)?;
-        let twin =
-            Twin { found: &found, source: &self.diagnosis, p3_lag_s: campaign.tolerances.actuator_lag_s };
-        let written = twin_campaign(&text, &twin, &registry::registry().effects)?;
+        let p3_lag_s = campaign.tolerances.actuator_lag_s;
+        let calibrated = CalibratedModel { found: &found, source: &self.diagnosis, p3_lag_s };
+        let written = calibrated_model_campaign(&text, &calibrated, &registry::registry().effects)?;
         write_new(&self.out, written.as_bytes())?;
         mapper_campaign::load(&self.out).map_err(Failure::of_campaign)?;
         standard_output::print(&format!(

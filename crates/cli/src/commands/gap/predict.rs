@@ -4,7 +4,7 @@ use crate::command_line::shared_arguments::channel_map;
 use crate::output::failure::Failure;
 use crate::{output::standard_output, registry};
 use clap::Args;
-use mapper_report::{doubt_text, held_text};
+use mapper_report::{doubt_text, forecast_check_text};
 use mapper_session::{Recorded, SealedForecast, Session, found_in};
 use serde_json::json;
 use std::path::PathBuf;
@@ -69,6 +69,6 @@ impl Predict {
         if self.json {
             return standard_output::print_json(&json!({ "sha256": seal, "held": held }));
         }
-        standard_output::print(&held_text(&held, &seal))
+        standard_output::print(&forecast_check_text(&held, &seal))
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::drift::causes::cause::{Cause, FOULING_FLOW_SHARE};
 use crate::drift::causes::time_history::TimeHistory;
-use mapper_observe::channels::DRIVERS;
+use mapper_observe::channels::INPUT_CHANNELS;
 use mapper_observe::perturbation::Perturbation;
 use mapper_physics::machine::params::{BoundaryConditions, Params};
 
@@ -33,7 +33,7 @@ impl Drift {
 
     /// Whether the sensor of a model input drifts.
     pub fn acts_on_inputs(&self) -> bool {
-        self.cause.channels().iter().any(|channel| DRIVERS.contains(channel))
+        self.cause.channels().iter().any(|channel| INPUT_CHANNELS.contains(channel))
     }
 
     /// Applies its mean between two campaign times, s, to the machine.
@@ -41,18 +41,18 @@ impl Drift {
         let mean = self.size * self.history.mean(from_s, to_s);
         match self.cause {
             Cause::Fouling => {
-                Perturbation::Efficiency.turn(params, mean);
-                Perturbation::Flow.turn(params, FOULING_FLOW_SHARE * mean);
+                Perturbation::Efficiency.adjust_machine(params, mean);
+                Perturbation::Flow.adjust_machine(params, FOULING_FLOW_SHARE * mean);
             }
-            Cause::BearingFriction => Perturbation::Friction.turn(params, mean),
+            Cause::BearingFriction => Perturbation::Friction.adjust_machine(params, mean),
             Cause::Sensors(_) => {}
         }
     }
 
     /// Subtracts the drift of a sensor from the input that it measures.
     pub fn subtract_from(&self, boundary: &mut BoundaryConditions, t_s: f64) {
-        for channel in self.cause.channels().iter().filter(|channel| DRIVERS.contains(channel)) {
-            Perturbation::Input(*channel).shift(boundary, -self.at(t_s));
+        for channel in self.cause.channels().iter().filter(|channel| INPUT_CHANNELS.contains(channel)) {
+            Perturbation::Input(*channel).adjust_boundary(boundary, -self.at(t_s));
         }
     }
 }

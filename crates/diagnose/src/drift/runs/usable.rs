@@ -3,7 +3,7 @@
 use crate::drift::runs::request::DriftError;
 use mapper_core::{Channel, Recording};
 use mapper_numerics::statistics::median;
-use mapper_observe::channels::{DRIVERS, OUTPUTS};
+use mapper_observe::channels::{INPUT_CHANNELS, OUTPUTS};
 use mapper_observe::plausible::check_running;
 
 /// Channels that the diagnosis needs.
@@ -19,7 +19,7 @@ pub(crate) fn usable(run: usize, recording: &Recording, lost_ratio: f64) -> Resu
     let (Some(first), Some(last)) = (recording.steps.first(), recording.steps.last()) else {
         return Err(DriftError::NoSteps { run });
     };
-    for channel in DRIVERS.into_iter().chain(OUTPUTS) {
+    for channel in INPUT_CHANNELS.into_iter().chain(OUTPUTS) {
         let Some(series) = recording.series.get(&channel) else { continue };
         let values = series.slice(first.start_s, last.end_s).1;
         let finite: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();

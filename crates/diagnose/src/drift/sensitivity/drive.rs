@@ -112,7 +112,7 @@ impl<'a> Drive<'a> {
     ) -> Result<Prediction, (usize, DriveError)> {
         let mut state = self.start;
         if let Some((perturbation, by)) = perturbed {
-            perturbation.start(&mut state, by);
+            perturbation.adjust_initial_state(&mut state, by);
         }
         let mut prediction = Prediction {
             means: vec![[0.0; OUTPUTS.len()]; self.segment_count],
@@ -143,7 +143,7 @@ impl<'a> Drive<'a> {
             for (from_s, to_s) in step.parts(start_s, drifts) {
                 let mut model = self.model.clone();
                 if let Some((perturbation, by)) = perturbed {
-                    perturbation.turn(&mut model.params, by);
+                    perturbation.adjust_machine(&mut model.params, by);
                 }
                 for drift in drifts {
                     drift.apply_to(&mut model.params, from_s + offset_s, to_s + offset_s);

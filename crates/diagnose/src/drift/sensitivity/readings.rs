@@ -7,7 +7,7 @@ use crate::drift::runs::time_axis::{CampaignStep, Segment};
 use crate::drift::sensitivity::drive::Prediction;
 use crate::drift::sensitivity::perturbations::{PERTURBATIONS, difference_step};
 use mapper_core::Channel;
-use mapper_observe::channels::{DRIVERS, OUTPUTS};
+use mapper_observe::channels::{INPUT_CHANNELS, OUTPUTS};
 use mapper_observe::perturbation::Perturbation;
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
@@ -92,7 +92,7 @@ impl Readings {
 
     /// The part of a signature that a model run with the drift contains: all but the drift of output sensors.
     pub fn model_signature(&self, cause: Cause) -> Option<Response> {
-        self.signature_of(cause, |channel| DRIVERS.contains(channel))
+        self.signature_of(cause, |channel| INPUT_CHANNELS.contains(channel))
     }
 
     fn signature_of(&self, cause: Cause, counts: impl Fn(&Channel) -> bool) -> Option<Response> {
@@ -113,7 +113,7 @@ impl Readings {
 
     fn sensor_signature(&self, channel: Channel) -> Option<Response> {
         // An input that reads too high drives the model too high: the true value is lower.
-        if DRIVERS.contains(&channel) {
+        if INPUT_CHANNELS.contains(&channel) {
             return Some(self.response(Perturbation::Input(channel))? * -1.0);
         }
         let is_compared = self.columns.iter().any(|column| OUTPUTS[*column] == channel);

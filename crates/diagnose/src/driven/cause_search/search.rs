@@ -4,7 +4,7 @@ use crate::driven::cause_search::fit::{Fit, SideProblem};
 use crate::driven::cause_search::sides::side::SideModel;
 use crate::gap::best_fit::coordinate::Coordinate;
 use crate::gap::causes::calibration::Calibration;
-use crate::gap::causes::weigh::prior_of_number;
+use crate::gap::causes::probabilities::prior_of_number;
 use crate::gap::next_experiment::best_experiment::SETTLED;
 use crate::gap::residuals::study::{Hypothesis, members};
 use mapper_inference::search::{Causes, Known, Limits, Offer, extend};
@@ -156,7 +156,11 @@ pub(crate) struct CauseProbabilities {
 }
 
 /// Probabilities of the causes of a search among this number of effects.
-pub(crate) fn weigh(calibration: &Calibration, effects: usize, found: &SearchResult) -> CauseProbabilities {
+pub(crate) fn cause_probabilities(
+    calibration: &Calibration,
+    effects: usize,
+    found: &SearchResult,
+) -> CauseProbabilities {
     let all: Vec<&Fit> = std::iter::once(&found.null).chain(&found.fits).collect();
     let inside = |fit: &Fit| weight(calibration, effects, fit) + (1.0 - PRIOR_OUTSIDE).ln();
     let outside = |fit: &Fit| fit.score_outside + prior(calibration, effects, fit) + PRIOR_OUTSIDE.ln();

@@ -22,9 +22,9 @@ pub struct Calibration {
     pub prior_triple: f64,
     /// Factor on the parameters' standard errors.
     pub interval_factor: f64,
-    /// Share of recordings with causes of the catalogue in which these are not among the candidates.
+    /// Share of recordings with causes of the effect library in which these are not among the candidates.
     pub unlisted: f64,
-    /// Logistic model of an unmodelled cause: offset, and slopes of the [`counted`] features.
+    /// Logistic model of an unmodelled cause: offset, and slopes of the [`logistic_features`].
     pub outside: [f64; 3],
 }
 
@@ -42,7 +42,8 @@ impl Calibration {
     /// Probability of an unmodelled cause, given smooth misfit and scatter of the best fit, in standard deviations.
     pub fn outside(&self, features: [f64; 2]) -> f64 {
         let [offset, slopes @ ..] = self.outside;
-        let x = offset + slopes.iter().zip(counted(features)).map(|(slope, x)| slope * x).sum::<f64>();
+        let x =
+            offset + slopes.iter().zip(logistic_features(features)).map(|(slope, x)| slope * x).sum::<f64>();
         1.0 / (1.0 + (-x).exp())
     }
 }
@@ -53,7 +54,7 @@ const MAX: f64 = 500.0;
 /// Transforms the features of an unmodelled cause for its logistic model. Smooth misfit enters as half its square, the negative
 /// log-probability under noise. Scatter enters by order of magnitude: it grows with any cause, which linearised models follow only to a few per
 /// cent.
-pub fn counted([smooth_sigma, scatter_sigma]: [f64; 2]) -> [f64; 2] {
+pub fn logistic_features([smooth_sigma, scatter_sigma]: [f64; 2]) -> [f64; 2] {
     let unlikely = 0.5 * smooth_sigma.max(0.0).powi(2);
     [unlikely.min(MAX), scatter_sigma.max(0.0).asinh()]
 }

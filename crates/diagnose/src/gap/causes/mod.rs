@@ -3,6 +3,6 @@
 pub mod additions;
 pub mod calibration;
 pub(crate) mod place;
+pub mod probabilities;
 pub(crate) mod select;
 pub(crate) mod smallest_seen;
-pub mod weigh;

@@ -5,7 +5,7 @@ use crate::gap::best_fit::fit::{Effort, Fit, MAX_SIGMAS, Start, fit};
 use crate::gap::best_fit::selection::Selection;
 use crate::gap::causes::additions::{Addition, additions, additions_of};
 use crate::gap::causes::calibration::Calibration;
-use crate::gap::causes::weigh::{prior, weight};
+use crate::gap::causes::probabilities::{prior, weight};
 use crate::gap::residuals::study::{PredictError, Study, members};
 use crate::gap::residuals::whiten::Linearised;
 use mapper_core::half_width_95;

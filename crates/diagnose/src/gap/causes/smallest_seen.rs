@@ -5,7 +5,7 @@ use crate::gap::best_fit::normal::PRIOR_STEPS;
 use crate::gap::best_fit::projector::Projector;
 use crate::gap::best_fit::selection::Selection;
 use crate::gap::causes::calibration::Calibration;
-use crate::gap::causes::weigh::prior_of_number;
+use crate::gap::causes::probabilities::prior_of_number;
 use crate::gap::findings::in_words;
 use crate::gap::findings::report::SmallestSeen;
 use crate::gap::residuals::study::Study;
@@ -16,8 +16,8 @@ use mapper_numerics::statistics::NORMAL_95;
 use mapper_physics::rig::effect::{EffectInfo, EffectParameter};
 
 /// Maximum number of runs to find a size, and the tolerance in the logarithm of the length: a tenth of a size does not change a plan.
-const LOOKS: usize = 6;
-const NEAR: f64 = 0.1;
+const MAX_RUNS: usize = 6;
+const LN_LENGTH_TOLERANCE: f64 = 0.1;
 
 /// Smallest size at which a recording shows an effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,7 +53,7 @@ pub fn smallest_size(
     let furthest = away(value_at(here * 1e9));
     let (mut smallest, mut acts) = (None::<f64>, false);
     let mut before: Option<(f64, f64)> = None;
-    for _ in 0..LOOKS {
+    for _ in 0..MAX_RUNS {
         let sigma = length(value_at(here))?;
         if sigma <= ROUNDING || here == 0.0 {
             break;
@@ -68,7 +68,7 @@ pub fn smallest_size(
         if sigma > 0.9 * wanted && smallest.is_none_or(|other| here.abs() < other.abs()) {
             smallest = Some(here);
         }
-        if (sigma / wanted).ln().abs() < NEAR {
+        if (sigma / wanted).ln().abs() < LN_LENGTH_TOLERANCE {
             break;
         }
         // Effects are nonlinear: interpolate with the power law of two runs.

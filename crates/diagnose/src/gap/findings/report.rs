@@ -34,7 +34,7 @@ pub struct Diagnosis {
     /// Causes, best first.
     pub candidates: Vec<Candidate>,
     /// Tolerances that end beyond three sigmas of their prior in the reported fit, furthest first: suspects.
-    pub suspects: Vec<Strained>,
+    pub suspects: Vec<BeyondPrior>,
     /// Parts of the machine whose causes fit this recording equally well; empty if the named cause is the only one.
     pub inseparable: Vec<String>,
     /// Probability that nothing is beyond tolerance.
@@ -46,7 +46,7 @@ pub struct Diagnosis {
     /// Laws for the gap that the effect library does not explain, best first; empty if none is proposed.
     pub laws: Vec<Law>,
     /// Residual source term of each balance, if it is the only one, most probable first; empty without a search.
-    pub forces: Vec<MissingForce>,
+    pub forces: Vec<MissingSource>,
     /// The gap before and after the best cause.
     pub gap: Gap,
     /// Suggested next step; `None` if the diagnosis is settled.
@@ -179,7 +179,7 @@ pub struct LawTerm {
 
 /// Residual source term of one balance, assuming that it is the only one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct MissingForce {
+pub struct MissingSource {
     /// Part of the model.
     pub submodel: String,
     /// The missing quantity.
@@ -248,7 +248,7 @@ pub struct PointGap {
 
 /// A tolerance or offset outside its prior.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Strained {
+pub struct BeyondPrior {
     /// Name.
     pub what: String,
     /// Absolute deviation in declared sigmas, above 3.
@@ -280,7 +280,7 @@ pub struct Gap {
     /// Its share of the gap.
     pub largest_share: f64,
     /// The tolerance furthest outside its prior without a cause; `None` if all are within three sigmas.
-    pub strained: Option<Strained>,
+    pub strained: Option<BeyondPrior>,
     /// Channels that the cause makes worse.
     pub worse: Vec<String>,
     /// Indices of the steps held out in one of the folds; empty if there are too few steps. Files use numbers, from 1.

@@ -1,6 +1,6 @@
 //! Gap reduction by a cause on held-out steps, with cross-validation folds and confidence interval.
 
+pub mod beyond_prior;
 pub mod folds;
 pub(crate) mod gap_distribution;
-pub mod how_far;
-pub mod strain;
+pub mod held_out_gap;

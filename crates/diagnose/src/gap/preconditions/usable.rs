@@ -8,7 +8,7 @@ use crate::gap::residuals::study::Study;
 use mapper_core::{Channel, Recording};
 use mapper_numerics::statistics::median;
 use mapper_observe::averages::time_table::Table;
-use mapper_observe::channels::DRIVERS;
+use mapper_observe::channels::INPUT_CHANNELS;
 use mapper_observe::declared::Declared;
 use mapper_observe::plausible::check_running;
 use mapper_physics::rig::effect::Effect;
@@ -82,7 +82,7 @@ pub fn usable(recording: &Recording, table: &Table, declared: &Declared) -> Resu
     {
         warnings.push(GapWarning::ChannelNotRecorded { channel });
     }
-    for channel in DRIVERS {
+    for channel in INPUT_CHANNELS {
         if table.column(channel).is_none() {
             warnings.push(GapWarning::InputNotRecorded { channel });
         }

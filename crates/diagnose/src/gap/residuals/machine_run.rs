@@ -3,7 +3,7 @@
 use crate::gap::residuals::hypothesis::Hypothesis;
 use crate::gap::residuals::nuisance::{NuisanceKind, OUTPUTS};
 use mapper_core::Channel;
-use mapper_observe::channels::DRIVERS;
+use mapper_observe::channels::INPUT_CHANNELS;
 use mapper_physics::rig::effect::{Effect, EffectParameter, Rig, add};
 use mapper_physics::rig::instruments::{Surroundings, true_value};
 use mapper_physics::simulation::model::{Outputs, PreparedModel, State};
@@ -62,7 +62,7 @@ pub(crate) fn acts_on_machine(nominal: &Rig, effect: &dyn Effect) -> bool {
     rig.model.params != nominal.model.params
         || !Arc::ptr_eq(&rig.model.map, &nominal.model.map)
         || !rig.model.hooks.is_empty()
-        || !DRIVERS.iter().all(same_path)
+        || !INPUT_CHANNELS.iter().all(same_path)
 }
 
 impl NuisanceKind {
@@ -70,7 +70,7 @@ impl NuisanceKind {
     pub(crate) fn is_on_machine(self) -> bool {
         match self {
             NuisanceKind::TurbineDrop | NuisanceKind::Delay(_) | NuisanceKind::Structure(..) => false,
-            NuisanceKind::Offset(channel) | NuisanceKind::Gain(channel) => DRIVERS.contains(&channel),
+            NuisanceKind::Offset(channel) | NuisanceKind::Gain(channel) => INPUT_CHANNELS.contains(&channel),
             NuisanceKind::CommonOffset(_) | NuisanceKind::Perturbation(_) | NuisanceKind::Shape(_) => true,
         }
     }

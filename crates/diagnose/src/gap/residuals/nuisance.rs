@@ -3,7 +3,7 @@
 
 use crate::gap::residuals::shape::SHAPES;
 use mapper_core::{Channel, Dimension};
-use mapper_observe::channels::{self, DRIVERS};
+use mapper_observe::channels::{self, INPUT_CHANNELS};
 use mapper_observe::declared::Declared;
 use mapper_observe::perturbation::Perturbation;
 use mapper_physics::rig::effect::Rig;
@@ -71,7 +71,7 @@ impl std::fmt::Display for NuisanceKind {
                 f.write_str("external_convection")
             }
             NuisanceKind::Perturbation(Perturbation::OilConductance) => f.write_str("oil_conductance"),
-            NuisanceKind::Perturbation(knob) => write!(f, "{knob:?}"),
+            NuisanceKind::Perturbation(perturbation) => write!(f, "{perturbation:?}"),
             NuisanceKind::TurbineDrop => f.write_str("turbine_drop"),
             NuisanceKind::Shape(i) => write!(f, "efficiency_shape {i}"),
             NuisanceKind::Delay(output) => write!(f, "delay of {}", OUTPUTS[*output]),
@@ -122,23 +122,25 @@ pub(crate) fn structure_delay_s(declared: &Declared, output: usize) -> f64 {
 pub fn nuisances(declared: &Declared) -> Vec<Nuisance> {
     use NuisanceKind as K;
     let t = &declared.tolerances;
-    let knob = |knob: Perturbation| (K::Perturbation(knob), knob.tolerance(t));
+    let perturbation =
+        |perturbation: Perturbation| (K::Perturbation(perturbation), perturbation.tolerance(t));
     let mut all: Vec<(NuisanceKind, f64)> = vec![
-        knob(Perturbation::Flow),
-        knob(Perturbation::Efficiency),
-        knob(Perturbation::TurbineEfficiency),
+        perturbation(Perturbation::Flow),
+        perturbation(Perturbation::Efficiency),
+        perturbation(Perturbation::TurbineEfficiency),
         (K::TurbineDrop, TURBINE_DROP_RATIO),
-        knob(Perturbation::ValveArea),
-        knob(Perturbation::CompressorConvection),
-        knob(Perturbation::ExternalConvection),
-        knob(Perturbation::OilConductance),
-        knob(Perturbation::Ambient),
-        knob(Perturbation::StartTc),
-        knob(Perturbation::StartTt),
+        perturbation(Perturbation::ValveArea),
+        perturbation(Perturbation::CompressorConvection),
+        perturbation(Perturbation::ExternalConvection),
+        perturbation(Perturbation::OilConductance),
+        perturbation(Perturbation::Ambient),
+        perturbation(Perturbation::StartTc),
+        perturbation(Perturbation::StartTt),
     ];
     // Each has the declared size, although the root mean square of all is then 1.7 of it: a deviation of one corner of the map is plausible.
     all.extend((0..SHAPES).map(|i| (K::Shape(i), t.efficiency_shape_ratio)));
-    let sensors = DRIVERS.iter().chain(OUTPUTS.iter().filter(|channel| !DRIVERS.contains(channel)));
+    let sensors =
+        INPUT_CHANNELS.iter().chain(OUTPUTS.iter().filter(|channel| !INPUT_CHANNELS.contains(channel)));
     all.extend(sensors.clone().map(|channel| (K::Offset(*channel), declared.offset_sigma(*channel))));
     all.extend(sensors.map(|channel| (K::Gain(*channel), declared.of(*channel).gain_sigma_ratio)));
     all.extend(declared.common_offsets.iter().filter_map(|common| {
@@ -159,9 +161,9 @@ pub fn nuisances(declared: &Declared) -> Vec<Nuisance> {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Circumstances {
     /// Perturbations of the ambient temperature and the start, each in its unit.
-    pub knobs: Vec<(Perturbation, f64)>,
-    /// Errors of the sensors of [`DRIVERS`], in their order: without them, the inputs are those of the machine.
-    pub paths: [ChannelPath; DRIVERS.len()],
+    pub perturbations: Vec<(Perturbation, f64)>,
+    /// Errors of the sensors of [`INPUT_CHANNELS`], in their order: without them, the inputs are those of the machine.
+    pub paths: [ChannelPath; INPUT_CHANNELS.len()],
     /// Relative increase of the temperature drop through the turbine.
     pub t4_drop_ratio: f64,
     /// Coefficients of the efficiency map's shape.
@@ -195,11 +197,13 @@ pub fn apply(
             path.offset += value * gain_error(channel, 0.0, declared.rest_pressure_pa());
         }
         // The cell sensor reads too high by this amount, so the model is driven with less.
-        K::Perturbation(Perturbation::Ambient) => circumstances.knobs.push((Perturbation::Ambient, -value)),
-        K::Perturbation(knob @ (Perturbation::StartTc | Perturbation::StartTt)) => {
-            circumstances.knobs.push((knob, value))
+        K::Perturbation(Perturbation::Ambient) => {
+            circumstances.perturbations.push((Perturbation::Ambient, -value))
         }
-        K::Perturbation(knob) => knob.turn(&mut rig.model.params, value),
+        K::Perturbation(perturbation @ (Perturbation::StartTc | Perturbation::StartTt)) => {
+            circumstances.perturbations.push((perturbation, value))
+        }
+        K::Perturbation(perturbation) => perturbation.adjust_machine(&mut rig.model.params, value),
         K::TurbineDrop => circumstances.t4_drop_ratio += value,
         K::Shape(i) => circumstances.shape[i] += value,
         K::Delay(i) => circumstances.delay_s[i] += value,

@@ -246,8 +246,8 @@ impl Study {
         let guess = estimate_state(&boundary, read);
         let held = (!self.rested).then(|| with_metal_held(&rig.model));
         let mut start = settle(held.as_ref().unwrap_or(&rig.model), &boundary, guess)?;
-        for (knob, by) in &circumstances.knobs {
-            knob.start(&mut start, *by);
+        for (perturbation, by) in &circumstances.perturbations {
+            perturbation.adjust_initial_state(&mut start, *by);
         }
         Ok(start)
     }

@@ -12,7 +12,7 @@ use mapper_core::{Channel, Recording, StepMarker};
 use mapper_observe::averages::block::{Block, block_mean, blocks};
 use mapper_observe::averages::schedule::Schedule;
 use mapper_observe::averages::time_table::Table;
-use mapper_observe::channels::DRIVERS;
+use mapper_observe::channels::INPUT_CHANNELS;
 use mapper_observe::declared::Declared;
 use mapper_observe::model_inputs::smoothed_inputs::SmoothedInputs;
 use mapper_observe::model_inputs::step_timing::{Times, with_command_times};
@@ -291,7 +291,7 @@ impl Study {
             rig.model.map =
                 Arc::new(ShapedMap { inner: rig.model.map.clone(), coefficients: circumstances.shape });
         }
-        circumstances.paths = DRIVERS.map(|channel| *rig.instruments.path(channel));
+        circumstances.paths = INPUT_CHANNELS.map(|channel| *rig.instruments.path(channel));
         Ok((rig, circumstances))
     }
 

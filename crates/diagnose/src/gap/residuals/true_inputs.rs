@@ -2,7 +2,7 @@
 
 use crate::gap::residuals::nuisance::Circumstances;
 use mapper_core::Channel;
-use mapper_observe::channels::{DRIVERS, boundary_condition};
+use mapper_observe::channels::{INPUT_CHANNELS, boundary_condition};
 use mapper_observe::model_inputs::smoothed_inputs::SmoothedInputs;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::rig::instruments::{ChannelPath, Surroundings};
@@ -63,15 +63,15 @@ impl Inputs for TrueInputs<'_> {
     fn at(&self, t_s: f64) -> BoundaryConditions {
         let mut boundary = self.recorded.at(t_s);
         let opening_ratio = boundary.valve_opening_ratio;
-        for (channel, path) in DRIVERS.into_iter().zip(&self.circumstances.paths) {
+        for (channel, path) in INPUT_CHANNELS.into_iter().zip(&self.circumstances.paths) {
             if *path != ChannelPath::default()
                 && let Some(value) = boundary_condition(&mut boundary, channel)
             {
                 *value = self.true_value(t_s, channel, path, *value, opening_ratio);
             }
         }
-        for (knob, by) in &self.circumstances.knobs {
-            knob.shift(&mut boundary, *by);
+        for (perturbation, by) in &self.circumstances.perturbations {
+            perturbation.adjust_boundary(&mut boundary, *by);
         }
         boundary
     }

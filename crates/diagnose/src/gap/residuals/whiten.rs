@@ -6,7 +6,7 @@ use crate::gap::residuals::study::{Hypothesis, PredictError, Prediction, Study};
 use mapper_core::Channel;
 use mapper_numerics::coloured_noise::{ColouredNoise, WhiteningFactor, covariance_of_means};
 use mapper_numerics::parallel;
-use mapper_observe::channels::DRIVERS;
+use mapper_observe::channels::INPUT_CHANNELS;
 use mapper_observe::model_inputs::smoothed_inputs::InputNoise;
 use mapper_observe::perturbation::UNINFORMATIVE;
 use nalgebra::DMatrix;
@@ -260,7 +260,7 @@ fn covariances(
     let lost_to_surge = lost_to_surge(study, nothing);
     let structural = step_errors(study, &base.slopes);
     // Response of every value to a unit of each input, from the response to its offset.
-    let responses: Vec<(InputNoise, &Vec<f64>, f64)> = DRIVERS
+    let responses: Vec<(InputNoise, &Vec<f64>, f64)> = INPUT_CHANNELS
         .iter()
         .zip(study.inputs.noise())
         .filter_map(|(channel, noise)| {

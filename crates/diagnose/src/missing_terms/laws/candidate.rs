@@ -2,7 +2,7 @@
 
 use crate::gap::best_fit::fit::{Effort, Fit, Start, fit};
 use crate::gap::best_fit::selection::Selection;
-use crate::gap::causes::weigh::MAX_EQUIVALENT;
+use crate::gap::causes::probabilities::MAX_EQUIVALENT;
 use crate::gap::residuals::study::{Hypothesis, Study};
 use crate::gap::residuals::whiten::Linearised;
 use crate::missing_terms::search::select::Choice;

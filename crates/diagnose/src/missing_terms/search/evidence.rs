@@ -12,7 +12,11 @@ pub struct LinearEvidence {
 }
 
 /// Evidence of the terms at `places` of the projected products, whose last row and column belong to the residual; `prior_sigma` in steps.
-pub fn weigh(products: &DMatrix<f64>, places: &[usize], prior_sigma: f64) -> Option<LinearEvidence> {
+pub fn linear_evidence(
+    products: &DMatrix<f64>,
+    places: &[usize],
+    prior_sigma: f64,
+) -> Option<LinearEvidence> {
     let last = products.nrows() - 1;
     let k = places.len();
     let mut matrix = DMatrix::from_fn(k, k, |i, j| products[(places[i], places[j])]);

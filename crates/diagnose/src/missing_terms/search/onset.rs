@@ -1,9 +1,9 @@
 //! Laws that begin during a recording.
 
 use crate::gap::best_fit::normal::PRIOR_STEPS;
-use crate::gap::causes::weigh::MAX_EQUIVALENT;
+use crate::gap::causes::probabilities::MAX_EQUIVALENT;
 use crate::missing_terms::search::columns::{Base, Products};
-use crate::missing_terms::search::evidence::weigh;
+use crate::missing_terms::search::evidence::linear_evidence;
 use crate::missing_terms::search::residual_source::in_each_step;
 use crate::missing_terms::search::select::Choice;
 use crate::missing_terms::terms::expression::{Expression, product};
@@ -67,7 +67,7 @@ pub fn begun(
                     .iter()
                     .map(|term| Some(terms.iter().position(|other| other == term)? * steps + begin))
                     .collect();
-                let Some(evidence) = weigh(&projected, &places?, PRIOR_STEPS) else { continue };
+                let Some(evidence) = linear_evidence(&projected, &places?, PRIOR_STEPS) else { continue };
                 let coefficients: Vec<f64> = evidence.coefficients.iter().copied().collect();
                 let wrong = choice
                     .terms

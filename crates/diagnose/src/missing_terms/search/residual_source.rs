@@ -34,7 +34,7 @@ const RUN: [Balance; 8] = [
 
 /// A balance with its residual source term.
 #[derive(Debug, Clone)]
-pub struct Force {
+pub struct ResidualSource {
     /// The balance.
     pub balance: Balance,
     /// Log evidence relative to none.
@@ -52,13 +52,17 @@ pub fn balances(study: &Study) -> Vec<Balance> {
 }
 
 /// Residual source terms of all `wanted` balances, each assumed to be the only one; best evidence first.
-pub fn forces(base: &Base<'_>, counts: &[bool], wanted: &dyn Fn(&Balance) -> bool) -> Vec<Force> {
+pub fn residual_sources(
+    base: &Base<'_>,
+    counts: &[bool],
+    wanted: &dyn Fn(&Balance) -> bool,
+) -> Vec<ResidualSource> {
     let study = base.study;
     let points = study.points(&study.nothing()).unwrap_or_default();
     let balances: Vec<Balance> = balances(study).into_iter().filter(wanted).collect();
-    let mut found: Vec<Force> = parallel::map(&balances, |balance| {
+    let mut found: Vec<ResidualSource> = parallel::map(&balances, |balance| {
         let columns = columns(base, *balance);
-        force(base, *balance, &columns, counts, &points)
+        residual_source(base, *balance, &columns, counts, &points)
     })
     .into_iter()
     .flatten()
@@ -134,13 +138,13 @@ pub fn in_each_step(
     columns
 }
 
-fn force(
+fn residual_source(
     base: &Base<'_>,
     balance: Balance,
     columns: &[Vec<f64>],
     counts: &[bool],
     points: &[PointState],
-) -> Option<Force> {
+) -> Option<ResidualSource> {
     let whitened: Vec<Vec<f64>> = columns
         .iter()
         .map(|column| {
@@ -177,7 +181,7 @@ fn force(
             *sum += mean * change;
         }
     }
-    Some(Force { balance, gain: best.gain, signature, levels })
+    Some(ResidualSource { balance, gain: best.gain, signature, levels })
 }
 
 /// Correlation lengths of a source term over speed, rpm, and opening.

@@ -1,7 +1,7 @@
 //! Selects the few library terms that explain the recording, in closed form.
 
 use crate::gap::best_fit::normal::PRIOR_STEPS;
-use crate::missing_terms::search::evidence::{LinearEvidence, weigh};
+use crate::missing_terms::search::evidence::{LinearEvidence, linear_evidence};
 use crate::missing_terms::terms::term::{Role, Term};
 use nalgebra::DMatrix;
 
@@ -24,7 +24,8 @@ pub struct Choice {
 pub fn choices(library: &[Term], usable: &[usize], products: &DMatrix<f64>) -> Vec<Choice> {
     let mut found: Vec<Choice> = Vec::new();
     let mut offer = |places: &[usize], rarity: f64| {
-        let Some(LinearEvidence { gain, coefficients }) = weigh(products, places, PRIOR_STEPS) else {
+        let Some(LinearEvidence { gain, coefficients }) = linear_evidence(products, places, PRIOR_STEPS)
+        else {
             return;
         };
         let terms: Vec<usize> = places.iter().map(|place| usable[*place]).collect();

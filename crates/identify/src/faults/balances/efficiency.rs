@@ -139,8 +139,10 @@ pub(crate) fn rows(
         })
     });
     let by_reading = by_reading.collect();
-    let readings =
-        known.iter().map(|(row, readings, _)| as_gains_count(readings, fitted.eta.values[*row])).collect();
+    let readings = known
+        .iter()
+        .map(|(row, readings, _)| at_gain_temperature(readings, fitted.eta.values[*row]))
+        .collect();
     // It changes the slope of T2 over Tc, which convection absorbs, and nothing at equal temperatures.
     let by_fault = vec![(Channel::T2, FaultKind::TowardsWall, vec![0.0; count])];
     Some(Rows { residual, covariance, readings, by_reading, by_machine, by_fault })
@@ -160,7 +162,7 @@ pub(crate) fn measured(fitted: &FittedEfficiencies, readings: &[Option<Readings>
         by_reading: known.iter().map(by_reading).collect(),
         readings: known
             .iter()
-            .map(|(row, readings)| as_gains_count(readings, fitted.eta.values[*row]))
+            .map(|(row, readings)| at_gain_temperature(readings, fitted.eta.values[*row]))
             .collect(),
         by_machine: Vec::new(),
         by_fault: vec![(Channel::T2, FaultKind::TowardsWall, vec![0.0; count])],
@@ -191,7 +193,7 @@ fn heat(readings: &Readings, eta: f64) -> f64 {
 
 /// Readings with the temperature at which a gain of T2 or Tc applies. Such a gain also changes the slope of T2 over Tc, which convection
 /// absorbs. The remaining effect is the error at equal temperatures, at the temperature after compression without heat.
-fn as_gains_count(readings: &Readings, eta: f64) -> Readings {
+fn at_gain_temperature(readings: &Readings, eta: f64) -> Readings {
     let mut other = *readings;
     [other.values[1], other.values[2]] = [compressed(readings, eta); 2];
     other

@@ -70,7 +70,7 @@ pub(crate) fn input_noise(
 fn ideal_gas(setting: &Setting, member: &Member<'_>, shared: &SharedVector) -> Vec<f64> {
     let mut ideal = *shared;
     ideal[PROBE_MM2] = 0.0;
-    setting.predict(&member.course, &ideal, &member.local, &[false; SHARED], false).t2_k
+    setting.predict(&member.history, &ideal, &member.local, &[false; SHARED], false).t2_k
 }
 
 /// One noise sequence, as block means.

@@ -44,7 +44,7 @@ impl InputNoiseSpline {
     }
 
     /// Variance of half the slope: the effect of the recording's own noise on the probe, in addition to least squares.
-    pub(crate) fn pull_variance(&self, square_mm2: f64) -> f64 {
+    pub(crate) fn half_slope_variance(&self, square_mm2: f64) -> f64 {
         let after = self.squares_mm2.partition_point(|knot| *knot <= square_mm2);
         let segment = after.saturating_sub(1).min(self.slope_variances.len().saturating_sub(1));
         0.25 * self.slope_variances.get(segment).copied().unwrap_or(0.0)

@@ -2,7 +2,7 @@
 //! and the shared ones, so they are eliminated step by step.
 
 use crate::joint::fit::input_noise_spline::InputNoiseSpline;
-use crate::joint::step_model::model::{Course, Setting};
+use crate::joint::step_model::model::{Setting, StepHistory};
 use crate::joint::step_model::parameters::{
     ETA, LOCAL, LocalVector, OFFSETS, PROBE_MM2, Prior, REFINEMENTS, SHARED, SURFACE, SharedVector,
 };
@@ -17,7 +17,7 @@ use nalgebra::{DMatrix, DVector, Matrix4, Matrix4xX, Vector4};
 /// One step in the fit.
 #[derive(Debug, Clone)]
 pub(crate) struct Member<'a> {
-    pub(crate) course: Course<'a>,
+    pub(crate) history: StepHistory<'a>,
     /// Measured T2 of each row, K.
     pub(crate) measured_k: Vec<f64>,
     pub(crate) whitening: WhiteningFilter,
@@ -122,7 +122,7 @@ impl Problem<'_> {
         let mut none = [false; SHARED];
         none[PROBE_MM2] = self.active[PROBE_MM2];
         let prediction =
-            self.setting.predict(&member.course, shared, local, by.unwrap_or(&none), by.is_some());
+            self.setting.predict(&member.history, shared, local, by.unwrap_or(&none), by.is_some());
         let mut residual: Vec<f64> = member
             .measured_k
             .iter()
@@ -280,7 +280,7 @@ impl Problem<'_> {
         self.members
             .iter()
             .filter_map(|member| {
-                let end = member.course.rows.last()?;
+                let end = member.history.rows.last()?;
                 Some(self.setting.ln_inlet_ratio_at(end, &self.shared, &member.local))
             })
             .collect()
@@ -403,8 +403,9 @@ impl Problem<'_> {
         for (row, index) in fitted[..sought].iter().enumerate() {
             let pulled = inverse.column(row).into_owned();
             if *index == PROBE_MM2 {
-                inverse +=
-                    self.input_noise.pull_variance(self.shared[PROBE_MM2]) * &pulled * pulled.transpose();
+                inverse += self.input_noise.half_slope_variance(self.shared[PROBE_MM2])
+                    * &pulled
+                    * pulled.transpose();
             }
         }
         let inverse = inverse;

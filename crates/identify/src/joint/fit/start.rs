@@ -4,7 +4,7 @@ use crate::faults::smooth::ANY_ROUGHNESS;
 use crate::joint::fit::inlet;
 use crate::joint::fit::input_noise_spline::InputNoiseSpline;
 use crate::joint::fit::solve::{Member, Problem};
-use crate::joint::step_model::model::{Course, Setting};
+use crate::joint::step_model::model::{Setting, StepHistory};
 use crate::joint::step_model::parameters::{
     ALPHA, BAROMETER, BENDS, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, GAIN_CHANNELS, GAINS, HUMIDITY, INLET,
     LN_AREA, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, LOCAL, OFFSET_CHANNELS, OFFSETS, PROBE_MM2, Prior,
@@ -232,7 +232,7 @@ pub(crate) fn member<'a>(
     // Refined from the residual.
     let noise_k = usual_noise_sigma(Channel::T2);
     Member {
-        course: Course { rows: &step.rows, terms },
+        history: StepHistory { rows: &step.rows, terms },
         measured_k: step.rows.iter().map(|row| row.t2_k).collect(),
         whitening: whitening(step, config, noise_k, noise_k, |_| 0.0),
         coupling: std::array::from_fn(|i| {
@@ -336,7 +336,7 @@ pub(crate) fn set_weights(problem: &mut Problem<'_>, steps: &[StepRows], config:
             expected.sqrt()
         } else {
             let prediction = problem.setting.predict(
-                &member.course,
+                &member.history,
                 &problem.shared,
                 &member.local,
                 &[false; SHARED],
@@ -351,7 +351,7 @@ pub(crate) fn set_weights(problem: &mut Problem<'_>, steps: &[StepRows], config:
             problem.members[i].coupling[BENDS..].copy_from_slice(&coupled);
         }
         let white_sigma_k = if expected > 0.0 { declared[1].max(0.1 * sigma_k) } else { sigma_k };
-        let terms = &problem.members[i].course.terms;
+        let terms = &problem.members[i].history.terms;
         let surface = crate::joint::step_model::model::surface_of(&problem.shared);
         let shape_k = |row: usize| terms.get(row).map_or(0.0, |terms| by_eta * dot(terms, surface));
         let new = whitening(step, config, sigma_k, white_sigma_k, shape_k);

@@ -33,7 +33,7 @@ pub(crate) struct Setting {
 
 /// The model's data of a step: its rows, and the surface terms at each row minus those at the step's end.
 #[derive(Debug, Clone)]
-pub(crate) struct Course<'a> {
+pub(crate) struct StepHistory<'a> {
     pub(crate) rows: &'a [Row],
     pub(crate) terms: Vec<[f64; TERM_COUNT]>,
 }
@@ -212,7 +212,7 @@ impl Setting {
 
     /// Derivative of T2 at a step's end with respect to each reading: T1, T2, Tc, P1, P2, flow. Gives the effect of sensor noise.
     pub(crate) fn sensitivities(&self, end: &Row, shared: &SharedVector, local: &LocalVector) -> [f64; 6] {
-        let course = Course { rows: std::slice::from_ref(end), terms: vec![[0.0; TERM_COUNT]] };
+        let history = StepHistory { rows: std::slice::from_ref(end), terms: vec![[0.0; TERM_COUNT]] };
         let ideal = {
             let mut ideal = *shared;
             ideal[PROBE_MM2] = 0.0;
@@ -220,7 +220,7 @@ impl Setting {
         };
         let mut active = [false; SHARED];
         active[OFFSETS..=FLOW_GAIN].fill(true);
-        let columns = self.predict(&course, &ideal, local, &active, true).columns;
+        let columns = self.predict(&history, &ideal, local, &active, true).columns;
         let at = |index: usize| columns.get(index).and_then(|column| column.first()).copied().unwrap_or(0.0);
         [
             at(OFFSETS),
@@ -246,13 +246,13 @@ impl Setting {
     /// Predicts T2, with derivatives by the parameters in `active` and by those of the step if `derivatives` is set.
     pub(crate) fn predict(
         &self,
-        course: &Course<'_>,
+        history: &StepHistory<'_>,
         shared: &SharedVector,
         local: &LocalVector,
         active: &[bool; SHARED],
         derivatives: bool,
     ) -> Prediction {
-        let n = course.rows.len();
+        let n = history.rows.len();
         let mut gas_k = Vec::with_capacity(n);
         let mut columns = vec![Vec::new(); if derivatives { SHARED + LOCAL } else { 0 }];
         if derivatives {
@@ -263,7 +263,7 @@ impl Setting {
             }
         }
         let (alpha, ln_direction, deviation) = (shared[ALPHA], shared[LN_DIRECTION], local[LN_DEVIATION]);
-        for (i, (row, terms)) in course.rows.iter().zip(&course.terms).enumerate() {
+        for (i, (row, terms)) in history.rows.iter().zip(&history.terms).enumerate() {
             let gas = self.gas(row, terms, shared, local);
             let h = self.h(&gas, shared, deviation);
             let t2_k = self.t2_k(&gas, h, alpha, ln_direction);
@@ -355,7 +355,7 @@ impl Setting {
                 put(HUMIDITY, full(Gas { air, rise_ratio, ..gas }, SLOPE_STEP));
             }
         }
-        self.through_probe(course.rows, gas_k, columns, shared, local, active)
+        self.through_probe(history.rows, gas_k, columns, shared, local, active)
     }
 
     /// Lag of the probe from row to row, for the square of its diameter.

@@ -12,7 +12,7 @@ use mapper_campaign::{Campaign, nominal_model};
 use mapper_diagnose::gap::best_fit::coordinate::coordinates;
 use mapper_diagnose::gap::best_fit::fit::Fit;
 use mapper_diagnose::gap::causes::calibration::Calibration;
-use mapper_diagnose::gap::causes::weigh::weight;
+use mapper_diagnose::gap::causes::probabilities::weight;
 use mapper_diagnose::gap::diagnose::{Diagnosed, GapRequest, diagnose};
 use mapper_diagnose::gap::findings::report::Verdict;
 use mapper_diagnose::gap::residuals::study::{Study, members};

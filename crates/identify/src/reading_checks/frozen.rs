@@ -5,8 +5,8 @@
 
 use crate::IdentifyConfig;
 use crate::needs::needs;
-use crate::objections::ends::Ends;
-use crate::objections::objection::Objection;
+use crate::reading_checks::ends::Ends;
+use crate::reading_checks::failed_check::FailedCheck;
 use crate::step_data::commands::FOLLOWED_S;
 use mapper_core::{Channel, Recording, Series, Warning, jump_ratio};
 use mapper_numerics::statistics::MIN_VALUES;
@@ -21,11 +21,11 @@ struct Run {
     last: usize,
 }
 
-pub(crate) fn objections(
+pub(crate) fn failed_checks(
     recording: &Recording,
     ends: &[Option<Ends>],
     config: &IdentifyConfig,
-) -> Vec<Objection> {
+) -> Vec<FailedCheck> {
     let moves = moves(ends);
     needs(config.method)
         .into_iter()
@@ -50,7 +50,7 @@ fn of_channel(
     channel: Channel,
     moves: bool,
     config: &IdentifyConfig,
-) -> Option<Objection> {
+) -> Option<FailedCheck> {
     let series = recording.series.get(&channel)?;
     let shortest_s = repeats_s(channel);
     let mut long = runs(series, shortest_s);
@@ -83,8 +83,8 @@ fn of_channel(
     let frozen = Warning::FrozenChannel { channel, reading: series.values[longest.first], from_s, to_s };
     // Cleaning removes the constant samples of a channel with declared noise; speed needs no other check.
     let samples_left_out = noisy && channel != Channel::ShaftSpeed;
-    let objection = Objection { samples_left_out, ..Objection::new(frozen, steps) };
-    (!objection.steps.is_empty()).then_some(objection)
+    let failed_check = FailedCheck { samples_left_out, ..FailedCheck::new(frozen, steps) };
+    (!failed_check.steps.is_empty()).then_some(failed_check)
 }
 
 /// The runs of one repeated value that are at least this long.

@@ -4,7 +4,7 @@
 //! jumps of a recording the moment of the largest change is known to a second or two. Two loggers with separate clocks, a filter, or a slow
 //! fieldbus client make a channel late.
 
-use crate::objections::objection::Objection;
+use crate::reading_checks::failed_check::FailedCheck;
 use crate::step_data::commands::begins_with_jump;
 use crate::step_data::samples::slope_per_s;
 use mapper_core::{Channel, Recording, Series, Swapped, Warning, WindowRule};
@@ -25,7 +25,7 @@ const WATCHED: [(Channel, bool); 5] = [
     (Channel::Tc, true),
 ];
 
-pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
+pub(crate) fn failed_checks(recording: &Recording) -> Vec<FailedCheck> {
     let steps = &recording.steps;
     let jumps_s: Vec<f64> = (0..steps.len())
         .filter(|position| begins_with_jump(steps, *position))
@@ -38,7 +38,7 @@ pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
     if jumps_s.len() < MIN_VALUES {
         return Vec::new();
     }
-    let mut found: Vec<Objection> = housing_jumps(recording, &jumps_s).into_iter().collect();
+    let mut found: Vec<FailedCheck> = housing_jumps(recording, &jumps_s).into_iter().collect();
     let lags_s: Vec<(Channel, f64)> = WATCHED
         .into_iter()
         .filter_map(|(channel, slope)| {
@@ -53,14 +53,14 @@ pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
         lags_s.iter().filter(|(_, lag_s)| (lag_s - middle_s).abs() > LATE_S).map(|(channel, lag_s)| {
             let (lag_s, jumps) = (lag_s - middle_s, jumps_s.len());
             let late = Warning::LateChannel { channel: *channel, lag_s, jumps };
-            Objection::to_all(late, recording)
+            FailedCheck::of_all_steps(late, recording)
         });
     found.extend(late);
     found
 }
 
 /// A housing of a kilogram cannot jump with the gas: if Tc jumps more than T2, the two are swapped.
-fn housing_jumps(recording: &Recording, jumps_s: &[f64]) -> Option<Objection> {
+fn housing_jumps(recording: &Recording, jumps_s: &[f64]) -> Option<FailedCheck> {
     let jump_k = |channel: Channel| {
         let series = recording.series.get(&channel)?;
         median(jumps_s.iter().filter_map(|jump_s| change(series, jump_s + LEVEL_S, false)).map(f64::abs))
@@ -68,7 +68,7 @@ fn housing_jumps(recording: &Recording, jumps_s: &[f64]) -> Option<Objection> {
     let (t2_k, tc_k) = (jump_k(Channel::T2)?, jump_k(Channel::Tc)?);
     (tc_k > 2.0 * t2_k).then(|| {
         let swapped = Swapped::TcBeforeT2 { tc_jump_k: tc_k, t2_jump_k: t2_k };
-        Objection::to_all(Warning::SwappedChannels(swapped), recording)
+        FailedCheck::of_all_steps(Warning::SwappedChannels(swapped), recording)
     })
 }
 

@@ -3,15 +3,15 @@
 //!
 //! A wrong unit changes it far more than machines differ: 1/s for rpm by 60, kg/h for kg/s by 60.
 
-use crate::objections::ends::Ends;
-use crate::objections::objection::Objection;
+use crate::reading_checks::ends::Ends;
+use crate::reading_checks::failed_check::FailedCheck;
 use mapper_core::{Scaled, Warning};
 use mapper_numerics::statistics::median;
 
 /// Limits for the median of a campaign's points, with a wide margin about real machines.
 const POSSIBLE: std::ops::RangeInclusive<f64> = 0.15..=4.0;
 
-pub(crate) fn objections(ends: &[Option<Ends>]) -> Option<Objection> {
+pub(crate) fn failed_checks(ends: &[Option<Ends>]) -> Option<FailedCheck> {
     let used: Vec<&Ends> = ends.iter().flatten().filter(|end| end.isentropic_rise_k() > 0.0).collect();
     let of = |end: &&Ends| {
         let omega_rad_s = end.speed_rpm * std::f64::consts::PI / 30.0;
@@ -30,5 +30,5 @@ pub(crate) fn objections(ends: &[Option<Ends>]) -> Option<Objection> {
         pressure_ratio: of_middle(|end| end.p2_pa / end.p1_pa),
         specific_speed: middle,
     };
-    Some(Objection::new(Warning::ScaledChannel(scaled), (0..ends.len()).collect()))
+    Some(FailedCheck::new(Warning::ScaledChannel(scaled), (0..ends.len()).collect()))
 }

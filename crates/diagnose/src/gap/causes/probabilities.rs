@@ -71,7 +71,7 @@ fn includes(study: &Study, whole: &Fit, part: &Fit) -> bool {
     ids(study, part).iter().all(|effect| whole.contains(effect))
 }
 
-pub(crate) fn weigh(
+pub(crate) fn cause_probabilities(
     study: &Study,
     calibration: &Calibration,
     null: &Fit,

@@ -4,8 +4,8 @@
 //! to 40 % of it. A single point may exceed it for a while, if a hot compressor housing heats the air or the shaft slows down. The median of a
 //! campaign may not.
 
-use crate::objections::ends::Ends;
-use crate::objections::objection::Objection;
+use crate::reading_checks::ends::Ends;
+use crate::reading_checks::failed_check::FailedCheck;
 use mapper_core::{Channel, Scaled, Warning};
 use mapper_numerics::statistics::median;
 use mapper_observe::plausible::check_running;
@@ -15,7 +15,7 @@ use mapper_physics::gas::air::Air;
 /// every gas stand.
 const POSSIBLE: std::ops::RangeInclusive<f64> = 0.2..=1.15;
 
-pub(crate) fn objections(ends: &[Option<Ends>]) -> Option<Objection> {
+pub(crate) fn failed_checks(ends: &[Option<Ends>]) -> Option<FailedCheck> {
     let powers_w: Vec<(f64, f64)> = ends
         .iter()
         .flatten()
@@ -40,5 +40,5 @@ pub(crate) fn objections(ends: &[Option<Ends>]) -> Option<Objection> {
         return None;
     }
     let scaled = Scaled::ShaftPower { compressor_w, turbine_w, power_ratio };
-    Some(Objection::new(Warning::ScaledChannel(scaled), (0..ends.len()).collect()))
+    Some(FailedCheck::new(Warning::ScaledChannel(scaled), (0..ends.len()).collect()))
 }

@@ -5,8 +5,8 @@
 //! exchanges at most half of the capacity flow times its distance). Hot turbine inlet gas read as T2 is beyond that; a turbine may be driven
 //! by cold gas.
 
-use crate::objections::ends::Ends;
-use crate::objections::objection::Objection;
+use crate::reading_checks::ends::Ends;
+use crate::reading_checks::failed_check::FailedCheck;
 use mapper_core::{Scaled, Swapped, Warning};
 use mapper_numerics::statistics::median;
 
@@ -19,7 +19,7 @@ pub const EFFICIENCY: std::ops::RangeInclusive<f64> = 0.25..=0.88;
 const APPARENT: std::ops::RangeInclusive<f64> = 0.2..=1.3;
 const MIDDLE: std::ops::RangeInclusive<f64> = 0.35..=1.0;
 
-pub(crate) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
+pub(crate) fn failed_checks(ends: &[Option<Ends>]) -> Vec<FailedCheck> {
     let known: Vec<&Ends> = ends.iter().flatten().collect();
     let all = || (0..ends.len()).collect::<Vec<usize>>();
     let mut found = Vec::new();
@@ -32,7 +32,7 @@ pub(crate) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
             p1_pa: middle(|end| end.p1_pa),
             p2_pa: middle(|end| end.p2_pa),
         };
-        found.push(Objection::new(Warning::SwappedChannels(swapped), all()));
+        found.push(FailedCheck::new(Warning::SwappedChannels(swapped), all()));
         return found;
     }
     let apparent = |end: &Ends| end.isentropic_rise_k() / (end.t2_k - end.t1_k);
@@ -41,7 +41,7 @@ pub(crate) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
     let swapped =
         |end: &&&Ends| end.t3_k.is_some_and(|t3_k| end.t2_k > t3_k) && apparent(end) < *MIDDLE.start();
     if 2 * known.iter().filter(swapped).count() > known.len() {
-        found.push(Objection::new(Warning::SwappedChannels(Swapped::T2AboveT3), all()));
+        found.push(FailedCheck::new(Warning::SwappedChannels(Swapped::T2AboveT3), all()));
     }
     let judged: Vec<&&Ends> = known.iter().filter(|end| end.isentropic_rise_k() > MIN_RISE_K).collect();
     // Without a rise of T2 the efficiency is undefined; treat it as too high.
@@ -58,9 +58,9 @@ pub(crate) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
             isentropic_rise_k: of(Ends::isentropic_rise_k),
             efficiency: middle,
         };
-        found.push(Objection::new(Warning::ScaledChannel(scaled), all()));
+        found.push(FailedCheck::new(Warning::ScaledChannel(scaled), all()));
     } else if !impossible.is_empty() {
-        found.push(Objection::new(Warning::ScaledChannel(Scaled::SomePoints), impossible));
+        found.push(FailedCheck::new(Warning::ScaledChannel(Scaled::SomePoints), impossible));
     }
     found
 }
@@ -96,9 +96,9 @@ mod tests {
     #[test]
     fn gas_colder_than_the_outlet_is_no_mistake_and_hot_gas_read_as_t2_is_one() {
         for t3_k in [300.0, 385.0, 773.15] {
-            assert!(objections(&ends_with(t3_k, None)).is_empty(), "{t3_k} K before the turbine");
+            assert!(failed_checks(&ends_with(t3_k, None)).is_empty(), "{t3_k} K before the turbine");
         }
-        let exchanged = objections(&ends_with(388.0, Some(773.15)));
+        let exchanged = failed_checks(&ends_with(388.0, Some(773.15)));
         assert!(matches!(exchanged[0].warning, Warning::SwappedChannels(_)), "{exchanged:?}");
     }
 }

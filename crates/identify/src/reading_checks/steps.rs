@@ -1,13 +1,13 @@
 //! Detects impossible steps: a rig is at one operating point at a time, and a number identifies one step.
 
-use crate::objections::objection::Objection;
+use crate::reading_checks::failed_check::FailedCheck;
 use mapper_core::{Recording, StepConflict, Warning, step_number};
 
 /// Overlap that the rounded times of other loggers explain, s: half of their second.
 const ROUNDED_S: f64 = 0.5;
 
 /// Steps that overlap in time or share a number.
-pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
+pub(crate) fn failed_checks(recording: &Recording) -> Vec<FailedCheck> {
     let steps = &recording.steps;
     let mut found = Vec::new();
     let mut by_time: Vec<usize> = (0..steps.len()).filter(|i| steps[*i].start_s < steps[*i].end_s).collect();
@@ -25,7 +25,7 @@ pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
                 second_start_s: step.start_s,
                 second_end_s: step.end_s,
             };
-            found.push(Objection::new(Warning::StepsContradict(overlap), vec![before, position]));
+            found.push(FailedCheck::new(Warning::StepsContradict(overlap), vec![before, position]));
         }
         if furthest.is_none_or(|before| steps[before].end_s < step.end_s) {
             furthest = Some(position);
@@ -36,7 +36,7 @@ pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
     for same in by_index.chunk_by(|a, b| steps[*a].index == steps[*b].index).filter(|same| same.len() > 1) {
         let shared =
             StepConflict::SharedNumber { number: step_number(steps[same[0]].index), steps: same.len() };
-        found.push(Objection::new(Warning::StepsContradict(shared), same.to_vec()));
+        found.push(FailedCheck::new(Warning::StepsContradict(shared), same.to_vec()));
     }
     found
 }

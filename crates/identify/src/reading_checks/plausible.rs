@@ -4,12 +4,12 @@
 
 use crate::IdentifyConfig;
 use crate::needs::needs;
-use crate::objections::objection::Objection;
+use crate::reading_checks::failed_check::FailedCheck;
 use mapper_core::{Recording, Warning};
 use mapper_numerics::statistics::median;
 use mapper_observe::plausible::check_running;
 
-pub(crate) fn objections(recording: &Recording, config: &IdentifyConfig) -> Vec<Objection> {
+pub(crate) fn failed_checks(recording: &Recording, config: &IdentifyConfig) -> Vec<FailedCheck> {
     needs(config.method)
         .into_iter()
         .filter_map(|channel| {
@@ -24,7 +24,7 @@ pub(crate) fn objections(recording: &Recording, config: &IdentifyConfig) -> Vec<
                 }
             }
             let why = check_running(channel, median(&middles)?).err()?;
-            Some(Objection::new(Warning::DeadChannel { channel, reading: why.value }, steps))
+            Some(FailedCheck::new(Warning::DeadChannel { channel, reading: why.value }, steps))
         })
         .collect()
 }

@@ -4,7 +4,7 @@ use mapper_core::{Recording, Warning};
 
 /// A failed check of the readings, and the steps that depend on them.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Objection {
+pub(crate) struct FailedCheck {
     /// Channel and values.
     pub(crate) warning: Warning,
     /// Positions of the steps.
@@ -13,13 +13,13 @@ pub(crate) struct Objection {
     pub(crate) samples_left_out: bool,
 }
 
-impl Objection {
+impl FailedCheck {
     pub(crate) fn new(warning: Warning, steps: Vec<usize>) -> Self {
-        Objection { warning, steps, samples_left_out: false }
+        FailedCheck { warning, steps, samples_left_out: false }
     }
 
-    /// An objection to all steps of a recording.
-    pub(crate) fn to_all(warning: Warning, recording: &Recording) -> Self {
-        Objection::new(warning, (0..recording.steps.len()).collect())
+    /// A failed check that concerns all steps of a recording.
+    pub(crate) fn of_all_steps(warning: Warning, recording: &Recording) -> Self {
+        FailedCheck::new(warning, (0..recording.steps.len()).collect())
     }
 }

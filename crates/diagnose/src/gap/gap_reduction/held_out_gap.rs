@@ -5,9 +5,9 @@ use crate::gap::best_fit::first_step::with_start_read;
 use crate::gap::best_fit::fit::{Effort, Fit, MAX_SIGMAS, Start, fit};
 use crate::gap::best_fit::selection::{Selection, dot_over};
 use crate::gap::findings::report::{ChannelGap, Gap, PointGap};
+use crate::gap::gap_reduction::beyond_prior::beyond_prior;
 use crate::gap::gap_reduction::folds::Folds;
 use crate::gap::gap_reduction::gap_distribution::{StepMisfit, gap_reduction};
-use crate::gap::gap_reduction::strain::beyond_prior;
 use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::study::{Hypothesis, Study};
 use crate::gap::residuals::whiten::{Linearised, rows_of_step};
@@ -68,7 +68,7 @@ fn start_within_limits(study: &Study, fit: &Fit) -> Start {
 
 /// Compares tolerances alone with the best cause on held-out steps. Each fold selects among the first few causes and refits, without its
 /// own steps.
-pub fn how_far(compared: Compared<'_>, folds: &Folds) -> Gap {
+pub fn held_out_gap(compared: Compared<'_>, folds: &Folds) -> Gap {
     let Compared { study, linearised: [nominal, _], null, .. } = compared;
     let (before, after) = predict_held_out(compared, folds);
     let steps: Vec<usize> = (0..study.steps.len()).collect();

@@ -61,7 +61,7 @@ pub struct Found {
 
 /// Errors that prevent the verification of a calibrated model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum TwinError {
+pub enum CalibratedModelError {
     /// The nuisance parameters differ.
     #[error(
         "the diagnosis has {theirs} tolerances, this campaign and recording have {ours} or others: use the campaign, channels and sensors of the diagnosis"
@@ -109,7 +109,7 @@ impl Found {
     }
 
     /// The hypothesis for another recording, whose initial state is unknown, with its covariance.
-    fn hypothesis(&self, study: &Study) -> Result<(Hypothesis, DMatrix<f64>), TwinError> {
+    fn hypothesis(&self, study: &Study) -> Result<(Hypothesis, DMatrix<f64>), CalibratedModelError> {
         let same = study.nuisances.len() == self.tolerances.len()
             && study
                 .nuisances
@@ -118,17 +118,17 @@ impl Found {
                 .all(|(n, found)| n.kind.to_string() == found.name);
         if !same {
             let (theirs, ours) = (self.tolerances.len(), study.nuisances.len());
-            return Err(TwinError::Tolerances { theirs, ours });
+            return Err(CalibratedModelError::Tolerances { theirs, ours });
         }
         let mut effects = Vec::new();
         for found in &self.effects {
             let index = (0..study.catalogue).find(|i| study.effects[*i].info().id == found.id.as_str());
-            let index = index.ok_or_else(|| TwinError::Effect(found.id.clone()))?;
+            let index = index.ok_or_else(|| CalibratedModelError::Effect(found.id.clone()))?;
             effects.push((index, found.values.clone()));
         }
         let n = self.tolerances.len() + effects.iter().map(|(_, values)| values.len()).sum::<usize>();
         if self.covariance.len() != n || self.covariance.iter().any(|row| row.len() != n) {
-            return Err(TwinError::Covariance(n));
+            return Err(CalibratedModelError::Covariance(n));
         }
         let mut covariance = DMatrix::from_fn(n, n, |i, j| self.covariance[i][j]);
         let mut nuisances = Vec::with_capacity(self.tolerances.len());
@@ -148,7 +148,7 @@ impl Found {
 
 /// Verification of one channel's forecast.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct HeldChannel {
+pub struct ChannelCheck {
     /// Root mean square of measured minus forecast, in the channel's unit.
     pub rms: f64,
     /// Residual relative to the noise: 1 is pure noise.
@@ -161,7 +161,7 @@ pub struct HeldChannel {
 
 /// Verification of a forecast.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Held {
+pub struct ForecastCheck {
     /// Residual of all channels relative to the noise: 1 is pure noise.
     pub ratio: f64,
     /// Share of all values within the 95 % band.
@@ -169,15 +169,15 @@ pub struct Held {
     /// Number of values.
     pub values: usize,
     /// Each channel.
-    pub channels: BTreeMap<String, HeldChannel>,
+    pub channels: BTreeMap<String, ChannelCheck>,
 }
 
 /// Compares a calibrated model, driven by the recorded inputs, with a recording to which it was not fitted. The compared values are block means,
 /// decorrelated within each step; their bands include the noise and the uncertainty of the model.
 ///
 /// # Errors
-/// [`TwinError`].
-pub fn hold(study: &Study, found: &Found) -> Result<Held, TwinError> {
+/// [`CalibratedModelError`].
+pub fn check_forecast(study: &Study, found: &Found) -> Result<ForecastCheck, CalibratedModelError> {
     let (hypothesis, covariance) = found.hypothesis(study)?;
     let nominal = Linearised::new(study)?;
     let there = nominal.at(study, &hypothesis)?;
@@ -203,7 +203,7 @@ pub fn hold(study: &Study, found: &Found) -> Result<Held, TwinError> {
         }
         let mean =
             |of: &dyn Fn(usize) -> f64| rows.iter().map(|row| of(*row)).sum::<f64>() / rows.len() as f64;
-        let held = HeldChannel {
+        let held = ChannelCheck {
             rms: mean(&|row| (study.measured[row] - there.base.values[row]).powi(2)).sqrt(),
             ratio: mean(&|row| residual[row] * residual[row]).sqrt(),
             inside: mean(&|row| inside[row]),
@@ -212,7 +212,7 @@ pub fn hold(study: &Study, found: &Found) -> Result<Held, TwinError> {
         channels.insert(channel.symbol().to_owned(), held);
     }
     let n = residual.len().max(1) as f64;
-    Ok(Held {
+    Ok(ForecastCheck {
         ratio: (dot(&residual, &residual) / n).sqrt(),
         inside: inside.iter().sum::<f64>() / n,
         values: residual.len(),
@@ -233,19 +233,19 @@ pub struct Expected {
 /// Forecasts the ends of planned steps under the campaign's inputs.
 ///
 /// # Errors
-/// [`TwinError`]; no steps if the nominal machine cannot settle at the first.
+/// [`CalibratedModelError`]; no steps if the nominal machine cannot settle at the first.
 pub fn forecast_steps(
     rig: SimulatedRig,
     steps: Vec<StepMarker>,
     found: &Found,
-) -> Result<Vec<Expected>, TwinError> {
+) -> Result<Vec<Expected>, CalibratedModelError> {
     let rest = steps.first().and_then(|step| step.to);
     let study = rest.and_then(|rest| simulated_steps(rig, steps, &rest, COARSE_S, |_| None));
     study.map_or_else(|| Ok(Vec::new()), |study| forecast(&study, found))
 }
 
 /// Forecasts the ends of a study's steps; the bands include model uncertainty and the noise of a reading.
-fn forecast(study: &Study, found: &Found) -> Result<Vec<Expected>, TwinError> {
+fn forecast(study: &Study, found: &Found) -> Result<Vec<Expected>, CalibratedModelError> {
     let (hypothesis, covariance) = found.hypothesis(study)?;
     let here = study.predict(&hypothesis)?;
     let mut columns = nuisance_changes(study, &hypothesis, &here);

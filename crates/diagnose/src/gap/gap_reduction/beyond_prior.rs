@@ -2,7 +2,7 @@
 
 use crate::gap::best_fit::fit::{Effort, Fit, MAX_SIGMAS, fit};
 use crate::gap::best_fit::selection::Selection;
-use crate::gap::findings::report::Strained;
+use crate::gap::findings::report::BeyondPrior;
 use crate::gap::residuals::study::Study;
 use crate::gap::residuals::whiten::Linearised;
 use mapper_numerics::statistics::DOUBT_SIGMAS;
@@ -12,17 +12,17 @@ const UNLIMITED: Effort = Effort { iterations: 8, enough: 0.5, max_sigmas: 1e3, 
 
 /// Tolerances of a fit beyond three sigmas of their prior, furthest first. A tolerance at [`MAX_SIGMAS`], which limits the search for causes, is fitted
 /// again without that limit.
-pub fn beyond_prior(study: &Study, linearised: &Linearised, fitted: &Fit) -> Vec<Strained> {
+pub fn beyond_prior(study: &Study, linearised: &Linearised, fitted: &Fit) -> Vec<BeyondPrior> {
     let limited = fitted.hypothesis.nuisances.iter().any(|sigmas| sigmas.abs() > 0.999 * MAX_SIGMAS);
     let freed =
         limited.then(|| fit(study, linearised, fitted, &Selection::all(study), UNLIMITED).ok()).flatten();
     let nuisances = &freed.as_ref().unwrap_or(fitted).hypothesis.nuisances;
-    let mut beyond: Vec<Strained> = study
+    let mut beyond: Vec<BeyondPrior> = study
         .nuisances
         .iter()
         .zip(nuisances)
         .filter(|(nuisance, sigmas)| sigmas.abs() > DOUBT_SIGMAS && nuisance.kind.is_of_rig())
-        .map(|(nuisance, sigmas)| Strained {
+        .map(|(nuisance, sigmas)| BeyondPrior {
             what: nuisance.kind.to_string(),
             sigmas: sigmas.abs(),
             value: nuisance.value(*sigmas),

@@ -5,7 +5,7 @@
 
 use crate::IdentifyConfig;
 use crate::needs::needs;
-use crate::objections::objection::Objection;
+use crate::reading_checks::failed_check::FailedCheck;
 use crate::step_data::samples::LONGEST_BRIDGE_S;
 use mapper_core::{Recording, Warning};
 use mapper_numerics::statistics::robust_sigma;
@@ -14,7 +14,7 @@ use mapper_numerics::statistics::robust_sigma;
 /// only reduces the difference between samples.
 const MAX_RATIO: f64 = 3.0;
 
-pub(crate) fn objections(recording: &Recording, config: &IdentifyConfig) -> Vec<Objection> {
+pub(crate) fn failed_checks(recording: &Recording, config: &IdentifyConfig) -> Vec<FailedCheck> {
     needs(config.method)
         .into_iter()
         .filter_map(|channel| {
@@ -33,7 +33,7 @@ pub(crate) fn objections(recording: &Recording, config: &IdentifyConfig) -> Vec<
                 return None;
             }
             let noisy = Warning::NoisyChannel { channel, noise: found, declared_noise: declared };
-            Some(Objection::to_all(noisy, recording))
+            Some(FailedCheck::of_all_steps(noisy, recording))
         })
         .collect()
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::Command;
 
 /// The capabilities.
-pub struct Offered {
+pub struct Capabilities {
     /// A Python with the packages of the tests.
     pub python: PathBuf,
     /// Whether a small file system can be mounted.
@@ -16,10 +16,10 @@ pub struct Offered {
     pub npm: bool,
 }
 
-impl Offered {
+impl Capabilities {
     /// Detects the capabilities; `python` is the Python of the tests.
     pub fn with(python: PathBuf) -> Self {
-        Offered {
+        Capabilities {
             python,
             mountable: machine::can_mount(),
             slurm: machine::has_slurm(),

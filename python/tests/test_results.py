@@ -15,8 +15,6 @@ import pytest
 
 mpl.use("agg")
 
-ROOT = Path(__file__).parents[2]
-
 
 def test_a_run_is_identified_as_by_the_command(run: mapper.Run, command: Callable[..., Any]) -> None:
     assert run.end == "completed"
@@ -172,18 +170,16 @@ def test_steady_points_are_reduced() -> None:
         mapper.reduce(measured.drop(columns="T1 [degC]"), reference="SAE")
 
 
-def test_a_gap_is_diagnosed_as_by_the_command(command: Callable[..., Any], tmp_path: Path) -> None:
-    file = ROOT / "campaigns/gap_rig.yaml"
-    campaign = mapper.Campaign.load(file)
-    run = campaign.run(tmp_path)
+def test_a_gap_is_diagnosed_as_by_the_command(command: Callable[..., Any], gap_rig: Path, gap_run: mapper.Run) -> None:
+    campaign = mapper.Campaign.load(gap_rig)
     seen: list[str] = []
-    diagnosis = mapper.diagnose(run, campaign, progress=lambda event: seen.append(event["event"]))
-    assert diagnosis.json == command("gap", "diagnose", file, run.directory)
+    diagnosis = mapper.diagnose(gap_run, campaign, progress=lambda event: seen.append(event["event"]))
+    assert diagnosis.json == command("gap", "diagnose", gap_rig, gap_run.directory)
     assert diagnosis.verdict == diagnosis.json["verdict"]
     assert len(diagnosis.causes) == len(diagnosis.json["candidates"])
     assert "progress" in seen
     # Nothing was planted: the diagnosis names no cause, and the points stay as they are.
-    result = mapper.identify(run, campaign=campaign)
+    result = mapper.identify(gap_run, campaign=campaign)
     corrected = diagnosis.corrected(result)
     assert corrected.json["correction"]["refused"] == {"reason": "no_cause"}
     assert corrected.json["points"] == result.json["points"]

@@ -1,8 +1,9 @@
 """Opens a run's page in Chromium as a reader would, and says as JSON what happened.
 
-    python browse_report.py CHROMIUM PAGE FOLDER
+    python browse_report.py CHROMIUM PAGE FOLDER [looked_at]
 
-Pictures of the page (390 and 1400 px wide, light and dark), of its head, and the print as A4 PDF are left in FOLDER.
+Pictures of the page (390 and 1400 px wide, light and dark), of its head, and the print as A4 PDF are left in FOLDER. A page that is
+only looked at is neither used nor printed.
 """
 
 import json
@@ -27,19 +28,7 @@ def opened(browser, width, height, scheme):
     return page
 
 
-with sync_playwright() as playwright:
-    browser = launched(playwright, chromium)
-    for width, height in [(1400, 1000), (390, 844)]:
-        for scheme in ["light", "dark"]:
-            page = opened(browser, width, height, scheme)
-            page.screenshot(path=folder / f"report-{width}-{scheme}.png", full_page=True)
-            serious.extend(serious_findings(Axe(), page, f"{width} {scheme}"))
-            # Tables may be wider than a phone, the page may not.
-            result[f"overflow_{width}_{scheme}"] = page.evaluate(
-                "document.documentElement.scrollWidth - document.documentElement.clientWidth"
-            )
-            page.close()
-
+def use_and_print(browser):
     page = opened(browser, 1400, 1000, "light")
     page.screenshot(path=folder / "report.png")
     ticks = lambda: page.locator("#map-plot g[data-mark='x-axis tick label'] text").all_text_contents()
@@ -94,7 +83,6 @@ with sync_playwright() as playwright:
         page.keyboard.press("Control+V")
         rows = page.input_value("#paste").split("\n")
         result["copied"].append([len(rows) == of.locator("tr").count(), len(rows[-1].split("\t")) == of.locator("tr").last.locator("td, th").count()])
-    result["heads_without_sorting"] = count("main thead th:not(:empty):not(:has(button))")
     page.evaluate("document.getElementById('paste').remove()")
     # By keyboard alone.
     page.focus("#step-choice")
@@ -110,6 +98,23 @@ with sync_playwright() as playwright:
     )
     page.emulate_media(media=None)
     page.pdf(path=folder / "report.pdf", format="A4", landscape=True)
+
+
+with sync_playwright() as playwright:
+    browser = launched(playwright, chromium)
+    for width, height in [(1400, 1000), (390, 844)]:
+        for scheme in ["light", "dark"]:
+            page = opened(browser, width, height, scheme)
+            page.screenshot(path=folder / f"report-{width}-{scheme}.png", full_page=True)
+            serious.extend(serious_findings(Axe(), page, f"{width} {scheme}"))
+            # Tables may be wider than a phone, the page may not.
+            result[f"overflow_{width}_{scheme}"] = page.evaluate(
+                "document.documentElement.scrollWidth - document.documentElement.clientWidth"
+            )
+            result["heads_without_sorting"] = page.locator("main thead th:not(:empty):not(:has(button))").count()
+            page.close()
+    if sys.argv[4:] != ["looked_at"]:
+        use_and_print(browser)
     browser.close()
 
 result.update(console=console, serious=serious, requests=[url for url in requests if url != page_file.as_uri()])

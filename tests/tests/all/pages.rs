@@ -68,7 +68,9 @@ fn a_diagnosis_opens_in_a_browser_with_all_its_pictures() {
     mapper(arguments.into_iter().chain(["-o".as_ref(), whole.as_os_str()])).exits(0);
     if option_env!("MAPPER_TEST_PYTHON").is_some() {
         let pictures = pictures("gap");
-        let seen = python("browse_report.py", [chromium.as_ref(), whole.as_os_str(), pictures.as_os_str()]);
+        // What a click does is the business of `the_page_of_a_run_works_in_a_browser`.
+        let looked_at = [chromium.as_ref(), whole.as_os_str(), pictures.as_os_str(), "looked_at".as_ref()];
+        let seen = python("browse_report.py", looked_at);
         for quiet in ["requests", "console", "serious"] {
             assert_eq!(seen[quiet], serde_json::json!([]), "{quiet}");
         }

@@ -80,8 +80,8 @@ fn undeclared<'a>(problem: &Problem<'a>) -> Option<Problem<'a>> {
     for (index, _, slab_sigma, _) in &sought {
         off.shared[*index] = off.priors[*index].mean + slab_sigma;
     }
-    for Member { course, measured_k, local, .. } in &mut off.members {
-        *measured_k = off.setting.predict(course, &off.shared, local, &[false; SHARED], false).t2_k;
+    for Member { history, measured_k, local, .. } in &mut off.members {
+        *measured_k = off.setting.predict(history, &off.shared, local, &[false; SHARED], false).t2_k;
     }
     (!sought.is_empty()).then_some(off)
 }

@@ -21,8 +21,8 @@ const PLACES: usize = 5;
 
 /// Name of the hypothesis without a cause.
 pub const NOTHING: &str = "nothing beyond tolerance";
-/// Causes of the catalogue that the list does not contain.
-pub const UNLISTED: &str = "other causes of the catalogue";
+/// Effects of the library that the list does not contain.
+pub const UNLISTED: &str = "other effects of the library";
 /// The answer that the cause is not in the library.
 pub const OUTSIDE: &str = "a cause outside the effect library";
 

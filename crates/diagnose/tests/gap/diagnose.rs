@@ -129,6 +129,7 @@ fn nothing_is_called_nothing() {
     let diagnosis = &diagnosed.diagnosis;
     assert_eq!(diagnosis.verdict, Verdict::WithinTolerance);
     let sum = diagnosis.probability_none
+        + diagnosis.probability_unlisted
         + diagnosis.probability_outside
         + diagnosis.candidates.iter().map(|c| c.probability).sum::<f64>();
     assert!((sum - 1.0).abs() < 1e-9, "{sum}");

@@ -18,7 +18,7 @@ pub fn verdict_forecast_text(
     if let Some(UndeclaredForecast { good, eta_standard_error }) = forecast.undeclared {
         let error = points_95(eta_standard_error);
         let rare = format!(
-            "If alpha_A, probe and heating/cooling ratio are one standard deviation off: {good} of {} good, {error}",
+            "If alpha_A, probe and heating/cooling ratio are one standard deviation off: {good} of {} good, {error} (95 %)",
             forecast.points
         );
         text += &wrapped(&rare, COLUMNS, 2);

@@ -73,7 +73,7 @@ impl Session<'_> {
     /// lets the speed overshoot. `None` too if the rehearsal fails, since it says nothing about the campaign then.
     ///
     /// # Errors
-    /// [`SessionError`] if it is interrupted, or there is no virtual lab.
+    /// [`SessionError`] if it is interrupted, or the registry has no virtual lab.
     pub fn forecast_guard_trip(
         &self,
         campaign: &Campaign,

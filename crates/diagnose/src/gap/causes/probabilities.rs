@@ -25,7 +25,7 @@ pub(crate) struct CauseProbabilities {
     pub alike: Vec<usize>,
     /// Probability that everything is within tolerance.
     pub none: f64,
-    /// Probability of causes of the catalogue that are not among the candidates.
+    /// Probability of causes of the effect library that are not among the candidates.
     pub unlisted: f64,
     /// Probability of an unmodelled cause, from the residual of the best fit.
     pub outside: f64,

@@ -27,11 +27,12 @@ use mapper_observe::declared::usual_noise_sigma;
 use mapper_physics::gas::air;
 use nalgebra::DVector;
 
-/// Start of the used part of a step after the last command change, s: h and efficiency are modelled while the operating point settles. If
-/// noise could look like a slow probe, the fit needs the seconds right after the jump, where the two differ by tens of kelvin. Without noise
-/// they only show where the surface is wrong. Inputs are smoothed over 3 s at first: starting at 1.5 s made a probe of 0.7 mm 0.026 mm too
-/// small, from 2 s on it is within its error (mean of 20 seeds).
+/// Start of the used part of a step after the last command change without noise, s: h and efficiency are modelled while the operating point
+/// settles, and the first seconds only show where the surface is wrong.
 pub(crate) const START_S: f64 = 3.0;
+/// The same with noise, s. Noise can look like a slow probe but for the seconds right after the jump, where the two differ by tens of kelvin.
+/// Inputs are smoothed over 3 s at first: starting at 1.5 s made a probe of 0.7 mm 0.026 mm too small, from 2 s on it is within its error
+/// (mean of 20 seeds).
 pub(crate) const START_WITH_NOISE_S: f64 = 2.0;
 /// Expected spread of the points' efficiencies about the surface, fraction: maps are not polynomials. The recordings of
 /// `benches/identification.py` have 0.0006, those of a machine with a map that drops steeply at choke 0.005.

@@ -15,8 +15,9 @@ use mapper_numerics::parallel;
 use mapper_numerics::statistics::NORMAL_95;
 use mapper_physics::rig::effect::{EffectInfo, EffectParameter};
 
-/// Maximum number of runs to find a size, and the tolerance in the logarithm of the length: a tenth of a size does not change a plan.
+/// Maximum number of runs to find a size. Judgement: an approximate size after these is sufficient.
 const MAX_RUNS: usize = 6;
+/// Tolerance in the logarithm of the signature's length: a tenth of a size does not change a plan.
 const LN_LENGTH_TOLERANCE: f64 = 0.1;
 
 /// Smallest size at which a recording shows an effect.

@@ -66,17 +66,22 @@ pub struct StructureTolerances {
 
 impl StructureTolerances {
     /// The share of a channel; 0 for a channel that the model does not predict.
-    pub fn of(&self, channel: Channel) -> f64 {
+    pub fn of(mut self, channel: Channel) -> f64 {
+        self.of_mut(channel).map_or(0.0, |ratio| *ratio)
+    }
+
+    /// The share of a channel; none for a channel that the model does not predict.
+    pub fn of_mut(&mut self, channel: Channel) -> Option<&mut f64> {
         match channel {
-            Channel::ShaftSpeed => self.shaft_speed_ratio,
-            Channel::CompressorFlow => self.compressor_flow_ratio,
-            Channel::P2 => self.p2_ratio,
-            Channel::T2 => self.t2_ratio,
-            Channel::Tc => self.tc_ratio,
-            Channel::TurbineFlow => self.turbine_flow_ratio,
-            Channel::T4 => self.t4_ratio,
-            Channel::Tt => self.tt_ratio,
-            _ => 0.0,
+            Channel::ShaftSpeed => Some(&mut self.shaft_speed_ratio),
+            Channel::CompressorFlow => Some(&mut self.compressor_flow_ratio),
+            Channel::P2 => Some(&mut self.p2_ratio),
+            Channel::T2 => Some(&mut self.t2_ratio),
+            Channel::Tc => Some(&mut self.tc_ratio),
+            Channel::TurbineFlow => Some(&mut self.turbine_flow_ratio),
+            Channel::T4 => Some(&mut self.t4_ratio),
+            Channel::Tt => Some(&mut self.tt_ratio),
+            _ => None,
         }
     }
 }

@@ -6,7 +6,7 @@ use crate::diagnosis::stand_actions::stand_actions;
 use crate::formatting::number::four_figures;
 use crate::formatting::table::COLUMNS;
 use crate::formatting::wrapped::wrapped;
-use mapper_core::{probability_text, step_number, with_unit};
+use mapper_core::{Channel, probability_text, step_number, with_unit};
 use mapper_diagnose::gap::findings::report::{
     BeyondPrior, Candidate, ChannelGap, Diagnosis, Estimate, Gap, Law, PointGap, SmallestSeen, Verdict,
     law_found,
@@ -213,19 +213,31 @@ fn is_not_borne_out(gap: &Gap) -> bool {
     gap.folds.len() > 1 && gap.steps_with_gap > 0 && gap.shrink <= 0.0
 }
 
-/// Effects in both recordings, which are not judged, if a reference recording was given.
+/// Effects in both recordings, which are not judged, if a reference recording was given; and what a campaign declares to do without it.
 fn not_judged(since: &Since) -> String {
-    let residuals = since.lacking.iter().map(|(channel, residual)| {
-        let (scale, unit) = display_scale(&residual.unit);
-        let share = 100.0 * residual.share;
-        format!("{channel} {} ({share:.1} %)", with_unit(four_figures(scale * residual.size), unit))
-    });
-    format!(
-        "only the change since {} is reported; the residual already present there is not judged (in parentheses, the share of the \
-         channel's variation that the model misses, as in `tolerances: structure`): {}\n",
+    let (mut residuals, mut structure, mut offsets) = (Vec::new(), Vec::new(), Vec::new());
+    for (channel, error) in &since.lacking {
+        let (scale, unit) = display_scale(&error.unit);
+        residuals.push(format!("{channel} {}", with_unit(four_figures(scale * error.size), unit)));
+        // P3 is an input.
+        if *channel != Channel::P3.symbol() {
+            structure.push(format!("{channel}: {:.1} %", 100.0 * error.declare.structure_ratio));
+            offsets.extend(error.declare.offset.map(|offset| {
+                format!("{channel}: {{offset: {}}}", with_unit(four_figures(scale * offset), unit))
+            }));
+        }
+    }
+    let mut text = format!(
+        "only the change since {} is reported; the residual already present there is not judged: {}\n\
+         a diagnosis without it needs these errors of the model's equations in the campaign:\n",
         since.recording,
-        residuals.collect::<Vec<_>>().join(", ")
-    )
+        residuals.join(", ")
+    );
+    text += &wrapped(&format!("  tolerances: {{structure: {{{}}}}}", structure.join(", ")), COLUMNS, 4);
+    if !offsets.is_empty() {
+        text += &wrapped(&format!("  sensors: {{{}}}", offsets.join(", ")), COLUMNS, 4);
+    }
+    text
 }
 
 /// Factor to the unit in which residuals are shown, and that unit.

@@ -12,6 +12,15 @@ pub struct Since {
     pub lacking: BTreeMap<String, Lacking>,
 }
 
+/// Errors of the model's equations, as a campaign declares them.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Declaration {
+    /// `offset` of the sensor, in the channel's unit: the mean error of the equations, if it is larger than the declared offset.
+    pub offset: Option<f64>,
+    /// `tolerances: structure`: standard deviation of the error, relative to that of the readings.
+    pub structure_ratio: f64,
+}
+
 /// Model error of one channel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Lacking {
@@ -21,4 +30,6 @@ pub struct Lacking {
     pub unit: String,
     /// Relative model error of the channel's changes over the recording, 0..1; changes since then may be predicted equally badly.
     pub share: f64,
+    /// What a diagnosis of this rig without a reference needs to be told.
+    pub declare: Declaration,
 }

@@ -8,9 +8,10 @@ use crate::gap::best_fit::fit::MAX_SIGMAS;
 use crate::gap::best_fit::normal::nuisance_products;
 use crate::gap::best_fit::selection::{Selection, dot_over};
 use crate::gap::findings::warning::GapWarning;
-use crate::gap::model_error::baseline_assumptions::{Lacking, Since};
+use crate::gap::model_error::baseline_assumptions::{Declaration, Lacking, Since};
 use crate::gap::model_error::errors_of_change::{elsewhere, errors_of_change};
 use crate::gap::model_error::log_time::covariance_of_errors;
+use crate::gap::model_error::measured_structure::measured_structure;
 use crate::gap::model_error::same_steps::same_steps;
 use crate::gap::preconditions::machine_mismatch::another_machine;
 use crate::gap::preconditions::problem::GapError;
@@ -66,6 +67,7 @@ impl Study {
         let model_error: Vec<f64> =
             before.measured.iter().zip(&predicted.values).map(|(seen, predicted)| seen - predicted).collect();
         let shares = errors_of_change(&before, &linearised, &model_error);
+        let declarations = measured_structure(&before)?;
         // Values missing in the reference recording cannot be compared.
         let partners = partners(&self, &before);
         let mut study = self.with_rows(&partners.iter().map(Option::is_some).collect::<Vec<_>>());
@@ -105,14 +107,14 @@ impl Study {
             noise
         });
         study.other_noise = noise.collect();
-        let since = Since { recording: name, lacking: by_channel(&before, &model_error, &shares) };
+        let since = Since { recording: name, lacking: by_channel(&before, &model_error, &shares, &declarations) };
         Ok(Changed { study, since, warnings })
     }
 }
 
 /// Fits the tolerances of a fault-free rig. The misfit sets the noise level, so that model error does not push tolerances outside their
 /// priors.
-fn tolerances(study: &Study, linearised: &Linearised) -> Result<Hypothesis, PredictError> {
+pub(super) fn tolerances(study: &Study, linearised: &Linearised) -> Result<Hypothesis, PredictError> {
     let everywhere = Selection::all(study);
     let products = nuisance_products(study, linearised, &everywhere);
     let rows = everywhere.rows(study);
@@ -142,13 +144,23 @@ fn tolerances(study: &Study, linearised: &Linearised) -> Result<Hypothesis, Pred
 }
 
 /// Model error of each channel.
-fn by_channel(study: &Study, model_error: &[f64], shares: &[f64]) -> BTreeMap<String, Lacking> {
+fn by_channel(
+    study: &Study,
+    model_error: &[f64],
+    shares: &[f64],
+    declarations: &[Declaration],
+) -> BTreeMap<String, Lacking> {
     let of_output = |(output, channel): (usize, &Channel)| {
         let groups = study.groups.iter().filter(|group| group.output == output);
         let rows: Vec<usize> = groups.flat_map(|group| group.rows.clone()).collect();
         let squares: f64 = rows.iter().map(|row| model_error[*row].powi(2)).sum();
         let size = (squares / rows.len().max(1) as f64).sqrt();
-        let of_channel = Lacking { size, unit: channel.unit().to_owned(), share: shares[output] };
+        let of_channel = Lacking {
+            size,
+            unit: channel.unit().to_owned(),
+            share: shares[output],
+            declare: declarations[output],
+        };
         (!rows.is_empty()).then(|| (channel.symbol().to_owned(), of_channel))
     };
     OUTPUTS.iter().enumerate().filter_map(of_output).collect()

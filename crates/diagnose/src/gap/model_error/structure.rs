@@ -12,7 +12,7 @@ use mapper_numerics::statistics::mean;
 use nalgebra::DMatrix;
 
 /// Mean and standard deviation of an output's readings over the recording.
-fn variation(study: &Study, output: usize) -> Option<(f64, f64)> {
+pub(crate) fn variation(study: &Study, output: usize) -> Option<(f64, f64)> {
     let groups = || study.groups.iter().filter(move |group| group.output == output);
     let readings = || groups().flat_map(|group| &study.measured[group.rows.clone()]);
     let middle = mean(readings())?;

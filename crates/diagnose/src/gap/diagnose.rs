@@ -211,7 +211,7 @@ pub fn diagnose(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
     let r#where = if verdict == Verdict::WithinTolerance {
         Vec::new()
     } else {
-        places(&study, &linearised, &null, &gains, named.then_some(alike.len()))
+        places((&study, calibration), &linearised, &null, &gains, named.then_some(alike.len()))
     };
     progress(0.95, "next experiment");
     let Suggested { next, experiments } = match verdict {

@@ -5,11 +5,12 @@ use crate::gap::best_fit::first_step::with_start_read;
 use crate::gap::best_fit::fit::{Effort, Fit, fit};
 use crate::gap::best_fit::selection::Selection;
 use crate::gap::causes::calibration::Calibration;
-use crate::gap::causes::place::{BEND, Explanation, Gain, Part, RARITY, of_fits, places_of, signature};
-use crate::gap::causes::probabilities::{MAX_EQUIVALENT, evidence_resolution, weight};
+use crate::gap::causes::place::{BEND, Explanation, Gain, Part, of_fits, places_of, rarity, signature};
+use crate::gap::causes::probabilities::{evidence_resolution, weight};
 use crate::gap::causes::select::MIN_SHRINK;
 use crate::gap::diagnose::Diagnosed;
-use crate::gap::findings::report::{Law, MissingSource, Place, Verdict};
+use crate::gap::findings::report::{Law, MAX_EQUIVALENT, MissingSource, Place, Verdict};
+use crate::gap::gap_reduction::folds::FOLDS;
 use crate::gap::gap_reduction::held_out_gap::channels_on;
 use crate::gap::residuals::study::{Study, members};
 use crate::missing_terms::laws::candidate::{Bench, Candidate, keep_determined, promising};
@@ -35,9 +36,6 @@ pub struct Discovered {
     pub settled: Option<Fit>,
 }
 
-/// Number of leave-one-out folds of steps in which a law must recur.
-const FOLDS: usize = 6;
-
 /// Searches outside the effect library, if the diagnosis leaves a residual; see [`wanted`].
 pub fn discover(
     diagnosed: &Diagnosed,
@@ -47,7 +45,7 @@ pub fn discover(
     if !wanted(diagnosed) {
         return Discovered::default();
     }
-    let Diagnosed { study, linearised, null, .. } = diagnosed;
+    let Diagnosed { study, linearised, .. } = diagnosed;
     progress(0.0, "laws");
     let library = library();
     let everywhere = Selection::all(study);
@@ -57,16 +55,16 @@ pub fn discover(
     }
     let nothing = Base::nothing(study, linearised);
     let mut bench = Bench { study: study.clone(), library };
-    let mut found = found(&mut bench, diagnosed, &nothing, &training, &everywhere);
+    let mut found = found(&mut bench, (diagnosed, calibration), &nothing, &training, &everywhere);
     progress(0.4, "a law together with a cause");
     let left = found.as_ref().is_none_or(|found| !found.adequate);
     if left
         && diagnosed.diagnosis.verdict == Verdict::PartlyExplained
         && let Some(best) = diagnosed.fits.first()
-        && let Some(both) = together_with_cause(&mut bench, diagnosed, best, &training, &everywhere)
+        && let Some(both) = together_with_cause(&mut bench, (diagnosed, calibration), best, &training, &everywhere)
     {
         let score = |found: &FittedLaws| found.fitted.first().map_or(f64::NEG_INFINITY, Candidate::score);
-        let better = found.as_ref().is_none_or(|alone| score(&both) > score(alone) + RARITY);
+        let better = found.as_ref().is_none_or(|alone| score(&both) > score(alone) + rarity(calibration, study));
         found = if better { Some(both) } else { found };
     }
     progress(0.6, "residual of the law");
@@ -80,7 +78,7 @@ pub fn discover(
     let here =
         |balance: &Balance| settled.is_none_or(|law| law.submodel == balance.properties().submodel.name());
     let forces = residual_sources(&nothing, &everywhere.steps, &here);
-    let places = places(diagnosed, &bench, found.as_ref(), &forces, null, bend);
+    let places = places((diagnosed, calibration), &bench, found.as_ref(), &forces, bend);
     Discovered {
         laws,
         forces: forces.into_iter().take(1 + MAX_EQUIVALENT).map(reported_source).collect(),
@@ -118,25 +116,27 @@ struct FittedLaws {
 /// Search in addition to the best library cause.
 fn together_with_cause(
     bench: &mut Bench,
-    diagnosed: &Diagnosed,
+    (diagnosed, calibration): (&Diagnosed, &Calibration),
     best: &Fit,
     training: &Selection,
     everywhere: &Selection,
 ) -> Option<FittedLaws> {
     let Diagnosed { study, linearised, .. } = diagnosed;
     let there = linearised.at(study, &best.hypothesis).ok()?;
-    found(bench, diagnosed, &Base::at_fit(study, &there, best), training, everywhere)
+    found(bench, (diagnosed, calibration), &Base::at_fit(study, &there, best), training, everywhere)
 }
 
 /// Searches the term library from a base: in closed form, then with model runs.
 fn found(
     bench: &mut Bench,
-    diagnosed: &Diagnosed,
+    (diagnosed, calibration): (&Diagnosed, &Calibration),
     base: &Base<'_>,
     training: &Selection,
     everywhere: &Selection,
 ) -> Option<FittedLaws> {
-    let adequate = |fit: &Fit| adequacy(&diagnosed.study, &diagnosed.linearised, fit).may_be_noise();
+    let adequate = |fit: &Fit| {
+        calibration.outside(adequacy(&diagnosed.study, &diagnosed.linearised, fit).features()) < 0.5
+    };
     let changes = base.changes(&bench.library);
     let usable: Vec<usize> = (0..changes.len()).filter(|place| changes[*place].is_some()).collect();
     let columns: Vec<Vec<f64>> = changes.into_iter().flatten().collect();
@@ -157,7 +157,7 @@ fn found(
     let again = in_folds.iter().filter(|fold| {
         let Some(first) = fold.first() else { return false };
         let own = fold.iter().find(|choice| choice.terms == trained.choice.terms);
-        part(first) == part(&trained.choice) && own.is_some_and(|own| own.gain > LIKE * first.gain)
+        part(first) == part(&trained.choice) && own.is_some_and(|own| own.gain > (1.0 - BEND) * first.gain)
     });
     let stability = again.count() as f64 / folds.len().max(1) as f64;
     if adequate(&fitted_best.fit) {
@@ -204,8 +204,6 @@ fn fitted(
     Some((trained, fitted))
 }
 
-/// Minimum evidence of a recurring law in a fold, as a share of the best evidence.
-const LIKE: f64 = 0.95;
 
 /// The best law, if it passes all tests.
 fn propose(
@@ -288,16 +286,16 @@ const PRIOR_LAW: f64 = 0.15;
 
 /// Locations from all explanations tried: effects, laws, source terms.
 fn places(
-    diagnosed: &Diagnosed,
+    (diagnosed, calibration): (&Diagnosed, &Calibration),
     bench: &Bench,
     found: Option<&FittedLaws>,
     forces: &[ResidualSource],
-    null: &Fit,
     bend: f64,
 ) -> Vec<Place> {
-    let Diagnosed { study, linearised, fits, .. } = diagnosed;
+    let Diagnosed { study, linearised, null, fits, .. } = diagnosed;
+    let rarity = rarity(calibration, study);
     let gains: Vec<Gain<'_>> = fits.iter().map(|fit| Gain { fit, gain: null.cost - fit.cost }).collect();
-    let mut explanations: Vec<Explanation<'_>> = of_fits(study, &gains);
+    let mut explanations: Vec<Explanation<'_>> = of_fits(study, &gains, rarity);
     let fitted = found.map_or(&[][..], |found| &found.fitted);
     explanations.extend(fitted.iter().map(|law| {
         let gain = null.cost - law.fit.cost;
@@ -319,7 +317,7 @@ fn places(
                 signature: Box::new(move || signature(&bench.study, &law.fit, effect)),
             }
         });
-        let score = 0.5 * gain - law.choice.rarity - RARITY * (1 + others.len()) as f64;
+        let score = 0.5 * gain - law.choice.rarity - rarity * (1 + others.len()) as f64;
         Explanation { score, parts: std::iter::once(law_part).chain(other_parts).collect() }
     }));
     // Linear gains are relative to the linear cost of the null hypothesis.

@@ -1,5 +1,6 @@
 //! Distinguishability before any rig runs: which balance's source term could imitate which effect.
 
+use crate::gap::best_fit::normal::PRIOR_STEPS;
 use crate::gap::best_fit::selection::Selection;
 use crate::gap::residuals::study::Study;
 use crate::gap::residuals::whiten::Linearised;
@@ -21,9 +22,6 @@ pub struct Signatures {
     pub effects: Vec<(String, f64, Vec<f64>)>,
 }
 
-/// Prior variance of a source term, relative to its typical size: larger than any effect needs.
-const FREE: f64 = 16.0;
-
 /// The matrix for the effects of a study, on its recording's inputs.
 pub fn signatures(study: &Study, linearised: &Linearised) -> Signatures {
     let base = Base::nothing(study, linearised);
@@ -41,7 +39,7 @@ pub fn signatures(study: &Study, linearised: &Linearised) -> Signatures {
         linearised.whiten(study, &mut change);
         change
     });
-    let shape = covariance(study, &study.points(&study.nothing()).unwrap_or_default()) * (FREE * FREE);
+    let shape = covariance(study, &study.points(&study.nothing()).unwrap_or_default()) * (PRIOR_STEPS * PRIOR_STEPS);
     let balances = balances(study);
     let shares: Vec<Vec<(f64, f64)>> = parallel::map(&balances, |balance| {
         let mut all: Vec<Vec<f64>> = columns(&base, *balance);

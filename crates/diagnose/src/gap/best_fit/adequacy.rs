@@ -6,10 +6,6 @@ use crate::gap::best_fit::selection::Selection;
 use crate::gap::residuals::nuisance::RESPONSES_S;
 use crate::gap::residuals::study::Study;
 use crate::gap::residuals::whiten::{Linearised, dot, rows_of_step};
-use mapper_numerics::statistics::DOUBT_SIGMAS;
-
-/// Weight of scatter from step to step relative to smooth misfit: scatter grows with the strength of an effect, even of a correct one.
-const SCATTER_COUNTS: f64 = 0.25;
 
 /// Residual of a fit.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,11 +21,6 @@ pub struct Adequacy {
 }
 
 impl Adequacy {
-    /// Whether the residual is consistent with noise and an imperfect fit, ignoring further library effects.
-    pub fn may_be_noise(&self) -> bool {
-        self.smooth_sigma + SCATTER_COUNTS * self.scatter_sigma < DOUBT_SIGMAS
-    }
-
     /// Features for the probability of an unmodelled cause.
     pub fn features(&self) -> [f64; 2] {
         [self.smooth_sigma, self.scatter_sigma]

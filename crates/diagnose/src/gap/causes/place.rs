@@ -5,6 +5,8 @@
 //! shares add up to 1. A fault-free part has no share, because another part explains the gap better.
 
 use crate::gap::best_fit::fit::Fit;
+use crate::gap::causes::calibration::Calibration;
+use crate::gap::causes::probabilities::prior_of_number;
 use crate::gap::findings::report::Place;
 use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::point_state::PointState;
@@ -14,9 +16,6 @@ use mapper_physics::rig::effect::Submodel;
 
 /// Linearisation error as a share of the gain: explanations closer than this remain open, and a part with less of the gap is not listed.
 pub const BEND: f64 = 0.01;
-
-/// Approximate cost of one more effect in log evidence.
-pub const RARITY: f64 = 5.0;
 
 /// Phases of a step: name and start after the jump, s.
 const PHASES: [(&str, f64); 3] = [("0-5 s", 0.0), ("5-30 s", 5.0), ("30-110 s", 30.0)];
@@ -45,8 +44,14 @@ pub struct Explanation<'a> {
     pub parts: Vec<Part<'a>>,
 }
 
-/// Converts fits to explanations. `fits` are effects and combinations, best first.
-pub fn of_fits<'a>(study: &'a Study, fits: &'a [Gain<'_>]) -> Vec<Explanation<'a>> {
+/// Cost of one more effect in log evidence: that of the first one.
+pub fn rarity(calibration: &Calibration, study: &Study) -> f64 {
+    let prior = |effects: usize| prior_of_number(calibration, study.catalogue, effects);
+    prior(0) - prior(1)
+}
+
+/// Converts fits to explanations. `fits` are effects and combinations, best first; `rarity`: see [`rarity`].
+pub fn of_fits<'a>(study: &'a Study, fits: &'a [Gain<'_>], rarity: f64) -> Vec<Explanation<'a>> {
     let explanation = |candidate: &'a Gain<'_>| {
         let all = members(&candidate.fit.hypothesis);
         let parts = all.iter().map(|effect| {
@@ -60,7 +65,7 @@ pub fn of_fits<'a>(study: &'a Study, fits: &'a [Gain<'_>]) -> Vec<Explanation<'a
             }
         });
         // Scores of fits to some steps and to all steps are not comparable; gains are.
-        Explanation { score: 0.5 * candidate.gain - RARITY * all.len() as f64, parts: parts.collect() }
+        Explanation { score: 0.5 * candidate.gain - rarity * all.len() as f64, parts: parts.collect() }
     };
     fits.iter().map(explanation).collect()
 }
@@ -76,20 +81,21 @@ pub fn signature(study: &Study, fit: &Fit, effect: usize) -> Option<Vec<f64>> {
 /// Locations of the gap, largest first. `fits` are single effects and pairs, best first; `named` is the number of the first ones that the data do not
 /// distinguish, if a cause is named.
 pub fn places(
-    study: &Study,
+    (study, calibration): (&Study, &Calibration),
     linearised: &Linearised,
     null: &Fit,
     fits: &[Gain<'_>],
     named: Option<usize>,
 ) -> Vec<Place> {
+    let rarity = rarity(calibration, study);
     let considered = named.map_or(fits, |causes| &fits[..fits.len().min(causes)]);
     // The other fits give each member's contribution.
-    let mut explanations = of_fits(study, fits);
+    let mut explanations = of_fits(study, fits, rarity);
     explanations.truncate(considered.len());
     if named.is_some() {
         // Fits to the same steps: their evidence is comparable.
         for (explanation, Gain { fit, .. }) in explanations.iter_mut().zip(considered) {
-            explanation.score = fit.score - RARITY * fit.hypothesis.effects.len() as f64;
+            explanation.score = fit.score - rarity * fit.hypothesis.effects.len() as f64;
         }
     }
     places_of(study, linearised, null, &explanations, if named.is_some() { 0.0 } else { BEND })

@@ -5,7 +5,7 @@ use crate::gap::best_fit::coordinate::{Coordinate, infos};
 use crate::gap::best_fit::fit::Fit;
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::findings::in_words;
-use crate::gap::findings::report::{Candidate, Estimate, Onset};
+use crate::gap::findings::report::{Candidate, Estimate, MAX_EQUIVALENT, Onset};
 use crate::gap::next_experiment::best_experiment::{Rivals, SETTLED};
 use crate::gap::residuals::hypothesis::TimeHistory;
 use crate::gap::residuals::study::{EffectValues, Hypothesis, Study};
@@ -140,9 +140,6 @@ fn onsets(study: &Study, fit: &Fit) -> BTreeMap<String, Onset> {
     });
     begun.collect()
 }
-
-/// Maximum number of alternatives named with the first cause; a longer list does not help.
-pub const MAX_EQUIVALENT: usize = 2;
 
 /// Difference in evidence below which data do not distinguish causes: the odds at which an interval excludes a value.
 pub fn evidence_resolution(calibration: &Calibration) -> f64 {

@@ -65,9 +65,8 @@ impl AtRest {
     pub const CHANNELS: [Channel; 3] = [Channel::T1, Channel::T2, Channel::Tc];
 }
 
-/// Lag of T3 and oil behind their setpoints on a usual stand, s: the virtual lab's values; campaigns do not declare their own.
-const T3_LAG_S: f64 = 20.0;
-const OIL_LAG_S: f64 = 30.0;
+/// Lag of T3 and oil behind their setpoints on a usual stand, s; campaigns do not declare their own. Judgement: heaters follow within a minute.
+const SETPOINT_LAG_S: f64 = 20.0;
 /// Time to mount a sensor, min.
 const MOUNTING_MIN: f64 = 30.0;
 
@@ -95,12 +94,12 @@ impl Experiment {
 
     /// The input that the step changes, as it would be recorded at `t_s` (rising) if the step began at `start_s`.
     pub fn driven(&self, t_s: &[f64], start_s: f64) -> Option<(Channel, Series)> {
-        let (channel, from_k, to_k, lag_s) = match self.also {
+        let (channel, from_k, to_k) = match self.also {
             AlsoChanged::Nothing | AlsoChanged::Sensor(_) | AlsoChanged::Soak(_) => return None,
-            AlsoChanged::T3 { from_k, to_k } => (Channel::T3, from_k, to_k, T3_LAG_S),
-            AlsoChanged::Oil { from_k, to_k } => (Channel::TOil, from_k, to_k, OIL_LAG_S),
+            AlsoChanged::T3 { from_k, to_k } => (Channel::T3, from_k, to_k),
+            AlsoChanged::Oil { from_k, to_k } => (Channel::TOil, from_k, to_k),
         };
-        let at = |t: &f64| to_k + (from_k - to_k) * (-(t - start_s).max(0.0) / lag_s).exp();
+        let at = |t: &f64| to_k + (from_k - to_k) * (-(t - start_s).max(0.0) / SETPOINT_LAG_S).exp();
         Some((channel, Series { t_s: t_s.to_vec(), values: t_s.iter().map(at).collect() }))
     }
 }

@@ -437,6 +437,8 @@ impl Suggestion {
 
 /// Probability below which a cause other than the first is not listed: it would be shown as "<0.5 %".
 pub(crate) const EXCLUDED: f64 = 0.005;
+/// Maximum number of alternatives to the first cause, and of experiments of one kind: a longer list does not help.
+pub const MAX_EQUIVALENT: usize = 2;
 
 impl Diagnosis {
     /// Causes to list: the first, and others that are not excluded.

@@ -3,7 +3,7 @@
 use crate::gap::residuals::study::Study;
 
 /// Number of folds.
-const FOLDS: usize = 3;
+pub(crate) const FOLDS: usize = 3;
 
 /// Groups of steps, each to be predicted by a fit to the others.
 #[derive(Debug, Clone, PartialEq, Eq)]

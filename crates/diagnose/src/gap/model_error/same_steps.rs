@@ -3,14 +3,12 @@
 use crate::gap::preconditions::problem::Problem;
 use crate::gap::residuals::study::Study;
 use mapper_core::{Channel, VALVE_JUMP_RATIO, jump_ratio};
+use mapper_identify::LONGEST_BRIDGE_S;
 use mapper_observe::averages::mean_reading::mean_reading;
 
-/// Length of a step, s.
-const LENGTH_S: f64 = 1.0;
-/// Turbine inlet temperature, K: a smaller difference is ambient variation, not another operating point.
-const T3_K: f64 = 10.0;
 
-/// Rejects a reference recording with steps other than those of the recording under diagnosis.
+/// Rejects a reference recording with steps other than those of the recording under diagnosis. Times may differ by the interval of a slow
+/// logger, T3 by its tolerance: a smaller difference is variation of the stand, not another operating point.
 pub(crate) fn same_steps(healthy: &Study, study: &Study) -> Result<(), Problem> {
     if healthy.steps.len() != study.steps.len() {
         return Err(Problem::OtherSteps { healthy: healthy.steps.len(), recorded: study.steps.len() });
@@ -37,10 +35,10 @@ pub(crate) fn same_steps(healthy: &Study, study: &Study) -> Result<(), Problem> 
         differs("opening of the valve", theirs.valve_opening_ratio, opening, "", VALVE_JUMP_RATIO * opening)?;
         // The running time before the first jump is not compared.
         if index > 0 {
-            differs("length", theirs.end_s - theirs.start_s, ours.end_s - ours.start_s, "s", LENGTH_S)?;
+            differs("length", theirs.end_s - theirs.start_s, ours.end_s - ours.start_s, "s", LONGEST_BRIDGE_S)?;
         }
         if let (Some(before), Some(now)) = (t3_k(healthy, index), t3_k(study, index)) {
-            differs("T3", before, now, "K", T3_K)?;
+            differs("T3", before, now, "K", study.declared.tolerances.turbine_inlet_temperature_k)?;
         }
     }
     Ok(())

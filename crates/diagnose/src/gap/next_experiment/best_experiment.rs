@@ -2,7 +2,7 @@
 
 use crate::gap::best_fit::fit::Fit;
 use crate::gap::findings::experiment::{AllowedJump, AlsoChanged, Experiment};
-use crate::gap::findings::report::{JumpPoint, Kind, Next, Place, Suggestion};
+use crate::gap::findings::report::{JumpPoint, Kind, MAX_EQUIVALENT, Next, Place, Suggestion};
 use crate::gap::next_experiment::odds::{Odds, entropy_bit, odds};
 use crate::gap::next_experiment::outlook::{apart, apart_at_first_sight, recorded_jumps, recorded_points};
 use crate::gap::residuals::nuisance::OUTPUTS;
@@ -14,18 +14,8 @@ use mapper_physics::rig::effect::Submodel;
 
 /// Share of the open probability above which the first cause is settled.
 pub const SETTLED: f64 = COVERAGE;
-/// Experiments expected to resolve less than this share of the open question are dropped.
-const MIN_ANSWER: f64 = 0.1;
-/// Number of jumps that are evaluated with refits.
+/// Number of jumps that are evaluated with refits, and of experiments shown.
 const CLOSE_LOOKS: usize = 6;
-/// Maximum number of experiments shown.
-const SHOWN: usize = 5;
-/// The same of one kind; also of those of each other kind that are evaluated.
-const OF_KIND: usize = 2;
-/// Maximum number of candidates to distinguish.
-pub const RIVALS: usize = 4;
-/// All experiments are compared with the same random draws.
-const SEED: u64 = 1;
 /// Time at the start of a step in a script, s: housings settle within minutes.
 const START_S: u32 = 300;
 
@@ -54,8 +44,8 @@ pub struct Suggested {
 /// recorded jumps are used. Unrecorded model channels are tried with the most promising jump. If no experiment resolves enough, the
 /// function names a sensor for the first candidate's part. `temperature` is the diagnosis'.
 pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[Experiment], temperature: f64) -> Suggested {
-    rivals.fits.truncate(RIVALS);
-    rivals.probabilities.truncate(RIVALS);
+    rivals.fits.truncate(1 + MAX_EQUIVALENT);
+    rivals.probabilities.truncate(1 + MAX_EQUIVALENT);
     let Some(first) = rivals.fits.first() else { return Suggested::default() };
     let mut all = allowed.to_vec();
     let jumps_known = all.iter().any(|experiment| Kind::of(experiment) == Kind::Jump);
@@ -74,7 +64,7 @@ pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[Experiment], tempe
     looks.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut close: Vec<Experiment> = Vec::new();
     for kind in Kind::ALL {
-        let most = if kind == Kind::Jump { CLOSE_LOOKS } else { OF_KIND };
+        let most = if kind == Kind::Jump { CLOSE_LOOKS } else { MAX_EQUIVALENT };
         let of_kind = looks.iter().map(|(_, experiment)| *experiment).filter(|e| Kind::of(e) == kind);
         close.extend(of_kind.take(most));
     }
@@ -85,7 +75,7 @@ pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[Experiment], tempe
     }
     let looked = parallel::map(&close, |experiment| {
         let apart = apart(study, experiment, &rivals.fits)?;
-        let odds = odds(&rivals.probabilities, &apart, temperature, SETTLED, SEED);
+        let odds = odds(&rivals.probabilities, &apart, temperature, SETTLED);
         Some((*experiment, odds, rate(experiment, &apart)))
     });
     let mut looked: Vec<(Experiment, Odds, f64)> = looked.into_iter().flatten().collect();
@@ -96,11 +86,13 @@ pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[Experiment], tempe
     let open_bit = entropy_bit(&rivals.probabilities);
     let answers = |odds: &Odds| odds.entropy_drop_bit / open_bit.max(f64::MIN_POSITIVE);
     let most = looked.iter().map(|(_, odds, _)| answers(odds)).fold(0.0, f64::max);
-    looked.retain(|(_, odds, _)| answers(odds) >= MIN_ANSWER);
+    // What resolves less settles nothing.
+    looked.retain(|(_, odds, _)| answers(odds) >= 1.0 - SETTLED);
     let mut experiments: Vec<Suggestion> = Vec::new();
     for (experiment, odds, _) in &looked {
         let kind = Kind::of(experiment);
-        if experiments.len() < SHOWN && experiments.iter().filter(|e| e.kind == kind).count() < OF_KIND {
+        let of_kind = experiments.iter().filter(|other| other.kind == kind).count();
+        if experiments.len() < CLOSE_LOOKS && of_kind < MAX_EQUIVALENT {
             experiments.push(suggestion(kind, experiment, odds, open_bit));
         }
     }

@@ -6,6 +6,7 @@ use crate::gap::best_fit::normal::misfit_increases;
 use crate::gap::findings::experiment::{AllowedJump, AlsoChanged, Experiment};
 use crate::gap::next_experiment::at_rest::apart_at_rest;
 use crate::gap::residuals::actuators::Actuators;
+use crate::gap::residuals::initial_state::SETTLING_S;
 use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::study::{Hypothesis, Study};
 use crate::gap::residuals::whiten::Linearised;
@@ -21,8 +22,6 @@ use mapper_physics::simulation::steady::hold_speed;
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// Simulated time at the start point before a jump, s.
-const HOLD_S: f64 = 30.0;
 /// Sample interval of the first pass, s.
 pub(crate) const COARSE_S: f64 = 0.5;
 /// Maximum time at the target that is simulated, s; longer dwells are cut.
@@ -95,8 +94,8 @@ fn simulated_experiment(recorded: &Study, experiment: &Experiment, interval_s: f
         valve_opening_ratio: point.valve_opening_ratio,
     };
     let steps = vec![
-        marker(0, 0.0, HOLD_S, jump.from_p3_pa, jump.from),
-        marker(1, HOLD_S, HOLD_S + dwell_s, jump.to_p3_pa, jump.to),
+        marker(0, 0.0, SETTLING_S, jump.from_p3_pa, jump.from),
+        marker(1, SETTLING_S, SETTLING_S + dwell_s, jump.to_p3_pa, jump.to),
     ];
     let added = if let AlsoChanged::Sensor(channel) = experiment.also { Some(channel) } else { None };
     let rig = SimulatedRig {
@@ -106,7 +105,7 @@ fn simulated_experiment(recorded: &Study, experiment: &Experiment, interval_s: f
         channels: recorded.table.columns.keys().copied().chain(added).collect(),
         actuators: recorded.actuators,
     };
-    let driven = |t_s: &[f64]| experiment.driven(t_s, HOLD_S);
+    let driven = |t_s: &[f64]| experiment.driven(t_s, SETTLING_S);
     let mut study = simulated_steps(rig, steps, &jump.from, interval_s, driven)?;
     study.catalogue = recorded.catalogue;
     study.nuisances.clone_from(&recorded.nuisances);

@@ -14,9 +14,10 @@ pub(crate) fn with_metal_held(model: &Model) -> Model {
     heavy
 }
 
-/// Time over which the initial metal temperatures are checked, s, and the rate above which they are not settled, K/s. The rate is some
-/// hundred times noise, and a tenth of that of a machine started cold minutes ago.
-const WATCH_S: f64 = 30.0;
+/// Time in which everything but the housings settles from an unknown state, s: several times the lag of a sheathed probe, the slowest part.
+pub(crate) const SETTLING_S: f64 = 30.0;
+/// Rate above which the initial metal temperatures are not settled, K/s: some hundred times noise, and a tenth of that of a machine started
+/// cold minutes ago.
 const RESTLESS_K_S: f64 = 0.05;
 
 /// Whether the metal temperatures are steady when the first step of a recording begins.
@@ -24,12 +25,12 @@ pub(crate) fn rested(table: &Table, start_s: f64) -> bool {
     [Channel::Tc, Channel::Tt].into_iter().all(|channel| {
         let Some(column) = table.column(channel) else { return true };
         let middle = |from_s: f64| {
-            let range = table.range(from_s, from_s + 0.3 * WATCH_S);
+            let range = table.range(from_s, from_s + 0.3 * SETTLING_S);
             mean_reading(&column[range].iter().copied().filter(|v| v.is_finite()).collect::<Vec<_>>())
         };
-        let (Some(first), Some(last)) = (middle(start_s), middle(start_s + 0.7 * WATCH_S)) else {
+        let (Some(first), Some(last)) = (middle(start_s), middle(start_s + 0.7 * SETTLING_S)) else {
             return true;
         };
-        (last - first).abs() < RESTLESS_K_S * 0.7 * WATCH_S
+        (last - first).abs() < RESTLESS_K_S * 0.7 * SETTLING_S
     })
 }

@@ -2,7 +2,8 @@
 
 use crate::gap::best_fit::fit::{Effort, Fit, Start, fit};
 use crate::gap::best_fit::selection::Selection;
-use crate::gap::causes::probabilities::MAX_EQUIVALENT;
+use crate::gap::causes::select::MIN_SHRINK;
+use crate::gap::findings::report::MAX_EQUIVALENT;
 use crate::gap::residuals::study::{Hypothesis, Study};
 use crate::gap::residuals::whiten::Linearised;
 use crate::missing_terms::search::select::Choice;
@@ -112,19 +113,14 @@ pub fn promising(library: &[Term], choices: &[Choice]) -> Vec<Choice> {
     let Some(best) = choices.first() else { return Vec::new() };
     let mut selected: Vec<Choice> = Vec::new();
     let part = |choice: &Choice| library[choice.terms[0]].submodel();
-    // A strong term makes the linearisation less accurate.
-    let min_gain = MIN_GAIN_RATIO * best.gain;
+    // A strong term makes the linearisation less accurate, so that part of the best gain is in doubt.
+    let min_gain = MIN_SHRINK * best.gain;
     for choice in choices.iter().filter(|choice| choice.gain > min_gain) {
         let of_part = selected.iter().filter(|other| part(other) == part(choice)).count();
         let parts = if part(choice) == part(best) { 1 + MAX_EQUIVALENT } else { 1 };
-        if of_part < parts && selected.len() < MAX_LAWS {
+        if of_part < parts {
             selected.push(choice.clone());
         }
     }
     selected
 }
-
-/// Minimum linear gain of another machine part, as a share of the best gain.
-const MIN_GAIN_RATIO: f64 = 0.3;
-/// Maximum number of fitted laws.
-const MAX_LAWS: usize = 6;

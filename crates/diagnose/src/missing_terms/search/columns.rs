@@ -8,13 +8,11 @@ use crate::gap::residuals::whiten::{Linearised, rows_of_step};
 use crate::missing_terms::terms::law_effect::LawEffect;
 use crate::missing_terms::terms::term::Term;
 use mapper_core::Channel;
+use mapper_inference::descent::Reach;
 use mapper_numerics::ROUNDING;
 use mapper_numerics::parallel;
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
-
-/// Step for numerical slopes, as a share of a typical size.
-const SLOPE_STEP: f64 = 0.3;
 
 /// Base hypothesis of the search: the null hypothesis, or a library cause that stays free during the search.
 #[derive(Debug)]
@@ -77,12 +75,13 @@ impl<'a> Base<'a> {
             own.add(Arc::new(LawEffect::new(together)));
         }
         let places: Vec<usize> = (0..runs.len()).collect();
+        let distance = Reach::Coarse.distance();
         let changes = parallel::map(&places, |place| {
             let mut there = self.hypothesis.clone();
-            let values = runs[*place].iter().map(|term| SLOPE_STEP * terms[*term].step).collect();
+            let values = runs[*place].iter().map(|term| distance * terms[*term].step).collect();
             there.effects.push((first + place, values));
             let there = own.predict(&there).ok()?;
-            let change = there.values.iter().zip(&self.prediction.values).map(|(t, b)| (t - b) / SLOPE_STEP);
+            let change = there.values.iter().zip(&self.prediction.values).map(|(t, b)| (t - b) / distance);
             Some(change.collect::<Vec<f64>>())
         });
         let mut of_terms: Vec<Option<Vec<f64>>> = vec![None; terms.len()];

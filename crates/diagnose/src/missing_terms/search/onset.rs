@@ -1,7 +1,7 @@
 //! Laws that begin during a recording.
 
 use crate::gap::best_fit::normal::PRIOR_STEPS;
-use crate::gap::causes::probabilities::MAX_EQUIVALENT;
+use crate::gap::findings::report::MAX_EQUIVALENT;
 use crate::missing_terms::search::columns::{Base, Products};
 use crate::missing_terms::search::evidence::linear_evidence;
 use crate::missing_terms::search::residual_source::in_each_step;
@@ -14,10 +14,6 @@ use nalgebra::DMatrix;
 
 /// Maximum number of terms tried with an onset.
 const TRIED: usize = 12;
-/// Maximum number of terms per machine part.
-const OF_A_PART: usize = 7;
-/// Number of machine parts whose constants are tried.
-const PARTS: usize = 2;
 
 /// The best choices, each with the onset step that fits the recording best, best first; adds their terms to the library. `choices` must
 /// come from the same products and steps, best first.
@@ -31,7 +27,7 @@ pub fn begun(
     let part = |choice: &Choice| library[choice.terms[0]].submodel();
     let mut parts = Vec::new();
     for choice in choices {
-        if parts.len() < PARTS && !parts.contains(&part(choice)) {
+        if parts.len() < MAX_EQUIVALENT && !parts.contains(&part(choice)) {
             parts.push(part(choice));
         }
     }
@@ -44,7 +40,8 @@ pub fn begun(
         let lags = choice.terms.iter().any(|term| library[*term].has_memory());
         let of_part = tried.iter().filter(|other| part(other) == part(choice)).count();
         let known = tried.iter().any(|other| other.terms == choice.terms);
-        if choice.terms.len() == 1 && !lags && !known && of_part < OF_A_PART && tried.len() < TRIED {
+        // No part takes the place of all others.
+        if choice.terms.len() == 1 && !lags && !known && 2 * of_part < TRIED && tried.len() < TRIED {
             tried.push(choice);
         }
     }

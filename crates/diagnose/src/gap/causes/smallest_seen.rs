@@ -10,13 +10,12 @@ use crate::gap::findings::in_words;
 use crate::gap::findings::report::SmallestSeen;
 use crate::gap::residuals::study::Study;
 use crate::gap::residuals::whiten::Linearised;
+use mapper_inference::descent::Until;
 use mapper_numerics::ROUNDING;
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::NORMAL_95;
 use mapper_physics::rig::effect::{EffectInfo, EffectParameter};
 
-/// Maximum number of runs to find a size. Judgement: an approximate size after these is sufficient.
-const MAX_RUNS: usize = 6;
 /// Tolerance in the logarithm of the signature's length: a tenth of a size does not change a plan.
 const LN_LENGTH_TOLERANCE: f64 = 0.1;
 
@@ -54,7 +53,7 @@ pub fn smallest_size(
     let furthest = away(value_at(here * 1e9));
     let (mut smallest, mut acts) = (None::<f64>, false);
     let mut before: Option<(f64, f64)> = None;
-    for _ in 0..MAX_RUNS {
+    for _ in 0..Until::default().iterations {
         let sigma = length(value_at(here))?;
         if sigma <= ROUNDING || here == 0.0 {
             break;

@@ -9,6 +9,7 @@ use crate::drift::runs::time_axis::{self, CampaignStep, Segment, mean_variance_r
 use crate::drift::runs::usable::usable;
 use crate::drift::sensitivity::drive::{Drive, predict};
 use crate::drift::sensitivity::readings::{Readings, Response, SegmentMeans};
+use crate::gap::residuals::initial_state::SETTLING_S;
 use crate::gap::residuals::whiten::NEAR_SURGE;
 use mapper_core::{Channel, Recording};
 use mapper_numerics::statistics::mean;
@@ -17,8 +18,6 @@ use mapper_observe::declared::Declared;
 use mapper_observe::perturbation::Perturbation;
 use nalgebra::DMatrix;
 
-/// Time at the start of each run that is left out, s: the rig may still be settling from an unknown state.
-const SETTLING_S: f64 = 30.0;
 /// Model error of a segment's mean, relative to the noise of one sample: that of a mean of 44 independent samples, so that a longer segment
 /// gains no more weight. Judgement.
 const MODEL_ERROR_RATIO: f64 = 0.15;
@@ -62,7 +61,7 @@ fn read<'a>(
         .iter()
         .enumerate()
         .map(|(run, recording)| {
-            Drive::new(run, recording, request.model, &request.boundary, &steps, &segments)
+            Drive::new(run, recording, request, &steps, &segments)
         })
         .collect::<Result<_, _>>()?;
     let (base, perturbed) = predict(&mut drives, &[])?;

@@ -5,13 +5,9 @@ use crate::drift::likelihood::low_rank::LowRank;
 use crate::drift::runs::request::Unsolvable;
 use crate::drift::sensitivity::readings::Readings;
 use mapper_inference::descent::ROUNDS;
-use mapper_numerics::statistics::median;
+use mapper_numerics::statistics::{EXCLUDE_SIGMAS, median};
 use mapper_observe::perturbation::UNINFORMATIVE;
 use nalgebra::{DMatrix, DVector};
-
-/// Distance from the model, relative to the median segment, above which a segment is an outlier: five standard deviations of a normal
-/// distribution occur once in two million.
-const OUTLIER_RATIO: f64 = 5.0;
 
 /// Excludes segments that are outliers even for the best explanation: the model cannot follow the machine there (surge, a valve at its stop).
 /// Returns their number, the noise without them, and the residual of the best explanation.
@@ -35,7 +31,7 @@ pub(crate) fn leave_out(
         let kept = (0..own.len()).filter(|segment| !out[*segment]).map(|segment| sizes[segment]);
         let usual = median(kept).unwrap_or(1.0).max(1.0);
         let far: Vec<usize> = (0..own.len())
-            .filter(|segment| !out[*segment] && sizes[*segment] > OUTLIER_RATIO * OUTLIER_RATIO * usual)
+            .filter(|segment| !out[*segment] && sizes[*segment] > EXCLUDE_SIGMAS * EXCLUDE_SIGMAS * usual)
             .collect();
         if far.is_empty() {
             break;

@@ -6,7 +6,7 @@ use mapper_observe::averages::mean_reading::{BEFORE_S, mean_between};
 use mapper_observe::averages::schedule::Schedule;
 
 /// Lengths of the segments of a step: from 5 s after a jump on, increasing.
-const SEGMENTS: Schedule = Schedule {
+pub(crate) const SEGMENTS: Schedule = Schedule {
     first_s: 5.0,
     lengths_s: &[(15.0, 10.0), (35.0, 20.0), (95.0, 30.0), (f64::INFINITY, 60.0)],
     shortest_s: 5.0,

@@ -66,7 +66,7 @@ pub(crate) fn constants(readings: &Readings, declared: &Declared) -> Vec<Respons
             constants.push(channel_response(readings, output, &deviation, &acts_in));
         }
     }
-    add_slow_variations(readings, &mut constants);
+    add_slow_variations(readings, declared, &mut constants);
     constants.retain(|constant| constant.iter().take(readings.row_count()).any(|value| *value != 0.0));
     constants
 }
@@ -80,14 +80,13 @@ fn declared_error(declared: &Declared, channel: Channel, reading: f64) -> f64 {
 /// Knot distance of slow variations, s. Judgement: several steps of a minute, so that variations explain no single step, and a fraction of the
 /// hour in which turbine housings settle.
 const KNOT_S: f64 = 480.0;
-/// Slow variation of the air around the housings, which is seldom recorded, one standard deviation, K: air conditioning that cycles by 2 K from
-/// peak to peak.
-const AMBIENT_VARIATION_K: f64 = 0.7;
 /// Slow variation of the turbine side, K: model errors of its housing take an hour to decay.
 const TURBINE_VARIATION: [(Channel, f64); 2] = [(Channel::Tt, 0.2), (Channel::T4, 0.1)];
 
-/// Adds time histories that are linear between knots. No drift has such a time history, so they do not hide one.
-fn add_slow_variations(readings: &Readings, constants: &mut Vec<Response>) {
+/// Adds time histories that are linear between knots: of the air around the housings, within its tolerance, and of the turbine side. No drift
+/// has such a time history, so they do not hide one.
+fn add_slow_variations(readings: &Readings, declared: &Declared, constants: &mut Vec<Response>) {
+    let ambient_k = Perturbation::Ambient.tolerance(&declared.tolerances);
     let (start_s, end_s) = readings.span_s();
     let count = ((end_s - start_s) / KNOT_S).ceil().clamp(1.0, 60.0);
     for knot in 0..=count as usize {
@@ -103,7 +102,7 @@ fn add_slow_variations(readings: &Readings, constants: &mut Vec<Response>) {
             })
         };
         if let Some(ambient) = readings.response(Perturbation::Ambient) {
-            constants.push(variation(&|row, _| AMBIENT_VARIATION_K * ambient[row]));
+            constants.push(variation(&|row, _| ambient_k * ambient[row]));
         }
         for (channel, sigma) in TURBINE_VARIATION {
             constants.push(variation(&|_, output| if OUTPUTS[output] == channel { sigma } else { 0.0 }));

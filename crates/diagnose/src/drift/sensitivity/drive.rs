@@ -1,7 +1,7 @@
 //! Drives the nominal model through whole runs, with and without each perturbation.
 
 use crate::drift::causes::drift::Drift;
-use crate::drift::runs::request::DriftError;
+use crate::drift::runs::request::{DriftError, DriftRequest};
 use crate::drift::runs::time_axis::{CampaignStep, Segment};
 use crate::drift::sensitivity::driven_step::{
     Coverage, DrivenStep, SKIPPED_S, Target, measured_state, state_after,
@@ -22,8 +22,6 @@ use mapper_physics::simulation::model::{Model, State};
 
 /// Interval of model readings within a segment, s.
 const SAMPLE_S: f64 = 2.5;
-/// Time before the start over which readings give the initial state, s.
-const BEFORE_START_S: f64 = 2.0;
 
 /// Model predictions for one run, or for all.
 #[derive(Debug, Clone, Default)]
@@ -59,8 +57,7 @@ impl<'a> Drive<'a> {
     pub fn new(
         run: usize,
         recording: &Recording,
-        model: &'a Model,
-        nominal: &BoundaryConditions,
+        request: &DriftRequest<'a>,
         steps: &[CampaignStep],
         segments: &[Segment],
     ) -> Result<Self, DriftError> {
@@ -71,9 +68,11 @@ impl<'a> Drive<'a> {
         };
         let jumps: Vec<(f64, f64)> =
             of_run.iter().map(|(_, step)| (step.start_s, step.valve_opening_ratio)).collect();
+        let (model, nominal) = (request.model, &request.boundary);
         let inputs = AveragedInputs::read(recording, nominal, &jumps, last.end_s)
             .map_err(|source| DriftError::Inputs { run, source })?;
-        let start = start_state(run, recording, model, &inputs, first.start_s)?;
+        let before_s = request.identification.thresholds.end_mean_s;
+        let start = start_state((run, recording), model, &inputs, first.start_s, before_s)?;
         let mut segment_count = 0;
         let mut driven_steps = Vec::new();
         for (position, step) in &of_run {
@@ -81,6 +80,7 @@ impl<'a> Drive<'a> {
                 step: **step,
                 start_s: step.start_s,
                 end_s: step.end_s,
+                segments_s: Vec::new(),
                 before_jump: measured_state(recording, nominal, step.start_s - 0.6),
                 after_jump: measured_state(recording, nominal, step.start_s + SKIPPED_S),
                 at_end: measured_state(recording, nominal, step.end_s - 1.0),
@@ -95,6 +95,7 @@ impl<'a> Drive<'a> {
                     driven.times_s.push(segment.start_s + share * segment.length_s());
                     driven.targets.push(Target::Segment(segment_count));
                 }
+                driven.segments_s.push(segment.start_s);
                 segment_count += 1;
             }
             driven.times_s.push(step.end_s - 1e-3);
@@ -139,7 +140,6 @@ impl<'a> Drive<'a> {
                 drifts,
                 offset_s,
             };
-            let nodes = step.nodes_s(start_s);
             for (from_s, to_s) in step.parts(start_s, drifts) {
                 let mut model = self.model.clone();
                 if let Some((perturbation, by)) = perturbed {
@@ -151,7 +151,7 @@ impl<'a> Drive<'a> {
                 let before = step.times_s.partition_point(|t_s| *t_s < from_s);
                 let times_s = &step.times_s[before..];
                 let times_s = &times_s[..times_s.partition_point(|t_s| *t_s < to_s)];
-                let grid = FrozenGrid::new(from_s, to_s, &[], &nodes);
+                let grid = FrozenGrid::new(from_s, to_s, &[start_s], times_s);
                 let step_ends = &mut prediction.step_ends;
                 let (means, highest) = (&mut prediction.means, &mut prediction.surge_position_ratio);
                 state = drive(&model, &inputs, state, &grid, times_s, |reading, prepared, state, outputs| {
@@ -218,16 +218,16 @@ pub(crate) fn predict(
     Ok((base, perturbed))
 }
 
-/// State at the start: as measured just before it; without such readings, steady under the first inputs.
+/// State at the start: as measured in `before_s` seconds before it; without such readings, steady under the first inputs.
 fn start_state(
-    run: usize,
-    recording: &Recording,
+    (run, recording): (usize, &Recording),
     model: &Model,
     inputs: &AveragedInputs,
     start_s: f64,
+    before_s: f64,
 ) -> Result<State, DriftError> {
-    let before = |channel| mean_between(recording, channel, start_s - BEFORE_START_S, start_s, 5);
-    let first = |channel| mean_between(recording, channel, start_s, start_s + BEFORE_START_S + BEFORE_S, 5);
+    let before = |channel| mean_between(recording, channel, start_s - before_s, start_s, 5);
+    let first = |channel| mean_between(recording, channel, start_s, start_s + before_s + BEFORE_S, 5);
     let read = |channel| before(channel).or_else(|| first(channel));
     let boundary = inputs.at(start_s);
     let guess = estimate_state(&boundary, read);

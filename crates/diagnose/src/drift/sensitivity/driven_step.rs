@@ -1,28 +1,24 @@
 //! One step of a run through which the model is driven.
 
 use crate::drift::causes::drift::Drift;
-use crate::drift::runs::time_axis::CampaignStep;
+use crate::drift::runs::time_axis::{CampaignStep, SEGMENTS};
 use mapper_core::{Channel, Recording};
 use mapper_observe::averages::mean_reading::{BEFORE_S, mean_between};
 use mapper_observe::initial_state::estimate_state;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::model::State;
 
-/// Longest time step, s, until each time after a jump, s.
-const TIME_STEPS_S: [(f64, f64); 5] =
-    [(0.2, 0.05), (3.0, 0.1), (8.0, 0.5), (20.0, 1.0), (f64::INFINITY, 3.0)];
 /// Time after a jump that is left out if the model cannot follow the jump (deep beyond the surge line), s. Shaft and outlet then start from their
 /// readings, the metal from the change of its readings.
-pub(crate) const SKIPPED_S: f64 = 5.0;
-/// Longest time for which a drifting machine is taken as constant, s: a drift of 1 K in an hour changes by 0.01 K in it, below any sensor's
-/// resolution.
-const PART_S: f64 = 30.0;
+pub(crate) const SKIPPED_S: f64 = SEGMENTS.first_s;
 
 /// One step of a run.
 pub(crate) struct DrivenStep {
     pub step: CampaignStep,
     pub start_s: f64,
     pub end_s: f64,
+    /// Starts of its segments.
+    pub segments_s: Vec<f64>,
     /// Measured state just before the jump.
     pub before_jump: Option<State>,
     /// Measured state [`SKIPPED_S`] after the jump.
@@ -54,30 +50,11 @@ pub(crate) enum Target {
 }
 
 impl DrivenStep {
-    /// Ends of the time steps: short after the jump, longer when only metal temperatures change.
-    pub(crate) fn nodes_s(&self, start_s: f64) -> Vec<f64> {
-        let mut nodes = Vec::new();
-        let mut at_s = start_s;
-        while at_s < self.end_s {
-            let since_s = at_s - start_s;
-            let step_s = TIME_STEPS_S
-                .iter()
-                .find(|(until_s, _)| since_s < until_s - 1e-9)
-                .map_or(3.0, |(_, step_s)| *step_s);
-            at_s += step_s;
-            nodes.push(at_s);
-        }
-        nodes
-    }
-
-    /// Parts with a constant machine: the whole step, unless the machine drifts.
+    /// Parts with a constant machine: the whole step, or its segments if the machine drifts. Only the mean over a segment is compared.
     pub(crate) fn parts(&self, start_s: f64, drifts: &[Drift]) -> Vec<(f64, f64)> {
         let mut edges = vec![start_s];
         for drift in drifts.iter().filter(|drift| drift.acts_on_machine()) {
-            let count = ((self.end_s - start_s) / PART_S).ceil().max(1.0);
-            edges.extend(
-                (1..count as usize).map(|part| start_s + (self.end_s - start_s) * part as f64 / count),
-            );
+            edges.extend(self.segments_s.iter().filter(|segment_s| **segment_s > start_s));
             let onset_s = drift.history.onset_s - self.step.offset_s;
             // A part must not have zero length.
             if (start_s + 0.1..self.end_s - 0.1).contains(&onset_s) {

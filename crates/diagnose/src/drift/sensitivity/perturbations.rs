@@ -35,13 +35,11 @@ pub(crate) fn difference_step(perturbation: Perturbation) -> f64 {
     }
 }
 
-/// Factor on declared tolerances: repeats distinguish a constant from drift whatever its size, so a wide prior costs nothing.
-const TOLERANCE_FACTOR: f64 = 2.0;
-/// The factor for the turbine housing at the start: its initial state takes an hour to decay.
-const START_TT_FACTOR: f64 = 4.0;
+/// Factor on declared tolerances: repeats distinguish a constant from drift whatever its size, so a wide prior costs nothing. Judgement: the
+/// turbine housing, whose initial state takes an hour to decay, may start 20 K off.
+const TOLERANCE_FACTOR: f64 = 4.0;
 
 /// Prior standard deviation of a perturbation that is constant over the campaign. Inputs have declared offsets instead.
 pub(crate) fn sigma(perturbation: Perturbation, tolerances: &ModelTolerances) -> f64 {
-    let factor = if perturbation == Perturbation::StartTt { START_TT_FACTOR } else { TOLERANCE_FACTOR };
-    factor * perturbation.tolerance(tolerances)
+    TOLERANCE_FACTOR * perturbation.tolerance(tolerances)
 }

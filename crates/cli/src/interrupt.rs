@@ -28,7 +28,10 @@ fn handle_signal(stop: &RunStop, gentle: bool) {
             "The rig is safe and the recording is complete; its results are being written. Press Ctrl-C again to end without them; `mapper \
              identify` makes them later from the run directory.\n",
         ),
-        SignalResponse::MayExit => std::process::exit(Code::Interrupted as i32),
+        SignalResponse::MayExit => {
+            standard_output::warn("stopped by the operator\n");
+            std::process::exit(Code::Interrupted as i32)
+        }
     }
 }
 

@@ -6,11 +6,10 @@ use mapper_physics::compressor_map::tabulated_map::{MapError, MapRow, TabulatedM
 
 /// Reason why a file is not a nominal map.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum NominalTableError {
-    /// The file cannot be read as a map.
     #[error(transparent)]
     Import(#[from] ImportError),
-    /// The map has no efficiencies, and the model needs them.
     #[error(
         "the map has no efficiencies, and the nominal model needs them: give a map that has some, or `map: closed_form`"
     )]

@@ -5,82 +5,45 @@ use std::path::PathBuf;
 
 /// A missing or unusable driver.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum DriverError {
-    /// No program has this name.
+    /// `hint`: a sentence with a leading space, or empty.
     #[error(
         "there is no such backend. Built in: {built_in}. A driver would be a program `{program}`, which is not in {searched}{hint}"
     )]
-    NotFound {
-        /// File name searched.
-        program: String,
-        /// Built-in backends of the program.
-        built_in: String,
-        /// Searched locations.
-        searched: String,
-        /// A hint: a sentence with a leading space, or empty.
-        hint: String,
-    },
-    /// It cannot be started.
+    NotFound { program: String, built_in: String, searched: String, hint: String },
     #[error("{} cannot be started: {source}{}", program.display(), start_hint(source))]
-    NotStarted {
-        /// The program.
-        program: PathBuf,
-        /// The reason.
-        source: std::io::Error,
-    },
-    /// No driver listens on the socket.
+    NotStarted { program: PathBuf, source: std::io::Error },
     #[error(
         "no driver listens at the socket {}: {source}. Start its driver (`mapper-backend-NAME --socket PATH`), or remove the file, so that the \
                  driver is started as a program",
         socket.display()
     )]
-    NotListening {
-        /// The socket.
-        socket: PathBuf,
-        /// The reason.
-        source: std::io::Error,
-    },
-    /// The program is not executable.
+    NotListening { socket: PathBuf, source: std::io::Error },
     #[error("{} exists, but is not executable; run `chmod +x {}`", program.display(), program.display())]
-    NotExecutable {
-        /// The program.
-        program: PathBuf,
-    },
-    /// The driver's protocol version is incompatible.
+    NotExecutable { program: PathBuf },
     #[error("it uses version {}.{} of the protocol; this program uses {}.{}. Use a driver with the same major version", theirs.major, theirs.minor, ours.major, ours.minor)]
-    Version {
-        /// Its version.
-        theirs: Version,
-        /// This program's version.
-        ours: Version,
-    },
-    /// The response is not that of a driver.
+    Version { theirs: Version, ours: Version },
     #[error("it is not a driver for mapper: {0}")]
     NotADriver(String),
-    /// The driver reports a different name.
     #[error("it reports the name `{0}`; the file name of the program has to end with this name")]
     Name(String),
-    /// The driver's data are inconsistent.
     #[error(transparent)]
     InvalidData(#[from] InvalidData),
-    /// The driver has exited or closed its output.
+    /// The text continues the sentence, or is empty.
     #[error("the driver has ended{0}")]
     Ended(String),
-    /// The driver sent an invalid message.
     #[error("the driver sent an invalid message: {0}")]
     InvalidMessage(String),
-    /// The driver does not read its input.
     #[error("the driver does not read its input")]
     NotReading,
     /// An error reported by the driver.
     #[error("{0}")]
     Message(String),
-    /// The campaign contains a secret.
     #[error(
         "a campaign must not contain a secret; write `{{env: NAME}}` and set the environment variable NAME"
     )]
     Secret,
-    /// An environment variable is not set.
     #[error("the environment variable {0} is not set")]
     NotSet(String),
 }

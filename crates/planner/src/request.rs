@@ -60,55 +60,30 @@ pub struct UnreachablePoint {
 
 /// Failure of planning.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum PlanError {
-    /// Points cannot be reached within the limits.
     #[error("{} of the points cannot be reached: {}", .0.len(), .0.iter().map(|point| format!("{} ({})", point.point, point.reason)).collect::<Vec<_>>().join("; "))]
     Unreachable(Vec<UnreachablePoint>),
-    /// No points.
     #[error("the campaign has no points; give its grid at least one")]
     NoPoints,
-    /// The time budget leaves too little time at each point.
     #[error(
         "a time budget of {:.1} min leaves {dwell_s:.0} s for each of {steps} steps, but a step needs at least {shortest_s:.0} s; allow at \
                  least {:.0} min or remove points",
         budget_s / 60.0,
         (needed_s / 60.0).ceil()
     )]
-    BudgetTooShort {
-        /// The budget, s.
-        budget_s: f64,
-        /// Steps of the plan.
-        steps: usize,
-        /// Time that the budget leaves for each step, s.
-        dwell_s: f64,
-        /// Minimum dwell of a step, s.
-        shortest_s: f64,
-        /// Budget that the minimum dwell needs, s.
-        needed_s: f64,
-    },
-    /// A required error was set, but no method predicts errors.
+    BudgetTooShort { budget_s: f64, steps: usize, dwell_s: f64, shortest_s: f64, needed_s: f64 },
     #[error(
         "`required_sigma_eta` needs an identification method that predicts errors; set `identification.method: joint`, or give `timing.dwell`"
     )]
     NoPredictedError,
-    /// Every order of the points contains a forbidden jump.
+    /// Every order contains a forbidden jump; `worst`: for each violated limit, the jump that exceeds it most.
     #[error(
         "every order that was tried contains a forbidden jump ({jumps} were found); the worst of each limit: {}; widen the limits or \
          remove points",
         worst.iter().map(|(jump, reason)| format!("{} to {}: {reason}", jump.from, jump.to)).collect::<Vec<_>>().join("; ")
     )]
-    NoAdmissibleOrder {
-        /// Number of forbidden jumps.
-        jumps: usize,
-        /// For each violated limit, the jump that exceeds it most.
-        worst: Vec<(Jump, Rejection)>,
-    },
-    /// The simulation of a step failed.
+    NoAdmissibleOrder { jumps: usize, worst: Vec<(Jump, Rejection)> },
     #[error("the forecast of the step to {to} failed: {source}")]
-    Forecast {
-        /// Destination of the step.
-        to: OperatingPoint,
-        /// The simulation's error.
-        source: SimulationError,
-    },
+    Forecast { to: OperatingPoint, source: SimulationError },
 }

@@ -12,22 +12,17 @@ const MESSAGE_LIMIT: usize = 1000;
 
 /// Failure of a sequence.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum SequenceError {
     /// The script has an error, or one of its steps was refused.
     #[error("{0}")]
     Script(Box<ScriptError>),
-    /// The script's thread could not be started.
     #[error("the thread of the sequence script could not be started: {0}")]
     Thread(#[source] std::io::Error),
-    /// The script computes too long between two steps.
     #[error(
         "the sequence script computed for {limit_s} s without a new step and was ended; reduce its work between two steps"
     )]
-    TooSlow {
-        /// Limit, s.
-        limit_s: u64,
-    },
-    /// The script's thread ended unexpectedly: a fault of the program.
+    TooSlow { limit_s: u64 },
     #[error("the sequence script ended without a result: this is a fault of the program")]
     Lost,
 }

@@ -18,25 +18,12 @@ pub struct Key<T> {
 
 /// An unknown key, or an invalid value.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum KeyError {
-    /// No such key.
     #[error("there is no key `{key}`; the keys are {known}")]
-    Unknown {
-        /// The unknown key.
-        key: String,
-        /// All keys, with commas between them.
-        known: String,
-    },
-    /// Not a value of the key.
+    Unknown { key: String, known: String },
     #[error("`{value}` is not a value of `{key}`; write e.g. `{example}`")]
-    Value {
-        /// The key.
-        key: &'static str,
-        /// The invalid value.
-        value: String,
-        /// A valid one.
-        example: &'static str,
-    },
+    Value { key: &'static str, value: String, example: &'static str },
 }
 
 /// Sets the key `name` of a description.

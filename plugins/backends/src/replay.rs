@@ -22,17 +22,14 @@ pub const PLUGIN: BackendPlugin = BackendPlugin {
 
 /// Reason for the end of a replay.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum ReplayError {
-    /// The settings name no file.
     #[error("write the path of an MCAP file, e.g. {{recording: runs/x/recording.mcap}}")]
     NoRecording,
-    /// The file cannot be read.
     #[error(transparent)]
     Unreadable(#[from] RecordError),
-    /// The channel map cannot be read, or has mistakes.
     #[error(transparent)]
     ChannelMap(#[from] ChannelMapError),
-    /// A poll beyond the end of the recording.
     #[error("the recording being replayed has ended")]
     Ended,
 }

@@ -20,57 +20,28 @@ const MIN_PEAK_EFFICIENCY: f64 = 0.3;
 
 /// Why a map cannot be that of a compressor with this wheel; its text continues "the map `FILE`: ".
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum MapMisfit {
-    /// A line that does not compress.
     #[error(
         "the highest pressure ratio at {:.1} krpm is {pressure_ratio:.3}, but a compressor has more than 1", .speed_rpm / 1e3
     )]
-    NoCompression {
-        /// Corrected speed of the line, rpm.
-        speed_rpm: f64,
-        /// Its highest pressure ratio.
-        pressure_ratio: f64,
-    },
-    /// Efficiencies of no compressor.
+    NoCompression { speed_rpm: f64, pressure_ratio: f64 },
     #[error("the highest efficiency is {:.1} %, but compressors reach 60 % and more", 100.0 * .peak)]
-    Efficiency {
-        /// The highest one, fraction.
-        peak: f64,
-    },
-    /// Flow of another size of machine.
+    Efficiency { peak: f64 },
+    /// Choke flow of the map, and of a similar compressor.
     #[error(
         "the flow is about {} times too {} for a wheel of {} mm: it is read as {} kg/s at choke and {:.1} krpm, where {} kg/s would be usual",
         factor(*.found_kg_s, *.usual_kg_s), large_or_small(*.found_kg_s, *.usual_kg_s),
         to_mm(*.wheel_m), two_digits(*.found_kg_s), .speed_rpm / 1e3, two_digits(*.usual_kg_s)
     )]
-    Flow {
-        /// Choke flow of the map, kg/s.
-        found_kg_s: f64,
-        /// That of a similar compressor, kg/s.
-        usual_kg_s: f64,
-        /// Corrected speed, rpm.
-        speed_rpm: f64,
-        /// Diameter of the wheel, m.
-        wheel_m: f64,
-    },
+    Flow { found_kg_s: f64, usual_kg_s: f64, speed_rpm: f64, wheel_m: f64 },
     /// More head than a wheel can give at its tip speed.
     #[error(
         "a pressure ratio of {pressure_ratio:.2} needs a tip speed of more than {:.0} m/s, and a wheel of {} mm has {:.0} m/s at {} krpm: \
          the speeds are too low or the wheel is too small by a factor of at least {:.1}",
         .needed_m_s, to_mm(*.wheel_m), .tip_m_s, two_digits(.speed_rpm / 1e3), .needed_m_s / .tip_m_s
     )]
-    TipSpeed {
-        /// Highest pressure ratio of the fastest line.
-        pressure_ratio: f64,
-        /// Tip speed that it needs, m/s.
-        needed_m_s: f64,
-        /// Tip speed of the wheel, m/s.
-        tip_m_s: f64,
-        /// Corrected speed of the line, rpm.
-        speed_rpm: f64,
-        /// Diameter of the wheel, m.
-        wheel_m: f64,
-    },
+    TipSpeed { pressure_ratio: f64, needed_m_s: f64, tip_m_s: f64, speed_rpm: f64, wheel_m: f64 },
 }
 
 impl MapMisfit {

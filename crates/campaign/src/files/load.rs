@@ -25,16 +25,10 @@ pub const MAX_MAP_BYTES: usize = 16 << 20;
 
 /// Errors of loading a campaign.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum CampaignError {
-    /// The file cannot be read.
     #[error("failed to read the campaign {}: {source}", .path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Cause.
-        source: io::Error,
-    },
-    /// The file has mistakes.
+    Read { path: PathBuf, source: io::Error },
     #[error("{0}")]
     Mistakes(Box<Findings>),
 }

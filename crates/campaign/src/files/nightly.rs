@@ -15,16 +15,10 @@ const DEFAULT_NIGHTS: usize = 14;
 
 /// Error while loading a nightly campaign.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum NightlyError {
-    /// The file cannot be read.
     #[error("failed to read the nightly campaign {}: {source}", .path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Cause.
-        source: std::io::Error,
-    },
-    /// The file has mistakes.
+    Read { path: PathBuf, source: std::io::Error },
     #[error("{0}")]
     Mistakes(Box<Findings>),
 }

@@ -78,13 +78,10 @@ pub struct Recording {
 
 /// Reason why a recording cannot be used.
 #[derive(Debug, Clone, thiserror::Error, PartialEq)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum RecordingError {
-    /// A required channel is missing.
     #[error("the recording has no channel {channel} ({}); name it in the channel map", channel.info().description)]
-    MissingChannel {
-        /// The channel.
-        channel: Channel,
-    },
+    MissingChannel { channel: Channel },
 }
 
 impl Recording {

@@ -52,11 +52,10 @@ impl From<Element> for String {
 
 /// A text that is not the name of a sensor.
 #[derive(Debug, Clone, thiserror::Error, PartialEq, Eq)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum UnknownElement {
-    /// The text is not a channel and a number.
     #[error("`{0}` is not a channel and the number of one of its sensors, such as `T2/3`")]
     NotElement(String),
-    /// Unknown channel.
     #[error(transparent)]
     Channel(#[from] UnknownChannel),
 }

@@ -160,69 +160,25 @@ pub trait Backend: Send {
 
 /// Reason why a call of a backend failed.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum BackendError {
-    /// A call out of order in the life cycle.
     #[error("`{call}` was called while the rig is {state}, not {needed}: a defect of the calling program")]
-    OutOfOrder {
-        /// The call.
-        call: &'static str,
-        /// State the rig is in.
-        state: &'static str,
-        /// State the call needs.
-        needed: &'static str,
-    },
-    /// A setpoint outside the range of the rig.
+    OutOfOrder { call: &'static str, state: &'static str, needed: &'static str },
     #[error(
         "{quantity} = {} is outside the range of the rig ({low} to {})",
         with_unit(value, unit),
         with_unit(high, unit)
     )]
-    SetpointOutOfRange {
-        /// Name of the setpoint.
-        quantity: &'static str,
-        /// Requested value.
-        value: f64,
-        /// Unit of the three values.
-        unit: &'static str,
-        /// Lowest allowed value.
-        low: f64,
-        /// Highest allowed value.
-        high: f64,
-    },
-    /// The backend's own settings in the campaign are wrong.
+    SetpointOutOfRange { quantity: &'static str, value: f64, unit: &'static str, low: f64, high: f64 },
+    /// The backend's own settings in the campaign are wrong; `path`: the keys below `backend.settings`.
     #[error("the settings of backend `{backend}` are wrong at `{path}`: {source}")]
-    Settings {
-        /// Name of the backend.
-        backend: String,
-        /// Key path below `backend.settings`.
-        path: String,
-        /// The mistake and its remedy.
-        source: BackendCause,
-    },
-    /// A simulation could not continue.
+    Settings { backend: String, path: String, source: BackendCause },
     #[error("the simulation stopped at {t_s:.3} s: {source}")]
-    Simulation {
-        /// Run time, s.
-        t_s: f64,
-        /// The reason.
-        source: BackendCause,
-    },
-    /// A call did not return in time.
+    Simulation { t_s: f64, source: BackendCause },
     #[error("the rig did not answer `{call}` within {limit_s} s")]
-    Deadline {
-        /// The call.
-        call: &'static str,
-        /// Time limit, s.
-        limit_s: f64,
-    },
-    /// The connection to the rig was lost.
+    Deadline { call: &'static str, limit_s: f64 },
     #[error("the rig was lost at {t_s:.3} s: {source}")]
-    Lost {
-        /// Run time, s.
-        t_s: f64,
-        /// The reason.
-        source: BackendCause,
-    },
+    Lost { t_s: f64, source: BackendCause },
 }
 
 /// The error of the backend. Each backend has its own error type.

@@ -9,63 +9,24 @@ const MAX_RATE_HZ: f64 = 100_000.0;
 
 /// Invalid or inconsistent data from a driver.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum InvalidData {
-    /// A channel that the program does not have.
     #[error("it describes an unknown channel: {0}")]
     Channel(#[from] UnknownChannel),
-    /// A channel in another unit.
     #[error("it sends {channel} in {unit}; the unit of {channel} is {right}")]
-    Unit {
-        /// The channel.
-        channel: Channel,
-        /// The unit in the description.
-        unit: String,
-        /// The unit of the channel.
-        right: &'static str,
-    },
-    /// A repeated channel.
+    Unit { channel: Channel, unit: String, right: &'static str },
     #[error("it sends {0} twice")]
     Duplicate(String),
-    /// A guard that the program does not have.
     #[error("it requires an unknown guard `{0}`; this program may be older than the driver")]
     Guard(String),
-    /// An impossible number.
     #[error("its {name} is {value} {unit}, which is impossible")]
-    Number {
-        /// The quantity.
-        name: &'static str,
-        /// Value.
-        value: f64,
-        /// Unit.
-        unit: &'static str,
-    },
-    /// Columns of different lengths.
+    Number { name: &'static str, value: f64, unit: &'static str },
     #[error("{name} has {length} values for {count} samples")]
-    ColumnLength {
-        /// The column.
-        name: String,
-        /// Its length.
-        length: usize,
-        /// Number of samples.
-        count: usize,
-    },
-    /// Times that do not increase.
+    ColumnLength { name: String, length: usize, count: usize },
     #[error("a sample at {t_s} s after one at {before_s} s")]
-    Time {
-        /// The time before, s.
-        before_s: f64,
-        /// The time, s.
-        t_s: f64,
-    },
-    /// Missing or repeated samples.
+    Time { before_s: f64, t_s: f64 },
     #[error("expected sample {expected}, received sample {found}{}", describe_missing(*expected, *found))]
-    Sequence {
-        /// Number of the next sample.
-        expected: u64,
-        /// Number of the received sample.
-        found: u64,
-    },
-    /// More samples than the queue holds.
+    Sequence { expected: u64, found: u64 },
     #[error("it sends more samples than were requested")]
     TooMany,
 }

@@ -26,38 +26,20 @@ impl Encoding {
 
 /// A frame that cannot be read, or its content.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum FrameError {
-    /// Its declared length exceeds the limit.
     #[error("a frame of {bytes} bytes; at most {limit} may be sent")]
-    TooLarge {
-        /// Its length, bytes.
-        bytes: u64,
-        /// Maximum length, bytes.
-        limit: u32,
-    },
-    /// It is text.
+    TooLarge { bytes: u64, limit: u32 },
     #[error(
         "text that begins with `{begins}` instead of a frame: write only frames to standard output, and text to standard error"
     )]
-    Text {
-        /// Its first letters.
-        begins: String,
-    },
-    /// It is empty.
+    Text { begins: String },
     #[error("an empty frame")]
     Empty,
-    /// The stream ended inside it.
     #[error("the stream ended after {got} of {wanted} bytes of a frame")]
-    Truncated {
-        /// Bytes received.
-        got: usize,
-        /// Bytes expected.
-        wanted: usize,
-    },
-    /// It is not a message.
+    Truncated { got: usize, wanted: usize },
     #[error("not a message: {0}")]
     Content(String),
-    /// The stream failed.
     #[error(transparent)]
     Stream(#[from] std::io::Error),
 }

@@ -24,89 +24,41 @@ pub struct MapRow {
 
 /// Reason why a table is not a map.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum MapError {
-    /// An invalid value.
+    /// `row` counts from 1, without the header.
     #[error(
         "row {row} of the map: {quantity} = {} has no physical meaning (it must be {needed})",
         with_unit(value, unit)
     )]
-    Value {
-        /// Row, from 1, header not counted.
-        row: usize,
-        /// Name of the column.
-        quantity: &'static str,
-        /// Value.
-        value: f64,
-        /// Unit of the column.
-        unit: &'static str,
-        /// The allowed range.
-        needed: &'static str,
-    },
-    /// Too few speed lines to interpolate between.
+    Value { row: usize, quantity: &'static str, value: f64, unit: &'static str, needed: &'static str },
     #[error("the map has {lines} speed line(s); at least 2 are needed")]
-    TooFewLines {
-        /// Number of lines.
-        lines: usize,
-    },
-    /// A line with too few points.
+    TooFewLines { lines: usize },
     #[error(
         "the speed line at {speed_corrected_rpm} rpm has {points} usable point(s) between choke and its highest pressure ratio; at least 3 are needed"
     )]
-    TooFewPoints {
-        /// The line's corrected speed, rpm.
-        speed_corrected_rpm: f64,
-        /// Number of points.
-        points: usize,
-    },
-    /// A line below another of lower speed.
+    TooFewPoints { speed_corrected_rpm: f64, points: usize },
     #[error(
         "the speed line at {speed_corrected_rpm} rpm ends on the surge side at a pressure ratio of {pressure_ratio}, below that of the next slower line ({slower_pressure_ratio}): the lines cross"
     )]
-    Crossing {
-        /// The line's corrected speed, rpm.
-        speed_corrected_rpm: f64,
-        /// Highest pressure ratio.
-        pressure_ratio: f64,
-        /// Highest pressure ratio of the next slower line.
-        slower_pressure_ratio: f64,
-    },
-    /// All lines are slower than those of any turbocharger.
+    Crossing { speed_corrected_rpm: f64, pressure_ratio: f64, slower_pressure_ratio: f64 },
     #[error(
         "the fastest speed line turns at {} only: no turbocharger is that slow; if the table has krpm, add the unit to its heading (`speed [krpm]`)",
         with_unit(speed_corrected_rpm, "rpm")
     )]
-    Slow {
-        /// The fastest corrected speed, rpm.
-        speed_corrected_rpm: f64,
-    },
-    /// A line faster than any turbocharger.
+    Slow { speed_corrected_rpm: f64 },
     #[error(
         "row {row} of the map: no turbocharger turns at {} (2e6 rpm at most); if the table has rpm, its heading must not say krpm",
         with_unit(speed_corrected_rpm, "rpm")
     )]
-    Fast {
-        /// Row, from 1, header not counted.
-        row: usize,
-        /// Corrected speed, rpm.
-        speed_corrected_rpm: f64,
-    },
-    /// More flow than an inlet can pass.
+    Fast { row: usize, speed_corrected_rpm: f64 },
     #[error(
         "row {row} of the map: no compressor passes {} at {} ({} at most); if the table has g/s, kg/h or lb/min, add the unit to its heading (`flow [g/s]`)",
         with_unit(flow_corrected_kg_s, "kg/s"),
         with_unit(speed_corrected_rpm, "rpm"),
         with_unit(format_args!("{limit_kg_s:.2}"), "kg/s")
     )]
-    Flow {
-        /// Row, from 1, header not counted.
-        row: usize,
-        /// Corrected flow, kg/s.
-        flow_corrected_kg_s: f64,
-        /// Corrected speed, rpm.
-        speed_corrected_rpm: f64,
-        /// Largest flow of an inlet, kg/s.
-        limit_kg_s: f64,
-    },
+    Flow { row: usize, flow_corrected_kg_s: f64, speed_corrected_rpm: f64, limit_kg_s: f64 },
 }
 
 /// A stored speed line.

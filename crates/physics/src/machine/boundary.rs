@@ -43,31 +43,18 @@ impl Default for BoundaryConditions {
 
 /// Boundary conditions under which the model is not valid.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum BoundaryError {
-    /// No gas goes through the turbine.
     #[error(
         "P3 = {p3_pa:.0} Pa is not above P4 = {p4_pa:.0} Pa: the running model needs flow through the turbine; use standstill instead"
     )]
-    NoTurbineFlow {
-        /// Turbine inlet total pressure, Pa.
-        p3_pa: f64,
-        /// Turbine outlet pressure, Pa.
-        p4_pa: f64,
-    },
-    /// A value outside any rig's range.
+    NoTurbineFlow { p3_pa: f64, p4_pa: f64 },
     #[error(
         "{name} = {} has no physical meaning here; it must be finite and above {}",
         with_unit(value, unit),
         with_unit(0, unit)
     )]
-    NotPhysical {
-        /// Name of the boundary condition.
-        name: &'static str,
-        /// Value.
-        value: f64,
-        /// Unit.
-        unit: &'static str,
-    },
+    NotPhysical { name: &'static str, value: f64, unit: &'static str },
 }
 
 impl BoundaryConditions {

@@ -54,48 +54,22 @@ pub struct LineRequest {
 
 /// Reason why a line has no points.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum LineError {
-    /// The machine has no steady state on the line.
     #[error("the nominal machine has no steady state: {0}")]
     NoSteadyState(#[from] SteadyError),
-    /// The valve, at its widest requested opening, passes less flow than the surge end.
     #[error(
         "the line has no points: its choke end at opening {widest_opening_ratio} has {:.2} g/s corrected, its surge end with a margin of {:.1} % would have {:.2} g/s", 1e3 * .choke_end_kg_s, 100.0 * .surge_margin_ratio, 1e3 * .surge_end_kg_s
     )]
-    NoRoom {
-        /// Widest requested opening.
-        widest_opening_ratio: f64,
-        /// Corrected flow at the choke end, kg/s.
-        choke_end_kg_s: f64,
-        /// Requested surge margin.
-        surge_margin_ratio: f64,
-        /// Corrected flow at the surge end, kg/s.
-        surge_end_kg_s: f64,
-    },
-    /// The spacing is larger than the line is long.
+    NoRoom { widest_opening_ratio: f64, choke_end_kg_s: f64, surge_margin_ratio: f64, surge_end_kg_s: f64 },
     #[error(
         "a spacing of {:.2} g/s gives one point: from choke ({:.2} g/s corrected) to surge end ({:.2} g/s) the line has {:.2} g/s", 1e3 * .spacing_kg_s, 1e3 * .choke_end_kg_s, 1e3 * .surge_end_kg_s, 1e3 * (.choke_end_kg_s - .surge_end_kg_s)
     )]
-    SpacingTooWide {
-        /// Requested spacing, kg/s.
-        spacing_kg_s: f64,
-        /// Corrected flow at the choke end, kg/s.
-        choke_end_kg_s: f64,
-        /// Corrected flow at the surge end, kg/s.
-        surge_end_kg_s: f64,
-    },
-    /// The spacing gives more points than a line may have.
+    SpacingTooWide { spacing_kg_s: f64, choke_end_kg_s: f64, surge_end_kg_s: f64 },
     #[error(
         "a spacing of {:.4} g/s gives {count:.0} points over {:.2} g/s; a line may have at most {MAX_POINTS}", 1e3 * .spacing_kg_s, 1e3 * .range_kg_s
     )]
-    TooManyPoints {
-        /// Requested spacing, kg/s.
-        spacing_kg_s: f64,
-        /// Number of points with this spacing.
-        count: f64,
-        /// Flow from end to end, kg/s.
-        range_kg_s: f64,
-    },
+    TooManyPoints { spacing_kg_s: f64, count: f64, range_kg_s: f64 },
 }
 
 impl LineError {

@@ -12,81 +12,39 @@ use mapper_core::{Limits, OperatingPoint, temperature};
 
 /// A reason why a point cannot be reached; its text continues a sentence that starts with the point's name.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum Obstacle {
-    /// The valve cannot be set to this opening.
     #[error("is outside the valve's range, above 0 to {highest_ratio}")]
-    Opening {
-        /// Largest opening, relative to the nominal area.
-        highest_ratio: f64,
-    },
-    /// The machine has no steady state at the point.
+    Opening { highest_ratio: f64 },
     #[error("cannot be held: {0}")]
     NoSteadyState(#[source] SteadyError),
-    /// The shaft turns too fast.
     #[error("is above the speed limit, `limits.speed` = {} krpm", .limit_rpm / 1e3)]
-    Speed {
-        /// Limit, rpm.
-        limit_rpm: f64,
-    },
-    /// Beyond the nominal surge line.
+    Speed { limit_rpm: f64 },
     #[error(
         "is beyond the surge line of the nominal map, at {:.0} % of the surge flow", 100.0 * (1.0 + .margin_ratio)
     )]
-    Surge {
-        /// Surge margin, below 0.
-        margin_ratio: f64,
-    },
-    /// Too close to surge.
+    Surge { margin_ratio: f64 },
     #[error(
         "has a surge margin of {:.1} %, below `limits.surge_margin` = {} %", 100.0 * .margin_ratio, 100.0 * .limit_ratio
     )]
-    SurgeMargin {
-        /// Surge margin.
-        margin_ratio: f64,
-        /// Smallest allowed margin.
-        limit_ratio: f64,
-    },
-    /// The turbine would need more pressure than the rig has.
+    SurgeMargin { margin_ratio: f64, limit_ratio: f64 },
     #[error(
         "needs P3 = {:.1} kPa, above `limits.turbine_inlet_pressure.max` = {} kPa", .p3_pa / 1e3, .limit_pa / 1e3
     )]
-    HighP3 {
-        /// Pressure that holds the point, Pa.
-        p3_pa: f64,
-        /// Limit, Pa.
-        limit_pa: f64,
-    },
-    /// The turbine would need less pressure than the rig can hold.
+    HighP3 { p3_pa: f64, limit_pa: f64 },
     #[error(
         "needs P3 = {:.1} kPa, below `limits.turbine_inlet_pressure.min` = {} kPa", .p3_pa / 1e3, .limit_pa / 1e3
     )]
-    LowP3 {
-        /// Pressure that holds the point, Pa.
-        p3_pa: f64,
-        /// Limit, Pa.
-        limit_pa: f64,
-    },
-    /// The compressor outlet gets too hot.
+    LowP3 { p3_pa: f64, limit_pa: f64 },
     #[error(
         "heats the compressor outlet to T2 = {}, above `limits.compressor_outlet_temperature` = {}",
         temperature(*.t2_k), temperature(*.limit_k)
     )]
-    T2 {
-        /// Outlet temperature, K.
-        t2_k: f64,
-        /// Limit, K.
-        limit_k: f64,
-    },
-    /// The turbine inlet is too hot.
+    T2 { t2_k: f64, limit_k: f64 },
     #[error(
         "has T3 = {}, above `limits.turbine_inlet_temperature` = {}", temperature(*.t3_k), temperature(*.limit_k)
     )]
-    T3 {
-        /// Turbine inlet temperature, K.
-        t3_k: f64,
-        /// Limit, K.
-        limit_k: f64,
-    },
+    T3 { t3_k: f64, limit_k: f64 },
 }
 
 impl Obstacle {

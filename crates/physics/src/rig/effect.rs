@@ -197,48 +197,19 @@ pub trait Effect: std::fmt::Debug + Send + Sync {
 
 /// Reason why an effect cannot be added to a rig.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum EffectError {
-    /// Too few or too many values.
     #[error("effect `{id}` has the parameters {names}, and {given} values were given: give one for each")]
-    Count {
-        /// The effect.
-        id: String,
-        /// Names of its parameters.
-        names: String,
-        /// Number of values.
-        given: usize,
-    },
-    /// An invalid value.
+    Count { id: String, names: String, given: usize },
     #[error(
         "{name} = {} of effect `{id}` is not between {low} and {}",
         with_unit(value, unit),
         with_unit(high, unit)
     )]
-    OutOfRange {
-        /// The effect.
-        id: String,
-        /// The parameter.
-        name: String,
-        /// Value.
-        value: f64,
-        /// Unit.
-        unit: String,
-        /// Smallest value.
-        low: f64,
-        /// Largest value.
-        high: f64,
-    },
-    /// A parameter that the effect does not have: a bug in the effect.
+    OutOfRange { id: String, name: String, value: f64, unit: String, low: f64, high: f64 },
+    /// A bug in the effect.
     #[error("effect `{id}` has no parameter `{name}`; it has {names}")]
-    NoParameter {
-        /// The effect.
-        id: String,
-        /// The requested name.
-        name: String,
-        /// Names of its parameters.
-        names: String,
-    },
-    /// No room for hidden temperatures.
+    NoParameter { id: String, name: String, names: String },
     #[error(transparent)]
     Room(#[from] TooManyExtraStates),
 }

@@ -46,25 +46,14 @@ pub struct InterpolatedInputs {
 
 /// Reason why a table cannot be interpolated.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum InputsError {
-    /// No rows, or more or fewer rows than times.
     #[error(
         "{times} times and {rows} rows of boundary conditions; their numbers must be equal, and at least one"
     )]
-    Lengths {
-        /// Number of times.
-        times: usize,
-        /// Number of rows.
-        rows: usize,
-    },
-    /// Times out of order.
+    Lengths { times: usize, rows: usize },
     #[error("the times of boundary conditions must rise; {after_s} s comes after {before_s} s")]
-    Order {
-        /// The earlier row's time, s.
-        before_s: f64,
-        /// The later row's time, s.
-        after_s: f64,
-    },
+    Order { before_s: f64, after_s: f64 },
 }
 
 impl InterpolatedInputs {

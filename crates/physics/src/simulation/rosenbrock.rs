@@ -54,27 +54,16 @@ impl<const N: usize> Step<N> {
 
 /// Reason why an integration could not continue.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum IntegrationError {
-    /// The error control requires ever smaller steps.
     #[error(
         "the integration needs steps below {step_s:.1e} s at {t_s:.6} s; the inputs or parameters there are beyond the model"
     )]
-    StepTooSmall {
-        /// Time, s.
-        t_s: f64,
-        /// Step, s.
-        step_s: f64,
-    },
-    /// The bound on the number of steps was reached.
+    StepTooSmall { t_s: f64, step_s: f64 },
     #[error(
         "the integration took more than {steps} steps and is at {t_s:.6} s; loosen the tolerance or shorten the run"
     )]
-    TooManySteps {
-        /// Time, s.
-        t_s: f64,
-        /// Steps taken.
-        steps: usize,
-    },
+    TooManySteps { t_s: f64, steps: usize },
 }
 
 /// The step-size control and the state that is carried from step to step.

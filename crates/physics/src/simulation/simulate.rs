@@ -49,16 +49,10 @@ pub struct ModelEvent {
 
 /// Reason why a simulation could not continue.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum SimulationError {
-    /// The boundary conditions are not valid.
     #[error("at {t_s:.3} s: {source}")]
-    Boundary {
-        /// Time, s.
-        t_s: f64,
-        /// The violated limit.
-        source: BoundaryError,
-    },
-    /// The integration failed.
+    Boundary { t_s: f64, source: BoundaryError },
     #[error(transparent)]
     Integration(#[from] IntegrationError),
 }

@@ -32,46 +32,22 @@ impl SteadyState {
 
 /// Reason for a missing steady state.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum SteadyError {
-    /// The boundary conditions are not valid.
     #[error(transparent)]
     Boundary(#[from] BoundaryError),
-    /// The flows of compressor and valve are equal at no pressure.
     #[error(
         "at {speed_rpm:.0} rpm the flows of compressor and valve (opening {valve_opening_ratio}) are equal at no outlet pressure"
     )]
-    NoFlowBalance {
-        /// Shaft speed, rpm.
-        speed_rpm: f64,
-        /// Valve opening.
-        valve_opening_ratio: f64,
-    },
-    /// No turbine inlet pressure up to `highest_pa` drives the compressor at this speed.
+    NoFlowBalance { speed_rpm: f64, valve_opening_ratio: f64 },
     #[error(
         "no turbine inlet pressure between {lowest_pa:.0} and {highest_pa:.0} Pa gives the {power_w:.0} W that the compressor needs at {speed_rpm:.0} rpm, valve opening {valve_opening_ratio}"
     )]
-    NoPowerBalance {
-        /// Shaft speed, rpm.
-        speed_rpm: f64,
-        /// Valve opening.
-        valve_opening_ratio: f64,
-        /// Power demand of compressor and bearings, W.
-        power_w: f64,
-        /// Lowest pressure tried, Pa.
-        lowest_pa: f64,
-        /// Highest pressure tried, Pa.
-        highest_pa: f64,
-    },
-    /// The housings' temperatures did not settle.
+    NoPowerBalance { speed_rpm: f64, valve_opening_ratio: f64, power_w: f64, lowest_pa: f64, highest_pa: f64 },
     #[error(
         "the housing temperatures at {speed_rpm:.0} rpm, valve opening {valve_opening_ratio}, do not settle"
     )]
-    NoHeatBalance {
-        /// Shaft speed, rpm.
-        speed_rpm: f64,
-        /// Valve opening.
-        valve_opening_ratio: f64,
-    },
+    NoHeatBalance { speed_rpm: f64, valve_opening_ratio: f64 },
 }
 
 /// Highest pressure tried, relative to P4.

@@ -4,57 +4,22 @@ use mapper_core::{readable, temperature};
 
 /// Reason why a jump is not allowed.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum Rejection {
-    /// The compressor stays beyond the surge line for too long.
     #[error("it stays {longest_s:.1} s beyond the surge line; {allowed_s:.1} s are allowed")]
-    Surge {
-        /// Longest period, s.
-        longest_s: f64,
-        /// Allowed, s.
-        allowed_s: f64,
-    },
-    /// The shaft overshoots its limit.
+    Surge { longest_s: f64, allowed_s: f64 },
     #[error("the shaft reaches {}; its limit is {}", readable(*.highest_rpm, "rpm"), readable(*.limit_rpm, "rpm"))]
-    Overspeed {
-        /// Highest speed during the jump, rpm.
-        highest_rpm: f64,
-        /// Limit, rpm.
-        limit_rpm: f64,
-    },
-    /// The outlet gets too hot.
+    Overspeed { highest_rpm: f64, limit_rpm: f64 },
     #[error("T2 reaches {}; its limit is {}", temperature(*.highest_k), temperature(*.limit_k))]
-    OutletTemperature {
-        /// Highest temperature during the jump, K.
-        highest_k: f64,
-        /// Limit, K.
-        limit_k: f64,
-    },
-    /// The turbine inlet is too hot.
+    OutletTemperature { highest_k: f64, limit_k: f64 },
     #[error("T3 is {}; its limit is {}", temperature(*.t3_k), temperature(*.limit_k))]
-    TurbineInletTemperature {
-        /// T3, K.
-        t3_k: f64,
-        /// Limit, K.
-        limit_k: f64,
-    },
-    /// The housing temperature changes too much.
+    TurbineInletTemperature { t3_k: f64, limit_k: f64 },
     #[error(
         "the housing temperature changes by {gradient_k:.1} K in the window; its limit is {limit_k:.1} K"
     )]
-    HousingGradient {
-        /// Change in the window, K.
-        gradient_k: f64,
-        /// Limit, K.
-        limit_k: f64,
-    },
-    /// The rig cannot change P3 before the window begins.
+    HousingGradient { gradient_k: f64, limit_k: f64 },
     #[error("P3 takes {needed_s:.1} s to reach its new value; the window begins after {available_s:.1} s")]
-    Slew {
-        /// Time P3 takes, s.
-        needed_s: f64,
-        /// Time until the window, s.
-        available_s: f64,
-    },
+    Slew { needed_s: f64, available_s: f64 },
 }
 
 impl Rejection {

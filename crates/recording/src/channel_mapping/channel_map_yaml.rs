@@ -24,16 +24,10 @@ pub(crate) static DOCUMENT: Document =
 
 /// Errors of reading a channel map.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum ChannelMapError {
-    /// The file cannot be read.
     #[error("failed to read the channel map {}: {source}", .path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
-    /// The file has mistakes.
+    Read { path: PathBuf, source: io::Error },
     #[error("{0}")]
     Mistakes(Box<Findings>),
 }

@@ -6,47 +6,20 @@ use zstd::zstd_safe::{DCtx, ResetDirective, get_error_name};
 
 /// Why a chunk cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum ChunkError {
-    /// It ends within its header.
     #[error("its header is incomplete")]
     Header,
-    /// Its unpacked size exceeds the limit.
     #[error("its header gives {claimed} bytes, and at most {limit} bytes are read")]
-    TooLarge {
-        /// Stated size, bytes.
-        claimed: u64,
-        /// Maximum size that is read, bytes.
-        limit: u64,
-    },
-    /// Another compression.
+    TooLarge { claimed: u64, limit: u64 },
     #[error("it is compressed with `{compression}`, and only lz4 and zstd can be read")]
-    Compression {
-        /// Its compression.
-        compression: String,
-    },
-    /// The compressed data are damaged.
+    Compression { compression: String },
     #[error("it does not decompress ({reason})")]
-    Decompress {
-        /// The error of the library.
-        reason: String,
-    },
-    /// Its unpacked size differs from the stated one.
+    Decompress { reason: String },
     #[error("it has {found} bytes, and its header gives {claimed}")]
-    Length {
-        /// Stated size, bytes.
-        claimed: u64,
-        /// Actual size, bytes.
-        found: u64,
-    },
-    /// Its content was changed.
+    Length { claimed: u64, found: u64 },
     #[error("its checksum is {found:08x}, not {saved:08x} as stored")]
-    Checksum {
-        /// Stored checksum.
-        saved: u32,
-        /// Checksum of the content.
-        found: u32,
-    },
-    /// Its last record is cut.
+    Checksum { saved: u32, found: u32 },
     #[error("it ends within a record")]
     CutRecord,
 }

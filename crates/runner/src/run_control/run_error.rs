@@ -6,37 +6,24 @@ use mapper_core::BackendError;
 
 /// Failure of a run. The rig was commanded to its safe state before this is returned.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum RunError {
-    /// The rig could not be armed.
     #[error("the rig could not be armed, and no step was started: {0}")]
     NotArmed(#[source] BackendError),
-    /// The rig failed.
     #[error("the rig failed: {0}")]
     Backend(#[from] BackendError),
-    /// A recorder or another observer failed.
     #[error("{0}")]
     Observer(#[from] ObserverError),
-    /// The step source failed.
     #[error("{0}")]
     Source(#[from] StepSourceError),
-    /// The program itself failed.
     #[error(
         "the program failed during the run ({message}); the rig is safe. Please report this as a fault of the program"
     )]
-    Panicked {
-        /// Message of the panic.
-        message: String,
-    },
-    /// The rig did not confirm its safe state.
+    Panicked { message: String },
     #[error(
         "THE RIG DID NOT CONFIRM ITS SAFE STATE: {source}. Cut its air by hand. The run had ended because: {why}"
     )]
-    NotSafe {
-        /// Why the run had ended.
-        why: String,
-        /// The rig's error.
-        source: BackendError,
-    },
+    NotSafe { why: String, source: BackendError },
 }
 
 impl RunError {

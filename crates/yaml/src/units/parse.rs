@@ -4,39 +4,18 @@ use super::{Kind, Unit};
 
 /// Reason why a text is not a quantity of the required kind.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum UnitError {
-    /// It does not start with a number.
     #[error("`{text}` does not start with a number")]
-    NoNumber {
-        /// The text as written.
-        text: String,
-    },
-    /// A decimal comma.
+    NoNumber { text: String },
     #[error("`{text}` has a decimal comma")]
-    DecimalComma {
-        /// The text as written.
-        text: String,
-    },
-    /// The number overflows.
+    DecimalComma { text: String },
     #[error("`{text}` is not a finite number")]
-    NotFinite {
-        /// The text as written.
-        text: String,
-    },
-    /// A number without its unit.
+    NotFinite { text: String },
     #[error("`{text}` has no unit")]
-    NoUnit {
-        /// The text as written.
-        text: String,
-    },
-    /// A unit of another kind of quantity.
+    NoUnit { text: String },
     #[error("`{unit}` is not a unit of {}", .kind.name())]
-    WrongUnit {
-        /// The unit as written.
-        unit: String,
-        /// The required kind of quantity.
-        kind: Kind,
-    },
+    WrongUnit { unit: String, kind: Kind },
 }
 
 impl UnitError {

@@ -43,24 +43,16 @@ impl std::fmt::Display for Code {
 
 /// Why bytes are not a valid telegram, or not the expected one.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum TelegramError {
-    /// Not a function code.
     #[error("`{0}` is not a code of four capital letters, such as AKON")]
     InvalidCode(String),
-    /// It ends too early, or a required blank is missing.
     #[error("{0:?} is not an AK telegram")]
     Malformed(String),
-    /// The code is unknown to the instrument.
     #[error("the instrument does not know {0}")]
     Unknown(Code),
-    /// The answer belongs to another request.
     #[error("the answer is to {found}, not to {requested}")]
-    Other {
-        /// The requested code.
-        requested: Code,
-        /// The code in the answer.
-        found: String,
-    },
+    Other { requested: Code, found: String },
 }
 
 /// The request for a channel of the instrument, with parameters.

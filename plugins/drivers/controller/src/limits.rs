@@ -93,36 +93,18 @@ impl SafeSettings {
 
 /// A setting that is out of range.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum LimitError {
-    /// A number outside its limits.
     #[error("{value} {unit} is outside {low} to {high} {unit}")]
-    Outside {
-        /// The number.
-        value: f64,
-        /// Its unit.
-        unit: &'static str,
-        /// Minimum.
-        low: f64,
-        /// Maximum.
-        high: f64,
-    },
-    /// A scale that loses the value.
+    Outside { value: f64, unit: &'static str, low: f64, high: f64 },
     #[error("a scale of {0} loses the value; its magnitude must be between 1e-12 and 1e12")]
     Scale(f64),
-    /// A setpoint with too coarse a resolution.
+    /// All values in SI.
     #[error(
         "holds integers, so the setpoint would be rounded to steps of {step} from {low} to {high} (SI). Use a floating-point type, or a smaller \
                  `scale`"
     )]
-    Coarse {
-        /// Increment, SI.
-        step: f64,
-        /// Minimum setpoint, SI.
-        low: f64,
-        /// Maximum setpoint, SI.
-        high: f64,
-    },
-    /// A channel required by a guard is missing.
+    Coarse { step: f64, low: f64, high: f64 },
     #[error("the rig has to measure {0}: a guard needs it")]
     NotMeasured(Channel),
 }

@@ -4,11 +4,10 @@ use serde_json::Value;
 
 /// Why a secret is unavailable.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum SecretError {
-    /// It is written in the settings.
     #[error("write `{{env: NAME}}`, the name of an environment variable that holds it")]
     Form,
-    /// The variable is not set.
     #[error("the environment variable {0} is not set")]
     NotSet(String),
 }

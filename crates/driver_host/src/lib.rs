@@ -3,7 +3,7 @@
 //! backend.
 //!
 //! A driver may hang, exit or send anything: every call has a timeout, every queue a limit, and every sample is checked. [`conformance`]
-//! has the rules that every backend keeps, and a backend with faults for tests.
+//! has the rules that every backend keeps.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

@@ -4,8 +4,8 @@
 #[path = "../tests/faults/faulty_driver.rs"]
 mod faulty_driver;
 
+use faulty_driver::faulty_backend::FaultyBackend;
 use mapper_core::{Backend, BackendError};
-use mapper_driver_host::conformance::FaultyBackend;
 
 fn main() -> std::process::ExitCode {
     mapper_driver::serve("faulty", env!("CARGO_PKG_VERSION"), |settings| {

@@ -2,81 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A measured or commanded quantity of the rig.
-///
-/// Serialised by its symbol (`"T2"`), the name used in the paper, in messages and in channel maps.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub enum Channel {
-    /// Shaft speed.
-    #[serde(rename = "N")]
-    ShaftSpeed,
-    /// Compressor mass flow.
-    #[serde(rename = "m_c")]
-    CompressorFlow,
-    /// Compressor inlet pressure (station 1).
-    P1,
-    /// Compressor inlet total temperature (station 1).
-    T1,
-    /// Compressor outlet pressure (station 2).
-    P2,
-    /// Compressor outlet total temperature, as read by the probe (station 2).
-    T2,
-    /// Compressor housing temperature.
-    Tc,
-    /// Turbine mass flow.
-    #[serde(rename = "m_t")]
-    TurbineFlow,
-    /// Turbine inlet pressure (station 3).
-    P3,
-    /// Turbine inlet total temperature (station 3).
-    T3,
-    /// Turbine outlet pressure (station 4).
-    P4,
-    /// Turbine outlet total temperature (station 4).
-    T4,
-    /// Turbine housing temperature.
-    Tt,
-    /// Oil inlet temperature.
-    #[serde(rename = "T_oil")]
-    TOil,
-    /// Ambient temperature around the housings.
-    #[serde(rename = "T_amb")]
-    TAmb,
-    /// Commanded turbine inlet pressure.
-    #[serde(rename = "P3_command")]
-    P3Command,
-    /// Commanded turbine inlet temperature.
-    #[serde(rename = "T3_command")]
-    T3Command,
-    /// Commanded back-pressure valve opening, relative to the nominal area.
-    #[serde(rename = "valve_command")]
-    ValveCommand,
-    /// Commanded oil inlet temperature.
-    #[serde(rename = "T_oil_command")]
-    TOilCommand,
-    /// Oil outlet temperature.
-    #[serde(rename = "T_oil_out")]
-    TOilOut,
-    /// Oil mass flow.
-    #[serde(rename = "m_oil")]
-    OilFlow,
-    /// Cooling water inlet temperature.
-    #[serde(rename = "T_water")]
-    TWater,
-    /// Cooling water outlet temperature.
-    #[serde(rename = "T_water_out")]
-    TWaterOut,
-    /// Cooling water mass flow.
-    #[serde(rename = "m_water")]
-    WaterFlow,
-    /// Relative humidity of the air that the compressor takes in.
-    #[serde(rename = "RH")]
-    RelativeHumidity,
-    /// Dew point of that air.
-    #[serde(rename = "T_dew")]
-    DewPoint,
-}
-
 /// The device a channel belongs to; one message per group and sample is recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -152,43 +77,58 @@ pub struct ChannelInfo {
     pub description: &'static str,
 }
 
-/// Every channel, in recording order.
+/// Declares [`Channel`] and [`CHANNELS`].
+macro_rules! channels {
+    ($($channel:ident, $symbol:literal, $group:ident, $field:literal, $dimension:ident, $description:literal;)+) => {
+        /// A measured or commanded quantity of the rig.
+        ///
+        /// Serialised by its symbol (`"T2"`), the name used in the paper, in messages and in channel maps.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+        pub enum Channel {
+            $(#[doc = $description] #[serde(rename = $symbol)] $channel,)+
+        }
+
+        /// Every channel, in recording order.
+        pub const CHANNELS: [ChannelInfo; [$($symbol),+].len()] = [$(ChannelInfo {
+            channel: Channel::$channel,
+            symbol: $symbol,
+            group: Group::$group,
+            field: $field,
+            dimension: Dimension::$dimension,
+            description: $description,
+        }),+];
+    };
+}
+
 #[rustfmt::skip]
-pub const CHANNELS: [ChannelInfo; 26] = {
-    use Channel as C;
-    use Dimension::{MassFlow, Pressure, Ratio, RotationalSpeed, Temperature};
-    const fn row(channel: Channel, symbol: &'static str, group: Group, field: &'static str, dimension: Dimension, description: &'static str) -> ChannelInfo {
-        ChannelInfo { channel, symbol, group, field, dimension, description }
-    }
-    [
-        row(C::ShaftSpeed,     "N",             Group::Compressor, "speed_rpm",                   RotationalSpeed, "shaft speed"),
-        row(C::CompressorFlow, "m_c",           Group::Compressor, "flow_kg_s",                   MassFlow,        "compressor mass flow"),
-        row(C::P1,             "P1",            Group::Compressor, "inlet_pressure_pa",           Pressure,        "compressor inlet pressure, as tapped"),
-        row(C::T1,             "T1",            Group::Compressor, "inlet_temperature_k",         Temperature,     "compressor inlet total temperature"),
-        row(C::P2,             "P2",            Group::Compressor, "outlet_pressure_pa",          Pressure,        "compressor outlet pressure, as tapped"),
-        row(C::T2,             "T2",            Group::Compressor, "outlet_temperature_k",        Temperature,     "compressor outlet total temperature, as the probe reads it"),
-        row(C::Tc,             "Tc",            Group::Compressor, "housing_temperature_k",       Temperature,     "compressor housing temperature"),
-        row(C::TurbineFlow,    "m_t",           Group::Turbine,    "flow_kg_s",                   MassFlow,        "turbine mass flow"),
-        row(C::P3,             "P3",            Group::Turbine,    "inlet_pressure_pa",           Pressure,        "turbine inlet pressure, as tapped"),
-        row(C::T3,             "T3",            Group::Turbine,    "inlet_temperature_k",         Temperature,     "turbine inlet total temperature"),
-        row(C::P4,             "P4",            Group::Turbine,    "outlet_pressure_pa",          Pressure,        "turbine outlet pressure, as tapped"),
-        row(C::T4,             "T4",            Group::Turbine,    "outlet_temperature_k",        Temperature,     "turbine outlet total temperature"),
-        row(C::Tt,             "Tt",            Group::Turbine,    "housing_temperature_k",       Temperature,     "turbine housing temperature"),
-        row(C::TOil,           "T_oil",         Group::Turbine,    "oil_temperature_k",           Temperature,     "oil inlet temperature"),
-        row(C::TAmb,           "T_amb",         Group::Ambient,    "temperature_k",               Temperature,     "ambient temperature"),
-        row(C::P3Command,      "P3_command",    Group::Command,    "turbine_inlet_pressure_pa",   Pressure,        "commanded turbine inlet pressure"),
-        row(C::T3Command,      "T3_command",    Group::Command,    "turbine_inlet_temperature_k", Temperature,     "commanded turbine inlet temperature"),
-        row(C::ValveCommand,   "valve_command", Group::Command,    "valve_opening",               Ratio,           "commanded back-pressure valve opening, relative to the nominal area"),
-        row(C::TOilCommand,    "T_oil_command", Group::Command,    "oil_temperature_k",           Temperature,     "commanded oil inlet temperature"),
-        row(C::TOilOut,        "T_oil_out",     Group::Turbine,    "oil_outlet_temperature_k",    Temperature,     "oil outlet temperature"),
-        row(C::OilFlow,        "m_oil",         Group::Turbine,    "oil_flow_kg_s",               MassFlow,        "oil mass flow"),
-        row(C::TWater,         "T_water",       Group::Turbine,    "water_temperature_k",         Temperature,     "cooling water inlet temperature"),
-        row(C::TWaterOut,      "T_water_out",   Group::Turbine,    "water_outlet_temperature_k",  Temperature,     "cooling water outlet temperature"),
-        row(C::WaterFlow,      "m_water",       Group::Turbine,    "water_flow_kg_s",             MassFlow,        "cooling water mass flow"),
-        row(C::RelativeHumidity, "RH",          Group::Ambient,    "relative_humidity",           Ratio,           "relative humidity of the inlet air"),
-        row(C::DewPoint,       "T_dew",         Group::Ambient,    "dew_point_k",                 Temperature,     "dew point of the inlet air"),
-    ]
-};
+channels! {
+    ShaftSpeed,       "N",             Compressor, "speed_rpm",                   RotationalSpeed, "shaft speed";
+    CompressorFlow,   "m_c",           Compressor, "flow_kg_s",                   MassFlow,        "compressor mass flow";
+    P1,               "P1",            Compressor, "inlet_pressure_pa",           Pressure,        "compressor inlet pressure, as tapped";
+    T1,               "T1",            Compressor, "inlet_temperature_k",         Temperature,     "compressor inlet total temperature";
+    P2,               "P2",            Compressor, "outlet_pressure_pa",          Pressure,        "compressor outlet pressure, as tapped";
+    T2,               "T2",            Compressor, "outlet_temperature_k",        Temperature,     "compressor outlet total temperature, as the probe reads it";
+    Tc,               "Tc",            Compressor, "housing_temperature_k",       Temperature,     "compressor housing temperature";
+    TurbineFlow,      "m_t",           Turbine,    "flow_kg_s",                   MassFlow,        "turbine mass flow";
+    P3,               "P3",            Turbine,    "inlet_pressure_pa",           Pressure,        "turbine inlet pressure, as tapped";
+    T3,               "T3",            Turbine,    "inlet_temperature_k",         Temperature,     "turbine inlet total temperature";
+    P4,               "P4",            Turbine,    "outlet_pressure_pa",          Pressure,        "turbine outlet pressure, as tapped";
+    T4,               "T4",            Turbine,    "outlet_temperature_k",        Temperature,     "turbine outlet total temperature";
+    Tt,               "Tt",            Turbine,    "housing_temperature_k",       Temperature,     "turbine housing temperature";
+    TOil,             "T_oil",         Turbine,    "oil_temperature_k",           Temperature,     "oil inlet temperature";
+    TAmb,             "T_amb",         Ambient,    "temperature_k",               Temperature,     "ambient temperature";
+    P3Command,        "P3_command",    Command,    "turbine_inlet_pressure_pa",   Pressure,        "commanded turbine inlet pressure";
+    T3Command,        "T3_command",    Command,    "turbine_inlet_temperature_k", Temperature,     "commanded turbine inlet temperature";
+    ValveCommand,     "valve_command", Command,    "valve_opening",               Ratio,           "commanded back-pressure valve opening, relative to the nominal area";
+    TOilCommand,      "T_oil_command", Command,    "oil_temperature_k",           Temperature,     "commanded oil inlet temperature";
+    TOilOut,          "T_oil_out",     Turbine,    "oil_outlet_temperature_k",    Temperature,     "oil outlet temperature";
+    OilFlow,          "m_oil",         Turbine,    "oil_flow_kg_s",               MassFlow,        "oil mass flow";
+    TWater,           "T_water",       Turbine,    "water_temperature_k",         Temperature,     "cooling water inlet temperature";
+    TWaterOut,        "T_water_out",   Turbine,    "water_outlet_temperature_k",  Temperature,     "cooling water outlet temperature";
+    WaterFlow,        "m_water",       Turbine,    "water_flow_kg_s",             MassFlow,        "cooling water mass flow";
+    RelativeHumidity, "RH",            Ambient,    "relative_humidity",           Ratio,           "relative humidity of the inlet air";
+    DewPoint,         "T_dew",         Ambient,    "dew_point_k",                 Temperature,     "dew point of the inlet air";
+}
 
 /// Number of modelled channels, which are the first ones. The others are only measured.
 pub const MODELLED_CHANNELS: usize = 19;
@@ -196,7 +136,6 @@ pub const MODELLED_CHANNELS: usize = 19;
 impl Channel {
     /// The channel's row in [`CHANNELS`].
     pub fn info(self) -> &'static ChannelInfo {
-        // The table is in declaration order; a test checks it.
         &CHANNELS[self as usize]
     }
 

@@ -1,10 +1,7 @@
-//! The conformance kit of the interface [`Backend`](mapper_core::Backend): rules that every backend must keep ([`RULES`],
-//! `mapper backend check NAME`), and a backend with faults on demand ([`FaultyBackend`]) to test programs that control a rig.
+//! The rules of the interface [`Backend`](mapper_core::Backend) that every backend must keep ([`RULES`], `mapper backend check NAME`).
 
 mod candidate;
-mod faulty_backend;
 mod rules;
 
 pub use candidate::{Candidate, CheckResult};
-pub use faulty_backend::{Fault, FaultyBackend};
 pub use rules::{NotArmed, RULES, Rule, check_rules};

@@ -1,9 +1,12 @@
 //! The rig of these tests and its faults as a driver. The test and `examples/mapper-backend-faulty.rs` both refer to a row
 //! by its index.
 
+#[path = "faulty_backend.rs"]
+pub(crate) mod faulty_backend;
+
+use faulty_backend::Fault;
 use mapper_backends::virtual_lab::{LabSettings, SensorErrors, VirtualLab};
 use mapper_core::Channel::{self, P2, P3, ShaftSpeed, T2};
-use mapper_driver_host::conformance::Fault;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::model::Model;
 

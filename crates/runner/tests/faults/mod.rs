@@ -6,13 +6,13 @@ mod faulty_driver;
 mod over_protocol;
 
 use super::{Notebook, Recorded, plan};
+use faulty_driver::faulty_backend::{Fault, FaultyBackend};
 use faulty_driver::{FAULT_S, lab};
 use mapper_backends::virtual_lab::VirtualLab;
 use mapper_core::{
     Backend, Channel, EventKind, FrozenLimit, GuardName, GuardSet, Plan, Reaction, SafeTrajectory,
     SignalGuard, SpeedBand, SurgeVariation, UnpacedClock,
 };
-use mapper_driver_host::conformance::{Fault, FaultyBackend};
 use mapper_runner::{
     BatchWatch, Guard, PlanSteps, Protection, ReadingBounds, RigWatch, RunEnd, RunError, Runner, SignalWatch,
     SilenceWatch, SurgeWatch, UnguardedChannel,

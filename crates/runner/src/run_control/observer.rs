@@ -17,92 +17,46 @@ impl ObserverError {
     }
 }
 
-/// Called by the runner in order of run time. Every method does nothing by default.
-pub trait RunObserver {
-    /// The rig is armed.
-    ///
-    /// # Errors
-    /// [`ObserverError`] ends the run in its safe state, here and below.
-    fn on_start(&mut self, _rig: &RigDescription) -> Result<(), ObserverError> {
-        Ok(())
-    }
+/// Declares [`RunObserver`], and a list of observers as one observer.
+macro_rules! run_observer {
+    ($($(#[$doc:meta])+ $method:ident($news:ty);)+) => {
+        /// Called by the runner in order of run time. Every method does nothing by default.
+        pub trait RunObserver {
+            $(
+                $(#[$doc])+
+                ///
+                /// # Errors
+                /// [`ObserverError`] ends the run in its safe state.
+                fn $method(&mut self, _news: &$news) -> Result<(), ObserverError> {
+                    Ok(())
+                }
+            )+
+        }
 
-    /// A step begins; `marker.end_s` is its planned end.
-    ///
-    /// # Errors
-    /// [`ObserverError`].
-    fn on_step_start(&mut self, _marker: &StepMarker) -> Result<(), ObserverError> {
-        Ok(())
-    }
-
-    /// New samples with the rig's own events; also called for warm-up and cool-down.
-    ///
-    /// # Errors
-    /// [`ObserverError`].
-    fn on_batch(&mut self, _batch: &SampleBatch) -> Result<(), ObserverError> {
-        Ok(())
-    }
-
-    /// A message of the runner: a guard that tripped, a stop, the safe state.
-    ///
-    /// # Errors
-    /// [`ObserverError`].
-    fn on_event(&mut self, _event: &Event) -> Result<(), ObserverError> {
-        Ok(())
-    }
-
-    /// A guard has cut the step short: it does not count.
-    ///
-    /// # Errors
-    /// [`ObserverError`].
-    fn on_step_abandoned(&mut self, _marker: &StepMarker) -> Result<(), ObserverError> {
-        Ok(())
-    }
-
-    /// A step has ended; `marker.end_s` is its real end.
-    ///
-    /// # Errors
-    /// [`ObserverError`].
-    fn on_step_end(&mut self, _marker: &StepMarker) -> Result<(), ObserverError> {
-        Ok(())
-    }
-
-    /// The step that has just ended was complete: neither a stop nor a fault cut it short.
-    ///
-    /// # Errors
-    /// [`ObserverError`].
-    fn on_step_completed(&mut self, _marker: &StepMarker) -> Result<(), ObserverError> {
-        Ok(())
-    }
+        /// Calls each observer in turn; the first error skips the remaining ones.
+        impl RunObserver for Vec<&mut dyn RunObserver> {
+            $(
+                fn $method(&mut self, news: &$news) -> Result<(), ObserverError> {
+                    self.iter_mut().try_for_each(|observer| observer.$method(news))
+                }
+            )+
+        }
+    };
 }
 
-/// Calls each observer in turn; the first error skips the remaining ones.
-impl RunObserver for Vec<&mut dyn RunObserver> {
-    fn on_start(&mut self, rig: &RigDescription) -> Result<(), ObserverError> {
-        self.iter_mut().try_for_each(|observer| observer.on_start(rig))
-    }
-
-    fn on_step_start(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
-        self.iter_mut().try_for_each(|observer| observer.on_step_start(marker))
-    }
-
-    fn on_batch(&mut self, batch: &SampleBatch) -> Result<(), ObserverError> {
-        self.iter_mut().try_for_each(|observer| observer.on_batch(batch))
-    }
-
-    fn on_event(&mut self, event: &Event) -> Result<(), ObserverError> {
-        self.iter_mut().try_for_each(|observer| observer.on_event(event))
-    }
-
-    fn on_step_abandoned(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
-        self.iter_mut().try_for_each(|observer| observer.on_step_abandoned(marker))
-    }
-
-    fn on_step_end(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
-        self.iter_mut().try_for_each(|observer| observer.on_step_end(marker))
-    }
-
-    fn on_step_completed(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
-        self.iter_mut().try_for_each(|observer| observer.on_step_completed(marker))
-    }
+run_observer! {
+    /// The rig is armed.
+    on_start(RigDescription);
+    /// A step begins; `end_s` of its marker is its planned end.
+    on_step_start(StepMarker);
+    /// New samples with the rig's own events; also called for warm-up and cool-down.
+    on_batch(SampleBatch);
+    /// A message of the runner: a guard that tripped, a stop, the safe state.
+    on_event(Event);
+    /// A guard has cut the step short: it does not count.
+    on_step_abandoned(StepMarker);
+    /// A step has ended; `end_s` of its marker is its real end.
+    on_step_end(StepMarker);
+    /// The step that has just ended was complete: neither a stop nor a fault cut it short.
+    on_step_completed(StepMarker);
 }

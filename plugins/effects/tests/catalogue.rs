@@ -74,8 +74,11 @@ fn stepped(effect: &dyn Effect, share: f64) -> Vec<f64> {
 }
 
 fn with(effects: &[(&Arc<dyn Effect>, Vec<f64>)]) -> Rig {
-    let effects = effects.iter().map(|(effect, values)| (effect.as_ref(), values.as_slice()));
-    effect::compose(&nominal(), effects).unwrap()
+    let mut rig = nominal();
+    for (effect, values) in effects {
+        effect::add(&mut rig, effect.as_ref(), values).unwrap();
+    }
+    rig
 }
 
 /// Largest difference over all readings, relative to each reading.

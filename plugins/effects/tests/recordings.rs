@@ -3,12 +3,11 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_physics::machine::params::BoundaryConditions;
-use mapper_physics::rig::effect::{self, Effect, Rig};
+use mapper_physics::rig::effect::{self, Rig};
 use mapper_physics::simulation::inputs::InterpolatedInputs;
 use mapper_physics::simulation::model::Model;
 use mapper_physics::simulation::simulate::{Simulator, Watch};
 use mapper_physics::simulation::steady;
-use std::sync::Arc;
 
 /// Rows of numbers below a header line.
 fn table(name: &str) -> Vec<Vec<f64>> {
@@ -103,11 +102,10 @@ fn with_its_effect_the_model_follows_the_recording_and_without_it_does_not() {
     let nominal = Rig::new(Model::nominal());
     for (name, effects, most) in cases {
         let (means, commands) = (table(name), table(&format!("{name}_commands")));
-        let effects: Vec<(Arc<dyn Effect>, &[f64])> =
-            effects.iter().map(|(id, values)| (mapper_effects::find(id).unwrap(), *values)).collect();
-        let rig =
-            effect::compose(&nominal, effects.iter().map(|(effect, values)| (effect.as_ref(), *values)))
-                .unwrap();
+        let mut rig = nominal.clone();
+        for (id, values) in effects {
+            effect::add(&mut rig, mapper_effects::find(id).unwrap().as_ref(), values).unwrap();
+        }
         let inputs = inputs(&means, &commands);
         let (without, with) = (scatter(&nominal, &means, &inputs), scatter(&rig, &means, &inputs));
         assert!(with[most] < without[most] / 3.0, "{name}: {without:?} without, {with:?} with its effect");

@@ -27,10 +27,4 @@ impl CommonErrors {
     pub fn eta_standard_error(&self) -> f64 {
         self.eta_changes.iter().map(|change| change * change).sum::<f64>().sqrt()
     }
-
-    /// Covariance of the point's `eta` with that of another point of the recording, without their own parts, fraction
-    /// squared.
-    pub fn eta_covariance(&self, other: &CommonErrors) -> f64 {
-        self.eta_changes.iter().zip(&other.eta_changes).map(|(one, other)| one * other).sum()
-    }
 }

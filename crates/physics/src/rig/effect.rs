@@ -222,18 +222,3 @@ pub enum EffectError {
 pub fn add(rig: &mut Rig, effect: &dyn Effect, values: &[f64]) -> Result<(), EffectError> {
     effect.prepare(&NamedValues::new(effect.info(), values)?, rig)
 }
-
-/// `nominal` with all `effects` at their values.
-///
-/// # Errors
-/// Those of [`add`].
-pub fn compose<'a>(
-    nominal: &Rig,
-    effects: impl IntoIterator<Item = (&'a dyn Effect, &'a [f64])>,
-) -> Result<Rig, EffectError> {
-    let mut rig = nominal.clone();
-    for (effect, values) in effects {
-        add(&mut rig, effect, values)?;
-    }
-    Ok(rig)
-}

@@ -61,22 +61,6 @@ impl Default for OtherStructure {
 }
 
 impl OtherStructure {
-    /// The limit in which these equations equal those of the lumped model: coupled nodes, uniform h, mixed gas, a short duct without loss,
-    /// almost no volume before it, no hysteresis, fast sensors.
-    pub fn lumped_limit() -> Self {
-        OtherStructure {
-            housing_coupling_w_k: 1e5,
-            uneven_h_ratio: 0.0,
-            mixed_gas: true,
-            duct_length_m: 1e-3,
-            duct_loss_ratio: 0.0,
-            volume_share_ratio: 0.02,
-            hysteresis_ratio: 0.0,
-            sensor_speed_ratio: f64::INFINITY,
-            ..Self::default()
-        }
-    }
-
     /// Another machine: a turbine housing of two masses, a flatter law of convection, a turbine that gains efficiency with expansion, a
     /// compressor housing of loosely coupled nodes, a short duct, slow sensors, no hysteresis.
     pub fn two_masses() -> Self {

@@ -2,7 +2,8 @@
 
 use crate::virtual_lab::campaign_keys::setting_problem::SettingProblem;
 use crate::virtual_lab::rig::drift::{DriftTarget, LabDrift};
-use mapper_core::{BackendError, Channel};
+use crate::virtual_lab::sensors::draws::offset_kind;
+use mapper_core::{BackendError, Channel, Dimension};
 use mapper_yaml::units::{Kind, Quantity};
 use serde::Deserialize;
 
@@ -55,12 +56,8 @@ const MAX_CHANGE_RATIO: f64 = 0.3;
 fn parse_change(target: DriftTarget, text: &str) -> Result<f64, SettingProblem> {
     const FRICTION: &str = "W s2/rad2";
     let kind = match target {
-        DriftTarget::Sensor(channel) => match channel.info().dimension {
-            mapper_core::Dimension::RotationalSpeed => Kind::Speed,
-            mapper_core::Dimension::MassFlow | mapper_core::Dimension::Ratio => Kind::Fraction,
-            mapper_core::Dimension::Pressure => Kind::PressureDifference,
-            mapper_core::Dimension::Temperature => Kind::TemperatureDifference,
-        },
+        DriftTarget::Sensor(channel) if channel.info().dimension == Dimension::MassFlow => Kind::Fraction,
+        DriftTarget::Sensor(channel) => offset_kind(channel),
         DriftTarget::Fouling => Kind::Fraction,
         DriftTarget::BearingFriction => {
             let number = text.trim().strip_suffix(FRICTION).map(|number| number.trim().parse());

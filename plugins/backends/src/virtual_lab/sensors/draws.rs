@@ -2,6 +2,7 @@
 
 use crate::virtual_lab::sensors::sensor::SensorErrors;
 use mapper_core::{Channel, DeclaredUncertainty};
+use mapper_recording::logs::units::{difference, kind_of};
 use mapper_yaml::units::Kind;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -50,11 +51,5 @@ pub(crate) fn draw(seed: u64, stream: u64) -> (f64, f64) {
 
 /// The kind of an offset of a channel.
 pub(crate) fn offset_kind(channel: Channel) -> Kind {
-    match channel.info().dimension {
-        mapper_core::Dimension::RotationalSpeed => Kind::Speed,
-        mapper_core::Dimension::MassFlow => Kind::MassFlow,
-        mapper_core::Dimension::Pressure => Kind::PressureDifference,
-        mapper_core::Dimension::Temperature => Kind::TemperatureDifference,
-        mapper_core::Dimension::Ratio => Kind::Fraction,
-    }
+    difference(kind_of(channel))
 }

@@ -57,9 +57,6 @@ async fn serve_client(mut stream: TcpStream, stand: Arc<Mutex<Stand>>) -> std::i
 }
 
 /// Serves until the listener fails.
-///
-/// # Errors
-/// An error of the listener.
 pub async fn serve(listener: TcpListener, stand: Arc<Mutex<Stand>>) -> std::io::Result<()> {
     let permits = Arc::new(tokio::sync::Semaphore::new(CONNECTIONS));
     loop {

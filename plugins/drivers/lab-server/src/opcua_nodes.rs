@@ -132,9 +132,6 @@ pub enum Protection {
 }
 
 /// Describes the permitted users, without name or password.
-///
-/// # Errors
-/// [`ServeError::IncompleteUser`]
 pub fn describe_users(protection: Protection) -> Result<String, ServeError> {
     Ok(match (protection, user()?) {
         (Protection::Clear, _) => {
@@ -269,9 +266,6 @@ fn add_nodes(handle: &ServerHandle, shared: &Shared) -> Result<(), ServeError> {
 }
 
 /// Makes a server for this address; it listens once it is run.
-///
-/// # Errors
-/// [`ServeError`]
 pub fn make(at: SocketAddr, shared: &Shared, protection: Protection) -> Result<Server, ServeError> {
     let (server, handle) = builder(at, &directory()?, protection)?.build().map_err(ServeError::NotBuilt)?;
     add_nodes(&handle, shared)?;

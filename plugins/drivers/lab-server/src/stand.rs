@@ -70,9 +70,6 @@ pub struct Stand {
 
 impl Stand {
     /// A stand at rest. `speed`: seconds of the lab per second of wall time.
-    ///
-    /// # Errors
-    /// An error of the lab.
     pub fn new(mut lab: Box<dyn Backend>, speed_max_rpm: f64, speed: f64) -> Result<Stand, BackendError> {
         let any = SetpointRange { low: f64::MIN, high: f64::MAX };
         let all = SetpointRanges { p3_pa: any, t3_k: any, valve_opening_ratio: any, oil_temperature_k: any };
@@ -174,9 +171,6 @@ impl Stand {
     }
 
     /// Advances the lab to this wall time, s since the beginning.
-    ///
-    /// # Errors
-    /// An error of the lab.
     pub fn advance(&mut self, wall_s: f64) -> Result<(), BackendError> {
         self.wall_s = wall_s;
         let silent_s = wall_s - self.last_heartbeat_s;

@@ -1,8 +1,7 @@
 //! `mapper-backend-lab`: the virtual lab behind the driver protocol. It is the example of a driver in Rust. With `real_time` it also serves
 //! to rehearse a run, and `command_log` names a file for the commands.
 
-mod command_log;
-mod real_time;
+mod rehearsal_rig;
 mod settings;
 
 use settings::open;

@@ -1,7 +1,6 @@
 //! The settings of the driver, and the rig made from them.
 
-use crate::command_log::CommandLog;
-use crate::real_time::RealTime;
+use crate::rehearsal_rig::RehearsalRig;
 use mapper_backends::BACKENDS;
 use mapper_core::{Backend, BackendError};
 use mapper_session::{Registry, nominal_model};
@@ -55,14 +54,10 @@ pub(crate) fn open(settings: &Value) -> Result<Box<dyn Backend>, BackendError> {
         Registry { backends: BACKENDS.to_vec(), effects: mapper_effects::catalogue(), ..Registry::default() };
     let model = nominal_model(&campaign).map_err(|error| of_campaign(error.to_string()))?;
     let lab = registry.make_backend(&campaign, &model).map_err(|error| of_campaign(error.to_string()))?;
-    let lab: Box<dyn Backend> = if settings.real_time { Box::new(RealTime(lab)) } else { lab };
-    match settings.command_log {
-        None => Ok(lab),
-        Some(path) => {
-            let file = std::fs::File::create(&path);
-            let file =
-                file.map_err(|source| settings_error("command_log", LabError::CommandLog { path, source }))?;
-            Ok(Box::new(CommandLog::new(lab, file)))
-        }
-    }
+    let log = settings.command_log.map(|path| {
+        let error =
+            |source| settings_error("command_log", LabError::CommandLog { path: path.clone(), source });
+        std::fs::File::create(&path).map_err(error)
+    });
+    Ok(Box::new(RehearsalRig { lab, real_time: settings.real_time, log: log.transpose()?, now_s: 0.0 }))
 }

@@ -27,6 +27,8 @@ pub(crate) fn value_or<D: Dimension>(quantity: Option<Quantity<D>>, default: f64
 }
 
 /// Overrides a default with the value of the file.
-pub(crate) fn set<D: Dimension>(target: &mut f64, quantity: Option<Quantity<D>>) {
-    *target = value_or(quantity, *target);
+pub(crate) fn set<T>(target: &mut T, given: Option<impl Into<T>>) {
+    if let Some(given) = given {
+        *target = given.into();
+    }
 }

@@ -98,6 +98,17 @@ fn read(text: &str, origin: &Path) -> Result<(Tree, Notes), Findings> {
     mapper_yaml::read(Source::new(&DOCUMENT, origin, text))
 }
 
+/// What `add` notes on a text; the mistakes of the text itself if it cannot be read.
+fn findings(text: &str, origin: &Path, add: impl FnOnce(&mut Tree, &mut Notes)) -> Findings {
+    match read(text, origin) {
+        Ok((mut tree, mut notes)) => {
+            add(&mut tree, &mut notes);
+            tree.findings(notes)
+        }
+        Err(findings) => findings,
+    }
+}
+
 /// Reports a mistake in the settings of a backend, which only the backend can judge, at its place in the campaign's text.
 ///
 /// `at`: keys down to the backend's name, e.g. `backend.virtual_lab`; `setting`: the path below it, e.g. `machine.alpha_area`. A
@@ -112,61 +123,47 @@ pub fn backend_mistake(
 ) -> Findings {
     let keys = at.split('.').chain(setting.split('.'));
     let steps: Vec<Step> = keys.filter(|key| !key.is_empty()).map(Step::from).collect();
-    let (mut tree, mut notes) = match read(text, origin) {
-        Ok(read) => read,
-        Err(findings) => return findings,
-    };
-    if hidden {
-        tree.hide(&steps);
-    }
-    let remedy = "docs/reference/virtual_lab.md lists the settings of the virtual lab, docs/how-to/rig.md those of drivers";
-    notes.push(tree.finding(FindingKind::WrongValue, &steps, message, remedy));
-    tree.findings(notes)
+    findings(text, origin, |tree, notes| {
+        if hidden {
+            tree.hide(&steps);
+        }
+        let remedy = "docs/reference/virtual_lab.md lists the settings of the virtual lab, docs/how-to/rig.md those of drivers";
+        notes.push(tree.finding(FindingKind::WrongValue, &steps, message, remedy));
+    })
 }
 
 /// An unknown format of the map, at its place in the campaign's text. `known`: the supported names.
 pub fn format_mistake(text: &str, origin: &Path, format: &str, known: &[&str]) -> Findings {
-    let (tree, mut notes) = match read(text, origin) {
-        Ok(read) => read,
-        Err(findings) => return findings,
-    };
-    let mut steps = steps!["outputs", "formats"].to_vec();
-    let index = tree.items(&steps).iter().position(|written| written == format);
-    steps.extend(index.map(Step::from));
-    let message = format!("`{format}` is not a format for writing maps");
-    let remedy = format!("choose from {}", known.join(", "));
-    notes.push(tree.finding(FindingKind::WrongValue, &steps, message, remedy));
-    tree.findings(notes)
+    findings(text, origin, |tree, notes| {
+        let mut steps = steps!["outputs", "formats"].to_vec();
+        let index = tree.items(&steps).iter().position(|written| written == format);
+        steps.extend(index.map(Step::from));
+        let message = format!("`{format}` is not a format for writing maps");
+        let remedy = format!("choose from {}", known.join(", "));
+        notes.push(tree.finding(FindingKind::WrongValue, &steps, message, remedy));
+    })
 }
 
 /// Unusual settings in a campaign without mistakes, each at its place in the text. `more`: findings of other crates.
 pub fn warnings(text: &str, origin: &Path, campaign: &Campaign, more: Vec<Concern>) -> Findings {
-    let (tree, mut notes) = match read(text, origin) {
-        Ok(read) => read,
-        Err(findings) => return findings,
-    };
-    let paths = match campaign.lines.as_slice() {
-        [] => tree.deserialise().map(|file: CampaignFile| file.grid.points(&[], 0.0).1).unwrap_or_default(),
-        _ => resolved::places(campaign),
-    };
-    let own =
-        unusual_settings::find_concerns(campaign, &paths).into_iter().filter(|concern| !concern.is_error);
-    for concern in own.chain(more) {
-        note(&tree, &mut notes, FindingKind::Unusual, concern);
-    }
-    tree.findings(notes)
+    findings(text, origin, |tree, notes| {
+        let paths = match campaign.lines.as_slice() {
+            [] => {
+                tree.deserialise().map(|file: CampaignFile| file.grid.points(&[], 0.0).1).unwrap_or_default()
+            }
+            _ => resolved::places(campaign),
+        };
+        let own = unusual_settings::find_concerns(campaign, &paths).into_iter();
+        let own = own.filter(|concern| !concern.is_error);
+        own.chain(more).for_each(|concern| note(tree, notes, FindingKind::Unusual, concern));
+    })
 }
 
 /// Mistakes of a campaign that another crate found, each at its place in the text.
 pub fn mistakes(text: &str, origin: &Path, concerns: Vec<Concern>) -> Findings {
-    let (tree, mut notes) = match read(text, origin) {
-        Ok(read) => read,
-        Err(findings) => return findings,
-    };
-    for concern in concerns {
-        note(&tree, &mut notes, FindingKind::Implausible, concern);
-    }
-    tree.findings(notes)
+    findings(text, origin, |tree, notes| {
+        concerns.into_iter().for_each(|concern| note(tree, notes, FindingKind::Implausible, concern));
+    })
 }
 
 fn note(tree: &Tree, notes: &mut Notes, kind: FindingKind, concern: Concern) {
@@ -198,12 +195,9 @@ fn deserialise(
     campaign.machine.assumed = machine_sizes::find_assumed_sizes(tree, &campaign.machine.params);
     let wheel = steps!["machine", "geometry", "compressor", "wheel_diameter"];
     campaign.machine.wheel_is_declared = tree.get(&wheel).is_some();
-    for concern in unusual_settings::find_concerns(&campaign, &point_paths)
-        .into_iter()
-        .filter(|concern| concern.is_error)
-    {
-        note(tree, notes, FindingKind::Implausible, concern);
-    }
+    let concerns = unusual_settings::find_concerns(&campaign, &point_paths).into_iter();
+    let errors = concerns.filter(|concern| concern.is_error);
+    errors.for_each(|concern| note(tree, notes, FindingKind::Implausible, concern));
     if notes.is_empty()
         && !campaign.lines.is_empty()
         && let Ok(model) = reachable_points::nominal_model(&campaign)

@@ -4,8 +4,7 @@ use crate::checking::Check;
 use crate::elements::points::grid::PointFile;
 use crate::units::Kind;
 use mapper_core::{Jump, Repeats};
-use mapper_yaml::FindingKind;
-use mapper_yaml::steps;
+use mapper_yaml::{FindingKind, steps};
 use schemars::JsonSchema;
 use serde::Deserialize;
 

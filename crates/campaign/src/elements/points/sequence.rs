@@ -1,8 +1,7 @@
 //! `sequence:`, a script in place of an order.
 
 use crate::checking::{Check, resolve_path};
-use mapper_yaml::FindingKind;
-use mapper_yaml::steps;
+use mapper_yaml::{FindingKind, steps};
 use serde::Serialize;
 use std::io;
 use std::path::{Path, PathBuf};

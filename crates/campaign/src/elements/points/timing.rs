@@ -3,8 +3,7 @@
 use crate::checking::Check;
 use crate::units::{Duration, Fraction, Quantity};
 use mapper_core::{Dwell, Timing};
-use mapper_yaml::FindingKind;
-use mapper_yaml::steps;
+use mapper_yaml::{FindingKind, steps};
 use schemars::JsonSchema;
 use serde::Deserialize;
 

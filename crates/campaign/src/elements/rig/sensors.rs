@@ -12,8 +12,7 @@ use crate::units::{
     TemperatureDifference,
 };
 use mapper_core::{Channel, DeclaredUncertainty};
-use mapper_yaml::FindingKind;
-use mapper_yaml::steps;
+use mapper_yaml::{FindingKind, steps};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;

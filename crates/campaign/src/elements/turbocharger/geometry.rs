@@ -43,11 +43,6 @@ impl GeometryFile {
     }
 }
 
-/// Overrides a default with a plain number.
-fn set_number(target: &mut f64, number: Option<f64>) {
-    *target = number.unwrap_or(*target);
-}
-
 /// Correlation `Nu = a Re^b Pr^(1/3) (mu/mu_skin)^0.14`.
 #[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -62,8 +57,8 @@ pub(crate) struct NusseltFile {
 
 impl NusseltFile {
     fn apply(self, coefficient: &mut f64, exponent: &mut f64) {
-        set_number(coefficient, self.coefficient);
-        set_number(exponent, self.exponent);
+        set(coefficient, self.coefficient);
+        set(exponent, self.exponent);
     }
 }
 
@@ -105,14 +100,14 @@ impl CompressorFile {
     fn apply(self, params: &mut Params) {
         let to = &mut params.compressor;
         set(&mut to.internal_area_m2, self.internal_area);
-        set_number(&mut to.alpha_area_ratio, self.alpha_area);
+        set(&mut to.alpha_area_ratio, self.alpha_area);
         set(&mut to.inlet_diameter_m, self.inlet_diameter);
-        to.inlet_convection = self.inlet_convection.unwrap_or(to.inlet_convection);
+        set(&mut to.inlet_convection, self.inlet_convection);
         set(&mut to.outlet_diameter_m, self.outlet_diameter);
         set(&mut to.wheel_diameter_m, self.wheel_diameter);
         set(&mut to.housing_mass_kg, self.housing_mass);
         set(&mut to.external_area_m2, self.external_area);
-        set_number(&mut to.emissivity_ratio, self.emissivity);
+        set(&mut to.emissivity_ratio, self.emissivity);
         self.nusselt.unwrap_or_default().apply(&mut to.nusselt_coefficient, &mut to.nusselt_exponent);
     }
 }
@@ -160,11 +155,11 @@ impl TurbineFile {
         set(&mut to.wheel_radius_m, self.wheel_radius);
         set(&mut to.housing_mass_kg, self.housing_mass);
         set(&mut to.external_area_m2, self.external_area);
-        set_number(&mut to.emissivity_ratio, self.emissivity);
+        set(&mut to.emissivity_ratio, self.emissivity);
         self.nusselt.unwrap_or_default().apply(&mut to.nusselt_coefficient, &mut to.nusselt_exponent);
         set(&mut to.choked_flow_kg_s, self.choked_flow);
-        set_number(&mut to.peak_efficiency, self.peak_efficiency);
-        set_number(&mut to.peak_blade_speed_ratio, self.peak_blade_speed_ratio);
+        set(&mut to.peak_efficiency, self.peak_efficiency);
+        set(&mut to.peak_blade_speed_ratio, self.peak_blade_speed_ratio);
     }
 }
 
@@ -216,7 +211,7 @@ impl OutletFile {
         let to = &mut params.outlet;
         set(&mut to.volume_m3, self.volume);
         set(&mut to.valve_area_m2, self.valve_area);
-        set_number(&mut to.discharge_coefficient, self.discharge_coefficient);
+        set(&mut to.discharge_coefficient, self.discharge_coefficient);
     }
 }
 

@@ -115,19 +115,14 @@ pub struct ImportedColumn {
 /// Assumption or computation of a map reader.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
+#[allow(missing_docs, reason = "the variants describe their values")]
 pub enum ImportRemark {
     /// The columns have no headings: rpm, kg/s, pressure ratio, efficiency were assumed.
     NoHeading,
     /// Columns without headings after the efficiency were ignored.
-    FurtherColumns {
-        /// Their number.
-        count: usize,
-    },
+    FurtherColumns { count: usize },
     /// Columns are not used: another one has their quantity, or the map has no such quantity.
-    UnusedColumns {
-        /// Their headings.
-        headings: Vec<String>,
-    },
+    UnusedColumns { headings: Vec<String> },
     /// Efficiencies are percentages, from their size.
     EfficiencyInPercent,
     /// A row without speed has that of the row above.
@@ -135,10 +130,7 @@ pub enum ImportRemark {
     /// The table has no efficiencies.
     NoEfficiency,
     /// Reduced quantities became corrected ones of this state.
-    ReducedQuantities {
-        /// The state.
-        reference: ReferenceState,
-    },
+    ReducedQuantities { reference: ReferenceState },
     /// Measured points were corrected; their efficiency is the apparent one, heat transfer included.
     Measured,
     /// The file names no unit of flow; kg/s was taken.
@@ -146,13 +138,7 @@ pub enum ImportRemark {
     /// Speeds without a unit were assumed to be in rpm/K^0.5, because of their size.
     SpeedParameterAssumed,
     /// Relative speeds were multiplied by this speed.
-    DesignSpeed {
-        /// Speed of 1, rpm.
-        rpm: f64,
-    },
+    DesignSpeed { rpm: f64 },
     /// Extrapolated nodes of the fitted map were ignored.
-    ExtrapolatedNodes {
-        /// Their number.
-        count: usize,
-    },
+    ExtrapolatedNodes { count: usize },
 }

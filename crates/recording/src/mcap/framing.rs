@@ -12,21 +12,11 @@ const FRAME_BYTES: usize = 9;
 #[derive(Debug, PartialEq)]
 pub(crate) enum Frame<'a> {
     /// A whole record.
-    Record {
-        /// Offset of the record from the start of the stream.
-        offset: u64,
-        /// Kind of record.
-        opcode: u8,
-        /// Its content.
-        body: &'a [u8],
-    },
+    Record { offset: u64, opcode: u8, body: &'a [u8] },
     /// The stream ends between two records.
     End,
     /// The stream ends within the record at this offset.
-    Truncated {
-        /// Offset of the record.
-        offset: u64,
-    },
+    Truncated { offset: u64 },
 }
 
 /// Reads records from a stream. Memory grows with the actual data, never with a stated length.

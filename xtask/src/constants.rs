@@ -1,9 +1,7 @@
 //! Makes the reference page of numeric constants: name, value and source of every constant in the inference crates.
 
 use crate::error::Error;
-use crate::workspace;
-use std::fs;
-use std::path::{Path, PathBuf};
+use crate::{files, workspace};
 
 /// The inference crates, whose results depend on chosen constants.
 const CRATES: [&str; 3] = ["inference", "identify", "diagnose"];
@@ -30,8 +28,8 @@ pub fn page() -> Result<String, Error> {
         let folder = workspace::root().join("crates").join(name).join("src");
         let mut rows = String::new();
         let mut count = 0;
-        for path in sources(&folder)? {
-            let text = fs::read_to_string(&path).map_err(|source| file(&path, source))?;
+        for path in files::rust_files(&folder)? {
+            let text = files::read(&path)?;
             let within = path.strip_prefix(&folder).unwrap_or(&path).display().to_string();
             for Constant { name, value, source } in constants(&text) {
                 count += 1;
@@ -43,24 +41,6 @@ pub fn page() -> Result<String, Error> {
         );
     }
     Ok(page)
-}
-
-/// All Rust files below a folder, in order.
-fn sources(folder: &Path) -> Result<Vec<PathBuf>, Error> {
-    let mut files = Vec::new();
-    let mut folders = vec![folder.to_owned()];
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(&folder).map_err(|source| file(&folder, source))? {
-            let path = entry.map_err(|source| file(&folder, source))?.path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|extension| extension == "rs") {
-                files.push(path);
-            }
-        }
-    }
-    files.sort();
-    Ok(files)
 }
 
 /// The numeric constants of a file, tests left out.
@@ -100,10 +80,6 @@ fn constant(statement: &str, source: &str) -> Option<Constant> {
             source: source.to_owned(),
         }
     })
-}
-
-fn file(path: &Path, source: std::io::Error) -> Error {
-    Error::File { path: path.to_owned(), source }
 }
 
 /// Text that stays within one cell.

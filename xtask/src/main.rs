@@ -5,6 +5,7 @@ mod commands;
 mod constants;
 mod environment;
 mod error;
+mod files;
 mod step;
 mod workspace;
 
@@ -35,9 +36,9 @@ fn main() -> ExitCode {
         ["quick"] => commands::quick::quick(),
         ["test"] => commands::test::test(),
         ["fleet-test"] => commands::fleet_test::fleet_test(),
-        ["fmt"] => checks::formatting::formatting(checks::formatting::Mode::Write),
-        ["docs"] => commands::docs::docs(commands::docs::Mode::Write),
-        ["docs", "--check"] => commands::docs::docs(commands::docs::Mode::Check),
+        ["fmt"] => checks::formatting::formatting(files::Mode::Write),
+        ["docs"] => commands::docs::docs(files::Mode::Write),
+        ["docs", "--check"] => commands::docs::docs(files::Mode::Check),
         ["python"] => commands::test::python(),
         ["wheel"] => checks::python_package::wheel(),
         ["performance"] => commands::performance::performance(),

@@ -2,6 +2,7 @@
 
 use crate::environment::capabilities::{Capabilities, with_program};
 use crate::error::Error;
+use crate::files::{self, at};
 use crate::step::{command, run, say};
 use crate::{environment::python_env, workspace};
 use std::fs;
@@ -13,9 +14,7 @@ use std::process::Command;
 pub fn check(capabilities: &Capabilities) -> Result<(), Error> {
     let home = workspace::target_dir().join("python-package");
     let package = home.join("mapper");
-    if package.exists() {
-        fs::remove_dir_all(&package).map_err(|source| Error::File { path: package.clone(), source })?;
-    }
+    files::remove(&package)?;
     copy_files(&workspace::root().join("python/python/mapper"), &package)?;
     let library = workspace::target_dir().join("debug/lib_mapper.so");
     copy(&library, &package.join("_mapper.abi3.so"))?;
@@ -47,7 +46,7 @@ fn execute_notebooks(python_command: &dyn Fn(&[&str]) -> Command) -> Result<(), 
                   book = nbformat.read(sys.argv[1], as_version=4)\n\
                   nbclient.NotebookClient(book, timeout=600, kernel_name='python3').execute()";
     let notebooks = workspace::root().join("examples/notebooks");
-    for notebook in files(&notebooks)? {
+    for notebook in plain_files(&notebooks)? {
         let mut execute = python_command(&["-c", script, &notebook.to_string_lossy()]);
         execute.current_dir(&notebooks);
         run(execute)?;
@@ -59,17 +58,14 @@ fn execute_notebooks(python_command: &dyn Fn(&[&str]) -> Command) -> Result<(), 
 pub fn wheel() -> Result<(), Error> {
     let python = python_env::prepare()?;
     let (wheels, empty) = (workspace::target_dir().join("wheels"), workspace::target_dir().join("wheel-env"));
-    for old in [&wheels, &empty] {
-        if old.exists() {
-            fs::remove_dir_all(old).map_err(|source| Error::File { path: old.clone(), source })?;
-        }
-    }
+    files::remove(&wheels)?;
+    files::remove(&empty)?;
     let folder = wheels.to_string_lossy();
     let pip = ["-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", &folder];
     run(command(&python, &[&pip[..], &["./python"]].concat()))?;
     run(command("python3", &["-m", "venv", &empty.to_string_lossy()]))?;
     let mut install: Command = command(empty.join("bin/python"), &["-m", "pip", "install", "--quiet"]);
-    for wheel in files(&wheels)? {
+    for wheel in plain_files(&wheels)? {
         install.arg(format!("{}[test]", wheel.display()));
     }
     run(install)?;
@@ -82,8 +78,8 @@ pub fn wheel() -> Result<(), Error> {
 }
 
 fn copy_files(from: &Path, to: &Path) -> Result<(), Error> {
-    fs::create_dir_all(to).map_err(|source| Error::File { path: to.to_owned(), source })?;
-    for file in files(from)? {
+    fs::create_dir_all(to).map_err(at(to))?;
+    for file in plain_files(from)? {
         let name = file.file_name().unwrap_or_default();
         // A library from a development build of the package.
         if file.extension().is_none_or(|extension| extension != "so") {
@@ -94,18 +90,10 @@ fn copy_files(from: &Path, to: &Path) -> Result<(), Error> {
 }
 
 fn copy(from: &Path, to: &Path) -> Result<(), Error> {
-    fs::copy(from, to).map(drop).map_err(|source| Error::File { path: from.to_owned(), source })
+    fs::copy(from, to).map(drop).map_err(at(from))
 }
 
 /// The plain files of a directory.
-fn files(directory: &Path) -> Result<Vec<PathBuf>, Error> {
-    let failed = |source| Error::File { path: directory.to_owned(), source };
-    let mut found: Vec<PathBuf> = fs::read_dir(directory)
-        .map_err(failed)?
-        .flatten()
-        .map(|entry| entry.path())
-        .filter(|path| path.is_file())
-        .collect();
-    found.sort();
-    Ok(found)
+fn plain_files(directory: &Path) -> Result<Vec<PathBuf>, Error> {
+    Ok(files::entries(directory)?.into_iter().filter(|path| path.is_file()).collect())
 }

@@ -56,11 +56,12 @@ pub fn run(mut command: Command, tally: &mut Tally) -> Result<bool, Error> {
     Ok(child.wait().map_err(start)?.success())
 }
 
-/// Prints the summary line.
-pub fn close(tally: &Tally, well: bool) {
+/// Prints the summary line; an error if tests failed.
+pub fn close(tally: &Tally, well: bool) -> Result<(), Error> {
     let verdict = if well { "ok" } else { "FAILED" };
     let Tally { passed, failed, ignored } = tally;
     say(&format!(
         "test result: {verdict}. {passed} passed; {failed} failed; {ignored} ignored (all test programs)\n"
     ));
+    if well { Ok(()) } else { Err(Error::Failed { command: "the tests".to_owned() }) }
 }

@@ -3,21 +3,13 @@
 use crate::checks::lints;
 use crate::constants;
 use crate::error::Error;
+use crate::files::{self, Mode, at, write};
 use crate::step::{command, output, run, say};
 use crate::workspace;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
-
-/// Whether documents are written or compared.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mode {
-    /// Write the files.
-    Write,
-    /// Compare the files with newly generated ones.
-    Check,
-}
 
 /// Generated files and folders below docs.
 const GENERATED: &[&str] = &[
@@ -63,19 +55,17 @@ pub fn generated(mode: Mode) -> Result<(), Error> {
     // The documents are made in another directory and compared by content, independently of git.
     let made = workspace::target_dir().join("xtask-docs");
     let docs = workspace::root().join("docs");
-    if made.exists() {
-        fs::remove_dir_all(&made).map_err(at(&made))?;
-    }
+    files::remove(&made)?;
     let programs = programs();
     // In parallel, because each uses one core.
     let (reproduced, others) = std::thread::scope(|scope| {
         let others = scope.spawn(|| {
             for page in ["sequences", "campaign"] {
                 let text = output(command(&programs.reference_docs, &[page]))? + "\n";
-                write(&made.join(format!("reference/{page}.md")), text.as_bytes())?;
+                write(&made.join(format!("reference/{page}.md")), text)?;
             }
-            write(&made.join("reference/cli.md"), command_line(&programs)?.as_bytes())?;
-            write(&made.join("reference/constants.md"), constants::page()?.as_bytes())?;
+            write(&made.join("reference/cli.md"), command_line(&programs)?)?;
+            write(&made.join("reference/constants.md"), constants::page()?)?;
             mapped(&programs, &made)?;
             measured(&programs, &made)
         });
@@ -118,14 +108,12 @@ pub fn generated(mode: Mode) -> Result<(), Error> {
 /// Help of every command.
 fn command_line(programs: &Programs) -> Result<String, Error> {
     let pages = workspace::target_dir().join("xtask-docs-man");
-    if pages.exists() {
-        fs::remove_dir_all(&pages).map_err(at(&pages))?;
-    }
+    files::remove(&pages)?;
     output(command(&programs.mapper, &["man", "--out", &pages.to_string_lossy()]))?;
     // One manual page per command: mapper-gap-diagnose.1.
     let mut names = Vec::new();
-    for page in fs::read_dir(&pages).map_err(at(&pages))? {
-        let name = page.map_err(at(&pages))?.file_name().to_string_lossy().into_owned();
+    for page in files::entries(&pages)? {
+        let name = page.file_name().unwrap_or_default().to_string_lossy();
         names.extend(name.strip_suffix(".1").map(|name| name.replace('-', " ")));
     }
     names.sort();
@@ -148,15 +136,13 @@ fn command_line(programs: &Programs) -> Result<String, Error> {
 /// The picture of the plan, and the map, of the shipped campaign.
 fn mapped(programs: &Programs, made: &Path) -> Result<(), Error> {
     let runs = workspace::target_dir().join("xtask-docs-runs");
-    if runs.exists() {
-        fs::remove_dir_all(&runs).map_err(at(&runs))?;
-    }
+    files::remove(&runs)?;
     fs::create_dir_all(made.join("images")).map_err(at(made))?;
     let plan = made.join("images/plan.svg");
     output(command(&programs.mapper, &["plan", SHIPPED, "--svg", &plan.to_string_lossy()]))?;
     run(command(&programs.mapper, &["run", SHIPPED, "--out", &runs.to_string_lossy()]))?;
-    for run in fs::read_dir(&runs).map_err(at(&runs))? {
-        let map = run.map_err(at(&runs))?.path().join("map.svg");
+    for run in files::entries(&runs)? {
+        let map = run.join("map.svg");
         write(&made.join("images/turbo_a.svg"), &fs::read(&map).map_err(at(&map))?)?;
     }
     Ok(())
@@ -166,9 +152,7 @@ fn mapped(programs: &Programs, made: &Path) -> Result<(), Error> {
 fn measured(programs: &Programs, made: &Path) -> Result<(), Error> {
     let file = |name: &str| format!("{MEASURED}/{name}");
     let out = workspace::target_dir().join("xtask-docs-measured");
-    if out.exists() {
-        fs::remove_dir_all(&out).map_err(at(&out))?;
-    }
+    files::remove(&out)?;
     let (log, channels, campaign) = (file("measured.csv"), file("channels.yaml"), file("campaign.yaml"));
     let given =
         ["transient", &log, "--channels", &channels, "--campaign", &campaign, "--fit-until", "13.2 s"];
@@ -203,32 +187,14 @@ fn programs() -> Programs {
     Programs { mapper: program("mapper"), reference_docs: program(&format!("examples/{EXAMPLE}")) }
 }
 
-fn write(path: &Path, content: &[u8]) -> Result<(), Error> {
-    if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder).map_err(at(folder))?;
-    }
-    fs::write(path, content).map_err(at(path))
-}
-
 /// All generated files below a folder, by their path in it.
 fn contents(root: &Path) -> Result<BTreeMap<PathBuf, Vec<u8>>, Error> {
-    let mut files = BTreeMap::new();
-    let mut open: Vec<PathBuf> =
-        GENERATED.iter().map(|name| root.join(name)).filter(|path| path.exists()).collect();
-    while let Some(path) = open.pop() {
-        if path.is_dir() {
-            for entry in fs::read_dir(&path).map_err(at(&path))? {
-                open.push(entry.map_err(at(&path))?.path());
-            }
-        } else {
-            let content = fs::read(&path).map_err(at(&path))?;
-            files.insert(path.strip_prefix(root).unwrap_or(&path).to_owned(), content);
+    let mut contents = BTreeMap::new();
+    for path in GENERATED.iter().map(|name| root.join(name)).filter(|path| path.exists()) {
+        for file in if path.is_dir() { files::all_files(&path)? } else { vec![path] } {
+            let content = fs::read(&file).map_err(at(&file))?;
+            contents.insert(file.strip_prefix(root).unwrap_or(&file).to_owned(), content);
         }
     }
-    Ok(files)
-}
-
-fn at(path: &Path) -> impl FnOnce(std::io::Error) -> Error {
-    let path = path.to_owned();
-    |source| Error::File { path, source }
+    Ok(contents)
 }

@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::step::{self, command, output, run, say};
-use crate::workspace;
+use crate::{files, workspace};
 use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -30,7 +30,7 @@ pub fn performance() -> Result<(), Error> {
     // Measured manually, because a clean release build takes minutes.
     page.push_str(include_str!("../build_time.md"));
     let path = workspace::root().join("docs/validation/performance.md");
-    fs::write(&path, &page).map_err(|source| Error::File { path: path.clone(), source })?;
+    files::write(&path, &page)?;
     say(&page);
     Ok(())
 }
@@ -92,7 +92,7 @@ fn transients(page: &mut String, ours: &Path) -> Result<(), Error> {
 /// Compiles the peer; `None` if its tools are missing.
 fn peer() -> Result<Option<PathBuf>, Error> {
     let folder = workspace::target_dir().join("peers");
-    fs::create_dir_all(&folder).map_err(|source| Error::File { path: folder.clone(), source })?;
+    fs::create_dir_all(&folder).map_err(files::at(&folder))?;
     let binary = folder.join("lab_cvode");
     let binary_text = binary.to_string_lossy().into_owned();
     let libraries = [
@@ -118,7 +118,7 @@ fn whole_run(page: &mut String, mapper: &Path) -> Result<(), Error> {
         seconds.push(took.as_secs_f64());
         megabytes.push(peak_kib as f64 * 1024.0 / 1e6);
     }
-    fs::remove_dir_all(&out).map_err(|source| Error::File { path: out.clone(), source })?;
+    files::remove(&out)?;
     let _ = writeln!(
         page,
         "## The whole job: `mapper run {CAMPAIGN}`\n\n48 points, 9 repeats and the first point again, 1 h 25 min of the rig's time at 10 Hz, soak \

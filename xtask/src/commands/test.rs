@@ -1,10 +1,11 @@
 //! `cargo xtask test`: all checks of the repository.
 
-use crate::checks::formatting::{Mode, formatting};
+use crate::checks::formatting::formatting;
 use crate::checks::tally::Tally;
 use crate::commands::docs;
 use crate::environment::capabilities::{Capabilities, with_program};
 use crate::error::Error;
+use crate::files::Mode;
 use crate::step::{Steps, command, run, say};
 use crate::{
     checks::{lints, python_package, test_programs},
@@ -53,7 +54,7 @@ pub fn test() -> Result<(), Error> {
         || tests(&capabilities),
         vec![
             ("Python package", Box::new(|| python_package::check(&capabilities))),
-            ("generated documents", Box::new(|| docs::generated(docs::Mode::Check))),
+            ("generated documents", Box::new(|| docs::generated(Mode::Check))),
             ("documentation", Box::new(|| documentation(&capabilities))),
         ],
     );
@@ -87,10 +88,7 @@ fn tests(capabilities: &Capabilities) -> Result<(), Error> {
     let mut tally = Tally::default();
     let programs = test_programs::tests("full", |cores| 2 * cores + 2);
     let well = test_programs::run(with_program(lints::linting(capabilities.to(programs))), &mut tally)?;
-    test_programs::close(&tally, well);
-    if !well {
-        return Err(Error::Failed { command: "the tests".to_owned() });
-    }
+    test_programs::close(&tally, well)?;
     let allowed = MOUNTING_TESTS * usize::from(!capabilities.mountable) + usize::from(!capabilities.slurm);
     let left_out = tally.ignored.saturating_sub(allowed);
     if left_out > 0 { Err(Error::LeftOut { count: left_out }) } else { Ok(()) }

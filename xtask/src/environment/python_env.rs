@@ -2,9 +2,9 @@
 
 use crate::error::Error;
 use crate::step::{self, command, run, say};
-use crate::workspace;
+use crate::{files, workspace};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Minimum version of Python for the pinned numpy and scipy.
 const OLDEST: (&str, &str) = ("3.11", "(3, 11)");
@@ -20,7 +20,7 @@ fn home() -> PathBuf {
 
 /// Creates the environment, unless one with the same packages exists. Returns its Python.
 pub fn prepare() -> Result<PathBuf, Error> {
-    let wanted = read(&workspace::root().join("tests/python/requirements.txt"))?;
+    let wanted = files::read(&workspace::root().join("tests/python/requirements.txt"))?;
     let (home, python) = (home(), python());
     // Written last, because its absence marks an incomplete environment.
     let stamp = home.join("made-from.txt");
@@ -30,15 +30,13 @@ pub fn prepare() -> Result<PathBuf, Error> {
         return Ok(python);
     }
     check_version()?;
-    if home.exists() {
-        fs::remove_dir_all(&home).map_err(|source| Error::File { path: home.clone(), source })?;
-    }
+    files::remove(&home)?;
     run(command("python3", &["-m", "venv", &home.to_string_lossy()]))?;
     // Only wheels, because building scipy from source needs a Fortran compiler and half an hour.
     let arguments = ["-m", "pip", "install", "--disable-pip-version-check", "--no-input", "--quiet"];
     let list = ["--only-binary", ":all:", "--requirement", "tests/python/requirements.txt"];
     run(command(&python, &[&arguments[..], &list].concat()))?;
-    fs::write(&stamp, wanted).map_err(|source| Error::File { path: stamp.clone(), source })?;
+    files::write(&stamp, wanted)?;
     Ok(python)
 }
 
@@ -49,8 +47,4 @@ fn check_version() -> Result<(), Error> {
         Some((_, "True")) => Ok(()),
         _ => Err(Error::OldPython { found: answer, needed: OLDEST.0 }),
     }
-}
-
-fn read(path: &Path) -> Result<String, Error> {
-    fs::read_to_string(path).map_err(|source| Error::File { path: path.to_owned(), source })
 }

@@ -3,6 +3,8 @@
 mod read;
 mod write;
 
+pub(crate) use write::{Column, write_table};
+
 use mapper_core::MapFormat;
 
 pub(crate) const FORMAT: MapFormat = MapFormat {

@@ -1,6 +1,8 @@
 //! The fitted surface as CSV: one row per node with its errors, extrapolation marked.
 
+use crate::csv::{Column, write_table};
 use crate::heading::heading;
+use crate::labels::number;
 use mapper_core::{CompressorMap, ExportError, FittedLine, FittedMap, FittedNode, MapFormat};
 
 pub(crate) const FORMAT: MapFormat = MapFormat {
@@ -12,35 +14,37 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     ..MapFormat::NONE
 };
 
-/// Column names, in order.
-const COLUMNS: [&str; 14] = [
-    "speed_corrected_rpm",
-    "beta",
-    "flow_corrected_kg_s",
-    "pressure_ratio",
-    "eta",
-    "work_ratio",
-    "flow_standard_error_kg_s",
-    "pressure_ratio_standard_error",
-    "eta_standard_error",
-    "flow_common_standard_error_kg_s",
-    "pressure_ratio_common_standard_error",
-    "eta_common_standard_error",
-    "line",
-    "support",
-];
+/// A line, a position on it, and its node there.
+type Row<'a> = (&'a FittedLine, f64, &'a FittedNode);
+
+/// The columns, in order.
+fn columns<'a>() -> [Column<Row<'a>>; 14] {
+    [
+        ("speed_corrected_rpm", |(line, ..)| number(line.speed_corrected_rpm)),
+        ("beta", |(_, beta_ratio, _)| number(*beta_ratio)),
+        ("flow_corrected_kg_s", |(.., node)| number(node.flow_corrected_kg_s)),
+        ("pressure_ratio", |(.., node)| number(node.pressure_ratio)),
+        ("eta", |(.., node)| number(node.eta)),
+        ("work_ratio", |(.., node)| number(node.work_ratio)),
+        ("flow_standard_error_kg_s", |(.., node)| number(node.flow_standard_error_kg_s)),
+        ("pressure_ratio_standard_error", |(.., node)| number(node.pressure_ratio_standard_error)),
+        ("eta_standard_error", |(.., node)| number(node.eta_standard_error)),
+        ("flow_common_standard_error_kg_s", |(.., node)| number(node.flow_common_standard_error_kg_s)),
+        ("pressure_ratio_common_standard_error", |(.., node)| {
+            number(node.pressure_ratio_common_standard_error)
+        }),
+        ("eta_common_standard_error", |(.., node)| number(node.eta_common_standard_error)),
+        ("line", |(line, ..)| (if line.measured { "measured" } else { "between_or_beyond" }).to_owned()),
+        ("support", |(.., node)| (if node.extrapolated { "extrapolated" } else { "measured" }).to_owned()),
+    ]
+}
 
 fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
     let fitted = map.fitted.as_ref().ok_or(ExportError::NeedsFit { format: FORMAT.name })?;
-    let failed = ExportError::failed(FORMAT.name);
-    let mut writer = ::csv::Writer::from_writer(header(map, fitted).into_bytes());
-    writer.write_record(COLUMNS).map_err(&failed)?;
-    for line in &fitted.lines {
-        for (beta_ratio, node) in fitted.beta_ratio.iter().zip(&line.nodes) {
-            writer.write_record(row(line, *beta_ratio, node)).map_err(&failed)?;
-        }
-    }
-    writer.into_inner().map_err(|error| failed(error.into_error().into()))
+    let rows = fitted.lines.iter().flat_map(|line| {
+        fitted.beta_ratio.iter().zip(&line.nodes).map(move |(beta_ratio, node)| (line, *beta_ratio, node))
+    });
+    write_table(FORMAT.name, header(map, fitted), columns(), rows)
 }
 
 fn header(map: &CompressorMap, fitted: &FittedMap) -> String {
@@ -54,25 +58,4 @@ fn header(map: &CompressorMap, fitted: &FittedMap) -> String {
         100.0 * fitted.distance_rms_ratio,
         100.0 * fitted.eta_rms,
     )
-}
-
-fn row(line: &FittedLine, beta_ratio: f64, node: &FittedNode) -> [String; 14] {
-    // Shortest text that reads back to the same number.
-    let number = |value: f64| value.to_string();
-    [
-        number(line.speed_corrected_rpm),
-        number(beta_ratio),
-        number(node.flow_corrected_kg_s),
-        number(node.pressure_ratio),
-        number(node.eta),
-        number(node.work_ratio),
-        number(node.flow_standard_error_kg_s),
-        number(node.pressure_ratio_standard_error),
-        number(node.eta_standard_error),
-        number(node.flow_common_standard_error_kg_s),
-        number(node.pressure_ratio_common_standard_error),
-        number(node.eta_common_standard_error),
-        (if line.measured { "measured" } else { "between_or_beyond" }).to_owned(),
-        (if node.extrapolated { "extrapolated" } else { "measured" }).to_owned(),
-    ]
 }

@@ -1,5 +1,6 @@
 //! Maps of turbines: tables of points with exact digits, the fitted table with its intervals, and tables for simulation programs.
 
+use crate::labels::digits;
 use mapper_core::{
     ExportError, FittedTurbine, FittedTurbineLine, FittedTurbineNode, ImportError, ImportedTurbine,
     MapDescription, TurbineFormat, TurbineMap, one_line,
@@ -30,11 +31,6 @@ fn heading(map: &TurbineMap, mark: &str) -> String {
 
 fn read_text(bytes: &[u8], given: &MapDescription) -> Result<ImportedTurbine, ImportError> {
     read_turbine_text(&text_of(bytes)?, given)
-}
-
-/// The shortest text that reads back to the same number; empty for none.
-fn digits(value: Option<f64>) -> String {
-    value.map(|value| value.to_string()).unwrap_or_default()
 }
 
 fn write_csv(map: &TurbineMap) -> Result<Vec<u8>, ExportError> {

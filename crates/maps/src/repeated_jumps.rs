@@ -11,7 +11,7 @@ pub struct RepeatedJump {
     /// Target of the jump.
     pub to: OperatingPoint,
     /// Indices of the steps, from 0; files have their numbers, from 1.
-    #[serde(serialize_with = "mapper_core::test_plan::step_number::list::serialize")]
+    #[serde(serialize_with = "mapper_core::test_plan::step_number::serialize")]
     pub steps: Vec<usize>,
     /// Efficiency of each step, fraction.
     pub eta: Vec<f64>,

@@ -1,7 +1,7 @@
 //! The number of a step: files and texts count from 1, code uses an index from 0.
 //!
-//! The serde adapters write the number and read it back as an index: this module for one step, [`list`] and [`lists`] for several, [`option`] for
-//! an optional one, [`entry`] for plans and step markers, whose older files have the index.
+//! The serde adapters write the number and read it back as an index: this module for one step, or several that are only written; [`entry`] for
+//! plans and step markers, whose older files have the index.
 
 use serde::de::{Deserialize, Deserializer, Error};
 use serde::ser::{Serialize, Serializer};
@@ -15,12 +15,45 @@ fn index_of<E: Error>(number: usize) -> Result<usize, E> {
     number.checked_sub(1).ok_or_else(|| E::custom("steps count from 1, and this one has the number 0"))
 }
 
-/// Writes the number of the step at `index`.
+/// Indices of steps, which files have as numbers.
+pub trait Steps {
+    /// Their numbers, in the same form.
+    type Numbers: Serialize;
+
+    /// Their numbers.
+    fn numbers(&self) -> Self::Numbers;
+}
+
+impl Steps for usize {
+    type Numbers = usize;
+
+    fn numbers(&self) -> usize {
+        step_number(*self)
+    }
+}
+
+impl<T: Steps> Steps for Option<T> {
+    type Numbers = Option<T::Numbers>;
+
+    fn numbers(&self) -> Self::Numbers {
+        self.as_ref().map(T::numbers)
+    }
+}
+
+impl<T: Steps> Steps for Vec<T> {
+    type Numbers = Vec<T::Numbers>;
+
+    fn numbers(&self) -> Self::Numbers {
+        self.iter().map(T::numbers).collect()
+    }
+}
+
+/// Writes the numbers of steps.
 ///
 /// # Errors
 /// The errors of the serializer.
-pub fn serialize<S: Serializer>(index: &usize, serializer: S) -> Result<S::Ok, S::Error> {
-    step_number(*index).serialize(serializer)
+pub fn serialize<S: Serializer>(indices: &impl Steps, serializer: S) -> Result<S::Ok, S::Error> {
+    indices.numbers().serialize(serializer)
 }
 
 /// Reads a number from 1 as an index.
@@ -29,49 +62,6 @@ pub fn serialize<S: Serializer>(index: &usize, serializer: S) -> Result<S::Ok, S
 /// The errors of the deserializer, and an error for step 0.
 pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
     index_of(usize::deserialize(deserializer)?)
-}
-
-/// Several steps.
-pub mod list {
-    use super::{Serialize, Serializer};
-    use crate::step_number;
-
-    /// Writes the numbers of the steps at `indices`.
-    ///
-    /// # Errors
-    /// The errors of the serializer.
-    pub fn serialize<S: Serializer>(indices: &[usize], serializer: S) -> Result<S::Ok, S::Error> {
-        indices.iter().copied().map(step_number).collect::<Vec<_>>().serialize(serializer)
-    }
-}
-
-/// Groups of steps.
-pub mod lists {
-    use super::{Serialize, Serializer};
-    use crate::step_number;
-
-    /// Writes the numbers of the steps at `indices`, group by group.
-    ///
-    /// # Errors
-    /// The errors of the serializer.
-    pub fn serialize<S: Serializer>(indices: &[Vec<usize>], serializer: S) -> Result<S::Ok, S::Error> {
-        let numbers = |group: &Vec<usize>| group.iter().copied().map(step_number).collect::<Vec<_>>();
-        indices.iter().map(numbers).collect::<Vec<_>>().serialize(serializer)
-    }
-}
-
-/// A step, or none.
-pub mod option {
-    use super::{Serialize, Serializer};
-    use crate::step_number;
-
-    /// Writes the number of the step at `index`, or null.
-    ///
-    /// # Errors
-    /// The errors of the serializer.
-    pub fn serialize<S: Serializer>(index: &Option<usize>, serializer: S) -> Result<S::Ok, S::Error> {
-        index.map(step_number).serialize(serializer)
-    }
 }
 
 /// For a flattened field: `step` from 1. Files of version 0.1.0 have `index` from 0 instead.

@@ -275,7 +275,7 @@ pub struct Gap {
     /// Number of steps with a misfit beyond noise after the tolerance fit: the sample size of the interval.
     pub steps_with_gap: usize,
     /// Index of the step with the largest share of the gap, from 0; files use its number, from 1.
-    #[serde(serialize_with = "mapper_core::test_plan::step_number::option::serialize")]
+    #[serde(serialize_with = "mapper_core::test_plan::step_number::serialize")]
     pub largest_step: Option<usize>,
     /// Its share of the gap.
     pub largest_share: f64,
@@ -284,10 +284,10 @@ pub struct Gap {
     /// Channels that the cause makes worse.
     pub worse: Vec<String>,
     /// Indices of the steps held out in one of the folds; empty if there are too few steps. Files use numbers, from 1.
-    #[serde(serialize_with = "mapper_core::test_plan::step_number::list::serialize")]
+    #[serde(serialize_with = "mapper_core::test_plan::step_number::serialize")]
     pub held_out_steps: Vec<usize>,
     /// Folds: indices of the steps held out together, from 0; files use numbers, from 1.
-    #[serde(serialize_with = "mapper_core::test_plan::step_number::lists::serialize")]
+    #[serde(serialize_with = "mapper_core::test_plan::step_number::serialize")]
     pub folds: Vec<Vec<usize>>,
     /// Each channel.
     pub channels: BTreeMap<String, ChannelGap>,

@@ -3,7 +3,8 @@
 //! Each reading keeps its own time, so a channel has the rate of its source; at other times its column is NaN. A reading that arrives
 //! after later rig samples is appended behind them and keeps its own time as its source time.
 
-use crate::backends::instrument_link::{Answer, InstrumentLink};
+use crate::backends::deadline::Answer;
+use crate::backends::instrument_link::InstrumentLink;
 use mapper_core::{
     Backend, BackendError, Channel, ChannelColumn, ElementColumn, Event, EventKind, Provenance, Quality,
     RigDescription, SampleBatch, Setpoints, TruthColumn,

@@ -16,15 +16,15 @@ enum Call {
     Disarm,
 }
 
-/// Number of the call, and its result.
-type Answer = (u64, Result<Option<SampleBatch>, BackendError>);
+/// Result of a call; only a poll has samples.
+pub(crate) type Answer = Result<SampleBatch, BackendError>;
 
 /// Adds deadlines to another backend. A call that has timed out is not repeated: later calls wait behind it, and time out
 /// themselves until the rig answers. Late answers are discarded, and the samples in them count as missed.
 pub struct DeadlineBackend {
     description: RigDescription,
     calls: Sender<(u64, Call)>,
-    answers: Receiver<Answer>,
+    answers: Receiver<(u64, Answer)>,
     number: u64,
     deadlines: Deadlines,
 }
@@ -38,10 +38,41 @@ pub struct Deadlines {
     pub call: Duration,
 }
 
-/// The rig's thread has ended.
+/// Why the thread of a backend gives no more answers.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 struct ThreadEnded(String);
+
+pub(crate) const ENDED: &str = "its thread has ended";
+
+pub(crate) fn lost_error(message: impl Into<String>) -> BackendError {
+    BackendError::Lost { t_s: 0.0, source: Box::new(ThreadEnded(message.into())) }
+}
+
+/// Contains a panic of a backend, which `name` names.
+pub(crate) fn catch_panic(name: &str, call: impl FnOnce() -> Answer) -> Answer {
+    catch_unwind(AssertUnwindSafe(call))
+        .unwrap_or_else(|panic| Err(lost_error(format!("{name} panicked: {}", panic_message(&*panic)))))
+}
+
+/// Starts a thread that answers calls. It is detached: a hanging call must not keep the program from ending.
+pub(crate) fn answer_on_thread<C: Send + 'static, A: Send + 'static>(
+    name: &str,
+    mut answer: impl FnMut(C) -> A + Send + 'static,
+) -> Result<(Sender<C>, Receiver<A>), BackendError> {
+    let (calls, to_do) = channel();
+    let (reply, answers) = channel();
+    let work = move || {
+        for call in to_do {
+            if reply.send(answer(call)).is_err() {
+                break;
+            }
+        }
+    };
+    let started = std::thread::Builder::new().name(name.to_owned()).spawn(work);
+    started.map_err(|error| BackendError::Lost { t_s: 0.0, source: Box::new(error) })?;
+    Ok((calls, answers))
+}
 
 impl DeadlineBackend {
     /// `backend` with these deadlines for its calls.
@@ -50,48 +81,27 @@ impl DeadlineBackend {
     /// [`BackendError::Lost`] if no thread can be started.
     pub fn new(mut backend: Box<dyn Backend>, deadlines: Deadlines) -> Result<Self, BackendError> {
         let description = backend.describe();
-        let (calls, to_do) = channel::<(u64, Call)>();
-        let (reply, answers) = channel::<Answer>();
-        // Detached on purpose: a hanging call must not keep the program from ending.
-        std::thread::Builder::new()
-            .name("rig".to_owned())
-            .spawn(move || {
-                for (number, call) in to_do {
-                    let answer = catch_unwind(AssertUnwindSafe(|| match call {
-                        Call::Arm => backend.arm().map(|()| None),
-                        Call::Set(setpoints) => backend.set(&setpoints).map(|()| None),
-                        Call::Poll(until_s) => backend.poll(until_s).map(Some),
-                        Call::Hold => backend.hold().map(|()| None),
-                        Call::MakeSafe => backend.make_safe().map(|()| None),
-                        Call::Disarm => backend.disarm().map(|()| None),
-                    }));
-                    let answer = answer.unwrap_or_else(|panic| {
-                        let source = Box::new(ThreadEnded(format!(
-                            "the backend panicked: {}",
-                            panic_message(&*panic)
-                        )));
-                        Err(BackendError::Lost { t_s: 0.0, source })
-                    });
-                    if reply.send((number, answer)).is_err() {
-                        break;
-                    }
-                }
-            })
-            .map_err(|error| BackendError::Lost { t_s: 0.0, source: Box::new(error) })?;
+        let done = SampleBatch::default;
+        let mut make = move |call| match call {
+            Call::Arm => backend.arm().map(|()| done()),
+            Call::Set(setpoints) => backend.set(&setpoints).map(|()| done()),
+            Call::Poll(until_s) => backend.poll(until_s),
+            Call::Hold => backend.hold().map(|()| done()),
+            Call::MakeSafe => backend.make_safe().map(|()| done()),
+            Call::Disarm => backend.disarm().map(|()| done()),
+        };
+        let answer = move |(number, call)| (number, catch_panic("the backend", || make(call)));
+        let (calls, answers) = answer_on_thread("rig", answer)?;
         Ok(DeadlineBackend { description, calls, answers, number: 0, deadlines })
     }
 
-    fn call(&mut self, name: &'static str, call: Call) -> Result<Option<SampleBatch>, BackendError> {
+    fn call(&mut self, name: &'static str, call: Call) -> Answer {
         let limit = match call {
             Call::Arm | Call::Disarm => self.deadlines.arming,
             _ => self.deadlines.call,
         };
         self.number += 1;
-        let lost_error = || {
-            let source = Box::new(ThreadEnded("its thread has ended".to_owned()));
-            BackendError::Lost { t_s: 0.0, source }
-        };
-        self.calls.send((self.number, call)).map_err(|_| lost_error())?;
+        self.calls.send((self.number, call)).map_err(|_| lost_error(ENDED))?;
         loop {
             match self.answers.recv_timeout(limit) {
                 // A late answer to a call that has timed out.
@@ -100,7 +110,7 @@ impl DeadlineBackend {
                 Err(RecvTimeoutError::Timeout) => {
                     return Err(BackendError::Deadline { call: name, limit_s: limit.as_secs_f64() });
                 }
-                Err(RecvTimeoutError::Disconnected) => return Err(lost_error()),
+                Err(RecvTimeoutError::Disconnected) => return Err(lost_error(ENDED)),
             }
         }
     }
@@ -120,7 +130,7 @@ impl Backend for DeadlineBackend {
     }
 
     fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError> {
-        self.call("poll", Call::Poll(until_s)).map(Option::unwrap_or_default)
+        self.call("poll", Call::Poll(until_s))
     }
 
     fn hold(&mut self) -> Result<(), BackendError> {

@@ -1,18 +1,9 @@
 //! The backend of an auxiliary instrument: called directly, or on its own thread so that the run never waits for it.
 
-use crate::run_control::run::panic_message;
+use crate::backends::deadline::{Answer, ENDED, answer_on_thread, catch_panic, lost_error};
 use mapper_core::{Backend, BackendError, SampleBatch};
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
 use std::time::Duration;
-
-/// Result of a request.
-pub(crate) type Answer = Result<SampleBatch, BackendError>;
-
-/// Why an instrument was lost.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-struct ThreadEnded(String);
 
 pub(crate) enum Call {
     Arm,
@@ -35,18 +26,9 @@ pub(crate) enum InstrumentLink {
     },
 }
 
-fn lost_error(message: String) -> BackendError {
-    BackendError::Lost { t_s: 0.0, source: Box::new(ThreadEnded(message)) }
-}
-
-/// Contains a panic of an instrument: the run continues without the instrument.
-fn catch_panic(call: impl FnOnce() -> Answer) -> Answer {
-    catch_unwind(AssertUnwindSafe(call))
-        .unwrap_or_else(|panic| Err(lost_error(format!("it panicked: {}", panic_message(&*panic)))))
-}
-
 fn make_call(backend: &mut dyn Backend, call: &Call) -> Answer {
-    catch_panic(|| match call {
+    // The run continues without the instrument.
+    catch_panic("it", || match call {
         Call::Arm => backend.arm().map(|()| SampleBatch::default()),
         Call::Poll(until_s) => backend.poll(*until_s),
         Call::Disarm => backend.disarm().map(|()| SampleBatch::default()),
@@ -62,19 +44,7 @@ impl InstrumentLink {
         if simulated_time {
             return Ok(InstrumentLink::Direct { backend, answer: None });
         }
-        let (calls, to_do) = channel::<Call>();
-        let (reply, answers) = channel::<Answer>();
-        // Detached: a hanging instrument must not keep the program from ending.
-        std::thread::Builder::new()
-            .name("reader".to_owned())
-            .spawn(move || {
-                for call in to_do {
-                    if reply.send(make_call(backend.as_mut(), &call)).is_err() {
-                        break;
-                    }
-                }
-            })
-            .map_err(|error| BackendError::Lost { t_s: 0.0, source: Box::new(error) })?;
+        let (calls, answers) = answer_on_thread("reader", move |call| make_call(backend.as_mut(), &call))?;
         Ok(InstrumentLink::OwnThread { calls, answers, is_pending: false, armed: false, deadline })
     }
 
@@ -136,13 +106,13 @@ impl InstrumentLink {
         let InstrumentLink::OwnThread { calls, answers, deadline, .. } = self else {
             return Ok(SampleBatch::default());
         };
-        calls.send(call).map_err(|_| lost_error("its thread has ended".to_owned()))?;
+        calls.send(call).map_err(|_| lost_error(ENDED))?;
         match answers.recv_timeout(*deadline) {
             Ok(answer) => answer,
             Err(RecvTimeoutError::Timeout) => {
                 Err(BackendError::Deadline { call: name, limit_s: deadline.as_secs_f64() })
             }
-            Err(RecvTimeoutError::Disconnected) => Err(lost_error("its thread has ended".to_owned())),
+            Err(RecvTimeoutError::Disconnected) => Err(lost_error(ENDED)),
         }
     }
 }

@@ -1,8 +1,7 @@
 //! Quality and source time of readings. Only unusual ones are recorded: the others are good and were taken on arrival.
 
-use crate::format::PROVENANCE_TOPIC;
 use crate::writing::recording_file::{McapFile, add_channel};
-use crate::writing::schema::provenance_schema;
+use crate::writing::topics::Topic;
 use mapper_core::{Channel, Quality, ReadingOrigin, SampleBatch};
 use mcap::McapResult;
 use serde::{Deserialize, Serialize};
@@ -57,8 +56,7 @@ impl ProvenanceWriter {
         if let Some(channel) = self.channel {
             return Ok(channel);
         }
-        let (schema, units) = provenance_schema();
-        let channel = add_channel(mcap, PROVENANCE_TOPIC, &schema, &units)?;
+        let channel = add_channel(mcap, &Topic::of_provenance())?;
         self.channel = Some(channel);
         Ok(channel)
     }

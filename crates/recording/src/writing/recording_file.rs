@@ -1,10 +1,8 @@
 //! The file of a recording: its header, metadata, attachments and topics.
 
 use crate::FormatVersion;
-use crate::format::{
-    CAMPAIGN_NAME, EVENT_TOPIC, FORMAT_KEY, METADATA_NAME, PLAN_NAME, START_KEY, STEP_TOPIC,
-};
-use crate::writing::schema::{event_schema, step_schema};
+use crate::format::{CAMPAIGN_NAME, FORMAT_KEY, METADATA_NAME, PLAN_NAME, START_KEY};
+use crate::writing::topics::Topic;
 use mcap::records::Metadata;
 use mcap::write::NoSeek;
 use mcap::{Attachment, Compression, McapError, McapResult, WriteOptions, Writer};
@@ -75,24 +73,17 @@ pub(crate) fn open(file: File, header: &RecordingHeader) -> McapResult<OpenedFil
             })?;
         }
     }
-    let (schema, units) = step_schema();
-    let step_channel = add_channel(&mut mcap, STEP_TOPIC, &schema, &units)?;
-    let (schema, units) = event_schema();
-    let event_channel = add_channel(&mut mcap, EVENT_TOPIC, &schema, &units)?;
+    let step_channel = add_channel(&mut mcap, &Topic::of_steps())?;
+    let event_channel = add_channel(&mut mcap, &Topic::of_events())?;
     mcap.flush()?;
     Ok(OpenedFile { mcap, step_channel, event_channel })
 }
 
-/// Defines a topic with its schema and the units of its fields.
-pub(crate) fn add_channel(
-    mcap: &mut McapFile,
-    topic: &str,
-    schema: &[u8],
-    units: &BTreeMap<String, String>,
-) -> McapResult<u16> {
-    let name = topic.trim_start_matches('/').replace('/', ".");
-    let schema_id = mcap.add_schema(&name, "jsonschema", schema)?;
-    mcap.add_channel(schema_id, topic, "json", units)
+/// Defines a topic.
+pub(crate) fn add_channel(mcap: &mut McapFile, topic: &Topic) -> McapResult<u16> {
+    let name = topic.name.trim_start_matches('/').replace('/', ".");
+    let schema_id = mcap.add_schema(&name, "jsonschema", &topic.schema)?;
+    mcap.add_channel(schema_id, topic.name, "json", &topic.units)
 }
 
 /// The error of the system, or that of `mcap`.

@@ -31,11 +31,6 @@ pub(crate) fn numeric_schema(title: &str, fields: &[Field<'_>]) -> Vec<u8> {
     object(title, properties)
 }
 
-/// Units of the fields, as stored in the channel's metadata.
-pub(crate) fn unit_metadata(fields: &[Field<'_>]) -> BTreeMap<String, String> {
-    fields.iter().map(|field| (field.name.to_owned(), field.unit.to_owned())).collect()
-}
-
 /// Schema of `/step` with the units of its fields.
 pub(crate) fn step_schema() -> (Vec<u8>, BTreeMap<String, String>) {
     let point = |description: &str| {

@@ -1,7 +1,7 @@
 //! Topics of a recording and their messages, for the file and for clients that receive the same data live.
 
-use crate::format::{EVENT_TOPIC, STEP_TOPIC};
-use crate::writing::schema::{Field, event_schema, numeric_schema, step_schema, unit_metadata};
+use crate::format::{EVENT_TOPIC, PROVENANCE_TOPIC, STEP_TOPIC};
+use crate::writing::schema::{Field, event_schema, numeric_schema, provenance_schema, step_schema};
 use mapper_core::{Channel, Event, Group, StepMarker, step_number};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
@@ -35,8 +35,13 @@ impl Topic {
             channels.into_iter().filter(|channel| channel.info().group == group).collect();
         channels.sort();
         let fields: Vec<Field<'_>> = channels.into_iter().map(|of| Field::of_channel(of.info())).collect();
-        let name = group.topic();
-        Topic { name, schema: numeric_schema(name, &fields), units: unit_metadata(&fields) }
+        Topic::of_fields(group.topic(), &fields)
+    }
+
+    /// Numbers with their units.
+    pub(crate) fn of_fields(name: &'static str, fields: &[Field<'_>]) -> Topic {
+        let units = fields.iter().map(|field| (field.name.to_owned(), field.unit.to_owned())).collect();
+        Topic { name, schema: numeric_schema(name, fields), units }
     }
 
     /// Starts and ends of steps.
@@ -49,6 +54,12 @@ impl Topic {
     pub fn of_events() -> Topic {
         let (schema, units) = event_schema();
         Topic { name: EVENT_TOPIC, schema, units }
+    }
+
+    /// Unusual provenance of readings.
+    pub(crate) fn of_provenance() -> Topic {
+        let (schema, units) = provenance_schema();
+        Topic { name: PROVENANCE_TOPIC, schema, units }
     }
 }
 

@@ -3,8 +3,8 @@
 use crate::format::{ELEMENTS_TOPIC, TRUTH_TOPIC};
 use crate::writing::provenance::ProvenanceWriter;
 use crate::writing::recording_file::{McapFile, OpenedFile, RecordingHeader, add_channel, io_error, open};
-use crate::writing::schema::{Field, numeric_schema, unit_metadata};
-use crate::writing::topics::{StepPhase, event_message, step_message};
+use crate::writing::schema::Field;
+use crate::writing::topics::{StepPhase, Topic, event_message, step_message};
 use crate::{BatchError, RecordError};
 use mapper_core::{Channel, Event, Group, SampleBatch, StepMarker};
 use mcap::McapResult;
@@ -365,8 +365,7 @@ impl RecordingWriter {
     /// Defines a topic in the file; one whose fields change over the run gets a second definition.
     fn add_layout(&mut self, topic: &'static str, fields: &[Field<'_>]) -> Result<usize, RecordError> {
         self.refuse_after_failure()?;
-        let schema = numeric_schema(topic, fields);
-        let added = add_channel(&mut self.mcap, topic, &schema, &unit_metadata(fields));
+        let added = add_channel(&mut self.mcap, &Topic::of_fields(topic, fields));
         let channel_id = self.check_write(added)?;
         let prefixes = fields
             .iter()

@@ -12,6 +12,7 @@ use std::path::PathBuf;
 
 /// A compressor map.
 #[pyclass(frozen, module = "mapper._mapper")]
+#[derive(Clone)]
 pub struct Map {
     pub(crate) map: CompressorMap,
 }

@@ -13,53 +13,20 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
 /// Outcome of a run: the rig is safe and the recording is kept.
-#[pyclass(frozen, module = "mapper._mapper")]
+#[pyclass(frozen, get_all, module = "mapper._mapper")]
 pub struct Outcome {
-    directory: PathBuf,
-    recording: PathBuf,
-    end: &'static str,
-    sentence: String,
-    json: Option<String>,
-    map: Option<mapper_core::CompressorMap>,
-}
-
-#[pymethods]
-impl Outcome {
     /// The run's directory.
-    #[getter]
-    fn directory(&self) -> &Path {
-        &self.directory
-    }
-
+    directory: PathBuf,
     /// Its recording.
-    #[getter]
-    fn recording(&self) -> &Path {
-        &self.recording
-    }
-
+    recording: PathBuf,
     /// How it ended: completed, drifted, tripped, interrupted or failed.
-    #[getter]
-    fn end(&self) -> &'static str {
-        self.end
-    }
-
+    end: &'static str,
     /// The same in a sentence.
-    #[getter]
-    fn sentence(&self) -> &str {
-        &self.sentence
-    }
-
+    sentence: String,
     /// What `mapper run --json` prints; `None` without results.
-    #[getter]
-    fn json(&self) -> Option<&str> {
-        self.json.as_deref()
-    }
-
+    json: Option<String>,
     /// The map; `None` without one.
-    #[getter]
-    fn map(&self) -> Option<Map> {
-        self.map.clone().map(|map| Map { map })
-    }
+    map: Option<Map>,
 }
 
 /// Runs the campaign in a new directory in `parent`. `socket`: where its backend listens, if that is a rig in Python. Ctrl-C stops it at the next sample, and is raised again when the rig is safe.
@@ -128,7 +95,7 @@ fn run(
     let (json, map) = match results {
         Ok(results) => {
             let json = serde_json::to_value(&results).map_err(SessionError::from)?;
-            (Some(with_messages(json).to_string()), results.compressor_map)
+            (Some(with_messages(json).to_string()), results.compressor_map.map(|map| Map { map }))
         }
         // Stopped before there was anything to identify.
         Err(_) if end != "completed" => (None, None),

@@ -25,10 +25,3 @@ pub(crate) fn optional_si<'de, D: Dimension, S: Deserializer<'de>>(
 pub(crate) fn value_or<D: Dimension>(quantity: Option<Quantity<D>>, default: f64) -> f64 {
     quantity.map_or(default, |quantity| quantity.value)
 }
-
-/// Overrides a default with the value of the file.
-pub(crate) fn set<T>(target: &mut T, given: Option<impl Into<T>>) {
-    if let Some(given) = given {
-        *target = given.into();
-    }
-}

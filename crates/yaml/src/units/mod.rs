@@ -17,4 +17,4 @@ pub use kind::{
     TemperatureDifference, TemperatureRate, Unit, Volume,
 };
 pub use parse::{UnitError, parse, parse_with};
-pub use quantity::Quantity;
+pub use quantity::{Quantity, set};

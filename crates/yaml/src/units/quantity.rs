@@ -23,6 +23,13 @@ impl<D: Dimension> Quantity<D> {
     }
 }
 
+/// Overrides a default with the value of a file, if there is one.
+pub fn set<T>(target: &mut T, given: Option<impl Into<T>>) {
+    if let Some(given) = given {
+        *target = given.into();
+    }
+}
+
 impl<D> From<Quantity<D>> for f64 {
     /// The value in SI units, except shaft speed in rpm.
     fn from(quantity: Quantity<D>) -> f64 {

@@ -5,7 +5,7 @@ use super::structure::{NAME, OtherStructure};
 use crate::virtual_lab::{LabSettings, SettingProblem, check_range, read_settings};
 use mapper_core::BackendError;
 use mapper_physics::rig::nominal_rig::NominalRig;
-use mapper_yaml::units::{Conductance, Fraction, Length, Quantity};
+use mapper_yaml::units::{Conductance, Fraction, Length, Quantity, set};
 use serde::Deserialize;
 
 /// The keys below `structure`. All are optional.
@@ -68,28 +68,18 @@ fn read_keys(settings: &serde_json::Value, nominal: &NominalRig) -> Result<LabSe
 
 impl StructureFile {
     fn structure(&self) -> Result<OtherStructure, BackendError> {
-        let defaults = OtherStructure::default();
-        let structure = OtherStructure {
-            housing_coupling_w_k: self
-                .housing_coupling
-                .map_or(defaults.housing_coupling_w_k, |quantity| quantity.value),
-            uneven_h_ratio: self.uneven_h.map_or(defaults.uneven_h_ratio, |quantity| quantity.value),
-            mixed_gas: self.mixed_gas.unwrap_or(defaults.mixed_gas),
-            duct_length_m: self.duct_length.map_or(defaults.duct_length_m, |quantity| quantity.value),
-            duct_loss_ratio: self.duct_loss.unwrap_or(defaults.duct_loss_ratio),
-            volume_share_ratio: self
-                .volume_share
-                .map_or(defaults.volume_share_ratio, |quantity| quantity.value),
-            hysteresis_ratio: self.hysteresis.map_or(defaults.hysteresis_ratio, |quantity| quantity.value),
-            sensor_speed_ratio: self.sensor_speed.unwrap_or(defaults.sensor_speed_ratio),
-            convection_exponent_change: self
-                .convection_exponent
-                .unwrap_or(defaults.convection_exponent_change),
-            turbine_inner_ratio: self
-                .turbine_inner
-                .map_or(defaults.turbine_inner_ratio, |quantity| quantity.value),
-            turbine_efficiency_slope: self.turbine_slope.unwrap_or(defaults.turbine_efficiency_slope),
-        };
+        let mut structure = OtherStructure::default();
+        set(&mut structure.housing_coupling_w_k, self.housing_coupling);
+        set(&mut structure.uneven_h_ratio, self.uneven_h);
+        set(&mut structure.mixed_gas, self.mixed_gas);
+        set(&mut structure.duct_length_m, self.duct_length);
+        set(&mut structure.duct_loss_ratio, self.duct_loss);
+        set(&mut structure.volume_share_ratio, self.volume_share);
+        set(&mut structure.hysteresis_ratio, self.hysteresis);
+        set(&mut structure.sensor_speed_ratio, self.sensor_speed);
+        set(&mut structure.convection_exponent_change, self.convection_exponent);
+        set(&mut structure.turbine_inner_ratio, self.turbine_inner);
+        set(&mut structure.turbine_efficiency_slope, self.turbine_slope);
         for (key, value, unit, range) in [
             ("housing_coupling", structure.housing_coupling_w_k, "W/K", 0.1..=1e6),
             ("uneven_h", 100.0 * structure.uneven_h_ratio, "%", 0.0..=90.0),

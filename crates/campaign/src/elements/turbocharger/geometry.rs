@@ -1,8 +1,7 @@
 //! `machine.geometry:`, which overrides the machine of Burke et al., Appendix A, scaled to the given wheel.
 
 use crate::machine_sizes::similar_machine;
-use crate::si_values::set;
-use crate::units::{Area, Conductance, Conductivity, Inertia, Length, Mass, MassFlow, Quantity, Volume};
+use crate::units::{Area, Conductance, Conductivity, Inertia, Length, Mass, MassFlow, Quantity, Volume, set};
 use mapper_core::InletConvection;
 use mapper_physics::machine::params::Params;
 use schemars::JsonSchema;

@@ -275,12 +275,6 @@ impl<const N: usize, I: Inputs> OdeSystem<N> for DrivenSystem<'_, I> {
         let outputs = self.prepared.evaluate_on_map(&state, on_map);
         self.prepared.derivatives(&state, &outputs)
     }
-
-    fn time_derivative(&mut self, t_s: f64, y: &[f64; N], rates: &[f64; N]) -> Option<[f64; N]> {
-        let ahead_s = 1e-6;
-        let rates_ahead = self.rates(t_s + ahead_s, y);
-        Some(std::array::from_fn(|i| (rates_ahead[i] - rates[i]) / ahead_s))
-    }
 }
 
 #[cfg(test)]

@@ -12,8 +12,21 @@ pub trait OdeSystem<const N: usize> {
     /// Rates at `t_s`. Non-finite rates make the integrator retry the step with a smaller one.
     fn rates(&mut self, t_s: f64, y: &[f64; N]) -> [f64; N];
 
-    /// df/dt at fixed `y`, if the system depends on time between kinks; `None` if it does not.
-    fn time_derivative(&mut self, t_s: f64, y: &[f64; N], rates: &[f64; N]) -> Option<[f64; N]>;
+    /// Whether the rates depend on time between kinks.
+    fn depends_on_time(&self) -> bool {
+        true
+    }
+
+    /// df/dt at fixed `y`; `None` if the system does not depend on time. It is a forward difference, because there may be a kink at the
+    /// start. Inputs are linear or exponential over much longer times.
+    fn time_derivative(&mut self, t_s: f64, y: &[f64; N], rates: &[f64; N]) -> Option<[f64; N]> {
+        if !self.depends_on_time() {
+            return None;
+        }
+        let ahead_s = 1e-6;
+        let rates_ahead = self.rates(t_s + ahead_s, y);
+        Some(std::array::from_fn(|i| (rates_ahead[i] - rates[i]) / ahead_s))
+    }
 }
 
 /// Local error allowed per step.

@@ -12,8 +12,8 @@ mod rig;
 
 pub use implausible::{format_short, is_plausible};
 pub use limits::{
-    AcceptedRanges, LimitError, REQUIRED_GUARDS, SafeSettings, Target, check_range, check_resolution,
-    check_scale,
+    AcceptedRanges, LimitError, REQUIRED_GUARDS, SafeSettings, Target, WriteSettings, check_range,
+    check_resolution, check_scale,
 };
 pub use rig::{Reading, Stand, rig};
 

@@ -29,6 +29,32 @@ named_enum! {
 /// Maximum count of the heartbeat; 0 follows.
 pub(crate) const MAX_HEARTBEAT: u16 = 9999;
 
+/// Where each target is written, as the protocol gives places.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WriteSettings<T> {
+    p3: T,
+    t3: T,
+    valve: T,
+    oil_temperature: T,
+    air: T,
+    heartbeat: T,
+}
+
+impl<T> WriteSettings<T> {
+    /// The place of a target.
+    pub fn of(&self, target: Target) -> &T {
+        match target {
+            Target::P3 => &self.p3,
+            Target::T3 => &self.t3,
+            Target::Valve => &self.valve,
+            Target::OilTemperature => &self.oil_temperature,
+            Target::Air => &self.air,
+            Target::Heartbeat => &self.heartbeat,
+        }
+    }
+}
+
 /// Setpoint ranges that a rig accepts.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]

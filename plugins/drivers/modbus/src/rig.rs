@@ -128,8 +128,8 @@ impl Controller for Registers {
         let settings = &self.settings;
         self.link.write_group(WRITES_WITHIN, |link| {
             for (target, value) in values {
-                let entry = settings.register_settings(*target);
-                let registers = settings.registers(&entry, *value);
+                let entry = settings.write.of(*target);
+                let registers = settings.registers(entry, *value);
                 let registers = registers.ok_or(SettingError::DoesNotFit { value: *value })?;
                 let refused = |source| RegisterError::of_write(source, *target, *value, &registers);
                 link.write(entry.register, &registers).map_err(refused)?;

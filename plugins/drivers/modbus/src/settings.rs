@@ -3,7 +3,8 @@
 use crate::link::Table;
 use crate::registers::{NumberFormat, Order};
 use mapper_controller::{
-    AcceptedRanges, LimitError, SafeSettings, Stand, Target, check_range, check_resolution, check_scale,
+    AcceptedRanges, LimitError, SafeSettings, Stand, Target, WriteSettings, check_range, check_resolution,
+    check_scale,
 };
 use mapper_core::{BackendError, Channel};
 use mapper_yaml::units::{Duration, Frequency, Quantity};
@@ -41,7 +42,7 @@ pub(crate) struct Settings {
     #[serde(deserialize_with = "mapper_driver::by_channel")]
     pub(crate) read: BTreeMap<Channel, RegisterSettings>,
     /// Location of each setpoint.
-    pub(crate) write: WriteSettings,
+    pub(crate) write: WriteSettings<RegisterSettings>,
     /// Accepted setpoints.
     pub(crate) accepts: AcceptedRanges,
     /// The safe trajectory.
@@ -74,19 +75,6 @@ fn default_scale() -> f64 {
 
 fn holding() -> Table {
     Table::Holding
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct WriteSettings {
-    pub(crate) p3: RegisterSettings,
-    pub(crate) t3: RegisterSettings,
-    pub(crate) valve: RegisterSettings,
-    pub(crate) oil_temperature: RegisterSettings,
-    /// 1: air on, 0: off.
-    pub(crate) air: RegisterSettings,
-    /// Counts up twice a second; the controller cuts the air if it stops.
-    pub(crate) heartbeat: RegisterSettings,
 }
 
 /// Why settings are rejected.
@@ -134,18 +122,6 @@ impl Settings {
         self.timeout.as_ref().map_or(0.2, |timeout| timeout.value)
     }
 
-    /// Location of a target.
-    pub(crate) fn register_settings(&self, target: Target) -> RegisterSettings {
-        match target {
-            Target::P3 => self.write.p3,
-            Target::T3 => self.write.t3,
-            Target::Valve => self.write.valve,
-            Target::OilTemperature => self.write.oil_temperature,
-            Target::Air => self.write.air,
-            Target::Heartbeat => self.write.heartbeat,
-        }
-    }
-
     /// The stand for these settings.
     pub(crate) fn stand(&self) -> Stand {
         Stand {
@@ -170,18 +146,18 @@ impl Settings {
         self.check_read_registers()?;
         let mut used: Vec<u16> = Vec::new();
         for target in Target::ALL {
-            let (path, entry) = (format!("write.{}", target.name()), self.register_settings(target));
+            let (path, entry) = (format!("write.{}", target.name()), self.write.of(target));
             if entry.table != Table::Holding {
                 return Err(settings_error(format!("{path}.table"), SettingError::NotWritten));
             }
-            self.check_register(&path, &entry)?;
+            self.check_register(&path, entry)?;
             let range = self.accepts.range(target);
             if entry.form.is_whole() {
                 check_resolution(target, entry.scale, range)
                     .map_err(|error| settings_error(path.clone(), error.into()))?;
             }
             for value in [range.low, range.high] {
-                if self.registers(&entry, value).is_none() {
+                if self.registers(entry, value).is_none() {
                     return Err(settings_error(path, SettingError::DoesNotFit { value }));
                 }
             }
@@ -206,8 +182,7 @@ impl Settings {
                 {
                     return Err(at(SettingError::ReadTwice { register, other }));
                 }
-                let goes_to =
-                    |target: &Target| self.register_settings(*target).registers().contains(&register);
+                let goes_to = |target: &Target| self.write.of(*target).registers().contains(&register);
                 if let Some(target) =
                     Target::ALL.into_iter().find(goes_to).filter(|_| entry.table == Table::Holding)
                 {

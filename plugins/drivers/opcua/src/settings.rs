@@ -1,6 +1,8 @@
 //! The settings of the driver as a campaign writes them below `opcua`.
 
-use mapper_controller::{AcceptedRanges, LimitError, SafeSettings, Stand, Target, check_range, check_scale};
+use mapper_controller::{
+    AcceptedRanges, LimitError, SafeSettings, Stand, Target, WriteSettings, check_range, check_scale,
+};
 use mapper_core::{BackendError, Channel, Dimension};
 use mapper_driver::{SecretError, secret};
 use mapper_yaml::units::{Duration, Frequency, Kind, Quantity};
@@ -41,7 +43,7 @@ pub(crate) struct Settings {
     #[serde(deserialize_with = "mapper_driver::by_channel")]
     pub(crate) read: BTreeMap<Channel, NodeSettings>,
     /// Location of each setpoint.
-    pub(crate) write: WriteSettings,
+    pub(crate) write: WriteSettings<NodeSettings>,
     /// Accepted setpoints.
     pub(crate) accepts: AcceptedRanges,
     /// The safe trajectory.
@@ -99,19 +101,6 @@ fn node_id<'de, D: serde::Deserializer<'de>>(from: D) -> Result<NodeId, D::Error
             format!("`{text}` is not a node id; they are written as ns=2;s=Stand.P3 or ns=3;i=1001");
         serde::de::Error::custom(message)
     })
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct WriteSettings {
-    p3: NodeSettings,
-    t3: NodeSettings,
-    valve: NodeSettings,
-    oil_temperature: NodeSettings,
-    /// 1 or true: air on.
-    air: NodeSettings,
-    /// Counts up twice a second; the controller cuts the air if it stops.
-    heartbeat: NodeSettings,
 }
 
 /// Why settings are rejected.
@@ -252,18 +241,17 @@ impl Settings {
             if let Some((other, ..)) = reads.iter().find(|(_, other_node, _)| *other_node == node) {
                 return Err(at(SettingError::ReadTwice { node, other: *other }));
             }
-            if let Some(target) =
-                Target::ALL.into_iter().find(|target| self.write.node(*target).0.node == node)
-            {
+            if let Some(target) = Target::ALL.into_iter().find(|target| self.write.of(*target).node == node) {
                 return Err(at(SettingError::ReadsSetpoint { node, key: target.name() }));
             }
             reads.push((*channel, node, scale));
         }
         let mut writes: BTreeMap<Target, (NodeId, Scale)> = BTreeMap::new();
         for target in Target::ALL {
-            let (entry, unit_channel) = self.write.node(target);
+            let entry = self.write.of(target);
             let path = format!("write.{}", target.name());
-            let scale = entry.scale(unit_channel).map_err(|error| settings_error(path.clone(), error))?;
+            let scale =
+                entry.scale(unit_channel(target)).map_err(|error| settings_error(path.clone(), error))?;
             if writes.values().any(|(node, _)| *node == entry.node) {
                 return Err(settings_error(path, SettingError::Shared(entry.node.clone())));
             }
@@ -292,17 +280,13 @@ impl Settings {
     }
 }
 
-impl WriteSettings {
-    /// Location of a target, and the channel that defines its permitted units.
-    fn node(&self, target: Target) -> (&NodeSettings, Channel) {
-        match target {
-            Target::P3 => (&self.p3, Channel::P3),
-            Target::T3 => (&self.t3, Channel::T3),
-            Target::Valve => (&self.valve, Channel::ValveCommand),
-            Target::OilTemperature => (&self.oil_temperature, Channel::TOil),
-            Target::Air => (&self.air, Channel::ValveCommand),
-            Target::Heartbeat => (&self.heartbeat, Channel::ValveCommand),
-        }
+/// The channel that defines the permitted units of a target.
+fn unit_channel(target: Target) -> Channel {
+    match target {
+        Target::P3 => Channel::P3,
+        Target::T3 => Channel::T3,
+        Target::OilTemperature => Channel::TOil,
+        Target::Valve | Target::Air | Target::Heartbeat => Channel::ValveCommand,
     }
 }
 

@@ -2,26 +2,17 @@
 
 use std::path::PathBuf;
 
-/// Why a developer command failed.
+/// Why a developer command failed; [`Display`](std::fmt::Display) describes the variants.
 #[derive(Debug)]
 pub enum Error {
-    /// A program could not be started.
     Start { command: String, source: std::io::Error },
-    /// A program ended with an error; it has printed the reason.
     Failed { command: String },
-    /// A program that the tests need is missing, and this process may not install it.
     Missing { what: &'static str, used_for: &'static str, install: String },
-    /// The installed Python is too old for the packages.
     OldPython { found: String, needed: &'static str },
-    /// A file could not be read or written.
     File { path: PathBuf, source: std::io::Error },
-    /// Some steps failed; each has printed the reason.
     Steps { failed: Vec<&'static str> },
-    /// The compiler or clippy printed warnings.
     Warnings { count: usize },
-    /// Required tests were skipped.
     LeftOut { count: usize },
-    /// Generated documents are out of date.
     Stale { differences: Vec<String> },
 }
 

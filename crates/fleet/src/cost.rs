@@ -89,7 +89,7 @@ impl Fleet {
                 .unwrap_or_default();
         }
         let status = self.status();
-        let cost = self.cost(&status).ok_or(FleetError::UnknownCost { why: reason })?;
+        let cost = self.cost(&status).ok_or(FleetError::UnknownCost(reason))?;
         Ok(CostEstimate { cost, status })
     }
 }

@@ -93,7 +93,7 @@ impl Fleet {
         self.check_not_queued()?;
         let status = self.status();
         let limits = &options.limits;
-        let refused = |why: String| Err(FleetError::DoesNotFit { why });
+        let refused = |why: String| Err(FleetError::DoesNotFit(why));
         if let Some(hours) = limits.hours.filter(|hours| cost.left_hours > *hours) {
             return refused(format!(
                 "the remaining items take {:.2} processor hours, the limit is {hours}; raise the limit or make the study smaller",
@@ -178,7 +178,7 @@ impl Fleet {
     pub fn submission(&self) -> Result<Submission, FleetError> {
         let path = self.directory().join(SUBMITTED);
         if !path.exists() {
-            return Err(FleetError::NotSubmitted { directory: self.directory().to_owned() });
+            return Err(FleetError::NotSubmitted(self.directory().to_owned()));
         }
         let bytes = read_at_most(&path, 1 << 20)?;
         serde_json::from_slice(&bytes).map_err(FleetError::content(&path, "a submission"))

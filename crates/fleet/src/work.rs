@@ -96,7 +96,7 @@ impl Fleet {
             ItemSelection::Shard(shard) => items.filter(|item| shard.holds(&item.hash)).collect(),
             ItemSelection::Item(hash) => {
                 let found = self.study.items.iter().find(|item| item.hash == hash);
-                vec![found.ok_or(FleetError::NoItem { hash })?]
+                vec![found.ok_or(FleetError::NoItem(hash))?]
             }
         };
         if let ItemSelection::First(_) = selection {

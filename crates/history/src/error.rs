@@ -14,11 +14,8 @@ pub enum HistoryError {
         source: std::io::Error,
     },
     /// The file does not exist, and only reading was requested.
-    #[error("there is no history at {}; run a nightly campaign to make one, or name another file", .path.display())]
-    Missing {
-        /// The file.
-        path: PathBuf,
-    },
+    #[error("there is no history at {}; run a nightly campaign to make one, or name another file", .0.display())]
+    Missing(PathBuf),
     /// The file is a database of something else, or of a newer program.
     #[error("{} is not a history that this program can read: {reason}; name another file", .path.display())]
     Foreign {
@@ -28,11 +25,8 @@ pub enum HistoryError {
         reason: String,
     },
     /// The file, or its directory, cannot be written.
-    #[error("the history {} cannot be written; check the permissions, or name another file", .path.display())]
-    ReadOnly {
-        /// The file.
-        path: PathBuf,
-    },
+    #[error("the history {} cannot be written; check the permissions, or name another file", .0.display())]
+    ReadOnly(PathBuf),
     /// Any other error of SQLite.
     #[error("the history {} cannot be used: {source}", .path.display())]
     Sqlite {

@@ -108,7 +108,7 @@ impl History {
         });
         match writable {
             Err(HistoryError::Sqlite { path, source }) if is_read_only(&source) => {
-                Err(HistoryError::ReadOnly { path })
+                Err(HistoryError::ReadOnly(path))
             }
             writable => writable.map(|()| history),
         }
@@ -120,7 +120,7 @@ impl History {
     /// [`HistoryError::Missing`] if there is none, otherwise as [`History::open`].
     pub fn open_existing(path: &Path) -> Result<History, HistoryError> {
         if !path.exists() {
-            return Err(HistoryError::Missing { path: path.to_owned() });
+            return Err(HistoryError::Missing(path.to_owned()));
         }
         check_plain(path)?;
         // A WAL database may need its side files to be created even for reading, so a read-only connection would fail after a crash.

@@ -247,13 +247,13 @@ fn a_history_that_cannot_be_written_is_read_and_refuses_a_night_beforehand() {
     let written = History::open(&path).map(drop);
     mode(path.parent().unwrap(), 0o755);
     assert_eq!(read.unwrap().len(), 4);
-    assert!(!bound || matches!(written, Err(HistoryError::ReadOnly { .. })), "{written:?}");
+    assert!(!bound || matches!(written, Err(HistoryError::ReadOnly(_))), "{written:?}");
 }
 
 #[test]
 fn what_is_no_history_is_refused_and_left_alone() {
     let (scratch, path) = scratch();
-    assert!(matches!(History::open_existing(&path), Err(HistoryError::Missing { .. })));
+    assert!(matches!(History::open_existing(&path), Err(HistoryError::Missing(_))));
     let text = scratch.path().join("notes.txt");
     std::fs::write(&text, "not a database, but long enough to be looked at as one, surely".repeat(20))
         .unwrap();

@@ -38,13 +38,10 @@ const POINT_FIELDS: [(&str, &str, &str); 9] = [
 pub enum FoxgloveStreamError {
     /// The address is not a local one.
     #[error(
-        "`{text}` is not a local address, such as 127.0.0.1:8765, which is required because Foxglove sends no token; other computers can connect \
+        "`{0}` is not a local address, such as 127.0.0.1:8765, which is required because Foxglove sends no token; other computers can connect \
          by a tunnel (`ssh -L 8765:127.0.0.1:8765 STAND`)"
     )]
-    Address {
-        /// The given text.
-        text: String,
-    },
+    Address(String),
     /// The library cannot serve.
     #[error("the Foxglove stream cannot be served at {address}: {source}; choose another address")]
     Serve {
@@ -75,7 +72,7 @@ impl FoxgloveStream {
         start_time_ns: u64,
         channels: &[Channel],
     ) -> Result<FoxgloveStream, FoxgloveStreamError> {
-        let not_local = || FoxgloveStreamError::Address { text: text.to_owned() };
+        let not_local = || FoxgloveStreamError::Address(text.to_owned());
         let mut address: SocketAddr = text.parse().map_err(|_| not_local())?;
         if !address.ip().is_loopback() {
             return Err(not_local());

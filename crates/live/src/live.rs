@@ -36,7 +36,7 @@ impl Live {
         let tls = tls.map(read).transpose()?;
         let port_alone = text.parse::<u16>().map(|port| SocketAddr::from((Ipv4Addr::LOCALHOST, port)));
         let address: SocketAddr =
-            port_alone.or_else(|_| text.parse()).map_err(|_| LiveError::Address { text: text.to_owned() })?;
+            port_alone.or_else(|_| text.parse()).map_err(|_| LiveError::Address(text.to_owned()))?;
         let listen = |source| LiveError::Listen { address, source };
         let listener = TcpListener::bind(address).map_err(listen)?;
         let address = listener.local_addr().map_err(listen)?;

@@ -8,12 +8,9 @@ use std::net::SocketAddr;
 pub enum LiveError {
     /// The address is invalid.
     #[error(
-        "`{text}` is not an address; write a port, e.g. 7373, or 127.0.0.1:7373, or 0.0.0.0:7373 for other machines too"
+        "`{0}` is not an address; write a port, e.g. 7373, or 127.0.0.1:7373, or 0.0.0.0:7373 for other machines too"
     )]
-    Address {
-        /// The given text.
-        text: String,
-    },
+    Address(String),
     /// The address is not available.
     #[error("the live page cannot be served at {address}: {source}; choose another address")]
     Listen {

@@ -1,8 +1,8 @@
 //! Assembles a compressor map from identified points.
 
+use crate::AssembleError;
 use crate::grouping::{Group, group_by_speed};
 use crate::repeats::points_for_map;
-use crate::{AssembleError, Grouping};
 use mapper_core::{
     CompressorMap, IdentifiedPoint, MapPoint, Method, ReferenceState, SpeedLine, SpeedShift, Verdict,
 };
@@ -15,33 +15,28 @@ use mapper_physics::compressor_map::similarity::at_speed;
 /// [`MapPoint::shift`], the measured point in [`MapPoint::identified`].
 ///
 /// Points with a target form a line per target speed; points without one are grouped by gaps in corrected speed
-/// ([`Grouping`]). Lines come in order of mean corrected speed, their points in order of corrected flow (then of
+/// (`grouping.rs`). Lines come in order of mean corrected speed, their points in order of corrected flow (then of
 /// falling pressure ratio, for the vertical part at choke). Repeats for the detection of
-/// drift are left out unless the point itself has no efficiency ([`points_for_map`](crate::points_for_map)). An unusable point keeps
+/// drift are left out unless the point itself has no efficiency (`repeats.rs`). An unusable point keeps
 /// flow and pressure ratio, without `eta`.
 ///
 /// `reference` is the reference state of the points' corrected quantities, `method` the method that identified all of them.
 ///
 /// # Errors
 /// [`AssembleError`]: no points; a point whose corrected flow, corrected speed or pressure ratio is not finite;
-/// points of another method; an unusable `grouping`.
+/// points of another method.
 pub fn assemble(
     points: &[IdentifiedPoint],
     machine: &str,
     reference: ReferenceState,
     method: Method,
-    grouping: Grouping,
 ) -> Result<CompressorMap, AssembleError> {
-    let gap = grouping.speed_gap_ratio;
-    if !(gap > 0.0 && gap < 1.0) {
-        return Err(AssembleError::SpeedGap { speed_gap_ratio: gap });
-    }
     let points = &points_for_map(points);
     if points.is_empty() {
         return Err(AssembleError::NoPoints);
     }
     points.iter().try_for_each(|point| check_point(point, method))?;
-    let mut lines: Vec<SpeedLine> = group_by_speed(points, &grouping).iter().map(line_of_group).collect();
+    let mut lines: Vec<SpeedLine> = group_by_speed(points).iter().map(line_of_group).collect();
     lines.sort_by(|a, b| a.speed_corrected_rpm.total_cmp(&b.speed_corrected_rpm));
     Ok(CompressorMap {
         machine: machine.to_owned(),

@@ -37,10 +37,4 @@ pub enum AssembleError {
         /// Method of the point.
         found: Method,
     },
-    /// The gap between speed lines is out of range.
-    #[error("the speed gap is {speed_gap_ratio}; it must be above 0 and below 1, e.g. 0.04")]
-    SpeedGap {
-        /// The gap, ratio.
-        speed_gap_ratio: f64,
-    },
 }

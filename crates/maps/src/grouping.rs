@@ -2,21 +2,9 @@
 
 use mapper_core::IdentifiedPoint;
 
-/// Rule that assigns points without a target speed to speed lines.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Grouping {
-    /// Minimum gap between neighbouring lines in order of corrected speed, as a ratio of the slower one; above 0, below 1.
-    ///
-    /// The default of 4 % separates lines of maps, which are at least 8 % apart, from the variation within one: 1 % with speed control, and
-    /// some 2 % without.
-    pub speed_gap_ratio: f64,
-}
-
-impl Default for Grouping {
-    fn default() -> Self {
-        Grouping { speed_gap_ratio: 0.04 }
-    }
-}
+/// Minimum gap between neighbouring lines of points without a target speed, as a ratio of the slower corrected speed. It separates lines of
+/// maps, which are at least 8 % apart, from the variation within one: 1 % with speed control, and some 2 % without.
+const SPEED_GAP_RATIO: f64 = 0.04;
 
 /// Points of one line in their original order, with their common target.
 pub(crate) struct Group<'a> {
@@ -25,7 +13,7 @@ pub(crate) struct Group<'a> {
 }
 
 /// Groups points with a target by its speed, and all others by gaps in corrected speed. Every point is in exactly one group.
-pub(crate) fn group_by_speed<'a>(points: &'a [IdentifiedPoint], grouping: &Grouping) -> Vec<Group<'a>> {
+pub(crate) fn group_by_speed(points: &[IdentifiedPoint]) -> Vec<Group<'_>> {
     let (mut with_target, mut without_target): (Vec<_>, Vec<_>) =
         points.iter().partition(|point| target_speed_rpm(point).is_some());
     // Stable sorts: equal points stay in the order of measurement.
@@ -43,7 +31,7 @@ pub(crate) fn group_by_speed<'a>(points: &'a [IdentifiedPoint], grouping: &Group
         group.target_speed_rpm = group.points.first().and_then(|point| target_speed_rpm(point));
     }
     groups.extend(split(without_target, |a, b| {
-        b.speed_corrected_rpm - a.speed_corrected_rpm > grouping.speed_gap_ratio * a.speed_corrected_rpm.abs()
+        b.speed_corrected_rpm - a.speed_corrected_rpm > SPEED_GAP_RATIO * a.speed_corrected_rpm.abs()
     }));
     groups
 }

@@ -7,7 +7,7 @@ use mapper_core::{IdentifiedPoint, StepKind, Verdict};
 /// A point without a usable efficiency is replaced by the repeat of the same target with the best verdict and, among these, the smallest
 /// 95 % interval. The first point of a campaign has no jump before it, so only the joint method gives it an efficiency. If it is visited
 /// again for that reason, the better visit by the same rule counts: a mean would claim too small an interval, since the visits share errors.
-pub fn points_for_map(points: &[IdentifiedPoint]) -> Vec<IdentifiedPoint> {
+pub(crate) fn points_for_map(points: &[IdentifiedPoint]) -> Vec<IdentifiedPoint> {
     let repeats = || {
         points.iter().filter(|point| point.kind != StepKind::Point && point.target.is_some() && usable(point))
     };

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_core::{CommonErrors, IdentifiedPoint, Method, OperatingPoint, ReferenceState, StepKind, Verdict};
-use mapper_maps::{AssembleError, Grouping, assemble};
+use mapper_maps::{AssembleError, assemble};
 use proptest::prelude::*;
 
 fn point(
@@ -44,7 +44,7 @@ fn point(
 }
 
 fn make(points: &[IdentifiedPoint]) -> Result<mapper_core::CompressorMap, AssembleError> {
-    assemble(points, "turbo_a", ReferenceState::SAE, Method::Dynamic, Grouping::default())
+    assemble(points, "turbo_a", ReferenceState::SAE, Method::Dynamic)
 }
 
 prop_compose! {
@@ -144,14 +144,6 @@ fn points_that_make_no_map_are_refused_with_a_reason() {
     let mut other = point(4, None, 5e4, 0.03);
     other.method = Method::Steady;
     assert!(matches!(make(&[other]), Err(AssembleError::MixedMethods { step: 4, .. })));
-    let wide = assemble(
-        &[point(0, None, 5e4, 0.03)],
-        "",
-        ReferenceState::SAE,
-        Method::Dynamic,
-        Grouping { speed_gap_ratio: f64::NAN },
-    );
-    assert!(matches!(wide, Err(AssembleError::SpeedGap { .. })));
 }
 
 proptest! {

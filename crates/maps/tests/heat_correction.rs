@@ -90,7 +90,7 @@ fn what_shows_no_heat_is_refused_with_what_to_do() {
     let refused = |map, heat| correct_for_heat(map, heat).unwrap_err();
     let mut joint = map_of(&rows_of(&euler(&SPEEDS_KRPM, 30.0)));
     joint.method = Method::Joint;
-    assert!(matches!(refused(joint, None), HeatCorrectionError::Adiabatic { .. }));
+    assert!(matches!(refused(joint, None), HeatCorrectionError::Adiabatic(_)));
     let two = map_of(&rows_of(&euler(&[50.0, 100.0], 30.0)));
     assert!(matches!(refused(two, None), HeatCorrectionError::TooFew { lines: 2, .. }));
     let near = map_of(&rows_of(&euler(&[100.0, 110.0, 120.0, 130.0], 30.0)));

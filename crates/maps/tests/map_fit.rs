@@ -172,7 +172,7 @@ fn a_map_that_cannot_be_fitted_is_refused_with_a_reason() {
         map.lines.iter_mut().for_each(|line| line.points.truncate(points));
         MapFit::new(&map).map(|_| ())
     };
-    assert!(matches!(few(1, 7), Err(MapFitError::TooFewLines { lines: 1 })));
+    assert!(matches!(few(1, 7), Err(MapFitError::TooFewLines(1))));
     assert!(matches!(few(2, 3), Err(MapFitError::TooFewPoints { points: 6, .. })));
     let mut flat = turbo_a(0.0, 1);
     flat.lines[2].points.iter_mut().for_each(|p| p.identified.pressure_ratio = 0.9);

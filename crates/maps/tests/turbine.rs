@@ -108,5 +108,5 @@ fn a_table_has_every_line_and_few_points_are_refused() {
     assert!(fitted.lines.iter().flat_map(|line| &line.nodes).all(|node| node.flow_low < node.flow_high));
     assert!(fitted.flow_error_rms_ratio < 0.01);
     let few = TurbineMap { points: map.points[..2].to_vec(), ..map };
-    assert_eq!(TurbineFit::new(&few).unwrap_err(), TurbineFitError::TooFewPoints { points: 2 });
+    assert_eq!(TurbineFit::new(&few).unwrap_err(), TurbineFitError::TooFewPoints(2));
 }

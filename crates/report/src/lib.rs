@@ -64,7 +64,7 @@ pub use plan::plan_remark_text::{guard_trip_text, plan_remark_text};
 pub use plan::plan_text::plan_text;
 pub use plan::speed_lines_text::lines_text;
 pub use plan::verdict_forecast_text::verdict_forecast_text;
-pub use point_results::budget_table::{BUDGET_COLUMNS, budget_rows};
+pub use point_results::budget_table::budget_csv;
 pub use point_results::disagreement::disagreement_text;
 pub use point_results::end_readings::{END_S, at_end};
 pub use point_results::lines_of_points::{first_doubts_text, points_by_line_text, verdict_sentence};

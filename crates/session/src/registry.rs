@@ -55,7 +55,7 @@ impl Default for Registry {
 }
 
 fn no_effect(path: &Path) -> Result<Arc<dyn Effect>, SessionError> {
-    Err(SessionError::EffectFilesUnsupported { path: path.to_owned() })
+    Err(SessionError::EffectFilesUnsupported(path.to_owned()))
 }
 
 impl Registry {

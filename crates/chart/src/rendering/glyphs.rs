@@ -15,8 +15,6 @@ pub(crate) struct Fonts {
 }
 
 impl Fonts {
-    /// # Errors
-    /// If the built-in font cannot be parsed: a fault of the build.
     pub(crate) fn new() -> Result<Self, ttf_parser::FaceParsingError> {
         let regular = Face::parse(dejavu::sans::regular(), 0)?;
         Ok(Fonts { regular, bold: Face::parse(dejavu::sans::bold(), 0)? })

@@ -27,11 +27,8 @@ pub enum PngError {
         height: f64,
     },
     /// The encoder failed.
-    #[error("failed to encode the picture: {source}")]
-    Encode {
-        /// Error.
-        source: Box<dyn std::error::Error + Send + Sync>,
-    },
+    #[error("failed to encode the picture: {0}")]
+    Encode(#[source] Box<dyn std::error::Error + Send + Sync>),
 }
 
 impl Figure {
@@ -41,7 +38,7 @@ impl Figure {
     /// [`PngError`].
     pub fn to_png(&self, scale: f32) -> Result<Vec<u8>, PngError> {
         let pixels = render(&crate::rendering::draw::draw_figure(self), scale)?;
-        pixels.encode_png().map_err(|error| PngError::Encode { source: Box::new(error) })
+        pixels.encode_png().map_err(|error| PngError::Encode(Box::new(error)))
     }
 }
 

@@ -101,7 +101,7 @@ impl Failure {
 
     /// The live page is not available.
     pub fn of_live(error: LiveError) -> Self {
-        let code = if matches!(error, LiveError::Address { .. }) { Code::BadInput } else { Code::Failure };
+        let code = if matches!(error, LiveError::Address(_)) { Code::BadInput } else { Code::Failure };
         let command = matches!(error, LiveError::Listen { .. }).then(|| "`--live=ADDRESS`".to_owned());
         Failure::with_command(code, &error, command)
     }
@@ -185,7 +185,7 @@ impl From<SessionError> for Failure {
             ErrorKind::Interrupted => Code::Interrupted,
         };
         match error {
-            SessionError::Exists { .. } if output_options::has_force() => {
+            SessionError::Exists(_) if output_options::has_force() => {
                 Failure::new(code, format!("{error}, or replace it with `--force`"))
             }
             SessionError::Campaign(error) => Failure::of_campaign(error),
@@ -214,9 +214,7 @@ impl From<BlindError> for Failure {
 impl From<FleetError> for Failure {
     fn from(error: FleetError) -> Self {
         let code = match &error {
-            FleetError::File { .. } | FleetError::Queue { .. } | FleetError::UnknownCost { .. } => {
-                Code::Failure
-            }
+            FleetError::File { .. } | FleetError::Queue { .. } | FleetError::UnknownCost(_) => Code::Failure,
             FleetError::Interrupted => Code::Interrupted,
             _ => Code::BadInput,
         };

@@ -29,7 +29,7 @@ pub fn command_for(error: &E) -> Option<String> {
         E::UnknownOutputFormat { .. } => "`--to FORMAT`",
         E::FirstMap(error) if matches!(**error, FirstMapError::NotAMap { .. }) => "`mapper map convert`",
         E::Fmu(FmuExportError::Platform | FmuExportError::Compiler { .. }) => "without `--compile`",
-        E::MapWork(MapWorkError::NotMeasured { .. }) => "`mapper map inspect`",
+        E::MapWork(MapWorkError::NotMeasured(_)) => "`mapper map inspect`",
         E::MapWork(MapWorkError::NotCorrected {
             source: Heat::TooFew { .. } | Heat::OneSpeed { .. } | Heat::Singular,
             ..
@@ -42,8 +42,8 @@ pub fn command_for(error: &E) -> Option<String> {
             _ => return None,
         },
         E::Export(ExportError::NeedsFit { .. }) => "`mapper map fit FILE --out NEW`",
-        E::History(HistoryError::Missing { .. }) => "`mapper nightly`, or `--db FILE`",
-        E::History(HistoryError::Foreign { .. } | HistoryError::ReadOnly { .. }) => "`--db FILE`",
+        E::History(HistoryError::Missing(_)) => "`mapper nightly`, or `--db FILE`",
+        E::History(HistoryError::Foreign { .. } | HistoryError::ReadOnly(_)) => "`--db FILE`",
         _ => return None,
     };
     Some(fixed.to_owned())
@@ -52,12 +52,12 @@ pub fn command_for(error: &E) -> Option<String> {
 /// As [`command_for`], for an error of a fleet directory.
 pub fn fleet_command_for(error: &FleetError) -> Option<String> {
     Some(match error {
-        FleetError::NoStudy { .. } | FleetError::Changed { .. } => {
+        FleetError::NoStudy(_) | FleetError::Changed(_) => {
             "`mapper fleet make STUDY.yaml --out DIR`".to_owned()
         }
-        FleetError::NoItem { .. } => "`mapper fleet status DIR --items`".to_owned(),
+        FleetError::NoItem(_) => "`mapper fleet status DIR --items`".to_owned(),
         FleetError::NothingLeft { directory, .. } => format!("`mapper fleet merge {}`", directory.display()),
-        FleetError::NotSubmitted { .. } => "`mapper fleet submit`".to_owned(),
+        FleetError::NotSubmitted(_) => "`mapper fleet submit`".to_owned(),
         FleetError::StillQueued { .. } => "`mapper fleet retry`".to_owned(),
         _ => return None,
     })

@@ -30,11 +30,8 @@ pub enum FleetError {
         source: serde_json::Error,
     },
     /// The directory has no study.
-    #[error("there is no study in {}; make one", .directory.display())]
-    NoStudy {
-        /// The directory.
-        directory: PathBuf,
-    },
+    #[error("there is no study in {}; make one", .0.display())]
+    NoStudy(PathBuf),
     /// The directory has the layout of another program.
     #[error("{} has layout {found}; this program reads {known}", .path.display())]
     Layout {
@@ -93,29 +90,17 @@ pub enum FleetError {
         second: String,
     },
     /// An item's file was changed.
-    #[error("{} has been changed: its hash differs from its name; make the study again", .path.display())]
-    Changed {
-        /// The file.
-        path: PathBuf,
-    },
+    #[error("{} has been changed: its hash differs from its name; make the study again", .0.display())]
+    Changed(PathBuf),
     /// An item that the study does not have.
-    #[error("the study has no item {hash}; choose one from its list of items")]
-    NoItem {
-        /// The requested item.
-        hash: Hash,
-    },
+    #[error("the study has no item {0}; choose one from its list of items")]
+    NoItem(Hash),
     /// The cost of an item is unknown.
-    #[error("the cost is unknown, because every item so far has failed; the first failed with: {why}")]
-    UnknownCost {
-        /// The cause.
-        why: String,
-    },
-    /// The study does not fit.
-    #[error("not submitted: {why}")]
-    DoesNotFit {
-        /// What does not fit, with numbers and the remedy.
-        why: String,
-    },
+    #[error("the cost is unknown, because every item so far has failed; the first failed with: {0}")]
+    UnknownCost(String),
+    /// The study does not fit: what, with numbers and the remedy.
+    #[error("not submitted: {0}")]
+    DoesNotFit(String),
     /// No item is left to do.
     #[error("all {items} items are done; merge the study {}", .directory.display())]
     NothingLeft {
@@ -125,11 +110,8 @@ pub enum FleetError {
         directory: PathBuf,
     },
     /// A retry without an earlier submission.
-    #[error("{} has not been submitted yet; submit it", .directory.display())]
-    NotSubmitted {
-        /// The directory.
-        directory: PathBuf,
-    },
+    #[error("{} has not been submitted yet; submit it", .0.display())]
+    NotSubmitted(PathBuf),
     /// Tasks of an earlier submission are still in the queue.
     #[error(
         "{} is already in the queue: job {job} has {tasks} waiting or running tasks; wait until they end, or cancel the job, and then retry",

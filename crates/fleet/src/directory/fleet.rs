@@ -24,7 +24,7 @@ impl Fleet {
     pub fn open(directory: &Path, program: &str) -> Result<Fleet, FleetError> {
         let path = directory.join(STUDY);
         if !path.exists() {
-            return Err(FleetError::NoStudy { directory: directory.to_owned() });
+            return Err(FleetError::NoStudy(directory.to_owned()));
         }
         let study = Study::read(&path)?;
         if study.program != program {

@@ -41,7 +41,7 @@ impl Item {
     pub fn read(path: &Path, hash: &Hash) -> Result<Item, FleetError> {
         let bytes = read_at_most(path, MAX_FILE_BYTES)?;
         if Hash::of(&bytes) != *hash {
-            return Err(FleetError::Changed { path: path.to_owned() });
+            return Err(FleetError::Changed(path.to_owned()));
         }
         serde_json::from_slice(&bytes).map_err(FleetError::content(path, "an item"))
     }

@@ -85,7 +85,7 @@ fn existing_items(study: &StudyFile, directory: &Path, program: &str) -> Result<
             found: found.name,
             kind: found.kind,
         }),
-        Err(FleetError::NoStudy { .. }) => Ok(BTreeSet::new()),
+        Err(FleetError::NoStudy(_)) => Ok(BTreeSet::new()),
         Err(error) => Err(error),
     }
 }

@@ -60,7 +60,7 @@ pub fn correct_for_heat(
     given_w: Option<f64>,
 ) -> Result<(CompressorMap, HeatCorrection), HeatCorrectionError> {
     if matches!(map.method, Method::Dynamic | Method::Joint | Method::Corrected) {
-        return Err(HeatCorrectionError::Adiabatic { method: map.method });
+        return Err(HeatCorrectionError::Adiabatic(map.method));
     }
     let points = work_points(&map);
     let estimate = match given_w {

@@ -6,11 +6,8 @@ use mapper_core::Method;
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum HeatCorrectionError {
     /// The efficiencies contain no heat.
-    #[error("the map was identified by the {method} method: its efficiencies already exclude heat")]
-    Adiabatic {
-        /// The method.
-        method: Method,
-    },
+    #[error("the map was identified by the {0} method: its efficiencies already exclude heat")]
+    Adiabatic(Method),
     /// Too few points or lines.
     #[error(
         "{points} points on {lines} speed lines have an efficiency and lie outside choke; estimating the heat takes at least 8 points on 3 lines; measure more, \

@@ -4,11 +4,8 @@
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MapFitError {
     /// Fewer than two distinguishable speeds.
-    #[error("the map has {lines} speed line(s) with points; a fit over speed needs at least 2")]
-    TooFewLines {
-        /// Lines with usable points.
-        lines: usize,
-    },
+    #[error("the map has {0} speed line(s) with points; a fit over speed needs at least 2")]
+    TooFewLines(usize),
     /// Too few points to determine the lines.
     #[error(
         "the map has {points} points and {with_eta} efficiencies; a fit needs at least 8 and 6, preferably 5 or more on each line"

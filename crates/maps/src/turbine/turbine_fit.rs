@@ -49,11 +49,8 @@ const NODES: usize = 21;
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum TurbineFitError {
     /// Too few points.
-    #[error("the turbine map has {points} points; a fit needs at least 4, on lines of different speed")]
-    TooFewPoints {
-        /// Number of points.
-        points: usize,
-    },
+    #[error("the turbine map has {0} points; a fit needs at least 4, on lines of different speed")]
+    TooFewPoints(usize),
 }
 
 /// A fitted turbine map.
@@ -113,7 +110,7 @@ impl TurbineFit {
             }
             ends.extend(line_ends(points));
         }
-        let too_few = TurbineFitError::TooFewPoints { points: flow.len() };
+        let too_few = TurbineFitError::TooFewPoints(flow.len());
         if flow.len() < MIN_POINTS {
             return Err(too_few);
         }

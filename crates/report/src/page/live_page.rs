@@ -8,7 +8,7 @@ use crate::page::shell::{Purpose, shell};
 use mapper_campaign::Campaign;
 use mapper_campaign::units::Kind;
 use mapper_core::{IdentifiedPoint, Plan};
-use mapper_maps::{Grouping, assemble};
+use mapper_maps::assemble;
 use serde::Serialize;
 
 /// Initial data of the script.
@@ -77,7 +77,7 @@ pub fn target_line_name(speed_rpm: f64, campaign: &Campaign, display: &Display) 
 pub fn live_map(points: &[IdentifiedPoint], campaign: &Campaign, display: &Display) -> LiveMap {
     let Some(first) = points.first() else { return LiveMap::default() };
     let (machine, reference) = (&campaign.machine.name, campaign.reference);
-    let map = assemble(points, machine, reference, first.method, Grouping::default());
+    let map = assemble(points, machine, reference, first.method);
     LiveMap(map.map(|map| drawn_map(&map, display)).unwrap_or_default())
 }
 

@@ -26,9 +26,6 @@ const DWELL_S: f64 = 300.0;
 const SOAK_S: f64 = 1800.0;
 
 /// All permitted experiments.
-///
-/// # Errors
-/// As [`PlanInputs::of`].
 pub(crate) fn experiments(
     registry: &Registry,
     campaign: &Campaign,

@@ -17,7 +17,7 @@ use mapper_identify::{
     FoundFault, IdentifyConfig, NominalRig, TwoParameter, ZeroOutcome, ZeroSettings, identify_recording,
     isothermal_zero, method_for, with_measured_humidity,
 };
-use mapper_maps::{AssembleError, Grouping, RepeatedJump, assemble, repeated_jumps};
+use mapper_maps::{AssembleError, RepeatedJump, assemble, repeated_jumps};
 use mapper_observe::FusedChannel;
 use mapper_observe::energy_balance::Gases;
 use mapper_physics::gas::air::Air;
@@ -125,13 +125,10 @@ impl Identified {
     pub fn has_points(&self, warnings: &[String]) -> Result<(), SessionError> {
         let why: Vec<String> =
             warnings.iter().cloned().chain(self.remarks.iter().map(result_remark_text)).collect();
-        if self.points.is_empty() { Err(SessionError::NoPoints { why: why.join("; ") }) } else { Ok(()) }
+        if self.points.is_empty() { Err(SessionError::NoPoints(why.join("; "))) } else { Ok(()) }
     }
 
     /// The map of the points with map coordinates: the others are left out.
-    ///
-    /// # Errors
-    /// As [`assemble`].
     pub(crate) fn map(&self, machine: &str) -> Result<CompressorMap, AssembleError> {
         let has_place = |point: &&IdentifiedPoint| {
             let place = [point.flow_corrected_kg_s, point.pressure_ratio, point.speed_corrected_rpm];
@@ -139,7 +136,7 @@ impl Identified {
         };
         let points: Vec<IdentifiedPoint> = self.points_alone().filter(has_place).cloned().collect();
         let config = &self.config;
-        let map = assemble(&points, machine, config.reference, config.method, Grouping::default())?;
+        let map = assemble(&points, machine, config.reference, config.method)?;
         let surge = self.surge.iter().flat_map(|found| found.marks.iter().map(|scored| scored.mark));
         Ok(CompressorMap { surge: surge.collect(), ..with_gas(map, config.air) })
     }

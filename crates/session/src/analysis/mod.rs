@@ -1,6 +1,5 @@
 //! Analysis of a finished recording: identified points, result files, gap diagnosis, drift check, and calibrated models.
 
-pub(crate) mod budget_file;
 pub(crate) mod calibrated_model_campaign;
 pub(crate) mod calibrated_model_files;
 pub(crate) mod drift;

@@ -1,6 +1,5 @@
 //! Results of a run or recording: points, map and report, as data and as files in its directory.
 
-use crate::analysis::budget_file::budget_csv;
 use crate::analysis::identification::Identified;
 use crate::recording::files::{json_text, write_new};
 use crate::recording::program::program_and_commit;
@@ -16,7 +15,9 @@ use mapper_identify::{T2History, t2_history};
 use mapper_maps::{MapFit, MapFitOptions, RepeatedJump};
 use mapper_recording::{ChannelMap, ReadOptions, ReadWarning, read_recording};
 use mapper_report::page::{OtherRun, RunPage, gap_part, run_page};
-use mapper_report::{Display, PointsOrigin, ReportSource, RunReport, instant, run_report, with_messages};
+use mapper_report::{
+    Display, PointsOrigin, ReportSource, RunReport, budget_csv, instant, run_report, with_messages,
+};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -269,7 +270,8 @@ impl Session<'_> {
         let points_file = with_messages(identified.points_json());
         files.write(run_directory::POINTS, json_text(&points_file)?.as_bytes());
         if !identified.budgets.is_empty() {
-            files.write(run_directory::BUDGET, &budget_csv(&identified.budgets)?);
+            let failed = SessionError::file("write", Path::new(run_directory::BUDGET));
+            files.write(run_directory::BUDGET, &budget_csv(&identified.budgets).map_err(failed)?);
         }
         let (repeats, program) = (identified.repeats(), program_and_commit(self.registry.commit));
         let has_picture = map.contains_key("svg");

@@ -1,7 +1,5 @@
 //! Errors of a session.
 
-use crate::errors::error_kind::ErrorKind;
-use crate::errors::lockout_text::since_text;
 use crate::errors::map_work_error::MapWorkError;
 use crate::variant::VariantError;
 use mapper_campaign::{CampaignError, NightlyError};
@@ -22,6 +20,23 @@ use mapper_yaml::keys::KeyError;
 use std::io;
 use std::path::{Path, PathBuf};
 
+/// Category of an error, for exit codes and status pages.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ErrorKind {
+    /// A file could not be read or written, or the program has a defect.
+    Failure,
+    /// The campaign or another input has mistakes.
+    BadInput,
+    /// No plan is possible, or the given plan is stale.
+    NoPlan,
+    /// The rig failed.
+    Rig,
+    /// The recording does not contain the required data.
+    BadRecording,
+    /// Stopped by the operator.
+    Interrupted,
+}
+
 /// Why a session could not complete a request.
 #[derive(Debug, thiserror::Error)]
 pub enum SessionError {
@@ -32,26 +47,17 @@ pub enum SessionError {
     #[error(transparent)]
     Nightly(#[from] NightlyError),
     /// A nightly campaign lists a campaign whose steps come from a script.
-    #[error("{}: the points of a script may differ between nights; replace `sequence` by a grid", .path.display())]
-    NightlySequence {
-        /// The campaign.
-        path: PathBuf,
-    },
+    #[error("{}: the points of a script may differ between nights; replace `sequence` by a grid", .0.display())]
+    NightlySequence(PathBuf),
     /// The machine list of a nightly campaign is wrong.
     #[error(transparent)]
     Variant(#[from] VariantError),
     /// Two runs of a night have the same campaign, machine, method and seed.
-    #[error("{key} appears twice in the nightly campaign; give each campaign its own name")]
-    DuplicateNightlyRun {
-        /// The run.
-        key: String,
-    },
+    #[error("{0} appears twice in the nightly campaign; give each campaign its own name")]
+    DuplicateNightlyRun(String),
     /// Rows of a study do not match the runs of this night.
-    #[error("the study does not belong to this nightly campaign: {difference}; make a new study")]
-    NightlyMismatch {
-        /// What differs.
-        difference: String,
-    },
+    #[error("the study does not belong to this nightly campaign: {0}; make a new study")]
+    NightlyMismatch(String),
     /// A log without steps has too little data.
     #[error(transparent)]
     Driven(#[from] mapper_diagnose::driven::DrivenError),
@@ -125,12 +131,9 @@ pub enum SessionError {
         /// What is wrong.
         why: String,
     },
-    /// No point was identified from a recording.
-    #[error("no point was identified: no step of the recording is long enough. {why}")]
-    NoPoints {
-        /// What is known about the recording.
-        why: String,
-    },
+    /// No point was identified from a recording; what is known about it.
+    #[error("no point was identified: no step of the recording is long enough. {0}")]
+    NoPoints(String),
     /// A recording was given twice.
     #[error("{} and {} contain the same readings, whose noise would count as independent evidence; give each recording once",
         .0[0].display(), .0[1].display())]
@@ -238,20 +241,14 @@ pub enum SessionError {
         reason: String,
     },
     /// A script makes no step.
-    #[error("the sequence script {} makes no step", .path.display())]
-    NoSteps {
-        /// The script.
-        path: PathBuf,
-    },
+    #[error("the sequence script {} makes no step", .0.display())]
+    NoSteps(PathBuf),
     /// A suspected effect is not a valid effect.
     #[error(transparent)]
     Effect(Box<dyn std::error::Error + Send + Sync>),
     /// This program cannot read effects from files.
-    #[error("{}: this program does not read effects from files", .path.display())]
-    EffectFilesUnsupported {
-        /// The file.
-        path: PathBuf,
-    },
+    #[error("{}: this program does not read effects from files", .0.display())]
+    EffectFilesUnsupported(PathBuf),
     /// A suspected effect has the same name as another.
     #[error("{}: there is already an effect `{id}`; choose another name", .path.display())]
     DuplicateEffect {
@@ -362,11 +359,8 @@ pub enum SessionError {
     #[error(transparent)]
     Fmu(#[from] crate::errors::fmu_error::FmuExportError),
     /// The file already exists.
-    #[error("{} already exists and is not replaced; choose another name", .path.display())]
-    Exists {
-        /// The file.
-        path: PathBuf,
-    },
+    #[error("{} already exists and is not replaced; choose another name", .0.display())]
+    Exists(PathBuf),
     /// A file or directory could not be read, written or made.
     #[error("failed to {action} {}: {source}", .path.display())]
     File {
@@ -378,11 +372,8 @@ pub enum SessionError {
         source: io::Error,
     },
     /// A parent directory has too many runs.
-    #[error("{} already contains 999 runs from this second", .parent.display())]
-    TooManyRuns {
-        /// The directory.
-        parent: PathBuf,
-    },
+    #[error("{} already contains 999 runs from this second", .0.display())]
+    TooManyRuns(PathBuf),
     /// Data could not be written as YAML: a defect of the program.
     #[error("failed to write YAML: {0}")]
     Yaml(#[from] serde_yaml::Error),
@@ -392,6 +383,11 @@ pub enum SessionError {
     /// The operator stopped the work.
     #[error("stopped by the operator")]
     Interrupted,
+}
+
+/// The run of a lockout; empty if it is unknown, because the entry cannot be read.
+pub fn since_text(run: &Path) -> String {
+    if run.as_os_str().is_empty() { String::new() } else { format!(" since the run {}", run.display()) }
 }
 
 /// The rigs that wait for acknowledgement.
@@ -407,7 +403,7 @@ impl SessionError {
     pub(crate) fn file(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
         move |source| match source.kind() {
-            io::ErrorKind::AlreadyExists => SessionError::Exists { path },
+            io::ErrorKind::AlreadyExists => SessionError::Exists(path),
             _ => SessionError::File { action, path, source },
         }
     }
@@ -422,10 +418,10 @@ impl SessionError {
             | E::ChannelMap(ChannelMapError::Read { .. }) => ErrorKind::Failure,
             E::Campaign(CampaignError::Mistakes(_))
             | E::Nightly(NightlyError::Mistakes(_))
-            | E::NightlySequence { .. }
-            | E::DuplicateNightlyRun { .. }
+            | E::NightlySequence(..)
+            | E::DuplicateNightlyRun(..)
             | E::Variant(_)
-            | E::NightlyMismatch { .. }
+            | E::NightlyMismatch(..)
             | E::NoRecording
             | E::DifferentCampaigns { .. }
             | E::Method { .. }
@@ -434,7 +430,7 @@ impl SessionError {
             | E::Reader { .. }
             | E::Effect(_)
             | E::DuplicateEffect { .. }
-            | E::EffectFilesUnsupported { .. }
+            | E::EffectFilesUnsupported(..)
             | E::ChannelMap(ChannelMapError::Mistakes(_))
             | E::MachineUnknown { .. }
             | E::NothingToAcknowledge { .. }
@@ -464,7 +460,7 @@ impl SessionError {
             | E::InvalidPlan { .. }
             | E::NotResumable { .. }
             | E::RehearsalTripped { .. }
-            | E::NoSteps { .. } => ErrorKind::NoPlan,
+            | E::NoSteps(..) => ErrorKind::NoPlan,
             E::Run { source, .. } => match source {
                 RunError::Backend(_) | RunError::NotArmed(_) => ErrorKind::Rig,
                 RunError::Source(_) => ErrorKind::BadInput,
@@ -478,7 +474,7 @@ impl SessionError {
             E::Record(RecordError::Log(LogError::Read { .. })) | E::Log(LogError::Read { .. }) => {
                 ErrorKind::Failure
             }
-            E::Log(_) | E::NoPoints { .. } => ErrorKind::BadRecording,
+            E::Log(_) | E::NoPoints(..) => ErrorKind::BadRecording,
             E::LogOption(_) | E::CalibratedModel(_) | E::CalibratedModelFile { .. } => ErrorKind::BadInput,
             E::Record(_) | E::Driven(_) | E::OtherMachine(_) | E::Identify(_) | E::Drift(_) | E::Gap(_) => {
                 ErrorKind::BadRecording
@@ -489,8 +485,8 @@ impl SessionError {
             | E::History(_)
             | E::Export(_)
             | E::File { .. }
-            | E::Exists { .. }
-            | E::TooManyRuns { .. }
+            | E::Exists(_)
+            | E::TooManyRuns(..)
             | E::Yaml(_)
             | E::Json(_) => ErrorKind::Failure,
             E::Interrupted => ErrorKind::Interrupted,

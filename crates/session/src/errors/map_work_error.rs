@@ -36,12 +36,9 @@ pub enum MapWorkError {
     /// A table whose points are corrected already.
     #[error(
         "{} is not a table of measured points, which has columns for N, flow, P1, T1, P2 and T2 (of a turbine N, flow, P3, T3, P4 and T4); inspect the columns that were recognised",
-        .path.display()
+        .0.display()
     )]
-    NotMeasured {
-        /// The file.
-        path: PathBuf,
-    },
+    NotMeasured(PathBuf),
     /// Points that are not a map.
     #[error("{}: {source}", .path.display())]
     NotAssembled {
@@ -64,11 +61,8 @@ pub enum MapWorkError {
     )]
     NoDefinition,
     /// The map of a compressor and that of a turbine.
-    #[error("{} is a turbine map, the other file a compressor map; give two maps of the same machine", .turbine.display())]
-    TwoMachines {
-        /// The file of the turbine.
-        turbine: PathBuf,
-    },
+    #[error("{} is a turbine map, the other file a compressor map; give two maps of the same machine", .0.display())]
+    TwoMachines(PathBuf),
     /// A request that turbine maps cannot fulfil, because their quantities are reduced.
     #[error("{} is a turbine map and has no {property}; leave that out", .path.display())]
     NotOfTurbine {
@@ -78,9 +72,6 @@ pub enum MapWorkError {
         property: &'static str,
     },
     /// A picture that cannot be made.
-    #[error("failed to draw the picture: {problem}")]
-    Picture {
-        /// The problem.
-        problem: String,
-    },
+    #[error("failed to draw the picture: {0}")]
+    Picture(String),
 }

@@ -3,9 +3,6 @@
 //! Messages name no command or option of the program: a library has none. The command line adds them.
 
 pub(crate) mod error;
-pub(crate) mod error_kind;
-
 pub(crate) mod first_map_error;
 pub(crate) mod fmu_error;
-pub(crate) mod lockout_text;
 pub(crate) mod map_work_error;

@@ -75,7 +75,7 @@ pub fn first_campaign(
     std::fs::create_dir_all(&request.directory).map_err(SessionError::file("create", &request.directory))?;
     for path in [Some(&campaign_path), channels.as_ref()].into_iter().flatten() {
         if path.exists() {
-            return Err(SessionError::Exists { path: path.clone() });
+            return Err(SessionError::Exists(path.clone()));
         }
     }
     write_new(&map_path, map.text.as_bytes())?;

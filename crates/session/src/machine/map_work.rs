@@ -283,26 +283,23 @@ impl Registry {
         picture: Option<(&Path, Existing)>,
     ) -> Result<MapWork, SessionError> {
         let paths = [first.0, second.0];
-        match (self.read_map_file(first.0, first.1)?, self.read_map_file(second.0, second.1)?) {
+        let maps = (self.read_map_file(first.0, first.1)?, self.read_map_file(second.0, second.1)?);
+        let (text, json, remarks) = match maps {
             (MapFile::Compressor(a), MapFile::Compressor(b)) => {
                 let comparison = compare(&a.map, &b.map).map_err(MapWorkError::from)?;
                 if let Some((path, existing)) = picture {
                     let names = distinct_names(paths);
                     let figure = map_comparison_figure(&a.map, &b.map, &comparison, &names);
                     let png = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"));
-                    let failed =
-                        |error: &dyn std::fmt::Display| MapWorkError::Picture { problem: error.to_string() };
                     let bytes = if png {
-                        figure.to_png(2.0).map_err(|error| failed(&error))?
+                        figure.to_png(2.0).map_err(|error| MapWorkError::Picture(error.to_string()))?
                     } else {
                         figure.to_svg().into_bytes()
                     };
                     write_file(path, &bytes, existing)?;
                 }
-                let warnings_of_both =
-                    [warnings(paths[0], &a.remarks), warnings(paths[1], &b.remarks)].concat();
                 let json = serde_json::to_value(&comparison)?;
-                Ok(MapWork { text: map_comparison_text(&comparison), json, warnings: warnings_of_both })
+                (map_comparison_text(&comparison), json, [a.remarks, b.remarks])
             }
             (MapFile::Turbine(a), MapFile::Turbine(b)) => {
                 if picture.is_some() {
@@ -311,18 +308,14 @@ impl Registry {
                 }
                 let comparison = compare_turbines(&a.map, &b.map)
                     .map_err(|source| MapWorkError::TurbineNotFitted { path: paths[0].to_owned(), source })?;
-                let warnings_of_both =
-                    [warnings(paths[0], &a.remarks), warnings(paths[1], &b.remarks)].concat();
                 let json = serde_json::to_value(&comparison)?;
-                Ok(MapWork { text: turbine_comparison_text(&comparison), json, warnings: warnings_of_both })
+                (turbine_comparison_text(&comparison), json, [a.remarks, b.remarks])
             }
-            (MapFile::Turbine(_), _) => {
-                Err(MapWorkError::TwoMachines { turbine: paths[0].to_owned() }.into())
-            }
-            (_, MapFile::Turbine(_)) => {
-                Err(MapWorkError::TwoMachines { turbine: paths[1].to_owned() }.into())
-            }
-        }
+            (MapFile::Turbine(_), _) => return Err(MapWorkError::TwoMachines(paths[0].to_owned()).into()),
+            (_, MapFile::Turbine(_)) => return Err(MapWorkError::TwoMachines(paths[1].to_owned()).into()),
+        };
+        let warnings = [warnings(paths[0], &remarks[0]), warnings(paths[1], &remarks[1])].concat();
+        Ok(MapWork { text, json, warnings })
     }
 }
 

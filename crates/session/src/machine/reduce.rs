@@ -1,7 +1,6 @@
 //! Reduces tables of steady points (N, flow, P1, T1, P2, T2) to a map with uncertainties. Heat transfer is removed if the housing temperature
 //! was measured, or T3 for its heat balance. Tables of turbine points (N, flow, P3, T3, P4, T4) become a turbine map.
 
-use crate::analysis::budget_file::budget_csv;
 use crate::analysis::identification::with_gas;
 use crate::machine::fmu_file::with_identified;
 use crate::machine::map_work::{MapOut, MapWork, warnings, write_turbine_fitted_if_needed};
@@ -16,11 +15,11 @@ use mapper_core::{
     ThermalModel, TurbineMap,
 };
 use mapper_identify::{IdentifyConfig, KnownHeat, PressureTap, method_of_table};
-use mapper_maps::{Grouping, assemble, mark_line_ends, reduce_turbine};
+use mapper_maps::{assemble, mark_line_ends, reduce_turbine};
 use mapper_physics::gas::air::Air;
 use mapper_physics::gas::mixture::Gas;
 use mapper_physics::machine::params::{BoundaryConditions, Params};
-use mapper_report::{reduced_text, reduced_turbine_text};
+use mapper_report::{budget_csv, reduced_text, reduced_turbine_text};
 use serde::Deserialize;
 use serde_json::json;
 use std::path::Path;
@@ -139,7 +138,7 @@ impl Registry {
         };
         let measured = table.measured.as_slice();
         if measured.is_empty() {
-            return Err(MapWorkError::NotMeasured { path: path.to_owned() }.into());
+            return Err(MapWorkError::NotMeasured(path.to_owned()).into());
         }
         config.reference = table.map.reference;
         config.thresholds.end_mean_s = config.thresholds.steady_mean_s;
@@ -154,7 +153,7 @@ impl Registry {
         });
         let (points, budgets): (Vec<_>, Vec<PointBudgets>) =
             mapper_identify::reduce(measured, known, &config)?.into_iter().unzip();
-        let map = assemble(&points, &name, config.reference, config.method, Grouping::default())
+        let map = assemble(&points, &name, config.reference, config.method)
             .map_err(|source| MapWorkError::NotAssembled { path: path.to_owned(), source })?;
         let mut map = with_gas(map, config.air);
         let ends = mark_line_ends(&mut map, |step| measured.get(step)?.end);
@@ -171,7 +170,8 @@ impl Registry {
             "file": out.map(|out| out.path),
         });
         if let Some((file, existing)) = budget {
-            write_file(file, &budget_csv(&budgets)?, existing)?;
+            let csv = budget_csv(&budgets).map_err(SessionError::file("write", file))?;
+            write_file(file, &csv, existing)?;
         }
         if let Some((out, format)) = out.zip(format) {
             write_map_fitted_if_needed(out.path, format, map, out.existing)?;
@@ -198,7 +198,7 @@ impl Registry {
             machine.map_or_else(|| Ok(TestStand::unknown(path)), TestStand::read)?;
         let table = self.inspect_turbine(path, user_description.clone())?;
         if table.measured.is_empty() {
-            return Err(MapWorkError::NotMeasured { path: path.to_owned() }.into());
+            return Err(MapWorkError::NotMeasured(path.to_owned()).into());
         }
         let points = reduce_turbine(&table.measured, &config.declared);
         let mut text = reduced_turbine_text(&points, &remarks);

@@ -27,7 +27,7 @@ impl PreparedNight {
         for group in &nightly.groups {
             let campaign = mapper_campaign::load(&group.campaign)?;
             if campaign.sequence.is_some() {
-                return Err(SessionError::NightlySequence { path: group.campaign.clone() });
+                return Err(SessionError::NightlySequence(group.campaign.clone()));
             }
             let model = nominal_model(&campaign)?;
             let methods = if group.methods.is_empty() {
@@ -47,7 +47,7 @@ impl PreparedNight {
                         let run =
                             NightlyRun::new(campaign.clone(), model.clone(), method, seed, machine.clone())?;
                         if !keys.insert(run.key.clone()) {
-                            return Err(SessionError::DuplicateNightlyRun { key: run.key.to_string() });
+                            return Err(SessionError::DuplicateNightlyRun(run.key.to_string()));
                         }
                         runs.push(run);
                     }
@@ -74,7 +74,7 @@ impl PreparedNight {
         let missing = self.runs.iter().find(|run| !rows.iter().any(|row| row.key == run.key));
         let missing =
             missing.map_or_else(|| "it has other runs".to_owned(), |run| format!("it has no {}", run.key));
-        Err(SessionError::NightlyMismatch { difference: missing })
+        Err(SessionError::NightlyMismatch(missing))
     }
 
     /// Number of runs.

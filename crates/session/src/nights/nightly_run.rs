@@ -59,9 +59,6 @@ impl NightlyRun {
     }
 
     /// Plans, runs, records, identifies and scores. A failure becomes part of the row.
-    ///
-    /// # Errors
-    /// [`SessionError::Interrupted`] if the operator stopped it.
     pub(crate) fn run(&self, session: &Session<'_>, directory: &Path) -> Result<RunRow, SessionError> {
         let mut row = RunRow {
             key: self.key.clone(),

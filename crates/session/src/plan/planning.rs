@@ -39,9 +39,6 @@ pub fn plan_of(campaign: &Campaign, request: &PlanRequest<'_>) -> Result<Plan, S
 }
 
 /// The points of a campaign in planned order, without any further forecast.
-///
-/// # Errors
-/// As [`plan`].
 pub(crate) fn order_points(campaign: &Campaign, model: &Model) -> Result<Vec<OperatingPoint>, SessionError> {
     let inputs = PlanInputs::of(campaign)?;
     let request = PlanRequest { method: None, bound: false, ..inputs.request(campaign, model) };
@@ -49,9 +46,6 @@ pub(crate) fn order_points(campaign: &Campaign, model: &Model) -> Result<Vec<Ope
 }
 
 /// Hashes of the plan's inputs: a plan with other hashes is stale.
-///
-/// # Errors
-/// [`SessionError::Json`] if the campaign cannot be written as JSON.
 pub(crate) fn hash_inputs(campaign: &Campaign, model: &Model) -> Result<PlanInputHashes, SessionError> {
     let Some(script) = &campaign.sequence else {
         return Ok(mapper_planner::hash_inputs(&PlanInputs::of(campaign)?.request(campaign, model)));

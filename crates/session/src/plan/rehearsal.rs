@@ -61,7 +61,7 @@ pub fn rehearse(
     }
     let mut plan = steps.steps.executed(&base);
     if plan.steps.is_empty() {
-        return Err(SessionError::NoSteps { path: source.path.clone() });
+        return Err(SessionError::NoSteps(source.path.clone()));
     }
     add_surge_search(campaign, model, &mut plan);
     Ok(Rehearsal { plan, notes: steps.notes })

@@ -74,9 +74,6 @@ pub(crate) fn forecast_verdicts(campaign: &Campaign, plan: &Plan) -> Option<Verd
 
 /// Changes of the campaign after which more points are surely good than `now`, the cheapest first. At most one dwell and one soak are listed:
 /// the first that makes all points good, otherwise the one with the most good points; a change that gains much less than the other is omitted.
-///
-/// # Errors
-/// That of `plan`, which plans a changed campaign.
 pub(crate) fn advise(
     campaign: &Campaign,
     now: VerdictForecast,

@@ -23,7 +23,7 @@ impl Existing {
     /// [`SessionError::Exists`].
     pub fn check(self, path: &Path) -> Result<(), SessionError> {
         let is_kept = self == Existing::Kept && path.exists();
-        if is_kept { Err(SessionError::Exists { path: path.to_owned() }) } else { Ok(()) }
+        if is_kept { Err(SessionError::Exists(path.to_owned())) } else { Ok(()) }
     }
 }
 
@@ -46,9 +46,6 @@ pub fn write_file(path: &Path, bytes: &[u8], existing: Existing) -> Result<(), S
 }
 
 /// Writes files to a directory, which is created if it is missing, and returns their paths.
-///
-/// # Errors
-/// As [`write_file`]; [`SessionError::File`] if the directory cannot be created.
 pub(crate) fn write_files(
     directory: &Path,
     contents: &[(&str, Vec<u8>)],
@@ -98,9 +95,6 @@ pub fn json_text(value: &impl Serialize) -> Result<String, SessionError> {
 }
 
 /// Reads a file of at most `limit_bytes`. Memory is bounded even if the file grows or reports a wrong size.
-///
-/// # Errors
-/// [`SessionError::File`] if it cannot be read or is too large.
 pub(crate) fn read_at_most(path: &Path, limit_bytes: u64) -> Result<Vec<u8>, SessionError> {
     let limit_bytes = usize::try_from(limit_bytes).unwrap_or(usize::MAX);
     mapper_yaml::read_limited(path, limit_bytes).map_err(SessionError::file("read", path))
@@ -115,7 +109,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("file");
         write_file(&path, b"first", Existing::Kept).unwrap();
-        assert!(matches!(write_file(&path, b"second", Existing::Kept), Err(SessionError::Exists { .. })));
+        assert!(matches!(write_file(&path, b"second", Existing::Kept), Err(SessionError::Exists(_))));
         assert_eq!(read_at_most(&path, 9).unwrap(), b"first");
         write_file(&path, b"third", Existing::Replaced).unwrap();
         assert_eq!(read_at_most(&path, 9).unwrap(), b"third");

@@ -59,9 +59,6 @@ impl InterruptedRun {
 
     /// Removes steps that a later part repeated, and the last line of the surge search. The search depends on its preceding data and restarts
     /// that line.
-    ///
-    /// # Errors
-    /// Read errors of a recording.
     pub(crate) fn discard_superseded_steps(&mut self, campaign: &Campaign) -> Result<(), SessionError> {
         if !depends_on_readings(campaign) {
             return Ok(());

@@ -67,7 +67,7 @@ pub fn create(parent: &Path, campaign: &str, time: &str) -> Result<PathBuf, Sess
             Err(error) => return Err(SessionError::file("create", &path)(error)),
         }
     }
-    Err(SessionError::TooManyRuns { parent: parent.to_owned() })
+    Err(SessionError::TooManyRuns(parent.to_owned()))
 }
 
 /// Stores a file named by the campaign under the same relative path in the run directory. A file outside the campaign's directory is not copied.

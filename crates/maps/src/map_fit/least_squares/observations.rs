@@ -140,7 +140,7 @@ impl Observations {
         // Lines at one speed are one line to a fit over speed.
         let distinct = 1 + self.lines_rpm.windows(2).filter(|w| w[1] > w[0] * (1.0 + 1e-3)).count();
         if self.lines_rpm.len() < 2 || distinct < 2 {
-            return Err(MapFitError::TooFewLines { lines: distinct.min(self.lines_rpm.len()) });
+            return Err(MapFitError::TooFewLines(distinct.min(self.lines_rpm.len())));
         }
         let with_eta = self.points.iter().filter(|p| p.eta.is_some()).count();
         if self.points.len() < 8 || with_eta < 6 {

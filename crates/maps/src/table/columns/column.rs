@@ -39,9 +39,6 @@ impl Column {
     }
 
     /// A column with the unit of its heading, if there is one.
-    ///
-    /// # Errors
-    /// [`ColumnError::Unit`] if the unit does not fit the quantity.
     pub(crate) fn with_unit(
         index: usize,
         quantity: Quantity,

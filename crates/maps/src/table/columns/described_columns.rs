@@ -110,9 +110,6 @@ impl DescribedColumns {
     }
 
     /// The columns that are described by their numbers.
-    ///
-    /// # Errors
-    /// [`ColumnError`] for a wrong unit.
     pub(crate) fn numbered(&self) -> Result<Vec<Column>, ColumnError> {
         let numbered = self.statements.iter().filter_map(|statement| match statement.place {
             ColumnPlace::Number(index) => Some((index, statement)),

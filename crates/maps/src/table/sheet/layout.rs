@@ -107,9 +107,6 @@ impl Layout {
 }
 
 /// Detects the layout of a table; the cells are transposed if the headings are in the first column.
-///
-/// # Errors
-/// As [`layout`], and [`ImportError::Empty`].
 pub(crate) fn detect_layout<'a>(
     grid: &'a Grid,
     described: &DescribedColumns,

@@ -3,117 +3,85 @@
 use crate::Floor;
 use serde::{Deserialize, Serialize};
 
-/// A metric of a run. Efficiencies are fractions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Metric {
+/// Declares the metrics with their names, their descriptions for users, their display units with the factor from the stored value, and the
+/// minimum half widths of their bands.
+macro_rules! metrics {
+    ($($(#[doc = $doc:literal])* $metric:ident $name:literal $description:literal $unit:literal $factor:literal $floor:ident $half_width:literal,)*) => {
+        /// A metric of a run. Efficiencies are fractions.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+        #[serde(rename_all = "snake_case")]
+        pub enum Metric {
+            $($(#[doc = $doc])* $metric,)*
+        }
+
+        impl Metric {
+            /// All of them, in the order in which they are shown.
+            pub const ALL: [Metric; 11] = [$(Metric::$metric),*];
+
+            /// Name on the command line, in JSON, and of the column in the file.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Metric::$metric => $name,)*
+                }
+            }
+
+            /// Description for users.
+            pub fn description(self) -> &'static str {
+                match self {
+                    $(Metric::$metric => $description,)*
+                }
+            }
+
+            /// Display unit, and the factor from the stored value to it.
+            pub fn display_unit(self) -> (&'static str, f64) {
+                match self {
+                    $(Metric::$metric => ($unit, $factor),)*
+                }
+            }
+
+            /// Minimum half width of its band.
+            ///
+            /// Because seeds are fixed, an unchanged program repeats its results exactly and the scatter of the nights is 0; the floor then
+            /// decides. It is a quarter of the smallest change that must be detected (0.2 points of efficiency), and far above the rounding
+            /// differences of another compiler (1e-9).
+            pub fn floor(self) -> Floor {
+                match self {
+                    $(Metric::$metric => Floor::$floor($half_width),)*
+                }
+            }
+        }
+    };
+}
+
+metrics! {
     /// Points with the verdict `good`.
-    GoodPoints,
+    GoodPoints "good_points" "points that are good" "points" 1.0 Absolute 0.5,
     /// Mean identified efficiency, fraction.
-    EtaMean,
+    EtaMean "eta_mean" "mean efficiency" "%" 100.0 Absolute 5e-4,
     /// Mean true efficiency, fraction.
-    EtaTrueMean,
+    EtaTrueMean "eta_true_mean" "mean true efficiency" "%" 100.0 Absolute 5e-4,
     /// Median absolute error of the efficiency, fraction.
-    EtaMedianError,
+    EtaMedianError "eta_median_error" "median error of the efficiency" "%points" 100.0 Absolute 5e-4,
     /// Largest absolute error of the efficiency, fraction.
-    EtaWorstError,
+    EtaWorstError "eta_worst_error" "largest error of the efficiency" "%points" 100.0 Absolute 5e-4,
     /// Share of the points whose 95 % interval contains the true efficiency, ratio.
-    EtaCoverage,
+    EtaCoverage "eta_coverage" "intervals that contain the true efficiency" "%" 100.0 Absolute 0.02,
     /// Mean identified heat-transfer coefficient, W/(m2 K).
-    HMean,
+    HMean "h_mean" "mean heat-transfer coefficient" "W/(m2 K)" 1.0 Relative 2.5e-3,
     /// Mean true heat-transfer coefficient, W/(m2 K).
-    HTrueMean,
+    HTrueMean "h_true_mean" "mean true heat-transfer coefficient" "W/(m2 K)" 1.0 Relative 2.5e-3,
     /// Median absolute relative error of the heat-transfer coefficient, ratio.
-    HMedianError,
+    HMedianError "h_median_error" "median error of the heat-transfer coefficient" "%" 100.0 Absolute 2.5e-3,
     /// Largest absolute relative error of the heat-transfer coefficient, ratio.
-    HWorstError,
+    HWorstError "h_worst_error" "largest error of the heat-transfer coefficient" "%" 100.0 Absolute 2.5e-3,
     /// Duration of the run in the rig's own time, minutes.
-    RigMinutes,
+    RigMinutes "rig_minutes" "time on the rig" "min" 1.0 Relative 2.5e-3,
 }
 
 impl Metric {
-    /// All of them, in the order in which they are shown.
-    pub const ALL: [Metric; 11] = [
-        Metric::GoodPoints,
-        Metric::EtaMean,
-        Metric::EtaTrueMean,
-        Metric::EtaMedianError,
-        Metric::EtaWorstError,
-        Metric::EtaCoverage,
-        Metric::HMean,
-        Metric::HTrueMean,
-        Metric::HMedianError,
-        Metric::HWorstError,
-        Metric::RigMinutes,
-    ];
-
-    /// Name on the command line, in JSON, and of the column in the file.
-    pub fn name(self) -> &'static str {
-        match self {
-            Metric::GoodPoints => "good_points",
-            Metric::EtaMean => "eta_mean",
-            Metric::EtaTrueMean => "eta_true_mean",
-            Metric::EtaMedianError => "eta_median_error",
-            Metric::EtaWorstError => "eta_worst_error",
-            Metric::EtaCoverage => "eta_coverage",
-            Metric::HMean => "h_mean",
-            Metric::HTrueMean => "h_true_mean",
-            Metric::HMedianError => "h_median_error",
-            Metric::HWorstError => "h_worst_error",
-            Metric::RigMinutes => "rig_minutes",
-        }
-    }
-
-    /// Description for users.
-    pub fn description(self) -> &'static str {
-        match self {
-            Metric::GoodPoints => "points that are good",
-            Metric::EtaMean => "mean efficiency",
-            Metric::EtaTrueMean => "mean true efficiency",
-            Metric::EtaMedianError => "median error of the efficiency",
-            Metric::EtaWorstError => "largest error of the efficiency",
-            Metric::EtaCoverage => "intervals that contain the true efficiency",
-            Metric::HMean => "mean heat-transfer coefficient",
-            Metric::HTrueMean => "mean true heat-transfer coefficient",
-            Metric::HMedianError => "median error of the heat-transfer coefficient",
-            Metric::HWorstError => "largest error of the heat-transfer coefficient",
-            Metric::RigMinutes => "time on the rig",
-        }
-    }
-
     /// The metric of this name.
     pub fn find(name: &str) -> Option<Metric> {
         Metric::ALL.into_iter().find(|metric| metric.name() == name)
-    }
-
-    /// Display unit, and the factor from the stored value to it.
-    pub fn display_unit(self) -> (&'static str, f64) {
-        match self {
-            Metric::GoodPoints => ("points", 1.0),
-            Metric::EtaMean | Metric::EtaTrueMean | Metric::EtaCoverage => ("%", 100.0),
-            Metric::EtaMedianError | Metric::EtaWorstError => ("%points", 100.0),
-            Metric::HMean | Metric::HTrueMean => ("W/(m2 K)", 1.0),
-            Metric::HMedianError | Metric::HWorstError => ("%", 100.0),
-            Metric::RigMinutes => ("min", 1.0),
-        }
-    }
-
-    /// Minimum half width of its band.
-    ///
-    /// Because seeds are fixed, an unchanged program repeats its results exactly and the scatter of the nights is 0; the floor then decides. It is
-    /// a quarter of the smallest change that must be detected (0.2 points of efficiency), and far above the rounding differences of another
-    /// compiler (1e-9).
-    pub fn floor(self) -> Floor {
-        match self {
-            Metric::GoodPoints => Floor::Absolute(0.5),
-            Metric::EtaMean | Metric::EtaTrueMean | Metric::EtaMedianError | Metric::EtaWorstError => {
-                Floor::Absolute(5e-4)
-            }
-            Metric::EtaCoverage => Floor::Absolute(0.02),
-            Metric::HMean | Metric::HTrueMean => Floor::Relative(2.5e-3),
-            Metric::HMedianError | Metric::HWorstError => Floor::Absolute(2.5e-3),
-            Metric::RigMinutes => Floor::Relative(2.5e-3),
-        }
     }
 }
 

@@ -4,28 +4,30 @@ use crate::formatting::markdown::{self, Align};
 use mapper_core::{PointBudgets, UncertaintyBudget, step_number};
 use std::fmt::Write;
 
-/// Head of the file: one row for each source of each number of each point.
-pub const BUDGET_COLUMNS: [&str; 13] = [
-    "step",
-    "quantity",
-    "value",
-    "source",
-    "standard_uncertainty",
-    "unit",
-    "sensitivity",
-    "contribution",
-    "degrees_of_freedom",
-    "combined_standard_uncertainty",
-    "effective_degrees_of_freedom",
-    "coverage_factor",
-    "expanded_uncertainty",
-];
-
-/// The rows of the file. An empty cell of degrees of freedom means that the uncertainty is known exactly.
-pub fn budget_rows(budgets: &[PointBudgets]) -> Vec<[String; 13]> {
+/// The budgets as a file: one row for each source of each number of each point. An empty cell of degrees of freedom means that the uncertainty
+/// is known exactly.
+///
+/// # Errors
+/// None in practice: it is written to memory.
+pub fn budget_csv(budgets: &[PointBudgets]) -> std::io::Result<Vec<u8>> {
     let number = |value: f64| format!("{value:e}");
     let freedom = |value: Option<f64>| value.map(|value| format!("{value:.1}")).unwrap_or_default();
-    let mut rows = Vec::new();
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record([
+        "step",
+        "quantity",
+        "value",
+        "source",
+        "standard_uncertainty",
+        "unit",
+        "sensitivity",
+        "contribution",
+        "degrees_of_freedom",
+        "combined_standard_uncertainty",
+        "effective_degrees_of_freedom",
+        "coverage_factor",
+        "expanded_uncertainty",
+    ])?;
     for point in budgets {
         let numbers = [
             ("eta", point.eta.as_ref()),
@@ -34,8 +36,8 @@ pub fn budget_rows(budgets: &[PointBudgets]) -> Vec<[String; 13]> {
         ];
         for (quantity, budget) in numbers {
             let Some(budget) = budget else { continue };
-            rows.extend(budget.rows.iter().map(|row| {
-                [
+            for row in &budget.rows {
+                writer.write_record([
                     step_number(point.step).to_string(),
                     quantity.to_owned(),
                     number(budget.value),
@@ -49,11 +51,11 @@ pub fn budget_rows(budgets: &[PointBudgets]) -> Vec<[String; 13]> {
                     freedom(budget.degrees_of_freedom),
                     format!("{:.2}", budget.coverage_factor),
                     number(budget.expanded_uncertainty),
-                ]
-            }));
+                ])?;
+            }
         }
     }
-    rows
+    writer.into_inner().map_err(csv::IntoInnerError::into_error)
 }
 
 /// The section of the report: contributions to the efficiency of every point, and to its pressure ratio. Empty without budgets.

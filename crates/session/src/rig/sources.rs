@@ -27,6 +27,9 @@ enum ReaderProblem {
     DuplicateChannel { channel: Channel, other: String },
 }
 
+/// Name of the auxiliary instrument that provides a channel; `None` for the rig.
+type Provider = Option<String>;
+
 /// The rig with its auxiliary instruments, and their channels for the guards.
 pub struct Sources {
     /// All sources combined into one backend.
@@ -50,7 +53,7 @@ impl Registry {
         }
         let rig_description = rig.describe();
         let mut providers: Vec<(Channel, Provider)> =
-            rig_description.channels.iter().map(|channel| (*channel, Provider::Rig)).collect();
+            rig_description.channels.iter().map(|channel| (*channel, None)).collect();
         let (mut readers, mut read, mut exclusive) = (Vec::new(), Vec::new(), Vec::new());
         for choice in &campaign.readers {
             let at = format!("readers.{}.backend.{}", choice.name, choice.backend.name);
@@ -82,23 +85,6 @@ impl Registry {
     }
 }
 
-/// The source of a channel.
-#[derive(Debug, Clone, PartialEq, Eq)]
-enum Provider {
-    Rig,
-    /// The auxiliary instrument of this name.
-    Reader(String),
-}
-
-impl std::fmt::Display for Provider {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Provider::Rig => f.write_str("the rig"),
-            Provider::Reader(name) => write!(f, "`{name}`"),
-        }
-    }
-}
-
 /// The channels to take from an auxiliary instrument.
 fn select_channels(
     choice: &ReaderChoice,
@@ -112,42 +98,23 @@ fn select_channels(
     if rig.controls {
         return wrong(below("backend"), ReaderProblem::Controls(format!("`{}`", choice.backend.name)));
     }
-    let from = |channel: &Channel, providers: &[(Channel, Provider)]| {
-        providers.iter().find(|(known, _)| known == channel).map(|(_, other)| other.clone())
+    let (channels, at) = match &choice.channels {
+        Some(listed) => (listed.clone(), below("channels")),
+        None => (rig.channels.clone(), below("backend")),
     };
-    match &choice.channels {
-        Some(listed) => {
-            if let Some(channel) = listed.iter().find(|channel| !rig.channels.contains(channel)) {
-                let delivers =
-                    rig.channels.iter().map(|channel| channel.symbol()).collect::<Vec<_>>().join(", ");
-                return wrong(
-                    below("channels"),
-                    ReaderProblem::MissingChannel { channel: *channel, delivers },
-                );
-            }
-            // A listed channel replaces the rig's own.
-            for channel in listed {
-                if let Some(other) = from(channel, providers).filter(|other| *other != Provider::Rig) {
-                    return wrong(
-                        below("channels"),
-                        ReaderProblem::DuplicateChannel { channel: *channel, other: other.to_string() },
-                    );
-                }
-            }
-        }
-        None => {
-            for channel in &rig.channels {
-                if let Some(other) = from(channel, providers) {
-                    return wrong(
-                        below("backend"),
-                        ReaderProblem::DuplicateChannel { channel: *channel, other: other.to_string() },
-                    );
-                }
-            }
+    if let Some(channel) = channels.iter().find(|channel| !rig.channels.contains(channel)) {
+        let delivers = rig.channels.iter().map(|channel| channel.symbol()).collect::<Vec<_>>().join(", ");
+        return wrong(at, ReaderProblem::MissingChannel { channel: *channel, delivers });
+    }
+    for channel in &channels {
+        let provider = providers.iter().find(|(known, _)| known == channel).map(|(_, provider)| provider);
+        // A listed channel replaces the rig's own.
+        if let Some(provider) = provider.filter(|other| choice.channels.is_none() || other.is_some()) {
+            let other = provider.as_ref().map_or_else(|| "the rig".to_owned(), |name| format!("`{name}`"));
+            return wrong(at, ReaderProblem::DuplicateChannel { channel: *channel, other });
         }
     }
-    let channels = choice.channels.clone().unwrap_or_else(|| rig.channels.clone());
     providers.retain(|(channel, _)| !channels.contains(channel));
-    providers.extend(channels.iter().map(|channel| (*channel, Provider::Reader(choice.name.clone()))));
+    providers.extend(channels.iter().map(|channel| (*channel, Some(choice.name.clone()))));
     Ok(channels)
 }

@@ -1,7 +1,7 @@
 //! Shapes of a picture before they are written as SVG or drawn as pixels.
 
 use crate::Colour;
-use crate::items::{Dash, Note, TextAnchor};
+use crate::items::{Dash, Note};
 
 /// Style of a line.
 #[derive(Debug, Clone, Copy)]
@@ -31,6 +31,14 @@ impl Stroke {
         };
         pattern.iter().map(|part| part * self.drawn_width_px().max(1.2)).collect()
     }
+}
+
+/// Part of a text that is at its place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum TextAnchor {
+    Start,
+    Middle,
+    End,
 }
 
 /// Style of a text.

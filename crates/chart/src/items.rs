@@ -1,6 +1,6 @@
 //! Items that a panel can show. Coordinates are in the axes' units throughout; lengths on paper are in px.
 
-use crate::palette::{GREY, INK};
+use crate::palette::INK;
 use crate::{Colour, Contours};
 
 /// An item of a panel. Items are drawn in the given order, texts last.
@@ -51,8 +51,8 @@ pub struct Line {
     pub arrows: bool,
     /// Entry in the legend; items with equal text share one entry.
     pub label: Option<String>,
-    /// Text next to one end.
-    pub end_label: Option<EndLabel>,
+    /// Text next to one end, on the line's continuation.
+    pub end_label: Option<(String, LineEnd)>,
 }
 
 /// End of a line.
@@ -62,15 +62,6 @@ pub enum LineEnd {
     First,
     /// Last visible point.
     Last,
-}
-
-/// A text next to one end of a line, on the line's continuation.
-#[derive(Debug, Clone, PartialEq)]
-pub struct EndLabel {
-    /// The text.
-    pub text: String,
-    /// Position.
-    pub end: LineEnd,
 }
 
 impl Line {
@@ -105,7 +96,7 @@ impl Line {
 
     /// Writes a text next to one end.
     pub fn end_label(mut self, text: impl Into<String>, end: LineEnd) -> Self {
-        self.end_label = Some(EndLabel { text: text.into(), end });
+        self.end_label = Some((text.into(), end));
         self
     }
 }
@@ -229,13 +220,11 @@ pub enum RuleAt {
     X(f64),
 }
 
-/// A straight reference line across the whole panel. The axis is extended to include it.
+/// A straight grey reference line across the whole panel. The axis is extended to include it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rule {
     /// Position.
     pub at: RuleAt,
-    /// Colour.
-    pub colour: Colour,
     /// Dash pattern.
     pub dash: Dash,
     /// Entry in the legend.
@@ -243,20 +232,14 @@ pub struct Rule {
 }
 
 impl Rule {
-    /// A dashed grey line.
+    /// A dashed line.
     pub fn new(at: RuleAt) -> Self {
-        Rule { at, colour: GREY, dash: Dash::Dashed, label: None }
+        Rule { at, dash: Dash::Dashed, label: None }
     }
 
     /// Sets the legend's text.
     pub fn label(mut self, label: impl Into<String>) -> Self {
         self.label = Some(label.into());
-        self
-    }
-
-    /// Sets the colour.
-    pub fn colour(mut self, colour: Colour) -> Self {
-        self.colour = colour;
         self
     }
 }
@@ -287,18 +270,7 @@ impl Polygon {
     }
 }
 
-/// Part of a text that is at its place.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TextAnchor {
-    /// Beginning.
-    Start,
-    /// Middle.
-    Middle,
-    /// End.
-    End,
-}
-
-/// A text at a place. It does not widen the axes.
+/// A text that begins at a place. It does not widen the axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Annotation {
     /// The text, one line.
@@ -307,8 +279,6 @@ pub struct Annotation {
     pub at: (f64, f64),
     /// Shift from the place, px, to the right and up.
     pub shift_px: (f64, f64),
-    /// Part of the text that is at the place.
-    pub anchor: TextAnchor,
     /// Colour.
     pub colour: Colour,
 }
@@ -316,7 +286,7 @@ pub struct Annotation {
 impl Annotation {
     /// Text 6 px to the right of a point.
     pub fn new(text: impl Into<String>, at: (f64, f64)) -> Self {
-        Annotation { text: text.into(), at, shift_px: (6.0, 0.0), anchor: TextAnchor::Start, colour: INK }
+        Annotation { text: text.into(), at, shift_px: (6.0, 0.0), colour: INK }
     }
 }
 

@@ -30,15 +30,14 @@ pub mod palette;
 mod rendering;
 mod text;
 
-pub use contours::contour_item::{ContourLevel, Contours};
-pub use contours::grid::{GridError, StructuredGrid};
+pub use contours::contour_item::Contours;
+pub use contours::grid::StructuredGrid;
 pub use contours::marching::contour_lines;
 pub use figure_layout::axis::Axis;
-pub use figure_layout::figure::{Figure, LegendPlace, Panel};
-pub use figure_layout::ticks::nice_ticks;
+pub use figure_layout::figure::{Figure, Panel};
 pub use items::{
-    Annotation, Dash, EndLabel, Item, Line, LineEnd, Marker, Note, PointLabels, Polygon, Rule, RuleAt,
-    Scatter, ScatterPoint, TextAnchor,
+    Annotation, Dash, Item, Line, LineEnd, Marker, Note, PointLabels, Polygon, Rule, RuleAt, Scatter,
+    ScatterPoint,
 };
 pub use palette::Colour;
 pub use rendering::png::PngError;

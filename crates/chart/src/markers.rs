@@ -2,19 +2,11 @@
 
 use crate::Colour;
 use crate::drawing::{Drawing, Stroke};
-use crate::items::Marker;
+use crate::items::{Marker, Scatter};
 use crate::palette::WHITE;
 
-/// Style of a marker.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct MarkerStyle {
-    pub marker: Marker,
-    pub colour: Colour,
-    pub hollow: bool,
-    pub size_px: f64,
-}
-
-pub(crate) fn draw_marker(drawing: &mut Drawing, (x, y): (f64, f64), style: &MarkerStyle) {
+/// A marker in the style of `style`, at this place.
+pub(crate) fn draw_marker(drawing: &mut Drawing, (x, y): (f64, f64), style: &Scatter) {
     let size = if style.size_px.is_finite() { style.size_px.clamp(1.0, 60.0) } else { 7.0 };
     let r = size / 2.0;
     let (fill, stroke) = if style.hollow {

@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_chart::{
-    Annotation, Axis, Contours, Figure, LegendPlace, Line, LineEnd, Marker, Panel, Polygon, Rule, RuleAt,
-    Scatter, ScatterPoint, StructuredGrid, palette,
+    Annotation, Axis, Contours, Figure, Line, LineEnd, Marker, Panel, Polygon, Rule, RuleAt, Scatter,
+    ScatterPoint, StructuredGrid, palette,
 };
 use proptest::prelude::*;
 
@@ -61,12 +61,12 @@ fn figure(points: &[(f64, f64)], others: &[(f64, f64)], text: &str, range: (f64,
     let levels: Vec<f64> = others.iter().map(|p| p.1).collect();
     let panel = Panel::new(Axis::new(text), Axis::new(text))
         .title(text)
-        .with(Contours::new(grid, &levels, |z| z.to_string()).shaded().label(text))
+        .with(Contours::new(grid, &levels, |z| z.to_string()))
         .with(Polygon::new(points.to_vec(), palette::SKY).label("area"))
         .with(Line::new(points.to_vec(), palette::BLUE).arrows().label(text).end_label(text, LineEnd::Last))
         .with(Scatter::new(bars, palette::ORANGE).marker(Marker::Cross).label("points"))
         .with(Annotation::new(text, others.first().copied().unwrap_or_default()));
-    let mut fixed = panel.clone().legend(LegendPlace::Right);
+    let mut fixed = panel.clone();
     fixed.x = fixed.x.range(range.0, range.1);
     for other in others {
         fixed.add(Rule::new(RuleAt::Y(other.0)));

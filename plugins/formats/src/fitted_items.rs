@@ -16,7 +16,7 @@ pub(crate) fn add_map(panel: &mut Panel, fitted: &FittedMap, units: &MapUnits) {
     add_shade(panel, fitted);
     if let Some(grid) = fitted_surface(fitted) {
         let levels = contour_levels(grid.value_range());
-        panel.add(Contours::new(grid, &levels, percent).shaded().colour(palette::Colour(40, 80, 120)));
+        panel.add(Contours::new(grid, &levels, percent));
     }
     for line in &fitted.lines {
         let all = || line.nodes.iter().map(|n| (place(n), n.extrapolated));

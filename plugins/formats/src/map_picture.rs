@@ -86,7 +86,7 @@ fn surge_marks(map: &CompressorMap) -> Scatter {
 fn add_measured_lines(panel: &mut Panel, map: &CompressorMap, units: &MapUnits) {
     if let Some(grid) = efficiency_surface(map) {
         let levels = contour_levels(grid.value_range());
-        panel.add(Contours::new(grid, &levels, percent).shaded().colour(palette::Colour(40, 80, 120)));
+        panel.add(Contours::new(grid, &levels, percent));
     }
     for line in &map.lines {
         let curve = speed_curve(map, line);

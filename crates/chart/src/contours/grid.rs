@@ -13,59 +13,20 @@ pub struct StructuredGrid {
     z: Vec<f64>,
 }
 
-/// Reason why a grid cannot be made.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum GridError {
-    /// Coordinates or values have the wrong length.
-    #[error(
-        "a grid of {rows} rows and {columns} columns needs rows * columns values each; x has {x}, y {y}, z {z}"
-    )]
-    Length {
-        /// Requested number of rows.
-        rows: usize,
-        /// Requested number of columns.
-        columns: usize,
-        /// Number of x values.
-        x: usize,
-        /// Number of y values.
-        y: usize,
-        /// Number of z values.
-        z: usize,
-    },
-}
-
 /// A node: x, y in the axes' units, z in the field's.
 pub(crate) type Node = [f64; 3];
 
 impl StructuredGrid {
-    /// Makes a grid of node coordinates `x`, `y` (units of the axes) and values `z`, each `rows * columns` long.
-    ///
-    /// # Errors
-    /// [`GridError::Length`] if a length is wrong.
-    pub fn new(
-        rows: usize,
-        columns: usize,
-        x: Vec<f64>,
-        y: Vec<f64>,
-        z: Vec<f64>,
-    ) -> Result<Self, GridError> {
-        let expected = rows.checked_mul(columns);
-        if [x.len(), y.len(), z.len()].iter().any(|len| Some(*len) != expected) {
-            return Err(GridError::Length { rows, columns, x: x.len(), y: y.len(), z: z.len() });
-        }
-        Ok(StructuredGrid { rows, columns, x, y, z })
-    }
-
-    /// A grid over the lines `x` and `y` with `z(x, y)` at each node; rows run along x.
-    pub fn from_fn(x: &[f64], y: &[f64], z: impl Fn(f64, f64) -> f64) -> Self {
-        let nodes = || y.iter().flat_map(|y| x.iter().map(move |x| (*x, *y)));
-        StructuredGrid {
-            rows: y.len(),
-            columns: x.len(),
-            x: nodes().map(|n| n.0).collect(),
-            y: nodes().map(|n| n.1).collect(),
-            z: nodes().map(|n| z(n.0, n.1)).collect(),
-        }
+    /// Makes a grid of node coordinates `x`, `y` (units of the axes) and values `z`; `None` if one of them is not `rows * columns` long.
+    pub fn new(rows: usize, columns: usize, x: Vec<f64>, y: Vec<f64>, z: Vec<f64>) -> Option<Self> {
+        let nodes = rows.checked_mul(columns)?;
+        [x.len(), y.len(), z.len()].iter().all(|count| *count == nodes).then_some(StructuredGrid {
+            rows,
+            columns,
+            x,
+            y,
+            z,
+        })
     }
 
     /// Number of rows.

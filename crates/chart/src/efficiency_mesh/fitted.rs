@@ -29,5 +29,5 @@ pub fn fitted_surface(fitted: &FittedMap) -> Option<StructuredGrid> {
     // The values are computed by columns, but the grid is stored by rows.
     let flat =
         |field: &Vec<Vec<f64>>| (0..rows).flat_map(|r| field.iter().map(move |c| c[r])).collect::<Vec<f64>>();
-    StructuredGrid::new(rows, columns, flat(&fields[0]), flat(&fields[1]), flat(&fields[2])).ok()
+    StructuredGrid::new(rows, columns, flat(&fields[0]), flat(&fields[1]), flat(&fields[2]))
 }

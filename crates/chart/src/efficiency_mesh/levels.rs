@@ -1,6 +1,6 @@
 //! The levels of efficiency contours.
 
-use crate::nice_ticks;
+use crate::figure_layout::ticks::nice_ticks;
 
 /// Round levels (fractions), finer near the best efficiency, where the map is flat.
 pub fn contour_levels(range: Option<(f64, f64)>) -> Vec<f64> {

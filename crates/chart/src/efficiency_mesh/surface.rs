@@ -63,7 +63,7 @@ pub fn interpolated_lines(map: &CompressorMap) -> Option<Vec<InterpolatedLine>> 
 pub fn efficiency_surface(map: &CompressorMap) -> Option<StructuredGrid> {
     let lines = interpolated_lines(map)?;
     let field = |field: usize| lines.iter().flat_map(|line| &line.nodes).map(|node| node[field]).collect();
-    StructuredGrid::new(lines.len(), COLUMNS, field(0), field(1), field(2)).ok()
+    StructuredGrid::new(lines.len(), COLUMNS, field(0), field(1), field(2))
 }
 
 /// Spans of flow (kg/s) and pressure ratio over the lines, above 0.
@@ -78,14 +78,14 @@ fn spans(lines: &[SpeedLine]) -> Option<(f64, f64)> {
 
 /// Sorts the points of a line from surge to choke by flow minus pressure ratio, so that noise does not change the order of
 /// points on the steep part at choke or on the flat part at surge.
-pub fn surge_to_choke(line: &SpeedLine, (flow_span, ratio_span): (f64, f64)) -> Vec<&MapPoint> {
+fn surge_to_choke(line: &SpeedLine, (flow_span, ratio_span): (f64, f64)) -> Vec<&MapPoint> {
     let mut points: Vec<&MapPoint> = line.points.iter().collect();
     let key = |p: &MapPoint| p.flow_corrected_kg_s / flow_span - p.pressure_ratio / ratio_span;
     points.sort_by(|a, b| key(a).total_cmp(&key(b)));
     points
 }
 
-/// Sorts the points of a line from surge to choke by flow minus pressure ratio, each divided by its span over the map.
+/// The points of a line from surge to choke.
 pub fn points_surge_to_choke<'a>(map: &CompressorMap, line: &'a SpeedLine) -> Vec<&'a MapPoint> {
     surge_to_choke(line, spans(&map.lines).unwrap_or((1.0, 1.0)))
 }

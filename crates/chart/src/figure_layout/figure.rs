@@ -2,19 +2,7 @@
 
 use crate::{Axis, Item};
 
-/// Position of the legend; never inside the drawing area, so it never covers data.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum LegendPlace {
-    /// Below the axis title, in rows.
-    #[default]
-    Below,
-    /// To the right, one entry a line.
-    Right,
-    /// Nowhere.
-    None,
-}
-
-/// A pair of axes with its items.
+/// A pair of axes with its items. The legend is below the axes, so that it never covers data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
     /// Title, e.g. `(a) 110 to 50 krpm`; empty for none.
@@ -25,14 +13,12 @@ pub struct Panel {
     pub y: Axis,
     /// Contents, in drawing order.
     pub items: Vec<Item>,
-    /// Position of the legend.
-    pub legend: LegendPlace,
 }
 
 impl Panel {
     /// An empty panel.
     pub fn new(x: Axis, y: Axis) -> Self {
-        Panel { title: String::new(), x, y, items: Vec::new(), legend: LegendPlace::Below }
+        Panel { title: String::new(), x, y, items: Vec::new() }
     }
 
     /// Sets the title.
@@ -50,12 +36,6 @@ impl Panel {
     /// Adds something to show.
     pub fn add(&mut self, item: impl Into<Item>) {
         self.items.push(item.into());
-    }
-
-    /// Places the legend.
-    pub fn legend(mut self, place: LegendPlace) -> Self {
-        self.legend = place;
-        self
     }
 }
 

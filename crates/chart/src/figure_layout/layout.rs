@@ -4,7 +4,7 @@ use crate::figure_layout::clip::Rect;
 use crate::figure_layout::frame::{Frame, fit_scales};
 use crate::figure_layout::legend::{Entry, ROW_PX, entries, flow};
 use crate::text::{width_px, wrap};
-use crate::{Figure, LegendPlace, Panel};
+use crate::{Figure, Panel};
 
 pub(crate) const TITLE_PX: f64 = 18.0;
 pub(crate) const SUBTITLE_PX: f64 = 13.0;
@@ -14,12 +14,16 @@ pub(crate) const TICK_PX: f64 = 12.0;
 pub(crate) const MARGIN_PX: f64 = 16.0;
 /// Ticks, their labels and the axis title below a drawing area.
 const BELOW_PX: f64 = 54.0;
+/// Room to the right of a drawing area.
+const RIGHT_PX: f64 = 10.0;
+/// Gap between panels side by side.
+const GAP_PX: f64 = 18.0;
 
 /// A panel with the positions of its parts.
 pub(crate) struct PlacedPanel<'a> {
     pub panel: &'a Panel,
     pub frame: Frame,
-    pub entries: Vec<Entry>,
+    pub entries: Vec<Entry<'a>>,
     pub legend_places: Vec<(f64, f64)>,
     pub legend_origin: (f64, f64),
 }
@@ -43,26 +47,20 @@ pub(crate) fn layout(figure: &Figure) -> Sheet<'_> {
         .iter()
         .map(|panel| {
             let (x, y) = fit_scales(panel, width, height);
-            let entries = if panel.legend == LegendPlace::None { Vec::new() } else { entries(panel) };
             let tick_width = y.ticks.iter().map(|t| width_px(&t.1, TICK_PX)).fold(0.0, f64::max);
             let left = 10.0 + tick_width + if panel.y.title.is_empty() { 0.0 } else { 10.0 + AXIS_TITLE_PX };
-            let right = match panel.legend {
-                LegendPlace::Right => 14.0 + entries.iter().map(Entry::width_px).fold(0.0, f64::max),
-                _ => 10.0,
-            };
-            (panel, x, y, entries, left, right)
+            (panel, x, y, left)
         })
         .collect();
 
     // Equal widths in a column keep the frames aligned.
-    let max_in_column = |column: usize, part: &dyn Fn(usize) -> f64| {
-        (column..measured.len()).step_by(columns).map(part).fold(0.0, f64::max)
+    let max_in_column = |column: usize| {
+        measured[column.min(measured.len())..].iter().step_by(columns).map(|m| m.3).fold(0.0, f64::max)
     };
-    let lefts: Vec<f64> = (0..columns).map(|c| max_in_column(c, &|i| measured[i].4)).collect();
-    let rights: Vec<f64> = (0..columns).map(|c| max_in_column(c, &|i| measured[i].5)).collect();
+    let lefts: Vec<f64> = (0..columns).map(max_in_column).collect();
     let sheet_width = 2.0 * MARGIN_PX
-        + lefts.iter().zip(&rights).map(|(left, right)| left + width + right).sum::<f64>()
-        + 18.0 * (columns - 1) as f64;
+        + lefts.iter().map(|left| left + width + RIGHT_PX).sum::<f64>()
+        + GAP_PX * (columns - 1) as f64;
 
     let text_width = sheet_width - 2.0 * MARGIN_PX;
     let title = wrap(&figure.title, TITLE_PX, text_width);
@@ -78,7 +76,7 @@ pub(crate) fn layout(figure: &Figure) -> Sheet<'_> {
         let frame_top = top + title_room;
         let mut cell_height: f64 = height + BELOW_PX;
         let mut left = MARGIN_PX;
-        for (column, (panel, x, y, entries, ..)) in row.into_iter().enumerate() {
+        for (column, (panel, x, y, _)) in row.into_iter().enumerate() {
             let frame_left = left + lefts[column];
             let rect = Rect {
                 left: frame_left,
@@ -86,23 +84,13 @@ pub(crate) fn layout(figure: &Figure) -> Sheet<'_> {
                 right: frame_left + width,
                 bottom: frame_top + height,
             };
-            let (legend_places, legend_origin) = if panel.legend == LegendPlace::Right {
-                let places = (0..entries.len()).map(|i| (0.0, i as f64 * ROW_PX)).collect();
-                cell_height = cell_height.max(entries.len() as f64 * ROW_PX);
-                (places, (rect.right + 14.0, rect.top))
-            } else {
-                let (places, count) = flow(&entries, width + lefts[column] - 10.0);
-                cell_height = cell_height.max(height + BELOW_PX + count as f64 * ROW_PX + 4.0);
-                (places, (left + 10.0, rect.bottom + BELOW_PX))
-            };
-            panels.push(PlacedPanel {
-                panel,
-                frame: Frame { rect, x, y },
-                entries,
-                legend_places,
-                legend_origin,
-            });
-            left = rect.right + rights[column] + 18.0;
+            let entries = entries(panel);
+            let (legend_places, count) = flow(&entries, width + lefts[column] - 10.0);
+            cell_height = cell_height.max(height + BELOW_PX + count as f64 * ROW_PX + 4.0);
+            let legend_origin = (left + 10.0, rect.bottom + BELOW_PX);
+            let frame = Frame { rect, x, y };
+            panels.push(PlacedPanel { panel, frame, entries, legend_places, legend_origin });
+            left = rect.right + RIGHT_PX + GAP_PX;
         }
         top = frame_top + cell_height + 8.0;
     }

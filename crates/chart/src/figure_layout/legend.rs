@@ -1,9 +1,9 @@
 //! Entries of a legend, and their positions.
 
-use crate::drawing::{Drawing, Stroke, TextStyle};
-use crate::items::{Dash, Item, TextAnchor};
-use crate::markers::{MarkerStyle, draw_marker};
-use crate::palette::INK;
+use crate::drawing::{Drawing, Stroke, TextAnchor, TextStyle};
+use crate::items::{Item, Scatter};
+use crate::markers::draw_marker;
+use crate::palette::{GREY, INK};
 use crate::text::{cut, width_px};
 use crate::{Colour, Panel};
 
@@ -15,20 +15,20 @@ const LONGEST_TEXT_PX: f64 = 420.0;
 
 /// A symbol in the legend.
 #[derive(Debug, Clone, Copy)]
-enum Swatch {
+enum Swatch<'a> {
     Line(Stroke),
-    Marker(MarkerStyle),
+    Marker(&'a Scatter),
     Area(Colour, f64),
 }
 
 /// A text with the symbol that it explains.
 #[derive(Debug, Clone)]
-pub(crate) struct Entry {
+pub(crate) struct Entry<'a> {
     text: String,
-    swatches: Vec<Swatch>,
+    swatches: Vec<Swatch<'a>>,
 }
 
-impl Entry {
+impl Entry<'_> {
     pub(crate) fn width_px(&self) -> f64 {
         SWATCH_PX + 6.0 + width_px(&self.text, FONT_PX) + GAP_PX
     }
@@ -39,32 +39,20 @@ impl Entry {
 }
 
 /// One entry per text, in order of first appearance.
-pub(crate) fn entries(panel: &Panel) -> Vec<Entry> {
-    let mut entries: Vec<Entry> = Vec::new();
+pub(crate) fn entries(panel: &Panel) -> Vec<Entry<'_>> {
+    let mut entries: Vec<Entry<'_>> = Vec::new();
     for item in &panel.items {
         let (label, swatch) = match item {
             Item::Line(line) => (
                 &line.label,
                 Swatch::Line(Stroke { colour: line.colour, width_px: line.width_px, dash: line.dash }),
             ),
-            Item::Scatter(scatter) => (
-                &scatter.label,
-                Swatch::Marker(MarkerStyle {
-                    marker: scatter.marker,
-                    colour: scatter.colour,
-                    hollow: scatter.hollow,
-                    size_px: scatter.size_px,
-                }),
-            ),
+            Item::Scatter(scatter) => (&scatter.label, Swatch::Marker(scatter)),
             Item::Rule(rule) => {
-                (&rule.label, Swatch::Line(Stroke { colour: rule.colour, width_px: 1.2, dash: rule.dash }))
+                (&rule.label, Swatch::Line(Stroke { colour: GREY, width_px: 1.2, dash: rule.dash }))
             }
-            Item::Contours(contours) => (
-                &contours.label,
-                Swatch::Line(Stroke { colour: contours.colour, width_px: 1.2, dash: Dash::Solid }),
-            ),
             Item::Polygon(polygon) => (&polygon.label, Swatch::Area(polygon.colour, polygon.opacity)),
-            Item::Annotation(_) | Item::PointLabels(_) => continue,
+            Item::Contours(_) | Item::Annotation(_) | Item::PointLabels(_) => continue,
         };
         let Some(label) = label else { continue };
         let text = cut(label, FONT_PX, LONGEST_TEXT_PX);
@@ -79,7 +67,7 @@ pub(crate) fn entries(panel: &Panel) -> Vec<Entry> {
 }
 
 /// Upper left corners of entries in rows of `width` px, and the number of rows.
-pub(crate) fn flow(entries: &[Entry], width: f64) -> (Vec<(f64, f64)>, usize) {
+pub(crate) fn flow(entries: &[Entry<'_>], width: f64) -> (Vec<(f64, f64)>, usize) {
     // Equal columns are easier to read than ragged rows.
     let cell = entries.iter().map(Entry::width_px).fold(1.0, f64::max);
     let columns = ((width / cell) as usize).max(1);
@@ -88,13 +76,13 @@ pub(crate) fn flow(entries: &[Entry], width: f64) -> (Vec<(f64, f64)>, usize) {
     (places, entries.len().div_ceil(columns))
 }
 
-pub(crate) fn draw(drawing: &mut Drawing, entries: &[Entry], places: &[(f64, f64)], origin: (f64, f64)) {
+pub(crate) fn draw(drawing: &mut Drawing, entries: &[Entry<'_>], places: &[(f64, f64)], origin: (f64, f64)) {
     for (entry, place) in entries.iter().zip(places) {
         let (x, y) = (origin.0 + place.0, origin.1 + place.1 + 0.5 * ROW_PX);
         for swatch in &entry.swatches {
             match swatch {
                 Swatch::Line(stroke) => drawing.line((x, y), (x + SWATCH_PX, y), stroke),
-                Swatch::Marker(style) => draw_marker(drawing, (x + 0.5 * SWATCH_PX, y), style),
+                Swatch::Marker(scatter) => draw_marker(drawing, (x + 0.5 * SWATCH_PX, y), scatter),
                 Swatch::Area(colour, opacity) => {
                     let (x2, top, bottom) = (x + SWATCH_PX, y - 6.0, y + 6.0);
                     drawing.areas(&[vec![(x, top), (x2, top), (x2, bottom), (x, bottom)]], *colour, *opacity);

@@ -25,7 +25,7 @@ pub(crate) fn valid_range(low: f64, high: f64) -> (f64, f64) {
 /// Round numbers (1, 2, 2.5 or 5 times a power of ten apart) between `low` and `high`, about `target` of them.
 ///
 /// At least two and at most 4 `target` + 4. An empty, infinite or NaN range is replaced by a valid one.
-pub fn nice_ticks(low: f64, high: f64, target: usize) -> Vec<f64> {
+pub(crate) fn nice_ticks(low: f64, high: f64, target: usize) -> Vec<f64> {
     let (low, high) = valid_range(low, high);
     let target = target.clamp(1, 1000);
     // A round step may give one tick or none; a readable axis needs two.

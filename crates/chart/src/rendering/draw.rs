@@ -3,7 +3,7 @@
 use crate::contours::bands::band;
 use crate::contours::contour_label::{place, without_gap};
 use crate::contours::marching::contour_lines;
-use crate::drawing::{Drawing, Stroke, TextStyle};
+use crate::drawing::{Drawing, Stroke, TextAnchor, TextStyle};
 use crate::figure_layout::clip::{self, Rect};
 use crate::figure_layout::frame::Frame;
 use crate::figure_layout::layout::{
@@ -11,14 +11,16 @@ use crate::figure_layout::layout::{
 };
 use crate::figure_layout::legend;
 use crate::figure_layout::point_labels::Surroundings;
-use crate::items::{Annotation, Dash, Item, Line, LineEnd, Rule, RuleAt, Scatter, TextAnchor};
-use crate::markers::{MarkerStyle, draw_arrow, draw_marker};
-use crate::palette::{INK, LIGHT_GREY};
+use crate::items::{Annotation, Item, Line, LineEnd, Rule, RuleAt, Scatter};
+use crate::markers::{draw_arrow, draw_marker};
+use crate::palette::{BLUE, Colour, GREY, INK, LIGHT_GREY};
 use crate::text::{cut, width_px};
 use crate::{Contours, Figure, Panel};
 
 const LABEL_PX: f64 = 11.0;
 const MAX_LEVELS: usize = 100;
+/// Colour of contour lines and their labels: dark blue, which stands out on the shading.
+const CONTOUR: Colour = Colour(40, 80, 120);
 
 /// A text that is drawn after everything else, so that no line crosses it.
 struct LateText {
@@ -88,7 +90,7 @@ fn find_obstacles(frame: &Frame, items: &[Item]) -> Vec<(f64, f64)> {
                 out.extend(line.points.windows(2).map(|pair| frame.px(middle(pair))));
             }
             Item::Line(line) => {
-                let half = line.end_label.as_ref().map_or(0.0, |label| 0.5 * width_px(&label.text, LABEL_PX));
+                let half = line.end_label.as_ref().map_or(0.0, |(text, _)| 0.5 * width_px(text, LABEL_PX));
                 let text = end_label_at(frame, line);
                 out.extend(text.iter().flat_map(|at| [-half, 0.0, half].map(|dx| (at.0 + dx, at.1))));
             }
@@ -148,8 +150,8 @@ fn draw_line(drawing: &mut Drawing, frame: &Frame, line: &Line, late: &mut Vec<L
             }
         }
     }
-    let (Some(label), Some(at)) = (&line.end_label, end_label_at(frame, line)) else { return };
-    let width = width_px(&label.text, LABEL_PX);
+    let (Some((text, _)), Some(at)) = (&line.end_label, end_label_at(frame, line)) else { return };
+    let width = width_px(text, LABEL_PX);
     // Overlapping texts are illegible, so the earlier one is kept.
     let covered = |earlier: &LateText| {
         (earlier.at.0 - at.0).abs() < 0.5 * (width + width_px(&earlier.text, LABEL_PX))
@@ -157,16 +159,16 @@ fn draw_line(drawing: &mut Drawing, frame: &Frame, line: &Line, late: &mut Vec<L
     };
     if !late.iter().filter(|text| text.at_line_end).any(covered) {
         let style = TextStyle::new(LABEL_PX, line.colour, TextAnchor::Middle).halo().bold();
-        late.push(LateText { at, text: label.text.clone(), style, at_line_end: true });
+        late.push(LateText { at, text: text.clone(), style, at_line_end: true });
     }
 }
 
 /// Middle of the text at a line's end.
 fn end_label_at(frame: &Frame, line: &Line) -> Option<(f64, f64)> {
-    let label = line.end_label.as_ref()?;
+    let (text, end) = line.end_label.as_ref()?;
     let points: Vec<_> = line.points.iter().map(|p| frame.px(*p)).collect();
     let pieces = clip::polyline(&points, &frame.rect);
-    let ends = match label.end {
+    let ends = match end {
         LineEnd::First => pieces.first().map(|p| (p[1], p[0])),
         LineEnd::Last => pieces.last().map(|p| (p[p.len() - 2], p[p.len() - 1])),
     };
@@ -176,7 +178,7 @@ fn end_label_at(frame: &Frame, line: &Line) -> Option<(f64, f64)> {
     let (inner, end) = ends.or(single.map(|p| ((p.0 - 1.0, p.1), p)))?;
     let length = (end.0 - inner.0).hypot(end.1 - inner.1).max(1e-9);
     let (ux, uy) = ((end.0 - inner.0) / length, (end.1 - inner.1) / length);
-    let half_width = 0.5 * width_px(&label.text, LABEL_PX);
+    let half_width = 0.5 * width_px(text, LABEL_PX);
     // The distance that the box of the text needs in this direction, within the frame.
     let centre = (end.0 + ux * (half_width + 8.0), end.1 + uy * 14.0);
     let y = centre.1.clamp(frame.rect.top + 8.0, frame.rect.bottom - 8.0);
@@ -187,12 +189,6 @@ fn end_label_at(frame: &Frame, line: &Line) -> Option<(f64, f64)> {
 }
 
 fn draw_scatter(drawing: &mut Drawing, frame: &Frame, scatter: &Scatter) {
-    let style = MarkerStyle {
-        marker: scatter.marker,
-        colour: scatter.colour,
-        hollow: scatter.hollow,
-        size_px: scatter.size_px,
-    };
     for point in &scatter.points {
         for (interval, along_x) in [(point.x_interval, true), (point.y_interval, false)] {
             let Some((low, high)) = interval else { continue };
@@ -204,8 +200,8 @@ fn draw_scatter(drawing: &mut Drawing, frame: &Frame, scatter: &Scatter) {
         let at = frame.px((point.x, point.y));
         if at.0.is_finite() && at.1.is_finite() && frame.rect.contains(at) {
             match scatter.notes.get(index) {
-                None => draw_marker(drawing, at, &style),
-                Some(note) => drawing.noted(note, |drawing| draw_marker(drawing, at, &style)),
+                None => draw_marker(drawing, at, scatter),
+                Some(note) => drawing.noted(note, |drawing| draw_marker(drawing, at, scatter)),
             }
         }
     }
@@ -235,7 +231,7 @@ fn draw_rule(drawing: &mut Drawing, frame: &Frame, rule: &Rule) {
         RuleAt::Y(value) => [(frame.x.low, value), (frame.x.high, value)],
         RuleAt::X(value) => [(value, frame.y.low), (value, frame.y.high)],
     };
-    let stroke = Stroke { colour: rule.colour, width_px: 1.2, dash: rule.dash };
+    let stroke = Stroke { colour: GREY, width_px: 1.2, dash: rule.dash };
     for piece in clip::polyline(&ends.map(|p| frame.px(p)), &frame.rect) {
         drawing.polyline(&piece, &stroke);
     }
@@ -249,28 +245,25 @@ fn draw_contours(
     late: &mut Vec<LateText>,
 ) {
     let levels = &contours.levels[..contours.levels.len().min(MAX_LEVELS)];
-    if let Some(shade) = contours.shade {
-        let mut edges = vec![f64::NEG_INFINITY];
-        edges.extend(levels.iter().map(|level| level.value));
-        edges.push(f64::INFINITY);
-        for (i, pair) in edges.windows(2).enumerate() {
-            let share = i as f64 / (edges.len() - 2).max(1) as f64;
-            let polygons: Vec<_> = band(&contours.grid, pair[0], pair[1])
-                .into_iter()
-                .map(|p| clip::polygon(&p.into_iter().map(|p| frame.px(p)).collect::<Vec<_>>(), &frame.rect))
-                .collect();
-            // Light enough that markers and texts stand out on the darkest.
-            drawing.areas(&polygons, shade.tint(0.04 + 0.30 * share), 1.0);
-        }
+    let mut edges = vec![f64::NEG_INFINITY];
+    edges.extend(levels.iter().map(|(level, _)| level));
+    edges.push(f64::INFINITY);
+    for (i, pair) in edges.windows(2).enumerate() {
+        let share = i as f64 / (edges.len() - 2).max(1) as f64;
+        let polygons: Vec<_> = band(&contours.grid, pair[0], pair[1])
+            .into_iter()
+            .map(|p| clip::polygon(&p.into_iter().map(|p| frame.px(p)).collect::<Vec<_>>(), &frame.rect))
+            .collect();
+        // Light enough that markers and texts stand out on the darkest.
+        drawing.areas(&polygons, BLUE.tint(0.04 + 0.30 * share), 1.0);
     }
-    let stroke = Stroke { colour: contours.colour, width_px: 1.0, dash: Dash::Solid };
-    for level in levels {
-        let width = width_px(&level.label, LABEL_PX);
-        for chain in contour_lines(&contours.grid, level.value) {
+    let stroke = Stroke::solid(CONTOUR, 1.0);
+    for (level, label) in levels {
+        let width = width_px(label, LABEL_PX);
+        for chain in contour_lines(&contours.grid, *level) {
             let points: Vec<_> = chain.into_iter().map(|p| frame.px(p)).collect();
             for piece in clip::polyline(&points, &frame.rect) {
-                let place = if level.label.is_empty() { None } else { place(&piece, width, obstacles) };
-                let Some(place) = place else {
+                let Some(place) = place(&piece, width, obstacles) else {
                     drawing.polyline(&piece, &stroke);
                     continue;
                 };
@@ -280,9 +273,8 @@ fn draw_contours(
                 obstacles.push(place.centre);
                 late.push(LateText {
                     at: place.centre,
-                    text: level.label.clone(),
-                    style: TextStyle::new(LABEL_PX, contours.colour, TextAnchor::Middle)
-                        .turned(place.turn_deg),
+                    text: label.clone(),
+                    style: TextStyle::new(LABEL_PX, CONTOUR, TextAnchor::Middle).turned(place.turn_deg),
                     at_line_end: false,
                 });
             }
@@ -325,7 +317,7 @@ fn add_annotation(frame: &Frame, item: &Annotation, late: &mut Vec<LateText>) {
     let (x, y) = frame.px(item.at);
     let at = (x + item.shift_px.0, y - item.shift_px.1);
     if at.0.is_finite() && at.1.is_finite() && frame.rect.contains(at) {
-        let style = TextStyle::new(LABEL_PX, item.colour, item.anchor).halo();
+        let style = TextStyle::new(LABEL_PX, item.colour, TextAnchor::Start).halo();
         late.push(LateText { at, text: item.text.clone(), style, at_line_end: false });
     }
 }

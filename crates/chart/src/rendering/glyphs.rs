@@ -3,8 +3,8 @@
 //! Letters are placed from left to right with the kerning of the font, which is sufficient for titles, units and numbers. Joined or
 //! right-to-left scripts are correct only in the SVG, because the viewer sets its text.
 
+use crate::drawing::TextAnchor;
 use crate::drawing::{Px, TextStyle};
-use crate::items::TextAnchor;
 use tiny_skia::{Path, PathBuilder, Transform};
 use ttf_parser::{Face, GlyphId, OutlineBuilder};
 

@@ -1,7 +1,7 @@
 //! A drawing as SVG, with fixed number formatting.
 
+use crate::drawing::TextAnchor;
 use crate::drawing::{Drawing, Px, Shape, Stroke, TextStyle};
-use crate::items::TextAnchor;
 use crate::palette::WHITE;
 use crate::text::escape;
 use std::fmt::Write;

@@ -1,8 +1,9 @@
 //! Merges parts into the result, which is the same for any number of machines and any order of work.
 
-use crate::directory::shared_files::{Machine, make_directory};
+use crate::directory::part::PartRefusal;
+use crate::directory::shared_files::{Machine, file_name_safe, make_directory};
 use crate::status::{Status, UnfinishedItem};
-use crate::{Fleet, FleetError, Kind, Outcome, Output, PartRefusal};
+use crate::{Fleet, FleetError, Kind, Outcome, Output};
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
@@ -39,12 +40,9 @@ impl Fleet {
                 Some(Ok((part, body))) if part.outcome == Outcome::Done => Ok(body),
                 Some(Ok((_, reason))) => Err(reason),
                 Some(Err(refusal)) => {
-                    let reason = Some(refusal.to_string());
-                    damaged.borrow_mut().push(UnfinishedItem {
-                        name: item.name.clone(),
-                        hash: item.hash,
-                        why: reason,
-                    });
+                    let why = Some(refusal.to_string());
+                    let (name, hash) = (item.name.clone(), item.hash);
+                    damaged.borrow_mut().push(UnfinishedItem { name, hash, why });
                     Err(refusal.to_string())
                 }
                 None => Err("missing".to_owned()),
@@ -109,8 +107,4 @@ fn install(new: &Path, result: &Path) -> Result<(), FleetError> {
         let _ = std::fs::remove_file(result.join(name));
     }
     Ok(())
-}
-
-fn file_name_safe(name: &str) -> String {
-    name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect()
 }

@@ -18,7 +18,7 @@ pub struct Template {
 }
 
 /// Largest template, bytes.
-const MAX_FILE_BYTES: u64 = 64 << 10;
+const MAX_FILE_BYTES: usize = 64 << 10;
 
 impl Template {
     /// Slurm.
@@ -100,7 +100,7 @@ pub fn query_task_states(template: &Template, job: &str) -> Option<BTreeMap<Stri
     for _ in 0..QUERY_ATTEMPTS {
         if child.try_wait().ok()?.is_some() {
             let mut printed = String::new();
-            child.stdout.take()?.take(MAX_FILE_BYTES * 16).read_to_string(&mut printed).ok()?;
+            child.stdout.take()?.take(MAX_FILE_BYTES as u64 * 16).read_to_string(&mut printed).ok()?;
             let mut states = BTreeMap::new();
             for state in printed.lines().map(str::trim).filter(|line| !line.is_empty()) {
                 *states.entry(state.to_lowercase()).or_insert(0) += 1;

@@ -2,6 +2,7 @@
 
 use crate::directory::fleet::part_name;
 use crate::directory::part::Outcome;
+use crate::directory::shared_files::read_at_most;
 use crate::{Fleet, Hash, ItemEntry, Part};
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -48,6 +49,11 @@ impl Status {
         self.items - self.done
     }
 
+    /// The items without a result: failed, refused and missing.
+    pub(crate) fn unfinished_items(&self) -> impl Iterator<Item = &UnfinishedItem> {
+        self.failed.iter().chain(&self.refused).chain(&self.missing)
+    }
+
     /// Items that were started and have no part: in progress, or lost with their worker.
     pub fn started_items(&self) -> usize {
         self.missing.iter().filter(|item| item.why.is_some()).count()
@@ -88,8 +94,7 @@ impl Fleet {
     }
 
     fn worker_of(&self, item: &ItemEntry) -> Option<String> {
-        let worker =
-            crate::directory::shared_files::read_at_most(&self.progress_marker(&item.hash), 256).ok()?;
+        let worker = read_at_most(&self.progress_marker(&item.hash), 256).ok()?;
         Some(String::from_utf8_lossy(&worker).into_owned())
     }
 

@@ -156,13 +156,8 @@ impl Fleet {
         let before = self.submission()?;
         self.check_not_queued()?;
         let status = self.status();
-        let mut numbers: Vec<u64> = status
-            .failed
-            .iter()
-            .chain(&status.refused)
-            .chain(&status.missing)
-            .map(|item| Shard::holding(&item.hash, before.tasks).number())
-            .collect();
+        let mut numbers: Vec<u64> =
+            status.unfinished_items().map(|item| Shard::holding(&item.hash, before.tasks).number()).collect();
         numbers.sort_unstable();
         numbers.dedup();
         if numbers.is_empty() {
@@ -206,9 +201,8 @@ impl Fleet {
 
     /// Number of items without a result in the largest shard, for this number of shards.
     fn largest_shard(&self, status: &Status, tasks: u64) -> usize {
-        let unfinished = status.failed.iter().chain(&status.refused).chain(&status.missing);
         let mut counts = std::collections::BTreeMap::new();
-        for item in unfinished {
+        for item in status.unfinished_items() {
             *counts.entry(Shard::holding(&item.hash, tasks).number()).or_insert(0) += 1;
         }
         counts.into_values().max().unwrap_or(0)

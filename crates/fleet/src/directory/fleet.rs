@@ -1,6 +1,6 @@
 //! The directory of a study and its layout.
 
-use crate::directory::part::{Part, PartRefusal, PartRequirements};
+use crate::directory::part::{Part, PartRefusal};
 use crate::{FleetError, Hash, ItemEntry, Kind, Study};
 use std::path::{Path, PathBuf};
 
@@ -82,11 +82,7 @@ impl Fleet {
 
     /// An item's part with its body; `None` without a part.
     pub(crate) fn read_part(&self, item: &ItemEntry) -> Option<Result<(Part, String), PartRefusal>> {
-        Part::read(&self.part(&item.hash), self.expected(item))
-    }
-
-    fn expected<'a>(&'a self, item: &'a ItemEntry) -> PartRequirements<'a> {
-        PartRequirements { hash: &item.hash, program: &self.study.program }
+        Part::read(&self.part(&item.hash), &item.hash, &self.study.program)
     }
 }
 

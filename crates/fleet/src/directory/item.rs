@@ -7,7 +7,7 @@ use serde_json::Value;
 use std::path::Path;
 
 /// Largest file of an item, bytes: a campaign with its map file.
-const MAX_FILE_BYTES: u64 = 32 << 20;
+const MAX_FILE_BYTES: usize = 32 << 20;
 
 /// The work, and the program that does it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

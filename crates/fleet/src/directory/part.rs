@@ -76,16 +76,6 @@ pub enum PartRefusal {
     /// Its content was changed.
     #[error("has been changed: its checksum is wrong")]
     Checksum,
-    /// The kind cannot read its content.
-    #[error("has the wrong content: {0}")]
-    Content(String),
-}
-
-/// Requirements of a part file.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct PartRequirements<'a> {
-    pub hash: &'a Hash,
-    pub program: &'a str,
 }
 
 impl Part {
@@ -112,17 +102,18 @@ impl Part {
         Ok(part)
     }
 
-    /// A part with its body, whose checksum is checked; `None` without a file.
+    /// The part of the item `hash` by `program`, with its body, whose checksum is checked; `None` without a file.
     pub(crate) fn read(
         path: &Path,
-        expected: PartRequirements<'_>,
+        hash: &Hash,
+        program: &str,
     ) -> Option<Result<(Part, String), PartRefusal>> {
         match std::fs::symlink_metadata(path) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => None,
             Err(error) => Some(Err(PartRefusal::Unread(error.to_string()))),
             // A pipe would hang, and a link may lead anywhere.
             Ok(metadata) if !metadata.is_file() => Some(Err(PartRefusal::NotAPart)),
-            Ok(_) => Some(read_body(path, expected)),
+            Ok(_) => Some(read_body(path, hash, program)),
         }
     }
 }
@@ -132,17 +123,17 @@ fn unread(error: impl std::fmt::Display) -> PartRefusal {
 }
 
 /// The header, the file, and the bytes of the body that were read with the header.
-fn open(path: &Path, expected: PartRequirements<'_>) -> Result<(Part, File, Vec<u8>), PartRefusal> {
+fn open(path: &Path, hash: &Hash, program: &str) -> Result<(Part, File, Vec<u8>), PartRefusal> {
     let mut file = mapper_yaml::open_file(path).map_err(unread)?;
     let length = file.metadata().map_err(unread)?.len();
     let mut bytes = Vec::with_capacity(MAX_HEADER_BYTES);
     (&mut file).take(MAX_HEADER_BYTES as u64).read_to_end(&mut bytes).map_err(unread)?;
     let end = bytes.iter().position(|byte| *byte == b'\n').ok_or(PartRefusal::NotAPart)?;
     let part: Part = serde_json::from_slice(&bytes[..end]).map_err(|_| PartRefusal::NotAPart)?;
-    if part.item != *expected.hash {
+    if part.item != *hash {
         return Err(PartRefusal::OtherItem(part.item));
     }
-    if part.program != expected.program {
+    if part.program != program {
         return Err(PartRefusal::OtherProgram(part.program));
     }
     if part.body_bytes > MAX_BODY_BYTES {
@@ -155,8 +146,8 @@ fn open(path: &Path, expected: PartRequirements<'_>) -> Result<(Part, File, Vec<
     Ok((part, file, bytes.split_off(end + 1)))
 }
 
-fn read_body(path: &Path, expected: PartRequirements<'_>) -> Result<(Part, String), PartRefusal> {
-    let (part, file, mut body) = open(path, expected)?;
+fn read_body(path: &Path, hash: &Hash, program: &str) -> Result<(Part, String), PartRefusal> {
+    let (part, file, mut body) = open(path, hash, program)?;
     file.take(MAX_BODY_BYTES + 1).read_to_end(&mut body).map_err(unread)?;
     if Hash::of(&body) != part.body_sha256 {
         return Err(PartRefusal::Checksum);

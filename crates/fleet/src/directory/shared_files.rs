@@ -2,7 +2,7 @@
 
 use crate::FleetError;
 use std::fs::File;
-use std::io::{ErrorKind, Read, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Identity and clocks of the worker; this crate reads no clock itself.
@@ -34,8 +34,7 @@ pub(crate) fn write_whole(
 ) -> Result<(), FleetError> {
     let folder = path.parent().unwrap_or(Path::new("."));
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let writer: String = writer.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
-    let new = folder.join(format!(".{name}.{writer}.new"));
+    let new = folder.join(format!(".{name}.{}.new", file_name_safe(writer)));
     let write = || -> std::io::Result<()> {
         let mut file = File::create(&new)?;
         for piece in pieces {
@@ -54,18 +53,14 @@ pub(crate) fn write_whole(
     })
 }
 
-/// Reads a regular file of at most `limit_bytes`. A pipe or a device is not opened: it could hang.
-pub(crate) fn read_at_most(path: &Path, limit_bytes: u64) -> Result<Vec<u8>, FleetError> {
-    let read = || -> std::io::Result<Vec<u8>> {
-        let mut bytes = Vec::new();
-        mapper_yaml::open_file(path)?.take(limit_bytes + 1).read_to_end(&mut bytes)?;
-        if bytes.len() as u64 > limit_bytes {
-            let larger = format!("it is larger than the {limit_bytes} bytes that are read");
-            return Err(std::io::Error::new(ErrorKind::FileTooLarge, larger));
-        }
-        Ok(bytes)
-    };
-    read().map_err(FleetError::file("read", path))
+/// Reads a file of at most `limit_bytes`.
+pub(crate) fn read_at_most(path: &Path, limit_bytes: usize) -> Result<Vec<u8>, FleetError> {
+    mapper_yaml::read_limited(path, limit_bytes).map_err(FleetError::file("read", path))
+}
+
+/// A name without characters that mean something in a path.
+pub(crate) fn file_name_safe(name: &str) -> String {
+    name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect()
 }
 
 /// Creates a directory and its parents.

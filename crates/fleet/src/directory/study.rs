@@ -12,7 +12,7 @@ pub(crate) const LAYOUT: u32 = 1;
 /// Maximum number of items of a study.
 pub(crate) const MAX_ITEMS: usize = 1_000_000;
 /// Largest file of a study, bytes: a million items.
-const MAX_FILE_BYTES: u64 = 256 << 20;
+const MAX_FILE_BYTES: usize = 256 << 20;
 
 /// One item in the list.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

@@ -3,10 +3,22 @@
 use crate::c_text::number;
 use crate::header::DEFAULT_TOLERANCE;
 use crate::machine::{FmuError, FmuMachine};
-use crate::sources::SOURCES;
 use crate::variable::{Causality, Switch, UNITS, Variable};
 use quick_xml::escape::escape;
 use std::fmt::Write;
+
+/// Name and text of the C files that all FMUs share.
+pub(crate) const SOURCES: &[(&str, &str)] = &[
+    ("fmu.c", include_str!("../c/fmu.c")),
+    ("machine.c", include_str!("../c/machine.c")),
+    ("machine.h", include_str!("../c/machine.h")),
+    ("map.c", include_str!("../c/map.c")),
+    ("rodas5p.c", include_str!("../c/rodas5p.c")),
+    // Unchanged headers of the standard (2-clause BSD, Modelica Association).
+    ("fmi2Functions.h", include_str!("../c/fmi2/fmi2Functions.h")),
+    ("fmi2FunctionTypes.h", include_str!("../c/fmi2/fmi2FunctionTypes.h")),
+    ("fmi2TypesPlatform.h", include_str!("../c/fmi2/fmi2TypesPlatform.h")),
+];
 
 /// Writes the description with the GUID of the sources.
 pub fn description(
@@ -35,8 +47,8 @@ pub fn description(
         let _ = writeln!(xml, "      <File name=\"{name}\"/>");
     }
     xml += "    </SourceFiles>\n  </CoSimulation>\n  <UnitDefinitions>\n";
-    for unit in UNITS {
-        let _ = writeln!(xml, "    <Unit name=\"{}\"><BaseUnit {}/></Unit>", unit.name, unit.base);
+    for (name, base) in UNITS {
+        let _ = writeln!(xml, "    <Unit name=\"{name}\"><BaseUnit {base}/></Unit>");
     }
     xml += "  </UnitDefinitions>\n  <LogCategories>\n    <Category name=\"logStatusWarning\"/>\n    <Category name=\"logStatusError\"/>\n  </LogCategories>\n";
     let _ = writeln!(

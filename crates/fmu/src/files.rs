@@ -1,9 +1,8 @@
 //! The files of an FMU with their paths in the archive.
 
-use crate::description::description;
+use crate::description::{SOURCES, description};
 use crate::header::{header, with_guid};
 use crate::machine::{FmuError, FmuMachine};
-use crate::sources::SOURCES;
 use crate::variables::{switches, variables};
 use sha2::{Digest, Sha256};
 use std::fmt::Write;

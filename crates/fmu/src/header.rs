@@ -82,11 +82,8 @@ fn gases(text: &mut String, params: &Params) -> Result<(), FmuError> {
         ("TURBINE_GAS", params.turbine.gas),
         ("VAPOUR", Gas::vapour()),
     ] {
-        let list = |values: &[f64]| {
-            let numbers: Result<Vec<String>, FmuError> =
-                values.iter().map(|value| number(name, *value)).collect();
-            numbers.map(|numbers| format!("{{{}}}", numbers.join(", ")))
-        };
+        let list =
+            |values: &[f64]| numbers(name, values.iter().copied()).map(|numbers| format!("{{{numbers}}}"));
         let virials = gas.virials.unwrap_or(Virials { own: [0.0; 5], with_vapour: [0.0; 5] });
         // Writing to a String cannot fail.
         let _ = writeln!(

@@ -14,7 +14,6 @@ mod files;
 mod fitted;
 mod header;
 mod machine;
-mod sources;
 mod variable;
 mod variables;
 

@@ -37,30 +37,22 @@ pub struct Switch {
     pub description: &'static str,
 }
 
-/// A unit in the standard's base units: exponents of kg, m, s, K, rad, and a factor.
-#[derive(Debug, Clone, Copy)]
-pub struct Unit {
-    /// Name.
-    pub name: &'static str,
-    /// Base units and exponents, and the factor if it is not 1, as attributes of XML.
-    pub base: &'static str,
-}
-
-/// Every unit of the variables.
-pub const UNITS: &[Unit] = &[
-    Unit { name: "1", base: "" },
-    Unit { name: "m", base: r#"m="1""# },
-    Unit { name: "m2", base: r#"m="2""# },
-    Unit { name: "m3", base: r#"m="3""# },
-    Unit { name: "kg", base: r#"kg="1""# },
-    Unit { name: "kg/s", base: r#"kg="1" s="-1""# },
-    Unit { name: "kg.m2", base: r#"kg="1" m="2""# },
-    Unit { name: "K", base: r#"K="1""# },
-    Unit { name: "Pa", base: r#"kg="1" m="-1" s="-2""# },
-    Unit { name: "W", base: r#"kg="1" m="2" s="-3""# },
-    Unit { name: "W/K", base: r#"kg="1" m="2" s="-3" K="-1""# },
-    Unit { name: "W/(m.K)", base: r#"kg="1" m="1" s="-3" K="-1""# },
-    Unit { name: "W/(m2.K)", base: r#"kg="1" s="-3" K="-1""# },
-    Unit { name: "W.s2/rad2", base: r#"kg="1" m="2" s="-1" rad="-2""# },
-    Unit { name: "rpm", base: r#"rad="1" s="-1" factor="0.10471975511965977""# },
+/// Every unit of the variables, with its base units of the standard and their exponents (kg, m, s, K, rad), and the factor if it is not 1, as
+/// attributes of XML.
+pub const UNITS: &[(&str, &str)] = &[
+    ("1", ""),
+    ("m", r#"m="1""#),
+    ("m2", r#"m="2""#),
+    ("m3", r#"m="3""#),
+    ("kg", r#"kg="1""#),
+    ("kg/s", r#"kg="1" s="-1""#),
+    ("kg.m2", r#"kg="1" m="2""#),
+    ("K", r#"K="1""#),
+    ("Pa", r#"kg="1" m="-1" s="-2""#),
+    ("W", r#"kg="1" m="2" s="-3""#),
+    ("W/K", r#"kg="1" m="2" s="-3" K="-1""#),
+    ("W/(m.K)", r#"kg="1" m="1" s="-3" K="-1""#),
+    ("W/(m2.K)", r#"kg="1" s="-3" K="-1""#),
+    ("W.s2/rad2", r#"kg="1" m="2" s="-1" rad="-2""#),
+    ("rpm", r#"rad="1" s="-1" factor="0.10471975511965977""#),
 ];

@@ -1,12 +1,11 @@
 //! Converts session events into messages for browsers.
 
-use crate::live_run::LiveRun;
-use crate::operator_commands::OperatorCommand;
 use crate::state::{
     CurrentValues, LoggedMessage, MAX_EVENTS, MAX_POINTS, Reading, State, Step, TRACE_ROWS, TracedChannel,
 };
+use crate::web_server::server::OperatorCommand;
 use mapper_campaign::Campaign;
-use mapper_core::{Channel, IdentifiedPoint, PlanStep, SignalGuard, StepMarker};
+use mapper_core::{Channel, IdentifiedPoint, Plan, PlanStep, SignalGuard, StepMarker};
 use mapper_report::Display;
 use mapper_report::page::{LiveMap, live_map, live_point, planned, target_line_name};
 use mapper_session::{Operator, SessionEvent, soak_s};
@@ -22,6 +21,26 @@ const TICK: Duration = Duration::from_millis(200);
 /// Channels with a chart of the last minutes.
 const TRACED: [Channel; 6] =
     [Channel::T2, Channel::Tc, Channel::ShaftSpeed, Channel::CompressorFlow, Channel::P2, Channel::P3];
+
+/// The run and its stop flags.
+pub struct LiveRun<'a> {
+    /// The campaign.
+    pub campaign: &'a Campaign,
+    /// The plan.
+    pub plan: &'a Plan,
+    /// Ratio of rig time to wall-clock time; `None`: as fast as possible.
+    pub pace: Option<f64>,
+    /// Measured channels and setpoints of the rig.
+    pub channels: &'a [Channel],
+    /// Epoch time of run time 0, ns, as in the recording.
+    pub start_time_ns: u64,
+    /// Operator requests read by the runner.
+    pub operator: Arc<Operator>,
+    /// Stops at the end of the step.
+    pub after_step: Arc<AtomicBool>,
+    /// Stops now.
+    pub now: Arc<AtomicBool>,
+}
 
 /// Keeps the state and returns its changes.
 pub(crate) struct Feed {

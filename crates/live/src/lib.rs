@@ -11,15 +11,13 @@ mod feed;
 mod foxglove_stream;
 mod live;
 mod live_error;
-mod live_run;
 mod observers;
-mod operator_commands;
 mod state;
 mod web_server;
 
+pub use feed::LiveRun;
 #[cfg(feature = "foxglove")]
 pub use foxglove_stream::{FoxgloveStream, FoxgloveStreamError};
 pub use live_error::LiveError;
-pub use live_run::LiveRun;
 pub use observers::{ObserverRequest, Observers};
 pub use web_server::tls::{TlsError, TlsFiles};

@@ -1,12 +1,10 @@
 //! The live page of a run: opened before the run, updated during it, closed after it.
 
-use crate::feed::Feed;
+use crate::feed::{Feed, LiveRun};
 use crate::live_error::LiveError;
-use crate::live_run::LiveRun;
-use crate::operator_commands::OperatorCommand;
 use crate::web_server::access::Access;
 use crate::web_server::hub::Hub;
-use crate::web_server::server::{ServedContent, serve};
+use crate::web_server::server::{OperatorCommand, ServedContent, serve};
 use crate::web_server::tls::{Tls, TlsFiles, read};
 use mapper_report::page::live_page;
 use mapper_session::SessionEvent;

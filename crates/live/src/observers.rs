@@ -1,10 +1,10 @@
 //! All observers of a run: browsers on its live page, and the Foxglove stream.
 
+use crate::feed::LiveRun;
 #[cfg(feature = "foxglove")]
 use crate::foxglove_stream::FoxgloveStream;
 use crate::live::Live;
 use crate::live_error::LiveError;
-use crate::live_run::LiveRun;
 use crate::web_server::tls::TlsFiles;
 use mapper_session::SessionEvent;
 use std::path::Path;

@@ -1,6 +1,5 @@
 //! The server: one thread per connection, one request per connection.
 
-use crate::operator_commands::OperatorCommand;
 use crate::web_server::access::Access;
 use crate::web_server::connections::{Connection, Connections};
 use crate::web_server::hub::Hub;
@@ -20,6 +19,19 @@ const WRITE_BYTES: usize = 1 << 14;
 const HEARTBEAT: Duration = Duration::from_secs(2);
 const HEADERS: &str = "Cache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\nReferrer-Policy: no-referrer\r\n\
                        X-Frame-Options: DENY\r\nConnection: close\r\n";
+
+/// Command of a button.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum OperatorCommand {
+    /// Hold the current step.
+    Hold,
+    /// Continue after a hold.
+    Continue,
+    /// Stop the run at the end of the step.
+    StopAfterStep,
+    /// Go to the safe state now.
+    SafeNow,
+}
 
 /// The served content.
 pub(crate) struct ServedContent {

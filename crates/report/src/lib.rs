@@ -29,7 +29,7 @@ pub use diagnosis::stand_actions::{next_measurement, stand_actions};
 pub use formatting::bar_text::{progress_text, short_duration};
 pub use formatting::display::Display;
 pub use formatting::duration::duration;
-pub use formatting::number::{four_figures, number, percent};
+pub use formatting::number::{four_figures, number, percent, significant_digits};
 pub use formatting::paint::{Paint, paint_verdict};
 pub use formatting::table::{TextTable, with_heads};
 pub use formatting::wrapped::wrapped;
@@ -89,8 +89,10 @@ pub use test_report::instruments::{
 pub use test_report::key_figures::key_figures;
 pub use test_report::repeated_jumps::repeated_jumps_text;
 pub use test_report::run_report::{
-    ReportSource, RunReport, SurgeReport, condition_facts, cover_facts, instant, provenance_facts, run_report,
+    ReportSource, RunReport, condition_facts, cover_facts, instant, provenance_facts, run_report,
 };
 pub use test_report::sensors_text::{declared_sensors_text, sensors_text};
-pub use test_report::surge_text::{surge_columns_text, surge_heads, surge_remarks, surge_rows, surge_text};
+pub use test_report::surge_text::{
+    SurgeReport, surge_columns_text, surge_heads, surge_remarks, surge_rows, surge_text,
+};
 pub use test_report::zero_text::{ZERO_HEADS, zero_rows, zero_text, zero_words};

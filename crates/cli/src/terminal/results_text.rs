@@ -87,7 +87,8 @@ fn remarks(identified: &Identified, concern_all: bool) -> impl Iterator<Item = S
 }
 
 fn shown_results_text(units: &DisplayUnits, found: &ShownResults<'_>, shown: DetailLevel) -> String {
-    let mut text = if shown.full { full(units, found, shown) } else { short(units, found, shown) };
+    let display = Display::new(units);
+    let mut text = if shown.full { full(&display, found, shown) } else { short(&display, found, shown) };
     let has = |verdict| found.identified.points_alone().any(|point| point.verdict == verdict);
     let worst = [Verdict::Unusable, Verdict::Doubtful].into_iter().find(|verdict| has(*verdict));
     let sentence = verdict_sentence(found.identified.points_alone());
@@ -97,25 +98,24 @@ fn shown_results_text(units: &DisplayUnits, found: &ShownResults<'_>, shown: Det
     text
 }
 
-fn short(units: &DisplayUnits, found: &ShownResults<'_>, shown: DetailLevel) -> String {
+fn short(display: &Display, found: &ShownResults<'_>, shown: DetailLevel) -> String {
+    let identified = found.identified;
     let mut text = String::new();
-    if let Some(disagreement) =
-        disagreement_text(&found.identified.points, &found.identified.two_parameter, units)
-    {
+    if let Some(disagreement) = disagreement_text(&identified.points, &identified.two_parameter, display) {
         text.push_str(&wrapped(&disagreement, COLUMNS, 2));
         text.push('\n');
     }
-    text.push_str(&points_by_line_text(&found.identified.points, found.map, units, shown.truth, shown.paint));
+    text.push_str(&points_by_line_text(&identified.points, found.map, display, shown.truth, shown.paint));
     text.push('\n');
-    text.push_str(&first_doubts_text(&found.identified.points));
-    if let Some(truth) = truth_text(&found.identified.points).filter(|_| shown.truth) {
+    text.push_str(&first_doubts_text(&identified.points));
+    if let Some(truth) = truth_text(&identified.points).filter(|_| shown.truth) {
         text.push_str(&wrapped(&truth, COLUMNS, 2));
     }
-    if let Some(surge) = &found.identified.surge {
-        text.push_str(&surge_columns_text(&surge.marks, &surge.remarks, surge.surges, units, shown.truth));
+    if let Some(surge) = &identified.surge {
+        text.push_str(&surge_columns_text(surge, display, shown.truth));
     }
     // Omit sensors that all agree.
-    for fused in found.identified.sensors.iter().filter(|fused| !fused.left_out.is_empty()) {
+    for fused in identified.sensors.iter().filter(|fused| !fused.left_out.is_empty()) {
         text.push_str(&wrapped(&fused.to_string(), COLUMNS, 2));
     }
     for remark in &found.remarks {
@@ -129,21 +129,22 @@ fn short(units: &DisplayUnits, found: &ShownResults<'_>, shown: DetailLevel) -> 
     text
 }
 
-fn full(units: &DisplayUnits, found: &ShownResults<'_>, shown: DetailLevel) -> String {
-    let mut text = disagreement_text(&found.identified.points, &found.identified.two_parameter, units)
-        .unwrap_or_default();
-    text.push_str(&points_text(&found.identified.points, units, shown.truth));
-    if let Some(shared) = shared_errors_text(found.identified.points_alone(), units) {
+fn full(display: &Display, found: &ShownResults<'_>, shown: DetailLevel) -> String {
+    let identified = found.identified;
+    let mut text =
+        disagreement_text(&identified.points, &identified.two_parameter, display).unwrap_or_default();
+    text.push_str(&points_text(&identified.points, display, shown.truth));
+    if let Some(shared) = shared_errors_text(identified.points_alone(), display) {
         let _ = writeln!(text, "{shared}");
     }
-    text.push_str(&repeated_jumps_text(found.repeats, &Display::new(units)));
-    if let Some(thermal) = &found.identified.thermal {
+    text.push_str(&repeated_jumps_text(found.repeats, display));
+    if let Some(thermal) = &identified.thermal {
         text.push_str(&thermal_text(thermal));
     }
-    text.push_str(&sensors_text(&found.identified.sensors));
-    text.push_str(&zero_text(&found.identified.zero));
-    if let Some(surge) = &found.identified.surge {
-        let _ = write!(text, "\n{}", surge_text(&surge.marks, &surge.remarks, surge.surges, units));
+    text.push_str(&sensors_text(&identified.sensors));
+    text.push_str(&zero_text(&identified.zero));
+    if let Some(surge) = &identified.surge {
+        let _ = write!(text, "\n{}", surge_text(surge, display));
     }
     for remark in &found.remarks {
         let _ = writeln!(text, "{remark}");

@@ -42,7 +42,9 @@ pub fn drift_text(report: &DriftReport) -> String {
                 _ if limit.cause == Cause::BearingFriction => {
                     write!(text, " {} {},", limit.cause, limit.cause.show(limit.change))
                 }
-                unit => write!(text, " {} {} {unit},", limit.cause, number::three_figures(limit.change)),
+                unit => {
+                    write!(text, " {} {} {unit},", limit.cause, number::significant_digits(limit.change, 3))
+                }
             };
         }
         text.pop();

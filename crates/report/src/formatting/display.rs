@@ -6,7 +6,7 @@ use mapper_core::{Channel, OperatingPoint};
 use mapper_recording::logs::units::kind_of;
 
 /// Formatter of values in the display units.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Display {
     units: DisplayUnits,
 }
@@ -22,16 +22,38 @@ impl Display {
         &self.units
     }
 
-    /// A value converted from the internal to the display unit, for drawing.
-    pub fn number(&self, kind: Kind, inside: f64) -> f64 {
-        let symbol = match kind {
+    /// The display unit of a kind; empty for a kind that is shown as it is.
+    fn unit(&self, kind: Kind) -> &str {
+        match kind {
             Kind::Speed => &self.units.speed,
             Kind::Pressure => &self.units.pressure,
             Kind::MassFlow => &self.units.flow,
             Kind::Temperature => &self.units.temperature,
-            _ => return inside,
+            _ => "",
+        }
+    }
+
+    /// A value converted from the internal to the display unit, for drawing.
+    pub fn number(&self, kind: Kind, inside: f64) -> f64 {
+        match self.unit(kind) {
+            "" => inside,
+            // A checked campaign names only existing units; anything else is shown in SI.
+            symbol => kind.unit(symbol).map_or(inside, |unit| unit.from_inside(inside)),
+        }
+    }
+
+    /// A value in its display unit, without the unit.
+    fn shown(&self, kind: Kind, inside: f64) -> String {
+        let decimals = match (kind, self.unit(kind)) {
+            (Kind::Speed, "krpm") => 2,
+            (Kind::Speed, _) | (Kind::Pressure, "Pa") => 0,
+            (Kind::MassFlow, "kg/s") => 5,
+            (Kind::Pressure, "bar") => 4,
+            (Kind::MassFlow | Kind::Pressure, _) => 2,
+            (Kind::Temperature, _) => 1,
+            _ => 3,
         };
-        Self::convert_to_unit(kind, symbol, inside)
+        format!("{:.decimals$}", self.number(kind, inside))
     }
 
     /// A reading of a channel converted to the display unit, for drawing.
@@ -41,24 +63,12 @@ impl Display {
 
     /// The display unit of a channel's readings; empty for a ratio.
     pub fn unit_of(&self, channel: Channel) -> &str {
-        match kind_of(channel) {
-            Kind::Speed => &self.units.speed,
-            Kind::MassFlow => &self.units.flow,
-            Kind::Pressure => &self.units.pressure,
-            Kind::Temperature => &self.units.temperature,
-            _ => "",
-        }
+        self.unit(kind_of(channel))
     }
 
     /// A reading of a channel in its display unit, without the unit.
     pub fn shown_reading(&self, channel: Channel, inside: f64) -> String {
-        match kind_of(channel) {
-            Kind::Speed => self.speed(inside),
-            Kind::MassFlow => self.flow(inside),
-            Kind::Pressure => self.pressure(inside),
-            Kind::Temperature => self.temperature(inside),
-            _ => format!("{inside:.3}"),
-        }
+        self.shown(kind_of(channel), inside)
     }
 
     /// The display unit of differences between readings of a channel: K for temperatures.
@@ -75,15 +85,6 @@ impl Display {
         Some(shown).filter(|shown| shown.is_finite() && *shown != 0.0)
     }
 
-    fn convert_to_unit(kind: Kind, symbol: &str, inside: f64) -> f64 {
-        // A checked campaign names only existing units; anything else is shown in SI.
-        kind.unit(symbol).map_or(inside, |unit| unit.from_inside(inside))
-    }
-
-    fn format_in_unit(kind: Kind, symbol: &str, value: f64, decimals: usize) -> String {
-        format!("{:.decimals$}", Self::convert_to_unit(kind, symbol, value))
-    }
-
     /// Column head: name, and the unit of speeds.
     pub fn speed_head(&self, name: &str) -> String {
         format!("{name} {}", self.units.speed)
@@ -91,17 +92,12 @@ impl Display {
 
     /// A shaft speed.
     pub fn speed(&self, speed_rpm: f64) -> String {
-        Self::format_in_unit(
-            Kind::Speed,
-            &self.units.speed,
-            speed_rpm,
-            if self.units.speed == "krpm" { 2 } else { 0 },
-        )
+        self.shown(Kind::Speed, speed_rpm)
     }
 
     /// The name of a speed line: its corrected speed in three figures.
     pub fn line_name(&self, speed_corrected_rpm: f64) -> String {
-        let speed = Self::convert_to_unit(Kind::Speed, &self.units.speed, speed_corrected_rpm);
+        let speed = self.number(Kind::Speed, speed_corrected_rpm);
         let exponent = if speed == 0.0 { 0 } else { speed.abs().log10().floor() as i32 };
         let last = 10f64.powi(exponent - 2);
         let text = format!("{:.*}", (2 - exponent).max(0) as usize, (speed / last).round() * last);
@@ -126,12 +122,7 @@ impl Display {
 
     /// A pressure.
     pub fn pressure(&self, pressure_pa: f64) -> String {
-        let decimals = match self.units.pressure.as_str() {
-            "Pa" => 0,
-            "bar" => 4,
-            _ => 2,
-        };
-        Self::format_in_unit(Kind::Pressure, &self.units.pressure, pressure_pa, decimals)
+        self.shown(Kind::Pressure, pressure_pa)
     }
 
     /// Column head: name, and the unit of flows.
@@ -141,12 +132,7 @@ impl Display {
 
     /// A mass flow.
     pub fn flow(&self, flow_kg_s: f64) -> String {
-        Self::format_in_unit(
-            Kind::MassFlow,
-            &self.units.flow,
-            flow_kg_s,
-            if self.units.flow == "kg/s" { 5 } else { 2 },
-        )
+        self.shown(Kind::MassFlow, flow_kg_s)
     }
 
     /// Column head: name, and the unit of temperatures.
@@ -156,6 +142,6 @@ impl Display {
 
     /// A temperature.
     pub fn temperature(&self, temperature_k: f64) -> String {
-        Self::format_in_unit(Kind::Temperature, &self.units.temperature, temperature_k, 1)
+        self.shown(Kind::Temperature, temperature_k)
     }
 }

@@ -14,9 +14,9 @@ pub fn percent(fraction: Option<f64>, decimals: usize) -> String {
     number(fraction.map(|fraction| 100.0 * fraction), decimals)
 }
 
-/// Three significant digits, without trailing zeros.
-pub fn three_figures(value: f64) -> String {
-    let rounded: f64 = format!("{value:.2e}").parse().unwrap_or(value);
+/// A number with at most this many significant digits, without trailing zeros.
+pub fn significant_digits(value: f64, count: usize) -> String {
+    let rounded: f64 = format!("{value:.*e}", count.saturating_sub(1)).parse().unwrap_or(value);
     if rounded != 0.0 && rounded.abs() < 1e-3 { format!("{rounded:e}") } else { rounded.to_string() }
 }
 

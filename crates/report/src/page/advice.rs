@@ -20,19 +20,13 @@ pub(crate) fn recommended_actions(report: &RunReport<'_>) -> Vec<String> {
     if !report.origin.is_complete() {
         actions.push(report.origin.sentence());
     }
-    if let Some(text) = disagreement_text(
-        report.points,
-        report.two_parameter,
-        &report.campaign.map(|campaign| campaign.display.clone()).unwrap_or_default(),
-    ) {
+    if let Some(text) = disagreement_text(report.points, report.two_parameter, &report.display()) {
         actions.push(text.trim_end().to_owned());
     }
     if let (ZeroOutcome::Refused(_), Some(sentence)) = (report.zero, zero_words(report.zero)) {
         actions.push(sentence);
     }
-    let points_with = |verdict| {
-        report.points.iter().map(|scored| &scored.point).filter(move |point| point.verdict == verdict)
-    };
+    let points_with = |verdict| report.identified().filter(move |point| point.verdict == verdict);
     for verdict in [Verdict::Unusable, Verdict::Doubtful] {
         // Findings about the most steps come first. Three sentences are enough here; the rest is listed with the points.
         let mut warnings = doubts(points_with(verdict));

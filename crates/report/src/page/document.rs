@@ -1,6 +1,5 @@
 //! The page as HTML.
 
-use crate::Display;
 use crate::page::drawn_map::{DrawnMap, drawn_map};
 use crate::page::drawn_points::{DrawnPoint, drawn_points};
 use crate::page::drawn_steps::{DrawnStep, drawn_steps};
@@ -33,10 +32,9 @@ struct DrawnOther {
 /// None in practice: JSON of numbers and strings can always be written.
 pub fn run_page(page: &RunPage<'_>) -> Result<String, serde_json::Error> {
     let report = page.report;
-    let units = report.campaign.map(|campaign| campaign.display.clone()).unwrap_or_default();
-    let display = Display::new(&units);
+    let display = report.display();
     let drawn = PageData {
-        units: units.clone(),
+        units: display.units().clone(),
         points: drawn_points(page, &display),
         map: page.report.map.map(|map| drawn_map(map, &display)).unwrap_or_default(),
         steps: drawn_steps(page, &display),
@@ -50,12 +48,17 @@ pub fn run_page(page: &RunPage<'_>) -> Result<String, serde_json::Error> {
         (sections::head::head(page))
         main {
             (sections::map::map(page))
-            (sections::step::step(page))
+            (sections::step::step(page, &display))
             (sections::conditions::conditions(page, &display))
             (sections::points::points(page, &display))
             (sections::plan::plan(page, &display))
-            (sections::gap::gap(page))
-            (sections::notes::notes(page, &units))
+            @if let Some(diagnosis) = &page.gap {
+                section #gap aria-labelledby="gap-head" {
+                    h2 #gap-head { "Gap to the nominal model" }
+                    (diagnosis)
+                }
+            }
+            (sections::notes::notes(page, &display))
             (sections::provenance::provenance(page))
         }
     };

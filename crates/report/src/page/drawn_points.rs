@@ -60,7 +60,7 @@ pub(crate) fn drawn_points(page: &RunPage<'_>, display: &Display) -> Vec<DrawnPo
         let own_points = lines.filter(|line| line.points.iter().any(|point| point.identified.step == step));
         own_points.map(|line| line.speed_corrected_rpm).next()
     };
-    let points = page.report.points.iter().map(|scored| &scored.point);
+    let points = page.report.identified();
     points
         .map(|point| {
             let rounded = line_of(point.step).unwrap_or(point.speed_corrected_rpm);
@@ -119,13 +119,7 @@ fn raw(page: &RunPage<'_>, step: usize, display: &Display) -> Vec<String> {
     let marker = page.report.recording.steps.iter().find(|marker| marker.index == step);
     let read = |channel| marker.and_then(|marker| at_end(page.report.recording, marker, channel));
     let shown = |channel: Channel| {
-        let value = read(channel)?;
-        let text = match channel {
-            Channel::ShaftSpeed => display.speed(value),
-            Channel::CompressorFlow => display.flow(value),
-            Channel::P1 | Channel::P2 | Channel::P3 => display.pressure(value),
-            _ => display.temperature(value),
-        };
+        let text = display.shown_reading(channel, read(channel)?);
         Some(format!("{channel} {text} {}", display.unit_of(channel)))
     };
     RAW.into_iter().filter_map(shown).collect()

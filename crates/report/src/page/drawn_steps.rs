@@ -57,12 +57,7 @@ pub(crate) fn drawn_steps(page: &RunPage<'_>, display: &Display) -> Vec<DrawnSte
     let markers = page.report.recording.steps.iter();
     markers
         .filter_map(|marker| {
-            let point = page
-                .report
-                .points
-                .iter()
-                .map(|scored| &scored.point)
-                .find(|point| point.step == marker.index)?;
+            let point = page.report.identified().find(|point| point.step == marker.index)?;
             let history = page.t2_histories.iter().find(|history| history.step == marker.index);
             let window = point
                 .window

@@ -1,7 +1,6 @@
 //! Disagreement of the joint and the two-parameter method: the most important warning for a reader.
 
 use crate::formatting::display::Display;
-use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{IdentifiedPoint, step_number};
 use mapper_identify::TwoParameter;
 use mapper_recording::score::ScoredPoint;
@@ -10,9 +9,8 @@ use mapper_recording::score::ScoredPoint;
 pub fn disagreement_text(
     points: &[ScoredPoint],
     two_parameter: &[TwoParameter],
-    units: &DisplayUnits,
+    display: &Display,
 ) -> Option<String> {
-    let display = Display::new(units);
     let pairs = two_parameter.iter().filter_map(|other| {
         let point = points.iter().map(|scored| &scored.point).find(|point| point.step == other.step)?;
         Some((point, other, distance(point, other)?))
@@ -29,7 +27,7 @@ pub fn disagreement_text(
         100.0 * distance,
         step_number(point.step),
         display.speed(point.speed_rpm),
-        units.speed,
+        display.units().speed,
         crate::point_results::points::opening(point.valve_opening_ratio),
         100.0 * other.eta,
         100.0 * point.eta.unwrap_or(f64::NAN),

@@ -8,7 +8,6 @@ use crate::formatting::wrapped::wrapped;
 use crate::point_results::point_warnings::{Doubt, doubts};
 use crate::point_results::points::opening;
 use crate::verdict_word;
-use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{CompressorMap, IdentifiedPoint, SpeedLine, Verdict, step_number};
 use mapper_numerics::statistics::mean;
 use mapper_recording::score::ScoredPoint;
@@ -18,11 +17,10 @@ use mapper_recording::score::ScoredPoint;
 pub fn points_by_line_text(
     points: &[ScoredPoint],
     map: Option<&CompressorMap>,
-    units: &DisplayUnits,
+    display: &Display,
     truth: bool,
     paint: Paint,
 ) -> String {
-    let display = Display::new(units);
     let truth = truth && points.iter().any(|scored| scored.truth.is_some());
     let mut heads = vec![
         display.units().speed.clone(),
@@ -41,7 +39,7 @@ pub fn points_by_line_text(
     let mut table = with_heads(&heads);
     let mut verdicts = Vec::new();
     let mut add = |name: String, scored: &ScoredPoint| {
-        let mut row = row(&display, &scored.point);
+        let mut row = row(display, &scored.point);
         row.insert(0, name);
         if truth {
             row.push(number(scored.truth.as_ref().map(|truth| 100.0 * truth.eta), 2));

@@ -6,21 +6,20 @@ use crate::formatting::table::{self, COLUMNS};
 use crate::formatting::wrapped::wrapped;
 use crate::plan::plan_text::{mark, marks_legend};
 use crate::point_results::point_warnings::doubts;
-use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{IdentifiedPoint, StepKind, Verdict, step_number};
 use mapper_recording::score::{ScoreSummary, ScoredPoint};
 use std::fmt::Write;
 
 /// Identified points as a table with their warnings below; deviations from the truth if it is known.
 /// `truth`: whether to show the latter.
-pub fn points_text(points: &[ScoredPoint], units: &DisplayUnits, truth: bool) -> String {
+pub fn points_text(points: &[ScoredPoint], display: &Display, truth: bool) -> String {
     let kinds: Vec<StepKind> = points.iter().map(|scored| scored.point.kind).collect();
     let legend = wrapped(
         &format!("{}+/-: half a 95 % interval. dT2: change of T2 in the window.", marks_legend(&kinds)),
         COLUMNS,
         0,
     );
-    let mut text = format!("{}\n\n{legend}\n", points_table(points, units, truth));
+    let mut text = format!("{}\n\n{legend}\n", points_table(points, display, truth));
     let doubted = points.iter().map(|scored| &scored.point).filter(|point| point.verdict != Verdict::Good);
     for doubt in doubts(doubted) {
         let _ = writeln!(text, "{}: {}", doubt.steps(), doubt.message());
@@ -77,8 +76,7 @@ pub fn opening(ratio: f64) -> String {
     if ratio.is_finite() { ((1e3 * ratio).round() / 1e3).to_string() } else { "-".to_owned() }
 }
 
-fn points_table(points: &[ScoredPoint], units: &DisplayUnits, truth: bool) -> table::TextTable {
-    let display = Display::new(units);
+fn points_table(points: &[ScoredPoint], display: &Display, truth: bool) -> table::TextTable {
     let with_truth = truth && points.iter().any(|scored| scored.truth.is_some());
     let mut heads = vec![
         "step".to_owned(),

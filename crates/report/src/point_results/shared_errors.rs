@@ -1,7 +1,6 @@
 //! The share of the points' intervals that is common to all of them, in a sentence.
 
 use crate::formatting::display::Display;
-use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{IdentifiedPoint, Verdict, half_width_95};
 use mapper_numerics::statistics::median;
 
@@ -9,9 +8,8 @@ use mapper_numerics::statistics::median;
 /// point has an interval with a common part.
 pub fn shared_errors_text<'a>(
     points: impl Iterator<Item = &'a IdentifiedPoint>,
-    units: &DisplayUnits,
+    display: &Display,
 ) -> Option<String> {
-    let display = Display::new(units);
     let usable: Vec<&IdentifiedPoint> = points
         .filter(|point| point.verdict != Verdict::Unusable && point.eta_low.is_some())
         .filter(|point| !point.common.eta_changes.is_empty())
@@ -29,7 +27,7 @@ pub fn shared_errors_text<'a>(
         let common = half(|point| Some(half_width_95(point.common.eta_standard_error())))?;
         Some(format!("{common:.2} of +/- {total:.2} points"))
     };
-    let first = format!("{} at {} {}", describe(&slow)?, display.speed(slowest_rpm), units.speed);
+    let first = format!("{} at {} {}", describe(&slow)?, display.speed(slowest_rpm), display.units().speed);
     let parts = match describe(&fast) {
         Some(others) => format!("{first} and {others} above"),
         None => first,

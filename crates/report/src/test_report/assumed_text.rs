@@ -1,6 +1,6 @@
 //! Sizes of the machine that a campaign assumes, and the files of a first campaign.
 
-use crate::formatting::number::three_figures;
+use crate::formatting::number::significant_digits;
 use crate::formatting::wrapped::wrapped;
 use mapper_campaign::{AssumedSize, Campaign, internal_area_sigma_ratio};
 use std::path::Path;
@@ -31,7 +31,7 @@ fn sentence_with(campaign: &Campaign, name: fn(&AssumedSize) -> &str) -> Option<
     };
     Some(format!(
         "assumed, from the machine of Burke et al. scaled to a wheel of {} mm: {}{widened}",
-        three_figures(wheel_mm),
+        significant_digits(wheel_mm, 3),
         named.join(", ")
     ))
 }
@@ -66,5 +66,5 @@ pub fn first_campaign_text(
 
 fn size_text(name: &str, size: &AssumedSize) -> String {
     let unit = if size.unit.is_empty() { String::new() } else { format!(" {}", size.unit) };
-    format!("{name} {}{unit}", three_figures(size.value))
+    format!("{name} {}{unit}", significant_digits(size.value, 3))
 }

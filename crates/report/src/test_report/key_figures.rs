@@ -1,5 +1,6 @@
 //! Range and uncertainty of a map, in a few sentences.
 
+use crate::formatting::display::Display;
 use crate::formatting::duration::duration;
 use mapper_campaign::Campaign;
 use mapper_core::{CompressorMap, IdentifiedPoint, Plan, Verdict};
@@ -14,8 +15,8 @@ pub fn key_figures(
     plan: Option<&Plan>,
 ) -> Option<String> {
     let (all, map) = (points.len(), map?);
-    let units = campaign.map(|campaign| campaign.display.clone()).unwrap_or_default();
-    let display = crate::Display::new(&units);
+    let display = campaign.map_or_else(Display::default, |campaign| Display::new(&campaign.display));
+    let unit = &display.units().speed;
     let on_map: usize = map.lines.iter().map(|line| line.points.len()).sum();
     let speeds = || map.lines.iter().map(|line| line.speed_corrected_rpm);
     let slowest = display.line_name(speeds().fold(f64::INFINITY, f64::min));
@@ -24,11 +25,10 @@ pub fn key_figures(
     let highest = measured.map(|point| point.pressure_ratio).fold(f64::NEG_INFINITY, f64::max);
     let mut phrases = match map.lines.len() {
         0 => return None,
-        1 => format!("The map has {on_map} points at {fastest} {} (corrected)", units.speed),
+        1 => format!("The map has {on_map} points at {fastest} {unit} (corrected)"),
         lines => {
             format!(
-                "The map has {on_map} points on {lines} speed lines from {slowest} to {fastest} {} (corrected)",
-                units.speed
+                "The map has {on_map} points on {lines} speed lines from {slowest} to {fastest} {unit} (corrected)"
             )
         }
     };
@@ -44,10 +44,9 @@ pub fn key_figures(
         best.filter_map(|point| Some((point, point.eta?))).max_by(|a, b| a.1.total_cmp(&b.1))
     {
         phrases.push_str(&format!(
-            " The best efficiency is {:.1} %, at {} {} and a pressure ratio of {:.2}.",
+            " The best efficiency is {:.1} %, at {} {unit} and a pressure ratio of {:.2}.",
             100.0 * eta,
             display.line_name(best.speed_corrected_rpm),
-            units.speed,
             best.pressure_ratio
         ));
     }

@@ -21,21 +21,19 @@ use crate::test_report::instruments::{
 };
 use crate::test_report::key_figures::key_figures;
 use crate::test_report::repeated_jumps::repeated_jumps_text;
-use crate::test_report::surge_text::surge_text;
+use crate::test_report::surge_text::{SurgeReport, surge_text};
 use crate::test_report::zero_text::{ZERO_HEADS, zero_rows, zero_words};
 use mapper_campaign::Campaign;
-use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{
-    Channel, CompressorMap, DeclaredUncertainty, Event, Method, Plan, PointBudgets, Recording,
-    ReferenceState, ResultRemark, SurgeNotFound, terminal_text,
+    Channel, CompressorMap, DeclaredUncertainty, Event, IdentifiedPoint, Method, Plan, PointBudgets,
+    Recording, ReferenceState, ResultRemark, terminal_text,
 };
 use mapper_diagnose::gap::correction::PointCorrection;
 use mapper_identify::{TwoParameter, ZeroOutcome};
 use mapper_maps::RepeatedJump;
 use mapper_observe::FusedChannel;
 use mapper_observe::energy_balance::Gases;
-use mapper_recording::score::{ScoreSummary, ScoredMark, ScoredPoint};
-use serde::Serialize;
+use mapper_recording::score::{ScoreSummary, ScoredPoint};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -96,6 +94,16 @@ pub struct RunReport<'a> {
 }
 
 impl<'a> RunReport<'a> {
+    /// The campaign's display units, or the usual ones.
+    pub(crate) fn display(&self) -> Display {
+        self.campaign.map_or_else(Display::default, |campaign| Display::new(&campaign.display))
+    }
+
+    /// The points without their truth.
+    pub(crate) fn identified(&self) -> impl Iterator<Item = &'a IdentifiedPoint> + use<'a> {
+        self.points.iter().map(|scored| &scored.point)
+    }
+
     /// The points and their readings, for energy balance and acceptance.
     pub(crate) fn judged_points(&self) -> JudgedPoints<'a> {
         let RunReport { campaign, recording, gases, points, used, .. } = *self;
@@ -114,17 +122,6 @@ pub struct ReportSource {
     pub duration_s: f64,
     /// Steps marked or found in it.
     pub steps: usize,
-}
-
-/// Result of the search for surge.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct SurgeReport {
-    /// The marks in order of speed, with the truth if the recording contains it.
-    pub marks: Vec<ScoredMark>,
-    /// Lines on which no mark was found.
-    pub remarks: Vec<SurgeNotFound>,
-    /// How often the compressor went into surge.
-    pub surges: usize,
 }
 
 /// The picture of the map, the only link.
@@ -155,14 +152,13 @@ fn markdown_report(report: &RunReport<'_>) -> String {
         recording,
         ..
     } = *report;
-    let units = campaign.map(|campaign| campaign.display.clone()).unwrap_or_default();
-    let display = Display::new(&units);
+    let display = report.display();
     // Writing to a String cannot fail, here and below.
     let mut text = format!("# Compressor map of {machine}\n\n{}\n", facts(&cover_facts(report)));
-    if let Some(disagreement) = disagreement_text(points, two_parameter, &units) {
+    if let Some(disagreement) = disagreement_text(points, two_parameter, &display) {
         let _ = writeln!(text, "**{}**\n", disagreement.trim_end());
     }
-    let verdict = verdict_sentence(points.iter().map(|scored| &scored.point));
+    let verdict = verdict_sentence(report.identified());
     let _ = writeln!(text, "**{verdict}** {}\n", origin.sentence());
     let remark_texts = |concerns_all: bool| {
         let those = remarks.iter().filter(|remark| remark.concerns_all_points() == concerns_all);
@@ -210,22 +206,22 @@ fn markdown_report(report: &RunReport<'_>) -> String {
     if let Some(score) = score {
         let _ = writeln!(text, "{}", score_text(score));
     }
-    points_section(&mut text, &units, report);
+    points_section(&mut text, &display, report);
     if !report.corrections.is_empty() {
         let _ = writeln!(text, "\n## Before and after the correction\n\n{CORRECTION_CAPTION}\n");
         text.push_str(&markdown::table(&CORRECTION_HEADS, Align::Right, correction_rows(report.corrections)));
     }
     text.push_str(&budget_section(report.budgets));
     text.push_str(&acceptance_sections(&report.judged_points()));
-    if let Some(SurgeReport { marks, remarks, surges }) = surge {
-        let _ = write!(text, "\n## Surge\n\n{}", surge_text(marks, remarks, *surges, &units));
+    if let Some(surge) = surge {
+        let _ = write!(text, "\n## Surge\n\n{}", surge_text(surge, &display));
     }
     if let Some(words) = zero_words(report.zero) {
         let _ = writeln!(text, "\n## Isothermal zero\n\n{words}\n");
         text.push_str(&markdown::table(&ZERO_HEADS, Align::Left, zero_rows(report.zero, &display)));
     }
     if !repeats.is_empty() {
-        let sentences = repeated_jumps_text(repeats, &Display::new(&units));
+        let sentences = repeated_jumps_text(repeats, &display);
         let _ = write!(
             text,
             "\n## Drift\n\nRepeats are not part of the map. Fixed offsets cancel in the changes between them.\n\n{}",
@@ -379,27 +375,25 @@ fn instruments_section(campaign: &Campaign, report: &RunReport<'_>, display: &Di
     text
 }
 
-fn points_section(text: &mut String, units: &DisplayUnits, report: &RunReport<'_>) {
-    let display = Display::new(units);
-    let points = || report.points.iter().map(|scored| &scored.point);
+fn points_section(text: &mut String, display: &Display, report: &RunReport<'_>) {
     text.push_str(
         "## Points by speed line\n\nIntervals are 95 %: noise, declared sensor offsets, and the estimated error of the method while \
          the flow changes. T2, P2 and T3 are means over the last 2 s of the step, when the gas has settled and the housing has not.\n\n",
     );
-    if let Some(shared) = shared_errors_text(points(), units) {
+    if let Some(shared) = shared_errors_text(report.identified(), display) {
         let _ = writeln!(text, "{shared}\n");
     }
-    for group in point_groups(report.map, points(), &display) {
+    for group in point_groups(report.map, report.identified(), display) {
         let rows = group
             .points
             .iter()
-            .map(|point| point_cells(report.recording, point, &display).map(|cell| cell.text));
+            .map(|point| point_cells(report.recording, point, display).map(|cell| cell.text));
         let _ = writeln!(text, "### {}\n", group.caption);
-        text.push_str(&markdown::table(&point_heads(&display), Align::Right, rows));
+        text.push_str(&markdown::table(&point_heads(display), Align::Right, rows));
         text.push('\n');
     }
     text.push_str("## Doubts and remarks\n\n");
-    let doubts = doubts(points());
+    let doubts = doubts(report.identified());
     for doubt in &doubts {
         let _ = writeln!(text, "- {} ({}): {}", doubt.steps(), doubt.code, doubt.message());
     }

@@ -5,28 +5,33 @@ use crate::formatting::markdown::{self, Align};
 use crate::formatting::number::{number, percent};
 use crate::formatting::table::{COLUMNS, with_heads};
 use crate::formatting::wrapped::wrapped;
-use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{SurgeFoundBy, SurgeMark, SurgeNotFound, half_width_95};
 use mapper_recording::score::ScoredMark;
+use serde::Serialize;
+
+/// Result of the search for surge.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct SurgeReport {
+    /// The marks in order of speed, with the truth if the recording contains it.
+    pub marks: Vec<ScoredMark>,
+    /// Lines on which no mark was found.
+    pub remarks: Vec<SurgeNotFound>,
+    /// How often the compressor went into surge.
+    pub surges: usize,
+}
 
 /// Marks of a search for surge, lines without a mark, and the number of surge events; Markdown.
-pub fn surge_text(
-    marks: &[ScoredMark],
-    remarks: &[SurgeNotFound],
-    surges: usize,
-    units: &DisplayUnits,
-) -> String {
-    let display = Display::new(units);
-    let table = markdown::table(&surge_heads(marks, &display), Align::Right, surge_rows(marks, &display));
-    let remarks_text: String =
-        surge_remarks(remarks, surges).iter().map(|remark| format!("\n{remark}\n")).collect();
+pub fn surge_text(surge: &SurgeReport, display: &Display) -> String {
+    let (heads, rows) = (surge_heads(&surge.marks, display), surge_rows(&surge.marks, display));
+    let table = markdown::table(&heads, Align::Right, rows);
+    let remarks_text: String = surge_remarks(surge).iter().map(|remark| format!("\n{remark}\n")).collect();
     format!("{table}{remarks_text}")
 }
 
 /// The number of surge events, and the lines without a mark, a sentence each.
-pub fn surge_remarks(remarks: &[SurgeNotFound], surges: usize) -> Vec<String> {
-    std::iter::once(times(surges))
-        .chain(remarks.iter().map(|SurgeNotFound { target_speed_rpm, openings, enough }| match enough {
+pub fn surge_remarks(surge: &SurgeReport) -> Vec<String> {
+    std::iter::once(times(surge.surges))
+        .chain(surge.remarks.iter().map(|SurgeNotFound { target_speed_rpm, openings, enough }| match enough {
             true => format!(
                 "Not found at {target_speed_rpm:.0} rpm: the variation of pressures and flow did not grow over {openings} openings."
             ),
@@ -56,19 +61,13 @@ pub fn surge_heads(marks: &[ScoredMark], display: &Display) -> Vec<String> {
 }
 
 /// The same for a terminal of 80 columns. `truth`: whether to show the deviations of the marks from it.
-pub fn surge_columns_text(
-    marks: &[ScoredMark],
-    remarks: &[SurgeNotFound],
-    surges: usize,
-    units: &DisplayUnits,
-    truth: bool,
-) -> String {
+pub fn surge_columns_text(surge: &SurgeReport, display: &Display, truth: bool) -> String {
     let shown = |scored: &ScoredMark| {
         if truth { *scored } else { ScoredMark { truth_flow_corrected_kg_s: None, ..*scored } }
     };
-    let marks: Vec<ScoredMark> = marks.iter().map(shown).collect();
+    let marks: Vec<ScoredMark> = surge.marks.iter().map(shown).collect();
     let marks = marks.as_slice();
-    let display = Display::new(units);
+    let units = display.units();
     let mut heads = [&units.speed, &units.flow, "+/- %", "PR", "+/-", "nearest %", "openings", "found by"]
         .map(str::to_owned)
         .to_vec();
@@ -76,7 +75,7 @@ pub fn surge_columns_text(
         heads.push("error %".to_owned());
     }
     let mut table = with_heads(&heads);
-    for row in surge_rows(marks, &display) {
+    for row in surge_rows(marks, display) {
         table.add_row(row);
     }
     let words = "Surge-side ends of the lines: corrected speed and flow, half widths of 95 % intervals, distance of the nearest \
@@ -85,7 +84,7 @@ pub fn surge_columns_text(
     if with_truth(marks) {
         text.push_str("error: difference from the simulator's truth.\n");
     }
-    for remark in surge_remarks(remarks, surges) {
+    for remark in surge_remarks(surge) {
         text.push_str(&wrapped(&remark, COLUMNS, 2));
     }
     text

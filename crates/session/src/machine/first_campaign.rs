@@ -1,11 +1,12 @@
 //! The first campaign of a machine: a commented file, its nominal map and a channel map, made from the wheel diameter.
 
 use crate::machine::first_map::FirstMap;
-use crate::machine::first_request::{FirstCampaignRequest, FirstRig, significant_digits};
+use crate::machine::first_request::{FirstCampaignRequest, FirstRig};
 use crate::recording::files::write_new;
 use crate::{Registry, SessionError};
 use mapper_campaign::{AssumedSize, Campaign, CampaignError, similar_sizes};
 use mapper_physics::compressor_map::closed_form_map::TURBO_A_WHEEL_M;
+use mapper_report::significant_digits;
 use serde::Serialize;
 use std::io::{Error, ErrorKind};
 use std::path::{Path, PathBuf};

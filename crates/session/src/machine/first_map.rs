@@ -1,13 +1,14 @@
 //! The nominal map of a first campaign: the machine's own, or that of a similar compressor.
 
 use crate::errors::first_map_error::FirstMapError;
-use crate::machine::first_request::{FirstCampaignRequest, significant_digits};
+use crate::machine::first_request::FirstCampaignRequest;
 use crate::{Registry, SessionError};
 use mapper_campaign::{MapMisfit, USUAL_WHEEL_DIAMETERS_M, find_map_misfit, nominal_table};
 use mapper_chart::efficiency_mesh::{InterpolatedLine, SUBDIVISIONS, interpolated_lines};
 use mapper_core::{ReferenceState, one_line};
 use mapper_physics::compressor_map::characteristic::CompressorCharacteristic;
 use mapper_physics::compressor_map::closed_form_map::{ClosedFormMap, TURBO_A_WHEEL_M};
+use mapper_report::significant_digits;
 use std::path::Path;
 
 /// Lowest and highest corrected speed of campaigns/turbo_a.yaml, rpm: tip speeds of 136 and 422 m/s.

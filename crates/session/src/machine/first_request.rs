@@ -40,9 +40,3 @@ pub struct FirstCampaignRequest {
     /// Lowest and highest corrected speed, rpm; those of the map if `None`.
     pub speeds_rpm: Option<(f64, f64)>,
 }
-
-/// A number with at most this many significant digits, without trailing zeros.
-pub(crate) fn significant_digits(value: f64, count: usize) -> String {
-    let rounded: f64 = format!("{value:.*e}", count.saturating_sub(1)).parse().unwrap_or(value);
-    if rounded != 0.0 && rounded.abs() < 1e-3 { format!("{rounded:e}") } else { rounded.to_string() }
-}

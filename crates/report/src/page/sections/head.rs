@@ -19,7 +19,7 @@ pub(crate) fn head(page: &RunPage<'_>) -> Markup {
                 "Efficiency is isentropic, total to total (" (report.gases.compressor.efficiency.description()) "); corrected to " (report.reference) "; method " (report.method) "."
             }
             section.verdict.clean[clean] aria-labelledby="verdict" {
-                h2 #verdict { (verdict_sentence(report.points.iter().map(|scored| &scored.point))) }
+                h2 #verdict { (verdict_sentence(report.identified())) }
                 @for premise in premises { p { strong { (sentence(&result_remark_text(premise))) } } }
                 @if let Some(figures) = key_figures(report.map, report.points, report.campaign, report.plan) { p { (figures) } }
                 @if actions.is_empty() && clean {

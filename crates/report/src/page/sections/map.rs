@@ -15,7 +15,8 @@ const LAYERS: [(&str, &str, bool); 6] = [
 ];
 
 pub(crate) fn map(page: &RunPage<'_>) -> Markup {
-    let units = page.report.campaign.map(|campaign| campaign.display.clone()).unwrap_or_default();
+    let display = page.report.display();
+    let speed = &display.units().speed;
     let has_dynamic = !page.report.two_parameter.is_empty();
     html! {
         section #map aria-labelledby="map-head" {
@@ -32,8 +33,8 @@ pub(crate) fn map(page: &RunPage<'_>) -> Markup {
             }
             (legend(page))
             div.plots {
-                figure { div #map-plot {} figcaption { "Pressure ratio over corrected flow. Numbers at lines: corrected speed in " (units.speed) "; numbers on contours: efficiency in %." span.screen { " Zoom with Ctrl and the wheel, move by dragging; click a point to see its transient." } } }
-                figure { div #eta-plot {} figcaption { "Efficiency over corrected flow, with 95 % intervals. Numbers at lines: corrected speed in " (units.speed) "." } }
+                figure { div #map-plot {} figcaption { "Pressure ratio over corrected flow. Numbers at lines: corrected speed in " (speed) "; numbers on contours: efficiency in %." span.screen { " Zoom with Ctrl and the wheel, move by dragging; click a point to see its transient." } } }
+                figure { div #eta-plot {} figcaption { "Efficiency over corrected flow, with 95 % intervals. Numbers at lines: corrected speed in " (speed) "." } }
             }
             noscript { p { "The drawings need JavaScript; the same map is next to this file as map.svg." } }
         }

@@ -1,7 +1,6 @@
 //! The sections of the page, in its order.
 
 pub(crate) mod conditions;
-pub(crate) mod gap;
 pub(crate) mod head;
 pub(crate) mod live;
 pub(crate) mod map;

@@ -7,14 +7,12 @@ use crate::{
     Display, SurgeReport, ZERO_HEADS, doubts, repeated_jumps_text, result_remark_text, score_text,
     surge_heads, surge_remarks, surge_rows, zero_rows, zero_words,
 };
-use mapper_campaign::campaign::DisplayUnits;
 use maud::{Markup, html};
 
-pub(crate) fn notes(page: &RunPage<'_>, units: &DisplayUnits) -> Markup {
+pub(crate) fn notes(page: &RunPage<'_>, display: &Display) -> Markup {
     let report = page.report;
-    let display = Display::new(units);
-    let zero = zero_rows(report.zero, &display);
-    let warnings = doubts(report.points.iter().map(|scored| &scored.point));
+    let zero = zero_rows(report.zero, display);
+    let warnings = doubts(report.identified());
     // The others are next to the verdict.
     let remarks: Vec<_> = report.remarks.iter().filter(|remark| !remark.concerns_all_points()).collect();
     html! {
@@ -35,11 +33,11 @@ pub(crate) fn notes(page: &RunPage<'_>, units: &DisplayUnits) -> Markup {
             @if !report.repeats.is_empty() {
                 h3 { "Drift" }
                 p { "Repeats are not on the map. Fixed offsets of the sensors cancel in the change from one to the next." }
-                (sentences(&repeated_jumps_text(report.repeats, &display)))
+                (sentences(&repeated_jumps_text(report.repeats, display)))
             }
             @if let Some(surge) = report.surge {
                 h3 { "Surge" }
-                (surge_part(surge, &display))
+                (surge_part(surge, display))
             }
             @if !report.sensors.is_empty() {
                 h3 { "Channels with several sensors" }
@@ -60,7 +58,7 @@ fn surge_part(surge: &SurgeReport, display: &Display) -> Markup {
     let rows: Vec<Row> = surge_rows(&surge.marks, display).into_iter().map(cells).collect();
     html! {
         (data_table("Measured surge", &surge_heads(&surge.marks, display), &rows))
-        @for remark in surge_remarks(&surge.remarks, surge.surges) { p { (remark) } }
+        @for remark in surge_remarks(surge) { p { (remark) } }
     }
 }
 

@@ -48,7 +48,7 @@ fn was_run(page: &RunPage<'_>, step: &PlanStep) -> bool {
 
 fn row(page: &RunPage<'_>, display: &Display, step: &PlanStep) -> Row {
     let marker = page.report.recording.steps.iter().find(|marker| marker.index == step.index);
-    let point = page.report.points.iter().map(|scored| &scored.point).find(|point| point.step == step.index);
+    let point = page.report.identified().find(|point| point.step == step.index);
     let optional = |value: Option<f64>, decimals| match value {
         Some(value) => Cell::number(number(Some(value), decimals), value),
         None => Cell::text("-"),

@@ -3,14 +3,15 @@
 use crate::diagnosis::correction_text::{CORRECTION_CAPTION, CORRECTION_HEADS, correction_rows};
 use crate::page::run_page::RunPage;
 use crate::page::table::{Cell, Row, data_table};
-use crate::{Display, END_S, PointCell, point_cells, point_groups, point_heads, shared_errors_text};
-use mapper_core::{IdentifiedPoint, Verdict};
+use crate::{
+    Display, END_S, PointCell, point_cells, point_groups, point_heads, shared_errors_text, verdict_word,
+};
+use mapper_core::IdentifiedPoint;
 use maud::{Markup, html};
 
 pub(crate) fn points(page: &RunPage<'_>, display: &Display) -> Markup {
     let report = page.report;
-    let identified = || report.points.iter().map(|scored| &scored.point);
-    let groups = point_groups(report.map, identified(), display);
+    let groups = point_groups(report.map, report.identified(), display);
     let heads = point_heads(display);
     html! {
         section #points aria-labelledby="points-head" {
@@ -20,7 +21,7 @@ pub(crate) fn points(page: &RunPage<'_>, display: &Display) -> Markup {
                  the housing is not; the uncertainty of readings is given with the instruments. The intervals of flow and pressure ratio are those \
                  of their sensors."
             }
-            @if let Some(shared) = shared_errors_text(identified(), display.units()) { p { (shared) } }
+            @if let Some(shared) = shared_errors_text(report.identified(), display) { p { (shared) } }
             @for group in &groups {
                 @let rows: Vec<Row> = group.points.iter().map(|point| row(page, display, point)).collect();
                 (data_table(&group.caption, &heads, &rows))
@@ -38,19 +39,11 @@ fn row(page: &RunPage<'_>, display: &Display, point: &IdentifiedPoint) -> Row {
     let last = cells.len() - 1;
     let cell = |(index, PointCell { text, value }): (usize, PointCell)| {
         let cell = value.map_or_else(|| Cell::text(text.clone()), |value| Cell::number(text.clone(), value));
-        if index == last { cell.class(class_of(point.verdict)) } else { cell }
+        if index == last { cell.class(verdict_word(point.verdict)) } else { cell }
     };
     Row { step: Some(point.step), cells: cells.into_iter().enumerate().map(cell).collect() }
 }
 
 fn corrected_row(cells: [String; 6]) -> Row {
     Row { step: None, cells: cells.into_iter().map(Cell::text).collect() }
-}
-
-fn class_of(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::Good => "good",
-        Verdict::Doubtful => "doubtful",
-        Verdict::Unusable => "unusable",
-    }
 }

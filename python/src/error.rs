@@ -79,7 +79,7 @@ fn of_session(error: SessionError) -> PyErr {
         | E::OtherMachine(_)
         | E::MachineUnknown { .. }
         | E::DifferentCampaigns { .. }
-        | E::Method { .. }
+        | E::Method(..)
         | E::Drift(_)
         | E::Driven(_)
         | E::Gap(_) => IdentificationError::new_err(error.to_string()),

@@ -100,5 +100,5 @@ fn machine_of(recorded: &[Recorded]) -> String {
 }
 
 pub fn named_method(name: String) -> Result<Method, SessionError> {
-    serde_json::from_value(Value::from(name.clone())).map_err(|source| SessionError::Method { name, source })
+    serde_json::from_value(Value::from(name.clone())).map_err(|source| SessionError::Method(name, source))
 }

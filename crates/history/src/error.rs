@@ -6,13 +6,8 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 pub enum HistoryError {
     /// The directory of the file cannot be created.
-    #[error("failed to create {}: {source}", .path.display())]
-    Directory {
-        /// The directory.
-        path: PathBuf,
-        /// The cause.
-        source: std::io::Error,
-    },
+    #[error("failed to create {}: {}", .0.display(), .1)]
+    Directory(PathBuf, #[source] std::io::Error),
     /// The file does not exist, and only reading was requested.
     #[error("there is no history at {}; run a nightly campaign to make one, or name another file", .0.display())]
     Missing(PathBuf),
@@ -28,11 +23,6 @@ pub enum HistoryError {
     #[error("the history {} cannot be written; check the permissions, or name another file", .0.display())]
     ReadOnly(PathBuf),
     /// Any other error of SQLite.
-    #[error("the history {} cannot be used: {source}", .path.display())]
-    Sqlite {
-        /// The file.
-        path: PathBuf,
-        /// The cause.
-        source: rusqlite::Error,
-    },
+    #[error("the history {} cannot be used: {}", .0.display(), .1)]
+    Sqlite(PathBuf, #[source] rusqlite::Error),
 }

@@ -94,7 +94,7 @@ impl History {
     pub fn open(path: &Path) -> Result<History, HistoryError> {
         if let Some(parent) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
             std::fs::create_dir_all(parent)
-                .map_err(|source| HistoryError::Directory { path: parent.to_owned(), source })?;
+                .map_err(|source| HistoryError::Directory(parent.to_owned(), source))?;
         }
         check_plain(path)?;
         let mut history = Self::connect(path, OpenFlags::default())?;
@@ -102,12 +102,10 @@ impl History {
         let writable = history.prepare().and_then(|()| {
             let transaction = history.connection.transaction_with_behavior(TransactionBehavior::Immediate);
             let path = path.to_owned();
-            transaction
-                .and_then(Transaction::rollback)
-                .map_err(|source| HistoryError::Sqlite { path, source })
+            transaction.and_then(Transaction::rollback).map_err(|source| HistoryError::Sqlite(path, source))
         });
         match writable {
-            Err(HistoryError::Sqlite { path, source }) if is_read_only(&source) => {
+            Err(HistoryError::Sqlite(path, source)) if is_read_only(&source) => {
                 Err(HistoryError::ReadOnly(path))
             }
             writable => writable.map(|()| history),
@@ -127,7 +125,7 @@ impl History {
         let mut history =
             Self::connect(path, OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX)?;
         match history.prepare() {
-            Err(HistoryError::Sqlite { source, .. }) if is_read_only(&source) => Self::open_read_only(path),
+            Err(HistoryError::Sqlite(_, source)) if is_read_only(&source) => Self::open_read_only(path),
             prepared => prepared.map(|()| history),
         }
     }
@@ -149,7 +147,7 @@ impl History {
     }
 
     fn connect(path: &Path, flags: OpenFlags) -> Result<History, HistoryError> {
-        let fail = |source| HistoryError::Sqlite { path: path.to_owned(), source };
+        let fail = |source| HistoryError::Sqlite(path.to_owned(), source);
         let connection = Connection::open_with_flags(path, flags).map_err(fail)?;
         connection.busy_timeout(BUSY_TIMEOUT).map_err(fail)?;
         Ok(History { connection, path: path.to_owned() })
@@ -162,7 +160,7 @@ impl History {
             Some(rusqlite::ErrorCode::NotADatabase | rusqlite::ErrorCode::DatabaseCorrupt) => {
                 HistoryError::Foreign { path: path.clone(), reason: source.to_string() }
             }
-            _ => HistoryError::Sqlite { path: path.clone(), source },
+            _ => HistoryError::Sqlite(path.clone(), source),
         };
         let foreign = |reason: String| HistoryError::Foreign { path: path.clone(), reason };
         // SQLite reports busy at once if another process switches to WAL at the same time. The mode is stored in the file, so one success is enough.
@@ -206,7 +204,7 @@ impl History {
     /// [`HistoryError::Sqlite`]; the history is then unchanged.
     pub fn append(&mut self, night: &mut Night, nights: usize) -> Result<Comparison, HistoryError> {
         let path = self.path.clone();
-        self.try_append(night, nights).map_err(|source| HistoryError::Sqlite { path, source })
+        self.try_append(night, nights).map_err(|source| HistoryError::Sqlite(path, source))
     }
 
     fn try_append(&mut self, night: &mut Night, nights: usize) -> rusqlite::Result<Comparison> {
@@ -267,7 +265,7 @@ impl History {
     /// # Errors
     /// [`HistoryError::Sqlite`].
     pub fn runs(&self, filter: &Filter) -> Result<Vec<ListedRun>, HistoryError> {
-        self.try_runs(filter).map_err(|source| HistoryError::Sqlite { path: self.path.clone(), source })
+        self.try_runs(filter).map_err(|source| HistoryError::Sqlite(self.path.clone(), source))
     }
 
     fn try_runs(&self, filter: &Filter) -> rusqlite::Result<Vec<ListedRun>> {
@@ -300,7 +298,7 @@ impl History {
     /// # Errors
     /// [`HistoryError::Sqlite`].
     pub fn points(&self, filter: &Filter) -> Result<(Vec<StoredNight>, Vec<ObservedPoint>), HistoryError> {
-        self.try_points(filter).map_err(|source| HistoryError::Sqlite { path: self.path.clone(), source })
+        self.try_points(filter).map_err(|source| HistoryError::Sqlite(self.path.clone(), source))
     }
 
     fn try_points(&self, filter: &Filter) -> rusqlite::Result<(Vec<StoredNight>, Vec<ObservedPoint>)> {

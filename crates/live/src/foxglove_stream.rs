@@ -43,13 +43,8 @@ pub enum FoxgloveStreamError {
     )]
     Address(String),
     /// The library cannot serve.
-    #[error("the Foxglove stream cannot be served at {address}: {source}; choose another address")]
-    Serve {
-        /// The address.
-        address: SocketAddr,
-        /// The reason.
-        source: FoxgloveError,
-    },
+    #[error("the Foxglove stream cannot be served at {0}: {1}; choose another address")]
+    Serve(SocketAddr, #[source] FoxgloveError),
 }
 
 /// A stream of readings for Foxglove and Lichtblick.
@@ -93,7 +88,7 @@ impl FoxgloveStream {
             .message_backlog_size(MAX_QUEUED_MESSAGES)
             .context(&context)
             .start_blocking()
-            .map_err(|source| FoxgloveStreamError::Serve { address, source })?;
+            .map_err(|source| FoxgloveStreamError::Serve(address, source))?;
         // The server lives until the process ends.
         address.set_port(server.port());
         Ok(FoxgloveStream { address, start_time_ns, topics, _context: context })

@@ -35,7 +35,7 @@ impl Live {
         let port_alone = text.parse::<u16>().map(|port| SocketAddr::from((Ipv4Addr::LOCALHOST, port)));
         let address: SocketAddr =
             port_alone.or_else(|_| text.parse()).map_err(|_| LiveError::Address(text.to_owned()))?;
-        let listen = |source| LiveError::Listen { address, source };
+        let listen = |source| LiveError::Listen(address, source);
         let listener = TcpListener::bind(address).map_err(listen)?;
         let address = listener.local_addr().map_err(listen)?;
         let token = if address.ip().is_loopback() { None } else { Some(token()?) };
@@ -106,7 +106,7 @@ impl Live {
         let _ = std::thread::Builder::new()
             .name("live".to_owned())
             .spawn(move || serve(&listener, &for_thread))
-            .map_err(|source| LiveError::Listen { address: self.address, source })?;
+            .map_err(|source| LiveError::Listen(self.address, source))?;
         // This is the only start, because the listener was just taken.
         let _ = self.started.set((feed, served));
         Ok(())

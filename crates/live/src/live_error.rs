@@ -12,13 +12,8 @@ pub enum LiveError {
     )]
     Address(String),
     /// The address is not available.
-    #[error("the live page cannot be served at {address}: {source}; choose another address")]
-    Listen {
-        /// The address.
-        address: SocketAddr,
-        /// The reason.
-        source: std::io::Error,
-    },
+    #[error("the live page cannot be served at {0}: {1}; choose another address")]
+    Listen(SocketAddr, #[source] std::io::Error),
     /// The system has no random numbers for a token.
     #[error("the system cannot generate random numbers for a token: {0}")]
     Token(getrandom::Error),

@@ -29,21 +29,11 @@ pub struct Variant {
 #[derive(Debug, thiserror::Error)]
 pub enum VariantError {
     /// The table cannot be read.
-    #[error("failed to read the machines in {}: {source}", .path.display())]
-    Read {
-        /// The table.
-        path: PathBuf,
-        /// The reason.
-        source: std::io::Error,
-    },
+    #[error("failed to read the machines in {}: {}", .0.display(), .1)]
+    Read(PathBuf, #[source] std::io::Error),
     /// A row has the wrong form.
-    #[error("{}: {source}", .path.display())]
-    Form {
-        /// The table.
-        path: PathBuf,
-        /// Location and reason.
-        source: csv::Error,
-    },
+    #[error("{}: {}", .0.display(), .1)]
+    Form(PathBuf, #[source] csv::Error),
     /// The table as a whole is invalid.
     #[error("{}: {problem}", .path.display())]
     Table {
@@ -73,7 +63,7 @@ impl Variant {
     /// # Errors
     /// [`VariantError`] with the line.
     pub fn read(path: &Path) -> Result<Vec<Variant>, VariantError> {
-        let unread = |source| VariantError::Read { path: path.to_owned(), source };
+        let unread = |source| VariantError::Read(path.to_owned(), source);
         let bytes = mapper_yaml::read_limited(path, MAX_TABLE_BYTES).map_err(unread)?;
         let text = String::from_utf8(bytes).map_err(|error| unread(std::io::Error::other(error)))?;
         Self::from_text(&text, path)
@@ -94,7 +84,7 @@ impl Variant {
                 usize::try_from(*expected_len.min(len)).unwrap_or(usize::MAX),
                 &format!("line {}: {len} cells below a header of {expected_len}", at.line()),
             ),
-            _ => VariantError::Form { path: path.to_owned(), source: error },
+            _ => VariantError::Form(path.to_owned(), error),
         };
         let mut reader = csv::ReaderBuilder::new()
             .delimiter(delimiter as u8)

@@ -27,15 +27,15 @@ pub fn command_for(error: &E) -> Option<String> {
         }
         E::StalePlan { .. } | E::InvalidPlan { .. } => "`mapper plan CAMPAIGN --out FILE`",
         E::UnknownOutputFormat { .. } => "`--to FORMAT`",
-        E::FirstMap(error) if matches!(**error, FirstMapError::NotAMap { .. }) => "`mapper map convert`",
+        E::FirstMap(error) if matches!(**error, FirstMapError::NotAMap(..)) => "`mapper map convert`",
         E::Fmu(FmuExportError::Platform | FmuExportError::Compiler { .. }) => "without `--compile`",
         E::MapWork(MapWorkError::NotMeasured(_)) => "`mapper map inspect`",
-        E::MapWork(MapWorkError::NotCorrected {
-            source: Heat::TooFew { .. } | Heat::OneSpeed { .. } | Heat::Singular,
-            ..
-        }) => "`--heat WATTS`",
+        E::MapWork(MapWorkError::NotCorrected(
+            _,
+            Heat::TooFew { .. } | Heat::OneSpeed { .. } | Heat::Singular,
+        )) => "`--heat WATTS`",
         E::MapWork(MapWorkError::NoDefinition) => "`--efficiency DEFINITION`",
-        E::Import { source, .. } => match source {
+        E::Import(_, source) => match source {
             ImportError::NoUnit { .. } | ImportError::FlowUnit => "`--with KEY=VALUE`",
             ImportError::RelativeSpeed { .. } | ImportError::DesignSpeedUnused { .. } => "`--design-speed`",
             ImportError::NoReference | ImportError::ReferenceConflict { .. } => "`--reference`",

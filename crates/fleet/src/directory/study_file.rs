@@ -14,13 +14,8 @@ const MAX_FILE_BYTES: usize = 4 << 20;
 #[derive(Debug, thiserror::Error)]
 pub enum StudyFileError {
     /// The file cannot be read.
-    #[error("failed to read the study {}: {source}", .path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// The cause.
-        source: std::io::Error,
-    },
+    #[error("failed to read the study {}: {}", .0.display(), .1)]
+    Read(PathBuf, #[source] std::io::Error),
     /// The file has mistakes.
     #[error("{0}")]
     Mistakes(Box<Findings>),
@@ -78,7 +73,7 @@ impl StudyFile {
 pub fn open_study(path: &Path) -> Result<StudyFile, StudyFileError> {
     let mistakes = |findings| StudyFileError::Mistakes(Box::new(findings));
     let text = mapper_yaml::open(&DOCUMENT, path, MAX_FILE_BYTES)
-        .map_err(|source| StudyFileError::Read { path: path.to_owned(), source })?
+        .map_err(|source| StudyFileError::Read(path.to_owned(), source))?
         .map_err(mistakes)?;
     let (tree, mut notes) = mapper_yaml::read(Source::new(&DOCUMENT, path, &text)).map_err(mistakes)?;
     if let Some(finding) = tree.find_other_kind("fleet", &["fleet", "study"]) {

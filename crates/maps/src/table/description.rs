@@ -141,13 +141,8 @@ pub fn set_key(description: &mut MapDescription, key: &str, value: &str) -> Resu
 #[derive(Debug, thiserror::Error)]
 pub enum DescriptionError {
     /// The file cannot be read.
-    #[error("failed to read the map description {}: {source}", .path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// The cause.
-        source: io::Error,
-    },
+    #[error("failed to read the map description {}: {}", .0.display(), .1)]
+    Read(PathBuf, #[source] io::Error),
     /// The file has mistakes.
     #[error("{0}")]
     Mistakes(Box<Findings>),
@@ -160,7 +155,7 @@ pub enum DescriptionError {
 pub fn read_description(path: &Path) -> Result<MapDescription, DescriptionError> {
     let mistakes = |findings| DescriptionError::Mistakes(Box::new(findings));
     let text = mapper_yaml::open(&DOCUMENT, path, MAX_BYTES)
-        .map_err(|source| DescriptionError::Read { path: path.to_owned(), source })?
+        .map_err(|source| DescriptionError::Read(path.to_owned(), source))?
         .map_err(mistakes)?;
     description_from_yaml(&text, path).map_err(mistakes)
 }

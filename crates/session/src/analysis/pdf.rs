@@ -28,13 +28,8 @@ pub enum PrintError {
     #[error("printing needs Chromium or a browser made from it, and none is on the path (looked for {}); install `chromium`, or open the page and print it there", BROWSERS.join(", "))]
     NoBrowser,
     /// The browser could not be used.
-    #[error("{browser} could not be used: {source}")]
-    System {
-        /// Its name.
-        browser: &'static str,
-        /// The system's error.
-        source: io::Error,
-    },
+    #[error("{0} could not be used: {1}")]
+    System(&'static str, #[source] io::Error),
     /// The browser wrote no PDF.
     #[error("{browser} made no PDF ({reason}); open the page and print it there")]
     NoPdf {
@@ -52,7 +47,7 @@ pub enum PrintError {
 /// [`PrintError`].
 pub fn page_as_pdf(page: &str, directory: &Path) -> Result<Vec<u8>, PrintError> {
     let browser = BROWSERS.into_iter().find(|name| is_on_path(name)).ok_or(PrintError::NoBrowser)?;
-    let failed = |source| PrintError::System { browser, source };
+    let failed = |source| PrintError::System(browser, source);
     let folder = tempfile::Builder::new().prefix("mapper-print-").tempdir_in(directory).map_err(failed)?;
     let at = |name: &str| folder.path().join(name);
     std::fs::write(at("page.html"), page).map_err(failed)?;

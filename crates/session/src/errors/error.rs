@@ -81,13 +81,8 @@ pub enum SessionError {
         differs: &'static str,
     },
     /// An unknown method.
-    #[error("`{name}` is not a method: {source}")]
-    Method {
-        /// The name given.
-        name: String,
-        /// The known methods.
-        source: serde_json::Error,
-    },
+    #[error("`{0}` is not a method: {1}")]
+    Method(String, #[source] serde_json::Error),
     /// The campaign's map is unusable.
     #[error("the nominal model has no map: {0}")]
     Model(#[from] mapper_campaign::NominalTableError),
@@ -95,13 +90,8 @@ pub enum SessionError {
     #[error(transparent)]
     Plan(#[from] PlanError),
     /// A file does not contain a plan.
-    #[error("{} is not a plan: {source}", .path.display())]
-    NotAPlan {
-        /// The file.
-        path: PathBuf,
-        /// The reason.
-        source: serde_json::Error,
-    },
+    #[error("{} is not a plan: {}", .0.display(), .1)]
+    NotAPlan(PathBuf, #[source] serde_json::Error),
     /// A stored plan no longer matches its inputs.
     #[error("{} is stale: {} changed since it was made; make a new plan", .path.display(), .changed.join(" and "))]
     StalePlan {
@@ -314,13 +304,8 @@ pub enum SessionError {
     #[error(transparent)]
     MapWork(#[from] MapWorkError),
     /// A map file has mistakes.
-    #[error("{}: {source}", .path.display())]
-    Import {
-        /// The file.
-        path: PathBuf,
-        /// Its mistakes.
-        source: ImportError,
-    },
+    #[error("{}: {}", .0.display(), .1)]
+    Import(PathBuf, #[source] ImportError),
     /// An unknown map format.
     #[error("there is no map format `{name}`; the formats are {}", .known.join(", "))]
     UnknownFormat {
@@ -348,13 +333,8 @@ pub enum SessionError {
         known: Vec<String>,
     },
     /// A map cannot be fitted.
-    #[error("`{format}` needs a fitted map: {source}")]
-    Fit {
-        /// The format.
-        format: &'static str,
-        /// The reason.
-        source: mapper_maps::MapFitError,
-    },
+    #[error("`{0}` needs a fitted map: {1}")]
+    Fit(&'static str, #[source] mapper_maps::MapFitError),
     /// A machine cannot be written as an FMU.
     #[error(transparent)]
     Fmu(#[from] crate::errors::fmu_error::FmuExportError),
@@ -414,7 +394,7 @@ impl SessionError {
         match self {
             E::Campaign(CampaignError::Read { .. })
             | E::Nightly(NightlyError::Read { .. })
-            | E::MapWork(MapWorkError::Description(DescriptionError::Read { .. }))
+            | E::MapWork(MapWorkError::Description(DescriptionError::Read(..)))
             | E::ChannelMap(ChannelMapError::Read { .. }) => ErrorKind::Failure,
             E::Campaign(CampaignError::Mistakes(_))
             | E::Nightly(NightlyError::Mistakes(_))
@@ -424,7 +404,7 @@ impl SessionError {
             | E::NightlyMismatch(..)
             | E::NoRecording
             | E::DifferentCampaigns { .. }
-            | E::Method { .. }
+            | E::Method(..)
             | E::Model(_)
             | E::Backend(_)
             | E::Reader { .. }
@@ -434,12 +414,12 @@ impl SessionError {
             | E::ChannelMap(ChannelMapError::Mistakes(_))
             | E::MachineUnknown { .. }
             | E::NothingToAcknowledge { .. }
-            | E::Import { .. }
+            | E::Import(..)
             | E::MapWork(_)
             | E::UnknownFormat { .. }
             | E::UnknownExtension { .. }
             | E::UnknownOutputFormat { .. }
-            | E::Fit { .. }
+            | E::Fit(..)
             | E::Fmu(_)
             | E::FirstMap(_)
             | E::Drift(DriftError::NoRun)
@@ -455,7 +435,7 @@ impl SessionError {
             | E::NotArmed(_)
             | E::Preflight(_) => ErrorKind::Rig,
             E::Plan(_)
-            | E::NotAPlan { .. }
+            | E::NotAPlan(..)
             | E::StalePlan { .. }
             | E::InvalidPlan { .. }
             | E::NotResumable { .. }

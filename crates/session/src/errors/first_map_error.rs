@@ -17,15 +17,10 @@ pub enum FirstMapError {
     },
     /// The file is not a map.
     #[error(
-        "the file {} is not a map: {source}; write a table of corrected speed, corrected flow, pressure ratio and efficiency, with units \
-         in its header, or convert a map of another format", .path.display()
+        "the file {} is not a map: {}; write a table of corrected speed, corrected flow, pressure ratio and efficiency, with units \
+         in its header, or convert a map of another format", .0.display(), .1
     )]
-    NotAMap {
-        /// The file.
-        path: PathBuf,
-        /// The reason.
-        source: NominalTableError,
-    },
+    NotAMap(PathBuf, #[source] NominalTableError),
     /// The map is not that of a compressor with this wheel.
     #[error("the map {}: {misfit}; {}", .path.display(), .misfit.remedy())]
     Misfit {

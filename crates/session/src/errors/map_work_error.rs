@@ -15,24 +15,14 @@ pub enum MapWorkError {
     #[error(transparent)]
     Key(#[from] KeyError),
     /// A compressor map without a fit.
-    #[error("{}: {source}", .path.display())]
-    NotFitted {
-        /// The file.
-        path: PathBuf,
-        /// The reason.
-        source: MapFitError,
-    },
+    #[error("{}: {}", .0.display(), .1)]
+    NotFitted(PathBuf, #[source] MapFitError),
     /// Compressor maps that cannot be compared.
     #[error(transparent)]
     NotCompared(#[from] MapFitError),
     /// A turbine map without a fit.
-    #[error("{}: {source}", .path.display())]
-    TurbineNotFitted {
-        /// The file.
-        path: PathBuf,
-        /// The reason.
-        source: TurbineFitError,
-    },
+    #[error("{}: {}", .0.display(), .1)]
+    TurbineNotFitted(PathBuf, #[source] TurbineFitError),
     /// A table whose points are corrected already.
     #[error(
         "{} is not a table of measured points, which has columns for N, flow, P1, T1, P2 and T2 (of a turbine N, flow, P3, T3, P4 and T4); inspect the columns that were recognised",
@@ -40,21 +30,11 @@ pub enum MapWorkError {
     )]
     NotMeasured(PathBuf),
     /// Points that are not a map.
-    #[error("{}: {source}", .path.display())]
-    NotAssembled {
-        /// The file.
-        path: PathBuf,
-        /// The reason.
-        source: AssembleError,
-    },
+    #[error("{}: {}", .0.display(), .1)]
+    NotAssembled(PathBuf, #[source] AssembleError),
     /// A map that cannot be corrected for heat.
-    #[error("{}: {source}", .path.display())]
-    NotCorrected {
-        /// The file.
-        path: PathBuf,
-        /// The reason.
-        source: HeatCorrectionError,
-    },
+    #[error("{}: {}", .0.display(), .1)]
+    NotCorrected(PathBuf, #[source] HeatCorrectionError),
     /// A conversion of efficiencies without their definition.
     #[error(
         "the file does not state how its efficiencies are defined; state the definition, e.g. `constant_gamma 1.4`"

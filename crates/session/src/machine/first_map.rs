@@ -109,7 +109,7 @@ fn map_from_file(
     let reference = request.reference.state;
     let text = resample_table(registry, path, reference)?;
     let map = nominal_table(&text, Some(reference))
-        .map_err(|source| Box::new(FirstMapError::NotAMap { path: path.to_owned(), source }))?;
+        .map_err(|source| Box::new(FirstMapError::NotAMap(path.to_owned(), source)))?;
     if let Some(misfit) = find_map_misfit(&map, request.wheel_diameter_m) {
         return Err(Box::new(FirstMapError::Misfit { path: path.to_owned(), misfit }).into());
     }

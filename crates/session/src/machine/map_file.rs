@@ -36,9 +36,7 @@ impl Registry {
         user_description: impl Into<MapDescription>,
     ) -> Result<ImportedMap, SessionError> {
         let (format, bytes) = self.map_bytes(path)?;
-        format
-            .read(&bytes, user_description)
-            .map_err(|source| SessionError::Import { path: path.to_owned(), source })
+        format.read(&bytes, user_description).map_err(|source| SessionError::Import(path.to_owned(), source))
     }
 
     /// Reads the map of a turbine.
@@ -53,7 +51,7 @@ impl Registry {
         let (format, bytes) = self.map_bytes(path)?;
         format
             .read_turbine(&bytes, user_description)
-            .map_err(|source| SessionError::Import { path: path.to_owned(), source })
+            .map_err(|source| SessionError::Import(path.to_owned(), source))
     }
 
     /// Format and content of a map file.
@@ -88,7 +86,7 @@ impl Registry {
             .map_err(SessionError::file("read", path))?;
         let bytes = unpack(&bytes)
             .map(std::borrow::Cow::into_owned)
-            .map_err(|source| SessionError::Import { path: path.to_owned(), source })?;
+            .map_err(|source| SessionError::Import(path.to_owned(), source))?;
         Ok((format, bytes))
     }
 
@@ -174,7 +172,7 @@ pub fn write_map_fitted_if_needed(
     let needs_fit = map.fitted.is_none() && matches!(format.write(&map), Err(ExportError::NeedsFit { .. }));
     let map = if needs_fit {
         let options = MapFitOptions { leave_one_out: false, ..MapFitOptions::default() };
-        fit_map(map, &options).map_err(|source| SessionError::Fit { format: format.name, source })?
+        fit_map(map, &options).map_err(|source| SessionError::Fit(format.name, source))?
     } else {
         map
     };

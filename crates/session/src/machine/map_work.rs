@@ -72,7 +72,7 @@ impl Registry {
     ) -> Result<MapFile, SessionError> {
         match self.inspect_map(path, user_description) {
             Ok(imported) => Ok(MapFile::Compressor(imported)),
-            Err(SessionError::Import { source: ImportError::Turbine { .. }, .. }) => {
+            Err(SessionError::Import(_, ImportError::Turbine { .. })) => {
                 self.inspect_turbine(path, user_description).map(MapFile::Turbine)
             }
             Err(error) => Err(error),
@@ -148,7 +148,7 @@ impl Registry {
         let (mut text, json, remarks) = match self.read_map_file(path, user_description)? {
             MapFile::Compressor(imported) => {
                 let map = fit_map(imported.map, options)
-                    .map_err(|source| MapWorkError::NotFitted { path: path.to_owned(), source })?;
+                    .map_err(|source| MapWorkError::NotFitted(path.to_owned(), source))?;
                 if let Some((out, format)) = format {
                     write_map(out.path, format, &map, out.existing)?;
                 }
@@ -159,7 +159,7 @@ impl Registry {
             }
             MapFile::Turbine(imported) => {
                 let map = fit_turbine(imported.map)
-                    .map_err(|source| MapWorkError::TurbineNotFitted { path: path.to_owned(), source })?;
+                    .map_err(|source| MapWorkError::TurbineNotFitted(path.to_owned(), source))?;
                 if let Some((out, format)) = format {
                     write_file(out.path, &format.write_turbine(&map)?, out.existing)?;
                 }
@@ -263,7 +263,7 @@ impl Registry {
         let format = out.map(|out| out.format(self)).transpose()?;
         let imported = self.inspect_map(path, user_description)?;
         let (map, correction) = correct_for_heat(imported.map, heat_w)
-            .map_err(|source| MapWorkError::NotCorrected { path: path.to_owned(), source })?;
+            .map_err(|source| MapWorkError::NotCorrected(path.to_owned(), source))?;
         let mut text = heat_correction_text(&correction);
         if let Some((out, format)) = out.zip(format) {
             write_map_fitted_if_needed(out.path, format, map, out.existing)?;
@@ -307,7 +307,7 @@ impl Registry {
                     return Err(MapWorkError::NotOfTurbine { path: paths[0].to_owned(), property }.into());
                 }
                 let comparison = compare_turbines(&a.map, &b.map)
-                    .map_err(|source| MapWorkError::TurbineNotFitted { path: paths[0].to_owned(), source })?;
+                    .map_err(|source| MapWorkError::TurbineNotFitted(paths[0].to_owned(), source))?;
                 let json = serde_json::to_value(&comparison)?;
                 (turbine_comparison_text(&comparison), json, [a.remarks, b.remarks])
             }
@@ -329,7 +329,7 @@ pub(crate) fn write_turbine_fitted_if_needed(
     let needs_fit =
         map.fitted.is_none() && matches!(format.write_turbine(&map), Err(ExportError::NeedsFit { .. }));
     let map = if needs_fit {
-        fit_turbine(map).map_err(|source| MapWorkError::TurbineNotFitted { path: path.to_owned(), source })?
+        fit_turbine(map).map_err(|source| MapWorkError::TurbineNotFitted(path.to_owned(), source))?
     } else {
         map
     };

@@ -131,7 +131,7 @@ impl Registry {
             ..user_description.clone()
         };
         let table = match self.inspect_map(path, &description) {
-            Err(SessionError::Import { source: ImportError::Turbine { .. }, .. }) if budget.is_none() => {
+            Err(SessionError::Import(_, ImportError::Turbine { .. })) if budget.is_none() => {
                 return self.reduce_turbine_points(path, user_description, machine, out);
             }
             table => table?,
@@ -154,7 +154,7 @@ impl Registry {
         let (points, budgets): (Vec<_>, Vec<PointBudgets>) =
             mapper_identify::reduce(measured, known, &config)?.into_iter().unzip();
         let map = assemble(&points, &name, config.reference, config.method)
-            .map_err(|source| MapWorkError::NotAssembled { path: path.to_owned(), source })?;
+            .map_err(|source| MapWorkError::NotAssembled(path.to_owned(), source))?;
         let mut map = with_gas(map, config.air);
         let ends = mark_line_ends(&mut map, |step| measured.get(step)?.end);
         let mut text = reduced_text(&map, &ends, &budgets, &remarks);

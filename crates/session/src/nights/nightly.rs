@@ -90,8 +90,7 @@ impl PreparedNight {
 
 /// Parses a method name as written in campaigns.
 fn method(name: &str) -> Result<Method, SessionError> {
-    serde_json::from_value(name.into())
-        .map_err(|source| SessionError::Method { name: name.to_owned(), source })
+    serde_json::from_value(name.into()).map_err(|source| SessionError::Method(name.to_owned(), source))
 }
 
 impl Session<'_> {

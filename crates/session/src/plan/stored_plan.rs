@@ -29,8 +29,8 @@ const ROUNDING_RATIO: f64 = 1e-9;
 pub fn stored_plan(path: &Path, now: &PlanInputHashes, campaign: &Campaign) -> Result<Plan, SessionError> {
     let bytes = read_at_most(path, MAX_FILE_BYTES)?;
     let wrong = |why: String| SessionError::InvalidPlan { path: path.to_owned(), why };
-    let stored: Plan = serde_json::from_slice(&bytes)
-        .map_err(|source| SessionError::NotAPlan { path: path.to_owned(), source })?;
+    let stored: Plan =
+        serde_json::from_slice(&bytes).map_err(|source| SessionError::NotAPlan(path.to_owned(), source))?;
     let then = &stored.made_from;
     let changed: Vec<&str> = [
         ("the campaign", then.campaign_sha256 != now.campaign_sha256),

@@ -25,7 +25,7 @@ pub use directory::hash::Hash;
 pub use directory::item::Item;
 pub use directory::kind::{ItemDraft, Kind, Output, Results, StudyDraft, WorkContext, WorkError};
 pub use directory::kinds::kind_of;
-pub use directory::part::{Outcome, Part};
+pub(crate) use directory::part::{Outcome, Part};
 pub use directory::shared_files::Machine;
 pub use directory::study::{ItemEntry, Study};
 pub use directory::study_file::{StudyFile, StudyFileError, open_study};

@@ -24,4 +24,4 @@ pub use night::{Night, PointRow, RunKey, RunRow};
 pub use outlier::{DeviationPattern, MIN_MACHINES_FOR_OUTLIERS, Outlier};
 pub use production::{Drift, MS_PER_DAY, Production, ProductionPoint, Spread, Stand, analyse_productions};
 pub use quantity::PointQuantity;
-pub use store::{DEFAULT_NIGHTS, Filter, History, ListedRun, ObservedPoint, StoredNight};
+pub use store::{Filter, History, ListedRun, ObservedPoint, StoredNight};

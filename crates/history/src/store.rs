@@ -8,9 +8,6 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Default number of nights that a band is based on: two weeks.
-pub const DEFAULT_NIGHTS: usize = 14;
-
 /// SQLite application ID of history files: "mapr".
 const APPLICATION_ID: i32 = 0x6d61_7072;
 /// Version of the table layout.

@@ -20,18 +20,15 @@ mod test_report;
 pub use diagnosis::corrected_points::corrected_csv;
 pub use diagnosis::correction_text::correction_text;
 pub use diagnosis::drift_text::drift_text;
-pub use diagnosis::gap_text::{
-    NOTHING, OUTSIDE, UNLISTED, candidate_name, doubt_text, gap_text, headline, suspect_text,
-};
+pub use diagnosis::gap_text::{doubt_text, gap_text, headline};
 pub use diagnosis::prediction_check_text::forecast_check_text;
 pub use diagnosis::recordings_text::recordings_text;
-pub use diagnosis::stand_actions::{next_measurement, stand_actions};
 pub use formatting::bar_text::{progress_text, short_duration};
 pub use formatting::display::Display;
 pub use formatting::duration::duration;
-pub use formatting::number::{four_figures, number, percent, significant_digits};
+pub use formatting::number::{number, percent, significant_digits};
 pub use formatting::paint::{Paint, paint_verdict};
-pub use formatting::table::{TextTable, with_heads};
+pub use formatting::table::with_heads;
 pub use formatting::wrapped::wrapped;
 pub use heat_transfer::heat_correction_text::heat_correction_text;
 pub use heat_transfer::result_pictures::{ErrorAtGradient, error_figure, heat_transfer_figure};
@@ -53,46 +50,43 @@ pub use maps::map_comparison_text::map_comparison_text;
 pub use maps::map_fit_text::map_fit_text;
 pub use maps::reduced_text::reduced_text;
 pub use maps::turbine_file::{TurbinePoint, turbine_points, turbine_text};
-pub use maps::turbine_map_text::{
-    imported_turbine_text, reduced_turbine_text, turbine_comparison_text, turbine_fit_text,
-};
+pub use maps::turbine_map_text::{imported_turbine_text, reduced_turbine_text, turbine_comparison_text, turbine_fit_text};
 pub use plan::campaign_check_text::campaign_check_text;
 pub use plan::comparison_text::{comparison_json, comparison_text};
 pub use plan::jump_text::{jump_json, jump_text};
 pub use plan::plan_picture::plan_svg;
-pub use plan::plan_remark_text::{guard_trip_text, plan_remark_text};
+pub use plan::plan_remark_text::guard_trip_text;
 pub use plan::plan_text::plan_text;
 pub use plan::speed_lines_text::lines_text;
 pub use plan::verdict_forecast_text::verdict_forecast_text;
 pub use point_results::budget_table::budget_csv;
 pub use point_results::disagreement::disagreement_text;
-pub use point_results::end_readings::{END_S, at_end};
 pub use point_results::lines_of_points::{first_doubts_text, points_by_line_text, verdict_sentence};
-pub use point_results::point_table::{PointCell, PointGroup, point_cells, point_groups, point_heads};
-pub use point_results::point_warnings::{Doubt, doubts};
-pub use point_results::points::{opening, points_text, score_text, step_name, truth_text, verdict_word};
+pub use point_results::points::{opening, points_text, truth_text};
 pub use point_results::result_remark_text::result_remark_text;
 pub use point_results::shared_errors::shared_errors_text;
 pub use point_results::warning_text::{warning_text, with_messages};
 pub use reference_pages::campaign_page::campaign_page;
 pub use reference_pages::sequence_page::sequence_page;
-pub use test_report::acceptance::{
-    ACCEPTANCE_HEADS, BALANCE_HEADS, BALANCE_WORDS, JudgedPoints, acceptance_rows, acceptance_words,
-    balance_rows,
-};
-pub use test_report::assumed_text::{assumed_sentence, assumed_text, first_campaign_text};
-pub use test_report::conditions::{CONDITION_HEADS, condition_rows};
+pub use test_report::assumed_text::{assumed_text, first_campaign_text};
 pub use test_report::ending_text::{PointsOrigin, ending_sentence};
-pub use test_report::instruments::{
-    INSTRUMENT_HEADS, INSTRUMENT_WORDS, REGISTER_HEADS, instrument_rows, register_rows,
-};
-pub use test_report::key_figures::key_figures;
 pub use test_report::repeated_jumps::repeated_jumps_text;
-pub use test_report::run_report::{
-    ReportSource, RunReport, condition_facts, cover_facts, instant, provenance_facts, run_report,
-};
+pub use test_report::run_report::{ReportSource, RunReport, instant, run_report};
 pub use test_report::sensors_text::{declared_sensors_text, sensors_text};
-pub use test_report::surge_text::{
-    SurgeReport, surge_columns_text, surge_heads, surge_remarks, surge_rows, surge_text,
-};
-pub use test_report::zero_text::{ZERO_HEADS, zero_rows, zero_text, zero_words};
+pub use test_report::surge_text::{SurgeReport, surge_columns_text, surge_text};
+pub use test_report::zero_text::zero_text;
+
+pub(crate) use diagnosis::gap_text::{NOTHING, OUTSIDE, UNLISTED, suspect_text};
+pub(crate) use diagnosis::stand_actions::{next_measurement, stand_actions};
+pub(crate) use formatting::number::four_figures;
+pub(crate) use point_results::end_readings::{END_S, at_end};
+pub(crate) use point_results::point_table::{PointCell, point_cells, point_groups, point_heads};
+pub(crate) use point_results::point_warnings::doubts;
+pub(crate) use point_results::points::{score_text, step_name, verdict_word};
+pub(crate) use test_report::acceptance::{ACCEPTANCE_HEADS, BALANCE_HEADS, BALANCE_WORDS, acceptance_rows, acceptance_words, balance_rows};
+pub(crate) use test_report::conditions::{CONDITION_HEADS, condition_rows};
+pub(crate) use test_report::instruments::{INSTRUMENT_HEADS, INSTRUMENT_WORDS, REGISTER_HEADS, instrument_rows, register_rows};
+pub(crate) use test_report::key_figures::key_figures;
+pub(crate) use test_report::run_report::{condition_facts, cover_facts, provenance_facts};
+pub(crate) use test_report::surge_text::{surge_heads, surge_remarks, surge_rows};
+pub(crate) use test_report::zero_text::{ZERO_HEADS, zero_rows, zero_words};

@@ -7,7 +7,7 @@ use crate::{Session, SessionError, plan::planning};
 use mapper_campaign::Campaign;
 use mapper_core::Recording;
 use mapper_diagnose::drift::{DriftReport, DriftRequest, RecordedRun, diagnose};
-use mapper_identify::{IdentifyConfig, ZeroOutcome};
+use mapper_identify::ZeroOutcome;
 use mapper_observe::FusedChannel;
 use mapper_recording::ChannelMap;
 
@@ -50,7 +50,14 @@ impl Session<'_> {
             fuse_sensors(recordings(recorded), config, Some(campaign), map);
         let sensors = channels.into_iter().next().unwrap_or_default();
         take_air_and_probe(&mut model, &config);
-        let (recordings, config, zero) = subtract_first_zero(recordings, config, campaign);
+        // A separate zero for each run would hide drift between them.
+        let zero = recordings.first().map_or(ZeroOutcome::NotRequested, |first| {
+            ZeroOutcome::of(first, &config, campaign.zero.map(Into::into))
+        });
+        // Declared offsets are kept: they are not drift. The zero determines them far better than the model, whose own errors would appear as
+        // changes.
+        let recordings: Vec<Recording> =
+            recordings.into_iter().map(|recording| zero.subtract(recording, config.clone()).0).collect();
         let fingerprints: Vec<Option<String>> = recorded.iter().map(fingerprint).collect();
         // The first recording of a run that was resumed after its soak contains only the soak.
         let directory = |place: usize| recorded.get(place).map(|recorded_run| recorded_run.path.parent());
@@ -76,22 +83,6 @@ impl Session<'_> {
         })?;
         Ok(Drift { report, sensors, zero })
     }
-}
-
-/// Subtracts the zero of the first run from all runs. A separate zero for each run would hide drift between them.
-fn subtract_first_zero(
-    recordings: Vec<Recording>,
-    config: IdentifyConfig,
-    campaign: &Campaign,
-) -> (Vec<Recording>, IdentifyConfig, ZeroOutcome) {
-    let zero = recordings.first().map_or(ZeroOutcome::NotRequested, |first| {
-        ZeroOutcome::of(first, &config, campaign.zero.map(Into::into))
-    });
-    let recordings =
-        recordings.into_iter().map(|recording| zero.subtract(recording, config.clone()).0).collect();
-    // Declared offsets are kept: they are not drift. The zero determines them far better than the model, whose own errors would appear as
-    // changes.
-    (recordings, config, zero)
 }
 
 /// Fingerprint of what must be the same in all runs: machine, boundary conditions, points and timing. Seed, name, rig and output may differ.

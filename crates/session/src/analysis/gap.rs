@@ -25,7 +25,6 @@ use mapper_diagnose::gap::next_experiment::best_experiment::sensor_near;
 use mapper_diagnose::gap::next_experiment::outlook::SimulatedRig;
 use mapper_diagnose::gap::preconditions::usable::checked_study;
 use mapper_diagnose::gap::residuals::actuators::Actuators;
-use mapper_diagnose::gap::residuals::study::Study;
 use mapper_diagnose::gap::residuals::whiten::Linearised;
 use mapper_diagnose::missing_terms::discover::discover;
 use mapper_identify::{ZeroOutcome, ZeroSettings};
@@ -63,7 +62,10 @@ impl Gap {
         // An effect that is present in both recordings belongs to the rig; it does not describe a complete machine.
         let is_complete = self.diagnosed.diagnosis.since.is_none();
         value["found"] = json!(is_complete.then(|| Found::of(&self.diagnosed)).flatten());
-        value["drift"] = self.drift.as_ref().map_or(Value::Null, drift_json);
+        // Without the individual points.
+        value["drift"] = self.drift.as_ref().map_or(Value::Null, |drift| {
+            json!({"verdict": drift.verdict, "drifts": drift.drifts, "reason": drift.reason})
+        });
         value["zero"] = json!(self.zero);
         if !self.sensors.is_empty() {
             value["sensors"] = json!(self.sensors);
@@ -78,11 +80,6 @@ impl Gap {
     pub fn page(&self, machine: &str, recording: &str) -> Result<String, SessionError> {
         Ok(gap_page(machine, recording, &self.diagnosed)?)
     }
-}
-
-/// Drift without the individual points.
-fn drift_json(drift: &DriftReport) -> Value {
-    json!({"verdict": drift.verdict, "drifts": drift.drifts, "reason": drift.reason})
 }
 
 impl Session<'_> {
@@ -219,7 +216,10 @@ impl Session<'_> {
         found: &Found,
     ) -> Result<ForecastCheck, SessionError> {
         let GapInput { zeroed, model, .. } = self.prepare_for_gap(recorded, campaign, map)?;
-        Ok(check_forecast(&study_of(&zeroed.recording, campaign, zeroed.declared, model, effects)?, found)?)
+        let ZeroedRecording { recording, declared, .. } = zeroed;
+        let (study, _) =
+            checked_study(&recording, declared, model, effects, campaign.tolerances_declared)?;
+        Ok(check_forecast(&study, found)?)
     }
 
     /// Expected readings of the diagnosed machine at the end of each planned step of a campaign.
@@ -264,17 +264,6 @@ impl Session<'_> {
     }
 }
 
-/// A recording in the form that the diagnosis needs.
-fn study_of(
-    recording: &Recording,
-    campaign: &Campaign,
-    declared: Declared,
-    model: Model,
-    effects: Vec<Arc<dyn Effect>>,
-) -> Result<Study, GapError> {
-    Ok(checked_study(recording, declared, model, effects, campaign.tolerances_declared)?.0)
-}
-
 /// The linearised recording if tolerances alone explain it down to noise. In that case apparent drift in repeats is not subtracted, because the
 /// diagnosis is much more sensitive.
 fn linearise_noise(
@@ -282,7 +271,8 @@ fn linearise_noise(
     campaign: &Campaign,
     model: &Model,
 ) -> Result<Option<Linearised>, GapError> {
-    let study = study_of(&zeroed.recording, campaign, zeroed.declared.clone(), model.clone(), Vec::new())?;
+    let (declared, judged) = (zeroed.declared.clone(), campaign.tolerances_declared);
+    let (study, _) = checked_study(&zeroed.recording, declared, model.clone(), Vec::new(), judged)?;
     let linearised = Linearised::new(&study)?;
     let null = fit(&study, &linearised, &study.nothing(), &Selection::all(&study), Effort::default())?;
     let misfit = adequacy(&study, &linearised, &null);

@@ -132,15 +132,10 @@ impl RigStates {
         if let Some(Lockout { reason, run }) = self.lockout_of(rig) {
             return Err(SessionError::RigLockedOut { rig: rig.to_owned(), reason, run });
         }
-        let owner = match read_entry::<Owner>(&mut lock) {
-            StoredEntry::Present(owner) => Some(owner),
-            StoredEntry::Empty => None,
-            StoredEntry::Unreadable(why) => {
-                let reason =
-                    format!("the entry of its last owner cannot be read ({why}: {})", path.display());
-                return Err(SessionError::RigLockedOut { rig: rig.to_owned(), reason, run: PathBuf::new() });
-            }
-        };
+        let owner = read_entry::<Owner>(&mut lock).map_err(|why| {
+            let reason = format!("the entry of its last owner cannot be read ({why}: {})", path.display());
+            SessionError::RigLockedOut { rig: rig.to_owned(), reason, run: PathBuf::new() }
+        })?;
         if let Some(owner) =
             owner.filter(|owner| resumes.is_none_or(|run| !is_same_directory(run, &owner.run)))
         {
@@ -164,9 +159,9 @@ impl RigStates {
             Err(error) if error.kind() == ErrorKind::NotFound => None,
             Err(error) => Some(unreadable(error.to_string())),
             Ok(mut file) => Some(match read_entry(&mut file) {
-                StoredEntry::Present(latch) => latch,
-                StoredEntry::Empty => unreadable("it is empty".to_owned()),
-                StoredEntry::Unreadable(why) => unreadable(why),
+                Ok(Some(latch)) => latch,
+                Ok(None) => unreadable("it is empty".to_owned()),
+                Err(why) => unreadable(why),
             }),
         }
     }
@@ -187,11 +182,10 @@ impl RigStates {
         let (mut lock, _) = self.open(rig)?;
         let in_use = matches!(lock.try_lock(), Err(TryLockError::WouldBlock));
         let (owner, unreadable) = match read_entry(&mut lock) {
-            StoredEntry::Present(owner) => (Some(owner), None),
-            // A runner that has just started has not recorded its owner yet.
-            StoredEntry::Empty => (None, None),
-            StoredEntry::Unreadable(_) if in_use => (None, None),
-            StoredEntry::Unreadable(why) => (None, Some(why)),
+            Ok(owner) => (owner, None),
+            // A runner that has just started has not recorded its owner completely.
+            Err(_) if in_use => (None, None),
+            Err(why) => (None, Some(why)),
         };
         let latch = self.lockout_of(rig).or_else(|| {
             let reason = format!("the entry of its last owner cannot be read ({})", unreadable?);
@@ -299,31 +293,23 @@ fn try_lock(rig: &str, lock: &mut File, path: &Path) -> Result<(), SessionError>
     match lock.try_lock() {
         Ok(()) => Ok(()),
         Err(TryLockError::WouldBlock) => {
-            let owner = match read_entry::<Owner>(lock) {
-                StoredEntry::Present(owner) => owner.to_string(),
-                StoredEntry::Empty | StoredEntry::Unreadable(_) => "another runner".to_owned(),
-            };
+            let owner = read_entry::<Owner>(lock).ok().flatten();
+            let owner = owner.map_or("another runner".to_owned(), |owner| owner.to_string());
             Err(SessionError::RigInUse { rig: rig.to_owned(), owner })
         }
         Err(TryLockError::Error(source)) => Err(SessionError::file("lock", path)(source)),
     }
 }
 
-/// Content of a lock or lockout file.
-enum StoredEntry<T> {
-    Empty,
-    Present(T),
-    Unreadable(String),
-}
-
-fn read_entry<T: for<'de> Deserialize<'de>>(file: &mut File) -> StoredEntry<T> {
+/// Content of a lock or lockout file: `None` if it is empty, the reason if it cannot be read.
+fn read_entry<T: for<'de> Deserialize<'de>>(file: &mut File) -> Result<Option<T>, String> {
     let mut text = String::new();
-    match file.rewind().and_then(|()| file.take(MAX_FILE_BYTES).read_to_string(&mut text)) {
-        Err(error) => StoredEntry::Unreadable(error.to_string()),
-        Ok(_) if text.is_empty() => StoredEntry::Empty,
-        Ok(_) => serde_json::from_str(&text)
-            .map_or_else(|error| StoredEntry::Unreadable(error.to_string()), StoredEntry::Present),
+    let read = file.rewind().and_then(|()| file.take(MAX_FILE_BYTES).read_to_string(&mut text));
+    read.map_err(|error| error.to_string())?;
+    if text.is_empty() {
+        return Ok(None);
     }
+    serde_json::from_str(&text).map(Some).map_err(|error| error.to_string())
 }
 
 /// Opens a file for reading and writing. It must be a plain file with one name, because a link that another user placed there could make a run

@@ -41,7 +41,6 @@ pub(crate) enum TextAnchor {
     End,
 }
 
-/// Style of a text.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TextStyle {
     pub size_px: f64,

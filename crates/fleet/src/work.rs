@@ -32,7 +32,6 @@ pub struct WorkOutcome {
     pub failed: Vec<(String, String)>,
 }
 
-/// Outcome of one item.
 enum ItemOutcome {
     Done,
     AlreadyDone,

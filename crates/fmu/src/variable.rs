@@ -22,18 +22,15 @@ pub struct Variable {
     pub unit: &'static str,
     /// Initial value; `None` for outputs.
     pub start: Option<f64>,
-    /// Description.
     pub description: &'static str,
 }
 
 /// A boolean parameter. Its index in the list is its value reference.
 #[derive(Debug, Clone, Copy)]
 pub struct Switch {
-    /// Name.
     pub name: &'static str,
     /// Initial value.
     pub start: bool,
-    /// Description.
     pub description: &'static str,
 }
 

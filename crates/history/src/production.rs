@@ -235,7 +235,6 @@ impl PointFit {
         self.with_drift.then(|| self.fit.coefficients[1])
     }
 
-    /// Shift by the stand in one night.
     fn stand_shift(&self, night: usize, day: f64) -> f64 {
         let scatter = self
             .nights

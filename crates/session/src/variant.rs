@@ -6,7 +6,6 @@ use serde_json::{Map, Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Column of the serial number.
 const SERIAL_NUMBER_COLUMN: &str = "serial_number";
 /// Maximum size of a table of machines, bytes.
 const MAX_TABLE_BYTES: usize = 10_000_000;

@@ -27,7 +27,6 @@ struct LateText {
     at: (f64, f64),
     text: String,
     style: TextStyle,
-    /// Whether it is at the end of a line.
     at_line_end: bool,
 }
 

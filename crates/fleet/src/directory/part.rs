@@ -26,11 +26,9 @@ pub enum Outcome {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Part {
-    /// The item.
     pub item: Hash,
     /// Program, version and commit that did it.
     pub program: String,
-    /// The outcome.
     pub outcome: Outcome,
     /// How long it took on one core, s.
     pub duration_s: f64,

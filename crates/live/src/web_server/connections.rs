@@ -57,7 +57,6 @@ impl Connections {
         Some(Connection { all: self.clone(), number })
     }
 
-    /// Whether any is open.
     pub(crate) fn any_open(&self) -> bool {
         !self.lock().is_empty()
     }

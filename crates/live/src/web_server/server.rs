@@ -33,7 +33,6 @@ pub(crate) enum OperatorCommand {
     SafeNow,
 }
 
-/// The served content.
 pub(crate) struct ServedContent {
     pub(crate) page: String,
     pub(crate) access: Access,

@@ -83,7 +83,6 @@ mod with {
     /// Maximum size of a certificate chain or key, bytes: a certificate has some kilobytes, a chain some certificates.
     const MAX_PEM_BYTES: usize = 1 << 20;
 
-    /// TLS configuration of the server.
     #[derive(Clone)]
     pub(crate) struct Tls(Arc<ServerConfig>);
 

@@ -127,7 +127,6 @@ impl Surface {
         DVector::from_iterator(self.terms.len(), self.terms.iter().map(term))
     }
 
-    /// The value at a place.
     pub fn value(&self, place: Place) -> f64 {
         self.row(place).dot(&self.coefficients)
     }

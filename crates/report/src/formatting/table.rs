@@ -31,7 +31,6 @@ pub fn with_heads<H: AsRef<str>>(heads: &[H]) -> TextTable {
 }
 
 impl TextTable {
-    /// Adds a row.
     pub fn add_row(&mut self, cells: impl IntoIterator<Item = String>) {
         self.rows.push(cells.into_iter().collect());
     }

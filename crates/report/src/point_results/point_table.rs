@@ -30,7 +30,6 @@ impl PointCell {
 pub struct PointGroup<'a> {
     /// Their common property.
     pub caption: String,
-    /// The points.
     pub points: Vec<&'a IdentifiedPoint>,
 }
 

@@ -130,7 +130,6 @@ pub fn step_name(point: &IdentifiedPoint) -> String {
     }
 }
 
-/// A verdict as one word.
 pub fn verdict_word(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Good => "good",

@@ -29,9 +29,7 @@ pub struct JudgedPoints<'a> {
     pub campaign: Option<&'a Campaign>,
     /// The readings.
     pub recording: &'a Recording,
-    /// The gases.
     pub gases: Gases,
-    /// The points.
     pub points: &'a [ScoredPoint],
     /// Uncertainty of each channel used in the identification.
     pub used: &'a BTreeMap<Channel, DeclaredUncertainty>,

@@ -141,7 +141,6 @@ fn widen_by_open_causes(
     points
 }
 
-/// The point of a step.
 fn same_step(identified: &Identified, step: usize) -> Option<&IdentifiedPoint> {
     identified.points_alone().find(|point| point.step == step)
 }

@@ -16,7 +16,6 @@ use mapper_runner::{ObserverError, PlanSteps, RunEnd, RunError, RunObserver, Ste
 
 /// Objective recorded in the plan of a script.
 const OBJECTIVE: &str = "sequence";
-/// The backend of the rehearsal.
 const REHEARSAL_BACKEND: &str = "virtual_lab";
 /// Rehearsed time of each step of a plan, s: the lab's valve takes 2.5 s from end to end, and shafts follow within seconds.
 const JUMP_S: f64 = 10.0;

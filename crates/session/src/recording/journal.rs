@@ -18,7 +18,6 @@ const MAX_JOURNAL_BYTES: u64 = 16 << 20;
 pub struct Identity {
     /// Name of the machine.
     pub machine: String,
-    /// Its serial number.
     pub serial_number: Option<String>,
     /// Hash of the campaign.
     pub campaign_sha256: String,

@@ -288,7 +288,6 @@ fn is_same_directory(a: &Path, b: &Path) -> bool {
     resolved(a) == resolved(b)
 }
 
-/// Locks the file of a rig.
 fn try_lock(rig: &str, lock: &mut File, path: &Path) -> Result<(), SessionError> {
     match lock.try_lock() {
         Ok(()) => Ok(()),

@@ -24,7 +24,6 @@ const TARGET_TOLERANCE_RATIO: f64 = 1e-9;
 /// A step source after replay, from the first missing step on.
 struct ResumedSteps<'a> {
     inner: &'a mut dyn StepSource,
-    /// The step that is repeated.
     repeat: Option<PlanStep>,
     repeating: bool,
     /// Offset from run time to the source's time, s.

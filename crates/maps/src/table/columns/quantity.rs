@@ -19,7 +19,6 @@ macro_rules! quantities {
                 }
             }
 
-            /// The quantity of a key.
             pub(crate) fn of_key(key: &str) -> Option<Quantity> {
                 match key {
                     $($key => Some(Quantity::$quantity),)*

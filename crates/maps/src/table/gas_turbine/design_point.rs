@@ -6,7 +6,6 @@ use mapper_core::{DesignPoint, ImportError, ImportRemark};
 /// The design point of a map file, in the numbers of its tables. NPSS and pyCycle: NcMapDes, RlineMapDes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MapDesign {
-    /// Speed.
     pub speed: f64,
     /// Flow, pressure ratio and efficiency there; `None` if the tables do not have the point.
     pub values: Option<[f64; 3]>,

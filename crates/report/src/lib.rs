@@ -31,7 +31,7 @@ pub use formatting::paint::{Paint, paint_verdict};
 pub use formatting::table::with_heads;
 pub use formatting::wrapped::wrapped;
 pub use heat_transfer::heat_correction_text::heat_correction_text;
-pub use heat_transfer::result_pictures::{ErrorAtGradient, error_figure, heat_transfer_figure};
+pub use heat_transfer::result_pictures::{error_figure, heat_transfer_figure};
 pub use heat_transfer::thermal_file::ThermalExport;
 pub use heat_transfer::thermal_model::thermal_text;
 pub use history::fleet_text::{cost_text, merged_text, status_text, submission_text};

@@ -6,9 +6,8 @@ use crate::{Session, SessionError};
 use mapper_chart::Figure;
 use mapper_core::{ExportError, IdentifiedPoint, ThermalModel};
 use mapper_recording::ChannelMap;
-use mapper_recording::score::ScoredPoint;
 use mapper_report::{
-    ErrorAtGradient, ThermalExport, TurbinePoint, error_figure, heat_transfer_figure, turbine_points,
+    ThermalExport, TurbinePoint, error_figure, heat_transfer_figure, turbine_points,
     turbine_text,
 };
 use serde::Serialize;
@@ -54,9 +53,7 @@ impl Session<'_> {
             ("heat_transfer.svg", heat.to_svg().into_bytes()),
             ("heat_transfer.png", png(&heat)?),
         ];
-        let errors = errors(&identified.points);
-        if !errors.is_empty() {
-            let figure = error_figure(machine, &errors);
+        if let Some(figure) = error_figure(machine, &identified.points) {
             contents.push(("error.svg", figure.to_svg().into_bytes()));
             contents.push(("error.png", png(&figure)?));
         }
@@ -68,19 +65,4 @@ impl Session<'_> {
 /// The figure as PNG, with two pixels per unit.
 pub(crate) fn png(figure: &Figure) -> Result<Vec<u8>, SessionError> {
     Ok(figure.to_png(2.0).map_err(ExportError::failed("png"))?)
-}
-
-/// Errors of the points with known truth.
-fn errors(points: &[ScoredPoint]) -> Vec<ErrorAtGradient> {
-    points
-        .iter()
-        .filter_map(|ScoredPoint { point, truth }| {
-            Some(ErrorAtGradient {
-                dt2_k: point.dt2_k?,
-                eta_error: point.eta? - truth.as_ref()?.eta,
-                eta_half_interval: point.eta_low.zip(point.eta_high).map(|(low, high)| 0.5 * (high - low)),
-                verdict: point.verdict,
-            })
-        })
-        .collect()
 }

@@ -50,7 +50,9 @@ pub use maps::map_comparison_text::map_comparison_text;
 pub use maps::map_fit_text::map_fit_text;
 pub use maps::reduced_text::reduced_text;
 pub use maps::turbine_file::{TurbinePoint, turbine_points, turbine_text};
-pub use maps::turbine_map_text::{imported_turbine_text, reduced_turbine_text, turbine_comparison_text, turbine_fit_text};
+pub use maps::turbine_map_text::{
+    imported_turbine_text, reduced_turbine_text, turbine_comparison_text, turbine_fit_text,
+};
 pub use plan::campaign_check_text::campaign_check_text;
 pub use plan::comparison_text::{comparison_json, comparison_text};
 pub use plan::jump_text::{jump_json, jump_text};
@@ -83,9 +85,13 @@ pub(crate) use point_results::end_readings::{END_S, at_end};
 pub(crate) use point_results::point_table::{PointCell, point_cells, point_groups, point_heads};
 pub(crate) use point_results::point_warnings::doubts;
 pub(crate) use point_results::points::{score_text, step_name, verdict_word};
-pub(crate) use test_report::acceptance::{ACCEPTANCE_HEADS, BALANCE_HEADS, BALANCE_WORDS, acceptance_rows, acceptance_words, balance_rows};
+pub(crate) use test_report::acceptance::{
+    ACCEPTANCE_HEADS, BALANCE_HEADS, BALANCE_WORDS, acceptance_rows, acceptance_words, balance_rows,
+};
 pub(crate) use test_report::conditions::{CONDITION_HEADS, condition_rows};
-pub(crate) use test_report::instruments::{INSTRUMENT_HEADS, INSTRUMENT_WORDS, REGISTER_HEADS, instrument_rows, register_rows};
+pub(crate) use test_report::instruments::{
+    INSTRUMENT_HEADS, INSTRUMENT_WORDS, REGISTER_HEADS, instrument_rows, register_rows,
+};
 pub(crate) use test_report::key_figures::key_figures;
 pub(crate) use test_report::run_report::{condition_facts, cover_facts, provenance_facts};
 pub(crate) use test_report::surge_text::{surge_heads, surge_remarks, surge_rows};

@@ -15,7 +15,7 @@ use mapper_diagnose::gap::diagnose::Diagnosed;
 use mapper_diagnose::gap::findings::report::Verdict;
 use mapper_diagnose::gap::residuals::nuisance::OUTPUTS;
 use mapper_diagnose::gap::residuals::study::Study;
-use mapper_numerics::statistics::mean;
+use mapper_numerics::statistics::{mean, rms};
 use maud::{Markup, PreEscaped, html};
 
 /// The page. `machine` and `recording` are names for its title.
@@ -196,15 +196,8 @@ fn residual_maps(diagnosed: &Diagnosed) -> Vec<String> {
         let mut classes: [Vec<(f64, f64)>; CLASSES.len()] = Default::default();
         for step in 0..diagnosed.study.steps.len() {
             let Some(place) = place_on_map(&diagnosed.study, step) else { continue };
-            let whitened: Vec<f64> = diagnosed
-                .study
-                .groups
-                .iter()
-                .filter(|group| group.step == step)
-                .flat_map(|group| &residual[group.rows.clone()])
-                .map(|r| r * r)
-                .collect();
-            let rms = (whitened.iter().sum::<f64>() / whitened.len().max(1) as f64).sqrt();
+            let groups = diagnosed.study.groups.iter().filter(|group| group.step == step);
+            let rms = rms(groups.flat_map(|group| &residual[group.rows.clone()])).unwrap_or(0.0);
             let class = CLASSES.iter().position(|(up_to, ..)| rms <= *up_to).unwrap_or(CLASSES.len() - 1);
             classes[class].push(place);
         }
@@ -254,8 +247,7 @@ fn heat_map(diagnosed: &Diagnosed, caption: &str, residual: &[f64]) -> Markup {
 fn heat_cell(diagnosed: &Diagnosed, residual: &[f64], step: usize, output: usize) -> Markup {
     let group = diagnosed.study.groups.iter().find(|g| g.step == step && g.output == output);
     let Some(group) = group else { return html! { td { "-" } } };
-    let whitened = &residual[group.rows.clone()];
-    let rms = (whitened.iter().map(|r| r * r).sum::<f64>() / whitened.len().max(1) as f64).sqrt();
+    let rms = rms(&residual[group.rows.clone()]).unwrap_or(0.0);
     // White at 1, red from 30 on, logarithmic.
     let heat = (rms.max(1.0).ln() / 30f64.ln()).clamp(0.0, 1.0);
     let fade = (255.0 * (1.0 - heat)) as u8;

@@ -7,8 +7,7 @@ use mapper_chart::Figure;
 use mapper_core::{ExportError, IdentifiedPoint, ThermalModel};
 use mapper_recording::ChannelMap;
 use mapper_report::{
-    ThermalExport, TurbinePoint, error_figure, heat_transfer_figure, turbine_points,
-    turbine_text,
+    ThermalExport, TurbinePoint, error_figure, heat_transfer_figure, turbine_points, turbine_text,
 };
 use serde::Serialize;
 use std::path::{Path, PathBuf};

@@ -63,9 +63,10 @@ impl Gap {
         let is_complete = self.diagnosed.diagnosis.since.is_none();
         value["found"] = json!(is_complete.then(|| Found::of(&self.diagnosed)).flatten());
         // Without the individual points.
-        value["drift"] = self.drift.as_ref().map_or(Value::Null, |drift| {
-            json!({"verdict": drift.verdict, "drifts": drift.drifts, "reason": drift.reason})
-        });
+        value["drift"] = self.drift.as_ref().map_or(
+            Value::Null,
+            |drift| json!({"verdict": drift.verdict, "drifts": drift.drifts, "reason": drift.reason}),
+        );
         value["zero"] = json!(self.zero);
         if !self.sensors.is_empty() {
             value["sensors"] = json!(self.sensors);
@@ -217,8 +218,7 @@ impl Session<'_> {
     ) -> Result<ForecastCheck, SessionError> {
         let GapInput { zeroed, model, .. } = self.prepare_for_gap(recorded, campaign, map)?;
         let ZeroedRecording { recording, declared, .. } = zeroed;
-        let (study, _) =
-            checked_study(&recording, declared, model, effects, campaign.tolerances_declared)?;
+        let (study, _) = checked_study(&recording, declared, model, effects, campaign.tolerances_declared)?;
         Ok(check_forecast(&study, found)?)
     }
 

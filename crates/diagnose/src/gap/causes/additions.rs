@@ -6,7 +6,6 @@ use crate::gap::best_fit::projector::{Projector, Share};
 use crate::gap::best_fit::selection::Selection;
 use crate::gap::residuals::study::{Prediction, Study, members};
 use crate::gap::residuals::whiten::{Linearised, rows_of_step};
-use mapper_inference::descent::{MAX_MOVE, Reach};
 use mapper_numerics::parallel;
 use mapper_physics::rig::effect::EffectParameter;
 use nalgebra::DVector;
@@ -24,6 +23,10 @@ pub struct Addition {
     pub start: Start,
 }
 
+/// Maximum trusted linear step, as a multiple of the step taken; effects are nonlinear.
+const MAX_REACH: f64 = 3.0;
+/// Minimum start offset from neutral, as a share of a step: some effects have zero slope at neutral.
+const OFF_NEUTRAL: f64 = 0.1;
 
 /// Every further effect added to a fit, in closed form from one run each; effects with interacting parameters use several starts.
 pub fn additions(study: &Study, linearised: &Linearised, selection: &Selection, base: &Fit) -> Vec<Addition> {
@@ -158,7 +161,7 @@ impl FitNeighbourhood<'_> {
         let change = self.change(effect, vec![parameter.neutral + step])?;
         let products = self.products(&change);
         let opposite = step_to(-step);
-        if products.1 < -Reach::Coarse.distance() * products.0
+        if products.1 < -OFF_NEUTRAL * products.0
             && opposite != 0.0
             && let Some(other) = self.change(effect, vec![parameter.neutral + opposite])
         {
@@ -180,13 +183,11 @@ impl FitNeighbourhood<'_> {
         (own, seen): (f64, f64),
     ) -> Addition {
         let at = |share: f64| (parameter.neutral + share * step).clamp(parameter.low, parameter.high);
-        let wanted = if own > 1e-9 { (seen / own).clamp(-MAX_MOVE, MAX_MOVE) } else { 0.0 };
+        let wanted = if own > 1e-9 { (seen / own).clamp(-MAX_REACH, MAX_REACH) } else { 0.0 };
         let share = (at(wanted) - parameter.neutral) / step;
         let gain = 2.0 * share * seen - share * share * own;
-        // Some effects have zero slope at neutral.
-        let least = Reach::Coarse.distance();
-        let off = if wanted < 0.0 { wanted.min(-least) } else { wanted.max(least) };
-        let off = if at(off) == parameter.neutral { least } else { off };
+        let off = if wanted < 0.0 { wanted.min(-OFF_NEUTRAL) } else { wanted.max(OFF_NEUTRAL) };
+        let off = if at(off) == parameter.neutral { OFF_NEUTRAL } else { off };
         let coordinate = Coordinate::new(parameter);
         let by = coordinate.of(parameter.neutral + step) - coordinate.of(parameter.neutral);
         // A weak effect starts at neutral, where the prediction is known.

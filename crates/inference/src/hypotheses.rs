@@ -87,6 +87,19 @@ pub struct Member {
     pub alternatives: Vec<(usize, f64)>,
 }
 
+/// A hypothesis as the only member of the explanation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Single {
+    /// Position among the hypotheses.
+    pub index: usize,
+    /// Its odds against no hypothesis.
+    pub odds: f64,
+    /// Its size: mean.
+    pub value: f64,
+    /// One standard deviation of `value`.
+    pub sigma: f64,
+}
+
 /// The most probable explanation.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Explanation {
@@ -133,7 +146,7 @@ impl Likelihood {
     }
 
     /// Marginal likelihood of the hypotheses: integrates over the first parameters, which have standard deviations `always`.
-    pub(crate) fn marginalise(&self, always: &[f64]) -> Option<Likelihood> {
+    fn marginalise(&self, always: &[f64]) -> Option<Likelihood> {
         if always.is_empty() {
             return Some(self.clone());
         }
@@ -149,11 +162,6 @@ impl Likelihood {
             precision_mean: self.precision_mean.rows(first, count - first)
                 - shared.tr_mul(&factor.solve(&precision_mean)),
         })
-    }
-
-    /// Precision of one parameter, and precision times mean.
-    pub(crate) fn of_parameter(&self, index: usize) -> (f64, f64) {
-        (self.precision[(index, index)], self.precision_mean[index])
     }
 
     /// The Cholesky factor of the scaled posterior precision `1 + D H D` of some parameters, and their scaled precision_mean.
@@ -172,6 +180,20 @@ impl Likelihood {
     pub fn standard_errors(&self, priors: &Priors) -> Option<Vec<f64>> {
         let information = self.marginalise(&priors.always)?.precision.diagonal();
         Some(information.iter().map(|information| information.max(0.0).sqrt().recip()).collect())
+    }
+
+    /// Every hypothesis as the only member of the explanation; `None` if the covariance of the declared parameters is singular.
+    pub fn singles(&self, priors: &Priors) -> Option<Vec<Single>> {
+        let Likelihood { precision, precision_mean } = self.marginalise(&priors.always)?;
+        let single = |(index, hypothesis): (usize, &Hypothesis)| {
+            let precision_mean = precision_mean[index];
+            let scaled = 1.0 + hypothesis.sigma.powi(2) * precision[(index, index)];
+            let value = hypothesis.sigma.powi(2) * precision_mean / scaled;
+            let possible = !(hypothesis.at_least_zero && value < 0.0);
+            let odds = (0.5 * value * precision_mean - 0.5 * scaled.ln() + hypothesis.ln_prior).exp();
+            possible.then(|| Single { index, odds, value, sigma: hypothesis.sigma / scaled.sqrt() })
+        };
+        Some(priors.hypotheses.iter().enumerate().filter_map(single).collect())
     }
 
     /// Smallest size of a hypothesis that can be detected: its expected residuals make its family as probable as no hypothesis at all;
@@ -480,5 +502,23 @@ mod tests {
         let mut likelihood = Likelihood::new(1);
         assert_eq!(likelihood.add(&singular), None);
         assert_eq!(likelihood, Likelihood::new(1));
+    }
+
+    /// One reading of 3 with a standard error of 1 for a size of 2: by hand 0.8 of the reading, and the ratio of two normal densities.
+    #[test]
+    fn a_single_hypothesis_is_a_text_book_case() {
+        let mut likelihood = Likelihood::new(1);
+        let balance = Balance {
+            residual: DVector::from_element(1, 3.0),
+            covariance: DMatrix::from_element(1, 1, 1.0),
+            columns: DMatrix::from_element(1, 1, 1.0),
+        };
+        likelihood.add(&balance).unwrap();
+        let singles = likelihood.singles(&Priors::even(Vec::new(), &[2.0], 0.1)).unwrap();
+        assert_eq!(singles.len(), 1, "{singles:?}");
+        let single = &singles[0];
+        let density = |variance: f64| (-4.5 / variance).exp() / variance.sqrt();
+        assert!((single.value - 2.4).abs() < 1e-12 && (single.sigma - 0.8_f64.sqrt()).abs() < 1e-12);
+        assert!((single.odds / (0.1 * density(5.0) / density(1.0)) - 1.0).abs() < 1e-12);
     }
 }

@@ -1,6 +1,6 @@
 //! The shortest interval of a mixture of normal distributions about weighted centres.
 
-use mapper_numerics::statistics::EXCLUDE_SIGMAS;
+use mapper_numerics::statistics::{EXCLUDE_SIGMAS, range};
 
 /// Cells of the density for one standard deviation: the error of the interval is then below 0.01 standard deviations.
 const CELLS_PER_SIGMA: f64 = 16.0;
@@ -19,9 +19,7 @@ pub fn is_identified(after: f64, before: f64) -> bool {
 /// Shortest interval that contains `coverage` of the mixture of normal distributions about `centres` (weight, value), each with the
 /// standard deviation `sigma`. `None` if there are no centres or a number is not finite.
 pub fn shortest(centres: &[(f64, f64)], sigma: f64, coverage: f64) -> Option<(f64, f64)> {
-    let (low, high) = centres
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (_, x)| (low.min(*x), high.max(*x)));
+    let (low, high) = range(centres.iter().map(|(_, x)| *x));
     if !(low.is_finite() && high.is_finite() && sigma.is_finite()) {
         return None;
     }

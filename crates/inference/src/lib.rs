@@ -11,4 +11,3 @@ pub mod hypotheses;
 pub mod interval;
 pub mod mixture;
 pub mod search;
-pub mod singles;

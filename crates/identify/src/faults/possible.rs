@@ -16,9 +16,8 @@ use crate::faults::{
 use crate::single_step::budgets::own_row;
 use crate::single_step::dynamic::Estimate;
 use mapper_core::{EstimateUncertainty, half_width_95, standard_error_of};
-use mapper_inference::hypotheses::{Likelihood, Priors};
+use mapper_inference::hypotheses::{Likelihood, Priors, Single};
 use mapper_inference::mixture::MIN_WEIGHT;
-use mapper_inference::singles::Single;
 use nalgebra::DVector;
 
 /// A fault that is not excluded.

@@ -3,15 +3,14 @@
 use crate::faults::balances::efficiency::FittedEfficiencies;
 use crate::faults::found_fault::{FoundFault, Suspect};
 use crate::faults::nominal_rig::NominalRig;
+use crate::joint::TwoParameter;
 use crate::needs::missing;
 use crate::reading_checks::failed_check::FailedCheck;
 use crate::reading_checks::failed_checks;
 use crate::single_step::dynamic::Estimate;
 use crate::step_data::end_state::{EndState, end_state};
 use crate::step_data::humidity::with_measured_humidity;
-
 use crate::step_outcome::findings::Findings;
-use crate::step_outcome::two_parameter::TwoParameter;
 use crate::{
     IdentifyConfig, IdentifyError, PressureTap, StepError, faults, joint,
     single_step::{budgets, dynamic, steady},

@@ -27,9 +27,8 @@ pub use isothermal_zero::zero::{
     IsothermalZero, NoZero, ZeroSettings, expected_after_zero, isothermal_zero, zeroed,
 };
 pub use isothermal_zero::zero_outcome::ZeroOutcome;
-pub use joint::MAX_RESTING_ETA;
 pub use joint::expected::expected_together;
-pub use joint::step_model::surface::EfficiencySurface;
+pub use joint::{MAX_RESTING_ETA, TwoParameter};
 pub use mapper_core::{Choice, JointSettings, SettleBands, WindowRule};
 pub use needs::{method_for, needs};
 pub use reading_checks::bounds::EFFICIENCY;
@@ -39,4 +38,3 @@ pub use single_step::t2_history::{T2History, t2_history};
 pub use step_data::humidity::with_measured_humidity;
 pub use step_data::samples::LONGEST_BRIDGE_S;
 pub use step_outcome::error::{IdentifyError, StepError};
-pub use step_outcome::two_parameter::TwoParameter;

@@ -7,7 +7,6 @@ use crate::IdentifyConfig;
 use crate::joint::Fitted;
 use crate::joint::fit::solve::{Member, Problem};
 use crate::joint::fit::start::{self, START_S};
-use crate::joint::step_model::parameters::SHARED;
 use crate::joint::step_model::rows::{COARSER, Row, StepRows, block_s_after, place};
 use crate::joint::{MAX_RESTING_ETA, fit::refinements, uncertainty::smoothness};
 use crate::single_step::dynamic::Estimate;
@@ -36,7 +35,7 @@ pub fn expected_together(steps: &[&[ForecastRow]], config: &IdentifyConfig) -> O
     let parameter_error_eta = refinements::resting_on_declaration(&problem, None)?;
     let reported = |problem: &Problem<'_>| -> Option<Vec<Option<f64>>> {
         let mut open = problem.clone();
-        let found = Fitted::of(&mut open)?.smoothed(&open, &condensed, config);
+        let found = Fitted::of(&mut open)?.smoothed(&open, &condensed);
         let mut sigmas = vec![None; steps.len()];
         for (eta, step) in found.eta.iter().zip(&condensed) {
             sigmas[step.position] = Some(eta.uncertainty.combined_standard_error());
@@ -48,7 +47,7 @@ pub fn expected_together(steps: &[&[ForecastRow]], config: &IdentifyConfig) -> O
         undeclared(&problem).and_then(|problem| reported(&problem)).unwrap_or_default();
     refinements::hold(&mut problem);
     problem.minimise_roughly()?;
-    let smoothed = smoothness::smoothed(&problem, &problem.covariance()?, None, &condensed, config.reference);
+    let smoothed = smoothness::smoothed(&problem, &problem.covariance()?, None, &condensed);
     let mut found = vec![None; steps.len()];
     for (i, (member, step)) in problem.members.iter().zip(&condensed).enumerate() {
         let (eta, ln_h) = (smoothed.eta[i], smoothed.ln_h[i]);
@@ -81,7 +80,7 @@ fn undeclared<'a>(problem: &Problem<'a>) -> Option<Problem<'a>> {
         off.shared[*index] = off.priors[*index].mean + slab_sigma;
     }
     for Member { history, measured_k, local, .. } in &mut off.members {
-        *measured_k = off.setting.predict(history, &off.shared, local, &[false; SHARED], false).t2_k;
+        *measured_k = off.setting.predict_t2_k(history, &off.shared, local);
     }
     (!sought.is_empty()).then_some(off)
 }

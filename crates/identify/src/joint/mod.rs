@@ -15,13 +15,12 @@ pub(crate) mod uncertainty;
 use crate::faults::balances::efficiency::FittedEfficiencies;
 use crate::joint::fit::refinements::{Gain, Refinements};
 use crate::joint::fit::solve::{Covariance, Problem};
-use crate::joint::step_model::parameters::{INLET, PROBE_MM2, SHARED};
+use crate::joint::step_model::parameters::{INLET, PROBE_MM2};
 use crate::joint::step_model::rows::{Row, StepRows};
 use crate::joint::uncertainty::smoothness::{Smoothed, SmoothedValue};
 use crate::single_step::dynamic::Estimate;
 use crate::step_data::end_state::EndState;
 use crate::step_outcome::findings::Findings;
-use crate::step_outcome::two_parameter::TwoParameter;
 use crate::{IdentifyConfig, step_data::commands};
 use mapper_core::{
     EstimateUncertainty, FitFailure, LeftOut, Recording, ThermalModel, Verdict, Warning, Window,
@@ -29,6 +28,7 @@ use mapper_core::{
 };
 use mapper_inference::descent::ROUNDS;
 use mapper_numerics::statistics::rms;
+use serde::Serialize;
 
 /// Growth of the points' standard errors above which leaving a region out costs more than it gains.
 const MAX_LOST_RATIO: f64 = 2.0;
@@ -36,6 +36,20 @@ const MAX_LOST_RATIO: f64 = 2.0;
 /// Maximum error of the efficiencies, fraction, that only the declaration of alpha_A, probe and heating/cooling ratio excludes: above it, a
 /// machine not as declared could pass for one that is.
 pub const MAX_RESTING_ETA: f64 = 0.0125;
+
+/// The efficiency that the two-parameter method (`dynamic`) finds in a step which another method has identified.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct TwoParameter {
+    /// Place of the step, from 0; files have its number, from 1.
+    #[serde(serialize_with = "mapper_core::test_plan::step_number::serialize")]
+    pub step: usize,
+    /// Isentropic efficiency, total to total, fraction.
+    pub eta: f64,
+    /// Lower end of its 95 % interval.
+    pub eta_low: f64,
+    /// Upper end.
+    pub eta_high: f64,
+}
 
 /// Result of the method for a recording.
 #[derive(Debug)]
@@ -103,10 +117,8 @@ pub(crate) fn estimate(
         }
         let (first, last) = (step.rows.first(), step.rows.last());
         let change = |read: fn(&Row) -> f64| first.zip(last).map(|(first, last)| read(last) - read(first));
-        let prediction =
-            problem.setting.predict(&member.history, &problem.shared, &member.local, &[false; SHARED], false);
-        let residual =
-            member.measured_k.iter().zip(&prediction.t2_k).map(|(measured, found)| measured - found);
+        let predicted_k = problem.setting.predict_t2_k(&member.history, &problem.shared, &member.local);
+        let residual = member.measured_k.iter().zip(&predicted_k).map(|(measured, found)| measured - found);
         let [eta_rows, ln_h_rows] = smoothed.budgets[i].clone();
         let eta_rows = eta_rows.into_iter().map(|row| uncertainty::budget::in_unit(row, 1.0, "1")).collect();
         let h_rows =
@@ -173,7 +185,7 @@ impl<'a> Attempt<'a> {
             (member.shares, member.barred) = (false, true);
         }
         let fitted = fitted(&mut problem, steps, config)?;
-        let smoothed = fitted.smoothed(&problem, steps, config);
+        let smoothed = fitted.smoothed(&problem, steps);
         let Fitted { covariance, refined, resting } = fitted;
         let refinements = refined.as_ref().map(|(refinements, _)| refinements);
         let thermal =
@@ -188,7 +200,7 @@ impl<'a> Attempt<'a> {
         alone: &[Estimate],
         config: &IdentifyConfig,
     ) -> Option<Self> {
-        regions::regions(steps, config.reference).into_iter().find_map(|of_size| {
+        regions::regions(steps).into_iter().find_map(|of_size| {
             let rests = of_size.into_iter().filter_map(|region| {
                 let rest = Attempt::new(steps, alone, config, &region.steps)?;
                 let undoubted = rest.thermal.doubts.is_empty();
@@ -246,9 +258,9 @@ impl Fitted {
     }
 
     /// The numbers of all points of the problem, with their errors.
-    fn smoothed(&self, problem: &Problem<'_>, steps: &[StepRows], config: &IdentifyConfig) -> Smoothed {
+    fn smoothed(&self, problem: &Problem<'_>, steps: &[StepRows]) -> Smoothed {
         let known = self.refined.as_ref().map(|(refinements, gain)| (refinements, gain));
-        uncertainty::smoothness::smoothed(problem, &self.covariance, known, steps, config.reference)
+        uncertainty::smoothness::smoothed(problem, &self.covariance, known, steps)
     }
 }
 

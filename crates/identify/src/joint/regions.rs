@@ -10,7 +10,7 @@ use crate::joint::fit::start::LAW_SIGMA;
 use crate::joint::step_model::parameters::{EXPONENT, LN_COEFFICIENT, REFINEMENTS};
 use crate::joint::step_model::rows::StepRows;
 use crate::joint::step_model::surface::SurfaceScale;
-use mapper_core::{MapRegion, ReferenceState};
+use mapper_core::MapRegion;
 use mapper_numerics::statistics::{EXCLUDE_SIGMAS, MIN_VALUES};
 
 /// Shares of the steps in a region; the smallest one that helps is excluded.
@@ -28,9 +28,9 @@ pub(crate) struct Region {
 type Rank = fn(&(f64, f64)) -> f64;
 
 /// All regions, the small ones first; those of equal size are adjacent.
-pub(crate) fn regions(steps: &[StepRows], reference: ReferenceState) -> Vec<Vec<Region>> {
+pub(crate) fn regions(steps: &[StepRows]) -> Vec<Vec<Region>> {
     let places: Vec<(f64, f64)> = steps.iter().map(|step| step.end.place).collect();
-    let Some(scale) = SurfaceScale::of(&places, reference).filter(|_| steps.len() > MIN_VALUES) else {
+    let Some(scale) = SurfaceScale::of(&places).filter(|_| steps.len() > MIN_VALUES) else {
         return Vec::new();
     };
     let coordinates: Vec<(f64, f64)> = places.iter().map(|place| scale.coordinates(*place)).collect();

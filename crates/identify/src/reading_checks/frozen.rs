@@ -9,7 +9,7 @@ use crate::reading_checks::ends::Ends;
 use crate::reading_checks::failed_check::FailedCheck;
 use crate::step_data::commands::FOLLOWED_S;
 use mapper_core::{Channel, Recording, Series, Warning, jump_ratio};
-use mapper_numerics::statistics::MIN_VALUES;
+use mapper_numerics::statistics::{MIN_VALUES, range};
 use mapper_physics::rig::sensor_fault::repeats_s;
 
 /// Share of equal neighbours outside the long runs above which a logger counts as coarse.
@@ -36,8 +36,7 @@ pub(crate) fn failed_checks(
 /// Whether the operating point changes between any steps.
 fn moves(ends: &[Option<Ends>]) -> bool {
     let moves = |channel, read: fn(&Ends) -> f64| {
-        let ends = || ends.iter().flatten().map(read);
-        let (low, high) = (ends().fold(f64::INFINITY, f64::min), ends().fold(f64::NEG_INFINITY, f64::max));
+        let (low, high) = range(ends.iter().flatten().map(read));
         high > low * (1.0 + jump_ratio(channel))
     };
     moves(Channel::ShaftSpeed, |end| end.speed_rpm)

@@ -2,7 +2,7 @@
 //! with eqs. 1-3 of the paper and the measured T1, Tc, flow and pressure ratio, read through the declared probe.
 
 use crate::IdentifyConfig;
-use crate::single_step::probe_reading::{Probe, ProbeResponse};
+use crate::single_step::probe::{Probe, ProbeResponse};
 use crate::step_data::samples::{Row, Samples};
 use mapper_core::{Bound, InletConvection};
 use mapper_numerics::least_squares::{Damping, DampingRule, MAX_ITERATIONS};

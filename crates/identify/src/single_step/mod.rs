@@ -8,6 +8,5 @@ pub(crate) mod expected;
 pub(crate) mod fit;
 pub(crate) mod flow_drift;
 pub(crate) mod probe;
-pub(crate) mod probe_reading;
 pub(crate) mod steady;
 pub(crate) mod t2_history;

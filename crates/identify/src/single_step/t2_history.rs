@@ -2,7 +2,7 @@
 
 use crate::IdentifyConfig;
 use crate::single_step::fit::{Geometry, t2_k};
-use crate::single_step::probe_reading::ProbeResponse;
+use crate::single_step::probe::ProbeResponse;
 use crate::step_data::samples::Samples;
 use mapper_core::{IdentifiedPoint, Recording};
 use mapper_numerics::statistics::mean;

@@ -3,4 +3,3 @@
 pub(crate) mod error;
 pub(crate) mod findings;
 pub(crate) mod interval_width;
-pub(crate) mod two_parameter;

@@ -2,7 +2,6 @@
 
 pub mod characteristic;
 pub mod closed_form_map;
-pub mod efficiency_shape;
 pub mod inlet_limit;
 pub mod one_point_map;
 pub mod similarity;

@@ -9,10 +9,11 @@ use crate::IdentifyConfig;
 use crate::joint::fit::input_noise_spline::InputNoiseSpline;
 use crate::joint::fit::solve::{Member, Problem};
 use crate::joint::step_model::model::Setting;
-use crate::joint::step_model::parameters::{PROBE_MM2, SHARED, SharedVector};
+use crate::joint::step_model::parameters::{PROBE_MM2, SharedVector};
 use crate::joint::step_model::rows::{Row, StepRows};
 use crate::joint::step_model::smoothing::Smoother;
 use crate::single_step::probe::follow;
+use crate::step_data::samples;
 use mapper_core::Channel;
 use mapper_numerics::coloured_noise::memory;
 use rand::SeedableRng;
@@ -30,14 +31,13 @@ pub(crate) fn input_noise(
     steps: &[StepRows],
     config: &IdentifyConfig,
 ) -> InputNoiseSpline {
-    let noisy: Vec<(usize, f64)> =
-        [Channel::T1, Channel::T2, Channel::Tc, Channel::P1, Channel::P2, Channel::CompressorFlow]
-            .iter()
-            .enumerate()
-            .filter(|(_, channel)| **channel != Channel::T2)
-            .filter_map(|(index, channel)| Some((index, config.declared.get(channel)?.noise_sigma)))
-            .filter(|(_, sigma)| *sigma > 0.0)
-            .collect();
+    let noisy: Vec<(usize, f64)> = samples::Row::CHANNELS
+        .iter()
+        .enumerate()
+        .filter(|(_, channel)| **channel != Channel::T2)
+        .filter_map(|(index, channel)| Some((index, config.declared.get(channel)?.noise_sigma)))
+        .filter(|(_, sigma)| *sigma > 0.0)
+        .collect();
     if !problem.probe_fitted || noisy.is_empty() {
         return InputNoiseSpline::default();
     }
@@ -70,7 +70,7 @@ pub(crate) fn input_noise(
 fn ideal_gas(setting: &Setting, member: &Member<'_>, shared: &SharedVector) -> Vec<f64> {
     let mut ideal = *shared;
     ideal[PROBE_MM2] = 0.0;
-    setting.predict(&member.history, &ideal, &member.local, &[false; SHARED], false).t2_k
+    setting.predict_t2_k(&member.history, &ideal, &member.local)
 }
 
 /// One noise sequence, as block means.

@@ -15,7 +15,7 @@ use crate::joint::step_model::surface::{SurfaceScale, TERM_COUNT, dot};
 use crate::single_step::dynamic::{self, Estimate};
 use crate::step_data::cleaning::cleaned;
 use crate::step_data::end_state::EndState;
-use crate::step_data::samples::Samples;
+use crate::step_data::samples::{Row, Samples};
 use crate::step_data::window;
 use crate::step_outcome::findings::Findings;
 use crate::{IdentifyConfig, WindowRule, step_data::commands};
@@ -114,7 +114,7 @@ pub(crate) fn problem<'a>(
     config: &IdentifyConfig,
 ) -> Option<Problem<'a>> {
     let places: Vec<(f64, f64)> = steps.iter().map(|step| step.end.place).collect();
-    let scale = SurfaceScale::of(&places, config.reference)?;
+    let scale = SurfaceScale::of(&places)?;
     let choice = &config.joint;
     let reynolds = |step: &StepRows| {
         let bulk_k = step.end.t2_k;
@@ -326,8 +326,7 @@ pub(crate) fn coupled(slopes: &[f64; 6], by_eta: f64) -> Option<[f64; OFFSET_CHA
 
 /// Sets the noise of each step and the sensitivity of its efficiency to offsets, at the current parameters.
 pub(crate) fn set_weights(problem: &mut Problem<'_>, steps: &[StepRows], config: &IdentifyConfig) {
-    let channels = [Channel::T1, Channel::T2, Channel::Tc, Channel::P1, Channel::P2, Channel::CompressorFlow];
-    let declared: Vec<f64> = channels.iter().map(|channel| config.sensor(*channel).noise_sigma).collect();
+    let declared = Row::CHANNELS.map(|channel| config.sensor(channel).noise_sigma);
     for (i, step) in steps.iter().enumerate().take(problem.members.len()) {
         let member = &problem.members[i];
         let slopes = problem.setting.sensitivities(&step.end, &problem.shared, &member.local);
@@ -336,15 +335,9 @@ pub(crate) fn set_weights(problem: &mut Problem<'_>, steps: &[StepRows], config:
         let sigma_k = if expected > 0.0 {
             expected.sqrt()
         } else {
-            let prediction = problem.setting.predict(
-                &member.history,
-                &problem.shared,
-                &member.local,
-                &[false; SHARED],
-                false,
-            );
+            let predicted_k = problem.setting.predict_t2_k(&member.history, &problem.shared, &member.local);
             let square: f64 =
-                member.measured_k.iter().zip(&prediction.t2_k).skip(1).map(|(a, b)| (a - b).powi(2)).sum();
+                member.measured_k.iter().zip(&predicted_k).skip(1).map(|(a, b)| (a - b).powi(2)).sum();
             (square / (member.measured_k.len() as f64 - 3.0).max(1.0)).sqrt().max(3e-4)
         };
         let by_eta = problem.setting.by_efficiency(&step.end, &problem.shared, &member.local);

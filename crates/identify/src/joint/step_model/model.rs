@@ -243,6 +243,16 @@ impl Setting {
         (at(local[ETA] + SLOPE_STEP) - at(local[ETA] - SLOPE_STEP)) / (2.0 * SLOPE_STEP)
     }
 
+    /// Predicts T2, K.
+    pub(crate) fn predict_t2_k(
+        &self,
+        history: &StepHistory<'_>,
+        shared: &SharedVector,
+        local: &LocalVector,
+    ) -> Vec<f64> {
+        self.predict(history, shared, local, &[false; SHARED], false).t2_k
+    }
+
     /// Predicts T2, with derivatives by the parameters in `active` and by those of the step if `derivatives` is set.
     pub(crate) fn predict(
         &self,

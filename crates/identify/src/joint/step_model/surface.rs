@@ -5,8 +5,7 @@
 //! is a cubic plus a term for small Reynolds numbers and leakage at low speed. A cubic alone lies above the slowest line and below the next
 //! one, and biases the points.
 
-use mapper_core::ReferenceState;
-use mapper_physics::compressor_map::efficiency_shape::EfficiencyShape;
+use mapper_numerics::statistics::range;
 
 /// Powers of u and v of each term but the last, lowest first, with the prior standard deviation of its coefficient. Maps bend, but less at
 /// higher order (efficiency varies by some 0.3 over a map, |u|, |v| <= 1).
@@ -32,7 +31,6 @@ pub(crate) const TERM_COUNT: usize = 12;
 /// Position and scale of the surface on the map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SurfaceScale {
-    pub(crate) reference: ReferenceState,
     speed_middle_rpm: f64,
     speed_half_range_rpm: f64,
     flow_exponent: f64,
@@ -45,7 +43,7 @@ pub(crate) type Place = (f64, f64);
 
 impl SurfaceScale {
     /// Scales for the positions of the points; `None` for no points, or positions that are not positive.
-    pub(crate) fn of(places: &[Place], reference: ReferenceState) -> Option<Self> {
+    pub(crate) fn of(places: &[Place]) -> Option<Self> {
         let usable = |x: f64| x.is_finite() && x > 0.0;
         if places.is_empty() || !places.iter().all(|(speed, flow)| usable(*speed) && usable(*flow)) {
             return None;
@@ -56,14 +54,7 @@ impl SurfaceScale {
         let reduced =
             places.iter().map(|(speed, flow)| flow / (speed / speed_middle_rpm).powf(flow_exponent));
         let (middle, half_range) = middle_and_half_range(reduced);
-        Some(SurfaceScale {
-            reference,
-            speed_middle_rpm,
-            speed_half_range_rpm,
-            flow_exponent,
-            middle,
-            half_range,
-        })
+        Some(SurfaceScale { speed_middle_rpm, speed_half_range_rpm, flow_exponent, middle, half_range })
     }
 
     /// Speed and flow scaled to the points, -1 to 1.
@@ -92,8 +83,7 @@ impl SurfaceScale {
 
 /// Middle and half of the range. The range is at least a tenth of the middle, so that a single point has one.
 pub(crate) fn middle_and_half_range(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    let (low, high) = values
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+    let (low, high) = range(values);
     let middle = 0.5 * (low + high);
     (middle, (0.5 * (high - low)).max(0.05 * middle))
 }
@@ -112,19 +102,6 @@ fn exponent(places: &[Place]) -> f64 {
         xy += (speed.ln() - x) * (flow.ln() - y);
     }
     if xx > 1e-4 * n { (xy / xx).clamp(0.5, 2.0) } else { 1.0 }
-}
-
-/// The surface with its coefficients.
-#[derive(Debug, Clone, PartialEq)]
-pub struct EfficiencySurface {
-    pub(crate) scale: SurfaceScale,
-    pub(crate) coefficients: [f64; TERM_COUNT],
-}
-
-impl EfficiencyShape for EfficiencySurface {
-    fn efficiency(&self, speed_corrected_rpm: f64, flow_corrected_kg_s: f64) -> f64 {
-        dot(&self.scale.terms((speed_corrected_rpm, flow_corrected_kg_s)), &self.coefficients)
-    }
 }
 
 fn with_last(first: [f64; TERM_COUNT - 1], last: f64) -> [f64; TERM_COUNT] {
@@ -150,7 +127,7 @@ mod tests {
             .iter()
             .flat_map(|n| [0.6, 0.7, 0.8, 0.9, 1.0, 1.1].map(|v| (n * 1e3, 1e-3 * n * v)))
             .collect();
-        let scale = SurfaceScale::of(&places, ReferenceState::SAE).unwrap();
+        let scale = SurfaceScale::of(&places).unwrap();
         let loss = |speed_rpm: f64| 0.06 * ((50e3 / speed_rpm).powi(2) - (50.0_f64 / 155.0).powi(2));
         let priors = SurfaceScale::prior_sigmas();
         let mut normal =
@@ -162,9 +139,8 @@ mod tests {
             right -= terms * loss(place.0) / (OWN * OWN);
         }
         let coefficients = normal.cholesky().unwrap().solve(&right).into();
-        let surface = EfficiencySurface { scale, coefficients };
         for (speed_rpm, flow_kg_s) in places {
-            let off = surface.efficiency(speed_rpm, flow_kg_s) + loss(speed_rpm);
+            let off = dot(&scale.terms((speed_rpm, flow_kg_s)), &coefficients) + loss(speed_rpm);
             assert!(off.abs() < 1.2e-3, "{speed_rpm} rpm, {flow_kg_s} kg/s: {off}");
         }
     }

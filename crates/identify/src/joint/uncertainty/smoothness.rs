@@ -18,9 +18,7 @@ use crate::joint::step_model::surface::{SLOW_LOSS, SurfaceScale};
 use crate::joint::uncertainty::budget::{self, ReportedError};
 use crate::joint::uncertainty::common_part::common_part;
 use crate::joint::uncertainty::quantity::{Quantity, is_offset, of_shared, quantities};
-use mapper_core::{
-    BudgetRow, Channel, Dimension, EstimateUncertainty, ReferenceState, confidence_interval_95,
-};
+use mapper_core::{BudgetRow, Channel, Dimension, EstimateUncertainty, confidence_interval_95};
 use mapper_inference::mixture::MIN_WEIGHT;
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::{EXCLUDE_SIGMAS, mean, median};
@@ -85,12 +83,11 @@ pub(crate) fn smoothed(
     covariance: &Covariance,
     refined: Option<(&Refinements, &Gain)>,
     steps: &[StepRows],
-    reference: ReferenceState,
 ) -> Smoothed {
     let (etas, ln_hs) = quantities(problem, covariance, steps);
     let carried = (0..covariance.fitted.len()).any(|row| is_offset(covariance.fitted[row]));
     let places: Vec<(f64, f64)> = steps.iter().map(|step| step.end.place).collect();
-    let scale = SurfaceScale::of(&places, reference);
+    let scale = SurfaceScale::of(&places);
     // With more, the computation would take minutes: offsets keep their declared spread.
     let few = etas.len() <= MAX_STEPS;
     let slowness: Vec<f64> =

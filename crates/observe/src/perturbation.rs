@@ -3,7 +3,6 @@
 use crate::channels::boundary_condition;
 use mapper_core::{Channel, ModelTolerances};
 use mapper_physics::machine::params::{BoundaryConditions, Params};
-use mapper_physics::simulation::inputs::Inputs;
 use mapper_physics::simulation::model::State;
 
 /// Factor on the standard deviation of an uninformative prior.
@@ -112,37 +111,6 @@ impl Perturbation {
     }
 }
 
-/// Inputs with shifts.
-#[derive(Debug, Clone, Copy)]
-pub struct ShiftedInputs<'a, I> {
-    /// The recording itself.
-    pub inputs: &'a I,
-    /// Shifts, each in its unit.
-    pub shifts: &'a [(Perturbation, f64)],
-}
-
-impl<I: Inputs> Inputs for ShiftedInputs<'_, I> {
-    fn at(&self, t_s: f64) -> BoundaryConditions {
-        let mut boundary = self.inputs.at(t_s);
-        for (perturbation, by) in self.shifts {
-            perturbation.adjust_boundary(&mut boundary, *by);
-        }
-        boundary
-    }
-
-    fn time_s(&self, t_s: f64) -> f64 {
-        self.inputs.time_s(t_s)
-    }
-
-    fn next_kink_s(&self, t_s: f64) -> f64 {
-        self.inputs.next_kink_s(t_s)
-    }
-
-    fn is_constant_after(&self, t_s: f64) -> bool {
-        self.inputs.is_constant_after(t_s)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -177,15 +145,9 @@ mod tests {
             Perturbation::Input(channel).adjust_boundary(&mut boundary, 1.0);
             assert_ne!(boundary, before, "{channel}");
         }
-    }
-
-    #[test]
-    fn shifted_inputs_differ_by_what_is_added() {
-        let recorded = BoundaryConditions::default();
-        let shifts = [(Perturbation::Input(Channel::P1), -50.0), (Perturbation::Ambient, 2.0)];
-        let shifted = ShiftedInputs { inputs: &recorded, shifts: &shifts }.at(3.0);
-        assert_eq!(shifted.p1_pa, recorded.p1_pa - 50.0);
-        assert_eq!(shifted.ambient_temperature_k, recorded.ambient_temperature_k + 2.0);
-        assert_eq!(shifted.t1_k, recorded.t1_k);
+        let before = boundary;
+        Perturbation::Ambient.adjust_boundary(&mut boundary, 2.0);
+        assert_eq!(boundary.ambient_temperature_k, before.ambient_temperature_k + 2.0);
+        assert_eq!(boundary.t1_k, before.t1_k);
     }
 }

@@ -60,9 +60,7 @@ fn read<'a>(
     let mut drives: Vec<Drive<'a>> = recordings
         .iter()
         .enumerate()
-        .map(|(run, recording)| {
-            Drive::new(run, recording, request, &steps, &segments)
-        })
+        .map(|(run, recording)| Drive::new(run, recording, request, &steps, &segments))
         .collect::<Result<_, _>>()?;
     let (base, perturbed) = predict(&mut drives, &[])?;
     let all: Vec<SegmentMeans> = segments

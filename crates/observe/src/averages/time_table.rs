@@ -16,7 +16,7 @@ pub struct Table {
 }
 
 /// A sample interval above this many typical ones is a gap.
-const GAP_INTERVALS: f64 = 2.5;
+pub const GAP_INTERVALS: f64 = 2.5;
 
 impl Table {
     /// Resamples the measured channels of a recording to the times of the shaft speed, or of the first channel.

@@ -8,7 +8,7 @@ use crate::averages::time_table::Table;
 use crate::model_inputs::lagged_command::{LaggedCommand, Level, Response, is_same_command, levels_of_step};
 use mapper_core::{Channel, Recording, StepMarker};
 use mapper_numerics::minimise::minimise;
-use mapper_numerics::statistics::{mean, median, rms, robust_sigma};
+use mapper_numerics::statistics::{DOUBT_SIGMAS, mean, median, rms, robust_sigma};
 use std::ops::Range;
 
 /// Maximum delay of a command behind its step's start, s; a later one belongs to another change.
@@ -22,8 +22,7 @@ const MIN_CHANGE_SIGMAS: f64 = 6.0;
 const MIN_CHANGE_RATIO: f64 = 0.02;
 /// Time before and after a jump of P3 that is used for its timing, s.
 const AROUND_S: (f64, f64) = (1.0, 3.0);
-/// The jumps are timed separately if they differ by more than these, in standard errors and in s.
-const MIN_DIFFERENCE_SIGMAS: f64 = 3.0;
+/// The jumps are timed separately if they differ by more than this, s, and by more than [`DOUBT_SIGMAS`].
 const MIN_DIFFERENCE_S: f64 = 3e-3;
 /// Scatter of the sample times below which it is neglected, s.
 const MIN_SCATTER_S: f64 = 1e-3;
@@ -107,7 +106,7 @@ impl Times {
         let Some(common_s) = median(shifts.iter().map(|(shift_s, _)| *shift_s)) else { return times };
         let difference_sigmas = rms(shifts.iter().map(|(shift_s, error_s)| (shift_s - common_s) / error_s));
         let difference_s = rms(shifts.iter().map(|(shift_s, _)| shift_s - common_s));
-        if difference_sigmas > Some(MIN_DIFFERENCE_SIGMAS) && difference_s > Some(MIN_DIFFERENCE_S) {
+        if difference_sigmas > Some(DOUBT_SIGMAS) && difference_s > Some(MIN_DIFFERENCE_S) {
             for (jump, (shift_s, _)) in jumps.iter().zip(&shifts) {
                 times.starts_s[jump.step] += shift_s;
             }

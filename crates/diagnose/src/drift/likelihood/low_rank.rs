@@ -55,11 +55,7 @@ impl LowRank {
 
     /// Degrees of freedom used by the constants: the trace of the projection onto them.
     pub fn degrees_of_freedom(&self) -> f64 {
-        self.constants_count() as f64 - self.inner.inverse().trace()
-    }
-
-    pub fn constants_count(&self) -> usize {
-        self.columns.ncols()
+        self.columns.ncols() as f64 - self.inner.inverse().trace()
     }
 }
 

@@ -1,12 +1,16 @@
 //! Constants of a campaign, each with its prior: they are not drift.
 
 use crate::drift::runs::time_axis::Segment;
-use crate::drift::sensitivity::perturbations::{PERTURBATIONS, sigma};
+use crate::drift::sensitivity::perturbations::PERTURBATIONS;
 use crate::drift::sensitivity::readings::{Readings, Response};
 use mapper_core::Channel;
 use mapper_observe::channels::OUTPUTS;
 use mapper_observe::declared::Declared;
 use mapper_observe::perturbation::Perturbation;
+
+/// Factor on declared tolerances: repeats distinguish a constant from drift whatever its size, so a wide prior costs nothing. Judgement: the
+/// turbine housing, whose initial state takes an hour to decay, may start 20 K off.
+const TOLERANCE_FACTOR: f64 = 4.0;
 
 /// Deviations of each operating point from the smooth model, common to its repeats: one standard deviation.
 const OWN_DEVIATIONS: [(Perturbation, f64); 4] = [
@@ -37,7 +41,7 @@ pub(crate) fn constants(readings: &Readings, declared: &Declared) -> Vec<Respons
                 let level = readings.input_levels.get(channel).copied().unwrap_or(0.0);
                 declared_error(declared, *channel, level)
             }
-            perturbation => sigma(*perturbation, &declared.tolerances),
+            perturbation => TOLERANCE_FACTOR * perturbation.tolerance(&declared.tolerances),
         };
         if sigma <= 0.0 {
             continue;

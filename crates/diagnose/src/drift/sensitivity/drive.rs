@@ -13,7 +13,7 @@ use mapper_observe::averages::mean_reading::{BEFORE_S, mean_between};
 use mapper_observe::channels::OUTPUTS;
 use mapper_observe::initial_state::estimate_state;
 use mapper_observe::model_inputs::averaged_inputs::AveragedInputs;
-use mapper_observe::perturbation::{Perturbation, ShiftedInputs};
+use mapper_observe::perturbation::Perturbation;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::rig::instruments::true_value;
 use mapper_physics::simulation::driven::{DriveError, FrozenGrid, drive, settle};
@@ -135,11 +135,7 @@ impl<'a> Drive<'a> {
                 _ => {}
             }
             let offset_s = step.step.offset_s;
-            let inputs = DriftFreeInputs {
-                inputs: ShiftedInputs { inputs: &self.inputs, shifts: perturbed.as_slice() },
-                drifts,
-                offset_s,
-            };
+            let inputs = DriftFreeInputs { recorded: &self.inputs, perturbed, drifts, offset_s };
             for (from_s, to_s) in step.parts(start_s, drifts) {
                 let mut model = self.model.clone();
                 if let Some((perturbation, by)) = perturbed {
@@ -241,9 +237,10 @@ fn start_state(
     Ok(if is_metal_measured { State { tc_k, inner_k: tc_k, tt_k, ..settled } } else { settled })
 }
 
-/// Inputs without the drift of their sensors.
+/// Inputs without the drift of their sensors, with at most one perturbation.
 struct DriftFreeInputs<'a> {
-    inputs: ShiftedInputs<'a, AveragedInputs>,
+    recorded: &'a AveragedInputs,
+    perturbed: Option<(Perturbation, f64)>,
     drifts: &'a [Drift],
     /// Offset from run time to campaign time, s.
     offset_s: f64,
@@ -251,7 +248,10 @@ struct DriftFreeInputs<'a> {
 
 impl Inputs for DriftFreeInputs<'_> {
     fn at(&self, t_s: f64) -> BoundaryConditions {
-        let mut boundary = self.inputs.at(t_s);
+        let mut boundary = self.recorded.at(t_s);
+        if let Some((perturbation, by)) = self.perturbed {
+            perturbation.adjust_boundary(&mut boundary, by);
+        }
         for drift in self.drifts {
             drift.subtract_from(&mut boundary, t_s + self.offset_s);
         }
@@ -259,10 +259,10 @@ impl Inputs for DriftFreeInputs<'_> {
     }
 
     fn next_kink_s(&self, t_s: f64) -> f64 {
-        self.inputs.next_kink_s(t_s)
+        self.recorded.next_kink_s(t_s)
     }
 
     fn is_constant_after(&self, t_s: f64) -> bool {
-        !self.drifts.iter().any(Drift::acts_on_inputs) && self.inputs.is_constant_after(t_s)
+        !self.drifts.iter().any(Drift::acts_on_inputs) && self.recorded.is_constant_after(t_s)
     }
 }

@@ -1,6 +1,6 @@
 //! Perturbations of the model that give the responses of the readings by finite differences.
 
-use mapper_core::{Channel, Dimension, ModelTolerances};
+use mapper_core::{Channel, Dimension};
 use mapper_observe::perturbation::Perturbation;
 
 pub(crate) const PERTURBATIONS: [Perturbation; 19] = [
@@ -33,13 +33,4 @@ pub(crate) fn difference_step(perturbation: Perturbation) -> f64 {
         Perturbation::Friction => 5e-8,
         _ => 2e-3,
     }
-}
-
-/// Factor on declared tolerances: repeats distinguish a constant from drift whatever its size, so a wide prior costs nothing. Judgement: the
-/// turbine housing, whose initial state takes an hour to decay, may start 20 K off.
-const TOLERANCE_FACTOR: f64 = 4.0;
-
-/// Prior standard deviation of a perturbation that is constant over the campaign. Inputs have declared offsets instead.
-pub(crate) fn sigma(perturbation: Perturbation, tolerances: &ModelTolerances) -> f64 {
-    TOLERANCE_FACTOR * perturbation.tolerance(tolerances)
 }

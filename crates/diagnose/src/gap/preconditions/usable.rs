@@ -7,7 +7,7 @@ use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::study::Study;
 use mapper_core::{Channel, Recording};
 use mapper_numerics::statistics::median;
-use mapper_observe::averages::time_table::Table;
+use mapper_observe::averages::time_table::{GAP_INTERVALS, Table};
 use mapper_observe::channels::INPUT_CHANNELS;
 use mapper_observe::declared::Declared;
 use mapper_observe::plausible::check_running;
@@ -129,7 +129,7 @@ fn commanded(recording: &Recording, table: &Table) -> Result<(), Problem> {
 }
 
 fn gaps(table: &Table) -> Option<GapWarning> {
-    let gap = |pair: &[f64]| pair[1] - pair[0] > 2.5 * table.interval_s;
+    let gap = |pair: &[f64]| pair[1] - pair[0] > GAP_INTERVALS * table.interval_s;
     let missing_s: f64 = table.t_s.windows(2).filter(|pair| gap(pair)).map(|pair| pair[1] - pair[0]).sum();
     let gaps = table.t_s.windows(2).filter(|pair| gap(pair)).count();
     (gaps > 0).then_some(GapWarning::GapsInRecording { gaps, missing_s })

@@ -14,7 +14,7 @@ use crate::gap::gap_reduction::folds::FOLDS;
 use crate::gap::gap_reduction::held_out_gap::channels_on;
 use crate::gap::residuals::study::{Study, members};
 use crate::missing_terms::laws::candidate::{Bench, Candidate, keep_determined, promising};
-use crate::missing_terms::laws::script::script;
+use crate::missing_terms::laws::script::script_of;
 use crate::missing_terms::laws::sentence::{LawDescription, tell};
 use crate::missing_terms::search::columns::{Base, Products};
 use crate::missing_terms::search::onset::begun;
@@ -61,10 +61,12 @@ pub fn discover(
     if left
         && diagnosed.diagnosis.verdict == Verdict::PartlyExplained
         && let Some(best) = diagnosed.fits.first()
-        && let Some(both) = together_with_cause(&mut bench, (diagnosed, calibration), best, &training, &everywhere)
+        && let Some(both) =
+            together_with_cause(&mut bench, (diagnosed, calibration), best, &training, &everywhere)
     {
         let score = |found: &FittedLaws| found.fitted.first().map_or(f64::NEG_INFINITY, Candidate::score);
-        let better = found.as_ref().is_none_or(|alone| score(&both) > score(alone) + rarity(calibration, study));
+        let better =
+            found.as_ref().is_none_or(|alone| score(&both) > score(alone) + rarity(calibration, study));
         found = if better { Some(both) } else { found };
     }
     progress(0.6, "residual of the law");
@@ -204,7 +206,6 @@ fn fitted(
     Some((trained, fitted))
 }
 
-
 /// The best law, if it passes all tests.
 fn propose(
     diagnosed: &Diagnosed,
@@ -254,8 +255,9 @@ fn propose(
         .sum::<f64>()
         + ((inside - best.score() - PRIOR_LAW.ln()) / calibration.temperature).exp();
     let describe = |candidate: &Candidate| tell(&bench.library, candidate, calibration.interval_factor);
-    let LawDescription { sentence, terms, sink_k } = describe(best);
-    let description = LawDescription { sentence: sentence.clone(), terms: terms.clone(), sink_k };
+    let description = describe(best);
+    let script = script_of(&best.terms(&bench.library), &description);
+    let LawDescription { sentence, terms, .. } = description;
     let equivalent =
         found.fitted.iter().skip(1).filter(near).take(MAX_EQUIVALENT).map(|c| describe(c).sentence);
     vec![Law {
@@ -271,7 +273,7 @@ fn propose(
         stability: found.stability,
         equivalent: equivalent.collect(),
         rhai: None,
-        script: script(&bench.library, best, &description),
+        script,
     }]
 }
 

@@ -1,5 +1,6 @@
 //! Distinguishability before any rig runs: which balance's source term could imitate which effect.
 
+use crate::gap::best_fit::coordinate::typical;
 use crate::gap::best_fit::normal::PRIOR_STEPS;
 use crate::gap::best_fit::selection::Selection;
 use crate::gap::residuals::study::Study;
@@ -30,7 +31,7 @@ pub fn signatures(study: &Study, linearised: &Linearised) -> Signatures {
     let changes: Vec<Vec<f64>> = parallel::map(&places, |place| {
         let parameters = &study.effects[*place].info().parameters;
         // For two interacting parameters, a point inside their range.
-        let values = parameters.iter().map(|p| (p.neutral + p.typical_step).clamp(p.low, p.high)).collect();
+        let values = parameters.iter().map(typical).collect();
         let mut with = study.nothing();
         with.effects.push((*place, values));
         let there =
@@ -39,7 +40,8 @@ pub fn signatures(study: &Study, linearised: &Linearised) -> Signatures {
         linearised.whiten(study, &mut change);
         change
     });
-    let shape = covariance(study, &study.points(&study.nothing()).unwrap_or_default()) * (PRIOR_STEPS * PRIOR_STEPS);
+    let shape =
+        covariance(study, &study.points(&study.nothing()).unwrap_or_default()) * (PRIOR_STEPS * PRIOR_STEPS);
     let balances = balances(study);
     let shares: Vec<Vec<(f64, f64)>> = parallel::map(&balances, |balance| {
         let mut all: Vec<Vec<f64>> = columns(&base, *balance);

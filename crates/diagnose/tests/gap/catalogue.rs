@@ -89,12 +89,12 @@ fn complaint(clean: &Study, nominal: &Linearised, index: usize, effect: &dyn Eff
         return Some(format!("it leaves a misfit of {:.0} in {count} values", own.cost));
     }
     let name = |effect: usize| study.effects[effect].info().id.to_string();
-    let mut more = additions(&study, nominal, &everywhere, &own);
+    let mut more = additions(&study, nominal, &everywhere, &own, false);
     more.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     if more[0].gain > CHANCE {
         return Some(format!("{} reduces it by {:.1} in addition", name(more[0].effect), more[0].gain));
     }
-    let mut rivals = additions(&study, nominal, &everywhere, &null);
+    let mut rivals = additions(&study, nominal, &everywhere, &null, false);
     rivals.retain(|rival| rival.effect != index);
     rivals.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let better = rivals.into_iter().take(RIVALS).find_map(|rival| {

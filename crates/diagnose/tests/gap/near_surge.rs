@@ -111,7 +111,7 @@ fn an_exact_recording_near_surge_has_no_cause() {
     let linearised = Linearised::new(&study).unwrap();
     let all = Selection::all(&study);
     let null = fit(&study, &linearised, &study.nothing(), &all, Effort::default()).unwrap();
-    let found = additions(&study, &linearised, &all, &null);
+    let found = additions(&study, &linearised, &all, &null, false);
     let most = found.iter().max_by(|a, b| a.gain.total_cmp(&b.gain)).unwrap();
     let left = adequacy(&study, &linearised, &null);
     assert!(null.cost < 10.0, "{} of {} values", null.cost, study.measured.len());

@@ -54,11 +54,14 @@ fn an_error_of_the_equations_is_a_cause_only_beyond_its_declaration() {
     assert_ne!(ask(&plain, declared(), None).verdict, Verdict::WithinTolerance);
     let mut with_structure = declared();
     let lacking = ask(&plain, declared(), Some(&two_walls(&[], 6))).since.unwrap().lacking;
-    for (channel, error) in OUTPUTS.iter().filter_map(|channel| Some((channel, lacking.get(channel.symbol())?))) {
+    for (channel, error) in
+        OUTPUTS.iter().filter_map(|channel| Some((channel, lacking.get(channel.symbol())?)))
+    {
         if let Some(ratio) = with_structure.tolerances.structure.of_mut(*channel) {
             *ratio = error.declare.structure_ratio;
         }
-        if let (Some(sensor), Some(offset)) = (with_structure.sensors.get_mut(channel), error.declare.offset) {
+        if let (Some(sensor), Some(offset)) = (with_structure.sensors.get_mut(channel), error.declare.offset)
+        {
             sensor.offset_sigma = offset;
         }
     }

@@ -3,13 +3,14 @@
 use crate::driven::cause_search::fit::{Columns, Fit, SideProblem};
 use crate::driven::cause_search::side_diagnosis::NotDiagnosable;
 use crate::driven::cause_search::sides::side::SideModel;
+use crate::gap::best_fit::coordinate::typical;
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::smallest_seen::{evidence_needed, smallest_size};
 use crate::gap::findings::in_words;
 use crate::gap::findings::report::SmallestSeen;
 use crate::gap::residuals::study::Hypothesis;
 use mapper_numerics::{ROUNDING, parallel};
-use mapper_physics::rig::effect::{EffectInfo, EffectParameter};
+use mapper_physics::rig::effect::EffectInfo;
 
 /// Indices of the effects that change a judged channel, and the other effects with the reason.
 pub(crate) fn diagnosable<S: SideModel>(problem: &SideProblem<'_, S>) -> (Vec<usize>, Vec<NotDiagnosable>) {
@@ -75,7 +76,6 @@ pub(crate) fn smallest<S: SideModel>(
             Some((change.own.max(0.0).sqrt(), imitator))
         };
         // The other parameters stay neutral if the effect is visible then: the lag of an element is, a wall without mass is not.
-        let typical = |p: &EffectParameter| (p.neutral + p.typical_step).clamp(p.low, p.high);
         let mut fixed: Vec<f64> = others.iter().map(|p| p.neutral).collect();
         if signature(&fixed, typical(parameter))?.0 <= ROUNDING {
             fixed = others.iter().map(typical).collect();

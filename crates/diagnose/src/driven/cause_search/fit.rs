@@ -357,11 +357,8 @@ impl<S: SideModel> Model for Objective<'_, '_, S> {
     fn room(&self, unknowns: &DVector<f64>) -> Vec<(f64, f64)> {
         let count = unknowns.len() - self.coordinates.len();
         let of_unknowns = unknowns.iter().take(count).map(|z| room_within(-MAX_SIGMAS, MAX_SIGMAS, *z));
-        let of_effects = self.coordinates.iter().zip(unknowns.iter().skip(count)).map(|(coordinate, at)| {
-            let (low, high) = coordinate.ends();
-            room_within(low, high, *at)
-        });
-        of_unknowns.chain(of_effects).collect()
+        let of_effects = self.coordinates.iter().zip(unknowns.iter().skip(count));
+        of_unknowns.chain(of_effects.map(|(coordinate, at)| coordinate.room(*at))).collect()
     }
 
     fn accept(&mut self, point: &Point) {

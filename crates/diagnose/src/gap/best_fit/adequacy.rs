@@ -16,8 +16,6 @@ pub struct Adequacy {
     pub smooth_excess: f64,
     /// Scatter of the effect's parameters from step to step above its expectation, in standard deviations; 0 without effects.
     pub scatter_sigma: f64,
-    /// Mean squared whitened residual.
-    pub mean_square: f64,
 }
 
 impl Adequacy {
@@ -78,13 +76,8 @@ pub fn adequacy(study: &Study, linearised: &Linearised, fit: &Fit) -> Adequacy {
             scatter_sigma = scatter_sigma.max((sum - count) / (2.0f64 * count).sqrt());
         }
     }
-    let mean_square = dot(&fit.residual, &fit.residual) / fit.residual.len().max(1) as f64;
-    Adequacy {
-        smooth_sigma: smooth_excess / (2.0 * expected.max(1.0)).sqrt(),
-        smooth_excess,
-        scatter_sigma,
-        mean_square,
-    }
+    let smooth_sigma = smooth_excess / (2.0 * expected.max(1.0)).sqrt();
+    Adequacy { smooth_sigma, smooth_excess, scatter_sigma }
 }
 
 /// Misfit of each step: `(|r|^2 - n)/n`.

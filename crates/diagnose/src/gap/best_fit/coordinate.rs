@@ -1,6 +1,7 @@
 //! Search coordinates of effect parameters, and hypotheses as vectors of unknowns.
 
-use crate::gap::residuals::study::Hypothesis;
+use crate::gap::residuals::hypothesis::Hypothesis;
+use mapper_inference::descent::room_within;
 use mapper_physics::rig::effect::{Effect, EffectInfo, EffectParameter};
 use nalgebra::DVector;
 use std::sync::Arc;
@@ -38,6 +39,12 @@ impl Coordinate {
         (ends.0.min(ends.1), ends.0.max(ends.1))
     }
 
+    /// Largest change in one iteration of a descent, down and up.
+    pub(crate) fn room(&self, at: f64) -> (f64, f64) {
+        let (low, high) = self.ends();
+        room_within(low, high, at)
+    }
+
     /// A value at this distance from another one, on the side that is within the range, and the coordinate's change.
     pub fn next_to(&self, value: f64, distance: f64) -> (f64, f64) {
         let at = self.of(value);
@@ -52,6 +59,11 @@ impl Coordinate {
         let value = if self.logarithmic { coordinate.exp() } else { coordinate * self.scale };
         value.clamp(self.low, self.high)
     }
+}
+
+/// Value of a parameter a typical step from neutral.
+pub(crate) fn typical(parameter: &EffectParameter) -> f64 {
+    (parameter.neutral + parameter.typical_step).clamp(parameter.low, parameter.high)
 }
 
 /// Descriptions of a hypothesis' effects, in order.

@@ -11,7 +11,7 @@ use crate::gap::residuals::hypothesis::TimeHistory;
 use crate::gap::residuals::nuisance::NuisanceKind;
 use crate::gap::residuals::study::{Hypothesis, PredictError, Prediction, Study};
 use crate::gap::residuals::whiten::{Linearised, rows_of_step};
-use mapper_inference::descent::{End, FINE, Model, Normal, Reach, Until, descend, room_within};
+use mapper_inference::descent::{End, FINE, Model, Normal, Reach, Until, descend};
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 use std::sync::Arc;
@@ -286,11 +286,8 @@ impl Model for Objective<'_> {
         let n = unknowns.len() - self.coordinates.len();
         let nuisances = unknowns.iter().take(n).zip(&self.max_sigmas);
         let of_nuisances = nuisances.map(|(u, max)| (-max - u, max - u));
-        let of_effects = self.coordinates.iter().zip(unknowns.iter().skip(n)).map(|(coordinate, at)| {
-            let (low, high) = coordinate.ends();
-            room_within(low, high, *at)
-        });
-        of_nuisances.chain(of_effects).collect()
+        let of_effects = self.coordinates.iter().zip(unknowns.iter().skip(n));
+        of_nuisances.chain(of_effects.map(|(coordinate, at)| coordinate.room(*at))).collect()
     }
 }
 

@@ -28,13 +28,9 @@ const MAX_REACH: f64 = 3.0;
 /// Minimum start offset from neutral, as a share of a step: some effects have zero slope at neutral.
 const OFF_NEUTRAL: f64 = 0.1;
 
-/// Every further effect added to a fit, in closed form from one run each; effects with interacting parameters use several starts.
-pub fn additions(study: &Study, linearised: &Linearised, selection: &Selection, base: &Fit) -> Vec<Addition> {
-    additions_of(study, linearised, selection, base, false)
-}
-
-/// The same, or for `onsets` the study's candidates with an onset, as if nothing before the onset changed and nothing persisted.
-pub(crate) fn additions_of(
+/// Every further effect added to a fit, in closed form from one run each; effects with interacting parameters use several starts. For `onsets`
+/// the study's candidates with an onset, as if nothing before the onset changed and nothing persisted.
+pub fn additions(
     study: &Study,
     linearised: &Linearised,
     selection: &Selection,

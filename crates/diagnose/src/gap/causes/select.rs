@@ -3,7 +3,7 @@
 use crate::gap::best_fit::coordinate::Coordinate;
 use crate::gap::best_fit::fit::{Effort, Fit, MAX_SIGMAS, Start, fit};
 use crate::gap::best_fit::selection::Selection;
-use crate::gap::causes::additions::{Addition, additions, additions_of};
+use crate::gap::causes::additions::{Addition, additions};
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::probabilities::{prior, weight};
 use crate::gap::residuals::study::{PredictError, Study, members};
@@ -68,7 +68,7 @@ pub fn search(search: Search<'_>, progress: &dyn Fn(f64, &str)) -> Result<Search
     progress(0.15, "single effects");
     // Not from the nuisances of the null fit, which may imitate an effect.
     let untouched = fit(study, linearised, &study.nothing(), selection, Effort { iterations: 1, ..QUICK })?;
-    let mut singles = additions(study, linearised, selection, &untouched);
+    let mut singles = additions(study, linearised, selection, &untouched, false);
     singles.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     // Half of the library limits the time; linear gains of strong effects are too inexact for fewer.
     let half = study.catalogue.div_ceil(2);
@@ -165,7 +165,7 @@ impl Causes for Search<'_> {
             }
         };
         let Search { study, linearised, selection, onsets, .. } = *self;
-        additions_of(study, linearised, selection, base, onsets).into_iter().map(offer).collect()
+        additions(study, linearised, selection, base, onsets).into_iter().map(offer).collect()
     }
 
     fn without(&self, fit: &Fit, cause: usize) -> (Start, Effort) {
@@ -251,9 +251,8 @@ fn all_effects_act(study: &Study, fitted: &Fit) -> bool {
         columns = rest;
         let acts = own.iter().any(|column| column.iter().any(|change| *change != 0.0));
         let parameters = study.effects[*index].info().parameters.iter();
-        acts && parameters.zip(values).any(|(parameter, value)| {
-            (value - parameter.neutral).abs() > FINE * parameter.typical_step.abs()
-        })
+        acts && parameters
+            .zip(values)
+            .any(|(parameter, value)| (value - parameter.neutral).abs() > FINE * parameter.typical_step.abs())
     })
 }
-

@@ -1,6 +1,6 @@
 //! Smallest detectable size of an effect, from its signature length with nuisances projected out and the evidence required to name a cause.
 
-use crate::gap::best_fit::coordinate::Coordinate;
+use crate::gap::best_fit::coordinate::{Coordinate, typical};
 use crate::gap::best_fit::normal::PRIOR_STEPS;
 use crate::gap::best_fit::projector::Projector;
 use crate::gap::best_fit::selection::Selection;
@@ -49,7 +49,7 @@ pub fn smallest_size(
         let value = if coordinate.is_logarithmic() { 1.0 / away } else { parameter.neutral + away };
         value.clamp(parameter.low, parameter.high)
     };
-    let mut here = away((parameter.neutral + parameter.typical_step).clamp(parameter.low, parameter.high));
+    let mut here = away(typical(parameter));
     let furthest = away(value_at(here * 1e9));
     let (mut smallest, mut acts) = (None::<f64>, false);
     let mut before: Option<(f64, f64)> = None;
@@ -107,8 +107,8 @@ pub fn smallest_seen(study: &Study, linearised: &Linearised, calibration: &Calib
         let (parameter, others) = info.parameters.split_last()?;
         let smallest = smallest_size(parameter, against, |value| {
             // With several parameters, the others are a typical step from neutral.
-            let typical = others.iter().map(|p| (p.neutral + p.typical_step).clamp(p.low, p.high));
-            let change = linearised.change(study, *index, typical.chain([value]).collect())?;
+            let values = others.iter().map(typical).chain([value]).collect();
+            let change = linearised.change(study, *index, values)?;
             let right = projector.right(&change);
             Some(projector.product(&change, &right, &change, &right).max(0.0).sqrt())
         })?;

@@ -10,9 +10,9 @@ use crate::gap::best_fit::selection::{Selection, dot_over};
 use crate::gap::findings::warning::GapWarning;
 use crate::gap::model_error::baseline_assumptions::{Declaration, Lacking, Since};
 use crate::gap::model_error::errors_of_change::{elsewhere, errors_of_change};
-use crate::gap::model_error::log_time::covariance_of_errors;
 use crate::gap::model_error::measured_structure::measured_structure;
 use crate::gap::model_error::same_steps::same_steps;
+use crate::gap::model_error::structure::covariance_of_errors;
 use crate::gap::preconditions::machine_mismatch::another_machine;
 use crate::gap::preconditions::problem::GapError;
 use crate::gap::preconditions::usable::checked_study;
@@ -107,7 +107,8 @@ impl Study {
             noise
         });
         study.other_noise = noise.collect();
-        let since = Since { recording: name, lacking: by_channel(&before, &model_error, &shares, &declarations) };
+        let since =
+            Since { recording: name, lacking: by_channel(&before, &model_error, &shares, &declarations) };
         Ok(Changed { study, since, warnings })
     }
 }

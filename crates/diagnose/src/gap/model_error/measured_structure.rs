@@ -43,7 +43,8 @@ pub(crate) fn measured_structure(study: &Study) -> Result<[Declaration; OUTPUTS.
 fn declarations(study: &Study, predicted: &[f64]) -> [Declaration; OUTPUTS.len()] {
     std::array::from_fn(|output| {
         let groups = study.groups.iter().filter(|group| group.output == output);
-        let errors = groups.flat_map(|group| group.rows.clone()).map(|row| study.measured[row] - predicted[row]);
+        let errors =
+            groups.flat_map(|group| group.rows.clone()).map(|row| study.measured[row] - predicted[row]);
         let (Some(offset), Some((_, sigma))) = (mean(errors.clone()), variation(study, output)) else {
             return Declaration::default();
         };

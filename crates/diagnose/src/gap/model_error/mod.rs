@@ -3,7 +3,6 @@
 pub mod baseline_assumptions;
 pub(crate) mod errors_of_change;
 pub mod healthy;
-pub(crate) mod log_time;
 pub(crate) mod measured_structure;
 pub(crate) mod same_steps;
 pub(crate) mod structure;

@@ -6,7 +6,6 @@ use mapper_core::{Channel, VALVE_JUMP_RATIO, jump_ratio};
 use mapper_identify::LONGEST_BRIDGE_S;
 use mapper_observe::averages::mean_reading::mean_reading;
 
-
 /// Rejects a reference recording with steps other than those of the recording under diagnosis. Times may differ by the interval of a slow
 /// logger, T3 by its tolerance: a smaller difference is variation of the stand, not another operating point.
 pub(crate) fn same_steps(healthy: &Study, study: &Study) -> Result<(), Problem> {
@@ -35,7 +34,13 @@ pub(crate) fn same_steps(healthy: &Study, study: &Study) -> Result<(), Problem> 
         differs("opening of the valve", theirs.valve_opening_ratio, opening, "", VALVE_JUMP_RATIO * opening)?;
         // The running time before the first jump is not compared.
         if index > 0 {
-            differs("length", theirs.end_s - theirs.start_s, ours.end_s - ours.start_s, "s", LONGEST_BRIDGE_S)?;
+            differs(
+                "length",
+                theirs.end_s - theirs.start_s,
+                ours.end_s - ours.start_s,
+                "s",
+                LONGEST_BRIDGE_S,
+            )?;
         }
         if let (Some(before), Some(now)) = (t3_k(healthy, index), t3_k(study, index)) {
             differs("T3", before, now, "K", study.declared.tolerances.turbine_inlet_temperature_k)?;

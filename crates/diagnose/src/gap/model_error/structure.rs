@@ -5,10 +5,10 @@
 //! part of the same size differs from step to step, because the error depends on the state: a Gaussian process over ln of the time since the
 //! jump, which enters the covariance (the discrepancy of Kennedy and O'Hagan, J. R. Stat. Soc. B 63:425, 2001).
 
-use crate::gap::model_error::log_time::covariance_of_errors;
 use crate::gap::residuals::nuisance::{OUTPUTS, RESPONSES_S, structure_delay_s, structure_ratio};
 use crate::gap::residuals::study::{Group, Study};
 use mapper_numerics::statistics::mean;
+use mapper_physics::rig::instruments::NOMINAL_P3_LAG_S;
 use nalgebra::DMatrix;
 
 /// Mean and standard deviation of an output's readings over the recording.
@@ -35,6 +35,17 @@ pub(crate) fn repeating_part(study: &Study, output: usize, part: usize) -> Vec<(
         }));
     }
     whole
+}
+
+/// Covariance within a step of errors proportional to each of `histories`. They are correlated over the logarithm of time, because the parts of
+/// the machine follow with time constants from tenths of a second to minutes. Values within the usual lag of P3 after a jump are fully correlated.
+pub(crate) fn covariance_of_errors(since_jump_s: &[f64], histories: [&[f64]; 2]) -> DMatrix<f64> {
+    let n = since_jump_s.len();
+    let at: Vec<f64> = since_jump_s.iter().map(|t_s| (t_s.max(0.0) + NOMINAL_P3_LAG_S).ln()).collect();
+    DMatrix::from_fn(n, n, |i, j| {
+        let sum: f64 = histories.iter().map(|history| history[i] * history[j]).sum();
+        sum * (-(at[i] - at[j]).abs()).exp()
+    })
 }
 
 /// Covariance of each group's error that differs from step to step, unit squared; empty if no error is declared. `slopes` are those of

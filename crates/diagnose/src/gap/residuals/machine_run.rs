@@ -1,10 +1,11 @@
 //! A run of the machine, which hypotheses share if they differ only in the sensors of outputs.
 
+use crate::gap::best_fit::coordinate::typical;
 use crate::gap::residuals::hypothesis::Hypothesis;
 use crate::gap::residuals::nuisance::{NuisanceKind, OUTPUTS};
 use mapper_core::Channel;
 use mapper_observe::channels::INPUT_CHANNELS;
-use mapper_physics::rig::effect::{Effect, EffectParameter, Rig, add};
+use mapper_physics::rig::effect::{Effect, Rig, add};
 use mapper_physics::rig::instruments::{Surroundings, true_value};
 use mapper_physics::simulation::model::{Outputs, PreparedModel, State};
 use std::sync::Arc;
@@ -52,7 +53,6 @@ impl Sample {
 
 /// Whether an effect changes the machine or its inputs, and not only sensors of outputs.
 pub(crate) fn acts_on_machine(nominal: &Rig, effect: &dyn Effect) -> bool {
-    let typical = |p: &EffectParameter| (p.neutral + p.typical_step).clamp(p.low, p.high);
     let values: Vec<f64> = effect.info().parameters.iter().map(typical).collect();
     let mut rig = nominal.clone();
     if add(&mut rig, effect, &values).is_err() {

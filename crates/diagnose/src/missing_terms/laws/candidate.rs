@@ -38,10 +38,15 @@ impl Candidate {
         self.fit.score - self.choice.rarity
     }
 
+    /// Its terms.
+    pub fn terms<'a>(&self, library: &'a [Term]) -> Vec<&'a Term> {
+        self.choice.terms.iter().map(|place| &library[*place]).collect()
+    }
+
     /// Whether every coefficient differs significantly from 0. The level that accompanies a slope may have any value.
     pub fn is_determined(&self, library: &[Term]) -> bool {
         let covariance = &self.fit.covariance;
-        let terms: Vec<&Term> = self.choice.terms.iter().map(|place| &library[*place]).collect();
+        let terms = self.terms(library);
         let first = covariance.nrows().saturating_sub(terms.len());
         let sink = terms.iter().any(|term| term.role == Role::Slope);
         let values = self.coefficients();

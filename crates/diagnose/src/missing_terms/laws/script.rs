@@ -1,19 +1,12 @@
 //! A law as an effect script, to be read, edited and used in the next diagnosis.
 
-use crate::missing_terms::laws::candidate::Candidate;
 use crate::missing_terms::laws::sentence::{LawDescription, sink};
 use crate::missing_terms::terms::balance::Balance;
 use crate::missing_terms::terms::expression::Expression;
 use crate::missing_terms::terms::term::Term;
 use std::fmt::Write as _;
 
-/// The script; `None` if a term cannot be written as one.
-pub fn script(library: &[Term], candidate: &Candidate, description: &LawDescription) -> Option<String> {
-    let terms: Vec<&Term> = candidate.choice.terms.iter().map(|place| &library[*place]).collect();
-    script_of(&terms, description)
-}
-
-/// The script of some terms.
+/// The script of some terms; `None` if a term cannot be written as one.
 pub fn script_of(terms: &[&Term], description: &LawDescription) -> Option<String> {
     let submodel = terms.first()?.submodel().name();
     let mut parameters = String::new();

@@ -43,7 +43,7 @@ pub struct LawDescription {
 
 /// Describes a law; `interval_factor` widens its standard errors.
 pub fn tell(library: &[Term], candidate: &Candidate, interval_factor: f64) -> LawDescription {
-    let terms: Vec<&Term> = candidate.choice.terms.iter().map(|place| &library[*place]).collect();
+    let terms = candidate.terms(library);
     let values = candidate.coefficients();
     let covariance = &candidate.fit.covariance;
     // The law's coordinates are the last of the fit, in steps.

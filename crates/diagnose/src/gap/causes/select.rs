@@ -9,7 +9,7 @@ use crate::gap::causes::probabilities::{prior, weight};
 use crate::gap::residuals::study::{PredictError, Study, members};
 use crate::gap::residuals::whiten::Linearised;
 use mapper_core::half_width_95;
-use mapper_inference::descent::{FINE, ROUNDS};
+use mapper_inference::descent::ROUNDS;
 use mapper_inference::hypotheses::MAX_MEMBERS;
 use mapper_inference::search::{Causes, Known, Limits, Offer, climb, extend};
 
@@ -28,6 +28,12 @@ pub struct Search<'a> {
 
 /// Judgement: limits the time. The slack is the evidence that a cause must have over no cause.
 const LIMITS: Limits = Limits { members: MAX_MEMBERS, starts: 2, fits: 6, slack: 3.0 };
+/// Decrease of the cost by a single effect above which nuisances are linearised again at its fit: their derivatives differ there from those at the
+/// nominal point.
+const STRONG: f64 = 30.0;
+/// Number of starts of single effects that are fitted, those with the largest linear gain, which misjudges strong effects. Judgement: limits
+/// the time.
+const SINGLES: usize = 26;
 /// Share of the misfit that a cause must remove to explain it in part, also on held-out steps. An additional effect that removes less probably imitates a
 /// cause outside the library, so the search does not extend that set.
 pub const MIN_SHRINK: f64 = 0.5;
@@ -70,19 +76,16 @@ pub fn search(search: Search<'_>, progress: &dyn Fn(f64, &str)) -> Result<Search
     let untouched = fit(study, linearised, &study.nothing(), selection, Effort { iterations: 1, ..QUICK })?;
     let mut singles = additions(study, linearised, selection, &untouched, false);
     singles.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    // Half of the library limits the time; linear gains of strong effects are too inexact for fewer.
-    let half = study.catalogue.div_ceil(2);
-    let singles: Vec<(Start, Effort)> = singles.into_iter().take(half).map(|a| (a.start, QUICK)).collect();
+    let singles: Vec<(Start, Effort)> = singles.into_iter().take(SINGLES).map(|a| (a.start, QUICK)).collect();
     let mut known = Known::default();
     known.keep(&search, null.clone());
     known.fit_all(&search, &singles);
     refit_best(&search, &mut known, 7, f64::INFINITY, EFFORT);
-    // At a cause that is named already, the derivatives of the tolerances differ from those at the nominal point.
-    let is_named = |best: &&Fit| search.ln_odds(best) - search.ln_odds(&null) > search.calibration.threshold;
-    let relinearised = known.ranked(&search).first().filter(is_named).and_then(|best| {
-        let at_best = linearised.at(study, &best.hypothesis).ok()?;
-        Some((at_best, members(&best.hypothesis)))
-    });
+    let relinearised =
+        known.ranked(&search).first().filter(|best| null.cost - best.cost > STRONG).and_then(|best| {
+            let at_best = linearised.at(study, &best.hypothesis).ok()?;
+            Some((at_best, members(&best.hypothesis)))
+        });
     let search = match &relinearised {
         Some((at_best, _)) => Search { linearised: at_best, ..search },
         None => search,
@@ -251,8 +254,11 @@ fn all_effects_act(study: &Study, fitted: &Fit) -> bool {
         columns = rest;
         let acts = own.iter().any(|column| column.iter().any(|change| *change != 0.0));
         let parameters = study.effects[*index].info().parameters.iter();
-        acts && parameters
-            .zip(values)
-            .any(|(parameter, value)| (value - parameter.neutral).abs() > FINE * parameter.typical_step.abs())
+        acts && parameters.zip(values).any(|(parameter, value)| {
+            (value - parameter.neutral).abs() > NEUTRAL_STEPS * parameter.typical_step.abs()
+        })
     })
 }
+
+/// Distance from neutral, in typical steps, below which an effect is absent.
+const NEUTRAL_STEPS: f64 = 1e-3;

@@ -1,7 +1,6 @@
 //! Residuals scaled by the noise and the uncertainty of the inputs.
 
 use crate::gap::model_error::structure::{repeating_part, step_errors};
-use crate::gap::residuals::initial_state::SETTLING_S;
 use crate::gap::residuals::nuisance::{JUMP_S, NuisanceKind, OUTPUTS};
 use crate::gap::residuals::study::{Hypothesis, PredictError, Prediction, Study};
 use mapper_core::Channel;
@@ -230,8 +229,10 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
 /// Position on the speed line beyond which a jump runs along or across the surge line: flow and outlet pressure are then too sensitive to be
 /// used in it.
 pub(crate) const NEAR_SURGE: f64 = 0.975;
-/// For each step, the time after its jump, s, in which flow and outlet pressure are uninformative, and that in which all readings are: the
-/// end of a surge cycle is chaotic.
+/// Time after the last surge cycle in which no reading counts, s: its end is chaotic, and the shaft takes some seconds to recover.
+const AFTER_SURGE_S: f64 = 15.0;
+
+/// For each step, the time after its jump, s, in which flow and outlet pressure are uninformative, and that in which all readings are.
 fn lost_to_surge(study: &Study, nothing: &Hypothesis) -> Vec<(f64, f64)> {
     let Ok(positions) = study.surge_positions(nothing) else {
         return vec![(JUMP_S, 0.0); study.steps.len()];
@@ -241,7 +242,7 @@ fn lost_to_surge(study: &Study, nothing: &Hypothesis) -> Vec<(f64, f64)> {
     let lost = |step: usize| {
         let jump_s = if near(step) || (step > 0 && near(step - 1)) { JUMP_S } else { 0.0 };
         let in_surge = positions[step].iter().filter(|(_, position)| *position > 1.0);
-        let ends_s = in_surge.map(|(since_s, _)| since_s + SETTLING_S).fold(0.0, f64::max);
+        let ends_s = in_surge.map(|(since_s, _)| since_s + AFTER_SURGE_S).fold(0.0, f64::max);
         (jump_s, ends_s)
     };
     (0..study.steps.len())

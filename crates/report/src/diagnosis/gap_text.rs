@@ -227,17 +227,31 @@ fn not_judged(since: &Since) -> String {
             }));
         }
     }
-    let mut text = format!(
+    let unjudged = format!(
         "only the change since {} is reported; the residual already present there is not judged: {}\n\
-         a diagnosis without it needs these errors of the model's equations in the campaign:\n",
+         a diagnosis without it needs these errors of the model's equations in the campaign:",
         since.recording,
         residuals.join(", ")
     );
-    text += &wrapped(&format!("  tolerances: {{structure: {{{}}}}}", structure.join(", ")), COLUMNS, 4);
+    let mut text = wrapped(&unjudged, COLUMNS, 2);
+    text.push_str(&flow_mapping("  tolerances: {structure: {", &structure, "}}"));
     if !offsets.is_empty() {
-        text += &wrapped(&format!("  sensors: {{{}}}", offsets.join(", ")), COLUMNS, 4);
+        text.push_str(&flow_mapping("  sensors: {", &offsets, "}"));
     }
     text
+}
+
+/// A mapping of a campaign on few lines, broken between its entries.
+fn flow_mapping(start: &str, entries: &[String], end: &str) -> String {
+    let mut lines = vec![start.to_owned()];
+    for (index, entry) in entries.iter().enumerate() {
+        let entry = format!("{entry}{}", if index + 1 < entries.len() { ", " } else { end });
+        match lines.last_mut() {
+            Some(line) if line.len() + entry.trim_end().len() <= COLUMNS => line.push_str(&entry),
+            _ => lines.push(format!("    {entry}")),
+        }
+    }
+    lines.iter().map(|line| format!("{}\n", line.trim_end())).collect()
 }
 
 /// Factor to the unit in which residuals are shown, and that unit.

@@ -4,28 +4,24 @@
 //! block by block: readings `m_h` minus the model `f_h` with its fitted tolerances `u_h`. The diagnosis uses `m - (m_h - f_h(u_h))` with
 //! noise `C + C_h`, unsmoothed because smoothing needs its time history. Each recording has its own inputs, so ambient changes do not count.
 
-use crate::gap::best_fit::fit::MAX_SIGMAS;
-use crate::gap::best_fit::normal::nuisance_products;
-use crate::gap::best_fit::selection::{Selection, dot_over};
 use crate::gap::findings::warning::GapWarning;
 use crate::gap::model_error::baseline_assumptions::{Declaration, Lacking, Since};
 use crate::gap::model_error::errors_of_change::{elsewhere, errors_of_change};
+use crate::gap::model_error::fitted_tolerances::fitted_tolerances;
 use crate::gap::model_error::measured_structure::measured_structure;
 use crate::gap::model_error::same_steps::same_steps;
 use crate::gap::model_error::structure::covariance_of_errors;
 use crate::gap::preconditions::machine_mismatch::another_machine;
 use crate::gap::preconditions::problem::GapError;
 use crate::gap::preconditions::usable::checked_study;
-use crate::gap::residuals::hypothesis::Hypothesis;
 use crate::gap::residuals::nuisance::OUTPUTS;
-use crate::gap::residuals::study::{Group, PredictError, Study};
-use crate::gap::residuals::whiten::{Linearised, dot};
+use crate::gap::residuals::study::{Group, Study};
+use crate::gap::residuals::whiten::Linearised;
 use mapper_core::{Channel, Recording};
-use mapper_inference::descent::ROUNDS;
 use mapper_observe::declared::Declared;
 use mapper_observe::model_inputs::step_timing::with_command_times;
 use mapper_physics::simulation::model::Model;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 
 /// A reference recording: the same rig and steps, fault-free.
@@ -62,7 +58,7 @@ impl Study {
         same_steps(&before, &self)?;
         let linearised = Linearised::new(&before)?;
         another_machine(&before, &linearised.base.values)?;
-        let tolerances = tolerances(&before, &linearised)?;
+        let tolerances = fitted_tolerances(&before, &linearised)?;
         let predicted = before.predict(&tolerances)?;
         let model_error: Vec<f64> =
             before.measured.iter().zip(&predicted.values).map(|(seen, predicted)| seen - predicted).collect();
@@ -111,37 +107,6 @@ impl Study {
             Since { recording: name, lacking: by_channel(&before, &model_error, &shares, &declarations) };
         Ok(Changed { study, since, warnings })
     }
-}
-
-/// Fits the tolerances of a fault-free rig. The misfit sets the noise level, so that model error does not push tolerances outside their
-/// priors.
-pub(super) fn tolerances(study: &Study, linearised: &Linearised) -> Result<Hypothesis, PredictError> {
-    let everywhere = Selection::all(study);
-    let products = nuisance_products(study, linearised, &everywhere);
-    let rows = everywhere.rows(study);
-    let (mut best, mut residual) = (study.nothing(), linearised.residual(study, &linearised.base));
-    let n = best.nuisances.len();
-    for _ in 0..ROUNDS {
-        let excess = (dot(&residual, &residual) / residual.len().max(1) as f64).max(1.0);
-        let matrix = &products + DMatrix::identity(n, n) * excess;
-        let right = DVector::from_fn(n, |i, _| {
-            dot_over(&rows, &linearised.columns[i], &residual) - excess * best.nuisances[i]
-        });
-        let Some(step) = matrix.cholesky().map(|cholesky| cholesky.solve(&right)) else { break };
-        let mut moved = best.clone();
-        for (sigmas, by) in moved.nuisances.iter_mut().zip(step.iter()) {
-            *sigmas = (*sigmas + by).clamp(-MAX_SIGMAS, MAX_SIGMAS);
-        }
-        let there = linearised.residual_of(study, &moved)?;
-        let cost = |residual: &[f64], at: &Hypothesis| {
-            dot(residual, residual) / excess + dot(&at.nuisances, &at.nuisances)
-        };
-        if cost(&there, &moved) >= cost(&residual, &best) {
-            break;
-        }
-        (best, residual) = (moved, there);
-    }
-    Ok(best)
 }
 
 /// Model error of each channel.

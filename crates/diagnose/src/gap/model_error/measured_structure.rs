@@ -1,7 +1,7 @@
 //! Errors of the model's equations, measured by a fault-free recording, as a campaign declares them.
 
 use crate::gap::model_error::baseline_assumptions::Declaration;
-use crate::gap::model_error::healthy::tolerances;
+use crate::gap::model_error::fitted_tolerances::fitted_tolerances;
 use crate::gap::model_error::structure::variation;
 use crate::gap::residuals::nuisance::{JUMP_S, NuisanceKind, OUTPUTS, nuisances};
 use crate::gap::residuals::study::{PredictError, Study};
@@ -22,7 +22,7 @@ pub(crate) fn measured_structure(study: &Study) -> Result<[Declaration; OUTPUTS.
         }
     }
     declared.nuisances = nuisances(&declared.declared);
-    let mut fitted = tolerances(&declared, &Linearised::new(&declared)?)?;
+    let mut fitted = fitted_tolerances(&declared, &Linearised::new(&declared)?)?;
     let mut delay_s = [0.0; OUTPUTS.len()];
     for (nuisance, sigmas) in declared.nuisances.iter().zip(&mut fitted.nuisances) {
         match nuisance.kind {

@@ -2,6 +2,7 @@
 
 pub mod baseline_assumptions;
 pub(crate) mod errors_of_change;
+pub(crate) mod fitted_tolerances;
 pub mod healthy;
 pub(crate) mod measured_structure;
 pub(crate) mod same_steps;

@@ -30,6 +30,6 @@ pub struct Lacking {
     pub unit: String,
     /// Relative model error of the channel's changes over the recording, 0..1; changes since then may be predicted equally badly.
     pub share: f64,
-    /// What a diagnosis of this rig without a reference needs to be told.
+    /// What the campaign declares for a diagnosis of this rig without a reference.
     pub declare: Declaration,
 }

@@ -120,19 +120,11 @@ const HOLD_S: f64 = 100.0;
 /// Blocks of phases in which only the metal temperature changes.
 const SLOW: Schedule =
     Schedule { first_s: 0.0, lengths_s: &[(f64::INFINITY, 10.0)], shortest_s: 0.0, shortest_ratio: 0.5 };
-/// Blocks after a jump.
+/// Blocks after a jump: short while speed and probe settle.
 const AFTER_JUMP: Schedule = Schedule {
-    lengths_s: &[(1.0, 0.1), (3.0, 0.2), (6.0, 1.0), (14.0, 2.0), (30.0, 4.0), (f64::INFINITY, 10.0)],
-    ..SLOW
-};
-
-/// Blocks after a jump in a recording with more steps than [`MANY_STEPS`]: half as many, over half the time.
-const AFTER_ONE_OF_MANY: Schedule = Schedule {
     lengths_s: &[(1.0, 0.2), (3.0, 0.5), (7.0, 2.0), (15.0, 4.0), (31.0, 8.0), (f64::INFINITY, 16.0)],
     ..SLOW
 };
-/// Number of steps above which each has fewer blocks.
-const MANY_STEPS: usize = 30;
 
 impl Study {
     /// Prepares a recording whose campaign declares the actuator response.
@@ -161,8 +153,6 @@ impl Study {
         let timed = times.timed(recording);
         let mut nominal = Rig::new(model);
         nominal.instruments.p3_lag_s = declared.tolerances.actuator_lag_s;
-        let many = recording.steps.len() > MANY_STEPS;
-        let after_jump = if many { AFTER_ONE_OF_MANY } else { AFTER_JUMP };
         let first_s = table.t_s.first().copied().unwrap_or(0.0);
         let steps: Vec<StudyStep> = recording
             .steps
@@ -174,7 +164,7 @@ impl Study {
                 let end_s = recording.steps.get(index + 1).map_or(marker.end_s, |next| next.start_s);
                 let start_s =
                     if jumped { marker.start_s } else { marker.start_s.max(end_s - HOLD_S).max(first_s) };
-                let schedule = if jumped { after_jump } else { SLOW };
+                let schedule = if jumped { AFTER_JUMP } else { SLOW };
                 StudyStep { marker: *marker, jumped, blocks: blocks(&table, start_s, end_s, &schedule) }
             })
             .collect();

@@ -60,7 +60,7 @@ pub use maps::turbine_map::{
 pub use measurement::channel::{
     CHANNELS, Channel, ChannelInfo, Dimension, Group, MODELLED_CHANNELS, UnknownChannel,
 };
-pub use measurement::declared_uncertainty::{DeclaredUncertainty, NoiseColour};
+pub use measurement::declared_uncertainty::{DeclaredUncertainty, NoiseColour, SAMPLE_INTERVAL_S};
 pub use measurement::event::{Event, EventKind};
 pub use measurement::held_point::{JUMPS, SAME_COMMAND_RATIO, StepPoint, VALVE_JUMP_RATIO, jump_ratio};
 pub use measurement::joined_recordings::{StepOrigin, join_recordings};

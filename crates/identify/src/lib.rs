@@ -20,6 +20,7 @@ mod step_outcome;
 
 pub use config::{DeclaredUncertainty, IdentifyConfig, NoiseColour, PressureTap, Thresholds};
 pub use faults::balance_rows::Machine;
+pub use faults::end_readings::MAX_CORRELATED_ROWS;
 pub use faults::found_fault::{FoundFault, Suspect};
 pub use faults::nominal_rig::NominalRig;
 pub use identify::{Identified, identify, identify_each, identify_recording};
@@ -28,12 +29,13 @@ pub use isothermal_zero::zero::{
 };
 pub use isothermal_zero::zero_outcome::ZeroOutcome;
 pub use joint::expected::expected_together;
+pub use joint::step_model::rows::BLOCK_S;
 pub use joint::{MAX_RESTING_ETA, TwoParameter};
 pub use mapper_core::{Choice, JointSettings, SettleBands, WindowRule};
 pub use needs::{method_for, needs};
 pub use reading_checks::bounds::EFFICIENCY;
 pub use reduce::{KnownHeat, method_of_table, reduce};
-pub use single_step::expected::{DECLARED_INTERVAL_S, expected, expected_steady};
+pub use single_step::expected::{expected, expected_steady};
 pub use single_step::t2_history::{T2History, t2_history};
 pub use step_data::humidity::with_measured_humidity;
 pub use step_data::samples::LONGEST_BRIDGE_S;

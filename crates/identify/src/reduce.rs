@@ -5,14 +5,13 @@
 
 use crate::identify::point;
 use crate::single_step::dynamic::{Estimate, judge_assumption};
-use crate::single_step::expected::DECLARED_INTERVAL_S;
 use crate::single_step::fit::ETA_BOUNDS;
 use crate::step_data::end_state::EndState;
 use crate::step_outcome::findings::Findings;
 use crate::{IdentifyConfig, IdentifyError, single_step::budgets, step_outcome::interval_width};
 use mapper_core::{
     Channel, EstimateUncertainty, EtaSignal, IdentifiedPoint, MeasuredPoint, Method, ModelTolerances,
-    NoCompression, PointBudgets, ReferenceState, StepKind, StepMarker, Warning,
+    NoCompression, PointBudgets, ReferenceState, SAMPLE_INTERVAL_S, StepKind, StepMarker, Warning,
 };
 use mapper_numerics::root::root_between;
 use mapper_physics::compressor_map::one_point_map::OnePointMap;
@@ -94,7 +93,7 @@ fn of_point(
 
 /// Samples of a mean over the end of a point.
 fn samples(config: &IdentifyConfig) -> usize {
-    (config.thresholds.steady_mean_s / DECLARED_INTERVAL_S).round() as usize
+    (config.thresholds.steady_mean_s / SAMPLE_INTERVAL_S).round() as usize
 }
 
 fn estimate(

@@ -37,7 +37,7 @@ pub enum Reach {
 /// Fine distance of finite differences, in the unknowns' units: both rounding and curvature errors are small.
 pub const FINE: f64 = 0.02;
 /// Largest change of an unknown in one iteration, in its unit: models are nonlinear.
-const MAX_MOVE: f64 = 2.0;
+pub const MAX_MOVE: f64 = 2.0;
 
 impl Reach {
     /// The distance, in the unknowns' units.

@@ -14,8 +14,6 @@ use nalgebra::{DMatrix, DVector};
 pub const DRAWS: usize = 128;
 /// Minimum probability of a set that gets draws: a fiftieth of the probability outside a 95 % interval.
 pub const MIN_WEIGHT: f64 = 1e-3;
-/// Bases of the Halton sequence, one for each parameter.
-const BASES: [usize; 8] = [2, 3, 5, 7, 11, 13, 17, 19];
 
 /// A parameter that may be neutral. All values are distances from neutral.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,10 +52,10 @@ pub struct Mixture {
 
 impl Mixture {
     /// Evaluates all sets. `mean` and `covariance` are those of the parameters' distances from neutral, from a fit with all of them free.
-    /// `None` if the covariance is not positive definite or there are more than 8 parameters.
+    /// `None` if the covariance is not positive definite or its size is another.
     pub fn of(mean: &DVector<f64>, covariance: &DMatrix<f64>, parameters: &[Parameter]) -> Option<Self> {
         let count = parameters.len();
-        if count > BASES.len() || mean.len() != count || covariance.shape() != (count, count) {
+        if mean.len() != count || covariance.shape() != (count, count) {
             return None;
         }
         let exact = Likelihood::of(mean, covariance, parameters)?;
@@ -219,6 +217,7 @@ fn draw_within_ranges(
     parameters: &[Parameter],
 ) -> Option<Vec<(f64, DVector<f64>)>> {
     let lower = covariance.clone().cholesky()?.l();
+    let bases: Vec<usize> = primes().take(free.len()).collect();
     let point = |index: usize| {
         let (mut normal, mut mass) = (DVector::zeros(free.len()), 1.0);
         let mut values = DVector::zeros(free.len());
@@ -226,7 +225,7 @@ fn draw_within_ranges(
             let conditional_mean = mean[a] + (0..a).map(|b| lower[(a, b)] * normal[b]).sum::<f64>();
             let distribution = bounded(conditional_mean, lower[(a, a)], &parameters[free[a]]);
             mass *= distribution.mass();
-            values[a] = distribution.quantile(halton_point(index, BASES[a]));
+            values[a] = distribution.quantile(halton_point(index, bases[a]));
             normal[a] = (values[a] - conditional_mean) / lower[(a, a)];
         }
         (mass, values)
@@ -234,12 +233,17 @@ fn draw_within_ranges(
     Some((0..DRAWS).map(point).collect())
 }
 
-/// Points of a standard normal distribution in at most 8 dimensions, evenly spread (a Halton sequence): a mean over them replaces one over many
-/// random draws.
+/// Points of a standard normal distribution, evenly spread (a Halton sequence): a mean over them replaces one over many random draws.
 pub fn normal_points(dimensions: usize) -> Vec<Vec<f64>> {
+    let bases: Vec<usize> = primes().take(dimensions).collect();
     let coordinate = |index: usize, base: &usize| normal_quantile(halton_point(index, *base)).unwrap_or(0.0);
-    let point = |index: usize| BASES.iter().take(dimensions).map(|base| coordinate(index, base)).collect();
+    let point = |index: usize| bases.iter().map(|base| coordinate(index, base)).collect();
     (0..DRAWS).map(point).collect()
+}
+
+/// Bases of the Halton sequence, one for each parameter.
+fn primes() -> impl Iterator<Item = usize> {
+    (2..).filter(|n| (2..*n).all(|divisor| n % divisor != 0))
 }
 
 /// The radical inverse of `index` + 1, between 0 and 1 (Halton, Numer. Math. 2:84, 1960).

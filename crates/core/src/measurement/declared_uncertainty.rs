@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+/// Sample interval of the program's own recordings, to which declared noise refers, s.
+pub const SAMPLE_INTERVAL_S: f64 = 0.1;
+
 /// One-sigma uncertainty of a channel, in its SI unit.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]

@@ -1,8 +1,7 @@
 //! Complete rows of a log: driving and judged channels of one side of the machine.
 
 use crate::driven::DrivenError;
-use mapper_core::{Channel, Recording};
-use mapper_identify::DECLARED_INTERVAL_S;
+use mapper_core::{Channel, Recording, SAMPLE_INTERVAL_S};
 use mapper_observe::plausible::is_reading;
 
 /// Maximum number of rows, evenly spread over a longer log: five minutes at 10 Hz.
@@ -20,8 +19,6 @@ pub(crate) struct SideChannels<'a> {
 
 /// Minimum pressure ratio of compressor or turbine: below it the work is so small that temperatures do not show the efficiency.
 pub(crate) const MIN_PRESSURE_RATIO: f64 = 1.02;
-/// Minimum flow, kg/s: the equations of the gas path divide by it.
-pub(crate) const MIN_FLOW_KG_S: f64 = 1e-3;
 
 /// Complete rows, as columns of equal length. SI units.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -51,7 +48,7 @@ impl Rows {
         }
         let span_s =
             judged.t_s.last().zip(judged.t_s.first()).map_or(0.0, |(last_s, first_s)| last_s - first_s);
-        let spacing_s = DECLARED_INTERVAL_S.max(span_s / MAX_ROWS as f64);
+        let spacing_s = SAMPLE_INTERVAL_S.max(span_s / MAX_ROWS as f64);
         let empty = |channels: &[Channel]| channels.iter().map(|channel| (*channel, Vec::new())).collect();
         let mut rows =
             Rows { drives: empty(channels.drives), judged: empty(channels.judged), ..Rows::default() };

@@ -4,11 +4,12 @@ use crate::gap::best_fit::coordinate::{coordinates, infos};
 use crate::gap::best_fit::fit::{changes_near, effect_changes};
 use crate::gap::diagnose::Diagnosed;
 use crate::gap::findings::report::Verdict;
-use crate::gap::next_experiment::outlook::{COARSE_S, SimulatedRig, simulated_steps};
+use crate::gap::next_experiment::outlook::{SimulatedRig, simulated_steps};
 use crate::gap::residuals::nuisance::{Nuisance, OFFSET_PREFIX, OUTPUTS};
 use crate::gap::residuals::study::{Hypothesis, PredictError, Study};
 use crate::gap::residuals::whiten::{Linearised, dot, nuisance_changes};
 use mapper_core::{Channel, StepMarker, half_width_95};
+use mapper_identify::BLOCK_S;
 use mapper_inference::descent::FINE;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -240,7 +241,7 @@ pub fn forecast_steps(
     found: &Found,
 ) -> Result<Vec<Expected>, CalibratedModelError> {
     let rest = steps.first().and_then(|step| step.to);
-    let study = rest.and_then(|rest| simulated_steps(rig, steps, &rest, COARSE_S, |_| None));
+    let study = rest.and_then(|rest| simulated_steps(rig, steps, &rest, BLOCK_S, |_| None));
     study.map_or_else(|| Ok(Vec::new()), |study| forecast(&study, found))
 }
 

@@ -22,6 +22,7 @@ use crate::missing_terms::search::residual_source::{ResidualSource, residual_sou
 use crate::missing_terms::search::select::{Choice, choices};
 use crate::missing_terms::terms::balance::{Balance, Properties};
 use crate::missing_terms::terms::library::library;
+use mapper_core::half_width_95;
 
 /// Results outside the effect library.
 #[derive(Debug, Default)]
@@ -352,7 +353,7 @@ fn reported_source(force: ResidualSource) -> MissingSource {
         steps: force
             .levels
             .iter()
-            .map(|(level, sigma)| [*level, level - 1.96 * sigma, level + 1.96 * sigma])
+            .map(|(level, sigma)| [*level, level - half_width_95(*sigma), level + half_width_95(*sigma)])
             .collect(),
     }
 }

@@ -5,8 +5,8 @@ use crate::reading_checks::ends::Ends;
 use mapper_core::{Channel, Recording};
 use mapper_physics::gas::air::Air;
 
-/// Maximum number of rows of a balance, evenly spread: the cost grows with the cube, and these take a second.
-pub(crate) const MAX_STEPS: usize = 500;
+/// Maximum number of correlated rows, evenly spread: the cost grows with the cube, and these take a second.
+pub const MAX_CORRELATED_ROWS: usize = 500;
 
 /// The channels of the compressor, in the order of all arrays here.
 pub(crate) const CHANNELS: [Channel; 7] = [

@@ -17,7 +17,7 @@ use crate::IdentifyConfig;
 use crate::faults::balance_rows::{MACHINE, Machine, Rows};
 use crate::faults::balances::conditions;
 use crate::faults::balances::efficiency::FittedEfficiencies;
-use crate::faults::end_readings::{CHANNELS, MAX_STEPS, Readings, span_s};
+use crate::faults::end_readings::{CHANNELS, MAX_CORRELATED_ROWS, Readings, span_s};
 use crate::faults::found_fault::{FoundFault, Suspect};
 use crate::faults::nominal_rig::NominalRig;
 use crate::reading_checks::ends::Ends;
@@ -131,14 +131,14 @@ pub(crate) fn suspect(index: usize) -> Suspect {
     }
 }
 
-/// The readings of all steps, by position; at most [`MAX_STEPS`] of them.
+/// The readings of all steps, by position; at most [`MAX_CORRELATED_ROWS`] of them.
 pub(crate) fn all_readings(
     recording: &Recording,
     ends: &[Option<Ends>],
     rest_pressure_pa: f64,
 ) -> Option<Vec<Option<Readings>>> {
     let (first_s, last_s) = span_s(recording)?;
-    let every = ends.len().div_ceil(MAX_STEPS).max(1);
+    let every = ends.len().div_ceil(MAX_CORRELATED_ROWS).max(1);
     let of = |(position, end): (usize, &Option<Ends>)| {
         let used = end.as_ref().filter(|_| position.is_multiple_of(every))?;
         Some(Readings::of(used, first_s, last_s, rest_pressure_pa))

@@ -7,9 +7,10 @@
 
 use crate::IdentifyConfig;
 use crate::isothermal_zero::relaxation;
-use crate::single_step::expected::DECLARED_INTERVAL_S;
 use crate::step_data::samples::TREND_BLOCK_S;
-use mapper_core::{Channel, DeclaredUncertainty, Recording, Series, Soak, StepMarker, plausible};
+use mapper_core::{
+    Channel, DeclaredUncertainty, Recording, SAMPLE_INTERVAL_S, Series, Soak, StepMarker, plausible,
+};
 use mapper_numerics::coloured_noise::variance_of_mean;
 use mapper_numerics::statistics::{EXCLUDE_SIGMAS, mean};
 use mapper_observe::declared::{CommonOffset, rest_pressure_pa};
@@ -335,7 +336,7 @@ fn expected_limit_error(
     let t_s: Vec<f64> = (0..(used_s / TREND_BLOCK_S) as usize)
         .map(|block| soak_s - used_s + (block as f64 + 0.5) * TREND_BLOCK_S)
         .collect();
-    let samples = (TREND_BLOCK_S / DECLARED_INTERVAL_S) as usize;
+    let samples = (TREND_BLOCK_S / SAMPLE_INTERVAL_S) as usize;
     let variance = config.noise().variance_of_mean(samples, TREND_BLOCK_S);
     let relaxing: Vec<f64> = t_s.iter().map(|t_s| relaxation::usual_k(*t_s)).collect();
     relaxation::limit(&t_s, &relaxing, noise_sigma * variance.sqrt()).map(|(_, error)| error)

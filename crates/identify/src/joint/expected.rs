@@ -10,8 +10,7 @@ use crate::joint::fit::start::{self, START_S};
 use crate::joint::step_model::rows::{COARSER, Row, StepRows, block_s_after, place};
 use crate::joint::{MAX_RESTING_ETA, fit::refinements, uncertainty::smoothness};
 use crate::single_step::dynamic::Estimate;
-use crate::single_step::expected::DECLARED_INTERVAL_S;
-use mapper_core::{MethodResult, MethodResults};
+use mapper_core::{MethodResult, MethodResults, SAMPLE_INTERVAL_S};
 use mapper_numerics::coloured_noise::BlockNoise;
 use mapper_numerics::statistics::MIN_VALUES;
 use mapper_physics::operating_point::forecast::ForecastRow;
@@ -117,5 +116,5 @@ fn row(expected: &ForecastRow, noise: BlockNoise, config: &IdentifyConfig) -> Ro
 }
 
 fn noise(block_s: f64, config: &IdentifyConfig) -> BlockNoise {
-    BlockNoise::of_mean(config.noise(), block_s / DECLARED_INTERVAL_S, block_s)
+    BlockNoise::of_mean(config.noise(), block_s / SAMPLE_INTERVAL_S, block_s)
 }

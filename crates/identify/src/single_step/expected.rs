@@ -6,11 +6,8 @@ use crate::single_step::covariance::{Correlation, NoiseVariances};
 use crate::single_step::fit::{Geometry, fit};
 use crate::single_step::steady::{apparent_eta, uncertainty};
 use crate::step_data::samples::{Samples, forecast_row};
-use mapper_core::MethodResult;
+use mapper_core::{MethodResult, SAMPLE_INTERVAL_S};
 use mapper_physics::operating_point::forecast::ForecastRow;
-
-/// Sample interval to which the declared noise of a campaign refers, s.
-pub const DECLARED_INTERVAL_S: f64 = 0.1;
 
 /// Fits noise-free rows like a recording, and propagates the declared uncertainties.
 ///
@@ -23,7 +20,7 @@ pub fn expected(rows: &[ForecastRow], interval_s: f64, config: &IdentifyConfig) 
     let fit = fit(&samples, geometry)?;
     let declared = declared_effect(&fit, &samples, geometry, config);
     let mut noise = NoiseVariances::split(declared.noise_k2, config.noise());
-    noise.white_k2 *= (DECLARED_INTERVAL_S / interval_s).min(1.0);
+    noise.white_k2 *= (SAMPLE_INTERVAL_S / interval_s).min(1.0);
     let [eta, h] = Correlation::of(&fit, &samples.times_s(), config.noise_colour).standard_errors_for(noise);
     let [offset_eta, offset_h] = declared.bias_standard_errors;
     let sigma_eta = eta.hypot(offset_eta);

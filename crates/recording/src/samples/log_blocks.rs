@@ -1,10 +1,8 @@
-//! Averages a fast log to the rate of the identification.
+//! Averages a fast log to the rate of the program's own recordings: identification evaluates transients of seconds.
 
 use crate::samples::log_clock::TakeRow;
+use mapper_core::SAMPLE_INTERVAL_S;
 use mapper_numerics::statistics::nearest_rank;
-
-/// Rate of the means, Hz: that of this program's own recordings. Identification evaluates transients of seconds.
-const RATE_HZ: f64 = 10.0;
 
 /// Maximum rate of a group that is not averaged, Hz: blocks would have one sample, or alternately one and two.
 const MAX_UNAVERAGED_HZ: f64 = 15.0;
@@ -111,7 +109,7 @@ impl BlockAverager {
 impl Block {
     fn push(&mut self, t_s: f64, values: &[f64], take: &mut TakeRow<'_>) {
         // A sample on a border belongs to the later block, whatever the last digit of its time.
-        let number = (t_s * RATE_HZ + 1e-6).floor() as i64;
+        let number = (t_s / SAMPLE_INTERVAL_S + 1e-6).floor() as i64;
         if number != self.number {
             self.flush(take);
             self.number = number;

@@ -5,12 +5,10 @@
 //! it is insensitive to level and slope, and a jump of the operating point affects only a few of these differences.
 
 use crate::guards::guard::{CommandedState, Guard, Trip};
-use mapper_core::{Channel, GuardName, SampleBatch, SurgeVariation};
+use mapper_core::{Channel, GuardName, SAMPLE_INTERVAL_S, SampleBatch, SurgeVariation};
 use mapper_numerics::statistics::median;
 use std::collections::VecDeque;
 
-/// Sampling interval of the guard, s.
-const SAMPLE_INTERVAL_S: f64 = 0.1;
 /// Number of samples that are evaluated: two seconds.
 const SAMPLES: usize = 20;
 /// Ratio of the median absolute second difference to the standard deviation of independent normal noise: 0.6745 sqrt(6).

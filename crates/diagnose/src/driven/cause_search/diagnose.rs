@@ -18,6 +18,7 @@ use crate::gap::causes::probabilities::{estimates, name_of};
 use crate::gap::findings::report::EXCLUDED;
 use crate::gap::findings::report::MAX_EQUIVALENT;
 use mapper_core::{Channel, Recording};
+use mapper_identify::MAX_CORRELATED_ROWS;
 use mapper_inference::interval::is_identified;
 use mapper_numerics::statistics::{NORMAL_975, rms};
 use mapper_observe::Declared;
@@ -27,9 +28,6 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 use std::sync::Arc;
-
-/// Maximum number of rows. More add no information, because the model error is correlated over seconds.
-const MAX_ROWS: usize = 800;
 
 /// Inputs of a diagnosis.
 pub struct SideRequest<'a> {
@@ -67,7 +65,7 @@ pub fn diagnose(request: &SideRequest<'_>, side: Side) -> Result<Diagnosis, Driv
 fn diagnose_side<S: SideModel>(request: &SideRequest<'_>) -> Result<Diagnosis, DrivenError> {
     let all = Rows::read(request.recording, S::channels())?;
     let (calibration, lost_rows) = (request.calibration, all.lost);
-    let rows = denoised(&all, request.declared).thinned(MAX_ROWS);
+    let rows = denoised(&all, request.declared).thinned(MAX_CORRELATED_ROWS);
     let fitted = rows.t_s.partition_point(|t_s| *t_s < request.fit_until_s);
     // Twice the unknowns.
     let needed = 2 * S::unknowns().len();
@@ -158,7 +156,7 @@ fn white_k<S: SideModel>(
             *value += sigma * z;
         }
     }
-    let noisy = denoised(&noisy, declared).thinned(MAX_ROWS);
+    let noisy = denoised(&noisy, declared).thinned(MAX_CORRELATED_ROWS);
     let with_noise = SideProblem { side: &S::of(noisy), white_k: Vec::new(), ..*problem };
     let (quiet, noisy) = (problem.predict(&problem.nothing())?, with_noise.predict(&problem.nothing())?);
     let sigma_k = |(index, (channel, _)): (usize, &(Channel, Vec<f64>))| {

@@ -6,6 +6,7 @@ use crate::gap::best_fit::projector::{Projector, Share};
 use crate::gap::best_fit::selection::Selection;
 use crate::gap::residuals::study::{Prediction, Study, members};
 use crate::gap::residuals::whiten::{Linearised, rows_of_step};
+use mapper_inference::descent::MAX_MOVE;
 use mapper_numerics::parallel;
 use mapper_physics::rig::effect::EffectParameter;
 use nalgebra::DVector;
@@ -23,8 +24,6 @@ pub struct Addition {
     pub start: Start,
 }
 
-/// Maximum trusted linear step, as a multiple of the step taken; effects are nonlinear.
-const MAX_REACH: f64 = 3.0;
 /// Minimum start offset from neutral, as a share of a step: some effects have zero slope at neutral.
 const OFF_NEUTRAL: f64 = 0.1;
 
@@ -179,7 +178,7 @@ impl FitNeighbourhood<'_> {
         (own, seen): (f64, f64),
     ) -> Addition {
         let at = |share: f64| (parameter.neutral + share * step).clamp(parameter.low, parameter.high);
-        let wanted = if own > 1e-9 { (seen / own).clamp(-MAX_REACH, MAX_REACH) } else { 0.0 };
+        let wanted = if own > 1e-9 { (seen / own).clamp(-MAX_MOVE, MAX_MOVE) } else { 0.0 };
         let share = (at(wanted) - parameter.neutral) / step;
         let gain = 2.0 * share * seen - share * share * own;
         let off = if wanted < 0.0 { wanted.min(-OFF_NEUTRAL) } else { wanted.max(OFF_NEUTRAL) };

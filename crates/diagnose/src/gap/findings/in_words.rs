@@ -2,12 +2,7 @@
 
 use mapper_core::with_unit;
 use mapper_physics::laws::bearing_friction::at_150_krpm;
-use mapper_physics::laws::housing::STEFAN_BOLTZMANN_W_M2K4;
 use mapper_physics::rig::effect::EffectParameter;
-
-/// Housing temperatures between which radiation is stated, K.
-const HOT_K: f64 = 700.0;
-const COLD_K: f64 = 350.0;
 
 /// A parameter value as text: "+5 %" for a factor of 1.05, "370 W at 150 krpm" for friction.
 pub fn size(parameter: &EffectParameter, value: f64) -> String {
@@ -18,10 +13,7 @@ pub fn size(parameter: &EffectParameter, value: f64) -> String {
         "1" => format!("{} %", figures(100.0 * value)),
         "m" => format!("{} mm", figures(1e3 * value)),
         "kg/kg" => format!("{} g/kg", figures(1e3 * value)),
-        "m2" => {
-            let power_w = value * STEFAN_BOLTZMANN_W_M2K4 * (HOT_K.powi(4) - COLD_K.powi(4));
-            format!("{} W between {HOT_K:.0} and {COLD_K:.0} K", figures(power_w))
-        }
+        "m2" => format!("{} cm2 of black surface", figures(1e4 * value)),
         "W s2/rad2" => at_150_krpm(value),
         unit => with_unit(figures(value), unit),
     }
@@ -45,7 +37,6 @@ fn figures(value: f64) -> String {
 mod tests {
     use super::*;
 
-    /// Hand calculation: 5.67e-8 (700^4 - 350^4) = 12 763 W/m2, times 4e-3 m2 is 51 W.
     #[test]
     fn sizes_by_hand() {
         let parameter = |unit: &'static str, neutral: f64| EffectParameter {
@@ -62,7 +53,7 @@ mod tests {
             ("1", 0.0, 0.12, "12 %"),
             ("m", 0.0, 1.5e-3, "1.5 mm"),
             ("W s2/rad2", 0.0, 1.49e-6, "370 W at 150 krpm"),
-            ("m2", 0.0, 4e-3, "51.1 W between 700 and 350 K"),
+            ("m2", 0.0, 4e-3, "40 cm2 of black surface"),
             ("kg/kg", 0.0, 0.012, "12 g/kg"),
             ("Pa", 0.0, -310.0, "-310 Pa"),
         ] {

@@ -156,8 +156,6 @@ pub fn channels_on(
     by_channel(study, [&nominal, &Predicted::of(before), &Predicted::of(after)], steps)
 }
 
-/// Number of blocks at the end of a step whose mean residual counts for its point: half a minute.
-const END_BLOCKS: usize = 3;
 /// A channel is worse if its residual grows by this ratio, and by more than chance.
 const WORSE_RATIO: f64 = 1.1;
 
@@ -199,15 +197,12 @@ fn by_channel(
     (channels, worse)
 }
 
-/// Residual of T2 over the last blocks of a step as a share of the temperature rise: at equal pressures, that of the efficiency.
+/// Residual of T2 in the last block of a step as a share of the temperature rise: at equal pressures, that of the efficiency.
 fn rise_residual_ratio(study: &Study, step: usize, predicted: &[f64]) -> Option<f64> {
     let group = study.groups.iter().find(|g| g.step == step && OUTPUTS[g.output] == Channel::T2)?;
-    let rows = group.rows.end.saturating_sub(END_BLOCKS).max(group.rows.start)..group.rows.end;
-    let mean = |of: &dyn Fn(usize) -> f64| rows.clone().map(of).sum::<f64>() / rows.len() as f64;
-    let rise_k =
-        mean(&|row| study.measured[row]) - study.inputs.at(study.steps[step].blocks.last()?.mean_s).t1_k;
-    let residual_k = mean(&|row| study.measured[row] - predicted[row]);
-    (rise_k > 1.0).then(|| (residual_k / rise_k).abs())
+    let row = group.rows.clone().last()?;
+    let rise_k = study.measured[row] - study.inputs.at(study.steps[step].blocks.last()?.mean_s).t1_k;
+    (rise_k > 1.0).then(|| ((study.measured[row] - predicted[row]) / rise_k).abs())
 }
 
 /// Efficiency and heat transfer at the end of each step: with the cause and its tolerances, with these tolerances alone, and for the

@@ -2,9 +2,11 @@
 
 use crate::gap::best_fit::fit::Fit;
 use crate::gap::findings::experiment::{AllowedJump, AlsoChanged, Experiment};
-use crate::gap::findings::report::{JumpPoint, Kind, MAX_EQUIVALENT, Next, Place, Suggestion};
+use crate::gap::findings::report::{CLOSE_LOOKS, JumpPoint, Kind, MAX_EQUIVALENT, Next, Place, Suggestion};
 use crate::gap::next_experiment::odds::{Odds, entropy_bit, odds};
-use crate::gap::next_experiment::outlook::{apart, apart_at_first_sight, recorded_jumps, recorded_points};
+use crate::gap::next_experiment::outlook::{
+    HOUSINGS_SETTLE_S, apart, apart_at_first_sight, recorded_jumps, recorded_points,
+};
 use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::study::Study;
 use mapper_core::{Channel, OperatingPoint};
@@ -14,10 +16,6 @@ use mapper_physics::rig::effect::Submodel;
 
 /// Share of the open probability above which the first cause is settled.
 pub const SETTLED: f64 = COVERAGE;
-/// Number of jumps that are evaluated with refits, and of experiments shown.
-const CLOSE_LOOKS: usize = 6;
-/// Time at the start of a step in a script, s: housings settle within minutes.
-const START_S: u32 = 300;
 
 /// Open candidates, best first, with their probabilities.
 pub struct Rivals<'a> {
@@ -151,7 +149,7 @@ fn script(experiment: &Experiment) -> Vec<String> {
         AlsoChanged::Oil { to_k, .. } => Some(format!("oil(\"{} degC\");", celsius(to_k))),
     };
     let go = [format!("jump({}, \"{} s\");", place(to), round(dwell_s))];
-    let start = [format!("jump({}, \"{START_S} s\");", place(from))];
+    let start = [format!("jump({}, \"{HOUSINGS_SETTLE_S} s\");", place(from))];
     start.into_iter().chain(change).chain(go).collect()
 }
 

@@ -10,8 +10,8 @@ use crate::gap::residuals::initial_state::SETTLING_S;
 use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::study::{Hypothesis, Study};
 use crate::gap::residuals::whiten::Linearised;
-use mapper_core::{Channel, OperatingPoint, Recording, Series, StepKind, StepMarker};
-use mapper_identify::DECLARED_INTERVAL_S;
+use mapper_core::{Channel, OperatingPoint, Recording, SAMPLE_INTERVAL_S, Series, StepKind, StepMarker};
+use mapper_identify::BLOCK_S;
 use mapper_inference::descent::FINE;
 use mapper_observe::averages::time_table::Table;
 use mapper_observe::declared::Declared;
@@ -22,10 +22,8 @@ use mapper_physics::simulation::steady::hold_speed;
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// Sample interval of the first pass, s.
-pub(crate) const COARSE_S: f64 = 0.5;
-/// Maximum time at the target that is simulated, s; longer dwells are cut.
-const MAX_S: f64 = 600.0;
+/// Time in which the housings settle, s: that at the start of a step in a script, and the maximum time at its target that is simulated.
+pub(crate) const HOUSINGS_SETTLE_S: f64 = 300.0;
 
 /// The rig of a recording, for steps that are only simulated.
 #[derive(Debug, Clone)]
@@ -82,7 +80,7 @@ pub(crate) fn simulated_steps(
 /// A study of a simulated experiment: the settled start, then the step. Effects that began in the recording act.
 fn simulated_experiment(recorded: &Study, experiment: &Experiment, interval_s: f64) -> Option<Study> {
     let jump = &experiment.jump;
-    let dwell_s = jump.dwell_s.clamp(10.0, MAX_S);
+    let dwell_s = jump.dwell_s.clamp(10.0, HOUSINGS_SETTLE_S);
     let marker = |index: usize, from: f64, to: f64, p3_pa: f64, point: OperatingPoint| StepMarker {
         index,
         kind: StepKind::Repeat,
@@ -132,7 +130,7 @@ pub fn apart_at_first_sight(
     if let AlsoChanged::Soak(soak) = experiment.also {
         return apart_at_rest(recorded, &soak, fits);
     }
-    let study = simulated_experiment(recorded, experiment, COARSE_S)?;
+    let study = simulated_experiment(recorded, experiment, BLOCK_S)?;
     let linearised = Linearised::of_noise_alone(&study).ok()?;
     let predictions = fits
         .iter()
@@ -154,7 +152,7 @@ pub fn apart(recorded: &Study, experiment: &Experiment, fits: &[&Fit]) -> Option
     if let AlsoChanged::Soak(soak) = experiment.also {
         return apart_at_rest(recorded, &soak, fits);
     }
-    let study = simulated_experiment(recorded, experiment, DECLARED_INTERVAL_S)?;
+    let study = simulated_experiment(recorded, experiment, SAMPLE_INTERVAL_S)?;
     let nominal = Linearised::new(&study).ok()?;
     let mut predicted = Vec::new();
     for fit in fits {

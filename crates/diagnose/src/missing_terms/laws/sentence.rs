@@ -4,7 +4,7 @@ use crate::gap::findings::report::LawTerm;
 use crate::missing_terms::laws::candidate::Candidate;
 use crate::missing_terms::terms::library::REFERENCE_K;
 use crate::missing_terms::terms::term::{Role, Term};
-use mapper_core::with_unit;
+use mapper_core::{half_width_95, with_unit};
 
 /// A number with its standard error.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,7 +53,7 @@ pub fn tell(library: &[Term], candidate: &Candidate, interval_factor: f64) -> La
             * terms[i].step
             * terms[j].step
     };
-    let widened = 1.96 * interval_factor;
+    let widened = half_width_95(interval_factor);
     let numbers: Vec<Uncertain> = (0..terms.len())
         .map(|i| Uncertain { value: values[i], half: widened * cov(i, i).max(0.0).sqrt() })
         .collect();

@@ -184,9 +184,8 @@ fn residual_source(
     Some(ResidualSource { balance, gain: best.gain, signature, levels })
 }
 
-/// Correlation lengths of a source term over speed, rpm, and opening.
-const SMOOTH_RPM: f64 = 35e3;
-const SMOOTH_OPENING: f64 = 0.3;
+/// Correlation length of a source term over speed, as a share of the highest, and over the opening of the valve.
+const SMOOTH: f64 = 0.3;
 /// Variances of the common level and of the part smooth over the map, each, and of the free part of each step.
 const COMMON: f64 = 0.5;
 const FREE: f64 = 0.02;
@@ -194,9 +193,10 @@ const FREE: f64 = 0.02;
 /// Prior covariance of levels and decaying parts for a source term of typical size.
 pub fn covariance(study: &Study, points: &[PointState]) -> DMatrix<f64> {
     let steps = study.steps.len();
+    let highest_rpm = points.iter().map(|point| point.speed_rpm).fold(1.0, f64::max);
     let at = |step: usize| {
-        let speed_rpm = points.get(step).map_or(0.0, |point| point.speed_rpm);
-        (speed_rpm / SMOOTH_RPM, study.steps[step].marker.valve_opening_ratio / SMOOTH_OPENING)
+        let speed_ratio = points.get(step).map_or(0.0, |point| point.speed_rpm / highest_rpm);
+        (speed_ratio / SMOOTH, study.steps[step].marker.valve_opening_ratio / SMOOTH)
     };
     let near = |a: (f64, f64), b: (f64, f64)| (-0.5 * ((a.0 - b.0).powi(2) + (a.1 - b.1).powi(2))).exp();
     // The decaying part is similar for jumps of similar size.

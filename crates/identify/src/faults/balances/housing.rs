@@ -13,7 +13,7 @@
 
 use crate::IdentifyConfig;
 use crate::faults::balance_rows::{Rows, common, own};
-use crate::faults::end_readings::{CHANNELS, MAX_STEPS, PerChannel, Readings, span_s};
+use crate::faults::end_readings::{CHANNELS, MAX_CORRELATED_ROWS, PerChannel, Readings, span_s};
 use crate::step_data::samples::{Row, Samples, slope_per_s};
 use mapper_core::{Channel, Recording, StepKind, StepMarker, Window, WindowRule};
 use mapper_numerics::statistics::{DOUBT_SIGMAS, MIN_VALUES, mean, rms};
@@ -50,7 +50,7 @@ impl Part {
 
 pub(crate) fn rows(recording: &Recording, config: &IdentifyConfig, used: &[bool]) -> Option<Rows> {
     let count = used.iter().filter(|used| **used).count();
-    let max_parts = (MAX_STEPS / count.max(1)).max(1);
+    let max_parts = (MAX_CORRELATED_ROWS / count.max(1)).max(1);
     let steps: Vec<Vec<Part>> = recording
         .steps
         .iter()

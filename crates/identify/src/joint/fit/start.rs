@@ -11,6 +11,7 @@ use crate::joint::step_model::parameters::{
     REFINEMENTS, SHARED, SLOPE, SURFACE,
 };
 use crate::joint::step_model::rows::{StepRows, condensed};
+use crate::joint::step_model::smoothing::SHORTEST_HALF_S;
 use crate::joint::step_model::surface::{SurfaceScale, TERM_COUNT, dot};
 use crate::single_step::dynamic::{self, Estimate};
 use crate::step_data::cleaning::cleaned;
@@ -29,7 +30,7 @@ use nalgebra::DVector;
 
 /// Start of the used part of a step after the last command change without noise, s: h and efficiency are modelled while the operating point
 /// settles, and the first seconds only show where the surface is wrong.
-pub(crate) const START_S: f64 = 3.0;
+pub(crate) const START_S: f64 = SHORTEST_HALF_S;
 /// The same with noise, s. Noise can look like a slow probe but for the seconds right after the jump, where the two differ by tens of kelvin.
 /// Inputs are smoothed over 3 s at first: starting at 1.5 s made a probe of 0.7 mm 0.026 mm too small, from 2 s on it is within its error
 /// (mean of 20 seeds).

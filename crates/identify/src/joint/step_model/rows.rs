@@ -11,7 +11,7 @@ use mapper_numerics::statistics::mean;
 
 /// Length of the blocks over which samples are averaged before the fit, s: a quarter of the correlation time of sensor noise, and far below
 /// any time scale in a window.
-const BLOCK_S: f64 = 0.5;
+pub const BLOCK_S: f64 = 0.5;
 /// Factor on this length for noisy data from [`FOLLOWED_S`] after the first sample on, and in a forecast: it costs a few percent of the
 /// information. Without noise it would cost a thousandth of alpha_A behind a slow probe.
 pub(crate) const COARSER: f64 = 2.0;

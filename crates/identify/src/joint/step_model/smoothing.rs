@@ -10,7 +10,7 @@ use nalgebra::{Matrix4, Vector4};
 /// Half the width of the local cubic fit, s.
 const HALF_S: f64 = 10.0;
 /// Half the width of the local fit at the first row, s.
-const SHORTEST_HALF_S: f64 = 3.0;
+pub(crate) const SHORTEST_HALF_S: f64 = 3.0;
 
 /// For each row, the neighbouring rows and their weights in a local cubic.
 #[derive(Debug, Clone, Default)]

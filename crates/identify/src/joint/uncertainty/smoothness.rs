@@ -7,7 +7,7 @@
 //! keep their declared spread; on a flat one they lose about half of it. All quantities correlated with the efficiencies are corrected too.
 
 use crate::faults::balances::efficiency::{FittedEfficiencies, FittedQuantity};
-use crate::faults::end_readings::{CHANNELS, MAX_STEPS};
+use crate::faults::end_readings::{CHANNELS, MAX_CORRELATED_ROWS};
 use crate::faults::smooth::ANY_ROUGHNESS;
 use crate::joint::fit::refinements::{Gain, Refinements};
 use crate::joint::fit::solve::{Covariance, Problem};
@@ -89,7 +89,7 @@ pub(crate) fn smoothed(
     let places: Vec<(f64, f64)> = steps.iter().map(|step| step.end.place).collect();
     let scale = SurfaceScale::of(&places);
     // With more, the computation would take minutes: offsets keep their declared spread.
-    let few = etas.len() <= MAX_STEPS;
+    let few = etas.len() <= MAX_CORRELATED_ROWS;
     let slowness: Vec<f64> =
         scale.iter().flat_map(|scale| places.iter().map(|place| scale.slowness(*place))).collect();
     let solved = match scale.filter(|_| few && carried) {
@@ -376,7 +376,7 @@ fn solve(etas: &[Quantity], coordinates: &[(f64, f64, f64)], problem: &Problem<'
         }
     }
     // The cost grows with the cube: many points get their weights from a subset.
-    let most = MAX_STEPS as f64 / (choices.len() as f64).cbrt();
+    let most = MAX_CORRELATED_ROWS as f64 / (choices.len() as f64).cbrt();
     let every = (used.len() as f64 / most).ceil().max(1.0) as usize;
     loop {
         let sample: Vec<usize> = (0..used.len()).filter(|i| used[*i]).step_by(every).collect();

@@ -3,10 +3,10 @@
 use crate::driven::cause_search::sides::side::{
     CORRELATION_S, HOUSING_CORRELATION_S, ModelError, Side, SideModel, relaxed_k, true_drive,
 };
-use crate::driven::log_rows::{MIN_FLOW_KG_S, MIN_PRESSURE_RATIO, Rows, SideChannels};
+use crate::driven::log_rows::{MIN_PRESSURE_RATIO, Rows, SideChannels};
 use crate::driven::parameters::{Parameter, log_normal, normal};
-use mapper_core::Channel;
-use mapper_identify::{DECLARED_INTERVAL_S, EFFICIENCY};
+use mapper_core::{Channel, SAMPLE_INTERVAL_S};
+use mapper_identify::EFFICIENCY;
 use mapper_numerics::statistics::mean;
 use mapper_physics::compressor_map::one_point_map::OnePointMap;
 use mapper_physics::laws::housing::compressor_capacity_j_k;
@@ -79,7 +79,7 @@ impl SideModel for CompressorSide {
             judged: &[Channel::T2, Channel::Tc],
             is_usable: |row| {
                 let [speed_rpm, flow_kg_s, p1_pa, p2_pa, _] = *row else { return false };
-                p2_pa >= MIN_PRESSURE_RATIO * p1_pa && flow_kg_s >= MIN_FLOW_KG_S && speed_rpm > 0.0
+                p2_pa >= MIN_PRESSURE_RATIO * p1_pa && flow_kg_s > 0.0 && speed_rpm > 0.0
             },
         }
     }
@@ -250,7 +250,7 @@ impl Tip {
         let tip_k = match self.last {
             _ if tau_s <= 0.0 => target_k,
             // A slow tip starts at its reading, one that follows within a sample at its target.
-            None => target_k + (self.start_k - target_k) * tau_s / (tau_s + DECLARED_INTERVAL_S),
+            None => target_k + (self.start_k - target_k) * tau_s / (tau_s + SAMPLE_INTERVAL_S),
             Some((before_s, before_k, tip_k)) => {
                 let elapsed_s = t_s - before_s;
                 let slope = (target_k - before_k) / elapsed_s.max(1e-9);

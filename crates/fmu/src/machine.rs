@@ -45,19 +45,12 @@ impl FmuMachine<'_> {
 
 /// Reason why an FMU cannot be made.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum FmuError {
-    /// A number that cannot be written in C.
     #[error("{name} = {value}: an FMU needs a finite number")]
-    NotFinite {
-        /// Name of the number.
-        name: String,
-        /// Value.
-        value: f64,
-    },
-    /// The archive cannot be written.
+    NotFinite { name: String, value: f64 },
     #[error("the archive cannot be written: {0}")]
     Archive(#[from] zip::result::ZipError),
-    /// A file in the archive cannot be written.
     #[error("a file of the archive cannot be written: {0}")]
     File(#[from] std::io::Error),
 }

@@ -35,14 +35,13 @@ const POINT_FIELDS: [(&str, &str, &str); 9] = [
 
 /// Why the stream cannot be served.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum FoxgloveStreamError {
-    /// The address is not a local one.
     #[error(
         "`{0}` is not a local address, such as 127.0.0.1:8765, which is required because Foxglove sends no token; other computers can connect \
          by a tunnel (`ssh -L 8765:127.0.0.1:8765 STAND`)"
     )]
     Address(String),
-    /// The library cannot serve.
     #[error("the Foxglove stream cannot be served at {0}: {1}; choose another address")]
     Serve(SocketAddr, #[source] FoxgloveError),
 }

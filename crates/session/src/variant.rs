@@ -26,33 +26,20 @@ pub struct Variant {
 
 /// Why the machines cannot be read.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum VariantError {
-    /// The table cannot be read.
     #[error("failed to read the machines in {}: {}", .0.display(), .1)]
     Read(PathBuf, #[source] std::io::Error),
-    /// A row has the wrong form.
     #[error("{}: {}", .0.display(), .1)]
     Form(PathBuf, #[source] csv::Error),
-    /// The table as a whole is invalid.
+    /// `problem`: with its correction.
     #[error("{}: {problem}", .path.display())]
-    Table {
-        /// The table.
-        path: PathBuf,
-        /// The problem and its correction.
-        problem: String,
-    },
-    /// The path of a setting leads into a plain value.
+    Table { path: PathBuf, problem: String },
+    /// `there`: the value at that path.
     #[error(
         "machine {serial_number}: the campaign has no settings at `{key}`, but `{there}`; leave the column out, or change the campaign"
     )]
-    Occupied {
-        /// The machine.
-        serial_number: String,
-        /// The column.
-        key: String,
-        /// The value at that path.
-        there: String,
-    },
+    Occupied { serial_number: String, key: String, there: String },
 }
 
 impl Variant {

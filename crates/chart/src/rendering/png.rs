@@ -14,19 +14,12 @@ const HALO_PX: f32 = 3.0;
 
 /// Reason why a figure cannot be drawn as pixels.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum PngError {
-    /// The font of the program cannot be parsed.
     #[error("failed to read the font that comes with the program: {0}")]
     Font(#[from] ttf_parser::FaceParsingError),
-    /// The picture is too large or empty.
     #[error("a picture of {width} by {height} pixels cannot be made; at most 64 million pixels are allowed")]
-    Size {
-        /// Width, pixels.
-        width: f64,
-        /// Height, pixels.
-        height: f64,
-    },
-    /// The encoder failed.
+    Size { width: f64, height: f64 },
     #[error("failed to encode the picture: {0}")]
     Encode(#[source] Box<dyn std::error::Error + Send + Sync>),
 }

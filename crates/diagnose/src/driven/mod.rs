@@ -14,24 +14,16 @@ use mapper_core::RecordingError;
 
 /// Errors of identification from a log without steps.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum DrivenError {
-    /// A driving or judged channel is missing.
     #[error(transparent)]
     Channel(#[from] RecordingError),
-    /// There are too few rows.
+    /// `until_s`: end of the part that is fitted.
     #[error(
         "the log has {rows} complete rows before {until_s:.1} s, with all driving channels and the machine at work; at least {needed} \
          are needed"
     )]
-    TooFewRows {
-        /// Complete rows.
-        rows: usize,
-        /// End of the part that is fitted, s.
-        until_s: f64,
-        /// Number of rows needed.
-        needed: usize,
-    },
-    /// The nominal machine has no solution.
+    TooFewRows { rows: usize, until_s: f64, needed: usize },
     #[error(
         "the model of the campaign's machine has no solution under the readings of this log: check its geometry and the units in the \
          channel map"

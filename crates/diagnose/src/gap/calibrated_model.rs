@@ -62,26 +62,18 @@ pub struct Found {
 
 /// Errors that prevent the verification of a calibrated model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum CalibratedModelError {
-    /// The nuisance parameters differ.
     #[error(
         "the diagnosis has {theirs} tolerances, this campaign and recording have {ours} or others: use the campaign, channels and sensors of the diagnosis"
     )]
-    Tolerances {
-        /// In the diagnosis.
-        theirs: usize,
-        /// Here.
-        ours: usize,
-    },
-    /// An unknown effect.
+    Tolerances { theirs: usize, ours: usize },
     #[error("effect `{0}` of the diagnosis is not in the effect library; add it with --effect")]
     Effect(String),
-    /// Invalid covariance.
     #[error(
         "the covariance of the diagnosis does not have {0} rows and columns, one for each tolerance and parameter"
     )]
     Covariance(usize),
-    /// The model cannot follow the recording.
     #[error(transparent)]
     Predict(#[from] PredictError),
 }

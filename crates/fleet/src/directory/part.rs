@@ -42,36 +42,20 @@ pub struct Part {
 
 /// Reason why a file is not a valid part of the study.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum PartRefusal {
-    /// It cannot be read.
     #[error("cannot be read: {0}")]
     Unread(String),
-    /// It does not start with the header of a part.
     #[error("is not a part")]
     NotAPart,
-    /// Its header names another item.
     #[error("contains the item {0}")]
     OtherItem(Hash),
-    /// Another version made it.
     #[error("was made by {0}")]
     OtherProgram(String),
-    /// Its length differs from its header.
     #[error("has {found} bytes instead of {stated}")]
-    Length {
-        /// Actual length.
-        found: u64,
-        /// Length in its header.
-        stated: u64,
-    },
-    /// It is larger than any part.
+    Length { found: u64, stated: u64 },
     #[error("has {found} bytes, more than the {limit} that are read")]
-    TooLarge {
-        /// Actual length.
-        found: u64,
-        /// Maximum length.
-        limit: u64,
-    },
-    /// Its content was changed.
+    TooLarge { found: u64, limit: u64 },
     #[error("has been changed: its checksum is wrong")]
     Checksum,
 }

@@ -12,11 +12,10 @@ const MAX_FILE_BYTES: usize = 4 << 20;
 
 /// Errors of reading a study file.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum StudyFileError {
-    /// The file cannot be read.
     #[error("failed to read the study {}: {}", .0.display(), .1)]
     Read(PathBuf, #[source] std::io::Error),
-    /// The file has mistakes.
     #[error("{0}")]
     Mistakes(Box<Findings>),
 }

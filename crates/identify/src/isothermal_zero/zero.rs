@@ -80,40 +80,20 @@ pub struct IsothermalZero {
 
 /// Why a recording has no isothermal zero.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum NoZero {
-    /// The standstill before the first step was too short.
     #[error("the shaft rests for {found_s:.0} s before the first step; the zero needs {needed_s:.0} s")]
-    NoSoak {
-        /// Time at standstill, s.
-        found_s: f64,
-        /// Time needed, s.
-        needed_s: f64,
-    },
-    /// A temperature is still drifting.
+    NoSoak { found_s: f64, needed_s: f64 },
     #[error(
         "{channel} still drifts by {drift_k_min:+.2} K/min in the soak (limit {limit_k_min:.2}): soak longer"
     )]
-    Drifts {
-        /// The channel.
-        channel: Channel,
-        /// Its drift, K/min.
-        drift_k_min: f64,
-        /// Maximum drift, K/min.
-        limit_k_min: f64,
-    },
-    /// Sensors differ by more than their declared offsets allow.
+    Drifts { channel: Channel, drift_k_min: f64, limit_k_min: f64 },
+    /// `off`: minus the common reading, K or Pa; `sigma`: expected standard deviation.
     #[error(
         "{channel} reads {off:+.2} {} off the others in the soak, {:.1} times its declared offset: the rig is not uniform, or the sensor is broken",
         channel.unit(), off.abs() / sigma
     )]
-    Uneven {
-        /// The channel.
-        channel: Channel,
-        /// Reading minus the common reading, K or Pa.
-        off: f64,
-        /// Its expected standard deviation, K or Pa.
-        sigma: f64,
-    },
+    Uneven { channel: Channel, off: f64, sigma: f64 },
 }
 
 /// Finds the offsets of T1, T2, Tc and T_oil against each other, and of P1 and P2.

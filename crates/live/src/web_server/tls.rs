@@ -16,26 +16,13 @@ pub struct TlsFiles {
 
 /// Why the page cannot be served over TLS.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum TlsError {
-    /// A file cannot be read or has the wrong content.
+    /// `what`: the required content.
     #[error("{}: {why}; it has to be a {what} in PEM", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// The required content.
-        what: &'static str,
-        /// The problem.
-        why: String,
-    },
-    /// Certificate and key do not match.
+    File { path: PathBuf, what: &'static str, why: String },
     #[error("{} and {} cannot be used together: {why}", files.certificate.display(), files.key.display())]
-    Pair {
-        /// The files.
-        files: TlsFiles,
-        /// The problem.
-        why: String,
-    },
-    /// The program was built without TLS.
+    Pair { files: TlsFiles, why: String },
     #[error("this program was built without TLS; build it with `--features tls`, or use a tunnel (ssh -L)")]
     NotBuilt,
 }

@@ -139,11 +139,10 @@ pub fn set_key(description: &mut MapDescription, key: &str, value: &str) -> Resu
 
 /// Why a map description cannot be read.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum DescriptionError {
-    /// The file cannot be read.
     #[error("failed to read the map description {}: {}", .0.display(), .1)]
     Read(PathBuf, #[source] io::Error),
-    /// The file has mistakes.
     #[error("{0}")]
     Mistakes(Box<Findings>),
 }

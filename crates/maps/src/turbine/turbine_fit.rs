@@ -47,8 +47,8 @@ const NODES: usize = 21;
 
 /// Why a turbine map cannot be fitted.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum TurbineFitError {
-    /// Too few points.
     #[error("the turbine map has {0} points; a fit needs at least 4, on lines of different speed")]
     TooFewPoints(usize),
 }

@@ -23,21 +23,15 @@ const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Why a page could not be printed.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum PrintError {
-    /// No browser.
     #[error("printing needs Chromium or a browser made from it, and none is on the path (looked for {}); install `chromium`, or open the page and print it there", BROWSERS.join(", "))]
     NoBrowser,
-    /// The browser could not be used.
     #[error("{0} could not be used: {1}")]
     System(&'static str, #[source] io::Error),
-    /// The browser wrote no PDF.
+    /// `reason`: how the browser ended, and the last line of its log.
     #[error("{browser} made no PDF ({reason}); open the page and print it there")]
-    NoPdf {
-        /// Its name.
-        browser: &'static str,
-        /// How it ended, and the last line of its log.
-        reason: String,
-    },
+    NoPdf { browser: &'static str, reason: String },
 }
 
 /// The PDF of a page. `directory` is for temporary files of the browser, which as a snap package has access only to the user's own

@@ -5,39 +5,23 @@ use std::path::PathBuf;
 
 /// Why a first campaign cannot get its nominal map.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum FirstMapError {
-    /// A wheel of no turbocharger.
     #[error(
         "a compressor wheel of {} mm is unusual: turbochargers have {:.0} to {:.0} mm; give its diameter at the exit, with its unit",
         (1e7 * .wheel_m).round() / 1e4, 1e3 * USUAL_WHEEL_DIAMETERS_M.0, 1e3 * USUAL_WHEEL_DIAMETERS_M.1
     )]
-    Wheel {
-        /// Its diameter, m.
-        wheel_m: f64,
-    },
-    /// The file is not a map.
+    Wheel { wheel_m: f64 },
     #[error(
         "the file {} is not a map: {}; write a table of corrected speed, corrected flow, pressure ratio and efficiency, with units \
          in its header, or convert a map of another format", .0.display(), .1
     )]
     NotAMap(PathBuf, #[source] NominalTableError),
-    /// The map is not that of a compressor with this wheel.
     #[error("the map {}: {misfit}; {}", .path.display(), .misfit.remedy())]
-    Misfit {
-        /// The file.
-        path: PathBuf,
-        /// The reason.
-        misfit: MapMisfit,
-    },
-    /// The speed range does not overlap with the map.
+    Misfit { path: PathBuf, misfit: MapMisfit },
     #[error(
         "the map has no speed line between {:.1} and {:.1} krpm; choose speeds between {:.1} and {:.1} krpm",
         .requested_rpm.0 / 1e3, .requested_rpm.1 / 1e3, .map_rpm.0 / 1e3, .map_rpm.1 / 1e3
     )]
-    NoLines {
-        /// The requested speed range, rpm.
-        requested_rpm: (f64, f64),
-        /// The lowest and highest line of the map, rpm.
-        map_rpm: (f64, f64),
-    },
+    NoLines { requested_rpm: (f64, f64), map_rpm: (f64, f64) },
 }

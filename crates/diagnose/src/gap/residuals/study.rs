@@ -59,11 +59,10 @@ pub struct Prediction {
 
 /// Errors that prevent a prediction.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum PredictError {
-    /// The model cannot follow.
     #[error(transparent)]
     Drive(#[from] DriveError),
-    /// A value is out of its range.
     #[error(transparent)]
     Effect(#[from] EffectError),
 }

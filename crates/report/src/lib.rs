@@ -14,7 +14,6 @@ mod maps;
 pub mod page;
 mod plan;
 mod point_results;
-mod reference_pages;
 mod test_report;
 
 pub use diagnosis::corrected_points::corrected_csv;
@@ -68,8 +67,6 @@ pub use point_results::points::{opening, points_text, truth_text};
 pub use point_results::result_remark_text::result_remark_text;
 pub use point_results::shared_errors::shared_errors_text;
 pub use point_results::warning_text::{warning_text, with_messages};
-pub use reference_pages::campaign_page::campaign_page;
-pub use reference_pages::sequence_page::sequence_page;
 pub use test_report::assumed_text::{assumed_text, first_campaign_text};
 pub use test_report::ending_text::{PointsOrigin, ending_sentence};
 pub use test_report::repeated_jumps::repeated_jumps_text;

@@ -238,10 +238,3 @@ pub struct LastSample {
     /// Sequence number of the next sample, that is the number of samples since arming.
     pub next_sequence: u64,
 }
-
-/// `note`: a remark of the driver for the user.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Note {
-    /// One sentence.
-    pub message: String,
-}

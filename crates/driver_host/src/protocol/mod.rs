@@ -13,10 +13,9 @@ pub use convert_error::{read_error, write_error};
 pub use frame::{Encoding, FrameError, decode, encode, read_frame, write_frame};
 pub use message::{
     ChannelDescription, Code, Configure, DescribeResult, Description, Failure, Hello, LastSample, Message,
-    Note, Poll, Ranges, Version, Welcome,
+    Poll, Ranges, Version, Welcome,
 };
 pub use samples::{Column, ElementSamples, RigEvent, Samples, TruthSamples, batch, split_batch};
-pub use schema::schema;
 
 /// Magic word in the hello of both sides.
 pub const MAGIC: &str = "mapper-backend";

@@ -1,45 +1,49 @@
 //! The JSON schema of all messages, generated from the types that read and write them.
 
-use crate::protocol::{
-    Configure, DescribeResult, Failure, Hello, LastSample, Message, Note, Poll, Samples, Welcome,
-};
-use mapper_core::Setpoints;
-use schemars::generate::SchemaSettings;
-use serde_json::{Value, json};
-
-/// The schema: `Message` describes the content of a frame, the others describe `params` and `result` of each method.
-pub fn schema() -> Value {
-    let mut generator = SchemaSettings::draft2020_12().into_generator();
-    let message = generator.subschema_for::<Message>();
-    let methods = json!({
-        "hello": {"params": generator.subschema_for::<Hello>(), "result": generator.subschema_for::<Welcome>()},
-        "configure": {"params": generator.subschema_for::<Configure>(), "result": {}},
-        "describe": {"result": generator.subschema_for::<DescribeResult>()},
-        "arm": {"result": {}},
-        "set": {"params": generator.subschema_for::<Setpoints>(), "result": {}},
-        "hold": {"result": {}},
-        "poll": {"params": generator.subschema_for::<Poll>(), "result": generator.subschema_for::<LastSample>()},
-        "make_safe": {"result": {}},
-        "disarm": {"result": {}},
-        "lease": {},
-        "samples": {"params": generator.subschema_for::<Samples>()},
-        "lost": {"params": generator.subschema_for::<Failure>()},
-        "note": {"params": generator.subschema_for::<Note>()},
-    });
-    json!({
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "Messages between mapper and a driver",
-        "allOf": [message],
-        "x-methods": methods,
-        "$defs": generator.take_definitions(true),
-    })
-}
-
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use crate::protocol::{Configure, DescribeResult, Failure, Hello, LastSample, Message, Poll, Samples, Welcome};
+    use mapper_core::Setpoints;
     use proptest::prelude::*;
+    use schemars::{JsonSchema, generate::SchemaSettings};
+    use serde_json::{Value, json};
     use std::collections::BTreeMap;
+
+    /// `note`: a remark of the driver for the user.
+    #[derive(JsonSchema)]
+    #[allow(dead_code, reason = "the host reads the message alone")]
+    struct Note {
+        /// One sentence.
+        message: String,
+    }
+
+    /// The schema: `Message` describes the content of a frame, the others describe `params` and `result` of each method.
+    fn schema() -> Value {
+        let mut generator = SchemaSettings::draft2020_12().into_generator();
+        let message = generator.subschema_for::<Message>();
+        let methods = json!({
+            "hello": {"params": generator.subschema_for::<Hello>(), "result": generator.subschema_for::<Welcome>()},
+            "configure": {"params": generator.subschema_for::<Configure>(), "result": {}},
+            "describe": {"result": generator.subschema_for::<DescribeResult>()},
+            "arm": {"result": {}},
+            "set": {"params": generator.subschema_for::<Setpoints>(), "result": {}},
+            "hold": {"result": {}},
+            "poll": {"params": generator.subschema_for::<Poll>(), "result": generator.subschema_for::<LastSample>()},
+            "make_safe": {"result": {}},
+            "disarm": {"result": {}},
+            "lease": {},
+            "samples": {"params": generator.subschema_for::<Samples>()},
+            "lost": {"params": generator.subschema_for::<Failure>()},
+            "note": {"params": generator.subschema_for::<Note>()},
+        });
+        json!({
+            "$schema": "https://json-schema.org/draft/2020-12/schema",
+            "title": "Messages between mapper and a driver",
+            "allOf": [message],
+            "x-methods": methods,
+            "$defs": generator.take_definitions(true),
+        })
+    }
 
     /// Valid examples of messages: method, part of the message, content.
     fn examples() -> [(&'static str, &'static str, Value); 9] {
@@ -183,7 +187,7 @@ mod tests {
     fn the_committed_schema_matches_the_types() {
         let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
             .join("../../docs/reference/protocol.schema.json");
-        let made = format!("{}\n", serde_json::to_string_pretty(&super::schema()).unwrap());
+        let made = format!("{}\n", serde_json::to_string_pretty(&schema()).unwrap());
         if std::env::var_os("MAPPER_WRITE_SCHEMA").is_some() {
             std::fs::write(&file, &made).unwrap();
         }

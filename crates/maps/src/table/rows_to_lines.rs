@@ -33,6 +33,8 @@ pub struct Row {
 }
 
 impl Row {
+    /// Refuses values that are impossible for a compressor.
+    ///
     /// # Errors
     /// [`ImportError`] with the impossible value.
     pub fn check(&self) -> Result<(), ImportError> {

@@ -30,13 +30,7 @@ pub fn viscosity_pa_s(temperature_k: f64) -> f64 {
 /// Thermal conductivity at 300 K, W/(m K).
 pub const CONDUCTIVITY_AT_300_K_W_MK: f64 = 0.02624;
 
-/// Thermal conductivity `0.02624 (T/300)^0.8646`, W/(m K).
-#[inline]
-pub fn conductivity_w_mk(temperature_k: f64) -> f64 {
-    CONDUCTIVITY_AT_300_K_W_MK * ln_conductivity_ratio(temperature_k).exp()
-}
-
-/// ln of the thermal conductivity over that at 300 K.
+/// ln of the thermal conductivity `0.02624 (T/300)^0.8646` W/(m K) over that at 300 K.
 #[inline]
 pub fn ln_conductivity_ratio(temperature_k: f64) -> f64 {
     0.8646 * (temperature_k / 300.0).ln()
@@ -232,6 +226,8 @@ mod tests {
     /// are simple on purpose: they follow the table within 1 % (cp), 2 % (mu) and 5 % (k).
     #[test]
     fn properties_follow_the_tables() {
+        let conductivity_w_mk =
+            |t_k: f64| CONDUCTIVITY_AT_300_K_W_MK * ln_conductivity_ratio(t_k).exp();
         for (t_k, cp, mu, k) in [
             (300.0, 1007.0, 184.6e-7, 26.3e-3),
             (400.0, 1014.0, 230.1e-7, 33.8e-3),

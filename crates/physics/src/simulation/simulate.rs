@@ -129,11 +129,6 @@ impl Simulator {
         }
     }
 
-    /// Current time, s.
-    pub fn t_s(&self) -> f64 {
-        sized!(&self.integrator, integrator => integrator.t_s)
-    }
-
     /// Current state.
     pub fn state(&self) -> State {
         sized!(&self.integrator, integrator => State::from_array(&integrator.y))

@@ -132,11 +132,6 @@ impl<'a> SpeedControl<'a> {
         }
     }
 
-    /// Deficit of turbine power with which the next step begins, natural logarithm.
-    pub fn deficit(&self) -> f64 {
-        self.deficit
-    }
-
     /// P3 with which a step begins at `t_s`, Pa. A step at the current point continues with the current command.
     pub fn begin(&mut self, step: &PlanStep, t_s: f64) -> f64 {
         if let Some(hold) = &mut self.hold

@@ -109,11 +109,6 @@ impl<'a> SurgeSearch<'a> {
     /// Time of a line in addition to its readings, s.
     pub const AROUND_S: f64 = ARRIVE_S + RETURN_S;
 
-    /// Number of surge events during the approaches.
-    pub fn surges(&self) -> usize {
-        self.surges
-    }
-
     fn update_line_ends(&mut self, step: &PlanStep) {
         let known = self.line_ends.iter_mut().find(|end| (end.to.speed_rpm - step.to.speed_rpm).abs() < 1e-3);
         match known {

@@ -76,16 +76,6 @@ impl PreparedNight {
             missing.map_or_else(|| "it has other runs".to_owned(), |run| format!("it has no {}", run.key));
         Err(SessionError::NightlyMismatch(missing))
     }
-
-    /// Number of runs.
-    pub fn len(&self) -> usize {
-        self.runs.len()
-    }
-
-    /// Whether the night has no runs.
-    pub fn is_empty(&self) -> bool {
-        self.runs.is_empty()
-    }
 }
 
 /// Parses a method name as written in campaigns.

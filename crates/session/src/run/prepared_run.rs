@@ -160,11 +160,6 @@ impl PreparedRun<'_> {
         &self.plan
     }
 
-    /// The nominal model used for the plan.
-    pub fn model(&self) -> &Model {
-        &self.model
-    }
-
     /// The rig.
     pub fn rig(&self) -> RigDescription {
         self.sources.backend.describe()

@@ -3,7 +3,6 @@
 //! Gauss-Newton on whitened residuals, as in [`crate::gap::best_fit::fit`]. The model error is fitted too, because it is not declared for a machine on an
 //! engine.
 
-use crate::driven::cause_search::noise::Whitening;
 use crate::driven::cause_search::sides::side::{ModelError, SideModel};
 use crate::gap::best_fit::coordinate::{
     Coordinate, coordinates, effect_neighbours, hypothesis_at, infos, nuisance_neighbours, unknowns,
@@ -12,6 +11,7 @@ use crate::gap::best_fit::fit::MAX_SIGMAS;
 use crate::gap::best_fit::normal::PRIOR_STEPS;
 use crate::gap::residuals::study::Hypothesis;
 use mapper_inference::descent::{End, FINE, Model, Normal, Reach, Until, descend, room_within};
+use mapper_numerics::coloured_noise::{BlockNoise, WhiteningFilter};
 use mapper_numerics::minimise::minimise;
 use mapper_numerics::statistics::HINT_SIGMAS;
 use mapper_physics::rig::effect::{Effect, Rig, add};
@@ -95,17 +95,18 @@ impl<S: SideModel> SideProblem<'_, S> {
     }
 
     /// Whitening of each channel with these model errors, K.
-    pub(crate) fn whitenings(&self, counts: &[bool], left_k: &[f64]) -> Vec<Whitening> {
+    pub(crate) fn whitenings(&self, counts: &[bool], left_k: &[f64]) -> Vec<WhiteningFilter> {
         left_k.iter().enumerate().map(|(channel, left_k)| self.whitening(counts, channel, *left_k)).collect()
     }
 
-    fn whitening(&self, counts: &[bool], channel: usize, left_k: f64) -> Whitening {
+    fn whitening(&self, counts: &[bool], channel: usize, left_k: f64) -> WhiteningFilter {
         let rows = self.side.rows();
         let (_, read) = &rows.judged[channel];
-        let used: Vec<bool> =
-            read.iter().zip(counts).map(|(read, counts)| *counts && read.is_finite()).collect();
-        let correlation_s = S::model_errors()[channel].correlation_s;
-        Whitening::new(&rows.t_s, &used, self.white_k[channel], left_k, correlation_s)
+        let noise =
+            BlockNoise { white: self.white_k[channel].max(1e-6).powi(2), first_order: left_k.powi(2) };
+        let used = read.iter().zip(counts).map(|(read, counts)| *counts && read.is_finite());
+        let rows = rows.t_s.iter().zip(used).map(|(t_s, used)| (*t_s, noise, used));
+        WhiteningFilter::new(rows, S::model_errors()[channel].correlation_s, 1.0, 1.0)
     }
 
     /// The most probable model error of one channel, K; the misfit there, and the logarithm of the posterior's width.
@@ -119,7 +120,7 @@ impl<S: SideModel> SideProblem<'_, S> {
         let misfit = |z: f64| {
             let whitening = self.whitening(counts, channel, median_k * (width * z).exp());
             let mut white = residual.to_vec();
-            whitening.whiten(&mut white);
+            whitening.apply(&mut white);
             0.5 * white.iter().map(|w| w * w).sum::<f64>() + whitening.ln_spreads + 0.5 * z * z
         };
         if width == 0.0 {
@@ -205,7 +206,7 @@ impl<S: SideModel> SideProblem<'_, S> {
         hypothesis: Hypothesis,
         predicted: Columns,
         slopes: &[Columns],
-        whitenings: Vec<Whitening>,
+        whitenings: Vec<WhiteningFilter>,
         precision: DMatrix<f64>,
     ) -> Option<LinearisedFit<'_, '_, S>> {
         Some(LinearisedFit {
@@ -247,9 +248,9 @@ fn changes(there: &Columns, here: &Columns, units: f64) -> Columns {
 }
 
 /// Columns of all channels, whitened.
-fn whitened(whitenings: &[Whitening], columns: &Columns) -> Columns {
+fn whitened(whitenings: &[WhiteningFilter], columns: &Columns) -> Columns {
     let mut white = columns.clone();
-    whitenings.iter().zip(&mut white).for_each(|(whitening, column)| whitening.whiten(column));
+    whitenings.iter().zip(&mut white).for_each(|(whitening, column)| whitening.apply(column));
     white
 }
 
@@ -262,7 +263,7 @@ pub(crate) struct LinearisedFit<'a, 'p, S> {
     problem: &'a SideProblem<'p, S>,
     pub(crate) hypothesis: Hypothesis,
     predicted: Columns,
-    whitenings: Vec<Whitening>,
+    whitenings: Vec<WhiteningFilter>,
     columns: Vec<Columns>,
     residual: Columns,
     precision: Cholesky<f64, Dyn>,
@@ -310,7 +311,7 @@ struct Objective<'a, 'p, S> {
     coordinates: Vec<Coordinate>,
     priors: Vec<(f64, f64)>,
     /// For the model error at the last accepted point.
-    whitenings: Vec<Whitening>,
+    whitenings: Vec<WhiteningFilter>,
 }
 
 struct Point {
@@ -368,7 +369,7 @@ impl<S: SideModel> Model for Objective<'_, '_, S> {
 }
 
 /// The normal equations of slopes and a residual; `pulls` as in [`Objective::pulls`].
-fn normal(whitenings: &[Whitening], slopes: &[Columns], residual: &Columns, pulls: &[(f64, f64)]) -> Normal {
+fn normal(whitenings: &[WhiteningFilter], slopes: &[Columns], residual: &Columns, pulls: &[(f64, f64)]) -> Normal {
     let columns: Vec<Columns> = slopes.iter().map(|slope| whitened(whitenings, slope)).collect();
     let residual = whitened(whitenings, residual);
     let matrix = DMatrix::from_fn(columns.len(), columns.len(), |i, j| {

@@ -1,7 +1,6 @@
 //! Gap reduction on held-out data: phase by phase, and after the fitted part.
 
 use crate::driven::cause_search::fit::{Columns, Fit, SideProblem};
-use crate::driven::cause_search::noise::CorrelatedNoise;
 use crate::driven::cause_search::search::weight;
 use crate::driven::cause_search::side_diagnosis::{Beyond, HeldOut, Phase};
 use crate::driven::cause_search::sides::side::SideModel;
@@ -150,4 +149,27 @@ fn draws<S: SideModel>(problem: &SideProblem<'_, S>, fit: &Fit, seed: u64) -> Ve
         Some(readings_k)
     });
     drawn.into_iter().flatten().collect()
+}
+
+/// First-order noise along the rows of a log.
+struct CorrelatedNoise {
+    sigma: f64,
+    correlation_s: f64,
+    /// Time, s, and value of the previous row.
+    last: Option<(f64, f64)>,
+}
+
+impl CorrelatedNoise {
+    fn new(sigma: f64, correlation_s: f64) -> Self {
+        CorrelatedNoise { sigma, correlation_s, last: None }
+    }
+
+    /// The noise at the next row, from a standard normal number.
+    fn next(&mut self, t_s: f64, z: f64) -> f64 {
+        let (keep, before) =
+            self.last.map_or((0.0, 0.0), |(at_s, noise)| ((-(t_s - at_s) / self.correlation_s).exp(), noise));
+        let noise = keep * before + self.sigma * (1.0 - keep * keep).sqrt() * z;
+        self.last = Some((t_s, noise));
+        noise
+    }
 }

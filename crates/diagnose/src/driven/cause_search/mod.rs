@@ -5,7 +5,6 @@ mod detectable;
 mod diagnose;
 mod fit;
 mod held_out;
-mod noise;
 mod phases;
 mod search;
 mod side_diagnosis;

@@ -17,8 +17,8 @@ pub(crate) fn measured_structure(study: &Study) -> Result<[Declaration; OUTPUTS.
         if let Some(ratio) = declared.declared.tolerances.structure.of_mut(*channel) {
             *ratio = error.structure_ratio;
         }
-        if let (Some(sensor), Some(offset)) = (declared.declared.sensors.get_mut(channel), error.offset) {
-            sensor.offset_sigma = offset;
+        if let Some(offset) = error.offset {
+            declared.declared.sensors.entry(*channel).or_default().offset_sigma = offset;
         }
     }
     declared.nuisances = nuisances(&declared.declared);

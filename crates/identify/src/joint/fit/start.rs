@@ -257,7 +257,7 @@ fn whitening(
 ) -> WhiteningFilter {
     let noise = step.rows.iter().enumerate().map(|(i, row)| {
         let wrong = SHAPE_ERROR_RATIO * shape_k(i) / sigma_k;
-        (row.t_s, BlockNoise { first_order: row.noise.first_order + wrong * wrong, ..row.noise })
+        (row.t_s, BlockNoise { first_order: row.noise.first_order + wrong * wrong, ..row.noise }, true)
     });
     WhiteningFilter::new(noise, config.noise_colour.time_constant_s, sigma_k, white_sigma_k)
 }

@@ -1,7 +1,7 @@
 //! The reference of a campaign's keys, from its JSON schema.
 
-use crate::formatting::markdown::{Align, table, without_html_and_links};
 use mapper_campaign::json_schema;
+use mapper_report::formatting::markdown::{Align, table, without_html_and_links};
 use serde_json::{Map, Value};
 
 const HEAD: &str = "\

@@ -1,6 +1,6 @@
 //! The documentation of the functions of a script, from the same table that registers them.
 
-use crate::formatting::markdown::{Align, table};
+use mapper_report::formatting::markdown::{Align, table};
 use mapper_sequence::functions;
 
 /// The page, Markdown.

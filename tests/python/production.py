@@ -5,7 +5,7 @@ usage: python production.py HISTORY
 24 machines in 8 nights, a day apart but one gap; a tenth of the runs is missing. Machines, nights and the rest scatter, the stand
 drifts, and one machine (M-07) has 6 % less efficiency at all speeds, another (M-19) loses with 1/speed^2. At each place the mixed
 model of the others is fitted by restricted maximum likelihood: a mean, a drift in time, machines and nights crossed. Prints
-[{"speed_rpm", "mean", "drift_a_day", "drift_error", "machine_sigma", "night_sigma", "rest_sigma"}, ...].
+[{"speed_rpm", "mean", "drift_a_day", "drift_error", "machine_sigma", "night_sigma", "residual_sigma"}, ...].
 """
 
 import json
@@ -72,7 +72,7 @@ def fitted(frame):
         "drift_error": fit.bse_fe["day"] / 100,
         "machine_sigma": sigmas["machine"],
         "night_sigma": sigmas["night"],
-        "rest_sigma": float(np.sqrt(fit.scale)) / 100,
+        "residual_sigma": float(np.sqrt(fit.scale)) / 100,
     }
 
 

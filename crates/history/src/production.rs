@@ -52,12 +52,12 @@ pub struct ProductionPoint {
 pub struct Spread {
     /// Value of the average machine.
     pub mean: f64,
-    /// Standard deviation between machines; `None` if each was measured once: it is then part of `rest_sigma`.
+    /// Standard deviation between machines; `None` if each was measured once: it is then part of `residual_sigma`.
     pub machine_sigma: Option<f64>,
     /// Standard deviation between nights without the drift; `None` for a single night.
     pub night_sigma: Option<f64>,
     /// Standard deviation of one measurement of one machine in one night.
-    pub rest_sigma: f64,
+    pub residual_sigma: f64,
 }
 
 /// Effect of the stand on all machines.
@@ -227,7 +227,7 @@ impl PointFit {
             mean,
             machine_sigma: sigma(self.machines),
             night_sigma: sigma(self.nights),
-            rest_sigma: self.fit.rest_sigma,
+            residual_sigma: self.fit.residual_sigma,
         }
     }
 

@@ -37,7 +37,7 @@ pub struct MixedFit {
     /// Standard deviation of each group's effects.
     pub group_sigmas: Vec<f64>,
     /// Standard deviation of the residual.
-    pub rest_sigma: f64,
+    pub residual_sigma: f64,
     /// The effect of each level of each group, shrunk towards 0 (best linear unbiased prediction).
     pub effects: Vec<Vec<Effect>>,
 }
@@ -254,10 +254,10 @@ impl Sums {
     fn fit(&self, shares: &[f64]) -> Option<MixedFit> {
         let solved = self.solve(shares)?;
         let degrees_of_freedom = (self.observations - self.coefficients) as f64;
-        let rest_sigma = (solved.square / degrees_of_freedom).sqrt();
+        let residual_sigma = (solved.square / degrees_of_freedom).sqrt();
         let column = |column: usize| Effect {
             value: solved.scale[column] * solved.solution[column],
-            standard_error: rest_sigma
+            standard_error: residual_sigma
                 * solved.scale[column]
                 * solved.inverse[(column, column)].max(0.0).sqrt(),
         };
@@ -267,7 +267,7 @@ impl Sums {
             let diagonal = solved.diagonal[row];
             Effect {
                 value: solved.first_ratio * solved.first[row],
-                standard_error: rest_sigma
+                standard_error: residual_sigma
                     * solved.first_ratio
                     * (1.0 / diagonal + other_variance / (diagonal * diagonal)).sqrt(),
             }
@@ -280,8 +280,8 @@ impl Sums {
         }
         Some(MixedFit {
             coefficients: (0..self.coefficients).map(column).collect(),
-            group_sigmas: shares.iter().map(|share| ratio(*share) * rest_sigma).collect(),
-            rest_sigma,
+            group_sigmas: shares.iter().map(|share| ratio(*share) * residual_sigma).collect(),
+            residual_sigma,
             effects,
         })
     }
@@ -353,7 +353,7 @@ mod tests {
             prop_assume!(of_machines > 0.01 && of_nights > 0.01);
             let fit = fitted(&data);
             // The search ends at 1e-7 of the share.
-            prop_assert!((fit.rest_sigma.powi(2) / rest - 1.0).abs() < 1e-5);
+            prop_assert!((fit.residual_sigma.powi(2) / rest - 1.0).abs() < 1e-5);
             prop_assert!((fit.group_sigmas[0].powi(2) / of_machines - 1.0).abs() < 1e-4);
             prop_assert!((fit.group_sigmas[1].powi(2) / of_nights - 1.0).abs() < 1e-4);
             prop_assert!((fit.coefficients[0].value - all).abs() < 1e-9);
@@ -385,7 +385,7 @@ mod tests {
     fn without_any_rest_machines_are_what_they_are() {
         let data = balanced(8, 3, [1.0, 0.0, 0.0]);
         let fit = fitted(&data);
-        assert!(fit.rest_sigma < 1e-3 && fit.group_sigmas[0] > 0.5, "{fit:?}");
+        assert!(fit.residual_sigma < 1e-3 && fit.group_sigmas[0] > 0.5, "{fit:?}");
     }
 
     #[test]

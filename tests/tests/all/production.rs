@@ -126,7 +126,7 @@ fn a_production_is_fitted_as_statsmodels_fits_it() {
         assert_eq!(place["speed_rpm"], expected["speed_rpm"]);
         let eta = &place["eta"];
         assert!((number(eta, "mean") - number(expected, "mean")).abs() < 1e-6, "{eta} {expected}");
-        for sigma in ["machine_sigma", "night_sigma", "rest_sigma"] {
+        for sigma in ["machine_sigma", "night_sigma", "residual_sigma"] {
             // statsmodels' search ends within a few parts in ten thousand.
             let ratio = number(eta, sigma) / number(expected, sigma);
             assert!((ratio - 1.0).abs() < 2e-3, "{sigma}: {eta} {expected}");

@@ -188,7 +188,7 @@ pub fn diagnose(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
         let n = null.residual.len() as f64;
         let removed = 1.0 - (best.cost - n).max(0.0) / (null.cost - n).max(1.0);
         let smooth = 1.0 - left.smooth_excess.max(0.0) / left_by_null.smooth_excess.max(1.0);
-        let better = gap.shrink > MIN_SHRINK;
+        let better = gap.gap_reduction > MIN_SHRINK;
         if removed > MIN_SHRINK && smooth > MIN_SHRINK && better {
             Verdict::PartlyExplained
         } else {
@@ -238,8 +238,8 @@ pub fn diagnose(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
         probability_none: posterior.none,
         probability_unlisted: posterior.unlisted,
         probability_outside: posterior.outside,
-        laws: Vec::new(),
-        forces: Vec::new(),
+        closure_terms: Vec::new(),
+        residual_sources: Vec::new(),
         gap,
         next,
         experiments,

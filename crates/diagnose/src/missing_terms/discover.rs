@@ -28,9 +28,9 @@ use mapper_core::half_width_95;
 #[derive(Debug, Default)]
 pub struct Discovered {
     /// Proposed laws, best first; usually one or none.
-    pub laws: Vec<Law>,
+    pub closure_terms: Vec<Law>,
     /// Residual source term of each balance, most probable first.
-    pub forces: Vec<MissingSource>,
+    pub residual_sources: Vec<MissingSource>,
     /// Locations of the gap; `None` if the diagnosis' locations remain valid.
     pub places: Option<Vec<Place>>,
     /// The first law fitted to all steps, if it is more probable than not.
@@ -71,20 +71,20 @@ pub fn discover(
         found = if better { Some(both) } else { found };
     }
     progress(0.6, "residual of the law");
-    let laws = propose(diagnosed, calibration, &bench, found.as_ref(), &training);
+    let closure_terms = propose(diagnosed, calibration, &bench, found.as_ref(), &training);
     // If a law leaves only noise, linear gains of other parts are irrelevant.
-    let settled = laws.first().filter(|law| law.probability > 0.5);
+    let settled = closure_terms.first().filter(|law| law.probability > 0.5);
     let best = found.as_ref().and_then(|found| found.fitted.first());
     let settled_fit = settled.and(best).map(|best| best.fit.clone());
     let bend = if settled.is_some() { 0.0 } else { BEND };
     progress(0.7, "residual source terms");
     let here =
         |balance: &Balance| settled.is_none_or(|law| law.submodel == balance.properties().submodel.name());
-    let forces = residual_sources(&nothing, &everywhere.steps, &here);
-    let places = places((diagnosed, calibration), &bench, found.as_ref(), &forces, bend);
+    let residual_sources = residual_sources(&nothing, &everywhere.steps, &here);
+    let places = places((diagnosed, calibration), &bench, found.as_ref(), &residual_sources, bend);
     Discovered {
-        laws,
-        forces: forces.into_iter().take(1 + MAX_EQUIVALENT).map(reported_source).collect(),
+        closure_terms,
+        residual_sources: residual_sources.into_iter().take(1 + MAX_EQUIVALENT).map(reported_source).collect(),
         places: Some(places),
         settled: settled_fit,
     }
@@ -237,9 +237,9 @@ fn propose(
         if training.steps[0] { fit } else { with_start_read(&bench.study, linearised, fit) }
     };
     let (before, after) = (read(before), read(trained.fit.clone()));
-    let shrink = shrink(study, &before, &after, held_out);
+    let gap_reduction = gap_reduction(study, &before, &after, held_out);
     // It must recur in half of the folds.
-    if shrink < MIN_SHRINK || found.stability < 0.5 {
+    if gap_reduction < MIN_SHRINK || found.stability < 0.5 {
         return Vec::new();
     }
     let (channels, worse) = channels_on(study, linearised, [&before, &after], held_out);
@@ -266,7 +266,7 @@ fn propose(
         sentence,
         terms,
         probability: (1.0 - left) / weights,
-        shrink,
+        gap_reduction,
         held_out_steps: held_out.len(),
         channels,
         worse,
@@ -292,7 +292,7 @@ fn places(
     (diagnosed, calibration): (&Diagnosed, &Calibration),
     bench: &Bench,
     found: Option<&FittedLaws>,
-    forces: &[ResidualSource],
+    residual_sources: &[ResidualSource],
     bend: f64,
 ) -> Vec<Place> {
     let Diagnosed { study, linearised, null, fits, .. } = diagnosed;
@@ -325,13 +325,13 @@ fn places(
     }));
     // Linear gains are relative to the linear cost of the null hypothesis.
     let linear_null = 0.5 * (null.cost - linear_cost(diagnosed));
-    for force in forces.iter().filter(|force| force.gain > 0.0) {
+    for source in residual_sources.iter().filter(|source| source.gain > 0.0) {
         let part = Part {
-            submodel: force.balance.properties().submodel,
-            gain: 2.0 * force.gain,
-            signature: Box::new(move || Some(force.signature.clone())),
+            submodel: source.balance.properties().submodel,
+            gain: 2.0 * source.gain,
+            signature: Box::new(move || Some(source.signature.clone())),
         };
-        explanations.push(Explanation { score: force.gain + linear_null, parts: vec![part] });
+        explanations.push(Explanation { score: source.gain + linear_null, parts: vec![part] });
     }
     places_of(study, linearised, null, &explanations, bend)
 }
@@ -343,14 +343,14 @@ fn linear_cost(diagnosed: &Diagnosed) -> f64 {
     Products::new(&base, &[]).projected(&everywhere.steps).map_or(diagnosed.null.cost, |left| left[(0, 0)])
 }
 
-fn reported_source(force: ResidualSource) -> MissingSource {
-    let Properties { submodel, words, unit, .. } = force.balance.properties();
+fn reported_source(source: ResidualSource) -> MissingSource {
+    let Properties { submodel, words, unit, .. } = source.balance.properties();
     MissingSource {
         submodel: submodel.name().to_owned(),
-        force: words,
+        quantity: words,
         unit: unit.to_owned(),
-        evidence: force.gain,
-        steps: force
+        evidence: source.gain,
+        steps: source
             .levels
             .iter()
             .map(|(level, sigma)| [*level, level - half_width_95(*sigma), level + half_width_95(*sigma)])
@@ -360,7 +360,7 @@ fn reported_source(force: ResidualSource) -> MissingSource {
 
 /// Gap reduction by a law on steps used neither to find nor to fit it:
 /// `1 - sum g_after+/sum g_before+` with `g = (|r|^2 - n)/n` over the held-out steps; over all steps if none is held out.
-fn shrink(study: &Study, before: &Fit, after: &Fit, held_out: &[usize]) -> f64 {
+fn gap_reduction(study: &Study, before: &Fit, after: &Fit, held_out: &[usize]) -> f64 {
     let all: Vec<usize> = (0..study.steps.len()).collect();
     let steps = if held_out.is_empty() { &all } else { held_out };
     let of = |fit: &Fit| {

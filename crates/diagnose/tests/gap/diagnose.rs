@@ -187,7 +187,7 @@ fn a_probe_of_two_millimetres_is_named_measured_and_closes_the_gap() {
     assert_eq!(diagnosis.r#where[0].submodel, "t2_probe");
     assert_eq!(diagnosis.r#where[0].channel, "T2");
     // On held-out steps the residual is noise, which no cause can remove.
-    assert!(diagnosis.gap.shrink > 0.9 && !diagnosis.gap.held_out_steps.is_empty());
+    assert!(diagnosis.gap.gap_reduction > 0.9 && !diagnosis.gap.held_out_steps.is_empty());
     assert!(diagnosis.gap.channels["T2"].after < 0.2 * diagnosis.gap.channels["T2"].before);
 }
 
@@ -197,8 +197,8 @@ fn a_probe_of_two_millimetres_is_named_measured_and_closes_the_gap() {
 fn an_offset_beyond_its_tolerance_is_a_gap_that_its_cause_removes() {
     let cause = mapper_effects::find("t2_offset").unwrap();
     let gap = ask_with(&record(&[("t2_offset", &[2.5])], 6), Some(cause)).unwrap().diagnosis.gap;
-    assert!(gap.strained.is_some());
-    assert!(gap.shrink > 0.9 && gap.steps_with_gap == gap.held_out_steps.len(), "{gap:?}");
+    assert!(gap.beyond_prior.is_some());
+    assert!(gap.gap_reduction > 0.9 && gap.steps_with_gap == gap.held_out_steps.len(), "{gap:?}");
 }
 
 /// Neither hides the other, and each reduces the misfit by the square of its signature length.

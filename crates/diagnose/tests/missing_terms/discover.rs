@@ -78,21 +78,21 @@ fn a_coolant_passage_is_found_placed_and_written() {
     assert_eq!(places[0].submodel, "compressor_housing");
     let sum: f64 = places.iter().map(|place| place.share).sum();
     assert!((sum - 1.0).abs() < 1e-9, "shares add up to {sum}");
-    let law = found.laws.first().unwrap();
+    let law = found.closure_terms.first().unwrap();
     assert_eq!(law.submodel, "compressor_housing");
     for (term, truth) in law.terms.iter().zip([1.5, 353.15]) {
         // 95 % intervals, twice as wide: four standard errors.
         let half = term.high - term.low;
         assert!((term.value - truth).abs() < half, "{}", law.sentence);
     }
-    assert!(law.shrink > 0.8, "{}", law.shrink);
+    assert!(law.gap_reduction > 0.8, "{}", law.gap_reduction);
     // Steps used neither in the search nor in the fit: the housing improves, and no channel gets worse.
     let housing = &law.channels["Tc"];
     assert!(law.held_out_steps > 0 && housing.after < 0.2 * housing.before, "{:?}", law.channels);
     assert_eq!(law.worse, [""; 0]);
     assert!(found.settled.is_some());
     // The source term in each step, estimated without the law, agrees with the law.
-    assert_eq!(found.forces[0].submodel, "compressor_housing");
+    assert_eq!(found.residual_sources[0].submodel, "compressor_housing");
     let script = ScriptEffect::new(law.script.as_ref().unwrap(), Path::new("law.rhai")).unwrap();
     assert_eq!(script.info().submodel.name(), "compressor_housing");
 }
@@ -105,7 +105,7 @@ fn nothing_has_no_law() {
     let found = parallel::map(&seeds, |seed| {
         let mut diagnosed = ask(&Rig::new(Model::nominal()), *seed);
         diagnosed.diagnosis.verdict = Verdict::Unexplained;
-        discover(&diagnosed, &Calibration::shipped().unwrap(), &|_, _| {}).laws
+        discover(&diagnosed, &Calibration::shipped().unwrap(), &|_, _| {}).closure_terms
     });
     let sentences: Vec<&str> = found.iter().flatten().map(|law| law.sentence.as_str()).collect();
     assert!(sentences.len() <= 1, "{sentences:?}");

@@ -127,21 +127,21 @@ const NOT_THE_TRUTH: f64 = 0.05;
 /// The missing term and the closure term for it.
 fn laws(diagnosis: &Diagnosis) -> String {
     let mut text = String::new();
-    if let (Some(force), Some(place)) = (diagnosis.forces.first(), diagnosis.r#where.first())
-        && force.submodel == place.submodel
+    if let (Some(source), Some(place)) = (diagnosis.residual_sources.first(), diagnosis.r#where.first())
+        && source.submodel == place.submodel
     {
         let (low, high) =
-            force.steps.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), [value, ..]| {
+            source.steps.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), [value, ..]| {
                 (low.min(*value), high.max(*value))
             });
         text += &format!(
             "\nresidual source term\n  {}: {} .. {} over the steps\n",
-            force.force,
+            source.quantity,
             four_figures(low),
-            with_unit(four_figures(high), &force.unit)
+            with_unit(four_figures(high), &source.unit)
         );
     }
-    for law in &diagnosis.laws {
+    for law in &diagnosis.closure_terms {
         text += &format!(
             "\nclosure term\n  {}\n  {}; {} on held-out steps\n",
             law.sentence,
@@ -164,7 +164,7 @@ fn laws(diagnosis: &Diagnosis) -> String {
 /// The effect of a closure term on the gap, in words.
 fn describe_removed_residual(law: &Law) -> String {
     match law.worse.as_slice() {
-        [] => format!("removes {:.0} % of the gap", 100.0 * law.shrink),
+        [] => format!("removes {:.0} % of the gap", 100.0 * law.gap_reduction),
         worse => format!("the gap does not shrink: {} gets worse", worse.join(", ")),
     }
 }
@@ -210,7 +210,7 @@ pub fn headline(diagnosis: &Diagnosis) -> String {
 
 /// Whether steps with a gap that the fit of the cause did not see keep it.
 fn is_not_borne_out(gap: &Gap) -> bool {
-    gap.folds.len() > 1 && gap.steps_with_gap > 0 && gap.shrink <= 0.0
+    gap.folds.len() > 1 && gap.steps_with_gap > 0 && gap.gap_reduction <= 0.0
 }
 
 /// Effects in both recordings, which are not judged, if a reference recording was given; and what a campaign declares to do without it.
@@ -357,7 +357,7 @@ fn describe_gap_reduction(diagnosis: &Diagnosis) -> String {
             gap.held_out_steps.len()
         ),
     };
-    if named && gap.worse.is_empty() && gap.shrink <= 0.0 {
+    if named && gap.worse.is_empty() && gap.gap_reduction <= 0.0 {
         text += match gap.steps_with_gap {
             0 => "  tolerances leave no gap on these steps either\n",
             _ => "  the cause does not reduce the gap on these steps\n",
@@ -365,9 +365,9 @@ fn describe_gap_reduction(diagnosis: &Diagnosis) -> String {
     } else if named && gap.worse.is_empty() {
         text += &format!(
             "  {:.1} % of the gap removed (95 % interval for similar steps: {:.0} .. {:.0} %)\n",
-            100.0 * gap.shrink,
-            (100.0 * gap.shrink_low).floor(),
-            (100.0 * gap.shrink_high).ceil()
+            100.0 * gap.gap_reduction,
+            (100.0 * gap.gap_reduction_low).floor(),
+            (100.0 * gap.gap_reduction_high).ceil()
         );
         text += &describe_support(gap);
     } else if !gap.worse.is_empty() {
@@ -402,12 +402,12 @@ fn list_affected_points(diagnosis: &Diagnosis) -> String {
 
 /// If tolerances can replace the cause without a larger residual: the tolerance that would have to exceed its prior.
 fn describe_strained_tolerance(gap: &Gap) -> String {
-    let Some(strained) = gap.strained.as_ref().filter(|_| gap.shrink < STANDS_IN) else {
+    let Some(beyond_prior) = gap.beyond_prior.as_ref().filter(|_| gap.gap_reduction < STANDS_IN) else {
         return String::new();
     };
     format!(
         "  tolerances can replace the cause, but exceed their declaration: {} by {:.1} sigma\n",
-        strained.what, strained.sigmas
+        beyond_prior.what, beyond_prior.sigmas
     )
 }
 

@@ -71,7 +71,7 @@ fn row(place: &ProductionPoint) -> Vec<String> {
         [
             range_of(|spread| spread.machine_sigma),
             range_of(|spread| spread.night_sigma),
-            range_of(|spread| Some(spread.rest_sigma)),
+            range_of(|spread| Some(spread.residual_sigma)),
         ]
     };
     row.push(number::number(place.eta.as_ref().map(|eta| 100.0 * eta.mean), 2));

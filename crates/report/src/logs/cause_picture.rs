@@ -5,10 +5,10 @@ use mapper_diagnose::driven::cause_search::{Diagnosis, SideVerdict};
 
 /// Two panels over time: the reading with both predictions, and both residuals.
 pub fn why_figure(name: &str, diagnosis: &Diagnosis) -> Figure {
-    let course = &diagnosis.course;
+    let history = &diagnosis.time_history;
     let channel = diagnosis.judged.first().copied().unwrap_or("");
     let over = |values: &mut dyn Iterator<Item = f64>| -> Vec<(f64, f64)> {
-        course.t_s.iter().copied().zip(values).collect()
+        history.t_s.iter().copied().zip(values).collect()
     };
     let rule = |panel: &mut Panel| {
         if let Some(beyond) = &diagnosis.beyond {
@@ -19,19 +19,19 @@ pub fn why_figure(name: &str, diagnosis: &Diagnosis) -> Figure {
     let mut readings = Panel::new(Axis::new("time, s"), Axis::new(format!("{channel}, degC")))
         .title(format!("(a) {channel} as read and as predicted"));
     let celsius = |values: &[f64]| over(&mut values.iter().map(|k| k - 273.15));
-    readings.add(Line::new(celsius(&course.before_k), palette::INK).label("without a cause"));
-    readings.add(Line::new(celsius(&course.after_k), palette::BLUE).label(cause_label(diagnosis)));
+    readings.add(Line::new(celsius(&history.before_k), palette::INK).label("without a cause"));
+    readings.add(Line::new(celsius(&history.after_k), palette::BLUE).label(cause_label(diagnosis)));
     let dot = |(x, y): (f64, f64)| ScatterPoint { x, y, x_interval: None, y_interval: None };
-    let dots = celsius(&course.read_k).into_iter().map(dot).collect();
+    let dots = celsius(&history.read_k).into_iter().map(dot).collect();
     readings.add(Scatter::new(dots, palette::INK).size_px(2.0).label("read"));
     rule(&mut readings);
     let mut left =
         Panel::new(Axis::new("time, s"), Axis::new("read less predicted, K")).title("(b) residual");
     let off = |predicted: &[f64]| {
-        over(&mut course.read_k.iter().zip(predicted).map(|(read, predicted)| read - predicted))
+        over(&mut history.read_k.iter().zip(predicted).map(|(read, predicted)| read - predicted))
     };
-    left.add(Line::new(off(&course.before_k), palette::INK).label("without a cause"));
-    left.add(Line::new(off(&course.after_k), palette::BLUE).label(cause_label(diagnosis)));
+    left.add(Line::new(off(&history.before_k), palette::INK).label("without a cause"));
+    left.add(Line::new(off(&history.after_k), palette::BLUE).label(cause_label(diagnosis)));
     rule(&mut left);
     let side = diagnosis.side.name();
     Figure::new(format!("The {side} side of {name}, driven by its measured neighbours"))

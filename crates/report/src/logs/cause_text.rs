@@ -174,15 +174,15 @@ fn phases(text: &mut String, held_out: &HeldOut, channel: &str) {
          {:.2} K with the cause that they choose; {:.2} K less on average ({:.2} .. {:.2}, {} phases)",
         held_out.before_k,
         held_out.after_k,
-        held_out.shrink_k,
-        held_out.shrink_low_k,
-        held_out.shrink_high_k,
+        held_out.gap_reduction_k,
+        held_out.gap_reduction_low_k,
+        held_out.gap_reduction_high_k,
         held_out.phases.len()
     );
     let named = held_out.phases.iter().any(|phase| !phase.chosen.is_empty());
     if named && held_out.after_k >= held_out.before_k {
         text.push_str("          the cause does not reduce the residual of held-out phases\n");
-    } else if named && held_out.shrink_low_k <= 0.0 {
+    } else if named && held_out.gap_reduction_low_k <= 0.0 {
         text.push_str("          too few phases to exclude chance\n");
     }
     for phase in &held_out.phases {

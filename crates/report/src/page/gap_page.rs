@@ -53,7 +53,7 @@ fn sections(diagnosed: &Diagnosed, heading: &dyn Fn(&str) -> Markup) -> Markup {
     let with_cause = diagnosed.with_cause.as_ref().filter(|_| diagnosis.verdict != Verdict::WithinTolerance);
     html! {
         // The closure term in the headline is not repeated.
-        @for law in diagnosis.laws.iter().filter(|law| !headline(diagnosis).contains(&law.sentence)) {
+        @for law in diagnosis.closure_terms.iter().filter(|law| !headline(diagnosis).contains(&law.sentence)) {
             p { "Closure term for " (law.submodel) ": " b { (law.sentence) } }
         }
         (heading("Causes"))
@@ -66,9 +66,9 @@ fn sections(diagnosed: &Diagnosed, heading: &dyn Fn(&str) -> Markup) -> Markup {
             p { "Inseparable in this recording: " (diagnosis.inseparable.join(", ")) "." }
         }
         (pictures("Ends of the steps on the map, coloured by the difference between measured and computed readings.", residual_maps(diagnosed)))
-        @if !diagnosis.forces.is_empty() {
+        @if !diagnosis.residual_sources.is_empty() {
             (heading("Missing heat, power or flow of each balance, if it alone has one"))
-            (forces(diagnosed))
+            (residual_sources(diagnosed))
         }
         (heading("Difference between measured and computed readings"))
         p {
@@ -137,18 +137,18 @@ fn causes(diagnosed: &Diagnosed) -> Markup {
 }
 
 /// The residual source term of each balance at the end of each step, if that balance alone has one.
-fn forces(diagnosed: &Diagnosed) -> Markup {
-    let forces = &diagnosed.diagnosis.forces;
+fn residual_sources(diagnosed: &Diagnosed) -> Markup {
+    let residual_sources = &diagnosed.diagnosis.residual_sources;
     let table = html! {
         table {
             tr {
                 th { "step" }
-                @for force in forces { th { (force.force) ", " (force.unit) } }
+                @for source in residual_sources { th { (source.quantity) ", " (source.unit) } }
             }
             @for step in 0..diagnosed.study.steps.len() {
                 tr {
                     td { (step_number(step)) }
-                    @for [value, low, high] in forces.iter().filter_map(|force| force.steps.get(step)) {
+                    @for [value, low, high] in residual_sources.iter().filter_map(|source| source.steps.get(step)) {
                         td title=(format!("{low:.3e} .. {high:.3e}")) { (four_figures(*value)) }
                     }
                 }

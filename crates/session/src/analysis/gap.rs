@@ -134,7 +134,7 @@ impl Session<'_> {
             diagnosed.explain_by(law);
         }
         let diagnosis = &mut diagnosed.diagnosis;
-        (diagnosis.laws, diagnosis.forces) = (discovery.laws, discovery.forces);
+        (diagnosis.closure_terms, diagnosis.residual_sources) = (discovery.closure_terms, discovery.residual_sources);
         if let Some(places) = discovery.places {
             diagnosis.r#where = places;
             // The best extra sensor is one next to the location that was just found.
@@ -344,12 +344,12 @@ fn note_drift(diagnosis: &mut Diagnosis, drift: Option<&DriftReport>) {
     {
         diagnosis.verdict = Verdict::WithinTolerance;
         diagnosis.r#where.clear();
-        diagnosis.forces.clear();
+        diagnosis.residual_sources.clear();
         diagnosis.next = None;
         diagnosis.experiments.clear();
     }
     // A change with time cannot be expressed as a closure term.
-    diagnosis.laws.clear();
+    diagnosis.closure_terms.clear();
     if !subtracted && matches!(diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained) {
         diagnosis.verdict = Verdict::Unexplained;
         diagnosis.experiments.clear();

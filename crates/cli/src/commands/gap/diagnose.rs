@@ -82,7 +82,7 @@ impl Diagnose {
             gaps.push((recorded.path.display().to_string(), gap));
         }
         if let [(title, gap)] = &mut gaps[..] {
-            self.write_laws(&mut gap.diagnosed.diagnosis.laws)?;
+            self.write_laws(&mut gap.diagnosed.diagnosis.closure_terms)?;
             if let Some(file) = &self.html {
                 let page = gap.page(&campaign.machine.name, title)?;
                 self.replace.write(file, page.as_bytes())?;

@@ -130,7 +130,7 @@ fn diagnose_side<S: SideModel>(request: &SideRequest<'_>) -> Result<Diagnosis, D
         asked,
         not_asked: not_diagnosable,
         unknowns: unknowns::<S>(likeliest),
-        course: ChannelTrace {
+        time_history: ChannelTrace {
             t_s: rows.t_s.clone(),
             read_k: rows.judged[0].1.clone(),
             before_k: found.null.predicted[0].clone(),

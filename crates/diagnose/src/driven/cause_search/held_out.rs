@@ -72,7 +72,7 @@ pub(crate) fn held_out<S: SideModel>(
         (squares.sum::<f64>() / phases.iter().map(|rows| rows.len() as f64).sum::<f64>()).sqrt()
     };
     let reductions: Vec<f64> = found.iter().map(|phase| phase.before_k - phase.after_k).collect();
-    let shrink_k = mean(&reductions)?;
+    let gap_reduction_k = mean(&reductions)?;
     let samples = reductions.len() as f64;
     let half_k = student_quantile(0.975, samples - 1.0).unwrap_or(f64::INFINITY)
         * standard_deviation(&reductions).unwrap_or(f64::INFINITY)
@@ -80,9 +80,9 @@ pub(crate) fn held_out<S: SideModel>(
     Some(HeldOut {
         before_k: whole(&|phase| phase.before_k),
         after_k: whole(&|phase| phase.after_k),
-        shrink_k,
-        shrink_low_k: shrink_k - half_k,
-        shrink_high_k: shrink_k + half_k,
+        gap_reduction_k,
+        gap_reduction_low_k: gap_reduction_k - half_k,
+        gap_reduction_high_k: gap_reduction_k + half_k,
         phases: found,
     })
 }

@@ -78,11 +78,11 @@ pub struct HeldOut {
     /// With the cause, K.
     pub after_k: f64,
     /// Mean reduction over the phases, K.
-    pub shrink_k: f64,
+    pub gap_reduction_k: f64,
     /// Lower end of its 95 % interval (Student's t, one sample per phase).
-    pub shrink_low_k: f64,
+    pub gap_reduction_low_k: f64,
     /// Upper end.
-    pub shrink_high_k: f64,
+    pub gap_reduction_high_k: f64,
 }
 
 /// Prediction after the fitted part.
@@ -177,7 +177,7 @@ pub struct Diagnosis {
     /// Unknowns of the side under the likeliest explanation.
     pub unknowns: Vec<Unknown>,
     /// The first judged channel over time.
-    pub course: ChannelTrace,
+    pub time_history: ChannelTrace,
     /// Unusable rows.
     pub lost_rows: usize,
 }

@@ -44,9 +44,10 @@ pub struct Diagnosis {
     /// Probability that the cause is not in the effect library.
     pub probability_outside: f64,
     /// Laws for the gap that the effect library does not explain, best first; empty if none is proposed.
-    pub laws: Vec<Law>,
+    #[serde(rename = "laws")]
+    pub closure_terms: Vec<Law>,
     /// Residual source term of each balance, if it is the only one, most probable first; empty without a search.
-    pub forces: Vec<MissingSource>,
+    pub residual_sources: Vec<MissingSource>,
     /// The gap before and after the best cause.
     pub gap: Gap,
     /// Suggested next step; `None` if the diagnosis is settled.
@@ -142,7 +143,7 @@ pub struct Law {
     /// Probability of this law among all laws tried and no law.
     pub probability: f64,
     /// Share of the gap removed on steps used neither to find nor to fit the law; 0 if any channel gets worse.
-    pub shrink: f64,
+    pub gap_reduction: f64,
     /// Number of these held-out steps.
     pub held_out_steps: usize,
     /// Gap of each channel on these steps.
@@ -183,7 +184,7 @@ pub struct MissingSource {
     /// Part of the model.
     pub submodel: String,
     /// The missing quantity.
-    pub force: String,
+    pub quantity: String,
     /// Its unit.
     pub unit: String,
     /// Logarithm of its evidence relative to none.
@@ -266,12 +267,13 @@ pub struct Gap {
     pub before: f64,
     /// The same with the best cause.
     pub after: f64,
-    /// Gap reduction as a share; 0 if a channel gets worse.
-    pub shrink: f64,
+    /// Gap reduction as a share; 0 if a channel gets worse. Scorers of other simulators read it by this name.
+    #[serde(rename = "shrink")]
+    pub gap_reduction: f64,
     /// 95 % interval of this share for similar steps: lower end.
-    pub shrink_low: f64,
+    pub gap_reduction_low: f64,
     /// Upper end.
-    pub shrink_high: f64,
+    pub gap_reduction_high: f64,
     /// Number of steps with a misfit beyond noise after the tolerance fit: the sample size of the interval.
     pub steps_with_gap: usize,
     /// Index of the step with the largest share of the gap, from 0; files use its number, from 1.
@@ -280,7 +282,7 @@ pub struct Gap {
     /// Its share of the gap.
     pub largest_share: f64,
     /// The tolerance furthest outside its prior without a cause; `None` if all are within three sigmas.
-    pub strained: Option<BeyondPrior>,
+    pub beyond_prior: Option<BeyondPrior>,
     /// Channels that the cause makes worse.
     pub worse: Vec<String>,
     /// Indices of the steps held out in one of the folds; empty if there are too few steps. Files use numbers, from 1.
@@ -489,5 +491,5 @@ impl Diagnosis {
 
 /// The law that is more probable than not; `None` if there is none.
 pub fn law_found(diagnosis: &Diagnosis) -> Option<&Law> {
-    diagnosis.laws.first().filter(|law| law.probability > 0.5)
+    diagnosis.closure_terms.first().filter(|law| law.probability > 0.5)
 }

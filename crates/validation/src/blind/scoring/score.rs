@@ -52,7 +52,8 @@ struct Estimate {
 
 #[derive(Debug, Clone, Copy, Deserialize)]
 struct Gap {
-    shrink: Option<f64>,
+    #[serde(rename = "shrink")]
+    gap_reduction: Option<f64>,
 }
 
 /// The result of one case.
@@ -129,7 +130,7 @@ pub struct Score {
     /// Median error of a parameter over its distance from neutral; `None` if none was named.
     pub parameter_error_median: Option<f64>,
     /// Median share of the gap that was removed; `None` if nothing was named.
-    pub shrink_median: Option<f64>,
+    pub gap_reduction_median: Option<f64>,
     /// Brier score: mean squared difference between 1 and the probability of the true cause; `None` without cases.
     pub squared_miss_mean: Option<f64>,
     /// Mean number of indistinguishable explanations; `None` without diagnoses.
@@ -201,7 +202,7 @@ fn score_truths(truths: &[Truth], diagnosis_of: impl Fn(&str) -> Option<Diagnosi
     for (class, from_sigma) in score.classes.iter_mut().zip(std::iter::once(&0.0).chain(&CLASSES_SIGMA)) {
         class.from_sigma = *from_sigma;
     }
-    let (mut errors, mut shrinks, mut squared_misses, mut set_sizes) = (vec![], vec![], vec![], vec![]);
+    let (mut errors, mut reductions, mut squared_misses, mut set_sizes) = (vec![], vec![], vec![], vec![]);
     for truth in truths {
         let causes: BTreeSet<String> = truth.effects.keys().cloned().collect();
         let kind = kind_of(truth);
@@ -273,7 +274,7 @@ fn score_truths(truths: &[Truth], diagnosis_of: impl Fn(&str) -> Option<Diagnosi
                             (estimate.low.unwrap_or(f64::NAN), estimate.high.unwrap_or(f64::NAN));
                         score.covered.count(low <= value && value <= high);
                     }
-                    shrinks.extend(diagnosis.gap.and_then(|gap| gap.shrink));
+                    reductions.extend(diagnosis.gap.and_then(|gap| gap.gap_reduction));
                 }
             }
         }
@@ -292,7 +293,7 @@ fn score_truths(truths: &[Truth], diagnosis_of: impl Fn(&str) -> Option<Diagnosi
     }
     // For an even number, the upper of the two middle values, as in `score.py`.
     score.parameter_error_median = nearest_rank(&errors, 0.5);
-    score.shrink_median = nearest_rank(&shrinks, 0.5);
+    score.gap_reduction_median = nearest_rank(&reductions, 0.5);
     score.squared_miss_mean = mean(&squared_misses);
     score.set_size_mean = mean(&set_sizes);
     score

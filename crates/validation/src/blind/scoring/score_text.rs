@@ -44,7 +44,7 @@ impl Score {
             ("place right (first two)", self.place.to_string()),
             ("parameter error, median", format!("{} %", number(percent, 1))),
             ("95 % interval covers truth", self.covered.to_string()),
-            ("gap reduction, median", number(self.shrink_median, 3)),
+            ("gap reduction, median", number(self.gap_reduction_median, 3)),
             ("mean squared error of p", number(self.squared_miss_mean, 3)),
             ("set size, mean", number(self.set_size_mean, 2)),
         ]

@@ -58,7 +58,6 @@ pub struct Driver {
     description: Option<RigDescription>,
     secrets: Secrets,
     timeouts: Timeouts,
-    /// Number of the last request.
     last_request: u64,
     armed: Option<Lease>,
     /// Whether arming was requested and neither refused nor followed by a release, so that this session may own the rig.

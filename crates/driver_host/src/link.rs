@@ -120,7 +120,6 @@ impl Link {
         })
     }
 
-    /// The sender.
     pub(crate) fn sender(&self) -> Result<&MessageSender, DriverError> {
         self.sender.as_ref().ok_or_else(|| DriverError::Ended(String::new()))
     }

@@ -98,7 +98,6 @@ impl IdentifyConfig {
         self.reference.corrected_flow_kg_s(flow_kg_s * self.air.dry_flow_ratio(), t1_k, p1_pa)
     }
 
-    /// Declared uncertainty of a sensor.
     pub(crate) fn sensor(&self, channel: Channel) -> DeclaredUncertainty {
         self.declared.get(&channel).copied().unwrap_or_default()
     }

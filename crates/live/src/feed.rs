@@ -64,7 +64,6 @@ struct FeedState {
     overrun_s: Vec<f64>,
     /// Whether the operator held the current step: its duration must not influence the forecast.
     held: bool,
-    /// Number of started steps.
     started_steps: usize,
     soak_s: f64,
     /// Planned rig time after the current step, s.

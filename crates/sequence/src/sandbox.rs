@@ -52,7 +52,6 @@ impl Budget {
         self.cancelled.store(true, Ordering::Relaxed);
     }
 
-    /// Counts one operation.
     pub(crate) fn count_operation(&self) -> Option<ScriptEnd> {
         if self.cancelled.load(Ordering::Relaxed) {
             return Some(ScriptEnd::Cancelled);

@@ -37,7 +37,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-formats",   &["core", "yaml", "numerics", "physics", "chart", "maps"]),
     ("mapper-log-formats", &["recording", "workbook"]),
     // Text, pages and pictures, made from data.
-    ("mapper-report",    &["core", "chart", "observe", "physics", "campaign", "planner", "identify", "numerics", "maps", "diagnose", "history", "recording", "sequence", "fleet"]),
+    ("mapper-report",    &["core", "chart", "observe", "physics", "campaign", "planner", "identify", "numerics", "maps", "diagnose", "history", "recording", "fleet"]),
     // The application as a library. The caller passes the plug-ins.
     ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "recording", "observe", "identify", "diagnose", "history", "maps", "report", "numerics", "fleet", "fmu", "yaml"]),
     // The live page of a run.

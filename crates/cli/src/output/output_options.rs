@@ -18,7 +18,6 @@ pub struct OutputOptions {
     progress: Option<String>,
 }
 
-/// The chosen options.
 #[derive(Debug, Clone, Copy, Default)]
 struct ChosenOptions {
     colour: ColourChoice,

@@ -183,7 +183,6 @@ struct State {
     sent_s: f64,
 }
 
-/// The bar.
 struct ProgressDisplay {
     bar: ProgressBar,
 }

@@ -39,7 +39,6 @@ impl Token {
     }
 }
 
-/// The parts of a name.
 pub(super) fn parts_of(name: &str) -> Vec<Token> {
     let mut tokens = Vec::new();
     for part in normalise(name).split('_').filter(|part| !part.is_empty()) {

@@ -5,7 +5,6 @@ use super::measured::Measured;
 /// Tags with another meaning if their number is short: `PT2` is the total pressure at station 2, `TIT 1` a turbine inlet temperature.
 const LONG_NUMBERS: [&str; 6] = ["tt", "pt", "pi", "pit", "tit", "st"];
 
-/// A tag number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Tag {
     pub(super) measured: Measured,

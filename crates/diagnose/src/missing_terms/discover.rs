@@ -84,7 +84,11 @@ pub fn discover(
     let places = places((diagnosed, calibration), &bench, found.as_ref(), &residual_sources, bend);
     Discovered {
         closure_terms,
-        residual_sources: residual_sources.into_iter().take(1 + MAX_EQUIVALENT).map(reported_source).collect(),
+        residual_sources: residual_sources
+            .into_iter()
+            .take(1 + MAX_EQUIVALENT)
+            .map(reported_source)
+            .collect(),
         places: Some(places),
         settled: settled_fit,
     }

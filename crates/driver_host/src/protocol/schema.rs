@@ -2,7 +2,9 @@
 
 #[cfg(test)]
 mod tests {
-    use crate::protocol::{Configure, DescribeResult, Failure, Hello, LastSample, Message, Poll, Samples, Welcome};
+    use crate::protocol::{
+        Configure, DescribeResult, Failure, Hello, LastSample, Message, Poll, Samples, Welcome,
+    };
     use mapper_core::Setpoints;
     use proptest::prelude::*;
     use schemars::{JsonSchema, generate::SchemaSettings};

@@ -53,7 +53,6 @@ pub(crate) fn write_whole(
     })
 }
 
-/// Reads a file of at most `limit_bytes`.
 pub(crate) fn read_at_most(path: &Path, limit_bytes: usize) -> Result<Vec<u8>, FleetError> {
     mapper_yaml::read_limited(path, limit_bytes).map_err(FleetError::file("read", path))
 }

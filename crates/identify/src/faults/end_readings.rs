@@ -19,7 +19,6 @@ pub(crate) const CHANNELS: [Channel; 7] = [
     Channel::ShaftSpeed,
 ];
 
-/// One number for each of [`CHANNELS`].
 pub(crate) type PerChannel = [f64; CHANNELS.len()];
 
 /// Readings with the time at which they were taken.

@@ -147,7 +147,6 @@ fn is_flow(quantity: Quantity) -> bool {
     matches!(quantity, Quantity::Flow | Quantity::TurbineFlow)
 }
 
-/// The measured values of a point.
 fn measured_point(
     point: &Point<'_>,
     description: &MapDescription,
@@ -188,10 +187,6 @@ pub fn reduced_turbine_point(point: &MeasuredTurbinePoint) -> TurbineMapPoint {
     }
 }
 
-/// Checks the values of a point.
-///
-/// # Errors
-/// [`ImportError::Value`] for a value that is impossible for a turbine.
 fn check(line: usize, row: TurbineMapPoint) -> Result<TurbineMapPoint, ImportError> {
     let flow = row.flow_parameter_kg_sqrt_k_s_kpa;
     let eta = row.efficiency.unwrap_or(0.5);

@@ -226,8 +226,7 @@ mod tests {
     /// are simple on purpose: they follow the table within 1 % (cp), 2 % (mu) and 5 % (k).
     #[test]
     fn properties_follow_the_tables() {
-        let conductivity_w_mk =
-            |t_k: f64| CONDUCTIVITY_AT_300_K_W_MK * ln_conductivity_ratio(t_k).exp();
+        let conductivity_w_mk = |t_k: f64| CONDUCTIVITY_AT_300_K_W_MK * ln_conductivity_ratio(t_k).exp();
         for (t_k, cp, mu, k) in [
             (300.0, 1007.0, 184.6e-7, 26.3e-3),
             (400.0, 1014.0, 230.1e-7, 33.8e-3),

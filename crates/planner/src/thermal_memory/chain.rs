@@ -46,7 +46,6 @@ pub trait Chain {
 pub(crate) struct RepeatedJump {
     pub(crate) from: usize,
     pub(crate) to: usize,
-    /// Number of repeats.
     pub(crate) count: usize,
 }
 

@@ -6,49 +6,29 @@ use std::fmt;
 coded_enum! {
 /// A property of a log, by its stable code. It displays as one sentence with values. Rows count from 1.
 LogFinding {
-    /// How the text of the log is written.
     "dialect" Dialect { separator: char, decimal: char, is_decimal_assumed: bool, encoding: String },
     /// The rows of the header; `units_in_names`: the names contain the units.
     "header" Header { names_row: Option<usize>, units_row: Option<usize>, units_in_names: bool, data_row: usize },
-    /// A row apart from the header has the units of columns without one.
     "distant_units" DistantUnits { row: usize },
-    /// Cells have their unit after the number.
     "units_in_cells" UnitsInCells { columns: usize },
-    /// Rows before the header were skipped.
     "skipped_rows" SkippedRows { rows: usize },
-    /// Equal names were numbered.
     "repeated_names" RepeatedNames { names: usize },
-    /// Each row names its quantity.
     "long_form" LongForm { name: String, value: String, quantities: usize },
-    /// The user gave the rate.
     "rate" Rate { rate_hz: f64 },
-    /// The file has the interval of its samples.
     "waveform" Waveform { interval_s: f64 },
     /// The clock of a group; `others`: clocks of the same pace.
     "clock" Clock { group: String, clock: String, others: Vec<String> },
-    /// Each group has a clock of its own.
     "clocks" Clocks { groups: usize },
-    /// The clocks have different epochs.
     "epochs" DifferentEpochs,
-    /// Day and month of a date cannot be distinguished.
     "ambiguous_date" AmbiguousDate { column: String },
-    /// A date goes back by an hour.
     "hour_back" HourBack,
-    /// Program and version of an MDF file.
     "mdf_version" MdfVersion { version: String, program: String },
-    /// The file contains frames of a bus.
     "bus_frames" BusFrames,
-    /// Columns with a name have no values.
     "without_values" WithoutValues { columns: Vec<String> },
-    /// Columns were left out.
     "left_out" LeftOut { columns: usize, reason: String },
-    /// A named column or table was left out.
     "skipped" Skipped { part: String, name: String, reason: String },
-    /// Hidden sheets, and whether they are read.
     "hidden_sheets" HiddenSheets { sheets: Vec<String>, is_read: bool },
-    /// Only hidden sheets have tables, and several do.
     "several_hidden" SeveralHidden,
-    /// A property of one table of the file.
     "in_table" InTable { part: String, name: String, finding: Box<LogFinding> },
 }
 }

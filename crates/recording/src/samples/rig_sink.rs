@@ -51,7 +51,6 @@ pub(crate) enum SinkMessage {
 /// A message with its place in the file.
 #[derive(Debug)]
 pub(crate) struct PositionedMessage<T> {
-    /// Number of the message.
     pub(crate) position: u64,
     pub(crate) log_time_ns: u64,
     pub(crate) message: T,

@@ -19,7 +19,6 @@ const MIN_FAST_RATIO: f64 = 0.01;
 /// Minimum relative change of P3 by a chain of slow changes that is a jump of a slow rig. A smaller one is a speed controller's.
 const MIN_SLOW_RATIO: f64 = 0.02;
 
-/// A message on `/step`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub(crate) struct StepMessage {
     #[serde(flatten, with = "mapper_core::test_plan::step_number::entry")]

@@ -17,9 +17,7 @@ pub(crate) type McapFile = Writer<NoSeek<BufWriter<File>>>;
 /// A file that is ready for messages.
 pub(crate) struct OpenedFile {
     pub(crate) mcap: McapFile,
-    /// Channel of `/step`.
     pub(crate) step_channel: u16,
-    /// Channel of `/event`.
     pub(crate) event_channel: u16,
 }
 

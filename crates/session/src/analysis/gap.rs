@@ -134,7 +134,8 @@ impl Session<'_> {
             diagnosed.explain_by(law);
         }
         let diagnosis = &mut diagnosed.diagnosis;
-        (diagnosis.closure_terms, diagnosis.residual_sources) = (discovery.closure_terms, discovery.residual_sources);
+        (diagnosis.closure_terms, diagnosis.residual_sources) =
+            (discovery.closure_terms, discovery.residual_sources);
         if let Some(places) = discovery.places {
             diagnosis.r#where = places;
             // The best extra sensor is one next to the location that was just found.

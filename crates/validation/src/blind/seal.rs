@@ -55,7 +55,6 @@ pub(crate) fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Reads a JSON file.
 pub(crate) fn read_json<T: DeserializeOwned>(path: &Path, what: &'static str) -> Result<T, BlindError> {
     let bytes = read(path)?;
     serde_json::from_slice(&bytes).map_err(|source| BlindError::Content {

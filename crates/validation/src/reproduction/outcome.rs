@@ -53,7 +53,6 @@ impl Outcome {
     }
 }
 
-/// Identifies a run.
 pub(crate) fn identify_run(run: &Run, config: &IdentifyConfig) -> Result<Outcome, ReproduceError> {
     identify_recording(run, &run.recording, config)
 }

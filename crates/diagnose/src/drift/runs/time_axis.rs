@@ -81,7 +81,6 @@ pub(crate) fn steps(runs: &[&Recording]) -> Vec<CampaignStep> {
     steps
 }
 
-/// The segments of all steps.
 pub(crate) fn segments(steps: &[CampaignStep]) -> Vec<Segment> {
     let of_step = |(position, step): (usize, &CampaignStep)| {
         let segments = SEGMENTS.segments(step.start_s, step.end_s, 0.0);

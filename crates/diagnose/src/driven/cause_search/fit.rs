@@ -369,7 +369,12 @@ impl<S: SideModel> Model for Objective<'_, '_, S> {
 }
 
 /// The normal equations of slopes and a residual; `pulls` as in [`Objective::pulls`].
-fn normal(whitenings: &[WhiteningFilter], slopes: &[Columns], residual: &Columns, pulls: &[(f64, f64)]) -> Normal {
+fn normal(
+    whitenings: &[WhiteningFilter],
+    slopes: &[Columns],
+    residual: &Columns,
+    pulls: &[(f64, f64)],
+) -> Normal {
     let columns: Vec<Columns> = slopes.iter().map(|slope| whitened(whitenings, slope)).collect();
     let residual = whitened(whitenings, residual);
     let matrix = DMatrix::from_fn(columns.len(), columns.len(), |i, j| {

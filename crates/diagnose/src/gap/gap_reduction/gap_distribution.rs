@@ -9,7 +9,6 @@ pub(crate) struct GapReduction {
     pub(crate) removed: f64,
     /// 95 % interval of this share for similar steps.
     pub(crate) interval: (f64, f64),
-    /// Number of steps with a gap.
     pub(crate) steps: usize,
     /// Index of the step with most of the gap and its share; `None` if no step has a gap.
     pub(crate) largest: Option<(usize, f64)>,

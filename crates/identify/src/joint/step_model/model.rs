@@ -243,7 +243,6 @@ impl Setting {
         (at(local[ETA] + SLOPE_STEP) - at(local[ETA] - SLOPE_STEP)) / (2.0 * SLOPE_STEP)
     }
 
-    /// Predicts T2, K.
     pub(crate) fn predict_t2_k(
         &self,
         history: &StepHistory<'_>,

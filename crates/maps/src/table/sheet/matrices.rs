@@ -29,7 +29,6 @@ struct Matrix {
     title: Column,
     /// Row of the title.
     at: usize,
-    /// Rows of the values.
     rows: Range<usize>,
     /// The axis of the speed and the other one, as written.
     speeds: Vec<f64>,

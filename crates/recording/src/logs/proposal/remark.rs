@@ -6,59 +6,34 @@ use std::fmt;
 coded_enum! {
 /// A remark on a proposal, by its stable code. It displays as one sentence with values.
 ProposalRemark {
-    /// Other columns have names that fit as well.
     "rivals" Rivals { columns: Vec<String> },
-    /// The name may be of another quantity or place.
     "ambiguous_name" AmbiguousName,
-    /// The names are tag numbers of a piping diagram, which have the quantity and no place.
     "tag_numbers" TagNumbers { columns: Vec<String> },
     /// The tag number gives no place, but only one order of the loops is a compressor (and turbine).
     "tag_station" TagStation { number: u32 },
-    /// The name indicates a value that the stand computed.
     "computed" Computed,
-    /// The readings are impossible in the unit of the log.
     "implausible_range" ImplausibleRange { min: f64, max: f64, unit: String, plausible_units: Vec<String> },
-    /// Some readings are impossible: marks of missing values, or faults.
     "impossible_readings" ImpossibleReadings { value: f64, unit: String },
     /// The range fits one unit alone; `columns`: number of columns of the kind that share it.
     "one_unit_fits" OneUnitFits { unit: String, columns: usize },
-    /// The range fits no unit.
     "no_unit_fits" NoUnitFits { min: f64, max: f64 },
-    /// The range fits several units.
     "several_units_fit" SeveralUnitsFit { units: Vec<String> },
-    /// The other units of the log are imperial, and the inlet would be too warm in degC.
     "imperial" Imperial,
-    /// The unit of a flow fits the machine's flows at a speed.
     "fits_machine" FitsMachine { unit: String, surge_kg_s: f64, choke_kg_s: f64, speed_rpm: f64 },
-    /// The unit of a flow fits the size of the wheel.
     "fits_wheel" FitsWheel { unit: String, diameter_m: f64 },
-    /// The unit of a column that may be a channel is unknown.
     "unknown_unit" UnknownUnit { channel: Channel, column: String, unit: String },
-    /// A column that may be a channel is a volume flow.
     "volume_flow" VolumeFlow { channel: Channel, column: String, unit: String },
-    /// A column that may be a channel is a flow at an unstated standard temperature.
     "standard_flow" StandardFlow { channel: Channel, column: String, unit: String, known_units: Vec<String> },
-    /// The readings are too low for an absolute pressure.
     "taken_as_gauge" TakenAsGauge { min_pa: f64 },
-    /// The log gives no reference of a pressure, and P1 is a gauge pressure.
     "gauge_like_inlet" GaugeLikeInlet,
-    /// A channel is above another, as expected while the shaft turns.
     "above" Above { higher: Channel, lower: Channel, share: f64 },
-    /// A channel is too seldom above another.
     "seldom_above" SeldomAbove { higher: Channel, lower: Channel, share: f64 },
-    /// The stations may be numbered as in a gas turbine.
     "other_stations" OtherStations,
-    /// The stations are numbered as in a gas turbine.
     "gas_turbine_stations" GasTurbineStations,
-    /// The log is of an engine, so that a valve may be the engine's.
     "engine_valve" EngineValve,
-    /// The speed is as low as an engine's.
     "engine_speed" EngineSpeed { max_rpm: f64 },
-    /// Flow correlates with speed, or does not.
     "correlation" Correlation { r: f64, is_expected: bool },
-    /// A temperature without a place is above that of an ideal compression, so it is the gas.
     "gas_temperature" GasTemperature { max_k: f64, ideal_k: f64 },
-    /// A temperature without a place may be the gas after the machine.
     "housing_or_gas" HousingOrGas { gas: Channel },
 }
 }

@@ -78,10 +78,17 @@ impl Steps {
     }
 }
 
-/// A command in the root of the repository.
+/// A command in the root of the repository, without the variables that `cargo run` sets for this program: a build script that looks at them
+/// would make its library again where a test or the shell builds, and once more in the next step.
 pub fn command(program: impl AsRef<OsStr>, arguments: &[&str]) -> Command {
     let mut command = Command::new(program);
     command.args(arguments).current_dir(workspace::root());
+    for (name, _) in std::env::vars_os() {
+        let text = name.to_string_lossy();
+        if ["CARGO_PKG_", "CARGO_MANIFEST_"].iter().any(|start| text.starts_with(start)) {
+            command.env_remove(&name);
+        }
+    }
     command
 }
 

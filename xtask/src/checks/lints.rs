@@ -1,6 +1,7 @@
 //! Lints and documentation.
 
 use crate::error::Error;
+use crate::files;
 use crate::step::{command, output, say};
 use crate::workspace;
 use std::ffi::{OsStr, OsString};
@@ -55,7 +56,7 @@ pub fn as_rustdoc() -> Option<ExitCode> {
     let succeeds = |arguments: &[OsString]| {
         Command::new(&rustdoc).args(arguments).status().is_ok_and(|status| status.success())
     };
-    let mut well = succeeds(&arguments);
+    let mut well = !has_examples(&arguments) || succeeds(&arguments);
     if arguments.iter().any(|argument| argument == "--test") {
         let out = workspace::target_dir().join("doc").into_os_string();
         let more = ["-D".into(), "warnings".into(), "--out-dir".into(), out];
@@ -65,6 +66,19 @@ pub fn as_rustdoc() -> Option<ExitCode> {
         say("rustdoc failed\n");
     }
     Some(if well { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// Whether the documentation of the crate may contain examples: to look for them, rustdoc reads the crate as thoroughly as for its pages.
+fn has_examples(arguments: &[OsString]) -> bool {
+    let root = arguments.iter().map(Path::new).find(|path| path.extension() == Some(OsStr::new("rs")));
+    let files = root.and_then(Path::parent).and_then(|folder| files::rust_files(folder).ok());
+    // What is no folder of sources is left to rustdoc.
+    files.is_none_or(|files| {
+        files.iter().any(|file| {
+            files::read(file)
+                .is_ok_and(|text| ["/// ```", "//! ```"].iter().any(|fence| text.contains(fence)))
+        })
+    })
 }
 
 /// Arguments of rustdoc without those that concern tests.

@@ -2,7 +2,7 @@
 
     python browse_live.py CHROMIUM FOLDER MAPPER run CAMPAIGN --out RUNS --pace 60
 
-Pictures of the page (390 and 1400 px wide, light and dark) and of its head are left in FOLDER.
+Pictures of the page (1400 px wide and light, 390 px wide and dark) and of its head are left in FOLDER.
 """
 
 import atexit
@@ -20,7 +20,7 @@ from pathlib import Path
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import sync_playwright
 
-from chromium import launched, serious_findings, watched
+from chromium import VIEWS, launched, serious_findings, watched
 
 chromium, folder, command = sys.argv[1], Path(sys.argv[2]), sys.argv[3:]
 console, serious, requests, result = [], [], [], {}
@@ -122,17 +122,16 @@ with sync_playwright() as playwright:
     until(page, "document.querySelector('#where').textContent.startsWith('Held')")
     until(page, "document.querySelector('#events').textContent.includes('the step is held')")
     result["held_at"] = page.text_content("#phase")
-    for width, height in [(1400, 1000), (390, 844)]:
-        for scheme in ["light", "dark"]:
-            other, small = opened(browser, width, height, scheme)
-            small.screenshot(path=folder / f"live-{width}-{scheme}.png", full_page=True)
-            if (width, scheme) == (1400, "light"):
-                small.screenshot(path=folder / "live.png")
-            serious.extend(serious_findings(Axe(), small, f"{width} {scheme}"))
-            result[f"overflow_{width}_{scheme}"] = small.evaluate(
-                "document.documentElement.scrollWidth - document.documentElement.clientWidth"
-            )
-            other.close()
+    for width, height, scheme in VIEWS:
+        other, small = opened(browser, width, height, scheme)
+        small.screenshot(path=folder / f"live-{width}-{scheme}.png", full_page=True)
+        if (width, scheme) == (1400, "light"):
+            small.screenshot(path=folder / "live.png")
+        serious.extend(serious_findings(Axe(), small, f"{width} {scheme}"))
+        result[f"overflow_{width}_{scheme}"] = small.evaluate(
+            "document.documentElement.scrollWidth - document.documentElement.clientWidth"
+        )
+        other.close()
     result["still_held_at"] = page.text_content("#phase")
     before = points()
     page.reload()

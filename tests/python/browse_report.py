@@ -2,7 +2,7 @@
 
     python browse_report.py CHROMIUM PAGE FOLDER [looked_at]
 
-Pictures of the page (390 and 1400 px wide, light and dark), of its head, and the print as A4 PDF are left in FOLDER. A page that is
+Pictures of the page (1400 px wide and light, 390 px wide and dark), of its head, and the print as A4 PDF are left in FOLDER. A page that is
 only looked at is neither used nor printed.
 """
 
@@ -13,7 +13,7 @@ from pathlib import Path
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import sync_playwright
 
-from chromium import launched, serious_findings, watched
+from chromium import VIEWS, launched, serious_findings, watched
 
 chromium, page_file, folder = sys.argv[1], Path(sys.argv[2]).resolve(), Path(sys.argv[3])
 console, requests, serious = [], [], []
@@ -102,17 +102,16 @@ def use_and_print(browser):
 
 with sync_playwright() as playwright:
     browser = launched(playwright, chromium)
-    for width, height in [(1400, 1000), (390, 844)]:
-        for scheme in ["light", "dark"]:
-            page = opened(browser, width, height, scheme)
-            page.screenshot(path=folder / f"report-{width}-{scheme}.png", full_page=True)
-            serious.extend(serious_findings(Axe(), page, f"{width} {scheme}"))
-            # Tables may be wider than a phone, the page may not.
-            result[f"overflow_{width}_{scheme}"] = page.evaluate(
-                "document.documentElement.scrollWidth - document.documentElement.clientWidth"
-            )
-            result["heads_without_sorting"] = page.locator("main thead th:not(:empty):not(:has(button))").count()
-            page.close()
+    for width, height, scheme in VIEWS:
+        page = opened(browser, width, height, scheme)
+        page.screenshot(path=folder / f"report-{width}-{scheme}.png", full_page=True)
+        serious.extend(serious_findings(Axe(), page, f"{width} {scheme}"))
+        # Tables may be wider than a phone, the page may not.
+        result[f"overflow_{width}_{scheme}"] = page.evaluate(
+            "document.documentElement.scrollWidth - document.documentElement.clientWidth"
+        )
+        result["heads_without_sorting"] = page.locator("main thead th:not(:empty):not(:has(button))").count()
+        page.close()
     if sys.argv[4:] != ["looked_at"]:
         use_and_print(browser)
     browser.close()

@@ -170,21 +170,22 @@ def main():
                         rms = math.sqrt(statistics.fmean(e * e for e in errors)) if errors else math.nan
                         print("  ", run.name, f"rms {rms:.2f} mean {statistics.fmean(errors):+.2f}", "; ".join(shown), flush=True)
         if arguments.write:
-            Path(arguments.write).write_text(PAGE.format(date=datetime.date.today(), table="\n".join(lines), seeds=len(seeds)))
+            Path(arguments.write).write_text(PAGE.format(date=datetime.date.today(), table="\n".join(lines), first=arguments.first, seeds=len(seeds)))
 
 
 PAGE = """\
 # Identification by class of machine
 
-Made on {date} by these commands, half an hour on two cores; do not edit. `--before OTHER/mapper` adds the rows of another build.
+Made on {date} by these commands, three quarters of an hour on two cores; do not edit. `--before OTHER/mapper` adds the rows of another build.
 
-    python3 benches/identification.py record recordings --mapper target/release/mapper
-    python3 benches/identification.py compare recordings --mapper target/release/mapper --write docs/validation/identification.md
+    python3 benches/identification.py record recordings --first {first} --mapper target/release/mapper
+    python3 benches/identification.py compare recordings --first {first} --mapper target/release/mapper --write docs/validation/identification.md
 
 The 48 points of `campaigns/turbo_a.yaml` on the virtual lab, {seeds} seeds a class, each with its own plan, noise and offsets, identified by `joint`. The class is
 the undeclared property of the machine: alpha_A; a T2 probe; the ratio of cooling to heating; mix 1: alpha_A 0.05, ratio 0.9, probe 0.7 mm;
 mix 2: alpha_A 0.08, ratio 0.93; mix 3: alpha_A 0.04, probe 1 mm. The bent map falls by 6 points more towards low speed; the other housing is heavier and
-has another law of convection and a tenth of its area before the wheel, all declared. "Lines" follows speed lines instead of thermal gradients.
+has another law of convection and a tenth of its area before the wheel, all declared. With alpha_A, every odd seed
+has an undeclared law of h before the wheel. "Lines" follows speed lines.
 
 Errors in points of efficiency. **covered**: share of the good points whose 95 % interval contains the truth. **half interval**: mean of all points.
 **recordings**: those whose mean error lies within their mean half interval. The points of a recording share most of their error, so N recordings

@@ -72,7 +72,7 @@ pub fn as_rustdoc() -> Option<ExitCode> {
 fn has_examples(arguments: &[OsString]) -> bool {
     let root = arguments.iter().map(Path::new).find(|path| path.extension() == Some(OsStr::new("rs")));
     let files = root.and_then(Path::parent).and_then(|folder| files::rust_files(folder).ok());
-    // What is no folder of sources is left to rustdoc.
+    // Without readable sources, rustdoc decides.
     files.is_none_or(|files| {
         files.iter().any(|file| {
             files::read(file)

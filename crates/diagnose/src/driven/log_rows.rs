@@ -2,6 +2,8 @@
 
 use crate::driven::DrivenError;
 use mapper_core::{Channel, Recording, SAMPLE_INTERVAL_S};
+use mapper_numerics::statistics::EXCLUDE_SIGMAS;
+use mapper_observe::declared::usual_noise_sigma;
 use mapper_observe::plausible::is_reading;
 
 /// Maximum number of rows, evenly spread over a longer log: five minutes at 10 Hz.
@@ -18,7 +20,14 @@ pub(crate) struct SideChannels<'a> {
 }
 
 /// Minimum pressure ratio of compressor or turbine: below it the work is so small that temperatures do not show the efficiency.
-pub(crate) const MIN_PRESSURE_RATIO: f64 = 1.02;
+const MIN_PRESSURE_RATIO: f64 = 1.02;
+
+/// Whether a side does enough work for its temperatures to show its efficiency. The equations divide by the flow, which a meter must
+/// distinguish from none.
+pub(crate) fn does_work(speed_rpm: f64, flow_kg_s: f64, low_pa: f64, high_pa: f64) -> bool {
+    let min_flow_kg_s = EXCLUDE_SIGMAS * usual_noise_sigma(Channel::CompressorFlow);
+    high_pa >= MIN_PRESSURE_RATIO * low_pa && flow_kg_s >= min_flow_kg_s && speed_rpm > 0.0
+}
 
 /// Complete rows, as columns of equal length. SI units.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -11,7 +11,7 @@ use crate::gap::causes::select::{
 };
 use crate::gap::causes::smallest_seen::smallest_seen;
 use crate::gap::findings::experiment::Experiment;
-use crate::gap::findings::report::{CLOSE_LOOKS, Diagnosis, Verdict};
+use crate::gap::findings::report::{Diagnosis, MAX_REFITTED, Verdict};
 use crate::gap::findings::warning::GapWarning;
 use crate::gap::gap_reduction::beyond_prior::beyond_prior;
 use crate::gap::gap_reduction::folds::Folds;
@@ -130,7 +130,7 @@ pub fn diagnose(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
     let mut finalists: Vec<&Fit> = found
         .fits
         .iter()
-        .take(CLOSE_LOOKS)
+        .take(MAX_REFITTED)
         .enumerate()
         .filter(|(place, f)| *place < 3 || !hopeless(f))
         .map(|(_, f)| f)
@@ -164,7 +164,7 @@ pub fn diagnose(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
         study.add_onsets();
         let at = Search { study: &study, linearised: at_best, selection, calibration, onsets: true };
         search_onsets(at, &null, &mut fits);
-        fits.truncate(CLOSE_LOOKS);
+        fits.truncate(MAX_REFITTED);
         fits = supported(&at, fits);
         left = adequacy(&study, &linearised, fits.first().unwrap_or(&null));
     }

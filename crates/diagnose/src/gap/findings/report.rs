@@ -440,7 +440,7 @@ impl Suggestion {
 /// Probability below which a cause other than the first is not listed: it would be shown as "<0.5 %".
 pub(crate) const EXCLUDED: f64 = 0.005;
 /// Maximum number of candidates that are evaluated with refits: fits of the search, and experiments. Judgement: limits the time.
-pub(crate) const CLOSE_LOOKS: usize = 7;
+pub(crate) const MAX_REFITTED: usize = 7;
 /// Maximum number of alternatives to the first cause, and of experiments of one kind: a longer list does not help.
 pub const MAX_EQUIVALENT: usize = 2;
 

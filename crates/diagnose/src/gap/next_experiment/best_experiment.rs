@@ -2,10 +2,10 @@
 
 use crate::gap::best_fit::fit::Fit;
 use crate::gap::findings::experiment::{AllowedJump, AlsoChanged, Experiment};
-use crate::gap::findings::report::{CLOSE_LOOKS, JumpPoint, Kind, MAX_EQUIVALENT, Next, Place, Suggestion};
+use crate::gap::findings::report::{JumpPoint, Kind, MAX_EQUIVALENT, MAX_REFITTED, Next, Place, Suggestion};
 use crate::gap::next_experiment::odds::{Odds, entropy_bit, odds};
 use crate::gap::next_experiment::outlook::{
-    HOUSINGS_SETTLE_S, apart, apart_at_first_sight, recorded_jumps, recorded_points,
+    SETTLED_HOUSINGS_S, apart, apart_at_first_sight, recorded_jumps, recorded_points,
 };
 use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::study::Study;
@@ -62,7 +62,7 @@ pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[Experiment], tempe
     looks.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut close: Vec<Experiment> = Vec::new();
     for kind in Kind::ALL {
-        let most = if kind == Kind::Jump { CLOSE_LOOKS } else { MAX_EQUIVALENT };
+        let most = if kind == Kind::Jump { MAX_REFITTED } else { MAX_EQUIVALENT };
         let of_kind = looks.iter().map(|(_, experiment)| *experiment).filter(|e| Kind::of(e) == kind);
         close.extend(of_kind.take(most));
     }
@@ -90,7 +90,7 @@ pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[Experiment], tempe
     for (experiment, odds, _) in &looked {
         let kind = Kind::of(experiment);
         let of_kind = experiments.iter().filter(|other| other.kind == kind).count();
-        if experiments.len() < CLOSE_LOOKS && of_kind < MAX_EQUIVALENT {
+        if experiments.len() < MAX_REFITTED && of_kind < MAX_EQUIVALENT {
             experiments.push(suggestion(kind, experiment, odds, open_bit));
         }
     }
@@ -149,7 +149,7 @@ fn script(experiment: &Experiment) -> Vec<String> {
         AlsoChanged::Oil { to_k, .. } => Some(format!("oil(\"{} degC\");", celsius(to_k))),
     };
     let go = [format!("jump({}, \"{} s\");", place(to), round(dwell_s))];
-    let start = [format!("jump({}, \"{HOUSINGS_SETTLE_S} s\");", place(from))];
+    let start = [format!("jump({}, \"{SETTLED_HOUSINGS_S} s\");", place(from))];
     start.into_iter().chain(change).chain(go).collect()
 }
 

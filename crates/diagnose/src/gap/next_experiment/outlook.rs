@@ -22,8 +22,8 @@ use mapper_physics::simulation::steady::hold_speed;
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// Time in which the housings settle, s: that at the start of a step in a script, and the maximum time at its target that is simulated.
-pub(crate) const HOUSINGS_SETTLE_S: f64 = 300.0;
+/// Duration of the first step of a script, and maximum simulated time at a target, s. Judgement: housings settle within minutes.
+pub(crate) const SETTLED_HOUSINGS_S: f64 = 300.0;
 
 /// The rig of a recording, for steps that are only simulated.
 #[derive(Debug, Clone)]
@@ -80,7 +80,7 @@ pub(crate) fn simulated_steps(
 /// A study of a simulated experiment: the settled start, then the step. Effects that began in the recording act.
 fn simulated_experiment(recorded: &Study, experiment: &Experiment, interval_s: f64) -> Option<Study> {
     let jump = &experiment.jump;
-    let dwell_s = jump.dwell_s.clamp(10.0, HOUSINGS_SETTLE_S);
+    let dwell_s = jump.dwell_s.clamp(10.0, SETTLED_HOUSINGS_S);
     let marker = |index: usize, from: f64, to: f64, p3_pa: f64, point: OperatingPoint| StepMarker {
         index,
         kind: StepKind::Repeat,

@@ -184,8 +184,9 @@ fn residual_source(
     Some(ResidualSource { balance, gain: best.gain, signature, levels })
 }
 
-/// Correlation length of a source term over speed, as a share of the highest, and over the opening of the valve.
-const SMOOTH: f64 = 0.3;
+/// Correlation length of a source term over speed, as a share of the highest, and over the opening of the valve. Judgement: the flow and heat
+/// of a machine change over a third of its map.
+const CORRELATION_LENGTH: f64 = 0.3;
 /// Variances of the common level and of the part smooth over the map, each, and of the free part of each step.
 const COMMON: f64 = 0.5;
 const FREE: f64 = 0.02;
@@ -196,7 +197,7 @@ pub fn covariance(study: &Study, points: &[PointState]) -> DMatrix<f64> {
     let highest_rpm = points.iter().map(|point| point.speed_rpm).fold(1.0, f64::max);
     let at = |step: usize| {
         let speed_ratio = points.get(step).map_or(0.0, |point| point.speed_rpm / highest_rpm);
-        (speed_ratio / SMOOTH, study.steps[step].marker.valve_opening_ratio / SMOOTH)
+        (speed_ratio / CORRELATION_LENGTH, study.steps[step].marker.valve_opening_ratio / CORRELATION_LENGTH)
     };
     let near = |a: (f64, f64), b: (f64, f64)| (-0.5 * ((a.0 - b.0).powi(2) + (a.1 - b.1).powi(2))).exp();
     // The decaying part is similar for jumps of similar size.

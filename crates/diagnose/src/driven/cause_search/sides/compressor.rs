@@ -3,7 +3,7 @@
 use crate::driven::cause_search::sides::side::{
     CORRELATION_S, HOUSING_CORRELATION_S, ModelError, Side, SideModel, relaxed_k, true_drive,
 };
-use crate::driven::log_rows::{MIN_PRESSURE_RATIO, Rows, SideChannels};
+use crate::driven::log_rows::{Rows, SideChannels, does_work};
 use crate::driven::parameters::{Parameter, log_normal, normal};
 use mapper_core::{Channel, SAMPLE_INTERVAL_S};
 use mapper_identify::EFFICIENCY;
@@ -79,7 +79,7 @@ impl SideModel for CompressorSide {
             judged: &[Channel::T2, Channel::Tc],
             is_usable: |row| {
                 let [speed_rpm, flow_kg_s, p1_pa, p2_pa, _] = *row else { return false };
-                p2_pa >= MIN_PRESSURE_RATIO * p1_pa && flow_kg_s > 0.0 && speed_rpm > 0.0
+                does_work(speed_rpm, flow_kg_s, p1_pa, p2_pa)
             },
         }
     }

@@ -3,7 +3,7 @@
 use crate::driven::cause_search::sides::side::{
     CORRELATION_S, HOUSING_CORRELATION_S, ModelError, Side, SideModel, relaxed_k, true_drive,
 };
-use crate::driven::log_rows::{MIN_PRESSURE_RATIO, Rows, SideChannels};
+use crate::driven::log_rows::{Rows, SideChannels, does_work};
 use crate::driven::parameters::{Parameter, log_normal, normal};
 use mapper_core::Channel;
 use mapper_physics::laws::housing::turbine_capacity_j_k;
@@ -54,7 +54,7 @@ impl SideModel for TurbineSide {
             judged: &[Channel::T4, Channel::Tt],
             is_usable: |row| {
                 let [speed_rpm, flow_kg_s, p3_pa, _, p4_pa] = *row else { return false };
-                p3_pa >= MIN_PRESSURE_RATIO * p4_pa && flow_kg_s > 0.0 && speed_rpm > 0.0
+                does_work(speed_rpm, flow_kg_s, p4_pa, p3_pa)
             },
         }
     }

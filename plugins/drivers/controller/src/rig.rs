@@ -127,6 +127,13 @@ struct Armed {
     accepted_heartbeat_s: Option<f64>,
 }
 
+impl Armed {
+    fn next_heartbeat(&mut self) -> f64 {
+        self.heartbeat = (self.heartbeat + 1) % (MAX_HEARTBEAT + 1);
+        f64::from(self.heartbeat)
+    }
+}
+
 impl<C: Controller> Rig<C> {
     fn armed(&mut self, call: &'static str) -> Result<&mut Armed, BackendError> {
         self.armed.as_mut().ok_or(BackendError::OutOfOrder { call, state: "not armed", needed: "armed" })
@@ -145,8 +152,7 @@ impl<C: Controller> Rig<C> {
     fn send_heartbeat(&mut self, until_s: f64) -> Option<String> {
         let armed = self.armed.as_mut().filter(|armed| until_s - armed.last_heartbeat_s >= HEARTBEAT_S)?;
         armed.last_heartbeat_s = until_s;
-        armed.heartbeat = (armed.heartbeat + 1) % (MAX_HEARTBEAT + 1);
-        let sent = self.controller.write(&[(Target::Heartbeat, f64::from(armed.heartbeat))]);
+        let sent = self.controller.write(&[(Target::Heartbeat, armed.next_heartbeat())]);
         if sent.is_ok() {
             armed.accepted_heartbeat_s = Some(until_s);
         }
@@ -289,8 +295,12 @@ impl<C: Controller> Backend for Rig<C> {
 
     fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError> {
         self.stand.accepts.ranges().check(setpoints)?;
-        self.armed("set")?;
+        let heartbeat = self.armed("set")?.next_heartbeat();
         let on = setpoints.mode == RigMode::Running;
+        if on {
+            // Not polled for a while, the watchdog has expired and would cut the air as soon as it comes on.
+            self.write(&[(Target::Heartbeat, heartbeat)])?;
+        }
         // The valve first: lower back pressure is always safe.
         let values = [
             (Target::Valve, setpoints.valve_opening_ratio),

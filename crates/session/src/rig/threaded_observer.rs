@@ -1,4 +1,4 @@
-//! Runs an observer on a separate thread, so that a short disk stall delays neither the rig nor its guards.
+//! Runs an observer on a separate thread, so that compression and a short disk stall delay neither the rig nor its guards.
 
 use mapper_core::{Event, SampleBatch, StepMarker};
 use mapper_runner::{ObserverError, RunObserver};
@@ -86,32 +86,6 @@ impl<'scope, O: RunObserver + Send + 'scope> RunObserver for ThreadedObserver<'s
     fn on_step_completed(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
         let marker = *marker;
         self.send(move |observer| observer.on_step_completed(&marker))
-    }
-}
-
-/// The thread on which an observer runs.
-pub(crate) enum ObserverThread<'scope, O> {
-    /// The calling thread, for simulated time: a delay does no harm, and passing messages would cost more than the observer's own work.
-    Calling(O),
-    /// A separate thread, for a rig in real time.
-    Separate(ThreadedObserver<'scope, O>),
-}
-
-impl<'scope, O: RunObserver + Send + 'scope> ObserverThread<'scope, O> {
-    /// The observer, on either thread.
-    pub(crate) fn observer(&mut self) -> &mut dyn RunObserver {
-        match self {
-            ObserverThread::Calling(observer) => observer,
-            ObserverThread::Separate(threaded) => threaded,
-        }
-    }
-
-    /// Same as [`ThreadedObserver::end`].
-    pub(crate) fn end(self) -> (O, Result<(), ObserverError>) {
-        match self {
-            ObserverThread::Calling(observer) => (observer, Ok(())),
-            ObserverThread::Separate(threaded) => threaded.end(),
-        }
     }
 }
 

@@ -18,7 +18,7 @@ use crate::rig::observers::{EventForwarder, Recorder};
 use crate::rig::rig_lease::RigLease;
 use crate::rig::rig_state::RigStates;
 use crate::rig::sources::Sources;
-use crate::rig::threaded_observer::{ObserverThread, ThreadedObserver};
+use crate::rig::threaded_observer::ThreadedObserver;
 use crate::run::preflight::{check_room, check_setpoints};
 use crate::run::recording_metadata::metadata;
 use crate::run::replayed_steps::drive_resumed;
@@ -383,12 +383,8 @@ impl PreparedRun<'_> {
         let (end, drifted, recorder) = std::thread::scope(|scope| {
             let start = || StepEstimator::start(scope, identification(campaign), session.on_event);
             let mut estimates = session.estimates.then(start);
-            let mut recorder = if pace.each_sample {
-                ObserverThread::Separate(ThreadedObserver::start(scope, recorder))
-            } else {
-                ObserverThread::Calling(recorder)
-            };
-            let mut observers: Vec<&mut dyn RunObserver> = vec![recorder.observer(), &mut forwarder];
+            let mut recorder = ThreadedObserver::start(scope, recorder);
+            let mut observers: Vec<&mut dyn RunObserver> = vec![&mut recorder, &mut forwarder];
             observers.extend(estimates.as_mut().map(|estimates| estimates as &mut dyn RunObserver));
             let run_steps = |steps: &mut dyn StepSource| {
                 drive_resumed(replayed, steps, |steps| {

@@ -21,7 +21,7 @@ const STEP_LIMITS_S: (f64, f64) = (0.01, 6.0);
 
 /// Estimated error of a step, relative to the states, above which the grid is too coarse for it: 10 rpm at 100 krpm and 10 Pa at 100 kPa, a
 /// third of the noise of a sample at most. Along the surge line the error is a hundred times larger.
-const GRID_TOLERANCE: f64 = 1e-4;
+pub(crate) const GRID_TOLERANCE: f64 = 1e-4;
 /// Tolerance of the approach to a steady state: only the end must be accurate.
 const ANY_ERROR: f64 = 1e6;
 /// Relative tolerance of the integration if the steps of the grid are too coarse: that of the virtual lab. Maximum number of
@@ -97,26 +97,44 @@ pub fn drive(
     start: State,
     grid: &FrozenGrid,
     times_s: &[f64],
-    on_sample: impl FnMut(usize, &PreparedModel<'_>, &State, &Outputs),
+    mut on_sample: impl FnMut(usize, &PreparedModel<'_>, &State, &Outputs),
 ) -> Result<State, DriveError> {
-    drive_within(GRID_TOLERANCE, model, inputs, start, grid, times_s, on_sample)
+    let start_s = grid.nodes_s.first().copied().unwrap_or(f64::INFINITY);
+    let mut next = times_s.partition_point(|t| *t < start_s);
+    drive_steps(GRID_TOLERANCE, model, inputs, start, grid, |system, step| {
+        while let Some(t_s) = times_s.get(next).filter(|t| **t <= step.times_s[1]) {
+            let (prepared, state) = (system.prepare_for(*t_s), (step.state_at)(*t_s));
+            on_sample(next, prepared, &state, &prepared.evaluate(&state));
+            next += 1;
+        }
+    })
 }
 
-fn drive_within(
+/// One step of a drive.
+pub(crate) struct DrivenStep<'a> {
+    /// Start and end, s.
+    pub(crate) times_s: [f64; 2],
+    /// State at the start.
+    pub(crate) start: State,
+    /// State at the end, and between the start and it if one step of the method was sufficient.
+    pub(crate) state_at: &'a dyn Fn(f64) -> State,
+}
+
+/// Drives `model` from `start` over the grid; `on_step` receives each step.
+pub(crate) fn drive_steps<I: Inputs>(
     tolerance_ratio: f64,
     model: &Model,
-    inputs: &impl Inputs,
+    inputs: &I,
     start: State,
     grid: &FrozenGrid,
-    times_s: &[f64],
-    on_sample: impl FnMut(usize, &PreparedModel<'_>, &State, &Outputs),
+    on_step: impl FnMut(&mut DrivenSystem<'_, I>, DrivenStep<'_>),
 ) -> Result<State, DriveError> {
     if model.hooks.extra_states() > 0 {
-        run::<{ MAX_STATES }>(tolerance_ratio, model, inputs, start, grid, times_s, on_sample)
+        run::<{ MAX_STATES }, I>(tolerance_ratio, model, inputs, start, grid, on_step)
     } else if model.has_inner_wall() {
-        run::<6>(tolerance_ratio, model, inputs, start, grid, times_s, on_sample)
+        run::<6, I>(tolerance_ratio, model, inputs, start, grid, on_step)
     } else {
-        run::<5>(tolerance_ratio, model, inputs, start, grid, times_s, on_sample)
+        run::<5, I>(tolerance_ratio, model, inputs, start, grid, on_step)
     }
 }
 
@@ -136,44 +154,41 @@ pub fn settle(model: &Model, boundary: &BoundaryConditions, guess: State) -> Res
             step_s *= growth;
             nodes_s.push(at_s);
         }
-        drive_within(ANY_ERROR, model, boundary, guess, &FrozenGrid { nodes_s }, &[], |_, _, _, _| {})
+        drive_steps(ANY_ERROR, model, boundary, guess, &FrozenGrid { nodes_s }, |_, _| {})
     };
     drive_with_steps(0.02, 1.5).or_else(|_| drive_with_steps(1e-4, 1.2))
 }
 
-fn run<const N: usize>(
+fn run<const N: usize, I: Inputs>(
     tolerance_ratio: f64,
     model: &Model,
-    inputs: &impl Inputs,
+    inputs: &I,
     start: State,
     grid: &FrozenGrid,
-    times_s: &[f64],
-    mut on_sample: impl FnMut(usize, &PreparedModel<'_>, &State, &Outputs),
+    mut on_step: impl FnMut(&mut DrivenSystem<'_, I>, DrivenStep<'_>),
 ) -> Result<State, DriveError>
 where
     Const<N>: DimMin<Const<N>, Output = Const<N>>,
 {
     let Some(&start_s) = grid.nodes_s.first() else { return Ok(start) };
     let mut integrator = Integrator::<N>::new(start_s, start.to_array(), tolerances(tolerance_ratio));
-    let mut next = times_s.partition_point(|t| *t < start_s);
     for pair in grid.nodes_s.windows(2) {
         let failed = DriveError { t_s: pair[0] };
         // The step uses its own inputs up to its end, even if the inputs jump there.
         let end_s = pair[1];
         let boundary = inputs.at(pair[0]);
         boundary.check().map_err(|_| failed)?;
-        let before_end_s = end_s - 1e-9 * (end_s - pair[0]);
         let mut system = DrivenSystem {
             model,
             inputs,
-            last_s: before_end_s,
+            last_s: last_of_step_s(pair[0], end_s),
             boundary_s: pair[0],
             prepared: model.prepare_at(inputs.time_s(pair[0]), &boundary),
             on_map: None,
         };
         // The speed line has a corner on the surge line, with an infinite slope on one side: short steps across it.
         let surge_before = system.surge_position(&integrator.y);
-        let saved = integrator.clone();
+        let (saved, start) = (integrator.clone(), integrator.y);
         let step = integrator.step_on_grid(&mut system, end_s).ok().filter(|(step, _)| is_physical(&step.y1));
         let step = match step {
             Some((step, error)) if error <= 1.0 && !system.crosses_corner(surge_before, &step.y1) => step,
@@ -183,12 +198,9 @@ where
                 step_with_error_control(&mut integrator, &mut system, end_s).ok_or(failed)?
             }
         };
-        while let Some(t_s) = times_s.get(next).filter(|t| **t <= end_s) {
-            system.prepare_for(*t_s);
-            let state = State::from_array(&step.at(*t_s));
-            on_sample(next, &system.prepared, &state, &system.prepared.evaluate(&state));
-            next += 1;
-        }
+        let state_at = |t_s: f64| State::from_array(&step.at(t_s));
+        let (times_s, start) = ([pair[0], end_s], State::from_array(&start));
+        on_step(&mut system, DrivenStep { times_s, start, state_at: &state_at });
     }
     Ok(State::from_array(&integrator.y))
 }
@@ -217,11 +229,17 @@ where
 }
 
 /// Whether the shaft turns and the outlet holds a pressure.
-fn is_physical<const N: usize>(y: &[f64; N]) -> bool {
+pub(crate) fn is_physical<const N: usize>(y: &[f64; N]) -> bool {
     y[0] > 0.0 && y[1] > 0.0
 }
 
-struct DrivenSystem<'a, I: Inputs> {
+/// Last time at which the inputs of a step act: they may jump at its end.
+pub(crate) fn last_of_step_s(start_s: f64, end_s: f64) -> f64 {
+    end_s - 1e-9 * (end_s - start_s)
+}
+
+/// The model during a step.
+pub(crate) struct DrivenSystem<'a, I: Inputs> {
     model: &'a Model,
     inputs: &'a I,
     /// Last time that belongs to the step.
@@ -244,13 +262,15 @@ impl<I: Inputs> DrivenSystem<'_, I> {
         (surge_before < 1.0) != (self.surge_position(after) < 1.0)
     }
 
-    fn prepare_for(&mut self, t_s: f64) {
+    /// The model at a time within the step.
+    pub(crate) fn prepare_for(&mut self, t_s: f64) -> &PreparedModel<'_> {
         let t_s = t_s.min(self.last_s);
         if t_s != self.boundary_s {
             self.prepared = self.model.prepare_at(self.inputs.time_s(t_s), &self.inputs.at(t_s));
             self.boundary_s = t_s;
             self.on_map = None;
         }
+        &self.prepared
     }
 
     fn on_map(&mut self, state: &State) -> CharacteristicPoint {

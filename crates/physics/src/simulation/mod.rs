@@ -2,6 +2,7 @@
 
 pub mod driven;
 pub mod inputs;
+pub mod linearised_run;
 pub mod model;
 pub mod outputs;
 pub mod rodas5p;

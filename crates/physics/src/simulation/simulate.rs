@@ -99,7 +99,7 @@ struct CrossingWatch {
 pub const DEFAULT_RELATIVE_TOLERANCE: f64 = 1e-6;
 
 /// Typical magnitudes of the states.
-const STATE_SIZES: [f64; MAX_STATES] = [1e4, 1e5, 3e2, 5e2, 3e2, 3e2, 3e2, 3e2];
+pub(crate) const STATE_SIZES: [f64; MAX_STATES] = [1e4, 1e5, 3e2, 5e2, 3e2, 3e2, 3e2, 3e2];
 
 impl SizedIntegrator {
     fn new(model: &Model, t_s: f64, state: State, relative_ratio: f64) -> Self {

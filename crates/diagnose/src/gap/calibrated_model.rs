@@ -5,6 +5,7 @@ use crate::gap::best_fit::fit::{changes_near, effect_changes};
 use crate::gap::diagnose::Diagnosed;
 use crate::gap::findings::report::Verdict;
 use crate::gap::next_experiment::outlook::{SimulatedRig, simulated_steps};
+use crate::gap::residuals::machine_run::LinearisedMachine;
 use crate::gap::residuals::nuisance::{Nuisance, OFFSET_PREFIX, OUTPUTS};
 use crate::gap::residuals::study::{Hypothesis, PredictError, Study};
 use crate::gap::residuals::whiten::{Linearised, dot, nuisance_changes};
@@ -241,9 +242,10 @@ pub fn forecast_steps(
 fn forecast(study: &Study, found: &Found) -> Result<Vec<Expected>, CalibratedModelError> {
     let (hypothesis, covariance) = found.hypothesis(study)?;
     let here = study.predict(&hypothesis)?;
-    let mut columns = nuisance_changes(study, &hypothesis, &here);
+    let machine = LinearisedMachine::of(&here.run);
+    let mut columns = nuisance_changes(study, &hypothesis, &here, &machine);
     let at = coordinates(&study.effects, &hypothesis);
-    columns.extend(changes_near(study, &hypothesis, &here, &at, FINE));
+    columns.extend(changes_near(study, &machine, &hypothesis, &here, &at, FINE));
     let mut expected: Vec<Expected> =
         (0..study.steps.len()).map(|step| Expected { step, channels: BTreeMap::new() }).collect();
     for group in &study.groups {

@@ -196,7 +196,7 @@ fn fitted(
     training: &Selection,
     everywhere: &Selection,
 ) -> Option<(Vec<Candidate>, Vec<Candidate>)> {
-    let quick = Effort { iterations: 3, enough: 1.0, ..Effort::default() };
+    let quick = Effort { iterations: 3, enough: 1.0, exact: false, ..Effort::default() };
     let starts: Vec<_> = chosen.iter().map(|choice| bench.start(&base.hypothesis, choice)).collect();
     let mut trained = bench.fit(starts.into_iter(), base.linearised, training, quick);
     keep_determined(&bench.library, &mut trained);

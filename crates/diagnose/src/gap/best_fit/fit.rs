@@ -8,6 +8,7 @@ use crate::gap::best_fit::coordinate::{Coordinate, coordinates, effect_neighbour
 use crate::gap::best_fit::normal::{PRIOR_STEPS, normal_matrix, nuisance_products};
 use crate::gap::best_fit::selection::{Selection, dot_over};
 use crate::gap::residuals::hypothesis::TimeHistory;
+use crate::gap::residuals::machine_run::LinearisedMachine;
 use crate::gap::residuals::nuisance::NuisanceKind;
 use crate::gap::residuals::study::{Hypothesis, PredictError, Prediction, Study};
 use crate::gap::residuals::whiten::{Linearised, rows_of_step};
@@ -51,6 +52,9 @@ pub struct Effort {
     pub max_sigmas: f64,
     /// The same of a tolerance of the rig; initial state, clocks and the shape of the map are none.
     pub max_sigmas_of_rig: f64,
+    /// Whether each point is a run of its own. If not, it follows from the run where nuisances were linearised: for fits that only select what to fit
+    /// again.
+    pub exact: bool,
 }
 
 impl Effort {
@@ -63,7 +67,7 @@ impl Effort {
 impl Default for Effort {
     fn default() -> Self {
         let Until { iterations, enough } = Until::default();
-        Effort { iterations, enough, max_sigmas: MAX_SIGMAS, max_sigmas_of_rig: MAX_SIGMAS }
+        Effort { iterations, enough, max_sigmas: MAX_SIGMAS, max_sigmas_of_rig: MAX_SIGMAS, exact: true }
     }
 }
 
@@ -123,7 +127,7 @@ impl From<&Fit> for Start {
     fn from(fit: &Fit) -> Start {
         Start {
             hypothesis: fit.hypothesis.clone(),
-            prediction: Some(Arc::new(fit.prediction.clone())),
+            prediction: fit.prediction.run.is_exact.then(|| Arc::new(fit.prediction.clone())),
             columns: Column::of(fit),
         }
     }
@@ -151,6 +155,7 @@ pub fn fit(
         nuisance_products: nuisance_products(study, linearised, selection),
         coordinates,
         max_sigmas: study.nuisances.iter().map(|nuisance| effort.max_sigmas_of(nuisance.kind)).collect(),
+        exact: effort.exact,
         columns_known: !columns.is_empty(),
         effect_columns: columns.iter().map(|column| column.values(study)).collect(),
         last: None,
@@ -194,6 +199,7 @@ struct Objective<'a> {
     coordinates: Vec<Coordinate>,
     /// Maximum size of each nuisance, in sigmas.
     max_sigmas: Vec<f64>,
+    exact: bool,
     /// Whitened changes for a unit of each effect's coordinate.
     effect_columns: Vec<Vec<f64>>,
     /// Whether they were known at the start, so that steps only correct them.
@@ -210,7 +216,10 @@ struct Point {
 
 impl Objective<'_> {
     fn at_hypothesis(&self, hypothesis: Hypothesis) -> Result<Point, PredictError> {
-        let prediction = self.study.predict(&hypothesis)?;
+        let prediction = match self.exact {
+            true => self.study.predict(&hypothesis)?,
+            false => self.study.predict_linearly(&hypothesis, &self.linearised.machine)?,
+        };
         Ok(self.at_prediction(hypothesis, prediction))
     }
 
@@ -305,21 +314,26 @@ pub(crate) fn effect_changes(
     coordinates: &[Coordinate],
     distance: f64,
 ) -> Vec<Vec<f64>> {
-    let mut changes = changes_near(study, hypothesis, here, coordinates, distance);
+    let mut changes = changes_near(study, &linearised.machine, hypothesis, here, coordinates, distance);
     changes.iter_mut().for_each(|change| linearised.whiten(study, change));
     changes
 }
 
-/// The same, not whitened.
+/// The same, not whitened. A prediction that follows from `machine` is compared with others that do.
 pub(crate) fn changes_near(
     study: &Study,
+    machine: &LinearisedMachine,
     hypothesis: &Hypothesis,
     here: &Prediction,
     coordinates: &[Coordinate],
     distance: f64,
 ) -> Vec<Vec<f64>> {
+    let predict = |moved: &Hypothesis| match here.run.is_exact {
+        true => study.predict_near(moved, here),
+        false => study.predict_linearly(moved, machine),
+    };
     effect_neighbours(hypothesis, coordinates, distance)
-        .map(|(moved, step)| match study.predict_near(&moved, here) {
+        .map(|(moved, step)| match predict(&moved) {
             Ok(there) if step != 0.0 => {
                 there.values.iter().zip(&here.values).map(|(t, h)| (t - h) / step).collect()
             }

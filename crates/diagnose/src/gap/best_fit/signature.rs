@@ -24,7 +24,8 @@ pub fn lengths(
     noise_free.measured = study.predict(&with)?.values;
     // Uses model runs rather than a linearisation, because a tolerance that imitates the effect follows its nonlinearity. The declared size
     // already penalises tolerances, so the bound is wide.
-    let effort = Effort { iterations: 5, enough: 0.5, max_sigmas: 60.0, max_sigmas_of_rig: 60.0 };
+    let effort =
+        Effort { iterations: 5, enough: 0.5, max_sigmas: 60.0, max_sigmas_of_rig: 60.0, exact: true };
     let everywhere = Selection::all(study);
     (0..effects.len())
         .map(|place| {

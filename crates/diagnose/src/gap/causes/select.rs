@@ -41,9 +41,10 @@ pub const MIN_SHRINK: f64 = 0.5;
 /// Difference of the log evidence from the best above which a fit is not improved further: no linearisation changes it by so much.
 pub const HOPELESS: f64 = 60.0;
 
-const QUICK: Effort = Effort { iterations: 3, enough: 1.0, max_sigmas: 3.0, max_sigmas_of_rig: 3.0 };
+const QUICK: Effort =
+    Effort { iterations: 3, enough: 1.0, max_sigmas: 3.0, max_sigmas_of_rig: 3.0, exact: false };
 const EFFORT: Effort =
-    Effort { iterations: 6, enough: 0.3, max_sigmas: MAX_SIGMAS, max_sigmas_of_rig: MAX_SIGMAS };
+    Effort { iterations: 6, enough: 0.3, max_sigmas: MAX_SIGMAS, max_sigmas_of_rig: MAX_SIGMAS, exact: true };
 
 #[derive(Debug)]
 pub struct SearchResult {

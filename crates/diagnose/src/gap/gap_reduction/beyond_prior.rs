@@ -8,7 +8,8 @@ use crate::gap::residuals::whiten::Linearised;
 use mapper_numerics::statistics::DOUBT_SIGMAS;
 
 /// Effort of a fit whose tolerances have no limit; this one has no effect.
-const UNLIMITED: Effort = Effort { iterations: 8, enough: 0.5, max_sigmas: 1e3, max_sigmas_of_rig: 1e3 };
+const UNLIMITED: Effort =
+    Effort { iterations: 8, enough: 0.5, max_sigmas: 1e3, max_sigmas_of_rig: 1e3, exact: true };
 
 /// Tolerances of a fit beyond three sigmas of their prior, furthest first. A tolerance at [`MAX_SIGMAS`], which limits the search for causes, is fitted
 /// again without that limit.

@@ -50,8 +50,13 @@ impl Predicted {
 
 /// Effort of a fit without some of the steps; it starts at the best fit to all steps. A tolerance beyond this limit is a suspect
 /// ([`beyond_prior`]), and its own reduction of the gap does not count.
-const EFFORT: Effort =
-    Effort { iterations: 5, enough: 0.2, max_sigmas: MAX_SIGMAS, max_sigmas_of_rig: DOUBT_SIGMAS };
+const EFFORT: Effort = Effort {
+    iterations: 5,
+    enough: 0.2,
+    max_sigmas: MAX_SIGMAS,
+    max_sigmas_of_rig: DOUBT_SIGMAS,
+    exact: true,
+};
 
 /// The start of a fit without some of the steps: the best fit to all steps, its tolerances within [`EFFORT`].
 fn start_within_limits(study: &Study, fit: &Fit) -> Start {

@@ -7,15 +7,32 @@ use mapper_core::Channel;
 use mapper_observe::channels::INPUT_CHANNELS;
 use mapper_physics::rig::effect::{Effect, Rig, add};
 use mapper_physics::rig::instruments::{Surroundings, true_value};
+use mapper_physics::simulation::linearised_run::LinearisedRun;
 use mapper_physics::simulation::model::{Outputs, PreparedModel, State};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// One run of the machine: the quantities at its sensors, at each time of a study.
 #[derive(Debug, Clone)]
 pub(crate) struct MachineRun {
     /// The hypothesis without sensors of outputs.
     pub(crate) machine: Hypothesis,
+    /// Whether the model was integrated; if not, the run follows from another.
+    pub(crate) is_exact: bool,
     pub(crate) samples: Vec<Sample>,
+}
+
+/// A run of the machine with its derivatives, which are computed when first needed.
+#[derive(Debug)]
+pub(crate) struct LinearisedMachine {
+    pub(crate) run: Arc<MachineRun>,
+    /// `None` if the run has no derivatives everywhere.
+    pub(crate) linear: OnceLock<Option<LinearisedSamples>>,
+}
+
+impl LinearisedMachine {
+    pub(crate) fn of(run: &Arc<MachineRun>) -> LinearisedMachine {
+        LinearisedMachine { run: run.clone(), linear: OnceLock::new() }
+    }
 }
 
 /// The machine at one time.
@@ -29,7 +46,30 @@ pub(crate) struct Sample {
     pub(crate) turbine_drop_k: f64,
 }
 
+/// The values of a sample.
+pub(crate) type SampleValues = [f64; OUTPUTS.len() + 7];
+/// A run with its derivatives and those of its samples.
+pub(crate) type LinearisedSamples = LinearisedRun<{ OUTPUTS.len() + 7 }>;
+
 impl Sample {
+    pub(crate) fn to_array(self) -> SampleValues {
+        let [compressor, turbine] = self.surroundings;
+        let around = |at: Surroundings| [at.wall_k, at.flow_ratio, at.opening_ratio];
+        let mut all = self.values.into_iter().chain(around(compressor)).chain(around(turbine));
+        std::array::from_fn(|_| all.next().unwrap_or(self.turbine_drop_k))
+    }
+
+    pub(crate) fn from_array(all: SampleValues) -> Sample {
+        let at = |i: usize| all[OUTPUTS.len() + i];
+        let around =
+            |i: usize| Surroundings { wall_k: at(i), flow_ratio: at(i + 1), opening_ratio: at(i + 2) };
+        Sample {
+            values: std::array::from_fn(|i| all[i]),
+            surroundings: [around(0), around(3)],
+            turbine_drop_k: at(6),
+        }
+    }
+
     pub(crate) fn of(prepared: &PreparedModel<'_>, state: &State, outputs: &Outputs) -> Sample {
         let opening_ratio = prepared.boundary().valve_opening_ratio;
         let around = |channel, wall_k, flow_kg_s| {

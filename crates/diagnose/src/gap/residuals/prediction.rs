@@ -3,7 +3,9 @@
 use crate::gap::model_error::structure::repeating_part;
 use crate::gap::residuals::hypothesis::Hypothesis;
 use crate::gap::residuals::initial_state::with_metal_held;
-use crate::gap::residuals::machine_run::{MachineRun, Sample};
+use crate::gap::residuals::machine_run::{
+    LinearisedMachine, LinearisedSamples, MachineRun, Sample, SampleValues,
+};
 use crate::gap::residuals::nuisance::{Circumstances, OUTPUTS, RESPONSES_S};
 use crate::gap::residuals::study::{PredictError, Prediction, Study};
 use mapper_core::Channel;
@@ -16,6 +18,18 @@ use mapper_physics::simulation::driven::{DriveError, drive, settle};
 use mapper_physics::simulation::inputs::Inputs;
 use mapper_physics::simulation::model::{Outputs, PreparedModel, State};
 use std::sync::Arc;
+
+/// Steps with a constant rig.
+struct Segment {
+    first: usize,
+    /// Start and end, s; infinite at both ends of the recording.
+    from_s: f64,
+    to_s: f64,
+}
+
+fn read_sample(prepared: &PreparedModel<'_>, state: &State, outputs: &Outputs) -> SampleValues {
+    Sample::of(prepared, state, outputs).to_array()
+}
 
 impl Study {
     /// A hypothesis without the sensors of outputs.
@@ -31,19 +45,25 @@ impl Study {
         machine
     }
 
-    /// Segments of steps with a constant rig under a hypothesis: the first step of each.
-    fn segments(&self, hypothesis: &Hypothesis) -> Vec<usize> {
+    /// Segments of steps with a constant rig under a hypothesis.
+    fn segments(&self, hypothesis: &Hypothesis) -> Vec<Segment> {
         let shares = |step: usize| {
             let effects = hypothesis.effects.iter();
             effects.map(move |(index, _)| self.histories[*index].share(step, self.steps.len()))
         };
-        (0..self.steps.len().max(1))
+        let firsts: Vec<usize> = (0..self.steps.len().max(1))
             .filter(|step| *step == 0 || !shares(*step).eq(shares(step - 1)))
+            .collect();
+        let begin_s = |step: usize| self.steps[step].marker.start_s;
+        firsts
+            .iter()
+            .enumerate()
+            .map(|(place, first)| Segment {
+                first: *first,
+                from_s: if place == 0 { f64::NEG_INFINITY } else { begin_s(*first) },
+                to_s: firsts.get(place + 1).map_or(f64::INFINITY, |next| begin_s(*next)),
+            })
             .collect()
-    }
-
-    fn segment_end_s(&self, segments: &[usize], place: usize) -> f64 {
-        segments.get(place + 1).map_or(f64::INFINITY, |next| self.steps[*next].marker.start_s)
     }
 
     /// Drives the model of a hypothesis through the recording. `on_sample` receives the index of each of `times_s` and the model's state.
@@ -64,11 +84,10 @@ impl Study {
         times_s: &[f64],
         mut on_sample: impl FnMut(usize, &PreparedModel<'_>, &State, &Outputs),
     ) -> Result<(), PredictError> {
-        let segments = self.segments(hypothesis);
         let mut state: Option<State> = None;
         let mut done = 0;
-        for (place, first) in segments.iter().enumerate() {
-            let (rig, circumstances) = &rig_in(*first)?;
+        for Segment { first, from_s, to_s } in self.segments(hypothesis) {
+            let (rig, circumstances) = &rig_in(first)?;
             let inputs = self.true_inputs(circumstances);
             let start = match state {
                 None => self.start(rig, &inputs, circumstances)?,
@@ -77,15 +96,13 @@ impl Study {
             let sample = |index: usize, prepared: &PreparedModel<'_>, state: &State, outputs: &Outputs| {
                 on_sample(done + index, prepared, state, outputs);
             };
-            let from_s = if place == 0 { f64::NEG_INFINITY } else { self.steps[*first].marker.start_s };
-            let end_s = self.segment_end_s(&segments, place);
-            let until = times_s.partition_point(|t| *t <= end_s);
-            let grid = self.grid.part(from_s, end_s);
+            let until = times_s.partition_point(|t| *t <= to_s);
+            let grid = self.grid.part(from_s, to_s);
             let mut ended = drive(&rig.model, &inputs, start, &grid, &times_s[done..until], sample)?;
             done = until;
             // An instantaneous probe has no state until a slow probe replaces it.
-            if rig.model.params.t2_probe_diameter_m == 0.0 && end_s.is_finite() {
-                let boundary = inputs.at(end_s - 1e-6);
+            if rig.model.params.t2_probe_diameter_m == 0.0 && to_s.is_finite() {
+                let boundary = inputs.at(to_s - 1e-6);
                 ended.t2_tip_k = rig.model.prepare(&boundary).evaluate(&ended).t2_k;
             }
             state = Some(ended);
@@ -129,16 +146,14 @@ impl Study {
     ) -> Result<(), PredictError> {
         let mut followers =
             OUTPUTS.map(|channel| ChannelFollower::new(*self.nominal.instruments.path(channel)));
-        let segments = self.segments(hypothesis);
         let mut done = 0;
-        for (place, first) in segments.iter().enumerate() {
-            let (rig, circumstances) = &rig_in(*first)?;
+        for Segment { first, to_s, .. } in self.segments(hypothesis) {
+            let (rig, circumstances) = &rig_in(first)?;
             let p3 = Response { lag_s: rig.instruments.p3_lag_s, ..self.actuators.p3 };
             let command = LaggedCommand::new(self.inputs.command.levels().to_vec(), p3, self.actuators.valve);
             let paths = OUTPUTS.map(|channel| *rig.instruments.path(channel));
             followers.iter_mut().zip(paths).for_each(|(follower, path)| follower.turn_to(path));
-            let end_s = self.segment_end_s(&segments, place);
-            let until = times_s.partition_point(|t| *t <= end_s);
+            let until = times_s.partition_point(|t| *t <= to_s);
             // No sample lies behind the end of the followed part.
             let followed = times_s.iter().zip(samples).enumerate().take(until).skip(done);
             for (index, (t_s, sample)) in followed {
@@ -170,7 +185,7 @@ impl Study {
     pub fn predict(&self, hypothesis: &Hypothesis) -> Result<Prediction, PredictError> {
         let machine = self.machine(hypothesis);
         let samples = self.samples(&machine, |step| self.rig(&machine, step), &self.times_s)?;
-        self.predict_from(hypothesis, Arc::new(MachineRun { machine, samples }))
+        self.predict_from(hypothesis, Arc::new(MachineRun { machine, is_exact: true, samples }))
     }
 
     /// The same, with the run of another prediction if both have the same machine.
@@ -184,6 +199,76 @@ impl Study {
         } else {
             self.predict(hypothesis)
         }
+    }
+
+    /// The same, from the derivatives of a run: for small differences, or derivatives.
+    pub(crate) fn predict_linearly(
+        &self,
+        hypothesis: &Hypothesis,
+        near: &LinearisedMachine,
+    ) -> Result<Prediction, PredictError> {
+        let machine = self.machine(hypothesis);
+        if machine == near.run.machine {
+            return self.predict_from(hypothesis, near.run.clone());
+        }
+        let linear = near.linear.get_or_init(|| self.linearise(&near.run.machine));
+        match linear.as_ref().map_or(Ok(None), |run| self.samples_of_other(run, &machine))? {
+            Some(samples) => {
+                self.predict_from(hypothesis, Arc::new(MachineRun { machine, is_exact: false, samples }))
+            }
+            None => self.predict(hypothesis),
+        }
+    }
+
+    /// The derivatives of a run; `None` if it has none everywhere.
+    fn linearise(&self, machine: &Hypothesis) -> Option<LinearisedSamples> {
+        let mut driven: Option<(LinearisedSamples, State)> = None;
+        for Segment { first, from_s, to_s } in self.segments(machine) {
+            let (rig, circumstances) = self.rig(machine, first).ok()?;
+            let inputs = self.true_inputs(&circumstances);
+            let (mut run, start) = match driven {
+                None => {
+                    let start = self.start(&rig, &inputs, &circumstances).ok()?;
+                    (LinearisedSamples::new(&rig.model, start), start)
+                }
+                Some(driven) => driven,
+            };
+            let end = run.drive(&rig.model, &inputs, start, &self.grid.part(from_s, to_s), read_sample)?;
+            driven = Some((run, end));
+        }
+        driven.map(|(run, _)| run)
+    }
+
+    /// Samples of another machine; `None` if it has other states than the run.
+    fn samples_of_other(
+        &self,
+        run: &LinearisedSamples,
+        machine: &Hypothesis,
+    ) -> Result<Option<Vec<Sample>>, PredictError> {
+        let mut samples = Vec::with_capacity(self.times_s.len());
+        let mut distance = None;
+        for Segment { first, from_s, to_s } in self.segments(machine) {
+            let (rig, circumstances) = self.rig(machine, first)?;
+            if !run.fits(&rig.model) {
+                return Ok(None);
+            }
+            let inputs = self.true_inputs(&circumstances);
+            let mut from_run = match distance {
+                None => run.distance_of_start(&self.start(&rig, &inputs, &circumstances)?),
+                Some(distance) => distance,
+            };
+            let times_s = &self.times_s[samples.len()..self.times_s.partition_point(|t| *t <= to_s)];
+            run.drive_other(
+                (&rig.model, &inputs),
+                (from_s, to_s),
+                &mut from_run,
+                times_s,
+                read_sample,
+                |sample| samples.push(Sample::from_array(sample)),
+            )?;
+            distance = Some(from_run);
+        }
+        Ok(Some(samples))
     }
 
     fn predict_from(

@@ -1,6 +1,7 @@
 //! Residuals scaled by the noise and the uncertainty of the inputs.
 
 use crate::gap::model_error::structure::{repeating_part, step_errors};
+use crate::gap::residuals::machine_run::LinearisedMachine;
 use crate::gap::residuals::nuisance::{JUMP_S, NuisanceKind, OUTPUTS};
 use crate::gap::residuals::study::{Hypothesis, PredictError, Prediction, Study};
 use mapper_core::Channel;
@@ -20,6 +21,8 @@ pub struct Linearised {
     hypothesis: Hypothesis,
     /// Prediction there.
     pub base: Prediction,
+    /// Its run, from which derivatives follow.
+    pub(crate) machine: LinearisedMachine,
     noise: Noise,
     /// Whitened change for one sigma of each nuisance.
     pub columns: Vec<Vec<f64>>,
@@ -61,9 +64,10 @@ impl Linearised {
     pub fn new(study: &Study) -> Result<Linearised, PredictError> {
         let nothing = study.nothing();
         let base = study.predict(&nothing)?;
-        let changes = nuisance_changes(study, &nothing, &base);
+        let machine = LinearisedMachine::of(&base.run);
+        let changes = nuisance_changes(study, &nothing, &base, &machine);
         let noise = Noise::new(covariances(study, &nothing, &base, &changes));
-        Ok(Linearised::with(study, nothing, base, changes, noise))
+        Ok(Linearised { machine, ..Linearised::with(study, nothing, base, changes, noise) })
     }
 
     /// Whitening by the noise of the outputs alone, without derivatives.
@@ -80,13 +84,16 @@ impl Linearised {
     /// [`PredictError`] if the model cannot follow there.
     pub fn at(&self, study: &Study, hypothesis: &Hypothesis) -> Result<Linearised, PredictError> {
         let base = study.predict(hypothesis)?;
-        let changes = nuisance_changes(study, hypothesis, &base);
-        Ok(Linearised::with(study, hypothesis.clone(), base, changes, self.noise.clone()))
+        let machine = LinearisedMachine::of(&base.run);
+        let changes = nuisance_changes(study, hypothesis, &base, &machine);
+        let there = Linearised::with(study, hypothesis.clone(), base, changes, self.noise.clone());
+        Ok(Linearised { machine, ..there })
     }
 
     fn without_columns(hypothesis: Hypothesis, base: Prediction, noise: Noise) -> Linearised {
         let (columns, products) = (Vec::new(), Vec::new());
-        Linearised { hypothesis, base, noise, columns, products, further: Mutex::default() }
+        let (machine, further) = (LinearisedMachine::of(&base.run), Mutex::default());
+        Linearised { hypothesis, base, machine, noise, columns, products, further }
     }
 
     fn with(
@@ -119,8 +126,13 @@ impl Linearised {
         let mut with = base.clone();
         with.effects.push((effect, values));
         let change = || {
-            let base = study.predict_near(&base, &self.base).ok()?;
-            let with = study.predict_near(&with, &base).ok()?;
+            let (base, with) = if base == self.hypothesis {
+                (self.base.clone(), study.predict_linearly(&with, &self.machine).ok()?)
+            } else {
+                let base = study.predict(&base).ok()?;
+                let with = study.predict_near(&with, &base).ok()?;
+                (base, with)
+            };
             let mut change: Vec<f64> = with.values.iter().zip(&base.values).map(|(w, b)| w - b).collect();
             self.whiten(study, &mut change);
             Some(Arc::new(change))
@@ -166,7 +178,12 @@ impl Linearised {
 }
 
 /// Change per sigma of each nuisance at a hypothesis, computed in parallel.
-pub(crate) fn nuisance_changes(study: &Study, here: &Hypothesis, base: &Prediction) -> Vec<Vec<f64>> {
+pub(crate) fn nuisance_changes(
+    study: &Study,
+    here: &Hypothesis,
+    base: &Prediction,
+    machine: &LinearisedMachine,
+) -> Vec<Vec<f64>> {
     let indices: Vec<usize> = (0..study.nuisances.len()).collect();
     parallel::map(&indices, |index| {
         let nuisance = study.nuisances[*index];
@@ -190,7 +207,7 @@ pub(crate) fn nuisance_changes(study: &Study, here: &Hypothesis, base: &Predicti
         // Step towards the centre, so that a nuisance at its limit stays within it.
         let step = if here.nuisances[*index] > 0.0 { -1.0 } else { 1.0 };
         moved.nuisances[*index] += step;
-        match study.predict_near(&moved, base) {
+        match study.predict_linearly(&moved, machine) {
             Ok(there) => {
                 there.values.iter().zip(&base.values).map(|(there, here)| (there - here) / step).collect()
             }

@@ -3,7 +3,7 @@
 
 use crate::gap::best_fit::fit::Fit;
 use crate::gap::residuals::nuisance::OUTPUTS;
-use crate::gap::residuals::study::{Hypothesis, Prediction, Study};
+use crate::gap::residuals::study::{Hypothesis, Study};
 use crate::gap::residuals::whiten::{Linearised, rows_of_step};
 use crate::missing_terms::terms::law_effect::LawEffect;
 use crate::missing_terms::terms::term::Term;
@@ -23,8 +23,6 @@ pub struct Base<'a> {
     pub linearised: &'a Linearised,
     /// Nuisances and effects of the base.
     pub hypothesis: Hypothesis,
-    /// Prediction of the base.
-    pub prediction: Prediction,
     /// Whitened residual of the base.
     pub residual: Vec<f64>,
     /// Whitened derivatives with respect to the base's effects.
@@ -35,8 +33,7 @@ impl<'a> Base<'a> {
     /// The null hypothesis.
     pub fn nothing(study: &'a Study, linearised: &'a Linearised) -> Base<'a> {
         let residual = linearised.residual(study, &linearised.base);
-        let prediction = linearised.base.clone();
-        Base { study, linearised, hypothesis: study.nothing(), prediction, residual, free: Vec::new() }
+        Base { study, linearised, hypothesis: study.nothing(), residual, free: Vec::new() }
     }
 
     /// A fitted cause.
@@ -45,7 +42,6 @@ impl<'a> Base<'a> {
             study,
             linearised,
             hypothesis: fit.hypothesis.clone(),
-            prediction: fit.prediction.clone(),
             residual: fit.residual.clone(),
             free: fit.effect_columns.clone(),
         }
@@ -80,8 +76,9 @@ impl<'a> Base<'a> {
             let mut there = self.hypothesis.clone();
             let values = runs[*place].iter().map(|term| distance * terms[*term].step).collect();
             there.effects.push((first + place, values));
-            let there = own.predict(&there).ok()?;
-            let change = there.values.iter().zip(&self.prediction.values).map(|(t, b)| (t - b) / distance);
+            let there = own.predict_linearly(&there, &self.linearised.machine).ok()?;
+            let base = &self.linearised.base.values;
+            let change = there.values.iter().zip(base).map(|(t, b)| (t - b) / distance);
             Some(change.collect::<Vec<f64>>())
         });
         let mut of_terms: Vec<Option<Vec<f64>>> = vec![None; terms.len()];

@@ -29,12 +29,32 @@ impl UnitError {
             }
             UnitError::DecimalComma { .. } => format!("write a decimal point, e.g. `{example}`"),
             UnitError::NoUnit { text } => {
-                let unit = example.split_once(' ').map_or("", |(_, unit)| unit);
-                format!("write e.g. `{} {unit}` (units: {units})", text.trim())
+                let number = text.trim();
+                let share =
+                    number.parse().ok().filter(|share: &f64| kind == Kind::Fraction && share.abs() < 1.0);
+                match share.map(|share| 100.0 * share) {
+                    Some(percent) => format!("write `{percent} %` for the share {number}, or `{number} %`"),
+                    None => {
+                        let probable = probable_unit(kind, number).unwrap_or_else(|| example.to_owned());
+                        format!("write e.g. `{probable}` (units: {units})")
+                    }
+                }
             }
             UnitError::WrongUnit { unit, .. } => wrong_unit_remedy(unit, kind, &units),
         }
     }
+}
+
+/// A number without a unit, with the unit that makes it most similar to the example; `None` if no unit does.
+fn probable_unit(kind: Kind, number: &str) -> Option<String> {
+    let usual = parse(kind, kind.example()).ok()?;
+    let candidates = kind.units().iter().filter_map(|unit| {
+        let text = format!("{number} {}", unit.symbol());
+        let decades = (parse(kind, &text).ok()? / usual).log10().abs();
+        // Another quantity is more than thirty times larger or smaller.
+        (decades < 1.5).then_some((decades, text))
+    });
+    candidates.min_by(|(a, _), (b, _)| a.total_cmp(b)).map(|(_, text)| text)
 }
 
 fn wrong_unit_remedy(unit: &str, kind: Kind, units: &str) -> String {

@@ -2,7 +2,7 @@
 
 use crate::output::standard_error::say;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use mapper_core::{StepMarker, terminal_json, terminal_text};
+use mapper_core::{StepKind, StepMarker, terminal_json, terminal_text};
 use mapper_report::{progress_text, short_duration, with_messages, wrapped};
 use mapper_session::SessionEvent;
 use serde_json::json;
@@ -276,10 +276,12 @@ fn say_lines(event: &SessionEvent, state: &mut State) {
         SessionEvent::StepStarted(marker) => format!(
             "{:8.1} s  {}, {}, for {}, {} left",
             marker.start_s,
-            marker.number().map_or_else(
-                || "repeated step".to_owned(),
-                |number| format!("step {number} of {}", state.steps.max(number))
-            ),
+            match marker.number() {
+                Some(number) if marker.kind != StepKind::Repeat || number <= state.steps => {
+                    format!("step {number} of {}", state.steps.max(number))
+                }
+                _ => "repeated step".to_owned(),
+            },
             place(marker),
             short_duration(marker.end_s - marker.start_s),
             short_duration(state.duration_s - marker.start_s)

@@ -174,6 +174,12 @@ impl<'a> MissingSteps<'a> {
         }
         MissingSteps { plan, next, notes: vec![note] }
     }
+
+    /// Rig time that they need, with warm-up and cool-down, s.
+    pub(crate) fn duration_s(&self) -> f64 {
+        let dwells_s: f64 = self.next.iter().map(|step| step.dwell_s).sum();
+        self.plan.warm_up_s + dwells_s + self.plan.cool_down_s
+    }
 }
 
 impl StepSource for MissingSteps<'_> {

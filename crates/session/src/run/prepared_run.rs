@@ -355,12 +355,14 @@ impl PreparedRun<'_> {
             without_soak = Campaign { zero: None, ..campaign.clone() };
             campaign = &without_soak;
         }
+        let mut steps_s = self.plan.duration_s();
         let steps: &mut dyn StepSource = match (&mut self.scripted, from_plan) {
             (Some(scripted), _) => scripted,
             (None, Some(interrupted)) => {
                 let saved = interrupted.saved();
-                let note = interrupted.summary(campaign, &self.plan, &saved);
+                let note = interrupted.summary(self.request.campaign, &self.plan, &saved);
                 missing = MissingSteps::new(&self.plan, &saved, note);
+                steps_s = missing.duration_s();
                 &mut missing
             }
             (None, None) => &mut planned,
@@ -377,7 +379,7 @@ impl PreparedRun<'_> {
         let mut forwarder = EventForwarder {
             on_event: session.on_event,
             steps: self.plan.steps.len(),
-            duration_s: soak_s(campaign) + self.plan.duration_s(),
+            duration_s: soak_s(campaign) + steps_s,
         };
         let (model, backend) = (&self.model, self.sources.backend.as_mut());
         let (end, drifted, recorder) = std::thread::scope(|scope| {

@@ -25,6 +25,11 @@ pub enum DrivenError {
     )]
     TooFewRows { rows: usize, until_s: f64, needed: usize },
     #[error(
+        "the recording has {steps} steps with the opening of their valve: `mapper gap diagnose CAMPAIGN RECORDING` diagnoses it; this \
+         command is for logs without steps"
+    )]
+    HasSteps { steps: usize },
+    #[error(
         "the model of the campaign's machine has no solution under the readings of this log: check its geometry and the units in the \
          channel map"
     )]

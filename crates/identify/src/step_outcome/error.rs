@@ -14,7 +14,7 @@ pub enum IdentifyError {
     )]
     MissingChannels { method: Method, missing: Vec<Channel> },
     #[error(
-        "the recording has no steps: it has no step markers, and its command channels never change. Map P3_command and valve_command"
+        "the recording has no steps: it has no step markers, and its command channels never change. Map P3_command and valve_command, or give the whole file if it was cut"
     )]
     NoSteps,
     #[error("{name} = {value} is not usable: {expected}")]

@@ -6,6 +6,7 @@ use crate::recording::files::{Existing, json_text, write_files};
 use crate::recording::identification_config::declared;
 use crate::recording::recording_file::{Recorded, check_machine};
 use crate::{Session, SessionError};
+use mapper_diagnose::driven::DrivenError;
 use mapper_diagnose::driven::cause_search::{Diagnosis, Side, SideRequest, diagnose};
 use mapper_diagnose::gap::causes::calibration::Calibration;
 use mapper_observe::Declared;
@@ -22,7 +23,7 @@ impl Session<'_> {
     ///
     /// # Errors
     /// [`SessionError::MachineUnknown`] if no campaign defines the machine, [`SessionError::OtherMachine`] if it is another,
-    /// [`SessionError::Driven`] if the log has too little data.
+    /// [`SessionError::Driven`] if the log has too little data, or steps.
     pub fn transient(
         &self,
         recorded: &Recorded,
@@ -33,9 +34,15 @@ impl Session<'_> {
     ) -> Result<Diagnosis, SessionError> {
         let campaign = recorded.require_campaign()?;
         check_machine(recorded, campaign)?;
+        let recording = &recorded.read.recording;
+        // Steps say more than the readings at work, from which their heat balances cannot be told apart.
+        let steps = recording.steps.iter().filter(|step| step.valve_opening_ratio.is_finite()).count();
+        if steps > 1 {
+            return Err(DrivenError::HasSteps { steps }.into());
+        }
         Ok(diagnose(
             &SideRequest {
-                recording: &recorded.read.recording,
+                recording,
                 nominal: &Rig::new(nominal_model(campaign)?),
                 effects,
                 declared: &Declared {

@@ -2,6 +2,7 @@
 
 use crate::machine::first_map::FirstMap;
 use crate::machine::first_request::{FirstCampaignRequest, FirstRig};
+use crate::plan::campaign_forecast::longer_soak_s;
 use crate::recording::files::write_new;
 use crate::{Registry, SessionError};
 use mapper_campaign::{AssumedSize, Campaign, CampaignError, similar_sizes};
@@ -70,8 +71,13 @@ pub fn first_campaign(
     let map = FirstMap::of(registry, request)?;
     let file = |ending: &str| request.directory.join(format!("{}{ending}", request.name));
     let (campaign_path, map_path) = (file(".yaml"), request.directory.join(&map.file_name));
-    let text = campaign_text(request, &map);
-    let campaign = check_campaign(&text, &campaign_path, &map)?;
+    let mut text = campaign_text(request, &map);
+    let mut campaign = check_campaign(&text, &campaign_path, &map)?;
+    // The housings of large machines take longer to reach the temperature of the cell.
+    if let Some(soak_s) = longer_soak_s(&campaign) {
+        text = text.replacen("soak: 30 min", &format!("soak: {:.0} min", soak_s / 60.0), 1);
+        campaign = check_campaign(&text, &campaign_path, &map)?;
+    }
     let channels = (request.rig != FirstRig::VirtualLab).then(|| file("_channels.yaml"));
     std::fs::create_dir_all(&request.directory).map_err(SessionError::file("create", &request.directory))?;
     for path in [Some(&campaign_path), channels.as_ref()].into_iter().flatten() {
@@ -132,6 +138,11 @@ fn campaign_text(request: &FirstCampaignRequest, map: &FirstMap) -> String {
         ("title", request.rig.title().to_owned()),
         ("commands", commands),
         ("name", name.clone()),
+        // In quotes if it would be read as a number or another word of YAML.
+        (
+            "yaml_name",
+            serde_yaml::to_string(name).map_or_else(|_| name.clone(), |text| text.trim().to_owned()),
+        ),
         ("geometry", geometry(request, map)),
         ("map_file", map.file_name.clone()),
         ("reference", request.reference.name.to_owned()),

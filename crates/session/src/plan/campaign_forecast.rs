@@ -9,7 +9,7 @@ use crate::rig::drive::soak_s;
 use crate::{Session, SessionError};
 use mapper_campaign::campaign::Date;
 use mapper_campaign::{Campaign, Concern};
-use mapper_core::{Advice, Dwell, Method, Plan, PlanStep, StepKind, VerdictForecast, WindowRule};
+use mapper_core::{Advice, Dwell, Method, Plan, PlanStep, Soak, StepKind, VerdictForecast, WindowRule};
 use mapper_identify::ZeroSettings;
 use mapper_physics::laws::standstill::{StandstillState, relax};
 use mapper_physics::laws::thermocouple::time_constant_s;
@@ -69,7 +69,7 @@ impl Session<'_> {
             Some(source) => rehearse(self, campaign, model, source)?.plan,
         };
         let concerns = [
-            soak_concern(campaign, model),
+            soak_concern(campaign),
             settling_concern(campaign, &plan),
             probe_concern(campaign, &plan),
             required_error_concern(campaign, &plan),
@@ -144,31 +144,63 @@ fn plan_of_sample(
     plan_of(campaign, &PlanRequest { points: &points, ..request })
 }
 
-/// A soak too short for the housings to reach the cell temperature, from the largest difference that the zero assumes.
-fn soak_concern(campaign: &Campaign, model: &Model) -> Option<Concern> {
-    let soak = campaign.zero?;
-    let settings = ZeroSettings::from(soak);
-    let ambient_k = campaign.boundary.ambient_temperature_k;
-    let warm_k = ambient_k + WARM_K;
-    let start = StandstillState { tc_k: warm_k, tt_k: warm_k };
-    let tc_k = |after_s: f64| relax(&model.params, start, soak.oil_temperature_k, ambient_k, after_s).tc_k;
-    // As in the zero: from the first to the last third of its segment.
-    let drift_k_min = |duration_s: f64| {
-        let third_s = duration_s.min(settings.longest_s) / 3.0;
-        let middle_k = |from_s: f64| tc_k(from_s + 0.5 * third_s);
+/// Housings that cool from the largest difference that the zero assumes.
+struct SoakingHousings<'a> {
+    campaign: &'a Campaign,
+    soak: Soak,
+    settings: ZeroSettings,
+}
+
+impl<'a> SoakingHousings<'a> {
+    /// `None` without a zero.
+    fn of(campaign: &'a Campaign) -> Option<Self> {
+        let soak = campaign.zero?;
+        Some(SoakingHousings { campaign, soak, settings: ZeroSettings::from(soak) })
+    }
+
+    /// Difference of the compressor housing from the cell, K.
+    fn difference_k(&self, after_s: f64) -> f64 {
+        let ambient_k = self.campaign.boundary.ambient_temperature_k;
+        let start = StandstillState { tc_k: ambient_k + WARM_K, tt_k: ambient_k + WARM_K };
+        let params = &self.campaign.machine.params;
+        relax(params, start, self.soak.oil_temperature_k, ambient_k, after_s).tc_k - ambient_k
+    }
+
+    /// Drift of Tc as in the zero, from the first to the last third of its segment, K/min.
+    fn drift_k_min(&self, duration_s: f64) -> f64 {
+        let third_s = duration_s.min(self.settings.longest_s) / 3.0;
+        let middle_k = |from_s: f64| self.difference_k(from_s + 0.5 * third_s);
         (middle_k(duration_s - third_s) - middle_k(duration_s - 3.0 * third_s)) / (2.0 * third_s / 60.0)
-    };
-    let is_enough = |duration_s: f64| {
-        drift_k_min(duration_s).abs() <= settings.drift_k_min && tc_k(duration_s) - ambient_k <= 0.5 * WARM_K
-    };
-    if is_enough(soak.duration_s) {
+    }
+
+    fn is_sufficient(&self, duration_s: f64) -> bool {
+        self.drift_k_min(duration_s).abs() <= self.settings.drift_k_min
+            && self.difference_k(duration_s) <= 0.5 * WARM_K
+    }
+
+    /// The shortest sufficient soak, in steps of five minutes; `None` if a day is not long enough.
+    fn shortest_s(&self) -> Option<f64> {
+        (1..)
+            .map(|i| SOAK_STEP_S * f64::from(i))
+            .take_while(|s| *s <= LONGEST_SOAK_S)
+            .find(|s| self.is_sufficient(*s))
+    }
+}
+
+/// The shortest soak of a campaign that its zero accepts, s; `None` without a zero, or if its own is sufficient.
+pub(crate) fn longer_soak_s(campaign: &Campaign) -> Option<f64> {
+    let housings = SoakingHousings::of(campaign)?;
+    housings.shortest_s().filter(|_| !housings.is_sufficient(housings.soak.duration_s))
+}
+
+/// A soak too short for the housings to reach the cell temperature.
+fn soak_concern(campaign: &Campaign) -> Option<Concern> {
+    let housings = SoakingHousings::of(campaign)?;
+    let duration_s = housings.soak.duration_s;
+    if housings.is_sufficient(duration_s) {
         return None;
     }
-    let longer = (1..)
-        .map(|i| SOAK_STEP_S * f64::from(i))
-        .take_while(|s| *s <= LONGEST_SOAK_S)
-        .find(|s| is_enough(*s));
-    let remedy = longer.map_or_else(
+    let remedy = housings.shortest_s().map_or_else(
         || "a soak of a day is not long enough; check that oil and cell have the same temperature, and the masses of the machine".to_owned(),
         |s| format!("soak {:.0} min or longer", s / 60.0),
     );
@@ -177,10 +209,10 @@ fn soak_concern(campaign: &Campaign, model: &Model) -> Option<Concern> {
         format!(
             "after a soak of {:.0} min, housings that were {WARM_K} K warmer than the cell are still {:.1} K warmer, and Tc drifts by \
              {:+.2} K/min; the zero rejects a drift of more than {:.2} K/min and mistakes the remaining difference for an offset",
-            soak.duration_s / 60.0,
-            tc_k(soak.duration_s) - ambient_k,
-            drift_k_min(soak.duration_s),
-            settings.drift_k_min
+            duration_s / 60.0,
+            housings.difference_k(duration_s),
+            housings.drift_k_min(duration_s),
+            housings.settings.drift_k_min
         ),
         remedy,
     ))

@@ -17,7 +17,7 @@ pub(crate) struct ZeroFile {
     #[schemars(extend("x-min" = "250 K", "x-max" = "450 K"), example = &"25 degC")]
     oil_temperature: Option<Quantity<Temperature>>,
     /// Temperature non-uniformity of the rig at rest, one standard deviation of the temperature at a sensor about the mean of all sensors: the uncertainty of each offset after the zero; 0.05 K if none is given.
-    #[schemars(extend("x-min" = "0 K", "x-max" = "10 K"), example = &"0.05 K")]
+    #[schemars(extend("x-min" = "0 K", "x-max" = "1 K"), example = &"0.05 K")]
     evenness: Option<Quantity<TemperatureDifference>>,
     /// Uncertainty of the pressure at P1 and P2 at rest, one standard deviation; 5 Pa if none is given.
     #[schemars(extend("x-min" = "0 Pa", "x-max" = "1 kPa"), example = &"5 Pa")]

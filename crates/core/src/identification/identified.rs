@@ -151,12 +151,26 @@ pub struct IdentifiedPoint {
 }
 
 impl IdentifiedPoint {
+    /// Distance from `eta` to the farther end of its 95 % interval, fraction: the interval of a mixture of models is not symmetric.
+    pub fn eta_margin_95(&self) -> Option<f64> {
+        margin(self.eta?, self.eta_low?, self.eta_high?)
+    }
+
+    /// The same of `h_w_m2k`, W/(m2 K).
+    pub fn h_margin_95_w_m2k(&self) -> Option<f64> {
+        margin(self.h_w_m2k?, self.h_low_w_m2k?, self.h_high_w_m2k?)
+    }
+
     /// Standard error of `eta` that no other point shares, fraction; `None` without an interval.
     pub fn eta_own_standard_error(&self) -> Option<f64> {
         let all = standard_error_of(self.eta_low?, self.eta_high?);
         let common = self.common.eta_standard_error();
         Some((all * all - common * common).max(0.0).sqrt())
     }
+}
+
+fn margin(value: f64, low: f64, high: f64) -> Option<f64> {
+    Some((high - value).max(value - low))
 }
 
 /// A number that is null if unknown.

@@ -29,7 +29,11 @@ pub fn drift_text(report: &DriftReport) -> String {
         let _ = writeln!(text, "Not excluded: {others}.");
     }
     if !report.groups.is_empty() {
-        text.push_str("\nd: change since the first visit, corrected for the boundary conditions.\n");
+        text.push_str(
+            "\nd: change since the first visit, corrected for the boundary conditions.\n\
+             +/-: noise of each visit, identified by itself (95 %); errors that all visits\n\
+             share do not change the comparison.\n",
+        );
     }
     for group in &report.groups {
         let _ = write!(text, "\nFrom {} to {}\n{}\n", group.from, group.to, group_table(group));

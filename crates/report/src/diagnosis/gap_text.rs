@@ -65,20 +65,26 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
         text += &list_smallest_detectable(&diagnosis.smallest_seen);
     }
     text += "\ncauses\n";
-    for candidate in diagnosis.listed().take(CAUSES) {
-        let lines = wrapped(&cause(candidate), COLUMNS - 11, 0);
-        let lines = lines.trim_end().replace('\n', "\n           ");
-        text += &format!("  {:>7}  {lines}\n", probability_text(candidate.probability));
-        for set in &candidate.equivalent {
-            text += &format!("           indistinguishable from {}\n", set.join(" + "));
-        }
-    }
-    for (probability, target) in [
-        (diagnosis.probability_none, NOTHING),
-        (diagnosis.probability_unlisted, UNLISTED),
-        (diagnosis.probability_outside, OUTSIDE),
-    ] {
-        text += &format!("  {:>7}  {target}\n", probability_text(probability));
+    let mut causes: Vec<(f64, String)> = diagnosis
+        .listed()
+        .take(CAUSES)
+        .map(|candidate| {
+            let lines = wrapped(&cause(candidate), COLUMNS - 11, 0);
+            let mut lines = lines.trim_end().replace('\n', "\n           ");
+            for set in &candidate.equivalent {
+                lines += &format!("\n           indistinguishable from {}", set.join(" + "));
+            }
+            (candidate.probability, lines)
+        })
+        .chain([
+            (diagnosis.probability_none, NOTHING.to_owned()),
+            (diagnosis.probability_unlisted, UNLISTED.to_owned()),
+            (diagnosis.probability_outside, OUTSIDE.to_owned()),
+        ])
+        .collect();
+    causes.sort_by(|a, b| b.0.total_cmp(&a.0));
+    for (probability, lines) in causes {
+        text += &format!("  {:>7}  {lines}\n", probability_text(probability));
     }
     for suspect in &diagnosis.suspects {
         text += &format!("  suspect: {}\n", suspect_text(suspect));

@@ -26,6 +26,13 @@ pub fn jump_json(jump: &JumpForecast) -> serde_json::Value {
 pub fn jump_text(campaign: &Campaign, jump: &JumpForecast) -> String {
     let display = Display::new(&campaign.display);
     let predicted = &jump.predicted;
+    // A method that identifies all steps together has no error of a single jump.
+    let points = |error: Option<f64>| {
+        error.map_or_else(
+            || "not of one jump alone".to_owned(),
+            |error| format!("{} points", percent(Some(error), 2)),
+        )
+    };
     let mut text = format!(
         "{} -> {} (from the steady state of the first)\n",
         display.place(jump.from),
@@ -37,8 +44,8 @@ pub fn jump_text(campaign: &Campaign, jump: &JumpForecast) -> String {
         ("dT2 in the window", format!("{} K", number(predicted.dt2_k, 2))),
         ("dTc in the window", format!("{} K", number(predicted.dtc_k, 2))),
         ("settles after", format!("{} s", number(predicted.settle_s, 1))),
-        ("standard error of eta", format!("{} %points", percent(predicted.sigma_eta, 2))),
-        ("bias of the method", format!("{} %points", percent(predicted.bias_eta, 2))),
+        ("standard error of eta", points(predicted.sigma_eta)),
+        ("bias of the method", points(predicted.bias_eta)),
         ("beyond the surge line", format!("{:.2} s at a stretch", jump.longest_surge_s)),
         ("highest speed", format!("{} {}", display.speed(jump.highest_speed_rpm), campaign.display.speed)),
         (

@@ -100,9 +100,11 @@ fn summary(campaign: &Campaign, plan: &Plan, soak_s: f64) -> String {
     let mut lines = vec![
         ("plan", format!("{}, {} by {}", plan.campaign, steps(&plan.steps), plan.objective)),
         ("rig time", format!("{} ({})", duration(soak_s + plan.duration_s()), parts.join(", "))),
-        ("total gradient", total_gradient(plan)),
-        ("min gradient", format!("{} K{}", number(figures.min_gradient_k, 1), least_bound(plan))),
     ];
+    if let Some(min_gradient_k) = figures.min_gradient_k {
+        let least = format!("{min_gradient_k:.1} K{}", least_bound(plan));
+        lines.extend([("total gradient", total_gradient(plan)), ("min gradient", least)]);
+    }
     let declared = figures.rms_error_eta.map(|error| {
         format!(
             "{} points of efficiency rms over the points, {} at the worst point (one sigma), if the machine is as declared",
@@ -150,6 +152,7 @@ fn steps(steps: &[PlanStep]) -> String {
     let (shortest_s, longest_s) = (dwells().fold(f64::INFINITY, f64::min), dwells().fold(0.0, f64::max));
     match steps.len() {
         0 => "no steps".to_owned(),
+        1 => format!("1 step of {shortest_s:.0} s"),
         count if shortest_s == longest_s => format!("{count} steps of {shortest_s:.0} s"),
         count => format!("{count} steps of {shortest_s:.0} to {longest_s:.0} s"),
     }

@@ -122,16 +122,15 @@ fn speed_lines(points: &[ScoredPoint], map: Option<&CompressorMap>) -> Vec<(f64,
 }
 
 fn row(display: &Display, point: &IdentifiedPoint) -> Vec<String> {
-    let half = |low: Option<f64>, high: Option<f64>| Some(0.5 * (high? - low?));
     vec![
         step_number(point.step).to_string(),
         opening(point.valve_opening_ratio),
         display.flow(point.flow_corrected_kg_s),
         format!("{:.4}", point.pressure_ratio),
         percent(point.eta, 2),
-        percent(half(point.eta_low, point.eta_high), 2),
+        percent(point.eta_margin_95(), 2),
         number(point.h_w_m2k, 0),
-        number(half(point.h_low_w_m2k, point.h_high_w_m2k), 0),
+        number(point.h_margin_95_w_m2k(), 0),
     ]
 }
 

@@ -92,7 +92,6 @@ pub fn point_cells(recording: &Recording, point: &IdentifiedPoint, display: &Dis
         |k: Option<f64>| k.map_or_else(PointCell::nothing, |k| PointCell::new(display.temperature(k), k));
     let pressure =
         |pa: Option<f64>| pa.map_or_else(PointCell::nothing, |pa| PointCell::new(display.pressure(pa), pa));
-    let half = |low: Option<f64>, high: Option<f64>| low.zip(high).map(|(low, high)| 0.5 * (high - low));
     let optional = |text: String, value: Option<f64>| PointCell::new(text, value.unwrap_or(f64::NAN));
     // A half width of 0 means that no sensor is declared, not that it is perfect.
     let known =
@@ -100,8 +99,7 @@ pub fn point_cells(recording: &Recording, point: &IdentifiedPoint, display: &Dis
     let flow_half_kg_s =
         half_width_95(point.common.flow_corrected_standard_error_ratio) * point.flow_corrected_kg_s;
     let pr_half = half_width_95(point.common.pressure_ratio_standard_error);
-    let eta_half = half(point.eta_low, point.eta_high);
-    let h_half = half(point.h_low_w_m2k, point.h_high_w_m2k);
+    let (eta_half, h_half) = (point.eta_margin_95(), point.h_margin_95_w_m2k());
     let valve = point.valve_opening_ratio;
     [
         PointCell::new(step_name(point), point.step as f64),

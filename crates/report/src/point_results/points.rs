@@ -15,7 +15,7 @@ use std::fmt::Write;
 pub fn points_text(points: &[ScoredPoint], display: &Display, truth: bool) -> String {
     let kinds: Vec<StepKind> = points.iter().map(|scored| scored.point.kind).collect();
     let legend = wrapped(
-        &format!("{}+/-: half a 95 % interval. dT2: change of T2 in the window.", marks_legend(&kinds)),
+        &format!("{}+/- holds the 95 % interval. dT2: change of T2 in the window.", marks_legend(&kinds)),
         COLUMNS,
         0,
     );
@@ -97,7 +97,6 @@ fn points_table(points: &[ScoredPoint], display: &Display, truth: bool) -> table
     }
     let mut table = table::with_heads(&heads);
     for ScoredPoint { point, truth } in points {
-        let half = |low: Option<f64>, high: Option<f64>| Some(0.5 * (high? - low?));
         let mut row = vec![
             format!("{}{}", step_number(point.step), mark(point.kind)),
             display.speed(point.speed_rpm),
@@ -105,9 +104,9 @@ fn points_table(points: &[ScoredPoint], display: &Display, truth: bool) -> table
             display.flow(point.flow_corrected_kg_s),
             format!("{:.4}", point.pressure_ratio),
             percent(point.eta, 2),
-            percent(half(point.eta_low, point.eta_high), 2),
+            percent(point.eta_margin_95(), 2),
             number(point.h_w_m2k, 0),
-            number(half(point.h_low_w_m2k, point.h_high_w_m2k), 0),
+            number(point.h_margin_95_w_m2k(), 0),
             number(point.dt2_k, 1),
             verdict_word(point.verdict).to_owned(),
         ];

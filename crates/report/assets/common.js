@@ -4,7 +4,7 @@ const root = document.documentElement;
 const page = JSON.parse(document.getElementById("data").textContent);
 const style = name => getComputedStyle(root).getPropertyValue(name).trim();
 const byId = id => document.getElementById(id);
-const half = (low, high) => low == null || high == null ? null : (high - low) / 2;
+const margin = (value, low, high) => value == null || low == null || high == null ? null : Math.max(high - value, value - low);
 const shown = (value, digits, unit = "") => value == null ? "-" : value.toFixed(digits).replace(/^-(0\.?0*)$/, "$1") + unit;
 const short = d3.format(".3~g");
 // On paper a drawing is scaled to its column: a narrower one has larger letters.

@@ -25,7 +25,7 @@ pub fn shared_errors_text<'a>(
         };
         let total = half(|point| Some(0.5 * (point.eta_high? - point.eta_low?)))?;
         let common = half(|point| Some(half_width_95(point.common.eta_standard_error())))?;
-        Some(format!("{common:.2} of +/- {total:.2} points"))
+        Some(format!("{common:.2} of a half width of {total:.2} points"))
     };
     let first = format!("{} at {} {}", describe(&slow)?, display.speed(slowest_rpm), display.units().speed);
     let parts = match describe(&fast) {

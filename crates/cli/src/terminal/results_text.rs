@@ -122,7 +122,7 @@ fn short(display: &Display, found: &ShownResults<'_>, shown: DetailLevel) -> Str
         text.push_str(&wrapped(remark, COLUMNS, 2));
     }
     let footer = format!(
-        "+/- holds the 95 % interval; points.json has its ends. Common errors, repeats, sensors and zero: {}, or the page of the run.",
+        "+/- covers the 95 % interval; points.json has its ends. Common errors, repeats, sensors and zero: {}, or the page of the run.",
         found.command
     );
     text.push_str(&wrapped(&footer, COLUMNS, 2));

@@ -25,7 +25,7 @@ const PART: f64 = 2.0 - SQRT_2;
 /// Relative distance of a difference quotient: the square root of the rounding error.
 const DISTANCE: f64 = 1.5e-8;
 /// Difference of rates, in typical states per second, above which a step does not begin as the one before ended, because inputs or model have
-/// jumped: 0.01 rpm/s.
+/// jumped: 0.1 rpm/s.
 const JUMP_S: f64 = 1e-6;
 
 /// A run with its derivatives, and those of `M` quantities that are read from it.

@@ -15,7 +15,7 @@ use std::fmt::Write;
 pub fn points_text(points: &[ScoredPoint], display: &Display, truth: bool) -> String {
     let kinds: Vec<StepKind> = points.iter().map(|scored| scored.point.kind).collect();
     let legend = wrapped(
-        &format!("{}+/- holds the 95 % interval. dT2: change of T2 in the window.", marks_legend(&kinds)),
+        &format!("{}+/- covers the 95 % interval. dT2: change of T2 in the window.", marks_legend(&kinds)),
         COLUMNS,
         0,
     );

@@ -35,7 +35,7 @@ impl Session<'_> {
         let campaign = recorded.require_campaign()?;
         check_machine(recorded, campaign)?;
         let recording = &recorded.read.recording;
-        // Steps say more than the readings at work, from which their heat balances cannot be told apart.
+        // Jumps separate the heat balances; readings alone do not, and would blame a cause that is not there.
         let steps = recording.steps.iter().filter(|step| step.valve_opening_ratio.is_finite()).count();
         if steps > 1 {
             return Err(DrivenError::HasSteps { steps }.into());

@@ -17,7 +17,7 @@ pub(crate) fn points(page: &RunPage<'_>, display: &Display) -> Markup {
         section #points aria-labelledby="points-head" {
             h2 #points-head { "Points by speed line" }
             p {
-                "+/- holds the 95 % interval, whose ends are in points.json. T2, P2 and T3 are means over the last " (END_S) " s of the step, when the gas is settled and \
+                "+/- covers the 95 % interval, whose ends are in points.json. T2, P2 and T3 are means over the last " (END_S) " s of the step, when the gas is settled and \
                  the housing is not; the uncertainty of readings is given with the instruments. The intervals of flow and pressure ratio are those \
                  of their sensors."
             }

@@ -1,6 +1,6 @@
 """Do the 95 % intervals hold on machines that differ? Campaigns with drawn machines, on the virtual lab.
 
-    cargo build --release
+    cargo build --release --locked
     python3 benches/coverage.py --mapper target/release/mapper --write docs/validation/coverage.md
 
 Each campaign has a machine of its own: a map that falls by 0 to 8 points more towards low speed and drops more or less

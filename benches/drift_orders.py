@@ -1,6 +1,6 @@
 """The smallest drift that is found along speed lines and by large jumps, at equal rig time.
 
-    cargo build --release
+    cargo build --release --locked
     python3 benches/drift_orders.py --mapper target/release/mapper --plant --write docs/validation/drift_orders.md
 
 Burke et al. order the points by jumps between speed lines (figure 13 b) and state that this allows "better detection of measurement

@@ -1,6 +1,6 @@
 """Hot maps corrected by `mapper map correct`, compared with the apparent ones and the joint method, on the virtual lab: errors against its truth.
 
-    cargo build --release
+    cargo build --release --locked
     python3 benches/heat_correction.py --mapper target/release/mapper --write docs/validation/maps.md
 
 Two machines. The closed form of turbo_a, whose work coefficient rises at low speed without any heat. And a table with the same flows and

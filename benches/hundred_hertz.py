@@ -1,6 +1,6 @@
 """What an hour of a run at 100 Hz with 24 sensors costs, and whether a sample is lost.
 
-    cargo build --release
+    cargo build --release --locked
     target/python-env/bin/python benches/hundred_hertz.py --mapper target/release/mapper
 
 The virtual lab in scaled time, as fast as it goes: the time counted is that of the whole program, simulation, recording and

@@ -1,6 +1,6 @@
 """How far `joint` errs, and how often its intervals hold, by class of machine: two builds on the same recordings.
 
-    cargo build --release
+    cargo build --release --locked
     python3 benches/identification.py record recordings --mapper target/release/mapper
     python3 benches/identification.py compare recordings --mapper target/release/mapper --before OTHER/mapper --write docs/validation/identification.md
 

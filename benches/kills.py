@@ -1,6 +1,6 @@
 """What is left of a run that is killed at any moment, up to three times, and whether the rest of it makes the same map.
 
-    cargo build --release
+    cargo build --release --locked
     target/python-env/bin/python benches/kills.py --mapper target/release/mapper --kills 500
 
 Runs four campaigns in turn: nine points of a minute evaluated by `dynamic` and by `joint` with a repeated jump, the same with a search of

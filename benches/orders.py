@@ -1,6 +1,6 @@
 """Orders of the same points on four machines: what the plan expects, and how far many seeds then err.
 
-    cargo build --release
+    cargo build --release --locked
     python3 benches/orders.py --mapper target/release/mapper --write docs/validation/orders.md
 
 Each seed draws its own plan, noise and offsets from the declared spread. The campaign is the shipped one, changed in order and machine

@@ -1,6 +1,6 @@
 """How processor time and memory of each kind of work grow with its size.
 
-    cargo build --release
+    cargo build --release --locked
     python benches/scale.py target/release/mapper [KIND ...]
 
 Kinds: plan, identify, diagnose, log, map, nightly, fleet; all of them if none is named. The exponent is that of the time over the size, from the row

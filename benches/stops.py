@@ -1,6 +1,6 @@
 """How long a stop takes, in each phase of a run and for each way to ask for it, and in the other commands.
 
-    cargo build --release
+    cargo build --release --locked
     target/python-env/bin/python benches/stops.py --mapper target/release/mapper
 
 In a run with a rig, the time is that from the request to the event of the first command of the safe state, which is sent before it is

@@ -1,6 +1,6 @@
 """Surge sought on the virtual lab, and the slowest line left out: many seeds, errors against the truth.
 
-    cargo build --release
+    cargo build --release --locked
     python3 benches/surge_lines.py --mapper target/release/mapper --write docs/validation/maps.md
 
 Each seed draws noise and offsets; the margin at which the variation before surge begins is drawn from 18 to 30 %, its size from

@@ -24,9 +24,10 @@ SCRIPTS = HERE / "mapper._mapper.data" / "scripts"
 
 def add_command() -> None:
     """Build the command with the library's cargo and put it where maturin takes it."""
-    cargo = [os.environ.get("CARGO", "cargo"), "build", "--release", "--package", "mapper-cli", "--bin", "mapper"]
+    cargo = [os.environ.get("CARGO", "cargo"), "build", "--release", "--locked"]
+    command = ["--package", "mapper-cli", "--bin", "mapper"]
     built = subprocess.run(
-        [*cargo, "--message-format=json-render-diagnostics"], cwd=HERE, check=True, stdout=subprocess.PIPE
+        [*cargo, *command, "--message-format=json-render-diagnostics"], cwd=HERE, check=True, stdout=subprocess.PIPE
     )
     messages = (json.loads(line) for line in built.stdout.splitlines())
     (program,) = [message["executable"] for message in messages if message.get("executable")]

@@ -28,7 +28,7 @@ fn binary() -> &'static Path {
 fn build(options: &[&str]) -> String {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut command = Command::new(cargo);
-    command.arg("build").args(options);
+    command.args(["build", "--locked"]).args(options);
     command.arg("--message-format=json-render-diagnostics").current_dir(repository());
     // Optimised if the tests are.
     if !cfg!(debug_assertions) {

@@ -1,6 +1,6 @@
 //! What the contract costs in addition to the work: items made, parts written through, all merged.
 //!
-//! `cargo run --release -p mapper-fleet --example overhead -- DIR 10000 8192`: items, and bytes of each result.
+//! `cargo run --release --locked -p mapper-fleet --example overhead -- DIR 10000 8192`: items, and bytes of each result.
 
 #![allow(clippy::print_stdout, missing_docs)]
 

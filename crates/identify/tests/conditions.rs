@@ -1,7 +1,7 @@
 //! Readings with errors that leave a recording plausible, alone and combined: points that stay good have intervals that cover the truth.
 //!
 //! ```text
-//! MAPPER_CONDITIONS_MACHINES=20 cargo test --release -p mapper-identify --test all conditions:: -- --nocapture
+//! MAPPER_CONDITIONS_MACHINES=20 cargo test --release --locked -p mapper-identify --test all conditions:: -- --nocapture
 //! ```
 //!
 //! With `MAPPER_CONDITIONS_RECORDING=FOLDER` it takes another simulator's recording instead: `readings.csv` (t and the channels in SI) and

@@ -1,6 +1,6 @@
 //! Sensor faults on random machines: the rates of false alarms and of detections.
 //!
-//! `MAPPER_FAULT_MACHINES=200 cargo test --release -p mapper-identify --test all faults:: -- --nocapture` prints the table of
+//! `MAPPER_FAULT_MACHINES=200 cargo test --release --locked -p mapper-identify --test all faults:: -- --nocapture` prints the table of
 //! docs/validation/faults.md.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]

@@ -1,5 +1,5 @@
 //! How often one faulty sensor of four is found and rightly named, and how often a fault-free recording is called faulty:
-//! `cargo run --release -p mapper-observe --example element_study -- SEEDS` (200 where it is left out).
+//! `cargo run --release --locked -p mapper-observe --example element_study -- SEEDS` (200 where it is left out).
 #![allow(clippy::print_stdout, missing_docs, reason = "what it prints is all it is for")]
 #[path = "../tests/common/mod.rs"]
 #[allow(clippy::unwrap_used, reason = "shared with the tests")]

@@ -1,6 +1,6 @@
 //! Integrates the 12 reference jumps, 110 s each, with all outputs at 10 Hz, and prints the time per transient.
 //!
-//! `cargo run --release -p mapper-physics --example transients -- REPEATS [RTOL]`, for comparison with a peer.
+//! `cargo run --release --locked -p mapper-physics --example transients -- REPEATS [RTOL]`, for comparison with a peer.
 #![allow(clippy::print_stdout)]
 
 use mapper_physics::machine::params::BoundaryConditions;

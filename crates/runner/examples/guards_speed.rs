@@ -1,7 +1,7 @@
 //! Benchmark of the guards: an hour of 19 channels at 100 Hz, polled sample by sample, and the time from a violation to the safe command.
 //!
 //! ```text
-//! cargo run --release -p mapper-runner --example guards_speed
+//! cargo run --release --locked -p mapper-runner --example guards_speed
 //! ```
 #![allow(clippy::print_stdout, reason = "it is there to print")]
 

@@ -1,7 +1,7 @@
 //! Measures CPU time and latency of a run on a stand with 24 sensors, and with an additional pressure at 1 kHz: docs/validation/performance.md.
 //!
 //! ```text
-//! cargo run --release -p mapper-session --example rig_load
+//! cargo run --release --locked -p mapper-session --example rig_load
 //! ```
 //!
 //! This prints one table. A word after `--` runs only one part:

@@ -1,7 +1,7 @@
 //! Measures how closely the speed loop follows its target at each step, on the virtual lab with sensor noise, over several seeds.
 //!
 //! ```text
-//! cargo run --release -p mapper-session --example speed_study
+//! cargo run --release --locked -p mapper-session --example speed_study
 //! ```
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, missing_docs)]

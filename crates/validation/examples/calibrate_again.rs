@@ -1,6 +1,6 @@
 //! Fits the calibration again to diagnoses that a study of calibrations has made: their fit takes a second, they take hours.
 //!
-//!     cargo run --release -p mapper-validation --example calibrate_again -- DIR/result/observed.json MADE_BY OUT
+//!     cargo run --release --locked -p mapper-validation --example calibrate_again -- DIR/result/observed.json MADE_BY OUT
 //!
 //! MADE_BY is the command that is written into the calibration; OUT a directory.
 

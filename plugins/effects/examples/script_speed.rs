@@ -1,5 +1,5 @@
 //! Measures how much slower a scripted effect is than the same built-in effect:
-//! `cargo run --release -p mapper-effects --example script_speed`
+//! `cargo run --release --locked -p mapper-effects --example script_speed`
 #![allow(clippy::print_stdout)]
 
 use mapper_effects::ScriptEffect;

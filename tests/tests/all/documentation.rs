@@ -1,6 +1,8 @@
 //! Checks the documentation: links, commands, campaigns, warning codes, and length.
 
-use mapper_tests::{mapper_in, repository, scratch};
+use mapper_core::EventKind;
+use mapper_recording::{ReadOptions, read_marks};
+use mapper_tests::{CampaignFile, mapper_in, repository, scratch, shared_run};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -128,31 +130,67 @@ fn every_page_is_in_the_table_of_contents() {
 fn every_page_referenced_in_the_sources_exists() {
     let root = repository();
     let mut named = BTreeSet::new();
-    for folder in ["benches", "campaigns", "crates", "examples", "plugins", "python", "tests", "xtask"] {
-        sources(&root.join(folder), &mut named);
+    for (_, text) in sources() {
+        let rests = text.split("docs/").skip(1);
+        let pages = rests.filter_map(|rest| Some(format!("docs/{}.md", rest.split_once(".md")?.0)));
+        // A page name has no blanks: what is between was text.
+        named.extend(
+            pages.filter(|page| page.chars().all(|c| c.is_ascii_alphanumeric() || "/_-.".contains(c))),
+        );
     }
     assert!(named.len() > 15, "{named:?}");
     let missing: Vec<_> = named.iter().filter(|name| !root.join(name).exists()).collect();
     assert!(missing.is_empty(), "sources name pages that do not exist: {missing:?}");
 }
 
-fn sources(folder: &Path, named: &mut BTreeSet<String>) {
+/// Sources, scripts, campaigns and services, with their text.
+fn sources() -> Vec<(PathBuf, String)> {
+    let mut found = Vec::new();
+    for folder in ["benches", "campaigns", "crates", "examples", "plugins", "python", "tests", "xtask"] {
+        sources_below(&repository().join(folder), &mut found);
+    }
+    found
+}
+
+fn sources_below(folder: &Path, found: &mut Vec<(PathBuf, String)>) {
     for path in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
         let name = path.file_name().unwrap().to_string_lossy().into_owned();
         if path.is_dir() {
             if !["target", "venv", "__pycache__"].contains(&name.as_str()) && !name.starts_with('.') {
-                sources(&path, named);
+                sources_below(&path, found);
             }
-        } else if [".rs", ".py", ".yaml", ".md", ".service"].iter().any(|end| name.ends_with(end)) {
+        } else if [".rs", ".py", ".yaml", ".yml", ".md", ".service"].iter().any(|end| name.ends_with(end)) {
             let text = fs::read_to_string(&path).unwrap_or_default();
-            let rests = text.split("docs/").skip(1);
-            let pages = rests.filter_map(|rest| Some(format!("docs/{}.md", rest.split_once(".md")?.0)));
-            // A page name has no blanks: what is between was text.
-            named.extend(pages.filter(|page| {
-                page.chars().all(|letter| letter.is_ascii_alphanumeric() || "/_-.".contains(letter))
-            }));
+            found.push((path, text));
         }
     }
+}
+
+/// Commands of cargo in a text that build something, each to its end. A command has options; the name of a subcommand in a sentence has
+/// none.
+fn building_commands(text: &str) -> Vec<&str> {
+    let builds = ["build", "run", "install", "nextest", "test", "bench", "check", "clippy"];
+    let rests = text.match_indices("cargo ").map(|(start, _)| &text[start..]);
+    let commands = rests.map(|rest| rest.split(['`', '\n', '\\', '"', '#', ';']).next().unwrap().trim_end());
+    let is_build = |command: &&str| {
+        let mut words = command.split(' ').skip(1);
+        words.next().is_some_and(|name| builds.contains(&name)) && words.any(|word| word.starts_with('-'))
+    };
+    commands.filter(is_build).collect()
+}
+
+/// Without `--locked`, cargo may take other versions of the libraries than those that were tested.
+#[test]
+fn every_cargo_command_in_the_documentation_uses_the_lock_file() {
+    let pages = pages().into_iter().map(|page| (page.clone(), fs::read_to_string(&page).unwrap()));
+    let mut all: Vec<(PathBuf, String)> = pages.chain(sources()).collect();
+    sources_below(&repository().join(".github"), &mut all);
+    let commands =
+        all.iter().flat_map(|(path, text)| building_commands(text).into_iter().map(move |line| (path, line)));
+    let (locked, unlocked): (Vec<_>, Vec<_>) =
+        commands.partition(|(_, command)| command.split(' ').any(|word| word == "--locked"));
+    assert!(locked.len() > 50, "{} commands were found", locked.len());
+    assert!(unlocked.is_empty(), "commands without --locked: {unlocked:#?}");
 }
 
 fn words(text: &str) -> usize {
@@ -303,6 +341,20 @@ fn the_campaigns_in_the_pages_pass_their_check() {
         }
     }
     assert!(count >= 8, "{count} campaigns were found");
+}
+
+/// The short campaign of the README is the first run of many readers, on any seed.
+#[test]
+fn the_campaign_of_the_readme_does_not_surge() {
+    let readme = fs::read_to_string(repository().join("README.md")).unwrap();
+    let (_, code) = prose_and_code(&readme);
+    let (_, text) = code.iter().find(|(_, part)| part.starts_with("campaign:")).unwrap();
+    for seed in 1..=2 {
+        let run = shared_run(&CampaignFile::of(format!("{text}seed: {seed}\n"))).run;
+        let (_, events) = read_marks(&run.join("recording.mcap"), &ReadOptions::default()).unwrap();
+        let surges: Vec<_> = events.iter().filter(|event| event.kind == EventKind::SurgeEntered).collect();
+        assert!(surges.is_empty(), "seed {seed}: {surges:?}");
+    }
 }
 
 /// The README has the same table as the validation page.

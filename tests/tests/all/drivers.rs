@@ -178,7 +178,10 @@ fn drivers_are_listed_with_their_location_or_build_command() {
     let text = String::from_utf8(output.stdout).unwrap();
     for name in ["modbus", "opcua", "ak"] {
         let joined = text.split_whitespace().collect::<Vec<_>>().join(" ");
-        assert!(joined.contains(&format!("cargo build --release -p mapper-backend-{name}")), "{text}");
+        assert!(
+            joined.contains(&format!("cargo build --release --locked -p mapper-backend-{name}")),
+            "{text}"
+        );
     }
 }
 

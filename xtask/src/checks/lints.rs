@@ -15,7 +15,7 @@ const REAL_RUSTDOC: &str = "MAPPER_XTASK_RUSTDOC";
 pub fn clippy() -> Command {
     command(
         workspace::cargo(),
-        &["clippy", "--workspace", "--all-targets", "--quiet", "--", "-D", "warnings"],
+        &["clippy", "--locked", "--workspace", "--all-targets", "--quiet", "--", "-D", "warnings"],
     )
 }
 

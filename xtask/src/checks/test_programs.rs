@@ -10,8 +10,16 @@ use std::process::{Command, Stdio};
 /// Runs the tests of the workspace with nextest, which runs them in parallel across all programs, or with `cargo test` if nextest is missing. `profile` is one of `.config/nextest.toml`; `threads_of` returns its number of threads for a number of cores.
 pub fn tests(profile: &str, threads_of: impl Fn(usize) -> usize) -> Command {
     if machine::has_nextest() {
-        let arguments =
-            ["nextest", "run", "--workspace", "--all-features", "--no-fail-fast", "--profile", profile];
+        let arguments = [
+            "nextest",
+            "run",
+            "--locked",
+            "--workspace",
+            "--all-features",
+            "--no-fail-fast",
+            "--profile",
+            profile,
+        ];
         let mut command =
             step::command(workspace::cargo(), &[&arguments[..], &["--color", "never"]].concat());
         let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
@@ -20,14 +28,26 @@ pub fn tests(profile: &str, threads_of: impl Fn(usize) -> usize) -> Command {
     } else {
         step::command(
             workspace::cargo(),
-            &["test", "--workspace", "--all-features", "--no-fail-fast", "--lib", "--bins", "--tests"],
+            &[
+                "test",
+                "--locked",
+                "--workspace",
+                "--all-features",
+                "--no-fail-fast",
+                "--lib",
+                "--bins",
+                "--tests",
+            ],
         )
     }
 }
 
 /// Runs the examples in the documentation.
 pub fn documentation_tests() -> Command {
-    step::command(workspace::cargo(), &["test", "--workspace", "--all-features", "--doc", "--no-fail-fast"])
+    step::command(
+        workspace::cargo(),
+        &["test", "--locked", "--workspace", "--all-features", "--doc", "--no-fail-fast"],
+    )
 }
 
 /// Runs a command with its output shown, and counts the tests in it. `Ok(false)` if some failed.

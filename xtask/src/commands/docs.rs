@@ -175,8 +175,17 @@ struct Programs {
 fn build() -> Result<(), Error> {
     // Names the whole workspace and one test, so that libraries have the same features as in the tests. With all tests, those that depend
     // on capabilities of the computer would be rebuilt.
-    let arguments =
-        ["build", "--quiet", "--workspace", "--all-features", "--test", "turbine", "--bin", "mapper"];
+    let arguments = [
+        "build",
+        "--locked",
+        "--quiet",
+        "--workspace",
+        "--all-features",
+        "--test",
+        "turbine",
+        "--bin",
+        "mapper",
+    ];
     let examples = ["--example", EXAMPLE];
     run(lints::linting(command(workspace::cargo(), &[&arguments[..], &examples].concat())))
 }

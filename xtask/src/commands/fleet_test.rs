@@ -17,7 +17,7 @@ pub fn fleet_test() -> Result<(), Error> {
     let capabilities = Capabilities::with(python_env::prepare()?);
     let mut steps = Steps::default();
     steps.run("building", || {
-        let all = ["build", "--workspace", "--all-features", "--bins", "--tests", "--quiet"];
+        let all = ["build", "--locked", "--workspace", "--all-features", "--bins", "--tests", "--quiet"];
         run(capabilities.to(command(workspace::cargo(), &all)))
     });
     steps.run("tests", || {
@@ -26,7 +26,7 @@ pub fn fleet_test() -> Result<(), Error> {
             &["-p", "mapper-fleet", "-p", "mapper-validation", "--tests"][..],
             &["-p", "mapper-tests", "--test", "all", "fleet"],
         ] {
-            let arguments = [&["test", "--all-features", "--no-fail-fast"], tests].concat();
+            let arguments = [&["test", "--locked", "--all-features", "--no-fail-fast"], tests].concat();
             let tests = with_program(capabilities.to(command(workspace::cargo(), &arguments)));
             well &= test_programs::run(tests, &mut tally)?;
         }

@@ -18,8 +18,8 @@ const CAMPAIGN: &str = "campaigns/turbo_a.yaml";
 
 /// Measures everything and writes the page.
 pub fn performance() -> Result<(), Error> {
-    run(cargo(&["build", "--release", "-p", "mapper-cli"]))?;
-    run(cargo(&["build", "--release", "-p", "mapper-physics", "--example", "transients"]))?;
+    run(cargo(&["build", "--release", "--locked", "-p", "mapper-cli"]))?;
+    run(cargo(&["build", "--release", "--locked", "-p", "mapper-physics", "--example", "transients"]))?;
     let release = workspace::target_dir().join("release");
     // Writing to a String cannot fail, here and below.
     let mut page = String::from(HEAD);
@@ -84,7 +84,7 @@ fn transients(page: &mut String, ours: &Path) -> Result<(), Error> {
     }
     let _ = writeln!(
         page,
-        "\n`cargo run --release -p mapper-physics --example transients -- {REPEATS}`; the peer is in `benches/peers`.\n"
+        "\n`cargo run --release --locked -p mapper-physics --example transients -- {REPEATS}`; the peer is in `benches/peers`.\n"
     );
     Ok(())
 }
@@ -157,7 +157,7 @@ fn identification(page: &mut String) -> Result<(), Error> {
     let _ = writeln!(
         page,
         "## Identification of one step of 1000 samples\n\nFit, standard errors, checks and verdict. \
-         `cargo bench -p mapper-identify --bench identify`:\n\n```\n{table}\n```"
+         `cargo bench --locked -p mapper-identify --bench identify`:\n\n```\n{table}\n```"
     );
     Ok(())
 }

@@ -27,7 +27,7 @@ pub fn quick() -> Result<(), Error> {
             test_programs::tests("quick", |cores| cores + 2)
         } else {
             // Without nextest, tests cannot be skipped by name; only the fast tests inside the libraries are run.
-            cargo(&["test", "--workspace", "--no-fail-fast", "--lib"])
+            cargo(&["test", "--locked", "--workspace", "--no-fail-fast", "--lib"])
         };
         let well = test_programs::run(tests, &mut tally)?;
         test_programs::close(&tally, well)

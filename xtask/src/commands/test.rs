@@ -79,7 +79,7 @@ pub fn python() -> Result<(), Error> {
 
 /// Builds and lints the program together with all tests. Alone, some libraries would have other features and be built twice.
 pub fn build(capabilities: &Capabilities) -> Command {
-    let all = ["build", "--workspace", "--all-features", "--all-targets", "--quiet"];
+    let all = ["build", "--locked", "--workspace", "--all-features", "--all-targets", "--quiet"];
     lints::linting(capabilities.to(command(workspace::cargo(), &all)))
 }
 

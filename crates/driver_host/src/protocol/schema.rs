@@ -184,7 +184,7 @@ mod tests {
     }
 
     /// The committed schema, which authors of drivers use, matches the types. To generate it again:
-    /// `MAPPER_WRITE_SCHEMA=1 cargo test -p mapper-driver-host the_committed_schema`.
+    /// `MAPPER_WRITE_SCHEMA=1 cargo test --locked -p mapper-driver-host the_committed_schema`.
     #[test]
     fn the_committed_schema_matches_the_types() {
         let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))

@@ -90,16 +90,16 @@ const UNSUPPORTED_FORMATS: [(&[u8], &str); 7] = [
     ),
     (
         b"TDSm",
-        "it is TDMS, which this program was built without: `cargo build --release --features tdms`, or export it as CSV or MDF 4",
+        "it is TDMS, which this program was built without: `cargo build --release --locked --features tdms`, or export it as CSV or MDF 4",
     ),
     (
         b"PAR1",
-        "it is Parquet, which this program was built without: `cargo build --release --features parquet`, or export it as CSV, e.g. \
+        "it is Parquet, which this program was built without: `cargo build --release --locked --features parquet`, or export it as CSV, e.g. \
          with `polars.read_parquet(FILE).write_csv(NEW)`",
     ),
     (
         b"ARROW1",
-        "it is Arrow, which this program was built without: `cargo build --release --features parquet`, or export it as CSV, e.g. \
+        "it is Arrow, which this program was built without: `cargo build --release --locked --features parquet`, or export it as CSV, e.g. \
          with `polars.read_ipc(FILE).write_csv(NEW)`",
     ),
     (b"\x89HDF", "it is HDF5; export it as CSV"),

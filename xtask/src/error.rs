@@ -14,6 +14,7 @@ pub enum Error {
     Warnings { count: usize },
     LeftOut { count: usize },
     Stale { differences: Vec<String> },
+    Constants { violations: String },
 }
 
 impl std::fmt::Display for Error {
@@ -39,6 +40,7 @@ impl std::fmt::Display for Error {
                     "{count} tests were left out; `cargo xtask test` must run all (look for `ignored` above)"
                 )
             }
+            Error::Constants { violations } => write!(f, "numbers without a source:\n{violations}"),
             Error::Stale { differences } => write!(
                 f,
                 "generated documents are out of date; run `cargo xtask docs` and look at what changed:\n  {}",

@@ -2,7 +2,6 @@
 
 mod checks;
 mod commands;
-mod constants;
 mod environment;
 mod error;
 mod files;

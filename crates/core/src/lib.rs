@@ -19,6 +19,7 @@ mod rig;
 mod schema;
 pub mod test_plan;
 mod text;
+pub mod unit_factors;
 
 pub use identification::acceptance::{ACCEPTANCE_WINDOW_S, AcceptanceCriteria};
 pub use identification::common_errors::CommonErrors;

@@ -6,8 +6,35 @@ use mapper_numerics::coloured_noise::ColouredNoise;
 use mapper_physics::gas::air::Air;
 use mapper_physics::gas::mixture::Gas;
 use mapper_physics::gas::pressure_tap::static_to_total_pa;
+use mapper_physics::machine::params::Params;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+
+/// Thresholds of every campaign.
+const USUAL_THRESHOLDS: Thresholds = Thresholds {
+    // Bound: the standard deviation of the residual is then known to a sixth, 1 / sqrt(2 n).
+    fewest_samples: 20,
+    // Judgement: more lost samples indicate a defect of the logger.
+    lost_samples_ratio: 0.05,
+    // Judgement: two points of efficiency; users of a map notice more.
+    sigma_eta: 0.02,
+    // Bound: efficiencies of compressors range over 0.6, so such an error carries no information.
+    unusable_sigma_eta: 0.2,
+    // Bound: five times the noise of a thermocouple, 0.1 K; a smaller change hardly determines two parameters.
+    dt2_k: 0.5,
+    // Bound: a quarter of the error above which a point is doubtful.
+    flow_drift_eta: 0.005,
+    // Bound: by chance, 20 samples exceed it once in 900 fits (chi-square with 20 degrees of freedom).
+    residual_over_noise_ratio: 1.5,
+    // Judgement: slow residuals of less than 2 % of the change of T2 are usual model errors.
+    structure_ratio: 0.02,
+    // Bound: several correlation times of sensor noise.
+    steady_mean_s: 10.0,
+    // Judgement: five times the noise of a slope over a minute.
+    steady_drift_k_min: 0.5,
+    // Bound: short compared with the housings' time constants, longer than the correlation time of sensor noise.
+    end_mean_s: 2.0,
+};
 
 /// Settings of an identification.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -64,17 +91,18 @@ pub struct IdentifyConfig {
 impl Default for IdentifyConfig {
     /// The dynamic method on the nominal machine (Appendix A of the paper), total-pressure taps, no declared uncertainty.
     fn default() -> Self {
+        let machine = Params::default().compressor;
         IdentifyConfig {
             method: Method::Dynamic,
             window: WindowRule::default(),
             settle_bands: SettleBands::default(),
             alpha_area_ratio: 0.0,
             alpha_area_sigma_ratio: 0.0,
-            internal_area_m2: 29e-3,
+            internal_area_m2: machine.internal_area_m2,
             internal_area_sigma_ratio: 0.0,
             inlet_convection: InletConvection::Shared,
-            inlet_diameter_m: 40e-3,
-            outlet_diameter_m: 35e-3,
+            inlet_diameter_m: machine.inlet_diameter_m,
+            outlet_diameter_m: machine.outlet_diameter_m,
             probe_diameter_m: 0.0,
             joint: JointSettings::default(),
             reference: ReferenceState::SAE,
@@ -164,18 +192,6 @@ pub struct Thresholds {
 
 impl Default for Thresholds {
     fn default() -> Self {
-        Thresholds {
-            fewest_samples: 20,
-            lost_samples_ratio: 0.05,
-            sigma_eta: 0.02,
-            unusable_sigma_eta: 0.2,
-            dt2_k: 0.5,
-            flow_drift_eta: 0.005,
-            residual_over_noise_ratio: 1.5,
-            structure_ratio: 0.02,
-            steady_mean_s: 10.0,
-            steady_drift_k_min: 0.5,
-            end_mean_s: 2.0,
-        }
+        USUAL_THRESHOLDS
     }
 }

@@ -23,6 +23,12 @@ use mapper_physics::simulation::model::{Model, Outputs, State, rad_s_of_rpm};
 use mapper_physics::simulation::steady::settle_housings;
 use std::sync::Arc;
 
+/// Lower ends of the search for the efficiency, ratios to the apparent one, tried in turn. Bound: where the search starts; an end
+/// without a balance is skipped.
+const SEARCH_STARTS: [f64; 4] = [0.95, 0.8, 0.6, 0.4];
+/// Tolerance of the search. Bound: far below any digit that is shown.
+const ETA_TOLERANCE: f64 = 1e-10;
+
 /// A machine whose heat transfer is known.
 #[derive(Debug, Clone, Copy)]
 pub struct KnownHeat<'a> {
@@ -241,9 +247,9 @@ impl Inputs {
         // No balance holds far below the apparent efficiency, where the compressor takes more than the turbine can give.
         let lowest = match self.point.tc_k {
             Some(_) => vec![ETA_BOUNDS.0],
-            None => [0.95, 0.8, 0.6, 0.4].map(|share| (share * apparent).max(ETA_BOUNDS.0)).to_vec(),
+            None => SEARCH_STARTS.map(|share| (share * apparent).max(ETA_BOUNDS.0)).to_vec(),
         };
-        lowest.into_iter().find_map(|lowest| root_between(lowest, ETA_BOUNDS.1, 1e-10, excess_k))
+        lowest.into_iter().find_map(|lowest| root_between(lowest, ETA_BOUNDS.1, ETA_TOLERANCE, excess_k))
     }
 
     /// The state of the machine with settled housings; `None` if they do not settle.

@@ -34,15 +34,18 @@ pub enum Reach {
     Coarse,
 }
 
-/// Fine distance of finite differences, in the unknowns' units: both rounding and curvature errors are small.
+/// Fine distance of finite differences, in the unknowns' units. Bound: both rounding and curvature errors are small.
 pub const FINE: f64 = 0.02;
-/// Largest change of an unknown in one iteration, in its unit: models are nonlinear.
+/// Coarse distance, which follows the curvature of the model over a fifth of an unknown's unit. Bound: far from the minimum a secant is better
+/// than a tangent.
+pub const COARSE: f64 = 10.0 * FINE;
+/// Largest change of an unknown in one iteration, in its unit. Bound: models are nonlinear.
 pub const MAX_MOVE: f64 = 2.0;
 
 impl Reach {
     /// The distance, in the unknowns' units.
     pub fn distance(self) -> f64 {
-        if self == Reach::Fine { FINE } else { 10.0 * FINE }
+        if self == Reach::Fine { FINE } else { COARSE }
     }
 }
 
@@ -51,11 +54,11 @@ pub fn room_within(low: f64, high: f64, at: f64) -> (f64, f64) {
     ((low - at).clamp(-MAX_MOVE, 0.0), (high - at).clamp(0.0, MAX_MOVE))
 }
 
-/// Minimum predicted decrease of the cost for another iteration, if fits are compared with each other: 0.01 in ln of the evidence is
-/// negligible.
+/// Minimum predicted decrease of the cost for another iteration, if fits are compared with each other. Bound: 0.01 in ln of the evidence
+/// is negligible.
 pub const ENOUGH: f64 = 0.02;
 
-/// Maximum number of alternations between two fits that depend on each other: each reduces the error to about a tenth.
+/// Maximum number of alternations between two fits that depend on each other. Bound: each reduces the error to about a tenth.
 pub const ROUNDS: usize = 3;
 
 /// Stopping rule of a descent.
@@ -87,9 +90,9 @@ pub struct End<Point> {
     pub promised: f64,
 }
 
-/// Maximum number of lengths tried for one step.
+/// Maximum number of lengths tried for one step. Bound: the last is a hundredth of the step; a shorter one is no progress.
 const MAX_STEP_LENGTHS: usize = 5;
-/// Ratio of each length to the previous one: all of them reach a hundredth of the step. Judgement.
+/// Ratio of each length to the previous one. Bound: all of them reach a hundredth of the step.
 const STEP_SHORTENING: f64 = 0.35;
 
 /// Minimises the cost from `unknowns`, at which the model gives `point`.

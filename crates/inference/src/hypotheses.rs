@@ -15,7 +15,11 @@ use mapper_numerics::ROUNDING;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use std::collections::BTreeMap;
 
-/// Maximum number of members of an explanation, and of single causes from which the search starts: bounds the search. Judgement.
+/// Size of a cause that is certainly detected, in its prior standard deviations. Bound: the upper end of a bisection only.
+const CERTAIN_SIGMAS: f64 = 1e6;
+
+/// Maximum number of members of an explanation, and of single causes from which the search starts. Bound: the effort of the search; rigs
+/// with more than three causes at once are not expected.
 pub const MAX_MEMBERS: usize = 4;
 
 /// Residuals and their sensitivities to the parameters.
@@ -211,7 +215,7 @@ impl Likelihood {
             each.fold(f64::NEG_INFINITY, ln_sum)
         };
         // The odds grow with the size: bisection between zero and a multiple that is certainly detected.
-        let (mut low, mut high) = (0.0, 1e6 * priors.hypotheses[index].sigma);
+        let (mut low, mut high) = (0.0, CERTAIN_SIGMAS * priors.hypotheses[index].sigma);
         if ln_odds(high) < 0.0 {
             return Some(f64::INFINITY);
         }

@@ -2,12 +2,12 @@
 
 use mapper_numerics::statistics::{EXCLUDE_SIGMAS, range};
 
-/// Cells of the density for one standard deviation: the error of the interval is then below 0.01 standard deviations.
+/// Cells of the density for one standard deviation. Bound: the error of the interval is then below 0.01 standard deviations.
 const CELLS_PER_SIGMA: f64 = 16.0;
-/// Maximum number of cells between the lowest and the highest centre: bounds the effort if the centres are far apart.
+/// Maximum number of cells between the lowest and the highest centre. Bound: the effort if the centres are far apart.
 const MAX_CELLS: f64 = 4096.0;
 
-/// Coverage of all reported intervals.
+/// Coverage of all reported intervals. Source: the usual coverage of measurement uncertainty (GUM, JCGM 100, 6.3).
 pub const COVERAGE: f64 = 0.95;
 
 /// Whether data carry more information about a parameter than its prior, from the widths (or errors) after and before them; otherwise the prior

@@ -10,9 +10,10 @@
 use mapper_numerics::statistics::{BoundedNormal, normal_quantile};
 use nalgebra::{DMatrix, DVector};
 
-/// Number of draws of each set, and of a posterior: means and probabilities then agree with sums over a grid to some thousandths (tested below).
+/// Number of draws of each set, and of a posterior. Bound: means and probabilities then agree with sums over a grid to some thousandths
+/// (tested below).
 pub const DRAWS: usize = 128;
-/// Minimum probability of a set that gets draws: a fiftieth of the probability outside a 95 % interval.
+/// Minimum probability of a set that gets draws. Bound: a fiftieth of the probability outside a 95 % interval.
 pub const MIN_WEIGHT: f64 = 1e-3;
 
 /// A parameter that may be neutral. All values are distances from neutral.

@@ -101,7 +101,7 @@ impl<Fit: Clone + Send + Sync> Known<Fit> {
     }
 }
 
-/// Maximum number of sets of the same families that are fitted in one round: predictions for neighbouring onsets are similar.
+/// Maximum number of sets of the same families that are fitted in one round. Bound: predictions for neighbouring onsets are similar.
 const MAX_FITS_PER_FAMILY: usize = 2;
 
 /// Searches sets of several causes; `known` has the fit without causes and those of all single causes.

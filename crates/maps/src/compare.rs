@@ -1,16 +1,19 @@
 //! Compares two maps: differences in units, with their standard errors.
 
 use crate::efficiency_definition::convert_efficiency;
-use crate::map_fit::{MapFit, MapFitError, MapFitOptions};
+use crate::map_fit::{MIN_FLOW_KG_S, MIN_RATIO_RANGE, MapFit, MapFitError, MapFitOptions};
 use mapper_core::{CompressorMap, FittedLine, FittedNode, confidence_interval_95};
 use mapper_numerics::polyline::NearestOnPolyline;
 use serde::Serialize;
 
-/// Compared places on each line.
+/// Relative difference of the speeds of one line. Bound: half of what stands hold.
+const SAME_LINE_RATIO: f64 = 0.005;
+
+/// Compared places on each line. Bound: more show nothing new between smooth lines.
 const PLACES: usize = 25;
-/// Nodes of the fitted lines for each compared place.
+/// Nodes of the fitted lines for each compared place. Bound: the nearest place is then between nodes a hundredth of a line apart.
 const NODES_PER_PLACE: usize = 4;
-/// Maximum relative difference between the speeds of end lines that count as equal: stands hold a speed within 1 %.
+/// Maximum relative difference between the speeds of end lines that count as equal. Bound: stands hold a speed within 1 %.
 const END_TOLERANCE_RATIO: f64 = 0.01;
 
 /// A place of the second map compared with the nearest place of the first at equal corrected speed. Differences: second minus
@@ -108,8 +111,7 @@ pub fn compare(first: &CompressorMap, second: &CompressorMap) -> Result<MapCompa
     };
     let mut all: Vec<f64> = speeds.iter().flatten().map(snap_to_end).collect();
     all.sort_by(f64::total_cmp);
-    // Measured lines less than half a percent apart are one line.
-    all.dedup_by(|b, a| *b <= *a * 1.005);
+    all.dedup_by(|b, a| *b <= *a * (1.0 + SAME_LINE_RATIO));
     let (common, not_compared_rpm): (Vec<f64>, Vec<f64>) = all.into_iter().partition(within);
     let options = MapFitOptions {
         further_speeds_rpm: Some(common.clone()),
@@ -158,8 +160,8 @@ fn summarise(lines: Vec<SpeedLineComparison>, not_compared_rpm: Vec<f64>) -> Map
 
 fn compare_lines(first: &FittedLine, second: &FittedLine) -> Vec<PlaceComparison> {
     let known: Vec<&FittedNode> = first.nodes.iter().filter(|n| !n.extrapolated).collect();
-    let flow_scale_kg_s = known.iter().map(|n| n.flow_corrected_kg_s).fold(1e-12, f64::max);
-    let ratio_scale = known.iter().map(|n| n.pressure_ratio - 1.0).fold(1e-6, f64::max);
+    let flow_scale_kg_s = known.iter().map(|n| n.flow_corrected_kg_s).fold(MIN_FLOW_KG_S, f64::max);
+    let ratio_scale = known.iter().map(|n| n.pressure_ratio - 1.0).fold(MIN_RATIO_RANGE, f64::max);
     let line = ReferenceLine { nodes: &known, flow_scale_kg_s, ratio_scale };
     let nodes = second.nodes.iter().step_by(NODES_PER_PLACE).filter(|node| !node.extrapolated);
     nodes.filter_map(|node| line.compare_place(node)).collect()

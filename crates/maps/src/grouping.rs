@@ -2,8 +2,11 @@
 
 use mapper_core::IdentifiedPoint;
 
-/// Minimum gap between neighbouring lines of points without a target speed, as a ratio of the slower corrected speed. It separates lines of
-/// maps, which are at least 8 % apart, from the variation within one: 1 % with speed control, and some 2 % without.
+/// Relative difference of equal target speeds. Bound: targets are setpoints, which differ by rounding only.
+const TARGET_ROUNDING_RATIO: f64 = 1e-6;
+
+/// Minimum gap between neighbouring lines of points without a target speed, as a ratio of the slower corrected speed. Bound: it separates
+/// lines of maps, which are at least 8 % apart, from the variation within one: 1 % with speed control, and some 2 % without.
 const SPEED_GAP_RATIO: f64 = 0.04;
 
 /// Points of one line in their original order, with their common target.
@@ -24,8 +27,7 @@ pub(crate) fn group_by_speed(points: &[IdentifiedPoint]) -> Vec<Group<'_>> {
     without_target.sort_by(|a, b| a.speed_corrected_rpm.total_cmp(&b.speed_corrected_rpm));
     let mut groups = split(with_target, |a, b| {
         let (a, b) = (target_speed_rpm(a).unwrap_or_default(), target_speed_rpm(b).unwrap_or_default());
-        // Targets are setpoints: they differ by rounding only.
-        b - a > 1e-6 * a.abs()
+        b - a > TARGET_ROUNDING_RATIO * a.abs()
     });
     for group in &mut groups {
         group.target_speed_rpm = group.points.first().and_then(|point| target_speed_rpm(point));

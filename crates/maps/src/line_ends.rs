@@ -3,14 +3,14 @@
 use mapper_core::{CompressorMap, EndEvidence, LineEnd, MapPoint, SpeedLine, Warning};
 use serde::Serialize;
 
-/// Efficiency below which a compressor counts as choked (Garrett, Turbo Tech 103).
+/// Efficiency below which a compressor counts as choked (Garrett, Turbo Tech 103). Source: Garrett, Turbo Tech 103.
 const MAX_CHOKE_ETA: f64 = 0.58;
 /// Maximum relative rise of flow over the relative loss of pressure rise on the vertical part of a line. It is above 1 at the zero-slope
-/// point and approaches 0 in choke. Judgement.
+/// point and approaches 0 in choke. Bound: it is above 1 at the zero-slope point and approaches 0 in choke.
 const MAX_VERTICAL_SLOPE_RATIO: f64 = 0.1;
-/// Minimum loss of pressure rise, ratio: large compared with the scatter of repeated points, 0.2 %. Judgement.
+/// Minimum loss of pressure rise, ratio. Bound: large compared with the scatter of repeated points, 0.2 %.
 const MIN_PRESSURE_LOSS_RATIO: f64 = 0.05;
-/// Maximum relative difference in flow of a repeated point: twice the usual uncertainty of a flow meter, 0.5 %.
+/// Maximum relative difference in flow of a repeated point. Bound: twice the usual uncertainty of a flow meter, 0.5 %.
 const REPEAT_RATIO: f64 = 0.01;
 
 /// An end of a line.

@@ -6,9 +6,10 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-/// Relative tolerance of an iteration: the square root of the rounding error of f64 (Press et al., Numerical Recipes, ch. 10.1).
+/// Relative tolerance of an iteration. Source: the square root of the rounding error of f64 (Press et al., Numerical Recipes, ch. 10.1).
 pub const ROUNDING: f64 = 1.490_116_119_384_765_6e-8;
-/// Relative step of a central difference: the cube root of the rounding error, which balances rounding and curvature (ibid., ch. 5.7).
+/// Relative step of a central difference. Source: the cube root of the rounding error, which balances rounding and curvature (ibid., ch.
+/// 5.7).
 pub const SLOPE_STEP: f64 = 6.055_454_452_393_343e-6;
 
 pub mod coloured_noise;

@@ -1,10 +1,11 @@
 //! The minimum of a scalar function on an interval.
 
-/// Maximum number of evaluations. Golden section alone halves the interval in fewer than two evaluations, so the limit suffices for full precision.
+/// Maximum number of evaluations. Golden section alone halves the interval in fewer than two evaluations, so the limit suffices for full
+/// precision. Bound: golden section alone halves the interval in fewer than two evaluations, so the limit suffices for full precision.
 const MAX_EVALUATIONS: usize = 200;
-/// Golden section: the smaller part of the interval, (3 - sqrt(5)) / 2.
+/// Golden section. Source: the smaller part of the interval, (3 - sqrt(5)) / 2.
 const GOLDEN_SECTION: f64 = 0.381_966_011_250_105_1;
-/// Relative distance below which values of a smooth function cannot be distinguished: the square root of the rounding error.
+/// Relative distance below which values of a smooth function cannot be distinguished. Bound: the square root of the rounding error.
 const RESOLUTION: f64 = 1.5e-8;
 
 /// A minimum of a function.

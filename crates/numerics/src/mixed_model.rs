@@ -3,18 +3,22 @@
 use crate::minimise::minimise;
 use nalgebra::{DMatrix, DVector};
 
-/// Maximum number of iterations over the variances. A few suffice, because crossed groups hardly interact.
+/// Maximum number of iterations over the variances. A few suffice, because crossed groups hardly interact. Bound: a few suffice, because
+/// crossed groups hardly interact.
 const MAX_ROUNDS: usize = 60;
-/// The iteration has converged if no share changes by more than twice this.
+/// The iteration has converged if no share changes by more than twice this. Bound: far below the standard error of any share.
 const SHARE_TOLERANCE: f64 = 1e-7;
-/// Largest ratio of a group's standard deviation to the residual's that is distinguished from infinity.
+/// Largest ratio of a group's standard deviation to the residual's that is distinguished from infinity. Bound: no data distinguish it
+/// from infinity.
 const MAX_RATIO: f64 = 1e4;
-/// Fraction of the sum of squares below which a residual is rounding error.
+/// Fraction of the sum of squares below which a residual is rounding error. Bound: some tens of roundings of f64.
 const ROUNDING: f64 = 1e-14;
 /// Minimum fraction of a column's square that is independent of the other columns; below it the columns count as linearly dependent.
+/// Bound: its square root is a thousand roundings of f64.
 const MIN_INDEPENDENT_RATIO: f64 = 1e-12;
 
-/// Maximum level; a larger one is a mistake in the data and would need too much memory.
+/// Maximum level; a larger one is a mistake in the data and would need too much memory. Bound: a larger one is a mistake in the data and
+/// would need too much memory.
 const MAX_LEVELS: usize = 100_000;
 
 /// Observations `y = fixed * coefficients + sum of the effect of each group's level + residual`. All effects and residuals are independent

@@ -17,13 +17,15 @@ impl NearestOnPolyline {
     /// The point of the polyline through `vertices` that is nearest to `point`, the first one of several. `None` for fewer than two
     /// vertices or NaN coordinates.
     pub fn of(vertices: &[(f64, f64)], point: (f64, f64)) -> Option<Self> {
-        // A smaller distance beyond an end is rounding error.
+        /// Distance beyond an end, in its segment's length, that is no distance. Bound: rounding error.
         const TOLERANCE: f64 = 1e-6;
+        /// Minimum square of a segment's length. Bound: excludes division by zero for vertices that coincide.
+        const MIN_SQUARE: f64 = 1e-30;
         let last = vertices.len().checked_sub(2)?;
         let nearest_in = |(segment, pair): (usize, &[(f64, f64)])| {
             let ((ax, ay), (bx, by)) = (pair[0], pair[1]);
             let (dx, dy) = (bx - ax, by - ay);
-            let share = ((point.0 - ax) * dx + (point.1 - ay) * dy) / (dx * dx + dy * dy).max(1e-30);
+            let share = ((point.0 - ax) * dx + (point.1 - ay) * dy) / (dx * dx + dy * dy).max(MIN_SQUARE);
             let share_ratio = share.clamp(0.0, 1.0);
             let distance = (point.0 - ax - share_ratio * dx).hypot(point.1 - ay - share_ratio * dy);
             let beyond_end =

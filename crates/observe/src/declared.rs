@@ -7,6 +7,15 @@ use mapper_physics::machine::params::BoundaryConditions;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
+/// Noise of a sample of shaft speed, rpm. Judgement: eddy-current counters resolve some tens of rpm.
+const USUAL_NOISE_RPM: f64 = 30.0;
+/// Noise of a sample of flow, kg/s. Judgement: 0.3 % of a usual flow.
+const USUAL_NOISE_KG_S: f64 = 1.5e-4;
+/// Noise of a sample of pressure, Pa. Judgement: 0.02 % of a range of 3 bar.
+const USUAL_NOISE_PA: f64 = 60.0;
+/// Noise of a sample of temperature, K. Judgement: thermocouples in gas have 0.1 to 0.3 K.
+const USUAL_NOISE_K: f64 = 0.2;
+
 /// Merges the declared uncertainties of every sensor of a recording, by a rule common to all programs.
 ///
 /// The most specific declaration applies. `channel_map` describes the sensors of this recording: for a channel declared there, its noise and
@@ -99,10 +108,10 @@ impl Declared {
 /// Noise of one sample of a typical sensor of a gas stand, in the channel's unit.
 pub fn usual_noise_sigma(channel: Channel) -> f64 {
     match channel.info().dimension {
-        Dimension::RotationalSpeed => 30.0,
-        Dimension::MassFlow => 1.5e-4,
-        Dimension::Pressure => 60.0,
-        Dimension::Temperature | Dimension::Ratio => 0.2,
+        Dimension::RotationalSpeed => USUAL_NOISE_RPM,
+        Dimension::MassFlow => USUAL_NOISE_KG_S,
+        Dimension::Pressure => USUAL_NOISE_PA,
+        Dimension::Temperature | Dimension::Ratio => USUAL_NOISE_K,
     }
 }
 

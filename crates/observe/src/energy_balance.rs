@@ -7,6 +7,9 @@ use mapper_physics::gas::mixture::Gas;
 use mapper_physics::rig::sensor_fault::CALIBRATED_AT_K;
 use std::collections::BTreeMap;
 
+/// Temperature of the first number of [`OIL`], K. Source: the same table.
+const OIL_AT_K: f64 = 300.0;
+
 /// A power, W.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Power {
@@ -52,13 +55,14 @@ const INPUTS: [Channel; 16] = [
     Channel::P4,
 ];
 
-/// Heat capacity of engine oil at 300 K, J/(kg K), and its rise, J/(kg K2): Incropera, Fundamentals of Heat and Mass Transfer, table A.5.
+/// Heat capacity of engine oil at 300 K, J/(kg K), and its rise, J/(kg K2). Source: Incropera, Fundamentals of Heat and Mass Transfer,
+/// table A.5.
 const OIL: (f64, f64) = (1909.0, 4.2);
-/// Standard uncertainty of the heat capacity of oil, ratio. Judgement: different oils differ by some percent.
+/// Standard uncertainty of the heat capacity of oil, ratio. Bound: different oils differ by some percent.
 const OIL_RATIO: f64 = 0.03;
-/// Heat capacity of water, J/(kg K): 4178 at 310 K to 4217 at 373 K (the same book, table A.6).
+/// Heat capacity of water, J/(kg K). Source: 4178 at 310 K to 4217 at 373 K (the same book, table A.6).
 const WATER_J_KGK: f64 = 4190.0;
-/// Step of the numerical derivatives, ratio of the standard uncertainty.
+/// Step of the numerical derivatives, ratio of the standard uncertainty. Bound: the balances are nearly linear over it.
 const STEP_RATIO: f64 = 0.1;
 
 /// The gases of compressor and turbine.
@@ -117,6 +121,7 @@ pub fn energy_balance(
     }
 }
 
+/// Number of powers. Source: definition.
 const POWERS: usize = 5;
 
 /// The powers of compressor, turbine, oil, water, losses, W; NaN if a reading is missing.
@@ -146,7 +151,7 @@ fn powers_w(readings: &[f64; INPUTS.len()], gases: &Gases, oil_ratio: f64) -> [f
     let compressor = m_c * at(gases.compressor, p1_pa, p2_pa).enthalpy_rise_j_kg(t1_k, t2_k);
     let turbine = m_t * at(Air::new(gases.turbine, 0.0), p4_pa, p3_pa).enthalpy_rise_j_kg(t4_k, t3_k);
     let (at_300_k, rise) = OIL;
-    let oil_j_kgk = oil_ratio * (at_300_k + rise * (0.5 * (oil_k + oil_out_k) - 300.0));
+    let oil_j_kgk = oil_ratio * (at_300_k + rise * (0.5 * (oil_k + oil_out_k) - OIL_AT_K));
     let oil = m_oil * oil_j_kgk * (oil_out_k - oil_k);
     let water = m_water * WATER_J_KGK * (water_out_k - water_k);
     let zero_if_missing = |heat: f64| if heat.is_finite() { heat } else { 0.0 };

@@ -5,7 +5,7 @@ use mapper_core::{Channel, ModelTolerances};
 use mapper_physics::machine::params::{BoundaryConditions, Params};
 use mapper_physics::simulation::model::State;
 
-/// Factor on the standard deviation of an uninformative prior.
+/// Factor on the standard deviation of an uninformative prior. Bound: such a prior does not enter the result.
 pub const UNINFORMATIVE: f64 = 1e4;
 
 /// A quantity of model, inputs or initial state.
@@ -41,9 +41,10 @@ pub enum Perturbation {
     StartTt,
 }
 
-/// Ambient temperature is measured at one place in the cell, not at each wall, K.
+/// Ambient temperature is measured at one place in the cell, not at each wall, K. Bound: temperatures in a test cell differ by some
+/// kelvin.
 const AMBIENT_SIGMA_K: f64 = 1.0;
-/// The rig may not have been at steady state before the recording, K.
+/// The rig may not have been at steady state before the recording, K. Judgement: housings after a usual warm-up.
 const START_SIGMA_K: f64 = 5.0;
 
 impl Perturbation {

@@ -2,6 +2,17 @@
 
 use mapper_core::{Channel, Dimension, plausible};
 
+/// Values of a pressure in kPa labelled Pa. Bound: inlet to three stages of boost.
+const KPA_LABELLED_PA: std::ops::Range<f64> = 30.0..2_000.0;
+/// Values of a pressure in bar labelled Pa. Bound: the same range.
+const BAR_LABELLED_PA: std::ops::Range<f64> = 0.3..30.0;
+/// Values of a temperature in degC labelled K. Bound: inlet to the outlet of a compressor.
+const DEGC_LABELLED_K: std::ops::Range<f64> = 0.0..200.0;
+/// Values of a speed in krpm or 1/s labelled rpm. Bound: idle of the largest to the limit of the smallest machines.
+const KRPM_LABELLED_RPM: std::ops::Range<f64> = 5.0..1_000.0;
+/// Maximum flow, kg/s. Bound: the largest turbochargers, of ships.
+const MAX_FLOW_KG_S: f64 = 20.0;
+
 /// Whether a single value is finite and possible on any rig; other values count as lost.
 pub fn is_reading(channel: Channel, value: f64) -> bool {
     value.is_finite() && plausible(channel).any.contains(&value)
@@ -37,19 +48,19 @@ pub fn check_running(channel: Channel, median: f64) -> Result<(), Implausible> {
 /// Likely cause of an implausible reading, and the remedy.
 fn remedy(channel: Channel, value: f64) -> &'static str {
     match channel.info().dimension {
-        Dimension::Pressure if (30.0..2_000.0).contains(&value) => {
+        Dimension::Pressure if KPA_LABELLED_PA.contains(&value) => {
             "It looks like kPa labelled Pa; correct the unit in the channel map"
         }
-        Dimension::Pressure if (0.3..30.0).contains(&value) => {
+        Dimension::Pressure if BAR_LABELLED_PA.contains(&value) => {
             "It looks like bar labelled Pa; correct the unit in the channel map"
         }
-        Dimension::Temperature if (0.0..200.0).contains(&value) => {
+        Dimension::Temperature if DEGC_LABELLED_K.contains(&value) => {
             "It looks like degC labelled K; correct the unit in the channel map"
         }
-        Dimension::RotationalSpeed if (5.0..1_000.0).contains(&value) => {
+        Dimension::RotationalSpeed if KRPM_LABELLED_RPM.contains(&value) => {
             "It looks like krpm or 1/s labelled rpm; correct the unit in the channel map"
         }
-        Dimension::MassFlow if value > 20.0 => {
+        Dimension::MassFlow if value > MAX_FLOW_KG_S => {
             "It looks like g/s or kg/h labelled kg/s; correct the unit in the channel map"
         }
         Dimension::MassFlow => "No flow is measured; check unit and sensor",

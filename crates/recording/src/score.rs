@@ -11,6 +11,9 @@ use serde::Serialize;
 use std::path::PathBuf;
 use std::thread::ScopedJoinHandle;
 
+/// One point of efficiency. Source: definition.
+const ONE_POINT_ETA: f64 = 0.01;
+
 /// True values at the end of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PointTruth {
@@ -98,7 +101,7 @@ pub struct ScoredMark {
     pub truth_flow_corrected_kg_s: Option<f64>,
 }
 
-/// Time of the truth before the end of the measurement nearest surge, s.
+/// Time of the truth before the end of the measurement nearest surge, s. Bound: several settling times of pressure and flow.
 const TRUTH_LEAD_S: f64 = 10.0;
 
 /// Pairs surge marks with the truth of their recording; `approaches` give the inlet's state, which corrects the true flow.
@@ -149,7 +152,7 @@ pub fn summarise(points: &[ScoredPoint]) -> Option<ScoreSummary> {
     Some(ScoreSummary {
         points: count,
         eta_median_error: median(&eta_errors)?,
-        eta_within_one_point_ratio: share(eta_errors.iter().filter(|error| **error <= 0.01).count()),
+        eta_within_one_point_ratio: share(eta_errors.iter().filter(|error| **error <= ONE_POINT_ETA).count()),
         eta_worst_error: eta_errors.iter().copied().fold(0.0, f64::max),
         eta_coverage_ratio: share(covered),
         h_coverage_ratio: mean(&h_covered),

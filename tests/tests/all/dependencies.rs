@@ -59,7 +59,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-lab-server", &["core", "campaign", "session", "backends", "effects", "backend-ak"]),
     // Tests run the program and read its files, and compare gases with Python's CoolProp, which is installed for them alone; maintenance
     // commands are independent of the program.
-    ("mapper-tests",     &["core", "physics", "recording"]),
+    ("mapper-tests",     &["core", "physics", "recording", "xtask"]),
     ("xtask",            &[]),
 ];
 

@@ -5,6 +5,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod circles;
+mod constants;
 mod dependencies;
 mod documentation;
 mod doomed;

@@ -1,7 +1,6 @@
 //! `cargo xtask docs`: generates documents with the program.
 
 use crate::checks::lints;
-use crate::constants;
 use crate::error::Error;
 use crate::files::{self, Mode, at, write};
 use crate::step::{command, output, run, say};
@@ -10,6 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
+use xtask::constants;
 
 /// Generated files and folders below docs.
 const GENERATED: &[&str] = &[
@@ -65,7 +65,9 @@ pub fn generated(mode: Mode) -> Result<(), Error> {
                 write(&made.join(format!("reference/{page}.md")), text)?;
             }
             write(&made.join("reference/cli.md"), command_line(&programs)?)?;
-            write(&made.join("reference/constants.md"), constants::page()?)?;
+            let constants = constants::page(&workspace::root());
+            let constants = constants.map_err(|violations| Error::Constants { violations })?;
+            write(&made.join("reference/constants.md"), constants)?;
             mapped(&programs, &made)?;
             measured(&programs, &made)
         });

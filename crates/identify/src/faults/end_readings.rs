@@ -5,7 +5,7 @@ use crate::reading_checks::ends::Ends;
 use mapper_core::{Channel, Recording};
 use mapper_physics::gas::air::Air;
 
-/// Maximum number of correlated rows, evenly spread: the cost grows with the cube, and these take a second.
+/// Maximum number of correlated rows, evenly spread. Bound: the cost grows with the cube, and these take a second.
 pub const MAX_CORRELATED_ROWS: usize = 500;
 
 /// The channels of the compressor, in the order of all arrays here.
@@ -41,7 +41,7 @@ pub(crate) fn span_s(recording: &Recording) -> Option<(f64, f64)> {
     (last_s > first_s).then_some((first_s, last_s))
 }
 
-/// Steps for derivatives: small compared with the curvature of the balances, large compared with rounding.
+/// Steps for derivatives. Bound: small compared with the curvature of the balances, large compared with rounding.
 const DIFFERENCES: PerChannel = [0.05, 0.05, 0.05, 20.0, 20.0, 1e-5, 20.0];
 
 impl Readings {

@@ -29,11 +29,11 @@ use mapper_inference::mixture::MIN_WEIGHT;
 use mapper_numerics::statistics::EXCLUDE_SIGMAS;
 use mapper_physics::rig::sensor_fault::additive;
 
-/// Prior probability of a fault: one recording in ten has one. Judgement; docs/validation/faults.md uses the same value.
+/// Prior probability of a fault. Judgement: one recording in ten has one. Judgement; docs/validation/faults.md uses the same value.
 const EXPECTED_FAULTS: f64 = 0.1;
-/// Deviation of a machine from its declaration, ratio, one standard deviation: another machine of the same series.
+/// Deviation of a machine from its declaration, ratio, one standard deviation. Bound: another machine of the same series.
 const OTHER_MACHINE_RATIO: f64 = 0.05;
-/// The same of convection: correlations of heat transfer in pipes scatter by that much (Incropera, ch. 8.5).
+/// The same of convection. Source: correlations of heat transfer in pipes scatter by that much (Incropera, ch. 8.5).
 const OTHER_CONVECTION_RATIO: f64 = 0.2;
 
 /// All balances of a recording, and the prior of the parameters. `ends`: of the usable steps. `fitted`: efficiencies of the joint fit, if

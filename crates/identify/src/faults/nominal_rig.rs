@@ -8,6 +8,9 @@ use mapper_numerics::root::bisect;
 use mapper_physics::simulation::model::Model;
 use std::collections::BTreeMap;
 
+/// Minimum length of a segment of a speed line, in the line's largest flow and PR - 1. Bound: excludes division by zero, far below 1/200.
+const MIN_LENGTH: f64 = 1e-9;
+
 /// The declared rig of a campaign with its tolerances.
 #[derive(Debug, Clone, Copy)]
 pub struct NominalRig<'a> {
@@ -19,11 +22,11 @@ pub struct NominalRig<'a> {
     pub conditions: &'a BTreeMap<Channel, f64>,
 }
 
-/// Range about the measured speed in which the map's speed is searched.
+/// Range about the measured speed in which the map's speed is searched. Bound: beyond it no reading of a speed is in the same unit.
 const SPEEDS: (f64, f64) = (0.4, 2.5);
-/// Number of positions on a speed line among which the nearest is searched.
+/// Number of positions on a speed line among which the nearest is searched. Bound: their distance is below the roughness of a map.
 const PLACES: usize = 200;
-/// Extension beyond the surge point, share of the line's PR - 1: a rig may reach further than its map.
+/// Extension beyond the surge point, share of the line's PR - 1. Bound: a rig may reach further than its map.
 const BEYOND_SURGE: f64 = 0.03;
 
 impl NominalRig<'_> {
@@ -66,6 +69,6 @@ impl NominalRig<'_> {
         let here = (flow_kg_s / largest_kg_s, (readings.p2_pa() / readings.p1_pa() - 1.0) / (top - 1.0));
         let NearestOnPolyline { segment, share_ratio, .. } = NearestOnPolyline::of(&line, here)?;
         let (((ax, ay), a), ((bx, by), b)) = (places[segment], places[segment + 1]);
-        Some((a + share_ratio * (b - a), (b - a) / (bx - ax).hypot(by - ay).max(1e-9)))
+        Some((a + share_ratio * (b - a), (b - a) / (bx - ax).hypot(by - ay).max(MIN_LENGTH)))
     }
 }

@@ -15,8 +15,8 @@ pub(crate) struct Smooth {
     pub(crate) lengths: (f64, f64),
 }
 
-/// Deviation of any map from such a function, ratio: with it the chi-squares of a public measured map (TurboTools, 93 points) are 95 for the
-/// efficiencies and 118 for the heads.
+/// Deviation of any map from such a function, ratio. Calibrated: with it the chi-squares of a public measured map (TurboTools, 93 points)
+/// are 95 for the efficiencies and 118 for the heads.
 pub(crate) const ANY_ROUGHNESS: f64 = 4e-3;
 
 /// A position on the map.

@@ -1,9 +1,9 @@
 //! Extrapolates a relaxing reading to its limit: a stopped housing reaches the cell's temperature within an hour, a soak is shorter.
 
-/// Time constants of stopped turbocharger housings, s: 1 to 2 kg of aluminium at 1 to 2 W/K. Longer ones, which the readings cannot exclude,
-/// would bias the limit.
+/// Time constants of stopped turbocharger housings, s. Bound: 1 to 2 kg of aluminium at 1 to 2 W/K. Longer ones, which the readings
+/// cannot exclude, would bias the limit.
 const TIME_CONSTANTS_S: [f64; 5] = [400.0, 550.0, 700.0, 900.0, 1200.0];
-/// Prior standard deviation of the initial distance from the limit, K.
+/// Prior standard deviation of the initial distance from the limit, K. Bound: ten times the non-uniformity of a finished soak.
 const START_SIGMA_K: f64 = 3.0;
 
 /// Distance of a typical housing from its limit after `t_s` of soak, K: a kelvin at the beginning, with the middle time constant. A housing

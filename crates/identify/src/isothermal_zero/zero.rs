@@ -8,6 +8,7 @@
 use crate::IdentifyConfig;
 use crate::isothermal_zero::relaxation;
 use crate::step_data::samples::TREND_BLOCK_S;
+use mapper_core::unit_factors::S_PER_MIN;
 use mapper_core::{
     Channel, DeclaredUncertainty, Recording, SAMPLE_INTERVAL_S, Series, Soak, StepMarker, plausible,
 };
@@ -18,6 +19,16 @@ use mapper_observe::plausible::is_reading;
 use mapper_physics::rig::sensor_fault::gain_error;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+
+/// Longest segment at the end of a soak that is used, s. Bound: on average over it, noise of 0.1 K is below 0.01 K.
+const LONGEST_SOAK_S: f64 = 600.0;
+/// Minimum length of that segment, s. Bound: noise of 0.1 K at 10 Hz leaves its drift an error of 0.02 K/min.
+const SHORTEST_SOAK_S: f64 = 60.0;
+/// Maximum drift of a temperature over it, K/min. Bound: housings of 10 minutes are then within 1 K of their limit.
+const MAX_SOAK_DRIFT_K_MIN: f64 = 0.1;
+/// Parts of a soak: its drift is the difference of last and first; the limit leaves the first out. Source: the slope between
+/// thirds has nearly the smallest error (Bartlett, Biometrics 5, 1949).
+const SOAK_PARTS: f64 = 3.0;
 
 /// Residual non-uniformity of a soak, and the criteria by which a soak is recognised.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -43,9 +54,9 @@ impl Default for ZeroSettings {
         ZeroSettings {
             temperature_sigma_k: Soak::TEMPERATURE_SIGMA_K,
             pressure_sigma_pa: Soak::PRESSURE_SIGMA_PA,
-            longest_s: 600.0,
-            shortest_s: 60.0,
-            drift_k_min: 0.1,
+            longest_s: LONGEST_SOAK_S,
+            shortest_s: SHORTEST_SOAK_S,
+            drift_k_min: MAX_SOAK_DRIFT_K_MIN,
             allows_a_fault: false,
         }
     }
@@ -282,7 +293,7 @@ fn housing_limit(
     config: &IdentifyConfig,
     settings: &ZeroSettings,
 ) -> Option<(f64, f64)> {
-    let first_s = start_s + (end_s - start_s) / 3.0;
+    let first_s = start_s + (end_s - start_s) / SOAK_PARTS;
     let noise_sigma = config.declared.get(&Channel::Tc)?.noise_sigma;
     if end_s - start_s < settings.longest_s {
         return None;
@@ -312,7 +323,7 @@ fn expected_limit_error(
     if soak_s < settings.longest_s {
         return None;
     }
-    let used_s = 2.0 / 3.0 * soak_s;
+    let used_s = (SOAK_PARTS - 1.0) / SOAK_PARTS * soak_s;
     let t_s: Vec<f64> = (0..(used_s / TREND_BLOCK_S) as usize)
         .map(|block| soak_s - used_s + (block as f64 + 0.5) * TREND_BLOCK_S)
         .collect();
@@ -352,8 +363,8 @@ struct SoakMean {
 /// Mean of a channel over a segment, and its drift from the first to the last third.
 fn soak_mean(recording: &Recording, channel: Channel, start_s: f64, end_s: f64) -> Option<SoakMean> {
     let series: &Series = recording.series.get(&channel)?;
-    let third_s = (end_s - start_s) / 3.0;
+    let third_s = (end_s - start_s) / SOAK_PARTS;
     let of = |start_s: f64, end_s: f64| mean(usable(channel, series.slice(start_s, end_s).1));
     let (early, late) = (of(start_s, start_s + third_s)?, of(end_s - third_s, end_s)?);
-    Some(SoakMean { mean: of(start_s, end_s)?, drift_per_min: (late - early) / (2.0 * third_s / 60.0) })
+    Some(SoakMean { mean: of(start_s, end_s)?, drift_per_min: (late - early) / (2.0 * third_s / S_PER_MIN) })
 }

@@ -7,6 +7,7 @@ use crate::IdentifyConfig;
 use crate::joint::Fitted;
 use crate::joint::fit::solve::{Member, Problem};
 use crate::joint::fit::start::{self, START_S};
+use crate::joint::step_model::rows::TIME_ROUNDING_S;
 use crate::joint::step_model::rows::{COARSER, Row, StepRows, block_s_after, place};
 use crate::joint::{MAX_RESTING_ETA, fit::refinements, uncertainty::smoothness};
 use crate::single_step::dynamic::Estimate;
@@ -91,8 +92,7 @@ fn condensed(position: usize, step: &[ForecastRow], config: &IdentifyConfig) -> 
     let mut rows: Vec<Row> = Vec::new();
     for expected in &step[first..] {
         let block_s = COARSER * block_s_after(expected.t_s - first_s, config);
-        // Half a nanosecond: times are rounded.
-        if rows.last().is_none_or(|last| expected.t_s - last.t_s >= block_s - 5e-10) {
+        if rows.last().is_none_or(|last| expected.t_s - last.t_s >= block_s - TIME_ROUNDING_S) {
             rows.push(row(expected, noise(block_s, config), config));
         }
     }

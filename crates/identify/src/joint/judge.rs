@@ -9,12 +9,17 @@ use crate::step_data::samples::TREND_BLOCK_S;
 use crate::step_outcome::findings::Findings;
 use crate::step_outcome::interval_width;
 use mapper_core::{EstimateUncertainty, LeftOut, ModelDoubt, ModelEvidence, PoorFit, Warning};
+use mapper_numerics::statistics::DOUBT_SIGMAS;
 use mapper_numerics::statistics::{HINT_SIGMAS, mean, median, rms};
 
-/// Mean square of the whitened residual's sums over segments of [`TREND_BLOCK_S`], of all steps, above which the model itself is doubtful:
-/// smoothed inputs and fitted parameters reduce it from 1 to about 0.8 if the model fits the rig.
+/// Efficiencies that a compressor can have. Bound: 1 is an ideal compression; below 0.05 nearly all work is heat.
+const POSSIBLE_ETA: std::ops::RangeInclusive<f64> = 0.05..=1.0;
+
+/// Mean square of the whitened residual's sums over segments of [`TREND_BLOCK_S`], of all steps, above which the model itself is
+/// doubtful. Calibrated: `benches/identification.py`; smoothed inputs and fitted parameters reduce it from 1 to about 0.8 if the model
+/// fits the rig.
 const SLOW_SQUARE: f64 = 1.3;
-/// Scatter of the points about the convection law above which the law does not apply, ratio.
+/// Scatter of the points about the convection law above which the law does not apply, ratio. Bound: twenty times the usual spread.
 const LAW_SCATTER_RATIO: f64 = 0.06;
 
 /// Mean square of a step's whitened residual.
@@ -65,7 +70,7 @@ pub(crate) fn judge_step(
 ) {
     let Some(member) = problem.members.get(index) else { return };
     let eta = member.local[ETA];
-    if !(0.05..=1.0).contains(&eta) {
+    if !POSSIBLE_ETA.contains(&eta) {
         findings.refuse(Warning::PoorFit(PoorFit::Eta { eta }));
     }
     if eta_error.combined_standard_error() > config.thresholds.sigma_eta {
@@ -80,7 +85,7 @@ pub(crate) fn judge_step(
         findings.doubt(Warning::LeftOut(LeftOut::PoorFit));
     }
     let deviation = member.local[LN_DEVIATION];
-    if deviation.abs() > LAW_SCATTER_RATIO.max(3.0 * member.priors[LN_DEVIATION].sigma) {
+    if deviation.abs() > LAW_SCATTER_RATIO.max(DOUBT_SIGMAS * member.priors[LN_DEVIATION].sigma) {
         findings.doubt(Warning::OffTheLaw { h_deviation_ratio: deviation.exp_m1() });
     }
 }

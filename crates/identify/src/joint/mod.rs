@@ -30,11 +30,12 @@ use mapper_inference::descent::ROUNDS;
 use mapper_numerics::statistics::rms;
 use serde::Serialize;
 
-/// Growth of the points' standard errors above which leaving a region out costs more than it gains.
+/// Growth of the points' standard errors above which leaving a region out costs more than it gains. Judgement: a region is excluded if
+/// the errors at most double.
 const MAX_LOST_RATIO: f64 = 2.0;
 
-/// Maximum error of the efficiencies, fraction, that only the declaration of alpha_A, probe and heating/cooling ratio excludes: above it, a
-/// machine not as declared could pass for one that is.
+/// Maximum error of the efficiencies, fraction, that only the declaration of alpha_A, probe and heating/cooling ratio excludes. Bound:
+/// above it, a machine not as declared could pass for one that is.
 pub const MAX_RESTING_ETA: f64 = 0.0125;
 
 /// The efficiency that the two-parameter method (`dynamic`) finds in a step which another method has identified.

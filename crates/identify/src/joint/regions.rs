@@ -13,7 +13,8 @@ use crate::joint::step_model::surface::SurfaceScale;
 use mapper_core::MapRegion;
 use mapper_numerics::statistics::{EXCLUDE_SIGMAS, MIN_VALUES};
 
-/// Shares of the steps in a region; the smallest one that helps is excluded.
+/// Shares of the steps in a region; the smallest one that helps is excluded. Bound: fewer steps are excluded one by one, more would leave
+/// too few.
 const SHARES: [f64; 2] = [1.0 / 6.0, 1.0 / 3.0];
 
 /// Steps at one end of the map.

@@ -11,10 +11,15 @@ use crate::joint::step_model::parameters::{
 use crate::joint::step_model::rows::StepRows;
 use crate::joint::uncertainty::quantity::is_offset;
 use crate::joint::uncertainty::smoothness::Smoothed;
+use mapper_core::unit_factors::M_PER_MM;
 use mapper_core::{ConvectionLaw, CorrelatedPair, EstimateUncertainty, Origin, SharedValue, ThermalModel};
 use mapper_inference::interval::is_identified;
 
-/// Correlation above which two parameters count as entangled.
+/// Step of the derivative of a transformed parameter. Bound: between rounding and curvature for parameters of order 1.
+const TRANSFORM_STEP: f64 = 1e-6;
+
+/// Correlation above which two parameters count as entangled. Bound: from here the errors of the two grow more than threefold, 1 / sqrt(1
+/// - r^2).
 const ENTANGLED: f64 = 0.95;
 
 /// Collects the shared parameters.
@@ -96,7 +101,8 @@ fn value(
     let fitted = problem.shared[index] + shift;
     let reported = transform(fitted);
     let variance = sigma * sigma;
-    let slope = (transform(fitted + 1e-6) - transform(fitted - 1e-6)) / 2e-6;
+    let slope =
+        (transform(fitted + TRANSFORM_STEP) - transform(fitted - TRANSFORM_STEP)) / (2.0 * TRANSFORM_STEP);
     let mut bias = 0.0;
     for (other, index) in covariance.fitted.iter().enumerate() {
         if (OFFSETS..SURFACE).contains(index) {
@@ -126,7 +132,7 @@ fn value(
 fn probe(problem: &Problem<'_>, covariance: &Covariance) -> SharedValue {
     let square = problem.shared[PROBE_MM2].max(0.0);
     if !problem.probe_fitted {
-        return SharedValue::assumed(1e-3 * square.sqrt());
+        return SharedValue::assumed(M_PER_MM * square.sqrt());
     }
     let sigma = covariance.error_of(PROBE_MM2).or_else(|| {
         let mut free = problem.clone();
@@ -140,9 +146,9 @@ fn probe(problem: &Problem<'_>, covariance: &Covariance) -> SharedValue {
             origin: Origin::NotIdentifiable,
         };
     };
-    let error_m = 1e-3 * ((square + sigma).sqrt() - square.sqrt());
+    let error_m = M_PER_MM * ((square + sigma).sqrt() - square.sqrt());
     SharedValue {
-        value: is_identified(sigma, problem.priors[PROBE_MM2].sigma).then_some(1e-3 * square.sqrt()),
+        value: is_identified(sigma, problem.priors[PROBE_MM2].sigma).then_some(M_PER_MM * square.sqrt()),
         uncertainty: EstimateUncertainty { noise_standard_error: error_m, bias_standard_error: 0.0 },
         origin: Origin::Fitted,
     }

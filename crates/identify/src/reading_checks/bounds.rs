@@ -10,13 +10,15 @@ use crate::reading_checks::failed_check::FailedCheck;
 use mapper_core::{Scaled, Swapped, Warning};
 use mapper_numerics::statistics::median;
 
-/// Isentropic rise above which heat no longer hides the work, K.
+/// Isentropic rise above which heat no longer hides the work, K. Bound: heat changes T2 by less than half of it.
 const MIN_RISE_K: f64 = 20.0;
-/// Isentropic efficiencies, total to total, of turbocharger compressors: the best stay below 0.85, poor ones near choke have a third.
+/// Isentropic efficiencies, total to total, of turbocharger compressors. Bound: the best stay below 0.85, poor ones near choke have a
+/// third.
 pub const EFFICIENCY: std::ops::RangeInclusive<f64> = 0.25..=0.88;
-/// Apparent efficiencies of single points, which include the heat of a housing far from the gas, and that of the median point, where the housing
-/// is warmer than the gas before compression and colder than the gas after it.
+/// Apparent efficiencies of single points. Bound: they include the heat of a housing far from the gas.
 const APPARENT: std::ops::RangeInclusive<f64> = 0.2..=1.3;
+/// Apparent efficiency of the median point. Bound: there the housing is warmer than the gas before compression and colder than the gas
+/// after it.
 const MIDDLE: std::ops::RangeInclusive<f64> = 0.35..=1.0;
 
 pub(crate) fn failed_checks(ends: &[Option<Ends>]) -> Vec<FailedCheck> {

@@ -10,11 +10,19 @@ use crate::step_data::samples::slope_per_s;
 use mapper_core::{Channel, Recording, Series, Swapped, Warning, WindowRule};
 use mapper_numerics::statistics::{MIN_VALUES, mean, median};
 
-/// Averaging time of a level before and after a moment, s; twice as long for a slope. Moments lie a quarter of it apart.
+/// Spacing of the moments in averaging times. Bound: fine compared with a level, so that no peak is missed.
+const MOMENT_SPACING_RATIO: f64 = 0.25;
+/// Minimum ratio of the largest squared change to the mean. Bound: noise of ten jumps does not reach it at any of
+/// 80 moments.
+const MIN_PEAK_RATIO: f64 = 4.0;
+
+/// Averaging time of a level before and after a moment, s; twice as long for a slope. Moments lie a quarter of it apart. Bound: longer
+/// than the correlation time of sensor noise, shorter than a lag that matters.
 const LEVEL_S: f64 = 2.0;
-/// Latest moment after a jump that is considered, s; the earliest is [`WindowRule::EARLIEST_S`] before it.
+/// Latest moment after a jump that is considered, s; the earliest is [`WindowRule::EARLIEST_S`] before it. Bound: slower channels than
+/// that are no sensors.
 const AFTER_S: f64 = 40.0;
-/// Lag behind the others above which a channel is late, s: a probe of 4 mm and a shaft that runs up make 2 s.
+/// Lag behind the others above which a channel is late, s. Bound: a probe of 4 mm and a shaft that runs up make 2 s.
 const LATE_S: f64 = 3.5;
 /// Whether a channel changes its level or its slope at a jump.
 const WATCHED: [(Channel, bool); 5] = [
@@ -74,7 +82,7 @@ fn housing_jumps(recording: &Recording, jumps_s: &[f64]) -> Option<FailedCheck> 
 
 /// Time after the jumps at which a channel changes most, s; `None` if it does not change.
 fn lag_s(series: &Series, jumps_s: &[f64], slope: bool) -> Option<f64> {
-    let every_s = 0.25 * LEVEL_S;
+    let every_s = MOMENT_SPACING_RATIO * LEVEL_S;
     let moments = ((WindowRule::EARLIEST_S + AFTER_S) / every_s) as usize;
     let mut squares = vec![0.0; moments + 1];
     for jump_s in jumps_s {
@@ -90,7 +98,7 @@ fn lag_s(series: &Series, jumps_s: &[f64], slope: bool) -> Option<f64> {
     }
     let (at, largest) = squares.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
     // Pure noise has no peak.
-    let clear = *largest > 4.0 * mean(&squares)?;
+    let clear = *largest > MIN_PEAK_RATIO * mean(&squares)?;
     clear.then_some(at as f64 * every_s - WindowRule::EARLIEST_S)
 }
 

@@ -12,7 +12,7 @@ use mapper_core::{Channel, Recording, Series, Warning, jump_ratio};
 use mapper_numerics::statistics::{MIN_VALUES, range};
 use mapper_physics::rig::sensor_fault::repeats_s;
 
-/// Share of equal neighbours outside the long runs above which a logger counts as coarse.
+/// Share of equal neighbours outside the long runs above which a logger counts as coarse. Bound: noise above a digit repeats less often.
 const COARSE_SHARE: f64 = 0.3;
 
 /// A run of one repeated value.

@@ -10,8 +10,8 @@ use crate::step_data::samples::LONGEST_BRIDGE_S;
 use mapper_core::{Recording, Warning};
 use mapper_numerics::statistics::robust_sigma;
 
-/// Ratio of a sample's standard deviation to the declared one above which intervals are far too narrow. Judgement; noise with a time constant
-/// only reduces the difference between samples.
+/// Ratio of a sample's standard deviation to the declared one above which intervals are far too narrow. Judgement; noise with a time
+/// constant only reduces the difference between samples. Bound: noise with a time constant only reduces the difference between samples.
 const MAX_RATIO: f64 = 3.0;
 
 pub(crate) fn failed_checks(recording: &Recording, config: &IdentifyConfig) -> Vec<FailedCheck> {

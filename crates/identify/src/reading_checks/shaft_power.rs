@@ -11,8 +11,8 @@ use mapper_numerics::statistics::median;
 use mapper_observe::plausible::check_running;
 use mapper_physics::gas::air::Air;
 
-/// Limits for the ratio of compressor to turbine power: upper, and lower. A turbine housing that loses as much as it delivers is far below
-/// every gas stand.
+/// Limits for the ratio of compressor to turbine power. Bound: upper, and lower. A turbine housing that loses as much as it delivers is
+/// far below every gas stand.
 const POSSIBLE: std::ops::RangeInclusive<f64> = 0.2..=1.15;
 
 pub(crate) fn failed_checks(ends: &[Option<Ends>]) -> Option<FailedCheck> {

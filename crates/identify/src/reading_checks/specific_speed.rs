@@ -7,17 +7,22 @@ use crate::reading_checks::ends::Ends;
 use crate::reading_checks::failed_check::FailedCheck;
 use mapper_core::{Scaled, Warning};
 use mapper_numerics::statistics::median;
+use mapper_physics::machine::state::rad_s_of_rpm;
 
-/// Limits for the median of a campaign's points, with a wide margin about real machines.
+/// Exponent of the head. Source: definition of the specific speed.
+const HEAD_EXPONENT: f64 = 0.75;
+
+/// Limits for the median of a campaign's points, with a wide margin about real machines. Bound: radial compressors have 0.3 to 2
+/// (Cordier's diagram).
 const POSSIBLE: std::ops::RangeInclusive<f64> = 0.15..=4.0;
 
 pub(crate) fn failed_checks(ends: &[Option<Ends>]) -> Option<FailedCheck> {
     let used: Vec<&Ends> = ends.iter().flatten().filter(|end| end.isentropic_rise_k() > 0.0).collect();
     let of = |end: &&Ends| {
-        let omega_rad_s = end.speed_rpm * std::f64::consts::PI / 30.0;
+        let omega_rad_s = rad_s_of_rpm(end.speed_rpm);
         let flow_m3_s = end.flow_kg_s * end.air.gas_constant_j_kgk() * end.t1_k / end.p1_pa;
         let head_j_kg = end.air.heat_capacity_j_kgk(end.t1_k) * end.isentropic_rise_k();
-        omega_rad_s * flow_m3_s.max(0.0).sqrt() / head_j_kg.powf(0.75)
+        omega_rad_s * flow_m3_s.max(0.0).sqrt() / head_j_kg.powf(HEAD_EXPONENT)
     };
     let middle = median(used.iter().map(of).filter(|speed| speed.is_finite()))?;
     if POSSIBLE.contains(&middle) {

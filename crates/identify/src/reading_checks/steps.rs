@@ -3,7 +3,7 @@
 use crate::reading_checks::failed_check::FailedCheck;
 use mapper_core::{Recording, StepConflict, Warning, step_number};
 
-/// Overlap that the rounded times of other loggers explain, s: half of their second.
+/// Overlap that the rounded times of other loggers explain, s. Bound: half of their second.
 const ROUNDED_S: f64 = 0.5;
 
 /// Steps that overlap in time or share a number.

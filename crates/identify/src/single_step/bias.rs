@@ -9,6 +9,9 @@ use crate::step_data::samples::{Row, Samples};
 use mapper_core::Channel;
 use mapper_physics::gas::air::Air;
 
+/// Step of a derivative by a reading, relative. Bound: between rounding and curvature.
+pub(crate) const READING_STEP_RATIO: f64 = 1e-5;
+
 /// Effect of the declared uncertainties.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct DeclaredEffect {
@@ -110,7 +113,7 @@ fn sensitivity(fit: &Fit, samples: &Samples, geometry: Geometry, channel: Channe
         return vec![1.0; samples.len()];
     }
     let of = |row: &Row| {
-        let step = 1e-5 * row.read(channel);
+        let step = READING_STEP_RATIO * row.read(channel);
         let moved = |by: f64| t2_k(geometry, &row.moved(channel, by, geometry.air), fit.eta, fit.h_w_m2k);
         -(moved(step) - moved(-step)) / (2.0 * step)
     };

@@ -14,9 +14,19 @@ use mapper_physics::laws::inlet_convection::InletLaw;
 use mapper_physics::machine::params::Params;
 use nalgebra::{Matrix2, Vector2};
 
-/// Search range of the efficiency, fraction. Above 1 is impossible and is reported; the fit may go there to show it.
+/// Distance from a bound, ratio, below which a parameter is on it. Bound: above the tolerance of the fit.
+const AT_BOUND_RATIO: f64 = 1e-6;
+/// Size of heat-transfer coefficients, W/(m2 K); half of it is a start value. Bound: a size only; the paper has 100 to 1000.
+const USUAL_H_W_M2K: f64 = 1e3;
+/// Determinant, relative to the diagonal, below which two parameters cannot be distinguished. Bound: rounding of f64.
+const SINGULAR_RATIO: f64 = 1e-13;
+/// Maximum temperature rise of the start values, ratio to the isentropic one. Bound: an apparent efficiency of a quarter.
+const MAX_APPARENT_RISE: f64 = 4.0;
+
+/// Search range of the efficiency, fraction. Above 1 is impossible and is reported; the fit may go there to show it. Bound: above 1 is
+/// impossible and is reported; the fit may go there to show it.
 pub(crate) const ETA_BOUNDS: (f64, f64) = (0.05, 2.0);
-/// Search range of the heat-transfer coefficient, W/(m2 K).
+/// Search range of the heat-transfer coefficient, W/(m2 K). Bound: boiling water reaches 1e5, gas never.
 pub(crate) const H_BOUNDS_W_M2K: (f64, f64) = (0.0, 1e5);
 
 /// Parameters of eqs. 1-3 in addition to the samples.
@@ -92,11 +102,13 @@ impl Fit {
 
     /// Name of a parameter on its bound, if any.
     pub(crate) fn at_bound(&self) -> Option<Bound> {
-        let near = |value: f64, bound: f64, size: f64| (value - bound).abs() < 1e-6 * size;
+        let near = |value: f64, bound: f64, size: f64| (value - bound).abs() < AT_BOUND_RATIO * size;
         if near(self.eta, ETA_BOUNDS.0, 1.0) || near(self.eta, ETA_BOUNDS.1, 1.0) {
             return Some(Bound::Eta { eta: self.eta });
         }
-        if near(self.h_w_m2k, H_BOUNDS_W_M2K.0, 1e3) || near(self.h_w_m2k, H_BOUNDS_W_M2K.1, 1e5) {
+        if near(self.h_w_m2k, H_BOUNDS_W_M2K.0, USUAL_H_W_M2K)
+            || near(self.h_w_m2k, H_BOUNDS_W_M2K.1, H_BOUNDS_W_M2K.1)
+        {
             return Some(Bound::H { h_w_m2k: self.h_w_m2k });
         }
         None
@@ -223,7 +235,8 @@ fn linearised(
 /// Inverse of a symmetric positive definite matrix; `None` if it is numerically singular.
 fn inverted(m: Matrix2<f64>) -> Option<Matrix2<f64>> {
     let determinant = m.determinant();
-    (determinant.is_finite() && determinant > 1e-13 * m[(0, 0)] * m[(1, 1)]).then(|| m.try_inverse())?
+    (determinant.is_finite() && determinant > SINGULAR_RATIO * m[(0, 0)] * m[(1, 1)])
+        .then(|| m.try_inverse())?
 }
 
 /// Start values: with the measured T2 in the heat terms, eqs. 1-3 are linear in 1/eta and h except for one product, which takes 1/eta from the
@@ -234,7 +247,7 @@ fn start(samples: &Samples, geometry: Geometry) -> [f64; 2] {
         rise_k += row.t2_k - row.t1_k;
         isentropic_k += row.t1_k * row.rise_ratio;
     }
-    let apparent = (rise_k / isentropic_k).clamp(1.0, 4.0);
+    let apparent = (rise_k / isentropic_k).clamp(1.0, MAX_APPARENT_RISE);
     let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
     for row in &samples.rows {
         let t2_k = row.t2_k;
@@ -257,7 +270,7 @@ fn start(samples: &Samples, geometry: Geometry) -> [f64; 2] {
     let found: Option<[f64; 2]> = inverted(normal).map(|g| (g * right).into());
     let [inverse_eta, h_w_m2k] = found.unwrap_or([apparent, f64::NAN]);
     [
-        inside(1.0 / inverse_eta, ETA_BOUNDS, (1.0 / apparent).clamp(0.25, 1.0)),
-        inside(h_w_m2k, H_BOUNDS_W_M2K, 500.0),
+        inside(1.0 / inverse_eta, ETA_BOUNDS, (1.0 / apparent).clamp(1.0 / MAX_APPARENT_RISE, 1.0)),
+        inside(h_w_m2k, H_BOUNDS_W_M2K, 0.5 * USUAL_H_W_M2K),
     ]
 }

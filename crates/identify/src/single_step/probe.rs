@@ -7,6 +7,9 @@
 use crate::step_data::samples::Samples;
 use mapper_physics::laws::thermocouple;
 
+/// Argument below which the series of (1 - e^-x)/x replaces the formula. Bound: the next term is below rounding.
+const SERIES_BELOW: f64 = 1e-6;
+
 /// One time step of the probe: the weights of its last reading and of the gas before and now. Exact for a gas temperature that is linear in
 /// between.
 #[derive(Debug, Clone, Copy)]
@@ -24,7 +27,7 @@ impl Lag {
         let x = interval_s / time_constant_s;
         let kept = (-x).exp();
         // (1 - e^-x)/x, without loss of digits for small x.
-        let mean = if x < 1e-6 { 1.0 - 0.5 * x } else { -(-x).exp_m1() / x };
+        let mean = if x < SERIES_BELOW { 1.0 - 0.5 * x } else { -(-x).exp_m1() / x };
         Lag { kept, before: mean - kept, now: 1.0 - mean }
     }
 

@@ -3,18 +3,21 @@
 //! Heat between gas and housing counts as work here. The dynamic method avoids the resulting error of the adiabatic efficiency (fig. 5 of the
 //! paper).
 
+use crate::single_step::bias::READING_STEP_RATIO;
 use crate::single_step::dynamic::{Estimate, enough};
 use crate::step_data::cleaning::without_spikes;
 use crate::step_data::samples::{Row, Samples, slope_per_s};
 use crate::step_outcome::findings::Findings;
 use crate::{IdentifyConfig, step_outcome::interval_width};
+use mapper_core::unit_factors::S_PER_MIN;
 use mapper_core::{Channel, EstimateUncertainty, EtaSignal, NoCompression, Recording, Warning, Window};
 use mapper_numerics::statistics::standard_deviation;
 use mapper_physics::gas::air::Air;
 use mapper_physics::laws::compression::apparent_efficiency;
 use mapper_physics::laws::thermocouple::time_constant_s;
 
-/// Segment at the end of a step in which temperatures must not drift, s: with noise of 0.1 K its slope is then known to better than 0.1 K/min.
+/// Segment at the end of a step in which temperatures must not drift, s. Bound: with noise of 0.1 K its slope is then known to better
+/// than 0.1 K/min.
 const DRIFT_SPAN_S: f64 = 60.0;
 
 /// The efficiency if heat between gas and housing counts as work.
@@ -70,7 +73,7 @@ pub(crate) fn estimate(
     uncertainty.bias_standard_error = uncertainty.bias_standard_error.hypot(lag_eta);
     for channel in [Channel::T2, Channel::Tc] {
         let readings = trend.rows.iter().map(|row| (row.t_s, row.read(channel)));
-        let Some(drift_k_min) = slope_per_s(readings).map(|slope| 60.0 * slope) else { continue };
+        let Some(drift_k_min) = slope_per_s(readings).map(|slope| S_PER_MIN * slope) else { continue };
         if drift_k_min.abs() > limits.steady_drift_k_min {
             let limit_k_min = limits.steady_drift_k_min;
             findings.doubt(Warning::NotSettled { channel, drift_k_min, limit_k_min });
@@ -106,7 +109,7 @@ pub(crate) fn uncertainty(
     for channel in [Channel::T1, Channel::T2, Channel::P1, Channel::P2] {
         let Some(declared) = config.declared.get(&channel) else { continue };
         let value = means.read(channel);
-        let step = 1e-5 * value;
+        let step = READING_STEP_RATIO * value;
         let moved = |by: f64| apparent_eta(&means.moved(channel, by, config.air), config.air);
         let slope = (moved(step) - moved(-step)) / (2.0 * step);
         let spreads = [declared.offset_sigma, value * declared.gain_sigma_ratio];

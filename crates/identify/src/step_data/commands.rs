@@ -5,10 +5,11 @@
 use mapper_core::{Channel, Recording, SAME_COMMAND_RATIO, StepMarker};
 use mapper_numerics::ROUNDING;
 
-/// Time after a jump from which only the housings still change, s: several settling times of probe and speed.
+/// Time after a jump from which only the housings still change, s. Bound: several settling times of probe and speed.
 pub(crate) const FOLLOWED_S: f64 = 20.0;
 
-/// Gap to the previous step above which the previous command is not the starting point, s.
+/// Gap to the previous step above which the previous command is not the starting point, s. Bound: the housings keep their state over a
+/// shorter one.
 const MAX_GAP_S: f64 = 60.0;
 
 /// Whether a command changes by more than rounding; an unknown one does not.

@@ -8,9 +8,10 @@ use mapper_physics::gas::air::Air;
 use mapper_physics::laws::compression::isentropic_rise_ratio;
 use mapper_physics::operating_point::forecast::ForecastRow;
 
-/// Longest gap between neighbouring samples of a channel, s: slow loggers have 1 Hz.
+/// Longest gap between neighbouring samples of a channel, s. Bound: slow loggers have 1 Hz.
 pub const LONGEST_BRIDGE_S: f64 = 2.5;
-/// Length of the blocks over which a residual or reading is averaged if only its trend matters, s: several correlation times of sensor noise.
+/// Length of the blocks over which a residual or reading is averaged if only its trend matters, s. Bound: several correlation times of
+/// sensor noise.
 pub(crate) const TREND_BLOCK_S: f64 = 10.0;
 
 /// Readings at one instant, total pressures.

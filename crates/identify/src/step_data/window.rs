@@ -6,6 +6,9 @@ use mapper_core::{Channel, Recording, Series, SettleBands, StepMarker, Warning, 
 use mapper_numerics::statistics::median;
 use mapper_physics::operating_point::settled::{BLOCK_S, noise_spread, settled_count, with_bands};
 
+/// Tolerance of the end of a window, s. Source: loggers round step times to milliseconds.
+const STEP_ROUNDING_S: f64 = 1e-3;
+
 /// The window of a step; `None` if the step is too short for one.
 pub(crate) fn choose(
     recording: &Recording,
@@ -23,8 +26,7 @@ pub(crate) fn choose(
 fn fixed(step: &StepMarker, start_s: f64, end_s: f64, findings: &mut Findings) -> Option<Window> {
     let wanted_s = step.start_s + end_s;
     let window = Window { start_s: step.start_s + start_s, end_s: wanted_s.min(step.end_s) };
-    // A millisecond of tolerance: step times of other loggers are rounded.
-    if window.end_s + 1e-3 < wanted_s {
+    if window.end_s + STEP_ROUNDING_S < wanted_s {
         let step_s = step.end_s - step.start_s;
         findings.remark(Warning::WindowCut { requested_end_s: end_s, step_s });
     }

@@ -9,13 +9,14 @@ use mapper_core::{
 };
 use serde::Serialize;
 
-/// Standard error of an estimated heat over the heat: on the virtual lab the estimate is up to twice the true heat of slow lines if their
-/// work grows for other reasons too.
+/// Standard error of an estimated heat over the heat. Calibrated: `benches/heat_correction.py`; on the virtual lab the estimate is up to
+/// twice the true heat of slow lines if their work grows for other reasons too.
 const HEAT_STANDARD_ERROR_RATIO: f64 = 0.5;
-/// Standard error of every efficiency from the assumption of one heat for the whole map, fraction: on the virtual lab at 500 degC fast
-/// lines lose 1.4 points by heat to the housing, which the method ignores.
+/// Standard error of every efficiency from the assumption of one heat for the whole map, fraction. Calibrated:
+/// `benches/heat_correction.py`; on the virtual lab at 500 degC fast lines lose 1.4 points by heat to the housing, which the method
+/// ignores.
 const MODEL_STANDARD_ERROR: f64 = 0.01;
-/// Maximum credible corrected efficiency, fraction.
+/// Maximum credible corrected efficiency, fraction. Bound: no compressor reaches it.
 const MAX_EFFICIENCY: f64 = 0.95;
 
 /// Effect of the correction on a line.

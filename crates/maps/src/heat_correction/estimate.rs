@@ -5,15 +5,22 @@ use super::work::WorkPoint;
 use mapper_numerics::statistics::mean;
 use nalgebra::{DMatrix, DVector};
 
-/// Robust standard deviations beyond which a residual loses weight (Huber).
+/// Median absolute value of a standard normal distribution. Source: its quantile at 0.75.
+const MEDIAN_OF_SIZE: f64 = 0.6745;
+/// Minimum scatter, ratio. Bound: exact points keep weights.
+const MIN_SCATTER: f64 = 1e-9;
+
+/// Robust standard deviations beyond which a residual loses weight (Huber). Source: Huber, Robust Statistics (1981).
 const HUBER_THRESHOLD: f64 = 1.5;
-/// Rounds of reweighting.
+/// Rounds of reweighting. Bound: weights converge in a few.
 const ROUNDS: usize = 8;
-/// Minimum number of points and lines, and minimum ratio of the line speeds.
+/// Minimum number of points. Bound: four parameters.
 const MIN_POINTS: usize = 8;
+/// Minimum number of lines. Bound: a trend over speed needs three.
 const MIN_LINES: usize = 3;
+/// Minimum ratio of the line speeds. Bound: heat falls with the cube of speed, by three over it.
 const MIN_SPEED_RATIO: f64 = 1.5;
-/// Minimum ratio of smallest to largest singular value of a determined fit.
+/// Minimum ratio of smallest to largest singular value of a determined fit. Bound: its square is above rounding of f64.
 const MIN_SINGULAR_VALUE_RATIO: f64 = 1e-5;
 
 /// The heat of a map.
@@ -90,10 +97,9 @@ fn fit_heat(points: &[WorkPoint]) -> Option<(f64, f64)> {
         let residuals = &rows * &solution - DVector::from_element(points.len(), 1.0);
         let mut sorted: Vec<f64> = residuals.iter().map(|residual| residual.abs()).collect();
         sorted.sort_by(f64::total_cmp);
-        // The median of a normal variable's absolute value is 0.6745 standard deviations.
-        let scatter = (sorted.get(sorted.len() / 2)? / 0.6745).max(1e-9);
+        let scatter = (sorted.get(sorted.len() / 2)? / MEDIAN_OF_SIZE).max(MIN_SCATTER);
         for (weight, residual) in weights.iter_mut().zip(residuals.iter()) {
-            *weight = (HUBER_THRESHOLD * scatter / residual.abs().max(1e-300)).min(1.0);
+            *weight = (HUBER_THRESHOLD * scatter / residual.abs().max(f64::MIN_POSITIVE)).min(1.0);
         }
         estimate = Some((solution[3] / sizes[3], scatter));
     }

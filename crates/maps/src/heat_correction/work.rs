@@ -5,13 +5,14 @@ use mapper_physics::gas::air::Air;
 use mapper_physics::gas::mixture::Gas;
 use mapper_physics::laws::compression::isentropic_rise_ratio;
 
-/// Unit of the speed ratio, rpm: the estimate does not depend on it, nor on the wheel's diameter.
+/// Unit of the speed ratio, rpm. Bound: the estimate does not depend on it, nor on the wheel's diameter.
 const UNIT_SPEED_RPM: f64 = 100_000.0;
-/// Share of the stage's temperature rise up to the wheel's exit: the degree of reaction of radial wheels.
+/// Share of the stage's temperature rise up to the wheel's exit. Source: the degree of reaction of radial wheels (Casey and Robinson,
+/// Radial Flow Turbocompressors, 2021).
 const REACTION: f64 = 0.6;
-/// Density over temperature along the wheel: 1/(n - 1) of a polytrope with n = 1.5.
+/// Density over temperature along the wheel. Source: 1/(n - 1) of a polytrope with n = 1.5.
 const DENSITY_EXPONENT: f64 = 2.0;
-/// Minimum efficiency of a point on the choke side, over the best of its line: below, inlet choking determines the work.
+/// Minimum efficiency of a point on the choke side, over the best of its line. Bound: below, inlet choking determines the work.
 const MIN_EFFICIENCY_OF_BEST_RATIO: f64 = 0.85;
 
 /// Work and flow coefficients of a point at the map's reference state.

@@ -11,7 +11,7 @@ use crate::map_fit::speed_lines::ends::End;
 use mapper_core::{CompressorMap, FittedLine};
 use std::collections::BTreeMap;
 
-/// Factors on the smallest penalty that are tried until no lines cross.
+/// Factors on the smallest penalty that are tried until no lines cross. Bound: the last is nearly similarity, whose lines do not cross.
 const STIFFNESSES: [f64; 3] = [1.0, 30.0, 1000.0];
 
 impl MapFit {

@@ -8,6 +8,7 @@ mod prediction_errors;
 mod speed_lines;
 
 pub use error::MapFitError;
+pub(crate) use fitted_surface::surface::{MIN_FLOW_KG_S, MIN_RATIO_RANGE};
 pub use fitted_surface::surface::{MapFit, NearestPlace};
 pub use fitted_surface::table::MapFitOptions;
 pub use prediction_errors::leave_out::leave_out;

@@ -38,11 +38,11 @@ const EFFICIENCY_TERMS: [Term; 11] = [
     [0, 2, 0],
     [0, 0, 3],
 ];
-/// Usual inlet temperature of gas stands (600 degC), K: the exponent of the gas changes by only 4 % between 300 degC and 900 degC.
+/// Usual inlet temperature of gas stands (600 degC), K. Bound: the exponent of the gas changes by only 4 % between 300 degC and 900 degC.
 const USUAL_GAS_K: f64 = 873.15;
-/// Minimum number of points: fewer determine only a constant and its scatter.
+/// Minimum number of points. Bound: fewer determine only a constant and its scatter.
 const MIN_POINTS: usize = 4;
-/// Nodes over the expansion ratio.
+/// Nodes over the expansion ratio. Bound: finer than the measured points.
 const NODES: usize = 21;
 
 /// Why a turbine map cannot be fitted.
@@ -70,7 +70,8 @@ struct LineEnds {
     highest_ratio: f64,
 }
 
-/// Maximum relative distance outside the measured range that does not count as extrapolated: stands hold speeds and pressures within 1 %.
+/// Maximum relative distance outside the measured range that does not count as extrapolated. Bound: stands hold speeds and pressures
+/// within 1 %.
 const END_TOLERANCE_RATIO: f64 = 0.01;
 
 fn vane(point: &TurbineMapPoint) -> f64 {

@@ -1,7 +1,13 @@
 //! A quantity of a turbine map as a polynomial over vane position, speed and one coordinate of the expansion, by linear least squares.
 
+use mapper_numerics::statistics::SHARE_975;
 use mapper_numerics::statistics::{range, student_quantile};
 use nalgebra::{DMatrix, DVector};
+
+/// Maximum leverage of a point. Bound: excludes division by zero.
+const MAX_LEVERAGE: f64 = 1.0 - 1e-9;
+/// Distance of equal coordinates, ratio to the largest. Bound: stands hold speeds and positions within 1 %.
+const SAME_COORDINATE_RATIO: f64 = 0.02;
 
 /// Vane position, speed, coordinate of the expansion.
 pub(crate) type Place = [f64; 3];
@@ -33,7 +39,7 @@ pub(crate) struct Surface {
     pub left_out_rms: f64,
 }
 
-/// Minimum number of points per term: with fewer the residuals underestimate the error.
+/// Minimum number of points per term. Bound: with fewer the residuals underestimate the error.
 const MIN_POINTS_PER_TERM: usize = 2;
 
 impl Surface {
@@ -93,7 +99,7 @@ impl Surface {
         let residuals: f64 = observations.iter().map(|o| (o.value - surface.value(o.place)).powi(2)).sum();
         surface.left_out_rms = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
         surface.sigma = (residuals / freedom).sqrt().max(surface.left_out_rms);
-        surface.quantile = student_quantile(0.975, freedom)?;
+        surface.quantile = student_quantile(SHARE_975, freedom)?;
         surface.left_out_rms.is_finite().then_some(surface)
     }
 
@@ -133,7 +139,7 @@ impl Surface {
 
     fn leverage(&self, place: Place) -> f64 {
         let row = self.row(place);
-        (row.transpose() * &self.inverse * &row)[(0, 0)].min(1.0 - 1e-9)
+        (row.transpose() * &self.inverse * &row)[(0, 0)].min(MAX_LEVERAGE)
     }
 
     /// Standard error of a measured value at a place: of the surface and of the scatter about it.
@@ -147,7 +153,7 @@ impl Surface {
     }
 }
 
-/// Minimum ratio of the eigenvalues of a determined fit: at 1e-10 coefficients keep five of fifteen digits.
+/// Minimum ratio of the eigenvalues of a determined fit. Bound: at 1e-10 coefficients keep five of fifteen digits.
 const MIN_EIGENVALUE_RATIO: f64 = 1e-10;
 
 fn ranges(observations: &[Observation]) -> Option<(Place, Place)> {
@@ -180,7 +186,7 @@ fn inner_lines(observations: &[Observation], lines: usize) -> Vec<usize> {
     if inner.len() < 2 { (0..lines).collect() } else { inner }
 }
 
-/// Maximum relative difference of speed within a line.
+/// Maximum relative difference of speed within a line. Bound: it varies by 1 %, and lines of maps are at least 5 % apart.
 const MAX_LINE_SPEED_DIFFERENCE_RATIO: f64 = 0.015;
 
 /// Number of distinct coordinates along an axis. Those less than 2 % of the largest apart count as one, such as a controlled speed.
@@ -191,7 +197,7 @@ fn distinct(observations: &[Observation], axis: usize) -> usize {
     let mut count = 0;
     let mut last = f64::NEG_INFINITY;
     for value in values {
-        if value > last + 0.02 * largest || count == 0 {
+        if value > last + SAME_COORDINATE_RATIO * largest || count == 0 {
             count += 1;
             last = value;
         }

@@ -6,6 +6,12 @@
 
 use super::ColouredNoise;
 use super::first_order;
+use super::first_order::CONSTANT_BELOW;
+
+/// Minimum share of white noise in the variance of a sample. Bound: never zero, since a filter that trusts each row completely is useless.
+const MIN_WHITE_OF_SAMPLE_RATIO: f64 = 1e-3;
+/// Minimum share of white noise in the variance of a mean. Bound: as for a sample; a mean over a short block has more.
+const MIN_WHITE_RATIO: f64 = 0.02;
 
 /// Kalman filter that whitens columns row by row.
 #[derive(Debug, Clone, Default)]
@@ -33,13 +39,12 @@ impl BlockNoise {
     pub fn of_mean(noise: ColouredNoise, samples: f64, block_s: f64) -> Self {
         let share = noise.first_order_variance_ratio();
         let white = noise.white_variance_ratio() / samples.max(1.0);
-        if block_s / noise.time_constant_s < 1e-4 || samples < 2.0 {
-            return BlockNoise { white: white.max(1e-3), first_order: share };
+        if block_s / noise.time_constant_s < CONSTANT_BELOW || samples < 2.0 {
+            return BlockNoise { white: white.max(MIN_WHITE_OF_SAMPLE_RATIO), first_order: share };
         }
         let first_order = first_order::block_covariance(share, block_s, noise.time_constant_s);
         let own = first_order::variance_of_mean(share, block_s, noise.time_constant_s);
-        // Never zero: a filter that trusts each row completely is useless.
-        BlockNoise { white: (white + own - first_order).max(0.02 * (white + own)), first_order }
+        BlockNoise { white: (white + own - first_order).max(MIN_WHITE_RATIO * (white + own)), first_order }
     }
 }
 

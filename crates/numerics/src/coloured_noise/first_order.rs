@@ -1,5 +1,11 @@
 //! Correlation and means of a first-order process.
 
+/// Length in time constants below which the series of the mean's variance replaces the formula, which subtracts nearly equal numbers. Bound:
+/// the series is accurate to 1e-14 there.
+const SERIES_BELOW: f64 = 0.02;
+/// Length below which the factor of the covariance is 1. Bound: the next term of its series is x^2 / 12.
+pub(super) const CONSTANT_BELOW: f64 = 1e-4;
+
 /// Correlation of two values of the process `apart_s` apart; 0 for a process without memory.
 pub fn memory(apart_s: f64, time_constant_s: f64) -> f64 {
     if time_constant_s > 0.0 { (-apart_s.abs() / time_constant_s).exp() } else { 0.0 }
@@ -17,8 +23,7 @@ pub fn variance_of_mean(variance: f64, length_s: f64, time_constant_s: f64) -> f
     if time_constant_s <= 0.0 || x.is_infinite() {
         return 0.0;
     }
-    // The formula subtracts nearly equal numbers; below this limit the series is accurate to 1e-14 and the formula is not.
-    if x < 0.02 {
+    if x < SERIES_BELOW {
         let series = [-2.0 / 5040.0, 2.0 / 720.0, -2.0 / 120.0, 2.0 / 24.0, -2.0 / 6.0, 1.0];
         return variance * series.into_iter().fold(0.0, |sum, term| sum * x + term);
     }
@@ -32,8 +37,7 @@ pub fn variance_of_mean(variance: f64, length_s: f64, time_constant_s: f64) -> f
 /// without bound with the length, as the memory falls. For a time constant of 0 it is infinite.
 pub fn block_covariance(variance: f64, length_s: f64, time_constant_s: f64) -> f64 {
     let x = length_s / time_constant_s;
-    // The formula loses digits below this limit; the next term of the series is x^2 / 12.
-    if x < 1e-4 {
+    if x < CONSTANT_BELOW {
         return variance;
     }
     variance * (2.0 * x.cosh() - 2.0) / (x * x)

@@ -4,9 +4,9 @@ use super::ColouredNoise;
 use super::first_order::memory;
 use nalgebra::DMatrix;
 
-/// Distance in time constants beyond which correlation is neglected: it is then below 6e-6.
+/// Distance in time constants beyond which correlation is neglected. Bound: it is then below 6e-6.
 const NEGLIGIBLE_CORRELATION_DISTANCE: f64 = 12.0;
-/// Blocks with fewer samples are summed over all pairs of samples.
+/// Blocks with fewer samples are summed over all pairs of samples. Bound: effort; the results are equal.
 const MIN_SAMPLES_FACTORED: usize = 4;
 
 /// Covariance of means of noise with standard deviation 1; one row for each block.

@@ -20,7 +20,7 @@ pub struct DampingRule {
 }
 
 impl DampingRule {
-    /// For a good start and a nearly linear model: starts small and quickly becomes negligible.
+    /// For a good start and a nearly linear model. Bound: starts small and quickly becomes negligible; the minimum does not depend on it.
     pub const GOOD_START: DampingRule = DampingRule {
         start: 1e-4,
         growth: 10.0,
@@ -32,7 +32,7 @@ impl DampingRule {
     };
 }
 
-/// Maximum number of iterations of a fit: a good start needs about ten.
+/// Maximum number of iterations of a fit. Bound: a good start needs about ten.
 pub const MAX_ITERATIONS: usize = 60;
 
 /// The damping during a fit.

@@ -3,23 +3,29 @@
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 use statrs::function::beta::inv_beta_reg;
 
-/// 97.5 % quantile of the standard normal distribution: half of a 95 % interval, standard errors.
+/// Share below the upper end of a 95 % interval. Source: its definition.
+pub const SHARE_975: f64 = 0.975;
+/// Share below the lower end. Source: its definition.
+pub const SHARE_025: f64 = 0.025;
+
+/// 97.5 % quantile of the standard normal distribution. Source: half of a 95 % interval, standard errors.
 pub const NORMAL_975: f64 = 1.959_963_984_540_054;
 
-/// 95 % quantile of the standard normal distribution: a quantity this far above a threshold exceeds it in 95 of 100 cases.
+/// 95 % quantile of the standard normal distribution. Source: a quantity this far above a threshold exceeds it in 95 of 100 cases.
 pub const NORMAL_95: f64 = 1.644_853_626_951_472;
 
-/// Threshold for a hint, in standard deviations: by chance exceeded once in 22 times.
+/// Threshold for a hint, in standard deviations. Bound: by chance exceeded once in 22 times.
 pub const HINT_SIGMAS: f64 = 2.0;
-/// Threshold for a doubt about one number, in standard deviations: by chance exceeded once in 370 times.
+/// Threshold for a doubt about one number, in standard deviations. Bound: by chance exceeded once in 370 times.
 pub const DOUBT_SIGMAS: f64 = 3.0;
-/// Threshold for excluding one of hundreds of numbers, in standard deviations: by chance exceeded once in 16,000 times.
+/// Threshold for excluding one of hundreds of numbers, in standard deviations. Bound: by chance exceeded once in 16,000 times.
 pub const EXCLUDE_SIGMAS: f64 = 4.0;
 
-/// Minimum number of values for a mean and its scatter: the relative error of their standard deviation, 1 / sqrt(2 (n - 1)), is a quarter.
+/// Minimum number of values for a mean and its scatter. Bound: the relative error of their standard deviation, 1 / sqrt(2 (n - 1)), is a
+/// quarter.
 pub const MIN_VALUES: usize = 8;
 
-/// 95 % quantile of chi-square with one degree of freedom: the square of [`NORMAL_975`].
+/// 95 % quantile of chi-square with one degree of freedom. Source: the square of [`NORMAL_975`].
 pub const CHI_SQUARE_1_95: f64 = 3.841_458_820_694_124;
 
 /// Quantile of the standard normal distribution at `share` (between 0 and 1); otherwise `None`.
@@ -38,8 +44,8 @@ pub fn student_quantile(share: f64, degrees_of_freedom: f64) -> Option<f64> {
 /// be fractions: `n` independent values between 0 and 1 with mean `m` count as `n m` hits.
 pub fn share_interval_95(hits: f64, trials: f64) -> (f64, f64) {
     let misses = trials - hits;
-    let low = if hits > 0.0 { inv_beta_reg(hits, misses.max(0.0) + 1.0, 0.025) } else { 0.0 };
-    let high = if misses > 0.0 { inv_beta_reg(hits.max(0.0) + 1.0, misses, 0.975) } else { 1.0 };
+    let low = if hits > 0.0 { inv_beta_reg(hits, misses.max(0.0) + 1.0, SHARE_025) } else { 0.0 };
+    let high = if misses > 0.0 { inv_beta_reg(hits.max(0.0) + 1.0, misses, SHARE_975) } else { 1.0 };
     (low, high)
 }
 

@@ -11,8 +11,8 @@ mod robust;
 
 pub use bounded_normal::BoundedNormal;
 pub use distributions::{
-    CHI_SQUARE_1_95, DOUBT_SIGMAS, EXCLUDE_SIGMAS, HINT_SIGMAS, MIN_VALUES, NORMAL_95, NORMAL_975,
-    normal_quantile, share_interval_95, student_quantile,
+    CHI_SQUARE_1_95, DOUBT_SIGMAS, EXCLUDE_SIGMAS, HINT_SIGMAS, MIN_VALUES, NORMAL_95, NORMAL_975, SHARE_025,
+    SHARE_975, normal_quantile, share_interval_95, student_quantile,
 };
 pub use moments::{mean, rms, standard_deviation};
 pub use order::{median, median_of_sorted, nearest_rank, quantile, range};

@@ -3,7 +3,7 @@
 use super::order::median;
 use std::borrow::Borrow;
 
-/// Standard deviation over median absolute value of a normal distribution about 0: 1 / quantile(0.75).
+/// Standard deviation over median absolute value of a normal distribution about 0. Source: 1 / quantile(0.75).
 pub const MEDIAN_SIZE_TO_SIGMA: f64 = 1.482_602_218_505_602;
 
 /// Standard deviation of normally distributed deviations about 0, in their unit, from their median absolute value: up to half of them may

@@ -3,7 +3,8 @@
 use mapper_core::{Channel, Recording};
 use mapper_numerics::statistics::mean;
 
-/// Distance of the end of a segment before a jump, s: a sample at the jump belongs to the segment after it.
+/// Distance of the end of a segment before a jump, s: a sample at the jump belongs to the segment after it. Bound: above the rounding of
+/// times, below any sample interval.
 pub const BEFORE_S: f64 = 1e-6;
 
 /// Mean of readings, in their unit; `None` without any, or if one of them is not a number.

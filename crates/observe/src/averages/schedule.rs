@@ -1,5 +1,8 @@
 //! Segments of a step for averaging readings: short after the jump, long while only the temperature of the metal changes.
 
+/// Difference of equal times, s. Source: recordings store nanoseconds.
+pub(crate) const TIME_ROUNDING_S: f64 = 1e-9;
+
 /// Rule for cutting a step into segments.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Schedule {
@@ -21,8 +24,8 @@ impl Schedule {
         let whole_s = end_s - start_s;
         let mut segments = Vec::new();
         let mut at_s = self.first_s;
-        while whole_s - at_s > 1e-9 {
-            let row = self.lengths_s.iter().find(|(until_s, _)| at_s < until_s - 1e-9);
+        while whole_s - at_s > TIME_ROUNDING_S {
+            let row = self.lengths_s.iter().find(|(until_s, _)| at_s < until_s - TIME_ROUNDING_S);
             let length_s = row.or(self.lengths_s.last()).map_or(whole_s, |(_, l)| *l).max(interval_s);
             let shortest_s = self.shortest_s.max(self.shortest_ratio * length_s);
             if whole_s - at_s < shortest_s {

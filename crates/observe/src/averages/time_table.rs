@@ -15,7 +15,8 @@ pub struct Table {
     pub columns: BTreeMap<Channel, Vec<f64>>,
 }
 
-/// A sample interval above this many typical ones is a gap. Judgement: one lost sample doubles an interval, and clocks jitter by less than half.
+/// A sample interval above this many typical ones is a gap. Bound: one lost sample doubles an interval, and clocks jitter by less than
+/// half.
 pub const GAP_INTERVALS: f64 = 2.5;
 
 impl Table {

@@ -13,20 +13,20 @@ use mapper_numerics::statistics::mean;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::inputs::{Inputs, InputsError, InterpolatedInputs};
 
-/// Time after a jump for which readings are not averaged, s: actuators need some tenths.
+/// Time after a jump for which readings are not averaged, s. Bound: actuators need some tenths.
 const RAW_S: f64 = 3.0;
-/// Maximum lag that is attributed to the valve, s: pneumatic and electric actuators of this size need 0.1 to 1 s, flow meters up to several
-/// seconds. Judgement.
+/// Maximum lag that is attributed to the valve, s. Bound: pneumatic and electric actuators of this size need 0.1 to 1 s, flow meters up
+/// to several seconds.
 const MAX_VALVE_LAG_S: f64 = 1.5;
-/// Averaging times after the raw readings. A speed-control loop corrects P3 by a per cent within ten seconds of the jump, and the means must
-/// follow this. Each is at least as long as the time step of the model.
+/// Averaging times after the raw readings. Each is at least as long as the time step of the model. Bound: a speed-control loop corrects
+/// P3 by a per cent within ten seconds of the jump, and the means must follow this.
 const AFTER_JUMP: Schedule = Schedule {
     first_s: RAW_S,
     lengths_s: &[(8.0, 0.5), (20.0, 1.0), (50.0, 5.0), (f64::INFINITY, 10.0)],
     shortest_s: 0.1,
     shortest_ratio: 0.5,
 };
-/// Averaging times without a previous jump.
+/// Averaging times without a previous jump. Bound: only the temperature of the metal changes.
 const AT_REST: Schedule =
     Schedule { first_s: 0.0, lengths_s: &[(f64::INFINITY, 10.0)], shortest_s: 0.1, shortest_ratio: 0.5 };
 

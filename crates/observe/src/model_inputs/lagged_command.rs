@@ -6,7 +6,26 @@ use mapper_numerics::minimise::minimise;
 use mapper_numerics::statistics::{mean, median};
 use mapper_physics::laws::orifice;
 
-/// Change of a command below which it counts as constant.
+/// Lags after which a jump is almost complete. Bound: 0.25 % of it is left, exp(-6).
+const SETTLING_LAGS: f64 = 6.0;
+/// Minimum flow through an orifice of 1 m2, kg/s. Bound: excludes division by zero without a pressure difference.
+const MIN_FLUX: f64 = 1e-9;
+/// Minimum change of the opening for a jump of the valve. Bound: four times the repeatability of a positioner, 0.005.
+const MIN_VALVE_JUMP_RATIO: f64 = 0.02;
+/// Share of a step at its end in which pressures and flow are settled. Bound: steps are longer than three settling times.
+const SETTLED_SHARE: f64 = 0.3;
+/// Minimum jump of P3 in noise of a sample. Bound: noise alone never reaches it.
+const MIN_P3_JUMP_SIGMAS: f64 = 10.0;
+/// Lags that are searched, s. Bound: below a sample interval of any log, to above any actuator.
+const LAGS_S: (f64, f64) = (1e-3, 60.0);
+/// Relative tolerance of the lag. Bound: far below its error.
+const LAG_TOLERANCE: f64 = 1e-6;
+/// Factor of the fine search about the best of [`RATES`]. Bound: the distance of two rates.
+const RATE_FACTOR: f64 = 1.8;
+/// Relative tolerance of the rate. Bound: far below its error.
+const RATE_TOLERANCE: f64 = 1e-4;
+
+/// Change of a command below which it counts as constant. Bound: rounding of a stored command.
 const COMMAND_TOLERANCE_RATIO: f64 = 1e-6;
 
 /// A commanded level from a given time on.
@@ -119,7 +138,7 @@ impl LaggedCommand {
 
     /// Time after which a jump of P3 is almost complete, s.
     pub fn p3_settles_s(&self, from_pa: f64, to_pa: f64) -> f64 {
-        (to_pa - from_pa).abs() / self.p3.slew_per_s + 6.0 * self.p3.lag_s
+        (to_pa - from_pa).abs() / self.p3.slew_per_s + SETTLING_LAGS * self.p3.lag_s
     }
 
     /// Commanded levels.
@@ -152,15 +171,17 @@ pub(crate) fn is_same_command(value: f64, other: f64) -> bool {
     (value / other - 1.0).abs() <= COMMAND_TOLERANCE_RATIO
 }
 
-/// Number of intervals of a coarse search.
+/// Number of intervals of a coarse search. Bound: neighbouring lags differ by less than a factor of two.
 const COARSE_STEPS: usize = 24;
-/// Rates of the coarse search, in median jumps per second.
+/// Rates of the coarse search, in median jumps per second. Bound: slower rates are no jumps, faster ones a lag alone.
 const RATES: [f64; 9] = [0.2, 0.35, 0.6, 1.0, 1.7, 3.0, 5.0, 9.0, 16.0];
-/// Reduction of the sum of squared residuals, relative to their mean square, above which a rate limit is accepted: ten standard deviations of white noise, five
-/// of coloured noise over the half second of a ramp. A wrongly accepted limit has no effect, because a fast rate is equivalent to a lag alone.
+/// Reduction of the sum of squared residuals, relative to their mean square, above which a rate limit is accepted: ten standard
+/// deviations of white noise, five of coloured noise over the half second of a ramp. A wrongly accepted limit has no effect, because a
+/// fast rate is equivalent to a lag alone. Bound: ten standard deviations of white noise, five of coloured noise over the half second of
+/// a ramp. A wrongly accepted limit has no effect, because a fast rate is equivalent to a lag alone.
 const MIN_COST_REDUCTION: f64 = 100.0;
-/// Reduction by the best of [`RATES`] above which a fine search follows: half of the distance between two rates loses less than 90 % of
-/// the reduction.
+/// Reduction by the best of [`RATES`] above which a fine search follows. Bound: half of the distance between two rates loses less than 90
+/// % of the reduction.
 const MIN_COARSE_REDUCTION: f64 = 0.1 * MIN_COST_REDUCTION;
 
 /// Response of the measured P3 to its command, with a rate limit if the recording supports one; `None` without jumps or P3.
@@ -184,18 +205,22 @@ pub fn measured_valve_response(table: &Table, recording: &Recording, nominal_p1_
     let openings: Vec<f64> = (0..table.t_s.len())
         .map(|i| {
             let p1_pa = p1.map_or(nominal_p1_pa, |p1| p1[i]);
-            flow[i] / orifice::flow_kg_s(1.0, p2[i], t2[i], p1_pa).max(1e-9)
+            flow[i] / orifice::flow_kg_s(1.0, p2[i], t2[i], p1_pa).max(MIN_FLUX)
         })
         .collect();
     let change = |pair: &[StepMarker]| (pair[1].valve_opening_ratio - pair[0].valve_opening_ratio).abs();
-    let jumps: Vec<f64> =
-        recording.steps.windows(2).filter(|pair| change(pair) > 0.02).map(|pair| pair[1].start_s).collect();
+    let jumps: Vec<f64> = recording
+        .steps
+        .windows(2)
+        .filter(|pair| change(pair) > MIN_VALVE_JUMP_RATIO)
+        .map(|pair| pair[1].start_s)
+        .collect();
     // Convert areas to openings, with the median ratio at the settled ends of the steps.
     let mut areas: Vec<f64> = recording
         .steps
         .iter()
         .filter_map(|step| {
-            let range = table.range(step.end_s - 0.3 * (step.end_s - step.start_s), step.end_s);
+            let range = table.range(step.end_s - SETTLED_SHARE * (step.end_s - step.start_s), step.end_s);
             Some(median(openings[range].iter().filter(|x| x.is_finite()))? / step.valve_opening_ratio)
         })
         .filter(|area| area.is_finite() && *area > 0.0)
@@ -203,7 +228,7 @@ pub fn measured_valve_response(table: &Table, recording: &Recording, nominal_p1_
     areas.sort_by(f64::total_cmp);
     let area_m2 = *areas.get(areas.len() / 2)?;
     let openings: Vec<f64> = openings.iter().map(|x| x / area_m2).collect();
-    let sizes = recording.steps.windows(2).map(change).filter(|size| *size > 0.02);
+    let sizes = recording.steps.windows(2).map(change).filter(|size| *size > MIN_VALVE_JUMP_RATIO);
     let commanded = LaggedCommand::of_recording(recording, Response::lag(0.0), Response::lag(0.0));
     estimate_response(table, &openings, &jumps, sizes.collect(), |response| {
         let command = commanded.with_responses(Response::lag(0.0), response);
@@ -213,11 +238,13 @@ pub fn measured_valve_response(table: &Table, recording: &Recording, nominal_p1_
 
 /// Starts of the steps with a jump of P3.
 fn p3_jumps(recording: &Recording, noise_sigma: f64) -> Vec<f64> {
-    let jumped = |pair: &&[StepMarker]| (pair[1].p3_pa - pair[0].p3_pa).abs() > 10.0 * noise_sigma.max(1.0);
+    let jumped = |pair: &&[StepMarker]| {
+        (pair[1].p3_pa - pair[0].p3_pa).abs() > MIN_P3_JUMP_SIGMAS * noise_sigma.max(1.0)
+    };
     recording.steps.windows(2).filter(jumped).map(|pair| pair[1].start_s).collect()
 }
 
-/// Time before and after a jump over which a response is compared, s.
+/// Time before and after a jump over which a response is compared, s. Bound: a level before, and several lags after.
 const AROUND_S: (f64, f64) = (3.0, 12.0);
 
 /// Sum of squared residuals around each jump, with a free level.
@@ -235,7 +262,7 @@ fn sum_of_squares(table: &Table, values: &[f64], jumps: &[f64], predicted: impl 
 
 /// The lag with minimum cost, and that cost.
 fn best_lag(cost: impl Fn(f64) -> f64) -> Option<(f64, f64)> {
-    let lag_s = minimise_globally((1e-3, 60.0), 1e-6, &cost)?;
+    let lag_s = minimise_globally(LAGS_S, LAG_TOLERANCE, &cost)?;
     Some((lag_s, cost(lag_s)))
 }
 
@@ -276,8 +303,8 @@ fn estimate_response<Prediction: Fn(f64) -> f64>(
         return Some(unlimited.1);
     }
     let cost = |rate: f64| at_rate(rate).map_or(f64::INFINITY, |(cost, _)| cost);
-    let range = (coarse.slew_per_s / 1.8, coarse.slew_per_s * 1.8);
-    let limited = at_rate(minimise_globally(range, 1e-4, cost)?);
+    let range = (coarse.slew_per_s / RATE_FACTOR, coarse.slew_per_s * RATE_FACTOR);
+    let limited = at_rate(minimise_globally(range, RATE_TOLERANCE, cost)?);
     Some(limited.filter(|(cost, _)| is_better(*cost, MIN_COST_REDUCTION)).unwrap_or(unlimited).1)
 }
 

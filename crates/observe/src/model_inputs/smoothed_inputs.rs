@@ -10,8 +10,12 @@ use crate::declared::Declared;
 use crate::model_inputs::lagged_command::{LaggedCommand, Response};
 use crate::model_inputs::smoother::{TimeHistory, smooth};
 use mapper_core::{Channel, Recording};
+use mapper_numerics::statistics::MIN_VALUES;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::inputs::Inputs;
+
+/// Minimum variance of a jump's height, ratio to that of a sample. Bound: the height is a mean over at least ten samples.
+const HEIGHT_VARIANCE_RATIO: f64 = 0.1;
 
 /// A recorded quantity without its noise: a smooth part, plus a part proportional to P3.
 #[derive(Debug, Clone, PartialEq)]
@@ -121,7 +125,8 @@ impl Inputs for SmoothedInputs {
     }
 }
 
-/// Length of the segments before and after a jump that give its height, s.
+/// Length of the segments before and after a jump that give its height, s. Bound: its mean has a third of the noise of a second; housings
+/// hardly move.
 const LEVEL_WINDOW_S: f64 = 8.0;
 
 /// Change of `values` per pascal of P3, by regression of their jumps on those of P3, shrunk by its uncertainty (positive-part James-Stein
@@ -155,7 +160,7 @@ fn change_per_pascal(
     let share = sum_xy / sum_xx;
     let scatter = pairs.iter().map(|(x, y)| (y - share * x).powi(2)).sum::<f64>() / (pairs.len() - 1) as f64;
     // The noise limits the scatter from below.
-    let error = (scatter.max(noise_sigma * noise_sigma * 0.1) / sum_xx).sqrt();
+    let error = (scatter.max(noise_sigma * noise_sigma * HEIGHT_VARIANCE_RATIO) / sum_xx).sqrt();
     if share == 0.0 { 0.0 } else { share * (1.0 - (error / share).powi(2)).max(0.0) }
 }
 
@@ -172,5 +177,5 @@ fn line_at(table: &Table, values: &[f64], start_s: f64, end_s: f64, at_s: f64) -
         stv += t * v;
     }
     let determinant = n * stt - st * st;
-    (n >= 8.0 && determinant > 0.0).then(|| (stt * sv - st * stv) / determinant)
+    (n >= MIN_VALUES as f64 && determinant > 0.0).then(|| (stt * sv - st * stv) / determinant)
 }

@@ -6,11 +6,23 @@
 //! kink at each of them.
 
 use mapper_core::NoiseColour;
+use mapper_core::SAMPLE_INTERVAL_S;
 use mapper_numerics::coloured_noise::{memory, variance_of_mean};
 use mapper_numerics::statistics::median;
 use nalgebra::{Matrix3, RowVector3, Vector3};
 
-/// Length of the bins that are filtered, s.
+/// Minimum noise of a sample, in its unit. Bound: excludes division by zero for values without noise.
+const MIN_NOISE: f64 = 1e-12;
+/// Minimum time constant of coloured noise, s. Bound: below it noise is white.
+const MIN_TIME_CONSTANT_S: f64 = 1e-3;
+/// Longest correlation time of the smoothed values, s. Bound: hours, longer than any step.
+const MAX_CORRELATION_S: f64 = 1e4;
+/// Standard deviation of the start value, in noise of a sample. Bound: so large that it does not enter the result.
+const START_SIGMAS: f64 = 1e3;
+/// Variance of the start slope over that of the value. Bound: a slope of ten noises per second, steeper than any drift.
+const START_SLOPE_RATIO: f64 = 1e-4;
+
+/// Length of the bins that are filtered, s. Bound: shorter than any time scale of an input but its jumps.
 const BIN_S: f64 = 1.0;
 
 /// A smooth time history with its uncertainty.
@@ -71,11 +83,12 @@ struct Bin {
     samples: f64,
 }
 
-/// Candidate standard deviations of a change of slope, in noise of a sample per second.
+/// Candidate standard deviations of a change of slope, in noise of a sample per second. Bound: the data choose among them.
 const KINKS_PER_S: [f64; 4] = [0.01, 0.1, 1.0, 10.0];
-/// Minimum gain of the log likelihood for changes of slope: that of one more parameter at three standard deviations.
+/// Minimum gain of the log likelihood for changes of slope. Bound: that of one more parameter at three standard deviations.
 const MIN_LIKELIHOOD_GAIN: f64 = 4.5;
-/// Candidate exponents of the ratio of intensity to variance, in half decades.
+/// Candidate exponents of the ratio of intensity to variance, in half decades. Bound: from a straight line over hours to a time history
+/// that follows each bin.
 const EXPONENTS: std::ops::RangeInclusive<i32> = -26..=4;
 
 /// Smooths `values` at `t_s` (rising; NaN counts as missing); one sample has the noise `noise_sigma`. The slope may change
@@ -90,9 +103,9 @@ pub fn smooth(
     let bins = bins(t_s, values);
     let first = bins.iter().find_map(|bin| bin.mean)?;
     let start_s = t_s[0] + 0.5 * BIN_S;
-    let noise_sigma = noise_sigma.max(1e-12);
+    let noise_sigma = noise_sigma.max(MIN_NOISE);
     let c2 = colour.first_order_share_ratio.powi(2);
-    let tau_s = colour.time_constant_s.max(1e-3);
+    let tau_s = colour.time_constant_s.max(MIN_TIME_CONSTANT_S);
     let mut kinks = vec![false; bins.len()];
     for kink_s in kinks_s {
         // Move the kink to the nearest edge between two bins.
@@ -141,8 +154,9 @@ pub fn smooth(
     let (value, slope_s, variance) = filter.smooth(&tracks);
     let kinks = if kink_variance > 0.0 { kinks.clone() } else { Vec::new() };
     // Density of the noise at low frequency; the smoother's window is the fourth root of its ratio to the intensity.
-    let density = filter.white_variance * 0.1 + 2.0 * tau_s * c2 * noise_sigma * noise_sigma;
-    let correlation_s = (density / best_intensity).powf(0.25).clamp(2.0, 1e4) * std::f64::consts::SQRT_2;
+    let density = filter.white_variance * SAMPLE_INTERVAL_S + 2.0 * tau_s * c2 * noise_sigma * noise_sigma;
+    let correlation_s =
+        (density / best_intensity).powf(0.25).clamp(2.0, MAX_CORRELATION_S) * std::f64::consts::SQRT_2;
     let sigma = median(&variance).unwrap_or(0.0).max(0.0).sqrt();
     Some(TimeHistory { start_s, value, slope_s, kinks, sigma, correlation_s })
 }
@@ -202,10 +216,13 @@ impl Filter<'_> {
         let kink = Vector3::new(0.5 * d, 1.0, 0.0);
         let process_noise_at_kink = process_noise + kink * kink.transpose() * kink_variance;
         let observe = RowVector3::new(1.0, 0.0, 1.0);
-        let wide = 1e3 * self.noise_sigma;
+        let wide = START_SIGMAS * self.noise_sigma;
         let mut mean = Vector3::new(self.first, 0.0, 0.0);
-        let mut covariance =
-            Matrix3::from_diagonal(&Vector3::new(wide * wide, wide * wide * 1e-4, self.coloured_variance));
+        let mut covariance = Matrix3::from_diagonal(&Vector3::new(
+            wide * wide,
+            wide * wide * START_SLOPE_RATIO,
+            self.coloured_variance,
+        ));
         let mut likelihood = 0.0;
         for (place, bin) in self.bins.iter().enumerate() {
             let (before, before_covariance) = (mean, covariance);

@@ -4,6 +4,7 @@
 //! The recorded command gives the time to within one sample. The remaining error shows in the measured P3, which changes by tens of kPa a
 //! second after a jump. An equal delay of all jumps belongs to the actuator and stays in its response; different delays belong to the run.
 
+use crate::averages::schedule::TIME_ROUNDING_S;
 use crate::averages::time_table::Table;
 use crate::model_inputs::lagged_command::{LaggedCommand, Level, Response, is_same_command, levels_of_step};
 use mapper_core::{Channel, Recording, StepMarker};
@@ -11,22 +12,39 @@ use mapper_numerics::minimise::minimise;
 use mapper_numerics::statistics::{DOUBT_SIGMAS, mean, median, rms, robust_sigma};
 use std::ops::Range;
 
-/// Maximum delay of a command behind its step's start, s; a later one belongs to another change.
+/// Minimum jump of P3 for its timing, in noise of a sample. Bound: a time is then known to a hundredth of the rise.
+const MIN_TIMED_JUMP_SIGMAS: f64 = 100.0;
+/// Step of the derivative by time, s. Bound: between rounding and curvature.
+const SLOPE_STEP_S: f64 = 1e-3;
+/// Tolerance of a delay, s. Bound: far below its error.
+const SHIFT_TOLERANCE_S: f64 = 1e-5;
+/// Minimum information of a jump about its time. Bound: excludes division by zero.
+const MIN_INFORMATION: f64 = 1e-12;
+/// Variance of a time minus the mean of its neighbours, for unit variance of each. Source: 1 + 2/4.
+const IRREGULARITY_VARIANCE: f64 = 1.5;
+/// Standard deviations of chi-square above which times are irregular; neighbouring triples share samples, which doubles its scatter. Bound:
+/// by chance once in a million recordings.
+const MIN_IRREGULARITY_SIGMAS: f64 = 5.0;
+
+/// Maximum delay of a command behind its step's start, s; a later one belongs to another change. Bound: a later one belongs to another
+/// change.
 const MAX_COMMAND_DELAY_S: f64 = 2.0;
-/// Maximum sample spacing of a command for the timing of its change, s.
+/// Maximum sample spacing of a command for the timing of its change, s. Bound: a coarser log does not show when it changed.
 const MAX_COMMAND_SPACING_S: f64 = 1.0;
-/// Time before a jump over which P3 is averaged, s.
+/// Time before a jump over which P3 is averaged, s. Bound: thirty samples at 10 Hz.
 const LEVEL_WINDOW_S: f64 = 3.0;
-/// Thresholds for a change of P3: in standard deviations of its scatter, and as a fraction of the jump.
+/// Minimum change of P3, in standard deviations of its scatter. Bound: by chance never exceeded.
 const MIN_CHANGE_SIGMAS: f64 = 6.0;
+/// Minimum change of P3, ratio to the jump. Bound: a speed controller changes it by less between two samples.
 const MIN_CHANGE_RATIO: f64 = 0.02;
-/// Time before and after a jump of P3 that is used for its timing, s.
+/// Time before and after a jump of P3 that is used for its timing, s. Bound: a level before, and the rise.
 const AROUND_S: (f64, f64) = (1.0, 3.0);
-/// The jumps are timed separately if they differ by more than this, s, and by more than [`DOUBT_SIGMAS`].
+/// The jumps are timed separately if they differ by more than this, s, and by more than [`DOUBT_SIGMAS`]. Bound: a smaller one has no
+/// effect on the fit.
 const MIN_DIFFERENCE_S: f64 = 3e-3;
-/// Scatter of the sample times below which it is neglected, s.
+/// Scatter of the sample times below which it is neglected, s. Bound: a hundredth of the sample interval.
 const MIN_SCATTER_S: f64 = 1e-3;
-/// Minimum rate of P3 for the timing of samples, in noise sigmas per second.
+/// Minimum rate of P3 for the timing of samples, in noise sigmas per second. Bound: a sample then has a time error below 0.02 s.
 const MIN_RATE_SIGMAS_PER_S: f64 = 50.0;
 
 /// Moves the start of each step to the last sample before its command changed, so that the step includes its whole transient.
@@ -38,7 +56,7 @@ pub fn with_command_times(recording: &Recording) -> Recording {
         corrected.steps[index].start_s = start_s;
         // Keep adjacent steps adjacent.
         if let Some(last) = index.checked_sub(1).map(|last| &mut corrected.steps[last])
-            && last.end_s >= before_s - 1e-9
+            && last.end_s >= before_s - TIME_ROUNDING_S
         {
             last.end_s = start_s;
         }
@@ -75,7 +93,7 @@ fn sampled_delay_s(recording: &Recording, step: &StepMarker) -> Option<f64> {
         return None;
     }
     // Scatter of P3 at a constant command.
-    let constant = p3.slice(step.start_s - LEVEL_WINDOW_S, before_s + 1e-9).1;
+    let constant = p3.slice(step.start_s - LEVEL_WINDOW_S, before_s + TIME_ROUNDING_S).1;
     let level_pa = median(constant.iter().filter(|value| value.is_finite()))?;
     let scatter_pa = robust_sigma(constant.iter().map(|value| value - level_pa))?;
     let measured_pa = p3
@@ -147,15 +165,8 @@ impl Jump {
             levels.extend(levels_of_step(recording, marker));
             let from_pa = levels[at - 1].p3_pa;
             let samples = table.range(marker.start_s - AROUND_S.0, marker.start_s + AROUND_S.1);
-            ((marker.p3_pa - from_pa).abs() > 100.0 * noise_sigma && samples.len() > 10).then_some(Jump {
-                step,
-                levels,
-                at,
-                p3,
-                noise_sigma,
-                interval_s: table.interval_s,
-                samples,
-            })
+            ((marker.p3_pa - from_pa).abs() > MIN_TIMED_JUMP_SIGMAS * noise_sigma && samples.len() > 10)
+                .then_some(Jump { step, levels, at, p3, noise_sigma, interval_s: table.interval_s, samples })
         };
         (1..steps.len()).filter_map(jump).collect()
     }
@@ -178,7 +189,7 @@ impl Jump {
 
     /// Rate of P3 at each sample, Pa/s.
     fn slopes(&self, table: &Table, shift_s: f64) -> Vec<f64> {
-        let (command, step_s) = (self.command(shift_s), 1e-3);
+        let (command, step_s) = (self.command(shift_s), SLOPE_STEP_S);
         let start_s = self.levels[self.at].start_s + shift_s;
         let slope = |t_s: f64| (command.p3_pa(t_s + step_s) - command.p3_pa(t_s)) / step_s;
         self.samples.clone().map(|i| if table.t_s[i] > start_s { slope(table.t_s[i]) } else { 0.0 }).collect()
@@ -196,9 +207,9 @@ impl Jump {
         };
         // The command came between two samples, and acts within one sample interval.
         let (low_s, high_s) = (-0.5 * self.interval_s, 2.0 * self.interval_s);
-        let shift_s = minimise(low_s, high_s, 1e-5, cost).at;
+        let shift_s = minimise(low_s, high_s, SHIFT_TOLERANCE_S, cost).at;
         let information: f64 = self.slopes(table, shift_s).iter().map(|slope| slope * slope).sum();
-        (shift_s, self.noise_sigma / information.max(1e-12).sqrt())
+        (shift_s, self.noise_sigma / information.max(MIN_INFORMATION).sqrt())
     }
 }
 
@@ -220,15 +231,14 @@ fn scatter_s(table: &Table, values: &[f64], jumps: &[Jump], shifts: &[(f64, f64)
             if irregularity_s.is_finite() {
                 let weight = 1.0 / noise;
                 sum += weight * (irregularity_s * irregularity_s - noise);
-                weights += 1.5 * weight;
+                weights += IRREGULARITY_VARIANCE * weight;
                 chi += irregularity_s * irregularity_s / noise;
                 count += 1.0;
             }
         }
     }
-    // Neighbouring triples share samples, which doubles the scatter of `chi`.
-    let chi_limit = count + 5.0 * 2.0 * f64::sqrt(2.0 * count);
-    let scatter_s = f64::sqrt(f64::max(sum / f64::max(weights, 1e-30), 0.0));
+    let chi_limit = count + MIN_IRREGULARITY_SIGMAS * 2.0 * f64::sqrt(2.0 * count);
+    let scatter_s = f64::sqrt(f64::max(sum / f64::max(weights, f64::MIN_POSITIVE), 0.0));
     if count > 0.0 && chi > chi_limit && scatter_s > MIN_SCATTER_S { scatter_s } else { 0.0 }
 }
 

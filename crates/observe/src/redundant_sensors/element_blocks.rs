@@ -3,9 +3,9 @@
 use crate::plausible::is_reading;
 use mapper_core::{Channel, Series};
 
-/// Length of a block, s: longer than the correlation time of usual noise, shorter than the lag of a probe that is too large.
+/// Length of a block, s. Bound: longer than the correlation time of usual noise, shorter than the lag of a probe that is too large.
 const BLOCK_S: f64 = 2.0;
-/// Maximum number of blocks of a recording; a longer one has longer blocks.
+/// Maximum number of blocks of a recording; a longer one has longer blocks. Bound: effort; two days.
 const MAX_BLOCKS: f64 = 100_000.0;
 
 /// Block means of each sensor; NaN without a reading.

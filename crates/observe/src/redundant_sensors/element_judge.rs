@@ -11,38 +11,47 @@ use mapper_numerics::coloured_noise::ColouredNoise;
 use mapper_numerics::statistics::mean;
 use mapper_physics::laws::thermocouple;
 
-/// Fraction of fault-free recordings in which a sensor is excluded for its offset; half of the permitted false alarms.
+/// Fraction of fault-free recordings in which a sensor is excluded for its offset; half of the permitted false alarms. Bound: half of the
+/// permitted false alarms, 1 %.
 pub(crate) const FALSE_ALARMS_RATIO: f64 = 0.005;
-/// Number of parts of the recording that are judged separately: an offset that starts in the middle has its full size in the last part.
+/// Number of parts of the recording that are judged separately. Bound: an offset that starts in the middle has its full size in the last
+/// part.
 const PARTS: usize = 4;
-/// Minimum number of blocks for a decision.
+/// Minimum number of blocks for a decision. Bound: a standard deviation is then known to a quarter.
 const MIN_BLOCKS: usize = 10;
-/// A sensor is silent if it gives no reading in a larger fraction of the blocks, compared with the sensor that has most.
+/// A sensor is silent if it gives no reading in a larger fraction of the blocks, compared with the sensor that has most. Bound: a sensor
+/// with most of the readings is not silent.
 const MAX_MISSING_RATIO: f64 = 0.5;
-/// Minimum duration, s, and number of samples of a reading that repeats to the last digit for a stuck sensor.
+/// Minimum duration of a reading that repeats to the last digit for a stuck sensor, s. Bound: ten correlation times of sensor noise.
 const FROZEN_S: f64 = 20.0;
+/// Minimum number of its samples. Bound: a live sensor whose digit changes in a fifth of its samples repeats as often once in a hundred
+/// cases.
 const FROZEN_SAMPLES: usize = 20;
-/// Minimum fraction of samples of a live sensor that differ from the previous one: a coarse digit repeats often.
+/// Minimum fraction of samples of a live sensor that differ from the previous one. Bound: a coarse digit repeats often.
 const MIN_CHANGING_RATIO: f64 = 0.2;
-/// Band within which a reading counts as constant, in standard deviations of a block mean; noise exceeds it in 1e-8 of blocks.
+/// Band within which a reading counts as constant, in standard deviations of a block mean; noise exceeds it in 1e-8 of blocks. Bound:
+/// noise exceeds it in 1e-8 of blocks.
 const CONSTANT_BAND_SIGMAS: f64 = 6.0;
-/// Minimum change of the other sensors in the same time, in widths of this band, and its duration in blocks (20 s), after which a slow probe
-/// has followed by half of the change.
+/// Minimum change of the other sensors in the same time, in widths of this band. Bound: their noise makes a quarter of it at most.
 const MIN_MOVE_BANDS: f64 = 4.0;
+/// Its minimum duration in blocks. Bound: 20 s, after which a slow probe has followed by half of the change.
 const MIN_MOVE_BLOCKS: usize = 10;
-/// Difference of lags that is always acceptable, s: at the slopes of a usual window it is smaller than a sensor's offset.
+/// Difference of lags that is always acceptable, s. Bound: at the slopes of a usual window it is smaller than a sensor's offset.
 const LAG_TOLERANCE_S: f64 = 0.5;
-/// Accuracy of a lag computed from the tip diameter, ratio: tips are not spheres, and the flow is not known.
+/// Accuracy of a lag computed from the tip diameter, ratio. Bound: tips are not spheres, and the flow is not known.
 const LAG_TOLERANCE_RATIO: f64 = 0.5;
-/// Minimum size of a significant lag, in standard errors.
+/// Minimum size of a significant lag, in standard errors. Bound: by chance never exceeded.
 const MIN_LAG_SIGMAS: f64 = 6.0;
-/// Factor on the regression's standard errors, which assume independent residuals; those of blocks are slightly correlated.
+/// Factor on the regression's standard errors, which assume independent residuals; those of blocks are slightly correlated. Bound: they
+/// assume independent residuals; those of blocks are slightly correlated.
 const STANDARD_ERROR_FACTOR: f64 = 2.0;
-/// Minimum ratio of slopes to their noise for the estimate of a lag.
+/// Minimum ratio of slopes to their noise for the estimate of a lag. Bound: noise in the slopes then biases a lag by 4 %, 1 / 5^2.
 const MIN_SLOPE_SIGMAS: f64 = 5.0;
-/// Typical outlet pipe, flow and temperature: lags of declared diameters are only compared with each other.
+/// Typical outlet pipe, m. Bound: lags of declared diameters are only compared with each other.
 const USUAL_PIPE_M: f64 = 0.035;
+/// Typical flow, kg/s. Bound: as for the pipe.
 const USUAL_FLOW_KG_S: f64 = 0.05;
+/// Typical outlet temperature, K. Bound: as for the pipe.
 const USUAL_T2_K: f64 = 350.0;
 
 /// Result for the sensors of one channel, by their positions from 0.

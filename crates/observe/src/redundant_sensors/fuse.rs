@@ -12,8 +12,8 @@ use mapper_core::{Channel, DeclaredUncertainty, Element, NoiseColour, Recording,
 use mapper_numerics::statistics::{mean, median, median_of_sorted, normal_quantile};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Deviation of a reading from the median of its neighbours, or of an aligned reading from that of at least three sensors, beyond which it is a
-/// spike, in standard deviations.
+/// Deviation of a reading from the median of its neighbours, or of an aligned reading from that of at least three sensors, beyond which
+/// it is a spike, in standard deviations. Bound: noise never reaches it.
 pub const SPIKE_SIGMAS: f64 = 8.0;
 
 /// Judges the redundant sensors of all channels of a recording, and lists the excluded ones. Channels without a declaration, or with another

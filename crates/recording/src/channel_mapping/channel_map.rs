@@ -10,6 +10,13 @@ use mapper_core::{
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+/// Temperature of the standard atmosphere at sea level, K. Source: ISO 2533.
+const SEA_LEVEL_K: f64 = 288.15;
+/// Its gradient, K/m. Source: ISO 2533.
+const GRADIENT_K_M: f64 = 6.5e-3;
+/// Gravity over the gas constant and the gradient. Source: ISO 2533.
+const BAROMETRIC_EXPONENT: f64 = 5.255_88;
+
 /// Maps a recording's topics and fields onto channels. SI inside; written with units in YAML.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ChannelMap {
@@ -60,11 +67,11 @@ pub struct Barometer {
 }
 
 pub(crate) const UNKNOWN_WORD: &str = "unknown";
-/// Uncertainty of a barometer's reading, Pa: the weather changes it by some hectopascal while a test runs.
+/// Uncertainty of a barometer's reading, Pa. Bound: the weather changes it by some hectopascal while a test runs.
 const READING_SIGMA_PA: f64 = 100.0;
-/// Uncertainty of the pressure at a known altitude, Pa: the weather of the middle latitudes.
+/// Uncertainty of the pressure at a known altitude, Pa. Bound: the weather of the middle latitudes.
 const ALTITUDE_SIGMA_PA: f64 = 1e3;
-/// Uncertainty of the pressure at an unknown place, Pa: weather, and altitudes of up to some 500 m.
+/// Uncertainty of the pressure at an unknown place, Pa. Bound: weather, and altitudes of up to some 500 m.
 const UNKNOWN_SIGMA_PA: f64 = 3e3;
 
 impl Barometer {
@@ -75,10 +82,11 @@ impl Barometer {
 
     /// The standard atmosphere (ISO 2533) at an altitude below 11 km.
     pub fn at_altitude(altitude_m: f64) -> Self {
-        // Temperature at sea level, its gradient, and gravity over the gas constant and the gradient.
-        let (sea_level_k, gradient_k_m, exponent) = (288.15, 6.5e-3, 5.255_88);
-        let ratio = (1.0 - gradient_k_m * altitude_m / sea_level_k).max(0.0);
-        Barometer { pressure_pa: STANDARD_ATMOSPHERE_PA * ratio.powf(exponent), sigma_pa: ALTITUDE_SIGMA_PA }
+        let ratio = (1.0 - GRADIENT_K_M * altitude_m / SEA_LEVEL_K).max(0.0);
+        Barometer {
+            pressure_pa: STANDARD_ATMOSPHERE_PA * ratio.powf(BAROMETRIC_EXPONENT),
+            sigma_pa: ALTITUDE_SIGMA_PA,
+        }
     }
 
     /// The standard atmosphere, for a stand of unknown altitude.

@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Maximum size of a channel map, bytes.
+/// Maximum size of a channel map, bytes. Bound: memory; a map has some kilobytes.
 const MAX_BYTES: usize = 1 << 20;
 
 /// Name of the file in messages.

@@ -8,6 +8,7 @@ use crate::logs::proposal::short;
 use crate::logs::units::{kind_of, unit};
 use crate::logs::{Kind, Unit};
 use crate::{AmbientPressure, ChannelSource};
+use mapper_core::unit_factors::PA_PER_KPA;
 use mapper_core::{Channel, Series};
 use mapper_numerics::statistics::quantile;
 use mapper_yaml::{FindingKind, steps};
@@ -85,12 +86,12 @@ pub(crate) fn check_ambient(
     mistakes: &mut MapMistakes,
 ) {
     let (min_pa, max_pa) = AMBIENT_RANGE_PA;
-    let allowed = format!("it lies between {:.0} and {:.0} kPa", min_pa / 1e3, max_pa / 1e3);
+    let allowed = format!("it lies between {:.0} and {:.0} kPa", min_pa / PA_PER_KPA, max_pa / PA_PER_KPA);
     match (ambient, column.and_then(trimmed_range)) {
         (AmbientPressure::Constant(barometer), _) if !(min_pa..=max_pa).contains(&barometer.pressure_pa) => {
             let message = format!(
                 "the ambient pressure is {} kPa, which is impossible",
-                short(barometer.pressure_pa / 1e3)
+                short(barometer.pressure_pa / PA_PER_KPA)
             );
             let remedy = format!("{allowed}: write the barometer's reading");
             mistakes.add(FindingKind::Implausible, &steps!["ambient_pressure"], message, remedy);

@@ -47,7 +47,7 @@ pub struct LogFormat {
 pub struct LogFormats(pub &'static [LogFormat]);
 
 impl LogFormats {
-    /// Size of the start of a file by which formats recognise it, bytes.
+    /// Size of the start of a file by which formats recognise it, bytes. Bound: effort; every format shows itself earlier.
     pub const HEAD_BYTES: usize = 4096;
 
     /// The format of a file that starts with these bytes.

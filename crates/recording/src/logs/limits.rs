@@ -3,22 +3,26 @@
 //! The unpacked size limits the time too, since every byte takes constant time. Limits of single formats (parts of a workbook, length of
 //! a line) are with their readers.
 
-/// Maximum unpacked size of a small file, bytes: an hour at 1 kHz with 37 channels as doubles.
+/// Maximum unpacked size of a small file, bytes. Bound: an hour at 1 kHz with 37 channels as doubles.
 pub const MAX_UNPACKED_BYTES: u64 = 1 << 30;
 
-/// Maximum unpacked over packed size of a larger file: noisy readings compress to a fifth at best, the text of a sheet to a fifteenth.
+/// Maximum unpacked over packed size of a larger file. Bound: noisy readings compress to a fifth at best, the text of a sheet to a
+/// fifteenth.
 pub const MAX_UNPACKED_RATIO: u64 = 20;
 
-/// Maximum unpacked size of a small file whose content is kept in memory, bytes: an hour at 10 Hz with 100 columns of text, 16 bytes each.
+/// Maximum unpacked size of a small file whose content is kept in memory, bytes. Bound: an hour at 10 Hz with 100 columns of text, 16
+/// bytes each.
 const MIN_MEMORY_BYTES: u64 = 64 << 20;
 
-/// Maximum unpacked size of one block, bytes; a reader holds two at a time. The MDF standard recommends 4 MiB.
+/// Maximum unpacked size of one block, bytes; a reader holds two at a time. The MDF standard recommends 4 MiB. Bound: a reader holds two
+/// at a time; the MDF standard recommends 4 MiB.
 pub const MAX_BLOCK_BYTES: u64 = 32 << 20;
 
-/// Maximum nesting of a conversion formula, with signs and powers: polynomials, the deepest formulas of sensors, have about ten levels.
+/// Maximum nesting of a conversion formula, with signs and powers. Bound: polynomials, the deepest formulas of sensors, have about ten
+/// levels.
 pub const MAX_FORMULA_DEPTH: usize = 64;
 
-/// Maximum number of operators of a conversion formula: each may be a level of its expression tree.
+/// Maximum number of operators of a conversion formula. Bound: each may be a level of its expression tree.
 pub const MAX_FORMULA_OPERATORS: usize = 1000;
 
 /// Maximum unpacked size of a file of this size, bytes.

@@ -4,13 +4,16 @@ use crate::logs::units::{kind_of, unit};
 use mapper_core::{Channel, plausible};
 use mapper_yaml::units::{Kind, Unit};
 
-/// Share of the readings ignored at each end of the range: spikes and dropouts do not indicate a wrong unit.
+/// Deepest gauge pressure, ratio to the ambient one. Bound: throttled inlets reach a half; below zero absolute nothing exists.
+const MAX_SUCTION_RATIO: f64 = 0.7;
+
+/// Share of the readings ignored at each end of the range. Bound: spikes and dropouts do not indicate a wrong unit.
 pub(crate) const TRIMMED_SHARE: f64 = 0.02;
 
-/// The standard atmosphere (ISO 2533), Pa: the ambient pressure of a log that does not contain it.
+/// The standard atmosphere (ISO 2533), Pa. Source: the ambient pressure of a log that does not contain it.
 pub(crate) const STANDARD_ATMOSPHERE_PA: f64 = 101_325.0;
 
-/// Range of an ambient pressure, Pa.
+/// Range of an ambient pressure, Pa. Bound: altitudes of up to 5 km, and the highest weather.
 pub const AMBIENT_RANGE_PA: (f64, f64) = (5e4, 1.1e5);
 
 /// Whether readings between `low` and `high` (SI, without the trimmed share at each end) are possible for a channel.
@@ -44,12 +47,12 @@ pub fn fitting_units(channel: Channel, low: f64, high: f64, offset: f64) -> Vec<
 /// Whether pressures in this range (Pa) look like gauge readings: too low for absolute ones, and plausible after the ambient pressure
 /// is added.
 pub fn looks_like_gauge(channel: Channel, low_pa: f64, high_pa: f64) -> bool {
-    // Only the size matters here.
+    /// An ambient pressure, Pa. Bound: only the size matters here.
     const AMBIENT_PA: f64 = 1e5;
     kind_of(channel) == Kind::Pressure
         && !is_plausible(channel, low_pa, high_pa)
         && is_plausible(channel, low_pa + AMBIENT_PA, high_pa + AMBIENT_PA)
-        && low_pa > -0.7 * AMBIENT_PA
+        && low_pa > -MAX_SUCTION_RATIO * AMBIENT_PA
 }
 
 #[cfg(test)]

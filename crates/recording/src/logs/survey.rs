@@ -5,12 +5,13 @@ use crate::logs::{Log, LogError, Row};
 use mapper_numerics::statistics::nearest_rank;
 use serde::Serialize;
 
+/// Number of intervals that determine the typical one. Bound: memory.
 const MAX_INTERVALS: usize = 4096;
 
-/// Typical intervals above which a step of the clock is a gap.
+/// Typical intervals above which a step of the clock is a gap. Bound: loggers jitter by less.
 const GAP_INTERVALS: f64 = 5.0;
 
-/// Maximum number of listed gaps; further ones are only counted.
+/// Maximum number of listed gaps; further ones are only counted. Bound: memory; further ones are only counted.
 const MAX_LISTED_GAPS: usize = 100;
 
 /// Contents of a log.

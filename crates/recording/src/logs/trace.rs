@@ -1,6 +1,6 @@
 //! Compresses a long series to a bounded number of means, and draws a series in one line of text.
 
-/// Maximum number of means; a power of two.
+/// Maximum number of means; a power of two. Bound: memory; more than a line on screen shows.
 const MAX_BINS: usize = 512;
 
 /// A series as means over equal numbers of rows.
@@ -69,7 +69,7 @@ pub fn sparkline(values: &[f64], width: usize) -> String {
     let bar = |value: f64| match value {
         value if !value.is_finite() => ' ',
         _ if high <= low => BARS[3],
-        value => BARS[((8.0 * (value - low) / (high - low)) as usize).min(7)],
+        value => BARS[((BARS.len() as f64 * (value - low) / (high - low)) as usize).min(BARS.len() - 1)],
     };
     (0..width).map(|index| bar(share(index))).collect()
 }

@@ -6,11 +6,11 @@ use crate::mcap::records::{op, parse_message};
 use crate::mcap::sink::Sink;
 use mapper_numerics::parallel;
 
-/// Maximum total size of a batch, unpacked: enough work for all cores, and small compared with a recording.
+/// Maximum total size of a batch, unpacked. Bound: enough work for all cores, and small compared with a recording.
 const MAX_BATCH_BYTES: u64 = 4 << 20;
-/// Maximum number of chunks of a batch: with small chunks, a larger batch would only delay the first messages.
+/// Maximum number of chunks of a batch. Bound: with small chunks, a larger batch would only delay the first messages.
 const MAX_BATCH_CHUNKS: usize = 1024;
-/// Parts of a batch: more than there are cores, to balance the load.
+/// Parts of a batch. Bound: more than there are cores, to balance the load.
 const PARTS: usize = 16;
 
 /// A record of a chunk.

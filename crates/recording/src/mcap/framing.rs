@@ -5,7 +5,7 @@
 
 use std::io::{self, Read};
 
-/// Bytes before a record's body: one of opcode, eight of length.
+/// Bytes before a record's body. Source: MCAP, one of opcode, eight of length.
 const FRAME_BYTES: usize = 9;
 
 /// Result of a read.

@@ -9,11 +9,12 @@ use crate::samples::log_clock::{LogClock, Restart};
 use crate::samples::series_builder::SeriesBuilder;
 use crate::{AmbientPressure, ChannelMap, ChannelSource, ReadOptions, ReadWarning, RecordError};
 use mapper_core::Channel;
+use mapper_core::unit_factors::NS_PER_S;
 use mapper_yaml::{FindingKind, Step, closest, steps};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Time 0 of a log on the clock of [`SeriesBuilder`]; it leaves room for negative times.
+/// Time 0 of a log on the clock of [`SeriesBuilder`]; it leaves room for negative times. Bound: room for negative times.
 const LOG_ZERO_NS: u64 = 1 << 62;
 
 /// Result of reading a log.
@@ -126,7 +127,7 @@ pub(crate) fn read_log(
 
 impl LogContent {
     fn take(&mut self, places: &[(usize, Target, &'static Unit)], t_s: f64, values: &[f64]) {
-        let time_ns = LOG_ZERO_NS.saturating_add_signed((t_s * 1e9).round() as i64);
+        let time_ns = LOG_ZERO_NS.saturating_add_signed((t_s * NS_PER_S).round() as i64);
         for (at, target, unit) in places {
             // An empty cell is not a sample: slow and fast columns share rows.
             let Some(value) = values.get(*at).copied().filter(|value| value.is_finite()) else { continue };

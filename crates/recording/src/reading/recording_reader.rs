@@ -19,6 +19,7 @@ use crate::{
     AmbientPressure, ChannelMap, ChannelSource, FormatVersion, ReadWarning, RecordError,
     channel_mapping::plausibility,
 };
+use mapper_core::unit_factors::PERCENT;
 use mapper_core::{
     Channel, Element, Event, Group, Quality, ReadingOrigin, Recording, RedundantSensors, Series, StepMarker,
 };
@@ -378,7 +379,7 @@ fn detect_steps(
     warnings: &mut Vec<ReadWarning>,
 ) -> Vec<StepMarker> {
     if let Some(share) = series.get(&Channel::ValveCommand).and_then(reversal_share) {
-        warnings.push(ReadWarning::MeasuredValve { turns_percent: 100.0 * share });
+        warnings.push(ReadWarning::MeasuredValve { turns_percent: PERCENT * share });
         let steps = steps_from_jumps(series, true, warnings);
         if let Some(position) = series.get_mut(&Channel::ValveCommand) {
             hold_at_step_ends(position, &steps);

@@ -13,13 +13,13 @@ use std::collections::BTreeMap;
 use std::io::{self, Read};
 use std::path::Path;
 
-/// Larger schemas are skipped, which limits the memory that many of them could take.
+/// Larger schemas are skipped, bytes. Bound: the memory that many of them could take.
 const MAX_SCHEMA_BYTES: usize = 1 << 20;
 
-/// Maximum total size of topic definitions and schemas; later ones are skipped.
+/// Maximum total size of topic definitions and schemas; later ones are skipped. Bound: memory; later ones are skipped.
 const MAX_DEFINITIONS_BYTES: usize = 64 << 20;
 
-/// Number of damaged chunks and records that are listed; further ones are only counted.
+/// Number of damaged chunks and records that are listed; further ones are only counted. Bound: memory; further ones are only counted.
 const MAX_LISTED_DAMAGE: u64 = 100;
 
 /// Results of a pass in addition to the forwarded data.

@@ -7,16 +7,17 @@ use crate::samples::rig_sink::PositionedMessage;
 use crate::samples::series_builder::{ClockBreak, SeriesBuilder};
 use crate::step_detection::steps::StepMessage;
 use mapper_core::Event;
+use mapper_core::unit_factors::NS_PER_S;
 use std::collections::BTreeMap;
 
-/// Maximum number of messages between the breaks of several channels that one step of the clock caused: the fastest topic sends as many
-/// while the slowest sends one.
+/// Maximum number of messages between the breaks of several channels that one step of the clock caused. Bound: the fastest topic sends as
+/// many while the slowest sends one.
 const MAX_MESSAGES_APART: u64 = 1000;
 
-/// Clocks of channels and markers may differ by this much, ns.
+/// Clocks of channels and markers may differ by this much, ns. Bound: threads write in turn.
 const TOLERANCE_NS: u64 = 2_000_000_000;
 
-/// Interval of a channel that has only one sample before the break, ns: the rate of this program's recordings.
+/// Interval of a channel that has only one sample before the break, ns. Source: the rate of this program's recordings.
 const USUAL_INTERVAL_NS: u64 = 100_000_000;
 
 type Builders = BTreeMap<MappedQuantity, SeriesBuilder>;
@@ -59,7 +60,7 @@ pub(crate) fn repair_set_back(
         }
         move_messages(steps, from, shift_ns);
         move_messages(events, from, shift_ns);
-        warnings.push(ReadWarning::ClockSet { by_s: -(shift_ns as f64) / 1e9 });
+        warnings.push(ReadWarning::ClockSet { by_s: -(shift_ns as f64) / NS_PER_S });
     }
 }
 
@@ -80,7 +81,7 @@ pub(crate) fn repair_set_forward(
     let first_ns = builders.values().filter_map(SeriesBuilder::first_time_ns).min();
     let (Some(first_ns), Some(first)) = (first_ns, steps.first()) else { return };
     let ahead_ns = |step: &PositionedMessage<StepMessage>, start_time_ns: u64| {
-        let run_ns = (step.message.t_s * 1e9) as i128;
+        let run_ns = (step.message.t_s * NS_PER_S) as i128;
         i64::try_from(i128::from(step.log_time_ns) - i128::from(start_time_ns) - run_ns).unwrap_or(0)
     };
     let by_ns = ahead_ns(first, *start_time_ns);
@@ -88,7 +89,7 @@ pub(crate) fn repair_set_forward(
         u64::try_from(by_ns).is_ok_and(|by_ns| has_gap(builders, (first_ns, first.log_time_ns), by_ns));
     if by_ns.unsigned_abs() > TOLERANCE_NS && !was_set {
         *start_time_ns = start_time_ns.saturating_add_signed(by_ns);
-        warnings.push(ReadWarning::ClockSet { by_s: by_ns as f64 / 1e9 });
+        warnings.push(ReadWarning::ClockSet { by_s: by_ns as f64 / NS_PER_S });
     }
     let mut from_ns = first_ns;
     for at in 0..steps.len() {
@@ -104,7 +105,7 @@ pub(crate) fn repair_set_forward(
             for step in steps.iter_mut().skip(at) {
                 step.log_time_ns = step.log_time_ns.saturating_sub(by_ns);
             }
-            warnings.push(ReadWarning::ClockSet { by_s: by_ns as f64 / 1e9 });
+            warnings.push(ReadWarning::ClockSet { by_s: by_ns as f64 / NS_PER_S });
         }
         from_ns = steps.get(at).map_or(from_ns, |step| step.log_time_ns);
     }

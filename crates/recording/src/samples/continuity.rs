@@ -7,24 +7,27 @@ use crate::ReadWarning;
 use crate::channel_mapping::mapped_topics::MappedQuantity;
 use crate::samples::log_clock::{MAX_BACK_INTERVALS, MAX_BACK_S};
 use crate::samples::series_builder::SeriesBuilder;
+use mapper_core::unit_factors::NS_PER_S;
 use mapper_numerics::statistics::median;
 use std::collections::BTreeMap;
 
-/// Samples on each side of a gap that determine level and slope, and their minimum number.
+/// Samples on each side of a gap that determine level and slope. Bound: more would average over changes.
 const SIDE_SAMPLES: usize = 20;
+/// Their minimum number. Bound: the error of their standard deviation is a quarter.
 const MIN_SIDE_SAMPLES: usize = 8;
 
-/// Maximum number of gaps that are checked: a clock is set once or twice.
+/// Maximum number of gaps that are checked. Bound: a clock is set once or twice.
 const MAX_GAPS: usize = 100;
 
-/// Standard errors within which two levels, or two slopes, are equal.
+/// Standard errors within which two levels, or two slopes, are equal. Bound: by chance never exceeded.
 const EQUAL_SIGMAS: f64 = 5.0;
 
-/// Minimum slope in standard errors, and minimum change over a pause in tolerances, for a reading that is evidence.
+/// Minimum slope in standard errors for a reading that is evidence. Bound: noise never reaches it.
 const MIN_SLOPE_SIGMAS: f64 = 8.0;
+/// Minimum change over a pause in tolerances for a reading that is evidence. Bound: equal levels on both sides then exclude a pause.
 const MIN_MOVE_RATIO: f64 = 10.0;
 
-/// Rounding of readings, relative to their level.
+/// Rounding of readings, relative to their level. Bound: stored numbers have more digits.
 const ROUNDING_RATIO: f64 = 1e-9;
 
 /// A straight line through the samples next to a gap.
@@ -83,7 +86,7 @@ fn gap_evidence(
     let jump = after.level - (before.level + before.slope_per_s * interval_s);
     let tolerance = EQUAL_SIGMAS * before.level_sigma.hypot(after.level_sigma);
     let slope_sigma = before.slope_sigma_per_s.hypot(after.slope_sigma_per_s);
-    let gap_s = to_ns.saturating_sub(from_ns) as f64 / 1e9;
+    let gap_s = to_ns.saturating_sub(from_ns) as f64 / NS_PER_S;
     if jump.abs() > tolerance {
         return Some(GapEvidence::Paused);
     }
@@ -104,9 +107,9 @@ pub(crate) fn repair_gaps<'a>(
     for _ in 0..MAX_GAPS {
         let Some((gap, by_ns)) = find_clock_step(builders) else { return };
         for builder in builders.values_mut().chain(others.iter_mut().map(|builder| &mut **builder)) {
-            builder.close_gap(gap.0, gap.1, by_ns, (MAX_BACK_S * 1e9) as u64);
+            builder.close_gap(gap.0, gap.1, by_ns, (MAX_BACK_S * NS_PER_S) as u64);
         }
-        warnings.push(ReadWarning::ClockSet { by_s: by_ns as f64 / 1e9 });
+        warnings.push(ReadWarning::ClockSet { by_s: by_ns as f64 / NS_PER_S });
     }
 }
 
@@ -124,6 +127,6 @@ fn find_clock_step(builders: &BTreeMap<MappedQuantity, SeriesBuilder>) -> Option
         let all: Vec<GapEvidence> =
             builders.values().filter_map(|builder| gap_evidence(builder, gap, interval_s)).collect();
         let set = all.contains(&GapEvidence::Set) && !all.contains(&GapEvidence::Paused);
-        set.then(|| (gap, (gap.1 - gap.0).saturating_sub((interval_s * 1e9).round() as u64)))
+        set.then(|| (gap, (gap.1 - gap.0).saturating_sub((interval_s * NS_PER_S).round() as u64)))
     })
 }

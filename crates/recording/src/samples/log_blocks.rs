@@ -4,9 +4,13 @@ use crate::samples::log_clock::TakeRow;
 use mapper_core::SAMPLE_INTERVAL_S;
 use mapper_numerics::statistics::nearest_rank;
 
-/// Maximum rate of a group that is not averaged, Hz: blocks would have one sample, or alternately one and two.
+/// Rounding of a time, ratio to the sample interval: a sample on a border belongs to the later block. Bound: the last digit of a stored time.
+const BORDER_RATIO: f64 = 1e-6;
+
+/// Maximum rate of a group that is not averaged, Hz. Bound: blocks would have one sample, or alternately one and two.
 const MAX_UNAVERAGED_HZ: f64 = 15.0;
 
+/// Rows from which the rate of a group is estimated. Bound: memory.
 const RATE_ROWS: usize = 256;
 
 /// Number of intervals monitored later: a log may be slow at rest and fast after a trigger.
@@ -108,8 +112,7 @@ impl BlockAverager {
 
 impl Block {
     fn push(&mut self, t_s: f64, values: &[f64], take: &mut TakeRow<'_>) {
-        // A sample on a border belongs to the later block, whatever the last digit of its time.
-        let number = (t_s / SAMPLE_INTERVAL_S + 1e-6).floor() as i64;
+        let number = (t_s / SAMPLE_INTERVAL_S + BORDER_RATIO).floor() as i64;
         if number != self.number {
             self.flush(take);
             self.number = number;

@@ -1,17 +1,18 @@
 //! The clock of a group of rows: isolated wrong times are skipped, and a restarted clock ends the reading.
 
-/// Minimum difference from both neighbours for a wrong time, s.
+/// Minimum difference from both neighbours for a wrong time, s. Bound: a day; a log has no such gap between two rows and back.
 pub(crate) const STRAY_S: f64 = 86_400.0;
 
-/// Maximum valid time, s: a century, within the range of a series' clock.
+/// Maximum valid time, s. Bound: a century, within the range of a series' clock.
 const MAX_TIME_S: f64 = 3.2e9;
 
-/// Maximum number of intervals by which a clock may step back: loggers write some rows out of order.
+/// Maximum number of intervals by which a clock may step back. Bound: loggers write some rows out of order.
 pub(crate) const MAX_BACK_INTERVALS: f64 = 5.0;
 
-/// Maximum step back that is always allowed, s: another clock synchronised it.
+/// Maximum step back that is always allowed, s. Bound: another clock synchronised it.
 pub(crate) const MAX_BACK_S: f64 = 2.0;
 
+/// Recent intervals whose median is the typical one. Bound: memory.
 const KEPT_INTERVALS: usize = 15;
 
 /// A clock that goes back.

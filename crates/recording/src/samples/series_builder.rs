@@ -2,15 +2,16 @@
 
 use crate::ReadWarning;
 use crate::samples::log_clock::{MAX_BACK_INTERVALS, MAX_BACK_S, STRAY_S};
+use mapper_core::unit_factors::NS_PER_S;
 use mapper_core::{Channel, Series};
 
-/// Maximum step back of a clock due to late messages, ns: the same as for logs.
-const MAX_BACK_NS: u64 = (MAX_BACK_S * 1e9) as u64;
+/// Maximum step back of a clock due to late messages, ns. Source: the same as for logs.
+const MAX_BACK_NS: u64 = (MAX_BACK_S * NS_PER_S) as u64;
 
-/// Maximum number of breaks: a file whose times go back more often has another fault than a clock that was set.
+/// Maximum number of breaks. Bound: a file whose times go back more often has another fault than a clock that was set.
 const MAX_BREAKS: usize = 100;
 
-/// Samples before a break whose shortest interval is that of the channel.
+/// Samples before a break whose shortest interval is that of the channel. Bound: a pause before a break does not hide the rate.
 const RECENT_SAMPLES: usize = 6;
 
 /// A place in the file at which the times of a channel go back.
@@ -151,12 +152,12 @@ impl SeriesBuilder {
     /// Times between neighbours, s, where they advance.
     pub(crate) fn intervals_s(&self) -> Vec<f64> {
         let steps = self.times_ns.windows(2).filter_map(|pair| pair[1].checked_sub(pair[0]));
-        steps.filter(|step| *step > 0).map(|step| step as f64 / 1e9).collect()
+        steps.filter(|step| *step > 0).map(|step| step as f64 / NS_PER_S).collect()
     }
 
     /// Neighbours that are more than this apart, ns.
     pub(crate) fn gaps(&self, limit_s: f64) -> impl Iterator<Item = (u64, u64)> {
-        let far = move |pair: &&[u64]| pair[1].saturating_sub(pair[0]) as f64 > limit_s * 1e9;
+        let far = move |pair: &&[u64]| pair[1].saturating_sub(pair[0]) as f64 > limit_s * NS_PER_S;
         self.times_ns.windows(2).filter(far).map(|pair| (pair[0], pair[1]))
     }
 
@@ -165,7 +166,7 @@ impl SeriesBuilder {
         let half_ns = from_ns + to_ns.saturating_sub(from_ns) / 2;
         let next = self.times_ns.windows(2).position(|pair| pair[0] < half_ns && half_ns <= pair[1])? + 1;
         let (edge_ns, start_ns) = (*self.times_ns.get(next - 1)?, *self.times_ns.get(next)?);
-        let seconds = |time_ns: u64, from_ns: u64| (time_ns as i128 - from_ns as i128) as f64 / 1e9;
+        let seconds = |time_ns: u64, from_ns: u64| (time_ns as i128 - from_ns as i128) as f64 / NS_PER_S;
         let of = |range: std::ops::Range<usize>, edge_ns: u64| -> Vec<(f64, f64)> {
             range
                 .filter_map(|at| Some((seconds(*self.times_ns.get(at)?, edge_ns), *self.values.get(at)?)))
@@ -187,7 +188,7 @@ impl SeriesBuilder {
     pub(crate) fn drop_strays(&mut self) -> Option<(u64, u64)> {
         let mut sorted = self.times_ns.clone();
         sorted.sort_unstable();
-        let far = |a: u64, b: u64| a.abs_diff(b) as f64 > STRAY_S * 1e9;
+        let far = |a: u64, b: u64| a.abs_diff(b) as f64 > STRAY_S * NS_PER_S;
         let strays: Vec<u64> = sorted
             .iter()
             .enumerate()
@@ -230,5 +231,5 @@ impl SeriesBuilder {
 
 /// Run time of a log time. Exact to the nanosecond for runs up to 104 days.
 pub(crate) fn run_time_s(time_ns: u64, zero_ns: u64) -> f64 {
-    (time_ns as i128 - zero_ns as i128) as f64 / 1e9
+    (time_ns as i128 - zero_ns as i128) as f64 / NS_PER_S
 }

@@ -5,34 +5,45 @@ use mapper_core::{Channel, JUMPS, Series, StepKind, StepMarker, VALVE_JUMP_RATIO
 use mapper_numerics::statistics::{self, nearest_rank};
 use std::collections::BTreeMap;
 
-/// Time over which means are compared before and after, s.
+/// Share of the largest level below which a signal counts as at rest. Bound: idle is above it.
+const MIN_LEVEL_SHARE: f64 = 0.1;
+
+/// Median absolute value of a standard normal distribution. Source: its quantile at 0.75.
+const MEDIAN_OF_SIZE: f64 = 0.6745;
+
+/// Minimum size of a jump's start in noise of a mean. Bound: by chance once in 16,000 means.
+const START_SIGMAS: f64 = 4.0;
+
+/// Time over which means are compared before and after, s. Bound: noise of a mean over it is below any jump; slower changes are no jumps.
 const WINDOW_S: f64 = 3.0;
 
-/// Time between the two windows, s: long compared with a jump, short compared with a drift.
+/// Time between the two windows, s. Bound: long compared with a jump, short compared with a drift.
 const SEPARATION_S: f64 = 2.0;
 
-/// Shortest interval of the search grid for jumps, s.
+/// Shortest interval of the search grid for jumps, s. Bound: twice the usual sample interval.
 const GRID_S: f64 = 0.2;
 
-/// Maximum number of points of that grid: a day at its shortest interval.
+/// Maximum number of points of that grid. Bound: a day at its shortest interval.
 const MAX_GRID_POINTS: f64 = 5e5;
 
-/// Multiple of the noise of a mean over the grid's interval that a jump must exceed.
+/// Multiple of the noise of a mean over the grid's interval that a jump must exceed. Bound: by chance never exceeded.
 const NOISE_MULTIPLE: f64 = 6.0;
 
-/// Share of a jump that marks its start.
+/// Share of a jump that marks its start. Bound: a sample of the start, far above noise.
 const START_SHARE: f64 = 0.1;
 
-/// Share of the smallest jump per window below which a signal counts as settled again.
+/// Share of the smallest jump per window below which a signal counts as settled again. Bound: what is left of a jump after a window is
+/// smaller.
 const CALM_SHARE: f64 = 0.3;
 
-/// A speed controller goes on correcting for this long after a jump, s, by less than [`SETTLING_SHARE`] of it.
+/// A speed controller goes on correcting for this long after a jump, s, by less than [`SETTLING_SHARE`] of it. Bound: integral times of
+/// stands are some seconds.
 const SETTLING_S: f64 = 15.0;
 
-/// See [`SETTLING_S`].
+/// See [`SETTLING_S`]. Bound: overshoot of a damped controller.
 const SETTLING_SHARE: f64 = 0.2;
 
-/// Shaft speed below which the machine is at rest, rpm: far below any idle, far above any sensor's noise.
+/// Shaft speed below which the machine is at rest, rpm. Bound: far below any idle, far above any sensor's noise.
 const MAX_REST_RPM: f64 = 1000.0;
 
 /// The valve opening, if it was measured.
@@ -227,15 +238,15 @@ impl Signal {
             }))
             .collect();
         let top = values.iter().map(|value| value.abs()).fold(0.0, f64::max);
-        let floor = 0.1 * top;
+        let floor = MIN_LEVEL_SHARE * top;
         // Only while the signal moves, and without steps of 0: for a reading that is constant between its jumps,
         // only the jumps would remain.
         let running = values.windows(2).filter(|pair| pair[0].abs() > floor && pair[1].abs() > floor);
         let mut steps: Vec<f64> = running.map(|pair| (pair[1] - pair[0]).abs()).collect();
         steps.sort_unstable_by(f64::total_cmp);
-        // Of a normal distribution the median of the absolute values is 0.6745 standard deviations; a difference has twice the
-        // variance.
-        let sigma = steps.get(steps.len() / 2).copied().unwrap_or(0.0) / 0.6745 / std::f64::consts::SQRT_2;
+        // A difference has twice the variance.
+        let sigma =
+            steps.get(steps.len() / 2).copied().unwrap_or(0.0) / MEDIAN_OF_SIZE / std::f64::consts::SQRT_2;
         Signal { channel, values, sums, sigma, min_jump_ratio, floor }
     }
 
@@ -253,7 +264,7 @@ impl Signal {
     fn has_begun(&self, place: usize, from: usize, to: usize, after_from: usize, window: usize) -> bool {
         let (before, after) = (self.mean(from, to), self.mean(after_from, after_from + window));
         let jump = after - before;
-        let enough = (START_SHARE * jump.abs()).max(4.0 * self.sigma).min(0.5 * jump.abs());
+        let enough = (START_SHARE * jump.abs()).max(START_SIGMAS * self.sigma).min(0.5 * jump.abs());
         let off = |place: usize| {
             self.values.get(place).is_some_and(|value| (value - before) * jump.signum() > enough)
         };

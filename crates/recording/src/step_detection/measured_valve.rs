@@ -3,12 +3,13 @@
 use mapper_core::{Series, StepMarker};
 use mapper_numerics::statistics::median;
 
-/// Minimum share of samples in which a measured position reverses; commands with points of a minute reverse a tenth as often.
+/// Minimum share of samples in which a measured position reverses. Bound: commands with points of a minute reverse a tenth as often.
 const MIN_REVERSAL_SHARE: f64 = 0.05;
 
+/// Their minimum number. Bound: a campaign of commands has fewer in such a share of its samples.
 const MIN_REVERSALS: usize = 20;
 
-/// Share of the largest opening: if half of the moves are smaller, they are the resolution of a sensor.
+/// Share of the largest opening. Bound: if half of the moves are smaller, they are the resolution of a sensor.
 const SMALL_MOVE_SHARE: f64 = 5e-3;
 
 /// Share of samples in which a command reverses, if the reversals are so frequent or so small that it is a measured position.

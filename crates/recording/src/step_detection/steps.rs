@@ -6,17 +6,21 @@ use mapper_numerics::statistics::median;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
+/// Share of [`MAX_JUMP_GAP_S`] in which a fast jump already changes in proportion. Bound: the fastest rate of a controller lasts longer.
+const FAST_START_SHARE: f64 = 0.25;
+
 /// Maximum time between changes of commands that belong to one jump, s. Pressure and valve change one after the other, and a ramp is a
-/// chain of changes.
+/// chain of changes. Bound: pressure and valve change one after the other, and a ramp is a chain of changes.
 const MAX_JUMP_GAP_S: f64 = 1.0;
 
-/// Relative change below which a command counts as unchanged: the read-back of a constant command varies in its last digits.
+/// Relative change below which a command counts as unchanged. Bound: the read-back of a constant command varies in its last digits.
 const COMMAND_TOLERANCE_RATIO: f64 = 1e-6;
 
-/// Minimum relative change of P3 within [`MAX_JUMP_GAP_S`] that is a jump: a speed controller changes it more slowly.
+/// Minimum relative change of P3 within [`MAX_JUMP_GAP_S`] that is a jump. Bound: a speed controller changes it more slowly.
 const MIN_FAST_RATIO: f64 = 0.01;
 
-/// Minimum relative change of P3 by a chain of slow changes that is a jump of a slow rig. A smaller one is a speed controller's.
+/// Minimum relative change of P3 by a chain of slow changes that is a jump of a slow rig. A smaller one is a speed controller's. Bound: a
+/// smaller one is a speed controller's.
 const MIN_SLOW_RATIO: f64 = 0.02;
 
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -184,7 +188,8 @@ fn jump_of_chain(chain: &[f64], p3_changes: &[Change], valve_changes: &[Change])
         moved_ratio(from_s, from_s + share * MAX_JUMP_GAP_S) > share * MIN_FAST_RATIO
     };
     let fast = chain.iter().copied().find(|t_s| {
-        !within(valve_changes, *t_s, *t_s).is_empty() || fast_over(*t_s, 0.25) && fast_over(*t_s, 1.0)
+        !within(valve_changes, *t_s, *t_s).is_empty()
+            || fast_over(*t_s, FAST_START_SHARE) && fast_over(*t_s, 1.0)
     });
     let slow = (moved_ratio(first_s, last_s) > MIN_SLOW_RATIO).then_some(first_s);
     Some((fast.or(slow)?, last_s))

@@ -7,7 +7,7 @@ use mcap::McapResult;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Times that differ by less are equal, s: the jitter of clocks and threads.
+/// Times that differ by less are equal, s. Bound: the jitter of clocks and threads.
 const TIME_TOLERANCE_S: f64 = 1e-4;
 
 /// Unusual provenance of one reading.

@@ -6,6 +6,7 @@ use crate::writing::recording_file::{McapFile, OpenedFile, RecordingHeader, add_
 use crate::writing::schema::Field;
 use crate::writing::topics::{StepPhase, Topic, event_message, step_message};
 use crate::{BatchError, RecordError};
+use mapper_core::unit_factors::NS_PER_S;
 use mapper_core::{Channel, Event, Group, SampleBatch, StepMarker};
 use mcap::McapResult;
 use mcap::records::MessageHeader;
@@ -209,8 +210,8 @@ impl RecordingWriter {
     }
 
     fn log_time_ns(&self, t_s: f64) -> Result<u64, RecordError> {
-        // The cast saturates, and the limit of 1e9 s keeps sums far from the range of i128.
-        let since_epoch = self.start_time_ns as i128 + (t_s * 1e9).round() as i128;
+        // The cast saturates, and the limit of NS_PER_S s keeps sums far from the range of i128.
+        let since_epoch = self.start_time_ns as i128 + (t_s * NS_PER_S).round() as i128;
         match u64::try_from(since_epoch) {
             Ok(log_time) if t_s.is_finite() => Ok(log_time),
             _ => Err(self.input_error(BatchError::Time { t_s })),

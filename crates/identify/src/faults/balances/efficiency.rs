@@ -46,8 +46,8 @@ impl FittedEfficiencies {
     }
 }
 
-/// `-ln eta` of any compressor: it changes by 0.4 over a speed line and by some 0.1 over the speeds. Judgement, checked by the chi-square of
-/// [`ANY_ROUGHNESS`].
+/// `-ln eta` of any compressor: it changes by 0.4 over a speed line and by some 0.1 over the speeds. Calibrated: by hand, so that the
+/// chi-square of a public measured map is its number of points ([`ANY_ROUGHNESS`]).
 const ANY_MAP: Smooth = Smooth {
     terms: &[
         (0, 0, 1.0),
@@ -66,13 +66,14 @@ const ANY_MAP: Smooth = Smooth {
     amplitude: 0.03,
     lengths: (0.7, 0.5),
 };
-/// Shape of a declared map's error, in units of its tolerance.
+/// Shape of a declared map's error, in units of its tolerance. Bound: errors of a map extend over a third of it: shorter ones are
+/// roughness.
 const DECLARED_MAP: Smooth = Smooth { terms: &[], slow: 0.0, amplitude: 1.0, lengths: (0.7, 0.7) };
 /// Relative error of the heat between gas and housing in eqs. 1-3, one standard deviation. Judgement: the fitted convection law contains most
 /// of the heat.
 const HEAT_RATIO: f64 = 0.05;
 /// Position error of a point along its speed line due to the tolerances of flow map and valve, one standard deviation. Unit: the line's
-/// largest flow and largest PR - 1.
+/// largest flow and largest PR - 1. Bound: the product of flow tolerance and slope of a usual speed line.
 const PLACE_RATIO: f64 = 0.01;
 
 /// `readings`: of all steps, by position.

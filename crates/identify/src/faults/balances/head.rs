@@ -11,8 +11,8 @@ use crate::faults::smooth::{ANY_ROUGHNESS, At, Smooth};
 use mapper_core::ReferenceState;
 use nalgebra::DVector;
 
-/// The curve of any compressor: ln of its distance from the origin over speed and angle. Judgement, checked by the
-/// chi-square of [`ANY_ROUGHNESS`].
+/// The curve of any compressor: ln of its distance from the origin over speed and angle. Calibrated: by hand, so that the chi-square of a
+/// public measured map is its number of points ([`ANY_ROUGHNESS`]).
 const ANY_CURVE: Smooth = Smooth {
     terms: &[
         (0, 0, 3.0),
@@ -33,9 +33,11 @@ const ANY_CURVE: Smooth = Smooth {
     amplitude: 0.02,
     lengths: (0.7, 0.5),
 };
-/// Smooth error of a declared map, in units of its declared tolerance of flow: the remaining error is a common factor.
+/// Smooth error of a declared map, in units of its declared tolerance of flow: the remaining error is a common factor. Bound: errors of a
+/// map extend over a third of it: shorter ones are roughness.
 const DECLARED_HEAD: Smooth = Smooth { terms: &[], slow: 0.0, amplitude: 1.0, lengths: (0.7, 0.7) };
-/// Deviation of the rig from a declared map, ratio: readings at the end of a step that is not fully settled. Judgement: half the usual tolerance of a map, 0.5 %.
+/// Deviation of the rig from a declared map, ratio: readings at the end of a step that is not fully settled. Bound: half the usual
+/// tolerance of a map, 0.5 %.
 pub(crate) const ROUGHNESS: f64 = 2e-3;
 
 pub(crate) fn rows(

@@ -19,13 +19,14 @@ use mapper_core::{Channel, Recording, StepKind, StepMarker, Window, WindowRule};
 use mapper_numerics::statistics::{DOUBT_SIGMAS, MIN_VALUES, mean, rms};
 use mapper_physics::rig::sensor_fault::FaultKind;
 
-/// Length of a part over which the housing's slope is taken, s: noise of 0.15 K at 10 Hz leaves 0.002 K/s, and a step of a minute has three.
+/// Length of a part over which the housing's slope is taken, s. Bound: noise of 0.15 K at 10 Hz leaves 0.002 K/s, and a step of a minute
+/// has three.
 const PART_S: f64 = 18.0;
-/// Closure error of a balance, W.
+/// Closure error of a balance, W. Judgement: a tenth of the heat that a hot housing exchanges.
 const CLOSURE_ERROR_W: f64 = 10.0;
-/// Difference of T2 and Tc in a housing with more than one temperature, one standard deviation, K: 1 K is three of it.
+/// Difference of T2 and Tc in a housing with more than one temperature, one standard deviation, K. Bound: 1 K is three of it.
 const UNEVEN_K: f64 = 0.35;
-/// The same for the part that develops over the run as it warms up, K: a housing of two walls makes up to 3 K.
+/// The same for the part that develops over the run as it warms up, K. Bound: a housing of two walls makes up to 3 K.
 const UNEVEN_DRIFT_K: f64 = 1.0;
 
 /// A part of a step.

@@ -11,14 +11,17 @@ use mapper_observe::perturbation::UNINFORMATIVE;
 use mapper_physics::laws::orifice;
 use nalgebra::DMatrix;
 
-/// Difference between the pressure behind the valve, which is not measured, and the inlet pressure, one standard deviation, Pa. Judgement:
+/// Difference of two openings that are the same command. Bound: the rounding of a logged command in per cent.
+const SAME_OPENING: f64 = 1e-6;
+
+/// Difference between the pressure behind the valve, which is not measured, and the inlet pressure, one standard deviation, Pa. Bound:
 /// filters, silencers and exhaust lines have some hundred.
 const BEHIND_PA: f64 = 300.0;
-/// Variation of a valve's discharge coefficient with the pressure ratio, one standard deviation, and the difference of the logarithm over
-/// which it varies. Judgement.
+/// Variation of a valve's discharge coefficient with the pressure ratio, one standard deviation. Judgement: usual valves vary by some per cent.
 const DISCHARGE_RATIO: f64 = 0.02;
+/// Difference of the logarithm of the pressure ratio over which it varies. Judgement: half a speed line.
 const DISCHARGE_LENGTH: f64 = 0.5;
-/// Repeatability of a valve's area, one standard deviation. Judgement: a positioner resolves some tenths of a per cent of the travel.
+/// Repeatability of a valve's area, one standard deviation. Bound: a positioner resolves some tenths of a per cent of the travel.
 const SET_AGAIN_RATIO: f64 = 0.005;
 
 pub(crate) fn rows(
@@ -58,7 +61,7 @@ pub(crate) fn rows(
             openings.iter().map(|opening| (opening * whole).ln()).collect()
         }
         None => {
-            let same = |i: usize, j: usize| (openings[i] - openings[j]).abs() < 1e-6;
+            let same = |i: usize, j: usize| (openings[i] - openings[j]).abs() < SAME_OPENING;
             covariance += discharge;
             let any = UNINFORMATIVE * SET_AGAIN_RATIO;
             covariance += DMatrix::from_fn(count, count, |i, j| if same(i, j) { any * any } else { 0.0 });

@@ -15,7 +15,7 @@ use mapper_inference::interval::COVERAGE;
 use mapper_numerics::statistics::{HINT_SIGMAS, mean};
 use nalgebra::DMatrix;
 
-/// Maximum ratio of the distance to its linear estimate: beyond it the linearisation is not valid.
+/// Maximum ratio of the distance to its linear estimate. Bound: beyond it the linearisation is not valid.
 const MAX_NONLINEARITY: f64 = 2.0;
 
 /// Degree to which h before the wheel follows the inlet's own law.

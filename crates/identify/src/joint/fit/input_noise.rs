@@ -20,9 +20,10 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
-/// Diameters at which it is computed, mm; the spline between them uses the square.
+/// Diameters at which it is computed, mm; the spline between them uses the square. Bound: the error of the spline is below that of the
+/// draws.
 const DIAMETERS_MM: [f64; 10] = [0.0, 0.25, 0.5, 0.8, 1.2, 1.7, 2.3, 3.2, 4.5, 7.0];
-/// Noise samples per step: the scatter of their mean adds a sixteenth to that of the recording's own noise.
+/// Noise samples per step. Bound: the scatter of their mean adds a sixteenth to that of the recording's own noise.
 const DRAWS: usize = 16;
 
 /// Computes it at the current parameters; `None` without a fitted probe or declared noise.

@@ -14,6 +14,9 @@ use mapper_numerics::least_squares::{Arrow, ArrowBlock, Damping, DampingRule, MA
 use mapper_numerics::parallel;
 use nalgebra::{DMatrix, DVector, Matrix4, Matrix4xX, Vector4};
 
+/// Relative rounding error of the cost. Bound: some tens of roundings of f64.
+const COST_ROUNDING: f64 = 1e-14;
+
 /// One step in the fit.
 #[derive(Debug, Clone)]
 pub(crate) struct Member<'a> {
@@ -321,7 +324,7 @@ impl Problem<'_> {
                     .map(|(member, change)| std::array::from_fn(|i| member.local[i] + change[i]))
                     .collect();
                 let cost = self.cost(&shared, &locals);
-                (cost <= best * (1.0 + 1e-14)).then_some((shared, locals, cost))
+                (cost <= best * (1.0 + COST_ROUNDING)).then_some((shared, locals, cost))
             };
             let Some((shared, locals, cost)) = damping.search(trial) else { break };
             // A parameter on its bound stays there while the others are fitted.

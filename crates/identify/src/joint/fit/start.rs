@@ -4,6 +4,7 @@ use crate::faults::smooth::ANY_ROUGHNESS;
 use crate::joint::fit::inlet;
 use crate::joint::fit::input_noise_spline::InputNoiseSpline;
 use crate::joint::fit::solve::{Member, Problem};
+use crate::joint::step_model::model::reynolds;
 use crate::joint::step_model::model::{Setting, StepHistory};
 use crate::joint::step_model::parameters::{
     ALPHA, BAROMETER, BENDS, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, GAIN_CHANNELS, GAINS, HUMIDITY, INLET,
@@ -20,31 +21,62 @@ use crate::step_data::samples::{Row, Samples};
 use crate::step_data::window;
 use crate::step_outcome::findings::Findings;
 use crate::{IdentifyConfig, WindowRule, step_data::commands};
+use mapper_core::unit_factors::MM_PER_M;
 use mapper_core::{Channel, Choice, Recording, TooFew, Warning, Window};
 use mapper_numerics::coloured_noise::{BlockNoise, WhiteningFilter};
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::{DOUBT_SIGMAS, mean};
 use mapper_observe::declared::usual_noise_sigma;
-use mapper_physics::gas::air;
 use nalgebra::DVector;
+
+/// Prior of ln of the Nusselt coefficient about that of Appendix A, one standard deviation. Bound: a factor of 20 either way, more than
+/// correlations of pipes, bends and volutes differ.
+const LN_COEFFICIENT_SIGMA: f64 = 3.0;
+/// Prior of the Reynolds number's exponent. Source: 0.8 for turbulent pipes (Dittus and Boelter), 1.13 in Appendix A of the paper.
+const EXPONENT_MEAN: f64 = 0.9;
+/// Its standard deviation. Bound: from laminar, 0.3, to proportional to flow and above, 1.4.
+const EXPONENT_SIGMA: f64 = 0.5;
+/// Minimum start value of the square of a fitted probe's diameter, mm2. Bound: a start value only; at 0 the derivative would vanish.
+const START_PROBE_MM2: f64 = 0.5;
+/// Efficiencies of single steps that count for the start value. Bound: those of compressors, choke included.
+const START_ETAS: std::ops::Range<f64> = 0.2..0.95;
+/// Start value of the efficiency if no step gives one. Bound: a start value only; mean of compressor maps.
+const USUAL_ETA: f64 = 0.65;
+/// Range of a step's start value. Bound: a start value only.
+const START_CLAMP_ETA: (f64, f64) = (0.3, 0.9);
+/// Spread of h about the law before the recording determines it. Bound: a start value only, three times [`LAW_SIGMA`].
+const START_DEVIATION_SIGMA: f64 = 0.01;
+/// Error of the first reading as the state of the probe, K, one standard deviation. Bound: above any lag after the first seconds.
+const FIRST_READING_SIGMA_K: f64 = 5.0;
+/// Error of the surface's slope within a step, ratio, one standard deviation. Judgement: surfaces through a few points bend differently from maps.
+const SLOPE_SIGMA: f64 = 0.05;
+/// Step of the logarithm of the spreads that are tried. Bound: spreads a tenth apart give the same weights to the points.
+const SPREAD_STEP_LN: f64 = 0.1;
+/// Parameters of a step that its residual determines. Source: degrees of freedom: efficiency, first reading and h.
+const FITTED_PER_STEP: f64 = 3.0;
+/// Minimum noise of a block mean, K. Bound: rounding of readings to 0.001 K.
+const MIN_NOISE_K: f64 = 3e-4;
+/// Minimum share of white noise in the noise of a step. Bound: keeps the whitening regular.
+const MIN_WHITE_RATIO: f64 = 0.1;
 
 /// Start of the used part of a step after the last command change without noise, s: h and efficiency are modelled while the operating point
 /// settles, and the first seconds only show where the surface is wrong.
 pub(crate) const START_S: f64 = SHORTEST_HALF_S;
-/// The same with noise, s. Noise can look like a slow probe but for the seconds right after the jump, where the two differ by tens of kelvin.
-/// Inputs are smoothed over 3 s at first: starting at 1.5 s made a probe of 0.7 mm 0.026 mm too small, from 2 s on it is within its error
-/// (mean of 20 seeds).
+/// The same with noise, s. Noise can look like a slow probe but for the seconds right after the jump, where the two differ by tens of
+/// kelvin. Calibrated: `benches/identification.py`. Inputs are smoothed over 3 s at first: starting at 1.5 s made a probe of 0.7 mm 0.026
+/// mm too small, from 2 s on it is within its error (mean of 20 seeds).
 pub(crate) const START_WITH_NOISE_S: f64 = 2.0;
-/// Expected spread of the points' efficiencies about the surface, fraction: maps are not polynomials. The recordings of
-/// `benches/identification.py` have 0.0006, those of a machine with a map that drops steeply at choke 0.005.
+/// Expected spread of the points' efficiencies about the surface, fraction: maps are not polynomials. Calibrated:
+/// `benches/identification.py`, 0.0006; a machine with a map that drops steeply at choke has 0.005.
 pub(crate) const SURFACE_SIGMA: f64 = 1e-3;
-/// Relative error of the surface's effect on a prediction: surfaces through a few points bend differently from maps.
+/// Relative error of the surface's effect on a prediction. Judgement: surfaces
+/// through a few points bend differently from maps.
 const SHAPE_ERROR_RATIO: f64 = 0.03;
-/// Expected spread of the points' h about the law, ratio. The recordings of `benches/identification.py` have 0.0022 to 0.003.
+/// Expected spread of the points' h about the law, ratio. Calibrated: `benches/identification.py`, 0.0022 to 0.003.
 pub(crate) const LAW_SIGMA: f64 = 3e-3;
-/// Weight of the expected spread, in points: small next to the dozens of points of a campaign, sufficient without any.
+/// Weight of the expected spread, in points. Bound: small next to the dozens of points of a campaign, sufficient without any.
 const PRIOR_WEIGHT: f64 = 4.0;
-/// Logarithms, in tenths, of the spreads that are tried over the expected one: from a thirtieth to thirty times.
+/// Logarithms, in tenths, of the spreads that are tried over the expected one. Bound: from a thirtieth to thirty times.
 const SPREAD_RATIOS_LN: std::ops::RangeInclusive<i32> = -34..=34;
 
 /// Condenses every step that has a window with enough samples.
@@ -117,11 +149,7 @@ pub(crate) fn problem<'a>(
     let places: Vec<(f64, f64)> = steps.iter().map(|step| step.end.place).collect();
     let scale = SurfaceScale::of(&places)?;
     let choice = &config.joint;
-    let reynolds = |step: &StepRows| {
-        let bulk_k = step.end.t2_k;
-        4.0 * step.end.flow_kg_s
-            / (std::f64::consts::PI * config.outlet_diameter_m * air::viscosity_pa_s(bulk_k))
-    };
+    let reynolds = |step: &StepRows| reynolds(step.end.flow_kg_s, config.outlet_diameter_m, step.end.t2_k);
     let ln_reference = steps.iter().map(|step| reynolds(step).ln()).sum::<f64>() / steps.len() as f64;
     let setting = Setting {
         rest_pressure_pa: config.rest_pressure_pa,
@@ -137,20 +165,20 @@ pub(crate) fn problem<'a>(
     let mut shared = [0.0; SHARED];
     let mut active = [false; SHARED];
     let mut lowest = [f64::NEG_INFINITY; SHARED];
-    // The law of a turbocharger may differ much from Appendix A, but not by orders of magnitude.
     let law = mapper_physics::machine::params::Params::default().compressor;
     shared[EXPONENT] = law.nusselt_exponent;
     shared[LN_COEFFICIENT] = law.nusselt_coefficient.ln() + law.nusselt_exponent * ln_reference;
-    priors[LN_COEFFICIENT] = Prior { mean: shared[LN_COEFFICIENT], sigma: 3.0 };
-    priors[EXPONENT] = Prior { mean: 0.9, sigma: 0.5 };
+    priors[LN_COEFFICIENT] = Prior { mean: shared[LN_COEFFICIENT], sigma: LN_COEFFICIENT_SIGMA };
+    priors[EXPONENT] = Prior { mean: EXPONENT_MEAN, sigma: EXPONENT_SIGMA };
     active[LN_COEFFICIENT] = true;
     active[EXPONENT] = true;
     REFINEMENTS.into_iter().for_each(|(index, sigma, ..)| priors[index].sigma = sigma);
     shared[ALPHA] = config.alpha_area_ratio;
     priors[ALPHA].mean = config.alpha_area_ratio;
     active[ALPHA] = choice.alpha_area == Choice::Fitted;
-    let probe_mm2 = (1e3 * config.probe_diameter_m).powi(2);
-    shared[PROBE_MM2] = if choice.probe == Choice::Fitted { probe_mm2.max(0.5) } else { probe_mm2 };
+    let probe_mm2 = (MM_PER_M * config.probe_diameter_m).powi(2);
+    shared[PROBE_MM2] =
+        if choice.probe == Choice::Fitted { probe_mm2.max(START_PROBE_MM2) } else { probe_mm2 };
     priors[PROBE_MM2].mean = probe_mm2;
     active[PROBE_MM2] = choice.probe == Choice::Fitted;
     lowest[PROBE_MM2] = 0.0;
@@ -177,9 +205,9 @@ pub(crate) fn problem<'a>(
     let etas: Vec<f64> = steps
         .iter()
         .filter_map(|step| alone.get(step.position)?.eta.map(|(eta, _)| eta))
-        .filter(|eta| (0.2..0.95).contains(eta))
+        .filter(|eta| START_ETAS.contains(eta))
         .collect();
-    let mean_eta = mean(&etas).unwrap_or(0.65);
+    let mean_eta = mean(&etas).unwrap_or(USUAL_ETA);
     shared[SURFACE] = mean_eta;
     for (k, sigma) in SurfaceScale::prior_sigmas().into_iter().enumerate() {
         priors[SURFACE + k] = Prior { mean: shared[SURFACE + k], sigma };
@@ -221,16 +249,19 @@ pub(crate) fn member<'a>(
             std::array::from_fn::<f64, TERM_COUNT, _>(|k| here[k] - end_terms[k])
         })
         .collect();
-    let eta = found.and_then(|found| found.eta).map_or(mean_eta, |(eta, _)| eta).clamp(0.3, 0.9);
+    let eta = found
+        .and_then(|found| found.eta)
+        .map_or(mean_eta, |(eta, _)| eta)
+        .clamp(START_CLAMP_ETA.0, START_CLAMP_ETA.1);
     let first_k = step.rows.first().map_or(step.end.t2_k, |row| row.t2_k);
     let mut local = [0.0; LOCAL];
     let mut own = [free; LOCAL];
     local[ETA] = eta;
-    own[LN_DEVIATION] = Prior { mean: 0.0, sigma: 0.01 };
+    own[LN_DEVIATION] = Prior { mean: 0.0, sigma: START_DEVIATION_SIGMA };
     local[FIRST_READING] = first_k;
-    own[FIRST_READING] = Prior { mean: first_k, sigma: 5.0 };
+    own[FIRST_READING] = Prior { mean: first_k, sigma: FIRST_READING_SIGMA_K };
     local[SLOPE] = 1.0;
-    own[SLOPE] = Prior { mean: 1.0, sigma: 0.05 };
+    own[SLOPE] = Prior { mean: 1.0, sigma: SLOPE_SIGMA };
     // Refined from the residual.
     let noise_k = usual_noise_sigma(Channel::T2);
     Member {
@@ -313,7 +344,7 @@ fn spread(posteriors: &[(f64, f64)], under_sigma: f64, expected: f64) -> f64 {
     };
     // Bad steps give the density several maxima.
     SPREAD_RATIOS_LN
-        .map(|tenths| expected * (0.1 * f64::from(tenths)).exp())
+        .map(|tenths| expected * (SPREAD_STEP_LN * f64::from(tenths)).exp())
         .max_by(|a, b| ln_density(*a).total_cmp(&ln_density(*b)))
         .unwrap_or(expected)
 }
@@ -332,20 +363,20 @@ pub(crate) fn set_weights(problem: &mut Problem<'_>, steps: &[StepRows], config:
         let member = &problem.members[i];
         let slopes = problem.setting.sensitivities(&step.end, &problem.shared, &member.local);
         let expected: f64 = slopes.iter().zip(&declared).map(|(slope, sigma)| (slope * sigma).powi(2)).sum();
-        // Without a declaration the residual gives the noise; 0.3 mK is the error of block means.
+        // Without a declaration the residual gives the noise.
         let sigma_k = if expected > 0.0 {
             expected.sqrt()
         } else {
             let predicted_k = problem.setting.predict_t2_k(&member.history, &problem.shared, &member.local);
             let square: f64 =
                 member.measured_k.iter().zip(&predicted_k).skip(1).map(|(a, b)| (a - b).powi(2)).sum();
-            (square / (member.measured_k.len() as f64 - 3.0).max(1.0)).sqrt().max(3e-4)
+            (square / (member.measured_k.len() as f64 - FITTED_PER_STEP).max(1.0)).sqrt().max(MIN_NOISE_K)
         };
         let by_eta = problem.setting.by_efficiency(&step.end, &problem.shared, &member.local);
         if let Some(coupled) = coupled(&slopes, by_eta) {
             problem.members[i].coupling[BENDS..].copy_from_slice(&coupled);
         }
-        let white_sigma_k = if expected > 0.0 { declared[1].max(0.1 * sigma_k) } else { sigma_k };
+        let white_sigma_k = if expected > 0.0 { declared[1].max(MIN_WHITE_RATIO * sigma_k) } else { sigma_k };
         let terms = &problem.members[i].history.terms;
         let surface = crate::joint::step_model::model::surface_of(&problem.shared);
         let shape_k = |row: usize| terms.get(row).map_or(0.0, |terms| by_eta * dot(terms, surface));

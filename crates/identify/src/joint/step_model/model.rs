@@ -7,6 +7,7 @@ use crate::joint::step_model::parameters::{
 use crate::joint::step_model::rows::Row;
 use crate::joint::step_model::surface::{TERM_COUNT, dot};
 use crate::single_step::probe::{self, Lag, follow};
+use mapper_core::unit_factors::M_PER_MM;
 use mapper_numerics::SLOPE_STEP;
 use mapper_physics::gas::air::{self, Air};
 use mapper_physics::laws::compression::{
@@ -16,6 +17,18 @@ use mapper_physics::laws::compression::{
 use mapper_physics::laws::inlet_convection::InletLaw;
 use mapper_physics::laws::nusselt;
 use mapper_physics::rig::sensor_fault::CALIBRATED_AT_K;
+
+/// Minimum efficiency of the model. Bound: keeps the temperature rise finite while a fit searches.
+const MIN_ETA: f64 = 0.02;
+/// Step of the derivative by the square of the probe's diameter, relative. Bound: between rounding and curvature.
+const PROBE_STEP_RATIO: f64 = 1e-4;
+/// Minimum square to which it relates, mm2. Bound: keeps the step above rounding at an ideal probe.
+const MIN_PROBE_STEP_MM2: f64 = 0.1;
+
+/// Reynolds number of a pipe.
+pub(crate) fn reynolds(flow_kg_s: f64, diameter_m: f64, bulk_k: f64) -> f64 {
+    4.0 * flow_kg_s / (std::f64::consts::PI * diameter_m * air::viscosity_pa_s(bulk_k))
+}
 
 /// Settings common to all steps.
 #[derive(Debug, Clone, Copy)]
@@ -176,7 +189,7 @@ impl Setting {
     }
 
     fn reynolds(&self, flow_kg_s: f64, bulk_k: f64) -> f64 {
-        4.0 * flow_kg_s / (std::f64::consts::PI * self.outlet_diameter_m * air::viscosity_pa_s(bulk_k))
+        reynolds(flow_kg_s, self.outlet_diameter_m, bulk_k)
     }
 
     fn gas(&self, row: &Row, terms: &[f64; TERM_COUNT], shared: &SharedVector, local: &LocalVector) -> Gas {
@@ -193,7 +206,7 @@ impl Setting {
             flow_kg_s: row.flow_kg_s / (1.0 + shared[FLOW_GAIN]),
             rise_ratio: isentropic_rise_ratio(pressure_ratio, t1_k, air),
             air,
-            eta: (local[ETA] + slope).max(0.02),
+            eta: (local[ETA] + slope).max(MIN_ETA),
         }
     }
 
@@ -369,7 +382,7 @@ impl Setting {
 
     /// Lag of the probe from row to row, for the square of its diameter.
     pub(crate) fn lags(&self, rows: &[Row], gas_k: &[f64], square_mm2: f64) -> Vec<Lag> {
-        let diameter_m = 1e-3 * square_mm2.max(0.0).sqrt();
+        let diameter_m = M_PER_MM * square_mm2.max(0.0).sqrt();
         let rows = rows.iter().zip(gas_k).map(|(row, gas_k)| (row.t_s, row.flow_kg_s, *gas_k));
         probe::lags(rows, diameter_m, self.outlet_diameter_m)
     }
@@ -405,7 +418,7 @@ impl Setting {
             let zeros = vec![0.0; gas_k.len()];
             columns[SHARED + FIRST_READING] = follow(&lags, 1.0, &zeros);
             if active[PROBE_MM2] {
-                let step = 1e-4 * shared[PROBE_MM2].max(0.1);
+                let step = PROBE_STEP_RATIO * shared[PROBE_MM2].max(MIN_PROBE_STEP_MM2);
                 let moved = follow(&lags_at(shared[PROBE_MM2] + step), first_k, &gas_k);
                 columns[PROBE_MM2] = moved.iter().zip(&readings).map(|(a, b)| (a - b) / step).collect();
             }

@@ -75,12 +75,12 @@ impl Prior {
     }
 }
 
-/// Each parameter with a prior about its declared value: standard deviation of the prior under which it is fitted (wide), standard deviation
-/// of its slab in the mixture, and the change that small model errors can cause. Compressors have 0 to 0.3 of their area before the wheel.
-/// Probes of 0.5 to 3 mm are sold, and half a millimetre is a sheathed thermocouple. Heated and cooled boundary layers differ by up to a third
-/// (Gnielinski's (Pr/Pr_w)^0.11 and (T/T_w)^0.45 between 300 and 600 K). A change of alpha_A by its model error moves an efficiency by a quarter
-/// of a point, as do the offsets; `benches/identification.py` calibrates it: with 0.025 the error at an undeclared alpha_A of 0.05 is 2.1
-/// points instead of 0.4.
+/// Each parameter with a prior about its declared value: standard deviation of the prior under which it is fitted (wide), standard
+/// deviation of its slab in the mixture, and the change that small model errors can cause. Compressors have 0 to 0.3 of their area before
+/// the wheel. Probes of 0.5 to 3 mm are sold, and half a millimetre is a sheathed thermocouple. Heated and cooled boundary layers differ
+/// by up to a third (Gnielinski's (Pr/Pr_w)^0.11 and (T/T_w)^0.45 between 300 and 600 K). A change of alpha_A by its model error moves an
+/// efficiency by a quarter of a point, as do the offsets. Calibrated: `benches/identification.py`; with 0.025 the error at an undeclared
+/// alpha_A of 0.05 is 2.1 points instead of 0.4.
 pub(crate) const REFINEMENTS: [(Place, f64, f64, f64); 3] =
     [(ALPHA, 0.3, 0.1, 0.005), (PROBE_MM2, 10.0, 2.0, 0.1), (LN_DIRECTION, 0.5, 0.2, 0.015)];
 

@@ -9,11 +9,14 @@ use mapper_core::{Channel, Recording, Window};
 use mapper_numerics::coloured_noise::BlockNoise;
 use mapper_numerics::statistics::mean;
 
-/// Length of the blocks over which samples are averaged before the fit, s: a quarter of the correlation time of sensor noise, and far below
-/// any time scale in a window.
+/// Rounding error of the time of a sample, s. Source: recordings store nanoseconds; half of one.
+pub(crate) const TIME_ROUNDING_S: f64 = 5e-10;
+
+/// Length of the blocks over which samples are averaged before the fit, s. Bound: a quarter of the correlation time of sensor noise, and
+/// far below any time scale in a window.
 pub const BLOCK_S: f64 = 0.5;
-/// Factor on this length for noisy data from [`FOLLOWED_S`] after the first sample on, and in a forecast: it costs a few percent of the
-/// information. Without noise it would cost a thousandth of alpha_A behind a slow probe.
+/// Factor on this length for noisy data from [`FOLLOWED_S`] after the first sample on, and in a forecast. Bound: it costs a few percent
+/// of the information. Without noise it would cost a thousandth of alpha_A behind a slow probe.
 pub(crate) const COARSER: f64 = 2.0;
 
 /// Means over one block.
@@ -56,8 +59,8 @@ pub(crate) fn condensed(
     while start < samples.len() {
         let start_s = samples.rows[start].t_s;
         let block_s = block_s_after(start_s - samples.rows[0].t_s, config);
-        // Half a nanosecond: times of samples are rounded.
-        let end = samples.rows.partition_point(|row| row.t_s < start_s + block_s - 5e-10).max(start + 1);
+        let end =
+            samples.rows.partition_point(|row| row.t_s < start_s + block_s - TIME_ROUNDING_S).max(start + 1);
         let of =
             |of: fn(&samples::Row) -> f64| mean(samples.rows[start..end].iter().map(of)).unwrap_or(f64::NAN);
         let t_s = of(|row| row.t_s);

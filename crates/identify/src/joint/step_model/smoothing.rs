@@ -7,9 +7,10 @@
 use mapper_numerics::statistics::MIN_VALUES;
 use nalgebra::{Matrix4, Vector4};
 
-/// Half the width of the local cubic fit, s.
+/// Half the width of the local cubic fit, s. Bound: far below the time constants of housings, far above the correlation time of sensor
+/// noise.
 const HALF_S: f64 = 10.0;
-/// Half the width of the local fit at the first row, s.
+/// Half the width of the local fit at the first row, s. Bound: long enough for a cubic through noisy readings.
 pub(crate) const SHORTEST_HALF_S: f64 = 3.0;
 
 /// For each row, the neighbouring rows and their weights in a local cubic.

@@ -7,8 +7,15 @@
 
 use mapper_numerics::statistics::range;
 
-/// Powers of u and v of each term but the last, lowest first, with the prior standard deviation of its coefficient. Maps bend, but less at
-/// higher order (efficiency varies by some 0.3 over a map, |u|, |v| <= 1).
+/// Minimum speed, ratio to the middle one. Bound: keeps the reduced flow of a machine at rest finite.
+const MIN_SPEED_RATIO: f64 = 1e-3;
+/// Minimum range of the points, ratio to its middle. Bound: a single point has a range too.
+const MIN_RANGE_RATIO: f64 = 0.1;
+/// Minimum variance of ln speed for a slope over it. Bound: speeds within 1 % do not determine one.
+const MIN_LN_SPEED_VARIANCE: f64 = 1e-4;
+
+/// Powers of u and v of each term but the last, lowest first, with the prior standard deviation of its coefficient. Judgement: maps bend,
+/// but less at higher order (efficiency varies by some 0.3 over a map, |u|, |v| <= 1).
 const POWERS: [(i32, i32, f64); TERM_COUNT - 1] = [
     (0, 0, 1.0),
     (1, 0, 0.3),
@@ -22,10 +29,11 @@ const POWERS: [(i32, i32, f64); TERM_COUNT - 1] = [
     (0, 3, 0.05),
     (2, 2, 0.05),
 ];
-/// Additional loss of efficiency at small Reynolds numbers and by leakage, fraction: one standard deviation of the last term, which multiplies
-/// [`SurfaceScale::slowness`]. Published maps fall by 2 to 10 points from their peak to a third of full speed, where it is about 3.
+/// Additional loss of efficiency at small Reynolds numbers and by leakage, fraction: one standard deviation of the last term, which
+/// multiplies [`SurfaceScale::slowness`]. Source: published maps fall by 2 to 10 points from their peak to a third of full speed, where
+/// it is about 3.
 pub(crate) const SLOW_LOSS: f64 = 1e-2;
-/// Number of coefficients.
+/// Number of coefficients. Source: the terms of [`POWERS`] and the loss at low speed.
 pub(crate) const TERM_COUNT: usize = 12;
 
 /// Position and scale of the surface on the map.
@@ -60,7 +68,8 @@ impl SurfaceScale {
     /// Speed and flow scaled to the points, -1 to 1.
     pub(crate) fn coordinates(&self, (speed_rpm, flow_kg_s): Place) -> (f64, f64) {
         let u = (speed_rpm - self.speed_middle_rpm) / self.speed_half_range_rpm;
-        let reduced = flow_kg_s / (speed_rpm / self.speed_middle_rpm).max(1e-3).powf(self.flow_exponent);
+        let reduced =
+            flow_kg_s / (speed_rpm / self.speed_middle_rpm).max(MIN_SPEED_RATIO).powf(self.flow_exponent);
         (u, (reduced - self.middle) / self.half_range)
     }
 
@@ -85,7 +94,7 @@ impl SurfaceScale {
 pub(crate) fn middle_and_half_range(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let (low, high) = range(values);
     let middle = 0.5 * (low + high);
-    (middle, (0.5 * (high - low)).max(0.05 * middle))
+    (middle, (0.5 * (high - low)).max(0.5 * MIN_RANGE_RATIO * middle))
 }
 
 /// Slope of ln flow over ln speed; 1 if the points do not determine one.
@@ -101,7 +110,7 @@ fn exponent(places: &[Place]) -> f64 {
         xx += (speed.ln() - x).powi(2);
         xy += (speed.ln() - x) * (flow.ln() - y);
     }
-    if xx > 1e-4 * n { (xy / xx).clamp(0.5, 2.0) } else { 1.0 }
+    if xx > MIN_LN_SPEED_VARIANCE * n { (xy / xx).clamp(0.5, 2.0) } else { 1.0 }
 }
 
 fn with_last(first: [f64; TERM_COUNT - 1], last: f64) -> [f64; TERM_COUNT] {

@@ -7,6 +7,9 @@ use crate::joint::step_model::parameters::{
 use crate::joint::step_model::rows::StepRows;
 use nalgebra::DVector;
 
+/// Step of the derivative of h by an offset, in prior standard deviations. Bound: the law is nearly linear over it.
+const STEP_SIGMAS: f64 = 0.1;
+
 /// A quantity that depends on the parameters: its covariance with every point's efficiency, its variance, and its covariances with the shared
 /// parameters.
 pub(crate) struct Quantity {
@@ -97,7 +100,7 @@ pub(crate) fn quantities(
             weights[EXPONENT] = ln_re;
             // The convection law is evaluated at the readings, so a flow error is an error of h.
             for index in covariance.fitted.iter().copied().filter(|index| is_offset(*index)) {
-                let step = 0.1 * problem.priors[index].sigma;
+                let step = STEP_SIGMAS * problem.priors[index].sigma;
                 let mut moved = problem.shared;
                 moved[index] += step;
                 weights[index] = (at(&moved).0 / h_w_m2k).ln() / step;

@@ -24,11 +24,16 @@ use mapper_numerics::parallel;
 use mapper_numerics::statistics::{EXCLUDE_SIGMAS, mean, median};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// Standard deviations of the efficiencies about their mean, fraction: the range of compressor maps along a valve opening and across.
+/// Additional variance of a point that is not used. Bound: a million times that of any efficiency.
+const UNUSED_VARIANCE: f64 = 1e4;
+
+/// Standard deviations of the efficiencies about their mean, fraction. Bound: the range of compressor maps along a valve opening and
+/// across.
 const AMPLITUDES: [f64; 3] = [0.05, 0.1, 0.2];
-/// Correlation lengths of efficiency over speed, in halves of the range of the points.
+/// Correlation lengths of efficiency over speed, in halves of the range of the points. Bound: the data choose among them; shorter ones
+/// are roughness, longer ones a plane.
 const SPEED_LENGTHS: [f64; 4] = [0.7, 1.0, 1.4, 2.0];
-/// The same over flow at equal speed.
+/// The same over flow at equal speed. Bound: the data choose among them.
 const FLOW_LENGTHS: [f64; 5] = [0.35, 0.5, 0.7, 1.0, 2.0];
 /// Deviation from any smooth function, fraction: of machines in simulation, and of a measured map.
 const ROUGHNESSES: [f64; 2] = [SURFACE_SIGMA, ANY_ROUGHNESS];
@@ -438,7 +443,8 @@ fn matrix(
         let (i, j) = (points[row], points[column]);
         let ((u, v, slow), (other_u, other_v, other_slow)) = (coordinates[i], coordinates[j]);
         let (by_speed, by_flow) = ((u - other_u) / speed_length, (v - other_v) / flow_length);
-        let own = if i == j { roughness * roughness + if used[i] { 0.0 } else { 1e4 } } else { 0.0 };
+        let own =
+            if i == j { roughness * roughness + if used[i] { 0.0 } else { UNUSED_VARIANCE } } else { 0.0 };
         0.5 * (etas[i].by_eta[j] + etas[j].by_eta[i])
             + amplitude * amplitude * (-0.5 * (by_speed * by_speed + by_flow * by_flow)).exp()
             // It cannot be distinguished from an offset.

@@ -1,7 +1,9 @@
 //! Standard errors of the places of a line.
 
+use crate::map_fit::least_squares::problem::PARAMETER_STEP;
 use crate::map_fit::least_squares::solution::Solution;
 use crate::map_fit::speed_lines::line_shape::{FlowFrame, LineShape, PARAMETERS, Parameters, WORK};
+use crate::map_fit::speed_lines::nearest::{DIFFERENCE_STEP_RAD, MIN_SQUARE_SLOPE};
 use crate::map_fit::speed_lines::nearest::{Scales, normal};
 use nalgebra::{DMatrix, DVector};
 
@@ -38,16 +40,15 @@ impl LineErrors {
 
     /// Errors at an angle of the line, rad.
     pub(crate) fn at(&self, angle_rad: f64, scales: Scales) -> PlaceError {
-        const STEP: f64 = 1e-5;
         let at = |shape: &LineShape, angle: f64| {
             let place = shape.physical(angle, self.speed_ratio);
             [place.flow_kg_s / scales.flow_kg_s, place.pressure_ratio / scales.ratio, place.eta]
         };
         let shape = LineShape::new(&self.parameters, self.frame);
-        let (here, next) = (at(&shape, angle_rad), at(&shape, angle_rad + STEP));
-        let slope: [f64; 3] = std::array::from_fn(|i| (next[i] - here[i]) / STEP);
+        let (here, next) = (at(&shape, angle_rad), at(&shape, angle_rad + DIFFERENCE_STEP_RAD));
+        let slope: [f64; 3] = std::array::from_fn(|i| (next[i] - here[i]) / DIFFERENCE_STEP_RAD);
         let (nx, ny) = normal(&slope);
-        let length = (slope[0].powi(2) + slope[1].powi(2)).max(1e-12);
+        let length = (slope[0].powi(2) + slope[1].powi(2)).max(MIN_SQUARE_SLOPE);
         let place = shape.at(angle_rad);
         let work_terms = shape.work_terms(place.flow_at_nominal_kg_s, place.head);
         let (mut across, mut eta) = (DVector::zeros(PARAMETERS), DVector::zeros(PARAMETERS));
@@ -58,9 +59,9 @@ impl LineErrors {
                 continue;
             }
             let mut moved = self.parameters;
-            moved[q] += STEP;
+            moved[q] += PARAMETER_STEP;
             let there = at(&LineShape::new(&moved, self.frame), angle_rad);
-            let d: [f64; 3] = std::array::from_fn(|i| (there[i] - here[i]) / STEP);
+            let d: [f64; 3] = std::array::from_fn(|i| (there[i] - here[i]) / PARAMETER_STEP);
             across[q] = d[0] * nx + d[1] * ny;
             // The nearest place moves along the line as the line moves.
             eta[q] = d[2] - slope[2] * (d[0] * slope[0] + d[1] * slope[1]) / length;

@@ -7,7 +7,15 @@ use crate::map_fit::speed_lines::line_shape::LineShape;
 use crate::map_fit::speed_lines::nearest::{Scales, nearest};
 use std::collections::BTreeMap;
 
-/// Minimum and maximum speed of a fit, over the slowest and the fastest measured speed.
+/// Minimum flow of a line as a unit, kg/s. Bound: excludes division by zero.
+pub(crate) const MIN_FLOW_KG_S: f64 = 1e-12;
+/// Minimum PR - 1 of a line as a unit. Bound: excludes division by zero.
+pub(crate) const MIN_RATIO_RANGE: f64 = 1e-6;
+/// Relative difference of equal speeds. Bound: rounding.
+pub(crate) const SPEED_ROUNDING_RATIO: f64 = 1e-9;
+
+/// Minimum and maximum speed of a fit, over the slowest and the fastest measured speed. Bound: beyond, the errors are larger than the
+/// map.
 pub(crate) const SPEED_RANGE_RATIO: (f64, f64) = (0.1, 1.3);
 
 /// A fitted surface.
@@ -70,7 +78,7 @@ impl MapFit {
 
     /// Whether a speed is outside the measured range.
     pub(crate) fn is_outside(&self, speed_ratio: f64) -> bool {
-        self.solution.splines.shape.outside(speed_ratio) > 1e-9
+        self.solution.splines.shape.outside(speed_ratio) > SPEED_ROUNDING_RATIO
     }
 
     /// The efficiency; in extrapolation at most the best measured one.

@@ -2,6 +2,7 @@
 
 use crate::map_fit::MapFitError;
 use crate::map_fit::fitted_surface::line_errors::LineErrors;
+use crate::map_fit::fitted_surface::surface::{MIN_FLOW_KG_S, MIN_RATIO_RANGE, SPEED_ROUNDING_RATIO};
 use crate::map_fit::fitted_surface::surface::{MapFit, SPEED_RANGE_RATIO};
 use crate::map_fit::speed_lines::crossing::count_crossings;
 use crate::map_fit::speed_lines::line_shape::{ANGLE_RANGE_RAD, LineShape, MIN_ANGLE_RAD};
@@ -11,9 +12,21 @@ use mapper_core::{FittedLine, FittedMap, FittedNode};
 use mapper_numerics::root::bisect;
 use nalgebra::{DMatrix, DVector};
 
-/// Steps along a line for the placement of nodes at equal distances.
+/// Ridge of the smoothed ends. Bound: keeps the matrix regular, far below any weight.
+const RIDGE: f64 = 1e-9;
+/// Minimum angle of a surge-side end, rad. Bound: a line has a length.
+const MIN_SURGE_RAD: f64 = 0.2;
+/// Share of the pressure rise by which a line ends below a pressure ratio of 1. Bound: the vertical part is then complete.
+const LOWEST_SHARE: f64 = 0.15;
+/// Minimum of this lowest pressure ratio. Bound: engine models ask for no lower one.
+const MIN_LOWEST_RATIO: f64 = 0.9;
+/// Distance beyond the last point that is not an extrapolation, rad. Bound: about 1 % of a line.
+const ANGLE_TOLERANCE_RAD: f64 = 0.02;
+
+/// Steps along a line for the placement of nodes at equal distances. Bound: six steps for each of the usual 40 nodes.
 const WALK_STEPS: usize = 240;
-/// Default further speeds of a table: two over the slowest measured speed, one over the fastest.
+/// Default further speeds of a table: two over the slowest measured speed, one over the fastest. Bound: engine models need idle, and a
+/// margin above the fastest line.
 const DEFAULT_SPEED_RATIOS: (f64, f64, f64) = (0.4, 0.7, 1.05);
 
 /// Contents of a table of the fit.
@@ -56,7 +69,7 @@ pub(crate) fn table(fit: &MapFit, options: &MapFitOptions) -> Result<FittedMap, 
     speeds.extend(further.iter().map(|speed| (*speed, false)));
     speeds.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
     // A further speed equal to a measured one counts as measured, and equal lines are merged.
-    speeds.dedup_by(|b, a| b.0 <= a.0 * (1.0 + 1e-9));
+    speeds.dedup_by(|b, a| b.0 <= a.0 * (1.0 + SPEED_ROUNDING_RATIO));
     let nodes = options.nodes.clamp(5, 400);
     let ends = LineEndAngles::new(fit);
     let lines: Vec<FittedLine> = speeds
@@ -96,7 +109,8 @@ struct MeasuredEnds {
     surge: f64,
 }
 
-/// Smoothing of the surge-side ends: variance of an end over that of its roughness.
+/// Smoothing of the surge-side ends: variance of an end over that of its roughness. Bound: an end is known to a twentieth of its
+/// roughness, 0.06^2.
 const END_SMOOTHING: f64 = 0.004;
 
 impl LineEndAngles {
@@ -125,7 +139,7 @@ impl LineEndAngles {
         let mean = ends.mean();
         let square = basis.tr_mul(&basis)
             + &spline.penalty * END_SMOOTHING
-            + DMatrix::identity(spline.len(), spline.len()) * 1e-9;
+            + DMatrix::identity(spline.len(), spline.len()) * RIDGE;
         let deviation = square
             .cholesky()
             .map(|factor| factor.solve(&basis.tr_mul(&ends.add_scalar(-mean))))
@@ -138,13 +152,13 @@ impl LineEndAngles {
     fn surge_rad(&self, speed_ratio: f64) -> f64 {
         let smooth = |speed: f64| self.spline.row(speed).dot(&self.surge);
         let (Some(first), Some(last)) = (self.measured.first(), self.measured.last()) else {
-            return smooth(speed_ratio).clamp(0.2, ANGLE_RANGE_RAD.1);
+            return smooth(speed_ratio).clamp(MIN_SURGE_RAD, ANGLE_RANGE_RAD.1);
         };
         // Beyond the measured speeds the end keeps the distance from the smooth end that it has at the outermost line.
         let at = speed_ratio.clamp(first.speed_ratio, last.speed_ratio);
         let measured = self.between(at, |line| line.surge).unwrap_or(f64::NEG_INFINITY);
         let over = (measured - smooth(at)).max(0.0);
-        (smooth(speed_ratio) + over).clamp(0.2, ANGLE_RANGE_RAD.1)
+        (smooth(speed_ratio) + over).clamp(MIN_SURGE_RAD, ANGLE_RANGE_RAD.1)
     }
 
     /// Range of angles with measured points; `None` outside the measured speeds.
@@ -155,7 +169,7 @@ impl LineEndAngles {
 
     /// A value of the measured lines, linear between neighbours; `None` outside the measured speeds.
     fn between(&self, speed_ratio: f64, value: impl Fn(&MeasuredEnds) -> f64) -> Option<f64> {
-        let slack = 1e-9;
+        let slack = SPEED_ROUNDING_RATIO;
         let after = self.measured.partition_point(|line| line.speed_ratio < speed_ratio - slack);
         let upper = self.measured.get(after)?;
         if upper.speed_ratio <= speed_ratio + slack {
@@ -169,7 +183,7 @@ impl LineEndAngles {
 
 /// Lowest pressure ratio of a line: below 1 by a share of the line's pressure rise.
 fn lowest_pressure_ratio(highest_ratio: f64) -> f64 {
-    (1.0 - 0.15 * (highest_ratio - 1.0)).clamp(0.9, 1.0)
+    (1.0 - LOWEST_SHARE * (highest_ratio - 1.0)).clamp(MIN_LOWEST_RATIO, 1.0)
 }
 
 fn line_nodes(fit: &MapFit, ends: &LineEndAngles, speed_corrected_rpm: f64, count: usize) -> Vec<FittedNode> {
@@ -187,7 +201,10 @@ fn line_nodes(fit: &MapFit, ends: &LineEndAngles, speed_corrected_rpm: f64, coun
         })
         .collect();
     let max = |value: fn(&(f64, f64)) -> f64| places.iter().map(value).fold(f64::MIN, f64::max);
-    let scales = Scales { flow_kg_s: max(|p| p.0).max(1e-12), ratio: (max(|p| p.1) - 1.0).max(1e-6) };
+    let scales = Scales {
+        flow_kg_s: max(|p| p.0).max(MIN_FLOW_KG_S),
+        ratio: (max(|p| p.1) - 1.0).max(MIN_RATIO_RANGE),
+    };
     let mut length = vec![0.0];
     for pair in places.windows(2) {
         let step = ((pair[1].0 - pair[0].0) / scales.flow_kg_s).hypot((pair[1].1 - pair[0].1) / scales.ratio);
@@ -205,8 +222,9 @@ fn line_nodes(fit: &MapFit, ends: &LineEndAngles, speed_corrected_rpm: f64, coun
             let angle = walk[after - 1] + share * (walk[after] - walk[after - 1]);
             let place = shape.physical(angle, speed_ratio);
             let error = errors.at(angle, scales);
-            // A rounding error beyond the last point is not an extrapolation.
-            let extrapolated = supported.is_none_or(|(low, high)| angle < low - 0.02 || angle > high + 0.02);
+            let extrapolated = supported.is_none_or(|(low, high)| {
+                angle < low - ANGLE_TOLERANCE_RAD || angle > high + ANGLE_TOLERANCE_RAD
+            });
             let eta = fit.limit_efficiency(place.eta, extrapolated);
             let common = fit.data.common.at(speed_ratio, place.flow_kg_s / scales.flow_kg_s);
             let work = shape.at(angle).work * speed_ratio * speed_ratio;

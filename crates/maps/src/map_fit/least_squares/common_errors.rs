@@ -5,7 +5,7 @@
 
 use mapper_core::{CommonErrors, MapPoint};
 
-/// Distance of half weight, in units of the nominal speed and of the line's maximum flow.
+/// Distance of half weight, in units of the nominal speed and of the line's maximum flow. Bound: the distance of neighbouring points.
 const HALF_WEIGHT_DISTANCE_RATIO: f64 = 0.1;
 
 /// Common errors of the points, with their positions.

@@ -5,10 +5,24 @@ use crate::map_fit::least_squares::common_errors::CommonErrorField;
 use mapper_core::{CompressorMap, MapPoint, SurgeMark, Verdict};
 use mapper_physics::compressor_map::similarity::head_ratio;
 
-/// Maximum number of points and lines of a fit: several times those of the largest measured maps.
+/// Maximum pressure ratio of a point. Bound: several stages; a larger one is a mistake.
+const MAX_PRESSURE_RATIO: f64 = 50.0;
+/// Minimum PR - 1 of a line. Bound: 10 Pa of 100 kPa, below the resolution of any sensor.
+const MIN_PRESSURE_RISE: f64 = 1e-4;
+/// Relative difference of speed within one line. Bound: stands hold a speed within 1 %; a fit over speed needs two.
+const SAME_LINE_RATIO: f64 = 1e-3;
+/// Efficiencies that are fitted. Bound: apparent efficiencies and choked points included.
+const USABLE_ETA: std::ops::RangeInclusive<f64> = -1.0..=1.5;
+/// Minimum number of points. Bound: a line has six parameters of its shape, two of them over speed.
+const MIN_POINTS: usize = 8;
+/// Minimum number of points with an efficiency. Bound: the work coefficient has six terms.
+const MIN_POINTS_WITH_ETA: usize = 6;
+
+/// Maximum number of points of a fit. Bound: effort; several times those of the largest measured maps.
 const MAX_POINTS: usize = 2000;
+/// Maximum number of lines of a fit. Bound: as for the points.
 const MAX_LINES: usize = 60;
-/// Maximum relative difference between the speeds of a surge mark and its line.
+/// Maximum relative difference between the speeds of a surge mark and its line. Bound: less than half of the distance of lines.
 const MAX_MARK_SPEED_DIFFERENCE_RATIO: f64 = 0.03;
 
 /// One point.
@@ -61,7 +75,7 @@ impl Observations {
             [p.flow_corrected_kg_s, p.pressure_ratio, p.speed_corrected_rpm]
                 .iter()
                 .all(|v| v.is_finite() && *v > 0.0)
-                && p.pressure_ratio < 50.0
+                && p.pressure_ratio < MAX_PRESSURE_RATIO
         };
         let mut lines: Vec<(f64, Vec<&MapPoint>)> = map
             .lines
@@ -86,7 +100,7 @@ impl Observations {
                 |value: fn(&MapPoint) -> f64| members.iter().map(|p| value(p)).fold(f64::MIN, f64::max);
             let flow_scale_kg_s = largest(|p| p.identified.flow_corrected_kg_s);
             let ratio_scale = largest(|p| p.identified.pressure_ratio) - 1.0;
-            if ratio_scale <= 1e-4 {
+            if ratio_scale <= MIN_PRESSURE_RISE {
                 return Err(MapFitError::NoCompression { speed_corrected_rpm: *speed_corrected_rpm });
             }
             for point in members {
@@ -137,13 +151,13 @@ impl Observations {
     }
 
     fn check_sufficient(&self) -> Result<(), MapFitError> {
-        // Lines at one speed are one line to a fit over speed.
-        let distinct = 1 + self.lines_rpm.windows(2).filter(|w| w[1] > w[0] * (1.0 + 1e-3)).count();
+        let distinct =
+            1 + self.lines_rpm.windows(2).filter(|w| w[1] > w[0] * (1.0 + SAME_LINE_RATIO)).count();
         if self.lines_rpm.len() < 2 || distinct < 2 {
             return Err(MapFitError::TooFewLines(distinct.min(self.lines_rpm.len())));
         }
         let with_eta = self.points.iter().filter(|p| p.eta.is_some()).count();
-        if self.points.len() < 8 || with_eta < 6 {
+        if self.points.len() < MIN_POINTS || with_eta < MIN_POINTS_WITH_ETA {
             return Err(MapFitError::TooFewPoints { points: self.points.len(), with_eta });
         }
         Ok(())
@@ -158,7 +172,7 @@ fn observation(
     ratio_scale: f64,
 ) -> Observation {
     let p = &point.identified;
-    let eta = point.eta.filter(|eta| p.verdict != Verdict::Unusable && (-1.0..=1.5).contains(eta));
+    let eta = point.eta.filter(|eta| p.verdict != Verdict::Unusable && USABLE_ETA.contains(eta));
     let eta_error = p.eta_own_standard_error().unwrap_or(0.0);
     Observation {
         line,

@@ -2,11 +2,11 @@
 
 use crate::map_fit::speed_lines::line_shape::Parameters;
 
-/// Standard errors beyond which a residual loses weight.
+/// Standard errors beyond which a residual loses weight. Bound: by chance exceeded once in 370 times.
 pub(crate) const ROBUST_SIGMAS: f64 = 3.0;
 
-/// Range of the precision of a roughness over its starting value. Twenty times stiffer is visually straight; a stiffer one would make
-/// errors beyond the measured lines too small.
+/// Range of the precision of a roughness over its starting value. Bound: twenty times stiffer is visually straight; a stiffer one would
+/// make errors beyond the measured lines too small.
 pub(crate) const ROUGHNESS_PRECISION_RANGE: [f64; 2] = [0.03, 20.0];
 
 /// Variance components.

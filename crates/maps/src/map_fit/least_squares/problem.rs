@@ -10,16 +10,46 @@ use crate::map_fit::speed_lines::line_shape::{
     CHOKE_FLOW, CHOKE_HEAD, EXPONENTS, FlowFrame, LineShape, PARAMETERS, Parameters, WORK, ZERO_SLOPE_FLOW,
     ZERO_SLOPE_HEAD,
 };
+use crate::map_fit::speed_lines::nearest::MIN_SQUARE_SLOPE;
 use crate::map_fit::speed_lines::nearest::{Foot, Scales, nearest, normal};
 use crate::map_fit::speed_lines::splines::{Rows, Splines};
 use mapper_numerics::statistics::{mean, median, quantile};
 use nalgebra::{DMatrix, DVector};
 
+/// Minimum distance of knots over speed, ratio. Bound: stands hold a speed within 1 %.
+const MIN_KNOT_DISTANCE_RATIO: f64 = 0.02;
+/// Choke flow over the largest flow of a line. Bound: a start value.
+const START_CHOKE_RATIO: f64 = 1.03;
+/// Head at zero slope over the largest head of a line. Bound: a start value.
+const START_HEAD_RATIO: f64 = 1.005;
+/// Logit of the zero-slope flow over the choke flow. Bound: a start value, a ratio of 0.3.
+const START_ZERO_SLOPE_FLOW: f64 = -0.8;
+/// Head at choke over head at zero slope. Bound: a start value.
+const START_CHOKE_HEAD: f64 = 0.1;
+/// Logarithm of the exponents minus their minimum. Bound: a start value, exponents of 2: an ellipse.
+const START_EXPONENT: f64 = -0.05;
+/// Penalty of the start values' roughness. Bound: a start value.
+const START_PENALTY: f64 = 0.03;
+/// Minimum flow, head or work of which a logarithm is taken. Bound: excludes the logarithm of zero.
+const SMALL: f64 = 1e-9;
+/// Minimum efficiency of a point for the start values. Bound: excludes division by zero.
+const MIN_ETA: f64 = 0.05;
+/// Ridge of the start values. Bound: keeps matrices regular, far below any weight.
+const RIDGE: f64 = 1e-6;
+/// Step of the derivatives by a parameter. Bound: between rounding and curvature for parameters of order 1.
+pub(crate) const PARAMETER_STEP: f64 = 1e-5;
+/// Minimum range of flow, ratio to the largest. Bound: excludes division by zero.
+const MIN_RANGE_RATIO: f64 = 1e-6;
+
 /// Parameters that an offset of a whole line changes: flow; head with work (an error of speed, without effect on efficiency); work alone
 /// (efficiency).
 pub(crate) const LINE_OFFSETS: [&[usize]; 3] = [&[CHOKE_FLOW], &[ZERO_SLOPE_HEAD, WORK], &[WORK]];
+/// Maximum number of knots over speed. Bound: effort; maps have up to ten lines.
 const MAX_KNOTS: usize = 10;
-/// Prior standard deviations of each parameter's level about its starting value: wide if points determine the parameter.
+/// Prior standard deviations of each parameter's level about its starting value. Bound: where points determine a parameter, wider than
+/// any line: ln of flow and head, 2; logit of the zero-slope flow, 0.7; choke head, 0.25; ln of the exponents, 0.4; corrections of the
+/// radius, 0.03, the scatter of a line about an ellipse; ln of the work, 2, its slopes, 1, and its curvatures, 0.5, more than an
+/// efficiency changes along a line.
 const LEVEL_SD: Parameters = [2.0, 2.0, 0.7, 0.25, 0.4, 0.4, 0.03, 0.03, 2.0, 1.0, 1.0, 0.5, 0.5, 0.5];
 
 /// Data and basis of a fit.
@@ -43,7 +73,7 @@ impl<'a> Problem<'a> {
     pub(crate) fn new(data: &'a Observations, frame: Option<FlowFrame>) -> Self {
         let mut ratios: Vec<f64> =
             data.lines_rpm.iter().map(|speed| speed / data.nominal_speed_rpm).collect();
-        ratios.dedup_by(|b, a| *b < *a * 1.02);
+        ratios.dedup_by(|b, a| *b < *a * (1.0 + MIN_KNOT_DISTANCE_RATIO));
         let splines = Splines::new(&if ratios.len() <= MAX_KNOTS { ratios } else { select_knots(&ratios) });
         let rows = data.points.iter().map(|p| splines.rows(p.speed_ratio)).collect();
         let frame = frame.unwrap_or_else(|| frame_of(data));
@@ -64,12 +94,11 @@ impl<'a> Problem<'a> {
     fn starting_level(&self) -> Parameters {
         let mean = |values: &[f64]| mean(values).unwrap_or(f64::NAN);
         let mut level = [0.0; PARAMETERS];
-        level[CHOKE_FLOW] = (1.03 * mean(&self.line_maxima(Observation::flow))).ln();
-        level[ZERO_SLOPE_HEAD] = mean(&self.line_maxima(Observation::head)).max(1e-9).ln();
-        level[ZERO_SLOPE_FLOW] = -0.8;
-        level[CHOKE_HEAD] = 0.1;
-        // Exponents near 2: an ellipse.
-        EXPONENTS.iter().for_each(|i| level[*i] = -0.05);
+        level[CHOKE_FLOW] = (START_CHOKE_RATIO * mean(&self.line_maxima(Observation::flow))).ln();
+        level[ZERO_SLOPE_HEAD] = mean(&self.line_maxima(Observation::head)).max(SMALL).ln();
+        level[ZERO_SLOPE_FLOW] = START_ZERO_SLOPE_FLOW;
+        level[CHOKE_HEAD] = START_CHOKE_HEAD;
+        EXPONENTS.iter().for_each(|i| level[*i] = START_EXPONENT);
         level
     }
 
@@ -82,29 +111,29 @@ impl<'a> Problem<'a> {
             .points
             .iter()
             .filter_map(|p| {
-                let work = (p.head() / p.eta?.max(0.05)).max(1e-9).ln();
+                let work = (p.head() / p.eta?.max(MIN_ETA)).max(SMALL).ln();
                 Some(((p.flow() - self.frame.middle_kg_s) / self.frame.half_range_kg_s, work))
             })
             .collect();
         let terms = DMatrix::from_fn(with_eta.len(), 3, |i, j| with_eta[i].0.powi(j as i32));
         let works = DVector::from_iterator(with_eta.len(), with_eta.iter().map(|w| w.1));
-        let square = terms.tr_mul(&terms) + DMatrix::identity(3, 3) * 1e-6;
+        let square = terms.tr_mul(&terms) + DMatrix::identity(3, 3) * RIDGE;
         let work = square.cholesky().ok_or(MapFitError::Singular)?.solve(&terms.tr_mul(&works));
         for j in 0..3 {
             values.row_mut(WORK + j).fill(work[j]);
         }
         let basis = DMatrix::from_fn(self.rows.len(), knots, |i, k| self.rows[i].shape[k]);
         let smoother = basis.tr_mul(&basis)
-            + &self.splines.shape.penalty * (0.03 / self.rows.len() as f64)
-            + DMatrix::identity(knots, knots) * 1e-6;
+            + &self.splines.shape.penalty * (START_PENALTY / self.rows.len() as f64)
+            + DMatrix::identity(knots, knots) * RIDGE;
         let smoother = smoother.cholesky().ok_or(MapFitError::Singular)?;
         for (parameter, sizes, factor) in [
-            (CHOKE_FLOW, self.line_maxima(Observation::flow), 1.03),
-            (ZERO_SLOPE_HEAD, self.line_maxima(Observation::head), 1.005),
+            (CHOKE_FLOW, self.line_maxima(Observation::flow), START_CHOKE_RATIO),
+            (ZERO_SLOPE_HEAD, self.line_maxima(Observation::head), START_HEAD_RATIO),
         ] {
             let logs = DVector::from_iterator(
                 self.rows.len(),
-                self.data.points.iter().map(|p| (factor * sizes[p.line].max(1e-9)).ln()),
+                self.data.points.iter().map(|p| (factor * sizes[p.line].max(SMALL)).ln()),
             );
             values.row_mut(parameter).copy_from(&smoother.solve(&basis.tr_mul(&logs)).transpose());
         }
@@ -156,13 +185,12 @@ impl<'a> Problem<'a> {
 
     /// Derivatives of the residuals, each row times the root of its weight.
     pub(crate) fn jacobian(&self, unknowns: &Unknowns, feet: &[Foot], weights: &[[f64; 2]]) -> DMatrix<f64> {
-        const STEP: f64 = 1e-5;
         let (knots, lines) = (self.splines.len(), self.data.lines_rpm.len());
         let mut out = DMatrix::zeros(2 * feet.len(), PARAMETERS * knots + LINE_OFFSETS.len() * lines);
         for (i, (p, foot)) in self.data.points.iter().zip(feet).enumerate() {
             let parameters = self.parameters(unknowns, i);
             let (nx, ny) = normal(&foot.slope);
-            let length = (foot.slope[0].powi(2) + foot.slope[1].powi(2)).max(1e-12);
+            let length = (foot.slope[0].powi(2) + foot.slope[1].powi(2)).max(MIN_SQUARE_SLOPE);
             let root = weights[i].map(f64::sqrt);
             let shape = LineShape::new(&parameters, self.frame);
             let here = shape.at(foot.angle_rad);
@@ -173,12 +201,12 @@ impl<'a> Problem<'a> {
                     (0.0, 0.0, -foot.place.eta * work_terms[q - WORK])
                 } else {
                     let mut moved = parameters;
-                    moved[q] += STEP;
+                    moved[q] += PARAMETER_STEP;
                     let place = LineShape::new(&moved, self.frame).physical(foot.angle_rad, p.speed_ratio);
                     (
-                        (place.flow_kg_s - foot.place.flow_kg_s) / p.flow_scale_kg_s / STEP,
-                        (place.pressure_ratio - foot.place.pressure_ratio) / p.ratio_scale / STEP,
-                        (place.eta - foot.place.eta) / STEP,
+                        (place.flow_kg_s - foot.place.flow_kg_s) / p.flow_scale_kg_s / PARAMETER_STEP,
+                        (place.pressure_ratio - foot.place.pressure_ratio) / p.ratio_scale / PARAMETER_STEP,
+                        (place.eta - foot.place.eta) / PARAMETER_STEP,
                     )
                 };
                 // The nearest place moves along the line as the line moves.
@@ -276,7 +304,7 @@ fn frame_of(data: &Observations) -> FlowFrame {
     let flows: Vec<f64> = data.points.iter().map(Observation::flow).collect();
     let (low, high) = (quantile(&flows, 0.0).unwrap_or(0.0), quantile(&flows, 1.0).unwrap_or(1.0));
     let middle_kg_s = median(&flows).unwrap_or(0.5);
-    FlowFrame { middle_kg_s, half_range_kg_s: (0.5 * (high - low)).max(1e-6 * high) }
+    FlowFrame { middle_kg_s, half_range_kg_s: (0.5 * (high - low)).max(MIN_RANGE_RATIO * high) }
 }
 
 /// Units of distance of a point's line.

@@ -4,6 +4,7 @@ use crate::map_fit::least_squares::problem::LINE_OFFSETS;
 use crate::map_fit::speed_lines::ends::{End, EndWidenings, NO_WIDENING, Widening};
 use crate::map_fit::speed_lines::line_shape::{FlowFrame, LineShape, PARAMETERS, Parameters, WORK};
 use crate::map_fit::speed_lines::splines::Splines;
+use mapper_numerics::statistics::SHARE_975;
 use mapper_numerics::statistics::{NORMAL_975, student_quantile};
 use nalgebra::DMatrix;
 
@@ -62,7 +63,7 @@ impl Solution {
         // Student's quantile over the normal one, squared, for the number of second differences that estimated the roughness.
         let freedom = knots.saturating_sub(2).max(1) as f64;
         let small_sample_factor =
-            student_quantile(0.975, freedom).map_or(1.0, |quantile| (quantile / NORMAL_975).powi(2));
+            student_quantile(SHARE_975, freedom).map_or(1.0, |quantile| (quantile / NORMAL_975).powi(2));
         let prior_variances =
             (self.splines.shape.prior_variance(speed_ratio), self.splines.work.prior_variance(speed_ratio));
         let widening = self.widening_at(speed_ratio);

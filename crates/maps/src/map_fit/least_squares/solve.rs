@@ -10,20 +10,31 @@ use crate::map_fit::speed_lines::line_shape::{FlowFrame, Parameters, WORK};
 use mapper_numerics::least_squares::{Damping, DampingRule, damped_step, inverse};
 use nalgebra::{DMatrix, DVector};
 
-/// Rounds with fixed variances, rounds that estimate the variances, and final rounds with the last variances.
+/// Relative gain of a round below which the variances are estimated. Bound: effort.
+const FREE_GAIN_RATIO: f64 = 1e-2;
+/// Relative gain below which they have converged. Bound: effort.
+const ESTIMATE_GAIN_RATIO: f64 = 1e-3;
+/// Relative gain below which the fit has converged. Bound: the parameters then move by a hundredth of their errors.
+const SETTLED_GAIN_RATIO: f64 = 1e-4;
+
+/// Rounds with fixed variances, rounds that estimate the variances, and final rounds with the last variances. Bound: the fit converges
+/// before.
 const ROUNDS: [usize; 3] = [8, 22, 15];
-/// Maximum relative change of a variance component after convergence.
+/// Maximum relative change of a variance component after convergence. Bound: a tenth of the error of a variance from the usual number of
+/// lines.
 const MAX_RELATIVE_CHANGE: f64 = 0.05;
-/// Starting scatter of whole lines: small, since on a map of few lines a large one would absorb the shape.
+/// Starting scatter of whole lines. Bound: small, since on a map of few lines a large one would absorb the shape.
 const START_LINE_SCATTER: f64 = 0.005;
-/// Starting scales of the residuals: the first always, the others if the result is above [`MAX_RMS`].
+/// Starting scales of the residuals: the first always, the others if the result is above [`MAX_RMS`]. Bound: start values.
 const START_SCALES: [f64; 3] = [0.01, 0.003, 0.02];
-/// Root mean square of distance or efficiency above which the fit is repeated from other scales.
+/// Root mean square of distance or efficiency above which the fit is repeated from other scales. Bound: twice that of usual maps.
 const MAX_RMS: f64 = 0.006;
-/// Starting roughness of each parameter over speed.
+/// Starting roughness of each parameter over speed. Bound: start values, which the data change by up to thirty times
+/// ([`ROUGHNESS_PRECISION_RANGE`]); in the order of the prior standard deviations of the levels, as second derivative over the logarithm
+/// of speed.
 const START_ROUGHNESS: Parameters = [0.5, 0.5, 3.0, 1.0, 1.5, 1.5, 0.15, 0.15, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5];
 
-/// Damping of the steps: strong, since nearest places and weights change between rounds.
+/// Damping of the steps. Bound: strong, since nearest places and weights change between rounds; the minimum does not depend on it.
 const DAMPING: DampingRule = DampingRule {
     start: 1e-2,
     growth: 5.0,
@@ -140,19 +151,21 @@ fn solve_from(
             (unknowns, feet) = (next, next_feet);
         }
         match phase {
-            Phase::Free if round + 1 >= free || gain < 1e-2 * cost => phase = Phase::Estimate,
+            Phase::Free if round + 1 >= free || gain < FREE_GAIN_RATIO * cost => phase = Phase::Estimate,
             Phase::Estimate => {
                 let inverse = inverse(&normal_matrix.cholesky().ok_or(MapFitError::Singular)?);
                 let residuals = problem.residuals(&feet);
                 let change =
                     problem.update(&mut precisions, &unknowns, &inverse, &jacobian, &residuals, &start_rough);
-                if round + 1 >= free + estimate || (change < MAX_RELATIVE_CHANGE && gain < 1e-3 * cost) {
+                if round + 1 >= free + estimate
+                    || (change < MAX_RELATIVE_CHANGE && gain < ESTIMATE_GAIN_RATIO * cost)
+                {
                     // A nearest place may be a local minimum on a wrong part of the line: search the whole line again.
                     feet = problem.feet(&unknowns, None);
                     phase = Phase::Settle;
                 }
             }
-            Phase::Settle if gain < 1e-4 * cost => break,
+            Phase::Settle if gain < SETTLED_GAIN_RATIO * cost => break,
             _ => {}
         }
     }

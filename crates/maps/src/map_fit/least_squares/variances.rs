@@ -10,6 +10,21 @@ use crate::map_fit::least_squares::problem::{Problem, Unknowns};
 use crate::map_fit::speed_lines::line_shape::{PARAMETERS, Parameters};
 use nalgebra::DMatrix;
 
+/// Minimum degrees of freedom of a variance. Bound: excludes division by zero.
+const MIN_FREEDOM: f64 = 1e-2;
+/// Minimum sum of squares. Bound: excludes division by zero.
+const SMALL: f64 = 1e-9;
+/// Largest change of the precision of a roughness in one round, down and up. Bound: the path only; the result does not depend on it.
+const ROUGHNESS_STEP: (f64, f64) = (0.3, 3.0);
+/// Precisions of line offsets: of 3 % and of 0.05 %. Bound: a smaller scatter is not an error of speed, a larger one would be another machine.
+const LINE_PRECISIONS: (f64, f64) = (1.0 / 9e-4, 4e6);
+/// Minimum degrees of freedom of residuals, share of the points. Bound: a line of few points has residuals that the fit has absorbed.
+const MIN_FREEDOM_SHARE: f64 = 0.25;
+/// Largest change of a scale in one round, down and up. Bound: the path only.
+const SCALE_STEP: (f64, f64) = (0.7, 1.2);
+/// Range of the scales of residuals. Bound: repeated points scatter by 0.2 % at least; above 3 % they are no map.
+const SCALES: (f64, f64) = (1e-3, 0.03);
+
 impl Problem<'_> {
     /// The deviance of the solution without the determinant of the information.
     pub(crate) fn deviance(
@@ -57,9 +72,9 @@ impl Problem<'_> {
             let values = unknowns.values.row(q).transpose();
             let block = inverse.view((q * knots, q * knots), (knots, knots));
             let used = precisions.rough[q] * (block * &self.splines.of(q).penalty).trace();
-            let free = (knots.saturating_sub(2) as f64 - used).max(1e-2);
-            let wanted = free / (values.dot(&(&self.splines.of(q).penalty * &values)) + 1e-9);
-            let step = (wanted / precisions.rough[q]).clamp(0.3, 3.0);
+            let free = (knots.saturating_sub(2) as f64 - used).max(MIN_FREEDOM);
+            let wanted = free / (values.dot(&(&self.splines.of(q).penalty * &values)) + SMALL);
+            let step = (wanted / precisions.rough[q]).clamp(ROUGHNESS_STEP.0, ROUGHNESS_STEP.1);
             let [min, max] = ROUGHNESS_PRECISION_RANGE.map(|ratio| ratio * start);
             let next = (precisions.rough[q] * step).clamp(min, max);
             set(&mut precisions.rough[q], next);
@@ -67,10 +82,10 @@ impl Problem<'_> {
         for (index, precision) in precisions.lines.iter_mut().enumerate() {
             let first = PARAMETERS * knots + index * lines;
             let trace: f64 = (first..first + lines).map(|i| inverse[(i, i)]).sum();
-            let wanted = (lines as f64 - *precision * trace).max(0.01)
-                / (unknowns.offsets.row(index).norm_squared() + 1e-9);
-            // Between 0.05 % and 3 %: a smaller scatter is not an error of speed, a larger one would be another machine.
-            let next = (*precision * (wanted / *precision).clamp(0.5, 2.0)).clamp(1.0 / 9e-4, 4e6);
+            let wanted = (lines as f64 - *precision * trace).max(MIN_FREEDOM)
+                / (unknowns.offsets.row(index).norm_squared() + SMALL);
+            let next = (*precision * (wanted / *precision).clamp(0.5, 2.0))
+                .clamp(LINE_PRECISIONS.0, LINE_PRECISIONS.1);
             set(precision, next);
         }
         let projected = jacobian * inverse;
@@ -90,10 +105,13 @@ impl Problem<'_> {
                 sum[1] += robust * share * share;
                 sum[2] += (leverage * share * share).min(1.0);
             }
-            let degrees = (sum[1] - sum[2]).max(0.25 * sum[1]).max(1e-9);
+            let degrees = (sum[1] - sum[2]).max(MIN_FREEDOM_SHARE * sum[1]).max(SMALL);
             let wanted = (sum[0] / degrees).sqrt();
             let scale = precisions.scales[c];
-            set(&mut precisions.scales[c], wanted.clamp((0.7 * scale).max(1e-3), (1.2 * scale).min(0.03)));
+            set(
+                &mut precisions.scales[c],
+                wanted.clamp((SCALE_STEP.0 * scale).max(SCALES.0), (SCALE_STEP.1 * scale).min(SCALES.1)),
+            );
         }
         change
     }

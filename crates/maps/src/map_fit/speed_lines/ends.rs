@@ -9,6 +9,7 @@ pub(crate) struct Widening {
     pub work: f64,
 }
 
+/// No widening. Source: definition.
 pub(crate) const NO_WIDENING: Widening = Widening { shape: 1.0, work: 1.0 };
 
 /// An end of the measured speeds.

@@ -12,38 +12,52 @@
 
 use mapper_physics::compressor_map::similarity::pressure_ratio_of_signed_head;
 
-/// Terms of the radius' correction.
+/// Range of ln of an exponent minus its minimum. Bound: from corners to nearly a rectangle; beyond, the line does not change visibly.
+const EXPONENT_LN: (f64, f64) = (-4.0, 2.2);
+/// Range of ln of the work coefficient. Bound: keeps it finite while a fit searches.
+const WORK_LN: (f64, f64) = (-8.0, 5.0);
+/// Largest flow coordinate of the work coefficient, in halves of the range. Bound: a cubic must not run away beyond the points.
+const MAX_FLOW_COORDINATE: f64 = 1.6;
+/// Start of Newton's steps. Bound: a start value.
+const START_RADIUS_LN: f64 = 0.15;
+/// Precision of an angle or of ln of the radius; Newton's error after a step is about its square. Bound: far below any error of a point.
+pub(crate) const ANGLE_PRECISION_RAD: f64 = 1e-7;
+
+/// Terms of the radius' correction. Bound: more would follow the scatter of points.
 pub(crate) const HARMONICS: usize = 2;
-/// Terms of the work coefficient.
+/// Terms of the work coefficient. Bound: more would follow the scatter of points.
 pub(crate) const WORK_TERMS: usize = 6;
-/// Parameters of a line.
+/// Parameters of a line. Source: choke flow, head and flow at zero slope, choke head, two exponents, and the terms.
 pub(crate) const PARAMETERS: usize = 6 + HARMONICS + WORK_TERMS;
 
+/// Position of a parameter.
+pub(crate) type Index = usize;
 /// Parameter: logarithm of the choke flow.
-pub(crate) const CHOKE_FLOW: usize = 0;
+pub(crate) const CHOKE_FLOW: Index = 0;
 /// Parameter: logarithm of the head at zero slope.
-pub(crate) const ZERO_SLOPE_HEAD: usize = 1;
+pub(crate) const ZERO_SLOPE_HEAD: Index = 1;
 /// Parameter: logit of the zero-slope flow over the choke flow.
-pub(crate) const ZERO_SLOPE_FLOW: usize = 2;
+pub(crate) const ZERO_SLOPE_FLOW: Index = 2;
 /// Parameter: head at choke over head at zero slope, softly limited.
-pub(crate) const CHOKE_HEAD: usize = 3;
+pub(crate) const CHOKE_HEAD: Index = 3;
 /// Parameters: logarithms of the exponents minus [`MIN_EXPONENT`].
-pub(crate) const EXPONENTS: [usize; 2] = [4, 5];
+pub(crate) const EXPONENTS: [Index; 2] = [4, 5];
 /// First parameter of the correction.
-pub(crate) const HARMONIC: usize = 6;
+pub(crate) const HARMONIC: Index = 6;
 /// First parameter of the work coefficient.
-pub(crate) const WORK: usize = 6 + HARMONICS;
+pub(crate) const WORK: Index = 6 + HARMONICS;
 
 /// Parameters of a line, see the constants.
 pub(crate) type Parameters = [f64; PARAMETERS];
 
-/// Minimum exponent: at 1 the line would have corners.
+/// Minimum exponent. Bound: at 1 the line would have corners.
 const MIN_EXPONENT: f64 = 1.05;
-/// Maximum absolute choke head over the head at zero slope.
+/// Maximum absolute choke head over the head at zero slope. Bound: measured lines end above it.
 const MAX_CHOKE_HEAD_RATIO: f64 = 0.7;
-/// Minimum angle, rad: low enough for a pressure ratio below 1 on every line ([`MAX_CHOKE_HEAD_RATIO`]).
+/// Minimum angle, rad. Bound: low enough for a pressure ratio below 1 on every line ([`MAX_CHOKE_HEAD_RATIO`]).
 pub(crate) const MIN_ANGLE_RAD: f64 = -3.0;
-/// Range of the angle for the nearest place, rad: 0 is choke, pi/2 zero slope; below 0 the line is vertical.
+/// Range of the angle for the nearest place, rad. Bound: 0 is choke, pi/2 zero slope; below 0 the line is vertical, and no point lies far
+/// beyond surge.
 pub(crate) const ANGLE_RANGE_RAD: (f64, f64) = (-0.6, 0.8 * std::f64::consts::PI);
 
 /// Location and scale of the flow coefficients, so that the terms of the work coefficient are of order 1.
@@ -102,7 +116,7 @@ impl LineShape {
                 * MAX_CHOKE_HEAD_RATIO
                 * (p[CHOKE_HEAD] / MAX_CHOKE_HEAD_RATIO).tanh(),
             zero_slope_head,
-            exponents: EXPONENTS.map(|i| MIN_EXPONENT + p[i].clamp(-4.0, 2.2).exp()),
+            exponents: EXPONENTS.map(|i| MIN_EXPONENT + p[i].clamp(EXPONENT_LN.0, EXPONENT_LN.1).exp()),
             harmonics,
             work,
             frame,
@@ -123,12 +137,13 @@ impl LineShape {
         let head = self.choke_head + (self.zero_slope_head - self.choke_head) * y;
         let log_work: f64 =
             self.work_terms(flow, head).iter().zip(&self.work).map(|(term, c)| term * c).sum();
-        Place { flow_at_nominal_kg_s: flow, head, work: log_work.clamp(-8.0, 5.0).exp() }
+        Place { flow_at_nominal_kg_s: flow, head, work: log_work.clamp(WORK_LN.0, WORK_LN.1).exp() }
     }
 
     /// Derivatives of the logarithm of the work coefficient by its parameters, at a place of the line.
     pub(crate) fn work_terms(&self, flow: f64, head: f64) -> [f64; WORK_TERMS] {
-        let z = ((flow - self.frame.middle_kg_s) / self.frame.half_range_kg_s).clamp(-1.6, 1.6);
+        let z = ((flow - self.frame.middle_kg_s) / self.frame.half_range_kg_s)
+            .clamp(-MAX_FLOW_COORDINATE, MAX_FLOW_COORDINATE);
         let y = (head - self.choke_head) / (self.zero_slope_head - self.choke_head);
         let drop = (1.0 - y).clamp(0.0, 1.0);
         [1.0, z, z * z, drop, drop * drop, z * z * z]
@@ -137,17 +152,17 @@ impl LineShape {
     /// Distance of the curve from the ellipse's centre, in units of its half axes.
     fn radius(&self, angle_rad: f64, cos: f64, sin: f64) -> f64 {
         let [n, k] = self.exponents;
-        let (log_cos, log_sin) = (cos.max(1e-300).ln(), sin.max(1e-300).ln());
+        let (log_cos, log_sin) = (cos.max(f64::MIN_POSITIVE).ln(), sin.max(f64::MIN_POSITIVE).ln());
         // The ellipse's equation as ln((r cos)^n + (r sin)^k) = 0 in ln r: convex, nearly straight, of slope between n
         // and k, so that Newton's steps need no guard and few rounds.
-        let mut log_r = -log_cos.max(log_sin) - 0.15;
+        let mut log_r = -log_cos.max(log_sin) - START_RADIUS_LN;
         for _ in 0..20 {
             let (a, b) = ((n * (log_r + log_cos)).exp(), (k * (log_r + log_sin)).exp());
             let sum = a + b;
             let step = sum.ln() * sum / (n * a + k * b);
             log_r -= step;
             // The error after a step is about the square of the step.
-            if step.abs() < 1e-7 {
+            if step.abs() < ANGLE_PRECISION_RAD {
                 break;
             }
         }

@@ -1,6 +1,12 @@
 //! Finds the place on a line nearest to a point, with distances in the line's units.
 
+use crate::map_fit::speed_lines::line_shape::ANGLE_PRECISION_RAD;
 use crate::map_fit::speed_lines::line_shape::{ANGLE_RANGE_RAD, LineShape, PhysicalPlace};
+
+/// Minimum square of a slope by angle. Bound: excludes division by zero at corners.
+pub(crate) const MIN_SQUARE_SLOPE: f64 = 1e-12;
+/// Shortest step that is tried, rad. Bound: a tenth of the precision.
+const MIN_STEP_RAD: f64 = 1e-8;
 
 /// Units of distance of a line.
 #[derive(Debug, Clone, Copy)]
@@ -20,9 +26,9 @@ pub(crate) struct Foot {
     pub distance: f64,
 }
 
-/// Maximum step along the line, rad.
+/// Maximum step along the line, rad. Bound: the direction of a line changes little over it.
 const MAX_STEP_RAD: f64 = 0.12;
-/// Half step of the difference quotients by angle, rad.
+/// Half step of the difference quotients by angle, rad. Bound: between rounding and curvature.
 const DIFFERENCE_STEP_RAD: f64 = 1e-5;
 
 /// Finds the nearest place, from `guess_rad` if it is given, else on the whole line.
@@ -52,12 +58,12 @@ pub(crate) fn nearest(
         let (x, y) = best.offset;
         let [sx, sy, _] = foot.slope;
         let length = sx * sx + sy * sy;
-        if length.is_nan() || length <= 1e-12 {
+        if length.is_nan() || length <= MIN_SQUARE_SLOPE {
             break;
         }
         let mut step = (foot.angle_rad + (x * sx + y * sy) / length).clamp(low, high) - foot.angle_rad;
         let mut trial = at(foot.angle_rad + step);
-        while trial.square >= best.square && step.abs() > 1e-8 {
+        while trial.square >= best.square && step.abs() > MIN_STEP_RAD {
             step *= 0.5;
             trial = at(foot.angle_rad + step);
         }
@@ -66,7 +72,7 @@ pub(crate) fn nearest(
         }
         best = trial;
         foot = foot_at(shape, speed_ratio, foot.angle_rad + step, &best, scales);
-        if step.abs() < 1e-7 {
+        if step.abs() < ANGLE_PRECISION_RAD {
             break;
         }
     }
@@ -122,6 +128,6 @@ fn foot_at(
 
 /// Unit vector across the line, outwards (towards more flow and pressure ratio).
 pub(crate) fn normal(slope: &[f64; 3]) -> (f64, f64) {
-    let length = slope[0].hypot(slope[1]).max(1e-300);
+    let length = slope[0].hypot(slope[1]).max(f64::MIN_POSITIVE);
     (slope[1] / length, -slope[0] / length)
 }

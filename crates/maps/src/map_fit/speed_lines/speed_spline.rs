@@ -6,8 +6,11 @@
 use crate::map_fit::speed_lines::ends::End;
 use nalgebra::{DMatrix, DVector};
 
+/// Distance of a speed from a knot at which it counts as the knot, ratio. Bound: rounding.
+const KNOT_TOLERANCE: f64 = 1e-6;
+
 /// Decay length of the slope beyond the outermost knots, as a share of the nominal speed (or its inverse); at most half the range of the
-/// knots. Similarity holds far outside, so a trend must not continue.
+/// knots. Bound: similarity holds far outside, so a trend must not continue.
 const DAMPING_LENGTH_RATIO: f64 = 0.5;
 
 /// Coordinate of a parameter as a function of speed over the nominal speed: flow and head change with the Mach number, in proportion to
@@ -135,7 +138,7 @@ impl SpeedSpline {
     pub(crate) fn prior_variance(&self, speed_ratio: f64) -> f64 {
         let at = self.coordinate.of(speed_ratio);
         let place = self.knots.partition_point(|knot| *knot < at);
-        let near = |knot: &f64| (knot - at).abs() < 1e-6 * (1.0 + at.abs());
+        let near = |knot: &f64| (knot - at).abs() < KNOT_TOLERANCE * (1.0 + at.abs());
         if self.knots[place.saturating_sub(1)..].iter().take(2).any(near) {
             return 0.0;
         }

@@ -6,7 +6,7 @@ use mapper_yaml::units::Kind;
 /// How well a name fits a channel; larger is better.
 pub(crate) type Weight = u32;
 
-/// Minimum weight of a name that is not ambiguous, if its readings are plausible.
+/// Minimum weight of a name that is not ambiguous, if its readings are plausible. Source: the scale of the weights in the table of words.
 pub(crate) const MIN_CLEAR_WEIGHT: Weight = 60;
 
 /// The channel of a quantity at a place.

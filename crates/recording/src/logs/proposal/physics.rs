@@ -7,13 +7,16 @@ use crate::logs::units::{kind_of, unit};
 use crate::logs::{Layout, Survey};
 use mapper_core::{Channel, ColumnName, Word};
 
-/// Minimum share of samples that agree.
+/// Shaft speed above which a machine turns, rpm. Bound: above the noise of any sensor, below any idle.
+const MIN_TURNING_RPM: f64 = 2000.0;
+
+/// Minimum share of samples that agree. Bound: transients and noise make fewer exceptions.
 const MIN_AGREEMENT_SHARE: f64 = 0.9;
 
-/// Minimum correlation of flow and speed. It is low since flow varies alone along a speed line.
+/// Minimum correlation of flow and speed. Bound: low, since flow varies alone along a speed line.
 const MIN_CORRELATION: f64 = 0.3;
 
-/// Maximum speed of road vehicle engines, rpm. The largest turbochargers, on ships, reach about 9000 rpm.
+/// Maximum speed of road vehicle engines, rpm. Bound: the largest turbochargers, on ships, reach about 9000 rpm.
 const MAX_ENGINE_RPM: f64 = 8e3;
 
 /// Channels that most logs name by station numbers.
@@ -46,8 +49,9 @@ pub(super) fn check(proposal: &mut Proposal, layout: &Layout, survey: &Survey) -
         let (Some(high), Some(low)) = (readings(proposal, higher), readings(proposal, lower)) else {
             continue;
         };
-        let turning =
-            |t_s: f64| running.as_ref().is_none_or(|speed| speed.at(t_s).is_none_or(|rpm| rpm > 2000.0));
+        let turning = |t_s: f64| {
+            running.as_ref().is_none_or(|speed| speed.at(t_s).is_none_or(|rpm| rpm > MIN_TURNING_RPM))
+        };
         let pairs: Vec<(f64, f64)> = high
             .samples()
             .filter(|(t_s, _)| turning(*t_s))
@@ -116,13 +120,13 @@ pub(super) fn remark_stations(proposal: &mut Proposal, layout: &Layout) {
     }
 }
 
-/// (gamma - 1) / gamma of air.
+/// (gamma - 1) / gamma of air. Source: gamma of 1.4 (ISO 5389).
 pub(super) const EXPONENT: f64 = 0.2857;
 
-/// Minimum pressure ratio: from here the gas is at least 38 K above the inlet, and an unheated housing is far below it.
+/// Minimum pressure ratio. Bound: from here the gas is at least 38 K above the inlet, and an unheated housing is far below it.
 const MIN_PRESSURE_RATIO: f64 = 1.5;
 
-/// Maximum inlet temperature if the log has no column for it, K: test cells rarely exceed 40 degC.
+/// Maximum inlet temperature if the log has no column for it, K. Bound: test cells rarely exceed 40 degC.
 const MAX_INLET_K: f64 = 313.15;
 
 /// Decides whether `T_c` is gas or housing if no other column is the gas: gas cannot be cooler than after an ideal compression.

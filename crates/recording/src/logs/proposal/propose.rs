@@ -12,6 +12,9 @@ use crate::logs::{Column, ColumnSurvey, Layout, Survey};
 use mapper_core::{CHANNELS, Channel, ColumnName, Word, plausible};
 use mapper_yaml::units::{HeaderUnit, Kind, Reference, Unit, header_unit, volume_flow_m3_s};
 
+/// Minimum reading of an absolute outlet pressure if the inlet is gauge, Pa. Bound: gauge readings at idle are lower, as are absolute ones.
+const MAX_GAUGE_MIN_PA: f64 = 1.6e5;
+
 /// A column as a candidate for a channel.
 struct Candidate {
     column: usize,
@@ -167,7 +170,7 @@ fn without_number<'a>(column: &'a Column, layout: &Layout) -> &'a str {
     of_reader.or_else(|| by(".").filter(is_column)).unwrap_or(&column.name)
 }
 
-/// Maximum difference between the medians of two sensors at one place, as a ratio: wakes and stratification make a few per cent.
+/// Maximum difference between the medians of two sensors at one place, as a ratio. Bound: wakes and stratification make a few per cent.
 const MAX_SAME_PLACE_DIFFERENCE_RATIO: f64 = 0.1;
 
 /// Candidates that are further sensors at the place of `best`: their names differ only in the final number, and their readings agree.
@@ -376,7 +379,7 @@ fn decide_gauge(proposal: &mut Proposal, layout: &Layout, survey: &Survey, units
             proposed.gauge = true;
             proposed.certainty = proposed.certainty.min(Certainty::Likely);
             proposed.remarks.push(Remark::TakenAsGauge { min_pa: low });
-        } else if inlet_is_gauge && low < 1.6e5 {
+        } else if inlet_is_gauge && low < MAX_GAUGE_MIN_PA {
             proposed.gauge = true;
             proposed.certainty = proposed.certainty.min(Certainty::Likely);
             proposed.remarks.push(Remark::GaugeLikeInlet);

@@ -3,6 +3,13 @@
 use mapper_core::{Channel, coded_enum};
 use std::fmt;
 
+/// Size from which a number has no decimals. Source: three to five digits are shown.
+const FIVE_DIGITS: f64 = 1e4;
+/// Size from which a number has one decimal. Source: as above.
+const THREE_DIGITS: f64 = 100.0;
+/// Size below which a number is shown with its exponent. Source: as above.
+const SMALL: f64 = 1e-3;
+
 coded_enum! {
 /// A remark on a proposal, by its stable code. It displays as one sentence with values.
 ProposalRemark {
@@ -168,10 +175,10 @@ pub(crate) fn short(value: f64) -> String {
     match value.abs() {
         _ if !value.is_finite() => "-".to_owned(),
         0.0 => "0".to_owned(),
-        size if size >= 1e4 => format!("{value:.0}"),
-        size if size >= 100.0 => format!("{value:.1}"),
+        size if size >= FIVE_DIGITS => format!("{value:.0}"),
+        size if size >= THREE_DIGITS => format!("{value:.1}"),
         size if size >= 1.0 => format!("{value:.2}"),
-        size if size >= 1e-3 => format!("{value:.4}"),
+        size if size >= SMALL => format!("{value:.4}"),
         _ => format!("{value:.2e}"),
     }
 }

@@ -7,10 +7,12 @@ use crate::logs::plausible::{STANDARD_ATMOSPHERE_PA, TRIMMED_SHARE, fitting_unit
 use crate::logs::units::kind_of;
 use crate::logs::{Layout, Survey};
 use mapper_core::Channel;
+use mapper_core::unit_factors::S_PER_MIN;
 use mapper_yaml::units::{Kind, Unit, header_unit};
 use std::f64::consts::PI;
 
-/// Maximum pressure ratio: one stage reaches 6 at the tip speed limit of aluminium wheels; a third more is margin for a throttled inlet.
+/// Maximum pressure ratio. Bound: one stage reaches 6 at the tip speed limit of aluminium wheels; a third more is margin for a throttled
+/// inlet.
 const MAX_PRESSURE_RATIO: f64 = 8.0;
 
 /// Looks for one unit that fits all channels of a kind that have none.
@@ -70,7 +72,8 @@ fn is_imperial(layout: &Layout) -> bool {
     layout.columns.iter().any(|column| column.unit.as_deref().is_some_and(imperial))
 }
 
-/// Inlet temperature that no test cell exceeds, K. The inlet of a second stage may.
+/// Inlet temperature that no test cell exceeds, K. The inlet of a second stage may. Bound: air of 50 degC; the inlet of a second stage
+/// may be warmer.
 const MAX_INLET_K: f64 = 323.15;
 
 /// Whether the only unit of the temperatures is degC, and the inlet would be too warm in it.
@@ -83,20 +86,24 @@ fn inlet_is_too_warm(channels: &[(Channel, f64, f64)], common: &[&'static Unit])
 }
 
 /// Isentropic head over the square of the tip speed. Slip and backsweep leave 0.6 to 0.9 of it as work, of which 0.5 to 0.8 is head.
+/// Bound: slip and backsweep leave 0.6 to 0.9 of it as work, of which 0.5 to 0.8 is head.
 const HEAD_COEFFICIENT: f64 = 0.45;
-/// Flow over density, tip speed and disc area: wheels from 0.01 to 0.15 are radial.
+/// Flow over density, tip speed and disc area. Bound: wheels from 0.01 to 0.15 are radial.
 const FLOW_COEFFICIENT: f64 = 0.06;
 
-/// Maximum ratio, either way, of a flow to that of the mean coefficients: both ranges together give 0.1 to 4. Units that differ by less
-/// (g/s and kg/h: 3.6) cannot be distinguished.
+/// Maximum ratio, either way, of a flow to that of the mean coefficients. Bound: both ranges together give 0.1 to 4. Units that differ by
+/// less (g/s and kg/h: 3.6) cannot be distinguished.
 const FLOW_FACTOR: f64 = 8.0;
 
-/// Dry air at room temperature, within a few per cent: small compared with [`FLOW_FACTOR`].
+/// Heat capacity of dry air at room temperature, J/(kg K). Source: within a few per cent, small compared with [`FLOW_FACTOR`].
 const CP_J_KGK: f64 = 1005.0;
+/// Density of air, kg/m3. Source: as for the heat capacity.
 const DENSITY_KG_M3: f64 = 1.15;
+/// Inlet temperature, K. Source: as for the heat capacity.
 const INLET_K: f64 = 298.0;
 
-/// Maximum ratio by which the flow may lie outside surge and choke: for the correction to the inlet, and for lines between nominal ones.
+/// Maximum ratio by which the flow may lie outside surge and choke. Bound: for the correction to the inlet, and for lines between nominal
+/// ones.
 const NOMINAL_FACTOR: f64 = 1.3;
 
 /// Infers the unit of a flow from the machine's flow range if it is known, else from the wheel size that pressure ratio and speed give.
@@ -126,7 +133,7 @@ pub(super) fn infer_flow_unit(
             let ratio = outlet_pa / value_at(Channel::P1, TRIMMED_SHARE).unwrap_or(STANDARD_ATMOSPHERE_PA);
             let head_j_kg = CP_J_KGK * INLET_K * (ratio.max(1.0).powf(EXPONENT) - 1.0);
             let tip_m_s = (head_j_kg / HEAD_COEFFICIENT).sqrt();
-            let diameter_m = 60.0 * tip_m_s / (PI * speed_rpm);
+            let diameter_m = S_PER_MIN * tip_m_s / (PI * speed_rpm);
             let flow_kg_s = FLOW_COEFFICIENT * DENSITY_KG_M3 * tip_m_s * PI / 4.0 * diameter_m * diameter_m;
             let why = move |unit| Remark::FitsWheel { unit, diameter_m };
             (flow_kg_s / FLOW_FACTOR, flow_kg_s * FLOW_FACTOR, Box::new(why))

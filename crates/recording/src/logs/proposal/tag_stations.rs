@@ -17,20 +17,21 @@ struct Station {
     p_pa: Vec<f64>,
 }
 
-/// Minimum pressure ratio of the rows that count: below it, small errors of temperature decide.
+/// Minimum pressure ratio of the rows that count. Bound: below it, small errors of temperature decide.
 const MIN_RATIO: f64 = 1.3;
 
-/// Minimum number of such rows, and their minimum share that must agree.
+/// Minimum number of such rows. Bound: fewer agree by chance.
 const MIN_ROWS: usize = 5;
+/// Minimum share of them that must agree. Bound: transients and noise make fewer exceptions.
 const MIN_SHARE: f64 = 0.9;
 
-/// Apparent efficiencies of a compressor: heat from the turbine lowers them, and none is above an ideal compression.
+/// Apparent efficiencies of a compressor. Bound: heat from the turbine lowers them, and none is above an ideal compression.
 const COMPRESSION: std::ops::RangeInclusive<f64> = 0.3..=1.0;
 
-/// Apparent efficiencies of a turbine: heat losses raise them above 1.
+/// Apparent efficiencies of a turbine. Bound: heat losses raise them above 1.
 const EXPANSION: std::ops::RangeInclusive<f64> = 0.3..=1.2;
 
-/// (gamma - 1) / gamma of exhaust gas.
+/// (gamma - 1) / gamma of exhaust gas. Source: gamma of 1.33.
 const HOT_EXPONENT: f64 = 0.25;
 
 /// Proposes the stations of free tag numbers if physics leaves only one order, and marks their columns as taken.

@@ -119,25 +119,31 @@ impl Kind {
 /// A constant number, or a field of a constant.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Constant {
+    /// Its name, with that of the field.
     pub name: String,
+    /// Its expression.
     pub value: String,
     /// Its comment.
     pub comment: String,
     /// `None` if the comment names none.
     pub kind: Option<Kind>,
+    /// Line in its file, from 1.
     pub line: usize,
 }
 
 /// A literal outside constants.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Literal {
+    /// Its value.
     pub value: f64,
+    /// Line in its file, from 1.
     pub line: usize,
 }
 
 /// The numbers of a file, tests left out.
 #[derive(Debug, Default)]
 pub struct Numbers {
+    /// Constants and fields of constants, in order.
     pub constants: Vec<Constant>,
     /// Float literals outside constants that are not neutral.
     pub literals: Vec<Literal>,

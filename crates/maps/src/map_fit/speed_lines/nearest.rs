@@ -29,7 +29,7 @@ pub(crate) struct Foot {
 /// Maximum step along the line, rad. Bound: the direction of a line changes little over it.
 const MAX_STEP_RAD: f64 = 0.12;
 /// Half step of the difference quotients by angle, rad. Bound: between rounding and curvature.
-const DIFFERENCE_STEP_RAD: f64 = 1e-5;
+pub(crate) const DIFFERENCE_STEP_RAD: f64 = 1e-5;
 
 /// Finds the nearest place, from `guess_rad` if it is given, else on the whole line.
 pub(crate) fn nearest(

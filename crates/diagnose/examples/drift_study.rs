@@ -16,7 +16,8 @@ mod common;
 
 use common::{Planted, campaign, draw, drift_reading, identification, judge, judge_by};
 use mapper_core::{Channel, Method};
-use mapper_diagnose::drift::{Cause, RateOrStep, TimeHistory, TimeHistoryKind};
+use mapper_diagnose::drift::{Cause, RATE_PER_H, RateOrStep};
+use mapper_inference::time_history::{Shape, TimeHistory};
 use mapper_identify::{IdentifyConfig, identify_each};
 use std::collections::BTreeMap;
 
@@ -101,7 +102,7 @@ fn pairs(campaigns: usize, first: u64, limits: &BTreeMap<Cause, f64>) {
         let span_s = common::HOLD_S + 26.0 * common::DWELL_S;
         let causes = [sensors[one], sensors[other]];
         for cause in causes {
-            let course = TimeHistory { kind: TimeHistoryKind::Ramp, onset_s: 0.4 * draw() * span_s };
+            let course = TimeHistory { onset: 0.4 * draw() * span_s, shape: RATE_PER_H };
             let sign = if draw() < 0.5 { 1.0 } else { -1.0 };
             let size = sign * 3.0 * (1.0 + draw()) * limits[&cause] / course.at(span_s);
             cause.channels().iter().for_each(|channel| drift_reading(&mut recording, *channel, course, size));
@@ -136,13 +137,14 @@ fn one(
 ) -> Row {
     let mut draw = draw(seed ^ 0xd21f);
     let planted = cause.map(|cause| {
-        let kind = if draw() < 1.0 / 3.0 { TimeHistoryKind::Step } else { TimeHistoryKind::Ramp };
+        let shape = if draw() < 1.0 / 3.0 { Shape::Step } else { RATE_PER_H };
         let span_s = common::HOLD_S + 26.0 * common::DWELL_S;
-        let share = match kind {
-            TimeHistoryKind::Ramp => 0.4 * draw() * f64::from(u8::from(draw() < 0.7)),
-            TimeHistoryKind::Step => 0.25 + 0.5 * draw(),
+        let share = if shape == RATE_PER_H {
+            0.4 * draw() * f64::from(u8::from(draw() < 0.7))
+        } else {
+            0.25 + 0.5 * draw()
         };
-        let course = TimeHistory { kind, onset_s: share * span_s };
+        let course = TimeHistory { onset: share * span_s, shape };
         let sign = if draw() < 0.5 || cause == Cause::BearingFriction { 1.0 } else { -1.0 };
         let sign = if cause == Cause::Fouling { -1.0 } else { sign };
         let change = sign * factor * (1.0 + draw()) * limits[&cause];
@@ -157,7 +159,7 @@ fn one(
     // Two repeats: twice the time between visits of the reference jump.
     let two_repeats_s = 2.0 * 8.0 * common::DWELL_S;
     let onset_right = planted.is_some_and(|planted| {
-        main.is_some_and(|found| (found.onset_s - planted.course.onset_s).abs() <= two_repeats_s)
+        main.is_some_and(|found| (found.onset_s - planted.course.onset).abs() <= two_repeats_s)
     });
     // The mean is taken out: a constant bias is not the correction's business.
     let rms = |values: &[f64]| {
@@ -191,16 +193,16 @@ fn one(
         size_right: planted.is_some_and(|planted| {
             main.is_some_and(|found| {
                 let same_kind = matches!(
-                    (found.size, planted.course.kind),
-                    (RateOrStep::RatePerH(_), TimeHistoryKind::Ramp)
-                        | (RateOrStep::Step(_), TimeHistoryKind::Step)
+                    (found.size, planted.course.shape),
+                    (RateOrStep::RatePerH(_), Shape::Ramp(_))
+                        | (RateOrStep::Step(_), Shape::Step)
                 );
                 same_kind && (found.low..=found.high).contains(&planted.size)
             })
         }),
-        size_ratio: planted.and_then(|planted| match (main?.size, planted.course.kind) {
-            (RateOrStep::RatePerH(size), TimeHistoryKind::Ramp)
-            | (RateOrStep::Step(size), TimeHistoryKind::Step) => Some(size / planted.size),
+        size_ratio: planted.and_then(|planted| match (main?.size, planted.course.shape) {
+            (RateOrStep::RatePerH(size), Shape::Ramp(_))
+            | (RateOrStep::Step(size), Shape::Step) => Some(size / planted.size),
             _ => None,
         }),
         shrink: [shrink(&fitted, &start), shrink(&identified, &start), shrink(&identified, &undrifted)],

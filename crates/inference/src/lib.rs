@@ -10,4 +10,6 @@ pub mod descent;
 pub mod hypotheses;
 pub mod interval;
 pub mod mixture;
+pub mod posterior;
 pub mod search;
+pub mod time_history;

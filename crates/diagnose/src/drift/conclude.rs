@@ -2,15 +2,15 @@
 
 use crate::drift::causes::cause::{Cause, CauseKind};
 use crate::drift::causes::drift::Drift;
-use crate::drift::causes::time_history::TimeHistoryKind;
 use crate::drift::correction::corrected::{corrected_points, identified};
 use crate::drift::correction::visits::group;
 use crate::drift::likelihood::decide::{Decision, DetectedCause};
-use crate::drift::likelihood::fit::Fit;
+use crate::drift::likelihood::fit::FittedDrift;
 use crate::drift::likelihood::refinement::Refinement;
 use crate::drift::report::{DriftReport, DriftVerdict, FoundDrift, RateOrStep};
 use crate::drift::runs::request::DriftRequest;
 use mapper_core::{IdentifiedPoint, Recording, probability_text};
+use mapper_inference::time_history::Shape;
 
 pub(crate) fn conclude(
     request: &DriftRequest<'_>,
@@ -39,18 +39,18 @@ pub(crate) fn conclude(
     }
 }
 
-fn drift(detected: &DetectedCause, fit: &Fit) -> FoundDrift {
+fn drift(detected: &DetectedCause, fit: &FittedDrift) -> FoundDrift {
     let Drift { cause, history, size } = fit.drift;
     FoundDrift {
         cause,
         probability: detected.probability,
         alternatives: detected.alternatives.clone(),
-        onset_s: history.onset_s,
+        onset_s: history.onset,
         onset_low_s: fit.onset_low_s,
         onset_high_s: fit.onset_high_s,
-        size: match history.kind {
-            TimeHistoryKind::Ramp => RateOrStep::RatePerH(size),
-            TimeHistoryKind::Step => RateOrStep::Step(size),
+        size: match history.shape {
+            Shape::Ramp(_) => RateOrStep::RatePerH(size),
+            Shape::Step | Shape::Decay(_) => RateOrStep::Step(size),
         },
         low: fit.low,
         high: fit.high,

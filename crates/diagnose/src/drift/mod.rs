@@ -14,8 +14,7 @@ mod report;
 mod runs;
 mod sensitivity;
 
-pub use causes::cause::{Cause, CauseKind};
-pub use causes::time_history::{TimeHistory, TimeHistoryKind};
+pub use causes::cause::{Cause, CauseKind, RATE_PER_H};
 pub use correction::subtract_drift::without_drift;
 pub use diagnose::diagnose;
 pub use report::{

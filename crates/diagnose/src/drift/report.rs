@@ -1,7 +1,7 @@
 //! The report, printed and written as JSON.
 
-use crate::drift::causes::cause::Cause;
-use crate::drift::causes::time_history::{TimeHistory, TimeHistoryKind};
+use crate::drift::causes::cause::{Cause, RATE_PER_H};
+use mapper_inference::time_history::{Shape, TimeHistory};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -162,11 +162,11 @@ impl FoundDrift {
 
     /// Its size at a campaign time, s; unit of the cause.
     pub fn at(&self, t_s: f64) -> f64 {
-        let (kind, size) = match self.size {
-            RateOrStep::RatePerH(rate) => (TimeHistoryKind::Ramp, rate),
-            RateOrStep::Step(step) => (TimeHistoryKind::Step, step),
+        let (shape, size) = match self.size {
+            RateOrStep::RatePerH(rate) => (RATE_PER_H, rate),
+            RateOrStep::Step(step) => (Shape::Step, step),
         };
-        size * TimeHistory { kind, onset_s: self.onset_s }.at(t_s)
+        size * TimeHistory { onset: self.onset_s, shape }.at(t_s)
     }
 }
 

@@ -5,7 +5,7 @@ use crate::gap::best_fit::fit::{Effort, Fit};
 use crate::gap::best_fit::selection::Selection;
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::place::{Gain, places};
-use crate::gap::causes::probabilities::{cause_probabilities, rivals, suspicions, weight};
+use crate::gap::causes::probabilities::{Posterior, posterior, rivals, suspicions, weight};
 use crate::gap::causes::select::{
     HOPELESS, MIN_SHRINK, Search, close, ranked, refit, search, search_onsets, supported,
 };
@@ -25,6 +25,7 @@ use crate::gap::preconditions::usable::checked_study;
 use crate::gap::residuals::study::{Hypothesis, Prediction, Study, members};
 use crate::gap::residuals::whiten::Linearised;
 use mapper_core::Recording;
+use mapper_inference::posterior::CauseProbabilities;
 use mapper_observe::declared::Declared;
 use mapper_observe::model_inputs::step_timing::with_command_times;
 use mapper_physics::rig::effect::{Effect, Submodel};
@@ -171,18 +172,18 @@ pub fn diagnose(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
     progress(0.88, "residual");
     let best = fits.first().unwrap_or(&null);
     let left_by_null = adequacy(&study, &linearised, &null);
-    let posterior = cause_probabilities(&study, calibration, &null, &fits, &left);
-    let named = posterior.named;
+    let Posterior { probabilities, candidates, alike } = posterior(&study, calibration, &null, &fits, &left);
+    let CauseProbabilities { named, unmodelled, .. } = probabilities;
     let weight = |fit: &Fit| weight(calibration, &study, fit);
     // Each fold chooses among the causes that the data do not distinguish, and they share the location.
-    let alike: Vec<&Fit> = posterior.alike.iter().map(|place| &fits[*place]).collect();
+    let alike: Vec<&Fit> = alike.iter().map(|place| &fits[*place]).collect();
     let linearisations = [&linearised, at_best];
     let compared =
         Compared { study: &study, linearised: linearisations, null: &null, causes: &alike, weight: &weight };
     let gap = held_out_gap(compared, &folds);
     let verdict = if !named {
-        if posterior.outside > 0.5 { Verdict::Unexplained } else { Verdict::WithinTolerance }
-    } else if posterior.outside <= 0.5 {
+        if unmodelled > 0.5 { Verdict::Unexplained } else { Verdict::WithinTolerance }
+    } else if unmodelled <= 0.5 {
         Verdict::Explained
     } else {
         let n = null.residual.len() as f64;
@@ -212,13 +213,13 @@ pub fn diagnose(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
     };
     progress(0.95, "next experiment");
     let Suggested { next, experiments } = match verdict {
-        Verdict::WithinTolerance => suspicions(&posterior, &fits, &null)
+        Verdict::WithinTolerance => suspicions(&probabilities, &fits, &null)
             .map(|rivals| next(&study, rivals, &experiments, calibration.temperature))
             .unwrap_or_default(),
         Verdict::Unexplained | Verdict::PartlyExplained => {
             Suggested { next: Some(sensor_near(&r#where)), experiments: Vec::new() }
         }
-        Verdict::Explained => rivals(&posterior, &fits)
+        Verdict::Explained => rivals(&probabilities, &fits)
             .map(|rivals| next(&study, rivals, &experiments, calibration.temperature))
             .unwrap_or_default(),
     };
@@ -234,10 +235,10 @@ pub fn diagnose(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
         r#where,
         suspects: beyond_prior(&study, at_best, fits.first().filter(|_| named).unwrap_or(&null)),
         inseparable,
-        candidates: posterior.candidates,
-        probability_none: posterior.none,
-        probability_unlisted: posterior.unlisted,
-        probability_outside: posterior.outside,
+        candidates,
+        probability_none: probabilities.none,
+        probability_unlisted: probabilities.unlisted,
+        probability_outside: unmodelled,
         closure_terms: Vec::new(),
         residual_sources: Vec::new(),
         gap,

@@ -6,7 +6,7 @@ use crate::gap::best_fit::fit::{Effort, Fit, fit};
 use crate::gap::best_fit::selection::Selection;
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::place::{BEND, Explanation, Gain, Part, of_fits, places_of, rarity, signature};
-use crate::gap::causes::probabilities::{evidence_resolution, weight};
+use crate::gap::causes::probabilities::weight;
 use crate::gap::causes::select::MIN_SHRINK;
 use crate::gap::diagnose::Diagnosed;
 use crate::gap::findings::report::{Law, MAX_EQUIVALENT, MissingSource, Place, Verdict};
@@ -23,6 +23,7 @@ use crate::missing_terms::search::select::{Choice, choices};
 use crate::missing_terms::terms::balance::{Balance, Properties};
 use crate::missing_terms::terms::library::library;
 use mapper_core::half_width_95;
+use mapper_inference::posterior::{CauseProbabilities, CauseSet, Rules};
 
 /// Results outside the effect library.
 #[derive(Debug, Default)]
@@ -230,7 +231,13 @@ fn propose(
         .iter()
         .map(|fit| weight(calibration, study, fit))
         .fold(weight(calibration, study, null), f64::max);
-    if best.score() + PRIOR_LAW.ln() - inside < calibration.threshold {
+    let left = calibration.outside(adequacy(&bench.study, linearised, &best.fit).features());
+    let set = |law: &Candidate| CauseSet { members: vec![law.effect], ln_weight: law.score() + PRIOR_LAW.ln() };
+    let sets: Vec<CauseSet> = found.fitted.iter().map(set).collect();
+    // All laws are among the sets.
+    let rules = Rules { unlisted: 0.0, ..calibration.rules() };
+    let CauseProbabilities { named, alike, causes, .. } = rules.cause_probabilities(inside, &sets, left);
+    if !named {
         return Vec::new();
     }
     let Ok(before) = fit(&bench.study, linearised, &study.nothing(), training, Effort::default()) else {
@@ -251,32 +258,23 @@ fn propose(
     if !worse.is_empty() {
         return Vec::new();
     }
-    let left = calibration.outside(adequacy(&bench.study, linearised, &best.fit).features());
-    let near = |other: &&Candidate| best.score() - other.score() < evidence_resolution(calibration);
-    let weights: f64 = found
-        .fitted
-        .iter()
-        .map(|other| ((other.score() - best.score()) / calibration.temperature).exp())
-        .sum::<f64>()
-        + ((inside - best.score() - PRIOR_LAW.ln()) / calibration.temperature).exp();
     let describe = |candidate: &Candidate| tell(&bench.library, candidate, calibration.interval_factor);
     let description = describe(best);
     let script = script_of(&best.terms(&bench.library), &description);
     let LawDescription { sentence, terms, .. } = description;
-    let equivalent =
-        found.fitted.iter().skip(1).filter(near).take(MAX_EQUIVALENT).map(|c| describe(c).sentence);
+    let others = found.fitted[..alike].iter().skip(1).take(MAX_EQUIVALENT);
     vec![Law {
         submodel: bench.library[best.choice.terms[0]].submodel().name().to_owned(),
         sentence,
         terms,
-        probability: (1.0 - left) / weights,
+        probability: causes[0].probability,
         gap_reduction,
         held_out_steps: held_out.len(),
         channels,
         worse,
         beside: accompanying_effects(study, best),
         stability: found.stability,
-        equivalent: equivalent.collect(),
+        equivalent: others.map(|law| describe(law).sentence).collect(),
         rhai: None,
         script,
     }]

@@ -7,9 +7,9 @@ use crate::drift::common;
 use common::{Planted, campaign, drift_reading, judge, judge_all};
 use mapper_core::Channel;
 use mapper_diagnose::drift::{
-    Alternative, Cause, DriftReport, DriftVerdict, FoundDrift, RateOrStep, RecordedRun, TimeHistory,
-    TimeHistoryKind,
+    Alternative, Cause, DriftReport, DriftVerdict, FoundDrift, RATE_PER_H, RateOrStep, RecordedRun,
 };
+use mapper_inference::time_history::{Shape, TimeHistory};
 
 fn limit(report: &DriftReport, cause: Cause) -> f64 {
     report.detection_limits.iter().find(|limit| limit.cause == cause).unwrap().change
@@ -45,7 +45,7 @@ fn a_drift_free_campaign_is_not_flagged_and_prints_its_limits() {
 #[test]
 fn a_sensor_that_drifts_is_named_and_its_points_are_put_right() {
     // Three times the limit of 0.08 K over the campaign, from 600 s on.
-    let course = TimeHistory { kind: TimeHistoryKind::Ramp, onset_s: 600.0 };
+    let course = TimeHistory { onset: 600.0, shape: RATE_PER_H };
     let planted = Planted { cause: Cause::Sensors(&[Channel::T2]), course, size: 0.34 };
     let campaign = campaign(12, Some(planted));
     let report = judge(&campaign.recording);
@@ -80,8 +80,8 @@ fn a_sensor_that_drifts_is_named_and_its_points_are_put_right() {
 /// Each as large as in the test before: both are named, sized and dated together, and both are removed.
 #[test]
 fn two_drifts_at_once_are_both_named() {
-    let ramp = TimeHistory { kind: TimeHistoryKind::Ramp, onset_s: 600.0 };
-    let step = TimeHistory { kind: TimeHistoryKind::Step, onset_s: 1800.0 };
+    let ramp = TimeHistory { onset: 600.0, shape: RATE_PER_H };
+    let step = TimeHistory { onset: 1800.0, shape: Shape::Step };
     let planted = Planted { cause: Cause::Sensors(&[Channel::T2]), course: ramp, size: 0.34 };
     let mut recording = campaign(18, Some(planted)).recording;
     drift_reading(&mut recording, Channel::CompressorFlow, step, 0.01);
@@ -103,7 +103,7 @@ fn two_drifts_at_once_are_both_named() {
 /// one drift dated or sized roughly is not taken for another drift.
 #[test]
 fn a_large_step_is_one_drift() {
-    let at = |onset_s: f64| TimeHistory { kind: TimeHistoryKind::Step, onset_s };
+    let at = |onset: f64| TimeHistory { onset, shape: Shape::Step };
     for (seed, planted) in [
         (20, Planted { cause: Cause::Sensors(&[Channel::P2]), course: at(1708.0), size: 600.0 }),
         (21, Planted { cause: Cause::BearingFriction, course: at(1695.5), size: 8.65e-7 }),
@@ -111,14 +111,14 @@ fn a_large_step_is_one_drift() {
         let report = judge(&campaign(seed, Some(planted)).recording);
         let drift = only(&report);
         assert_eq!(drift.cause, planted.cause, "{}", report.reason);
-        assert!((drift.onset_s - planted.course.onset_s).abs() < 120.0, "{}", drift.onset_s);
+        assert!((drift.onset_s - planted.course.onset).abs() < 120.0, "{}", drift.onset_s);
     }
 }
 
 /// A barometer that drifts moves both absolute pressures, and neither by itself explains that.
 #[test]
 fn a_common_reference_that_drifts_is_named_as_one_cause() {
-    let course = TimeHistory { kind: TimeHistoryKind::Ramp, onset_s: 0.0 };
+    let course = TimeHistory { onset: 0.0, shape: RATE_PER_H };
     let mut recording = campaign(19, None).recording;
     for channel in [Channel::P1, Channel::P2] {
         drift_reading(&mut recording, channel, course, 400.0);
@@ -130,7 +130,7 @@ fn a_common_reference_that_drifts_is_named_as_one_cause() {
 
 #[test]
 fn a_machine_that_fouls_is_reported_from_its_sensors() {
-    let course = TimeHistory { kind: TimeHistoryKind::Ramp, onset_s: 0.0 };
+    let course = TimeHistory { onset: 0.0, shape: RATE_PER_H };
     let planted = Planted { cause: Cause::Fouling, course, size: -0.01 };
     let report = judge(&campaign(13, Some(planted)).recording);
     assert_eq!(
@@ -144,7 +144,7 @@ fn a_machine_that_fouls_is_reported_from_its_sensors() {
 
 #[test]
 fn a_machine_that_changes_much_is_sized_as_it_changed() {
-    let course = TimeHistory { kind: TimeHistoryKind::Ramp, onset_s: 0.0 };
+    let course = TimeHistory { onset: 0.0, shape: RATE_PER_H };
     let planted = Planted { cause: Cause::Fouling, course, size: -0.03 };
     let report = judge(&campaign(16, Some(planted)).recording);
     assert_eq!(only(&report).cause, planted.cause, "{}", report.reason);
@@ -156,7 +156,7 @@ fn a_machine_that_changes_much_is_sized_as_it_changed() {
 #[test]
 fn a_step_over_two_nights_is_dated_within_two_repeats() {
     // The second night follows the first on the campaign's axis of time; the gain of the flow meter steps at its begin.
-    let course = TimeHistory { kind: TimeHistoryKind::Step, onset_s: 0.0 };
+    let course = TimeHistory { onset: 0.0, shape: Shape::Step };
     let planted = Planted { cause: Cause::Sensors(&[Channel::CompressorFlow]), course, size: 0.01 };
     let (first, second) = (campaign(14, None), campaign(14, Some(planted)));
     let runs =

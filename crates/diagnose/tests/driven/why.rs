@@ -33,7 +33,7 @@ fn seeds() -> u64 {
 
 /// Ids of the open causes, one string per cause.
 fn open(found: &Diagnosis) -> Vec<String> {
-    found.causes[..found.open].iter().map(|cause| cause.effects.join("+")).collect()
+    found.causes[..found.open].iter().map(|cause| cause.candidate.effects.join("+")).collect()
 }
 
 /// Diagnoses an engine of each seed with a planted cause, fitted to the whole log. `without` is not recorded.
@@ -51,7 +51,7 @@ fn one_of(seed: u64, side: Side, course: &Course, planted: &[(&str, f64)], witho
 fn count(found: &[Diagnosis], right: impl Fn(&Diagnosis) -> bool) -> usize {
     let wrong = found.iter().filter(|found| !right(found));
     for found in wrong {
-        let causes: Vec<_> = found.causes.iter().map(|c| (c.effects.join("+"), c.probability)).collect();
+        let causes: Vec<_> = found.causes.iter().map(|c| (c.candidate.effects.join("+"), c.candidate.probability)).collect();
         println!(
             "{:?} outside {:.2}, left {:?}: {:?}",
             found.word,
@@ -89,7 +89,7 @@ fn a_slow_probe_is_named_with_its_size() {
     let found = all_of(COMPRESSOR, &Course::brake(), &[("tip_diameter", 2.5e-3)], &[Channel::Tc]);
     assert!(count(&found, |found| is_named(found, "tip_diameter")) >= almost_all());
     let held = |found: &Diagnosis| {
-        found.causes[0].parameters.get("tip_diameter").is_some_and(|d| (d.low..=d.high).contains(&2.5e-3))
+        found.causes[0].candidate.parameters.get("tip_diameter").is_some_and(|d| (d.low..=d.high).contains(&2.5e-3))
     };
     assert!(count(&found, held) >= almost_all());
     for found in &found {
@@ -107,7 +107,7 @@ fn a_sheathed_probe_is_named_and_no_wall_beside_a_bare_one() {
     assert!(count(&found, |found| is_named(found, "sheathed_probe")) >= almost_all());
     let held = |found: &Diagnosis| {
         let holds = |name: &str, truth: f64| {
-            found.causes[0].parameters.get(name).is_some_and(|p| (p.low..=p.high).contains(&truth))
+            found.causes[0].candidate.parameters.get(name).is_some_and(|p| (p.low..=p.high).contains(&truth))
         };
         holds("sheathed_probe.sheath_diameter", 3e-3) && holds("sheathed_probe.element_lag", 1.5)
     };
@@ -207,7 +207,7 @@ fn a_cause_outside_the_catalogue_is_reported_to_be_outside() {
 fn slow_probes_of_the_turbine_side_are_named() {
     let without = &[Channel::Tt];
     let near = |found: &Diagnosis, effect: &str, share: f64| {
-        found.causes[0].parameters.get(effect).is_some_and(|s| (s.value / 1.5 - 1.0).abs() < share)
+        found.causes[0].candidate.parameters.get(effect).is_some_and(|s| (s.value / 1.5 - 1.0).abs() < share)
     };
     let found = all_of(Side::Turbine, &Course::hills(), &[("t4_lag", 1.5)], without);
     assert!(count(&found, |found| is_named(found, "t4_lag") && near(found, "t4_lag", 0.05)) >= almost_all());

@@ -18,7 +18,8 @@ use mapper_diagnose::missing_terms::terms::expression::Expression;
 use mapper_diagnose::missing_terms::terms::law_effect::LawEffect;
 use mapper_diagnose::missing_terms::terms::library::library;
 use mapper_diagnose::missing_terms::terms::term::{Role, Term};
-use mapper_diagnose::missing_terms::terms::time_history::{Shape, TimeHistory};
+use mapper_diagnose::missing_terms::terms::time_history::{Span, Spans};
+use mapper_inference::time_history::{Shape, TimeHistory};
 use mapper_effects::ScriptEffect;
 use mapper_numerics::parallel;
 use mapper_observe::averages::time_table::Table;
@@ -116,7 +117,8 @@ fn nothing_has_no_law() {
 fn a_force_comes_back_in_its_step() {
     let mut planted = study(&VISITS, Vec::new());
     let begin_s = planted.steps[4].marker.start_s;
-    let course = TimeHistory { shape: Shape::Level, spans_s: vec![(begin_s, begin_s + VISITS.dwell_s)] };
+    let history = TimeHistory { onset: begin_s, shape: Shape::Step };
+    let course = Spans(vec![Span { history, end_s: begin_s + VISITS.dwell_s }]);
     let term = Term {
         acts_on: vec![(Balance::CompressorHousing, Expression::InTime(course))],
         unit: "W",

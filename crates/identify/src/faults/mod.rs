@@ -24,8 +24,8 @@ use crate::reading_checks::ends::Ends;
 use crate::reading_checks::failed_check::FailedCheck;
 use mapper_core::{Channel, Method, ModelTolerances, Recording, SuspectedFault, Warning};
 use mapper_inference::hypotheses::{Likelihood, Member, Priors};
-use mapper_inference::interval::COVERAGE;
 use mapper_inference::mixture::MIN_WEIGHT;
+use mapper_inference::posterior::EXCLUDED_ODDS;
 use mapper_numerics::statistics::EXCLUDE_SIGMAS;
 use mapper_physics::rig::sensor_fault::additive;
 
@@ -82,7 +82,7 @@ pub(crate) fn find(likelihood: &Likelihood, priors: &Priors, method: Method) -> 
         suspect: suspect(member.index),
         value: member.value,
         sigma: member.sigma,
-        alternatives: likelier_than(&member, 1.0 - COVERAGE),
+        alternatives: likelier_than(&member, EXCLUDED_ODDS),
         touches_points: touches_points(suspect(member.index), method)
             || likelier_than(&member, MIN_WEIGHT).into_iter().any(|other| touches_points(other, method)),
     };

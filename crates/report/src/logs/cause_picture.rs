@@ -45,7 +45,7 @@ pub fn why_figure(name: &str, diagnosis: &Diagnosis) -> Figure {
 fn cause_label(diagnosis: &Diagnosis) -> String {
     match (diagnosis.word, diagnosis.causes.first()) {
         (SideVerdict::Named | SideVerdict::NotDistinguished, Some(cause)) => {
-            format!("with {}", cause.names.join(" and "))
+            format!("with {}", cause.candidate.names.join(" and "))
         }
         _ => "no cause is named".to_owned(),
     }

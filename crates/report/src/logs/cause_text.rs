@@ -3,7 +3,7 @@
 use crate::formatting::table::{self, COLUMNS};
 use crate::formatting::wrapped::wrapped;
 use mapper_core::probability_text;
-use mapper_diagnose::driven::cause_search::{Beyond, Cause, Diagnosis, HeldOut, SideVerdict};
+use mapper_diagnose::driven::cause_search::{Beyond, Diagnosis, HeldOut, SideCause, SideVerdict};
 use std::fmt::Write;
 
 /// Maximum number of causes shown in addition to the undecided ones.
@@ -85,16 +85,16 @@ fn headline(diagnosis: &Diagnosis) -> String {
     match diagnosis.word {
         SideVerdict::Named => format!(
             "{} explains it ({}).",
-            open.first().map_or_else(String::new, |cause| capitalise(&cause.names.join(" and "))),
-            open.first().map_or_else(String::new, |cause| probability_text(cause.probability))
+            open.first().map_or_else(String::new, |cause| capitalise(&cause.candidate.names.join(" and "))),
+            open.first().map_or_else(String::new, |cause| probability_text(cause.candidate.probability))
         ),
         SideVerdict::NotDistinguished => format!(
             "{} explain it equally well and are indistinguishable.",
-            capitalise(&open.iter().map(|cause| cause.names.join(" and ")).collect::<Vec<_>>().join("; or "))
+            capitalise(&open.iter().map(|cause| cause.candidate.names.join(" and ")).collect::<Vec<_>>().join("; or "))
         ),
         SideVerdict::NotBorneOut => format!(
             "No cause is named: {} would explain the fitted part, but the residual of other phases does not decrease.",
-            open.first().map_or_else(String::new, |cause| cause.names.join(" and "))
+            open.first().map_or_else(String::new, |cause| cause.candidate.names.join(" and "))
         ),
         SideVerdict::WithinTolerance => format!(
             "Nothing is seen beyond the usual uncertainty of such a machine (no cause: {}).",
@@ -114,16 +114,16 @@ fn capitalise(words: &str) -> String {
 }
 
 fn causes(text: &mut String, diagnosis: &Diagnosis) {
-    let shown = |(place, cause): &(usize, &Cause)| {
+    let shown = |(place, cause): &(usize, &SideCause)| {
         *place < diagnosis.open
             || *place == 0
-            || (*place < diagnosis.open + FURTHER_ROWS && cause.probability > NOT_WORTH)
+            || (*place < diagnosis.open + FURTHER_ROWS && cause.candidate.probability > NOT_WORTH)
     };
     let heads = ["cause", "probability", "size", "95 % interval", "residual, K"];
     let mut rows = table::with_heads(&heads).with_texts(2..4);
     for (_, cause) in diagnosis.causes.iter().enumerate().filter(shown) {
         let each = |of: &dyn Fn(&mapper_diagnose::gap::findings::report::Estimate) -> String| {
-            cause.parameters.values().map(of).collect::<Vec<_>>().join("; ")
+            cause.candidate.parameters.values().map(of).collect::<Vec<_>>().join("; ")
         };
         let interval = each(&|e| {
             let scale = if e.unit == "m" { 1e3 } else { 1.0 };
@@ -140,8 +140,8 @@ fn causes(text: &mut String, diagnosis: &Diagnosis) {
         });
         let end = if cause.at_the_end.is_empty() { "" } else { " (end of its range)" };
         rows.add_row([
-            cause.effects.join(" + "),
-            probability_text(cause.probability),
+            cause.candidate.effects.join(" + "),
+            probability_text(cause.candidate.probability),
             each(&|e| e.size.clone()) + end,
             interval,
             cause.left_k.first().map_or_else(String::new, |k| format!("{k:.2}")),

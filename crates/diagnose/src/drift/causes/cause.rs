@@ -1,7 +1,7 @@
 //! Possible causes of drift.
 
-use crate::drift::causes::time_history::TimeHistoryKind;
 use mapper_core::{Channel, Dimension, with_unit};
+use mapper_inference::time_history::Shape;
 use mapper_physics::laws::bearing_friction::at_150_krpm;
 use mapper_physics::rig::sensor_fault::drifts;
 use serde::{Serialize, Serializer};
@@ -26,6 +26,9 @@ pub enum CauseKind {
     /// The machine changes.
     Machine,
 }
+
+/// A drift at a constant rate, per hour.
+pub const RATE_PER_H: Shape = Shape::Ramp(3600.0);
 
 /// Change of the map's flow by fouling, over the change of its efficiency.
 pub(crate) const FOULING_FLOW_SHARE: f64 = 0.6;
@@ -98,10 +101,10 @@ impl Cause {
     }
 
     /// Prior standard deviation of its rate per hour, or of its step, in a campaign of this length, s.
-    pub(crate) fn prior_sigma(self, kind: TimeHistoryKind, campaign_s: f64) -> f64 {
-        match kind {
-            TimeHistoryKind::Ramp => self.sigma_of_change() * 3600.0 / campaign_s,
-            TimeHistoryKind::Step => self.sigma_of_change(),
+    pub(crate) fn prior_sigma(self, shape: Shape, campaign_s: f64) -> f64 {
+        match shape {
+            Shape::Ramp(length_s) => self.sigma_of_change() * length_s / campaign_s,
+            Shape::Step | Shape::Decay(_) => self.sigma_of_change(),
         }
     }
 

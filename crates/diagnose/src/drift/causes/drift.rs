@@ -1,7 +1,7 @@
 //! A drift: its cause with a time history and a size, and its effect on machine and inputs.
 
 use crate::drift::causes::cause::{Cause, FOULING_FLOW_SHARE};
-use crate::drift::causes::time_history::TimeHistory;
+use mapper_inference::time_history::TimeHistory;
 use mapper_observe::channels::INPUT_CHANNELS;
 use mapper_observe::perturbation::Perturbation;
 use mapper_physics::machine::params::{BoundaryConditions, Params};

@@ -1,5 +1,4 @@
-//! Possible causes of drift, their time histories, and their effects on the model.
+//! Possible causes of drift, and their effects on the model.
 
 pub(crate) mod cause;
 pub(crate) mod drift;
-pub(crate) mod time_history;

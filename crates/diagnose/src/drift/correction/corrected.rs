@@ -2,7 +2,7 @@
 
 use crate::drift::causes::cause::{Cause, CauseKind};
 use crate::drift::correction::subtract_drift::without_drifts;
-use crate::drift::likelihood::fit::Fit;
+use crate::drift::likelihood::fit::FittedDrift;
 use crate::drift::likelihood::refinement::Refinement;
 use crate::drift::report::CorrectedPoint;
 use crate::drift::runs::request::DriftRequest;
@@ -37,7 +37,7 @@ pub(crate) fn corrected_points(
     let Refinement { readings, constants, fits, .. } = refined;
     let drifts = &fits.drifts;
     let has_sensor_drift = drifts.iter().any(|fit| fit.drift.cause.kind() == CauseKind::Sensor);
-    let signatures: Vec<(&Fit, Response)> =
+    let signatures: Vec<(&FittedDrift, Response)> =
         drifts.iter().filter_map(|fit| Some((fit, readings.signature(fit.drift.cause)?))).collect();
     let corrected: Vec<Vec<IdentifiedPoint>> = (0..recordings.len())
         .map(|run| {
@@ -54,7 +54,7 @@ pub(crate) fn corrected_points(
         .iter()
         .enumerate()
         .filter_map(|(position, step)| {
-            let at_end = |fit: &Fit| fit.drift.at(step.end_s + step.offset_s);
+            let at_end = |fit: &FittedDrift| fit.drift.at(step.end_s + step.offset_s);
             let positions = readings.point_positions(position);
             let [eta, h_w_m2k] = positions.map(|position| {
                 let mut value = readings.model[position];

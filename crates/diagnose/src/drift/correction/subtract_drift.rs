@@ -1,7 +1,7 @@
 //! A recording with the drift of its sensors subtracted from their readings.
 
 use crate::drift::causes::cause::is_relative;
-use crate::drift::likelihood::fit::Fit;
+use crate::drift::likelihood::fit::FittedDrift;
 use crate::drift::report::{DriftReport, FoundDrift};
 use mapper_core::{Channel, Recording};
 
@@ -17,9 +17,9 @@ pub fn without_drift(recording: &Recording, report: &DriftReport) -> Option<Reco
 }
 
 /// The recording of a run that starts `offset_s` after the campaign, with the fitted drifts subtracted.
-pub(crate) fn without_drifts(recording: &Recording, drifts: &[Fit], offset_s: f64) -> Recording {
+pub(crate) fn without_drifts(recording: &Recording, drifts: &[FittedDrift], offset_s: f64) -> Recording {
     let mut recording = recording.clone();
-    for Fit { drift, .. } in drifts {
+    for FittedDrift { drift, .. } in drifts {
         subtract(&mut recording, drift.cause.channels(), &|t_s| drift.at(t_s + offset_s));
     }
     recording

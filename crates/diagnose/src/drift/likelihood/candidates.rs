@@ -1,11 +1,11 @@
 //! All causes with all their time histories, as hypotheses of one likelihood.
 
-use crate::drift::causes::cause::Cause;
-use crate::drift::causes::time_history::{TimeHistory, TimeHistoryKind};
+use crate::drift::causes::cause::{Cause, RATE_PER_H};
 use crate::drift::likelihood::low_rank::LowRank;
 use crate::drift::runs::request::Unsolvable;
 use crate::drift::sensitivity::readings::{Readings, Response};
 use mapper_inference::hypotheses::{Hypothesis, Likelihood, Priors};
+use mapper_inference::time_history::{Shape, TimeHistory};
 use nalgebra::{DMatrix, DVector};
 
 /// Prior probability of a drift in a campaign. Judgement: repeats are made if drift is expected.
@@ -25,7 +25,7 @@ pub(crate) const FINE_ONSETS: usize = ONSETS * FINE_PER_GRID;
 
 /// A cause, by its position among the observable ones, with a time history.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Candidate {
+pub(crate) struct DatedCause {
     pub cause: usize,
     pub history: TimeHistory,
 }
@@ -33,7 +33,7 @@ pub(crate) struct Candidate {
 /// The observable causes, and all their time histories.
 pub(crate) struct Candidates {
     pub causes: Vec<Cause>,
-    pub all: Vec<Candidate>,
+    pub all: Vec<DatedCause>,
     /// Change of the readings by each at size 1 (rate per hour, or step), a column each.
     pub columns: DMatrix<f64>,
     pub priors: Priors,
@@ -46,8 +46,8 @@ impl Candidates {
             Cause::all().into_iter().filter_map(|cause| Some((cause, readings.signature(cause)?))).collect();
         let (start_s, end_s) = readings.span_s();
         let histories = time_histories(start_s, end_s, ONSETS);
-        let mut all: Vec<Candidate> = (0..observable.len())
-            .flat_map(|cause| histories.iter().map(move |history| Candidate { cause, history: *history }))
+        let mut all: Vec<DatedCause> = (0..observable.len())
+            .flat_map(|cause| histories.iter().map(move |history| DatedCause { cause, history: *history }))
             .collect();
         let on_grid = all.len();
         let spacing_s = (end_s - start_s) / ONSETS as f64;
@@ -55,32 +55,30 @@ impl Candidates {
             let Some(cause) = observable.iter().position(|(cause, _)| cause == known) else { continue };
             let fine = FINE_PER_GRID as f64;
             let shifts_s = (0..2 * FINE_PER_GRID).map(|part| ((part as f64 + 0.5) / fine - 1.0) * spacing_s);
-            let onsets_s = shifts_s.map(|by_s| history.onset_s + by_s).chain([history.onset_s]);
+            let onsets_s = shifts_s.map(|by_s| history.onset + by_s).chain([history.onset]);
             let within = onsets_s.filter(|onset_s| (start_s..end_s).contains(onset_s));
-            all.extend(
-                within.map(|onset_s| Candidate { cause, history: TimeHistory { onset_s, ..*history } }),
-            );
+            all.extend(within.map(|onset| DatedCause { cause, history: TimeHistory { onset, ..*history } }));
         }
         if all.is_empty() {
             return Err(Unsolvable::NothingShows);
         }
         let weight = |cause: &Cause| if is_rare(*cause) { RARE_CAUSE_WEIGHT } else { 1.0 };
         let weights: f64 = observable.iter().map(|(cause, _)| weight(cause)).sum();
-        let hypothesis = |(position, candidate): (usize, &Candidate)| {
+        let hypothesis = |(position, candidate): (usize, &DatedCause)| {
             let cause = observable[candidate.cause].0;
             // Fine onsets share the prior of their onset of the grid.
             let share = if position < on_grid { 1.0 } else { 0.5 / FINE_PER_GRID as f64 };
             let prior = share * EXPECTED_DRIFTS * weight(&cause) / weights / histories.len() as f64;
             Hypothesis {
                 family: candidate.cause,
-                sigma: cause.prior_sigma(candidate.history.kind, end_s - start_s),
+                sigma: cause.prior_sigma(candidate.history.shape, end_s - start_s),
                 ln_prior: prior.ln(),
                 at_least_zero: cause.is_at_least_zero(),
             }
         };
         let hypotheses = all.iter().enumerate().map(hypothesis).collect();
         let column =
-            |Candidate { cause, history }: &Candidate| readings.column(&observable[*cause].1, *history);
+            |DatedCause { cause, history }: &DatedCause| readings.column(&observable[*cause].1, *history);
         let columns: Vec<DVector<f64>> = all.iter().map(column).collect();
         Ok(Candidates {
             columns: DMatrix::from_columns(&columns),
@@ -119,12 +117,13 @@ pub(crate) fn time_histories(start_s: f64, end_s: f64, count: usize) -> Vec<Time
     let mut histories = Vec::new();
     for index in 0..count {
         let share = index as f64 / count as f64;
+        let onset = start_s + share * length_s;
         if share <= 0.88 {
-            histories.push(TimeHistory { kind: TimeHistoryKind::Ramp, onset_s: start_s + share * length_s });
+            histories.push(TimeHistory { onset, shape: RATE_PER_H });
         }
         // A step at the very start is a constant.
         if (0.04..=0.97).contains(&share) {
-            histories.push(TimeHistory { kind: TimeHistoryKind::Step, onset_s: start_s + share * length_s });
+            histories.push(TimeHistory { onset, shape: Shape::Step });
         }
     }
     histories

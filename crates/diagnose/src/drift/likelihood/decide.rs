@@ -1,7 +1,6 @@
 //! Selects the most probable set of causes and time histories, in addition to constants.
 
 use crate::drift::causes::cause::Cause;
-use crate::drift::causes::time_history::{TimeHistory, TimeHistoryKind};
 use crate::drift::likelihood::candidates::Candidates;
 use crate::drift::likelihood::low_rank::LowRank;
 use crate::drift::likelihood::residuals::{inflate, leave_out};
@@ -9,6 +8,8 @@ use crate::drift::report::{Alternative, DetectionLimit};
 use crate::drift::runs::request::{DriftError, Unsolvable};
 use crate::drift::sensitivity::readings::Readings;
 use mapper_inference::hypotheses::Member;
+use mapper_inference::posterior::shares;
+use mapper_inference::time_history::{Shape, TimeHistory};
 use nalgebra::DMatrix;
 
 /// A detected cause, before the fit of its size and onset.
@@ -55,8 +56,8 @@ pub(crate) fn decide(
     let detected = explanation.members.iter().map(|member| detected(&candidates, member)).collect();
     let (start_s, end_s) = readings.span_s();
     let is_steady = |index: &usize| {
-        let TimeHistory { kind, onset_s } = candidates.all[*index].history;
-        kind == TimeHistoryKind::Ramp && onset_s <= start_s
+        let TimeHistory { onset, shape } = candidates.all[*index].history;
+        matches!(shape, Shape::Ramp(_)) && onset <= start_s
     };
     let limit = |index: usize| {
         let rate_per_h = likelihood.smallest_seen(&candidates.priors, index)?;
@@ -91,12 +92,10 @@ fn detected(candidates: &Candidates, member: &Member) -> DetectedCause {
 
 /// Probabilities from ln of the odds, most probable first.
 fn probabilities(ln_odds: Vec<(Option<Cause>, f64)>) -> Vec<Alternative> {
-    let largest = ln_odds.iter().map(|(_, ln_odds)| *ln_odds).fold(f64::NEG_INFINITY, f64::max);
-    let sum: f64 = ln_odds.iter().map(|(_, ln_odds)| (ln_odds - largest).exp()).sum();
-    let mut all: Vec<Alternative> = ln_odds
-        .into_iter()
-        .map(|(cause, ln_odds)| Alternative { cause, probability: (ln_odds - largest).exp() / sum })
-        .collect();
+    let (causes, ln_odds): (Vec<_>, Vec<f64>) = ln_odds.into_iter().unzip();
+    let each = causes.into_iter().zip(shares(&ln_odds, 1.0));
+    let mut all: Vec<Alternative> =
+        each.map(|(cause, probability)| Alternative { cause, probability }).collect();
     all.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     all
 }

@@ -1,19 +1,19 @@
-//! Fits sizes and onsets of detected causes together with all constants.
+//! FittedDrifts sizes and onsets of detected causes together with all constants.
 
 use crate::drift::causes::cause::Cause;
 use crate::drift::causes::drift::Drift;
-use crate::drift::causes::time_history::TimeHistory;
 use crate::drift::likelihood::candidates::{FINE_ONSETS, time_histories};
 use crate::drift::likelihood::low_rank::LowRank;
 use crate::drift::runs::request::{DriftError, Unsolvable};
 use crate::drift::sensitivity::readings::{Readings, Response};
 use mapper_inference::descent::{ENOUGH, ROUNDS};
+use mapper_inference::time_history::TimeHistory;
 use mapper_numerics::statistics::{CHI_SQUARE_1_95, NORMAL_975};
 use nalgebra::{DMatrix, DVector};
 
 /// The best fit of a drift.
 #[derive(Debug, Clone)]
-pub(crate) struct Fit {
+pub(crate) struct FittedDrift {
     pub drift: Drift,
     /// 95 % interval of the size: the widest over the onsets compatible with the readings.
     pub low: f64,
@@ -24,22 +24,22 @@ pub(crate) struct Fit {
 }
 
 /// The fits of all drifts, with the constants.
-pub(crate) struct Fits {
-    pub drifts: Vec<Fit>,
+pub(crate) struct FittedDrifts {
+    pub drifts: Vec<FittedDrift>,
     /// Most probable constants, in standard deviations.
     pub constants: DVector<f64>,
     /// Noise and constants.
     pub noise: LowRank,
 }
 
-/// Fits all causes jointly, each with the kind of its time history, starting at its onset. `constants` are the responses to the constants, a column
+/// FittedDrifts all causes jointly, each with the kind of its time history, starting at its onset. `constants` are the responses to the constants, a column
 /// each.
 pub(crate) fn fit(
     readings: &Readings,
     own: &[DMatrix<f64>],
     constants: &DMatrix<f64>,
     mut detected: Vec<(Cause, TimeHistory)>,
-) -> Result<Fits, DriftError> {
+) -> Result<FittedDrifts, DriftError> {
     let mut drifts = Vec::new();
     for _ in 0..if detected.len() > 1 { ROUNDS } else { 1 } {
         drifts.clear();
@@ -53,13 +53,13 @@ pub(crate) fn fit(
         }
     }
     let mut residual = readings.difference.clone();
-    for Fit { drift, .. } in &drifts {
+    for FittedDrift { drift, .. } in &drifts {
         let column = readings.column(&signature(readings, drift.cause)?, drift.history);
         residual.iter_mut().zip(&column).for_each(|(residual, change)| *residual -= drift.size * change);
     }
     let noise = LowRank::new(own, constants)?;
     let constants = noise.constants(&noise.whiten(residual)).column(0).into_owned();
-    Ok(Fits { drifts, constants, noise })
+    Ok(FittedDrifts { drifts, constants, noise })
 }
 
 /// The constants, and the other drifts with their prior sizes.
@@ -73,7 +73,7 @@ fn with_others(
     let mut all = constants.clone().resize_horizontally(count + others.len(), 0.0);
     for (position, (cause, history)) in others.iter().enumerate() {
         let column = readings.column(&signature(readings, *cause)?, *history);
-        all.set_column(count + position, &(column * cause.prior_sigma(history.kind, end_s - start_s)));
+        all.set_column(count + position, &(column * cause.prior_sigma(history.shape, end_s - start_s)));
     }
     Ok(all)
 }
@@ -82,16 +82,16 @@ fn signature(readings: &Readings, cause: Cause) -> Result<Response, Unsolvable> 
     readings.signature(cause).ok_or(Unsolvable::Hidden { cause })
 }
 
-/// Fits one cause with time histories of the same kind as `start`. `noise` includes everything else.
+/// FittedDrifts one cause with time histories of the same kind as `start`. `noise` includes everything else.
 fn fit_one(
     readings: &Readings,
     noise: &LowRank,
     cause: Cause,
     start: TimeHistory,
-) -> Result<Fit, DriftError> {
+) -> Result<FittedDrift, DriftError> {
     let (start_s, end_s) = readings.span_s();
     let mut fine = time_histories(start_s, end_s, FINE_ONSETS);
-    fine.retain(|history| history.kind == start.kind);
+    fine.retain(|history| history.shape == start.shape);
     let signature = signature(readings, cause)?;
     let columns: Vec<DVector<f64>> =
         fine.iter().map(|history| readings.column(&signature, *history)).collect();
@@ -120,11 +120,11 @@ fn fit_one(
     let extreme = |value: &dyn Fn(usize) -> f64, sign: f64| {
         sign * within.iter().map(|index| sign * value(*index)).fold(f64::NEG_INFINITY, f64::max)
     };
-    Ok(Fit {
+    Ok(FittedDrift {
         drift: Drift { cause, history: fine[peak], size: size(peak) },
         low: extreme(&|index| size(index) - NORMAL_975 * sigma(index), -1.0),
         high: extreme(&|index| size(index) + NORMAL_975 * sigma(index), 1.0),
-        onset_low_s: extreme(&|index| fine[index].onset_s, -1.0),
-        onset_high_s: extreme(&|index| fine[index].onset_s, 1.0),
+        onset_low_s: extreme(&|index| fine[index].onset, -1.0),
+        onset_high_s: extreme(&|index| fine[index].onset, 1.0),
     })
 }

@@ -3,15 +3,15 @@
 
 use crate::drift::causes::cause::Cause;
 use crate::drift::causes::drift::Drift;
-use crate::drift::causes::time_history::TimeHistory;
 use crate::drift::likelihood::candidates::FINE_ONSETS;
 use crate::drift::likelihood::decide::{Decision, decide};
-use crate::drift::likelihood::fit::{Fit, Fits, fit};
+use crate::drift::likelihood::fit::{FittedDrift, FittedDrifts, fit};
 use crate::drift::runs::request::DriftError;
 use crate::drift::sensitivity::constants::constants;
 use crate::drift::sensitivity::drive::{Drive, predict};
 use crate::drift::sensitivity::readings::{Readings, Response};
 use mapper_inference::descent::ROUNDS;
+use mapper_inference::time_history::TimeHistory;
 use mapper_observe::declared::Declared;
 use nalgebra::DMatrix;
 
@@ -20,7 +20,7 @@ pub(crate) struct Refinement {
     pub readings: Readings,
     pub constants: Vec<Response>,
     pub decision: Decision,
-    pub fits: Fits,
+    pub fits: FittedDrifts,
 }
 
 impl Refinement {
@@ -46,12 +46,12 @@ impl Refinement {
         readings: Readings,
         own: &[DMatrix<f64>],
         declared: &Declared,
-        known: &[Fit],
+        known: &[FittedDrift],
     ) -> Result<Refinement, DriftError> {
         let constants = constants(&readings, declared);
         let columns =
             DMatrix::from_fn(readings.row_count(), constants.len(), |row, column| constants[column][row]);
-        let decide = |known: &[Fit]| -> Result<(Decision, Fits), DriftError> {
+        let decide = |known: &[FittedDrift]| -> Result<(Decision, FittedDrifts), DriftError> {
             let histories: Vec<(Cause, TimeHistory)> =
                 known.iter().map(|fit| (fit.drift.cause, fit.drift.history)).collect();
             let decision =
@@ -93,16 +93,16 @@ impl Refinement {
 }
 
 /// The constants, and the effect of a small error of each known onset, which would otherwise look like another drift.
-fn with_date_errors(columns: &DMatrix<f64>, readings: &Readings, known: &[Fit]) -> DMatrix<f64> {
+fn with_date_errors(columns: &DMatrix<f64>, readings: &Readings, known: &[FittedDrift]) -> DMatrix<f64> {
     let (start_s, end_s) = readings.span_s();
     // The spacing of the onsets in the fit.
     let error_s = (end_s - start_s) / FINE_ONSETS as f64;
     let mut all = columns.clone().resize_horizontally(columns.ncols() + known.len(), 0.0);
-    for (position, Fit { drift, .. }) in known.iter().enumerate() {
+    for (position, FittedDrift { drift, .. }) in known.iter().enumerate() {
         let Some(signature) = readings.signature(drift.cause) else { continue };
         let mean = |row: usize, by_s: f64| {
-            let onset_s = drift.history.onset_s + by_s;
-            readings.mean_of(row, TimeHistory { onset_s, ..drift.history })
+            let onset = drift.history.onset + by_s;
+            readings.mean_of(row, TimeHistory { onset, ..drift.history })
         };
         for row in 0..readings.row_count() {
             all[(row, columns.ncols() + position)] =

@@ -55,7 +55,7 @@ impl DrivenStep {
         let mut edges = vec![start_s];
         for drift in drifts.iter().filter(|drift| drift.acts_on_machine()) {
             edges.extend(self.segments_s.iter().filter(|segment_s| **segment_s > start_s));
-            let onset_s = drift.history.onset_s - self.step.offset_s;
+            let onset_s = drift.history.onset - self.step.offset_s;
             // A part must not have zero length.
             if (start_s + 0.1..self.end_s - 0.1).contains(&onset_s) {
                 edges.push(onset_s);

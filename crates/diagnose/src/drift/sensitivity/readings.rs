@@ -2,11 +2,11 @@
 
 use crate::drift::causes::cause::{Cause, FOULING_FLOW_SHARE, is_relative};
 use crate::drift::causes::drift::Drift;
-use crate::drift::causes::time_history::TimeHistory;
 use crate::drift::runs::time_axis::{CampaignStep, Segment};
 use crate::drift::sensitivity::drive::Prediction;
 use crate::drift::sensitivity::perturbations::{PERTURBATIONS, difference_step};
 use mapper_core::Channel;
+use mapper_inference::time_history::TimeHistory;
 use mapper_observe::channels::{INPUT_CHANNELS, OUTPUTS};
 use mapper_observe::perturbation::Perturbation;
 use nalgebra::{DMatrix, DVector};

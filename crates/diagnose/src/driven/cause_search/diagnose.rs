@@ -4,22 +4,22 @@ use crate::driven::DrivenError;
 use crate::driven::cause_search::denoise::denoised;
 use crate::driven::cause_search::detectable::{diagnosable, smallest};
 use crate::driven::cause_search::fit::{Fit, SideProblem};
-use crate::driven::cause_search::held_out::{beyond, held_out, ids, residual_rms_k};
+use crate::driven::cause_search::held_out::{beyond, held_out, residual_rms_k};
 use crate::driven::cause_search::phases::phases;
-use crate::driven::cause_search::search::{cause_probabilities, search};
-use crate::driven::cause_search::side_diagnosis::{Cause, ChannelTrace, Diagnosis, SideVerdict, Unknown};
+use crate::driven::cause_search::search::{probabilities, search};
+use crate::driven::cause_search::side_diagnosis::{ChannelTrace, Diagnosis, SideCause, SideVerdict, Unknown};
 use crate::driven::cause_search::sides::compressor::CompressorSide;
 use crate::driven::cause_search::sides::side::{Side, SideModel};
 use crate::driven::cause_search::sides::turbine::TurbineSide;
 use crate::driven::log_rows::Rows;
 use crate::gap::best_fit::coordinate::infos;
 use crate::gap::causes::calibration::Calibration;
-use crate::gap::causes::probabilities::{estimates, name_of};
-use crate::gap::findings::report::EXCLUDED;
-use crate::gap::findings::report::MAX_EQUIVALENT;
+use crate::gap::causes::probabilities::{candidate, name_of};
+use crate::gap::findings::report::{EXCLUDED, MAX_EQUIVALENT};
 use mapper_core::{Channel, Recording};
 use mapper_identify::MAX_CORRELATED_ROWS;
 use mapper_inference::interval::is_identified;
+use mapper_inference::posterior::Cause;
 use mapper_numerics::statistics::{NORMAL_975, rms};
 use mapper_observe::Declared;
 use mapper_physics::rig::effect::{Effect, Rig};
@@ -80,13 +80,13 @@ fn diagnose_side<S: SideModel>(request: &SideRequest<'_>) -> Result<Diagnosis, D
     problem.white_k = white_k(&problem, &all, request).ok_or(DrivenError::NoAnswer)?;
     let (diagnosable, mut not_diagnosable) = diagnosable(&problem);
     let found = search(&problem, &diagnosable, &counts, calibration).ok_or(DrivenError::NoAnswer)?;
-    let posterior = cause_probabilities(calibration, diagnosable.len(), &found);
-    let fit_of = |place: usize| &found.fits[posterior.causes[place].0];
-    let listed = |(_, probability): &&(usize, f64)| *probability >= EXCLUDED;
-    let causes = posterior.causes.iter().take_while(listed).count().max(posterior.open);
+    let posterior = probabilities(calibration, diagnosable.len(), &found);
+    let open = posterior.alike;
+    let fit_of = |place: usize| &found.fits[posterior.causes[place].set];
+    let listed = |cause: &&Cause| cause.probability >= EXCLUDED;
+    let causes = posterior.causes.iter().take_while(listed).count().max(open);
     // Held-out phases test it, even if a cause outside the library is more probable.
     let likeliest = if posterior.named && causes > 0 { fit_of(0) } else { &found.null };
-    let open = posterior.open;
     let choices: Vec<&Fit> =
         (0..if posterior.named { causes.min(1 + MAX_EQUIVALENT) } else { 0 }).map(fit_of).collect();
     let open_effects: Vec<usize> = (0..open)
@@ -99,7 +99,7 @@ fn diagnose_side<S: SideModel>(request: &SideRequest<'_>) -> Result<Diagnosis, D
     // Noise of the drives can imitate an effect in the fitted part, but not in held-out phases.
     let is_confirmed = held_out.as_ref().is_none_or(|phases| phases.after_k < phases.before_k);
     let word = match open {
-        _ if posterior.outside > 0.5 => SideVerdict::Outside,
+        _ if posterior.unmodelled > 0.5 => SideVerdict::Outside,
         0 => SideVerdict::WithinTolerance,
         _ if !is_confirmed => SideVerdict::NotBorneOut,
         1 => SideVerdict::Named,
@@ -118,9 +118,9 @@ fn diagnose_side<S: SideModel>(request: &SideRequest<'_>) -> Result<Diagnosis, D
         fitted_until_s: request.fit_until_s,
         word,
         probability_none: posterior.none,
-        probability_outside: posterior.outside,
+        probability_outside: posterior.unmodelled,
         causes: (0..causes)
-            .map(|place| cause(&problem, calibration, fit_of(place), posterior.causes[place].1))
+            .map(|place| cause(&problem, calibration, fit_of(place), posterior.causes[place].probability))
             .collect(),
         open,
         before_k: residual_rms_k(&problem, &found.null.predicted, 0..fitted),
@@ -171,13 +171,12 @@ fn cause<S: SideModel>(
     calibration: &Calibration,
     fit: &Fit,
     probability: f64,
-) -> Cause {
+) -> SideCause {
     let infos: Vec<_> = infos(problem.effects, &fit.hypothesis).collect();
     let unknowns = fit.hypothesis.nuisances.len();
     let inverse = fit.precision.clone().cholesky().map(|cholesky| cholesky.inverse());
     let covariance = inverse.map(|all| all.remove_rows(0, unknowns).remove_columns(0, unknowns));
     let effects = &fit.hypothesis.effects;
-    let parameters = estimates(calibration, problem.effects, effects, covariance.as_ref());
     let with_values = infos.iter().zip(effects).flat_map(|(info, (_, values))| {
         info.parameters.iter().zip(values).map(move |(parameter, value)| (info, parameter, value))
     });
@@ -185,11 +184,8 @@ fn cause<S: SideModel>(
         .filter(|(_, p, value)| [p.low, p.high].contains(value) && **value != p.neutral)
         .map(|(info, parameter, _)| name_of(info, parameter))
         .collect();
-    Cause {
-        effects: ids(problem, &fit.hypothesis),
-        names: infos.iter().map(|info| info.name.to_string()).collect(),
-        probability,
-        parameters,
+    SideCause {
+        candidate: candidate(calibration, problem.effects, &fit.hypothesis, covariance.as_ref(), probability),
         at_the_end,
         left_k: fit.left_k.clone(),
     }

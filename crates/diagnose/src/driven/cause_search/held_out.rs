@@ -4,9 +4,9 @@ use crate::driven::cause_search::fit::{Columns, Fit, SideProblem};
 use crate::driven::cause_search::search::weight;
 use crate::driven::cause_search::side_diagnosis::{Beyond, HeldOut, Phase};
 use crate::driven::cause_search::sides::side::SideModel;
-use crate::gap::best_fit::coordinate::{coordinates, hypothesis_at, infos, unknowns};
+use crate::gap::best_fit::coordinate::{coordinates, hypothesis_at, unknowns};
 use crate::gap::causes::calibration::Calibration;
-use crate::gap::residuals::study::Hypothesis;
+use crate::gap::causes::probabilities::ids;
 use mapper_core::Channel;
 use mapper_inference::mixture::DRAWS;
 use mapper_numerics::parallel;
@@ -64,7 +64,7 @@ pub(crate) fn held_out<S: SideModel>(
             until_rpm: speed_rpm[phase.end - 1],
             before_k: residual_rms_k(problem, &bare.predicted, phase.clone()),
             after_k: residual_rms_k(problem, &chosen.unwrap_or(bare).predicted, phase.clone()),
-            chosen: chosen.map_or_else(Vec::new, |fit| ids(problem, &fit.hypothesis)),
+            chosen: chosen.map_or_else(Vec::new, |fit| ids(problem.effects, &fit.hypothesis)),
         });
     }
     let whole = |of: &dyn Fn(&Phase) -> f64| {
@@ -85,11 +85,6 @@ pub(crate) fn held_out<S: SideModel>(
         gap_reduction_high_k: gap_reduction_k + half_k,
         phases: found,
     })
-}
-
-/// Ids of a hypothesis' effects.
-pub(crate) fn ids<S: SideModel>(problem: &SideProblem<'_, S>, hypothesis: &Hypothesis) -> Vec<String> {
-    infos(problem.effects, hypothesis).map(|info| info.id.to_string()).collect()
 }
 
 /// Compares the rows after the fitted part with the prediction of `after`.

@@ -12,6 +12,6 @@ mod sides;
 
 pub use diagnose::{SideRequest, diagnose};
 pub use side_diagnosis::{
-    Beyond, Cause, ChannelTrace, Diagnosis, HeldOut, NotDiagnosable, Phase, SideVerdict, Unknown,
+    Beyond, ChannelTrace, Diagnosis, HeldOut, NotDiagnosable, Phase, SideCause, SideVerdict, Unknown,
 };
 pub use sides::side::Side;

@@ -5,8 +5,8 @@ use crate::driven::cause_search::sides::side::SideModel;
 use crate::gap::best_fit::coordinate::Coordinate;
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::probabilities::prior_of_number;
-use crate::gap::next_experiment::best_experiment::SETTLED;
 use crate::gap::residuals::study::{Hypothesis, members};
+use mapper_inference::posterior::{CauseProbabilities, CauseSet, Rules, shares};
 use mapper_inference::search::{Causes, Known, Limits, Offer, extend};
 use mapper_numerics::parallel;
 use mapper_physics::rig::effect::{EffectInfo, EffectParameter};
@@ -142,74 +142,23 @@ impl<S: SideModel> Causes for Search<'_, S> {
     }
 }
 
-pub(crate) struct CauseProbabilities {
-    /// Of no cause.
-    pub(crate) none: f64,
-    /// Of a cause outside the library.
-    pub(crate) outside: f64,
-    /// Causes by index of their fit, most probable first. A superset of a better cause counts as that cause.
-    pub(crate) causes: Vec<(usize, f64)>,
-    /// Number of leading causes that the log does not distinguish.
-    pub(crate) open: usize,
-    /// Whether the evidence of the best cause over no cause exceeds chance.
-    pub(crate) named: bool,
-}
-
-/// Probabilities of the causes of a search among this number of effects.
-pub(crate) fn cause_probabilities(
+/// Probabilities of the causes of a search among this number of effects. Causes outside the library show as a larger error of the model.
+pub(crate) fn probabilities(
     calibration: &Calibration,
     effects: usize,
     found: &SearchResult,
 ) -> CauseProbabilities {
-    let all: Vec<&Fit> = std::iter::once(&found.null).chain(&found.fits).collect();
-    let inside = |fit: &Fit| weight(calibration, effects, fit) + (1.0 - PRIOR_OUTSIDE).ln();
-    let outside = |fit: &Fit| fit.score_outside + prior(calibration, effects, fit) + PRIOR_OUTSIDE.ln();
-    let top = all.iter().flat_map(|fit| [inside(fit), outside(fit)]).fold(f64::NEG_INFINITY, f64::max);
-    let share = |ln: f64| ((ln - top) / calibration.temperature).exp();
-    let all_outside: f64 = all.iter().map(|fit| share(outside(fit))).sum();
-    let total = all_outside + all.iter().map(|fit| share(inside(fit))).sum::<f64>();
-    let members_of = |fit: usize| members(&found.fits[fit].hypothesis);
-    let is_part =
-        |part: usize, whole: usize| members_of(part).iter().all(|effect| members_of(whole).contains(effect));
-    let mut causes: Vec<(usize, f64)> = Vec::new();
-    for (index, fit) in found.fits.iter().enumerate() {
-        let probability = share(inside(fit)) / total;
-        match causes.iter_mut().find(|(better, _)| is_part(*better, index)) {
-            Some((_, sum)) => *sum += probability,
-            None => causes.push((index, probability)),
-        }
-    }
-    let best = found.fits.first().map_or(f64::NEG_INFINITY, |fit| weight(calibration, effects, fit));
-    let named = best - weight(calibration, effects, &found.null) > calibration.threshold;
-    causes.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let mut open = if named { open_ones(&causes) } else { 0 };
-    // If all open causes share one effect, that effect is the cause: the other effects are too weak to detect.
-    let common = causes[..open]
-        .iter()
-        .position(|(part, _)| causes[..open].iter().all(|(whole, _)| is_part(*part, *whole)));
-    if let Some(common) = common.filter(|_| open > 1) {
-        let together = causes[..open].iter().map(|(_, probability)| probability).sum();
-        let cause = (causes[common].0, together);
-        causes.splice(..open, [cause]);
-        open = 1;
-    }
-    CauseProbabilities {
-        none: share(inside(&found.null)) / total,
-        outside: all_outside / total,
-        named,
-        open,
-        causes,
-    }
-}
-
-/// Number of leading causes that together have the settled share of the probability of all causes.
-fn open_ones(causes: &[(usize, f64)]) -> usize {
-    let all: f64 = causes.iter().map(|(_, probability)| probability).sum();
-    let mut sum = 0.0;
-    let is_open = |(_, probability): &&(usize, f64)| {
-        let open = sum < SETTLED * all;
-        sum += probability;
-        open
+    let all = || std::iter::once(&found.null).chain(&found.fits);
+    let inside = all().map(|fit| weight(calibration, effects, fit) + (1.0 - PRIOR_OUTSIDE).ln());
+    let outside = all().map(|fit| fit.score_outside + prior(calibration, effects, fit) + PRIOR_OUTSIDE.ln());
+    let shares = shares(&inside.chain(outside).collect::<Vec<_>>(), calibration.temperature);
+    let unmodelled = shares[shares.len() / 2..].iter().sum();
+    let set = |fit: &Fit| CauseSet {
+        members: members(&fit.hypothesis),
+        ln_weight: weight(calibration, effects, fit),
     };
-    causes.iter().take_while(is_open).count()
+    let sets: Vec<CauseSet> = found.fits.iter().map(set).collect();
+    // Every effect is tried, and the second one of a pair needs the evidence of a cause.
+    let rules = Rules { unlisted: 0.0, part_margin: calibration.threshold, ..calibration.rules() };
+    rules.cause_probabilities(weight(calibration, effects, &found.null), &sets, unmodelled)
 }

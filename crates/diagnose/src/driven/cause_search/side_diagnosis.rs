@@ -1,9 +1,8 @@
 //! Result of the diagnosis of one side.
 
 use crate::driven::cause_search::sides::side::Side;
-use crate::gap::findings::report::{Estimate, SmallestSeen};
+use crate::gap::findings::report::{Candidate, SmallestSeen};
 use serde::Serialize;
-use std::collections::BTreeMap;
 
 /// Overall verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -23,15 +22,10 @@ pub enum SideVerdict {
 
 /// A cause that explains the judged channels.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Cause {
-    /// Ids of its effects.
-    pub effects: Vec<String>,
-    /// Display names.
-    pub names: Vec<String>,
-    /// Probability.
-    pub probability: f64,
-    /// Sizes, by parameter, with 95 % intervals.
-    pub parameters: BTreeMap<String, Estimate>,
+pub struct SideCause {
+    /// The cause with its probability and the sizes of its effects.
+    #[serde(flatten)]
+    pub candidate: Candidate,
     /// Parameters at a limit of their range: the real cause exceeds this effect's range.
     pub at_the_end: Vec<String>,
     /// Its residual beyond noise, K, for each judged channel in order.
@@ -159,8 +153,8 @@ pub struct Diagnosis {
     /// Probability of a cause outside the effect library.
     pub probability_outside: f64,
     /// Causes, likeliest first.
-    pub causes: Vec<Cause>,
-    /// Number of leading causes that cannot be distinguished; together they have 95 % of the probability of all causes.
+    pub causes: Vec<SideCause>,
+    /// Number of leading causes that the log does not distinguish.
     pub open: usize,
     /// Root mean square of the first judged channel in the fitted part, K: without a cause.
     pub before_k: f64,

@@ -7,12 +7,12 @@
 use crate::gap::best_fit::coordinate::{Coordinate, coordinates, effect_neighbours, hypothesis_at, unknowns};
 use crate::gap::best_fit::normal::{PRIOR_STEPS, normal_matrix, nuisance_products};
 use crate::gap::best_fit::selection::{Selection, dot_over};
-use crate::gap::residuals::hypothesis::TimeHistory;
 use crate::gap::residuals::machine_run::LinearisedMachine;
 use crate::gap::residuals::nuisance::NuisanceKind;
 use crate::gap::residuals::study::{Hypothesis, PredictError, Prediction, Study};
 use crate::gap::residuals::whiten::{Linearised, rows_of_step};
 use mapper_inference::descent::{End, FINE, Model, Normal, Reach, Until, descend};
+use mapper_inference::time_history::TimeHistory;
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 use std::sync::Arc;
@@ -97,10 +97,9 @@ impl Column {
     /// Whitened change for a unit of the coordinate.
     fn values(&self, study: &Study) -> Vec<f64> {
         let mut values: Vec<f64> = self.change.iter().map(|change| change / self.units).collect();
-        if self.history != TimeHistory::Throughout {
-            let steps = study.steps.len();
-            for step in 0..steps {
-                let share = self.history.share(step, steps);
+        if self.history != TimeHistory::THROUGHOUT {
+            for step in 0..study.steps.len() {
+                let share = self.history.at(step as f64);
                 values[rows_of_step(study, step)].iter_mut().for_each(|value| *value *= share);
             }
         }
@@ -111,7 +110,7 @@ impl Column {
     pub fn of(fit: &Fit) -> Vec<Column> {
         let of_unit = |column: &Vec<f64>| {
             let change = Arc::new(column.clone());
-            Column { change, units: 1.0, history: TimeHistory::Throughout }
+            Column { change, units: 1.0, history: TimeHistory::THROUGHOUT }
         };
         fit.effect_columns.iter().map(of_unit).collect()
     }

@@ -136,7 +136,7 @@ impl FitNeighbourhood<'_> {
             let mut right = DVector::zeros(self.right_residual.len());
             let (mut own, mut seen) = (0.0, 0.0);
             for (step, of_step) in of_steps.iter().enumerate() {
-                let share = history.share(step, of_steps.len());
+                let share = history.at(step as f64);
                 right.axpy(share, &of_step.right, 1.0);
                 own += share * share * of_step.own;
                 seen += share * of_step.seen;

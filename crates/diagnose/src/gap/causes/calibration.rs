@@ -1,5 +1,6 @@
 //! Constants that convert scores into probabilities, calibrated on simulated campaigns. The data file records the command that produced it.
 
+use mapper_inference::posterior::{Rules, probability};
 use serde::{Deserialize, Serialize};
 
 /// Calibration constants.
@@ -44,7 +45,13 @@ impl Calibration {
         let [offset, slopes @ ..] = self.outside;
         let x =
             offset + slopes.iter().zip(logistic_features(features)).map(|(slope, x)| slope * x).sum::<f64>();
-        1.0 / (1.0 + (-x).exp())
+        probability(x)
+    }
+
+    /// The rules by which the fits of a search become probabilities. Its sets are reduced to the members that the recording supports.
+    pub fn rules(&self) -> Rules {
+        let Calibration { threshold, temperature, unlisted, .. } = *self;
+        Rules { threshold, temperature, unlisted, part_margin: 0.0 }
     }
 }
 

@@ -12,6 +12,7 @@ use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::point_state::PointState;
 use crate::gap::residuals::study::{Study, members};
 use crate::gap::residuals::whiten::Linearised;
+use mapper_inference::posterior::shares;
 use mapper_physics::rig::effect::Submodel;
 
 /// Linearisation error as a share of the gain: explanations closer than this remain open, and a part with less of the gap is not listed.
@@ -111,19 +112,17 @@ pub fn places_of(
     bend: f64,
 ) -> Vec<Place> {
     let gain = |e: &Explanation<'_>| e.parts.iter().map(|part| part.gain).sum::<f64>();
-    let best = explanations.iter().map(|e| e.score).fold(f64::NEG_INFINITY, f64::max);
     let most = explanations.iter().map(gain).fold(0.0, f64::max);
     let temperature = 1.0 + bend * 0.5 * most;
-    let weights: Vec<f64> = explanations.iter().map(|e| ((e.score - best) / temperature).exp()).collect();
-    let total: f64 = weights.iter().sum();
+    let weights = shares(&explanations.iter().map(|e| e.score).collect::<Vec<_>>(), temperature);
     // Share, and the explanation in which the part contributes most.
     let mut parts: Vec<(Submodel, f64, f64, &Part<'_>)> = Vec::new();
     let mut whole = 0.0;
     for (explanation, weight) in explanations.iter().zip(&weights) {
         let of_all = gain(explanation);
-        whole += weight / total * of_all;
+        whole += weight * of_all;
         for part in explanation.parts.iter().filter(|_| of_all > 0.0) {
-            let share = weight / total * part.gain / of_all;
+            let share = weight * part.gain / of_all;
             match parts.iter_mut().find(|(submodel, ..)| *submodel == part.submodel) {
                 Some((_, sum, largest, shown)) => {
                     *sum += share;

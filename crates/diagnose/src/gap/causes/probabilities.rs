@@ -7,30 +7,24 @@ use crate::gap::causes::calibration::Calibration;
 use crate::gap::findings::in_words;
 use crate::gap::findings::report::{Candidate, Estimate, MAX_EQUIVALENT, Onset};
 use crate::gap::next_experiment::best_experiment::{Rivals, SETTLED};
-use crate::gap::residuals::hypothesis::TimeHistory;
-use crate::gap::residuals::study::{EffectValues, Hypothesis, Study};
+use crate::gap::residuals::hypothesis::onset_step;
+use crate::gap::residuals::study::{EffectValues, Hypothesis, Study, members};
 use mapper_core::half_width_95;
-use mapper_inference::interval::COVERAGE;
+use mapper_inference::posterior::{Cause, CauseProbabilities, CauseSet};
+use mapper_inference::time_history::{Shape, TimeHistory};
 use mapper_physics::rig::effect::{Effect, EffectInfo, EffectParameter};
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-pub(crate) struct CauseProbabilities {
-    /// Causes, best first, without supersets of a better one.
+/// Probabilities of the causes that fit a recording.
+pub(crate) struct Posterior {
+    /// The probabilities.
+    pub probabilities: CauseProbabilities,
+    /// Causes for the report, best first, without supersets of a better one.
     pub candidates: Vec<Candidate>,
-    /// For each candidate, the index of its fit.
-    pub shown: Vec<usize>,
     /// The fits of the named cause and of those that the data do not distinguish from it, by index; empty if no cause is named.
     pub alike: Vec<usize>,
-    /// Probability that everything is within tolerance.
-    pub none: f64,
-    /// Probability of causes of the effect library that are not among the candidates.
-    pub unlisted: f64,
-    /// Probability of an unmodelled cause, from the residual of the best fit.
-    pub outside: f64,
-    /// Whether a cause is named.
-    pub named: bool,
 }
 
 /// Prior share of causes that begin during the recording. Judgement: one in two hundred, because they are rare and can imitate other
@@ -42,7 +36,7 @@ const LATE_RATIO: f64 = 0.005;
 pub(crate) fn prior(calibration: &Calibration, study: &Study, hypothesis: &Hypothesis) -> f64 {
     let of_number = prior_of_number(calibration, study.catalogue, hypothesis.effects.len());
     let late =
-        hypothesis.effects.iter().filter(|(index, _)| study.histories[*index] != TimeHistory::Throughout);
+        hypothesis.effects.iter().filter(|(index, _)| study.histories[*index] != TimeHistory::THROUGHOUT);
     of_number + late.count() as f64 * (LATE_RATIO / (2.0 * study.steps.len().max(1) as f64)).ln()
 }
 
@@ -65,85 +59,77 @@ pub fn weight(calibration: &Calibration, study: &Study, fit: &Fit) -> f64 {
     fit.score + prior(calibration, study, &fit.hypothesis)
 }
 
-/// Whether `whole` includes all effects of `part`, regardless of their onset.
-fn includes(study: &Study, whole: &Fit, part: &Fit) -> bool {
-    let whole = ids(study, whole);
-    ids(study, part).iter().all(|effect| whole.contains(effect))
-}
-
-pub(crate) fn cause_probabilities(
+/// Probabilities of the causes of these fits, best first. An inadequate best fit supports a cause that is not in the library.
+pub(crate) fn posterior(
     study: &Study,
     calibration: &Calibration,
     null: &Fit,
     fits: &[Fit],
     adequacy: &Adequacy,
-) -> CauseProbabilities {
-    let scores: Vec<f64> =
-        std::iter::once(null).chain(fits).map(|fit| weight(calibration, study, fit)).collect();
-    let top = scores.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let weights: Vec<f64> = scores.iter().map(|s| ((s - top) / calibration.temperature).exp()).collect();
-    let total: f64 = weights.iter().sum();
-    let best_cause = scores.iter().skip(1).copied().fold(f64::NEG_INFINITY, f64::max);
-    let named = best_cause - scores[0] > calibration.threshold;
-    let outside = calibration.outside(adequacy.features());
-    // If no cause is named, an inadequate fit also supports an unmodelled cause.
-    let inside = 1.0 - outside;
-    let none = inside * weights[0] / total;
-    let unlisted = calibration.unlisted * (inside - none);
-    let listed = inside * (1.0 - calibration.unlisted);
-    // A superset of a better cause counts as that cause with an additional effect too weak to detect.
-    let mut shown: Vec<usize> = Vec::new();
-    let mut probabilities: Vec<f64> = Vec::new();
-    for (place, fit) in fits.iter().enumerate() {
-        let probability = listed * weights[place + 1] / total;
-        match shown.iter().position(|better| includes(study, fit, &fits[*better])) {
-            Some(better) => probabilities[better] += probability,
-            None => {
-                shown.push(place);
-                probabilities.push(probability);
-            }
-        }
-    }
-    let near = |place: &usize| named && scores[1] - scores[*place + 1] < evidence_resolution(calibration);
-    let alike: Vec<usize> = shown.iter().copied().filter(near).take(1 + MAX_EQUIVALENT).collect();
-    let candidate = |(place, probability): (&usize, f64)| {
-        let fit = &fits[*place];
-        let (effects, covariance) = (&fit.hypothesis.effects, Some(&fit.covariance));
-        let others = if *place == 0 { alike.get(1..).unwrap_or_default() } else { &[] };
-        Candidate {
-            effects: ids(study, fit),
-            names: infos(&study.effects, &fit.hypothesis).map(|info| info.name.to_string()).collect(),
-            probability,
-            parameters: estimates(calibration, &study.effects, effects, covariance),
-            onsets: onsets(study, fit),
-            equivalent: others.iter().map(|place| ids(study, &fits[*place])).collect(),
-        }
+) -> Posterior {
+    let set = |fit: &Fit| CauseSet {
+        members: members(&fit.hypothesis).iter().map(|member| study.family(*member)).collect(),
+        ln_weight: weight(calibration, study, fit),
     };
-    let candidates = shown.iter().zip(probabilities).map(candidate).collect();
-    CauseProbabilities { candidates, shown, alike, none, unlisted, outside, named }
+    let sets: Vec<CauseSet> = fits.iter().map(set).collect();
+    let unmodelled = calibration.outside(adequacy.features());
+    let none = weight(calibration, study, null);
+    let probabilities = calibration.rules().cause_probabilities(none, &sets, unmodelled);
+    let causes = &probabilities.causes;
+    let alike: Vec<usize> =
+        causes[..probabilities.alike].iter().map(|cause| cause.set).take(1 + MAX_EQUIVALENT).collect();
+    let ids = |fit: &usize| ids(&study.effects, &fits[*fit].hypothesis);
+    let candidates = causes
+        .iter()
+        .enumerate()
+        .map(|(place, Cause { set, probability })| {
+            let (fit, covariance) = (&fits[*set], Some(&fits[*set].covariance));
+            let others = if place == 0 { alike.get(1..).unwrap_or_default() } else { &[] };
+            Candidate {
+                onsets: onsets(study, fit),
+                equivalent: others.iter().map(ids).collect(),
+                ..candidate(calibration, &study.effects, &fit.hypothesis, covariance, *probability)
+            }
+        })
+        .collect();
+    Posterior { probabilities, candidates, alike }
 }
 
-fn ids(study: &Study, fit: &Fit) -> Vec<String> {
-    infos(&study.effects, &fit.hypothesis).map(|info| info.id.to_string()).collect()
+/// A cause for the report, without onsets and equivalent causes.
+pub(crate) fn candidate(
+    calibration: &Calibration,
+    effects: &[Arc<dyn Effect>],
+    hypothesis: &Hypothesis,
+    covariance: Option<&DMatrix<f64>>,
+    probability: f64,
+) -> Candidate {
+    Candidate {
+        effects: ids(effects, hypothesis),
+        names: infos(effects, hypothesis).map(|info| info.name.to_string()).collect(),
+        probability,
+        parameters: estimates(calibration, effects, &hypothesis.effects, covariance),
+        onsets: BTreeMap::new(),
+        equivalent: Vec::new(),
+    }
+}
+
+/// Ids of a hypothesis' effects.
+pub(crate) fn ids(effects: &[Arc<dyn Effect>], hypothesis: &Hypothesis) -> Vec<String> {
+    infos(effects, hypothesis).map(|info| info.id.to_string()).collect()
 }
 
 fn onsets(study: &Study, fit: &Fit) -> BTreeMap<String, Onset> {
     let begun = fit.hypothesis.effects.iter().filter_map(|(index, _)| {
         let history = study.histories[*index];
-        let step = history.onset()?;
+        let step = onset_step(history)?;
         let onset = Onset {
             step,
             t_s: study.steps.get(step)?.marker.start_s,
-            grows: matches!(history, TimeHistory::Growing(_)),
+            grows: matches!(history.shape, Shape::Ramp(_)),
         };
         Some((study.effects[*index].info().id.to_string(), onset))
     });
     begun.collect()
-}
-
-/// Difference in evidence below which data do not distinguish causes: the odds at which an interval excludes a value.
-pub fn evidence_resolution(calibration: &Calibration) -> f64 {
-    -(1.0 - COVERAGE).ln() * calibration.temperature
 }
 
 /// Parameters of effects with 95 % intervals, computed in the search coordinate so that they stay within range. `covariance`: of the search
@@ -184,27 +170,27 @@ pub fn name_of(info: &EffectInfo, parameter: &EffectParameter) -> String {
 
 /// If no cause is named but one is more probable than none: the causes and the null hypothesis, most probable first.
 pub(crate) fn suspicions<'a>(
-    posterior: &CauseProbabilities,
+    probabilities: &CauseProbabilities,
     fits: &'a [Fit],
     null: &'a Fit,
 ) -> Option<Rivals<'a>> {
-    if posterior.candidates.first()?.probability <= posterior.none {
+    let CauseProbabilities { none, causes, .. } = probabilities;
+    if causes.first()?.probability <= *none {
         return None;
     }
-    let causes = posterior.candidates.iter().zip(&posterior.shown);
     let mut open: Vec<(f64, &Fit)> =
-        causes.map(|(cause, place)| (cause.probability, &fits[*place])).collect();
-    let nothing = open.partition_point(|(probability, _)| *probability > posterior.none);
-    open.insert(nothing, (posterior.none, null));
+        causes.iter().map(|Cause { set, probability }| (*probability, &fits[*set])).collect();
+    let nothing = open.partition_point(|(probability, _)| probability > none);
+    open.insert(nothing, (*none, null));
     let (probabilities, fits) = open.into_iter().unzip();
     Some(Rivals { fits, probabilities })
 }
 
 /// Open causes, best first; `None` if the first is settled.
-pub(crate) fn rivals<'a>(posterior: &CauseProbabilities, fits: &'a [Fit]) -> Option<Rivals<'a>> {
-    let probabilities: Vec<f64> =
-        posterior.candidates.iter().map(|candidate| candidate.probability).collect();
+pub(crate) fn rivals<'a>(probabilities: &CauseProbabilities, fits: &'a [Fit]) -> Option<Rivals<'a>> {
+    let causes = &probabilities.causes;
+    let probabilities: Vec<f64> = causes.iter().map(|cause| cause.probability).collect();
     let total: f64 = probabilities.iter().sum();
     (probabilities.len() > 1 && probabilities[0] < SETTLED * total)
-        .then(|| Rivals { fits: posterior.shown.iter().map(|place| &fits[*place]).collect(), probabilities })
+        .then(|| Rivals { fits: causes.iter().map(|cause| &fits[cause.set]).collect(), probabilities })
 }

@@ -6,6 +6,7 @@ use crate::gap::best_fit::selection::Selection;
 use crate::gap::causes::additions::{Addition, additions};
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::probabilities::{prior, weight};
+use crate::gap::residuals::hypothesis::onset_step;
 use crate::gap::residuals::study::{PredictError, Study, members};
 use crate::gap::residuals::whiten::Linearised;
 use mapper_core::half_width_95;
@@ -210,7 +211,7 @@ pub fn supported(search: &Search<'_>, fits: Vec<Fit>) -> Vec<Fit> {
         }
         let mut hypothesis = fit.hypothesis.clone();
         let mut effects = hypothesis.effects.iter_mut();
-        let (member, _) = effects.find(|(index, _)| study.histories[*index].onset().is_some())?;
+        let (member, _) = effects.find(|(index, _)| onset_step(study.histories[*index]).is_some())?;
         *member = study.family(*member);
         let throughout = search.fit(&(Start::from(&hypothesis), EFFORT))?;
         (search.ln_odds(fit) - search.ln_odds(&throughout) < search.calibration.threshold)

@@ -1,9 +1,10 @@
 //! A study with further effects (laws, and effects that begin with a step), or with some of its values.
 
-use crate::gap::residuals::hypothesis::TimeHistory;
+use crate::gap::residuals::hypothesis::{from_step, growing_from, onset_step};
 use crate::gap::residuals::machine_run::acts_on_machine;
 use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::study::{Group, Study};
+use mapper_inference::time_history::TimeHistory;
 use mapper_physics::rig::effect::Effect;
 use std::sync::Arc;
 
@@ -12,7 +13,7 @@ impl Study {
     pub fn add(&mut self, effect: Arc<dyn Effect>) -> usize {
         self.on_machine.push(acts_on_machine(&self.nominal, effect.as_ref()));
         self.effects.push(effect);
-        self.histories.push(TimeHistory::Throughout);
+        self.histories.push(TimeHistory::THROUGHOUT);
         self.effects.len() - 1
     }
 
@@ -22,8 +23,8 @@ impl Study {
         for effect in 0..self.catalogue {
             // Growth over a single step equals an onset there.
             let histories = (1..=last)
-                .map(TimeHistory::From)
-                .chain((1..last).map(TimeHistory::Growing))
+                .map(from_step)
+                .chain((1..last).map(|first| growing_from(first, self.steps.len())))
                 .collect::<Vec<_>>();
             for history in histories {
                 self.effects.push(self.effects[effect].clone());
@@ -36,7 +37,7 @@ impl Study {
     /// Candidates with an onset of one library effect.
     pub(crate) fn onsets_of(&self, effect: usize) -> impl Iterator<Item = usize> {
         let is_one = move |index: &usize| {
-            self.histories[*index].onset().is_some()
+            onset_step(self.histories[*index]).is_some()
                 && Arc::ptr_eq(&self.effects[*index], &self.effects[effect])
         };
         (self.catalogue..self.effects.len()).filter(is_one)

@@ -1,4 +1,6 @@
-//! A hypothesis: values of all nuisances and effects, and the onset and growth of an effect.
+//! A hypothesis: values of all nuisances and effects, and the steps in which an effect acts.
+
+use mapper_inference::time_history::{Shape, TimeHistory};
 
 /// Effects with their values: indices of the candidates, and one value per parameter.
 pub type EffectValues = Vec<(usize, Vec<f64>)>;
@@ -19,35 +21,20 @@ pub fn members(hypothesis: &Hypothesis) -> Vec<usize> {
     members
 }
 
-/// Onset and growth of an effect within a recording.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TimeHistory {
-    /// Present throughout.
-    Throughout,
-    /// From the step with this index on.
-    From(usize),
-    /// Grows evenly from step to step: absent before the step with this index, at full size in the last step.
-    Growing(usize),
+/// History of a cause that acts from the step with this index on.
+pub(crate) fn from_step(first: usize) -> TimeHistory {
+    TimeHistory { onset: first as f64, shape: Shape::Step }
 }
 
-impl TimeHistory {
-    /// Share of the full size in a step of a recording with `steps` steps, 0..1.
-    pub fn share(self, step: usize, steps: usize) -> f64 {
-        match self {
-            TimeHistory::Throughout => 1.0,
-            TimeHistory::From(first) => f64::from(u8::from(step >= first)),
-            TimeHistory::Growing(first) if step < first || steps <= first => 0.0,
-            TimeHistory::Growing(first) => (step - first + 1) as f64 / (steps - first) as f64,
-        }
-    }
+/// History of a cause that grows evenly from step to step: absent before the step with this index, at full size in the last of `steps`.
+pub(crate) fn growing_from(first: usize, steps: usize) -> TimeHistory {
+    TimeHistory { onset: first as f64 - 1.0, shape: Shape::Ramp((steps - first) as f64) }
+}
 
-    /// The step with which it begins; `None` if it is always present.
-    pub fn onset(self) -> Option<usize> {
-        match self {
-            TimeHistory::Throughout => None,
-            TimeHistory::From(first) | TimeHistory::Growing(first) => Some(first),
-        }
-    }
+/// The step with which a cause begins; `None` if it acts throughout.
+pub(crate) fn onset_step(history: TimeHistory) -> Option<usize> {
+    let first = if let Shape::Ramp(_) = history.shape { history.onset + 1.0 } else { history.onset };
+    first.is_finite().then_some(first as usize)
 }
 
 #[cfg(test)]
@@ -56,9 +43,9 @@ mod tests {
 
     #[test]
     fn what_grows_begins_with_its_step_and_is_whole_in_the_last() {
-        let shares = |history: TimeHistory| (0..5).map(|step| history.share(step, 5)).collect::<Vec<f64>>();
-        assert_eq!(shares(TimeHistory::Throughout), [1.0; 5]);
-        assert_eq!(shares(TimeHistory::From(3)), [0.0, 0.0, 0.0, 1.0, 1.0]);
-        assert_eq!(shares(TimeHistory::Growing(1)), [0.0, 0.25, 0.5, 0.75, 1.0]);
+        let shares = |history: TimeHistory| [0.0, 1.0, 2.0, 3.0, 4.0].map(|step| history.at(step));
+        assert_eq!(shares(from_step(3)), [0.0, 0.0, 0.0, 1.0, 1.0]);
+        assert_eq!(shares(growing_from(1, 5)), [0.0, 0.25, 0.5, 0.75, 1.0]);
+        assert_eq!([from_step(3), growing_from(1, 5), TimeHistory::THROUGHOUT].map(onset_step), [Some(3), Some(1), None]);
     }
 }

@@ -49,7 +49,7 @@ impl Study {
     fn segments(&self, hypothesis: &Hypothesis) -> Vec<Segment> {
         let shares = |step: usize| {
             let effects = hypothesis.effects.iter();
-            effects.map(move |(index, _)| self.histories[*index].share(step, self.steps.len()))
+            effects.map(move |(index, _)| self.histories[*index].at(step as f64))
         };
         let firsts: Vec<usize> = (0..self.steps.len().max(1))
             .filter(|step| *step == 0 || !shares(*step).eq(shares(step - 1)))

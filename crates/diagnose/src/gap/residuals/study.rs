@@ -1,7 +1,6 @@
 //! One prepared recording: residual layout, whitening, and model predictions for any hypothesis.
 
 use crate::gap::residuals::actuators::Actuators;
-use crate::gap::residuals::hypothesis::TimeHistory;
 pub use crate::gap::residuals::hypothesis::{EffectValues, Hypothesis, members};
 use crate::gap::residuals::initial_state::rested;
 use crate::gap::residuals::machine_run::{MachineRun, acts_on_machine};
@@ -16,6 +15,7 @@ use mapper_observe::channels::INPUT_CHANNELS;
 use mapper_observe::declared::Declared;
 use mapper_observe::model_inputs::smoothed_inputs::SmoothedInputs;
 use mapper_observe::model_inputs::step_timing::{Times, with_command_times};
+use mapper_inference::time_history::TimeHistory;
 use mapper_physics::rig::effect::{Effect, EffectError, EffectParameter, Rig, add};
 use mapper_physics::simulation::driven::{DriveError, FrozenGrid};
 use mapper_physics::simulation::model::Model;
@@ -220,7 +220,7 @@ impl Study {
         let (times_s, places): (Vec<f64>, Vec<_>) = reads.into_iter().unzip();
         Study {
             nuisances: nuisances(&declared),
-            histories: vec![TimeHistory::Throughout; effects.len()],
+            histories: vec![TimeHistory::THROUGHOUT; effects.len()],
             on_machine: effects.iter().map(|effect| acts_on_machine(&nominal, effect.as_ref())).collect(),
             catalogue: effects.len(),
             actuators,
@@ -263,7 +263,7 @@ impl Study {
         let mut rig = self.nominal.clone();
         let mut circumstances = Circumstances::default();
         for (index, values) in &hypothesis.effects {
-            let share = self.histories[*index].share(step, self.steps.len());
+            let share = self.histories[*index].at(step as f64);
             if share == 1.0 {
                 add(&mut rig, self.effects[*index].as_ref(), values)?;
             } else if share > 0.0 {

@@ -8,8 +8,9 @@ use crate::missing_terms::search::residual_source::in_each_step;
 use crate::missing_terms::search::select::Choice;
 use crate::missing_terms::terms::expression::{Expression, product};
 use crate::missing_terms::terms::term::{Role, Term};
-use crate::missing_terms::terms::time_history::{Shape, TimeHistory};
+use crate::missing_terms::terms::time_history::Spans;
 use mapper_core::step_number;
+use mapper_inference::time_history::Shape;
 use nalgebra::DMatrix;
 
 /// Maximum number of terms tried with an onset.
@@ -118,7 +119,7 @@ pub fn begun(
 fn from(term: &Term, begin_s: f64, step: usize) -> Term {
     let mut later = term.clone();
     for (_, formula) in &mut later.acts_on {
-        *formula = product(Expression::InTime(TimeHistory::from(begin_s)), formula.clone());
+        *formula = product(Expression::InTime(Spans::from(begin_s)), formula.clone());
     }
     // Level and slope form separate laws now: each sentence includes its own onset.
     later.role = Role::Other;
@@ -129,14 +130,14 @@ fn from(term: &Term, begin_s: f64, step: usize) -> Term {
 /// Whitened changes for one step of a term's coefficient, for an onset at each step of the recording: a term with an onset is the sum of its
 /// parts in each later step.
 fn from_each_step(base: &Base<'_>, term: &Term) -> Vec<Vec<f64>> {
-    let during = |history: TimeHistory| {
+    let during = |spans: Spans| {
         let mut during = term.clone();
         for (_, formula) in &mut during.acts_on {
-            *formula = product(Expression::InTime(history.clone()), formula.clone());
+            *formula = product(Expression::InTime(spans.clone()), formula.clone());
         }
         during
     };
-    let mut columns = in_each_step(base, Shape::Level, during, |terms| base.changes(terms));
+    let mut columns = in_each_step(base, Shape::Step, during, |terms| base.changes(terms));
     for step in (1..columns.len()).rev() {
         let (before, later) = columns.split_at_mut(step);
         before[step - 1].iter_mut().zip(&later[0]).for_each(|(before, later)| *before += later);

@@ -12,8 +12,9 @@ use crate::missing_terms::search::evidence::{Posterior, weigh_process};
 use crate::missing_terms::terms::balance::{Balance, Properties};
 use crate::missing_terms::terms::expression::Expression;
 use crate::missing_terms::terms::term::{Role, Term};
-use crate::missing_terms::terms::time_history::{Shape, TimeHistory};
+use crate::missing_terms::terms::time_history::{DECAY, Span, Spans};
 use mapper_core::Channel;
+use mapper_inference::time_history::{Shape, TimeHistory};
 use mapper_numerics::parallel;
 use nalgebra::{DMatrix, DVector};
 
@@ -74,8 +75,8 @@ pub fn residual_sources(
 /// Changes due to a typical source term in one step each, in the channels' units: levels first, then the decaying parts.
 pub fn columns(base: &Base<'_>, balance: Balance) -> Vec<Vec<f64>> {
     let Properties { plain_size: step, unit, .. } = balance.properties();
-    let term = |history: TimeHistory| Term {
-        acts_on: vec![(balance, Expression::InTime(history))],
+    let term = |spans: Spans| Term {
+        acts_on: vec![(balance, Expression::InTime(spans))],
         unit,
         step,
         words: String::new(),
@@ -88,20 +89,21 @@ pub fn columns(base: &Base<'_>, balance: Balance) -> Vec<Vec<f64>> {
             _ => in_each_step(base, shape, term, |terms| base.raw_changes(terms)),
         };
         // Nothing decays in the first step, which has no jump.
-        columns.into_iter().skip(usize::from(shape == Shape::Decay))
+        columns.into_iter().skip(usize::from(shape == DECAY))
     };
-    of_shape(Shape::Level).chain(of_shape(Shape::Decay)).collect()
+    of_shape(Shape::Step).chain(of_shape(DECAY)).collect()
 }
 
 /// A sensor offset needs no model run.
 fn read(study: &Study, channel: Channel, shape: Shape, size: f64) -> Vec<Vec<f64>> {
+    let after_jump = TimeHistory { onset: 0.0, shape };
     (0..study.steps.len())
         .map(|step| {
             let mut column = vec![0.0; study.measured.len()];
             for group in study.groups.iter().filter(|g| g.step == step && OUTPUTS[g.output] == channel) {
                 for (row, block) in group.rows.clone().zip(&group.blocks) {
                     let since_s = study.steps[step].blocks[*block].since_jump_s.max(0.0);
-                    column[row] = size * shape.at(since_s);
+                    column[row] = size * after_jump.at(since_s);
                 }
             }
             column
@@ -113,18 +115,19 @@ fn read(study: &Study, channel: Channel, shape: Shape, size: f64) -> Vec<Vec<f64
 pub fn in_each_step(
     base: &Base<'_>,
     shape: Shape,
-    term: impl Fn(TimeHistory) -> Term,
+    term: impl Fn(Spans) -> Term,
     changes: impl Fn(&[Term]) -> Vec<Option<Vec<f64>>>,
 ) -> Vec<Vec<f64>> {
     let study = base.study;
     let steps = study.steps.len();
     let span = |step: usize| {
-        let begin_s = if step == 0 { f64::NEG_INFINITY } else { study.steps[step].marker.start_s };
-        (begin_s, study.steps.get(step + 1).map_or(f64::INFINITY, |next| next.marker.start_s))
+        let onset = if step == 0 { f64::NEG_INFINITY } else { study.steps[step].marker.start_s };
+        let end_s = study.steps.get(step + 1).map_or(f64::INFINITY, |next| next.marker.start_s);
+        Span { history: TimeHistory { onset, shape }, end_s }
     };
     let members = |colour: usize| (colour..steps).step_by(APART);
-    let history = |colour: usize| TimeHistory { shape, spans_s: members(colour).map(span).collect() };
-    let terms: Vec<Term> = (0..APART.min(steps)).map(|colour| term(history(colour))).collect();
+    let spans = |colour: usize| Spans(members(colour).map(span).collect());
+    let terms: Vec<Term> = (0..APART.min(steps)).map(|colour| term(spans(colour))).collect();
     let mut columns = vec![vec![0.0; study.measured.len()]; steps];
     for (colour, change) in changes(&terms).into_iter().enumerate() {
         let Some(change) = change else { continue };

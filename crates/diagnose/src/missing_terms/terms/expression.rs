@@ -1,7 +1,7 @@
 //! Formulas that can be both evaluated and written as script.
 
 use crate::missing_terms::terms::quantity::Quantity;
-use crate::missing_terms::terms::time_history::TimeHistory;
+use crate::missing_terms::terms::time_history::Spans;
 use mapper_physics::machine::hooks::Site;
 use std::fmt::{Display, Formatter, Result};
 
@@ -22,8 +22,8 @@ pub enum Expression {
     Power(Box<Expression>, f64),
     /// The natural logarithm.
     Ln(Box<Expression>),
-    /// A time history.
-    InTime(TimeHistory),
+    /// The spans in which it acts.
+    InTime(Spans),
 }
 
 use Expression::{InTime, Ln, Minus, Number, Of, Power, Times, Value};
@@ -39,7 +39,7 @@ impl Expression {
             Times(a, b) => a.of(site, value) * b.of(site, value),
             Power(base, exponent) => base.of(site, value).powf(*exponent),
             Ln(of) => of.of(site, value).ln(),
-            InTime(history) => history.at(site.t_s),
+            InTime(spans) => spans.at(site.t_s),
         }
     }
 }
@@ -55,7 +55,7 @@ impl Display for Expression {
             Times(a, b) => write!(f, "{a} * {b}"),
             Power(base, exponent) => write!(f, "({base}) ** {}", number(*exponent)),
             Ln(of) => write!(f, "({of}).ln()"),
-            InTime(history) => write!(f, "{history}"),
+            InTime(spans) => write!(f, "{spans}"),
         }
     }
 }

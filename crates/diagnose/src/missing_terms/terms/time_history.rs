@@ -1,60 +1,46 @@
-//! Time history of a source term: a level, or a part that decays after a jump, during some time spans.
+//! Time spans in which a source term acts.
 
+use mapper_inference::time_history::{Shape, TimeHistory};
 use std::fmt::{Display, Formatter, Result};
 
-/// Time constant of a source term's decaying part, s: similar to that of the housings.
-pub const DECAY_S: f64 = 30.0;
+/// Decay of the part of a source term that follows a jump, s: similar to that of the housings.
+pub const DECAY: Shape = Shape::Decay(30.0);
 
-/// Time history of a source term within a step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Shape {
-    /// Constant.
-    Level,
-    /// `exp(-t/30 s)` after the jump.
-    Decay,
+/// A time history up to an end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Span {
+    /// History over time, s; an onset at minus infinity precedes the recording.
+    pub history: TimeHistory,
+    /// Its end, s.
+    pub end_s: f64,
 }
 
-impl Shape {
-    /// Share of its full size at this time after the jump.
-    pub fn at(self, since_s: f64) -> f64 {
-        match self {
-            Shape::Level => 1.0,
-            Shape::Decay => (-since_s / DECAY_S).exp(),
-        }
-    }
-}
-
-/// A shape during some time spans.
+/// A source term acts in these spans.
 #[derive(Debug, Clone, PartialEq)]
-pub struct TimeHistory {
-    /// Time history within a span.
-    pub shape: Shape,
-    /// Start and end of each, s; a start at minus infinity precedes the recording.
-    pub spans_s: Vec<(f64, f64)>,
-}
+pub struct Spans(pub Vec<Span>);
 
-impl TimeHistory {
+impl Spans {
     /// Zero before a time, s, and 1 from then on.
-    pub fn from(begin_s: f64) -> TimeHistory {
-        TimeHistory { shape: Shape::Level, spans_s: vec![(begin_s, f64::INFINITY)] }
+    pub fn from(begin_s: f64) -> Spans {
+        let history = TimeHistory { onset: begin_s, shape: Shape::Step };
+        Spans(vec![Span { history, end_s: f64::INFINITY }])
     }
 
     /// Its value at a time; NaN means the soak before the recording.
     pub fn at(&self, t_s: f64) -> f64 {
-        let mut spans = self.spans_s.iter();
         if t_s.is_nan() {
-            let before = spans.any(|(begin_s, _)| *begin_s == f64::NEG_INFINITY);
-            return if before && self.shape == Shape::Level { 1.0 } else { 0.0 };
+            let acts = |span: &Span| span.history == TimeHistory::THROUGHOUT;
+            return f64::from(u8::from(self.0.iter().any(acts)));
         }
-        let here = spans.find(|(begin_s, end_s)| (*begin_s..*end_s).contains(&t_s));
-        here.map_or(0.0, |(begin_s, _)| self.shape.at(t_s - begin_s))
+        let acts = |span: &&Span| (span.history.onset..span.end_s).contains(&t_s);
+        self.0.iter().find(acts).map_or(0.0, |span| span.history.at(t_s))
     }
 }
 
-/// Written as in an effect's script; only a level can be written.
-impl Display for TimeHistory {
+/// Written as in an effect's script; only a step can be written.
+impl Display for Spans {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
-        let begin_s = self.spans_s.first().map_or(f64::NEG_INFINITY, |(begin_s, _)| *begin_s);
+        let begin_s = self.0.first().map_or(f64::NEG_INFINITY, |span| span.history.onset);
         write!(f, "(if at.t_s < {begin_s:?} {{ 0.0 }} else {{ 1.0 }})")
     }
 }

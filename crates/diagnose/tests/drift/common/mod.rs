@@ -6,8 +6,9 @@ use mapper_core::{
     Channel, DeclaredUncertainty, ModelTolerances, NoiseColour, Recording, ReferenceState, Series, StepKind,
     StepMarker,
 };
-use mapper_diagnose::drift::{Cause, DriftReport, DriftRequest, RecordedRun, TimeHistory, diagnose};
+use mapper_diagnose::drift::{Cause, DriftReport, DriftRequest, RecordedRun, diagnose};
 use mapper_identify::{IdentifyConfig, WindowRule};
+use mapper_inference::time_history::TimeHistory;
 use mapper_observe::declared_uncertainties;
 use mapper_physics::compressor_map::characteristic::{CharacteristicPoint, CompressorCharacteristic};
 use mapper_physics::compressor_map::closed_form_map::ClosedFormMap;

@@ -1,0 +1,177 @@
+//! Probabilities of the causes that a search found: one rule for each question.
+//!
+//! - How probable is a set of causes? Its evidence times its prior, over the sum of all sets and of no cause. A temperature, from
+//!   calibration, divides differences of the logarithms.
+//! - Which sets count as one cause? A set counts as one of its parts if the part is more probable. The other members are then too weak to
+//!   show. A source whose sets are not reduced beforehand requires a margin of evidence for the other members.
+//! - Is a cause named? Yes, if its ln of odds against no cause exceeds a threshold.
+//! - Which causes do the data not distinguish? Those with odds of at least [`EXCLUDED_ODDS`] against the most probable one: the odds at
+//!   which an interval excludes a value.
+//! - Is it a cause that nobody modelled? The source states this probability: calibrated on the residual of the best fit, or from the
+//!   evidence of a larger model error. All modelled explanations share the rest.
+
+use crate::interval::COVERAGE;
+
+/// Odds against the most probable cause below which a cause is excluded: those at which an interval excludes a value.
+pub const EXCLUDED_ODDS: f64 = 1.0 - COVERAGE;
+
+/// Constants of the rules.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rules {
+    /// Minimum ln of the odds against no cause for a cause to be named.
+    pub threshold: f64,
+    /// Divisor of differences of the logarithms.
+    pub temperature: f64,
+    /// Share of the recordings with modelled causes in which these are not among the sets.
+    pub unlisted: f64,
+    /// ln of the odds by which a set must exceed its part to be a cause of its own; 0 if the members of a set have been tested before.
+    pub part_margin: f64,
+}
+
+/// A set of causes that explains the data.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CauseSet {
+    /// Its causes, without their onsets.
+    pub members: Vec<usize>,
+    /// ln of its evidence times its prior, up to a constant that all sets and no cause share.
+    pub ln_weight: f64,
+}
+
+/// A cause with its probability.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cause {
+    /// Position of its set.
+    pub set: usize,
+    /// Probability, with that of the sets that count as this cause.
+    pub probability: f64,
+}
+
+/// Probabilities of all explanations; they add up to 1.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CauseProbabilities {
+    /// Of no cause.
+    pub none: f64,
+    /// Causes, most probable first.
+    pub causes: Vec<Cause>,
+    /// Of modelled causes that are not among the sets.
+    pub unlisted: f64,
+    /// Of a cause that nobody modelled.
+    pub unmodelled: f64,
+    /// Whether a cause is named.
+    pub named: bool,
+    /// Number of the first causes that the data do not distinguish; 0 if none is named.
+    pub alike: usize,
+}
+
+impl Rules {
+    /// Difference of ln of the weights below which the data do not distinguish causes.
+    pub fn ln_resolution(&self) -> f64 {
+        -EXCLUDED_ODDS.ln() * self.temperature
+    }
+
+    /// Probabilities of `sets`, most probable first. `none`: ln of the weight of no cause. `unmodelled`: probability of a cause that nobody
+    /// modelled.
+    pub fn cause_probabilities(&self, none: f64, sets: &[CauseSet], unmodelled: f64) -> CauseProbabilities {
+        let ln_weights = std::iter::once(none).chain(sets.iter().map(|set| set.ln_weight));
+        let shares = shares(&ln_weights.collect::<Vec<_>>(), self.temperature);
+        let modelled = 1.0 - unmodelled;
+        let none_probability = modelled * shares[0];
+        let listed = modelled * (1.0 - self.unlisted);
+        let mut causes: Vec<Cause> = Vec::new();
+        let mut best: Vec<f64> = Vec::new();
+        for (set, share) in shares[1..].iter().enumerate() {
+            let cause = self.counts_as(sets, set);
+            let probability = listed * share;
+            match causes.iter_mut().find(|known| known.set == cause) {
+                Some(known) => known.probability += probability,
+                None => {
+                    causes.push(Cause { set: cause, probability });
+                    best.push(sets[set].ln_weight);
+                }
+            }
+        }
+        let named = best.first().is_some_and(|best| best - none > self.threshold);
+        let is_alike = |ln_weight: &&f64| named && best[0] - **ln_weight < self.ln_resolution();
+        CauseProbabilities {
+            none: none_probability,
+            unlisted: self.unlisted * (modelled - none_probability),
+            unmodelled,
+            named,
+            alike: best.iter().take_while(is_alike).count(),
+            causes,
+        }
+    }
+
+    /// The set as which a set counts: the most probable of its parts that is more probable or lacks less than the margin.
+    fn counts_as(&self, sets: &[CauseSet], set: usize) -> usize {
+        let whole = &sets[set];
+        let counts = |part: &usize| {
+            let CauseSet { members, ln_weight } = &sets[*part];
+            let is_smaller = members.len() < whole.members.len();
+            *part != set
+                && (*part < set || is_smaller && whole.ln_weight - ln_weight < self.part_margin)
+                && members.iter().all(|member| whole.members.contains(member))
+        };
+        (0..sets.len()).find(counts).map_or(set, |part| self.counts_as(sets, part))
+    }
+}
+
+/// Shares of explanations with these logarithms of their weights, divided by a temperature.
+pub fn shares(ln_weights: &[f64], temperature: f64) -> Vec<f64> {
+    let highest = ln_weights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let weights: Vec<f64> = ln_weights.iter().map(|ln| ((ln - highest) / temperature).exp()).collect();
+    let total: f64 = weights.iter().sum();
+    weights.into_iter().map(|weight| weight / total).collect()
+}
+
+/// Probability of ln of the odds.
+pub fn probability(ln_odds: f64) -> f64 {
+    1.0 / (1.0 + (-ln_odds).exp())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RULES: Rules = Rules { threshold: 3.0, temperature: 1.0, unlisted: 0.05, part_margin: 0.0 };
+
+    fn sets(of: &[(&[usize], f64)]) -> Vec<CauseSet> {
+        of.iter().map(|(members, ln_weight)| CauseSet { members: members.to_vec(), ln_weight: *ln_weight }).collect()
+    }
+
+    #[test]
+    fn probabilities_add_up_to_one_and_follow_the_odds() {
+        let found = RULES.cause_probabilities(0.0, &sets(&[(&[4], 5.0), (&[2], 4.0), (&[4, 7], 3.0)]), 0.2);
+        let sum: f64 = found.causes.iter().map(|cause| cause.probability).sum();
+        assert!((sum + found.none + found.unlisted + found.unmodelled - 1.0).abs() < 1e-12);
+        // Odds 1 : e^4 of no cause against the second, which has 95 % of its share.
+        assert!((found.causes[1].probability / found.none / 0.95 - f64::exp(4.0)).abs() < 1e-9);
+        // The pair with a weak second member counts as its first one.
+        let first = (f64::exp(5.0) + f64::exp(3.0)) / f64::exp(4.0);
+        assert_eq!(found.causes.iter().map(|cause| cause.set).collect::<Vec<_>>(), [0, 1]);
+        assert!((found.causes[0].probability / found.causes[1].probability - first).abs() < 1e-9);
+    }
+
+    #[test]
+    fn causes_are_alike_up_to_odds_of_one_to_twenty() {
+        let alike = |behind: f64| {
+            RULES.cause_probabilities(0.0, &sets(&[(&[0], 9.0), (&[1], 9.0 - behind)]), 0.0).alike
+        };
+        assert_eq!((alike(19f64.ln()), alike(21f64.ln())), (2, 1));
+        let warmer = Rules { temperature: 2.0, ..RULES };
+        assert_eq!(warmer.cause_probabilities(0.0, &sets(&[(&[0], 9.0), (&[1], 5.0)]), 0.0).alike, 2);
+        let weak = RULES.cause_probabilities(0.0, &sets(&[(&[0], 2.9)]), 0.0);
+        assert!(!weak.named && weak.alike == 0);
+    }
+
+    /// A second member within the margin is not named; with more evidence it is.
+    #[test]
+    fn a_member_needs_its_margin_of_evidence() {
+        let strict = Rules { part_margin: 3.0, ..RULES };
+        let first = |pair: f64| {
+            let sets = sets(&[(&[4, 7], pair), (&[2], 9.5), (&[4], 9.0)]);
+            strict.cause_probabilities(0.0, &sets, 0.0).causes[0].set
+        };
+        assert_eq!((first(11.0), first(13.0)), (2, 0));
+    }
+}

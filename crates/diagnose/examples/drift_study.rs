@@ -17,8 +17,8 @@ mod common;
 use common::{Planted, campaign, draw, drift_reading, identification, judge, judge_by};
 use mapper_core::{Channel, Method};
 use mapper_diagnose::drift::{Cause, RATE_PER_H, RateOrStep};
-use mapper_inference::time_history::{Shape, TimeHistory};
 use mapper_identify::{IdentifyConfig, identify_each};
+use mapper_inference::time_history::{Shape, TimeHistory};
 use std::collections::BTreeMap;
 
 const CAUSES: [Cause; 8] = [
@@ -194,15 +194,15 @@ fn one(
             main.is_some_and(|found| {
                 let same_kind = matches!(
                     (found.size, planted.course.shape),
-                    (RateOrStep::RatePerH(_), Shape::Ramp(_))
-                        | (RateOrStep::Step(_), Shape::Step)
+                    (RateOrStep::RatePerH(_), Shape::Ramp(_)) | (RateOrStep::Step(_), Shape::Step)
                 );
                 same_kind && (found.low..=found.high).contains(&planted.size)
             })
         }),
         size_ratio: planted.and_then(|planted| match (main?.size, planted.course.shape) {
-            (RateOrStep::RatePerH(size), Shape::Ramp(_))
-            | (RateOrStep::Step(size), Shape::Step) => Some(size / planted.size),
+            (RateOrStep::RatePerH(size), Shape::Ramp(_)) | (RateOrStep::Step(size), Shape::Step) => {
+                Some(size / planted.size)
+            }
             _ => None,
         }),
         shrink: [shrink(&fitted, &start), shrink(&identified, &start), shrink(&identified, &undrifted)],

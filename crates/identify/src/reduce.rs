@@ -168,7 +168,7 @@ fn estimate(
             let bias_standard_error = heat.tolerances.convection_ratio * h_w_m2k;
             let error = EstimateUncertainty { noise_standard_error: 0.0, bias_standard_error };
             estimate.h_w_m2k = Some((h_w_m2k, Some(error)));
-            findings.remark(Warning::ThroughTheLaw { convection_origin: Some(heat.origin.to_owned()) });
+            findings.remark(Warning::FromConvectionLaw { convection_origin: Some(heat.origin.to_owned()) });
         }
         None => findings.remark(Warning::Apparent),
     }

@@ -16,10 +16,10 @@ pub trait Model {
     fn cost(&self, unknowns: &DVector<f64>, point: &Self::Point) -> f64;
 
     /// The normal equations at a point; `reach` is the distance of the finite differences.
-    fn normal(&mut self, unknowns: &DVector<f64>, point: &Self::Point, reach: Reach) -> Normal;
+    fn normal(&mut self, unknowns: &DVector<f64>, point: &Self::Point, reach: DifferenceStep) -> Normal;
 
     /// Largest change of each unknown in one iteration: down (at most 0) and up.
-    fn room(&self, unknowns: &DVector<f64>) -> Vec<(f64, f64)>;
+    fn step_bounds(&self, unknowns: &DVector<f64>) -> Vec<(f64, f64)>;
 
     /// Called at each accepted point, for example to estimate the noise again.
     fn accept(&mut self, _: &Self::Point) {}
@@ -27,7 +27,7 @@ pub trait Model {
 
 /// Distance of the finite differences that give the slopes of the residuals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Reach {
+pub enum DifferenceStep {
     /// For a smooth cost.
     Fine,
     /// For a cost with small discontinuities, which hide its slope at a short distance.
@@ -42,15 +42,15 @@ pub const COARSE: f64 = 10.0 * FINE;
 /// Largest change of an unknown in one iteration, in its unit. Bound: models are nonlinear.
 pub const MAX_MOVE: f64 = 2.0;
 
-impl Reach {
+impl DifferenceStep {
     /// The distance, in the unknowns' units.
     pub fn distance(self) -> f64 {
-        if self == Reach::Fine { FINE } else { COARSE }
+        if self == DifferenceStep::Fine { FINE } else { COARSE }
     }
 }
 
 /// Largest change of an unknown in one iteration, down and up, that keeps it between `low` and `high`.
-pub fn room_within(low: f64, high: f64, at: f64) -> (f64, f64) {
+pub fn step_bounds_within(low: f64, high: f64, at: f64) -> (f64, f64) {
     ((low - at).clamp(-MAX_MOVE, 0.0), (high - at).clamp(0.0, MAX_MOVE))
 }
 
@@ -87,7 +87,7 @@ pub struct End<Point> {
     /// The normal equations.
     pub normal: Normal,
     /// Predicted decrease of the cost by one more iteration; larger than [`Until::enough`] if no step decreased the cost.
-    pub promised: f64,
+    pub predicted_decrease: f64,
 }
 
 /// Maximum number of lengths tried for one step. Bound: the last is a hundredth of the step; a shorter one is no progress.
@@ -103,13 +103,13 @@ pub fn descend<M: Model>(
     until: Until,
 ) -> End<M::Point> {
     model.accept(&point);
-    let mut reach = Reach::Fine;
+    let mut reach = DifferenceStep::Fine;
     let mut normal = model.normal(&unknowns, &point, reach);
     let mut predicted_decrease = 0.0;
     for _ in 1..until.iterations {
-        let Some((step, promised)) = normal.step(&model.room(&unknowns)) else { break };
-        predicted_decrease = promised;
-        if promised < until.enough {
+        let Some((step, decrease)) = normal.step(&model.step_bounds(&unknowns)) else { break };
+        predicted_decrease = decrease;
+        if decrease < until.enough {
             break;
         }
         let cost = model.cost(&unknowns, &point);
@@ -123,12 +123,12 @@ pub fn descend<M: Model>(
                 (unknowns, point) = better;
                 model.accept(&point);
             }
-            None if reach == Reach::Coarse => break,
-            None => reach = Reach::Coarse,
+            None if reach == DifferenceStep::Coarse => break,
+            None => reach = DifferenceStep::Coarse,
         }
         normal = model.normal(&unknowns, &point, reach);
     }
-    End { unknowns, point, normal, promised: predicted_decrease }
+    End { unknowns, point, normal, predicted_decrease }
 }
 
 /// The normal equations of an iteration: half the Hessian of the cost, and half its negative gradient.
@@ -137,31 +137,32 @@ pub struct Normal {
     /// Precision of the unknowns, priors included.
     pub matrix: DMatrix<f64>,
     /// Half the negative gradient of the cost.
-    pub pull: DVector<f64>,
+    pub gradient: DVector<f64>,
 }
 
 impl Normal {
     /// The step to the minimum cost within the bounds of each unknown's change, and the predicted decrease. The unknown that exceeds its
     /// bounds most is fixed at the bound, and the others are solved again.
-    pub fn step(&self, room: &[(f64, f64)]) -> Option<(DVector<f64>, f64)> {
-        let mut fixed: Vec<Option<f64>> = vec![None; room.len()];
-        for _ in 0..=room.len() {
+    pub fn step(&self, step_bounds: &[(f64, f64)]) -> Option<(DVector<f64>, f64)> {
+        let mut fixed: Vec<Option<f64>> = vec![None; step_bounds.len()];
+        for _ in 0..=step_bounds.len() {
             let free: Vec<usize> = (0..fixed.len()).filter(|i| fixed[*i].is_none()).collect();
             let mut step = DVector::from_fn(fixed.len(), |i, _| fixed[i].unwrap_or(0.0));
             let fixed_part = &self.matrix * &step;
             let matrix = DMatrix::from_fn(free.len(), free.len(), |i, j| self.matrix[(free[i], free[j])]);
-            let right = DVector::from_fn(free.len(), |i, _| self.pull[free[i]] - fixed_part[free[i]]);
+            let right = DVector::from_fn(free.len(), |i, _| self.gradient[free[i]] - fixed_part[free[i]]);
             let solution = matrix.cholesky()?.solve(&right);
             for (place, index) in free.iter().enumerate() {
                 step[*index] = solution[place];
             }
-            let excess = |i: &usize| (room[*i].0 - step[*i]).max(step[*i] - room[*i].1);
+            let excess = |i: &usize| (step_bounds[*i].0 - step[*i]).max(step[*i] - step_bounds[*i].1);
             let worst = free.into_iter().max_by(|a, b| excess(a).total_cmp(&excess(b)));
             let Some(worst) = worst.filter(|i| excess(i) > ROUNDING) else {
-                let promised = 2.0 * step.dot(&self.pull) - step.dot(&(&self.matrix * &step));
-                return Some((step, promised));
+                let predicted_decrease = 2.0 * step.dot(&self.gradient) - step.dot(&(&self.matrix * &step));
+                return Some((step, predicted_decrease));
             };
-            fixed[worst] = Some(step[worst].clamp(room[worst].0.min(0.0), room[worst].1.max(0.0)));
+            fixed[worst] =
+                Some(step[worst].clamp(step_bounds[worst].0.min(0.0), step_bounds[worst].1.max(0.0)));
         }
         None
     }
@@ -201,13 +202,13 @@ mod tests {
             residual.iter().map(|r| r * r).sum()
         }
 
-        fn normal(&mut self, x: &DVector<f64>, residual: &[f64; 2], _: Reach) -> Normal {
+        fn normal(&mut self, x: &DVector<f64>, residual: &[f64; 2], _: DifferenceStep) -> Normal {
             let slopes = DMatrix::from_row_slice(2, 2, &[1.0, 0.0, -20.0 * x[0], 10.0]);
             let residual = DVector::from_row_slice(residual);
-            Normal { matrix: slopes.tr_mul(&slopes), pull: -slopes.tr_mul(&residual) }
+            Normal { matrix: slopes.tr_mul(&slopes), gradient: -slopes.tr_mul(&residual) }
         }
 
-        fn room(&self, x: &DVector<f64>) -> Vec<(f64, f64)> {
+        fn step_bounds(&self, x: &DVector<f64>) -> Vec<(f64, f64)> {
             vec![(self.low - x[0], 5.0), (-5.0, 5.0)]
         }
     }
@@ -228,18 +229,18 @@ mod tests {
         assert!((bound[0] - 1.5).abs() < 1e-6 && (bound[1] - 2.25).abs() < 1e-6, "{bound}");
     }
 
-    /// Against all ways of holding unknowns at the ends of their room.
+    /// Against all ways of holding unknowns at their bounds.
     #[test]
     fn a_step_within_room_solves_for_the_others() {
         let matrix = DMatrix::from_row_slice(3, 3, &[4.0, 1.0, 0.5, 1.0, 3.0, 0.2, 0.5, 0.2, 2.0]);
-        let normal = Normal { matrix: matrix.clone(), pull: DVector::from_row_slice(&[8.0, -1.0, 1.0]) };
-        let (step, promised) = normal.step(&[(-1.0, 1.0); 3]).unwrap();
+        let normal = Normal { matrix: matrix.clone(), gradient: DVector::from_row_slice(&[8.0, -1.0, 1.0]) };
+        let (step, predicted_decrease) = normal.step(&[(-1.0, 1.0); 3]).unwrap();
         assert!((step[0] - 1.0).abs() < 1e-12);
         // The gradient vanishes along what is free.
-        let gradient = &matrix * &step - &normal.pull;
+        let gradient = &matrix * &step - &normal.gradient;
         assert!(gradient[1].abs() < 1e-12 && gradient[2].abs() < 1e-12);
-        let cost = |s: &DVector<f64>| s.dot(&(&matrix * s)) - 2.0 * s.dot(&normal.pull);
-        assert!((promised + cost(&step)).abs() < 1e-12);
+        let cost = |s: &DVector<f64>| s.dot(&(&matrix * s)) - 2.0 * s.dot(&normal.gradient);
+        assert!((predicted_decrease + cost(&step)).abs() < 1e-12);
         for axis in 0..3 {
             for by in [-0.01, 0.01] {
                 let mut other = step.clone();

@@ -233,13 +233,13 @@ impl Likelihood {
     /// The most probable set of hypotheses, found by adding, swapping and removing members until nothing is more probable.
     pub fn explain(&self, priors: &Priors) -> Option<Explanation> {
         let likelihood = self.marginalise(&priors.always)?;
-        let search = Search { likelihood: &likelihood, hypotheses: &priors.hypotheses };
+        let search = SetSearch { likelihood: &likelihood, hypotheses: &priors.hypotheses };
         // Start from the empty set and from each of the most probable families: if one cause nearly equals the sum of two others, no
         // single swap leads from one explanation to the other.
-        let mut starts: Vec<Offer> =
-            search.offers(&[]).into_values().filter(|offer| offer.ln_total > 0.0).collect();
+        let mut starts: Vec<Extension> =
+            search.extensions(&[]).into_values().filter(|extension| extension.ln_total > 0.0).collect();
         starts.sort_by(|a, b| b.ln_total.total_cmp(&a.ln_total));
-        let starts = starts.iter().take(MAX_MEMBERS).map(|offer| vec![offer.index]);
+        let starts = starts.iter().take(MAX_MEMBERS).map(|extension| vec![extension.index]);
         let ends = starts.chain([Vec::new()]).map(|start| search.climb(start));
         let best = ends.max_by(|a, b| search.ln_odds(a).total_cmp(&search.ln_odds(b)))?;
         search.explanation(&best)
@@ -248,7 +248,7 @@ impl Likelihood {
 
 /// A family that may join the explanation.
 #[derive(Debug, Clone, Copy)]
-struct Offer {
+struct Extension {
     /// Its most probable hypothesis.
     index: usize,
     /// ln of the odds of the set with this hypothesis.
@@ -257,13 +257,13 @@ struct Offer {
     ln_total: f64,
 }
 
-struct Search<'a> {
+struct SetSearch<'a> {
     /// Of the hypotheses alone.
     likelihood: &'a Likelihood,
     hypotheses: &'a [Hypothesis],
 }
 
-impl Search<'_> {
+impl SetSearch<'_> {
     fn free(&self, members: &[usize]) -> Vec<(usize, f64)> {
         members.iter().map(|index| (*index, self.hypotheses[*index].sigma)).collect()
     }
@@ -284,8 +284,8 @@ impl Search<'_> {
     }
 
     /// Every family without a member in `rest`, with its odds if it is added.
-    fn offers(&self, rest: &[usize]) -> BTreeMap<usize, Offer> {
-        let mut offers: BTreeMap<usize, Offer> = BTreeMap::new();
+    fn extensions(&self, rest: &[usize]) -> BTreeMap<usize, Extension> {
+        let mut extensions: BTreeMap<usize, Extension> = BTreeMap::new();
         let mut set = rest.to_vec();
         for (index, hypothesis) in self.hypotheses.iter().enumerate() {
             if rest.iter().any(|member| self.hypotheses[*member].family == hypothesis.family) {
@@ -297,14 +297,14 @@ impl Search<'_> {
             if ln_odds == f64::NEG_INFINITY {
                 continue;
             }
-            let offer = Offer { index, ln_odds, ln_total: ln_odds };
-            let join = |known: &mut Offer| {
+            let extension = Extension { index, ln_odds, ln_total: ln_odds };
+            let join = |known: &mut Extension| {
                 let ln_total = ln_sum(known.ln_total, ln_odds);
-                *known = Offer { ln_total, ..if ln_odds > known.ln_odds { offer } else { *known } };
+                *known = Extension { ln_total, ..if ln_odds > known.ln_odds { extension } else { *known } };
             };
-            offers.entry(hypothesis.family).and_modify(join).or_insert(offer);
+            extensions.entry(hypothesis.family).and_modify(join).or_insert(extension);
         }
-        offers
+        extensions
     }
 
     /// Changes one member at a time until no change makes the set more probable.
@@ -329,17 +329,18 @@ impl Search<'_> {
         };
         for place in 0..places {
             let rest = without(members, place);
-            let offers = self.offers(&rest);
+            let extensions = self.extensions(&rest);
             let removed = self.ln_odds(&rest);
             let family = members.get(place).map(|index| self.hypotheses[*index].family);
             let now =
-                family.map_or(removed, |family| offers.get(&family).map_or(removed, |own| own.ln_total));
+                family.map_or(removed, |family| extensions.get(&family).map_or(removed, |own| own.ln_total));
             try_set(removed - now, rest.clone());
-            for (other, offer) in &offers {
-                let set: Vec<usize> = rest.iter().copied().chain([offer.index]).collect();
+            for (other, extension) in &extensions {
+                let set: Vec<usize> = rest.iter().copied().chain([extension.index]).collect();
                 // The best hypothesis of the same family may change if the other members have changed.
                 let own = Some(*other) == family;
-                let gain = if own { offer.ln_odds - self.ln_odds(members) } else { offer.ln_total - now };
+                let gain =
+                    if own { extension.ln_odds - self.ln_odds(members) } else { extension.ln_total - now };
                 try_set(gain, set);
             }
         }
@@ -352,11 +353,11 @@ impl Search<'_> {
         let (solved, inverse) = (factor.solve(&precision_mean), factor.inverse());
         let member = |(place, index): (usize, &usize)| {
             let rest = without(members, place);
-            let mut offers = self.offers(&rest);
-            let own = offers.remove(&self.hypotheses[*index].family)?;
-            let mut alternatives: Vec<(usize, f64)> = offers
+            let mut extensions = self.extensions(&rest);
+            let own = extensions.remove(&self.hypotheses[*index].family)?;
+            let mut alternatives: Vec<(usize, f64)> = extensions
                 .into_iter()
-                .map(|(family, offer)| (family, (offer.ln_total - own.ln_total).exp()))
+                .map(|(family, extension)| (family, (extension.ln_total - own.ln_total).exp()))
                 .collect();
             alternatives.sort_by(|a, b| b.1.total_cmp(&a.1));
             let sigma = free[place].1;
@@ -369,7 +370,11 @@ impl Search<'_> {
             })
         };
         let members_found: Option<Vec<Member>> = members.iter().enumerate().map(member).collect();
-        let alone = self.offers(&[]).into_iter().map(|(family, offer)| (family, offer.ln_total)).collect();
+        let alone = self
+            .extensions(&[])
+            .into_iter()
+            .map(|(family, extension)| (family, extension.ln_total))
+            .collect();
         Some(Explanation { members: members_found?, ln_odds: self.ln_odds(members), alone })
     }
 }
@@ -419,7 +424,7 @@ mod tests {
                 ln_density(&balance.residual, &whole) - ln_density(&balance.residual, &balance.covariance);
             // Prior odds of 1: the ln of the odds is that of the evidence.
             let all = Priors::even(Vec::new(), &sigmas, 3.0);
-            let search = Search { likelihood: &likelihood, hypotheses: &all.hypotheses };
+            let search = SetSearch { likelihood: &likelihood, hypotheses: &all.hypotheses };
             prop_assert!((search.ln_odds(&[0, 1, 2]) - expected).abs() < 1e-9);
             // Generalised least squares of the last parameter with the others in the covariance.
             let priors = Priors::even(sigmas[..2].to_vec(), &[1.0], 0.1);
@@ -483,7 +488,7 @@ mod tests {
             let mut likelihood = Likelihood::new(8);
             let covariance = DMatrix::identity(12, 12);
             likelihood.add(&Balance { residual, covariance, columns: columns.clone() }).unwrap();
-            let search = Search { likelihood: &likelihood, hypotheses: &priors.hypotheses };
+            let search = SetSearch { likelihood: &likelihood, hypotheses: &priors.hypotheses };
             let family = |index: usize| priors.hypotheses[index].family;
             let singles = (0..8).map(|one| vec![one]);
             let pairs = (0..8).flat_map(|one| (one + 1..8).map(move |other| vec![one, other]));

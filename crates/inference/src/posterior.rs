@@ -39,7 +39,7 @@ pub struct CauseSet {
 
 /// A cause with its probability.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Cause {
+pub struct RankedCause {
     /// Position of its set.
     pub set: usize,
     /// Probability, with that of the sets that count as this cause.
@@ -52,7 +52,7 @@ pub struct CauseProbabilities {
     /// Of no cause.
     pub none: f64,
     /// Causes, most probable first.
-    pub causes: Vec<Cause>,
+    pub causes: Vec<RankedCause>,
     /// Of modelled causes that are not among the sets.
     pub unlisted: f64,
     /// Of a cause that nobody modelled.
@@ -77,7 +77,7 @@ impl Rules {
         let modelled = 1.0 - unmodelled;
         let none_probability = modelled * shares[0];
         let listed = modelled * (1.0 - self.unlisted);
-        let mut causes: Vec<Cause> = Vec::new();
+        let mut causes: Vec<RankedCause> = Vec::new();
         let mut best: Vec<f64> = Vec::new();
         for (set, share) in shares[1..].iter().enumerate() {
             let cause = self.counts_as(sets, set);
@@ -85,7 +85,7 @@ impl Rules {
             match causes.iter_mut().find(|known| known.set == cause) {
                 Some(known) => known.probability += probability,
                 None => {
-                    causes.push(Cause { set: cause, probability });
+                    causes.push(RankedCause { set: cause, probability });
                     best.push(sets[set].ln_weight);
                 }
             }
@@ -136,7 +136,9 @@ mod tests {
     const RULES: Rules = Rules { threshold: 3.0, temperature: 1.0, unlisted: 0.05, part_margin: 0.0 };
 
     fn sets(of: &[(&[usize], f64)]) -> Vec<CauseSet> {
-        of.iter().map(|(members, ln_weight)| CauseSet { members: members.to_vec(), ln_weight: *ln_weight }).collect()
+        of.iter()
+            .map(|(members, ln_weight)| CauseSet { members: members.to_vec(), ln_weight: *ln_weight })
+            .collect()
     }
 
     #[test]

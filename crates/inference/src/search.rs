@@ -24,7 +24,7 @@ pub trait Causes: Sync {
     fn ln_odds(&self, fit: &Self::Fit) -> f64;
 
     /// Predicted gain of each further cause, from a linearisation about a fit.
-    fn offers(&self, base: &Self::Fit) -> Vec<Offer<Self::Start>>;
+    fn extensions(&self, base: &Self::Fit) -> Vec<Extension<Self::Start>>;
 
     /// Start for the fit of the same set except for one cause.
     fn without(&self, fit: &Self::Fit, cause: usize) -> Self::Start;
@@ -33,12 +33,12 @@ pub trait Causes: Sync {
     fn fit(&self, start: &Self::Start) -> Option<Self::Fit>;
 
     /// Whether the search should add a cause to `to`, which it reached from `from`.
-    fn goes_on(&self, from: &Self::Fit, to: &Self::Fit) -> bool;
+    fn should_extend(&self, from: &Self::Fit, to: &Self::Fit) -> bool;
 }
 
 /// A cause that may be added to a fit.
 #[derive(Debug, Clone)]
-pub struct Offer<Start> {
+pub struct Extension<Start> {
     /// The cause.
     pub cause: usize,
     /// Predicted growth of ln of the odds.
@@ -151,7 +151,7 @@ fn climb_beyond<C: Causes>(
             subsets.chain(full_set).filter(|base| extended.insert(base.clone())).collect();
         for base_members in bases {
             let Some(base) = known.get(&base_members) else { continue };
-            for Offer { cause, ln_gain, start } in causes.offers(base) {
+            for Extension { cause, ln_gain, start } in causes.extensions(base) {
                 let mut set = base_members.clone();
                 set.push(cause);
                 set.sort_unstable();
@@ -167,7 +167,7 @@ fn climb_beyond<C: Causes>(
         known.fit_all(causes, &starts);
         let next = known.ranked(causes).into_iter().next();
         let Some(next) = next.filter(|next| causes.ln_odds(next) > causes.ln_odds(&best)) else { return };
-        may_grow = causes.goes_on(&best, &next);
+        may_grow = causes.should_extend(&best, &next);
         best = next;
     }
 }
@@ -264,7 +264,7 @@ mod tests {
             -0.5 * fit.misfit + LN_PRIOR * fit.sizes.len() as f64
         }
 
-        fn offers(&self, base: &Fit) -> Vec<Offer<Self::Start>> {
+        fn extensions(&self, base: &Fit) -> Vec<Extension<Self::Start>> {
             let left = self.left(&base.sizes);
             let used: Vec<usize> = self.members(base).iter().map(|cause| self.family(*cause)).collect();
             let free = (0..self.columns.ncols()).filter(|cause| !used.contains(&self.family(*cause)));
@@ -272,7 +272,11 @@ mod tests {
                 let slope = self.columns.column(cause).component_mul(&(&self.reading - &left));
                 let size = slope.dot(&left) / slope.norm_squared();
                 let ln_gain = 0.5 * size * slope.dot(&left) + LN_PRIOR;
-                Offer { cause, ln_gain, start: base.sizes.iter().copied().chain([(cause, size)]).collect() }
+                Extension {
+                    cause,
+                    ln_gain,
+                    start: base.sizes.iter().copied().chain([(cause, size)]).collect(),
+                }
             })
             .collect()
         }
@@ -285,7 +289,7 @@ mod tests {
             Some(self.fitted(start.clone()))
         }
 
-        fn goes_on(&self, _: &Fit, _: &Fit) -> bool {
+        fn should_extend(&self, _: &Fit, _: &Fit) -> bool {
             true
         }
     }

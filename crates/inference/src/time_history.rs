@@ -30,7 +30,13 @@ impl TimeHistory {
         match self.shape {
             Shape::Step => f64::from(u8::from(position >= self.onset)),
             Shape::Ramp(length) => since.max(0.0) / length,
-            Shape::Decay(constant) => if since >= 0.0 { (-since / constant).exp() } else { 0.0 },
+            Shape::Decay(constant) => {
+                if since >= 0.0 {
+                    (-since / constant).exp()
+                } else {
+                    0.0
+                }
+            }
         }
     }
 
@@ -45,9 +51,7 @@ impl TimeHistory {
             Shape::Step => acting / length,
             Shape::Ramp(full) if acting < length => 0.5 * acting * acting / length / full,
             Shape::Ramp(_) => self.at(0.5 * (start + end)),
-            Shape::Decay(constant) => {
-                (self.at(end - acting) - self.at(end)) * constant / length
-            }
+            Shape::Decay(constant) => (self.at(end - acting) - self.at(end)) * constant / length,
         }
     }
 }

@@ -69,7 +69,7 @@ pub use machine::first_request::{FirstCampaignRequest, FirstRig};
 pub use machine::fmu_file::WrittenFmu;
 pub use machine::map_file::{map_description, write_map, write_map_fitted_if_needed};
 pub use machine::map_work::{MapFile, MapOut, MapWork};
-pub use mapper_diagnose::driven::cause_search::Side;
+pub use mapper_diagnose::driven::Side;
 pub use mapper_maps::table::DescriptionError;
 pub use mapper_report::{result_remark_text, with_messages};
 pub use mapper_runner::Operator;

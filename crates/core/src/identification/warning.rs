@@ -39,7 +39,7 @@ Warning {
     /// No jump leads to the step (dynamic method).
     "no_transient" NoTransient,
     /// The efficiency comes from the shared parameters, because no jump leads to the step, or from a convection law of this origin.
-    "through_the_law" ThroughTheLaw { convection_origin: Option<String> },
+    "from_convection_law" FromConvectionLaw { convection_origin: Option<String> },
     /// The window has too few complete samples.
     "too_few_samples" TooFewSamples(TooFew),
     /// The requested window does not fit into the step.

@@ -5,20 +5,23 @@
 //! a time history ([`mapper_inference::hypotheses`]), explains the rest. Only repeats give evidence against the constants. docs/how-to/drift.md has
 //! the method with its measured error rates.
 
+mod candidates;
 mod causes;
-mod conclude;
+mod constants;
 mod correction;
+mod decide;
 mod diagnose;
-mod likelihood;
+mod drive;
+mod readings;
+mod refinement;
 mod report;
 mod runs;
-mod sensitivity;
 
-pub use causes::cause::{Cause, CauseKind, RATE_PER_H};
-pub use correction::subtract_drift::without_drift;
+pub use causes::{Cause, CauseKind, RATE_PER_H};
+pub use correction::without_drift;
 pub use diagnose::diagnose;
 pub use report::{
     Alternative, CorrectedPoint, DetectionLimit, DriftReport, DriftVerdict, FoundDrift, RateOrStep,
     RepeatGroup, Visit, VisitChannel,
 };
-pub use runs::request::{DriftError, DriftRequest, RecordedRun, Unsolvable};
+pub use runs::{DriftError, DriftRequest, RecordedRun, Unsolvable};

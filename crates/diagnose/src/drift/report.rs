@@ -1,6 +1,6 @@
 //! The report, printed and written as JSON.
 
-use crate::drift::causes::cause::{Cause, RATE_PER_H};
+use crate::drift::causes::{Cause, RATE_PER_H};
 use mapper_inference::time_history::{Shape, TimeHistory};
 use serde::Serialize;
 use std::collections::BTreeMap;

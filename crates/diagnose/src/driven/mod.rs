@@ -1,14 +1,28 @@
 //! Diagnosis from a log without steps: one side of the machine, driven by its measured neighbours.
 //!
 //! On an engine, P3 and valve are not set and the machine never settles. The measured speed, flow, pressures and inlet temperature determine the effect
-//! of the compressor on the gas. The judged channels are T2 and, if measured, Tc. [`cause_search`] fits one part of a log with and without a cause, and
+//! of the compressor on the gas. The judged channels are T2 and, if measured, Tc. The diagnosis fits one part of a log with and without a cause, and
 //! predicts the rest.
 //!
 //! Every parameter has a wide prior and an interval: a log of 13 s cannot distinguish a slow probe from a warm housing, and the result must show this.
 
-pub mod cause_search;
+pub(crate) mod compressor;
+mod denoise;
+mod detectable;
+mod diagnose;
+mod fit;
+mod held_out;
 mod log_rows;
-mod parameters;
+mod search;
+pub(crate) mod side;
+mod side_diagnosis;
+pub(crate) mod turbine;
+
+pub use diagnose::{SideRequest, diagnose};
+pub use side::Side;
+pub use side_diagnosis::{
+    Beyond, ChannelTrace, Diagnosis, HeldOut, NotDiagnosable, Phase, SideCause, SideVerdict, Unknown,
+};
 
 use mapper_core::RecordingError;
 

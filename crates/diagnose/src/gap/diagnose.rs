@@ -7,7 +7,7 @@ use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::place::{Gain, places};
 use crate::gap::causes::probabilities::{Posterior, posterior, rivals, suspicions, weight};
 use crate::gap::causes::select::{
-    HOPELESS, MIN_SHRINK, Search, close, ranked, refit, search, search_onsets, supported,
+    MAX_EVIDENCE_DEFICIT, MIN_GAP_REDUCTION, Search, close, ranked, refit, search, search_onsets, supported,
 };
 use crate::gap::causes::smallest_seen::smallest_seen;
 use crate::gap::findings::experiment::Experiment;
@@ -127,7 +127,8 @@ pub fn diagnose(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
     progress(0.65, "closest causes");
     let null = found.null;
     let at_best = found.relinearised.as_ref().map_or(&linearised, |(linearised, _)| linearised);
-    let hopeless = |f: &&Fit| found.fits.first().is_some_and(|best| best.score - f.score > HOPELESS);
+    let hopeless =
+        |f: &&Fit| found.fits.first().is_some_and(|best| best.score - f.score > MAX_EVIDENCE_DEFICIT);
     let mut finalists: Vec<&Fit> = found
         .fits
         .iter()
@@ -154,7 +155,7 @@ pub fn diagnose(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
     };
     let at_best = relinearised.as_ref().unwrap_or(at_best);
     if relinearised.is_some() {
-        let (closest, others) = fits.split_at(close(&fits[..fits.len().min(4)], HOPELESS).len());
+        let (closest, others) = fits.split_at(close(&fits[..fits.len().min(4)], MAX_EVIDENCE_DEFICIT).len());
         let again = refit(&at(at_best), &closest.iter().collect::<Vec<_>>(), effort);
         fits = ranked(&at(at_best), again.iter().chain(closest).chain(others));
     }
@@ -189,8 +190,8 @@ pub fn diagnose(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
         let n = null.residual.len() as f64;
         let removed = 1.0 - (best.cost - n).max(0.0) / (null.cost - n).max(1.0);
         let smooth = 1.0 - left.smooth_excess.max(0.0) / left_by_null.smooth_excess.max(1.0);
-        let better = gap.gap_reduction > MIN_SHRINK;
-        if removed > MIN_SHRINK && smooth > MIN_SHRINK && better {
+        let better = gap.gap_reduction > MIN_GAP_REDUCTION;
+        if removed > MIN_GAP_REDUCTION && smooth > MIN_GAP_REDUCTION && better {
             Verdict::PartlyExplained
         } else {
             Verdict::Unexplained

@@ -5,7 +5,7 @@
 use crate::driven::common::{self, Course, ELEMENT_LAG, declared, engine, healthy};
 use mapper_core::{Channel, Recording};
 use mapper_diagnose::driven::DrivenError;
-use mapper_diagnose::driven::cause_search::{Diagnosis, Side, SideRequest, SideVerdict, diagnose};
+use mapper_diagnose::driven::{Diagnosis, Side, SideRequest, SideVerdict, diagnose};
 use mapper_diagnose::gap::causes::calibration::Calibration;
 use mapper_effects::catalogue;
 use mapper_physics::rig::effect::Rig;
@@ -51,12 +51,13 @@ fn one_of(seed: u64, side: Side, course: &Course, planted: &[(&str, f64)], witho
 fn count(found: &[Diagnosis], right: impl Fn(&Diagnosis) -> bool) -> usize {
     let wrong = found.iter().filter(|found| !right(found));
     for found in wrong {
-        let causes: Vec<_> = found.causes.iter().map(|c| (c.candidate.effects.join("+"), c.candidate.probability)).collect();
+        let causes: Vec<_> =
+            found.causes.iter().map(|c| (c.candidate.effects.join("+"), c.candidate.probability)).collect();
         println!(
             "{:?} outside {:.2}, left {:?}: {:?}",
             found.word,
             found.probability_outside,
-            found.causes.first().map(|c| c.left_k.clone()),
+            found.causes.first().map(|c| c.model_error_sigma_k.clone()),
             &causes[..causes.len().min(3)]
         );
     }
@@ -89,7 +90,11 @@ fn a_slow_probe_is_named_with_its_size() {
     let found = all_of(COMPRESSOR, &Course::brake(), &[("tip_diameter", 2.5e-3)], &[Channel::Tc]);
     assert!(count(&found, |found| is_named(found, "tip_diameter")) >= almost_all());
     let held = |found: &Diagnosis| {
-        found.causes[0].candidate.parameters.get("tip_diameter").is_some_and(|d| (d.low..=d.high).contains(&2.5e-3))
+        found.causes[0]
+            .candidate
+            .parameters
+            .get("tip_diameter")
+            .is_some_and(|d| (d.low..=d.high).contains(&2.5e-3))
     };
     assert!(count(&found, held) >= almost_all());
     for found in &found {

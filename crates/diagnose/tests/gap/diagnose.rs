@@ -11,7 +11,7 @@ use mapper_diagnose::gap::findings::experiment::{AllowedJump, Experiment};
 use mapper_diagnose::gap::findings::report::Verdict;
 use mapper_diagnose::gap::findings::warning::GapWarning;
 use mapper_diagnose::gap::joint::{Fate, Value, over_recordings};
-use mapper_diagnose::gap::next_experiment::outlook::{apart, apart_at_first_sight};
+use mapper_diagnose::gap::next_experiment::outlook::{approximate_separation, separation};
 use mapper_diagnose::gap::preconditions::problem::Problem;
 use mapper_diagnose::gap::preconditions::usable::usable;
 use mapper_diagnose::gap::residuals::nuisance::NuisanceKind;
@@ -317,14 +317,14 @@ fn a_jump_tells_a_slow_probe_from_its_rival_and_from_itself_nothing() {
             dwell_s: 60.0,
         })
     };
-    let long = apart(&diagnosed.study, &jump(60e3, 140e3), &fits).unwrap();
-    let short = apart(&diagnosed.study, &jump(90e3, 91e3), &fits).unwrap();
+    let long = separation(&diagnosed.study, &jump(60e3, 140e3), &fits).unwrap();
+    let short = separation(&diagnosed.study, &jump(90e3, 91e3), &fits).unwrap();
     assert!(long[0][0].abs() < 1e-9 && long[1][1].abs() < 1e-9);
     // A probe's lag is visible when the temperature jumps; 80 krpm are some 100 K, one krpm is two.
     assert!(long[0][1] > 10.0 * short[0][1], "{long:?} {short:?}");
     // Refitting the rival can only reduce the distance. A detailed pass has five times as many samples, and at most five times the
     // information.
-    let blunt = apart_at_first_sight(&diagnosed.study, &jump(60e3, 140e3), &fits).unwrap();
+    let blunt = approximate_separation(&diagnosed.study, &jump(60e3, 140e3), &fits).unwrap();
     assert!(long[0][1] < 5.0 * blunt[0][1], "{long:?} {blunt:?}");
 }
 
@@ -423,9 +423,9 @@ fn causes_persist_come_and_go_over_the_nights() {
     assert_eq!((probe.effect.as_str(), probe.fate), ("tip_diameter", Fate::Persists));
     let width = |value: &Value| value.high - value.low;
     let narrowest = probe.each.iter().map(width).fold(f64::INFINITY, f64::min);
-    let apart = 1.0 / probe.each.iter().map(|v| width(v).powi(-2)).sum::<f64>().sqrt();
+    let separation = 1.0 / probe.each.iter().map(|v| width(v).powi(-2)).sum::<f64>().sqrt();
     let together = width(&probe.together);
-    assert!(together < narrowest && together > 0.99 * apart, "{together} {narrowest} {apart}");
+    assert!(together < narrowest && together > 0.99 * separation, "{together} {narrowest} {separation}");
 }
 
 /// The bearing begins to rub during a recording.

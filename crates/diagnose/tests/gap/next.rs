@@ -10,7 +10,7 @@ use mapper_diagnose::gap::diagnose::{Diagnosed, GapRequest, diagnose};
 use mapper_diagnose::gap::findings::experiment::{AllowedJump, AlsoChanged, AtRest, Experiment};
 use mapper_diagnose::gap::findings::report::{Kind, Next};
 use mapper_diagnose::gap::next_experiment::best_experiment::{Rivals, Suggested, next};
-use mapper_diagnose::gap::next_experiment::outlook::apart;
+use mapper_diagnose::gap::next_experiment::outlook::separation;
 use mapper_observe::averages::time_table::Table;
 use mapper_observe::model_inputs::lagged_command::Response;
 use mapper_observe::model_inputs::smoothed_inputs::SmoothedInputs;
@@ -89,9 +89,9 @@ fn an_oil_step_tells_an_oil_side_pair_apart_and_a_lag_from_nothing() {
     let diagnosed = ask(("ventilation", 2.0), &["ventilation", "oil_scale"]);
     let pair = [fit_of(&diagnosed, "ventilation"), fit_of(&diagnosed, "oil_scale")];
     let nearest = |experiment: &Experiment, pair: &[&Fit; 2], of: &Diagnosed| {
-        let apart = apart(&of.study, experiment, pair).unwrap();
-        assert!(apart[0][0].abs() < 1e-9 && apart[1][1].abs() < 1e-9, "from itself nothing");
-        apart[0][1].min(apart[1][0])
+        let separation = separation(&of.study, experiment, pair).unwrap();
+        assert!(separation[0][0].abs() < 1e-9 && separation[1][1].abs() < 1e-9, "from itself nothing");
+        separation[0][1].min(separation[1][0])
     };
     let step = nearest(&oil_step(70e3, 40.0), &pair, &diagnosed);
     let small = nearest(&oil_step(70e3, 4.0), &pair, &diagnosed);
@@ -115,7 +115,7 @@ fn a_more_uniform_soak_gives_more_information() {
     };
     let diagnosed = ask(("t2_offset", 2.0), &["t1_offset", "t2_offset"]);
     let pair = [fit_of(&diagnosed, "t2_offset"), fit_of(&diagnosed, "t1_offset")];
-    let information = |left_k: f64| apart(&diagnosed.study, &soak(left_k), &pair).unwrap();
+    let information = |left_k: f64| separation(&diagnosed.study, &soak(left_k), &pair).unwrap();
     // A more uniform soak gives more information; the common temperature stays unknown, and a cause does not differ from itself.
     let [even, uneven, useless] = [0.02, 0.3, 100.0].map(|left_k| information(left_k)[0][1]);
     assert!(

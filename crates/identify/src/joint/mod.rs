@@ -147,7 +147,7 @@ pub(crate) fn estimate(
             own.doubt(Warning::LeftOut(region.clone()));
         }
         if !commands::begins_with_jump(&recording.steps, step.position) {
-            own.remark(Warning::ThroughTheLaw { convection_origin: None });
+            own.remark(Warning::FromConvectionLaw { convection_origin: None });
         }
         own.remark_undeclared(config);
         if resting > MAX_RESTING_ETA {

@@ -77,7 +77,7 @@ mod tests {
         let [spikes, dead, no_jump] = [
             Warning::Outliers { count: 2 },
             Warning::DeadChannel { channel: Channel::T2, reading: 0.0 },
-            Warning::ThroughTheLaw { convection_origin: None },
+            Warning::FromConvectionLaw { convection_origin: None },
         ];
         let (law, bound) =
             (Warning::OffTheLaw { h_deviation_ratio: 0.1 }, Warning::AtBound(Bound::Eta { eta: 1.5 }));

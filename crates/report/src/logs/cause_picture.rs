@@ -1,7 +1,7 @@
 //! The judged quantity of one side of a machine, compared with the model without and with the most probable cause.
 
 use mapper_chart::{Axis, Dash, Figure, Line, Panel, Rule, RuleAt, Scatter, ScatterPoint, palette};
-use mapper_diagnose::driven::cause_search::{Diagnosis, SideVerdict};
+use mapper_diagnose::driven::{Diagnosis, SideVerdict};
 
 /// Two panels over time: the reading with both predictions, and both residuals.
 pub fn why_figure(name: &str, diagnosis: &Diagnosis) -> Figure {

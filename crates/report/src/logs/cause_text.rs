@@ -3,7 +3,7 @@
 use crate::formatting::table::{self, COLUMNS};
 use crate::formatting::wrapped::wrapped;
 use mapper_core::probability_text;
-use mapper_diagnose::driven::cause_search::{Beyond, Diagnosis, HeldOut, SideCause, SideVerdict};
+use mapper_diagnose::driven::{Beyond, Diagnosis, HeldOut, SideCause, SideVerdict};
 use std::fmt::Write;
 
 /// Maximum number of causes shown in addition to the undecided ones.
@@ -90,7 +90,13 @@ fn headline(diagnosis: &Diagnosis) -> String {
         ),
         SideVerdict::NotDistinguished => format!(
             "{} explain it equally well and are indistinguishable.",
-            capitalise(&open.iter().map(|cause| cause.candidate.names.join(" and ")).collect::<Vec<_>>().join("; or "))
+            capitalise(
+                &open
+                    .iter()
+                    .map(|cause| cause.candidate.names.join(" and "))
+                    .collect::<Vec<_>>()
+                    .join("; or ")
+            )
         ),
         SideVerdict::NotBorneOut => format!(
             "No cause is named: {} would explain the fitted part, but the residual of other phases does not decrease.",
@@ -144,7 +150,7 @@ fn causes(text: &mut String, diagnosis: &Diagnosis) {
             probability_text(cause.candidate.probability),
             each(&|e| e.size.clone()) + end,
             interval,
-            cause.left_k.first().map_or_else(String::new, |k| format!("{k:.2}")),
+            cause.model_error_sigma_k.first().map_or_else(String::new, |k| format!("{k:.2}")),
         ]);
     }
     let _ = writeln!(text, "{rows}\n");

@@ -7,7 +7,7 @@ use crate::recording::identification_config::declared;
 use crate::recording::recording_file::{Recorded, check_machine};
 use crate::{Session, SessionError};
 use mapper_diagnose::driven::DrivenError;
-use mapper_diagnose::driven::cause_search::{Diagnosis, Side, SideRequest, diagnose};
+use mapper_diagnose::driven::{Diagnosis, Side, SideRequest, diagnose};
 use mapper_diagnose::gap::causes::calibration::Calibration;
 use mapper_observe::Declared;
 use mapper_physics::rig::effect::{Effect, Rig};

@@ -3,7 +3,7 @@
 use crate::output::failure::Failure;
 use crate::{output::standard_output, registry};
 use clap::Args;
-use mapper_diagnose::missing_terms::imitations::signatures;
+use mapper_diagnose::closure::confounding::signatures;
 use mapper_physics::rig::effect::Effect;
 use mapper_report::with_heads;
 use mapper_validation::blind::study_without_causes;

@@ -1,7 +1,7 @@
 //! Search coordinates of effect parameters, and hypotheses as vectors of unknowns.
 
 use crate::gap::residuals::hypothesis::Hypothesis;
-use mapper_inference::descent::room_within;
+use mapper_inference::descent::step_bounds_within;
 use mapper_physics::rig::effect::{Effect, EffectInfo, EffectParameter};
 use nalgebra::DVector;
 use std::sync::Arc;
@@ -40,9 +40,9 @@ impl Coordinate {
     }
 
     /// Largest change in one iteration of a descent, down and up.
-    pub(crate) fn room(&self, at: f64) -> (f64, f64) {
+    pub(crate) fn step_bounds(&self, at: f64) -> (f64, f64) {
         let (low, high) = self.ends();
-        room_within(low, high, at)
+        step_bounds_within(low, high, at)
     }
 
     /// A value at this distance from another one, on the side that is within the range, and the coordinate's change.

@@ -11,7 +11,7 @@ use crate::gap::residuals::machine_run::LinearisedMachine;
 use crate::gap::residuals::nuisance::NuisanceKind;
 use crate::gap::residuals::study::{Hypothesis, PredictError, Prediction, Study};
 use crate::gap::residuals::whiten::{Linearised, rows_of_step};
-use mapper_inference::descent::{End, FINE, Model, Normal, Reach, Until, descend};
+use mapper_inference::descent::{DifferenceStep, End, FINE, Model, Normal, Until, descend};
 use mapper_inference::time_history::TimeHistory;
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
@@ -38,7 +38,7 @@ pub struct Fit {
     pub precision: DMatrix<f64>,
     /// Predicted decrease of the cost by one more iteration. It is large if the derivatives of the nuisances differ from those where they were
     /// linearised.
-    pub promised: f64,
+    pub predicted_decrease: f64,
 }
 
 /// Limits of a fit.
@@ -164,7 +164,7 @@ pub fn fit(
         Some(prediction) => fitted.at_prediction(start.clone(), Arc::unwrap_or_clone(prediction)),
         None => fitted.at_hypothesis(start.clone())?,
     };
-    let End { unknowns, point, normal, promised } = descend(&mut fitted, unknowns, point, until);
+    let End { unknowns, point, normal, predicted_decrease } = descend(&mut fitted, unknowns, point, until);
     let Point { hypothesis, prediction, residual } = point;
     let cost = cost_of(&fitted.rows, &residual, &hypothesis);
     let nuisances = hypothesis.nuisances.len();
@@ -184,7 +184,7 @@ pub fn fit(
         effect_columns: fitted.effect_columns,
         covariance: normal.covariance_from(nuisances).unwrap_or_else(unknown),
         precision: normal.matrix,
-        promised,
+        predicted_decrease,
     })
 }
 
@@ -233,7 +233,7 @@ impl Objective<'_> {
         let step = unknowns - before;
         let nuisances = self.linearised.columns.len();
         let moved = step.rows(nuisances, step.len() - nuisances).norm_squared();
-        let by_nuisances = SHORT * SHORT * (1.0 + step.rows(0, nuisances).norm_squared());
+        let by_nuisances = EQUIVALENT_STEP * EQUIVALENT_STEP * (1.0 + step.rows(0, nuisances).norm_squared());
         let columns = self.linearised.columns.iter().chain(&self.effect_columns);
         let mut missing: Vec<f64> = residual_before.iter().zip(residual).map(|(b, r)| b - r).collect();
         for (column, by) in columns.zip(step.iter()).filter(|(_, by)| **by != 0.0) {
@@ -248,7 +248,7 @@ impl Objective<'_> {
 
 /// Step of an effect's coordinate that is as nonlinear as one sigma of a nuisance: after a shorter step, most of the unpredicted change is due to the
 /// nuisances. Judgement: typical steps are some ten tolerances.
-const SHORT: f64 = 0.1;
+const EQUIVALENT_STEP: f64 = 0.1;
 
 impl Model for Objective<'_> {
     type Point = Point;
@@ -265,7 +265,7 @@ impl Model for Objective<'_> {
         cost_of(&self.rows, &point.residual, &point.hypothesis)
     }
 
-    fn normal(&mut self, unknowns: &DVector<f64>, point: &Point, reach: Reach) -> Normal {
+    fn normal(&mut self, unknowns: &DVector<f64>, point: &Point, reach: DifferenceStep) -> Normal {
         let Point { hypothesis, prediction, residual } = point;
         // Slopes are known to within the distance of their differences. Near surge the cost has small steps, which a longer difference averages.
         let is_near = |(before, _): &(DVector<f64>, Vec<f64>)| {
@@ -273,7 +273,7 @@ impl Model for Objective<'_> {
             step.iter().skip(hypothesis.nuisances.len()).all(|by| by.abs() < FINE)
         };
         let known = self.columns_known || self.last.as_ref().is_some_and(is_near);
-        if reach == Reach::Coarse || !known {
+        if reach == DifferenceStep::Coarse || !known {
             let Objective { study, linearised, coordinates, .. } = self;
             let distance = reach.distance();
             self.effect_columns =
@@ -286,16 +286,16 @@ impl Model for Objective<'_> {
         let matrix = normal_matrix(rows, linearised, &self.nuisance_products, effect_columns);
         let ask = |column: &Vec<f64>| dot_over(rows, column, residual);
         let pulled = linearised.columns.iter().zip(&hypothesis.nuisances).map(|(c, sigmas)| ask(c) - sigmas);
-        let pull = DVector::from_iterator(matrix.nrows(), pulled.chain(effect_columns.iter().map(ask)));
-        Normal { matrix, pull }
+        let gradient = DVector::from_iterator(matrix.nrows(), pulled.chain(effect_columns.iter().map(ask)));
+        Normal { matrix, gradient }
     }
 
-    fn room(&self, unknowns: &DVector<f64>) -> Vec<(f64, f64)> {
+    fn step_bounds(&self, unknowns: &DVector<f64>) -> Vec<(f64, f64)> {
         let n = unknowns.len() - self.coordinates.len();
         let nuisances = unknowns.iter().take(n).zip(&self.max_sigmas);
         let of_nuisances = nuisances.map(|(u, max)| (-max - u, max - u));
         let of_effects = self.coordinates.iter().zip(unknowns.iter().skip(n));
-        of_nuisances.chain(of_effects.map(|(coordinate, at)| coordinate.room(*at))).collect()
+        of_nuisances.chain(of_effects.map(|(coordinate, at)| coordinate.step_bounds(*at))).collect()
     }
 }
 

@@ -1,6 +1,6 @@
 //! Locates the gap in parts of the machine.
 //!
-//! Each explanation (a fitted cause, a law, a source term in one balance) has a score and parts. A part's share of an explanation is its
+//! Each explanation (a fitted cause, a closure term, a source term in one balance) has a score and parts. A part's share of an explanation is its
 //! additional misfit reduction given the other parts. Its share of the gap is the probability-weighted mean over the explanations, so
 //! shares add up to 1. A fault-free part has no share, because another part explains the gap better.
 
@@ -16,7 +16,7 @@ use mapper_inference::posterior::shares;
 use mapper_physics::rig::effect::Submodel;
 
 /// Linearisation error as a share of the gain: explanations closer than this remain open, and a part with less of the gap is not listed.
-pub const BEND: f64 = 0.01;
+pub const LINEARISATION_ERROR_RATIO: f64 = 0.01;
 
 /// Phases of a step: name and start after the jump, s.
 const PHASES: [(&str, f64); 3] = [("0-5 s", 0.0), ("5-30 s", 5.0), ("30-110 s", 30.0)];
@@ -99,7 +99,13 @@ pub fn places(
             explanation.score = fit.score - rarity * fit.hypothesis.effects.len() as f64;
         }
     }
-    places_of(study, linearised, null, &explanations, if named.is_some() { 0.0 } else { BEND })
+    places_of(
+        study,
+        linearised,
+        null,
+        &explanations,
+        if named.is_some() { 0.0 } else { LINEARISATION_ERROR_RATIO },
+    )
 }
 
 /// Locations of the gap from its explanations, largest first. Explanations within the share `bend` of the best gain remain open; `bend` is
@@ -135,7 +141,7 @@ pub fn places_of(
         }
     }
     parts.sort_by(|a, b| b.1.total_cmp(&a.1));
-    parts.retain(|(_, share, ..)| *share >= BEND);
+    parts.retain(|(_, share, ..)| *share >= LINEARISATION_ERROR_RATIO);
     let points = study.points(&null.hypothesis).unwrap_or_default();
     let shown = parts.into_iter().filter_map(|(submodel, share, _, part)| {
         Some((submodel, share, show(study, linearised, &(part.signature)()?, &points)?))

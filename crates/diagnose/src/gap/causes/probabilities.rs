@@ -10,7 +10,7 @@ use crate::gap::next_experiment::best_experiment::{Rivals, SETTLED};
 use crate::gap::residuals::hypothesis::onset_step;
 use crate::gap::residuals::study::{EffectValues, Hypothesis, Study, members};
 use mapper_core::half_width_95;
-use mapper_inference::posterior::{Cause, CauseProbabilities, CauseSet};
+use mapper_inference::posterior::{CauseProbabilities, CauseSet, RankedCause};
 use mapper_inference::time_history::{Shape, TimeHistory};
 use mapper_physics::rig::effect::{Effect, EffectInfo, EffectParameter};
 use nalgebra::DMatrix;
@@ -82,7 +82,7 @@ pub(crate) fn posterior(
     let candidates = causes
         .iter()
         .enumerate()
-        .map(|(place, Cause { set, probability })| {
+        .map(|(place, RankedCause { set, probability })| {
             let (fit, covariance) = (&fits[*set], Some(&fits[*set].covariance));
             let others = if place == 0 { alike.get(1..).unwrap_or_default() } else { &[] };
             Candidate {
@@ -179,7 +179,7 @@ pub(crate) fn suspicions<'a>(
         return None;
     }
     let mut open: Vec<(f64, &Fit)> =
-        causes.iter().map(|Cause { set, probability }| (*probability, &fits[*set])).collect();
+        causes.iter().map(|RankedCause { set, probability }| (*probability, &fits[*set])).collect();
     let nothing = open.partition_point(|(probability, _)| probability > none);
     open.insert(nothing, (*none, null));
     let (probabilities, fits) = open.into_iter().unzip();

@@ -12,7 +12,7 @@ use crate::gap::residuals::whiten::Linearised;
 use mapper_core::half_width_95;
 use mapper_inference::descent::ROUNDS;
 use mapper_inference::hypotheses::MAX_MEMBERS;
-use mapper_inference::search::{Causes, Known, Limits, Offer, climb, extend};
+use mapper_inference::search::{Causes, Extension, Known, Limits, climb, extend};
 
 #[derive(Clone, Copy)]
 pub struct Search<'a> {
@@ -31,16 +31,16 @@ pub struct Search<'a> {
 const LIMITS: Limits = Limits { members: MAX_MEMBERS, starts: 2, fits: 6, slack: 3.0 };
 /// Decrease of the cost by a single effect above which nuisances are linearised again at its fit: their derivatives differ there from those at the
 /// nominal point.
-const STRONG: f64 = 30.0;
+const RELINEARISING_DECREASE: f64 = 30.0;
 /// Number of starts of single effects that are fitted, those with the largest linear gain, which misjudges strong effects. Judgement: limits
 /// the time.
 const SINGLES: usize = 26;
 /// Share of the misfit that a cause must remove to explain it in part, also on held-out steps. An additional effect that removes less probably imitates a
 /// cause outside the library, so the search does not extend that set.
-pub const MIN_SHRINK: f64 = 0.5;
+pub const MIN_GAP_REDUCTION: f64 = 0.5;
 
 /// Difference of the log evidence from the best above which a fit is not improved further: no linearisation changes it by so much.
-pub const HOPELESS: f64 = 60.0;
+pub const MAX_EVIDENCE_DEFICIT: f64 = 60.0;
 
 const QUICK: Effort =
     Effort { iterations: 3, enough: 1.0, max_sigmas: 3.0, max_sigmas_of_rig: 3.0, exact: false };
@@ -64,7 +64,7 @@ pub fn search(search: Search<'_>, progress: &dyn Fn(f64, &str)) -> Result<Search
     // A fit ends too early if the derivatives of the tolerances changed; linearise them again there.
     let mut at_null = None;
     for _ in 0..ROUNDS {
-        if null.promised < QUICK.enough {
+        if null.predicted_decrease < QUICK.enough {
             break;
         }
         let Ok(there) = search.linearised.at(study, &null.hypothesis) else { break };
@@ -84,16 +84,18 @@ pub fn search(search: Search<'_>, progress: &dyn Fn(f64, &str)) -> Result<Search
     known.fit_all(&search, &singles);
     refit_best(&search, &mut known, 7, f64::INFINITY, EFFORT);
     let relinearised =
-        known.ranked(&search).first().filter(|best| null.cost - best.cost > STRONG).and_then(|best| {
-            let at_best = linearised.at(study, &best.hypothesis).ok()?;
-            Some((at_best, members(&best.hypothesis)))
-        });
+        known.ranked(&search).first().filter(|best| null.cost - best.cost > RELINEARISING_DECREASE).and_then(
+            |best| {
+                let at_best = linearised.at(study, &best.hypothesis).ok()?;
+                Some((at_best, members(&best.hypothesis)))
+            },
+        );
     let search = match &relinearised {
         Some((at_best, _)) => Search { linearised: at_best, ..search },
         None => search,
     };
     if relinearised.is_some() {
-        refit_best(&search, &mut known, 4, HOPELESS, Effort::default());
+        refit_best(&search, &mut known, 4, MAX_EVIDENCE_DEFICIT, Effort::default());
     }
     progress(0.4, "several effects");
     extend(&search, &mut known, LIMITS);
@@ -159,18 +161,18 @@ impl Causes for Search<'_> {
         weight(self.calibration, self.study, fit)
     }
 
-    fn offers(&self, base: &Fit) -> Vec<Offer<Self::Start>> {
+    fn extensions(&self, base: &Fit) -> Vec<Extension<Self::Start>> {
         let before = prior(self.calibration, self.study, &base.hypothesis);
-        let offer = |addition: Addition| {
+        let extension = |addition: Addition| {
             let prior = prior(self.calibration, self.study, &addition.start.hypothesis);
-            Offer {
+            Extension {
                 cause: addition.effect,
                 ln_gain: 0.5 * addition.gain + prior - before,
                 start: (addition.start, EFFORT),
             }
         };
         let Search { study, linearised, selection, onsets, .. } = *self;
-        additions(study, linearised, selection, base, onsets).into_iter().map(offer).collect()
+        additions(study, linearised, selection, base, onsets).into_iter().map(extension).collect()
     }
 
     fn without(&self, fit: &Fit, cause: usize) -> (Start, Effort) {
@@ -192,10 +194,10 @@ impl Causes for Search<'_> {
         all_effects_act(self.study, &fitted).then_some(fitted)
     }
 
-    fn goes_on(&self, from: &Fit, to: &Fit) -> bool {
+    fn should_extend(&self, from: &Fit, to: &Fit) -> bool {
         let values: usize = self.selection.rows(self.study).iter().map(ExactSizeIterator::len).sum();
         let excess = |fit: &Fit| (fit.cost - values as f64).max(0.0);
-        to.hypothesis.effects.len() < 3 || excess(to) < (1.0 - MIN_SHRINK) * excess(from)
+        to.hypothesis.effects.len() < 3 || excess(to) < (1.0 - MIN_GAP_REDUCTION) * excess(from)
     }
 }
 

@@ -5,7 +5,7 @@ use crate::gap::findings::experiment::{AllowedJump, AlsoChanged, Experiment};
 use crate::gap::findings::report::{JumpPoint, Kind, MAX_EQUIVALENT, MAX_REFITTED, Next, Place, Suggestion};
 use crate::gap::next_experiment::odds::{Odds, entropy_bit, odds};
 use crate::gap::next_experiment::outlook::{
-    SETTLED_HOUSINGS_S, apart, apart_at_first_sight, recorded_jumps, recorded_points,
+    SETTLED_HOUSINGS_S, approximate_separation, recorded_jumps, recorded_points, separation,
 };
 use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::study::Study;
@@ -51,12 +51,12 @@ pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[Experiment], tempe
         let recorded = recorded_jumps(study, &recorded_points(study, &first.hypothesis));
         all.extend(recorded.into_iter().map(Experiment::jump));
     }
-    let rate = |experiment: &Experiment, apart: &[Vec<f64>]| {
-        gain(&rivals.probabilities, apart) / experiment.minutes()
+    let rate = |experiment: &Experiment, separation: &[Vec<f64>]| {
+        gain(&rivals.probabilities, separation) / experiment.minutes()
     };
     let looks = parallel::map(&all, |experiment| {
-        let apart = apart_at_first_sight(study, experiment, &rivals.fits)?;
-        Some((rate(experiment, &apart), *experiment))
+        let separation = approximate_separation(study, experiment, &rivals.fits)?;
+        Some((rate(experiment, &separation), *experiment))
     });
     let mut looks: Vec<(f64, Experiment)> = looks.into_iter().flatten().collect();
     looks.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -72,9 +72,9 @@ pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[Experiment], tempe
         close.extend(missing.map(|channel| Experiment { jump, also: AlsoChanged::Sensor(channel) }));
     }
     let looked = parallel::map(&close, |experiment| {
-        let apart = apart(study, experiment, &rivals.fits)?;
-        let odds = odds(&rivals.probabilities, &apart, temperature, SETTLED);
-        Some((*experiment, odds, rate(experiment, &apart)))
+        let separation = separation(study, experiment, &rivals.fits)?;
+        let odds = odds(&rivals.probabilities, &separation, temperature, SETTLED);
+        Some((*experiment, odds, rate(experiment, &separation)))
     });
     let mut looked: Vec<(Experiment, Odds, f64)> = looked.into_iter().flatten().collect();
     // Share resolved per minute; if several experiments resolve everything, the simplest comes first.
@@ -181,11 +181,11 @@ fn point(point: OperatingPoint) -> JumpPoint {
 }
 
 /// `sum p_k p_j d_kj^2`.
-fn gain(probabilities: &[f64], apart: &[Vec<f64>]) -> f64 {
+fn gain(probabilities: &[f64], separation: &[Vec<f64>]) -> f64 {
     let row = |(p, row): (&f64, &Vec<f64>)| -> f64 {
         row.iter().zip(probabilities).map(|(d2, q)| p * q * d2).sum::<f64>()
     };
-    probabilities.iter().zip(apart).map(row).sum()
+    probabilities.iter().zip(separation).map(row).sum()
 }
 
 /// A sensor that measures a part directly.

@@ -18,12 +18,12 @@ pub struct Odds {
     pub entropy_drop_bit: f64,
 }
 
-/// Forecast for causes of `probabilities` (any sum above 0), `apart` in squared sigmas (row: true, column: rival; the smaller direction of
+/// Forecast for causes of `probabilities` (any sum above 0), `separation` in squared sigmas (row: true, column: rival; the smaller direction of
 /// a pair counts). `temperature` divides log evidence, as in the diagnosis; `settled` is the requested share.
-pub fn odds(probabilities: &[f64], apart: &[Vec<f64>], temperature: f64, settled: f64) -> Odds {
+pub fn odds(probabilities: &[f64], separation: &[Vec<f64>], temperature: f64, settled: f64) -> Odds {
     let total: f64 = probabilities.iter().sum();
     let p: Vec<f64> = probabilities.iter().map(|p| p / total.max(f64::MIN_POSITIVE)).collect();
-    let places = places(apart);
+    let places = places(separation);
     let noise = normal_points(places.len());
     let (mut settles, mut share, mut left_bit) = (0.0, 0.0, 0.0);
     // Equal numbers of draws per cause, weighted, so that small probabilities are sampled too.
@@ -61,9 +61,9 @@ pub fn entropy_bit(probabilities: &[f64]) -> f64 {
 }
 
 /// Points with the given squared distances (Torgerson 1952); the non-Euclidean part of the distances is dropped.
-fn places(apart: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    let n = apart.len();
-    let d2 = DMatrix::from_fn(n, n, |i, j| if i == j { 0.0 } else { apart[i][j].min(apart[j][i]) });
+fn places(separation: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let n = separation.len();
+    let d2 = DMatrix::from_fn(n, n, |i, j| if i == j { 0.0 } else { separation[i][j].min(separation[j][i]) });
     // Scalar products of the points relative to the first.
     let products = DMatrix::from_fn(n, n, |i, j| 0.5 * (d2[(0, i)] + d2[(0, j)] - d2[(i, j)]));
     let eigen = SymmetricEigen::new(products);
@@ -139,8 +139,8 @@ mod tests {
     /// The experiment separates one of three causes from the other two, but not these two from each other.
     #[test]
     fn a_pair_that_looks_alike_stays_open() {
-        let apart = vec![vec![0.0, 0.0, 400.0], vec![0.0, 0.0, 400.0], vec![400.0, 400.0, 0.0]];
-        let odds = odds(&[0.4, 0.4, 0.2], &apart, 1.0, SETTLED);
+        let separation = vec![vec![0.0, 0.0, 400.0], vec![0.0, 0.0, 400.0], vec![400.0, 400.0, 0.0]];
+        let odds = odds(&[0.4, 0.4, 0.2], &separation, 1.0, SETTLED);
         assert!((odds.settles - 0.2).abs() < 1e-9, "{odds:?}");
         // One bit remains in four of five cases.
         assert!((odds.entropy_drop_bit - (entropy_bit(&[0.4, 0.4, 0.2]) - 0.8)).abs() < 1e-6);

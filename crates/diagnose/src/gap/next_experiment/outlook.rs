@@ -122,7 +122,7 @@ fn with_unknown_start(study: &Study, fit: &Fit) -> Hypothesis {
 }
 
 /// Separation of the predictions of each two candidates before a refit, in squared sigmas of the noise; `None` if the model cannot run the step.
-pub fn apart_at_first_sight(
+pub fn approximate_separation(
     recorded: &Study,
     experiment: &Experiment,
     fits: &[&Fit],
@@ -148,7 +148,7 @@ pub fn apart_at_first_sight(
 ///
 /// It is `D'D - D'J (L + J'J)^-1 J'D`, whitened, with the difference `D` of the predictions, the derivatives `J` of the prediction of `j` with respect to
 /// its nuisances and parameters, and their precision `L` from the recording.
-pub fn apart(recorded: &Study, experiment: &Experiment, fits: &[&Fit]) -> Option<Vec<Vec<f64>>> {
+pub fn separation(recorded: &Study, experiment: &Experiment, fits: &[&Fit]) -> Option<Vec<Vec<f64>>> {
     if let AlsoChanged::Soak(soak) = experiment.also {
         return apart_at_rest(recorded, &soak, fits);
     }

@@ -1,4 +1,4 @@
-//! A study with further effects (laws, and effects that begin with a step), or with some of its values.
+//! A study with further effects (closure terms, and effects that begin with a step), or with some of its values.
 
 use crate::gap::residuals::hypothesis::{from_step, growing_from, onset_step};
 use crate::gap::residuals::machine_run::acts_on_machine;

@@ -46,6 +46,9 @@ mod tests {
         let shares = |history: TimeHistory| [0.0, 1.0, 2.0, 3.0, 4.0].map(|step| history.at(step));
         assert_eq!(shares(from_step(3)), [0.0, 0.0, 0.0, 1.0, 1.0]);
         assert_eq!(shares(growing_from(1, 5)), [0.0, 0.25, 0.5, 0.75, 1.0]);
-        assert_eq!([from_step(3), growing_from(1, 5), TimeHistory::THROUGHOUT].map(onset_step), [Some(3), Some(1), None]);
+        assert_eq!(
+            [from_step(3), growing_from(1, 5), TimeHistory::THROUGHOUT].map(onset_step),
+            [Some(3), Some(1), None]
+        );
     }
 }

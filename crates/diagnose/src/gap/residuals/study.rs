@@ -8,6 +8,7 @@ use crate::gap::residuals::nuisance::{Circumstances, Nuisance, OUTPUTS, apply, n
 use crate::gap::residuals::shape::{SHAPES, ShapedMap};
 use crate::gap::residuals::true_inputs::SurroundingsHistory;
 use mapper_core::{Channel, Recording, StepMarker};
+use mapper_inference::time_history::TimeHistory;
 use mapper_observe::averages::block::{Block, block_mean, blocks};
 use mapper_observe::averages::schedule::Schedule;
 use mapper_observe::averages::time_table::Table;
@@ -15,7 +16,6 @@ use mapper_observe::channels::INPUT_CHANNELS;
 use mapper_observe::declared::Declared;
 use mapper_observe::model_inputs::smoothed_inputs::SmoothedInputs;
 use mapper_observe::model_inputs::step_timing::{Times, with_command_times};
-use mapper_inference::time_history::TimeHistory;
 use mapper_physics::rig::effect::{Effect, EffectError, EffectParameter, Rig, add};
 use mapper_physics::simulation::driven::{DriveError, FrozenGrid};
 use mapper_physics::simulation::model::Model;

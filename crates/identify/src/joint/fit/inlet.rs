@@ -100,9 +100,9 @@ pub(crate) fn carry(problem: &mut Problem<'_>, sigma: f64, without: &Covariance)
         let known = place(a).zip(place(b)).map_or(0.0, |(a, b)| without.shared[(a, b)]);
         known + moved[a] * moved[b]
     });
-    for (i, answer) in with.answers.iter().enumerate() {
+    for (i, answer) in with.sensitivities.iter().enumerate() {
         let (own_before, mixed_before) = &without.own[i];
-        let alone = own_before - mixed_before * without.answers[i].transpose();
+        let alone = own_before - mixed_before * without.sensitivities[i].transpose();
         let mixed = answer * &with.shared;
         with.own[i] = (alone + &mixed * answer.transpose(), mixed);
     }

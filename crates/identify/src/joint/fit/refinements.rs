@@ -164,7 +164,7 @@ impl Refinements {
         let across = columns(shared) * gain.transpose();
         let change = block(shared) + self.mixture.covariance()?;
         let changed = shared - &across - across.transpose() + &gain * change * gain.transpose();
-        for ((own, mixed), answer) in covariance.own.iter_mut().zip(&covariance.answers) {
+        for ((own, mixed), answer) in covariance.own.iter_mut().zip(&covariance.sensitivities) {
             let after = answer * &changed;
             *own += (&after - &*mixed) * answer.transpose();
             *mixed = after;

@@ -74,7 +74,7 @@ pub(crate) struct Covariance {
     /// For each step: covariance of its own parameters with the shared ones free, and of own with shared.
     pub(crate) own: Vec<(Matrix4<f64>, Matrix4xX<f64>)>,
     /// For each step: sensitivity of its own parameters to the shared ones.
-    pub(crate) answers: Vec<Matrix4xX<f64>>,
+    pub(crate) sensitivities: Vec<Matrix4xX<f64>>,
 }
 
 impl Member<'_> {
@@ -421,13 +421,13 @@ impl Problem<'_> {
         shared.view_mut((0, sought), (sought, carried)).copy_from(&mixed);
         shared.view_mut((sought, 0), (carried, sought)).copy_from(&mixed.transpose());
         shared.view_mut((sought, sought), (carried, carried)).copy_from(&spread);
-        let answers: Vec<Matrix4xX<f64>> = equations
+        let sensitivities: Vec<Matrix4xX<f64>> = equations
             .blocks
             .iter()
             .zip(&inverses)
             .map(|(block, inverse)| -(inverse * &block.mixed))
             .collect();
-        let own = answers
+        let own = sensitivities
             .iter()
             .zip(&inverses)
             .map(|(answer, inverse)| {
@@ -435,6 +435,6 @@ impl Problem<'_> {
                 (inverse + &mixed * answer.transpose(), mixed)
             })
             .collect();
-        Some(Covariance { fitted, shared, own, answers })
+        Some(Covariance { fitted, shared, own, sensitivities })
     }
 }

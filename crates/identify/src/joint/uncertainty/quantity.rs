@@ -34,8 +34,8 @@ pub(crate) fn is_offset(index: usize) -> bool {
 pub(crate) fn of_shared(covariance: &Covariance, row: usize) -> Quantity {
     let by_shared: DVector<f64> = covariance.shared.column(row).into_owned();
     let by_eta = DVector::from_iterator(
-        covariance.answers.len(),
-        covariance.answers.iter().map(|answer| answer.row(ETA).transpose().dot(&by_shared)),
+        covariance.sensitivities.len(),
+        covariance.sensitivities.iter().map(|answer| answer.row(ETA).transpose().dot(&by_shared)),
     );
     let by_smooth = by_offsets(covariance, &by_shared);
     let variance = covariance.shared[(row, row)];
@@ -60,7 +60,7 @@ fn by_offsets(covariance: &Covariance, by_shared: &DVector<f64>) -> DVector<f64>
 /// Covariance of two quantities of one step with all shared parameters known.
 fn alone(covariance: &Covariance, step: usize, first: usize, second: usize) -> f64 {
     let (own, mixed) = &covariance.own[step];
-    own[(first, second)] - mixed.row(second).dot(&covariance.answers[step].row(first))
+    own[(first, second)] - mixed.row(second).dot(&covariance.sensitivities[step].row(first))
 }
 
 /// Efficiency and ln h of every step, relative to the fitted values.
@@ -70,20 +70,20 @@ pub(crate) fn quantities(
     steps: &[StepRows],
 ) -> (Vec<Quantity>, Vec<Quantity>) {
     let count = problem.members.len();
-    let answers: Vec<DVector<f64>> =
-        covariance.answers.iter().map(|answer| answer.row(ETA).transpose()).collect();
+    let sensitivities: Vec<DVector<f64>> =
+        covariance.sensitivities.iter().map(|answer| answer.row(ETA).transpose()).collect();
     let etas: Vec<Quantity> = (0..count)
         .map(|i| {
             let (own, mixed) = &covariance.own[i];
             let by_shared: DVector<f64> = mixed.row(ETA).transpose();
             let mut by_eta =
-                DVector::from_iterator(count, answers.iter().map(|answer| answer.dot(&by_shared)));
+                DVector::from_iterator(count, sensitivities.iter().map(|answer| answer.dot(&by_shared)));
             by_eta[i] = own[(ETA, ETA)];
             let mut by_smooth = by_offsets(covariance, &by_shared);
             let own_variance = alone(covariance, i, ETA, ETA);
             by_smooth[i] += own_variance;
             let (value, variance) = (problem.members[i].local[ETA], own[(ETA, ETA)]);
-            let (answer, own_with_eta) = (answers[i].clone(), own_variance);
+            let (answer, own_with_eta) = (sensitivities[i].clone(), own_variance);
             Quantity { value, by_eta, by_smooth, variance, by_shared, answer, own_variance, own_with_eta }
         })
         .collect();
@@ -112,13 +112,13 @@ pub(crate) fn quantities(
             let deviation: DVector<f64> = mixed.row(LN_DEVIATION).transpose();
             let by_shared = &deviation + &covariance.shared * &weights;
             let mut by_eta =
-                DVector::from_iterator(count, answers.iter().map(|answer| answer.dot(&by_shared)));
+                DVector::from_iterator(count, sensitivities.iter().map(|answer| answer.dot(&by_shared)));
             by_eta[i] = own[(LN_DEVIATION, ETA)] + mixed.row(ETA).transpose().dot(&weights);
             let variance = own[(LN_DEVIATION, LN_DEVIATION)] + weights.dot(&(&by_shared + &deviation));
             let mut by_smooth = by_offsets(covariance, &by_shared);
             let own_with_eta = alone(covariance, i, ETA, LN_DEVIATION);
             by_smooth[i] += own_with_eta;
-            let answer = covariance.answers[i].row(LN_DEVIATION).transpose() + &weights;
+            let answer = covariance.sensitivities[i].row(LN_DEVIATION).transpose() + &weights;
             let own_variance = alone(covariance, i, LN_DEVIATION, LN_DEVIATION);
             let value = 0.0;
             Quantity { value, by_eta, by_smooth, variance, by_shared, answer, own_variance, own_with_eta }

@@ -13,10 +13,10 @@ pub(crate) fn sentence_of(warning: &Warning) -> Option<Sentence> {
         Warning::NoTransient => {
             sentence!("no jump leads to this step, so it has no transient; the dynamic method needs one")
         }
-        Warning::ThroughTheLaw { convection_origin: None } => {
+        Warning::FromConvectionLaw { convection_origin: None } => {
             sentence!("no jump leads to this step: its efficiency comes from the shared parameters")
         }
-        Warning::ThroughTheLaw { convection_origin: Some(origin) } => {
+        Warning::FromConvectionLaw { convection_origin: Some(origin) } => {
             sentence!("heat removed by eqs. 1-3 with the convection law {}", origin.clone())
         }
         Warning::TooFewSamples(reason) => too_few(reason),

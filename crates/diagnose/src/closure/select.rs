@@ -1,0 +1,207 @@
+//! Selects the few library terms that explain the recording, and the step with which they begin.
+
+use crate::closure::columns::{Base, LinearEvidence, Products, linear_evidence};
+use crate::closure::expression::{Expression, Spans, product};
+use crate::closure::residual_source::in_each_step;
+use crate::closure::term::{Role, Term};
+use crate::gap::best_fit::normal::PRIOR_STEPS;
+use crate::gap::findings::report::MAX_EQUIVALENT;
+use mapper_core::step_number;
+use mapper_inference::time_history::Shape;
+use nalgebra::DMatrix;
+
+/// Some library terms, by index, with their fit to the recording.
+#[derive(Debug, Clone)]
+pub struct Choice {
+    /// Indices in the library, ascending.
+    pub terms: Vec<usize>,
+    /// Log evidence relative to none, including rarity.
+    pub gain: f64,
+    /// Evidence penalty for one choice among many.
+    pub rarity: f64,
+    /// Onset step; 0 from the beginning.
+    pub begin: usize,
+    /// Coefficients, in steps.
+    pub coefficients: Vec<f64>,
+}
+
+/// All closure terms of one term, and of two in the same machine part; best first. `usable` are the library indices of the products' columns.
+pub fn choices(library: &[Term], usable: &[usize], products: &DMatrix<f64>) -> Vec<Choice> {
+    let mut found: Vec<Choice> = Vec::new();
+    let mut add = |places: &[usize], rarity: f64| {
+        let Some(LinearEvidence { gain, coefficients }) = linear_evidence(products, places, PRIOR_STEPS)
+        else {
+            return;
+        };
+        let terms: Vec<usize> = places.iter().map(|place| usable[*place]).collect();
+        let wrong =
+            terms.iter().zip(coefficients.iter()).any(|(term, c)| library[*term].positive && *c < 0.0);
+        if !wrong && gain.is_finite() {
+            let coefficients = coefficients.iter().copied().collect();
+            found.push(Choice { terms, gain: gain - rarity, rarity, begin: 0, coefficients });
+        }
+    };
+    let simple = (usable.len() as f64).ln();
+    for place in 0..usable.len() {
+        if library[usable[place]].role != Role::Slope {
+            add(&[place], simple);
+        }
+    }
+    let pairs: Vec<(usize, usize)> = (0..usable.len())
+        .flat_map(|a| (0..a).map(move |b| (b, a)))
+        .filter(|(a, b)| go_together(&library[usable[*a]], &library[usable[*b]]))
+        .collect();
+    for (a, b) in &pairs {
+        // Level and slope form one closure term, with its own temperature.
+        let sink = library[usable[*a]].role == Role::Slope || library[usable[*b]].role == Role::Slope;
+        add(&[*a, *b], if sink { simple } else { 1.0 + (pairs.len() as f64).ln() });
+    }
+    found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    found
+}
+
+/// Whether two terms form a closure term: both in one machine part, and a slope only with the level of its own balance.
+fn go_together(a: &Term, b: &Term) -> bool {
+    let same_balance = a.balance() == b.balance();
+    match (a.role, b.role) {
+        (Role::Slope, Role::Level) | (Role::Level, Role::Slope) => same_balance,
+        (Role::Slope, _) | (_, Role::Slope) => false,
+        // A level with a known sink equals an unknown sink.
+        (Role::Level, Role::Exchange) | (Role::Exchange, Role::Level) => {
+            !same_balance && a.submodel() == b.submodel()
+        }
+        _ => a.submodel() == b.submodel(),
+    }
+}
+
+/// Maximum number of terms tried with an onset.
+const TRIED: usize = 12;
+
+/// The best choices, each with the onset step that fits the recording best, best first; adds their terms to the library. `choices` must
+/// come from the same products and steps, best first.
+pub fn begun(
+    base: &Base<'_>,
+    library: &mut Vec<Term>,
+    choices: &[Choice],
+    counts: &[bool],
+    folds: &[Vec<bool>],
+) -> Option<(Vec<Choice>, f64)> {
+    let part = |choice: &Choice| library[choice.terms[0]].submodel();
+    let mut parts = Vec::new();
+    for choice in choices {
+        if parts.len() < MAX_EQUIVALENT && !parts.contains(&part(choice)) {
+            parts.push(part(choice));
+        }
+    }
+    // A constant with an onset does not look like a constant, so the best parts' constants are tried whatever their gain.
+    let constants = choices.iter().filter(|choice| {
+        choice.terms.iter().all(|term| library[*term].is_constant()) && parts.contains(&part(choice))
+    });
+    let mut tried: Vec<&Choice> = Vec::new();
+    for choice in constants.chain(choices) {
+        let lags = choice.terms.iter().any(|term| library[*term].has_memory());
+        let of_part = tried.iter().filter(|other| part(other) == part(choice)).count();
+        let known = tried.iter().any(|other| other.terms == choice.terms);
+        // No part takes the place of all others.
+        if choice.terms.len() == 1 && !lags && !known && 2 * of_part < TRIED && tried.len() < TRIED {
+            tried.push(choice);
+        }
+    }
+    let steps = base.study.steps.len();
+    // Each term's change for every possible onset.
+    let mut terms: Vec<usize> = tried.iter().flat_map(|choice| choice.terms.iter().copied()).collect();
+    terms.sort_unstable();
+    terms.dedup();
+    let columns: Vec<Vec<f64>> =
+        terms.iter().flat_map(|term| from_each_step(base, &library[*term])).collect();
+    let products = Products::new(base, &columns);
+    let best = |counts: &[bool]| {
+        let projected: DMatrix<f64> = products.projected(counts)?;
+        let mut found: Vec<Choice> = Vec::new();
+        for choice in &tried {
+            let rarity = choice.rarity + (steps as f64).ln();
+            for begin in 1..steps {
+                let places: Option<Vec<usize>> = choice
+                    .terms
+                    .iter()
+                    .map(|term| Some(terms.iter().position(|other| other == term)? * steps + begin))
+                    .collect();
+                let Some(evidence) = linear_evidence(&projected, &places?, PRIOR_STEPS) else { continue };
+                let coefficients: Vec<f64> = evidence.coefficients.iter().copied().collect();
+                let wrong = choice
+                    .terms
+                    .iter()
+                    .zip(&coefficients)
+                    .any(|(term, c)| library[*term].positive && *c < 0.0);
+                if !wrong && evidence.gain.is_finite() {
+                    found.push(Choice {
+                        gain: evidence.gain - rarity,
+                        rarity,
+                        begin,
+                        coefficients,
+                        terms: choice.terms.clone(),
+                    });
+                }
+            }
+        }
+        found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        Some(found)
+    };
+    let found = best(counts)?;
+    let first = found.first()?;
+    let again = folds.iter().filter(|fold| {
+        let in_fold = best(fold);
+        let of_fold = in_fold.as_ref().and_then(|found| found.first());
+        of_fold
+            .is_some_and(|of_fold| of_fold.terms == first.terms && of_fold.begin.abs_diff(first.begin) <= 1)
+    });
+    let stability = again.count() as f64 / folds.len().max(1) as f64;
+    let mut chosen: Vec<Choice> = Vec::new();
+    for choice in found {
+        if chosen.len() <= MAX_EQUIVALENT && chosen.iter().all(|other| other.terms != choice.terms) {
+            chosen.push(choice);
+        }
+    }
+    for choice in &mut chosen {
+        let begin_s = base.study.steps[choice.begin].marker.start_s;
+        choice.terms = choice
+            .terms
+            .iter()
+            .map(|term| {
+                library.push(from(&library[*term], begin_s, choice.begin));
+                library.len() - 1
+            })
+            .collect();
+    }
+    Some((chosen, stability))
+}
+
+/// A term with an onset.
+fn from(term: &Term, begin_s: f64, step: usize) -> Term {
+    let mut later = term.clone();
+    for (_, formula) in &mut later.acts_on {
+        *formula = product(Expression::InTime(Spans::from(begin_s)), formula.clone());
+    }
+    // Level and slope form separate closure terms now: each sentence includes its own onset.
+    later.role = Role::Other;
+    later.words = format!("{} from step {} on", later.words, step_number(step));
+    later
+}
+
+/// Whitened changes for one step of a term's coefficient, for an onset at each step of the recording: a term with an onset is the sum of its
+/// parts in each later step.
+fn from_each_step(base: &Base<'_>, term: &Term) -> Vec<Vec<f64>> {
+    let during = |spans: Spans| {
+        let mut during = term.clone();
+        for (_, formula) in &mut during.acts_on {
+            *formula = product(Expression::InTime(spans.clone()), formula.clone());
+        }
+        during
+    };
+    let mut columns = in_each_step(base, Shape::Step, during, |terms| base.changes(terms));
+    for step in (1..columns.len()).rev() {
+        let (before, later) = columns.split_at_mut(step);
+        before[step - 1].iter_mut().zip(&later[0]).for_each(|(before, later)| *before += later);
+    }
+    columns
+}

@@ -1,0 +1,223 @@
+//! A term of a balance: its formula, unit and typical size, and its effect on the model.
+
+use crate::closure::balance::Balance;
+use crate::closure::expression::Expression;
+use crate::gap::best_fit::fit::MAX_SIGMAS;
+use crate::gap::best_fit::normal::PRIOR_STEPS;
+use mapper_core::Channel;
+use mapper_physics::gas::air;
+use mapper_physics::machine::hooks::{Hooks, Site, TooManyExtraStates};
+use mapper_physics::rig::effect::{
+    Effect, EffectError, EffectInfo, EffectParameter, NamedValues, Rig, Submodel,
+};
+use std::borrow::Cow;
+
+/// Role of a term among others of its balance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// A constant.
+    Level,
+    /// Proportional to a temperature relative to the library reference; together with the level, heat exchange with an unknown temperature.
+    Slope,
+    /// Heat exchange with a known temperature.
+    Exchange,
+    /// Any other term.
+    Other,
+}
+
+/// A term of the library.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Term {
+    /// Balances it acts on, with the formulas that its coefficient multiplies; the first is its location. Heat between two parts acts on both.
+    pub acts_on: Vec<(Balance, Expression)>,
+    /// Unit of the coefficient.
+    pub unit: &'static str,
+    /// A clearly significant size of the coefficient.
+    pub step: f64,
+    /// Description, with `{}` for the coefficient.
+    pub words: String,
+    /// Its role among others of its balance.
+    pub role: Role,
+    /// Whether the coefficient must be positive: a conductance, an area, a time.
+    pub positive: bool,
+}
+
+impl Term {
+    /// Its location.
+    pub fn balance(&self) -> Balance {
+        self.acts_on[0].0
+    }
+
+    /// The sensor whose reading alone it changes, if any.
+    pub fn sensor(&self) -> Option<Channel> {
+        match self.acts_on[..] {
+            [(Balance::Reading(channel) | Balance::Lag(channel), _)] => Some(channel),
+            _ => None,
+        }
+    }
+
+    /// Whether it is independent of the machine's state.
+    pub fn is_constant(&self) -> bool {
+        matches!(self.acts_on[..], [(_, Expression::Number(_))])
+    }
+
+    /// Whether it has its own memory, like a lag.
+    pub fn has_memory(&self) -> bool {
+        self.acts_on.iter().any(|(balance, _)| matches!(balance, Balance::Lag(_)))
+    }
+
+    /// Name of what it acts on, for sentences.
+    pub fn words_of_place(&self) -> String {
+        self.balance().properties().place_words
+    }
+
+    /// The machine part in which it acts.
+    pub fn submodel(&self) -> Submodel {
+        self.balance().properties().submodel
+    }
+}
+
+/// Terms with their coefficients, active in a model.
+#[derive(Debug)]
+pub struct TermHooks {
+    /// Balance, coefficient, formula.
+    acting: Vec<(Balance, f64, Expression)>,
+    /// Whether each kind of hook is used, so that unused ones are skipped.
+    on_readings: bool,
+}
+
+/// Adds terms with coefficients to a rig.
+///
+/// # Errors
+/// Never in practice: terms have no hidden temperatures.
+pub fn put_into(rig: &mut Rig, terms: &[(Term, f64)]) -> Result<(), TooManyExtraStates> {
+    let mut acting = Vec::new();
+    for (term, coefficient) in terms {
+        for (balance, formula) in &term.acts_on {
+            if let Balance::Lag(channel) = balance {
+                rig.instruments.path_mut(*channel).lag_s += coefficient;
+            } else if *coefficient != 0.0 {
+                acting.push((*balance, *coefficient, formula.clone()));
+            }
+        }
+    }
+    if acting.is_empty() {
+        return Ok(());
+    }
+    let on_readings = acting.iter().any(|(balance, ..)| matches!(balance, Balance::Reading(_)));
+    rig.hook(TermHooks { acting, on_readings })
+}
+
+impl TermHooks {
+    fn sum(&self, at: Balance, site: &Site<'_>, value: f64) -> f64 {
+        let here = self.acting.iter().filter(|(balance, ..)| *balance == at);
+        here.map(|(_, coefficient, formula)| coefficient * formula.of(site, value)).sum()
+    }
+
+    /// Gas temperature after heat from a balance.
+    fn heated_k(&self, at: Balance, site: &Site<'_>, gas_k: f64) -> f64 {
+        let heat_w = self.sum(at, site, gas_k);
+        if heat_w == 0.0 {
+            gas_k
+        } else {
+            gas_k + heat_w / (site.flow_kg_s * air::heat_capacity_j_kgk(gas_k))
+        }
+    }
+}
+
+impl Hooks for TermHooks {
+    fn flow_kg_s(&self, site: &Site<'_>, flow_kg_s: f64) -> f64 {
+        flow_kg_s * (1.0 + self.sum(Balance::MapFlow, site, flow_kg_s))
+    }
+
+    fn efficiency(&self, site: &Site<'_>, efficiency: f64) -> f64 {
+        efficiency * (1.0 + self.sum(Balance::Work, site, efficiency))
+    }
+
+    fn h_w_m2k(&self, site: &Site<'_>, h_w_m2k: f64) -> f64 {
+        h_w_m2k * (1.0 + self.sum(Balance::Convection, site, h_w_m2k))
+    }
+
+    fn gas_before_k(&self, site: &Site<'_>, t1_prime_k: f64) -> f64 {
+        self.heated_k(Balance::GasBefore, site, t1_prime_k)
+    }
+
+    fn gas_after_k(&self, site: &Site<'_>, t2_prime_k: f64) -> f64 {
+        self.heated_k(Balance::GasAfter, site, t2_prime_k)
+    }
+
+    fn gas_outlet_k(&self, site: &Site<'_>, t2_k: f64) -> f64 {
+        self.heated_k(Balance::GasOutlet, site, t2_k)
+    }
+
+    fn heat_to_compressor_w(&self, site: &Site<'_>) -> f64 {
+        self.sum(Balance::CompressorHousing, site, f64::NAN)
+    }
+
+    fn heat_to_turbine_w(&self, site: &Site<'_>) -> f64 {
+        self.sum(Balance::TurbineHousing, site, f64::NAN)
+    }
+
+    fn flow_to_outlet_kg_s(&self, site: &Site<'_>) -> f64 {
+        self.sum(Balance::Outlet, site, f64::NAN)
+    }
+
+    fn shaft_torque_nm(&self, site: &Site<'_>) -> f64 {
+        self.sum(Balance::Shaft, site, f64::NAN)
+    }
+
+    fn reading(&self, site: &Site<'_>, channel: Channel, value: f64) -> f64 {
+        if self.on_readings { value + self.sum(Balance::Reading(channel), site, value) } else { value }
+    }
+}
+
+/// Maximum distance of a coefficient from zero, in steps.
+pub const MAX_STEPS: f64 = PRIOR_STEPS * MAX_SIGMAS;
+
+/// Some terms of one part of the machine, each with a coefficient.
+#[derive(Debug, Clone)]
+pub struct ClosureEffect {
+    info: EffectInfo,
+    terms: Vec<Term>,
+}
+
+impl ClosureEffect {
+    /// The effect of one or more terms.
+    pub fn new(terms: Vec<Term>) -> ClosureEffect {
+        let parameters = terms
+            .iter()
+            .enumerate()
+            .map(|(place, term)| EffectParameter {
+                name: Cow::Owned(format!("c{}", place + 1)),
+                unit: Cow::Borrowed(term.unit),
+                low: if term.positive { 0.0 } else { -MAX_STEPS * term.step },
+                high: MAX_STEPS * term.step,
+                neutral: 0.0,
+                typical_step: term.step,
+            })
+            .collect();
+        let info = EffectInfo {
+            name: Cow::Borrowed("a closure term that is proposed"),
+            id: Cow::Borrowed("law"),
+            description: Cow::Borrowed("terms that were found"),
+            equation: Cow::Borrowed("as its terms"),
+            source: Cow::Borrowed("found by regression"),
+            submodel: terms.first().map_or(mapper_physics::rig::effect::Submodel::Shaft, Term::submodel),
+            also_shows_in: Vec::new(),
+            parameters,
+        };
+        ClosureEffect { info, terms }
+    }
+}
+
+impl Effect for ClosureEffect {
+    fn info(&self) -> &EffectInfo {
+        &self.info
+    }
+
+    fn prepare(&self, values: &NamedValues<'_>, rig: &mut Rig) -> Result<(), EffectError> {
+        let with: Vec<(Term, f64)> =
+            self.terms.iter().cloned().zip(values.iter().map(|(_, value)| value)).collect();
+        Ok(put_into(rig, &with)?)
+    }
+}

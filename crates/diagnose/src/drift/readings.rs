@@ -1,0 +1,179 @@
+//! The readings of all runs compared with the model, and their responses to perturbations and causes.
+
+use crate::drift::causes::{Cause, Drift, FOULING_FLOW_SHARE, is_relative};
+use crate::drift::drive::{PERTURBATIONS, Prediction, difference_step};
+use crate::drift::runs::{CampaignStep, Segment};
+use mapper_core::Channel;
+use mapper_inference::time_history::TimeHistory;
+use mapper_observe::channels::{INPUT_CHANNELS, OUTPUTS};
+use mapper_observe::perturbation::Perturbation;
+use nalgebra::{DMatrix, DVector};
+use std::collections::BTreeMap;
+
+/// Change of readings and points: the compared means, segment by segment, then the efficiency (fraction) at the end of each step, then the
+/// heat-transfer coefficient there, W/(m2 K).
+pub(crate) type Response = DVector<f64>;
+
+/// Means of [`OUTPUTS`] over a segment, measured and by the nominal model.
+#[derive(Debug, Clone)]
+pub(crate) struct SegmentMeans {
+    pub segment: Segment,
+    pub measured: [Option<f64>; OUTPUTS.len()],
+    pub nominal: [f64; OUTPUTS.len()],
+}
+
+/// All readings compared with the model.
+#[derive(Clone)]
+pub(crate) struct Readings {
+    pub runs: usize,
+    pub steps: Vec<CampaignStep>,
+    /// The compared segments.
+    pub segments: Vec<Segment>,
+    /// Compared channels, as positions in [`OUTPUTS`].
+    pub columns: Vec<usize>,
+    /// Reading minus model, channel by channel, segment by segment; one column.
+    pub difference: DMatrix<f64>,
+    /// Readings and points of the model; NaN for the points of steps that it cannot follow.
+    pub model: Response,
+    /// Response to each of [`PERTURBATIONS`], per unit.
+    pub responses: Vec<Response>,
+    /// Mean of each recorded input.
+    pub input_levels: BTreeMap<Channel, f64>,
+    /// Positions of the compared segments in `all`.
+    pub kept: Vec<usize>,
+    pub all: Vec<SegmentMeans>,
+}
+
+impl Readings {
+    /// Number of compared means; each is a row.
+    pub fn row_count(&self) -> usize {
+        self.segments.len() * self.columns.len()
+    }
+
+    /// Positions of a step's efficiency and heat-transfer coefficient in a [`Response`].
+    pub fn point_positions(&self, step: usize) -> [usize; 2] {
+        let eta = self.row_count() + step;
+        [eta, eta + self.steps.len()]
+    }
+
+    /// Step that an element of a [`Response`] belongs to.
+    pub fn step_of(&self, position: usize) -> usize {
+        match position.checked_sub(self.row_count()) {
+            Some(point) => point % self.steps.len(),
+            None => self.segments[position / self.columns.len()].step,
+        }
+    }
+
+    /// A response of the readings alone: `value` of each row and of its channel's position in [`OUTPUTS`].
+    pub fn response_of_rows(&self, value: impl Fn(usize, usize) -> f64) -> Response {
+        let rows = self.row_count();
+        Response::from_fn(rows + 2 * self.steps.len(), |position, _| {
+            if position < rows { value(position, self.columns[position % self.columns.len()]) } else { 0.0 }
+        })
+    }
+
+    pub fn response(&self, perturbation: Perturbation) -> Option<&Response> {
+        self.responses.get(PERTURBATIONS.iter().position(|other| *other == perturbation)?)
+    }
+
+    /// Start of the campaign and end of its last step, campaign time, s.
+    pub fn span_s(&self) -> (f64, f64) {
+        let start = self.steps.first().map_or(0.0, |step| step.start_s + step.offset_s);
+        let end = self.steps.last().map_or(0.0, |step| step.end_s + step.offset_s);
+        (start, end)
+    }
+
+    /// Response to a constant cause of unit size; `None` if no reading responds.
+    pub fn signature(&self, cause: Cause) -> Option<Response> {
+        self.signature_of(cause, |_| true)
+    }
+
+    /// The part of a signature that a model run with the drift contains: all but the drift of output sensors.
+    pub fn model_signature(&self, cause: Cause) -> Option<Response> {
+        self.signature_of(cause, |channel| INPUT_CHANNELS.contains(channel))
+    }
+
+    fn signature_of(&self, cause: Cause, counts: impl Fn(&Channel) -> bool) -> Option<Response> {
+        let signature = match cause {
+            Cause::Sensors(channels) => channels
+                .iter()
+                .filter(|channel| counts(channel))
+                .filter_map(|channel| self.sensor_signature(*channel))
+                .reduce(|sum, other| sum + other)?,
+            Cause::Fouling => {
+                self.response(Perturbation::Efficiency)?
+                    + self.response(Perturbation::Flow)? * FOULING_FLOW_SHARE
+            }
+            Cause::BearingFriction => self.response(Perturbation::Friction)?.clone(),
+        };
+        signature.iter().take(self.row_count()).any(|value| *value != 0.0).then_some(signature)
+    }
+
+    fn sensor_signature(&self, channel: Channel) -> Option<Response> {
+        // An input that reads too high drives the model too high: the true value is lower.
+        if INPUT_CHANNELS.contains(&channel) {
+            return Some(self.response(Perturbation::Input(channel))? * -1.0);
+        }
+        let is_compared = self.columns.iter().any(|column| OUTPUTS[*column] == channel);
+        is_compared.then(|| {
+            self.response_of_rows(|row, output| match OUTPUTS[output] == channel {
+                true if is_relative(channel) => self.model[row],
+                true => 1.0,
+                false => 0.0,
+            })
+        })
+    }
+
+    /// Mean of a time history over the segment of a row.
+    pub fn mean_of(&self, row: usize, history: TimeHistory) -> f64 {
+        let segment = &self.segments[row / self.columns.len()];
+        let offset_s = self.steps[segment.step].offset_s;
+        history.mean(segment.start_s + offset_s, segment.end_s + offset_s)
+    }
+
+    /// Change of the readings by a cause of size 1 with this signature and time history.
+    pub fn column(&self, signature: &Response, history: TimeHistory) -> DVector<f64> {
+        DVector::from_fn(self.row_count(), |row, _| signature[row] * self.mean_of(row, history))
+    }
+
+    /// The same readings with another prediction; `None` if it does not cover all compared segments.
+    pub fn with_prediction(&self, base: &Prediction, perturbed: &[Prediction]) -> Option<Readings> {
+        let rows = self.row_count();
+        let model = self.response_to(base);
+        let response = |(perturbation, prediction): (&Perturbation, &Prediction)| {
+            let mut response = (self.response_to(prediction) - &model) / difference_step(*perturbation);
+            // Steps that the model cannot follow give no point.
+            response.iter_mut().skip(rows).filter(|value| !value.is_finite()).for_each(|value| *value = 0.0);
+            response
+        };
+        let columns = self.columns.len();
+        let measured = |row: usize| self.all[self.kept[row / columns]].measured[self.columns[row % columns]];
+        let difference = DMatrix::from_fn(rows, 1, |row, _| measured(row).unwrap_or(f64::NAN) - model[row]);
+        let is_complete = difference.iter().all(|value| value.is_finite());
+        let responses = PERTURBATIONS.iter().zip(perturbed).map(response).collect();
+        is_complete.then(|| Readings { difference, model, responses, ..self.clone() })
+    }
+
+    /// Readings and points of a prediction.
+    fn response_to(&self, prediction: &Prediction) -> Response {
+        let (rows, columns, steps) = (self.row_count(), self.columns.len(), self.steps.len());
+        Response::from_fn(rows + 2 * steps, |position, _| match position.checked_sub(rows) {
+            None => prediction.means[self.kept[position / columns]][self.columns[position % columns]],
+            Some(point) if point < steps => prediction.step_ends[point].0,
+            Some(point) => prediction.step_ends[point - steps].1,
+        })
+    }
+
+    /// Subtracts the linear effect of a drift with this signature from the model.
+    pub fn subtract_from_model(&mut self, signature: &Response, drift: &Drift) {
+        for row in 0..self.row_count() {
+            self.difference[row] += signature[row] * (drift.size * self.mean_of(row, drift.history));
+        }
+        for step in 0..self.steps.len() {
+            let end_s = self.steps[step].end_s + self.steps[step].offset_s;
+            for position in self.point_positions(step) {
+                self.model[position] -= signature[position] * drift.at(end_s);
+            }
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! Searches the effects and pairs of effects that explain the judged channels, with their probabilities.
+
+use crate::driven::fit::{SideFit, SideProblem};
+use crate::driven::side::SideModel;
+use crate::gap::best_fit::coordinate::Coordinate;
+use crate::gap::causes::calibration::Calibration;
+use crate::gap::causes::probabilities::prior_of_number;
+use crate::gap::residuals::study::{Hypothesis, members};
+use mapper_inference::posterior::{CauseProbabilities, CauseSet, Rules, shares};
+use mapper_inference::search::{Causes, Extension, Known, Limits, extend};
+use mapper_numerics::parallel;
+use mapper_physics::rig::effect::{EffectInfo, EffectParameter};
+
+pub(crate) struct SearchResult {
+    /// SideFit of the unknowns alone.
+    pub(crate) null: SideFit,
+    /// Effects and pairs of effects, most probable first.
+    pub(crate) fits: Vec<SideFit>,
+}
+
+/// Prior probability that a cause is outside the library. Judgement: as small as the remainder of the library priors.
+const PRIOR_OUTSIDE: f64 = 0.1;
+
+/// Logarithm of the prior of a fit's cause, among this number of effects.
+fn prior(calibration: &Calibration, effects: usize, fit: &SideFit) -> f64 {
+    prior_of_number(calibration, effects, fit.hypothesis.effects.len())
+}
+
+/// Logarithm of the evidence of a fit, including its prior.
+pub(crate) fn weight(calibration: &Calibration, effects: usize, fit: &SideFit) -> f64 {
+    fit.score + prior(calibration, effects, fit)
+}
+
+/// Start values of an effect: one and three typical steps from neutral, on each possible side.
+fn start_values(info: &EffectInfo) -> Vec<Vec<f64>> {
+    let at = |share: f64| -> Vec<f64> {
+        let value = |p: &EffectParameter| {
+            let coordinate = Coordinate::new(p);
+            // For a parameter that spans decades, a step is a factor.
+            let value = if coordinate.is_logarithmic() {
+                coordinate.value(coordinate.of(p.neutral + p.typical_step))
+            } else {
+                p.neutral + share * p.typical_step
+            };
+            value.clamp(p.low, p.high)
+        };
+        info.parameters.iter().map(value).collect()
+    };
+    let neutral: Vec<f64> = info.parameters.iter().map(|p| p.neutral).collect();
+    let mut starts: Vec<Vec<f64>> = Vec::new();
+    for share in [1.0, 3.0, -1.0] {
+        let start = at(share);
+        if start != neutral && !starts.contains(&start) {
+            starts.push(start);
+        }
+    }
+    starts
+}
+
+/// Judgement: limits the time. Every effect is tried, because the linear gain depends on the model error, which a cause reduces.
+const LIMITS: Limits = Limits { members: 2, starts: 3, fits: 6, slack: f64::INFINITY };
+
+/// Fits no cause, each of the effects, and the most promising pairs.
+pub(crate) fn search<S: SideModel>(
+    problem: &SideProblem<'_, S>,
+    effects: &[usize],
+    counts: &[bool],
+    calibration: &Calibration,
+) -> Option<SearchResult> {
+    let search = SideSearch { problem, effects, counts, calibration };
+    let null = problem.fit(&problem.nothing(), counts)?;
+    let mut known = Known::default();
+    known.keep(&search, null.clone());
+    let starts_of = |effect: &usize| search.starts(&problem.nothing(), *effect);
+    known.fit_all(&search, &effects.iter().flat_map(starts_of).collect::<Vec<_>>());
+    let best = known.ranked(&search).first().map_or(f64::NEG_INFINITY, |best| best.score);
+    if best - null.score > calibration.threshold {
+        extend(&search, &mut known, LIMITS);
+    }
+    Some(SearchResult { null, fits: known.ranked(&search) })
+}
+
+struct SideSearch<'a, S> {
+    problem: &'a SideProblem<'a, S>,
+    effects: &'a [usize],
+    counts: &'a [bool],
+    calibration: &'a Calibration,
+}
+
+impl<S: SideModel> SideSearch<'_, S> {
+    fn starts(&self, base: &Hypothesis, effect: usize) -> Vec<Hypothesis> {
+        let with = |values: Vec<f64>| {
+            let mut start = base.clone();
+            start.effects.push((effect, values));
+            start
+        };
+        start_values(self.problem.effects[effect].info()).into_iter().map(with).collect()
+    }
+}
+
+impl<S: SideModel> Causes for SideSearch<'_, S> {
+    type Fit = SideFit;
+    type Start = Hypothesis;
+
+    fn members(&self, fit: &SideFit) -> Vec<usize> {
+        members(&fit.hypothesis)
+    }
+
+    fn family(&self, cause: usize) -> usize {
+        cause
+    }
+
+    fn ln_odds(&self, fit: &SideFit) -> f64 {
+        weight(self.calibration, self.effects.len(), fit)
+    }
+
+    fn extensions(&self, base: &SideFit) -> Vec<Extension<Hypothesis>> {
+        let Some(linearised) = self.problem.linearise(base, self.counts) else { return Vec::new() };
+        let used = members(&base.hypothesis);
+        let others = self.effects.iter().filter(|effect| !used.contains(effect));
+        let starts: Vec<(usize, Hypothesis)> = others
+            .flat_map(|cause| self.starts(&base.hypothesis, *cause).into_iter().map(|start| (*cause, start)))
+            .collect();
+        let extensions = parallel::map(&starts, |(cause, start)| {
+            Some(Extension { cause: *cause, ln_gain: 0.5 * linearised.gain(start)?, start: start.clone() })
+        });
+        extensions.into_iter().flatten().collect()
+    }
+
+    fn without(&self, fit: &SideFit, cause: usize) -> Hypothesis {
+        let mut start = fit.hypothesis.clone();
+        start.effects.retain(|(index, _)| *index != cause);
+        start
+    }
+
+    fn fit(&self, start: &Hypothesis) -> Option<SideFit> {
+        self.problem.fit(start, self.counts)
+    }
+
+    fn should_extend(&self, _: &SideFit, _: &SideFit) -> bool {
+        true
+    }
+}
+
+/// Probabilities of the causes of a search among this number of effects. Causes outside the library show as a larger error of the model.
+pub(crate) fn probabilities(
+    calibration: &Calibration,
+    effects: usize,
+    found: &SearchResult,
+) -> CauseProbabilities {
+    let all = || std::iter::once(&found.null).chain(&found.fits);
+    let inside = all().map(|fit| weight(calibration, effects, fit) + (1.0 - PRIOR_OUTSIDE).ln());
+    let outside = all().map(|fit| fit.score_outside + prior(calibration, effects, fit) + PRIOR_OUTSIDE.ln());
+    let shares = shares(&inside.chain(outside).collect::<Vec<_>>(), calibration.temperature);
+    let unmodelled = shares[shares.len() / 2..].iter().sum();
+    let set = |fit: &SideFit| CauseSet {
+        members: members(&fit.hypothesis),
+        ln_weight: weight(calibration, effects, fit),
+    };
+    let sets: Vec<CauseSet> = found.fits.iter().map(set).collect();
+    // Every effect is tried, and the second one of a pair needs the evidence of a cause.
+    let rules = Rules { unlisted: 0.0, part_margin: calibration.threshold, ..calibration.rules() };
+    rules.cause_probabilities(weight(calibration, effects, &found.null), &sets, unmodelled)
+}

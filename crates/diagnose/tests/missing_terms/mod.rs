@@ -1,3 +1,0 @@
-//! Integration tests of the module `missing_terms`.
-
-mod discover;

@@ -97,7 +97,7 @@ def case(mapper, folder, number, seed, sizes, candidates):
         share = after.get((name,), 0.0) / total if total > 0 else 0.0
         if kind == "soak" and name in AT_REST:
             total = sum(after.get(tuple(c), 0.0) for c in is_open)
-            reported = any(w.startswith(f"{AT_REST[name].capitalize()} reads") for w in then["off_at_rest"])
+            reported = any(w.startswith(f"{AT_REST[name].capitalize()} reads") for w in then["offsets_at_rest"])
             share = 1.0 - total if reported else 0.0
         rows.append({"case": number, "effect": name, "kind": kind, "forecast": suggestion["probability_settled"],
                      "bit": suggestion["entropy_drop_bit"], "share": share, "settled": share >= SETTLED,

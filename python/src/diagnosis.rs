@@ -12,28 +12,28 @@ use std::path::PathBuf;
 
 /// Diagnoses a recording, as `mapper gap diagnose` does; returns the JSON of that command. `effects`: suspected effects written in rhai.
 #[pyfunction]
-#[pyo3(signature = (recording, campaign, effects, healthy=None, on_event=None))]
+#[pyo3(signature = (recording, campaign, effects, baseline=None, on_event=None))]
 pub fn diagnose(
     py: Python<'_>,
     recording: &Recording,
     campaign: &Campaign,
     effects: Vec<PathBuf>,
-    healthy: Option<&Recording>,
+    baseline: Option<&Recording>,
     on_event: Option<Py<PyAny>>,
 ) -> PyResult<String> {
     let (source, campaign) = (recording.source.clone(), campaign.inner.clone());
-    let healthy = healthy.map(|recording| recording.source.clone());
+    let baseline = baseline.map(|recording| recording.source.clone());
     compute(py, on_event.as_ref(), move |events| {
         let registry = registry();
         let effects = registry.effects_with(&effects)?;
         let given = Some(&campaign.campaign);
         let read = source.with(given)?;
         let recorded = single(&read)?;
-        let healthy = healthy.map(|source| source.with(given)).transpose()?;
-        let healthy = healthy.as_ref().and_then(|read| read.first());
+        let baseline = baseline.map(|source| source.with(given)).transpose()?;
+        let baseline = baseline.as_ref().and_then(|read| read.first());
         let on_event = |event: &_| events.show(event);
         let session = Session { on_event: &on_event, ..Session::new(&registry) };
-        let gap = session.diagnose_gap(recorded, &campaign.campaign, &source.map, effects, healthy)?;
+        let gap = session.diagnose_gap(recorded, &campaign.campaign, &source.map, effects, baseline)?;
         Ok::<String, Fault>(gap.json().map_err(|error: SessionError| Fault::from(error))?.to_string())
     })
 }

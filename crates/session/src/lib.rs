@@ -81,7 +81,7 @@ pub use plan::campaign_forecast::CampaignForecast;
 pub use plan::planning::{PlanInputs, nominal_model, plan, plan_of};
 pub use plan::rehearsal::{Rehearsal, rehearse};
 pub use plan::stored_plan::stored_plan;
-pub use recording::files::{Existing, json_text, write_file, write_new};
+pub use recording::files::{DIAGNOSIS_FORMAT, Existing, Versioned, json_text, write_file, write_new};
 pub use recording::identification_config::{declared, identification};
 pub use recording::log_inspection::{LogInspection, inspect_log};
 pub use recording::program::{PROGRAM, program_and_commit};

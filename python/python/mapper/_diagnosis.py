@@ -57,7 +57,7 @@ class Diagnosis:
     @property
     def places(self) -> pd.DataFrame:
         """Locations of the gap, largest first; ``size`` is in the unit of the column ``unit``."""
-        return _tables.table(self.json["where"])
+        return _tables.table(self.json["locations"])
 
     def corrected(self, method: Result | str | None = None) -> Result:
         """Identify the recording again without the causes found, as ``mapper gap correct`` does.
@@ -96,7 +96,7 @@ def diagnose(
     campaign: Campaign,
     *,
     effects: Sequence[Effect | str | os.PathLike[str]] = (),
-    healthy: Recording | Run | None = None,
+    baseline: Recording | Run | None = None,
     progress: bool | Callable[[dict[str, Any]], object] = False,
 ) -> Diagnosis:
     """Say where a recording departs from the nominal model and which effect causes it, as ``mapper gap diagnose`` does.
@@ -111,7 +111,7 @@ def diagnose(
         Campaign with machine, declared uncertainties and tolerances.
     effects
         Suspected effects: files written in rhai, or :class:`mapper.Effect`.
-    healthy
+    baseline
         Reference recording of the same rig and steps: the diagnosis then covers only changes since then.
     progress
         True shows a bar (needs tqdm). A function is called with each event.
@@ -122,7 +122,7 @@ def diagnose(
         Required data are missing, or the recording is of another machine.
     """
     inner = _recorded(recording)
-    reference = None if healthy is None else _recorded(healthy)
+    reference = None if baseline is None else _recorded(baseline)
     with Progress.of(progress) as shown, TemporaryDirectory(prefix="mapper-") as scripts:
         found = _mapper.diagnose(inner, campaign._inner, _files(effects, scripts), reference, observer(shown))
 

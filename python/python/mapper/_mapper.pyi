@@ -89,7 +89,7 @@ def diagnose(
     recording: Recording,
     campaign: Campaign,
     effects: list[Path],
-    healthy: Recording | None = None,
+    baseline: Recording | None = None,
     on_event: _OnEvent | None = None,
 ) -> str: ...
 def correct(

@@ -8,7 +8,7 @@ use crate::{output::standard_output, registry};
 use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_report::{corrected_csv, drift_text, sensors_text, zero_text};
-use mapper_session::{Recorded, Session, SessionError};
+use mapper_session::{DIAGNOSIS_FORMAT, Recorded, Session, SessionError, Versioned};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -57,7 +57,8 @@ impl Drift {
         let warnings: Vec<String> =
             recorded.iter().flat_map(|recorded| &recorded.read.warnings).map(ToString::to_string).collect();
         if self.json {
-            let mut value = serde_json::to_value(&drift.report).map_err(SessionError::from)?;
+            let versioned = Versioned { format_version: DIAGNOSIS_FORMAT, content: &drift.report };
+            let mut value = serde_json::to_value(versioned).map_err(SessionError::from)?;
             value["recordings"] = recorded.iter().map(|recorded| json!(recorded.path)).collect();
             value["zero"] = json!(drift.zero);
             if !drift.sensors.is_empty() {

@@ -6,7 +6,7 @@ use crate::output::standard_output::Replace;
 use crate::{output::standard_output, registry};
 use clap::Args;
 use mapper_report::why_text;
-use mapper_session::{Recorded, Session, Side, write_transient};
+use mapper_session::{DIAGNOSIS_FORMAT, Recorded, Session, Side, Versioned, write_transient};
 use std::path::PathBuf;
 
 /// Identify and diagnose one side of a machine from a log without steps, driven by its measured speed, flow, pressures and inlet temperature
@@ -60,7 +60,7 @@ impl Transient {
             None => Vec::new(),
         };
         if self.json {
-            return standard_output::print_json(&diagnosis);
+            return standard_output::print_json(&Versioned { format_version: DIAGNOSIS_FORMAT, content: &diagnosis });
         }
         let mut text = why_text(&diagnosis);
         text.extend(recorded.read.warnings.iter().map(|warning| format!("recording: {warning}\n")));

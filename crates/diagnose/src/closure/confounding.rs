@@ -1,6 +1,5 @@
 //! Distinguishability before any rig runs: which balance's source term could imitate which effect.
 
-use crate::closure::balance::Balance;
 use crate::closure::columns::{Base, Products, weigh_process};
 use crate::closure::residual_source::{balances, columns, covariance};
 use crate::gap::best_fit::coordinate::typical;
@@ -14,8 +13,8 @@ use nalgebra::DVector;
 /// The matrix of effects against balances.
 #[derive(Debug, Clone)]
 pub struct Signatures {
-    /// The balances.
-    pub balances: Vec<Balance>,
+    /// The balances, in words.
+    pub balances: Vec<String>,
     /// Each effect's id, its signature length at one typical step in sigmas (nuisances projected out), and a share per balance. The share
     /// is the part of its energy that a source term in that balance could reproduce: 1 means that this balance alone explains it, 0 that it
     /// is unaffected.
@@ -72,5 +71,6 @@ pub fn signatures(study: &Study, linearised: &Linearised) -> Signatures {
             )
         })
         .collect();
+    let balances = balances.iter().map(|balance| balance.properties().words).collect();
     Signatures { balances, effects }
 }

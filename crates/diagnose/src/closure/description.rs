@@ -5,7 +5,7 @@ use crate::closure::candidate::FittedClosure;
 use crate::closure::expression::Expression;
 use crate::closure::library::REFERENCE_K;
 use crate::closure::term::{Role, Term};
-use crate::gap::findings::report::LawTerm;
+use crate::gap::findings::report::ClosureCoefficient;
 use mapper_core::{half_width_95, with_unit};
 use std::fmt::Write as _;
 
@@ -39,7 +39,7 @@ pub struct ClosureDescription {
     /// The sentence.
     pub sentence: String,
     /// Its numbers.
-    pub terms: Vec<LawTerm>,
+    pub terms: Vec<ClosureCoefficient>,
     /// Temperature of the heat exchange partner, K, if it is one of the numbers.
     pub sink_k: Option<f64>,
 }
@@ -60,7 +60,7 @@ pub fn describe(library: &[Term], candidate: &FittedClosure, interval_factor: f6
     let numbers: Vec<Uncertain> = (0..terms.len())
         .map(|i| Uncertain { value: values[i], half: widened * cov(i, i).max(0.0).sqrt() })
         .collect();
-    let row = |term: String, number: Uncertain, unit: &str| LawTerm {
+    let row = |term: String, number: Uncertain, unit: &str| ClosureCoefficient {
         term,
         value: number.value,
         low: number.value - number.half,

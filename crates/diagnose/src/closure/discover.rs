@@ -4,7 +4,7 @@ use crate::closure::balance::{Balance, Properties};
 use crate::closure::candidate::{FittedClosure, TermSearch, keep_determined, promising};
 use crate::closure::columns::{Base, Products};
 use crate::closure::description::{ClosureDescription, describe, script_of};
-use crate::closure::library::library;
+use crate::closure::library as term_library;
 use crate::closure::residual_source::{ResidualSource, residual_sources};
 use crate::closure::select::{Choice, begun, choices};
 use crate::gap::best_fit::adequacy::{adequacy, misfit_of_steps};
@@ -17,11 +17,12 @@ use crate::gap::causes::place::{
 };
 use crate::gap::causes::probabilities::weight;
 use crate::gap::causes::select::MIN_GAP_REDUCTION;
-use crate::gap::diagnose::Diagnosed;
-use crate::gap::findings::report::{Law, MAX_EQUIVALENT, MissingSource, Place, Verdict};
+use crate::gap::findings::report::{BalanceClosure, ClosureTerm, MAX_EQUIVALENT, Place};
 use crate::gap::gap_reduction::folds::FOLDS;
 use crate::gap::gap_reduction::held_out_gap::channels_on;
+use crate::gap::library_fits::LibraryFits;
 use crate::gap::residuals::study::{Study, members};
+use crate::gap::verdict::Explained;
 use mapper_core::half_width_95;
 use mapper_inference::posterior::{CauseProbabilities, CauseSet, Rules};
 
@@ -29,42 +30,46 @@ use mapper_inference::posterior::{CauseProbabilities, CauseSet, Rules};
 #[derive(Debug, Default)]
 pub struct Discovered {
     /// Proposed closure terms, best first; usually one or none.
-    pub closure_terms: Vec<Law>,
+    pub closure_terms: Vec<ClosureTerm>,
     /// Residual source term of each balance, most probable first.
-    pub residual_sources: Vec<MissingSource>,
+    pub residual_sources: Vec<BalanceClosure>,
     /// Locations of the gap; `None` if the diagnosis' locations remain valid.
     pub places: Option<Vec<Place>>,
     /// The first closure term fitted to all steps, if it is more probable than not.
     pub settled: Option<Fit>,
 }
 
-/// Searches outside the effect library, if the diagnosis leaves a residual; see [`wanted`].
-pub fn discover(
-    diagnosed: &Diagnosed,
+impl Discovered {
+    /// Without the closure terms; the locations that were found with them remain.
+    pub(crate) fn without_terms(self) -> Discovered {
+        Discovered { closure_terms: Vec::new(), settled: None, ..self }
+    }
+}
+
+/// Searches outside the effect library, and if it explains most of the gap also in addition to its best cause.
+pub(crate) fn discover(
+    library: &LibraryFits,
+    explained: Explained,
     calibration: &Calibration,
     progress: &(dyn Fn(f64, &str) + Sync),
 ) -> Discovered {
-    if !wanted(diagnosed) {
-        return Discovered::default();
-    }
-    let Diagnosed { study, linearised, .. } = diagnosed;
+    let LibraryFits { study, linearised, .. } = library;
     progress(0.0, "closure terms");
-    let library = library();
     let everywhere = Selection::all(study);
     let mut training = everywhere.clone();
-    for step in held_out_steps(diagnosed) {
+    for step in held_out_steps(library) {
         training.steps[*step] = false;
     }
     let nothing = Base::nothing(study, linearised);
-    let mut search = TermSearch { study: study.clone(), library };
-    let mut found = found(&mut search, (diagnosed, calibration), &nothing, &training, &everywhere);
+    let mut search = TermSearch { study: study.clone(), library: term_library::library() };
+    let mut found = found(&mut search, (library, calibration), &nothing, &training, &everywhere);
     progress(0.4, "a closure term together with a cause");
     let left = found.as_ref().is_none_or(|found| !found.adequate);
     if left
-        && diagnosed.diagnosis.verdict == Verdict::PartlyExplained
-        && let Some(best) = diagnosed.fits.first()
+        && explained == Explained::Most
+        && let Some(best) = library.fits.first()
         && let Some(both) =
-            together_with_cause(&mut search, (diagnosed, calibration), best, &training, &everywhere)
+            together_with_cause(&mut search, (library, calibration), best, &training, &everywhere)
     {
         let score =
             |found: &FittedTerms| found.fitted.first().map_or(f64::NEG_INFINITY, FittedClosure::score);
@@ -73,7 +78,7 @@ pub fn discover(
         found = if better { Some(both) } else { found };
     }
     progress(0.6, "residual of the closure term");
-    let closure_terms = propose(diagnosed, calibration, &search, found.as_ref(), &training);
+    let closure_terms = propose(library, calibration, &search, found.as_ref(), &training);
     // If a closure term leaves only noise, linear gains of other parts are irrelevant.
     let settled = closure_terms.first().filter(|closure| closure.probability > 0.5);
     let best = found.as_ref().and_then(|found| found.fitted.first());
@@ -84,7 +89,7 @@ pub fn discover(
         settled.is_none_or(|closure| closure.submodel == balance.properties().submodel.name())
     };
     let residual_sources = residual_sources(&nothing, &everywhere.steps, &here);
-    let places = places((diagnosed, calibration), &search, found.as_ref(), &residual_sources, bend);
+    let places = places((library, calibration), &search, found.as_ref(), &residual_sources, bend);
     Discovered {
         closure_terms,
         residual_sources: residual_sources
@@ -98,18 +103,11 @@ pub fn discover(
 }
 
 /// Steps withheld while a closure term is chosen: the first fold. A search for each fold would take three times as long.
-fn held_out_steps(diagnosed: &Diagnosed) -> &[usize] {
-    match diagnosed.diagnosis.gap.folds.as_slice() {
+fn held_out_steps(library: &LibraryFits) -> &[usize] {
+    match library.folds.steps.as_slice() {
         [first, _, ..] => first,
         _ => &[],
     }
-}
-
-/// Whether a diagnosis leaves a residual to explain.
-pub fn wanted(diagnosed: &Diagnosed) -> bool {
-    matches!(diagnosed.diagnosis.verdict, Verdict::PartlyExplained | Verdict::Unexplained)
-        || (diagnosed.diagnosis.verdict != Verdict::WithinTolerance
-            && diagnosed.diagnosis.probability_outside > 0.5)
 }
 
 struct FittedTerms {
@@ -126,27 +124,26 @@ struct FittedTerms {
 /// Search in addition to the best library cause.
 fn together_with_cause(
     search: &mut TermSearch,
-    (diagnosed, calibration): (&Diagnosed, &Calibration),
+    (library, calibration): (&LibraryFits, &Calibration),
     best: &Fit,
     training: &Selection,
     everywhere: &Selection,
 ) -> Option<FittedTerms> {
-    let Diagnosed { study, linearised, .. } = diagnosed;
+    let LibraryFits { study, linearised, .. } = library;
     let there = linearised.at(study, &best.hypothesis).ok()?;
-    found(search, (diagnosed, calibration), &Base::at_fit(study, &there, best), training, everywhere)
+    found(search, (library, calibration), &Base::at_fit(study, &there, best), training, everywhere)
 }
 
 /// Searches the term library from a base: in closed form, then with model runs.
 fn found(
     search: &mut TermSearch,
-    (diagnosed, calibration): (&Diagnosed, &Calibration),
+    (library, calibration): (&LibraryFits, &Calibration),
     base: &Base<'_>,
     training: &Selection,
     everywhere: &Selection,
 ) -> Option<FittedTerms> {
-    let adequate = |fit: &Fit| {
-        calibration.outside(adequacy(&diagnosed.study, &diagnosed.linearised, fit).features()) < 0.5
-    };
+    let adequate =
+        |fit: &Fit| calibration.outside(adequacy(&library.study, &library.linearised, fit).features()) < 0.5;
     let changes = base.changes(&search.library);
     let usable: Vec<usize> = (0..changes.len()).filter(|place| changes[*place].is_some()).collect();
     let columns: Vec<Vec<f64>> = changes.into_iter().flatten().collect();
@@ -217,18 +214,18 @@ fn fitted(
 
 /// The best closure term, if it passes all tests.
 fn propose(
-    diagnosed: &Diagnosed,
+    library: &LibraryFits,
     calibration: &Calibration,
     search: &TermSearch,
     found: Option<&FittedTerms>,
     training: &Selection,
-) -> Vec<Law> {
+) -> Vec<ClosureTerm> {
     let Some(found) = found else { return Vec::new() };
     let Some(best) = found.fitted.first() else { return Vec::new() };
     let Some(trained) = found.trained.iter().find(|trained| trained.effect == best.effect) else {
         return Vec::new();
     };
-    let Diagnosed { study, linearised, null, fits, .. } = diagnosed;
+    let LibraryFits { study, linearised, null, fits, .. } = library;
     // The best alternative: no cause, or a library cause.
     let inside = fits
         .iter()
@@ -249,7 +246,7 @@ fn propose(
     let Ok(before) = fit(&search.study, linearised, &study.nothing(), training, Effort::default()) else {
         return Vec::new();
     };
-    let held_out = held_out_steps(diagnosed);
+    let held_out = held_out_steps(library);
     let read = |fit: Fit| {
         if training.steps[0] { fit } else { with_start_read(&search.study, linearised, fit) }
     };
@@ -270,7 +267,7 @@ fn propose(
     let script = script_of(&best.terms(&search.library), &description);
     let ClosureDescription { sentence, terms, .. } = description;
     let others = found.fitted[..alike].iter().skip(1).take(MAX_EQUIVALENT);
-    vec![Law {
+    vec![ClosureTerm {
         submodel: search.library[best.choice.terms[0]].submodel().name().to_owned(),
         sentence,
         terms,
@@ -298,13 +295,13 @@ const PRIOR_CLOSURE: f64 = 0.15;
 
 /// Locations from all explanations tried: effects, closure terms, source terms.
 fn places(
-    (diagnosed, calibration): (&Diagnosed, &Calibration),
+    (library, calibration): (&LibraryFits, &Calibration),
     search: &TermSearch,
     found: Option<&FittedTerms>,
     residual_sources: &[ResidualSource],
     bend: f64,
 ) -> Vec<Place> {
-    let Diagnosed { study, linearised, null, fits, .. } = diagnosed;
+    let LibraryFits { study, linearised, null, fits, .. } = library;
     let rarity = rarity(calibration, study);
     let gains: Vec<Gain<'_>> = fits.iter().map(|fit| Gain { fit, gain: null.cost - fit.cost }).collect();
     let mut explanations: Vec<Explanation<'_>> = of_fits(study, &gains, rarity);
@@ -333,7 +330,7 @@ fn places(
         Explanation { score, parts: std::iter::once(closure_part).chain(other_parts).collect() }
     }));
     // Linear gains are relative to the linear cost of the null hypothesis.
-    let linear_null = 0.5 * (null.cost - linear_cost(diagnosed));
+    let linear_null = 0.5 * (null.cost - linear_cost(library));
     for source in residual_sources.iter().filter(|source| source.gain > 0.0) {
         let part = Part {
             submodel: source.balance.properties().submodel,
@@ -346,15 +343,15 @@ fn places(
 }
 
 /// Linear estimate of the cost with tolerances only, from the nominal model.
-fn linear_cost(diagnosed: &Diagnosed) -> f64 {
-    let base = Base::nothing(&diagnosed.study, &diagnosed.linearised);
-    let everywhere = Selection::all(&diagnosed.study);
-    Products::new(&base, &[]).projected(&everywhere.steps).map_or(diagnosed.null.cost, |left| left[(0, 0)])
+fn linear_cost(library: &LibraryFits) -> f64 {
+    let base = Base::nothing(&library.study, &library.linearised);
+    let everywhere = Selection::all(&library.study);
+    Products::new(&base, &[]).projected(&everywhere.steps).map_or(library.null.cost, |left| left[(0, 0)])
 }
 
-fn reported_source(source: ResidualSource) -> MissingSource {
+fn reported_source(source: ResidualSource) -> BalanceClosure {
     let Properties { submodel, words, unit, .. } = source.balance.properties();
-    MissingSource {
+    BalanceClosure {
         submodel: submodel.name().to_owned(),
         quantity: words,
         unit: unit.to_owned(),

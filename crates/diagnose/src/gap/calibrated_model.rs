@@ -2,19 +2,27 @@
 
 use crate::gap::best_fit::coordinate::{coordinates, infos};
 use crate::gap::best_fit::fit::{changes_near, effect_changes};
+use crate::gap::causes::calibration::Calibration;
 use crate::gap::diagnose::Diagnosed;
 use crate::gap::findings::report::Verdict;
 use crate::gap::next_experiment::outlook::{SimulatedRig, simulated_steps};
+use crate::gap::preconditions::problem::GapError;
+use crate::gap::prepare::Prepared;
+use crate::gap::request::RigRecording;
+use crate::gap::residuals::actuators::Actuators;
 use crate::gap::residuals::machine_run::LinearisedMachine;
 use crate::gap::residuals::nuisance::{Nuisance, OFFSET_PREFIX, OUTPUTS};
 use crate::gap::residuals::study::{Hypothesis, PredictError, Study};
 use crate::gap::residuals::whiten::{Linearised, dot, nuisance_changes};
-use mapper_core::{Channel, StepMarker, half_width_95};
+use mapper_core::{Channel, half_width_95};
 use mapper_identify::BLOCK_S;
 use mapper_inference::descent::FINE;
+use mapper_observe::model_inputs::lagged_command::Response;
+use mapper_physics::rig::effect::Effect;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// An effect with its values.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -75,6 +83,9 @@ pub enum CalibratedModelError {
         "the covariance of the diagnosis does not have {0} rows and columns, one for each tolerance and parameter"
     )]
     Covariance(usize),
+    /// The recording cannot be compared with the model.
+    #[error(transparent)]
+    Gap(#[from] GapError),
     #[error(transparent)]
     Predict(#[from] PredictError),
 }
@@ -171,7 +182,13 @@ pub struct ForecastCheck {
 ///
 /// # Errors
 /// [`CalibratedModelError`].
-pub fn check_forecast(study: &Study, found: &Found) -> Result<ForecastCheck, CalibratedModelError> {
+pub fn check_forecast(
+    recorded: &RigRecording,
+    effects: Vec<Arc<dyn Effect>>,
+    found: &Found,
+    calibration: &Calibration,
+) -> Result<ForecastCheck, CalibratedModelError> {
+    let study = &Prepared::new(recorded, calibration).zeroed.study(recorded, effects)?;
     let (hypothesis, covariance) = found.hypothesis(study)?;
     let nominal = Linearised::new(study)?;
     let there = nominal.at(study, &hypothesis)?;
@@ -224,15 +241,26 @@ pub struct Expected {
     pub channels: BTreeMap<String, [f64; 2]>,
 }
 
-/// Forecasts the ends of planned steps under the campaign's inputs.
+/// Forecasts the ends of planned steps under the campaign's inputs. `planned`: a recording that has only steps.
 ///
 /// # Errors
 /// [`CalibratedModelError`]; no steps if the nominal machine cannot settle at the first.
 pub fn forecast_steps(
-    rig: SimulatedRig,
-    steps: Vec<StepMarker>,
+    planned: RigRecording,
+    effects: Vec<Arc<dyn Effect>>,
     found: &Found,
 ) -> Result<Vec<Expected>, CalibratedModelError> {
+    let declared = planned.declared();
+    let lag = Response::lag(planned.tolerances.actuator_lag_s);
+    let judged = planned.tolerances_declared;
+    let rig = SimulatedRig {
+        channels: declared.sensors.keys().copied().collect(),
+        declared,
+        model: planned.model,
+        effects,
+        actuators: Actuators { p3: lag, valve: Response::lag(0.0), judged },
+    };
+    let steps = planned.recording.steps;
     let rest = steps.first().and_then(|step| step.to);
     let study = rest.and_then(|rest| simulated_steps(rig, steps, &rest, BLOCK_S, |_| None));
     study.map_or_else(|| Ok(Vec::new()), |study| forecast(&study, found))

@@ -4,10 +4,8 @@
 //! measured readings, so that an efficiency identified from the result is that of the machine alone. The difference depends on the map of the model only
 //! as far as a cause depends on the operating point.
 
-use crate::gap::best_fit::coordinate::{coordinates, hypothesis_at, infos, unknowns};
+use crate::gap::best_fit::coordinate::{coordinates, hypothesis_at, unknowns};
 use crate::gap::best_fit::fit::Fit;
-use crate::gap::diagnose::Diagnosed;
-use crate::gap::findings::report::{Candidate, Verdict};
 use crate::gap::residuals::nuisance::{Circumstances, OUTPUTS};
 use crate::gap::residuals::study::{Hypothesis, PredictError, Study};
 use mapper_core::{Channel, Recording, Series};
@@ -15,7 +13,6 @@ use mapper_observe::channels::{INPUT_CHANNELS, boundary_condition};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::rig::effect::{EffectError, Rig};
 use mapper_physics::simulation::inputs::Inputs;
-use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Effect of causes on the readings of a recording.
@@ -108,86 +105,4 @@ pub fn one_sigma_away(study: &Study, fit: &Fit) -> Option<Vec<Hypothesis>> {
         hypothesis_at(&fit.hypothesis, &coordinates, &moved)
     });
     Some(moved.collect())
-}
-
-/// Minimum probability of the causes by which a map is corrected. Judgement: of the diagnoses with a higher probability, 94 % are right on 2000 simulated
-/// campaigns (docs/validation/gap.md).
-pub const NEEDED_PROBABILITY: f64 = 0.9;
-
-/// A map before and after its correction for causes.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct CorrectedMap {
-    /// The causes, most probable first; more than one if a recording does not distinguish them.
-    pub causes: Vec<Candidate>,
-    /// Why nothing was corrected; `None` if it was.
-    pub refused: Option<NotCorrected>,
-    /// Points in order of their steps.
-    pub points: Vec<PointCorrection>,
-}
-
-/// Why a map is not corrected.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[serde(tag = "reason", rename_all = "snake_case")]
-pub enum NotCorrected {
-    /// The diagnosis names no cause.
-    NoCause,
-    /// The open causes together are less probable than [`NEEDED_PROBABILITY`].
-    Improbable {
-        /// Probability of all causes together.
-        probability: f64,
-    },
-    /// The recording does not determine how large the causes are.
-    Undetermined,
-    /// The corrections for causes that the recording does not distinguish differ by more than the interval.
-    Ambiguous {
-        /// Number of the step where they differ most, relative to its interval.
-        step: usize,
-        /// Their largest difference there, fraction.
-        difference: f64,
-        /// Half of the 95 % interval there, fraction.
-        half_interval: f64,
-    },
-}
-
-/// Efficiency of a point before and after: value and ends of the 95 % interval, fraction.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct PointCorrection {
-    /// Number of the step, from 1.
-    pub step: usize,
-    /// Shaft speed, rpm.
-    pub speed_rpm: f64,
-    /// Valve opening.
-    pub valve: f64,
-    /// As recorded; `None` without a result.
-    pub before: Option<[f64; 3]>,
-    /// Without the causes; `None` without a result or a correction.
-    pub after: Option<[f64; 3]>,
-    /// Standard uncertainty of the correction, fraction.
-    pub correction_sigma: f64,
-}
-
-impl Diagnosed {
-    /// The open causes with their fits, and their total probability: the most probable ones that together reach [`NEEDED_PROBABILITY`]. None if the
-    /// diagnosis names no cause of the library.
-    pub fn open_causes(&self) -> (Vec<(&Candidate, &Fit)>, f64) {
-        let mut causes: Vec<(&Candidate, &Fit)> = Vec::new();
-        let mut probability = 0.0;
-        if !matches!(self.diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained) {
-            return (causes, probability);
-        }
-        for candidate in &self.diagnosis.candidates {
-            if probability >= NEEDED_PROBABILITY {
-                break;
-            }
-            let is_of_candidate = |fit: &&Fit| {
-                let mut ids = infos(&self.study.effects, &fit.hypothesis).map(|info| &info.id);
-                fit.hypothesis.effects.len() == candidate.effects.len()
-                    && ids.all(|id| candidate.effects.iter().any(|effect| effect == id))
-            };
-            let Some(fit) = self.fits.iter().find(is_of_candidate) else { break };
-            probability += candidate.probability;
-            causes.push((candidate, fit));
-        }
-        (causes, probability)
-    }
 }

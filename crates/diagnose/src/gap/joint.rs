@@ -33,15 +33,15 @@ pub struct Value {
 /// Change of a cause over the recordings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Fate {
+pub enum Persistence {
     /// In all recordings, with the same size.
     Persists,
     /// In all recordings, with different sizes.
     Changes,
     /// In the last recording but not in the first.
-    Came,
+    Appeared,
     /// In the first recording but not in the last.
-    Went,
+    Disappeared,
     /// In some recordings.
     ComesAndGoes,
 }
@@ -58,7 +58,7 @@ pub struct Over {
     /// Unit.
     pub unit: String,
     /// Change of the cause.
-    pub fate: Fate,
+    pub persistence: Persistence,
     /// Value of each recording alone, in order.
     pub each: Vec<Value>,
     /// Whether each recording has the cause.
@@ -117,12 +117,12 @@ pub fn over_recordings(diagnosed: &[&Diagnosed], calibration: &Calibration) -> V
                 > DOUBT_SIGMAS * (own * own - spread * spread).max(1e-4 * own * own).sqrt()
         });
         let (begins, ends) = (present.first() == Some(&true), present.last() == Some(&true));
-        let fate = match (present.iter().all(|p| *p), begins, ends) {
-            (true, ..) if apart => Fate::Changes,
-            (true, ..) => Fate::Persists,
-            (_, false, true) => Fate::Came,
-            (_, true, false) => Fate::Went,
-            _ => Fate::ComesAndGoes,
+        let persistence = match (present.iter().all(|p| *p), begins, ends) {
+            (true, ..) if apart => Persistence::Changes,
+            (true, ..) => Persistence::Persists,
+            (_, false, true) => Persistence::Appeared,
+            (_, true, false) => Persistence::Disappeared,
+            _ => Persistence::ComesAndGoes,
         };
         let value = |x: f64, sigma: f64| {
             let ends = <[f64; 2]>::from(confidence_interval_95(x, sigma)).map(|x| at[k].value(x));
@@ -136,7 +136,7 @@ pub fn over_recordings(diagnosed: &[&Diagnosed], calibration: &Calibration) -> V
             name: info.name.to_string(),
             parameter: parameter.name.to_string(),
             unit: parameter.unit.to_string(),
-            fate,
+            persistence,
             each: (0..fits.len()).map(|i| value(place(i), sigma(&fits[i], k))).collect(),
             present,
             size: in_words::size(parameter, together.value),

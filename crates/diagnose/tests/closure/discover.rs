@@ -2,20 +2,18 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use crate::gap::common::{Visits, declared};
+use crate::gap::common::{Visits, declared, effects, request};
 use mapper_diagnose::closure::balance::Balance;
 use mapper_diagnose::closure::columns::Base;
 use mapper_diagnose::closure::description::{ClosureDescription, script_of, sink};
-use mapper_diagnose::closure::discover::discover;
 use mapper_diagnose::closure::expression::{Expression, Span, Spans};
 use mapper_diagnose::closure::library::library;
 use mapper_diagnose::closure::residual_source::residual_sources;
 use mapper_diagnose::closure::term::{ClosureEffect, Role, Term};
-use mapper_diagnose::gap::causes::calibration::Calibration;
-use mapper_diagnose::gap::diagnose::{Diagnosed, GapRequest, diagnose};
-use mapper_diagnose::gap::findings::report::Verdict;
+use mapper_diagnose::gap;
 use mapper_diagnose::gap::residuals::study::{Hypothesis, Study};
 use mapper_diagnose::gap::residuals::whiten::Linearised;
+use mapper_diagnose::gap::{ClosureSearch, Diagnosed, GapRequest, Verdict};
 use mapper_effects::ScriptEffect;
 use mapper_inference::time_history::{Shape, TimeHistory};
 use mapper_numerics::parallel;
@@ -28,23 +26,12 @@ use std::sync::Arc;
 const VISITS: Visits =
     Visits { speeds_rpm: &[90e3, 140e3, 60e3, 120e3, 70e3, 130e3, 80e3, 110e3, 60e3], dwell_s: 60.0 };
 
-fn ask(rig: &Rig, seed: u64) -> Diagnosed {
+fn ask(rig: &Rig, seed: u64, closure_search: ClosureSearch) -> Diagnosed {
     let recording = crate::gap::common::record_of(rig, &VISITS, seed);
-    // Candidates unrelated to the planted law.
-    let candidates = ["tip_diameter", "flowmeter_gain"];
-    diagnose(GapRequest {
-        tolerances_declared: true,
-        experiments: Vec::new(),
-        recording: &recording,
-        declared: declared(),
-        healthy: None,
-        model: Model::nominal(),
-        effects: candidates.iter().map(|id| mapper_effects::find(id).unwrap()).collect(),
-        calibration: Calibration::shipped().unwrap(),
-        linearised: None,
-        progress: &|_, _| {},
-    })
-    .unwrap()
+    // Candidates unrelated to the planted term.
+    let candidates = effects(&["tip_diameter", "flowmeter_gain"]);
+    let library = request(&recording, declared(), Model::nominal(), candidates);
+    gap(GapRequest { closure_search, ..library }).unwrap()
 }
 
 fn study(visits: &Visits, effects: Vec<Arc<dyn Effect>>) -> Study {
@@ -69,10 +56,10 @@ fn a_coolant_passage_is_found_placed_and_written() {
     (planted[slope], planted[level]) = (1.5, 1.5 * (353.15 - 323.15));
     let mut rig = Rig::new(Model::nominal());
     add(&mut rig, &ClosureEffect::new(terms), &planted).unwrap();
-    let diagnosed = ask(&rig, 11);
-    assert!(diagnosed.diagnosis.verdict != Verdict::WithinTolerance);
-    let found = discover(&diagnosed, &Calibration::shipped().unwrap(), &|_, _| {});
-    let places = found.places.unwrap();
+    let diagnosed = ask(&rig, 11, ClosureSearch::IfUnexplained);
+    let found = &diagnosed.diagnosis;
+    assert!(found.verdict != Verdict::WithinTolerance);
+    let places = &found.locations;
     assert_eq!(places[0].submodel, "compressor_housing");
     let sum: f64 = places.iter().map(|place| place.share).sum();
     assert!((sum - 1.0).abs() < 1e-9, "shares add up to {sum}");
@@ -88,9 +75,9 @@ fn a_coolant_passage_is_found_placed_and_written() {
     let housing = &law.channels["Tc"];
     assert!(law.held_out_steps > 0 && housing.after < 0.2 * housing.before, "{:?}", law.channels);
     assert_eq!(law.worse, [""; 0]);
-    assert!(found.settled.is_some());
+    assert!(found.probable_closure_term().is_some());
     // The source term in each step, estimated without the law, agrees with the law.
-    assert_eq!(found.residual_sources[0].submodel, "compressor_housing");
+    assert_eq!(found.closure_terms_by_balance[0].submodel, "compressor_housing");
     let script = ScriptEffect::new(law.script.as_ref().unwrap(), Path::new("law.rhai")).unwrap();
     assert_eq!(script.info().submodel.name(), "compressor_housing");
 }
@@ -101,9 +88,7 @@ fn a_coolant_passage_is_found_placed_and_written() {
 fn nothing_has_no_law() {
     let seeds = [21, 22];
     let found = parallel::map(&seeds, |seed| {
-        let mut diagnosed = ask(&Rig::new(Model::nominal()), *seed);
-        diagnosed.diagnosis.verdict = Verdict::Unexplained;
-        discover(&diagnosed, &Calibration::shipped().unwrap(), &|_, _| {}).closure_terms
+        ask(&Rig::new(Model::nominal()), *seed, ClosureSearch::Always).diagnosis.closure_terms
     });
     let sentences: Vec<&str> = found.iter().flatten().map(|law| law.sentence.as_str()).collect();
     assert!(sentences.len() <= 1, "{sentences:?}");

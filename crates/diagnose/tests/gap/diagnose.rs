@@ -2,18 +2,19 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use crate::gap::common::{self, Visits, boundary, declared};
+use crate::gap::common::{self, Visits, boundary, declared, effects, request};
 use mapper_core::{Channel, Dimension, OperatingPoint, Recording, Series};
 use mapper_diagnose::gap::calibrated_model::{Found, check_forecast};
 use mapper_diagnose::gap::causes::calibration::Calibration;
-use mapper_diagnose::gap::diagnose::{Diagnosed, GapError, GapRequest, diagnose};
+use mapper_diagnose::gap::diagnose::{Diagnosed, gap};
 use mapper_diagnose::gap::findings::experiment::{AllowedJump, Experiment};
 use mapper_diagnose::gap::findings::report::Verdict;
 use mapper_diagnose::gap::findings::warning::GapWarning;
-use mapper_diagnose::gap::joint::{Fate, Value, over_recordings};
+use mapper_diagnose::gap::joint::{Persistence, Value, over_recordings};
 use mapper_diagnose::gap::next_experiment::outlook::{approximate_separation, separation};
-use mapper_diagnose::gap::preconditions::problem::Problem;
+use mapper_diagnose::gap::preconditions::problem::{GapError, Problem};
 use mapper_diagnose::gap::preconditions::usable::usable;
+use mapper_diagnose::gap::request::RigRecording;
 use mapper_diagnose::gap::residuals::nuisance::NuisanceKind;
 use mapper_diagnose::gap::residuals::study::Study;
 use mapper_observe::averages::time_table::Table;
@@ -45,7 +46,7 @@ fn a_run_in_real_time_is_late_and_its_rig_is_not_to_blame() {
     let late_s = [0.0, 0.41, 0.07, 0.03, 0.15, 0.05, 0.26];
     let recording = common::record_late(&Rig::new(Model::nominal()), &VISITS, 5, &late_s, 8e-3);
     let diagnosed = ask(&recording).unwrap();
-    assert_eq!(diagnosed.diagnosis.verdict, Verdict::WithinTolerance, "{:?}", diagnosed.diagnosis.r#where);
+    assert_eq!(diagnosed.diagnosis.verdict, Verdict::WithinTolerance, "{:?}", diagnosed.diagnosis.locations);
     assert!((diagnosed.study.scatter_s / 8e-3 - 1.0).abs() < 0.4, "{}", diagnosed.study.scatter_s);
 
     // A real fault is still detected.
@@ -78,20 +79,8 @@ fn ask(recording: &Recording) -> Result<Diagnosed, GapError> {
 /// The same with one more candidate.
 fn ask_with(recording: &Recording, more: Option<Arc<dyn Effect>>) -> Result<Diagnosed, GapError> {
     let candidates = ["tip_diameter", "stem_conduction", "bearing_friction", "flowmeter_gain"];
-    let effects: Vec<Arc<dyn Effect>> =
-        candidates.iter().map(|id| mapper_effects::find(id).unwrap()).chain(more).collect();
-    diagnose(GapRequest {
-        tolerances_declared: true,
-        experiments: Vec::new(),
-        recording,
-        declared: declared(),
-        healthy: None,
-        model: Model::nominal(),
-        effects,
-        calibration: Calibration::shipped().unwrap(),
-        linearised: None,
-        progress: &|_, _| {},
-    })
+    let effects = effects(&candidates).into_iter().chain(more).collect();
+    gap(request(recording, declared(), Model::nominal(), effects))
 }
 
 /// A common offset of several sensors changes the prediction like equal offsets of each: the model sees both as shifted readings and
@@ -184,8 +173,8 @@ fn a_probe_of_two_millimetres_is_named_measured_and_closes_the_gap() {
     // Three times the half width of its own interval.
     let room = 1.5 * (estimate.high - estimate.low);
     assert!((estimate.value - 2e-3).abs() < room && room < 2e-4, "{estimate:?}");
-    assert_eq!(diagnosis.r#where[0].submodel, "t2_probe");
-    assert_eq!(diagnosis.r#where[0].channel, "T2");
+    assert_eq!(diagnosis.locations[0].submodel, "t2_probe");
+    assert_eq!(diagnosis.locations[0].channel, "T2");
     // On held-out steps the residual is noise, which no cause can remove.
     assert!(diagnosis.gap.gap_reduction > 0.9 && !diagnosis.gap.held_out_steps.is_empty());
     assert!(diagnosis.gap.channels["T2"].after < 0.2 * diagnosis.gap.channels["T2"].before);
@@ -357,22 +346,9 @@ fn convection_before_the_wheel_is_never_ruled_out_for_its_area() {
     model.params.compressor.alpha_area_ratio = 0.2;
     let mut rig = Rig::new(model.clone());
     add(&mut rig, mapper_effects::find("inlet_htc").unwrap().as_ref(), &[1.6]).unwrap();
-    let effects = |ids: &[&str]| ids.iter().map(|id| mapper_effects::find(id).unwrap()).collect();
-    let question = |recording, model, ids: &[&str]| GapRequest {
-        tolerances_declared: true,
-        experiments: Vec::new(),
-        recording,
-        declared: declared(),
-        healthy: None,
-        model,
-        effects: effects(ids),
-        calibration: Calibration::shipped().unwrap(),
-        linearised: None,
-        progress: &|_, _| {},
-    };
     let recording = record_of(&rig, 12);
-    let ids = ["inlet_htc", "area_split", "tip_diameter"];
-    let diagnosis = diagnose(question(&recording, model, &ids)).unwrap().diagnosis;
+    let candidates = || effects(&["inlet_htc", "area_split", "tip_diameter"]);
+    let diagnosis = gap(request(&recording, declared(), model, candidates())).unwrap().diagnosis;
     assert_eq!(diagnosis.verdict, Verdict::Explained);
     let first = &diagnosis.candidates[0];
     let mut open: Vec<Vec<String>> = first.equivalent.clone();
@@ -380,7 +356,7 @@ fn convection_before_the_wheel_is_never_ruled_out_for_its_area() {
     assert!(open.iter().any(|cause| cause == &["inlet_htc"]), "{open:?}");
 
     let recording = record(&[("tip_diameter", &[2e-3])], 6);
-    let diagnosis = diagnose(question(&recording, Model::nominal(), &ids)).unwrap().diagnosis;
+    let diagnosis = gap(request(&recording, declared(), Model::nominal(), candidates())).unwrap().diagnosis;
     assert_eq!(diagnosis.candidates[0].effects, ["tip_diameter"]);
     let named = diagnosis.candidates.iter().flat_map(|candidate| &candidate.effects);
     assert!(named.into_iter().all(|id| id != "inlet_htc"));
@@ -389,20 +365,23 @@ fn convection_before_the_wheel_is_never_ruled_out_for_its_area() {
 /// One recording's result predicts another with other points, without a fit: the residual is noise within the 95 % band. A covariance with
 /// the wrong dimensions is refused.
 #[test]
-fn the_twin_of_one_night_forecasts_the_next() {
+fn the_model_calibrated_in_one_night_forecasts_the_next() {
     let truth: [(&str, &[f64]); 2] = [("tip_diameter", &[2e-3]), ("bearing_friction", &[6e-7])];
     let first = ask(&record(&truth, 21)).unwrap();
     let found = Found::of(&first).unwrap();
     let next = next_night(&truth, 21);
-    let table = Table::new(&next).unwrap();
-    let study = Study::new(&next, table, declared(), Model::nominal(), first.study.effects.clone());
-    let held = check_forecast(&study, &found).unwrap();
+    let next = RigRecording::simulated(next, declared(), Model::nominal());
+    let check = |found: &Found| {
+        let effects = first.study.effects.clone();
+        check_forecast(&next, effects, found, &Calibration::shipped().unwrap())
+    };
+    let held = check(&found).unwrap();
     assert!(held.ratio < 1.2 && (0.92..0.99).contains(&held.inside), "{held:?}");
     let nominal = Found { effects: Vec::new(), ..found };
-    assert!(check_forecast(&study, &nominal).is_err(), "its covariance is of another machine");
+    assert!(check(&nominal).is_err(), "its covariance is of another machine");
 }
 
-/// Two recordings of a rig with a slow probe, and a third with a new probe and a rubbing bearing: each cause has its fate. Two recordings
+/// Two recordings of a rig with a slow probe, and a third with a new probe and a rubbing bearing: each cause has its persistence. Two recordings
 /// know the probe better than one, but not better than two independent ones.
 #[test]
 fn causes_persist_come_and_go_over_the_nights() {
@@ -416,11 +395,15 @@ fn causes_persist_come_and_go_over_the_nights() {
     let nights: Vec<&Diagnosed> = nights.iter().collect();
     let calibration = Calibration::shipped().unwrap();
     let over = over_recordings(&nights, &calibration);
-    let fate = |id: &str| over.iter().find(|cause| cause.effect == id).unwrap().fate;
-    assert_eq!((fate("tip_diameter"), fate("bearing_friction")), (Fate::Went, Fate::Came), "{over:?}");
+    let persistence = |id: &str| over.iter().find(|cause| cause.effect == id).unwrap().persistence;
+    assert_eq!(
+        (persistence("tip_diameter"), persistence("bearing_friction")),
+        (Persistence::Disappeared, Persistence::Appeared),
+        "{over:?}"
+    );
     let two = over_recordings(&nights[..2], &calibration);
     let probe = &two[0];
-    assert_eq!((probe.effect.as_str(), probe.fate), ("tip_diameter", Fate::Persists));
+    assert_eq!((probe.effect.as_str(), probe.persistence), ("tip_diameter", Persistence::Persists));
     let width = |value: &Value| value.high - value.low;
     let narrowest = probe.each.iter().map(width).fold(f64::INFINITY, f64::min);
     let separation = 1.0 / probe.each.iter().map(|v| width(v).powi(-2)).sum::<f64>().sqrt();

@@ -1,10 +1,10 @@
 //! Integration tests of the module `gap`.
 
+mod baseline;
 mod catalogue;
 pub(crate) mod common;
 mod correction;
 mod diagnose;
-mod healthy;
 mod near_surge;
 mod next;
 mod structure;

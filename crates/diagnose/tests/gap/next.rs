@@ -5,8 +5,7 @@
 use crate::gap::common::{self, Visits, boundary, declared};
 use mapper_core::{Channel, OperatingPoint, Recording, StepKind, StepMarker};
 use mapper_diagnose::gap::best_fit::fit::Fit;
-use mapper_diagnose::gap::causes::calibration::Calibration;
-use mapper_diagnose::gap::diagnose::{Diagnosed, GapRequest, diagnose};
+use mapper_diagnose::gap::diagnose::{Diagnosed, gap};
 use mapper_diagnose::gap::findings::experiment::{AllowedJump, AlsoChanged, AtRest, Experiment};
 use mapper_diagnose::gap::findings::report::{Kind, Next};
 use mapper_diagnose::gap::next_experiment::best_experiment::{Rivals, Suggested, next};
@@ -15,14 +14,13 @@ use mapper_observe::averages::time_table::Table;
 use mapper_observe::model_inputs::lagged_command::Response;
 use mapper_observe::model_inputs::smoothed_inputs::SmoothedInputs;
 use mapper_physics::machine::params::BoundaryConditions;
-use mapper_physics::rig::effect::{Effect, Rig, add};
+use mapper_physics::rig::effect::{Rig, add};
 use mapper_physics::simulation::inputs::Inputs;
 use mapper_physics::simulation::model::Model;
 use mapper_physics::simulation::steady::hold_speed;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
-use std::sync::Arc;
 
 /// Four steps, after which heat to the oil and heat to the cell are hardly distinguishable.
 const VISITS: Visits = Visits { speeds_rpm: &[90e3, 130e3, 70e3, 110e3], dwell_s: 120.0 };
@@ -31,21 +29,8 @@ fn ask(truth: (&str, f64), candidates: &[&str]) -> Diagnosed {
     let mut rig = Rig::new(Model::nominal());
     add(&mut rig, mapper_effects::find(truth.0).unwrap().as_ref(), &[truth.1]).unwrap();
     let recording = common::record_of(&rig, &VISITS, 3);
-    let effects: Vec<Arc<dyn Effect>> =
-        candidates.iter().map(|id| mapper_effects::find(id).unwrap()).collect();
-    diagnose(GapRequest {
-        tolerances_declared: true,
-        experiments: Vec::new(),
-        recording: &recording,
-        declared: declared(),
-        healthy: None,
-        model: Model::nominal(),
-        effects,
-        calibration: Calibration::shipped().unwrap(),
-        linearised: None,
-        progress: &|_, _| {},
-    })
-    .unwrap()
+    let effects = common::effects(candidates);
+    gap(common::request(&recording, common::declared(), Model::nominal(), effects)).unwrap()
 }
 
 fn point(speed_rpm: f64) -> OperatingPoint {

@@ -2,12 +2,11 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use crate::gap::common::{Visits, declared, record_of};
+use crate::gap::common::{Visits, declared, effects, record_of, request};
 use mapper_core::Recording;
-use mapper_diagnose::gap::causes::calibration::Calibration;
-use mapper_diagnose::gap::diagnose::{GapRequest, diagnose};
+use mapper_diagnose::gap::diagnose::gap;
 use mapper_diagnose::gap::findings::report::{Diagnosis, Verdict};
-use mapper_diagnose::gap::model_error::healthy::Healthy;
+use mapper_diagnose::gap::request::{BaselineRecording, GapRequest, RigRecording};
 use mapper_observe::channels::OUTPUTS;
 use mapper_observe::declared::Declared;
 use mapper_physics::rig::effect::{Rig, add};
@@ -15,26 +14,14 @@ use mapper_physics::simulation::model::Model;
 
 const VISITS: Visits = Visits { speeds_rpm: &[90e3, 140e3, 60e3, 120e3, 70e3, 130e3], dwell_s: 60.0 };
 
-fn ask(recording: &Recording, declared: Declared, healthy: Option<&Recording>) -> Diagnosis {
+fn ask(recording: &Recording, declared: Declared, baseline: Option<&Recording>) -> Diagnosis {
     let candidates = ["tip_diameter", "bearing_friction", "flowmeter_gain"];
-    diagnose(GapRequest {
-        tolerances_declared: true,
-        experiments: Vec::new(),
-        recording,
-        healthy: healthy.map(|recording| Healthy {
-            name: "monday".to_owned(),
-            recording,
-            declared: declared.clone(),
-        }),
-        declared,
-        model: Model::nominal(),
-        effects: candidates.iter().map(|id| mapper_effects::find(id).unwrap()).collect(),
-        calibration: Calibration::shipped().unwrap(),
-        linearised: None,
-        progress: &|_, _| {},
-    })
-    .unwrap()
-    .diagnosis
+    let baseline = baseline.map(|baseline| BaselineRecording {
+        name: "monday".to_owned(),
+        recording: RigRecording::simulated(baseline.clone(), declared.clone(), Model::nominal()),
+    });
+    let recording = request(recording, declared, Model::nominal(), effects(&candidates));
+    gap(GapRequest { baseline, ..recording }).unwrap().diagnosis
 }
 
 /// A machine whose housing has two walls instead of one, which no candidate describes, and what acts on it besides.
@@ -53,7 +40,7 @@ fn an_error_of_the_equations_is_a_cause_only_beyond_its_declaration() {
     let plain = two_walls(&[], 5);
     assert_ne!(ask(&plain, declared(), None).verdict, Verdict::WithinTolerance);
     let mut with_structure = declared();
-    let lacking = ask(&plain, declared(), Some(&two_walls(&[], 6))).since.unwrap().lacking;
+    let lacking = ask(&plain, declared(), Some(&two_walls(&[], 6))).baseline.unwrap().lacking;
     for (channel, error) in
         OUTPUTS.iter().filter_map(|channel| Some((channel, lacking.get(channel.symbol())?)))
     {

@@ -4,8 +4,7 @@ use crate::diagnosis::gap_next::next_text;
 use crate::diagnosis::gap_text::{cause, headline};
 use crate::formatting::table::{COLUMNS, with_heads};
 use crate::formatting::wrapped::wrapped;
-use mapper_diagnose::gap::correction::{CorrectedMap, NEEDED_PROBABILITY, NotCorrected, PointCorrection};
-use mapper_diagnose::gap::findings::report::{Diagnosis, law_found};
+use mapper_diagnose::gap::{CorrectedMap, Diagnosis, NEEDED_PROBABILITY, NotCorrected, PointCorrection};
 
 /// What the table before and after shows.
 pub(crate) const CORRECTION_CAPTION: &str = "Efficiency, %, with its 95 % interval";
@@ -48,8 +47,8 @@ fn build_text(map: &CorrectedMap, diagnosis: &Diagnosis) -> String {
         }
         let largest = map.points.iter().map(|point| point.correction_sigma).fold(0.0, f64::max);
         if largest > 0.0 {
-            let source = if diagnosis.is_outside_without_law() {
-                "No law describes the cause: it may touch every point, and the residual of T2 widens"
+            let source = if diagnosis.is_outside_without_closure() {
+                "No closure term describes the cause: it may touch every point, and the residual of T2 widens"
             } else {
                 "What a correction would change, weighted with its probability, widens"
             };
@@ -58,8 +57,8 @@ fn build_text(map: &CorrectedMap, diagnosis: &Diagnosis) -> String {
                 100.0 * largest
             );
         }
-        if law_found(diagnosis).is_some() {
-            text += "A law was found: write it with `mapper gap diagnose --laws DIR`, and correct with `--effect`.\n";
+        if diagnosis.probable_closure_term().is_some() {
+            text += "A closure term was found: write it with `mapper gap diagnose --closure-terms DIR`, and correct with `--effect`.\n";
         }
         return text + next_text(diagnosis).as_str();
     }

@@ -1,7 +1,7 @@
 //! Recommended next steps, as text.
 
 use mapper_core::probability_text;
-use mapper_diagnose::gap::findings::report::{Diagnosis, Kind, Next, Suggestion};
+use mapper_diagnose::gap::{Diagnosis, Kind, Next, Suggestion};
 
 /// 0 degC, K.
 const ZERO_C_K: f64 = 273.15;
@@ -13,8 +13,8 @@ pub(crate) fn next_text(diagnosis: &Diagnosis) -> String {
     match (next, diagnosis.experiments.first()) {
         (Next::Sensor { sensor, reason }, _) => {
             text += &format!("  {sensor}: {reason}\n");
-            if diagnosis.since.is_none() {
-                text += "  if the model's equations only approximate this rig: give a fault-free recording with --healthy, or declare what they may \
+            if diagnosis.baseline.is_none() {
+                text += "  if the model's equations only approximate this rig: give a fault-free recording with --baseline, or declare what they may \
                          miss under `tolerances: structure`\n";
             }
         }

@@ -7,11 +7,10 @@ use crate::formatting::number::four_figures;
 use crate::formatting::table::COLUMNS;
 use crate::formatting::wrapped::wrapped;
 use mapper_core::{Channel, probability_text, step_number, with_unit};
-use mapper_diagnose::gap::findings::report::{
-    BeyondPrior, Candidate, ChannelGap, Diagnosis, Estimate, Gap, Law, PointGap, SmallestSeen, Verdict,
-    law_found,
+use mapper_diagnose::gap::{
+    Baseline, BeyondPrior, Candidate, ChannelGap, ClosureTerm, Diagnosis, Estimate, Gap, PointGap,
+    SmallestSeen, Verdict,
 };
-use mapper_diagnose::gap::model_error::baseline_assumptions::Since;
 use std::collections::BTreeMap;
 
 /// Maximum number of causes shown.
@@ -32,17 +31,17 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
     if let Some(nearest) = nearest(diagnosis) {
         text += &format!("{nearest}\n");
     }
-    if let Some(since) = &diagnosis.since {
-        text += &not_judged(since);
+    if let Some(baseline) = &diagnosis.baseline {
+        text += &not_judged(baseline);
     }
     if diagnosis.verdict != Verdict::WithinTolerance {
-        for sensor in &diagnosis.off_at_rest {
+        for sensor in &diagnosis.offsets_at_rest {
             text += &format!("{}: subtracted before the diagnosis\n", offset_at_rest_text(sensor));
         }
     }
-    if !diagnosis.r#where.is_empty() {
+    if !diagnosis.locations.is_empty() {
         text += "\nlocation\n";
-        for place in diagnosis.r#where.iter().take(PLACES) {
+        for place in diagnosis.locations.iter().take(PLACES) {
             let place = format!(
                 "  {}: {:.0} % of the gap, {:.0} sigma; largest in {}, {} after the jump, {}: {} {}",
                 part_name(&place.submodel),
@@ -89,7 +88,7 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
     for suspect in &diagnosis.suspects {
         text += &format!("  suspect: {}\n", suspect_text(suspect));
     }
-    text += &laws(diagnosis);
+    text += &closure_terms(diagnosis);
     text += &describe_gap_reduction(diagnosis);
     let actions = stand_actions(diagnosis);
     if !actions.is_empty() {
@@ -131,9 +130,10 @@ pub fn suspect_text(suspect: &BeyondPrior) -> String {
 const NOT_THE_TRUTH: f64 = 0.05;
 
 /// The missing term and the closure term for it.
-fn laws(diagnosis: &Diagnosis) -> String {
+fn closure_terms(diagnosis: &Diagnosis) -> String {
     let mut text = String::new();
-    if let (Some(source), Some(place)) = (diagnosis.residual_sources.first(), diagnosis.r#where.first())
+    if let (Some(source), Some(place)) =
+        (diagnosis.closure_terms_by_balance.first(), diagnosis.locations.first())
         && source.submodel == place.submodel
     {
         let (low, high) =
@@ -147,20 +147,20 @@ fn laws(diagnosis: &Diagnosis) -> String {
             with_unit(four_figures(high), &source.unit)
         );
     }
-    for law in &diagnosis.closure_terms {
+    for term in &diagnosis.closure_terms {
         text += &format!(
             "\nclosure term\n  {}\n  {}; {} on held-out steps\n",
-            law.sentence,
-            probability_text(law.probability),
-            describe_removed_residual(law)
+            term.sentence,
+            probability_text(term.probability),
+            describe_removed_residual(term)
         );
-        if law.probability < NOT_THE_TRUTH {
+        if term.probability < NOT_THE_TRUTH {
             text += "  its residual is more than noise: its form is not the true one\n";
         }
-        for other in &law.equivalent {
+        for other in &term.equivalent {
             text += &format!("  indistinguishable from: {other}\n");
         }
-        if let Some(file) = &law.rhai {
+        if let Some(file) = &term.rhai {
             text += &format!("  written to {file}: give it with --effect\n");
         }
     }
@@ -168,9 +168,9 @@ fn laws(diagnosis: &Diagnosis) -> String {
 }
 
 /// The effect of a closure term on the gap, in words.
-fn describe_removed_residual(law: &Law) -> String {
-    match law.worse.as_slice() {
-        [] => format!("removes {:.0} % of the gap", 100.0 * law.gap_reduction),
+fn describe_removed_residual(term: &ClosureTerm) -> String {
+    match term.worse.as_slice() {
+        [] => format!("removes {:.0} % of the gap", 100.0 * term.gap_reduction),
         worse => format!("the gap does not shrink: {} gets worse", worse.join(", ")),
     }
 }
@@ -178,12 +178,13 @@ fn describe_removed_residual(law: &Law) -> String {
 /// One sentence: the most probable answer.
 pub fn headline(diagnosis: &Diagnosis) -> String {
     let first = diagnosis.candidates.first();
-    let since = diagnosis.since.as_ref().map(|since| since.recording.as_str());
-    let seen = since.map_or_else(|| "is seen".to_owned(), |since| format!("has changed since {since}"));
+    let baseline = diagnosis.baseline.as_ref().map(|baseline| baseline.recording.as_str());
+    let seen =
+        baseline.map_or_else(|| "is seen".to_owned(), |baseline| format!("has changed since {baseline}"));
     match (diagnosis.verdict, first) {
-        (Verdict::WithinTolerance, _) if !diagnosis.off_at_rest.is_empty() => format!(
+        (Verdict::WithinTolerance, _) if !diagnosis.offsets_at_rest.is_empty() => format!(
             "{}; with that subtracted nothing beyond the declared tolerances {seen}",
-            diagnosis.off_at_rest.iter().map(offset_at_rest_text).collect::<Vec<_>>().join(", ")
+            diagnosis.offsets_at_rest.iter().map(offset_at_rest_text).collect::<Vec<_>>().join(", ")
         ),
         (Verdict::WithinTolerance, Some(first)) if first.probability > diagnosis.probability_none => format!(
             "nothing beyond the declared tolerances {seen} for certain; {} is suspected ({})",
@@ -199,17 +200,20 @@ pub fn headline(diagnosis: &Diagnosis) -> String {
         }
         (Verdict::Explained, Some(first)) => {
             let verb = if first.effects.len() == 1 { "explains" } else { "explain" };
-            let target =
-                since.map_or_else(|| "the gap".to_owned(), |since| format!("the change since {since}"));
+            let target = baseline
+                .map_or_else(|| "the gap".to_owned(), |baseline| format!("the change since {baseline}"));
             format!("{} {verb} {target}", candidate_name(first))
         }
         _ => {
-            let suffix = since.map_or_else(String::new, |since| format!(" of the change since {since}"));
+            let suffix =
+                baseline.map_or_else(String::new, |baseline| format!(" of the change since {baseline}"));
             let outside = format!(
                 "{OUTSIDE} is the most probable{suffix} ({})",
                 probability_text(diagnosis.probability_outside)
             );
-            law_found(diagnosis).map_or_else(|| outside.clone(), |law| format!("{outside}: {}", law.sentence))
+            diagnosis
+                .probable_closure_term()
+                .map_or_else(|| outside.clone(), |term| format!("{outside}: {}", term.sentence))
         }
     }
 }
@@ -220,9 +224,9 @@ fn is_not_borne_out(gap: &Gap) -> bool {
 }
 
 /// Effects in both recordings, which are not judged, if a reference recording was given; and what a campaign declares to do without it.
-fn not_judged(since: &Since) -> String {
+fn not_judged(baseline: &Baseline) -> String {
     let (mut residuals, mut structure, mut offsets) = (Vec::new(), Vec::new(), Vec::new());
-    for (channel, error) in &since.lacking {
+    for (channel, error) in &baseline.lacking {
         let (scale, unit) = display_scale(&error.unit);
         residuals.push(format!("{channel} {}", with_unit(four_figures(scale * error.size), unit)));
         // P3 is an input.
@@ -236,7 +240,7 @@ fn not_judged(since: &Since) -> String {
     let unjudged = format!(
         "only the change since {} is reported; the residual already present there is not judged: {}\n\
          a diagnosis without it needs these errors of the model's equations in the campaign:",
-        since.recording,
+        baseline.recording,
         residuals.join(", ")
     );
     let mut text = wrapped(&unjudged, COLUMNS, 2);
@@ -338,7 +342,7 @@ fn list_smallest_detectable(effects: &[SmallestSeen]) -> String {
 const NAMED_SHARE: f64 = 0.2;
 
 /// Number of steps that support the cause, and the step that dominates the gap.
-fn describe_support(gap: &mapper_diagnose::gap::findings::report::Gap) -> String {
+fn describe_support(gap: &mapper_diagnose::gap::Gap) -> String {
     let count = gap.held_out_steps.len();
     if count == 0 {
         return String::new();
@@ -352,8 +356,8 @@ fn describe_support(gap: &mapper_diagnose::gap::findings::report::Gap) -> String
 
 fn describe_gap_reduction(diagnosis: &Diagnosis) -> String {
     let gap = &diagnosis.gap;
-    if let Some(law) = law_found(diagnosis) {
-        return describe_law_reduction(diagnosis, law, gap.folds.iter().map(Vec::len).sum());
+    if let Some(term) = diagnosis.probable_closure_term() {
+        return describe_closure_reduction(diagnosis, term, gap.folds.iter().map(Vec::len).sum());
     }
     let named = matches!(diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained);
     let mut text = match gap.folds.len() {
@@ -388,11 +392,11 @@ fn describe_gap_reduction(diagnosis: &Diagnosis) -> String {
     text
 }
 
-/// Points that a cause outside the library may touch, if no law describes it.
+/// Points that a cause outside the library may touch, if no term describes it.
 fn list_affected_points(diagnosis: &Diagnosis) -> String {
     let points = diagnosis.gap.points.iter().enumerate();
     let largest = points.max_by(|a, b| a.1.eta_residual.total_cmp(&b.1.eta_residual));
-    let Some((step, point)) = largest.filter(|_| diagnosis.is_outside_without_law()) else {
+    let Some((step, point)) = largest.filter(|_| diagnosis.is_outside_without_closure()) else {
         return String::new();
     };
     wrapped(
@@ -421,13 +425,13 @@ fn describe_strained_tolerance(gap: &Gap) -> String {
 const STANDS_IN: f64 = 0.5;
 
 /// The gap reduction of a closure term that resembles no effect of the library.
-fn describe_law_reduction(diagnosis: &Diagnosis, law: &Law, steps: usize) -> String {
-    let seen = match law.held_out_steps {
+fn describe_closure_reduction(diagnosis: &Diagnosis, term: &ClosureTerm, steps: usize) -> String {
+    let seen = match term.held_out_steps {
         0 => "on the fitted steps; there are too few to hold any out".to_owned(),
         held => format!("on {held} of {steps} steps, used neither to find the closure term nor to fit it"),
     };
-    format!("\ngap reduction, {seen}\n  {}\n", describe_removed_residual(law))
-        + by_channel(diagnosis, &law.channels, "with the term", 3).as_str()
+    format!("\ngap reduction, {seen}\n  {}\n", describe_removed_residual(term))
+        + by_channel(diagnosis, &term.channels, "with the term", 3).as_str()
 }
 
 /// The residual of each channel in the first so many columns.
@@ -438,7 +442,7 @@ fn by_channel(
     columns: usize,
 ) -> String {
     let mut text = "  rms residual\n      ".to_owned();
-    let bare = if diagnosis.since.is_some() { "reference" } else { "nominal" };
+    let bare = if diagnosis.baseline.is_some() { "baseline" } else { "nominal" };
     for head in [bare, "tolerances fitted", with].iter().take(columns) {
         text += &format!(" {head:>18}");
     }

@@ -1,6 +1,6 @@
 //! Sentences of the limits of a diagnosis.
 
-use mapper_diagnose::gap::findings::warning::{GapWarning, OffsetAtRest};
+use mapper_diagnose::gap::{GapWarning, OffsetAtRest};
 
 /// The sentence of a warning, with values and units.
 pub fn gap_warning_text(warning: &GapWarning) -> String {
@@ -23,7 +23,7 @@ pub fn gap_warning_text(warning: &GapWarning) -> String {
             "the times of the samples are off by {:.0} ms, as P3 shows where it jumps: readings that change have accordingly less weight",
             1e3 * scatter_s
         ),
-        GapWarning::HealthyRecording { warning } => {
+        GapWarning::BaselineRecording { warning } => {
             format!("the reference recording: {}", gap_warning_text(warning))
         }
         GapWarning::Drift { reason, subtracted: true } => {

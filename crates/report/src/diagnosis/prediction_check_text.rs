@@ -1,7 +1,7 @@
 //! Evaluation of a pre-registered prediction, as a page for a terminal.
 
 use crate::formatting::number::four_figures;
-use mapper_diagnose::gap::calibrated_model::ForecastCheck;
+use mapper_diagnose::gap::ForecastCheck;
 
 /// The page.
 pub fn forecast_check_text(held: &ForecastCheck, seal: &str) -> String {

@@ -2,7 +2,7 @@
 
 use crate::formatting::number::four_figures;
 use mapper_core::with_unit;
-use mapper_diagnose::gap::joint::{Fate, Over, Value};
+use mapper_diagnose::gap::{Over, Persistence, Value};
 
 /// The page: each recording's headline, then each cause over all of them.
 pub fn recordings_text(headlines: &[(String, String)], over: &[Over]) -> String {
@@ -15,14 +15,14 @@ pub fn recordings_text(headlines: &[(String, String)], over: &[Over]) -> String 
     }
     text += "\ncauses over the recordings\n";
     for cause in over {
-        let fate = match cause.fate {
-            Fate::Persists => "persists",
-            Fate::Changes => "is in every recording, and changes",
-            Fate::Came => "came",
-            Fate::Went => "went",
-            Fate::ComesAndGoes => "comes and goes",
+        let persistence = match cause.persistence {
+            Persistence::Persists => "persists",
+            Persistence::Changes => "is in every recording, and changes",
+            Persistence::Appeared => "appeared",
+            Persistence::Disappeared => "disappeared",
+            Persistence::ComesAndGoes => "comes and goes",
         };
-        text += &format!("  {} ({}) {fate}: {}\n", cause.name, cause.effect, cause.size);
+        text += &format!("  {} ({}) {persistence}: {}\n", cause.name, cause.effect, cause.size);
         for (number, (value, present)) in cause.each.iter().zip(&cause.present).enumerate() {
             let absent = if *present { "" } else { ", indistinguishable from zero" };
             text += &format!("    {:8} {}{absent}\n", number + 1, interval(value, &cause.unit));

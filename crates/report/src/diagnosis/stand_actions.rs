@@ -2,7 +2,7 @@
 
 use crate::diagnosis::gap_warning_text::offset_at_rest_text;
 use crate::formatting::number::number;
-use mapper_diagnose::gap::findings::report::{Diagnosis, Next, Verdict};
+use mapper_diagnose::gap::{Diagnosis, Next, Verdict};
 
 /// Probability below which a cause is not listed for a check while another one is open. Judgement: one visit in ten would find it.
 const WORTH_A_CHECK: f64 = 0.1;
@@ -150,7 +150,7 @@ pub fn stand_actions(diagnosis: &Diagnosis) -> Vec<String> {
         .iter()
         .enumerate()
         .filter(|(place, candidate)| candidate.probability >= WORTH_A_CHECK || (*place == 0 && named));
-    if diagnosis.verdict == Verdict::WithinTolerance && diagnosis.off_at_rest.is_empty() {
+    if diagnosis.verdict == Verdict::WithinTolerance && diagnosis.offsets_at_rest.is_empty() {
         actions.extend(
             open.flat_map(|(_, candidate)| &candidate.effects).filter_map(|id| find_action(&EFFECTS, id)),
         );
@@ -162,12 +162,12 @@ pub fn stand_actions(diagnosis: &Diagnosis) -> Vec<String> {
         }
         if diagnosis.verdict != Verdict::Explained || actions.is_empty() {
             actions.extend(
-                diagnosis.r#where.iter().take(2).filter_map(|place| find_action(&PLACES, &place.submodel)),
+                diagnosis.locations.iter().take(2).filter_map(|place| find_action(&PLACES, &place.submodel)),
             );
         }
     }
     let mut once: Vec<String> = diagnosis
-        .off_at_rest
+        .offsets_at_rest
         .iter()
         .map(|sensor| format!("calibrate this sensor: {}", offset_at_rest_text(sensor)))
         .collect();

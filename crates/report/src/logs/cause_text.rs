@@ -128,7 +128,7 @@ fn causes(text: &mut String, diagnosis: &Diagnosis) {
     let heads = ["cause", "probability", "size", "95 % interval", "residual, K"];
     let mut rows = table::with_heads(&heads).with_texts(2..4);
     for (_, cause) in diagnosis.causes.iter().enumerate().filter(shown) {
-        let each = |of: &dyn Fn(&mapper_diagnose::gap::findings::report::Estimate) -> String| {
+        let each = |of: &dyn Fn(&mapper_diagnose::gap::Estimate) -> String| {
             cause.candidate.parameters.values().map(of).collect::<Vec<_>>().join("; ")
         };
         let interval = each(&|e| {

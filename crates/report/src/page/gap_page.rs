@@ -11,10 +11,7 @@ use crate::{
 use mapper_chart::palette::{self, Colour};
 use mapper_chart::{Axis, Figure, Line, Panel, Scatter};
 use mapper_core::{Channel, probability_text, step_number};
-use mapper_diagnose::gap::diagnose::Diagnosed;
-use mapper_diagnose::gap::findings::report::Verdict;
-use mapper_diagnose::gap::residuals::nuisance::OUTPUTS;
-use mapper_diagnose::gap::residuals::study::Study;
+use mapper_diagnose::gap::{Diagnosed, OUTPUTS, Study, Verdict};
 use mapper_numerics::statistics::{mean, rms};
 use maud::{Markup, PreEscaped, html};
 
@@ -53,22 +50,22 @@ fn sections(diagnosed: &Diagnosed, heading: &dyn Fn(&str) -> Markup) -> Markup {
     let with_cause = diagnosed.with_cause.as_ref().filter(|_| diagnosis.verdict != Verdict::WithinTolerance);
     html! {
         // The closure term in the headline is not repeated.
-        @for law in diagnosis.closure_terms.iter().filter(|law| !headline(diagnosis).contains(&law.sentence)) {
-            p { "Closure term for " (law.submodel) ": " b { (law.sentence) } }
+        @for term in diagnosis.closure_terms.iter().filter(|term| !headline(diagnosis).contains(&term.sentence)) {
+            p { "Closure term for " (term.submodel) ": " b { (term.sentence) } }
         }
         (heading("Causes"))
         (causes(diagnosed))
         @for suspect in &diagnosis.suspects { p { "Suspect: " (suspect_text(suspect)) "." } }
         (heading("Place in the machine"))
-        @if diagnosis.r#where.is_empty() { p { "No part departs from the model by more than noise." } }
+        @if diagnosis.locations.is_empty() { p { "No part departs from the model by more than noise." } }
         @else { (places(diagnosed)) }
         @if !diagnosis.inseparable.is_empty() {
             p { "Inseparable in this recording: " (diagnosis.inseparable.join(", ")) "." }
         }
         (pictures("Ends of the steps on the map, coloured by the difference between measured and computed readings.", residual_maps(diagnosed)))
-        @if !diagnosis.residual_sources.is_empty() {
+        @if !diagnosis.closure_terms_by_balance.is_empty() {
             (heading("Missing heat, power or flow of each balance, if it alone has one"))
-            (residual_sources(diagnosed))
+            (closure_terms_by_balance(diagnosed))
         }
         (heading("Difference between measured and computed readings"))
         p {
@@ -137,18 +134,18 @@ fn causes(diagnosed: &Diagnosed) -> Markup {
 }
 
 /// The residual source term of each balance at the end of each step, if that balance alone has one.
-fn residual_sources(diagnosed: &Diagnosed) -> Markup {
-    let residual_sources = &diagnosed.diagnosis.residual_sources;
+fn closure_terms_by_balance(diagnosed: &Diagnosed) -> Markup {
+    let terms = &diagnosed.diagnosis.closure_terms_by_balance;
     let table = html! {
         table {
             tr {
                 th { "step" }
-                @for source in residual_sources { th { (source.quantity) ", " (source.unit) } }
+                @for source in terms { th { (source.quantity) ", " (source.unit) } }
             }
             @for step in 0..diagnosed.study.steps.len() {
                 tr {
                     td { (step_number(step)) }
-                    @for [value, low, high] in residual_sources.iter().filter_map(|source| source.steps.get(step)) {
+                    @for [value, low, high] in terms.iter().filter_map(|source| source.steps.get(step)) {
                         td title=(format!("{low:.3e} .. {high:.3e}")) { (four_figures(*value)) }
                     }
                 }
@@ -163,7 +160,7 @@ fn places(diagnosed: &Diagnosed) -> Markup {
     let table = html! {
         table {
             tr { @for head in ["part", "share", "sigma", "channel", "after the jump", "region"] { th { (head) } } }
-            @for place in &diagnosed.diagnosis.r#where {
+            @for place in &diagnosed.diagnosis.locations {
                 tr {
                     td { (part_name(&place.submodel)) }
                     td { (format!("{:.0} %", 100.0 * place.share)) }

@@ -28,7 +28,7 @@ use mapper_core::{
     Channel, CompressorMap, DeclaredUncertainty, Event, IdentifiedPoint, Method, Plan, PointBudgets,
     Recording, ReferenceState, ResultRemark, terminal_text,
 };
-use mapper_diagnose::gap::correction::PointCorrection;
+use mapper_diagnose::gap::PointCorrection;
 use mapper_identify::{TwoParameter, ZeroOutcome};
 use mapper_maps::RepeatedJump;
 use mapper_observe::FusedChannel;

@@ -1,7 +1,7 @@
 //! Converts a diagnosed machine into the virtual lab of a campaign.
 
 use crate::SessionError;
-use mapper_diagnose::gap::calibrated_model::{CalibratedModelError, Found};
+use mapper_diagnose::gap::{CalibratedModelError, Found};
 use mapper_physics::rig::effect::{Effect, EffectParameter};
 use serde_json::{Map, Value, json};
 use std::path::Path;
@@ -116,7 +116,7 @@ fn with_backend(text: &str, block: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mapper_diagnose::gap::calibrated_model::{FoundEffect, FoundTolerance};
+    use mapper_diagnose::gap::{FoundEffect, FoundTolerance};
 
     /// Every effect of the library, and tolerances of both kinds, arrive in the campaign as numbers or values with units.
     #[test]

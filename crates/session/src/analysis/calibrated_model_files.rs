@@ -1,8 +1,8 @@
 //! Files of the calibrated model: a diagnosis, and a pre-registered prediction.
 
 use crate::SessionError;
-use crate::recording::files::{json_text, read_at_most, write_new};
-use mapper_diagnose::gap::calibrated_model::{Expected, Found};
+use crate::recording::files::{DIAGNOSIS_FORMAT, FORECAST_FORMAT, json_text, read_at_most, write_new};
+use mapper_diagnose::gap::{Expected, Found};
 use mapper_planner::sha256_hex;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -10,9 +10,11 @@ use std::path::Path;
 /// Maximum size of a diagnosis or prediction file, bytes.
 const FILE_MAX_BYTES: u64 = 64 << 20;
 
-/// The fields read from a diagnosis.
+/// The fields read from a diagnosis. Those of the first format, which had no number, are the same.
 #[derive(Debug, Deserialize)]
 struct Diagnosis {
+    #[serde(default)]
+    format_version: u32,
     found: Option<Found>,
 }
 
@@ -23,12 +25,9 @@ struct Diagnosis {
 pub fn found_in(path: &Path) -> Result<Found, SessionError> {
     let diagnosis: Diagnosis = serde_json::from_str(&text_of(path)?)
         .map_err(|error| wrong(path, format!("not a diagnosis: {error}")))?;
+    check_format(path, diagnosis.format_version, DIAGNOSIS_FORMAT)?;
     diagnosis.found.ok_or_else(|| {
-        wrong(
-            path,
-            "it contains no identified machine; diagnose one recording without reference recordings"
-                .to_owned(),
-        )
+        wrong(path, "it contains no identified machine; diagnose one recording without a baseline".to_owned())
     })
 }
 
@@ -36,6 +35,9 @@ pub fn found_in(path: &Path) -> Result<Found, SessionError> {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SealedForecast {
+    /// Version of the keys; 0 in files that have no number, whose keys are those of version 1.
+    #[serde(default)]
+    pub format_version: u32,
     /// Name of the campaign.
     pub campaign: String,
     /// The identified machine, with its covariance.
@@ -45,6 +47,11 @@ pub struct SealedForecast {
 }
 
 impl SealedForecast {
+    /// The forecast of a campaign's steps.
+    pub fn new(campaign: String, found: Found, steps: Vec<Expected>) -> SealedForecast {
+        SealedForecast { format_version: FORECAST_FORMAT, campaign, found, steps }
+    }
+
     /// Writes a new file and returns its SHA-256.
     ///
     /// # Errors
@@ -66,10 +73,18 @@ impl SealedForecast {
             let why = format!("its SHA-256 is {seal}, not {wanted}: it is not the forecast that was sealed");
             return Err(wrong(path, why));
         }
-        let forecast =
+        let forecast: SealedForecast =
             serde_json::from_str(&text).map_err(|error| wrong(path, format!("not a forecast: {error}")))?;
+        check_format(path, forecast.format_version, FORECAST_FORMAT)?;
         Ok((forecast, seal))
     }
+}
+
+/// Refuses a file of a later program.
+fn check_format(path: &Path, found: u32, known: u32) -> Result<(), SessionError> {
+    let why =
+        || format!("its format_version is {found}, and this program knows {known}: use a newer program");
+    if found <= known { Ok(()) } else { Err(wrong(path, why())) }
 }
 
 fn text_of(path: &Path) -> Result<String, SessionError> {

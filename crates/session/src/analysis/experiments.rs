@@ -5,7 +5,7 @@ use crate::recording::identification_config::identification_with;
 use crate::{Registry, SessionError};
 use mapper_campaign::Campaign;
 use mapper_core::{OperatingPoint, RigMode, SetpointRanges, Setpoints};
-use mapper_diagnose::gap::findings::experiment::{AllowedJump, AlsoChanged, AtRest, Experiment};
+use mapper_diagnose::gap::{AllowedJump, AlsoChanged, AtRest, Experiment};
 use mapper_identify::{ZeroSettings, expected_after_zero};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::reach::reach;

@@ -2,6 +2,7 @@
 
 use crate::plan::surge::find_surge_marks;
 use crate::recording::calibration_warnings;
+use crate::recording::files::POINTS_FORMAT;
 use crate::recording::fusing::{fuse_sensors, take_air_and_probe};
 use crate::recording::identification_config::{declared_conditions, identification_of, identification_with};
 use crate::recording::recording_file::{Recorded, check_all_distinct, check_machine};
@@ -12,7 +13,7 @@ use mapper_core::{
     Channel, CompressorMap, IdentifiedPoint, Method, PointBudgets, Recording, ResultRemark, StepMarker,
     StepOrigin, ThermalModel, join_recordings,
 };
-use mapper_diagnose::gap::correction::PointCorrection;
+use mapper_diagnose::gap::PointCorrection;
 use mapper_identify::{
     FoundFault, IdentifyConfig, NominalRig, TwoParameter, ZeroOutcome, ZeroSettings, identify_recording,
     isothermal_zero, method_for, with_measured_humidity,
@@ -89,6 +90,7 @@ impl Identified {
     /// Content of the points file.
     pub(crate) fn points_json(&self) -> Value {
         let mut value = json!({
+            "format_version": POINTS_FORMAT,
             "reference": self.config.reference,
             "efficiency": self.config.air.efficiency,
             "gas": self.config.air.description(),

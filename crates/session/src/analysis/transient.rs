@@ -2,18 +2,16 @@
 
 use crate::analysis::further_results::png;
 use crate::plan::planning::nominal_model;
-use crate::recording::files::{Existing, json_text, write_files};
+use crate::recording::files::{DIAGNOSIS_FORMAT, Existing, Versioned, json_text, write_files};
 use crate::recording::identification_config::declared;
 use crate::recording::recording_file::{Recorded, check_machine};
 use crate::{Session, SessionError};
-use mapper_diagnose::driven::DrivenError;
-use mapper_diagnose::driven::{Diagnosis, Side, SideRequest, diagnose};
-use mapper_diagnose::gap::causes::calibration::Calibration;
+use mapper_diagnose::driven::{Diagnosis, DrivenError, Side, SideRequest, diagnose};
+use mapper_diagnose::gap::Calibration;
 use mapper_observe::Declared;
 use mapper_physics::rig::effect::{Effect, Rig};
 use mapper_recording::ChannelMap;
 use mapper_report::{why_figure, why_text};
-use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -73,7 +71,10 @@ pub fn write_transient(
 ) -> Result<Vec<PathBuf>, SessionError> {
     let figure = why_figure(machine, diagnosis);
     let contents = [
-        ("transient.json", json_text(&json!(diagnosis))?.into_bytes()),
+        (
+            "transient.json",
+            json_text(&Versioned { format_version: DIAGNOSIS_FORMAT, content: diagnosis })?.into_bytes(),
+        ),
         ("transient.txt", why_text(diagnosis).into_bytes()),
         ("transient.svg", figure.to_svg().into_bytes()),
         ("transient.png", png(&figure)?),

@@ -5,8 +5,7 @@ use crate::variant::VariantError;
 use mapper_campaign::{CampaignError, NightlyError};
 use mapper_core::{BackendError, ExportError, ImportError};
 use mapper_diagnose::drift::DriftError;
-use mapper_diagnose::gap::calibrated_model::CalibratedModelError;
-use mapper_diagnose::gap::diagnose::GapError;
+use mapper_diagnose::gap::{CalibratedModelError, GapError};
 use mapper_history::HistoryError;
 use mapper_identify::IdentifyError;
 use mapper_maps::table::DescriptionError;
@@ -293,6 +292,7 @@ impl SessionError {
                 ErrorKind::Failure
             }
             E::Log(_) | E::NoPoints(..) => ErrorKind::BadRecording,
+            E::CalibratedModel(CalibratedModelError::Gap(_)) => ErrorKind::BadRecording,
             E::LogOption(_) | E::CalibratedModel(_) | E::CalibratedModelFile { .. } => ErrorKind::BadInput,
             E::Record(_) | E::Driven(_) | E::OtherMachine(_) | E::Identify(_) | E::Drift(_) | E::Gap(_) => {
                 ErrorKind::BadRecording

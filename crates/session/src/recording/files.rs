@@ -61,6 +61,24 @@ pub(crate) fn write_files(
     Ok(files)
 }
 
+/// Version of the keys of all diagnoses (gap, drift, log without steps). Version 1 had no number, and `where`, `laws`, `off_at_rest`, `since` and
+/// `gap.shrink` for `locations`, `closure_terms`, `offsets_at_rest`, `baseline` and `gap.gap_reduction`.
+pub const DIAGNOSIS_FORMAT: u32 = 2;
+/// Version of the keys of a points file.
+pub(crate) const POINTS_FORMAT: u32 = 1;
+/// Version of the keys of a sealed forecast.
+pub(crate) const FORECAST_FORMAT: u32 = 1;
+
+/// Content of a JSON file with the version of its keys.
+#[derive(Debug, Serialize)]
+pub struct Versioned<T> {
+    /// Raised when a key changes its name or meaning.
+    pub format_version: u32,
+    /// The keys.
+    #[serde(flatten)]
+    pub content: T,
+}
+
 /// Writes a file under a temporary name in the same directory, so that the final name never belongs to an incomplete file, even if the disk is
 /// full.
 fn write_temporary(path: &Path, bytes: &[u8]) -> std::io::Result<NamedTempFile> {

@@ -35,8 +35,6 @@ pub enum BlindError {
     Record(#[from] RecordError),
     #[error(transparent)]
     NominalModel(#[from] NominalTableError),
-    #[error("the recording has no channel for signatures; declare sensors of speed, P2, T2 or Tc")]
-    NothingRecorded,
     #[error("failed to measure signatures: {source}")]
     Signatures { source: Box<dyn std::error::Error + Send + Sync> },
     #[error("{cases} cases were requested; 1 to {max} are allowed")]

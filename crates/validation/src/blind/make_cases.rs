@@ -1,6 +1,6 @@
 //! Makes a directory of blind cases.
 
-use crate::blind::calibration::no_cause_study::StudySignatureMeter;
+use crate::blind::calibration::no_cause_study::visibility_on;
 use crate::blind::cases::case::{Case, Draw};
 use crate::blind::cases::equations::Laboratory;
 use crate::blind::cases::truth::Truth;
@@ -29,7 +29,7 @@ pub struct CreatedCases {
 }
 
 /// Draws cases from `catalogue` and the outside causes, runs each on the virtual lab of `campaign`, and writes to
-/// `directory`, which must not contain cases yet: NAME.mcap for each, NAME.healthy.mcap if requested, the answers, and a manifest with their hash.
+/// `directory`, which must not contain cases yet: NAME.mcap for each, NAME.baseline.mcap if requested, the answers, and a manifest with their hash.
 ///
 /// `done` receives the number of finished cases. Equal arguments give equal bytes.
 ///
@@ -47,8 +47,8 @@ pub fn make(
     // Strengths are always measured with the model's own equations, so that equal seeds give equal causes in both simulators.
     let schedule = Schedule::new(campaign, &nominal)?.on(draw.laboratory);
     std::fs::create_dir_all(directory).map_err(BlindError::file(directory))?;
-    let answers = run_all(&schedule, campaign, &cases, draw.healthy, directory, done)?;
-    let manifest = seal(&campaign.name, draw.laboratory, draw.healthy, &answers, directory)?;
+    let answers = run_all(&schedule, campaign, &cases, draw.baseline, directory, done)?;
+    let manifest = seal(&campaign.name, draw.laboratory, draw.baseline, &answers, directory)?;
     Ok(CreatedCases { manifest, answers })
 }
 
@@ -68,7 +68,7 @@ pub fn draw_cases(
     let schedule = Schedule::new(campaign, &nominal)?;
     let mut known = catalogue.to_vec();
     known.extend(outside_kinds(draw.outside));
-    let meter = StudySignatureMeter::new(campaign, &schedule, &nominal, known, draw.seed)?;
+    let meter = visibility_on(campaign, &schedule, &nominal, known, draw.seed)?;
     Ok(draw.cases(catalogue, &meter))
 }
 
@@ -93,7 +93,7 @@ pub fn record(
 pub fn seal(
     campaign: &str,
     laboratory: Laboratory,
-    healthy: bool,
+    baseline: bool,
     answers: &[Truth],
     directory: &Path,
 ) -> Result<Manifest, BlindError> {
@@ -101,7 +101,8 @@ pub fn seal(
     let manifest = Manifest {
         campaign: campaign.to_owned(),
         laboratory,
-        healthy,
+        baseline,
+        former: (),
         cases: answers.iter().map(|answer| answer.name.clone()).collect(),
         answers_sha256: sha256(&bytes),
     };
@@ -122,7 +123,7 @@ fn run_all(
     schedule: &Schedule<'_>,
     campaign: &Campaign,
     cases: &[Case],
-    healthy: bool,
+    baseline: bool,
     directory: &Path,
     done: &(dyn Fn(usize) + Sync),
 ) -> Result<Vec<Truth>, BlindError> {
@@ -131,8 +132,8 @@ fn run_all(
     parallel::try_map(cases, |case| {
         let header = header(campaign);
         let truth = schedule.run(case, &directory.join(format!("{}.mcap", case.name)), &header);
-        if healthy && truth.is_ok() {
-            let file = directory.join(format!("{}.healthy.mcap", case.name));
+        if baseline && truth.is_ok() {
+            let file = directory.join(format!("{}.baseline.mcap", case.name));
             schedule.run_reference(case, &file, &header)?;
         }
         done(finished.fetch_add(1, Ordering::Relaxed) + 1);

@@ -12,7 +12,7 @@ pub mod scoring;
 mod seal;
 mod virtual_runs;
 
-pub use calibration::no_cause_study::study_without_causes;
+pub use calibration::no_cause_study::visibility;
 pub use cases::case::{Case, Draw, SIGMA_RANGE};
 pub use cases::cause::Cause;
 pub use cases::equations::Laboratory;

@@ -4,7 +4,8 @@ use crate::blind::cases::equations::Laboratory;
 use crate::blind::cases::truth::Truth;
 use crate::blind::error::BlindError;
 use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
 use sha2::{Digest, Sha256};
 use std::io::Read;
 use std::path::Path;
@@ -23,19 +24,29 @@ pub struct Manifest {
     /// The simulator of the cases.
     #[serde(default)]
     pub laboratory: Laboratory,
-    /// Whether each rig was also recorded on a night without its causes, as NAME.healthy.mcap.
+    /// Whether each rig was also recorded on a night without its causes, as NAME.baseline.mcap.
     #[serde(default)]
-    pub healthy: bool,
+    pub baseline: bool,
+    /// The former key of `baseline`.
+    #[serde(default, skip_serializing, rename = "healthy", deserialize_with = "former_key")]
+    pub(crate) former: (),
     /// Names of the cases; each has a recording NAME.mcap.
     pub cases: Vec<String>,
     /// SHA-256 of the file of answers.
     pub answers_sha256: String,
 }
 
+/// Refuses the key of earlier programs.
+fn former_key<'de, D: Deserializer<'de>>(_: D) -> Result<(), D::Error> {
+    Err(Error::custom(
+        "`healthy` is now `baseline`, and NAME.healthy.mcap is NAME.baseline.mcap: rename them, or make the cases again",
+    ))
+}
+
 impl Manifest {
     /// Heading that distinguishes its score from those of other cases.
     pub fn title(&self) -> String {
-        let recording = if self.healthy { ", with a healthy recording" } else { "" };
+        let recording = if self.baseline { ", with a baseline" } else { "" };
         format!("{}{recording}", self.laboratory.name())
     }
 

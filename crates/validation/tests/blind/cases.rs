@@ -106,10 +106,10 @@ fn oracle(truth: &Truth) -> serde_json::Value {
     let known = verdict == "explained";
     json!({
         "verdict": verdict,
-        "where": [],
+        "locations": [],
         "candidates": if known { json!([{"effects": ids, "probability": 1.0, "parameters": parameters}]) } else { json!([]) },
         "probability_none": if verdict == "within_tolerance" { 1.0 } else { 0.0 },
         "probability_outside": if outside { 1.0 } else { 0.0 },
-        "gap": {"shrink": 1.0},
+        "gap": {"gap_reduction": 1.0},
     })
 }

@@ -1,4 +1,4 @@
 //! Integration tests of the module `blind`.
 
+mod baseline;
 mod cases;
-mod healthy;

@@ -77,7 +77,7 @@ pub(crate) struct TolerancesElement {
 }
 
 /// Share of each output's variation over a recording that the model's equations may miss; 0 if none is given. With a fault-free recording
-/// `mapper gap diagnose --healthy` measures it.
+/// `mapper gap diagnose --baseline` measures it.
 #[derive(Default, Deserialize, JsonSchema)]
 #[serde(remote = "StructureTolerances", default, deny_unknown_fields)]
 pub(crate) struct StructureElement {

@@ -1,6 +1,6 @@
 //! `mapper gap diagnose`: diagnoses the difference between a recording and the nominal model.
 
-use crate::command_line::shared_arguments::channel_map;
+use crate::command_line::shared_arguments::{channel_map, renamed};
 use crate::output::exit_code::Code;
 use crate::output::failure::Failure;
 use crate::output::standard_output::Replace;
@@ -9,12 +9,9 @@ use crate::{
     registry,
 };
 use clap::Args;
-use mapper_diagnose::gap::causes::calibration::Calibration;
-use mapper_diagnose::gap::diagnose::Diagnosed;
-use mapper_diagnose::gap::findings::report::Law;
-use mapper_diagnose::gap::joint::over_recordings;
+use mapper_diagnose::gap::{Calibration, ClosureTerm, Diagnosed, over_recordings};
 use mapper_report::{gap_text, headline, recordings_text, sensors_text, zero_text};
-use mapper_session::{Gap, Recorded, Session, SessionError, SessionEvent, check_all_distinct};
+use mapper_session::{DIAGNOSIS_FORMAT, Gap, Recorded, Session, SessionError, SessionEvent, check_all_distinct};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -31,6 +28,8 @@ pub struct Diagnose {
     pub named: Vec<PathBuf>,
     /// Reference recording of the same rig and steps, fault-free: report changes since then, not what is missing in the model
     #[arg(long, value_name = "FILE")]
+    pub baseline: Option<PathBuf>,
+    #[arg(long, hide = true, value_parser = renamed("--baseline"))]
     pub healthy: Option<PathBuf>,
     /// Channel map: where a recording made by another program holds the rig's channels (YAML)
     #[arg(long, value_name = "MAP")]
@@ -41,8 +40,10 @@ pub struct Diagnose {
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
-    /// Write each law that is found as an effect in rhai into this directory
+    /// Write each closure term that is found as an effect in rhai into this directory
     #[arg(long, value_name = "DIR")]
+    pub closure_terms: Option<PathBuf>,
+    #[arg(long, hide = true, value_parser = renamed("--closure-terms"))]
     pub laws: Option<PathBuf>,
     /// Also write an HTML page with pictures to this new file
     #[arg(long, value_name = "OUT")]
@@ -60,7 +61,7 @@ impl Diagnose {
         let registry = registry::registry();
         let effects = registry.effects_with(&self.effects)?;
         let read = |file: &PathBuf| Recorded::read(&registry, file, &map, Some(&campaign));
-        let healthy = self.healthy.as_ref().map(read).transpose()?;
+        let baseline = self.baseline.as_ref().map(read).transpose()?;
         let progress = output_options::progress();
         progress.show(&SessionEvent::Progress { done_ratio: 0.0, what: "reading".to_owned() });
         let read_run = |file: &PathBuf| Recorded::read_run(&registry, file, &map, Some(&campaign));
@@ -68,21 +69,21 @@ impl Diagnose {
         let recordings = self.recordings.iter().chain(&self.named).map(read_run);
         let recordings: Vec<Recorded> =
             recordings.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
-        check_all_distinct(recordings.iter().chain(&healthy))?;
-        if (self.html.is_some() || self.laws.is_some()) && recordings.len() > 1 {
-            let message = "--html and --laws need exactly one recording (a resumed run has several)";
+        check_all_distinct(recordings.iter().chain(&baseline))?;
+        if (self.html.is_some() || self.closure_terms.is_some()) && recordings.len() > 1 {
+            let message = "--html and --closure-terms need exactly one recording (a resumed run has several)";
             return Err(Failure::new(Code::BadInput, message));
         }
         let mut gaps = Vec::with_capacity(recordings.len());
         for recorded in recordings {
             let on_event = |event: &_| progress.show(event);
             let session = Session { on_event: &on_event, ..Session::new(&registry) };
-            let gap = session.diagnose_gap(&recorded, &campaign, &map, effects.clone(), healthy.as_ref())?;
+            let gap = session.diagnose_gap(&recorded, &campaign, &map, effects.clone(), baseline.as_ref())?;
             progress.clear();
             gaps.push((recorded.path.display().to_string(), gap));
         }
         if let [(title, gap)] = &mut gaps[..] {
-            self.write_laws(&mut gap.diagnosed.diagnosis.closure_terms)?;
+            self.write_closure_terms(&mut gap.diagnosed.diagnosis.closure_terms)?;
             if let Some(file) = &self.html {
                 let page = gap.page(&campaign.machine.name, title)?;
                 self.replace.write(file, page.as_bytes())?;
@@ -106,34 +107,36 @@ impl Diagnose {
                     Ok(value)
                 })
                 .collect();
-            return standard_output::print_json(&json!({ "recordings": each?, "causes": over }));
+            return standard_output::print_json(&json!({
+                "format_version": DIAGNOSIS_FORMAT, "recordings": each?, "causes": over,
+            }));
         }
         let heads: Vec<(String, String)> =
             gaps.iter().map(|(path, gap)| (path.clone(), headline(&gap.diagnosed.diagnosis))).collect();
         standard_output::print(&recordings_text(&heads, &over))
     }
 
-    /// Writes the laws that can be written into `directory`; next to the page if only that was asked for.
-    fn write_laws(&self, laws: &mut [Law]) -> Result<(), Failure> {
-        let (directory, page) = (self.laws.as_deref(), self.html.as_deref());
-        if let Some(directory) = directory.filter(|_| laws.iter().any(|law| law.script.is_some())) {
+    /// Writes the closure terms that can be written into `directory`; next to the page if only that was asked for.
+    fn write_closure_terms(&self, terms: &mut [ClosureTerm]) -> Result<(), Failure> {
+        let (directory, page) = (self.closure_terms.as_deref(), self.html.as_deref());
+        if let Some(directory) = directory.filter(|_| terms.iter().any(|term| term.script.is_some())) {
             std::fs::create_dir_all(directory)
                 .map_err(|error| Failure::new(Code::Failure, format!("{}: {error}", directory.display())))?;
         }
-        for (place, law) in laws.iter_mut().enumerate() {
-            let Some(script) = &law.script else { continue };
+        for (place, term) in terms.iter_mut().enumerate() {
+            let Some(script) = &term.script else { continue };
             let file = match (directory, page) {
-                (Some(directory), _) => directory.join(format!("law_{}.rhai", place + 1)),
-                (None, Some(page)) => page.with_extension(format!("law_{}.rhai", place + 1)),
+                (Some(directory), _) => directory.join(format!("closure_term_{}.rhai", place + 1)),
+                (None, Some(page)) => page.with_extension(format!("closure_term_{}.rhai", place + 1)),
                 (None, None) => continue,
             };
             self.replace.write(&file, script.as_bytes())?;
-            law.rhai = Some(file.display().to_string());
+            term.rhai = Some(file.display().to_string());
         }
         Ok(())
     }
 }
 
 fn text(gap: &Gap) -> String {
-    [gap_text(&gap.diagnosed.diagnosis), sensors_text(&gap.sensors), zero_text(&gap.zero)].concat()
+    [gap_text(&gap.diagnosed.diagnosis), sensors_text(&gap.sensors), zero_text(&gap.diagnosed.zero)].concat()
 }

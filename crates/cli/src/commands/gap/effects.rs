@@ -3,10 +3,9 @@
 use crate::output::failure::Failure;
 use crate::{output::standard_output, registry};
 use clap::Args;
-use mapper_diagnose::closure::confounding::signatures;
 use mapper_physics::rig::effect::Effect;
 use mapper_report::with_heads;
-use mapper_validation::blind::study_without_causes;
+use mapper_validation::blind::visibility;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -58,9 +57,8 @@ impl Effects {
     /// The matrix of effects against balances on a recording of the campaign without causes.
     fn print_signatures(&self, campaign: &Path, effects: Vec<Arc<dyn Effect>>) -> Result<(), Failure> {
         let campaign = mapper_campaign::load(campaign).map_err(Failure::of_campaign)?;
-        let (study, linearised) = study_without_causes(&campaign, effects, campaign.seed)?;
-        let matrix = signatures(&study, &linearised);
-        let names: Vec<String> = matrix.balances.iter().map(|balance| balance.properties().words).collect();
+        let matrix = visibility(&campaign, effects, campaign.seed)?.by_balance();
+        let names = &matrix.balances;
         if self.json {
             let rows: Vec<_> = matrix
                 .effects

@@ -5,7 +5,7 @@ use crate::output::failure::Failure;
 use crate::{output::standard_output, registry};
 use clap::Args;
 use mapper_report::{doubt_text, forecast_check_text};
-use mapper_session::{Recorded, SealedForecast, Session, found_in};
+use mapper_session::{DIAGNOSIS_FORMAT, Recorded, SealedForecast, Session, found_in};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -46,9 +46,9 @@ impl Predict {
         let session = Session::new(&registry);
         if let Some(diagnosis) = &self.diagnosis {
             let found = found_in(diagnosis)?;
-            let steps = session.forecast_twin(&campaign, &map, effects, &found)?;
+            let steps = session.forecast_calibrated_model(&campaign, &map, effects, &found)?;
             let doubt = found.doubt.clone();
-            let forecast = SealedForecast { campaign: campaign.name.clone(), found, steps };
+            let forecast = SealedForecast::new(campaign.name.clone(), found, steps);
             let (seal, steps) = (forecast.write(&self.forecast)?, forecast.steps.len());
             if self.json {
                 return standard_output::print_json(
@@ -65,10 +65,12 @@ impl Predict {
         let Some(recording) = &self.recording else { return Ok(()) };
         let (forecast, seal) = SealedForecast::read(&self.forecast, self.seal.as_deref())?;
         let recorded = Recorded::read(&registry, recording, &map, Some(&campaign))?;
-        let held = session.hold_twin(&recorded, &campaign, &map, effects, &forecast.found)?;
+        let check = session.check_forecast(&recorded, &campaign, &map, effects, &forecast.found)?;
         if self.json {
-            return standard_output::print_json(&json!({ "sha256": seal, "held": held }));
+            return standard_output::print_json(&json!({
+                "format_version": DIAGNOSIS_FORMAT, "sha256": seal, "check": check,
+            }));
         }
-        standard_output::print(&forecast_check_text(&held, &seal))
+        standard_output::print(&forecast_check_text(&check, &seal))
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::gap::findings::experiment::{AlsoChanged, Experiment};
 use crate::gap::findings::warning::{GapWarning, OffsetAtRest};
-use crate::gap::model_error::baseline_assumptions::Since;
+use crate::gap::model_error::baseline_assumptions::Baseline;
 use mapper_core::probability_text;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -26,11 +26,11 @@ pub enum Verdict {
 pub struct Diagnosis {
     /// Overall verdict.
     pub verdict: Verdict,
-    /// Set if a reference recording was given: the diagnosis then covers only changes since that recording.
+    /// Set if a baseline was given: the diagnosis then covers only changes since that recording.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub since: Option<Since>,
+    pub baseline: Option<Baseline>,
     /// Locations of the gap, largest first.
-    pub r#where: Vec<Place>,
+    pub locations: Vec<Place>,
     /// Causes, best first.
     pub candidates: Vec<Candidate>,
     /// Tolerances that end beyond three sigmas of their prior in the reported fit, furthest first: suspects.
@@ -43,11 +43,10 @@ pub struct Diagnosis {
     pub probability_unlisted: f64,
     /// Probability that the cause is not in the effect library.
     pub probability_outside: f64,
-    /// Laws for the gap that the effect library does not explain, best first; empty if none is proposed.
-    #[serde(rename = "laws")]
-    pub closure_terms: Vec<Law>,
-    /// Residual source term of each balance, if it is the only one, most probable first; empty without a search.
-    pub residual_sources: Vec<MissingSource>,
+    /// Closure terms for the gap that the effect library does not explain, best first; empty if none is proposed.
+    pub closure_terms: Vec<ClosureTerm>,
+    /// The closure term that each balance would need if it were the only one, most probable first; empty without a search.
+    pub closure_terms_by_balance: Vec<BalanceClosure>,
     /// The gap before and after the best cause.
     pub gap: Gap,
     /// Suggested next step; `None` if the diagnosis is settled.
@@ -59,7 +58,7 @@ pub struct Diagnosis {
     /// Assumptions for missing campaign declarations; one sentence each.
     pub assumed: Vec<String>,
     /// Sensor offsets beyond tolerance, found at rest and already subtracted.
-    pub off_at_rest: Vec<OffsetAtRest>,
+    pub offsets_at_rest: Vec<OffsetAtRest>,
     /// Limits of the diagnosis.
     pub warnings: Vec<GapWarning>,
 }
@@ -131,18 +130,18 @@ pub struct SmallestSeen {
     pub size: Option<String>,
 }
 
-/// A law found for a residual source term.
+/// A term that closes a balance outside the effect library.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Law {
+pub struct ClosureTerm {
     /// Part of the model where it acts.
     pub submodel: String,
-    /// The law as a sentence, with its numbers.
+    /// The term as a sentence, with its numbers.
     pub sentence: String,
-    /// Its terms.
-    pub terms: Vec<LawTerm>,
-    /// Probability of this law among all laws tried and no law.
+    /// Its coefficients.
+    pub terms: Vec<ClosureCoefficient>,
+    /// Probability of this term among all terms tried and none.
     pub probability: f64,
-    /// Share of the gap removed on steps used neither to find nor to fit the law; 0 if any channel gets worse.
+    /// Share of the gap removed on steps used neither to find nor to fit the term; 0 if any channel gets worse.
     pub gap_reduction: f64,
     /// Number of these held-out steps.
     pub held_out_steps: usize,
@@ -150,22 +149,22 @@ pub struct Law {
     pub channels: BTreeMap<String, ChannelGap>,
     /// Channels that get worse on these steps.
     pub worse: Vec<String>,
-    /// Library effects fitted together with the law; empty if it was found alone.
+    /// Library effects fitted together with the term; empty if it was found alone.
     pub beside: Vec<String>,
-    /// Share of the leave-one-out folds of steps that select the same part and this law's terms or equivalents.
+    /// Share of the leave-one-out folds of steps that select the same part and this term or an equivalent.
     pub stability: f64,
-    /// Laws that the recording cannot distinguish from this one, as sentences.
+    /// Closure terms that the recording cannot distinguish from this one, as sentences.
     pub equivalent: Vec<String>,
     /// Name of the effect file written for it.
     pub rhai: Option<String>,
-    /// Content of that file; `None` if a script cannot express the law.
+    /// Content of that file; `None` if a script cannot express the term.
     #[serde(skip)]
     pub script: Option<String>,
 }
 
-/// One number of a law with its 95 % interval.
+/// One number of a closure term with its 95 % interval.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct LawTerm {
+pub struct ClosureCoefficient {
     /// Name.
     pub term: String,
     /// Best value.
@@ -178,9 +177,9 @@ pub struct LawTerm {
     pub unit: String,
 }
 
-/// Residual source term of one balance, assuming that it is the only one.
+/// The closure term that one balance would need, assuming that it is the only one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct MissingSource {
+pub struct BalanceClosure {
     /// Part of the model.
     pub submodel: String,
     /// The missing quantity.
@@ -267,8 +266,7 @@ pub struct Gap {
     pub before: f64,
     /// The same with the best cause.
     pub after: f64,
-    /// Gap reduction as a share; 0 if a channel gets worse. Scorers of other simulators read it by this name.
-    #[serde(rename = "shrink")]
+    /// Gap reduction as a share; 0 if a channel gets worse.
     pub gap_reduction: f64,
     /// 95 % interval of this share for similar steps: lower end.
     pub gap_reduction_low: f64,
@@ -454,19 +452,24 @@ impl Diagnosis {
             .map(|(_, c)| c)
     }
 
-    /// Whether a cause outside the library is more probable than not, and no law describes it: it may change any point.
-    pub fn is_outside_without_law(&self) -> bool {
+    /// The closure term that is more probable than not; `None` if there is none.
+    pub fn probable_closure_term(&self) -> Option<&ClosureTerm> {
+        self.closure_terms.first().filter(|term| term.probability > 0.5)
+    }
+
+    /// Whether a cause outside the library is more probable than not, and no closure term describes it: it may change any point.
+    pub fn is_outside_without_closure(&self) -> bool {
         let is_open = matches!(self.verdict, Verdict::PartlyExplained | Verdict::Unexplained);
-        is_open && self.probability_outside > 0.5 && law_found(self).is_none()
+        is_open && self.probability_outside > 0.5 && self.probable_closure_term().is_none()
     }
 
     /// Why the named cause is not the best explanation of the recording; `None` if it is.
     pub fn doubt(&self) -> Option<String> {
-        if let Some(law) = law_found(self) {
+        if let Some(term) = self.probable_closure_term() {
             return Some(format!(
-                "a law explains the recording better ({}): {}; add the law as an effect to the next diagnosis",
-                probability_text(law.probability),
-                law.sentence
+                "a closure term explains the recording better ({}): {}; add it as an effect to the next diagnosis",
+                probability_text(term.probability),
+                term.sentence
             ));
         }
         let others: Vec<String> = self
@@ -487,9 +490,4 @@ impl Diagnosis {
             Verdict::Explained | Verdict::WithinTolerance => None,
         }
     }
-}
-
-/// The law that is more probable than not; `None` if there is none.
-pub fn law_found(diagnosis: &Diagnosis) -> Option<&Law> {
-    diagnosis.closure_terms.first().filter(|law| law.probability > 0.5)
 }

@@ -16,8 +16,8 @@ GapWarning {
     "assumed_noise" AssumedNoise { channel: Channel, noise_sigma: f64 },
     /// The sample times scatter, so changing readings have less weight.
     "uncertain_times" UncertainTimes { scatter_s: f64 },
-    /// A limit of the healthy recording.
-    "healthy_recording" HealthyRecording { warning: Box<GapWarning> },
+    /// A limit of the baseline recording.
+    "baseline_recording" BaselineRecording { warning: Box<GapWarning> },
     /// A drift during the recording: `subtracted` from a sensor's readings, or of the machine, so that no cause is named.
     "drift" Drift { reason: String, subtracted: bool },
     /// A detected drift was not subtracted, because tolerances alone explain the recording down to noise.

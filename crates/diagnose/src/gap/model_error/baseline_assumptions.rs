@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 /// Baseline of a rig: its model error in fault-free condition.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Since {
+pub struct Baseline {
     /// The reference recording.
     pub recording: String,
     /// Model error of each channel there after fitting tolerances; present in both recordings and therefore not diagnosed.

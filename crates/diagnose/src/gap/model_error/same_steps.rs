@@ -8,24 +8,25 @@ use mapper_observe::averages::mean_reading::mean_reading;
 
 /// Rejects a reference recording with steps other than those of the recording under diagnosis. Times may differ by the interval of a slow
 /// logger, T3 by its tolerance: a smaller difference is variation of the stand, not another operating point.
-pub(crate) fn same_steps(healthy: &Study, study: &Study) -> Result<(), Problem> {
-    if healthy.steps.len() != study.steps.len() {
-        return Err(Problem::OtherSteps { healthy: healthy.steps.len(), recorded: study.steps.len() });
+pub(crate) fn same_steps(baseline: &Study, study: &Study) -> Result<(), Problem> {
+    if baseline.steps.len() != study.steps.len() {
+        return Err(Problem::OtherSteps { baseline: baseline.steps.len(), recorded: study.steps.len() });
     }
     let t3_k = |of: &Study, step: usize| {
         let marker = &of.steps[step].marker;
         let column = of.table.column(Channel::T3)?;
         mean_reading(&column[of.table.range(marker.start_s, marker.end_s)])
     };
-    for (index, (theirs, ours)) in healthy.steps.iter().zip(&study.steps).enumerate() {
+    for (index, (theirs, ours)) in baseline.steps.iter().zip(&study.steps).enumerate() {
         let (theirs, ours) = (&theirs.marker, &ours.marker);
-        let differs = |what: &'static str, healthy: f64, recorded: f64, unit: &'static str, within: f64| {
-            let same = (healthy - recorded).abs() <= within || !healthy.is_finite() || !recorded.is_finite();
+        let differs = |what: &'static str, baseline: f64, recorded: f64, unit: &'static str, within: f64| {
+            let same =
+                (baseline - recorded).abs() <= within || !baseline.is_finite() || !recorded.is_finite();
             let step = ours.index;
             if same {
                 Ok(())
             } else {
-                Err(Problem::OtherStep { step, what, healthy, recorded, unit, within })
+                Err(Problem::OtherStep { step, what, baseline, recorded, unit, within })
             }
         };
         // Model error hardly changes between points that count as one.
@@ -42,7 +43,7 @@ pub(crate) fn same_steps(healthy: &Study, study: &Study) -> Result<(), Problem> 
                 LONGEST_BRIDGE_S,
             )?;
         }
-        if let (Some(before), Some(now)) = (t3_k(healthy, index), t3_k(study, index)) {
+        if let (Some(before), Some(now)) = (t3_k(baseline, index), t3_k(study, index)) {
             differs("T3", before, now, "K", study.declared.tolerances.turbine_inlet_temperature_k)?;
         }
     }

@@ -38,17 +38,17 @@ pub enum Problem {
     )]
     NotCommanded { measured_pa: f64, commanded_pa: f64 },
     #[error(
-        "the healthy recording has {healthy} step(s), the recording under diagnosis {recorded}, but only equal steps can be compared: record a healthy run of the same plan"
+        "the baseline has {baseline} step(s), the recording under diagnosis {recorded}, but only equal steps can be compared: record a baseline of the same plan"
     )]
-    OtherSteps { healthy: usize, recorded: usize },
+    OtherSteps { baseline: usize, recorded: usize },
     #[error(
-        "step {} of the healthy recording differs: its {what} is {healthy:.3} {unit}, that of the recording under diagnosis {recorded:.3} {unit} (allowed difference {within:.3} {unit}); record a healthy run of the same plan",
+        "step {} of the baseline differs: its {what} is {baseline:.3} {unit}, that of the recording under diagnosis {recorded:.3} {unit} (allowed difference {within:.3} {unit}); record a baseline of the same plan",
         step_number(*step)
     )]
     OtherStep {
         step: usize,
         what: &'static str,
-        healthy: f64,
+        baseline: f64,
         recorded: f64,
         unit: &'static str,
         within: f64,

@@ -4,9 +4,11 @@
 use mapper_core::{
     Channel, DeclaredUncertainty, ModelTolerances, NoiseColour, Recording, Series, StepKind, StepMarker,
 };
+use mapper_diagnose::gap::causes::calibration::Calibration;
+use mapper_diagnose::gap::request::{ClosureSearch, GapRequest, RigRecording};
 use mapper_observe::declared::{Declared, declared_uncertainties};
 use mapper_physics::machine::params::BoundaryConditions;
-use mapper_physics::rig::effect::Rig;
+use mapper_physics::rig::effect::{Effect, Rig};
 use mapper_physics::rig::instruments::ChannelFollower;
 use mapper_physics::simulation::inputs::InterpolatedInputs;
 use mapper_physics::simulation::model::Model;
@@ -16,6 +18,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Operating points at one opening, with a jump between consecutive points.
 pub struct Visits {
@@ -170,4 +173,28 @@ pub fn declared() -> Declared {
         nominal: boundary(),
         common_offsets: Vec::new(),
     }
+}
+
+/// A diagnosis with the library alone.
+pub fn request(
+    recording: &Recording,
+    declared: Declared,
+    model: Model,
+    effects: Vec<Arc<dyn Effect>>,
+) -> GapRequest<'static> {
+    GapRequest {
+        recording: RigRecording::simulated(recording.clone(), declared, model),
+        baseline: None,
+        effects,
+        experiments: Vec::new(),
+        closure_search: ClosureSearch::Never,
+        calibration: Calibration::shipped().unwrap(),
+        warnings: Vec::new(),
+        progress: &|_, _| {},
+    }
+}
+
+/// The library effects of these names.
+pub fn effects(ids: &[&str]) -> Vec<Arc<dyn Effect>> {
+    ids.iter().map(|id| mapper_effects::find(id).unwrap()).collect()
 }

@@ -10,7 +10,7 @@ use crate::plan::plan_remark_text::plan_remark_text;
 use crate::point_results::result_remark_text::result_remark_text;
 use crate::point_results::warning_text::sentence::Sentence;
 use mapper_core::{ModelDoubt, PlanRemark, ResultRemark, Warning};
-use mapper_diagnose::gap::findings::warning::GapWarning;
+use mapper_diagnose::gap::GapWarning;
 use mapper_recording::logs::LogFinding;
 use mapper_recording::logs::proposal::ProposalRemark;
 use serde::de::DeserializeOwned;

@@ -2,20 +2,18 @@
 //! that convert scores into probabilities.
 
 use crate::blind::calibration::logistic::{Row, logistic};
-use crate::blind::calibration::no_cause_study::{StudySignatureMeter, declared};
+use crate::blind::calibration::no_cause_study::{declared, visibility_on};
 use crate::blind::cases::case::{Case, Draw};
+use crate::blind::cases::cause::Cause;
 use crate::blind::cases::kind::CaseKind;
 use crate::blind::error::BlindError;
 use crate::blind::outside::{OutsideUse, outside_kinds};
 use crate::blind::virtual_runs::case_run::Schedule;
 use mapper_campaign::{Campaign, nominal_model};
-use mapper_diagnose::gap::best_fit::coordinate::coordinates;
-use mapper_diagnose::gap::best_fit::fit::Fit;
-use mapper_diagnose::gap::causes::calibration::Calibration;
-use mapper_diagnose::gap::causes::probabilities::weight;
-use mapper_diagnose::gap::diagnose::{Diagnosed, GapRequest, diagnose};
-use mapper_diagnose::gap::findings::report::Verdict;
-use mapper_diagnose::gap::residuals::study::{Study, members};
+use mapper_diagnose::gap;
+use mapper_diagnose::gap::{
+    Calibration, ClosureSearch, Diagnosed, GapRequest, RigRecording, Scores, Verdict,
+};
 use mapper_fleet::Engine;
 use mapper_numerics::statistics::{NORMAL_975, quantile};
 use mapper_physics::rig::effect::Effect;
@@ -122,7 +120,7 @@ pub fn cases(
     let schedule = Schedule::new(campaign, &nominal)?;
     let mut known = catalogue.to_vec();
     known.extend(outside_kinds(OutsideUse::Calibration));
-    let meter = StudySignatureMeter::new(campaign, &schedule, &nominal, known, plan.seed)?;
+    let meter = visibility_on(campaign, &schedule, &nominal, known, plan.seed)?;
     let draw = |cases, kinds, seed| Draw { kinds, ..Draw::new(seed, cases, OutsideUse::Calibration) };
     let others = vec![CaseKind::Single, CaseKind::Pair, CaseKind::Outside];
     let mut cases = draw(plan.others, others, plan.seed).cases(catalogue, &meter);
@@ -153,16 +151,15 @@ impl<'a> CalibrationSettings<'a> {
     /// [`BlindError`] if it cannot be run.
     pub fn observe(&self, case: &Case) -> Result<Option<DiagnosisSummary>, BlindError> {
         let recording = Schedule::new(self.campaign, &self.nominal)?.record(case)?;
-        let diagnosed = diagnose(GapRequest {
-            tolerances_declared: true,
-            experiments: Vec::new(),
-            recording: &recording,
-            declared: declared(self.campaign),
-            healthy: None,
-            model: self.nominal.clone(),
+        let declared = declared(self.campaign);
+        let diagnosed = gap(GapRequest {
+            recording: RigRecording::simulated(recording, declared, self.nominal.clone()),
+            baseline: None,
             effects: self.catalogue.to_vec(),
+            experiments: Vec::new(),
+            closure_search: ClosureSearch::Never,
             calibration: self.before.clone(),
-            linearised: None,
+            warnings: Vec::new(),
             progress: &|_, _| {},
         });
         Ok(diagnosed.ok().map(|diagnosed| observe(case, &self.before, &diagnosed)))
@@ -170,42 +167,18 @@ impl<'a> CalibrationSettings<'a> {
 }
 
 fn observe(case: &Case, calibration: &Calibration, diagnosed: &Diagnosed) -> DiagnosisSummary {
-    let Diagnosed { study, null, fits, adequacy, diagnosis, .. } = diagnosed;
-    let causes: BTreeSet<String> = case.causes.iter().map(|c| c.effect.info().id.to_string()).collect();
-    let names = |fit: &Fit| -> BTreeSet<String> {
-        members(&fit.hypothesis).into_iter().map(|i| study.effects[i].info().id.to_string()).collect()
-    };
-    let named = fits.first().filter(|fit| names(fit) == causes);
+    let truth: Vec<(String, Vec<f64>)> = case.causes.iter().map(Cause::id_and_values).collect();
+    let Scores { nothing, candidates, features, errors_sigma } = diagnosed.scores(calibration, &truth);
     DiagnosisSummary {
         kind: case.kind,
-        causes,
-        verdict: diagnosis.verdict,
+        causes: truth.into_iter().map(|(id, _)| id).collect(),
+        verdict: diagnosed.diagnosis.verdict,
         sigma: case.sigmas.iter().copied().reduce(f64::min),
-        nothing: weight(calibration, study, null),
-        candidates: fits.iter().map(|fit| (names(fit), weight(calibration, study, fit))).collect(),
-        features: adequacy.features(),
-        errors_sigma: named.map_or_else(Vec::new, |fit| errors_sigma(case, study, fit)),
+        nothing,
+        candidates,
+        features,
+        errors_sigma,
     }
-}
-
-/// Error of each parameter in its own standard errors, in the coordinate in which it was searched.
-fn errors_sigma(case: &Case, study: &Study, fit: &Fit) -> Vec<f64> {
-    let coordinates = coordinates(&study.effects, &fit.hypothesis);
-    let mut place = 0;
-    let mut errors = Vec::new();
-    for (index, values) in &fit.hypothesis.effects {
-        let id = &study.effects[*index].info().id;
-        let truth = case.causes.iter().find(|cause| cause.effect.info().id == *id).map(|cause| &cause.values);
-        for (number, value) in values.iter().enumerate() {
-            let (coordinate, variance) = (&coordinates[place], fit.covariance[(place, place)]);
-            if let Some(truth) = truth.and_then(|truth| truth.get(number)) {
-                errors.push((coordinate.of(*truth) - coordinate.of(*value)) / variance.sqrt());
-            }
-            place += 1;
-        }
-    }
-    errors.retain(|error| error.is_finite());
-    errors
 }
 
 /// Weight of each case, 1 on average. The threshold needs many cases without a cause; together they count only as much as the

@@ -1,6 +1,6 @@
 //! A logistic regression of unmodelled causes.
 
-use mapper_diagnose::gap::causes::calibration::logistic_features;
+use mapper_diagnose::gap::logistic_features;
 use mapper_numerics::minimise::minimise;
 
 /// Maximum number of iterations of coordinate descent; about fifty are needed.

@@ -42,7 +42,7 @@ pub struct Draw {
     /// The simulator of the cases.
     pub laboratory: Laboratory,
     /// Whether each rig is also recorded on a night without its causes.
-    pub healthy: bool,
+    pub baseline: bool,
 }
 
 /// From barely visible to impossible to overlook.
@@ -58,7 +58,7 @@ impl Draw {
             outside,
             sigma_range: SIGMA_RANGE,
             laboratory: Laboratory::default(),
-            healthy: false,
+            baseline: false,
         }
     }
 

@@ -11,3 +11,10 @@ pub struct Cause {
     /// Its values.
     pub values: Vec<f64>,
 }
+
+impl Cause {
+    /// The id of the effect, and its values.
+    pub(crate) fn id_and_values(&self) -> (String, Vec<f64>) {
+        (self.effect.info().id.to_string(), self.values.clone())
+    }
+}

@@ -4,7 +4,7 @@ use crate::blind::calibration::calibrate::{DiagnosisSummary, fit, shipped, weigh
 use crate::blind::cases::kind::CaseKind;
 use crate::blind::error::BlindError;
 use crate::blind::scoring::interval::{Share, clopper_pearson_95};
-use mapper_diagnose::gap::causes::calibration::Calibration;
+use mapper_diagnose::gap::Calibration;
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -205,7 +205,7 @@ pub fn reliability_text(reliabilities: &[Reliability]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mapper_diagnose::gap::findings::report::Verdict;
+    use mapper_diagnose::gap::Verdict;
 
     /// A case whose first candidate has this `probability`; `right`: whether it is the true cause.
     fn case(probability: f64, right: bool) -> DiagnosisSummary {

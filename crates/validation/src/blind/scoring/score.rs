@@ -7,7 +7,8 @@ use crate::blind::scoring::interval::Share;
 use crate::blind::seal::{MANIFEST_NAME, Manifest, open, read_json};
 use mapper_effects::catalogue;
 use mapper_numerics::statistics::{mean, nearest_rank};
-use serde::{Deserialize, Serialize};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -15,8 +16,11 @@ use std::path::Path;
 #[derive(Debug, Clone, Default, Deserialize)]
 struct Diagnosis {
     verdict: String,
-    #[serde(default, rename = "where")]
-    places: Vec<Place>,
+    #[serde(default)]
+    locations: Vec<Place>,
+    /// A key of the first format, in which no diagnosis is scored.
+    #[serde(default, rename = "where", deserialize_with = "of_first_format")]
+    _where: (),
     #[serde(default)]
     candidates: Vec<Candidate>,
     #[serde(default)]
@@ -25,6 +29,13 @@ struct Diagnosis {
     probability_outside: Option<f64>,
     #[serde(default)]
     gap: Option<Gap>,
+}
+
+/// Refuses a key of the first format.
+fn of_first_format<'de, D: Deserializer<'de>>(_: D) -> Result<(), D::Error> {
+    Err(Error::custom(
+        "its keys are those of format 1 (`where` and `gap.shrink` are now `locations` and `gap.gap_reduction`); diagnose the recording again",
+    ))
 }
 
 #[derive(Debug, Clone, Deserialize)]
@@ -52,7 +63,6 @@ struct Estimate {
 
 #[derive(Debug, Clone, Copy, Deserialize)]
 struct Gap {
-    #[serde(rename = "shrink")]
     gap_reduction: Option<f64>,
 }
 
@@ -255,7 +265,7 @@ fn score_truths(truths: &[Truth], diagnosis_of: impl Fn(&str) -> Option<Diagnosi
         if let (Some(diagnosis), Some(compared)) = (&diagnosis, &compared) {
             set_sizes.push(compared.set_size as f64);
             if matches!(kind, CaseKind::Single | CaseKind::Pair | CaseKind::Triple) {
-                let first_two = diagnosis.places.iter().take(2);
+                let first_two = diagnosis.locations.iter().take(2);
                 let right = first_two
                     .flat_map(|place| causes.iter().map(|id| shows_in(id, &place.submodel)))
                     .any(|right| right);

@@ -1,5 +1,6 @@
 //! `mapper gap blind make`.
 
+use crate::command_line::shared_arguments::renamed;
 use crate::output::failure::Failure;
 use crate::{
     output::{output_options, standard_output},
@@ -40,9 +41,11 @@ pub struct Make {
     /// Simulator of the rig: virtual_lab, or other_lab or two_masses, whose equations no effect of the library has
     #[arg(long, value_name = "NAME", default_value = "virtual_lab")]
     laboratory: Laboratory,
-    /// Also record each rig on another night without its causes, for `run` to give to the diagnosis with --healthy
+    /// Also record each rig on another night without its causes, for `run` to give to the diagnosis with --baseline
     #[arg(long)]
-    healthy: bool,
+    baseline: bool,
+    #[arg(long, hide = true, num_args = 0..=1, default_missing_value = "", value_parser = renamed("--baseline"))]
+    pub healthy: Option<PathBuf>,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
@@ -55,7 +58,7 @@ impl Make {
         let draw = Draw {
             kinds: self.kinds.clone(),
             laboratory: self.laboratory,
-            healthy: self.healthy,
+            baseline: self.baseline,
             sigma_range: [self.least_sigma, self.most_sigma],
             ..Draw::new(self.seed, self.cases, outside)
         };

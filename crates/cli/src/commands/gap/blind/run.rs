@@ -43,7 +43,7 @@ impl Run {
         let names: Vec<&String> = manifest.cases.iter().filter(|name| !name.contains(['/', '\\'])).collect();
         let threads = (cores() / engine.parallel_jobs(names.len())).max(1);
         let diagnosed =
-            engine.each(&names, |_, name| self.diagnose(&program, name, manifest.healthy, threads));
+            engine.each(&names, |_, name| self.diagnose(&program, name, manifest.baseline, threads));
         progress.clear();
         let diagnosed: Vec<_> = diagnosed?.into_iter().collect::<Option<_>>().ok_or_else(|| {
             Failure::new(Code::Interrupted, "stopped by the operator; the same command continues from there")
@@ -65,7 +65,7 @@ impl Run {
         &self,
         program: &Path,
         name: &str,
-        healthy: bool,
+        baseline: bool,
         threads: usize,
     ) -> Result<Result<(), String>, Failure> {
         let of_case = |ending: &str| self.directory.join(format!("{name}.{ending}"));
@@ -80,8 +80,8 @@ impl Run {
             .arg(of_case("mcap"))
             .arg("--json")
             .args(
-                healthy
-                    .then(|| [OsString::from("--healthy"), of_case("healthy.mcap").into()])
+                baseline
+                    .then(|| [OsString::from("--baseline"), of_case("baseline.mcap").into()])
                     .into_iter()
                     .flatten(),
             )

@@ -1,11 +1,11 @@
-//! Changes since a reference recording of the same rig in fault-free condition.
+//! Changes since a baseline: a recording of the same rig in fault-free condition.
 //!
 //! Every model of a rig has a structural error, larger than most faults and present in every recording. A reference recording measures it
 //! block by block: readings `m_h` minus the model `f_h` with its fitted tolerances `u_h`. The diagnosis uses `m - (m_h - f_h(u_h))` with
 //! noise `C + C_h`, unsmoothed because smoothing needs its time history. Each recording has its own inputs, so ambient changes do not count.
 
 use crate::gap::findings::warning::GapWarning;
-use crate::gap::model_error::baseline_assumptions::{Declaration, Lacking, Since};
+use crate::gap::model_error::baseline_assumptions::{Baseline, Declaration, Lacking};
 use crate::gap::model_error::errors_of_change::{elsewhere, errors_of_change};
 use crate::gap::model_error::fitted_tolerances::fitted_tolerances;
 use crate::gap::model_error::measured_structure::measured_structure;
@@ -14,46 +14,35 @@ use crate::gap::model_error::structure::covariance_of_errors;
 use crate::gap::preconditions::machine_mismatch::another_machine;
 use crate::gap::preconditions::problem::GapError;
 use crate::gap::preconditions::usable::checked_study;
+use crate::gap::prepare::Zeroed;
 use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::study::{Group, Study};
 use crate::gap::residuals::whiten::Linearised;
-use mapper_core::{Channel, Recording};
-use mapper_observe::declared::Declared;
+use mapper_core::Channel;
 use mapper_observe::model_inputs::step_timing::with_command_times;
 use mapper_physics::simulation::model::Model;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 
-/// A reference recording: the same rig and steps, fault-free.
-#[derive(Debug)]
-pub struct Healthy<'a> {
-    /// Display name.
-    pub name: String,
-    /// The recording.
-    pub recording: &'a Recording,
-    /// The declared tolerances and noise of this recording.
-    pub declared: Declared,
-}
-
 /// A study of the changes since the reference recording.
 pub(crate) struct Changed {
     pub(crate) study: Study,
-    pub(crate) since: Since,
+    pub(crate) baseline: Baseline,
     /// Warnings about the reference recording.
     pub(crate) warnings: Vec<GapWarning>,
 }
 
 impl Study {
     /// Turns this study into one of the changes since a reference recording.
-    pub(crate) fn since(
+    pub(crate) fn changes_since(
         self,
-        healthy: Healthy<'_>,
+        name: String,
+        baseline: &Zeroed,
         model: Model,
         tolerances_declared: bool,
     ) -> Result<Changed, GapError> {
-        let Healthy { name, recording, declared } = healthy;
-        let recording = &with_command_times(recording);
-        let declared = declared.with_exact_equations();
+        let recording = &with_command_times(&baseline.recording);
+        let declared = baseline.declared.clone().with_exact_equations();
         let (before, warnings) = checked_study(recording, declared, model, Vec::new(), tolerances_declared)?;
         same_steps(&before, &self)?;
         let linearised = Linearised::new(&before)?;
@@ -103,9 +92,9 @@ impl Study {
             noise
         });
         study.other_noise = noise.collect();
-        let since =
-            Since { recording: name, lacking: by_channel(&before, &model_error, &shares, &declarations) };
-        Ok(Changed { study, since, warnings })
+        let baseline =
+            Baseline { recording: name, lacking: by_channel(&before, &model_error, &shares, &declarations) };
+        Ok(Changed { study, baseline, warnings })
     }
 }
 

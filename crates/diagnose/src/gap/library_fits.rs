@@ -1,0 +1,160 @@
+//! The fits of the effect library to a recording: the search, the closest causes refitted, and causes that begin later.
+
+use crate::gap::best_fit::adequacy::{Adequacy, adequacy};
+use crate::gap::best_fit::fit::{Effort, Fit, MAX_SIGMAS};
+use crate::gap::best_fit::selection::Selection;
+use crate::gap::causes::calibration::Calibration;
+use crate::gap::causes::place::{Gain, places};
+use crate::gap::causes::probabilities::{Posterior, posterior};
+use crate::gap::causes::select::{
+    MAX_EVIDENCE_DEFICIT, Search, close, ranked, refit, search, search_onsets, supported,
+};
+use crate::gap::findings::report::{MAX_REFITTED, Place};
+use crate::gap::gap_reduction::folds::Folds;
+use crate::gap::preconditions::problem::GapError;
+use crate::gap::residuals::study::{Study, members};
+use crate::gap::residuals::whiten::Linearised;
+
+/// A recording and the fits of the library to it.
+pub(crate) struct LibraryFits {
+    pub(crate) study: Study,
+    /// Linearised at the nominal model.
+    pub(crate) linearised: Linearised,
+    /// Linearised at the best fit, if the nominal model is far from it.
+    at_best: Option<Linearised>,
+    /// Held-out steps, selected before any fit.
+    pub(crate) folds: Folds,
+    /// Fit of the tolerances alone.
+    pub(crate) null: Fit,
+    /// The closest causes, refitted, best first.
+    pub(crate) fits: Vec<Fit>,
+    /// All fits of the search, best first.
+    searched: Vec<Fit>,
+    /// Tests of the residual of the best fit.
+    pub(crate) adequacy: Adequacy,
+}
+
+/// Effort of the last fits, by which causes are compared.
+const FINAL: Effort =
+    Effort { iterations: 5, enough: 0.1, max_sigmas: MAX_SIGMAS, max_sigmas_of_rig: MAX_SIGMAS, exact: true };
+
+impl LibraryFits {
+    /// Searches the effects that explain the study best.
+    pub(crate) fn new(
+        study: Study,
+        linearised: Linearised,
+        calibration: &Calibration,
+        progress: &dyn Fn(f64, &str),
+    ) -> Result<LibraryFits, GapError> {
+        let folds = Folds::of(&study);
+        let everywhere = Selection::all(&study);
+        let selection = &everywhere;
+        let nominal =
+            Search { study: &study, linearised: &linearised, selection, calibration, onsets: false };
+        let found = search(nominal, progress)?;
+        progress(0.65, "closest causes");
+        let (at_search, members_there) = found.relinearised.unzip();
+        let searched = Search { linearised: at_search.as_ref().unwrap_or(&linearised), ..nominal };
+        let fits = refit(&searched, &closest(&found.fits), FINAL);
+        let moved =
+            fits.first().zip(members_there).filter(|(best, there)| members(&best.hypothesis) != *there);
+        let at_best = moved.and_then(|(best, _)| linearised.at(&study, &best.hypothesis).ok());
+        let fits = match &at_best {
+            Some(at_best) => compared_at_best(&Search { linearised: at_best, ..nominal }, fits),
+            None => fits,
+        };
+        let at_best = at_best.or(at_search);
+        let best = Search { linearised: at_best.as_ref().unwrap_or(&linearised), ..nominal };
+        let fits = supported(&best, fits);
+        let adequacy = adequacy(&study, &linearised, fits.first().unwrap_or(&found.null));
+        let fitted = LibraryFits {
+            at_best,
+            folds,
+            null: found.null,
+            fits,
+            searched: found.fits,
+            adequacy,
+            study,
+            linearised,
+        };
+        Ok(fitted.with_onsets(calibration, selection, progress))
+    }
+
+    /// If the best fit is not adequate: also causes that begin with a step or grow from it.
+    fn with_onsets(
+        mut self,
+        calibration: &Calibration,
+        selection: &Selection,
+        progress: &dyn Fn(f64, &str),
+    ) -> LibraryFits {
+        if calibration.outside(self.adequacy.features()) <= 0.5 || self.folds.steps.len() < 2 {
+            return self;
+        }
+        progress(0.8, "causes that begin");
+        self.study.add_onsets();
+        let linearised = self.at_best.as_ref().unwrap_or(&self.linearised);
+        let at = Search { study: &self.study, linearised, selection, calibration, onsets: true };
+        search_onsets(at, &self.null, &mut self.fits);
+        self.fits.truncate(MAX_REFITTED);
+        self.fits = supported(&at, self.fits);
+        self.adequacy = adequacy(&self.study, &self.linearised, self.fits.first().unwrap_or(&self.null));
+        self
+    }
+
+    /// Probabilities of the causes.
+    pub(crate) fn posterior(&self, calibration: &Calibration) -> Posterior {
+        posterior(&self.study, calibration, &self.null, &self.fits, &self.adequacy)
+    }
+
+    /// The most probable cause; the tolerances alone if there is none.
+    pub(crate) fn best(&self) -> &Fit {
+        self.fits.first().unwrap_or(&self.null)
+    }
+
+    /// Linearised at the best fit.
+    pub(crate) fn at_best(&self) -> &Linearised {
+        self.at_best.as_ref().unwrap_or(&self.linearised)
+    }
+
+    pub(crate) fn adequacy_of(&self, fit: &Fit) -> Adequacy {
+        adequacy(&self.study, &self.linearised, fit)
+    }
+
+    /// Locations of the gap by the causes of the library: by those that the data do not distinguish if a cause is named, else by all.
+    pub(crate) fn locations(&self, calibration: &Calibration, posterior: &Posterior) -> Vec<Place> {
+        let LibraryFits { study, linearised, null, .. } = self;
+        let gain = |fit| Gain { fit, gain: null.cost - fit.cost };
+        let mut gains: Vec<Gain<'_>> = self.fits.iter().map(gain).collect();
+        for fit in &self.searched {
+            if gains.iter().all(|other| members(&other.fit.hypothesis) != members(&fit.hypothesis)) {
+                gains.push(gain(fit));
+            }
+        }
+        let is_alike = |place: &usize, gain: &Gain<'_>| std::ptr::eq(&self.fits[*place], gain.fit);
+        let rank = |gain: &Gain<'_>| posterior.alike.iter().position(|place| is_alike(place, gain));
+        gains.sort_by_key(|gain| rank(gain).unwrap_or(usize::MAX));
+        let named = posterior.probabilities.named.then_some(posterior.alike.len());
+        places((study, calibration), linearised, null, &gains, named)
+    }
+}
+
+/// The fits of the search that are compared: the best, and their members alone, since a pair is only compared fairly if these are refitted, too.
+fn closest(fits: &[Fit]) -> Vec<&Fit> {
+    let Some(best) = fits.first() else { return Vec::new() };
+    let is_close =
+        |(place, fit): &(usize, &Fit)| *place < 3 || best.score - fit.score <= MAX_EVIDENCE_DEFICIT;
+    let mut closest: Vec<&Fit> =
+        fits.iter().take(MAX_REFITTED).enumerate().filter(is_close).map(|(_, fit)| fit).collect();
+    for effect in members(&best.hypothesis) {
+        let alone = fits.iter().find(|fit| members(&fit.hypothesis) == [effect]);
+        closest.extend(alone.filter(|fit| !closest.iter().any(|other| std::ptr::eq(*other, *fit))));
+    }
+    closest
+}
+
+/// Refits close candidates with the linearisation at the best fit, not at the nominal point.
+fn compared_at_best(at_best: &Search<'_>, fits: Vec<Fit>) -> Vec<Fit> {
+    let (closest, others) = fits.split_at(close(&fits[..fits.len().min(4)], MAX_EVIDENCE_DEFICIT).len());
+    let again = refit(at_best, &closest.iter().collect::<Vec<_>>(), FINAL);
+    ranked(at_best, again.iter().chain(closest).chain(others))
+}

@@ -1,7 +1,6 @@
 //! Stores the results of nightly runs in one SQLite file ([`History`]) and finds changes in them.
 //!
-//! For developers, who see the night after a change of the program ([`compare`]), and for production tests of many machines of one type
-//! ([`analyse_productions`]). The file has one row for each run and one for each point. A night is written in one transaction, so that a killed
+//! For developers, who see the night after a change of the program ([`compare`]). The file has one row for each run and one for each point. A night is written in one transaction, so that a killed
 //! process leaves the history unchanged; concurrent processes wait for each other.
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
@@ -10,8 +9,6 @@ mod compare;
 mod error;
 mod metric;
 mod night;
-mod outlier;
-mod production;
 mod quantity;
 mod store;
 
@@ -21,7 +18,5 @@ pub use error::HistoryError;
 pub use mapper_numerics::statistics::median;
 pub use metric::Metric;
 pub use night::{Night, PointRow, RunKey, RunRow};
-pub use outlier::{DeviationPattern, MIN_MACHINES_FOR_OUTLIERS, Outlier};
-pub use production::{Drift, MS_PER_DAY, Production, ProductionPoint, Spread, Stand, analyse_productions};
 pub use quantity::PointQuantity;
-pub use store::{Filter, History, ListedRun, ObservedPoint, StoredNight};
+pub use store::{Filter, History, ListedRun, StoredNight};

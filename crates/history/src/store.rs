@@ -44,17 +44,6 @@ pub struct ListedRun {
     pub run: RunRow,
 }
 
-/// A stored point with its run and night.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ObservedPoint {
-    /// Its night, by [`StoredNight::id`].
-    pub night_id: i64,
-    /// Its run.
-    pub key: RunKey,
-    /// The point.
-    pub point: PointRow,
-}
-
 /// Which runs are listed.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Filter {
@@ -288,39 +277,6 @@ impl History {
                 Ok(ListedRun { night, run: read_run_row(row, 7)? })
             })?
             .collect()
-    }
-
-    /// The points of all runs that match a filter, and their nights, oldest first.
-    ///
-    /// # Errors
-    /// [`HistoryError::Sqlite`].
-    pub fn points(&self, filter: &Filter) -> Result<(Vec<StoredNight>, Vec<ObservedPoint>), HistoryError> {
-        self.try_points(filter).map_err(|source| HistoryError::Sqlite(self.path.clone(), source))
-    }
-
-    fn try_points(&self, filter: &Filter) -> rusqlite::Result<(Vec<StoredNight>, Vec<ObservedPoint>)> {
-        let mut nights: Vec<StoredNight> = self.try_runs(filter)?.into_iter().map(|run| run.night).collect();
-        nights.dedup();
-        let mut statement = self.connection.prepare(
-            "SELECT r.night_id, r.campaign, r.machine, r.method, r.seed, p.speed_rpm, p.valve_opening_ratio, p.visit, p.eta, \
-               p.eta_true, p.h_w_m2k, p.h_true_w_m2k \
-             FROM point p JOIN run r ON r.id = p.run_id JOIN night n ON n.id = r.night_id \
-             WHERE (?1 IS NULL OR r.machine = ?1 OR r.campaign = ?1) AND (?2 IS NULL OR r.method = ?2) \
-               AND (?3 IS NULL OR n.started_ms >= ?3) \
-             ORDER BY n.started_ms, n.id, r.id, p.speed_rpm, p.valve_opening_ratio, p.visit",
-        )?;
-        let points = statement
-            .query_map(params![filter.machine, filter.method, filter.since_ms], |row| {
-                let key = RunKey {
-                    campaign: row.get(1)?,
-                    machine: row.get(2)?,
-                    method: row.get(3)?,
-                    seed: row.get::<_, i64>(4)?.cast_unsigned(),
-                };
-                Ok(ObservedPoint { night_id: row.get(0)?, key, point: read_point_row(row, 5)? })
-            })?
-            .collect::<rusqlite::Result<_>>()?;
-        Ok((nights, points))
     }
 }
 

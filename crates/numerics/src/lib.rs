@@ -1,4 +1,4 @@
-//! General numerical methods for the physics and inference crates: [`statistics`], coloured noise, damped least squares, mixed models,
+//! General numerical methods for the physics and inference crates: [`statistics`], coloured noise, damped least squares,
 //! minima and roots of scalar functions, and parallel work.
 //!
 //! This crate uses no other crate of the workspace. rayon distributes the work, nalgebra solves linear equations, and statrs has the
@@ -15,7 +15,6 @@ pub const SLOPE_STEP: f64 = 6.055_454_452_393_343e-6;
 pub mod coloured_noise;
 pub mod least_squares;
 pub mod minimise;
-pub mod mixed_model;
 pub mod parallel;
 pub mod polyline;
 pub mod root;

@@ -18,8 +18,8 @@ mod targets;
 pub mod thermal_memory;
 mod upper_bound;
 
-pub use jumps::graph::{JumpForecast, build_jump_graph, explain_jump};
-pub use jumps::rejection::Rejection;
+pub use jumps::jump_forecast::{JumpForecast, Rejection, explain_jump, forecast_all_jumps};
+pub use jumps::jump_graph::SeparatePoints;
 pub use jumps::walk::STABLE_DRIFT_K_MIN;
 pub use method::{ForecastRow, MethodResult, MethodResults, PredictedMethod};
 pub use ordering::objective::Objective;

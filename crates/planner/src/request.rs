@@ -1,6 +1,7 @@
 //! Input and errors of planning.
 
-use crate::jumps::rejection::Rejection;
+use crate::jumps::jump_forecast::Rejection;
+use crate::jumps::jump_graph::SeparatePoints;
 use crate::method::PredictedMethod;
 use mapper_core::{Jump, Limits, OperatingPoint, Repeats, SettleBands, Timing, VisitOrder, WindowRule};
 use mapper_physics::machine::params::BoundaryConditions;
@@ -84,6 +85,13 @@ pub enum PlanError {
         worst.iter().map(|(jump, reason)| format!("{} to {}: {reason}", jump.from, jump.to)).collect::<Vec<_>>().join("; ")
     )]
     NoAdmissibleOrder { jumps: usize, worst: Vec<(Jump, Rejection)> },
+    /// No order reaches all points, over other points either.
+    #[error(
+        "no order within the limits reaches all points; separate from the others are {}; widen the limits, add points between, or remove \
+         these points",
+        .0.iter().map(SeparatePoints::to_string).collect::<Vec<_>>().join("; ")
+    )]
+    SeparatePoints(Vec<SeparatePoints>),
     #[error("the forecast of the step to {to} failed: {source}")]
     Forecast { to: OperatingPoint, source: SimulationError },
 }

@@ -9,7 +9,7 @@ use mapper_core::{Dwell, Jump, OperatingPoint, PlanRemark, Repeats, StepKind, Vi
 use mapper_physics::simulation::model::Model;
 use mapper_planner::thermal_memory::chain::gradients_k;
 use mapper_planner::{
-    Effort, Objective, PlanError, PlanRequest, Rejection, build_jump_graph, explain_jump, make_plan,
+    Effort, Objective, PlanError, PlanRequest, Rejection, explain_jump, forecast_all_jumps, make_plan,
     max_steps, search, search_min_gradient,
 };
 
@@ -84,20 +84,42 @@ fn a_forbidden_jump_has_a_reason_and_is_avoided() {
     let plan = make_plan(&limited).unwrap();
     assert!(plan.steps.iter().all(|step| step.predicted.dtc_k.unwrap_or(0.0).abs() <= 15.0));
     limited.limits.housing_gradient_max_k = Some(0.01);
-    let Err(PlanError::NoAdmissibleOrder { jumps, worst }) = make_plan(&limited) else { panic!("a plan") };
-    let exceeds = |reason: &Rejection| matches!(reason, Rejection::HousingGradient { gradient_k, limit_k } if gradient_k.abs() > *limit_k);
-    assert!(jumps >= 1 && worst.len() == 1 && exceeds(&worst[0].1), "{worst:?}");
+    let Err(PlanError::SeparatePoints(separate)) = make_plan(&limited) else { panic!("a plan") };
+    // No jump is allowed, so one point can be reached, and each of the others is alone.
+    assert_eq!(separate.len(), 8);
+    for part in &separate {
+        let (_, reason) = part.into.unwrap();
+        assert!(matches!(reason, Rejection::HousingGradient { gradient_k, .. } if gradient_k > 0.01), "{part}");
+        assert_eq!(part.points.len(), 1);
+    }
+}
+
+/// Points at one opening, where jumps of 20 krpm change the housing by at most 25.3 K and jumps of 100 krpm by more than 26 K.
+#[test]
+fn a_way_over_points_between_replaces_a_forbidden_jump() {
+    let (model, points) = (Model::nominal(), grid());
+    let line: Vec<OperatingPoint> =
+        points.iter().copied().filter(|point| point.valve_opening_ratio == 0.5).collect();
+    let ends_first = [line[0], line[5], line[1], line[2], line[3], line[4]];
+    let mut limited = request(&model, &ends_first, VisitOrder::Listed);
+    limited.limits.housing_gradient_max_k = Some(26.0);
+    let plan = make_plan(&limited).unwrap();
+    assert!(plan.steps.iter().all(|step| step.predicted.dtc_k.unwrap_or(0.0).abs() <= 26.0));
+    // The order of the points is the listed one; the visits between them are no points.
+    let of_kind = |kind| plan.steps.iter().filter(move |step| step.kind == kind);
+    assert_eq!(of_kind(StepKind::Point).map(|step| step.to).collect::<Vec<_>>(), ends_first);
+    assert!(of_kind(StepKind::Repeat).count() >= 2);
+    let around = |remark: &&PlanRemark| matches!(remark, PlanRemark::WayAround { over, .. } if !over.is_empty());
+    assert!(plan.remarks.iter().any(|remark| around(&remark)), "{:?}", plan.remarks);
 }
 
 #[test]
-fn the_graph_has_every_jump_once() {
+fn every_jump_is_forecast_once() {
     let (model, points) = (Model::nominal(), grid());
-    let graph = build_jump_graph(&request(&model, &points[..4], VisitOrder::ThermalGradient)).unwrap();
-    assert_eq!((graph.node_count(), graph.edge_count()), (4, 12));
-    for edge in graph.edge_indices() {
-        let (from, to) = graph.edge_endpoints(edge).unwrap();
-        assert_eq!((graph[from], graph[to]), (graph[edge].from, graph[edge].to));
-    }
+    let jumps = forecast_all_jumps(&request(&model, &points[..4], VisitOrder::ThermalGradient)).unwrap();
+    let pairs = |from: OperatingPoint| points[..4].iter().filter(move |to| **to != from).map(move |to| (from, *to));
+    let expected: Vec<_> = points[..4].iter().flat_map(|from| pairs(*from)).collect();
+    assert_eq!(jumps.iter().map(|jump| (jump.from, jump.to)).collect::<Vec<_>>(), expected);
 }
 
 #[test]

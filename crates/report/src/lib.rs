@@ -37,7 +37,6 @@ pub use history::fleet_text::{cost_text, merged_text, status_text, submission_te
 pub use history::history_picture::history_svg;
 pub use history::history_text::{groups_text, listed_run_json, runs_text, time};
 pub use history::night_text::night_text;
-pub use history::production_text::production_text;
 pub use logs::cause_picture::why_figure;
 pub use logs::cause_text::why_text;
 pub use logs::log_text::log_text;

@@ -1,6 +1,5 @@
 //! `mapper history`: results of the nightly runs.
 
-use crate::command_line::subcommands::subcommands;
 use crate::output::failure::Failure;
 use crate::output::standard_output;
 use crate::output::standard_output::Replace;
@@ -11,13 +10,9 @@ use mapper_session::{SessionError, night_report_link};
 use serde_json::json;
 use std::path::PathBuf;
 
-subcommands! { HistoryCommand:
-    fleet::Fleet,
-}
-
-/// Selected runs of a history.
+/// List, filter and plot the results of the nightly runs
 #[derive(Debug, Args)]
-pub struct RunSelection {
+pub struct History {
     /// The history
     #[arg(long, value_name = "FILE", default_value = "runs/history.db")]
     pub db: PathBuf,
@@ -30,17 +25,6 @@ pub struct RunSelection {
     /// Only nights since this day (UTC)
     #[arg(long, value_name = "YYYY-MM-DD", value_parser = parse_day)]
     pub since: Option<jiff::Timestamp>,
-}
-
-/// List, filter and plot the results of the nightly runs
-#[derive(Debug, Args)]
-#[command(args_conflicts_with_subcommands = true)]
-pub struct History {
-    /// Other statistics
-    #[command(subcommand)]
-    command: Option<HistoryCommand>,
-    #[command(flatten)]
-    pub selection: RunSelection,
     /// Show this figure instead of the default ones; may be given more than once
     #[arg(long, value_name = "FIGURE", value_parser = parse_metric)]
     pub figure: Vec<Metric>,
@@ -81,36 +65,24 @@ const DEFAULT_METRICS: [Metric; 6] = [
     Metric::HMedianError,
 ];
 
-impl RunSelection {
-    fn filter(&self) -> Filter {
-        Filter {
+impl History {
+    pub fn run(&self) -> Result<(), Failure> {
+        let filter = Filter {
             machine: self.machine.clone(),
             method: self.method.clone(),
             since_ms: self.since.map(|since| since.as_millisecond()),
-        }
-    }
-}
-
-fn open_history(selection: &RunSelection) -> Result<mapper_history::History, Failure> {
-    Ok(mapper_history::History::open_existing(&selection.db).map_err(SessionError::from)?)
-}
-
-impl History {
-    pub fn run(&self) -> Result<(), Failure> {
-        if let Some(command) = &self.command {
-            return command.run();
-        }
-        let runs =
-            open_history(&self.selection)?.runs(&self.selection.filter()).map_err(SessionError::from)?;
+        };
+        let history = mapper_history::History::open_existing(&self.db);
+        let runs = history.and_then(|history| history.runs(&filter)).map_err(SessionError::from)?;
         let figures: Vec<Metric> =
             if self.figure.is_empty() { DEFAULT_METRICS.to_vec() } else { self.figure.clone() };
         if let Some(path) = &self.svg {
-            let report_of = |started_ms| night_report_link(path, &self.selection.db, started_ms);
+            let report_of = |started_ms| night_report_link(path, &self.db, started_ms);
             self.replace.write(path, history_svg(&runs, &figures, report_of).as_bytes())?;
         }
         if self.json {
             let runs: Vec<serde_json::Value> = runs.iter().map(mapper_report::listed_run_json).collect();
-            return standard_output::print_json(&json!({"history": self.selection.db, "runs": runs}));
+            return standard_output::print_json(&json!({"history": self.db, "runs": runs}));
         }
         standard_output::print(&if self.runs {
             runs_text(&runs, &figures)

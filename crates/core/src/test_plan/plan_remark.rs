@@ -15,6 +15,8 @@ PlanRemark {
     "no_repeated_jump" NoRepeatedJump,
     /// A jump follows all other steps, and is not a point of the map.
     "appended_jump" AppendedJump { from: OperatingPoint, to: OperatingPoint },
+    /// A limit forbids the jump; the plan leads over these points instead, which it visits again.
+    "way_around" WayAround { from: OperatingPoint, to: OperatingPoint, over: Vec<OperatingPoint> },
     /// The first point is visited again at the end.
     "first_point_again" FirstPointAgain { point: OperatingPoint },
     /// No jump leads to the first point, so that it has no transient.
@@ -45,6 +47,8 @@ pub enum NoBound {
     OrderNotSearched,
     /// A jump was appended to the points.
     AppendedJump,
+    /// The plan leads around forbidden jumps.
+    WayAround,
     /// There are too many points for its table, or the housing states are unbounded.
     TooLarge,
 }

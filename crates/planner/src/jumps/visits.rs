@@ -1,6 +1,6 @@
 //! The visits of a plan: its points in order, repeats of one jump to detect drift, the return to the first point, and an appended jump.
 
-use crate::jumps::graph::forecast_jump;
+use crate::jumps::jump_forecast::forecast_jump;
 use crate::ordering::objective::{FORBIDDEN_PENALTY, Objective};
 use crate::request::{PlanError, PlanRequest};
 use crate::thermal_memory::chain::{Chain, RepeatedJump, return_jump};
@@ -52,7 +52,8 @@ pub(crate) fn propose_repeated_jumps(
     });
     let mut allowed = Vec::new();
     for (from, to) in jumps.into_iter().take(MAX_SIMULATED_JUMPS) {
-        let jump = forecast_jump(request, (points[from], &targets[from]), (points[to], &targets[to]))?;
+        let dwell_s = request.timing.dwell.fixed_or_usual_s();
+        let jump = forecast_jump(request, (points[from], &targets[from]), (points[to], &targets[to]), dwell_s)?;
         if jump.rejections.is_empty() {
             allowed.push(Jump { from: jump.from, to: jump.to });
         }

@@ -1,6 +1,6 @@
 //! Plans of the same points in the other orders, for comparison.
 
-use crate::plans::plan::make_plan;
+use crate::plans::plan::make_plan_of_direct_jumps;
 use crate::request::{PlanError, PlanRequest};
 use mapper_core::{Dwell, Plan, Timing, VisitOrder};
 use mapper_numerics::parallel;
@@ -19,7 +19,7 @@ pub fn plan_other_orders(request: &PlanRequest<'_>, plan: &Plan) -> Result<Vec<P
     let make = |order: &VisitOrder| {
         let conventional = *order == VisitOrder::Conventional;
         let dwell = Dwell::Fixed(if conventional { 0.0 } else { dwell_s });
-        make_plan(&PlanRequest {
+        make_plan_of_direct_jumps(&PlanRequest {
             order: *order,
             timing: Timing { dwell, ..request.timing },
             repeats: request.repeats.filter(|_| !conventional),

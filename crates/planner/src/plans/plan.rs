@@ -29,31 +29,55 @@ pub fn make_plan(request: &PlanRequest<'_>) -> Result<Plan, PlanError> {
         return Err(PlanError::NoPoints);
     }
     let targets = solve_steady_states(request, request.points)?;
-    let plan = plan_with_repeats(request, &targets);
+    match plan_with_return(request, &targets, false) {
+        // Every order contains a forbidden jump: lead around it.
+        Err(PlanError::NoAdmissibleOrder { .. }) => plan_with_return(request, &targets, true),
+        plan => plan,
+    }
+}
+
+/// Makes the plan of [`make_plan`], but refuses if every order contains a forbidden jump.
+pub(crate) fn make_plan_of_direct_jumps(request: &PlanRequest<'_>) -> Result<Plan, PlanError> {
+    plan_with_return(request, &solve_steady_states(request, request.points)?, false)
+}
+
+/// Makes the plan with the return to the first point if it is requested and allowed. `targets`: the steady states of its points.
+fn plan_with_return(
+    request: &PlanRequest<'_>,
+    targets: &[SteadyState],
+    ways_around: bool,
+) -> Result<Plan, PlanError> {
+    let plan = plan_with_repeats(request, targets, ways_around);
     let (true, Err(PlanError::NoAdmissibleOrder { .. })) = (request.return_to_first, &plan) else {
         return plan;
     };
     // Only the return may be forbidden. It is a default, not a request, so the plan is made without it.
-    let mut plan = plan_with_repeats(&PlanRequest { return_to_first: false, ..request.clone() }, &targets)?;
+    let without = PlanRequest { return_to_first: false, ..request.clone() };
+    let mut plan = plan_with_repeats(&without, targets, ways_around)?;
     plan.remarks.push(PlanRemark::NoWayBack);
     Ok(plan)
 }
 
-/// Makes the plan with the requested repeats. `targets`: the steady states of its points.
-fn plan_with_repeats(request: &PlanRequest<'_>, targets: &[SteadyState]) -> Result<Plan, PlanError> {
-    let Some(repeats) = request.repeats else { return plan_with_jump(request, targets, None) };
+/// Makes the plan with the requested repeats.
+fn plan_with_repeats(
+    request: &PlanRequest<'_>,
+    targets: &[SteadyState],
+    ways_around: bool,
+) -> Result<Plan, PlanError> {
+    let plan_with_jump = |repeats| plan_with_jump(request, targets, repeats, ways_around);
+    let Some(repeats) = request.repeats else { return plan_with_jump(None) };
     if let Some(jump) = repeats.jump {
-        return plan_with_jump(request, targets, Some((repeats, jump)));
+        return plan_with_jump(Some((repeats, jump)));
     }
     let mut no_order = None;
     for jump in propose_repeated_jumps(request, targets)?.into_iter().take(MAX_REPEATED_JUMPS_TRIED) {
-        match plan_with_jump(request, targets, Some((repeats, jump))) {
+        match plan_with_jump(Some((repeats, jump))) {
             // The jump may be allowed from a steady state, but not from the housing temperatures of the plan: try the next one.
             Err(error @ PlanError::NoAdmissibleOrder { .. }) => no_order = Some(error),
             result => return result,
         }
     }
-    let mut plan = plan_with_jump(request, targets, None).map_err(|error| no_order.unwrap_or(error))?;
+    let mut plan = plan_with_jump(None).map_err(|error| no_order.unwrap_or(error))?;
     plan.remarks.push(PlanRemark::NoRepeatedJump);
     Ok(plan)
 }
@@ -63,8 +87,9 @@ fn plan_with_jump(
     request: &PlanRequest<'_>,
     targets: &[SteadyState],
     repeats: Option<(Repeats, Jump)>,
+    ways_around: bool,
 ) -> Result<Plan, PlanError> {
-    let builder = PlanBuilder::new(request, targets, repeats)?;
+    let builder = PlanBuilder::new(request, targets, repeats, ways_around)?;
     let draft = match request.timing.dwell {
         Dwell::Fixed(dwell_s) => builder.draft(dwell_s)?,
         Dwell::TimeBudget(budget_s) => fit_time_budget(request, &builder, budget_s)?,
@@ -82,19 +107,26 @@ fn fit_time_budget(
     let steps_s = budget_s - request.timing.warm_up_s - request.timing.cool_down_s;
     let dwell_s = |steps: usize| (steps_s / steps as f64).floor();
     let steps = max_steps(request);
-    if dwell_s(steps) < MIN_DWELL_S {
-        return Err(PlanError::BudgetTooShort {
+    let too_short = |steps: usize| {
+        Err(PlanError::BudgetTooShort {
             budget_s,
             steps,
             dwell_s: dwell_s(steps).max(0.0),
             shortest_s: MIN_DWELL_S,
             needed_s: budget_s - steps_s + steps as f64 * MIN_DWELL_S,
-        });
+        })
+    };
+    if dwell_s(steps) < MIN_DWELL_S {
+        return too_short(steps);
     }
     let draft = builder.draft(dwell_s(steps))?;
-    // A repeat takes one step instead of two if the order visits the start of the repeated jump anyway.
-    let longer_s = dwell_s(draft.steps().len());
-    if longer_s > draft.dwell_s { builder.with_dwell(draft, longer_s) } else { Ok(draft) }
+    // A repeat takes one step instead of two if the order visits the start of the repeated jump anyway. Ways around forbidden jumps take
+    // more steps.
+    let steps = draft.steps().len();
+    match dwell_s(steps) {
+        fitting_s if fitting_s < MIN_DWELL_S => too_short(steps),
+        fitting_s => builder.with_dwell(draft, fitting_s),
+    }
 }
 
 /// Finds the shortest dwell, in whole seconds, whose expected error (rms over the points) is at most `required`; the maximum dwell if

@@ -1,6 +1,7 @@
 //! Builds a plan for a given dwell: order, repeats, appended jump, figures, bound and remarks.
 
-use crate::jumps::rejection::Rejection;
+use crate::jumps::jump_forecast::{Rejection, forecast_jumps};
+use crate::jumps::jump_graph::JumpGraph;
 use crate::jumps::visits::{
     Visit, append_jump, append_return, insert_repeats, repeat_count, value, visits_of_points,
 };
@@ -28,7 +29,10 @@ const MAX_REORDERINGS: usize = 25;
 /// Effort of a repeated search relative to the first: with one jump forbidden, the best order changes little.
 const REORDER_EFFORT_RATIO: f64 = 0.2;
 
-/// Maximum number of steps of a plan: each repeat and the appended jump take at most two.
+/// Maximum number of points for which all jumps are simulated to find ways around forbidden ones: some seconds.
+const MAX_GRAPH_POINTS: usize = 100;
+
+/// Maximum number of steps of a plan without ways around forbidden jumps: each repeat and the appended jump take at most two.
 pub fn max_steps(request: &PlanRequest<'_>) -> usize {
     let points = request.points.len();
     let repeats = request.repeats.map_or(0, |repeats| 2 * repeat_count(repeats, points));
@@ -44,6 +48,15 @@ pub(crate) struct PlanBuilder<'a> {
     targets: Vec<SteadyState>,
     repeated: Option<RepeatedJump>,
     appended: Option<(usize, usize)>,
+    /// Whether a way over other points may replace a forbidden jump.
+    ways_around: bool,
+}
+
+/// A forbidden jump of an order, and the points over which the plan leads instead.
+#[derive(Debug, Clone, PartialEq)]
+struct WayAround {
+    jump: Jump,
+    over: Vec<OperatingPoint>,
 }
 
 /// An order of the points with its simulated steps.
@@ -52,6 +65,7 @@ pub(crate) struct Draft {
     pub(crate) dwell_s: f64,
     ordered: PointOrder,
     visits: Vec<Visit>,
+    ways_around: Vec<WayAround>,
     steps: Vec<PlanStep>,
     parameter_error: Option<ParameterError>,
     /// The reduced housing on which the order was searched; `None` if it was made for another dwell.
@@ -75,9 +89,10 @@ impl<'a> PlanBuilder<'a> {
         request: &'a PlanRequest<'a>,
         targets: &[SteadyState],
         repeats: Option<(Repeats, Jump)>,
+        ways_around: bool,
     ) -> Result<Self, PlanError> {
         let (points, targets) = (request.points.to_vec(), targets.to_vec());
-        let mut builder = PlanBuilder { request, points, targets, repeated: None, appended: None };
+        let mut builder = PlanBuilder { request, points, targets, repeated: None, appended: None, ways_around };
         if let Some((repeats, Jump { from, to })) = repeats {
             let (from, to) = (builder.index_of(from)?, builder.index_of(to)?);
             builder.repeated =
@@ -103,6 +118,9 @@ impl<'a> PlanBuilder<'a> {
         let request = self.request;
         let mut housing = Housing::new(request, &self.points, &self.targets, dwell_s)?;
         housing.has_return = request.return_to_first;
+        if self.ways_around && self.points.len() <= MAX_GRAPH_POINTS {
+            return self.draft_with_ways_around(housing, dwell_s);
+        }
         let mut given: Vec<usize> = (0..request.points.len()).collect();
         let mut forbidden_jumps: BTreeSet<(usize, usize)> = BTreeSet::new();
         let mut worst: Vec<(Jump, Rejection)> = Vec::new();
@@ -121,6 +139,7 @@ impl<'a> PlanBuilder<'a> {
                     dwell_s,
                     ordered,
                     visits,
+                    ways_around: Vec::new(),
                     steps,
                     parameter_error,
                     housing: Some(housing),
@@ -139,6 +158,64 @@ impl<'a> PlanBuilder<'a> {
             }
         }
         Err(PlanError::NoAdmissibleOrder { jumps: forbidden_jumps.len(), worst })
+    }
+
+    /// Searches the order with the fewest forbidden jumps, and leads around each of them on the shortest way over other points.
+    fn draft_with_ways_around(&self, mut housing: Housing, dwell_s: f64) -> Result<Draft, PlanError> {
+        let request = self.request;
+        let mut graph = JumpGraph::complete(&self.points);
+        graph.forbid_rejected(&forecast_jumps(request, &self.points, &self.targets, dwell_s)?);
+        let ranks = graph.ranks().map_err(PlanError::SeparatePoints)?;
+        graph.forbidden().for_each(|(from, to)| housing.forbid(from, to));
+        let given: Vec<usize> = (0..request.points.len()).collect();
+        let mut orders = search_orders(&housing, &self.points, &given, request);
+        for ordered in &mut orders {
+            ordered.order.sort_by_key(|point| ranks[*point]);
+            ordered.proven = false;
+        }
+        let (ordered, direct, _) = self.best_of(&housing, orders).ok_or(PlanError::NoPoints)?;
+        let mut worst: Vec<(Jump, Rejection)> = Vec::new();
+        while let Some((visits, ways_around)) = self.lead_around(&graph, &direct) {
+            let Walk { steps, forbidden, parameter_error } =
+                walk(request, &self.points, &self.targets, &visits, dwell_s)?;
+            if forbidden.is_empty() {
+                let housing = Some(housing);
+                return Ok(Draft { dwell_s, ordered, visits, ways_around, steps, parameter_error, housing });
+            }
+            let mut is_new = false;
+            for ForbiddenJump { from, to, reasons } in forbidden {
+                is_new |= graph.forbid(from, to, &reasons);
+                let jump = Jump { from: self.points[from], to: self.points[to] };
+                reasons.into_iter().for_each(|reason| keep_worst(&mut worst, jump, reason));
+            }
+            if !is_new {
+                break;
+            }
+        }
+        Err(PlanError::NoAdmissibleOrder { jumps: graph.forbidden().count(), worst })
+    }
+
+    /// The visits with a way over other points in place of each forbidden jump. `None` if there is no such way, or if the jump is one that
+    /// the plan has to make: the repeated or the appended one.
+    fn lead_around(&self, graph: &JumpGraph, direct: &[Visit]) -> Option<(Vec<Visit>, Vec<WayAround>)> {
+        let required = [self.repeated.map(|jump| (jump.from, jump.to)), self.appended];
+        let (mut visits, mut ways): (Vec<Visit>, Vec<WayAround>) = (Vec::new(), Vec::new());
+        for visit in direct {
+            if let Some(from) = visits.last().map(|last| last.index)
+                && from != visit.index
+                && !graph.is_allowed(from, visit.index)
+            {
+                if visit.kind == StepKind::Repeat && required.contains(&Some((from, visit.index))) {
+                    return None;
+                }
+                let over = graph.points_between(from, visit.index)?;
+                visits.extend(over.iter().map(|&index| Visit { index, kind: StepKind::Repeat }));
+                let jump = Jump { from: self.points[from], to: self.points[visit.index] };
+                ways.push(WayAround { jump, over: over.into_iter().map(|point| self.points[point]).collect() });
+            }
+            visits.push(*visit);
+        }
+        Some((visits, ways))
     }
 
     /// The order with the highest value including repeats, its visits, and whether they end with a return to the first point.
@@ -197,7 +274,7 @@ impl<'a> PlanBuilder<'a> {
             cool_down_s: timing.cool_down_s,
             remarks: self.remarks(&draft),
             figures,
-            bound_remark: self.bound_remark(bound.as_ref()),
+            bound_remark: self.bound_remark(&draft, bound.as_ref()),
             bound,
             steps: draft.steps,
             surge_search_s: 0.0,
@@ -207,7 +284,7 @@ impl<'a> PlanBuilder<'a> {
     /// Upper bounds on the gradients of any order with this dwell, if the order was searched for.
     fn bound(&self, draft: &Draft) -> Result<Option<PlanBound>, PlanError> {
         let request = self.request;
-        if !request.order.is_searched() || request.appended.is_some() {
+        if !request.order.is_searched() || request.appended.is_some() || !draft.ways_around.is_empty() {
             return Ok(None);
         }
         let housing = match &draft.housing {
@@ -259,7 +336,7 @@ impl<'a> PlanBuilder<'a> {
     }
 
     /// Reason why the bound is missing.
-    fn bound_remark(&self, bound: Option<&PlanBound>) -> Option<NoBound> {
+    fn bound_remark(&self, draft: &Draft, bound: Option<&PlanBound>) -> Option<NoBound> {
         let request = self.request;
         if bound.is_some() || !request.bound {
             None
@@ -267,6 +344,8 @@ impl<'a> PlanBuilder<'a> {
             Some(NoBound::OrderNotSearched)
         } else if request.appended.is_some() {
             Some(NoBound::AppendedJump)
+        } else if !draft.ways_around.is_empty() {
+            Some(NoBound::WayAround)
         } else {
             Some(NoBound::TooLarge)
         }
@@ -281,6 +360,11 @@ impl<'a> PlanBuilder<'a> {
         if let Some(PlanStep { from: Some(from), to, .. }) = repeats().next() {
             remarks.push(PlanRemark::RepeatedJump { from: *from, to: *to, times: repeats().count() });
         }
+        remarks.extend(draft.ways_around.iter().map(|WayAround { jump, over }| PlanRemark::WayAround {
+            from: jump.from,
+            to: jump.to,
+            over: over.clone(),
+        }));
         if let Some(Jump { from, to }) = request.appended {
             remarks.push(PlanRemark::AppendedJump { from, to });
         }

@@ -1,8 +1,11 @@
 //! Trends of the nights: a panel per figure, a line per campaign and method.
 
 use mapper_chart::{Axis, Colour, Figure as Picture, Line, Note, Panel, Scatter};
-use mapper_history::{ListedRun, MS_PER_DAY, Metric, median};
+use mapper_history::{ListedRun, Metric, median};
 use std::collections::{BTreeMap, BTreeSet};
+
+/// Milliseconds of a day.
+const MS_PER_DAY: f64 = 86_400_000.0;
 
 const COLOURS: [Colour; 8] = [
     Colour(0x1D, 0x4E, 0x89),

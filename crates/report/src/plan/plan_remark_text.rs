@@ -23,6 +23,11 @@ pub fn plan_remark_text(remark: &PlanRemark) -> String {
                 place(to)
             )
         }
+        PlanRemark::WayAround { from, to, over } => {
+            let over: Vec<String> = over.iter().map(place).collect();
+            let (from, to) = (place(from), place(to));
+            format!("a limit forbids the jump from {from} to {to}; the plan leads over {}", over.join(", "))
+        }
         PlanRemark::FirstPointAgain { point } => {
             format!(
                 "the first point, {}, is visited again at the end: no jump led to it at the start",
@@ -113,6 +118,7 @@ pub(crate) fn no_bound_text(reason: NoBound) -> &'static str {
     match reason {
         NoBound::OrderNotSearched => "the order was not searched for",
         NoBound::AppendedJump => "none: a jump was appended to the points",
+        NoBound::WayAround => "none: the plan leads around forbidden jumps",
         NoBound::TooLarge => {
             "none: too many points for its table, or the states of the housing are unbounded"
         }

@@ -62,7 +62,7 @@ pub(crate) fn mark(kind: StepKind) -> &'static str {
 /// The meaning of the marks of these steps; empty without any.
 pub(crate) fn marks_legend(kinds: &[StepKind]) -> String {
     let marks = [
-        (StepKind::Repeat, "r repeats a jump to show drift"),
+        (StepKind::Repeat, "r visits a point again, to show drift or to lead around a forbidden jump"),
         (StepKind::Return, "a visits the first point again"),
         (StepKind::Approach, "s approaches surge"),
     ];

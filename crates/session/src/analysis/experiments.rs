@@ -75,8 +75,8 @@ fn allowed_jumps(campaign: &Campaign, model: &Model) -> Result<Vec<AllowedJump>,
     let inputs = PlanInputs::of(campaign)?;
     // The check of a jump does not depend on the expected error after it.
     let request = PlanRequest { method: None, ..inputs.request(campaign, model) };
-    let Ok(graph) = mapper_planner::build_jump_graph(&request) else { return Ok(Vec::new()) };
-    let allowed = graph.edge_weights().filter(|jump| jump.rejections.is_empty());
+    let Ok(jumps) = mapper_planner::forecast_all_jumps(&request) else { return Ok(Vec::new()) };
+    let allowed = jumps.iter().filter(|jump| jump.rejections.is_empty());
     Ok(allowed
         .map(|jump| AllowedJump {
             from: jump.from,

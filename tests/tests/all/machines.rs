@@ -1,6 +1,6 @@
-//! A production series: machines are run one after the other and evaluated together.
+//! Nights of many machines of one kind: of a table, or drawn.
 
-use mapper_tests::{mapper, mapper_in, python, repository, scratch};
+use mapper_tests::{mapper_in, repository, scratch};
 use serde_json::Value;
 use std::path::Path;
 
@@ -43,18 +43,6 @@ fn machines_of_a_table_are_run_one_by_one() {
     };
     // 4 % less efficiency by definition; the points move a little, since the machine runs at another pressure for the same set-points.
     assert!((eta("B-2") / eta("B-1") - 0.96).abs() < 0.005, "{} {}", eta("B-1"), eta("B-2"));
-
-    // Two seeds a machine: machines and the rest are separated, as `history fleet` reports.
-    let fleet =
-        mapper_in(scratch.path(), ["history", "fleet", "--db", "history.db", "--json"]).exits(0).json();
-    let production = &fleet["productions"][0];
-    assert_eq!(production["machines"], serde_json::json!(["B-1", "B-2"]));
-    assert_eq!(production["outliers"], Value::Null, "two machines say nothing of what is usual");
-    for place in production["places"].as_array().unwrap() {
-        // Two machines 4 % of 0.7 apart have a standard deviation of 0.02; dynamic without a zero adds its own.
-        let sigma = number(&place["eta"], "machine_sigma");
-        assert!((0.01..0.035).contains(&sigma), "{place}");
-    }
 }
 
 #[test]
@@ -97,50 +85,4 @@ fn a_drawn_machine_is_the_same_in_every_run() {
     let (again, other) = (mean(&truth("-0001", 2)), mean(&truth("-0002", 1)));
     let first = mean(&truth("-0001", 1));
     assert!((first - again).abs() < 0.2 * (first - other).abs(), "{first} {again} {other}");
-}
-
-/// Compared with the restricted maximum likelihood of statsmodels on the same history without outliers.
-#[test]
-#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
-fn a_production_is_fitted_as_statsmodels_fits_it() {
-    let scratch = scratch();
-    write(scratch.path(), "drawn_machines: 1");
-    mapper_in(scratch.path(), ["nightly", "nightly.yaml"]).exits(0);
-    let history = scratch.path().join("history.db");
-    let reference = python("production.py", [&history]);
-    let arguments = ["history", "fleet", "--machine", "made", "--db", history.to_str().unwrap()];
-    let production = &mapper(arguments.iter().chain(&["--json"])).exits(0).json()["productions"][0];
-
-    let outliers = production["outliers"].as_array().unwrap();
-    let found: Vec<(&str, &str)> = outliers
-        .iter()
-        .map(|one| (one["machine"].as_str().unwrap(), one["sign"].as_str().unwrap()))
-        .collect();
-    assert_eq!(found.len(), 2, "{outliers:?}");
-    assert!(found.contains(&("M-07", "efficiency_everywhere")), "{found:?}");
-    assert!(found.contains(&("M-19", "efficiency_at_low_speed")), "{found:?}");
-
-    let places = production["places"].as_array().unwrap();
-    let mut drift = 0.0;
-    for (place, expected) in places.iter().zip(reference.as_array().unwrap()) {
-        assert_eq!(place["speed_rpm"], expected["speed_rpm"]);
-        let eta = &place["eta"];
-        assert!((number(eta, "mean") - number(expected, "mean")).abs() < 1e-6, "{eta} {expected}");
-        for sigma in ["machine_sigma", "night_sigma", "residual_sigma"] {
-            // statsmodels' search ends within a few parts in ten thousand.
-            let ratio = number(eta, sigma) / number(expected, sigma);
-            assert!((ratio - 1.0).abs() < 2e-3, "{sigma}: {eta} {expected}");
-        }
-        drift += number(expected, "drift_a_day") / 4.0;
-    }
-    let found = &production["stand"]["eta_drift"];
-    assert!((number(found, "a_day") / drift - 1.0).abs() < 1e-3, "{found} {drift}");
-    assert!(
-        number(found, "low") < -0.0008 && -0.0008 < number(found, "high"),
-        "the drift that was put in: {found}"
-    );
-
-    let text = mapper(arguments).exits(0).stdout;
-    assert!(text.lines().all(|line| line.chars().count() <= 120), "{text}");
-    assert!(text.contains("M-07: efficiency") && text.contains("2 of 24 machines stand out"), "{text}");
 }

@@ -3,7 +3,7 @@
     pip install CoolProp numpy
     python benches/gas_properties.py
 
-Prints the constants of crates/physics/src/gas/species.rs: `cp/R` of the ideal gas in powers of T/1000 K, least squares of the relative
+Prints the constants of crates/physics/src/gas/mixture.rs: `cp/R` of the ideal gas in powers of T/1000 K, least squares of the relative
 error at 400 temperatures from 220 to 1400 K, four times the weight below 650 K, where compressors work. Then those of
 crates/physics/src/gas/mixture.rs: second virial coefficients in powers of 1/T, of water vapour (IAPWS-95, relative error) and of water vapour with air
 (Harvey and Huang, Int. J. Thermophys. 28, 2007, as in ASHRAE RP-1485).

@@ -20,7 +20,7 @@ const FORMULAS: &[(&str, &[f64], &str)] = &[
     ("crates/identify/src/joint/fit/input_noise_spline.rs", &[0.25, 3.0, 6.0], "natural cubic spline"),
     ("crates/recording/src/logs/proposal/shared_units.rs", &[4.0], "area of a circle"),
     (
-        "crates/numerics/src/coloured_noise/first_order.rs",
+        "crates/numerics/src/coloured_noise.rs",
         &[6.0, 24.0, 120.0, 720.0, 5040.0],
         "series of e^-x",
     ),

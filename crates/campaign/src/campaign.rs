@@ -1,53 +1,41 @@
 //! The campaign file, and the [`Campaign`] with units resolved and defaults filled in. Its elements are in `elements`.
 
-use crate::elements::evaluation::acceptance::AcceptanceFile;
-use crate::elements::evaluation::drift::DriftFile;
+use crate::elements::evaluation::acceptance::{AcceptanceFile, DriftFile};
+pub use crate::elements::evaluation::identification::Identification;
 use crate::elements::evaluation::identification::IdentificationFile;
 use crate::elements::evaluation::tolerances::TolerancesElement;
+pub use crate::elements::output::{DisplayUnits, FormatName, Outputs, Report};
 use crate::elements::points::grid::GridFile;
-use crate::elements::points::repeats::{RepeatsFile, repeats};
-use crate::elements::points::sequence::sequence;
-use crate::elements::points::surge_search::SurgeSearchFile;
-use crate::elements::points::timing::TimingFile;
-use crate::elements::points::zero::ZeroFile;
-use crate::elements::rig::backend::backend;
-use crate::elements::rig::boundary::BoundaryFile;
+pub use crate::elements::points::repeats::SequenceSource;
+use crate::elements::points::repeats::{RepeatsFile, SurgeSearchFile, repeats, sequence};
+use crate::elements::points::timing::{TimingFile, ZeroFile};
+pub use crate::elements::rig::backend::{BackendChoice, ReaderChoice};
+use crate::elements::rig::backend::{ReaderFile, backend, readers};
 use crate::elements::rig::calibration::Calibration;
+pub use crate::elements::rig::calibration::{CalibrationRule, Date};
+use crate::elements::rig::control::{SafeStateFile, SpeedControlFile, speed_control};
 use crate::elements::rig::guards::{GuardInputs, GuardsFile};
-use crate::elements::rig::limits::LimitsFile;
-use crate::elements::rig::readers::{ReaderFile, readers};
-use crate::elements::rig::safe_state::SafeStateFile;
+use crate::elements::rig::limits::{BoundaryFile, LimitsFile};
+pub use crate::elements::rig::redundant_sensors::SensorDeclaration;
 use crate::elements::rig::sensors::SensorsFile;
-use crate::elements::rig::speed_control::{SpeedControlFile, speed_control};
-use crate::elements::turbocharger::efficiency::EfficiencyFile;
 use crate::elements::turbocharger::gas::GasFile;
 use crate::elements::turbocharger::machine::MachineFile;
-use crate::elements::turbocharger::reference::ReferenceFile;
+pub use crate::elements::turbocharger::machine::{DescriptionSource, Machine, MapSource};
+use crate::elements::turbocharger::reference::{EfficiencyFile, ReferenceFile};
 use mapper_core::{
     AcceptanceCriteria, Channel, EfficiencyDefinition, GuardSet, Limits, ModelTolerances, OnDrift,
     OperatingPoint, ReferenceState, Repeats, SafeTrajectory, Soak, SpeedControlSettings, SurgeSearchSettings,
     Timing, VisitOrder,
 };
 use mapper_physics::machine::params::BoundaryConditions;
-use mapper_physics::operating_point::follow_outlet::FollowOutlet;
 use mapper_physics::operating_point::line_points::LineRequest;
+use mapper_physics::operating_point::reach::FollowOutlet;
 use mapper_yaml::Step;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
-
-pub use crate::elements::evaluation::identification::Identification;
-pub use crate::elements::output::display::DisplayUnits;
-pub use crate::elements::output::outputs::{FormatName, Outputs};
-pub use crate::elements::output::report::Report;
-pub use crate::elements::points::sequence::SequenceSource;
-pub use crate::elements::rig::backend::BackendChoice;
-pub use crate::elements::rig::calibration::{CalibrationRule, Date};
-pub use crate::elements::rig::readers::ReaderChoice;
-pub use crate::elements::rig::redundant_sensors::SensorDeclaration;
-pub use crate::elements::turbocharger::machine::{DescriptionSource, Machine, MapSource};
 
 /// A checked campaign: everything that a run needs, in SI units and rpm.
 ///

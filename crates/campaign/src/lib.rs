@@ -20,10 +20,10 @@ mod testing;
 
 pub use campaign::Campaign;
 pub use checks::calibration::{CalibrationWarning, forecast_calibration_warnings};
-pub use checks::concern::Concern;
 pub use checks::map_misfit::{MapMisfit, find_map_misfit};
+pub use checks::reachable_points::Concern;
 pub use checks::reachable_points::{UnreachablePoint, nominal_model, unreachable_points};
-pub use checks::unusual_settings::sizes::USUAL_WHEEL_DIAMETERS_M;
+pub use checks::unusual_settings::USUAL_WHEEL_DIAMETERS_M;
 pub use elements::rig::guards::DEFAULT_MAX_AGE_S;
 pub use files::load::{
     CampaignError, MAX_FILE_BYTES, MAX_MAP_BYTES, backend_mistake, check, check_with, format_mistake, load,

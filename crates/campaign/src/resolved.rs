@@ -1,11 +1,11 @@
 //! Resolves the speed lines of a campaign to points on the nominal machine.
 
 use crate::campaign::Campaign;
-use crate::checks::concern::Concern;
+use crate::checks::reachable_points::Concern;
 use mapper_core::OperatingPoint;
 use mapper_physics::machine::params::BoundaryConditions;
-use mapper_physics::operating_point::follow_outlet::hold_speed;
 use mapper_physics::operating_point::line_points::{LineRequest, Spread, line_points};
+use mapper_physics::operating_point::reach::hold_speed;
 use mapper_physics::simulation::model::Model;
 use mapper_yaml::{Step, steps};
 use serde::Serialize;

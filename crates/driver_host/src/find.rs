@@ -1,4 +1,4 @@
-//! Finds drivers: first sockets, then programs in this program's directory and in the directories of `PATH`.
+//! Where drivers are found: on the search path, at an address, and those that are included.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -125,6 +125,30 @@ fn is_program(path: &Path) -> bool {
 fn is_socket(_: &Path) -> bool {
     false
 }
+
+/// Drivers that come with the source and are built separately: name, purpose, build command.
+pub const INCLUDED_DRIVERS: &[(&str, &str, &str)] = &[
+    (
+        "lab",
+        "the virtual lab as a driver, for rehearsals",
+        "cargo build --release --locked -p mapper-backend-lab",
+    ),
+    (
+        "modbus",
+        "a PLC with Modbus TCP, docs/how-to/rig.md",
+        "cargo build --release --locked -p mapper-backend-modbus",
+    ),
+    (
+        "ak",
+        "an instrument, read only, docs/how-to/rig.md",
+        "cargo build --release --locked -p mapper-backend-ak",
+    ),
+    (
+        "opcua",
+        "a PLC with OPC UA, docs/how-to/rig.md",
+        "cargo build --release --locked -p mapper-backend-opcua",
+    ),
+];
 
 #[cfg(test)]
 mod tests {

@@ -11,7 +11,6 @@ pub mod conformance;
 mod driver;
 mod error;
 mod find;
-mod included_drivers;
 mod lease;
 mod link;
 pub mod protocol;
@@ -20,5 +19,5 @@ mod secrets;
 
 pub use driver::{DEFAULT_TIMEOUTS, Driver, Timeouts};
 pub use error::DriverError;
+pub use find::INCLUDED_DRIVERS;
 pub use find::{DriverLocation, Endpoint, PREFIX, SearchPath};
-pub use included_drivers::INCLUDED_DRIVERS;

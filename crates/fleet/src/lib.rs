@@ -8,32 +8,28 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-mod cost;
 mod directory;
-mod engine;
 mod merge;
-mod queue;
-mod shard;
 mod status;
 mod submit;
 mod work;
 
-pub use cost::{Cost, CostEstimate};
-pub use directory::error::FleetError;
+pub use directory::files::FleetError;
+pub use directory::files::Hash;
+pub use directory::files::Machine;
+pub use directory::fleet::CreatedStudy;
 pub use directory::fleet::Fleet;
-pub use directory::hash::Hash;
-pub use directory::item::Item;
-pub use directory::kind::{ItemDraft, Kind, Output, Results, StudyDraft, WorkContext, WorkError};
-pub use directory::kinds::kind_of;
+pub use directory::fleet::kind_of;
+pub use directory::fleet::{ItemDraft, Kind, Output, Results, StudyDraft, WorkContext, WorkError};
 pub(crate) use directory::part::{Outcome, Part};
-pub use directory::shared_files::Machine;
+pub use directory::study::Item;
 pub use directory::study::{ItemEntry, Study};
-pub use directory::study_file::{StudyFile, StudyFileError, open_study};
-pub use directory::study_writer::CreatedStudy;
-pub use engine::{Engine, cores};
+pub use directory::study::{StudyFile, StudyFileError, open_study};
 pub use merge::MergeOutcome;
-pub use queue::{Template, query_task_states};
-pub use shard::Shard;
+pub use status::Shard;
 pub use status::{Status, UnfinishedItem};
 pub use submit::{Limits, Submission, SubmitOptions};
+pub use submit::{Template, query_task_states};
+pub use work::{Cost, CostEstimate};
+pub use work::{Engine, cores};
 pub use work::{ItemSelection, WorkOutcome};

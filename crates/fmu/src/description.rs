@@ -1,9 +1,8 @@
 //! `modelDescription.xml` of the FMI standard, version 2.0.
 
-use crate::c_text::number;
-use crate::header::DEFAULT_TOLERANCE;
+use crate::header::{DEFAULT_TOLERANCE, number};
 use crate::machine::{FmuError, FmuMachine};
-use crate::variable::{Causality, Switch, UNITS, Variable};
+use crate::variables::{Causality, Switch, UNITS, Variable};
 use quick_xml::escape::escape;
 use std::fmt::Write;
 

@@ -1,11 +1,32 @@
-//! The files of an FMU with their paths in the archive.
+//! The files of an FMU, and their archive.
 
 use crate::description::{SOURCES, description};
 use crate::header::{header, with_guid};
 use crate::machine::{FmuError, FmuMachine};
 use crate::variables::{switches, variables};
 use sha2::{Digest, Sha256};
-use std::fmt::Write;
+use std::fmt::Write as _;
+use std::io::{Cursor, Write as _};
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, ZipWriter};
+
+/// Packs the files of an FMU.
+///
+/// # Errors
+/// [`FmuError::Archive`] or [`FmuError::File`] if the archive cannot hold them.
+pub fn archive(files: &[FmuFile]) -> Result<Vec<u8>, FmuError> {
+    let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
+    // No time stamp, so that equal files give equal bytes.
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Deflated)
+        .last_modified_time(DateTime::default())
+        .unix_permissions(0o644);
+    for file in files {
+        zip.start_file(file.path.as_str(), options)?;
+        zip.write_all(&file.bytes)?;
+    }
+    Ok(zip.finish()?.into_inner())
+}
 
 /// A file of an FMU.
 #[derive(Debug, Clone, PartialEq, Eq)]

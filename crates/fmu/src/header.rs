@@ -1,21 +1,42 @@
-//! Writes `model_data.h`: the data of the machine, and the constants of the Rust model.
+//! The numbers of a machine as a C header.
 
-use crate::c_text::{array, identifier, number, numbers};
 use crate::machine::{FmuError, FmuMachine, FmuMap};
-use crate::variable::{Causality, Switch, Variable};
+use crate::variables::{Causality, Switch, Variable};
 use mapper_core::ReferenceState;
 use mapper_physics::compressor_map::characteristic::CompressorCharacteristic;
 use mapper_physics::compressor_map::tabulated_map::{Line, Node, TabulatedMap};
+use mapper_physics::gas::air;
+use mapper_physics::gas::mixture::{Gas, Virials};
+use mapper_physics::laws::{convection, housing};
 use mapper_physics::machine::params::Params;
-use mapper_physics::{
-    gas::{
-        air,
-        mixture::{Gas, Virials},
-    },
-    laws::{housing, nusselt},
-    simulation::rodas5p,
-};
+use mapper_physics::simulation::rosenbrock;
 use std::fmt::Write;
+
+/// The shortest decimal that C reads back as the same number.
+pub fn number(name: &str, value: f64) -> Result<String, FmuError> {
+    if value.is_finite() {
+        Ok(format!("{value:e}"))
+    } else {
+        Err(FmuError::NotFinite { name: name.to_owned(), value })
+    }
+}
+
+/// The numbers of an array, comma-separated.
+pub fn numbers(name: &str, values: impl IntoIterator<Item = f64>) -> Result<String, FmuError> {
+    Ok(values.into_iter().map(|value| number(name, value)).collect::<Result<Vec<_>, _>>()?.join(", "))
+}
+
+/// `static const double NAME[] = {...};`
+pub fn array(text: &mut String, name: &str, values: impl IntoIterator<Item = f64>) -> Result<(), FmuError> {
+    // Writing to a String cannot fail.
+    let _ = writeln!(text, "static const double {name}[] = {{{}}};", numbers(name, values)?);
+    Ok(())
+}
+
+/// A variable's name as part of a C identifier.
+pub fn identifier(name: &str) -> String {
+    name.replace('.', "_")
+}
 
 /// Default tolerance, relative to each state.
 pub const DEFAULT_TOLERANCE: f64 = 1e-8;
@@ -60,7 +81,7 @@ fn constants(text: &mut String, reference: ReferenceState) -> Result<(), FmuErro
         ("REAL_AIR_GAS_CONSTANT", Gas::AIR_GAS_CONSTANT_J_KGK),
         ("GAMMA_AIR", air::HEAT_CAPACITY_RATIO),
         ("STEFAN_BOLTZMANN", housing::STEFAN_BOLTZMANN_W_M2K4),
-        ("WALL_EXPONENT", nusselt::WALL_EXPONENT),
+        ("WALL_EXPONENT", convection::WALL_EXPONENT),
         ("MAP_T_REF_K", reference.t_ref_k),
         ("MAP_P_REF_PA", reference.p_ref_pa),
         ("DEFAULT_TOLERANCE", DEFAULT_TOLERANCE),
@@ -158,9 +179,9 @@ fn table(text: &mut String, map: &TabulatedMap) -> Result<(), FmuError> {
 }
 
 fn tableau(text: &mut String) -> Result<(), FmuError> {
-    let _ = writeln!(text, "#define RODAS_STAGES {}", rodas5p::STAGES);
-    let _ = writeln!(text, "static const double rodas_gamma = {};", number("gamma", rodas5p::GAMMA)?);
-    for (name, rows) in [("rodas_a", &rodas5p::A), ("rodas_c", &rodas5p::C)] {
+    let _ = writeln!(text, "#define RODAS_STAGES {}", rosenbrock::STAGES);
+    let _ = writeln!(text, "static const double rodas_gamma = {};", number("gamma", rosenbrock::GAMMA)?);
+    for (name, rows) in [("rodas_a", &rosenbrock::A), ("rodas_c", &rosenbrock::C)] {
         let rows = rows
             .iter()
             .map(|row| Ok(format!("    {{{}}}", numbers(name, row.iter().copied())?)))
@@ -172,4 +193,17 @@ fn tableau(text: &mut String) -> Result<(), FmuError> {
         );
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_come_back_and_nonsense_is_refused() {
+        for value in [0.1, 29e-3, 1e300, -0.0, f64::MIN_POSITIVE] {
+            assert_eq!(number("", value).unwrap().parse::<f64>().unwrap().to_bits(), value.to_bits());
+        }
+        assert!(number("flow", f64::NAN).unwrap_err().to_string().contains("flow"));
+    }
 }

@@ -7,17 +7,13 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-mod archive;
-mod c_text;
 mod description;
 mod files;
-mod fitted;
 mod header;
 mod machine;
-mod variable;
 mod variables;
 
-pub use archive::archive;
+pub use files::archive;
 pub use files::{FmuFile, files};
-pub use fitted::table_of_fit;
+pub use machine::table_of_fit;
 pub use machine::{FmuError, FmuMachine, FmuMap};

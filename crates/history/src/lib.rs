@@ -4,19 +4,16 @@
 //! process leaves the history unchanged; concurrent processes wait for each other.
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-mod band;
 mod compare;
-mod error;
 mod metric;
 mod night;
-mod quantity;
 mod store;
 
-pub use band::{Band, Floor};
 pub use compare::{Comparison, MetricOutsideBand, PointsOutsideBand, Shift, compare};
-pub use error::HistoryError;
 pub use mapper_numerics::statistics::median;
 pub use metric::Metric;
+pub use metric::{Band, Floor};
+pub use night::PointQuantity;
 pub use night::{Night, PointRow, RunKey, RunRow};
-pub use quantity::PointQuantity;
+pub use store::HistoryError;
 pub use store::{Filter, History, ListedRun, StoredNight};

@@ -1,6 +1,6 @@
-//! The history file, an SQLite database.
+//! The history file, an SQLite database, and its errors.
 
-use crate::{Comparison, HistoryError, Metric, Night, PointRow, RunKey, RunRow, compare};
+use crate::{Comparison, Metric, Night, PointRow, RunKey, RunRow, compare};
 use rusqlite::{Connection, OpenFlags, Transaction, TransactionBehavior, params};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -379,4 +379,21 @@ fn is_read_only(error: &rusqlite::Error) -> bool {
 /// Returns `None`, stored as NULL, for values that are not finite.
 fn finite(value: Option<f64>) -> Option<f64> {
     value.filter(|value| value.is_finite())
+}
+
+/// Errors when a history is read or written.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
+pub enum HistoryError {
+    #[error("failed to create {}: {}", .0.display(), .1)]
+    Directory(PathBuf, #[source] std::io::Error),
+    #[error("there is no history at {}; run a nightly campaign to make one, or name another file", .0.display())]
+    Missing(PathBuf),
+    /// The file is a database of something else, or of a newer program.
+    #[error("{} is not a history that this program can read: {reason}; name another file", .path.display())]
+    Foreign { path: PathBuf, reason: String },
+    #[error("the history {} cannot be written; check the permissions, or name another file", .0.display())]
+    ReadOnly(PathBuf),
+    #[error("the history {} cannot be used: {}", .0.display(), .1)]
+    Sqlite(PathBuf, #[source] rusqlite::Error),
 }

@@ -4,21 +4,22 @@
 //! Each source of uncertainty is changed by one standard deviation to both sides, and the efficiency is computed again.
 
 use crate::identify::point;
+use crate::single_step::budgets;
 use crate::single_step::dynamic::{Estimate, judge_assumption};
 use crate::single_step::fit::ETA_BOUNDS;
 use crate::step_data::end_state::EndState;
 use crate::step_outcome::findings::Findings;
-use crate::{IdentifyConfig, IdentifyError, single_step::budgets, step_outcome::interval_width};
+use crate::step_outcome::interval_width;
+use crate::{IdentifyConfig, IdentifyError};
 use mapper_core::{
     Channel, EstimateUncertainty, EtaSignal, IdentifiedPoint, MeasuredPoint, Method, ModelTolerances,
     NoCompression, PointBudgets, ReferenceState, SAMPLE_INTERVAL_S, StepKind, StepMarker, Warning,
 };
 use mapper_numerics::root::root_between;
-use mapper_physics::compressor_map::one_point_map::OnePointMap;
+use mapper_physics::compressor_map::closed_form_map::OnePointMap;
 use mapper_physics::gas::air::Air;
 use mapper_physics::laws::compression::apparent_efficiency;
-use mapper_physics::machine::boundary::BoundaryConditions;
-use mapper_physics::machine::params::Params;
+use mapper_physics::machine::params::{BoundaryConditions, Params};
 use mapper_physics::simulation::model::{Model, Outputs, State, rad_s_of_rpm};
 use mapper_physics::simulation::steady::settle_housings;
 use std::sync::Arc;

@@ -7,7 +7,7 @@ use mapper_core::{
     CompressorMap, IdentifiedPoint, MapPoint, Method, ReferenceState, SpeedLine, SpeedShift, Verdict,
 };
 use mapper_numerics::statistics::range;
-use mapper_physics::compressor_map::similarity::at_speed;
+use mapper_physics::compressor_map::characteristic::at_speed;
 
 /// Assembles a map from identified points.
 ///

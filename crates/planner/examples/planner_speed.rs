@@ -7,7 +7,7 @@
 
 use mapper_core::{Dwell, Limits, OperatingPoint, Repeats, SettleBands, Timing, VisitOrder, WindowRule};
 use mapper_physics::machine::params::BoundaryConditions;
-use mapper_physics::operating_point::follow_outlet::FollowOutlet;
+use mapper_physics::operating_point::reach::FollowOutlet;
 use mapper_physics::simulation::model::Model;
 use mapper_planner::{PlanRequest, make_plan};
 use std::time::Instant;

@@ -6,10 +6,12 @@
 
 #![allow(clippy::print_stdout, reason = "what it prints is what it is for")]
 
+use mapper_physics::gas::air;
+use mapper_physics::laws::housing;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::model::Model;
-use mapper_physics::{gas::air, laws::housing, simulation::steady};
-use mapper_planner::thermal_memory::chain::{Chain, gradients_k};
+use mapper_physics::simulation::steady;
+use mapper_planner::thermal_memory::housing::{Chain, gradients_k};
 use mapper_planner::{Effort, Objective, search};
 use std::time::Instant;
 

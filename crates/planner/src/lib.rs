@@ -10,22 +10,20 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod jumps;
-mod method;
 mod ordering;
 mod plans;
 mod request;
-mod targets;
 pub mod thermal_memory;
 mod upper_bound;
 
-pub use jumps::jump_forecast::{JumpForecast, Rejection, explain_jump, forecast_all_jumps};
-pub use jumps::jump_graph::SeparatePoints;
+pub use jumps::jump_forecast::{JumpForecast, explain_jump, forecast_all_jumps};
+pub use jumps::jump_graph::{Rejection, SeparatePoints};
 pub use jumps::walk::STABLE_DRIFT_K_MIN;
-pub use method::{ForecastRow, MethodResult, MethodResults, PredictedMethod};
 pub use ordering::objective::Objective;
 pub use ordering::search::{Effort, search, search_min_gradient};
-pub use plans::comparison::plan_other_orders;
 pub use plans::fingerprint::{hash_inputs, sha256_hex};
 pub use plans::plan::make_plan;
+pub use plans::plan::plan_other_orders;
 pub use plans::plan_builder::max_steps;
+pub use request::{ForecastRow, MethodResult, MethodResults, PredictedMethod};
 pub use request::{PlanError, PlanRequest, UnreachablePoint};

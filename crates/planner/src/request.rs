@@ -1,13 +1,15 @@
-//! Input and errors of planning.
+//! Inputs and errors of planning, the interface to the identification method, and the steady states of the points.
 
-use crate::jumps::jump_forecast::Rejection;
+use crate::jumps::jump_graph::Rejection;
 use crate::jumps::jump_graph::SeparatePoints;
-use crate::method::PredictedMethod;
 use mapper_core::{Jump, Limits, OperatingPoint, Repeats, SettleBands, Timing, VisitOrder, WindowRule};
+pub use mapper_core::{MethodResult, MethodResults};
 use mapper_physics::machine::params::BoundaryConditions;
-use mapper_physics::operating_point::follow_outlet::FollowOutlet;
+pub use mapper_physics::operating_point::forecast::ForecastRow;
+use mapper_physics::operating_point::reach::{FollowOutlet, describe_obstacles, reach};
 use mapper_physics::simulation::model::Model;
 use mapper_physics::simulation::simulate::SimulationError;
+use mapper_physics::simulation::steady::SteadyState;
 
 /// All inputs of a plan.
 #[derive(Debug, Clone)]
@@ -94,4 +96,36 @@ pub enum PlanError {
     SeparatePoints(Vec<SeparatePoints>),
     #[error("the forecast of the step to {to} failed: {source}")]
     Forecast { to: OperatingPoint, source: SimulationError },
+}
+
+/// An identification method, for planning.
+pub trait PredictedMethod: std::fmt::Debug + Sync {
+    /// Predicts the result of a single step from the rows of its window, which are `interval_s` apart. `None` if the method has no
+    /// result, or if it identifies all steps together.
+    fn predict_step(&self, window: &[ForecastRow], interval_s: f64) -> Option<MethodResult>;
+
+    /// Predicts the results of all steps of a campaign, each given from its jump to its end. `None` if the method identifies each
+    /// step separately, or if its fit does not converge.
+    fn predict_campaign(&self, steps: &[&[ForecastRow]]) -> Option<MethodResults>;
+
+    /// Predicts the reading of conventional mapping at a settled point: apparent efficiency and its standard error, fractions.
+    fn predict_settled(&self, row: &ForecastRow) -> Option<(f64, f64)>;
+}
+
+/// Solves the steady state of each point. The error lists every point that violates a limit, with all violated limits.
+pub(crate) fn solve_steady_states(
+    request: &PlanRequest<'_>,
+    points: &[OperatingPoint],
+) -> Result<Vec<SteadyState>, PlanError> {
+    let mut unreachable = Vec::new();
+    let mut targets = Vec::with_capacity(points.len());
+    for &point in points {
+        match reach(request.model, point, &request.boundary, request.follow_outlet, &request.limits) {
+            Ok(target) => targets.push(target),
+            Err(obstacles) => {
+                unreachable.push(UnreachablePoint { point, reason: describe_obstacles(&obstacles) })
+            }
+        }
+    }
+    if unreachable.is_empty() { Ok(targets) } else { Err(PlanError::Unreachable(unreachable)) }
 }

@@ -7,7 +7,7 @@ mod common;
 use common::{SimpleHousing, grid, request};
 use mapper_core::{Dwell, Jump, OperatingPoint, PlanRemark, Repeats, StepKind, VisitOrder};
 use mapper_physics::simulation::model::Model;
-use mapper_planner::thermal_memory::chain::gradients_k;
+use mapper_planner::thermal_memory::housing::gradients_k;
 use mapper_planner::{
     Effort, Objective, PlanError, PlanRequest, Rejection, explain_jump, forecast_all_jumps, make_plan,
     max_steps, search, search_min_gradient,
@@ -89,7 +89,10 @@ fn a_forbidden_jump_has_a_reason_and_is_avoided() {
     assert_eq!(separate.len(), 8);
     for part in &separate {
         let (_, reason) = part.into.unwrap();
-        assert!(matches!(reason, Rejection::HousingGradient { gradient_k, .. } if gradient_k > 0.01), "{part}");
+        assert!(
+            matches!(reason, Rejection::HousingGradient { gradient_k, .. } if gradient_k > 0.01),
+            "{part}"
+        );
         assert_eq!(part.points.len(), 1);
     }
 }
@@ -109,7 +112,8 @@ fn a_way_over_points_between_replaces_a_forbidden_jump() {
     let of_kind = |kind| plan.steps.iter().filter(move |step| step.kind == kind);
     assert_eq!(of_kind(StepKind::Point).map(|step| step.to).collect::<Vec<_>>(), ends_first);
     assert!(of_kind(StepKind::Repeat).count() >= 2);
-    let around = |remark: &&PlanRemark| matches!(remark, PlanRemark::WayAround { over, .. } if !over.is_empty());
+    let around =
+        |remark: &&PlanRemark| matches!(remark, PlanRemark::WayAround { over, .. } if !over.is_empty());
     assert!(plan.remarks.iter().any(|remark| around(&remark)), "{:?}", plan.remarks);
 }
 
@@ -117,7 +121,8 @@ fn a_way_over_points_between_replaces_a_forbidden_jump() {
 fn every_jump_is_forecast_once() {
     let (model, points) = (Model::nominal(), grid());
     let jumps = forecast_all_jumps(&request(&model, &points[..4], VisitOrder::ThermalGradient)).unwrap();
-    let pairs = |from: OperatingPoint| points[..4].iter().filter(move |to| **to != from).map(move |to| (from, *to));
+    let pairs =
+        |from: OperatingPoint| points[..4].iter().filter(move |to| **to != from).map(move |to| (from, *to));
     let expected: Vec<_> = points[..4].iter().flat_map(|from| pairs(*from)).collect();
     assert_eq!(jumps.iter().map(|jump| (jump.from, jump.to)).collect::<Vec<_>>(), expected);
 }

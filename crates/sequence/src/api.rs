@@ -2,9 +2,8 @@
 
 use crate::error::throw;
 use crate::request::Refusal;
-use crate::result::StepResult;
 use crate::session::{ScriptThrow, Session, lock};
-use crate::step::EndCondition;
+use crate::step::{EndCondition, StepResult};
 use mapper_core::{IdentifiedPoint, OperatingPoint};
 use mapper_yaml::units::Kind;
 use rhai::{Array, Dynamic, Engine, FLOAT, INT, ImmutableString};

@@ -1,11 +1,9 @@
 //! The implementation of the functions that a script calls.
 
 use crate::error::throw;
-use crate::forecast::NominalForecast;
-use crate::request::{Refusal, SequenceRequest};
-use crate::result::StepResult;
+use crate::request::{NominalForecast, Refusal, SequenceRequest};
 use crate::settle::SettleRule;
-use crate::step::{EndCondition, ScriptMessage, SequenceStep};
+use crate::step::{EndCondition, ScriptMessage, SequenceStep, StepResult};
 use mapper_core::{OperatingPoint, PlanStep, StepKind};
 use mapper_physics::simulation::steady::SteadyState;
 use rhai::{EvalAltResult, Position};

@@ -25,7 +25,7 @@ fn request() -> SequenceRequest {
         settle_bands: SettleBands::default(),
         model: Model::nominal(),
         boundary: BoundaryConditions::default(),
-        follow_outlet: mapper_physics::operating_point::follow_outlet::FollowOutlet::default(),
+        follow_outlet: mapper_physics::operating_point::reach::FollowOutlet::default(),
         limits: Limits {
             speed_max_rpm: 180e3,
             p3_min_pa: 120e3,

@@ -15,11 +15,11 @@ mod schema_check;
 pub mod units;
 
 pub use document::file::{open, open_file, read_limited};
-pub use document::path::{Step, path_text};
+pub use document::positions::{Step, path_text};
 pub use document::tree::{Tree, read};
+pub use mistakes::finding::closest;
 pub use mistakes::finding::{Finding, FindingKind};
-pub use mistakes::findings::Findings;
-pub use mistakes::notes::Notes;
+pub use mistakes::source::Findings;
+pub use mistakes::source::Notes;
 pub use mistakes::source::{Document, Source};
-pub use mistakes::suggestion::closest;
 pub use schema_check::schema::{Schema, json_schema_of};

@@ -5,8 +5,7 @@ use mapper_core::{
     Backend, BackendError, Channel, ChannelColumn, Element, ElementColumn, Event, EventKind, Group,
     Recording, RigDescription, RigMode, SafeTrajectory, SampleBatch, Series, Setpoints,
 };
-use mapper_physics::rig::backend_plugin::BackendPlugin;
-use mapper_physics::rig::nominal_rig::NominalRig;
+use mapper_physics::rig::backend_plugin::{BackendPlugin, NominalRig};
 use mapper_recording::{ChannelMap, ChannelMapError, ReadOptions, RecordError, read_recording};
 use std::path::Path;
 

@@ -1,8 +1,7 @@
 //! One instant of the machine with an effect, for tests with known results.
 
 use mapper_physics::machine::params::BoundaryConditions;
-use mapper_physics::rig::effect::Rig;
-use mapper_physics::rig::effect_kind::EffectKind;
+use mapper_physics::rig::effect::{EffectKind, Rig};
 use mapper_physics::simulation::model::{Model, Outputs, State, rad_s_of_rpm};
 
 /// Inlet temperature of the instant, K.

@@ -1,8 +1,7 @@
 //! Gases against CoolProp's equations of state.
 
 use mapper_physics::gas::air::Air;
-use mapper_physics::gas::mixture::{Fuel, Gas};
-use mapper_physics::gas::species::Species;
+use mapper_physics::gas::mixture::{Fuel, Gas, Species};
 use mapper_physics::laws::compression::apparent_efficiency;
 use mapper_tests::python;
 

@@ -4,7 +4,7 @@ use crate::campaign::Campaign;
 use crate::elements::rig::calibration::{Calibration, CalibrationRule, Date};
 use mapper_core::{CalibrationDefect, Channel, DeclaredUncertainty, Dimension, Warning};
 use mapper_physics::machine::params::BoundaryConditions;
-use mapper_physics::operating_point::follow_outlet::hold_speed;
+use mapper_physics::operating_point::reach::hold_speed;
 use mapper_physics::rig::instruments::true_value;
 use mapper_physics::rig::sensor_fault::CALIBRATED_AT_K;
 use mapper_physics::simulation::model::Model;

@@ -1,10 +1,9 @@
 //! Compares a nominal map with the compressor's wheel, to find columns in another unit or in another order.
 
-use crate::checks::concern::to_mm;
+use crate::checks::reachable_points::to_mm;
 use mapper_core::ReferenceState;
-use mapper_physics::compressor_map::characteristic::CompressorCharacteristic;
+use mapper_physics::compressor_map::characteristic::{CompressorCharacteristic, head_ratio};
 use mapper_physics::compressor_map::closed_form_map::ClosedFormMap;
-use mapper_physics::compressor_map::similarity::head_ratio;
 use mapper_physics::compressor_map::tabulated_map::TabulatedMap;
 use mapper_physics::gas::air;
 use std::f64::consts::PI;

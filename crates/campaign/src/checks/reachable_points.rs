@@ -1,12 +1,15 @@
-//! Checks that the nominal model can reach each point within the limits.
+//! Checks of a whole campaign: contradictions, points that cannot be reached, and doubts.
 
 use crate::campaign::Campaign;
+use crate::checking::{Check, Files};
+use crate::elements;
 use crate::nominal_table::NominalTableError;
 use mapper_core::OperatingPoint;
 use mapper_physics::compressor_map::characteristic::CompressorCharacteristic;
 use mapper_physics::compressor_map::closed_form_map::ClosedFormMap;
 use mapper_physics::operating_point::reach::{describe_obstacles, reach};
 use mapper_physics::simulation::model::Model;
+use mapper_yaml::{Notes, Step, Tree};
 use std::sync::Arc;
 
 /// A point that cannot be measured.
@@ -50,4 +53,47 @@ pub fn unreachable_points(campaign: &Campaign, model: &Model) -> Vec<Unreachable
         })
     };
     campaign.points.iter().enumerate().filter_map(check_point).collect()
+}
+
+/// Checks everything that needs more than one value.
+pub(crate) fn check_consistency(tree: &Tree, files: Files<'_>, notes: &mut Notes) {
+    let mut check = Check { tree, files, notes };
+    elements::rig::backend::check(&mut check);
+    elements::rig::limits::check(&mut check);
+    elements::rig::guards::check(&mut check);
+    elements::evaluation::identification::check(&mut check);
+    elements::points::timing::check(&mut check);
+    elements::points::repeats::check_repeats(&mut check);
+    elements::rig::sensors::check(&mut check);
+    elements::output::check(&mut check);
+    elements::turbocharger::machine::check(&mut check);
+    elements::turbocharger::gas::check(&mut check);
+    elements::points::repeats::check_sequence(&mut check);
+    elements::points::grid::check(&mut check);
+}
+
+/// An unusual or impossible setting of a campaign.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Concern {
+    /// Whether it is an error, so that the campaign cannot run; otherwise a warning.
+    pub is_error: bool,
+    /// The key, as a path.
+    pub at: Vec<Step>,
+    /// Description, with values and units.
+    pub message: String,
+    /// The remedy.
+    pub remedy: String,
+}
+
+impl Concern {
+    /// A warning at the key with this path.
+    pub fn warning(path: &[&str], message: String, remedy: String) -> Self {
+        let at = path.iter().map(|key| Step::from(*key)).collect();
+        Concern { is_error: false, at, message, remedy }
+    }
+}
+
+/// A length in mm, rounded to 0.1 um.
+pub(crate) fn to_mm(length_m: f64) -> f64 {
+    (1e7 * length_m).round() / 1e4
 }

@@ -1,13 +1,11 @@
 //! Reads a campaign from a text or a file, or reports all its mistakes.
 
 use crate::campaign::{Campaign, CampaignFile};
-use crate::checks::concern::Concern;
-use crate::checks::consistency;
-use crate::checks::reachable_points::{self, UnreachablePoint};
-use crate::checks::unusual_settings;
+use crate::checks::reachable_points::{Concern, UnreachablePoint};
+use crate::checks::{reachable_points, unusual_settings};
 use crate::files::schema::SCHEMA;
-use crate::machine_sizes;
-use crate::resolved::{self, limit_is_wrong};
+use crate::resolved::limit_is_wrong;
+use crate::{machine_sizes, resolved};
 use mapper_maps::table::file_text;
 use mapper_yaml::{Document, FindingKind, Findings, Notes, Source, Step, Tree, steps};
 use std::collections::BTreeSet;
@@ -88,7 +86,7 @@ pub fn check_with(
     }
     SCHEMA.check(&tree, &mut notes);
     if !notes.is_full() {
-        consistency::check(&tree, files, &mut notes);
+        reachable_points::check_consistency(&tree, files, &mut notes);
     }
     let campaign = notes.is_empty().then(|| deserialise(&tree, files, unreachable, &mut notes)).flatten();
     campaign.ok_or_else(|| tree.findings(notes))

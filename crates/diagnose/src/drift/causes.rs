@@ -4,7 +4,7 @@ use mapper_core::{Channel, Dimension, with_unit};
 use mapper_inference::time_history::{Shape, TimeHistory};
 use mapper_observe::channels::INPUT_CHANNELS;
 use mapper_observe::perturbation::Perturbation;
-use mapper_physics::laws::bearing_friction::at_150_krpm;
+use mapper_physics::laws::turbine::at_150_krpm;
 use mapper_physics::machine::params::{BoundaryConditions, Params};
 use mapper_physics::rig::sensor_fault::drifts;
 use serde::{Serialize, Serializer};

@@ -8,7 +8,7 @@ use crate::driven::side::{
 use mapper_core::{Channel, SAMPLE_INTERVAL_S};
 use mapper_identify::EFFICIENCY;
 use mapper_numerics::statistics::mean;
-use mapper_physics::compressor_map::one_point_map::OnePointMap;
+use mapper_physics::compressor_map::closed_form_map::OnePointMap;
 use mapper_physics::laws::housing::compressor_capacity_j_k;
 use mapper_physics::machine::params::{BoundaryConditions, MODEL_REFERENCE};
 use mapper_physics::rig::effect::{Rig, Submodel};

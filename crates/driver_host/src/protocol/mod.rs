@@ -2,14 +2,13 @@
 //! docs/reference/protocol.md specifies it; the JSON schema of the messages is generated from these types.
 
 mod convert;
-mod convert_error;
 mod frame;
 mod message;
 mod samples;
 mod schema;
 
+pub use crate::protocol::convert::{read_error, write_error};
 pub use convert::{InvalidData, read_description, write_description};
-pub use convert_error::{read_error, write_error};
 pub use frame::{Encoding, FrameError, decode, encode, read_frame, write_frame};
 pub use message::{
     ChannelDescription, Code, Configure, DescribeResult, Description, Failure, Hello, LastSample, Message,

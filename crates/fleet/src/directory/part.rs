@@ -1,6 +1,6 @@
 //! The outcome of an item: a header line, then the result, or the reason for its absence.
 
-use crate::directory::shared_files::{Durability, Machine, write_whole};
+use crate::directory::files::{Durability, Machine, write_whole};
 use crate::{FleetError, Hash, Item};
 use serde::{Deserialize, Serialize};
 use std::fs::File;

@@ -1,18 +1,21 @@
-//! The description of a study in its directory.
+//! A study: the file of its user, its list of items, and one item.
 
-use crate::directory::shared_files::{Durability, read_at_most, write_whole};
+use crate::directory::files::{Durability, read_at_most, write_whole};
 use crate::{FleetError, Hash};
+use mapper_yaml::{Document, FindingKind, Findings, Notes, Schema, Source, Tree, steps};
+use schemars::JsonSchema;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Version of the directory's layout.
 pub(crate) const LAYOUT: u32 = 1;
 /// Maximum number of items of a study.
 pub(crate) const MAX_ITEMS: usize = 1_000_000;
 /// Largest file of a study, bytes: a million items.
-const MAX_FILE_BYTES: usize = 256 << 20;
+const MAX_STUDY_BYTES: usize = 256 << 20;
 
 /// One item in the list.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -44,7 +47,7 @@ pub struct Study {
 
 impl Study {
     pub(crate) fn read(path: &Path) -> Result<Study, FleetError> {
-        let bytes = read_at_most(path, MAX_FILE_BYTES)?;
+        let bytes = read_at_most(path, MAX_STUDY_BYTES)?;
         // Checked first: another layout may have other keys.
         #[derive(Deserialize)]
         struct Head {
@@ -75,5 +78,126 @@ impl Study {
             }
         }
         Ok(())
+    }
+}
+
+/// Name of the file in messages.
+static DOCUMENT: Document = Document { name: "study", example: "campaigns/fleet/blind.yaml" };
+/// Largest file of a study, bytes: some ten thousand names of campaigns.
+const MAX_STUDY_FILE_BYTES: usize = 4 << 20;
+
+/// Errors of reading a study file.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
+pub enum StudyFileError {
+    #[error("failed to read the study {}: {}", .0.display(), .1)]
+    Read(PathBuf, #[source] std::io::Error),
+    #[error("{0}")]
+    Mistakes(Box<Findings>),
+}
+
+/// A study file, of which only the name and the kind are read.
+#[derive(Debug)]
+pub struct StudyFile {
+    path: PathBuf,
+    tree: Tree,
+    /// Its name.
+    pub name: String,
+    /// Its kind.
+    pub kind: String,
+}
+
+impl StudyFile {
+    /// A file that it names, relative to its own directory.
+    pub fn sibling_path(&self, file: &Path) -> PathBuf {
+        self.path.parent().unwrap_or(Path::new("")).join(file)
+    }
+
+    /// The complete file, read by the kind; name and kind included.
+    ///
+    /// # Errors
+    /// [`StudyFileError::Mistakes`] with all mistakes.
+    pub fn read<T: DeserializeOwned + JsonSchema>(&self) -> Result<T, StudyFileError> {
+        let mut notes = Notes::default();
+        Schema::of::<T>().check(&self.tree, &mut notes);
+        if notes.is_empty() {
+            match self.tree.deserialise() {
+                Ok(file) => return Ok(file),
+                Err(finding) => notes.push(finding),
+            }
+        }
+        Err(self.mistakes(notes))
+    }
+
+    /// A mistake found by the kind, at a key of the file.
+    pub fn mistake(&self, key: &str, message: String, remedy: &str) -> StudyFileError {
+        let mut notes = Notes::default();
+        notes.push(self.tree.finding(FindingKind::WrongValue, &steps![key], message, remedy));
+        self.mistakes(notes)
+    }
+
+    fn mistakes(&self, notes: Notes) -> StudyFileError {
+        StudyFileError::Mistakes(Box::new(Findings::new(self.tree.source().clone(), notes)))
+    }
+}
+
+/// Reads name and kind of a study.
+///
+/// # Errors
+/// [`StudyFileError`].
+pub fn open_study(path: &Path) -> Result<StudyFile, StudyFileError> {
+    let mistakes = |findings| StudyFileError::Mistakes(Box::new(findings));
+    let text = mapper_yaml::open(&DOCUMENT, path, MAX_STUDY_FILE_BYTES)
+        .map_err(|source| StudyFileError::Read(path.to_owned(), source))?
+        .map_err(mistakes)?;
+    let (tree, mut notes) = mapper_yaml::read(Source::new(&DOCUMENT, path, &text)).map_err(mistakes)?;
+    if let Some(finding) = tree.find_other_kind("fleet", &["fleet", "study"]) {
+        notes.push(finding);
+    }
+    if !notes.is_empty() {
+        return Err(mistakes(tree.findings(notes)));
+    }
+    let word = |key: &str| tree.text(&steps![key]).unwrap_or_default().to_owned();
+    Ok(StudyFile { path: path.to_owned(), name: word("fleet"), kind: word("study"), tree })
+}
+
+/// Largest file of an item, bytes: a campaign with its map file.
+const MAX_ITEM_BYTES: usize = 32 << 20;
+
+/// The work, and the program that does it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Item {
+    /// Display name; results are listed by it.
+    pub name: String,
+    /// Kind of the study.
+    pub kind: String,
+    /// Program, version and commit that made the item; only the same program may process it.
+    pub program: String,
+    /// Input of the kind: campaign, machine, seed, method or case.
+    pub payload: Value,
+}
+
+impl Item {
+    /// The content of its file.
+    ///
+    /// # Errors
+    /// The serialiser's: none in practice.
+    pub fn bytes(&self) -> Result<Vec<u8>, serde_json::Error> {
+        let mut bytes = serde_json::to_vec(self)?;
+        bytes.push(b'\n');
+        Ok(bytes)
+    }
+
+    /// Reads an item and checks that its hash matches its name.
+    ///
+    /// # Errors
+    /// [`FleetError::File`], [`FleetError::Changed`] if the hash differs, [`FleetError::Content`].
+    pub fn read(path: &Path, hash: &Hash) -> Result<Item, FleetError> {
+        let bytes = read_at_most(path, MAX_ITEM_BYTES)?;
+        if Hash::of(&bytes) != *hash {
+            return Err(FleetError::Changed(path.to_owned()));
+        }
+        serde_json::from_slice(&bytes).map_err(FleetError::content(path, "an item"))
     }
 }

@@ -10,7 +10,7 @@ use mapper_numerics::statistics::rms;
 use mapper_numerics::{ROUNDING, SLOPE_STEP};
 use mapper_physics::gas::air::Air;
 use mapper_physics::laws::compression::{CompressionInputs, compress, compressed_k};
-use mapper_physics::laws::inlet_convection::InletLaw;
+use mapper_physics::laws::convection::InletLaw;
 use mapper_physics::machine::params::Params;
 use nalgebra::{Matrix2, Vector2};
 

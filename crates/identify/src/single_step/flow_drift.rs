@@ -4,7 +4,7 @@ use crate::single_step::fit::Fit;
 use crate::step_data::samples::{Row, Samples};
 use mapper_numerics::statistics::mean;
 use mapper_physics::laws::compression::compressed_k;
-use mapper_physics::laws::nusselt::coefficient_w_m2k;
+use mapper_physics::laws::convection::coefficient_w_m2k;
 use mapper_physics::machine::params::{CompressorParams, Params};
 
 /// Changes of flow and h, and their effect.

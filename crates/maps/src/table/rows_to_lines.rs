@@ -6,7 +6,7 @@ use mapper_core::{
     CommonErrors, CompressorMap, IdentifiedPoint, ImportError, Method, ReferenceState, StepKind, Verdict,
 };
 use mapper_numerics::statistics::range;
-use mapper_physics::compressor_map::inlet_limit::{MIN_TOP_SPEED_RPM, max_flow_kg_s};
+use mapper_physics::compressor_map::characteristic::{MIN_TOP_SPEED_RPM, max_flow_kg_s};
 
 /// Maximum number of points.
 pub const MAX_POINTS: usize = 100_000;

@@ -2,7 +2,4 @@
 
 pub mod characteristic;
 pub mod closed_form_map;
-pub mod inlet_limit;
-pub mod one_point_map;
-pub mod similarity;
 pub mod tabulated_map;

@@ -4,9 +4,10 @@
 //! surge end), so that lines of different speed can be blended at equal x. Beyond the outermost lines similarity applies:
 //! flow in proportion to speed, isentropic head to its square. This extrapolation is only for the run-up of a machine.
 
-use crate::compressor_map::characteristic::{CharacteristicPoint, CompressorCharacteristic};
-use crate::compressor_map::inlet_limit::{MAX_SPEED_RPM, MIN_TOP_SPEED_RPM, max_flow_kg_s};
-use crate::compressor_map::similarity::{head_ratio as head, pressure_ratio_of_head};
+use crate::compressor_map::characteristic::{
+    CharacteristicPoint, CompressorCharacteristic, MAX_SPEED_RPM, MIN_TOP_SPEED_RPM, head_ratio as head,
+    max_flow_kg_s, pressure_ratio_of_head,
+};
 use mapper_core::{ReferenceState, with_unit};
 
 /// A row of a map file.

@@ -9,8 +9,7 @@
 //! Domain: flow, efficiency, temperatures and areas above 0 (the efficiency is negative if the machine brakes the gas);
 //! pressure ratios up to about 6. Eq. 3 is the one-node form of a heat exchanger: the temperature of the gas cannot cross that of the metal.
 
-use crate::gas::air::Air;
-use crate::gas::fast_power::power;
+use crate::gas::air::{Air, power};
 use mapper_core::EfficiencyDefinition;
 
 /// Conditions along the gas path of the compressor.

@@ -1,13 +1,27 @@
-//! The turbine (fixed vanes): swallowing capacity, heat to the housing, expansion.
-//!
-//! Closed forms of the virtual laboratory for the paper's turbine. Domain: P3 above P4 (the caller checks), expansion ratios up
-//! to about 4, viscosity and conductivity of air. The efficiency is total to static and a parabola over the blade-speed ratio (e.g. Watson and
-//! Janota, Turbocharging the Internal Combustion Engine, ch. 5), at least 0.05.
+//! The turbine, and the power that the bearings take from the shaft.
 
-use crate::gas::air::{self, Air};
-use crate::gas::fast_power::power;
-use crate::laws::nusselt;
+use crate::gas::air;
+use crate::gas::air::{Air, power};
+use crate::laws::convection;
 use crate::machine::params::{BoundaryConditions, TurbineParams};
+use crate::machine::state::rad_s_of_rpm;
+
+/// Friction power, W, from the friction coefficient c in W s^2/rad^2 and the shaft speed in rad/s.
+pub fn friction_power_w(bearing_friction_w_s2: f64, shaft_speed_rad_s: f64) -> f64 {
+    bearing_friction_w_s2 * shaft_speed_rad_s * shaft_speed_rad_s
+}
+
+/// A friction coefficient in W s^2/rad^2 as text: the power at 150 krpm to two digits, e.g. "370 W at 150 krpm".
+pub fn at_150_krpm(bearing_friction_w_s2: f64) -> String {
+    let power_w = friction_power_w(bearing_friction_w_s2, rad_s_of_rpm(150e3));
+    if power_w == 0.0 || !power_w.is_finite() {
+        return format!("{power_w} W at 150 krpm");
+    }
+    let second_digit = power_w.abs().log10().floor() as i32 - 1;
+    let step_w = 10f64.powi(second_digit);
+    let decimals = (-second_digit).max(0) as usize;
+    format!("{:.decimals$} W at 150 krpm", (power_w / step_w).round() * step_w)
+}
 
 /// Reference state of the swallowing capacity: the ISA day.
 const FLOW_REFERENCE_K: f64 = 288.15;
@@ -63,14 +77,14 @@ impl TurbineInlet {
             / gas.dry_flow_ratio();
         let cp3_j_kgk = gas.heat_capacity_j_kgk(boundary.t3_k);
         // At equal viscosity of wall and gas the viscosity ratio is 1; scale this to a wall of 1 Pa s.
-        let h_unit_wall_w_m2k = nusselt::coefficient_w_m2k(
+        let h_unit_wall_w_m2k = convection::coefficient_w_m2k(
             params.nusselt_coefficient,
             params.nusselt_exponent,
             params.inlet_diameter_m,
             flow_kg_s,
             boundary.t3_k,
             boundary.t3_k,
-        ) * air::viscosity_pa_s(boundary.t3_k).powf(nusselt::WALL_EXPONENT);
+        ) * air::viscosity_pa_s(boundary.t3_k).powf(convection::WALL_EXPONENT);
         TurbineInlet {
             params: *params,
             t3_k: boundary.t3_k,
@@ -92,7 +106,7 @@ impl TurbineInlet {
     #[inline]
     pub fn at(&self, tt_k: f64, shaft_speed_rad_s: f64) -> TurbineState {
         let params = &self.params;
-        let h_w_m2k = self.h_unit_wall_w_m2k * power(air::viscosity_pa_s(tt_k), -nusselt::WALL_EXPONENT);
+        let h_w_m2k = self.h_unit_wall_w_m2k * power(air::viscosity_pa_s(tt_k), -convection::WALL_EXPONENT);
         let conductance_w_k = h_w_m2k * params.internal_area_m2;
         let transfer_units = conductance_w_k / (self.flow_kg_s * self.cp3_j_kgk);
         let t3_prime_k = (self.t3_k + transfer_units * tt_k) / (1.0 + transfer_units);
@@ -126,6 +140,22 @@ fn isentropic_drop_ratio(ln_expansion_ratio: f64, exponent: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::machine::params::Params;
+
+    /// By hand: 150 krpm are 15708 rad/s, their square 2.467e8, times 1.49e-6 368 W.
+    #[test]
+    fn power_by_hand() {
+        let power_w = friction_power_w(1.49e-6, rad_s_of_rpm(150e3));
+        // Four figures by hand.
+        assert!((power_w - 367.6).abs() < 0.1, "{power_w}");
+    }
+
+    #[test]
+    fn two_figures() {
+        assert_eq!(at_150_krpm(1.49e-6), "370 W at 150 krpm");
+        assert_eq!(at_150_krpm(1.5e-7), "37 W at 150 krpm");
+        assert_eq!(at_150_krpm(-2.9e-8), "-7.2 W at 150 krpm");
+        assert_eq!(at_150_krpm(0.0), "0 W at 150 krpm");
+    }
 
     /// A turbine without heat loss and with efficiency 1 at every blade-speed ratio that a test can reach.
     fn inlet(expansion_ratio: f64, t3_k: f64) -> TurbineInlet {

@@ -10,7 +10,7 @@
 //! round reduces the difference to some per cent.
 
 use crate::machine::params::BoundaryConditions;
-use crate::operating_point::follow_outlet::{FollowOutlet, hold_speed};
+use crate::operating_point::reach::{FollowOutlet, hold_speed};
 use crate::simulation::model::{Model, State};
 use crate::simulation::steady::{SteadyError, SteadyState};
 use mapper_core::{OperatingPoint, ReferenceState};

@@ -1,6 +1,5 @@
 //! Operating points for campaign, plan and sequence: reach, places on a speed line, settling, and forecast of a step.
 
-pub mod follow_outlet;
 pub mod forecast;
 pub mod line_points;
 pub mod reach;

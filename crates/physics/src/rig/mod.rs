@@ -2,7 +2,5 @@
 
 pub mod backend_plugin;
 pub mod effect;
-pub mod effect_kind;
 pub mod instruments;
-pub mod nominal_rig;
 pub mod sensor_fault;

@@ -5,7 +5,6 @@ pub mod inputs;
 pub mod linearised_run;
 pub mod model;
 pub mod outputs;
-pub mod rodas5p;
 pub mod rosenbrock;
 pub mod simulate;
 pub mod steady;

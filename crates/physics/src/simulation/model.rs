@@ -1,20 +1,15 @@
 //! The lumped turbocharger: shaft, outlet volume, two housings, and the gas paths between them.
 
 use crate::compressor_map::characteristic::{CharacteristicPoint, CompressorCharacteristic};
-use crate::laws::bearing_friction::friction_power_w;
-use crate::laws::compression;
-use crate::laws::turbine::TurbineInlet;
-use crate::machine::boundary::BoundaryConditions;
-pub use crate::machine::boundary::BoundaryError;
+use crate::gas::air;
+use crate::laws::turbine::{TurbineInlet, friction_power_w};
+use crate::laws::{compression, convection, housing, orifice, thermocouple};
 use crate::machine::hooks::{HookList, Hooks, Site};
-use crate::machine::params::Params;
+pub use crate::machine::params::BoundaryError;
+use crate::machine::params::{BoundaryConditions, Params};
 use crate::machine::state::MAX_STATES;
 pub use crate::machine::state::{State, rad_s_of_rpm};
 pub use crate::simulation::outputs::{HookTerms, Outputs};
-use crate::{
-    gas::air,
-    laws::{housing, inlet_convection, nusselt, orifice, thermocouple},
-};
 use std::sync::Arc;
 
 /// Flow below which the gas path is not evaluated (it divides by the flow), kg/s.
@@ -171,7 +166,7 @@ impl PreparedModel<'_> {
         let isentropic_rise_ratio = compression::isentropic_rise_ratio(pressure_ratio, boundary.t1_k, air);
         // Bulk temperature of the properties: compression from T1 without heat transfer.
         let bulk_k = compression::compressed_k(boundary.t1_k, isentropic_rise_ratio, efficiency, air);
-        let mut h_w_m2k = nusselt::coefficient_w_m2k(
+        let mut h_w_m2k = convection::coefficient_w_m2k(
             compressor.nusselt_coefficient,
             compressor.nusselt_exponent,
             compressor.outlet_diameter_m,
@@ -189,7 +184,7 @@ impl PreparedModel<'_> {
         };
         let (q1_w, mut t1_prime_k) = compression::before_wheel(
             directed_w_k(boundary.t1_k)
-                * inlet_convection::h_ratio(compressor, boundary.t1_k, bulk_k)
+                * convection::h_ratio(compressor, boundary.t1_k, bulk_k)
                 * compressor.alpha_area_ratio
                 + compressor.inlet_conductance_w_k,
             boundary.t1_k,

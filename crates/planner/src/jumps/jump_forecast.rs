@@ -1,45 +1,11 @@
 //! Jumps between points: expected result of each, and the limits that forbid it.
 
-use crate::request::{PlanError, PlanRequest};
-use crate::targets::solve_steady_states;
+use crate::jumps::jump_graph::Rejection;
+use crate::request::{PlanError, PlanRequest, solve_steady_states};
 use crate::thermal_memory::forecast::{Forecast, forecast};
-use mapper_core::{OperatingPoint, Predicted, SURGE_ALLOWED_S, readable, temperature};
+use mapper_core::{OperatingPoint, Predicted, SURGE_ALLOWED_S};
 use mapper_numerics::parallel;
 use mapper_physics::simulation::steady::SteadyState;
-
-/// Reason why a jump is not allowed.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[allow(missing_docs, reason = "the messages describe the variants")]
-pub enum Rejection {
-    #[error("it stays {longest_s:.1} s beyond the surge line; {allowed_s:.1} s are allowed")]
-    Surge { longest_s: f64, allowed_s: f64 },
-    #[error("the shaft reaches {}; its limit is {}", readable(*.highest_rpm, "rpm"), readable(*.limit_rpm, "rpm"))]
-    Overspeed { highest_rpm: f64, limit_rpm: f64 },
-    #[error("T2 reaches {}; its limit is {}", temperature(*.highest_k), temperature(*.limit_k))]
-    OutletTemperature { highest_k: f64, limit_k: f64 },
-    #[error("T3 is {}; its limit is {}", temperature(*.t3_k), temperature(*.limit_k))]
-    TurbineInletTemperature { t3_k: f64, limit_k: f64 },
-    #[error(
-        "the housing temperature changes by {gradient_k:.1} K in the window; its limit is {limit_k:.1} K"
-    )]
-    HousingGradient { gradient_k: f64, limit_k: f64 },
-    #[error("P3 takes {needed_s:.1} s to reach its new value; the window begins after {available_s:.1} s")]
-    Slew { needed_s: f64, available_s: f64 },
-}
-
-impl Rejection {
-    /// What the jump reaches, relative to its limit.
-    pub(crate) fn ratio(&self) -> f64 {
-        match *self {
-            Rejection::Surge { longest_s, allowed_s } => longest_s / allowed_s,
-            Rejection::Overspeed { highest_rpm, limit_rpm } => highest_rpm / limit_rpm,
-            Rejection::OutletTemperature { highest_k, limit_k } => highest_k / limit_k,
-            Rejection::TurbineInletTemperature { t3_k, limit_k } => t3_k / limit_k,
-            Rejection::HousingGradient { gradient_k, limit_k } => gradient_k.abs() / limit_k,
-            Rejection::Slew { needed_s, available_s } => needed_s / available_s,
-        }
-    }
-}
 
 /// The forecast of a jump from the steady state of one point to another point.
 #[derive(Debug, Clone, PartialEq)]
@@ -143,26 +109,32 @@ pub fn explain_jump(
     }
 }
 
-/// Forecasts all jumps between the points, forbidden ones included. Each costs one simulation: use it for tens of points.
+/// Forecasts all jumps between the points by start, then destination, forbidden ones included. Each costs one simulation: use it for tens
+/// of points.
 ///
 /// # Errors
 /// Those of [`explain_jump`].
 pub fn forecast_all_jumps(request: &PlanRequest<'_>) -> Result<Vec<JumpForecast>, PlanError> {
     let targets = solve_steady_states(request, request.points)?;
-    forecast_jumps(request, request.points, &targets, request.timing.dwell.fixed_or_usual_s())
+    let dwell_s = request.timing.dwell.fixed_or_usual_s();
+    let jumps = forecast_jumps(request, request.points, &targets, dwell_s)?;
+    Ok(jumps.into_iter().map(|(_, jump)| jump).collect())
 }
 
-/// Forecasts all jumps between points with these steady states, by start, then destination.
+/// Forecasts all jumps between points with these steady states; with the indices of start and destination.
 pub(crate) fn forecast_jumps(
     request: &PlanRequest<'_>,
     points: &[OperatingPoint],
     targets: &[SteadyState],
     dwell_s: f64,
-) -> Result<Vec<JumpForecast>, PlanError> {
-    let all = || points.iter().copied().zip(targets);
-    let jumps: Vec<_> = all()
-        .enumerate()
-        .flat_map(|(i, from)| all().enumerate().filter(move |(j, _)| i != *j).map(move |(_, to)| (from, to)))
-        .collect();
-    parallel::try_map(&jumps, |(from, to)| forecast_jump(request, *from, *to, dwell_s))
+) -> Result<Vec<((usize, usize), JumpForecast)>, PlanError> {
+    let count = points.len();
+    let jumps =
+        (0..count).flat_map(|from| (0..count).filter(move |to| *to != from).map(move |to| (from, to)));
+    let forecast = |&(from, to): &(usize, usize)| {
+        let jump =
+            forecast_jump(request, (points[from], &targets[from]), (points[to], &targets[to]), dwell_s)?;
+        Ok(((from, to), jump))
+    };
+    parallel::try_map(&jumps.collect::<Vec<_>>(), forecast)
 }

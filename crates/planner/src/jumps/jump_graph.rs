@@ -1,7 +1,6 @@
 //! The jumps that no limit forbids, as a directed graph: the points that one order can reach, and ways around a forbidden jump.
 
-use crate::jumps::jump_forecast::{JumpForecast, Rejection};
-use mapper_core::{Jump, OperatingPoint};
+use mapper_core::{Jump, OperatingPoint, readable, temperature};
 use petgraph::algo::{astar, tarjan_scc};
 use petgraph::graphmap::DiGraphMap;
 use std::collections::BTreeMap;
@@ -10,6 +9,40 @@ use std::fmt;
 /// Cost of a jump over the whole range of speed relative to that of a visit: of two ways with equally many visits, the one with the smaller
 /// jumps is chosen. It is small enough that no sum of jumps outweighs a visit.
 const SPEED_COST_RATIO: f64 = 1e-3;
+
+/// Reason why a jump is not allowed.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
+pub enum Rejection {
+    #[error("it stays {longest_s:.1} s beyond the surge line; {allowed_s:.1} s are allowed")]
+    Surge { longest_s: f64, allowed_s: f64 },
+    #[error("the shaft reaches {}; its limit is {}", readable(*.highest_rpm, "rpm"), readable(*.limit_rpm, "rpm"))]
+    Overspeed { highest_rpm: f64, limit_rpm: f64 },
+    #[error("T2 reaches {}; its limit is {}", temperature(*.highest_k), temperature(*.limit_k))]
+    OutletTemperature { highest_k: f64, limit_k: f64 },
+    #[error("T3 is {}; its limit is {}", temperature(*.t3_k), temperature(*.limit_k))]
+    TurbineInletTemperature { t3_k: f64, limit_k: f64 },
+    #[error(
+        "the housing temperature changes by {gradient_k:.1} K in the window; its limit is {limit_k:.1} K"
+    )]
+    HousingGradient { gradient_k: f64, limit_k: f64 },
+    #[error("P3 takes {needed_s:.1} s to reach its new value; the window begins after {available_s:.1} s")]
+    Slew { needed_s: f64, available_s: f64 },
+}
+
+impl Rejection {
+    /// What the jump reaches, relative to its limit.
+    pub(crate) fn ratio(&self) -> f64 {
+        match *self {
+            Rejection::Surge { longest_s, allowed_s } => longest_s / allowed_s,
+            Rejection::Overspeed { highest_rpm, limit_rpm } => highest_rpm / limit_rpm,
+            Rejection::OutletTemperature { highest_k, limit_k } => highest_k / limit_k,
+            Rejection::TurbineInletTemperature { t3_k, limit_k } => t3_k / limit_k,
+            Rejection::HousingGradient { gradient_k, limit_k } => gradient_k.abs() / limit_k,
+            Rejection::Slew { needed_s, available_s } => needed_s / available_s,
+        }
+    }
+}
 
 /// A directed graph of points, by their index. Its edges are the allowed jumps.
 #[derive(Debug, Clone)]
@@ -60,16 +93,6 @@ impl JumpGraph {
             }
         }
         JumpGraph { points: points.to_vec(), allowed, forbidden: BTreeMap::new() }
-    }
-
-    /// Forbids the jumps whose forecasts violate a limit.
-    pub(crate) fn forbid_rejected(&mut self, forecasts: &[JumpForecast]) {
-        for jump in forecasts {
-            let index = |point: OperatingPoint| self.points.iter().position(|other| *other == point);
-            if let (Some(from), Some(to)) = (index(jump.from), index(jump.to)) {
-                self.forbid(from, to, &jump.rejections);
-            }
-        }
     }
 
     /// Removes a jump if there is a reason. Returns whether it was allowed before.
@@ -138,9 +161,8 @@ impl JumpGraph {
                 points.contains(&inside) && !points.contains(&outside)
             });
             let least = crossing.min_by(|a, b| a.1.ratio().total_cmp(&b.1.ratio()));
-            least.map(|(&(from, to), reason)| {
-                (Jump { from: self.points[from], to: self.points[to] }, *reason)
-            })
+            least
+                .map(|(&(from, to), reason)| (Jump { from: self.points[from], to: self.points[to] }, *reason))
         };
         SeparatePoints {
             into: least_violated(&|from, to| (to, from)),

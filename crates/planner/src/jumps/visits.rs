@@ -3,7 +3,7 @@
 use crate::jumps::jump_forecast::forecast_jump;
 use crate::ordering::objective::{FORBIDDEN_PENALTY, Objective};
 use crate::request::{PlanError, PlanRequest};
-use crate::thermal_memory::chain::{Chain, RepeatedJump, return_jump};
+use crate::thermal_memory::housing::{Chain, RepeatedJump, return_jump};
 use mapper_core::{Jump, OperatingPoint, Repeats, StepKind};
 use mapper_physics::simulation::steady::SteadyState;
 
@@ -53,7 +53,8 @@ pub(crate) fn propose_repeated_jumps(
     let mut allowed = Vec::new();
     for (from, to) in jumps.into_iter().take(MAX_SIMULATED_JUMPS) {
         let dwell_s = request.timing.dwell.fixed_or_usual_s();
-        let jump = forecast_jump(request, (points[from], &targets[from]), (points[to], &targets[to]), dwell_s)?;
+        let jump =
+            forecast_jump(request, (points[from], &targets[from]), (points[to], &targets[to]), dwell_s)?;
         if jump.rejections.is_empty() {
             allowed.push(Jump { from: jump.from, to: jump.to });
         }

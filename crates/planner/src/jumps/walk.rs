@@ -1,6 +1,7 @@
 //! Simulates the steps of an order with the full model.
 
-use crate::jumps::jump_forecast::{Rejection, find_rejections};
+use crate::jumps::jump_forecast::find_rejections;
+use crate::jumps::jump_graph::Rejection;
 use crate::jumps::visits::Visit;
 use crate::request::{PlanError, PlanRequest};
 use crate::thermal_memory::forecast::{Forecast, ParameterError, add_joint_errors, forecast};

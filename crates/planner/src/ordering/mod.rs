@@ -1,7 +1,5 @@
 //! Search for the best order of the points under thermal memory, exact for few points and by annealing for many.
 
-pub(crate) mod candidates;
-pub(crate) mod exact;
 pub(crate) mod objective;
 pub(crate) mod order;
 pub(crate) mod search;

@@ -4,9 +4,8 @@
 //! that the assignment of successors (`candidates`) favours. The effect of a move is computed from the first changed step until the
 //! housing has forgotten the change: a few steps, whatever the length of the order.
 
-use crate::ordering::candidates::Candidates;
-use crate::ordering::objective::Objective;
-use crate::thermal_memory::chain::{Chain, gradients_k};
+use crate::ordering::objective::{Candidates, Objective};
+use crate::thermal_memory::housing::{Chain, gradients_k};
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::nearest_rank;
 use rand::{RngExt, SeedableRng};

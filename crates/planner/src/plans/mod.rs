@@ -1,7 +1,5 @@
 //! Complete plans from a request: construction, key figures, input hashes, and comparison with other orders.
 
-pub(crate) mod comparison;
 pub(crate) mod fingerprint;
 pub(crate) mod plan;
 pub(crate) mod plan_builder;
-pub(crate) mod plan_figures;

@@ -1,11 +1,10 @@
-//! Makes a plan from a request: chooses the repeated jump and the dwell, then builds the order.
+//! Makes a plan from a request: the repeated jump, the dwell, then the order; and plans of the same points in the other orders.
 
 use crate::jumps::visits::propose_repeated_jumps;
-use crate::plans::plan_builder::{Draft, PlanBuilder, max_steps};
-use crate::plans::plan_figures::rms_error_eta;
-use crate::request::{PlanError, PlanRequest};
-use crate::targets::solve_steady_states;
-use mapper_core::{Dwell, Jump, Plan, PlanRemark, Repeats, WindowRule};
+use crate::plans::plan_builder::{Draft, PlanBuilder, max_steps, rms_error_eta};
+use crate::request::{PlanError, PlanRequest, solve_steady_states};
+use mapper_core::{Dwell, Jump, Plan, PlanRemark, Repeats, Timing, VisitOrder, WindowRule};
+use mapper_numerics::parallel;
 use mapper_physics::simulation::steady::SteadyState;
 
 /// Maximum number of jumps tried for repeats if the request gives none; each needs a complete search.
@@ -175,4 +174,34 @@ fn fit_required_error(builder: &PlanBuilder<'_>, required: f64) -> Result<Draft,
     } else {
         builder.with_dwell(draft, dwell_s)
     }
+}
+
+/// Plans the points of `plan` in every other order, with the same dwell. Orders that a limit forbids are omitted.
+///
+/// Conventional mapping has no repeats and waits at each point until T2 and the housing drift by less than
+/// [`STABLE_DRIFT_K_MIN`](crate::STABLE_DRIFT_K_MIN).
+///
+/// # Errors
+/// [`PlanError`] if a simulation fails.
+pub fn plan_other_orders(request: &PlanRequest<'_>, plan: &Plan) -> Result<Vec<Plan>, PlanError> {
+    let others: Vec<VisitOrder> =
+        VisitOrder::ALL.into_iter().filter(|order| order.name() != plan.objective).collect();
+    let dwell_s = plan.steps.first().map_or(0.0, |step| step.dwell_s);
+    let make = |order: &VisitOrder| {
+        let conventional = *order == VisitOrder::Conventional;
+        let dwell = Dwell::Fixed(if conventional { 0.0 } else { dwell_s });
+        make_plan_of_direct_jumps(&PlanRequest {
+            order: *order,
+            timing: Timing { dwell, ..request.timing },
+            repeats: request.repeats.filter(|_| !conventional),
+            return_to_first: request.return_to_first && !conventional,
+            appended: None,
+            bound: false,
+            ..request.clone()
+        })
+    };
+    parallel::map(&others, make)
+        .into_iter()
+        .filter(|plan| !matches!(plan, Err(PlanError::NoAdmissibleOrder { .. })))
+        .collect()
 }

@@ -1,28 +1,61 @@
-//! Builds a plan for a given dwell: order, repeats, appended jump, figures, bound and remarks.
+//! Builds a plan for a given dwell: order, repeats, ways around forbidden jumps, figures, bound and remarks.
 
-use crate::jumps::jump_forecast::{Rejection, forecast_jumps};
-use crate::jumps::jump_graph::JumpGraph;
+use crate::jumps::jump_forecast::forecast_jumps;
+use crate::jumps::jump_graph::{JumpGraph, Rejection};
 use crate::jumps::visits::{
     Visit, append_jump, append_return, insert_repeats, repeat_count, value, visits_of_points,
 };
 use crate::jumps::walk::{ForbiddenJump, Walk, walk};
 use crate::ordering::order::{PROOF_TOLERANCE_RATIO, PointOrder, objective, search_orders};
 use crate::plans::fingerprint::hash_inputs;
-use crate::plans::plan_figures::{compute_figures, rms_error_eta};
-use crate::request::{PlanError, PlanRequest};
-use crate::targets::solve_steady_states;
-use crate::thermal_memory::chain::{RepeatedJump, gradients_k};
+use crate::request::{PlanError, PlanRequest, solve_steady_states};
 use crate::thermal_memory::forecast::ParameterError;
-use crate::thermal_memory::housing::Housing;
+use crate::thermal_memory::housing::{Housing, RepeatedJump, gradients_k};
 use crate::upper_bound::bound::GradientBounds;
 use mapper_core::{
-    Dwell, Jump, NoBound, OperatingPoint, Plan, PlanBound, PlanRemark, PlanStep, Repeats, StepKind,
-    VisitOrder,
+    Dwell, Jump, NoBound, OperatingPoint, Plan, PlanBound, PlanFigures, PlanRemark, PlanStep, Predicted,
+    Repeats, StepKind, VisitOrder,
 };
+use mapper_numerics::statistics::rms;
 use mapper_physics::simulation::steady::SteadyState;
 use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::mem::discriminant;
+
+/// Standard error and bias of the efficiency, added in quadrature.
+fn error_eta(predicted: &Predicted) -> Option<f64> {
+    Some(predicted.sigma_eta?.hypot(predicted.bias_eta.unwrap_or(0.0)))
+}
+
+/// Root mean square of the expected errors of the steps that measure a point.
+pub(crate) fn rms_error_eta(steps: &[PlanStep]) -> Option<f64> {
+    let errors: Vec<f64> = measured_steps(steps).filter_map(error_eta).collect();
+    rms(&errors)
+}
+
+fn measured_steps(steps: &[PlanStep]) -> impl Iterator<Item = &Predicted> {
+    steps.iter().filter(|step| step.kind.measures()).map(|step| &step.predicted)
+}
+
+/// Computes the figures from the steps that measure a point. Repeats do not count.
+pub(crate) fn compute_figures(
+    steps: &[PlanStep],
+    minutes: f64,
+    parameter_error: Option<ParameterError>,
+) -> PlanFigures {
+    let gradients = || measured_steps(steps).filter_map(|predicted| predicted.dtc_k).map(f64::abs);
+    let largest = |values: &mut dyn Iterator<Item = f64>| values.max_by(f64::total_cmp);
+    PlanFigures {
+        sum_gradient_k: gradients().sum(),
+        min_gradient_k: gradients().min_by(f64::total_cmp),
+        worst_sigma_eta: largest(&mut measured_steps(steps).filter_map(|predicted| predicted.sigma_eta)),
+        rms_error_eta: rms_error_eta(steps),
+        rms_error_reported_eta: parameter_error.map(|parameter_error| parameter_error.reported_eta),
+        resting_eta: parameter_error.map(|parameter_error| parameter_error.eta),
+        worst_error_eta: largest(&mut measured_steps(steps).filter_map(error_eta)),
+        minutes,
+    }
+}
 
 /// Maximum number of searches: each forbids the jumps that the full simulation rejected in the previous order.
 const MAX_REORDERINGS: usize = 25;
@@ -92,7 +125,8 @@ impl<'a> PlanBuilder<'a> {
         ways_around: bool,
     ) -> Result<Self, PlanError> {
         let (points, targets) = (request.points.to_vec(), targets.to_vec());
-        let mut builder = PlanBuilder { request, points, targets, repeated: None, appended: None, ways_around };
+        let mut builder =
+            PlanBuilder { request, points, targets, repeated: None, appended: None, ways_around };
         if let Some((repeats, Jump { from, to })) = repeats {
             let (from, to) = (builder.index_of(from)?, builder.index_of(to)?);
             builder.repeated =
@@ -164,7 +198,9 @@ impl<'a> PlanBuilder<'a> {
     fn draft_with_ways_around(&self, mut housing: Housing, dwell_s: f64) -> Result<Draft, PlanError> {
         let request = self.request;
         let mut graph = JumpGraph::complete(&self.points);
-        graph.forbid_rejected(&forecast_jumps(request, &self.points, &self.targets, dwell_s)?);
+        for ((from, to), jump) in forecast_jumps(request, &self.points, &self.targets, dwell_s)? {
+            graph.forbid(from, to, &jump.rejections);
+        }
         let ranks = graph.ranks().map_err(PlanError::SeparatePoints)?;
         graph.forbidden().for_each(|(from, to)| housing.forbid(from, to));
         let given: Vec<usize> = (0..request.points.len()).collect();
@@ -211,7 +247,10 @@ impl<'a> PlanBuilder<'a> {
                 let over = graph.points_between(from, visit.index)?;
                 visits.extend(over.iter().map(|&index| Visit { index, kind: StepKind::Repeat }));
                 let jump = Jump { from: self.points[from], to: self.points[visit.index] };
-                ways.push(WayAround { jump, over: over.into_iter().map(|point| self.points[point]).collect() });
+                ways.push(WayAround {
+                    jump,
+                    over: over.into_iter().map(|point| self.points[point]).collect(),
+                });
             }
             visits.push(*visit);
         }

@@ -1,7 +1,6 @@
 //! Simulates one step of the plan on the nominal machine, and predicts the errors of the identification.
 
-use crate::method::MethodResult;
-use crate::request::PlanRequest;
+use crate::request::{MethodResult, PlanRequest};
 use mapper_core::{Predicted, VisitOrder};
 use mapper_numerics::statistics::rms;
 use mapper_physics::machine::params::BoundaryConditions;

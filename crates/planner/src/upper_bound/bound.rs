@@ -5,10 +5,8 @@
 //! successors with these weights is an upper bound on the sum of any order. For up to [`MAX_RELAXATION_POINTS`] points, a
 //! Lagrangian relaxation gives a tighter bound.
 
-use crate::thermal_memory::chain::{Chain, RepeatedJump};
-use crate::thermal_memory::housing::{Housing, Interval, StateBox};
-use crate::upper_bound::assignment::solve_bottleneck;
-use crate::upper_bound::auction::run_auction;
+use crate::thermal_memory::housing::{Chain, Housing, Interval, RepeatedJump, StateBox};
+use crate::upper_bound::assignment::{run_auction, solve_bottleneck};
 use crate::upper_bound::relaxation::{RelaxationProblem, bound_sum_k};
 
 /// Rounds of narrowing the ranges: each multiplies the remaining excess by the memory of the housing over one dwell.
@@ -172,8 +170,8 @@ fn propagate_boxes(
 mod tests {
     use super::*;
     use crate::request::PlanRequest;
-    use crate::targets::solve_steady_states;
-    use crate::thermal_memory::chain::gradients_k;
+    use crate::request::solve_steady_states;
+    use crate::thermal_memory::housing::gradients_k;
     use mapper_core::{Dwell, Limits, OperatingPoint, SettleBands, Timing, VisitOrder, WindowRule};
     use mapper_physics::simulation::model::Model;
     use proptest::prelude::*;

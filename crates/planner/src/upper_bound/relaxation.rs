@@ -8,8 +8,7 @@
 //! A price is piecewise linear in Tc and linear in Tt. Gradients and states are convex or affine on each piece, except for a small
 //! quadratic part that is bounded separately. The largest weight of a jump is therefore at a corner of the pieces.
 
-use crate::thermal_memory::chain::{Chain, RepeatedJump};
-use crate::thermal_memory::housing::{Housing, StateBox, Surface};
+use crate::thermal_memory::housing::{Chain, Housing, RepeatedJump, StateBox, Surface};
 use crate::upper_bound::assignment::solve_assignment;
 use mapper_numerics::parallel;
 

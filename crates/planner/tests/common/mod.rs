@@ -1,12 +1,14 @@
 //! The grid of docs/explanation/planner.md, a request, and a housing with one time constant per point.
 
 use mapper_core::{Dwell, Limits, OperatingPoint, SettleBands, Timing, VisitOrder, WindowRule};
+use mapper_physics::gas::air;
+use mapper_physics::laws::housing;
 use mapper_physics::machine::params::BoundaryConditions;
-use mapper_physics::operating_point::follow_outlet::FollowOutlet;
+use mapper_physics::operating_point::reach::FollowOutlet;
 use mapper_physics::simulation::model::Model;
-use mapper_physics::{gas::air, laws::housing, simulation::steady};
+use mapper_physics::simulation::steady;
 use mapper_planner::PlanRequest;
-use mapper_planner::thermal_memory::chain::Chain;
+use mapper_planner::thermal_memory::housing::Chain;
 
 /// Points along speed lines, in the order of conventional mapping.
 pub fn grid() -> Vec<OperatingPoint> {

@@ -11,7 +11,7 @@ use mapper_campaign::campaign::Date;
 use mapper_campaign::{Campaign, Concern};
 use mapper_core::{Advice, Dwell, Method, Plan, PlanStep, Soak, StepKind, VerdictForecast, WindowRule};
 use mapper_identify::ZeroSettings;
-use mapper_physics::laws::standstill::{StandstillState, relax};
+use mapper_physics::laws::housing::{StandstillState, relax};
 use mapper_physics::laws::thermocouple::time_constant_s;
 use mapper_physics::simulation::model::Model;
 use mapper_planner::{PlanRequest, max_steps};

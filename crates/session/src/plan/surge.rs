@@ -5,11 +5,11 @@ use mapper_campaign::Campaign;
 use mapper_core::{OperatingPoint, Plan, PlanRemark, Predicted, Recording};
 use mapper_identify::IdentifyConfig;
 use mapper_physics::machine::params::BoundaryConditions;
-use mapper_physics::operating_point::follow_outlet::hold_speed;
+use mapper_physics::operating_point::reach::hold_speed;
 use mapper_physics::simulation::model::Model;
 use mapper_recording::ChannelMap;
-use mapper_runner::surge::{self, SurgeErrors, SurgeMarks};
-use mapper_runner::{HoldConditions, SurgeSearch};
+use mapper_runner::surge::{SurgeErrors, SurgeMarks};
+use mapper_runner::{HoldConditions, SurgeSearch, surge};
 
 /// Setpoints and predicted readings of the nominal machine at a point near or beyond its surge line. `None` if P3 or T2 would exceed the
 /// campaign's limits.

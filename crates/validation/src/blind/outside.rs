@@ -7,8 +7,7 @@ use mapper_core::Channel;
 use mapper_physics::effect;
 use mapper_physics::gas::air;
 use mapper_physics::machine::hooks::{Hooks, Site};
-use mapper_physics::rig::effect::Effect;
-use mapper_physics::rig::effect_kind::effect_of;
+use mapper_physics::rig::effect::{Effect, effect_of};
 use std::sync::Arc;
 
 /// Purpose of an outside cause.

@@ -1,6 +1,9 @@
-//! A reproduced figure as data.
+//! Data of a figure, the paper's statements about it, and the errors of the reproduction.
 
 use mapper_core::named_enum;
+use mapper_identify::{IdentifyError, StepError};
+use mapper_physics::simulation::simulate::SimulationError;
+use mapper_physics::simulation::steady::SteadyError;
 
 /// One reproduced figure of the paper.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,4 +79,21 @@ impl Table {
 /// Path of this figure's picture, relative to the page of the figures.
 pub fn picture_path(result: &FigureResult) -> String {
     format!("reproduction/figure_{}.svg", result.number)
+}
+
+/// Why a figure could not be reproduced.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
+pub enum ReproduceError {
+    #[error(transparent)]
+    Steady(#[from] SteadyError),
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    #[error(transparent)]
+    Identify(#[from] IdentifyError),
+    /// A step has no point.
+    #[error(transparent)]
+    Step(#[from] StepError),
+    #[error("a simulated run has no step or no sample in the window")]
+    NoStep,
 }

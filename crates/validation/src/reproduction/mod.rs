@@ -2,7 +2,6 @@
 //!
 //! [`reproduce`] returns data and pictures. The same program gives the same bytes at any time and on any computer.
 
-mod error;
 mod figure_data;
 mod figures;
 mod lab;
@@ -12,7 +11,7 @@ mod outcome;
 mod page;
 mod picture;
 
-pub use error::ReproduceError;
+pub use crate::reproduction::figure_data::ReproduceError;
 pub use figure_data::{FigureResult, Statement, Table, Verdict, picture_path};
 pub use page::{figure_json, reproduction_page};
 

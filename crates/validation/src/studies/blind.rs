@@ -4,8 +4,7 @@ use crate::blind::scoring::score::score;
 use crate::blind::{
     CaseKind, Draw, Laboratory, OutsideUse, SIGMA_RANGE, StoredCase, Truth, draw_cases, record, seal,
 };
-use crate::studies::error::StudyError;
-use crate::studies::source::CampaignSource;
+use crate::studies::source::{CampaignSource, StudyError};
 use mapper_fleet::{
     FleetError, ItemDraft, Kind, Output, Results, StudyDraft, StudyFile, WorkContext, WorkError,
 };

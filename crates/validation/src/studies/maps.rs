@@ -1,8 +1,7 @@
 //! `study: maps`: campaigns repeated with several seeds and identified by several methods. All points are kept, for the coverage of
 //! intervals, tables over seeds, and the scatter compared with the planner's prediction.
 
-use crate::studies::error::StudyError;
-use crate::studies::source::CampaignSource;
+use crate::studies::source::{CampaignSource, StudyError};
 use mapper_core::Method;
 use mapper_fleet::{
     FleetError, ItemDraft, Kind, Output, Results, StudyDraft, StudyFile, WorkContext, WorkError,

@@ -2,10 +2,8 @@
 
 mod blind;
 mod calibration;
-mod error;
 mod maps;
 mod nightly;
-mod reliability_picture;
 mod source;
 
 use mapper_fleet::Kind;

@@ -1,7 +1,6 @@
 //! `study: nightly`: the runs of a nightly campaign.
 
-use crate::studies::error::StudyError;
-use crate::studies::source::CampaignSource;
+use crate::studies::source::{CampaignSource, StudyError};
 use mapper_campaign::load_nightly;
 use mapper_core::Method;
 use mapper_fleet::{

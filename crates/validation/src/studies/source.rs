@@ -1,6 +1,5 @@
-//! A campaign inside an item: its text, and the text of the files that it names.
+//! The source of a study's campaigns, and the errors of studies.
 
-use crate::studies::error::StudyError;
 use mapper_campaign::{Campaign, CampaignError, check_with, load, read_named_file, read_text};
 use mapper_fleet::FleetError;
 use mapper_session::Registry;
@@ -9,6 +8,29 @@ use std::collections::BTreeMap;
 use std::io::{Error, ErrorKind};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
+
+/// Why a study has no items, or a part no result.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
+pub enum StudyError {
+    #[error("{}: its rig `{backend}` is not simulated; studies run only on backends of this program", .campaign.display())]
+    Rig { campaign: PathBuf, backend: String },
+    /// A campaign that was checked when the study was made has mistakes now.
+    #[error("the campaign of the item has mistakes: {0}")]
+    Campaign(String),
+    #[error("the item has no file {0}")]
+    File(String),
+    #[error("the effect library has no effect `{0}`")]
+    Cause(String),
+    #[error("{name} has the wrong content: {source}")]
+    Content { name: String, source: serde_json::Error },
+}
+
+impl From<StudyError> for FleetError {
+    fn from(error: StudyError) -> Self {
+        FleetError::kind(error)
+    }
+}
 
 /// All input files of a campaign.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

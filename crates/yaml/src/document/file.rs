@@ -1,11 +1,10 @@
 //! Reads files from disk up to a size limit.
 
-use crate::mistakes::finding::FindingKind;
-use crate::mistakes::findings::Findings;
-use crate::mistakes::source::{Document, Source};
-use crate::mistakes::suggestion::closest;
+use crate::mistakes::finding::{FindingKind, closest};
+use crate::mistakes::source::{Document, Findings, Source};
 use std::fs::{File, OpenOptions};
-use std::io::{self, ErrorKind, Read, Seek};
+use std::io;
+use std::io::{ErrorKind, Read, Seek};
 use std::path::Path;
 
 /// Opens a plain file: the one place where files that a user names are opened. A pipe or a device is not opened: reading it may hang or never end.

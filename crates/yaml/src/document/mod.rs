@@ -1,7 +1,5 @@
 //! Parses YAML within limits: the values, and the position of every key for later messages.
 
 pub(crate) mod file;
-mod other_kind;
-pub(crate) mod path;
 pub(crate) mod positions;
 pub(crate) mod tree;

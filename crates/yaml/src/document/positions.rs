@@ -1,13 +1,7 @@
-//! Positions of all keys and values of a YAML text, and limits on its size.
-//!
-//! saphyr-parser delivers events, so that the nesting depth is limited here and not by the stack. serde_yaml gives no positions; it reads
-//! the values of a text that passed. YAML features that would hide mistakes (anchors, aliases, merge keys, tags, several documents) are
-//! rejected.
+//! Positions of values in a YAML text, and the path of a value.
 
-use crate::document::path::Step;
 use crate::mistakes::finding::FindingKind;
-use crate::mistakes::notes::Notes;
-use crate::mistakes::source::Source;
+use crate::mistakes::source::{Notes, Source};
 use saphyr_parser::{Event, Marker, Parser, ScalarStyle, ScanError};
 use serde::de::IgnoredAny;
 use std::collections::HashMap;
@@ -322,4 +316,44 @@ fn is_finite(text: &str) -> bool {
     let is_named = [".inf", ".nan"].iter().any(|name| digits.eq_ignore_ascii_case(name));
     let is_number = digits.starts_with(|c: char| c.is_ascii_digit() || c == '.');
     !(is_named || is_number && digits.parse().is_ok_and(f64::is_infinite))
+}
+
+/// A step from a value to one of its children.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub enum Step {
+    /// To the value of a key.
+    Key(String),
+    /// To an item of a list, from 0.
+    Index(usize),
+}
+
+impl From<&str> for Step {
+    fn from(key: &str) -> Step {
+        Step::Key(key.to_owned())
+    }
+}
+
+impl From<usize> for Step {
+    fn from(index: usize) -> Step {
+        Step::Index(index)
+    }
+}
+
+/// `grid.points[3].speed`
+pub fn path_text(steps: &[Step]) -> String {
+    let mut text = String::new();
+    for step in steps {
+        match step {
+            Step::Index(index) => text.push_str(&format!("[{index}]")),
+            Step::Key(key) if text.is_empty() => text.push_str(key),
+            Step::Key(key) => text.push_str(&format!(".{key}")),
+        }
+    }
+    text
+}
+
+/// The steps to a place, from strings and indices: `steps!["grid", "points", 3]`.
+#[macro_export]
+macro_rules! steps {
+    ($($step:expr),* $(,)?) => { [$($crate::Step::from($step)),*] };
 }

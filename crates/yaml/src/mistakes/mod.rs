@@ -1,8 +1,4 @@
 //! Mistakes of a file collected during its checks, and their display with source line and remedy.
 
 pub(crate) mod finding;
-pub(crate) mod findings;
-pub(crate) mod notes;
-pub(crate) mod render;
 pub(crate) mod source;
-pub(crate) mod suggestion;

@@ -2,17 +2,16 @@
 //!
 //! serde would stop at the first mistake, and would lose position and choices for untagged enums and unknown keys.
 
-use crate::document::path::{Step, path_text};
+use crate::document::positions::{Step, path_text};
 use crate::document::tree::Tree;
-use crate::mistakes::finding::{Finding, FindingKind};
-use crate::mistakes::notes::Notes;
-use crate::mistakes::suggestion::{closest, guess};
+use crate::mistakes::finding::{Finding, FindingKind, closest, guess};
+use crate::mistakes::source::Notes;
+
 use crate::schema_check::messages::{
     describe_violation, example_of, example_sentence, keys_of, quote, replacement, shorten, with_description,
     wrong_name,
 };
-use crate::schema_check::quantity_check::{self, Message};
-use crate::schema_check::rules::{Rule, Violation, find_violations};
+use crate::schema_check::rules::{Message, Rule, Violation, check_quantity, find_violations};
 use crate::schema_check::schema::Schema;
 use serde_json::{Map, Value};
 use std::collections::HashSet;
@@ -47,7 +46,7 @@ impl Check<'_> {
         match rule {
             Rule::Quantity(message) => self.note(steps, message),
             // One mistake in a quantity violates type, range and kind: report it once.
-            _ if quantity_check::check(schema, value).is_some() => {}
+            _ if check_quantity(schema, value).is_some() => {}
             Rule::UnknownKeys(keys) => self.report_unknown_keys(steps, keys, schema),
             Rule::MissingKey(key) => self.report_missing_key(steps, key, schema),
             Rule::NoForm(forms) => self.report_intended_form(steps, forms, schema, value),

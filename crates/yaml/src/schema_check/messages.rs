@@ -1,9 +1,7 @@
 //! Messages of the violated rules.
 
-use crate::mistakes::finding::FindingKind;
-use crate::mistakes::suggestion::guess;
-use crate::schema_check::quantity_check::{Message, name_of};
-use crate::schema_check::rules::Rule;
+use crate::mistakes::finding::{FindingKind, guess};
+use crate::schema_check::rules::{Message, Rule, name_of};
 use serde_json::{Map, Value};
 
 /// The message for a violated rule about a value itself; `None` for rules about keys and alternative forms, which need other positions.

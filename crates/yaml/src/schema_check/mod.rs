@@ -2,6 +2,5 @@
 
 pub(crate) mod check;
 pub(crate) mod messages;
-pub(crate) mod quantity_check;
 pub(crate) mod rules;
 pub(crate) mod schema;

@@ -4,7 +4,7 @@ use super::equations::apply_structure;
 use super::structure::{NAME, OtherStructure};
 use crate::virtual_lab::{LabSettings, SettingProblem, check_range, read_settings};
 use mapper_core::BackendError;
-use mapper_physics::rig::nominal_rig::NominalRig;
+use mapper_physics::rig::backend_plugin::NominalRig;
 use mapper_yaml::units::{Conductance, Fraction, Length, Quantity, set};
 use serde::Deserialize;
 

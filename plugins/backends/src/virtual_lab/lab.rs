@@ -4,7 +4,8 @@ use super::samples::{Instant, SampleCollector, SensorBank};
 use super::settings::{LabSettings, Start};
 use crate::setpoint_limits;
 use crate::virtual_lab::rig::actuator::Actuator;
-use crate::virtual_lab::rig::drift::{self, LabDrift};
+use crate::virtual_lab::rig::drift;
+use crate::virtual_lab::rig::drift::LabDrift;
 use crate::virtual_lab::rig::inputs::{LabInputs, MIN_EXPANSION_RATIO};
 use crate::virtual_lab::rig::precursor::Resonator;
 use crate::virtual_lab::rig::running::RunningMachine;
@@ -15,7 +16,8 @@ use mapper_core::{
     Backend, BackendError, CHANNELS, Channel, Event, EventKind, GuardName, MODELLED_CHANNELS, RigDescription,
     RigMode, SafeTrajectory, SampleBatch, Setpoints,
 };
-use mapper_physics::laws::standstill::{self, StandstillState};
+use mapper_physics::laws::housing;
+use mapper_physics::laws::housing::StandstillState;
 use mapper_physics::rig::instruments::ChannelFollower;
 use mapper_physics::simulation::inputs::Inputs;
 use mapper_physics::simulation::model::{State, rad_s_of_rpm};
@@ -245,7 +247,7 @@ fn settle(settings: &LabSettings, armed: &ArmedLab, now_s: f64) -> Result<Machin
             let state = StandstillState { tc_k: ambient_k, tt_k: ambient_k };
             // After a day at rest.
             let oil_k = armed.inputs.oil.value(now_s);
-            let state = standstill::relax(&settings.model.params, state, oil_k, ambient_k, 86_400.0);
+            let state = housing::relax(&settings.model.params, state, oil_k, ambient_k, 86_400.0);
             Ok(Machine::Standstill { state, t_s: now_s })
         }
     }
@@ -373,7 +375,7 @@ impl ArmedLab {
                 let mut relax_to = |t_s: f64| {
                     let oil_k = inputs.oil.value(t_s);
                     if t_s > *state_s {
-                        *state = standstill::relax(params, *state, oil_k, ambient_k, t_s - *state_s);
+                        *state = housing::relax(params, *state, oil_k, ambient_k, t_s - *state_s);
                         *state_s = t_s;
                     }
                     *state

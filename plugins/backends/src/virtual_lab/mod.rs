@@ -27,7 +27,7 @@ pub use settings::{LabSettings, Start};
 
 use mapper_core::{Backend, BackendError};
 use mapper_physics::rig::backend_plugin::BackendPlugin;
-use mapper_physics::rig::nominal_rig::NominalRig;
+use mapper_physics::rig::backend_plugin::NominalRig;
 
 /// The lab as a plugin for campaigns.
 pub const PLUGIN: BackendPlugin =

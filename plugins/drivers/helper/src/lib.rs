@@ -25,7 +25,6 @@ mod armed;
 mod descent;
 mod outage;
 mod output_queue;
-mod pipes;
 mod refusal;
 mod server;
 mod serving;
@@ -35,10 +34,10 @@ mod socket;
 
 pub use about::{About, SOCKET};
 pub use outage::Outage;
-pub use pipes::serve;
-pub use settings::address::address;
-pub use settings::by_channel::by_channel;
-pub use settings::secret::{SecretError, secret};
+pub use settings::address;
+pub use settings::by_channel;
+pub use settings::{SecretError, secret};
+pub use socket::serve;
 #[cfg(unix)]
 pub use socket::serve_at;
 

@@ -2,7 +2,7 @@
 //! to a request that timed out may still arrive, and this library would take it for the answer to the next
 //! (slowtec/tokio-modbus issue 324).
 
-use crate::blocks::Block;
+use crate::registers::Block;
 use std::future::Future;
 use std::io::ErrorKind;
 use std::net::SocketAddr;

@@ -2,7 +2,6 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-mod blocks;
 mod link;
 mod registers;
 mod rig;

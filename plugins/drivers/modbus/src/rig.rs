@@ -1,8 +1,7 @@
 //! The registers of the rig.
 
-use crate::blocks::{Block, group_registers};
 use crate::link::{Link, LinkError, Table};
-use crate::registers::Order;
+use crate::registers::{Block, Order, group_registers};
 use crate::settings::{RegisterSettings, SettingError, Settings, settings_error};
 use mapper_controller::{Controller, Reading, Target, is_plausible, rig};
 use mapper_core::{Backend, BackendError, Channel};

@@ -1,9 +1,9 @@
-//! `acceptance:`
+//! `acceptance:` and `drift:`, what is judged during and after a run.
 
-use crate::elements::output::report::SensorSymbol;
+use crate::elements::output::SensorSymbol;
 use crate::si_values::value_or;
 use crate::units::{Duration, Fraction, Quantity};
-use mapper_core::{ACCEPTANCE_WINDOW_S, AcceptanceCriteria, Channel};
+use mapper_core::{ACCEPTANCE_WINDOW_S, AcceptanceCriteria, Channel, OnDrift};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -68,4 +68,13 @@ impl From<AcceptanceFile> for AcceptanceCriteria {
             },
         }
     }
+}
+
+/// Reaction to drift.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct DriftFile {
+    /// `hold` ends the run in its safe state; `zero` also requests a zero of the sensors; `continue` notes the drift and continues the run.
+    #[schemars(example = &"hold")]
+    pub(crate) on_drift: OnDrift,
 }

@@ -1,8 +1,5 @@
 //! Campaign keys for the evaluation of steps: identification method, window, settle bands, tolerances, and drift.
 
 pub(crate) mod acceptance;
-pub(crate) mod drift;
 pub(crate) mod identification;
-pub(crate) mod settle_bands;
 pub(crate) mod tolerances;
-pub(crate) mod window;

@@ -1,12 +1,15 @@
-//! `repeats:`
+//! `sequence:`, `repeats:` and `surge_search:`, the steps besides the points of the grid.
 
-use crate::checking::Check;
+use crate::checking::{Check, resolve_path};
 use crate::elements::points::grid::PointFile;
-use crate::units::Kind;
-use mapper_core::{Jump, Repeats};
+use crate::si_values::value_or;
+use crate::units::{Duration, Fraction, Kind, Quantity};
+use mapper_core::{Jump, Repeats, SurgeSearchSettings};
 use mapper_yaml::{FindingKind, steps};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
+use std::io;
+use std::path::{Path, PathBuf};
 
 const DEFAULT_SPACING_STEPS: usize = 12;
 const DEFAULT_COUNT: usize = 2;
@@ -64,7 +67,7 @@ pub(crate) fn repeats(file: Option<RepeatsFile>) -> Option<Repeats> {
 }
 
 /// Checks the points of a repeated jump.
-pub(crate) fn check(check: &mut Check<'_>) {
+pub(crate) fn check_repeats(check: &mut Check<'_>) {
     let point = |end: &str| {
         let (speed, _) = check.quantity(Kind::Speed, &steps!["repeats", "jump", end, "speed"])?;
         let opening = check.number(&steps!["repeats", "jump", end, "opening"])?;
@@ -76,6 +79,82 @@ pub(crate) fn check(check: &mut Check<'_>) {
         let message = "the repeated jump ends where it starts, so it has no transient".to_owned();
         let remedy = "let it lead to another speed, e.g. from the slowest to the fastest";
         check.note(FindingKind::Conflict, &steps!["repeats", "jump", "to"], message, remedy);
+    }
+}
+
+/// A sequence script.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SequenceSource {
+    /// Path as written in the campaign.
+    #[serde(skip)]
+    pub named: String,
+    /// Path as resolved from the campaign file. Not part of the canonical JSON: only the text identifies the script.
+    #[serde(skip)]
+    pub path: PathBuf,
+    /// The script.
+    pub text: String,
+}
+
+/// Reads the script that a campaign names.
+///
+/// # Errors
+/// If it can no longer be read.
+pub(crate) fn sequence(
+    name: Option<&str>,
+    origin: &Path,
+    files: &dyn Fn(&Path) -> io::Result<String>,
+) -> io::Result<Option<SequenceSource>> {
+    let source = |name: &str| {
+        let path = resolve_path(origin, name);
+        let text = files(&path)?;
+        Ok(SequenceSource { named: name.to_owned(), path, text })
+    };
+    name.map(source).transpose()
+}
+
+/// Checks that the script can be read.
+pub(crate) fn check_sequence(check: &mut Check<'_>) {
+    let steps = steps!["sequence"];
+    let Some(name) = check.text(&steps).filter(|name| name.ends_with(".rhai")) else { return };
+    if let (path, Err(error)) = check.file(name) {
+        let message = format!("the sequence script `{}` cannot be read: {error}", path.display());
+        let remedy = "write its path relative to the campaign file, or remove `sequence`";
+        check.note(FindingKind::MissingFile, &steps, message, remedy);
+    }
+}
+
+/// Search for the surge line after all other steps: at the end of each speed line the valve closes in small steps while the variation of pressures and flow indicates the distance to surge. It opens again before surge, and the surge-side end is marked with its uncertainty.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct SurgeSearchFile {
+    /// Smallest surge margin (flow over surge flow, minus one) to approach; 3 % if none is given.
+    #[schemars(extend("x-min" = "0.5 %", "x-max" = "30 %"), example = &"3 %")]
+    closest: Option<Quantity<Fraction>>,
+    /// Largest change of the valve's opening per step near surge, relative to the opening; 3 % if none is given.
+    #[schemars(extend("x-min" = "0.5 %", "x-max" = "10 %"), example = &"3 %")]
+    step: Option<Quantity<Fraction>>,
+    /// Time at each opening; 25 s if none is given. The rig needs the first 5 s to follow.
+    #[schemars(extend("x-min" = "12 s", "x-max" = "10 min"), example = &"25 s")]
+    dwell: Option<Quantity<Duration>>,
+    /// Standard error of the surge flow at which a line is finished, without the flow meter's gain; 0.8 % if none is given.
+    #[schemars(extend("x-min" = "0.1 %", "x-max" = "5 %"), example = &"0.8 %")]
+    standard_error: Option<Quantity<Fraction>>,
+    /// Maximum number of openings of one line; 40 if none is given.
+    #[schemars(range(min = 5, max = 200), example = 40)]
+    most_steps: Option<usize>,
+}
+
+impl SurgeSearchFile {
+    /// The search, with defaults filled in.
+    pub(crate) fn settings(self) -> SurgeSearchSettings {
+        let usual = SurgeSearchSettings::default();
+        SurgeSearchSettings {
+            closest_margin_ratio: value_or(self.closest, usual.closest_margin_ratio),
+            step_ratio: value_or(self.step, usual.step_ratio),
+            dwell_s: value_or(self.dwell, usual.dwell_s),
+            wanted_standard_error_ratio: value_or(self.standard_error, usual.wanted_standard_error_ratio),
+            most_steps: self.most_steps.unwrap_or(usual.most_steps),
+        }
     }
 }
 
@@ -93,5 +172,17 @@ mod tests {
         assert_eq!(read("{every: 20}"), Some((false, 20, 2)));
         let jump = "{jump: {from: {speed: 50 krpm, opening: 1}, to: {speed: 90 krpm, opening: 1}}}";
         assert_eq!(read(jump), Some((true, 12, 2)));
+    }
+
+    #[test]
+    fn what_is_left_out_has_its_default() {
+        let read = |text| crate::testing::any::<SurgeSearchFile>(text).unwrap().settings();
+        assert_eq!(read("{}"), SurgeSearchSettings::default());
+        let written = SurgeSearchSettings {
+            closest_margin_ratio: 0.05,
+            dwell_s: 60.0,
+            ..SurgeSearchSettings::default()
+        };
+        assert_eq!(read("{closest: 5 %, dwell: 1 min}"), written);
     }
 }

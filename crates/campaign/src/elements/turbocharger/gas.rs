@@ -2,8 +2,7 @@
 
 use crate::checking::Check;
 use crate::units::{Fraction, Kind, Quantity};
-use mapper_physics::gas::mixture::{Fuel, Gas};
-use mapper_physics::gas::species::Species;
+use mapper_physics::gas::mixture::{Fuel, Gas, Species};
 use mapper_physics::machine::params::Params;
 use mapper_yaml::{FindingKind, steps};
 use schemars::JsonSchema;

@@ -1,7 +1,7 @@
-//! `reference:`, and the reference state of a map file.
+//! `reference:`, the reference state of a map file, and `efficiency:`.
 
 use crate::units::{Pressure, Quantity, Temperature};
-use mapper_core::ReferenceState;
+use mapper_core::{EfficiencyDefinition, ReferenceState};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -42,6 +42,42 @@ impl From<ReferenceFile> for ReferenceState {
             ReferenceFile::State(state) => {
                 ReferenceState { t_ref_k: state.temperature.value, p_ref_pa: state.pressure.value }
             }
+        }
+    }
+}
+
+// Untagged: the type of the YAML node determines the variant, and the schema has been checked.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub(crate) enum EfficiencyFile {
+    Named(NamedEfficiency),
+    Gamma(GammaFile),
+}
+
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+pub(crate) enum NamedEfficiency {
+    #[serde(rename = "enthalpy")]
+    Enthalpy,
+    #[serde(rename = "kappa_of_T1")]
+    KappaOfT1,
+}
+
+/// Efficiency by temperature rises at a constant ratio of heat capacities.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct GammaFile {
+    /// Ratio of heat capacities, e.g. 1.4 for air.
+    // Kinetic theory: 5/3 for a monatomic gas, less for all others.
+    #[schemars(range(max = 1.667), extend("exclusiveMinimum" = 1), example = 1.4)]
+    constant_gamma: f64,
+}
+
+impl From<EfficiencyFile> for EfficiencyDefinition {
+    fn from(file: EfficiencyFile) -> Self {
+        match file {
+            EfficiencyFile::Named(NamedEfficiency::Enthalpy) => EfficiencyDefinition::Enthalpy,
+            EfficiencyFile::Named(NamedEfficiency::KappaOfT1) => EfficiencyDefinition::KappaOfT1,
+            EfficiencyFile::Gamma(file) => EfficiencyDefinition::ConstantGamma(file.constant_gamma),
         }
     }
 }

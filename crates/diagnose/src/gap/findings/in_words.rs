@@ -1,7 +1,7 @@
 //! Effect sizes as text in engineering terms.
 
 use mapper_core::with_unit;
-use mapper_physics::laws::bearing_friction::at_150_krpm;
+use mapper_physics::laws::turbine::at_150_krpm;
 use mapper_physics::rig::effect::EffectParameter;
 
 /// A parameter value as text: "+5 %" for a factor of 1.05, "370 W at 150 krpm" for friction.

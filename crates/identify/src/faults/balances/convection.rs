@@ -11,7 +11,7 @@ use crate::faults::end_readings::{CHANNELS, Readings};
 use crate::faults::nominal_rig::NominalRig;
 use crate::single_step::fit::ETA_BOUNDS;
 use mapper_core::Channel;
-use mapper_physics::laws::nusselt;
+use mapper_physics::laws::convection;
 use mapper_physics::rig::sensor_fault::FaultKind;
 use nalgebra::DMatrix;
 
@@ -71,7 +71,7 @@ pub(crate) fn rows(
         known.map(|(row, _)| fitted.eta.values[row].clamp(ETA_BOUNDS.0, ETA_BOUNDS.1)).collect();
     for (i, (readings, eta)) in rows.readings.iter().zip(etas).enumerate() {
         let declared = |readings: &Readings| {
-            let h_w_m2k = nusselt::coefficient_w_m2k(
+            let h_w_m2k = convection::coefficient_w_m2k(
                 compressor.nusselt_coefficient,
                 compressor.nusselt_exponent,
                 compressor.outlet_diameter_m,

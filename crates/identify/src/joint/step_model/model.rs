@@ -14,8 +14,8 @@ use mapper_physics::laws::compression::{
     CompressionInputs, actual_rise_k, compress, compressed_k, isentropic_rise_ratio,
     rise_ratio_by_ln_pressure,
 };
-use mapper_physics::laws::inlet_convection::InletLaw;
-use mapper_physics::laws::nusselt;
+use mapper_physics::laws::convection;
+use mapper_physics::laws::convection::InletLaw;
 use mapper_physics::rig::sensor_fault::CALIBRATED_AT_K;
 
 /// Minimum efficiency of the model. Bound: keeps the temperature rise finite while a fit searches.
@@ -123,7 +123,7 @@ impl Setting {
         Answer {
             ln_h_by_bulk: (hotter.h_w_m2k / here.h_w_m2k - 1.0) / by_k,
             inlet_by_bulk: (hotter.inlet_h_ratio - here.inlet_h_ratio) / by_k,
-            ln_h_by_metal: nusselt::WALL_EXPONENT * (viscosity_ratio - 1.0) / (metal_k - gas.tc_k),
+            ln_h_by_metal: convection::WALL_EXPONENT * (viscosity_ratio - 1.0) / (metal_k - gas.tc_k),
             ln_h_by_ln_flow: shared[EXPONENT],
         }
     }
@@ -138,7 +138,7 @@ impl Setting {
         };
         let exponent = shared[EXPONENT];
         let ln_coefficient = shared[LN_COEFFICIENT] + ln_deviation - exponent * self.reynolds_reference.ln();
-        let h_w_m2k = nusselt::coefficient_w_m2k(
+        let h_w_m2k = convection::coefficient_w_m2k(
             ln_coefficient.exp(),
             exponent,
             self.outlet_diameter_m,

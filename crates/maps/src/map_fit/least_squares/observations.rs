@@ -3,7 +3,7 @@
 use crate::map_fit::MapFitError;
 use crate::map_fit::least_squares::common_errors::CommonErrorField;
 use mapper_core::{CompressorMap, MapPoint, SurgeMark, Verdict};
-use mapper_physics::compressor_map::similarity::head_ratio;
+use mapper_physics::compressor_map::characteristic::head_ratio;
 
 /// Maximum pressure ratio of a point. Bound: several stages; a larger one is a mistake.
 const MAX_PRESSURE_RATIO: f64 = 50.0;

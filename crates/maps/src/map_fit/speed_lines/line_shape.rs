@@ -10,7 +10,7 @@
 //! friction and recirculation) is a cubic of the flow coefficient with two terms for the drop towards choke; it
 //! changes little with speed, so efficiency can be extrapolated over speed.
 
-use mapper_physics::compressor_map::similarity::pressure_ratio_of_signed_head;
+use mapper_physics::compressor_map::characteristic::pressure_ratio_of_signed_head;
 
 /// Range of ln of an exponent minus its minimum. Bound: from corners to nearly a rectangle; beyond, the line does not change visibly.
 const EXPONENT_LN: (f64, f64) = (-4.0, 2.2);
@@ -74,7 +74,7 @@ pub(crate) struct FlowFrame {
 pub(crate) struct Place {
     /// Flow over the speed ratio, kg/s.
     pub flow_at_nominal_kg_s: f64,
-    /// Isentropic head over the speed ratio's square; see `mapper_physics::compressor_map::similarity`.
+    /// Isentropic head over the speed ratio's square; see `mapper_physics::compressor_map::characteristic`.
     pub head: f64,
     /// Work in the units of `head`.
     pub work: f64,

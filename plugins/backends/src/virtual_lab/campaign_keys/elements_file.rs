@@ -5,7 +5,7 @@ use crate::virtual_lab::sensors::draws::{Draws, offset_kind};
 use crate::virtual_lab::sensors::elements::{LabElement, LabElements, stream};
 use crate::virtual_lab::sensors::sensor::SensorErrors;
 use mapper_core::{BackendError, Channel, DeclaredElement, Element};
-use mapper_physics::rig::nominal_rig::NominalRig;
+use mapper_physics::rig::backend_plugin::NominalRig;
 use mapper_yaml::units::{Duration, Length, Quantity};
 use serde::Deserialize;
 use std::collections::BTreeMap;

@@ -1,9 +1,10 @@
 //! Settings of the lab in a campaign, below `backend: {virtual_lab: ...}`.
 
-use crate::virtual_lab::campaign_keys::drift_file::{self, DriftFile};
+use crate::virtual_lab::campaign_keys::drift_file::DriftFile;
 use crate::virtual_lab::campaign_keys::effects_file::{EffectValues, apply_effects};
-use crate::virtual_lab::campaign_keys::elements_file::{self, FaultFile};
+use crate::virtual_lab::campaign_keys::elements_file::FaultFile;
 use crate::virtual_lab::campaign_keys::setting_problem::{SettingProblem, check_range};
+use crate::virtual_lab::campaign_keys::{drift_file, elements_file};
 use crate::virtual_lab::rig::actuator::ActuatorDynamics;
 use crate::virtual_lab::rig::boundary_wander::Weather;
 use crate::virtual_lab::rig::precursor::SurgePrecursor;
@@ -14,9 +15,9 @@ use crate::virtual_lab::sensors::sensor::SensorErrors;
 use crate::virtual_lab::settings::{LabSettings, Start};
 use mapper_core::{BackendError, Channel};
 use mapper_physics::machine::params::Params;
+use mapper_physics::rig::backend_plugin::NominalRig;
 use mapper_physics::rig::effect::Rig;
 use mapper_physics::rig::instruments::Instruments;
-use mapper_physics::rig::nominal_rig::NominalRig;
 use mapper_physics::simulation::model::Model;
 use mapper_yaml::units::{
     Conductance, Dimension, Duration, Fraction, Frequency, Length, PressureRate, Quantity, RatioRate, Speed,

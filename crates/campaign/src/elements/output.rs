@@ -1,17 +1,94 @@
-//! `report:`
+//! Campaign keys for the results: output files, report, and display units.
 
 use crate::checking::Check;
 use crate::elements::rig::calibration::{Date, check_date};
 use crate::elements::rig::sensors::CALIBRATED;
 use crate::si_values::optional_si;
-use crate::units::{Fraction, Pressure, Quantity, Temperature};
+use crate::units::{Fraction, Kind, Pressure, Quantity, Temperature, Unit};
 use mapper_core::Channel;
 use mapper_physics::gas::air;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_yaml::steps;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 use std::collections::BTreeMap;
+
+/// Display units, by their symbols; convert with [`crate::units::Kind::unit`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct DisplayUnits {
+    /// Unit of temperatures; degC if none is given.
+    #[schemars(extend("enum" = symbols(Kind::Temperature)), example = &"degC")]
+    pub temperature: String,
+    /// Unit of pressures; kPa if none is given.
+    #[schemars(extend("enum" = symbols(Kind::Pressure)), example = &"kPa")]
+    pub pressure: String,
+    /// Unit of shaft speeds; krpm if none is given.
+    #[schemars(extend("enum" = symbols(Kind::Speed)), example = &"krpm")]
+    pub speed: String,
+    /// Unit of mass flows; g/s if none is given.
+    #[schemars(extend("enum" = symbols(Kind::MassFlow)), example = &"g/s")]
+    pub flow: String,
+}
+
+impl Default for DisplayUnits {
+    fn default() -> Self {
+        DisplayUnits {
+            temperature: "degC".into(),
+            pressure: "kPa".into(),
+            speed: "krpm".into(),
+            flow: "g/s".into(),
+        }
+    }
+}
+
+fn symbols(kind: Kind) -> serde_json::Value {
+    json!(kind.units().iter().map(Unit::symbol).collect::<Vec<_>>())
+}
+
+const DEFAULT_DIRECTORY: &str = "runs";
+const DEFAULT_FORMATS: [&str; 4] = ["csv", "json", "svg", "fitted"];
+
+/// Formats and directory of the results.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Outputs {
+    /// Parent directory of the run directories; `runs` if none is given.
+    #[schemars(length(min = 1), example = &"runs")]
+    pub directory: String,
+    /// Formats of the map, each once; csv, json, svg and fitted if none is given. docs/reference/maps.md lists all supported formats.
+    #[schemars(extend("uniqueItems" = true, "examples" = [["csv", "json", "svg"]]))]
+    pub formats: Vec<FormatName>,
+}
+
+/// Name of a map format, e.g. `csv`. The caller knows the valid names; [`crate::format_mistake`] reports any other one.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(transparent)]
+#[schemars(inline)]
+pub struct FormatName(#[schemars(length(min = 1), example = &"csv")] pub String);
+
+impl FormatName {
+    /// The name.
+    pub fn name(&self) -> &str {
+        &self.0
+    }
+}
+
+impl std::fmt::Display for FormatName {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl Default for Outputs {
+    fn default() -> Self {
+        Outputs {
+            directory: DEFAULT_DIRECTORY.to_owned(),
+            formats: DEFAULT_FORMATS.map(|name| FormatName(name.to_owned())).to_vec(),
+        }
+    }
+}
 
 /// Information for the test report that no sensor measures.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
@@ -105,6 +182,30 @@ pub(crate) fn check(check: &mut Check<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_usual_units_are_units() {
+        let usual = DisplayUnits::default();
+        for (kind, symbol) in [
+            (Kind::Temperature, &usual.temperature),
+            (Kind::Pressure, &usual.pressure),
+            (Kind::Speed, &usual.speed),
+            (Kind::MassFlow, &usual.flow),
+        ] {
+            assert!(kind.units().iter().any(|unit| unit.symbol() == symbol), "{symbol}");
+        }
+        let read = crate::testing::any::<DisplayUnits>("{pressure: bar}").unwrap();
+        assert_eq!(read, DisplayUnits { pressure: "bar".into(), ..usual });
+    }
+
+    #[test]
+    fn what_is_left_out_has_its_default() {
+        let read = |text| crate::testing::any::<Outputs>(text).unwrap();
+        assert_eq!(read("{}"), Outputs::default());
+        let one = Outputs { formats: vec![FormatName("npss".to_owned())], ..Outputs::default() };
+        assert_eq!(read("{formats: [npss]}"), one);
+        assert_eq!(read("{directory: elsewhere}").formats, Outputs::default().formats);
+    }
 
     #[test]
     fn written_with_units_kept_in_si() {

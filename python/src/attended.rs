@@ -1,7 +1,8 @@
 //! Work in a thread of its own while the calling thread watches for Ctrl-C.
 
 use crate::error::{Fault, MapperError};
-use mapper_session::{SessionEvent, with_messages};
+use mapper::{Observer, SessionEvent};
+use mapper_session::with_messages;
 use pyo3::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -25,6 +26,7 @@ pub struct Shared {
 }
 
 /// The worker's side: events for the caller.
+#[derive(Clone)]
 pub struct Events {
     shared: Shared,
     /// `None` if no one looks.
@@ -32,8 +34,14 @@ pub struct Events {
 }
 
 impl Events {
+    /// The observer that passes every event on.
+    pub fn observer(&self) -> Observer {
+        let events = self.clone();
+        Arc::new(move |event| events.show(event))
+    }
+
     /// Notes an event and passes it on.
-    pub fn show(&self, event: &SessionEvent) {
+    fn show(&self, event: &SessionEvent) {
         if matches!(event, SessionEvent::RigReleased) {
             self.shared.holds_rig.store(false, Ordering::SeqCst);
         }

@@ -1,33 +1,28 @@
-//! Identification of recordings.
+//! Identification and diagnosis of recordings.
 
 use crate::attended::compute;
 use crate::campaign::Campaign;
-use crate::error::{Fault, IdentificationError};
+use crate::error::Fault;
 use crate::map::Map;
-use crate::recording::{Recording, reader_warnings};
-use crate::registry::registry;
-use mapper_core::Method;
-use mapper_session::{
-    Identified as Found, Recorded, Session, SessionError, compressor_map, result_remark_text,
-};
+use crate::recording::Recording;
+use mapper::{DiagnosisOptions, Identification, Method};
+use mapper_session::SessionError;
 use pyo3::prelude::*;
 use serde_json::Value;
-use std::path::Path;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Points of one recording or of several.
 #[pyclass(frozen, module = "mapper._mapper")]
 pub struct Identified {
-    found: Arc<Found>,
-    machine: String,
+    found: Arc<Identification>,
     json: Value,
 }
 
-impl Identified {
-    /// Points of recordings of a machine, the first with this path.
-    pub fn of(found: Found, path: Option<&Path>, warnings: &[String], machine: String) -> Identified {
-        let json = found.json(path, warnings);
-        Identified { found: Arc::new(found), machine, json }
+impl From<Identification> for Identified {
+    fn from(found: Identification) -> Self {
+        let json = found.json();
+        Identified { found: Arc::new(found), json }
     }
 }
 
@@ -47,16 +42,8 @@ impl Identified {
 
     /// The map of the points, with a fitted surface if there are enough of them.
     fn map(&self, py: Python<'_>) -> PyResult<Map> {
-        let (found, machine) = (self.found.clone(), self.machine.clone());
-        let (map, remarks) = compute(py, None, move |_| {
-            let mut remarks = Vec::new();
-            Ok((compressor_map(&machine, &found, &mut remarks), remarks))
-        })?;
-        map.map(|map| Map { map }).ok_or_else(|| {
-            IdentificationError::new_err(
-                remarks.iter().map(result_remark_text).collect::<Vec<_>>().join("; "),
-            )
-        })
+        let found = self.found.clone();
+        compute(py, None, move |_| Ok(Map { map: found.map()? }))
     }
 }
 
@@ -69,36 +56,56 @@ pub fn identify(
     campaign: Option<&Campaign>,
     method: Option<String>,
 ) -> PyResult<Identified> {
-    let sources: Vec<_> = recordings.iter().map(|recording| recording.source.clone()).collect();
+    let sources: Vec<_> = recordings.iter().map(|recording| recording.inner.clone()).collect();
     let campaign = campaign.map(|campaign| campaign.inner.clone());
     drop(recordings);
     compute(py, None, move |_| {
-        let given = campaign.as_ref().map(|inner| &inner.campaign);
-        let map = &sources.first().ok_or(SessionError::NoRecording)?.map;
-        if sources.iter().any(|source| source.map != *map) {
-            let message = "recordings that are identified together need the same channel map";
-            return Err(Fault::Argument(message.to_owned()));
-        }
         let method = method.map(named_method).transpose()?;
-        let runs = sources.iter().map(|source| source.with(given)).collect::<Result<Vec<_>, _>>()?;
-        let recorded: Vec<Recorded> = runs.into_iter().flatten().collect();
-        let path = recorded.first().map(|first| first.path.clone());
-        let warnings = reader_warnings(&recorded);
-        let machine = machine_of(&recorded);
-        let registry = registry();
-        let found = Session::new(&registry).identify(recorded, map, method)?;
-        found.has_points(&warnings)?;
-        Ok(Identified::of(found, path.as_deref(), &warnings, machine))
+        Ok(mapper::identify(&sources, campaign.as_ref(), method)?.into())
     })
 }
 
-/// Name of the machine: the campaign's, or the file's.
-fn machine_of(recorded: &[Recorded]) -> String {
-    let Some(first) = recorded.first() else { return String::new() };
-    let named = || first.path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    first.campaign.as_ref().map_or_else(named, |campaign| campaign.machine.name.clone())
+fn named_method(name: String) -> Result<Method, SessionError> {
+    serde_json::from_value(Value::from(name.clone())).map_err(|source| SessionError::Method(name, source))
 }
 
-pub fn named_method(name: String) -> Result<Method, SessionError> {
-    serde_json::from_value(Value::from(name.clone())).map_err(|source| SessionError::Method(name, source))
+/// Diagnoses a recording, as `mapper gap diagnose` does; returns the JSON of that command. `effects`: suspected effects written in rhai.
+#[pyfunction]
+#[pyo3(signature = (recording, campaign, effects, baseline=None, on_event=None))]
+pub fn diagnose(
+    py: Python<'_>,
+    recording: &Recording,
+    campaign: &Campaign,
+    effects: Vec<PathBuf>,
+    baseline: Option<&Recording>,
+    on_event: Option<Py<PyAny>>,
+) -> PyResult<String> {
+    let (recording, campaign) = (recording.inner.clone(), campaign.inner.clone());
+    let baseline = baseline.map(|recording| recording.inner.clone());
+    compute(py, on_event.as_ref(), move |events| {
+        let options =
+            DiagnosisOptions { effects, baseline, observer: Some(events.observer()), ..Default::default() };
+        Ok(recording.diagnose_with(&campaign, &options)?.json()?.to_string())
+    })
+}
+
+/// Diagnoses a recording and identifies it again without the causes found, as `mapper gap correct` does; returns the JSON of the correction
+/// and the points.
+#[pyfunction]
+#[pyo3(signature = (recording, campaign, effects, method=None))]
+pub fn correct(
+    py: Python<'_>,
+    recording: &Recording,
+    campaign: &Campaign,
+    effects: Vec<PathBuf>,
+    method: Option<String>,
+) -> PyResult<(String, Identified)> {
+    let (recording, campaign) = (recording.inner.clone(), campaign.inner.clone());
+    compute(py, None, move |_| {
+        let method = method.map(named_method).transpose()?;
+        let options = DiagnosisOptions { effects, method, ..Default::default() };
+        let corrected = recording.correct(&campaign, &options)?;
+        let map = serde_json::to_string(&corrected.map).map_err(SessionError::from)?;
+        Ok::<_, Fault>((map, corrected.identification.into()))
+    })
 }

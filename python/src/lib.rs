@@ -1,17 +1,15 @@
-//! The private module `mapper._mapper`: `mapper-session` for the Python package.
+//! The private module `mapper._mapper`: the crate `mapper` for the Python package.
 //!
 //! Every function here does what one command does, and returns the same JSON. The classes that users see are written in Python
 //! (`python/mapper`). No function holds the interpreter's lock while it works.
 
 mod attended;
 mod campaign;
-mod diagnosis;
 mod error;
-mod frame;
 mod identified;
 mod map;
+mod plugins;
 mod recording;
-mod registry;
 mod run;
 
 use pyo3::pymodule;
@@ -22,11 +20,9 @@ mod _mapper {
     #[pymodule_export]
     use crate::campaign::{Campaign, write_template};
     #[pymodule_export]
-    use crate::diagnosis::{correct, diagnose};
-    #[pymodule_export]
     use crate::error::{CampaignError, IdentificationError, MapperError, RecordingError};
     #[pymodule_export]
-    use crate::identified::{Identified, identify};
+    use crate::identified::{Identified, correct, diagnose, identify};
     #[pymodule_export]
     use crate::map::{Map, map_formats};
     #[pymodule_export]

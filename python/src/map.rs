@@ -2,9 +2,9 @@
 
 use crate::attended::compute;
 use crate::error::Fault;
-use crate::registry::registry;
+use crate::plugins::plugins;
 use mapper_core::CompressorMap;
-use mapper_formats::{FORMATS, parse_reference};
+use mapper_maps::table::parse_reference;
 use mapper_maps::{MapFitOptions, fit_map};
 use mapper_session::{Existing, SessionError, with_messages, write_map_fitted_if_needed};
 use pyo3::prelude::*;
@@ -26,7 +26,7 @@ impl Map {
         compute(py, None, move |_| {
             let reference = reference.map(|text| parse_reference(&text)).transpose();
             let reference = reference.map_err(|error| Fault::Argument(error.to_string()))?;
-            let found = registry().inspect_map(&path, reference)?;
+            let found = plugins().inspect_map(&path, reference)?;
             let remarks = serde_json::to_string(&found.remarks).map_err(SessionError::from)?;
             Ok((Map { map: found.map }, remarks))
         })
@@ -46,7 +46,7 @@ impl Map {
 
     /// Writes the map to a file in a format. A format that tabulates the whole map gets a fitted one.
     fn write(&self, py: Python<'_>, path: PathBuf, format: &str, replace: bool) -> PyResult<()> {
-        let format = registry().written_format(format).map_err(Fault::from)?;
+        let format = plugins().written_format(format).map_err(Fault::from)?;
         let map = self.map.clone();
         let existing = if replace { Existing::Replaced } else { Existing::Kept };
         compute(py, None, move |_| Ok(write_map_fitted_if_needed(&path, format, map, existing).map(drop)?))
@@ -71,5 +71,5 @@ impl Map {
 /// Name, extension and description of each format that maps are written in.
 #[pyfunction]
 pub fn map_formats() -> Vec<(&'static str, &'static str, &'static str)> {
-    FORMATS.written().map(|format| (format.name, format.extension, format.description)).collect()
+    plugins().formats.written().map(|format| (format.name, format.extension, format.description)).collect()
 }

@@ -3,70 +3,41 @@
 use crate::attended::compute;
 use crate::campaign::Campaign;
 use crate::error::Fault;
-use crate::registry::registry;
-use mapper_campaign::Campaign as Checked;
+use crate::plugins::plugins;
+use mapper::ChannelMap;
 use mapper_core::{Channel, Series};
-use mapper_recording::{ChannelMap, ChannelMapError};
-use mapper_session::{Recorded, SessionError, channel_map};
+use mapper_session::{SessionError, channel_map};
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::PyBytes;
 use serde_json::json;
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::path::PathBuf;
 
 /// A run directory, an MCAP file or a log of another program, with its channel map.
 #[pyclass(frozen, module = "mapper._mapper")]
 pub struct Recording {
-    pub(crate) source: Arc<Source>,
+    pub(crate) inner: mapper::Recording,
     summary: String,
-}
-
-/// Where a recording comes from, and its contents.
-pub struct Source {
-    path: PathBuf,
-    pub(crate) map: ChannelMap,
-    recorded: Vec<Recorded>,
-}
-
-impl Source {
-    /// The recordings with a given campaign in place of their own.
-    pub fn with(&self, given: Option<&Checked>) -> Result<Vec<Recorded>, SessionError> {
-        // Which steps of a resumed run count depends on the campaign.
-        if given.is_some() && self.recorded.len() > 1 {
-            return Recorded::read_run(&registry(), &self.path, &self.map, given);
-        }
-        let copy = |one: &Recorded| Recorded {
-            path: one.path.clone(),
-            read: one.read.clone(),
-            campaign: given.or(one.campaign.as_ref()).cloned(),
-            approaches: one.approaches.clone(),
-        };
-        Ok(self.recorded.iter().map(copy).collect())
-    }
-
-    /// The samples of the first recording.
-    fn series(&self) -> impl Iterator<Item = (&Channel, &Series)> {
-        self.recorded.iter().take(1).flat_map(|first| &first.read.recording.series)
-    }
 }
 
 impl Recording {
     /// With the steps, events and so on of all its parts.
-    fn of(source: Source) -> Result<Recording, Fault> {
-        let read = &source.recorded;
-        let first = read.first().ok_or(SessionError::NoRecording)?;
-        let steps: Vec<_> = read.iter().flat_map(|one| &one.read.recording.steps).collect();
-        let events: Vec<_> = read.iter().flat_map(|one| &one.read.recording.events).collect();
+    fn of(inner: mapper::Recording) -> Result<Recording, Fault> {
+        let first = inner.parts().first().ok_or(SessionError::NoRecording)?;
         let summary = json!({
             "path": first.path,
             "start_time_ns": first.read.start_time_ns,
             "metadata": first.read.metadata,
-            "warnings": reader_warnings(read),
-            "steps": steps,
-            "events": events,
+            "warnings": inner.warnings(),
+            "steps": inner.steps().collect::<Vec<_>>(),
+            "events": inner.events().collect::<Vec<_>>(),
         });
-        Ok(Recording { summary: summary.to_string(), source: Arc::new(source) })
+        Ok(Recording { summary: summary.to_string(), inner })
+    }
+
+    /// The samples of the first part.
+    fn series(&self) -> impl Iterator<Item = (&Channel, &Series)> {
+        self.inner.parts().iter().take(1).flat_map(|first| &first.read.recording.series)
     }
 }
 
@@ -84,9 +55,7 @@ impl Recording {
         let campaign = campaign.map(|campaign| campaign.inner.clone());
         compute(py, None, move |_| {
             let map = channels.map_or_else(|| Ok(ChannelMap::native()), |file| channel_map(&file))?;
-            let given = campaign.as_ref().map(|inner| &inner.campaign);
-            let recorded = Recorded::read_run(&registry(), &path, &map, given)?;
-            Recording::of(Source { path, map, recorded })
+            Recording::of(mapper::Recording::read(&path, map, campaign.as_ref(), plugins())?)
         })
     }
 
@@ -94,12 +63,7 @@ impl Recording {
     #[staticmethod]
     fn of_frame(py: Python<'_>, content: PyBackedBytes, channels_text: String) -> PyResult<Recording> {
         compute(py, None, move |_| {
-            let map = ChannelMap::from_yaml(&channels_text, Path::new("channels.yaml"));
-            let map =
-                map.map_err(|findings| SessionError::from(ChannelMapError::Mistakes(Box::new(findings))))?;
-            let path = PathBuf::from("DataFrame");
-            let recorded = vec![Recorded::read_bytes(&registry(), &content, &path, &map, None)?];
-            Recording::of(Source { path, map, recorded })
+            Recording::of(mapper::Recording::from_bytes(&content, "DataFrame", &channels_text, plugins())?)
         })
     }
 
@@ -112,7 +76,7 @@ impl Recording {
     /// Symbol and unit of each channel.
     #[getter]
     fn channels(&self) -> Vec<(&'static str, &'static str)> {
-        self.source.series().map(|(channel, _)| (channel.symbol(), channel.unit())).collect()
+        self.series().map(|(channel, _)| (channel.symbol(), channel.unit())).collect()
     }
 
     /// Times, s, and values of a channel in SI units, as native 64-bit floats.
@@ -121,18 +85,13 @@ impl Recording {
         py: Python<'py>,
         symbol: &str,
     ) -> PyResult<(Bound<'py, PyBytes>, Bound<'py, PyBytes>)> {
-        let found = self.source.series().find(|(channel, _)| channel.symbol() == symbol);
+        let found = self.series().find(|(channel, _)| channel.symbol() == symbol);
         let (_, series) = found.ok_or_else(|| {
-            let known: Vec<&str> = self.source.series().map(|(channel, _)| channel.symbol()).collect();
+            let known: Vec<&str> = self.series().map(|(channel, _)| channel.symbol()).collect();
             Fault::Argument(format!("the recording has no channel `{symbol}`; it has {}", known.join(", ")))
         })?;
         Ok((floats(py, &series.t_s)?, floats(py, &series.values)?))
     }
-}
-
-/// Problems of the files.
-pub fn reader_warnings(read: &[Recorded]) -> Vec<String> {
-    read.iter().flat_map(|one| &one.read.warnings).map(ToString::to_string).collect()
 }
 
 /// Copies numbers once, into memory of Python that NumPy then uses as it is.

@@ -1,13 +1,12 @@
 //! Runs on simulated rigs.
 
 use crate::attended::{Attended, Shared, attend};
-use crate::campaign::{Campaign, Inner};
+use crate::campaign::Campaign;
 use crate::error::Fault;
 use crate::map::Map;
-use crate::registry::{registry, registry_with_rig};
-use mapper_session::{
-    RunOutcome, RunRequest, RunTermination, Session, SessionError, SessionEvent, with_messages,
-};
+use crate::plugins::plugins_with_rig;
+use mapper::{RigDescription, RunEnding, RunOptions};
+use mapper_session::{SessionError, with_messages};
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -41,16 +40,41 @@ pub fn run_campaign(
     on_event: Option<Py<PyAny>>,
     socket: Option<PathBuf>,
 ) -> PyResult<Outcome> {
-    let (inner, shared) = (campaign.inner.clone(), Shared::default());
+    let (campaign, shared) = (campaign.inner.clone(), Shared::default());
     let of_worker = shared.clone();
     let attended = attend(py, shared, on_event.as_ref(), move |events| {
-        let on_event = |event: &SessionEvent| events.show(event);
-        let request = RunRequest {
-            started_name: &started_name,
-            started_ns,
-            ..RunRequest::new(&inner.campaign, &inner.text, &parent)
+        let (stop, holds_rig) = (of_worker.stop.clone(), of_worker.holds_rig);
+        let of_run = stop.clone();
+        let before_arming = move |rig: &RigDescription| {
+            if !rig.simulated_time {
+                return Err(format!(
+                    "backend `{}` is a rig in real time; run it with the command `mapper run`, which handles all signals",
+                    rig.backend
+                ));
+            }
+            holds_rig.store(true, Ordering::SeqCst);
+            if stop.load(Ordering::SeqCst) {
+                holds_rig.store(false, Ordering::SeqCst);
+                return Err("stopped before the rig was armed".to_owned());
+            }
+            Ok(())
         };
-        run(&inner, request, &on_event, &of_worker, socket)
+        let options = RunOptions {
+            started_name,
+            started_ns,
+            stop: of_run,
+            observer: Some(events.observer()),
+            before_arming: Some(Box::new(before_arming)),
+            ..RunOptions::below(parent)
+        };
+        let campaign = match socket {
+            Some(socket) => {
+                let rig = campaign.settings().backend.name.clone();
+                campaign.with_plugins(plugins_with_rig(rig, socket))
+            }
+            None => campaign,
+        };
+        outcome(&campaign.run_with(options)?)
     })?;
     match attended {
         Attended::Ended(result, None) => Ok(result?),
@@ -59,49 +83,23 @@ pub fn run_campaign(
     }
 }
 
-fn run(
-    inner: &Inner,
-    request: RunRequest<'_>,
-    on_event: &(dyn Fn(&SessionEvent) + Sync),
-    shared: &Shared,
-    socket: Option<PathBuf>,
-) -> Result<Outcome, Fault> {
-    let backend = inner.campaign.backend.name.clone();
-    let registry = socket.map_or_else(registry, |socket| registry_with_rig((backend, socket)));
-    let session = Session { on_event, stop: &shared.stop, ..Session::new(&registry) };
-    let prepared = session.prepare(request).map_err(|error| inner.fault(error))?;
-    let rig = prepared.rig();
-    if !rig.simulated_time {
-        return Err(Fault::Argument(format!(
-            "backend `{}` is a rig in real time; run it with the command `mapper run`, which handles all signals",
-            rig.backend
-        )));
-    }
-    shared.holds_rig.store(true, Ordering::SeqCst);
-    if shared.stop.load(Ordering::SeqCst) {
-        shared.holds_rig.store(false, Ordering::SeqCst);
-        return Err(Fault::Argument("stopped before the rig was armed".to_owned()));
-    }
-    let outcome = prepared.run(&session)?;
-    let sentence = outcome.sentence();
-    let RunOutcome { directory, recording, end, results } = outcome;
-    let end = match end {
-        RunTermination::Completed => "completed",
-        RunTermination::Drifted { .. } => "drifted",
-        RunTermination::Tripped { .. } => "tripped",
-        RunTermination::Interrupted { .. } => "interrupted",
-        RunTermination::Failed(source) => return Err(SessionError::Run { source, recording }.into()),
+fn outcome(run: &mapper::Run) -> Result<Outcome, Fault> {
+    let end = match run.ending() {
+        RunEnding::Completed => "completed",
+        RunEnding::Drifted { .. } => "drifted",
+        RunEnding::Tripped { .. } => "tripped",
+        RunEnding::Interrupted { .. } => "interrupted",
+        RunEnding::Failed { .. } => "failed",
     };
-    let (json, map) = match results {
-        Ok(results) => {
-            let json = serde_json::to_value(&results).map_err(SessionError::from)?;
-            (Some(with_messages(json).to_string()), results.compressor_map.map(|map| Map { map }))
-        }
-        // Stopped before there was anything to identify.
-        Err(_) if end != "completed" => (None, None),
-        Err(error) => return Err(error.into()),
-    };
-    Ok(Outcome { directory, recording, end, sentence, json, map })
+    let json = run.results().map(serde_json::to_value).transpose().map_err(SessionError::from)?;
+    Ok(Outcome {
+        directory: run.directory().to_owned(),
+        recording: run.recording_file().to_owned(),
+        end,
+        sentence: run.sentence().to_owned(),
+        json: json.map(|json| with_messages(json).to_string()),
+        map: run.results().and_then(|results| results.compressor_map.clone()).map(|map| Map { map }),
+    })
 }
 
 /// The exception, with a note on where the recording is (Python 3.11 and later).

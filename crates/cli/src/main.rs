@@ -1,11 +1,10 @@
 //! The command line program `mapper`: from a campaign file to a compressor map.
 //!
-//! `commands` has one file for each command, with its options and its output. `mapper-session` does the work; only `registry` names
-//! plug-ins.
+//! `commands` has one file for each command, with its options and its output. `mapper-session` does the work, with the
+//! plug-ins of the crate `mapper`.
 
 mod command_line;
 mod commands;
-mod drivers;
 mod fleet_directory;
 mod interrupt;
 mod output;

@@ -21,7 +21,7 @@ use mapper_core::{
 use mapper_recording::{ChannelMap, ReadOptions, read_recording};
 use mapper_session::{InterruptedRun, Registry, RunRequest, Session, SessionEvent};
 use std::path::Path;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -231,7 +231,7 @@ fn run(text: &str, parent: &Path, real_time: bool, stop_at: usize, resume: Optio
     let files = |path: &Path| std::fs::read_to_string(path);
     let origin = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../campaigns/turbo_a.yaml"));
     let campaign = mapper_campaign::check(text, origin, &files).unwrap_or_else(|error| panic!("{error}"));
-    let registry = Registry { driver: Some(driver), ..Registry::default() };
+    let registry = Registry { driver: Some(Arc::new(driver)), ..Registry::empty() };
     let (stop, begun, asked) = (AtomicBool::new(false), Mutex::new((0.0, Instant::now())), Instant::now());
     let (cost, to_start) = (Mutex::new((0.0, 0.0)), Mutex::new(0.0));
     let on_event = |event: &SessionEvent| match event {

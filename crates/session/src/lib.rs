@@ -1,38 +1,11 @@
 //! The application as a library: plans and runs campaigns, identifies recordings, and writes maps and reports.
 //!
-//! For programs that offer these operations to users: the command line, the Python package, nightly runs and blind cases. Each creates a
-//! [`Session`] with its plug-ins, an observer and stop flags. The library neither parses arguments nor prints. A complete campaign, from its
-//! file to its map:
-//!
-//! ```
-//! use mapper_backends::virtual_lab;
-//! use mapper_formats::FORMATS;
-//! use mapper_session::{Registry, RunRequest, Session, SessionEvent};
-//! use std::path::Path;
-//!
-//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let registry =
-//!     Registry { backends: vec![virtual_lab::PLUGIN], formats: FORMATS, ..Registry::default() };
-//! let show = |event: &SessionEvent| {
-//!     if let SessionEvent::StepStarted(step) = event {
-//!         println!("step {} at {:.0} s", mapper_core::step_number(step.index), step.start_s);
-//!     }
-//! };
-//! let session = Session { on_event: &show, ..Session::new(&registry) };
-//! let file = Path::new("../../campaigns/grid18.yaml");
-//! let (campaign, text) = (mapper_campaign::load(file)?, mapper_campaign::read_text(file)?);
-//! let runs = tempfile::tempdir()?;
-//! let results = session.run(RunRequest::new(&campaign, &text, runs.path()))?.results?;
-//! for point in results.identified.points_alone() {
-//!     if let (Some(eta), Some(h_w_m2k)) = (point.eta, point.h_w_m2k) {
-//!         println!("eta = {eta:.3}, h = {h_w_m2k:.0} W/(m2 K)");
-//!     }
-//! }
-//! let map = results.compressor_map.ok_or("no map")?;
-//! assert_eq!(map.lines.len(), 6, "one line for each speed of the grid");
-//! # Ok(())
-//! # }
-//! ```
+//! The crate `mapper` is its interface for users. Here each operation is a method of [`Session`], which has the plug-ins, an observer and the
+//! stop flags of its caller. A run makes the plan ([`plan()`]), locks and arms the rig ([`Session::prepare`], [`PreparedRun::run`]), records
+//! every sample with a journal, and keeps the rig safe whatever happens. [`Session::identify`] turns recordings into points for every
+//! command: it fuses redundant sensors, subtracts the zero, identifies all steps together, and adds the truth of a simulated rig. Results are
+//! points, map and report as data and as files in the run's directory. Diagnoses go the same way through [`Session::diagnose_gap`]. The library
+//! neither parses arguments nor prints, and contains neither physics nor statistics.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
@@ -59,7 +32,7 @@ pub use analysis::identification::Identified;
 pub use analysis::pdf::{PrintError, page_as_pdf};
 pub use analysis::results::{Results, compressor_map};
 pub use analysis::transient::write_transient;
-pub use errors::error::{ErrorKind, SessionError, since_text};
+pub use errors::error::{ErrorKind, Input, SessionError, since_text};
 pub use errors::first_map_error::FirstMapError;
 pub use errors::fmu_error::FmuExportError;
 pub use errors::map_work_error::MapWorkError;

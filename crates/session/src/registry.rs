@@ -17,7 +17,8 @@ use std::sync::Arc;
 pub type ReadEffect = fn(&Path) -> Result<Arc<dyn Effect>, SessionError>;
 
 /// Creates a driver, a backend that is not a plug-in, from its name and settings.
-pub type MakeDriver = fn(&str, &serde_json::Value) -> Result<Box<dyn Backend>, BackendError>;
+pub type MakeDriver =
+    Arc<dyn Fn(&str, &serde_json::Value) -> Result<Box<dyn Backend>, BackendError> + Send + Sync>;
 
 /// All plug-ins of a session, and the source commit of the program that creates it.
 #[derive(Clone)]
@@ -38,9 +39,10 @@ pub struct Registry {
     pub commit: &'static str,
 }
 
-impl Default for Registry {
-    /// A registry without plug-ins.
-    fn default() -> Self {
+impl Registry {
+    /// A registry without plug-ins, to which its user adds those that are needed. It runs no campaign without a backend, and diagnoses nothing
+    /// without an effect library.
+    pub fn empty() -> Self {
         Registry {
             backends: Vec::new(),
             driver: None,
@@ -51,13 +53,7 @@ impl Default for Registry {
             commit: "",
         }
     }
-}
 
-fn no_effect(path: &Path) -> Result<Arc<dyn Effect>, SessionError> {
-    Err(SessionError::EffectFilesUnsupported(path.to_owned()))
-}
-
-impl Registry {
     /// The backend that a campaign names: a plug-in, or a driver of that name.
     ///
     /// # Errors
@@ -81,7 +77,7 @@ impl Registry {
         model: &Model,
     ) -> Result<Box<dyn Backend>, BackendError> {
         if let Some(driver) =
-            self.driver.filter(|_| !self.backends.iter().any(|plugin| plugin.name == wanted.name))
+            self.driver.as_ref().filter(|_| !self.backends.iter().any(|plugin| plugin.name == wanted.name))
         {
             return driver(&wanted.name, &wanted.settings);
         }
@@ -105,6 +101,10 @@ impl Registry {
         }
         Ok(effects)
     }
+}
+
+fn no_effect(path: &Path) -> Result<Arc<dyn Effect>, SessionError> {
+    Err(SessionError::EffectFilesUnsupported(path.to_owned()))
 }
 
 /// Nominal machine and rig data for a backend.

@@ -52,7 +52,7 @@ fn too_few_steps_have_no_expected_error() {
 fn seeds_err_as_forecast() {
     let first = Campaign { order: VisitOrder::SpeedLines, ..small(&[AS_DECLARED]) };
     let forecast = planned(&first).figures.rms_error_eta.unwrap();
-    let registry = Registry { backends: vec![virtual_lab::PLUGIN], formats: FORMATS, ..Registry::default() };
+    let registry = Registry { backends: vec![virtual_lab::PLUGIN], formats: FORMATS, ..Registry::empty() };
     let session = Session::new(&registry);
     let (mut square, mut count) = (0.0, 0.0);
     for seed in 1..=5 {
@@ -89,7 +89,7 @@ fn the_stated_error_is_that_of_the_intervals() {
     let figures = planned(&campaign).figures;
     let stated = figures.rms_error_reported_eta.unwrap();
     assert!(stated > 2.0 * figures.rms_error_eta.unwrap(), "{figures:?}");
-    let registry = Registry { backends: vec![virtual_lab::PLUGIN], formats: FORMATS, ..Registry::default() };
+    let registry = Registry { backends: vec![virtual_lab::PLUGIN], formats: FORMATS, ..Registry::empty() };
     let folder = tempfile::tempdir().unwrap();
     let run = Session::new(&registry).run(RunRequest::new(&campaign, "", folder.path())).unwrap();
     let points = run.results.unwrap().identified.points;

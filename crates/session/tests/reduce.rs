@@ -83,7 +83,7 @@ fn reduced(text: &str, machine: Option<&Path>, given: &MapDescription) -> MapWor
     let scratch = tempfile::tempdir().unwrap();
     let file = scratch.path().join("points.csv");
     std::fs::write(&file, text).unwrap();
-    let registry = Registry { formats: FORMATS, ..Registry::default() };
+    let registry = Registry { formats: FORMATS, ..Registry::empty() };
     registry.reduce_points(&file, given, machine, None, None).unwrap()
 }
 
@@ -138,7 +138,7 @@ fn the_turbines_points_become_its_map() {
     let scratch = tempfile::tempdir().unwrap();
     let (file, out) = (scratch.path().join("points.csv"), scratch.path().join("turbine.csv"));
     std::fs::write(&file, table_of_both(&states)).unwrap();
-    let registry = Registry { formats: FORMATS, ..Registry::default() };
+    let registry = Registry { formats: FORMATS, ..Registry::empty() };
     let to = MapOut { path: &out, format: None, existing: Existing::Kept };
     let given = MapDescription::default();
     let work = registry.reduce_turbine_points(&file, &given, Some(&campaign_file()), Some(to)).unwrap();

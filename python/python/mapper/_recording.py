@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -15,8 +15,11 @@ import pandas as pd
 
 from mapper import _mapper, _tables
 
-if TYPE_CHECKING:
-    from mapper._campaign import Campaign
+
+class Described(Protocol):
+    """What a recording needs of a :class:`mapper.Campaign`: machine, sensors and window, not its plans and runs."""
+
+    _inner: _mapper.Campaign
 
 
 class Recording:
@@ -43,7 +46,7 @@ class Recording:
         path: str | os.PathLike[str],
         channels: str | os.PathLike[str] | None = None,
         *,
-        campaign: Campaign | None = None,
+        campaign: Described | None = None,
     ) -> Recording:
         """Read a run directory, an MCAP file or a log of another program.
 

@@ -4,6 +4,7 @@ use cargo_metadata::{DependencyKind, MetadataCommand};
 use mapper_tests::tree::{circles, packages};
 use petgraph::algo::tarjan_scc;
 use petgraph::graphmap::DiGraphMap;
+use std::collections::BTreeMap;
 
 /// Circles that are known and to be broken: folder of the package, and its files from `src`. What is left of one may stay;
 /// one that is gone fails the test as well, so that this list can only shrink.
@@ -37,6 +38,34 @@ fn modules_of_a_crate_have_no_circular_dependencies() {
         let there = found.iter().any(|(found, circle)| found == folder && is_part_of(circle, files));
         assert!(there, "{folder}: the circle of {files:?} is gone: take it off the list in {}", file!());
     }
+}
+
+/// The modules of the Python package, imports for type checkers included.
+#[test]
+fn modules_of_the_python_package_have_no_circular_imports() {
+    let folder = mapper_tests::repository().join("python/python/mapper");
+    let mut sources = BTreeMap::new();
+    for path in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+        if path.extension().is_some_and(|end| end == "py") {
+            let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
+            sources.insert(name, std::fs::read_to_string(&path).unwrap());
+        }
+    }
+    let mut imports = DiGraphMap::<&str, ()>::new();
+    for (name, text) in &sources {
+        for line in text.lines().map(str::trim_start) {
+            // `from mapper._map import Map`, or `from mapper import _map, _tables`.
+            let Some(rest) = line.strip_prefix("from mapper") else { continue };
+            let (module, names) = rest.split_once(" import ").unwrap();
+            let imported = if module.is_empty() { names } else { &module[1..] };
+            for other in imported.split(", ").filter_map(|other| sources.get_key_value(other)) {
+                imports.add_edge(name, other.0, ());
+            }
+        }
+    }
+    assert!(imports.edge_count() > 20, "{} imports were found", imports.edge_count());
+    let circles: Vec<_> = tarjan_scc(&imports).into_iter().filter(|circle| circle.len() > 1).collect();
+    assert!(circles.is_empty(), "{circles:?}");
 }
 
 /// Dependencies of tests count too, which Cargo itself does not check.

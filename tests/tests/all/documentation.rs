@@ -169,7 +169,7 @@ fn sources_below(folder: &Path, found: &mut Vec<(PathBuf, String)>) {
 /// Commands of cargo in a text that build something, each to its end. A command has options; the name of a subcommand in a sentence has
 /// none.
 fn building_commands(text: &str) -> Vec<&str> {
-    let builds = ["build", "run", "install", "nextest", "test", "bench", "check", "clippy"];
+    let builds = ["build", "run", "install", "nextest", "test", "bench", "check", "clippy", "doc"];
     let rests = text.match_indices("cargo ").map(|(start, _)| &text[start..]);
     let commands = rests.map(|rest| rest.split(['`', '\n', '\\', '"', '#', ';']).next().unwrap().trim_end());
     let is_build = |command: &&str| {
@@ -349,6 +349,7 @@ fn the_campaign_of_the_readme_does_not_surge() {
     let readme = fs::read_to_string(repository().join("README.md")).unwrap();
     let (_, code) = prose_and_code(&readme);
     let (_, text) = code.iter().find(|(_, part)| part.starts_with("campaign:")).unwrap();
+    assert_eq!(*text, fs::read_to_string(repository().join("examples/short.yaml")).unwrap());
     for seed in 1..=2 {
         let run = shared_run(&CampaignFile::of(format!("{text}seed: {seed}\n"))).run;
         let (_, events) = read_marks(&run.join("recording.mcap"), &ReadOptions::default()).unwrap();

@@ -5,7 +5,7 @@ use crate::output::failure::Failure;
 use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_core::{MapDescription, ReferenceState};
-use mapper_formats::parse_reference;
+use mapper_maps::table::parse_reference;
 use mapper_recording::ChannelMap;
 use mapper_session::map_description;
 use std::path::{Path, PathBuf};

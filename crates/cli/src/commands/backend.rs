@@ -2,7 +2,7 @@
 
 use crate::output::exit_code::Code;
 use crate::output::failure::Failure;
-use crate::{drivers, output::standard_output, registry, rig_states};
+use crate::{output::standard_output, registry, rig_states};
 use clap::{Args, Subcommand};
 use mapper_core::{RigMode, Setpoints};
 use mapper_driver_host::conformance::{Candidate, check_rules};
@@ -44,7 +44,7 @@ impl Backend {
     }
 
     fn list(&self) -> Result<(), Failure> {
-        let installed = drivers::locations().all();
+        let installed = mapper::driver_locations().all();
         let driver = |found: &DriverLocation| {
             let known = INCLUDED_DRIVERS.iter().find(|(name, ..)| *name == found.name);
             let summary = known.map_or("driver", |(_, summary, _)| summary);
@@ -95,7 +95,7 @@ impl Backend {
             // it.
             if !registry.backends.iter().any(|plugin| plugin.name == name) {
                 let is_known = INCLUDED_DRIVERS.iter().any(|(known, ..)| *known == name);
-                let message = match is_known || drivers::locations().find(name).is_some() {
+                let message = match is_known || mapper::driver_locations().find(name).is_some() {
                     false => format!("there is no backend `{name}`; `mapper backend list` shows all"),
                     true => format!(
                         "this campaign names `{named}`, not `{name}`, and has no settings for `{name}`; use `mapper backend check {named} --campaign {}`",

@@ -5,12 +5,9 @@ use crate::output::remedy::{command_for, fleet_command_for};
 use crate::output::terminal_lines::wrap_for_terminal;
 use crate::output::{output_options, standard_error};
 use mapper_campaign::{CampaignError, Findings, NightlyError};
-use mapper_core::BackendError;
-use mapper_driver_host::DriverError;
 use mapper_fleet::{FleetError, StudyFileError};
 use mapper_live::LiveError;
-use mapper_recording::{ChannelMapError, RecordError};
-use mapper_session::{DescriptionError, ErrorKind, MapWorkError, SessionError};
+use mapper_session::{ErrorKind, SessionError};
 use mapper_validation::blind::BlindError;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -81,22 +78,7 @@ impl Failure {
     /// A session error that concerns a campaign file. A mistake in the backend settings or in the map formats is shown at its line.
     pub fn in_campaign(error: SessionError, campaign: &Path) -> Self {
         let Ok(text) = mapper_campaign::read_text(campaign) else { return error.into() };
-        let findings = match &error {
-            SessionError::Backend(BackendError::Settings { backend, path, source }) => {
-                let hidden = matches!(source.downcast_ref(), Some(DriverError::Secret));
-                let at = format!("backend.{backend}");
-                mapper_campaign::backend_mistake(&text, campaign, &at, path, &source.to_string(), hidden)
-            }
-            SessionError::Reader { at, setting, source } => {
-                let hidden = matches!(source.downcast_ref(), Some(DriverError::Secret));
-                mapper_campaign::backend_mistake(&text, campaign, at, setting, &source.to_string(), hidden)
-            }
-            SessionError::UnknownFormat { name, known } => {
-                mapper_campaign::format_mistake(&text, campaign, name, known)
-            }
-            _ => return error.into(),
-        };
-        Failure::of_campaign(CampaignError::Mistakes(Box::new(findings)))
+        mapper::show_in_campaign(error, &text, campaign).into()
     }
 
     /// The live page is not available.
@@ -177,23 +159,21 @@ fn shorten(message: &str) -> String {
 impl From<SessionError> for Failure {
     fn from(error: SessionError) -> Self {
         let code = match error.kind() {
-            ErrorKind::Failure => Code::Failure,
             ErrorKind::BadInput => Code::BadInput,
             ErrorKind::NoPlan => Code::NoPlan,
             ErrorKind::Rig => Code::Rig,
             ErrorKind::BadRecording => Code::BadRecording,
             ErrorKind::Interrupted => Code::Interrupted,
+            _ => Code::Failure,
         };
         match error {
             SessionError::Exists(_) if output_options::has_force() => {
                 Failure::new(code, format!("{error}, or replace it with `--force`"))
             }
-            SessionError::Campaign(error) => Failure::of_campaign(error),
-            SessionError::Nightly(NightlyError::Mistakes(findings))
-            | SessionError::ChannelMap(ChannelMapError::Mistakes(findings))
-            | SessionError::MapWork(MapWorkError::Description(DescriptionError::Mistakes(findings)))
-            | SessionError::Record(RecordError::ChannelMap(findings)) => Failure::of_findings(&findings),
-            error => Failure::with_command(code, &error, command_for(&error)),
+            error => match error.findings() {
+                Some(findings) => Failure::of_findings(findings),
+                None => Failure::with_command(code, &error, command_for(&error)),
+            },
         }
     }
 }

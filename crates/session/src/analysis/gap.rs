@@ -80,6 +80,9 @@ impl Session<'_> {
         effects: Vec<Arc<dyn Effect>>,
         baseline: Option<&Recorded>,
     ) -> Result<Gap, SessionError> {
+        if effects.is_empty() {
+            return Err(SessionError::NoEffects);
+        }
         let progress = |done_ratio: f64, what: &str| {
             self.send(SessionEvent::Progress { done_ratio, what: what.to_owned() });
         };

@@ -2,7 +2,7 @@
 
 use crate::errors::map_work_error::MapWorkError;
 use crate::variant::VariantError;
-use mapper_campaign::{CampaignError, NightlyError};
+use mapper_campaign::{CampaignError, Findings, NightlyError};
 use mapper_core::{BackendError, ExportError, ImportError};
 use mapper_diagnose::drift::DriftError;
 use mapper_diagnose::gap::{CalibratedModelError, GapError};
@@ -21,6 +21,7 @@ use std::path::{Path, PathBuf};
 
 /// Category of an error, for exit codes and status pages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ErrorKind {
     /// A file could not be read or written, or the program has a defect.
     Failure,
@@ -34,6 +35,18 @@ pub enum ErrorKind {
     BadRecording,
     /// Stopped by the operator.
     Interrupted,
+}
+
+/// The input that an error is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Input {
+    /// A campaign cannot be read, has mistakes, or has no plan.
+    Campaign,
+    /// A recording or its channel map cannot be read.
+    Recording,
+    /// A recording does not contain the required data.
+    RecordedData,
 }
 
 /// Why a session could not complete a request.
@@ -65,6 +78,15 @@ pub enum SessionError {
          for all", .first.display(), .other.display()
     )]
     DifferentCampaigns { first: PathBuf, other: PathBuf, differs: &'static str },
+    #[error("recordings that are identified together need the same channel map; identify each separately")]
+    DifferentChannelMaps,
+    /// With the reasons.
+    #[error("the points make no map: {0}")]
+    NoMap(String),
+    #[error(
+        "there is no effect library, so a diagnosis would find no cause; pass the effects of the registry, or effects of your own"
+    )]
+    NoEffects,
     #[error("`{0}` is not a method: {1}")]
     Method(String, #[source] serde_json::Error),
     #[error("the nominal model has no map: {0}")]
@@ -225,6 +247,55 @@ impl SessionError {
         }
     }
 
+    /// The mistakes of a file that people write, each with its place.
+    pub fn findings(&self) -> Option<&Findings> {
+        match self {
+            SessionError::Campaign(CampaignError::Mistakes(findings))
+            | SessionError::Nightly(NightlyError::Mistakes(findings))
+            | SessionError::ChannelMap(ChannelMapError::Mistakes(findings))
+            | SessionError::MapWork(MapWorkError::Description(DescriptionError::Mistakes(findings)))
+            | SessionError::Record(RecordError::ChannelMap(findings)) => Some(findings),
+            _ => None,
+        }
+    }
+
+    /// The input that the error is about; `None` for any other than a campaign or a recording.
+    pub fn input(&self) -> Option<Input> {
+        use SessionError as E;
+        match self {
+            E::ChannelMap(_)
+            | E::Record(_)
+            | E::Log(_)
+            | E::LogOption(_)
+            | E::SameRecording { .. }
+            | E::NoRecording => Some(Input::Recording),
+            E::Identify(_)
+            | E::NoPoints(_)
+            | E::NoMap(_)
+            | E::OtherMachine(_)
+            | E::MachineUnknown { .. }
+            | E::DifferentCampaigns { .. }
+            | E::Method(..)
+            | E::Drift(_)
+            | E::Driven(_)
+            | E::Gap(_) => Some(Input::RecordedData),
+            E::Campaign(_)
+            | E::Model(_)
+            | E::Plan(_)
+            | E::NoSteps(_)
+            | E::Sequence(_)
+            | E::Script(_)
+            | E::Rehearsal(_)
+            | E::RehearsalTripped { .. }
+            | E::Backend(_)
+            | E::Reader { .. }
+            | E::FirstMap(_)
+            | E::MissingGuards { .. }
+            | E::GuardWithoutChannel { .. } => Some(Input::Campaign),
+            _ => None,
+        }
+    }
+
     /// Category of the error.
     pub fn kind(&self) -> ErrorKind {
         use SessionError as E;
@@ -241,6 +312,8 @@ impl SessionError {
             | E::NightlyMismatch(..)
             | E::NoRecording
             | E::DifferentCampaigns { .. }
+            | E::DifferentChannelMaps
+            | E::NoEffects
             | E::Method(..)
             | E::Model(_)
             | E::Backend(_)
@@ -291,7 +364,7 @@ impl SessionError {
             E::Record(RecordError::Log(LogError::Read { .. })) | E::Log(LogError::Read { .. }) => {
                 ErrorKind::Failure
             }
-            E::Log(_) | E::NoPoints(..) => ErrorKind::BadRecording,
+            E::Log(_) | E::NoPoints(..) | E::NoMap(..) => ErrorKind::BadRecording,
             E::CalibratedModel(CalibratedModelError::Gap(_)) => ErrorKind::BadRecording,
             E::LogOption(_) | E::CalibratedModel(_) | E::CalibratedModelFile { .. } => ErrorKind::BadInput,
             E::Record(_) | E::Driven(_) | E::OtherMachine(_) | E::Identify(_) | E::Drift(_) | E::Gap(_) => {

@@ -113,7 +113,7 @@ pub fn driven(campaign: &Campaign) -> Driven {
     let registry = Registry {
         backends: vec![mapper_backends::virtual_lab::PLUGIN],
         effects: mapper_effects::catalogue(),
-        ..Registry::default()
+        ..Registry::empty()
     };
     let model = nominal_model(campaign).unwrap();
     let plan = plan(campaign, &model).unwrap();

@@ -107,7 +107,7 @@ fn make(arguments: &Arguments) -> Result<Stand, LabError> {
         settings.entry("sample_rate").or_insert_with(|| format!("{rate_hz} Hz").into());
     }
     let registry =
-        Registry { backends: BACKENDS.to_vec(), effects: mapper_effects::catalogue(), ..Registry::default() };
+        Registry { backends: BACKENDS.to_vec(), effects: mapper_effects::catalogue(), ..Registry::empty() };
     let model = nominal_model(&campaign).map_err(|error| campaign_error(error.to_string()))?;
     let lab = registry.make_backend(&campaign, &model).map_err(|error| campaign_error(error.to_string()))?;
     Ok(Stand::new(lab, campaign.limits.speed_max_rpm, arguments.speed)?)

@@ -208,7 +208,7 @@ mod tests {
     fn stand() -> Stand {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../campaigns/turbo_a.yaml");
         let campaign = mapper_campaign::load(path.as_ref()).unwrap();
-        let registry = Registry { backends: BACKENDS.to_vec(), ..Registry::default() };
+        let registry = Registry { backends: BACKENDS.to_vec(), ..Registry::empty() };
         let lab = registry.make_backend(&campaign, &nominal_model(&campaign).unwrap()).unwrap();
         Stand::new(lab, 120_000.0, 10.0).unwrap()
     }

@@ -51,7 +51,7 @@ pub(crate) fn open(settings: &Value) -> Result<Box<dyn Backend>, BackendError> {
     let path = std::path::absolute(&settings.campaign).unwrap_or(settings.campaign);
     let campaign = mapper_campaign::load(&path).map_err(|error| of_campaign(error.to_string()))?;
     let registry =
-        Registry { backends: BACKENDS.to_vec(), effects: mapper_effects::catalogue(), ..Registry::default() };
+        Registry { backends: BACKENDS.to_vec(), effects: mapper_effects::catalogue(), ..Registry::empty() };
     let model = nominal_model(&campaign).map_err(|error| of_campaign(error.to_string()))?;
     let lab = registry.make_backend(&campaign, &model).map_err(|error| of_campaign(error.to_string()))?;
     let log = settings.command_log.map(|path| {

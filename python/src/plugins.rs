@@ -1,23 +1,41 @@
-//! The log format in which the package hands a DataFrame over, in memory: a line of text, a line of JSON, and the values of each column as
-//! 64-bit floats in this computer's order of bytes, the time, s, first.
+//! What the package adds to the plug-ins: DataFrames as a log format, and rigs in Python as a driver.
+//!
+//! A DataFrame is handed over in memory: a line of text, a line of JSON, and the values of each column as 64-bit floats in this computer's
+//! order of bytes, the time, s, first.
 
-use mapper_log_formats::LOG_FORMATS;
+use mapper::Registry;
+use mapper_core::{Backend, BackendError};
+use mapper_driver_host::{DEFAULT_TIMEOUTS, Driver, SearchPath};
 use mapper_recording::logs::{
     Column, Group, Layout, Log, LogError, LogFile, LogFormat, LogFormats, LogOptions, Row, RowSink,
 };
 use serde_json::Value;
-use std::sync::LazyLock;
+use std::path::PathBuf;
+use std::sync::{Arc, LazyLock};
 
 const NAME: &str = "DataFrame";
 const MAGIC: &[u8] = b"mapper DataFrame\n";
 const VALUE_BYTES: usize = 8;
 const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
 
-/// All log formats, DataFrames included.
-pub fn log_formats() -> LogFormats {
-    static ALL: LazyLock<Vec<LogFormat>> =
-        LazyLock::new(|| std::iter::once(FORMAT).chain(LOG_FORMATS.0.iter().copied()).collect());
-    LogFormats(&ALL)
+/// Every plug-in of the package. It starts no drivers: a rig in real time is run by the command, which handles all signals.
+pub fn plugins() -> Registry {
+    static LOGS: LazyLock<Vec<LogFormat>> = LazyLock::new(|| {
+        let others = mapper::plugins().logs;
+        std::iter::once(FORMAT).chain(others.0.iter().copied()).collect()
+    });
+    Registry { driver: None, logs: LogFormats(&LOGS), ..mapper::plugins() }
+}
+
+/// The plug-ins for a run on a rig in Python, of this name in the campaign and at this socket. No other driver is found.
+pub fn plugins_with_rig(rig: String, socket: PathBuf) -> Registry {
+    let connect = move |name: &str, settings: &Value| -> Result<Box<dyn Backend>, BackendError> {
+        Ok(Box::new(match name == rig {
+            true => Driver::connect_socket(&socket, name, settings, DEFAULT_TIMEOUTS)?,
+            false => Driver::find(&SearchPath::default(), name, settings, "", "")?,
+        }))
+    };
+    Registry { driver: Some(Arc::new(connect)), ..plugins() }
 }
 
 fn recognises(head: &[u8]) -> bool {

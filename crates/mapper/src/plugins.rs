@@ -1,0 +1,69 @@
+//! The one place that names plug-ins.
+
+use mapper_backends::BACKENDS;
+use mapper_core::{Backend, BackendError};
+use mapper_driver_host::{Driver, INCLUDED_DRIVERS, SearchPath};
+use mapper_effects::ScriptEffect;
+use mapper_formats::FORMATS;
+use mapper_log_formats::LOG_FORMATS;
+use mapper_physics::rig::effect::Effect;
+use mapper_session::{Registry, SessionError};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Every plug-in of this distribution: backends, drivers, effects, map formats, log formats.
+///
+/// Fields of the result can be replaced or extended, e.g. by a backend of your own:
+///
+/// ```
+/// let mut plugins = mapper::plugins();
+/// plugins.backends.retain(|backend| backend.name == "virtual_lab");
+/// assert!(plugins.effects.iter().any(|effect| effect.info().id == "htc_scale"));
+/// ```
+pub fn plugins() -> Registry {
+    Registry {
+        backends: BACKENDS.to_vec(),
+        driver: Some(Arc::new(start_driver)),
+        effects: mapper_effects::catalogue(),
+        read_effect,
+        formats: FORMATS,
+        logs: LOG_FORMATS,
+        ..Registry::empty()
+    }
+}
+
+/// A suspected effect, written in rhai.
+fn read_effect(path: &Path) -> Result<Arc<dyn Effect>, SessionError> {
+    let text = mapper_campaign::read_text(path).map_err(|source| SessionError::File {
+        action: "read",
+        path: path.to_owned(),
+        source,
+    })?;
+    let effect = ScriptEffect::new(&text, path).map_err(|error| SessionError::Effect(Box::new(error)))?;
+    Ok(Arc::new(effect))
+}
+
+/// Locations of drivers: first those that listen at a socket, then those next to this program, then those on `PATH`.
+pub fn driver_locations() -> SearchPath {
+    let sockets = private_state_directory().map(|state| state.join("drivers"));
+    SearchPath::new(std::env::current_exe().ok().as_deref(), std::env::var_os("PATH").as_deref(), sockets)
+}
+
+/// `$MAPPER_STATE_DIR`, `$XDG_STATE_HOME/mapper` or `~/.local/state/mapper`: a directory that other users cannot write to, because a
+/// program that listens at a socket in it controls the rig.
+fn private_state_directory() -> Option<PathBuf> {
+    let variable = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    variable("MAPPER_STATE_DIR")
+        .or_else(|| variable("XDG_STATE_HOME").map(|state| state.join("mapper")))
+        .or_else(|| variable("HOME").map(|home| home.join(".local/state/mapper")))
+}
+
+/// Starts the driver of a campaign, a separate program.
+fn start_driver(name: &str, settings: &Value) -> Result<Box<dyn Backend>, BackendError> {
+    let built_in = BACKENDS.iter().map(|plugin| plugin.name).collect::<Vec<_>>().join(", ");
+    let known = INCLUDED_DRIVERS.iter().find(|(known, ..)| *known == name);
+    let hint =
+        known.map_or_else(String::new, |(.., line)| format!("; `{line}` in the source of mapper builds it"));
+    Ok(Box::new(Driver::find(&driver_locations(), name, settings, &built_in, &hint)?))
+}

@@ -6,7 +6,7 @@ use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::study::{Hypothesis, Study};
 use crate::gap::residuals::whiten::{Linearised, rows_of_step};
 use mapper_core::Channel;
-use mapper_inference::descent::DifferenceStep;
+use mapper_numerics::least_squares::descent::DifferenceStep;
 use mapper_numerics::{ROUNDING, parallel};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
@@ -237,6 +237,8 @@ pub fn weigh_process(
 pub struct Posterior {
     /// Log evidence relative to no process.
     pub gain: f64,
+    /// Mean of the coefficients, in steps.
     pub mean: DVector<f64>,
+    /// Their covariance, in steps.
     pub covariance: DMatrix<f64>,
 }

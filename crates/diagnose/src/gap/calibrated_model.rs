@@ -16,7 +16,7 @@ use crate::gap::residuals::study::{Hypothesis, PredictError, Study};
 use crate::gap::residuals::whiten::{Linearised, dot, nuisance_changes};
 use mapper_core::{Channel, half_width_95};
 use mapper_identify::BLOCK_S;
-use mapper_inference::descent::FINE;
+use mapper_numerics::least_squares::descent::FINE;
 use mapper_observe::model_inputs::lagged_command::Response;
 use mapper_physics::rig::effect::Effect;
 use nalgebra::{DMatrix, DVector};

@@ -26,7 +26,7 @@ use mapper_core::{
     EstimateUncertainty, FitFailure, LeftOut, Recording, ThermalModel, Verdict, Warning, Window,
     confidence_interval_95,
 };
-use mapper_inference::descent::ROUNDS;
+use mapper_numerics::least_squares::descent::ROUNDS;
 use mapper_numerics::statistics::rms;
 use serde::Serialize;
 

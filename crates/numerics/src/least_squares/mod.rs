@@ -1,6 +1,8 @@
 //! Nonlinear least squares by damped steps: the control of the damping, and the solution of the damped normal equations, whose matrix
 //! is full or arrow-shaped.
 //!
+//! [`descent`] is the fit of a model whose runs are costly: undamped steps within bounds, shortened if they do not help.
+//!
 //! The caller defines the problem: residuals, weights, bounds, and estimates between the steps. docs/decisions/0010-numerics.md gives
 //! the reasons for not using a library.
 //!
@@ -10,6 +12,7 @@
 mod arrow;
 mod damping;
 mod dense;
+pub mod descent;
 
 pub use arrow::{Arrow, ArrowBlock, Reduced};
 pub use damping::{Damping, DampingRule, MAX_ITERATIONS};

@@ -6,7 +6,7 @@ use crate::gap::best_fit::projector::{Projector, Share};
 use crate::gap::best_fit::selection::Selection;
 use crate::gap::residuals::study::{Prediction, Study, members};
 use crate::gap::residuals::whiten::{Linearised, rows_of_step};
-use mapper_inference::descent::MAX_MOVE;
+use mapper_numerics::least_squares::descent::MAX_MOVE;
 use mapper_numerics::parallel;
 use mapper_physics::rig::effect::EffectParameter;
 use nalgebra::DVector;

@@ -10,9 +10,9 @@ use crate::gap::residuals::hypothesis::onset_step;
 use crate::gap::residuals::study::{PredictError, Study, members};
 use crate::gap::residuals::whiten::Linearised;
 use mapper_core::half_width_95;
-use mapper_inference::descent::ROUNDS;
 use mapper_inference::hypotheses::MAX_MEMBERS;
 use mapper_inference::search::{Causes, Extension, Known, Limits, climb, extend};
+use mapper_numerics::least_squares::descent::ROUNDS;
 
 #[derive(Clone, Copy)]
 pub struct Search<'a> {

@@ -6,7 +6,7 @@ use crate::gap::best_fit::selection::{Selection, dot_over};
 use crate::gap::residuals::hypothesis::Hypothesis;
 use crate::gap::residuals::study::{PredictError, Study};
 use crate::gap::residuals::whiten::{Linearised, dot};
-use mapper_inference::descent::ROUNDS;
+use mapper_numerics::least_squares::descent::ROUNDS;
 use nalgebra::{DMatrix, DVector};
 
 /// Fits the tolerances of a fault-free rig. The misfit sets the noise level, so that model error does not push tolerances outside their

@@ -9,7 +9,7 @@ use crate::gap::best_fit::normal::misfit_increases;
 use crate::gap::findings::experiment::AtRest;
 use crate::gap::residuals::study::{Hypothesis, Study};
 use mapper_core::Channel;
-use mapper_inference::descent::FINE;
+use mapper_numerics::least_squares::descent::FINE;
 use mapper_observe::perturbation::UNINFORMATIVE;
 use nalgebra::DMatrix;
 

@@ -1,7 +1,7 @@
 //! Response of P3 and the valve to their commands, and whether it is diagnosed.
 
 use mapper_core::{Channel, Recording};
-use mapper_inference::descent::ROUNDS;
+use mapper_numerics::least_squares::descent::ROUNDS;
 use mapper_observe::averages::time_table::Table;
 use mapper_observe::declared::Declared;
 use mapper_observe::model_inputs::lagged_command::{Response, measured_p3_response, measured_valve_response};

@@ -7,9 +7,9 @@ use crate::joint::step_model::parameters::{
     ETA, LOCAL, LocalVector, OFFSETS, PROBE_MM2, Prior, REFINEMENTS, SHARED, SURFACE, SharedVector,
 };
 use mapper_core::IdentifiedInlet;
-use mapper_inference::descent::ENOUGH;
 use mapper_numerics::ROUNDING;
 use mapper_numerics::coloured_noise::WhiteningFilter;
+use mapper_numerics::least_squares::descent::ENOUGH;
 use mapper_numerics::least_squares::{Arrow, ArrowBlock, Damping, DampingRule, MAX_ITERATIONS, Reduced};
 use mapper_numerics::parallel;
 use nalgebra::{DMatrix, DVector, Matrix4, Matrix4xX, Vector4};

@@ -1,6 +1,6 @@
 //! The most probable values of the unknowns of a nonlinear model: Gauss-Newton within bounds.
 
-use mapper_numerics::ROUNDING;
+use crate::ROUNDING;
 use nalgebra::{DMatrix, DVector};
 
 /// A model whose whitened residuals depend on unknowns. Its cost is the sum of squares of the residuals, plus the squared distance of

@@ -3,7 +3,7 @@
 use crate::closure::select::Choice;
 use crate::closure::term::{ClosureEffect, Role, Term};
 use crate::gap::best_fit::fit::{Effort, Fit, Start, fit};
-use crate::gap::best_fit::selection::Selection;
+use crate::gap::best_fit::normal::Selection;
 use crate::gap::causes::select::MIN_GAP_REDUCTION;
 use crate::gap::findings::report::MAX_EQUIVALENT;
 use crate::gap::residuals::study::{Hypothesis, Study};

@@ -3,8 +3,7 @@
 use crate::closure::columns::{Base, Products, weigh_process};
 use crate::closure::residual_source::{balances, columns, covariance};
 use crate::gap::best_fit::coordinate::typical;
-use crate::gap::best_fit::normal::PRIOR_STEPS;
-use crate::gap::best_fit::selection::Selection;
+use crate::gap::best_fit::normal::{PRIOR_STEPS, Selection};
 use crate::gap::residuals::study::Study;
 use crate::gap::residuals::whiten::Linearised;
 use mapper_numerics::parallel;

@@ -8,9 +8,8 @@ use crate::closure::library as term_library;
 use crate::closure::residual_source::{ResidualSource, residual_sources};
 use crate::closure::select::{Choice, begun, choices};
 use crate::gap::best_fit::adequacy::{adequacy, misfit_of_steps};
-use crate::gap::best_fit::first_step::with_start_read;
-use crate::gap::best_fit::fit::{Effort, Fit, fit};
-use crate::gap::best_fit::selection::Selection;
+use crate::gap::best_fit::fit::{Effort, Fit, fit, with_start_read};
+use crate::gap::best_fit::normal::Selection;
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::place::{
     Explanation, Gain, LINEARISATION_ERROR_RATIO, Part, of_fits, places_of, rarity, signature,
@@ -18,8 +17,7 @@ use crate::gap::causes::place::{
 use crate::gap::causes::probabilities::weight;
 use crate::gap::causes::select::MIN_GAP_REDUCTION;
 use crate::gap::findings::report::{BalanceClosure, ClosureTerm, MAX_EQUIVALENT, Place};
-use crate::gap::gap_reduction::folds::FOLDS;
-use crate::gap::gap_reduction::held_out_gap::channels_on;
+use crate::gap::gap_reduction::{FOLDS, channels_on};
 use crate::gap::library_fits::LibraryFits;
 use crate::gap::residuals::study::{Study, members};
 use crate::gap::verdict::Explained;

@@ -11,7 +11,7 @@ use crate::drift::runs;
 use crate::drift::runs::{
     CampaignStep, DriftError, DriftRequest, Segment, Unsolvable, mean_variance_ratio, usable,
 };
-use crate::gap::residuals::initial_state::SETTLING_S;
+use crate::gap::residuals::true_inputs::SETTLING_S;
 use crate::gap::residuals::whiten::NEAR_SURGE;
 use mapper_core::{Channel, IdentifiedPoint, Recording, probability_text};
 use mapper_inference::time_history::Shape;

@@ -6,7 +6,7 @@ use crate::gap::best_fit::fit::Fit;
 use crate::gap::correction::{Changes, one_sigma_away};
 use crate::gap::diagnose::Diagnosed;
 use crate::gap::findings::report::{Candidate, Verdict};
-use crate::gap::preconditions::problem::GapError;
+use crate::gap::preconditions::GapError;
 use crate::gap::residuals::study::Hypothesis;
 use mapper_core::{
     BudgetRow, IdentifiedPoint, PointBudgets, Recording, UncertaintyBudget, half_width_95, step_number,

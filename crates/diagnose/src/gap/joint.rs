@@ -6,7 +6,7 @@
 
 use crate::gap::best_fit::coordinate::{Coordinate, coordinates, infos, parameters, unknowns};
 use crate::gap::best_fit::fit::{Effort, Fit, fit};
-use crate::gap::best_fit::selection::Selection;
+use crate::gap::best_fit::normal::Selection;
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::diagnose::Diagnosed;
 use crate::gap::findings::in_words;

@@ -2,7 +2,7 @@
 
 use crate::gap::best_fit::adequacy::{Adequacy, adequacy};
 use crate::gap::best_fit::fit::{Effort, Fit, MAX_SIGMAS};
-use crate::gap::best_fit::selection::Selection;
+use crate::gap::best_fit::normal::Selection;
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::place::{Gain, places};
 use crate::gap::causes::probabilities::{Posterior, posterior};
@@ -10,8 +10,8 @@ use crate::gap::causes::select::{
     MAX_EVIDENCE_DEFICIT, Search, close, ranked, refit, search, search_onsets, supported,
 };
 use crate::gap::findings::report::{MAX_REFITTED, Place};
-use crate::gap::gap_reduction::folds::Folds;
-use crate::gap::preconditions::problem::GapError;
+use crate::gap::gap_reduction::Folds;
+use crate::gap::preconditions::GapError;
 use crate::gap::residuals::study::{Study, members};
 use crate::gap::residuals::whiten::Linearised;
 

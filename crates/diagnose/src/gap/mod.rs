@@ -20,6 +20,8 @@ pub mod residuals;
 pub mod scores;
 pub(crate) mod verdict;
 
+pub use crate::gap::model_error::baseline::{Baseline, Declaration, Lacking};
+pub use crate::gap::preconditions::{GapError, Problem};
 pub use calibrated_model::{
     CalibratedModelError, ChannelCheck, Expected, ForecastCheck, Found, FoundEffect, FoundTolerance,
     check_forecast, forecast_steps,
@@ -36,8 +38,6 @@ pub use findings::report::{
 };
 pub use findings::warning::{GapWarning, OffsetAtRest};
 pub use joint::{Over, Persistence, Value, over_recordings};
-pub use model_error::baseline_assumptions::{Baseline, Declaration, Lacking};
-pub use preconditions::problem::{GapError, Problem};
 pub use request::{BaselineRecording, ClosureSearch, GapRequest, RigRecording};
 pub use residuals::nuisance::OUTPUTS;
 pub use residuals::study::Study;

@@ -1,13 +1,13 @@
 //! A recording made ready for the diagnosis: the drift of its sensors and the offsets that its zero finds are subtracted.
 
-use crate::drift::{self, CauseKind, DriftReport, DriftRequest, RecordedRun, without_drift};
+use crate::drift;
+use crate::drift::{CauseKind, DriftReport, DriftRequest, RecordedRun, without_drift};
 use crate::gap::best_fit::adequacy::adequacy;
 use crate::gap::best_fit::fit::{Effort, fit};
-use crate::gap::best_fit::selection::Selection;
+use crate::gap::best_fit::normal::Selection;
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::findings::warning::OffsetAtRest;
-use crate::gap::preconditions::problem::GapError;
-use crate::gap::preconditions::usable::checked_study;
+use crate::gap::preconditions::{GapError, checked_study};
 use crate::gap::request::RigRecording;
 use crate::gap::residuals::study::Study;
 use crate::gap::residuals::whiten::Linearised;

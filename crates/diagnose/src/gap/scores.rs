@@ -2,13 +2,11 @@
 
 use crate::closure::confounding::{Signatures, signatures};
 use crate::gap::best_fit::coordinate::coordinates;
-use crate::gap::best_fit::fit::Fit;
-use crate::gap::best_fit::signature::lengths;
+use crate::gap::best_fit::fit::{Fit, lengths};
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::probabilities::weight;
 use crate::gap::diagnose::Diagnosed;
-use crate::gap::preconditions::problem::GapError;
-use crate::gap::preconditions::usable::checked_study;
+use crate::gap::preconditions::{GapError, checked_study};
 use crate::gap::request::RigRecording;
 use crate::gap::residuals::study::{EffectValues, Study, members};
 use crate::gap::residuals::whiten::Linearised;

@@ -7,7 +7,7 @@ use mapper_core::{Channel, Recording};
 use mapper_diagnose::gap::diagnose::{Diagnosed, gap};
 use mapper_diagnose::gap::findings::report::Verdict;
 use mapper_diagnose::gap::findings::warning::GapWarning;
-use mapper_diagnose::gap::preconditions::problem::{GapError, Problem};
+use mapper_diagnose::gap::preconditions::{GapError, Problem};
 use mapper_diagnose::gap::request::{BaselineRecording, GapRequest, RigRecording};
 use mapper_physics::rig::effect::{Rig, add};
 use mapper_physics::simulation::model::Model;

@@ -3,10 +3,10 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use crate::gap::common::{self, Visits, declared};
-use mapper_diagnose::gap::best_fit::fit::{Effort, fit};
-use mapper_diagnose::gap::best_fit::selection::Selection;
-use mapper_diagnose::gap::best_fit::signature::lengths;
+use crate::gap::common;
+use crate::gap::common::{Visits, declared};
+use mapper_diagnose::gap::best_fit::fit::{Effort, fit, lengths};
+use mapper_diagnose::gap::best_fit::normal::Selection;
 use mapper_diagnose::gap::causes::additions::additions;
 use mapper_diagnose::gap::residuals::study::{EffectValues, Hypothesis, Study};
 use mapper_diagnose::gap::residuals::whiten::Linearised;

@@ -2,7 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use crate::gap::common::{self, Visits, boundary, declared, effects, request};
+use crate::gap::common;
+use crate::gap::common::{Visits, boundary, declared, effects, request};
 use mapper_core::{Channel, Dimension, OperatingPoint, Recording, Series};
 use mapper_diagnose::gap::calibrated_model::{Found, check_forecast};
 use mapper_diagnose::gap::causes::calibration::Calibration;
@@ -12,8 +13,7 @@ use mapper_diagnose::gap::findings::report::Verdict;
 use mapper_diagnose::gap::findings::warning::GapWarning;
 use mapper_diagnose::gap::joint::{Persistence, Value, over_recordings};
 use mapper_diagnose::gap::next_experiment::outlook::{approximate_separation, separation};
-use mapper_diagnose::gap::preconditions::problem::{GapError, Problem};
-use mapper_diagnose::gap::preconditions::usable::usable;
+use mapper_diagnose::gap::preconditions::{GapError, Problem, usable};
 use mapper_diagnose::gap::request::RigRecording;
 use mapper_diagnose::gap::residuals::nuisance::NuisanceKind;
 use mapper_diagnose::gap::residuals::study::Study;
@@ -203,7 +203,7 @@ fn two_effects_are_both_named_and_each_takes_off_the_square_of_its_signature() {
     // Gain of both compared with the meter alone and with none.
     let meter = 3;
     let study = &diagnosed.study;
-    let alone = mapper_diagnose::gap::best_fit::signature::lengths(
+    let alone = mapper_diagnose::gap::best_fit::fit::lengths(
         study,
         &diagnosed.linearised,
         &vec![(meter, vec![1.02])],

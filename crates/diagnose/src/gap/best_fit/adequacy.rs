@@ -2,7 +2,7 @@
 //! the misfit would be invisible.
 
 use crate::gap::best_fit::fit::Fit;
-use crate::gap::best_fit::selection::Selection;
+use crate::gap::best_fit::normal::Selection;
 use crate::gap::residuals::nuisance::RESPONSES_S;
 use crate::gap::residuals::study::Study;
 use crate::gap::residuals::whiten::{Linearised, dot, rows_of_step};

@@ -5,11 +5,10 @@
 //! always that of the model itself.
 
 use crate::gap::best_fit::coordinate::{Coordinate, coordinates, effect_neighbours, hypothesis_at, unknowns};
-use crate::gap::best_fit::normal::{PRIOR_STEPS, normal_matrix, nuisance_products};
-use crate::gap::best_fit::selection::{Selection, dot_over};
+use crate::gap::best_fit::normal::{PRIOR_STEPS, Selection, dot_over, normal_matrix, nuisance_products};
 use crate::gap::residuals::machine_run::LinearisedMachine;
 use crate::gap::residuals::nuisance::NuisanceKind;
-use crate::gap::residuals::study::{Hypothesis, PredictError, Prediction, Study};
+use crate::gap::residuals::study::{EffectValues, Hypothesis, PredictError, Prediction, Study};
 use crate::gap::residuals::whiten::{Linearised, rows_of_step};
 use mapper_inference::time_history::TimeHistory;
 use mapper_numerics::least_squares::descent::{DifferenceStep, End, FINE, Model, Normal, Until, descend};
@@ -343,3 +342,56 @@ pub(crate) fn changes_near(
 
 /// Maximum size of a nuisance, in declared sigmas: a larger deviation is not a tolerance.
 pub const MAX_SIGMAS: f64 = 6.0;
+
+/// Refits only the initial state to the first step. Otherwise the unknown start temperature would count as a machine misfit of a held-out first
+/// step, a hundred times too large. Returns the fit unchanged if the misfit of the first step does not fall.
+pub fn with_start_read(study: &Study, linearised: &Linearised, fit: Fit) -> Fit {
+    let rows = [rows_of_step(study, 0)];
+    let starts: Vec<usize> =
+        study.nuisances.iter().enumerate().filter(|(_, n)| n.kind.is_start()).map(|(i, _)| i).collect();
+    let column = |place: usize| &linearised.columns[starts[place]];
+    let n = starts.len();
+    let matrix =
+        DMatrix::from_fn(n, n, |i, j| dot_over(&rows, column(i), column(j)) + if i == j { 1.0 } else { 0.0 });
+    let right = DVector::from_fn(n, |i, _| {
+        dot_over(&rows, column(i), &fit.residual) - fit.hypothesis.nuisances[starts[i]]
+    });
+    let Some(step) = matrix.cholesky().map(|cholesky| cholesky.solve(&right)) else { return fit };
+    let mut moved = fit.hypothesis.clone();
+    for (index, by) in starts.iter().zip(step.iter()) {
+        moved.nuisances[*index] = (moved.nuisances[*index] + by).clamp(-MAX_SIGMAS, MAX_SIGMAS);
+    }
+    let Ok(prediction) = study.predict(&moved) else { return fit };
+    let residual = linearised.residual(study, &prediction);
+    if dot_over(&rows, &residual, &residual) >= dot_over(&rows, &fit.residual, &fit.residual) {
+        return fit;
+    }
+    Fit { hypothesis: moved, prediction, residual, ..fit }
+}
+
+/// Signature length of each of `effects` (indices into the study's effects, with values), given the others.
+///
+/// # Errors
+/// [`PredictError`] if the model cannot follow the recording with these effects.
+pub fn lengths(
+    study: &Study,
+    linearised: &Linearised,
+    effects: &EffectValues,
+) -> Result<Vec<f64>, PredictError> {
+    let mut with = study.nothing();
+    with.effects.clone_from(effects);
+    let mut noise_free = study.clone();
+    noise_free.measured = study.predict(&with)?.values;
+    // Uses model runs rather than a linearisation, because a tolerance that imitates the effect follows its nonlinearity. The declared size
+    // already penalises tolerances, so the bound is wide.
+    let effort =
+        Effort { iterations: 5, enough: 0.5, max_sigmas: 60.0, max_sigmas_of_rig: 60.0, exact: true };
+    let everywhere = Selection::all(study);
+    (0..effects.len())
+        .map(|place| {
+            let mut without = with.clone();
+            without.effects.remove(place);
+            Ok(fit(&noise_free, linearised, &without, &everywhere, effort)?.cost.max(0.0).sqrt())
+        })
+        .collect()
+}

@@ -2,9 +2,5 @@
 
 pub mod adequacy;
 pub mod coordinate;
-pub(crate) mod first_step;
 pub mod fit;
-pub(crate) mod normal;
-pub(crate) mod projector;
-pub mod selection;
-pub mod signature;
+pub mod normal;

@@ -1,9 +1,8 @@
-//! Normal equations of nuisances and effects.
+//! Normal equations of nuisances and effects over selected steps, and the projection of nuisances out of columns.
 
-use crate::gap::best_fit::selection::{Selection, dot_over};
 use crate::gap::residuals::study::Study;
-use crate::gap::residuals::whiten::{Linearised, dot};
-use nalgebra::{DMatrix, DVector};
+use crate::gap::residuals::whiten::{Linearised, dot, rows_of_step};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use std::ops::Range;
 
 /// Prior width of an effect's parameter, in typical steps.
@@ -82,4 +81,95 @@ pub(crate) fn misfit_increases(fits: &[ExpectedFit]) -> Option<Vec<Vec<f64>>> {
         fits.iter().map(of_rival).collect()
     };
     fits.iter().map(|(truth, ..)| of_truth(truth)).collect()
+}
+
+/// Products of the rows of a step of a column: with the free columns, with themselves, with the residual.
+pub(crate) struct Share {
+    pub(crate) right: DVector<f64>,
+    pub(crate) own: f64,
+    pub(crate) seen: f64,
+}
+
+/// Repeated solver for the nuisance block of the normal equations.
+pub(crate) struct Projector<'a> {
+    linearised: &'a Linearised,
+    rows: Vec<Range<usize>>,
+    cholesky: Cholesky<f64, Dyn>,
+    /// Additional free columns.
+    others: &'a [Vec<f64>],
+}
+
+impl<'a> Projector<'a> {
+    pub(crate) fn new(
+        study: &Study,
+        linearised: &'a Linearised,
+        selection: &Selection,
+        others: &'a [Vec<f64>],
+    ) -> Option<Projector<'a>> {
+        let rows = selection.rows(study);
+        let products = nuisance_products(study, linearised, selection);
+        let matrix = normal_matrix(&rows, linearised, &products, others);
+        Some(Projector { linearised, rows, cholesky: matrix.cholesky()?, others })
+    }
+
+    pub(crate) fn right(&self, column: &[f64]) -> DVector<f64> {
+        let n = self.linearised.columns.len();
+        DVector::from_fn(n + self.others.len(), |i, _| {
+            let other = if i < n { &self.linearised.columns[i] } else { &self.others[i - n] };
+            dot_over(&self.rows, other, column)
+        })
+    }
+
+    /// Product of two columns after projecting out the free ones (softened by their priors).
+    pub(crate) fn product(
+        &self,
+        a: &[f64],
+        right_a: &DVector<f64>,
+        b: &[f64],
+        right_b: &DVector<f64>,
+    ) -> f64 {
+        self.projected(dot_over(&self.rows, a, b), right_a, right_b)
+    }
+
+    /// The same where the product with the free columns in is known.
+    pub(crate) fn projected(&self, product: f64, right_a: &DVector<f64>, right_b: &DVector<f64>) -> f64 {
+        product - right_a.dot(&self.cholesky.solve(right_b))
+    }
+
+    /// [`Projector::right`] of some rows alone, and their product with another column and with themselves.
+    pub(crate) fn share(&self, rows: &Range<usize>, column: &[f64], residual: &[f64]) -> Share {
+        let own = &column[rows.clone()];
+        let columns = self.linearised.columns.iter().chain(self.others);
+        let right = columns.map(|other| dot(&other[rows.clone()], own));
+        Share {
+            right: DVector::from_iterator(self.linearised.columns.len() + self.others.len(), right),
+            own: dot(own, own),
+            seen: dot(own, &residual[rows.clone()]),
+        }
+    }
+}
+
+/// Selected steps.
+#[derive(Debug, Clone)]
+pub struct Selection {
+    /// Whether each step is selected.
+    pub steps: Vec<bool>,
+}
+
+impl Selection {
+    /// All steps.
+    pub fn all(study: &Study) -> Selection {
+        Selection { steps: vec![true; study.steps.len()] }
+    }
+
+    /// Rows of the selected steps.
+    pub fn rows(&self, study: &Study) -> Vec<Range<usize>> {
+        let counts = |step: &usize| self.steps.get(*step).copied().unwrap_or(false);
+        (0..study.steps.len()).filter(counts).map(|step| rows_of_step(study, step)).collect()
+    }
+}
+
+/// Scalar product over some rows.
+pub fn dot_over(rows: &[Range<usize>], a: &[f64], b: &[f64]) -> f64 {
+    rows.iter().map(|range| dot(&a[range.clone()], &b[range.clone()])).sum()
 }

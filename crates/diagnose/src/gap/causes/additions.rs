@@ -2,8 +2,7 @@
 
 use crate::gap::best_fit::coordinate::Coordinate;
 use crate::gap::best_fit::fit::{Column, Fit, Start};
-use crate::gap::best_fit::projector::{Projector, Share};
-use crate::gap::best_fit::selection::Selection;
+use crate::gap::best_fit::normal::{Projector, Selection, Share};
 use crate::gap::residuals::study::{Prediction, Study, members};
 use crate::gap::residuals::whiten::{Linearised, rows_of_step};
 use mapper_numerics::least_squares::descent::MAX_MOVE;

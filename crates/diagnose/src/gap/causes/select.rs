@@ -2,7 +2,7 @@
 
 use crate::gap::best_fit::coordinate::Coordinate;
 use crate::gap::best_fit::fit::{Effort, Fit, MAX_SIGMAS, Start, fit};
-use crate::gap::best_fit::selection::Selection;
+use crate::gap::best_fit::normal::Selection;
 use crate::gap::causes::additions::{Addition, additions};
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::probabilities::{prior, weight};

@@ -1,19 +1,16 @@
 //! Smallest detectable size of an effect, from its signature length with nuisances projected out and the evidence required to name a cause.
 
 use crate::gap::best_fit::coordinate::{Coordinate, typical};
-use crate::gap::best_fit::normal::PRIOR_STEPS;
-use crate::gap::best_fit::projector::Projector;
-use crate::gap::best_fit::selection::Selection;
+use crate::gap::best_fit::normal::{PRIOR_STEPS, Projector, Selection};
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::probabilities::prior_of_number;
 use crate::gap::findings::in_words;
 use crate::gap::findings::report::SmallestSeen;
 use crate::gap::residuals::study::Study;
 use crate::gap::residuals::whiten::Linearised;
-use mapper_numerics::ROUNDING;
 use mapper_numerics::least_squares::descent::Until;
-use mapper_numerics::parallel;
 use mapper_numerics::statistics::NORMAL_95;
+use mapper_numerics::{ROUNDING, parallel};
 use mapper_physics::rig::effect::{EffectInfo, EffectParameter};
 
 /// Tolerance in the logarithm of the signature's length: a tenth of a size does not change a plan.

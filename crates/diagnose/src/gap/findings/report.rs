@@ -2,7 +2,7 @@
 
 use crate::gap::findings::experiment::{AlsoChanged, Experiment};
 use crate::gap::findings::warning::{GapWarning, OffsetAtRest};
-use crate::gap::model_error::baseline_assumptions::Baseline;
+use crate::gap::model_error::baseline::Baseline;
 use mapper_core::probability_text;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -1,6 +1,5 @@
 //! Choice of the next experiment or sensor, by the expected separation of the remaining candidate effects.
 
-pub(crate) mod at_rest;
 pub mod best_experiment;
 pub(crate) mod odds;
 pub mod outlook;

@@ -1,20 +1,19 @@
-//! Predicts the result of an experiment: how far it separates the candidates, before and after a refit of each.
+//! What an experiment would show: predictions of jumps and of a soak at rest, and how far they separate causes.
 
-use crate::gap::best_fit::coordinate::coordinates;
+use crate::gap::best_fit::coordinate::{coordinates, effect_neighbours, nuisance_neighbours};
 use crate::gap::best_fit::fit::{Fit, effect_changes};
 use crate::gap::best_fit::normal::misfit_increases;
-use crate::gap::findings::experiment::{AllowedJump, AlsoChanged, Experiment};
-use crate::gap::next_experiment::at_rest::apart_at_rest;
-use crate::gap::residuals::actuators::Actuators;
-use crate::gap::residuals::initial_state::SETTLING_S;
+use crate::gap::findings::experiment::{AllowedJump, AlsoChanged, AtRest, Experiment};
 use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::study::{Hypothesis, Study};
+use crate::gap::residuals::true_inputs::{Actuators, SETTLING_S};
 use crate::gap::residuals::whiten::Linearised;
 use mapper_core::{Channel, OperatingPoint, Recording, SAMPLE_INTERVAL_S, Series, StepKind, StepMarker};
 use mapper_identify::BLOCK_S;
 use mapper_numerics::least_squares::descent::FINE;
 use mapper_observe::averages::time_table::Table;
 use mapper_observe::declared::Declared;
+use mapper_observe::perturbation::UNINFORMATIVE;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::rig::effect::Effect;
 use mapper_physics::simulation::model::Model;
@@ -203,6 +202,55 @@ pub fn recorded_points(study: &Study, hypothesis: &Hypothesis) -> Vec<OperatingP
         .map(|(step, point)| OperatingPoint {
             speed_rpm: point.speed_rpm,
             valve_opening_ratio: step.marker.valve_opening_ratio,
+        })
+        .collect()
+}
+
+/// Misfit increase of each fit (column) after refitting to a soak, if another fit (row) were true, in squared sigmas.
+pub(crate) fn apart_at_rest(recorded: &Study, soak: &AtRest, fits: &[&Fit]) -> Option<Vec<Vec<f64>>> {
+    let sensors: Vec<(Channel, f64)> = AtRest::CHANNELS
+        .into_iter()
+        .zip(soak.left_sigma_k)
+        .filter(|(channel, _)| recorded.table.column(*channel).is_some())
+        .collect();
+    if sensors.len() < 2 {
+        return None;
+    }
+    let predicted = fits
+        .iter()
+        .map(|fit| {
+            let here = offsets(recorded, &sensors, &fit.hypothesis)?;
+            let mut columns = changes(recorded, &sensors, &fit.hypothesis, &here)?;
+            columns.push(sensors.iter().map(|(_, sigma)| 1.0 / sigma).collect());
+            let known = fit.precision.nrows();
+            let mut precision = DMatrix::zeros(columns.len(), columns.len());
+            precision.view_mut((0, 0), (known, known)).copy_from(&fit.precision);
+            // The common temperature of all sensors is unknown.
+            precision[(known, known)] = UNINFORMATIVE.powi(-2);
+            Some((here, columns, precision))
+        })
+        .collect::<Option<Vec<_>>>()?;
+    misfit_increases(&predicted)
+}
+
+/// Offsets of the sensors, in units of their remaining uncertainty.
+fn offsets(study: &Study, sensors: &[(Channel, f64)], hypothesis: &Hypothesis) -> Option<Vec<f64>> {
+    sensors.iter().map(|(channel, sigma)| Some(study.offset_at_end(hypothesis, *channel)? / sigma)).collect()
+}
+
+/// Changes of these offsets for one sigma of each nuisance and for a unit of each effect coordinate.
+fn changes(
+    study: &Study,
+    sensors: &[(Channel, f64)],
+    hypothesis: &Hypothesis,
+    here: &[f64],
+) -> Option<Vec<Vec<f64>>> {
+    let coordinates = coordinates(&study.effects, hypothesis);
+    nuisance_neighbours(hypothesis, FINE)
+        .chain(effect_neighbours(hypothesis, &coordinates, FINE))
+        .map(|(moved, step)| {
+            let there = offsets(study, sensors, &moved)?;
+            Some(there.iter().zip(here).map(|(there, here)| (there - here) / step).collect())
         })
         .collect()
 }

@@ -2,12 +2,12 @@
 
 use crate::gap::model_error::structure::repeating_part;
 use crate::gap::residuals::hypothesis::Hypothesis;
-use crate::gap::residuals::initial_state::with_metal_held;
 use crate::gap::residuals::machine_run::{
     LinearisedMachine, LinearisedSamples, MachineRun, Sample, SampleValues,
 };
 use crate::gap::residuals::nuisance::{Circumstances, OUTPUTS, RESPONSES_S};
 use crate::gap::residuals::study::{PredictError, Prediction, Study};
+use crate::gap::residuals::true_inputs::with_metal_held;
 use mapper_core::Channel;
 use mapper_observe::averages::mean_reading::mean_reading;
 use mapper_observe::initial_state::estimate_state;

@@ -1,12 +1,20 @@
-//! The inputs that act on the machine: as recorded, without the errors of their sensors.
+//! Inputs of the model: recorded responses of the actuators, true values of the readings, and whether the metal had settled.
 
 use crate::gap::residuals::nuisance::Circumstances;
-use mapper_core::Channel;
+use mapper_core::{Channel, Recording};
+use mapper_numerics::ROUNDING;
+use mapper_numerics::least_squares::descent::ROUNDS;
+use mapper_observe::averages::mean_reading::mean_reading;
+use mapper_observe::averages::time_table::Table;
 use mapper_observe::channels::{INPUT_CHANNELS, boundary_condition};
+use mapper_observe::declared::Declared;
+use mapper_observe::model_inputs::lagged_command::{Response, measured_p3_response, measured_valve_response};
 use mapper_observe::model_inputs::smoothed_inputs::SmoothedInputs;
+use mapper_observe::model_inputs::step_timing::{Times, with_command_times};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::rig::instruments::{ChannelPath, Surroundings};
 use mapper_physics::simulation::inputs::Inputs;
+use mapper_physics::simulation::model::Model;
 
 /// Walls and flows along a recording: they scale the errors of sensors.
 #[derive(Debug, Clone, Default)]
@@ -83,4 +91,74 @@ impl Inputs for TrueInputs<'_> {
     fn is_constant_after(&self, t_s: f64) -> bool {
         self.recorded.is_constant_after(t_s)
     }
+}
+
+/// Response of P3 and the valve to their commands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Actuators {
+    /// P3; Pa/s.
+    pub p3: Response,
+    /// The valve; 1/s.
+    pub valve: Response,
+    /// Whether P3 is compared with its declared response.
+    pub judged: bool,
+}
+
+impl Actuators {
+    /// With declared tolerances, measured P3 drives the model and is compared with its declared lag, and the valve follows at once. Without
+    /// them, both responses are estimated from the recording.
+    pub fn of(table: &Table, recording: &Recording, declared: &Declared, judged: bool) -> Actuators {
+        let (p3, timed) = timed_p3(table, recording, declared);
+        let valve =
+            if judged { None } else { measured_valve_response(table, &timed, declared.nominal.p1_pa) };
+        Actuators { p3, valve: valve.unwrap_or(Response::lag(0.0)), judged }
+    }
+}
+
+/// Estimates the P3 response and shifts the steps to when their commands reached the rig; each estimate uses the other.
+fn timed_p3(table: &Table, recording: &Recording, declared: &Declared) -> (Response, Recording) {
+    let noise_sigma = declared.noise_sigma(Channel::P3);
+    let follows = |recording: &Recording| {
+        let p3 = measured_p3_response(table, recording, noise_sigma);
+        p3.unwrap_or(Response::lag(declared.tolerances.actuator_lag_s))
+    };
+    let commanded = with_command_times(recording);
+    let (mut p3, mut timed) = (follows(&commanded), commanded.clone());
+    for _ in 0..ROUNDS {
+        let next = Times::read(table, &commanded, p3, noise_sigma).timed(&commanded);
+        if next.steps == timed.steps {
+            break;
+        }
+        (p3, timed) = (follows(&next), next);
+    }
+    (p3, timed)
+}
+
+/// The model with its metal so heavy that its temperatures hold while everything else settles.
+pub(crate) fn with_metal_held(model: &Model) -> Model {
+    let mut heavy = model.clone();
+    heavy.params.compressor.housing_mass_kg /= ROUNDING;
+    heavy.params.turbine.housing_mass_kg /= ROUNDING;
+    heavy
+}
+
+/// Time in which everything but the housings settles from an unknown state, s: several times the lag of a sheathed probe, the slowest part.
+pub(crate) const SETTLING_S: f64 = 30.0;
+/// Rate above which the initial metal temperatures are not settled, K/s: some hundred times noise, and a tenth of that of a machine started
+/// cold minutes ago.
+const RESTLESS_K_S: f64 = 0.05;
+
+/// Whether the metal temperatures are steady when the first step of a recording begins.
+pub(crate) fn rested(table: &Table, start_s: f64) -> bool {
+    [Channel::Tc, Channel::Tt].into_iter().all(|channel| {
+        let Some(column) = table.column(channel) else { return true };
+        let middle = |from_s: f64| {
+            let range = table.range(from_s, from_s + 0.3 * SETTLING_S);
+            mean_reading(&column[range].iter().copied().filter(|v| v.is_finite()).collect::<Vec<_>>())
+        };
+        let (Some(first), Some(last)) = (middle(start_s), middle(start_s + 0.7 * SETTLING_S)) else {
+            return true;
+        };
+        (last - first).abs() < RESTLESS_K_S * 0.7 * SETTLING_S
+    })
 }

@@ -1,22 +1,143 @@
-//! Gap reduction on held-out steps.
+//! The gap before and after a cause, on steps that were not used to fit it.
 
 use crate::gap::best_fit::adequacy::misfit_of_steps;
-use crate::gap::best_fit::first_step::with_start_read;
-use crate::gap::best_fit::fit::{Effort, Fit, MAX_SIGMAS, Start, fit};
-use crate::gap::best_fit::selection::{Selection, dot_over};
-use crate::gap::findings::report::{ChannelGap, Gap, PointGap};
-use crate::gap::gap_reduction::beyond_prior::beyond_prior;
-use crate::gap::gap_reduction::folds::Folds;
-use crate::gap::gap_reduction::gap_distribution::{StepMisfit, gap_reduction};
+use crate::gap::best_fit::fit::{Effort, Fit, MAX_SIGMAS, Start, fit, with_start_read};
+use crate::gap::best_fit::normal::{Selection, dot_over};
+use crate::gap::findings::report::{BeyondPrior, ChannelGap, Gap, PointGap};
 use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::study::{Hypothesis, Study};
 use crate::gap::residuals::whiten::{Linearised, rows_of_step};
 use mapper_core::Channel;
 use mapper_numerics::parallel;
-use mapper_numerics::statistics::DOUBT_SIGMAS;
+use mapper_numerics::statistics::{DOUBT_SIGMAS, share_interval_95};
 use mapper_physics::simulation::inputs::Inputs;
 use std::collections::BTreeMap;
 use std::ops::Range;
+
+/// Effort of a fit whose tolerances have no limit; this one has no effect.
+const UNLIMITED: Effort =
+    Effort { iterations: 8, enough: 0.5, max_sigmas: 1e3, max_sigmas_of_rig: 1e3, exact: true };
+
+/// Tolerances of a fit beyond three sigmas of their prior, furthest first. A tolerance at [`MAX_SIGMAS`], which limits the search for causes, is fitted
+/// again without that limit.
+pub fn beyond_prior(study: &Study, linearised: &Linearised, fitted: &Fit) -> Vec<BeyondPrior> {
+    let limited = fitted.hypothesis.nuisances.iter().any(|sigmas| sigmas.abs() > 0.999 * MAX_SIGMAS);
+    let freed =
+        limited.then(|| fit(study, linearised, fitted, &Selection::all(study), UNLIMITED).ok()).flatten();
+    let nuisances = &freed.as_ref().unwrap_or(fitted).hypothesis.nuisances;
+    let mut beyond: Vec<BeyondPrior> = study
+        .nuisances
+        .iter()
+        .zip(nuisances)
+        .filter(|(nuisance, sigmas)| sigmas.abs() > DOUBT_SIGMAS && nuisance.kind.is_of_rig())
+        .map(|(nuisance, sigmas)| BeyondPrior {
+            what: nuisance.kind.to_string(),
+            sigmas: sigmas.abs(),
+            value: nuisance.value(*sigmas),
+        })
+        .collect();
+    beyond.sort_by(|a, b| b.sigmas.total_cmp(&a.sigmas));
+    beyond
+}
+
+/// Number of folds.
+pub(crate) const FOLDS: usize = 3;
+
+/// Groups of steps, each to be predicted by a fit to the others.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Folds {
+    /// Step indices of each fold, ascending; a single fold means no hold-out.
+    pub steps: Vec<Vec<usize>>,
+}
+
+impl Folds {
+    /// The folds of a recording. Each fold covers every opening and speed range as far as the number of steps allows. Empty if there are
+    /// too few steps.
+    pub fn of(study: &Study) -> Folds {
+        let places = study.steps.iter().map(|step| (step.marker.valve_opening_ratio, step.marker.p3_pa));
+        Folds::latin_square(&places.collect::<Vec<_>>())
+    }
+
+    /// Assigns steps to folds: along each opening in order of pressure (and so speed), starting with a different fold
+    /// at each opening.
+    fn latin_square(places: &[(f64, f64)]) -> Folds {
+        if places.len() < 2 * FOLDS {
+            return Folds { steps: vec![(0..places.len()).collect()] };
+        }
+        let mut openings: Vec<f64> = places.iter().map(|(opening, _)| *opening).collect();
+        openings.sort_by(f64::total_cmp);
+        openings.dedup_by(|a, b| (*a - *b).abs() < 1e-6);
+        let mut steps = vec![Vec::new(); FOLDS];
+        // A single step at an opening continues the order of the previous opening.
+        let mut assigned = 0;
+        for (row, opening) in openings.iter().enumerate() {
+            let mut here: Vec<usize> =
+                (0..places.len()).filter(|i| (places[*i].0 - opening).abs() < 1e-6).collect();
+            here.sort_by(|a, b| places[*a].1.total_cmp(&places[*b].1).then(a.cmp(b)));
+            let first = if here.len() < FOLDS { assigned } else { row };
+            for (rank, step) in here.iter().enumerate() {
+                steps[(first + rank) % FOLDS].push(*step);
+            }
+            assigned += here.len();
+        }
+        for fold in &mut steps {
+            fold.sort_unstable();
+        }
+        Folds { steps }
+    }
+}
+
+/// Gap reduction over several steps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct GapReduction {
+    /// Share of the whole gap removed.
+    pub(crate) removed: f64,
+    /// 95 % interval of this share for similar steps.
+    pub(crate) interval: (f64, f64),
+    pub(crate) steps: usize,
+    /// Index of the step with most of the gap and its share; `None` if no step has a gap.
+    pub(crate) largest: Option<(usize, f64)>,
+}
+
+/// Misfit `(|r|^2 - n)/n` of one step before and after, and its number of values.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct StepMisfit {
+    pub(crate) before: f64,
+    pub(crate) after: f64,
+    pub(crate) values: usize,
+}
+
+impl StepMisfit {
+    fn has_gap(&self) -> bool {
+        // For noise, |r|^2 has mean n and variance 2 n.
+        self.before > DOUBT_SIGMAS * (2.0 / self.values.max(1) as f64).sqrt()
+    }
+
+    /// Share of its own gap removed, 0..1.
+    fn removed(&self) -> f64 {
+        (1.0 - self.after.max(0.0) / self.before).clamp(0.0, 1.0)
+    }
+}
+
+/// Every step with a gap counts as one trial, whatever its size. The interval is Clopper and Pearson's for the mean share removed. The
+/// share of the whole gap is weighted by size, so one step may dominate it. The interval is then widened to include that share, and the
+/// step is named.
+pub(crate) fn gap_reduction(steps: &[StepMisfit]) -> GapReduction {
+    let positive = |g: f64| g.max(0.0);
+    let total: f64 = steps.iter().map(|step| positive(step.before)).sum();
+    let remaining: f64 = steps.iter().map(|step| positive(step.after)).sum();
+    let removed = if total > 0.0 { 1.0 - remaining / total } else { 0.0 };
+    let shares: Vec<f64> = steps.iter().filter(|step| step.has_gap()).map(StepMisfit::removed).collect();
+    let (low, high) = share_interval_95(shares.iter().sum(), shares.len() as f64);
+    let whole = removed.clamp(0.0, 1.0);
+    let largest = steps
+        .iter()
+        .enumerate()
+        .filter(|(_, step)| step.has_gap())
+        .map(|(index, step)| (index, positive(step.before) / total))
+        .max_by(|a, b| a.1.total_cmp(&b.1));
+    GapReduction { removed, interval: (low.min(whole), high.max(whole)), steps: shares.len(), largest }
+}
 
 #[derive(Clone, Copy)]
 pub struct Compared<'a> {
@@ -237,4 +358,71 @@ fn points(study: &Study, after: &Hypothesis, predicted: &[f64]) -> Vec<PointGap>
             })
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Six speeds at three openings, shuffled: each fold has every speed once and every opening twice.
+    #[test]
+    fn every_fold_has_every_speed_and_every_opening() {
+        let mut places = Vec::new();
+        for opening in [0.5, 0.7, 1.0] {
+            for speed in [90.0, 150.0, 50.0, 130.0, 70.0, 110.0] {
+                places.push((opening, 1e3 * speed * (1.0 + 0.1 * opening)));
+            }
+        }
+        let folds = Folds::latin_square(&places).steps;
+        assert_eq!(folds.iter().map(Vec::len).collect::<Vec<_>>(), [6, 6, 6]);
+        for fold in &folds {
+            for opening in [0.5, 0.7, 1.0] {
+                assert_eq!(fold.iter().filter(|i| places[**i].0 == opening).count(), 2);
+            }
+            let mut speeds: Vec<usize> = fold.iter().map(|i| i % 6).collect();
+            speeds.sort_unstable();
+            assert_eq!(speeds, [0, 1, 2, 3, 4, 5]);
+        }
+        let mut all = folds.concat();
+        all.sort_unstable();
+        assert_eq!(all, (0..18).collect::<Vec<_>>());
+        // One step per opening still gives three folds of two.
+        let single: Vec<(f64, f64)> = (0..6).map(|i| (0.5 + 0.1 * f64::from(i), 1e5)).collect();
+        assert!(Folds::latin_square(&single).steps.iter().all(|fold| fold.len() == 2));
+    }
+
+    fn step(before: f64, after: f64) -> StepMisfit {
+        StepMisfit { before, after, values: 800 }
+    }
+
+    /// Clopper and Pearson (1934): 18 of 18 gives more than 0.025^(1/18) = 81.5 %, even if one of the 18 has most of the gap; 1 of 1 gives
+    /// only more than 2.5 %.
+    #[test]
+    fn one_large_step_does_not_silence_the_others() {
+        let mut steps = vec![step(2.0, 0.0); 18];
+        let even = gap_reduction(&steps);
+        steps[4] = step(1000.0, 0.0);
+        let uneven = gap_reduction(&steps);
+        for found in [even, uneven] {
+            assert_eq!((found.removed, found.steps), (1.0, 18));
+            assert!((found.interval.0 - 0.025f64.powf(1.0 / 18.0)).abs() < 1e-6, "{found:?}");
+        }
+        assert!(uneven.largest.is_some_and(|(index, share)| index == 4 && share > 0.96));
+        // Steps without a gap carry no information.
+        let mut alone = vec![step(0.0, 0.0); 17];
+        alone.push(step(50.0, 0.0));
+        let alone = gap_reduction(&alone);
+        assert_eq!((alone.steps, alone.largest), (1, Some((17, 1.0))));
+        assert!((alone.interval.0 - 0.025).abs() < 1e-6, "{alone:?}");
+    }
+
+    /// The step with most of the gap keeps it: the total share then lies outside the other steps' interval, and the interval includes both.
+    #[test]
+    fn the_interval_holds_the_share_of_the_whole() {
+        let mut steps = vec![step(2.0, 0.0); 17];
+        steps.push(step(500.0, 500.0));
+        let found = gap_reduction(&steps);
+        assert!(found.removed < 0.1 && found.interval.0 <= found.removed, "{found:?}");
+        assert_eq!(gap_reduction(&[]).steps, 0);
+    }
 }

@@ -22,12 +22,12 @@ mod run;
 mod session;
 mod variant;
 
-pub use analysis::calibrated_model_campaign::{CalibratedModel, calibrated_model_campaign};
-pub use analysis::calibrated_model_files::{SealedForecast, found_in};
+pub use crate::analysis::calibrated_model::{CalibratedModel, calibrated_model_campaign};
+pub use crate::analysis::calibrated_model::{SealedForecast, found_in};
+pub use crate::analysis::gap::GapCorrection;
 pub use analysis::drift::Drift;
 pub use analysis::further_results::RigFiles;
 pub use analysis::gap::Gap;
-pub use analysis::gap_correction::GapCorrection;
 pub use analysis::identification::Identified;
 pub use analysis::pdf::{PrintError, page_as_pdf};
 pub use analysis::results::{Results, compressor_map};

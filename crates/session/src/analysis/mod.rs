@@ -1,12 +1,10 @@
 //! Analysis of a finished recording: identified points, result files, gap diagnosis, drift check, and calibrated models.
 
-pub(crate) mod calibrated_model_campaign;
-pub(crate) mod calibrated_model_files;
+pub(crate) mod calibrated_model;
 pub(crate) mod drift;
 pub(crate) mod experiments;
 pub(crate) mod further_results;
 pub(crate) mod gap;
-pub(crate) mod gap_correction;
 pub(crate) mod identification;
 pub(crate) mod pdf;
 pub(crate) mod results;

@@ -1,5 +1,4 @@
 //! Calibration of the diagnosis on simulated cases: the constants that convert scores into probabilities.
 
 pub mod calibrate;
-pub(crate) mod logistic;
 pub(crate) mod no_cause_study;

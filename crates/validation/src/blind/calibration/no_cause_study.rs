@@ -1,11 +1,8 @@
 //! Measures signatures with the diagnosis itself, on a recording without causes.
 
-use crate::blind::cases::case::Case;
-use crate::blind::cases::cause::Cause;
-use crate::blind::cases::kind::CaseKind;
-use crate::blind::cases::strength::SignatureMeter;
+use crate::blind::cases::{Case, CaseKind, Cause, SignatureMeter};
 use crate::blind::error::BlindError;
-use crate::blind::virtual_runs::case_run::Schedule;
+use crate::blind::virtual_runs::Schedule;
 use mapper_campaign::{Campaign, nominal_model};
 use mapper_core::NoiseColour;
 use mapper_diagnose::gap::{EffectVisibility, RigRecording};

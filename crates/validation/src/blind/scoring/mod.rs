@@ -3,4 +3,3 @@
 pub(crate) mod interval;
 pub mod reliability;
 pub mod score;
-pub(crate) mod score_text;

@@ -1,7 +1,7 @@
 //! Reliability of the probabilities: an answer given with probability p should be right in a share p of the cases.
 
 use crate::blind::calibration::calibrate::{DiagnosisSummary, fit, shipped, weights};
-use crate::blind::cases::kind::CaseKind;
+use crate::blind::cases::CaseKind;
 use crate::blind::error::BlindError;
 use crate::blind::scoring::interval::{Share, clopper_pearson_95};
 use mapper_diagnose::gap::Calibration;

@@ -1,21 +1,24 @@
-//! Runs one case on the virtual lab.
+//! Runs of a case on the virtual lab: its schedule, steps, and where samples go.
 
-use crate::blind::cases::case::Case;
-use crate::blind::cases::equations::Laboratory;
-use crate::blind::cases::truth::Truth;
+use crate::blind::cases::{Case, Laboratory, Truth, TruthPoint};
 use crate::blind::error::BlindError;
-use crate::blind::virtual_runs::destination::{FileDestination, MemoryDestination};
-use crate::blind::virtual_runs::steps::{StepsOfCase, steps_of_case};
-use mapper_backends::other_lab::{self, OtherStructure};
+use mapper_backends::other_lab;
+use mapper_backends::other_lab::OtherStructure;
 use mapper_backends::virtual_lab::{
     ActuatorDynamics, LabSettings, SensorErrors, Start, VirtualLab, Weather, draw_tolerances,
 };
 use mapper_campaign::Campaign;
-use mapper_core::{Channel, NoiseColour, PlanStep, Recording, UnpacedClock};
-use mapper_physics::rig::effect::{self, Rig};
+use mapper_core::{
+    Channel, NoiseColour, OperatingPoint, PlanStep, Predicted, Recording, SampleBatch, StepKind, StepMarker,
+    UnpacedClock,
+};
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::rig::effect;
+use mapper_physics::rig::effect::Rig;
 use mapper_physics::simulation::model::Model;
-use mapper_recording::{ChannelMap, RecordingHeader, RecordingWriter};
-use mapper_runner::{RunObserver, Runner};
+use mapper_physics::simulation::steady;
+use mapper_recording::{ChannelMap, RecordError, RecordingHeader, RecordingWriter, StepPhase};
+use mapper_runner::{ObserverError, RunObserver, Runner, StepSource, StepSourceError};
 use mapper_session::declared;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -158,5 +161,131 @@ impl<'a> Schedule<'a> {
         };
         let of_case = |source| BlindError::Run { name: case.name.clone(), source };
         runner.run().map(|_| ()).map_err(of_case)
+    }
+}
+
+/// Writes the recording, and collects the truth at the end of each step for the answers.
+pub(crate) struct FileDestination {
+    writer: RecordingWriter,
+    last: SampleBatch,
+    points: Vec<TruthPoint>,
+}
+
+impl FileDestination {
+    pub(crate) fn new(writer: RecordingWriter) -> Self {
+        FileDestination { writer, last: SampleBatch::default(), points: Vec::new() }
+    }
+
+    /// Finishes the file and returns the truth of each point.
+    pub(crate) fn finish(self) -> Result<Vec<TruthPoint>, RecordError> {
+        self.writer.finish()?;
+        Ok(self.points)
+    }
+}
+
+impl RunObserver for FileDestination {
+    fn on_step_start(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        self.writer.write_step(marker, StepPhase::Start).map_err(ObserverError::new)
+    }
+
+    fn on_batch(&mut self, batch: &SampleBatch) -> Result<(), ObserverError> {
+        let without_truth = SampleBatch { truth: Vec::new(), ..batch.clone() };
+        self.writer.write_batch(&without_truth).map_err(ObserverError::new)?;
+        self.last = batch.clone();
+        Ok(())
+    }
+
+    fn on_step_end(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        let last = |name: &str| {
+            let column = self.last.truth.iter().find(|column| column.name == name);
+            column.and_then(|column| column.values.last().copied()).unwrap_or(f64::NAN)
+        };
+        self.points.push(TruthPoint {
+            valve: marker.valve_opening_ratio,
+            speed_rpm: last("speed_rpm"),
+            eta: last("eta"),
+            h: last("h_w_m2k"),
+        });
+        self.writer.write_step(marker, StepPhase::End).map_err(ObserverError::new)
+    }
+}
+
+/// Keeps the recording in memory without the truth.
+#[derive(Default)]
+pub(crate) struct MemoryDestination {
+    pub(crate) recording: Recording,
+}
+
+impl RunObserver for MemoryDestination {
+    fn on_batch(&mut self, batch: &SampleBatch) -> Result<(), ObserverError> {
+        for column in &batch.columns {
+            let series = self.recording.series.entry(column.channel).or_default();
+            series.t_s.extend(&batch.t_s);
+            series.values.extend(&column.values);
+        }
+        Ok(())
+    }
+
+    fn on_step_end(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        self.recording.steps.push(*marker);
+        Ok(())
+    }
+}
+
+/// One step for each point with the P3 that the nominal model needs. Only the steady state is predicted.
+pub(crate) fn steps_of_case(campaign: &Campaign, nominal: &Model) -> Result<Vec<PlanStep>, BlindError> {
+    let (timing, dwell_s) = (&campaign.timing, campaign.timing.dwell.fixed_or_usual_s());
+    let mut from: Option<OperatingPoint> = None;
+    let points = campaign.points.iter().enumerate();
+    points
+        .map(|(index, point)| {
+            let boundary =
+                BoundaryConditions { valve_opening_ratio: point.valve_opening_ratio, ..campaign.boundary };
+            let steady_state = steady::hold_speed(nominal, point.speed_rpm, &boundary)?;
+            let outputs = &steady_state.outputs;
+            Ok(PlanStep {
+                index,
+                kind: StepKind::Point,
+                from: from.replace(*point),
+                to: *point,
+                p3_pa: steady_state.boundary.p3_pa,
+                t3_k: boundary.t3_k,
+                oil_temperature_k: boundary.oil_temperature_k,
+                dwell_s,
+                start_s: timing.warm_up_s + index as f64 * dwell_s,
+                predicted: Predicted::settled(
+                    outputs.flow_kg_s,
+                    outputs.pressure_ratio,
+                    outputs.t2_k,
+                    dwell_s,
+                ),
+            })
+        })
+        .collect()
+}
+
+/// Yields these steps.
+pub(crate) struct StepsOfCase<'a> {
+    left: std::slice::Iter<'a, PlanStep>,
+    warm_up_s: f64,
+}
+
+impl<'a> StepsOfCase<'a> {
+    pub(crate) fn new(steps: &'a [PlanStep], warm_up_s: f64) -> Self {
+        StepsOfCase { left: steps.iter(), warm_up_s }
+    }
+}
+
+impl StepSource for StepsOfCase<'_> {
+    fn warm_up_s(&self) -> f64 {
+        self.warm_up_s
+    }
+
+    fn cool_down_s(&self) -> f64 {
+        0.0
+    }
+
+    fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError> {
+        Ok(self.left.next().cloned())
     }
 }

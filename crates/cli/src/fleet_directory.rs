@@ -1,8 +1,10 @@
 //! Opens fleet directories, with this computer as the worker.
 
+use crate::environment::SystemClock;
+use crate::environment::registry;
+use crate::interrupt;
 use crate::output::failure::Failure;
-use crate::wall_clock::SystemClock;
-use crate::{interrupt, output::output_options, registry};
+use crate::output::output_options;
 use mapper_core::Wall;
 use mapper_fleet::{Engine, Fleet, FleetError, Kind, Machine};
 use mapper_session::Registry;
@@ -12,7 +14,7 @@ use std::path::Path;
 pub fn with_machine<T>(
     then: impl FnOnce(&Registry, &[&dyn Kind], &Machine<'_>) -> Result<T, Failure>,
 ) -> Result<T, Failure> {
-    let (registry, wall) = (registry::registry(), SystemClock::new());
+    let (registry, wall) = (registry(), SystemClock::new());
     let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
     let task = std::env::var("SLURM_JOB_ID").map_or_else(|_| String::new(), |id| format!(" job {id}"));
     let name = format!("{} process {}{task}", host.trim(), std::process::id());

@@ -1,7 +1,6 @@
 //! Handles Ctrl-C and other signals, so that a run stops safely.
 
-use crate::output::exit_code::Code;
-use crate::output::failure::Failure;
+use crate::output::failure::{Code, Failure};
 use crate::output::standard_output;
 use mapper_session::{RunStop, SignalResponse};
 use std::sync::Arc;

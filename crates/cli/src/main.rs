@@ -5,13 +5,11 @@
 
 mod command_line;
 mod commands;
+mod environment;
 mod fleet_directory;
 mod interrupt;
 mod output;
-mod registry;
-mod rig_states;
 mod terminal;
-mod wall_clock;
 
 use clap::{CommandFactory, FromArgMatches, Parser};
 use std::ffi::OsString;
@@ -19,7 +17,7 @@ use std::process::ExitCode;
 
 /// From a campaign file to a complete turbocharger-compressor map, efficiency and heat transfer included.
 #[derive(Debug, Parser)]
-#[command(name = "mapper", version, after_help = output::exit_code::HELP, arg_required_else_help = true)]
+#[command(name = "mapper", version, after_help = output::failure::HELP, arg_required_else_help = true)]
 struct Arguments {
     #[command(flatten)]
     manner: output::output_options::OutputOptions,
@@ -30,7 +28,7 @@ struct Arguments {
 fn main() -> ExitCode {
     let raw: Vec<OsString> = std::env::args_os().collect();
     let (json, colour) = output::output_options::scan_raw_arguments(&raw);
-    let read = command_line::tasks::by_task(Arguments::command()).color(colour).try_get_matches_from(raw);
+    let read = command_line::by_task(Arguments::command()).color(colour).try_get_matches_from(raw);
     let read = read.and_then(|matches| Ok((Arguments::from_arg_matches(&matches)?, matches)));
     match read {
         Ok((arguments, matches)) => {
@@ -38,10 +36,10 @@ fn main() -> ExitCode {
             output::output_options::set_commands(Arguments::command);
             match arguments.command.run() {
                 Ok(()) => ExitCode::SUCCESS,
-                Err(failure) => output::exit_report::failed(&failure),
+                Err(failure) => output::failure::failed(&failure),
             }
         }
-        Err(error) if error.use_stderr() => output::exit_report::wrong_arguments(error, json),
+        Err(error) if error.use_stderr() => output::failure::wrong_arguments(error, json),
         Err(error) => error.exit(),
     }
 }

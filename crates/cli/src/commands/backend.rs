@@ -1,8 +1,9 @@
 //! `mapper backend`.
 
-use crate::output::exit_code::Code;
-use crate::output::failure::Failure;
-use crate::{output::standard_output, registry, rig_states};
+use crate::environment::registry;
+use crate::environment::rig_states_directory;
+use crate::output::failure::{Code, Failure};
+use crate::output::standard_output;
 use clap::{Args, Subcommand};
 use mapper_core::{RigMode, Setpoints};
 use mapper_driver_host::conformance::{Candidate, check_rules};
@@ -59,7 +60,7 @@ impl Backend {
         };
         let absent =
             INCLUDED_DRIVERS.iter().filter(|(name, ..)| !installed.iter().any(|one| one.name == *name));
-        let built_in = registry::registry().backends;
+        let built_in = registry().backends;
         let backends: Vec<Value> = built_in
             .iter()
             .map(|plugin| json!({"name": plugin.name, "summary": plugin.summary}))
@@ -88,7 +89,7 @@ impl Backend {
 
     fn check(&self, name: &str, path: &Path) -> Result<(), Failure> {
         let mut campaign = mapper_campaign::load(path).map_err(Failure::of_campaign)?;
-        let registry = registry::registry();
+        let registry = registry();
         let named = campaign.backend.name.clone();
         if named != name {
             // Built-in backends need no settings. A driver needs at least an address, and the settings of another backend do not contain
@@ -114,7 +115,7 @@ impl Backend {
             .map_err(|error| Failure::in_campaign(error, path))?
             .describe();
         // A rig that is in use or locked out must not be touched.
-        let states = RigStates::new(&rig_states::directory(None));
+        let states = RigStates::new(&rig_states_directory(None));
         let claim = rig.exclusive.as_deref().map(|rig| states.claim(rig, None)).transpose()?;
         let make = || match registry.make_backend(&campaign, &model) {
             Ok(backend) => Ok(backend),

@@ -1,14 +1,13 @@
 //! `mapper check`.
 
-use crate::output::exit_code::Code;
-use crate::output::failure::Failure;
-use crate::{
-    interrupt,
-    output::{output_options, standard_output},
-    registry, wall_clock,
-};
+use crate::environment::registry;
+use crate::environment::today;
+use crate::interrupt;
+use crate::output::failure::{Code, Failure};
+use crate::output::{output_options, standard_output};
 use clap::Args;
-use mapper_campaign::{CampaignError, campaign::Date};
+use mapper_campaign::CampaignError;
+use mapper_campaign::campaign::Date;
 use mapper_report::{assumed_text, declared_sensors_text, lines_text, verdict_forecast_text};
 use mapper_session::{Session, nominal_model};
 use serde_json::json;
@@ -30,7 +29,7 @@ pub struct Check {
 impl Check {
     /// Checks a campaign, makes its plan or rehearses its script, and prints a summary after any warnings.
     pub fn run(&self) -> Result<(), Failure> {
-        let day = self.date.or_else(wall_clock::today);
+        let day = self.date.or_else(today);
         let (campaign, text) = match mapper_session::load_on(&self.campaign, day) {
             Ok(loaded) => loaded,
             Err(CampaignError::Mistakes(findings)) if self.json => {
@@ -44,7 +43,7 @@ impl Check {
         };
         let model = nominal_model(&campaign)?;
         // The backend reads its settings now, so that mistakes in them are reported before the run.
-        let registry = registry::registry();
+        let registry = registry();
         registry
             .make_sources(&campaign, &model)
             .map(drop)

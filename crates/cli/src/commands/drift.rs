@@ -1,10 +1,10 @@
 //! `mapper drift`: searches recordings for drift of the rig.
 
-use crate::command_line::shared_arguments::{channel_map, given_campaign};
-use crate::output::exit_code::Code;
-use crate::output::failure::Failure;
+use crate::command_line::{channel_map, given_campaign};
+use crate::environment::registry;
+use crate::output::failure::{Code, Failure};
+use crate::output::standard_output;
 use crate::output::standard_output::Replace;
-use crate::{output::standard_output, registry};
 use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_report::{corrected_csv, drift_text, sensors_text, zero_text};
@@ -41,7 +41,7 @@ impl Drift {
     pub fn run(&self) -> Result<(), Failure> {
         let (files, given) = self.sources()?;
         let map = channel_map(self.channels.as_deref())?;
-        let registry = registry::registry();
+        let registry = registry();
         let read = |file: &PathBuf| Recorded::read_run(&registry, file, &map, given.as_ref());
         let runs = files.iter().map(read).collect::<Result<Vec<_>, SessionError>>()?;
         let recorded: Vec<Recorded> = runs.into_iter().flatten().collect();

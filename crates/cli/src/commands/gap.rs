@@ -1,6 +1,6 @@
 //! `mapper gap`.
 
-use crate::command_line::subcommands::subcommands;
+use crate::command_line::subcommands;
 use crate::output::failure::Failure;
 use clap::Args;
 

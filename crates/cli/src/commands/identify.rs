@@ -1,10 +1,11 @@
 //! `mapper identify`: from recordings to points and a map, without a rig.
 
-use crate::command_line::shared_arguments::{channel_map, given_campaign};
-use crate::output::detail_options::DetailArguments;
+use crate::command_line::{channel_map, given_campaign};
+use crate::environment::registry;
 use crate::output::failure::Failure;
+use crate::output::output_options::DetailArguments;
+use crate::output::standard_output;
 use crate::terminal::{identified_text, results_text};
-use crate::{output::standard_output, registry};
 use clap::{Args, ValueEnum};
 use mapper_core::Method;
 use mapper_session::{Recorded, Session};
@@ -42,7 +43,7 @@ impl Identify {
     pub fn run(&self) -> Result<(), Failure> {
         let map = channel_map(self.channels.as_deref())?;
         let given = given_campaign(self.campaign.as_deref())?;
-        let registry = registry::registry();
+        let registry = registry();
         let read = |path: &PathBuf| Recorded::read_run(&registry, path, &map, given.as_ref());
         let runs = self.recordings.iter().map(read).collect::<Result<Vec<_>, _>>()?;
         let recorded: Vec<Recorded> = runs.into_iter().flatten().collect();

@@ -1,8 +1,8 @@
 //! `mapper init`.
 
-use crate::output::exit_code::Code;
-use crate::output::failure::Failure;
-use crate::{output::standard_output, registry};
+use crate::environment::registry;
+use crate::output::failure::{Code, Failure};
+use crate::output::standard_output;
 use clap::{Args, ValueEnum};
 use mapper_campaign::units::{Kind, parse};
 use mapper_core::{NAMED_REFERENCES, NamedReference};
@@ -96,7 +96,7 @@ impl Init {
                 _ => return Err(Failure::new(Code::BadInput, "--speeds takes the lower speed first")),
             },
         };
-        let written = first_campaign(&registry::registry(), &request)?;
+        let written = first_campaign(&registry(), &request)?;
         match self.json {
             true => standard_output::print_json(&written),
             false => standard_output::print(&first_campaign_text(

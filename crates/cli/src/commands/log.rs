@@ -1,8 +1,14 @@
-//! `mapper log`.
+//! `mapper log`: what a log of another program contains.
 
-use crate::command_line::subcommands::subcommands;
+use crate::command_line::{key_and_value, subcommands};
+use crate::environment::registry;
 use crate::output::failure::Failure;
+use crate::output::standard_output;
+use crate::output::standard_output::Replace;
 use clap::Args;
+use mapper_report::log_text;
+use mapper_session::inspect_log;
+use std::path::PathBuf;
 
 /// Look into the log of a test stand
 #[derive(Debug, Args)]
@@ -12,11 +18,51 @@ pub struct Log {
 }
 
 subcommands! { LogCommand:
-    inspect::Inspect,
+    Inspect,
 }
 
 impl Log {
     pub fn run(&self) -> Result<(), Failure> {
         self.command.run()
+    }
+}
+
+/// Show every column of a log with unit, rate, range and gaps, and propose a channel map
+#[derive(Debug, Args)]
+pub struct Inspect {
+    /// Log of a test stand
+    pub log: PathBuf,
+    /// How to read it if automatic detection gave the wrong answer, e.g. `separator=;`, `time=TS`; may be repeated
+    #[arg(long = "with", value_name = "KEY=VALUE", value_parser = key_and_value)]
+    pub with: Vec<(String, String)>,
+    /// Campaign of the machine, whose map shows the unit of a flow without one
+    #[arg(long, value_name = "CAMPAIGN")]
+    pub machine: Option<PathBuf>,
+    /// Write the proposed channel map to this new file
+    #[arg(long, value_name = "FILE")]
+    pub write_channels: Option<PathBuf>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub replace: Replace,
+}
+
+impl Inspect {
+    pub fn run(&self) -> Result<(), Failure> {
+        let registry = registry();
+        let log = inspect_log(&registry, &self.log, self.with.clone(), self.machine.as_deref())?;
+        if let Some(file) = &self.write_channels {
+            self.replace.write(file, log.channel_map().as_bytes())?;
+        }
+        if self.json {
+            return standard_output::print_json(&log.json());
+        }
+        let mut text = log_text(log.format, &log.layout, &log.survey, &log.proposal);
+        match &self.write_channels {
+            Some(file) => text.push_str(&format!("\nThe channel map is in {}.\n", file.display())),
+            None => text.push_str("\nSave it with `--write-channels FILE`.\n"),
+        }
+        standard_output::print(&text)
     }
 }

@@ -1,7 +1,6 @@
 //! `mapper man`.
 
-use crate::output::exit_code::Code;
-use crate::output::failure::Failure;
+use crate::output::failure::{Code, Failure};
 use crate::output::{output_options, standard_output};
 use clap::Args;
 use serde_json::json;

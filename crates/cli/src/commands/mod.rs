@@ -1,6 +1,6 @@
 //! One file for each command, with its options and its output. To add a command, write its file and add a line below.
 
-use crate::command_line::subcommands::subcommands;
+use crate::command_line::subcommands;
 use crate::output::failure::Failure;
 
 subcommands! { Command:

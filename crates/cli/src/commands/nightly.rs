@@ -1,12 +1,9 @@
 //! `mapper nightly`: runs full maps on the simulated rig and compares them with the nights before.
 
-use crate::output::exit_code::Code;
-use crate::output::failure::Failure;
-use crate::{
-    interrupt,
-    output::{output_options, standard_output},
-    registry,
-};
+use crate::environment::registry;
+use crate::interrupt;
+use crate::output::failure::{Code, Failure};
+use crate::output::{output_options, standard_output};
 use clap::Args;
 use mapper_campaign::load_nightly;
 use mapper_history::{History, Night};
@@ -46,8 +43,7 @@ impl Nightly {
         // Opened before the runs, so that a history without write permission is reported at once.
         let path = self.db.clone().unwrap_or_else(|| nightly.history.clone());
         let mut history = History::open(&path).map_err(SessionError::from)?;
-        let (registry, stop, progress) =
-            (registry::registry(), interrupt::stop_flag()?, output_options::progress());
+        let (registry, stop, progress) = (registry(), interrupt::stop_flag()?, output_options::progress());
         let on_event = |event: &_| progress.show(event);
         let session = Session { on_event: &on_event, stop: &stop, ..Session::new(&registry) };
         let started = jiff::Timestamp::now();

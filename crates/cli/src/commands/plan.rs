@@ -1,9 +1,10 @@
 //! `mapper plan`.
 
-use crate::output::exit_code::Code;
-use crate::output::failure::Failure;
+use crate::environment::registry;
+use crate::interrupt;
+use crate::output::failure::{Code, Failure};
+use crate::output::standard_output;
 use crate::output::standard_output::Replace;
-use crate::{interrupt, output::standard_output, registry};
 use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::SequenceSource;
@@ -64,7 +65,7 @@ impl Plan {
     pub fn run(&self) -> Result<(), Failure> {
         let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
         let model = nominal_model(&campaign)?;
-        let (registry, stop) = (registry::registry(), interrupt::stop_flag()?);
+        let (registry, stop) = (registry(), interrupt::stop_flag()?);
         let session = Session { stop: &stop, ..Session::new(&registry) };
         if let Some(source) = &campaign.sequence {
             return self.run_script(&session, &campaign, &model, source);

@@ -1,13 +1,10 @@
 //! `mapper report`: the page of a run, with other runs for comparison.
 
-use crate::command_line::shared_arguments::{channel_map, given_campaign};
-use crate::output::exit_code::Code;
-use crate::output::failure::Failure;
+use crate::command_line::{channel_map, given_campaign};
+use crate::environment::registry;
+use crate::output::failure::{Code, Failure};
 use crate::output::standard_output::Replace;
-use crate::{
-    output::{output_options, standard_output},
-    registry,
-};
+use crate::output::{output_options, standard_output};
 use clap::Args;
 use mapper_recording::ChannelMap;
 use mapper_session::{Gap, Recorded, Registry, Session, SessionError, page_as_pdf};
@@ -54,7 +51,7 @@ impl Report {
         replace.existing().check(&out)?;
         let map = channel_map(self.channels.as_deref())?;
         let given = given_campaign(self.campaign.as_deref())?;
-        let registry = registry::registry();
+        let registry = registry();
         let read = |path: &PathBuf| Recorded::read_run(&registry, path, &map, given.as_ref());
         let mut runs = self.runs.iter().map(read).collect::<Result<Vec<_>, _>>()?;
         let others = runs.split_off(1.min(runs.len()));

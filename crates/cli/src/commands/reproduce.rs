@@ -1,7 +1,6 @@
 //! `mapper reproduce`: the paper's figures on the nominal model.
 
-use crate::output::exit_code::Code;
-use crate::output::failure::Failure;
+use crate::output::failure::{Code, Failure};
 use crate::output::{output_options, standard_output};
 use clap::Args;
 use mapper_validation::reproduction::{FIGURES, picture_path};

@@ -1,7 +1,8 @@
 //! `mapper rig`.
 
+use crate::environment::rig_states_directory;
 use crate::output::failure::Failure;
-use crate::{output::standard_output, rig_states};
+use crate::output::standard_output;
 use clap::{Args, Subcommand};
 use mapper_session::{RigStates, RigStatus, since_text};
 use std::path::PathBuf;
@@ -35,7 +36,7 @@ enum RigCommand {
 
 impl Rig {
     pub fn run(&self) -> Result<(), Failure> {
-        let states = RigStates::new(&rig_states::directory(self.states.as_deref()));
+        let states = RigStates::new(&rig_states_directory(self.states.as_deref()));
         let (status, cleared) = match &self.command {
             RigCommand::Status { rig: None } => return self.print_all(&states.list()),
             RigCommand::Status { rig: Some(rig) } => (states.status(rig)?, false),

@@ -1,23 +1,22 @@
 //! `mapper run`: runs a campaign and makes the map.
 
-use crate::output::detail_options::DetailArguments;
-use crate::output::exit_code::Code;
-use crate::output::failure::Failure;
+use crate::environment::registry;
+use crate::environment::rig_states_directory;
+use crate::environment::{SystemClock, today};
+use crate::interrupt;
+use crate::output::failure::{Code, Failure};
+use crate::output::output_options::DetailArguments;
+use crate::output::{output_options, standard_output};
 use crate::terminal::results_text;
-use crate::wall_clock::{SystemClock, today};
-use crate::{
-    interrupt,
-    output::{output_options, standard_output},
-    registry, rig_states,
-};
 use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_core::{PacedClock, Verdict};
 use mapper_live::{LiveError, LiveRun, ObserverRequest, Observers, TlsFiles};
 use mapper_report::plan_text;
+use mapper_session::recording::run_directory;
 use mapper_session::{
     InterruptedRun, Operator, Phase, PreparedRun, RunOutcome, RunRequest, RunTermination, Session,
-    SessionError, SessionEvent, load_on, recording::run_directory, soak_s, start_time_ns,
+    SessionError, SessionEvent, load_on, soak_s, start_time_ns,
 };
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -77,10 +76,9 @@ impl Run {
         let resume = self.resume.as_deref().map(InterruptedRun::read).transpose()?;
         let parent = self.out.clone().unwrap_or_else(|| expand_home(&campaign.outputs.directory));
         let started = jiff::Timestamp::now();
-        let (registry, stop, progress) =
-            (registry::registry(), interrupt::run_stop()?, output_options::progress());
+        let (registry, stop, progress) = (registry(), interrupt::run_stop()?, output_options::progress());
         progress.begin("planning");
-        let states = rig_states::directory(None);
+        let states = rig_states_directory(None);
         let started_ns = u64::try_from(started.as_nanosecond()).unwrap_or(0);
         let observers = self.observers().map_err(Failure::of_live)?;
         let on_event = |event: &SessionEvent| {

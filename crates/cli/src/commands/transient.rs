@@ -1,9 +1,10 @@
 //! `mapper transient`: diagnoses a log without steady steps.
 
-use crate::command_line::shared_arguments::{channel_map, given_campaign};
+use crate::command_line::{channel_map, given_campaign};
+use crate::environment::registry;
 use crate::output::failure::Failure;
+use crate::output::standard_output;
 use crate::output::standard_output::Replace;
-use crate::{output::standard_output, registry};
 use clap::Args;
 use mapper_report::why_text;
 use mapper_session::{DIAGNOSIS_FORMAT, Recorded, Session, Side, Versioned, write_transient};
@@ -49,7 +50,7 @@ impl Transient {
     pub fn run(&self) -> Result<(), Failure> {
         let map = channel_map(self.channels.as_deref())?;
         let given = given_campaign(self.campaign.as_deref())?;
-        let registry = registry::registry();
+        let registry = registry();
         let recorded = Recorded::read(&registry, &self.recording, &map, given.as_ref())?;
         let effects = registry.effects_with(&self.effects)?;
         let diagnosis =
@@ -60,7 +61,10 @@ impl Transient {
             None => Vec::new(),
         };
         if self.json {
-            return standard_output::print_json(&Versioned { format_version: DIAGNOSIS_FORMAT, content: &diagnosis });
+            return standard_output::print_json(&Versioned {
+                format_version: DIAGNOSIS_FORMAT,
+                content: &diagnosis,
+            });
         }
         let mut text = why_text(&diagnosis);
         text.extend(recorded.read.warnings.iter().map(|warning| format!("recording: {warning}\n")));

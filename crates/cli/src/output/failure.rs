@@ -1,13 +1,18 @@
-//! Failures of commands, with message and exit code.
+//! Failures of commands: message, remedy, and exit code.
 
-use crate::output::exit_code::Code;
-use crate::output::remedy::{command_for, fleet_command_for};
-use crate::output::terminal_lines::wrap_for_terminal;
-use crate::output::{output_options, standard_error};
+use crate::output::standard_output::{say, say_rendered, wrap_for_terminal};
+use crate::output::{output_options, standard_output};
+use clap::error::{ContextKind, ContextValue, ErrorKind as ArgumentError};
 use mapper_campaign::{CampaignError, Findings, NightlyError};
+use mapper_core::{ExportError, ImportError, terminal_text};
 use mapper_fleet::{FleetError, StudyFileError};
+use mapper_history::HistoryError;
 use mapper_live::LiveError;
-use mapper_session::{ErrorKind, SessionError};
+use mapper_maps::HeatCorrectionError as Heat;
+use mapper_recording::RecordError;
+use mapper_session::{
+    ErrorKind, FirstMapError, FmuExportError, MapWorkError, SessionError, SessionError as E,
+};
 use mapper_validation::blind::BlindError;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -122,10 +127,10 @@ impl Failure {
         match self.presentation {
             Presentation::ClosedPipe => return None,
             Presentation::Printed => {}
-            Presentation::Rendered => standard_error::say_rendered(&self.message),
+            Presentation::Rendered => say_rendered(&self.message),
             Presentation::Sentence => {
                 let sentence = format!("mapper: {}\n", shorten(&self.message));
-                standard_error::say(&wrap_for_terminal(&sentence, terminal_size_of(std::io::stderr())));
+                say(&wrap_for_terminal(&sentence, terminal_size_of(std::io::stderr())));
             }
         }
         Some(ExitCode::from(self.code as u8))
@@ -205,4 +210,140 @@ impl From<FleetError> for Failure {
             error => Failure::with_command(code, &error, fleet_command_for(&error)),
         }
     }
+}
+
+/// Exit codes, stable for scripts; `mapper --help` lists them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Code {
+    /// A file could not be read or written, or the program is at fault.
+    Failure = 1,
+    // 2 is clap's: wrong arguments.
+    /// The campaign or another input file has mistakes; all of them were printed.
+    BadInput = 3,
+    /// There is no plan, or the plan given is stale.
+    NoPlan = 4,
+    /// The rig failed or a guard tripped; the rig is safe and the recording is kept.
+    Rig = 5,
+    /// The recording lacks data that identification needs.
+    BadRecording = 6,
+    /// A nightly run failed, or a metric is outside the band of the nights before.
+    Moved = 7,
+    /// Items of a fleet are missing or failed.
+    Incomplete = 8,
+    /// Stopped by the operator; the rig is safe and the recording is kept.
+    Interrupted = 130,
+}
+
+/// The table of exit codes for `--help`.
+pub const HELP: &str = "\
+Exit codes:
+  0    done
+  1    a file could not be read or written, or the program has a defect
+  2    wrong arguments
+  3    the campaign or another input file has mistakes (all are printed)
+  4    no plan is possible, or the given plan is stale
+  5    the rig failed, a guard tripped, or the rig is in use, locked out or without its required guards; the recording is kept
+  6    the recording lacks data that identification needs
+  7    a nightly run failed, or a metric is outside the band of the nights before
+  8    items of a fleet are missing or failed (all are listed)
+  130  stopped by the operator; the rig is safe, the recording is kept";
+
+/// Prints the failure, with `--json` as an object if none was printed yet.
+pub fn failed(failure: &Failure) -> ExitCode {
+    let Some(code) = failure.report() else { return ExitCode::SUCCESS };
+    if output_options::json() && !standard_output::has_printed() {
+        // If the reader has closed the pipe, the text is lost.
+        let _ = standard_output::print_json(&failure.json());
+    }
+    code
+}
+
+/// Arguments that could not be read: as usual on standard error, and with `--json` as an object on standard output. Clap's own tip for an
+/// argument that no option takes would pass an option as the name of a file.
+pub fn wrong_arguments(mut error: clap::Error, json: bool) -> ExitCode {
+    let tip = match error.get(ContextKind::InvalidArg) {
+        Some(ContextValue::String(word)) if word == "--seed" => {
+            "the seed is a key of the campaign, e.g. `seed: 2`"
+        }
+        _ => "quote a value with blanks, e.g. \"60 mm\"; write an optional one after `=`, e.g. `--live=9999`",
+    };
+    if error.kind() == ArgumentError::UnknownArgument && error.get(ContextKind::SuggestedArg).is_none() {
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.to_owned().into()]));
+    }
+    let text = error.to_string();
+    // The colours of clap would let those of an argument pass.
+    if terminal_text(&text) == text {
+        let _ = error.print();
+    } else {
+        say(&text);
+    }
+    if json {
+        let mut parts = text.trim_start_matches("error: ").splitn(2, "\n\n").map(str::trim);
+        let value = json!({ "code": 2, "message": parts.next(), "help": parts.next() });
+        let _ = standard_output::print_json(&value);
+    }
+    ExitCode::from(2)
+}
+
+/// The command or option for the remedy in the error's message; `None` if there is none.
+pub fn command_for(error: &E) -> Option<String> {
+    let fixed = match error {
+        E::RigAbandoned { rig, run, .. } => {
+            let acknowledge = acknowledge_command(rig);
+            return Some(format!("`mapper run --resume {}`, or {acknowledge}", run.display()));
+        }
+        E::RigLockedOut { rig, .. } => return Some(acknowledge_command(rig)),
+        E::DifferentCampaigns { .. } | E::MachineUnknown { channel_map_suffices: false } => {
+            "`--campaign FILE`"
+        }
+        E::MachineUnknown { channel_map_suffices: true } => "`--campaign FILE`, or `--channels FILE`",
+        E::Record(RecordError::LogWithoutMap { path }) => {
+            let log = path.display();
+            return Some(format!(
+                "`--channels FILE`; `mapper log inspect {log} --write-channels FILE` proposes a channel map"
+            ));
+        }
+        E::StalePlan { .. } | E::InvalidPlan { .. } => "`mapper plan CAMPAIGN --out FILE`",
+        E::UnknownOutputFormat { .. } => "`--to FORMAT`",
+        E::FirstMap(error) if matches!(**error, FirstMapError::NotAMap(..)) => "`mapper map convert`",
+        E::Fmu(FmuExportError::Platform | FmuExportError::Compiler { .. }) => "without `--compile`",
+        E::MapWork(MapWorkError::NotMeasured(_)) => "`mapper map inspect`",
+        E::MapWork(MapWorkError::NotCorrected(
+            _,
+            Heat::TooFew { .. } | Heat::OneSpeed { .. } | Heat::Singular,
+        )) => "`--heat WATTS`",
+        E::MapWork(MapWorkError::NoDefinition) => "`--efficiency DEFINITION`",
+        E::Import(_, source) => match source {
+            ImportError::NoUnit { .. } | ImportError::FlowUnit => "`--with KEY=VALUE`",
+            ImportError::RelativeSpeed { .. } | ImportError::DesignSpeedUnused { .. } => "`--design-speed`",
+            ImportError::NoReference | ImportError::ReferenceConflict { .. } => "`--reference`",
+            _ => return None,
+        },
+        E::Export(ExportError::NeedsFit { .. }) => "`mapper map fit FILE --out NEW`",
+        E::History(HistoryError::Missing(_)) => "`mapper nightly`, or `--db FILE`",
+        E::History(HistoryError::Foreign { .. } | HistoryError::ReadOnly(_)) => "`--db FILE`",
+        _ => return None,
+    };
+    Some(fixed.to_owned())
+}
+
+/// As [`command_for`], for an error of a fleet directory.
+pub fn fleet_command_for(error: &FleetError) -> Option<String> {
+    Some(match error {
+        FleetError::NoStudy(_) | FleetError::Changed(_) => {
+            "`mapper fleet make STUDY.yaml --out DIR`".to_owned()
+        }
+        FleetError::NoItem(_) => "`mapper fleet status DIR --items`".to_owned(),
+        FleetError::NothingLeft { directory, .. } => format!("`mapper fleet merge {}`", directory.display()),
+        FleetError::NotSubmitted(_) => "`mapper fleet submit`".to_owned(),
+        FleetError::StillQueued { .. } => "`mapper fleet retry`".to_owned(),
+        _ => return None,
+    })
+}
+
+fn acknowledge_command(rig: &str) -> String {
+    let plain = !rig.is_empty() && rig.chars().all(|c| c.is_alphanumeric() || "-_./:@".contains(c));
+    let quoted = if plain { rig.to_owned() } else { format!("'{}'", rig.replace('\'', r"'\''")) };
+    format!("`mapper rig acknowledge {quoted}`")
 }

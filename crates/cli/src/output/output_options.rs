@@ -1,6 +1,9 @@
-//! Output of the program: colours, progress, JSON. Chosen once on the command line, for all commands.
+//! Options that every command has, and those for more detail.
 
-use crate::terminal::{ColourChoice, Progress, ProgressFormat, is_coloured, understands_escapes};
+use crate::output::output_options;
+use crate::terminal::{
+    ColourChoice, DetailLevel, Progress, ProgressFormat, is_coloured, understands_escapes,
+};
 use clap::{ArgMatches, Args, ColorChoice};
 use mapper_report::Paint;
 use std::ffi::OsString;
@@ -111,4 +114,21 @@ pub fn progress() -> Progress {
         (false, false) => ProgressFormat::Lines,
     };
     Progress::new(chosen_options().progress.unwrap_or(default_format))
+}
+
+/// Options of commands that print identified points.
+#[derive(Debug, Args)]
+pub struct DetailArguments {
+    /// Show everything: wide tables, common parameters, repeats, sensors, the zero
+    #[arg(long)]
+    pub full: bool,
+    /// Show the simulator's truth next to the points
+    #[arg(long)]
+    pub truth: bool,
+}
+
+impl DetailArguments {
+    pub fn detail_level(&self) -> DetailLevel {
+        DetailLevel { full: self.full, truth: self.truth, paint: output_options::paint() }
+    }
 }

@@ -1,8 +1,8 @@
 //! `mapper gap apply`: writes a campaign whose virtual lab is the diagnosed machine.
 
-use crate::output::exit_code::Code;
-use crate::output::failure::Failure;
-use crate::{output::standard_output, registry};
+use crate::environment::registry;
+use crate::output::failure::{Code, Failure};
+use crate::output::standard_output;
 use clap::Args;
 use mapper_report::doubt_text;
 use mapper_session::{CalibratedModel, calibrated_model_campaign, found_in, write_new};
@@ -29,7 +29,7 @@ impl Apply {
         let found = found_in(&self.diagnosis)?;
         let p3_lag_s = campaign.tolerances.actuator_lag_s;
         let calibrated = CalibratedModel { found: &found, source: &self.diagnosis, p3_lag_s };
-        let written = calibrated_model_campaign(&text, &calibrated, &registry::registry().effects)?;
+        let written = calibrated_model_campaign(&text, &calibrated, &registry().effects)?;
         write_new(&self.out, written.as_bytes())?;
         mapper_campaign::load(&self.out).map_err(Failure::of_campaign)?;
         standard_output::print(&format!(

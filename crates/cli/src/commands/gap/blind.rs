@@ -1,8 +1,23 @@
-//! `mapper gap blind`: the check of the diagnosis on withheld data.
+//! `mapper gap blind`: diagnoses of cases whose causes are withheld.
 
-use crate::command_line::subcommands::subcommands;
-use crate::output::failure::Failure;
+use crate::command_line::{renamed, subcommands};
+use crate::environment::registry;
+use crate::interrupt;
+use crate::output::failure::{Code, Failure};
+use crate::output::standard_output::Replace;
+use crate::output::{output_options, standard_output};
 use clap::Args;
+use mapper_fleet::{Engine, cores};
+use mapper_report::with_heads;
+use mapper_session::{json_text, write_new};
+use mapper_validation::blind::calibration::calibrate::{Plan, calibrate};
+use mapper_validation::blind::scoring::reliability::{calibrated_text, reliabilities};
+use mapper_validation::blind::scoring::score::{open_answers, score};
+use mapper_validation::blind::{CaseKind, Draw, Laboratory, MANIFEST_NAME, Manifest, OutsideUse};
+use serde_json::json;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 
 /// Check the diagnosis on data whose causes are withheld
 #[derive(Debug, Args)]
@@ -12,14 +27,275 @@ pub struct Blind {
 }
 
 subcommands! { BlindCommand:
-    make::Make,
-    run::Run,
-    score::Score,
-    calibrate::Calibrate,
+    Make,
+    Run,
+    Score,
+    Calibrate,
 }
 
 impl Blind {
     pub fn run(&self) -> Result<(), Failure> {
         self.command.run()
+    }
+}
+
+/// Calibrate the probabilities on separate cases, whose outside causes are not used in the check
+#[derive(Debug, Args)]
+pub struct Calibrate {
+    /// Campaign with machine, schedule, declared uncertainties and tolerances (YAML)
+    #[arg(long, value_name = "FILE", default_value = "campaigns/gap_rig.yaml")]
+    pub campaign: PathBuf,
+    /// Seed of all random draws
+    #[arg(long)]
+    pub seed: u64,
+    /// Number of cases without a cause, which set the threshold
+    #[arg(long)]
+    pub nulls: usize,
+    /// Number of cases of the other kinds
+    #[arg(long)]
+    pub cases: usize,
+    /// New file for the calibration (JSON)
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Also write the result of each case to this new file (JSON)
+    #[arg(long, value_name = "FILE")]
+    pub observed: Option<PathBuf>,
+    /// Number of diagnoses at a time [default: all cores]
+    #[arg(long, value_name = "COUNT")]
+    pub jobs: Option<usize>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub replace: Replace,
+}
+
+impl Calibrate {
+    /// Draws, records and diagnoses separate cases, and writes the calibration that fits them.
+    pub fn run(&self) -> Result<(), Failure> {
+        let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
+        let plan = Plan { seed: self.seed, nulls: self.nulls, others: self.cases };
+        let (stop, progress) = (interrupt::stop_flag()?, output_options::progress());
+        let report = |done, of| progress.pieces(done, of);
+        let engine = Engine { jobs: self.jobs, stop: &stop, on_progress: &report };
+        let made_by = plan.command(&self.campaign);
+        let fitted = calibrate(&campaign, &registry().effects, &plan, made_by, &engine);
+        progress.clear();
+        let stopped = || Failure::new(Code::Interrupted, "stopped; `mapper fleet` keeps finished cases");
+        let (calibration, observed) = fitted?.ok_or_else(stopped)?;
+        self.replace.write(&self.out, json_text(&calibration)?.as_bytes())?;
+        if let Some(file) = &self.observed {
+            self.replace.write(file, json_text(&observed)?.as_bytes())?;
+        }
+        let (fitted, made) = (reliabilities(&observed)?, observed.len());
+        match self.json {
+            true => standard_output::print_json(
+                &json!({"calibration": self.out, "diagnoses": made, "reliability": fitted}),
+            ),
+            false => standard_output::print(&calibrated_text(made, &self.out, &fitted)),
+        }
+    }
+}
+
+/// Draw cases on the virtual lab, record them, seal their causes and print the seal
+#[derive(Debug, Args)]
+pub struct Make {
+    /// Campaign with machine, schedule, declared uncertainties and tolerances (YAML)
+    #[arg(long, value_name = "FILE", default_value = "campaigns/gap_rig.yaml")]
+    pub campaign: PathBuf,
+    /// Directory for the cases
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Seed of all random draws
+    #[arg(long)]
+    pub seed: u64,
+    /// Number of cases
+    #[arg(long)]
+    pub cases: usize,
+    /// Draw only cases of this kind (none, single, pair, outside, triple); may be repeated
+    #[arg(long = "kind", value_name = "KIND")]
+    kinds: Vec<CaseKind>,
+    /// Minimum signature of a cause, in sigmas
+    #[arg(long, value_name = "SIGMAS", default_value_t = mapper_validation::blind::SIGMA_RANGE[0])]
+    pub least_sigma: f64,
+    /// Maximum signature of a cause, in sigmas
+    #[arg(long, value_name = "SIGMAS", default_value_t = mapper_validation::blind::SIGMA_RANGE[1])]
+    pub most_sigma: f64,
+    /// Draw outside causes from those kept for calibration, not from those reserved for the check
+    #[arg(long)]
+    pub calibration: bool,
+    /// Simulator of the rig: virtual_lab, or other_lab or two_masses, whose equations no effect of the library has
+    #[arg(long, value_name = "NAME", default_value = "virtual_lab")]
+    laboratory: Laboratory,
+    /// Also record each rig on another night without its causes, for `run` to give to the diagnosis with --baseline
+    #[arg(long)]
+    baseline: bool,
+    #[arg(long, hide = true, num_args = 0..=1, default_missing_value = "", value_parser = renamed("--baseline"))]
+    pub healthy: Option<PathBuf>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Make {
+    pub fn run(&self) -> Result<(), Failure> {
+        let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
+        let outside = if self.calibration { OutsideUse::Calibration } else { OutsideUse::Check };
+        let draw = Draw {
+            kinds: self.kinds.clone(),
+            laboratory: self.laboratory,
+            baseline: self.baseline,
+            sigma_range: [self.least_sigma, self.most_sigma],
+            ..Draw::new(self.seed, self.cases, outside)
+        };
+        let progress = output_options::progress();
+        progress.pieces(0, self.cases);
+        let done = |done| progress.pieces(done, self.cases);
+        let made = mapper_validation::blind::make(&campaign, &registry().effects, &draw, &self.out, &done);
+        progress.clear();
+        let made = made?;
+        if self.json {
+            return standard_output::print_json(&json!({
+                "directory": self.out,
+                "cases": made.manifest.cases,
+                "answers_sha256": made.manifest.answers_sha256,
+            }));
+        }
+        standard_output::print(&format!(
+            "{} cases in {}\nSHA-256 of the answers: {}\n",
+            made.manifest.cases.len(),
+            self.out.display(),
+            made.manifest.answers_sha256,
+        ))
+    }
+}
+
+/// Diagnose the recordings that have no diagnosis yet
+#[derive(Debug, Args)]
+pub struct Run {
+    /// Directory of the cases
+    pub directory: PathBuf,
+    /// Campaign given to the diagnosis (YAML)
+    #[arg(long, value_name = "FILE", default_value = "campaigns/gap_rig.yaml")]
+    pub campaign: PathBuf,
+    /// Number of diagnoses at a time [default: all cores]
+    #[arg(long, value_name = "COUNT")]
+    pub jobs: Option<usize>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Run {
+    /// Diagnoses each recording in a process of its own, as a user would: `mapper gap diagnose ... --json`.
+    pub fn run(&self) -> Result<(), Failure> {
+        let failure = |message: String| Failure::new(Code::Failure, message);
+        let manifest = Manifest::read(&self.directory.join(MANIFEST_NAME))?;
+        let program = std::env::current_exe().map_err(|error| failure(error.to_string()))?;
+        let (stop, progress) = (interrupt::stop_flag()?, output_options::progress());
+        let report = |done, of| progress.pieces(done, of);
+        let engine = Engine { jobs: self.jobs, stop: &stop, on_progress: &report };
+        let names: Vec<&String> = manifest.cases.iter().filter(|name| !name.contains(['/', '\\'])).collect();
+        let threads = (cores() / engine.parallel_jobs(names.len())).max(1);
+        let diagnosed =
+            engine.each(&names, |_, name| self.diagnose(&program, name, manifest.baseline, threads));
+        progress.clear();
+        let diagnosed: Vec<_> = diagnosed?.into_iter().collect::<Option<_>>().ok_or_else(|| {
+            Failure::new(Code::Interrupted, "stopped by the operator; the same command continues from there")
+        })?;
+        let failed: Vec<String> = diagnosed.into_iter().filter_map(Result::err).collect();
+        if failed.is_empty() {
+            if self.json {
+                return standard_output::print_json(
+                    &json!({ "cases": manifest.cases, "directory": self.directory }),
+                );
+            }
+            let (cases, directory) = (manifest.cases.len(), self.directory.display());
+            return standard_output::print(&format!("{cases} diagnoses in {directory}\n"));
+        }
+        Err(failure(format!("{} recordings were not diagnosed:\n{}", failed.len(), failed.join("\n"))))
+    }
+    /// Diagnoses one case unless its diagnosis exists. The inner `Err` is the message of a failed diagnosis.
+    fn diagnose(
+        &self,
+        program: &Path,
+        name: &str,
+        baseline: bool,
+        threads: usize,
+    ) -> Result<Result<(), String>, Failure> {
+        let of_case = |ending: &str| self.directory.join(format!("{name}.{ending}"));
+        let diagnosis = of_case("diagnosis.json");
+        if diagnosis.exists() {
+            return Ok(Ok(()));
+        }
+        let finished = Command::new(program)
+            .args(["gap", "diagnose"])
+            .arg(&self.campaign)
+            .arg("--recording")
+            .arg(of_case("mcap"))
+            .arg("--json")
+            .args(
+                baseline
+                    .then(|| [OsString::from("--baseline"), of_case("baseline.mcap").into()])
+                    .into_iter()
+                    .flatten(),
+            )
+            // Several run at once, so each gets its share of the cores.
+            .env("RAYON_NUM_THREADS", threads.to_string())
+            .stdin(Stdio::null())
+            .output()
+            .map_err(|error| {
+                Failure::new(Code::Failure, format!("failed to start {}: {error}", program.display()))
+            })?;
+        if finished.status.success() {
+            write_new(&diagnosis, &finished.stdout)?;
+            return Ok(Ok(()));
+        }
+        let message = String::from_utf8_lossy(&finished.stderr);
+        Ok(Err(format!("{name}: {}", message.lines().last().unwrap_or_default())))
+    }
+}
+
+/// Open the seal and print how often the diagnoses are right
+#[derive(Debug, Args)]
+pub struct Score {
+    /// Directory of the cases
+    pub directory: PathBuf,
+    /// Print the table in Markdown, next to that of the cases in another directory
+    #[arg(long, value_name = "DIR", conflicts_with = "json")]
+    pub beside: Option<PathBuf>,
+    /// Also write each answer as NAME.truth.json next to its recording
+    #[arg(long)]
+    pub open: bool,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Score {
+    pub fn run(&self) -> Result<(), Failure> {
+        let scored = score(&self.directory)?;
+        if self.open {
+            open_answers(&self.directory)?;
+        }
+        if self.json {
+            return standard_output::print_json(&scored);
+        }
+        if let Some(other) = &self.beside {
+            let title = |of: &Path| Manifest::read(&of.join(MANIFEST_NAME)).map(|it| it.title());
+            let (this, that) = (title(&self.directory)?, title(other)?);
+            return standard_output::print(&scored.compare_with([&this, &that], &score(other)?));
+        }
+        let mut text = scored.case_lines() + "\n";
+        for (label, value) in scored.rows() {
+            text += &format!("{label:28}{value}\n");
+        }
+        let mut rows = scored.class_rows().into_iter();
+        let heads: Vec<String> = rows.next().into_iter().flatten().collect();
+        let mut table = with_heads(&heads);
+        for row in rows {
+            table.add_row(row);
+        }
+        standard_output::print(&format!("{text}\n{table}\nBrackets are exact 95 % intervals of the share.\n"))
     }
 }

@@ -1,10 +1,10 @@
 //! `mapper gap correct`: corrects the map of a recording for its diagnosed causes.
 
-use crate::command_line::shared_arguments::channel_map;
+use crate::command_line::channel_map;
 use crate::commands::identify::MethodArgument;
+use crate::environment::registry;
 use crate::output::failure::Failure;
 use crate::output::{output_options, standard_output};
-use crate::registry;
 use clap::Args;
 use mapper_core::Method;
 use mapper_report::correction_text;
@@ -40,7 +40,7 @@ impl Correct {
     pub fn run(&self) -> Result<(), Failure> {
         let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
         let map = channel_map(self.channels.as_deref())?;
-        let registry = registry::registry();
+        let registry = registry();
         let effects = registry.effects_with(&self.effects)?;
         let recorded = Recorded::read(&registry, &self.recording, &map, Some(&campaign))?;
         let progress = output_options::progress();

@@ -1,17 +1,16 @@
 //! `mapper gap diagnose`: diagnoses the difference between a recording and the nominal model.
 
-use crate::command_line::shared_arguments::{channel_map, renamed};
-use crate::output::exit_code::Code;
-use crate::output::failure::Failure;
+use crate::command_line::{channel_map, renamed};
+use crate::environment::registry;
+use crate::output::failure::{Code, Failure};
 use crate::output::standard_output::Replace;
-use crate::{
-    output::{output_options, standard_output},
-    registry,
-};
+use crate::output::{output_options, standard_output};
 use clap::Args;
 use mapper_diagnose::gap::{Calibration, ClosureTerm, Diagnosed, over_recordings};
 use mapper_report::{gap_text, headline, recordings_text, sensors_text, zero_text};
-use mapper_session::{DIAGNOSIS_FORMAT, Gap, Recorded, Session, SessionError, SessionEvent, check_all_distinct};
+use mapper_session::{
+    DIAGNOSIS_FORMAT, Gap, Recorded, Session, SessionError, SessionEvent, check_all_distinct,
+};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -58,7 +57,7 @@ impl Diagnose {
         self.html.iter().try_for_each(|file| self.replace.existing().check(file))?;
         let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
         let map = channel_map(self.channels.as_deref())?;
-        let registry = registry::registry();
+        let registry = registry();
         let effects = registry.effects_with(&self.effects)?;
         let read = |file: &PathBuf| Recorded::read(&registry, file, &map, Some(&campaign));
         let baseline = self.baseline.as_ref().map(read).transpose()?;

@@ -1,7 +1,8 @@
 //! `mapper gap effects`.
 
+use crate::environment::registry;
 use crate::output::failure::Failure;
-use crate::{output::standard_output, registry};
+use crate::output::standard_output;
 use clap::Args;
 use mapper_physics::rig::effect::Effect;
 use mapper_report::with_heads;
@@ -26,7 +27,7 @@ pub struct Effects {
 
 impl Effects {
     pub fn run(&self) -> Result<(), Failure> {
-        let effects = registry::registry().effects_with(&self.effects)?;
+        let effects = registry().effects_with(&self.effects)?;
         if let Some(campaign) = &self.signatures {
             return self.print_signatures(campaign, effects);
         }

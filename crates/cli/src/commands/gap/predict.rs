@@ -1,8 +1,9 @@
 //! `mapper gap predict`: makes a pre-registered forecast of the next recording, and compares it with that recording.
 
-use crate::command_line::shared_arguments::channel_map;
+use crate::command_line::channel_map;
+use crate::environment::registry;
 use crate::output::failure::Failure;
-use crate::{output::standard_output, registry};
+use crate::output::standard_output;
 use clap::Args;
 use mapper_report::{doubt_text, forecast_check_text};
 use mapper_session::{DIAGNOSIS_FORMAT, Recorded, SealedForecast, Session, found_in};
@@ -41,7 +42,7 @@ impl Predict {
     pub fn run(&self) -> Result<(), Failure> {
         let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
         let map = channel_map(self.channels.as_deref())?;
-        let registry = registry::registry();
+        let registry = registry();
         let effects = registry.effects_with(&self.effects)?;
         let session = Session::new(&registry);
         if let Some(diagnosis) = &self.diagnosis {

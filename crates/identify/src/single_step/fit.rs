@@ -5,9 +5,9 @@ use crate::IdentifyConfig;
 use crate::single_step::probe::{Probe, ProbeResponse};
 use crate::step_data::samples::{Row, Samples};
 use mapper_core::{Bound, InletConvection};
-use mapper_numerics::least_squares::{Damping, DampingRule, MAX_ITERATIONS};
+use mapper_numerics::SLOPE_STEP;
+use mapper_numerics::least_squares::{Damping, DampingRule, MAX_ITERATIONS, is_negligible};
 use mapper_numerics::statistics::rms;
-use mapper_numerics::{ROUNDING, SLOPE_STEP};
 use mapper_physics::gas::air::Air;
 use mapper_physics::laws::compression::{CompressionInputs, compress, compressed_k};
 use mapper_physics::laws::convection::InletLaw;
@@ -176,7 +176,7 @@ pub(crate) fn fit(samples: &Samples, geometry: Geometry) -> Option<Fit> {
         let Some((to, there)) = damping.search(trial) else { break };
         let decrease = cost - square(&there);
         best = linearised(samples, geometry, probe_response.clone(), to, there)?;
-        if decrease <= ROUNDING * cost {
+        if is_negligible(decrease, cost, 0.0) {
             break;
         }
     }

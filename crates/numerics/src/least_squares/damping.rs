@@ -1,4 +1,6 @@
-//! Levenberg-Marquardt damping, and the search for a step that reduces the cost.
+//! Levenberg-Marquardt damping, the search for a step that reduces the cost, and the stopping rule.
+
+use crate::ROUNDING;
 
 /// How the damping changes during a fit. Damping is a fraction of the diagonal of the normal matrix.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,6 +36,12 @@ impl DampingRule {
 
 /// Maximum number of iterations of a fit. Bound: a good start needs about ten.
 pub const MAX_ITERATIONS: usize = 60;
+
+/// The stopping rule of every fit: an iteration decreases the cost, as predicted or as found, by no more than `enough`, or than rounding of the
+/// cost.
+pub fn is_negligible(decrease: f64, cost: f64, enough: f64) -> bool {
+    decrease <= enough.max(ROUNDING * cost)
+}
 
 /// The damping during a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,6 +1,7 @@
 //! The most probable values of the unknowns of a nonlinear model: Gauss-Newton within bounds.
 
 use crate::ROUNDING;
+use crate::least_squares::damping::is_negligible;
 use nalgebra::{DMatrix, DVector};
 
 /// A model whose whitened residuals depend on unknowns. Its cost is the sum of squares of the residuals, plus the squared distance of
@@ -109,10 +110,10 @@ pub fn descend<M: Model>(
     for _ in 1..until.iterations {
         let Some((step, decrease)) = normal.step(&model.step_bounds(&unknowns)) else { break };
         predicted_decrease = decrease;
-        if decrease < until.enough {
+        let cost = model.cost(&unknowns, &point);
+        if is_negligible(decrease, cost, until.enough) {
             break;
         }
-        let cost = model.cost(&unknowns, &point);
         let improvement = (0..MAX_STEP_LENGTHS).find_map(|trial| {
             let unknowns = &unknowns + &step * STEP_SHORTENING.powi(trial as i32);
             let point = model.at(&unknowns)?;

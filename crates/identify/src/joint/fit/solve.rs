@@ -7,10 +7,11 @@ use crate::joint::step_model::parameters::{
     ETA, LOCAL, LocalVector, OFFSETS, PROBE_MM2, Prior, REFINEMENTS, SHARED, SURFACE, SharedVector,
 };
 use mapper_core::IdentifiedInlet;
-use mapper_numerics::ROUNDING;
 use mapper_numerics::coloured_noise::WhiteningFilter;
 use mapper_numerics::least_squares::descent::ENOUGH;
-use mapper_numerics::least_squares::{Arrow, ArrowBlock, Damping, DampingRule, MAX_ITERATIONS, Reduced};
+use mapper_numerics::least_squares::{
+    Arrow, ArrowBlock, Damping, DampingRule, MAX_ITERATIONS, Reduced, is_negligible,
+};
 use mapper_numerics::parallel;
 use nalgebra::{DMatrix, DVector, Matrix4, Matrix4xX, Vector4};
 
@@ -351,7 +352,7 @@ impl Problem<'_> {
             }
             let decrease = best - cost;
             best = cost;
-            if decrease <= (ROUNDING * cost).max(enough) {
+            if is_negligible(decrease, cost, enough) {
                 break;
             }
         }

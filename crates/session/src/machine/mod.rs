@@ -1,9 +1,6 @@
 //! Machine data before and after a test: first campaign, nominal map, work on map files, and FMU export.
 
 pub(crate) mod first_campaign;
-pub(crate) mod first_map;
-pub(crate) mod first_request;
-pub(crate) mod fmu_binary;
 pub(crate) mod fmu_file;
 pub(crate) mod map_file;
 pub(crate) mod map_work;

@@ -2,5 +2,3 @@
 
 pub(crate) mod night_report;
 pub(crate) mod nightly;
-pub(crate) mod nightly_row;
-pub(crate) mod nightly_run;

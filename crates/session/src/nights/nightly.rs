@@ -1,14 +1,24 @@
-//! A nightly campaign: full maps on the simulated rig, compared with earlier nights.
+//! A night of runs: its pieces, its rows in the history, and their comparison with earlier nights.
 
-use crate::nights::nightly_run::NightlyRun;
-use crate::plan::planning::nominal_model;
-use crate::variant::Variant;
-use crate::{Session, SessionError, SessionEvent};
-use mapper_campaign::Nightly;
-use mapper_core::Method;
+use crate::{ErrorKind, Session, SessionError, SessionEvent};
+use crate::plan::planning::{nominal_model, plan};
+use crate::recording::run_directory;
+use crate::recording::files::{PROGRAM, json_text};
+use crate::recording::recording_file::Recorded;
+use crate::rig::drive::drive;
+use crate::rig::observers::Recorder;
+use crate::variant::{Variant, VariantError};
+use mapper_campaign::{Campaign, Nightly};
+use mapper_core::{Method, Plan, RunEnding, Verdict};
 use mapper_fleet::Engine;
-use mapper_history::RunRow;
-use std::collections::BTreeSet;
+use mapper_history::{Metric, PointRow, RunKey, RunRow};
+use mapper_numerics::statistics::mean;
+use mapper_physics::simulation::model::Model;
+use mapper_recording::{ChannelMap, ReadOptions, RecordingHeader, RecordingWriter, read_recording};
+use mapper_recording::score::ScoredPoint;
+use mapper_runner::{PlanSteps, RunEnd};
+use serde_json::Value;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// All runs of a night, ready to start.
@@ -118,4 +128,197 @@ impl Session<'_> {
         let _ = std::fs::remove_dir_all(directory);
         row
     }
+}
+
+/// A campaign with method and seed set, ready to run.
+pub struct NightlyRun {
+    /// The campaign, with method and seed.
+    pub campaign: Campaign,
+    /// Its nominal model.
+    pub model: Model,
+    /// The machine, if it is one of several.
+    pub machine: Option<Variant>,
+    /// Key of the run, the same every night.
+    pub key: RunKey,
+}
+
+impl NightlyRun {
+    /// A campaign with a method, a seed and, optionally, one of several machines.
+    ///
+    /// # Errors
+    /// [`VariantError`] if the machine cannot be put into the campaign.
+    pub fn new(
+        mut campaign: Campaign,
+        model: Model,
+        method: Method,
+        seed: u64,
+        machine: Option<Variant>,
+    ) -> Result<NightlyRun, VariantError> {
+        campaign.identification.method = method;
+        campaign.seed = seed;
+        if let Some(machine) = &machine {
+            machine.apply_to(&mut campaign)?;
+        }
+        let key = RunKey {
+            campaign: campaign.name.clone(),
+            machine: machine
+                .as_ref()
+                .map_or_else(|| campaign.machine.name.clone(), |machine| machine.serial_number.clone()),
+            method: method.to_string(),
+            seed,
+        };
+        Ok(NightlyRun { campaign, model, machine, key })
+    }
+
+    /// Plans, runs, records, identifies and scores. A failure becomes part of the row.
+    pub(crate) fn run(&self, session: &Session<'_>, directory: &Path) -> Result<RunRow, SessionError> {
+        let mut row = RunRow {
+            key: self.key.clone(),
+            campaign_sha256: String::new(),
+            model_sha256: String::new(),
+            failure: None,
+            figures: BTreeMap::new(),
+            points: Vec::new(),
+        };
+        match self.fill_row(&mut row, session, directory) {
+            Err(error) if error.kind() == ErrorKind::Interrupted => return Err(error),
+            Err(error) => row.failure = Some(error.to_string()),
+            Ok(()) => {}
+        }
+        Ok(row)
+    }
+
+    fn fill_row(
+        &self,
+        row: &mut RunRow,
+        session: &Session<'_>,
+        directory: &Path,
+    ) -> Result<(), SessionError> {
+        let plan = plan(&self.campaign, &self.model)?;
+        row.campaign_sha256 = plan.made_from.campaign_sha256.clone();
+        row.model_sha256 = plan.made_from.model_sha256.clone();
+        match self.record_and_read(&plan, session, directory)? {
+            Ok(recorded) => {
+                let identified = session.identify(vec![recorded], &ChannelMap::native(), None)?;
+                row.figures = metrics(&identified.points, &plan);
+                row.points = point_rows(&identified.points);
+            }
+            Err(stopped) => row.failure = Some(stopped),
+        }
+        Ok(())
+    }
+
+    /// Identifies one recording by each of the methods and returns the points with their truth, as in a run's `points.json`. The inner `Err` is
+    /// the reason if a guard stopped the run.
+    ///
+    /// # Errors
+    /// [`SessionError`] if the campaign cannot be planned, run or identified.
+    pub fn points(
+        &self,
+        session: &Session<'_>,
+        directory: &Path,
+        methods: &[Method],
+    ) -> Result<Result<Vec<Value>, String>, SessionError> {
+        let plan = plan(&self.campaign, &self.model)?;
+        let recording = match self.record_and_read(&plan, session, directory)? {
+            Ok(recorded) => recorded.path,
+            Err(stopped) => return Ok(Err(stopped)),
+        };
+        let identify_with = |method: &Method| -> Result<Value, SessionError> {
+            let recorded = self.read(&recording)?;
+            let identified = session.identify(vec![recorded], &ChannelMap::native(), Some(*method))?;
+            Ok(serde_json::to_value(&identified.points)?)
+        };
+        methods.iter().map(identify_with).collect::<Result<_, _>>().map(Ok)
+    }
+
+    /// Runs the campaign and reads the recording. The inner `Err` is the reason if a guard stopped the run.
+    fn record_and_read(
+        &self,
+        plan: &Plan,
+        session: &Session<'_>,
+        directory: &Path,
+    ) -> Result<Result<Recorded, String>, SessionError> {
+        let recording = directory.join(run_directory::RECORDING);
+        match self.record(plan, session, &recording)? {
+            RunEnd::Completed => Ok(Ok(self.read(&recording)?)),
+            RunEnd::Interrupted { .. } => Err(SessionError::Interrupted),
+            RunEnd::Tripped(trip) => Ok(Err(format!("stopped at {:.1} s: {}", trip.t_s, trip.reason))),
+        }
+    }
+
+    fn read(&self, recording: &Path) -> Result<Recorded, SessionError> {
+        let read = read_recording(recording, &ChannelMap::native(), &ReadOptions::default())?;
+        Ok(Recorded::of(recording.to_owned(), read, Some(self.campaign.clone())))
+    }
+
+    fn record(&self, plan: &Plan, session: &Session<'_>, recording: &Path) -> Result<RunEnd, SessionError> {
+        let mut backend = session.registry.make_sources(&self.campaign, &self.model)?.backend;
+        let header = RecordingHeader {
+            library: PROGRAM.to_owned(),
+            plan_json: Some(json_text(plan)?.into_bytes()),
+            ..RecordingHeader::default()
+        };
+        let mut recorder = Recorder::new(RecordingWriter::create(recording, &header)?);
+        // A night runs many campaigns in parallel; no step events are sent.
+        let mut steps = PlanSteps::new(plan);
+        let end =
+            drive(&self.campaign, &self.model, &mut steps, backend.as_mut(), &mut recorder, session.stop)
+                .map_err(|source| SessionError::Run { source, recording: recording.to_owned() })?;
+        // Nightly runs have no journal.
+        recorder.finish(RunEnding::Completed)?;
+        Ok(end)
+    }
+}
+
+/// The monitored metrics; those without a value are omitted.
+pub(crate) fn metrics(points: &[ScoredPoint], plan: &Plan) -> BTreeMap<Metric, f64> {
+    let score = mapper_recording::score::summarise(points);
+    let good = points.iter().filter(|scored| scored.point.verdict == Verdict::Good).count();
+    // Means of the truth use the same points as means of the results.
+    let both = |scored: &&ScoredPoint| scored.point.eta.is_some() && scored.truth.is_some();
+    let with_eta: Vec<&ScoredPoint> = points.iter().filter(both).collect();
+    Metric::ALL
+        .into_iter()
+        .filter_map(|metric| {
+            let value = match metric {
+                Metric::GoodPoints => Some(good as f64),
+                Metric::EtaMean => mean(with_eta.iter().filter_map(|scored| scored.point.eta)),
+                Metric::EtaTrueMean => mean(with_eta.iter().filter_map(|scored| Some(scored.truth?.eta))),
+                Metric::EtaMedianError => score.map(|score| score.eta_median_error),
+                Metric::EtaWorstError => score.map(|score| score.eta_worst_error),
+                Metric::EtaCoverage => score.map(|score| score.eta_coverage_ratio),
+                Metric::HMean => mean(with_eta.iter().filter_map(|scored| scored.point.h_w_m2k)),
+                Metric::HTrueMean => mean(with_eta.iter().filter_map(|scored| Some(scored.truth?.h_w_m2k))),
+                Metric::HMedianError => score.and_then(|score| score.h_median_error_ratio),
+                Metric::HWorstError => score.and_then(|score| score.h_worst_error_ratio),
+                Metric::RigMinutes => Some(plan.duration_s() / 60.0),
+            };
+            Some((metric, value.filter(|value| value.is_finite())?))
+        })
+        .collect()
+}
+
+/// One row for each point; repeat visits are distinguished by their visit number.
+pub(crate) fn point_rows(points: &[ScoredPoint]) -> Vec<PointRow> {
+    let mut visits: BTreeMap<(u64, u64), usize> = BTreeMap::new();
+    points
+        .iter()
+        .map(|ScoredPoint { point, truth }| {
+            let speed_rpm = point.target.map_or(point.speed_rpm, |target| target.speed_rpm);
+            let visits =
+                visits.entry((speed_rpm.to_bits(), point.valve_opening_ratio.to_bits())).or_default();
+            let visit = *visits;
+            *visits += 1;
+            PointRow {
+                speed_rpm,
+                valve_opening_ratio: point.valve_opening_ratio,
+                visit,
+                eta: point.eta,
+                eta_true: truth.map(|truth| truth.eta),
+                h_w_m2k: point.h_w_m2k,
+                h_true_w_m2k: truth.map(|truth| truth.h_w_m2k),
+            }
+        })
+        .collect()
 }

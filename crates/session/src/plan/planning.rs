@@ -1,15 +1,18 @@
-//! The plan of a campaign and its inputs.
+//! The plan of a campaign and its inputs: the error forecast of the method, the zero, the surge search.
 
 use crate::SessionError;
-use crate::plan::predicted_method::{Forecaster, Scope};
-use crate::plan::surge::add_surge_search;
-use crate::plan::zero_forecast;
-use crate::recording::identification_config::identification;
+use crate::recording::identification_config::{declared, identification};
 use mapper_campaign::Campaign;
-use mapper_core::{Method, OperatingPoint, Plan, PlanInputHashes};
-use mapper_identify::{IdentifyConfig, ZeroSettings, expected_after_zero};
+use mapper_core::{Channel, Method, OperatingPoint, Plan, PlanInputHashes, PlanRemark, Predicted, Recording};
+use mapper_identify::{IdentifyConfig, PressureTap, ZeroSettings, expected, expected_after_zero, expected_steady, expected_together};
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::operating_point::reach::hold_speed;
 use mapper_physics::simulation::model::Model;
-use mapper_planner::{PlanRequest, PredictedMethod, make_plan, sha256_hex};
+use mapper_planner::{ForecastRow, MethodResult, MethodResults, PlanRequest, PredictedMethod, make_plan, sha256_hex};
+use mapper_recording::ChannelMap;
+use mapper_runner::{HoldConditions, SurgeSearch, surge};
+use mapper_runner::surge::{SurgeErrors, SurgeMarks};
+use std::collections::BTreeMap;
 
 /// The nominal model of a campaign.
 ///
@@ -33,7 +36,7 @@ pub fn plan(campaign: &Campaign, model: &Model) -> Result<Plan, SessionError> {
 /// As [`plan`].
 pub fn plan_of(campaign: &Campaign, request: &PlanRequest<'_>) -> Result<Plan, SessionError> {
     let mut plan = make_plan(request)?;
-    plan.remarks.extend(zero_forecast::zero_remark(campaign));
+    plan.remarks.extend(zero_remark(campaign));
     add_surge_search(campaign, request.model, &mut plan);
     Ok(plan)
 }
@@ -117,5 +120,166 @@ fn identification_after_zero(campaign: &Campaign) -> IdentifyConfig {
             expected_after_zero(config, &ZeroSettings::from(soak), soak.duration_s, campaign.boundary.p1_pa)
         }
         None => config,
+    }
+}
+
+/// Channels whose offsets dominate the error of efficiency.
+const CHANNELS: [Channel; 5] = [Channel::T1, Channel::T2, Channel::Tc, Channel::P1, Channel::P2];
+/// Duration ratio of the longer soak to the planned one.
+const LONGER_RATIO: f64 = 2.0;
+/// Minimum relative reduction of an offset by a longer soak that is reported.
+const MIN_REDUCTION_RATIO: f64 = 0.3;
+
+/// The remark of a plan; `None` without a zero or without declared offsets.
+pub(crate) fn zero_remark(campaign: &Campaign) -> Option<PlanRemark> {
+    let soak = campaign.zero?;
+    let left_after = |soak_s: f64| -> BTreeMap<Channel, f64> {
+        let settings = ZeroSettings::from(soak);
+        let expected_sigma =
+            expected_after_zero(identification(campaign), &settings, soak_s, campaign.boundary.p1_pa)
+                .declared;
+        CHANNELS
+            .into_iter()
+            .filter_map(|channel| Some((channel, expected_sigma.get(&channel)?.offset_sigma)))
+            .collect()
+    };
+    let longer_soak_s = LONGER_RATIO * soak.duration_s;
+    let (offset_sigmas, mut longer_offset_sigmas) = (left_after(soak.duration_s), left_after(longer_soak_s));
+    longer_offset_sigmas.retain(|channel, longer| {
+        offset_sigmas
+            .get(channel)
+            .is_some_and(|expected_sigma| *longer < (1.0 - MIN_REDUCTION_RATIO) * expected_sigma)
+    });
+    (!offset_sigmas.is_empty()).then_some(PlanRemark::OffsetsAfterSoak {
+        soak_s: soak.duration_s,
+        offset_sigmas,
+        longer_soak_s,
+        longer_offset_sigmas,
+    })
+}
+
+/// Which steps a method identifies together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Scope {
+    /// Each step separately (`dynamic`).
+    EachStep,
+    /// All steps together (`joint`).
+    AllSteps,
+    /// Settled points only (`steady`).
+    Settled,
+}
+
+/// The campaign's method, after its zero.
+#[derive(Debug)]
+pub(crate) struct Forecaster {
+    config: IdentifyConfig,
+    scope: Scope,
+}
+
+impl Forecaster {
+    /// The method under `config`.
+    pub(crate) fn of(config: IdentifyConfig, scope: Scope) -> Self {
+        // A forecast uses total pressures.
+        let total = PressureTap::Total;
+        Forecaster { config: IdentifyConfig { inlet_tap: total, outlet_tap: total, ..config }, scope }
+    }
+}
+
+impl PredictedMethod for Forecaster {
+    fn predict_step(&self, window: &[ForecastRow], interval_s: f64) -> Option<MethodResult> {
+        if self.scope != Scope::EachStep || window.is_empty() {
+            return None;
+        }
+        expected(window, interval_s, &self.config)
+    }
+
+    fn predict_campaign(&self, steps: &[&[ForecastRow]]) -> Option<MethodResults> {
+        if self.scope != Scope::AllSteps {
+            return None;
+        }
+        expected_together(steps, &self.config)
+    }
+
+    fn predict_settled(&self, row: &ForecastRow) -> Option<(f64, f64)> {
+        expected_steady(row, &self.config)
+    }
+}
+
+/// Setpoints and predicted readings of the nominal machine at a point near or beyond its surge line. `None` if P3 or T2 would exceed the
+/// campaign's limits.
+pub fn hold_near_surge(campaign: &Campaign, model: &Model, point: OperatingPoint) -> Option<HoldConditions> {
+    let boundary = BoundaryConditions { valve_opening_ratio: point.valve_opening_ratio, ..campaign.boundary };
+    let steady = hold_speed(model, point.speed_rpm, &boundary, campaign.follow_outlet).ok()?;
+    let (limits, outputs) = (&campaign.limits, &steady.outputs);
+    let p3_pa = steady.boundary.p3_pa;
+    let within = (limits.p3_min_pa..=limits.p3_max_pa).contains(&p3_pa)
+        && limits.t2_max_k.is_none_or(|limit_k| outputs.t2_k <= limit_k);
+    within.then(|| HoldConditions {
+        p3_pa,
+        t3_k: steady.boundary.t3_k,
+        oil_temperature_k: steady.boundary.oil_temperature_k,
+        predicted: Predicted::settled(outputs.flow_kg_s, outputs.pressure_ratio, outputs.t2_k, 0.0),
+        surge_margin_ratio: steady.surge_margin_ratio(model),
+    })
+}
+
+/// Adds the search, as forecast on the nominal machine, to a plan's duration and remarks.
+pub(crate) fn add_surge_search(campaign: &Campaign, model: &Model, plan: &mut Plan) {
+    let Some(seek) = campaign.surge_search else { return };
+    let mut ends: Vec<OperatingPoint> = Vec::new();
+    for step in &plan.steps {
+        match ends.iter_mut().find(|end| (end.speed_rpm - step.to.speed_rpm).abs() < 1e-3) {
+            Some(end) if end.valve_opening_ratio <= step.to.valve_opening_ratio => {}
+            Some(end) => *end = step.to,
+            None => ends.push(step.to),
+        }
+    }
+    let margin = |end: &OperatingPoint| {
+        hold_near_surge(campaign, model, *end).map_or(1.0, |steady| steady.surge_margin_ratio)
+    };
+    let approaches: usize = ends.iter().map(|end| surge::expected_readings(margin(end), &seek)).sum();
+    plan.surge_search_s = approaches as f64 * seek.dwell_s + ends.len() as f64 * SurgeSearch::AROUND_S;
+    plan.figures.minutes = plan.duration_s() / 60.0;
+    plan.remarks.push(PlanRemark::SurgeSearch {
+        lines: ends.len(),
+        closest_margin_ratio: seek.closest_margin_ratio,
+        steps: approaches + 2 * ends.len(),
+        duration_s: plan.surge_search_s,
+    });
+}
+
+/// Finds the surge marks in the approaches of a recording.
+pub(crate) fn find_surge_marks(
+    approaches: &Recording,
+    campaign: Option<&Campaign>,
+    config: &IdentifyConfig,
+) -> SurgeMarks {
+    let errors = campaign.map_or_else(SurgeErrors::default, |campaign| {
+        SurgeErrors::of(&declared(campaign, &ChannelMap::native()))
+    });
+    surge::find_surge_marks(approaches, config.reference, errors)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::shipped;
+    use super::*;
+
+    #[test]
+    fn a_longer_soak_is_mentioned_if_it_reduces_an_offset_clearly() {
+        let mut campaign = shipped::campaign(&[]);
+        let named = |campaign: &_| match zero_remark(campaign) {
+            Some(PlanRemark::OffsetsAfterSoak { soak_s, longer_offset_sigmas, .. }) => {
+                Some((soak_s, longer_offset_sigmas.into_keys().collect::<Vec<_>>()))
+            }
+            _ => None,
+        };
+        // Only the housing has not settled; averaging no longer improves the other sensors.
+        assert_eq!(named(&campaign), Some((1800.0, vec![Channel::Tc])));
+        let soak = campaign.zero.as_mut().unwrap();
+        soak.duration_s = 4.0 * 3600.0;
+        assert_eq!(named(&campaign), Some((4.0 * 3600.0, Vec::new())));
+        campaign.zero = None;
+        assert_eq!(named(&campaign), None);
     }
 }

@@ -3,7 +3,7 @@
 use crate::SessionError;
 use crate::plan::planning::order_points;
 use crate::recording::identification_config::identification;
-use crate::rig::estimates::{append_samples, config_for_single_steps, retain_last_two_steps};
+use crate::rig::observers::{append_samples, config_for_single_steps, retain_last_two_steps};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::SequenceSource;
 use mapper_core::{IdentifiedPoint, Plan, PlanStep, Recording, SampleBatch, StepMarker, step_number};

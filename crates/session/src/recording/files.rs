@@ -1,4 +1,4 @@
-//! File access: existing files are replaced only on request, and reads have a size limit.
+//! Files of results: written once, with the program that made them.
 
 use crate::SessionError;
 use serde::Serialize;
@@ -116,6 +116,17 @@ pub fn json_text(value: &impl Serialize) -> Result<String, SessionError> {
 pub(crate) fn read_at_most(path: &Path, limit_bytes: u64) -> Result<Vec<u8>, SessionError> {
     let limit_bytes = usize::try_from(limit_bytes).unwrap_or(usize::MAX);
     mapper_yaml::read_limited(path, limit_bytes).map_err(SessionError::file("read", path))
+}
+
+/// Name and version of the program, as recordings carry it.
+pub const PROGRAM: &str = concat!("mapper ", env!("CARGO_PKG_VERSION"));
+
+/// Name, version and commit, for people. `commit`: empty if unknown.
+pub fn program_and_commit(commit: &str) -> String {
+    match commit {
+        "" => PROGRAM.to_owned(),
+        commit => format!("{PROGRAM}, commit {commit}"),
+    }
 }
 
 #[cfg(test)]

@@ -1,11 +1,10 @@
-//! Converts a campaign's declarations into the configuration of identification and diagnosis.
+//! Settings of an identification, from a campaign or a channel map, and warnings about calibrations.
 
-use mapper_campaign::{Campaign, internal_area_sigma_ratio};
-use mapper_core::{
-    ALPHA_AREA_SIGMA_RATIO, Channel, DeclaredUncertainty, Dimension, Method, ModelTolerances, ReferenceState,
-    WindowRule,
-};
+use mapper_campaign::{CalibrationWarning, Campaign, internal_area_sigma_ratio};
+use mapper_campaign::campaign::{CalibrationRule, Date};
+use mapper_core::{ALPHA_AREA_SIGMA_RATIO, Channel, DeclaredUncertainty, Dimension, IdentifiedPoint, Method, ModelTolerances, Recording, ReferenceState, Verdict, WindowRule};
 use mapper_identify::{IdentifyConfig, PressureTap};
+use mapper_numerics::statistics::range;
 use mapper_observe::declared_uncertainties;
 use mapper_physics::gas::air::Air;
 use mapper_recording::{AmbientPressure, ChannelMap, MachineConstants};
@@ -171,4 +170,30 @@ pub(crate) fn identification_of(machine: &MachineConstants, map: &ChannelMap) ->
         ..defaults
     };
     with_barometer(config, map)
+}
+
+/// Adds the defects of the sensors' calibrations to each point. If the campaign requires calibrations, the point is unusable.
+pub(crate) fn warn_about_calibrations(
+    points: &mut [IdentifiedPoint],
+    recording: &Recording,
+    campaign: &Campaign,
+    day: Option<Date>,
+) {
+    for point in points {
+        let Some(step) = recording.steps.iter().find(|step| step.index == point.step) else { continue };
+        let readings = |channel: Channel| {
+            let values = recording.series.get(&channel)?.slice(step.start_s, step.end_s).1;
+            let (low, high) = range(values.iter().copied().filter(|value| value.is_finite()));
+            (low <= high).then_some((low, high))
+        };
+        for CalibrationWarning { warning, .. } in campaign.calibration_warnings(day, readings) {
+            match campaign.calibration {
+                CalibrationRule::Optional => point.warnings.push(warning),
+                CalibrationRule::Required => {
+                    point.warnings.insert(0, warning);
+                    point.verdict = Verdict::Unusable;
+                }
+            }
+        }
+    }
 }

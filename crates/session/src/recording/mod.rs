@@ -1,12 +1,10 @@
 //! Files of a run and its recording: run directory, journal, resumption, and reading of recordings for the analysis.
 
-pub(crate) mod calibration_warnings;
 pub(crate) mod files;
 pub(crate) mod fusing;
 pub(crate) mod identification_config;
 pub(crate) mod journal;
 pub(crate) mod log_inspection;
-pub(crate) mod program;
 pub(crate) mod recording_file;
 pub(crate) mod resume;
 pub mod run_directory;

@@ -1,12 +1,16 @@
-//! Observers of a running campaign: the recorder, and the forwarder to the session's own observer.
+//! Observers of a run: the recorder with its journal, the sender of events, the estimator of points, each in a thread of its own if it is slow.
 
 use crate::SessionEvent;
 use crate::event::OnEvent;
 use crate::recording::journal::{Entry, Journal};
-use mapper_core::{Event, EventKind, RigDescription, RunEnding, SampleBatch, StepMarker};
+use mapper_core::{Event, EventKind, Method, Recording, RigDescription, RunEnding, SampleBatch, StepMarker};
+use mapper_identify::{IdentifyConfig, identify_each};
 use mapper_recording::{RecordError, RecordingWriter, StepPhase};
 use mapper_runner::{ObserverError, RunObserver};
 use std::fs::File;
+use std::panic::resume_unwind;
+use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
+use std::thread::{Scope, ScopedJoinHandle};
 
 /// Writes everything to the recording, and the safely recorded steps to the journal.
 pub(crate) struct Recorder {
@@ -144,5 +148,249 @@ impl RunObserver for EventForwarder<'_> {
     fn on_step_end(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
         (self.on_event)(&SessionEvent::StepEnded(*marker));
         Ok(())
+    }
+}
+
+/// Queue length: some seconds of samples. If the queue is full the run waits, so no data are lost.
+const MAX_WAITING_CALLS: usize = 32;
+
+/// A call of an observer, to be made on its thread.
+type Call<'scope, O> = Box<dyn FnOnce(&mut O) -> Result<(), ObserverError> + Send + 'scope>;
+
+/// The observer accepts no more messages.
+#[derive(Debug, thiserror::Error)]
+#[error("recording stopped after an error that was reported before")]
+struct ObserverStopped;
+
+/// Makes all calls, in order, on another thread until its observer fails. The next call returns the error; all later calls fail.
+pub(crate) struct ThreadedObserver<'scope, O> {
+    to_thread: SyncSender<Call<'scope, O>>,
+    thread: ScopedJoinHandle<'scope, O>,
+    failed: Receiver<ObserverError>,
+}
+
+impl<'scope, O: RunObserver + Send + 'scope> ThreadedObserver<'scope, O> {
+    /// Starts the thread.
+    pub(crate) fn start<'env>(scope: &'scope Scope<'scope, 'env>, mut observer: O) -> Self {
+        let (to_thread, calls) = sync_channel::<Call<'scope, O>>(MAX_WAITING_CALLS);
+        let (fail, failed) = channel();
+        let thread = scope.spawn(move || {
+            // The error must be stored before the end of the thread becomes visible.
+            if let Err(error) = calls.iter().try_for_each(|call| call(&mut observer)) {
+                let _ = fail.send(error);
+            }
+            observer
+        });
+        ThreadedObserver { to_thread, thread, failed }
+    }
+
+    /// Waits for the end of all calls. Returns the observer, and its error if no earlier call has returned that.
+    pub(crate) fn end(self) -> (O, Result<(), ObserverError>) {
+        drop(self.to_thread);
+        let observer = self.thread.join().unwrap_or_else(|panicked| resume_unwind(panicked));
+        (observer, self.failed.try_recv().map_or(Ok(()), Err))
+    }
+
+    fn send(
+        &mut self,
+        call: impl FnOnce(&mut O) -> Result<(), ObserverError> + Send + 'scope,
+    ) -> Result<(), ObserverError> {
+        match self.to_thread.send(Box::new(call)) {
+            Ok(()) => Ok(()),
+            Err(_) => Err(self.failed.recv().unwrap_or_else(|_| ObserverError::new(ObserverStopped))),
+        }
+    }
+}
+
+impl<'scope, O: RunObserver + Send + 'scope> RunObserver for ThreadedObserver<'scope, O> {
+    fn on_step_start(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        let marker = *marker;
+        self.send(move |observer| observer.on_step_start(&marker))
+    }
+
+    fn on_batch(&mut self, batch: &SampleBatch) -> Result<(), ObserverError> {
+        let batch = batch.clone();
+        self.send(move |observer| observer.on_batch(&batch))
+    }
+
+    fn on_event(&mut self, event: &Event) -> Result<(), ObserverError> {
+        let event = event.clone();
+        self.send(move |observer| observer.on_event(&event))
+    }
+
+    fn on_step_abandoned(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        let marker = *marker;
+        self.send(move |observer| observer.on_step_abandoned(&marker))
+    }
+
+    fn on_step_end(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        let marker = *marker;
+        self.send(move |observer| observer.on_step_end(&marker))
+    }
+
+    fn on_step_completed(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        let marker = *marker;
+        self.send(move |observer| observer.on_step_completed(&marker))
+    }
+}
+
+/// Steps that may wait for identification. If the run is faster, estimates are dropped and the run is not delayed.
+const MAX_WAITING_STEPS: usize = 4;
+
+/// Keeps the last two steps and sends them to a separate thread, so that identification never delays the rig.
+pub(crate) struct StepEstimator {
+    recent: Recording,
+    to_thread: SyncSender<Recording>,
+}
+
+impl StepEstimator {
+    /// Starts the thread, which ends when this value is dropped.
+    pub(crate) fn start<'scope, 'env>(
+        scope: &'scope Scope<'scope, 'env>,
+        config: IdentifyConfig,
+        on_event: OnEvent<'env>,
+    ) -> Self {
+        let (to_thread, steps) = sync_channel::<Recording>(MAX_WAITING_STEPS);
+        let config = config_for_single_steps(config);
+        scope.spawn(move || {
+            while let Ok(recording) = steps.recv() {
+                let points = identify_each(&recording, &config).unwrap_or_default();
+                if let Some(Ok(point)) = points.into_iter().last() {
+                    on_event(&SessionEvent::PointEstimated(Box::new(point)));
+                }
+            }
+        });
+        StepEstimator { recent: Recording::default(), to_thread }
+    }
+}
+
+impl RunObserver for StepEstimator {
+    fn on_batch(&mut self, batch: &SampleBatch) -> Result<(), ObserverError> {
+        append_samples(&mut self.recent, batch);
+        Ok(())
+    }
+
+    fn on_step_end(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        retain_last_two_steps(&mut self.recent, marker);
+        let _ = self.to_thread.try_send(self.recent.clone());
+        Ok(())
+    }
+}
+
+/// Appends samples to a recording as a file reader would: missing readings are omitted.
+pub(crate) fn append_samples(recent: &mut Recording, batch: &SampleBatch) {
+    for column in &batch.columns {
+        let series = recent.series.entry(column.channel).or_default();
+        for (t_s, value) in batch.t_s.iter().zip(&column.values).filter(|(_, value)| value.is_finite()) {
+            series.t_s.push(*t_s);
+            series.values.push(*value);
+        }
+    }
+}
+
+/// Adds an ended step and drops data before the previous one. Identification of the last step needs only these two.
+pub(crate) fn retain_last_two_steps(recent: &mut Recording, marker: &StepMarker) {
+    if recent.steps.len() > 1 {
+        recent.steps.remove(0);
+    }
+    if let Some(before) = recent.steps.first().copied() {
+        for series in recent.series.values_mut() {
+            let old_samples = series.t_s.partition_point(|t_s| *t_s < before.start_s);
+            series.t_s.drain(..old_samples);
+            series.values.drain(..old_samples);
+        }
+    }
+    recent.steps.push(*marker);
+}
+
+/// Settings for single steps. The standard errors exclude the assumed alpha_A, because further visits would not reduce that part.
+pub(crate) fn config_for_single_steps(config: IdentifyConfig) -> IdentifyConfig {
+    let method = match config.method {
+        Method::Joint => Method::Dynamic,
+        method => method,
+    };
+    IdentifyConfig { method, alpha_area_sigma_ratio: 0.0, ..config }
+}
+
+#[cfg(test)]
+mod tests {
+    use mapper_core::EventKind;
+    use std::io;
+    use std::thread::scope;
+    use super::*;
+
+    /// Keeps the times of events, and fails at a given number of them.
+    struct Counts {
+        times: Vec<f64>,
+        fails_at: usize,
+    }
+
+    impl RunObserver for Counts {
+        fn on_event(&mut self, event: &Event) -> Result<(), ObserverError> {
+            if self.times.len() == self.fails_at {
+                return Err(ObserverError::new(io::Error::from(io::ErrorKind::StorageFull)));
+            }
+            self.times.push(event.t_s);
+            Ok(())
+        }
+    }
+
+    fn event(t_s: f64) -> Event {
+        Event { t_s, kind: EventKind::Note, message: String::new() }
+    }
+
+    #[test]
+    fn all_events_arrive_in_order_before_the_end() {
+        let times: Vec<f64> = (0..1000).map(f64::from).collect();
+        let (observer, error) = scope(|scope| {
+            let mut threaded =
+                ThreadedObserver::start(scope, Counts { times: Vec::new(), fails_at: usize::MAX });
+            times.iter().for_each(|t_s| threaded.on_event(&event(*t_s)).unwrap());
+            threaded.end()
+        });
+        assert_eq!(observer.times, times);
+        error.unwrap();
+    }
+
+    /// For a failure at any call, the error is returned once, and no later message counts as observed.
+    #[test]
+    fn an_error_is_reported_and_later_events_are_not_observed() {
+        for fails_at in [0, 1, 50, 99] {
+            let (observer, errors) = scope(|scope| {
+                let mut threaded = ThreadedObserver::start(scope, Counts { times: Vec::new(), fails_at });
+                let results: Vec<_> = (0..100).map(|t_s| threaded.on_event(&event(f64::from(t_s)))).collect();
+                let (observer, at_end) = threaded.end();
+                let errors =
+                    results.into_iter().chain([at_end]).skip_while(Result::is_ok).collect::<Vec<_>>();
+                (observer, errors)
+            });
+            assert_eq!(observer.times.len(), fails_at);
+            let full = io::Error::from(io::ErrorKind::StorageFull).to_string();
+            let [first, later @ ..] = errors.as_slice() else { panic!("no error") };
+            assert_eq!(first.as_ref().unwrap_err().to_string(), full, "{fails_at}");
+            // If a call has returned the error, the end must not return it.
+            if let [calls @ .., end] = later {
+                assert!(calls.iter().all(Result::is_err) && end.is_ok(), "{fails_at}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_panic_of_an_observer_reaches_the_caller() {
+        struct Panics;
+        impl RunObserver for Panics {
+            fn on_event(&mut self, _event: &Event) -> Result<(), ObserverError> {
+                panic!("on purpose")
+            }
+        }
+        let ended = std::panic::catch_unwind(|| {
+            scope(|scope| {
+                let mut threaded = ThreadedObserver::start(scope, Panics);
+                let refused = (0..1000).any(|t_s| threaded.on_event(&event(f64::from(t_s))).is_err());
+                assert!(refused, "a thousand events after the observer failed");
+                threaded.end().1
+            })
+        });
+        assert_eq!(ended.unwrap_err().downcast_ref::<&str>(), Some(&"on purpose"));
     }
 }

@@ -1,6 +1,6 @@
 //! Metadata of a recording.
 
-use crate::recording::program::PROGRAM;
+use crate::recording::files::PROGRAM;
 use mapper_campaign::Campaign;
 use mapper_core::{Plan, RigDescription};
 use std::collections::BTreeMap;

@@ -1,18 +1,21 @@
-//! Errors of a session.
+//! Errors of a session, their category and the input that they are about.
 
-use crate::errors::map_work_error::MapWorkError;
 use crate::variant::VariantError;
-use mapper_campaign::{CampaignError, Findings, NightlyError};
+use mapper_campaign::{CampaignError, Findings, MapMisfit, NightlyError, NominalTableError, USUAL_WHEEL_DIAMETERS_M};
 use mapper_core::{BackendError, ExportError, ImportError};
 use mapper_diagnose::drift::DriftError;
 use mapper_diagnose::gap::{CalibratedModelError, GapError};
+use mapper_fmu::FmuError;
 use mapper_history::HistoryError;
 use mapper_identify::IdentifyError;
+use mapper_maps::{AssembleError, HeatCorrectionError, MapFitError, TurbineFitError};
 use mapper_maps::table::DescriptionError;
 use mapper_observe::OtherMachine;
+use mapper_physics::compressor_map::tabulated_map::MapError;
+use mapper_physics::simulation::steady::SteadyError;
 use mapper_planner::PlanError;
-use mapper_recording::logs::LogError;
 use mapper_recording::{ChannelMapError, RecordError};
+use mapper_recording::logs::LogError;
 use mapper_runner::{RunError, StepSourceError};
 use mapper_sequence::SequenceError;
 use mapper_yaml::keys::KeyError;
@@ -70,7 +73,7 @@ pub enum SessionError {
     #[error(transparent)]
     Driven(#[from] mapper_diagnose::driven::DrivenError),
     #[error(transparent)]
-    FirstMap(#[from] Box<crate::errors::first_map_error::FirstMapError>),
+    FirstMap(#[from] Box<FirstMapError>),
     #[error("no recording was given; name a run directory or a recording")]
     NoRecording,
     #[error(
@@ -207,7 +210,7 @@ pub enum SessionError {
     #[error("`{0}` needs a fitted map: {1}")]
     Fit(&'static str, #[source] mapper_maps::MapFitError),
     #[error(transparent)]
-    Fmu(#[from] crate::errors::fmu_error::FmuExportError),
+    Fmu(#[from] FmuExportError),
     #[error("{} already exists and is not replaced; choose another name", .0.display())]
     Exists(PathBuf),
     #[error("failed to {action} {}: {source}", .path.display())]
@@ -383,4 +386,85 @@ impl SessionError {
             E::Interrupted => ErrorKind::Interrupted,
         }
     }
+}
+
+/// Why a first campaign cannot get its nominal map.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
+pub enum FirstMapError {
+    #[error(
+        "a compressor wheel of {} mm is unusual: turbochargers have {:.0} to {:.0} mm; give its diameter at the exit, with its unit",
+        (1e7 * .wheel_m).round() / 1e4, 1e3 * USUAL_WHEEL_DIAMETERS_M.0, 1e3 * USUAL_WHEEL_DIAMETERS_M.1
+    )]
+    Wheel { wheel_m: f64 },
+    #[error(
+        "the file {} is not a map: {}; write a table of corrected speed, corrected flow, pressure ratio and efficiency, with units \
+         in its header, or convert a map of another format", .0.display(), .1
+    )]
+    NotAMap(PathBuf, #[source] NominalTableError),
+    #[error("the map {}: {misfit}; {}", .path.display(), .misfit.remedy())]
+    Misfit { path: PathBuf, misfit: MapMisfit },
+    #[error(
+        "the map has no speed line between {:.1} and {:.1} krpm; choose speeds between {:.1} and {:.1} krpm",
+        .requested_rpm.0 / 1e3, .requested_rpm.1 / 1e3, .map_rpm.0 / 1e3, .map_rpm.1 / 1e3
+    )]
+    NoLines { requested_rpm: (f64, f64), map_rpm: (f64, f64) },
+}
+
+/// Why a machine cannot be written as an FMU.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
+pub enum FmuExportError {
+    #[error("an FMU needs a map of the whole machine: {0}")]
+    NoMap(String),
+    #[error("the map cannot be simulated: {0}")]
+    Map(#[from] MapError),
+    #[error("the model has no steady state to start from: {0}")]
+    Start(#[from] SteadyError),
+    #[error(transparent)]
+    Fmu(#[from] FmuError),
+    #[error(
+        "FMI 2.0 has no name for libraries of this platform; export the sources only and let the importer compile them"
+    )]
+    Platform,
+    #[error(
+        "the sources cannot be compiled with `{compiler}`: {why}; install a C compiler, name it in CC, or export the sources only"
+    )]
+    Compiler { compiler: String, why: String },
+}
+
+/// Errors of commands on map files.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
+pub enum MapWorkError {
+    #[error(transparent)]
+    Description(#[from] DescriptionError),
+    #[error(transparent)]
+    Key(#[from] KeyError),
+    #[error("{}: {}", .0.display(), .1)]
+    NotFitted(PathBuf, #[source] MapFitError),
+    #[error(transparent)]
+    NotCompared(#[from] MapFitError),
+    #[error("{}: {}", .0.display(), .1)]
+    TurbineNotFitted(PathBuf, #[source] TurbineFitError),
+    /// A table whose points are corrected already.
+    #[error(
+        "{} is not a table of measured points, which has columns for N, flow, P1, T1, P2 and T2 (of a turbine N, flow, P3, T3, P4 and T4); inspect the columns that were recognised",
+        .0.display()
+    )]
+    NotMeasured(PathBuf),
+    #[error("{}: {}", .0.display(), .1)]
+    NotAssembled(PathBuf, #[source] AssembleError),
+    #[error("{}: {}", .0.display(), .1)]
+    NotCorrected(PathBuf, #[source] HeatCorrectionError),
+    #[error(
+        "the file does not state how its efficiencies are defined; state the definition, e.g. `constant_gamma 1.4`"
+    )]
+    NoDefinition,
+    #[error("{} is a turbine map, the other file a compressor map; give two maps of the same machine", .0.display())]
+    TwoMachines(PathBuf),
+    #[error("{} is a turbine map and has no {property}; leave that out", .path.display())]
+    NotOfTurbine { path: PathBuf, property: &'static str },
+    #[error("failed to draw the picture: {0}")]
+    Picture(String),
 }

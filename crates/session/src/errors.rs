@@ -1,21 +1,23 @@
 //! Errors of a session, their category and the input that they are about.
 
 use crate::variant::VariantError;
-use mapper_campaign::{CampaignError, Findings, MapMisfit, NightlyError, NominalTableError, USUAL_WHEEL_DIAMETERS_M};
+use mapper_campaign::{
+    CampaignError, Findings, MapMisfit, NightlyError, NominalTableError, USUAL_WHEEL_DIAMETERS_M,
+};
 use mapper_core::{BackendError, ExportError, ImportError};
 use mapper_diagnose::drift::DriftError;
 use mapper_diagnose::gap::{CalibratedModelError, GapError};
 use mapper_fmu::FmuError;
 use mapper_history::HistoryError;
 use mapper_identify::IdentifyError;
-use mapper_maps::{AssembleError, HeatCorrectionError, MapFitError, TurbineFitError};
 use mapper_maps::table::DescriptionError;
+use mapper_maps::{AssembleError, HeatCorrectionError, MapFitError, TurbineFitError};
 use mapper_observe::OtherMachine;
 use mapper_physics::compressor_map::tabulated_map::MapError;
 use mapper_physics::simulation::steady::SteadyError;
 use mapper_planner::PlanError;
-use mapper_recording::{ChannelMapError, RecordError};
 use mapper_recording::logs::LogError;
+use mapper_recording::{ChannelMapError, RecordError};
 use mapper_runner::{RunError, StepSourceError};
 use mapper_sequence::SequenceError;
 use mapper_yaml::keys::KeyError;

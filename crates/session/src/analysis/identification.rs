@@ -1,6 +1,5 @@
 //! Converts a recording into identified points, with their truth if known. All commands use this module.
 
-use crate::{Session, SessionError, SessionEvent};
 use crate::plan::planning::find_surge_marks;
 use crate::recording::files::POINTS_FORMAT;
 use crate::recording::fusing::{fuse_sensors, take_air_and_probe};
@@ -8,17 +7,26 @@ use crate::recording::identification_config::{
     declared_conditions, identification_of, identification_with, warn_about_calibrations,
 };
 use crate::recording::recording_file::{Recorded, check_all_distinct, check_machine};
-use mapper_campaign::{Campaign, nominal_model};
+use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::campaign::Date;
-use mapper_core::{Channel, CompressorMap, IdentifiedPoint, Method, PointBudgets, Recording, ResultRemark, StepMarker, StepOrigin, ThermalModel, join_recordings};
+use mapper_campaign::{Campaign, nominal_model};
+use mapper_core::{
+    Channel, CompressorMap, IdentifiedPoint, Method, PointBudgets, Recording, ResultRemark, StepMarker,
+    StepOrigin, ThermalModel, join_recordings,
+};
 use mapper_diagnose::gap::PointCorrection;
-use mapper_identify::{FoundFault, IdentifyConfig, NominalRig, TwoParameter, ZeroOutcome, ZeroSettings, identify_recording, isothermal_zero, method_for, with_measured_humidity};
+use mapper_identify::{
+    FoundFault, IdentifyConfig, NominalRig, TwoParameter, ZeroOutcome, ZeroSettings, identify_recording,
+    isothermal_zero, method_for, with_measured_humidity,
+};
 use mapper_maps::{AssembleError, RepeatedJump, assemble, repeated_jumps};
 use mapper_observe::FusedChannel;
 use mapper_observe::energy_balance::Gases;
 use mapper_physics::gas::air::Air;
+use mapper_recording::score::{
+    PendingTruths, ScoreSummary, ScoredPoint, Truth, score, score_marks, with_truths,
+};
 use mapper_recording::{AmbientPressure, Barometer, ChannelMap};
-use mapper_recording::score::{PendingTruths, ScoreSummary, ScoredPoint, Truth, score, score_marks, with_truths};
 use mapper_report::{SurgeReport, result_remark_text, with_messages};
 use mapper_runner::surge::SurgeMarks;
 use serde::Serialize;

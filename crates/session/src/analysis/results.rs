@@ -1,19 +1,23 @@
 //! Results of a run or recording: points, map and report, as data and as files in its directory.
 
-use crate::{Gap, Registry, Session, SessionError};
 use crate::analysis::identification::Identified;
-use crate::recording::run_directory;
 use crate::recording::files::{json_text, program_and_commit, write_new};
 use crate::recording::recording_file::{Recorded, merge_parts};
+use crate::recording::run_directory;
+use crate::{Gap, Registry, Session, SessionError};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::Outputs;
 use mapper_campaign::units::Kind;
-use mapper_core::{CompressorMap, ExportError, IdentifiedPoint, MapUnits, Method, Plan, ResultRemark, RunEnding};
+use mapper_core::{
+    CompressorMap, ExportError, IdentifiedPoint, MapUnits, Method, Plan, ResultRemark, RunEnding,
+};
 use mapper_identify::{T2History, t2_history};
 use mapper_maps::{MapFit, MapFitOptions, RepeatedJump};
 use mapper_recording::{ChannelMap, ReadOptions, ReadWarning, read_recording};
-use mapper_report::{Display, PointsOrigin, ReportSource, RunReport, budget_csv, instant, run_report, with_messages};
 use mapper_report::page::{OtherRun, RunPage, gap_part, run_page};
+use mapper_report::{
+    Display, PointsOrigin, ReportSource, RunReport, budget_csv, instant, run_report, with_messages,
+};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};

@@ -1,10 +1,13 @@
 //! The first campaign of a machine, with its nominal map.
 
-use crate::{Registry, SessionError};
 use crate::errors::FirstMapError;
 use crate::plan::campaign_forecast::longer_soak_s;
 use crate::recording::files::write_new;
-use mapper_campaign::{AssumedSize, Campaign, CampaignError, MapMisfit, USUAL_WHEEL_DIAMETERS_M, find_map_misfit, nominal_table, similar_sizes};
+use crate::{Registry, SessionError};
+use mapper_campaign::{
+    AssumedSize, Campaign, CampaignError, MapMisfit, USUAL_WHEEL_DIAMETERS_M, find_map_misfit, nominal_table,
+    similar_sizes,
+};
 use mapper_chart::efficiency_mesh::{InterpolatedLine, SUBDIVISIONS, interpolated_lines};
 use mapper_core::{NamedReference, ReferenceState, one_line};
 use mapper_physics::compressor_map::characteristic::CompressorCharacteristic;

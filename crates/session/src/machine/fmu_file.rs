@@ -1,9 +1,9 @@
 //! A machine as an FMU file, with its binary if a C compiler is there.
 
-use crate::{Session, SessionError};
 use crate::errors::FmuExportError;
 use crate::recording::files::{Existing, read_at_most, write_file, write_new};
 use crate::recording::recording_file::Recorded;
+use crate::{Session, SessionError};
 use mapper_campaign::Campaign;
 use mapper_core::ThermalModel;
 use mapper_fmu::{FmuFile, FmuMachine, FmuMap, archive, files, table_of_fit};

@@ -1,12 +1,14 @@
 //! Reads and writes map files by format.
 
-use crate::{Registry, SessionError};
 use crate::errors::MapWorkError;
 use crate::recording::files::{Existing, write_file};
+use crate::{Registry, SessionError};
 use mapper_campaign::Campaign;
-use mapper_core::{CompressorMap, ExportError, ImportedMap, ImportedTurbine, MAP_FILE_SIZE_LIMIT, MapDescription, MapFormat};
-use mapper_maps::{MapFitOptions, fit_map};
+use mapper_core::{
+    CompressorMap, ExportError, ImportedMap, ImportedTurbine, MAP_FILE_SIZE_LIMIT, MapDescription, MapFormat,
+};
 use mapper_maps::table::{read_description, set_key, unpack};
+use mapper_maps::{MapFitOptions, fit_map};
 use std::io::{Error, ErrorKind, Read};
 use std::path::Path;
 

@@ -1,13 +1,21 @@
 //! Commands on map files, of compressors and turbines: the result as text for people and as JSON for programs.
 
-use crate::{Registry, SessionError, write_file, write_map};
 use crate::errors::MapWorkError;
 use crate::machine::map_file::write_map_fitted_if_needed;
 use crate::recording::files::Existing;
-use mapper_core::{EfficiencyDefinition, ExportError, ImportError, ImportRemark, ImportedMap, ImportedTurbine, MapDescription, MapFormat, ReferenceState, TurbineMap};
-use mapper_maps::{MapFitOptions, compare, compare_turbines, convert_efficiency, correct_for_heat, fit_map, fit_turbine};
+use crate::{Registry, SessionError, write_file, write_map};
+use mapper_core::{
+    EfficiencyDefinition, ExportError, ImportError, ImportRemark, ImportedMap, ImportedTurbine,
+    MapDescription, MapFormat, ReferenceState, TurbineMap,
+};
 use mapper_maps::table::{description_text, turbine_description_text};
-use mapper_report::{distinct_names, heat_correction_text, import_remark_text, imported_map_text, imported_turbine_text, map_comparison_figure, map_comparison_text, map_fit_text, turbine_comparison_text, turbine_fit_text};
+use mapper_maps::{
+    MapFitOptions, compare, compare_turbines, convert_efficiency, correct_for_heat, fit_map, fit_turbine,
+};
+use mapper_report::{
+    distinct_names, heat_correction_text, import_remark_text, imported_map_text, imported_turbine_text,
+    map_comparison_figure, map_comparison_text, map_fit_text, turbine_comparison_text, turbine_fit_text,
+};
 use serde_json::{Value, json};
 use std::path::Path;
 

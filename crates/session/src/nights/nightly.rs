@@ -1,21 +1,21 @@
 //! A night of runs: its pieces, its rows in the history, and their comparison with earlier nights.
 
-use crate::{ErrorKind, Session, SessionError, SessionEvent};
 use crate::plan::planning::{nominal_model, plan};
-use crate::recording::run_directory;
 use crate::recording::files::{PROGRAM, json_text};
 use crate::recording::recording_file::Recorded;
+use crate::recording::run_directory;
 use crate::rig::drive::drive;
 use crate::rig::observers::Recorder;
 use crate::variant::{Variant, VariantError};
+use crate::{ErrorKind, Session, SessionError, SessionEvent};
 use mapper_campaign::{Campaign, Nightly};
 use mapper_core::{Method, Plan, RunEnding, Verdict};
 use mapper_fleet::Engine;
 use mapper_history::{Metric, PointRow, RunKey, RunRow};
 use mapper_numerics::statistics::mean;
 use mapper_physics::simulation::model::Model;
-use mapper_recording::{ChannelMap, ReadOptions, RecordingHeader, RecordingWriter, read_recording};
 use mapper_recording::score::ScoredPoint;
+use mapper_recording::{ChannelMap, ReadOptions, RecordingHeader, RecordingWriter, read_recording};
 use mapper_runner::{PlanSteps, RunEnd};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};

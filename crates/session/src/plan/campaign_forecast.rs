@@ -1,14 +1,17 @@
 //! Verdicts to expect from a campaign before its run, and the changes that make more points good.
 
-use crate::{Session, SessionError};
 use crate::plan::calibration_check::calibration_concerns;
 use crate::plan::planning::{PlanInputs, plan_of};
 use crate::plan::rehearsal::rehearse;
 use crate::recording::identification_config::identification;
 use crate::rig::drive::soak_s;
-use mapper_campaign::{Campaign, Concern};
+use crate::{Session, SessionError};
 use mapper_campaign::campaign::Date;
-use mapper_core::{Advice, CampaignChange, Dwell, Method, OperatingPoint, Plan, PlanStep, Soak, StepKind, UndeclaredForecast, VerdictForecast, WindowRule};
+use mapper_campaign::{Campaign, Concern};
+use mapper_core::{
+    Advice, CampaignChange, Dwell, Method, OperatingPoint, Plan, PlanStep, Soak, StepKind,
+    UndeclaredForecast, VerdictForecast, WindowRule,
+};
 use mapper_identify::{MAX_RESTING_ETA, ZeroSettings};
 use mapper_numerics::statistics::rms;
 use mapper_physics::laws::housing::{StandstillState, relax};

@@ -4,14 +4,19 @@ use crate::SessionError;
 use crate::recording::identification_config::{declared, identification};
 use mapper_campaign::Campaign;
 use mapper_core::{Channel, Method, OperatingPoint, Plan, PlanInputHashes, PlanRemark, Predicted, Recording};
-use mapper_identify::{IdentifyConfig, PressureTap, ZeroSettings, expected, expected_after_zero, expected_steady, expected_together};
+use mapper_identify::{
+    IdentifyConfig, PressureTap, ZeroSettings, expected, expected_after_zero, expected_steady,
+    expected_together,
+};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::reach::hold_speed;
 use mapper_physics::simulation::model::Model;
-use mapper_planner::{ForecastRow, MethodResult, MethodResults, PlanRequest, PredictedMethod, make_plan, sha256_hex};
+use mapper_planner::{
+    ForecastRow, MethodResult, MethodResults, PlanRequest, PredictedMethod, make_plan, sha256_hex,
+};
 use mapper_recording::ChannelMap;
-use mapper_runner::{HoldConditions, SurgeSearch, surge};
 use mapper_runner::surge::{SurgeErrors, SurgeMarks};
+use mapper_runner::{HoldConditions, SurgeSearch, surge};
 use std::collections::BTreeMap;
 
 /// The nominal model of a campaign.
@@ -262,8 +267,8 @@ pub(crate) fn find_surge_marks(
 
 #[cfg(test)]
 mod tests {
-    use crate::shipped;
     use super::*;
+    use crate::shipped;
 
     #[test]
     fn a_longer_soak_is_mentioned_if_it_reduces_an_offset_clearly() {

@@ -1,12 +1,15 @@
 //! Rehearses a sequence script, or the jumps of a plan, on the nominal machine, so that errors never reach the rig.
 
-use crate::{Session, SessionError};
 use crate::plan::planning::{add_surge_search, hash_inputs, plan};
 use crate::plan::scripted_steps::ScriptedSteps;
 use crate::rig::drive::drive;
+use crate::{Session, SessionError};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::{BackendChoice, SequenceSource};
-use mapper_core::{Channel, GuardName, GuardSet, OperatingPoint, Plan, PlanRemark, PlanStep, SampleBatch, StepMarker, VisitOrder};
+use mapper_core::{
+    Channel, GuardName, GuardSet, OperatingPoint, Plan, PlanRemark, PlanStep, SampleBatch, StepMarker,
+    VisitOrder,
+};
 use mapper_physics::simulation::model::Model;
 use mapper_runner::{ObserverError, PlanSteps, RunEnd, RunError, RunObserver, StepSource, StepSourceError};
 

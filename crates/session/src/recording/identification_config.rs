@@ -1,8 +1,11 @@
 //! Settings of an identification, from a campaign or a channel map, and warnings about calibrations.
 
-use mapper_campaign::{CalibrationWarning, Campaign, internal_area_sigma_ratio};
 use mapper_campaign::campaign::{CalibrationRule, Date};
-use mapper_core::{ALPHA_AREA_SIGMA_RATIO, Channel, DeclaredUncertainty, Dimension, IdentifiedPoint, Method, ModelTolerances, Recording, ReferenceState, Verdict, WindowRule};
+use mapper_campaign::{CalibrationWarning, Campaign, internal_area_sigma_ratio};
+use mapper_core::{
+    ALPHA_AREA_SIGMA_RATIO, Channel, DeclaredUncertainty, Dimension, IdentifiedPoint, Method,
+    ModelTolerances, Recording, ReferenceState, Verdict, WindowRule,
+};
 use mapper_identify::{IdentifyConfig, PressureTap};
 use mapper_numerics::statistics::range;
 use mapper_observe::declared_uncertainties;

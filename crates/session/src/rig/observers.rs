@@ -314,10 +314,10 @@ pub(crate) fn config_for_single_steps(config: IdentifyConfig) -> IdentifyConfig 
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use mapper_core::EventKind;
     use std::io;
     use std::thread::scope;
-    use super::*;
 
     /// Keeps the times of events, and fails at a given number of them.
     struct Counts {

@@ -1,16 +1,15 @@
 //! A complete run: makes the plan, drives the rig, records, identifies, assembles the map, and writes the report.
 
-use crate::{Session, SessionError, SessionEvent};
 use crate::analysis::results::{Results, RunPart};
 use crate::plan::planning::{hash_inputs, hold_near_surge, nominal_model, plan};
 use crate::plan::rehearsal::rehearse;
 use crate::plan::scripted_steps::ScriptedSteps;
 use crate::plan::stored_plan::stored_plan;
-use crate::recording::run_directory;
 use crate::recording::files::{PROGRAM, json_text, write_new};
 use crate::recording::identification_config::{declared, identification};
 use crate::recording::journal::{Entry, Identity, Journal, rig_sha256};
 use crate::recording::resume::{InterruptedRun, MissingSteps, depends_on_readings};
+use crate::recording::run_directory;
 use crate::rig::drive::{Pace, drive_paced, soak_s};
 use crate::rig::guards::check_guards;
 use crate::rig::observers::{EventForwarder, Recorder, StepEstimator, ThreadedObserver};
@@ -21,13 +20,16 @@ use crate::run::preflight::{check_room, check_setpoints};
 use crate::run::recording_metadata::metadata;
 use crate::run::replayed_steps::drive_resumed;
 use crate::run::run_end::{RunTermination, lockout_reason};
+use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::MapSource;
 use mapper_core::{Clock, Plan, PlanInputHashes, RigDescription, UnpacedClock};
 use mapper_physics::simulation::model::Model;
 use mapper_recording::{ChannelMap, RecordingHeader, RecordingWriter};
 use mapper_report::ending_sentence;
-use mapper_runner::{DeadlineBackend, Deadlines, DriftWatch, PlanSteps, RunError, RunObserver, StepSource, SurgeSearch};
+use mapper_runner::{
+    DeadlineBackend, Deadlines, DriftWatch, PlanSteps, RunError, RunObserver, StepSource, SurgeSearch,
+};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::Duration;

@@ -6,7 +6,7 @@ use crate::single_step::probe::{Probe, ProbeResponse};
 use crate::step_data::samples::{Row, Samples};
 use mapper_core::{Bound, InletConvection};
 use mapper_numerics::SLOPE_STEP;
-use mapper_numerics::least_squares::{Damping, DampingRule, MAX_ITERATIONS, is_negligible};
+use mapper_numerics::least_squares::{DampedFit, minimise};
 use mapper_numerics::statistics::rms;
 use mapper_physics::gas::air::Air;
 use mapper_physics::laws::compression::{CompressionInputs, compress, compressed_k};
@@ -155,32 +155,48 @@ pub(crate) fn fit(samples: &Samples, geometry: Geometry) -> Option<Fit> {
         return None;
     }
     let probe_response = ProbeResponse::of(samples, geometry.probe);
-    let residual = |at: [f64; 2]| residual_k(samples, geometry, probe_response.as_ref(), at);
     let at = start(samples, geometry);
-    let mut best = linearised(samples, geometry, probe_response.clone(), at, residual(at))?;
-    let mut damping = Damping::new(DampingRule::GOOD_START);
-    for _ in 0..MAX_ITERATIONS {
-        let cost = square(&best.residual_k);
-        let normal = products(&best.jacobian, &best.jacobian);
-        let right = right(&best.jacobian, &best.residual_k);
-        let trial = |damping: f64| {
-            let damped = normal + Matrix2::from_diagonal(&(damping * normal.diagonal()));
-            let step = inverted(damped)? * right;
-            let to = [
-                (best.eta + step[0]).clamp(ETA_BOUNDS.0, ETA_BOUNDS.1),
-                (best.h_w_m2k + step[1]).clamp(H_BOUNDS_W_M2K.0, H_BOUNDS_W_M2K.1),
-            ];
-            let there = residual(to);
-            (square(&there) < cost).then_some((to, there))
-        };
-        let Some((to, there)) = damping.search(trial) else { break };
-        let decrease = cost - square(&there);
-        best = linearised(samples, geometry, probe_response.clone(), to, there)?;
-        if is_negligible(decrease, cost, 0.0) {
-            break;
-        }
+    let residual = residual_k(samples, geometry, probe_response.as_ref(), at);
+    let fit = linearised(samples, geometry, probe_response, at, residual)?;
+    let mut descent = Descent { samples, geometry, fit };
+    minimise(&mut descent, 0.0)?;
+    Some(descent.fit)
+}
+
+/// A fit on its way to the minimum, with its derivatives.
+struct Descent<'a> {
+    samples: &'a Samples,
+    geometry: Geometry,
+    fit: Fit,
+}
+
+impl DampedFit for Descent<'_> {
+    type Equations = (Matrix2<f64>, Vector2<f64>);
+    /// Both parameters with the residual, K.
+    type Place = ([f64; 2], Vec<f64>);
+
+    fn linearise(&self) -> Option<(f64, Self::Equations)> {
+        let Fit { jacobian, residual_k, .. } = &self.fit;
+        Some((square(residual_k), (products(jacobian, jacobian), right(jacobian, residual_k))))
     }
-    Some(best)
+
+    fn step(&self, (normal, right): &Self::Equations, cost: f64, damping: f64) -> Option<(Self::Place, f64)> {
+        let Descent { samples, geometry, fit } = self;
+        let damped = normal + Matrix2::from_diagonal(&(damping * normal.diagonal()));
+        let step = inverted(damped)? * right;
+        let to = [
+            (fit.eta + step[0]).clamp(ETA_BOUNDS.0, ETA_BOUNDS.1),
+            (fit.h_w_m2k + step[1]).clamp(H_BOUNDS_W_M2K.0, H_BOUNDS_W_M2K.1),
+        ];
+        let there = residual_k(samples, *geometry, fit.probe_response.as_ref(), to);
+        let next = square(&there);
+        (next < cost).then_some(((to, there), next))
+    }
+
+    fn move_to(&mut self, (to, residual_k): Self::Place) -> Option<()> {
+        self.fit = linearised(self.samples, self.geometry, self.fit.probe_response.clone(), to, residual_k)?;
+        Some(())
+    }
 }
 
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {

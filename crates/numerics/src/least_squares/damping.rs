@@ -35,7 +35,7 @@ impl DampingRule {
 }
 
 /// Maximum number of iterations of a fit. Bound: a good start needs about ten.
-pub const MAX_ITERATIONS: usize = 60;
+const MAX_ITERATIONS: usize = 60;
 
 /// The stopping rule of every fit: an iteration decreases the cost, as predicted or as found, by no more than `enough`, or than rounding of the
 /// cost.
@@ -73,6 +73,43 @@ impl Damping {
         }
         None
     }
+}
+
+/// A sum of squares at its current place, to be minimised by damped steps.
+pub trait DampedFit {
+    /// Normal equations, dense or arrow-shaped.
+    type Equations;
+    /// Values of the unknowns.
+    type Place;
+
+    /// Cost and normal equations at the current place; `None` if they are not finite.
+    fn linearise(&self) -> Option<(f64, Self::Equations)>;
+
+    /// The place after a damped step, and its cost; `None` if the equations cannot be solved or the cost is above `cost`, that of the current
+    /// place.
+    fn step(&self, equations: &Self::Equations, cost: f64, damping: f64) -> Option<(Self::Place, f64)>;
+
+    /// Moves to a place; `None` if nothing is defined there.
+    fn move_to(&mut self, place: Self::Place) -> Option<()>;
+}
+
+/// Minimises the cost from the current place, until an iteration decreases it by `enough` or less. Returns the cost; `None` if the fit has no
+/// equations.
+pub fn minimise<F: DampedFit>(fit: &mut F, enough: f64) -> Option<f64> {
+    let mut damping = Damping::new(DampingRule::GOOD_START);
+    let mut best = f64::INFINITY;
+    for _ in 0..MAX_ITERATIONS {
+        let (cost, equations) = fit.linearise()?;
+        best = cost;
+        let trial = |damping| fit.step(&equations, cost, damping);
+        let Some((place, lower)) = damping.search(trial) else { break };
+        fit.move_to(place)?;
+        best = lower;
+        if is_negligible(cost - lower, lower, enough) {
+            break;
+        }
+    }
+    Some(best)
 }
 
 #[cfg(test)]

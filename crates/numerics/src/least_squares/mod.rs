@@ -15,5 +15,5 @@ mod dense;
 pub mod descent;
 
 pub use arrow::{Arrow, ArrowBlock, Reduced};
-pub use damping::{Damping, DampingRule, MAX_ITERATIONS, is_negligible};
+pub use damping::{DampedFit, Damping, DampingRule, minimise};
 pub use dense::{damped_step, inverse};

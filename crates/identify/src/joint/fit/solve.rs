@@ -9,9 +9,7 @@ use crate::joint::step_model::parameters::{
 use mapper_core::IdentifiedInlet;
 use mapper_numerics::coloured_noise::WhiteningFilter;
 use mapper_numerics::least_squares::descent::ENOUGH;
-use mapper_numerics::least_squares::{
-    Arrow, ArrowBlock, Damping, DampingRule, MAX_ITERATIONS, Reduced, is_negligible,
-};
+use mapper_numerics::least_squares::{Arrow, ArrowBlock, DampedFit, Reduced, minimise};
 use mapper_numerics::parallel;
 use nalgebra::{DMatrix, DVector, Matrix4, Matrix4xX, Vector4};
 
@@ -63,6 +61,67 @@ pub(crate) struct Problem<'a> {
 struct Normal {
     cost: f64,
     equations: Arrow<LOCAL>,
+}
+
+/// A fit on its way to the minimum.
+struct Descent<'p, 'a> {
+    problem: &'p mut Problem<'a>,
+    /// Indices of the fitted shared parameters.
+    fitted: Vec<usize>,
+}
+
+impl DampedFit for Descent<'_, '_> {
+    type Equations = Arrow<LOCAL>;
+    type Place = (SharedVector, Vec<LocalVector>);
+
+    fn linearise(&self) -> Option<(f64, Arrow<LOCAL>)> {
+        let Normal { cost, equations } = self.problem.normal(&self.fitted);
+        cost.is_finite().then_some((cost, equations))
+    }
+
+    fn step(&self, equations: &Arrow<LOCAL>, cost: f64, damping: f64) -> Option<(Self::Place, f64)> {
+        let Descent { problem, fitted } = self;
+        let (change, own) = equations.step(damping)?;
+        let mut shared = problem.shared;
+        for (row, index) in fitted.iter().enumerate() {
+            shared[*index] = (shared[*index] + change[row]).max(problem.lowest[*index]);
+        }
+        let locals: Vec<LocalVector> = problem
+            .members
+            .iter()
+            .zip(&own)
+            .map(|(member, change)| std::array::from_fn(|i| member.local[i] + change[i]))
+            .collect();
+        let next = problem.cost(&shared, &locals);
+        (next <= cost * (1.0 + COST_ROUNDING)).then_some(((shared, locals), next))
+    }
+
+    fn move_to(&mut self, (shared, locals): Self::Place) -> Option<()> {
+        let Descent { problem, fitted } = self;
+        // A parameter on its bound stays there while the others are fitted.
+        fitted.retain(|index| shared[*index] > problem.lowest[*index]);
+        for (active, (value, lowest)) in problem.active.iter_mut().zip(shared.iter().zip(&problem.lowest)) {
+            *active &= value > lowest;
+        }
+        // An excluded step is not in the cost: it moves only if its own fit improves.
+        let moves: Vec<bool> = problem
+            .members
+            .iter()
+            .zip(&locals)
+            .map(|(member, local)| {
+                member.shares
+                    || problem.local_cost(member, &shared, local)
+                        <= problem.local_cost(member, &shared, &member.local)
+            })
+            .collect();
+        problem.shared = shared;
+        for ((member, local), moves) in problem.members.iter_mut().zip(locals).zip(moves) {
+            if moves {
+                member.local = local;
+            }
+        }
+        Some(())
+    }
 }
 
 /// Covariance of all parameters, as far as needed.
@@ -303,60 +362,8 @@ impl Problem<'_> {
 
     /// Ends if an iteration decreases the cost by `enough` or less.
     fn descend(&mut self, enough: f64) -> Option<f64> {
-        let mut fitted = self.fitted();
-        let mut damping = Damping::new(DampingRule::GOOD_START);
-        let mut best = f64::INFINITY;
-        for _ in 0..MAX_ITERATIONS {
-            let normal = self.normal(&fitted);
-            best = normal.cost;
-            if !best.is_finite() {
-                return None;
-            }
-            let trial = |damping| {
-                let (change, own) = normal.equations.step(damping)?;
-                let mut shared = self.shared;
-                for (row, index) in fitted.iter().enumerate() {
-                    shared[*index] = (shared[*index] + change[row]).max(self.lowest[*index]);
-                }
-                let locals: Vec<LocalVector> = self
-                    .members
-                    .iter()
-                    .zip(&own)
-                    .map(|(member, change)| std::array::from_fn(|i| member.local[i] + change[i]))
-                    .collect();
-                let cost = self.cost(&shared, &locals);
-                (cost <= best * (1.0 + COST_ROUNDING)).then_some((shared, locals, cost))
-            };
-            let Some((shared, locals, cost)) = damping.search(trial) else { break };
-            // A parameter on its bound stays there while the others are fitted.
-            fitted.retain(|index| shared[*index] > self.lowest[*index]);
-            for (active, (value, lowest)) in self.active.iter_mut().zip(shared.iter().zip(&self.lowest)) {
-                *active &= value > lowest;
-            }
-            // An excluded step is not in the cost: it moves only if its own fit improves.
-            let moves: Vec<bool> = self
-                .members
-                .iter()
-                .zip(&locals)
-                .map(|(member, local)| {
-                    member.shares
-                        || self.local_cost(member, &shared, local)
-                            <= self.local_cost(member, &shared, &member.local)
-                })
-                .collect();
-            self.shared = shared;
-            for ((member, local), moves) in self.members.iter_mut().zip(locals).zip(moves) {
-                if moves {
-                    member.local = local;
-                }
-            }
-            let decrease = best - cost;
-            best = cost;
-            if is_negligible(decrease, cost, enough) {
-                break;
-            }
-        }
-        Some(best)
+        let fitted = self.fitted();
+        minimise(&mut Descent { problem: self, fitted }, enough)
     }
 
     /// Values of some shared parameters after one undamped step, ignoring bounds.

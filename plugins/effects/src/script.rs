@@ -6,11 +6,10 @@
 mod engine;
 mod error;
 mod header;
-mod hook_names;
 mod hooks;
 
+pub use crate::script::hooks::HOOK_NAMES;
 pub use error::ScriptEffectError;
-pub use hook_names::HOOK_NAMES;
 
 use engine::Program;
 use header::Header;

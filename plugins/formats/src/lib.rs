@@ -4,9 +4,7 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-mod fitted_items;
 mod heading;
-mod labels;
 mod map_picture;
 mod simulation_table;
 mod turbine;

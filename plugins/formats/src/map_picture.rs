@@ -1,15 +1,17 @@
-//! The map as a picture: (a) pressure ratio over flow with efficiency contours, (b) efficiency over flow.
-//!
-//! The marker size in (a) shows the uncertainty of a point, in classes of its 95 % interval (text would cover the
-//! map), and (b) shows the interval itself as a bar. Shape and colour distinguish good from doubtful; points without
-//! an efficiency are hollow.
+//! The picture of a map: lines, points, contours of efficiency, and the fitted surface.
 
-use crate::fitted_items;
-use crate::heading::efficiency_name;
-use crate::labels::{percent, speed};
-use mapper_chart::efficiency_mesh::{contour_levels, efficiency_surface, points_surge_to_choke, speed_curve};
-use mapper_chart::{Axis, Contours, Figure, Line, LineEnd, Marker, Panel, Scatter, ScatterPoint, palette};
-use mapper_core::{CompressorMap, MapPoint, MapUnits, Method, SurgeMark, Verdict, confidence_interval_95};
+use crate::heading::{efficiency_name, percent, speed};
+use mapper_chart::efficiency_mesh::{
+    SUBDIVISIONS, contour_levels, efficiency_surface, fitted_surface, interpolate_between_lines,
+    points_surge_to_choke, speed_curve,
+};
+use mapper_chart::{
+    Axis, Contours, Dash, Figure, Line, LineEnd, Marker, Panel, Polygon, Scatter, ScatterPoint, palette,
+};
+use mapper_core::{
+    CompressorMap, FittedLine, FittedMap, FittedNode, MapPoint, MapUnits, Method, SpeedLine, SurgeMark,
+    Verdict, confidence_interval_95,
+};
 
 /// The map as a figure of two panels in these units, efficiency in %.
 pub fn map_figure(map: &CompressorMap, units: &MapUnits) -> Figure {
@@ -48,7 +50,7 @@ fn map_panel(map: &CompressorMap, units: &MapUnits) -> Panel {
     let mut panel = Panel::new(flow_axis(units), Axis::new("total pressure ratio P2/P1"))
         .title(format!("(a) speed lines ({}, corrected) and efficiency contours (%)", units.speed));
     match &map.fitted {
-        Some(fitted) => fitted_items::add_map(&mut panel, fitted, units),
+        Some(fitted) => add_map(&mut panel, fitted, units),
         None => add_measured_lines(&mut panel, map, units),
     }
     if !map.surge.is_empty() {
@@ -104,7 +106,7 @@ fn efficiency_panel(map: &CompressorMap, units: &MapUnits) -> Panel {
     let mut panel =
         Panel::new(flow_axis(units), Axis::new(name)).title("(b) efficiency with its 95 % interval");
     if let Some(fitted) = &map.fitted {
-        fitted_items::add_eta(&mut panel, map, fitted);
+        add_eta(&mut panel, map, fitted);
     }
     let last = map.lines.len().saturating_sub(1).max(1) as f64;
     for (index, line) in map.lines.iter().enumerate() {
@@ -190,6 +192,162 @@ impl Class {
                 Scatter::new(points, palette::VERMILLION).marker(Marker::Diamond).size_px(self.size_px)
             }
             Verdict::Unusable => Scatter::new(points, palette::INK).hollow().size_px(self.size_px),
+        }
+    }
+}
+
+const SURGE: palette::Colour = palette::VERMILLION;
+const CHOKE: palette::Colour = palette::PURPLE;
+/// All items below the points in the panel of pressure ratio over flow.
+pub(crate) fn add_map(panel: &mut Panel, fitted: &FittedMap, units: &MapUnits) {
+    add_shade(panel, fitted);
+    if let Some(grid) = fitted_surface(fitted) {
+        let levels = contour_levels(grid.value_range());
+        panel.add(Contours::new(grid, &levels, percent));
+    }
+    for line in &fitted.lines {
+        let all = || line.nodes.iter().map(|n| (place(n), n.extrapolated));
+        let colour = if line.measured { palette::INK } else { palette::GREY };
+        panel.add(Line::new(runs(all(), true), palette::GREY).width_px(1.0).dash(Dash::Dashed));
+        panel.add(Line::new(runs(all(), false), colour).width_px(1.3));
+    }
+    // If two speed labels overlap, the first one is kept, so measured lines come first.
+    let (measured, others): (Vec<&FittedLine>, Vec<&FittedLine>) =
+        fitted.lines.iter().partition(|line| line.measured);
+    for line in measured.into_iter().chain(others) {
+        let colour = if line.measured { palette::INK } else { palette::GREY };
+        // An invisible line at the last visible node carries the speed label.
+        let end = line.nodes.iter().find(|n| !n.extrapolated).or_else(|| middle(line)).map(place);
+        panel.add(
+            Line::new(end.into_iter().collect(), colour)
+                .width_px(0.0)
+                .end_label(speed(line.speed_corrected_rpm, units), LineEnd::Last),
+        );
+    }
+    let surge: Vec<(f64, f64)> = fitted.surge_line().map(|(_, n)| place(n)).collect();
+    let choke: Vec<(f64, f64)> = fitted.choke_line().map(|(_, n)| place(n)).collect();
+    panel.add(Line::new(surge, SURGE).width_px(1.6).dash(Dash::DashDot).label("surge-side end of the lines"));
+    panel.add(Line::new(choke, CHOKE).width_px(1.6).dash(Dash::Dotted).label("choke"));
+    panel.add(Line::new(Vec::new(), palette::GREY).width_px(1.0).dash(Dash::Dashed).label("extrapolated"));
+}
+
+/// Fitted efficiency of the measured lines over flow, with its 95 % band, within each line's measured range. Beyond, towards
+/// pressure ratio 1, it falls to 0 and would compress the measured range into the top of the picture.
+pub(crate) fn add_eta(panel: &mut Panel, map: &CompressorMap, fitted: &FittedMap) {
+    let measured: Vec<&FittedLine> = fitted.lines.iter().filter(|line| line.measured).collect();
+    let last = measured.len().saturating_sub(1).max(1) as f64;
+    for (index, (line, own)) in measured.iter().zip(&map.lines).enumerate() {
+        let colour = palette::sequential(index as f64 / last);
+        let drawn = between_points(line, own);
+        let side = |low: bool| {
+            drawn.iter().map(move |(flow_kg_s, eta, standard_error)| {
+                let (below, above) = confidence_interval_95(*eta, *standard_error);
+                (*flow_kg_s, 100.0 * if low { below } else { above })
+            })
+        };
+        let mut band: Vec<(f64, f64)> = side(true).collect();
+        band.extend(side(false).collect::<Vec<_>>().into_iter().rev());
+        panel.add(Polygon { opacity: 0.25, ..Polygon::new(band, colour) });
+        let curve = drawn.iter().map(|(flow_kg_s, eta, _)| (*flow_kg_s, 100.0 * eta)).collect();
+        panel.add(Line::new(curve, colour).width_px(1.2));
+    }
+}
+
+/// A point on a line's curve: flow, efficiency and its standard error.
+type CurvePoint = (f64, f64, f64);
+
+/// The curve of a line between its largest and its smallest measured flow, interpolated at its ends, and above its lowest
+/// efficiency: at choke the flow no longer shows the end of the measured range.
+fn between_points(line: &FittedLine, own: &SpeedLine) -> Vec<CurvePoint> {
+    let points = || own.points.iter().filter(|point| point.eta.is_some());
+    let flows = || points().map(|point| point.flow_corrected_kg_s);
+    let (smallest_kg_s, largest_kg_s) =
+        (flows().fold(f64::INFINITY, f64::min), flows().fold(f64::NEG_INFINITY, f64::max));
+    let lowest =
+        points().filter_map(|point| point.identified.eta_low.or(point.eta)).fold(f64::INFINITY, f64::min);
+    let mut drawn: Vec<CurvePoint> = Vec::new();
+    let mut before: Option<CurvePoint> = None;
+    // From choke to surge.
+    for node in line.nodes.iter().map(|n| (n.flow_corrected_kg_s, n.eta, n.eta_standard_error)) {
+        let (flow_kg_s, eta, _) = node;
+        if flow_kg_s < smallest_kg_s {
+            drawn.extend(
+                before.filter(|_| !drawn.is_empty()).map(|before| at_flow(before, node, smallest_kg_s)),
+            );
+            break;
+        }
+        if flow_kg_s <= CHOKED_RATIO * largest_kg_s && (eta >= lowest || !drawn.is_empty()) {
+            let beyond = before.filter(|before| drawn.is_empty() && before.0 > CHOKED_RATIO * largest_kg_s);
+            drawn.extend(beyond.map(|before| at_flow(before, node, largest_kg_s)));
+            drawn.push(node);
+        }
+        before = Some(node);
+    }
+    drawn
+}
+
+/// A line is choked if its flow changes by less than this factor from one measured point to the next.
+const CHOKED_RATIO: f64 = 1.01;
+
+/// The curve between two nodes, interpolated in flow.
+fn at_flow(a: CurvePoint, b: CurvePoint, flow_kg_s: f64) -> CurvePoint {
+    let share = (a.0 - flow_kg_s) / (a.0 - b.0);
+    let at = |a: f64, b: f64| a + share * (b - a);
+    (flow_kg_s, at(a.1, b.1), at(a.2, b.2))
+}
+
+fn place(node: &FittedNode) -> (f64, f64) {
+    (node.flow_corrected_kg_s, node.pressure_ratio)
+}
+
+fn middle(line: &FittedLine) -> Option<&FittedNode> {
+    line.nodes.get(line.nodes.len() / 2)
+}
+
+/// Points of one kind; NaN breaks the line at a change of kind. A dashed line extends to its solid neighbours.
+fn runs(points: impl Iterator<Item = ((f64, f64), bool)>, extrapolated: bool) -> Vec<(f64, f64)> {
+    let all: Vec<((f64, f64), bool)> = points.collect();
+    let belongs = |i: usize| {
+        all[i].1 == extrapolated
+            || extrapolated && (i > 0 && all[i - 1].1 || i + 1 < all.len() && all[i + 1].1)
+    };
+    (0..all.len()).map(|i| if belongs(i) { all[i].0 } else { (f64::NAN, f64::NAN) }).collect()
+}
+
+/// Grey between neighbouring lines if a corner is extrapolated, one polygon for each run of nodes. From line to line
+/// it has the same boundary curves as the contours, so that no white gap remains.
+fn add_shade(panel: &mut Panel, fitted: &FittedMap) {
+    let speeds: Vec<f64> = fitted.lines.iter().map(|line| line.speed_corrected_rpm).collect();
+    if speeds.len() < 2 || !speeds.windows(2).all(|w| w[1] > w[0]) {
+        return;
+    }
+    let side = |column: usize, pair: usize| -> Vec<(f64, f64)> {
+        let over_speed = |value: fn(&FittedNode) -> f64| {
+            let values: Vec<f64> =
+                fitted.lines.iter().map(|line| line.nodes.get(column).map_or(f64::NAN, value)).collect();
+            interpolate_between_lines(&speeds, &values)
+        };
+        let (flow, ratio) = (over_speed(|n| n.flow_corrected_kg_s), over_speed(|n| n.pressure_ratio));
+        (pair * SUBDIVISIONS..=(pair + 1) * SUBDIVISIONS).map(|i| (flow[i], ratio[i])).collect()
+    };
+    for (index, pair) in fitted.lines.windows(2).enumerate() {
+        let (low, high) = (&pair[0].nodes, &pair[1].nodes);
+        let grey = |i: usize| [&low[i], &low[i + 1], &high[i], &high[i + 1]].iter().any(|n| n.extrapolated);
+        let cells = low.len().min(high.len()).saturating_sub(1);
+        let mut start = 0;
+        while start < cells {
+            if !grey(start) {
+                start += 1;
+                continue;
+            }
+            let end = (start..cells).take_while(|i| grey(*i)).last().unwrap_or(start) + 1;
+            let mut outline: Vec<(f64, f64)> = low[start..=end].iter().map(place).collect();
+            outline.extend(side(end, index));
+            outline.extend(high[start..=end].iter().rev().map(place));
+            outline.extend(side(start, index).into_iter().rev());
+            panel
+                .add(Polygon { opacity: 0.16, ..Polygon::new(outline, palette::GREY).label("extrapolated") });
+            start = end;
         }
     }
 }

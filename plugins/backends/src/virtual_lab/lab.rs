@@ -9,9 +9,7 @@ use crate::virtual_lab::rig::drift::LabDrift;
 use crate::virtual_lab::rig::inputs::{LabInputs, MIN_EXPANSION_RATIO};
 use crate::virtual_lab::rig::precursor::Resonator;
 use crate::virtual_lab::rig::running::RunningMachine;
-use crate::virtual_lab::sensors::elements::ElementBank;
-use crate::virtual_lab::sensors::second_order::SecondOrderFollower;
-use crate::virtual_lab::sensors::sensor::Sensor;
+use crate::virtual_lab::sensors::{ElementBank, SecondOrderFollower, Sensor};
 use mapper_core::{
     Backend, BackendError, CHANNELS, Channel, Event, EventKind, GuardName, MODELLED_CHANNELS, RigDescription,
     RigMode, SafeTrajectory, SampleBatch, Setpoints,

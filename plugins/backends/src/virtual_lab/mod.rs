@@ -9,6 +9,9 @@ mod sensors;
 mod settings;
 mod truth;
 
+pub use crate::virtual_lab::sensors::SecondOrder;
+pub use crate::virtual_lab::sensors::SensorErrors;
+pub use crate::virtual_lab::sensors::{LabElement, LabElements};
 pub use campaign_keys::setting_problem::{SettingProblem, check_range};
 pub use campaign_keys::settings_file::read_settings;
 pub use lab::VirtualLab;
@@ -20,9 +23,6 @@ pub use rig::inputs::LabInputs;
 pub use rig::precursor::SurgePrecursor;
 pub use rig::running::{RunningMachine, Structure, StructureError};
 pub use rig::tolerances::draw_tolerances;
-pub use sensors::elements::{LabElement, LabElements};
-pub use sensors::second_order::SecondOrder;
-pub use sensors::sensor::SensorErrors;
 pub use settings::{LabSettings, Start};
 
 use mapper_core::{Backend, BackendError};

@@ -4,9 +4,7 @@ use super::settings::LabSettings;
 use super::truth::TruthRecorder;
 use crate::virtual_lab::rig::drift;
 use crate::virtual_lab::rig::precursor::{P2_SHARE, Resonator, Swing};
-use crate::virtual_lab::sensors::elements::ElementBank;
-use crate::virtual_lab::sensors::second_order::SecondOrderFollower;
-use crate::virtual_lab::sensors::sensor::Sensor;
+use crate::virtual_lab::sensors::{ElementBank, SecondOrderFollower, Sensor};
 use mapper_core::{
     CHANNELS, Channel, ChannelColumn, ElementColumn, Event, MODELLED_CHANNELS, SampleBatch, Setpoints,
 };

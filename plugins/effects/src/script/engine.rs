@@ -1,7 +1,7 @@
 //! The script engine: its restrictions, its limits, and one instance per thread.
 
 use super::header::Mistake;
-use super::hook_names::HOOK_NAMES;
+use crate::script::hooks::HOOK_NAMES;
 use mapper_core::Channel;
 use mapper_physics::machine::hooks::Site;
 use mapper_physics::rig::effect::{EffectError, NamedValues};
@@ -10,9 +10,8 @@ use rhai::{AST, CallFnOptions, Dynamic, Engine, FuncArgs, ParseError, Position, 
 use std::cell::RefCell;
 use std::collections::{BTreeSet, HashMap};
 use std::rc::Rc;
-use std::sync::Arc;
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
 
 /// Maximum operations of one call: a hook is called some million times in a run.
 const MAX_OPERATIONS: u64 = 10_000;

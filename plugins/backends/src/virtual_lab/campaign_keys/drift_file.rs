@@ -2,7 +2,7 @@
 
 use crate::virtual_lab::campaign_keys::setting_problem::SettingProblem;
 use crate::virtual_lab::rig::drift::{DriftTarget, LabDrift};
-use crate::virtual_lab::sensors::draws::offset_kind;
+use crate::virtual_lab::sensors::offset_kind;
 use mapper_core::{BackendError, Channel, Dimension};
 use mapper_yaml::units::{Kind, Quantity};
 use serde::Deserialize;

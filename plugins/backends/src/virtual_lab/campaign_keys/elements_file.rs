@@ -1,9 +1,7 @@
 //! The lab's redundant sensors as declared, and `faults:` below `virtual_lab`: offset, slow or stuck sensors.
 
 use crate::virtual_lab::campaign_keys::setting_problem::{SettingProblem, check_range};
-use crate::virtual_lab::sensors::draws::{Draws, offset_kind};
-use crate::virtual_lab::sensors::elements::{LabElement, LabElements, stream};
-use crate::virtual_lab::sensors::sensor::SensorErrors;
+use crate::virtual_lab::sensors::{Draws, LabElement, LabElements, SensorErrors, offset_kind, stream};
 use mapper_core::{BackendError, Channel, DeclaredElement, Element};
 use mapper_physics::rig::backend_plugin::NominalRig;
 use mapper_yaml::units::{Duration, Length, Quantity};

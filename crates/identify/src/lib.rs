@@ -1,8 +1,17 @@
 //! Identifies points from a recording: efficiency and heat-transfer coefficient, with their uncertainty.
 //!
-//! [`identify`] is a function from a [`Recording`](mapper_core::Recording) to points, one for each step.
-//! `dynamic` is the method of Burke et al., section 3; `steady` is conventional mapping. This crate has no access to a simulator's true
-//! values.
+//! [`identify_recording`] is a function from a [`Recording`](mapper_core::Recording) to points, one for each step. This crate has no access to
+//! a simulator's true values. Its stages:
+//!
+//! 1. Every step gets its end state, the mean over its last seconds; [`isothermal_zero()`] has determined the offsets to subtract before.
+//! 2. Every step is fitted alone: `dynamic` finds the efficiency and the h whose T2, by eqs. 1-3, is closest to the measured one (Burke et al.,
+//!    section 3); `steady` sets h to zero at the end of the step.
+//! 3. The readings are checked against physics and against each other. A contradiction is searched for the fault of a sensor or of the machine
+//!    that explains it; steps that stay contradicted are refused.
+//! 4. `joint` fits all steps together: one law of h and a smooth efficiency for all, alpha_A, probe and heating/cooling ratio neutral or free.
+//!    Errors that are not estimated, offsets and gains, are carried into the intervals.
+//! 5. The smoothness of the map over speed corrects offsets that a zero did not remove.
+//! 6. Every point gets an interval with its budget by source, a verdict and its reasons.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

@@ -6,7 +6,7 @@ use std::path::Path;
 /// Crates whose errors the Python package, a live page and the CLI show.
 const LIBRARIES: [&str; 7] = ["core", "fleet", "history", "live", "maps", "recording", "session"];
 
-/// The CLI adds the command or option for the remedy, in its `output/remedy.rs`; elsewhere there is none.
+/// The CLI adds the command or option for the remedy, in its `output/failure.rs`; elsewhere there is none.
 #[test]
 fn no_error_names_a_command_or_an_option_of_the_cli() {
     let mut errors = 0;

@@ -36,10 +36,10 @@ fn main() -> ExitCode {
             output::output_options::set_commands(Arguments::command);
             match arguments.command.run() {
                 Ok(()) => ExitCode::SUCCESS,
-                Err(failure) => output::failure::failed(&failure),
+                Err(failure) => output::exit_report::failed(&failure),
             }
         }
-        Err(error) if error.use_stderr() => output::failure::wrong_arguments(error, json),
+        Err(error) if error.use_stderr() => output::exit_report::wrong_arguments(error, json),
         Err(error) => error.exit(),
     }
 }

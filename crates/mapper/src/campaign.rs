@@ -2,7 +2,6 @@
 
 use crate::error::{Error, show_in_campaign};
 use crate::plugins::plugins;
-use crate::run::{Run, RunOptions};
 use mapper_campaign::CampaignError;
 use mapper_core::Plan;
 use mapper_session::{
@@ -107,24 +106,6 @@ impl Campaign {
         let mut request = inputs.request(settings, &model);
         request.effort = effort;
         Ok(Rehearsal { plan: plan_of(settings, &request)?, notes: Vec::new() })
-    }
-
-    /// Runs the campaign on its simulated rig, as fast as possible: plan, steps, recording, identification, map and report. The files are
-    /// in a new directory below the campaign's `outputs.directory`.
-    ///
-    /// # Errors
-    /// As [`Campaign::run_with`].
-    pub fn run(&self) -> Result<Run, Error> {
-        self.run_with(RunOptions::default())
-    }
-
-    /// The same with options: directory, pace, stop flag, observer.
-    ///
-    /// # Errors
-    /// If no plan is possible, the rig is not available or fails, a file cannot be written, or the finished recording cannot be identified. A
-    /// run that a guard or the operator stopped is not an error: [`Run::ending`] says so, and the rig is safe.
-    pub fn run_with(&self, options: RunOptions) -> Result<Run, Error> {
-        options.run(self)
     }
 
     /// An error of a session with this campaign, at its place in the text if it has one.

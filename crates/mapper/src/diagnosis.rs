@@ -59,6 +59,32 @@ impl DiagnosisOptions {
     }
 }
 
+impl Recording {
+    /// Explains where the rig departs from the nominal machine of this campaign, with the effect library of the plug-ins.
+    ///
+    /// # Errors
+    /// If the recording is of another machine, required data are missing, or the nominal model cannot follow it.
+    pub fn diagnose(&self, campaign: &Campaign) -> Result<Diagnosis, Error> {
+        self.diagnose_with(campaign, &DiagnosisOptions::default())
+    }
+
+    /// The same with options: effects of your own, a baseline, an observer.
+    ///
+    /// # Errors
+    /// As [`Recording::diagnose`].
+    pub fn diagnose_with(&self, campaign: &Campaign, options: &DiagnosisOptions) -> Result<Diagnosis, Error> {
+        options.diagnose(self, campaign)
+    }
+
+    /// Diagnoses, and identifies the readings again without the causes found.
+    ///
+    /// # Errors
+    /// As [`Recording::diagnose`] and [`Recording::identify`].
+    pub fn correct(&self, campaign: &Campaign, options: &DiagnosisOptions) -> Result<Correction, Error> {
+        options.correct(self, campaign)
+    }
+}
+
 /// Verdict, causes with their probabilities, locations, gap reduction, and the next experiment.
 pub struct Diagnosis {
     gap: Gap,

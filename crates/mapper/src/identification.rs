@@ -41,6 +41,16 @@ pub fn identify(
     Ok(described.identification(found))
 }
 
+impl Recording {
+    /// Identifies efficiency and heat transfer of every step, with the machine and the sensors of this campaign.
+    ///
+    /// # Errors
+    /// If the recording is of another machine, or data that the method needs are missing.
+    pub fn identify(&self, campaign: &Campaign) -> Result<Identification, Error> {
+        identify(std::slice::from_ref(self), Some(campaign), None)
+    }
+}
+
 /// What the results need to know of the files.
 pub(crate) struct Described {
     machine: String,

@@ -1,9 +1,7 @@
 //! Recordings: of runs, and of other programs.
 
 use crate::campaign::Campaign;
-use crate::diagnosis::{Correction, Diagnosis, DiagnosisOptions};
 use crate::error::Error;
-use crate::identification::{Identification, identify};
 use crate::plugins::plugins;
 use mapper_core::{Channel, Event, Series, StepMarker};
 use mapper_recording::{ChannelMap, ChannelMapError};
@@ -104,38 +102,6 @@ impl Recording {
     /// Problems of the files that did not prevent reading them.
     pub fn warnings(&self) -> Vec<String> {
         self.parts().iter().flat_map(|part| &part.read.warnings).map(ToString::to_string).collect()
-    }
-
-    /// Identifies efficiency and heat transfer of every step, with the machine and the sensors of this campaign.
-    ///
-    /// # Errors
-    /// If the recording is of another machine, or data that the method needs are missing.
-    pub fn identify(&self, campaign: &Campaign) -> Result<Identification, Error> {
-        identify(std::slice::from_ref(self), Some(campaign), None)
-    }
-
-    /// Explains where the rig departs from the nominal machine of this campaign, with the effect library of the plug-ins.
-    ///
-    /// # Errors
-    /// If the recording is of another machine, required data are missing, or the nominal model cannot follow it.
-    pub fn diagnose(&self, campaign: &Campaign) -> Result<Diagnosis, Error> {
-        self.diagnose_with(campaign, &DiagnosisOptions::default())
-    }
-
-    /// The same with options: effects of your own, a baseline, an observer.
-    ///
-    /// # Errors
-    /// As [`Recording::diagnose`].
-    pub fn diagnose_with(&self, campaign: &Campaign, options: &DiagnosisOptions) -> Result<Diagnosis, Error> {
-        options.diagnose(self, campaign)
-    }
-
-    /// Diagnoses, and identifies the readings again without the causes found.
-    ///
-    /// # Errors
-    /// As [`Recording::diagnose`] and [`Recording::identify`].
-    pub fn correct(&self, campaign: &Campaign, options: &DiagnosisOptions) -> Result<Correction, Error> {
-        options.correct(self, campaign)
     }
 
     /// The parts with a given campaign in place of their own.

@@ -88,6 +88,26 @@ impl RunOptions {
     }
 }
 
+impl Campaign {
+    /// Runs the campaign on its simulated rig, as fast as possible: plan, steps, recording, identification, map and report. The files are
+    /// in a new directory below the campaign's `outputs.directory`.
+    ///
+    /// # Errors
+    /// As [`Campaign::run_with`].
+    pub fn run(&self) -> Result<Run, Error> {
+        self.run_with(RunOptions::default())
+    }
+
+    /// The same with options: directory, pace, stop flag, observer.
+    ///
+    /// # Errors
+    /// If no plan is possible, the rig is not available or fails, a file cannot be written, or the finished recording cannot be identified. A
+    /// run that a guard or the operator stopped is not an error: [`Run::ending`] says so, and the rig is safe.
+    pub fn run_with(&self, options: RunOptions) -> Result<Run, Error> {
+        options.run(self)
+    }
+}
+
 fn refused(why: String) -> Error {
     SessionError::Preflight(why).into()
 }

@@ -8,7 +8,7 @@ mod error;
 mod header;
 mod hooks;
 
-pub use crate::script::hooks::HOOK_NAMES;
+pub use crate::script::engine::HOOK_NAMES;
 pub use error::ScriptEffectError;
 
 use engine::Program;

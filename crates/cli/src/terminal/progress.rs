@@ -1,6 +1,6 @@
 //! Progress on standard error: a bar, lines, or JSON.
 
-use crate::output::standard_output::say;
+use crate::output::standard_error::say;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use mapper_core::{StepKind, StepMarker, terminal_json, terminal_text};
 use mapper_report::{progress_text, short_duration, with_messages, wrapped};

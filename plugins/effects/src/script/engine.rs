@@ -1,7 +1,6 @@
 //! The script engine: its restrictions, its limits, and one instance per thread.
 
 use super::header::Mistake;
-use crate::script::hooks::HOOK_NAMES;
 use mapper_core::Channel;
 use mapper_physics::machine::hooks::Site;
 use mapper_physics::rig::effect::{EffectError, NamedValues};
@@ -12,6 +11,22 @@ use std::collections::{BTreeSet, HashMap};
 use std::rc::Rc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
+
+/// Functions a script may define, in addition to `reading_CHANNEL(at, p, value)`, with the number of their arguments:
+/// `(at, p, value)` returns the value for the model, `(at, p)` a term to add.
+pub const HOOK_NAMES: [(&str, usize); 11] = [
+    ("flow_kg_s", 3),
+    ("efficiency", 3),
+    ("h_w_m2k", 3),
+    ("gas_before_k", 3),
+    ("gas_after_k", 3),
+    ("gas_outlet_k", 3),
+    ("heat_to_compressor_w", 2),
+    ("heat_to_inner_w", 2),
+    ("heat_to_turbine_w", 2),
+    ("shaft_torque_nm", 2),
+    ("flow_to_outlet_kg_s", 2),
+];
 
 /// Maximum operations of one call: a hook is called some million times in a run.
 const MAX_OPERATIONS: u64 = 10_000;

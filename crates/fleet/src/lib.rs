@@ -14,7 +14,7 @@ mod status;
 mod submit;
 mod work;
 
-pub use directory::files::FleetError;
+pub use directory::files::{FleetError, StudyFileError};
 pub use directory::files::Hash;
 pub use directory::files::Machine;
 pub use directory::fleet::CreatedStudy;
@@ -24,7 +24,7 @@ pub use directory::fleet::{ItemDraft, Kind, Output, Results, StudyDraft, WorkCon
 pub(crate) use directory::part::{Outcome, Part};
 pub use directory::study::Item;
 pub use directory::study::{ItemEntry, Study};
-pub use directory::study::{StudyFile, StudyFileError, open_study};
+pub use directory::study::{StudyFile, open_study};
 pub use merge::MergeOutcome;
 pub use status::Shard;
 pub use status::{Status, UnfinishedItem};

@@ -1,5 +1,6 @@
 //! The files of a fleet: their names by SHA-256, how they are read and written, and what may be wrong with them.
 
+use mapper_yaml::Findings;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::fmt;
@@ -8,12 +9,22 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+/// Errors of reading a study file.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
+pub enum StudyFileError {
+    #[error("failed to read the study {}: {}", .0.display(), .1)]
+    Read(PathBuf, #[source] std::io::Error),
+    #[error("{0}")]
+    Mistakes(Box<Findings>),
+}
+
 /// Errors of a fleet directory.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum FleetError {
     #[error(transparent)]
-    StudyFile(#[from] crate::StudyFileError),
+    StudyFile(#[from] StudyFileError),
     #[error("failed to {action} {}: {source}", .path.display())]
     File { action: &'static str, path: PathBuf, source: std::io::Error },
     #[error("{} is not {what}: {source}", .path.display())]

@@ -1,6 +1,6 @@
 //! A study: the file of its user, its list of items, and one item.
 
-use crate::directory::files::{Durability, read_at_most, write_whole};
+use crate::directory::files::{Durability, StudyFileError, read_at_most, write_whole};
 use crate::{FleetError, Hash};
 use mapper_yaml::{Document, FindingKind, Findings, Notes, Schema, Source, Tree, steps};
 use schemars::JsonSchema;
@@ -85,16 +85,6 @@ impl Study {
 static DOCUMENT: Document = Document { name: "study", example: "campaigns/fleet/blind.yaml" };
 /// Largest file of a study, bytes: some ten thousand names of campaigns.
 const MAX_STUDY_FILE_BYTES: usize = 4 << 20;
-
-/// Errors of reading a study file.
-#[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "the messages describe the variants")]
-pub enum StudyFileError {
-    #[error("failed to read the study {}: {}", .0.display(), .1)]
-    Read(PathBuf, #[source] std::io::Error),
-    #[error("{0}")]
-    Mistakes(Box<Findings>),
-}
 
 /// A study file, of which only the name and the kind are read.
 #[derive(Debug)]

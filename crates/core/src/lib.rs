@@ -14,7 +14,6 @@ mod identification;
 mod maps;
 mod measurement;
 mod named_enum;
-mod names;
 mod rig;
 mod schema;
 pub mod test_plan;
@@ -71,10 +70,6 @@ pub use measurement::redundant::{DeclaredElement, Element, MAX_ELEMENTS, Redunda
 pub use measurement::sample::{ChannelColumn, ElementColumn, Provenance, Quality, SampleBatch, TruthColumn};
 pub use measurement::step_marker::StepMarker;
 pub use named_enum::UnknownName;
-pub use names::column_name::{Clarity, ColumnName, Place};
-pub use names::measured::Measured;
-pub use names::missing::is_missing_mark;
-pub use names::words::Word;
 pub use rig::backend::{
     Backend, BackendCause, BackendError, RigDescription, RigMode, SetpointRange, SetpointRanges, Setpoints,
 };
@@ -100,5 +95,4 @@ pub use test_plan::visit_order::VisitOrder;
 pub use text::one_line::one_line;
 pub use text::probability_text::probability_text;
 pub use text::terminal_text::{coloured_text, terminal_json, terminal_text};
-pub use text::text_encoding::TextEncoding;
 pub use text::with_unit::{readable, shorten_numbers, temperature, with_unit};

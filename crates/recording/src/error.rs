@@ -1,9 +1,9 @@
 //! Why a recording could not be written or read.
 
 use crate::logs::LogError;
-use crate::logs::units::{kind_of, remedy};
 use crate::{FormatVersion, ReadWarning, UnitError};
 use mapper_core::Channel;
+use mapper_table::{kind_of, remedy};
 use mapper_yaml::Findings;
 use std::{io, path::PathBuf};
 

@@ -4,11 +4,11 @@
 //! openATFX does (github.com/peak-solution/openatfx), whose examples are ASAM's.
 
 use crate::columns::table_head::MAX_COLUMNS;
-use crate::notation::instant::{Instant, parse_instant};
 use crate::tables::column_log::{ColumnTable, check_columns_file, column_log};
 use crate::tables::column_rows::Chunk;
 use mapper_recording::logs::limits::{MAX_UNPACKED_BYTES, max_memory_bytes};
-use mapper_recording::logs::{DateOrder, Log, LogError, LogFile, LogFinding, LogFormat, LogOptions};
+use mapper_recording::logs::{Log, LogError, LogFile, LogFinding, LogFormat, LogOptions};
+use mapper_table::{DateOrder, Instant, parse_instant};
 use quick_xml::Reader;
 use quick_xml::events::Event;
 use std::collections::HashMap;

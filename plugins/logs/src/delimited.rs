@@ -1,16 +1,11 @@
 //! CSV and similar formats: cells with a separator between them.
 
 use crate::columns::sample::HEAD_ROWS;
-use crate::notation::separator::{SEPARATORS, decimal, score, typical_length};
-use crate::notation::table_row::Rows;
 use crate::tables::long_table::{LongForm, LongRows};
-use crate::tables::row_stream::{Dialect, RowStream};
+use crate::tables::row_stream::RowStream;
 use crate::tables::table_log::{Origin, Table};
-use mapper_recording::logs::{
-    Layout, Log, LogError, LogFile, LogFinding, LogFormat, LogOptions, RowSink, TextEncoding,
-};
-use std::io::Cursor;
-use std::ops::Range;
+use mapper_recording::logs::{Layout, Log, LogError, LogFile, LogFinding, LogFormat, LogOptions, RowSink};
+use mapper_table::{Dialect, SEPARATORS, TextEncoding, decimal_sign, detect_text};
 
 pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
 
@@ -43,34 +38,10 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
     let head = file.head(HEAD_BYTES)?;
     let (found, mark) = TextEncoding::guess(&head);
     let encoding = options.encoding.unwrap_or(found);
-    let is_whole_file = head.len() < HEAD_BYTES;
-    let rows_by = |separator: u8| -> Result<Vec<Vec<String>>, LogError> {
-        let dialect = Dialect { encoding, mark, separator, decimal: b'.' };
-        let mut stream = RowStream::over(file, Box::new(Cursor::new(head.clone())), dialect);
-        let (mut rows, mut spans) = (Vec::new(), Vec::new());
-        while rows.len() < HEAD_ROWS && stream.advance()? {
-            rows.push(stream.texts());
-            spans.push(stream.spans());
-        }
-        // The last line of the sample may be truncated.
-        if !is_whole_file && rows.len() < HEAD_ROWS && rows.len() > 1 {
-            rows.pop();
-        }
-        if separator == b' ' {
-            join_names(&mut rows, &spans);
-        }
-        Ok(rows)
-    };
     let given = options.separator.and_then(|separator| u8::try_from(separator).ok());
-    let mut best: Option<(f64, u8, Vec<Vec<String>>)> = None;
-    for separator in given.map_or(SEPARATORS.to_vec(), |separator| vec![separator]) {
-        let rows = rows_by(separator)?;
-        let score = score(&rows, separator);
-        if best.as_ref().is_none_or(|(other, ..)| score > *other) {
-            best = Some((score, separator, rows));
-        }
-    }
-    let Some((_, separator, rows)) = best.filter(|(score, ..)| *score > 0.0) else {
+    let found = detect_text(&head, (encoding, mark), given, (HEAD_ROWS, head.len() < HEAD_BYTES));
+    let found = found.map_err(|error| file.read_error(error))?;
+    let Some((separator, rows)) = found else {
         return Err(file.content_error(
             NAME,
             match head.trim_ascii_start().first() {
@@ -80,7 +51,7 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
             },
         ));
     };
-    let (found_decimal, is_seen) = decimal(&rows);
+    let (found_decimal, is_seen) = decimal_sign(&rows);
     let decimal = options.decimal.and_then(|sign| u8::try_from(sign).ok()).unwrap_or(found_decimal);
     let mut table = Table::analyse(&rows, decimal, options, Origin::Rows)
         .map_err(|message| file.content_error(NAME, message))?;
@@ -101,28 +72,6 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
     };
     table.layout.findings.insert(0, found);
     Ok(Box::new(Delimited { file: file.clone(), dialect, table, long }))
-}
-
-/// Joins names of several words above columns between blanks: single blanks are within a name. If there are not as many names as columns,
-/// the assignment is unknown and the row is text.
-fn join_names(rows: &mut [Vec<String>], spans: &[Vec<Range<usize>>]) {
-    let length = typical_length(rows);
-    for (row, spans) in rows.iter_mut().zip(spans) {
-        let is_word = |cell: &String| cell.chars().any(char::is_alphabetic) && cell.parse::<f64>().is_err();
-        if length == 0 || row.len() <= length || !row.iter().all(is_word) {
-            continue;
-        }
-        let mut names: Vec<String> = Vec::new();
-        let mut end = None;
-        for (word, span) in row.iter().zip(spans) {
-            match names.last_mut().filter(|_| end.is_some_and(|end: usize| end + 1 == span.start)) {
-                Some(name) => *name = format!("{name} {word}"),
-                None => names.push(word.clone()),
-            }
-            end = Some(span.end);
-        }
-        *row = if names.len() == length { names } else { vec![row.join(" ")] };
-    }
 }
 
 impl Log for Delimited {

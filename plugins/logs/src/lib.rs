@@ -8,7 +8,6 @@
 mod columns;
 mod mdf_layout;
 mod mdf_source;
-mod notation;
 mod tables;
 
 use mapper_recording::logs::LogFormats;

@@ -3,9 +3,10 @@
 use crate::mdf_layout::{check_channel_count, column, forward_rows, wanted_channels};
 use crate::mdf_source::MdfSource;
 use falcon_mdf::{Channel, ChannelGroup, Conversion, Mf4File, OpenOptions, Signal};
+use mapper_recording::Kind;
 use mapper_recording::logs::limits::{MAX_BLOCK_BYTES, max_unpacked_bytes};
 use mapper_recording::logs::{
-    Group, Kind, Layout, Log, LogError, LogFile, LogFinding, LogFormat, LogOptions, RowSink,
+    Group, Layout, Log, LogError, LogFile, LogFinding, LogFormat, LogOptions, RowSink,
 };
 use std::collections::BTreeSet;
 

@@ -2,7 +2,6 @@
 
 use crate::columns::sample::HEAD_ROWS;
 use crate::columns::table_head::MAX_COLUMNS;
-use crate::notation::instant::Instant;
 use crate::tables::column_log::COLUMN_OPTIONS;
 use crate::tables::column_rows::{Chunk, Chunks, ColumnRows};
 use crate::tables::joined_tables::{Part, join_tables};
@@ -10,6 +9,7 @@ use crate::tables::table_log::{Origin, Table};
 use mapper_recording::logs::{
     Layout, Log, LogError, LogFile, LogFinding, LogFormat, LogOptions, ReadSeek, Row, RowSink,
 };
+use mapper_table::Instant;
 use std::io::{Seek as _, SeekFrom};
 use tedium::{ChannelPath, PropertyPath, PropertyValue, TdmsError, TdmsFile, TdmsStorageType};
 

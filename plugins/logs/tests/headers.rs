@@ -6,7 +6,8 @@ use mapper_core::Channel::{
 };
 use mapper_log_formats::LOG_FORMATS;
 use mapper_recording::logs::proposal::{Certainty, propose};
-use mapper_recording::logs::{LogFile, LogOptions, header_unit, survey};
+use mapper_recording::logs::{LogFile, LogOptions, survey};
+use mapper_table::header_unit;
 use std::path::Path;
 
 /// What a column holds.

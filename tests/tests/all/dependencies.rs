@@ -11,20 +11,20 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-core",      &[]),
     ("mapper-chart",     &["core"]),
     ("mapper-numerics",  &[]),
-    // Old workbooks, which logs and maps may be.
-    ("mapper-workbook",  &[]),
+    // Cells, names and units of logs and maps.
+    ("mapper-table",     &["core", "yaml"]),
     // Work in many pieces, independent of its content.
     ("mapper-fleet",     &["numerics", "yaml"]),
     ("mapper-physics",   &["core", "numerics"]),
     ("mapper-fmu",       &["core", "physics"]),
     // Nominal maps of campaigns are tables of points, so maps lie below campaigns.
-    ("mapper-maps",      &["core", "numerics", "physics", "workbook", "yaml"]),
+    ("mapper-maps",      &["core", "numerics", "physics", "table", "yaml"]),
     ("mapper-campaign",  &["core", "maps", "physics", "yaml"]),
     ("mapper-planner",   &["core", "numerics", "physics"]),
     ("mapper-sequence",  &["core", "numerics", "physics", "yaml"]),
     ("mapper-runner",    &["core", "numerics", "physics"]),
     ("mapper-driver-host", &["core"]),
-    ("mapper-recording", &["core", "numerics", "yaml"]),
+    ("mapper-recording", &["core", "numerics", "table", "yaml"]),
     ("mapper-observe",   &["core", "numerics", "physics"]),
     ("mapper-inference", &["numerics"]),
     ("mapper-identify",  &["core", "inference", "numerics", "physics", "observe"]),
@@ -35,7 +35,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-backends",  &["core", "numerics", "physics", "recording", "yaml"]),
     ("mapper-effects",   &["core", "physics"]),
     ("mapper-formats",   &["core", "yaml", "numerics", "physics", "chart", "maps"]),
-    ("mapper-log-formats", &["recording", "workbook"]),
+    ("mapper-log-formats", &["recording", "table"]),
     // Text, pages and pictures, made from data.
     ("mapper-report",    &["core", "chart", "observe", "physics", "campaign", "planner", "identify", "numerics", "maps", "diagnose", "history", "recording", "fleet"]),
     // The application as a library. The caller passes the plug-ins.

@@ -3,5 +3,4 @@
 pub(crate) mod one_line;
 pub(crate) mod probability_text;
 pub(crate) mod terminal_text;
-pub(crate) mod text_encoding;
 pub(crate) mod with_unit;

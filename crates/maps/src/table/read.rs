@@ -22,7 +22,8 @@ use mapper_physics::gas::air::{Air, humidity_kg_kg};
 use mapper_physics::gas::mixture::Gas;
 use mapper_physics::gas::pressure_tap::static_to_total_pa;
 use mapper_physics::laws::compression::apparent_efficiency;
-use mapper_yaml::units::{Kind, header_unit};
+use mapper_table::header_unit;
+use mapper_yaml::units::Kind;
 
 /// The map of a text.
 ///

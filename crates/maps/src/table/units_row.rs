@@ -1,15 +1,14 @@
 //! Merges a row of units into the headings of a table.
 
-use crate::table::columns::column::{is_dimensionless, is_known_unit};
+use mapper_table::{bare_unit, is_dimensionless, is_unit, is_units_row};
 
 /// Headings with the units from a row of their own below them: `flow` and `g/s` become `flow [g/s]`. `None` if the row below is
-/// not a row of units. A heading with a unit keeps it.
+/// not a row of units. A heading with a unit keeps it. Each unit counts by itself: an unknown one concerns its own column alone.
 pub(super) fn merge_units_row(headings: &[String], below: &[String]) -> Option<Vec<String>> {
-    let bare = |text: &str| text.trim().trim_matches(['[', ']', '(', ')']).trim().to_owned();
-    let units: Vec<String> = below.iter().map(|text| bare(text)).collect();
-    let all_known = units.iter().all(|unit| is_dimensionless(unit) || is_known_unit(unit));
-    let some_known = units.iter().any(|unit| !is_dimensionless(unit));
-    if !(all_known && some_known) || units.len() > headings.len() {
+    let units: Vec<&str> = below.iter().map(|text| bare_unit(text)).collect();
+    let some_known = units.iter().any(|unit| !is_dimensionless(unit) && is_unit(unit));
+    let is_number = |unit: &&str| unit.starts_with(|c: char| c.is_ascii_digit()) && !is_unit(unit);
+    if !some_known || !is_units_row(below) || units.iter().any(is_number) || units.len() > headings.len() {
         return None;
     }
     let joined = headings.iter().enumerate().map(|(index, heading)| match units.get(index) {
@@ -30,7 +29,9 @@ mod tests {
         let names = ["speed", "flow", "PR", "eta (is)"].map(str::to_owned);
         let joined = merge_units_row(&names, &["[krpm]", "g/s", "-", "%"].map(str::to_owned)).unwrap();
         assert_eq!(joined, ["speed [krpm]", "flow [g/s]", "PR", "eta (is)"]);
-        for none in [["60", "38", "1.2", "70"], ["krpm", "slugs", "-", "%"], ["", "-", "", ""]] {
+        let joined = merge_units_row(&names, &["krpm", "slugs", "T-T", "%"].map(str::to_owned)).unwrap();
+        assert_eq!(joined, ["speed [krpm]", "flow [slugs]", "PR [T-T]", "eta (is)"]);
+        for none in [["60", "38", "1.2", "70"], ["1", "1", "1.2", "%"], ["", "-", "", ""]] {
             assert_eq!(merge_units_row(&names, &none.map(str::to_owned)), None);
         }
     }

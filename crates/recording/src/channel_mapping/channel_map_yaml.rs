@@ -3,10 +3,10 @@
 use crate::channel_mapping::channel_map::UNKNOWN_WORD;
 use crate::channel_mapping::channel_map_schema::SCHEMA;
 use crate::format::TRUTH_PREFIX;
-use crate::logs::units::{difference, kind_of, parse_quantity, remedy, unit};
 use crate::logs::{LogOptions, OPTION_KEYS};
 use crate::{AmbientPressure, Barometer, ChannelMap, ChannelSource, MachineConstants, WindowLimits};
 use mapper_core::{Channel, DeclaredUncertainty, Element, NoiseColour, RedundantSensors, ReferenceState};
+use mapper_table::{difference, kind_of, parse_quantity, remedy, unit};
 use mapper_yaml::keys::KeyError;
 use mapper_yaml::units::{Kind, UnitError};
 use mapper_yaml::{Document, FindingKind, Findings, Notes, Source, Step, Tree, steps};

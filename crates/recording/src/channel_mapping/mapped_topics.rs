@@ -1,9 +1,9 @@
 //! Assigns fields of topics to channels, with their units.
 
-use crate::logs::units::{kind_of, unit};
 use crate::mcap::records::ChannelDefinition;
 use crate::{ChannelMap, ChannelSource, ReadWarning, RecordError};
 use mapper_core::{Channel, Element};
+use mapper_table::{kind_of, unit};
 use mapper_yaml::units::{Kind, Unit};
 use serde_json::Value;
 use std::path::Path;

@@ -5,12 +5,12 @@ use crate::logs::plausible::{
     AMBIENT_RANGE_PA, TRIMMED_SHARE, fitting_units, is_plausible, looks_like_gauge,
 };
 use crate::logs::proposal::short;
-use crate::logs::units::{kind_of, unit};
-use crate::logs::{Kind, Unit};
 use crate::{AmbientPressure, ChannelSource};
 use mapper_core::unit_factors::PA_PER_KPA;
 use mapper_core::{Channel, Series};
 use mapper_numerics::statistics::quantile;
+use mapper_table::{kind_of, unit};
+use mapper_yaml::units::{Kind, Unit};
 use mapper_yaml::{FindingKind, steps};
 
 /// The readings of a channel.

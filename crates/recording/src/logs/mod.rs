@@ -14,15 +14,13 @@ pub mod plausible;
 pub mod proposal;
 mod survey;
 mod trace;
-pub mod units;
 
 pub use error::LogError;
 pub use file::{LogFile, ReadSeek};
 pub use finding::LogFinding;
 pub use format::{Log, LogFormat, LogFormats, OpenLog, Row, RowSink};
 pub use layout::{Column, Group, Layout};
-pub use mapper_core::{TextEncoding, is_missing_mark};
-pub use mapper_yaml::units::{HeaderUnit, Kind, Reference, Unit, header_unit, split_unit};
-pub use options::{DateOrder, LogOptions, OPTION_KEYS};
+pub use mapper_table::{difference, kind_of};
+pub use options::{LogOptions, OPTION_KEYS};
 pub use survey::{ColumnSurvey, Gap, GroupSurvey, Survey, survey};
 pub use trace::{Trace, sparkline};

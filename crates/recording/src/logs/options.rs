@@ -1,19 +1,8 @@
 //! The user's options for a log, for properties that automatic detection gets wrong.
 
-use mapper_core::TextEncoding;
+use mapper_table::{DateOrder, TextEncoding};
 use mapper_yaml::keys::{Key, KeyError, set_key, store};
 use mapper_yaml::units::{Kind, parse};
-
-/// The order of the parts of a date.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum DateOrder {
-    /// 22.11.2026.
-    DayFirst,
-    /// 11/22/2026.
-    MonthFirst,
-    /// 2026-11-22.
-    YearFirst,
-}
 
 /// Properties of a log that the user states; the reader detects the others.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -1,7 +1,7 @@
 //! Plausible ranges of the channels: they reveal a wrong unit before anything is computed.
 
-use crate::logs::units::{kind_of, unit};
 use mapper_core::{Channel, plausible};
+use mapper_table::{kind_of, unit};
 use mapper_yaml::units::{Kind, Unit};
 
 /// Deepest gauge pressure, ratio to the ambient one. Bound: throttled inlets reach a half; below zero absolute nothing exists.

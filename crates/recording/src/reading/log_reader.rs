@@ -2,14 +2,15 @@
 
 use crate::channel_mapping::channel_map_mistakes::MapMistakes;
 use crate::channel_mapping::mapped_topics::{MappedQuantity, source_of, sources};
-use crate::logs::units::{kind_of, remedy, unit};
-use crate::logs::{Kind, Layout, LogFile, Reference, Row, Unit, header_unit};
+use crate::logs::{Layout, LogFile, Row};
 use crate::samples::log_blocks::BlockAverager;
 use crate::samples::log_clock::{LogClock, Restart};
 use crate::samples::series_builder::SeriesBuilder;
 use crate::{AmbientPressure, ChannelMap, ChannelSource, ReadOptions, ReadWarning, RecordError};
 use mapper_core::Channel;
 use mapper_core::unit_factors::NS_PER_S;
+use mapper_table::{Reference, header_unit, kind_of, remedy, unit};
+use mapper_yaml::units::{Kind, Unit};
 use mapper_yaml::{FindingKind, Step, closest, steps};
 use std::collections::BTreeMap;
 use std::path::Path;

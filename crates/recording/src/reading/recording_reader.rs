@@ -3,7 +3,7 @@
 use crate::channel_mapping::channel_map_mistakes::MapMistakes;
 use crate::channel_mapping::mapped_topics::{MappedQuantity, source_of, sources};
 use crate::channel_mapping::plausibility::Readings;
-use crate::logs::{LogError, LogFile, Unit};
+use crate::logs::{LogError, LogFile};
 use crate::reading::log_reader::{is_mcap, log_of_path, read_log};
 use crate::reading::read_options::ReadOptions;
 use crate::reading::scan::{ScanResult, scan};
@@ -23,6 +23,7 @@ use mapper_core::unit_factors::PERCENT;
 use mapper_core::{
     Channel, Element, Event, Group, Quality, ReadingOrigin, Recording, RedundantSensors, Series, StepMarker,
 };
+use mapper_yaml::units::Unit;
 use mapper_yaml::{FindingKind, steps};
 use std::collections::BTreeMap;
 use std::io::{self, BufReader, Read};

@@ -4,7 +4,6 @@ use crate::channel_mapping::mapped_topics::{MappedQuantity, MappedTopic, map_top
 use crate::format::{
     CAMPAIGN_NAME, EVENT_TOPIC, FORMAT_KEY, METADATA_NAME, PLAN_NAME, PROVENANCE_TOPIC, START_KEY, STEP_TOPIC,
 };
-use crate::logs::Unit;
 use crate::mcap::message::{FieldValue, read_fields};
 use crate::mcap::records::ChannelDefinition;
 use crate::mcap::sink::Sink;
@@ -13,6 +12,7 @@ use crate::step_detection::steps::StepMessage;
 use crate::writing::provenance::{OriginMessage, read_origins};
 use crate::{ChannelMap, FormatVersion, ReadWarning, RecordError};
 use mapper_core::Event;
+use mapper_yaml::units::Unit;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 

@@ -3,7 +3,7 @@
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_campaign::units::Kind;
 use mapper_core::{Channel, OperatingPoint};
-use mapper_recording::logs::units::kind_of;
+use mapper_recording::logs::kind_of;
 
 /// Formatter of values in the display units.
 #[derive(Debug, Clone, Default)]

@@ -123,7 +123,7 @@ const MASS_FLOW: &[Unit] = &[
     unit(&["Sm3/h", "Sm³/h"], AIR_AT_1_K, 3600.0 * 288.15),
 ];
 /// A cubic foot, m3.
-pub(super) const CUBIC_FOOT_M3: f64 = 0.3048 * 0.3048 * 0.3048;
+pub const CUBIC_FOOT_M3: f64 = 0.3048 * 0.3048 * 0.3048;
 /// Density of dry air at 101.325 kPa times its temperature, kg K/m3; gas constant of the standard atmosphere (ISO 2533).
 const AIR_AT_1_K: f64 = 101_325.0 / 287.052_87;
 const DURATION: &[Unit] =

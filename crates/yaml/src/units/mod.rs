@@ -5,16 +5,14 @@
 //! factor, has no name for `krpm`, and parses only its own spellings; this table is short enough to check against
 //! the definitions of the units.
 
-mod header_unit;
 mod kind;
 mod parse;
 mod quantity;
 
-pub use header_unit::{HeaderUnit, Reference, header_unit, split_unit, volume_flow_m3_s};
 pub use kind::{
-    Area, BARE_RATIO, Conductance, Conductivity, Dimension, Duration, Fraction, Frequency, Inertia, Kind,
-    Length, Mass, MassFlow, Pressure, PressureDifference, PressureRate, RatioRate, Speed, Temperature,
-    TemperatureDifference, TemperatureRate, Unit, Volume,
+    Area, BARE_RATIO, CUBIC_FOOT_M3, Conductance, Conductivity, Dimension, Duration, Fraction, Frequency,
+    Inertia, Kind, Length, Mass, MassFlow, Pressure, PressureDifference, PressureRate, RatioRate, Speed,
+    Temperature, TemperatureDifference, TemperatureRate, Unit, Volume,
 };
 pub use parse::{UnitError, parse, parse_with};
 pub use quantity::{Quantity, set};

@@ -4,7 +4,7 @@ use mapper_core::{Channel, DeclaredUncertainty, Element, ElementColumn, Redundan
 use mapper_physics::laws::thermocouple;
 use mapper_physics::rig::instruments::{ChannelFollower, ChannelPath};
 use mapper_physics::simulation::model::Outputs;
-use mapper_recording::logs::units::{difference, kind_of};
+use mapper_recording::logs::{difference, kind_of};
 use mapper_yaml::units::Kind;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};

@@ -1,8 +1,8 @@
 //! The clock of a table: the time of each row.
 
-use crate::notation::instant::NS_PER_DAY;
-use crate::notation::table_row::Cells;
-use mapper_recording::logs::{DateOrder, LogFinding};
+use crate::tables::table_row::Cells;
+use mapper_recording::logs::LogFinding;
+use mapper_table::{DateOrder, NS_PER_DAY};
 
 /// The source of a group's time.
 #[derive(Debug, Clone, PartialEq)]

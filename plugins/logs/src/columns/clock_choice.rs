@@ -4,9 +4,10 @@ use crate::columns::clock::{Clock, GroupClock, NS_PER_HOUR, Spread, restart_offs
 use crate::columns::counter::{count_unit_s, describe_unit, is_clock_name};
 use crate::columns::sample::{Sample, SampleRow, cells};
 use crate::columns::table_head::HeadColumn;
-use crate::notation::instant::{Instant, NS_PER_DAY, guess_order, minutes_and_seconds, parse_instant};
-use crate::notation::number::parse_number;
-use mapper_recording::logs::{DateOrder, Group, LogFinding, LogOptions};
+use mapper_recording::logs::{Group, LogFinding, LogOptions};
+use mapper_table::{
+    DateOrder, Instant, NS_PER_DAY, guess_order, minutes_and_seconds, parse_instant, parse_number,
+};
 
 /// The clocks of a table.
 #[derive(Debug, Clone, PartialEq, Default)]

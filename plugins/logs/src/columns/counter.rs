@@ -2,8 +2,8 @@
 
 use crate::columns::sample::{Sample, cells};
 use crate::columns::table_head::HeadColumn;
-use crate::notation::number::read_number;
-use mapper_recording::logs::{Kind, header_unit};
+use mapper_recording::Kind;
+use mapper_table::{header_unit, read_number};
 
 /// Whether a column of numbers is labelled as a clock: by its name, unless its unit contradicts, or by its unit.
 pub(crate) fn is_clock_name(column: &HeadColumn) -> bool {

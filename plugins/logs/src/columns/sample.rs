@@ -1,8 +1,8 @@
 //! The first rows of a table, from which its clocks are found.
 
 use crate::columns::table_head::HeadColumn;
-use crate::notation::number::read_number;
-use crate::notation::table_row::{Cell, Cells};
+use crate::tables::table_row::{Cell, Cells};
+use mapper_table::read_number;
 
 /// Maximum number of rows of a table in its sample.
 pub(crate) const HEAD_ROWS: usize = 400;

@@ -1,9 +1,10 @@
 //! Names, units and the first row of data of a table, found from its first rows.
 
-use crate::notation::instant::parse_instant;
-use crate::notation::number::{is_missing, number_with_unit, read_number};
-use crate::notation::separator::typical_length;
-use mapper_recording::logs::{DateOrder, LogFinding, LogOptions, header_unit, split_unit};
+use mapper_recording::logs::{LogFinding, LogOptions};
+use mapper_table::{
+    DateOrder, bare_unit, header_unit, is_missing, is_units_row, number_with_unit, parse_instant,
+    read_number, split_unit, typical_length,
+};
 use std::collections::BTreeMap;
 
 pub(crate) const MAX_COLUMNS: usize = 10_000;
@@ -77,7 +78,7 @@ pub(crate) fn analyse_head(
     let mut repeated = 0;
     for column in 0..width {
         let header = one_line(cell(names_row, column));
-        let own_unit = cell(units_row, column).trim_matches(['[', ']', '(', ')', ' ']);
+        let own_unit = bare_unit(cell(units_row, column));
         let (mut name, mut unit) = split_unit(&header);
         if units_row.is_some() {
             // `T2 (upper)` is a name if the units have their own row.
@@ -262,15 +263,6 @@ fn distinct(row: Option<&Vec<String>>) -> usize {
     cells.sort();
     cells.dedup();
     cells.len()
-}
-
-fn is_units_row(row: &[String]) -> bool {
-    let filled: Vec<&String> = row.iter().filter(|cell| !cell.is_empty()).collect();
-    let units = filled
-        .iter()
-        .filter(|cell| header_unit(cell).is_some() || header_unit(cell.trim_matches(['(', ')'])).is_some());
-    let units = units.count();
-    units > 0 && 2 * units >= filled.len()
 }
 
 fn header_rows(rows: &[Vec<String>], data_row: usize, length: usize) -> Vec<usize> {

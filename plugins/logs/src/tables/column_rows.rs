@@ -1,9 +1,8 @@
 //! Rows of a table that is stored by columns.
 
-use crate::notation::instant::Instant;
-use crate::notation::table_row::{Cell, Cells, Rows};
-use crate::notation::typed_cell::Value;
+use crate::tables::table_row::{Cell, Cells, Rows};
 use mapper_recording::logs::LogError;
+use mapper_table::{Instant, Value};
 
 /// Some rows of a column; those after its end are empty.
 #[derive(Debug, Clone, PartialEq)]

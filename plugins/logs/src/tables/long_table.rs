@@ -1,10 +1,10 @@
 //! Tables in long form, whose rows have a time, the name of a quantity and its value. They become tables with a column for each quantity.
 
-use crate::notation::number::{is_missing, read_number};
-use crate::notation::table_row::{Cell, Cells, Rows};
 use crate::tables::row_stream::RowStream;
 use crate::tables::table_log::Table;
-use mapper_recording::logs::{LogError, LogFinding, header_unit};
+use crate::tables::table_row::{Cell, Cells, Rows};
+use mapper_recording::logs::{LogError, LogFinding};
+use mapper_table::{header_unit, is_missing, read_number};
 use std::collections::BTreeSet;
 
 const MAX_NAMES: usize = 1000;

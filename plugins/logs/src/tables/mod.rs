@@ -9,3 +9,4 @@ pub(crate) mod record_batches;
 pub(crate) mod row_sorter;
 pub(crate) mod row_stream;
 pub(crate) mod table_log;
+pub(crate) mod table_row;

@@ -2,7 +2,6 @@
 
 use crate::columns::sample::HEAD_ROWS;
 use crate::columns::table_head::MAX_COLUMNS;
-use crate::notation::instant::{Instant, NS_PER_DAY};
 use crate::tables::column_log::COLUMN_OPTIONS;
 use crate::tables::column_rows::{Chunk, Chunks, ColumnRows};
 use crate::tables::table_log::{Origin, Table};
@@ -18,6 +17,7 @@ use arrow_array::types::{
 use arrow_array::{Array, RecordBatch};
 use arrow_schema::{ArrowError, DataType, Field, Schema, TimeUnit};
 use mapper_recording::logs::{Layout, Log, LogError, LogFile, LogFinding, LogOptions, RowSink};
+use mapper_table::{Instant, NS_PER_DAY};
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Once;

@@ -2,9 +2,13 @@
 
 use crate::table::columns::quantity::Quantity;
 use crate::table::columns::quantity_name::{is_turbine, quantity_of_name};
-use mapper_core::{ColumnName, Measured, ReferenceState, Word};
+use mapper_core::ReferenceState;
 use mapper_physics::gas::air::GAS_CONSTANT_J_KGK;
-use mapper_yaml::units::{Kind, Reference, Unit, header_unit, split_unit, volume_flow_m3_s};
+use mapper_table::{
+    ColumnName, Measured, Reference, Word, header_unit, is_dimensionless, is_reduced_unit, split_unit,
+    volume_flow_m3_s,
+};
+use mapper_yaml::units::{Kind, Unit};
 
 /// A column with its unit.
 #[derive(Debug, Clone, PartialEq)]
@@ -93,6 +97,18 @@ impl Column {
         ColumnName::read(&parts(&self.heading).0).has(Word::Static)
     }
 
+    /// Whether the heading names the compressor.
+    pub(crate) fn is_of_compressor(&self) -> bool {
+        ColumnName::read(&parts(&self.heading).0).is_of_compressor()
+    }
+
+    /// Whether the name has a `T` after its first letter, for total or for the turbine: `P1T`, `PT1`.
+    pub(crate) fn has_letter_t(&self) -> bool {
+        let (name, _) = parts(&self.heading);
+        let letters: Vec<char> = name.chars().filter(|letter| letter.is_alphanumeric()).collect();
+        letters.len() <= 4 && letters.iter().skip(1).any(|letter| letter.eq_ignore_ascii_case(&'t'))
+    }
+
     /// Whether the heading names a corrected quantity.
     pub(crate) fn is_corrected(&self) -> bool {
         ColumnName::read(&parts(&self.heading).0).has(Word::Corrected)
@@ -141,7 +157,11 @@ pub(crate) fn column(index: usize, heading: &str, machine: Machine) -> Result<Op
     let Some(quantity) = quantity_of_name(&name, &plain, by_unit, machine == Machine::Turbine) else {
         return Ok(None);
     };
-    Column::with_unit(index, quantity, heading, unit.as_deref()).map(Some)
+    match Column::with_unit(index, quantity, heading, unit.as_deref()) {
+        // A point may be without it.
+        Err(_) if quantity.is_optional() => Ok(None),
+        column => column.map(Some),
+    }
 }
 
 /// Name and unit of a heading. Brackets that name the kind of a ratio are dropped.
@@ -230,18 +250,6 @@ pub fn flow_unit_kg_s(text: &str) -> Option<f64> {
     Some(unit_of(Kind::MassFlow, text)?.to_inside(1.0))
 }
 
-pub(crate) fn is_dimensionless(unit: &str) -> bool {
-    matches!(
-        unit.to_lowercase().as_str(),
-        "" | "-" | "--" | "1" | "ratio" | "fraction" | "frac" | "dimensionless" | "dec" | "nd"
-    )
-}
-
-/// Whether a text is a unit of any quantity of a table.
-pub(crate) fn is_known_unit(unit: &str) -> bool {
-    header_unit(unit).is_some() || quantity_of_unit(unit).is_some() || is_unit(Quantity::Humidity, unit)
-}
-
 fn quantity_of_unit(unit: &str) -> Option<Quantity> {
     let lower = unit.trim().to_lowercase();
     if volume_flow_m3_s(unit).is_some() {
@@ -250,7 +258,7 @@ fn quantity_of_unit(unit: &str) -> Option<Quantity> {
     if lower == "%" {
         return Some(Quantity::Efficiency);
     }
-    if is_root(&lower) {
+    if is_reduced_unit(&lower) {
         return Some(if lower.contains("kg") || lower.contains("lb") {
             Quantity::ReducedFlow
         } else {
@@ -264,19 +272,12 @@ fn quantity_of_unit(unit: &str) -> Option<Quantity> {
     }
 }
 
-fn is_root(lower: &str) -> bool {
-    let lower = lower.replace(',', ".");
-    ["k^0.5", "k^.5", "k^1/2", "sqrt(k", "sqrtk", "√k", "k0.5", "k**0.5"]
-        .iter()
-        .any(|root| lower.contains(root))
-}
-
 fn scale(quantity: Quantity, unit: &str) -> Option<Scale> {
     let unit = &unit.replace(['·', '⋅'], "*").replace(',', ".");
     let lower = unit.trim().to_lowercase();
     match quantity {
         Quantity::VolumeFlow => Some(Scale::Factor(volume_flow_m3_s(unit)??)),
-        Quantity::ReducedSpeed if is_root(&lower) => {
+        Quantity::ReducedSpeed if is_reduced_unit(&lower) => {
             // `1/min/√K` has a slash of its own.
             let root = ["sqrt", "√", "k^", "k0.5", "k**"].iter().filter_map(|root| lower.find(root)).min()?;
             let speed = lower.get(..root)?.trim_end_matches(['/', '*', '-', ' ', '(']);

@@ -1,5 +1,6 @@
 //! The quantities of a table of points.
 
+use mapper_core::Channel;
 use mapper_yaml::units::Kind;
 
 /// Declares the quantities with their keys in a map description, their names in messages, and the kinds of their units.
@@ -89,6 +90,34 @@ quantities! {
 }
 
 impl Quantity {
+    /// The quantity that a channel of a stand measures, if tables of points have it.
+    pub(crate) fn of_channel(channel: Channel) -> Option<Quantity> {
+        let all = [
+            (Channel::P1, Quantity::P1),
+            (Channel::P2, Quantity::P2),
+            (Channel::P3, Quantity::P3),
+            (Channel::P4, Quantity::P4),
+            (Channel::T1, Quantity::T1),
+            (Channel::T2, Quantity::T2),
+            (Channel::T3, Quantity::T3),
+            (Channel::T4, Quantity::T4),
+            (Channel::Tc, Quantity::Tc),
+            (Channel::TOil, Quantity::Oil),
+        ];
+        all.into_iter().find(|(known, _)| *known == channel).map(|(_, quantity)| quantity)
+    }
+
+    /// The turbine's quantity with the number of a compressor's: the inlet is 1 on both machines in `P1T` beside `P1C`.
+    pub(crate) fn of_turbine(self) -> Option<Quantity> {
+        match self {
+            Quantity::P1 => Some(Quantity::P3),
+            Quantity::P2 => Some(Quantity::P4),
+            Quantity::T1 => Some(Quantity::T3),
+            Quantity::T2 => Some(Quantity::T4),
+            _ => None,
+        }
+    }
+
     /// Whether a point may be without it.
     pub(crate) fn is_optional(self) -> bool {
         use Quantity::{Ambient, Humidity, Oil, P3, P4, T3, T4, Tc, TurbineFlow};

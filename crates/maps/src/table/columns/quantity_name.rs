@@ -1,7 +1,7 @@
 //! The quantity of a heading, from its name and unit.
 
 use crate::table::columns::quantity::Quantity;
-use mapper_core::{ColumnName, Measured, Place, Word};
+use mapper_table::{ColumnName, Measured, Place, Word, channel_at};
 
 /// Whether a name belongs to a turbine.
 pub(crate) fn is_turbine(plain: &str) -> bool {
@@ -17,13 +17,11 @@ fn has_root(plain: &str) -> bool {
 /// The quantity of a parameter that only turbine maps use.
 fn parameter_of_turbine(plain: &str, by_unit: Option<Quantity>) -> Option<Quantity> {
     match plain {
-        "sp" | "speedparameter" | "speedparam" | "nred" | "reducedspeed" => {
+        "sp" | "nred" | "reducedspeed" => {
             let is_corrected = by_unit == Some(Quantity::Speed);
             Some(if is_corrected { Quantity::Speed } else { Quantity::ReducedSpeed })
         }
-        "mfp" | "massflowparameter" | "flowparameter" | "massparameter" | "phi" => {
-            Some(Quantity::ReducedFlow)
-        }
+        "mfp" | "massparameter" | "phi" => Some(Quantity::ReducedFlow),
         "nt" => Some(by_unit.unwrap_or(Quantity::Speed)),
         _ => None,
     }
@@ -55,6 +53,15 @@ pub(crate) fn quantity_of_name(
     });
     if read.is_other() {
         return None;
+    }
+    // `speedpar.`, `Mass Flow Parameter`: reduced quantities, unless their unit is one of corrected ones.
+    let parameter = plain.trim_end_matches('.');
+    if ["par", "param", "parameter"].iter().any(|end| parameter.ends_with(end)) {
+        match (read.measured(), by_unit) {
+            (Some(Measured::Speed), None) => return Some(Quantity::ReducedSpeed),
+            (Some(Measured::Flow), None) => return Some(Quantity::ReducedFlow),
+            _ => {}
+        }
     }
     if is_turbine_map {
         if read.has(Word::Is(Measured::Vane)) {
@@ -92,14 +99,6 @@ pub(crate) fn quantity_of_name(
         (Measured::Flow, Place::Turbine) => Some(Quantity::TurbineFlow),
         (Measured::Flow | Measured::VolumeFlow, _) => Some(Quantity::Flow),
         (Measured::Pressure, Place::Ambient) => Some(Quantity::Ambient),
-        (Measured::Pressure, Place::Station(station)) => {
-            [Quantity::P1, Quantity::P2, Quantity::P3, Quantity::P4].get(station as usize - 1).copied()
-        }
-        (Measured::Temperature, Place::Station(station)) => {
-            [Quantity::T1, Quantity::T2, Quantity::T3, Quantity::T4].get(station as usize - 1).copied()
-        }
-        (Measured::Temperature, Place::Oil) => Some(Quantity::Oil),
-        (Measured::Temperature, Place::Compressor | Place::Housing) => Some(Quantity::Tc),
-        _ => None,
+        (measured, place) => channel_at(measured, place).and_then(Quantity::of_channel),
     }
 }

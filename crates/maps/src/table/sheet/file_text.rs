@@ -3,6 +3,7 @@
 use crate::table::sheet::grid::text_of;
 use crate::table::sheet::workbook::grid_of_workbook;
 use mapper_core::{ImportError, MAP_FILE_SIZE_LIMIT};
+use mapper_table::is_workbook;
 use std::borrow::Cow;
 use std::io::Read;
 
@@ -12,8 +13,7 @@ use std::io::Read;
 /// [`ImportError`] if it is neither text nor a workbook.
 pub fn file_text(bytes: &[u8]) -> Result<String, ImportError> {
     let bytes = unpack(bytes)?;
-    let is_workbook = bytes.starts_with(b"PK") || bytes.starts_with(&mapper_workbook::MAGIC);
-    if is_workbook { Ok(grid_of_workbook(&bytes, None)?.csv()) } else { text_of(&bytes) }
+    if is_workbook(&bytes) { Ok(grid_of_workbook(&bytes, None)?.csv()) } else { text_of(&bytes) }
 }
 
 /// Unpacks a gzip file; returns any other content unchanged.

@@ -3,7 +3,8 @@
 use crate::table::columns::column::parts;
 use crate::table::sheet::grid::{Grid, GridRow};
 use crate::table::units_row::merge_units_row;
-use mapper_core::{ColumnName, ImportRemark, Word};
+use mapper_core::ImportRemark;
+use mapper_table::{ColumnName, Word};
 
 /// A row of headings.
 pub(crate) struct Headings {

@@ -6,7 +6,8 @@ use crate::table::columns::quantity::Quantity;
 use crate::table::sheet::grid::{Grid, GridRow};
 use crate::table::sheet::headings::Headings;
 use crate::table::sheet::speed_heading::{speed_in, without_speed};
-use mapper_core::{ImportError, ImportRemark, is_missing_mark};
+use mapper_core::{ImportError, ImportRemark};
+use mapper_table::is_missing_mark;
 use std::borrow::Cow;
 
 /// Columns of one block: all of a table, or those of one speed line if lines are side by side.
@@ -232,6 +233,13 @@ fn columns(described: &DescribedColumns, cells: &[String]) -> Result<Vec<Column>
         cells.iter().enumerate().filter(|(_, cell)| cell.contains(char::is_alphabetic) || cell.contains('%'))
     {
         all.extend(described.column(index, cell)?);
+    }
+    let of_compressor: Vec<Quantity> =
+        all.iter().filter(|column| column.is_of_compressor()).map(|column| column.quantity).collect();
+    for column in all.iter_mut().filter(|column| !column.is_of_compressor()) {
+        // Beside `P1C` and `PC1`, the letter of `P1T` and `PT1` is the turbine's; alone it stands for a total value.
+        let is_taken = of_compressor.contains(&column.quantity) && column.has_letter_t();
+        column.quantity = column.quantity.of_turbine().filter(|_| is_taken).unwrap_or(column.quantity);
     }
     let is_map = all.iter().any(|column| column.quantity == Quantity::PressureRatio);
     let rank = |column: &Column| (column.is_static(), column.is_corrected() != is_map);

@@ -5,7 +5,7 @@ use crate::table::columns::column::{Column, Machine, column};
 use crate::table::columns::quantity::Quantity;
 use crate::table::sheet::grid::{Grid, GridRow};
 use crate::table::sheet::speed_heading::without_speed;
-use mapper_core::is_missing_mark;
+use mapper_table::is_missing_mark;
 use std::collections::HashMap;
 use std::ops::Range;
 

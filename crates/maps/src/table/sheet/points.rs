@@ -6,8 +6,9 @@ use crate::table::columns::quantity::Quantity;
 use crate::table::rows_to_lines::check_point_count;
 use crate::table::sheet::grid::{Grid, GridRow};
 use crate::table::sheet::layout::{self, Layout};
-use mapper_core::{ImportError, ImportRemark, ImportedColumn, LineEnd, ReferenceState, is_missing_mark};
+use mapper_core::{ImportError, ImportRemark, ImportedColumn, LineEnd, ReferenceState};
 use mapper_numerics::statistics::range;
+use mapper_table::is_missing_mark;
 
 /// The values of a point by column, as written.
 pub(crate) struct Point<'a> {

@@ -1,7 +1,8 @@
 //! Speeds in titles and headings: `N = 60000 rpm`, `PR@60000`, `60 krpm | flow [kg/s]`.
 
 use crate::table::sheet::grid::Grid;
-use mapper_yaml::units::{Kind, Unit, header_unit};
+use mapper_table::header_unit;
+use mapper_yaml::units::{Kind, Unit};
 use std::ops::RangeInclusive;
 
 /// Range of a number without a unit that is a speed, rpm. Smaller numbers are diameters in mm, temperatures or pressures in mbar, larger

@@ -1,10 +1,10 @@
 //! Reads sheets of Excel workbooks.
 
-use crate::table::sheet::grid::{Grid, GridRow, MAX_CELLS, MAX_ROWS, count_number_cells};
+use crate::table::sheet::grid::{Grid, GridRow, MAX_ROWS, count_number_cells};
 use crate::table::sheet::matrices::{points_of_matrices, quantity_of_title};
 use crate::table::sheet::speed_heading::without_speed;
 use mapper_core::ImportError;
-use mapper_workbook::{XlsxLimits, check_xlsx};
+use mapper_table::{Book, Value, XlsxLimits, decimal_sign_of_cells, parse_number};
 use std::io::Cursor;
 
 /// The cells of the named sheet, else of the first visible sheet with a table of numbers, else of a hidden one.
@@ -13,9 +13,8 @@ use std::io::Cursor;
 /// [`ImportError::Workbook`] if it is not a workbook, unpacks to more than a map needs, or has no such sheet.
 pub(crate) fn grid_of_workbook(bytes: &[u8], wanted: Option<&str>) -> Result<Grid, ImportError> {
     let mut sheets = sheets_of(bytes)?;
-    let has_table = |sheet: &&mut Sheet| {
-        sheet.rows.iter().filter(|row| count_number_cells(&row.cells, true) >= 3).count() >= 2
-    };
+    let has_table =
+        |sheet: &&mut Sheet| sheet.rows.iter().filter(|row| count_number_cells(&row.cells) >= 3).count() >= 2;
     let grid = |sheet: &mut Sheet| Grid::of_rows(std::mem::take(&mut sheet.rows));
     let is_wanted = |sheet: &&mut Sheet| match wanted {
         Some(name) => sheet.name == name,
@@ -75,88 +74,57 @@ struct Sheet {
     rows: Vec<GridRow>,
 }
 
-/// Maximum number of cells between the first and the last of each row of a sheet, empty ones included: 100 000 points with 40 columns.
+/// Maximum number of cells of a sheet, empty ones between others included: 100 000 points with 40 columns.
 const MAX_SHEET_CELLS: usize = 40 * MAX_ROWS;
 
 /// All sheets of a workbook.
 fn sheets_of(bytes: &[u8]) -> Result<Vec<Sheet>, ImportError> {
     let failed = |problem: String| ImportError::Workbook { problem };
-    let mut sheets = Vec::new();
-    let mut add = |name: String, is_hidden: bool, cells: Vec<PositionedCell>| {
-        let rows = rows_of_cells(cells).map_err(|why| failed(format!("sheet `{name}` {why}")))?;
-        sheets.push(Sheet { name, is_hidden, rows });
-        Ok::<(), ImportError>(())
-    };
-    // Limits the memory: many cells may share one long text.
-    let mut left = MAX_UNPACKED_BYTES as usize;
-    let mut trimmed = |text: &str| {
-        let text = text.trim();
-        left = left.checked_sub(text.len()).ok_or_else(|| failed(too_large()))?;
-        Ok::<String, ImportError>(text.to_owned())
-    };
-    if bytes.starts_with(&mapper_workbook::MAGIC) {
-        for sheet in mapper_workbook::read_xls(Cursor::new(bytes)).map_err(failed)? {
-            let mut cells = Vec::new();
-            for (row, column, cell) in sheet.cells {
-                let text = match cell {
-                    mapper_workbook::Cell::Number(value) | mapper_workbook::Cell::Days(value) => {
-                        trimmed(&value.to_string())?
-                    }
-                    mapper_workbook::Cell::Text(text) => trimmed(&text)?,
-                };
-                cells.push((u32::from(row), usize::from(column), text));
-            }
-            add(sheet.name, sheet.is_hidden, cells)?;
-        }
-        return Ok(sheets);
-    }
     let limits = XlsxLimits { unpacked_bytes: MAX_UNPACKED_BYTES, memory_bytes: MAX_UNPACKED_BYTES };
-    check_xlsx(Cursor::new(bytes), limits).map_err(failed)?;
-    let book = calamine::Reader::new(Cursor::new(bytes));
-    let mut book: calamine::Xlsx<_> = book.map_err(|error: calamine::XlsxError| failed(error.to_string()))?;
-    for sheet in calamine::Reader::sheets_metadata(&book).to_vec() {
-        // `worksheet_range` would allocate the rectangle around all cells. Charts have no cells.
-        let Ok(mut reader) = book.worksheet_cells_reader(&sheet.name) else { continue };
-        let mut cells = Vec::new();
-        while let Some(cell) = reader.next_cell().map_err(|error| failed(error.to_string()))? {
-            let (row, column) = cell.get_position();
-            let text = match cell.get_value() {
-                calamine::DataRef::SharedString(text) => trimmed(text)?,
-                value => trimmed(&calamine::Data::from(value.clone()).to_string())?,
-            };
-            cells.push((row, column as usize, text));
+    let mut book = Book::open(Cursor::new(bytes), limits).map_err(failed)?;
+    // Limits the memory: many cells may share one long text.
+    let mut left_bytes = MAX_UNPACKED_BYTES as usize;
+    let mut sheets = Vec::new();
+    for (name, is_hidden) in book.sheets() {
+        let Some(mut rows) = book.rows(&name) else { continue };
+        let (mut numbers, mut cells, mut left) = (Vec::new(), Vec::new(), MAX_SHEET_CELLS);
+        while rows.advance().map_err(failed)? {
+            let row = rows.row();
+            let too_many =
+                || failed(format!("sheet `{name}` has more than {MAX_SHEET_CELLS} cells; no map needs that"));
+            left = left.checked_sub(row.len()).ok_or_else(too_many)?;
+            let text_bytes: usize = row.iter().map(Value::text_bytes).sum();
+            left_bytes = left_bytes.checked_sub(text_bytes).ok_or_else(|| failed(too_large()))?;
+            if cells.len() < 2 * MAX_ROWS {
+                numbers.push(rows.number());
+                cells.push(row.to_vec());
+            }
         }
-        add(sheet.name, sheet.visible != calamine::SheetVisible::Visible, cells)?;
+        let decimal = decimal_sign_of_cells(&cells);
+        let filled = |row: &Vec<Value>| row.iter().position(|cell| !cell.is_empty());
+        let first = cells.iter().filter_map(filled).min().unwrap_or_default();
+        let texts =
+            |row: &Vec<Value>| row.iter().skip(first).map(|cell| text_of_cell(cell, decimal)).collect();
+        let rows = numbers.iter().zip(&cells).map(|(at, row)| GridRow {
+            at: *at,
+            cells: texts(row),
+            is_comment: false,
+        });
+        let rows =
+            rows.filter(|row| row.cells.iter().any(|cell| cell.contains(char::is_alphanumeric))).collect();
+        sheets.push(Sheet { name, is_hidden, rows });
     }
     Ok(sheets)
 }
 
-/// A cell with its row and column from 0.
-type PositionedCell = (u32, usize, String);
-
-/// The rows of cells that are not blank, from the first column with a cell.
-fn rows_of_cells(mut cells: Vec<PositionedCell>) -> Result<Vec<GridRow>, String> {
-    cells.sort_by_key(|(row, column, _)| (*row, *column));
-    let first = cells.iter().map(|(_, column, _)| *column).min().unwrap_or_default();
-    let mut rows = Vec::new();
-    let mut left = MAX_SHEET_CELLS;
-    for row in cells.chunk_by(|(row, ..), (next, ..)| row == next) {
-        let mut texts = Vec::new();
-        for (_, column, text) in
-            row.iter().filter(|(_, column, text)| !text.is_empty() && *column < MAX_CELLS)
-        {
-            texts.resize(column - first, String::new());
-            texts.push(text.clone());
+/// A cell as text with decimal points; numbers that are stored as text may have another decimal sign.
+fn text_of_cell(cell: &Value, decimal: u8) -> String {
+    match cell {
+        Value::Text(text) if decimal == b',' => {
+            parse_number(text.as_bytes(), decimal).map_or_else(|| text.clone(), |number| number.to_string())
         }
-        let too_many = || format!("has more than {MAX_SHEET_CELLS} cells; no map needs that");
-        left = left.checked_sub(texts.len()).ok_or_else(too_many)?;
-        let at = row.first().map_or(0, |(row, ..)| *row as usize + 1);
-        let row = GridRow { at, cells: texts, is_comment: false };
-        if rows.len() < 2 * MAX_ROWS && row.cells.iter().any(|cell| cell.contains(char::is_alphanumeric)) {
-            rows.push(row);
-        }
+        cell => cell.text(b'.'),
     }
-    Ok(rows)
 }
 
 /// Maximum unpacked size of a workbook, bytes: 100 000 points with 20 columns of 30 bytes.

@@ -1,6 +1,7 @@
 //! Channels that the name of a column may mean.
 
-use mapper_core::{CHANNELS, Channel, Clarity, ColumnName, Measured, Place, Word};
+use mapper_core::{CHANNELS, Channel};
+use mapper_table::{Clarity, ColumnName, Measured, Place, Word, channel_at};
 use mapper_yaml::units::Kind;
 
 /// How well a name fits a channel; larger is better.
@@ -8,30 +9,6 @@ pub(crate) type Weight = u32;
 
 /// Minimum weight of a name that is not ambiguous, if its readings are plausible. Source: the scale of the weights in the table of words.
 pub(crate) const MIN_CLEAR_WEIGHT: Weight = 60;
-
-/// The channel of a quantity at a place.
-fn channel_at(measured: Measured, place: Place) -> Option<Channel> {
-    let (pressures, temperatures) = (
-        [Channel::P1, Channel::P2, Channel::P3, Channel::P4],
-        [Channel::T1, Channel::T2, Channel::T3, Channel::T4],
-    );
-    let at = |channels: [Channel; 4], station: u32| channels.get(station as usize - 1).copied();
-    match (measured, place) {
-        (Measured::Pressure, Place::Station(station)) => at(pressures, station),
-        (Measured::Temperature, Place::Station(station)) => at(temperatures, station),
-        (Measured::Temperature, Place::Compressor | Place::Housing) => Some(Channel::Tc),
-        (Measured::Temperature, Place::Turbine) => Some(Channel::Tt),
-        (Measured::Temperature, Place::Oil) => Some(Channel::TOil),
-        (Measured::Temperature, Place::OilOut) => Some(Channel::TOilOut),
-        (Measured::Temperature, Place::Ambient) => Some(Channel::TAmb),
-        (Measured::Speed, Place::Shaft | Place::Unnamed) => Some(Channel::ShaftSpeed),
-        (Measured::Flow, Place::Compressor | Place::Unnamed) => Some(Channel::CompressorFlow),
-        (Measured::Flow, Place::Turbine) => Some(Channel::TurbineFlow),
-        (Measured::Flow, Place::Oil) => Some(Channel::OilFlow),
-        (Measured::Opening, _) => Some(Channel::ValveCommand),
-        _ => None,
-    }
-}
 
 /// Kinds of units, and the quantity that a unit of each kind implies if the name has none.
 const KINDS: [(Kind, Measured); 5] = [

@@ -3,9 +3,9 @@
 use super::channel_proposal::{Ambient, Certainty, Proposal, ProposedChannel};
 use super::remark::ProposalRemark as Remark;
 use crate::logs::plausible::STANDARD_ATMOSPHERE_PA;
-use crate::logs::units::{kind_of, unit};
 use crate::logs::{Layout, Survey};
-use mapper_core::{Channel, ColumnName, Word};
+use mapper_core::Channel;
+use mapper_table::{ColumnName, Word, kind_of, unit};
 
 /// Shaft speed above which a machine turns, rpm. Bound: above the noise of any sensor, below any idle.
 const MIN_TURNING_RPM: f64 = 2000.0;
@@ -204,7 +204,7 @@ impl Readings {
             (_, false) | (None, _) => 0.0,
             (Some(Ambient::Assumed), _) => STANDARD_ATMOSPHERE_PA,
             (Some(Ambient::Column { column, unit }), _) => {
-                crate::logs::units::unit(mapper_yaml::units::Kind::Pressure, unit)
+                mapper_table::unit(mapper_yaml::units::Kind::Pressure, unit)
                     .ok()?
                     .to_inside(survey.columns.get(*column)?.quantile(0.5))
             }

@@ -7,10 +7,12 @@ use super::{physics, shared_units, tag_stations};
 use crate::logs::plausible::{
     AMBIENT_RANGE_PA, TRIMMED_SHARE, fitting_units, is_plausible, looks_like_gauge,
 };
-use crate::logs::units::kind_of;
 use crate::logs::{Column, ColumnSurvey, Layout, Survey};
-use mapper_core::{CHANNELS, Channel, ColumnName, Word, plausible};
-use mapper_yaml::units::{HeaderUnit, Kind, Reference, Unit, header_unit, volume_flow_m3_s};
+use mapper_core::{CHANNELS, Channel, plausible};
+use mapper_table::{
+    ColumnName, HeaderUnit, Measured, Place, Reference, Word, header_unit, kind_of, volume_flow_m3_s,
+};
+use mapper_yaml::units::{Kind, Unit};
 
 /// Minimum reading of an absolute outlet pressure if the inlet is gauge, Pa. Bound: gauge readings at idle are lower, as are absolute ones.
 const MAX_GAUGE_MIN_PA: f64 = 1.6e5;
@@ -341,7 +343,7 @@ fn propose_channel(
 
 /// A remark about readings that no sensor of the channel can have: marks of missing values, or faults.
 fn impossible_readings(channel: Channel, data: &ColumnSurvey, unit: Option<&'static str>) -> Option<Remark> {
-    let unit = crate::logs::units::unit(kind_of(channel), unit?).ok()?;
+    let unit = mapper_table::unit(kind_of(channel), unit?).ok()?;
     let range = plausible(channel);
     let (low, high) = (unit.to_inside(data.min), unit.to_inside(data.max));
     // Gauge pressures may be negative.
@@ -359,7 +361,7 @@ fn impossible_readings(channel: Channel, data: &ColumnSurvey, unit: Option<&'sta
 /// Decides which pressures are gauge pressures, and finds the ambient pressure.
 fn decide_gauge(proposal: &mut Proposal, layout: &Layout, survey: &Survey, units: &[Option<HeaderUnit>]) {
     let in_pa = |proposed: &ProposedChannel| -> Option<(f64, f64)> {
-        let unit = crate::logs::units::unit(Kind::Pressure, proposed.unit?).ok()?;
+        let unit = mapper_table::unit(Kind::Pressure, proposed.unit?).ok()?;
         let data: &ColumnSurvey = survey.columns.get(proposed.column)?;
         Some((
             unit.to_inside(data.quantile(TRIMMED_SHARE)),
@@ -391,8 +393,11 @@ fn decide_gauge(proposal: &mut Proposal, layout: &Layout, survey: &Survey, units
     let ambient = layout.columns.iter().enumerate().find_map(|(index, column)| {
         let unit =
             units[index].filter(|unit| unit.kind == Kind::Pressure && unit.reference != Reference::Gauge)?;
-        let named =
-            [&column.name, &column.description].iter().any(|name| ColumnName::read(name).has(Word::Ambient));
+        let is_ambient = |name: &String| {
+            let name = ColumnName::read(name);
+            name.has(Word::Ambient) || matches!(name.place(Measured::Pressure), Some((Place::Ambient, _)))
+        };
+        let named = [&column.name, &column.description].into_iter().any(is_ambient);
         let median_pa = unit.unit.to_inside(survey.columns[index].quantile(0.5));
         let (min_pa, max_pa) = AMBIENT_RANGE_PA;
         (named && (min_pa..=max_pa).contains(&median_pa))

@@ -4,11 +4,11 @@ use super::channel_proposal::{Certainty, NominalFlows, Proposal, ProposedChannel
 use super::physics::EXPONENT;
 use super::remark::ProposalRemark as Remark;
 use crate::logs::plausible::{STANDARD_ATMOSPHERE_PA, TRIMMED_SHARE, fitting_units};
-use crate::logs::units::kind_of;
 use crate::logs::{Layout, Survey};
 use mapper_core::Channel;
 use mapper_core::unit_factors::S_PER_MIN;
-use mapper_yaml::units::{Kind, Unit, header_unit};
+use mapper_table::{header_unit, kind_of};
+use mapper_yaml::units::{Kind, Unit};
 use std::f64::consts::PI;
 
 /// Maximum pressure ratio. Bound: one stage reaches 6 at the tip speed limit of aluminium wheels; a third more is margin for a throttled
@@ -115,7 +115,7 @@ pub(super) fn infer_flow_unit(
 ) {
     let value_at = |channel: Channel, share: f64| -> Option<f64> {
         let proposed = proposal.entry(channel).filter(|proposed| proposed.certainty > Certainty::Unsure)?;
-        let unit = crate::logs::units::unit(kind_of(channel), proposed.unit?).ok()?;
+        let unit = mapper_table::unit(kind_of(channel), proposed.unit?).ok()?;
         let offset_pa = if proposed.gauge { STANDARD_ATMOSPHERE_PA } else { 0.0 };
         Some(unit.to_inside(survey.columns.get(proposed.column)?.quantile(share)) + offset_pa)
     };

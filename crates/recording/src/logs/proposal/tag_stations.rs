@@ -5,8 +5,9 @@ use super::physics::EXPONENT;
 use super::remark::ProposalRemark as Remark;
 use crate::logs::plausible::STANDARD_ATMOSPHERE_PA;
 use crate::logs::{Layout, Survey};
-use mapper_core::{Channel, ColumnName, Measured};
-use mapper_yaml::units::{HeaderUnit, Kind, Reference};
+use mapper_core::Channel;
+use mapper_table::{ColumnName, HeaderUnit, Measured, Reference};
+use mapper_yaml::units::Kind;
 
 /// Temperature and pressure of one loop, K and Pa, by row of the trace.
 struct Station {

@@ -1,10 +1,15 @@
-//! Reads sheets with their cells.
+//! Reads the sheets of Excel 97 to 2003 workbooks (`.xls`, [MS-XLS]) within limits.
+//!
+//! `calamine` reads them too, but fills the rectangle around all cells of a sheet (0.4 GB for two cells in opposite corners), follows
+//! endless chains of sectors and panics on short records. Here memory is at most six times the size of the file, since a cell has at least six
+//! bytes in the file and 32 here.
 
-use crate::records::{BOF, CONTINUE, EOF, Record, Records};
-use crate::strings::{Bytes, shared};
 use std::collections::HashMap;
 use std::io::{Read, Seek};
 use std::rc::Rc;
+
+/// The first bytes of a compound file, which holds a workbook of Excel 97 to 2003.
+pub const XLS_MAGIC: [u8; 8] = *b"\xD0\xCF\x11\xE0\xA1\xB1\x1A\xE1";
 
 /// Maximum size of the stream with the sheets, bytes: 65 536 rows, the format's maximum, of 50 numbers take 59 MB.
 const MAX_STREAM_BYTES: u64 = 64 << 20;
@@ -225,4 +230,120 @@ fn unpacked(rk: u32) -> f64 {
     let value =
         if rk & 2 != 0 { f64::from(rk.cast_signed() >> 2) } else { f64::from_bits(u64::from(rk & !3) << 32) };
     if rk & 1 != 0 { value / 100.0 } else { value }
+}
+
+const EOF: u16 = 0x000A;
+const CONTINUE: u16 = 0x003C;
+const BOF: u16 = 0x0809;
+
+#[derive(Clone, Copy)]
+struct Record<'a> {
+    kind: u16,
+    data: &'a [u8],
+}
+
+impl Record<'_> {
+    fn u8(&self, at: usize) -> Option<u8> {
+        self.data.get(at).copied()
+    }
+
+    fn u16(&self, at: usize) -> Option<u16> {
+        Some(u16::from_le_bytes(*self.data.get(at..)?.first_chunk()?))
+    }
+
+    fn u32(&self, at: usize) -> Option<u32> {
+        Some(u32::from_le_bytes(*self.data.get(at..)?.first_chunk()?))
+    }
+
+    fn f64(&self, at: usize) -> Option<f64> {
+        Some(f64::from_le_bytes(*self.data.get(at..)?.first_chunk()?))
+    }
+}
+
+/// The records from the start of a stream; they end at the first incomplete one.
+struct Records<'a>(&'a [u8]);
+
+impl<'a> Iterator for Records<'a> {
+    type Item = Record<'a>;
+
+    fn next(&mut self) -> Option<Record<'a>> {
+        let head = Record { kind: 0, data: self.0 };
+        let (kind, length) = (head.u16(0)?, usize::from(head.u16(2)?));
+        let data = self.0.get(4..4 + length)?;
+        self.0 = self.0.get(4 + length..)?;
+        Some(Record { kind, data })
+    }
+}
+
+/// Set if characters have two bytes.
+const WIDE: u8 = 0x01;
+/// Set if a list of fonts follows the characters.
+const RICH: u8 = 0x08;
+/// Set if phonetic data follow the characters.
+const EXTENDED: u8 = 0x04;
+
+/// Bytes in one record and those that continue it.
+struct Bytes<'a> {
+    pieces: Vec<&'a [u8]>,
+    piece: usize,
+    at: usize,
+}
+
+impl<'a> Bytes<'a> {
+    fn new(pieces: Vec<&'a [u8]>) -> Self {
+        Bytes { pieces, piece: 0, at: 0 }
+    }
+
+    /// Whether the current record is at its end.
+    fn at_end_of_piece(&self) -> bool {
+        self.pieces.get(self.piece).is_none_or(|piece| self.at >= piece.len())
+    }
+
+    fn byte(&mut self) -> Option<u8> {
+        while self.at_end_of_piece() {
+            self.piece += 1;
+            self.at = 0;
+            self.pieces.get(self.piece)?;
+        }
+        self.at += 1;
+        self.pieces.get(self.piece)?.get(self.at - 1).copied()
+    }
+
+    fn number(&mut self, bytes: u32) -> Option<u32> {
+        (0..bytes).try_fold(0, |sum, place| Some(sum | u32::from(self.byte()?) << (8 * place)))
+    }
+
+    /// Characters; a record that continues them begins with flags of its own.
+    fn characters(&mut self, count: u32, mut flags: u8) -> Option<String> {
+        let mut units = Vec::new();
+        for index in 0..count {
+            if index > 0 && self.at_end_of_piece() {
+                flags = self.byte()?;
+            }
+            let unit = self.number(if flags & WIDE != 0 { 2 } else { 1 })?;
+            units.push(u16::try_from(unit).ok()?);
+        }
+        Some(String::from_utf16_lossy(&units))
+    }
+
+    /// A text whose count of characters has `count_bytes`. Before Excel 97 it has no flags, and characters of one byte.
+    fn text(&mut self, count_bytes: u32, has_flags: bool) -> Option<String> {
+        let count = self.number(count_bytes)?;
+        let flags = if has_flags { self.byte()? } else { 0 };
+        let fonts = if flags & RICH != 0 { self.number(2)? } else { 0 };
+        let phonetic = if flags & EXTENDED != 0 { self.number(4)? } else { 0 };
+        let text = self.characters(count, flags)?;
+        for _ in 0..4 * u64::from(fonts) + u64::from(phonetic) {
+            self.byte()?;
+        }
+        Some(text)
+    }
+}
+
+/// The texts that cells refer to, up to the first incomplete one.
+fn shared(pieces: Vec<&[u8]>) -> Vec<Rc<str>> {
+    let mut bytes = Bytes::new(pieces);
+    // The number of all references, and the number of texts.
+    let Some(count) = bytes.number(4).and_then(|_| bytes.number(4)) else { return Vec::new() };
+    (0..count).map_while(|_| bytes.text(2, true).map(Rc::from)).collect()
 }

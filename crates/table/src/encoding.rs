@@ -1,10 +1,11 @@
 //! Encodings of text files.
 
-use crate::names::column_name::is_known_word;
+use crate::column_name::is_known_word;
 use encoding_rs::{
     Decoder, Encoding, GB18030, SHIFT_JIS, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1250, WINDOWS_1251,
     WINDOWS_1252,
 };
+use std::io::{self, Read};
 
 /// The encoding of a text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,6 +16,9 @@ const MAX_SAMPLE_BYTES: usize = 1 << 16;
 const MAX_LINES: usize = 200;
 
 impl TextEncoding {
+    /// UTF-8.
+    pub const UTF_8: TextEncoding = TextEncoding(UTF_8);
+
     /// The encoding of a file that starts with these bytes, and the length of its byte order mark.
     pub fn guess(head: &[u8]) -> (TextEncoding, usize) {
         let marked = Encoding::for_bom(head);
@@ -85,6 +89,38 @@ fn guess_before_utf8(bytes: &[u8]) -> &'static Encoding {
     all.into_iter().max_by_key(|encoding| known_words(encoding)).unwrap_or(WINDOWS_1252)
 }
 
+/// Converts text to UTF-8.
+pub struct DecodingReader<R> {
+    inner: R,
+    decoder: Decoder,
+    decoded: io::Cursor<String>,
+    is_finished: bool,
+}
+
+impl<R: Read> DecodingReader<R> {
+    /// The text of a reader of bytes, decoded piece by piece.
+    pub fn new(inner: R, decoder: Decoder) -> Self {
+        DecodingReader { inner, decoder, decoded: io::Cursor::default(), is_finished: false }
+    }
+}
+
+impl<R: Read> Read for DecodingReader<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        loop {
+            let count = self.decoded.read(buffer)?;
+            if count > 0 || self.is_finished || buffer.is_empty() {
+                return Ok(count);
+            }
+            let mut block = [0u8; 8192];
+            let count = self.inner.read(&mut block)?;
+            self.is_finished = count == 0;
+            let mut text = String::with_capacity(self.decoder.max_utf8_buffer_length(count).unwrap_or(0));
+            let _ = self.decoder.decode_to_string(&block[..count], &mut text, self.is_finished);
+            self.decoded = io::Cursor::new(text);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -111,5 +147,21 @@ mod tests {
         assert_eq!(TextEncoding::of_name("gbk").map(TextEncoding::name), Some("GBK"));
         assert_eq!(TextEncoding::of_name("Latin-1").map(TextEncoding::name), Some("Latin-1"));
         assert_eq!(TextEncoding::of_name("morse"), None);
+    }
+
+    #[test]
+    fn any_encoding_becomes_the_same_text() {
+        let text = "T2 [°C];Drehzahl ATL 𝄞\n".repeat(1500);
+        let wide = |bytes: fn(u16) -> [u8; 2]| text.encode_utf16().flat_map(bytes).collect::<Vec<u8>>();
+        for (bytes, encoding) in [
+            (wide(u16::to_le_bytes), encoding_rs::UTF_16LE),
+            (wide(u16::to_be_bytes), encoding_rs::UTF_16BE),
+            (encoding_rs::GB18030.encode(&text).0.into_owned(), encoding_rs::GB18030),
+        ] {
+            let mut read = String::new();
+            let decoder = encoding.new_decoder_without_bom_handling();
+            DecodingReader::new(bytes.as_slice(), decoder).read_to_string(&mut read).unwrap();
+            assert!(read == text);
+        }
     }
 }

@@ -1,7 +1,6 @@
 //! Dates and times of day in the notations of logs.
 
 use jiff::civil::Date;
-use mapper_recording::logs::DateOrder;
 
 /// Permitted years: the range of 64 bits in nanoseconds, and no log is older.
 const YEARS: std::ops::RangeInclusive<i64> = 1970..=2200;
@@ -14,20 +13,31 @@ const MAX_DAYS: i64 = 84_371;
 
 const NS_PER_S: i64 = 1_000_000_000;
 /// Nanoseconds per day.
-pub(crate) const NS_PER_DAY: i64 = 86_400 * NS_PER_S;
+pub const NS_PER_DAY: i64 = 86_400 * NS_PER_S;
+
+/// The order of the parts of a date.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DateOrder {
+    /// 22.11.2026.
+    DayFirst,
+    /// 11/22/2026.
+    MonthFirst,
+    /// 2026-11-22.
+    YearFirst,
+}
 
 /// A date, a time of day, or both.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Instant {
+pub struct Instant {
     /// Days since 1970-01-01.
-    pub(crate) day: Option<i64>,
+    pub day: Option<i64>,
     /// Nanoseconds since midnight; times of another zone are shifted to UTC relative to `day`.
-    pub(crate) ns_of_day: Option<i64>,
+    pub ns_of_day: Option<i64>,
 }
 
 impl Instant {
     /// Nanoseconds since 1970-01-01, or since midnight without a date.
-    pub(crate) fn ns(self) -> i64 {
+    pub fn ns(self) -> i64 {
         self.day.unwrap_or(0).saturating_mul(NS_PER_DAY).saturating_add(self.ns_of_day.unwrap_or(0))
     }
 }
@@ -36,7 +46,7 @@ impl Instant {
 ///
 /// Also a date with the name of its month (`18-Nov-2025 10:20`), the day of the year before the time (`322:10:20:30`, as in IRIG
 /// time codes), and days before it (`0 days 00:00:10`).
-pub(crate) fn parse_instant(text: &str, order: DateOrder) -> Option<Instant> {
+pub fn parse_instant(text: &str, order: DateOrder) -> Option<Instant> {
     let text = text.trim();
     if text.len() > MAX_TEXT_BYTES {
         return None;
@@ -178,7 +188,7 @@ fn days_and_time(text: &str) -> Option<Instant> {
 }
 
 /// Minutes, and seconds with their fraction, as Excel writes times into text files (`mm:ss.0`), ns.
-pub(crate) fn minutes_and_seconds(text: &str) -> Option<i64> {
+pub fn minutes_and_seconds(text: &str) -> Option<i64> {
     let (minute, rest) = text.trim().split_once(':')?;
     let (second, fraction) = rest.split_once(['.', ','])?;
     let whole = |part: &str| -> Option<i64> {
@@ -189,7 +199,7 @@ pub(crate) fn minutes_and_seconds(text: &str) -> Option<i64> {
 }
 
 /// The order of day, month and year in some dates, from their separators and numbers above 12.
-pub(crate) fn guess_order<'a>(dates: impl Iterator<Item = &'a str>) -> (DateOrder, bool) {
+pub fn guess_order<'a>(dates: impl Iterator<Item = &'a str>) -> (DateOrder, bool) {
     let mut doubtful = None;
     for text in dates {
         let Some((parts, separator)) =

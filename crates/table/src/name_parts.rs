@@ -1,11 +1,10 @@
-//! Cuts a name into words, letters and numbers.
+//! Cuts a name into words, letters and numbers, or into the tag number of a piping diagram (ISA 5.1): `TT-101`, `PT_2101`, `FT-3`.
 
-use super::measured::Measured;
-use super::words::{Word, meanings};
+use crate::words::{Measured, Word, meanings};
 
 /// A part of a name.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Token {
+pub(crate) enum Token {
     Word(&'static [Word]),
     Letter(char),
     Number(u32),
@@ -13,21 +12,21 @@ pub(super) enum Token {
 }
 
 impl Token {
-    pub(super) fn is(self, word: Word) -> bool {
+    pub(crate) fn is(self, word: Word) -> bool {
         matches!(self, Token::Word(words) if words.contains(&word))
     }
 
-    pub(super) fn is_machine(self) -> bool {
+    pub(crate) fn is_machine(self) -> bool {
         self.is(Word::Compressor) || self.is(Word::Turbine)
     }
 
-    pub(super) fn measured(self) -> Option<Measured> {
+    pub(crate) fn measured(self) -> Option<Measured> {
         let Token::Word(words) = self else { return None };
         words.iter().find_map(|word| if let Word::Is(measured) = word { Some(*measured) } else { None })
     }
 
     /// The quantity of a letter at the start of a name.
-    pub(super) fn letter(self) -> Option<Measured> {
+    pub(crate) fn letter(self) -> Option<Measured> {
         match self {
             Token::Letter('t') => Some(Measured::Temperature),
             Token::Letter('p') => Some(Measured::Pressure),
@@ -39,7 +38,7 @@ impl Token {
     }
 }
 
-pub(super) fn parts_of(name: &str) -> Vec<Token> {
+pub(crate) fn parts_of(name: &str) -> Vec<Token> {
     let mut tokens = Vec::new();
     for part in normalise(name).split('_').filter(|part| !part.is_empty()) {
         push_part(&mut tokens, part);
@@ -118,7 +117,7 @@ fn push_part(tokens: &mut Vec<Token>, part: &str) {
 }
 
 /// Short words that count at the start or end of a compound: `prcomp`, `etats`, `tcompin`, `ntc`.
-const SHORT_STARTS: [&str; 5] = ["pr", "pi", "nc", "mc", "wc"];
+const SHORT_STARTS: [&str; 6] = ["pr", "pi", "nc", "mc", "wc", "mf"];
 const SHORT_ENDS: [&str; 5] = ["in", "ts", "tt", "tc", "tl"];
 
 /// The parts of a compound, if all are known: `luftmassenstrom`, `tcompin`, `mdotc`.
@@ -192,4 +191,43 @@ fn push_known_stems(tokens: &mut Vec<Token>, text: &str) {
     if !is_known {
         tokens.push(Token::Unknown);
     }
+}
+
+/// Tags with another meaning if their number is short: `PT2` is the total pressure at station 2, `TIT 1` a turbine inlet temperature.
+const LONG_NUMBERS: [&str; 6] = ["tt", "pt", "pi", "pit", "tit", "st"];
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Tag {
+    pub(crate) measured: Measured,
+    /// The number of its loop.
+    pub(crate) number: u32,
+}
+
+/// The tag number at the start of a name, and the rest of the name.
+pub(crate) fn split_tag(name: &str) -> Option<(Tag, &str)> {
+    let letters = name.find(|c: char| !c.is_ascii_alphabetic())?;
+    let (code, rest) = name.split_at(letters);
+    let code = code.to_ascii_lowercase();
+    let mut functions = code.chars();
+    // `PT100` is a resistance thermometer, `PT-100` a tag.
+    let is_thermometer = code == "pt" && ["100", "500", "1000"].iter().any(|ohms| rest.starts_with(ohms));
+    let measured = match functions.next()? {
+        'p' if is_thermometer => Measured::Temperature,
+        't' => Measured::Temperature,
+        'p' => Measured::Pressure,
+        'f' => Measured::Flow,
+        's' => Measured::Speed,
+        _ => return None,
+    };
+    // Transmitter, element, indicator, recorder; `D` is a difference, `V` a valve.
+    if !(1..=2).contains(&functions.as_str().len()) || !functions.all(|letter| "teir".contains(letter)) {
+        return None;
+    }
+    let number = rest.trim_start_matches(['-', '_', ' ', '.']);
+    let digits = number.find(|c: char| !c.is_ascii_digit()).unwrap_or(number.len());
+    let suffix = number[digits..].trim_start_matches(|c: char| c.is_ascii_uppercase());
+    let ends = suffix.is_empty() || suffix.starts_with(|c: char| !c.is_alphanumeric());
+    let least = if LONG_NUMBERS.contains(&code.as_str()) { 3 } else { 1 };
+    let loop_number = number[..digits].parse().ok()?;
+    (ends && (least..=5).contains(&digits)).then_some((Tag { measured, number: loop_number }, suffix))
 }

@@ -1,9 +1,8 @@
 //! Reads quantity and place from the name of a column.
 
-use super::measured::Measured;
-use super::name_parts::{Token, parts_of};
-use super::tag::{Tag, split_tag};
-use super::words::Word;
+use crate::name_parts::{Tag, Token, parts_of, split_tag};
+use crate::words::{Measured, Word};
+use mapper_core::Channel;
 
 /// A place of a turbocharger.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -142,6 +141,11 @@ impl ColumnName {
         })
     }
 
+    /// Whether a word or a letter names the compressor: `P1C`, `PC1`.
+    pub fn is_of_compressor(&self) -> bool {
+        self.machine().0 == Some(Place::Compressor)
+    }
+
     /// Whether words or stations refer to the turbine. A letter is not enough: `t` may also mean total.
     pub fn is_of_turbine(&self) -> bool {
         self.has(Word::Turbine) && !self.has(Word::Compressor)
@@ -235,6 +239,10 @@ impl ColumnName {
             return Some((Place::Station(place), clarity));
         }
         if let Some((number, clarity)) = station {
+            // `P0`, `P_0`: the barometer.
+            if number == 0 && measured == Measured::Pressure {
+                return Some((Place::Ambient, Clarity::Vague));
+            }
             return self.place_of_station(number, clarity, machine, by_letter);
         }
         if self.has(Word::Ambient) {
@@ -333,7 +341,16 @@ impl ColumnName {
         let words = (self.has(Word::Compressor), self.has(Word::Turbine));
         let letter = |c: char| {
             let quantity = self.quantity().unwrap_or_default();
-            self.tokens.iter().enumerate().any(|(at, token)| at > quantity && *token == Token::Letter(c))
+            // In `Inlet Temperature T1` the letter is the quantity's symbol.
+            let is_symbol = |at: usize| {
+                matches!(self.tokens.get(at + 1), Some(Token::Number(_)))
+                    && self.tokens.get(quantity).and_then(|token| token.measured()).is_some_and(|measured| {
+                        Token::Letter(c).letter() == Some(measured) && at == quantity + 1
+                    })
+            };
+            let is_machine =
+                |(at, token): (usize, &Token)| at > quantity && *token == Token::Letter(c) && !is_symbol(at);
+            self.tokens.iter().enumerate().any(is_machine)
         };
         match words {
             (true, false) => (Some(Place::Compressor), false),
@@ -386,6 +403,30 @@ impl ColumnName {
             }
         }
         if before != after { (before, after) } else { (is_in, is_out) }
+    }
+}
+
+/// The channel of a quantity at a place.
+pub fn channel_at(measured: Measured, place: Place) -> Option<Channel> {
+    let (pressures, temperatures) = (
+        [Channel::P1, Channel::P2, Channel::P3, Channel::P4],
+        [Channel::T1, Channel::T2, Channel::T3, Channel::T4],
+    );
+    let at = |channels: [Channel; 4], station: u32| channels.get((station as usize).checked_sub(1)?).copied();
+    match (measured, place) {
+        (Measured::Pressure, Place::Station(station)) => at(pressures, station),
+        (Measured::Temperature, Place::Station(station)) => at(temperatures, station),
+        (Measured::Temperature, Place::Compressor | Place::Housing) => Some(Channel::Tc),
+        (Measured::Temperature, Place::Turbine) => Some(Channel::Tt),
+        (Measured::Temperature, Place::Oil) => Some(Channel::TOil),
+        (Measured::Temperature, Place::OilOut) => Some(Channel::TOilOut),
+        (Measured::Temperature, Place::Ambient) => Some(Channel::TAmb),
+        (Measured::Speed, Place::Shaft | Place::Unnamed) => Some(Channel::ShaftSpeed),
+        (Measured::Flow, Place::Compressor | Place::Unnamed) => Some(Channel::CompressorFlow),
+        (Measured::Flow, Place::Turbine) => Some(Channel::TurbineFlow),
+        (Measured::Flow, Place::Oil) => Some(Channel::OilFlow),
+        (Measured::Opening, _) => Some(Channel::ValveCommand),
+        _ => None,
     }
 }
 

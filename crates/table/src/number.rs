@@ -1,6 +1,6 @@
 //! Numbers in the notations of logs.
 
-use mapper_recording::logs::{header_unit, is_missing_mark};
+use crate::units::header_unit;
 
 /// Maximum length of a number's text, bytes.
 const MAX_NUMBER_BYTES: usize = 48;
@@ -10,21 +10,37 @@ const FIRST_GROUP_DIGITS: std::ops::RangeInclusive<usize> = 1..=3;
 
 /// Minimum value that marks a missing reading: instruments write 9.9e37 for an overload and 9.91e37 for no reading (SCPI-99,
 /// section 7.2.1.4 and 7.2.1.5), others 1e30 or the largest number of single precision.
-pub(crate) const NO_READING: f64 = 1e30;
+pub const NO_READING: f64 = 1e30;
 
 /// The number in a cell; `None` for anything else, including words for infinity and not-a-number, and the
 /// numbers with which instruments mark missing readings.
 ///
-/// Blanks may follow the sign (`+   98.61`), and a Fortran `D` may mark the exponent.
-pub(crate) fn parse_number(cell: &[u8], decimal: u8) -> Option<f64> {
+/// Blanks may follow the sign (`+   98.61`) and separate thousands (`60 000`), and a Fortran `D` may mark the exponent.
+pub fn parse_number(cell: &[u8], decimal: u8) -> Option<f64> {
     let cell = cell.trim_ascii();
     let (negative, digits) = match cell.split_first()? {
         (b'-', rest) => (true, rest.trim_ascii_start()),
         (b'+', rest) => (false, rest.trim_ascii_start()),
-        _ => (false, cell),
+        _ => match cell.strip_prefix("\u{2212}".as_bytes()) {
+            Some(rest) => (true, rest.trim_ascii_start()),
+            None => (false, cell),
+        },
     };
-    let value = parse_digits(digits, decimal)?;
+    let value = parse_digits(digits, decimal)
+        .or_else(|| parse_digits(without_blanks(digits, decimal)?.as_bytes(), decimal))?;
     Some(if negative { -value } else { value }).filter(|value| value.abs() < NO_READING)
+}
+
+/// Digits whose thousands blanks separate: `60 000`.
+fn without_blanks(cell: &[u8], decimal: u8) -> Option<String> {
+    let text = std::str::from_utf8(cell).ok().filter(|text| text.contains(char::is_whitespace))?;
+    let whole = text.split(char::from(decimal)).next()?;
+    let mut groups = whole.split(char::is_whitespace);
+    let is_digits = |group: &str| group.bytes().all(|byte| byte.is_ascii_digit());
+    let is_first =
+        groups.next().is_some_and(|group| FIRST_GROUP_DIGITS.contains(&group.len()) && is_digits(group));
+    let is_grouped = is_first && groups.all(|group| group.len() == 3 && is_digits(group));
+    is_grouped.then(|| text.split_whitespace().collect())
 }
 
 /// A number without a sign.
@@ -84,7 +100,7 @@ fn fortran(text: &str) -> Option<f64> {
 }
 
 /// A number followed by its unit, as in `98.75 kPa`.
-pub(crate) fn number_with_unit(cell: &str, decimal: u8) -> Option<(f64, &str)> {
+pub fn number_with_unit(cell: &str, decimal: u8) -> Option<(f64, &str)> {
     let cell = cell.trim();
     // `1/min` begins with a digit.
     let apart = cell.split_once(' ').filter(|(_, unit)| header_unit(unit.trim()).is_some());
@@ -105,13 +121,13 @@ pub(crate) fn number_with_unit(cell: &str, decimal: u8) -> Option<(f64, &str)> {
 }
 
 /// The number in a cell, with or without a unit after it.
-pub(crate) fn read_number(cell: &str, decimal: u8) -> Option<f64> {
+pub fn read_number(cell: &str, decimal: u8) -> Option<f64> {
     parse_number(cell.as_bytes(), decimal)
         .or_else(|| number_with_unit(cell, decimal).map(|(number, _)| number))
 }
 
 /// The number before a unit; NaN for anything else.
-pub(crate) fn number_in(cell: &str, decimal: u8, unit: &str) -> f64 {
+pub fn number_in(cell: &str, decimal: u8, unit: &str) -> f64 {
     number_with_unit(cell, decimal).filter(|(_, found)| *found == unit).map_or(f64::NAN, |(number, _)| number)
 }
 
@@ -123,8 +139,19 @@ fn starts_as_thousands(text: &[u8]) -> bool {
 }
 
 /// Whether a cell marks a missing value.
-pub(crate) fn is_missing(cell: &[u8]) -> bool {
+pub fn is_missing(cell: &[u8]) -> bool {
     std::str::from_utf8(cell).is_ok_and(is_missing_mark)
+}
+
+/// Words of data loggers, spreadsheets and meters for a missing value, in lower case.
+const MARKS: &str = "nan na n/a n.a. #n/a #na #nv #div/0! #value! #wert! #ref! #bezug! #num! #zahl! #null! #name? null none inf +inf -inf \
+    1.#qnan 1.#inf -1.#ind ol o.l. over ovld overload overflow overrange err error fault invalid open";
+
+/// Whether a cell marks a missing value, by a word or by dashes or stars only.
+pub fn is_missing_mark(cell: &str) -> bool {
+    let cell = cell.trim();
+    MARKS.split(' ').any(|mark| cell.eq_ignore_ascii_case(mark))
+        || cell.chars().all(|c| matches!(c, '-' | '\u{2013}' | '\u{2014}' | '*'))
 }
 
 #[cfg(test)]
@@ -153,6 +180,10 @@ mod tests {
             ("1e999", b'.', None),
             ("+   98.61", b'.', Some(98.61)),
             ("- 0,25", b',', Some(-0.25)),
+            ("60 000", b'.', Some(6e4)),
+            ("-1 234 567,5", b',', Some(-1_234_567.5)),
+            ("60 00", b'.', None),
+            ("\u{2212}0.5", b'.', Some(-0.5)),
             ("9.860732D+01", b'.', Some(98.60732)),
             ("1,5d-2", b',', Some(0.015)),
             ("12D3", b'.', None),

@@ -1,8 +1,7 @@
 //! One row of a table, independent of its storage.
 
-use crate::notation::instant::{Instant, parse_instant};
-use crate::notation::number::{NO_READING, number_in, parse_number};
-use mapper_recording::logs::{DateOrder, LogError};
+use mapper_recording::logs::LogError;
+use mapper_table::{DateOrder, Instant, NO_READING, number_in, parse_instant, parse_number};
 
 /// The content of a cell.
 pub(crate) enum Cell<'a> {

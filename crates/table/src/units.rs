@@ -1,7 +1,7 @@
 //! Units in the headers of logs and tables.
 
-use super::kind::CUBIC_FOOT_M3;
-use super::{BARE_RATIO, Kind, Unit};
+use mapper_core::{Channel, Dimension};
+use mapper_yaml::units::{BARE_RATIO, CUBIC_FOOT_M3, Kind, Unit, UnitError, parse_with};
 use serde::Serialize;
 
 /// Reference of a pressure.
@@ -200,7 +200,8 @@ pub fn header_unit(text: &str) -> Option<HeaderUnit> {
     if lower.is_empty() || lower.len() > 24 {
         return None;
     }
-    let known = |kind, symbol, reference| Some(HeaderUnit { kind, unit: unit(kind, symbol)?, reference });
+    let known =
+        |kind, symbol, reference| Some(HeaderUnit { kind, unit: by_symbol(kind, symbol)?, reference });
     for (kind, symbol, spellings) in SPELLINGS {
         if spellings.contains(&lower.as_str()) {
             return known(*kind, symbol, Reference::Unstated);
@@ -218,8 +219,46 @@ pub fn header_unit(text: &str) -> Option<HeaderUnit> {
     None
 }
 
+/// Whether a text is a unit of a column, reduced quantities and humidity included.
+pub fn is_unit(text: &str) -> bool {
+    header_unit(text).is_some()
+        || volume_flow_m3_s(text).is_some()
+        || is_reduced_unit(text)
+        || matches!(text.trim().to_lowercase().as_str(), "g/kg" | "kg/kg")
+}
+
+/// Whether a unit has the root of a temperature, as those of reduced speed and flow do.
+pub fn is_reduced_unit(text: &str) -> bool {
+    let lower = text.to_lowercase().replace(',', ".");
+    let roots = ["k^0.5", "k^.5", "k^1/2", "sqrt(k", "sqrtk", "√k", "k0.5", "k**0.5"];
+    roots.iter().any(|root| lower.contains(root))
+}
+
+/// Whether a text stands for the unit of a ratio.
+pub fn is_dimensionless(unit: &str) -> bool {
+    matches!(
+        unit.to_lowercase().as_str(),
+        "" | "-" | "--" | "1" | "ratio" | "fraction" | "frac" | "dimensionless" | "dec" | "nd" | "none"
+    )
+}
+
+/// A cell of a row of units without the brackets around it: `[kPa]`, `(bar(a))`.
+pub fn bare_unit(cell: &str) -> &str {
+    let cell = cell.trim();
+    let pairs = [('[', ']'), ('(', ')')];
+    let inside = pairs.iter().find_map(|(open, close)| cell.strip_prefix(*open)?.strip_suffix(*close));
+    inside.map_or(cell, str::trim)
+}
+
+/// Whether the cells of a row are units: one at least, and not fewer than other texts.
+pub fn is_units_row(row: &[String]) -> bool {
+    let filled = row.iter().filter(|cell| !cell.is_empty()).count();
+    let units = row.iter().filter(|cell| is_unit(bare_unit(cell))).count();
+    units > 0 && 2 * units >= filled
+}
+
 /// The unit with this symbol; ratios also have the unit `1`.
-fn unit(kind: Kind, symbol: &str) -> Option<&'static Unit> {
+fn by_symbol(kind: Kind, symbol: &str) -> Option<&'static Unit> {
     kind.unit(symbol).or((symbol == BARE_RATIO.symbol()).then_some(&BARE_RATIO))
 }
 
@@ -264,9 +303,70 @@ pub fn split_unit(header: &str) -> (String, Option<String>) {
     (header.to_owned(), None)
 }
 
+/// The kind of quantity that a channel measures.
+pub fn kind_of(channel: Channel) -> Kind {
+    match channel.info().dimension {
+        Dimension::RotationalSpeed => Kind::Speed,
+        Dimension::MassFlow => Kind::MassFlow,
+        Dimension::Pressure => Kind::Pressure,
+        Dimension::Temperature => Kind::Temperature,
+        Dimension::Ratio => Kind::Fraction,
+    }
+}
+
+/// The kind of noise and offsets of a reading.
+pub fn difference(kind: Kind) -> Kind {
+    match kind {
+        Kind::Temperature => Kind::TemperatureDifference,
+        Kind::Pressure => Kind::PressureDifference,
+        other => other,
+    }
+}
+
+/// The unit with a spelling of this or another program.
+///
+/// # Errors
+/// [`UnitError::WrongUnit`] for what is not a unit of the kind.
+pub fn unit(kind: Kind, spelling: &str) -> Result<&'static Unit, UnitError> {
+    let spelling = spelling.trim();
+    find(kind, spelling).ok_or_else(|| UnitError::WrongUnit { unit: spelling.to_owned(), kind })
+}
+
+/// Parses a number with its unit, such as `29e-3 m^2`, to SI and rpm. A ratio needs no unit.
+///
+/// # Errors
+/// [`UnitError`] for what is not a finite number, for an unknown unit, and for a missing one.
+pub fn parse_quantity(kind: Kind, text: &str) -> Result<f64, UnitError> {
+    parse_with(kind, text, |spelling| match spelling {
+        "" => (kind == Kind::Fraction).then_some(&BARE_RATIO),
+        spelling => find(kind, spelling),
+    })
+}
+
+/// The remedy for an error: the units that are valid.
+pub fn remedy(kind: Kind, error: &UnitError) -> String {
+    let bare = if kind == Kind::Fraction { "; a ratio may be written with `1`" } else { "" };
+    format!("{}{bare}", error.remedy(kind))
+}
+
+fn find(kind: Kind, spelling: &str) -> Option<&'static Unit> {
+    kind.unit(spelling).or_else(|| match (kind, spelling) {
+        (Kind::Fraction, "1" | "-") => Some(&BARE_RATIO),
+        (Kind::Temperature, "C" | "celsius") => kind.unit("degC"),
+        (Kind::Temperature, "F") => kind.unit("degF"),
+        // Unambiguous for a channel: channels contain absolute pressures.
+        (Kind::Pressure, "psi") => kind.unit("psia"),
+        // Unambiguous for an interval too: only the scale counts, and degF and degR have the same.
+        (Kind::TemperatureDifference, "degC" | "°C") => kind.unit("K"),
+        (Kind::TemperatureDifference, "degF" | "°F") => Kind::Temperature.unit("degR"),
+        _ => None,
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use mapper_core::CHANNELS;
 
     #[test]
     fn units_as_test_stands_write_them() {
@@ -309,7 +409,7 @@ mod tests {
     }
 
     fn symbol_of(kind: Kind, symbol: &str) -> &'static str {
-        unit(kind, symbol).unwrap().symbol()
+        by_symbol(kind, symbol).unwrap().symbol()
     }
 
     #[test]
@@ -332,5 +432,57 @@ mod tests {
         ] {
             assert_eq!(split_unit(header), (name.to_owned(), unit.map(str::to_owned)), "{header}");
         }
+    }
+
+    #[test]
+    fn foreign_spellings_mean_what_their_programs_mean() {
+        // Definitions of the units; NIST SP 811 for psi (tolerance: its seven digits).
+        for (kind, text, inside) in [
+            (Kind::Temperature, "25 C", 298.15),
+            (Kind::Temperature, "25celsius", 298.15),
+            (Kind::Temperature, "212 F", 373.15),
+            (Kind::TemperatureDifference, "0.25 degC", 0.25),
+            (Kind::TemperatureDifference, "1.8 °F", 1.0),
+            (Kind::Pressure, "14.695948775 psi", 101_325.0),
+            (Kind::PressureDifference, "0.01 psi", 68.947_57),
+            (Kind::Speed, "110e3 rev/min", 110e3),
+            (Kind::Speed, "1000 rev/s", 60e3),
+            (Kind::MassFlow, "36 kg/hr", 0.01),
+            (Kind::MassFlow, "1 lb/s", 0.453_592_37),
+            (Kind::Fraction, "0.7", 0.7),
+            (Kind::Fraction, "0.7 1", 0.7),
+            (Kind::Fraction, "50 %", 0.5),
+        ] {
+            let got = parse_quantity(kind, text).unwrap();
+            assert!((got - inside).abs() <= 5e-8 * inside, "{text}: {got}");
+        }
+    }
+
+    #[test]
+    fn the_native_unit_of_every_channel_leaves_every_bit_as_it_is() {
+        for row in CHANNELS {
+            let native = unit(kind_of(row.channel), row.dimension.unit()).unwrap();
+            for value in [-0.0, 0.1, 98_100.123_456_789] {
+                assert_eq!(native.to_inside(value).to_bits(), f64::to_bits(value), "{}", row.symbol);
+            }
+        }
+    }
+
+    #[test]
+    fn text_that_is_not_a_quantity_is_refused() {
+        for (kind, text) in [
+            (Kind::Fraction, ""),
+            (Kind::Pressure, "abc"),
+            (Kind::Pressure, "5"),
+            (Kind::Pressure, "5 K"),
+            (Kind::Pressure, "5 barg"),
+            (Kind::Temperature, "inf K"),
+            (Kind::Temperature, "1e999 K"),
+            (Kind::Fraction, "nan"),
+            (Kind::Fraction, "1e999"),
+        ] {
+            assert!(parse_quantity(kind, text).is_err(), "{text}");
+        }
+        assert!(unit(Kind::Fraction, "").is_err());
     }
 }

@@ -1,8 +1,23 @@
 //! The table of the words in names of measured quantities, in all languages that the readers of logs and maps know.
 
-use super::measured::Measured;
 use std::collections::HashMap;
 use std::sync::LazyLock;
+
+/// A quantity that a name may have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs, reason = "the names are the quantities")]
+pub enum Measured {
+    Temperature,
+    Pressure,
+    Speed,
+    Flow,
+    VolumeFlow,
+    PressureRatio,
+    Efficiency,
+    Humidity,
+    Opening,
+    Vane,
+}
 
 /// Meaning of a word in a name.
 ///
@@ -42,14 +57,14 @@ const TABLE: &[(&[Word], &str)] = &[
     (&[Is(Pressure), Compressor, Out, Acronym], "cop cdp"),
     (&[Is(Pressure), Turbine, In, Acronym], "tip"),
     (&[Is(Pressure), Turbine, Out, Acronym], "top"),
-    (&[Is(Pressure)], "press prs pressure druck pression presion pressione pressao druk tryck cisnienie tlak давлен 压力 气压 压 圧力"),
+    (&[Is(Pressure)], "press prs pressure druck pression presion pressione pressao druk tryck cisnienie tlak давлен 压力 气压 压 圧力 圧"),
     (&[Is(Pressure), Total], "pt"),
     (&[Is(Pressure), Static], "ps"),
     (&[Is(Pressure), Charge], "ladedruck"),
-    (&[Is(Pressure), Ambient], "luftdruck baro barometer barometric barometrisch barometerdruck 大气压 大气压力"),
+    (&[Is(Pressure), Ambient], "luftdruck baro pbar barometer barometric barometrisch barometerdruck барометр барометрическ 大气压 大气压力 大気圧"),
     (&[Is(Speed)], "speed spd drehzahl rpm vitesse regime velocidad velocita giri rotacao toerental varvtal rotation rotations rotational umdrehungen predkosc obroty otacky оборот вращен 转速 回転数 回転速度"),
     (&[Is(Speed), Corrected], "nc"),
-    (&[Is(Flow)], "flow massflow mass massflowrate massrate massenstrom massenfluss durchsatz massendurchsatz debit caudal portata vazao gasto massastroom floede przeplyw prutok mdot dm mf расход 流量 质量流量 質量流量"),
+    (&[Is(Flow)], "flow massflow mass massflowrate massrate massenstrom massenfluss durchsatz massendurchsatz debit caudal portata vazao gasto massastroom floede fm masy strumien przeplyw prutok mdot dm mf расход 流量 质量流量 質量流量"),
     (&[Is(Flow), Compressor], "mc wc mv ml ma wa massc"),
     (&[Is(Flow), Turbine], "mt wt"),
     (&[Is(Flow), Air], "maf caf luftmasse"),
@@ -66,16 +81,18 @@ const TABLE: &[(&[Word], &str)] = &[
     (&[Expansion], "expansion detente espansione entspannung"),
     (&[Compressor], "comp compr cmp cmpr compressor verd verdichter kompressor kompresor sprezarka sprezarki lader compresseur compresor compressore компрессор 压气机 压缩机 压气 圧縮機 コンプレッサ"),
     (&[Turbine], "tur turb turbine turbinen turbina turbiny turbin турбин 涡轮 涡轮机 透平 タービン"),
-    (&[Shaft], "tc tl atl turbo turbocharger turbolader abgasturbolader turbocompressore shaft rotor welle arbre eje ротор турбокомпрессор 涡轮增压器 增压器 转子 ターボ"),
+    (&[Shaft], "tc tl atl turbo turbocharger turbolader abgasturbolader turbocompressore shaft rotor spool gg laeufer welle arbre eje ротор турбокомпрессор 涡轮增压器 增压器 转子 ターボ 過給機 ткр"),
     (&[Exhaust], "abgas exh exhaust gas hotgas echappement scarico выхлоп 排气 废气 燃气"),
-    (&[Air], "air luft aire aria ar lucht воздух 空气"),
+    (&[Air], "air luft aire aria ar lucht powietrza powietrze воздух 空气"),
     (&[Charge], "boost ladeluft"),
-    (&[Oil], "oil oel huile aceite olio oleo olej масл 机油 滑油 润滑油 潤滑油 油"),
+    (&[Oil], "oil oel huile aceite olio oleo olej olie olje масл 机油 滑油 润滑油 潤滑油 油"),
     (&[Housing], "housing hsg casing wall skin metal wand geh gehaeuse gehause body material carter carcasa carcassa paroi pared корпус 壳体 蜗壳 外壳 壳"),
     (&[Bearing], "bearing lager lagergehaeuse palier cojinete подшипник 轴承 轴承体"),
-    (&[Ambient], "amb ambient ambiant ambiante ambiente umg umgebung room raum cell zelle testbed pruefstand atm atmospheric atmospherique atmosphere окружающ 环境 大气"),
-    (&[In], "in inl inlet intake suct ein eintritt ansaug suction entree entry entrada entrata ingresso admission admision aspiration wlot wlotu вход входе 进口 入口 进 吸入"),
+    (&[Ambient], "amb ambient ambiant ambiante ambiente umg umgebung omgivning omgeving otoczenia otoczenie room raum cell zelle testbed pruefstand atm atmospheric atmospherique atmosphere окружающ 环境 大气 大気"),
+    (&[In], "in inl inlet inlaat intake suc suct ein eintritt ansaug suction entree entry entrada entrata ingresso admission admision aspiration wlot wlotu вход входе 进口 入口 进 吸入"),
     (&[In, Air], "进气"),
+    (&[Turbine, In], "涡前"),
+    (&[Turbine, Out], "涡后"),
     (&[Out], "out outl outlet disch dis aus austritt discharge exit sortie salida saida uscita wylot wylotu выход выходе 出口 出"),
     (&[Before], "vor before upstream us pre avant amont antes voor foere monte przed перед 前"),
     (&[After], "nach hinter after behind downstream ds post apres aval despues na efter valle za за после 后 後"),
@@ -97,7 +114,7 @@ static WORDS: LazyLock<HashMap<&str, &[Word]>> = LazyLock::new(|| {
 });
 
 /// The meanings of a word in lower case without accents.
-pub(super) fn meanings(word: &str) -> Option<&'static [Word]> {
+pub(crate) fn meanings(word: &str) -> Option<&'static [Word]> {
     WORDS.get(word).copied()
 }
 

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, missing_docs)]
 
-use mapper_workbook::{Cell, read_xls};
+use mapper_table::{Cell, read_xls};
 use proptest::prelude::*;
 use std::io::{Cursor, Write};
 

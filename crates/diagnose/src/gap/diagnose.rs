@@ -98,7 +98,7 @@ pub fn gap(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
     let diagnosis = Diagnosis {
         verdict,
         baseline,
-        locations: locations,
+        locations,
         suspects: beyond_prior(&library.study, library.at_best(), named.unwrap_or(&library.null)),
         inseparable: inseparable(&library, &posterior),
         closure_terms: closure.closure_terms,

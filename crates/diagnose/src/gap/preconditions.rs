@@ -61,6 +61,9 @@ const ANOTHER_MACHINE_RATIO: [(Channel, f64); 5] = [
 ];
 
 /// Rejects a recording that is far from the nominal prediction.
+///
+/// # Errors
+/// [`Problem`] with the channel that departs furthest.
 pub fn another_machine(study: &Study, predicted: &[f64]) -> Result<(), Problem> {
     let mut worst: Option<(f64, Channel, f64)> = None;
     for (channel, limit) in ANOTHER_MACHINE_RATIO {

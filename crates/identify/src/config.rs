@@ -1,5 +1,6 @@
 //! Configuration of identification: method, window, geometry, declared uncertainty, thresholds.
 
+use crate::step_outcome::error::IdentifyError;
 use mapper_core::{Channel, InletConvection, JointSettings, Method, ReferenceState, SettleBands, WindowRule};
 pub use mapper_core::{DeclaredUncertainty, NoiseColour};
 use mapper_numerics::coloured_noise::ColouredNoise;
@@ -121,6 +122,34 @@ impl Default for IdentifyConfig {
 }
 
 impl IdentifyConfig {
+    /// Checks that all numbers are in range.
+    pub(crate) fn check(&self) -> Result<(), IdentifyError> {
+        let share = |name, value: f64| (name, value, (0.0..=1.0).contains(&value), "a share from 0 to 1");
+        let positive = |name, value: f64, expected| (name, value, value.is_finite() && value > 0.0, expected);
+        let colour = self.noise_colour;
+        let mut checks = vec![
+            share("alpha_area_ratio", self.alpha_area_ratio),
+            share("alpha_area_sigma_ratio", self.alpha_area_sigma_ratio),
+            share("internal_area_sigma_ratio", self.internal_area_sigma_ratio),
+            positive("internal_area_m2", self.internal_area_m2, "a positive area, m2"),
+            positive("time_constant_s", colour.time_constant_s, "a positive time, s"),
+            share("first_order_share_ratio", colour.first_order_share_ratio),
+        ];
+        for tap in [self.inlet_tap, self.outlet_tap] {
+            if let PressureTap::Static { pipe_diameter_m } = tap {
+                checks.push(positive("pipe_diameter_m", pipe_diameter_m, "a positive diameter, m"));
+            }
+        }
+        if let WindowRule::Fixed { start_s, end_s } = self.window {
+            checks.push(("start_s", start_s, start_s >= 0.0, "0 s or more after the jump"));
+            checks.push(("end_s", end_s, end_s > start_s, "later than the window's start"));
+        }
+        match checks.into_iter().find(|(_, _, usable, _)| !usable) {
+            Some((name, value, _, expected)) => Err(IdentifyError::Config { name, value, expected }),
+            None => Ok(()),
+        }
+    }
+
     /// Corrected flow, kg/s: the flow of dry air in the reference state at the same Mach numbers.
     pub(crate) fn corrected_flow_kg_s(&self, flow_kg_s: f64, t1_k: f64, p1_pa: f64) -> f64 {
         self.reference.corrected_flow_kg_s(flow_kg_s * self.air.dry_flow_ratio(), t1_k, p1_pa)

@@ -1,7 +1,7 @@
 //! Identifies points from a recording: efficiency and heat-transfer coefficient, with their uncertainty.
 //!
 //! [`identify_recording`] is a function from a [`Recording`](mapper_core::Recording) to points, one for each step. This crate has no access to
-//! a simulator's true values. Its stages:
+//! a simulator's true values. Its stages (1 to 3 make the `evidence`, 3 to 5 the `estimates`, 6 the `points`):
 //!
 //! 1. Every step gets its end state, the mean over its last seconds; [`isothermal_zero()`] has determined the offsets to subtract before.
 //! 2. Every step is fitted alone: `dynamic` finds the efficiency and the h whose T2, by eqs. 1-3, is closest to the measured one (Burke et al.,
@@ -16,11 +16,14 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod config;
+mod estimates;
+mod evidence;
 mod faults;
 mod identify;
 mod isothermal_zero;
 mod joint;
 mod needs;
+mod points;
 mod reading_checks;
 mod reduce;
 mod single_step;

@@ -3,7 +3,7 @@
 //!
 //! Each source of uncertainty is changed by one standard deviation to both sides, and the efficiency is computed again.
 
-use crate::identify::point;
+use crate::points::point;
 use crate::single_step::budgets;
 use crate::single_step::dynamic::{Estimate, judge_assumption};
 use crate::single_step::fit::ETA_BOUNDS;
@@ -53,7 +53,7 @@ pub fn reduce(
     heat: Option<KnownHeat<'_>>,
     config: &IdentifyConfig,
 ) -> Result<Vec<(IdentifiedPoint, PointBudgets)>, IdentifyError> {
-    crate::identify::check(config)?;
+    config.check()?;
     let heat = heat.filter(|_| config.method == Method::Corrected);
     Ok(measured.iter().enumerate().map(|(index, measured)| of_point(index, measured, heat, config)).collect())
 }

@@ -26,7 +26,7 @@ pub use calibrated_model::{
     CalibratedModelError, ChannelCheck, Expected, ForecastCheck, Found, FoundEffect, FoundTolerance,
     check_forecast, forecast_steps,
 };
-pub use causes::calibration::{Calibration, logistic_features};
+pub use causes::calibration::{Calibration, Origin, logistic_features};
 pub use consequence::{
     AddedUncertainty, CorrectedMap, Correction, NEEDED_PROBABILITY, NotCorrected, PointCorrection,
 };

@@ -1,6 +1,8 @@
 //! `study: calibration`: the cases that `mapper gap blind calibrate` draws to convert scores into probabilities.
 
-use crate::blind::calibration::calibrate::{CalibrationSettings, DiagnosisSummary, Plan, cases, fitted};
+use crate::blind::calibration::calibrate::{
+    CalibrationSettings, DiagnosisSummary, Plan, cases, fitted, undetermined,
+};
 use crate::blind::scoring::reliability::{Bin, Reliability, reliabilities, reliability_text};
 use crate::blind::{Case, StoredCase};
 use crate::studies::source::{CampaignSource, StudyError};
@@ -127,8 +129,9 @@ pub fn fit_calibration(
         ("reliability.svg", reliability_svg(&reliabilities)),
     ];
     let description = format!(
-        "calibration.json from {} diagnoses in observed.json; reliability.svg\n{}",
+        "calibration.json from {} diagnoses in observed.json; reliability.svg\n{}\n{}",
         observed.len(),
+        undetermined(&calibration).join("\n"),
         reliability_text(&reliabilities).trim_end()
     );
     Ok(CalibrationResult { files, summary: description })

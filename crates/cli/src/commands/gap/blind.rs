@@ -92,7 +92,7 @@ impl Calibrate {
             true => standard_output::print_json(
                 &json!({"calibration": self.out, "diagnoses": made, "reliability": fitted}),
             ),
-            false => standard_output::print(&calibrated_text(made, &self.out, &fitted)),
+            false => standard_output::print(&calibrated_text(made, &self.out, &calibration, &fitted)),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use mapper_inference::posterior::{Rules, probability};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Calibration constants.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -27,6 +28,22 @@ pub struct Calibration {
     pub unlisted: f64,
     /// Logistic model of an unmodelled cause: offset, and slopes of the [`logistic_features`].
     pub outside: [f64; 3],
+    /// Where each number comes from, by its key; those of `outside` are `outside_0` to `outside_2`.
+    pub origins: BTreeMap<String, Origin>,
+}
+
+/// Where a number of the calibration comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Origin {
+    /// Fitted: the data determine it.
+    Data,
+    /// Fitted, but it ends at a bound that was set by hand.
+    Bound,
+    /// Fitted, but the data hardly narrow its prior.
+    Prior,
+    /// Not fitted.
+    Copied,
 }
 
 const TEXT: &str = include_str!("../../../calibration.json");

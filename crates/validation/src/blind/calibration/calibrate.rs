@@ -8,13 +8,15 @@ use crate::blind::virtual_runs::Schedule;
 use mapper_campaign::{Campaign, nominal_model};
 use mapper_diagnose::gap;
 use mapper_diagnose::gap::{
-    Calibration, ClosureSearch, Diagnosed, GapRequest, RigRecording, Scores, Verdict, logistic_features,
+    Calibration, ClosureSearch, Diagnosed, GapRequest, Origin, RigRecording, Scores, Verdict,
+    logistic_features,
 };
 use mapper_fleet::Engine;
 use mapper_numerics::minimise::minimise;
 use mapper_numerics::statistics::{NORMAL_975, quantile};
 use mapper_physics::rig::effect::Effect;
 use mapper_physics::simulation::model::Model;
+use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -208,8 +210,7 @@ pub fn fitted(observed: &[DiagnosisSummary], made_by: String) -> Result<Calibrat
 /// catalogue, and the probabilities must reflect how often that happens.
 pub fn fit(before: &Calibration, observed: &[DiagnosisSummary], made_by: String) -> Calibration {
     let margins = observed.iter().filter(|o| o.kind == CaseKind::None).map(DiagnosisSummary::margin);
-    let threshold =
-        quantile(margins, QUIET_SHARE).map_or(before.threshold, |margin| margin.max(MIN_THRESHOLD));
+    let threshold = at_least(quantile(margins, QUIET_SHARE), MIN_THRESHOLD, before.threshold);
     let weights = weights(before, observed);
     let weighted = || observed.iter().zip(weights.iter().copied());
     let inside: Vec<(&DiagnosisSummary, f64)> =
@@ -218,16 +219,60 @@ pub fn fit(before: &Calibration, observed: &[DiagnosisSummary], made_by: String)
         .map(|(o, weight)| Row { features: o.features, outside: o.kind == CaseKind::Outside, weight })
         .collect();
     let errors = observed.iter().flat_map(|o| &o.errors_sigma).map(|z| z.abs());
+    // Never narrower than the standard errors of the fit, because a few cases do not justify more confidence.
+    let interval_factor =
+        at_least(quantile(errors, 0.95).map(|z| z / NORMAL_975), 1.0, before.interval_factor);
+    let temperature = temperature(&inside, before.temperature);
+    let unlisted = unlisted(observed).unwrap_or((before.unlisted, Origin::Copied));
+    let (outside, of_outside) = logistic(&rows).unwrap_or((before.outside, [Origin::Copied; 3]));
+    let copied =
+        ["prior_none", "prior_single", "prior_pair", "prior_triple"].map(|key| (key, Origin::Copied));
+    let fitted = [
+        ("threshold", threshold.1),
+        ("temperature", temperature.1),
+        ("interval_factor", interval_factor.1),
+        ("unlisted", unlisted.1),
+        ("outside_0", of_outside[0]),
+        ("outside_1", of_outside[1]),
+        ("outside_2", of_outside[2]),
+    ];
     Calibration {
         made_by,
-        threshold,
-        temperature: temperature(&inside, before.temperature),
-        // Never narrower than the standard errors of the fit, because a few cases do not justify more confidence.
-        interval_factor: quantile(errors, 0.95).map_or(before.interval_factor, |z| (z / NORMAL_975).max(1.0)),
-        unlisted: unlisted(observed).unwrap_or(before.unlisted),
-        outside: logistic(&rows).unwrap_or(before.outside),
+        threshold: threshold.0,
+        temperature: temperature.0,
+        interval_factor: interval_factor.0,
+        unlisted: unlisted.0,
+        outside,
+        origins: copied.into_iter().chain(fitted).map(|(key, origin)| (key.to_owned(), origin)).collect(),
         ..before.clone()
     }
+}
+
+/// A fitted number, at least `lowest`; `before` if the cases give none.
+fn at_least(found: Option<f64>, lowest: f64, before: f64) -> (f64, Origin) {
+    match found {
+        None => (before, Origin::Copied),
+        Some(found) if found <= lowest => (lowest, Origin::Bound),
+        Some(found) => (found, Origin::Data),
+    }
+}
+
+/// The numbers of a calibration that the data do not determine, one line for each reason.
+pub fn undetermined(calibration: &Calibration) -> Vec<String> {
+    let keys = |of: Origin| -> Vec<&str> {
+        let all = calibration.origins.iter().filter(|(_, origin)| **origin == of);
+        all.map(|(key, _)| key.as_str()).collect()
+    };
+    let reasons = [
+        (Origin::Bound, "at a bound that was set by hand"),
+        (Origin::Prior, "hardly determined by the data"),
+        (Origin::Copied, "copied from the previous calibration"),
+    ];
+    let lines = reasons.into_iter().map(|(of, reason)| (keys(of), reason));
+    lines
+        .filter(|(keys, _)| !keys.is_empty())
+        .map(|(keys, reason)| format!("{}: {reason}", keys.join(", ")))
+        .collect()
 }
 
 /// Weakest cause of the cases that decide how often the causes are not listed, sigmas: one of 70 causes is named in 95 of 100 recordings from
@@ -235,23 +280,27 @@ pub fn fit(before: &Calibration, observed: &[DiagnosisSummary], made_by: String)
 const DETECTABLE_SIGMAS: f64 = 6.0;
 
 /// Share of the cases with detectable causes of the catalogue in which these are not among the candidates: mean of the posterior under
-/// Jeffreys' prior. `None` without such cases.
-fn unlisted(observed: &[DiagnosisSummary]) -> Option<f64> {
+/// Jeffreys' prior, with its origin. `None` without such cases.
+fn unlisted(observed: &[DiagnosisSummary]) -> Option<(f64, Origin)> {
     let is_detectable = |o: &&DiagnosisSummary| {
         !matches!(o.kind, CaseKind::None | CaseKind::Outside)
             && o.sigma.is_some_and(|sigma| sigma >= DETECTABLE_SIGMAS)
     };
     let cases: Vec<_> = observed.iter().filter(is_detectable).collect();
     let missed = cases.iter().filter(|case| !case.is_listed()).count();
-    (!cases.is_empty()).then(|| (missed as f64 + 0.5) / (cases.len() as f64 + 1.0))
+    (!cases.is_empty()).then(|| {
+        let (all, mean) = (cases.len() as f64 + 1.0, (missed as f64 + 0.5) / (cases.len() as f64 + 1.0));
+        let sigma = |mean: f64, all: f64| (mean * (1.0 - mean) / (all + 1.0)).sqrt();
+        (mean, of_width(sigma(mean, all), sigma(0.5, 1.0)))
+    })
 }
 
 /// Prior standard deviation of the logarithm of the temperature around the previous one. Without it, cases that are all right would lead to
 /// certainty.
 const TEMPERATURE_SPREAD: f64 = 0.3;
 
-/// The temperature with the largest posterior probability of the true causes, with `before` as prior.
-fn temperature(cases: &[(&DiagnosisSummary, f64)], before: f64) -> f64 {
+/// The temperature with the largest posterior probability of the true causes, with `before` as prior, and its origin.
+fn temperature(cases: &[(&DiagnosisSummary, f64)], before: f64) -> (f64, Origin) {
     let cost = |temperature: f64| -> f64 {
         let deviation = (temperature / before).ln() / TEMPERATURE_SPREAD;
         let misses: f64 = cases
@@ -269,8 +318,15 @@ fn temperature(cases: &[(&DiagnosisSummary, f64)], before: f64) -> f64 {
             .sum();
         misses + 0.5 * deviation * deviation
     };
-    let grid = (0..=60).map(|i| 1.0 * 30f64.powf(f64::from(i) / 60.0));
-    grid.min_by(|a, b| cost(*a).total_cmp(&cost(*b))).unwrap_or(1.0)
+    let at = |i: i32| 30f64.powf(f64::from(i) / 60.0);
+    let best = (0..=60).min_by(|a, b| cost(at(*a)).total_cmp(&cost(at(*b)))).unwrap_or(0);
+    let step_ln = 30f64.ln() / 60.0;
+    let curvature = (cost(at(best + 1)) + cost(at(best - 1)) - 2.0 * cost(at(best))) / (step_ln * step_ln);
+    let origin = match best {
+        0 | 60 => Origin::Bound,
+        _ => of_width(curvature.max(0.0).sqrt().recip(), TEMPERATURE_SPREAD),
+    };
+    (at(best), origin)
 }
 
 /// Maximum number of iterations of coordinate descent; about fifty are needed.
@@ -286,6 +342,16 @@ const PRIOR_PRECISION: f64 = 0.25;
 /// a gross misfit meaningless.
 const MIN_SLOPES: [f64; 2] = [0.5, 0.0];
 
+/// Distance from a bound at which a weight counts as on it.
+const BOUND_TOLERANCE: f64 = 1e-4;
+/// Posterior over prior standard deviation above which the data do not determine a number.
+const MAX_WIDTH_RATIO: f64 = 0.5;
+
+/// The origin of a fitted number with this posterior and prior standard deviation.
+pub(crate) fn of_width(posterior_sigma: f64, prior_sigma: f64) -> Origin {
+    if posterior_sigma > MAX_WIDTH_RATIO * prior_sigma { Origin::Prior } else { Origin::Data }
+}
+
 /// A case.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Row {
@@ -295,8 +361,9 @@ pub(crate) struct Row {
     pub weight: f64,
 }
 
-/// Offset and slopes of the logistic that separates outside causes from the others. `None` if one of the classes is empty.
-pub(crate) fn logistic(rows: &[Row]) -> Option<[f64; 3]> {
+/// Offset and slopes of the logistic that separates outside causes from the others, each with its origin. `None` if one of the classes is
+/// empty.
+pub(crate) fn logistic(rows: &[Row]) -> Option<([f64; 3], [Origin; 3])> {
     if rows.iter().all(|row| row.outside) || rows.iter().all(|row| !row.outside) {
         return None;
     }
@@ -316,7 +383,7 @@ pub(crate) fn logistic(rows: &[Row]) -> Option<[f64; 3]> {
     for _ in 0..ROUNDS {
         let last = weights;
         for place in 0..weights.len() {
-            let (low, high) = if place == 0 { (-30.0, 30.0) } else { (MIN_SLOPES[place - 1], 10.0) };
+            let (low, high) = bounds(place);
             weights[place] = minimise(low, high, 1e-9, |value| {
                 let mut tried = weights;
                 tried[place] = value;
@@ -329,7 +396,48 @@ pub(crate) fn logistic(rows: &[Row]) -> Option<[f64; 3]> {
             break;
         }
     }
-    Some(weights)
+    Some((weights, origins(&weights, &curvatures(&loss, &weights))))
+}
+
+/// Range of the offset or of a slope.
+fn bounds(place: usize) -> (f64, f64) {
+    if place == 0 { (-30.0, 30.0) } else { (MIN_SLOPES[place - 1], 10.0) }
+}
+
+/// Second derivatives of the loss.
+fn curvatures(loss: &dyn Fn(&[f64; 3]) -> f64, weights: &[f64; 3]) -> Matrix3<f64> {
+    const STEP: f64 = 1e-3;
+    Matrix3::from_fn(|i, j| {
+        let at = |a: f64, b: f64| {
+            let mut moved = *weights;
+            moved[i] += a * STEP;
+            moved[j] += b * STEP;
+            loss(&moved)
+        };
+        (at(1.0, 1.0) - at(1.0, -1.0) - at(-1.0, 1.0) + at(-1.0, -1.0)) / (4.0 * STEP * STEP)
+    })
+}
+
+/// Where each weight comes from: weights at a bound are fixed for the errors of the others.
+fn origins(weights: &[f64; 3], curvatures: &Matrix3<f64>) -> [Origin; 3] {
+    let is_bound = |place: usize| {
+        let (low, high) = bounds(place);
+        (weights[place] - low).min(high - weights[place]) < BOUND_TOLERANCE
+    };
+    let mut free = *curvatures;
+    for place in (0..3).filter(|place| is_bound(*place)) {
+        free.row_mut(place).fill(0.0);
+        free.column_mut(place).fill(0.0);
+        free[(place, place)] = 1.0;
+    }
+    let covariance = free.try_inverse();
+    std::array::from_fn(|place| match &covariance {
+        _ if is_bound(place) => Origin::Bound,
+        Some(covariance) => {
+            of_width(covariance[(place, place)].max(0.0).sqrt(), PRIOR_PRECISION.recip().sqrt())
+        }
+        None => Origin::Prior,
+    })
 }
 
 /// Argument of the logistic for features that [`logistic_features`] has limited.
@@ -365,7 +473,7 @@ mod tests {
             (0..80).map(|_| observed(CaseKind::Single, 40.0, 36.0)).collect();
         cases.extend((0..20).map(|_| observed(CaseKind::Single, 36.0, 40.0)));
         let expected = 4.0 / 4f64.ln();
-        let fitted = temperature(&cases.iter().map(|case| (case, 1.0)).collect::<Vec<_>>(), expected);
+        let (fitted, _) = temperature(&cases.iter().map(|case| (case, 1.0)).collect::<Vec<_>>(), expected);
         // The grid's own steps are 6 %.
         assert!((fitted / expected - 1.0).abs() < 0.06, "{fitted} for {expected}");
     }
@@ -403,11 +511,23 @@ mod tests {
     fn the_boundary_lies_between_the_classes() {
         let rows: Vec<Row> =
             (0..80).map(|i| row([-1.0, if i % 2 == 0 { 2.0 } else { 20.0 }], i % 2 == 1)).collect();
-        let weights = logistic(&rows).unwrap();
+        let (weights, _) = logistic(&rows).unwrap();
         // Eighty cases against a weak prior: each class on its side with odds of e^2 at least.
         let at = |features| argument(&weights, &logistic_features(features));
         assert!(at([-1.0, 2.0]) < -2.0 && at([-1.0, 20.0]) > 2.0);
         assert!(logistic(&[row([1.0; 2], true)]).is_none());
+    }
+
+    /// Features of zero say nothing of the slopes, and a thousand cases determine the offset.
+    #[test]
+    fn numbers_without_data_come_from_their_prior() {
+        let rows: Vec<Row> = (0..1000).map(|i| row([0.0; 2], i % 2 == 0)).collect();
+        let (_, origins) = logistic(&rows).unwrap();
+        assert_eq!(origins, [Origin::Data, Origin::Prior, Origin::Prior]);
+        // Gross misfit in sound cases pulls its slope below its bound.
+        let rows: Vec<Row> =
+            (0..80).map(|i| row([if i % 2 == 0 { 9.0 } else { 0.0 }, 0.0], i % 2 == 1)).collect();
+        assert_eq!(logistic(&rows).unwrap().1[1], Origin::Bound);
     }
 
     /// Failed searches do not remove the effect of a gross misfit.
@@ -415,7 +535,7 @@ mod tests {
     fn a_gross_misfit_stays_evidence_of_an_outside_cause() {
         let rows: Vec<Row> =
             (0..80).map(|i| row([if i % 8 == 0 { 1e4 } else { 0.0 }, 0.0], i % 8 == 1)).collect();
-        let weights = logistic(&rows).unwrap();
+        let (weights, _) = logistic(&rows).unwrap();
         assert!(argument(&weights, &logistic_features([20.0, 0.0])) > 10.0, "{weights:?}");
     }
 }

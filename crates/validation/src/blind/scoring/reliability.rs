@@ -1,6 +1,6 @@
 //! Reliability of the probabilities: an answer given with probability p should be right in a share p of the cases.
 
-use crate::blind::calibration::calibrate::{DiagnosisSummary, fit, shipped, weights};
+use crate::blind::calibration::calibrate::{DiagnosisSummary, fit, shipped, undetermined, weights};
 use crate::blind::cases::CaseKind;
 use crate::blind::error::BlindError;
 use crate::blind::scoring::interval::{Share, clopper_pearson_95};
@@ -175,10 +175,15 @@ fn shipped_and_cross_validated(before: &Calibration, observed: &[DiagnosisSummar
     ]
 }
 
-/// The result of a calibration as text, with its file.
-pub fn calibrated_text(diagnoses: usize, file: &Path, reliabilities: &[Reliability]) -> String {
-    let reliability = reliability_text(reliabilities);
-    format!("calibration from {diagnoses} diagnoses in {}\n{reliability}", file.display())
+/// The result of a calibration as text, with its file and the numbers that the data do not determine.
+pub fn calibrated_text(
+    diagnoses: usize,
+    file: &Path,
+    calibration: &Calibration,
+    reliabilities: &[Reliability],
+) -> String {
+    let (reliability, undetermined) = (reliability_text(reliabilities), undetermined(calibration).join("\n"));
+    format!("calibration from {diagnoses} diagnoses in {}\n{undetermined}\n{reliability}", file.display())
 }
 
 /// One sentence for each result.

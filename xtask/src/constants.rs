@@ -43,7 +43,10 @@ const NEUTRAL: [f64; 4] = [0.0, 0.5, 1.0, 2.0];
 const FORMATTING: [&str; 6] = ["format", "write", "writeln", "println", "assert", "debug_assert"];
 
 /// Endings of names, and their units. A longer ending comes first.
-const UNITS: [(&str, &str); 30] = [
+const UNITS: [(&str, &str); 33] = [
+    ("_KG_KG", "kg/kg"),
+    ("_K_MIN", "K/min"),
+    ("_K_M", "K/m"),
     ("_PER_S2", "1/s2"),
     ("_PER_S", "1/s"),
     ("_KG_M3", "kg/m3"),
@@ -214,11 +217,11 @@ fn calibration(root: &Path) -> Result<String, String> {
     let mut numbers = Vec::new();
     for (key, value) in file.as_object().into_iter().flatten() {
         match value {
-            serde_json::Value::Number(number) => numbers.push((key.clone(), number.to_string())),
+            serde_json::Value::Number(number) => numbers.push((key.clone(), decimals(number))),
             serde_json::Value::Array(all) => {
-                numbers.extend(
-                    all.iter().enumerate().map(|(i, number)| (format!("{key}_{i}"), number.to_string())),
-                );
+                numbers.extend(all.iter().enumerate().map(|(i, number)| {
+                    (format!("{key}_{i}"), number.as_number().map(decimals).unwrap_or_default())
+                }));
             }
             _ => {}
         }
@@ -235,6 +238,11 @@ fn calibration(root: &Path) -> Result<String, String> {
         let _ = writeln!(section, "| `{key}` | {value} | {origin} |");
     }
     Ok(section)
+}
+
+/// Four decimals, as many as any of these numbers needs.
+fn decimals(number: &serde_json::Number) -> String {
+    format!("{:.4}", number.as_f64().unwrap_or(f64::NAN))
 }
 
 fn row(constant: &Constant, file: &str) -> String {

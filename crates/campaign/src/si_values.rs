@@ -1,4 +1,4 @@
-//! Converts a value with its unit to a field in SI.
+//! Values with their units as fields in SI, and elements of optional keys that override defaults.
 
 use crate::units::{Dimension, Quantity};
 use serde::{Deserialize, Deserializer};
@@ -25,3 +25,29 @@ pub(crate) fn optional_si<'de, D: Dimension, S: Deserializer<'de>>(
 pub(crate) fn value_or<D: Dimension>(quantity: Option<Quantity<D>>, default: f64) -> f64 {
     quantity.map_or(default, |quantity| quantity.value)
 }
+
+/// Declares an element of optional keys: for each key its description, the field of the target that it sets, if any, the kind of its value,
+/// and its `schemars` attributes.
+macro_rules! element {
+    (
+        $(#[$doc:meta])+
+        $vis:vis $element:ident for $target:ty {
+            $($(#[$key_doc:meta])+ $key:ident $(=> $field:ident)?: $kind:ty [$($schema:tt)*];)+
+        }
+    ) => {
+        $(#[$doc])+
+        #[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
+        #[serde(deny_unknown_fields)]
+        $vis struct $element {
+            $($(#[$key_doc])+ #[schemars($($schema)*)] $key: Option<$kind>,)+
+        }
+
+        impl $element {
+            /// Sets the fields whose keys are given.
+            fn apply(self, to: &mut $target) {
+                $($($crate::units::set(&mut to.$field, self.$key);)?)+
+            }
+        }
+    };
+}
+pub(crate) use element;

@@ -37,6 +37,12 @@ impl<D> From<Quantity<D>> for f64 {
     }
 }
 
+impl<D> From<Quantity<D>> for Option<f64> {
+    fn from(quantity: Quantity<D>) -> Option<f64> {
+        Some(quantity.value)
+    }
+}
+
 impl<'de, D: Dimension> Deserialize<'de> for Quantity<D> {
     fn deserialize<S: Deserializer<'de>>(deserializer: S) -> Result<Self, S::Error> {
         let text = String::deserialize(deserializer)?;

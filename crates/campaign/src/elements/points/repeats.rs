@@ -2,7 +2,7 @@
 
 use crate::checking::{Check, resolve_path};
 use crate::elements::points::grid::PointFile;
-use crate::si_values::value_or;
+use crate::si_values::element;
 use crate::units::{Duration, Fraction, Kind, Quantity};
 use mapper_core::{Jump, Repeats, SurgeSearchSettings};
 use mapper_yaml::{FindingKind, steps};
@@ -123,38 +123,28 @@ pub(crate) fn check_sequence(check: &mut Check<'_>) {
     }
 }
 
-/// Search for the surge line after all other steps: at the end of each speed line the valve closes in small steps while the variation of pressures and flow indicates the distance to surge. It opens again before surge, and the surge-side end is marked with its uncertainty.
-#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct SurgeSearchFile {
-    /// Smallest surge margin (flow over surge flow, minus one) to approach; 3 % if none is given.
-    #[schemars(extend("x-min" = "0.5 %", "x-max" = "30 %"), example = &"3 %")]
-    closest: Option<Quantity<Fraction>>,
-    /// Largest change of the valve's opening per step near surge, relative to the opening; 3 % if none is given.
-    #[schemars(extend("x-min" = "0.5 %", "x-max" = "10 %"), example = &"3 %")]
-    step: Option<Quantity<Fraction>>,
-    /// Time at each opening; 25 s if none is given. The rig needs the first 5 s to follow.
-    #[schemars(extend("x-min" = "12 s", "x-max" = "10 min"), example = &"25 s")]
-    dwell: Option<Quantity<Duration>>,
-    /// Standard error of the surge flow at which a line is finished, without the flow meter's gain; 0.8 % if none is given.
-    #[schemars(extend("x-min" = "0.1 %", "x-max" = "5 %"), example = &"0.8 %")]
-    standard_error: Option<Quantity<Fraction>>,
-    /// Maximum number of openings of one line; 40 if none is given.
-    #[schemars(range(min = 5, max = 200), example = 40)]
-    most_steps: Option<usize>,
+element! {
+    /// Search for the surge line after all other steps: at the end of each speed line the valve closes in small steps while the variation of pressures and flow indicates the distance to surge. It opens again before surge, and the surge-side end is marked with its uncertainty.
+    pub(crate) SurgeSearchFile for SurgeSearchSettings {
+        /// Smallest surge margin (flow over surge flow, minus one) to approach; 3 % if none is given.
+        closest => closest_margin_ratio: Quantity<Fraction> [extend("x-min" = "0.5 %", "x-max" = "30 %"), example = &"3 %"];
+        /// Largest change of the valve's opening per step near surge, relative to the opening; 3 % if none is given.
+        step => step_ratio: Quantity<Fraction> [extend("x-min" = "0.5 %", "x-max" = "10 %"), example = &"3 %"];
+        /// Time at each opening; 25 s if none is given. The rig needs the first 5 s to follow.
+        dwell => dwell_s: Quantity<Duration> [extend("x-min" = "12 s", "x-max" = "10 min"), example = &"25 s"];
+        /// Standard error of the surge flow at which a line is finished, without the flow meter's gain; 0.8 % if none is given.
+        standard_error => wanted_standard_error_ratio: Quantity<Fraction> [extend("x-min" = "0.1 %", "x-max" = "5 %"), example = &"0.8 %"];
+        /// Maximum number of openings of one line; 40 if none is given.
+        most_steps => most_steps: usize [range(min = 5, max = 200), example = 40];
+    }
 }
 
 impl SurgeSearchFile {
     /// The search, with defaults filled in.
     pub(crate) fn settings(self) -> SurgeSearchSettings {
-        let usual = SurgeSearchSettings::default();
-        SurgeSearchSettings {
-            closest_margin_ratio: value_or(self.closest, usual.closest_margin_ratio),
-            step_ratio: value_or(self.step, usual.step_ratio),
-            dwell_s: value_or(self.dwell, usual.dwell_s),
-            wanted_standard_error_ratio: value_or(self.standard_error, usual.wanted_standard_error_ratio),
-            most_steps: self.most_steps.unwrap_or(usual.most_steps),
-        }
+        let mut settings = SurgeSearchSettings::default();
+        self.apply(&mut settings);
+        settings
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::checking::Check;
 use crate::elements::rig::redundant_sensors::SensorDeclaration;
-use crate::si_values::value_or;
+use crate::si_values::{element, value_or};
 use crate::units::{
     Duration, Fraction, Kind, Pressure, PressureDifference, Quantity, Speed, Temperature,
     TemperatureDifference,
@@ -47,85 +47,66 @@ pub(crate) struct GuardsFile {
     signals: SignalsFile,
 }
 
-/// The guard over the shaft speed.
-#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-struct OverspeedFile {
-    /// Trips above this speed, at most `limits.speed`.
-    #[schemars(extend("x-above" = "0 rpm", "x-max" = "1000 krpm"), example = &"180 krpm")]
-    above: Option<Quantity<Speed>>,
-    /// Hysteresis: the trip ends when the speed is this far below; 0 rpm if none is given.
-    #[schemars(extend("x-min" = "0 rpm", "x-max" = "100 krpm"), example = &"500 rpm")]
-    hysteresis: Option<Quantity<Speed>>,
-    /// Trips after this time; 0.2 s if none is given, so that one noisy sample does not.
-    #[schemars(extend("x-min" = "0 s", "x-max" = "10 s"), example = &"0.2 s")]
-    dwell: Option<Quantity<Duration>>,
-    /// Reaction; `latch` if none is given.
-    #[schemars(example = &"latch")]
-    reaction: Option<Reaction>,
+element! {
+    /// The guard over the shaft speed.
+    OverspeedFile for SignalGuard {
+        /// Trips above this speed, at most `limits.speed`.
+        above => above: Quantity<Speed> [extend("x-above" = "0 rpm", "x-max" = "1000 krpm"), example = &"180 krpm"];
+        /// Hysteresis: the trip ends when the speed is this far below; 0 rpm if none is given.
+        hysteresis => hysteresis: Quantity<Speed> [extend("x-min" = "0 rpm", "x-max" = "100 krpm"), example = &"500 rpm"];
+        /// Trips after this time; 0.2 s if none is given, so that one noisy sample does not.
+        dwell => dwell_s: Quantity<Duration> [extend("x-min" = "0 s", "x-max" = "10 s"), example = &"0.2 s"];
+        /// Reaction; `latch` if none is given.
+        reaction => reaction: Reaction [example = &"latch"];
+    }
 }
 
-/// A guard over a temperature.
-#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-struct TemperatureFile {
-    /// Trips above this temperature, at most the limit of the same name.
-    #[schemars(extend("x-min" = "250 K", "x-max" = "1400 K"), example = &"250 degC")]
-    above: Option<Quantity<Temperature>>,
-    /// Trips if it changes by more than this within `within`.
-    #[schemars(extend("x-above" = "0 K", "x-max" = "1000 K"), example = &"60 K")]
-    change: Option<Quantity<TemperatureDifference>>,
-    /// Time of `change`; 10 s if none is given.
-    #[schemars(extend("x-above" = "0 s", "x-max" = "10 min"), example = &"10 s")]
-    within: Option<Quantity<Duration>>,
-    /// Hysteresis: the trip ends when the temperature is this far below; 0 K if none is given.
-    #[schemars(extend("x-min" = "0 K", "x-max" = "200 K"), example = &"2 K")]
-    hysteresis: Option<Quantity<TemperatureDifference>>,
-    /// Trips after this time; 0.2 s if none is given.
-    #[schemars(extend("x-min" = "0 s", "x-max" = "10 min"), example = &"0.2 s")]
-    dwell: Option<Quantity<Duration>>,
-    /// Reaction; `safe` if none is given.
-    #[schemars(example = &"safe")]
-    reaction: Option<Reaction>,
+element! {
+    /// A guard over a temperature.
+    TemperatureFile for SignalGuard {
+        /// Trips above this temperature, at most the limit of the same name.
+        above => above: Quantity<Temperature> [extend("x-min" = "250 K", "x-max" = "1400 K"), example = &"250 degC"];
+        /// Trips if it changes by more than this within `within`.
+        change: Quantity<TemperatureDifference> [extend("x-above" = "0 K", "x-max" = "1000 K"), example = &"60 K"];
+        /// Time of `change`; 10 s if none is given.
+        within: Quantity<Duration> [extend("x-above" = "0 s", "x-max" = "10 min"), example = &"10 s"];
+        /// Hysteresis: the trip ends when the temperature is this far below; 0 K if none is given.
+        hysteresis => hysteresis: Quantity<TemperatureDifference> [extend("x-min" = "0 K", "x-max" = "200 K"), example = &"2 K"];
+        /// Trips after this time; 0.2 s if none is given.
+        dwell => dwell_s: Quantity<Duration> [extend("x-min" = "0 s", "x-max" = "10 min"), example = &"0.2 s"];
+        /// Reaction; `safe` if none is given.
+        reaction => reaction: Reaction [example = &"safe"];
+    }
 }
 
-/// The guard over the turbine inlet pressure.
-#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-struct PressureFile {
-    /// Trips above this pressure, at most the highest of `limits.turbine_inlet_pressure`.
-    #[schemars(extend("x-above" = "0 kPa", "x-max" = "2 MPa"), example = &"400 kPa")]
-    above: Option<Quantity<Pressure>>,
-    /// Hysteresis: the trip ends when the pressure is this far below; 0 Pa if none is given.
-    #[schemars(extend("x-min" = "0 Pa", "x-max" = "200 kPa"), example = &"1 kPa")]
-    hysteresis: Option<Quantity<PressureDifference>>,
-    /// Trips after this time; 0.2 s if none is given.
-    #[schemars(extend("x-min" = "0 s", "x-max" = "10 min"), example = &"0.2 s")]
-    dwell: Option<Quantity<Duration>>,
-    /// Reaction; `safe` if none is given.
-    #[schemars(example = &"safe")]
-    reaction: Option<Reaction>,
+element! {
+    /// The guard over the turbine inlet pressure.
+    PressureFile for SignalGuard {
+        /// Trips above this pressure, at most the highest of `limits.turbine_inlet_pressure`.
+        above => above: Quantity<Pressure> [extend("x-above" = "0 kPa", "x-max" = "2 MPa"), example = &"400 kPa"];
+        /// Hysteresis: the trip ends when the pressure is this far below; 0 Pa if none is given.
+        hysteresis => hysteresis: Quantity<PressureDifference> [extend("x-min" = "0 Pa", "x-max" = "200 kPa"), example = &"1 kPa"];
+        /// Trips after this time; 0.2 s if none is given.
+        dwell => dwell_s: Quantity<Duration> [extend("x-min" = "0 s", "x-max" = "10 min"), example = &"0.2 s"];
+        /// Reaction; `safe` if none is given.
+        reaction => reaction: Reaction [example = &"safe"];
+    }
 }
 
-/// The guard over the oil.
-#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-struct OilFile {
-    /// Trips above this temperature.
-    #[schemars(extend("x-min" = "250 K", "x-max" = "500 K"), example = &"130 degC")]
-    above: Option<Quantity<Temperature>>,
-    /// Trips below this temperature while gas flows.
-    #[schemars(extend("x-min" = "250 K", "x-max" = "500 K"), example = &"20 degC")]
-    below: Option<Quantity<Temperature>>,
-    /// Hysteresis: the trip ends when the temperature is this far inside; 0 K if none is given.
-    #[schemars(extend("x-min" = "0 K", "x-max" = "200 K"), example = &"2 K")]
-    hysteresis: Option<Quantity<TemperatureDifference>>,
-    /// Trips after this time; 1 s if none is given.
-    #[schemars(extend("x-min" = "0 s", "x-max" = "10 min"), example = &"1 s")]
-    dwell: Option<Quantity<Duration>>,
-    /// Reaction; `safe` if none is given.
-    #[schemars(example = &"safe")]
-    reaction: Option<Reaction>,
+element! {
+    /// The guard over the oil.
+    OilFile for SignalGuard {
+        /// Trips above this temperature.
+        above => above: Quantity<Temperature> [extend("x-min" = "250 K", "x-max" = "500 K"), example = &"130 degC"];
+        /// Trips below this temperature while gas flows.
+        below => below: Quantity<Temperature> [extend("x-min" = "250 K", "x-max" = "500 K"), example = &"20 degC"];
+        /// Hysteresis: the trip ends when the temperature is this far inside; 0 K if none is given.
+        hysteresis => hysteresis: Quantity<TemperatureDifference> [extend("x-min" = "0 K", "x-max" = "200 K"), example = &"2 K"];
+        /// Trips after this time; 1 s if none is given.
+        dwell => dwell_s: Quantity<Duration> [extend("x-min" = "0 s", "x-max" = "10 min"), example = &"1 s"];
+        /// Reaction; `safe` if none is given.
+        reaction => reaction: Reaction [example = &"safe"];
+    }
 }
 
 /// The guard over the housing's change.
@@ -143,34 +124,28 @@ struct HousingFile {
     reaction: Option<Reaction>,
 }
 
-/// The guard against surge.
-#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-struct SurgeFile {
-    /// Variation of the flow from which surge is suspected, one standard deviation; 5 % if none is given.
-    #[schemars(extend("x-above" = "0 %", "x-max" = "50 %"), example = &"5 %")]
-    flow: Option<Quantity<Fraction>>,
-    /// Variation of P2 or P1 that must occur together with that of the flow; 1 % if none is given.
-    #[schemars(extend("x-above" = "0 %", "x-max" = "50 %"), example = &"1 %")]
-    pressure: Option<Quantity<Fraction>>,
-    /// Trips after this time: a jump may touch the surge line, a point may not stay beyond it; 5 s if none is given.
-    #[schemars(extend("x-min" = "0 s", "x-max" = "5 s"), example = &"5 s")]
-    dwell: Option<Quantity<Duration>>,
-    /// Reaction; `safe` if none is given.
-    #[schemars(example = &"skip_step")]
-    reaction: Option<Reaction>,
+element! {
+    /// The guard against surge.
+    SurgeFile for SurgeVariation {
+        /// Variation of the flow from which surge is suspected, one standard deviation; 5 % if none is given.
+        flow => flow_ratio: Quantity<Fraction> [extend("x-above" = "0 %", "x-max" = "50 %"), example = &"5 %"];
+        /// Variation of P2 or P1 that must occur together with that of the flow; 1 % if none is given.
+        pressure => pressure_ratio: Quantity<Fraction> [extend("x-above" = "0 %", "x-max" = "50 %"), example = &"1 %"];
+        /// Trips after this time: a jump may touch the surge line, a point may not stay beyond it; 5 s if none is given.
+        dwell => dwell_s: Quantity<Duration> [extend("x-min" = "0 s", "x-max" = "5 s"), example = &"5 s"];
+        /// Reaction; `safe` if none is given.
+        reaction => reaction: Reaction [example = &"skip_step"];
+    }
 }
 
-/// The guard over the speed of a step.
-#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-struct SpeedFile {
-    /// Largest deviation over the last 10 s of a step; 5 % if none is given, 25 % if `speed_control` is off.
-    #[schemars(extend("x-above" = "0 %", "x-max" = "25 %"), example = &"5 %")]
-    band: Option<Quantity<Fraction>>,
-    /// Reaction; `safe` if none is given.
-    #[schemars(example = &"safe")]
-    reaction: Option<Reaction>,
+element! {
+    /// The guard over the speed of a step.
+    SpeedFile for SpeedBand {
+        /// Largest deviation over the last 10 s of a step; 5 % if none is given, 25 % if `speed_control` is off.
+        band => band_ratio: Quantity<Fraction> [extend("x-above" = "0 %", "x-max" = "25 %"), example = &"5 %"];
+        /// Reaction; `safe` if none is given.
+        reaction => reaction: Reaction [example = &"safe"];
+    }
 }
 
 /// Settings of every guarded signal.
@@ -236,60 +211,40 @@ impl GuardsFile {
                 .flatten(),
             reaction,
         };
-        let overspeed = self.overspeed;
-        let mut signals = vec![SignalGuard {
-            above: Some(value_or(overspeed.above, limits.speed_max_rpm)),
-            hysteresis: value_or(overspeed.hysteresis, 0.0),
-            dwell_s: value_or(overspeed.dwell, DEFAULT_DWELL_S),
-            ..guard(GuardName::Overspeed, Channel::ShaftSpeed, overspeed.reaction.unwrap_or(Reaction::Latch))
-        }];
-        let p3 = self.turbine_inlet_pressure;
-        signals.push(SignalGuard {
-            above: Some(value_or(p3.above, limits.p3_max_pa)),
-            hysteresis: value_or(p3.hysteresis, 0.0),
-            dwell_s: value_or(p3.dwell, DEFAULT_DWELL_S),
-            ..guard(GuardName::TurbineInletPressure, Channel::P3, p3.reaction.unwrap_or(Reaction::Safe))
-        });
-        for (name, channel, file, limit_k) in [
-            (
-                GuardName::CompressorOutletTemperature,
-                Channel::T2,
-                self.compressor_outlet_temperature,
-                limits.t2_max_k,
-            ),
-            (
-                GuardName::TurbineInletTemperature,
-                Channel::T3,
-                self.turbine_inlet_temperature,
-                limits.t3_max_k,
-            ),
+        let mut overspeed = SignalGuard {
+            above: Some(limits.speed_max_rpm),
+            ..guard(GuardName::Overspeed, Channel::ShaftSpeed, Reaction::Latch)
+        };
+        self.overspeed.apply(&mut overspeed);
+        let mut p3 = SignalGuard {
+            above: Some(limits.p3_max_pa),
+            ..guard(GuardName::TurbineInletPressure, Channel::P3, Reaction::Safe)
+        };
+        self.turbine_inlet_pressure.apply(&mut p3);
+        let mut signals = vec![overspeed, p3];
+        let (t2, t3) = (GuardName::CompressorOutletTemperature, GuardName::TurbineInletTemperature);
+        for (name, channel, file, above) in [
+            (t2, Channel::T2, self.compressor_outlet_temperature, limits.t2_max_k),
+            (t3, Channel::T3, self.turbine_inlet_temperature, limits.t3_max_k),
         ] {
-            let above = file.above.map(|above| above.value).or(limit_k);
             let change = file.change.map(|change| LargestChange {
                 change: change.value,
                 within_s: value_or(file.within, DEFAULT_CHANGE_WITHIN_S),
             });
+            let mut temperature = SignalGuard { above, change, ..guard(name, channel, Reaction::Safe) };
+            file.apply(&mut temperature);
             // T2 is monitored for valid readings even without a limit.
-            if above.is_some() || change.is_some() || channel == Channel::T2 {
-                signals.push(SignalGuard {
-                    above,
-                    change,
-                    hysteresis: value_or(file.hysteresis, 0.0),
-                    dwell_s: value_or(file.dwell, DEFAULT_DWELL_S),
-                    ..guard(name, channel, file.reaction.unwrap_or(Reaction::Safe))
-                });
+            if temperature.above.is_some() || temperature.change.is_some() || channel == Channel::T2 {
+                signals.push(temperature);
             }
         }
         // P2 is monitored too, since the surge guard needs it.
         signals.push(guard(GuardName::Signals, Channel::P2, Reaction::Safe));
-        if let Some(oil) = self.oil_temperature {
-            signals.push(SignalGuard {
-                above: oil.above.map(|above| above.value),
-                below: oil.below.map(|below| below.value),
-                hysteresis: value_or(oil.hysteresis, 0.0),
-                dwell_s: value_or(oil.dwell, DEFAULT_OIL_DWELL_S),
-                ..guard(GuardName::OilTemperature, Channel::TOil, oil.reaction.unwrap_or(Reaction::Safe))
-            });
+        if let Some(file) = self.oil_temperature {
+            let guard = guard(GuardName::OilTemperature, Channel::TOil, Reaction::Safe);
+            let mut oil = SignalGuard { dwell_s: DEFAULT_OIL_DWELL_S, ..guard };
+            file.apply(&mut oil);
+            signals.push(oil);
         }
         let housing = self.housing_gradient;
         let change_k = housing.map(|file| file.change.value).or(limits.housing_gradient_max_k);
@@ -301,19 +256,20 @@ impl GuardsFile {
                 ..guard(GuardName::HousingGradient, Channel::Tc, reaction)
             });
         }
-        let band = if speed_is_held { DEFAULT_SPEED_BAND_RATIO } else { DEFAULT_OPEN_LOOP_BAND_RATIO };
+        let mut surge = SurgeVariation {
+            flow_ratio: DEFAULT_SURGE_FLOW_RATIO,
+            pressure_ratio: DEFAULT_SURGE_PRESSURE_RATIO,
+            dwell_s: SURGE_ALLOWED_S,
+            reaction: Reaction::Safe,
+        };
+        self.surge.apply(&mut surge);
+        let band_ratio = if speed_is_held { DEFAULT_SPEED_BAND_RATIO } else { DEFAULT_OPEN_LOOP_BAND_RATIO };
+        let mut speed = SpeedBand { band_ratio, reaction: Reaction::Safe };
+        self.speed.apply(&mut speed);
         GuardSet {
             signals,
-            surge: Some(SurgeVariation {
-                flow_ratio: value_or(self.surge.flow, DEFAULT_SURGE_FLOW_RATIO),
-                pressure_ratio: value_or(self.surge.pressure, DEFAULT_SURGE_PRESSURE_RATIO),
-                dwell_s: value_or(self.surge.dwell, SURGE_ALLOWED_S),
-                reaction: self.surge.reaction.unwrap_or(Reaction::Safe),
-            }),
-            speed: Some(SpeedBand {
-                band_ratio: value_or(self.speed.band, band),
-                reaction: self.speed.reaction.unwrap_or(Reaction::Safe),
-            }),
+            surge: Some(surge),
+            speed: Some(speed),
             frozen_flow: frozen(Channel::CompressorFlow),
         }
     }

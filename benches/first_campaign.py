@@ -63,7 +63,7 @@ def assumed():
     sizes = (crates / "campaign/src/machine_sizes.rs").read_text()
     slab = lambda name: float(re.search(rf"\({name}, [\d.]+, ([\d.]+), [\d.]+\)", refinements)[1])
     area = re.search(r"SCALED_AREA_SIGMA_RATIO: f64 = ([\d.]+)", sizes)[1]
-    return slab("ALPHA"), slab("PROBE_MM2"), slab("LN_DIRECTION"), float(area)
+    return slab("ALPHA"), slab("PROBE_MM2"), slab("LN_HEATING_COOLING_RATIO"), float(area)
 
 
 def stand_of(text, number):

@@ -29,7 +29,7 @@ def main():
     for before, after in [
         ("order: thermal_gradient ", "order: listed "),
         ("method: joint ", "method: dynamic "),
-        ("zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}\n", ""),
+        ("zero: {soak: 30 min, nonuniformity: 0.01 K, pressure_nonuniformity: 1 Pa}\n", ""),
         ("  virtual_lab: {}\n", "  virtual_lab: {sample_rate: 100 Hz}\n"),
         ("  dwell: 40 s ", "  dwell: 75 s "),
         ("seed: 1 ", "repeats: off\nreturn_to_first: false\nseed: 1 "),

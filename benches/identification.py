@@ -164,7 +164,7 @@ def main():
                 put("| " + " | ".join(row(name, build, found)) + " |")
                 if arguments.shared:
                     for (points, thermal), run in zip(found, runs):
-                        values = {k: thermal[k] for k in ("alpha_area_ratio", "probe_diameter_m", "direction_factor")} if thermal else {}
+                        values = {k: thermal[k] for k in ("alpha_area_ratio", "probe_diameter_m", "heating_cooling_ratio")} if thermal else {}
                         shown = [f"{k} {v['value']} +- {v['uncertainty']['noise_standard_error']:.4f} {v['origin']}" for k, v in values.items()]
                         errors = [error_of(p) for p in points if error_of(p) is not None]
                         rms = math.sqrt(statistics.fmean(e * e for e in errors)) if errors else math.nan

@@ -5,7 +5,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 # How even the shipped campaign declares its soak to leave the machine.
-SHIPPED = "evenness: 0.01 K, pressure_evenness: 1 Pa"
+SHIPPED = "nonuniformity: 0.01 K, pressure_nonuniformity: 1 Pa"
 
 
 def closed_form(n_krpm, pressure_ratio, low_speed_loss, steepness):

@@ -22,7 +22,7 @@ PARTS = [
     ("openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [0.7, 1.4]"),
     ("warm_up: 2 min ", "warm_up: 60 s "),
     ("seed: 1 ", "repeats: off\nseed: 1 "),
-    ("zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}\n", ""),
+    ("zero: {soak: 30 min, nonuniformity: 0.01 K, pressure_nonuniformity: 1 Pa}\n", ""),
     ("method: joint ", "method: dynamic "),
 ]
 GUIDE = (ROOT / "docs/how-to/rig.md").read_text()

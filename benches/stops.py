@@ -128,7 +128,7 @@ def event(*kinds):
 
 
 SHORT_SOAK = ("soak: 30 min", "soak: 5 min")
-NO_SOAK = ("zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}", "")
+NO_SOAK = ("zero: {soak: 30 min, nonuniformity: 0.01 K, pressure_nonuniformity: 1 Pa}", "")
 SHORT_WARM_UP = ("warm_up: 2 min", "warm_up: 1 s")
 SURGE = ("seed: 1 ", "surge_search: {}\nseed: 1 ")
 SCRIPT = ("seed: 1 ", "sequence: long.rhai\nseed: 1 ")

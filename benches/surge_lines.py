@@ -62,7 +62,7 @@ def marks_alone(args):
     text = replaced(text, "openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [0.5]")
     text = replaced(text, "warm_up: 10 min ", "warm_up: 2 min ")
     text = replaced(text, "dwell: 120 s ", "dwell: 30 s ")
-    text = replaced(text, "zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}\n", "")
+    text = replaced(text, "zero: {soak: 30 min, nonuniformity: 0.01 K, pressure_nonuniformity: 1 Pa}\n", "")
     text = replaced(text, "method: joint ", "method: steady ")
     text = replaced(text, "formats: [csv, json, svg, surge]", "formats: [json]")
     text = replaced(text, "order: thermal_gradient ", "repeats: off\norder: listed ")

@@ -18,9 +18,9 @@ pub const SHORT_GRID: &[(&str, &str)] = &[
     ("seed: 1 ", "repeats: off\nreturn_to_first: false\nseed: 1 "),
 ];
 
-/// Replacements for the two-parameter method of the paper, which identifies each step separately, and no soak before the run.
+/// Replacements for the dynamic method of the paper, which identifies each step separately, and no soak before the run.
 pub const SINGLE_STEP_METHOD: &[(&str, &str)] = &[
-    ("zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}\n", ""),
+    ("zero: {soak: 30 min, nonuniformity: 0.01 K, pressure_nonuniformity: 1 Pa}\n", ""),
     ("method: joint ", "method: dynamic "),
 ];
 

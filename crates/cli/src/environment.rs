@@ -1,7 +1,7 @@
 //! What the program takes from its computer: plug-ins with the commit, the directory of rig states, the clock.
 
 use mapper_campaign::campaign::Date;
-use mapper_core::Wall;
+use mapper_core::WallClock;
 use mapper_session::{Registry, shared_state_directory};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -32,7 +32,7 @@ pub fn today() -> Option<Date> {
     Date::from_epoch_ns(u64::try_from(jiff::Timestamp::now().as_nanosecond()).unwrap_or(0))
 }
 
-impl Wall for SystemClock {
+impl WallClock for SystemClock {
     fn now_s(&self) -> f64 {
         self.0.elapsed().as_secs_f64()
     }

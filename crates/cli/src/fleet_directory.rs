@@ -5,7 +5,7 @@ use crate::environment::registry;
 use crate::interrupt;
 use crate::output::failure::Failure;
 use crate::output::output_options;
-use mapper_core::Wall;
+use mapper_core::WallClock;
 use mapper_fleet::{Engine, Fleet, FleetError, Kind, Machine};
 use mapper_session::Registry;
 use std::path::Path;

@@ -73,14 +73,14 @@ pub use named_enum::UnknownName;
 pub use rig::backend::{
     Backend, BackendCause, BackendError, RigDescription, RigMode, SetpointRange, SetpointRanges, Setpoints,
 };
-pub use rig::clock::{Clock, PacedClock, UnpacedClock, Wall};
+pub use rig::clock::{Clock, PacedClock, UnpacedClock, WallClock};
 pub use rig::guard::{
     FrozenLimit, GuardName, GuardSet, LargestChange, Reaction, SafeTrajectory, SignalGuard, SpeedBand,
     SurgeVariation,
 };
 pub use rig::limits::{Limits, SURGE_ALLOWED_S};
 pub use rig::on_drift::OnDrift;
-pub use rig::run_ending::RunEnding;
+pub use rig::run_ending::{RunEnding, Trip};
 pub use rig::soak::Soak;
 pub use rig::speed_response::{SpeedControlSettings, SpeedResponse};
 pub use rig::surge::{SurgeFoundBy, SurgeMark, SurgeNotFound, SurgeSearchSettings};

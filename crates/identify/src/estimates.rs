@@ -4,7 +4,7 @@ use crate::evidence::Evidence;
 use crate::faults::balances::efficiency::FittedEfficiencies;
 use crate::faults::found_fault::{FoundFault, Suspect};
 use crate::faults::nominal_rig::NominalRig;
-use crate::joint::{Joint, TwoParameter};
+use crate::joint::{Joint, DynamicEfficiency};
 use crate::reading_checks::failed_check::FailedCheck;
 use crate::single_step::dynamic::Estimate;
 use crate::single_step::steady;
@@ -20,7 +20,7 @@ pub(crate) struct Estimated {
     pub(crate) steps: Vec<(Result<EndState, StepError>, Findings)>,
     pub(crate) estimates: Vec<Estimate>,
     pub(crate) thermal: Option<ThermalModel>,
-    pub(crate) two_parameter: Vec<TwoParameter>,
+    pub(crate) dynamic: Vec<DynamicEfficiency>,
     pub(crate) faults: Vec<FoundFault>,
     /// One standard error of each suspect's size, in its unit.
     pub(crate) detectable: Vec<(Suspect, f64)>,
@@ -45,7 +45,7 @@ impl Estimated {
         let is_refused = faults.iter().any(|fault| fault.touches_points) || evidence.is_refused();
         // Only the joint fit computes the effect of each sensor error on the efficiencies. The points stay those of the method.
         let needs_joint = whole && nominal.is_some() && !evidence.alone.0.is_empty();
-        let Joint { mut estimates, thermal, two_parameter, fitted } =
+        let Joint { mut estimates, thermal, dynamic, fitted } =
             by_method(&mut evidence, recording, config, is_refused, needs_joint);
         if let Some(fitted) = &fitted {
             // The efficiencies carry more information, and about more channels.
@@ -73,7 +73,7 @@ impl Estimated {
         }
         let errors = balances.map(|(likelihood, priors)| faults::standard_errors(&likelihood, &priors));
         let steps = states.into_iter().zip(findings).collect();
-        Estimated { steps, estimates, thermal, two_parameter, faults, detectable: errors.unwrap_or_default() }
+        Estimated { steps, estimates, thermal, dynamic, faults, detectable: errors.unwrap_or_default() }
     }
 }
 
@@ -108,7 +108,7 @@ fn by_method(
         evidence.findings.iter_mut().zip(own_findings).for_each(|(findings, own)| findings.take(own));
         alone
     };
-    Joint { estimates, thermal: None, two_parameter: Vec::new(), fitted }
+    Joint { estimates, thermal: None, dynamic: Vec::new(), fitted }
 }
 
 /// The steps that contribute to the shared parameters: steps with a failed check would bias the others. Samples of a temporarily frozen

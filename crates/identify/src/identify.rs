@@ -5,7 +5,7 @@ use crate::estimates::Estimated;
 use crate::evidence::Evidence;
 use crate::faults::found_fault::{FoundFault, Suspect};
 use crate::faults::nominal_rig::NominalRig;
-use crate::joint::TwoParameter;
+use crate::joint::DynamicEfficiency;
 use crate::needs::missing;
 use crate::points::points_with_budgets;
 use crate::step_data::humidity::with_measured_humidity;
@@ -45,8 +45,8 @@ pub struct Identified {
     pub points: Vec<Result<IdentifiedPoint, StepError>>,
     /// Shared parameters of the points; `None` if the method has none.
     pub thermal: Option<ThermalModel>,
-    /// Result of the two-parameter method for the same steps, if it gives one and was not the requested method.
-    pub two_parameter: Vec<TwoParameter>,
+    /// Result of the dynamic method for the same steps, if it gives one and was not the requested method.
+    pub dynamic: Vec<DynamicEfficiency>,
     /// Faults of sensors or machine that explain contradictions in the recording; empty if there are none.
     pub faults: Vec<FoundFault>,
     /// One standard error of the size of each possible fault, in the fault's unit; infinite if the recording does not determine it. A fault of
@@ -77,7 +77,7 @@ pub fn identify_recording(
     }
     let evidence = Evidence::of(recording, config);
     let estimated = Estimated::of(evidence, recording, config, nominal.as_ref());
-    let Estimated { steps, estimates, thermal, two_parameter, faults, detectable } = estimated;
+    let Estimated { steps, estimates, thermal, dynamic, faults, detectable } = estimated;
     let (points, budgets) = points_with_budgets(recording, steps, &estimates, config);
-    Ok(Identified { points, thermal, two_parameter, faults, detectable, budgets })
+    Ok(Identified { points, thermal, dynamic, faults, detectable, budgets })
 }

@@ -42,7 +42,7 @@ pub use isothermal_zero::zero::{
 pub use isothermal_zero::zero_outcome::ZeroOutcome;
 pub use joint::expected::expected_together;
 pub use joint::step_model::rows::BLOCK_S;
-pub use joint::{MAX_RESTING_ETA, TwoParameter};
+pub use joint::{DynamicEfficiency, MAX_PRIOR_SENSITIVITY_ETA};
 pub use mapper_core::{Choice, JointSettings, SettleBands, WindowRule};
 pub use needs::{method_for, needs};
 pub use reading_checks::bounds::EFFICIENCY;

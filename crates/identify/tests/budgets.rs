@@ -47,7 +47,7 @@ fn fixed() -> JointSettings {
     JointSettings {
         alpha_area: Choice::Fixed,
         probe: Choice::Fixed,
-        direction: Choice::Fixed,
+        heating_cooling_ratio: Choice::Fixed,
         inlet_h: Choice::Fixed,
         ..JointSettings::default()
     }

@@ -1,4 +1,4 @@
-//! The two-parameter method with a lagging probe: as good as without one if the probe is declared, biased if not.
+//! The dynamic method with a lagging probe: as good as without one if the probe is declared, biased if not.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use crate::lab::{self, Campaign, Machine, campaign, eighteen, measured};

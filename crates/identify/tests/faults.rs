@@ -36,7 +36,7 @@ fn drawn(seed: u64) -> Drawn {
     let machine = LabMachine {
         alpha: or(&mut rng, 0.0, 0.0, 0.2),
         probe_m: or(&mut rng, 0.0, 0.5e-3, 2e-3),
-        direction: or(&mut rng, 1.0, 0.7, 1.1),
+        heating_cooling_ratio: or(&mut rng, 1.0, 0.7, 1.1),
         ..LabMachine::default()
     };
     let mut points: Vec<(f64, f64)> = [0.5, 0.8, 1.2, 1.8]

@@ -85,10 +85,11 @@ fn without_noise_a_slow_probe_is_found_with_and_without_a_known_share() {
 
 #[test]
 fn without_noise_convection_that_depends_on_direction_is_found() {
-    let campaign = campaign(&eighteen(), 120.0, Machine { direction: 0.65, ..Machine::default() });
+    let campaign =
+        campaign(&eighteen(), 120.0, Machine { heating_cooling_ratio: 0.65, ..Machine::default() });
     let (points, thermal) = found(&campaign.recording, &joint());
     let (eta, _) = worst(&points, &campaign);
-    let factor = value(&thermal.direction_factor);
+    let factor = value(&thermal.heating_cooling_ratio);
     assert!((factor - 0.65).abs() < 0.02 && eta < 0.003, "factor {factor}, eta {eta}");
 }
 
@@ -157,7 +158,7 @@ fn noise_in_the_inputs_is_not_taken_for_a_probe() {
         let (points, thermal) = found(&recording, &config);
         let (eta, _) = worst(&points, &campaign);
         assert!(value(&thermal.probe_diameter_m) < 1e-3, "seed {seed}: {:?}", thermal.probe_diameter_m);
-        // Three standard errors at 50 krpm, where the two-parameter method has an error of 4 points even without noise.
+        // Three standard errors at 50 krpm, where the dynamic method has an error of 4 points even without noise.
         assert!(eta < 0.01, "seed {seed}: {eta}");
     }
 }
@@ -226,7 +227,7 @@ fn a_campaign_of_one_step_gives_what_it_can() {
     let point = points[0].as_ref().unwrap();
     // Settled, and alone: efficiency and heat cannot be separated. The point is not good, but its interval covers the truth.
     assert_ne!(point.verdict, Verdict::Good, "{point:?}");
-    assert!(codes(point).contains(&"rests_on_declaration"), "{point:?}");
+    assert!(codes(point).contains(&"prior_dominated"), "{point:?}");
     let (low, high) = point.eta_low.zip(point.eta_high).unwrap();
     assert!((low..=high).contains(&campaign.truth[0].eta), "{low} to {high}");
 }

@@ -39,7 +39,7 @@ fn config(method: Method, declared: &BTreeMap<Channel, DeclaredUncertainty>) -> 
     let joint = JointSettings {
         alpha_area: Choice::Fixed,
         probe: Choice::Fixed,
-        direction: Choice::Fixed,
+        heating_cooling_ratio: Choice::Fixed,
         inlet_h: Choice::Fixed,
         ..JointSettings::default()
     };

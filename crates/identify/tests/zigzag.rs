@@ -1,4 +1,4 @@
-//! The two-parameter method on a noise-free continuous campaign, compared with an independent implementation
+//! The dynamic method on a noise-free continuous campaign, compared with an independent implementation
 //! (`crates/physics/tests/reference/zigzag.csv`).
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
@@ -23,7 +23,7 @@ struct Row {
     p3_pa: f64,
     eta_end: f64,
     h_end_w_m2k: f64,
-    two_parameter: Option<(f64, f64)>,
+    dynamic: Option<(f64, f64)>,
 }
 
 fn rows() -> Vec<Row> {
@@ -40,7 +40,7 @@ fn rows() -> Vec<Row> {
                 p3_pa: number(2).unwrap(),
                 eta_end: number(4).unwrap(),
                 h_end_w_m2k: number(5).unwrap(),
-                two_parameter: number(6).zip(number(7)),
+                dynamic: number(6).zip(number(7)),
             }
         })
         .collect()
@@ -118,12 +118,12 @@ struct Figures {
 }
 
 fn reference_figures() -> Figures {
-    let errors = rows().iter().filter_map(|row| Some((row.two_parameter?.0 - row.eta_end).abs())).collect();
+    let errors = rows().iter().filter_map(|row| Some((row.dynamic?.0 - row.eta_end).abs())).collect();
     figures_of(errors, f64::NAN)
 }
 
 fn figures(points: &[(Row, IdentifiedPoint)]) -> Figures {
-    let transients = points.iter().filter(|(row, _)| row.two_parameter.is_some());
+    let transients = points.iter().filter(|(row, _)| row.dynamic.is_some());
     let error = |row: &Row, point: &IdentifiedPoint| (point.eta.unwrap() - row.eta_end).abs();
     let errors = transients.clone().map(|(row, point)| error(row, point)).collect();
     let good = transients.filter(|(_, point)| point.verdict == mapper_core::Verdict::Good);
@@ -148,7 +148,7 @@ fn a_fixed_window_agrees_with_the_independent_implementation() {
     let points = identified(WindowRule::Fixed { start_s: 10.0, end_s: 110.0 });
     let (mut worst_eta, mut worst_h) = (0.0f64, 0.0f64);
     for (row, point) in &points {
-        let Some((eta, h_w_m2k)) = row.two_parameter else {
+        let Some((eta, h_w_m2k)) = row.dynamic else {
             assert_eq!(point.verdict, mapper_core::Verdict::Unusable);
             assert_eq!(point.warnings[0].code(), "no_transient");
             assert_eq!((point.eta, point.h_w_m2k), (None, None));
@@ -221,7 +221,7 @@ fn noise_and_offsets_are_within_what_the_points_say() {
             let mut rng = Pcg64::seed_from_u64(seed);
             for (rows, clean) in &clean {
                 let points = identify(&measured(clean, &mut rng, with_offsets), &config).unwrap();
-                for (row, point) in rows.iter().zip(points).filter(|(row, _)| row.two_parameter.is_some()) {
+                for (row, point) in rows.iter().zip(points).filter(|(row, _)| row.dynamic.is_some()) {
                     let (low, high) = point.eta_low.zip(point.eta_high).unwrap();
                     held += f64::from(u8::from(low <= row.eta_end && row.eta_end <= high));
                     let warned =
@@ -276,7 +276,7 @@ fn together(rows: &[Row]) -> Recording {
 }
 
 /// The joint method finds the file's efficiencies within 0.2 points at every point, and h within 1.5 %. This includes points without a
-/// transient, at which the two-parameter method has errors up to 4.2 points.
+/// transient, at which the dynamic method has errors up to 4.2 points.
 #[test]
 fn the_joint_method_finds_every_efficiency_of_the_file() {
     let rows = rows();

@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::identification::remarks_text;
 use crate::recording::Recording;
 use mapper_core::{Clock, CompressorMap, IdentifiedPoint, RigDescription, RunEnding, UnpacedClock};
-use mapper_session::{Results, RunOutcome, RunRequest, RunTermination, Session, SessionError, SessionEvent};
+use mapper_session::{Results, RunOutcome, RunRequest, Session, SessionError, SessionEvent};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -126,13 +126,13 @@ impl Run {
     fn of(outcome: RunOutcome) -> Result<Run, Error> {
         let sentence = outcome.sentence();
         let RunOutcome { directory, recording, end, results } = outcome;
-        let ending = end.ending();
-        let results = match (end, results) {
-            (RunTermination::Failed(source), _) => {
-                return Err(SessionError::Run { source, recording }.into());
-            }
+        let ending = match end {
+            Ok(ending) => ending,
+            Err(source) => return Err(SessionError::Run { source, recording }.into()),
+        };
+        let results = match (&ending, results) {
             (_, Ok(results)) => Some(results),
-            (RunTermination::Completed, Err(error)) => return Err(error.into()),
+            (RunEnding::Completed, Err(error)) => return Err(error.into()),
             // Stopped before there was anything to identify.
             (_, Err(_)) => None,
         };

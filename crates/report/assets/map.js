@@ -13,7 +13,7 @@ function words(p) {
   ];
   if (p.eta_common != null) lines.push(`  common ${shown(p.eta_common, 2)}, own ${shown(p.eta_own, 2)}`);
   if (p.h != null) lines.push(`h ${shown(p.h, 0)} ± ${shown(margin(p.h, p.h_low, p.h_high), 0)} W/(m² K)`);
-  if (p.dynamic) lines.push(`two-parameter ${shown(p.dynamic[0], 2)} %`);
+  if (p.dynamic) lines.push(`dynamic ${shown(p.dynamic[0], 2)} %`);
   // Three readings a line: the text is next to the pointer.
   for (let i = 0; i < p.raw.length; i += 3) lines.push(`${i ? "  " : "read "}${p.raw.slice(i, i + 3).join(", ")}`);
   lines.push(p.verdict);

@@ -124,7 +124,7 @@ fn plan() -> Plan {
             worst_sigma_eta: None,
             rms_error_eta: None,
             rms_error_reported_eta: None,
-            resting_eta: None,
+            prior_sensitivity_eta: None,
             worst_error_eta: None,
             minutes: 60.0,
         },

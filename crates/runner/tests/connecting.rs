@@ -2,10 +2,12 @@
 
 use crate::run::plan;
 use mapper_backends::virtual_lab::{LabSettings, VirtualLab};
-use mapper_core::{Backend, BackendError, Event, RigDescription, SampleBatch, Setpoints, UnpacedClock};
+use mapper_core::{
+    Backend, BackendError, Event, RigDescription, RunEnding, SampleBatch, Setpoints, UnpacedClock,
+};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::model::Model;
-use mapper_runner::{ObserverError, PlanSteps, Protection, RunEnd, RunObserver, Runner};
+use mapper_runner::{ObserverError, PlanSteps, Protection, RunObserver, Runner};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -83,7 +85,7 @@ fn a_stop_while_the_rig_is_connected_is_answered_before_it_is_armed() {
             stop_after_step: if gentle { &stop } else { &never },
             ..Protection::default()
         });
-        let ended = if fails { end.is_err() } else { end.unwrap() == RunEnd::Interrupted { t_s: 0.0 } };
+        let ended = if fails { end.is_err() } else { end.unwrap() == RunEnding::Interrupted { t_s: 0.0 } };
         assert!(ended, "gentle {gentle}, fails {fails}");
         assert_eq!(rig.calls, ["armed after the answer", "made safe", "disarmed"]);
     }

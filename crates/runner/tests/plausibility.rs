@@ -1,7 +1,7 @@
 //! Plausible readings of jumps, surge and standstill stay good; jumps faster than the sensor's lag are bad while they last.
 
-use mapper_core::{Channel, ChannelColumn, Element, ElementColumn, Quality, Reaction, SampleBatch};
-use mapper_runner::{CommandedState, PlausibilityWatch, ReadingBounds, Trip};
+use mapper_core::{Channel, ChannelColumn, Element, ElementColumn, Quality, Reaction, SampleBatch, Trip};
+use mapper_runner::{CommandedState, PlausibilityWatch, ReadingBounds};
 
 const INTERVAL_S: f64 = 0.1;
 const RUNNING: CommandedState =

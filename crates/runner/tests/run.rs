@@ -7,14 +7,14 @@ mod faults;
 use mapper_backends::virtual_lab::{LabSettings, VirtualLab};
 use mapper_core::{
     Backend, BackendError, Channel, Event, EventKind, GuardName, OperatingPoint, PacedClock, Plan,
-    PlanFigures, PlanInputHashes, PlanStep, Predicted, Quality, Reaction, RigDescription, SampleBatch,
-    Setpoints, SignalGuard, StepKind, StepMarker, UnpacedClock, Wall,
+    PlanFigures, PlanInputHashes, PlanStep, Predicted, Quality, Reaction, RigDescription, RunEnding,
+    SampleBatch, Setpoints, SignalGuard, StepKind, StepMarker, UnpacedClock, WallClock,
 };
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::model::Model;
 use mapper_runner::{
-    Guard, ObserverError, Operator, PlanSteps, Protection, RunEnd, RunError, RunObserver, Runner,
-    SignalWatch, StepSource, StepSourceError,
+    Guard, ObserverError, Operator, PlanSteps, Protection, RunError, RunObserver, Runner, SignalWatch,
+    StepSource, StepSourceError,
 };
 use std::collections::BTreeSet;
 use std::sync::Mutex;
@@ -54,7 +54,7 @@ pub fn plan() -> Plan {
             worst_sigma_eta: None,
             rms_error_eta: None,
             rms_error_reported_eta: None,
-            resting_eta: None,
+            prior_sensitivity_eta: None,
             worst_error_eta: None,
             minutes: 1.0,
         },
@@ -159,7 +159,11 @@ impl Backend for Watched {
     }
 }
 
-fn run(notebook: &mut Notebook, guards: Vec<Box<dyn Guard>>, stop: &AtomicBool) -> Result<RunEnd, RunError> {
+fn run(
+    notebook: &mut Notebook,
+    guards: Vec<Box<dyn Guard>>,
+    stop: &AtomicBool,
+) -> Result<RunEnding, RunError> {
     let (plan, mut rig) = (plan(), Watched::new());
     let end = Runner {
         steps: &mut PlanSteps::new(&plan),
@@ -178,7 +182,7 @@ fn run(notebook: &mut Notebook, guards: Vec<Box<dyn Guard>>, stop: &AtomicBool) 
 #[test]
 fn a_plan_is_run_in_time_and_without_gaps() {
     let mut notebook = Notebook::default();
-    assert_eq!(run(&mut notebook, Vec::new(), &AtomicBool::new(false)).unwrap(), RunEnd::Completed);
+    assert_eq!(run(&mut notebook, Vec::new(), &AtomicBool::new(false)).unwrap(), RunEnding::Completed);
     assert_eq!(notebook.samples.len(), 551);
     let times: Vec<(f64, f64)> = notebook.ends.iter().map(|marker| (marker.start_s, marker.end_s)).collect();
     assert_eq!(times, [(10.0, 30.0), (30.0, 50.0)]);
@@ -209,7 +213,7 @@ fn a_tripped_guard_makes_the_rig_safe_and_is_reported() {
     let mut notebook = Notebook::default();
     let guard = overspeed(0.2);
     let end = run(&mut notebook, vec![Box::new(guard)], &AtomicBool::new(false)).unwrap();
-    let RunEnd::Tripped(trip) = end else { panic!("{end:?}") };
+    let RunEnding::Tripped(trip) = end else { panic!("{end:?}") };
     assert!((30.0..32.0).contains(&trip.t_s), "{trip:?}");
     assert_eq!(notebook.events, [EventKind::GuardTripped, EventKind::SafeState]);
     // The unfinished step ends at the stop, and the recording shows the shaft slow down.
@@ -223,7 +227,7 @@ fn the_operator_stops_at_the_next_poll() {
     static STOP: AtomicBool = AtomicBool::new(false);
     let mut notebook = Notebook { stop_at_s: Some((15.0, &STOP)), ..Notebook::default() };
     let end = run(&mut notebook, Vec::new(), &STOP).unwrap();
-    assert_eq!(end, RunEnd::Interrupted { t_s: 15.0 });
+    assert_eq!(end, RunEnding::Interrupted { t_s: 15.0 });
     assert_eq!(notebook.events, [EventKind::Interrupted, EventKind::SafeState]);
 }
 
@@ -251,7 +255,7 @@ impl StepSource for NeverReady<'_> {
 /// A wall clock that advances only during waits.
 struct WaitClock(std::cell::Cell<f64>);
 
-impl Wall for &WaitClock {
+impl WallClock for &WaitClock {
     fn now_s(&self) -> f64 {
         self.0.get()
     }
@@ -281,7 +285,7 @@ fn the_operator_can_stop_while_a_step_is_computed() {
     }
     .run()
     .unwrap();
-    assert_eq!(end, RunEnd::Interrupted { t_s: 0.5 });
+    assert_eq!(end, RunEnding::Interrupted { t_s: 0.5 });
     assert!(rig.made_safe && rig.disarmed);
 }
 
@@ -292,7 +296,7 @@ struct StopsAt<'a> {
     stop: &'a AtomicBool,
 }
 
-impl Wall for &StopsAt<'_> {
+impl WallClock for &StopsAt<'_> {
     fn now_s(&self) -> f64 {
         *self.now_s.lock().unwrap()
     }
@@ -359,7 +363,7 @@ fn a_stop_does_not_wait_for_the_next_sample() {
             ..Protection::default()
         })
         .unwrap();
-        assert!(matches!(end, RunEnd::Interrupted { .. }), "{stop_s}: {end:?}");
+        assert!(matches!(end, RunEnding::Interrupted { .. }), "{stop_s}: {end:?}");
         let late_s = rig.safe_s.unwrap() - stop_s;
         assert!((0.0..0.02).contains(&late_s), "{stop_s} s: {late_s} s late");
     }
@@ -383,7 +387,7 @@ fn guards_check_samples_while_a_step_is_computed() {
     }
     .run()
     .unwrap();
-    let RunEnd::Tripped(trip) = end else { panic!("{end:?}") };
+    let RunEnding::Tripped(trip) = end else { panic!("{end:?}") };
     assert!(trip.t_s > 0.5, "{trip:?}");
     assert!(rig.made_safe && rig.disarmed);
     assert!(notebook.samples.windows(2).all(|pair| pair[1].0 - pair[0].0 < 0.11), "no gap in the samples");
@@ -442,7 +446,7 @@ fn a_held_step_lasts_until_its_release() {
         stop: &AtomicBool::new(false),
     };
     let end = runner.run_under(&Protection { operator: Some(&operator), ..Protection::default() }).unwrap();
-    assert_eq!(end, RunEnd::Completed);
+    assert_eq!(end, RunEnding::Completed);
     // It starts at 10 s, is held until the second that ends at 60 s, then lasts its 20 s; the next one is as planned.
     let [first, second] = holds.notebook.ends[..] else { panic!("{:?}", holds.notebook.ends) };
     assert!((first.end_s - 10.0 - 20.0 - 50.0).abs() <= 1.0, "{first:?}");

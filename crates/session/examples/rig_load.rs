@@ -16,7 +16,7 @@
 
 use mapper_core::{
     Backend, BackendError, Channel, ChannelColumn, Element, ElementColumn, PacedClock, RigDescription,
-    SafeTrajectory, SampleBatch, Setpoints, UnpacedClock, Wall,
+    SafeTrajectory, SampleBatch, Setpoints, UnpacedClock, WallClock,
 };
 use mapper_recording::{ChannelMap, ReadOptions, read_recording};
 use mapper_session::{InterruptedRun, Registry, RunRequest, Session, SessionEvent};
@@ -182,7 +182,7 @@ fn driver(name: &str, _: &serde_json::Value) -> Result<Box<dyn Backend>, Backend
 
 struct Clock(Instant);
 
-impl Wall for Clock {
+impl WallClock for Clock {
     fn now_s(&self) -> f64 {
         self.0.elapsed().as_secs_f64()
     }
@@ -204,7 +204,7 @@ fn campaign(dwell_s: u32, more: &str) -> String {
     let replaced = [
         ("  virtual_lab: {}\n", "  stand: {}\n".to_owned()),
         ("order: thermal_gradient ", "order: listed ".to_owned()),
-        ("zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}\n", String::new()),
+        ("zero: {soak: 30 min, nonuniformity: 0.01 K, pressure_nonuniformity: 1 Pa}\n", String::new()),
         ("  dwell: 40 s ", format!("  dwell: {dwell_s} s ")),
         ("  warm_up: 2 min ", "  warm_up: 1 s ".to_owned()),
         ("method: joint ", "method: dynamic ".to_owned()),

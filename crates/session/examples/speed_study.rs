@@ -42,7 +42,7 @@ fn run(lab: &str, control: &str, seed: u64) -> Driven {
             "speeds: [50 krpm, 80 krpm, 110 krpm, 140 krpm, 155 krpm]",
         ),
         ("openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [0.5, 1.0, 2.0]"),
-        ("zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}\n", ""),
+        ("zero: {soak: 30 min, nonuniformity: 0.01 K, pressure_nonuniformity: 1 Pa}\n", ""),
     ]))
 }
 

@@ -62,7 +62,6 @@ pub use rig::rig_state::{RigStates, RigStatus, shared_state_directory};
 pub use rig::sources::Sources;
 pub use run::prepared_run::{PreparedRun, RunOutcome, RunRequest};
 pub use run::recording_metadata::start_time_ns;
-pub use run::run_end::RunTermination;
 pub use run::run_stop::{Phase, RunStop, SignalResponse};
 pub use session::Session;
 pub use variant::Variant;

@@ -7,7 +7,7 @@ use mapper_backends::virtual_lab;
 use mapper_campaign::Campaign;
 use mapper_core::{Dwell, Plan, ResultRemark, Timing, VisitOrder, standard_error_of};
 use mapper_formats::FORMATS;
-use mapper_identify::MAX_RESTING_ETA;
+use mapper_identify::MAX_PRIOR_SENSITIVITY_ETA;
 use mapper_numerics::statistics::rms;
 use mapper_planner::plan_other_orders;
 use mapper_session::{PlanInputs, Registry, RunRequest, Session, nominal_model, plan, plan_of};
@@ -30,8 +30,10 @@ fn planned(campaign: &Campaign) -> Plan {
 }
 
 /// alpha_A, probe and heating/cooling ratio as declared: twelve points do not determine them.
-const AS_DECLARED: (&str, &str) =
-    ("  method: joint ", "  joint: {alpha_area: fixed, probe: fixed, direction: fixed}\n  method: joint ");
+const AS_DECLARED: (&str, &str) = (
+    "  method: joint ",
+    "  joint: {alpha_area: fixed, probe: fixed, heating_cooling_ratio: fixed}\n  method: joint ",
+);
 
 /// A forecast that the recording cannot keep is not stated: what rests on the declaration is.
 #[test]
@@ -40,7 +42,7 @@ fn too_few_steps_have_no_expected_error() {
     assert_eq!(plan.figures.rms_error_eta, None);
     assert!(plan.steps.iter().all(|step| step.predicted.sigma_eta.is_none()));
     let stated = plan.figures.rms_error_reported_eta.unwrap();
-    assert!(stated > MAX_RESTING_ETA, "{stated}");
+    assert!(stated > MAX_PRIOR_SENSITIVITY_ETA, "{stated}");
     // Held as declared, the same steps have one.
     let held = planned(&small(&[AS_DECLARED])).figures;
     assert!(held.rms_error_eta.unwrap() < stated);
@@ -60,7 +62,7 @@ fn seeds_err_as_forecast() {
         let folder = tempfile::tempdir().unwrap();
         let identified =
             session.run(RunRequest::new(&campaign, "", folder.path())).unwrap().results.unwrap().identified;
-        let parameters = ["alpha_area", "probe", "direction"].map(str::to_owned).to_vec();
+        let parameters = ["alpha_area", "probe", "heating_cooling_ratio"].map(str::to_owned).to_vec();
         assert!(
             identified.remarks.contains(&ResultRemark::HeldFixed { parameters }),
             "{:?}",

@@ -259,7 +259,7 @@ fn the_thermal_model_of_a_run_removes_the_heat() {
             alpha_area_ratio: shared(compressor.alpha_area_ratio, 0.0),
             inlet: None,
             probe_diameter_m: shared(0.0, 0.0),
-            direction_factor: shared(1.0, 0.0),
+            heating_cooling_ratio: shared(1.0, 0.0),
             offsets: BTreeMap::new(),
             entangled: Vec::new(),
             doubts: Vec::new(),

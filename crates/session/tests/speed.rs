@@ -17,7 +17,7 @@ fn run(lab: &str, seed: u64, more: &[(&str, &str)]) -> Driven {
             "speeds: [50 krpm, 110 krpm, 155 krpm]",
         ),
         ("openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [0.5, 1.4]"),
-        ("zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}\n", ""),
+        ("zero: {soak: 30 min, nonuniformity: 0.01 K, pressure_nonuniformity: 1 Pa}\n", ""),
     ];
     driven(&campaign(&[&replacements[..], more].concat()))
 }

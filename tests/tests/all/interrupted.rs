@@ -15,7 +15,7 @@ use std::time::Duration;
 const LONG: &[(&str, &str)] = &[
     ("warm_up: 2 min ", "warm_up: 60 s "),
     // Half an hour in which nothing happens.
-    ("zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}\n", ""),
+    ("zero: {soak: 30 min, nonuniformity: 0.01 K, pressure_nonuniformity: 1 Pa}\n", ""),
     // This test does not need an optimised order, and the search would take most of its time.
     ("order: thermal_gradient ", "order: listed "),
     ("dwell: 40 s ", "dwell: 5 min "),

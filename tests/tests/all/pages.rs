@@ -98,7 +98,7 @@ const NINE_POINTS: &[(&str, &str)] = &[
     ("openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [0.7, 1.0, 1.4]"),
     ("warm_up: 2 min ", "warm_up: 60 s "),
     ("dwell: 40 s ", "dwell: 120 s "),
-    ("zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}\n", ""),
+    ("zero: {soak: 30 min, nonuniformity: 0.01 K, pressure_nonuniformity: 1 Pa}\n", ""),
     ("operator: virtual\n", "operator: '</script><img src=x onerror=alert(1)>'\n"),
 ];
 

@@ -50,7 +50,7 @@ fn a_speed_that_cannot_be_reached_is_reported_with_its_point() {
     replacements.extend([
         ("virtual_lab: {}", "virtual_lab: {effects: {turbine_efficiency: 0.9}}"),
         ("{min: 110 kPa, max: 500 kPa}", "{min: 110 kPa, max: 221 kPa}"),
-        ("zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}\n", ""),
+        ("zero: {soak: 30 min, nonuniformity: 0.01 K, pressure_nonuniformity: 1 Pa}\n", ""),
     ]);
     let campaign = CampaignFile::shipped_with(&replacements);
     let result = run_into(&campaign.path, &campaign.runs()).json();
@@ -75,7 +75,7 @@ fn a_replayed_run_uses_the_recorded_commands() {
     let mut replacements = SHORT_GRID.to_vec();
     replacements.extend([
         ("virtual_lab: {}", lab),
-        ("zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}\n", ""),
+        ("zero: {soak: 30 min, nonuniformity: 0.01 K, pressure_nonuniformity: 1 Pa}\n", ""),
     ]);
     let campaign = CampaignFile::shipped_with(&replacements);
     let first = run_into(&campaign.path, &campaign.runs()).json();

@@ -15,7 +15,7 @@ fn run(search: &str, lab: &str, seed: u32, out: &Path) -> Value {
         ),
         ("openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [0.7, 0.5]"),
         ("warm_up: 2 min ", "warm_up: 60 s "),
-        ("zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}\n", ""),
+        ("zero: {soak: 30 min, nonuniformity: 0.01 K, pressure_nonuniformity: 1 Pa}\n", ""),
         ("method: joint ", "method: dynamic "),
         ("virtual_lab: {}", &lab),
         ("formats: [csv, json, svg]", "formats: [json, surge]"),

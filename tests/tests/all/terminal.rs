@@ -42,7 +42,7 @@ fn a_run_into_a_pipe_prints_a_line_per_step_within_80_columns() {
 fn what_all_results_depend_on_is_next_to_the_verdict() {
     let fixed = (
         "  method: joint ",
-        "  joint: {alpha_area: fixed, probe: fixed, direction: fixed}\n  method: joint ",
+        "  joint: {alpha_area: fixed, probe: fixed, heating_cooling_ratio: fixed}\n  method: joint ",
     );
     let campaign = CampaignFile::shipped_with(&[SHORT_GRID, &[fixed]].concat());
     let run = shared_run(&campaign).run;

@@ -78,7 +78,7 @@ fn run_of_a_day(folder: &Path, day: &str, seed: usize) {
     // Half an hour of soak is most of it.
     let changed = [
         ("seed: 1 ", seed.as_str()),
-        ("zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}\n", ""),
+        ("zero: {soak: 30 min, nonuniformity: 0.01 K, pressure_nonuniformity: 1 Pa}\n", ""),
     ];
     let campaign = CampaignFile::shipped_with(&[&SMALLER[..], &changed].concat());
     copy(&shared_run(&campaign).run, &folder.join("runs").join(day));

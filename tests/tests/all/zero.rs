@@ -15,8 +15,11 @@ fn run(zero: &str, seed: u32, out: &Path) -> Value {
         ("openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [0.7, 1.0]"),
         // Temperatures alone: no soak says anything of a flow meter.
         ("m_c:   {noise: 1.5e-4 kg/s, gain: 0.5 %}", "m_c:   {noise: 1.5e-4 kg/s}"),
-        ("zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}\n", ""),
-        ("method: joint ", "joint: {alpha_area: fixed, probe: fixed, direction: fixed}\n  method: joint "),
+        ("zero: {soak: 30 min, nonuniformity: 0.01 K, pressure_nonuniformity: 1 Pa}\n", ""),
+        (
+            "method: joint ",
+            "joint: {alpha_area: fixed, probe: fixed, heating_cooling_ratio: fixed}\n  method: joint ",
+        ),
         // The same steps with and without a zero.
         ("seed: 1 ", &seed),
     ]);

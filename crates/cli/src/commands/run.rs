@@ -10,12 +10,12 @@ use crate::output::{output_options, standard_output};
 use crate::terminal::results_text;
 use clap::Args;
 use mapper_campaign::Campaign;
-use mapper_core::{PacedClock, Verdict};
+use mapper_core::{PacedClock, RunEnding, Trip, Verdict};
 use mapper_live::{LiveError, LiveRun, ObserverRequest, Observers, TlsFiles};
 use mapper_report::plan_text;
 use mapper_session::recording::run_directory;
 use mapper_session::{
-    InterruptedRun, Operator, Phase, PreparedRun, RunOutcome, RunRequest, RunTermination, Session,
+    InterruptedRun, Operator, Phase, PreparedRun, RunOutcome, RunRequest, Session,
     SessionError, SessionEvent, load_on, soak_s, start_time_ns,
 };
 use serde_json::json;
@@ -157,27 +157,29 @@ impl Run {
         let unwritten = results.as_ref().ok().and_then(|results| results.unwritten.clone());
         const KEPT: &str = "the rig is safe and the recording is kept";
         let failure = match end {
-            RunTermination::Completed if unwritten.is_some() => {
+            Ok(RunEnding::Completed) if unwritten.is_some() => {
                 let unwritten = unwritten.unwrap_or_default();
                 let message = format!("{unwritten} (`mapper run --resume {}`)", directory.display());
                 Some(Failure::new(Code::Failure, message))
             }
-            RunTermination::Completed if unusable => Some(Failure::new(
+            Ok(RunEnding::Completed) if unusable => Some(Failure::new(
                 Code::BadRecording,
                 "no point is usable; the reasons are listed above and in the report",
             )),
-            RunTermination::Completed => None,
-            RunTermination::Drifted { reason } => {
+            Ok(RunEnding::Completed) => None,
+            Ok(RunEnding::Drifted { reason }) => {
                 Some(Failure::new(Code::Rig, format!("{reason}. The rig is safe and the recording is kept")))
             }
-            RunTermination::Interrupted { t_s } => Some(Failure::new(
+            Ok(RunEnding::Interrupted { t_s }) => Some(Failure::new(
                 Code::Interrupted,
                 format!("stopped by the operator at {t_s:.0} s; {KEPT}"),
             )),
-            RunTermination::Tripped { t_s, reason } => {
+            Ok(RunEnding::Tripped(Trip { t_s, reason, .. })) => {
                 Some(Failure::new(Code::Rig, format!("stopped at {t_s:.1} s: {reason}; {KEPT}")))
             }
-            RunTermination::Failed(source) => {
+            // The runner reports a failure as an error; this is one that a file remembers.
+            Ok(RunEnding::Failed { reason }) => Some(Failure::new(Code::Rig, format!("{reason}; {KEPT}"))),
+            Err(source) => {
                 let recording = recording.clone();
                 Some(SessionError::Run { source, recording }.into())
             }

@@ -101,7 +101,7 @@ fn shown_results_text(units: &DisplayUnits, found: &ShownResults<'_>, shown: Det
 fn short(display: &Display, found: &ShownResults<'_>, shown: DetailLevel) -> String {
     let identified = found.identified;
     let mut text = String::new();
-    if let Some(disagreement) = disagreement_text(&identified.points, &identified.two_parameter, display) {
+    if let Some(disagreement) = disagreement_text(&identified.points, &identified.dynamic, display) {
         text.push_str(&wrapped(&disagreement, COLUMNS, 2));
         text.push('\n');
     }
@@ -131,8 +131,7 @@ fn short(display: &Display, found: &ShownResults<'_>, shown: DetailLevel) -> Str
 
 fn full(display: &Display, found: &ShownResults<'_>, shown: DetailLevel) -> String {
     let identified = found.identified;
-    let mut text =
-        disagreement_text(&identified.points, &identified.two_parameter, display).unwrap_or_default();
+    let mut text = disagreement_text(&identified.points, &identified.dynamic, display).unwrap_or_default();
     text.push_str(&points_text(&identified.points, display, shown.truth));
     if let Some(shared) = shared_errors_text(identified.points_alone(), display) {
         let _ = writeln!(text, "{shared}");

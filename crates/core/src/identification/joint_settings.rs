@@ -18,13 +18,14 @@ pub enum Choice {
 /// The shared parameters of the joint method.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
+#[schemars(extend("x-removed" = { "direction": "write `heating_cooling_ratio: fixed` or `heating_cooling_ratio: fitted`" }))]
 pub struct JointSettings {
     /// Share of the internal area before compression.
     pub alpha_area: Choice,
     /// Diameter of the T2 probe; `fixed` takes that of `sensors.T2.probe_diameter`.
     pub probe: Choice,
     /// Factor on the heat-transfer coefficient if the metal is hotter than the gas; 1 if `fixed`.
-    pub direction: Choice,
+    pub heating_cooling_ratio: Choice,
     /// Whether the heat-transfer coefficient upstream of the wheel equals that downstream or follows the inlet's own diameter; as in
     /// `machine.geometry` if `fixed`.
     pub inlet_h: Choice,
@@ -38,7 +39,7 @@ impl JointSettings {
         let parameters = [
             ("alpha_area", self.alpha_area),
             ("probe", self.probe),
-            ("direction", self.direction),
+            ("heating_cooling_ratio", self.heating_cooling_ratio),
             ("inlet_h", self.inlet_h),
             ("offsets", self.offsets),
         ];

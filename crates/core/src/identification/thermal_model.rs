@@ -107,7 +107,8 @@ pub struct ThermalModel {
     /// Tip diameter of the T2 probe (eqs. 11-12), m; 0 is an ideal probe.
     pub probe_diameter_m: SharedValue,
     /// Factor on the coefficient if the metal is hotter than the gas it touches.
-    pub direction_factor: SharedValue,
+    #[serde(alias = "direction_factor")]
+    pub heating_cooling_ratio: SharedValue,
     /// Offsets of readings (reading minus true value), by channel, K or Pa.
     pub offsets: BTreeMap<Channel, SharedValue>,
     /// Parameters that are nearly indistinguishable (absolute correlation above 0.95).

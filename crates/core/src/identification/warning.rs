@@ -74,7 +74,7 @@ Warning {
     /// Noise makes the efficiency uncertain.
     "noise_dominates" NoiseDominates(WideInterval),
     /// The efficiencies depend on declared uncertainties; from the recording alone they have this error.
-    "rests_on_declaration" RestsOnDeclaration { eta_error: f64 },
+    "prior_dominated" PriorDominated { eta_error: f64 },
     /// The efficiency depends on an alpha_A with too large an uncertainty.
     "assumed_alpha" AssumedAlpha { alpha_area_ratio: f64, alpha_area_sigma_ratio: f64, eta_sigma: f64 },
     /// No sensor uncertainty is declared.

@@ -20,7 +20,7 @@ impl Clock for UnpacedClock {
 }
 
 /// A wall clock and a way to wait for it, provided by the main program.
-pub trait Wall {
+pub trait WallClock {
     /// Time since any fixed instant, s; never goes back.
     fn now_s(&self) -> f64;
 
@@ -38,7 +38,7 @@ pub struct PacedClock<W> {
     start_s: Option<f64>,
 }
 
-impl<W: Wall> PacedClock<W> {
+impl<W: WallClock> PacedClock<W> {
     /// A clock that begins with the first wait. `speed_ratio`: run time over wall-clock time, 1 for real time; values that are
     /// not above 0 mean real time.
     pub fn new(wall: W, speed_ratio: f64) -> Self {
@@ -47,7 +47,7 @@ impl<W: Wall> PacedClock<W> {
     }
 }
 
-impl<W: Wall> Clock for PacedClock<W> {
+impl<W: WallClock> Clock for PacedClock<W> {
     fn advances_by_itself(&self) -> bool {
         true
     }
@@ -71,7 +71,7 @@ mod tests {
     /// A wall clock that advances only during waits.
     struct Idle(Cell<f64>);
 
-    impl Wall for &Idle {
+    impl WallClock for &Idle {
         fn now_s(&self) -> f64 {
             self.0.get()
         }

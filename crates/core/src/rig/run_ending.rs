@@ -1,8 +1,22 @@
-//! The end of a run.
+//! The end of a run, the same for the runner, the journal and the reports.
 
+use crate::rig::guard::{GuardName, Reaction};
 use serde::{Deserialize, Serialize};
 
-/// Reason for the end of a run; its `code` is stable.
+/// The report of a guard.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Trip {
+    /// Run time, s.
+    pub t_s: f64,
+    /// The guard that tripped.
+    pub guard: GuardName,
+    /// The required reaction.
+    pub reaction: Reaction,
+    /// One sentence with values and units.
+    pub reason: String,
+}
+
+/// How a run ended; its `code` is stable. The rig is safe in all cases.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "code", rename_all = "snake_case")]
 #[allow(missing_docs, reason = "the variants describe their values")]
@@ -13,8 +27,8 @@ pub enum RunEnding {
     Drifted { reason: String },
     /// The operator stopped the run at this run time.
     Interrupted { t_s: f64 },
-    /// A guard tripped at this run time.
-    Tripped { t_s: f64, reason: String },
-    /// The rig, the script or the recording failed.
+    /// A guard tripped.
+    Tripped(Trip),
+    /// The rig, the script or the recording failed. The runner reports it as an error; files have it as this.
     Failed { reason: String },
 }

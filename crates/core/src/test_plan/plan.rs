@@ -145,8 +145,8 @@ pub struct PlanFigures {
     #[serde(default)]
     pub rms_error_reported_eta: Option<f64>,
     /// Error of the efficiencies that only the declared values of these parameters exclude (fraction).
-    #[serde(default)]
-    pub resting_eta: Option<f64>,
+    #[serde(default, alias = "resting_eta")]
+    pub prior_sensitivity_eta: Option<f64>,
     /// Largest predicted error of the efficiency, standard error and bias in quadrature (fraction).
     #[serde(default)]
     pub worst_error_eta: Option<f64>,

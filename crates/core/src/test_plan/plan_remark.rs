@@ -24,7 +24,7 @@ PlanRemark {
     /// A limit forbids the return to the first point.
     "no_way_back" NoWayBack,
     /// The points will have the warning of this code: the error without declared uncertainties, and the largest permitted one.
-    "rests_on_declaration" RestsOnDeclaration { eta_error: f64, max_eta_error: f64 },
+    "prior_dominated" PriorDominated { eta_error: f64, max_eta_error: f64 },
     /// The longest dwell does not reach the required error.
     "required_error_not_reached" RequiredErrorNotReached { dwell_s: f64, eta_sigma: f64, required_eta_sigma: f64 },
     /// The search for surge after the steps.

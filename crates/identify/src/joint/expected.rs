@@ -9,7 +9,7 @@ use crate::joint::fit::solve::{Member, Problem};
 use crate::joint::fit::start::{self, START_S};
 use crate::joint::step_model::rows::TIME_ROUNDING_S;
 use crate::joint::step_model::rows::{COARSER, Row, StepRows, block_s_after, place};
-use crate::joint::{MAX_RESTING_ETA, fit::refinements, uncertainty::smoothness};
+use crate::joint::{MAX_PRIOR_SENSITIVITY_ETA, fit::refinements, uncertainty::smoothness};
 use crate::single_step::dynamic::Estimate;
 use mapper_core::{MethodResult, MethodResults, SAMPLE_INTERVAL_S};
 use mapper_numerics::coloured_noise::BlockNoise;
@@ -32,7 +32,7 @@ pub fn expected_together(steps: &[&[ForecastRow]], config: &IdentifyConfig) -> O
     problem.minimise_roughly()?;
     start::refine(&mut problem, &condensed, config)?;
     problem.minimise_roughly()?;
-    let parameter_error_eta = refinements::resting_on_declaration(&problem, None)?;
+    let parameter_error_eta = refinements::prior_sensitivity(&problem, None)?;
     let reported = |problem: &Problem<'_>| -> Option<Vec<Option<f64>>> {
         let mut open = problem.clone();
         let found = Fitted::of(&mut open)?.smoothed(&open, &condensed);
@@ -67,7 +67,7 @@ pub fn expected_together(steps: &[&[ForecastRow]], config: &IdentifyConfig) -> O
         reported_sigma_eta,
         undeclared_sigma_eta,
         parameter_error_eta,
-        max_parameter_error_eta: MAX_RESTING_ETA,
+        max_parameter_error_eta: MAX_PRIOR_SENSITIVITY_ETA,
     })
 }
 

@@ -46,7 +46,7 @@ pub(crate) fn exclude(problem: &mut Problem<'_>, config: &IdentifyConfig) {
     let squares: Vec<f64> = problem
         .members
         .iter()
-        .map(|member| if member.barred { f64::INFINITY } else { mean_square(problem, member) })
+        .map(|member| if member.excluded { f64::INFINITY } else { mean_square(problem, member) })
         .collect();
     let open = || squares.iter().copied().filter(|square| square.is_finite());
     let Some(middle) = median(open()) else { return };
@@ -55,7 +55,7 @@ pub(crate) fn exclude(problem: &mut Problem<'_>, config: &IdentifyConfig) {
     let bad = open().filter(|square| *square > limit).count();
     let few = 3 * bad <= open().count();
     for (member, square) in problem.members.iter_mut().zip(&squares) {
-        member.shares = !(member.barred || few && *square > limit);
+        member.contributes = !(member.excluded || few && *square > limit);
     }
 }
 
@@ -81,7 +81,7 @@ pub(crate) fn judge_step(
     if declared && square.sqrt() > config.thresholds.residual_over_noise_ratio {
         findings.doubt(Warning::PoorFit(PoorFit::NoiseRatio { residual_ratio: square.sqrt() }));
     }
-    if !member.shares && !member.barred {
+    if !member.contributes && !member.excluded {
         findings.doubt(Warning::LeftOut(LeftOut::PoorFit));
     }
     let deviation = member.local[LN_DEVIATION];
@@ -96,7 +96,7 @@ pub(crate) fn doubts(problem: &Problem<'_>, smoothed: &Smoothed, config: &Identi
     let slow: Vec<f64> = problem
         .members
         .iter()
-        .filter(|member| member.shares)
+        .filter(|member| member.contributes)
         .filter_map(|m| slow_square(problem, m))
         .collect();
     let slow = mean(&slow).unwrap_or(0.0);

@@ -36,11 +36,11 @@ const MAX_LOST_RATIO: f64 = 2.0;
 
 /// Maximum error of the efficiencies, fraction, that only the declaration of alpha_A, probe and heating/cooling ratio excludes. Bound:
 /// above it, a machine not as declared could pass for one that is.
-pub const MAX_RESTING_ETA: f64 = 0.0125;
+pub const MAX_PRIOR_SENSITIVITY_ETA: f64 = 0.0125;
 
-/// The efficiency that the two-parameter method (`dynamic`) finds in a step which another method has identified.
+/// The efficiency that the dynamic method (Burke et al.) finds in a step which another method has identified.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct TwoParameter {
+pub struct DynamicEfficiency {
     /// Place of the step, from 0; files have its number, from 1.
     #[serde(serialize_with = "mapper_core::test_plan::step_number::serialize")]
     pub step: usize,
@@ -58,8 +58,8 @@ pub(crate) struct Joint {
     pub(crate) estimates: Vec<Estimate>,
     /// Shared parameters of the points; `None` if there are none.
     pub(crate) thermal: Option<ThermalModel>,
-    /// Result of the two-parameter method for the steps that it can use.
-    pub(crate) two_parameter: Vec<TwoParameter>,
+    /// Result of the dynamic method for the steps that it can use.
+    pub(crate) dynamic: Vec<DynamicEfficiency>,
     /// The efficiencies before the smoothness prior; `None` if nothing was fitted jointly.
     pub(crate) fitted: Option<FittedEfficiencies>,
 }
@@ -75,11 +75,11 @@ pub(crate) fn estimate(
     findings: &mut [Findings],
 ) -> Joint {
     let (alone, own_findings) = alone;
-    let mut two_parameter = Vec::new();
+    let mut dynamic = Vec::new();
     for ((step, estimate), own) in recording.steps.iter().zip(&alone).zip(&own_findings) {
         if let (Some((eta, Some(error))), true) = (estimate.eta, own.verdict != Verdict::Unusable) {
             let (eta_low, eta_high) = confidence_interval_95(eta, error.combined_standard_error());
-            two_parameter.push(TwoParameter { step: step.index, eta, eta_low, eta_high });
+            dynamic.push(DynamicEfficiency { step: step.index, eta, eta_low, eta_high });
         }
     }
     let steps = fit::start::steps(recording, end_states, config, findings);
@@ -96,10 +96,10 @@ pub(crate) fn estimate(
             findings[step.position].doubt(Warning::FitFailed(FitFailure::AllSteps));
             estimates[step.position] = alone[step.position].clone();
         }
-        return Joint { estimates, thermal: None, two_parameter, fitted: None };
+        return Joint { estimates, thermal: None, dynamic, fitted: None };
     };
     let fitted = uncertainty::smoothness::as_measured(&attempt.problem, &steps);
-    let Attempt { problem, smoothed, thermal, resting, left_out, .. } = attempt;
+    let Attempt { problem, smoothed, thermal, prior_sensitivity, left_out, .. } = attempt;
     let mut estimates = vec![Estimate::default(); recording.steps.len()];
     for (i, (member, step)) in problem.members.iter().zip(&steps).enumerate() {
         let own = &mut findings[step.position];
@@ -143,21 +143,21 @@ pub(crate) fn estimate(
         };
         let dt2_k = estimates[step.position].dt2_k;
         judge::judge_step(&problem, i, eta_error, dt2_k, config, own);
-        if let Some(region) = left_out.as_ref().filter(|_| member.barred) {
+        if let Some(region) = left_out.as_ref().filter(|_| member.excluded) {
             own.doubt(Warning::LeftOut(region.clone()));
         }
         if !commands::begins_with_jump(&recording.steps, step.position) {
             own.remark(Warning::FromConvectionLaw { convection_origin: None });
         }
         own.remark_undeclared(config);
-        if resting > MAX_RESTING_ETA {
-            own.doubt(Warning::RestsOnDeclaration { eta_error: resting });
+        if prior_sensitivity > MAX_PRIOR_SENSITIVITY_ETA {
+            own.doubt(Warning::PriorDominated { eta_error: prior_sensitivity });
         }
         for doubt in &thermal.doubts {
             own.doubt(Warning::ModelDoubted(doubt.clone()));
         }
     }
-    Joint { estimates, thermal: Some(thermal), two_parameter, fitted }
+    Joint { estimates, thermal: Some(thermal), dynamic, fitted }
 }
 
 /// A fit with its results.
@@ -167,31 +167,31 @@ struct Attempt<'a> {
     smoothed: Smoothed,
     thermal: ThermalModel,
     /// Error of the efficiencies if parameters shrunk to their declared values are not as declared, fraction.
-    resting: f64,
-    /// Reason for excluding the barred steps, if any.
+    prior_sensitivity: f64,
+    /// Reason for excluding the excluded steps, if any.
     left_out: Option<LeftOut>,
 }
 
 impl<'a> Attempt<'a> {
-    /// `barred`: indices of steps excluded from the shared parameters.
+    /// `excluded`: indices of steps excluded from the shared parameters.
     fn new(
         steps: &'a [StepRows],
         alone: &[Estimate],
         config: &IdentifyConfig,
-        barred: &[usize],
+        excluded: &[usize],
     ) -> Option<Self> {
         let mut problem = fit::start::problem(steps, alone, config)?;
-        for index in barred {
+        for index in excluded {
             let member = problem.members.get_mut(*index)?;
-            (member.shares, member.barred) = (false, true);
+            (member.contributes, member.excluded) = (false, true);
         }
         let fitted = fitted(&mut problem, steps, config)?;
         let smoothed = fitted.smoothed(&problem, steps);
-        let Fitted { covariance, refined, resting } = fitted;
+        let Fitted { covariance, refined, prior_sensitivity } = fitted;
         let refinements = refined.as_ref().map(|(refinements, _)| refinements);
         let thermal =
             thermal_model::thermal_model(&problem, &covariance, &smoothed, refinements, steps, config);
-        Some(Attempt { problem, covariance, smoothed, thermal, resting, left_out: None })
+        Some(Attempt { problem, covariance, smoothed, thermal, prior_sensitivity, left_out: None })
     }
 
     /// The fit without the region of the map that disagrees most, if any.
@@ -227,7 +227,7 @@ struct Fitted {
     /// `None` without parameters with a prior to search for.
     refined: Option<(Refinements, Gain)>,
     /// Dependence of the efficiencies on the declaration, fraction.
-    resting: f64,
+    prior_sensitivity: f64,
 }
 
 /// Fits, estimates noise and spreads from the fit, excludes steps that fit far worse, fits again, and evaluates the parameters with a prior.
@@ -251,11 +251,11 @@ impl Fitted {
         let open = problem.clone();
         let refinements = fit::refinements::settle(problem)?;
         let (covariance, gain) = covariance(problem, refinements.as_ref(), inlet_sigma)?;
-        let resting = match &refinements {
-            Some(found) => fit::refinements::resting_on_declaration(&open, Some(found))?,
+        let prior_sensitivity = match &refinements {
+            Some(found) => fit::refinements::prior_sensitivity(&open, Some(found))?,
             None => 0.0,
         };
-        Some(Fitted { covariance, refined: refinements.zip(gain), resting })
+        Some(Fitted { covariance, refined: refinements.zip(gain), prior_sensitivity })
     }
 
     /// The numbers of all points of the problem, with their errors.

@@ -5,8 +5,8 @@ use crate::joint::fit::refinements::Refinements;
 use crate::joint::fit::solve::{Covariance, Problem};
 use crate::joint::judge;
 use crate::joint::step_model::parameters::{
-    ALPHA, EXPONENT, LN_AREA, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, OFFSET_CHANNELS, OFFSETS,
-    PROBE_MM2, SURFACE, symbol,
+    ALPHA, EXPONENT, LN_AREA, LN_COEFFICIENT, LN_DEVIATION, LN_HEATING_COOLING_RATIO, OFFSET_CHANNELS,
+    OFFSETS, PROBE_MM2, SURFACE, symbol,
 };
 use crate::joint::step_model::rows::StepRows;
 use crate::joint::uncertainty::quantity::is_offset;
@@ -73,7 +73,7 @@ pub(crate) fn thermal_model(
         alpha_area_ratio: of(ALPHA, &|x| x),
         inlet: problem.inlet,
         probe_diameter_m: probe(problem, covariance),
-        direction_factor: of(LN_DIRECTION, &f64::exp),
+        heating_cooling_ratio: of(LN_HEATING_COOLING_RATIO, &f64::exp),
         offsets: OFFSET_CHANNELS
             .iter()
             .enumerate()

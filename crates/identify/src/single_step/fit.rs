@@ -1,4 +1,4 @@
-//! The two-parameter fit: efficiency and heat-transfer coefficient, constant over the window, by least squares on T2
+//! The dynamic fit (Burke et al.): efficiency and heat-transfer coefficient, constant over the window, by least squares on T2
 //! with eqs. 1-3 of the paper and the measured T1, Tc, flow and pressure ratio, read through the declared probe.
 
 use crate::IdentifyConfig;

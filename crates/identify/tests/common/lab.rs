@@ -38,7 +38,7 @@ pub struct Machine {
     pub alpha: f64,
     pub probe_m: f64,
     /// Factor on h if the metal is hotter than the gas.
-    pub direction: f64,
+    pub heating_cooling_ratio: f64,
     /// The law of h before the wheel.
     pub inlet: InletConvection,
     /// Water per dry air, kg/kg.
@@ -103,7 +103,7 @@ impl Default for Machine {
         Machine {
             alpha: 0.0,
             probe_m: 0.0,
-            direction: 1.0,
+            heating_cooling_ratio: 1.0,
             inlet: InletConvection::Shared,
             humidity_kg_kg: 0.0,
             scales: [1.0; 4],
@@ -202,7 +202,7 @@ pub fn campaign(points: &[(f64, f64)], dwell_s: f64, machine: Machine) -> Campai
                         h_w_m2k: outputs.h_w_m2k,
                         speed_rpm: state.shaft_speed_rpm(),
                     };
-                    let t2_k = if machine.direction == 1.0 {
+                    let t2_k = if machine.heating_cooling_ratio == 1.0 {
                         outputs.t2_probe_k
                     } else {
                         directional(machine, &boundary, state.tc_k, outputs)
@@ -257,7 +257,7 @@ fn directional(
     let rise = isentropic_rise_ratio(outputs.pressure_ratio, boundary.t1_k, Air::PAPER);
     let bulk_k = boundary.t1_k * (1.0 + rise / outputs.efficiency);
     let area_m2 = 29e-3;
-    let factor = |hotter: bool| if hotter { machine.direction } else { 1.0 };
+    let factor = |hotter: bool| if hotter { machine.heating_cooling_ratio } else { 1.0 };
     let before_m2 = machine.alpha * area_m2 * factor(tc_k > boundary.t1_k);
     let pass = |after_m2: f64| {
         let inputs = CompressionInputs {

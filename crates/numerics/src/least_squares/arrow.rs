@@ -16,7 +16,7 @@ pub struct ArrowBlock<const L: usize> {
     /// Right-hand side.
     pub right: SVector<f64, L>,
     /// Whether the group contributes to the estimate of the shared parameters.
-    pub shares: bool,
+    pub contributes: bool,
 }
 
 /// The normal equations of all parameters.
@@ -56,7 +56,7 @@ impl<const L: usize> Arrow<L> {
                 own[(i, i)] *= 1.0 + damping;
             }
             let inverse = own.cholesky()?.inverse();
-            if block.shares {
+            if block.contributes {
                 let eliminated = block.mixed.transpose() * inverse;
                 matrix -= &eliminated * &block.mixed;
                 right -= &eliminated * block.right;
@@ -108,7 +108,7 @@ mod tests {
                 own: normal.fixed_view::<2, 2>(3 + 2 * group, 3 + 2 * group).into_owned(),
                 mixed: normal.fixed_rows::<2>(3 + 2 * group).columns(0, 3).into_owned(),
                 right: right.fixed_rows::<2>(3 + 2 * group).into_owned(),
-                shares: true,
+                contributes: true,
             })
             .collect();
         let arrow = Arrow {
@@ -145,7 +145,7 @@ mod tests {
     fn a_group_without_a_say_only_follows() {
         let (mut arrow, ..) = example();
         let without = Arrow { blocks: arrow.blocks[..2].to_vec(), ..arrow.clone() };
-        arrow.blocks[2].shares = false;
+        arrow.blocks[2].contributes = false;
         let ((shared, own), (expected, _)) = (arrow.step(0.0).unwrap(), without.step(0.0).unwrap());
         assert_eq!(shared, expected);
         let last = &arrow.blocks[2];

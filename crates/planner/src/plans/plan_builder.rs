@@ -51,7 +51,7 @@ pub(crate) fn compute_figures(
         worst_sigma_eta: largest(&mut measured_steps(steps).filter_map(|predicted| predicted.sigma_eta)),
         rms_error_eta: rms_error_eta(steps),
         rms_error_reported_eta: parameter_error.map(|parameter_error| parameter_error.reported_eta),
-        resting_eta: parameter_error.map(|parameter_error| parameter_error.eta),
+        prior_sensitivity_eta: parameter_error.map(|parameter_error| parameter_error.eta),
         worst_error_eta: largest(&mut measured_steps(steps).filter_map(error_eta)),
         minutes,
     }
@@ -417,7 +417,7 @@ impl<'a> PlanBuilder<'a> {
         if let Some(ParameterError { eta, max_eta, .. }) =
             draft.parameter_error.filter(|parameter_error| parameter_error.eta > parameter_error.max_eta)
         {
-            remarks.push(PlanRemark::RestsOnDeclaration { eta_error: eta, max_eta_error: max_eta });
+            remarks.push(PlanRemark::PriorDominated { eta_error: eta, max_eta_error: max_eta });
         }
         if let (Dwell::RequiredSigmaEta(required), Some(found)) = (request.timing.dwell, rms_error_eta(steps))
             && found > required

@@ -86,7 +86,7 @@ impl ThermalExport<'_> {
         shared("nusselt_exponent", "1", law.map(|l| &l.exponent), compressor.nusselt_exponent);
         shared("alpha_area", "1", self.found.map(|f| &f.alpha_area_ratio), compressor.alpha_area_ratio);
         shared("t2_probe_diameter", "m", self.found.map(|f| &f.probe_diameter_m), params.t2_probe_diameter_m);
-        shared("direction_factor", "1", self.found.map(|f| &f.direction_factor), 1.0);
+        shared("heating_cooling_ratio", "1", self.found.map(|f| &f.heating_cooling_ratio), 1.0);
         if let Some(inlet) = self.found.and_then(|identified| identified.inlet) {
             let _ =
                 writeln!(text, "inlet_diameter {} m # declared\n# {}", inlet.diameter_m, inlet_text(&inlet));

@@ -36,7 +36,7 @@ pub fn thermal_text(thermal: &ThermalModel) -> String {
     }
     line("alpha_A", &thermal.alpha_area_ratio, 1.0, "", 3);
     line("T2 probe diameter", &thermal.probe_diameter_m, 1e3, "mm", 2);
-    line("heating/cooling ratio of h", &thermal.direction_factor, 1.0, "", 3);
+    line("heating/cooling ratio of h", &thermal.heating_cooling_ratio, 1.0, "", 3);
     for (channel, offset) in &thermal.offsets {
         let decimals = if channel.unit() == "Pa" { 0 } else { 2 };
         line(&format!("offset of {channel}"), offset, 1.0, channel.unit(), decimals);
@@ -127,7 +127,7 @@ mod tests {
             alpha_area_ratio: unknown,
             inlet: None,
             probe_diameter_m: SharedValue::assumed(0.0),
-            direction_factor: SharedValue::assumed(1.0),
+            heating_cooling_ratio: SharedValue::assumed(1.0),
             offsets: std::collections::BTreeMap::new(),
             entangled: vec![CorrelatedPair {
                 first: "alpha_A".to_owned(),

@@ -20,7 +20,7 @@ pub(crate) fn recommended_actions(report: &RunReport<'_>) -> Vec<String> {
     if !report.origin.is_complete() {
         actions.push(report.origin.sentence());
     }
-    if let Some(text) = disagreement_text(report.points, report.two_parameter, &report.display()) {
+    if let Some(text) = disagreement_text(report.points, report.dynamic, &report.display()) {
         actions.push(text.trim_end().to_owned());
     }
     if let (ZeroOutcome::Refused(_), Some(sentence)) = (report.zero, zero_words(report.zero)) {

@@ -4,7 +4,7 @@ use crate::page::run_page::RunPage;
 use crate::{Display, at_end, step_name, verdict_word, warning_text};
 use mapper_campaign::units::Kind;
 use mapper_core::{Channel, IdentifiedPoint, half_width_95, standard_error_of};
-use mapper_identify::TwoParameter;
+use mapper_identify::DynamicEfficiency;
 use serde::Serialize;
 
 /// Channels whose readings are shown with a point.
@@ -43,7 +43,7 @@ pub(crate) struct DrawnPoint {
     h: Option<f64>,
     h_low: Option<f64>,
     h_high: Option<f64>,
-    /// Result of the two-parameter method.
+    /// Result of the dynamic method.
     dynamic: Option<[f64; 3]>,
     valve: Option<f64>,
     verdict: &'static str,
@@ -64,18 +64,18 @@ pub(crate) fn drawn_points(page: &RunPage<'_>, display: &Display) -> Vec<DrawnPo
     points
         .map(|point| {
             let rounded = line_of(point.step).unwrap_or(point.speed_corrected_rpm);
-            let two = page.report.two_parameter.iter().find(|two| two.step == point.step);
+            let two = page.report.dynamic.iter().find(|two| two.step == point.step);
             let drawn = drawn_point(point, display.line_name(rounded), two, display);
             DrawnPoint { raw: raw(page, point.step, display), ..drawn }
         })
         .collect()
 }
 
-/// A point on a line; `two`: its result by the two-parameter method.
+/// A point on a line; `two`: its result by the dynamic method.
 pub(crate) fn drawn_point(
     point: &IdentifiedPoint,
     line: String,
-    two: Option<&TwoParameter>,
+    two: Option<&DynamicEfficiency>,
     display: &Display,
 ) -> DrawnPoint {
     let percent = |value: Option<f64>| value.map(|value| 100.0 * value);

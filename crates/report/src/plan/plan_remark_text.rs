@@ -38,8 +38,8 @@ pub fn plan_remark_text(remark: &PlanRemark) -> String {
             format!("no jump leads to the first point, {}: it has no transient to identify", place(point))
         }
         PlanRemark::NoWayBack => "a limit forbids the way back to the first point at the end".to_owned(),
-        PlanRemark::RestsOnDeclaration { eta_error, max_eta_error } => format!(
-            "no expected error is stated, and the points will be doubtful (`rests_on_declaration`): these steps determine the efficiencies \
+        PlanRemark::PriorDominated { eta_error, max_eta_error } => format!(
+            "no expected error is stated, and the points will be doubtful (`prior_dominated`): these steps determine the efficiencies \
              only to {:.1} points if alpha_A, probe and heating/cooling ratio have to be found, and {:.2} are needed; lengthen the \
              dwell, add points, or set known ones to `fixed` in `identification.joint`",
             100.0 * eta_error,

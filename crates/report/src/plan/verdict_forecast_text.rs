@@ -49,11 +49,11 @@ fn near_limit_text(forecast: &VerdictForecast) -> String {
     let steps = "these steps determine alpha_A, probe and heating/cooling ratio a little";
     let text = match forecast.good {
         0 => format!(
-            "Near a limit: if {steps} better than forecast, up to {} points are good; otherwise all are doubtful (`rests_on_declaration`).",
+            "Near a limit: if {steps} better than forecast, up to {} points are good; otherwise all are doubtful (`prior_dominated`).",
             forecast.good_high
         ),
         _ => format!(
-            "Near a limit: if {steps} worse than forecast, all points are doubtful (`rests_on_declaration`)."
+            "Near a limit: if {steps} worse than forecast, all points are doubtful (`prior_dominated`)."
         ),
     };
     wrapped(&text, COLUMNS, 2)

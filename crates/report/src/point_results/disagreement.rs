@@ -1,17 +1,17 @@
-//! Disagreement of the joint and the two-parameter method: the most important warning for a reader.
+//! Disagreement of the joint and the dynamic method: the most important warning for a reader.
 
 use crate::formatting::display::Display;
 use mapper_core::{IdentifiedPoint, step_number};
-use mapper_identify::TwoParameter;
+use mapper_identify::DynamicEfficiency;
 use mapper_recording::score::ScoredPoint;
 
 /// One sentence on the points whose 95 % intervals by both methods do not overlap; `None` if all overlap.
 pub fn disagreement_text(
     points: &[ScoredPoint],
-    two_parameter: &[TwoParameter],
+    dynamic: &[DynamicEfficiency],
     display: &Display,
 ) -> Option<String> {
-    let pairs = two_parameter.iter().filter_map(|other| {
+    let pairs = dynamic.iter().filter_map(|other| {
         let point = points.iter().map(|scored| &scored.point).find(|point| point.step == other.step)?;
         Some((point, other, distance(point, other)?))
     });
@@ -34,11 +34,11 @@ pub fn disagreement_text(
     ))
 }
 
-fn distance(point: &IdentifiedPoint, other: &TwoParameter) -> Option<f64> {
+fn distance(point: &IdentifiedPoint, other: &DynamicEfficiency) -> Option<f64> {
     Some((point.eta? - other.eta).abs())
 }
 
-fn are_disjoint(point: &IdentifiedPoint, other: &TwoParameter) -> bool {
+fn are_disjoint(point: &IdentifiedPoint, other: &DynamicEfficiency) -> bool {
     let (Some(low), Some(high)) = (point.eta_low, point.eta_high) else { return false };
     other.eta_high < low || high < other.eta_low
 }

@@ -1,6 +1,6 @@
 //! The end of a run, or the origin of its points, as a sentence.
 
-use mapper_core::{Method, RunEnding};
+use mapper_core::{Method, RunEnding, Trip};
 
 /// Where the points of a report come from.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,7 +32,7 @@ pub fn ending_sentence(ending: &RunEnding) -> String {
         RunEnding::Completed => return "Completed.".to_owned(),
         RunEnding::Drifted { reason } => format!("({reason})"),
         RunEnding::Interrupted { t_s } => format!("by the operator at {t_s:.0} s"),
-        RunEnding::Tripped { t_s, reason } => format!("by a guard at {t_s:.1} s ({reason})"),
+        RunEnding::Tripped(Trip { t_s, reason, .. }) => format!("by a guard at {t_s:.1} s ({reason})"),
         // A script's error shows its source line below the first line.
         RunEnding::Failed { reason } => {
             format!("by a fault ({})", reason.lines().next().unwrap_or_default())

@@ -29,7 +29,7 @@ use mapper_core::{
     Recording, ReferenceState, ResultRemark, terminal_text,
 };
 use mapper_diagnose::gap::PointCorrection;
-use mapper_identify::{TwoParameter, ZeroOutcome};
+use mapper_identify::{DynamicEfficiency, ZeroOutcome};
 use mapper_maps::RepeatedJump;
 use mapper_observe::FusedChannel;
 use mapper_observe::energy_balance::Gases;
@@ -75,8 +75,8 @@ pub struct RunReport<'a> {
     pub points: &'a [ScoredPoint],
     /// Jumps that were made more than once.
     pub repeats: &'a [RepeatedJump],
-    /// Results of the two-parameter method for the same steps, if another method was used.
-    pub two_parameter: &'a [TwoParameter],
+    /// Results of the dynamic method for the same steps, if another method was used.
+    pub dynamic: &'a [DynamicEfficiency],
     /// Result of the isothermal zero.
     pub zero: &'a ZeroOutcome,
     /// Result for channels with several sensors.
@@ -144,7 +144,7 @@ fn markdown_report(report: &RunReport<'_>) -> String {
         events,
         points,
         repeats,
-        two_parameter,
+        dynamic,
         sensors,
         score,
         surge,
@@ -155,7 +155,7 @@ fn markdown_report(report: &RunReport<'_>) -> String {
     let display = report.display();
     // Writing to a String cannot fail, here and below.
     let mut text = format!("# Compressor map of {machine}\n\n{}\n", facts(&cover_facts(report)));
-    if let Some(disagreement) = disagreement_text(points, two_parameter, &display) {
+    if let Some(disagreement) = disagreement_text(points, dynamic, &display) {
         let _ = writeln!(text, "**{}**\n", disagreement.trim_end());
     }
     let verdict = verdict_sentence(report.identified());

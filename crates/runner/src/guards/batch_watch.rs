@@ -1,7 +1,7 @@
 //! The guard for the sample stream itself: lost, repeated, disordered or impossible samples.
 
-use crate::guards::guard::{CommandedState, Guard, Trip};
-use mapper_core::{GuardName, Reaction, SampleBatch};
+use crate::guards::guard::{CommandedState, Guard};
+use mapper_core::{GuardName, Reaction, SampleBatch, Trip};
 
 /// How far a sample may lie beyond the requested time, s: the clocks of rig and program differ.
 const MAX_AHEAD_S: f64 = 1.0;

@@ -1,19 +1,6 @@
 //! Guards end a step or a run before damage occurs. Each guard is an object outside the runner, not an `if` inside it.
 
-use mapper_core::{GuardName, OperatingPoint, Reaction, SampleBatch};
-
-/// The report of a guard.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Trip {
-    /// Run time, s.
-    pub t_s: f64,
-    /// The guard that tripped.
-    pub guard: GuardName,
-    /// The required reaction.
-    pub reaction: Reaction,
-    /// One sentence with values and units.
-    pub reason: String,
-}
+use mapper_core::{OperatingPoint, SampleBatch, Trip};
 
 /// The commanded state of the rig, as far as guards need it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

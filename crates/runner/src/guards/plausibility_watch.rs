@@ -21,11 +21,11 @@
 //! turbocharger (1 l) rises by up to 20 MPa/s. Flow in a pipe of 0.5 m changes by 200 kg/s2 at 100 kPa. A power of 30 kW accelerates the
 //! shaft (16e-6 kg m2) at 95 krpm by 1.8 Mrpm/s. At 10 Hz, each of these exceeds the measuring range within one sample.
 
-use crate::guards::guard::{CommandedState, Trip};
+use crate::guards::guard::CommandedState;
 use crate::guards::recent_minimum::RecentMinimum;
 use crate::guards::start_check::REQUIRED_CHANNELS;
 use mapper_core::{
-    Channel, Dimension, Element, GuardName, Provenance, Quality, Reaction, SampleBatch, measurable,
+    Channel, Dimension, Element, GuardName, Provenance, Quality, Reaction, SampleBatch, Trip, measurable,
     plausible, readable,
 };
 use std::collections::BTreeMap;

@@ -1,7 +1,7 @@
 //! The guard for the rig itself: a reported trip, or a shaft that is no longer driven.
 
-use crate::guards::guard::{CommandedState, Guard, Trip};
-use mapper_core::{Channel, EventKind, GuardName, Reaction, SampleBatch};
+use crate::guards::guard::{CommandedState, Guard};
+use mapper_core::{Channel, EventKind, GuardName, Reaction, SampleBatch, Trip};
 
 /// Time after the start of a step in which the shaft may accelerate, s.
 const START_UP_S: f64 = 30.0;

@@ -1,9 +1,9 @@
 //! The guard for one channel: value, rate of change, age, quality, and a frozen reading.
 
 use crate::guards::frozen_reading::FrozenReading;
-use crate::guards::guard::{CommandedState, Guard, Trip};
+use crate::guards::guard::{CommandedState, Guard};
 use crate::guards::plausibility_watch::is_possible;
-use mapper_core::{Quality, Reaction, SampleBatch, SignalGuard, readable};
+use mapper_core::{Quality, Reaction, SampleBatch, SignalGuard, Trip, readable};
 use std::collections::VecDeque;
 
 /// A continuing violation trips again after this time, s.

@@ -1,8 +1,8 @@
 //! The guard for channels that no other guard checks, of the rig and of auxiliary instruments: it reports a channel that falls silent or freezes.
 
 use crate::guards::frozen_reading::FrozenReading;
-use crate::guards::guard::{CommandedState, Guard, Trip};
-use mapper_core::{Channel, FrozenLimit, GuardName, Quality, Reaction, SampleBatch};
+use crate::guards::guard::{CommandedState, Guard};
+use mapper_core::{Channel, FrozenLimit, GuardName, Quality, Reaction, SampleBatch, Trip};
 
 /// A channel without a guard of its own.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,7 +1,6 @@
 //! Compares the mean speed at the end of a step with its target.
 
-use crate::guards::guard::Trip;
-use mapper_core::{Channel, GuardName, PlanStep, SampleBatch, SpeedBand, StepKind};
+use mapper_core::{Channel, GuardName, PlanStep, SampleBatch, SpeedBand, StepKind, Trip};
 use std::collections::VecDeque;
 
 /// Duration over which the speed is averaged, s. Steps shorter than three times this are not checked.

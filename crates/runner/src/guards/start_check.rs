@@ -1,7 +1,7 @@
 //! Checks the first seconds of a run, before the machine is driven far: every channel alive, in range, and on time.
 
-use crate::guards::guard::{CommandedState, Guard, Trip};
-use mapper_core::{Channel, GuardName, Reaction, SampleBatch, measurable, with_unit};
+use crate::guards::guard::{CommandedState, Guard};
+use mapper_core::{Channel, GuardName, Reaction, SampleBatch, Trip, measurable, with_unit};
 
 /// Duration of the check, s.
 const CHECK_DURATION_S: f64 = 5.0;

@@ -4,8 +4,8 @@
 //! at 10 Hz folds both into noise of the same size. The guard uses the median size of the second difference of three samples:
 //! it is insensitive to level and slope, and a jump of the operating point affects only a few of these differences.
 
-use crate::guards::guard::{CommandedState, Guard, Trip};
-use mapper_core::{Channel, GuardName, SAMPLE_INTERVAL_S, SampleBatch, SurgeVariation};
+use crate::guards::guard::{CommandedState, Guard};
+use mapper_core::{Channel, GuardName, SAMPLE_INTERVAL_S, SampleBatch, SurgeVariation, Trip};
 use mapper_numerics::statistics::median;
 use std::collections::VecDeque;
 

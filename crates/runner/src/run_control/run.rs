@@ -1,6 +1,6 @@
 //! The run itself: soak, warm-up, steps, cool-down.
 
-use crate::guards::guard::{ActiveGuards, CommandedState, Guard, Trip};
+use crate::guards::guard::{ActiveGuards, CommandedState, Guard};
 use crate::guards::plausibility_watch::PlausibilityWatch;
 use crate::guards::speed_history::SpeedHistory;
 use crate::run_control::observer::{ObserverError, RunObserver};
@@ -10,8 +10,8 @@ use crate::run_control::run_error::RunError;
 use crate::run_control::speed_control::SpeedControl;
 use crate::step_sources::step_source::StepSource;
 use mapper_core::{
-    Backend, BackendError, Clock, Event, EventKind, GuardName, PlanStep, Reaction, RigMode, SampleBatch,
-    Setpoints, Soak, StepMarker,
+    Backend, BackendError, Clock, Event, EventKind, GuardName, PlanStep, Reaction, RigMode, RunEnding,
+    SampleBatch, Setpoints, Soak, StepMarker, Trip,
 };
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::AtomicBool;
@@ -29,20 +29,6 @@ const APPROACH_STAGES: u32 = 4;
 const APPROACH_STAGE_S: f64 = 10.0;
 /// Maximum number of consecutive steps that guards may skip; one more ends the run.
 const MAX_SKIPPED_STEPS: u32 = 3;
-
-/// How a run ended, if the program did not fail.
-#[derive(Debug, Clone, PartialEq)]
-pub enum RunEnd {
-    /// Every step was run.
-    Completed,
-    /// The operator stopped it; the rig is safe.
-    Interrupted {
-        /// Run time, s.
-        t_s: f64,
-    },
-    /// A guard tripped; the rig is safe.
-    Tripped(Trip),
-}
 
 /// Step source, rig and everything else that a run needs.
 pub struct Runner<'a> {
@@ -101,7 +87,7 @@ impl Runner<'_> {
     ///
     /// # Errors
     /// As [`Runner::run_under`].
-    pub fn run(self) -> Result<RunEnd, RunError> {
+    pub fn run(self) -> Result<RunEnding, RunError> {
         self.run_under(&Protection::default())
     }
 
@@ -111,7 +97,7 @@ impl Runner<'_> {
     ///
     /// # Errors
     /// [`RunError`] if the rig or an observer failed.
-    pub fn run_under(mut self, protection: &Protection<'_>) -> Result<RunEnd, RunError> {
+    pub fn run_under(mut self, protection: &Protection<'_>) -> Result<RunEnding, RunError> {
         let answered = self.arm(protection)?;
         let sample_s = 1.0 / self.backend.describe().sample_rate_hz;
         let mut run = Run {
@@ -131,7 +117,7 @@ impl Runner<'_> {
         let end = match catch_unwind(AssertUnwindSafe(|| {
             answered.map_err(Halt::from).and_then(|()| run.execute())
         })) {
-            Ok(Ok(())) => Ok(RunEnd::Completed),
+            Ok(Ok(())) => Ok(RunEnding::Completed),
             Ok(Err(halt)) => run.shut_down(halt),
             Err(panic) => run.shut_down(Halt::Failed(RunError::Panicked { message: panic_message(&*panic) })),
         };

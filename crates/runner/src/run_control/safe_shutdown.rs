@@ -2,9 +2,9 @@
 
 use crate::guards::guard::CommandedState;
 use crate::run_control::protection::Protection;
-use crate::run_control::run::{Halt, Run, RunEnd, panic_message};
+use crate::run_control::run::{Halt, Run, panic_message};
 use crate::run_control::run_error::RunError;
-use mapper_core::{BackendError, Event, EventKind, GuardName, SampleBatch, Setpoints};
+use mapper_core::{BackendError, Event, EventKind, GuardName, RunEnding, SampleBatch, Setpoints};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Time between two setpoints of the run-down, s.
@@ -30,25 +30,25 @@ pub(crate) fn catch_panic(report: impl FnOnce() -> Result<(), RunError>) -> Resu
 
 impl Run<'_, '_> {
     /// Makes the rig safe, then reports the reason. It cannot be interrupted and takes a bounded time.
-    pub(crate) fn shut_down(&mut self, halt: Halt) -> Result<RunEnd, RunError> {
+    pub(crate) fn shut_down(&mut self, halt: Halt) -> Result<RunEnding, RunError> {
         // The first command is sent before anything is written: a disk may be slow.
         let start = self.begin_run_down();
         // A step that missed its speed does not count, whatever its duration.
         let step_counts = !matches!(&halt, Halt::Tripped(trip, _) if trip.guard == GuardName::Speed);
         let (end, kind, message, unreported) = match halt {
             Halt::Interrupted => (
-                Ok(RunEnd::Interrupted { t_s: self.now_s }),
+                Ok(RunEnding::Interrupted { t_s: self.now_s }),
                 EventKind::Interrupted,
                 "stopped by the operator".to_owned(),
                 None,
             ),
             Halt::Tripped(trip, unreported) => {
                 let reason = trip.reason.clone();
-                (Ok(RunEnd::Tripped(trip)), EventKind::GuardTripped, reason, unreported)
+                (Ok(RunEnding::Tripped(trip)), EventKind::GuardTripped, reason, unreported)
             }
             Halt::Cut(trip) => {
                 let reason = trip.reason.clone();
-                (Ok(RunEnd::Tripped(trip)), EventKind::GuardTripped, reason, None)
+                (Ok(RunEnding::Tripped(trip)), EventKind::GuardTripped, reason, None)
             }
             Halt::Failed(error) => {
                 let message = error.to_string();

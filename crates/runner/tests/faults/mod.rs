@@ -10,11 +10,11 @@ use faulty_driver::faulty_backend::{Fault, FaultyBackend};
 use faulty_driver::{FAULT_S, lab};
 use mapper_backends::virtual_lab::VirtualLab;
 use mapper_core::{
-    Backend, Channel, EventKind, FrozenLimit, GuardName, GuardSet, Plan, Reaction, SafeTrajectory,
+    Backend, Channel, EventKind, FrozenLimit, GuardName, GuardSet, Plan, Reaction, RunEnding, SafeTrajectory,
     SignalGuard, SpeedBand, SurgeVariation, UnpacedClock,
 };
 use mapper_runner::{
-    BatchWatch, Guard, PlanSteps, Protection, ReadingBounds, RigWatch, RunEnd, RunError, Runner, SignalWatch,
+    BatchWatch, Guard, PlanSteps, Protection, ReadingBounds, RigWatch, RunError, Runner, SignalWatch,
     SilenceWatch, SurgeWatch, UnguardedChannel,
 };
 use std::sync::atomic::AtomicBool;
@@ -73,7 +73,7 @@ fn readings() -> ReadingBounds {
 }
 
 struct FaultRun {
-    end: Result<RunEnd, RunError>,
+    end: Result<RunEnding, RunError>,
     notebook: Notebook,
     rig: FaultyBackend<VirtualLab>,
 }
@@ -84,7 +84,7 @@ fn run_with_faults(faults: &[(f64, Fault)], set: &GuardSet) -> FaultRun {
     FaultRun { end, notebook, rig }
 }
 
-fn run_on(rig: &mut dyn Backend, set: &GuardSet) -> (Result<RunEnd, RunError>, Notebook) {
+fn run_on(rig: &mut dyn Backend, set: &GuardSet) -> (Result<RunEnding, RunError>, Notebook) {
     let plan = plan_of_minutes();
     let mut notebook = Notebook::default();
     let mut guards: Vec<Box<dyn Guard>> =
@@ -120,7 +120,7 @@ fn run_on(rig: &mut dyn Backend, set: &GuardSet) -> (Result<RunEnd, RunError>, N
 #[test]
 fn without_a_fault_no_guard_trips() {
     let run = run_with_faults(&[], &default_guards());
-    assert_eq!(run.end.unwrap(), RunEnd::Completed);
+    assert_eq!(run.end.unwrap(), RunEnding::Completed);
     assert_eq!(run.notebook.events, []);
     assert!(run.notebook.bad.is_empty(), "{:?}", run.notebook.bad);
     assert_eq!(run.rig.safe_at_s, [130.0], "made safe once, at its end");
@@ -153,7 +153,7 @@ fn every_fault_of_a_rig_ends_the_run_in_the_safe_state() {
         let begin_s = if fault == Fault::Ignores { 60.0 } else { FAULT_S };
         let run = run_with_faults(&[(begin_s, fault.clone())], &default_guards());
         let end = run.end.unwrap_or_else(|error| panic!("{fault:?}: {error}"));
-        let RunEnd::Tripped(trip) = end else { panic!("{fault:?}: {end:?}") };
+        let RunEnding::Tripped(trip) = end else { panic!("{fault:?}: {end:?}") };
         assert!(trip.reason.contains(words), "{fault:?}: {}", trip.reason);
         // A fault affects the whole batch of its second.
         assert!((begin_s - 1.0..=at_most_s).contains(&trip.t_s), "{fault:?}: at {} s", trip.t_s);
@@ -190,7 +190,7 @@ fn readings_that_contradict_physics_end_the_run() {
     ] {
         let run = run_with_faults(&[(FAULT_S + 20.0, fault.clone())], &default_guards());
         let end = run.end.unwrap_or_else(|error| panic!("{fault:?}: {error}"));
-        let RunEnd::Tripped(trip) = end else { panic!("{fault:?}: {end:?}") };
+        let RunEnding::Tripped(trip) = end else { panic!("{fault:?}: {end:?}") };
         assert_eq!((trip.guard, trip.reaction), (GuardName::Signals, Reaction::Safe), "{fault:?}");
         // A fault affects the whole batch of its second; what follows the shaft late, and backflow of surge, may last two seconds more.
         let begin_s = FAULT_S + 20.0;
@@ -208,7 +208,7 @@ fn readings_that_contradict_physics_end_the_run() {
     // A turbine-side channel that nothing depends on is noted, and the run goes on.
     for fault in [Fault::Shifted(Tt, 300.0), Fault::Reads(T4, 100.0)] {
         let run = run_with_faults(&[(FAULT_S + 20.0, fault.clone())], &default_guards());
-        assert_eq!(run.end.unwrap(), RunEnd::Completed, "{fault:?}");
+        assert_eq!(run.end.unwrap(), RunEnding::Completed, "{fault:?}");
         assert_eq!(run.notebook.events, [EventKind::GuardActed], "{fault:?}");
     }
 }
@@ -225,7 +225,7 @@ fn a_frozen_sensor_is_detected_after_the_next_jump() {
     ] {
         let guards = GuardSet { frozen_flow: Some(FROZEN), ..default_guards() };
         let run = run_with_faults(&[(40.0, Fault::Frozen(channel))], &guards);
-        let RunEnd::Tripped(trip) = run.end.unwrap() else { panic!("{channel}") };
+        let RunEnding::Tripped(trip) = run.end.unwrap() else { panic!("{channel}") };
         let is_late = at_s.start == 90.0;
         assert_eq!(trip.reason.contains("frozen"), is_late, "{}", trip.reason);
         assert!(trip.reason.contains(channel.symbol()), "{}", trip.reason);
@@ -237,11 +237,11 @@ fn a_frozen_sensor_is_detected_after_the_next_jump() {
 fn an_interrupted_link_loses_samples_and_a_delayed_one_does_not() {
     // The samples of that second are lost, which the sequence numbers of later ones show.
     let night_without = run_with_faults(&[(FAULT_S, Fault::Mute(1.5))], &default_guards());
-    let RunEnd::Tripped(trip) = night_without.end.unwrap() else { panic!("not seen") };
+    let RunEnding::Tripped(trip) = night_without.end.unwrap() else { panic!("not seen") };
     assert!(trip.reason.contains("samples were lost"), "{}", trip.reason);
     // Samples that are only delayed are not lost.
     let held = run_with_faults(&[(FAULT_S, Fault::Late(1.5))], &default_guards());
-    assert_eq!(held.end.unwrap(), RunEnd::Completed);
+    assert_eq!(held.end.unwrap(), RunEnding::Completed);
     assert_eq!(held.notebook.samples.len(), 1351);
 }
 
@@ -269,7 +269,7 @@ fn refused_setpoints_and_a_panic_end_safe_and_a_lost_rig_is_reported_as_unknown(
 fn the_safe_state_is_retried_and_then_its_failure_is_reported() {
     let nan = (FAULT_S, Fault::Nan(Channel::T2));
     let twice = run_with_faults(&[nan.clone(), (0.0, Fault::NotSafe(2))], &default_guards());
-    assert!(matches!(twice.end, Ok(RunEnd::Tripped(_))));
+    assert!(matches!(twice.end, Ok(RunEnding::Tripped(_))));
     assert_eq!(twice.rig.safe_at_s.len(), 1);
     let never = run_with_faults(&[nan, (0.0, Fault::NotSafe(usize::MAX))], &default_guards());
     let error = never.end.unwrap_err();
@@ -280,7 +280,7 @@ fn the_safe_state_is_retried_and_then_its_failure_is_reported() {
 /// A clock that advances only during waits and slow disk writes.
 struct WaitClock(std::cell::Cell<f64>);
 
-impl mapper_core::Wall for &WaitClock {
+impl mapper_core::WallClock for &WaitClock {
     fn now_s(&self) -> f64 {
         self.0.get()
     }
@@ -308,7 +308,7 @@ impl mapper_runner::RunObserver for SlowDisk<'_> {
 fn run_on_wall_clock(
     faults: &[(f64, Fault)],
     takes_s: f64,
-) -> (Result<RunEnd, RunError>, FaultyBackend<VirtualLab>, usize, f64) {
+) -> (Result<RunEnding, RunError>, FaultyBackend<VirtualLab>, usize, f64) {
     let (plan, wall) = (plan_of_minutes(), WaitClock(std::cell::Cell::new(0.0)));
     let mut rig = FaultyBackend::new(lab(), faults.to_vec());
     let mut disk = SlowDisk { wall: &wall, takes_s, written: 0 };
@@ -344,7 +344,7 @@ fn a_slow_disk_does_not_delay_the_first_safe_command() {
     for (takes_s, late_s) in [(0.8, 1.0), (3.0, 400.0)] {
         let faults = [(FAULT_S, Fault::Reads(Channel::T2, 600.0))];
         let (end, rig, written, wall_s) = run_on_wall_clock(&faults, takes_s);
-        let RunEnd::Tripped(trip) = end.unwrap() else { panic!("not seen") };
+        let RunEnding::Tripped(trip) = end.unwrap() else { panic!("not seen") };
         // The dwell of 0.2 s, and the next sample.
         assert!(trip.t_s - FAULT_S < 0.35, "{takes_s} s: {}", trip.t_s);
         let first = rig.commands.iter().find(|(_, sent)| sent.t3_k < 300.0).unwrap();
@@ -376,7 +376,7 @@ fn attempts_to_make_the_rig_safe_are_half_a_second_apart() {
 #[test]
 fn the_run_down_follows_the_declared_trajectory() {
     let run = run_with_faults(&[(FAULT_S, Fault::Reads(Channel::T2, 600.0))], &default_guards());
-    let RunEnd::Tripped(trip) = run.end.unwrap() else { panic!("not seen") };
+    let RunEnding::Tripped(trip) = run.end.unwrap() else { panic!("not seen") };
     let run_down: Vec<_> = run.rig.commands.iter().filter(|(_, sent)| sent.t3_k < 300.0).collect();
     let before = run.rig.commands.iter().rev().find(|(_, sent)| sent.t3_k > 300.0).unwrap().1;
     let expected = ((before.p3_pa - 110e3) / 5e3).floor() as usize;
@@ -397,7 +397,7 @@ fn of_two_guards_the_more_severe_reaction_wins() {
     set.signals[0].reaction = Reaction::Latch;
     let faults =
         [(FAULT_S, Fault::Reads(Channel::T2, 600.0)), (FAULT_S, Fault::Reads(Channel::ShaftSpeed, 2e5))];
-    let RunEnd::Tripped(trip) = run_with_faults(&faults, &set).end.unwrap() else { panic!("not seen") };
+    let RunEnding::Tripped(trip) = run_with_faults(&faults, &set).end.unwrap() else { panic!("not seen") };
     assert_eq!((trip.guard, trip.reaction), (GuardName::Overspeed, Reaction::Latch));
 }
 
@@ -411,18 +411,18 @@ fn mild_reactions_note_skip_repeat_or_hold() {
     };
     let high = [(FAULT_S + 5.0, Fault::Reads(Channel::T2, 600.0))];
     let noted = with(Reaction::Note, &high);
-    assert_eq!(noted.end.unwrap(), RunEnd::Completed);
+    assert_eq!(noted.end.unwrap(), RunEnding::Completed);
     assert!(noted.notebook.events.iter().all(|kind| *kind == EventKind::GuardActed));
     // Reported at its start, and every ten seconds while it continues.
     assert!((5..=7).contains(&noted.notebook.events.len()), "{:?}", noted.notebook.events);
     assert_eq!(noted.notebook.ends.len(), 2);
 
     let skipped = with(Reaction::SkipStep, &high);
-    assert_eq!(skipped.end.unwrap(), RunEnd::Completed);
+    assert_eq!(skipped.end.unwrap(), RunEnding::Completed);
     assert_eq!((skipped.notebook.ends.len(), skipped.notebook.abandoned.len()), (1, 1));
 
     let again = with(Reaction::SmallerSteps, &high);
-    assert_eq!(again.end.unwrap(), RunEnd::Completed);
+    assert_eq!(again.end.unwrap(), RunEnding::Completed);
     assert_eq!((again.notebook.starts.len(), again.notebook.abandoned.len()), (3, 2));
     let sent: Vec<f64> = again.rig.commands.iter().map(|(_, sent)| sent.p3_pa).collect();
     let (low_pa, high_pa) = (sent[0], sent[2]);
@@ -435,7 +435,7 @@ fn mild_reactions_note_skip_repeat_or_hold() {
     let held = with(Reaction::Hold, &high);
     assert_eq!(held.rig.held_at_s.len(), 1, "the rig gets one hold command, when the hold begins");
     assert!((FAULT_S + 5.0..FAULT_S + 7.0).contains(&held.rig.held_at_s[0]), "{:?}", held.rig.held_at_s);
-    let RunEnd::Tripped(trip) = held.end.unwrap() else { panic!("held for ever") };
+    let RunEnding::Tripped(trip) = held.end.unwrap() else { panic!("held for ever") };
     assert!(trip.reason.contains("has held the setpoints for 300 s"), "{}", trip.reason);
     assert!(trip.t_s < 130.0 + 320.0);
 }

@@ -2,9 +2,8 @@
 
 use super::faulty_driver::{ExpectedEnd, PROTOCOL_FAULTS};
 use super::{default_guards, run_on};
-use mapper_core::EventKind;
+use mapper_core::{EventKind, RunEnding};
 use mapper_driver_host::{DEFAULT_TIMEOUTS, Driver};
-use mapper_runner::RunEnd;
 
 #[test]
 fn every_fault_over_the_protocol_ends_safe_or_is_reported_as_unsafe() {
@@ -17,7 +16,7 @@ fn every_fault_over_the_protocol_ends_safe_or_is_reported_as_unsafe() {
         let (end, notebook) = run_on(&mut driver, &default_guards());
         let at = |kind| notebook.events.iter().position(|seen| *seen == kind);
         match (ends, end) {
-            (ExpectedEnd::Trips(words, at_most_s), Ok(RunEnd::Tripped(trip))) => {
+            (ExpectedEnd::Trips(words, at_most_s), Ok(RunEnding::Tripped(trip))) => {
                 assert!(trip.reason.contains(words), "{fault:?}: {}", trip.reason);
                 assert!((begin_s - 1.0..=*at_most_s).contains(&trip.t_s), "{fault:?}: at {} s", trip.t_s);
                 let (tripped, safe) = (at(EventKind::GuardTripped), at(EventKind::SafeState));

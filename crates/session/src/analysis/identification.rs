@@ -16,7 +16,7 @@ use mapper_core::{
 };
 use mapper_diagnose::gap::PointCorrection;
 use mapper_identify::{
-    FoundFault, IdentifyConfig, NominalRig, TwoParameter, ZeroOutcome, ZeroSettings, identify_recording,
+    DynamicEfficiency, FoundFault, IdentifyConfig, NominalRig, ZeroOutcome, ZeroSettings, identify_recording,
     isothermal_zero, method_for, with_measured_humidity,
 };
 use mapper_maps::{AssembleError, RepeatedJump, assemble, repeated_jumps};
@@ -53,7 +53,7 @@ pub struct Identified {
     /// Parameters common to all points (joint method).
     pub thermal: Option<ThermalModel>,
     /// Two-parameter results for the same steps (joint method).
-    pub two_parameter: Vec<TwoParameter>,
+    pub dynamic: Vec<DynamicEfficiency>,
     /// Faults of sensors or machine that are needed to explain the recording.
     #[serde(skip)]
     pub faults: Vec<FoundFault>,
@@ -97,7 +97,7 @@ impl Identified {
             "gas": self.config.air.description(),
             "points": self.points,
             "thermal": self.thermal,
-            "two_parameter": self.two_parameter,
+            "dynamic": self.dynamic,
             "faults": self.faults,
             "budgets": self.budgets,
             "zero": self.zero,
@@ -256,7 +256,7 @@ impl Session<'_> {
             config,
             points,
             thermal: identified.thermal,
-            two_parameter: identified.two_parameter,
+            dynamic: identified.dynamic,
             faults: identified.faults,
             budgets: identified.budgets,
             sensors,

@@ -365,7 +365,7 @@ fn run_report_of<'a>(
         events: &identified.recording.events,
         points: &identified.points,
         repeats,
-        two_parameter: &identified.two_parameter,
+        dynamic: &identified.dynamic,
         sensors: &identified.sensors,
         score: identified.score.as_ref(),
         surge: identified.surge.as_ref(),

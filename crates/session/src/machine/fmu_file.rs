@@ -125,7 +125,7 @@ pub(crate) fn with_identified(declared: &Params, found: &ThermalModel) -> Params
     if let Some(alpha) = found.alpha_area_ratio.value {
         compressor.alpha_area_ratio = alpha;
     }
-    if let Some(factor) = found.direction_factor.value {
+    if let Some(factor) = found.heating_cooling_ratio.value {
         compressor.hot_metal_h_ratio = factor;
     }
     if let Some(inlet) = &found.inlet {

@@ -16,7 +16,7 @@ use mapper_numerics::statistics::mean;
 use mapper_physics::simulation::model::Model;
 use mapper_recording::score::ScoredPoint;
 use mapper_recording::{ChannelMap, ReadOptions, RecordingHeader, RecordingWriter, read_recording};
-use mapper_runner::{PlanSteps, RunEnd};
+use mapper_runner::PlanSteps;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -241,9 +241,10 @@ impl NightlyRun {
     ) -> Result<Result<Recorded, String>, SessionError> {
         let recording = directory.join(run_directory::RECORDING);
         match self.record(plan, session, &recording)? {
-            RunEnd::Completed => Ok(Ok(self.read(&recording)?)),
-            RunEnd::Interrupted { .. } => Err(SessionError::Interrupted),
-            RunEnd::Tripped(trip) => Ok(Err(format!("stopped at {:.1} s: {}", trip.t_s, trip.reason))),
+            RunEnding::Completed => Ok(Ok(self.read(&recording)?)),
+            RunEnding::Interrupted { .. } => Err(SessionError::Interrupted),
+            RunEnding::Drifted { reason } | RunEnding::Failed { reason } => Ok(Err(reason)),
+            RunEnding::Tripped(trip) => Ok(Err(format!("stopped at {:.1} s: {}", trip.t_s, trip.reason))),
         }
     }
 
@@ -252,7 +253,7 @@ impl NightlyRun {
         Ok(Recorded::of(recording.to_owned(), read, Some(self.campaign.clone())))
     }
 
-    fn record(&self, plan: &Plan, session: &Session<'_>, recording: &Path) -> Result<RunEnd, SessionError> {
+    fn record(&self, plan: &Plan, session: &Session<'_>, recording: &Path) -> Result<RunEnding, SessionError> {
         let mut backend = session.registry.make_sources(&self.campaign, &self.model)?.backend;
         let header = RecordingHeader {
             library: PROGRAM.to_owned(),

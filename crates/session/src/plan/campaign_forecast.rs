@@ -12,7 +12,7 @@ use mapper_core::{
     Advice, CampaignChange, Dwell, Method, OperatingPoint, Plan, PlanStep, Soak, StepKind,
     UndeclaredForecast, VerdictForecast, WindowRule,
 };
-use mapper_identify::{MAX_RESTING_ETA, ZeroSettings};
+use mapper_identify::{MAX_PRIOR_SENSITIVITY_ETA, ZeroSettings};
 use mapper_numerics::statistics::rms;
 use mapper_physics::laws::housing::{StandstillState, relax};
 use mapper_physics::laws::thermocouple::time_constant_s;
@@ -260,7 +260,7 @@ fn information_concern(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
         Concern::warning(
             &["timing"],
             "the steps contain too little information on alpha_A, probe and heating/cooling ratio; the points will probably be doubtful \
-             (`rests_on_declaration`)"
+             (`prior_dominated`)"
                 .to_owned(),
             "lengthen the dwell, add points, or fix known parameters (`identification.joint`)".to_owned(),
         )
@@ -334,7 +334,7 @@ const DWELL_RATIOS: [f64; 6] = [1.25, 1.5, 2.0, 2.5, 3.0, 4.0];
 const SOAKS_S: [f64; 2] = [1800.0, 3600.0];
 /// Measured over forecast error that rests on the declaration: 0.9 to 1.3 in 13 of 14 campaigns of `benches/advice.py` with a dwell of 12
 /// to 18 s; a tenth is added at both ends.
-const RESTING_RATIOS: (f64, f64) = (0.8, 1.4);
+const PRIOR_SENSITIVITY_RATIOS: (f64, f64) = (0.8, 1.4);
 /// Measured over forecast standard error of the efficiencies (rms): 0.87 to 1.63 on 36 machines of `benches/first_campaign.py` (200 to 259)
 /// without alpha_A. It depends on the noise. With alpha_A it lies between this forecast and [`UndeclaredForecast`].
 const ERROR_RATIOS: (f64, f64) = (0.85, 1.65);
@@ -372,10 +372,10 @@ pub(crate) fn forecast_verdicts(campaign: &Campaign, plan: &Plan) -> Option<Verd
         let good = best.iter().filter(|(_, sigma)| *sigma <= limit).count();
         UndeclaredForecast { good, eta_standard_error }
     });
-    let resting_eta = plan.figures.resting_eta.unwrap_or(0.0);
-    let is_enough = |resting_ratio: f64| resting_ratio * resting_eta <= MAX_RESTING_ETA;
+    let prior_sensitivity_eta = plan.figures.prior_sensitivity_eta.unwrap_or(0.0);
+    let is_enough = |prior_sensitivity_ratio: f64| prior_sensitivity_ratio * prior_sensitivity_eta <= MAX_PRIOR_SENSITIVITY_ETA;
     let (low, high) =
-        (informative && is_enough(RESTING_RATIOS.1), informative || is_enough(RESTING_RATIOS.0));
+        (informative && is_enough(PRIOR_SENSITIVITY_RATIOS.1), informative || is_enough(PRIOR_SENSITIVITY_RATIOS.0));
     Some(VerdictForecast {
         points: best.len(),
         good: if informative { good(1.0) } else { 0 },

@@ -7,11 +7,11 @@ use crate::{Session, SessionError};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::{BackendChoice, SequenceSource};
 use mapper_core::{
-    Channel, GuardName, GuardSet, OperatingPoint, Plan, PlanRemark, PlanStep, SampleBatch, StepMarker,
-    VisitOrder,
+    Channel, GuardName, GuardSet, OperatingPoint, Plan, PlanRemark, PlanStep, RunEnding, SampleBatch,
+    StepMarker, VisitOrder,
 };
 use mapper_physics::simulation::model::Model;
-use mapper_runner::{ObserverError, PlanSteps, RunEnd, RunError, RunObserver, StepSource, StepSourceError};
+use mapper_runner::{ObserverError, PlanSteps, RunError, RunObserver, StepSource, StepSourceError};
 
 /// Objective recorded in the plan of a script.
 const OBJECTIVE: &str = "sequence";
@@ -51,11 +51,12 @@ pub fn rehearse(
         error => SessionError::Rehearsal(error),
     };
     match end.map_err(failed)? {
-        RunEnd::Completed => {}
-        RunEnd::Tripped(trip) => {
+        // The runner reports a failure as an error, and a rehearsal watches no drift.
+        RunEnding::Completed | RunEnding::Drifted { .. } | RunEnding::Failed { .. } => {}
+        RunEnding::Tripped(trip) => {
             return Err(SessionError::RehearsalTripped { t_s: trip.t_s, reason: trip.reason });
         }
-        RunEnd::Interrupted { .. } => return Err(SessionError::Interrupted),
+        RunEnding::Interrupted { .. } => return Err(SessionError::Interrupted),
     }
     let mut plan = steps.steps.executed(&base);
     if plan.steps.is_empty() {
@@ -79,7 +80,7 @@ impl Session<'_> {
         plan: &Plan,
     ) -> Result<Option<PlanRemark>, SessionError> {
         let (end, progress) = self.rehearse_jumps(campaign, model, plan)?;
-        let (Ok(RunEnd::Tripped(trip)), Some(to)) = (end, progress.to) else { return Ok(None) };
+        let (Ok(RunEnding::Tripped(trip)), Some(to)) = (end, progress.to) else { return Ok(None) };
         let mut highest_speed_rpm = None;
         if trip.guard == GuardName::Overspeed {
             let mut unlimited = Campaign { guards: None, ..campaign.clone() };
@@ -95,7 +96,7 @@ impl Session<'_> {
         campaign: &Campaign,
         model: &Model,
         plan: &Plan,
-    ) -> Result<(Result<RunEnd, RunError>, Progress), SessionError> {
+    ) -> Result<(Result<RunEnding, RunError>, Progress), SessionError> {
         let mut settings = serde_json::json!({});
         if campaign.backend.name == REHEARSAL_BACKEND
             && let Some(actuators) = campaign.backend.settings.get("actuators")
@@ -114,7 +115,7 @@ impl Session<'_> {
         let mut progress = Progress::default();
         let mut steps = PlanSteps::new(&jumps);
         match drive(&nominal, model, &mut steps, backend.as_mut(), &mut progress, self.stop) {
-            Ok(RunEnd::Interrupted { .. }) => Err(SessionError::Interrupted),
+            Ok(RunEnding::Interrupted { .. }) => Err(SessionError::Interrupted),
             end => Ok((end, progress)),
         }
     }

@@ -2,13 +2,13 @@
 
 use crate::rig::guards::make_guards;
 use mapper_campaign::Campaign;
-use mapper_core::{Backend, Channel, Clock, PlanStep, UnpacedClock};
+use mapper_core::{Backend, Channel, Clock, PlanStep, RunEnding, UnpacedClock};
 use mapper_physics::laws::thermocouple;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::speed_response::speed_response;
 use mapper_physics::simulation::model::Model;
 use mapper_runner::{
-    Operator, Protection, ReadingBounds, RunEnd, RunError, RunObserver, Runner, SoakSource, SpeedControl,
+    Operator, Protection, ReadingBounds, RunError, RunObserver, Runner, SoakSource, SpeedControl,
     SpeedControlLimits, StepSource, UnguardedChannel,
 };
 use std::sync::atomic::AtomicBool;
@@ -25,14 +25,14 @@ pub fn drive(
     backend: &mut dyn Backend,
     observer: &mut dyn RunObserver,
     stop: &AtomicBool,
-) -> Result<RunEnd, RunError> {
+) -> Result<RunEnding, RunError> {
     let pace = Pace {
         clock: &mut UnpacedClock,
         each_sample: false,
         stop,
         stop_after_step: &NEVER_SET,
         operator: None,
-        read: &[],
+        auxiliary_channels: &[],
     };
     drive_paced(campaign, model, steps, backend, observer, pace)
 }
@@ -52,7 +52,7 @@ pub struct Pace<'a> {
     /// Other operator requests.
     pub operator: Option<&'a Operator>,
     /// Channels of auxiliary instruments; a guard watches that their data arrive.
-    pub read: &'a [UnguardedChannel],
+    pub auxiliary_channels: &'a [UnguardedChannel],
 }
 
 /// Same as [`drive`], at a given pace.
@@ -66,9 +66,9 @@ pub fn drive_paced(
     backend: &mut dyn Backend,
     observer: &mut dyn RunObserver,
     pace: Pace<'_>,
-) -> Result<RunEnd, RunError> {
+) -> Result<RunEnding, RunError> {
     let rig = backend.describe();
-    let guards = make_guards(campaign, &rig, pace.read);
+    let guards = make_guards(campaign, &rig, pace.auxiliary_channels);
     let mut with_soak;
     let steps: &mut dyn StepSource = match campaign.zero {
         None => steps,

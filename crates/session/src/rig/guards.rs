@@ -13,7 +13,7 @@ use mapper_runner::{
 pub fn make_guards(
     campaign: &Campaign,
     rig: &RigDescription,
-    read: &[UnguardedChannel],
+    auxiliary_channels: &[UnguardedChannel],
 ) -> Vec<Box<dyn Guard>> {
     let set = campaign.guard_set();
     let guarded: Vec<Channel> = set.signals.iter().map(|spec| spec.channel).collect();
@@ -26,9 +26,9 @@ pub fn make_guards(
     }
     guards.extend(set.surge.map(|spec| Box::new(SurgeWatch::new(spec)) as Box<dyn Guard>));
     if rig.controls {
-        let mut watched = read.to_vec();
+        let mut watched = auxiliary_channels.to_vec();
         let is_new = |channel: &&Channel| {
-            !guarded.contains(channel) && !read.iter().any(|other| other.channel == **channel)
+            !guarded.contains(channel) && !auxiliary_channels.iter().any(|other| other.channel == **channel)
         };
         let required = REQUIRED_CHANNELS.iter().filter(|channel| rig.channels.contains(channel));
         watched.extend(required.filter(is_new).map(|channel| UnguardedChannel {

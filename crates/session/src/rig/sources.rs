@@ -35,7 +35,7 @@ pub struct Sources {
     /// All sources combined into one backend.
     pub backend: Box<dyn Backend>,
     /// Every channel of an auxiliary instrument.
-    pub read: Vec<UnguardedChannel>,
+    pub auxiliary_channels: Vec<UnguardedChannel>,
     /// Names of instruments that only one run may use at a time.
     pub exclusive: Vec<String>,
 }
@@ -49,12 +49,12 @@ impl Registry {
     pub fn make_sources(&self, campaign: &Campaign, model: &Model) -> Result<Sources, SessionError> {
         let rig = self.make_backend(campaign, model)?;
         if campaign.readers.is_empty() {
-            return Ok(Sources { backend: rig, read: Vec::new(), exclusive: Vec::new() });
+            return Ok(Sources { backend: rig, auxiliary_channels: Vec::new(), exclusive: Vec::new() });
         }
         let rig_description = rig.describe();
         let mut providers: Vec<(Channel, Provider)> =
             rig_description.channels.iter().map(|channel| (*channel, None)).collect();
-        let (mut readers, mut read, mut exclusive) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut readers, mut auxiliary_channels, mut exclusive) = (Vec::new(), Vec::new(), Vec::new());
         for choice in &campaign.readers {
             let at = format!("readers.{}.backend.{}", choice.name, choice.backend.name);
             let wrong = |error| match error {
@@ -75,13 +75,13 @@ impl Registry {
                 age_s,
                 frozen: None,
             };
-            read.extend(channels.iter().map(as_read));
+            auxiliary_channels.extend(channels.iter().map(as_read));
             exclusive.extend(rig.exclusive);
             readers.push(AuxiliaryInstrument { name: choice.name.clone(), backend, channels });
         }
         let backend =
             RigWithInstruments::new(rig, readers, CONNECT_TIMEOUT).map_err(SessionError::Backend)?;
-        Ok(Sources { backend: Box::new(backend), read, exclusive })
+        Ok(Sources { backend: Box::new(backend), auxiliary_channels, exclusive })
     }
 }
 

@@ -4,5 +4,4 @@ pub(crate) mod preflight;
 pub(crate) mod prepared_run;
 pub(crate) mod recording_metadata;
 pub(crate) mod replayed_steps;
-pub(crate) mod run_end;
 pub(crate) mod run_stop;

@@ -19,11 +19,10 @@ use crate::rig::sources::Sources;
 use crate::run::preflight::{check_room, check_setpoints};
 use crate::run::recording_metadata::metadata;
 use crate::run::replayed_steps::drive_resumed;
-use crate::run::run_end::{RunTermination, lockout_reason};
 use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::MapSource;
-use mapper_core::{Clock, Plan, PlanInputHashes, RigDescription, UnpacedClock};
+use mapper_core::{Clock, Plan, PlanInputHashes, Reaction, RigDescription, RunEnding, UnpacedClock};
 use mapper_physics::simulation::model::Model;
 use mapper_recording::{ChannelMap, RecordingHeader, RecordingWriter};
 use mapper_report::ending_sentence;
@@ -90,8 +89,8 @@ pub struct RunOutcome {
     pub directory: PathBuf,
     /// Its recording.
     pub recording: PathBuf,
-    /// How it ended.
-    pub end: RunTermination,
+    /// How it ended; the error if rig, script or recording failed.
+    pub end: Result<RunEnding, RunError>,
     /// The results, or the reason for their absence.
     pub results: Result<Results, SessionError>,
 }
@@ -99,7 +98,21 @@ pub struct RunOutcome {
 impl RunOutcome {
     /// The end of the run in one sentence.
     pub fn sentence(&self) -> String {
-        ending_sentence(&self.end.ending())
+        ending_sentence(&for_files(&self.end))
+    }
+}
+
+/// The end of a run as data for files.
+fn for_files(end: &Result<RunEnding, RunError>) -> RunEnding {
+    end.as_ref().map_or_else(|error| RunEnding::Failed { reason: error.to_string() }, Clone::clone)
+}
+
+/// Why the rig must be locked out: its state is unknown, or it must be inspected before the next run. `None` if the next run may start.
+fn lockout_reason(end: &Result<RunEnding, RunError>) -> Option<String> {
+    match end {
+        Ok(RunEnding::Tripped(trip)) if trip.reaction == Reaction::Latch => Some(trip.reason.clone()),
+        Err(error) if error.leaves_rig_state_unknown() => Some(error.to_string()),
+        _ => None,
     }
 }
 
@@ -209,7 +222,7 @@ impl PreparedRun<'_> {
         })?;
         // With several sources, each has its own sample times.
         let writer = RecordingWriter::create(&recording, &self.header(plan_json))?
-            .omit_absent(!self.sources.read.is_empty());
+            .omit_absent(!self.sources.auxiliary_channels.is_empty());
         let identity = Identity::of(campaign, &self.plan, &rig)?;
         journal
             .write(&Entry::Part { identity, recording: name })
@@ -217,32 +230,29 @@ impl PreparedRun<'_> {
         // A rig in real time keeps running if this computer fails, so the recording is flushed to disk.
         let sync_handle = if rig.simulated_time { None } else { std::fs::File::open(&recording).ok() };
         let recorder = Recorder::new(writer).with_journal(journal, sync_handle);
-        let read = self.sources.read.clone();
+        let auxiliary_channels = self.sources.auxiliary_channels.clone();
         let pace = Pace {
             clock,
             each_sample,
             stop: session.stop,
             stop_after_step: session.stop_after_step,
             operator: session.operator,
-            read: &read,
+            auxiliary_channels: &auxiliary_channels,
         };
         let (end, finished, lockout) = self.drive_and_record(session, recorder, pace);
         lease.release(lockout, &directory)?;
         session.send(SessionEvent::RigReleased);
-        if let RunTermination::Failed(error @ RunError::NotArmed(_)) = end {
+        if let Err(error @ RunError::NotArmed(_)) = end {
             return Err(self.discard_unarmed_run(error, &directory));
         }
         // A failed run has its own reason; any other run must have a complete file.
-        if !matches!(
-            end,
-            RunTermination::Failed(_) | RunTermination::Interrupted { .. } | RunTermination::Tripped { .. }
-        ) {
+        if matches!(end, Ok(RunEnding::Completed | RunEnding::Drifted { .. })) {
             finished?;
         }
         parts.push(RunPart { recording: recording.clone(), soaked: true, saved: None });
         move_earlier_results(&directory)?;
         let executed = self.executed(&directory);
-        let results = self.results(session, executed, &end, &directory, &parts);
+        let results = self.results(session, executed, for_files(&end), &directory, &parts);
         Ok(RunOutcome { directory, recording, end, results })
     }
 
@@ -259,14 +269,14 @@ impl PreparedRun<'_> {
         &self,
         session: &Session<'_>,
         executed: Result<Plan, SessionError>,
-        end: &RunTermination,
+        ending: RunEnding,
         directory: &Path,
         parts: &[RunPart],
     ) -> Result<Results, SessionError> {
         let what = "identifying the recorded steps".to_owned();
         session.send(SessionEvent::Progress { done_ratio: 0.0, what });
         let (campaign, started_ns) = (self.request.campaign, self.request.started_ns);
-        session.results(campaign, &executed?, end.ending(), started_ns, directory, parts)
+        session.results(campaign, &executed?, ending, started_ns, directory, parts)
     }
 
     /// Identifies a run that was interrupted after its last step. Only the map is missing, so the rig is not used.
@@ -278,9 +288,9 @@ impl PreparedRun<'_> {
         let directory = interrupted.directory.clone();
         let parts = self.earlier_parts(&directory);
         let recording = parts.last().map_or_else(PathBuf::new, |part| part.recording.clone());
-        let end = RunTermination::Completed;
+        let end = Ok(RunEnding::Completed);
         move_earlier_results(&directory)?;
-        let results = self.results(session, Ok(self.plan.clone()), &end, &directory, &parts);
+        let results = self.results(session, Ok(self.plan.clone()), RunEnding::Completed, &directory, &parts);
         Ok(Some(RunOutcome { directory, recording, end, results }))
     }
 
@@ -338,7 +348,7 @@ impl PreparedRun<'_> {
         session: &Session<'_>,
         recorder: Recorder,
         pace: Pace<'_>,
-    ) -> (RunTermination, Result<(), SessionError>, Option<String>) {
+    ) -> (Result<RunEnding, RunError>, Result<(), SessionError>, Option<String>) {
         let mut planned = PlanSteps::new(&self.plan);
         let mut missing;
         // A resumed run uses its unchanged plan, or replays its data if later steps depend on them.
@@ -404,8 +414,11 @@ impl PreparedRun<'_> {
             (end, drifted, recorder)
         });
         let lockout = lockout_reason(&end);
-        let end = RunTermination::from_runner(end, drifted);
-        let finished = recorder.finish(end.ending()).map_err(SessionError::from);
+        let end = end.map(|ending| match (ending, drifted) {
+            (RunEnding::Completed, Some(reason)) => RunEnding::Drifted { reason },
+            (ending, _) => ending,
+        });
+        let finished = recorder.finish(for_files(&end)).map_err(SessionError::from);
         (end, finished, lockout)
     }
 

@@ -6,11 +6,11 @@
 use crate::SessionError;
 use crate::recording::resume::{FIRST_REPEAT_INDEX, InterruptedRun};
 use mapper_core::{
-    ChannelColumn, ElementColumn, Event, PlanStep, Recording, SampleBatch, Series, StepKind, StepMarker,
-    step_number,
+    ChannelColumn, ElementColumn, Event, PlanStep, Recording, RunEnding, SampleBatch, Series, StepKind,
+    StepMarker, step_number,
 };
 use mapper_recording::{ChannelMap, ReadOptions, read_recording};
-use mapper_runner::{RunEnd, RunError, StepSource, StepSourceError};
+use mapper_runner::{RunError, StepSource, StepSourceError};
 
 /// Length of a replayed batch, s, as in the original polls.
 const BATCH_S: f64 = 1.0;
@@ -35,8 +35,8 @@ struct ResumedSteps<'a> {
 pub(crate) fn drive_resumed(
     interrupted: Option<&InterruptedRun>,
     steps: &mut dyn StepSource,
-    drive: impl FnOnce(&mut dyn StepSource) -> Result<RunEnd, RunError>,
-) -> Result<RunEnd, RunError> {
+    drive: impl FnOnce(&mut dyn StepSource) -> Result<RunEnding, RunError>,
+) -> Result<RunEnding, RunError> {
     let Some(interrupted) = interrupted else { return drive(steps) };
     let mut resumed = ResumedSteps::replay(interrupted, steps).map_err(StepSourceError::new)?;
     drive(&mut resumed)

@@ -3,8 +3,8 @@
 pub mod shipped;
 
 use mapper_campaign::Campaign;
-use mapper_core::{Channel, Event, EventKind, SampleBatch, StepMarker};
-use mapper_runner::{ObserverError, PlanSteps, RunEnd, RunObserver};
+use mapper_core::{Channel, Event, EventKind, RunEnding, SampleBatch, StepMarker};
+use mapper_runner::{ObserverError, PlanSteps, RunObserver};
 use mapper_session::{Registry, drive, nominal_model, plan};
 use std::sync::atomic::AtomicBool;
 
@@ -122,6 +122,6 @@ pub fn driven(campaign: &Campaign) -> Driven {
     let mut steps = PlanSteps::new(&plan);
     let end =
         drive(campaign, &model, &mut steps, backend.as_mut(), &mut seen, &AtomicBool::new(false)).unwrap();
-    assert_eq!(end, RunEnd::Completed);
+    assert_eq!(end, RunEnding::Completed);
     seen
 }

@@ -16,13 +16,13 @@ const SAME_OPENING: f64 = 1e-6;
 
 /// Difference between the pressure behind the valve, which is not measured, and the inlet pressure, one standard deviation, Pa. Bound:
 /// filters, silencers and exhaust lines have some hundred.
-const BEHIND_PA: f64 = 300.0;
+const BACK_PRESSURE_SIGMA_PA: f64 = 300.0;
 /// Variation of a valve's discharge coefficient with the pressure ratio, one standard deviation. Judgement: usual valves vary by some per cent.
 const DISCHARGE_RATIO: f64 = 0.02;
 /// Difference of the logarithm of the pressure ratio over which it varies. Judgement: half a speed line.
 const DISCHARGE_LENGTH: f64 = 0.5;
 /// Repeatability of a valve's area, one standard deviation. Bound: a positioner resolves some tenths of a per cent of the travel.
-const SET_AGAIN_RATIO: f64 = 0.005;
+const VALVE_REPEATABILITY: f64 = 0.005;
 
 pub(crate) fn rows(
     steps: &[(f64, Readings)],
@@ -32,7 +32,7 @@ pub(crate) fn rows(
     let known = |step: &&(f64, Readings)| {
         let (opening, readings) = step;
         *opening > 0.0
-            && readings.p2_pa() - readings.p1_pa() > EXCLUDE_SIGMAS * BEHIND_PA
+            && readings.p2_pa() - readings.p1_pa() > EXCLUDE_SIGMAS * BACK_PRESSURE_SIGMA_PA
             && ln_area(readings).is_finite()
     };
     let known: Vec<&(f64, Readings)> = steps.iter().filter(known).collect();
@@ -48,8 +48,8 @@ pub(crate) fn rows(
     let discharge = DMatrix::from_fn(count, count, |i, j| {
         DISCHARGE_RATIO.powi(2) * (-0.5 * ((ln_ratio(i) - ln_ratio(j)) / DISCHARGE_LENGTH).powi(2)).exp()
     });
-    let mut covariance =
-        own(errors(&by_reading, noise, SET_AGAIN_RATIO).into_iter()) + common(&behind, BEHIND_PA);
+    let mut covariance = own(errors(&by_reading, noise, VALVE_REPEATABILITY).into_iter())
+        + common(&behind, BACK_PRESSURE_SIGMA_PA);
     let mut by_machine = Vec::new();
     let expected: Vec<f64> = match nominal {
         Some(nominal) => {
@@ -63,7 +63,7 @@ pub(crate) fn rows(
         None => {
             let same = |i: usize, j: usize| (openings[i] - openings[j]).abs() < SAME_OPENING;
             covariance += discharge;
-            let any = UNINFORMATIVE * SET_AGAIN_RATIO;
+            let any = UNINFORMATIVE * VALVE_REPEATABILITY;
             covariance += DMatrix::from_fn(count, count, |i, j| if same(i, j) { any * any } else { 0.0 });
             let middle = readings.iter().map(ln_area).sum::<f64>() / count as f64;
             vec![middle; count]

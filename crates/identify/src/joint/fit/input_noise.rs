@@ -46,7 +46,7 @@ pub(crate) fn input_noise(
     let mut draws = vec![vec![0.0; squares_mm2.len()]; DRAWS];
     // Fixed seed: the same recording gives the same result.
     let mut rng = Pcg64::seed_from_u64(1);
-    for (member, step) in problem.members.iter().zip(steps).filter(|(member, _)| member.shares) {
+    for (member, step) in problem.members.iter().zip(steps).filter(|(member, _)| member.contributes) {
         let rows = &step.rows;
         let t_s: Vec<f64> = rows.iter().map(|row| row.t_s).collect();
         let smoother = Smoother::new(&t_s);

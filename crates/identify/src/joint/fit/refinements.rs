@@ -47,7 +47,7 @@ pub(crate) fn hold(problem: &mut Problem<'_>) {
 
 /// Error of the efficiencies, fraction (rms of one standard error), if parameters that are taken for neutral are not: the part of their variance
 /// that knowing these parameters removes, averaged over the sets of the mixture. `None` as `found`: all are taken for neutral.
-pub(crate) fn resting_on_declaration(open: &Problem<'_>, found: Option<&Refinements>) -> Option<f64> {
+pub(crate) fn prior_sensitivity(open: &Problem<'_>, found: Option<&Refinements>) -> Option<f64> {
     let covariance = open.covariance()?;
     let rows: Vec<Option<usize>> = sought(open).iter().map(|(index, ..)| covariance.row_of(*index)).collect();
     let mut sets: BTreeMap<Vec<usize>, f64> = BTreeMap::new();

@@ -30,9 +30,9 @@ pub(crate) struct Member<'a> {
     /// Priors of the step's parameters; that of the efficiency is not used: see `surface_sigma`.
     pub(crate) priors: [Prior; LOCAL],
     /// Whether the step contributes to the shared parameters.
-    pub(crate) shares: bool,
+    pub(crate) contributes: bool,
     /// Whether the step is always excluded: its region of the map disagrees with the others.
-    pub(crate) barred: bool,
+    pub(crate) excluded: bool,
 }
 
 /// The whole fit.
@@ -109,7 +109,7 @@ impl DampedFit for Descent<'_, '_> {
             .iter()
             .zip(&locals)
             .map(|(member, local)| {
-                member.shares
+                member.contributes
                     || problem.local_cost(member, &shared, local)
                         <= problem.local_cost(member, &shared, &member.local)
             })
@@ -255,7 +255,7 @@ impl Problem<'_> {
                 own: Matrix4::zeros(),
                 mixed: Matrix4xX::zeros(m),
                 right: Vector4::zeros(),
-                shares: member.shares,
+                contributes: member.contributes,
             };
             for i in 0..LOCAL {
                 let column = &columns[SHARED + i];
@@ -274,7 +274,7 @@ impl Problem<'_> {
             }
             let off = member.off_surface(&self.shared, &member.local);
             block.right[ETA] -= surface_weight * off;
-            if member.shares {
+            if member.contributes {
                 normal.cost += residual.iter().map(|r| r * r).sum::<f64>() + off * off * surface_weight;
                 for i in (0..LOCAL).filter(|i| *i != ETA) {
                     normal.cost +=
@@ -286,7 +286,7 @@ impl Problem<'_> {
                     block.mixed[(i, a)] += product(&columns[SHARED + i], &columns[*index]);
                 }
                 let term = |index: usize| member.coupling[index];
-                if !member.shares {
+                if !member.contributes {
                     continue;
                 }
                 equations.right[a] +=
@@ -327,7 +327,8 @@ impl Problem<'_> {
     }
 
     fn cost(&self, shared: &SharedVector, locals: &[LocalVector]) -> f64 {
-        let sharing: Vec<_> = self.members.iter().zip(locals).filter(|(member, _)| member.shares).collect();
+        let sharing: Vec<_> =
+            self.members.iter().zip(locals).filter(|(member, _)| member.contributes).collect();
         let costs = parallel::map(&sharing, |(member, local)| self.local_cost(member, shared, local));
         self.shared_cost(shared) + costs.iter().sum::<f64>()
     }

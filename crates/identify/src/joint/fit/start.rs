@@ -8,8 +8,8 @@ use crate::joint::step_model::model::reynolds;
 use crate::joint::step_model::model::{Setting, StepHistory};
 use crate::joint::step_model::parameters::{
     ALPHA, BAROMETER, BENDS, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, GAIN_CHANNELS, GAINS, HUMIDITY, INLET,
-    LN_AREA, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, LOCAL, OFFSET_CHANNELS, OFFSETS, PROBE_MM2, Prior,
-    REFINEMENTS, SHARED, SLOPE, SURFACE,
+    LN_AREA, LN_COEFFICIENT, LN_DEVIATION, LN_HEATING_COOLING_RATIO, LOCAL, OFFSET_CHANNELS, OFFSETS,
+    PROBE_MM2, Prior, REFINEMENTS, SHARED, SLOPE, SURFACE,
 };
 use crate::joint::step_model::rows::{StepRows, condensed};
 use crate::joint::step_model::smoothing::SHORTEST_HALF_S;
@@ -182,7 +182,7 @@ pub(crate) fn problem<'a>(
     priors[PROBE_MM2].mean = probe_mm2;
     active[PROBE_MM2] = choice.probe == Choice::Fitted;
     lowest[PROBE_MM2] = 0.0;
-    active[LN_DIRECTION] = choice.direction == Choice::Fitted;
+    active[LN_HEATING_COOLING_RATIO] = choice.heating_cooling_ratio == Choice::Fitted;
     shared[INLET] = inlet::power_of(config.inlet_convection);
     priors[LN_AREA] = Prior { mean: 0.0, sigma: config.internal_area_sigma_ratio };
     active[LN_AREA] = config.internal_area_sigma_ratio > 0.0;
@@ -273,8 +273,8 @@ pub(crate) fn member<'a>(
         }),
         local,
         priors: own,
-        shares: true,
-        barred: false,
+        contributes: true,
+        excluded: false,
     }
 }
 
@@ -297,7 +297,7 @@ fn whitening(
 pub(crate) fn refine(problem: &mut Problem<'_>, steps: &[StepRows], config: &IdentifyConfig) -> Option<()> {
     set_weights(problem, steps, config);
     let covariance = problem.with_exact_readings().covariance()?;
-    let of_steps = || problem.members.iter().zip(&covariance.own).filter(|(member, _)| member.shares);
+    let of_steps = || problem.members.iter().zip(&covariance.own).filter(|(member, _)| member.contributes);
     let off_surface: Vec<(f64, f64)> = of_steps()
         .map(|(member, (own, mixed))| {
             let coupling = DVector::from_iterator(

@@ -2,7 +2,8 @@
 
 use crate::joint::step_model::parameters::{
     ALPHA, BAROMETER, BENDS, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, GAINS, HUMIDITY, INLET, LN_COEFFICIENT,
-    LN_DEVIATION, LN_DIRECTION, LOCAL, LocalVector, OFFSETS, PROBE_MM2, SHARED, SLOPE, SURFACE, SharedVector,
+    LN_DEVIATION, LN_HEATING_COOLING_RATIO, LOCAL, LocalVector, OFFSETS, PROBE_MM2, SHARED, SLOPE, SURFACE,
+    SharedVector,
 };
 use crate::joint::step_model::rows::Row;
 use crate::joint::step_model::surface::{TERM_COUNT, dot};
@@ -161,9 +162,11 @@ impl Setting {
 
     /// T2 by eqs. 1-3. The heating/cooling ratio scales h if the metal is the hotter one. Eqs. 1-3 have one h, so each part of the area is
     /// scaled instead.
-    fn t2_k(&self, gas: &Gas, convection: Convection, alpha: f64, ln_direction: f64) -> f64 {
+    fn t2_k(&self, gas: &Gas, convection: Convection, alpha: f64, ln_heating_cooling_ratio: f64) -> f64 {
         let Convection { h_w_m2k, bulk_k, inlet_h_ratio } = convection;
-        let outward = |hotter: bool| if hotter && ln_direction != 0.0 { ln_direction.exp() } else { 1.0 };
+        let outward = |hotter: bool| {
+            if hotter && ln_heating_cooling_ratio != 0.0 { ln_heating_cooling_ratio.exp() } else { 1.0 }
+        };
         let before_m2 = outward(gas.tc_k > gas.t1_k) * alpha * self.internal_area_m2;
         let pass = |after_m2: f64| {
             let inputs = CompressionInputs {
@@ -182,7 +185,7 @@ impl Setting {
         };
         let after_m2 = (1.0 - alpha) * self.internal_area_m2;
         let plain = pass(after_m2);
-        if ln_direction != 0.0 && gas.tc_k > plain.t2_prime_k {
+        if ln_heating_cooling_ratio != 0.0 && gas.tc_k > plain.t2_prime_k {
             return pass(after_m2 * outward(true)).t2_k;
         }
         plain.t2_k
@@ -251,7 +254,12 @@ impl Setting {
             let mut moved = *local;
             moved[ETA] = eta;
             let gas = self.gas(end, &[0.0; TERM_COUNT], shared, &moved);
-            self.t2_k(&gas, self.h(&gas, shared, moved[LN_DEVIATION]), shared[ALPHA], shared[LN_DIRECTION])
+            self.t2_k(
+                &gas,
+                self.h(&gas, shared, moved[LN_DEVIATION]),
+                shared[ALPHA],
+                shared[LN_HEATING_COOLING_RATIO],
+            )
         };
         (at(local[ETA] + SLOPE_STEP) - at(local[ETA] - SLOPE_STEP)) / (2.0 * SLOPE_STEP)
     }
@@ -284,25 +292,26 @@ impl Setting {
                 }
             }
         }
-        let (alpha, ln_direction, deviation) = (shared[ALPHA], shared[LN_DIRECTION], local[LN_DEVIATION]);
+        let (alpha, ln_heating_cooling_ratio, deviation) =
+            (shared[ALPHA], shared[LN_HEATING_COOLING_RATIO], local[LN_DEVIATION]);
         for (i, (row, terms)) in history.rows.iter().zip(&history.terms).enumerate() {
             let gas = self.gas(row, terms, shared, local);
             let h = self.h(&gas, shared, deviation);
-            let t2_k = self.t2_k(&gas, h, alpha, ln_direction);
+            let t2_k = self.t2_k(&gas, h, alpha, ln_heating_cooling_ratio);
             gas_k.push(t2_k);
             if !derivatives {
                 continue;
             }
             let answer = self.answer(&gas, &h, shared, deviation);
             let full = |to: Gas, step: f64| {
-                (self.t2_k(&to, answer.moved(&h, &gas, &to), alpha, ln_direction) - t2_k) / step
+                (self.t2_k(&to, answer.moved(&h, &gas, &to), alpha, ln_heating_cooling_ratio) - t2_k) / step
             };
             let by_eta = full(Gas { eta: gas.eta + SLOPE_STEP, ..gas }, SLOPE_STEP);
             let by_ln_h = (self.t2_k(
                 &gas,
                 Convection { h_w_m2k: h.h_w_m2k * (1.0 + SLOPE_STEP), ..h },
                 alpha,
-                ln_direction,
+                ln_heating_cooling_ratio,
             ) - t2_k)
                 / SLOPE_STEP;
             let mut put = |index: usize, value: f64| {
@@ -321,7 +330,8 @@ impl Setting {
             put(EXPONENT, by_ln_h * ln_reynolds);
             if active[INLET] || shared[INLET] != 0.0 {
                 let moved = Convection { inlet_h_ratio: h.inlet_h_ratio * (1.0 + SLOPE_STEP), ..h };
-                let by_ln_inlet = (self.t2_k(&gas, moved, alpha, ln_direction) - t2_k) / SLOPE_STEP;
+                let by_ln_inlet =
+                    (self.t2_k(&gas, moved, alpha, ln_heating_cooling_ratio) - t2_k) / SLOPE_STEP;
                 put(INLET, by_ln_inlet * self.ln_inlet_ratio(&gas, shared, h.bulk_k));
                 // The exponent applies to the Reynolds numbers on both sides.
                 let ln_inlet_over_outlet = (self.outlet_diameter_m * air::viscosity_pa_s(h.bulk_k)
@@ -330,12 +340,18 @@ impl Setting {
                 put(EXPONENT, by_ln_h * ln_reynolds + by_ln_inlet * shared[INLET] * ln_inlet_over_outlet);
             }
             if active[ALPHA] {
-                put(ALPHA, (self.t2_k(&gas, h, alpha + SLOPE_STEP, ln_direction) - t2_k) / SLOPE_STEP);
+                put(
+                    ALPHA,
+                    (self.t2_k(&gas, h, alpha + SLOPE_STEP, ln_heating_cooling_ratio) - t2_k) / SLOPE_STEP,
+                );
             }
-            if active[LN_DIRECTION] {
+            if active[LN_HEATING_COOLING_RATIO] {
                 // Stay away from 0, where the factor is switched off.
-                let step = if ln_direction == -SLOPE_STEP { -SLOPE_STEP } else { SLOPE_STEP };
-                put(LN_DIRECTION, (self.t2_k(&gas, h, alpha, ln_direction + step) - t2_k) / step);
+                let step = if ln_heating_cooling_ratio == -SLOPE_STEP { -SLOPE_STEP } else { SLOPE_STEP };
+                put(
+                    LN_HEATING_COOLING_RATIO,
+                    (self.t2_k(&gas, h, alpha, ln_heating_cooling_ratio + step) - t2_k) / step,
+                );
             }
             if active[OFFSETS] {
                 let (step, t1_k) = (gas.t1_k * SLOPE_STEP, gas.t1_k * (1.0 + SLOPE_STEP));
@@ -343,7 +359,7 @@ impl Setting {
                 let moved =
                     Gas { t1_k, rise_ratio: isentropic_rise_ratio(p2_pa / p1_pa, t1_k, gas.air), ..gas };
                 let convection = self.h(&moved, shared, deviation);
-                put(OFFSETS, -(self.t2_k(&moved, convection, alpha, ln_direction) - t2_k) / step);
+                put(OFFSETS, -(self.t2_k(&moved, convection, alpha, ln_heating_cooling_ratio) - t2_k) / step);
             }
             put(OFFSETS + 1, 1.0);
             put(GAINS, t2_k - CALIBRATED_AT_K);

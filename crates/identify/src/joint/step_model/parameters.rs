@@ -15,7 +15,7 @@ pub(crate) const ALPHA: Place = 2;
 /// Square of the probe's diameter, mm2: the lag grows with it from 0.
 pub(crate) const PROBE_MM2: Place = 3;
 /// ln of the heating/cooling ratio of h.
-pub(crate) const LN_DIRECTION: Place = 4;
+pub(crate) const LN_HEATING_COOLING_RATIO: Place = 4;
 /// First offset, in the order of [`OFFSET_CHANNELS`]; K or Pa.
 pub(crate) const OFFSETS: Place = 5;
 /// Channels with an offset.
@@ -82,7 +82,7 @@ impl Prior {
 /// efficiency by a quarter of a point, as do the offsets. Calibrated: `benches/identification.py`; with 0.025 the error at an undeclared
 /// alpha_A of 0.05 is 2.1 points instead of 0.4.
 pub(crate) const REFINEMENTS: [(Place, f64, f64, f64); 3] =
-    [(ALPHA, 0.3, 0.1, 0.005), (PROBE_MM2, 10.0, 2.0, 0.1), (LN_DIRECTION, 0.5, 0.2, 0.015)];
+    [(ALPHA, 0.3, 0.1, 0.005), (PROBE_MM2, 10.0, 2.0, 0.1), (LN_HEATING_COOLING_RATIO, 0.5, 0.2, 0.015)];
 
 /// Display symbol of a shared parameter.
 pub(crate) fn symbol(index: usize) -> String {
@@ -91,7 +91,7 @@ pub(crate) fn symbol(index: usize) -> String {
         EXPONENT => "Nusselt exponent".to_owned(),
         ALPHA => "alpha_A".to_owned(),
         PROBE_MM2 => "probe diameter".to_owned(),
-        LN_DIRECTION => "heating/cooling ratio".to_owned(),
+        LN_HEATING_COOLING_RATIO => "heating/cooling ratio".to_owned(),
         FLOW_GAIN => "gain of m_c".to_owned(),
         BAROMETER => "barometer".to_owned(),
         HUMIDITY => "humidity".to_owned(),

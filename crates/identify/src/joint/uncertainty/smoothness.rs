@@ -122,7 +122,7 @@ pub(crate) fn as_measured(problem: &Problem<'_>, steps: &[StepRows]) -> Option<F
     let problem = &problem.without_a_surface()?;
     let covariance = &problem.covariance()?;
     let (etas, ln_hs) = quantities(problem, covariance, steps);
-    let kept: Vec<usize> = (0..etas.len()).filter(|i| problem.members[*i].shares).collect();
+    let kept: Vec<usize> = (0..etas.len()).filter(|i| problem.members[*i].contributes).collect();
     let ln_h = |i: &usize| {
         problem.setting.h_at_end(&steps[*i].end, &problem.shared, &problem.members[*i].local).0.ln()
     };
@@ -370,7 +370,7 @@ fn together(quantities: &[Quantity], etas: &[Quantity], best: Option<&Solved>) -
 
 /// All choices of amplitude and lengths with sufficient weight.
 fn solve(etas: &[Quantity], coordinates: &[(f64, f64, f64)], problem: &Problem<'_>) -> Vec<Solved> {
-    let mut used: Vec<bool> = problem.members.iter().map(|member| member.shares).collect();
+    let mut used: Vec<bool> = problem.members.iter().map(|member| member.contributes).collect();
     let level = mean(etas.iter().map(|eta| eta.value)).unwrap_or(0.0);
     let mut choices = Vec::new();
     for amplitude in AMPLITUDES {

@@ -11,13 +11,13 @@ const LAYERS: [(&str, &str, bool); 6] = [
     ("extrapolated", "extrapolation", false),
     ("intervals", "95 % intervals", true),
     ("repeats", "repeats", false),
-    ("dynamic", "two-parameter method", false),
+    ("dynamic", "dynamic method", false),
 ];
 
 pub(crate) fn map(page: &RunPage<'_>) -> Markup {
     let display = page.report.display();
     let speed = &display.units().speed;
-    let has_dynamic = !page.report.two_parameter.is_empty();
+    let has_dynamic = !page.report.dynamic.is_empty();
     html! {
         section #map aria-labelledby="map-head" {
             h2 #map-head { "Map" }

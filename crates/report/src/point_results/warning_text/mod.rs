@@ -158,7 +158,7 @@ mod tests {
         {"code": "small_gradient", "dt2_k": 0.2, "needed_dt2_k": 0.5, "eta_sigma": 0.03},
         {"code": "offsets_dominate", "eta_noise_sigma": 0.01, "eta_bias_sigma": 0.05, "dt2_k": 9, "shared": true},
         {"code": "noise_dominates", "eta_noise_sigma": 0.05, "eta_bias_sigma": 0.01, "rise_k": 9},
-        {"code": "rests_on_declaration", "eta_error": 0.02},
+        {"code": "prior_dominated", "eta_error": 0.02},
         {"code": "assumed_alpha", "alpha_area_ratio": 0, "alpha_area_sigma_ratio": 0.1, "eta_sigma": 0.02},
         {"code": "nothing_declared"},
         {"code": "heat_corrected", "kind": "corrected", "apparent_eta": 0.6},

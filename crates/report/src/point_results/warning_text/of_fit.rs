@@ -17,7 +17,7 @@ pub(crate) fn sentence_of(warning: &Warning) -> Option<Sentence> {
         ),
         Warning::OffsetsDominate(interval) => describe_wide_interval(interval, true),
         Warning::NoiseDominates(interval) => describe_wide_interval(interval, false),
-        Warning::RestsOnDeclaration { eta_error } => sentence!(
+        Warning::PriorDominated { eta_error } => sentence!(
             "the recording alone determines the efficiencies only to {} points; the remainder depends on the declared alpha_A, probe and \
                  heating/cooling ratio: record longer steps or larger gradients, or set known ones to `fixed` in `identification.joint`",
             number(100.0 * eta_error, 1)

@@ -62,9 +62,16 @@ pub use measurement::channel::{
 };
 pub use measurement::declared_uncertainty::{DeclaredUncertainty, NoiseColour, SAMPLE_INTERVAL_S};
 pub use measurement::event::{Event, EventKind};
-pub use measurement::held_point::{JUMPS, SAME_COMMAND_RATIO, StepPoint, VALVE_JUMP_RATIO, jump_ratio};
+pub use measurement::fault_kind::FaultKind;
+pub use measurement::frozen::{COARSE_REPEAT_S, COARSE_REPEAT_SAMPLES, FrozenLimit, NOISY_REPEAT_S, repeats};
 pub use measurement::joined_recordings::{StepOrigin, join_recordings};
-pub use measurement::plausible::{Plausible, measurable, plausible};
+pub use measurement::jump::{
+    JUMPS, SAME_COMMAND_RATIO, SLOW_JUMP_MULTIPLE, StepPoint, is_commanded_jump, is_jump, is_same_command,
+    jump_ratio,
+};
+pub use measurement::plausible::{
+    Implausible, Plausible, check_running, is_plausible_range, is_possible, is_reading, measurable, plausible,
+};
 pub use measurement::recording::{ReadingOrigin, Recording, RecordingError, Series};
 pub use measurement::redundant::{DeclaredElement, Element, MAX_ELEMENTS, RedundantSensors, UnknownElement};
 pub use measurement::sample::{ChannelColumn, ElementColumn, Provenance, Quality, SampleBatch, TruthColumn};
@@ -75,8 +82,7 @@ pub use rig::backend::{
 };
 pub use rig::clock::{Clock, PacedClock, UnpacedClock, WallClock};
 pub use rig::guard::{
-    FrozenLimit, GuardName, GuardSet, LargestChange, Reaction, SafeTrajectory, SignalGuard, SpeedBand,
-    SurgeVariation,
+    GuardName, GuardSet, LargestChange, Reaction, SafeTrajectory, SignalGuard, SpeedBand, SurgeVariation,
 };
 pub use rig::limits::{Limits, SURGE_ALLOWED_S};
 pub use rig::on_drift::OnDrift;

@@ -13,11 +13,10 @@ pub mod energy_balance;
 pub mod initial_state;
 pub mod model_inputs;
 pub mod perturbation;
-pub mod plausible;
 pub mod redundant_sensors;
 pub mod same_machine;
 
 pub use declared::{Declared, declared_uncertainties};
-pub use redundant_sensors::element_fault::{Contradiction, Fault, FaultyElement, FusedChannel};
+pub use redundant_sensors::element_fault::{Contradiction, ElementFault, FaultyElement, FusedChannel};
 pub use redundant_sensors::fuse::{fuse, judge_elements};
 pub use same_machine::{OtherMachine, same_machine};

@@ -1,6 +1,6 @@
 //! Joins several recordings of one machine into one.
 
-use crate::measurement::held_point::{HeldPoint, StepPoint};
+use crate::measurement::jump::{HeldPoint, StepPoint};
 use crate::{Element, Recording, Series, StepKind, StepMarker};
 use std::collections::BTreeMap;
 

@@ -1,7 +1,7 @@
-//! Plausible readings of a turbocharger on a gas stand, in one table for all checks.
+//! What a plausible reading of a turbocharger on a gas stand is, in one table for all checks.
 
 use crate::{Channel, Dimension};
-use std::ops::RangeInclusive;
+use std::ops::{Range, RangeInclusive};
 
 /// Plausible readings of a channel, in its unit.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,5 +63,121 @@ pub fn measurable(dimension: Dimension) -> RangeInclusive<f64> {
         Dimension::Pressure => 1e3..=5e6,
         Dimension::Temperature => 200.0..=1600.0,
         Dimension::Ratio => -0.1..=10.0,
+    }
+}
+
+/// Whether a reading of a sensor is possible. While the machine runs, shaft speed and flow may still be zero, because a rig starts from rest.
+pub fn is_possible(channel: Channel, value: f64, running: bool) -> bool {
+    let from_rest = matches!(channel.info().dimension, Dimension::RotationalSpeed | Dimension::MassFlow);
+    value.is_finite()
+        && measurable(channel.info().dimension).contains(&value)
+        && (!running || from_rest || plausible(channel).running.contains(&value))
+}
+
+/// Whether the readings of a whole log, from `low` to `high` without its spikes, are possible for a channel. Speed and flow are 0 at rest, but
+/// not all the time; a channel that is always 0 is dead, and its unit may be right.
+pub fn is_plausible_range(channel: Channel, low: f64, high: f64) -> bool {
+    let running = plausible(channel).running;
+    let (min, max) = (*running.start(), *running.end());
+    match channel.info().dimension {
+        Dimension::RotationalSpeed | Dimension::MassFlow => {
+            high <= max && (high >= min || high == 0.0 && low == 0.0)
+        }
+        _ => low >= min && high <= max,
+    }
+}
+
+/// Values of a pressure in kPa labelled Pa. Bound: inlet to three stages of boost.
+const KPA_LABELLED_PA: Range<f64> = 30.0..2_000.0;
+/// Values of a pressure in bar labelled Pa. Bound: the same range.
+const BAR_LABELLED_PA: Range<f64> = 0.3..30.0;
+/// Values of a temperature in degC labelled K. Bound: inlet to the outlet of a compressor.
+const DEGC_LABELLED_K: Range<f64> = 0.0..200.0;
+/// Values of a speed in krpm or 1/s labelled rpm. Bound: idle of the largest to the limit of the smallest machines.
+const KRPM_LABELLED_RPM: Range<f64> = 5.0..1_000.0;
+/// Maximum flow, kg/s. Bound: the largest turbochargers, of ships.
+const MAX_FLOW_KG_S: f64 = 20.0;
+
+/// Whether a single value is finite and possible on any rig; other values count as lost.
+pub fn is_reading(channel: Channel, value: f64) -> bool {
+    value.is_finite() && plausible(channel).any.contains(&value)
+}
+
+/// The median reading of a channel is impossible for a running machine.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error(
+    "the median of {channel} is {value:.4} {unit}, which is impossible for a running machine ({low} to {high} {unit}). {remedy}",
+    unit = .channel.unit(),
+    remedy = remedy(*.channel, *.value),
+    low = plausible(*.channel).running.start(),
+    high = plausible(*.channel).running.end()
+)]
+pub struct Implausible {
+    /// The channel.
+    pub channel: Channel,
+    /// Median, SI.
+    pub value: f64,
+}
+
+/// Checks the median reading of a channel, SI.
+///
+/// # Errors
+/// [`Implausible`] with the likely cause and the remedy.
+pub fn check_running(channel: Channel, median: f64) -> Result<(), Implausible> {
+    if plausible(channel).running.contains(&median) {
+        return Ok(());
+    }
+    Err(Implausible { channel, value: median })
+}
+
+/// Likely cause of an implausible reading, and the remedy.
+fn remedy(channel: Channel, value: f64) -> &'static str {
+    match channel.info().dimension {
+        Dimension::Pressure if KPA_LABELLED_PA.contains(&value) => {
+            "It looks like kPa labelled Pa; correct the unit in the channel map"
+        }
+        Dimension::Pressure if BAR_LABELLED_PA.contains(&value) => {
+            "It looks like bar labelled Pa; correct the unit in the channel map"
+        }
+        Dimension::Temperature if DEGC_LABELLED_K.contains(&value) => {
+            "It looks like degC labelled K; correct the unit in the channel map"
+        }
+        Dimension::RotationalSpeed if KRPM_LABELLED_RPM.contains(&value) => {
+            "It looks like krpm or 1/s labelled rpm; correct the unit in the channel map"
+        }
+        Dimension::MassFlow if value > MAX_FLOW_KG_S => {
+            "It looks like g/s or kg/h labelled kg/s; correct the unit in the channel map"
+        }
+        Dimension::MassFlow => "No flow is measured; check unit and sensor",
+        _ => "Check unit and sensor; the channel map has the unit of each field",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn usual_readings_pass_and_each_wrong_unit_is_named() {
+        for (channel, value) in [
+            (Channel::ShaftSpeed, 90e3),
+            (Channel::CompressorFlow, 0.12),
+            (Channel::P2, 180e3),
+            (Channel::T3, 1173.0),
+        ] {
+            assert_eq!(check_running(channel, value), Ok(()));
+        }
+        for (channel, value, named) in [
+            (Channel::ShaftSpeed, 90.0, "krpm"),
+            (Channel::CompressorFlow, 120.0, "g/s"),
+            (Channel::CompressorFlow, 0.0, "No flow"),
+            (Channel::P2, 180.0, "kPa"),
+            (Channel::P2, 1.8, "bar"),
+            (Channel::T2, 85.0, "degC"),
+            (Channel::T2, f64::NAN, "Check unit"),
+        ] {
+            let message = check_running(channel, value).unwrap_err().to_string();
+            assert!(message.contains(named), "{message}");
+        }
     }
 }

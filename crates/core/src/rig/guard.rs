@@ -1,7 +1,7 @@
 //! Guards of a run: the terms that campaigns, rigs and runner share.
 
-use crate::Channel;
 use crate::named_enum::named_enum;
+use crate::{Channel, FrozenLimit};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -64,15 +64,6 @@ pub struct LargestChange {
     pub change: f64,
     /// Within this time, s, > 0.
     pub within_s: f64,
-}
-
-/// A reading is frozen if it has stayed within its band since before a jump of the setpoints.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct FrozenLimit {
-    /// Time after the jump, s, > 0.
-    pub after_s: f64,
-    /// Half width of the band, unit of the channel, >= 0.
-    pub band: f64,
 }
 
 /// A guard of one channel. Without bounds it checks only that the channel delivers readings.

@@ -1,7 +1,7 @@
 //! Recordings of a campaign on one axis of time, their repeats, and whether they can be compared.
 
 use crate::drift::causes::Cause;
-use mapper_core::{Channel, ModelTolerances, NoiseColour, Recording, StepPoint, step_number};
+use mapper_core::{Channel, Implausible, ModelTolerances, NoiseColour, Recording, StepPoint, check_running, step_number};
 use mapper_identify::{IdentifyConfig, LONGEST_BRIDGE_S};
 use mapper_numerics::coloured_noise::ColouredNoise;
 use mapper_numerics::statistics::median;
@@ -9,7 +9,6 @@ use mapper_observe::averages::mean_reading::{BEFORE_S, mean_between};
 use mapper_observe::averages::schedule::Schedule;
 use mapper_observe::channels::{INPUT_CHANNELS, OUTPUTS};
 use mapper_observe::declared::Declared;
-use mapper_observe::plausible::{Implausible, check_running};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::inputs::InputsError;
 use mapper_physics::simulation::model::Model;

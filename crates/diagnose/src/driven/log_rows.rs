@@ -1,10 +1,9 @@
 //! Complete rows of a log: driving and judged channels of one side of the machine.
 
 use crate::driven::DrivenError;
-use mapper_core::{Channel, Recording, SAMPLE_INTERVAL_S};
+use mapper_core::{Channel, Recording, SAMPLE_INTERVAL_S, is_reading};
 use mapper_numerics::statistics::EXCLUDE_SIGMAS;
 use mapper_observe::declared::usual_noise_sigma;
-use mapper_observe::plausible::is_reading;
 
 /// Maximum number of rows, evenly spread over a longer log: five minutes at 10 Hz.
 const MAX_ROWS: usize = 3_000;

@@ -4,13 +4,12 @@ use crate::gap::findings::warning::GapWarning;
 use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::study::{PredictError, Study};
 use crate::gap::residuals::true_inputs::Actuators;
-use mapper_core::{Channel, Recording, step_number};
+use mapper_core::{Channel, Implausible, Recording, StepMarker, check_running, is_commanded_jump, step_number};
 use mapper_numerics::statistics::median;
 use mapper_observe::averages::time_table::{GAP_INTERVALS, Table};
 use mapper_observe::channels::INPUT_CHANNELS;
 use mapper_observe::declared::Declared;
 use mapper_observe::model_inputs::lagged_command::Response;
-use mapper_observe::plausible::{Implausible, check_running};
 use mapper_physics::rig::effect::Effect;
 use mapper_physics::simulation::model::Model;
 use std::sync::Arc;
@@ -204,14 +203,11 @@ pub fn usable(recording: &Recording, table: &Table, declared: &Declared) -> Resu
     for (channel, values) in &table.columns {
         middle(&values[running.clone()]).map_or(Ok(()), |middle| check_running(*channel, middle))?;
     }
+    let commands = |step: &StepMarker| (step.p3_pa, step.valve_opening_ratio);
     let jumps = recording
         .steps
         .windows(2)
-        .filter(|pair| {
-            let moved = |a: f64, b: f64| (a - b).abs() > 0.01 * a.abs().max(b.abs());
-            moved(pair[0].p3_pa, pair[1].p3_pa)
-                || moved(pair[0].valve_opening_ratio, pair[1].valve_opening_ratio)
-        })
+        .filter(|pair| is_commanded_jump(commands(&pair[0]), commands(&pair[1])))
         .count();
     if jumps < 2 {
         return Err(Problem::NoJumps { steps: recording.steps.len() });

@@ -1,9 +1,9 @@
 //! The rows of one balance, and the columns of all parameters that affect them.
 
 use crate::faults::end_readings::{CHANNELS, PerChannel, Readings};
-use mapper_core::Channel;
+use mapper_core::{Channel, FaultKind};
 use mapper_inference::hypotheses::Balance;
-use mapper_physics::rig::sensor_fault::{FaultKind, SensorFault, additive, gain_error};
+use mapper_physics::rig::sensor_fault::{SensorFault, additive, gain_error};
 use nalgebra::{DMatrix, DVector};
 
 /// A balance of the recording.

@@ -1,8 +1,8 @@
 //! A detected fault and its description.
 
 use crate::faults::balance_rows::Machine;
-use mapper_core::{Channel, SuspectedFault};
-use mapper_physics::rig::sensor_fault::{FaultKind, SensorFault};
+use mapper_core::{Channel, FaultKind, SuspectedFault};
+use mapper_physics::rig::sensor_fault::SensorFault;
 use serde::{Serialize, Serializer};
 use std::fmt;
 

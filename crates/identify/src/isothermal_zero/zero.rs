@@ -10,12 +10,12 @@ use crate::isothermal_zero::relaxation;
 use crate::step_data::samples::TREND_BLOCK_S;
 use mapper_core::unit_factors::S_PER_MIN;
 use mapper_core::{
-    Channel, DeclaredUncertainty, Recording, SAMPLE_INTERVAL_S, Series, Soak, StepMarker, plausible,
+    Channel, DeclaredUncertainty, Recording, SAMPLE_INTERVAL_S, Series, Soak, StepMarker, is_reading,
+    plausible,
 };
 use mapper_numerics::coloured_noise::variance_of_mean;
 use mapper_numerics::statistics::{EXCLUDE_SIGMAS, mean};
 use mapper_observe::declared::{CommonOffset, rest_pressure_pa};
-use mapper_observe::plausible::is_reading;
 use mapper_physics::rig::sensor_fault::gain_error;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

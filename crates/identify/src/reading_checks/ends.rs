@@ -1,9 +1,8 @@
 //! The readings at the end of each step, when everything but the housing has settled.
 
 use crate::IdentifyConfig;
-use mapper_core::{Channel, Recording};
+use mapper_core::{Channel, Recording, is_reading};
 use mapper_numerics::statistics::median;
-use mapper_observe::plausible::is_reading;
 use mapper_physics::gas::air::Air;
 use mapper_physics::gas::mixture::Gas;
 use mapper_physics::laws::compression::isentropic_rise_ratio;

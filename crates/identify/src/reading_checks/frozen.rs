@@ -8,7 +8,7 @@ use crate::needs::needs;
 use crate::reading_checks::ends::Ends;
 use crate::reading_checks::failed_check::FailedCheck;
 use crate::step_data::commands::FOLLOWED_S;
-use mapper_core::{Channel, Recording, Series, Warning, jump_ratio};
+use mapper_core::{Channel, Recording, Series, Warning, is_jump, repeats};
 use mapper_numerics::statistics::{MIN_VALUES, range};
 use mapper_physics::rig::sensor_fault::repeats_s;
 
@@ -37,7 +37,7 @@ pub(crate) fn failed_checks(
 fn moves(ends: &[Option<Ends>]) -> bool {
     let moves = |channel, read: fn(&Ends) -> f64| {
         let (low, high) = range(ends.iter().flatten().map(read));
-        high > low * (1.0 + jump_ratio(channel))
+        is_jump(channel, low, high)
     };
     moves(Channel::ShaftSpeed, |end| end.speed_rpm)
         || moves(Channel::CompressorFlow, |end| end.flow_kg_s)
@@ -88,14 +88,8 @@ fn of_channel(
 
 /// The runs of one repeated value that are at least this long.
 fn runs(series: &Series, shortest_s: f64) -> Vec<Run> {
-    let mut runs = Vec::new();
-    let mut first = 0;
-    for segment in series.values.chunk_by(|a, b| a == b) {
-        let last = first + segment.len() - 1;
-        if segment.len() >= MIN_VALUES && series.t_s[last] - series.t_s[first] >= shortest_s {
-            runs.push(Run { first, last });
-        }
-        first = last + 1;
-    }
-    runs
+    let long = |run: &Run| {
+        run.last + 1 - run.first >= MIN_VALUES && series.t_s[run.last] - series.t_s[run.first] >= shortest_s
+    };
+    repeats(&series.values).map(|(first, last)| Run { first, last }).filter(long).collect()
 }

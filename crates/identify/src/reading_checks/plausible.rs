@@ -1,13 +1,12 @@
 //! Detects dead channels and wrong units: the median reading of a step is impossible for a running machine.
 //!
-//! The ranges are those of [`mapper_observe::plausible`], wide enough for every turbocharger on a gas stand.
+//! The ranges are those of [`mapper_core::plausible`], wide enough for every turbocharger on a gas stand.
 
 use crate::IdentifyConfig;
 use crate::needs::needs;
 use crate::reading_checks::failed_check::FailedCheck;
-use mapper_core::{Recording, Warning};
+use mapper_core::{Recording, Warning, check_running};
 use mapper_numerics::statistics::median;
-use mapper_observe::plausible::check_running;
 
 pub(crate) fn failed_checks(recording: &Recording, config: &IdentifyConfig) -> Vec<FailedCheck> {
     needs(config.method)

@@ -6,9 +6,8 @@
 
 use crate::reading_checks::ends::Ends;
 use crate::reading_checks::failed_check::FailedCheck;
-use mapper_core::{Channel, Scaled, Warning};
+use mapper_core::{Channel, Scaled, Warning, check_running};
 use mapper_numerics::statistics::median;
-use mapper_observe::plausible::check_running;
 use mapper_physics::gas::air::Air;
 
 /// Limits for the ratio of compressor to turbine power. Bound: upper, and lower. A turbine housing that loses as much as it delivers is

@@ -3,7 +3,7 @@
 use crate::IdentifyConfig;
 use crate::step_data::samples::{Row, Samples};
 use crate::step_outcome::findings::Findings;
-use mapper_core::{Channel, Warning};
+use mapper_core::{Channel, Warning, repeats};
 use mapper_numerics::statistics::{MIN_VALUES, median_of_sorted, robust_sigma};
 use mapper_observe::redundant_sensors::fuse::SPIKE_SIGMAS;
 use mapper_physics::rig::sensor_fault::repeats_s;
@@ -86,16 +86,6 @@ fn spikes_of(column: &[f64], smallest: f64) -> Vec<usize> {
 }
 
 fn stuck_of(t_s: &[f64], column: &[f64], repeats_s: f64) -> Vec<usize> {
-    let mut stuck = Vec::new();
-    let mut start = 0;
-    for i in 1..=column.len() {
-        if i < column.len() && column[i] == column[start] {
-            continue;
-        }
-        if t_s[i - 1] - t_s[start] >= repeats_s {
-            stuck.extend(start..i);
-        }
-        start = i;
-    }
-    stuck
+    let long = repeats(column).filter(|(first, last)| t_s[*last] - t_s[*first] >= repeats_s);
+    long.flat_map(|(first, last)| first..=last).collect()
 }

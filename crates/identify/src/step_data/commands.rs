@@ -2,8 +2,7 @@
 //!
 //! A closed loop that holds the speed changes P3 slightly all the time. Such a change is no jump, and the command counts as settled.
 
-use mapper_core::{Channel, Recording, SAME_COMMAND_RATIO, StepMarker};
-use mapper_numerics::ROUNDING;
+use mapper_core::{Channel, Recording, SAME_COMMAND_RATIO, StepMarker, is_same_command};
 
 /// Time after a jump from which only the housings still change, s. Bound: several settling times of probe and speed.
 pub(crate) const FOLLOWED_S: f64 = 20.0;
@@ -12,9 +11,9 @@ pub(crate) const FOLLOWED_S: f64 = 20.0;
 /// shorter one.
 const MAX_GAP_S: f64 = 60.0;
 
-/// Whether a command changes by more than rounding; an unknown one does not.
+/// Whether a command changes; an unknown one does not.
 fn changed(before: f64, after: f64) -> bool {
-    (after - before).abs() > ROUNDING * before.abs().max(after.abs())
+    before.is_finite() && after.is_finite() && !is_same_command(before, after)
 }
 
 /// Whether the step at `position` of `steps` begins with a change of a command.

@@ -2,9 +2,8 @@
 
 use crate::step_outcome::findings::Findings;
 use crate::{IdentifyConfig, StepError};
-use mapper_core::{Channel, Recording, Series, StepMarker, Warning};
+use mapper_core::{Channel, Recording, Series, StepMarker, Warning, is_reading};
 use mapper_numerics::statistics::{mean, median, robust_sigma};
-use mapper_observe::plausible::is_reading;
 use mapper_observe::redundant_sensors::fuse::SPIKE_SIGMAS;
 
 /// The operating point at the end of a step.

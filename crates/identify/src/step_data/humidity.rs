@@ -1,10 +1,9 @@
 //! Humidity from a hygrometer or a dew-point mirror.
 
 use crate::config::IdentifyConfig;
-use mapper_core::{Channel, Recording};
+use mapper_core::{Channel, Recording, check_running};
 use mapper_numerics::SLOPE_STEP;
 use mapper_numerics::statistics::mean;
-use mapper_observe::plausible::check_running;
 use mapper_physics::gas::air::humidity_kg_kg;
 
 /// The configuration with the humidity that was measured, the mean over the recording. A hygrometer is assumed to be in the air of the cell, or of the

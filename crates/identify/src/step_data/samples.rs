@@ -1,9 +1,8 @@
 //! The samples of a window on one time base, total pressures, complete rows only.
 
 use crate::IdentifyConfig;
-use mapper_core::{Channel, Recording, Series, Window};
+use mapper_core::{Channel, Recording, Series, Window, is_reading};
 use mapper_numerics::statistics::mean;
-use mapper_observe::plausible::is_reading;
 use mapper_physics::gas::air::Air;
 use mapper_physics::laws::compression::isentropic_rise_ratio;
 use mapper_physics::operating_point::forecast::ForecastRow;

@@ -1,7 +1,7 @@
 //! Response of P3 and the valve to their commands: a first-order lag and a rate limit, and their estimation from a recording.
 
 use crate::averages::time_table::Table;
-use mapper_core::{Channel, Recording, StepMarker};
+use mapper_core::{Channel, Recording, StepMarker, is_jump, is_same_command};
 use mapper_numerics::minimise::minimise;
 use mapper_numerics::statistics::{mean, median};
 use mapper_physics::laws::orifice;
@@ -10,8 +10,6 @@ use mapper_physics::laws::orifice;
 const SETTLING_LAGS: f64 = 6.0;
 /// Minimum flow through an orifice of 1 m2, kg/s. Bound: excludes division by zero without a pressure difference.
 const MIN_FLUX: f64 = 1e-9;
-/// Minimum change of the opening for a jump of the valve. Bound: four times the repeatability of a positioner, 0.005.
-const MIN_VALVE_JUMP_RATIO: f64 = 0.02;
 /// Share of a step at its end in which pressures and flow are settled. Bound: steps are longer than three settling times.
 const SETTLED_SHARE: f64 = 0.3;
 /// Minimum jump of P3 in noise of a sample. Bound: noise alone never reaches it.
@@ -24,9 +22,6 @@ const LAG_TOLERANCE: f64 = 1e-6;
 const RATE_FACTOR: f64 = 1.8;
 /// Relative tolerance of the rate. Bound: far below its error.
 const RATE_TOLERANCE: f64 = 1e-4;
-
-/// Change of a command below which it counts as constant. Bound: rounding of a stored command.
-const COMMAND_TOLERANCE_RATIO: f64 = 1e-6;
 
 /// A commanded level from a given time on.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -166,11 +161,6 @@ pub(crate) fn levels_of_step(recording: &Recording, step: &StepMarker) -> Vec<Le
     levels
 }
 
-/// Whether two commands are the same.
-pub(crate) fn is_same_command(value: f64, other: f64) -> bool {
-    (value / other - 1.0).abs() <= COMMAND_TOLERANCE_RATIO
-}
-
 /// Number of intervals of a coarse search. Bound: neighbouring lags differ by less than a factor of two.
 const COARSE_STEPS: usize = 24;
 /// Rates of the coarse search, in median jumps per second. Bound: slower rates are no jumps, faster ones a lag alone.
@@ -208,13 +198,12 @@ pub fn measured_valve_response(table: &Table, recording: &Recording, nominal_p1_
             flow[i] / orifice::flow_kg_s(1.0, p2[i], t2[i], p1_pa).max(MIN_FLUX)
         })
         .collect();
-    let change = |pair: &[StepMarker]| (pair[1].valve_opening_ratio - pair[0].valve_opening_ratio).abs();
-    let jumps: Vec<f64> = recording
-        .steps
-        .windows(2)
-        .filter(|pair| change(pair) > MIN_VALVE_JUMP_RATIO)
-        .map(|pair| pair[1].start_s)
-        .collect();
+    let openings_of = |pair: &[StepMarker]| (pair[0].valve_opening_ratio, pair[1].valve_opening_ratio);
+    let jumping = || {
+        let jumped = |(from, to): (f64, f64)| is_jump(Channel::ValveCommand, from, to);
+        recording.steps.windows(2).filter(move |pair| jumped(openings_of(pair)))
+    };
+    let jumps: Vec<f64> = jumping().map(|pair| pair[1].start_s).collect();
     // Convert areas to openings, with the median ratio at the settled ends of the steps.
     let mut areas: Vec<f64> = recording
         .steps
@@ -228,7 +217,7 @@ pub fn measured_valve_response(table: &Table, recording: &Recording, nominal_p1_
     areas.sort_by(f64::total_cmp);
     let area_m2 = *areas.get(areas.len() / 2)?;
     let openings: Vec<f64> = openings.iter().map(|x| x / area_m2).collect();
-    let sizes = recording.steps.windows(2).map(change).filter(|size| *size > MIN_VALVE_JUMP_RATIO);
+    let sizes = jumping().map(openings_of).map(|(from, to)| (to - from).abs());
     let commanded = LaggedCommand::of_recording(recording, Response::lag(0.0), Response::lag(0.0));
     estimate_response(table, &openings, &jumps, sizes.collect(), |response| {
         let command = commanded.with_responses(Response::lag(0.0), response);
@@ -239,7 +228,9 @@ pub fn measured_valve_response(table: &Table, recording: &Recording, nominal_p1_
 /// Starts of the steps with a jump of P3.
 fn p3_jumps(recording: &Recording, noise_sigma: f64) -> Vec<f64> {
     let jumped = |pair: &&[StepMarker]| {
-        (pair[1].p3_pa - pair[0].p3_pa).abs() > MIN_P3_JUMP_SIGMAS * noise_sigma.max(1.0)
+        let (from_pa, to_pa) = (pair[0].p3_pa, pair[1].p3_pa);
+        is_jump(Channel::P3Command, from_pa, to_pa)
+            && (to_pa - from_pa).abs() > MIN_P3_JUMP_SIGMAS * noise_sigma.max(1.0)
     };
     recording.steps.windows(2).filter(jumped).map(|pair| pair[1].start_s).collect()
 }

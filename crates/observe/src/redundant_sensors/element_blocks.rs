@@ -1,7 +1,6 @@
 //! Means of redundant sensors over common short blocks, independent of their sampling.
 
-use crate::plausible::is_reading;
-use mapper_core::{Channel, Series};
+use mapper_core::{Channel, Series, is_reading};
 
 /// Length of a block, s. Bound: longer than the correlation time of usual noise, shorter than the lag of a probe that is too large.
 const BLOCK_S: f64 = 2.0;

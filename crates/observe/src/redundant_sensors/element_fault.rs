@@ -1,37 +1,29 @@
 //! Faults of the redundant sensors of a channel, and the result of their fusion, as values and text.
 
-use mapper_core::{Channel, DeclaredUncertainty, Element};
+use mapper_core::{Channel, DeclaredUncertainty, Element, FaultKind};
 use serde::Serialize;
 use std::fmt;
 
-/// Reason for excluding a redundant sensor.
+/// Reason for excluding a redundant sensor, a kind of the catalogue of sensor faults.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Fault {
-    /// Reading differs from the others.
-    Off {
-        /// Its reading minus that of the others, in the channel's unit.
-        by: f64,
-        /// The difference in declared standard deviations of it.
-        sigmas: f64,
-    },
-    /// The sensor lags or leads the others.
-    Slow {
-        /// Its lag minus that of the others, s.
-        lag_s: f64,
-    },
-    /// The sensor is stuck while the others change.
-    Stuck {
-        /// Start of the constant reading in run time, s.
-        from_s: f64,
-        /// Constant reading, in the channel's unit.
-        reading: f64,
-    },
-    /// The sensor gives no reading for much of the time.
-    Silent {
-        /// Fraction of the recording without a reading.
-        missing_ratio: f64,
-    },
+pub struct ElementFault {
+    /// Its kind: offset, lag, frozen or silent.
+    pub kind: FaultKind,
+    /// Its reading minus that of the others, in the channel's unit; its lag minus that of the others, s; its constant reading; or its fraction of
+    /// missing readings.
+    pub size: f64,
+    /// The offset in declared standard deviations of it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sigmas: Option<f64>,
+    /// Start of the constant reading in run time, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub from_s: Option<f64>,
+}
+
+impl ElementFault {
+    pub(crate) fn new(kind: FaultKind, size: f64) -> ElementFault {
+        ElementFault { kind, size, sigmas: None, from_s: None }
+    }
 }
 
 /// An excluded sensor.
@@ -44,7 +36,7 @@ pub struct FaultyElement {
     /// Number of sensors that it was compared with.
     pub others: usize,
     /// The reason.
-    pub fault: Fault,
+    pub fault: ElementFault,
 }
 
 impl fmt::Display for FaultyElement {
@@ -54,25 +46,27 @@ impl fmt::Display for FaultyElement {
             1 => "the other one".to_owned(),
             others => format!("the other {others}"),
         };
-        match self.fault {
-            Fault::Off { by, sigmas } => {
-                let side = if by < 0.0 { "below" } else { "above" };
+        let ElementFault { kind, size, sigmas, from_s } = self.fault;
+        match kind {
+            FaultKind::Offset => {
+                let side = if size < 0.0 { "below" } else { "above" };
+                let sigmas = sigmas.unwrap_or(f64::NAN);
                 write!(
                     f,
                     "{name} reads {} {unit} {side} {others} ({sigmas:.1} sigma)",
-                    ShortNumber(by.abs())
+                    ShortNumber(size.abs())
                 )?;
             }
-            Fault::Slow { lag_s } => {
-                let later = if lag_s < 0.0 { "earlier" } else { "later" };
-                write!(f, "{name} follows changes {:.1} s {later} than {others}", lag_s.abs())?;
+            FaultKind::Lag => {
+                let later = if size < 0.0 { "earlier" } else { "later" };
+                write!(f, "{name} follows changes {:.1} s {later} than {others}", size.abs())?;
             }
-            Fault::Stuck { from_s, reading } => {
-                write!(f, "{name} is frozen at {reading:.6} {unit} from {from_s:.0} s on, {others} are not")?;
+            FaultKind::Frozen => {
+                let from_s = from_s.unwrap_or(f64::NAN);
+                write!(f, "{name} is frozen at {size:.6} {unit} from {from_s:.0} s on, {others} are not")?;
             }
-            Fault::Silent { missing_ratio } => {
-                write!(f, "{name} gives no reading for {:.0} % of the time", 100.0 * missing_ratio)?;
-            }
+            FaultKind::Silent => write!(f, "{name} gives no reading for {:.0} % of the time", 100.0 * size)?,
+            other => write!(f, "{name} has a fault: {other}")?,
         }
         f.write_str(": left out")
     }
@@ -97,7 +91,7 @@ pub struct Contradiction {
     /// The sensor that differs most from the others in use.
     pub name: String,
     /// The difference.
-    pub fault: Fault,
+    pub fault: ElementFault,
     /// Largest distance of a sensor in use from the fused reading, in the channel's unit: it widens the declared offset.
     pub widened_by: f64,
 }
@@ -146,12 +140,16 @@ impl fmt::Display for FusedChannel {
             write!(f, "; {faulty}")?;
         }
         if let Some(Contradiction { name, fault, widened_by }) = &self.contradiction {
-            let what = match fault {
-                Fault::Off { by, sigmas } => {
-                    format!("reads {:+.2} {unit} off the others ({sigmas:.1} sigma)", by)
+            let ElementFault { kind, size, sigmas, .. } = fault;
+            let what = match kind {
+                FaultKind::Offset => {
+                    format!(
+                        "reads {size:+.2} {unit} off the others ({:.1} sigma)",
+                        sigmas.unwrap_or(f64::NAN)
+                    )
                 }
-                Fault::Slow { lag_s } => format!("follows changes {lag_s:+.1} s after the others"),
-                Fault::Stuck { .. } | Fault::Silent { .. } => "does not follow the others".to_owned(),
+                FaultKind::Lag => format!("follows changes {size:+.1} s after the others"),
+                _ => "does not follow the others".to_owned(),
             };
             write!(
                 f,
@@ -173,9 +171,9 @@ mod tests {
             let element = Element { channel: Channel::T2, number: 3 };
             FaultyElement { element, name: "T2/3".to_owned(), others: 3, fault }.to_string()
         };
-        let off = faulty(Fault::Off { by: -1.52, sigmas: 6.1 });
+        let off = faulty(ElementFault { sigmas: Some(6.1), ..ElementFault::new(FaultKind::Offset, -1.52) });
         assert_eq!(off, "T2/3 reads 1.52 K below the other 3 (6.1 sigma): left out");
-        let slow = faulty(Fault::Slow { lag_s: 7.26 });
+        let slow = faulty(ElementFault::new(FaultKind::Lag, 7.26));
         assert_eq!(slow, "T2/3 follows changes 7.3 s later than the other 3: left out");
     }
 }

@@ -5,8 +5,11 @@
 //! sensor is identified by its own readings.
 
 use crate::redundant_sensors::element_blocks::Blocks;
-use crate::redundant_sensors::element_fault::Fault;
-use mapper_core::{Channel, NoiseColour, RedundantSensors, Series};
+use crate::redundant_sensors::element_fault::ElementFault;
+use mapper_core::{
+    COARSE_REPEAT_S, COARSE_REPEAT_SAMPLES, Channel, FaultKind, NoiseColour, RedundantSensors, Series,
+    repeats,
+};
 use mapper_numerics::coloured_noise::ColouredNoise;
 use mapper_numerics::statistics::mean;
 use mapper_physics::laws::thermocouple;
@@ -22,11 +25,6 @@ const MIN_BLOCKS: usize = 10;
 /// A sensor is silent if it gives no reading in a larger fraction of the blocks, compared with the sensor that has most. Bound: a sensor
 /// with most of the readings is not silent.
 const MAX_MISSING_RATIO: f64 = 0.5;
-/// Minimum duration of a reading that repeats to the last digit for a stuck sensor, s. Bound: ten correlation times of sensor noise.
-const FROZEN_S: f64 = 20.0;
-/// Minimum number of its samples. Bound: a live sensor whose digit changes in a fifth of its samples repeats as often once in a hundred
-/// cases.
-const FROZEN_SAMPLES: usize = 20;
 /// Minimum fraction of samples of a live sensor that differ from the previous one. Bound: a coarse digit repeats often.
 const MIN_CHANGING_RATIO: f64 = 0.2;
 /// Band within which a reading counts as constant, in standard deviations of a block mean; noise exceeds it in 1e-8 of blocks. Bound:
@@ -58,9 +56,9 @@ const USUAL_T2_K: f64 = 350.0;
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Judgement {
     /// Sensors to exclude, with the reason and the number of compared sensors.
-    pub(crate) left_out: Vec<(usize, Fault, usize)>,
+    pub(crate) left_out: Vec<(usize, ElementFault, usize)>,
     /// The worst difference among the remaining ones, if the wrong one cannot be identified.
-    pub(crate) contradiction: Option<(usize, Fault)>,
+    pub(crate) contradiction: Option<(usize, ElementFault)>,
 }
 
 impl Judgement {
@@ -108,6 +106,10 @@ pub(crate) fn judge(
     }
 }
 
+fn frozen(from_s: f64, reading: f64) -> ElementFault {
+    ElementFault { from_s: Some(from_s), ..ElementFault::new(FaultKind::Frozen, reading) }
+}
+
 struct Judge<'a> {
     sensors: &'a [Option<&'a Series>],
     declared: &'a RedundantSensors,
@@ -120,7 +122,7 @@ struct Judge<'a> {
 struct Difference {
     index: usize,
     severity: f64,
-    fault: Fault,
+    fault: ElementFault,
 }
 
 impl Judge<'_> {
@@ -131,7 +133,11 @@ impl Judge<'_> {
         for (index, count) in counts.iter().enumerate() {
             let missing_ratio = 1.0 - *count as f64 / max_count.max(1) as f64;
             if missing_ratio > MAX_MISSING_RATIO {
-                judgement.left_out.push((index, Fault::Silent { missing_ratio }, counts.len() - 1));
+                judgement.left_out.push((
+                    index,
+                    ElementFault::new(FaultKind::Silent, missing_ratio),
+                    counts.len() - 1,
+                ));
             }
         }
     }
@@ -154,17 +160,10 @@ impl Judge<'_> {
     }
 
     /// Finds a reading that repeats to the last digit while all others change.
-    fn find_frozen(&self, index: usize, others: &[usize]) -> Option<Fault> {
+    fn find_frozen(&self, index: usize, others: &[usize]) -> Option<ElementFault> {
         let series = self.sensors[index]?;
-        let (mut start, mut longest) = (0, (0, 0));
-        for i in 1..=series.values.len() {
-            if series.values.get(i) != series.values.get(start) {
-                if i - 1 - start > longest.1 - longest.0 {
-                    longest = (start, i - 1);
-                }
-                start = i;
-            }
-        }
+        // The first of the longest runs.
+        let longest = repeats(&series.values).reduce(|a, b| if b.1 - b.0 > a.1 - a.0 { b } else { a })?;
         let (from_s, to_s) = (*series.t_s.get(longest.0)?, *series.t_s.get(longest.1)?);
         let reading = *series.values.get(longest.0)?;
         let changes = |other: &usize| {
@@ -172,12 +171,12 @@ impl Judge<'_> {
             let change_count = values.windows(2).filter(|pair| pair[0] != pair[1]).count();
             change_count as f64 > MIN_CHANGING_RATIO * values.len() as f64
         };
-        let long = to_s - from_s >= FROZEN_S && longest.1 - longest.0 >= FROZEN_SAMPLES;
-        (long && others.iter().all(changes)).then_some(Fault::Stuck { from_s, reading })
+        let long = to_s - from_s >= COARSE_REPEAT_S && longest.1 - longest.0 >= COARSE_REPEAT_SAMPLES;
+        (long && others.iter().all(changes)).then(|| frozen(from_s, reading))
     }
 
     /// Finds a reading that stays within its noise while the others change far and permanently.
-    fn find_constant(&self, index: usize, others: &[usize]) -> Option<Fault> {
+    fn find_constant(&self, index: usize, others: &[usize]) -> Option<ElementFault> {
         let band = CONSTANT_BAND_SIGMAS * self.block_sigma(index).max(f64::MIN_POSITIVE);
         let own = &self.blocks.means[index];
         let reference = self.blocks.weighted(&self.declared.weights(|other| others.contains(&other)));
@@ -193,7 +192,7 @@ impl Judge<'_> {
                         usize::from((reference[block] - reference[first]).abs() > MIN_MOVE_BANDS * band);
                     if changed_blocks >= MIN_MOVE_BLOCKS {
                         let from_s = self.blocks.start_s + first as f64 * self.blocks.length_s;
-                        return Some(Fault::Stuck { from_s, reading: own[first] });
+                        return Some(frozen(from_s, own[first]));
                     }
                 }
                 _ => (start, changed_blocks) = (Some(block), 0),
@@ -223,10 +222,16 @@ impl Judge<'_> {
         }
         let lag = self.lag(index, &weights, &rows);
         let (by, sigmas) = self.offset(index, &weights, &rows, lag.map_or(0.0, |lag| lag.lag_s));
-        let offset =
-            Difference { index, severity: sigmas / self.limit_sigmas, fault: Fault::Off { by, sigmas } };
-        let slow =
-            lag.map(|Lag { lag_s, severity }| Difference { index, severity, fault: Fault::Slow { lag_s } });
+        let offset = Difference {
+            index,
+            severity: sigmas / self.limit_sigmas,
+            fault: ElementFault { sigmas: Some(sigmas), ..ElementFault::new(FaultKind::Offset, by) },
+        };
+        let slow = lag.map(|Lag { lag_s, severity }| Difference {
+            index,
+            severity,
+            fault: ElementFault::new(FaultKind::Lag, lag_s),
+        });
         Some(slow.filter(|slow| slow.severity > offset.severity).unwrap_or(offset))
     }
 

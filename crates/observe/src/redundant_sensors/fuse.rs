@@ -5,10 +5,12 @@
 //! of their mean is the mean of their lags, which is sufficient for slow changes.
 
 use crate::averages::time_table::resample;
-use crate::plausible::is_reading;
-use crate::redundant_sensors::element_fault::{Contradiction, Fault, FaultyElement, FusedChannel};
+use crate::redundant_sensors::element_fault::{Contradiction, FaultyElement, FusedChannel};
 use crate::redundant_sensors::element_judge::{FALSE_ALARMS_RATIO, Judgement, comparisons, judge};
-use mapper_core::{Channel, DeclaredUncertainty, Element, NoiseColour, Recording, RedundantSensors, Series};
+use mapper_core::{
+    Channel, DeclaredUncertainty, Element, FaultKind, NoiseColour, Recording, RedundantSensors, Series,
+    is_reading,
+};
 use mapper_numerics::statistics::{mean, median, median_of_sorted, normal_quantile};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -85,7 +87,7 @@ fn fused_channel(
     let mut fused = declared.fused(uses);
     let contradiction = judgement.contradiction.map(|(index, fault)| {
         // Either sensor may be right: the offset covers the farthest one.
-        let widened_by = if matches!(fault, Fault::Off { .. }) {
+        let widened_by = if fault.kind == FaultKind::Offset {
             max_difference(channel, sensors, declared, &uses)
         } else {
             0.0

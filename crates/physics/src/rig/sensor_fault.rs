@@ -5,32 +5,9 @@
 //! share a reference junction, pressure transducers a barometer or a supply.
 
 use crate::rig::effect::{Effect, EffectError, EffectInfo, EffectParameter, NamedValues, Rig, Submodel};
-use mapper_core::Channel;
+use mapper_core::{Channel, FaultKind, NOISY_REPEAT_S};
 use std::fmt;
 use std::sync::Arc;
-
-/// Form of the error of a reading.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum FaultKind {
-    /// A thermocouple reads a temperature between gas and wall: share of the difference.
-    TowardsWall,
-    /// The reading follows with a lag, s. T2 has two in series: a sheath of this diameter, m, as in eqs. 11 and 12, and the element in it.
-    Lag,
-    /// An error proportional to the reading; for temperatures, to the difference from [`CALIBRATED_AT_K`]. Ratio.
-    Gain,
-    /// A constant error of every reading, in the channel's unit (K, Pa, kg/s, rpm).
-    Offset,
-    /// A drift from zero at the start of the run to the full size at its end: in the unit of the channel, but a ratio to the
-    /// reading for flow and speed.
-    Drift,
-    /// An error proportional to the square of the flow, in the channel's unit at
-    /// [`FULL_FLUX_KG_M2S`](crate::rig::instruments::FULL_FLUX_KG_M2S): dynamic pressure at a tap, gas that is not mixed at a probe.
-    WithFlowSquared,
-    /// An error proportional to the opening of the valve, in the channel's unit at opening 1: flow around a tap that changes with it.
-    WithValve,
-    /// The reading repeats one value for longer than noise allows, s.
-    Frozen,
-}
 
 /// A fault of one or several sensors.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -71,8 +48,6 @@ const HOT_GAS_K: f64 = 10.0;
 const PRESSURE_PA: f64 = 3e3;
 const RATIO: f64 = 0.05;
 const LAG_S: f64 = 2.0;
-/// Noise repeats a value in two or three samples of a coarse logger, not for seconds.
-const FROZEN_S: f64 = 5.0;
 const WALL_RATIO: f64 = 0.1;
 /// Turbine inlet pressures are twice those of the compressor.
 const TURBINE_PA: f64 = 6e3;
@@ -187,13 +162,13 @@ pub const CATALOGUE: [SensorFault; 60] = {
         searched(&[T3], Offset, HOT_GAS_K, &[Size("t3_offset", "K", -60.0, 60.0, 5.0)]),
         searched(&[TurbineFlow], Gain, RATIO, &[Size("turbine_flow_gain", "1", 0.6, 1.5, 0.05)]),
         in_logs(&[TurbineFlow], Lag, LAG_S, &[Size("turbine_flow_lag", "s", 0.0, 30.0, 1.0)]),
-        fault(&[ShaftSpeed], Frozen, FROZEN_S),
-        fault(&[CompressorFlow], Frozen, FROZEN_S),
-        fault(&[P1], Frozen, FROZEN_S),
-        fault(&[T1], Frozen, FROZEN_S),
-        fault(&[P2], Frozen, FROZEN_S),
-        fault(&[T2], Frozen, FROZEN_S),
-        fault(&[Tc], Frozen, FROZEN_S),
+        fault(&[ShaftSpeed], Frozen, NOISY_REPEAT_S),
+        fault(&[CompressorFlow], Frozen, NOISY_REPEAT_S),
+        fault(&[P1], Frozen, NOISY_REPEAT_S),
+        fault(&[T1], Frozen, NOISY_REPEAT_S),
+        fault(&[P2], Frozen, NOISY_REPEAT_S),
+        fault(&[T2], Frozen, NOISY_REPEAT_S),
+        fault(&[Tc], Frozen, NOISY_REPEAT_S),
     ]
 };
 
@@ -283,7 +258,7 @@ impl SensorFault {
             FaultKind::Drift if relative => run_ratio * reading,
             FaultKind::Drift => run_ratio,
             FaultKind::TowardsWall => housing_k - reading,
-            FaultKind::Lag | FaultKind::Frozen | FaultKind::WithFlowSquared | FaultKind::WithValve => 0.0,
+            _ => 0.0,
         }
     }
 
@@ -308,9 +283,7 @@ impl SensorFault {
                 "y = x + b u",
                 "flow around the sensor that changes with the valve",
             ),
-            FaultKind::Offset | FaultKind::Drift | FaultKind::Frozen => {
-                ("reads high or low by a constant", "y = x + b", "calibration of the sensor")
-            }
+            _ => ("reads high or low by a constant", "y = x + b", "calibration of the sensor"),
         };
         let (submodel, neighbour) = match channel {
             Channel::T1 => (Submodel::T1Probe, Some(Submodel::CompressorGas)),
@@ -384,7 +357,7 @@ impl Effect for FaultEffect {
             FaultKind::TowardsWall => path.towards_wall_ratio += size,
             FaultKind::WithFlowSquared => path.with_flow_squared += size,
             FaultKind::WithValve => path.with_valve += size,
-            FaultKind::Offset | FaultKind::Drift | FaultKind::Frozen => path.offset += size,
+            _ => path.offset += size,
         }
         Ok(())
     }
@@ -393,22 +366,14 @@ impl Effect for FaultEffect {
 /// `offset of T2`.
 impl fmt::Display for SensorFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let kind = match self.kind {
-            FaultKind::Offset => "offset",
-            FaultKind::Gain => "gain error",
-            FaultKind::Drift => "drift",
-            FaultKind::Lag if self.sizes.len() > 1 => "sheathed probe",
-            FaultKind::Lag => "lag",
-            FaultKind::TowardsWall => {
-                return write!(f, "conduction along the {} probe", self.channel_names());
-            }
-            FaultKind::WithFlowSquared | FaultKind::WithValve => {
-                let cause = if self.kind == FaultKind::WithValve { "valve opening" } else { "flow squared" };
-                return write!(f, "error of {} with {cause}", self.channel_names());
-            }
-            FaultKind::Frozen => "frozen reading",
-        };
-        write!(f, "{kind} of {}", self.channel_names())
+        let names = self.channel_names();
+        match self.kind {
+            FaultKind::Lag if self.sizes.len() > 1 => write!(f, "sheathed probe of {names}"),
+            FaultKind::TowardsWall => write!(f, "conduction along the {names} probe"),
+            FaultKind::WithFlowSquared => write!(f, "error of {names} with flow squared"),
+            FaultKind::WithValve => write!(f, "error of {names} with valve opening"),
+            kind => write!(f, "{kind} of {names}"),
+        }
     }
 }
 

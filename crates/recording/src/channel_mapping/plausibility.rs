@@ -1,13 +1,11 @@
 //! Checks readings against the units of the channel map, before anything is computed from them.
 
 use crate::channel_mapping::channel_map_mistakes::MapMistakes;
-use crate::logs::plausible::{
-    AMBIENT_RANGE_PA, TRIMMED_SHARE, fitting_units, is_plausible, looks_like_gauge,
-};
+use crate::logs::plausible::{AMBIENT_RANGE_PA, TRIMMED_SHARE, fitting_units, looks_like_gauge};
 use crate::logs::proposal::short;
 use crate::{AmbientPressure, ChannelSource};
 use mapper_core::unit_factors::PA_PER_KPA;
-use mapper_core::{Channel, Series};
+use mapper_core::{Channel, Series, is_plausible_range};
 use mapper_numerics::statistics::quantile;
 use mapper_table::{kind_of, unit};
 use mapper_yaml::units::{Kind, Unit};
@@ -29,7 +27,7 @@ pub(crate) struct Readings<'a> {
 pub(crate) fn check(readings: &Readings<'_>, mistakes: &mut MapMistakes) {
     let Readings { channel, source, unit: unit_used, series, ambient_pa } = *readings;
     let Some((low, high)) = trimmed_range(series) else { return };
-    if is_plausible(channel, low, high) {
+    if is_plausible_range(channel, low, high) {
         return;
     }
     // Offset added to the readings.
@@ -43,7 +41,7 @@ pub(crate) fn check(readings: &Readings<'_>, mistakes: &mut MapMistakes) {
                 .to_owned(),
         );
     }
-    if source.gauge && is_plausible(channel, low - over_pa, high - over_pa) {
+    if source.gauge && is_plausible_range(channel, low - over_pa, high - over_pa) {
         right.push("as absolute pressures they would be plausible: delete `gauge: true`".to_owned());
     }
     for other in fitting_units(channel, written_low, written_high, over_pa) {

@@ -1,6 +1,6 @@
 //! Plausible ranges of the channels: they reveal a wrong unit before anything is computed.
 
-use mapper_core::{Channel, plausible};
+use mapper_core::{Channel, is_plausible_range};
 use mapper_table::{kind_of, unit};
 use mapper_yaml::units::{Kind, Unit};
 
@@ -16,17 +16,6 @@ pub(crate) const STANDARD_ATMOSPHERE_PA: f64 = 101_325.0;
 /// Range of an ambient pressure, Pa. Bound: altitudes of up to 5 km, and the highest weather.
 pub const AMBIENT_RANGE_PA: (f64, f64) = (5e4, 1.1e5);
 
-/// Whether readings between `low` and `high` (SI, without the trimmed share at each end) are possible for a channel.
-pub fn is_plausible(channel: Channel, low: f64, high: f64) -> bool {
-    let running = plausible(channel).running;
-    let (min, max) = (*running.start(), *running.end());
-    match kind_of(channel) {
-        // 0 at rest, but not all the time. A channel that is always 0 is dead: its unit may be right.
-        Kind::Speed | Kind::MassFlow => high <= max && (high >= min || high == 0.0 && low == 0.0),
-        _ => low >= min && high <= max,
-    }
-}
-
 /// Units that logs omit because their program or stand always uses them.
 const USUAL_UNITS: [&str; 15] = [
     "K", "degC", "Pa", "kPa", "mbar", "bar", "psia", "rpm", "krpm", "kg/s", "g/s", "kg/h", "lb/min", "%", "1",
@@ -38,7 +27,7 @@ pub fn fitting_units(channel: Channel, low: f64, high: f64, offset: f64) -> Vec<
     let kind = kind_of(channel);
     let usual = |unit: &&Unit| USUAL_UNITS.contains(&unit.symbol());
     let fitting = |unit: &&'static Unit| {
-        is_plausible(channel, unit.to_inside(low) + offset, unit.to_inside(high) + offset)
+        is_plausible_range(channel, unit.to_inside(low) + offset, unit.to_inside(high) + offset)
     };
     let bare = unit(kind, "1").ok();
     kind.units().iter().chain(bare).filter(usual).filter(fitting).collect()
@@ -50,8 +39,8 @@ pub fn looks_like_gauge(channel: Channel, low_pa: f64, high_pa: f64) -> bool {
     /// An ambient pressure, Pa. Bound: only the size matters here.
     const AMBIENT_PA: f64 = 1e5;
     kind_of(channel) == Kind::Pressure
-        && !is_plausible(channel, low_pa, high_pa)
-        && is_plausible(channel, low_pa + AMBIENT_PA, high_pa + AMBIENT_PA)
+        && !is_plausible_range(channel, low_pa, high_pa)
+        && is_plausible_range(channel, low_pa + AMBIENT_PA, high_pa + AMBIENT_PA)
         && low_pa > -MAX_SUCTION_RATIO * AMBIENT_PA
 }
 
@@ -62,20 +51,23 @@ mod tests {
     #[test]
     fn the_usual_mistakes_of_units_show() {
         // A car's compressor at 40 kg/h to 1100 kg/h taken for g/s and for kg/s.
-        assert!(is_plausible(Channel::CompressorFlow, 0.011, 0.31));
-        assert!(!is_plausible(Channel::CompressorFlow, 40.0, 1100.0));
+        assert!(is_plausible_range(Channel::CompressorFlow, 0.011, 0.31));
+        assert!(!is_plausible_range(Channel::CompressorFlow, 40.0, 1100.0));
         let symbols: Vec<_> = fitting_units(Channel::CompressorFlow, 40.0, 1100.0, 0.0)
             .iter()
             .map(|unit| unit.symbol())
             .collect();
         assert!(symbols.contains(&"kg/h") && !symbols.contains(&"kg/s"), "{symbols:?}");
         // degC taken for K, K for degC, rpm in thousands.
-        assert!(!is_plausible(Channel::T1, 19.0, 25.0) && !is_plausible(Channel::T1, 565.0, 573.0));
         assert!(
-            !is_plausible(Channel::ShaftSpeed, 50.0, 150.0) && is_plausible(Channel::ShaftSpeed, 0.0, 1.5e5)
+            !is_plausible_range(Channel::T1, 19.0, 25.0) && !is_plausible_range(Channel::T1, 565.0, 573.0)
+        );
+        assert!(
+            !is_plausible_range(Channel::ShaftSpeed, 50.0, 150.0)
+                && is_plausible_range(Channel::ShaftSpeed, 0.0, 1.5e5)
         );
         // A dead channel does not indicate a wrong unit.
-        assert!(is_plausible(Channel::ShaftSpeed, 0.0, 0.0));
+        assert!(is_plausible_range(Channel::ShaftSpeed, 0.0, 0.0));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Finds the steps of a recording without markers and commands: at jumps of speed, flow and pressures.
 
 use crate::ReadWarning;
-use mapper_core::{Channel, JUMPS, Series, StepKind, StepMarker, VALVE_JUMP_RATIO};
+use mapper_core::{Channel, Group, JUMPS, Series, StepKind, StepMarker, jump_ratio};
 use mapper_numerics::statistics::{self, nearest_rank};
 use std::collections::BTreeMap;
 
@@ -46,12 +46,14 @@ const SETTLING_SHARE: f64 = 0.2;
 /// Shaft speed below which the machine is at rest, rpm. Bound: far below any idle, far above any sensor's noise.
 const MAX_REST_RPM: f64 = 1000.0;
 
-/// The valve opening, if it was measured.
-const MEASURED_VALVE: (Channel, f64) = (Channel::ValveCommand, VALVE_JUMP_RATIO);
+/// The measured channels that jump, in the order of the table.
+fn measured_jumps() -> impl Iterator<Item = (Channel, f64)> {
+    JUMPS.into_iter().filter(|(channel, _)| channel.info().group != Group::Command)
+}
 
 /// Whether there is a signal that may jump.
 pub(crate) fn can_be_searched(series: &BTreeMap<Channel, Series>) -> bool {
-    JUMPS.iter().any(|(channel, _)| series.get(channel).is_some_and(|series| series.t_s.len() > 30))
+    measured_jumps().any(|(channel, _)| series.get(&channel).is_some_and(|series| series.t_s.len() > 30))
 }
 
 /// Steps from jump to jump. The time before the first jump is the first step. A measured valve is evaluated too.
@@ -60,8 +62,8 @@ pub(crate) fn steps_from_jumps(
     measured_valve: bool,
     warnings: &mut Vec<ReadWarning>,
 ) -> Vec<StepMarker> {
-    let wanted: Vec<(Channel, f64)> =
-        JUMPS.into_iter().chain(measured_valve.then_some(MEASURED_VALVE)).collect();
+    let valve = measured_valve.then_some((Channel::ValveCommand, jump_ratio(Channel::ValveCommand)));
+    let wanted: Vec<(Channel, f64)> = measured_jumps().chain(valve).collect();
     let grid = Grid::of(series, &wanted);
     let (Some(first_s), Some(last_s)) = (grid.t_s.first().copied(), grid.t_s.last().copied()) else {
         return Vec::new();

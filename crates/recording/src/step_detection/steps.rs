@@ -1,7 +1,10 @@
 //! The steps of a recording: from its markers, or from changes of the commands.
 
 use crate::ReadWarning;
-use mapper_core::{Channel, Group, OperatingPoint, Series, StepKind, StepMarker};
+use mapper_core::{
+    Channel, Group, OperatingPoint, SLOW_JUMP_MULTIPLE, Series, StepKind, StepMarker, is_same_command,
+    jump_ratio,
+};
 use mapper_numerics::statistics::median;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -12,16 +15,6 @@ const FAST_START_SHARE: f64 = 0.25;
 /// Maximum time between changes of commands that belong to one jump, s. Pressure and valve change one after the other, and a ramp is a
 /// chain of changes. Bound: pressure and valve change one after the other, and a ramp is a chain of changes.
 const MAX_JUMP_GAP_S: f64 = 1.0;
-
-/// Relative change below which a command counts as unchanged. Bound: the read-back of a constant command varies in its last digits.
-const COMMAND_TOLERANCE_RATIO: f64 = 1e-6;
-
-/// Minimum relative change of P3 within [`MAX_JUMP_GAP_S`] that is a jump. Bound: a speed controller changes it more slowly.
-const MIN_FAST_RATIO: f64 = 0.01;
-
-/// Minimum relative change of P3 by a chain of slow changes that is a jump of a slow rig. A smaller one is a speed controller's. Bound: a
-/// smaller one is a speed controller's.
-const MIN_SLOW_RATIO: f64 = 0.02;
 
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub(crate) struct StepMessage {
@@ -185,13 +178,14 @@ fn jump_of_chain(chain: &[f64], p3_changes: &[Change], valve_changes: &[Change])
     };
     // Without this limit, a controller's trim before a jump would become its start.
     let fast_over = |from_s: f64, share: f64| {
-        moved_ratio(from_s, from_s + share * MAX_JUMP_GAP_S) > share * MIN_FAST_RATIO
+        moved_ratio(from_s, from_s + share * MAX_JUMP_GAP_S) > share * jump_ratio(Channel::P3Command)
     };
     let fast = chain.iter().copied().find(|t_s| {
         !within(valve_changes, *t_s, *t_s).is_empty()
             || fast_over(*t_s, FAST_START_SHARE) && fast_over(*t_s, 1.0)
     });
-    let slow = (moved_ratio(first_s, last_s) > MIN_SLOW_RATIO).then_some(first_s);
+    let slow_ratio = SLOW_JUMP_MULTIPLE * jump_ratio(Channel::P3Command);
+    let slow = (moved_ratio(first_s, last_s) > slow_ratio).then_some(first_s);
     Some((fast.or(slow)?, last_s))
 }
 
@@ -220,9 +214,7 @@ fn find_changes(command: &Series) -> Vec<Change> {
     let mut current: Option<f64> = None;
     let mut changes = Vec::new();
     for (t_s, value) in command.t_s.iter().zip(&command.values).filter(|(_, value)| value.is_finite()) {
-        let before = current.filter(|before| {
-            (value - before).abs() > COMMAND_TOLERANCE_RATIO * value.abs().max(before.abs())
-        });
+        let before = current.filter(|before| !is_same_command(*value, *before));
         changes.extend(before.map(|before| Change { t_s: *t_s, before, after: *value }));
         if before.is_some() || current.is_none() {
             current = Some(*value);

@@ -3,10 +3,6 @@
 use crate::guards::guard::CommandedState;
 use mapper_core::{Channel, FrozenLimit, readable};
 
-/// A reading is frozen if it moves by no more than this ratio (4 mK of 400 K, 2 Pa of 200 kPa). The noise of thermocouple and
-/// pressure amplifiers is larger, and a jump of the setpoints moves a reading a hundred times as far.
-const FROZEN_RATIO: f64 = 1e-5;
-
 /// The last readings of a channel that may freeze.
 #[derive(Debug, Clone)]
 pub(crate) struct FrozenReading {
@@ -28,13 +24,11 @@ impl FrozenReading {
         channel: Channel,
         state: &CommandedState,
     ) -> Option<String> {
-        let FrozenLimit { after_s, band } = self.limit;
-        let unchanged =
-            |(_, constant): &(f64, f64)| (value - constant).abs() <= band.max(FROZEN_RATIO * constant.abs());
+        let unchanged = |(_, constant): &(f64, f64)| self.limit.is_constant(*constant, value);
         let (since_s, constant) = self.constant_since.filter(unchanged).unwrap_or((t_s, value));
         self.constant_since = Some((since_s, constant));
         let jumped_s = state.jumped_s.filter(|_| state.running)?;
-        if t_s - jumped_s < after_s || since_s > jumped_s {
+        if t_s - jumped_s < self.limit.after_s || since_s > jumped_s {
             return None;
         }
         let value = readable(value, channel.unit());

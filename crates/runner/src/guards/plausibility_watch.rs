@@ -25,7 +25,7 @@ use crate::guards::guard::CommandedState;
 use crate::guards::recent_minimum::RecentMinimum;
 use crate::guards::start_check::REQUIRED_CHANNELS;
 use mapper_core::{
-    Channel, Dimension, Element, GuardName, Provenance, Quality, Reaction, SampleBatch, Trip, measurable,
+    Channel, Element, FaultKind, GuardName, Provenance, Quality, Reaction, SampleBatch, Trip, is_possible,
     plausible, readable,
 };
 use std::collections::BTreeMap;
@@ -109,8 +109,8 @@ struct Track {
 /// A rule, with the sensor that it checks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Rule {
-    Range(Sensor),
-    Jump(Sensor),
+    /// An impossible reading or jump of one sensor.
+    Fault(FaultKind, Sensor),
     /// One of several T2 sensors.
     OutletProbe(Sensor),
     OutletTemperature,
@@ -126,7 +126,7 @@ impl Rule {
     fn sensors(self) -> Vec<Sensor> {
         use Channel as C;
         let channels = match self {
-            Rule::Range(sensor) | Rule::Jump(sensor) | Rule::OutletProbe(sensor) => return vec![sensor],
+            Rule::Fault(_, sensor) | Rule::OutletProbe(sensor) => return vec![sensor],
             Rule::OutletTemperature => vec![C::P1, C::T1, C::P2, C::T2],
             Rule::OutletPressure => vec![C::P1, C::P2],
             Rule::Head => vec![C::ShaftSpeed, C::P1, C::T1, C::P2],
@@ -226,7 +226,7 @@ impl PlausibilityWatch {
             let Some(value) = value else { continue };
             if !is_possible(channel, value, state.running) {
                 found.push((
-                    Rule::Range(sensor),
+                    Rule::Fault(FaultKind::OutOfRange, sensor),
                     format!("{} reads {}", sensor.name(), format_value(channel, value)),
                 ));
                 continue;
@@ -239,7 +239,7 @@ impl PlausibilityWatch {
                     format_value(channel, from),
                     format_value(channel, value)
                 );
-                found.push((Rule::Jump(sensor), reason));
+                found.push((Rule::Fault(FaultKind::Jump, sensor), reason));
             }
             self.tracks.insert(sensor, Track { last: (t_s, value), jumped });
         }
@@ -396,14 +396,6 @@ impl PlausibilityWatch {
         }
         worst
     }
-}
-
-/// Whether a reading of this channel is physically possible. Shaft speed and flow may be zero while the rig starts.
-pub(crate) fn is_possible(channel: Channel, value: f64, running: bool) -> bool {
-    let from_rest = matches!(channel.info().dimension, Dimension::RotationalSpeed | Dimension::MassFlow);
-    value.is_finite()
-        && measurable(channel.info().dimension).contains(&value)
-        && (!running || from_rest || plausible(channel).running.contains(&value))
 }
 
 fn format_value(channel: Channel, value: f64) -> String {

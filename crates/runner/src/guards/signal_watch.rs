@@ -2,8 +2,7 @@
 
 use crate::guards::frozen_reading::FrozenReading;
 use crate::guards::guard::{CommandedState, Guard};
-use crate::guards::plausibility_watch::is_possible;
-use mapper_core::{Quality, Reaction, SampleBatch, SignalGuard, Trip, readable};
+use mapper_core::{Quality, Reaction, SampleBatch, SignalGuard, Trip, is_possible, readable};
 use std::collections::VecDeque;
 
 /// A continuing violation trips again after this time, s.

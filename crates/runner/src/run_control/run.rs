@@ -11,15 +11,13 @@ use crate::run_control::speed_control::SpeedControl;
 use crate::step_sources::step_source::StepSource;
 use mapper_core::{
     Backend, BackendError, Clock, Event, EventKind, GuardName, PlanStep, Reaction, RigMode, RunEnding,
-    SampleBatch, Setpoints, Soak, StepMarker, Trip,
+    SampleBatch, Setpoints, Soak, StepMarker, Trip, is_commanded_jump,
 };
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::AtomicBool;
 
 /// Interval at which observers and steps receive samples, s of run time.
 const POLL_INTERVAL_S: f64 = 1.0;
-/// Relative change of P3 that counts as a jump (twice this for the valve): sensors have to follow it.
-const JUMP_RATIO: f64 = 0.01;
 /// Longest time that a guard may hold the setpoints, s.
 const MAX_HOLD_S: f64 = 300.0;
 /// Longest time that the operator may hold a step, s. It limits a hold that an operator forgets.
@@ -292,11 +290,10 @@ impl Run<'_, '_> {
     pub(crate) fn send(&mut self, setpoints: Setpoints) -> Result<(), BackendError> {
         self.runner.backend.set(&setpoints)?;
         let running = setpoints.mode == RigMode::Running;
-        let jumps = self.sent.is_some_and(|before| {
-            let change = |from: f64, to: f64| (to - from).abs() / from.abs();
-            change(before.p3_pa, setpoints.p3_pa) > JUMP_RATIO
-                || change(before.valve_opening_ratio, setpoints.valve_opening_ratio) > 2.0 * JUMP_RATIO
-        });
+        // Sensors have to follow a jump: see the guards of frozen readings.
+        let commands = |of: &Setpoints| (of.p3_pa, of.valve_opening_ratio);
+        let jumps =
+            self.sent.is_some_and(|before| is_commanded_jump(commands(&before), commands(&setpoints)));
         if jumps && running && self.commanded.running {
             self.commanded.jumped_s = Some(self.now_s);
         } else if !running {

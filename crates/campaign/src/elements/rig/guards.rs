@@ -8,8 +8,8 @@ use crate::units::{
     TemperatureDifference,
 };
 use mapper_core::{
-    Channel, FrozenLimit, GuardName, GuardSet, LargestChange, Limits, Reaction, SURGE_ALLOWED_S, SignalGuard,
-    SpeedBand, SurgeVariation,
+    COARSE_REPEAT_S, Channel, FrozenLimit, GuardName, GuardSet, LargestChange, Limits, Reaction,
+    SURGE_ALLOWED_S, SignalGuard, SpeedBand, SurgeVariation,
 };
 use mapper_yaml::{FindingKind, steps};
 use schemars::JsonSchema;
@@ -172,11 +172,6 @@ pub(crate) struct GuardInputs<'a> {
 const DEFAULT_DWELL_S: f64 = 0.2;
 /// Default age of a reading before a trip, s. Judgement: a few samples of an instrument that reads once a second.
 pub const DEFAULT_MAX_AGE_S: f64 = 3.0;
-/// Default time without any change before a channel counts as frozen, s: 200 samples at 10 Hz without noise.
-const DEFAULT_FROZEN_S: f64 = 20.0;
-/// Movement below which a channel counts as frozen, as a share of its declared noise: 200 samples of a working sensor cover five standard
-/// deviations, and a tenth of them if its noise was declared ten times too large.
-const FROZEN_NOISE_RATIO: f64 = 0.1;
 /// Default time beyond an oil limit before a trip, s. Judgement: ten samples at 10 Hz.
 const DEFAULT_OIL_DWELL_S: f64 = 1.0;
 const DEFAULT_CHANGE_WITHIN_S: f64 = 10.0;
@@ -190,11 +185,11 @@ impl GuardsFile {
     pub(crate) fn guards(self, by: &GuardInputs<'_>) -> GuardSet {
         let GuardInputs { limits, sensors, dwell_s, speed_is_held } = *by;
         let age_s = value_or(self.signals.age, DEFAULT_MAX_AGE_S);
-        let frozen_s = value_or(self.signals.frozen, DEFAULT_FROZEN_S);
+        let frozen_s = value_or(self.signals.frozen, COARSE_REPEAT_S);
         let frozen = |channel| {
             let noise =
                 sensors.get(&channel).map(|sensor: &SensorDeclaration| sensor.declared.noise_sigma)?;
-            (noise > 0.0).then_some(FrozenLimit { after_s: frozen_s, band: FROZEN_NOISE_RATIO * noise })
+            FrozenLimit::of_noise(noise, frozen_s)
         };
         let guard = |name, channel: Channel, reaction: Reaction| SignalGuard {
             name,

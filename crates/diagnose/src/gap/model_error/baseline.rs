@@ -10,7 +10,7 @@ use crate::gap::residuals::hypothesis::Hypothesis;
 use crate::gap::residuals::nuisance::{JUMP_S, NuisanceKind, OUTPUTS, nuisances};
 use crate::gap::residuals::study::{Group, PredictError, Study};
 use crate::gap::residuals::whiten::{Linearised, dot};
-use mapper_core::{Channel, VALVE_JUMP_RATIO, jump_ratio};
+use mapper_core::{Channel, jump_ratio};
 use mapper_identify::LONGEST_BRIDGE_S;
 use mapper_numerics::least_squares::descent::ROUNDS;
 use mapper_numerics::statistics::mean;
@@ -226,7 +226,7 @@ pub(crate) fn same_steps(baseline: &Study, study: &Study) -> Result<(), Problem>
         // Model error hardly changes between points that count as one.
         let (p3_kpa, opening) = (ours.p3_pa / 1e3, ours.valve_opening_ratio);
         differs("commanded P3", theirs.p3_pa / 1e3, p3_kpa, "kPa", jump_ratio(Channel::P3) * p3_kpa)?;
-        differs("opening of the valve", theirs.valve_opening_ratio, opening, "", VALVE_JUMP_RATIO * opening)?;
+        differs("opening of the valve", theirs.valve_opening_ratio, opening, "", jump_ratio(Channel::ValveCommand) * opening)?;
         // The running time before the first jump is not compared.
         if index > 0 {
             differs(

@@ -4,9 +4,8 @@ use crate::IdentifyConfig;
 use crate::faults::balance_rows::{MACHINE, Machine, Rows, common, own};
 use crate::faults::end_readings::{CHANNELS, Readings};
 use crate::faults::nominal_rig::NominalRig;
-use mapper_core::{Channel, ModelTolerances, Recording, StepMarker};
+use mapper_core::{Channel, ModelTolerances, Recording, StepMarker, is_reading};
 use mapper_numerics::statistics::median;
-use mapper_observe::plausible::is_reading;
 
 /// Tolerance of a condition, in the channel's unit; `None` if the channel is not a condition.
 pub(crate) fn tolerance(channel: Channel, tolerances: &ModelTolerances) -> Option<f64> {

@@ -10,9 +10,8 @@ use crate::faults::balances::efficiency::{FittedEfficiencies, compressed};
 use crate::faults::end_readings::{CHANNELS, Readings};
 use crate::faults::nominal_rig::NominalRig;
 use crate::single_step::fit::ETA_BOUNDS;
-use mapper_core::Channel;
+use mapper_core::{Channel, FaultKind};
 use mapper_physics::laws::convection;
-use mapper_physics::rig::sensor_fault::FaultKind;
 use nalgebra::DMatrix;
 
 /// Scatter of the points about the declared law, ratio: its shape over the map. Bound: correlations that fit one rig scatter by less,

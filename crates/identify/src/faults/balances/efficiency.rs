@@ -11,9 +11,8 @@ use crate::faults::nominal_rig::NominalRig;
 use crate::faults::places::{Places, is_on_a_map};
 use crate::faults::smooth::{ANY_ROUGHNESS, At, Smooth};
 use crate::single_step::fit::ETA_BOUNDS;
-use mapper_core::{Channel, ReferenceState};
+use mapper_core::{Channel, FaultKind, ReferenceState};
 use mapper_physics::laws::compression::{actual_rise_k, compressed_k, isentropic_rise_ratio};
-use mapper_physics::rig::sensor_fault::FaultKind;
 use nalgebra::{DMatrix, DVector};
 
 /// Efficiencies and heat-transfer coefficients as fitted, before the smoothness prior.

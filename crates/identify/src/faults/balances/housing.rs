@@ -15,9 +15,8 @@ use crate::IdentifyConfig;
 use crate::faults::balance_rows::{Rows, common, own};
 use crate::faults::end_readings::{CHANNELS, MAX_CORRELATED_ROWS, PerChannel, Readings, span_s};
 use crate::step_data::samples::{Row, Samples, slope_per_s};
-use mapper_core::{Channel, Recording, StepKind, StepMarker, Window, WindowRule};
+use mapper_core::{Channel, FaultKind, Recording, StepKind, StepMarker, Window, WindowRule};
 use mapper_numerics::statistics::{DOUBT_SIGMAS, MIN_VALUES, mean, rms};
-use mapper_physics::rig::sensor_fault::FaultKind;
 
 /// Length of a part over which the housing's slope is taken, s. Bound: noise of 0.15 K at 10 Hz leaves 0.002 K/s, and a step of a minute
 /// has three.

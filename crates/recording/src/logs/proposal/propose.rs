@@ -4,11 +4,9 @@ use super::channel_proposal::{Ambient, Certainty, NominalFlows, Proposal, Propos
 use super::names::{MIN_CLEAR_WEIGHT, Weight, channels_of};
 use super::remark::ProposalRemark as Remark;
 use super::{physics, shared_units, tag_stations};
-use crate::logs::plausible::{
-    AMBIENT_RANGE_PA, TRIMMED_SHARE, fitting_units, is_plausible, looks_like_gauge,
-};
+use crate::logs::plausible::{AMBIENT_RANGE_PA, TRIMMED_SHARE, fitting_units, looks_like_gauge};
 use crate::logs::{Column, ColumnSurvey, Layout, Survey};
-use mapper_core::{CHANNELS, Channel, plausible};
+use mapper_core::{CHANNELS, Channel, is_plausible_range, plausible};
 use mapper_table::{
     ColumnName, HeaderUnit, Measured, Place, Reference, Word, header_unit, kind_of, volume_flow_m3_s,
 };
@@ -259,7 +257,7 @@ fn rank_candidates(
         let is_plausible = match units[index] {
             Some(unit) => {
                 let (low, high) = (unit.unit.to_inside(low), unit.unit.to_inside(high));
-                is_plausible(channel, low, high) || looks_like_gauge(channel, low, high)
+                is_plausible_range(channel, low, high) || looks_like_gauge(channel, low, high)
             }
             None => !fitting_units(channel, low, high, 0.0).is_empty(),
         };

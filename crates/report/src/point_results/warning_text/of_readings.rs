@@ -3,9 +3,9 @@
 use crate::formatting::number::four_figures;
 use crate::point_results::warning_text::sentence::{Sentence, number, sentence, signed};
 use mapper_core::{
-    CalibrationDefect, Channel, Dimension, Scaled, StepConflict, SuspectedFault, Swapped, Warning, with_unit,
+    CalibrationDefect, Channel, Dimension, Implausible, Scaled, StepConflict, SuspectedFault, Swapped,
+    Warning, with_unit,
 };
-use mapper_observe::plausible::Implausible;
 
 /// The sentence; `None` for other warnings.
 pub(crate) fn sentence_of(warning: &Warning) -> Option<Sentence> {

@@ -1,22 +1,55 @@
-//! The measured operating point of a step, which distinguishes points if no commands were recorded.
+//! What a jump is: how far commands and readings change between two points of a map, and whether two steps are at the same point.
 
 use crate::{Channel, Recording, Series, StepMarker};
 
-/// Channels that jump between the points of a map, with the minimum relative change between two different points. Temperatures are not among them,
-/// because they take minutes to follow.
-pub const JUMPS: [(Channel, f64); 4] = [
+/// Channels that jump between the points of a map, with the minimum relative change between two different points. Temperatures are not among
+/// them, because they take minutes to follow.
+///
+/// | | ratio | why |
+/// |---|---|---|
+/// | shaft speed | 1 % | judgement: a fifth of the distance of speed lines |
+/// | flow, P3, P2 | 2 %, 1.5 % | judgement: held less precisely than the speed |
+/// | commanded P3 | 1 % | a command has no noise, and a speed loop moves it by less in a second |
+/// | valve opening | 2 % | judgement: a positioner resolves some tenths of a per cent |
+pub const JUMPS: [(Channel, f64); 6] = [
     (Channel::ShaftSpeed, 0.01),
     (Channel::CompressorFlow, 0.02),
     (Channel::P3, 0.015),
     (Channel::P2, 0.015),
+    (Channel::P3Command, 0.01),
+    (Channel::ValveCommand, 0.02),
 ];
 
-/// Like [`JUMPS`], for the valve's opening.
-pub const VALVE_JUMP_RATIO: f64 = 0.02;
+/// Multiple of the jump of a commanded P3 that a chain of slow changes must exceed to be a jump of a slow rig: the trims of a speed loop
+/// add up to more than one jump while the housings warm up.
+pub const SLOW_JUMP_MULTIPLE: f64 = 2.0;
+
+/// Relative change of a command within which a speed loop trims it at one point: half of the smallest jump of a command ([`JUMPS`]), and more
+/// than loggers round.
+pub const SAME_COMMAND_RATIO: f64 = 5e-3;
+
+/// Relative change below which a command counts as unchanged: the read-back of a constant command varies in the last digits of a
+/// single-precision number.
+const READ_BACK_RATIO: f64 = 1e-6;
 
 /// The relative change of a channel from which two points differ; 0 of a channel that does not jump.
 pub fn jump_ratio(channel: Channel) -> f64 {
     JUMPS.iter().find(|(of, _)| *of == channel).map_or(0.0, |(_, ratio)| *ratio)
+}
+
+/// Whether a channel jumps between two values. Values that are not numbers do not jump.
+pub fn is_jump(channel: Channel, before: f64, after: f64) -> bool {
+    (after - before).abs() > jump_ratio(channel) * before.abs().min(after.abs())
+}
+
+/// Whether P3 or the valve jumps between two pairs of commands, each of P3, Pa, and opening.
+pub fn is_commanded_jump(before: (f64, f64), after: (f64, f64)) -> bool {
+    is_jump(Channel::P3Command, before.0, after.0) || is_jump(Channel::ValveCommand, before.1, after.1)
+}
+
+/// Whether two values of a command are the same but for the digits of its read-back.
+pub fn is_same_command(value: f64, other: f64) -> bool {
+    (value - other).abs() <= READ_BACK_RATIO * value.abs().max(other.abs())
 }
 
 /// Medians of the second half of a step; NaN if there are none.
@@ -54,17 +87,18 @@ impl HeldPoint {
     /// Whether two steps were at the same point: equal speed and P3, and equal valve opening, or equal flow if the opening is unknown, each within
     /// the size of a jump. A point without speed matches none.
     pub(crate) fn is_same(&self, other: &HeldPoint) -> bool {
-        let is_close = |a: f64, b: f64, ratio: f64| (a - b).abs() <= ratio * a.abs().max(b.abs());
-        let unknown_or_close = |a: f64, b: f64, ratio: f64| a.is_nan() && b.is_nan() || is_close(a, b, ratio);
+        let is_same =
+            |channel: Channel, a: f64, b: f64| a.is_finite() && b.is_finite() && !is_jump(channel, a, b);
+        let both_unknown = |a: f64, b: f64| a.is_nan() && b.is_nan();
         let opening = (self.valve_opening_ratio, other.valve_opening_ratio);
-        let same_opening = if opening.0.is_nan() && opening.1.is_nan() {
-            is_close(self.flow_kg_s, other.flow_kg_s, jump_ratio(Channel::CompressorFlow))
+        let same_opening = if both_unknown(opening.0, opening.1) {
+            is_same(Channel::CompressorFlow, self.flow_kg_s, other.flow_kg_s)
         } else {
-            is_close(opening.0, opening.1, VALVE_JUMP_RATIO)
+            is_same(Channel::ValveCommand, opening.0, opening.1)
         };
         same_opening
-            && is_close(self.speed_rpm, other.speed_rpm, jump_ratio(Channel::ShaftSpeed))
-            && unknown_or_close(self.p3_pa, other.p3_pa, jump_ratio(Channel::P3))
+            && is_same(Channel::ShaftSpeed, self.speed_rpm, other.speed_rpm)
+            && (both_unknown(self.p3_pa, other.p3_pa) || is_same(Channel::P3, self.p3_pa, other.p3_pa))
     }
 }
 
@@ -74,10 +108,6 @@ pub struct StepPoint {
     step: StepMarker,
     pub(crate) held: Option<HeldPoint>,
 }
-
-/// Tolerance of the commands within which steps of logs without targets are at the same point: a third of the smallest jump ([`JUMPS`]), and
-/// more than loggers round.
-pub const SAME_COMMAND_RATIO: f64 = 5e-3;
 
 impl StepPoint {
     /// The point of a step.

@@ -1,11 +1,12 @@
-//! Why a recording could not be written or read.
+//! Errors of reading and writing recordings, and warnings about recordings that were read despite a fault.
 
-use crate::logs::LogError;
-use crate::{FormatVersion, ReadWarning, UnitError};
-use mapper_core::Channel;
+use crate::logs::{LogError, LogFinding};
+use crate::{ChunkError, FormatVersion, UnitError};
+use mapper_core::{Channel, step_number};
 use mapper_table::{kind_of, remedy};
 use mapper_yaml::Findings;
-use std::{io, path::PathBuf};
+use std::io;
+use std::path::PathBuf;
 
 /// Why a recording could not be written or read.
 #[derive(Debug, thiserror::Error)]
@@ -78,4 +79,110 @@ fn advice(source: &io::Error) -> &'static str {
 
 fn list(topics: &[String]) -> String {
     if topics.is_empty() { "none".to_owned() } else { topics.join(", ") }
+}
+
+/// A warning for the user of a recording. Each displays as one sentence with values.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
+pub enum ReadWarning {
+    #[error("the file is truncated at byte {offset}: everything after the last flush is lost")]
+    Truncated { offset: u64 },
+    #[error("the chunk at byte {offset} was left out: {source}")]
+    DamagedChunk { offset: u64, source: ChunkError },
+    /// `offset`: of the record, or of the chunk it is in.
+    #[error("the record at byte {offset} was left out: {part}")]
+    DamagedRecord { offset: u64, part: DamagedPart },
+    #[error("{count} more chunks and records were left out: they are damaged as well")]
+    MoreDamage { count: u64 },
+    #[error("{count} messages on {topic} were left out: they are not JSON objects")]
+    DamagedMessages { topic: String, count: u64 },
+    #[error("{count} messages were left out: the file does not define their channel")]
+    UndefinedChannel { count: u64 },
+    #[error("{topic} was left out: its messages are in encoding `{encoding}`, and only json can be read")]
+    UnknownEncoding { topic: String, encoding: String },
+    #[error("{count} values of {channel} are not numbers; they count as missing")]
+    NotANumber { channel: Channel, count: u64 },
+    #[error("the rig marked {count} readings of {channel} as bad; they count as missing")]
+    BadReadings { channel: Channel, count: u64 },
+    #[error("the recording has no `{field}` on {topic}, which the channel map gives for {channel}")]
+    MissingChannel { channel: Channel, topic: String, field: String },
+    #[error(
+        "the channel map gives {channel} in {mapped}, the recording in {recorded}; the channel map is used"
+    )]
+    UnitContradiction { channel: Channel, mapped: String, recorded: String },
+    #[error(
+        "{channel}: {reordered} samples came out of order and {repeated} repeated a time; they were sorted and the repeats left out"
+    )]
+    OutOfOrder { channel: Channel, reordered: usize, repeated: usize },
+    /// Positive: forward.
+    #[error("the clock was set by {by_s:+.1} s during the recording, or before it: the times were corrected")]
+    ClockSet { by_s: f64 },
+    #[error("only the first {limit} messages and other records were read")]
+    TooManyMessages { limit: u64 },
+    #[error("only the first {limit} values were read; split the recording")]
+    TooManyValues { limit: u64 },
+    #[error(
+        "{count} rows or samples were left out: their times (the first is {first_s} s) are invalid, go back, or are more than a day from their neighbours"
+    )]
+    StrayTimes { count: u64, first_s: f64 },
+    #[error("{finding}")]
+    Log { finding: LogFinding },
+    #[error("the log is faster than identification needs: it was averaged to 10 samples a second")]
+    Averaged,
+    #[error(
+        "valve_command reverses in {turns_percent:.0} % of its samples, so it is a measured position; each step has the opening at its end"
+    )]
+    MeasuredValve { turns_percent: f64 },
+    #[error(
+        "the recording has neither step markers nor commands that change: {count} steps were found at jumps of {channels}"
+    )]
+    StepsFound { count: usize, channels: String },
+    #[error(
+        "{channel} is a gauge pressure, and the ambient pressure is not in the recording: it was left out"
+    )]
+    NoAmbient { channel: Channel },
+    #[error(
+        "no steps were found: the recording has neither step markers nor a mapped P3_command or valve_command"
+    )]
+    NoCommands,
+    #[error(
+        "steps were found without {channel}: it is not in the recording, so the steps have no value of it"
+    )]
+    MissingCommand { channel: Channel },
+    /// A gap in the readings is most of a step; `index` counts from 0.
+    #[error(
+        "step {} has no readings for {gap_s:.1} s of its {duration_s:.1} s, from {from_s:.1} s on: the log paused, or its clock was set; split the log there, or correct its times",
+        step_number(*index)
+    )]
+    HollowStep { index: usize, gap_s: f64, from_s: f64, duration_s: f64 },
+    /// `index` counts from 0; `end_s`: time of the last sample.
+    #[error("step {} has no end: the run ended early, at {end_s} s", step_number(*index))]
+    UnfinishedStep { index: usize, end_s: f64 },
+}
+
+/// Kinds of damaged records.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DamagedPart {
+    /// A sample.
+    Message,
+    /// The description of a topic's fields.
+    Schema,
+    /// A topic.
+    Topic,
+    /// Pairs of names and values.
+    Metadata,
+    /// A file within the file.
+    Attachment,
+}
+
+impl std::fmt::Display for DamagedPart {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            DamagedPart::Message => "a message without its header",
+            DamagedPart::Schema => "a schema whose lengths do not fit",
+            DamagedPart::Topic => "a topic whose lengths do not fit",
+            DamagedPart::Metadata => "metadata whose lengths do not fit",
+            DamagedPart::Attachment => "an attachment whose lengths or checksum do not fit",
+        })
+    }
 }

@@ -19,22 +19,19 @@ mod reading;
 mod samples;
 pub mod score;
 mod step_detection;
-mod truth;
-mod warning;
 mod writing;
 
 pub use channel_mapping::channel_map::{
     AmbientPressure, Barometer, ChannelMap, ChannelSource, MachineConstants, WindowLimits,
 };
 pub use channel_mapping::channel_map_yaml::ChannelMapError;
-pub use error::{BatchError, RecordError};
+pub use error::{BatchError, DamagedPart, ReadWarning, RecordError};
 pub use format::FormatVersion;
 pub use mapper_yaml::Findings;
 pub use mapper_yaml::units::{Kind, Unit, UnitError};
 pub use mcap::chunk::ChunkError;
-pub use reading::read_options::ReadOptions;
 pub use reading::recording_reader::{ReadReport, read_marks, read_recording, read_recording_from};
-pub use warning::{DamagedPart, ReadWarning};
+pub use reading::scan::ReadOptions;
 pub use writing::recording_file::RecordingHeader;
 pub use writing::topics::{StepPhase, Topic, event_message, readings_message, step_message};
 pub use writing::writer::RecordingWriter;

@@ -1,7 +1,7 @@
-//! Identification result of one point, with its uncertainty.
+//! Identified points: efficiency and heat-transfer coefficient with interval, verdict, and the budget of their uncertainty; remarks on results.
 
-use crate::named_enum::named_enum;
-use crate::{CommonErrors, OperatingPoint, StepKind, Warning};
+use crate::enums::{coded_enum, named_enum};
+use crate::{Channel, OperatingPoint, StepKind, Warning};
 use serde::{Deserialize, Serialize};
 
 named_enum! {
@@ -207,4 +207,170 @@ pub struct MethodResults {
     pub parameter_error_eta: f64,
     /// Largest such error at which points can still be good, fraction.
     pub max_parameter_error_eta: f64,
+}
+
+/// Signed effects of a recording's common errors on one of its points.
+///
+/// Entry `k` of a list is the change due to one standard deviation of error `k`; error `k` is the same at every point of the
+/// recording, and errors of different `k` are independent. The covariance of two points is therefore the sum of the products of
+/// their entries. The variance of one point is the sum of the squares of its entries plus its own part, which no other
+/// point shares. The lists of `eta` and of `h` number their errors independently.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct CommonErrors {
+    /// Changes of `eta`, fraction; empty if no shared errors are known.
+    pub eta_changes: Vec<f64>,
+    /// Changes of `h`, W/(m2 K); empty if no shared errors are known.
+    pub h_changes_w_m2k: Vec<f64>,
+    /// Standard error that all corrected flows share (gain and offset of the flow meter, offsets of P1 and T1), ratio to
+    /// the flow.
+    pub flow_corrected_standard_error_ratio: f64,
+    /// Standard error that all pressure ratios share (offsets and gains of P1 and P2), absolute.
+    pub pressure_ratio_standard_error: f64,
+}
+
+impl CommonErrors {
+    /// Standard error of `eta` from shared errors, fraction.
+    pub fn eta_standard_error(&self) -> f64 {
+        self.eta_changes.iter().map(|change| change * change).sum::<f64>().sqrt()
+    }
+}
+
+/// One source of uncertainty.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BudgetRow {
+    /// Name, e.g. `offset of T1`.
+    pub source: String,
+    /// Standard uncertainty of the source, in `unit`.
+    pub standard_uncertainty: f64,
+    /// Unit of the source.
+    pub unit: String,
+    /// Change of the number per unit of the source.
+    pub sensitivity: f64,
+    /// Product of the two, in the unit of the number.
+    pub contribution: f64,
+    /// Degrees of freedom of the standard uncertainty; `None` for a declared uncertainty, which counts as exactly known.
+    pub degrees_of_freedom: Option<f64>,
+}
+
+/// All sources of one number. They are independent of each other.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct UncertaintyBudget {
+    /// The number.
+    pub value: f64,
+    /// The sources.
+    pub rows: Vec<BudgetRow>,
+    /// Half of its 95 % interval.
+    pub expanded_uncertainty: f64,
+    /// Ratio of that to the combined standard uncertainty.
+    pub coverage_factor: f64,
+    /// Degrees of freedom of the combined standard uncertainty by the formula of Welch and Satterthwaite; `None` if all are known exactly.
+    pub degrees_of_freedom: Option<f64>,
+}
+
+impl UncertaintyBudget {
+    /// The budget of a number with this half of its 95 % interval.
+    pub fn of(value: f64, rows: Vec<BudgetRow>, expanded_uncertainty: f64) -> Self {
+        let mut budget =
+            UncertaintyBudget { value, rows, expanded_uncertainty, ..UncertaintyBudget::default() };
+        let combined = budget.combined_standard_uncertainty();
+        budget.coverage_factor = expanded_uncertainty / combined;
+        let share = |row: &BudgetRow| Some(row.contribution.powi(4) / row.degrees_of_freedom?);
+        let shares: f64 = budget.rows.iter().filter_map(share).sum();
+        budget.degrees_of_freedom = (shares > 0.0).then(|| combined.powi(4) / shares);
+        budget
+    }
+
+    /// Root of the sum of squares of the contributions, in the unit of the number.
+    pub fn combined_standard_uncertainty(&self) -> f64 {
+        self.rows.iter().map(|row| row.contribution * row.contribution).sum::<f64>().sqrt()
+    }
+}
+
+/// The budgets of one point.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PointBudgets {
+    /// Index of the step, from 0; files have its number, from 1.
+    #[serde(with = "crate::test_plan::step_number")]
+    pub step: usize,
+    /// Efficiency, fraction.
+    pub eta: Option<UncertaintyBudget>,
+    /// Heat-transfer coefficient, W/(m2 K).
+    pub h_w_m2k: Option<UncertaintyBudget>,
+    /// Pressure ratio.
+    pub pressure_ratio: UncertaintyBudget,
+}
+
+coded_enum! {
+/// A remark on the results as a whole, by its stable code. `reason` is the message of the underlying error.
+ResultRemark {
+    /// A recording could be read in parts only; `file` is given if there are several.
+    "recording_incomplete" RecordingIncomplete { file: Option<String>, reason: String },
+    /// Channels of the usual method are missing, so that the efficiencies are those of conventional mapping.
+    "conventional_mapping" ConventionalMapping { usual: Method, missing: Vec<Channel> },
+    /// Parameters of `joint` keep their declared values; the result depends on them.
+    "held_fixed" HeldFixed { parameters: Vec<String> },
+    /// Gauge pressures are added to an ambient pressure that was not measured.
+    "unknown_ambient_pressure" UnknownAmbientPressure { pressure_pa: f64, sigma_pa: f64 },
+    /// The recording starts with the machine at rest, and the campaign does not use this as a zero.
+    "unused_rest" UnusedRest { start_s: f64, end_s: f64 },
+    /// The points are corrected for a cause that the diagnosis names.
+    "corrected" Corrected { causes: Vec<String>, probability: f64 },
+    /// The intervals contain what causes of a gap would change for which the points are not corrected; largest standard uncertainty of an
+    /// efficiency.
+    "widened_by_gap" WidenedByGap { causes: Vec<String>, largest_sigma: f64 },
+    /// The drift of a sensor was subtracted.
+    "drift_subtracted" DriftSubtracted { reason: String },
+    /// No map can be made from the points.
+    "no_map" NoMap { reason: String },
+    /// The map has no fitted surface.
+    "map_not_fitted" MapNotFitted { reason: String },
+    /// A map format was not written.
+    "format_not_written" FormatNotWritten { reason: String },
+    /// Another run has no map to compare with.
+    "nothing_to_compare" NothingToCompare { run: String },
+}
+}
+
+impl ResultRemark {
+    /// Whether all efficiencies depend on it, so that it is shown next to their verdict.
+    pub fn concerns_all_points(&self) -> bool {
+        use ResultRemark::{
+            ConventionalMapping, Corrected, DriftSubtracted, HeldFixed, UnknownAmbientPressure, WidenedByGap,
+        };
+        matches!(
+            self,
+            ConventionalMapping { .. }
+                | HeldFixed { .. }
+                | UnknownAmbientPressure { .. }
+                | Corrected { .. }
+                | WidenedByGap { .. }
+                | DriftSubtracted { .. }
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The example of GUM H.1 (end gauge): contributions of 25, 9.7, 2.9 and 16.6 nm with 18, 25.6, exact and 2 degrees of freedom, rows of
+    /// equal kind combined: 32 nm (31.7 without rounding) and 16 effective degrees of freedom, as the guide says with its 50 for the thermal row.
+    #[test]
+    fn the_end_gauge_of_the_guide_has_its_combined_uncertainty() {
+        let row = |contribution: f64, degrees_of_freedom: Option<f64>| BudgetRow {
+            source: String::new(),
+            standard_uncertainty: contribution,
+            unit: "nm".to_owned(),
+            sensitivity: 1.0,
+            contribution,
+            degrees_of_freedom,
+        };
+        let rows =
+            vec![row(25.0, Some(18.0)), row(9.7, Some(25.6)), row(2.9, Some(50.0)), row(16.6, Some(2.0))];
+        let budget = UncertaintyBudget::of(50_000_838.0, rows, 93.0);
+        assert!((budget.combined_standard_uncertainty() - 31.7).abs() < 0.1, "{budget:?}");
+        let freedom = budget.degrees_of_freedom.unwrap();
+        assert!((16.0..17.5).contains(&freedom), "{freedom}");
+    }
 }

@@ -1,6 +1,7 @@
-//! Parameters that all points of a campaign share: heat exchange of gas and compressor housing, and sensor errors.
+//! The identified heat transfer of a machine, and the models of h before the wheel.
 
-use crate::{Channel, EstimateUncertainty, InletConvection, ModelDoubt};
+use crate::{Channel, EstimateUncertainty, ModelDoubt};
+use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -122,4 +123,26 @@ pub struct ThermalModel {
 fn with_values<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<ModelDoubt>, D::Error> {
     let stored = Vec::<Value>::deserialize(deserializer)?;
     Ok(stored.into_iter().filter_map(|doubt| serde_json::from_value(doubt).ok()).collect())
+}
+
+/// Model of the heat-transfer coefficient upstream of the wheel. It matters only if part of the internal area lies upstream (alpha_A above 0).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(transform = crate::enums::flatten_to_names)]
+pub enum InletConvection {
+    /// The same coefficient upstream and downstream of the wheel, as in eqs. 1 and 3 of Burke et al.
+    #[default]
+    Shared,
+    /// A separate coefficient, from the Nusselt law of the outlet with diameter and temperature of the inlet (their Appendix A).
+    Own,
+}
+
+impl InletConvection {
+    /// The other model.
+    pub fn other(self) -> Self {
+        match self {
+            InletConvection::Shared => InletConvection::Own,
+            InletConvection::Own => InletConvection::Shared,
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! Every warning and remark about a point, with its values. `mapper-report` turns them into sentences; nothing reads a sentence.
 
 use crate::Channel;
-use crate::coded_enum::coded_enum;
+use crate::enums::coded_enum;
 use serde::{Deserialize, Serialize};
 
 coded_enum! {

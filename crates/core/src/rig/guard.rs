@@ -1,6 +1,6 @@
-//! Guards of a run: the terms that campaigns, rigs and runner share.
+//! Guards, their reactions, and the end of a run: the same for the runner, the journal and the reports.
 
-use crate::named_enum::named_enum;
+use crate::enums::named_enum;
 use crate::{Channel, FrozenLimit};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -34,7 +34,7 @@ named_enum! {
 /// Reaction when a guard trips, mildest first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-#[schemars(transform = crate::schema::flatten_to_names)]
+#[schemars(transform = crate::enums::flatten_to_names)]
 pub enum Reaction {
     /// Report the violation, and continue.
     Note,
@@ -160,4 +160,34 @@ impl Default for SafeTrajectory {
     fn default() -> Self {
         SafeTrajectory { p3_slew_pa_s: None, valve_opening_ratio: 1.0, within_s: 20.0 }
     }
+}
+
+/// The report of a guard.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Trip {
+    /// Run time, s.
+    pub t_s: f64,
+    /// The guard that tripped.
+    pub guard: GuardName,
+    /// The required reaction.
+    pub reaction: Reaction,
+    /// One sentence with values and units.
+    pub reason: String,
+}
+
+/// How a run ended; its `code` is stable. The rig is safe in all cases.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "code", rename_all = "snake_case")]
+#[allow(missing_docs, reason = "the variants describe their values")]
+pub enum RunEnding {
+    /// Every step was executed.
+    Completed,
+    /// Drift was detected, and the campaign asks to stop in that case.
+    Drifted { reason: String },
+    /// The operator stopped the run at this run time.
+    Interrupted { t_s: f64 },
+    /// A guard tripped.
+    Tripped(Trip),
+    /// The rig, the script or the recording failed. The runner reports it as an error; files have it as this.
+    Failed { reason: String },
 }

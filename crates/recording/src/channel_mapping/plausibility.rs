@@ -1,6 +1,6 @@
 //! Checks readings against the units of the channel map, before anything is computed from them.
 
-use crate::channel_mapping::channel_map_mistakes::MapMistakes;
+use crate::channel_mapping::channel_map_yaml::MapMistakes;
 use crate::logs::plausible::{AMBIENT_RANGE_PA, TRIMMED_SHARE, fitting_units, looks_like_gauge};
 use crate::logs::proposal::short;
 use crate::{AmbientPressure, ChannelSource};

@@ -1,8 +1,8 @@
-//! Parses the bodies of the relevant records without trusting any length.
-//!
-//! `mcap`'s own parser allocates a stated length (4 GB for a damaged string), and panics on a short attachment.
+//! Records of an MCAP file or chunk, one after the other, parsed without trusting any length. `mcap`'s own readers stop at the first fault, allocate a stated length (4 GB for a damaged string), and panic on a short attachment.
 
+use std::io;
 use std::collections::BTreeMap;
+use std::io::Read;
 
 /// Start of every MCAP file.
 pub(crate) const MAGIC: &[u8] = mcap::MAGIC;
@@ -105,4 +105,82 @@ pub(crate) fn parse_attachment(record: &[u8]) -> Option<(String, &[u8])> {
     let checked = record.get(..record.len() - body.0.len())?;
     let saved = body.u32()?;
     (saved == 0 || saved == crc32fast::hash(checked)).then_some((name, data))
+}
+
+/// Bytes before a record's body. Source: MCAP, one of opcode, eight of length.
+const FRAME_BYTES: usize = 9;
+
+/// Result of a read.
+#[derive(Debug, PartialEq)]
+pub(crate) enum Frame<'a> {
+    /// A whole record.
+    Record { offset: u64, opcode: u8, body: &'a [u8] },
+    /// The stream ends between two records.
+    End,
+    /// The stream ends within the record at this offset.
+    Truncated { offset: u64 },
+}
+
+/// Reads records from a stream. Memory grows with the actual data, never with a stated length.
+pub(crate) struct FrameReader<R> {
+    source: R,
+    offset: u64,
+    buffer: Vec<u8>,
+}
+
+impl<R: Read> FrameReader<R> {
+    /// Starts at the first record, `offset` bytes into the file.
+    pub(crate) fn new(source: R, offset: u64) -> Self {
+        FrameReader { source, offset, buffer: Vec::new() }
+    }
+
+    /// The next record.
+    pub(crate) fn next_frame(&mut self) -> io::Result<Frame<'_>> {
+        let offset = self.offset;
+        self.buffer.clear();
+        let frame_bytes = self.source.by_ref().take(FRAME_BYTES as u64).read_to_end(&mut self.buffer)?;
+        if frame_bytes == 0 {
+            return Ok(Frame::End);
+        }
+        let Some((opcode, length)) = parse_frame(&self.buffer) else {
+            return Ok(Frame::Truncated { offset });
+        };
+        self.buffer.clear();
+        let body_bytes = self.source.by_ref().take(length).read_to_end(&mut self.buffer)? as u64;
+        if body_bytes < length {
+            return Ok(Frame::Truncated { offset });
+        }
+        self.offset = offset.saturating_add(FRAME_BYTES as u64).saturating_add(length);
+        Ok(Frame::Record { offset, opcode, body: &self.buffer })
+    }
+}
+
+/// Splits the first record off a chunk: opcode, body, rest. `None` if it is incomplete.
+pub(crate) fn split_record(chunk: &[u8]) -> Option<(u8, &[u8], &[u8])> {
+    let (opcode, length) = parse_frame(chunk)?;
+    let rest = &chunk[FRAME_BYTES..];
+    let length = usize::try_from(length).ok().filter(|length| *length <= rest.len())?;
+    let (body, rest) = rest.split_at(length);
+    Some((opcode, body, rest))
+}
+
+fn parse_frame(bytes: &[u8]) -> Option<(u8, u64)> {
+    let (opcode, rest) = bytes.split_first()?;
+    Some((*opcode, u64::from_le_bytes(*rest.first_chunk()?)))
+}
+
+/// Receives the content of a recording.
+pub(crate) trait Sink: Sync {
+    type SinkMessage: Send;
+    /// A topic, before its first message.
+    fn define(&mut self, definition: &ChannelDefinition);
+    /// Reads a message on a defined topic; `None` if the topic is not wanted. Several are read in parallel.
+    fn read(&self, channel_id: u16, data: &[u8]) -> Option<Self::SinkMessage>;
+    /// Receives the content of a message, in the order of the file.
+    fn take(&mut self, channel_id: u16, log_time_ns: u64, content: Self::SinkMessage);
+    /// A metadata record.
+    fn metadata(&mut self, name: String, pairs: BTreeMap<String, String>);
+    fn attachment(&mut self, name: String, data: &[u8]);
+    /// Number of values kept so far.
+    fn value_count(&self) -> u64;
 }

@@ -1,10 +1,9 @@
 //! Reads a log of another program with a channel map.
 
-use crate::channel_mapping::channel_map_mistakes::MapMistakes;
+use crate::channel_mapping::channel_map_yaml::MapMistakes;
 use crate::channel_mapping::mapped_topics::{MappedQuantity, source_of, sources};
 use crate::logs::{Layout, LogFile, Row};
-use crate::samples::log_blocks::BlockAverager;
-use crate::samples::log_clock::{LogClock, Restart};
+use crate::samples::log_clock::{BlockAverager, LogClock, Restart};
 use crate::samples::series_builder::SeriesBuilder;
 use crate::{AmbientPressure, ChannelMap, ChannelSource, ReadOptions, ReadWarning, RecordError};
 use mapper_core::Channel;

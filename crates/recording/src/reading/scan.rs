@@ -1,16 +1,12 @@
-//! One pass over a recording: finds the recoverable data and forwards them.
+//! One pass over a recording within limits: finds the recoverable data and forwards them.
 
-use crate::mcap::batch::{Batch, Item, UnpackedChunk};
-use crate::mcap::chunk::{ChunkError, Unpacker};
-use crate::mcap::framing::{Frame, FrameReader, split_record};
-use crate::mcap::records::{
-    ChannelDefinition, MAGIC, op, parse_attachment, parse_channel, parse_message, parse_metadata,
-    parse_schema,
-};
-use crate::mcap::sink::Sink;
-use crate::{DamagedPart, ReadOptions, ReadWarning, RecordError};
+use crate::logs::LogFormats;
+use crate::mcap::chunk::{Batch, ChunkError, Item, UnpackedChunk, Unpacker};
+use crate::mcap::records::{ChannelDefinition, Frame, FrameReader, MAGIC, Sink, op, parse_attachment, parse_channel, parse_message, parse_metadata, parse_schema, split_record};
+use crate::{DamagedPart, ReadWarning, RecordError};
 use std::collections::BTreeMap;
-use std::io::{self, Read};
+use std::io;
+use std::io::Read;
 use std::path::Path;
 
 /// Larger schemas are skipped, bytes. Bound: the memory that many of them could take.
@@ -253,4 +249,30 @@ impl ScanResult {
 
 fn describe(magic: &[u8]) -> String {
     if magic.is_empty() { "nothing: it is empty".to_owned() } else { format!("`{}`", magic.escape_ascii()) }
+}
+
+/// Limits that protect the reader from a file.
+#[derive(Debug, Clone, Copy)]
+pub struct ReadOptions {
+    /// Chunks with a larger stated size are left out, bytes.
+    pub max_chunk_bytes: u64,
+    /// Messages and other records beyond these are left out; a log with more rows is refused.
+    pub max_messages: u64,
+    /// Values beyond these are left out; a log with more in its mapped columns, after averaging, is refused.
+    pub max_values: u64,
+    /// Formats of logs that are read in addition to MCAP.
+    pub logs: LogFormats,
+}
+
+impl Default for ReadOptions {
+    /// 256 MiB; 100 million, a month of four groups at 10 Hz; 64 million of 16 bytes, three days of 24 channels
+    /// at 10 Hz; MCAP alone.
+    fn default() -> Self {
+        ReadOptions {
+            max_chunk_bytes: 256 << 20,
+            max_messages: 100_000_000,
+            max_values: 64_000_000,
+            logs: LogFormats::default(),
+        }
+    }
 }

@@ -1,4 +1,7 @@
-//! The clock of a group of rows: isolated wrong times are skipped, and a restarted clock ends the reading.
+//! Rows of a log: isolated wrong times are skipped, a restarted clock ends the reading, and a fast log is averaged to the rate of the program's own recordings.
+
+use mapper_core::SAMPLE_INTERVAL_S;
+use mapper_numerics::statistics::nearest_rank;
 
 /// Minimum difference from both neighbours for a wrong time, s. Bound: a day; a log has no such gap between two rows and back.
 pub(crate) const STRAY_S: f64 = 86_400.0;
@@ -118,6 +121,137 @@ impl LogClock {
     }
 }
 
+/// Rounding of a time, ratio to the sample interval: a sample on a border belongs to the later block. Bound: the last digit of a stored time.
+const BORDER_RATIO: f64 = 1e-6;
+
+/// Maximum rate of a group that is not averaged, Hz. Bound: blocks would have one sample, or alternately one and two.
+const MAX_UNAVERAGED_HZ: f64 = 15.0;
+
+/// Rows from which the rate of a group is estimated. Bound: memory.
+const RATE_ROWS: usize = 256;
+
+/// Number of intervals monitored later: a log may be slow at rest and fast after a trigger.
+const MONITORED_INTERVALS: u32 = u64::BITS;
+
+/// The rows of one group, averaged if their rate is high.
+#[derive(Debug, Default)]
+pub(crate) struct BlockAverager {
+    /// Rows that determine the rate.
+    first: Vec<(f64, Vec<f64>)>,
+    state: State,
+}
+
+#[derive(Debug, Default)]
+enum State {
+    #[default]
+    /// The rate is not known yet.
+    Undecided,
+    Unchanged(RecentIntervals),
+    Averaging(Block),
+}
+
+/// The latest intervals of a slow log.
+#[derive(Debug)]
+struct RecentIntervals {
+    last_s: f64,
+    /// A bit for each interval, set if it was short.
+    short: u64,
+}
+
+impl RecentIntervals {
+    /// Whether most of the intervals have become short.
+    fn becomes_fast(&mut self, t_s: f64) -> bool {
+        let step_s = t_s - self.last_s;
+        if step_s > 0.0 || self.last_s.is_nan() {
+            self.short = self.short << 1 | u64::from(step_s * MAX_UNAVERAGED_HZ < 1.0);
+            self.last_s = t_s;
+        }
+        2 * self.short.count_ones() > MONITORED_INTERVALS
+    }
+}
+
+#[derive(Debug, Default)]
+struct Block {
+    number: i64,
+    rows: f64,
+    time_sum_s: f64,
+    sums: Vec<(f64, f64)>,
+}
+
+impl BlockAverager {
+    pub(crate) fn push(&mut self, t_s: f64, values: &[f64], take: &mut TakeRow<'_>) {
+        match &mut self.state {
+            State::Unchanged(intervals) => {
+                if intervals.becomes_fast(t_s) {
+                    self.state = State::Averaging(Block::default());
+                    return self.push(t_s, values, take);
+                }
+                take(t_s, values);
+            }
+            State::Averaging(block) => block.push(t_s, values, take),
+            State::Undecided => {
+                self.first.push((t_s, values.to_owned()));
+                if self.first.len() >= RATE_ROWS {
+                    self.decide(take);
+                }
+            }
+        }
+    }
+
+    /// Returns the remaining rows.
+    pub(crate) fn finish(&mut self, take: &mut TakeRow<'_>) {
+        if matches!(self.state, State::Undecided) {
+            self.decide(take);
+        }
+        if let State::Averaging(block) = &mut self.state {
+            block.flush(take);
+        }
+    }
+
+    /// Whether the rows are averaged.
+    pub(crate) fn is_averaging(&self) -> bool {
+        matches!(self.state, State::Averaging(_))
+    }
+
+    fn decide(&mut self, take: &mut TakeRow<'_>) {
+        let intervals_s = self.first.windows(2).map(|pair| pair[1].0 - pair[0].0).filter(|step| *step > 0.0);
+        let typical_s = nearest_rank(intervals_s, 0.5).unwrap_or(f64::INFINITY);
+        self.state = if typical_s * MAX_UNAVERAGED_HZ < 1.0 {
+            State::Averaging(Block::default())
+        } else {
+            State::Unchanged(RecentIntervals { last_s: f64::NAN, short: 0 })
+        };
+        for (t_s, values) in std::mem::take(&mut self.first) {
+            self.push(t_s, &values, take);
+        }
+    }
+}
+
+impl Block {
+    fn push(&mut self, t_s: f64, values: &[f64], take: &mut TakeRow<'_>) {
+        let number = (t_s / SAMPLE_INTERVAL_S + BORDER_RATIO).floor() as i64;
+        if number != self.number {
+            self.flush(take);
+            self.number = number;
+        }
+        self.rows += 1.0;
+        self.time_sum_s += t_s;
+        self.sums.resize(values.len(), (0.0, 0.0));
+        for (sum, value) in self.sums.iter_mut().zip(values).filter(|(_, value)| value.is_finite()) {
+            sum.0 += value;
+            sum.1 += 1.0;
+        }
+    }
+
+    fn flush(&mut self, take: &mut TakeRow<'_>) {
+        if self.rows > 0.0 {
+            let means: Vec<f64> = self.sums.iter().map(|(sum, count)| sum / count).collect();
+            take(self.time_sum_s / self.rows, &means);
+        }
+        *self = Block { number: self.number, ..Block::default() };
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -165,5 +299,55 @@ mod tests {
         let slow = [0.0, 60.0, 120.0, 180.0, 240.0, 0.0, 60.0, 300.0];
         assert_eq!(through(&slow).2, None);
         assert_eq!(through(&[5.0]).0, [5.0]);
+    }
+
+    fn through(rate_hz: f64, rows: usize) -> Vec<(f64, Vec<f64>)> {
+        let (mut blocks, mut out) = (BlockAverager::default(), Vec::new());
+        let mut take = |t_s: f64, values: &[f64]| out.push((t_s, values.to_owned()));
+        for row in 0..rows {
+            let t_s = row as f64 / rate_hz;
+            let slow = if row % 2 == 0 { 1.0 } else { f64::NAN };
+            blocks.push(t_s, &[5.0 * t_s, slow], &mut take);
+        }
+        blocks.finish(&mut take);
+        out
+    }
+
+    #[test]
+    fn a_fast_log_is_averaged_to_ten_hertz() {
+        let out = through(100.0, 1000);
+        assert_eq!(out.len(), 100);
+        for (index, (t_s, values)) in out.iter().enumerate() {
+            // Ten samples from 0.1 i to 0.1 i + 0.09 s have their mean in the middle; a ramp stays a ramp.
+            assert!((t_s - (0.1 * index as f64 + 0.045)).abs() < 1e-9, "{t_s}");
+            assert!((values[0] - 5.0 * t_s).abs() < 1e-9 && values[1] == 1.0);
+        }
+    }
+
+    #[test]
+    fn a_log_that_becomes_fast_is_averaged_from_then_on() {
+        let (mut blocks, mut out) = (BlockAverager::default(), Vec::new());
+        let mut take = |t_s: f64, values: &[f64]| out.push((t_s, values[0]));
+        let rest = (0..600).map(f64::from);
+        let run = (0..10_000).map(|row| 600.0 + f64::from(row) / 100.0);
+        rest.chain(run).for_each(|t_s| blocks.push(t_s, &[5.0 * t_s], &mut take));
+        blocks.finish(&mut take);
+        assert!(blocks.is_averaging());
+        // 600 unchanged rows at rest, 100 s at 10 Hz, and the few rows that showed the change.
+        assert!((1600..1640).contains(&out.len()), "{}", out.len());
+        assert!(out[..600].iter().enumerate().all(|(row, (t_s, _))| *t_s == row as f64));
+        assert!(out.iter().all(|(t_s, value)| (value - 5.0 * t_s).abs() < 1e-9));
+    }
+
+    #[test]
+    fn a_slow_log_is_not_changed() {
+        let out = through(10.0, 300);
+        assert_eq!(out.len(), 300);
+        assert!(
+            out.iter()
+                .enumerate()
+                .all(|(row, (t_s, values))| *t_s == row as f64 / 10.0 && values[0] == 5.0 * t_s)
+        );
+        assert_eq!(through(10.0, 3).len(), 3);
     }
 }

@@ -5,11 +5,10 @@ use crate::format::{
     CAMPAIGN_NAME, EVENT_TOPIC, FORMAT_KEY, METADATA_NAME, PLAN_NAME, PROVENANCE_TOPIC, START_KEY, STEP_TOPIC,
 };
 use crate::mcap::message::{FieldValue, read_fields};
-use crate::mcap::records::ChannelDefinition;
-use crate::mcap::sink::Sink;
+use crate::mcap::records::{ChannelDefinition, Sink};
 use crate::samples::series_builder::SeriesBuilder;
 use crate::step_detection::steps::StepMessage;
-use crate::writing::provenance::{OriginMessage, read_origins};
+use crate::writing::recording_file::{OriginMessage, read_origins};
 use crate::{ChannelMap, FormatVersion, ReadWarning, RecordError};
 use mapper_core::Event;
 use mapper_yaml::units::Unit;

@@ -1,5 +1,4 @@
 //! Detection of the steps of a recording, from markers, from commands, or from jumps of the readings.
 
 pub(crate) mod jump_steps;
-pub(crate) mod measured_valve;
 pub(crate) mod steps;

@@ -2,4 +2,3 @@
 
 pub(crate) mod auxiliary_instruments;
 pub(crate) mod deadline;
-pub(crate) mod instrument_link;

@@ -1,13 +1,8 @@
 //! Guards that end a step or a run before damage: signals, sample stream, plausibility, surge, and the rig itself.
 
-pub(crate) mod batch_watch;
-pub(crate) mod frozen_reading;
 pub(crate) mod guard;
 pub(crate) mod plausibility_watch;
-pub(crate) mod recent_minimum;
 pub(crate) mod rig_watch;
 pub(crate) mod signal_watch;
 pub(crate) mod silence_watch;
-pub(crate) mod speed_history;
-pub(crate) mod start_check;
 pub(crate) mod surge_watch;

@@ -1,7 +1,7 @@
 //! The guard for one channel: value, rate of change, age, quality, and a frozen reading.
 
-use crate::guards::frozen_reading::FrozenReading;
 use crate::guards::guard::{CommandedState, Guard};
+use crate::guards::silence_watch::FrozenReading;
 use mapper_core::{Quality, Reaction, SampleBatch, SignalGuard, Trip, is_possible, readable};
 use std::collections::VecDeque;
 

@@ -1,10 +1,6 @@
 //! Control of a run from soak to cool-down: steps, speed control, operator requests, protection, and safe shutdown.
 
 pub(crate) mod observer;
-pub(crate) mod operator;
-pub(crate) mod protection;
 pub(crate) mod run;
-pub(crate) mod run_error;
 pub(crate) mod safe_shutdown;
 pub(crate) mod speed_control;
-pub(crate) mod stopping;

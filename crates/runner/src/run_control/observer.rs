@@ -1,6 +1,12 @@
-//! Observers of a run: recorders, progress bars.
+//! What a run is connected to: observers, the operator, its protection in addition to its guards, and its errors.
 
-use mapper_core::{Event, RigDescription, SampleBatch, StepMarker};
+use crate::guards::plausibility_watch::ReadingBounds;
+use crate::step_sources::step_source::StepSourceError;
+use mapper_core::{
+    BackendError, Event, RigDescription, SafeTrajectory, SampleBatch, SetpointRanges, SpeedBand, StepMarker,
+};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Failure of an observer; the run ends in its safe state.
 #[derive(Debug, thiserror::Error)]
@@ -59,4 +65,120 @@ run_observer! {
     on_step_end(StepMarker);
     /// The step that has just ended was complete: neither a stop nor a fault cut it short.
     on_step_completed(StepMarker);
+}
+
+/// Maximum number of requests that wait to be recorded; further ones are dropped.
+const MAX_WAITING: usize = 64;
+
+/// Requests of the operator, from any thread. The run reads them after every batch of samples.
+#[derive(Debug, Default)]
+pub struct Operator {
+    is_held: AtomicBool,
+    requests: Mutex<Vec<String>>,
+}
+
+impl Operator {
+    /// Holds the current step until [`Operator::release`].
+    pub fn hold(&self) {
+        self.is_held.store(true, Ordering::SeqCst);
+    }
+
+    /// Releases a held step.
+    pub fn release(&self) {
+        self.is_held.store(false, Ordering::SeqCst);
+    }
+
+    /// Whether the step is held.
+    pub fn is_holding(&self) -> bool {
+        self.is_held.load(Ordering::SeqCst)
+    }
+
+    /// Adds a sentence to the recording: the request and who made it.
+    pub fn add_message(&self, sentence: String) {
+        if let Ok(mut requests) = self.requests.lock()
+            && requests.len() < MAX_WAITING
+        {
+            requests.push(sentence);
+        }
+    }
+
+    /// The requests since the last call.
+    pub(crate) fn take_messages(&self) -> Vec<String> {
+        self.requests.lock().map(|mut requests| std::mem::take(&mut *requests)).unwrap_or_default()
+    }
+}
+
+/// Failure of a run. The rig was commanded to its safe state before this is returned.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
+pub enum RunError {
+    #[error("the rig could not be armed, and no step was started: {0}")]
+    NotArmed(#[source] BackendError),
+    #[error("the rig failed: {0}")]
+    Backend(#[from] BackendError),
+    #[error("{0}")]
+    Observer(#[from] ObserverError),
+    #[error("{0}")]
+    Source(#[from] StepSourceError),
+    #[error(
+        "the program failed during the run ({message}); the rig is safe. Please report this as a fault of the program"
+    )]
+    Panicked { message: String },
+    #[error(
+        "THE RIG DID NOT CONFIRM ITS SAFE STATE: {source}. Cut its air by hand. The run had ended because: {why}"
+    )]
+    NotSafe { why: String, source: BackendError },
+}
+
+impl RunError {
+    /// Whether the state of the rig is unknown.
+    pub fn leaves_rig_state_unknown(&self) -> bool {
+        match self {
+            RunError::NotSafe { .. } | RunError::Panicked { .. } => true,
+            RunError::Backend(error) => {
+                matches!(error, BackendError::Lost { .. } | BackendError::Deadline { .. })
+            }
+            // A rig that does not answer may still arm later.
+            RunError::NotArmed(error) => matches!(error, BackendError::Deadline { .. }),
+            RunError::Observer(_) | RunError::Source(_) => false,
+        }
+    }
+}
+
+/// Protection of a run; [`Protection::default`] applies none.
+#[derive(Debug, Clone, Copy)]
+pub struct Protection<'a> {
+    /// The trajectory into the safe state.
+    pub safe: SafeTrajectory,
+    /// P3 at which the air is cut, Pa: the lowest setpoint that the rig accepts.
+    pub p3_min_pa: f64,
+    /// Setpoint ranges that the rig accepts, also during safe shutdown; `None`: unlimited.
+    pub accepts: Option<SetpointRanges>,
+    /// Allowed deviation of a step's speed; `None`: not checked.
+    pub speed: Option<SpeedBand>,
+    /// Bounds for the plausibility check of every sample; `None`: not checked.
+    pub readings: Option<ReadingBounds>,
+    /// Set from outside to stop at the end of the step.
+    pub stop_after_step: &'a AtomicBool,
+    /// Polls the rig sample by sample. A simulated rig is otherwise polled so only while a guard is alert.
+    pub each_sample: bool,
+    /// Requests of the operator; `None`: no operator.
+    pub operator: Option<&'a Operator>,
+}
+
+static NEVER: AtomicBool = AtomicBool::new(false);
+
+impl Default for Protection<'_> {
+    fn default() -> Self {
+        Protection {
+            safe: SafeTrajectory::default(),
+            p3_min_pa: 0.0,
+            accepts: None,
+            speed: None,
+            readings: None,
+            stop_after_step: &NEVER,
+            each_sample: false,
+            operator: None,
+        }
+    }
 }

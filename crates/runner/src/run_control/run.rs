@@ -1,12 +1,9 @@
 //! The run itself: soak, warm-up, steps, cool-down.
 
-use crate::guards::guard::{ActiveGuards, CommandedState, Guard};
+use crate::guards::guard::{ActiveGuards, CommandedState, Guard, SpeedHistory};
 use crate::guards::plausibility_watch::PlausibilityWatch;
-use crate::guards::speed_history::SpeedHistory;
-use crate::run_control::observer::{ObserverError, RunObserver};
-use crate::run_control::operator::Operator;
-use crate::run_control::protection::Protection;
-use crate::run_control::run_error::RunError;
+use crate::run_control::observer::Protection;
+use crate::run_control::observer::{ObserverError, Operator, RunError, RunObserver};
 use crate::run_control::speed_control::SpeedControl;
 use crate::step_sources::step_source::StepSource;
 use mapper_core::{

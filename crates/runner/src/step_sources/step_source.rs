@@ -1,4 +1,4 @@
-//! Sources of a run's steps: a plan, or a source that decides during the run.
+//! Sources of steps: a plan, and the soak before one.
 
 use mapper_core::{Plan, PlanStep, SampleBatch, Soak, StepMarker};
 
@@ -120,5 +120,37 @@ impl StepSource for PlanSteps<'_> {
         let step = self.plan.steps.get(self.next).cloned();
         self.next += 1;
         Ok(step)
+    }
+}
+
+/// The steps of another source, delayed by a soak.
+pub struct SoakSource<'a> {
+    inner: &'a mut dyn StepSource,
+    soak: Soak,
+}
+
+impl<'a> SoakSource<'a> {
+    /// `inner` after `soak`.
+    pub fn new(inner: &'a mut dyn StepSource, soak: Soak) -> Self {
+        SoakSource { inner, soak }
+    }
+}
+
+impl StepSource for SoakSource<'_> {
+    fn inner(&self) -> Option<&dyn StepSource> {
+        Some(self.inner)
+    }
+
+    fn inner_mut(&mut self) -> Option<&mut dyn StepSource> {
+        Some(self.inner)
+    }
+
+    fn soak(&self) -> Option<Soak> {
+        Some(self.soak)
+    }
+
+    fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError> {
+        let next = self.inner.next_step()?;
+        Ok(next.map(|step| PlanStep { start_s: step.start_s + self.soak.duration_s, ..step }))
     }
 }

@@ -1,8 +1,7 @@
-//! Estimates the surge flow from the readings so far.
+//! The surge flow extrapolated from the growth of the variation, and the next move of a search.
 
-use crate::surge::growth_law::{GrowthLaw, Observation, log_likelihood, log_likelihood_excess};
-use crate::surge::smoothed_flow::SmoothedFlow;
-use crate::surge::surge_reading::{PRECURSOR_CHANNELS, SurgeReading};
+use crate::surge::variation::{PRECURSOR_CHANNELS, SmoothedFlow, SurgeReading, Variation};
+use mapper_core::SurgeSearchSettings;
 use mapper_numerics::statistics::mean;
 
 /// Exponents of the growth of the variance with the inverse margin, with their prior probabilities: theory predicts 1, and rigs
@@ -138,4 +137,159 @@ fn candidates(closest_flow_kg_s: f64) -> Vec<f64> {
     let (min, max, count) = DISTANCES;
     let step = (max / min).ln() / (count - 1) as f64;
     (0..count).map(|i| closest_flow_kg_s * (1.0 - min * (step * i as f64).exp())).collect()
+}
+
+/// Dependence of the growing part on the surge margin.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct GrowthLaw {
+    /// The variance is proportional to the inverse of the margin to this power: 1 by theory.
+    pub(crate) exponent: f64,
+    /// Margin at which the growth begins.
+    pub(crate) onset_ratio: f64,
+}
+
+impl GrowthLaw {
+    /// The growing part at a margin, without its scale factor.
+    pub(crate) fn growth_at(self, margin_ratio: f64) -> f64 {
+        let part = |margin: f64| margin.max(1e-6).powf(-self.exponent);
+        (part(margin_ratio) - part(self.onset_ratio)).max(0.0)
+    }
+}
+
+/// The growing part without its scale factor, and the measured variation at that reading.
+pub(crate) type Observation = (f64, Variation);
+
+/// Iterations of the reweighted fit; the variance then changes by less than its own error.
+const ROUNDS: usize = 5;
+
+/// Log-likelihood of a channel's variations at the most likely non-negative level and size. A variance follows a chi-squared
+/// distribution with its degrees of freedom.
+pub(crate) fn log_likelihood(read: &[Observation]) -> f64 {
+    let level_min = 0.2 * read.iter().map(|(_, v)| v.variance).fold(f64::INFINITY, f64::min);
+    let mut expected: Vec<f64> = read.iter().map(|(_, variation)| variation.variance).collect();
+    for _ in 0..ROUNDS {
+        // Weighted least squares; the weights are inverse variances of the measured variances.
+        let (mut s, mut sg, mut sgg, mut sv, mut sgv) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        for ((part, variation), expected) in read.iter().zip(&expected) {
+            let weight = variation.degrees_of_freedom / (expected * expected);
+            s += weight;
+            sg += weight * part;
+            sgg += weight * part * part;
+            sv += weight * variation.variance;
+            sgv += weight * part * variation.variance;
+        }
+        let determinant = s * sgg - sg * sg;
+        let slope = if determinant > 1e-12 * s * sgg { (s * sgv - sg * sv) / determinant } else { 0.0 };
+        let mut size = slope.max(0.0);
+        let mut level = (sv - size * sg) / s;
+        if level < level_min {
+            level = level_min;
+            size = if sgg > 0.0 { ((sgv - level * sg) / sgg).max(0.0) } else { 0.0 };
+        }
+        for ((part, _), expected) in read.iter().zip(&mut expected) {
+            *expected = level + size * part;
+        }
+    }
+    read.iter()
+        .zip(&expected)
+        .map(|((_, variation), expected)| {
+            -0.5 * variation.degrees_of_freedom * (expected.ln() + variation.variance / expected)
+        })
+        .sum()
+}
+
+/// Log-likelihood ratio of a free variance to one of known level; 0 if the variance is smaller.
+pub(crate) fn log_likelihood_excess(read: Variation, level: f64) -> f64 {
+    let ratio = read.variance / level;
+    if ratio > 1.0 { 0.5 * read.degrees_of_freedom * (ratio - 1.0 - ratio.ln()) } else { 0.0 }
+}
+
+/// Decision after a reading.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Move {
+    /// Move the valve to this opening, relative to the nominal area. The opening of the last reading means that it is repeated.
+    To(f64),
+    /// The line is done.
+    Done(LineEnd),
+}
+
+/// Reason for the end of a line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LineEnd {
+    /// The surge flow is known with the required accuracy.
+    AccuracyReached,
+    /// Closing further would violate the required distance or the safe distance.
+    DistanceReached,
+    /// The maximum number of steps was reached.
+    MaxSteps,
+}
+
+/// Step of the opening while surge is far by the nominal map, ratio.
+const FAR_STEP_RATIO: f64 = 0.08;
+/// Surge margin of the nominal map beyond which surge is far, ratio: the nominal surge line is uncertain.
+const FAR_MARGIN_RATIO: f64 = 0.35;
+/// Step that is allowed whatever the highest possible surge flow, ratio. If surge were that near, the variation would already be
+/// larger at this opening, and only further readings can decide.
+const SMALL_STEP_RATIO: f64 = 0.007;
+/// Maximum extrapolation of the law, in multiples of the smallest margin: the start of the growth differs between rigs.
+const MAX_EXTRAPOLATION: f64 = 1.4;
+/// Minimum distance to the highest possible surge flow, ratio.
+const MIN_DISTANCE_RATIO: f64 = 0.005;
+/// Minimum useful step, ratio.
+const MIN_STEP_RATIO: f64 = 0.004;
+const MAX_READINGS_AT_OPENING: usize = 3;
+
+/// Expected number of readings of a line on a machine like the nominal one, from a surge margin on.
+pub fn expected_readings(margin_ratio: f64, seek: &SurgeSearchSettings) -> usize {
+    let (mut flow, mut readings) = (1.0 + margin_ratio, 1);
+    while flow > 1.0 + 1.3 * seek.closest_margin_ratio && readings < seek.most_steps {
+        let far = flow - 1.0 > FAR_MARGIN_RATIO;
+        flow *= 1.0 - if far { FAR_STEP_RATIO.max(seek.step_ratio) } else { seek.step_ratio };
+        readings += 1;
+    }
+    // A few more near surge, where the steps are smaller.
+    (readings + 3).min(seek.most_steps)
+}
+
+/// Chooses the next move; `readings` has at least one reading. `nominal_margin_ratio`: surge margin of the nominal machine
+/// at the last opening; `None` if unknown.
+pub fn choose_next_move(
+    readings: &[SurgeReading],
+    seek: &SurgeSearchSettings,
+    nominal_margin_ratio: Option<f64>,
+) -> Move {
+    let Some(last) = readings.last() else { return Move::Done(LineEnd::MaxSteps) };
+    if readings.len() >= seek.most_steps {
+        return Move::Done(LineEnd::MaxSteps);
+    }
+    let opening = last.valve_opening_ratio;
+    let estimate = SurgeEstimate::of(readings);
+    let Some(estimate) = estimate.filter(|estimate| estimate.is_usable) else {
+        let far = nominal_margin_ratio.is_some_and(|margin| margin > FAR_MARGIN_RATIO);
+        let step = match estimate {
+            // The variation grows, but at too few openings to estimate how fast.
+            Some(estimate) if estimate.has_growth => 0.5 * seek.step_ratio,
+            _ if far => FAR_STEP_RATIO.max(seek.step_ratio),
+            _ => seek.step_ratio,
+        };
+        return Move::To(opening * (1.0 - step));
+    };
+    let margin_ratio = estimate.closest_flow_kg_s / estimate.flow_corrected_kg_s - 1.0;
+    let near = margin_ratio <= MAX_EXTRAPOLATION * seek.closest_margin_ratio;
+    if near && estimate.standard_error_ratio() <= seek.wanted_standard_error_ratio {
+        return Move::Done(LineEnd::AccuracyReached);
+    }
+    // Near surge, pressures hardly change with flow: the flow is proportional to the opening.
+    let flow_kg_s = estimate.closest_flow_kg_s;
+    let possible_kg_s = estimate.flow_corrected_kg_s + 2.0 * estimate.standard_error_kg_s;
+    let safe_kg_s = possible_kg_s.max(estimate.highest_flow_kg_s) * (1.0 + MIN_DISTANCE_RATIO);
+    let lowest_kg_s = (flow_kg_s * (1.0 - seek.step_ratio))
+        .max(safe_kg_s.min(flow_kg_s * (1.0 - SMALL_STEP_RATIO)))
+        .max(estimate.flow_corrected_kg_s * (1.0 + seek.closest_margin_ratio));
+    let step = 1.0 - lowest_kg_s / flow_kg_s;
+    if step >= MIN_STEP_RATIO {
+        return Move::To(opening * (1.0 - step));
+    }
+    let count = readings.iter().rev().take_while(|reading| reading.valve_opening_ratio == opening).count();
+    if count < MAX_READINGS_AT_OPENING { Move::To(opening) } else { Move::Done(LineEnd::DistanceReached) }
 }

@@ -1,7 +1,7 @@
 //! The surge marks of a recording: one for each line with a surge search.
 
 use crate::surge::estimate::SurgeEstimate;
-use crate::surge::surge_reading::SurgeReading;
+use crate::surge::variation::SurgeReading;
 use mapper_core::{
     Channel, DeclaredUncertainty, EventKind, Recording, ReferenceState, StepKind, StepMarker, SurgeFoundBy,
     SurgeMark, SurgeNotFound,

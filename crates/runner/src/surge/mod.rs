@@ -5,15 +5,9 @@
 //! recording. docs/reference/maps.md describes them.
 
 mod estimate;
-mod growth_law;
 mod mark;
-mod next_move;
-mod smoothed_flow;
-mod surge_reading;
 mod variation;
 
-pub use estimate::SurgeEstimate;
+pub use estimate::{LineEnd, Move, SurgeEstimate, choose_next_move, expected_readings};
 pub use mark::{SurgeErrors, SurgeMarks, find_surge_marks};
-pub use next_move::{LineEnd, Move, choose_next_move, expected_readings};
-pub use surge_reading::{PRECURSOR_CHANNELS, SurgeReading};
-pub use variation::Variation;
+pub use variation::{PRECURSOR_CHANNELS, SurgeReading, Variation};

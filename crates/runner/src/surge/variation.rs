@@ -1,4 +1,8 @@
-//! The fast variation of a channel at one opening, without its slow drift.
+//! Variation of flow and pressure from one tenth of a second to the next, and the readings that a search for surge needs.
+
+use mapper_core::{Channel, Recording, ReferenceState, StepMarker, SurgeSearchSettings};
+use mapper_numerics::statistics::mean;
+use nalgebra::{Matrix3, Vector3};
 
 /// Length of the segments that are detrended by a straight line, s. Drift is not due to surge, and slow sampling may fold fast
 /// oscillations to low frequencies.
@@ -65,6 +69,113 @@ fn detrend(t_s: &[f64], values: &[f64]) -> Vec<f64> {
     }
     let slope = if along > 0.0 { across / along } else { 0.0 };
     t_s.iter().zip(values).map(|(t, value)| value - level - slope * (t - middle_s)).collect()
+}
+
+/// Flows and pressure ratios at one speed, in the order of the readings.
+#[derive(Debug, Clone)]
+pub(crate) struct SmoothedFlow {
+    /// Corrected flow at the speed of the last reading, kg/s.
+    pub(crate) flows_kg_s: Vec<f64>,
+    /// Relative standard error of the smoothed flow, from the scatter about the curve.
+    pub(crate) flow_error_ratio: f64,
+}
+
+/// Range of openings above the smallest one that is fitted: beyond it a parabola does not describe a valve.
+const REACH_RATIO: f64 = 1.7;
+
+impl SmoothedFlow {
+    /// Flows converted to the speed of the last reading by similarity, then smoothed by a parabola of the logarithm of flow over
+    /// the logarithm of the opening. With fewer than five readings the flows are as measured.
+    pub(crate) fn fit(readings: &[SurgeReading]) -> Option<Self> {
+        let last = readings.last()?;
+        let to_speed = |reading: &SurgeReading| {
+            reading.flow_corrected_kg_s * last.speed_corrected_rpm / reading.speed_corrected_rpm
+        };
+        let measured: Vec<f64> = readings.iter().map(to_speed).collect();
+        let log_distance =
+            |reading: &SurgeReading| (reading.valve_opening_ratio / last.valve_opening_ratio).ln();
+        let is_near = |reading: &SurgeReading| log_distance(reading).abs() < REACH_RATIO.ln();
+        let (mut square, mut right) = (Matrix3::zeros(), Vector3::zeros());
+        let mut count = 0usize;
+        for (reading, flow) in readings.iter().zip(&measured).filter(|(reading, _)| is_near(reading)) {
+            let row = row(log_distance(reading));
+            square += row * row.transpose();
+            right += row * flow.ln();
+            count += 1;
+        }
+        let unsmoothed = SmoothedFlow { flows_kg_s: measured.clone(), flow_error_ratio: 0.0 };
+        let (true, Some(inverse)) = (count >= 5, square.try_inverse()) else { return Some(unsmoothed) };
+        let parabola = inverse * right;
+        let flow = |reading: &SurgeReading| row(log_distance(reading)).dot(&parabola);
+        let pairs = || readings.iter().zip(&measured).filter(|(reading, _)| is_near(reading));
+        let residual: f64 = pairs().map(|(reading, measured)| (measured.ln() - flow(reading)).powi(2)).sum();
+        let sigma_ratio = (residual / (count - 3).max(1) as f64).sqrt();
+        let at_last = row(0.0);
+        let flows_kg_s = readings
+            .iter()
+            .zip(&measured)
+            .map(|(reading, measured)| if is_near(reading) { flow(reading).exp() } else { *measured })
+            .collect();
+        let flow_error_ratio = sigma_ratio * at_last.dot(&(inverse * at_last)).max(0.0).sqrt();
+        Some(SmoothedFlow { flows_kg_s, flow_error_ratio })
+    }
+}
+
+fn row(log_distance: f64) -> Vector3<f64> {
+    Vector3::new(1.0, log_distance, log_distance * log_distance)
+}
+
+/// Channels whose variation indicates surge.
+pub const PRECURSOR_CHANNELS: [Channel; 3] = [Channel::P2, Channel::CompressorFlow, Channel::P1];
+
+/// Means and variation at one opening.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurgeReading {
+    /// Valve opening relative to the nominal area.
+    pub valve_opening_ratio: f64,
+    /// Run time of its end, s.
+    pub end_s: f64,
+    /// Corrected speed, rpm.
+    pub speed_corrected_rpm: f64,
+    /// Physical speed, rpm.
+    pub speed_rpm: f64,
+    /// Corrected flow, kg/s.
+    pub flow_corrected_kg_s: f64,
+    /// Total pressure ratio P2/P1.
+    pub pressure_ratio: f64,
+    /// Total inlet pressure P1, Pa.
+    pub p1_pa: f64,
+    /// Variation of [`PRECURSOR_CHANNELS`]; `None` if a channel has too few samples.
+    pub variations: [Option<Variation>; PRECURSOR_CHANNELS.len()],
+}
+
+impl SurgeReading {
+    /// The reading of a step, from [`SurgeSearchSettings::SETTLE_S`] after its start on. `None` if a mean or every variation is unknown:
+    /// the step was too short, or a channel is missing.
+    pub fn of(recording: &Recording, step: &StepMarker, reference: ReferenceState) -> Option<Self> {
+        let samples = |channel: Channel| -> Option<(Vec<f64>, Vec<f64>)> {
+            let series = recording.series.get(&channel)?;
+            let (t_s, values) = series.slice(step.start_s + SurgeSearchSettings::SETTLE_S, step.end_s);
+            Some(t_s.iter().zip(values).filter(|(_, value)| value.is_finite()).unzip())
+        };
+        let level = |channel: Channel| mean(&samples(channel)?.1).filter(|level| *level > 0.0);
+        let (speed_rpm, flow_kg_s) = (level(Channel::ShaftSpeed)?, level(Channel::CompressorFlow)?);
+        let (t1_k, p1_pa, p2_pa) = (level(Channel::T1)?, level(Channel::P1)?, level(Channel::P2)?);
+        let variations = PRECURSOR_CHANNELS.map(|channel| {
+            let (t_s, values) = samples(channel)?;
+            Variation::of(&t_s, &values)
+        });
+        variations.iter().any(Option::is_some).then_some(SurgeReading {
+            valve_opening_ratio: step.valve_opening_ratio,
+            end_s: step.end_s,
+            speed_corrected_rpm: reference.corrected_speed_rpm(speed_rpm, t1_k),
+            speed_rpm,
+            flow_corrected_kg_s: reference.corrected_flow_kg_s(flow_kg_s, t1_k, p1_pa),
+            pressure_ratio: p2_pa / p1_pa,
+            p1_pa,
+            variations,
+        })
+    }
 }
 
 #[cfg(test)]

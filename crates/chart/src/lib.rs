@@ -25,6 +25,7 @@ mod drawing;
 pub mod efficiency_mesh;
 mod figure_layout;
 mod items;
+mod map_drawing;
 mod markers;
 pub mod palette;
 mod rendering;
@@ -39,5 +40,6 @@ pub use items::{
     Annotation, Dash, Item, Line, LineEnd, Marker, Note, PointLabels, Polygon, Rule, RuleAt, Scatter,
     ScatterPoint,
 };
+pub use map_drawing::{ContourDrawing, EtaDrawing, LineDrawing, MapDrawing, NodeDrawing};
 pub use palette::Colour;
 pub use rendering::png::PngError;

@@ -1,21 +1,19 @@
 //! The picture of a map: lines, points, contours of efficiency, and the fitted surface.
 
 use crate::heading::{efficiency_name, percent, speed};
-use mapper_chart::efficiency_mesh::{
-    SUBDIVISIONS, contour_levels, efficiency_surface, fitted_surface, interpolate_between_lines,
-    points_surge_to_choke, speed_curve,
-};
+use mapper_chart::efficiency_mesh::{SUBDIVISIONS, interpolate_between_lines, points_surge_to_choke};
 use mapper_chart::{
-    Axis, Contours, Dash, Figure, Line, LineEnd, Marker, Panel, Polygon, Scatter, ScatterPoint, palette,
+    Axis, Contours, Dash, Figure, Line, LineDrawing, LineEnd, MapDrawing, Marker, NodeDrawing, Panel,
+    Polygon, Scatter, ScatterPoint, palette,
 };
 use mapper_core::{
-    CompressorMap, FittedLine, FittedMap, FittedNode, MapPoint, MapUnits, Method, SpeedLine, SurgeMark,
-    Verdict, confidence_interval_95,
+    CompressorMap, FittedMap, FittedNode, MapPoint, MapUnits, Method, Verdict, confidence_interval_95,
 };
 
 /// The map as a figure of two panels in these units, efficiency in %.
 pub fn map_figure(map: &CompressorMap, units: &MapUnits) -> Figure {
     let points = map.lines.iter().map(|line| line.points.len()).sum::<usize>();
+    let drawing = MapDrawing::new(map);
     let machine = if map.machine.is_empty() { "unnamed machine" } else { &map.machine };
     Figure::new(format!("Compressor map of {machine}"))
         .subtitle(format!(
@@ -35,8 +33,8 @@ pub fn map_figure(map: &CompressorMap, units: &MapUnits) -> Figure {
                 ),
             },
         ))
-        .panel(map_panel(map, units))
-        .panel(efficiency_panel(map, units))
+        .panel(map_panel(map, &drawing, units))
+        .panel(efficiency_panel(map, &drawing, units))
         .panel_size_px(560.0, 460.0)
 }
 
@@ -46,15 +44,13 @@ fn flow_axis(units: &MapUnits) -> Axis {
 }
 
 /// Panel (a): items in kg/s and pressure ratio.
-fn map_panel(map: &CompressorMap, units: &MapUnits) -> Panel {
+fn map_panel(map: &CompressorMap, drawing: &MapDrawing, units: &MapUnits) -> Panel {
     let mut panel = Panel::new(flow_axis(units), Axis::new("total pressure ratio P2/P1"))
         .title(format!("(a) speed lines ({}, corrected) and efficiency contours (%)", units.speed));
-    match &map.fitted {
-        Some(fitted) => add_map(&mut panel, fitted, units),
-        None => add_measured_lines(&mut panel, map, units),
-    }
-    if !map.surge.is_empty() {
-        panel.add(surge_marks(map));
+    add_map(&mut panel, drawing, map.fitted.as_ref(), units);
+    if !drawing.sought.is_empty() {
+        let marks = Scatter::new(drawing.sought.clone(), palette::VERMILLION);
+        panel.add(marks.marker(Marker::Square).label("surge, sought"));
     }
     let all = || map.lines.iter().flat_map(|line| &line.points);
     for class in CLASSES {
@@ -69,35 +65,7 @@ fn map_panel(map: &CompressorMap, units: &MapUnits) -> Panel {
     panel
 }
 
-/// Measured surge-side ends, with their 95 % intervals.
-fn surge_marks(map: &CompressorMap) -> Scatter {
-    let mark = |mark: &SurgeMark| {
-        let (flow, ratio) = (mark.flow_corrected_kg_s, mark.pressure_ratio);
-        ScatterPoint {
-            x: flow,
-            y: ratio,
-            x_interval: Some(confidence_interval_95(flow, mark.flow_total_standard_error_kg_s())),
-            y_interval: Some(confidence_interval_95(ratio, mark.pressure_ratio_standard_error)),
-        }
-    };
-    let marks: Vec<ScatterPoint> = map.surge.iter().map(mark).collect();
-    Scatter::new(marks, palette::VERMILLION).marker(Marker::Square).label("surge, sought")
-}
-
-/// Lines and contours through the points, without a fit.
-fn add_measured_lines(panel: &mut Panel, map: &CompressorMap, units: &MapUnits) {
-    if let Some(grid) = efficiency_surface(map) {
-        let levels = contour_levels(grid.value_range());
-        panel.add(Contours::new(grid, &levels, percent));
-    }
-    for line in &map.lines {
-        let curve = speed_curve(map, line);
-        let speed = speed(line.speed_corrected_rpm, units);
-        panel.add(Line::new(curve, palette::INK).width_px(1.3).end_label(speed, LineEnd::Last));
-    }
-}
-
-fn efficiency_panel(map: &CompressorMap, units: &MapUnits) -> Panel {
+fn efficiency_panel(map: &CompressorMap, drawing: &MapDrawing, units: &MapUnits) -> Panel {
     let name = match map.method {
         Method::Steady => "apparent efficiency, %",
         Method::Dynamic | Method::Joint | Method::Corrected => "adiabatic efficiency, %",
@@ -105,9 +73,7 @@ fn efficiency_panel(map: &CompressorMap, units: &MapUnits) -> Panel {
     };
     let mut panel =
         Panel::new(flow_axis(units), Axis::new(name)).title("(b) efficiency with its 95 % interval");
-    if let Some(fitted) = &map.fitted {
-        add_eta(&mut panel, map, fitted);
-    }
+    add_eta(&mut panel, drawing);
     let last = map.lines.len().saturating_sub(1).max(1) as f64;
     for (index, line) in map.lines.iter().enumerate() {
         let colour = palette::sequential(index as f64 / last);
@@ -125,9 +91,6 @@ fn efficiency_panel(map: &CompressorMap, units: &MapUnits) -> Panel {
             continue;
         }
         let label = format!("{} {}", speed(line.speed_corrected_rpm, units), units.speed);
-        if map.fitted.is_none() {
-            panel.add(Line::new(points.iter().map(|(p, _)| (p.x, p.y)).collect(), colour).label(&label));
-        }
         for (verdict, marker) in [(Verdict::Good, Marker::Circle), (Verdict::Doubtful, Marker::Diamond)] {
             let members: Vec<ScatterPoint> = points.iter().filter(|p| p.1 == verdict).map(|p| p.0).collect();
             let scatter = Scatter::new(members, colour).marker(marker);
@@ -199,119 +162,83 @@ impl Class {
 const SURGE: palette::Colour = palette::VERMILLION;
 const CHOKE: palette::Colour = palette::PURPLE;
 /// All items below the points in the panel of pressure ratio over flow.
-pub(crate) fn add_map(panel: &mut Panel, fitted: &FittedMap, units: &MapUnits) {
-    add_shade(panel, fitted);
-    if let Some(grid) = fitted_surface(fitted) {
-        let levels = contour_levels(grid.value_range());
-        panel.add(Contours::new(grid, &levels, percent));
+fn add_map(panel: &mut Panel, drawing: &MapDrawing, fitted: Option<&FittedMap>, units: &MapUnits) {
+    if let Some(fitted) = fitted {
+        add_shade(panel, fitted);
     }
-    for line in &fitted.lines {
-        let all = || line.nodes.iter().map(|n| (place(n), n.extrapolated));
+    if let Some(grid) = &drawing.surface {
+        panel.add(Contours::new(grid.clone(), &drawing.levels(), percent));
+    }
+    for line in &drawing.lines {
         let colour = if line.measured { palette::INK } else { palette::GREY };
-        panel.add(Line::new(runs(all(), true), palette::GREY).width_px(1.0).dash(Dash::Dashed));
-        panel.add(Line::new(runs(all(), false), colour).width_px(1.3));
+        panel.add(Line::new(runs(&line.nodes, true), palette::GREY).width_px(1.0).dash(Dash::Dashed));
+        panel.add(Line::new(runs(&line.nodes, false), colour).width_px(1.3));
     }
     // If two speed labels overlap, the first one is kept, so measured lines come first.
-    let (measured, others): (Vec<&FittedLine>, Vec<&FittedLine>) =
-        fitted.lines.iter().partition(|line| line.measured);
+    let (measured, others): (Vec<&LineDrawing>, Vec<&LineDrawing>) =
+        drawing.lines.iter().partition(|line| line.measured);
     for line in measured.into_iter().chain(others) {
         let colour = if line.measured { palette::INK } else { palette::GREY };
-        // An invisible line at the last visible node carries the speed label.
-        let end = line.nodes.iter().find(|n| !n.extrapolated).or_else(|| middle(line)).map(place);
+        // An invisible line at its choke-side end carries the speed label.
+        let end = choke_end(line, fitted.is_some());
         panel.add(
             Line::new(end.into_iter().collect(), colour)
                 .width_px(0.0)
                 .end_label(speed(line.speed_corrected_rpm, units), LineEnd::Last),
         );
     }
-    let surge: Vec<(f64, f64)> = fitted.surge_line().map(|(_, n)| place(n)).collect();
-    let choke: Vec<(f64, f64)> = fitted.choke_line().map(|(_, n)| place(n)).collect();
+    if fitted.is_none() {
+        return;
+    }
+    let (surge, choke) = (drawing.surge.clone(), drawing.choke.clone());
     panel.add(Line::new(surge, SURGE).width_px(1.6).dash(Dash::DashDot).label("surge-side end of the lines"));
     panel.add(Line::new(choke, CHOKE).width_px(1.6).dash(Dash::Dotted).label("choke"));
     panel.add(Line::new(Vec::new(), palette::GREY).width_px(1.0).dash(Dash::Dashed).label("extrapolated"));
 }
 
-/// Fitted efficiency of the measured lines over flow, with its 95 % band, within each line's measured range. Beyond, towards
+/// The visible end of a line: fitted lines begin at choke, curves through points end there.
+fn choke_end(line: &LineDrawing, is_fitted: bool) -> Option<(f64, f64)> {
+    let visible = |node: &&NodeDrawing| !node.extrapolated;
+    let end = if is_fitted { line.nodes.iter().find(visible) } else { line.nodes.iter().rfind(visible) };
+    end.or_else(|| line.nodes.get(line.nodes.len() / 2)).map(|node| node.place)
+}
+
+/// Efficiency of the measured lines over flow, with its 95 % band, within each line's measured range. Beyond, towards
 /// pressure ratio 1, it falls to 0 and would compress the measured range into the top of the picture.
-pub(crate) fn add_eta(panel: &mut Panel, map: &CompressorMap, fitted: &FittedMap) {
-    let measured: Vec<&FittedLine> = fitted.lines.iter().filter(|line| line.measured).collect();
+fn add_eta(panel: &mut Panel, drawing: &MapDrawing) {
+    let measured: Vec<&LineDrawing> = drawing.lines.iter().filter(|line| line.measured).collect();
     let last = measured.len().saturating_sub(1).max(1) as f64;
-    for (index, (line, own)) in measured.iter().zip(&map.lines).enumerate() {
+    for (index, line) in measured.iter().enumerate() {
         let colour = palette::sequential(index as f64 / last);
-        let drawn = between_points(line, own);
         let side = |low: bool| {
-            drawn.iter().map(move |(flow_kg_s, eta, standard_error)| {
-                let (below, above) = confidence_interval_95(*eta, *standard_error);
-                (*flow_kg_s, 100.0 * if low { below } else { above })
+            line.eta.iter().map(move |node| {
+                let (below, above) = confidence_interval_95(node.eta, node.eta_standard_error);
+                (node.flow_corrected_kg_s, 100.0 * if low { below } else { above })
             })
         };
-        let mut band: Vec<(f64, f64)> = side(true).collect();
-        band.extend(side(false).collect::<Vec<_>>().into_iter().rev());
-        panel.add(Polygon { opacity: 0.25, ..Polygon::new(band, colour) });
-        let curve = drawn.iter().map(|(flow_kg_s, eta, _)| (*flow_kg_s, 100.0 * eta)).collect();
+        if line.eta.iter().any(|node| node.eta_standard_error > 0.0) {
+            let mut band: Vec<(f64, f64)> = side(true).collect();
+            band.extend(side(false).collect::<Vec<_>>().into_iter().rev());
+            panel.add(Polygon { opacity: 0.25, ..Polygon::new(band, colour) });
+        }
+        let curve = line.eta.iter().map(|node| (node.flow_corrected_kg_s, 100.0 * node.eta)).collect();
         panel.add(Line::new(curve, colour).width_px(1.2));
     }
-}
-
-/// A point on a line's curve: flow, efficiency and its standard error.
-type CurvePoint = (f64, f64, f64);
-
-/// The curve of a line between its largest and its smallest measured flow, interpolated at its ends, and above its lowest
-/// efficiency: at choke the flow no longer shows the end of the measured range.
-fn between_points(line: &FittedLine, own: &SpeedLine) -> Vec<CurvePoint> {
-    let points = || own.points.iter().filter(|point| point.eta.is_some());
-    let flows = || points().map(|point| point.flow_corrected_kg_s);
-    let (smallest_kg_s, largest_kg_s) =
-        (flows().fold(f64::INFINITY, f64::min), flows().fold(f64::NEG_INFINITY, f64::max));
-    let lowest =
-        points().filter_map(|point| point.identified.eta_low.or(point.eta)).fold(f64::INFINITY, f64::min);
-    let mut drawn: Vec<CurvePoint> = Vec::new();
-    let mut before: Option<CurvePoint> = None;
-    // From choke to surge.
-    for node in line.nodes.iter().map(|n| (n.flow_corrected_kg_s, n.eta, n.eta_standard_error)) {
-        let (flow_kg_s, eta, _) = node;
-        if flow_kg_s < smallest_kg_s {
-            drawn.extend(
-                before.filter(|_| !drawn.is_empty()).map(|before| at_flow(before, node, smallest_kg_s)),
-            );
-            break;
-        }
-        if flow_kg_s <= CHOKED_RATIO * largest_kg_s && (eta >= lowest || !drawn.is_empty()) {
-            let beyond = before.filter(|before| drawn.is_empty() && before.0 > CHOKED_RATIO * largest_kg_s);
-            drawn.extend(beyond.map(|before| at_flow(before, node, largest_kg_s)));
-            drawn.push(node);
-        }
-        before = Some(node);
-    }
-    drawn
-}
-
-/// A line is choked if its flow changes by less than this factor from one measured point to the next.
-const CHOKED_RATIO: f64 = 1.01;
-
-/// The curve between two nodes, interpolated in flow.
-fn at_flow(a: CurvePoint, b: CurvePoint, flow_kg_s: f64) -> CurvePoint {
-    let share = (a.0 - flow_kg_s) / (a.0 - b.0);
-    let at = |a: f64, b: f64| a + share * (b - a);
-    (flow_kg_s, at(a.1, b.1), at(a.2, b.2))
 }
 
 fn place(node: &FittedNode) -> (f64, f64) {
     (node.flow_corrected_kg_s, node.pressure_ratio)
 }
 
-fn middle(line: &FittedLine) -> Option<&FittedNode> {
-    line.nodes.get(line.nodes.len() / 2)
-}
-
-/// Points of one kind; NaN breaks the line at a change of kind. A dashed line extends to its solid neighbours.
-fn runs(points: impl Iterator<Item = ((f64, f64), bool)>, extrapolated: bool) -> Vec<(f64, f64)> {
-    let all: Vec<((f64, f64), bool)> = points.collect();
+/// Places of one kind; NaN breaks the line at a change of kind. A dashed line extends to its solid neighbours.
+fn runs(nodes: &[NodeDrawing], extrapolated: bool) -> Vec<(f64, f64)> {
+    let is_out =
+        |index: Option<usize>| index.and_then(|i| nodes.get(i)).is_some_and(|node| node.extrapolated);
     let belongs = |i: usize| {
-        all[i].1 == extrapolated
-            || extrapolated && (i > 0 && all[i - 1].1 || i + 1 < all.len() && all[i + 1].1)
+        nodes[i].extrapolated == extrapolated
+            || extrapolated && (is_out(i.checked_sub(1)) || is_out(i.checked_add(1)))
     };
-    (0..all.len()).map(|i| if belongs(i) { all[i].0 } else { (f64::NAN, f64::NAN) }).collect()
+    (0..nodes.len()).map(|i| if belongs(i) { nodes[i].place } else { (f64::NAN, f64::NAN) }).collect()
 }
 
 /// Grey between neighbouring lines if a corner is extrapolated, one polygon for each run of nodes. From line to line

@@ -11,6 +11,7 @@
 
 mod enums;
 mod identification;
+pub mod json_messages;
 mod maps;
 mod measurement;
 mod rig;
@@ -90,6 +91,7 @@ pub use test_plan::plan_remark::{
 };
 pub use test_plan::points::{Dwell, Jump, OperatingPoint, Repeats, Timing, VisitOrder};
 pub use test_plan::step_number::step_number;
+pub use json_messages::{JsonMessages, Sentences, with_sentences};
 pub use text::{
     coloured_text, one_line, probability_text, readable, shorten_numbers, temperature, terminal_json,
     terminal_text, with_unit,

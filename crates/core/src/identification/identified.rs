@@ -139,6 +139,7 @@ pub struct IdentifiedPoint {
     /// Whether to use it.
     pub verdict: Verdict,
     /// Reasons for a verdict other than good, and remarks.
+    #[serde(serialize_with = "crate::json_messages::serialize")]
     pub warnings: Vec<Warning>,
     /// Part of the recording used.
     pub window: Option<Window>,

@@ -115,7 +115,7 @@ pub struct ThermalModel {
     /// Parameters that are nearly indistinguishable (absolute correlation above 0.95).
     pub entangled: Vec<CorrelatedPair>,
     /// Evidence against the model; empty if there is none.
-    #[serde(deserialize_with = "with_values")]
+    #[serde(serialize_with = "crate::json_messages::serialize", deserialize_with = "with_values")]
     pub doubts: Vec<ModelDoubt>,
 }
 

@@ -200,7 +200,11 @@ pub struct Plan {
     #[serde(default, deserialize_with = "deserialize_no_bound")]
     pub bound_remark: Option<NoBound>,
     /// Remarks for the operator of the plan.
-    #[serde(default, deserialize_with = "deserialize_remarks")]
+    #[serde(
+        default,
+        serialize_with = "crate::json_messages::serialize",
+        deserialize_with = "deserialize_remarks"
+    )]
     pub remarks: Vec<PlanRemark>,
 }
 

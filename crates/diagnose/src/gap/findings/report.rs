@@ -60,6 +60,7 @@ pub struct Diagnosis {
     /// Sensor offsets beyond tolerance, found at rest and already subtracted.
     pub offsets_at_rest: Vec<OffsetAtRest>,
     /// Limits of the diagnosis.
+    #[serde(serialize_with = "mapper_core::json_messages::serialize")]
     pub warnings: Vec<GapWarning>,
 }
 

@@ -35,6 +35,7 @@ pub struct ProposedChannel {
     /// Certainty.
     pub certainty: Certainty,
     /// Reasons for the certainty, and assumptions.
+    #[serde(serialize_with = "mapper_core::json_messages::serialize")]
     pub remarks: Vec<ProposalRemark>,
 }
 
@@ -67,6 +68,7 @@ pub struct Proposal {
     /// Reference of gauge pressures; `None` if the log has no gauge pressure.
     pub ambient: Option<Ambient>,
     /// Results of the checks between channels.
+    #[serde(serialize_with = "mapper_core::json_messages::serialize")]
     pub remarks: Vec<ProposalRemark>,
 }
 

@@ -1,8 +1,7 @@
 //! Work in a thread of its own while the calling thread watches for Ctrl-C.
 
 use crate::error::{Fault, MapperError};
-use mapper::{Observer, SessionEvent};
-use mapper_session::with_messages;
+use mapper::{Observer, SessionEvent, with_messages};
 use pyo3::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -46,10 +45,10 @@ impl Events {
             self.shared.holds_rig.store(false, Ordering::SeqCst);
         }
         if let Some(sender) = &self.sender
-            && let Ok(event) = serde_json::to_value(event)
+            && let Ok(event) = with_messages(|| serde_json::to_value(event))
         {
             // A full queue loses a movement of the bar.
-            let _ = sender.try_send(with_messages(event).to_string());
+            let _ = sender.try_send(event.to_string());
         }
     }
 }

@@ -4,7 +4,7 @@ use crate::attended::compute;
 use crate::error::Fault;
 use crate::plugins::plugins;
 use mapper_core::NAMED_REFERENCES;
-use mapper_session::{FirstCampaignRequest, FirstRig, SessionError, first_campaign, with_messages};
+use mapper_session::{FirstCampaignRequest, FirstRig, SessionError, first_campaign};
 use pyo3::prelude::*;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -87,7 +87,8 @@ impl Campaign {
 fn plan_json(campaign: &mapper::Campaign, effort: f64) -> Result<Value, Fault> {
     let settings = campaign.settings();
     let planned = campaign.plan_with(effort)?;
-    let mut value = serde_json::to_value(&planned.plan).map_err(SessionError::from)?;
+    let mut value =
+        mapper::with_messages(|| serde_json::to_value(&planned.plan)).map_err(SessionError::from)?;
     if settings.sequence.is_some() {
         value["forecast"] = true.into();
         value["notes"] = planned.notes.into();
@@ -95,7 +96,7 @@ fn plan_json(campaign: &mapper::Campaign, effort: f64) -> Result<Value, Fault> {
     if let Some(zero) = settings.zero {
         value["soak_s"] = zero.duration_s.into();
     }
-    Ok(with_messages(value))
+    Ok(value)
 }
 
 /// Writes the first campaign of a machine and its nominal map, as `mapper init` does. Returns the JSON of that command.

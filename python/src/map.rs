@@ -6,7 +6,7 @@ use crate::plugins::plugins;
 use mapper_core::CompressorMap;
 use mapper_maps::table::parse_reference;
 use mapper_maps::{MapFitOptions, fit_map};
-use mapper_session::{Existing, SessionError, with_messages, write_map_fitted_if_needed};
+use mapper_session::{Existing, SessionError, write_map_fitted_if_needed};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 
@@ -40,8 +40,9 @@ impl Map {
 
     /// The map as JSON, its fitted surface included.
     fn json(&self) -> PyResult<String> {
-        let json = serde_json::to_value(&self.map).map_err(|error| Fault::from(SessionError::from(error)))?;
-        Ok(with_messages(json).to_string())
+        let json = mapper::with_messages(|| serde_json::to_value(&self.map));
+        let json = json.map_err(|error| Fault::from(SessionError::from(error)))?;
+        Ok(json.to_string())
     }
 
     /// Writes the map to a file in a format. A format that tabulates the whole map gets a fitted one.

@@ -6,7 +6,7 @@ use crate::error::Fault;
 use crate::map::Map;
 use crate::plugins::plugins_with_rig;
 use mapper::{RigDescription, RunEnding, RunOptions};
-use mapper_session::{SessionError, with_messages};
+use mapper_session::SessionError;
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -91,13 +91,14 @@ fn outcome(run: &mapper::Run) -> Result<Outcome, Fault> {
         RunEnding::Interrupted { .. } => "interrupted",
         RunEnding::Failed { .. } => "failed",
     };
-    let json = run.results().map(serde_json::to_value).transpose().map_err(SessionError::from)?;
+    let json = mapper::with_messages(|| run.results().map(serde_json::to_value).transpose())
+        .map_err(SessionError::from)?;
     Ok(Outcome {
         directory: run.directory().to_owned(),
         recording: run.recording_file().to_owned(),
         end,
         sentence: run.sentence().to_owned(),
-        json: json.map(|json| with_messages(json).to_string()),
+        json: json.map(|json| json.to_string()),
         map: run.results().and_then(|results| results.compressor_map.clone()).map(|map| Map { map }),
     })
 }

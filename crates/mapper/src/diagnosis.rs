@@ -101,7 +101,7 @@ impl Diagnosis {
     /// # Errors
     /// None in practice.
     pub fn json(&self) -> Result<Value, Error> {
-        Ok(self.gap.json()?)
+        Ok(mapper_report::with_messages(|| self.gap.json())?)
     }
 
     /// The diagnosis as one HTML page. `machine` and `recording` are the names in its title.

@@ -4,7 +4,8 @@ use crate::campaign::Campaign;
 use crate::error::Error;
 use crate::recording::Recording;
 use mapper_core::{CompressorMap, IdentifiedPoint, Method, ResultRemark};
-use mapper_session::{Identified, Recorded, Session, SessionError, compressor_map, result_remark_text};
+use mapper_report::{Message, with_messages};
+use mapper_session::{Identified, Recorded, Session, SessionError, compressor_map};
 use serde_json::Value;
 use std::path::PathBuf;
 
@@ -104,10 +105,10 @@ impl Identification {
 
     /// The object that `mapper identify --json` prints.
     pub fn json(&self) -> Value {
-        self.details.json(self.first_file.as_deref(), &self.warnings)
+        with_messages(|| self.details.json(self.first_file.as_deref(), &self.warnings))
     }
 }
 
 pub(crate) fn remarks_text(remarks: &[ResultRemark]) -> String {
-    remarks.iter().map(result_remark_text).collect::<Vec<_>>().join("; ")
+    remarks.iter().map(Message::message).collect::<Vec<_>>().join("; ")
 }

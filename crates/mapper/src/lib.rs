@@ -145,6 +145,7 @@ pub use mapper_diagnose::gap::CorrectedMap;
 pub use mapper_physics::rig::backend_plugin::BackendPlugin;
 pub use mapper_physics::rig::effect::Effect;
 pub use mapper_recording::ChannelMap;
+pub use mapper_report::with_messages;
 pub use mapper_session::{
     ErrorKind, Existing, Gap, Identified, Input, Recorded, Registry, Rehearsal, Results, SessionEvent,
 };

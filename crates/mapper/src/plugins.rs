@@ -29,6 +29,7 @@ pub fn plugins() -> Registry {
         read_effect,
         formats: FORMATS,
         logs: LOG_FORMATS,
+        sentences: Some(mapper_report::sentence),
         ..Registry::empty()
     }
 }

@@ -133,7 +133,7 @@ function drawEta() {
   const low = d3.min(data, p => p.eta_low ?? p.eta), high = d3.max(data, p => p.eta_high ?? p.eta);
   if (layer("lines"))
     for (const line of page.map.lines.filter(l => l.measured)) {
-      const nodes = line.nodes.filter(n => !n.out && n.eta != null && n.eta > (low ?? 0) - 3);
+      const nodes = line.eta;
       const name = d3.least(lineNames, n => Math.abs(n - line.speed));
       marks.push(Plot.areaY(nodes, { x: "flow", y1: n => n.eta - n.half, y2: n => n.eta + n.half, fill: lineColour(name), fillOpacity: 0.15, clip: true }));
       marks.push(Plot.line(nodes, { x: "flow", y: "eta", stroke: lineColour(name), clip: true }));
@@ -151,7 +151,7 @@ function drawEta() {
   page.others.forEach((other, index) => {
     if (!layer(`other${index}`)) return;
     for (const line of other.map.lines.filter(l => l.measured))
-      marks.push(Plot.line(line.nodes.filter(n => !n.out && n.eta > (low ?? 0) - 3), { x: "flow", y: "eta", stroke: d3.schemeTableau10[index % 10], strokeDasharray: "7 3", clip: true }));
+      marks.push(Plot.line(line.eta, { x: "flow", y: "eta", stroke: d3.schemeTableau10[index % 10], strokeDasharray: "7 3", clip: true }));
   });
   marks.push(...pointMarks(data, "eta"));
   const plot = Plot.plot({

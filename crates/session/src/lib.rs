@@ -43,7 +43,6 @@ pub use machine::map_file::{map_description, write_map, write_map_fitted_if_need
 pub use machine::map_work::{MapFile, MapOut, MapWork};
 pub use mapper_diagnose::driven::Side;
 pub use mapper_maps::table::DescriptionError;
-pub use mapper_report::{result_remark_text, with_messages};
 pub use mapper_runner::Operator;
 pub use nights::night_report::{night_report_link, night_report_path, write_night_report};
 pub use nights::nightly::PreparedNight;

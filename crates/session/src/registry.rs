@@ -4,7 +4,9 @@ use crate::SessionError;
 use crate::recording::identification_config::declared;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::BackendChoice;
-use mapper_core::{Backend, BackendError, Channel, DeclaredUncertainty, MapFormats, SetpointRanges};
+use mapper_core::{
+    Backend, BackendError, Channel, DeclaredUncertainty, MapFormats, Sentences, SetpointRanges,
+};
 use mapper_physics::rig::backend_plugin::{BackendPlugin, NominalRig};
 use mapper_physics::rig::effect::Effect;
 use mapper_physics::simulation::model::Model;
@@ -35,6 +37,8 @@ pub struct Registry {
     pub formats: MapFormats,
     /// Log formats of other programs.
     pub logs: LogFormats,
+    /// Sentences of warnings and remarks in written JSON; `None` writes their values alone.
+    pub sentences: Option<Sentences>,
     /// Commit that the program was built from; empty if unknown.
     pub commit: &'static str,
 }
@@ -50,6 +54,7 @@ impl Registry {
             read_effect: no_effect,
             formats: MapFormats(&[]),
             logs: LogFormats::default(),
+            sentences: None,
             commit: "",
         }
     }

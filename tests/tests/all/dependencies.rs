@@ -41,7 +41,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     // The application as a library. The caller passes the plug-ins.
     ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "recording", "observe", "identify", "diagnose", "history", "maps", "report", "numerics", "fleet", "fmu", "yaml"]),
     // The front door: the application with every plug-in, as a library.
-    ("mapper",           &["core", "physics", "campaign", "driver-host", "recording", "diagnose", "session", "backends", "effects", "formats", "log-formats"]),
+    ("mapper",           &["core", "physics", "campaign", "driver-host", "recording", "diagnose", "report", "session", "backends", "effects", "formats", "log-formats"]),
     // The live page of a run.
     ("mapper-live",      &["core", "campaign", "recording", "report", "session", "yaml"]),
     // Blind cases on the virtual lab, calibrations, the figures of the paper; above the application, like the program.

@@ -72,7 +72,7 @@ impl Backend {
         if self.json {
             return standard_output::print_json(&json!({ "backends": backends }));
         }
-        let mut table = mapper_report::with_heads(&["backend", "summary"]).with_texts([1]);
+        let mut table = mapper_report::Table::new(["backend", "summary"]).with_texts([1]);
         for entry in &backends {
             let word = |key: &str| entry[key].as_str();
             let location = match (word("program"), word("socket"), word("build")) {
@@ -82,9 +82,11 @@ impl Backend {
                 _ => String::new(),
             };
             let summary = word("summary").unwrap_or_default();
-            table.add_row([word("name").unwrap_or_default().to_owned(), format!("{summary}{location}")]);
+            table.row([word("name").unwrap_or_default().to_owned(), format!("{summary}{location}")]);
         }
-        standard_output::print(&format!("{table}\n"))
+        let mut document = mapper_report::Document::default();
+        document.table(table);
+        standard_output::show(&document)
     }
 
     fn check(&self, name: &str, path: &Path) -> Result<(), Failure> {

@@ -8,7 +8,7 @@ use crate::output::{output_options, standard_output};
 use clap::Args;
 use mapper_campaign::CampaignError;
 use mapper_campaign::campaign::Date;
-use mapper_report::{assumed_text, declared_sensors_text, lines_text, verdict_forecast_text};
+use mapper_report::{CheckedCampaign, Describe};
 use mapper_session::{Session, nominal_model};
 use serde_json::json;
 use std::path::PathBuf;
@@ -73,14 +73,19 @@ impl Check {
         if warnings.count() > 0 {
             standard_output::warn(&warnings.render(output_options::is_stderr_coloured()));
         }
-        let (steps, count) = ((forecast.steps, forecast.is_planned), warnings.count());
-        standard_output::print(&format!(
-            "{}{}{}{}{}",
-            mapper_report::campaign_check_text(&self.campaign, &campaign, steps, forecast.duration_s, count),
-            verdict_forecast_text(&campaign, forecast.verdicts, &forecast.advice),
-            declared_sensors_text(&campaign),
-            assumed_text(&campaign),
-            lines_text(&campaign, &lines),
-        ))
+        standard_output::show(
+            &CheckedCampaign {
+                file: &self.campaign,
+                campaign: &campaign,
+                steps: forecast.steps,
+                is_planned: forecast.is_planned,
+                duration_s: forecast.duration_s,
+                warnings: warnings.count(),
+                verdicts: forecast.verdicts,
+                advice: &forecast.advice,
+                lines: &lines,
+            }
+            .document(),
+        )
     }
 }

@@ -7,7 +7,7 @@ use crate::output::standard_output;
 use crate::output::standard_output::Replace;
 use clap::Args;
 use mapper_campaign::Campaign;
-use mapper_report::{corrected_csv, drift_text, sensors_text, zero_text};
+use mapper_report::{Describe, corrected_csv};
 use mapper_session::{DIAGNOSIS_FORMAT, Recorded, Session, SessionError, Versioned};
 use serde_json::json;
 use std::path::PathBuf;
@@ -67,10 +67,11 @@ impl Drift {
             value["recording_warnings"] = json!(warnings);
             return standard_output::print_json(&value);
         }
-        let mut text =
-            [drift_text(&drift.report), sensors_text(&drift.sensors), zero_text(&drift.zero)].concat();
-        text.extend(warnings.iter().map(|warning| format!("recording: {warning}\n")));
-        standard_output::print(&text)
+        let mut document = drift.report.document();
+        document.append(drift.sensors.document());
+        document.append(drift.zero.document());
+        warnings.iter().for_each(|warning| document.text(format!("recording: {warning}")));
+        standard_output::show(&document)
     }
 
     /// Recordings, and the campaign if one is given.

@@ -9,7 +9,7 @@ use mapper_fleet::{
     CreatedStudy, Hash, ItemSelection, Limits, MergeOutcome, Shard, SubmitOptions, Template, kind_of,
     open_study, query_task_states,
 };
-use mapper_report::{cost_text, merged_text, status_text, submission_text};
+use mapper_report::{Describe, study_status};
 use mapper_validation::studies::program;
 use serde_json::json;
 use std::path::PathBuf;
@@ -59,7 +59,7 @@ impl Estimate {
         if self.json {
             standard_output::print_json(&tried.cost)
         } else {
-            standard_output::print(&cost_text(&tried.cost))
+            standard_output::show(&tried.cost.document())
         }
     }
 }
@@ -141,7 +141,7 @@ pub fn print_merged(
         let result = merged.result.as_ref().map(|(path, _)| path);
         standard_output::print_json(&json!({ "status": merged.status, "result": result }))?;
     } else {
-        standard_output::print(&merged_text(merged))?;
+        standard_output::show(&merged.document())?;
     }
     if is_complete {
         return Ok(());
@@ -165,7 +165,7 @@ impl Retry {
         if self.json {
             standard_output::print_json(&submission)
         } else {
-            standard_output::print(&submission_text(&submission))
+            standard_output::show(&submission.document())
         }
     }
 }
@@ -234,7 +234,7 @@ impl Status {
                     &json!({ "study": fleet.study.name, "status": status, "core_s_left": left_s, "queue": states }),
                 );
             }
-            standard_output::print(&status_text(&fleet.study.name, &status, states.as_ref()))
+            standard_output::show(&study_status(&fleet.study.name, &status, states.as_ref()))
         })
     }
 }
@@ -304,7 +304,7 @@ impl Submit {
         if self.json {
             standard_output::print_json(&submission)
         } else {
-            standard_output::print(&submission_text(&submission))
+            standard_output::show(&submission.document())
         }
     }
 }

@@ -5,7 +5,7 @@ use crate::output::standard_output;
 use crate::output::standard_output::Replace;
 use clap::Args;
 use mapper_history::{Filter, Metric};
-use mapper_report::{groups_text, history_svg, runs_text};
+use mapper_report::{history_svg, listed_runs, night_groups};
 use mapper_session::{SessionError, night_report_link};
 use serde_json::json;
 use std::path::PathBuf;
@@ -84,10 +84,10 @@ impl History {
             let runs: Vec<serde_json::Value> = runs.iter().map(mapper_report::listed_run_json).collect();
             return standard_output::print_json(&json!({"history": self.db, "runs": runs}));
         }
-        standard_output::print(&if self.runs {
-            runs_text(&runs, &figures)
+        standard_output::show(&if self.runs {
+            listed_runs(&runs, &figures)
         } else {
-            groups_text(&runs, &figures)
+            night_groups(&runs, &figures)
         })
     }
 }

@@ -8,6 +8,7 @@ use crate::output::standard_output;
 use crate::terminal::{identified_text, results_text};
 use clap::{Args, ValueEnum};
 use mapper_core::Method;
+use mapper_report::with_messages;
 use mapper_session::{Recorded, Session};
 use std::path::PathBuf;
 
@@ -58,7 +59,7 @@ impl Identify {
             let results = session.identify_into(recorded, &map, method, directory)?;
             return match self.json {
                 true => standard_output::print_json(&results),
-                false => standard_output::print(&results_text(
+                false => standard_output::show(&results_text(
                     &display,
                     &results,
                     FULL_COMMAND,
@@ -69,8 +70,10 @@ impl Identify {
         let identified = session.identify(recorded, &map, method)?;
         identified.has_points(&warnings)?;
         match self.json {
-            true => standard_output::print_json(&identified.json(path.as_deref(), &warnings)),
-            false => standard_output::print(&identified_text(
+            true => {
+                standard_output::print_json(&with_messages(|| identified.json(path.as_deref(), &warnings)))
+            }
+            false => standard_output::show(&identified_text(
                 &display,
                 &identified,
                 FULL_COMMAND,

@@ -6,7 +6,6 @@ use crate::output::standard_output;
 use clap::{Args, ValueEnum};
 use mapper_campaign::units::{Kind, parse};
 use mapper_core::{NAMED_REFERENCES, NamedReference};
-use mapper_report::first_campaign_text;
 use mapper_session::{FirstCampaignRequest, FirstRig, first_campaign};
 use std::io::{BufRead, IsTerminal, Read};
 use std::path::PathBuf;
@@ -99,7 +98,7 @@ impl Init {
         let written = first_campaign(&registry(), &request)?;
         match self.json {
             true => standard_output::print_json(&written),
-            false => standard_output::print(&first_campaign_text(
+            false => standard_output::show(&mapper_report::first_campaign(
                 &written.campaign,
                 &written.map,
                 written.channels.as_deref(),

@@ -6,7 +6,7 @@ use crate::output::failure::Failure;
 use crate::output::standard_output;
 use crate::output::standard_output::Replace;
 use clap::Args;
-use mapper_report::log_text;
+use mapper_report::{log_contents, with_messages};
 use mapper_session::inspect_log;
 use std::path::PathBuf;
 
@@ -56,13 +56,13 @@ impl Inspect {
             self.replace.write(file, log.channel_map().as_bytes())?;
         }
         if self.json {
-            return standard_output::print_json(&log.json());
+            return standard_output::print_json(&with_messages(|| log.json()));
         }
-        let mut text = log_text(log.format, &log.layout, &log.survey, &log.proposal);
-        match &self.write_channels {
-            Some(file) => text.push_str(&format!("\nThe channel map is in {}.\n", file.display())),
-            None => text.push_str("\nSave it with `--write-channels FILE`.\n"),
-        }
-        standard_output::print(&text)
+        let mut document = log_contents(log.format, &log.layout, &log.survey, &log.proposal);
+        document.text(match &self.write_channels {
+            Some(file) => format!("The channel map is in {}.", file.display()),
+            None => "Save it with `--write-channels FILE`.".to_owned(),
+        });
+        standard_output::show(&document)
     }
 }

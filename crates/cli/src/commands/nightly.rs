@@ -7,7 +7,7 @@ use crate::output::{output_options, standard_output};
 use clap::Args;
 use mapper_campaign::load_nightly;
 use mapper_history::{History, Night};
-use mapper_report::night_text;
+use mapper_report::night_comparison;
 use mapper_session::{
     ErrorKind, PROGRAM, PreparedNight, Session, SessionError, night_report_path, write_night_report,
 };
@@ -80,7 +80,7 @@ impl Nightly {
                 "quiet": comparison.is_quiet(),
             }))?;
         } else {
-            standard_output::print(&night_text(&night, &comparison, &path))?;
+            standard_output::show(&night_comparison(&night, &comparison, &path))?;
         }
         if comparison.is_quiet() || (self.accept && comparison.failed.is_empty()) {
             return Ok(());

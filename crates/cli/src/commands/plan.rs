@@ -12,7 +12,9 @@ use mapper_campaign::units::{Kind, parse};
 use mapper_core::{Jump, OperatingPoint, Plan as StepPlan, VisitOrder};
 use mapper_physics::simulation::model::Model;
 use mapper_planner::{PlanRequest, make_plan, plan_other_orders};
-use mapper_report::{comparison_json, comparison_text, jump_json, jump_text, plan_svg, plan_text};
+use mapper_report::{
+    comparison_json, jump_forecast, jump_json, plan_comparison, plan_document, plan_svg, with_messages,
+};
 use mapper_session::{PlanInputs, Session, SessionError, json_text, nominal_model, plan_of, rehearse};
 use std::path::PathBuf;
 
@@ -77,7 +79,7 @@ impl Plan {
             return if self.json {
                 standard_output::print_json(&jump_json(&jump))
             } else {
-                standard_output::print(&jump_text(&campaign, &jump))
+                standard_output::show(&jump_forecast(&campaign, &jump))
             };
         }
         let appended = self.append.first().zip(self.append.get(1)).map(|(&from, &to)| Jump { from, to });
@@ -100,8 +102,9 @@ impl Plan {
             }
             return standard_output::print_json(&value);
         }
-        let comparison = others.map_or_else(String::new, |others| comparison_text(&plan, &others));
-        standard_output::print(&(plan_text(&campaign, &plan) + comparison.as_str()))
+        let mut document = plan_document(&campaign, &plan);
+        document.append(others.map(|others| plan_comparison(&plan, &others)).unwrap_or_default());
+        standard_output::show(&document)
     }
 
     /// Rehearses a script and prints the forecast plan.
@@ -124,13 +127,13 @@ impl Plan {
             value["notes"] = notes.into();
             return standard_output::print_json(&value);
         }
-        let notes: String = notes.iter().map(|note| format!("note: {note}\n")).collect();
-        standard_output::print(&format!(
-            "{}{notes}Forecast: the script {} was rehearsed on the nominal machine; on the rig it may take other steps, depending on the \
-             measurements.\n",
-            plan_text(campaign, &plan),
+        let mut document = plan_document(campaign, &plan);
+        notes.into_iter().for_each(|note| document.text(format!("note: {note}")));
+        document.text(format!(
+            "Forecast: the script {} was rehearsed on the nominal machine; on the rig it may take other steps, depending on the measurements.",
             source.path.display()
-        ))
+        ));
+        standard_output::show(&document)
     }
 
     fn store(&self, plan: &StepPlan) -> Result<(), Failure> {
@@ -140,7 +143,7 @@ impl Plan {
 }
 
 fn plan_json(campaign: &Campaign, plan: &StepPlan) -> Result<serde_json::Value, Failure> {
-    let mut value = serde_json::to_value(plan).map_err(SessionError::from)?;
+    let mut value = with_messages(|| serde_json::to_value(plan)).map_err(SessionError::from)?;
     if let Some(zero) = campaign.zero {
         value["soak_s"] = zero.duration_s.into();
     }

@@ -12,7 +12,7 @@ use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_core::{PacedClock, RunEnding, Trip, Verdict};
 use mapper_live::{LiveError, LiveRun, ObserverRequest, Observers, TlsFiles};
-use mapper_report::plan_text;
+use mapper_report::{plan_document, with_messages};
 use mapper_session::recording::run_directory;
 use mapper_session::{
     InterruptedRun, Operator, Phase, PreparedRun, RunOutcome, RunRequest, Session,
@@ -188,7 +188,7 @@ impl Run {
             (Err(error), None) => return Err(error.into()),
             (Ok(results), _) if !self.json => {
                 let full_command = format!("`mapper identify {} --full`", results.run.display());
-                standard_output::print(&results_text(
+                standard_output::show(&results_text(
                     &campaign.display,
                     &results,
                     &full_command,
@@ -199,7 +199,9 @@ impl Run {
             (Err(_), Some(_)) if !self.json => {}
             (results, failure) => {
                 let mut value = match results {
-                    Ok(results) => serde_json::to_value(&results).map_err(SessionError::from)?,
+                    Ok(results) => {
+                        with_messages(|| serde_json::to_value(&results)).map_err(SessionError::from)?
+                    }
                     Err(_) => json!({"run": directory, "recording": recording, "points": [], "map": {}}),
                 };
                 if let Some(failure) = failure {
@@ -215,25 +217,29 @@ impl Run {
         let (rig, plan) = (run.rig(), run.plan());
         let would_write = out.join(format!("{}-<time>", campaign.name));
         if self.json {
-            return standard_output::print_json(&json!({
-                "dry_run": true,
-                "rig": rig,
-                "would_write": would_write,
-                "soak_s": campaign.zero.map(|zero| zero.duration_s),
-                "plan": plan,
-            }));
+            let dry_run = || {
+                json!({
+                    "dry_run": true,
+                    "rig": rig,
+                    "would_write": would_write,
+                    "soak_s": campaign.zero.map(|zero| zero.duration_s),
+                    "plan": plan,
+                })
+            };
+            return standard_output::print_json(&with_messages(dry_run));
         }
         let samples = (soak_s(campaign) + plan.duration_s()) * rig.sample_rate_hz;
-        standard_output::print(&format!(
-            "{}Dry run: nothing was started or written. The rig is `{}` {}, {} channels at {} Hz ({samples:.0} samples); the results would be \
-             in {}.\n",
-            plan_text(campaign, plan),
+        let mut document = plan_document(campaign, plan);
+        document.text(format!(
+            "Dry run: nothing was started or written. The rig is `{}` {}, {} channels at {} Hz ({samples:.0} samples); the results would be \
+             in {}.",
             rig.backend,
             rig.version,
             rig.channels.len(),
             rig.sample_rate_hz,
             would_write.display(),
-        ))
+        ));
+        standard_output::show(&document)
     }
 }
 

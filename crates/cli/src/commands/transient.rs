@@ -6,7 +6,7 @@ use crate::output::failure::Failure;
 use crate::output::standard_output;
 use crate::output::standard_output::Replace;
 use clap::Args;
-use mapper_report::why_text;
+use mapper_report::Describe;
 use mapper_session::{DIAGNOSIS_FORMAT, Recorded, Session, Side, Versioned, write_transient};
 use std::path::PathBuf;
 
@@ -66,9 +66,9 @@ impl Transient {
                 content: &diagnosis,
             });
         }
-        let mut text = why_text(&diagnosis);
-        text.extend(recorded.read.warnings.iter().map(|warning| format!("recording: {warning}\n")));
-        text.extend(files.iter().map(|file| format!("{}\n", file.display())));
-        standard_output::print(&text)
+        let mut document = diagnosis.document();
+        recorded.read.warnings.iter().for_each(|warning| document.text(format!("recording: {warning}")));
+        files.iter().for_each(|file| document.text(file.display().to_string()));
+        standard_output::show(&document)
     }
 }

@@ -4,11 +4,12 @@ use crate::output::failure::{Code, Failure};
 use crate::output::standard_error::{say, wrap_for_terminal};
 use clap::Args;
 use mapper_core::{terminal_json, terminal_text};
-use mapper_report::with_messages;
+use mapper_report::{Document, Paint, with_messages, wrapped};
 use mapper_session::{Existing, MapOut, MapWork, SessionError, write_file};
 use serde::Serialize;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 use terminal_size::terminal_size_of;
 
@@ -76,6 +77,20 @@ fn write(text: &str) -> Result<(), Failure> {
     })
 }
 
+/// The colours of documents, chosen on the command line.
+static PAINT: OnceLock<Paint> = OnceLock::new();
+
+/// Stores the colours of documents.
+pub fn choose_paint(paint: Paint) {
+    // It is kept once: the options are set once.
+    let _ = PAINT.set(paint);
+}
+
+/// Writes a document.
+pub fn show(document: &Document) -> Result<(), Failure> {
+    print(&document.terminal(PAINT.get().copied().unwrap_or_default()))
+}
+
 /// Writes warnings, already formatted, to standard error.
 pub fn warn(text: &str) {
     say(text);
@@ -84,13 +99,13 @@ pub fn warn(text: &str) {
 /// Writes the result of an operation on map files, and its assumptions as warnings.
 pub fn print_map_work(work: &MapWork, as_json: bool) -> Result<(), Failure> {
     work.warnings.iter().for_each(|warning| warn(&format!("{warning}\n")));
-    if as_json { print_json(&work.json) } else { print(&work.text) }
+    if as_json { print_json(&work.json) } else { show(&work.document) }
 }
 
-/// Writes one JSON object and a line end to standard output; warnings get their sentences.
+/// Writes one JSON object and a line end to standard output; typed messages have their sentences.
 pub fn print_json(value: &impl Serialize) -> Result<(), Failure> {
-    let value = serde_json::to_value(value).map_err(SessionError::from)?;
-    write(&terminal_json(&mapper_session::json_text(&with_messages(value))?))?;
+    let value = with_messages(|| serde_json::to_value(value)).map_err(SessionError::from)?;
+    write(&terminal_json(&mapper_session::json_text(&value)?))?;
     PRINTED.store(true, Ordering::Relaxed);
     Ok(())
 }

@@ -347,7 +347,7 @@ fn print_json(event: &SessionEvent, state: &mut State) {
         }
         _ => {}
     }
-    let value = serde_json::to_value(event).map(with_messages);
+    let value = with_messages(|| serde_json::to_value(event));
     let value = value.unwrap_or_else(|error| json!({ "event": "error", "message": error.to_string() }));
     say(&terminal_json(&format!("{value}\n")));
 }

@@ -1,7 +1,7 @@
 //! The reference of a campaign's keys, from its JSON schema.
 
 use mapper_campaign::json_schema;
-use mapper_report::formatting::markdown::{Align, table, without_html_and_links};
+use mapper_report::{Table, markdown_table, markdown_text};
 use serde_json::{Map, Value};
 
 const HEAD: &str = "\
@@ -20,7 +20,7 @@ pub fn campaign_page() -> String {
     let mut text = HEAD.to_owned();
     for (key, value) in properties(&schema) {
         let needed = if required(&schema, key) { " Required." } else { "" };
-        text.push_str(&format!("\n## `{key}`\n\n{}{needed}\n", without_html_and_links(description(value))));
+        text.push_str(&format!("\n## `{key}`\n\n{}{needed}\n", markdown_text(description(value))));
         let mut rows = Vec::new();
         below("", value, &mut rows);
         if rows.is_empty() {
@@ -29,7 +29,8 @@ pub fn campaign_page() -> String {
                 text.push_str(&format!("\n{values}\n"));
             }
         } else {
-            text.push_str(&format!("\n{}", table(&["key", "value", "meaning"], Align::Left, rows)));
+            let table = Table::new(["key", "value", "meaning"]).all_texts().rows(rows);
+            text.push_str(&format!("\n{}", markdown_table(&table)));
         }
     }
     text
@@ -45,11 +46,7 @@ fn below(path: &str, schema: &Value, rows: &mut Vec<[String; 3]>) {
                 continue;
             }
             let needed = if required(form, key) { " Required." } else { "" };
-            rows.push([
-                name,
-                values(value),
-                format!("{}{needed}", without_html_and_links(description(value))),
-            ]);
+            rows.push([name, values(value), format!("{}{needed}", description(value))]);
             below(&path, value, rows);
         }
         if let Some(items) = form.get("items") {

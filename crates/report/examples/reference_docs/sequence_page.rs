@@ -1,6 +1,6 @@
 //! The documentation of the functions of a script, from the same table that registers them.
 
-use mapper_report::formatting::markdown::{Align, table};
+use mapper_report::{Table, markdown_table};
 use mapper_sequence::functions;
 
 /// The page, Markdown.
@@ -9,7 +9,8 @@ pub fn sequence_page() -> String {
     for functions in functions().chunk_by(|one, next| one.group == next.group) {
         let Some(first) = functions.first() else { continue };
         let rows = functions.iter().map(|entry| [format!("`{}`", entry.signature), entry.doc.to_owned()]);
-        text.push_str(&format!("\n## {}\n\n{}", first.group, table(&["", ""], Align::Left, rows)));
+        let table = Table::new(["", ""]).all_texts().rows(rows);
+        text.push_str(&format!("\n## {}\n\n{}", first.group, markdown_table(&table)));
     }
     text
 }

@@ -1,50 +1,54 @@
-//! Recommended next steps, as text.
+//! The next experiment of a diagnosis.
 
+use crate::document::{Document, Table};
 use mapper_core::probability_text;
 use mapper_diagnose::gap::{Diagnosis, Kind, Next, Suggestion};
 
 /// 0 degC, K.
 const ZERO_C_K: f64 = 273.15;
 
-/// The chapter; empty if nothing remains to be decided.
-pub(crate) fn next_text(diagnosis: &Diagnosis) -> String {
-    let Some(next) = &diagnosis.next else { return String::new() };
-    let mut text = "\nnext experiment\n".to_owned();
+/// The next experiment and its alternatives; empty if nothing remains to be decided.
+pub(crate) fn next_section(diagnosis: &Diagnosis) -> Document {
+    let mut document = Document::default();
+    let Some(next) = &diagnosis.next else { return document };
     match (next, diagnosis.experiments.first()) {
         (Next::Sensor { sensor, reason }, _) => {
-            text += &format!("  {sensor}: {reason}\n");
+            document.text(format!("{sensor}: {reason}"));
             if diagnosis.baseline.is_none() {
-                text += "  if the model's equations only approximate this rig: give a fault-free recording with --baseline, or declare what they may \
-                         miss under `tolerances: structure`\n";
+                document.text(
+                    "if the model's equations only approximate this rig: give a fault-free recording with --baseline, or declare what they \
+                     may miss under `tolerances: structure`",
+                );
             }
         }
         (Next::Jump { .. } | Next::Soak { .. }, Some(first)) => {
-            text += &format!(
-                "  {}: {:.1} min, after which the true cause should reach {}\n",
+            document.text(format!(
+                "{}: {:.1} min, after which the true cause should reach {}",
                 name_experiment(first),
                 first.minutes,
                 probability_text(first.expected_probability)
-            );
-            text += &describe_experiment(first);
+            ));
+            document.text(describe_experiment(first));
         }
         (Next::Jump { .. } | Next::Soak { .. }, None) => {}
     }
-    let Some(first) = diagnosis.experiments.first() else { return text };
-    text += &format!(
-        "  of {:.2} bit still open: bit per minute, in total, chance that the true cause then has 95 %\n",
+    let Some(first) = diagnosis.experiments.first() else { return document };
+    let heads = ["experiment", "min", "bit/min", "bit", "chance of 95 %"];
+    let mut table = Table::new(heads).caption(format!(
+        "Of {:.2} bit still open: information per minute and in total, and the chance that the true cause then has 95 %",
         first.entropy_bit
-    );
+    ));
     for experiment in &diagnosis.experiments {
-        text += &format!(
-            "  {:>6.3} bit/min {:>5.2} bit {:>7}  {}, {:.1} min\n",
-            experiment.entropy_drop_bit / experiment.minutes,
-            experiment.entropy_drop_bit,
-            probability_text(experiment.probability_settled),
+        table.row([
             name_experiment(experiment),
-            experiment.minutes,
-        );
+            format!("{:.1}", experiment.minutes),
+            format!("{:.3}", experiment.entropy_drop_bit / experiment.minutes),
+            format!("{:.2}", experiment.entropy_drop_bit),
+            probability_text(experiment.probability_settled),
+        ]);
     }
-    text
+    document.table(table);
+    document
 }
 
 /// The action, in words.
@@ -90,15 +94,15 @@ fn describe_experiment(experiment: &Suggestion) -> String {
     let Suggestion { from, to, .. } = experiment;
     match experiment.kind {
         Kind::Jump | Kind::ValveStep => format!(
-            "  mapper plan CAMPAIGN --append {:.0}krpm@{} {:.0}krpm@{} --out PLAN puts it after the points\n",
+            "`mapper plan CAMPAIGN --append {:.0}krpm@{} {:.0}krpm@{} --out PLAN` puts it after the points",
             from.speed_rpm / 1e3,
             from.valve,
             to.speed_rpm / 1e3,
             to.valve,
         ),
         Kind::Soak => {
-            format!("  a line of the campaign, before it is run again: {}\n", experiment.script.join(" "))
+            format!("a line of the campaign, before it is run again: {}", experiment.script.join(" "))
         }
-        _ => format!("  lines of a sequence, after the points: {}\n", experiment.script.join(" ")),
+        _ => format!("lines of a sequence, after the points: {}", experiment.script.join(" ")),
     }
 }

@@ -1,12 +1,13 @@
-//! A diagnosis as a page for a terminal.
+//! The diagnosis of a gap between rig and nominal model.
 
-use crate::diagnosis::gap_next::next_text;
-use crate::diagnosis::gap_warning_text::{gap_warning_text, offset_at_rest_text};
-use crate::diagnosis::stand_actions::stand_actions;
-use crate::formatting::number::four_figures;
-use crate::formatting::table::COLUMNS;
-use crate::formatting::wrapped::wrapped;
+use crate::diagnosis::gap_figures::{heat_table, residual_maps, traces};
+use crate::diagnosis::gap_next::next_section;
+use crate::diagnosis::stand_actions::{next_measurement, stand_actions};
+use crate::document::{Cell, Describe, Document, Table};
+use crate::formatting::{display_scale, four_figures};
+use crate::message::Message;
 use mapper_core::{Channel, probability_text, step_number, with_unit};
+use mapper_diagnose::gap::Diagnosed;
 use mapper_diagnose::gap::{
     Baseline, BeyondPrior, Candidate, ChannelGap, ClosureTerm, Diagnosis, Estimate, Gap, PointGap,
     SmallestSeen, Verdict,
@@ -14,110 +15,191 @@ use mapper_diagnose::gap::{
 use std::collections::BTreeMap;
 
 /// Maximum number of causes shown.
-const CAUSES: usize = 5;
-/// Maximum number of places shown.
-const PLACES: usize = 5;
+const CAUSES: usize = 8;
 
 /// Name of the hypothesis without a cause.
-pub const NOTHING: &str = "nothing beyond tolerance";
+const NOTHING: &str = "nothing beyond tolerance";
 /// Effects of the library that the list does not contain.
-pub const UNLISTED: &str = "other effects of the library";
+const UNLISTED: &str = "other effects of the library";
 /// The answer that the cause is not in the library.
-pub const OUTSIDE: &str = "a cause outside the effect library";
+const OUTSIDE: &str = "a cause outside the effect library";
 
-/// The page.
-pub fn gap_text(diagnosis: &Diagnosis) -> String {
-    let mut text = format!("{}\n", headline(diagnosis));
-    if let Some(nearest) = nearest(diagnosis) {
-        text += &format!("{nearest}\n");
+/// The findings without figures.
+impl Describe for Diagnosis {
+    fn document(&self) -> Document {
+        let mut document = Document::default();
+        document.strong(headline(self));
+        document.append(findings(self));
+        document.append(recommendations(self));
+        document
     }
+}
+
+/// The findings with their evidence as figures.
+pub(crate) fn gap_document(diagnosed: &Diagnosed) -> Document {
+    let diagnosis = &diagnosed.diagnosis;
+    let mut document = Document::default();
+    document.strong(headline(diagnosis));
+    document.append(findings(diagnosis));
+    document.section("Evidence", evidence(diagnosed));
+    document.append(recommendations(diagnosis));
+    document
+}
+
+fn findings(diagnosis: &Diagnosis) -> Document {
+    let mut document = Document::default();
+    document.text(nearest(diagnosis).unwrap_or_default());
     if let Some(baseline) = &diagnosis.baseline {
-        text += &not_judged(baseline);
+        add_unjudged(&mut document, baseline);
     }
     if diagnosis.verdict != Verdict::WithinTolerance {
         for sensor in &diagnosis.offsets_at_rest {
-            text += &format!("{}: subtracted before the diagnosis\n", offset_at_rest_text(sensor));
+            document.text(format!("{}: subtracted before the diagnosis", sensor.message()));
         }
     }
-    if !diagnosis.locations.is_empty() {
-        text += "\nlocation\n";
-        for place in diagnosis.locations.iter().take(PLACES) {
-            let place = format!(
-                "  {}: {:.0} % of the gap, {:.0} sigma; largest in {}, {} after the jump, {}: {} {}",
-                part_name(&place.submodel),
-                100.0 * place.share,
-                place.sigma,
-                place.channel,
-                place.phase,
-                place.region,
-                four_figures(place.size),
-                place.unit,
-            );
-            text += &wrapped(&place, COLUMNS, 6);
-        }
+    document.section("Causes", causes(diagnosis));
+    document.section("Location", locations(diagnosis));
+    document.section("Detection limits", detection_limits(&diagnosis.smallest_seen));
+    add_closure_terms(&mut document, diagnosis);
+    add_gap_reduction(&mut document, diagnosis);
+    document
+}
+
+fn recommendations(diagnosis: &Diagnosis) -> Document {
+    let mut document = Document::default();
+    let mut body = Document::default();
+    let mut actions = stand_actions(diagnosis);
+    actions.extend(next_measurement(diagnosis));
+    if actions.is_empty() {
+        body.text("Nothing: the rig is as declared.");
+    } else {
+        actions.push("then record again, and repeat the diagnosis".to_owned());
+        body.numbered(actions);
     }
-    if !diagnosis.inseparable.is_empty() {
-        let parts = diagnosis.inseparable.join(", ");
-        text += &wrapped(&format!("  inseparable in this recording: {parts}"), COLUMNS, 6);
-    }
-    if !diagnosis.smallest_seen.is_empty() {
-        text += &list_smallest_detectable(&diagnosis.smallest_seen);
-    }
-    text += "\ncauses\n";
-    let mut causes: Vec<(f64, String)> = diagnosis
-        .listed()
-        .take(CAUSES)
-        .map(|candidate| {
-            let lines = wrapped(&cause(candidate), COLUMNS - 11, 0);
-            let mut lines = lines.trim_end().replace('\n', "\n           ");
-            for set in &candidate.equivalent {
-                lines += &format!("\n           indistinguishable from {}", set.join(" + "));
-            }
-            (candidate.probability, lines)
-        })
+    document.section("What to do", body);
+    document.section("Next experiment", next_section(diagnosis));
+    let mut assumed = Document::default();
+    assumed.list(diagnosis.assumed.iter().map(ToString::to_string));
+    document.section("Assumed", assumed);
+    let mut limits = Document::default();
+    limits.list(diagnosis.warnings.iter().map(Message::message));
+    document.section("Limits of this diagnosis", limits);
+    document
+}
+
+/// The most probable causes with their probabilities, and the tolerances outside their prior.
+fn causes(diagnosis: &Diagnosis) -> Document {
+    let candidate_rows = diagnosis.listed().take(CAUSES).map(|candidate| {
+        let others =
+            candidate.equivalent.iter().map(|set| format!("; indistinguishable from {}", set.join(" + ")));
+        (candidate.probability, cause(candidate) + others.collect::<String>().as_str())
+    });
+    let mut rows: Vec<(f64, String)> = candidate_rows
         .chain([
             (diagnosis.probability_none, NOTHING.to_owned()),
             (diagnosis.probability_unlisted, UNLISTED.to_owned()),
             (diagnosis.probability_outside, OUTSIDE.to_owned()),
         ])
         .collect();
-    causes.sort_by(|a, b| b.0.total_cmp(&a.0));
-    for (probability, lines) in causes {
-        text += &format!("  {:>7}  {lines}\n", probability_text(probability));
+    rows.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut table = Table::new(["probability", "cause"]).with_texts([1]);
+    for (probability, name) in rows {
+        let cell = Cell::number(probability_text(probability), probability);
+        table.row([cell.bar(probability), name.into()]);
     }
-    for suspect in &diagnosis.suspects {
-        text += &format!("  suspect: {}\n", suspect_text(suspect));
-    }
-    text += &closure_terms(diagnosis);
-    text += &describe_gap_reduction(diagnosis);
-    let actions = stand_actions(diagnosis);
-    if !actions.is_empty() {
-        text += "\ncheck at the stand\n";
-        text += &actions.iter().map(|action| wrapped(&format!("  {action}"), COLUMNS, 4)).collect::<String>();
-    }
-    text += &next_text(diagnosis);
-    if !diagnosis.assumed.is_empty() {
-        text += "\nassumed\n";
-        for assumption in &diagnosis.assumed {
-            text += &wrapped(&format!("  {assumption}"), COLUMNS, 4);
-        }
-    }
-    if !diagnosis.warnings.is_empty() {
-        text += "\nlimits of this diagnosis\n";
-        for warning in &diagnosis.warnings {
-            text += &wrapped(&format!("  {}", gap_warning_text(warning)), COLUMNS, 4);
-        }
-    }
-    text
+    let mut document = Document::default();
+    document.table(table);
+    document.list(diagnosis.suspects.iter().map(|suspect| format!("suspect: {}", suspect_text(suspect))));
+    document
 }
 
-/// A warning that the named cause is not the best explanation, on separate lines; empty if there is none.
-pub fn doubt_text(doubt: Option<&str>) -> String {
-    doubt.map_or_else(String::new, |doubt| wrapped(&format!("warning: {doubt}"), COLUMNS, 2))
+/// The parts of the machine in order of their share of the gap.
+fn locations(diagnosis: &Diagnosis) -> Document {
+    let mut document = Document::default();
+    if diagnosis.locations.is_empty() {
+        document.text("No part departs from the model by more than noise.");
+    }
+    let heads = ["part", "share", "sigma", "largest in", "after the jump", "region", "size"];
+    let mut table = Table::new(heads).with_texts([3, 4, 5, 6]);
+    for place in &diagnosis.locations {
+        table.row([
+            part_name(&place.submodel),
+            format!("{:.0} %", 100.0 * place.share),
+            format!("{:.0}", place.sigma),
+            place.channel.to_string(),
+            place.phase.to_string(),
+            place.region.to_string(),
+            format!("{} {}", four_figures(place.size), place.unit),
+        ]);
+    }
+    document.table(table);
+    if !diagnosis.inseparable.is_empty() {
+        document.text(format!("Inseparable in this recording: {}.", diagnosis.inseparable.join(", ")));
+    }
+    document
+}
+
+/// The smallest detectable size of each effect.
+fn detection_limits(effects: &[SmallestSeen]) -> Document {
+    let mut document = Document::default();
+    if effects.is_empty() {
+        return document;
+    }
+    document.text("An effect would have been named, in 95 of 100 recordings like this one, from this size.");
+    document.facts(
+        "",
+        effects.iter().map(|seen| {
+            let size = seen.size.clone().unwrap_or_else(|| "no size within its range".to_owned());
+            (format!("{} ({})", seen.name, seen.effect), size)
+        }),
+    );
+    document
+}
+
+/// The difference between measured and computed readings, as figures and tables.
+fn evidence(diagnosed: &Diagnosed) -> Document {
+    let diagnosis = &diagnosed.diagnosis;
+    // The nearest cause of a rig without a gap explains nothing.
+    let with_cause = diagnosed.with_cause.as_ref().filter(|_| diagnosis.verdict != Verdict::WithinTolerance);
+    let mut document = Document::default();
+    document.figures(
+        "Ends of the steps on the map, coloured by the difference between measured and computed readings.",
+        residual_maps(diagnosed),
+    );
+    if !diagnosis.closure_terms_by_balance.is_empty() {
+        let quantities = diagnosis
+            .closure_terms_by_balance
+            .iter()
+            .map(|source| format!("{}, {}", source.quantity, source.unit));
+        let mut table = Table::new(["step".to_owned()].into_iter().chain(quantities))
+            .caption("Missing heat, power or flow of each balance, if it alone has one");
+        for step in 0..diagnosed.study.steps.len() {
+            let values =
+                diagnosis.closure_terms_by_balance.iter().filter_map(|source| source.steps.get(step));
+            let cells = values.map(|[value, low, high]| {
+                format!("{} ({} .. {})", four_figures(*value), four_figures(*low), four_figures(*high))
+            });
+            table.row([step_number(step).to_string()].into_iter().chain(cells));
+        }
+        document.table(table);
+    }
+    document.text(
+        "Root mean square of the difference between measured and computed readings for each step and channel, in units of the declared \
+         uncertainty: 1 is noise. Tolerances are fitted.",
+    );
+    document.table(heat_table(diagnosed, "without a cause", &diagnosed.without_cause.1));
+    if let Some((cause, fit)) = with_cause {
+        document.table(heat_table(diagnosed, &format!("with {cause}"), &fit.residual));
+        document.figures(
+            "Measured minus computed readings over time, of the four channels with the largest gap.",
+            traces(diagnosed),
+        );
+    }
+    document
 }
 
 /// A tolerance outside its prior, in words.
-pub fn suspect_text(suspect: &BeyondPrior) -> String {
+fn suspect_text(suspect: &BeyondPrior) -> String {
     format!(
         "{} ends {:.1} sigma from its declared value ({})",
         suspect.what,
@@ -130,8 +212,7 @@ pub fn suspect_text(suspect: &BeyondPrior) -> String {
 const NOT_THE_TRUTH: f64 = 0.05;
 
 /// The missing term and the closure term for it.
-fn closure_terms(diagnosis: &Diagnosis) -> String {
-    let mut text = String::new();
+fn add_closure_terms(document: &mut Document, diagnosis: &Diagnosis) {
     if let (Some(source), Some(place)) =
         (diagnosis.closure_terms_by_balance.first(), diagnosis.locations.first())
         && source.submodel == place.submodel
@@ -140,31 +221,32 @@ fn closure_terms(diagnosis: &Diagnosis) -> String {
             source.steps.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), [value, ..]| {
                 (low.min(*value), high.max(*value))
             });
-        text += &format!(
-            "\nresidual source term\n  {}: {} .. {} over the steps\n",
+        let mut body = Document::default();
+        body.text(format!(
+            "{}: {} .. {} over the steps",
             source.quantity,
             four_figures(low),
             with_unit(four_figures(high), &source.unit)
-        );
+        ));
+        document.section("Residual source term", body);
     }
     for term in &diagnosis.closure_terms {
-        text += &format!(
-            "\nclosure term\n  {}\n  {}; {} on held-out steps\n",
-            term.sentence,
+        let mut body = Document::default();
+        body.strong(&term.sentence);
+        body.text(format!(
+            "{}; {} on held-out steps",
             probability_text(term.probability),
             describe_removed_residual(term)
-        );
+        ));
         if term.probability < NOT_THE_TRUTH {
-            text += "  its residual is more than noise: its form is not the true one\n";
+            body.text("its residual is more than noise: its form is not the true one");
         }
-        for other in &term.equivalent {
-            text += &format!("  indistinguishable from: {other}\n");
-        }
+        body.list(term.equivalent.iter().map(|other| format!("indistinguishable from: {other}")));
         if let Some(file) = &term.rhai {
-            text += &format!("  written to {file}: give it with --effect\n");
+            body.text(format!("written to {file}: give it with --effect"));
         }
+        document.section(format!("Closure term for {}", part_name(&term.submodel)), body);
     }
-    text
 }
 
 /// The effect of a closure term on the gap, in words.
@@ -184,7 +266,7 @@ pub fn headline(diagnosis: &Diagnosis) -> String {
     match (diagnosis.verdict, first) {
         (Verdict::WithinTolerance, _) if !diagnosis.offsets_at_rest.is_empty() => format!(
             "{}; with that subtracted nothing beyond the declared tolerances {seen}",
-            diagnosis.offsets_at_rest.iter().map(offset_at_rest_text).collect::<Vec<_>>().join(", ")
+            diagnosis.offsets_at_rest.iter().map(Message::message).collect::<Vec<_>>().join(", ")
         ),
         (Verdict::WithinTolerance, Some(first)) if first.probability > diagnosis.probability_none => format!(
             "nothing beyond the declared tolerances {seen} for certain; {} is suspected ({})",
@@ -224,7 +306,7 @@ fn is_not_borne_out(gap: &Gap) -> bool {
 }
 
 /// Effects in both recordings, which are not judged, if a reference recording was given; and what a campaign declares to do without it.
-fn not_judged(baseline: &Baseline) -> String {
+fn add_unjudged(document: &mut Document, baseline: &Baseline) {
     let (mut residuals, mut structure, mut offsets) = (Vec::new(), Vec::new(), Vec::new());
     for (channel, error) in &baseline.lacking {
         let (scale, unit) = display_scale(&error.unit);
@@ -237,19 +319,20 @@ fn not_judged(baseline: &Baseline) -> String {
             }));
         }
     }
-    let unjudged = format!(
-        "only the change since {} is reported; the residual already present there is not judged: {}\n\
-         a diagnosis without it needs these errors of the model's equations in the campaign:",
+    document.text(format!(
+        "only the change since {} is reported; the residual already present there is not judged: {}",
         baseline.recording,
         residuals.join(", ")
-    );
-    let mut text = wrapped(&unjudged, COLUMNS, 2);
-    text.push_str(&flow_mapping("  tolerances: {structure: {", &structure, "}}"));
+    ));
+    document.text("a diagnosis without it needs these errors of the model's equations in the campaign:");
+    document.code(flow_mapping("tolerances: {structure: {", &structure, "}}"));
     if !offsets.is_empty() {
-        text.push_str(&flow_mapping("  sensors: {", &offsets, "}"));
+        document.code(flow_mapping("sensors: {", &offsets, "}"));
     }
-    text
 }
+
+/// Width of lines of a campaign.
+const WIDTH: usize = 78;
 
 /// A mapping of a campaign on few lines, broken between its entries.
 fn flow_mapping(start: &str, entries: &[String], end: &str) -> String {
@@ -257,20 +340,11 @@ fn flow_mapping(start: &str, entries: &[String], end: &str) -> String {
     for (index, entry) in entries.iter().enumerate() {
         let entry = format!("{entry}{}", if index + 1 < entries.len() { ", " } else { end });
         match lines.last_mut() {
-            Some(line) if line.len() + entry.trim_end().len() <= COLUMNS => line.push_str(&entry),
-            _ => lines.push(format!("    {entry}")),
+            Some(line) if line.len() + entry.trim_end().len() <= WIDTH => line.push_str(&entry),
+            _ => lines.push(format!("  {entry}")),
         }
     }
     lines.iter().map(|line| format!("{}\n", line.trim_end())).collect()
-}
-
-/// Factor to the unit in which residuals are shown, and that unit.
-pub(crate) fn display_scale(unit: &str) -> (f64, &str) {
-    match unit {
-        "Pa" => (1e-3, "kPa"),
-        "kg/s" => (1e3, "g/s"),
-        unit => (1.0, unit),
-    }
 }
 
 /// Name of a part of the machine in words, e.g. `T2 probe` for `t2_probe`.
@@ -296,7 +370,7 @@ fn nearest(diagnosis: &Diagnosis) -> Option<String> {
 }
 
 /// Effects by their names, with ids and onset times.
-pub fn candidate_name(candidate: &Candidate) -> String {
+fn candidate_name(candidate: &Candidate) -> String {
     let describe = |(id, name): (&String, &String)| match candidate.onsets.get(id) {
         Some(onset) if onset.grows => format!("{name} ({id}) growing from step {}", step_number(onset.step)),
         Some(onset) => format!("{name} ({id}) from step {} on", step_number(onset.step)),
@@ -306,7 +380,7 @@ pub fn candidate_name(candidate: &Candidate) -> String {
 }
 
 /// A cause with its parameters.
-pub fn cause(candidate: &Candidate) -> String {
+pub(crate) fn cause(candidate: &Candidate) -> String {
     let parameters: Vec<String> = candidate.parameters.iter().map(|(name, e)| parameter(name, e)).collect();
     format!("{}: {}", candidate_name(candidate), parameters.join(", "))
 }
@@ -327,148 +401,121 @@ fn parameter(name: &str, estimate: &Estimate) -> String {
     format!("{name} = {value} ({low} .. {high}){size}")
 }
 
-/// The smallest detectable size of each effect.
-fn list_smallest_detectable(effects: &[SmallestSeen]) -> String {
-    let mut text =
-        "\nan effect would have been named, in 95 of 100 recordings like this one, from\n".to_owned();
-    for seen in effects {
-        let size = seen.size.as_deref().unwrap_or("no size within its range");
-        text += &format!("  {:40} {size}\n", format!("{} ({})", seen.name, seen.effect));
-    }
-    text
-}
-
 /// Share of the gap from which a step is named: that of five equal steps.
 const NAMED_SHARE: f64 = 0.2;
 
-/// Number of steps that support the cause, and the step that dominates the gap.
-fn describe_support(gap: &mapper_diagnose::gap::Gap) -> String {
+/// Number of steps that support the cause, and the step that dominates the gap; empty without held-out steps.
+fn describe_support(gap: &Gap) -> String {
     let count = gap.held_out_steps.len();
     if count == 0 {
         return String::new();
     }
-    let mut text = format!("  {} of {count} steps show a gap", gap.steps_with_gap);
-    if let Some(step) = gap.largest_step.filter(|_| gap.largest_share >= NAMED_SHARE) {
-        text += &format!("; step {} has {:.0} % of it", step_number(step), 100.0 * gap.largest_share);
-    }
-    text + "\n"
+    let step = gap.largest_step.filter(|_| gap.largest_share >= NAMED_SHARE);
+    let largest =
+        step.map(|step| format!("; step {} has {:.0} % of it", step_number(step), 100.0 * gap.largest_share));
+    format!("{} of {count} steps show a gap{}", gap.steps_with_gap, largest.unwrap_or_default())
 }
 
-fn describe_gap_reduction(diagnosis: &Diagnosis) -> String {
+fn add_gap_reduction(document: &mut Document, diagnosis: &Diagnosis) {
     let gap = &diagnosis.gap;
+    let mut body = Document::default();
     if let Some(term) = diagnosis.probable_closure_term() {
-        return describe_closure_reduction(diagnosis, term, gap.folds.iter().map(Vec::len).sum());
+        let steps: usize = gap.folds.iter().map(Vec::len).sum();
+        let basis = match term.held_out_steps {
+            0 => "on the fitted steps; there are too few to hold any out".to_owned(),
+            held => {
+                format!("on {held} of {steps} steps, used neither to find the closure term nor to fit it")
+            }
+        };
+        body.text(describe_removed_residual(term));
+        body.table(by_channel(diagnosis, &term.channels, "with the term", 3));
+        return document.section(format!("Gap reduction, {basis}"), body);
     }
     let named = matches!(diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained);
-    let mut text = match gap.folds.len() {
-        0 | 1 => "\ngap reduction, on the fitted steps; there are too few to hold any out\n".to_owned(),
-        folds => format!(
-            "\ngap reduction, on {} held-out steps ({folds}-fold cross-validation)\n",
-            gap.held_out_steps.len()
-        ),
+    let basis = match gap.folds.len() {
+        0 | 1 => "on the fitted steps; there are too few to hold any out".to_owned(),
+        folds => format!("on {} held-out steps ({folds}-fold cross-validation)", gap.held_out_steps.len()),
     };
     if named && gap.worse.is_empty() && gap.gap_reduction <= 0.0 {
-        text += match gap.steps_with_gap {
-            0 => "  tolerances leave no gap on these steps either\n",
-            _ => "  the cause does not reduce the gap on these steps\n",
-        };
+        body.text(match gap.steps_with_gap {
+            0 => "tolerances leave no gap on these steps either",
+            _ => "the cause does not reduce the gap on these steps",
+        });
     } else if named && gap.worse.is_empty() {
-        text += &format!(
-            "  {:.1} % of the gap removed (95 % interval for similar steps: {:.0} .. {:.0} %)\n",
+        body.text(format!(
+            "{:.1} % of the gap removed (95 % interval for similar steps: {:.0} .. {:.0} %)",
             100.0 * gap.gap_reduction,
             (100.0 * gap.gap_reduction_low).floor(),
             (100.0 * gap.gap_reduction_high).ceil()
-        );
-        text += &describe_support(gap);
+        ));
+        body.text(describe_support(gap));
     } else if !gap.worse.is_empty() {
-        text += &format!("  the gap does not shrink: {} gets worse\n", gap.worse.join(", "));
+        body.text(format!("the gap does not shrink: {} gets worse", gap.worse.join(", ")));
     }
-    text += &by_channel(diagnosis, &gap.channels, "with the cause", if named { 3 } else { 2 });
-    text += &list_affected_points(diagnosis);
+    body.table(by_channel(diagnosis, &gap.channels, "with the cause", if named { 3 } else { 2 }));
+    body.text(describe_affected_points(diagnosis).unwrap_or_default());
     if named {
-        text += &describe_strained_tolerance(gap);
-        text += &points(&gap.points);
+        body.text(describe_strained_tolerance(gap).unwrap_or_default());
+        body.text(describe_points(&gap.points));
     }
-    text
+    document.section(format!("Gap reduction, {basis}"), body);
 }
 
-/// Points that a cause outside the library may touch, if no term describes it.
-fn list_affected_points(diagnosis: &Diagnosis) -> String {
+/// Points that a cause outside the library may touch, if no closure term describes it.
+fn describe_affected_points(diagnosis: &Diagnosis) -> Option<String> {
     let points = diagnosis.gap.points.iter().enumerate();
     let largest = points.max_by(|a, b| a.1.eta_residual.total_cmp(&b.1.eta_residual));
-    let Some((step, point)) = largest.filter(|_| diagnosis.is_outside_without_closure()) else {
-        return String::new();
-    };
-    wrapped(
-        &format!(
-            "  no closure term describes the cause: it may change the efficiency of every point; by the residual of T2, up to +/- {:.2} points (step {})",
-            100.0 * point.eta_residual,
-            step_number(step)
-        ),
-        COLUMNS,
-        4,
-    )
-}
-
-/// If tolerances can replace the cause without a larger residual: the tolerance that would have to exceed its prior.
-fn describe_strained_tolerance(gap: &Gap) -> String {
-    let Some(beyond_prior) = gap.beyond_prior.as_ref().filter(|_| gap.gap_reduction < STANDS_IN) else {
-        return String::new();
-    };
-    format!(
-        "  tolerances can replace the cause, but exceed their declaration: {} by {:.1} sigma\n",
-        beyond_prior.what, beyond_prior.sigmas
-    )
+    let (step, point) = largest.filter(|_| diagnosis.is_outside_without_closure())?;
+    Some(format!(
+        "no closure term describes the cause: it may change the efficiency of every point; by the residual of T2, up to +/- {:.2} points (step {})",
+        100.0 * point.eta_residual,
+        step_number(step)
+    ))
 }
 
 /// A cause that removes less than this share of the residual after tolerances can be replaced by them.
 const STANDS_IN: f64 = 0.5;
 
-/// The gap reduction of a closure term that resembles no effect of the library.
-fn describe_closure_reduction(diagnosis: &Diagnosis, term: &ClosureTerm, steps: usize) -> String {
-    let seen = match term.held_out_steps {
-        0 => "on the fitted steps; there are too few to hold any out".to_owned(),
-        held => format!("on {held} of {steps} steps, used neither to find the closure term nor to fit it"),
-    };
-    format!("\ngap reduction, {seen}\n  {}\n", describe_removed_residual(term))
-        + by_channel(diagnosis, &term.channels, "with the term", 3).as_str()
+/// If tolerances can replace the cause without a larger residual: the tolerance that would have to exceed its prior.
+fn describe_strained_tolerance(gap: &Gap) -> Option<String> {
+    let beyond_prior = gap.beyond_prior.as_ref().filter(|_| gap.gap_reduction < STANDS_IN)?;
+    Some(format!(
+        "tolerances can replace the cause, but exceed their declaration: {} by {:.1} sigma",
+        beyond_prior.what, beyond_prior.sigmas
+    ))
 }
 
-/// The residual of each channel in the first so many columns.
+/// The rms residual of each channel in the first so many columns.
 fn by_channel(
     diagnosis: &Diagnosis,
     channels: &BTreeMap<String, ChannelGap>,
     with: &str,
     columns: usize,
-) -> String {
-    let mut text = "  rms residual\n      ".to_owned();
+) -> Table {
     let bare = if diagnosis.baseline.is_some() { "baseline" } else { "nominal" };
-    for head in [bare, "tolerances fitted", with].iter().take(columns) {
-        text += &format!(" {head:>18}");
-    }
-    text += "\n";
+    let heads = ["rms residual", "unit"]
+        .into_iter()
+        .chain([bare, "tolerances fitted", with].into_iter().take(columns));
+    let mut table = Table::new(heads).with_texts([1]);
     for (channel, row) in channels {
         let (scale, unit) = display_scale(&row.unit);
-        text += &format!("  {channel:4}");
-        for value in [row.nominal, row.before, row.after].iter().take(columns) {
-            text += &format!(" {:>18}", four_figures(scale * value));
-        }
-        text += &format!(" {unit}\n");
+        let values = [row.nominal, row.before, row.after].into_iter().take(columns);
+        let values = values.map(|value| four_figures(scale * value));
+        table.row([channel.clone(), unit.to_owned()].into_iter().chain(values));
     }
-    text
+    table
 }
 
 /// The effect of the cause on efficiency and heat transfer at equal speed and pressures.
-fn points(points: &[PointGap]) -> String {
-    let largest = |suffix: fn(&PointGap) -> f64| {
-        let changes = points.iter().map(suffix).filter(|d| d.is_finite());
-        changes.fold(0.0f64, |most, d| if d.abs() > most.abs() { d } else { most })
+fn describe_points(points: &[PointGap]) -> String {
+    let largest = |change_of: fn(&PointGap) -> f64| {
+        let changes = points.iter().map(change_of).filter(|change| change.is_finite());
+        changes.fold(0.0f64, |most, change| if change.abs() > most.abs() { change } else { most })
     };
-    let eta_points = 100.0 * largest(|p| p.eta_after - p.eta_before);
-    let h_w_m2k = largest(|p| p.h_after_w_m2k - p.h_before_w_m2k);
-    let line = format!(
-        "  at equal speed and pressures, the cause changes the wheel's own efficiency by up to {eta_points:+.2} points and h by up to \
+    let eta_points = 100.0 * largest(|point| point.eta_after - point.eta_before);
+    let h_w_m2k = largest(|point| point.h_after_w_m2k - point.h_before_w_m2k);
+    format!(
+        "at equal speed and pressures, the cause changes the wheel's own efficiency by up to {eta_points:+.2} points and h by up to \
          {h_w_m2k:+.0} W/(m2 K); `mapper gap correct` gives its effect on the identified efficiencies"
-    );
-    wrapped(&line, COLUMNS, 4)
+    )
 }

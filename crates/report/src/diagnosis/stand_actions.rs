@@ -1,7 +1,8 @@
 //! Checks at the stand that confirm or exclude a cause.
 
-use crate::diagnosis::gap_warning_text::offset_at_rest_text;
-use crate::formatting::number::number;
+use crate::diagnosis::gap_next::name_experiment;
+use crate::formatting::number;
+use crate::message::Message;
 use mapper_diagnose::gap::{Diagnosis, Next, Verdict};
 
 /// Probability below which a cause is not listed for a check while another one is open. Judgement: one visit in ten would find it.
@@ -142,7 +143,7 @@ fn find_action(table: &[(&str, &'static str)], name: &str) -> Option<&'static st
 }
 
 /// Checks in order of the probability of their causes, each once; empty if the rig is as declared.
-pub fn stand_actions(diagnosis: &Diagnosis) -> Vec<String> {
+pub(crate) fn stand_actions(diagnosis: &Diagnosis) -> Vec<String> {
     let mut actions: Vec<&str> = Vec::new();
     let named = matches!(diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained);
     let open = diagnosis
@@ -169,7 +170,7 @@ pub fn stand_actions(diagnosis: &Diagnosis) -> Vec<String> {
     let mut once: Vec<String> = diagnosis
         .offsets_at_rest
         .iter()
-        .map(|sensor| format!("calibrate this sensor: {}", offset_at_rest_text(sensor)))
+        .map(|sensor| format!("calibrate this sensor: {}", sensor.message()))
         .collect();
     for action in actions {
         if !once.iter().any(|known| known == action) {
@@ -180,16 +181,12 @@ pub fn stand_actions(diagnosis: &Diagnosis) -> Vec<String> {
 }
 
 /// The measurement that decides between the causes that are left, in a sentence.
-pub fn next_measurement(diagnosis: &Diagnosis) -> Option<String> {
+pub(crate) fn next_measurement(diagnosis: &Diagnosis) -> Option<String> {
     let first = diagnosis.experiments.first();
     Some(match diagnosis.next.as_ref()? {
         Next::Sensor { sensor, reason } => format!("mount {sensor}: {reason}"),
         Next::Jump { .. } | Next::Soak { .. } => {
-            format!(
-                "measure: {}, {} min",
-                crate::diagnosis::gap_next::name_experiment(first?),
-                number(Some(first?.minutes), 1)
-            )
+            format!("measure: {}, {} min", name_experiment(first?), number(Some(first?.minutes), 1))
         }
     })
 }

@@ -2,5 +2,4 @@
 
 pub(crate) mod heat_correction_text;
 pub(crate) mod result_pictures;
-pub(crate) mod thermal_file;
 pub(crate) mod thermal_model;

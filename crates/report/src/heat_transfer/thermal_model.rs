@@ -1,69 +1,68 @@
-//! The parameters that the points of a campaign share, as text.
+//! The parameters that the points of a campaign share, for people and for other programs.
 
-use crate::point_results::warning_text::model_doubt_text;
-use mapper_core::{IdentifiedInlet, InletConvection, Origin, SharedValue, ThermalModel, half_width_95};
+use crate::document::{Describe, Document};
+use crate::message::Message;
+use mapper_core::{
+    IdentifiedInlet, InletConvection, Origin, SharedValue, ThermalModel, half_width_95, one_line,
+};
+use mapper_physics::laws::housing::{bearing_conductance_w_k, compressor_capacity_j_k, turbine_capacity_j_k};
+use mapper_physics::machine::params::Params;
+use serde_json::json;
 use std::fmt::Write;
 
-/// The thermal model as lines of text, one for each number.
-pub fn thermal_text(thermal: &ThermalModel) -> String {
-    let mut text = String::from("\nshared by all points (+/- 95 %):\n");
-    let mut line = |name: &str, value: &SharedValue, scale: f64, unit: &str, decimals: usize| {
-        let half = half_width_95(scale * value.uncertainty.combined_standard_error());
-        let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
-        // Rounded to zero, a number has no sign.
-        let rounded = |number: f64| {
-            let unsigned = (scale * number).abs() < 0.5 * 0.1f64.powi(decimals as i32);
-            if unsigned { 0.0 } else { scale * number }
+/// One row for each number, and sentences on the fit.
+impl Describe for ThermalModel {
+    fn document(&self) -> Document {
+        let mut rows: Vec<(String, String)> = Vec::new();
+        let mut row = |name: &str, value: &SharedValue, scale: f64, unit: &str, decimals: usize| {
+            rows.push((name.to_owned(), shared_value(value, scale, unit, decimals)));
         };
-        let _ = match (value.value, value.origin) {
-            (Some(number), Origin::Assumed) => {
-                writeln!(text, "  {name:<34} {:.decimals$}{unit} (assumed)", rounded(number))
-            }
-            (Some(number), _) => {
-                writeln!(text, "  {name:<34} {:.decimals$} +/- {half:.decimals$}{unit}", rounded(number))
-            }
-            (None, _) => {
-                writeln!(
-                    text,
-                    "  {name:<34} not identifiable from the recording (+/- {half:.decimals$}{unit})"
-                )
-            }
-        };
+        if let Some(law) = &self.convection {
+            row("Nusselt coefficient", &law.coefficient, 1.0, "", 6);
+            row("Nusselt exponent", &law.exponent, 1.0, "", 4);
+        }
+        row("alpha_A", &self.alpha_area_ratio, 1.0, "", 3);
+        row("T2 probe diameter", &self.probe_diameter_m, 1e3, "mm", 2);
+        row("heating/cooling ratio of h", &self.heating_cooling_ratio, 1.0, "", 3);
+        for (channel, offset) in &self.offsets {
+            let decimals = if channel.unit() == "Pa" { 0 } else { 2 };
+            row(&format!("offset of {channel}"), offset, 1.0, channel.unit(), decimals);
+        }
+        let mut document = Document::default();
+        document.facts("", rows);
+        if let Some(law) = &self.convection {
+            document.text(format!(
+                "fitted from Re {:.0} to {:.0}; single points deviate by {:.1} %",
+                law.reynolds_range.0,
+                law.reynolds_range.1,
+                100.0 * law.deviation_ratio
+            ));
+        }
+        document.text(self.inlet.as_ref().map(inlet_text).unwrap_or_default());
+        for pair in &self.entangled {
+            document.text(format!(
+                "{} and {} are barely distinguishable (correlation {:+.2})",
+                pair.first, pair.second, pair.correlation
+            ));
+        }
+        self.doubts.iter().for_each(|doubt| document.text(format!("doubt: {}", doubt.message())));
+        document
+    }
+}
+
+fn shared_value(value: &SharedValue, scale: f64, unit: &str, decimals: usize) -> String {
+    let half = half_width_95(scale * value.uncertainty.combined_standard_error());
+    let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+    // Rounded to zero, a number has no sign.
+    let rounded = |number: f64| {
+        let unsigned = (scale * number).abs() < 0.5 * 0.1f64.powi(decimals as i32);
+        if unsigned { 0.0 } else { scale * number }
     };
-    if let Some(law) = &thermal.convection {
-        line("Nusselt coefficient", &law.coefficient, 1.0, "", 6);
-        line("Nusselt exponent", &law.exponent, 1.0, "", 4);
+    match (value.value, value.origin) {
+        (Some(number), Origin::Assumed) => format!("{:.decimals$}{unit} (assumed)", rounded(number)),
+        (Some(number), _) => format!("{:.decimals$} +/- {half:.decimals$}{unit}", rounded(number)),
+        (None, _) => format!("not identifiable from the recording (+/- {half:.decimals$}{unit})"),
     }
-    line("alpha_A", &thermal.alpha_area_ratio, 1.0, "", 3);
-    line("T2 probe diameter", &thermal.probe_diameter_m, 1e3, "mm", 2);
-    line("heating/cooling ratio of h", &thermal.heating_cooling_ratio, 1.0, "", 3);
-    for (channel, offset) in &thermal.offsets {
-        let decimals = if channel.unit() == "Pa" { 0 } else { 2 };
-        line(&format!("offset of {channel}"), offset, 1.0, channel.unit(), decimals);
-    }
-    if let Some(law) = &thermal.convection {
-        let _ = writeln!(
-            text,
-            "  fitted from Re {:.0} to {:.0}; single points deviate by {:.1} %",
-            law.reynolds_range.0,
-            law.reynolds_range.1,
-            100.0 * law.deviation_ratio
-        );
-    }
-    if let Some(inlet) = &thermal.inlet {
-        let _ = writeln!(text, "  {}", inlet_text(inlet));
-    }
-    for pair in &thermal.entangled {
-        let _ = writeln!(
-            text,
-            "  {} and {} are barely distinguishable (correlation {:+.2})",
-            pair.first, pair.second, pair.correlation
-        );
-    }
-    for doubt in &thermal.doubts {
-        let _ = writeln!(text, "  doubt: {}", model_doubt_text(doubt));
-    }
-    text
 }
 
 /// The relation for h before the wheel, and whether the recording determines it, as one line without its end.
@@ -88,6 +87,105 @@ pub(crate) fn inlet_text(inlet: &IdentifiedInlet) -> String {
             law_name(inlet.convection.other()),
             inlet.probability
         ),
+    }
+}
+
+/// Temperature at which the housings' heat capacities are given, K.
+const CAPACITY_AT_K: f64 = 350.0;
+
+/// The reported data of a machine.
+#[derive(Debug, Clone, Copy)]
+pub struct ThermalExport<'a> {
+    /// Name of the machine.
+    pub machine: &'a str,
+    /// Declared geometry, masses and conductances.
+    pub params: &'a Params,
+    /// Result of a joint identification; `None` reports the declared values instead.
+    pub found: Option<&'a ThermalModel>,
+}
+
+impl ThermalExport<'_> {
+    /// One JSON object; keys carry units, and declared values that the recording did not give are marked `declared`.
+    ///
+    /// # Errors
+    /// That of serde_json; numbers and texts never fail.
+    pub fn json(&self) -> Result<Vec<u8>, serde_json::Error> {
+        let (params, compressor) = (self.params, &self.params.compressor);
+        let mut file = json!({
+            "machine": self.machine,
+            "identified": self.found,
+            "declared": {
+                "nusselt_law": "Nu = a Re^b Pr^(1/3) (mu/mu_wall)^0.14, Re = 4 m/(pi D mu)",
+                "nusselt_coefficient": compressor.nusselt_coefficient,
+                "nusselt_exponent": compressor.nusselt_exponent,
+                "diameter_m": compressor.outlet_diameter_m,
+                "alpha_area_ratio": compressor.alpha_area_ratio,
+                "internal_area_m2": compressor.internal_area_m2,
+                "external_area_m2": compressor.external_area_m2,
+                "emissivity_ratio": compressor.emissivity_ratio,
+                "compressor_housing_capacity_j_k": compressor_capacity_j_k(params, CAPACITY_AT_K),
+                "turbine_housing_capacity_j_k": turbine_capacity_j_k(params, CAPACITY_AT_K),
+                "capacity_at_k": CAPACITY_AT_K,
+                "housing_to_bearing_conductance_w_k": bearing_conductance_w_k(&params.bearing),
+                "bearing_to_oil_conductance_w_k": params.bearing.oil_conductance_w_k,
+                "t2_probe_diameter_m": params.t2_probe_diameter_m,
+            },
+        });
+        if compressor.alpha_area_ratio > 0.0
+            && let Some(declared) = file["declared"].as_object_mut()
+        {
+            declared.insert("inlet_convection".to_owned(), json!(compressor.inlet_convection));
+            declared.insert("inlet_diameter_m".to_owned(), json!(compressor.inlet_diameter_m));
+        }
+        let mut bytes = serde_json::to_vec_pretty(&file)?;
+        bytes.push(b'\n');
+        Ok(bytes)
+    }
+
+    /// The same as lines `name value unit # source`.
+    pub fn text(&self) -> String {
+        let (params, compressor) = (self.params, &self.params.compressor);
+        let mut text = format!(
+            "# thermal model of {}\n# Nu = a Re^b Pr^(1/3) (mu/mu_wall)^0.14, Re = 4 m/(pi D mu), over the compressor's inner walls\n",
+            one_line(self.machine)
+        );
+        let law = self.found.and_then(|identified| identified.convection.as_ref());
+        let mut shared = |name: &str, unit: &str, identified: Option<&SharedValue>, declared: f64| {
+            let (value, origin) = match identified.and_then(|shared| Some((shared.value?, shared))) {
+                Some((value, shared)) => {
+                    let (low, high) = shared.interval_95().unwrap_or((value, value));
+                    let origin = match shared.origin {
+                        Origin::Fitted => "identified",
+                        Origin::Assumed => "declared",
+                        Origin::NotIdentifiable => "declared; not identifiable from the recording",
+                    };
+                    (value, format!("{origin}, 95 % {low:.6} to {high:.6}"))
+                }
+                None => (declared, "declared".to_owned()),
+            };
+            let _ = writeln!(text, "{name} {value} {unit} # {origin}");
+        };
+        shared("nusselt_coefficient", "1", law.map(|l| &l.coefficient), compressor.nusselt_coefficient);
+        shared("nusselt_exponent", "1", law.map(|l| &l.exponent), compressor.nusselt_exponent);
+        shared("alpha_area", "1", self.found.map(|f| &f.alpha_area_ratio), compressor.alpha_area_ratio);
+        shared("t2_probe_diameter", "m", self.found.map(|f| &f.probe_diameter_m), params.t2_probe_diameter_m);
+        shared("heating_cooling_ratio", "1", self.found.map(|f| &f.heating_cooling_ratio), 1.0);
+        if let Some(inlet) = self.found.and_then(|identified| identified.inlet) {
+            let _ =
+                writeln!(text, "inlet_diameter {} m # declared\n# {}", inlet.diameter_m, inlet_text(&inlet));
+        }
+        for (name, value, unit) in [
+            ("diameter", law.map_or(compressor.outlet_diameter_m, |l| l.diameter_m), "m"),
+            ("internal_area", compressor.internal_area_m2, "m2"),
+            ("external_area", compressor.external_area_m2, "m2"),
+            ("compressor_housing_capacity", compressor_capacity_j_k(params, CAPACITY_AT_K), "J/K"),
+            ("turbine_housing_capacity", turbine_capacity_j_k(params, CAPACITY_AT_K), "J/K"),
+            ("housing_to_bearing_conductance", bearing_conductance_w_k(&params.bearing), "W/K"),
+            ("bearing_to_oil_conductance", params.bearing.oil_conductance_w_k, "W/K"),
+        ] {
+            let _ = writeln!(text, "{name} {value} {unit} # declared");
+        }
+        text
     }
 }
 
@@ -136,12 +234,29 @@ mod tests {
             }],
             doubts: Vec::new(),
         };
-        let text = thermal_text(&thermal);
+        let text = thermal.document().to_string();
         assert!(!text.contains("before the wheel"), "what makes no difference is not reported: {text}");
         assert!(text.contains("not identifiable from the recording"), "{text}");
         assert!(text.contains("alpha_A and heating/cooling ratio are barely distinguishable"), "{text}");
         let json = serde_json::to_value(&thermal).unwrap_or_default();
         assert_eq!(json["entangled"][0]["correlation"], 0.97);
         assert_eq!(json["alpha_area_ratio"]["value"], serde_json::Value::Null);
+    }
+
+    #[test]
+    fn json_and_text_tell_the_same_and_a_name_breaks_nothing() {
+        let params = Params::default();
+        let export = ThermalExport { machine: "a\nb 7", params: &params, found: None };
+        let value: serde_json::Value = serde_json::from_slice(&export.json().unwrap()).unwrap();
+        // Appendix A: 2 k A / L = 2 * 47.5 * 7e-4 / 45e-3 = 1.478 W/K; 0.93 kg * 945 J/(kg K) at 350 K.
+        let declared = |name: &str| value["declared"][name].as_f64().unwrap();
+        assert!((declared("housing_to_bearing_conductance_w_k") - 1.4778).abs() < 1e-4);
+        assert!((declared("compressor_housing_capacity_j_k") - 878.85).abs() < 1e-9);
+        let text = export.text();
+        assert!(
+            text.contains("nusselt_exponent 1.13 1 # declared\n")
+                && text.starts_with("# thermal model of a b 7\n")
+        );
+        assert!(text.lines().all(|line| line.starts_with('#') || line.split(' ').count() >= 5));
     }
 }

@@ -30,10 +30,7 @@ fn dates(first_ms: i64, last_ms: i64) -> Vec<(f64, String)> {
     let days = (0..=DATES_MAX).map(|i| first + i * step).take_while(|day| *day <= last);
     let format = if last - first > 360 { "%Y-%m-%d" } else { "%d %b" };
     days.map(|day| {
-        (
-            (day * day_ms - first_ms) as f64 / MS_PER_DAY,
-            crate::history::history_text::time(day * day_ms, format),
-        )
+        ((day * day_ms - first_ms) as f64 / MS_PER_DAY, crate::history::nights::time(day * day_ms, format))
     })
     // The first night's own midnight is before the axis.
     .map(|(place, text)| (place.max(0.0), text))
@@ -83,7 +80,7 @@ pub fn history_svg(
             for ((started_ms, _), (moved, program, mut values)) in nights {
                 let Some(value) = median(&mut values) else { continue };
                 places.push((day(started_ms), factor * value));
-                let at = crate::history::history_text::time(started_ms, "%Y-%m-%d %H:%M UTC");
+                let at = crate::history::nights::time(started_ms, "%Y-%m-%d %H:%M UTC");
                 notes.push(Note {
                     text: format!(
                         "{at}; {campaign} {method}; {figure}: {:.4} {unit}{}; {program}",

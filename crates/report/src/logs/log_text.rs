@@ -1,10 +1,8 @@
-//! The content of a log as a table, and a suggested channel map.
+//! The content of a log, and a suggested channel map.
 
-use crate::formatting::table::{COLUMNS, TextTable, with_heads};
-use crate::formatting::wrapped::wrapped;
+use crate::document::{Document, Table};
 use mapper_recording::logs::proposal::{Ambient, Certainty, Proposal};
 use mapper_recording::logs::{Layout, Survey, sparkline};
-use std::fmt::Write;
 
 /// Width of a trace, characters.
 const TRACE: usize = 20;
@@ -13,15 +11,13 @@ const TRACE: usize = 20;
 const GAPS: usize = 5;
 
 /// Findings, columns, gaps, and the suggestion with its certain and uncertain parts.
-pub fn log_text(format: &str, layout: &Layout, survey: &Survey, proposal: &Proposal) -> String {
-    let mut text = format!(
-        "{format}, {} columns. Detected layout (in brackets: the option to override it, `--with KEY=VALUE`):\n",
+pub fn log_contents(format: &str, layout: &Layout, survey: &Survey, proposal: &Proposal) -> Document {
+    let mut document = Document::default();
+    document.text(format!(
+        "{format}, {} columns. Detected layout (in brackets: the option to override it, `--with KEY=VALUE`):",
         layout.columns.len()
-    );
-    for finding in &layout.findings {
-        let _ = writeln!(text, "  {finding}");
-    }
-    text = wrapped(&text, COLUMNS, 4);
+    ));
+    document.list(layout.findings.iter().map(ToString::to_string));
     for (index, (group, data)) in layout.groups.iter().zip(&survey.groups).enumerate() {
         let several = layout.groups.len() > 1;
         let name = if several { format!("Group {} `{}`", index + 1, group.name) } else { "Rows".to_owned() };
@@ -30,27 +26,31 @@ pub fn log_text(format: &str, layout: &Layout, survey: &Survey, proposal: &Propo
         } else {
             String::new()
         };
-        let _ =
-            write!(text, "\n{name}: {} from {:.3} s to {:.3} s{rate}", data.rows, data.first_s, data.last_s);
-        if data.backward > 0 {
-            let _ = write!(text, "; {} rows are not after the row before", data.backward);
-        }
-        let _ = match data.gap_count {
-            0 => writeln!(text, ", no gaps."),
-            1 => writeln!(text, ", 1 gap:"),
-            count => writeln!(text, ", {count} gaps:"),
+        let backward = match data.backward {
+            0 => String::new(),
+            rows => format!("; {rows} rows are not after the row before"),
         };
-        for gap in data.gaps.iter().take(GAPS) {
-            let _ =
-                writeln!(text, "  {:.3} s to {:.3} s ({:.1} s)", gap.from_s, gap.to_s, gap.to_s - gap.from_s);
-        }
+        let gaps = match data.gap_count {
+            0 => "no gaps.".to_owned(),
+            1 => "1 gap:".to_owned(),
+            count => format!("{count} gaps:"),
+        };
+        document.text(format!(
+            "{name}: {} from {:.3} s to {:.3} s{rate}{backward}, {gaps}",
+            data.rows, data.first_s, data.last_s
+        ));
+        document.list(
+            data.gaps.iter().take(GAPS).map(|gap| {
+                format!("{:.3} s to {:.3} s ({:.1} s)", gap.from_s, gap.to_s, gap.to_s - gap.from_s)
+            }),
+        );
     }
-    let _ = writeln!(text, "\n{}", columns(layout, survey, proposal));
-    text.push_str(&wrapped(&proposal_text(layout, proposal), COLUMNS, 4));
-    text
+    document.table(columns(layout, survey, proposal));
+    document.section("Proposed channel map", proposed_map(layout, proposal));
+    document
 }
 
-fn columns(layout: &Layout, survey: &Survey, proposal: &Proposal) -> TextTable {
+fn columns(layout: &Layout, survey: &Survey, proposal: &Proposal) -> Table {
     let several = layout.groups.len() > 1;
     let mut head = vec!["column", "unit", "min", "max", "empty", "trace", "channel"];
     if several {
@@ -58,7 +58,7 @@ fn columns(layout: &Layout, survey: &Survey, proposal: &Proposal) -> TextTable {
     }
     let texts =
         (0..head.len()).filter(|index| ["unit", "trace", "channel", "column"].contains(&head[*index]));
-    let mut table = with_heads(&head).with_texts(texts);
+    let mut table = Table::new(&head).with_texts(texts);
     for (index, (column, data)) in layout.columns.iter().zip(&survey.columns).enumerate() {
         let is_ambient =
             matches!(&proposal.ambient, Some(Ambient::Column { column, .. }) if *column == index);
@@ -89,55 +89,47 @@ fn columns(layout: &Layout, survey: &Survey, proposal: &Proposal) -> TextTable {
         if several {
             row.insert(0, (column.group + 1).to_string());
         }
-        table.add_row(row);
+        table.row(row);
     }
     table
 }
 
 /// The suggestion: channels with a remark, and the relations between channels.
-fn proposal_text(layout: &Layout, proposal: &Proposal) -> String {
-    let mut text = String::new();
-    let symbols_of = |certainty: Certainty| -> Vec<&str> {
-        proposal
-            .channels
-            .iter()
-            .filter(|proposed| proposed.certainty == certainty)
-            .map(|proposed| proposed.channel.symbol())
-            .collect()
-    };
+fn proposed_map(layout: &Layout, proposal: &Proposal) -> Document {
     let list = |names: Vec<&str>| if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-    let _ = writeln!(text, "\nProposed channel map\n  sure: {}", list(symbols_of(Certainty::Sure)));
-    let _ = writeln!(text, "  likely: {}", list(symbols_of(Certainty::Likely)));
-    let _ = writeln!(text, "  not sure, kept as comments: {}", list(symbols_of(Certainty::Unsure)));
+    let symbols_of = |certainty: Certainty| {
+        let channels = proposal.channels.iter().filter(|proposed| proposed.certainty == certainty);
+        list(channels.map(|proposed| proposed.channel.symbol()).collect())
+    };
+    let name_of = |column: usize| layout.columns.get(column).map_or("", |column| column.name.as_str());
+    let mut lines = vec![
+        format!("sure: {}", symbols_of(Certainty::Sure)),
+        format!("likely: {}", symbols_of(Certainty::Likely)),
+        format!("not sure, kept as comments: {}", symbols_of(Certainty::Unsure)),
+    ];
     for proposed in proposal.channels.iter().filter(|proposed| !proposed.remarks.is_empty()) {
-        let name = layout.columns.get(proposed.column).map_or("", |column| column.name.as_str());
-        let _ = writeln!(text, "  {} (`{name}`): {}", proposed.channel, proposed.remarks_text());
+        lines.push(format!(
+            "{} (`{}`): {}",
+            proposed.channel,
+            name_of(proposed.column),
+            proposed.remarks_text()
+        ));
     }
-    let gauge: Vec<&str> = proposal
-        .channels
-        .iter()
-        .filter(|proposed| proposed.gauge)
-        .map(|proposed| proposed.channel.symbol())
-        .collect();
+    let gauge = proposal.channels.iter().filter(|proposed| proposed.gauge);
+    let gauge = gauge.map(|proposed| proposed.channel.symbol()).collect::<Vec<_>>().join(", ");
     match &proposal.ambient {
         None => {}
         Some(Ambient::Column { column, .. }) => {
-            let name = layout.columns.get(*column).map_or("", |column| column.name.as_str());
-            let _ = writeln!(text, "  gauge pressures: {}, over `{name}`", gauge.join(", "));
+            lines.push(format!("gauge pressures: {gauge}, over `{}`", name_of(*column)));
         }
-        Some(Ambient::Assumed) => {
-            let _ = writeln!(
-                text,
-                "  gauge pressures: {}; the log has no ambient pressure, so 101.3 kPa is assumed; write the reading of the \
-                 barometer",
-                gauge.join(", ")
-            );
-        }
+        Some(Ambient::Assumed) => lines.push(format!(
+            "gauge pressures: {gauge}; the log has no ambient pressure, so 101.3 kPa is assumed; write the reading of the barometer"
+        )),
     }
-    for remark in &proposal.remarks {
-        let _ = writeln!(text, "  {remark}");
-    }
-    text
+    lines.extend(proposal.remarks.iter().map(ToString::to_string));
+    let mut document = Document::default();
+    document.list(lines);
+    document
 }
 
 /// A name shortened for a table.

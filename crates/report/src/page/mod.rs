@@ -4,22 +4,12 @@
 //! No request leaves the page: its content policy allows none. `docs/how-to/report.md` describes the source of each
 //! number.
 
-mod advice;
-mod document;
-mod drawn_map;
-mod drawn_points;
-mod drawn_steps;
-mod gap_page;
+pub(crate) mod drawn;
 mod live_page;
-mod prose;
-mod run_page;
-mod sections;
-mod shell;
-mod table;
+pub(crate) mod run_page;
+pub(crate) mod shell;
+pub(crate) mod widgets;
 
-pub use document::run_page;
-pub use gap_page::{gap_page, gap_part};
 pub use live_page::{
     LiveMap, LivePoint, Planned, live_map, live_page, live_point, planned, target_line_name,
 };
-pub use run_page::{OtherRun, RunPage};

@@ -1,5 +1,7 @@
-//! The frame of a page: content policy, style, scripts, data.
+//! The frame of a page: content policy, style, scripts, data; and the page of a diagnosis, which needs no more.
 
+use crate::diagnosis::gap_text::gap_document;
+use mapper_diagnose::gap::Diagnosed;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use serde::Serialize;
 
@@ -98,6 +100,19 @@ fn json_in_html(data: &impl Serialize) -> Result<String, serde_json::Error> {
         .replace('<', "\\u003c")
         .replace('\u{2028}', "\\u2028")
         .replace('\u{2029}', "\\u2029"))
+}
+
+/// The page. `machine` and `recording` are names for its title.
+///
+/// # Errors
+/// None in practice: JSON of numbers and strings can always be written.
+pub fn gap_page(machine: &str, recording: &str, diagnosed: &Diagnosed) -> Result<String, serde_json::Error> {
+    let title = format!("Gap between {machine} and its nominal model");
+    let body = html! {
+        header { h1 { (title) } p.under { "Recording: " (recording) } }
+        main #gap { (gap_document(diagnosed).html()) }
+    };
+    shell(&title, &title, Purpose::Still, &(), &body)
 }
 
 #[cfg(test)]

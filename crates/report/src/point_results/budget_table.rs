@@ -1,8 +1,7 @@
 //! The uncertainty budgets of the points, as tables for the report and as a file.
 
-use crate::formatting::markdown::{self, Align};
+use crate::document::{Document, Table};
 use mapper_core::{PointBudgets, UncertaintyBudget, step_number};
-use std::fmt::Write;
 
 /// The budgets as a file: one row for each source of each number of each point. An empty cell of degrees of freedom means that the uncertainty
 /// is known exactly.
@@ -58,40 +57,36 @@ pub fn budget_csv(budgets: &[PointBudgets]) -> std::io::Result<Vec<u8>> {
     writer.into_inner().map_err(csv::IntoInnerError::into_error)
 }
 
-/// The section of the report: contributions to the efficiency of every point, and to its pressure ratio. Empty without budgets.
-pub(crate) fn budget_section(budgets: &[PointBudgets]) -> String {
+/// Contributions to the efficiency of every point, and to its pressure ratio; empty without budgets.
+pub(crate) fn budget_section(budgets: &[PointBudgets]) -> Document {
     let etas: Vec<(usize, &UncertaintyBudget)> =
         budgets.iter().filter_map(|point| Some((point.step, point.eta.as_ref()?))).collect();
     let ratios: Vec<(usize, &UncertaintyBudget)> =
         budgets.iter().map(|point| (point.step, &point.pressure_ratio)).collect();
+    let mut document = Document::default();
     if etas.is_empty() {
-        return String::new();
+        return document;
     }
-    let mut text = "\n## Uncertainty budget\n\nContributions to the standard uncertainty by source, in the form of the GUM: standard uncertainty of the \
-                    source times sensitivity. They combine as the root of the sum of squares; U is k times that, with a coverage of 95 %. \
-                    `budget.csv` has standard uncertainties, sensitivities and degrees of freedom, also of h.\n"
-        .to_owned();
-    for (title, unit, scale, digits, budgets) in
-        [("Efficiency", "points", 100.0, 2, etas), ("Pressure ratio", "1e-3", 1e3, 2, ratios)]
-    {
-        let _ = writeln!(text, "\n### {title}, {unit}\n");
-        text.push_str(&table(&budgets, scale, digits));
-    }
-    text
+    document.text(
+        "Contributions to the standard uncertainty by source, in the form of the GUM: standard uncertainty of the source times sensitivity. \
+         They combine as the root of the sum of squares; U is k times that, with a coverage of 95 %. `budget.csv` has standard \
+         uncertainties, sensitivities and degrees of freedom, also of h.",
+    );
+    document.table(budget_table(&etas, 100.0).caption("Efficiency, points"));
+    document.table(budget_table(&ratios, 1e3).caption("Pressure ratio, 1e-3"));
+    document
 }
 
-/// One row for each source, one column for each step.
-fn table(budgets: &[(usize, &UncertaintyBudget)], scale: f64, digits: usize) -> String {
+/// One row for each step, one column for each source.
+fn budget_table(budgets: &[(usize, &UncertaintyBudget)], scale: f64) -> Table {
     let mut sources: Vec<&str> = Vec::new();
     for row in budgets.iter().flat_map(|(_, budget)| &budget.rows) {
         if !sources.contains(&row.source.as_str()) {
             sources.push(&row.source);
         }
     }
-    let mut heads = vec!["step".to_owned()];
-    heads.extend(sources.iter().map(|source| (*source).to_owned()));
-    heads.extend(["combined".to_owned(), "k".to_owned(), "U".to_owned()]);
-    let cell = |value: f64| format!("{:.digits$}", scale * value);
+    let heads = ["step"].into_iter().chain(sources.iter().copied()).chain(["combined", "k", "U"]);
+    let cell = |value: f64| format!("{:.2}", scale * value);
     let rows = budgets.iter().map(|(step, budget)| {
         let share_of = |source: &&str| {
             let row = budget.rows.iter().find(|row| row.source == *source);
@@ -104,5 +99,5 @@ fn table(budgets: &[(usize, &UncertaintyBudget)], scale: f64, digits: usize) -> 
         cells.push(cell(budget.expanded_uncertainty));
         cells
     });
-    markdown::table(&heads, Align::Right, rows)
+    Table::new(heads).rows(rows)
 }

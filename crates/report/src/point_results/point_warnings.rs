@@ -1,6 +1,6 @@
 //! Warnings and remarks about points, each sentence once.
 
-use crate::point_results::warning_text::sentence::Sentence;
+use crate::document::Sentence;
 use crate::point_results::warning_text::sentence_of;
 use mapper_core::{IdentifiedPoint, step_number};
 

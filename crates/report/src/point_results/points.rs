@@ -1,126 +1,312 @@
-//! Identified points, their warnings, and their deviations from the truth.
+//! Tables of identified points: one description of each column, for terminal, report and page.
 
-use crate::formatting::display::Display;
-use crate::formatting::number::{number, percent};
-use crate::formatting::table::{self, COLUMNS};
-use crate::formatting::wrapped::wrapped;
-use crate::plan::plan_text::{mark, marks_legend};
-use crate::point_results::point_warnings::doubts;
-use mapper_core::{IdentifiedPoint, StepKind, Verdict, step_number};
-use mapper_recording::score::{ScoreSummary, ScoredPoint};
-use std::fmt::Write;
+use crate::document::{Cell, Document, Table, verdict_word};
+use crate::formatting::{Display, number, percent};
+use mapper_core::{
+    Channel, CompressorMap, IdentifiedPoint, Recording, SpeedLine, StepKind, StepMarker, Verdict,
+    half_width_95, step_number,
+};
+use mapper_numerics::statistics::mean;
+use mapper_recording::score::ScoredPoint;
 
-/// Identified points as a table with their warnings below; deviations from the truth if it is known.
-/// `truth`: whether to show the latter.
-pub fn points_text(points: &[ScoredPoint], display: &Display, truth: bool) -> String {
-    let kinds: Vec<StepKind> = points.iter().map(|scored| scored.point.kind).collect();
-    let legend = wrapped(
-        &format!("{}+/- covers the 95 % interval. dT2: change of T2 in the window.", marks_legend(&kinds)),
-        COLUMNS,
-        0,
-    );
-    let mut text = format!("{}\n\n{legend}\n", points_table(points, display, truth));
-    let doubted = points.iter().map(|scored| &scored.point).filter(|point| point.verdict != Verdict::Good);
-    for doubt in doubts(doubted) {
-        let _ = writeln!(text, "{}: {}", doubt.steps(), doubt.message());
-    }
-    let count = |verdict| points.iter().filter(|scored| scored.point.verdict == verdict).count();
-    let _ = writeln!(
-        text,
-        "{} points: {} good, {} doubtful, {} unusable.",
-        points.len(),
-        count(Verdict::Good),
-        count(Verdict::Doubtful),
-        count(Verdict::Unusable),
-    );
-    if let Some(score) = mapper_recording::score::summarise(points).filter(|_| truth) {
-        text.push_str(&score_text(&score));
-    }
-    text
+/// A column of a table of points.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Column {
+    Step,
+    Speed,
+    SpeedCorrected,
+    Opening,
+    Flow,
+    FlowMargin,
+    PressureRatio,
+    PressureRatioMargin,
+    Eta,
+    EtaMargin,
+    H,
+    HMargin,
+    T2Change,
+    T1,
+    P1,
+    /// Readings at the end of the step.
+    Read(Channel),
+    Verdict,
+    TrueEta,
+    TrueH,
 }
 
-/// Deviations of the points from the simulator's truth; `None` if the truth is unknown.
-pub fn truth_text(points: &[ScoredPoint]) -> Option<String> {
-    mapper_recording::score::summarise(points).map(|score| score_text(&score))
-}
+use Column as C;
 
-/// Deviations of the points from the simulator's truth.
-pub fn score_text(score: &ScoreSummary) -> String {
-    let mut text = format!(
-        "Against the simulator's truth ({} points): median error of efficiency {:.2} points, {:.2} at worst, {:.0} % \
-         within 1 point; the 95 % interval contains the truth at {:.0} % (points share the offsets of their sensors, so \
-         that their intervals are right or wrong together).\n",
-        score.points,
-        100.0 * score.eta_median_error,
-        100.0 * score.eta_worst_error,
-        100.0 * score.eta_within_one_point_ratio,
-        100.0 * score.eta_coverage_ratio,
-    );
-    if let (Some(median), Some(worst)) = (score.h_median_error_ratio, score.h_worst_error_ratio) {
-        let _ = writeln!(
-            text,
-            "Median error of the heat-transfer coefficient {:.1} %, {:.1} % at worst; its 95 % interval contains the truth at {}.",
-            100.0 * median,
-            100.0 * worst,
-            score
-                .h_coverage_ratio
-                .map_or_else(|| "no point".to_owned(), |ratio| format!("{:.0} %", 100.0 * ratio)),
-        );
-    }
-    text
-}
+/// The columns of a test report.
+pub(crate) const REPORT: [Column; 19] = [
+    C::Step,
+    C::Speed,
+    C::SpeedCorrected,
+    C::Opening,
+    C::Flow,
+    C::FlowMargin,
+    C::PressureRatio,
+    C::PressureRatioMargin,
+    C::Eta,
+    C::EtaMargin,
+    C::H,
+    C::HMargin,
+    C::T2Change,
+    C::T1,
+    C::P1,
+    C::Read(Channel::T2),
+    C::Read(Channel::P2),
+    C::Read(Channel::T3),
+    C::Verdict,
+];
+/// The columns of a wide table on a terminal.
+const WIDE: [Column; 11] = [
+    C::Step,
+    C::Speed,
+    C::Opening,
+    C::Flow,
+    C::PressureRatio,
+    C::Eta,
+    C::EtaMargin,
+    C::H,
+    C::HMargin,
+    C::T2Change,
+    C::Verdict,
+];
+/// The columns that fit next to the name of a speed line.
+const NARROW: [Column; 8] =
+    [C::Step, C::Opening, C::Flow, C::PressureRatio, C::Eta, C::EtaMargin, C::H, C::HMargin];
 
-/// A valve opening with three decimals; `-` if the recording does not contain it.
-pub fn opening(ratio: f64) -> String {
-    // Valves are set to a thousandth at best.
-    if ratio.is_finite() { ((1e3 * ratio).round() / 1e3).to_string() } else { "-".to_owned() }
-}
-
-fn points_table(points: &[ScoredPoint], display: &Display, truth: bool) -> table::TextTable {
-    let with_truth = truth && points.iter().any(|scored| scored.truth.is_some());
-    let mut heads = vec![
-        "step".to_owned(),
-        display.speed_head("speed"),
-        "opening".to_owned(),
-        display.flow_head("corr. flow"),
-        "PR".to_owned(),
-        "eta %".to_owned(),
-        "+/- points".to_owned(),
-        "h W/(m2 K)".to_owned(),
-        "+/- W/(m2 K)".to_owned(),
-        "dT2 K".to_owned(),
-        "verdict".to_owned(),
-    ];
-    if with_truth {
-        heads.push("true eta %".to_owned());
-        heads.push("true h".to_owned());
-    }
-    let mut table = table::with_heads(&heads);
-    for ScoredPoint { point, truth } in points {
-        let mut row = vec![
-            format!("{}{}", step_number(point.step), mark(point.kind)),
-            display.speed(point.speed_rpm),
-            opening(point.valve_opening_ratio),
-            display.flow(point.flow_corrected_kg_s),
-            format!("{:.4}", point.pressure_ratio),
-            percent(point.eta, 2),
-            percent(point.eta_margin_95(), 2),
-            number(point.h_w_m2k, 0),
-            number(point.h_margin_95_w_m2k(), 0),
-            number(point.dt2_k, 1),
-            verdict_word(point.verdict).to_owned(),
-        ];
-        if with_truth {
-            row.push(number(truth.map(|truth| 100.0 * truth.eta), 2));
-            row.push(number(truth.map(|truth| truth.h_w_m2k), 0));
+impl Column {
+    fn head(self, display: &Display) -> String {
+        match self {
+            C::Step => "step".to_owned(),
+            C::Speed => display.speed_head("N"),
+            C::SpeedCorrected => display.speed_head("N corr."),
+            C::Opening => "opening".to_owned(),
+            C::Flow => display.flow_head("flow corr."),
+            C::FlowMargin | C::PressureRatioMargin | C::EtaMargin | C::HMargin => "+/-".to_owned(),
+            C::PressureRatio => "PR".to_owned(),
+            C::Eta => "eta %".to_owned(),
+            C::H => "h W/(m2 K)".to_owned(),
+            C::T2Change => "dT2 K".to_owned(),
+            C::T1 => display.temperature_head("T1"),
+            C::P1 => display.pressure_head("P1"),
+            C::Read(channel) => format!("{channel} {}", display.unit_of(channel)),
+            C::Verdict => "verdict".to_owned(),
+            C::TrueEta => "true eta %".to_owned(),
+            C::TrueH => "true h".to_owned(),
         }
-        table.add_row(row);
+    }
+
+    fn cell(self, scored: &ScoredPoint, recording: Option<&Recording>, display: &Display) -> Cell {
+        let ScoredPoint { point, truth } = scored;
+        let flow = |kg_s: f64| display.flow(kg_s);
+        let ratio = |ratio: f64| format!("{ratio:.4}");
+        let in_percent = |ratio: f64| percent(Some(ratio), 2);
+        let whole = |value: f64| number(Some(value), 0);
+        // A half width of 0 means that no sensor is declared, not that it is perfect.
+        let declared = |half: f64| Some(half).filter(|half| *half > 0.0);
+        match self {
+            C::Step => Cell::number(step_name(point), point.step as f64),
+            C::Speed => Cell::optional(Some(point.speed_rpm), |rpm| display.speed(rpm)),
+            C::SpeedCorrected => Cell::optional(Some(point.speed_corrected_rpm), |rpm| display.speed(rpm)),
+            C::Opening => Cell::optional(Some(point.valve_opening_ratio), opening),
+            C::Flow => Cell::optional(Some(point.flow_corrected_kg_s), flow),
+            C::FlowMargin => {
+                let half_ratio = half_width_95(point.common.flow_corrected_standard_error_ratio);
+                Cell::optional(declared(half_ratio * point.flow_corrected_kg_s), flow)
+            }
+            C::PressureRatio => Cell::optional(Some(point.pressure_ratio), ratio),
+            C::PressureRatioMargin => {
+                Cell::optional(declared(half_width_95(point.common.pressure_ratio_standard_error)), ratio)
+            }
+            C::Eta => Cell::optional(point.eta, in_percent),
+            C::EtaMargin => Cell::optional(point.eta_margin_95(), in_percent),
+            C::H => Cell::optional(point.h_w_m2k, whole),
+            C::HMargin => Cell::optional(point.h_margin_95_w_m2k(), whole),
+            C::T2Change => Cell::optional(point.dt2_k, |k| number(Some(k), 1)),
+            C::T1 => Cell::optional(Some(point.t1_k), |k| display.temperature(k)),
+            C::P1 => Cell::optional(Some(point.p1_pa), |pa| display.pressure(pa)),
+            C::Read(channel) => {
+                let marker = recording.and_then(|all| all.steps.iter().find(|step| step.index == point.step));
+                let read = recording.zip(marker).and_then(|(all, marker)| at_end(all, marker, channel));
+                Cell::optional(read, |value| display.shown_reading(channel, value))
+            }
+            C::Verdict => Cell::verdict(point.verdict),
+            C::TrueEta => Cell::optional(truth.map(|truth| truth.eta), in_percent),
+            C::TrueH => Cell::optional(truth.map(|truth| truth.h_w_m2k), whole),
+        }
+    }
+}
+
+/// A table of points with these columns.
+fn points_table<'a>(
+    columns: &[Column],
+    points: impl Iterator<Item = &'a ScoredPoint>,
+    recording: Option<&Recording>,
+    display: &Display,
+) -> Table {
+    let mut table = Table::new(columns.iter().map(|column| column.head(display)));
+    for scored in points {
+        let cells = columns.iter().map(|column| column.cell(scored, recording, display)).collect();
+        table.row_of_step(Some(scored.point.step), cells);
     }
     table
 }
 
+/// The points of each speed line from surge to choke with all their columns, followed by the points outside the map.
+pub(crate) fn point_tables(
+    map: Option<&CompressorMap>,
+    points: &[ScoredPoint],
+    recording: &Recording,
+    display: &Display,
+) -> Vec<Table> {
+    let mut tables = Vec::new();
+    let mut on_a_line: Vec<usize> = Vec::new();
+    for line in map.map_or(&[][..], |map| map.lines.as_slice()) {
+        let own_points = points_of_line(points, |step| line.points.iter().any(|p| p.identified.step == step));
+        on_a_line.extend(own_points.iter().map(|scored| scored.point.step));
+        let caption =
+            format!("{} {} corrected", display.line_name(line.speed_corrected_rpm), display.units().speed);
+        tables.push(points_table(&REPORT, own_points.into_iter(), Some(recording), display).caption(caption));
+    }
+    let caption = if tables.is_empty() { "Points" } else { "Repeats, and points that are not on the map" };
+    let others = points.iter().filter(|scored| !on_a_line.contains(&scored.point.step));
+    tables.push(points_table(&REPORT, others, Some(recording), display).caption(caption));
+    tables
+}
+
+/// The points of a line from surge to choke.
+fn points_of_line(points: &[ScoredPoint], is_on_it: impl Fn(usize) -> bool) -> Vec<&ScoredPoint> {
+    let mut own_points: Vec<&ScoredPoint> =
+        points.iter().filter(|scored| is_on_it(scored.point.step)).collect();
+    own_points.sort_by(|a, b| a.point.flow_corrected_kg_s.total_cmp(&b.point.flow_corrected_kg_s));
+    own_points
+}
+
+/// All points in one wide table; with their true values if `truth` is set and they are known.
+pub(crate) fn wide_table(points: &[ScoredPoint], display: &Display, truth: bool) -> Table {
+    let true_columns: &[Column] = if with_truth(points, truth) { &[C::TrueEta, C::TrueH] } else { &[] };
+    points_table(&[&WIDE, true_columns].concat(), points.iter(), None, display)
+}
+
+fn with_truth(points: &[ScoredPoint], truth: bool) -> bool {
+    truth && points.iter().any(|scored| scored.truth.is_some())
+}
+
+/// The points of the map by speed line from surge to choke, followed by the points outside it; without repeats, which serve only
+/// for comparison. With their true efficiency if `truth` is set and it is known. It fits a terminal.
+pub(crate) fn points_by_line(
+    points: &[ScoredPoint],
+    map: Option<&CompressorMap>,
+    display: &Display,
+    truth: bool,
+) -> Document {
+    let units = display.units();
+    let with_truth = with_truth(points, truth);
+    let mut heads: Vec<&str> =
+        vec![&units.speed, "step", "opening", &units.flow, "PR", "eta %", "+/-", "h", "+/-"];
+    heads.extend(with_truth.then_some("true %"));
+    heads.push("");
+    let mut table = Table::new(heads);
+    let mut add = |name: String, scored: &ScoredPoint| {
+        let mut row = vec![name.into()];
+        row.extend(NARROW.iter().map(|column| match column {
+            C::Step => step_number(scored.point.step).to_string().into(),
+            column => column.cell(scored, None, display),
+        }));
+        row.extend(with_truth.then(|| C::TrueEta.cell(scored, None, display)));
+        // A good point needs no remark.
+        row.push(match scored.point.verdict {
+            Verdict::Good => "".into(),
+            verdict => Cell::verdict(verdict),
+        });
+        table.row_of_step(Some(scored.point.step), row);
+    };
+    let mut on_a_line = Vec::new();
+    for (speed_rpm, steps) in speed_lines(points, map) {
+        for (index, scored) in points_of_line(points, |step| steps.contains(&step)).into_iter().enumerate() {
+            add(if index == 0 { display.line_name(speed_rpm) } else { String::new() }, scored);
+            on_a_line.push(scored.point.step);
+        }
+    }
+    // A point with a repeat visit is on the map once, by the more certain visit.
+    let is_on_a_line = |scored: &ScoredPoint| {
+        let mut visits = points.iter().filter(|other| on_a_line.contains(&other.point.step));
+        let is_same = |other: &ScoredPoint| {
+            scored.point.target.zip(other.point.target).is_some_and(|(a, b)| a.is_same_place(&b))
+        };
+        on_a_line.contains(&scored.point.step) || visits.any(is_same)
+    };
+    // Without lines, each point has its measured speed.
+    let mut name = (!on_a_line.is_empty()).then(|| "no line".to_owned());
+    for scored in points.iter().filter(|scored| scored.point.kind.measures() && !is_on_a_line(scored)) {
+        let name = if on_a_line.is_empty() {
+            display.speed(scored.point.speed_corrected_rpm)
+        } else {
+            name.take().unwrap_or_default()
+        };
+        add(name, scored);
+    }
+    let mut document = Document::default();
+    document.text(format!(
+        "Points by corrected speed in {} and opening of the back-pressure valve, corrected flow in {}, h in W/(m2 K).",
+        units.speed, units.flow
+    ));
+    if let Some(map) = map {
+        let definition = map.efficiency.map(|definition| format!("; eta: {}", definition.description()));
+        let gas = map.gas.as_ref().map(|gas| format!("; gas: {gas}"));
+        let [definition, gas] = [definition, gas].map(Option::unwrap_or_default);
+        document.text(format!("Corrected to {}{definition}{gas}.", map.reference));
+    }
+    document.table(table);
+    document
+}
+
+/// Corrected speed of each line, rpm, and the steps on it: those of the map, or else steps with one target speed.
+fn speed_lines(points: &[ScoredPoint], map: Option<&CompressorMap>) -> Vec<(f64, Vec<usize>)> {
+    if let Some(map) = map {
+        let steps = |line: &SpeedLine| line.points.iter().map(|point| point.identified.step).collect();
+        return map.lines.iter().map(|line| (line.speed_corrected_rpm, steps(line))).collect();
+    }
+    let measured = points.iter().map(|scored| &scored.point).filter(|point| point.kind.measures());
+    let mut targeted: Vec<(f64, &IdentifiedPoint)> =
+        measured.filter_map(|point| Some((point.target?.speed_rpm, point))).collect();
+    targeted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let groups = targeted.chunk_by(|a, b| a.0 == b.0);
+    let line = |group: &[(f64, &IdentifiedPoint)]| {
+        let speed_rpm = mean(group.iter().map(|(_, point)| point.speed_corrected_rpm)).unwrap_or(f64::NAN);
+        (speed_rpm, group.iter().map(|(_, point)| point.step).collect())
+    };
+    groups.map(line).collect()
+}
+
+/// Number of points with each verdict, in a sentence.
+pub(crate) fn verdict_sentence<'a>(points: impl Iterator<Item = &'a IdentifiedPoint>) -> String {
+    let verdicts: Vec<Verdict> = points.map(|point| point.verdict).collect();
+    let count = |verdict| verdicts.iter().filter(|other| **other == verdict).count();
+    match (verdicts.len(), count(Verdict::Good)) {
+        (0, _) => "No point was identified.".to_owned(),
+        (1, 1) => "The point is good.".to_owned(),
+        (all, good) if all == good => format!("The points of all {all} steps are good."),
+        (all, good) => format!(
+            "The points of {good} of {all} steps are good, {} {}, {} {}.",
+            count(Verdict::Doubtful),
+            verdict_word(Verdict::Doubtful),
+            count(Verdict::Unusable),
+            verdict_word(Verdict::Unusable)
+        ),
+    }
+}
+
+/// A valve opening with three decimals; `-` if the recording does not contain it.
+pub(crate) fn opening(ratio: f64) -> String {
+    // Valves are set to a thousandth at best.
+    if ratio.is_finite() { ((1e3 * ratio).round() / 1e3).to_string() } else { "-".to_owned() }
+}
+
 /// The number of a point's step, from 1, and whether it is a repeat.
-pub fn step_name(point: &IdentifiedPoint) -> String {
+pub(crate) fn step_name(point: &IdentifiedPoint) -> String {
     match point.kind {
         StepKind::Point => step_number(point.step).to_string(),
         StepKind::Repeat => format!("{} repeat", step_number(point.step)),
@@ -129,10 +315,12 @@ pub fn step_name(point: &IdentifiedPoint) -> String {
     }
 }
 
-pub fn verdict_word(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::Good => "good",
-        Verdict::Doubtful => "doubtful",
-        Verdict::Unusable => "unusable",
-    }
+/// The last seconds of a step, over which readings are averaged.
+pub const END_S: f64 = 2.0;
+
+/// The mean of a channel over the last seconds of a step, in the channel's unit; `None` without readings.
+pub fn at_end(recording: &Recording, marker: &StepMarker, channel: Channel) -> Option<f64> {
+    let start_s = (marker.end_s - END_S).max(marker.start_s);
+    let values = recording.series.get(&channel)?.slice(start_s, marker.end_s).1;
+    mean(values).filter(|mean| mean.is_finite())
 }

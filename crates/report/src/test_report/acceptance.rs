@@ -1,27 +1,19 @@
 //! Energy balance of the points, and criteria of acceptance.
 
-use crate::formatting::markdown::{self, Align};
-use crate::point_results::end_readings::END_S;
+use crate::document::{Document, Table};
+use crate::point_results::points::END_S;
 use mapper_campaign::Campaign;
 use mapper_core::{Channel, DeclaredUncertainty, Recording, StepMarker, half_width_95, step_number};
 use mapper_observe::acceptance::{CriterionResult, judge_acceptance};
 use mapper_observe::energy_balance::{EnergyBalance, Gases, Power, energy_balance};
 use mapper_recording::score::ScoredPoint;
 use std::collections::BTreeMap;
-use std::fmt::Write;
-
-/// Columns of [`balance_rows`].
-pub const BALANCE_HEADS: [&str; 6] =
-    ["step", "compressor, W", "turbine, W", "oil, W", "water, W", "losses, W"];
 
 /// Meaning of the columns.
-pub const BALANCE_WORDS: &str = "Means of the last 2 s of each step, half widths of 95 % intervals from the declared sensors. Compressor: rise of \
+const BALANCE_WORDS: &str = "Means of the last 2 s of each step, half widths of 95 % intervals from the declared sensors. Compressor: rise of \
                                  the enthalpy of its air. Turbine: drop of the enthalpy of its gas. Losses: turbine minus the \
                                  others; until the housings are settled, heat that they store is part of them, and so are oil and water where they \
                                  are not measured.";
-
-/// Columns of [`acceptance_rows`].
-pub const ACCEPTANCE_HEADS: [&str; 5] = ["criterion", "limit, %", "largest, %", "result", "steps that fail"];
 
 /// The points and their readings.
 pub struct JudgedPoints<'a> {
@@ -48,7 +40,7 @@ fn balances<'a>(report: &JudgedPoints<'a>) -> Vec<(&'a StepMarker, EnergyBalance
 }
 
 /// A row for each point; none if the power of the turbine was not measured.
-pub fn balance_rows(report: &JudgedPoints<'_>) -> Vec<[String; 6]> {
+fn balance_rows(report: &JudgedPoints<'_>) -> Vec<[String; 6]> {
     let balances = balances(report);
     if balances.iter().all(|(_, balance)| balance.turbine.is_none()) {
         return Vec::new();
@@ -66,7 +58,7 @@ pub fn balance_rows(report: &JudgedPoints<'_>) -> Vec<[String; 6]> {
 }
 
 /// A row for each criterion of the campaign; none without criteria.
-pub fn acceptance_rows(report: &JudgedPoints<'_>) -> Vec<[String; 5]> {
+fn acceptance_rows(report: &JudgedPoints<'_>) -> Vec<[String; 5]> {
     let criteria = report.campaign.and_then(|campaign| campaign.acceptance.as_ref());
     let Some(criteria) = criteria else { return Vec::new() };
     let row = |judged: CriterionResult| {
@@ -92,7 +84,7 @@ pub fn acceptance_rows(report: &JudgedPoints<'_>) -> Vec<[String; 5]> {
 }
 
 /// Name, source and window of the campaign's criteria, a sentence.
-pub fn acceptance_words(report: &JudgedPoints<'_>) -> Option<String> {
+fn acceptance_words(report: &JudgedPoints<'_>) -> Option<String> {
     let criteria = report.campaign?.acceptance.as_ref()?;
     Some(format!(
         "{} ({}). Judged over the last {} s of each step; a fluctuation is the highest minus the lowest reading over the mean.",
@@ -100,18 +92,23 @@ pub fn acceptance_words(report: &JudgedPoints<'_>) -> Option<String> {
     ))
 }
 
-/// Both sections; empty if there is nothing to show.
-pub(crate) fn acceptance_sections(report: &JudgedPoints<'_>) -> String {
-    let mut text = String::new();
-    let balance = balance_rows(report);
-    // Writing to a String cannot fail.
-    if !balance.is_empty() {
-        let _ = writeln!(text, "\n## Energy balance\n\n{BALANCE_WORDS}\n");
-        text.push_str(&markdown::table(&BALANCE_HEADS, Align::Right, balance));
+/// Criteria and results; empty without criteria.
+pub(crate) fn acceptance_section(report: &JudgedPoints<'_>) -> Document {
+    let mut document = Document::default();
+    let heads = ["criterion", "limit, %", "largest, %", "result", "steps that fail"];
+    document.text(acceptance_words(report).unwrap_or_default());
+    document.table(Table::new(heads).with_texts([3, 4]).rows(acceptance_rows(report)));
+    document
+}
+
+/// The energy balance of each point; empty if the power of the turbine was not measured.
+pub(crate) fn balance_section(report: &JudgedPoints<'_>) -> Document {
+    let mut document = Document::default();
+    let rows = balance_rows(report);
+    if !rows.is_empty() {
+        let heads = ["step", "compressor, W", "turbine, W", "oil, W", "water, W", "losses, W"];
+        document.text(BALANCE_WORDS);
+        document.table(Table::new(heads).rows(rows));
     }
-    if let Some(sentence) = acceptance_words(report) {
-        let _ = writeln!(text, "\n## Acceptance\n\n{sentence}\n");
-        text.push_str(&markdown::table(&ACCEPTANCE_HEADS, Align::Left, acceptance_rows(report)));
-    }
-    text
+    document
 }

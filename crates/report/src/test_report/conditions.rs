@@ -1,20 +1,19 @@
-//! Declared conditions of rig and cell compared with the readings.
+//! Declared conditions of rig and cell compared with the readings, and the instruments.
 
-use crate::formatting::display::Display;
-use crate::point_results::end_readings::at_end;
+use crate::document::{Document, Table};
+use crate::formatting::Display;
+use crate::point_results::points::at_end;
 use mapper_campaign::Campaign;
-use mapper_core::{Channel, Recording};
+use mapper_core::{Channel, DeclaredUncertainty, Recording, half_width_95};
 use mapper_numerics::statistics::mean;
-
-/// Columns of [`condition_rows`].
-pub const CONDITION_HEADS: [&str; 6] = ["condition", "declared", "mean", "min", "max", "unit"];
+use std::collections::BTreeMap;
 
 /// A row for each condition with readings: name, declared value, and mean, minimum and maximum of its readings at the ends of the steps.
-pub fn condition_rows(
+pub(crate) fn condition_table(
     campaign: Option<&Campaign>,
     recording: &Recording,
     display: &Display,
-) -> Vec<[String; 6]> {
+) -> Table {
     let boundary = campaign.map(|campaign| &campaign.boundary);
     // A condition that follows the compressor's outlet has no single value.
     let follows = campaign.map(|campaign| campaign.follow_outlet).unwrap_or_default();
@@ -46,5 +45,138 @@ pub fn condition_rows(
             display.unit_of(channel).to_owned(),
         ])
     });
-    rows.collect()
+    Table::new(["condition", "declared", "mean", "min", "max", "unit"])
+        .caption("Conditions read at the ends of the steps")
+        .with_texts([5])
+        .rows(rows)
+}
+
+/// Meaning of the columns.
+const INSTRUMENT_WORDS: &str = "Half widths of 95 % intervals, as declared: noise of one sample, offset left after calibration, gain; \
+                                    temperatures in K. As used: the offset that the isothermal zero leaves, where there was one. \
+                                    `-`: it is not declared.";
+
+/// The instruments and their calibration register. `used`: the uncertainties of the identification; `tested_at`: start of the test.
+pub(crate) fn instruments_section(
+    campaign: &Campaign,
+    used: &BTreeMap<Channel, DeclaredUncertainty>,
+    tested_at: Option<&str>,
+    display: &Display,
+) -> Document {
+    let mut document = Document::default();
+    document.text(INSTRUMENT_WORDS);
+    let heads = [
+        "sensor",
+        "reads",
+        "unit",
+        "noise +/-",
+        "offset +/-",
+        "as used +/-",
+        "gain +/- %",
+        "tap or probe",
+        "last calibration",
+    ];
+    let instruments = Table::new(heads).caption("Instruments").with_texts([1, 2, 7, 8]);
+    document.table(instruments.rows(instrument_rows(campaign, used, display)));
+    let heads = ["sensor", "certificate", "laboratory", "calibrated", "due", "range", "U (k = 2)"];
+    let register = Table::new(heads).caption("Calibration register").all_texts();
+    document.table(register.rows(register_rows(campaign, tested_at, display)));
+    document
+}
+
+/// A row for each sensor of the campaign. `used`: the uncertainties of the identification.
+fn instrument_rows(
+    campaign: &Campaign,
+    used: &BTreeMap<Channel, DeclaredUncertainty>,
+    display: &Display,
+) -> Vec<[String; 9]> {
+    let row = |(channel, sensor): (&Channel, &mapper_campaign::campaign::SensorDeclaration)| {
+        let half = |sigma: f64| {
+            display.difference(*channel, half_width_95(sigma)).map_or_else(dash_cell, two_figures)
+        };
+        let declared = &sensor.declared;
+        let used = used.get(channel).map_or_else(dash_cell, |used| half(used.offset_sigma));
+        let place = match (sensor.static_tap_pipe_diameter_m, sensor.probe_diameter_m) {
+            (Some(pipe_m), _) => format!("static tap, pipe {:.1} mm", 1e3 * pipe_m),
+            (None, tip_m) if tip_m > 0.0 => format!("probe {:.1} mm", 1e3 * tip_m),
+            (None, _) if matches!(channel, Channel::P1 | Channel::P2) => "total".to_owned(),
+            _ => dash_cell(),
+        };
+        let several = sensor.redundant.as_ref().map(|_| " (several)").unwrap_or_default();
+        let dates = sensor.calibrations.iter().flatten().map(|calibration| calibration.date);
+        [
+            channel.to_string(),
+            format!("{}{several}", channel.info().description),
+            display.difference_unit(*channel).to_owned(),
+            half(declared.noise_sigma),
+            half(declared.offset_sigma),
+            used,
+            match half_width_95(declared.gain_sigma_ratio) {
+                gain if gain > 0.0 => two_figures(100.0 * gain),
+                _ => dash_cell(),
+            },
+            place,
+            dates.max().map_or_else(|| "not stated".to_owned(), |date| date.to_string()),
+        ]
+    };
+    campaign.sensors.iter().map(row).collect()
+}
+
+/// A row for each sensor whose calibration states more than its day. `tested_at`: start of the test, from its day on.
+fn register_rows(campaign: &Campaign, tested_at: Option<&str>, display: &Display) -> Vec<[String; 7]> {
+    let mut rows = Vec::new();
+    for (&channel, declaration) in &campaign.sensors {
+        for (_, sensor, calibration) in declaration.calibrated(channel) {
+            let Some(calibration) = calibration.filter(|certificate| certificate.is_certified()) else {
+                continue;
+            };
+            let text = |value: &Option<String>| value.clone().unwrap_or_else(dash_cell);
+            let reading = |value: f64| display.shown_reading(channel, value);
+            rows.push([
+                sensor,
+                text(&calibration.certificate),
+                text(&calibration.laboratory),
+                calibration.date.to_string(),
+                calibration.due.map_or_else(dash_cell, |due| {
+                    let due = due.to_string();
+                    let is_past = tested_at.is_some_and(|at| at.get(..due.len()) > Some(due.as_str()));
+                    if is_past { format!("{due}, expired") } else { due }
+                }),
+                calibration.range.map_or_else(dash_cell, |(min, max)| {
+                    format!("{} to {} {}", reading(min), reading(max), display.unit_of(channel))
+                }),
+                calibration
+                    .uncertainty
+                    .and_then(|expanded| display.difference(channel, expanded))
+                    .map_or_else(dash_cell, |expanded| {
+                        format!("{} {}", two_figures(expanded), display.difference_unit(channel))
+                    }),
+            ]);
+        }
+    }
+    rows
+}
+
+fn dash_cell() -> String {
+    "-".to_owned()
+}
+
+/// Two significant figures without an exponent, enough for an uncertainty.
+fn two_figures(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return dash_cell();
+    }
+    let decimals = (1.0 - value.abs().log10().floor()).clamp(0.0, 9.0) as usize;
+    format!("{value:.decimals$}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_uncertainty_has_two_figures() {
+        let shown = [0.000294, 0.0588, 0.49, 1.96, 58.8, 0.0].map(two_figures);
+        assert_eq!(shown, ["0.00029", "0.059", "0.49", "2.0", "59", "-"]);
+    }
 }

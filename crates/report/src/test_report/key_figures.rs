@@ -1,11 +1,13 @@
-//! Range and uncertainty of a map, in a few sentences.
+//! Range and uncertainty of a map, the end of its run, and the sizes that its campaign assumes.
 
-use crate::formatting::display::Display;
-use crate::formatting::duration::duration;
-use mapper_campaign::Campaign;
-use mapper_core::{CompressorMap, IdentifiedPoint, Plan, Verdict};
+use crate::document::Document;
+use crate::formatting::{Display, duration, significant_digits};
+use crate::message::Message;
+use mapper_campaign::{AssumedSize, Campaign, internal_area_sigma_ratio};
+use mapper_core::{CompressorMap, IdentifiedPoint, Method, Plan, RunEnding, Trip, Verdict};
 use mapper_numerics::statistics::median;
 use mapper_recording::score::ScoredPoint;
+use std::path::Path;
 
 /// Measured range, uncertainty and planned duration; `None` without a map.
 pub fn key_figures(
@@ -74,4 +76,105 @@ fn certainty<'a>(points: impl Iterator<Item = &'a IdentifiedPoint>) -> Option<St
     Some(format!(
         " Its efficiencies are known within +/- {median_half_width:.1} points (95 %) at half of the usable points, within +/- {widest:.1} at all of them."
     ))
+}
+
+/// Where the points of a report come from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PointsOrigin {
+    /// A run.
+    Run(RunEnding),
+    /// Recordings.
+    Recordings(Method),
+}
+
+impl PointsOrigin {
+    /// Whether every planned step is among the points.
+    pub(crate) fn is_complete(&self) -> bool {
+        !matches!(self, PointsOrigin::Run(ending) if *ending != RunEnding::Completed)
+    }
+
+    /// One sentence.
+    pub(crate) fn sentence(&self) -> String {
+        match self {
+            PointsOrigin::Run(ending) => ending.message(),
+            PointsOrigin::Recordings(method) => format!("Identified by the method `{method}`."),
+        }
+    }
+}
+
+impl Message for RunEnding {
+    fn message(&self) -> String {
+        let stop = match self {
+            RunEnding::Completed => return "Completed.".to_owned(),
+            RunEnding::Drifted { reason } => format!("({reason})"),
+            RunEnding::Interrupted { t_s } => format!("by the operator at {t_s:.0} s"),
+            RunEnding::Tripped(Trip { t_s, reason, .. }) => format!("by a guard at {t_s:.1} s ({reason})"),
+            // A script's error shows its source line below the first line.
+            RunEnding::Failed { reason } => {
+                format!("by a fault ({})", reason.lines().next().unwrap_or_default())
+            }
+        };
+        format!("Stopped {stop}: the map is not complete.")
+    }
+}
+
+/// The assumed sizes in one sentence, by name; `None` if the campaign gives all of them.
+pub(crate) fn assumed_sentence(campaign: &Campaign) -> Option<String> {
+    sentence_with(campaign, |size| size.name)
+}
+
+fn sentence_with(campaign: &Campaign, name: fn(&AssumedSize) -> &str) -> Option<String> {
+    let sizes = &campaign.machine.assumed;
+    if sizes.is_empty() {
+        return None;
+    }
+    let named: Vec<String> = sizes.iter().map(|size| size_text(name(size), size)).collect();
+    let wheel_mm = 1e3 * campaign.machine.params.compressor.wheel_diameter_m;
+    let sigma_ratio = internal_area_sigma_ratio(sizes);
+    let widened = if sigma_ratio > 0.0 {
+        format!(
+            "; the intervals of h include an uncertainty of {:.0} % (1 sigma) of the internal area of the compressor",
+            100.0 * sigma_ratio
+        )
+    } else {
+        String::new()
+    };
+    Some(format!(
+        "assumed, from the machine of Burke et al. scaled to a wheel of {} mm: {}{widened}",
+        significant_digits(wheel_mm, 3),
+        named.join(", ")
+    ))
+}
+
+/// The same by keys of the campaign.
+pub(crate) fn assumed_keys(campaign: &Campaign) -> Option<String> {
+    sentence_with(campaign, |size| &size.key)
+}
+
+/// The files of a first campaign, and the next commands.
+pub fn first_campaign(
+    campaign: &Path,
+    map: &Path,
+    channels: Option<&Path>,
+    points: usize,
+    assumed: &[AssumedSize],
+) -> Document {
+    let mut document = Document::default();
+    let mut files = vec![
+        ("campaign", format!("{} ({points} points)", campaign.display())),
+        ("map", map.display().to_string()),
+    ];
+    files.extend(channels.map(|channels| ("channels", channels.display().to_string())));
+    document.facts("", files);
+    document.text(format!(
+        "{} sizes of the machine are assumed from its wheel: they are listed in the campaign as comments. Correct the ones that you know.",
+        assumed.len()
+    ));
+    document.text(format!("Next: mapper check {}", campaign.display()));
+    document
+}
+
+fn size_text(name: &str, size: &AssumedSize) -> String {
+    let unit = if size.unit.is_empty() { String::new() } else { format!(" {}", size.unit) };
+    format!("{name} {}{unit}", significant_digits(size.value, 3))
 }

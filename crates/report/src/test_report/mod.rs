@@ -1,13 +1,8 @@
 //! The test report of a run and its sections: key figures, conditions, instruments, zero, drift, surge and assumptions.
 
 pub(crate) mod acceptance;
-pub(crate) mod assumed_text;
 pub(crate) mod conditions;
-pub(crate) mod ending_text;
-pub(crate) mod instruments;
 pub(crate) mod key_figures;
-pub(crate) mod repeated_jumps;
 pub(crate) mod run_report;
-pub(crate) mod sensors_text;
 pub(crate) mod surge_text;
-pub(crate) mod zero_text;
+pub(crate) mod zero_and_sensors;

@@ -1,41 +1,30 @@
-//! The test report of a run, as Markdown.
+//! The test report of a run or of identified recordings: one document for the Markdown file and for the page.
 
-use crate::diagnosis::correction_text::{CORRECTION_CAPTION, CORRECTION_HEADS, correction_rows};
-use crate::formatting::display::Display;
-use crate::formatting::duration::duration;
-use crate::formatting::markdown::{self, Align};
+use crate::diagnosis::gap_results::correction_table;
+use crate::document::{Document, Table};
+use crate::formatting::{Display, duration};
+use crate::message::Message;
+use crate::page::widgets::{OtherRun, map_widget, plan_widget, step_widget};
+use crate::plan::plan_document::executed_plan_table;
+use crate::point_results::agreement::{disagreement_text, shared_errors_text};
 use crate::point_results::budget_table::budget_section;
-use crate::point_results::disagreement::disagreement_text;
-use crate::point_results::lines_of_points::verdict_sentence;
-use crate::point_results::point_table::{point_cells, point_groups, point_heads};
 use crate::point_results::point_warnings::doubts;
-use crate::point_results::points::score_text;
-use crate::point_results::result_remark_text::result_remark_text;
-use crate::point_results::shared_errors::shared_errors_text;
-use crate::test_report::acceptance::{JudgedPoints, acceptance_sections};
-use crate::test_report::assumed_text::assumed_sentence;
-use crate::test_report::conditions::{CONDITION_HEADS, condition_rows};
-use crate::test_report::ending_text::PointsOrigin;
-use crate::test_report::instruments::{
-    INSTRUMENT_HEADS, INSTRUMENT_WORDS, REGISTER_HEADS, instrument_rows, register_rows,
-};
-use crate::test_report::key_figures::key_figures;
-use crate::test_report::repeated_jumps::repeated_jumps_text;
-use crate::test_report::surge_text::{SurgeReport, surge_text};
-use crate::test_report::zero_text::{ZERO_HEADS, zero_rows, zero_words};
+use crate::point_results::points::{END_S, point_tables, verdict_sentence};
+use crate::point_results::summary::{PointResults, score_sentences};
+use crate::test_report::acceptance::{JudgedPoints, acceptance_section, balance_section};
+use crate::test_report::conditions::{condition_table, instruments_section};
+use crate::test_report::key_figures::{PointsOrigin, assumed_sentence, key_figures};
+use crate::test_report::zero_and_sensors::zero_sentence;
 use mapper_campaign::Campaign;
 use mapper_core::{
-    Channel, CompressorMap, DeclaredUncertainty, Event, IdentifiedPoint, Method, Plan, PointBudgets,
-    Recording, ReferenceState, ResultRemark, terminal_text,
+    Channel, DeclaredUncertainty, Event, Method, Plan, PointBudgets, Recording, ReferenceState, Verdict,
 };
+use mapper_diagnose::gap::Diagnosed;
 use mapper_diagnose::gap::PointCorrection;
-use mapper_identify::{DynamicEfficiency, ZeroOutcome};
-use mapper_maps::RepeatedJump;
-use mapper_observe::FusedChannel;
+use mapper_identify::{T2History, ZeroOutcome};
 use mapper_observe::energy_balance::Gases;
-use mapper_recording::score::{ScoreSummary, ScoredPoint};
+use mapper_recording::score::summarise;
 use std::collections::BTreeMap;
-use std::fmt::Write;
 
 /// Content of a test report.
 pub struct RunReport<'a> {
@@ -49,8 +38,8 @@ pub struct RunReport<'a> {
     pub tested_at: Option<&'a str>,
     /// Program, version and commit.
     pub program: &'a str,
-    /// The map; `None` if there is none.
-    pub map: Option<&'a CompressorMap>,
+    /// Points, map and what they share.
+    pub results: PointResults<'a>,
     /// The readings, as identified.
     pub recording: &'a Recording,
     /// Uncertainty of each channel used in the identification.
@@ -59,8 +48,6 @@ pub struct RunReport<'a> {
     pub sources: &'a [ReportSource],
     /// End of the run, or origin of the points.
     pub origin: PointsOrigin,
-    /// Further remarks: on the recording, the method and the map.
-    pub remarks: &'a [ResultRemark],
     /// Reference state of corrected quantities.
     pub reference: ReferenceState,
     /// The gases, with the definition of the efficiencies.
@@ -71,44 +58,18 @@ pub struct RunReport<'a> {
     pub alpha_area_ratio: f64,
     /// Events during the run.
     pub events: &'a [Event],
-    /// Identified points, repeats included.
-    pub points: &'a [ScoredPoint],
-    /// Jumps that were made more than once.
-    pub repeats: &'a [RepeatedJump],
-    /// Results of the dynamic method for the same steps, if another method was used.
-    pub dynamic: &'a [DynamicEfficiency],
-    /// Result of the isothermal zero.
-    pub zero: &'a ZeroOutcome,
-    /// Result for channels with several sensors.
-    pub sensors: &'a [FusedChannel],
     /// Uncertainty budgets of the points.
     pub budgets: &'a [PointBudgets],
     /// Efficiencies before and after a correction for the causes of a gap; empty without one.
     pub corrections: &'a [PointCorrection],
-    /// Deviations of the points from the simulator's truth; `None` on a real rig.
-    pub score: Option<&'a ScoreSummary>,
-    /// Result of the search for surge; `None` if there was none.
-    pub surge: Option<&'a SurgeReport>,
     /// Whether a picture of the map is next to the report as `map.svg`.
     pub has_picture: bool,
-}
-
-impl<'a> RunReport<'a> {
-    /// The campaign's display units, or the usual ones.
-    pub(crate) fn display(&self) -> Display {
-        self.campaign.map_or_else(Display::default, |campaign| Display::new(&campaign.display))
-    }
-
-    /// The points without their truth.
-    pub(crate) fn identified(&self) -> impl Iterator<Item = &'a IdentifiedPoint> + use<'a> {
-        self.points.iter().map(|scored| &scored.point)
-    }
-
-    /// The points and their readings, for energy balance and acceptance.
-    pub(crate) fn judged_points(&self) -> JudgedPoints<'a> {
-        let RunReport { campaign, recording, gases, points, used, .. } = *self;
-        JudgedPoints { campaign, recording, gases, points, used }
-    }
+    /// T2 computed from the numbers of each point.
+    pub t2_histories: &'a [T2History],
+    /// The diagnosis of the gap to the nominal model, if there is one.
+    pub gap: Option<&'a Diagnosed>,
+    /// Maps for comparison.
+    pub others: &'a [OtherRun<'a>],
 }
 
 /// A recording that points were identified from.
@@ -124,119 +85,225 @@ pub struct ReportSource {
     pub steps: usize,
 }
 
-/// The picture of the map, the only link.
-const PICTURE: &str = "![map](map.svg)\n\n";
+impl RunReport<'_> {
+    /// The campaign's display units, or the usual ones.
+    pub(crate) fn display(&self) -> Display {
+        self.campaign.map_or_else(Display::default, |campaign| Display::new(&campaign.display))
+    }
 
-/// The report as Markdown. Names and messages from outside are in it, but neither HTML, links nor colours.
-pub fn run_report(report: &RunReport<'_>) -> String {
-    let text = terminal_text(&markdown_report(report));
-    let inert = markdown::without_html_and_links;
-    inert(&text).replacen(&inert(PICTURE), PICTURE, 1)
-}
+    /// The report as Markdown.
+    pub fn markdown(&self) -> String {
+        let mut document = self.cover();
+        document.verdict(self.verdict(), self.verdict_sentence());
+        document.append(self.summary());
+        document.append(self.body());
+        let mut report = Document::default();
+        report.section(self.title(), document);
+        // The title is the only heading of level 1.
+        report.markdown_at(1)
+    }
 
-fn markdown_report(report: &RunReport<'_>) -> String {
-    let RunReport {
-        machine,
-        campaign,
-        sources,
-        ref origin,
-        remarks,
-        events,
-        points,
-        repeats,
-        dynamic,
-        sensors,
-        score,
-        surge,
-        has_picture,
-        recording,
-        ..
-    } = *report;
-    let display = report.display();
-    // Writing to a String cannot fail, here and below.
-    let mut text = format!("# Compressor map of {machine}\n\n{}\n", facts(&cover_facts(report)));
-    if let Some(disagreement) = disagreement_text(points, dynamic, &display) {
-        let _ = writeln!(text, "**{}**\n", disagreement.trim_end());
+    pub(crate) fn title(&self) -> String {
+        format!("Compressor map of {}", self.machine)
     }
-    let verdict = verdict_sentence(report.identified());
-    let _ = writeln!(text, "**{verdict}** {}\n", origin.sentence());
-    let remark_texts = |concerns_all: bool| {
-        let those = remarks.iter().filter(|remark| remark.concerns_all_points() == concerns_all);
-        those.map(result_remark_text).collect::<Vec<_>>()
-    };
-    let (premises, others) = (remark_texts(true), remark_texts(false));
-    for premise in premises {
-        let _ = writeln!(text, "**All efficiencies depend on this:** {premise}.\n");
+
+    /// Customer, machine, place, date and persons; the definition of the numbers.
+    pub(crate) fn cover(&self) -> Document {
+        let mut document = Document::default();
+        document.facts("", cover_facts(self));
+        if self.is_simulated() {
+            document.strong("Simulated rig: nothing was measured on a real machine.");
+        }
+        document.text(format!(
+            "Efficiency is isentropic, total to total ({}); corrected to {}; method {}.",
+            self.gases.compressor.efficiency.description(),
+            self.reference,
+            self.method
+        ));
+        document
     }
-    if let Some(words) = key_figures(report.map, points, campaign, report.plan) {
-        let _ = writeln!(text, "{words}\n");
+
+    /// Whether the recording contains the simulator's truth.
+    fn is_simulated(&self) -> bool {
+        self.results.points.iter().any(|scored| scored.truth.is_some())
     }
-    if !others.is_empty() {
-        let _ = writeln!(text, "{}", others.iter().map(|remark| format!("- {remark}\n")).collect::<String>());
+
+    /// Good if the map can be used as it is, without a condition.
+    pub(crate) fn verdict(&self) -> Verdict {
+        let PointResults { points, map, remarks, .. } = self.results;
+        let is_clean = !points.is_empty()
+            && points.iter().all(|scored| scored.point.verdict == Verdict::Good)
+            && map.is_some()
+            && self.origin.is_complete()
+            && !remarks.iter().any(mapper_core::ResultRemark::concerns_all_points);
+        if is_clean { Verdict::Good } else { Verdict::Doubtful }
     }
-    if has_picture {
-        text.push_str(PICTURE);
+
+    pub(crate) fn verdict_sentence(&self) -> String {
+        verdict_sentence(self.results.identified())
     }
-    text.push_str("## Conditions\n\n");
-    text.push_str(&facts(&condition_facts(report)));
-    let rows = condition_rows(campaign, recording, &display);
-    if !rows.is_empty() {
-        text.push_str("\nRead at the ends of the steps:\n\n");
-        text.push_str(&markdown::table(&CONDITION_HEADS, Align::Left, &rows));
+
+    /// What the results depend on, the key figures, the recommended actions and the remarks.
+    pub(crate) fn summary(&self) -> Document {
+        let mut document = Document::default();
+        document.text(self.origin.sentence());
+        let concern_all =
+            |all: bool| self.results.remarks.iter().filter(move |remark| remark.concerns_all_points() == all);
+        for premise in concern_all(true) {
+            document.strong(format!("All efficiencies depend on this: {}", premise.message()));
+        }
+        document.text(
+            key_figures(self.results.map, self.results.points, self.campaign, self.plan).unwrap_or_default(),
+        );
+        let actions = self.recommended_actions();
+        if !actions.is_empty() {
+            document.text("Before the map is used:");
+            document.list(actions);
+        } else if self.verdict() == Verdict::Good {
+            document.text("Nothing needs attention before the map is used.");
+        }
+        if concern_all(false).next().is_some() {
+            document.text("Remarks:");
+            document.list(concern_all(false).map(Message::message));
+        }
+        document
     }
-    text.push('\n');
-    if !sources.is_empty() {
+
+    /// Actions in order of importance, each a sentence.
+    fn recommended_actions(&self) -> Vec<String> {
+        let PointResults { points, dynamic, zero, .. } = self.results;
+        let mut actions: Vec<String> = Vec::new();
+        actions.extend(disagreement_text(points, dynamic, &self.display()));
+        if matches!(zero, ZeroOutcome::Refused(_)) {
+            actions.extend(zero_sentence(zero));
+        }
+        for verdict in [Verdict::Unusable, Verdict::Doubtful] {
+            // Findings about the most steps come first. Three sentences are enough here; the rest is listed with the notes.
+            let mut warnings = doubts(self.results.identified().filter(|point| point.verdict == verdict));
+            warnings.sort_by_key(|doubt| std::cmp::Reverse(doubt.count()));
+            actions.extend(
+                warnings.iter().take(3).map(|doubt| format!("{}: {}", doubt.steps(), doubt.message())),
+            );
+        }
+        actions
+    }
+
+    /// All sections.
+    pub(crate) fn body(&self) -> Document {
+        let display = self.display();
+        let mut document = Document::default();
+        document.named_section("map", "Map", self.map_section());
+        let mut step = Document::default();
+        step.widget(step_widget(&self.results, &display), "");
+        document.named_section("step", "Transient of a point", step);
+        document.named_section("conditions", "Conditions and instruments", self.conditions(&display));
+        document.named_section("points", "Points by speed line", self.points(&display));
+        let mut corrections = Document::default();
+        corrections.table(correction_table(self.corrections));
+        document.named_section("corrections", "Before and after the correction", corrections);
+        document.named_section("budget", "Uncertainty budget", budget_section(self.budgets));
+        document.named_section("plan", "Executed plan", self.executed_plan(&display));
+        if let Some(diagnosed) = self.gap {
+            document.named_section(
+                "gap",
+                "Gap to the nominal model",
+                crate::diagnosis::gap_text::gap_document(diagnosed),
+            );
+        }
+        document.named_section("notes", "Notes", self.notes(&display));
+        let mut provenance = Document::default();
+        provenance.facts("", provenance_facts(self));
+        document.named_section("provenance", "Provenance", provenance);
+        document
+    }
+
+    fn map_section(&self) -> Document {
+        let mut document = Document::default();
+        // The only link of the report.
+        let picture = if self.has_picture { "![map](map.svg)" } else { "" };
+        document.widget(map_widget(&self.results, self.others, &self.display()), picture);
+        document
+    }
+
+    fn conditions(&self, display: &Display) -> Document {
+        let mut document = Document::default();
+        document.facts("Test", condition_facts(self));
+        document.table(condition_table(self.campaign, self.recording, display));
         // Steps are counted through all recordings.
-        let before = sources.iter().scan(0, |sum, source| Some(std::mem::replace(sum, *sum + source.steps)));
-        let rows: Vec<[String; 4]> =
-            sources.iter().zip(before).map(|(source, before)| source_row(source, before)).collect();
-        text.push_str(&markdown::table(&["recording", "begins", "lasts", "steps"], Align::Left, &rows));
-        text.push('\n');
+        let before =
+            self.sources.iter().scan(0, |sum, source| Some(std::mem::replace(sum, *sum + source.steps)));
+        let rows = self.sources.iter().zip(before).map(|(source, before)| source_row(source, before));
+        let heads = ["recording", "begins", "lasts", "steps"];
+        document.table(Table::new(heads).caption("Recordings").all_texts().rows(rows));
+        let RunReport { campaign, recording, gases, used, .. } = *self;
+        let judged = JudgedPoints { campaign, recording, gases, points: self.results.points, used };
+        document.section("Acceptance", acceptance_section(&judged));
+        document.folded_section("Energy balance", balance_section(&judged));
+        if let Some(campaign) = campaign {
+            document.section("Instruments", instruments_section(campaign, used, self.tested_at, display));
+        }
+        document
     }
-    if let Some(campaign) = campaign {
-        text.push_str(&instruments_section(campaign, report, &display));
+
+    fn points(&self, display: &Display) -> Document {
+        let mut document = Document::default();
+        document.text(format!(
+            "+/- covers the 95 % interval, whose ends are in points.json: noise, declared sensor offsets, and the estimated error of the \
+             method while the flow changes; those of flow and pressure ratio are of their sensors. dT2: change of T2 in the window. T2, P2 \
+             and T3 are means over the last {END_S} s of the step, when the gas has settled and the housing has not."
+        ));
+        document.text(shared_errors_text(self.results.identified(), display).unwrap_or_default());
+        let tables = point_tables(self.results.map, self.results.points, self.recording, display);
+        tables.into_iter().for_each(|table| document.table(table));
+        document
     }
-    if !sensors.is_empty() {
-        let lines: String = sensors.iter().map(|fused| format!("- {fused}\n")).collect();
-        let _ = writeln!(
-            text,
-            "## Several sensors\n\nFused by their declared uncertainty (one standard deviation).\n\n{lines}"
+
+    fn executed_plan(&self, display: &Display) -> Document {
+        let mut document = Document::default();
+        let Some(plan) = self.plan else {
+            document.text("The run has no plan; its steps were found in the recording.");
+            return document;
+        };
+        let was_run = |index: usize| self.recording.steps.iter().any(|marker| marker.index == index);
+        let missing = match plan.steps.iter().filter(|step| !was_run(step.index)).count() {
+            0 => String::new(),
+            missing => format!("; {missing} of {} steps were not run", plan.steps.len()),
+        };
+        document.text(format!(
+            "Order `{}`, {} planned{missing}. The thermal gradient of a step, dTc, is the change of the housing temperature within the \
+             window that was used; sigma is one standard error.",
+            plan.objective,
+            duration(plan.duration_s())
+        ));
+        document.widget(plan_widget(), "");
+        document.table(executed_plan_table(plan, self.recording, self.results.points, display));
+        document
+    }
+
+    fn notes(&self, display: &Display) -> Document {
+        let mut document = Document::default();
+        if let Some(score) = summarise(self.results.points) {
+            let mut body = Document::default();
+            body.list(score_sentences(&score));
+            document.section("Comparison with the simulator's truth", body);
+        }
+        document.append(self.results.common_parts(display, true));
+        let mut warnings = Document::default();
+        warnings.list(
+            doubts(self.results.identified())
+                .iter()
+                .map(|doubt| format!("{} (`{}`): {}", doubt.steps(), doubt.code, doubt.message())),
         );
+        let mut events = Document::default();
+        events.list(self.events.iter().map(|event| format!("{:.1} s: {}", event.t_s, event.message)));
+        for (heading, mut body) in [("Warnings and remarks", warnings), ("Events", events)] {
+            if body.is_empty() {
+                body.text("None.");
+            }
+            document.section(heading, body);
+        }
+        document
     }
-    if let Some(score) = score {
-        let _ = writeln!(text, "{}", score_text(score));
-    }
-    points_section(&mut text, &display, report);
-    if !report.corrections.is_empty() {
-        let _ = writeln!(text, "\n## Before and after the correction\n\n{CORRECTION_CAPTION}\n");
-        text.push_str(&markdown::table(&CORRECTION_HEADS, Align::Right, correction_rows(report.corrections)));
-    }
-    text.push_str(&budget_section(report.budgets));
-    text.push_str(&acceptance_sections(&report.judged_points()));
-    if let Some(surge) = surge {
-        let _ = write!(text, "\n## Surge\n\n{}", surge_text(surge, &display));
-    }
-    if let Some(words) = zero_words(report.zero) {
-        let _ = writeln!(text, "\n## Isothermal zero\n\n{words}\n");
-        text.push_str(&markdown::table(&ZERO_HEADS, Align::Left, zero_rows(report.zero, &display)));
-    }
-    if !repeats.is_empty() {
-        let sentences = repeated_jumps_text(repeats, &display);
-        let _ = write!(
-            text,
-            "\n## Drift\n\nRepeats are not part of the map. Fixed offsets cancel in the changes between them.\n\n{}",
-            sentences.lines().map(|line| format!("- {line}\n")).collect::<String>()
-        );
-    }
-    text.push_str("\n## Events\n\n");
-    if events.is_empty() {
-        text.push_str("None.\n");
-    }
-    for event in events {
-        let _ = writeln!(text, "- {:.1} s: {}", event.t_s, event.message);
-    }
-    let _ = write!(text, "\n## Provenance\n\n{}", facts(&provenance_facts(report)));
-    text
 }
 
 /// A formatted time since 1970-01-01 UTC, ns; `None` for 0: simulated time starts there, and so does a log that knows
@@ -258,13 +325,8 @@ fn source_row(source: &ReportSource, before: usize) -> [String; 4] {
     ]
 }
 
-fn facts(rows: &[(&'static str, String)]) -> String {
-    let rows = rows.iter().map(|(what, value)| [(*what).to_owned(), value.clone()]);
-    markdown::table(&["", ""], Align::Left, rows)
-}
-
 /// Names and values of the cover: customer, machine, place, date and persons.
-pub fn cover_facts(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
+fn cover_facts(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
     let Some(campaign) = report.campaign else {
         return vec![("machine", report.machine.to_owned()), ("tested", stated(report.tested_at))];
     };
@@ -290,9 +352,9 @@ fn stated(value: Option<&str>) -> String {
 }
 
 /// The declared conditions of rig and cell: name and value in words.
-pub fn condition_facts(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
+fn condition_facts(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
     let mut rows = report.campaign.map(campaign_rows).unwrap_or_default();
-    if report.score.is_some()
+    if report.is_simulated()
         && let Some((_, rig)) = rows.iter_mut().find(|(what, _)| *what == "rig")
     {
         rig.push_str(" (simulated)");
@@ -304,7 +366,7 @@ pub fn condition_facts(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
 }
 
 /// Method and settings behind the numbers: name and value in words.
-pub fn provenance_facts(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
+fn provenance_facts(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
     let mut rows = vec![("program", report.program.to_owned())];
     rows.push(("identification", format!("{}, alpha_A = {}", report.method, report.alpha_area_ratio)));
     rows.extend(report.campaign.map(|campaign| ("campaign", campaign.name.clone())));
@@ -358,46 +420,5 @@ fn whole_duration(campaign: &Campaign, plan: &Plan) -> String {
             duration(soak.duration_s)
         ),
         None => duration(plan.duration_s()),
-    }
-}
-
-fn instruments_section(campaign: &Campaign, report: &RunReport<'_>, display: &Display) -> String {
-    let rows = instrument_rows(campaign, report.used, display);
-    let mut text = format!("## Instruments\n\n{INSTRUMENT_WORDS}\n\n");
-    text.push_str(&markdown::table(&INSTRUMENT_HEADS, Align::Left, &rows));
-    text.push('\n');
-    let register = register_rows(campaign, report.tested_at, display);
-    if !register.is_empty() {
-        text.push_str("### Calibration register\n\n");
-        text.push_str(&markdown::table(&REGISTER_HEADS, Align::Left, &register));
-        text.push('\n');
-    }
-    text
-}
-
-fn points_section(text: &mut String, display: &Display, report: &RunReport<'_>) {
-    text.push_str(
-        "## Points by speed line\n\nIntervals are 95 %: noise, declared sensor offsets, and the estimated error of the method while \
-         the flow changes. T2, P2 and T3 are means over the last 2 s of the step, when the gas has settled and the housing has not.\n\n",
-    );
-    if let Some(shared) = shared_errors_text(report.identified(), display) {
-        let _ = writeln!(text, "{shared}\n");
-    }
-    for group in point_groups(report.map, report.identified(), display) {
-        let rows = group
-            .points
-            .iter()
-            .map(|point| point_cells(report.recording, point, display).map(|cell| cell.text));
-        let _ = writeln!(text, "### {}\n", group.caption);
-        text.push_str(&markdown::table(&point_heads(display), Align::Right, rows));
-        text.push('\n');
-    }
-    text.push_str("## Doubts and remarks\n\n");
-    let doubts = doubts(report.identified());
-    for doubt in &doubts {
-        let _ = writeln!(text, "- {} ({}): {}", doubt.steps(), doubt.code, doubt.message());
-    }
-    if doubts.is_empty() {
-        text.push_str("None.\n");
     }
 }

@@ -1,10 +1,7 @@
-//! Measured surge-side ends, in words and as a table.
+//! Measured surge-side ends.
 
-use crate::formatting::display::Display;
-use crate::formatting::markdown::{self, Align};
-use crate::formatting::number::{number, percent};
-use crate::formatting::table::{COLUMNS, with_heads};
-use crate::formatting::wrapped::wrapped;
+use crate::document::{Document, Table};
+use crate::formatting::{Display, number, percent};
 use mapper_core::{SurgeFoundBy, SurgeMark, SurgeNotFound, half_width_95};
 use mapper_recording::score::ScoredMark;
 use serde::Serialize;
@@ -20,16 +17,28 @@ pub struct SurgeReport {
     pub surges: usize,
 }
 
-/// Marks of a search for surge, lines without a mark, and the number of surge events; Markdown.
-pub fn surge_text(surge: &SurgeReport, display: &Display) -> String {
-    let (heads, rows) = (surge_heads(&surge.marks, display), surge_rows(&surge.marks, display));
-    let table = markdown::table(&heads, Align::Right, rows);
-    let remarks_text: String = surge_remarks(surge).iter().map(|remark| format!("\n{remark}\n")).collect();
-    format!("{table}{remarks_text}")
+/// Marks of a search for surge, lines without a mark, and the number of surge events; `truth`: with the deviations of the marks from it.
+pub(crate) fn surge_section(surge: &SurgeReport, display: &Display, truth: bool) -> Document {
+    let truth = truth && surge.marks.iter().any(|scored| scored.truth_flow_corrected_kg_s.is_some());
+    let units = display.units();
+    let mut heads: Vec<&str> =
+        vec![&units.speed, &units.flow, "+/- %", "PR", "+/-", "nearest %", "openings", "found by"];
+    heads.extend(truth.then_some("error %"));
+    let mut document = Document::default();
+    document.text(
+        "Surge-side ends of the lines: corrected speed and flow, half widths of 95 % intervals, distance of the nearest point above in \
+         flow, number of openings tried.",
+    );
+    if truth {
+        document.text("error: difference from the simulator's truth.");
+    }
+    document.table(Table::new(heads).with_texts([7]).rows(surge_rows(&surge.marks, display, truth)));
+    surge_remarks(surge).into_iter().for_each(|remark| document.text(remark));
+    document
 }
 
 /// The number of surge events, and the lines without a mark, a sentence each.
-pub fn surge_remarks(surge: &SurgeReport) -> Vec<String> {
+fn surge_remarks(surge: &SurgeReport) -> Vec<String> {
     std::iter::once(times(surge.surges))
         .chain(surge.remarks.iter().map(|SurgeNotFound { target_speed_rpm, openings, enough }| match enough {
             true => format!(
@@ -42,60 +51,8 @@ pub fn surge_remarks(surge: &SurgeReport) -> Vec<String> {
         .collect()
 }
 
-/// Columns of [`surge_rows`].
-pub fn surge_heads(marks: &[ScoredMark], display: &Display) -> Vec<String> {
-    let mut heads = vec![
-        display.speed_head("corrected speed"),
-        display.flow_head("surge flow, corrected"),
-        "+/- % (95 %)".to_owned(),
-        "PR".to_owned(),
-        "+/- (95 %)".to_owned(),
-        "nearest point above it, %".to_owned(),
-        "openings".to_owned(),
-        "found by".to_owned(),
-    ];
-    if with_truth(marks) {
-        heads.push("error, %".to_owned());
-    }
-    heads
-}
-
-/// The same for a terminal of 80 columns. `truth`: whether to show the deviations of the marks from it.
-pub fn surge_columns_text(surge: &SurgeReport, display: &Display, truth: bool) -> String {
-    let shown = |scored: &ScoredMark| {
-        if truth { *scored } else { ScoredMark { truth_flow_corrected_kg_s: None, ..*scored } }
-    };
-    let marks: Vec<ScoredMark> = surge.marks.iter().map(shown).collect();
-    let marks = marks.as_slice();
-    let units = display.units();
-    let mut heads = [&units.speed, &units.flow, "+/- %", "PR", "+/-", "nearest %", "openings", "found by"]
-        .map(str::to_owned)
-        .to_vec();
-    if with_truth(marks) {
-        heads.push("error %".to_owned());
-    }
-    let mut table = with_heads(&heads);
-    for row in surge_rows(marks, display) {
-        table.add_row(row);
-    }
-    let words = "Surge-side ends of the lines: corrected speed and flow, half widths of 95 % intervals, distance of the nearest \
-                 point above in flow, number of openings tried.";
-    let mut text = format!("{}\n{table}\n\n", wrapped(words, COLUMNS, 0));
-    if with_truth(marks) {
-        text.push_str("error: difference from the simulator's truth.\n");
-    }
-    for remark in surge_remarks(surge) {
-        text.push_str(&wrapped(&remark, COLUMNS, 2));
-    }
-    text
-}
-
-fn with_truth(marks: &[ScoredMark]) -> bool {
-    marks.iter().any(|scored| scored.truth_flow_corrected_kg_s.is_some())
-}
-
 /// A row for each mark, in order of speed.
-pub fn surge_rows(marks: &[ScoredMark], display: &Display) -> Vec<Vec<String>> {
+fn surge_rows(marks: &[ScoredMark], display: &Display, truth: bool) -> Vec<Vec<String>> {
     let row = |ScoredMark { mark, truth_flow_corrected_kg_s }: &ScoredMark| {
         let flow_kg_s = mark.flow_corrected_kg_s;
         let mut row = vec![
@@ -108,8 +65,8 @@ pub fn surge_rows(marks: &[ScoredMark], display: &Display) -> Vec<Vec<String>> {
             mark.steps.to_string(),
             evidence_name(mark).to_owned(),
         ];
-        if with_truth(marks) {
-            row.push(percent(truth_flow_corrected_kg_s.map(|truth| flow_kg_s / truth - 1.0), 2));
+        if truth {
+            row.push(percent(truth_flow_corrected_kg_s.map(|true_kg_s| flow_kg_s / true_kg_s - 1.0), 2));
         }
         row
     };

@@ -20,7 +20,7 @@ use mapper_observe::FusedChannel;
 use mapper_physics::rig::effect::Effect;
 use mapper_physics::simulation::model::Model;
 use mapper_recording::{ChannelMap, ReadWarning};
-use mapper_report::page::gap_page;
+use mapper_report::gap_page;
 use serde_json::{Value, json};
 use std::path::Path;
 use std::slice;

@@ -11,8 +11,8 @@ use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::campaign::Date;
 use mapper_campaign::{Campaign, nominal_model};
 use mapper_core::{
-    Channel, CompressorMap, IdentifiedPoint, Method, PointBudgets, Recording, ResultRemark, StepMarker,
-    StepOrigin, ThermalModel, join_recordings,
+    Channel, CompressorMap, IdentifiedPoint, JsonMessages, Method, PointBudgets, Recording, ResultRemark,
+    StepMarker, StepOrigin, ThermalModel, join_recordings,
 };
 use mapper_diagnose::gap::PointCorrection;
 use mapper_identify::{
@@ -27,7 +27,7 @@ use mapper_recording::score::{
     PendingTruths, ScoreSummary, ScoredPoint, Truth, score, score_marks, with_truths,
 };
 use mapper_recording::{AmbientPressure, Barometer, ChannelMap};
-use mapper_report::{SurgeReport, result_remark_text, with_messages};
+use mapper_report::{Message, PointResults, SurgeReport};
 use mapper_runner::surge::SurgeMarks;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -74,6 +74,7 @@ pub struct Identified {
     #[serde(skip)]
     pub corrections: Vec<PointCorrection>,
     /// Other remarks.
+    #[serde(serialize_with = "mapper_core::json_messages::serialize")]
     pub remarks: Vec<ResultRemark>,
 }
 
@@ -84,8 +85,8 @@ impl Identified {
         value["recording"] = json!(recording);
         value["score"] = json!(self.score);
         value["recording_warnings"] = json!(warnings);
-        value["remarks"] = json!(self.remarks);
-        with_messages(value)
+        value["remarks"] = json!(JsonMessages(&self.remarks));
+        value
     }
 
     /// Content of the points file.
@@ -111,6 +112,26 @@ impl Identified {
         value
     }
 
+    /// The results for people. `remarks`: these, and further ones.
+    pub fn shown<'a>(
+        &'a self,
+        map: Option<&'a CompressorMap>,
+        repeats: &'a [RepeatedJump],
+        remarks: &'a [ResultRemark],
+    ) -> PointResults<'a> {
+        PointResults {
+            points: &self.points,
+            map,
+            dynamic: &self.dynamic,
+            repeats,
+            thermal: self.thermal.as_ref(),
+            zero: &self.zero,
+            sensors: &self.sensors,
+            surge: self.surge.as_ref(),
+            remarks,
+        }
+    }
+
     /// The gases of compressor and turbine.
     pub(crate) fn gases(&self) -> Gases {
         Gases { compressor: self.config.air, turbine: self.config.turbine_gas }
@@ -127,7 +148,7 @@ impl Identified {
     /// [`SessionError::NoPoints`] with the known facts, including the `warnings` of the reader.
     pub fn has_points(&self, warnings: &[String]) -> Result<(), SessionError> {
         let why: Vec<String> =
-            warnings.iter().cloned().chain(self.remarks.iter().map(result_remark_text)).collect();
+            warnings.iter().cloned().chain(self.remarks.iter().map(Message::message)).collect();
         if self.points.is_empty() { Err(SessionError::NoPoints(why.join("; "))) } else { Ok(()) }
     }
 

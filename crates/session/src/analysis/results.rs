@@ -10,13 +10,13 @@ use mapper_campaign::campaign::Outputs;
 use mapper_campaign::units::Kind;
 use mapper_core::{
     CompressorMap, ExportError, IdentifiedPoint, MapUnits, Method, Plan, ResultRemark, RunEnding,
+    with_sentences,
 };
 use mapper_identify::{T2History, t2_history};
 use mapper_maps::{MapFit, MapFitOptions, RepeatedJump};
 use mapper_recording::{ChannelMap, ReadOptions, ReadWarning, read_recording};
-use mapper_report::page::{OtherRun, RunPage, gap_part, run_page};
 use mapper_report::{
-    Display, PointsOrigin, ReportSource, RunReport, budget_csv, instant, run_report, with_messages,
+    Display, OtherRun, PointResults, PointsOrigin, ReportSource, RunReport, budget_csv, instant,
 };
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -245,8 +245,10 @@ impl Session<'_> {
             other_maps.iter().map(|(name, map)| OtherRun { name: name.clone(), map }).collect();
         let repeats = identified.repeats();
         let (map, program) = (map.as_ref(), program_and_commit(self.registry.commit));
-        let report = run_report_of(&origin, &identified, map, &program, &remarks, &repeats, false);
-        page_of(&identified, &report, &others, gap)
+        let results = identified.shown(map, &repeats, &remarks);
+        let t2_histories = t2_histories(&identified);
+        let report = run_report(&origin, &identified, results, &program, &t2_histories);
+        Ok(RunReport { others: &others, gap: gap.map(|gap| &gap.diagnosed), ..report }.page()?)
     }
 
     /// Writes the files of an identification. After a file that cannot be written, the others are not written; the results are still returned.
@@ -267,7 +269,10 @@ impl Session<'_> {
             }
             None => BTreeMap::new(),
         };
-        let points_file = with_messages(identified.points_json());
+        let points_file = match self.registry.sentences {
+            Some(sentences) => with_sentences(sentences, || identified.points_json()),
+            None => identified.points_json(),
+        };
         files.write(run_directory::POINTS, json_text(&points_file)?.as_bytes());
         if !identified.budgets.is_empty() {
             let failed = SessionError::file("write", Path::new(run_directory::BUDGET));
@@ -275,17 +280,12 @@ impl Session<'_> {
         }
         let (repeats, program) = (identified.repeats(), program_and_commit(self.registry.commit));
         let has_picture = map.contains_key("svg");
-        let shown = run_report_of(
-            origin,
-            &identified,
-            compressor_map.as_ref(),
-            &program,
-            &remarks,
-            &repeats,
-            has_picture,
-        );
-        let report = files.write(run_directory::REPORT, run_report(&shown).as_bytes());
-        let page = files.write(run_directory::PAGE, page_of(&identified, &shown, &[], None)?.as_bytes());
+        let t2_histories = t2_histories(&identified);
+        let results = identified.shown(compressor_map.as_ref(), &repeats, &remarks);
+        let shown =
+            RunReport { has_picture, ..run_report(origin, &identified, results, &program, &t2_histories) };
+        let report = files.write(run_directory::REPORT, shown.markdown().as_bytes());
+        let page = files.write(run_directory::PAGE, shown.page()?.as_bytes());
         identified.remarks = remarks;
         let results = Results {
             run: directory.to_owned(),
@@ -331,14 +331,12 @@ fn name_of(path: &Path) -> String {
 }
 
 /// Contents of the report and the page.
-fn run_report_of<'a>(
+fn run_report<'a>(
     origin: &'a Provenance,
     identified: &'a Identified,
-    map: Option<&'a CompressorMap>,
+    results: PointResults<'a>,
     program: &'a str,
-    remarks: &'a [ResultRemark],
-    repeats: &'a [RepeatedJump],
-    has_picture: bool,
+    t2_histories: &'a [T2History],
 ) -> RunReport<'a> {
     RunReport {
         machine: &origin.machine,
@@ -346,44 +344,32 @@ fn run_report_of<'a>(
         plan: origin.plan.as_ref(),
         tested_at: origin.tested_at.as_deref(),
         program,
-        map,
+        results,
         recording: &identified.recording,
         used: &identified.config.declared,
         budgets: &identified.budgets,
         corrections: &identified.corrections,
-        zero: &identified.zero,
         sources: &origin.sources,
         origin: origin
             .ending
             .clone()
             .map_or(PointsOrigin::Recordings(identified.config.method), PointsOrigin::Run),
-        remarks,
         reference: identified.config.reference,
         gases: identified.gases(),
         method: identified.config.method,
         alpha_area_ratio: identified.config.alpha_area_ratio,
         events: &identified.recording.events,
-        points: &identified.points,
-        repeats,
-        dynamic: &identified.dynamic,
-        sensors: &identified.sensors,
-        score: identified.score.as_ref(),
-        surge: identified.surge.as_ref(),
-        has_picture,
+        has_picture: false,
+        t2_histories,
+        gap: None,
+        others: &[],
     }
 }
 
-/// The page of an identification, with other runs' maps.
-fn page_of(
-    identified: &Identified,
-    report: &RunReport<'_>,
-    others: &[OtherRun<'_>],
-    gap: Option<&Gap>,
-) -> Result<String, SessionError> {
+/// T2 computed from the numbers of each point.
+fn t2_histories(identified: &Identified) -> Vec<T2History> {
     let history = |point: &IdentifiedPoint| t2_history(&identified.recording, point, &identified.config);
-    let t2_histories: Vec<T2History> = identified.points_alone().filter_map(history).collect();
-    let gap = gap.map(|gap| gap_part(&gap.diagnosed));
-    Ok(run_page(&RunPage { report, t2_histories: &t2_histories, gap, others })?)
+    identified.points_alone().filter_map(history).collect()
 }
 
 /// Source entry of a recording in a report.

@@ -11,7 +11,7 @@ use mapper_diagnose::gap::Calibration;
 use mapper_observe::Declared;
 use mapper_physics::rig::effect::{Effect, Rig};
 use mapper_recording::ChannelMap;
-use mapper_report::{why_figure, why_text};
+use mapper_report::{Describe, why_figure};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -75,7 +75,7 @@ pub fn write_transient(
             "transient.json",
             json_text(&Versioned { format_version: DIAGNOSIS_FORMAT, content: diagnosis })?.into_bytes(),
         ),
-        ("transient.txt", why_text(diagnosis).into_bytes()),
+        ("transient.txt", diagnosis.document().to_string().into_bytes()),
         ("transient.svg", figure.to_svg().into_bytes()),
         ("transient.png", png(&figure)?),
     ];

@@ -13,8 +13,7 @@ use mapper_maps::{
     MapFitOptions, compare, compare_turbines, convert_efficiency, correct_for_heat, fit_map, fit_turbine,
 };
 use mapper_report::{
-    distinct_names, heat_correction_text, import_remark_text, imported_map_text, imported_turbine_text,
-    map_comparison_figure, map_comparison_text, map_fit_text, turbine_comparison_text, turbine_fit_text,
+    Describe, Document, Message, distinct_names, map_comparison_figure, map_fit, turbine_fit,
 };
 use serde_json::{Value, json};
 use std::path::Path;
@@ -23,7 +22,7 @@ use std::path::Path;
 #[derive(Debug)]
 pub struct MapWork {
     /// The result for people.
-    pub text: String,
+    pub document: Document,
     /// The result for programs.
     pub json: Value,
     /// Assumptions about the files.
@@ -57,7 +56,7 @@ impl MapOut<'_> {
 }
 
 pub(crate) fn warnings(path: &Path, remarks: &[ImportRemark]) -> Vec<String> {
-    remarks.iter().map(|remark| format!("{}: {}", path.display(), import_remark_text(remark))).collect()
+    remarks.iter().map(|remark| format!("{}: {}", path.display(), remark.message())).collect()
 }
 
 impl Registry {
@@ -90,7 +89,7 @@ impl Registry {
         description: Option<(&Path, Existing)>,
     ) -> Result<MapWork, SessionError> {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let (described, text, json) = match self.read_map_file(path, user_description)? {
+        let (described, document, json) = match self.read_map_file(path, user_description)? {
             MapFile::Compressor(imported) => {
                 let lines = imported.map.lines.iter().map(|line| {
                     json!({"speed_corrected_rpm": line.speed_corrected_rpm, "points": line.points.len()})
@@ -103,7 +102,7 @@ impl Registry {
                     "remarks": imported.remarks,
                     "lines": lines.collect::<Vec<_>>(),
                 });
-                (description_text(&name, &imported, user_description), imported_map_text(&imported), json)
+                (description_text(&name, &imported, user_description), imported.document(), json)
             }
             MapFile::Turbine(imported) => {
                 let lines = imported.map.lines().map(|line| {
@@ -119,17 +118,13 @@ impl Registry {
                     "remarks": imported.remarks,
                     "lines": lines.collect::<Vec<_>>(),
                 });
-                (
-                    turbine_description_text(&name, &imported, user_description),
-                    imported_turbine_text(&imported),
-                    json,
-                )
+                (turbine_description_text(&name, &imported, user_description), imported.document(), json)
             }
         };
         if let Some((file, existing)) = description {
             write_file(file, described.as_bytes(), existing)?;
         }
-        Ok(MapWork { text, json, warnings: Vec::new() })
+        Ok(MapWork { document, json, warnings: Vec::new() })
     }
 
     /// Fits a map, and writes it to `out`.
@@ -145,7 +140,7 @@ impl Registry {
     ) -> Result<MapWork, SessionError> {
         let format = out.map(|out| Ok::<_, SessionError>((out, out.format(self)?))).transpose()?;
         let file = out.map(|out| out.path);
-        let (mut text, json, remarks) = match self.read_map_file(path, user_description)? {
+        let (mut document, json, remarks) = match self.read_map_file(path, user_description)? {
             MapFile::Compressor(imported) => {
                 let map = fit_map(imported.map, options)
                     .map_err(|source| MapWorkError::NotFitted(path.to_owned(), source))?;
@@ -154,8 +149,8 @@ impl Registry {
                 }
                 let json =
                     json!({"map": path, "reference": map.reference, "fitted": map.fitted, "file": file});
-                let text = map.fitted.as_ref().map(|fitted| map_fit_text(&map, fitted)).unwrap_or_default();
-                (text, json, imported.remarks)
+                let document = map.fitted.as_ref().map(|fitted| map_fit(&map, fitted)).unwrap_or_default();
+                (document, json, imported.remarks)
             }
             MapFile::Turbine(imported) => {
                 let map = fit_turbine(imported.map)
@@ -164,14 +159,14 @@ impl Registry {
                     write_file(out.path, &format.write_turbine(&map)?, out.existing)?;
                 }
                 let json = json!({"map": path, "fitted": map.fitted, "file": file});
-                let text = map.fitted.as_ref().map(|fitted| turbine_fit_text(&map, fitted));
-                (text.unwrap_or_default(), json, imported.remarks)
+                let document = map.fitted.as_ref().map(|fitted| turbine_fit(&map, fitted));
+                (document.unwrap_or_default(), json, imported.remarks)
             }
         };
         if let Some(file) = file {
-            text.push_str(&format!("map        {}\n", file.display()));
+            document.facts("", [("map", file.display().to_string())]);
         }
-        Ok(MapWork { text, json, warnings: warnings(path, &remarks) })
+        Ok(MapWork { document, json, warnings: warnings(path, &remarks) })
     }
 
     /// Writes a map in another format, at another reference state, with efficiencies of another definition.
@@ -204,11 +199,12 @@ impl Registry {
                 let (map, fitted_here) = write_map_fitted_if_needed(out.path, format, map, out.existing)?;
                 let points: usize = map.lines.iter().map(|line| line.points.len()).sum();
                 let (lines, reference) = (map.lines.len(), map.reference);
-                let text = format!(
-                    "{file}: {}, {points} points on {lines} speed lines, corrected to {reference}{}\n",
+                let mut document = Document::default();
+                document.text(format!(
+                    "{file}: {}, {points} points on {lines} speed lines, corrected to {reference}{}",
                     format.name,
                     note(fitted_here)
-                );
+                ));
                 let json = json!({
                     "file": out.path,
                     "format": format.name,
@@ -218,7 +214,7 @@ impl Registry {
                     "points": points,
                     "fitted": map.fitted.is_some(),
                 });
-                Ok(MapWork { text, json, warnings: warnings(path, &imported.remarks) })
+                Ok(MapWork { document, json, warnings: warnings(path, &imported.remarks) })
             }
             MapFile::Turbine(imported) => {
                 let requested = [
@@ -230,11 +226,12 @@ impl Registry {
                 }
                 let (map, fitted_here) = write_turbine_fitted_if_needed(path, out, format, imported.map)?;
                 let (points, lines) = (map.points.len(), map.lines().count());
-                let text = format!(
-                    "{file}: {}, turbine, {points} points on {lines} speed lines{}\n",
+                let mut document = Document::default();
+                document.text(format!(
+                    "{file}: {}, turbine, {points} points on {lines} speed lines{}",
                     format.name,
                     note(fitted_here)
-                );
+                ));
                 let json = json!({
                     "file": out.path,
                     "format": format.name,
@@ -243,7 +240,7 @@ impl Registry {
                     "points": points,
                     "fitted": map.fitted.is_some(),
                 });
-                Ok(MapWork { text, json, warnings: warnings(path, &imported.remarks) })
+                Ok(MapWork { document, json, warnings: warnings(path, &imported.remarks) })
             }
         }
     }
@@ -264,13 +261,13 @@ impl Registry {
         let imported = self.inspect_map(path, user_description)?;
         let (map, correction) = correct_for_heat(imported.map, heat_w)
             .map_err(|source| MapWorkError::NotCorrected(path.to_owned(), source))?;
-        let mut text = heat_correction_text(&correction);
+        let mut document = correction.document();
         if let Some((out, format)) = out.zip(format) {
             write_map_fitted_if_needed(out.path, format, map, out.existing)?;
-            text.push_str(&format!("map        {}\n", out.path.display()));
+            document.facts("", [("map", out.path.display().to_string())]);
         }
         let json = json!({"map": path, "correction": correction, "file": out.map(|out| out.path)});
-        Ok(MapWork { text, json, warnings: warnings(path, &imported.remarks) })
+        Ok(MapWork { document, json, warnings: warnings(path, &imported.remarks) })
     }
 
     /// Compares two maps of the same machine. `picture` is a new file that shows both.
@@ -284,7 +281,7 @@ impl Registry {
     ) -> Result<MapWork, SessionError> {
         let paths = [first.0, second.0];
         let maps = (self.read_map_file(first.0, first.1)?, self.read_map_file(second.0, second.1)?);
-        let (text, json, remarks) = match maps {
+        let (document, json, remarks) = match maps {
             (MapFile::Compressor(a), MapFile::Compressor(b)) => {
                 let comparison = compare(&a.map, &b.map).map_err(MapWorkError::from)?;
                 if let Some((path, existing)) = picture {
@@ -299,7 +296,7 @@ impl Registry {
                     write_file(path, &bytes, existing)?;
                 }
                 let json = serde_json::to_value(&comparison)?;
-                (map_comparison_text(&comparison), json, [a.remarks, b.remarks])
+                (comparison.document(), json, [a.remarks, b.remarks])
             }
             (MapFile::Turbine(a), MapFile::Turbine(b)) => {
                 if picture.is_some() {
@@ -309,13 +306,13 @@ impl Registry {
                 let comparison = compare_turbines(&a.map, &b.map)
                     .map_err(|source| MapWorkError::TurbineNotFitted(paths[0].to_owned(), source))?;
                 let json = serde_json::to_value(&comparison)?;
-                (turbine_comparison_text(&comparison), json, [a.remarks, b.remarks])
+                (comparison.document(), json, [a.remarks, b.remarks])
             }
             (MapFile::Turbine(_), _) => return Err(MapWorkError::TwoMachines(paths[0].to_owned()).into()),
             (_, MapFile::Turbine(_)) => return Err(MapWorkError::TwoMachines(paths[1].to_owned()).into()),
         };
         let warnings = [warnings(paths[0], &remarks[0]), warnings(paths[1], &remarks[1])].concat();
-        Ok(MapWork { text, json, warnings })
+        Ok(MapWork { document, json, warnings })
     }
 }
 

@@ -19,7 +19,7 @@ use mapper_maps::{assemble, mark_line_ends, reduce_turbine};
 use mapper_physics::gas::air::Air;
 use mapper_physics::gas::mixture::Gas;
 use mapper_physics::machine::params::{BoundaryConditions, Params};
-use mapper_report::{budget_csv, reduced_text, reduced_turbine_text};
+use mapper_report::{budget_csv, reduced_map, reduced_turbine};
 use serde::Deserialize;
 use serde_json::json;
 use std::path::Path;
@@ -157,7 +157,7 @@ impl Registry {
             .map_err(|source| MapWorkError::NotAssembled(path.to_owned(), source))?;
         let mut map = with_gas(map, config.air);
         let ends = mark_line_ends(&mut map, |step| measured.get(step)?.end);
-        let mut text = reduced_text(&map, &ends, &budgets, &remarks);
+        let mut document = reduced_map(&map, &ends, &budgets, &remarks);
         let json = json!({
             "points": path,
             "method": config.method,
@@ -175,11 +175,11 @@ impl Registry {
         }
         if let Some((out, format)) = out.zip(format) {
             write_map_fitted_if_needed(out.path, format, map, out.existing)?;
-            text.push_str(&format!("map        {}\n", out.path.display()));
+            document.facts("", [("map", out.path.display().to_string())]);
         }
         let assumed =
             table.remarks.into_iter().filter(|remark| *remark != mapper_core::ImportRemark::Measured);
-        Ok(MapWork { text, json, warnings: warnings(path, &assumed.collect::<Vec<_>>()) })
+        Ok(MapWork { document, json, warnings: warnings(path, &assumed.collect::<Vec<_>>()) })
     }
 
     /// Makes the map of a turbine from a table of steady points. `machine` is a campaign or run directory with the sensors.
@@ -201,13 +201,13 @@ impl Registry {
             return Err(MapWorkError::NotMeasured(path.to_owned()).into());
         }
         let points = reduce_turbine(&table.measured, &config.declared);
-        let mut text = reduced_turbine_text(&points, &remarks);
+        let mut document = reduced_turbine(&points, &remarks);
         let json = json!({"points": path, "turbine": points, "efficiency": "apparent", "remarks": remarks, "file": out.map(|out| out.path)});
         if let Some((out, format)) = out.zip(format) {
             write_turbine_fitted_if_needed(path, out, format, TurbineMap { machine: name, ..table.map })?;
-            text.push_str(&format!("map        {}\n", out.path.display()));
+            document.facts("", [("map", out.path.display().to_string())]);
         }
-        Ok(MapWork { text, json, warnings: warnings(path, &table.remarks) })
+        Ok(MapWork { document, json, warnings: warnings(path, &table.remarks) })
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::{Existing, SessionError, write_file};
 use mapper_history::{Comparison, ListedRun, Metric, Night, StoredNight};
-use mapper_report::{night_text, runs_text};
+use mapper_report::{listed_runs, night_comparison};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -38,8 +38,8 @@ pub fn write_night_report(
         "{}, {}\n\n{}\n{}",
         night.name,
         night.program,
-        night_text(night, comparison, history),
-        runs_text(&runs, &Metric::ALL)
+        night_comparison(night, comparison, history),
+        listed_runs(&runs, &Metric::ALL)
     );
     write_file(&path, text.as_bytes(), Existing::Replaced)
 }

@@ -5,7 +5,7 @@ use mapper_campaign::campaign::{CalibrationRule, Date};
 use mapper_campaign::{Campaign, CampaignError, Concern, forecast_calibration_warnings, mistakes, read_text};
 use mapper_core::{CalibrationDefect, Warning};
 use mapper_physics::simulation::model::Model;
-use mapper_report::warning_text;
+use mapper_report::Message;
 use std::path::Path;
 
 /// Concerns about the calibrations on the day of a run; errors if the campaign requires them.
@@ -13,7 +13,7 @@ pub(crate) fn calibration_concerns(campaign: &Campaign, model: &Model, day: Opti
     let warnings = forecast_calibration_warnings(campaign, model, day).into_iter();
     let concern = warnings.map(|one| Concern {
         is_error: campaign.calibration == CalibrationRule::Required,
-        message: warning_text(&one.warning),
+        message: one.warning.message(),
         remedy: remedy(&one.warning).to_owned(),
         at: one.at,
     });

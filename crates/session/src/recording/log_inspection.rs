@@ -1,9 +1,9 @@
 //! Inspects the log of another program.
 
 use crate::{Registry, SessionError};
+use mapper_core::JsonMessages;
 use mapper_recording::logs::proposal::{NominalFlows, Proposal, channel_map_text, propose};
 use mapper_recording::logs::{Layout, LogFile, LogOptions, Survey, survey};
-use mapper_report::with_messages;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -72,10 +72,10 @@ impl LogInspection {
                 "max": data.max,
             })
         });
-        with_messages(json!({
+        json!({
             "log": self.path,
             "format": self.format,
-            "findings": self.layout.findings,
+            "findings": JsonMessages(&self.layout.findings),
             "start_time_ns": self.layout.start_time_ns,
             "groups": self.layout.groups.iter().zip(&self.survey.groups).map(|(group, data)| {
                 let mut value = json!(data);
@@ -86,7 +86,7 @@ impl LogInspection {
             "columns": columns.collect::<Vec<_>>(),
             "proposal": self.proposal,
             "channel_map": self.channel_map(),
-        }))
+        })
     }
 
     /// The proposal as text of a channel map.

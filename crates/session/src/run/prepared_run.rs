@@ -25,7 +25,7 @@ use mapper_campaign::campaign::MapSource;
 use mapper_core::{Clock, Plan, PlanInputHashes, Reaction, RigDescription, RunEnding, UnpacedClock};
 use mapper_physics::simulation::model::Model;
 use mapper_recording::{ChannelMap, RecordingHeader, RecordingWriter};
-use mapper_report::ending_sentence;
+use mapper_report::Message;
 use mapper_runner::{
     DeadlineBackend, Deadlines, DriftWatch, PlanSteps, RunError, RunObserver, StepSource, SurgeSearch,
 };
@@ -98,7 +98,7 @@ pub struct RunOutcome {
 impl RunOutcome {
     /// The end of the run in one sentence.
     pub fn sentence(&self) -> String {
-        ending_sentence(&for_files(&self.end))
+        for_files(&self.end).message()
     }
 }
 

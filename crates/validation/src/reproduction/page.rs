@@ -1,7 +1,7 @@
 //! The reproduction of the paper's figures as a page.
 
 use crate::reproduction::{FigureResult, picture_path};
-use mapper_report::formatting::markdown::{Align, table};
+use mapper_report::{Table, markdown_table};
 
 /// The page, Markdown; it links pictures by [`picture_path`], relative to the page. The same results give the same bytes.
 pub fn reproduction_page(results: &[FigureResult]) -> String {
@@ -13,10 +13,12 @@ pub fn reproduction_page(results: &[FigureResult]) -> String {
             result.number,
             result.title,
             result.method,
-            table(&["the paper states", "here", ""], Align::Left, rows),
+            markdown_table(&Table::new(["the paper states", "here", ""]).all_texts().rows(rows)),
             result.number,
             picture_path(result),
-            table(&result.table.head, Align::Right, &result.table.rows),
+            markdown_table(
+                &Table::new(&result.table.head).all_numbers().rows(result.table.rows.iter().cloned())
+            ),
         )
     });
     std::iter::once(HEAD.to_owned()).chain(figures).collect()

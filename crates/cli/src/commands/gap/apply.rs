@@ -4,7 +4,7 @@ use crate::environment::registry;
 use crate::output::failure::{Code, Failure};
 use crate::output::standard_output;
 use clap::Args;
-use mapper_report::doubt_text;
+use mapper_report::Document;
 use mapper_session::{CalibratedModel, calibrated_model_campaign, found_in, write_new};
 use std::path::PathBuf;
 
@@ -32,10 +32,9 @@ impl Apply {
         let written = calibrated_model_campaign(&text, &calibrated, &registry().effects)?;
         write_new(&self.out, written.as_bytes())?;
         mapper_campaign::load(&self.out).map_err(Failure::of_campaign)?;
-        standard_output::print(&format!(
-            "campaign with the diagnosed machine: {}\n{}",
-            self.out.display(),
-            doubt_text(found.doubt.as_deref())
-        ))
+        let mut document = Document::default();
+        document.text(format!("campaign with the diagnosed machine: {}", self.out.display()));
+        document.text(found.doubt.map(|doubt| format!("warning: {doubt}")).unwrap_or_default());
+        standard_output::show(&document)
     }
 }

@@ -8,7 +8,7 @@ use crate::output::standard_output::Replace;
 use crate::output::{output_options, standard_output};
 use clap::Args;
 use mapper_fleet::{Engine, cores};
-use mapper_report::with_heads;
+use mapper_report::{Document, Table};
 use mapper_session::{json_text, write_new};
 use mapper_validation::blind::calibration::calibrate::{Plan, calibrate};
 use mapper_validation::blind::scoring::reliability::{calibrated_text, reliabilities};
@@ -286,16 +286,15 @@ impl Score {
             let (this, that) = (title(&self.directory)?, title(other)?);
             return standard_output::print(&scored.compare_with([&this, &that], &score(other)?));
         }
-        let mut text = scored.case_lines() + "\n";
-        for (label, value) in scored.rows() {
-            text += &format!("{label:28}{value}\n");
-        }
+        let mut document = Document::default();
+        document.facts("", scored.rows());
         let mut rows = scored.class_rows().into_iter();
         let heads: Vec<String> = rows.next().into_iter().flatten().collect();
-        let mut table = with_heads(&heads);
-        for row in rows {
-            table.add_row(row);
-        }
-        standard_output::print(&format!("{text}\n{table}\nBrackets are exact 95 % intervals of the share.\n"))
+        let mut table = Table::new(heads);
+        rows.for_each(|row| table.row(row));
+        document.table(table);
+        document.text("Brackets are exact 95 % intervals of the share.");
+        standard_output::print(&scored.case_lines())?;
+        standard_output::show(&document)
     }
 }

@@ -7,8 +7,8 @@ use crate::output::failure::Failure;
 use crate::output::{output_options, standard_output};
 use clap::Args;
 use mapper_core::Method;
-use mapper_report::correction_text;
-use mapper_session::{Recorded, Session};
+use mapper_report::{correction, with_messages};
+use mapper_session::{Recorded, Session, SessionError};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -52,12 +52,15 @@ impl Correct {
         progress.clear();
         if self.json {
             let warnings: Vec<String> = recorded.read.warnings.iter().map(ToString::to_string).collect();
-            return standard_output::print_json(&json!({
-                "correction": corrected.map,
-                "diagnosis": corrected.gap.json()?,
-                "identified": corrected.identified.json(Some(&recorded.path), &warnings),
-            }));
+            let values = || {
+                Ok::<_, SessionError>(json!({
+                    "correction": corrected.map,
+                    "diagnosis": corrected.gap.json()?,
+                    "identified": corrected.identified.json(Some(&recorded.path), &warnings),
+                }))
+            };
+            return standard_output::print_json(&with_messages(values)?);
         }
-        standard_output::print(&correction_text(&corrected.map, &corrected.gap.diagnosed.diagnosis))
+        standard_output::show(&correction(&corrected.map, &corrected.gap.diagnosed.diagnosis))
     }
 }

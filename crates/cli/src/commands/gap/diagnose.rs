@@ -7,7 +7,7 @@ use crate::output::standard_output::Replace;
 use crate::output::{output_options, standard_output};
 use clap::Args;
 use mapper_diagnose::gap::{Calibration, ClosureTerm, Diagnosed, over_recordings};
-use mapper_report::{gap_text, headline, recordings_text, sensors_text, zero_text};
+use mapper_report::{Describe, Document, compared_recordings, headline, with_messages};
 use mapper_session::{
     DIAGNOSIS_FORMAT, Gap, Recorded, Session, SessionError, SessionEvent, check_all_distinct,
 };
@@ -90,9 +90,9 @@ impl Diagnose {
         }
         if let [(_, gap)] = &gaps[..] {
             return if self.json {
-                standard_output::print_json(&gap.json()?)
+                standard_output::print_json(&with_messages(|| gap.json())?)
             } else {
-                standard_output::print(&text(gap))
+                standard_output::show(&document(gap))
             };
         }
         let diagnosed: Vec<&Diagnosed> = gaps.iter().map(|(_, gap)| &gap.diagnosed).collect();
@@ -101,7 +101,7 @@ impl Diagnose {
             let each: Result<Vec<Value>, Failure> = gaps
                 .iter()
                 .map(|(path, gap)| {
-                    let mut value = gap.json()?;
+                    let mut value = with_messages(|| gap.json())?;
                     value["recording"] = json!(path);
                     Ok(value)
                 })
@@ -112,7 +112,7 @@ impl Diagnose {
         }
         let heads: Vec<(String, String)> =
             gaps.iter().map(|(path, gap)| (path.clone(), headline(&gap.diagnosed.diagnosis))).collect();
-        standard_output::print(&recordings_text(&heads, &over))
+        standard_output::show(&compared_recordings(&heads, &over))
     }
 
     /// Writes the closure terms that can be written into `directory`; next to the page if only that was asked for.
@@ -136,6 +136,9 @@ impl Diagnose {
     }
 }
 
-fn text(gap: &Gap) -> String {
-    [gap_text(&gap.diagnosed.diagnosis), sensors_text(&gap.sensors), zero_text(&gap.diagnosed.zero)].concat()
+fn document(gap: &Gap) -> Document {
+    let mut document = gap.diagnosed.diagnosis.document();
+    document.append(gap.sensors.document());
+    document.append(gap.diagnosed.zero.document());
+    document
 }

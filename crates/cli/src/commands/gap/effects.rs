@@ -5,7 +5,7 @@ use crate::output::failure::Failure;
 use crate::output::standard_output;
 use clap::Args;
 use mapper_physics::rig::effect::Effect;
-use mapper_report::with_heads;
+use mapper_report::{Document, Table};
 use mapper_validation::blind::visibility;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -36,14 +36,14 @@ impl Effects {
             return standard_output::print_json(&json!({ "effects": list }));
         }
         let heads = ["effect", "part", "unit", "neutral", "range"];
-        let mut table = with_heads(&heads);
-        let mut legend = String::new();
+        let mut table = Table::new(heads).with_texts([1, 2]);
+        let mut legend = Document::default();
         for effect in &effects {
             let info = effect.info();
-            legend += &format!("{}: {}\n", info.id, info.description);
+            legend.text(format!("{}: {}", info.id, info.description));
             for parameter in &info.parameters {
                 let name = if parameter.name == info.id { "" } else { &*parameter.name };
-                table.add_row([
+                table.row([
                     format!("{} {name}", info.id).trim_end().to_owned(),
                     info.submodel.name().to_owned(),
                     if parameter.unit == "1" { "-".to_owned() } else { parameter.unit.to_string() },
@@ -52,7 +52,10 @@ impl Effects {
                 ]);
             }
         }
-        standard_output::print(&format!("{table}\n\n{legend}"))
+        let mut document = Document::default();
+        document.table(table);
+        document.append(legend);
+        standard_output::show(&document)
     }
 
     /// The matrix of effects against balances on a recording of the campaign without causes.
@@ -74,16 +77,17 @@ impl Effects {
         }
         let letters: Vec<String> = (0..names.len()).map(|place| (place + 1).to_string()).collect();
         let heads: Vec<String> = ["effect", "sigma"].map(str::to_owned).into_iter().chain(letters).collect();
-        let mut table = with_heads(&heads);
+        let mut table = Table::new(&heads);
         for (id, sigma, shares) in &matrix.effects {
             let shares = shares.iter().map(|share| format!("{:.0}", 100.0 * share));
-            table.add_row([id.clone(), format!("{sigma:.0}")].into_iter().chain(shares));
+            table.row([id.clone(), format!("{sigma:.0}")].into_iter().chain(shares));
         }
-        let legend: Vec<String> =
-            names.iter().enumerate().map(|(place, name)| format!("{:>4}  {name}", place + 1)).collect();
-        standard_output::print(&format!(
-            "{table}\n% of each effect's signature (one typical step) that a residual source term in one balance could explain:\n{}\n",
-            legend.join("\n")
-        ))
+        let mut document = Document::default();
+        document.table(table);
+        document.text(
+            "% of each effect's signature (one typical step) that a residual source term in one balance could explain:",
+        );
+        document.list(names.iter().enumerate().map(|(place, name)| format!("{:>2}  {name}", place + 1)));
+        standard_output::show(&document)
     }
 }

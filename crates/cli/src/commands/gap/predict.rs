@@ -5,7 +5,7 @@ use crate::environment::registry;
 use crate::output::failure::Failure;
 use crate::output::standard_output;
 use clap::Args;
-use mapper_report::{doubt_text, forecast_check_text};
+use mapper_report::{Document, forecast_check};
 use mapper_session::{DIAGNOSIS_FORMAT, Recorded, SealedForecast, Session, found_in};
 use serde_json::json;
 use std::path::PathBuf;
@@ -56,11 +56,11 @@ impl Predict {
                     &json!({ "forecast": self.forecast, "steps": steps, "sha256": seal, "doubt": doubt }),
                 );
             }
-            return standard_output::print(&format!(
-                "forecast of {steps} steps in {}\nSHA-256: {seal}\n{}",
-                self.forecast.display(),
-                doubt_text(doubt.as_deref())
-            ));
+            let mut document = Document::default();
+            document.text(format!("forecast of {steps} steps in {}", self.forecast.display()));
+            document.text(format!("SHA-256: {seal}"));
+            document.text(doubt.map(|doubt| format!("warning: {doubt}")).unwrap_or_default());
+            return standard_output::show(&document);
         }
         // clap requires a recording if no diagnosis is given.
         let Some(recording) = &self.recording else { return Ok(()) };
@@ -72,6 +72,6 @@ impl Predict {
                 "format_version": DIAGNOSIS_FORMAT, "sha256": seal, "check": check,
             }));
         }
-        standard_output::print(&forecast_check_text(&check, &seal))
+        standard_output::show(&forecast_check(&check, &seal))
     }
 }

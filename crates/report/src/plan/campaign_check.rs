@@ -1,0 +1,159 @@
+//! The outcome of the check of a campaign: its size, the expected verdicts, assumed sizes and resolved speed lines.
+
+use crate::document::{Document, Table};
+use crate::formatting::{Display, duration, percent};
+use crate::test_report::key_figures::assumed_keys;
+use crate::test_report::zero_and_sensors::declared_sensors;
+use mapper_campaign::{Campaign, ResolvedLine, ResolvedPoint};
+use mapper_core::{Advice, CampaignChange, Channel, UndeclaredForecast, VerdictForecast, half_width_95};
+use std::path::Path;
+
+/// A campaign without mistakes.
+#[derive(Debug, Clone, Copy)]
+pub struct CheckedCampaign<'a> {
+    /// Its file.
+    pub file: &'a Path,
+    /// Its content.
+    pub campaign: &'a Campaign,
+    /// Number of steps, or its maximum.
+    pub steps: usize,
+    /// Whether the number of steps is known.
+    pub is_planned: bool,
+    /// Expected rig time, s.
+    pub duration_s: f64,
+    /// Number of warnings that were printed before.
+    pub warnings: usize,
+    /// Expected verdicts, if they can be forecast.
+    pub verdicts: Option<VerdictForecast>,
+    /// Changes that improve them.
+    pub advice: &'a [Advice],
+    /// The resolved speed lines.
+    pub lines: &'a [ResolvedLine],
+}
+
+impl crate::document::Describe for CheckedCampaign<'_> {
+    fn document(&self) -> Document {
+        let CheckedCampaign { campaign, steps, .. } = *self;
+        let warnings = match self.warnings {
+            0 => String::new(),
+            1 => ", 1 warning".to_owned(),
+            count => format!(", {count} warnings"),
+        };
+        let mut document = Document::default();
+        document.text(format!(
+            "{}: no mistakes{warnings}. {} points in {}{steps} steps on `{}` in {} of rig time{}.",
+            self.file.display(),
+            campaign.points.len(),
+            if self.is_planned { "" } else { "at most " },
+            campaign.backend.name,
+            duration(self.duration_s),
+            if campaign.sequence.is_some() { " by its script on the nominal machine" } else { "" },
+        ));
+        if let Some(forecast) = self.verdicts {
+            add_forecast(&mut document, campaign, &forecast, self.advice);
+        }
+        document.list(declared_sensors(campaign));
+        document.text(assumed_keys(campaign).unwrap_or_default());
+        add_lines(&mut document, campaign, self.lines);
+        document
+    }
+}
+
+/// The expected verdicts, and each change that improves them.
+fn add_forecast(document: &mut Document, campaign: &Campaign, forecast: &VerdictForecast, advice: &[Advice]) {
+    document.text(format!("Expected if the machine is as declared: {}", verdicts(forecast)));
+    if let Some(UndeclaredForecast { good, eta_standard_error }) = forecast.undeclared {
+        document.text(format!(
+            "If alpha_A, probe and heating/cooling ratio are one standard deviation off: {good} of {} good, {} (95 %)",
+            forecast.points,
+            points_95(eta_standard_error)
+        ));
+    }
+    let is_measured = |channel| campaign.sensors.contains_key(&channel);
+    if campaign.report.humidity_ratio.is_none()
+        && ![Channel::RelativeHumidity, Channel::DewPoint].into_iter().any(is_measured)
+    {
+        document.text("plus the unknown humidity: write `report: {humidity: 50 %}`, or record `RH`");
+    }
+    if forecast.near_limit {
+        document.text(describe_near_limit(forecast));
+    }
+    if forecast.good_low < forecast.points && advice.is_empty() {
+        document.text(
+            "Neither a longer dwell nor a longer soak makes more of them good; add points, or set known parameters to `fixed` in \
+             `identification.joint`.",
+        );
+    }
+    document.list(advice.iter().map(|Advice { change, forecast: after }| {
+        let additional_time = duration(after.duration_s - forecast.duration_s);
+        format!("{} (+{additional_time}): {}", change_text(*change), verdicts(after))
+    }));
+}
+
+/// The other outcome of a forecast near the limit: all points depend on it together, so a range from 0 would say less.
+fn describe_near_limit(forecast: &VerdictForecast) -> String {
+    let steps = "these steps determine alpha_A, probe and heating/cooling ratio a little";
+    match forecast.good {
+        0 => format!(
+            "Near a limit: if {steps} better than forecast, up to {} points are good; otherwise all are doubtful (`prior_dominated`).",
+            forecast.good_high
+        ),
+        _ => format!(
+            "Near a limit: if {steps} worse than forecast, all points are doubtful (`prior_dominated`)."
+        ),
+    }
+}
+
+fn verdicts(forecast: &VerdictForecast) -> String {
+    let VerdictForecast { points, good, good_low, good_high, near_limit, .. } = forecast;
+    let has_range = good_low < good_high && !near_limit;
+    let range = if has_range { format!(" ({good_low} to {good_high})") } else { String::new() };
+    let error = forecast.eta_standard_error.filter(|_| *good > 0);
+    let error = error.map_or_else(String::new, |sigma| format!(", efficiency {} (95 %)", points_95(sigma)));
+    format!("{good} of {points} points good{range}{error}")
+}
+
+fn points_95(sigma: f64) -> String {
+    format!("+/- {:.2} points", 100.0 * half_width_95(sigma))
+}
+
+fn change_text(change: CampaignChange) -> String {
+    match change {
+        CampaignChange::DwellS(dwell_s) => format!("`timing: {{dwell: {dwell_s:.0} s}}`"),
+        CampaignChange::SoakS(soak_s) => format!("`zero: {{soak: {:.0} min}}`", soak_s / 60.0),
+    }
+}
+
+/// Each speed line with the first and last of its points.
+fn add_lines(document: &mut Document, campaign: &Campaign, lines: &[ResolvedLine]) {
+    let display = Display::new(&campaign.display);
+    let mut rows = Table::new([
+        display.speed_head("corrected"),
+        display.speed_head("physical"),
+        "points".to_owned(),
+        display.flow_head("corrected flow"),
+        "PR".to_owned(),
+        "opening".to_owned(),
+        "surge margin %".to_owned(),
+    ]);
+    for line in lines {
+        let [Some(first), Some(last)] = [line.points.first(), line.points.last()] else { continue };
+        let range = |of: &dyn Fn(&ResolvedPoint) -> String| format!("{} to {}", of(first), of(last));
+        rows.row([
+            display.speed(line.speed_corrected_rpm),
+            display.speed(line.speed_rpm),
+            line.points.len().to_string(),
+            range(&|point| display.flow(point.flow_corrected_kg_s)),
+            range(&|point| format!("{:.3}", point.pressure_ratio)),
+            range(&|point| format!("{:.3}", point.valve_opening_ratio)),
+            percent(Some(last.surge_margin_ratio), 0),
+        ]);
+    }
+    if !lines.is_empty() {
+        document.table(rows);
+        document.text(format!(
+            "The lines on the nominal machine, from choke to surge, corrected to {}. `mapper plan` shows every point.",
+            campaign.reference
+        ));
+    }
+}

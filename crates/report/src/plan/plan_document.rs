@@ -1,0 +1,336 @@
+//! A plan before its run, compared with other orders, and after it.
+
+use crate::document::{Cell, Document, Table};
+use crate::formatting::{Display, duration, eta, number, percent};
+use crate::message::Message;
+use crate::plan::plan_remark_text::no_bound_text;
+use mapper_campaign::Campaign;
+use mapper_core::{
+    Plan, PlanBound, PlanStep, Recording, StepKind, VisitOrder, standard_error_of, step_number,
+};
+use mapper_planner::{JumpForecast, STABLE_DRIFT_K_MIN};
+use mapper_recording::score::ScoredPoint;
+use serde_json::{Value, json};
+
+/// The plan as a table, a legend and a summary.
+pub fn plan_document(campaign: &Campaign, plan: &Plan) -> Document {
+    let display = Display::new(&campaign.display);
+    let mut steps = Table::new([
+        "step".to_owned(),
+        display.speed_head("N"),
+        "valve".to_owned(),
+        display.pressure_head("P3"),
+        display.flow_head("m_c"),
+        "PR".to_owned(),
+        display.temperature_head("T2"),
+        "dTc K".to_owned(),
+        "+/- pts".to_owned(),
+        "settles s".to_owned(),
+        "ends".to_owned(),
+    ]);
+    // The machine soaks before the plan begins.
+    let soak_s = campaign.zero.map_or(0.0, |zero| zero.duration_s);
+    for step in &plan.steps {
+        let predicted = &step.predicted;
+        steps.row([
+            format!("{}{}", step_number(step.index), mark(step.kind)),
+            display.speed(step.to.speed_rpm),
+            step.to.shown().1.to_string(),
+            display.pressure(step.p3_pa),
+            display.flow(predicted.flow_kg_s),
+            format!("{:.3}", predicted.pressure_ratio),
+            display.temperature(predicted.t2_k),
+            number(predicted.dtc_k, 1),
+            percent(predicted.sigma_eta.map(|sigma| sigma.hypot(predicted.bias_eta.unwrap_or(0.0))), 2),
+            number(predicted.settle_s, 1),
+            eta(soak_s + step.start_s + step.dwell_s),
+        ]);
+    }
+    let mut document = Document::default();
+    document.table(steps);
+    document.text(legend(plan));
+    document.facts("", summary(campaign, plan, soak_s));
+    document
+}
+
+/// The mark of a step that is not a point of the grid.
+fn mark(kind: StepKind) -> &'static str {
+    match kind {
+        StepKind::Point => "",
+        StepKind::Repeat => "r",
+        StepKind::Return => "a",
+        StepKind::Approach => "s",
+    }
+}
+
+/// The meaning of the marks of these steps; empty without any.
+fn marks_legend(kinds: &[StepKind]) -> String {
+    let marks = [
+        (StepKind::Repeat, "r visits a point again, to show drift or to lead around a forbidden jump"),
+        (StepKind::Return, "a visits the first point again"),
+        (StepKind::Approach, "s approaches surge"),
+    ];
+    let marked: Vec<&str> =
+        marks.into_iter().filter(|(kind, _)| kinds.contains(kind)).map(|(_, text)| text).collect();
+    if marked.is_empty() { String::new() } else { format!("step: {}. ", marked.join(", ")) }
+}
+
+fn legend(plan: &Plan) -> String {
+    let marked = marks_legend(&plan.steps.iter().map(|step| step.kind).collect::<Vec<_>>());
+    format!(
+        "{marked}valve: opening of the back-pressure valve. P3: turbine inlet pressure. m_c, PR, T2: at the end of the step. dTc: change of the compressor \
+         housing's temperature in the window, the thermal gradient. +/-: expected error of the efficiency, points, one sigma. settles: after the jump. ends: after \
+         the start of the run."
+    )
+}
+
+/// Totals of the plan, a line for each figure.
+fn summary(campaign: &Campaign, plan: &Plan, soak_s: f64) -> Vec<(&'static str, String)> {
+    let figures = &plan.figures;
+    let steps_s: f64 = plan.steps.iter().map(|step| step.dwell_s).sum();
+    let parts = [
+        ("soak", soak_s),
+        ("warm-up", plan.warm_up_s),
+        ("steps", steps_s),
+        ("search for surge", plan.surge_search_s),
+        ("cool-down", plan.cool_down_s),
+    ];
+    let parts: Vec<String> = parts
+        .into_iter()
+        .filter(|(_, time_s)| *time_s > 0.0)
+        .map(|(name, time_s)| format!("{name} {}", duration(time_s)))
+        .collect();
+    let mut lines = vec![
+        ("plan", format!("{}, {} by {}", plan.campaign, steps(&plan.steps), plan.objective)),
+        ("rig time", format!("{} ({})", duration(soak_s + plan.duration_s()), parts.join(", "))),
+    ];
+    if let Some(min_gradient_k) = figures.min_gradient_k {
+        let least = format!("{min_gradient_k:.1} K{}", least_bound(plan));
+        lines.extend([("total gradient", total_gradient(plan)), ("min gradient", least)]);
+    }
+    let declared = figures.rms_error_eta.map(|error| {
+        format!(
+            "{} points of efficiency rms over the points, {} at the worst point (one sigma), if the machine is as declared",
+            percent(Some(error), 2),
+            percent(figures.worst_error_eta, 2)
+        )
+    });
+    let reported = figures.rms_error_reported_eta.map(|error| {
+        format!(
+            "the intervals will state {} rms, because they also cover the uncertainty of alpha_A, probe and heating/cooling ratio",
+            percent(Some(error), 2)
+        )
+    });
+    let errors: Vec<String> = declared.into_iter().chain(reported).collect();
+    if !errors.is_empty() {
+        lines.push(("expected error", errors.join("; ")));
+    }
+    lines.extend(plan.bound_remark.iter().map(|reason| ("bound", no_bound_text(*reason).to_owned())));
+    lines.extend(plan.remarks.iter().map(|remark| ("note", remark.message())));
+    if !campaign.machine.assumed.is_empty() {
+        let sizes = match campaign.machine.assumed.len() {
+            1 => "1 size".to_owned(),
+            count => format!("{count} sizes"),
+        };
+        lines.push((
+            "assumed",
+            format!("{sizes} of the machine, scaled from its wheel; `mapper check` gives the values"),
+        ));
+    }
+    let made_from = &plan.made_from;
+    let short = |hash: &str| hash.chars().take(12).collect::<String>();
+    let hashes =
+        format!("campaign {}, model {}", short(&made_from.campaign_sha256), short(&made_from.model_sha256));
+    lines.push(("made from", hashes));
+    lines
+}
+
+fn steps(steps: &[PlanStep]) -> String {
+    let dwells = || steps.iter().map(|step| step.dwell_s);
+    let (shortest_s, longest_s) = (dwells().fold(f64::INFINITY, f64::min), dwells().fold(0.0, f64::max));
+    match steps.len() {
+        0 => "no steps".to_owned(),
+        1 => format!("1 step of {shortest_s:.0} s"),
+        count if shortest_s == longest_s => format!("{count} steps of {shortest_s:.0} s"),
+        count => format!("{count} steps of {shortest_s:.0} to {longest_s:.0} s"),
+    }
+}
+
+fn total_gradient(plan: &Plan) -> String {
+    let total = format!("{:.0} K of housing temperature over all points", plan.figures.sum_gradient_k);
+    let Some(bound) = &plan.bound else { return total };
+    let bounded = format!("{total}; no order exceeds {:.0} K", bound.sum_gradient_k);
+    let by_gap = |gap: f64| format!("{bounded}, so this one is within {gap:.1} % of the best possible");
+    match (bound.gap_percent, bound.proof_tolerance_percent) {
+        (Some(_), Some(tolerance)) if plan.objective == VisitOrder::ThermalGradient.name() => {
+            format!("{total}; proven to be the best order within {tolerance:.1} %")
+        }
+        (Some(gap), _) if plan.objective == VisitOrder::ThermalGradient.name() => by_gap(gap),
+        _ => bounded,
+    }
+}
+
+fn least_bound(plan: &Plan) -> String {
+    let bound_text = |bound: &PlanBound| match (bound.proof_tolerance_percent, bound.gap_percent) {
+        (Some(tolerance), _) => format!("; proven to be the best order within {tolerance:.1} %"),
+        (None, Some(gap)) => {
+            format!("; no order exceeds {:.1} K, so this one is within {gap:.1} %", bound.min_gradient_k)
+        }
+        (None, None) => String::new(),
+    };
+    plan.bound
+        .as_ref()
+        .filter(|_| plan.objective == VisitOrder::MinGradient.name())
+        .map_or_else(String::new, bound_text)
+}
+
+/// Time of the steps, minutes.
+fn minutes(plan: &Plan) -> f64 {
+    plan.steps.iter().map(|step| step.dwell_s).sum::<f64>() / 60.0
+}
+
+/// For machines: gradients, minutes and predicted errors by order, the plan first.
+pub fn comparison_json(plan: &Plan, others: &[Plan]) -> Value {
+    let entry = |plan: &Plan| {
+        json!({
+            "order": plan.objective,
+            "minutes": minutes(plan),
+            "sum_gradient_k": plan.figures.sum_gradient_k,
+            "min_gradient_k": plan.figures.min_gradient_k,
+            "rms_error_eta": plan.figures.rms_error_eta,
+            "rms_error_reported_eta": plan.figures.rms_error_reported_eta,
+            "worst_error_eta": plan.figures.worst_error_eta,
+        })
+    };
+    std::iter::once(plan).chain(others).map(entry).collect()
+}
+
+/// A row for each order, the plan first.
+pub fn plan_comparison(plan: &Plan, others: &[Plan]) -> Document {
+    let heads = ["order", "steps min", "total K", "min K", "rms pts", "worst pts", "stated pts"];
+    let row = |plan: &Plan| {
+        let figures = &plan.figures;
+        [
+            plan.objective.clone(),
+            format!("{:.0}", minutes(plan)),
+            format!("{:.0}", figures.sum_gradient_k),
+            number(figures.min_gradient_k, 1),
+            percent(figures.rms_error_eta, 2),
+            percent(figures.worst_error_eta, 2),
+            percent(figures.rms_error_reported_eta, 2),
+        ]
+    };
+    let mut document = Document::default();
+    document.table(Table::new(heads).rows(std::iter::once(plan).chain(others).map(row)));
+    document.text(format!(
+        "total, min: sum and minimum of the thermal gradients. rms, worst: expected error of the efficiency over the points, one sigma, if the machine is as \
+         declared; stated: rms of the intervals, which contain other values of alpha_A, probe and heating/cooling ratio. \
+         conventional: each point until T2 and housing drift by less than {STABLE_DRIFT_K_MIN} K/min; its error is heat transfer."
+    ));
+    document
+}
+
+/// The same for a program, SI.
+pub fn jump_json(jump: &JumpForecast) -> serde_json::Value {
+    json!({
+        "from": jump.from,
+        "to": jump.to,
+        "predicted": jump.predicted,
+        "p3_change_pa": jump.p3_change_pa,
+        "longest_surge_s": jump.longest_surge_s,
+        "highest_speed_rpm": jump.highest_speed_rpm,
+        "highest_t2_k": jump.highest_t2_k,
+        "allowed": jump.rejections.is_empty(),
+        "rejections": jump.rejections.iter().map(ToString::to_string).collect::<Vec<_>>(),
+    })
+}
+
+/// The result of the jump from the steady state of its first point, and each reason against it.
+pub fn jump_forecast(campaign: &Campaign, jump: &JumpForecast) -> Document {
+    let display = Display::new(&campaign.display);
+    let predicted = &jump.predicted;
+    // A method that identifies all steps together has no error of a single jump.
+    let points = |error: Option<f64>| {
+        error.map_or_else(
+            || "not of one jump alone".to_owned(),
+            |error| format!("{} points", percent(Some(error), 2)),
+        )
+    };
+    let mut document = Document::default();
+    document.text(format!(
+        "{} -> {} (from the steady state of the first)",
+        display.place(jump.from),
+        display.place(jump.to)
+    ));
+    let change = jump.p3_change_pa / 1e3;
+    let rows = [
+        ("change of P3", format!("{change:+.1} kPa")),
+        ("dT2 in the window", format!("{} K", number(predicted.dt2_k, 2))),
+        ("dTc in the window", format!("{} K", number(predicted.dtc_k, 2))),
+        ("settles after", format!("{} s", number(predicted.settle_s, 1))),
+        ("standard error of eta", points(predicted.sigma_eta)),
+        ("bias of the method", points(predicted.bias_eta)),
+        ("beyond the surge line", format!("{:.2} s without interruption", jump.longest_surge_s)),
+        ("highest speed", format!("{} {}", display.speed(jump.highest_speed_rpm), campaign.display.speed)),
+        (
+            "highest T2",
+            format!("{} {}", display.temperature(jump.highest_t2_k), campaign.display.temperature),
+        ),
+    ];
+    document.facts("", rows);
+    if jump.rejections.is_empty() {
+        document.text("Allowed.");
+    }
+    jump.rejections.iter().for_each(|rejection| document.text(format!("Not allowed: {rejection}.")));
+    document
+}
+
+/// A row for each step of the plan.
+pub(crate) fn executed_plan_table(
+    plan: &Plan,
+    recording: &Recording,
+    points: &[ScoredPoint],
+    display: &Display,
+) -> Table {
+    let mut table = Table::new([
+        "step".to_owned(),
+        display.speed_head("from @ opening,"),
+        display.speed_head("to @ opening,"),
+        display.speed_head("N reached"),
+        "lasted s".to_owned(),
+        "planned s".to_owned(),
+        "dTc K".to_owned(),
+        "sigma of eta expected, points".to_owned(),
+        "sigma of eta achieved, points".to_owned(),
+    ])
+    .caption("Steps")
+    .with_texts([1, 2]);
+    for step in &plan.steps {
+        let point = points.iter().map(|scored| &scored.point).find(|point| point.step == step.index);
+        table.row_of_step(point.map(|point| point.step), cells(step, recording, point, display));
+    }
+    table
+}
+
+fn cells(
+    step: &PlanStep,
+    recording: &Recording,
+    point: Option<&mapper_core::IdentifiedPoint>,
+    display: &Display,
+) -> Vec<Cell> {
+    let marker = recording.steps.iter().find(|marker| marker.index == step.index);
+    let tenths = |value: Option<f64>| Cell::optional(value, |value| number(Some(value), 1));
+    let in_points = |sigma: Option<f64>| Cell::optional(sigma, |sigma| percent(Some(sigma), 2));
+    let achieved = point.and_then(|point| Some(standard_error_of(point.eta_low?, point.eta_high?)));
+    vec![
+        Cell::number(step_number(step.index).to_string(), step.index as f64),
+        step.from.map_or_else(|| "-".to_owned(), |from| display.place(from)).into(),
+        display.place(step.to).into(),
+        Cell::optional(point.map(|point| point.speed_rpm), |rpm| display.speed(rpm)),
+        tenths(marker.map(|marker| marker.end_s - marker.start_s)),
+        tenths(Some(step.dwell_s)),
+        tenths(point.and_then(|point| point.dtc_k)),
+        in_points(step.predicted.reported_sigma_eta.or(step.predicted.sigma_eta)),
+        in_points(achieved),
+    ]
+}

@@ -301,7 +301,7 @@ mod tests {
         assert_eq!(through(&[5.0]).0, [5.0]);
     }
 
-    fn through(rate_hz: f64, rows: usize) -> Vec<(f64, Vec<f64>)> {
+    fn averaged(rate_hz: f64, rows: usize) -> Vec<(f64, Vec<f64>)> {
         let (mut blocks, mut out) = (BlockAverager::default(), Vec::new());
         let mut take = |t_s: f64, values: &[f64]| out.push((t_s, values.to_owned()));
         for row in 0..rows {
@@ -315,7 +315,7 @@ mod tests {
 
     #[test]
     fn a_fast_log_is_averaged_to_ten_hertz() {
-        let out = through(100.0, 1000);
+        let out = averaged(100.0, 1000);
         assert_eq!(out.len(), 100);
         for (index, (t_s, values)) in out.iter().enumerate() {
             // Ten samples from 0.1 i to 0.1 i + 0.09 s have their mean in the middle; a ramp stays a ramp.
@@ -341,13 +341,13 @@ mod tests {
 
     #[test]
     fn a_slow_log_is_not_changed() {
-        let out = through(10.0, 300);
+        let out = averaged(10.0, 300);
         assert_eq!(out.len(), 300);
         assert!(
             out.iter()
                 .enumerate()
                 .all(|(row, (t_s, values))| *t_s == row as f64 / 10.0 && values[0] == 5.0 * t_s)
         );
-        assert_eq!(through(10.0, 3).len(), 3);
+        assert_eq!(averaged(10.0, 3).len(), 3);
     }
 }

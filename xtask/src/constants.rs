@@ -19,11 +19,7 @@ pub const NOT_YET: &[&str] = &["crates/diagnose/", "crates/maps/src/table"];
 const FORMULAS: &[(&str, &[f64], &str)] = &[
     ("crates/identify/src/joint/fit/input_noise_spline.rs", &[0.25, 3.0, 6.0], "natural cubic spline"),
     ("crates/recording/src/logs/proposal/shared_units.rs", &[4.0], "area of a circle"),
-    (
-        "crates/numerics/src/coloured_noise.rs",
-        &[6.0, 24.0, 120.0, 720.0, 5040.0],
-        "series of e^-x",
-    ),
+    ("crates/numerics/src/coloured_noise.rs", &[6.0, 24.0, 120.0, 720.0, 5040.0], "series of e^-x"),
     ("crates/numerics/src/minimise.rs", &[3.0], "Brent's rule of the shortest step"),
     ("crates/numerics/src/root.rs", &[4.0], "Brent's tolerance"),
     (

@@ -37,6 +37,7 @@ pub use identification::warning::{
     ModelDoubt, ModelEvidence, NoCompression, PoorFit, Scaled, StepConflict, SuspectedFault, Swapped, TooFew,
     Warning, WideInterval,
 };
+pub use json_messages::{JsonMessages, Sentences, with_sentences};
 pub use maps::imported_map::{
     DescribedColumn, DesignPoint, ImportRemark, ImportedColumn, ImportedMap, LineEnd, MapDescription,
     MeasuredPoint, MeasuredTurbinePoint, StaticTaps, TurbineReadings,
@@ -91,7 +92,6 @@ pub use test_plan::plan_remark::{
 };
 pub use test_plan::points::{Dwell, Jump, OperatingPoint, Repeats, Timing, VisitOrder};
 pub use test_plan::step_number::step_number;
-pub use json_messages::{JsonMessages, Sentences, with_sentences};
 pub use text::{
     coloured_text, one_line, probability_text, readable, shorten_numbers, temperature, terminal_json,
     terminal_text, with_unit,

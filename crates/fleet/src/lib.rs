@@ -14,9 +14,9 @@ mod status;
 mod submit;
 mod work;
 
-pub use directory::files::{FleetError, StudyFileError};
 pub use directory::files::Hash;
 pub use directory::files::Machine;
+pub use directory::files::{FleetError, StudyFileError};
 pub use directory::fleet::CreatedStudy;
 pub use directory::fleet::Fleet;
 pub use directory::fleet::kind_of;

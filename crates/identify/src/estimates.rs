@@ -4,7 +4,7 @@ use crate::evidence::Evidence;
 use crate::faults::balances::efficiency::FittedEfficiencies;
 use crate::faults::found_fault::{FoundFault, Suspect};
 use crate::faults::nominal_rig::NominalRig;
-use crate::joint::{Joint, DynamicEfficiency};
+use crate::joint::{DynamicEfficiency, Joint};
 use crate::reading_checks::failed_check::FailedCheck;
 use crate::single_step::dynamic::Estimate;
 use crate::single_step::steady;

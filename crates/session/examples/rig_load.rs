@@ -21,8 +21,8 @@ use mapper_core::{
 use mapper_recording::{ChannelMap, ReadOptions, read_recording};
 use mapper_session::{InterruptedRun, Registry, RunRequest, Session, SessionEvent};
 use std::path::Path;
-use std::sync::{Arc, Mutex};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 /// Log of the stand's actions.

@@ -412,8 +412,7 @@ fn the_functions_that_a_campaign_passes_exist() {
         let text = fs::read_to_string(repository().join(file)).unwrap();
         for name in cells[1].split('`').skip(1).step_by(2) {
             let function = name.rsplit("::").next().unwrap();
-            let is_defined =
-                ["(", "<"].iter().any(|after| text.contains(&format!("fn {function}{after}")));
+            let is_defined = ["(", "<"].iter().any(|after| text.contains(&format!("fn {function}{after}")));
             assert!(is_defined, "{file} has no function {name}");
             count += 1;
         }

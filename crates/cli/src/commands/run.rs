@@ -15,8 +15,8 @@ use mapper_live::{LiveError, LiveRun, ObserverRequest, Observers, TlsFiles};
 use mapper_report::{plan_document, with_messages};
 use mapper_session::recording::run_directory;
 use mapper_session::{
-    InterruptedRun, Operator, Phase, PreparedRun, RunOutcome, RunRequest, Session,
-    SessionError, SessionEvent, load_on, soak_s, start_time_ns,
+    InterruptedRun, Operator, Phase, PreparedRun, RunOutcome, RunRequest, Session, SessionError,
+    SessionEvent, load_on, soak_s, start_time_ns,
 };
 use serde_json::json;
 use std::path::{Path, PathBuf};

@@ -4,7 +4,7 @@ use crate::output::failure::{Code, Failure};
 use crate::output::standard_error::{say, wrap_for_terminal};
 use clap::Args;
 use mapper_core::{terminal_json, terminal_text};
-use mapper_report::{Document, Paint, with_messages, wrapped};
+use mapper_report::{Document, Paint, with_messages};
 use mapper_session::{Existing, MapOut, MapWork, SessionError, write_file};
 use serde::Serialize;
 use std::io::{ErrorKind, Write};

@@ -1,7 +1,9 @@
 //! Recordings of a campaign on one axis of time, their repeats, and whether they can be compared.
 
 use crate::drift::causes::Cause;
-use mapper_core::{Channel, Implausible, ModelTolerances, NoiseColour, Recording, StepPoint, check_running, step_number};
+use mapper_core::{
+    Channel, Implausible, ModelTolerances, NoiseColour, Recording, StepPoint, check_running, step_number,
+};
 use mapper_identify::{IdentifyConfig, LONGEST_BRIDGE_S};
 use mapper_numerics::coloured_noise::ColouredNoise;
 use mapper_numerics::statistics::median;

@@ -4,7 +4,9 @@ use crate::gap::findings::warning::GapWarning;
 use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::study::{PredictError, Study};
 use crate::gap::residuals::true_inputs::Actuators;
-use mapper_core::{Channel, Implausible, Recording, StepMarker, check_running, is_commanded_jump, step_number};
+use mapper_core::{
+    Channel, Implausible, Recording, StepMarker, check_running, is_commanded_jump, step_number,
+};
 use mapper_numerics::statistics::median;
 use mapper_observe::averages::time_table::{GAP_INTERVALS, Table};
 use mapper_observe::channels::INPUT_CHANNELS;

@@ -5,7 +5,10 @@
 //! sensor is identified by its own readings.
 
 use crate::redundant_sensors::element_fault::ElementFault;
-use mapper_core::{COARSE_REPEAT_S, COARSE_REPEAT_SAMPLES, Channel, FaultKind, NoiseColour, RedundantSensors, Series, is_reading, repeats};
+use mapper_core::{
+    COARSE_REPEAT_S, COARSE_REPEAT_SAMPLES, Channel, FaultKind, NoiseColour, RedundantSensors, Series,
+    is_reading, repeats,
+};
 use mapper_numerics::coloured_noise::ColouredNoise;
 use mapper_numerics::statistics::mean;
 use mapper_physics::laws::thermocouple;

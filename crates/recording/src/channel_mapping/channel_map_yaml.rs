@@ -4,7 +4,9 @@ use crate::channel_mapping::channel_map::UNKNOWN_WORD;
 use crate::channel_mapping::channel_map_schema::SCHEMA;
 use crate::format::TRUTH_PREFIX;
 use crate::logs::{LogOptions, OPTION_KEYS};
-use crate::{AmbientPressure, Barometer, ChannelMap, ChannelSource, MachineConstants, RecordError, WindowLimits};
+use crate::{
+    AmbientPressure, Barometer, ChannelMap, ChannelSource, MachineConstants, RecordError, WindowLimits,
+};
 use mapper_core::{Channel, DeclaredUncertainty, Element, NoiseColour, RedundantSensors, ReferenceState};
 use mapper_table::{difference, kind_of, parse_quantity, remedy, unit};
 use mapper_yaml::keys::KeyError;

@@ -1,7 +1,7 @@
 //! Records of an MCAP file or chunk, one after the other, parsed without trusting any length. `mcap`'s own readers stop at the first fault, allocate a stated length (4 GB for a damaged string), and panic on a short attachment.
 
-use std::io;
 use std::collections::BTreeMap;
+use std::io;
 use std::io::Read;
 
 /// Start of every MCAP file.

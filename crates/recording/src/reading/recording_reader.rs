@@ -10,7 +10,9 @@ use crate::reading::scan::{ReadOptions, ScanResult, scan};
 use crate::samples::clock_steps::{repair_gaps, repair_set_back, repair_set_forward};
 use crate::samples::rig_sink::{PositionedMessage, RigSink};
 use crate::samples::series_builder::{SeriesBuilder, run_time_s};
-use crate::step_detection::jump_steps::{can_be_searched, drop_rest_steps, hold_at_step_ends, reversal_share, steps_from_jumps};
+use crate::step_detection::jump_steps::{
+    can_be_searched, drop_rest_steps, hold_at_step_ends, reversal_share, steps_from_jumps,
+};
 use crate::step_detection::steps::{hollow_steps, steps_from_commands, steps_from_markers};
 use crate::writing::recording_file::OriginMessage;
 use crate::{AmbientPressure, ChannelMap, ChannelSource, FormatVersion, ReadWarning, RecordError};

@@ -2,7 +2,10 @@
 
 use crate::logs::LogFormats;
 use crate::mcap::chunk::{Batch, ChunkError, Item, UnpackedChunk, Unpacker};
-use crate::mcap::records::{ChannelDefinition, Frame, FrameReader, MAGIC, Sink, op, parse_attachment, parse_channel, parse_message, parse_metadata, parse_schema, split_record};
+use crate::mcap::records::{
+    ChannelDefinition, Frame, FrameReader, MAGIC, Sink, op, parse_attachment, parse_channel, parse_message,
+    parse_metadata, parse_schema, split_record,
+};
 use crate::{DamagedPart, ReadWarning, RecordError};
 use std::collections::BTreeMap;
 use std::io;

@@ -4,14 +4,14 @@ use crate::FormatVersion;
 use crate::format::{CAMPAIGN_NAME, FORMAT_KEY, METADATA_NAME, PLAN_NAME, START_KEY};
 use crate::writing::topics::Topic;
 use mapper_core::{Channel, Quality, ReadingOrigin, SampleBatch};
-use mcap::{Attachment, Compression, McapError, McapResult, WriteOptions, Writer};
 use mcap::records::Metadata;
 use mcap::write::NoSeek;
+use mcap::{Attachment, Compression, McapError, McapResult, WriteOptions, Writer};
 use serde::{Deserialize, Serialize};
-use std::io;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs::File;
+use std::io;
 use std::io::BufWriter;
 
 /// Chunks are built in memory, without seeking, so that the file ends with a whole chunk at every flush.

@@ -10,7 +10,7 @@ use mapper_chart::MapDrawing;
 use mapper_core::{
     Channel, CompressorMap, IdentifiedPoint, Recording, StepMarker, half_width_95, standard_error_of,
 };
-use mapper_identify::{T2History, DynamicEfficiency};
+use mapper_identify::{DynamicEfficiency, T2History};
 use mapper_numerics::statistics::{mean, rms};
 use serde::Serialize;
 

@@ -3,7 +3,11 @@
 use crate::document::{Sentence, number, sentence, signed};
 use crate::formatting::four_figures;
 use crate::message::Message;
-use mapper_core::{Bound, CalibrationDefect, Channel, Dimension, EndEvidence, EtaSignal, FitFailure, HeatCorrected, Implausible, LeftOut, MapRegion, ModelDoubt, ModelEvidence, NoCompression, PoorFit, Scaled, StepConflict, SuspectedFault, Swapped, TooFew, Warning, WideInterval, with_unit};
+use mapper_core::{
+    Bound, CalibrationDefect, Channel, Dimension, EndEvidence, EtaSignal, FitFailure, HeatCorrected,
+    Implausible, LeftOut, MapRegion, ModelDoubt, ModelEvidence, NoCompression, PoorFit, Scaled, StepConflict,
+    SuspectedFault, Swapped, TooFew, Warning, WideInterval, with_unit,
+};
 
 impl Message for Warning {
     fn message(&self) -> String {

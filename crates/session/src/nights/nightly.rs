@@ -253,7 +253,12 @@ impl NightlyRun {
         Ok(Recorded::of(recording.to_owned(), read, Some(self.campaign.clone())))
     }
 
-    fn record(&self, plan: &Plan, session: &Session<'_>, recording: &Path) -> Result<RunEnding, SessionError> {
+    fn record(
+        &self,
+        plan: &Plan,
+        session: &Session<'_>,
+        recording: &Path,
+    ) -> Result<RunEnding, SessionError> {
         let mut backend = session.registry.make_sources(&self.campaign, &self.model)?.backend;
         let header = RecordingHeader {
             library: PROGRAM.to_owned(),

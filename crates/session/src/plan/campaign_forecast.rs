@@ -373,9 +373,13 @@ pub(crate) fn forecast_verdicts(campaign: &Campaign, plan: &Plan) -> Option<Verd
         UndeclaredForecast { good, eta_standard_error }
     });
     let prior_sensitivity_eta = plan.figures.prior_sensitivity_eta.unwrap_or(0.0);
-    let is_enough = |prior_sensitivity_ratio: f64| prior_sensitivity_ratio * prior_sensitivity_eta <= MAX_PRIOR_SENSITIVITY_ETA;
-    let (low, high) =
-        (informative && is_enough(PRIOR_SENSITIVITY_RATIOS.1), informative || is_enough(PRIOR_SENSITIVITY_RATIOS.0));
+    let is_enough = |prior_sensitivity_ratio: f64| {
+        prior_sensitivity_ratio * prior_sensitivity_eta <= MAX_PRIOR_SENSITIVITY_ETA
+    };
+    let (low, high) = (
+        informative && is_enough(PRIOR_SENSITIVITY_RATIOS.1),
+        informative || is_enough(PRIOR_SENSITIVITY_RATIOS.0),
+    );
     Some(VerdictForecast {
         points: best.len(),
         good: if informative { good(1.0) } else { 0 },

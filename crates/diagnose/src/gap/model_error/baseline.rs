@@ -226,7 +226,13 @@ pub(crate) fn same_steps(baseline: &Study, study: &Study) -> Result<(), Problem>
         // Model error hardly changes between points that count as one.
         let (p3_kpa, opening) = (ours.p3_pa / 1e3, ours.valve_opening_ratio);
         differs("commanded P3", theirs.p3_pa / 1e3, p3_kpa, "kPa", jump_ratio(Channel::P3) * p3_kpa)?;
-        differs("opening of the valve", theirs.valve_opening_ratio, opening, "", jump_ratio(Channel::ValveCommand) * opening)?;
+        differs(
+            "opening of the valve",
+            theirs.valve_opening_ratio,
+            opening,
+            "",
+            jump_ratio(Channel::ValveCommand) * opening,
+        )?;
         // The running time before the first jump is not compared.
         if index > 0 {
             differs(

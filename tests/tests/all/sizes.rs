@@ -1,18 +1,22 @@
-//! Files small enough to be read in one go.
+//! Files and folders of a size that a reader takes in: one concept a file, and no more code than the program needs.
 
 use mapper_tests::repository;
 use mapper_tests::tree::{packages, production_lines};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
-/// Half of all files have at most so many lines before their tests.
-const MEDIAN_LINES: usize = 120;
-/// No file has more, unless its first comment says why.
-const LONGEST_LINES: usize = 500;
+/// No file has more lines before its tests: an hour's reading.
+const LONGEST_LINES: usize = 600;
+/// A file of fewer lines holds a part of a concept.
+const SHORT_LINES: usize = 60;
+/// Maximum share of short files; it may only fall, to a tenth.
+const MAX_SHORT_SHARE: f64 = 0.18;
+/// Maximum number of production files; it may only fall, to 650.
+const MAX_FILES: usize = 960;
+/// Maximum number of production lines; it may only fall, to 118 000, which a few engineers can own.
+const MAX_LINES: usize = 132_000;
 /// All of the program's own crate, tests included: what decides anything lies below it.
 const CLI_LINES: usize = 5_000;
-/// Files that are longer without saying why: to be emptied.
-const KNOWN: &[&str] = &[];
 
 /// Entries of a folder of sources, its own `mod.rs`, `lib.rs` or `main.rs` not counted: as many as a reader keeps in view.
 const FOLDER_ENTRIES: usize = 12;
@@ -25,38 +29,54 @@ const ONE_FILE_PER_THING: &[&str] = &[
     "plugins/logs/src",
 ];
 
-/// The word by which a first comment says why a file is as long as it is.
-const REASON: &str = "One file because";
+/// Files whose name says that they are a list of what stands beside them.
+fn is_list(place: &str) -> bool {
+    ["/mod.rs", "/lib.rs", "/main.rs"].iter().any(|name| place.ends_with(name))
+}
+
+/// Production lines of every file, by its path from the root of the repository.
+fn lengths() -> BTreeMap<String, usize> {
+    let files = packages().into_iter().flat_map(|package| package.files);
+    files
+        .map(|file| {
+            let text = std::fs::read_to_string(&file).unwrap();
+            let place = file.strip_prefix(repository()).unwrap().to_string_lossy().replace('\\', "/");
+            (place, production_lines(&text))
+        })
+        .collect()
+}
+
+/// The counts are printed: `cargo xtask test` shows them.
+#[test]
+fn the_tree_is_small_enough_to_own() {
+    let lengths = lengths();
+    let mut of_package = BTreeMap::<String, usize>::new();
+    for (place, lines) in &lengths {
+        let package = place.split("/src/").next().unwrap_or(place);
+        *of_package.entry(package.to_owned()).or_default() += lines;
+    }
+    for (package, lines) in &of_package {
+        println!("{lines:7} {package}");
+    }
+    let total: usize = lengths.values().sum();
+    println!("{total:7} production lines in {} files", lengths.len());
+    assert!(total <= MAX_LINES, "{total} production lines, at most {MAX_LINES}: remove what nobody would miss");
+    assert!(lengths.len() <= MAX_FILES, "{} files, at most {MAX_FILES}: a file holds a concept", lengths.len());
+}
 
 #[test]
-fn production_files_are_small() {
-    let mut lengths = Vec::new();
-    for file in packages().into_iter().flat_map(|package| package.files) {
-        let text = std::fs::read_to_string(&file).unwrap();
-        let place = file.strip_prefix(repository()).unwrap().to_string_lossy().replace('\\', "/");
-        let head: Vec<&str> = text.lines().take_while(|line| line.starts_with("//!")).collect();
-        lengths.push((production_lines(&text), place, head.join(" ").contains(REASON)));
-    }
-    lengths.sort();
-    let too_long: Vec<_> = lengths
-        .iter()
-        .filter(|(lines, place, has_reason)| {
-            *lines > LONGEST_LINES && !has_reason && !KNOWN.contains(&place.as_str())
-        })
-        .map(|(lines, place, _)| format!("{place}: {lines}"))
-        .collect();
+fn a_file_holds_one_concept() {
+    let lengths = lengths();
+    let too_long: Vec<_> = lengths.iter().filter(|(_, lines)| **lines > LONGEST_LINES).collect();
+    assert!(too_long.is_empty(), "files of more than {LONGEST_LINES} lines, to be split: {too_long:?}");
+    let files: Vec<_> = lengths.iter().filter(|(place, _)| !is_list(place)).collect();
+    let short: Vec<_> = files.iter().filter(|(_, lines)| **lines < SHORT_LINES).collect();
     assert!(
-        too_long.is_empty(),
-        "files of more than {LONGEST_LINES} lines; split them, or start a sentence of the first comment with \
-         `{REASON}`:\n{}",
-        too_long.join("\n")
+        short.len() as f64 <= MAX_SHORT_SHARE * files.len() as f64,
+        "{} of {} files have fewer than {SHORT_LINES} lines; merge those that hold a part of a concept:\n{short:?}",
+        short.len(),
+        files.len()
     );
-    for known in KNOWN {
-        let short = lengths.iter().any(|(lines, place, _)| place == known && *lines <= LONGEST_LINES);
-        assert!(!short, "{known} is short enough now: take it off the list in {}", file!());
-    }
-    let (median, place, _) = &lengths[lengths.len() / 2];
-    assert!(*median <= MEDIAN_LINES, "the median file, {place}, has {median} lines");
 }
 
 #[test]

@@ -151,13 +151,19 @@ pub struct Numbers {
 }
 
 /// The numbers of a source text.
+///
+/// # Errors
+/// That of the parser if it is not Rust.
 pub fn numbers(text: &str) -> Result<Numbers, syn::Error> {
     let mut numbers = Numbers { lines: text.lines().map(str::to_owned).collect(), ..Numbers::default() };
     numbers.visit_file(&syn::parse_file(text)?);
     Ok(numbers)
 }
 
-/// The page of all constants; every violation if there is one.
+/// The page of all constants.
+///
+/// # Errors
+/// Every violation, a line each, or the file that cannot be read.
 pub fn page(root: &Path) -> Result<String, String> {
     let violations = violations(root)?;
     if !violations.is_empty() {
@@ -255,6 +261,9 @@ fn unit(name: &str) -> &'static str {
 }
 
 /// Literals outside constants, constants without a kind, and entries of [`NOT_YET`] that are clean: one line each.
+///
+/// # Errors
+/// The file that cannot be read.
 pub fn violations(root: &Path) -> Result<Vec<String>, String> {
     let (mut violations, mut unfinished) = (Vec::new(), Vec::new());
     for name in CRATES {
@@ -326,7 +335,8 @@ impl Numbers {
         let counts = typed.is_none_or(is_number);
         // A table of texts is none, unless it has a number like 0.3.
         let floats = content.floats && (!content.texts || content.chosen || matches!(value, Expr::Struct(_)));
-        if !floats && !(content.integers && !content.texts && counts) {
+        let whole = content.integers && !content.texts && counts;
+        if !(floats || whole) {
             return;
         }
         let comment = comment(attributes);

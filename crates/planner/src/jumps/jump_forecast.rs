@@ -121,13 +121,16 @@ pub fn forecast_all_jumps(request: &PlanRequest<'_>) -> Result<Vec<JumpForecast>
     Ok(jumps.into_iter().map(|(_, jump)| jump).collect())
 }
 
+/// The forecast of a jump, with the indices of start and destination.
+type ForecastBetween = ((usize, usize), JumpForecast);
+
 /// Forecasts all jumps between points with these steady states; with the indices of start and destination.
 pub(crate) fn forecast_jumps(
     request: &PlanRequest<'_>,
     points: &[OperatingPoint],
     targets: &[SteadyState],
     dwell_s: f64,
-) -> Result<Vec<((usize, usize), JumpForecast)>, PlanError> {
+) -> Result<Vec<ForecastBetween>, PlanError> {
     let count = points.len();
     let jumps =
         (0..count).flat_map(|from| (0..count).filter(move |to| *to != from).map(move |to| (from, to)));

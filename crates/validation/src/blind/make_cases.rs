@@ -103,7 +103,7 @@ pub fn seal(
         campaign: campaign.to_owned(),
         laboratory,
         baseline,
-        former: (),
+        former: FormerKey,
         cases: answers.iter().map(|answer| answer.name.clone()).collect(),
         answers_sha256: sha256(&bytes),
     };
@@ -172,15 +172,19 @@ pub struct Manifest {
     pub baseline: bool,
     /// The former key of `baseline`.
     #[serde(default, skip_serializing, rename = "healthy", deserialize_with = "former_key")]
-    pub(crate) former: (),
+    pub(crate) former: FormerKey,
     /// Names of the cases; each has a recording NAME.mcap.
     pub cases: Vec<String>,
     /// SHA-256 of the file of answers.
     pub answers_sha256: String,
 }
 
+/// A key that no manifest may have.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct FormerKey;
+
 /// Refuses the key of earlier programs.
-fn former_key<'de, D: Deserializer<'de>>(_: D) -> Result<(), D::Error> {
+fn former_key<'de, D: Deserializer<'de>>(_: D) -> Result<FormerKey, D::Error> {
     Err(Error::custom(
         "`healthy` is now `baseline`, and NAME.healthy.mcap is NAME.baseline.mcap: rename them, or make the cases again",
     ))

@@ -46,7 +46,7 @@ fn without_noise_every_point_of_the_nominal_machine_is_right() {
         (value(&law.exponent) - 1.13).abs() < 0.002 && (value(&law.coefficient) / 0.004 - 1.0).abs() < 0.02
     );
     assert!(thermal.doubts.is_empty(), "{:?}", thermal.doubts);
-    assert!(points[0].warnings.iter().any(|warning| warning.code() == "through_the_law"));
+    assert!(points[0].warnings.iter().any(|warning| warning.code() == "from_convection_law"));
 }
 
 /// The twelve reference jumps of the paper's table: each in its own kind of campaign, two levels at three openings.

@@ -79,9 +79,7 @@ fn a_diagnosis_opens_in_a_browser_with_all_its_pictures() {
     let text = std::fs::read_to_string(whole).unwrap();
     let section = text.split("id=\"gap\"").nth(1).unwrap();
     assert!(section.contains("(stem_conduction) explains the gap") && section.matches("<svg").count() == 6);
-    for heading in
-        ["Causes", "Place in the machine", "Difference between measured and computed readings", "What to do"]
-    {
+    for heading in ["Causes", "Location", "Evidence", "What to do"] {
         assert!(dom.contains(&format!("<h2>{heading}")), "{heading}");
     }
     assert!(dom.contains("<ol><li>"), "a cause that is named leads to actions");

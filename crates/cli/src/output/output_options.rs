@@ -1,6 +1,5 @@
 //! Options that every command has, and those for more detail.
 
-use crate::output::standard_output;
 use crate::terminal::{
     ColourChoice, DetailLevel, Progress, ProgressFormat, is_coloured, understands_escapes,
 };
@@ -52,7 +51,6 @@ pub fn set_options(arguments: &OutputOptions, matches: &ArgMatches) {
     let replaces = command.is_some_and(|of| of.try_contains_id("force").unwrap_or(false));
     // It is kept once: `main` alone calls this.
     let _ = CHOSEN.set(ChosenOptions { colour, progress, json, replaces });
-    standard_output::choose_paint(paint());
 }
 
 /// Whether invalid arguments request JSON, and their choice of colours.
@@ -89,7 +87,7 @@ pub fn has_force() -> bool {
 }
 
 /// Colours of standard output.
-fn paint() -> Paint {
+pub fn paint() -> Paint {
     if coloured(shows_escapes(&std::io::stdout())) { Paint::Coloured } else { Paint::Plain }
 }
 

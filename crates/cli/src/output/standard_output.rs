@@ -1,15 +1,15 @@
 //! Standard output: the results of commands, as text or as one JSON object, and the files that they write.
 
 use crate::output::failure::{Code, Failure};
+use crate::output::output_options::paint;
 use crate::output::standard_error::{say, wrap_for_terminal};
 use clap::Args;
 use mapper_core::{terminal_json, terminal_text};
-use mapper_report::{Document, Paint, with_messages};
+use mapper_report::{Document, with_messages};
 use mapper_session::{Existing, MapOut, MapWork, SessionError, write_file};
 use serde::Serialize;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 use terminal_size::terminal_size_of;
 
@@ -77,18 +77,9 @@ fn write(text: &str) -> Result<(), Failure> {
     })
 }
 
-/// The colours of documents, chosen on the command line.
-static PAINT: OnceLock<Paint> = OnceLock::new();
-
-/// Stores the colours of documents.
-pub fn choose_paint(paint: Paint) {
-    // It is kept once: the options are set once.
-    let _ = PAINT.set(paint);
-}
-
 /// Writes a document.
 pub fn show(document: &Document) -> Result<(), Failure> {
-    print(&document.terminal(PAINT.get().copied().unwrap_or_default()))
+    print(&document.terminal(paint()))
 }
 
 /// Writes warnings, already formatted, to standard error.

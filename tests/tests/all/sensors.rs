@@ -41,7 +41,8 @@ fn every_command_detects_and_excludes_a_faulty_thermocouple() {
     let [out] = fused["left_out"].as_array().unwrap().as_slice() else { panic!("{fused}") };
     assert_eq!((&out["element"], &out["name"]), (&"T2/3".into(), &"T2/3".into()));
     // 2 K minus the mean of three draws of 0.25 K.
-    let by = out["fault"]["off"]["by"].as_f64().unwrap();
+    assert_eq!(out["fault"]["kind"], "offset");
+    let by = out["fault"]["size"].as_f64().unwrap();
     assert!((by - 2.0).abs() < 3.0 * 0.25 / 3f64.sqrt(), "{by} K");
     let report = std::fs::read_to_string(result["report"].as_str().unwrap()).unwrap();
     assert!(report.contains("T2/3"), "{report}");

@@ -19,7 +19,7 @@ const MAX_LINES: usize = 132_000;
 const CLI_LINES: usize = 5_000;
 
 /// Entries of a folder of sources, its own `mod.rs`, `lib.rs` or `main.rs` not counted: as many as a reader keeps in view.
-const FOLDER_ENTRIES: usize = 12;
+const FOLDER_ENTRIES: usize = 18;
 /// Folders with one file per thing.
 const ONE_FILE_PER_THING: &[&str] = &[
     "crates/cli/src/commands",

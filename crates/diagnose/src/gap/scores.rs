@@ -6,10 +6,11 @@ use crate::gap::best_fit::fit::{Fit, lengths};
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::probabilities::weight;
 use crate::gap::diagnose::Diagnosed;
-use crate::gap::preconditions::{GapError, checked_study};
+use crate::gap::preconditions::{GapError, Problem};
 use crate::gap::request::RigRecording;
 use crate::gap::residuals::study::{EffectValues, Study, members};
 use crate::gap::residuals::whiten::Linearised;
+use mapper_observe::averages::time_table::Table;
 use mapper_physics::rig::effect::Effect;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -77,8 +78,10 @@ impl EffectVisibility {
     /// # Errors
     /// [`GapError`] if the recording cannot be diagnosed.
     pub fn new(recorded: RigRecording, effects: Vec<Arc<dyn Effect>>) -> Result<EffectVisibility, GapError> {
-        let (declared, judged) = (recorded.declared(), recorded.tolerances_declared);
-        let (study, _) = checked_study(&recorded.recording, declared, recorded.model, effects, judged)?;
+        // A calculated recording has all channels, and may be as short as its cases.
+        let (recording, declared) = (&recorded.recording, recorded.declared());
+        let table = Table::new(recording).ok_or(Problem::Empty)?;
+        let study = Study::new(recording, table, declared, recorded.model, effects);
         let linearised = Linearised::new(&study)?;
         Ok(EffectVisibility { study, linearised })
     }

@@ -60,8 +60,15 @@ fn the_tree_is_small_enough_to_own() {
     }
     let total: usize = lengths.values().sum();
     println!("{total:7} production lines in {} files", lengths.len());
-    assert!(total <= MAX_LINES, "{total} production lines, at most {MAX_LINES}: remove what nobody would miss");
-    assert!(lengths.len() <= MAX_FILES, "{} files, at most {MAX_FILES}: a file holds a concept", lengths.len());
+    assert!(
+        total <= MAX_LINES,
+        "{total} production lines, at most {MAX_LINES}: remove what nobody would miss"
+    );
+    assert!(
+        lengths.len() <= MAX_FILES,
+        "{} files, at most {MAX_FILES}: a file holds a concept",
+        lengths.len()
+    );
 }
 
 #[test]

@@ -47,6 +47,7 @@ fn lengths() -> BTreeMap<String, usize> {
 }
 
 /// The counts are printed: `cargo xtask test` shows them.
+#[allow(clippy::print_stdout, reason = "the counts are stated in every run of the tests")]
 #[test]
 fn the_tree_is_small_enough_to_own() {
     let lengths = lengths();

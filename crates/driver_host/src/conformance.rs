@@ -1,4 +1,4 @@
-//! The rules of the interface [`Backend`](mapper_core::Backend) that every backend must keep ([`RULES`], `mapper backend check NAME`).
+//! The rules of the interface [`Backend`] that every backend must keep ([`RULES`], `mapper backend check NAME`).
 
 use mapper_core::{Backend, BackendError, RigMode, SampleBatch, Setpoints};
 use std::collections::BTreeSet;

@@ -47,7 +47,7 @@ impl Variant {
     /// separated by comma or semicolon; an empty cell keeps the campaign's value. Lines that begin with `#` are comments.
     ///
     /// # Errors
-    /// [`VariantError`] with the line.
+    /// `VariantError` with the line.
     pub fn read(path: &Path) -> Result<Vec<Variant>, VariantError> {
         let unread = |source| VariantError::Read(path.to_owned(), source);
         let bytes = mapper_yaml::read_limited(path, MAX_TABLE_BYTES).map_err(unread)?;
@@ -137,7 +137,7 @@ impl Variant {
     /// Puts the machine into a campaign.
     ///
     /// # Errors
-    /// [`VariantError::Occupied`]. The backend itself checks for unknown settings.
+    /// `VariantError::Occupied`. The backend itself checks for unknown settings.
     pub fn apply_to(&self, campaign: &mut Campaign) -> Result<(), VariantError> {
         campaign.machine.serial_number = Some(self.serial_number.clone());
         for (key, text) in &self.settings {

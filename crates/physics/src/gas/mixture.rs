@@ -175,7 +175,7 @@ impl Gas {
     /// A mixture. The fractions are scaled to a sum of 1; they must not be negative, and one must be above 0.
     ///
     /// ```
-    /// use mapper_physics::gas::{mixture::Gas, species::Species};
+    /// use mapper_physics::gas::mixture::{Gas, Species};
     /// let nitrogen = Gas::of_mole_fractions([(Species::N2, 1.0)]);
     /// // CoolProp 6: 1.0396 kJ/(kg K) at 300 K, at zero pressure.
     /// assert!((nitrogen.heat_capacity_j_kgk(300.0) / 1039.6 - 1.0).abs() < 5e-4);

@@ -38,7 +38,7 @@ pub enum PrintError {
 /// directories.
 ///
 /// # Errors
-/// [`PrintError`].
+/// `PrintError`.
 pub fn page_as_pdf(page: &str, directory: &Path) -> Result<Vec<u8>, PrintError> {
     let browser = BROWSERS.into_iter().find(|name| is_on_path(name)).ok_or(PrintError::NoBrowser)?;
     let failed = |source| PrintError::System(browser, source);

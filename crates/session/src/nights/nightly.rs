@@ -146,7 +146,7 @@ impl NightlyRun {
     /// A campaign with a method, a seed and, optionally, one of several machines.
     ///
     /// # Errors
-    /// [`VariantError`] if the machine cannot be put into the campaign.
+    /// `VariantError` if the machine cannot be put into the campaign.
     pub fn new(
         mut campaign: Campaign,
         model: Model,

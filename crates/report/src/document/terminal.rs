@@ -13,7 +13,7 @@ const NARROWEST: usize = 5;
 /// Minimum width of a column of text that is broken into lines: some three words.
 const TEXT: u16 = 24;
 /// Widest column of names in front of values.
-const NAMES: usize = 34;
+const NAMES: usize = 54;
 
 /// Whether words are coloured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -61,13 +61,13 @@ fn write(text: &mut String, document: &Document, paint: Paint) {
         if matches!(block, Block::Section(section) if section.is_for_browsers()) {
             continue;
         }
-        let separated = matches!(block, Block::Table(_) | Block::Section(_));
+        let separated = is_separated(block);
         // A heading is directly above its content.
         if (separated && !text.is_empty() && !text.ends_with(":\n") || after_table) && !text.ends_with("\n\n")
         {
             text.push('\n');
         }
-        after_table = matches!(block, Block::Table(_) | Block::Section(_));
+        after_table = is_separated(block);
         match block {
             Block::Paragraph(words, tone) => text.push_str(&match tone {
                 Tone::Verdict(verdict) => {
@@ -100,6 +100,11 @@ fn write(text: &mut String, document: &Document, paint: Paint) {
     }
 }
 
+/// Whether a blank line stands before and after the block.
+fn is_separated(block: &Block) -> bool {
+    matches!(block, Block::Table(_) | Block::Facts(_) | Block::Section(_))
+}
+
 /// Values behind the column of their names.
 fn write_facts(text: &mut String, facts: &Facts) {
     if !facts.caption.is_empty() {
@@ -109,6 +114,7 @@ fn write_facts(text: &mut String, facts: &Facts) {
     let width = longest.min(NAMES) + 2;
     for (name, value) in &facts.rows {
         let lines = wrapped(value, COLUMNS - width, 0).replace('\n', &format!("\n{}", " ".repeat(width)));
+        let name = format!("{name}  ");
         text.push_str(format!("{name:<width$}{}", lines.trim_end()).trim_end());
         text.push('\n');
     }
@@ -276,6 +282,14 @@ mod tests {
         let text = laid_out(&table);
         assert!(fits(&text) && text.contains("12.5"), "{text}");
         assert!(words.split(' ').all(|word| text.split_whitespace().any(|shown| shown == word)), "{text}");
+    }
+
+    #[test]
+    fn a_name_of_any_length_is_apart_from_its_value() {
+        let mut document = Document::default();
+        document.facts("", [("short", "1 K".to_owned()), (&"long ".repeat(14), "2 K".to_owned())]);
+        let text = document.to_string();
+        assert!(text.lines().all(|line| line.ends_with("  1 K") || line.ends_with("  2 K")), "{text}");
     }
 
     #[test]

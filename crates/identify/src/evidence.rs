@@ -1,4 +1,4 @@
-//! What each step of a recording shows on its own: its end state, its two-parameter fit, and the checks that its readings fail.
+//! What each step of a recording shows on its own: its end state, its dynamic fit, and the checks that its readings fail.
 
 use crate::reading_checks::ends::Ends;
 use crate::reading_checks::failed_check::FailedCheck;

@@ -74,7 +74,8 @@ impl Rules {
     pub fn cause_probabilities(&self, none: f64, sets: &[CauseSet], unmodelled: f64) -> CauseProbabilities {
         let ln_weights = std::iter::once(none).chain(sets.iter().map(|set| set.ln_weight));
         let shares = shares(&ln_weights.collect::<Vec<_>>(), self.temperature);
-        let modelled = 1.0 - unmodelled;
+        // A sum of shares may exceed 1 by rounding.
+        let modelled = (1.0 - unmodelled).max(0.0);
         let none_probability = modelled * shares[0];
         let listed = modelled * (1.0 - self.unlisted);
         let mut causes: Vec<RankedCause> = Vec::new();

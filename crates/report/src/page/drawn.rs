@@ -155,7 +155,7 @@ pub(crate) struct DrawnPoint {
     h: Option<f64>,
     h_low: Option<f64>,
     h_high: Option<f64>,
-    /// Result of the two-parameter method.
+    /// Result of the dynamic method.
     dynamic: Option<[f64; 3]>,
     valve: Option<f64>,
     verdict: &'static str,
@@ -183,7 +183,7 @@ pub(crate) fn drawn_points(report: &RunReport<'_>, display: &Display) -> Vec<Dra
         .collect()
 }
 
-/// A point on a line; `two`: its result by the two-parameter method.
+/// A point on a line; `two`: its result by the dynamic method.
 pub(crate) fn drawn_point(
     point: &IdentifiedPoint,
     line: String,

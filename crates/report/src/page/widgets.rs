@@ -21,7 +21,7 @@ const LAYERS: [(&str, &str, bool); 6] = [
     ("extrapolated", "extrapolation", false),
     ("intervals", "95 % intervals", true),
     ("repeats", "repeats", false),
-    ("dynamic", "two-parameter method", false),
+    ("dynamic", "dynamic method", false),
 ];
 
 /// The interactive map.

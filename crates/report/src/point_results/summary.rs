@@ -21,7 +21,7 @@ pub struct PointResults<'a> {
     pub points: &'a [ScoredPoint],
     /// The map; `None` if there is none.
     pub map: Option<&'a CompressorMap>,
-    /// Results of the two-parameter method for the same steps, if another method was used.
+    /// Results of the dynamic method for the same steps, if another method was used.
     pub dynamic: &'a [DynamicEfficiency],
     /// Jumps that were made more than once.
     pub repeats: &'a [RepeatedJump],

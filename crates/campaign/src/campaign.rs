@@ -10,6 +10,7 @@ pub use crate::elements::points::repeats::SequenceSource;
 use crate::elements::points::repeats::{RepeatsFile, SurgeSearchFile, repeats, sequence};
 use crate::elements::points::timing::{TimingFile, ZeroFile};
 pub use crate::elements::rig::backend::{BackendChoice, ReaderChoice};
+use crate::elements::rig::actuators::RigFile;
 use crate::elements::rig::backend::{ReaderFile, backend, readers};
 use crate::elements::rig::calibration::Calibration;
 pub use crate::elements::rig::calibration::{CalibrationRule, Date};
@@ -24,7 +25,7 @@ pub use crate::elements::turbocharger::machine::{DescriptionSource, Machine, Map
 use crate::elements::turbocharger::reference::{EfficiencyFile, ReferenceFile};
 use mapper_core::{
     AcceptanceCriteria, Channel, EfficiencyDefinition, GuardSet, Limits, ModelTolerances, OnDrift,
-    OperatingPoint, ReferenceState, Repeats, SafeTrajectory, Soak, SpeedControlSettings, SurgeSearchSettings,
+    OperatingPoint, ReferenceState, Repeats, RigActuators, SafeTrajectory, Soak, SpeedControlSettings, SurgeSearchSettings,
     Timing, VisitOrder,
 };
 use mapper_physics::machine::params::BoundaryConditions;
@@ -105,6 +106,9 @@ pub struct Campaign {
     pub seed: u64,
     /// Limits of the run.
     pub limits: Limits,
+    /// Motion of the stand's actuators; `None` if the file declares neither them nor a stroke of P3.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub actuators: Option<RigActuators>,
     /// The guards that the file declares; [`Campaign::guard_set`] has those in force.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub guards: Option<GuardSet>,
@@ -122,6 +126,11 @@ pub struct Campaign {
 }
 
 impl Campaign {
+    /// Motion of the stand's actuators: as declared, or that of a fast stand.
+    pub fn rig_actuators(&self) -> RigActuators {
+        self.actuators.unwrap_or_default()
+    }
+
     /// The guards of a run: those declared, or one at each limit.
     pub fn guard_set(&self) -> GuardSet {
         let inputs = GuardInputs {
@@ -169,6 +178,9 @@ pub(crate) struct CampaignFile {
     /// The rig, by the name of its backend, with the backend's own settings below it, e.g. `virtual_lab: {}`. The backend checks its settings.
     #[schemars(length(min = 1, max = 1), extend("minProperties" = 1, "maxProperties" = 1), example = serde_json::json!({"virtual_lab": {}}))]
     backend: BTreeMap<String, serde_json::Value>,
+    /// The gas stand: how fast its actuators follow their commands. If it is omitted, P3 and valve follow within a second.
+    #[schemars(example = serde_json::json!({"actuators": "screw_compressor"}))]
+    rig: Option<RigFile>,
     /// Auxiliary instruments by any name, e.g. a flow meter unknown to the PLC: read alongside the rig, never commanded.
     #[serde(default)]
     #[schemars(extend("maxProperties" = 16), example = serde_json::json!({"flow_meter": {"backend": {"ak": {}}}}))]
@@ -241,7 +253,8 @@ impl CampaignFile {
         files: &dyn Fn(&Path) -> io::Result<String>,
     ) -> io::Result<(Campaign, Vec<Vec<Step>>)> {
         let (boundary, follow_outlet) = (self.boundary.conditions(), self.boundary.follow_outlet());
-        let limits = self.limits.into();
+        let limits: Limits = self.limits.into();
+        let rig = self.rig.or_else(|| limits.p3_stroke_s.map(|_| RigFile::default()));
         let reference = self.reference.map_or(ReferenceState::SAE, ReferenceState::from);
         let lines = self.grid.lines(reference, &limits);
         let (points, point_paths) = self.grid.points(&lines, boundary.t1_k);
@@ -298,6 +311,7 @@ impl CampaignFile {
             surge_search: self.surge_search.map(SurgeSearchFile::settings),
             seed: self.seed.unwrap_or(DEFAULT_SEED),
             limits,
+            actuators: rig.map(|rig| rig.actuators(&limits)),
             guards,
             safe_state: self.safe_state.map(SafeStateFile::trajectory),
             reference,

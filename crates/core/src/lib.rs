@@ -76,6 +76,7 @@ pub use measurement::redundant::{DeclaredElement, Element, MAX_ELEMENTS, Redunda
 pub use measurement::sensor_fault::{
     COARSE_REPEAT_S, COARSE_REPEAT_SAMPLES, FaultKind, FrozenLimit, NOISY_REPEAT_S, repeats,
 };
+pub use rig::actuators::{ActuatorMotion, RigActuators};
 pub use rig::backend::{
     Backend, BackendCause, BackendError, Clock, PacedClock, RigDescription, RigMode, SetpointRange,
     SetpointRanges, Setpoints, UnpacedClock, WallClock,
@@ -92,6 +93,7 @@ pub use test_plan::plan_remark::{
 };
 pub use test_plan::points::{Dwell, Jump, OperatingPoint, Repeats, Timing, VisitOrder};
 pub use test_plan::step_number::step_number;
+pub use test_plan::transition::{Ramp, Ramps, Transition};
 pub use text::{
     coloured_text, one_line, probability_text, readable, shorten_numbers, temperature, terminal_json,
     terminal_text, with_unit,

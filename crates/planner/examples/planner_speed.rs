@@ -5,7 +5,7 @@
 
 #![allow(clippy::print_stdout, reason = "what it prints is what it is for")]
 
-use mapper_core::{Dwell, Limits, OperatingPoint, Repeats, SettleBands, Timing, VisitOrder, WindowRule};
+use mapper_core::{Dwell, Limits, OperatingPoint, RigActuators, Repeats, SettleBands, Timing, VisitOrder, WindowRule};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::reach::FollowOutlet;
 use mapper_physics::simulation::model::Model;
@@ -68,7 +68,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             t2_max_k: None,
             surge_margin_min_ratio: None,
             housing_gradient_max_k: None,
+            overshoot_max_ratio: None,
         },
+        actuators: RigActuators::default(),
         repeats: Some(Repeats { jump: None, every_steps: 12, at_least: 2 }),
         return_to_first: true,
         appended: None,

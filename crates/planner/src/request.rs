@@ -2,7 +2,9 @@
 
 use crate::jumps::jump_graph::Rejection;
 use crate::jumps::jump_graph::SeparatePoints;
-use mapper_core::{Jump, Limits, OperatingPoint, Repeats, SettleBands, Timing, VisitOrder, WindowRule};
+use mapper_core::{
+    Jump, Limits, OperatingPoint, Repeats, RigActuators, SettleBands, Timing, VisitOrder, WindowRule,
+};
 pub use mapper_core::{MethodResult, MethodResults};
 use mapper_physics::machine::params::BoundaryConditions;
 pub use mapper_physics::operating_point::forecast::ForecastRow;
@@ -36,6 +38,8 @@ pub struct PlanRequest<'a> {
     pub settle_bands: SettleBands,
     /// Limits of every step.
     pub limits: Limits,
+    /// Motion of the stand's actuators.
+    pub actuators: RigActuators,
     /// Repeated jumps to detect drift.
     pub repeats: Option<Repeats>,
     /// Visits the first point once more at the end, because no jump leads to it at the start.

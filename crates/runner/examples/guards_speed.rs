@@ -103,6 +103,7 @@ fn plan() -> Plan {
         oil_temperature_k: 323.15,
         dwell_s: HOUR_S + 60.0,
         start_s: 0.0,
+        transition: None,
         predicted: Predicted::settled(0.05, 1.5, 350.0, HOUR_S),
     };
     Plan {

@@ -22,6 +22,7 @@ pub use guards::surge_watch::SurgeWatch;
 pub use run_control::observer::{ObserverError, Operator, Protection, RunError, RunObserver};
 pub use run_control::run::Runner;
 pub use run_control::speed_control::{ResponseAt, SpeedControl, SpeedControlLimits};
+pub use run_control::transition_control::StandMotion;
 pub use step_sources::drift_watch::DriftWatch;
 pub use step_sources::step_source::{PlanSteps, SoakSource, StepSource, StepSourceError};
 pub use step_sources::surge_search::{HoldConditions, HoldConditionsAt, SurgeSearch};

@@ -25,6 +25,7 @@ fn step(index: usize) -> PlanStep {
         oil_temperature_k: 323.15,
         dwell_s: 100.0,
         start_s: 100.0 * index as f64,
+        transition: None,
         predicted: Predicted::settled(0.05, 1.5, 350.0, 120.0),
     }
 }

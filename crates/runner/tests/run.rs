@@ -32,6 +32,7 @@ pub fn plan() -> Plan {
         oil_temperature_k: 323.15,
         dwell_s: 20.0,
         start_s: 10.0 + 20.0 * index as f64,
+        transition: None,
         predicted: Predicted::settled(0.0, 1.0, 300.0, 20.0),
     };
     Plan {

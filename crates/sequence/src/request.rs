@@ -1,10 +1,14 @@
 //! The request of a sequence, and the forecast of its steps.
 
-use mapper_core::{Limits, OperatingPoint, Predicted, SettleBands, Timing, WindowRule};
+use mapper_core::{
+    Limits, OperatingPoint, Predicted, RigActuators, SettleBands, Timing, Transition, WindowRule,
+};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::forecast::{forecast_step, hold, warm_up_state};
 use mapper_physics::operating_point::reach::FollowOutlet;
 use mapper_physics::operating_point::reach::{describe_obstacles, reach};
+use mapper_physics::operating_point::transition::TransitionInputs;
+use mapper_physics::operating_point::transition_forecast::{Stand, forecast_transition};
 use mapper_physics::simulation::model::{Model, State};
 use mapper_physics::simulation::simulate::SimulationError;
 use mapper_physics::simulation::steady::SteadyState;
@@ -30,6 +34,8 @@ pub struct SequenceRequest {
     pub follow_outlet: FollowOutlet,
     /// Limits of every step.
     pub limits: Limits,
+    /// Motion of the stand's actuators.
+    pub actuators: RigActuators,
     /// The planner.
     pub order: OrderPoints,
 }
@@ -57,35 +63,57 @@ impl SequenceRequest {
 /// Maximum difference between executed and planned duration for a step to end in the planned state, s: one forecast interval.
 const PLANNED_TOLERANCE_S: f64 = 0.5;
 
+/// The forecast of a step.
+pub(crate) struct StepPrediction {
+    pub predicted: Predicted,
+    /// The way from the point before; `None` for the first step.
+    pub transition: Option<Transition>,
+    pub dwell_s: f64,
+}
+
 /// State of the nominal machine along a sequence.
 pub(crate) struct NominalForecast {
     /// State at the start of the current step; `None` before the first.
     state: Option<State>,
+    /// Steady state of the latest step's point.
+    from: Option<SteadyState>,
     /// Planned duration of the current step, s, and its final state.
     planned: Option<(f64, State)>,
 }
 
 impl NominalForecast {
     pub(crate) fn new() -> Self {
-        NominalForecast { state: None, planned: None }
+        NominalForecast { state: None, from: None, planned: None }
     }
 
-    /// Predicts the result of a step to `target`.
+    /// Predicts the result of a step to `target`, with its duration, s, and its way from the point before.
+    ///
+    /// On a stand that arrives late the step lasts longer than requested.
     pub(crate) fn forecast(
         &mut self,
         request: &SequenceRequest,
         target: &SteadyState,
         dwell_s: f64,
-        has_jump: bool,
-    ) -> Result<Predicted, SimulationError> {
+    ) -> Result<StepPrediction, SimulationError> {
         let state = match self.state {
             Some(state) => state,
             None => warm_up_state(&request.model, target.state, &target.boundary, request.timing.warm_up_s)?,
         };
         self.state = Some(state);
-        let step = forecast_step(&request.model, state, &target.boundary, dwell_s)?;
+        let (step, transition, dwell_s) = match self.from.replace(*target) {
+            Some(from) => {
+                let stand = Stand { limits: &request.limits, actuators: &request.actuators };
+                let forecast = forecast_transition(&request.model, state, (&from, target), stand, dwell_s)?;
+                (forecast.step, Some(forecast.transition), forecast.dwell_s)
+            }
+            None => {
+                let inputs = TransitionInputs::constant(&target.boundary);
+                (forecast_step(&request.model, state, &inputs, 0.0, dwell_s)?, None, dwell_s)
+            }
+        };
         self.planned = Some((dwell_s, step.end));
-        Ok(step.predicted(&request.window, &request.settle_bands, has_jump))
+        let predicted = step.predicted(&request.window, &request.settle_bands, transition.is_some());
+        Ok(StepPrediction { predicted, transition, dwell_s })
     }
 
     /// Ends the current step after `duration_s`.

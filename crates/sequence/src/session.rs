@@ -1,7 +1,7 @@
 //! The implementation of the functions that a script calls.
 
 use crate::error::throw;
-use crate::request::{NominalForecast, Refusal, SequenceRequest};
+use crate::request::{NominalForecast, Refusal, SequenceRequest, StepPrediction};
 use crate::settle::SettleRule;
 use crate::step::{EndCondition, ScriptMessage, SequenceStep, StepResult};
 use mapper_core::{OperatingPoint, PlanStep, StepKind};
@@ -192,8 +192,8 @@ impl Session {
         let target = self.check(to)?;
         let from = self.results.last().map(|result| result.target);
         let fail = |error| throw(format!("the forecast of the step to {to} failed: {error}"), "");
-        let predicted =
-            self.nominal.forecast(&self.request, &target, dwell_s, from.is_some()).map_err(fail)?;
+        let StepPrediction { predicted, transition, dwell_s } =
+            self.nominal.forecast(&self.request, &target, dwell_s).map_err(fail)?;
         let visited = self.results.iter().any(|result| result.target.is_same_place(&to));
         let step = PlanStep {
             index,
@@ -205,6 +205,7 @@ impl Session {
             oil_temperature_k: target.boundary.oil_temperature_k,
             dwell_s,
             start_s,
+            transition,
             predicted,
         };
         let notes = std::mem::take(&mut self.notes);

@@ -35,6 +35,7 @@ fn request() -> SequenceRequest {
             t3_max_k: None,
             surge_margin_min_ratio: None,
             housing_gradient_max_k: None,
+            overshoot_max_ratio: None,
         },
         order: Box::new(|points| Ok(points.iter().rev().copied().collect())),
     }

@@ -125,6 +125,7 @@ fn nominal_rig(campaign: &Campaign, model: &Model, effects: &[Arc<dyn Effect>]) 
     NominalRig {
         model: model.clone(),
         boundary: campaign.boundary,
+        actuators: campaign.rig_actuators(),
         speed_max_rpm: campaign.limits.speed_max_rpm,
         redundant: sensors()
             .filter_map(|(channel, sensor)| {

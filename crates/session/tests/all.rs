@@ -6,3 +6,4 @@ mod hostile_plans;
 mod joint_plan;
 mod reduce;
 mod speed;
+mod stands;

@@ -74,8 +74,8 @@ fn noisy() -> LabSettings {
     };
     LabSettings {
         sensors: [(Channel::T2, errors), (Channel::T1, errors)].into(),
-        p3_actuator: ActuatorDynamics { lag_s: 0.3, slew_per_s: 50e3 },
-        valve_actuator: ActuatorDynamics { lag_s: 0.2, slew_per_s: 1.0 },
+        p3_actuator: ActuatorDynamics::new(0.3, 50e3),
+        valve_actuator: ActuatorDynamics::new(0.2, 1.0),
         seed: 42,
         ..ideal()
     }

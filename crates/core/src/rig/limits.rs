@@ -28,12 +28,37 @@ pub struct Limits {
     pub surge_margin_min_ratio: Option<f64>,
     /// Largest change of the compressor housing within a window, K.
     pub housing_gradient_max_k: Option<f64>,
+    /// Largest overshoot of the shaft speed in a transition, relative to the higher of its two targets; `None` means
+    /// [`Limits::OVERSHOOT_RATIO`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub overshoot_max_ratio: Option<f64>,
 }
 
 impl Limits {
     /// Maximum rate of the turbine inlet pressure, Pa/s; `None` if no stroke is given.
     pub fn p3_slew_max_pa_s(&self) -> Option<f64> {
         self.p3_stroke_s.map(|stroke_s| (self.p3_max_pa - self.p3_min_pa) / stroke_s)
+    }
+
+    /// Default of the largest overshoot. Judgement: twice the band within which guards expect the speed of a step.
+    pub const OVERSHOOT_RATIO: f64 = 0.02;
+    /// Default of the smallest surge margin of a transition. Judgement: the usual uncertainty of a surge line.
+    pub const TRANSITION_MARGIN_RATIO: f64 = 0.05;
+    /// Room below the margins of two close points for the jump between them. Judgement: warm housings heat the outlet gas, which takes some
+    /// tenths of a per cent of the valve's flow.
+    const CLOSE_POINT_RATIO: f64 = 0.01;
+
+    /// Largest allowed overshoot, relative to the higher of the two targets of a transition.
+    pub fn overshoot_ratio(&self) -> f64 {
+        self.overshoot_max_ratio.unwrap_or(Self::OVERSHOOT_RATIO)
+    }
+
+    /// Minimum surge margin of a transition between points with these margins: the declared one, or
+    /// [`Limits::TRANSITION_MARGIN_RATIO`]. A point that is closer is reached with nearly its own margin.
+    pub fn transition_margin_ratio(&self, from_ratio: f64, to_ratio: f64) -> f64 {
+        let ends_ratio = from_ratio.min(to_ratio) - Self::CLOSE_POINT_RATIO;
+        let limit_ratio = self.surge_margin_min_ratio.unwrap_or(Self::TRANSITION_MARGIN_RATIO);
+        limit_ratio.min(ends_ratio.max(self.surge_margin_floor_ratio().min(0.0)))
     }
 
     /// Minimum surge margin of a point: the declared one, or the surge line.
@@ -120,8 +145,10 @@ pub struct SpeedResponse {
     pub rpm_per_pa: f64,
     /// Relative change of P3 per relative change of the turbine's power, ratio, > 0.
     pub p3_per_power: f64,
-    /// Time constant with which the speed follows P3's command, actuator included, s, > 0.
+    /// Time constant with which the speed follows P3's command, the actuator's lag included, s, > 0.
     pub time_constant_s: f64,
+    /// Lag and dead time of P3 behind its command, s, >= 0.
+    pub delay_s: f64,
 }
 
 /// The closed loop over the shaft speed, as declared in the campaign.

@@ -4,3 +4,4 @@ pub(crate) mod plan;
 pub(crate) mod plan_remark;
 pub(crate) mod points;
 pub mod step_number;
+pub(crate) mod transition;

@@ -1,6 +1,7 @@
 //! The plan as data: steps, their order, and the expected results.
 
 use crate::OperatingPoint;
+use crate::test_plan::transition::Transition;
 use crate::test_plan::plan_remark::{NoBound, PlanRemark, deserialize_no_bound, deserialize_remarks};
 use serde::{Deserialize, Serialize};
 
@@ -110,6 +111,9 @@ pub struct PlanStep {
     pub dwell_s: f64,
     /// Start of the step after the start of the run, s (warm-up included).
     pub start_s: f64,
+    /// Ramps from the point before, and their forecast; `None` for the first step, and for small steps.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub transition: Option<Transition>,
     /// Results expected from the nominal model.
     pub predicted: Predicted,
 }

@@ -2,6 +2,8 @@
 
 use crate::machine::params::BoundaryConditions;
 use crate::operating_point::settled::{settled_count, with_bands};
+use crate::operating_point::transition::TransitionInputs;
+use crate::simulation::inputs::Inputs;
 use crate::simulation::model::{Model, State};
 use crate::simulation::simulate::{Crossing, DEFAULT_RELATIVE_TOLERANCE, SimulationError, Simulator, Watch};
 use mapper_core::{Predicted, SettleBands, WindowRule};
@@ -10,6 +12,11 @@ use mapper_core::{Predicted, SettleBands, WindowRule};
 const SAMPLE_S: f64 = 0.5;
 /// Maximum number of samples of a forecast; steps of more than 10 000 s are sampled more coarsely.
 const MAX_SAMPLES: f64 = 20_000.0;
+
+/// Samples for each row while P3 and valve move: speed and surge margin are judged ten times a second. Judgement: a tenth of a shaft's time constant.
+const FINE_SAMPLES: usize = 5;
+/// Time after the arrival of P3 and valve in which the shaft follows, s. Bound: the time constants of turbochargers are below a few seconds.
+const FINE_AFTER_ARRIVAL_S: f64 = 5.0;
 
 /// A row of a forecast: the machine at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,8 +56,8 @@ pub struct StepForecast {
     pub highest_speed_rpm: f64,
     /// Highest reading of the outlet probe during the step, K. Before the first row the probe still shows the previous point.
     pub highest_t2_k: f64,
-    /// Longest time beyond the surge line, s.
-    pub longest_surge_s: f64,
+    /// Lowest surge margin during the step: flow over the surge flow at equal corrected speed, minus one.
+    pub lowest_surge_margin_ratio: f64,
 }
 
 /// The machine after `duration_s` at `boundary`.
@@ -83,60 +90,78 @@ pub fn warm_up_state(
     hold(model, State { tc_k: ambient_k, tt_k: ambient_k, ..first }, boundary, warm_up_s)
 }
 
-/// The step of `dwell_s` from `state` at `boundary`.
+/// The step of `dwell_s` from `state` under `inputs`, which move until `arrival_s`.
 ///
 /// # Errors
 /// [`SimulationError`] if the simulation fails.
 pub fn forecast_step(
     model: &Model,
     state: State,
-    boundary: &BoundaryConditions,
+    inputs: &TransitionInputs,
+    arrival_s: f64,
     dwell_s: f64,
 ) -> Result<StepForecast, SimulationError> {
     let mut simulator = Simulator::new(model, 0.0, state, DEFAULT_RELATIVE_TOLERANCE, Watch::default());
     let mut rows: Vec<ForecastRow> = Vec::new();
-    let (mut surge_since_s, mut longest_surge_s) = (None, 0.0f64);
     let interval_s = SAMPLE_S.max(dwell_s / MAX_SAMPLES);
-    let count = (dwell_s / interval_s).floor() as usize;
-    let times = (0..=count).map(|i| i as f64 * interval_s).filter(|t| *t < dwell_s).chain([dwell_s]);
+    let fine_end_s = arrival_s + FINE_AFTER_ARRIVAL_S;
+    let times = sample_times(interval_s, fine_end_s, dwell_s);
+    let mut are_rows = times.iter().map(|(_, is_row)| *is_row);
+    let (mut lowest_margin_ratio, mut highest_rpm, mut highest_t2_k) = (f64::INFINITY, 0.0f64, 0.0f64);
+    let mut crossed = false;
     simulator.run_to(
         dwell_s,
-        boundary,
-        times,
+        inputs,
+        times.iter().map(|(t_s, _)| *t_s),
         |t_s, state, outputs| {
-            rows.push(ForecastRow {
-                t_s,
-                speed_rpm: state.shaft_speed_rpm(),
-                flow_kg_s: outputs.flow_kg_s,
-                t1_k: boundary.t1_k,
-                p1_pa: boundary.p1_pa,
-                p2_pa: state.p2_pa,
-                t2_k: outputs.t2_probe_k,
-                tc_k: state.tc_k,
-                efficiency: outputs.efficiency,
-                h_w_m2k: outputs.h_w_m2k,
-            });
-        },
-        |event| match event.crossing {
-            Crossing::SurgeEntered => surge_since_s = Some(event.t_s),
-            Crossing::SurgeLeft => {
-                longest_surge_s = longest_surge_s.max(event.t_s - surge_since_s.take().unwrap_or(0.0));
+            let boundary = inputs.at(t_s);
+            let speed_rpm = state.shaft_speed_rpm();
+            let corrected_rpm = model.map.reference().corrected_speed_rpm(speed_rpm, boundary.t1_k);
+            let margin_ratio = outputs.flow_corrected_kg_s / model.map.surge_point(corrected_rpm).0 - 1.0;
+            lowest_margin_ratio = lowest_margin_ratio.min(margin_ratio);
+            highest_rpm = highest_rpm.max(speed_rpm);
+            highest_t2_k = highest_t2_k.max(outputs.t2_probe_k);
+            if are_rows.next() == Some(true) {
+                rows.push(ForecastRow {
+                    t_s,
+                    speed_rpm,
+                    flow_kg_s: outputs.flow_kg_s,
+                    t1_k: boundary.t1_k,
+                    p1_pa: boundary.p1_pa,
+                    p2_pa: state.p2_pa,
+                    t2_k: outputs.t2_probe_k,
+                    tc_k: state.tc_k,
+                    efficiency: outputs.efficiency,
+                    h_w_m2k: outputs.h_w_m2k,
+                });
             }
-            Crossing::OverspeedEntered | Crossing::OverspeedLeft => {}
         },
+        |event| crossed |= event.crossing == Crossing::SurgeEntered,
     )?;
-    if let Some(since_s) = surge_since_s {
-        longest_surge_s = longest_surge_s.max(dwell_s - since_s);
+    // A surge between two samples.
+    if crossed {
+        lowest_margin_ratio = lowest_margin_ratio.min(-f64::EPSILON);
     }
-    let highest = |value: fn(&ForecastRow) -> f64| rows.iter().map(value).fold(f64::NEG_INFINITY, f64::max);
     Ok(StepForecast {
-        highest_speed_rpm: highest(|row| row.speed_rpm),
-        highest_t2_k: highest(|row| row.t2_k),
-        longest_surge_s,
+        highest_speed_rpm: highest_rpm,
+        highest_t2_k,
+        lowest_surge_margin_ratio: lowest_margin_ratio,
         end: simulator.state(),
         interval_s,
         rows,
     })
+}
+
+/// Times of the samples, and whether each is a row: rows at `interval_s` and at the end, finer samples until `fine_end_s`.
+fn sample_times(interval_s: f64, fine_end_s: f64, dwell_s: f64) -> Vec<(f64, bool)> {
+    let fine_s = interval_s / FINE_SAMPLES as f64;
+    let count = (dwell_s / fine_s).floor() as usize;
+    let is_wanted = |(t_s, is_row): &(f64, bool)| *t_s < dwell_s && (*is_row || *t_s < fine_end_s);
+    let times = (0..=count).map(|i| match (i / FINE_SAMPLES, i % FINE_SAMPLES) {
+        (row, 0) => (row as f64 * interval_s, true),
+        _ => (i as f64 * fine_s, false),
+    });
+    times.filter(is_wanted).chain([(dwell_s, true)]).collect()
 }
 
 impl StepForecast {
@@ -197,7 +222,7 @@ mod tests {
         let model = Model::nominal();
         let boundary = BoundaryConditions { valve_opening_ratio: 0.7, ..BoundaryConditions::default() };
         let rest = hold_speed(&model, 110e3, &boundary).unwrap();
-        let forecast = forecast_step(&model, rest.state, &rest.boundary, 120.0).unwrap();
+        let forecast = forecast_step(&model, rest.state, &TransitionInputs::constant(&rest.boundary), 0.0, 120.0).unwrap();
         let predicted = forecast.predicted(&WindowRule::Auto, &SettleBands::default(), true);
         assert_eq!(predicted.settle_s, Some(0.0));
         // The integration's tolerance of 1e-6 at 400 K.
@@ -211,7 +236,7 @@ mod tests {
         let model = Model::nominal();
         let boundary = BoundaryConditions { valve_opening_ratio: 0.7, ..BoundaryConditions::default() };
         let rest = hold_speed(&model, 110e3, &boundary).unwrap();
-        let forecast = forecast_step(&model, rest.state, &rest.boundary, 120.0).unwrap();
+        let forecast = forecast_step(&model, rest.state, &TransitionInputs::constant(&rest.boundary), 0.0, 120.0).unwrap();
         let window = forecast.window((10.0, 110.0));
         assert_eq!((window[0].t_s, window[window.len() - 1].t_s), (10.0, 110.0));
         assert!(forecast.window((130.0, 140.0)).is_empty());

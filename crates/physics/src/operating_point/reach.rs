@@ -242,6 +242,7 @@ mod tests {
         t2_max_k: None,
         surge_margin_min_ratio: None,
         housing_gradient_max_k: None,
+        overshoot_max_ratio: None,
     };
 
     fn at(speed_rpm: f64, valve_opening_ratio: f64, limits: &Limits) -> Result<SteadyState, Vec<Obstacle>> {

@@ -5,18 +5,22 @@
 
 use crate::laws::turbine::TurbineInlet;
 use crate::machine::params::BoundaryConditions;
-use crate::rig::instruments::NOMINAL_P3_LAG_S;
 use crate::simulation::model::{Model, rad_s_of_rpm};
 use crate::simulation::steady::{SteadyError, hold_speed};
-use mapper_core::SpeedResponse;
+use mapper_core::{ActuatorMotion, SpeedResponse};
 
 /// Relative step of the finite differences: much larger than the tolerance of steady states, much smaller than any curvature.
 const STEP_RATIO: f64 = 1e-3;
 
-/// The response at `speed_rpm` under `boundary`, whose `p3_pa` is ignored. `None` if the machine has no steady state,
-/// or if the speed falls with rising P3.
-pub fn speed_response(model: &Model, speed_rpm: f64, boundary: &BoundaryConditions) -> Option<SpeedResponse> {
-    differentiate(model, speed_rpm, boundary).ok().filter(|response| {
+/// The response at `speed_rpm` under `boundary`, whose `p3_pa` is ignored, with a P3 that moves like `p3`. `None` if the machine has no steady
+/// state, or if the speed falls with rising P3.
+pub fn speed_response(
+    model: &Model,
+    speed_rpm: f64,
+    boundary: &BoundaryConditions,
+    p3: &ActuatorMotion,
+) -> Option<SpeedResponse> {
+    differentiate(model, speed_rpm, boundary, p3).ok().filter(|response| {
         [response.rpm_per_pa, response.p3_per_power, response.time_constant_s]
             .iter()
             .all(|value| value.is_finite() && *value > 0.0)
@@ -27,6 +31,7 @@ fn differentiate(
     model: &Model,
     speed_rpm: f64,
     boundary: &BoundaryConditions,
+    p3: &ActuatorMotion,
 ) -> Result<SpeedResponse, SteadyError> {
     let steady_state = hold_speed(model, speed_rpm, boundary)?;
     let faster_rpm = speed_rpm * (1.0 + STEP_RATIO);
@@ -45,13 +50,15 @@ fn differentiate(
     Ok(SpeedResponse {
         rpm_per_pa,
         p3_per_power: power_w(p3_pa) / (p3_pa * w_per_pa),
-        time_constant_s: shaft_s + NOMINAL_P3_LAG_S,
+        time_constant_s: shaft_s + p3.lag_s,
+        delay_s: p3.lag_s + p3.dead_time_s,
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use mapper_core::RigActuators;
     use crate::simulation::simulate::{DEFAULT_RELATIVE_TOLERANCE, Simulator, Watch};
 
     /// The integrated model after a small step of P3, with housings of constant temperature: the speed follows the gain, and
@@ -64,12 +71,13 @@ mod tests {
             model.params.compressor.housing_mass_kg = 1e3;
             model.params.turbine.housing_mass_kg = 1e3;
             let boundary = BoundaryConditions { valve_opening_ratio, ..BoundaryConditions::default() };
-            let response = speed_response(&model, speed_rpm, &boundary).unwrap();
+            let p3 = RigActuators::FAST_VALVE.p3;
+            let response = speed_response(&model, speed_rpm, &boundary, &p3).unwrap();
             let steady_state = hold_speed(&model, speed_rpm, &boundary).unwrap();
             let step_pa = 0.002 * steady_state.boundary.p3_pa;
             let stepped =
                 BoundaryConditions { p3_pa: steady_state.boundary.p3_pa + step_pa, ..steady_state.boundary };
-            let shaft_s = response.time_constant_s - NOMINAL_P3_LAG_S;
+            let shaft_s = response.time_constant_s - p3.lag_s;
             let mut simulator =
                 Simulator::new(&model, 0.0, steady_state.state, DEFAULT_RELATIVE_TOLERANCE, Watch::default());
             let mut rise_rpm = Vec::new();

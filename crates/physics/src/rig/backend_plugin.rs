@@ -4,7 +4,7 @@ use crate::machine::params::BoundaryConditions;
 use crate::rig::effect::Effect;
 use crate::simulation::model::Model;
 use mapper_core::{
-    Backend, BackendError, Channel, DeclaredUncertainty, ModelTolerances, RedundantSensors, Soak,
+    Backend, BackendError, Channel, DeclaredUncertainty, ModelTolerances, RedundantSensors, RigActuators, Soak,
 };
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -63,6 +63,8 @@ pub struct NominalRig {
     pub model: Model,
     /// Boundary conditions as declared.
     pub boundary: BoundaryConditions,
+    /// Motion of the actuators as declared.
+    pub actuators: RigActuators,
     /// The campaign's speed limit, rpm.
     pub speed_max_rpm: f64,
     /// One-sigma uncertainty of each sensor, in the channel's unit, as declared or as identification assumes it.

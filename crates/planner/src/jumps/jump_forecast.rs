@@ -3,7 +3,7 @@
 use crate::jumps::jump_graph::Rejection;
 use crate::request::{PlanError, PlanRequest, solve_steady_states};
 use crate::thermal_memory::forecast::{Forecast, forecast};
-use mapper_core::{OperatingPoint, Predicted, SURGE_ALLOWED_S};
+use mapper_core::{OperatingPoint, Predicted, WindowRule};
 use mapper_numerics::parallel;
 use mapper_physics::simulation::steady::SteadyState;
 
@@ -16,8 +16,10 @@ pub struct JumpForecast {
     pub to: OperatingPoint,
     /// Expected result.
     pub predicted: Predicted,
-    /// Longest period beyond the surge line, s.
-    pub longest_surge_s: f64,
+    /// Time until P3 and valve have arrived, s.
+    pub arrival_s: f64,
+    /// Lowest surge margin during the jump: flow over the surge flow at equal corrected speed, minus one.
+    pub lowest_surge_margin_ratio: f64,
     /// Highest shaft speed during the jump, rpm.
     pub highest_speed_rpm: f64,
     /// Highest outlet temperature during the jump, K.
@@ -34,24 +36,14 @@ pub struct JumpForecast {
 pub(crate) fn find_rejections(
     request: &PlanRequest<'_>,
     forecast: &Forecast,
-    p3_change_pa: f64,
-    t3_k: f64,
-    dwell_s: f64,
+    target: &SteadyState,
 ) -> Vec<Rejection> {
     let limits = &request.limits;
-    let mut found = Vec::new();
-    if forecast.step.longest_surge_s > SURGE_ALLOWED_S {
-        found.push(Rejection::Surge { longest_s: forecast.step.longest_surge_s, allowed_s: SURGE_ALLOWED_S });
-    }
-    if forecast.step.highest_speed_rpm > limits.speed_max_rpm {
-        found.push(Rejection::Overspeed {
-            highest_rpm: forecast.step.highest_speed_rpm,
-            limit_rpm: limits.speed_max_rpm,
-        });
-    }
+    let mut found = forecast.violations.clone();
     if let Some(limit_k) = limits.t2_max_k.filter(|limit_k| forecast.step.highest_t2_k > *limit_k) {
         found.push(Rejection::OutletTemperature { highest_k: forecast.step.highest_t2_k, limit_k });
     }
+    let t3_k = target.boundary.t3_k;
     if let Some(limit_k) = limits.t3_max_k.filter(|limit_k| t3_k > *limit_k) {
         found.push(Rejection::TurbineInletTemperature { t3_k, limit_k });
     }
@@ -59,12 +51,10 @@ pub(crate) fn find_rejections(
     if let Some(limit_k) = limits.housing_gradient_max_k.filter(|limit_k| gradient_k > *limit_k) {
         found.push(Rejection::HousingGradient { gradient_k, limit_k });
     }
-    if let Some(slew_pa_s) = limits.p3_slew_max_pa_s() {
-        let (available_s, _) = request.window.of_step_s(forecast.predicted.settle_s, dwell_s);
-        let needed_s = p3_change_pa.abs() / slew_pa_s;
-        if needed_s > available_s {
-            found.push(Rejection::Slew { needed_s, available_s });
-        }
+    if let (WindowRule::Fixed { start_s, .. }, Some(transition)) = (request.window, forecast.transition)
+        && transition.arrival_s > start_s
+    {
+        found.push(Rejection::Arrival { needed_s: transition.arrival_s, available_s: start_s });
     }
     found
 }
@@ -75,19 +65,19 @@ pub(crate) fn forecast_jump(
     (to, target): (OperatingPoint, &SteadyState),
     dwell_s: f64,
 ) -> Result<JumpForecast, PlanError> {
-    let forecast = forecast(request, start.state, &target.boundary, dwell_s, true)
+    let forecast = forecast(request, start.state, Some(start), target, dwell_s)
         .map_err(|source| PlanError::Forecast { to, source })?;
-    let p3_change_pa = target.boundary.p3_pa - start.boundary.p3_pa;
     Ok(JumpForecast {
         from,
         to,
         predicted: forecast.predicted,
-        longest_surge_s: forecast.step.longest_surge_s,
+        arrival_s: forecast.transition.map_or(0.0, |transition| transition.arrival_s),
+        lowest_surge_margin_ratio: forecast.step.lowest_surge_margin_ratio,
         highest_speed_rpm: forecast.step.highest_speed_rpm,
         highest_t2_k: forecast.step.highest_t2_k,
         p3_pa: target.boundary.p3_pa,
-        p3_change_pa,
-        rejections: find_rejections(request, &forecast, p3_change_pa, target.boundary.t3_k, dwell_s),
+        p3_change_pa: target.boundary.p3_pa - start.boundary.p3_pa,
+        rejections: find_rejections(request, &forecast, target),
     })
 }
 

@@ -1,6 +1,7 @@
 //! The jumps that no limit forbids, as a directed graph: the points that one order can reach, and ways around a forbidden jump.
 
 use mapper_core::{Jump, OperatingPoint, readable, temperature};
+use mapper_physics::operating_point::transition_forecast::{TransitionViolation, surge_excess_ratio};
 use petgraph::algo::{astar, tarjan_scc};
 use petgraph::graphmap::DiGraphMap;
 use std::collections::BTreeMap;
@@ -14,10 +15,15 @@ const SPEED_COST_RATIO: f64 = 1e-3;
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum Rejection {
-    #[error("it stays {longest_s:.1} s beyond the surge line; {allowed_s:.1} s are allowed")]
-    Surge { longest_s: f64, allowed_s: f64 },
+    #[error("its surge margin falls to {:.1} %; its limit is {:.1} %", 100.0 * .lowest_ratio, 100.0 * .limit_ratio)]
+    SurgeMargin { lowest_ratio: f64, limit_ratio: f64 },
     #[error("the shaft reaches {}; its limit is {}", readable(*.highest_rpm, "rpm"), readable(*.limit_rpm, "rpm"))]
     Overspeed { highest_rpm: f64, limit_rpm: f64 },
+    #[error(
+        "the shaft overshoots to {}, above its higher target, {}, by more than the allowed {:.1} %",
+        readable(*.highest_rpm, "rpm"), readable(*.target_rpm, "rpm"), 100.0 * (.limit_rpm / .target_rpm - 1.0)
+    )]
+    Overshoot { highest_rpm: f64, target_rpm: f64, limit_rpm: f64 },
     #[error("T2 reaches {}; its limit is {}", temperature(*.highest_k), temperature(*.limit_k))]
     OutletTemperature { highest_k: f64, limit_k: f64 },
     #[error("T3 is {}; its limit is {}", temperature(*.t3_k), temperature(*.limit_k))]
@@ -26,20 +32,42 @@ pub enum Rejection {
         "the housing temperature changes by {gradient_k:.1} K in the window; its limit is {limit_k:.1} K"
     )]
     HousingGradient { gradient_k: f64, limit_k: f64 },
-    #[error("P3 takes {needed_s:.1} s to reach its new value; the window begins after {available_s:.1} s")]
-    Slew { needed_s: f64, available_s: f64 },
+    #[error(
+        "P3 and valve arrive after {needed_s:.1} s; the window begins after {available_s:.1} s: begin `identification.window` later, or \
+         write `window: auto`"
+    )]
+    Arrival { needed_s: f64, available_s: f64 },
+}
+
+impl From<TransitionViolation> for Rejection {
+    fn from(violation: TransitionViolation) -> Self {
+        match violation {
+            TransitionViolation::SurgeMargin { lowest_ratio, limit_ratio } => {
+                Rejection::SurgeMargin { lowest_ratio, limit_ratio }
+            }
+            TransitionViolation::Overspeed { highest_rpm, limit_rpm } => {
+                Rejection::Overspeed { highest_rpm, limit_rpm }
+            }
+            TransitionViolation::Overshoot { highest_rpm, target_rpm, limit_rpm } => {
+                Rejection::Overshoot { highest_rpm, target_rpm, limit_rpm }
+            }
+        }
+    }
 }
 
 impl Rejection {
     /// What the jump reaches, relative to its limit.
     pub(crate) fn ratio(&self) -> f64 {
         match *self {
-            Rejection::Surge { longest_s, allowed_s } => longest_s / allowed_s,
+            Rejection::SurgeMargin { lowest_ratio, limit_ratio } => {
+                surge_excess_ratio(lowest_ratio, limit_ratio)
+            }
+            Rejection::Overshoot { highest_rpm, limit_rpm, .. } => highest_rpm / limit_rpm,
             Rejection::Overspeed { highest_rpm, limit_rpm } => highest_rpm / limit_rpm,
             Rejection::OutletTemperature { highest_k, limit_k } => highest_k / limit_k,
             Rejection::TurbineInletTemperature { t3_k, limit_k } => t3_k / limit_k,
             Rejection::HousingGradient { gradient_k, limit_k } => gradient_k.abs() / limit_k,
-            Rejection::Slew { needed_s, available_s } => needed_s / available_s,
+            Rejection::Arrival { needed_s, available_s } => needed_s / available_s,
         }
     }
 }

@@ -56,29 +56,27 @@ pub(crate) fn walk(
             VisitOrder::Conventional => stable_after_s(request, to, state, target)?.max(dwell_s),
             _ => dwell_s,
         };
-        let Forecast { predicted, step } = {
-            let step_forecast =
-                forecast(request, state, &target.boundary, dwell_s, now.is_some()).map_err(fail)?;
-            if let Some((_, from)) = now {
-                let p3_change_pa = target.boundary.p3_pa - targets[from].boundary.p3_pa;
-                let reasons =
-                    find_rejections(request, &step_forecast, p3_change_pa, target.boundary.t3_k, dwell_s);
-                if !reasons.is_empty() {
-                    forbidden.push(ForbiddenJump { from, to: visit.index, reasons });
-                }
+        let from = now.map(|(_, from)| from);
+        let start = from.map(|from| &targets[from]);
+        let step_forecast = forecast(request, state, start, target, dwell_s).map_err(fail)?;
+        if let Some(from) = from {
+            let reasons = find_rejections(request, &step_forecast, target);
+            if !reasons.is_empty() {
+                forbidden.push(ForbiddenJump { from, to: visit.index, reasons });
             }
-            step_forecast
-        };
+        }
+        let Forecast { predicted, step, transition, dwell_s, .. } = step_forecast;
         steps.push(PlanStep {
             index: steps.len(),
             kind: visit.kind,
-            from: now.map(|(_, from)| points[from]),
+            from: from.map(|from| points[from]),
             to,
             p3_pa: target.boundary.p3_pa,
             t3_k: target.boundary.t3_k,
             oil_temperature_k: target.boundary.oil_temperature_k,
             dwell_s,
             start_s,
+            transition,
             predicted,
         });
         start_s += dwell_s;

@@ -1,12 +1,15 @@
 //! Simulates one step of the plan on the nominal machine, and predicts the errors of the identification.
 
+use crate::jumps::jump_graph::Rejection;
 use crate::request::{MethodResult, PlanRequest};
-use mapper_core::{Predicted, VisitOrder};
+use mapper_core::{Predicted, Transition, VisitOrder};
 use mapper_numerics::statistics::rms;
-use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::forecast::{ForecastRow, StepForecast, forecast_step};
+use mapper_physics::operating_point::transition::TransitionInputs;
+use mapper_physics::operating_point::transition_forecast::{Stand, TransitionForecast, forecast_transition};
 use mapper_physics::simulation::model::State;
 use mapper_physics::simulation::simulate::SimulationError;
+use mapper_physics::simulation::steady::SteadyState;
 
 /// Maximum number of steps whose errors are predicted together, so that a large plan takes seconds. Of a longer plan, every n-th step
 /// represents the campaign.
@@ -17,24 +20,50 @@ const MAX_FORECAST_STEPS: usize = 400;
 pub(crate) struct Forecast {
     pub(crate) predicted: Predicted,
     pub(crate) step: StepForecast,
+    /// The way from the point before; `None` for the first step.
+    pub(crate) transition: Option<Transition>,
+    /// Duration of the step, s: longer than requested on a stand that arrives late.
+    pub(crate) dwell_s: f64,
+    /// Limits of surge margin and speed that the transition violates.
+    pub(crate) violations: Vec<Rejection>,
 }
 
-/// Forecasts the step from `state` to `boundary`. The first step of a campaign has no jump and therefore no gradients.
+/// Forecasts a step of `dwell_s` from `state` to `target`: on the fastest ramps that leave no limit, or on those that leave it least. The first step
+/// of a campaign has no jump and therefore no gradients.
 pub(crate) fn forecast(
     request: &PlanRequest<'_>,
     state: State,
-    boundary: &BoundaryConditions,
+    from: Option<&SteadyState>,
+    target: &SteadyState,
     dwell_s: f64,
-    has_jump: bool,
 ) -> Result<Forecast, SimulationError> {
-    let step = forecast_step(request.model, state, boundary, dwell_s)?;
+    let Some(from) = from else {
+        let inputs = TransitionInputs::constant(&target.boundary);
+        let step = forecast_step(request.model, state, &inputs, 0.0, dwell_s)?;
+        return Ok(with_errors(request, step, None, dwell_s, Vec::new()));
+    };
+    let stand = Stand { limits: &request.limits, actuators: &request.actuators };
+    let TransitionForecast { step, transition, dwell_s, violations } =
+        forecast_transition(request.model, state, (from, target), stand, dwell_s)?;
+    let violations = violations.into_iter().map(Rejection::from).collect();
+    Ok(with_errors(request, step, Some(transition), dwell_s, violations))
+}
+
+fn with_errors(
+    request: &PlanRequest<'_>,
+    step: StepForecast,
+    transition: Option<Transition>,
+    dwell_s: f64,
+    violations: Vec<Rejection>,
+) -> Forecast {
+    let has_jump = transition.is_some();
     let mut predicted = step.predicted(&request.window, &request.settle_bands, has_jump);
     if request.order == VisitOrder::Conventional {
         add_settled_error(request, &step, &mut predicted);
     } else if has_jump {
         add_single_step_error(request, &step, dwell_s, &mut predicted);
     }
-    Ok(Forecast { predicted, step })
+    Forecast { predicted, step, transition, dwell_s, violations }
 }
 
 /// Adds the error of the efficiency that conventional mapping measures at the end of the step.

@@ -249,17 +249,21 @@ fn slowest_and_fastest(targets: &[SteadyState]) -> Option<[&SteadyState; 2]> {
     Some([targets.iter().min_by(by_speed)?, targets.iter().max_by(by_speed)?])
 }
 
-/// Initial states of the simulations for each point; they span the campaign.
-fn start_states(scale: &Scale, [slowest, fastest]: [&SteadyState; 2]) -> [[State; 2]; 3] {
+/// Initial states of the simulations for each point, and the points before them; they span the campaign.
+fn start_states<'a>(
+    scale: &Scale,
+    [slowest, fastest]: [&'a SteadyState; 2],
+) -> [[(State, &'a SteadyState); 2]; 3] {
     DESIGN.map(|design| {
         [1.0, -1.0].map(|sign| {
             let [c, t, w] = design.map(|x| sign * x);
             let gas = if w < 0.0 { slowest } else { fastest };
-            State {
+            let state = State {
                 tc_k: scale.middle[0] + c * scale.half[0],
                 tt_k: scale.middle[1] + t * scale.half[1],
                 ..gas.state
-            }
+            };
+            (state, gas)
         })
     })
 }
@@ -274,8 +278,8 @@ fn simulate_response(
     let mut gradient_k = [[0.0; 2]; 3];
     let mut end = [[[0.0; 2]; 3]; 2];
     for (i, pair) in start_states(scale, [slowest, fastest]).into_iter().enumerate() {
-        for (j, state) in pair.into_iter().enumerate() {
-            let forecast = forecast(request, state, &target.boundary, dwell_s, true)?;
+        for (j, (state, from)) in pair.into_iter().enumerate() {
+            let forecast = forecast(request, state, Some(from), target, dwell_s)?;
             gradient_k[i][j] = forecast.predicted.dtc_k.unwrap_or(0.0);
             let [tc, tt, _] = scale.scaled(&forecast.step.end);
             (end[0][i][j], end[1][i][j]) = (tc, tt);

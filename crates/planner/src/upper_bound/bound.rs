@@ -172,7 +172,7 @@ mod tests {
     use crate::request::PlanRequest;
     use crate::request::solve_steady_states;
     use crate::thermal_memory::housing::gradients_k;
-    use mapper_core::{Dwell, Limits, OperatingPoint, SettleBands, Timing, VisitOrder, WindowRule};
+    use mapper_core::{Dwell, Limits, OperatingPoint, RigActuators, SettleBands, Timing, VisitOrder, WindowRule};
     use mapper_physics::simulation::model::Model;
     use proptest::prelude::*;
 
@@ -197,7 +197,9 @@ mod tests {
                 t2_max_k: None,
                 surge_margin_min_ratio: None,
                 housing_gradient_max_k: None,
+                overshoot_max_ratio: None,
             },
+            actuators: RigActuators::default(),
             repeats: None,
             return_to_first: false,
             appended: None,

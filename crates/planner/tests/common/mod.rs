@@ -1,6 +1,6 @@
 //! The grid of docs/explanation/planner.md, a request, and a housing with one time constant per point.
 
-use mapper_core::{Dwell, Limits, OperatingPoint, SettleBands, Timing, VisitOrder, WindowRule};
+use mapper_core::{Dwell, Limits, OperatingPoint, RigActuators, SettleBands, Timing, VisitOrder, WindowRule};
 use mapper_physics::gas::air;
 use mapper_physics::laws::housing;
 use mapper_physics::machine::params::BoundaryConditions;
@@ -40,7 +40,9 @@ pub fn request<'a>(model: &'a Model, points: &'a [OperatingPoint], order: VisitO
             t2_max_k: None,
             surge_margin_min_ratio: None,
             housing_gradient_max_k: None,
+            overshoot_max_ratio: None,
         },
+        actuators: RigActuators::default(),
         repeats: None,
         return_to_first: false,
         appended: None,

@@ -6,7 +6,8 @@ use crate::message::Message;
 use crate::plan::plan_remark_text::no_bound_text;
 use mapper_campaign::Campaign;
 use mapper_core::{
-    Plan, PlanBound, PlanStep, Recording, StepKind, VisitOrder, standard_error_of, step_number,
+    Plan, PlanBound, PlanStep, Recording, StepKind, Transition, VisitOrder, WindowRule, standard_error_of,
+    step_number,
 };
 use mapper_planner::{JumpForecast, STABLE_DRIFT_K_MIN};
 use mapper_recording::score::ScoredPoint;
@@ -125,6 +126,7 @@ fn summary(campaign: &Campaign, plan: &Plan, soak_s: f64) -> Vec<(&'static str, 
     if !errors.is_empty() {
         lines.push(("expected error", errors.join("; ")));
     }
+    lines.extend(transition_lines(plan, &Display::new(&campaign.display), &campaign.display.speed.to_string()));
     lines.extend(plan.bound_remark.iter().map(|reason| ("bound", no_bound_text(*reason).to_owned())));
     lines.extend(plan.remarks.iter().map(|remark| ("note", remark.message())));
     if !campaign.machine.assumed.is_empty() {
@@ -142,6 +144,41 @@ fn summary(campaign: &Campaign, plan: &Plan, soak_s: f64) -> Vec<(&'static str, 
     let hashes =
         format!("campaign {}, model {}", short(&made_from.campaign_sha256), short(&made_from.model_sha256));
     lines.push(("made from", hashes));
+    lines
+}
+
+/// The jumps that come closest to a limit, and the time that the stand's actuators cost.
+fn transition_lines(plan: &Plan, display: &Display, speed_unit: &str) -> Vec<(&'static str, String)> {
+    let jumps: Vec<(&PlanStep, Transition)> =
+        plan.steps.iter().filter_map(|step| Some((step, step.transition?))).collect();
+    let worst = |value: &dyn Fn(&(&PlanStep, Transition)) -> f64| {
+        jumps.iter().max_by(|a, b| value(a).total_cmp(&value(b)))
+    };
+    let fastest = worst(&|(_, transition)| transition.highest_speed_rpm);
+    let closest = worst(&|(_, transition)| -transition.lowest_surge_margin_ratio);
+    let latest = worst(&|(_, transition)| transition.arrival_s);
+    let (Some(fastest), Some(closest), Some(latest)) = (fastest, closest, latest) else { return Vec::new() };
+    let number = |jump: &(&PlanStep, Transition)| step_number(jump.0.index);
+    let limits = format!(
+        "highest speed {} {speed_unit} (step {}), lowest surge margin {} % (step {}), P3 and valve arrive within {:.1} s (step {})",
+        display.speed(fastest.1.highest_speed_rpm),
+        number(fastest),
+        percent(Some(closest.1.lowest_surge_margin_ratio), 1),
+        number(closest),
+        latest.1.arrival_s,
+        number(latest)
+    );
+    let late_s = jumps.iter().map(|(_, transition)| (transition.arrival_s - WindowRule::EARLIEST_S).max(0.0).ceil());
+    let slow_s: f64 = late_s.sum();
+    let mut lines = vec![("jumps", limits)];
+    if slow_s > 0.0 {
+        let text = format!(
+            "P3 and valve arrive later than {:.0} s after some jumps; these steps are longer, {} in total",
+            WindowRule::EARLIEST_S,
+            duration(slow_s)
+        );
+        lines.push(("slow stand", text));
+    }
     lines
 }
 
@@ -237,7 +274,8 @@ pub fn jump_json(jump: &JumpForecast) -> serde_json::Value {
         "to": jump.to,
         "predicted": jump.predicted,
         "p3_change_pa": jump.p3_change_pa,
-        "longest_surge_s": jump.longest_surge_s,
+        "arrival_s": jump.arrival_s,
+        "lowest_surge_margin_ratio": jump.lowest_surge_margin_ratio,
         "highest_speed_rpm": jump.highest_speed_rpm,
         "highest_t2_k": jump.highest_t2_k,
         "allowed": jump.rejections.is_empty(),
@@ -270,7 +308,8 @@ pub fn jump_forecast(campaign: &Campaign, jump: &JumpForecast) -> Document {
         ("settles after", format!("{} s", number(predicted.settle_s, 1))),
         ("standard error of eta", points(predicted.sigma_eta)),
         ("bias of the method", points(predicted.bias_eta)),
-        ("beyond the surge line", format!("{:.2} s without interruption", jump.longest_surge_s)),
+        ("P3 and valve arrive after", format!("{:.1} s", jump.arrival_s)),
+        ("lowest surge margin", format!("{} %", percent(Some(jump.lowest_surge_margin_ratio), 1))),
         ("highest speed", format!("{} {}", display.speed(jump.highest_speed_rpm), campaign.display.speed)),
         (
             "highest T2",

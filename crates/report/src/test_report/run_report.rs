@@ -17,7 +17,8 @@ use crate::test_report::key_figures::{PointsOrigin, assumed_sentence, key_figure
 use crate::test_report::zero_and_sensors::zero_sentence;
 use mapper_campaign::Campaign;
 use mapper_core::{
-    Channel, DeclaredUncertainty, Event, Method, Plan, PointBudgets, Recording, ReferenceState, Verdict,
+    Channel, DeclaredUncertainty, Event, EventKind, Method, Plan, PointBudgets, Recording, ReferenceState,
+    StepKind, Verdict,
 };
 use mapper_diagnose::gap::Diagnosed;
 use mapper_diagnose::gap::PointCorrection;
@@ -173,6 +174,7 @@ impl RunReport<'_> {
     fn recommended_actions(&self) -> Vec<String> {
         let PointResults { points, dynamic, zero, .. } = self.results;
         let mut actions: Vec<String> = Vec::new();
+        actions.extend(self.surges());
         actions.extend(disagreement_text(points, dynamic, &self.display()));
         if matches!(zero, ZeroOutcome::Refused(_)) {
             actions.extend(zero_sentence(zero));
@@ -186,6 +188,24 @@ impl RunReport<'_> {
             );
         }
         actions
+    }
+
+    /// The number of surges outside a search for surge.
+    fn surges(&self) -> Option<String> {
+        let approaches = self.recording.steps.iter().filter(|step| step.kind == StepKind::Approach);
+        let searched_from_s = approaches.map(|step| step.start_s).fold(f64::INFINITY, f64::min);
+        let entered = self.events.iter().filter(|event| event.kind == EventKind::SurgeEntered);
+        let times_s: Vec<f64> =
+            entered.map(|event| event.t_s).filter(|t_s| *t_s < searched_from_s).collect();
+        let first_s = times_s.first()?;
+        let count = match times_s.len() {
+            1 => "once".to_owned(),
+            more => format!("{more} times"),
+        };
+        Some(format!(
+            "the compressor surged {count}, first at {first_s:.1} s; the jumps of the plan came too close to the surge line of this machine: \
+             raise `limits.surge_margin`, and measure the motion of the stand (`rig.actuators`)"
+        ))
     }
 
     /// All sections.
@@ -295,7 +315,15 @@ impl RunReport<'_> {
                 .map(|doubt| format!("{} (`{}`): {}", doubt.steps(), doubt.code, doubt.message())),
         );
         let mut events = Document::default();
-        events.list(self.events.iter().map(|event| format!("{:.1} s: {}", event.t_s, event.message)));
+        events.list(
+            self.events
+                .iter()
+                .take(MAX_EVENTS)
+                .map(|event| format!("{:.1} s: {}", event.t_s, event.message)),
+        );
+        if let Some(further) = self.events.len().checked_sub(MAX_EVENTS).filter(|further| *further > 0) {
+            events.text(format!("{further} further events are in the recording."));
+        }
         for (heading, mut body) in [("Warnings and remarks", warnings), ("Events", events)] {
             if body.is_empty() {
                 body.text("None.");
@@ -305,6 +333,9 @@ impl RunReport<'_> {
         document
     }
 }
+
+/// Maximum number of events in a report. Judgement: more are not read; the recording has all of them.
+const MAX_EVENTS: usize = 200;
 
 /// A formatted time since 1970-01-01 UTC, ns; `None` for 0: simulated time starts there, and so does a log that knows
 /// only seconds, which is not a date.

@@ -1,6 +1,7 @@
 //! What a run is connected to: observers, the operator, its protection in addition to its guards, and its errors.
 
 use crate::guards::plausibility_watch::ReadingBounds;
+use crate::run_control::transition_control::StandMotion;
 use crate::step_sources::step_source::StepSourceError;
 use mapper_core::{
     BackendError, Event, RigDescription, SafeTrajectory, SampleBatch, SetpointRanges, SpeedBand, StepMarker,
@@ -152,6 +153,8 @@ pub struct Protection<'a> {
     pub safe: SafeTrajectory,
     /// P3 at which the air is cut, Pa: the lowest setpoint that the rig accepts.
     pub p3_min_pa: f64,
+    /// The stand, on which P3 and valve move on coordinated ramps; `None`: setpoints change at once.
+    pub stand: Option<StandMotion>,
     /// Setpoint ranges that the rig accepts, also during safe shutdown; `None`: unlimited.
     pub accepts: Option<SetpointRanges>,
     /// Allowed deviation of a step's speed; `None`: not checked.
@@ -173,6 +176,7 @@ impl Default for Protection<'_> {
         Protection {
             safe: SafeTrajectory::default(),
             p3_min_pa: 0.0,
+            stand: None,
             accepts: None,
             speed: None,
             readings: None,

@@ -5,10 +5,12 @@ use crate::guards::plausibility_watch::PlausibilityWatch;
 use crate::run_control::observer::Protection;
 use crate::run_control::observer::{ObserverError, Operator, RunError, RunObserver};
 use crate::run_control::speed_control::SpeedControl;
+use crate::run_control::surge_events::SurgeEvents;
+use crate::run_control::transition_control::{PressureMotion, StandMotion, TransitionControl};
 use crate::step_sources::step_source::StepSource;
 use mapper_core::{
-    Backend, BackendError, Clock, Event, EventKind, GuardName, PlanStep, Reaction, RigMode, RunEnding,
-    SampleBatch, Setpoints, Soak, StepMarker, Trip, is_commanded_jump,
+    Backend, BackendError, Clock, Event, EventKind, GuardName, OperatingPoint, PlanStep, Reaction, RigMode,
+    RunEnding, SampleBatch, Setpoints, Soak, StepMarker, Trip, WindowRule, is_commanded_jump,
 };
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::AtomicBool;
@@ -19,6 +21,17 @@ const POLL_INTERVAL_S: f64 = 1.0;
 const MAX_HOLD_S: f64 = 300.0;
 /// Longest time that the operator may hold a step, s. It limits a hold that an operator forgets.
 const MAX_OPERATOR_HOLD_S: f64 = 4.0 * 3600.0;
+/// Longest extension of a step whose P3 has not arrived, s. Bound: five times the stroke of the slowest stands.
+const MAX_ARRIVAL_WAIT_S: f64 = 300.0;
+/// Shortest run-down of P3 before the safe state, s: a faster P3 falls before the shaft has noticed the valve. Judgement.
+const MIN_UNLOAD_S: f64 = 5.0;
+/// Lags of P3 in the time of its arrival. Source: ln 100, as for declared actuators.
+const LAGS_OF_ARRIVAL: f64 = 4.6;
+/// Time after which a P3 that neither arrives nor moves is given up, s. Judgement: longer than any dead time.
+const STUCK_S: f64 = 10.0;
+/// Smallest delay of P3 that is reported, s, and the factor from which a later one is reported again. Judgement.
+const MIN_LATE_S: f64 = 3.0;
+const LATER_RATIO: f64 = 1.5;
 /// Number of stages when a step is approached again, and the duration of each, s.
 const APPROACH_STAGES: u32 = 4;
 const APPROACH_STAGE_S: f64 = 10.0;
@@ -59,6 +72,15 @@ impl<E: Into<RunError>> From<E> for Halt {
     }
 }
 
+/// The arrival of P3 at the setpoint of a step.
+struct Arrival {
+    start_s: f64,
+    /// Time after the start by which the plan expects it, s.
+    planned_s: f64,
+    /// By how much the step was extended, s.
+    extended_s: f64,
+}
+
 /// A run that is under way.
 pub(crate) struct Run<'a, 'p> {
     pub(crate) runner: Runner<'a>,
@@ -71,6 +93,18 @@ pub(crate) struct Run<'a, 'p> {
     speed_history: SpeedHistory,
     plausibility: Option<PlausibilityWatch>,
     skipped: u32,
+    /// The transition of the current step, until all its commands have been sent.
+    transition: Option<TransitionControl>,
+    /// Arrival of P3 in the current step; `None` once it has arrived.
+    arrival: Option<Arrival>,
+    p3_motion: PressureMotion,
+    surge_events: SurgeEvents,
+    /// Longest delay of P3 that was reported, s.
+    reported_late_s: f64,
+    /// Whether the valve opens at the start of the safe shutdown: after a surge.
+    pub(crate) opens_at_once: bool,
+    /// The point of the last step.
+    at: Option<OperatingPoint>,
     /// The step that a guard has cut short, until its end is reported.
     pub(crate) open_step: Option<StepMarker>,
     /// Whether the operator was informed that the run ends with this step.
@@ -105,6 +139,13 @@ impl Runner<'_> {
             speed_history: SpeedHistory::default(),
             plausibility: protection.readings.map(PlausibilityWatch::new),
             skipped: 0,
+            transition: None,
+            arrival: None,
+            p3_motion: PressureMotion::default(),
+            surge_events: SurgeEvents::default(),
+            reported_late_s: 0.0,
+            opens_at_once: false,
+            at: None,
             open_step: None,
             stop_confirmed: false,
         };
@@ -145,6 +186,7 @@ impl Run<'_, '_> {
                 let first_setpoints = self.begin_step(first);
                 self.send(first_setpoints)?;
                 self.run_until(warm_s, false, true)?;
+                self.at = Some(first.to);
                 // The first step reports whether its speed was reached; the warm-up does not.
                 let now_s = self.now_s;
                 let _ = self.runner.speed.as_mut().map(|speed| speed.end(now_s));
@@ -155,10 +197,25 @@ impl Run<'_, '_> {
             next = self.next_step()?;
             self.pass_notes()?;
         }
+        self.unload()?;
         self.runner.backend.make_safe()?;
         (self.sent, self.commanded) = (None, CommandedState::default());
         let end_s = self.now_s + self.runner.steps.cool_down_s();
         self.run_until(end_s, false, false)
+    }
+
+    /// Lowers P3 at the closed valve before the end of a run on a slow stand: the safe state opens the valve, and the shaft would speed up.
+    fn unload(&mut self) -> Result<(), Halt> {
+        let (Some(StandMotion { actuators, .. }), Some(sent)) = (self.protection.stand, self.sent) else {
+            return Ok(());
+        };
+        let p3_pa = self.protection.p3_min_pa.min(sent.p3_pa);
+        let duration_s = actuators.p3.ramp_s(sent.p3_pa - p3_pa) + actuators.p3.follow_s();
+        if sent.mode != RigMode::Running || duration_s < MIN_UNLOAD_S {
+            return Ok(());
+        }
+        self.send(Setpoints { p3_pa, ..sent })?;
+        self.run_until(self.now_s + duration_s.min(MAX_ARRIVAL_WAIT_S), false, false)
     }
 
     /// Waits for the next step, unless a stop is requested. A rig in real time is polled and guarded meanwhile.
@@ -194,7 +251,7 @@ impl Run<'_, '_> {
                 p3_pa: setpoints.p3_pa,
                 valve_opening_ratio: setpoints.valve_opening_ratio,
             };
-            self.send(setpoints)?;
+            self.start_transition(step, setpoints)?;
             (self.commanded.step_since_s, self.commanded.aim) = (Some(self.now_s), Some(step.to));
             self.speed_history.clear();
             self.runner.observer.on_step_start(&marker)?;
@@ -204,6 +261,8 @@ impl Run<'_, '_> {
                 self.end_speed_control()?;
                 self.check_speed(step)
             });
+            (self.transition, self.arrival) = (None, None);
+            self.at = Some(step.to);
             (self.commanded.step_since_s, self.commanded.aim) = (None, None);
             marker.end_s = self.now_s;
             let trip = match result {
@@ -300,6 +359,102 @@ impl Run<'_, '_> {
         Ok(())
     }
 
+    /// Starts the way to the setpoints of a step: at once, or on ramps.
+    fn start_transition(&mut self, step: &PlanStep, setpoints: Setpoints) -> Result<(), BackendError> {
+        let control = self.protection.stand.zip(self.sent).and_then(|(stand, before)| {
+            TransitionControl::new(stand, before, setpoints, (step, self.at), self.now_s)
+        });
+        self.transition = None;
+        self.arrival = self.protection.stand.map(|stand| Arrival {
+            start_s: self.now_s,
+            planned_s: match step.transition {
+                Some(transition) => transition.arrival_s,
+                None => stand.actuators.p3.follow_s(),
+            },
+            extended_s: 0.0,
+        });
+        let Some(control) = control else { return self.send(setpoints) };
+        self.send(control.setpoints())?;
+        self.transition = Some(control);
+        Ok(())
+    }
+
+    /// Sends the next setpoints of a transition. Returns whether it is under way.
+    fn advance_transition(&mut self, batch: &SampleBatch, until_s: f64) -> Result<bool, BackendError> {
+        let Some(mut control) = self.transition.take() else { return Ok(false) };
+        let next = control.advance(batch, self.now_s);
+        if self.now_s < until_s {
+            self.send(next)?;
+        }
+        let completes = control.is_complete();
+        if completes {
+            // Sensors have to follow from here on.
+            if control.is_jump() {
+                self.commanded.jumped_s = Some(self.now_s);
+            }
+            let now_s = self.now_s;
+            if let Some(speed) = &mut self.runner.speed {
+                speed.restart_wait(now_s);
+            }
+        } else {
+            self.transition = Some(control);
+        }
+        Ok(!completes)
+    }
+
+    /// Extends a step by `passed_s` while P3 has not arrived although it should have. Returns the extension, s.
+    fn wait_for_arrival(&mut self, passed_s: f64) -> Result<f64, ObserverError> {
+        let (Some(mut arrival), Some(sent)) = (self.arrival.take(), self.sent) else { return Ok(0.0) };
+        let since_s = self.now_s - arrival.start_s;
+        let late_s = since_s - arrival.planned_s.max(WindowRule::EARLIEST_S);
+        if late_s < 0.0 && !self.p3_motion.has_arrived(sent.p3_pa) {
+            self.arrival = Some(arrival);
+            return Ok(0.0);
+        }
+        let has_arrived = self.p3_motion.has_arrived(sent.p3_pa);
+        let gives_up = arrival.extended_s >= MAX_ARRIVAL_WAIT_S
+            || (!has_arrived && !self.p3_motion.is_moving_to(sent.p3_pa) && late_s > STUCK_S);
+        if has_arrived || gives_up {
+            if let Some(speed) = &mut self.runner.speed {
+                // The change beyond the declared motion is that of a longer lag.
+                speed.learn_delay((since_s - arrival.planned_s).max(0.0) / LAGS_OF_ARRIVAL);
+            }
+            self.report_arrival(&sent, since_s, arrival.planned_s, has_arrived)?;
+            return Ok(0.0);
+        }
+        arrival.extended_s += passed_s;
+        self.arrival = Some(arrival);
+        Ok(passed_s)
+    }
+
+    /// Reports a P3 that arrives clearly later than planned, or not at all.
+    fn report_arrival(
+        &mut self,
+        sent: &Setpoints,
+        since_s: f64,
+        planned_s: f64,
+        has_arrived: bool,
+    ) -> Result<(), ObserverError> {
+        let late_s = since_s - planned_s.max(WindowRule::EARLIEST_S);
+        if late_s < MIN_LATE_S || late_s < LATER_RATIO * self.reported_late_s {
+            return Ok(());
+        }
+        self.reported_late_s = late_s;
+        let command_kpa = sent.p3_pa / 1e3;
+        let message = match (has_arrived, self.p3_motion.p3_pa()) {
+            (false, Some(p3_pa)) => format!(
+                "P3 has not arrived: {command_kpa:.1} kPa commanded, {:.1} kPa measured {since_s:.0} s after the start of the step; check \
+                 the air supply",
+                p3_pa / 1e3
+            ),
+            _ => format!(
+                "P3 arrived at {command_kpa:.1} kPa {since_s:.0} s after the start of the step, {planned_s:.0} s planned: the stand is slower \
+                 than declared, and the step lasts longer; write its lag and rate in `rig.actuators.turbine_inlet_pressure`"
+            ),
+        };
+        self.runner.observer.on_event(&Event { t_s: self.now_s, kind: EventKind::Note, message })
+    }
+
     /// Ends the speed control of a step, and reports a speed that was not reached.
     fn end_speed_control(&mut self) -> Result<(), ObserverError> {
         let now_s = self.now_s;
@@ -358,7 +513,9 @@ impl Run<'_, '_> {
         while self.now_s < until_s {
             self.check_for_stop(in_step, until_s)?;
             let before_s = self.now_s;
-            let (batch, trips) = self.poll_until_trip(until_s, in_step)?;
+            let next_s = self.transition.as_ref().map_or(until_s, |control| before_s + control.interval_s());
+            let (batch, trips) = self.poll_until_trip(next_s.min(until_s), in_step)?;
+            self.p3_motion.add(&batch);
             if let Some(trip) = trips.iter().find(|trip| trip.reaction.ends_the_run()) {
                 return Err(Halt::Tripped(trip.clone(), Some(Box::new(batch))));
             }
@@ -409,8 +566,14 @@ impl Run<'_, '_> {
             if ends && in_step {
                 break;
             }
+            if self.advance_transition(&batch, until_s)? {
+                continue;
+            }
+            if in_step {
+                until_s += self.wait_for_arrival(self.now_s - before_s)?;
+            }
             if hold_speed && let (Some(speed), Some(sent)) = (&mut self.runner.speed, self.sent) {
-                let (p3_pa, event) = speed.on_batch(&batch);
+                let (p3_pa, event) = speed.on_batch(&batch, self.p3_motion.is_moving_to(sent.p3_pa));
                 event.map_or(Ok(()), |event| self.runner.observer.on_event(&event))?;
                 // At the end of a step the next step sets P3.
                 if let Some(p3_pa) = p3_pa.filter(|_| self.now_s < until_s) {
@@ -442,6 +605,7 @@ impl Run<'_, '_> {
             let judged =
                 self.plausibility.as_mut().and_then(|watch| watch.judge(&mut batch, &self.commanded));
             trips.extend(judged);
+            self.surge_events.join(&mut batch, next_s);
             match &mut merged {
                 None => merged = Some(batch),
                 Some(merged) => merged.append(batch),

@@ -3,6 +3,7 @@
 use crate::guards::guard::CommandedState;
 use crate::run_control::observer::{Protection, RunError};
 use crate::run_control::run::{Halt, Run, Runner, panic_message};
+use crate::run_control::transition_control::StandMotion;
 use mapper_core::{BackendError, Event, EventKind, GuardName, RunEnding, SampleBatch, Setpoints};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::Ordering;
@@ -35,6 +36,7 @@ impl Run<'_, '_> {
     /// Makes the rig safe, then reports the reason. It cannot be interrupted and takes a bounded time.
     pub(crate) fn shut_down(&mut self, halt: Halt) -> Result<RunEnding, RunError> {
         // The first command is sent before anything is written: a disk may be slow.
+        self.opens_at_once = matches!(&halt, Halt::Tripped(trip, _) if trip.guard == GuardName::Surge);
         let start = self.begin_run_down();
         // A step that missed its speed does not count, whatever its duration.
         let step_counts = !matches!(&halt, Halt::Tripped(trip, _) if trip.guard == GuardName::Speed);
@@ -114,8 +116,15 @@ impl Run<'_, '_> {
 
     /// Setpoints `after_s` into the run-down; `None` if the air is to be cut.
     fn run_down_setpoints(&self, from: &Setpoints, after_s: f64) -> Option<Setpoints> {
-        let Protection { safe, p3_min_pa, accepts, .. } = self.protection;
-        safe.setpoints(from, after_s, *p3_min_pa, accepts.as_ref())
+        let Protection { safe, p3_min_pa, accepts, stand, .. } = self.protection;
+        let next = safe.setpoints(from, after_s, *p3_min_pa, accepts.as_ref())?;
+        let Some(StandMotion { actuators, .. }) = stand.filter(|_| !self.opens_at_once) else { return Some(next) };
+        // A valve that opens before P3 has fallen lets the shaft speed up; only a compressor in surge needs it at once.
+        let rate_pa_s = safe.p3_slew_pa_s.map_or(actuators.p3.rate_per_s, |slew| slew.min(actuators.p3.rate_per_s));
+        let fallen_pa = rate_pa_s * (after_s - actuators.p3.dead_time_s - actuators.p3.lag_s);
+        let share = (fallen_pa / (from.p3_pa - p3_min_pa).max(1.0)).clamp(0.0, 1.0);
+        let opening = from.valve_opening_ratio + share * (next.valve_opening_ratio - from.valve_opening_ratio);
+        Some(Setpoints { valve_opening_ratio: opening, ..next })
     }
 
     /// Sends the first command of the run-down. Returns the setpoints from which it starts, or `None` if the air is to be cut at once.

@@ -15,6 +15,7 @@
 //! **Limits.** In the velocity form the command itself is the only integral. Clamping the command to its limits and to the rig's
 //! rate is therefore sufficient as anti-windup.
 
+use crate::run_control::transition_control::ARRIVED_RATIO;
 use mapper_core::{
     Channel, Event, EventKind, OperatingPoint, PlanStep, SampleBatch, SpeedControlSettings, SpeedResponse,
 };
@@ -23,6 +24,10 @@ use std::collections::VecDeque;
 
 /// Time constant of the closed loop, s: initial and final.
 const LAMBDA_S: (f64, f64) = (2.5, 20.0);
+/// Longest measured delay that tunes the loop, s. Bound: half of its slowest time constant.
+const MAX_EXTRA_DELAY_S: f64 = 10.0;
+/// Ratio of the closed loop's shortest time constant to the delay of P3. Source: Skogestad (2003), twice the delay has a margin of gain of five.
+const DELAYS_OF_LAMBDA: f64 = 2.0;
 /// Ratio of the closed loop's time constant to the time since the transient.
 const LAMBDA_GROWTH: f64 = 0.4;
 /// After a jump the loop waits for this number of machine time constants, plus the time that P3 needs at the rig's rate.
@@ -71,6 +76,8 @@ pub struct SpeedControl<'a> {
     /// Number of steps in the deficit's average.
     averaged_steps: usize,
     hold: Option<Hold>,
+    /// Measured delay of P3 beyond the declared one, s.
+    extra_delay_s: f64,
     /// The last command, Pa.
     last_sent_pa: Option<f64>,
 }
@@ -94,6 +101,8 @@ struct Hold {
     seconds_off: usize,
     /// Time and speed of the last seconds.
     recent: VecDeque<(f64, f64)>,
+    /// The latest reading of P3, Pa.
+    measured_p3_pa: Option<f64>,
     /// Start of saturation at a limit, and whether it was reported.
     saturated: Option<(f64, bool)>,
 }
@@ -114,6 +123,11 @@ impl Hold {
     }
 }
 
+/// Duration of the transient after a command, s.
+fn transient_s(response: &SpeedResponse) -> f64 {
+    (TRANSIENT_TIME_CONSTANTS * response.time_constant_s).clamp(MIN_TRANSIENT_S, MAX_TRANSIENT_S)
+}
+
 impl<'a> SpeedControl<'a> {
     /// Creates a controller without a learnt deficit.
     pub fn new(
@@ -128,6 +142,7 @@ impl<'a> SpeedControl<'a> {
             deficit: 0.0,
             averaged_steps: 0,
             hold: None,
+            extra_delay_s: 0.0,
             last_sent_pa: None,
         }
     }
@@ -158,6 +173,7 @@ impl<'a> SpeedControl<'a> {
             before: None,
             seconds_off: 0,
             recent: VecDeque::new(),
+            measured_p3_pa: None,
             saturated: None,
         };
         // A deficit learnt at other points must not drive the nominal machine beyond the speed limit.
@@ -170,17 +186,32 @@ impl<'a> SpeedControl<'a> {
             .map_or(0.0, |slew_pa_s| (hold.setpoint_pa - from_pa).abs() / slew_pa_s);
         hold.earliest_end_s = t_s
             + ramp_s
-            + (TRANSIENT_TIME_CONSTANTS * response.time_constant_s).clamp(MIN_TRANSIENT_S, MAX_TRANSIENT_S);
+            + transient_s(&response);
         let p3_pa = hold.setpoint_pa;
         self.hold = Some(hold);
         self.last_sent_pa = Some(p3_pa);
         p3_pa
     }
 
-    /// Processes new samples: returns the next P3 to send, Pa, and an event, if any.
-    pub fn on_batch(&mut self, batch: &SampleBatch) -> (Option<f64>, Option<Event>) {
+    /// Takes a delay of P3 into account that was measured beyond the declared one, s. The longest one stands: a loop that is too slow is
+    /// only slow.
+    pub fn learn_delay(&mut self, delay_s: f64) {
+        self.extra_delay_s = self.extra_delay_s.max(delay_s.min(MAX_EXTRA_DELAY_S));
+    }
+
+    /// Restarts the wait for the transient, when the last command of a transition was sent at `t_s`.
+    pub fn restart_wait(&mut self, t_s: f64) {
+        if let Some(hold) = &mut self.hold {
+            hold.start_s = t_s;
+            hold.earliest_end_s = t_s + transient_s(&hold.response);
+        }
+    }
+
+    /// Processes new samples: returns the next P3 to send, Pa, and an event, if any. While P3 still moves towards its command, nothing is
+    /// integrated.
+    pub fn on_batch(&mut self, batch: &SampleBatch, p3_moves: bool) -> (Option<f64>, Option<Event>) {
         let Some(mut hold) = self.hold.take() else { return (None, None) };
-        let event = self.advance(&mut hold, batch);
+        let event = self.advance(&mut hold, batch, p3_moves);
         let smallest_pa =
             MIN_CHANGE_SHARE * self.settings.band_ratio * hold.target.speed_rpm / hold.response.rpm_per_pa;
         let send = self
@@ -194,10 +225,13 @@ impl<'a> SpeedControl<'a> {
         (next, event)
     }
 
-    fn advance(&mut self, hold: &mut Hold, batch: &SampleBatch) -> Option<Event> {
+    fn advance(&mut self, hold: &mut Hold, batch: &SampleBatch, p3_moves: bool) -> Option<Event> {
         let now_s = *batch.t_s.last()?;
         let speeds = batch.column(Channel::ShaftSpeed)?;
         let speed_rpm = median(speeds.iter().filter(|speed| speed.is_finite()))?;
+        let pressures = batch.column(Channel::P3).unwrap_or_default();
+        hold.measured_p3_pa =
+            median(pressures.iter().filter(|p3_pa| p3_pa.is_finite())).or(hold.measured_p3_pa);
         hold.recent.push_back((now_s, speed_rpm));
         while hold.recent.front().is_some_and(|(t_s, _)| *t_s < now_s - AVERAGING_S) {
             hold.recent.pop_front();
@@ -208,6 +242,16 @@ impl<'a> SpeedControl<'a> {
         let dt_s = now_s - before_s;
         // A batch without later samples adds nothing.
         if dt_s <= 0.0 {
+            return None;
+        }
+        if p3_moves {
+            // The loop begins, or goes on, when the speed has followed the pressure that was commanded last.
+            hold.start_s = now_s;
+            if let Some(closed_s) = &mut hold.closed_s {
+                *closed_s += dt_s;
+                // The proportional part sees the whole change of the speed when the loop goes on.
+                hold.before = Some((now_s, error_before_rpm));
+            }
             return None;
         }
         if hold.closed_s.is_none() {
@@ -225,11 +269,15 @@ impl<'a> SpeedControl<'a> {
             hold.closed_s = Some(now_s - dt_s);
         }
         let closed_for_s = now_s - hold.closed_s.unwrap_or(now_s);
-        let lambda_s = (LAMBDA_GROWTH * closed_for_s).clamp(LAMBDA_S.0, LAMBDA_S.1);
+        // A loop that is slower than the delay of P3 does not swing (Skogestad, J. Process Control 13 (2003): lambda of at least the delay).
+        let delay_s = hold.response.delay_s + self.extra_delay_s;
+        let fastest_s = LAMBDA_S.0.max(DELAYS_OF_LAMBDA * delay_s).min(LAMBDA_S.1);
+        let lambda_s = (LAMBDA_GROWTH * closed_for_s).clamp(fastest_s, LAMBDA_S.1);
         let response = &hold.response;
         // After a gap in the samples, the integral counts a limited time only.
         let counted_s = dt_s.min(0.5 * lambda_s);
-        let change_pa = (response.time_constant_s * (error_rpm - error_before_rpm) + error_rpm * counted_s)
+        let time_constant_s = response.time_constant_s + self.extra_delay_s;
+        let change_pa = (time_constant_s * (error_rpm - error_before_rpm) + error_rpm * counted_s)
             / (lambda_s * response.rpm_per_pa);
         let requested_pa = hold.setpoint_pa + change_pa;
         let slew_pa = self.limits.p3_slew_max_pa_s.map_or(f64::INFINITY, |slew_pa_s| slew_pa_s * dt_s);
@@ -264,15 +312,19 @@ impl<'a> SpeedControl<'a> {
             message: format!(
                 "speed control: P3 stays at {:.1} kPa, {}; the speed is {:.2} krpm instead of {:.2} krpm",
                 hold.setpoint_pa / 1e3,
-                self.describe_limit(hold.setpoint_pa),
+                self.describe_limit(hold),
                 speed_rpm / 1e3,
                 hold.target.speed_rpm / 1e3
             ),
         })
     }
 
-    fn describe_limit(&self, p3_pa: f64) -> String {
-        if p3_pa >= self.limits.p3_max_pa {
+    fn describe_limit(&self, hold: &Hold) -> String {
+        let p3_pa = hold.setpoint_pa;
+        let far = |measured_pa: &f64| (measured_pa - p3_pa).abs() > ARRIVED_RATIO * p3_pa;
+        if let Some(measured_pa) = hold.measured_p3_pa.filter(far) {
+            format!("and has not arrived: {:.1} kPa measured; check the air supply", measured_pa / 1e3)
+        } else if p3_pa >= self.limits.p3_max_pa {
             "its upper limit".to_owned()
         } else if p3_pa <= self.limits.p3_min_pa {
             "its lower limit".to_owned()

@@ -94,6 +94,7 @@ impl PlanInputs {
             window: campaign.identification.window,
             settle_bands: campaign.identification.settle_bands,
             limits: campaign.limits,
+            actuators: campaign.rig_actuators(),
             appended: None,
             repeats: campaign.repeats,
             return_to_first: campaign.return_to_first && transient,

@@ -16,7 +16,7 @@ use mapper_runner::{ObserverError, PlanSteps, RunError, RunObserver, StepSource,
 /// Objective recorded in the plan of a script.
 const OBJECTIVE: &str = "sequence";
 const REHEARSAL_BACKEND: &str = "virtual_lab";
-/// Rehearsed time of each step of a plan, s: the lab's valve takes 2.5 s from end to end, and shafts follow within seconds.
+/// Rehearsed time of each step of a plan after the arrival of P3 and valve, s: shafts follow within seconds.
 const JUMP_S: f64 = 10.0;
 /// Ratio by which the speed limit is raised to find the highest speed. Judgement: no jump overshoots by half.
 const UNLIMITED_RATIO: f64 = 1.5;
@@ -67,9 +67,8 @@ pub fn rehearse(
 }
 
 impl Session<'_> {
-    /// Rehearses the jumps of a plan on the virtual lab of the nominal machine, and returns the first guard trip that would end the run. In
-    /// the lab, pressure and valve move at finite rates, at once in the planner's forecast: a pressure that rises before the valve has closed
-    /// lets the speed overshoot. `None` too if the rehearsal fails, since it says nothing about the campaign then.
+    /// Rehearses the jumps of a plan on the virtual lab of the nominal machine, and returns the first guard trip that would end the run: the
+    /// settings of the lab may move P3 and valve otherwise than declared. `None` too if the rehearsal fails, since it says nothing about the campaign then.
     ///
     /// # Errors
     /// [`SessionError`] if it is interrupted, or the registry has no virtual lab.
@@ -110,7 +109,8 @@ impl Session<'_> {
         let mut backend = self.registry.make_backend(&nominal, model)?;
         let mut jumps = Plan { cool_down_s: 0.0, ..plan.clone() };
         for step in &mut jumps.steps {
-            step.dwell_s = step.dwell_s.min(JUMP_S);
+            let arrival_s = step.transition.map_or(0.0, |transition| transition.arrival_s);
+            step.dwell_s = step.dwell_s.min(JUMP_S + arrival_s);
         }
         let mut progress = Progress::default();
         let mut steps = PlanSteps::new(&jumps);

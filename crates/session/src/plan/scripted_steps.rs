@@ -140,6 +140,7 @@ fn request(campaign: &Campaign, model: &Model) -> SequenceRequest {
         boundary: campaign.boundary,
         follow_outlet: campaign.follow_outlet,
         limits: campaign.limits,
+        actuators: campaign.rig_actuators(),
         order: Box::new(move |points| {
             // The script itself decides on repeat visits.
             let subset = Campaign {

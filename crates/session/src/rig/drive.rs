@@ -9,7 +9,7 @@ use mapper_physics::operating_point::speed_response::speed_response;
 use mapper_physics::simulation::model::Model;
 use mapper_runner::{
     Operator, Protection, ReadingBounds, RunError, RunObserver, Runner, SoakSource, SpeedControl,
-    SpeedControlLimits, StepSource, UnguardedChannel,
+    SpeedControlLimits, StandMotion, StepSource, UnguardedChannel,
 };
 use std::sync::atomic::AtomicBool;
 
@@ -80,6 +80,11 @@ pub fn drive_paced(
     let protection = Protection {
         safe: campaign.safe_state.unwrap_or(rig.safe),
         p3_min_pa: campaign.limits.p3_min_pa,
+        stand: rig.controls.then(|| StandMotion {
+            actuators: campaign.rig_actuators(),
+            overshoot_ratio: campaign.limits.overshoot_ratio(),
+            speed_max_rpm: campaign.limits.speed_max_rpm,
+        }),
         accepts: rig.accepts,
         speed: campaign.guard_set().speed.filter(|_| rig.controls),
         readings: rig.controls.then(|| reading_bounds(campaign)),
@@ -148,7 +153,7 @@ fn speed_control<'a>(campaign: &'a Campaign, model: &'a Model) -> Option<SpeedCo
     let limits = SpeedControlLimits {
         p3_min_pa: campaign.limits.p3_min_pa,
         p3_max_pa: high_pa - P3_ERROR_SIGMAS * sigma_pa,
-        p3_slew_max_pa_s: campaign.limits.p3_slew_max_pa_s(),
+        p3_slew_max_pa_s: campaign.actuators.map(|actuators| actuators.p3.rate_per_s),
         speed_max_rpm: campaign.limits.speed_max_rpm,
     };
     let response_at = move |step: &PlanStep| {
@@ -158,7 +163,7 @@ fn speed_control<'a>(campaign: &'a Campaign, model: &'a Model) -> Option<SpeedCo
             valve_opening_ratio: step.to.valve_opening_ratio,
             ..campaign.boundary
         };
-        speed_response(model, step.to.speed_rpm, &boundary)
+        speed_response(model, step.to.speed_rpm, &boundary, &campaign.rig_actuators().p3)
     };
     Some(SpeedControl::new(campaign.speed_control?, limits, Box::new(response_at)))
 }

@@ -90,6 +90,7 @@ impl RunObserver for Driven {
             let rows = batch.t_s.iter().zip(speeds).zip(commands);
             step.rows.extend(rows.map(|((t_s, speed), command)| (t_s - start_s, *speed, *command)));
         }
+        self.events.extend(batch.events.iter().cloned());
         Ok(())
     }
 

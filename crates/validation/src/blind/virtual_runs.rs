@@ -60,9 +60,9 @@ impl<'a> Schedule<'a> {
         for cause in &case.causes {
             effect::add(&mut rig, cause.effect.as_ref(), &cause.values)?;
         }
-        let immediate = ActuatorDynamics { lag_s: 0.0, slew_per_s: f64::INFINITY };
+        let immediate = ActuatorDynamics::AT_ONCE;
         let p3_actuator =
-            ActuatorDynamics { lag_s: self.campaign.tolerances.actuator_lag_s, slew_per_s: f64::INFINITY };
+            ActuatorDynamics::new(self.campaign.tolerances.actuator_lag_s, f64::INFINITY);
         let mut settings = LabSettings {
             start: Start::Settled,
             p3_actuator,
@@ -253,6 +253,7 @@ pub(crate) fn steps_of_case(campaign: &Campaign, nominal: &Model) -> Result<Vec<
                 oil_temperature_k: boundary.oil_temperature_k,
                 dwell_s,
                 start_s: timing.warm_up_s + index as f64 * dwell_s,
+                transition: None,
                 predicted: Predicted::settled(
                     outputs.flow_kg_s,
                     outputs.pressure_ratio,

@@ -83,7 +83,7 @@ impl LabSettings {
 
     /// A lab without sensor errors and actuator lag: the model itself.
     pub fn ideal(model: Model, cell: BoundaryConditions) -> Self {
-        let at_once = ActuatorDynamics { lag_s: 0.0, slew_per_s: f64::INFINITY };
+        let at_once = ActuatorDynamics::AT_ONCE;
         LabSettings {
             model,
             instruments: Instruments::default(),

@@ -66,7 +66,7 @@ fn lab(start: Start) -> LabSettings {
     };
     LabSettings {
         sensors: [(Channel::T1, errors), (Channel::T2, errors)].into(),
-        p3_actuator: ActuatorDynamics { lag_s: 0.3, slew_per_s: 50e3 },
+        p3_actuator: ActuatorDynamics::new(0.3, 50e3),
         start,
         seed: 42,
         ..LabSettings::ideal(Model::nominal(), BoundaryConditions::default())

@@ -441,6 +441,7 @@ mod tests {
             t2_max_k: None,
             surge_margin_min_ratio: margin,
             housing_gradient_max_k: None,
+            overshoot_max_ratio: None,
         };
         let none = LineDefaults { surge_margin: None, widest_opening: None };
         let plain = line.request(none, ReferenceState::SAE, &limits(None));

@@ -316,6 +316,7 @@ mod tests {
             t2_max_k: None,
             surge_margin_min_ratio: None,
             housing_gradient_max_k: None,
+            overshoot_max_ratio: None,
         };
         let by =
             GuardInputs { limits: &limits, sensors: &BTreeMap::new(), dwell_s: 120.0, speed_is_held: true };

@@ -85,12 +85,15 @@ pub(crate) struct LimitsFile {
     /// Highest compressor outlet temperature, T2.
     #[schemars(extend("x-min" = "250 K", "x-max" = "800 K"), example = &"250 degC")]
     compressor_outlet_temperature: Option<Quantity<Temperature>>,
-    /// Smallest surge margin: flow over the surge flow at equal corrected speed, minus one; 0 %, the surge line, if none is given. Use a value below 0 % for a machine that is known to be stable beyond the nominal map's line.
+    /// Smallest surge margin of points and of the jumps between them: flow over the surge flow at equal corrected speed, minus one. If none is given, 0 %, the surge line, for points and 5 % for jumps; a jump to a closer point has nearly the margin of the point. Use a value below 0 % for a machine that is known to be stable beyond the nominal map's line.
     #[schemars(extend("x-min" = "-50 %", "x-max" = "200 %"), example = &"2 %")]
     surge_margin: Option<Quantity<Fraction>>,
     /// Largest change of the compressor housing within an identification window.
     #[schemars(extend("x-above" = "0 K", "x-max" = "500 K"), example = &"30 K")]
     housing_gradient: Option<Quantity<TemperatureDifference>>,
+    /// Largest overshoot of the shaft speed in a jump, relative to the higher of its two targets; 2 % if none is given.
+    #[schemars(extend("x-above" = "0 %", "x-max" = "20 %"), example = &"2 %")]
+    overshoot: Option<Quantity<Fraction>>,
 }
 
 /// Lowest and highest pressure.
@@ -103,7 +106,7 @@ pub(crate) struct PressureRangeFile {
     /// Highest pressure.
     #[schemars(extend("x-above" = "0 kPa", "x-max" = "2 MPa"), example = &"400 kPa")]
     max: Quantity<Pressure>,
-    /// Time of the rig from the lowest to the highest pressure; the plan ignores it if none is given.
+    /// Time of the rig from the lowest to the highest pressure; `rig.actuators` can say more about its motion.
     #[schemars(extend("x-above" = "0 s", "x-max" = "24 h"), example = &"10 s")]
     stroke: Option<Quantity<Duration>>,
 }
@@ -120,6 +123,7 @@ impl From<LimitsFile> for Limits {
             t2_max_k: file.compressor_outlet_temperature.map(|limit| limit.value),
             surge_margin_min_ratio: file.surge_margin.map(|limit| limit.value),
             housing_gradient_max_k: file.housing_gradient.map(|limit| limit.value),
+            overshoot_max_ratio: file.overshoot.map(|limit| limit.value),
         }
     }
 }
@@ -163,7 +167,7 @@ mod tests {
 
     #[test]
     fn every_key_lands_in_its_own_field() {
-        let text = "{speed: 180 krpm, turbine_inlet_pressure: {min: 110 kPa, max: 4 bar, stroke: 10 s}, turbine_inlet_temperature: 600 degC, compressor_outlet_temperature: 200 degC, surge_margin: -5 %, housing_gradient: 30 K}";
+        let text = "{speed: 180 krpm, turbine_inlet_pressure: {min: 110 kPa, max: 4 bar, stroke: 10 s}, turbine_inlet_temperature: 600 degC, compressor_outlet_temperature: 200 degC, surge_margin: -5 %, housing_gradient: 30 K, overshoot: 3 %}";
         let limits = Limits::from(crate::testing::any::<LimitsFile>(text).unwrap());
         let near =
             |found: Option<f64>, expected: f64| (found.unwrap() - expected).abs() < 1e-9 * expected.abs();
@@ -171,6 +175,7 @@ mod tests {
         assert!(near(Some(limits.p3_min_pa), 110e3) && near(Some(limits.p3_max_pa), 400e3));
         assert!(near(limits.t3_max_k, 873.15) && near(limits.t2_max_k, 473.15));
         assert!(near(limits.surge_margin_min_ratio, -0.05) && near(limits.housing_gradient_max_k, 30.0));
+        assert!(near(limits.overshoot_max_ratio, 0.03));
         assert!(near(limits.p3_slew_max_pa_s(), 29e3), "290 kPa in 10 s");
     }
 }

@@ -1,5 +1,6 @@
 //! Campaign keys that describe the gas stand: backend, sensors, boundary conditions, speed control, limits, and guards.
 
+pub(crate) mod actuators;
 pub(crate) mod backend;
 pub(crate) mod calibration;
 pub(crate) mod control;

@@ -12,7 +12,7 @@ use crate::virtual_lab::rig::running::Lumped;
 use crate::virtual_lab::rig::tolerances::draw_tolerances;
 use crate::virtual_lab::sensors::{Draws, SensorErrors, draw, offset_kind};
 use crate::virtual_lab::settings::{LabSettings, Start};
-use mapper_core::{BackendError, Channel};
+use mapper_core::{ActuatorMotion, BackendError, Channel};
 use mapper_physics::machine::params::Params;
 use mapper_physics::rig::backend_plugin::NominalRig;
 use mapper_physics::rig::effect::Rig;
@@ -163,6 +163,10 @@ struct ActuatorsFile {
     turbine_inlet_pressure: ActuatorFile<PressureRate>,
     turbine_inlet_temperature: ActuatorFile<TemperatureRate>,
     valve: ActuatorFile<RatioRate>,
+    /// Play of the valve's drive, opening; the declared one by default.
+    valve_play: Option<Quantity<Fraction>>,
+    /// Change of the commanded opening below which the valve does not move; the declared one by default.
+    valve_dead_band: Option<Quantity<Fraction>>,
     oil_temperature: ActuatorFile<TemperatureRate>,
 }
 
@@ -171,11 +175,12 @@ struct ActuatorsFile {
 struct ActuatorFile<Rate: Dimension> {
     lag: Option<Quantity<Duration>>,
     slew: Option<Quantity<Rate>>,
+    dead_time: Option<Quantity<Duration>>,
 }
 
 impl<Rate: Dimension> Default for ActuatorFile<Rate> {
     fn default() -> Self {
-        ActuatorFile { lag: None, slew: None }
+        ActuatorFile { lag: None, slew: None, dead_time: None }
     }
 }
 
@@ -217,7 +222,7 @@ pub fn read_settings(
     }
     file.deviations.apply(&mut rig)?;
     apply_effects(&mut rig, &file.effects, &nominal.effects)?;
-    let actuators = &file.actuators;
+    let (actuators, declared) = (&file.actuators, &nominal.actuators);
     let draws = Draws {
         seed: nominal.seed,
         noise_ratio: if file.noise == NoiseName::Declared { 1.0 } else { 0.0 },
@@ -238,10 +243,20 @@ pub fn read_settings(
             StartName::Standstill => Start::Standstill,
             StartName::Settled => Start::Settled,
         },
-        p3_actuator: actuators.turbine_inlet_pressure.dynamics("turbine_inlet_pressure", 0.3, 200e3)?,
-        t3_actuator: actuators.turbine_inlet_temperature.dynamics("turbine_inlet_temperature", 20.0, 10.0)?,
-        valve_actuator: actuators.valve.dynamics("valve", 0.2, 1.0)?,
-        oil_actuator: actuators.oil_temperature.dynamics("oil_temperature", 30.0, 1.0)?,
+        p3_actuator: actuators.turbine_inlet_pressure.dynamics("turbine_inlet_pressure", &declared.p3)?,
+        t3_actuator: actuators
+            .turbine_inlet_temperature
+            .dynamics("turbine_inlet_temperature", &declared.t3)?,
+        valve_actuator: ActuatorDynamics {
+            play: actuators.opening("valve_play", actuators.valve_play, declared.valve_play_ratio)?,
+            dead_band: actuators.opening(
+                "valve_dead_band",
+                actuators.valve_dead_band,
+                declared.valve_dead_band_ratio,
+            )?,
+            ..actuators.valve.dynamics("valve", &declared.valve)?
+        },
+        oil_actuator: actuators.oil_temperature.dynamics("oil_temperature", &OIL_MOTION)?,
         sensors: draw_sensors(&offset_of, nominal, &draws),
         redundant: elements_file::read(&file.faults, nominal, &draws, &offset_of)?,
         uneven_at_rest: match file.offsets {
@@ -262,18 +277,40 @@ pub fn read_settings(
 }
 
 impl<Rate: Dimension> ActuatorFile<Rate> {
-    fn dynamics(&self, name: &str, lag_s: f64, slew_per_s: f64) -> Result<ActuatorDynamics, BackendError> {
-        let lag_s = self.lag.map_or(lag_s, |lag| lag.value);
-        let slew_per_s = self.slew.as_ref().map_or(slew_per_s, |slew| slew.value);
+    /// The dynamics of the settings, and the declared ones where they say nothing.
+    fn dynamics(&self, name: &str, declared: &ActuatorMotion) -> Result<ActuatorDynamics, BackendError> {
+        let lag_s = self.lag.map_or(declared.lag_s, |lag| lag.value);
+        let dead_time_s = self.dead_time.map_or(declared.dead_time_s, |dead_time| dead_time.value);
+        let slew_per_s = self.slew.as_ref().map_or(declared.rate_per_s, |slew| slew.value);
+        check_range(dead_time_s, "s", 0.0..=600.0)
+            .map_err(|problem| problem.at(format!("actuators.{name}.dead_time")))?;
         check_range(lag_s, "s", 0.0..=3600.0)
             .map_err(|problem| problem.at(format!("actuators.{name}.lag")))?;
         if slew_per_s <= 0.0 {
             let problem = SettingProblem::NotPositive { value: slew_per_s, unit: rate_unit::<Rate>() };
             return Err(problem.at(format!("actuators.{name}.slew")));
         }
-        Ok(ActuatorDynamics { lag_s, slew_per_s })
+        Ok(ActuatorDynamics { dead_time_s, ..ActuatorDynamics::new(lag_s, slew_per_s) })
     }
 }
+
+impl ActuatorsFile {
+    /// A part of the valve's opening: play or dead band.
+    fn opening(
+        &self,
+        key: &str,
+        given: Option<Quantity<Fraction>>,
+        declared_ratio: f64,
+    ) -> Result<f64, BackendError> {
+        let ratio = given.map_or(declared_ratio, |given| given.value);
+        check_range(100.0 * ratio, "%", 0.0..=50.0)
+            .map_err(|problem| problem.at(format!("actuators.{key}")))?;
+        Ok(ratio)
+    }
+}
+
+/// Motion of the oil's temperature. Judgement: heaters of oil take half a minute.
+const OIL_MOTION: ActuatorMotion = ActuatorMotion { lag_s: 30.0, rate_per_s: 1.0, dead_time_s: 0.0 };
 
 impl PrecursorFile {
     fn precursor(&self) -> Result<SurgePrecursor, BackendError> {
@@ -358,7 +395,7 @@ fn rate_unit<Rate: Dimension>() -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mapper_core::{DeclaredUncertainty, ModelTolerances};
+    use mapper_core::{DeclaredUncertainty, ModelTolerances, RigActuators};
     use mapper_physics::machine::params::BoundaryConditions;
     use serde_json::json;
 
@@ -367,6 +404,7 @@ mod tests {
         NominalRig {
             model: Model::nominal(),
             boundary: BoundaryConditions::default(),
+            actuators: RigActuators::default(),
             speed_max_rpm: 180e3,
             sensors: [(Channel::T1, declared), (Channel::T2, declared)].into(),
             redundant: BTreeMap::new(),
@@ -407,7 +445,7 @@ mod tests {
         });
         let lab = read_settings(&settings, &nominal()).unwrap();
         assert_eq!(lab.sample_rate_hz, 20.0);
-        assert_eq!(lab.p3_actuator, ActuatorDynamics { lag_s: 0.5, slew_per_s: 20e3 });
+        assert_eq!(lab.p3_actuator, ActuatorDynamics::new(0.5, 20e3));
         assert_eq!(lab.model.params.compressor.alpha_area_ratio, 0.2);
         assert_eq!(lab.model.params.t2_probe_diameter_m, 1.5e-3);
         assert_eq!(lab.sensors[&Channel::T2].offset, 0.3);

@@ -28,8 +28,7 @@ pub struct LabInputs {
 impl LabInputs {
     /// Constant inputs at `boundary`.
     pub fn constant(boundary: &BoundaryConditions) -> Self {
-        let at_rest =
-            |value: f64| Actuator::at_rest(ActuatorDynamics { lag_s: 0.0, slew_per_s: f64::INFINITY }, value);
+        let at_rest = |value: f64| Actuator::at_rest(ActuatorDynamics::AT_ONCE, value);
         LabInputs {
             cell: *boundary,
             weather: Weather::default(),

@@ -1,0 +1,71 @@
+//! Campaigns on virtual stands whose actuators are slow: the shaft keeps its limits, and the compressor does not surge.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use crate::common::shipped::campaign;
+use crate::common::{Driven, driven};
+use mapper_core::EventKind;
+use proptest::prelude::*;
+
+/// Points from 50 to 155 krpm, at small and large openings, with `limits.speed: 170 krpm`.
+fn run(lab: &str, declared: &str, seed: u64) -> Driven {
+    let (seed, rig) = (format!("{declared}seed: {seed}  "), format!("virtual_lab: {lab}"));
+    driven(&campaign(&[
+        ("virtual_lab: {}", &rig),
+        ("seed: 1  ", &seed),
+        ("speed: 180 krpm", "speed: 170 krpm"),
+        (
+            "speeds: [50 krpm, 65 krpm, 80 krpm, 95 krpm, 110 krpm, 125 krpm, 140 krpm, 155 krpm]",
+            "speeds: [50 krpm, 110 krpm, 155 krpm]",
+        ),
+        ("openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [0.5, 1.4, 2.5]"),
+        ("zero: {soak: 30 min, nonuniformity: 0.01 K, pressure_nonuniformity: 1 Pa}\n", ""),
+    ]))
+}
+
+fn assert_kept(driven: &Driven, stand: &str) {
+    assert!(driven.steps.len() >= 9);
+    assert!(
+        driven.events.iter().all(|event| event.kind != EventKind::SurgeEntered),
+        "{stand}: {:?}",
+        driven.events
+    );
+    for step in &driven.steps {
+        let highest_rpm = step.rows.iter().map(|row| row.1).fold(0.0, f64::max);
+        let from_rpm = step.marker.from.map_or(0.0, |from| from.speed_rpm);
+        // Four standard deviations of the sensor's noise, 30 rpm.
+        let limit_rpm = 1.02 * step.target_rpm().max(from_rpm) + 120.0;
+        assert!(highest_rpm <= limit_rpm, "{stand}: {highest_rpm} rpm in {:?}", step.marker);
+    }
+}
+
+/// Not declared: pressure that follows in seconds. The runner finds it in the readings.
+#[test]
+fn a_slow_pressure_that_nobody_declared_causes_no_overspeed() {
+    for (lag, slew) in [("3 s", "20 kPa/s"), ("8 s", "5 kPa/s")] {
+        let lab = format!("{{actuators: {{turbine_inlet_pressure: {{lag: {lag}, slew: {slew}}}}}}}");
+        let driven = run(&lab, "", 1);
+        assert_kept(&driven, &lab);
+        assert!(driven.steps.iter().all(|step| !step.not_reached), "{lab}");
+        assert!(
+            driven.events.iter().any(|event| event.message.contains("rig.actuators")),
+            "{lab}: the run says that the stand is slower than declared"
+        );
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(6))]
+    #[test]
+    fn declared_stands_keep_speed_and_surge_margin(
+        (lag_s, rate_kpa_s, dead_s) in (0.1..8.0f64, 5.0..200.0f64, 0.0..1.5f64),
+        (valve_lag_s, valve_rate, play) in (0.1..1.5f64, 0.2..2.0f64, 0.0..2.0f64),
+        seed in 1..100u64,
+    ) {
+        let declared = format!(
+            "rig: {{actuators: {{turbine_inlet_pressure: {{lag: {lag_s:.2} s, rate: {rate_kpa_s:.1} kPa/s, dead_time: {dead_s:.2} s}}, \
+             valve: {{lag: {valve_lag_s:.2} s, rate: {valve_rate:.2} 1/s, play: {play:.1} %}}}}}}\n"
+        );
+        assert_kept(&run("{}", &declared, seed), &declared);
+    }
+}

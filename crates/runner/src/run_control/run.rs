@@ -407,13 +407,13 @@ impl Run<'_, '_> {
         let (Some(mut arrival), Some(sent)) = (self.arrival.take(), self.sent) else { return Ok(0.0) };
         let since_s = self.now_s - arrival.start_s;
         let late_s = since_s - arrival.planned_s.max(WindowRule::EARLIEST_S);
-        if late_s < 0.0 && !self.p3_motion.has_arrived(sent.p3_pa) {
+        let is_under_way = self.transition.is_some() || self.p3_motion.is_moving_to(sent.p3_pa);
+        let has_arrived = !is_under_way && self.p3_motion.has_arrived(sent.p3_pa);
+        if late_s < 0.0 && !has_arrived {
             self.arrival = Some(arrival);
             return Ok(0.0);
         }
-        let has_arrived = self.p3_motion.has_arrived(sent.p3_pa);
-        let gives_up = arrival.extended_s >= MAX_ARRIVAL_WAIT_S
-            || (!has_arrived && !self.p3_motion.is_moving_to(sent.p3_pa) && late_s > STUCK_S);
+        let gives_up = arrival.extended_s >= MAX_ARRIVAL_WAIT_S || (!is_under_way && late_s > STUCK_S);
         if has_arrived || gives_up {
             if let Some(speed) = &mut self.runner.speed {
                 // The change beyond the declared motion is that of a longer lag.
@@ -566,11 +566,11 @@ impl Run<'_, '_> {
             if ends && in_step {
                 break;
             }
-            if self.advance_transition(&batch, until_s)? {
-                continue;
-            }
             if in_step {
                 until_s += self.wait_for_arrival(self.now_s - before_s)?;
+            }
+            if self.advance_transition(&batch, until_s)? {
+                continue;
             }
             if hold_speed && let (Some(speed), Some(sent)) = (&mut self.runner.speed, self.sent) {
                 let (p3_pa, event) = speed.on_batch(&batch, self.p3_motion.is_moving_to(sent.p3_pa));

@@ -199,9 +199,9 @@ impl TransitionControl {
 }
 
 /// Time over which the motion of P3 is judged, s. Judgement: longer than its noise, shorter than a slow stand's lag.
-const MOTION_S: f64 = 3.0;
-/// Relative change of P3 per second above which it still moves. Judgement: ten times what a speed loop changes in a settled step.
-const MOVING_PER_S: f64 = 1.5e-3;
+const MOTION_S: f64 = 5.0;
+/// Relative change of P3 per second above which it still moves. Judgement: twice what a speed loop changes in a settled step.
+const MOVING_PER_S: f64 = 4e-4;
 /// Relative distance of P3 from its command within which it has arrived. Judgement: offsets of sensors and losses of pipes are below.
 pub(crate) const ARRIVED_RATIO: f64 = 0.02;
 
@@ -246,7 +246,6 @@ impl PressureMotion {
     /// Whether P3 is at `command_pa`; true without readings.
     pub(crate) fn has_arrived(&self, command_pa: f64) -> bool {
         self.p3_pa().is_none_or(|p3_pa| (p3_pa - command_pa).abs() < ARRIVED_RATIO * command_pa)
-            && !self.is_moving_to(command_pa)
     }
 }
 

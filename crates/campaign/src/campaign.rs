@@ -9,8 +9,8 @@ use crate::elements::points::grid::GridFile;
 pub use crate::elements::points::repeats::SequenceSource;
 use crate::elements::points::repeats::{RepeatsFile, SurgeSearchFile, repeats, sequence};
 use crate::elements::points::timing::{TimingFile, ZeroFile};
-pub use crate::elements::rig::backend::{BackendChoice, ReaderChoice};
 use crate::elements::rig::actuators::RigFile;
+pub use crate::elements::rig::backend::{BackendChoice, ReaderChoice};
 use crate::elements::rig::backend::{ReaderFile, backend, readers};
 use crate::elements::rig::calibration::Calibration;
 pub use crate::elements::rig::calibration::{CalibrationRule, Date};
@@ -25,8 +25,8 @@ pub use crate::elements::turbocharger::machine::{DescriptionSource, Machine, Map
 use crate::elements::turbocharger::reference::{EfficiencyFile, ReferenceFile};
 use mapper_core::{
     AcceptanceCriteria, Channel, EfficiencyDefinition, GuardSet, Limits, ModelTolerances, OnDrift,
-    OperatingPoint, ReferenceState, Repeats, RigActuators, SafeTrajectory, Soak, SpeedControlSettings, SurgeSearchSettings,
-    Timing, VisitOrder,
+    OperatingPoint, ReferenceState, Repeats, RigActuators, SafeTrajectory, Soak, SpeedControlSettings,
+    SurgeSearchSettings, Timing, VisitOrder,
 };
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::line_points::LineRequest;

@@ -5,7 +5,9 @@
 
 #![allow(clippy::print_stdout, reason = "what it prints is what it is for")]
 
-use mapper_core::{Dwell, Limits, OperatingPoint, RigActuators, Repeats, SettleBands, Timing, VisitOrder, WindowRule};
+use mapper_core::{
+    Dwell, Limits, OperatingPoint, Repeats, RigActuators, SettleBands, Timing, VisitOrder, WindowRule,
+};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::reach::FollowOutlet;
 use mapper_physics::simulation::model::Model;

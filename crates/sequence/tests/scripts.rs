@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_core::{
-    CommonErrors, Dwell, IdentifiedPoint, Limits, Method, OperatingPoint, SettleBands, StepKind, Timing,
-    Verdict, WindowRule,
+    CommonErrors, Dwell, IdentifiedPoint, Limits, Method, OperatingPoint, RigActuators, SettleBands,
+    StepKind, Timing, Verdict, WindowRule,
 };
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::model::Model;
@@ -37,6 +37,7 @@ fn request() -> SequenceRequest {
             housing_gradient_max_k: None,
             overshoot_max_ratio: None,
         },
+        actuators: RigActuators::default(),
         order: Box::new(|points| Ok(points.iter().rev().copied().collect())),
     }
 }

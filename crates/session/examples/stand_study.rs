@@ -39,7 +39,9 @@ impl RunObserver for Seen {
             batch.truth.iter().find(|column| column.name == name).map(|column| &column.values[..])
         };
         let truth = truth_of("speed_rpm");
-        for (flow, surge) in truth_of("flow_kg_s").into_iter().flatten().zip(truth_of("surge_flow_kg_s").into_iter().flatten()) {
+        for (flow, surge) in
+            truth_of("flow_kg_s").into_iter().flatten().zip(truth_of("surge_flow_kg_s").into_iter().flatten())
+        {
             // Flow is meaningful from the first step on.
             if self.step.is_some() && flow.is_finite() {
                 self.lowest_margin = self.lowest_margin.min(flow / surge - 1.0);
@@ -55,7 +57,8 @@ impl RunObserver for Seen {
             && let Some((marker, _)) = self.step
             && (batch.t_s.last().copied().unwrap_or(0.0) / 3.0).floor() > (self.last_s / 3.0).floor()
         {
-            let last = |channel: Channel| batch.column(channel).and_then(<[f64]>::last).copied().unwrap_or(f64::NAN);
+            let last =
+                |channel: Channel| batch.column(channel).and_then(<[f64]>::last).copied().unwrap_or(f64::NAN);
             println!(
                 "    {:.1} step {} +{:.1}: to {:.0} rpm, N {:.0}, P3 {:.1} of {:.1} kPa, valve {:.3}",
                 self.last_s,

@@ -1,8 +1,8 @@
 //! The plan as data: steps, their order, and the expected results.
 
 use crate::OperatingPoint;
-use crate::test_plan::transition::Transition;
 use crate::test_plan::plan_remark::{NoBound, PlanRemark, deserialize_no_bound, deserialize_remarks};
+use crate::test_plan::transition::Transition;
 use serde::{Deserialize, Serialize};
 
 /// Whether a step measures a point for the map or revisits one.

@@ -222,7 +222,9 @@ mod tests {
         let model = Model::nominal();
         let boundary = BoundaryConditions { valve_opening_ratio: 0.7, ..BoundaryConditions::default() };
         let rest = hold_speed(&model, 110e3, &boundary).unwrap();
-        let forecast = forecast_step(&model, rest.state, &TransitionInputs::constant(&rest.boundary), 0.0, 120.0).unwrap();
+        let forecast =
+            forecast_step(&model, rest.state, &TransitionInputs::constant(&rest.boundary), 0.0, 120.0)
+                .unwrap();
         let predicted = forecast.predicted(&WindowRule::Auto, &SettleBands::default(), true);
         assert_eq!(predicted.settle_s, Some(0.0));
         // The integration's tolerance of 1e-6 at 400 K.
@@ -236,7 +238,9 @@ mod tests {
         let model = Model::nominal();
         let boundary = BoundaryConditions { valve_opening_ratio: 0.7, ..BoundaryConditions::default() };
         let rest = hold_speed(&model, 110e3, &boundary).unwrap();
-        let forecast = forecast_step(&model, rest.state, &TransitionInputs::constant(&rest.boundary), 0.0, 120.0).unwrap();
+        let forecast =
+            forecast_step(&model, rest.state, &TransitionInputs::constant(&rest.boundary), 0.0, 120.0)
+                .unwrap();
         let window = forecast.window((10.0, 110.0));
         assert_eq!((window[0].t_s, window[window.len() - 1].t_s), (10.0, 110.0));
         assert!(forecast.window((130.0, 140.0)).is_empty());

@@ -58,8 +58,8 @@ fn differentiate(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mapper_core::RigActuators;
     use crate::simulation::simulate::{DEFAULT_RELATIVE_TOLERANCE, Simulator, Watch};
+    use mapper_core::RigActuators;
 
     /// The integrated model after a small step of P3, with housings of constant temperature: the speed follows the gain, and
     /// reaches 63 % of the way in the shaft's time constant.

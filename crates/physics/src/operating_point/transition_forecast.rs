@@ -145,11 +145,14 @@ fn find_violations(
     let surges = (lowest_ratio < limit_ratio)
         .then_some(TransitionViolation::SurgeMargin { lowest_ratio, limit_ratio });
     let (highest_rpm, max_rpm) = (step.highest_speed_rpm, limits.speed_max_rpm);
-    let overspeeds = (highest_rpm > max_rpm)
-        .then_some(TransitionViolation::Overspeed { highest_rpm, limit_rpm: max_rpm });
+    let overspeeds =
+        (highest_rpm > max_rpm).then_some(TransitionViolation::Overspeed { highest_rpm, limit_rpm: max_rpm });
     let target_rpm = from.state.shaft_speed_rpm().max(target.state.shaft_speed_rpm());
     let limit_rpm = target_rpm * (1.0 + limits.overshoot_ratio());
-    let overshoots = (highest_rpm > limit_rpm)
-        .then_some(TransitionViolation::Overshoot { highest_rpm, target_rpm, limit_rpm });
+    let overshoots = (highest_rpm > limit_rpm).then_some(TransitionViolation::Overshoot {
+        highest_rpm,
+        target_rpm,
+        limit_rpm,
+    });
     [surges, overspeeds, overshoots].into_iter().flatten().collect()
 }

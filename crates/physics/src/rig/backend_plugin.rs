@@ -4,7 +4,8 @@ use crate::machine::params::BoundaryConditions;
 use crate::rig::effect::Effect;
 use crate::simulation::model::Model;
 use mapper_core::{
-    Backend, BackendError, Channel, DeclaredUncertainty, ModelTolerances, RedundantSensors, RigActuators, Soak,
+    Backend, BackendError, Channel, DeclaredUncertainty, ModelTolerances, RedundantSensors, RigActuators,
+    Soak,
 };
 use std::collections::BTreeMap;
 use std::sync::Arc;

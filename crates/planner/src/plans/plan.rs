@@ -122,7 +122,9 @@ fn fit_time_budget(
     // A repeat takes one step instead of two if the order visits the start of the repeated jump anyway. Ways around forbidden jumps take
     // more steps.
     let steps = draft.steps().len();
-    match dwell_s(steps) {
+    // On a slow stand, steps are longer by the time in which P3 and valve arrive.
+    let arrivals_s: f64 = draft.steps().iter().map(|step| step.dwell_s - draft.dwell_s).sum();
+    match ((steps_s - arrivals_s) / steps as f64).floor() {
         fitting_s if fitting_s < MIN_DWELL_S => too_short(steps),
         fitting_s => builder.with_dwell(draft, fitting_s),
     }

@@ -172,7 +172,9 @@ mod tests {
     use crate::request::PlanRequest;
     use crate::request::solve_steady_states;
     use crate::thermal_memory::housing::gradients_k;
-    use mapper_core::{Dwell, Limits, OperatingPoint, RigActuators, SettleBands, Timing, VisitOrder, WindowRule};
+    use mapper_core::{
+        Dwell, Limits, OperatingPoint, RigActuators, SettleBands, Timing, VisitOrder, WindowRule,
+    };
     use mapper_physics::simulation::model::Model;
     use proptest::prelude::*;
 

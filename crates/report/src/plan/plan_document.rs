@@ -126,7 +126,11 @@ fn summary(campaign: &Campaign, plan: &Plan, soak_s: f64) -> Vec<(&'static str, 
     if !errors.is_empty() {
         lines.push(("expected error", errors.join("; ")));
     }
-    lines.extend(transition_lines(plan, &Display::new(&campaign.display), &campaign.display.speed.to_string()));
+    lines.extend(transition_lines(
+        plan,
+        &Display::new(&campaign.display),
+        &campaign.display.speed.to_string(),
+    ));
     lines.extend(plan.bound_remark.iter().map(|reason| ("bound", no_bound_text(*reason).to_owned())));
     lines.extend(plan.remarks.iter().map(|remark| ("note", remark.message())));
     if !campaign.machine.assumed.is_empty() {
@@ -168,7 +172,8 @@ fn transition_lines(plan: &Plan, display: &Display, speed_unit: &str) -> Vec<(&'
         latest.1.arrival_s,
         number(latest)
     );
-    let late_s = jumps.iter().map(|(_, transition)| (transition.arrival_s - WindowRule::EARLIEST_S).max(0.0).ceil());
+    let late_s =
+        jumps.iter().map(|(_, transition)| (transition.arrival_s - WindowRule::EARLIEST_S).max(0.0).ceil());
     let slow_s: f64 = late_s.sum();
     let mut lines = vec![("jumps", limits)];
     if slow_s > 0.0 {

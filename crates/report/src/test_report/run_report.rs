@@ -195,8 +195,7 @@ impl RunReport<'_> {
         let approaches = self.recording.steps.iter().filter(|step| step.kind == StepKind::Approach);
         let searched_from_s = approaches.map(|step| step.start_s).fold(f64::INFINITY, f64::min);
         let entered = self.events.iter().filter(|event| event.kind == EventKind::SurgeEntered);
-        let times_s: Vec<f64> =
-            entered.map(|event| event.t_s).filter(|t_s| *t_s < searched_from_s).collect();
+        let times_s: Vec<f64> = entered.map(|event| event.t_s).filter(|t_s| *t_s < searched_from_s).collect();
         let first_s = times_s.first()?;
         let count = match times_s.len() {
             1 => "once".to_owned(),
@@ -316,10 +315,7 @@ impl RunReport<'_> {
         );
         let mut events = Document::default();
         events.list(
-            self.events
-                .iter()
-                .take(MAX_EVENTS)
-                .map(|event| format!("{:.1} s: {}", event.t_s, event.message)),
+            self.events.iter().take(MAX_EVENTS).map(|event| format!("{:.1} s: {}", event.t_s, event.message)),
         );
         if let Some(further) = self.events.len().checked_sub(MAX_EVENTS).filter(|further| *further > 0) {
             events.text(format!("{further} further events are in the recording."));

@@ -5,12 +5,13 @@ use crate::guards::plausibility_watch::PlausibilityWatch;
 use crate::run_control::observer::Protection;
 use crate::run_control::observer::{ObserverError, Operator, RunError, RunObserver};
 use crate::run_control::speed_control::SpeedControl;
+use crate::run_control::step_transition::Arrival;
 use crate::run_control::surge_events::SurgeEvents;
-use crate::run_control::transition_control::{PressureMotion, StandMotion, TransitionControl};
+use crate::run_control::transition_control::{PressureMotion, TransitionControl};
 use crate::step_sources::step_source::StepSource;
 use mapper_core::{
     Backend, BackendError, Clock, Event, EventKind, GuardName, OperatingPoint, PlanStep, Reaction, RigMode,
-    RunEnding, SampleBatch, Setpoints, Soak, StepMarker, Trip, WindowRule, is_commanded_jump,
+    RunEnding, SampleBatch, Setpoints, Soak, StepMarker, Trip, is_commanded_jump,
 };
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::AtomicBool;
@@ -21,17 +22,6 @@ const POLL_INTERVAL_S: f64 = 1.0;
 const MAX_HOLD_S: f64 = 300.0;
 /// Longest time that the operator may hold a step, s. It limits a hold that an operator forgets.
 const MAX_OPERATOR_HOLD_S: f64 = 4.0 * 3600.0;
-/// Longest extension of a step whose P3 has not arrived, s. Bound: five times the stroke of the slowest stands.
-const MAX_ARRIVAL_WAIT_S: f64 = 300.0;
-/// Shortest run-down of P3 before the safe state, s: a faster P3 falls before the shaft has noticed the valve. Judgement.
-const MIN_UNLOAD_S: f64 = 5.0;
-/// Lags of P3 in the time of its arrival. Source: ln 100, as for declared actuators.
-const LAGS_OF_ARRIVAL: f64 = 4.6;
-/// Time after which a P3 that neither arrives nor moves is given up, s. Judgement: longer than any dead time.
-const STUCK_S: f64 = 10.0;
-/// Smallest delay of P3 that is reported, s, and the factor from which a later one is reported again. Judgement.
-const MIN_LATE_S: f64 = 3.0;
-const LATER_RATIO: f64 = 1.5;
 /// Number of stages when a step is approached again, and the duration of each, s.
 const APPROACH_STAGES: u32 = 4;
 const APPROACH_STAGE_S: f64 = 10.0;
@@ -72,15 +62,6 @@ impl<E: Into<RunError>> From<E> for Halt {
     }
 }
 
-/// The arrival of P3 at the setpoint of a step.
-struct Arrival {
-    start_s: f64,
-    /// Time after the start by which the plan expects it, s.
-    planned_s: f64,
-    /// By how much the step was extended, s.
-    extended_s: f64,
-}
-
 /// A run that is under way.
 pub(crate) struct Run<'a, 'p> {
     pub(crate) runner: Runner<'a>,
@@ -94,17 +75,17 @@ pub(crate) struct Run<'a, 'p> {
     plausibility: Option<PlausibilityWatch>,
     skipped: u32,
     /// The transition of the current step, until all its commands have been sent.
-    transition: Option<TransitionControl>,
+    pub(crate) transition: Option<TransitionControl>,
     /// Arrival of P3 in the current step; `None` once it has arrived.
-    arrival: Option<Arrival>,
-    p3_motion: PressureMotion,
+    pub(crate) arrival: Option<Arrival>,
+    pub(crate) p3_motion: PressureMotion,
     surge_events: SurgeEvents,
     /// Longest delay of P3 that was reported, s.
-    reported_late_s: f64,
+    pub(crate) reported_late_s: f64,
     /// Whether the valve opens at the start of the safe shutdown: after a surge.
     pub(crate) opens_at_once: bool,
     /// The point of the last step.
-    at: Option<OperatingPoint>,
+    pub(crate) at: Option<OperatingPoint>,
     /// The step that a guard has cut short, until its end is reported.
     pub(crate) open_step: Option<StepMarker>,
     /// Whether the operator was informed that the run ends with this step.
@@ -202,20 +183,6 @@ impl Run<'_, '_> {
         (self.sent, self.commanded) = (None, CommandedState::default());
         let end_s = self.now_s + self.runner.steps.cool_down_s();
         self.run_until(end_s, false, false)
-    }
-
-    /// Lowers P3 at the closed valve before the end of a run on a slow stand: the safe state opens the valve, and the shaft would speed up.
-    fn unload(&mut self) -> Result<(), Halt> {
-        let (Some(StandMotion { actuators, .. }), Some(sent)) = (self.protection.stand, self.sent) else {
-            return Ok(());
-        };
-        let p3_pa = self.protection.p3_min_pa.min(sent.p3_pa);
-        let duration_s = actuators.p3.ramp_s(sent.p3_pa - p3_pa) + actuators.p3.follow_s();
-        if sent.mode != RigMode::Running || duration_s < MIN_UNLOAD_S {
-            return Ok(());
-        }
-        self.send(Setpoints { p3_pa, ..sent })?;
-        self.run_until(self.now_s + duration_s.min(MAX_ARRIVAL_WAIT_S), false, false)
     }
 
     /// Waits for the next step, unless a stop is requested. A rig in real time is polled and guarded meanwhile.
@@ -359,102 +326,6 @@ impl Run<'_, '_> {
         Ok(())
     }
 
-    /// Starts the way to the setpoints of a step: at once, or on ramps.
-    fn start_transition(&mut self, step: &PlanStep, setpoints: Setpoints) -> Result<(), BackendError> {
-        let control = self.protection.stand.zip(self.sent).and_then(|(stand, before)| {
-            TransitionControl::new(stand, before, setpoints, (step, self.at), self.now_s)
-        });
-        self.transition = None;
-        self.arrival = self.protection.stand.map(|stand| Arrival {
-            start_s: self.now_s,
-            planned_s: match step.transition {
-                Some(transition) => transition.arrival_s,
-                None => stand.actuators.p3.follow_s(),
-            },
-            extended_s: 0.0,
-        });
-        let Some(control) = control else { return self.send(setpoints) };
-        self.send(control.setpoints())?;
-        self.transition = Some(control);
-        Ok(())
-    }
-
-    /// Sends the next setpoints of a transition. Returns whether it is under way.
-    fn advance_transition(&mut self, batch: &SampleBatch, until_s: f64) -> Result<bool, BackendError> {
-        let Some(mut control) = self.transition.take() else { return Ok(false) };
-        let next = control.advance(batch, self.now_s);
-        if self.now_s < until_s {
-            self.send(next)?;
-        }
-        let completes = control.is_complete();
-        if completes {
-            // Sensors have to follow from here on.
-            if control.is_jump() {
-                self.commanded.jumped_s = Some(self.now_s);
-            }
-            let now_s = self.now_s;
-            if let Some(speed) = &mut self.runner.speed {
-                speed.restart_wait(now_s);
-            }
-        } else {
-            self.transition = Some(control);
-        }
-        Ok(!completes)
-    }
-
-    /// Extends a step by `passed_s` while P3 has not arrived although it should have. Returns the extension, s.
-    fn wait_for_arrival(&mut self, passed_s: f64) -> Result<f64, ObserverError> {
-        let (Some(mut arrival), Some(sent)) = (self.arrival.take(), self.sent) else { return Ok(0.0) };
-        let since_s = self.now_s - arrival.start_s;
-        let late_s = since_s - arrival.planned_s.max(WindowRule::EARLIEST_S);
-        let is_under_way = self.transition.is_some() || self.p3_motion.is_moving_to(sent.p3_pa);
-        let has_arrived = !is_under_way && self.p3_motion.has_arrived(sent.p3_pa);
-        if late_s < 0.0 && !has_arrived {
-            self.arrival = Some(arrival);
-            return Ok(0.0);
-        }
-        let gives_up = arrival.extended_s >= MAX_ARRIVAL_WAIT_S || (!is_under_way && late_s > STUCK_S);
-        if has_arrived || gives_up {
-            if let Some(speed) = &mut self.runner.speed {
-                // The change beyond the declared motion is that of a longer lag.
-                speed.learn_delay((since_s - arrival.planned_s).max(0.0) / LAGS_OF_ARRIVAL);
-            }
-            self.report_arrival(&sent, since_s, arrival.planned_s, has_arrived)?;
-            return Ok(0.0);
-        }
-        arrival.extended_s += passed_s;
-        self.arrival = Some(arrival);
-        Ok(passed_s)
-    }
-
-    /// Reports a P3 that arrives clearly later than planned, or not at all.
-    fn report_arrival(
-        &mut self,
-        sent: &Setpoints,
-        since_s: f64,
-        planned_s: f64,
-        has_arrived: bool,
-    ) -> Result<(), ObserverError> {
-        let late_s = since_s - planned_s.max(WindowRule::EARLIEST_S);
-        if late_s < MIN_LATE_S || late_s < LATER_RATIO * self.reported_late_s {
-            return Ok(());
-        }
-        self.reported_late_s = late_s;
-        let command_kpa = sent.p3_pa / 1e3;
-        let message = match (has_arrived, self.p3_motion.p3_pa()) {
-            (false, Some(p3_pa)) => format!(
-                "P3 has not arrived: {command_kpa:.1} kPa commanded, {:.1} kPa measured {since_s:.0} s after the start of the step; check \
-                 the air supply",
-                p3_pa / 1e3
-            ),
-            _ => format!(
-                "P3 arrived at {command_kpa:.1} kPa {since_s:.0} s after the start of the step, {planned_s:.0} s planned: the stand is slower \
-                 than declared, and the step lasts longer; write its lag and rate in `rig.actuators.turbine_inlet_pressure`"
-            ),
-        };
-        self.runner.observer.on_event(&Event { t_s: self.now_s, kind: EventKind::Note, message })
-    }
-
     /// Ends the speed control of a step, and reports a speed that was not reached.
     fn end_speed_control(&mut self) -> Result<(), ObserverError> {
         let now_s = self.now_s;
@@ -508,7 +379,12 @@ impl Run<'_, '_> {
 
     /// Runs the rig to `until_s` while guards, observer and source receive its samples. Within a step the source may end it early,
     /// and a guard may hold or cut it short. Outside a step, a guard that would cut a step short ends the run.
-    fn run_until(&mut self, mut until_s: f64, in_step: bool, hold_speed: bool) -> Result<(), Halt> {
+    pub(crate) fn run_until(
+        &mut self,
+        mut until_s: f64,
+        in_step: bool,
+        hold_speed: bool,
+    ) -> Result<(), Halt> {
         let (mut held_s, mut operator_held_s, mut hold_sent) = (0.0, 0.0, false);
         while self.now_s < until_s {
             self.check_for_stop(in_step, until_s)?;

@@ -118,12 +118,16 @@ impl Run<'_, '_> {
     fn run_down_setpoints(&self, from: &Setpoints, after_s: f64) -> Option<Setpoints> {
         let Protection { safe, p3_min_pa, accepts, stand, .. } = self.protection;
         let next = safe.setpoints(from, after_s, *p3_min_pa, accepts.as_ref())?;
-        let Some(StandMotion { actuators, .. }) = stand.filter(|_| !self.opens_at_once) else { return Some(next) };
+        let Some(StandMotion { actuators, .. }) = stand.filter(|_| !self.opens_at_once) else {
+            return Some(next);
+        };
         // A valve that opens before P3 has fallen lets the shaft speed up; only a compressor in surge needs it at once.
-        let rate_pa_s = safe.p3_slew_pa_s.map_or(actuators.p3.rate_per_s, |slew| slew.min(actuators.p3.rate_per_s));
+        let rate_pa_s =
+            safe.p3_slew_pa_s.map_or(actuators.p3.rate_per_s, |slew| slew.min(actuators.p3.rate_per_s));
         let fallen_pa = rate_pa_s * (after_s - actuators.p3.dead_time_s - actuators.p3.lag_s);
         let share = (fallen_pa / (from.p3_pa - p3_min_pa).max(1.0)).clamp(0.0, 1.0);
-        let opening = from.valve_opening_ratio + share * (next.valve_opening_ratio - from.valve_opening_ratio);
+        let opening =
+            from.valve_opening_ratio + share * (next.valve_opening_ratio - from.valve_opening_ratio);
         Some(Setpoints { valve_opening_ratio: opening, ..next })
     }
 

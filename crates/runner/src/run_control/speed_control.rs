@@ -184,9 +184,7 @@ impl<'a> SpeedControl<'a> {
             .limits
             .p3_slew_max_pa_s
             .map_or(0.0, |slew_pa_s| (hold.setpoint_pa - from_pa).abs() / slew_pa_s);
-        hold.earliest_end_s = t_s
-            + ramp_s
-            + transient_s(&response);
+        hold.earliest_end_s = t_s + ramp_s + transient_s(&response);
         let p3_pa = hold.setpoint_pa;
         self.hold = Some(hold);
         self.last_sent_pa = Some(p3_pa);

@@ -65,8 +65,10 @@ impl SurgeEvents {
             true => format!(", lowest flow {:.2} g/s", 1e3 * lowest_flow_kg_s),
             false => String::new(),
         };
-        let message =
-            format!("surge ended: it lasted {:.2} s from {since_s:.2} s to {left_s:.2} s{flow}", left_s - since_s);
+        let message = format!(
+            "surge ended: it lasted {:.2} s from {since_s:.2} s to {left_s:.2} s{flow}",
+            left_s - since_s
+        );
         Some(Event { t_s: now_s, kind: EventKind::SurgeLeft, message })
     }
 }

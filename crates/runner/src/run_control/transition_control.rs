@@ -5,8 +5,10 @@
 //! the shaft is above the higher target.
 
 use mapper_core::{
-    Channel, OperatingPoint, PlanStep, Ramp, Ramps, RigActuators, RigMode, SampleBatch, Setpoints, is_commanded_jump,
+    Channel, OperatingPoint, PlanStep, Ramp, Ramps, RigActuators, RigMode, SampleBatch, Setpoints,
+    is_commanded_jump,
 };
+use std::collections::VecDeque;
 
 /// The stand, as far as transitions need it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,6 +33,12 @@ const MIN_P3_CHANGE_RATIO: f64 = 0.02;
 const HOLD_OVERSHOOT_SHARE: f64 = 0.25;
 /// Distance from the limit of speed at which P3 stops rising, relative. Judgement: twice the change of a fast shaft in one interval.
 const LIMIT_DISTANCE_RATIO: f64 = 0.01;
+/// Time over which the speed is extrapolated, s. Judgement: a third of a shaft's usual time constant.
+const AHEAD_S: f64 = 0.3;
+/// Shortest time in which P3 falls back to its start, s. Judgement: a faster one makes the shaft swing.
+const MIN_RETREAT_S: f64 = 3.0;
+/// Time after the ramps in which the shaft may overshoot, s. Judgement: three time constants of a usual shaft.
+const WATCH_S: f64 = 4.0;
 /// Number of commands of a transition, and bounds of their interval, s. Judgement: finer than the steps that a shaft notices; a controller accepts
 /// ten commands a second.
 const COMMANDS: f64 = 40.0;
@@ -47,8 +55,6 @@ pub(crate) struct TransitionControl {
     ramps: Ramps,
     start_s: f64,
     now_s: f64,
-    /// Time that the ramp of P3 was held, s.
-    p3_held_s: f64,
     p3_share: f64,
     valve_share: f64,
     /// Speeds of the targets before and after, rpm.
@@ -56,6 +62,8 @@ pub(crate) struct TransitionControl {
     /// Readings of P3, Pa, and speed, rpm, at the start.
     first: (Option<f64>, Option<f64>),
     latest: (Option<f64>, Option<f64>),
+    /// Times, s, and speeds, rpm, of the last [`AHEAD_S`].
+    speeds: VecDeque<(f64, f64)>,
 }
 
 impl TransitionControl {
@@ -91,12 +99,12 @@ impl TransitionControl {
             ramps,
             start_s: now_s,
             now_s,
-            p3_held_s: 0.0,
             p3_share: 0.0,
             valve_share: 0.0,
             targets_rpm: (at.map_or(target_rpm, |at| at.speed_rpm), target_rpm),
             first: (None, None),
             latest: (None, None),
+            speeds: VecDeque::new(),
         })
     }
 
@@ -111,9 +119,16 @@ impl TransitionControl {
         is_commanded_jump(commands(&self.from), commands(&self.to))
     }
 
-    /// Whether all commands have been sent.
-    pub(crate) fn is_complete(&self) -> bool {
+    /// Whether P3 and valve have their last commands.
+    pub(crate) fn is_sent(&self) -> bool {
         self.p3_share >= 1.0 && self.valve_share >= 1.0
+    }
+
+    /// Whether all commands have been sent, and the shaft does not overshoot.
+    pub(crate) fn is_complete(&self) -> bool {
+        let rises = self.to.p3_pa > self.from.p3_pa;
+        let watched_s = self.ramps.end_s() + if rises { WATCH_S } else { 0.0 };
+        self.is_sent() && self.now_s - self.start_s >= watched_s
     }
 
     /// The setpoints at the latest time.
@@ -136,11 +151,19 @@ impl TransitionControl {
     /// Advances to `now_s`, the end of a batch of samples, and returns the next setpoints.
     pub(crate) fn advance(&mut self, batch: &SampleBatch, now_s: f64) -> Setpoints {
         let last = |channel: Channel| {
-            batch.column(channel).and_then(|values| values.iter().rev().copied().find(|value| value.is_finite()))
+            batch
+                .column(channel)
+                .and_then(|values| values.iter().rev().copied().find(|value| value.is_finite()))
         };
         let (p3_pa, speed_rpm) = (last(Channel::P3), last(Channel::ShaftSpeed));
         self.latest = (p3_pa.or(self.latest.0), speed_rpm.or(self.latest.1));
         self.first = (self.first.0.or(p3_pa), self.first.1.or(speed_rpm));
+        let speeds = batch.column(Channel::ShaftSpeed).unwrap_or_default();
+        self.speeds
+            .extend(batch.t_s.iter().copied().zip(speeds.iter().copied()).filter(|(_, rpm)| rpm.is_finite()));
+        while self.speeds.front().is_some_and(|(t_s, _)| *t_s < now_s - AHEAD_S) {
+            self.speeds.pop_front();
+        }
         let step_s = (now_s - self.now_s).max(0.0);
         self.now_s = now_s;
         self.advance_p3(step_s);
@@ -149,17 +172,35 @@ impl TransitionControl {
     }
 
     fn advance_p3(&mut self, step_s: f64) {
-        let rises = self.to.p3_pa > self.from.p3_pa;
-        let limit_rpm = (self.targets_rpm.0.max(self.targets_rpm.1)
-            * (1.0 + HOLD_OVERSHOOT_SHARE * self.stand.overshoot_ratio))
-            .min(self.stand.speed_max_rpm * (1.0 - LIMIT_DISTANCE_RATIO));
-        let limit_rpm = limit_rpm.max(self.targets_rpm.1);
-        if rises && self.latest.1.is_some_and(|speed_rpm| speed_rpm > limit_rpm) && self.valve_share < 1.0 {
-            // The valve has not arrived yet: P3 goes back at the rate at which it came.
-            self.p3_held_s += 2.0 * step_s;
+        let planned = self.ramps.p3.share(self.now_s - self.start_s);
+        let ramp_s = self.ramps.p3.duration_s;
+        if self.to.p3_pa <= self.from.p3_pa || ramp_s <= 0.0 {
+            self.p3_share = planned;
+            return;
         }
-        let since_s = self.now_s - self.start_s - self.p3_held_s;
-        self.p3_share = self.ramps.p3.share(since_s);
+        // Close to the limit P3 rises more slowly, and beyond it P3 falls: the valve has not arrived yet.
+        let room =
+            self.speed_ahead_rpm().map_or(1.0, |rpm| (1.0 - rpm / self.limit_rpm()) / LIMIT_DISTANCE_RATIO);
+        let rate_per_s = match room.clamp(-1.0, 1.0) {
+            falling if falling < 0.0 => falling / ramp_s.max(MIN_RETREAT_S),
+            rising => rising / ramp_s,
+        };
+        self.p3_share = (self.p3_share + rate_per_s * step_s).clamp(0.0, planned);
+    }
+
+    /// Speed above which P3 stops rising, rpm.
+    fn limit_rpm(&self) -> f64 {
+        let highest_rpm = self.targets_rpm.0.max(self.targets_rpm.1);
+        let overshoot_rpm = highest_rpm * (1.0 + HOLD_OVERSHOOT_SHARE * self.stand.overshoot_ratio);
+        overshoot_rpm.min(self.stand.speed_max_rpm * (1.0 - LIMIT_DISTANCE_RATIO)).max(highest_rpm)
+    }
+
+    /// The speed that the shaft reaches soon if it goes on as before, rpm.
+    fn speed_ahead_rpm(&self) -> Option<f64> {
+        let (now_s, now_rpm) = *self.speeds.back()?;
+        let (then_s, then_rpm) = *self.speeds.front()?;
+        let rate_rpm_s = if now_s > then_s { (now_rpm - then_rpm) / (now_s - then_s) } else { 0.0 };
+        Some(now_rpm + AHEAD_S * rate_rpm_s.max(0.0))
     }
 
     fn advance_valve(&mut self, step_s: f64) {
@@ -252,4 +293,108 @@ impl PressureMotion {
 fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     let (count, sum) = values.fold((0.0, 0.0), |(count, sum), value| (count + 1.0, sum + value));
     (count > 0.0).then(|| sum / count)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mapper_core::{ChannelColumn, Predicted, StepKind};
+
+    fn setpoints(p3_pa: f64, valve_opening_ratio: f64) -> Setpoints {
+        Setpoints {
+            mode: RigMode::Running,
+            p3_pa,
+            t3_k: 773.15,
+            valve_opening_ratio,
+            oil_temperature_k: 323.15,
+        }
+    }
+
+    fn step(from: OperatingPoint, to: OperatingPoint, p3_pa: f64) -> PlanStep {
+        PlanStep {
+            index: 1,
+            kind: StepKind::Point,
+            from: Some(from),
+            to,
+            p3_pa,
+            t3_k: 773.15,
+            oil_temperature_k: 323.15,
+            dwell_s: 60.0,
+            start_s: 0.0,
+            transition: None,
+            predicted: Predicted::settled(0.05, 1.5, 350.0, 60.0),
+        }
+    }
+
+    const FAST: StandMotion =
+        StandMotion { actuators: RigActuators::FAST_VALVE, overshoot_ratio: 0.02, speed_max_rpm: 170e3 };
+
+    /// Readings of a tenth of a second.
+    fn batch(t_s: f64, p3_pa: f64, speed_rpm: f64) -> SampleBatch {
+        let column = |channel, value| ChannelColumn { channel, values: vec![value] };
+        let columns = vec![column(Channel::P3, p3_pa), column(Channel::ShaftSpeed, speed_rpm)];
+        SampleBatch { t_s: vec![t_s], columns, ..SampleBatch::default() }
+    }
+
+    /// Unloading on a stand with a lag of 5 s that declares a fast one: at any time the valve has opened no further than P3 has fallen.
+    #[test]
+    fn the_valve_waits_for_the_pressure_that_is_measured() {
+        let point = |speed_rpm, valve_opening_ratio| OperatingPoint { speed_rpm, valve_opening_ratio };
+        let (from, to) = (point(150e3, 0.5), point(50e3, 2.5));
+        let (start, end) = (setpoints(300e3, 0.5), setpoints(130e3, 2.5));
+        let plan = step(from, to, 130e3);
+        let mut control = TransitionControl::new(FAST, start, end, (&plan, Some(from)), 0.0).unwrap();
+        let (mut p3_pa, mut complete_s) = (300e3, f64::INFINITY);
+        for tick in 1..=600 {
+            let t_s = 0.1 * f64::from(tick);
+            let sent = control.advance(&batch(t_s, p3_pa, 150e3), t_s);
+            let (fallen, opened) = ((300e3 - p3_pa) / 170e3, (sent.valve_opening_ratio - 0.5) / 2.0);
+            assert!(opened <= fallen + AHEAD_SHARE + 1e-9, "{t_s} s: {opened} of {fallen}");
+            if control.is_complete() {
+                complete_s = complete_s.min(t_s);
+            }
+            p3_pa += 0.1 / 5.0 * (sent.p3_pa - p3_pa);
+        }
+        // ln(1 / 0.03) lags.
+        assert!((15.0..25.0).contains(&complete_s), "{complete_s}");
+        assert_eq!(control.setpoints(), end);
+    }
+
+    /// Loading with a valve that does not close: P3 stops and falls before the shaft overshoots much.
+    #[test]
+    fn p3_does_not_rise_while_the_shaft_is_too_fast() {
+        let point = |speed_rpm, valve_opening_ratio| OperatingPoint { speed_rpm, valve_opening_ratio };
+        let (from, to) = (point(100e3, 2.5), point(150e3, 0.5));
+        let (start, end) = (setpoints(160e3, 2.5), setpoints(300e3, 0.5));
+        let plan = step(from, to, 300e3);
+        let mut control = TransitionControl::new(FAST, start, end, (&plan, Some(from)), 0.0).unwrap();
+        let (mut speed_rpm, mut highest_rpm) = (100e3, 0.0f64);
+        let mut sent = start;
+        for tick in 1..=200 {
+            let t_s = 0.1 * f64::from(tick);
+            // The shaft follows P3 within a second, to 200 krpm at 300 kPa.
+            let target_rpm = 100e3 + 100e3 * (sent.p3_pa - 160e3) / 140e3;
+            speed_rpm += 0.1 * (target_rpm - speed_rpm);
+            highest_rpm = highest_rpm.max(speed_rpm);
+            sent = control.advance(&batch(t_s, sent.p3_pa, speed_rpm), t_s);
+        }
+        assert!(highest_rpm < 160e3, "{highest_rpm}");
+        assert!(speed_rpm < 1.01 * 150e3 && sent.p3_pa < 300e3, "{speed_rpm} {}", sent.p3_pa);
+    }
+
+    #[test]
+    fn a_pressure_that_follows_is_moving_until_it_has_arrived() {
+        let mut motion = PressureMotion::default();
+        let mut arrived_s = f64::INFINITY;
+        for tick in 1..=600 {
+            let t_s = 0.1 * f64::from(tick);
+            let p3_pa = 200e3 - 50e3 * (-t_s / 5.0).exp();
+            motion.add(&batch(t_s, p3_pa, 1e5));
+            if motion.has_arrived(200e3) && !motion.is_moving_to(200e3) && t_s > MOTION_S {
+                arrived_s = arrived_s.min(t_s);
+            }
+        }
+        // 50 kPa/5 s exp(-t/5) falls below 80 Pa/s, about 2.5 s late.
+        assert!((22.0..32.0).contains(&arrived_s), "{arrived_s}");
+    }
 }

@@ -170,7 +170,8 @@ impl Approach {
             Stage::Over => return None,
         };
         let to = OperatingPoint { speed_rpm: self.end.to.speed_rpm, valve_opening_ratio: opening };
-        let mut step = PlanStep { kind: StepKind::Approach, to, dwell_s, transition: None, ..self.end.clone() };
+        let mut step =
+            PlanStep { kind: StepKind::Approach, to, dwell_s, transition: None, ..self.end.clone() };
         // The return needs no check: the end of the line is within the limits.
         if self.stage != Stage::Return {
             let held = hold(OperatingPoint { speed_rpm: to.speed_rpm * self.trim_ratio, ..to })?;

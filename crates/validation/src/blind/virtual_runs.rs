@@ -61,8 +61,7 @@ impl<'a> Schedule<'a> {
             effect::add(&mut rig, cause.effect.as_ref(), &cause.values)?;
         }
         let immediate = ActuatorDynamics::AT_ONCE;
-        let p3_actuator =
-            ActuatorDynamics::new(self.campaign.tolerances.actuator_lag_s, f64::INFINITY);
+        let p3_actuator = ActuatorDynamics::new(self.campaign.tolerances.actuator_lag_s, f64::INFINITY);
         let mut settings = LabSettings {
             start: Start::Settled,
             p3_actuator,

@@ -195,7 +195,9 @@ mod tests {
             if i > 12 {
                 let early = delayed.value(t_s + 0.05);
                 let mut again = Actuator::at_rest(ActuatorDynamics::new(0.4, f64::INFINITY), 0.0);
-                (0..=i).filter(|k| 0.1 * f64::from(*k) + 1.0 <= t_s + 0.05).for_each(|k| again.set(0.1 * f64::from(k) + 1.0, 0.02 * f64::from(k)));
+                (0..=i)
+                    .filter(|k| 0.1 * f64::from(*k) + 1.0 <= t_s + 0.05)
+                    .for_each(|k| again.set(0.1 * f64::from(k) + 1.0, 0.02 * f64::from(k)));
                 assert!((early - again.value(t_s + 0.05)).abs() < 1e-12, "{i}: {early}");
             }
         }

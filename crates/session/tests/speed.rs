@@ -22,6 +22,9 @@ fn run(lab: &str, seed: u64, more: &[(&str, &str)]) -> Driven {
     driven(&campaign(&[&replacements[..], more].concat()))
 }
 
+/// Longest ramp of a jump on the default lab, s.
+const RAMP_S: f64 = 5.0;
+
 const WORSE: &str = "virtual_lab: {effects: {turbine_efficiency: 0.9}}";
 
 #[test]
@@ -54,7 +57,7 @@ fn without_the_loop_a_worse_turbine_is_too_slow() {
         driven
             .steps
             .iter()
-            .all(|step| step.rows.iter().all(|row| row.2 == step.marker.p3_pa || row.0 <= 0.0))
+            .all(|step| step.rows.iter().all(|row| row.2 == step.marker.p3_pa || row.0 <= RAMP_S))
     );
     assert!(
         driven.events.iter().all(|event| event.kind != EventKind::SpeedNotReached),
@@ -71,8 +74,12 @@ fn on_the_nominal_machine_the_loop_is_quiet() {
         assert!(step.p3_scatter_pa() < 20.0, "{} rpm: {} Pa", step.target_rpm(), step.p3_scatter_pa());
         assert!(step.end_off_ratio().abs() < 0.003);
         // The housings ask for no more than some per cent of the turbine's power.
-        let moved =
-            step.rows.iter().map(|row| (row.2 / step.marker.p3_pa - 1.0).abs()).skip(1).fold(0.0, f64::max);
+        let moved = step
+            .rows
+            .iter()
+            .filter(|row| row.0 > RAMP_S)
+            .map(|row| (row.2 / step.marker.p3_pa - 1.0).abs())
+            .fold(0.0, f64::max);
         assert!(moved < 0.03, "{} rpm: {moved}", step.target_rpm());
     }
 }

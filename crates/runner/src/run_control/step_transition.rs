@@ -74,7 +74,8 @@ impl Run<'_, '_> {
     ) -> Result<bool, BackendError> {
         let Some(mut control) = self.transition.take() else { return Ok(false) };
         let was_sent = control.is_sent();
-        let next = control.advance(batch, self.now_s);
+        let p3_moves = self.sent.is_some_and(|sent| self.p3_motion.is_moving_to(sent.p3_pa));
+        let next = control.advance(batch, self.now_s, p3_moves);
         if self.now_s < until_s && self.sent != Some(next) {
             self.send(next)?;
         }

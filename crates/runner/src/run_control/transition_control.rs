@@ -39,6 +39,10 @@ const AHEAD_S: f64 = 0.3;
 const MIN_RETREAT_S: f64 = 3.0;
 /// Time after the ramps in which the shaft may overshoot, s. Judgement: three time constants of a usual shaft.
 const WATCH_S: f64 = 4.0;
+/// Time after the expected arrival of P3 at which its rest is judged, s. Judgement: the time over which its motion is measured.
+const REST_S: f64 = 5.0;
+/// Relative change of the speed per second below which the shaft rests. Judgement: four standard deviations of a usual sensor.
+const RESTING_PER_S: f64 = 5e-3;
 /// Number of commands of a transition, and bounds of their interval, s. Judgement: finer than the steps that a shaft notices; a controller accepts
 /// ten commands a second.
 const COMMANDS: f64 = 40.0;
@@ -64,6 +68,8 @@ pub(crate) struct TransitionControl {
     latest: (Option<f64>, Option<f64>),
     /// Times, s, and speeds, rpm, of the last [`AHEAD_S`].
     speeds: VecDeque<(f64, f64)>,
+    /// Whether P3 and shaft have come to rest.
+    leader_rests: bool,
 }
 
 impl TransitionControl {
@@ -105,6 +111,7 @@ impl TransitionControl {
             first: (None, None),
             latest: (None, None),
             speeds: VecDeque::new(),
+            leader_rests: false,
         })
     }
 
@@ -148,8 +155,8 @@ impl TransitionControl {
         }
     }
 
-    /// Advances to `now_s`, the end of a batch of samples, and returns the next setpoints.
-    pub(crate) fn advance(&mut self, batch: &SampleBatch, now_s: f64) -> Setpoints {
+    /// Advances to `now_s`, the end of a batch of samples, and returns the next setpoints. `p3_moves`: whether P3 still follows its command.
+    pub(crate) fn advance(&mut self, batch: &SampleBatch, now_s: f64, p3_moves: bool) -> Setpoints {
         let last = |channel: Channel| {
             batch
                 .column(channel)
@@ -166,6 +173,7 @@ impl TransitionControl {
         }
         let step_s = (now_s - self.now_s).max(0.0);
         self.now_s = now_s;
+        self.leader_rests = self.find_rest(p3_moves);
         self.advance_p3(step_s);
         self.advance_valve(step_s);
         self.setpoints()
@@ -197,10 +205,15 @@ impl TransitionControl {
 
     /// The speed that the shaft reaches soon if it goes on as before, rpm.
     fn speed_ahead_rpm(&self) -> Option<f64> {
+        self.speed_and_rate().map(|(now_rpm, rate_rpm_s)| now_rpm + AHEAD_S * rate_rpm_s.max(0.0))
+    }
+
+    /// The latest speed, rpm, and its rate over the last samples, rpm/s.
+    fn speed_and_rate(&self) -> Option<(f64, f64)> {
         let (now_s, now_rpm) = *self.speeds.back()?;
         let (then_s, then_rpm) = *self.speeds.front()?;
         let rate_rpm_s = if now_s > then_s { (now_rpm - then_rpm) / (now_s - then_s) } else { 0.0 };
-        Some(now_rpm + AHEAD_S * rate_rpm_s.max(0.0))
+        Some((now_rpm, rate_rpm_s))
     }
 
     fn advance_valve(&mut self, step_s: f64) {
@@ -217,25 +230,35 @@ impl TransitionControl {
 
     /// Share that P3 and shaft have really completed, if they lead; otherwise 1.
     fn leader_share(&self) -> f64 {
-        let share = |first: f64, latest: f64, change: f64| (latest - first) / change;
-        let p3_change_pa = self.to.p3_pa - self.from.p3_pa;
-        if p3_change_pa >= -MIN_P3_CHANGE_RATIO * self.from.p3_pa {
+        if self.to.p3_pa >= self.from.p3_pa * (1.0 - MIN_P3_CHANGE_RATIO) || self.leader_rests {
             return 1.0;
         }
+        // From the readings at the start, which need not be at the last commands.
+        let share = |first: f64, latest: f64, end: f64| {
+            if first > end { (first - latest) / (first - end) } else { 1.0 }
+        };
         let p3_share = match (self.first.0, self.latest.0) {
-            (Some(first_pa), Some(latest_pa)) => share(first_pa, latest_pa, p3_change_pa),
+            (Some(first_pa), Some(latest_pa)) => share(first_pa, latest_pa, self.to.p3_pa),
             _ => 1.0,
         };
-        let speed_change_rpm = self.targets_rpm.1 - self.targets_rpm.0;
-        let slows = speed_change_rpm < -MIN_SPEED_CHANGE_RATIO * self.targets_rpm.0;
         let closes = self.to.valve_opening_ratio < self.from.valve_opening_ratio;
         let speed_share = match (self.first.1, self.latest.1) {
-            (Some(first_rpm), Some(latest_rpm)) if slows && closes => {
-                share(first_rpm, latest_rpm, speed_change_rpm)
+            (Some(first_rpm), Some(latest_rpm))
+                if closes && self.targets_rpm.1 < first_rpm * (1.0 - MIN_SPEED_CHANGE_RATIO) =>
+            {
+                share(first_rpm, latest_rpm, self.targets_rpm.1)
             }
             _ => 1.0,
         };
         p3_share.min(speed_share).max(0.0)
+    }
+
+    /// Whether P3 and shaft have come to rest after the last command of P3, wherever their readings are.
+    fn find_rest(&self, p3_moves: bool) -> bool {
+        let follow_s = self.stand.actuators.p3.follow_s() + REST_S;
+        let is_late = self.now_s - self.start_s > self.ramps.p3.end_s() + follow_s;
+        let rests = |(now_rpm, rate_rpm_s): (f64, f64)| rate_rpm_s.abs() < RESTING_PER_S * now_rpm;
+        is_late && !p3_moves && self.speed_and_rate().is_none_or(rests)
     }
 }
 
@@ -347,7 +370,7 @@ mod tests {
         let (mut p3_pa, mut complete_s) = (300e3, f64::INFINITY);
         for tick in 1..=600 {
             let t_s = 0.1 * f64::from(tick);
-            let sent = control.advance(&batch(t_s, p3_pa, 150e3), t_s);
+            let sent = control.advance(&batch(t_s, p3_pa, 150e3), t_s, true);
             let (fallen, opened) = ((300e3 - p3_pa) / 170e3, (sent.valve_opening_ratio - 0.5) / 2.0);
             assert!(opened <= fallen + AHEAD_SHARE + 1e-9, "{t_s} s: {opened} of {fallen}");
             if control.is_complete() {
@@ -376,7 +399,7 @@ mod tests {
             let target_rpm = 100e3 + 100e3 * (sent.p3_pa - 160e3) / 140e3;
             speed_rpm += 0.1 * (target_rpm - speed_rpm);
             highest_rpm = highest_rpm.max(speed_rpm);
-            sent = control.advance(&batch(t_s, sent.p3_pa, speed_rpm), t_s);
+            sent = control.advance(&batch(t_s, sent.p3_pa, speed_rpm), t_s, true);
         }
         assert!(highest_rpm < 160e3, "{highest_rpm}");
         assert!(speed_rpm < 1.01 * 150e3 && sent.p3_pa < 300e3, "{speed_rpm} {}", sent.p3_pa);

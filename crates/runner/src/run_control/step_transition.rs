@@ -2,7 +2,7 @@
 
 use crate::run_control::observer::ObserverError;
 use crate::run_control::run::{Halt, Run};
-use crate::run_control::transition_control::{StandMotion, TransitionControl};
+use crate::run_control::transition_control::{Arrival, StandMotion, TransitionControl};
 use mapper_core::{BackendError, Event, EventKind, PlanStep, RigMode, SampleBatch, Setpoints, WindowRule};
 
 /// Longest extension of a step whose P3 has not arrived, s. Bound: five times the stroke of the slowest stands.
@@ -18,15 +18,6 @@ const STUCK_S: f64 = 10.0;
 /// Smallest delay of P3 that is reported, s, and the factor from which a later one is reported again. Judgement.
 const MIN_LATE_S: f64 = 3.0;
 const LATER_RATIO: f64 = 1.5;
-/// The arrival of P3 at the setpoint of a step.
-pub(crate) struct Arrival {
-    start_s: f64,
-    /// Time after the start by which the plan expects it, s.
-    planned_s: f64,
-    /// By how much the step was extended, s.
-    extended_s: f64,
-}
-
 impl Run<'_, '_> {
     /// Lowers P3 at the closed valve before the end of a run on a slow stand: the safe state opens the valve, and the shaft would speed up.
     pub(crate) fn unload(&mut self) -> Result<(), Halt> {

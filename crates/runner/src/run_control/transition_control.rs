@@ -262,6 +262,15 @@ impl TransitionControl {
     }
 }
 
+/// The arrival of P3 at the setpoint of a step.
+pub(crate) struct Arrival {
+    pub(crate) start_s: f64,
+    /// Time after the start by which the plan expects it, s.
+    pub(crate) planned_s: f64,
+    /// By how much the step was extended, s.
+    pub(crate) extended_s: f64,
+}
+
 /// Time over which the motion of P3 is judged, s. Judgement: longer than its noise, shorter than a slow stand's lag.
 const MOTION_S: f64 = 5.0;
 /// Relative change of P3 per second above which it still moves. Judgement: twice what a speed loop changes in a settled step.

@@ -57,8 +57,8 @@ pub use maps::turbine_map::{
     FittedTurbine, FittedTurbineLine, FittedTurbineNode, ImportedTurbine, TurbineMap, TurbineMapPoint,
 };
 pub use measurement::channel::{
-    CHANNELS, Channel, ChannelInfo, DeclaredUncertainty, Dimension, Group, MODELLED_CHANNELS, NoiseColour,
-    SAMPLE_INTERVAL_S, UnknownChannel,
+    CALIBRATED_AT_K, CHANNELS, Channel, ChannelInfo, DeclaredUncertainty, Dimension, Group,
+    MODELLED_CHANNELS, NoiseColour, SAMPLE_INTERVAL_S, UnknownChannel,
 };
 pub use measurement::joined_recordings::{StepOrigin, join_recordings};
 pub use measurement::jump::{

@@ -25,6 +25,7 @@ pub use checks::reachable_points::Concern;
 pub use checks::reachable_points::{UnreachablePoint, nominal_model, unreachable_points};
 pub use checks::unusual_settings::USUAL_WHEEL_DIAMETERS_M;
 pub use elements::rig::guards::DEFAULT_MAX_AGE_S;
+pub use elements::rig::sensor_class::{default_contact_sigma_ratio, default_gain_sigma_ratio};
 pub use files::load::{
     CampaignError, MAX_FILE_BYTES, MAX_MAP_BYTES, backend_mistake, check, check_with, format_mistake, load,
     mistakes, read_named_file, read_text, warnings,

@@ -21,9 +21,9 @@ pub mod unit_factors;
 
 pub use enums::UnknownName;
 pub use identification::identified::{
-    BudgetRow, CommonErrors, EstimateUncertainty, IdentifiedPoint, Method, MethodResult, MethodResults,
-    PointBudgets, ResultRemark, UncertaintyBudget, Verdict, Window, confidence_interval_95, half_width_95,
-    standard_error_of,
+    BudgetRow, CommonErrors, EstimateUncertainty, IdentifiedPoint, Margins, Method, MethodResult,
+    MethodResults, PointBudgets, ResultRemark, UncertaintyBudget, Verdict, Window, confidence_interval_95,
+    half_width_95, standard_error_of,
 };
 pub use identification::settings::{
     ACCEPTANCE_WINDOW_S, ALPHA_AREA_SIGMA_RATIO, AcceptanceCriteria, Choice, JointSettings, ModelTolerances,
@@ -57,8 +57,8 @@ pub use maps::turbine_map::{
     FittedTurbine, FittedTurbineLine, FittedTurbineNode, ImportedTurbine, TurbineMap, TurbineMapPoint,
 };
 pub use measurement::channel::{
-    CHANNELS, Channel, ChannelInfo, DeclaredUncertainty, Dimension, Group, MODELLED_CHANNELS, NoiseColour,
-    SAMPLE_INTERVAL_S, UnknownChannel,
+    CALIBRATED_AT_K, CHANNELS, Channel, ChannelInfo, DeclaredUncertainty, Dimension, Group,
+    MODELLED_CHANNELS, NoiseColour, SAMPLE_INTERVAL_S, UnknownChannel,
 };
 pub use measurement::joined_recordings::{StepOrigin, join_recordings};
 pub use measurement::jump::{

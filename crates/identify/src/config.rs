@@ -75,8 +75,16 @@ pub struct IdentifyConfig {
     pub humidity_sigma_kg_kg: f64,
     /// Pressure at which an isothermal zero has compared the pressure sensors, Pa: their gain errors count from there; 0 without a zero.
     pub rest_pressure_pa: f64,
-    /// Error that all absolute pressures share, one standard deviation, Pa: of the barometer to which gauge pressures are added.
+    /// Error that all absolute pressures share, one standard deviation, Pa: of the barometer to which gauge pressures are added, and what an
+    /// isothermal zero cannot show.
     pub barometer_sigma_pa: f64,
+    /// Reading of the cell's barometer on the day of the run, Pa; `None` if none is declared. A zero is compared with it.
+    pub barometer_pa: Option<f64>,
+    /// Error that all thermometers share, one standard deviation, K: what an isothermal zero cannot show; 0 without a zero, whose offsets are
+    /// independent.
+    pub thermometer_sigma_k: f64,
+    /// Share by which Tc may read towards the cell, one standard deviation above 0: by the mounting of its thermocouple. 0 trusts the contact.
+    pub housing_contact_sigma_ratio: f64,
     /// Type of the P1 tap.
     pub inlet_tap: PressureTap,
     /// Type of the P2 tap.
@@ -112,6 +120,9 @@ impl Default for IdentifyConfig {
             humidity_sigma_kg_kg: 0.0,
             rest_pressure_pa: 0.0,
             barometer_sigma_pa: 0.0,
+            barometer_pa: None,
+            thermometer_sigma_k: 0.0,
+            housing_contact_sigma_ratio: 0.0,
             inlet_tap: PressureTap::Total,
             outlet_tap: PressureTap::Total,
             declared: BTreeMap::new(),

@@ -357,7 +357,7 @@ impl Inputs {
         };
         match (input, reading) {
             (Input::Reading(_), Some(reading)) => *reading += by,
-            (Input::Gain(_), Some(reading)) => *reading *= 1.0 + by,
+            (Input::Gain(channel), Some(reading)) => *reading += by * channel.gain_distance(*reading),
             (Input::Barometer, _) => {
                 moved.point.p1_pa += by;
                 moved.point.p2_pa += by;

@@ -127,7 +127,7 @@ fn declared_offsets_move_the_result_as_declared() {
             let shifted = |sign: f64| {
                 let mut recording = transient.recording();
                 for value in &mut recording.series.get_mut(&channel).unwrap().values {
-                    *value += sign * (offset_sigma + gain_sigma_ratio * *value);
+                    *value += sign * (offset_sigma + gain_sigma_ratio * channel.gain_distance(*value));
                 }
                 let point = identify(&recording, &alone).unwrap().swap_remove(1);
                 [point.eta.unwrap(), point.h_w_m2k.unwrap()]

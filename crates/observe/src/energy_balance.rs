@@ -1,10 +1,9 @@
 //! Energy balance of a turbocharger over a time span, with its uncertainty.
 
-use mapper_core::{Channel, DeclaredUncertainty, Dimension, Recording};
+use mapper_core::{Channel, DeclaredUncertainty, Recording};
 use mapper_numerics::statistics::mean;
 use mapper_physics::gas::air::Air;
 use mapper_physics::gas::mixture::Gas;
-use mapper_physics::rig::sensor_fault::CALIBRATED_AT_K;
 use std::collections::BTreeMap;
 
 /// Temperature of the first number of [`OIL`], K. Source: the same table.
@@ -88,11 +87,9 @@ pub fn energy_balance(
         let values = series.slice(span_s.0, span_s.1).1;
         let Some(reading) = mean(values) else { continue };
         readings[place] = reading;
-        let zero = if channel.info().dimension == Dimension::Temperature { CALIBRATED_AT_K } else { 0.0 };
         if let Some(declared) = declared.get(&channel) {
             let noise = declared.noise_sigma / (values.len() as f64).sqrt();
-            let gain_error = declared.gain_sigma_ratio * (reading - zero);
-            sigmas[place] = noise.hypot(declared.offset_sigma).hypot(gain_error);
+            sigmas[place] = noise.hypot(declared.fixed_sigma(channel, reading));
         }
     }
     let powers = powers_w(&readings, gases, 1.0);

@@ -15,6 +15,7 @@ pub mod model_inputs;
 pub mod perturbation;
 pub mod redundant_sensors;
 pub mod same_machine;
+pub mod total_pressure;
 
 pub use declared::{Declared, declared_uncertainties};
 pub use redundant_sensors::element_fault::{Contradiction, ElementFault, FaultyElement, FusedChannel};

@@ -41,7 +41,7 @@ fn the_shipped_map_says_what_its_text_says() {
             t2_probe_diameter_m: 0.0,
         })
     );
-    let p3 = DeclaredUncertainty { noise_sigma: 80.0, offset_sigma: 150.0, gain_sigma_ratio: 0.0 };
+    let p3 = DeclaredUncertainty { noise_sigma: 80.0, offset_sigma: 150.0, gain_sigma_ratio: 5e-4 };
     assert_eq!(map.sensors[&Channel::P3], p3);
     assert_eq!(map.noise_colour, Some(NoiseColour { first_order_share_ratio: 0.6, time_constant_s: 2.0 }));
 }

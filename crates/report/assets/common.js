@@ -4,7 +4,16 @@ const root = document.documentElement;
 const page = JSON.parse(document.getElementById("data").textContent);
 const style = name => getComputedStyle(root).getPropertyValue(name).trim();
 const byId = id => document.getElementById(id);
-const margin = (value, low, high) => value == null || low == null || high == null ? null : Math.max(high - value, value - low);
+// Distances to the ends of an interval: one number, or both if they differ by more than a half.
+function margins(value, low, high, digits) {
+  if (value == null || low == null || high == null) return null;
+  const below = Math.max(value - low, 0), above = Math.max(high - value, 0), farther = Math.max(below, above);
+  return farther <= 1.5 * Math.min(below, above) ? shown(farther, digits) : `−${shown(below, digits)}/+${shown(above, digits)}`;
+}
+const withMargins = (value, low, high, digits) => {
+  const both = margins(value, low, high, digits);
+  return shown(value, digits) + (both == null ? "" : both.startsWith("−") ? ` ${both}` : ` ± ${both}`);
+};
 const shown = (value, digits, unit = "") => value == null ? "-" : value.toFixed(digits).replace(/^-(0\.?0*)$/, "$1") + unit;
 const short = d3.format(".3~g");
 // On paper a drawing is scaled to its column: a narrower one has larger letters.

@@ -90,7 +90,7 @@ function drawTraces() {
 function addPoint(p) {
   const row = byId("points").insertRow(0);
   row.dataset.step = p.step;
-  cells(row, [p.name, p.line, shown(p.flow, 2), shown(p.pr, 4), shown(p.eta, 2), shown(margin(p.eta, p.eta_low, p.eta_high), 2), shown(p.h, 0), p.verdict, (p.warnings[0] ?? "").replaceAll("`", "")]);
+  cells(row, [p.name, p.line, shown(p.flow, 2), shown(p.pr, 4), shown(p.eta, 2), margins(p.eta, p.eta_low, p.eta_high, 2) ?? "-", shown(p.h, 0), p.verdict, (p.warnings[0] ?? "").replaceAll("`", "")]);
   row.cells[7].className = p.verdict;
   row.addEventListener("click", () => choose(p.step));
 }

@@ -9,10 +9,10 @@ function words(p) {
     `step ${p.name}: ${p.line} ${page.units.speed}` + (p.valve == null ? "" : `, opening ${shown(p.valve, 3)}`),
     `flow ${shown(p.flow, 2)} ± ${shown(p.flow_half, 2)} ${page.units.flow}`,
     `pressure ratio ${shown(p.pr, 4)} ± ${shown(p.pr_half, 4)}`,
-    p.eta == null ? "efficiency not known" : `efficiency ${shown(p.eta, 2)} ± ${shown(margin(p.eta, p.eta_low, p.eta_high), 2)} %`,
+    p.eta == null ? "efficiency not known" : `efficiency ${withMargins(p.eta, p.eta_low, p.eta_high, 2)} %`,
   ];
   if (p.eta_common != null) lines.push(`  common ${shown(p.eta_common, 2)}, own ${shown(p.eta_own, 2)}`);
-  if (p.h != null) lines.push(`h ${shown(p.h, 0)} ± ${shown(margin(p.h, p.h_low, p.h_high), 0)} W/(m² K)`);
+  if (p.h != null) lines.push(`h ${withMargins(p.h, p.h_low, p.h_high, 0)} W/(m² K)`);
   if (p.dynamic) lines.push(`dynamic ${shown(p.dynamic[0], 2)} %`);
   // Three readings a line: the text is next to the pointer.
   for (let i = 0; i < p.raw.length; i += 3) lines.push(`${i ? "  " : "read "}${p.raw.slice(i, i + 3).join(", ")}`);

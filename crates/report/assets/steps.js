@@ -13,10 +13,10 @@ function stepWords(step, p) {
   const model = step.model;
   return [
     `Step ${p.name}, ${p.verdict}: ${p.line} ${page.units.speed} corrected` + (p.valve == null ? "" : `, opening ${shown(p.valve, 3)}`),
-    (p.eta == null ? "efficiency not known" : `efficiency ${shown(p.eta, 2)} ± ${shown(margin(p.eta, p.eta_low, p.eta_high), 2)} %${both}`) +
+    (p.eta == null ? "efficiency not known" : `efficiency ${withMargins(p.eta, p.eta_low, p.eta_high, 2)} %${both}`) +
       (p.dynamic ? `; by the dynamic method ${shown(p.dynamic[0], 2)} %` : ""),
     `corrected flow ${shown(p.flow, 2)} ± ${shown(p.flow_half, 2)} ${page.units.flow}, pressure ratio ${shown(p.pr, 4)} ± ${shown(p.pr_half, 4)}` +
-      (p.h == null ? "" : `, h ${shown(p.h, 0)} ± ${shown(margin(p.h, p.h_low, p.h_high), 0)} W/(m² K)`),
+      (p.h == null ? "" : `, h ${withMargins(p.h, p.h_low, p.h_high, 0)} W/(m² K)`),
     p.raw.length ? `readings at the end: ${p.raw.join(", ")}` : null,
     model ? `T2 residual ${shown(model.rms_k, 3)} K rms, after a shift of the mean by ${shown(model.shift_k, 3)} K` : null,
     ...p.warnings.map(sentence),

@@ -2,7 +2,7 @@
 
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_campaign::units::Kind;
-use mapper_core::{Channel, OperatingPoint};
+use mapper_core::{Channel, Margins, OperatingPoint};
 use mapper_numerics::statistics::range;
 use mapper_recording::logs::kind_of;
 
@@ -203,6 +203,21 @@ pub fn number(value: Option<f64>, decimals: usize) -> String {
 /// A fraction in percent (for efficiencies: in points), or a dash.
 pub fn percent(fraction: Option<f64>, decimals: usize) -> String {
     number(fraction.map(|fraction| 100.0 * fraction), decimals)
+}
+
+/// Distances to the ends of an interval: `0.55`, the farther one, or `-0.20/+0.90` if they differ by more than a half.
+pub(crate) fn margins_text(margins: Margins, decimals: usize) -> String {
+    if margins.is_symmetric() {
+        number(Some(margins.farther()), decimals)
+    } else {
+        format!("-{:.decimals$}/+{:.decimals$}", margins.below, margins.above)
+    }
+}
+
+/// A value with its interval: `73.1 +/- 0.5`, or `73.1 -0.2/+0.9`.
+pub(crate) fn with_margins(value: f64, margins: Margins, decimals: usize) -> String {
+    let sign = if margins.is_symmetric() { "+/- " } else { "" };
+    format!("{value:.decimals$} {sign}{}", margins_text(margins, decimals))
 }
 
 /// A number with at most this many significant digits, without trailing zeros.

@@ -70,7 +70,7 @@ fn noisy() -> LabSettings {
         coloured_sigma: 0.06,
         coloured_time_constant_s: 2.0,
         offset: 0.3,
-        gain_ratio: 0.0,
+        ..SensorErrors::default()
     };
     LabSettings {
         sensors: [(Channel::T2, errors), (Channel::T1, errors)].into(),

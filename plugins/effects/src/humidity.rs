@@ -5,11 +5,11 @@ use mapper_physics::effect;
 effect! {
     pub(crate) struct Humidity "humidity";
     name: "moist air",
-    description: "the compressor takes in moist air",
+    description: "the compressor takes in air with more water than declared",
     equation: "R (1 + 0.6078 w), cp (1 + 0.84 w), flow times sqrt(287.05/R) on the compressor side",
     source: "mixture of ideal gases; cp of vapour 1850 J/(kg K)",
     submodel: CompressorFlow, also_shows_in: [CompressorGas];
-    /// Water per dry air, kg/kg.
+    /// Water per dry air in addition to the declared humidity, kg/kg.
     water_kg_kg = "humidity" ["kg/kg"] 0.0 .. 0.06, neutral 0.0, step 0.012;
     |effect, rig| rig.model.params.compressor.humidity_kg_kg += effect.water_kg_kg
 }

@@ -4,7 +4,7 @@ use mapper_tests::{CampaignFile, mapper};
 
 /// Mistakes, and the text that the caret has to mark.
 const MISTAKES: &[(&str, &str, &str)] = &[
-    ("T_oil: {noise: 0.2 K, offset: 0.5 K}", "T_oil: {noise: 0.2, offset: 0.5 K}", "0.2"),
+    ("T_oil: {noise: 0.2 K, offset", "T_oil: {noise: 0.2, offset", "0.2"),
     ("1.4, 2.0, 2.5]", "1.4, 2.0, 9.5]", "9.5"),
     ("  warm_up: 2 min", "  warm_up: 10 kPa", "10 kPa"),
     ("order: thermal_gradient ", "ordr: sum_gradient ", "ordr"),

@@ -5,8 +5,7 @@ use mapper_tests::{CampaignFile, SHORT_GRID, SINGLE_STEP_METHOD, mapper, python,
 use serde_json::Value;
 use std::path::Path;
 
-const SINGLE: &str =
-    "  T2:    {noise: 0.1 K, offset: 0.25 K, probe_diameter: 0 mm}   # 0 mm: a probe without inertia\n";
+const SINGLE: &str = "  T2:    {noise: 0.1 K, offset: 0.25 K, gain: 0.05 %, probe_diameter: 0 mm}   # 0 mm: a probe without inertia\n";
 
 /// Four points of the shipped campaign with these sensors of T2 and these settings of the lab.
 fn campaign(sensors: &str, lab: &str) -> CampaignFile {
@@ -28,7 +27,7 @@ fn run(campaign: &CampaignFile, out: &Path) -> Value {
     mapper(arguments).exits(0).json()
 }
 
-const FOUR: &str = "{noise: 0.1 K, offset: 0.25 K, count: 4}";
+const FOUR: &str = "{noise: 0.1 K, offset: 0.25 K, gain: 0.05 %, count: 4}";
 
 #[test]
 fn every_command_detects_and_excludes_a_faulty_thermocouple() {
@@ -70,8 +69,9 @@ fn four_thermocouples_give_a_narrower_interval_than_one() {
         let campaign = campaign(sensors, "{}");
         run(&campaign, &scratch.path().join(name))
     };
-    let one = in_directory("{noise: 0.1 K, offset: 0.25 K, probe_diameter: 0 mm}", "one");
-    let listed = in_directory("[{noise: 0.1 K, offset: 0.25 K, probe_diameter: 0 mm}]", "listed");
+    let one = in_directory("{noise: 0.1 K, offset: 0.25 K, gain: 0.05 %, probe_diameter: 0 mm}", "one");
+    let listed =
+        in_directory("[{noise: 0.1 K, offset: 0.25 K, gain: 0.05 %, probe_diameter: 0 mm}]", "listed");
     let four = in_directory(FOUR, "four");
     assert_eq!(one["points"], listed["points"]);
     assert!(one.get("sensors").is_none(), "{}", one["sensors"]);

@@ -2,11 +2,10 @@
 
 use crate::campaign::Campaign;
 use crate::elements::rig::calibration::{Calibration, CalibrationRule, Date};
-use mapper_core::{CalibrationDefect, Channel, DeclaredUncertainty, Dimension, Warning};
+use mapper_core::{CalibrationDefect, Channel, DeclaredUncertainty, Warning};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::reach::hold_speed;
 use mapper_physics::rig::instruments::true_value;
-use mapper_physics::rig::sensor_fault::CALIBRATED_AT_K;
 use mapper_physics::simulation::model::Model;
 use mapper_yaml::Step;
 use std::collections::BTreeMap;
@@ -88,8 +87,7 @@ fn find_contradictions(
     if let (Some(expanded), Some((_, high))) = (calibration.uncertainty, readings) {
         // k = 2, with a tolerance of a tenth for rounding.
         let certified = 0.5 * expanded;
-        let zero = if channel.info().dimension == Dimension::Temperature { CALIBRATED_AT_K } else { 0.0 };
-        let declared = declared.offset_sigma.hypot(declared.gain_sigma_ratio * (high - zero));
+        let declared = declared.fixed_sigma(channel, high);
         if declared < 0.9 * certified {
             defects.push(CalibrationDefect::Uncertainty { certified, declared });
         }

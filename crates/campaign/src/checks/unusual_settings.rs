@@ -3,8 +3,9 @@
 use crate::campaign::{Campaign, MapSource};
 use crate::checks::map_misfit::{find_map_misfit, two_digits};
 use crate::checks::reachable_points::{Concern, to_mm};
+use crate::elements::rig::sensor_class::default_gain_sigma_ratio;
 use crate::machine_sizes::{SIZES, Size, similar_machine};
-use mapper_core::{Method, OperatingPoint, WindowRule};
+use mapper_core::{Channel, Method, OperatingPoint, WindowRule};
 use mapper_physics::compressor_map::characteristic::MAX_TIP_SPEED_M_S;
 use mapper_yaml::{Step, steps};
 use std::f64::consts::PI;
@@ -18,6 +19,7 @@ fn steps_of(keys: &[&str]) -> Vec<Step> {
 pub(crate) fn find_concerns(campaign: &Campaign, places: &[Vec<Step>]) -> Vec<Concern> {
     let mut concerns = find_dwell_concerns(campaign);
     concerns.extend(find_size_concerns(campaign));
+    concerns.extend(check_gains(campaign));
     let speeds = find_speed_concerns(campaign, places);
     let has_error = |concerns: &[Concern], at: &[&str]| {
         concerns.iter().any(|concern| concern.is_error && concern.at == steps_of(at))
@@ -72,6 +74,37 @@ fn find_dwell_concerns(campaign: &Campaign) -> Vec<Concern> {
         }],
         WindowRule::Auto | WindowRule::Fixed { .. } => Vec::new(),
     }
+}
+
+/// Finds sensors with an offset but without a gain, which would count as exact at 130 degC after a zero.
+fn check_gains(campaign: &Campaign) -> Option<Concern> {
+    let bare: Vec<Channel> = campaign
+        .sensors
+        .iter()
+        .filter(|(channel, sensor)| {
+            sensor.declared.offset_sigma > 0.0
+                && !sensor.gain_is_declared
+                && default_gain_sigma_ratio(**channel) > 0.0
+        })
+        .map(|(channel, _)| *channel)
+        .collect();
+    let first = bare.first()?;
+    let names: Vec<&str> = bare.iter().map(|channel| channel.symbol()).collect();
+    let percent = |channel: Channel| two_digits(100.0 * default_gain_sigma_ratio(channel));
+    Some(Concern {
+        is_error: false,
+        at: steps!["sensors", first.symbol()].to_vec(),
+        message: format!(
+            "{} declare an offset but no gain: identification takes {} % for thermometers (thermocouple of class 1) and {} % for \
+             pressure transducers (class 0.1)",
+            names.join(", "),
+            percent(Channel::T2),
+            percent(Channel::P2)
+        ),
+        remedy: "write the sensor's class, e.g. `class: K1` or `class: 0.1 %, full_scale: 500 kPa`, or the gain of its calibration, \
+                 e.g. `gain: 0.05 %`"
+            .to_owned(),
+    })
 }
 
 /// Place of the nominal map.

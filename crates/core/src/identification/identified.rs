@@ -152,14 +152,14 @@ pub struct IdentifiedPoint {
 }
 
 impl IdentifiedPoint {
-    /// Distance from `eta` to the farther end of its 95 % interval, fraction: the interval of a mixture of models is not symmetric.
-    pub fn eta_margin_95(&self) -> Option<f64> {
-        margin(self.eta?, self.eta_low?, self.eta_high?)
+    /// Distances from `eta` to the ends of its 95 % interval, fraction: the interval of a mixture of models is not symmetric.
+    pub fn eta_margins_95(&self) -> Option<Margins> {
+        Some(Margins::new(self.eta?, self.eta_low?, self.eta_high?))
     }
 
     /// The same of `h_w_m2k`, W/(m2 K).
-    pub fn h_margin_95_w_m2k(&self) -> Option<f64> {
-        margin(self.h_w_m2k?, self.h_low_w_m2k?, self.h_high_w_m2k?)
+    pub fn h_margins_95_w_m2k(&self) -> Option<Margins> {
+        Some(Margins::new(self.h_w_m2k?, self.h_low_w_m2k?, self.h_high_w_m2k?))
     }
 
     /// Standard error of `eta` that no other point shares, fraction; `None` without an interval.
@@ -170,8 +170,41 @@ impl IdentifiedPoint {
     }
 }
 
-fn margin(value: f64, low: f64, high: f64) -> Option<f64> {
-    Some((high - value).max(value - low))
+/// Ratio of the distances to both ends of an interval up to which it is written with one number. Judgement: a half more on one side is what a
+/// reader must know.
+const SYMMETRIC_RATIO: f64 = 1.5;
+
+/// Distances from a value to the ends of its interval, in the unit of the value.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Margins {
+    /// To the lower end, >= 0.
+    pub below: f64,
+    /// To the upper end, >= 0.
+    pub above: f64,
+}
+
+impl Margins {
+    /// Of a value in the interval from `low` to `high`. A value outside, as a bound may leave it, has no distance to that end.
+    pub fn new(value: f64, low: f64, high: f64) -> Self {
+        let distance = |difference: f64| if difference < 0.0 { 0.0 } else { difference };
+        Margins { below: distance(value - low), above: distance(high - value) }
+    }
+
+    /// Distance to the farther end: an interval of this half width about the value contains the whole.
+    pub fn farther(self) -> f64 {
+        self.below.max(self.above)
+    }
+
+    /// Whether one number describes both ends.
+    pub fn is_symmetric(self) -> bool {
+        self.farther() <= SYMMETRIC_RATIO * self.below.min(self.above)
+    }
+
+    /// In another unit of `per_unit` to one of this.
+    #[must_use]
+    pub fn scaled(self, per_unit: f64) -> Self {
+        Margins { below: per_unit * self.below, above: per_unit * self.above }
+    }
 }
 
 /// A number that is null if unknown.
@@ -315,6 +348,11 @@ ResultRemark {
     "unknown_ambient_pressure" UnknownAmbientPressure { pressure_pa: f64, sigma_pa: f64 },
     /// The recording starts with the machine at rest, and the campaign does not use this as a zero.
     "unused_rest" UnusedRest { start_s: f64, end_s: f64 },
+    /// All sensors of a kind contradict the cell's instrument at rest: `channel` is one of them, `reading` their common reading, `reference` that of
+    /// the cell, `common_sigma` the resulting uncertainty of all of them, in the channel's unit.
+    "cell_contradicts" CellContradicts { channel: Channel, reading: f64, reference: f64, common_sigma: f64 },
+    /// A sensor has a periodic error at rest, amplitude in the channel's unit: pick-up that the sampling folds to a low frequency.
+    "periodic_error" PeriodicError { channel: Channel, period_s: f64, amplitude: f64 },
     /// The points are corrected for a cause that the diagnosis names.
     "corrected" Corrected { causes: Vec<String>, probability: f64 },
     /// The intervals contain what causes of a gap would change for which the points are not corrected; largest standard uncertainty of an
@@ -337,13 +375,16 @@ impl ResultRemark {
     /// Whether all efficiencies depend on it, so that it is shown next to their verdict.
     pub fn concerns_all_points(&self) -> bool {
         use ResultRemark::{
-            ConventionalMapping, Corrected, DriftSubtracted, HeldFixed, UnknownAmbientPressure, WidenedByGap,
+            CellContradicts, ConventionalMapping, Corrected, DriftSubtracted, HeldFixed, PeriodicError,
+            UnknownAmbientPressure, WidenedByGap,
         };
         matches!(
             self,
             ConventionalMapping { .. }
                 | HeldFixed { .. }
                 | UnknownAmbientPressure { .. }
+                | CellContradicts { .. }
+                | PeriodicError { .. }
                 | Corrected { .. }
                 | WidenedByGap { .. }
                 | DriftSubtracted { .. }
@@ -357,6 +398,16 @@ mod tests {
 
     /// The example of GUM H.1 (end gauge): contributions of 25, 9.7, 2.9 and 16.6 nm with 18, 25.6, exact and 2 degrees of freedom, rows of
     /// equal kind combined: 32 nm (31.7 without rounding) and 16 effective degrees of freedom, as the guide says with its 50 for the thermal row.
+    #[test]
+    fn an_interval_has_one_number_only_if_its_ends_are_alike() {
+        let lopsided = Margins::new(0.731, 0.729, 0.740);
+        assert!((lopsided.below - 0.002).abs() < 1e-12 && (lopsided.above - 0.009).abs() < 1e-12);
+        assert!(!lopsided.is_symmetric());
+        assert!(Margins::new(0.731, 0.721, 0.743).is_symmetric());
+        // A value at its bound.
+        assert_eq!(Margins::new(0.0, 0.0, 0.1), Margins { below: 0.0, above: 0.1 });
+    }
+
     #[test]
     fn the_end_gauge_of_the_guide_has_its_combined_uncertainty() {
         let row = |contribution: f64, degrees_of_freedom: Option<f64>| BudgetRow {

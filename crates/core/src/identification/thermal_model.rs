@@ -65,6 +65,39 @@ pub struct ConvectionLaw {
     pub deviation_ratio: f64,
 }
 
+impl ConvectionLaw {
+    /// `a Re^b` at [`reynolds_reference`](Self::reynolds_reference), where its error is uncorrelated with that of the exponent. `None` without a
+    /// coefficient or an exponent.
+    pub fn nusselt_at_reference(&self) -> Option<SharedValue> {
+        let by_coefficient = self.reynolds_reference.powf(self.exponent.value?);
+        let EstimateUncertainty { noise_standard_error, bias_standard_error } = self.coefficient.uncertainty;
+        Some(SharedValue {
+            value: Some(self.coefficient.value? * by_coefficient),
+            uncertainty: EstimateUncertainty {
+                noise_standard_error: noise_standard_error * by_coefficient,
+                bias_standard_error: bias_standard_error * by_coefficient,
+            },
+            origin: self.coefficient.origin,
+        })
+    }
+
+    /// Standard error of `ln a`, which is that of the law at a Reynolds number of 1, far outside of the points; and its correlation with the
+    /// exponent.
+    pub fn ln_coefficient_error(&self) -> Option<(f64, f64)> {
+        let at_reference = self.coefficient.uncertainty.combined_standard_error() / self.coefficient.value?;
+        let by_exponent = self.reynolds_reference.ln() * self.exponent.uncertainty.combined_standard_error();
+        let standard_error = at_reference.hypot(by_exponent);
+        Some((standard_error, if standard_error > 0.0 { -by_exponent / standard_error } else { 0.0 }))
+    }
+
+    /// The 95 % interval of the coefficient a.
+    pub fn coefficient_interval_95(&self) -> Option<(f64, f64)> {
+        let half = crate::half_width_95(self.ln_coefficient_error()?.0);
+        let value = self.coefficient.value?;
+        Some((value * (-half).exp(), value * half.exp()))
+    }
+}
+
 /// Two shared parameters that are hardly distinguishable.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CorrelatedPair {
@@ -144,5 +177,44 @@ impl InletConvection {
             InletConvection::Shared => InletConvection::Own,
             InletConvection::Own => InletConvection::Shared,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two independent errors of plus and minus one standard deviation, at the reference and of the exponent: their law at Re = 1 has the stated
+    /// spread and correlation.
+    #[test]
+    fn the_coefficient_has_the_error_of_an_extrapolation_to_one() {
+        let with_error = |value: f64, standard_error: f64| SharedValue {
+            uncertainty: EstimateUncertainty {
+                noise_standard_error: standard_error,
+                bias_standard_error: 0.0,
+            },
+            origin: Origin::Fitted,
+            ..SharedValue::assumed(value)
+        };
+        let law = ConvectionLaw {
+            diameter_m: 0.035,
+            coefficient: with_error(0.004, 0.02 * 0.004),
+            exponent: with_error(1.13, 0.01),
+            reynolds_reference: 1.3e5,
+            reynolds_range: (5e4, 3e5),
+            deviation_ratio: 0.0,
+        };
+        let (standard_error, correlation) = law.ln_coefficient_error().unwrap();
+        let draws = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)].map(|(nusselt, exponent)| {
+            (0.02 * nusselt - 0.01 * exponent * law.reynolds_reference.ln(), 0.01 * exponent)
+        });
+        let mean = |of: fn(&(f64, f64)) -> f64| draws.iter().map(of).sum::<f64>() / 4.0;
+        let spread = mean(|(a, _)| a * a).sqrt();
+        assert!((spread / standard_error - 1.0).abs() < 1e-9, "{spread} {standard_error}");
+        let found = mean(|(a, b)| a * b) / spread / mean(|(_, b)| b * b).sqrt();
+        assert!((found - correlation).abs() < 1e-9, "{found} {correlation}");
+        let at_reference = law.nusselt_at_reference().unwrap();
+        let relative = at_reference.uncertainty.combined_standard_error() / at_reference.value.unwrap();
+        assert!((relative - 0.02).abs() < 1e-12);
     }
 }

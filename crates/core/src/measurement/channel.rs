@@ -144,6 +144,17 @@ impl Channel {
         self.info().symbol
     }
 
+    /// Distance of a reading from the value at which a gain error vanishes, in the channel's unit: [`CALIBRATED_AT_K`] for thermometers, 0 for
+    /// all others.
+    pub fn gain_distance(self, reading: f64) -> f64 {
+        match self.info().dimension {
+            Dimension::Temperature => reading - CALIBRATED_AT_K,
+            Dimension::RotationalSpeed | Dimension::MassFlow | Dimension::Pressure | Dimension::Ratio => {
+                reading
+            }
+        }
+    }
+
     /// SI unit (rpm for speed), e.g. `K`.
     pub fn unit(self) -> &'static str {
         self.info().dimension.unit()
@@ -183,6 +194,9 @@ impl std::str::FromStr for Channel {
 /// Sample interval of the program's own recordings, to which declared noise refers, s.
 pub const SAMPLE_INTERVAL_S: f64 = 0.1;
 
+/// Temperature at which a thermometer's gain error is zero, K. Source: ISO 1, reference temperature 20 degC.
+pub const CALIBRATED_AT_K: f64 = 293.15;
+
 /// One-sigma uncertainty of a channel, in its SI unit.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -191,8 +205,15 @@ pub struct DeclaredUncertainty {
     pub noise_sigma: f64,
     /// Fixed offset.
     pub offset_sigma: f64,
-    /// Fixed gain error, ratio to the value.
+    /// Fixed gain error, ratio to the value; of a thermometer, to its distance from [`CALIBRATED_AT_K`].
     pub gain_sigma_ratio: f64,
+}
+
+impl DeclaredUncertainty {
+    /// Fixed error of a reading of `channel`, offset and gain together, one standard deviation in the channel's unit.
+    pub fn fixed_sigma(&self, channel: Channel, reading: f64) -> f64 {
+        self.offset_sigma.hypot(self.gain_sigma_ratio * channel.gain_distance(reading))
+    }
 }
 
 /// Colour of the sensor noise: white noise and first-order noise, with standard deviations `sqrt(1 - c^2)` and `c` of the total.

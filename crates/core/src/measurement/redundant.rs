@@ -163,7 +163,7 @@ impl RedundantSensors {
 
     /// The reading of the channel at one instant, for guards and settle bands while the rig runs: the weighted mean
     /// without outliers. `readings` in the order of the sensors; NaN if none is finite.
-    pub fn live(&self, readings: &[f64]) -> f64 {
+    pub fn live(&self, channel: Channel, readings: &[f64]) -> f64 {
         let mut sorted: Vec<f64> = readings.iter().copied().filter(|reading| reading.is_finite()).collect();
         sorted.sort_by(f64::total_cmp);
         let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };
@@ -171,8 +171,7 @@ impl RedundantSensors {
         let has_reading = |index: usize| readings.get(index).is_some_and(|reading| reading.is_finite());
         let is_near = |index: usize| {
             let declared = &self.elements[index].declared;
-            let sigma =
-                declared.noise_sigma.hypot(declared.offset_sigma).hypot(declared.gain_sigma_ratio * middle);
+            let sigma = declared.noise_sigma.hypot(declared.fixed_sigma(channel, middle));
             has_reading(index)
                 && (sigma <= 0.0 || (readings[index] - middle).abs() <= LIVE_LIMIT_SIGMAS * sigma)
         };
@@ -241,16 +240,16 @@ mod tests {
     #[test]
     fn one_wild_or_lost_reading_does_not_move_the_live_value() {
         let four = RedundantSensors::alike(Channel::T2, 4, declared(0.1, 0.25));
-        assert!((four.live(&[350.0, 350.2, 349.9, 350.1]) - 350.05).abs() < 1e-9);
+        assert!((four.live(Channel::T2, &[350.0, 350.2, 349.9, 350.1]) - 350.05).abs() < 1e-9);
         for wild in [f64::NAN, 0.0, 900.0, f64::INFINITY] {
-            assert!((four.live(&[350.0, wild, 350.2, 350.1]) - 350.1).abs() < 1e-9, "{wild}");
+            assert!((four.live(Channel::T2, &[350.0, wild, 350.2, 350.1]) - 350.1).abs() < 1e-9, "{wild}");
         }
-        assert!(four.live(&[f64::NAN; 4]).is_nan());
+        assert!(four.live(Channel::T2, &[f64::NAN; 4]).is_nan());
         // If two contradict each other, neither is known to be wrong.
         let two = RedundantSensors::alike(Channel::P2, 2, declared(60.0, 100.0));
-        assert_eq!(two.live(&[150e3, 160e3]), 155e3);
+        assert_eq!(two.live(Channel::P1, &[150e3, 160e3]), 155e3);
         let exact = RedundantSensors::alike(Channel::P2, 2, declared(0.0, 0.0));
-        assert_eq!(exact.live(&[150e3, 160e3]), 155e3);
+        assert_eq!(exact.live(Channel::P1, &[150e3, 160e3]), 155e3);
     }
 
     #[test]

@@ -118,8 +118,11 @@ impl SafeTrajectory {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Soak {
-    /// Time at rest, s, > 0.
+    /// Time at rest, s, > 0; if the soak ends when the sensors rest, the shortest.
     pub duration_s: f64,
+    /// Whether the soak goes on until T1, T2, P1 and P2 rest, at most for [`Soak::LONGEST_S`].
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub until_settled: bool,
     /// Oil inlet temperature during the soak, K: equal to that of cell and inlet air.
     pub oil_temperature_k: f64,
     /// Temperature non-uniformity: standard deviation of the true temperature at a sensor about the mean of all, K, >= 0.
@@ -129,9 +132,19 @@ pub struct Soak {
 }
 
 impl Soak {
-    /// Groups of sensors that must read the same at standstill: temperatures and pressures.
-    pub const EQUAL_AT_REST: [&'static [Channel]; 2] =
-        [&[Channel::T1, Channel::T2, Channel::Tc, Channel::TOil], &[Channel::P1, Channel::P2]];
+    /// Groups of sensors that must read the same at standstill: temperatures, pressures of the compressor, and of the turbine.
+    pub const EQUAL_AT_REST: [&'static [Channel]; 3] = {
+        use Channel::{P1, P2, P3, P4, T1, T2, T3, T4, TOil, Tc, Tt};
+        [&[T1, T2, Tc, TOil, T3, T4, Tt], &[P1, P2], &[P3, P4]]
+    };
+    /// Shortest soak that ends when the sensors rest, s. Bound: gas in pipes settles within a minute, and two and a half minutes of noise of 0.1 K
+    /// are known to 0.01 K.
+    pub const SHORTEST_S: f64 = 300.0;
+    /// Longest soak that ends when the sensors rest, s. Judgement: a housing is then within 1 K of the cell, and waiting longer costs more than a
+    /// declared offset.
+    pub const LONGEST_S: f64 = 1800.0;
+    /// Maximum drift of a thermometer at rest, K/min. Bound: housings of 10 minutes are then within 1 K of their limit.
+    pub const MAX_DRIFT_K_MIN: f64 = 0.1;
     /// Default temperature non-uniformity of a soak: 0.05 K.
     pub const TEMPERATURE_SIGMA_K: f64 = 0.05;
     /// Default of [`Soak::pressure_sigma_pa`]: 5 Pa.

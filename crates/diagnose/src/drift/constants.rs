@@ -77,8 +77,7 @@ pub(crate) fn constants(readings: &Readings, declared: &Declared) -> Vec<Respons
 
 /// Declared constant error of a reading, one standard deviation.
 fn declared_error(declared: &Declared, channel: Channel, reading: f64) -> f64 {
-    let declared = declared.of(channel);
-    declared.offset_sigma.hypot(declared.gain_sigma_ratio * reading)
+    declared.of(channel).fixed_sigma(channel, reading)
 }
 
 /// Knot distance of slow variations, s. Judgement: several steps of a minute, so that variations explain no single step, and a fraction of the

@@ -1,11 +1,13 @@
 //! The isothermal zero: sensor offsets from a state in which all sensors must read the same.
 //!
-//! In a long soak at standstill the shaft is stopped, and oil and cell have one temperature. T1, T2, Tc and T_oil then see one temperature,
-//! and P1 and P2 one pressure. Their differences are offsets, up to the residual non-uniformity of the rig. Their common error keeps its
-//! declared uncertainty. It changes an efficiency only by its share of the absolute temperature, which is negligible, but it matters in a
-//! diagnosis of the whole machine.
+//! In a soak at standstill the shaft is stopped, and oil and cell have one temperature. T1, T2, Tc and T_oil then see one temperature,
+//! P1 and P2 one pressure, P3 and P4 another. Their differences are offsets, up to the residual non-uniformity of the rig. A sensor that does not
+//! rest yet keeps its declared offset: the gas at T1 and T2 rests within minutes, a housing within an hour. The common error is compared with
+//! the cell's thermometer and barometer, and keeps the remaining uncertainty.
 
 use crate::IdentifyConfig;
+use crate::isothermal_zero::periodic::{self, PeriodicError};
+use crate::isothermal_zero::references::{CellReference, compare};
 use crate::isothermal_zero::relaxation;
 use crate::step_data::samples::TREND_BLOCK_S;
 use mapper_core::unit_factors::S_PER_MIN;
@@ -15,7 +17,7 @@ use mapper_core::{
 };
 use mapper_numerics::coloured_noise::variance_of_mean;
 use mapper_numerics::statistics::{EXCLUDE_SIGMAS, mean};
-use mapper_observe::declared::{CommonOffset, rest_pressure_pa};
+use mapper_observe::declared::{CommonOffset, rest_pressure_pa, usual_noise_sigma};
 use mapper_physics::rig::sensor_fault::gain_error;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -24,11 +26,15 @@ use std::collections::BTreeMap;
 const LONGEST_SOAK_S: f64 = 600.0;
 /// Minimum length of that segment, s. Bound: noise of 0.1 K at 10 Hz leaves its drift an error of 0.02 K/min.
 const SHORTEST_SOAK_S: f64 = 60.0;
-/// Maximum drift of a temperature over it, K/min. Bound: housings of 10 minutes are then within 1 K of their limit.
-const MAX_SOAK_DRIFT_K_MIN: f64 = 0.1;
 /// Parts of a soak: its drift is the difference of last and first; the limit leaves the first out. Source: the slope between
 /// thirds has nearly the smallest error (Bartlett, Biometrics 5, 1949).
 const SOAK_PARTS: f64 = 3.0;
+
+/// Time constant with which a drifting reading approaches its limit, min. Bound: the middle of those of stopped housings, 700 s.
+const DRIFT_TIME_CONSTANT_MIN: f64 = 700.0 / S_PER_MIN;
+/// Share of the distance between a housing and the common reading by which the gas at its probes may differ. Judgement: gas at rest in a pipe
+/// flange of a warm housing; a thermometer five diameters away has the room's temperature to a tenth.
+const WARM_HOUSING_SHARE: f64 = 0.1;
 
 /// Residual non-uniformity of a soak, and the criteria by which a soak is recognised.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -56,7 +62,7 @@ impl Default for ZeroSettings {
             pressure_sigma_pa: Soak::PRESSURE_SIGMA_PA,
             longest_s: LONGEST_SOAK_S,
             shortest_s: SHORTEST_SOAK_S,
-            drift_k_min: MAX_SOAK_DRIFT_K_MIN,
+            drift_k_min: Soak::MAX_DRIFT_K_MIN,
             allows_a_fault: false,
         }
     }
@@ -87,6 +93,41 @@ pub struct IsothermalZero {
     /// Remaining common error of all offsets of one dimension: the common reading is only as accurate as the declared offsets.
     #[serde(default)]
     pub common: Vec<CommonOffset>,
+    /// Sensors that keep their declared offset, with the reason.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<LeftOutSensor>,
+    /// Comparisons of the common readings with the cell's instruments.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub references: Vec<CellReference>,
+    /// Periodic errors of readings at rest.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub periodic: Vec<PeriodicError>,
+}
+
+/// A sensor that a zero leaves out.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LeftOutSensor {
+    /// The sensor.
+    pub channel: Channel,
+    /// Why it keeps its declared offset.
+    pub reason: NotZeroed,
+}
+
+/// Why a sensor keeps its declared offset.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
+#[serde(rename_all = "snake_case")]
+#[allow(missing_docs, reason = "the messages describe the variants")]
+pub enum NotZeroed {
+    #[error("still drifts by {drift_k_min:+.2} K/min")]
+    Drifts { drift_k_min: f64 },
+    #[error("its housing needs a soak of {needed_s:.0} s")]
+    ShortSoak { needed_s: f64 },
+    /// `off`: minus the common reading; `sigma`: expected standard deviation; K or Pa.
+    #[error("reads {off:+.2} off the others, {:.1} times its declared offset", off.abs() / sigma)]
+    Disagrees { off: f64, sigma: f64 },
+    /// `sigma` of the zero, and the declared one, K or Pa.
+    #[error("its declared offset, {declared:.2}, is better known than the zero, {sigma:.2}")]
+    NoGain { sigma: f64, declared: f64 },
 }
 
 /// Why a recording has no isothermal zero.
@@ -107,11 +148,12 @@ pub enum NoZero {
     Uneven { channel: Channel, off: f64, sigma: f64 },
 }
 
-/// Finds the offsets of T1, T2, Tc and T_oil against each other, and of P1 and P2.
+/// Finds the offsets of the temperatures against each other, of P1 and P2, and of P3 and P4.
 ///
 /// Channels without a declared offset count as exact. Common temperature and pressure are means weighted by declared offset and
-/// non-uniformity. If a fault is allowed, drifting oil is left out, and a temperature sensor that exceeds its declared offset is compared with
-/// the others; if two pressure taps differ by more, either may be wrong, so both keep their declared offsets.
+/// non-uniformity. Sensors that do not rest, or that do not agree although they are not T1, T2, P1 or P2, are left out. If a fault is allowed, a
+/// temperature sensor that exceeds its declared offset is compared with the others; if two pressure taps differ by more, either may be wrong, so
+/// both keep their declared offsets.
 ///
 /// # Errors
 /// [`NoZero`] if the recording has no soak, or an unsuitable one.
@@ -120,46 +162,191 @@ pub fn isothermal_zero(
     config: &IdentifyConfig,
     settings: &ZeroSettings,
 ) -> Result<IsothermalZero, NoZero> {
-    let (start_s, end_s) = at_rest(recording);
+    let rest = at_rest(recording);
+    let (start_s, end_s) = rest;
     let no_soak = NoZero::NoSoak { found_s: (end_s - start_s).max(0.0), needed_s: settings.shortest_s };
     if (end_s - start_s).is_nan() || end_s - start_s < settings.shortest_s {
         return Err(no_soak);
     }
-    let rest = (start_s, end_s);
-    let start_s = start_s.max(end_s - settings.longest_s);
-    let mut zero = IsothermalZero { start_s, end_s, ..IsothermalZero::default() };
-    for (group, sigma) in groups(settings) {
-        let mut readings = Vec::new();
-        for channel in group {
-            let Some(reading) = soak_mean(recording, *channel, start_s, end_s) else { continue };
-            let drifts = group.len() > 2 && reading.drift_per_min.abs() > settings.drift_k_min;
-            // A drifting oil supply is independent of the cell, and no other sensor depends on it.
-            if drifts && settings.allows_a_fault && *channel == Channel::TOil {
-                continue;
-            }
-            if drifts {
-                return Err(NoZero::Drifts {
-                    channel: *channel,
-                    drift_k_min: reading.drift_per_min,
-                    limit_k_min: settings.drift_k_min,
-                });
-            }
-            let declared = config.sensor(*channel);
-            let mut mean = reading.mean;
-            let mut own = sigma.hypot(sigma_of_mean(declared.noise_sigma, end_s - start_s, config));
-            // The housing reaches the cell's temperature last, and its drift is below the threshold.
-            if *channel == Channel::Tc
-                && let Some((limit, error)) = housing_limit(recording, rest, config, settings)
-            {
-                (mean, own) = (limit, sigma.hypot(error));
-            }
-            let gain_sigma = declared.gain_sigma_ratio * gain_error(*channel, mean, 0.0);
-            let total = own.hypot(declared.offset_sigma).hypot(gain_sigma);
-            readings.push(Reading { channel: *channel, mean, own, total });
+    let start_s = end_s - used_s(end_s - start_s, settings);
+    let periodic = periodic::find(recording, config, (start_s, end_s));
+    let mut zero = IsothermalZero { start_s, end_s, periodic, ..IsothermalZero::default() };
+    let soak = SoakReadings { recording, config, settings, rest, used: (start_s, end_s) };
+    for group in groups(settings) {
+        let readings = soak.resting(&group, &mut zero.left_out);
+        let Some((common, readings)) = soak.agreeing(&group, readings, &mut zero.left_out)? else { continue };
+        let sigma = combined_sigma(&readings);
+        let (mut shift, mut common_sigma) = (0.0, sigma);
+        if group.has_reference
+            && let Some(reference) =
+                compare(recording, config, (start_s, end_s), group.channels[0], common, sigma)
+        {
+            (shift, common_sigma) = (reference.correction, reference.common_sigma);
+            zero.references.push(reference);
         }
+        for reading in &readings {
+            // The error that P3 and P4 share is part of the remaining error of each.
+            let left = if group.has_reference { reading.own } else { reading.own.hypot(sigma) };
+            zero.offsets.insert(reading.channel, reading.mean - common + shift);
+            zero.left_sigma.insert(reading.channel, left);
+        }
+        if group.has_reference {
+            let channels = readings.iter().map(|reading| reading.channel).collect();
+            zero.common.push(CommonOffset { channels, sigma: common_sigma, reading: common - shift });
+        }
+    }
+    // T1 and T2 must read the same; if only pressures rest, the reason of the temperatures is the reason of the whole.
+    if zero.offsets.is_empty() {
+        let drifting = zero.left_out.iter().find_map(|left| match left.reason {
+            NotZeroed::Drifts { drift_k_min } => Some((left.channel, drift_k_min)),
+            _ => None,
+        });
+        return Err(drifting.map_or(no_soak, |(channel, drift_k_min)| NoZero::Drifts {
+            channel,
+            drift_k_min,
+            limit_k_min: settings.drift_k_min,
+        }));
+    }
+    Ok(zero)
+}
+
+/// Length of the segment at the end of a soak that is used, s: half of it, since the first half settles, within the limits of the settings.
+fn used_s(soak_s: f64, settings: &ZeroSettings) -> f64 {
+    (0.5 * soak_s).min(settings.longest_s).max(settings.shortest_s)
+}
+
+/// A recording during its soak.
+struct SoakReadings<'a> {
+    recording: &'a Recording,
+    config: &'a IdentifyConfig,
+    settings: &'a ZeroSettings,
+    /// The whole standstill, s.
+    rest: (f64, f64),
+    /// Its used part, s.
+    used: (f64, f64),
+}
+
+impl SoakReadings<'_> {
+    /// The readings of a group that rest; the others are appended to `left_out`.
+    fn resting(&self, group: &Group, left_out: &mut Vec<LeftOutSensor>) -> Vec<Reading> {
+        let mut readings = Vec::new();
+        for channel in group.channels {
+            match self.reading(group, *channel) {
+                Some(Ok(reading)) => readings.push(reading),
+                Some(Err(reason)) => left_out.push(LeftOutSensor { channel: *channel, reason }),
+                None => {}
+            }
+        }
+        if group.drift_limit_per_min.is_some() {
+            self.widen_drifting(group, &mut readings);
+        }
+        let warm = |housing: Channel| {
+            let t1 = readings.iter().find(|reading| reading.channel == Channel::T1)?.mean;
+            let of = soak_mean(self.recording, housing, self.used.0, self.used.1)?;
+            let declared = self.config.sensor(housing).offset_sigma;
+            Some(WARM_HOUSING_SHARE * ((of.mean - t1).abs() - EXCLUDE_SIGMAS * declared).max(0.0))
+        };
+        // If a fault is allowed, a housing that reads too high may be at fault.
+        let is_judged = !self.settings.allows_a_fault;
+        let [compressor_k, turbine_k] = [Channel::Tc, Channel::Tt]
+            .map(|housing| if is_judged { warm(housing).unwrap_or(0.0) } else { 0.0 });
+        for reading in &mut readings {
+            match reading.channel {
+                Channel::T1 | Channel::T2 => reading.widen(compressor_k),
+                Channel::T3 | Channel::T4 => reading.widen(turbine_k),
+                _ => {}
+            }
+        }
+        // A zero that is less certain than the declaration is none.
+        readings.retain(|reading| {
+            let declared = self.config.sensor(reading.channel).offset_sigma;
+            let improves = declared == 0.0 || reading.own < declared;
+            if !improves {
+                let reason = NotZeroed::NoGain { sigma: reading.own, declared };
+                left_out.push(LeftOutSensor { channel: reading.channel, reason });
+            }
+            improves
+        });
+        readings
+    }
+
+    /// The reading of a channel at rest, or why it does not rest; `None` if it is not recorded, or not declared although only a declaration makes
+    /// it a member.
+    fn reading(&self, group: &Group, channel: Channel) -> Option<Result<Reading, NotZeroed>> {
+        let (start_s, end_s) = self.used;
+        let reading = soak_mean(self.recording, channel, start_s, end_s)?;
+        let declared = self.config.sensor(channel);
+        if HOT_SIDE.contains(&channel) && declared.offset_sigma <= 0.0 {
+            return None;
+        }
+        let noise_sigma =
+            if declared.noise_sigma > 0.0 { declared.noise_sigma } else { usual_noise_sigma(channel) };
+        let mut mean = reading.mean;
+        let mut own = group.sigma.hypot(sigma_of_mean(declared.noise_sigma, end_s - start_s, self.config));
+        if group.drift_limit_per_min.is_some_and(|limit| reading.drift_per_min.abs() > limit) {
+            return Some(Err(NotZeroed::Drifts { drift_k_min: reading.drift_per_min }));
+        }
+        // A housing reaches the cell's temperature last, and its drift may be below the threshold.
+        if HOUSINGS.contains(&channel) {
+            let needed_s = self.settings.longest_s;
+            let Some((limit, error)) = self.housing_limit(channel, noise_sigma) else {
+                return Some(Err(NotZeroed::ShortSoak { needed_s }));
+            };
+            (mean, own) = (limit, group.sigma.hypot(error));
+        }
+        let third_s = (end_s - start_s) / SOAK_PARTS;
+        let of_third = sigma_of_mean(noise_sigma, third_s, self.config);
+        let drift_sigma = std::f64::consts::SQRT_2 * of_third / (2.0 * third_s / S_PER_MIN);
+        let gain_sigma = declared.gain_sigma_ratio * gain_error(channel, mean, 0.0);
+        let total = own.hypot(declared.offset_sigma).hypot(gain_sigma);
+        let drift_per_min = reading.drift_per_min;
+        Some(Ok(Reading { channel, mean, own, total, drift_per_min, drift_sigma }))
+    }
+
+    /// Adds the distance from their limits to readings that drift against T1 and T2. If the air of the cell drifts, all of them do.
+    fn widen_drifting(&self, group: &Group, readings: &mut [Reading]) {
+        let core: Vec<Reading> =
+            readings.iter().copied().filter(|reading| group.is_core(reading.channel)).collect();
+        let Some(of_core) = mean(core.iter().map(|reading| reading.drift_per_min)) else { return };
+        let sigma_of_core =
+            core.iter().map(|reading| reading.drift_sigma).fold(0.0, f64::hypot) / core.len() as f64;
+        for reading in readings.iter_mut().filter(|reading| !HOUSINGS.contains(&reading.channel)) {
+            let drift = reading.drift_per_min - of_core;
+            if drift.abs() > EXCLUDE_SIGMAS * reading.drift_sigma.hypot(sigma_of_core) {
+                reading.widen(DRIFT_TIME_CONSTANT_MIN * drift);
+            }
+        }
+    }
+
+    /// The common reading and the sensors that agree with it; `None` if fewer than two remain.
+    fn agreeing(
+        &self,
+        group: &Group,
+        mut readings: Vec<Reading>,
+        left_out: &mut Vec<LeftOutSensor>,
+    ) -> Result<Option<(f64, Vec<Reading>)>, NoZero> {
+        let is_core = |reading: &Reading| group.is_core(reading.channel);
+        let allows_a_fault = self.settings.allows_a_fault;
+        // With one of T1 and T2 nothing shows that the other rests.
+        if readings.iter().filter(|reading| is_core(reading)).count() < CORE {
+            return Ok(None);
+        }
+        let core: Vec<Reading> = readings.iter().copied().filter(is_core).collect();
+        let core_common = (common(&core), combined_sigma(&core));
+        let may_be_at_fault =
+            |reading: &Reading| is_core(reading) || allows_a_fault && !HOT_SIDE.contains(&reading.channel);
+        readings.retain(|reading| {
+            let (off, sigma) = (reading.mean - core_common.0, reading.total.hypot(core_common.1));
+            let agrees = may_be_at_fault(reading) || off.abs() <= EXCLUDE_SIGMAS * sigma;
+            if !agrees {
+                let reason = NotZeroed::Disagrees { off, sigma };
+                left_out.push(LeftOutSensor { channel: reading.channel, reason });
+            }
+            agrees
+        });
         let mut common = common(&readings);
-        if readings.len() < 2 || !common.is_finite() {
-            continue;
+        if !common.is_finite() {
+            return Ok(None);
         }
         let uneven = |common: f64, at_fault: Option<Channel>| {
             let mut fault_free = readings.iter().filter(|reading| Some(reading.channel) != at_fault);
@@ -168,11 +355,12 @@ pub fn isothermal_zero(
         if let Some(first) = uneven(common, None) {
             let Reading { channel, mean, total, .. } = *first;
             let refused = NoZero::Uneven { channel, off: mean - common, sigma: total };
-            if !settings.allows_a_fault {
+            // P3 and P4 are no reason to refuse the zero of the compressor's sensors.
+            if !allows_a_fault && group.has_reference {
                 return Err(refused);
             }
             if readings.len() < 3 {
-                continue;
+                return Ok(None);
             }
             // Leave out the sensor without which the others agree best.
             let without = |channel: Channel| {
@@ -184,24 +372,38 @@ pub fn isothermal_zero(
                 (channel, common, spread)
             };
             let tried = readings.iter().map(|reading| without(reading.channel));
-            let Some((at_fault, of_others, _)) = tried.min_by(|a, b| a.2.total_cmp(&b.2)) else { continue };
+            let Some((at_fault, of_others, _)) = tried.min_by(|a, b| a.2.total_cmp(&b.2)) else {
+                return Ok(None);
+            };
             if uneven(of_others, Some(at_fault)).is_some() {
                 return Err(refused);
             }
             common = of_others;
         }
-        let weight: f64 = readings.iter().map(|reading| reading.total.powi(-2)).sum();
-        zero.common.push(CommonOffset {
-            channels: readings.iter().map(|reading| reading.channel).collect(),
-            sigma: weight.sqrt().recip(),
-            reading: common,
-        });
-        for reading in readings {
-            zero.offsets.insert(reading.channel, reading.mean - common);
-            zero.left_sigma.insert(reading.channel, reading.own);
-        }
+        Ok(Some((common, readings)))
     }
-    if zero.offsets.is_empty() { Err(no_soak) } else { Ok(zero) }
+
+    /// Limit of a housing's reading, K, from the last two thirds of the soak, and its standard error. `None` for a soak of less than ten minutes.
+    fn housing_limit(&self, channel: Channel, noise_sigma: f64) -> Option<(f64, f64)> {
+        let (start_s, end_s) = self.rest;
+        let first_s = start_s + (end_s - start_s) / SOAK_PARTS;
+        if end_s - start_s < self.settings.longest_s {
+            return None;
+        }
+        let series = self.recording.series.get(&channel)?;
+        let (mut t_s, mut means, mut fewest) = (Vec::new(), Vec::new(), usize::MAX);
+        for block in 0..((end_s - first_s) / TREND_BLOCK_S) as usize {
+            let from_s = first_s + block as f64 * TREND_BLOCK_S;
+            let (_, values) = series.slice(from_s, from_s + TREND_BLOCK_S);
+            let usable = usable(channel, values);
+            let Some(mean) = mean(&usable) else { continue };
+            t_s.push(from_s + 0.5 * TREND_BLOCK_S);
+            means.push(mean);
+            fewest = fewest.min(usable.len());
+        }
+        let variance = self.config.noise().variance_of_mean(fewest, TREND_BLOCK_S);
+        relaxation::limit(&t_s, &means, noise_sigma * variance.sqrt())
+    }
 }
 
 /// The recording without the offsets, and the configuration with the remaining uncertainty as declared offset: prior of the joint method, bias
@@ -212,6 +414,15 @@ pub fn zeroed(
     zero: &IsothermalZero,
 ) -> (Recording, IdentifyConfig) {
     config.rest_pressure_pa = rest_pressure_pa(&zero.common);
+    for common in &zero.common {
+        add_common_error(&mut config, &common.channels, common.sigma);
+    }
+    for error in &zero.periodic {
+        if let Some(declared) = config.declared.get(&error.channel).copied() {
+            let widened = error.widen(declared, &config, config.thresholds.end_mean_s);
+            config.declared.insert(error.channel, widened);
+        }
+    }
     for (channel, offset) in &zero.offsets {
         if let Some(series) = recording.series.get_mut(channel) {
             series.values.iter_mut().for_each(|value| *value -= offset);
@@ -224,6 +435,16 @@ pub fn zeroed(
     (recording, config)
 }
 
+/// Adds the error that all thermometers, or P1 and P2, share after a zero.
+fn add_common_error(config: &mut IdentifyConfig, channels: &[Channel], sigma: f64) {
+    if channels.contains(&Channel::P1) {
+        config.barometer_sigma_pa = config.barometer_sigma_pa.hypot(sigma);
+    }
+    if channels.contains(&Channel::T1) {
+        config.thermometer_sigma_k = config.thermometer_sigma_k.hypot(sigma);
+    }
+}
+
 /// Predicts the remaining offset uncertainty after a zero of `soak_s` at this pressure.
 pub fn expected_after_zero(
     mut config: IdentifyConfig,
@@ -232,19 +453,28 @@ pub fn expected_after_zero(
     pressure_pa: f64,
 ) -> IdentifyConfig {
     config.rest_pressure_pa = pressure_pa;
-    let used_s = soak_s.min(settings.longest_s);
-    for (channels, sigma) in groups(settings) {
-        for channel in channels {
+    let used_s = used_s(soak_s, settings);
+    for group in groups(settings) {
+        let mut members = Vec::new();
+        for channel in group.channels {
             let Some(declared) = config.declared.get(channel).copied() else { continue };
-            let averaged = sigma_of_mean(declared.noise_sigma, used_s, &config);
             let error = match channel {
-                Channel::Tc => {
-                    expected_limit_error(declared.noise_sigma, soak_s, &config, settings).unwrap_or(averaged)
+                Channel::Tc | Channel::Tt => {
+                    expected_limit_error(declared.noise_sigma, soak_s, &config, settings)
                 }
-                _ => averaged,
+                // Whether the gas of the turbine has settled is only known afterwards.
+                channel if HOT_SIDE.contains(channel) => None,
+                _ => Some(sigma_of_mean(declared.noise_sigma, used_s, &config)),
             };
-            let left = DeclaredUncertainty { offset_sigma: sigma.hypot(error), ..declared };
-            config.declared.insert(*channel, left);
+            let left = error.map(|error| group.sigma.hypot(error));
+            let Some(left) = left.filter(|left| *left < declared.offset_sigma) else { continue };
+            let total = left.hypot(declared.offset_sigma);
+            members.push(Reading { channel: *channel, own: left, total, ..Reading::of(*channel) });
+            config.declared.insert(*channel, DeclaredUncertainty { offset_sigma: left, ..declared });
+        }
+        let channels: Vec<Channel> = members.iter().map(|member| member.channel).collect();
+        if channels.len() >= CORE {
+            add_common_error(&mut config, &channels, combined_sigma(&members));
         }
     }
     config
@@ -257,10 +487,46 @@ fn sigma_of_mean(noise_sigma: f64, used_s: f64, config: &IdentifyConfig) -> f64 
     noise_sigma * variance_of_mean(colour.first_order_variance_ratio(), used_s, colour.time_constant_s).sqrt()
 }
 
-/// Channels that read the same at standstill, and the non-uniformity of each group.
-fn groups(settings: &ZeroSettings) -> [(&'static [Channel], f64); 2] {
-    let [temperatures, pressures] = Soak::EQUAL_AT_REST;
-    [(temperatures, settings.temperature_sigma_k), (pressures, settings.pressure_sigma_pa)]
+/// Sensors of the turbine's gas and housing: they may stay warm when the others rest, and never refuse a zero.
+const HOT_SIDE: [Channel; 3] = [Channel::T3, Channel::T4, Channel::Tt];
+/// Sensors of housings, whose readings are extrapolated to their limits.
+const HOUSINGS: [Channel; 2] = [Channel::Tc, Channel::Tt];
+/// Number of channels at the head of a group without which it is not zeroed. Bound: one sensor has nothing to be compared with.
+const CORE: usize = 2;
+
+/// Sensors that read the same at standstill.
+struct Group {
+    channels: &'static [Channel],
+    /// Residual non-uniformity, K or Pa.
+    sigma: f64,
+    /// Maximum drift, per minute; `None` for pressures, which follow the weather together.
+    drift_limit_per_min: Option<f64>,
+    /// Whether the cell has an instrument for the same quantity.
+    has_reference: bool,
+}
+
+impl Group {
+    /// Whether the group is not zeroed without this channel.
+    fn is_core(&self, channel: Channel) -> bool {
+        self.channels.iter().take(CORE).any(|core| *core == channel)
+    }
+}
+
+fn groups(settings: &ZeroSettings) -> [Group; 3] {
+    let [temperatures, pressures, turbine_pressures] = Soak::EQUAL_AT_REST;
+    let of_pressures = |channels, has_reference| Group {
+        channels,
+        sigma: settings.pressure_sigma_pa,
+        drift_limit_per_min: None,
+        has_reference,
+    };
+    let temperatures = Group {
+        channels: temperatures,
+        sigma: settings.temperature_sigma_k,
+        drift_limit_per_min: Some(settings.drift_k_min),
+        has_reference: true,
+    };
+    [temperatures, of_pressures(pressures, true), of_pressures(turbine_pressures, false)]
 }
 
 /// Whether a shaft is slower than any running machine's, and hence at standstill.
@@ -285,35 +551,7 @@ fn at_rest(recording: &Recording) -> (f64, f64) {
     (speed.t_s[first], speed.t_s[last.saturating_sub(1).max(first)])
 }
 
-/// Limit of the housing reading, K, from the last two thirds of the soak, and its standard error. `None` for a soak of less than ten minutes
-/// and for a sensor without declared noise.
-fn housing_limit(
-    recording: &Recording,
-    (start_s, end_s): (f64, f64),
-    config: &IdentifyConfig,
-    settings: &ZeroSettings,
-) -> Option<(f64, f64)> {
-    let first_s = start_s + (end_s - start_s) / SOAK_PARTS;
-    let noise_sigma = config.declared.get(&Channel::Tc)?.noise_sigma;
-    if end_s - start_s < settings.longest_s {
-        return None;
-    }
-    let series = recording.series.get(&Channel::Tc)?;
-    let (mut t_s, mut means, mut fewest) = (Vec::new(), Vec::new(), usize::MAX);
-    for block in 0..((end_s - first_s) / TREND_BLOCK_S) as usize {
-        let from_s = first_s + block as f64 * TREND_BLOCK_S;
-        let (_, values) = series.slice(from_s, from_s + TREND_BLOCK_S);
-        let usable = usable(Channel::Tc, values);
-        let Some(mean) = mean(&usable) else { continue };
-        t_s.push(from_s + 0.5 * TREND_BLOCK_S);
-        means.push(mean);
-        fewest = fewest.min(usable.len());
-    }
-    let variance = config.noise().variance_of_mean(fewest, TREND_BLOCK_S);
-    relaxation::limit(&t_s, &means, noise_sigma * variance.sqrt())
-}
-
-/// The standard error of [`housing_limit`] after a soak of `soak_s`.
+/// The standard error of the limit of a housing after a soak of `soak_s`.
 fn expected_limit_error(
     noise_sigma: f64,
     soak_s: f64,
@@ -342,6 +580,28 @@ struct Reading {
     own: f64,
     /// The same with the declared offset.
     total: f64,
+    /// Drift, K or Pa per minute.
+    drift_per_min: f64,
+    /// Standard deviation of the drift by noise.
+    drift_sigma: f64,
+}
+
+impl Reading {
+    /// Without a value and an error.
+    fn of(channel: Channel) -> Self {
+        Reading { channel, mean: 0.0, own: 0.0, total: 0.0, drift_per_min: 0.0, drift_sigma: 0.0 }
+    }
+
+    /// Adds an error of the zero.
+    fn widen(&mut self, sigma: f64) {
+        self.own = self.own.hypot(sigma);
+        self.total = self.total.hypot(sigma);
+    }
+}
+
+/// Standard deviation of the common reading.
+fn combined_sigma(readings: &[Reading]) -> f64 {
+    readings.iter().map(|reading| reading.total.powi(-2)).sum::<f64>().sqrt().recip()
 }
 
 /// The common reading of the sensors.

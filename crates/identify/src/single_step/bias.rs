@@ -8,6 +8,7 @@ use crate::single_step::fit::{Fit, Geometry, t2_k};
 use crate::step_data::samples::{Row, Samples};
 use mapper_core::Channel;
 use mapper_physics::gas::air::Air;
+use mapper_physics::rig::sensor_fault::gain_error;
 
 /// Step of a derivative by a reading, relative. Bound: between rounding and curvature.
 pub(crate) const READING_STEP_RATIO: f64 = 1e-5;
@@ -41,7 +42,10 @@ pub(crate) fn declared_effect(
         let sensitivity = sensitivity(fit, samples, geometry, channel);
         let rows = || sensitivity.iter().zip(&samples.rows);
         let by_offset_k = rows().map(|(s, _)| s * declared.offset_sigma).collect();
-        let by_gain_k = rows().map(|(s, row)| s * row.read(channel) * declared.gain_sigma_ratio).collect();
+        let gain = |row: &Row| {
+            declared.gain_sigma_ratio * gain_error(channel, row.read(channel), config.rest_pressure_pa)
+        };
+        let by_gain_k = rows().map(|(s, row)| s * gain(row)).collect();
         for (change_k, sigma) in
             [(by_offset_k, declared.offset_sigma), (by_gain_k, declared.gain_sigma_ratio)]
         {
@@ -61,6 +65,21 @@ pub(crate) fn declared_effect(
     if config.barometer_sigma_pa > 0.0 {
         let [p1, p2] = [Channel::P1, Channel::P2].map(|channel| sensitivity(fit, samples, geometry, channel));
         shared.push(p1.iter().zip(p2).map(|(p1, p2)| (p1 + p2) * config.barometer_sigma_pa).collect());
+    }
+    if config.housing_contact_sigma_ratio > 0.0 {
+        // The inlet air comes from the cell: T1 is close enough for the distance of the housing.
+        let by_tc = sensitivity(fit, samples, geometry, Channel::Tc);
+        let rows = by_tc.iter().zip(&samples.rows);
+        let changes = rows.map(|(by_tc, row)| {
+            by_tc * config.housing_contact_sigma_ratio * (row.read(Channel::Tc) - row.t1_k)
+        });
+        shared.push(changes.collect());
+    }
+    if config.thermometer_sigma_k > 0.0 {
+        let channels = [Channel::T1, Channel::T2, Channel::Tc];
+        let [t1, t2, tc] = channels.map(|channel| sensitivity(fit, samples, geometry, channel));
+        let all = t1.iter().zip(t2).zip(tc).map(|((t1, t2), tc)| (t1 + t2 + tc) * config.thermometer_sigma_k);
+        shared.push(all.collect());
     }
     if config.humidity_sigma_kg_kg > 0.0 {
         let air = geometry.air.with_humidity(geometry.air.humidity_kg_kg() + config.humidity_sigma_kg_kg);

@@ -15,6 +15,7 @@ use mapper_numerics::statistics::standard_deviation;
 use mapper_physics::gas::air::Air;
 use mapper_physics::laws::compression::apparent_efficiency;
 use mapper_physics::laws::thermocouple::time_constant_s;
+use mapper_physics::rig::sensor_fault::gain_error;
 
 /// Segment at the end of a step in which temperatures must not drift, s. Bound: with noise of 0.1 K its slope is then known to better
 /// than 0.1 K/min.
@@ -112,8 +113,9 @@ pub(crate) fn uncertainty(
         let step = READING_STEP_RATIO * value;
         let moved = |by: f64| apparent_eta(&means.moved(channel, by, config.air), config.air);
         let slope = (moved(step) - moved(-step)) / (2.0 * step);
-        let spreads = [declared.offset_sigma, value * declared.gain_sigma_ratio];
-        common.extend(spreads.iter().filter(|sigma| **sigma > 0.0).map(|sigma| slope * sigma));
+        let by_gain = declared.gain_sigma_ratio * gain_error(channel, value, config.rest_pressure_pa);
+        let spreads = [declared.offset_sigma, by_gain];
+        common.extend(spreads.iter().filter(|sigma| **sigma != 0.0).map(|sigma| slope * sigma));
         declared_square += (slope * declared.noise_sigma).powi(2);
     }
     let mut share = |sigma: f64, moved: &Row, air: Air| {
@@ -123,6 +125,9 @@ pub(crate) fn uncertainty(
     let (by_pa, by_kg_kg) = (config.barometer_sigma_pa, config.humidity_sigma_kg_kg);
     let higher = means.moved(Channel::P1, by_pa, config.air).moved(Channel::P2, by_pa, config.air);
     share(by_pa, &higher, config.air);
+    let by_k = config.thermometer_sigma_k;
+    let warmer = means.moved(Channel::T1, by_k, config.air).moved(Channel::T2, by_k, config.air);
+    share(by_k, &warmer, config.air);
     share(by_kg_kg, means, config.air.with_humidity(config.air.humidity_kg_kg() + by_kg_kg));
     let eta = |row: &Row| row.t1_k * row.rise_ratio / (row.t2_k - row.t1_k);
     let etas: Vec<f64> = samples.rows.iter().map(eta).filter(|eta| eta.is_finite()).collect();

@@ -47,7 +47,7 @@ fn reduced(
         let declared = declared.get(&channel).copied().unwrap_or_default();
         let mut moved = *measured;
         let Some(value) = reading(&mut moved) else { continue };
-        *value += declared.offset_sigma.hypot(declared.gain_sigma_ratio * *value);
+        *value += declared.fixed_sigma(channel, *value);
         let moved = reduced_turbine_point(&moved);
         of_flow = of_flow.hypot(moved.flow_parameter_kg_sqrt_k_s_kpa - point.flow_parameter_kg_sqrt_k_s_kpa);
         let change = moved.efficiency.zip(point.efficiency).map_or(0.0, |(moved, eta)| moved - eta);

@@ -86,7 +86,7 @@ pub(crate) fn judge(
     let mut judgement = Judgement::default();
     let Some(blocks) = Blocks::new(channel, sensors) else { return judgement };
     let colour = ColouredNoise::new(colour.first_order_share_ratio, colour.time_constant_s);
-    let judge = Judge { sensors, declared, blocks: &blocks, colour, limit_sigmas };
+    let judge = Judge { channel, sensors, declared, blocks: &blocks, colour, limit_sigmas };
     judge.exclude_silent(&mut judgement);
     judge.exclude_stuck(&mut judgement);
     let max_left_out = sensors.len().saturating_sub(1) / 2;
@@ -110,6 +110,7 @@ fn frozen(from_s: f64, reading: f64) -> ElementFault {
 }
 
 struct Judge<'a> {
+    channel: Channel,
     sensors: &'a [Option<&'a Series>],
     declared: &'a RedundantSensors,
     blocks: &'a Blocks,
@@ -279,7 +280,7 @@ impl Judge<'_> {
             let length_s = part.len() as f64 * self.blocks.length_s;
             let variance = |other: usize| {
                 let declared = &self.declared.elements[other].declared;
-                let fixed = declared.offset_sigma.hypot(declared.gain_sigma_ratio * level);
+                let fixed = declared.fixed_sigma(self.channel, level);
                 // For a sensor without a declared offset, use the noise of a sample as its scale.
                 let fixed = if fixed > 0.0 { fixed } else { declared.noise_sigma };
                 let samples = part.len() * self.blocks.samples[other];

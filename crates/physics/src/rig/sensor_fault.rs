@@ -40,8 +40,7 @@ enum SearchedIn {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Size(&'static str, &'static str, f64, f64, f64);
 
-/// Temperature at which a thermocouple's gain error is zero, K: 20 degC, the reference temperature of ISO 1.
-pub const CALIBRATED_AT_K: f64 = 293.15;
+pub use mapper_core::CALIBRATED_AT_K;
 
 const TEMPERATURE_K: f64 = 3.0;
 const HOT_GAS_K: f64 = 10.0;
@@ -193,9 +192,8 @@ pub fn additive() -> impl Iterator<Item = &'static SensorFault> {
 /// vanish; 0 without a zero.
 pub fn gain_error(channel: Channel, reading: f64, rest_pressure_pa: f64) -> f64 {
     match channel {
-        Channel::T1 | Channel::T2 | Channel::Tc => reading - CALIBRATED_AT_K,
         Channel::P1 | Channel::P2 => reading - rest_pressure_pa,
-        _ => reading,
+        _ => channel.gain_distance(reading),
     }
 }
 

@@ -419,7 +419,7 @@ fn combine_sensors(
             for (element, series) in &members {
                 readings[element.number - 1] = series.interpolate(*t_s).unwrap_or(f64::NAN);
             }
-            declared.live(&readings)
+            declared.live(channel, &readings)
         };
         let together = Series { t_s: first.t_s.clone(), values: first.t_s.iter().map(at).collect() };
         series.insert(channel, together);

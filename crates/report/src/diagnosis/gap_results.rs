@@ -3,8 +3,8 @@
 use crate::diagnosis::gap_next::next_section;
 use crate::diagnosis::gap_text::{cause, headline};
 use crate::document::{Document, Table};
-use crate::formatting::{display_scale, four_figures};
-use mapper_core::with_unit;
+use crate::formatting::{display_scale, four_figures, with_margins};
+use mapper_core::{Margins, with_unit};
 use mapper_diagnose::gap::Diagnosis;
 use mapper_diagnose::gap::ForecastCheck;
 use mapper_diagnose::gap::{CorrectedMap, NEEDED_PROBABILITY, NotCorrected, PointCorrection};
@@ -75,7 +75,8 @@ pub fn forecast_check(check: &ForecastCheck, seal: &str) -> Document {
 
 /// Efficiencies before and after, a row a point.
 pub(crate) fn correction_table(points: &[PointCorrection]) -> Table {
-    let value = |[eta, low, high]: [f64; 3]| format!("{:.1} +/- {:.1}", 100.0 * eta, 50.0 * (high - low));
+    let value =
+        |[eta, low, high]: [f64; 3]| with_margins(100.0 * eta, Margins::new(eta, low, high).scaled(100.0), 1);
     let or_none = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
     let row = |point: &PointCorrection| {
         let change = point.before.zip(point.after).map(|(before, after)| 100.0 * (after[0] - before[0]));

@@ -1,7 +1,8 @@
 //! The document model: headings, sentences, tables and figures as data.
 
+use crate::formatting::margins_text;
 use mapper_chart::Figure;
-use mapper_core::Verdict;
+use mapper_core::{Margins, Verdict};
 use maud::Markup;
 
 /// What people read about one subject.
@@ -125,6 +126,14 @@ impl Cell {
     pub(crate) fn optional(value: Option<f64>, text: impl FnOnce(f64) -> String) -> Self {
         match value.filter(|value| value.is_finite()) {
             Some(value) => Cell::number(text(value), value),
+            None => "-".into(),
+        }
+    }
+
+    /// The distances to the ends of an interval, sorted by the farther one.
+    pub(crate) fn margins(margins: Option<Margins>, decimals: usize) -> Self {
+        match margins.filter(|margins| margins.farther().is_finite()) {
+            Some(margins) => Cell::number(margins_text(margins, decimals), margins.farther()),
             None => "-".into(),
         }
     }

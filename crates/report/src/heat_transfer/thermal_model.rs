@@ -1,12 +1,17 @@
 //! The parameters that the points of a campaign share, for people and for other programs.
 
 use crate::document::{Describe, Document};
+use crate::formatting::significant_digits;
 use crate::message::Message;
 use mapper_core::{
-    IdentifiedInlet, InletConvection, Origin, SharedValue, ThermalModel, half_width_95, one_line,
+    ConvectionLaw, IdentifiedInlet, InletConvection, Origin, SharedValue, ThermalModel, half_width_95,
+    one_line,
 };
+use mapper_physics::gas::air::viscosity_pa_s;
+use mapper_physics::laws::convection::coefficient_w_m2k;
 use mapper_physics::laws::housing::{bearing_conductance_w_k, compressor_capacity_j_k, turbine_capacity_j_k};
 use mapper_physics::machine::params::Params;
+use serde::Serialize;
 use serde_json::json;
 use std::fmt::Write;
 
@@ -18,8 +23,10 @@ impl Describe for ThermalModel {
             rows.push((name.to_owned(), shared_value(value, scale, unit, decimals)));
         };
         if let Some(law) = &self.convection {
-            row("Nusselt coefficient", &law.coefficient, 1.0, "", 6);
-            row("Nusselt exponent", &law.exponent, 1.0, "", 4);
+            if let Some(at_reference) = law.nusselt_at_reference() {
+                row("a Re^b at the reference", &at_reference, 1.0, "", 1);
+            }
+            row("Nusselt exponent b", &law.exponent, 1.0, "", 4);
         }
         row("alpha_A", &self.alpha_area_ratio, 1.0, "", 3);
         row("T2 probe diameter", &self.probe_diameter_m, 1e3, "mm", 2);
@@ -32,9 +39,11 @@ impl Describe for ThermalModel {
         document.facts("", rows);
         if let Some(law) = &self.convection {
             document.text(format!(
-                "fitted from Re {:.0} to {:.0}; single points deviate by {:.1} %",
+                "Nu = a Re^b Pr^(1/3) (mu/mu_wall)^0.14 with a = {}, fitted from Re {:.0} to {:.0}, reference {:.0}; single points deviate by {:.1} %",
+                law.coefficient.value.map_or_else(|| "-".to_owned(), |a| significant_digits(a, 4)),
                 law.reynolds_range.0,
                 law.reynolds_range.1,
+                law.reynolds_reference,
                 100.0 * law.deviation_ratio
             ));
         }
@@ -104,6 +113,81 @@ pub struct ThermalExport<'a> {
     pub found: Option<&'a ThermalModel>,
 }
 
+/// The convection law where it is known best, with all that is needed to draw from it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+struct AtReference {
+    /// Reynolds number at which coefficient and exponent are uncorrelated.
+    reynolds: f64,
+    /// Temperature of gas and wall for which h is given, K.
+    temperature_k: f64,
+    /// h there, with its 95 % interval, W/(m2 K).
+    h_w_m2k: [f64; 3],
+    /// `a Re^b` there, with its 95 % interval.
+    nusselt: [f64; 3],
+    /// Exponent b, with its 95 % interval.
+    exponent: [f64; 3],
+    /// Correlation of `ln h` there with the exponent.
+    correlation: f64,
+    /// Coefficient a, the law at Re = 1, with its 95 % interval.
+    coefficient: [f64; 3],
+    /// Correlation of `ln a` with the exponent.
+    coefficient_correlation: f64,
+}
+
+impl AtReference {
+    fn new(law: &ConvectionLaw) -> Option<Self> {
+        let with_interval = |shared: &SharedValue| {
+            let (low, high) = shared.interval_95()?;
+            Some([shared.value?, low, high])
+        };
+        let nusselt = with_interval(&law.nusselt_at_reference()?)?;
+        let exponent = with_interval(&law.exponent)?;
+        let (low, high) = law.coefficient_interval_95()?;
+        let coefficient = law.coefficient.value?;
+        let viscosity_pa_s = viscosity_pa_s(CAPACITY_AT_K);
+        let flow_kg_s =
+            0.25 * std::f64::consts::PI * law.diameter_m * viscosity_pa_s * law.reynolds_reference;
+        let h_w_m2k = coefficient_w_m2k(
+            coefficient,
+            exponent[0],
+            law.diameter_m,
+            flow_kg_s,
+            CAPACITY_AT_K,
+            CAPACITY_AT_K,
+        );
+        Some(AtReference {
+            reynolds: law.reynolds_reference,
+            temperature_k: CAPACITY_AT_K,
+            h_w_m2k: nusselt.map(|value| h_w_m2k * value / nusselt[0]),
+            nusselt,
+            exponent,
+            correlation: 0.0,
+            coefficient: [coefficient, low, high],
+            coefficient_correlation: law.ln_coefficient_error()?.1,
+        })
+    }
+
+    /// As lines of the text export.
+    fn write(&self, text: &mut String) {
+        let [h, low, high] = self.h_w_m2k;
+        let _ = writeln!(
+            text,
+            "reynolds_reference {:.0} 1 # identified, where h and exponent are uncorrelated",
+            self.reynolds
+        );
+        let _ = writeln!(
+            text,
+            "h_at_reference {h:.2} W/(m2 K) # identified, 95 % {low:.2} to {high:.2}, gas and wall at {} K",
+            self.temperature_k
+        );
+        let _ = writeln!(
+            text,
+            "coefficient_exponent_correlation {:.6} 1 # of ln(nusselt_coefficient) and nusselt_exponent",
+            self.coefficient_correlation
+        );
+    }
+}
+
 impl ThermalExport<'_> {
     /// One JSON object; keys carry units, and declared values that the recording did not give are marked `declared`.
     ///
@@ -131,6 +215,9 @@ impl ThermalExport<'_> {
                 "t2_probe_diameter_m": params.t2_probe_diameter_m,
             },
         });
+        if let Some(at) = self.found.and_then(|found| AtReference::new(found.convection.as_ref()?)) {
+            file["convection_at_reference"] = json!(at);
+        }
         if compressor.alpha_area_ratio > 0.0
             && let Some(declared) = file["declared"].as_object_mut()
         {
@@ -150,7 +237,7 @@ impl ThermalExport<'_> {
             one_line(self.machine)
         );
         let law = self.found.and_then(|identified| identified.convection.as_ref());
-        let mut shared = |name: &str, unit: &str, identified: Option<&SharedValue>, declared: f64| {
+        let shared = |name: &str, unit: &str, identified: Option<&SharedValue>, declared: f64| {
             let (value, origin) = match identified.and_then(|shared| Some((shared.value?, shared))) {
                 Some((value, shared)) => {
                     let (low, high) = shared.interval_95().unwrap_or((value, value));
@@ -163,13 +250,33 @@ impl ThermalExport<'_> {
                 }
                 None => (declared, "declared".to_owned()),
             };
-            let _ = writeln!(text, "{name} {value} {unit} # {origin}");
+            format!("{name} {value} {unit} # {origin}\n")
         };
-        shared("nusselt_coefficient", "1", law.map(|l| &l.coefficient), compressor.nusselt_coefficient);
-        shared("nusselt_exponent", "1", law.map(|l| &l.exponent), compressor.nusselt_exponent);
-        shared("alpha_area", "1", self.found.map(|f| &f.alpha_area_ratio), compressor.alpha_area_ratio);
-        shared("t2_probe_diameter", "m", self.found.map(|f| &f.probe_diameter_m), params.t2_probe_diameter_m);
-        shared("heating_cooling_ratio", "1", self.found.map(|f| &f.heating_cooling_ratio), 1.0);
+        let interval = |(low, high): (f64, f64)| format!(", 95 % {low:.4e} to {high:.4e}");
+        let coefficient = law.and_then(|law| Some((law.coefficient.value?, law)));
+        let (coefficient, origin) = coefficient.map_or_else(
+            || (compressor.nusselt_coefficient, "declared".to_owned()),
+            |(value, law)| {
+                (
+                    value,
+                    format!("identified{}", law.coefficient_interval_95().map(interval).unwrap_or_default()),
+                )
+            },
+        );
+        let _ = writeln!(text, "nusselt_coefficient {coefficient} 1 # {origin}");
+        text += &shared("nusselt_exponent", "1", law.map(|l| &l.exponent), compressor.nusselt_exponent);
+        if let Some(at) = law.and_then(|law| AtReference::new(law)) {
+            at.write(&mut text);
+        }
+        text +=
+            &shared("alpha_area", "1", self.found.map(|f| &f.alpha_area_ratio), compressor.alpha_area_ratio);
+        text += &shared(
+            "t2_probe_diameter",
+            "m",
+            self.found.map(|f| &f.probe_diameter_m),
+            params.t2_probe_diameter_m,
+        );
+        text += &shared("heating_cooling_ratio", "1", self.found.map(|f| &f.heating_cooling_ratio), 1.0);
         if let Some(inlet) = self.found.and_then(|identified| identified.inlet) {
             let _ =
                 writeln!(text, "inlet_diameter {} m # declared\n# {}", inlet.diameter_m, inlet_text(&inlet));
@@ -241,6 +348,32 @@ mod tests {
         let json = serde_json::to_value(&thermal).unwrap_or_default();
         assert_eq!(json["entangled"][0]["correlation"], 0.97);
         assert_eq!(json["alpha_area_ratio"]["value"], serde_json::Value::Null);
+    }
+
+    /// A law that is known to 2 % at Re 130 000 and whose exponent is known to 0.01 is known to 12 % at Re = 1: the interval of h there is 4 %
+    /// wide to either side, that of the coefficient a factor of 1.26 (exp(1.96 sqrt(0.02^2 + (11.8 0.01)^2))).
+    #[test]
+    fn the_law_is_exported_where_it_is_known() {
+        let shared = |value: f64, noise_standard_error: f64| SharedValue {
+            uncertainty: mapper_core::EstimateUncertainty { noise_standard_error, bias_standard_error: 0.0 },
+            origin: Origin::Fitted,
+            ..SharedValue::assumed(value)
+        };
+        let law = ConvectionLaw {
+            diameter_m: 0.035,
+            coefficient: shared(0.004, 0.02 * 0.004),
+            exponent: shared(1.13, 0.01),
+            reynolds_reference: 1.3e5,
+            reynolds_range: (5e4, 3e5),
+            deviation_ratio: 0.003,
+        };
+        let at = AtReference::new(&law).unwrap();
+        assert!((at.h_w_m2k[2] / at.h_w_m2k[0] - 1.0392).abs() < 1e-3, "{at:?}");
+        assert!((at.coefficient[2] / at.coefficient[0] - 1.264).abs() < 5e-3, "{at:?}");
+        assert!(at.coefficient_correlation < -0.98, "{at:?}");
+        // Appendix A: Nu = 0.004 Re^1.13 Pr^(1/3), air at 350 K has 0.030 W/(m K) and Pr 0.70.
+        let by_hand = 0.004 * 1.3e5f64.powf(1.13) * 0.70f64.cbrt() * 0.030 / 0.035;
+        assert!((at.h_w_m2k[0] / by_hand - 1.0).abs() < 0.02, "{} {by_hand}", at.h_w_m2k[0]);
     }
 
     #[test]

@@ -121,9 +121,9 @@ impl Column {
                 Cell::optional(declared(half_width_95(point.common.pressure_ratio_standard_error)), ratio)
             }
             C::Eta => Cell::optional(point.eta, in_percent),
-            C::EtaMargin => Cell::optional(point.eta_margin_95(), in_percent),
+            C::EtaMargin => Cell::margins(point.eta_margins_95().map(|both| both.scaled(100.0)), 2),
             C::H => Cell::optional(point.h_w_m2k, whole),
-            C::HMargin => Cell::optional(point.h_margin_95_w_m2k(), whole),
+            C::HMargin => Cell::margins(point.h_margins_95_w_m2k(), 0),
             C::T2Change => Cell::optional(point.dt2_k, |k| number(Some(k), 1)),
             C::T1 => Cell::optional(Some(point.t1_k), |k| display.temperature(k)),
             C::P1 => Cell::optional(Some(point.p1_pa), |pa| display.pressure(pa)),

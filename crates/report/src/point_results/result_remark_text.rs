@@ -1,7 +1,9 @@
 //! Sentences of the remarks on results.
 
+use crate::formatting::significant_digits;
 use crate::message::Message;
-use mapper_core::{Method, ResultRemark, half_width_95, probability_text};
+use mapper_core::unit_factors::ICE_POINT_K;
+use mapper_core::{Dimension, Method, ResultRemark, half_width_95, probability_text};
 
 impl Message for ResultRemark {
     fn message(&self) -> String {
@@ -34,6 +36,28 @@ impl Message for ResultRemark {
                  `zero: {{soak: {:.0} min}}` in the campaign subtracts what they read differently there, which leaves less of the declared \
                  offsets in the intervals",
                 (end_s - start_s) / 60.0
+            ),
+            ResultRemark::CellContradicts { channel, reading, reference, common_sigma } => {
+                let (sensors, instrument, unit, scale, zero) = match channel.info().dimension {
+                    Dimension::Pressure => ("pressure sensors", "declared barometer", "kPa", 1e-3, 0.0),
+                    _ => ("thermometers", "cell's thermometer", "degC", 1.0, ICE_POINT_K),
+                };
+                let unit_of_difference = if unit == "kPa" { "kPa" } else { "K" };
+                format!(
+                    "at rest all {sensors} together read {:.2} {unit}, and the {instrument} {:.2} {unit}: one of them is wrong by {:+.2} \
+                     {unit_of_difference}; every interval contains an error of {:.2} {unit_of_difference} of all {sensors}; check the {instrument} \
+                     and the calibration of the {sensors}",
+                    scale * (reading - zero),
+                    scale * (reference - zero),
+                    scale * (reading - reference),
+                    scale * half_width_95(*common_sigma)
+                )
+            }
+            ResultRemark::PeriodicError { channel, period_s, amplitude } => format!(
+                "{channel} has a periodic error at rest, {} {} with a period of {period_s:.0} s as recorded: pick-up of the mains that the sampling \
+                 folds down, for example; it counts as noise of this sensor, so that it is taken for no fault; check screen, earth and filter",
+                significant_digits(*amplitude, 2),
+                channel.unit()
             ),
             ResultRemark::Corrected { causes, probability } => format!(
                 "corrected for {}, which the diagnosis of this recording names with {}: without this correction the efficiencies differ",

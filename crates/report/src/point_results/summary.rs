@@ -61,7 +61,7 @@ impl<'a> PointResults<'a> {
         disagreeing.for_each(|fused| document.text(fused.to_string()));
         self.closing(&mut document, warnings);
         document.text(format!(
-            "+/- covers the 95 % interval; points.json has its ends. Common errors, repeats, sensors and zero: {more}, or the page of the run."
+            "+/- covers the 95 % interval; -a/+b are the distances to its ends if they differ by more than a half. Common errors, repeats, sensors and zero: {more}, or the page of the run."
         ));
         document.append(self.conclusion());
         document
@@ -72,7 +72,7 @@ impl<'a> PointResults<'a> {
         let mut document = Document::default();
         document.text(disagreement_text(self.points, self.dynamic, display).unwrap_or_default());
         document.table(wide_table(self.points, display, truth));
-        document.text("+/- covers the 95 % interval. dT2: change of T2 in the window.");
+        document.text("+/- covers the 95 % interval; -a/+b: distances to its ends, if they differ by more than a half. dT2: change of T2 in the window.");
         let doubted = self.identified().filter(|point| point.verdict != Verdict::Good);
         for doubt in doubts(doubted) {
             document.text(format!("{}: {}", doubt.steps(), doubt.message()));

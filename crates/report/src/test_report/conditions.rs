@@ -5,6 +5,7 @@ use crate::formatting::Display;
 use crate::point_results::points::at_end;
 use mapper_campaign::Campaign;
 use mapper_core::{Channel, DeclaredUncertainty, Recording, half_width_95};
+use mapper_identify::IsothermalZero;
 use mapper_numerics::statistics::mean;
 use std::collections::BTreeMap;
 
@@ -53,13 +54,15 @@ pub(crate) fn condition_table(
 
 /// Meaning of the columns.
 const INSTRUMENT_WORDS: &str = "Half widths of 95 % intervals, as declared: noise of one sample, offset left after calibration, gain; \
-                                    temperatures in K. As used: the offset that the isothermal zero leaves, where there was one. \
+                                    temperatures in K. As used: the offset at rest, which the isothermal zero determines where \
+                                    there was one, and the gain over the distance from there. \
                                     `-`: it is not declared.";
 
 /// The instruments and their calibration register. `used`: the uncertainties of the identification; `tested_at`: start of the test.
 pub(crate) fn instruments_section(
     campaign: &Campaign,
     used: &BTreeMap<Channel, DeclaredUncertainty>,
+    zero: Option<&IsothermalZero>,
     tested_at: Option<&str>,
     display: &Display,
 ) -> Document {
@@ -76,8 +79,8 @@ pub(crate) fn instruments_section(
         "tap or probe",
         "last calibration",
     ];
-    let instruments = Table::new(heads).caption("Instruments").with_texts([1, 2, 7, 8]);
-    document.table(instruments.rows(instrument_rows(campaign, used, display)));
+    let instruments = Table::new(heads).caption("Instruments").with_texts([1, 2, 5, 7, 8]);
+    document.table(instruments.rows(instrument_rows(campaign, used, zero, display)));
     let heads = ["sensor", "certificate", "laboratory", "calibrated", "due", "range", "U (k = 2)"];
     let register = Table::new(heads).caption("Calibration register").all_texts();
     document.table(register.rows(register_rows(campaign, tested_at, display)));
@@ -88,6 +91,7 @@ pub(crate) fn instruments_section(
 fn instrument_rows(
     campaign: &Campaign,
     used: &BTreeMap<Channel, DeclaredUncertainty>,
+    zero: Option<&IsothermalZero>,
     display: &Display,
 ) -> Vec<[String; 9]> {
     let row = |(channel, sensor): (&Channel, &mapper_campaign::campaign::SensorDeclaration)| {
@@ -95,7 +99,9 @@ fn instrument_rows(
             display.difference(*channel, half_width_95(sigma)).map_or_else(dash_cell, two_figures)
         };
         let declared = &sensor.declared;
-        let used = used.get(channel).map_or_else(dash_cell, |used| half(used.offset_sigma));
+        let used = used.get(channel).map_or_else(dash_cell, |used| {
+            as_used(*channel, used, half(used.offset_sigma), rest_reading(zero, *channel), display)
+        });
         let place = match (sensor.static_tap_pipe_diameter_m, sensor.probe_diameter_m) {
             (Some(pipe_m), _) => format!("static tap, pipe {:.1} mm", 1e3 * pipe_m),
             (None, tip_m) if tip_m > 0.0 => format!("probe {:.1} mm", 1e3 * tip_m),
@@ -120,6 +126,37 @@ fn instrument_rows(
         ]
     };
     campaign.sensors.iter().map(row).collect()
+}
+
+/// Common reading of the zero for a sensor that was zeroed.
+fn rest_reading(zero: Option<&IsothermalZero>, channel: Channel) -> Option<f64> {
+    let zero = zero?;
+    zero.offsets.get(&channel)?;
+    zero.common.iter().find(|common| common.channels.contains(&channel)).map(|common| common.reading)
+}
+
+/// The error at a reading: the offset `offset`, and the gain over the distance from the reading at rest, or from that of the calibration. A zero
+/// determines the offset at rest; at 130 degC the gain adds to it.
+fn as_used(
+    channel: Channel,
+    used: &DeclaredUncertainty,
+    offset: String,
+    rest: Option<f64>,
+    display: &Display,
+) -> String {
+    let gain = half_width_95(used.gain_sigma_ratio);
+    if gain <= 0.0 {
+        return offset;
+    }
+    // The reading whose gain error is zero: only a difference of it and any other reading is needed.
+    let from = rest.unwrap_or(-channel.gain_distance(0.0));
+    let distance = if from == 0.0 {
+        "reading".to_owned()
+    } else {
+        format!("distance from {} {}", display.shown_reading(channel, from), display.unit_of(channel))
+    };
+    let gain = format!("{} % of {distance}", two_figures(100.0 * gain));
+    if offset == dash_cell() { gain } else { format!("{offset} + {gain}") }
 }
 
 /// A row for each sensor whose calibration states more than its day. `tested_at`: start of the test, from its day on.
@@ -173,6 +210,19 @@ fn two_figures(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// After a zero at 25 degC with 0.05 % (0.1 % at 95 %), T2 at 130 degC is known to 0.1 % of 105 K, not to the offset at rest alone.
+    #[test]
+    fn the_error_as_used_names_offset_and_gain() {
+        let used = DeclaredUncertainty { noise_sigma: 0.1, offset_sigma: 0.011, gain_sigma_ratio: 5e-4 };
+        let display = Display::default();
+        let shown = as_used(Channel::T2, &used, "0.022".to_owned(), Some(298.15), &display);
+        assert!(shown.contains("0.022 + 0.098 %"), "{shown}");
+        let unzeroed = as_used(Channel::P2, &used, "0.20".to_owned(), None, &display);
+        assert!(unzeroed.ends_with("% of reading"), "{unzeroed}");
+        let exact = DeclaredUncertainty { gain_sigma_ratio: 0.0, ..used };
+        assert_eq!(as_used(Channel::T2, &exact, "0.022".to_owned(), None, &display), "0.022");
+    }
 
     #[test]
     fn an_uncertainty_has_two_figures() {

@@ -1,10 +1,10 @@
 //! Range and uncertainty of a map, the end of its run, and the sizes that its campaign assumes.
 
 use crate::document::Document;
-use crate::formatting::{Display, duration, significant_digits};
+use crate::formatting::{Display, duration, margins_text, significant_digits};
 use crate::message::Message;
 use mapper_campaign::{AssumedSize, Campaign, internal_area_sigma_ratio};
-use mapper_core::{CompressorMap, IdentifiedPoint, Method, Plan, RunEnding, Trip, Verdict};
+use mapper_core::{CompressorMap, IdentifiedPoint, Margins, Method, Plan, RunEnding, Trip, Verdict};
 use mapper_numerics::statistics::median;
 use mapper_recording::score::ScoredPoint;
 use std::path::Path;
@@ -69,12 +69,23 @@ pub fn key_figures(
 /// Width of the intervals of usable points.
 fn certainty<'a>(points: impl Iterator<Item = &'a IdentifiedPoint>) -> Option<String> {
     let usable = points.filter(|point| point.verdict != Verdict::Unusable);
-    let halves: Vec<f64> =
-        usable.filter_map(|point| Some(50.0 * (point.eta_high? - point.eta_low?))).collect();
-    let median_half_width = median(halves.iter().copied())?;
-    let widest = halves.iter().copied().fold(0.0, f64::max);
+    let all: Vec<Margins> = usable.filter_map(|point| Some(point.eta_margins_95()?.scaled(100.0))).collect();
+    let middle = Margins {
+        below: median(all.iter().map(|margins| margins.below))?,
+        above: median(all.iter().map(|margins| margins.above))?,
+    };
+    let widest = Margins {
+        below: all.iter().map(|margins| margins.below).fold(0.0, f64::max),
+        above: all.iter().map(|margins| margins.above).fold(0.0, f64::max),
+    };
+    let within = |margins: Margins| {
+        let sign = if margins.is_symmetric() { "+/- " } else { "" };
+        format!("{sign}{}", margins_text(margins, 1))
+    };
     Some(format!(
-        " Its efficiencies are known within +/- {median_half_width:.1} points (95 %) at half of the usable points, within +/- {widest:.1} at all of them."
+        " Its efficiencies are known within {} points (95 %) at half of the usable points, within {} at all of them.",
+        within(middle),
+        within(widest)
     ))
 }
 

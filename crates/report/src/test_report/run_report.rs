@@ -259,7 +259,9 @@ impl RunReport<'_> {
         document.section("Acceptance", acceptance_section(&judged));
         document.folded_section("Energy balance", balance_section(&judged));
         if let Some(campaign) = campaign {
-            document.section("Instruments", instruments_section(campaign, used, self.tested_at, display));
+            let zero = self.results.zero.found();
+            document
+                .section("Instruments", instruments_section(campaign, used, zero, self.tested_at, display));
         }
         document
     }

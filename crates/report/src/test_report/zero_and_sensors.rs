@@ -41,6 +41,11 @@ pub(crate) fn zero_section(zero: &ZeroOutcome, display: &Display) -> Document {
     };
     let heads = ["sensor", "subtracted", "known within +/-", "unit"];
     document.table(Table::new(heads).with_texts([3]).rows(zero.offsets.iter().map(row)));
+    // The gas of the turbine stays warm longer than a soak lasts.
+    let hot_side = [Channel::T3, Channel::T4, Channel::Tt];
+    let kept = zero.left_out.iter().filter(|left| !hot_side.contains(&left.channel));
+    let kept = kept.map(|left| format!("{} keeps its declared offset: {}", left.channel, left.reason));
+    document.list(kept);
     document
 }
 

@@ -17,6 +17,8 @@ use std::sync::atomic::AtomicBool;
 
 /// Interval at which observers and steps receive samples, s of run time.
 const POLL_INTERVAL_S: f64 = 1.0;
+/// Interval at which a soak that ends when the sensors rest is checked, s. Judgement: short compared with the soak.
+const REST_CHECK_S: f64 = 10.0;
 /// Longest time that a guard may hold the setpoints, s.
 const MAX_HOLD_S: f64 = 300.0;
 /// Longest time that the operator may hold a step, s. It limits a hold that an operator forgets.
@@ -347,14 +349,24 @@ impl Run<'_, '_> {
             ..setpoints(first)
         })?;
         let message = format!(
-            "soak for {:.1} min: air off, oil at {}",
+            "soak for {}{:.1} min: air off, oil at {}",
+            if soak.until_settled { "at least " } else { "" },
             soak.duration_s / 60.0,
             mapper_core::temperature(soak.oil_temperature_k)
         );
         let (t_s, kind) = (self.now_s, EventKind::SoakStarted);
         self.runner.observer.on_event(&Event { t_s, kind, message })?;
-        self.run_until(self.now_s + soak.duration_s, false, false)?;
-        let message = "soak completed, air on".to_owned();
+        let start_s = self.now_s;
+        self.run_until(start_s + soak.duration_s, false, false)?;
+        while soak.until_settled && !self.runner.steps.is_at_rest() && self.now_s < start_s + Soak::LONGEST_S
+        {
+            self.run_until((self.now_s + REST_CHECK_S).min(start_s + Soak::LONGEST_S), false, false)?;
+        }
+        let message = if soak.until_settled {
+            format!("soak completed after {:.1} min, air on", (self.now_s - start_s) / 60.0)
+        } else {
+            "soak completed, air on".to_owned()
+        };
         let (t_s, kind) = (self.now_s, EventKind::SoakEnded);
         self.runner.observer.on_event(&Event { t_s, kind, message })?;
         Ok(())

@@ -80,7 +80,7 @@ impl<'a> DriftWatch<'a> {
         let mut differences = Vec::new();
         for ((channel, first), now) in COMPARED_CHANNELS.iter().zip(first).zip(now) {
             let Some(declared) = self.declared.get(channel) else { continue };
-            let fixed = declared.offset_sigma.hypot(declared.gain_sigma_ratio * first);
+            let fixed = declared.fixed_sigma(*channel, *first);
             // Noise of consecutive samples is correlated: they count as one sample in two seconds.
             let noise = declared.noise_sigma * (2.0 * 2.0 / END_S).sqrt();
             let limit = THRESHOLD_SIGMAS * fixed.hypot(noise);

@@ -1,5 +1,6 @@
 //! Sources of steps: a plan, and the soak before one.
 
+use crate::step_sources::rest_watch::RestWatch;
 use mapper_core::{Plan, PlanStep, SampleBatch, Soak, StepMarker};
 
 /// Why a source failed to provide its next step; the run ends in its safe state.
@@ -35,6 +36,11 @@ pub trait StepSource {
     /// The soak before the warm-up; none by default.
     fn soak(&self) -> Option<Soak> {
         self.inner()?.soak()
+    }
+
+    /// Whether the sensors rest whose rest ends a soak; false by default.
+    fn is_at_rest(&self) -> bool {
+        self.inner().is_some_and(StepSource::is_at_rest)
     }
 
     /// Warm-up time at the first point before its step, s; none by default.
@@ -127,12 +133,14 @@ impl StepSource for PlanSteps<'_> {
 pub struct SoakSource<'a> {
     inner: &'a mut dyn StepSource,
     soak: Soak,
+    /// `None` after the soak.
+    watch: Option<RestWatch>,
 }
 
 impl<'a> SoakSource<'a> {
     /// `inner` after `soak`.
     pub fn new(inner: &'a mut dyn StepSource, soak: Soak) -> Self {
-        SoakSource { inner, soak }
+        SoakSource { inner, soak, watch: soak.until_settled.then(RestWatch::default) }
     }
 }
 
@@ -147,6 +155,22 @@ impl StepSource for SoakSource<'_> {
 
     fn soak(&self) -> Option<Soak> {
         Some(self.soak)
+    }
+
+    fn is_at_rest(&self) -> bool {
+        self.watch.as_ref().is_some_and(RestWatch::is_at_rest)
+    }
+
+    fn on_batch(&mut self, batch: &SampleBatch) -> bool {
+        if let Some(watch) = &mut self.watch {
+            watch.on_batch(batch);
+        }
+        self.inner.on_batch(batch)
+    }
+
+    fn before_step(&mut self, marker: &StepMarker) {
+        self.watch = None;
+        self.inner.before_step(marker);
     }
 
     fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError> {

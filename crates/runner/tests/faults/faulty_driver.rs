@@ -19,7 +19,7 @@ pub(crate) fn lab() -> VirtualLab {
         coloured_sigma: 0.0,
         coloured_time_constant_s: 1.0,
         offset: 0.0,
-        gain_ratio: 0.0,
+        ..SensorErrors::default()
     };
     let sensors = [(Channel::ShaftSpeed, noise(30.0)), (Channel::P2, noise(60.0)), (Channel::T2, noise(0.1))];
     VirtualLab::new(LabSettings {

@@ -47,7 +47,7 @@ impl Session<'_> {
         let mut model = planning::nominal_model(campaign)?;
         let config = identification_with(campaign, map);
         let FusedRecordings { recordings, config, channels } =
-            fuse_sensors(recordings(recorded), config, Some(campaign), map);
+            fuse_sensors(recordings(recorded), config, Some(campaign), map).with_total_pressures(campaign);
         let sensors = channels.into_iter().next().unwrap_or_default();
         take_air_and_probe(&mut model, &config);
         // A separate zero for each run would hide drift between them.

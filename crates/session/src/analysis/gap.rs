@@ -163,7 +163,8 @@ fn fused(
     let mut model = nominal_model(campaign)?;
     let config = identification_with(campaign, map);
     let FusedRecordings { recordings, config, channels } =
-        fuse_sensors(recordings(slice::from_ref(recorded)), config, Some(campaign), map);
+        fuse_sensors(recordings(slice::from_ref(recorded)), config, Some(campaign), map)
+            .with_total_pressures(campaign);
     take_air_and_probe(&mut model, &config);
     let recording = recordings.into_iter().next().unwrap_or_default();
     let sensors = channels.into_iter().next().unwrap_or_default();

@@ -16,11 +16,12 @@ use mapper_core::{
 };
 use mapper_diagnose::gap::PointCorrection;
 use mapper_identify::{
-    DynamicEfficiency, FoundFault, IdentifyConfig, NominalRig, ZeroOutcome, ZeroSettings, identify_recording,
-    isothermal_zero, method_for, with_measured_humidity,
+    CellReference, DynamicEfficiency, FoundFault, IdentifyConfig, IsothermalZero, NominalRig, PeriodicError,
+    ZeroOutcome, ZeroSettings, identify_recording, isothermal_zero, method_for, with_measured_humidity,
 };
 use mapper_maps::{AssembleError, RepeatedJump, assemble, repeated_jumps};
 use mapper_observe::FusedChannel;
+use mapper_observe::declared::CommonOffset;
 use mapper_observe::energy_balance::Gases;
 use mapper_physics::gas::air::Air;
 use mapper_recording::score::{
@@ -242,6 +243,11 @@ impl Session<'_> {
         let first = fused.recordings.first().ok_or(SessionError::NoRecording)?;
         let zero = ZeroOutcome::of(first, &fused.config, soak.map(Into::into));
         remarks.extend(campaign.filter(|_| soak.is_none()).and_then(|_| unused_rest(first, &fused.config)));
+        remarks.extend(zero.found().into_iter().flat_map(contradictions));
+        let periodic = zero.found().map_or(&[][..], |zero| zero.periodic.as_slice());
+        remarks.extend(periodic.iter().map(|&PeriodicError { channel, period_s, amplitude }| {
+            ResultRemark::PeriodicError { channel, period_s, amplitude }
+        }));
         let (_, config) = zero.subtract(Recording::default(), fused.config.clone());
         let off = |recording: Recording| zero.subtract(recording, fused.config.clone()).0;
         let (recording, origins) = join_recordings(fused.recordings.into_iter().map(off).collect());
@@ -288,6 +294,19 @@ impl Session<'_> {
             remarks,
         })
     }
+}
+
+/// Remarks on instruments of the cell that contradict all sensors of a kind at rest.
+fn contradictions(zero: &IsothermalZero) -> impl Iterator<Item = ResultRemark> + '_ {
+    let contradicting = zero.references.iter().filter(|reference| reference.contradiction().is_some());
+    contradicting.filter_map(|reference| {
+        let is_of_kind = |common: &&CommonOffset| {
+            common.channels.first().is_some_and(|channel| channel.info().dimension == reference.dimension)
+        };
+        let channel = *zero.common.iter().find(is_of_kind)?.channels.first()?;
+        let CellReference { reading, reference, common_sigma, .. } = *reference;
+        Some(ResultRemark::CellContradicts { channel, reading, reference, common_sigma })
+    })
 }
 
 /// Remark that gauge pressures are added to an unknown ambient pressure.

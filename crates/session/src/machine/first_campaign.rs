@@ -28,6 +28,8 @@ const SPEED_LIMIT_RATIO: f64 = 1.1;
 /// The same on the virtual lab, whose pressure and valve move at once: with the narrow maps of a 52 mm wheel jumps overshoot by
 /// up to 18 %.
 const SPEED_LIMIT_IN_LAB_RATIO: f64 = 1.2;
+/// Diameter of the sheath of a T2 probe that is not given, m. Judgement: 1.5 mm is the usual one of gas stands.
+const USUAL_PROBE_M: f64 = 1.5e-3;
 /// Points of a speed line.
 const POINTS: usize = 6;
 
@@ -138,6 +140,7 @@ fn campaign_text(request: &FirstCampaignRequest, map: &FirstMap) -> String {
         false => "total".to_owned(),
     };
     let in_lab = request.rig == FirstRig::VirtualLab;
+    let probe_m = request.probe_diameter_m.unwrap_or(if in_lab { 0.0 } else { USUAL_PROBE_M });
     let speed_limit_ratio = if in_lab { SPEED_LIMIT_IN_LAB_RATIO } else { SPEED_LIMIT_RATIO };
     let values = [
         ("title", request.rig.title().to_owned()),
@@ -154,7 +157,7 @@ fn campaign_text(request: &FirstCampaignRequest, map: &FirstMap) -> String {
         ("flow_noise", significant_digits(FLOW_NOISE_KG_S * wheel_ratio * wheel_ratio, 2)),
         ("inlet_tap", tap(request.inlet_diameter_m, "compressor.inlet_diameter")),
         ("outlet_tap", tap(request.outlet_diameter_m, "compressor.outlet_diameter")),
-        ("probe", format!("{} mm", significant_digits(1e3 * request.probe_diameter_m.unwrap_or(0.0), 3))),
+        ("probe", format!("{} mm", significant_digits(1e3 * probe_m, 3))),
         ("lines", lines(&map.speeds_rpm)),
         // A log contains its own standstill, if there was one.
         ("zero", if request.rig == FirstRig::Log { String::new() } else { ZERO.to_owned() }),
@@ -166,8 +169,43 @@ fn campaign_text(request: &FirstCampaignRequest, map: &FirstMap) -> String {
             ),
         ),
     ];
+    let values = [values.to_vec(), sensor_classes(request.rig)].concat();
     // The backend has placeholders of its own.
     fill_template(&CAMPAIGN.replace("{{backend}}\n", request.rig.backend()), &values)
+}
+
+/// The errors of the sensors: as bought on a stand, by their classes; those of a calibrated chain on the virtual lab.
+fn sensor_classes(rig: FirstRig) -> Vec<(&'static str, String)> {
+    let values = match rig {
+        FirstRig::VirtualLab => [
+            ("sensor_words", "# left after a two-point calibration of the whole chain."),
+            ("speed_class", ""),
+            ("flow_class", "gain: 0.5 %"),
+            ("p1_class", "offset: 50 Pa, gain: 0.05 %"),
+            ("p2_class", "offset: 100 Pa, gain: 0.05 %"),
+            ("p3_class", "offset: 150 Pa, gain: 0.05 %"),
+            ("gas_class", "offset: 0.25 K, gain: 0.05 %"),
+            ("housing_class", "offset: 0.3 K, gain: 0.05 %, mounting: embedded"),
+            ("hot_class", "offset: 0.5 K, gain: 0.05 %"),
+        ],
+        FirstRig::GasStand | FirstRig::Log => [
+            (
+                "sensor_words",
+                "# by class, as bought: assumed here, write yours (K1, K2, N1, N2, Pt100_A, Pt100_B; per cent of full scale; type of the flow meter;\n\
+                 # blades of the wheel). After a calibration write its offset and gain instead, e.g. `offset: 0.1 K, gain: 0.05 %`. The probe's diameter\n\
+                 # (0 mm: without inertia) and the taps (total, or static with pipe_diameter) are assumed unless they were given.",
+            ),
+            ("speed_class", ", blades: 12"),
+            ("flow_class", "class: orifice"),
+            ("p1_class", "class: 0.1 %, full_scale: 200 kPa"),
+            ("p2_class", "class: 0.1 %, full_scale: 500 kPa"),
+            ("p3_class", "class: 0.1 %, full_scale: 500 kPa"),
+            ("gas_class", "class: K1"),
+            ("housing_class", "class: K1, mounting: glued"),
+            ("hot_class", "class: K1"),
+        ],
+    };
+    values.map(|(key, text)| (key, text.to_owned())).to_vec()
 }
 
 fn lines(speeds_rpm: &[f64]) -> String {
@@ -267,7 +305,7 @@ pub struct FirstCampaignRequest {
     pub outlet_diameter_m: Option<f64>,
     /// Whether P1 and P2 are measured at the wall.
     pub has_static_taps: bool,
-    /// Diameter of the T2 probe, m; an ideal probe if `None`.
+    /// Diameter of the T2 probe, m; if `None`, an ideal probe on the virtual lab, and a usual sheath elsewhere.
     pub probe_diameter_m: Option<f64>,
     /// The machine's own map; that of a similar compressor if `None`.
     pub map: Option<PathBuf>,

@@ -200,22 +200,21 @@ pub(crate) fn longer_soak_s(campaign: &Campaign) -> Option<f64> {
 fn soak_concern(campaign: &Campaign) -> Option<Concern> {
     let housings = SoakingHousings::of(campaign)?;
     let duration_s = housings.soak.duration_s;
-    if housings.is_sufficient(duration_s) {
+    if housings.soak.until_settled || housings.is_sufficient(duration_s) {
         return None;
     }
     let remedy = housings.shortest_s().map_or_else(
         || "a soak of a day is not long enough; check that oil and cell have the same temperature, and the masses of the machine".to_owned(),
-        |s| format!("soak {:.0} min or longer", s / 60.0),
+        |s| format!("soak {:.0} min or longer, or write `soak: auto` if the declared offset of Tc is enough", s / 60.0),
     );
     Some(Concern::warning(
         &["zero", "soak"],
         format!(
             "after a soak of {:.0} min, housings that were {WARM_K} K warmer than the cell are still {:.1} K warmer, and Tc drifts by \
-             {:+.2} K/min; the zero rejects a drift of more than {:.2} K/min and mistakes the remaining difference for an offset",
+             {:+.2} K/min: Tc keeps its declared offset, and only T1, T2 and the pressures are zeroed",
             duration_s / 60.0,
             housings.difference_k(duration_s),
-            housings.drift_k_min(duration_s),
-            housings.settings.drift_k_min
+            housings.drift_k_min(duration_s)
         ),
         remedy,
     ))
@@ -438,12 +437,13 @@ fn with_change(campaign: &Campaign, change: CampaignChange) -> Campaign {
         CampaignChange::DwellS(dwell_s) => changed.timing.dwell = Dwell::Fixed(dwell_s),
         CampaignChange::SoakS(duration_s) => {
             let usual = Soak {
+                until_settled: false,
                 duration_s,
                 oil_temperature_k: campaign.boundary.ambient_temperature_k,
                 temperature_sigma_k: Soak::TEMPERATURE_SIGMA_K,
                 pressure_sigma_pa: Soak::PRESSURE_SIGMA_PA,
             };
-            changed.zero = Some(Soak { duration_s, ..campaign.zero.unwrap_or(usual) });
+            changed.zero = Some(Soak { duration_s, until_settled: false, ..campaign.zero.unwrap_or(usual) });
         }
     }
     changed

@@ -3,8 +3,9 @@
 use crate::recording::recording_file::Recorded;
 use mapper_campaign::Campaign;
 use mapper_core::{Channel, DeclaredUncertainty, Recording, RedundantSensors};
-use mapper_identify::{IdentifyConfig, with_measured_humidity};
+use mapper_identify::{IdentifyConfig, PressureTap, with_measured_humidity};
 use mapper_observe::redundant_sensors::fuse::{element_count, harmonise};
+use mapper_observe::total_pressure::{StaticTap, with_total_pressures};
 use mapper_observe::{FusedChannel, fuse, judge_elements};
 use mapper_physics::simulation::model::Model;
 use mapper_recording::ChannelMap;
@@ -48,6 +49,25 @@ pub(crate) fn fuse_sensors(
 /// With the humidity that the first recording measured.
 fn of_first(recordings: &[Recording], config: IdentifyConfig) -> IdentifyConfig {
     recordings.first().map_or(config.clone(), |first| with_measured_humidity(first, &config))
+}
+
+impl FusedRecordings {
+    /// The same with total pressures in place of those at static taps, for a comparison with a model.
+    #[must_use]
+    pub(crate) fn with_total_pressures(mut self, campaign: &Campaign) -> Self {
+        let taps: Vec<StaticTap> = campaign
+            .sensors
+            .iter()
+            .filter_map(|(&pressure, sensor)| {
+                let pipe_diameter_m = sensor.static_tap_pipe_diameter_m?;
+                Some(StaticTap { pressure, pipe_diameter_m })
+            })
+            .collect();
+        let recordings = self.recordings.into_iter();
+        self.recordings = recordings.map(|recording| with_total_pressures(recording, &taps)).collect();
+        (self.config.inlet_tap, self.config.outlet_tap) = (PressureTap::Total, PressureTap::Total);
+        self
+    }
 }
 
 /// Gives a nominal model the probe and the air of a recording.

@@ -1,10 +1,13 @@
 //! Settings of an identification, from a campaign or a channel map, and warnings about calibrations.
 
 use mapper_campaign::campaign::{CalibrationRule, Date};
-use mapper_campaign::{CalibrationWarning, Campaign, internal_area_sigma_ratio};
+use mapper_campaign::{
+    CalibrationWarning, Campaign, default_contact_sigma_ratio, default_gain_sigma_ratio,
+    internal_area_sigma_ratio,
+};
 use mapper_core::{
-    ALPHA_AREA_SIGMA_RATIO, Channel, DeclaredUncertainty, Dimension, IdentifiedPoint, Method,
-    ModelTolerances, Recording, ReferenceState, Verdict, WindowRule,
+    ALPHA_AREA_SIGMA_RATIO, Channel, DeclaredUncertainty, IdentifiedPoint, Method, ModelTolerances,
+    Recording, ReferenceState, Verdict, WindowRule,
 };
 use mapper_identify::{IdentifyConfig, PressureTap};
 use mapper_numerics::statistics::range;
@@ -40,6 +43,12 @@ pub fn identification(campaign: &Campaign) -> IdentifyConfig {
         turbine_gas: campaign.machine.params.turbine.gas,
         humidity_sigma_kg_kg: campaign.report.humidity_sigma_kg_kg(&campaign.boundary),
         reference: campaign.reference,
+        barometer_pa: campaign.report.barometer_pa,
+        housing_contact_sigma_ratio: campaign
+            .sensors
+            .get(&Channel::Tc)
+            .and_then(|sensor| sensor.contact_sigma_ratio)
+            .unwrap_or_else(default_contact_sigma_ratio),
         inlet_tap: tap(Channel::P1),
         outlet_tap: tap(Channel::P2),
         declared: declared(campaign, &ChannelMap::native()),
@@ -70,15 +79,11 @@ pub fn declared(campaign: &Campaign, map: &ChannelMap) -> BTreeMap<Channel, Decl
     let mut declared = declared_uncertainties(&sensors, &campaign.tolerances, &map.sensors);
     for (channel, sensor) in &campaign.sensors {
         if let Some(declared) = declared.get_mut(channel).filter(|_| !sensor.gain_is_declared) {
-            add_pressure_gain(*channel, declared);
+            add_default_gain(*channel, declared);
         }
     }
     declared
 }
-
-/// Gain error of a pressure transducer without a declared one, ratio, one standard deviation: accuracy class 0.1, the best of EN 837-1, as the
-/// limits of a rectangular distribution (GUM 4.3.7).
-const PRESSURE_GAIN_RATIO: f64 = 5.8e-4;
 
 /// Standard uncertainty of a thermometer at 100 degC, K: tolerance class A of IEC 60751, 0.35 K, as the limits of a rectangular distribution.
 const THERMOMETER_K: f64 = 0.2;
@@ -95,20 +100,21 @@ pub(crate) fn assumed_sensors() -> BTreeMap<Channel, DeclaredUncertainty> {
     BTreeMap::from([
         (Channel::T1, offset(THERMOMETER_K)),
         (Channel::T2, offset(THERMOMETER_K)),
-        (Channel::P1, gain(PRESSURE_GAIN_RATIO)),
-        (Channel::P2, gain(PRESSURE_GAIN_RATIO)),
+        (Channel::P1, gain(default_gain_sigma_ratio(Channel::P1))),
+        (Channel::P2, gain(default_gain_sigma_ratio(Channel::P1))),
         (Channel::CompressorFlow, gain(flow_ratio)),
         (Channel::T3, offset(THERMOCOUPLE_K)),
         (Channel::T4, offset(THERMOCOUPLE_K)),
-        (Channel::P3, gain(PRESSURE_GAIN_RATIO)),
-        (Channel::P4, gain(PRESSURE_GAIN_RATIO)),
+        (Channel::P3, gain(default_gain_sigma_ratio(Channel::P1))),
+        (Channel::P4, gain(default_gain_sigma_ratio(Channel::P1))),
         (Channel::TurbineFlow, gain(flow_ratio)),
     ])
 }
 
-fn add_pressure_gain(channel: Channel, declared: &mut DeclaredUncertainty) {
-    if channel.info().dimension == Dimension::Pressure && declared.gain_sigma_ratio == 0.0 {
-        declared.gain_sigma_ratio = PRESSURE_GAIN_RATIO;
+/// Adds the gain of the sensor's kind if none is declared.
+fn add_default_gain(channel: Channel, declared: &mut DeclaredUncertainty) {
+    if declared.gain_sigma_ratio == 0.0 {
+        declared.gain_sigma_ratio = default_gain_sigma_ratio(channel);
     }
 }
 
@@ -151,13 +157,14 @@ pub(crate) fn identification_of(machine: &MachineConstants, map: &ChannelMap) ->
     };
     let (inlet_m, outlet_m) = (machine.compressor_inlet_diameter_m, machine.compressor_outlet_diameter_m);
     let mut declared = map.sensors.clone();
-    declared.iter_mut().for_each(|(channel, declared)| add_pressure_gain(*channel, declared));
+    declared.iter_mut().for_each(|(channel, declared)| add_default_gain(*channel, declared));
     let config = IdentifyConfig {
         method: Method::Joint,
         alpha_area_ratio: machine.alpha_area_ratio,
         alpha_area_sigma_ratio: ALPHA_AREA_SIGMA_RATIO,
         internal_area_m2: machine.compressor_internal_area_m2,
         probe_diameter_m: machine.t2_probe_diameter_m,
+        housing_contact_sigma_ratio: default_contact_sigma_ratio(),
         inlet_tap: tap(inlet_m),
         outlet_tap: tap(outlet_m),
         inlet_diameter_m: inlet_m.unwrap_or(defaults.inlet_diameter_m),

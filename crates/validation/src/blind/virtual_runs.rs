@@ -98,6 +98,7 @@ impl<'a> Schedule<'a> {
                     coloured_time_constant_s: colour.time_constant_s,
                     offset: declared.offset_sigma * normal(),
                     gain_ratio: declared.gain_sigma_ratio * normal(),
+                    exact_reading: -channel.gain_distance(0.0),
                 };
                 (channel, errors)
             })

@@ -26,7 +26,12 @@ pub(crate) struct Draws {
 
 impl Draws {
     /// Errors of the sensor with this random stream.
-    pub(crate) fn errors(&self, declared: &DeclaredUncertainty, stream: u64) -> SensorErrors {
+    pub(crate) fn errors(
+        &self,
+        channel: Channel,
+        declared: &DeclaredUncertainty,
+        stream: u64,
+    ) -> SensorErrors {
         let (offset, gain) = self.of(stream);
         SensorErrors {
             white_sigma: self.noise_ratio * WHITE_SHARE * declared.noise_sigma,
@@ -34,6 +39,7 @@ impl Draws {
             coloured_time_constant_s: COLOURED_TIME_CONSTANT_S,
             offset: offset * declared.offset_sigma,
             gain_ratio: gain * declared.gain_sigma_ratio,
+            exact_reading: -channel.gain_distance(0.0),
         }
     }
 
@@ -159,7 +165,7 @@ impl ElementBank {
             }
             *reading = member.last;
         }
-        (&self.readings, self.declared.live(&self.readings))
+        (&self.readings, self.declared.live(self.channel, &self.readings))
     }
 }
 
@@ -273,6 +279,8 @@ pub struct SensorErrors {
     pub offset: f64,
     /// Fixed gain error, ratio.
     pub gain_ratio: f64,
+    /// Value at which the gain error vanishes, in the channel's unit.
+    pub exact_reading: f64,
 }
 
 /// A sensor with its own random stream, so that its noise does not depend on other sensors.
@@ -305,7 +313,8 @@ impl Sensor {
     pub fn read(&mut self, truth: f64) -> f64 {
         let white: f64 = StandardNormal.sample(&mut self.random);
         let kick: f64 = StandardNormal.sample(&mut self.random);
-        let reading = truth * (1.0 + self.errors.gain_ratio)
+        let reading = truth
+            + self.errors.gain_ratio * (truth - self.errors.exact_reading)
             + self.errors.offset
             + self.errors.white_sigma * white
             + self.coloured;
@@ -343,7 +352,7 @@ mod tests {
             coloured_sigma: 0.6,
             coloured_time_constant_s: 2.0,
             offset: 5.0,
-            gain_ratio: 0.0,
+            ..SensorErrors::default()
         };
         let mut sensor = Sensor::new(errors, 0.1, 7, 3);
         let readings: Vec<f64> = (0..200_000).map(|_| sensor.read(100.0)).collect();

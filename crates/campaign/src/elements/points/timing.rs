@@ -102,9 +102,9 @@ pub(crate) fn check(check: &mut Check<'_>) {
     "pressure_evenness": "write its value under `pressure_nonuniformity`",
 }))]
 pub(crate) struct ZeroFile {
-    /// Time at rest before the warm-up, air off: until oil and housing have the temperature of the cell. The zero uses its last ten minutes, and is refused if a temperature still drifts by more than 0.1 K/min.
-    #[schemars(extend("x-min" = "1 min", "x-max" = "24 h"), example = &"30 min")]
-    soak: Quantity<Duration>,
+    /// Time at rest before the warm-up, air off; or `auto`: 5 min, and longer until T1, T2, P1 and P2 rest, at most 30 min. The zero uses the second half, at most ten minutes; a sensor that still drifts by more than 0.1 K/min keeps its declared offset, and so does Tc after less than ten minutes.
+    #[schemars(example = &"30 min")]
+    soak: SoakFile,
     /// Oil inlet temperature during the soak; that of the inlet air if none is given.
     #[schemars(extend("x-min" = "250 K", "x-max" = "450 K"), example = &"25 degC")]
     oil_temperature: Option<Quantity<Temperature>>,
@@ -116,11 +116,29 @@ pub(crate) struct ZeroFile {
     pressure_nonuniformity: Option<Quantity<PressureDifference>>,
 }
 
+// Untagged: the text determines the variant, and the schema has been checked.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub(crate) enum SoakFile {
+    Named(NamedSoak),
+    Fixed(#[schemars(extend("x-min" = "1 min", "x-max" = "24 h"), example = &"30 min")] Quantity<Duration>),
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum NamedSoak {
+    Auto,
+}
+
 impl ZeroFile {
     /// The soak, with the inlet air's temperature if none is given for the oil, K.
     pub(crate) fn soak(self, inlet_temperature_k: f64) -> Soak {
         Soak {
-            duration_s: self.soak.value,
+            duration_s: match self.soak {
+                SoakFile::Fixed(duration) => duration.value,
+                SoakFile::Named(NamedSoak::Auto) => Soak::SHORTEST_S,
+            },
+            until_settled: matches!(self.soak, SoakFile::Named(NamedSoak::Auto)),
             oil_temperature_k: value_or(self.oil_temperature, inlet_temperature_k),
             temperature_sigma_k: value_or(self.nonuniformity, Soak::TEMPERATURE_SIGMA_K),
             pressure_sigma_pa: value_or(self.pressure_nonuniformity, Soak::PRESSURE_SIGMA_PA),
@@ -158,11 +176,14 @@ mod tests {
         let read = |text| crate::testing::any::<ZeroFile>(text).unwrap().soak(298.15);
         let plain = Soak {
             duration_s: 1800.0,
+            until_settled: false,
             oil_temperature_k: 298.15,
             temperature_sigma_k: 0.05,
             pressure_sigma_pa: 5.0,
         };
         assert_eq!(read("{soak: 30 min}"), plain);
+        let automatic = Soak { duration_s: 300.0, until_settled: true, ..plain };
+        assert_eq!(read("{soak: auto}"), automatic);
         let written = Soak { temperature_sigma_k: 0.15, pressure_sigma_pa: 15.0, ..plain };
         assert_eq!(read("{soak: 0.5 h, nonuniformity: 0.15 K, pressure_nonuniformity: 15 Pa}"), written);
     }

@@ -7,4 +7,5 @@ pub(crate) mod control;
 pub(crate) mod guards;
 pub(crate) mod limits;
 pub(crate) mod redundant_sensors;
+pub(crate) mod sensor_class;
 pub(crate) mod sensors;

@@ -20,6 +20,9 @@ pub struct SensorDeclaration {
     /// Diameter of the probe's tip, m; 0 is a probe without inertia. For several sensors, that of the single probe with the same
     /// lag as the combined reading.
     pub probe_diameter_m: f64,
+    /// Share by which a thermocouple on a housing reads towards the cell, one standard deviation above 0; `None` if no mounting is declared.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contact_sigma_ratio: Option<f64>,
     /// Each of the redundant sensors; `None` if there is only one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub redundant: Option<RedundantSensors>,

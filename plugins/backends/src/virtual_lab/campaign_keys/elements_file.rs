@@ -60,7 +60,7 @@ fn make_elements(channel: Channel, nominal: &NominalRig, draws: &Draws) -> Optio
     let first_m = declared.elements.first().map(|element| element.probe_diameter_m);
     let have_equal_tips = declared.elements.iter().all(|element| Some(element.probe_diameter_m) == first_m);
     let make_element = |(index, element): (usize, &DeclaredElement)| {
-        let errors = draws.errors(&element.declared, stream(Element { channel, number: index + 1 }));
+        let errors = draws.errors(channel, &element.declared, stream(Element { channel, number: index + 1 }));
         LabElement {
             errors: SensorErrors { offset: errors.offset + common, ..errors },
             probe_diameter_m: (channel == Channel::T2 && !have_equal_tips)

@@ -367,8 +367,9 @@ fn draw_sensors(
     draws: &Draws,
 ) -> BTreeMap<Channel, SensorErrors> {
     let declared = nominal.sensors.iter();
-    let mut sensors: BTreeMap<Channel, SensorErrors> =
-        declared.map(|(channel, declared)| (*channel, draws.errors(declared, *channel as u64))).collect();
+    let mut sensors: BTreeMap<Channel, SensorErrors> = declared
+        .map(|(channel, declared)| (*channel, draws.errors(*channel, declared, *channel as u64)))
+        .collect();
     for (channel, offset) in offset_of {
         sensors.entry(*channel).or_default().offset = *offset;
     }

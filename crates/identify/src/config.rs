@@ -7,7 +7,7 @@ use mapper_numerics::coloured_noise::ColouredNoise;
 use mapper_physics::gas::air::Air;
 use mapper_physics::gas::mixture::Gas;
 use mapper_physics::gas::pressure_tap::static_to_total_pa;
-use mapper_physics::machine::params::Params;
+use mapper_physics::machine::params::{BearingParams, Params};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -63,6 +63,8 @@ pub struct IdentifyConfig {
     pub outlet_diameter_m: f64,
     /// Declared diameter of the T2 probe's tip, m, >= 0; 0 is a probe without inertia.
     pub probe_diameter_m: f64,
+    /// The compressor housing, for its heat balance.
+    pub housing: Housing,
     /// Model parameters with a prior that the joint method searches for.
     pub joint: JointSettings,
     /// Reference state of corrected quantities, dry air.
@@ -113,6 +115,7 @@ impl Default for IdentifyConfig {
             inlet_diameter_m: machine.inlet_diameter_m,
             outlet_diameter_m: machine.outlet_diameter_m,
             probe_diameter_m: 0.0,
+            housing: Housing::of(&Params::default()),
             joint: JointSettings::default(),
             reference: ReferenceState::SAE,
             air: Air::PAPER,
@@ -173,6 +176,52 @@ impl IdentifyConfig {
     /// The declared noise in the form that the numerics use.
     pub(crate) fn noise(&self) -> ColouredNoise {
         ColouredNoise::new(self.noise_colour.first_order_share_ratio, self.noise_colour.time_constant_s)
+    }
+}
+
+/// The compressor housing as declared: what its heat balance needs besides the gas.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Housing {
+    /// Mass, kg, > 0.
+    pub mass_kg: f64,
+    /// Standard deviation of ln of the heat capacity.
+    pub ln_capacity_sigma: f64,
+    /// External area, m2.
+    pub external_area_m2: f64,
+    /// External emissivity, 0..1, ratio to a black body.
+    pub emissivity_ratio: f64,
+    /// Bearing housing and oil.
+    pub bearing: BearingParams,
+}
+
+/// Standard deviation of ln of the heat capacity of a housing with a declared mass. Bound: pipes, clamps and insulation that warm up with it.
+const DECLARED_CAPACITY_SIGMA: f64 = 0.3;
+/// The same without a declaration. Bound: from a third to three times that of the nominal machine at this internal area.
+const UNDECLARED_CAPACITY_SIGMA: f64 = 1.0;
+
+impl Housing {
+    /// The housing of a declared machine.
+    pub fn of(params: &Params) -> Self {
+        Housing {
+            mass_kg: params.compressor.housing_mass_kg,
+            ln_capacity_sigma: DECLARED_CAPACITY_SIGMA,
+            external_area_m2: params.compressor.external_area_m2,
+            emissivity_ratio: params.compressor.emissivity_ratio,
+            bearing: params.bearing,
+        }
+    }
+
+    /// The housing of a machine of which only the internal area is known: the nominal machine at another size.
+    pub fn of_internal_area(internal_area_m2: f64) -> Self {
+        let nominal = Params::default();
+        let area_ratio = internal_area_m2 / nominal.compressor.internal_area_m2;
+        let declared = Housing::of(&nominal);
+        Housing {
+            mass_kg: declared.mass_kg * area_ratio.powf(1.5),
+            ln_capacity_sigma: UNDECLARED_CAPACITY_SIGMA,
+            external_area_m2: declared.external_area_m2 * area_ratio,
+            ..declared
+        }
     }
 }
 

@@ -4,7 +4,9 @@
 #![allow(clippy::print_stdout, reason = "docs/validation has the table")]
 
 use crate::lab::{Machine, campaign, eighteen, measured};
-use mapper_core::{Channel, DeclaredUncertainty, Method, Recording, UncertaintyBudget, half_width_95};
+use mapper_core::{
+    Channel, DeclaredUncertainty, IdentifiedPoint, Method, Recording, UncertaintyBudget, half_width_95,
+};
 use mapper_identify::{Choice, Identified, IdentifyConfig, JointSettings, identify_recording};
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::mean;
@@ -105,8 +107,10 @@ fn an_uncertain_area_is_in_h_alone() {
         let stated = contribution(budgets.h_w_m2k.as_ref().unwrap(), "internal area");
         // 1 / 1.01 is not quite 0.99.
         assert!((moved / stated - 1.0).abs() < 0.02, "step {}: {moved} {stated}", known.step);
-        assert!((off.eta.unwrap() - known.eta.unwrap()).abs() < 1e-6);
-        assert_eq!((uncertain.eta_low, uncertain.eta_high), (known.eta_low, known.eta_high));
+        assert!((off.eta.unwrap() - known.eta.unwrap()).abs() < 1e-5);
+        let ends = |point: &IdentifiedPoint| point.eta_low.zip(point.eta_high).unwrap();
+        let (with_area, without) = (ends(&uncertain), ends(known));
+        assert!((with_area.0 - without.0).abs() < 1e-5 && (with_area.1 - without.1).abs() < 1e-5);
         assert!(uncertain.h_high_w_m2k > known.h_high_w_m2k);
     }
 }

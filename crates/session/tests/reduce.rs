@@ -258,6 +258,7 @@ fn the_thermal_model_of_a_run_removes_the_heat() {
             internal_area_m2: compressor.internal_area_m2,
             alpha_area_ratio: shared(compressor.alpha_area_ratio, 0.0),
             inlet: None,
+            housing: None,
             probe_diameter_m: shared(0.0, 0.0),
             heating_cooling_ratio: shared(1.0, 0.0),
             offsets: BTreeMap::new(),

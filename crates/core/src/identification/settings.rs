@@ -72,6 +72,8 @@ pub struct JointSettings {
     pub inlet_h: Choice,
     /// Offsets of the sensors, with their declared uncertainty as prior.
     pub offsets: Choice,
+    /// Heat balance of the compressor housing as a second observation; only T2 is one if `fixed`.
+    pub balance: Choice,
 }
 
 impl JointSettings {
@@ -83,6 +85,7 @@ impl JointSettings {
             ("heating_cooling_ratio", self.heating_cooling_ratio),
             ("inlet_h", self.inlet_h),
             ("offsets", self.offsets),
+            ("balance", self.balance),
         ];
         let fixed = parameters.into_iter().filter(|(_, choice)| *choice == Choice::Fixed);
         fixed.map(|(key, _)| key.to_owned()).collect()

@@ -126,6 +126,27 @@ pub struct IdentifiedInlet {
     pub alpha_area_otherwise_ratio: Option<f64>,
 }
 
+/// The compressor housing as its heat balance shows it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct IdentifiedHousing {
+    /// Heat capacity over the declared one.
+    pub capacity_ratio: SharedValue,
+    /// Share of the heat capacity in an inner wall with its own temperature; `None` if the housing is one node.
+    pub inner_capacity_ratio: Option<SharedValue>,
+    /// Conductance between that wall and the rest, W/K.
+    pub inner_conductance_w_k: Option<SharedValue>,
+    /// Conductance between housing and gas before the wheel that does not follow the law of h, W/K.
+    pub inlet_conductance_w_k: SharedValue,
+    /// Time constant of the thermocouple on the housing, s.
+    pub tc_lag_s: SharedValue,
+    /// Heat from another source than gas, bearing, turbine and cell, at 330 K, W.
+    pub other_heat_w: SharedValue,
+    /// Its part in proportion to the housing temperature, W/K.
+    pub other_heat_w_k: SharedValue,
+    /// Spread of the heat that the balances of single steps do not have, one standard deviation, W.
+    pub step_heat_w: f64,
+}
+
 /// Results of a joint identification that concern all points.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ThermalModel {
@@ -143,6 +164,9 @@ pub struct ThermalModel {
     /// Factor on the coefficient if the metal is hotter than the gas it touches.
     #[serde(alias = "direction_factor")]
     pub heating_cooling_ratio: SharedValue,
+    /// The housing by its heat balance; `None` if the balance was not used.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub housing: Option<IdentifiedHousing>,
     /// Offsets of readings (reading minus true value), by channel, K or Pa.
     pub offsets: BTreeMap<Channel, SharedValue>,
     /// Parameters that are nearly indistinguishable (absolute correlation above 0.95).

@@ -5,14 +5,16 @@
 
 use crate::IdentifyConfig;
 use crate::joint::Fitted;
-use crate::joint::fit::solve::{Member, Problem};
-use crate::joint::fit::start::{self, START_S};
-use crate::joint::step_model::rows::TIME_ROUNDING_S;
-use crate::joint::step_model::rows::{COARSER, Row, StepRows, block_s_after, place};
-use crate::joint::{MAX_PRIOR_SENSITIVITY_ETA, fit::refinements, uncertainty::smoothness};
+use crate::joint::fit::solve::Problem;
+use crate::joint::fit::start;
+use crate::joint::step_model::parameters::Refinement;
+use crate::joint::step_model::rows::{Row, StepRows, TIME_ROUNDING_S, block_s_after, place, slopes};
+use crate::joint::step_model::smoothing::Smoothing;
+use crate::joint::uncertainty::numbers::Numbers;
+use crate::joint::{MAX_PRIOR_SENSITIVITY_ETA, fit::refinements};
 use crate::single_step::dynamic::Estimate;
 use mapper_core::{MethodResult, MethodResults, SAMPLE_INTERVAL_S};
-use mapper_numerics::coloured_noise::BlockNoise;
+use mapper_numerics::coloured_noise::covariance_of_means;
 use mapper_numerics::statistics::MIN_VALUES;
 use mapper_physics::operating_point::forecast::ForecastRow;
 
@@ -30,12 +32,12 @@ pub fn expected_together(steps: &[&[ForecastRow]], config: &IdentifyConfig) -> O
     let alone: Vec<Estimate> = steps.iter().map(start).collect();
     let mut problem = start::problem(&condensed, &alone, config)?;
     problem.minimise_roughly()?;
-    start::refine(&mut problem, &condensed, config)?;
+    start::refine(&mut problem, config)?;
     problem.minimise_roughly()?;
     let parameter_error_eta = refinements::prior_sensitivity(&problem, None)?;
     let reported = |problem: &Problem<'_>| -> Option<Vec<Option<f64>>> {
         let mut open = problem.clone();
-        let found = Fitted::of(&mut open)?.smoothed(&open, &condensed);
+        let found = Fitted::of(&mut open)?.numbers(&open, &condensed);
         let mut sigmas = vec![None; steps.len()];
         for (eta, step) in found.eta.iter().zip(&condensed) {
             sigmas[step.position] = Some(eta.uncertainty.combined_standard_error());
@@ -47,12 +49,12 @@ pub fn expected_together(steps: &[&[ForecastRow]], config: &IdentifyConfig) -> O
         undeclared(&problem).and_then(|problem| reported(&problem)).unwrap_or_default();
     refinements::hold(&mut problem);
     problem.minimise_roughly()?;
-    let smoothed = smoothness::smoothed(&problem, &problem.covariance()?, None, &condensed);
+    let numbers = Numbers::of(&problem, &problem.covariance()?, None, &condensed);
     let mut found = vec![None; steps.len()];
     for (i, (member, step)) in problem.members.iter().zip(&condensed).enumerate() {
-        let (eta, ln_h) = (smoothed.eta[i], smoothed.ln_h[i]);
-        let h_w_m2k =
-            problem.setting.h_at_end(&step.end, &problem.shared, &member.local).0 * ln_h.value.exp();
+        let (eta, ln_h) = (numbers.eta[i], numbers.ln_h[i]);
+        let at_end = problem.model.at_end(&step.end, &problem.shared, &member.local);
+        let h_w_m2k = at_end.h_w_m2k * ln_h.value.exp();
         let expected = MethodResult {
             eta: eta.value,
             sigma_eta: eta.uncertainty.combined_standard_error(),
@@ -76,45 +78,56 @@ pub fn expected_together(steps: &[&[ForecastRow]], config: &IdentifyConfig) -> O
 fn undeclared<'a>(problem: &Problem<'a>) -> Option<Problem<'a>> {
     let mut off = problem.clone();
     let sought = refinements::sought(problem);
-    for (index, _, slab_sigma, _) in &sought {
+    for Refinement { index, slab_sigma, .. } in &sought {
         off.shared[*index] = off.priors[*index].mean + slab_sigma;
     }
-    for Member { history, measured_k, local, .. } in &mut off.members {
-        *measured_k = off.setting.predict_t2_k(history, &off.shared, local);
+    let predictions = off.predictions(&off.shared, &off.locals(), None);
+    for (member, prediction) in off.members.iter_mut().zip(predictions) {
+        member.measured_k = prediction.readings_k;
     }
     (!sought.is_empty()).then_some(off)
 }
 
 /// The rows to which the method would condense the samples of a recording.
 fn condensed(position: usize, step: &[ForecastRow], config: &IdentifyConfig) -> Option<StepRows> {
-    let first = step.partition_point(|expected| expected.t_s < START_S);
-    let first_s = step.get(first)?.t_s;
+    let first = step.partition_point(|expected| expected.t_s < start::start_after_s(config));
+    let (first_s, last_s) = (step.get(first)?.t_s, step.last()?.t_s);
     let mut rows: Vec<Row> = Vec::new();
+    let mut times_s: Vec<Vec<f64>> = Vec::new();
     for expected in &step[first..] {
-        let block_s = COARSER * block_s_after(expected.t_s - first_s, config);
+        let block_s = block_s_after(expected.t_s - first_s, last_s - first_s, config);
         if rows.last().is_none_or(|last| expected.t_s - last.t_s >= block_s - TIME_ROUNDING_S) {
-            rows.push(row(expected, noise(block_s, config), config));
+            rows.push(row(expected, config));
+            let count = (block_s / SAMPLE_INTERVAL_S).round().max(1.0) as usize;
+            times_s.push((0..count).map(|i| expected.t_s + i as f64 * SAMPLE_INTERVAL_S).collect());
         }
     }
-    let end = row(step.last()?, rows.last()?.noise, config);
+    slopes(&mut rows);
+    let t_s: Vec<f64> = rows.iter().map(|row| row.t_s).collect();
+    let blocks: Vec<&[f64]> = times_s.iter().map(Vec::as_slice).collect();
+    let noise = covariance_of_means(&blocks, config.noise());
+    let smoothing = (!config.declared.is_empty()).then(|| Smoothing::new(&t_s));
+    let mut lead: Vec<Row> = step[..first].iter().map(|expected| row(expected, config)).collect();
+    slopes(&mut lead);
+    let end = row(step.last()?, config);
     let usable = rows.len() >= MIN_VALUES && end.place.0 > 0.0 && end.place.1 > 0.0;
-    usable.then_some(StepRows { position, rows, end })
+    usable.then_some(StepRows { position, lead, rows, end, smoothing, noise })
 }
 
-fn row(expected: &ForecastRow, noise: BlockNoise, config: &IdentifyConfig) -> Row {
+fn row(expected: &ForecastRow, config: &IdentifyConfig) -> Row {
     Row {
         t_s: expected.t_s,
         t1_k: expected.t1_k,
         t2_k: expected.t2_k,
         tc_k: expected.tc_k,
+        tc_read_k: expected.tc_k,
+        tc_slope_k_s: 0.0,
         p1_pa: expected.p1_pa,
         p2_pa: expected.p2_pa,
         flow_kg_s: expected.flow_kg_s,
+        tt_k: f64::NAN,
+        oil_k: f64::NAN,
+        ambient_k: f64::NAN,
         place: place(config, expected.speed_rpm, expected.flow_kg_s, expected.t1_k, expected.p1_pa),
-        noise,
     }
-}
-
-fn noise(block_s: f64, config: &IdentifyConfig) -> BlockNoise {
-    BlockNoise::of_mean(config.noise(), block_s / SAMPLE_INTERVAL_S, block_s)
 }

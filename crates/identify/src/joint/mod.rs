@@ -1,8 +1,10 @@
 //! The joint method: all steps of a campaign together.
 //!
-//! Each step keeps its own efficiency. The shared parameters are estimated once, from all steps: the convection law, the area share before the
-//! wheel, the probe's lag, the effect of a hotter wall, the sensors' offsets, and how efficiency varies over the map. See
-//! `docs/explanation/identification.md` for the reasons, assumptions and limits.
+//! Two things are predicted and compared with the recording: T2 by eqs. 1-3 with the measured housing temperature, and the change of that
+//! temperature within each step, by the heat that the gas gives to the housing. Each step keeps its own efficiency. The shared parameters are
+//! estimated once, from all steps: the convection law, the area share before the wheel, the probe's lag, the effect of a hotter wall,
+//! preheating in the inlet, the housing's balance, the sensors' errors, and how efficiency varies over the map. The housing is one node, or two if
+//! the recording says so. See `docs/explanation/identification.md` for the reasons, assumptions and limits.
 
 pub(crate) mod expected;
 pub(crate) mod fit;
@@ -15,9 +17,9 @@ pub(crate) mod uncertainty;
 use crate::faults::balances::efficiency::FittedEfficiencies;
 use crate::joint::fit::refinements::{Gain, Refinements};
 use crate::joint::fit::solve::{Covariance, Problem};
-use crate::joint::step_model::parameters::{INLET, PROBE_MM2};
+use crate::joint::step_model::parameters::INLET;
 use crate::joint::step_model::rows::{Row, StepRows};
-use crate::joint::uncertainty::smoothness::{Smoothed, SmoothedValue};
+use crate::joint::uncertainty::numbers::{Number, Numbers};
 use crate::single_step::dynamic::Estimate;
 use crate::step_data::end_state::EndState;
 use crate::step_outcome::findings::Findings;
@@ -37,6 +39,9 @@ const MAX_LOST_RATIO: f64 = 2.0;
 /// Maximum error of the efficiencies, fraction, that only the declaration of alpha_A, probe and heating/cooling ratio excludes. Bound:
 /// above it, a machine not as declared could pass for one that is.
 pub const MAX_PRIOR_SENSITIVITY_ETA: f64 = 0.0125;
+
+/// ln of the odds above which a housing has an inner wall. Bound: 150 to 1; recordings of one node give less than 1e-9, of two more than 1e400.
+const INNER_WALL_LN_ODDS: f64 = 5.0;
 
 /// The efficiency that the dynamic method (Burke et al.) finds in a step which another method has identified.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -83,9 +88,9 @@ pub(crate) fn estimate(
         }
     }
     let steps = fit::start::steps(recording, end_states, config, findings);
-    let attempt = match Attempt::new(&steps, &alone, config, &[]) {
+    let attempt = match Attempt::new(&steps, &alone, config) {
         Some(first) if !is_refused && !first.thermal.doubts.is_empty() => {
-            Some(first.without_a_region(&steps, &alone, config).unwrap_or(first))
+            Some(first.without_a_region(&steps, config).unwrap_or(first))
         }
         first => first,
     };
@@ -98,14 +103,16 @@ pub(crate) fn estimate(
         }
         return Joint { estimates, thermal: None, dynamic, fitted: None };
     };
-    let fitted = uncertainty::smoothness::as_measured(&attempt.problem, &steps);
-    let Attempt { problem, smoothed, thermal, prior_sensitivity, left_out, .. } = attempt;
+    let fitted = uncertainty::as_measured::as_measured(&attempt.problem, &steps, config);
+    let Attempt { problem, numbers, thermal, prior_sensitivity, left_out, .. } = attempt;
     let mut estimates = vec![Estimate::default(); recording.steps.len()];
+    let predictions = problem.predictions(&problem.shared, &problem.locals(), None);
+    let whitened = problem.whitened();
     for (i, (member, step)) in problem.members.iter().zip(&steps).enumerate() {
         let own = &mut findings[step.position];
-        let (SmoothedValue { value: eta, uncertainty: eta_error, interval, .. }, ln_h) =
-            (smoothed.eta[i], smoothed.ln_h[i]);
-        let fitted_h_w_m2k = problem.setting.h_at_end(&step.end, &problem.shared, &member.local).0;
+        let (Number { value: eta, uncertainty: eta_error, interval, .. }, ln_h) =
+            (numbers.eta[i], numbers.ln_h[i]);
+        let fitted_h_w_m2k = problem.model.at_end(&step.end, &problem.shared, &member.local).h_w_m2k;
         let h_w_m2k = fitted_h_w_m2k * ln_h.value.exp();
         let h_error = EstimateUncertainty {
             noise_standard_error: h_w_m2k * ln_h.uncertainty.noise_standard_error,
@@ -118,9 +125,10 @@ pub(crate) fn estimate(
         }
         let (first, last) = (step.rows.first(), step.rows.last());
         let change = |read: fn(&Row) -> f64| first.zip(last).map(|(first, last)| read(last) - read(first));
-        let predicted_k = problem.setting.predict_t2_k(&member.history, &problem.shared, &member.local);
-        let residual = member.measured_k.iter().zip(&predicted_k).map(|(measured, found)| measured - found);
-        let [eta_rows, ln_h_rows] = smoothed.budgets[i].clone();
+        let rows = step.rows.len();
+        let readings = member.measured_k.iter().zip(&predictions[i].readings_k).take(rows);
+        let residual = readings.map(|(measured, found)| measured - found);
+        let [eta_rows, ln_h_rows] = numbers.budgets[i].clone();
         let eta_rows = eta_rows.into_iter().map(|row| uncertainty::budget::in_unit(row, 1.0, "1")).collect();
         let h_rows =
             ln_h_rows.into_iter().map(|row| uncertainty::budget::in_unit(row, h_w_m2k, "W/(m2 K)")).collect();
@@ -133,8 +141,8 @@ pub(crate) fn estimate(
                 (fitted_h_w_m2k * ln_h.interval.0.exp(), fitted_h_w_m2k * ln_h.interval.1.exp()),
             ]),
             common: [
-                smoothed.common[0][i].clone(),
-                smoothed.common[1][i].iter().map(|by_ln_h| h_w_m2k * by_ln_h).collect(),
+                numbers.common[0][i].clone(),
+                numbers.common[1][i].iter().map(|by_ln_h| h_w_m2k * by_ln_h).collect(),
             ],
             window: first.zip(last).map(|(first, last)| Window { start_s: first.t_s, end_s: last.t_s }),
             residual_rms_k: rms(residual),
@@ -142,7 +150,7 @@ pub(crate) fn estimate(
             dtc_k: change(|row| row.tc_k),
         };
         let dt2_k = estimates[step.position].dt2_k;
-        judge::judge_step(&problem, i, eta_error, dt2_k, config, own);
+        judge::judge_step(&problem, (i, &whitened[i]), eta_error, dt2_k, config, own);
         if let Some(region) = left_out.as_ref().filter(|_| member.excluded) {
             own.doubt(Warning::LeftOut(region.clone()));
         }
@@ -164,7 +172,7 @@ pub(crate) fn estimate(
 struct Attempt<'a> {
     problem: Problem<'a>,
     covariance: Covariance,
-    smoothed: Smoothed,
+    numbers: Numbers,
     thermal: ThermalModel,
     /// Error of the efficiencies if parameters shrunk to their declared values are not as declared, fraction.
     prior_sensitivity: f64,
@@ -173,44 +181,51 @@ struct Attempt<'a> {
 }
 
 impl<'a> Attempt<'a> {
-    /// `excluded`: indices of steps excluded from the shared parameters.
-    fn new(
-        steps: &'a [StepRows],
-        alone: &[Estimate],
-        config: &IdentifyConfig,
-        excluded: &[usize],
-    ) -> Option<Self> {
+    fn new(steps: &'a [StepRows], alone: &[Estimate], config: &IdentifyConfig) -> Option<Self> {
         let mut problem = fit::start::problem(steps, alone, config)?;
+        let fitted = best_housing(&mut problem, config)?;
+        Attempt::of(problem, fitted, steps, config)
+    }
+
+    /// The fit without some steps, from this one on.
+    fn without(&self, excluded: &[usize], steps: &'a [StepRows], config: &IdentifyConfig) -> Option<Self> {
+        let mut problem = self.problem.clone();
+        problem.active[INLET] = false;
         for index in excluded {
             let member = problem.members.get_mut(*index)?;
             (member.contributes, member.excluded) = (false, true);
         }
-        let fitted = fitted(&mut problem, steps, config)?;
-        let smoothed = fitted.smoothed(&problem, steps);
+        minimise(&mut problem, config)?;
+        let fitted = Fitted::of(&mut problem)?;
+        Attempt::of(problem, fitted, steps, config)
+    }
+
+    fn of(
+        problem: Problem<'a>,
+        fitted: Fitted,
+        steps: &'a [StepRows],
+        config: &IdentifyConfig,
+    ) -> Option<Self> {
+        let numbers = fitted.numbers(&problem, steps);
         let Fitted { covariance, refined, prior_sensitivity } = fitted;
         let refinements = refined.as_ref().map(|(refinements, _)| refinements);
         let thermal =
-            thermal_model::thermal_model(&problem, &covariance, &smoothed, refinements, steps, config);
-        Some(Attempt { problem, covariance, smoothed, thermal, prior_sensitivity, left_out: None })
+            thermal_model::thermal_model(&problem, &covariance, &numbers, refinements, steps, config);
+        Some(Attempt { problem, covariance, numbers, thermal, prior_sensitivity, left_out: None })
     }
 
     /// The fit without the region of the map that disagrees most, if any.
-    fn without_a_region(
-        &self,
-        steps: &'a [StepRows],
-        alone: &[Estimate],
-        config: &IdentifyConfig,
-    ) -> Option<Self> {
+    fn without_a_region(&self, steps: &'a [StepRows], config: &IdentifyConfig) -> Option<Self> {
         regions::regions(steps).into_iter().find_map(|of_size| {
             let rests = of_size.into_iter().filter_map(|region| {
-                let rest = Attempt::new(steps, alone, config, &region.steps)?;
+                let rest = self.without(&region.steps, steps, config)?;
                 let undoubted = rest.thermal.doubts.is_empty();
                 let sigmas = regions::disagreement(
                     (&self.problem, &self.covariance),
                     (&rest.problem, &rest.covariance),
                 )?;
                 // The remaining steps must still determine the shared parameters.
-                let knows = rest.smoothed.middle_error() < MAX_LOST_RATIO * self.smoothed.middle_error();
+                let knows = rest.numbers.middle_error() < MAX_LOST_RATIO * self.numbers.middle_error();
                 (undoubted && knows).then_some((region, rest, sigmas))
             });
             let (region, mut rest, sigmas) = rests.max_by(|a, b| a.2.total_cmp(&b.2))?;
@@ -230,18 +245,41 @@ struct Fitted {
     prior_sensitivity: f64,
 }
 
-/// Fits, estimates noise and spreads from the fit, excludes steps that fit far worse, fits again, and evaluates the parameters with a prior.
-fn fitted(problem: &mut Problem<'_>, steps: &[StepRows], config: &IdentifyConfig) -> Option<Fitted> {
+/// Fits a housing of one node and one of two, and keeps the one that the recording favours.
+fn best_housing(problem: &mut Problem<'_>, config: &IdentifyConfig) -> Option<Fitted> {
+    // A fit of one node has moved its parameters to imitate a second one, so both begin at the start.
+    let mut two = fit::start::with_inner_wall(problem);
+    minimise(problem, config)?;
+    if problem.model.has_balance && judge::may_have_inner_wall(problem) {
+        let favoured = minimise_in_stages(&mut two, config)
+            .and_then(|()| Some(two.ln_evidence()? - problem.ln_evidence()?));
+        if favoured.is_some_and(|ln_odds| ln_odds > INNER_WALL_LN_ODDS) {
+            *problem = two;
+        }
+    }
+    Fitted::of(problem)
+}
+
+/// Fits law, efficiencies and housing first, with all parameters that may be neutral as declared: far from the minimum they imitate an inner wall.
+fn minimise_in_stages(problem: &mut Problem<'_>, config: &IdentifyConfig) -> Option<()> {
+    let sought = fit::refinements::sought(problem);
+    sought.iter().for_each(|refinement| problem.active[refinement.index] = false);
+    problem.minimise_roughly()?;
+    fit::step_noise::set(problem, config)?;
+    problem.minimise_roughly()?;
+    sought.iter().for_each(|refinement| problem.active[refinement.index] = true);
+    minimise(problem, config)
+}
+
+/// Fits, estimates noise and spreads from the fit, excludes steps that fit far worse, and fits again.
+fn minimise(problem: &mut Problem<'_>, config: &IdentifyConfig) -> Option<()> {
     for _ in 0..ROUNDS {
         problem.minimise_roughly()?;
-        fit::start::refine(problem, steps, config)?;
-        problem.input_noise = fit::input_noise::input_noise(problem, steps, config);
+        fit::start::refine(problem, config)?;
         judge::exclude(problem, config);
-        // A probe on its bound may leave it with better weights.
-        problem.active[PROBE_MM2] = problem.probe_fitted;
     }
     problem.minimise()?;
-    Fitted::of(problem)
+    Some(())
 }
 
 impl Fitted {
@@ -259,9 +297,9 @@ impl Fitted {
     }
 
     /// The numbers of all points of the problem, with their errors.
-    fn smoothed(&self, problem: &Problem<'_>, steps: &[StepRows]) -> Smoothed {
+    fn numbers(&self, problem: &Problem<'_>, steps: &[StepRows]) -> Numbers {
         let known = self.refined.as_ref().map(|(refinements, gain)| (refinements, gain));
-        uncertainty::smoothness::smoothed(problem, &self.covariance, known, steps)
+        Numbers::of(problem, &self.covariance, known, steps)
     }
 }
 

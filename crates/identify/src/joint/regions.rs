@@ -68,7 +68,7 @@ pub(crate) fn disagreement(
         if problem.active[index] { covariance.error_of(index) } else { Some(0.0) }
     };
     // Small model errors change a parameter by as much, and the spread of the points about the law changes the law.
-    let with_priors = REFINEMENTS.into_iter().map(|(index, _, _, model_error)| (index, model_error));
+    let with_priors = REFINEMENTS.into_iter().map(|refinement| (refinement.index, refinement.model_error));
     with_priors
         .chain([(EXPONENT, LAW_SIGMA), (LN_COEFFICIENT, LAW_SIGMA)])
         .filter_map(|(index, floor)| {

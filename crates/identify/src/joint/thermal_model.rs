@@ -5,14 +5,15 @@ use crate::joint::fit::refinements::Refinements;
 use crate::joint::fit::solve::{Covariance, Problem};
 use crate::joint::judge;
 use crate::joint::step_model::parameters::{
-    ALPHA, EXPONENT, LN_AREA, LN_COEFFICIENT, LN_DEVIATION, LN_HEATING_COOLING_RATIO, OFFSET_CHANNELS,
-    OFFSETS, PROBE_MM2, SURFACE, symbol,
+    ALPHA, EXPONENT, HEAT, HEAT_BY_TC, HOUSING, LN_AREA, LN_CAPACITY, LN_COEFFICIENT, LN_DEVIATION, LN_HEATING_COOLING_RATIO,
+    LN_INNER_CONDUCTANCE, LOGIT_INNER, OFFSET_CHANNELS, OFFSETS, PREHEAT, PROBE_MM2, STEP_HEAT, SURFACE, TC_LAG, symbol,
 };
 use crate::joint::step_model::rows::StepRows;
-use crate::joint::uncertainty::quantity::is_offset;
-use crate::joint::uncertainty::smoothness::Smoothed;
+use crate::joint::uncertainty::numbers::Numbers;
 use mapper_core::unit_factors::M_PER_MM;
-use mapper_core::{ConvectionLaw, CorrelatedPair, EstimateUncertainty, Origin, SharedValue, ThermalModel};
+use mapper_core::{
+    ConvectionLaw, CorrelatedPair, EstimateUncertainty, IdentifiedHousing, Origin, SharedValue, ThermalModel,
+};
 use mapper_inference::interval::is_identified;
 
 /// Step of the derivative of a transformed parameter. Bound: between rounding and curvature for parameters of order 1.
@@ -26,28 +27,29 @@ const ENTANGLED: f64 = 0.95;
 pub(crate) fn thermal_model(
     problem: &Problem<'_>,
     covariance: &Covariance,
-    smoothed: &Smoothed,
+    numbers: &Numbers,
     refinements: Option<&Refinements>,
     steps: &[StepRows],
     config: &IdentifyConfig,
 ) -> ThermalModel {
     let of = |index: usize, transform: &dyn Fn(f64) -> f64| {
-        value(problem, covariance, smoothed, refinements, index, transform)
+        value(problem, covariance, refinements, index, transform)
     };
+    let setting = &problem.model.setting;
     let reynolds: Vec<f64> = steps
         .iter()
         .zip(&problem.members)
         .map(|(step, member)| {
-            problem.setting.reynolds_reference
-                * problem.setting.h_at_end(&step.end, &problem.shared, &member.local).1.exp()
+            let at_end = problem.model.at_end(&step.end, &problem.shared, &member.local);
+            setting.reynolds_reference * at_end.ln_reynolds.exp()
         })
         .collect();
     let range = reynolds.iter().fold((f64::INFINITY, 0.0f64), |(low, high), x| (low.min(*x), high.max(*x)));
     let deviations: f64 = problem.members.iter().map(|member| member.local[LN_DEVIATION].powi(2)).sum();
-    let reference = problem.setting.reynolds_reference;
+    let reference = setting.reynolds_reference;
     let exponent = problem.shared[EXPONENT];
     let convection = Some(ConvectionLaw {
-        diameter_m: problem.setting.outlet_diameter_m,
+        diameter_m: setting.outlet_diameter_m,
         coefficient: of(LN_COEFFICIENT, &|x| x.exp() * reference.powf(-exponent)),
         exponent: of(EXPONENT, &|x| x),
         reynolds_reference: reference,
@@ -69,11 +71,12 @@ pub(crate) fn thermal_model(
     }
     ThermalModel {
         convection,
-        internal_area_m2: problem.setting.internal_area_m2,
+        internal_area_m2: setting.internal_area_m2,
         alpha_area_ratio: of(ALPHA, &|x| x),
         inlet: problem.inlet,
         probe_diameter_m: probe(problem, covariance),
         heating_cooling_ratio: of(LN_HEATING_COOLING_RATIO, &f64::exp),
+        housing: problem.model.has_balance.then(|| housing(problem, &of)),
         offsets: OFFSET_CHANNELS
             .iter()
             .enumerate()
@@ -81,7 +84,28 @@ pub(crate) fn thermal_model(
             .map(|(i, channel)| (*channel, of(OFFSETS + i, &|x| x)))
             .collect(),
         entangled,
-        doubts: judge::doubts(problem, smoothed, config),
+        doubts: judge::doubts(problem, numbers, config),
+    }
+}
+
+/// The housing; `of` reports a parameter.
+fn housing(
+    problem: &Problem<'_>,
+    of: &dyn Fn(usize, &dyn Fn(f64) -> f64) -> SharedValue,
+) -> IdentifiedHousing {
+    let same = |x: f64| x;
+    let inner = |index: usize, transform: &dyn Fn(f64) -> f64| {
+        problem.model.has_inner_wall.then(|| of(index, transform))
+    };
+    IdentifiedHousing {
+        capacity_ratio: of(LN_CAPACITY, &f64::exp),
+        inner_capacity_ratio: inner(LOGIT_INNER, &|logit| 1.0 / (1.0 + (-logit).exp())),
+        inner_conductance_w_k: inner(LN_INNER_CONDUCTANCE, &f64::exp),
+        inlet_conductance_w_k: of(PREHEAT, &same),
+        tc_lag_s: of(TC_LAG, &same),
+        other_heat_w: of(HEAT, &same),
+        other_heat_w_k: of(HEAT_BY_TC, &same),
+        step_heat_w: problem.members.first().map_or(0.0, |member| member.priors[STEP_HEAT].sigma),
     }
 }
 
@@ -89,7 +113,6 @@ pub(crate) fn thermal_model(
 fn value(
     problem: &Problem<'_>,
     covariance: &Covariance,
-    smoothed: &Smoothed,
     refinements: Option<&Refinements>,
     index: usize,
     transform: &dyn Fn(f64) -> f64,
@@ -97,15 +120,15 @@ fn value(
     let Some(row) = covariance.row_of(index) else {
         return SharedValue::assumed(transform(problem.shared[index]));
     };
-    let (shift, sigma) = smoothed.shared[row];
-    let fitted = problem.shared[index] + shift;
+    let fitted = problem.shared[index];
     let reported = transform(fitted);
-    let variance = sigma * sigma;
+    let variance = covariance.shared[(row, row)].max(0.0);
+    let sigma = variance.sqrt();
     let slope =
         (transform(fitted + TRANSFORM_STEP) - transform(fitted - TRANSFORM_STEP)) / (2.0 * TRANSFORM_STEP);
     let mut bias = 0.0;
     for (other, index) in covariance.fitted.iter().enumerate() {
-        if (OFFSETS..SURFACE).contains(index) {
+        if (OFFSETS..HOUSING).contains(index) {
             bias += covariance.shared[(row, other)].powi(2) * problem.priors[*index].weight();
         }
     }
@@ -113,7 +136,7 @@ fn value(
     // For a parameter with a prior, use the error from the recording alone.
     let known = refinements.and_then(|refinements| refinements.free(index)).map_or(sigma, |(_, error)| error);
     let uninformed = !is_identified(known, beforehand);
-    let is_offset = is_offset(index);
+    let is_offset = (OFFSETS..HOUSING).contains(&index);
     // The coefficient is that of the declared area, as h is.
     let area =
         if index == LN_COEFFICIENT && problem.active[LN_AREA] { problem.priors[LN_AREA].sigma } else { 0.0 };
@@ -131,20 +154,8 @@ fn value(
 /// The probe's diameter. Its square is fitted, which is 0 for an ideal probe: the error is then the largest probe that noise could hide.
 fn probe(problem: &Problem<'_>, covariance: &Covariance) -> SharedValue {
     let square = problem.shared[PROBE_MM2].max(0.0);
-    if !problem.probe_fitted {
+    let Some(sigma) = covariance.error_of(PROBE_MM2) else {
         return SharedValue::assumed(M_PER_MM * square.sqrt());
-    }
-    let sigma = covariance.error_of(PROBE_MM2).or_else(|| {
-        let mut free = problem.clone();
-        free.active[PROBE_MM2] = true;
-        free.covariance()?.error_of(PROBE_MM2)
-    });
-    let Some(sigma) = sigma else {
-        return SharedValue {
-            value: None,
-            uncertainty: EstimateUncertainty::default(),
-            origin: Origin::NotIdentifiable,
-        };
     };
     let error_m = M_PER_MM * ((square + sigma).sqrt() - square.sqrt());
     SharedValue {

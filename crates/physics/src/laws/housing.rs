@@ -56,7 +56,13 @@ pub fn radiation_w(area_m2: f64, tt_k: f64, tc_k: f64) -> f64 {
 /// Heat capacity of the compressor housing, J/K (Appendix A: 930-990 J/(kg K) over 300..500 K).
 #[inline]
 pub fn compressor_capacity_j_k(params: &Params, tc_k: f64) -> f64 {
-    params.compressor.housing_mass_kg * (930.0 + 60.0 * (tc_k - 300.0) / 200.0)
+    capacity_j_k(params.compressor.housing_mass_kg, tc_k)
+}
+
+/// Heat capacity of a compressor housing of this mass, J/K.
+#[inline]
+pub fn capacity_j_k(mass_kg: f64, tc_k: f64) -> f64 {
+    mass_kg * (930.0 + 60.0 * (tc_k - 300.0) / 200.0)
 }
 
 /// Heat capacity of the turbine housing, J/K (Appendix A: 500-700 J/(kg K) over 300..800 K).

@@ -31,6 +31,19 @@ impl Describe for ThermalModel {
         row("alpha_A", &self.alpha_area_ratio, 1.0, "", 3);
         row("T2 probe diameter", &self.probe_diameter_m, 1e3, "mm", 2);
         row("heating/cooling ratio of h", &self.heating_cooling_ratio, 1.0, "", 3);
+        if let Some(housing) = &self.housing {
+            row("preheating in the inlet", &housing.inlet_conductance_w_k, 1.0, "W/K", 2);
+            row("heat capacity of the housing over the declared one", &housing.capacity_ratio, 1.0, "", 3);
+            if let Some((share, conductance)) =
+                housing.inner_capacity_ratio.as_ref().zip(housing.inner_conductance_w_k.as_ref())
+            {
+                row("inner wall: share of the heat capacity", share, 1.0, "", 3);
+                row("inner wall: conductance to the rest", conductance, 1.0, "W/K", 1);
+            }
+            row("lag of Tc", &housing.tc_lag_s, 1.0, "s", 2);
+            row("heat from another source at 330 K", &housing.other_heat_w, 1.0, "W", 1);
+            row("heat from another source by Tc", &housing.other_heat_w_k, 1.0, "W/K", 2);
+        }
         for (channel, offset) in &self.offsets {
             let decimals = if channel.unit() == "Pa" { 0 } else { 2 };
             row(&format!("offset of {channel}"), offset, 1.0, channel.unit(), decimals);
@@ -331,6 +344,7 @@ mod tests {
             internal_area_m2: 29e-3,
             alpha_area_ratio: unknown,
             inlet: None,
+            housing: None,
             probe_diameter_m: SharedValue::assumed(0.0),
             heating_cooling_ratio: SharedValue::assumed(1.0),
             offsets: std::collections::BTreeMap::new(),

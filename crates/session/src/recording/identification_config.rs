@@ -9,7 +9,7 @@ use mapper_core::{
     ALPHA_AREA_SIGMA_RATIO, Channel, DeclaredUncertainty, IdentifiedPoint, Method, ModelTolerances,
     Recording, ReferenceState, Verdict, WindowRule,
 };
-use mapper_identify::{IdentifyConfig, PressureTap};
+use mapper_identify::{Housing, IdentifyConfig, PressureTap};
 use mapper_numerics::statistics::range;
 use mapper_observe::declared_uncertainties;
 use mapper_physics::gas::air::Air;
@@ -36,6 +36,7 @@ pub fn identification(campaign: &Campaign) -> IdentifyConfig {
         inlet_diameter_m: campaign.machine.params.compressor.inlet_diameter_m,
         outlet_diameter_m: campaign.machine.params.compressor.outlet_diameter_m,
         probe_diameter_m: campaign.machine.params.t2_probe_diameter_m,
+        housing: Housing::of(&campaign.machine.params),
         joint: settings.joint,
         internal_area_m2: campaign.machine.params.compressor.internal_area_m2,
         internal_area_sigma_ratio: internal_area_sigma_ratio(&campaign.machine.assumed),
@@ -163,6 +164,7 @@ pub(crate) fn identification_of(machine: &MachineConstants, map: &ChannelMap) ->
         alpha_area_ratio: machine.alpha_area_ratio,
         alpha_area_sigma_ratio: ALPHA_AREA_SIGMA_RATIO,
         internal_area_m2: machine.compressor_internal_area_m2,
+        housing: Housing::of_internal_area(machine.compressor_internal_area_m2),
         probe_diameter_m: machine.t2_probe_diameter_m,
         housing_contact_sigma_ratio: default_contact_sigma_ratio(),
         inlet_tap: tap(inlet_m),

@@ -9,7 +9,7 @@
 
 use crate::faults::smooth::ANY_ROUGHNESS;
 use crate::joint::fit::solve::{Covariance, Problem};
-use crate::joint::step_model::parameters::{ALPHA, INLET, LN_COEFFICIENT, PROBE_MM2, Prior};
+use crate::joint::step_model::parameters::{ALPHA, INLET, LN_COEFFICIENT, Prior};
 use mapper_core::{IdentifiedInlet, InletConvection, Origin};
 use mapper_inference::interval::COVERAGE;
 use mapper_numerics::statistics::{HINT_SIGMAS, mean};
@@ -41,7 +41,6 @@ pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<Option<f64>> {
     let tight = problem.surface_sigma;
     let refit_with = |problem: &mut Problem<'_>, surface_sigma: f64| {
         problem.surface_sigma = surface_sigma;
-        problem.active[PROBE_MM2] = problem.probe_fitted;
         problem.minimise()
     };
     if tight < ANY_ROUGHNESS {
@@ -55,7 +54,7 @@ pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<Option<f64>> {
 fn compared(problem: &mut Problem<'_>) -> Option<Option<f64>> {
     let declared = IdentifiedInlet {
         convection: convection_of(problem.shared[INLET]),
-        diameter_m: problem.setting.inlet_diameter_m,
+        diameter_m: problem.model.setting.inlet_diameter_m,
         origin: Origin::Assumed,
         probability: 1.0,
         alpha_area_otherwise_ratio: None,
@@ -64,7 +63,9 @@ fn compared(problem: &mut Problem<'_>) -> Option<Option<f64>> {
     let Some(mut other) = problem.inlet_sought.then(|| with_other_model(problem)).flatten() else {
         return Some(None);
     };
-    let seen = if problem.active[ALPHA] { 0.5 * (problem.square() - other.square()) } else { 0.0 };
+    // With a rig's noise and errors, small errors of the balance are larger than the difference.
+    let sees = problem.active[ALPHA] && !problem.model.has_balance;
+    let seen = if sees { 0.5 * (problem.square() - other.square()) } else { 0.0 };
     let mut left = 1.0 / (1.0 + (-seen).exp());
     // Keep the declared model unless the recording decides against it: the other one has other efficiencies.
     if left > COVERAGE {
@@ -94,7 +95,8 @@ pub(crate) fn carry(problem: &mut Problem<'_>, sigma: f64, without: &Covariance)
     problem.active[INLET] = true;
     let mut with = problem.covariance()?;
     let own = with.row_of(INLET)?;
-    let moved = with.shared.column(own) / sigma;
+    // The answer of the fit to another power, by the regression on it.
+    let moved = with.shared.column(own) * (sigma / with.shared[(own, own)]);
     let place = |row: usize| if row < own { Some(row) } else { row.checked_sub(1).filter(|_| row > own) };
     with.shared = DMatrix::from_fn(moved.len(), moved.len(), |a, b| {
         let known = place(a).zip(place(b)).map_or(0.0, |(a, b)| without.shared[(a, b)]);
@@ -140,9 +142,6 @@ fn with_other_model<'a>(problem: &Problem<'a>) -> Option<Problem<'a>> {
         other.shared[ALPHA] = odds / (1.0 + odds);
         other.shared[LN_COEFFICIENT] += ((1.0 - alpha) * (1.0 + odds)).ln();
     }
-    // The probe does not depend on the inlet, but it could be on its bound in only one of the fits.
-    other.active[PROBE_MM2] = false;
     other.minimise()?;
-    other.active[PROBE_MM2] = problem.active[PROBE_MM2];
     Some(other)
 }

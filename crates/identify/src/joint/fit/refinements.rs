@@ -1,4 +1,4 @@
-//! Selects the model parameters with a prior in eqs. 1-3: alpha_A, the probe, and the heating/cooling ratio of h.
+//! Selects the model parameters with a prior in eqs. 1-3: alpha_A, the probe, the heating/cooling ratio of h, and preheating in the inlet.
 //!
 //! Each free parameter increases the uncertainty of the points, even if the machine does not need it. Small model errors also look like a
 //! small value of each. So each one is neutral or free, and all sets are evaluated on the Gaussian of a fit with all of them free
@@ -6,7 +6,7 @@
 //! from linear. The spread of the mixture then enters the uncertainty of every number of every point.
 
 use crate::joint::fit::solve::{Covariance, Problem};
-use crate::joint::step_model::parameters::{ALPHA, ETA, OFFSETS, PROBE_MM2, REFINEMENTS, SURFACE};
+use crate::joint::step_model::parameters::{ALPHA, ETA, REFINEMENTS, Refinement};
 use mapper_core::standard_error_of;
 use mapper_inference::interval;
 use mapper_inference::mixture::{Draw, Mixture, Parameter};
@@ -31,15 +31,13 @@ pub(crate) struct Refinements {
 pub(crate) struct Gain(pub(crate) DMatrix<f64>);
 
 /// The parameters that a problem searches for.
-pub(crate) fn sought(problem: &Problem<'_>) -> Vec<(usize, f64, f64, f64)> {
-    let looked_for =
-        |index: usize| if index == PROBE_MM2 { problem.probe_fitted } else { problem.active[index] };
-    REFINEMENTS.into_iter().filter(|(index, ..)| looked_for(*index)).collect()
+pub(crate) fn sought(problem: &Problem<'_>) -> Vec<Refinement> {
+    REFINEMENTS.into_iter().filter(|refinement| problem.active[refinement.index]).collect()
 }
 
 /// Fixes these parameters at their declared values.
 pub(crate) fn hold(problem: &mut Problem<'_>) {
-    for (index, ..) in REFINEMENTS {
+    for Refinement { index, .. } in REFINEMENTS {
         problem.active[index] = false;
         problem.shared[index] = problem.priors[index].mean;
     }
@@ -49,7 +47,7 @@ pub(crate) fn hold(problem: &mut Problem<'_>) {
 /// that knowing these parameters removes, averaged over the sets of the mixture. `None` as `found`: all are taken for neutral.
 pub(crate) fn prior_sensitivity(open: &Problem<'_>, found: Option<&Refinements>) -> Option<f64> {
     let covariance = open.covariance()?;
-    let rows: Vec<Option<usize>> = sought(open).iter().map(|(index, ..)| covariance.row_of(*index)).collect();
+    let rows: Vec<Option<usize>> = sought(open).iter().map(|refinement| covariance.row_of(refinement.index)).collect();
     let mut sets: BTreeMap<Vec<usize>, f64> = BTreeMap::new();
     match found {
         None => _ = sets.insert(rows.iter().copied().flatten().collect(), 1.0),
@@ -87,8 +85,8 @@ pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<Option<Refinements>> {
 }
 
 /// Evaluates the mixture by linearising the problem at its current values, and moves the problem to its mean.
-fn linearised(problem: &mut Problem<'_>, sought: &[(usize, f64, f64, f64)]) -> Option<Refinements> {
-    let indices: Vec<usize> = sought.iter().map(|(index, ..)| *index).collect();
+fn linearised(problem: &mut Problem<'_>, sought: &[Refinement]) -> Option<Refinements> {
+    let indices: Vec<usize> = sought.iter().map(|refinement| refinement.index).collect();
     let declared: Vec<f64> = indices.iter().map(|index| problem.priors[*index].mean).collect();
     indices.iter().for_each(|index| problem.active[*index] = true);
     let covariance = problem.covariance()?;
@@ -102,19 +100,16 @@ fn linearised(problem: &mut Problem<'_>, sought: &[(usize, f64, f64, f64)]) -> O
     let parameters: Vec<Parameter> = sought
         .iter()
         .zip(&declared)
-        .map(|((index, _, slab_sigma, model_error), declared)| {
-            // alpha_A is a share of an area, and the probe parameter is the square of a diameter.
-            let (lowest, highest) = match *index {
-                ALPHA => (0.0, 1.0),
-                PROBE_MM2 => (0.0, f64::INFINITY),
-                _ => (f64::NEG_INFINITY, f64::INFINITY),
-            };
+        .map(|(refinement, declared)| {
+            let lowest = if refinement.is_positive { 0.0 } else { f64::NEG_INFINITY };
+            // alpha_A is a share of an area.
+            let highest = if refinement.index == ALPHA { 1.0 } else { f64::INFINITY };
             Parameter {
-                slab_sigma: *slab_sigma,
+                slab_sigma: refinement.slab_sigma,
                 low: lowest - declared,
                 high: highest - declared,
-                model_error: *model_error,
-                fitted_under_sigma: problem.priors[*index].sigma,
+                model_error: refinement.model_error,
+                fitted_under_sigma: problem.priors[refinement.index].sigma,
             }
         })
         .collect();
@@ -142,8 +137,7 @@ impl Refinements {
         self.place(index).map(|place| self.free[place])
     }
 
-    /// Replaces the Gaussian of these parameters with the mixture. The offsets keep their declared spread and do not move: these parameters
-    /// give no reliable information about them.
+    /// Replaces the Gaussian of these parameters with the mixture.
     pub(crate) fn apply(&self, covariance: &mut Covariance) -> Option<Gain> {
         let rows: Vec<usize> = self.indices.iter().filter_map(|index| covariance.row_of(*index)).collect();
         let columns =
@@ -151,15 +145,7 @@ impl Refinements {
         let block = |matrix: &DMatrix<f64>| {
             DMatrix::from_fn(rows.len(), rows.len(), |a, b| matrix[(rows[a], rows[b])])
         };
-        // The remaining variance if the offsets, which are mutually independent, are known.
-        let mut by_noise = covariance.shared.clone();
-        for (row, index) in covariance.fitted.iter().enumerate() {
-            if (OFFSETS..SURFACE).contains(index) {
-                let with = covariance.shared.column(row).into_owned();
-                by_noise -= &with * with.transpose() / covariance.shared[(row, row)];
-            }
-        }
-        let gain = columns(&by_noise) * block(&by_noise).cholesky()?.inverse();
+        let gain = columns(&covariance.shared) * block(&covariance.shared).cholesky()?.inverse();
         let shared = &covariance.shared;
         let across = columns(shared) * gain.transpose();
         let change = block(shared) + self.mixture.covariance()?;

@@ -1,30 +1,31 @@
 //! Levenberg-Marquardt on the joint fit's normal equations. Their matrix has arrow shape: a step's own parameters couple only with themselves
 //! and the shared ones, so they are eliminated step by step.
 
-use crate::joint::fit::input_noise_spline::InputNoiseSpline;
-use crate::joint::step_model::model::{Setting, StepHistory};
+use crate::joint::fit::step_noise::Whitening;
+use crate::joint::step_model::history::{Model, Prediction, StepHistory, Wall};
 use crate::joint::step_model::parameters::{
-    ETA, LOCAL, LocalVector, OFFSETS, PROBE_MM2, Prior, REFINEMENTS, SHARED, SURFACE, SharedVector,
+    ETA, HOUSING, LOCAL, LocalVector, OFFSETS, Prior, SHARED, SharedVector, bounds, longest_move,
 };
 use mapper_core::IdentifiedInlet;
-use mapper_numerics::coloured_noise::WhiteningFilter;
 use mapper_numerics::least_squares::descent::ENOUGH;
-use mapper_numerics::least_squares::{Arrow, ArrowBlock, DampedFit, Reduced, minimise};
+use mapper_numerics::least_squares::{Arrow, ArrowBlock, DampedFit, Reduced, inverse, minimise};
 use mapper_numerics::parallel;
 use nalgebra::{DMatrix, DVector, Matrix4, Matrix4xX, Vector4};
 
 /// Relative rounding error of the cost. Bound: some tens of roundings of f64.
 const COST_ROUNDING: f64 = 1e-14;
 
+/// Decrease of the cost for another iteration of an intermediate fit. Bound: the weights that follow change it by more.
+const ROUGHLY: f64 = 1.0;
+
 /// One step in the fit.
 #[derive(Debug, Clone)]
 pub(crate) struct Member<'a> {
     pub(crate) history: StepHistory<'a>,
-    /// Measured T2 of each row, K.
+    /// Readings of T2 of each row, then of Tc, K.
     pub(crate) measured_k: Vec<f64>,
-    pub(crate) whitening: WhiteningFilter,
-    /// Contribution of the shared parameters to the point's efficiency: the surface terms at the step's end, and for each offset's bend the
-    /// effect of that offset on the fitted efficiency.
+    pub(crate) whitening: Whitening,
+    /// Contribution of the shared parameters to the point's efficiency: the surface terms at the step's end.
     pub(crate) coupling: SharedVector,
     pub(crate) local: LocalVector,
     /// Priors of the step's parameters; that of the efficiency is not used: see `surface_sigma`.
@@ -38,19 +39,18 @@ pub(crate) struct Member<'a> {
 /// The whole fit.
 #[derive(Debug, Clone)]
 pub(crate) struct Problem<'a> {
-    pub(crate) setting: Setting,
+    pub(crate) model: Model,
     pub(crate) members: Vec<Member<'a>>,
     pub(crate) shared: SharedVector,
     pub(crate) priors: [Prior; SHARED],
     pub(crate) active: [bool; SHARED],
-    /// Lower bound of each shared parameter.
-    pub(crate) lowest: SharedVector,
     /// Spread of a point's efficiency about the surface, one standard deviation; infinite without a surface.
     pub(crate) surface_sigma: f64,
-    /// Contribution of noise in T1, Tc, flow and pressures to the sum of squares, as a function of the probe.
-    pub(crate) input_noise: InputNoiseSpline,
-    /// Whether the probe is fitted, even if it is currently on its bound.
-    pub(crate) probe_fitted: bool,
+    /// Slope of the expected sum of squares of input noise by each shared parameter, at `input_noise_at`.
+    pub(crate) input_noise: SharedVector,
+    pub(crate) input_noise_at: SharedVector,
+    /// Whether no noise is declared, so that a fit is exact.
+    pub(crate) is_exact: bool,
     /// Whether the recording is to decide which law h before the wheel follows.
     pub(crate) inlet_sought: bool,
     /// Result of that decision; `None` if it makes no difference.
@@ -82,38 +82,46 @@ impl DampedFit for Descent<'_, '_> {
     fn step(&self, equations: &Arrow<LOCAL>, cost: f64, damping: f64) -> Option<(Self::Place, f64)> {
         let Descent { problem, fitted } = self;
         let (change, own) = equations.step(damping)?;
+        // A step across a bound, or beyond where the model is linear, is cut there as a whole, which still reduces the cost.
+        let reach = fitted.iter().enumerate().map(|(row, index)| {
+            let (low, high) = bounds(*index);
+            let bound = if change[row] > 0.0 { high } else { low };
+            let share = (bound - problem.shared[*index]) / change[row];
+            let share = if share.is_finite() { share.clamp(0.0, 1.0) } else { 1.0 };
+            share.min(longest_move(*index) / change[row].abs().max(f64::MIN_POSITIVE))
+        });
+        let share = reach.fold(1.0, f64::min);
         let mut shared = problem.shared;
         for (row, index) in fitted.iter().enumerate() {
-            shared[*index] = (shared[*index] + change[row]).max(problem.lowest[*index]);
+            let (low, high) = bounds(*index);
+            shared[*index] = (shared[*index] + share * change[row]).clamp(low, high);
         }
         let locals: Vec<LocalVector> = problem
             .members
             .iter()
             .zip(&own)
-            .map(|(member, change)| std::array::from_fn(|i| member.local[i] + change[i]))
+            .map(|(member, change)| std::array::from_fn(|i| member.local[i] + share * change[i]))
             .collect();
         let next = problem.cost(&shared, &locals);
-        (next <= cost * (1.0 + COST_ROUNDING)).then_some(((shared, locals), next))
+        (next <= cost + cost.abs() * COST_ROUNDING).then_some(((shared, locals), next))
     }
 
     fn move_to(&mut self, (shared, locals): Self::Place) -> Option<()> {
         let Descent { problem, fitted } = self;
         // A parameter on its bound stays there while the others are fitted.
-        fitted.retain(|index| shared[*index] > problem.lowest[*index]);
-        for (active, (value, lowest)) in problem.active.iter_mut().zip(shared.iter().zip(&problem.lowest)) {
-            *active &= value > lowest;
-        }
+        fitted.retain(|index| {
+            let (low, high) = bounds(*index);
+            shared[*index] > low && shared[*index] < high
+        });
         // An excluded step is not in the cost: it moves only if its own fit improves.
-        let moves: Vec<bool> = problem
-            .members
-            .iter()
-            .zip(&locals)
-            .map(|(member, local)| {
-                member.contributes
-                    || problem.local_cost(member, &shared, local)
-                        <= problem.local_cost(member, &shared, &member.local)
-            })
-            .collect();
+        let mut moves = vec![true; problem.members.len()];
+        if problem.members.iter().any(|member| !member.contributes) {
+            let after = problem.local_costs(&shared, &locals);
+            let before = problem.local_costs(&shared, &problem.locals());
+            for (i, member) in problem.members.iter().enumerate() {
+                moves[i] = member.contributes || after[i] <= before[i];
+            }
+        }
         problem.shared = shared;
         for ((member, local), moves) in problem.members.iter_mut().zip(locals).zip(moves) {
             if moves {
@@ -138,6 +146,26 @@ pub(crate) struct Covariance {
 }
 
 impl Member<'_> {
+    /// Whitened residual and derivatives; the latter are empty where the prediction has none.
+    fn whitened(&self, prediction: &Prediction) -> (Vec<f64>, Vec<Vec<f64>>) {
+        let rows = self.measured_k.len();
+        let residual: Vec<f64> =
+            self.measured_k.iter().zip(&prediction.readings_k).map(|(a, b)| a - b).collect();
+        let known: Vec<usize> = (0..prediction.columns.len())
+            .filter(|index| prediction.columns[*index].len() == rows)
+            .collect();
+        let mut all = DMatrix::zeros(rows, known.len() + 1);
+        all.column_mut(0).copy_from_slice(&residual);
+        for (place, index) in known.iter().enumerate() {
+            all.column_mut(place + 1).copy_from_slice(&prediction.columns[*index]);
+        }
+        self.whitening.apply(&mut all);
+        let column = |place: usize| all.column(place).iter().copied().collect::<Vec<f64>>();
+        let mut columns = vec![Vec::new(); prediction.columns.len()];
+        known.iter().enumerate().for_each(|(place, index)| columns[*index] = column(place + 1));
+        (column(0), columns)
+    }
+
     /// Deviation of the point's efficiency from the surface.
     pub(crate) fn off_surface(&self, shared: &SharedVector, local: &LocalVector) -> f64 {
         local[ETA] - self.coupling.iter().zip(shared).map(|(a, b)| a * b).sum::<f64>()
@@ -145,6 +173,25 @@ impl Member<'_> {
 }
 
 impl Covariance {
+    fn of(
+        fitted: Vec<usize>,
+        shared: DMatrix<f64>,
+        equations: &Arrow<LOCAL>,
+        inverses: &[Matrix4<f64>],
+    ) -> Self {
+        let sensitivities: Vec<Matrix4xX<f64>> =
+            equations.blocks.iter().zip(inverses).map(|(block, inverse)| -(inverse * &block.mixed)).collect();
+        let own = sensitivities
+            .iter()
+            .zip(inverses)
+            .map(|(answer, inverse)| {
+                let mixed = answer * &shared;
+                (inverse + &mixed * answer.transpose(), mixed)
+            })
+            .collect();
+        Covariance { fitted, shared, own, sensitivities }
+    }
+
     /// Row of a shared parameter; `None` if it was not fitted.
     pub(crate) fn row_of(&self, index: usize) -> Option<usize> {
         self.fitted.iter().position(|fitted| *fitted == index)
@@ -157,68 +204,90 @@ impl Covariance {
 }
 
 impl Problem<'_> {
-    /// All uncertain shared parameters, offsets last.
-    pub(crate) fn unknown(&self) -> Vec<usize> {
-        let (carried, mut sought): (Vec<usize>, Vec<usize>) = (0..SHARED)
-            .filter(|index| self.active[*index])
-            .partition(|index| (OFFSETS..SURFACE).contains(index));
-        sought.extend(carried);
-        sought
+    /// The fitted parameters.
+    pub(crate) fn fitted(&self) -> Vec<usize> {
+        (0..SHARED).filter(|index| self.active[*index]).collect()
     }
 
-    /// The fitted parameters, without offsets and gains. A recording carries almost no information about those beyond the declaration, and
-    /// small model errors would dominate it. They are propagated into the covariance.
-    fn fitted(&self) -> Vec<usize> {
-        (0..SHARED).filter(|index| self.active[*index] && !(OFFSETS..SURFACE).contains(index)).collect()
+    /// The parameters of each step.
+    pub(crate) fn locals(&self) -> Vec<LocalVector> {
+        self.members.iter().map(|member| member.local).collect()
     }
 
-    /// Whitened residuals of a step (measured minus predicted), and derivatives of the prediction by its own parameters and by the shared ones
-    /// named in `by`.
-    pub(crate) fn residual(
+    /// The predictions of all steps, with derivatives by the parameters of the steps and the shared ones named in `by`. With an inner wall,
+    /// step after step: each begins with the wall of the one before.
+    pub(crate) fn predictions(
         &self,
-        member: &Member<'_>,
         shared: &SharedVector,
-        local: &LocalVector,
+        locals: &[LocalVector],
         by: Option<&[bool; SHARED]>,
-    ) -> (Vec<f64>, Vec<Vec<f64>>) {
-        // A fitted probe on its bound 0 still has its first reading.
-        let mut none = [false; SHARED];
-        none[PROBE_MM2] = self.active[PROBE_MM2];
-        let prediction =
-            self.setting.predict(&member.history, shared, local, by.unwrap_or(&none), by.is_some());
-        let mut residual: Vec<f64> = member
-            .measured_k
-            .iter()
-            .zip(&prediction.t2_k)
-            .map(|(measured, predicted)| measured - predicted)
-            .collect();
-        member.whitening.apply(&mut residual);
-        let mut columns = prediction.columns;
-        for column in &mut columns {
-            member.whitening.apply(column);
+    ) -> Vec<Prediction> {
+        let none = [false; SHARED];
+        let predict = |member: &Member<'_>, local: &LocalVector, before: Option<&Wall>| {
+            self.model.predict(&member.history, (shared, local), by.unwrap_or(&none), by.is_some(), before)
+        };
+        let members: Vec<_> = self.members.iter().zip(locals).collect();
+        if !self.model.has_inner_wall {
+            return parallel::map(&members, |(member, local)| predict(member, local, None));
         }
-        (residual, columns)
+        let mut predictions: Vec<Prediction> = Vec::with_capacity(members.len());
+        for (member, local) in members {
+            let before = predictions.last().and_then(|prediction| prediction.wall.as_ref());
+            let prediction = predict(member, local, before);
+            predictions.push(prediction);
+        }
+        predictions
     }
 
-    fn local_cost(&self, member: &Member<'_>, shared: &SharedVector, local: &LocalVector) -> f64 {
-        let (residual, _) = self.residual(member, shared, local, None);
-        let mut cost: f64 = residual.iter().map(|r| r * r).sum();
-        for (index, prior) in member.priors.iter().enumerate() {
-            if index != ETA {
-                cost += prior.weight() * (local[index] - prior.mean).powi(2);
-            }
-        }
-        let off = member.off_surface(shared, local);
-        cost + off * off / (self.surface_sigma * self.surface_sigma)
+    /// The inner wall at the begin of each step.
+    pub(crate) fn walls(&self, predictions: &[Prediction]) -> Vec<Option<Wall>> {
+        let ends = predictions.iter().map(|prediction| prediction.wall.clone());
+        std::iter::once(None).chain(ends).take(self.members.len()).collect()
+    }
+
+    /// Whitened residuals of all steps (measured minus predicted), and whitened derivatives of the prediction.
+    fn residuals(
+        &self,
+        shared: &SharedVector,
+        locals: &[LocalVector],
+        by: Option<&[bool; SHARED]>,
+    ) -> Vec<(Vec<f64>, Vec<Vec<f64>>)> {
+        let predictions = self.predictions(shared, locals, by);
+        let members: Vec<_> = self.members.iter().zip(predictions).collect();
+        parallel::map(&members, |(member, prediction)| member.whitened(prediction))
+    }
+
+    /// Whitened residuals of all steps at the current parameters: T2, then Tc.
+    pub(crate) fn whitened(&self) -> Vec<Vec<f64>> {
+        let residuals = self.residuals(&self.shared, &self.locals(), None);
+        residuals.into_iter().map(|(residual, _)| residual).collect()
+    }
+
+    fn local_costs(&self, shared: &SharedVector, locals: &[LocalVector]) -> Vec<f64> {
+        let residuals = self.residuals(shared, locals, None);
+        let steps = self.members.iter().zip(locals).zip(residuals);
+        steps
+            .map(|((member, local), (residual, _))| {
+                let mut cost: f64 = residual.iter().map(|r| r * r).sum();
+                for (index, prior) in member.priors.iter().enumerate() {
+                    if index != ETA {
+                        cost += prior.weight() * (local[index] - prior.mean).powi(2);
+                    }
+                }
+                let off = member.off_surface(shared, local);
+                cost + off * off / (self.surface_sigma * self.surface_sigma)
+            })
+            .collect()
     }
 
     fn shared_cost(&self, shared: &SharedVector) -> f64 {
-        let priors: f64 = self
-            .fitted()
+        self.fitted()
             .iter()
-            .map(|i| self.priors[*i].weight() * (shared[*i] - self.priors[*i].mean).powi(2))
-            .sum();
-        priors - self.input_noise.at(shared[PROBE_MM2]).0
+            .map(|i| {
+                let prior = self.priors[*i].weight() * (shared[*i] - self.priors[*i].mean).powi(2);
+                prior - self.input_noise[*i] * (shared[*i] - self.input_noise_at[*i])
+            })
+            .sum()
     }
 
     fn normal(&self, fitted: &[usize]) -> Normal {
@@ -236,19 +305,14 @@ impl Problem<'_> {
             let prior = self.priors[*index];
             equations.shared[(row, row)] += prior.weight();
             equations.right[row] += prior.weight() * (prior.mean - self.shared[*index]);
-            if *index == PROBE_MM2 {
-                equations.right[row] += 0.5 * self.input_noise.at(self.shared[PROBE_MM2]).1;
-            }
+            equations.right[row] += 0.5 * self.input_noise[*index];
         }
         let surface_weight = 1.0 / (self.surface_sigma * self.surface_sigma);
-        // Propagated parameters cost as many model evaluations as fitted ones, so the search skips them.
         let mut wanted = [false; SHARED];
         for index in fitted {
             wanted[*index] = true;
         }
-        let evaluated = parallel::map(&self.members, |member| {
-            self.residual(member, &self.shared, &member.local, Some(&wanted))
-        });
+        let evaluated = self.residuals(&self.shared, &self.locals(), Some(&wanted));
         for (member, (residual, columns)) in self.members.iter().zip(evaluated) {
             let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
             let mut block = ArrowBlock {
@@ -327,16 +391,41 @@ impl Problem<'_> {
     }
 
     fn cost(&self, shared: &SharedVector, locals: &[LocalVector]) -> f64 {
-        let sharing: Vec<_> =
-            self.members.iter().zip(locals).filter(|(member, _)| member.contributes).collect();
-        let costs = parallel::map(&sharing, |(member, local)| self.local_cost(member, shared, local));
-        self.shared_cost(shared) + costs.iter().sum::<f64>()
+        let costs = self.local_costs(shared, locals);
+        let sharing = self.members.iter().zip(costs).filter(|(member, _)| member.contributes);
+        self.shared_cost(shared) + sharing.map(|(_, cost)| cost).sum::<f64>()
     }
 
     /// The sum of squares at the current parameters.
     pub(crate) fn square(&self) -> f64 {
-        let locals: Vec<LocalVector> = self.members.iter().map(|member| member.local).collect();
-        self.cost(&self.shared, &locals)
+        self.cost(&self.shared, &self.locals())
+    }
+
+    /// ln of the density of the recording, by Laplace's method at the minimum, up to a constant of the recording. It counts the steps that a fit
+    /// excludes because it does not describe them.
+    pub(crate) fn ln_evidence(&self) -> Option<f64> {
+        let mut whole = self.clone();
+        whole.members.iter_mut().for_each(|member| member.contributes = !member.excluded);
+        whole.ln_density()
+    }
+
+    fn ln_density(&self) -> Option<f64> {
+        let fitted = self.fitted();
+        let Normal { cost, equations } = self.normal(&fitted);
+        let Reduced { matrix, inverses, .. } = equations.reduced(0.0)?;
+        let factor = matrix.cholesky()?;
+        let mut ln_volume: f64 = -factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>();
+        let sharing = self.members.iter().zip(&inverses).filter(|(member, _)| member.contributes);
+        let mut ln_prior: f64 =
+            fitted.iter().map(|i| self.priors[*i].weight()).filter(|w| *w > 0.0).map(|w| 0.5 * w.ln()).sum();
+        let mut ln_noise = 0.0;
+        for (member, inverse) in sharing {
+            ln_volume += 0.5 * inverse.determinant().ln();
+            ln_noise += member.whitening.ln_spread;
+            let own = (0..LOCAL).filter(|index| *index != ETA).map(|index| member.priors[index].sigma.ln());
+            ln_prior -= own.sum::<f64>() + self.surface_sigma.ln();
+        }
+        Some(-0.5 * cost + ln_volume + ln_prior - ln_noise)
     }
 
     /// ln of the ratio of h before the wheel to h after it by the inlet's own law, at the end of each step.
@@ -344,8 +433,8 @@ impl Problem<'_> {
         self.members
             .iter()
             .filter_map(|member| {
-                let end = member.history.rows.last()?;
-                Some(self.setting.ln_inlet_ratio_at(end, &self.shared, &member.local))
+                let end = member.history.step.rows.last()?;
+                Some(self.model.at_end(end, &self.shared, &member.local).ln_inlet_ratio)
             })
             .collect()
     }
@@ -353,12 +442,12 @@ impl Problem<'_> {
     /// Finds the minimum from the current parameters; `None` if it does not converge. Noise-free recordings resolve less than any standard
     /// error.
     pub(crate) fn minimise(&mut self) -> Option<f64> {
-        self.descend(0.0)
+        self.descend(if self.is_exact { 0.0 } else { ENOUGH })
     }
 
-    /// The same for an intermediate fit, or one that is compared with standard errors.
+    /// The same for an intermediate fit.
     pub(crate) fn minimise_roughly(&mut self) -> Option<f64> {
-        self.descend(ENOUGH)
+        self.descend(if self.is_exact { ENOUGH } else { ROUGHLY })
     }
 
     /// Ends if an iteration decreases the cost by `enough` or less.
@@ -375,75 +464,41 @@ impl Problem<'_> {
         indices.iter().map(|index| Some(self.shared[*index] + change[row(index)?])).collect()
     }
 
-    /// The problem at its minimum without the efficiency surface: the information of the steps and shared parameters alone.
-    pub(crate) fn without_a_surface(&self) -> Option<Self> {
-        let mut free = self.clone();
-        free.surface_sigma = f64::INFINITY;
-        free.active[SURFACE..].fill(false);
-        for (index, _, slab_sigma, _) in REFINEMENTS {
-            free.priors[index].sigma = slab_sigma;
-        }
-        free.minimise_roughly()?;
-        Some(free)
-    }
-
-    /// The same problem with readings that have no offset and no gain error.
-    pub(crate) fn with_exact_readings(&self) -> Self {
-        let mut exact = self.clone();
-        exact.active[OFFSETS..SURFACE].fill(false);
-        exact
-    }
-
     /// Covariance at the minimum; `None` if the equations are singular.
-    ///
-    /// Offsets keep their declared spread, and all other parameters respond to them as in the fit (Schmidt's consider covariance).
     pub(crate) fn covariance(&self) -> Option<Covariance> {
-        let fitted = self.unknown();
+        let fitted = self.fitted();
+        let equations = self.normal(&fitted).equations;
+        let Reduced { matrix, inverses, .. } = equations.reduced(0.0)?;
+        let shared = if fitted.is_empty() { DMatrix::zeros(0, 0) } else { inverse(&matrix.cholesky()?) };
+        Some(Covariance::of(fitted, shared, &equations, &inverses))
+    }
+
+    /// Covariance of a fit without the errors of the readings, which keep their declared spread: every other parameter responds to them as the
+    /// fit does (Schmidt's consider covariance).
+    pub(crate) fn considered(&self) -> Option<Covariance> {
+        let is_error = |index: &usize| (OFFSETS..HOUSING).contains(index);
+        let mut fitted = self.fitted();
+        fitted.sort_by_key(is_error);
         let equations = self.normal(&fitted).equations;
         let Reduced { matrix: reduced, inverses, .. } = equations.reduced(0.0)?;
-        let sought = fitted.iter().filter(|index| !(OFFSETS..SURFACE).contains(*index)).count();
+        let sought = fitted.iter().filter(|index| !is_error(index)).count();
         let carried = fitted.len() - sought;
-        let mut shared = DMatrix::zeros(fitted.len(), fitted.len());
-        let inverse = if sought == 0 {
+        let found = if sought == 0 {
             DMatrix::zeros(0, 0)
         } else {
-            reduced.view((0, 0), (sought, sought)).into_owned().cholesky()?.inverse()
+            inverse(&reduced.view((0, 0), (sought, sought)).into_owned().cholesky()?)
         };
-        let answer = -(&inverse * reduced.view((0, sought), (sought, carried)));
-        // Input noise moves the probe more than least squares expects.
-        let mut inverse = inverse;
-        for (row, index) in fitted[..sought].iter().enumerate() {
-            let pulled = inverse.column(row).into_owned();
-            if *index == PROBE_MM2 {
-                inverse += self.input_noise.half_slope_variance(self.shared[PROBE_MM2])
-                    * &pulled
-                    * pulled.transpose();
-            }
-        }
-        let inverse = inverse;
+        let answer = -(&found * reduced.view((0, sought), (sought, carried)));
         let spread = DMatrix::from_diagonal(&DVector::from_iterator(
             carried,
             fitted[sought..].iter().map(|index| self.priors[*index].sigma.powi(2)),
         ));
         let mixed = &answer * &spread;
-        shared.view_mut((0, 0), (sought, sought)).copy_from(&(inverse + &mixed * answer.transpose()));
+        let mut shared = DMatrix::zeros(fitted.len(), fitted.len());
+        shared.view_mut((0, 0), (sought, sought)).copy_from(&(found + &mixed * answer.transpose()));
         shared.view_mut((0, sought), (sought, carried)).copy_from(&mixed);
         shared.view_mut((sought, 0), (carried, sought)).copy_from(&mixed.transpose());
         shared.view_mut((sought, sought), (carried, carried)).copy_from(&spread);
-        let sensitivities: Vec<Matrix4xX<f64>> = equations
-            .blocks
-            .iter()
-            .zip(&inverses)
-            .map(|(block, inverse)| -(inverse * &block.mixed))
-            .collect();
-        let own = sensitivities
-            .iter()
-            .zip(&inverses)
-            .map(|(answer, inverse)| {
-                let mixed = answer * &shared;
-                (inverse + &mixed * answer.transpose(), mixed)
-            })
-            .collect();
-        Some(Covariance { fitted, shared, own, sensitivities })
+        Some(Covariance::of(fitted, shared, &equations, &inverses))
     }
 }

@@ -1,32 +1,29 @@
 //! Prepares a recording for the fit, and estimates noise and spreads from the fit.
 
 use crate::faults::smooth::ANY_ROUGHNESS;
-use crate::joint::fit::inlet;
-use crate::joint::fit::input_noise_spline::InputNoiseSpline;
 use crate::joint::fit::solve::{Member, Problem};
-use crate::joint::step_model::model::reynolds;
-use crate::joint::step_model::model::{Setting, StepHistory};
+use crate::joint::fit::{inlet, step_noise};
+use crate::joint::step_model::gas_path::{Setting, reynolds};
+use crate::joint::step_model::history::{Model, StepHistory};
 use crate::joint::step_model::parameters::{
-    ALPHA, BAROMETER, BENDS, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, GAIN_CHANNELS, GAINS, HUMIDITY, INLET,
-    LN_AREA, LN_COEFFICIENT, LN_DEVIATION, LN_HEATING_COOLING_RATIO, LOCAL, OFFSET_CHANNELS, OFFSETS,
-    PROBE_MM2, Prior, REFINEMENTS, SHARED, SLOPE, SURFACE,
+    ALPHA, BAROMETER, BEARING, ETA, EXPONENT, EXTERNAL, FIRST_READING, FLOW_GAIN, GAIN_CHANNELS, GAINS, HEAT,
+    HEAT_BY_TC, HUMIDITY, INLET, LN_AREA, LN_CAPACITY, LN_COEFFICIENT, LN_DEVIATION, LN_HEATING_COOLING_RATIO,
+    LN_INNER_CONDUCTANCE, LN_OIL, LOCAL, LOGIT_INNER, OFFSET_CHANNELS, OFFSETS, PREHEAT, PROBE_MM2, Prior,
+    RADIATION, REFINEMENTS, SHARED, STEP_HEAT, SURFACE, TC_LAG, THERMOMETERS,
 };
 use crate::joint::step_model::rows::{StepRows, condensed};
-use crate::joint::step_model::smoothing::SHORTEST_HALF_S;
-use crate::joint::step_model::surface::{SurfaceScale, TERM_COUNT, dot};
+use crate::joint::step_model::surface::{SurfaceScale, TERM_COUNT};
 use crate::single_step::dynamic::{self, Estimate};
 use crate::step_data::cleaning::cleaned;
 use crate::step_data::end_state::EndState;
-use crate::step_data::samples::{Row, Samples};
+use crate::step_data::samples::Samples;
 use crate::step_data::window;
 use crate::step_outcome::findings::Findings;
 use crate::{IdentifyConfig, WindowRule, step_data::commands};
 use mapper_core::unit_factors::MM_PER_M;
-use mapper_core::{Channel, Choice, Recording, TooFew, Warning, Window};
-use mapper_numerics::coloured_noise::{BlockNoise, WhiteningFilter};
+use mapper_core::{Channel, Choice, Recording, Series, StepMarker, TooFew, Warning, Window};
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::{DOUBT_SIGMAS, mean};
-use mapper_observe::declared::usual_noise_sigma;
 use nalgebra::DVector;
 
 /// Prior of ln of the Nusselt coefficient about that of Appendix A, one standard deviation. Bound: a factor of 20 either way, more than
@@ -36,7 +33,8 @@ const LN_COEFFICIENT_SIGMA: f64 = 3.0;
 const EXPONENT_MEAN: f64 = 0.9;
 /// Its standard deviation. Bound: from laminar, 0.3, to proportional to flow and above, 1.4.
 const EXPONENT_SIGMA: f64 = 0.5;
-/// Minimum start value of the square of a fitted probe's diameter, mm2. Bound: a start value only; at 0 the derivative would vanish.
+/// Minimum start value of the square of a fitted probe's diameter without the balance, mm2. Bound: a start value only; a probe without lag has no time history from
+/// which to find one.
 const START_PROBE_MM2: f64 = 0.5;
 /// Efficiencies of single steps that count for the start value. Bound: those of compressors, choke included.
 const START_ETAS: std::ops::Range<f64> = 0.2..0.95;
@@ -46,32 +44,65 @@ const USUAL_ETA: f64 = 0.65;
 const START_CLAMP_ETA: (f64, f64) = (0.3, 0.9);
 /// Spread of h about the law before the recording determines it. Bound: a start value only, three times [`LAW_SIGMA`].
 const START_DEVIATION_SIGMA: f64 = 0.01;
-/// Error of the first reading as the state of the probe, K, one standard deviation. Bound: above any lag after the first seconds.
+/// Error of the first reading as the state of the probe, K, one standard deviation. Bound: noise of a mean over half a second, and the bend of T2
+/// within it.
 const FIRST_READING_SIGMA_K: f64 = 5.0;
-/// Error of the surface's slope within a step, ratio, one standard deviation. Judgement: surfaces through a few points bend differently from maps.
-const SLOPE_SIGMA: f64 = 0.05;
 /// Step of the logarithm of the spreads that are tried. Bound: spreads a tenth apart give the same weights to the points.
 const SPREAD_STEP_LN: f64 = 0.1;
-/// Parameters of a step that its residual determines. Source: degrees of freedom: efficiency, first reading and h.
-const FITTED_PER_STEP: f64 = 3.0;
-/// Minimum noise of a block mean, K. Bound: rounding of readings to 0.001 K.
-const MIN_NOISE_K: f64 = 3e-4;
-/// Minimum share of white noise in the noise of a step. Bound: keeps the whitening regular.
-const MIN_WHITE_RATIO: f64 = 0.1;
 
 /// Start of the used part of a step after the last command change without noise, s: h and efficiency are modelled while the operating point
-/// settles, and the first seconds only show where the surface is wrong.
-pub(crate) const START_S: f64 = SHORTEST_HALF_S;
-/// The same with noise, s. Noise can look like a slow probe but for the seconds right after the jump, where the two differ by tens of
-/// kelvin. Calibrated: `benches/identification.py`. Inputs are smoothed over 3 s at first: starting at 1.5 s made a probe of 0.7 mm 0.026
-/// mm too small, from 2 s on it is within its error (mean of 20 seeds).
+/// settles, and the first seconds only show where the surface is wrong. Bound: shaft and outlet volume of a fast stand settle within it.
+pub(crate) const START_S: f64 = 3.0;
+/// The same with noise, s. Calibrated: `benches/identification.py`; earlier starts leave what smoothing does not follow, which looks like a
+/// probe of 0.7 mm.
 pub(crate) const START_WITH_NOISE_S: f64 = 2.0;
+/// The same with the balance of the housing, s: alpha_A and probe then follow from it, and what smoothing leaves of the first seconds would act on
+/// both. Calibrated: as above; from 4 s on one of eighteen recordings ended in a wrong minimum.
+pub(crate) const START_WITH_BALANCE_S: f64 = 6.0;
+/// Part of a step at its end with which its operating point is compared, ratio. Bound: long enough for a mean, short enough to have settled.
+const TAIL_RATIO: f64 = 0.25;
+/// Distance of the speed from its mean there within which a window may begin, ratio. Bound: the surface's slope is known to some per cent, and
+/// so far from the end it makes errors of a tenth of a point.
+const SPEED_BAND_RATIO: f64 = 0.015;
+/// The same of the flow. Bound: as for the speed; efficiency varies less along a line.
+const FLOW_BAND_RATIO: f64 = 0.05;
+/// Shortest window that a slow operating point leaves, s. Bound: a probe and a housing are then still visible.
+const SHORTEST_S: f64 = 8.0;
+/// Length of the means that are compared, s. Bound: noise of a flow meter at 10 Hz is then below 1 %.
+const SECOND_S: f64 = 1.0;
+
+/// Prior of the relative error of the housing's free convection. Source: correlations of free convection about bodies (Incropera, table 9)
+/// scatter by a quarter, and the air of a cell moves.
+const EXTERNAL_SIGMA: f64 = 0.5;
+/// The same of the conductance to the bearing. Bound: section and length of a bearing housing are known to a quarter.
+const BEARING_SIGMA: f64 = 0.3;
+/// Prior of ln of the conductance to the oil. Bound: within a factor of two of the declared one.
+const LN_OIL_SIGMA: f64 = 0.4;
+/// Prior of the view factor times area to the turbine housing, m2. Bound: a heat shield leaves a hundredth of a square metre.
+const RADIATION_SIGMA_M2: f64 = 0.01;
+/// Prior of heat from another source, W. Bound: a tenth of what a hot housing exchanges with its gas.
+const HEAT_SIGMA_W: f64 = 30.0;
+/// The same if the turbine housing or the oil is not recorded: their mean, W.
+const NEIGHBOURS_W: f64 = 60.0;
+/// Its standard deviation, W. Bound: turbine housings of 400 to 900 K behind 1.5 W/K.
+const NEIGHBOURS_SIGMA_W: f64 = 100.0;
+/// Prior of heat in proportion to Tc, W/K. Source: a cooled housing takes some 2 W/K.
+const HEAT_BY_TC_SIGMA_W_K: f64 = 2.0;
+/// Prior of the heat that a step's balance does not have, W: its spread is fitted.
+pub(crate) const STEP_HEAT_SIGMA_W: f64 = 3.0;
+/// Prior of the logit of the inner wall's share of the capacity. Bound: shares of 0.05 to 0.85 within two standard deviations.
+const LOGIT_INNER_PRIOR: (f64, f64) = (-0.5, 1.2);
+/// Prior of ln of the inner wall's conductance, W/K. Bound: 2 to 280 W/K within two standard deviations.
+const LN_INNER_CONDUCTANCE_PRIOR: (f64, f64) = (3.2, 1.2);
+/// Error that a zero of all thermometers cannot show, K. Judgement: even air at rest differs from place to place by some tenths.
+const THERMOMETERS_SIGMA_K: f64 = 0.15;
+/// Error that a zero of both pressures cannot show, Pa. Source: barometers of class 0.05 % of 1 bar, as the limits of a rectangular
+/// distribution.
+const PRESSURES_SIGMA_PA: f64 = 45.0;
+
 /// Expected spread of the points' efficiencies about the surface, fraction: maps are not polynomials. Calibrated:
 /// `benches/identification.py`, 0.0006; a machine with a map that drops steeply at choke has 0.005.
 pub(crate) const SURFACE_SIGMA: f64 = 1e-3;
-/// Relative error of the surface's effect on a prediction. Judgement: surfaces
-/// through a few points bend differently from maps.
-const SHAPE_ERROR_RATIO: f64 = 0.03;
 /// Expected spread of the points' h about the law, ratio. Calibrated: `benches/identification.py`, 0.0022 to 0.003.
 pub(crate) const LAW_SIGMA: f64 = 3e-3;
 /// Weight of the expected spread, in points. Bound: small next to the dozens of points of a campaign, sufficient without any.
@@ -105,6 +136,20 @@ pub(crate) fn steps(
     steps
 }
 
+/// Start of the used part of a step after its last command change, s.
+pub(crate) fn start_after_s(config: &IdentifyConfig) -> f64 {
+    match (config.declared.is_empty(), has_balance(config)) {
+        (true, _) => START_S,
+        (false, false) => START_WITH_NOISE_S,
+        (false, true) => START_WITH_BALANCE_S,
+    }
+}
+
+/// Whether the change of Tc is an observation: without its noise it has no weight against T2.
+fn has_balance(config: &IdentifyConfig) -> bool {
+    config.joint.balance == Choice::Fitted && config.sensor(Channel::Tc).noise_sigma > 0.0
+}
+
 /// Condenses one step.
 fn rows_of(
     recording: &Recording,
@@ -114,14 +159,16 @@ fn rows_of(
     own: &mut Findings,
 ) -> Option<StepRows> {
     let step = recording.steps.get(position)?;
-    let after_s = if config.declared.is_empty() { START_S } else { START_WITH_NOISE_S };
+    let after_s = start_after_s(config);
     let start_s = commands::settled_s(recording, step).max(step.start_s) + after_s;
-    let window = Window { start_s, end_s: step.end_s };
     if start_s.is_nan() || start_s >= step.end_s {
         let late = TooFew::LateCommands { before_end_s: step.end_s - start_s };
         own.refuse(Warning::TooFewSamples(late));
         return None;
     }
+    let start_s = reached_s(recording, step, start_s);
+    let window = Window { start_s, end_s: step.end_s };
+    let before = Samples::of(recording, Window { start_s: step.start_s, end_s: start_s }, config, true);
     let samples = cleaned(Samples::of(recording, window, config, true), config, own);
     if !dynamic::enough(&samples, config, own) {
         return None;
@@ -137,7 +184,34 @@ fn rows_of(
             own.doubt(Warning::NotStabilised { quantity, settled_s, needed_s, used_s: None });
         }
     }
-    condensed(recording, position, &samples, end_state, config)
+    condensed(recording, position, (&before, &samples), end_state, config)
+}
+
+/// Time from which on speed and flow stay near their values at the end of the step, s; at least `start_s`.
+fn reached_s(recording: &Recording, step: &StepMarker, start_s: f64) -> f64 {
+    let tail_s = step.end_s - TAIL_RATIO * (step.end_s - start_s);
+    let latest_s = (step.end_s - SHORTEST_S).max(start_s);
+    let bands = [(Channel::ShaftSpeed, SPEED_BAND_RATIO), (Channel::CompressorFlow, FLOW_BAND_RATIO)];
+    bands.into_iter().fold(start_s, |found_s, (channel, band_ratio)| {
+        let Some(series) = recording.series.get(&channel) else { return found_s };
+        let blocks = step_blocks(series, start_s, step.end_s);
+        let tail = blocks.iter().filter(|(t_s, _)| *t_s >= tail_s).map(|(_, value)| *value);
+        let Some(end) = mean(tail) else { return found_s };
+        let off = |(_, value): &&(f64, f64)| (value / end - 1.0).abs() > band_ratio;
+        let last = blocks.iter().filter(|(t_s, _)| *t_s < latest_s).filter(off).next_back();
+        last.map_or(found_s, |(t_s, _)| found_s.max((t_s + 0.5 * SECOND_S).min(latest_s)))
+    })
+}
+
+/// Means over a second, with their middle, s.
+fn step_blocks(series: &Series, start_s: f64, end_s: f64) -> Vec<(f64, f64)> {
+    let count = ((end_s - start_s) / SECOND_S).floor().clamp(0.0, series.t_s.len() as f64) as usize;
+    let block = |i: usize| {
+        let from_s = start_s + i as f64 * SECOND_S;
+        let (_, values) = series.slice(from_s, from_s + SECOND_S);
+        Some((from_s + 0.5 * SECOND_S, mean(values.iter().copied().filter(|value| value.is_finite()))?))
+    };
+    (0..count).filter_map(block).collect()
 }
 
 /// The fit with its start values.
@@ -164,7 +238,6 @@ pub(crate) fn problem<'a>(
     let mut priors = [free; SHARED];
     let mut shared = [0.0; SHARED];
     let mut active = [false; SHARED];
-    let mut lowest = [f64::NEG_INFINITY; SHARED];
     let law = mapper_physics::machine::params::Params::default().compressor;
     shared[EXPONENT] = law.nusselt_exponent;
     shared[LN_COEFFICIENT] = law.nusselt_coefficient.ln() + law.nusselt_exponent * ln_reference;
@@ -172,16 +245,15 @@ pub(crate) fn problem<'a>(
     priors[EXPONENT] = Prior { mean: EXPONENT_MEAN, sigma: EXPONENT_SIGMA };
     active[LN_COEFFICIENT] = true;
     active[EXPONENT] = true;
-    REFINEMENTS.into_iter().for_each(|(index, sigma, ..)| priors[index].sigma = sigma);
+    REFINEMENTS.into_iter().for_each(|refinement| priors[refinement.index].sigma = refinement.wide_sigma);
     shared[ALPHA] = config.alpha_area_ratio;
     priors[ALPHA].mean = config.alpha_area_ratio;
     active[ALPHA] = choice.alpha_area == Choice::Fitted;
     let probe_mm2 = (MM_PER_M * config.probe_diameter_m).powi(2);
-    shared[PROBE_MM2] =
-        if choice.probe == Choice::Fitted { probe_mm2.max(START_PROBE_MM2) } else { probe_mm2 };
+    let start_mm2 = if has_balance(config) { 0.0 } else { START_PROBE_MM2 };
+    shared[PROBE_MM2] = if choice.probe == Choice::Fitted { probe_mm2.max(start_mm2) } else { probe_mm2 };
     priors[PROBE_MM2].mean = probe_mm2;
     active[PROBE_MM2] = choice.probe == Choice::Fitted;
-    lowest[PROBE_MM2] = 0.0;
     active[LN_HEATING_COOLING_RATIO] = choice.heating_cooling_ratio == Choice::Fitted;
     shared[INLET] = inlet::power_of(config.inlet_convection);
     priors[LN_AREA] = Prior { mean: 0.0, sigma: config.internal_area_sigma_ratio };
@@ -193,15 +265,40 @@ pub(crate) fn problem<'a>(
         };
         for (i, channel) in OFFSET_CHANNELS.into_iter().enumerate() {
             fit_error(OFFSETS + i, config.sensor(channel).offset_sigma);
-            fit_error(BENDS + i, config.sensor(channel).offset_sigma);
         }
         for (i, channel) in GAIN_CHANNELS.into_iter().enumerate() {
             fit_error(GAINS + i, config.sensor(channel).gain_sigma_ratio);
         }
         fit_error(FLOW_GAIN, config.sensor(Channel::CompressorFlow).gain_sigma_ratio);
-        fit_error(BAROMETER, config.barometer_sigma_pa);
+        let is_zeroed = config.rest_pressure_pa > 0.0;
+        let unseen = |sigma: f64| if is_zeroed { sigma } else { 0.0 };
+        fit_error(BAROMETER, config.barometer_sigma_pa.hypot(unseen(PRESSURES_SIGMA_PA)));
+        fit_error(THERMOMETERS, unseen(THERMOMETERS_SIGMA_K));
         fit_error(HUMIDITY, config.humidity_sigma_kg_kg);
     }
+    let has_balance = has_balance(config);
+    if has_balance {
+        active[PREHEAT] = true;
+        active[TC_LAG] = true;
+        let mut fit = |index: usize, mean: f64, sigma: f64| {
+            priors[index] = Prior { mean, sigma };
+            shared[index] = mean;
+            active[index] = true;
+        };
+        let rows = || steps.iter().flat_map(|step| &step.rows);
+        fit(LN_CAPACITY, 0.0, config.housing.ln_capacity_sigma);
+        fit(EXTERNAL, 0.0, EXTERNAL_SIGMA);
+        fit(HEAT_BY_TC, 0.0, HEAT_BY_TC_SIGMA_W_K);
+        if rows().all(|row| row.has_neighbours()) {
+            fit(HEAT, 0.0, HEAT_SIGMA_W);
+            fit(BEARING, 0.0, BEARING_SIGMA);
+            fit(LN_OIL, 0.0, LN_OIL_SIGMA);
+            fit(RADIATION, 0.0, RADIATION_SIGMA_M2);
+        } else {
+            fit(HEAT, NEIGHBOURS_W, NEIGHBOURS_SIGMA_W);
+        }
+    }
+    let model = Model { setting, housing: config.housing, has_inner_wall: false, has_balance };
     let etas: Vec<f64> = steps
         .iter()
         .filter_map(|step| alone.get(step.position)?.eta.map(|(eta, _)| eta))
@@ -215,35 +312,50 @@ pub(crate) fn problem<'a>(
     }
 
     let members =
-        steps.iter().map(|step| member(step, alone.get(step.position), &scale, mean_eta, config)).collect();
+        steps.iter().map(|step| member(step, alone.get(step.position), (&scale, mean_eta), &model, config)).collect::<Option<Vec<_>>>()?;
     Some(Problem {
-        setting,
+        model,
         members,
         shared,
         priors,
         active,
-        lowest,
         surface_sigma: ANY_ROUGHNESS,
-        input_noise: InputNoiseSpline::default(),
-        probe_fitted: choice.probe == Choice::Fitted,
+        input_noise: [0.0; SHARED],
+        input_noise_at: [0.0; SHARED],
+        is_exact: config.declared.is_empty(),
         inlet_sought: choice.inlet_h == Choice::Fitted,
         inlet: None,
     })
 }
 
+/// The problem of a housing with an inner wall, which the problem of one node starts.
+pub(crate) fn with_inner_wall<'a>(problem: &Problem<'a>) -> Problem<'a> {
+    let mut two = problem.clone();
+    two.model.has_inner_wall = true;
+    for (index, (mean, sigma)) in
+        [(LOGIT_INNER, LOGIT_INNER_PRIOR), (LN_INNER_CONDUCTANCE, LN_INNER_CONDUCTANCE_PRIOR)]
+    {
+        two.priors[index] = Prior { mean, sigma };
+        two.shared[index] = mean;
+        two.active[index] = true;
+    }
+    two
+}
+
 /// A step with its start values. `found`: result of the step alone; `mean_eta` replaces an efficiency that it does not give.
-pub(crate) fn member<'a>(
+fn member<'a>(
     step: &'a StepRows,
     found: Option<&Estimate>,
-    scale: &SurfaceScale,
-    mean_eta: f64,
+    (scale, mean_eta): (&SurfaceScale, f64),
+    model: &Model,
     config: &IdentifyConfig,
-) -> Member<'a> {
+) -> Option<Member<'a>> {
     let free = Prior { mean: 0.0, sigma: f64::INFINITY };
     let end_terms = scale.terms(step.end.place);
     let terms = step
-        .rows
+        .lead
         .iter()
+        .chain(&step.rows)
         .map(|row| {
             let here = scale.terms(row.place);
             std::array::from_fn::<f64, TERM_COUNT, _>(|k| here[k] - end_terms[k])
@@ -260,14 +372,15 @@ pub(crate) fn member<'a>(
     own[LN_DEVIATION] = Prior { mean: 0.0, sigma: START_DEVIATION_SIGMA };
     local[FIRST_READING] = first_k;
     own[FIRST_READING] = Prior { mean: first_k, sigma: FIRST_READING_SIGMA_K };
-    local[SLOPE] = 1.0;
-    own[SLOPE] = Prior { mean: 1.0, sigma: SLOPE_SIGMA };
-    // Refined from the residual.
-    let noise_k = usual_noise_sigma(Channel::T2);
-    Member {
-        history: StepHistory { rows: &step.rows, terms },
-        measured_k: step.rows.iter().map(|row| row.t2_k).collect(),
-        whitening: whitening(step, config, noise_k, noise_k, |_| 0.0),
+    own[STEP_HEAT] = Prior { mean: 0.0, sigma: STEP_HEAT_SIGMA_W };
+    let mut measured_k: Vec<f64> = step.rows.iter().map(|row| row.t2_k).collect();
+    if model.has_balance {
+        measured_k.extend(step.rows.iter().map(|row| row.tc_read_k));
+    }
+    Some(Member {
+        history: StepHistory { step, terms },
+        whitening: step_noise::start(step, measured_k.len(), config)?,
+        measured_k,
         coupling: std::array::from_fn(|i| {
             i.checked_sub(SURFACE).and_then(|k| end_terms.get(k)).copied().unwrap_or(0.0)
         }),
@@ -275,28 +388,13 @@ pub(crate) fn member<'a>(
         priors: own,
         contributes: true,
         excluded: false,
-    }
-}
-
-/// `shape_k`: effect of the surface on the prediction at each row, K. Part of it is wrong, and varies as slowly as it does.
-fn whitening(
-    step: &StepRows,
-    config: &IdentifyConfig,
-    sigma_k: f64,
-    white_sigma_k: f64,
-    shape_k: impl Fn(usize) -> f64,
-) -> WhiteningFilter {
-    let noise = step.rows.iter().enumerate().map(|(i, row)| {
-        let wrong = SHAPE_ERROR_RATIO * shape_k(i) / sigma_k;
-        (row.t_s, BlockNoise { first_order: row.noise.first_order + wrong * wrong, ..row.noise }, true)
-    });
-    WhiteningFilter::new(noise, config.noise_colour.time_constant_s, sigma_k, white_sigma_k)
+    })
 }
 
 /// Estimates the noise of each step and the spreads of the points about surface and law from the fit; `None` if the equations are singular.
-pub(crate) fn refine(problem: &mut Problem<'_>, steps: &[StepRows], config: &IdentifyConfig) -> Option<()> {
-    set_weights(problem, steps, config);
-    let covariance = problem.with_exact_readings().covariance()?;
+pub(crate) fn refine(problem: &mut Problem<'_>, config: &IdentifyConfig) -> Option<()> {
+    step_noise::set(problem, config)?;
+    let covariance = problem.covariance()?;
     let of_steps = || problem.members.iter().zip(&covariance.own).filter(|(member, _)| member.contributes);
     let off_surface: Vec<(f64, f64)> = of_steps()
         .map(|(member, (own, mixed))| {
@@ -310,14 +408,23 @@ pub(crate) fn refine(problem: &mut Problem<'_>, steps: &[StepRows], config: &Ide
             (member.off_surface(&problem.shared, &member.local), variance)
         })
         .collect();
-    let off_law: Vec<(f64, f64)> = of_steps()
-        .map(|(member, (own, _))| (member.local[LN_DEVIATION], own[(LN_DEVIATION, LN_DEVIATION)]))
-        .collect();
+    let own = |index: usize| -> Vec<(f64, f64)> {
+        of_steps().map(|(member, (own, _))| (member.local[index], own[(index, index)])).collect()
+    };
+    let (off_law, off_balance) = (own(LN_DEVIATION), own(STEP_HEAT));
     problem.surface_sigma = spread(&off_surface, problem.surface_sigma, SURFACE_SIGMA);
-    let before = problem.members.first().map_or(LAW_SIGMA, |member| member.priors[LN_DEVIATION].sigma);
-    let sigma = spread(&off_law, before, LAW_SIGMA);
+    let before = |index: usize, usual: f64| {
+        problem.members.first().map_or(usual, |member| member.priors[index].sigma)
+    };
+    let law_sigma = spread(&off_law, before(LN_DEVIATION, LAW_SIGMA), LAW_SIGMA);
+    let heat_sigma_w = if problem.model.has_balance {
+        spread(&off_balance, before(STEP_HEAT, STEP_HEAT_SIGMA_W), STEP_HEAT_SIGMA_W)
+    } else {
+        STEP_HEAT_SIGMA_W
+    };
     for member in &mut problem.members {
-        member.priors[LN_DEVIATION].sigma = sigma;
+        member.priors[LN_DEVIATION].sigma = law_sigma;
+        member.priors[STEP_HEAT].sigma = heat_sigma_w;
     }
     Some(())
 }
@@ -349,38 +456,3 @@ fn spread(posteriors: &[(f64, f64)], under_sigma: f64, expected: f64) -> f64 {
         .unwrap_or(expected)
 }
 
-/// Sensitivity of the fitted efficiency to the offsets, from the sensitivities of T2 to the readings and to the efficiency; `None` if T2 does
-/// not depend on the efficiency.
-pub(crate) fn coupled(slopes: &[f64; 6], by_eta: f64) -> Option<[f64; OFFSET_CHANNELS.len()]> {
-    let coupled = std::array::from_fn(|i| -slopes[i] / by_eta);
-    coupled.iter().all(|x: &f64| x.is_finite()).then_some(coupled)
-}
-
-/// Sets the noise of each step and the sensitivity of its efficiency to offsets, at the current parameters.
-pub(crate) fn set_weights(problem: &mut Problem<'_>, steps: &[StepRows], config: &IdentifyConfig) {
-    let declared = Row::CHANNELS.map(|channel| config.sensor(channel).noise_sigma);
-    for (i, step) in steps.iter().enumerate().take(problem.members.len()) {
-        let member = &problem.members[i];
-        let slopes = problem.setting.sensitivities(&step.end, &problem.shared, &member.local);
-        let expected: f64 = slopes.iter().zip(&declared).map(|(slope, sigma)| (slope * sigma).powi(2)).sum();
-        // Without a declaration the residual gives the noise.
-        let sigma_k = if expected > 0.0 {
-            expected.sqrt()
-        } else {
-            let predicted_k = problem.setting.predict_t2_k(&member.history, &problem.shared, &member.local);
-            let square: f64 =
-                member.measured_k.iter().zip(&predicted_k).skip(1).map(|(a, b)| (a - b).powi(2)).sum();
-            (square / (member.measured_k.len() as f64 - FITTED_PER_STEP).max(1.0)).sqrt().max(MIN_NOISE_K)
-        };
-        let by_eta = problem.setting.by_efficiency(&step.end, &problem.shared, &member.local);
-        if let Some(coupled) = coupled(&slopes, by_eta) {
-            problem.members[i].coupling[BENDS..].copy_from_slice(&coupled);
-        }
-        let white_sigma_k = if expected > 0.0 { declared[1].max(MIN_WHITE_RATIO * sigma_k) } else { sigma_k };
-        let terms = &problem.members[i].history.terms;
-        let surface = crate::joint::step_model::model::surface_of(&problem.shared);
-        let shape_k = |row: usize| terms.get(row).map_or(0.0, |terms| by_eta * dot(terms, surface));
-        let new = whitening(step, config, sigma_k, white_sigma_k, shape_k);
-        problem.members[i].whitening = new;
-    }
-}

@@ -12,12 +12,15 @@ pub(crate) const LN_COEFFICIENT: Place = 0;
 pub(crate) const EXPONENT: Place = 1;
 /// alpha_A.
 pub(crate) const ALPHA: Place = 2;
-/// Square of the probe's diameter, mm2: the lag grows with it from 0.
+/// Square of the probe's diameter, mm2: the lag grows with it from 0. A negative one leads by as much as a positive one lags, so that a
+/// fit near 0 has no bound.
 pub(crate) const PROBE_MM2: Place = 3;
 /// ln of the heating/cooling ratio of h.
 pub(crate) const LN_HEATING_COOLING_RATIO: Place = 4;
+/// Conductance between housing and gas before the wheel that does not follow the law of h, W/K: an inlet duct.
+pub(crate) const PREHEAT: Place = 5;
 /// First offset, in the order of [`OFFSET_CHANNELS`]; K or Pa.
-pub(crate) const OFFSETS: Place = 5;
+pub(crate) const OFFSETS: Place = 6;
 /// Channels with an offset.
 pub(crate) const OFFSET_CHANNELS: [Channel; 5] =
     [Channel::T1, Channel::T2, Channel::Tc, Channel::P1, Channel::P2];
@@ -27,23 +30,43 @@ pub(crate) const FLOW_GAIN: Place = OFFSETS + OFFSET_CHANNELS.len();
 pub(crate) const GAINS: Place = FLOW_GAIN + 1;
 /// Channels with a gain error in addition to the flow meter. That of T1 is an offset: its reading hardly changes.
 pub(crate) const GAIN_CHANNELS: [Channel; 4] = [Channel::T2, Channel::Tc, Channel::P1, Channel::P2];
-/// Index of the error that P1 and P2 share, Pa: the barometer of gauge transducers.
+/// The error that P1 and P2 share, Pa: the barometer of gauge transducers, or what a zero of both cannot show.
 pub(crate) const BAROMETER: Place = GAINS + GAIN_CHANNELS.len();
-/// Index of the humidity's error, kg/kg.
-pub(crate) const HUMIDITY: Place = BAROMETER + 1;
+/// The error that T1, T2 and Tc share, K: what a zero of all of them cannot show.
+pub(crate) const THERMOMETERS: Place = BAROMETER + 1;
+/// The humidity's error, kg/kg.
+pub(crate) const HUMIDITY: Place = THERMOMETERS + 1;
 /// Degree to which h before the wheel follows the inlet's own law: 0 is h after the wheel, 1 is that law, with a power law
 /// between. Never fitted: a recording carries almost no information about it next to alpha_A.
 pub(crate) const INLET: Place = HUMIDITY + 1;
 /// ln of the internal area over its value. A recording determines h times the area, so an error of the area is one of h alone.
 pub(crate) const LN_AREA: Place = INLET + 1;
+/// First parameter of the housing's heat balance.
+pub(crate) const HOUSING: Place = LN_AREA + 1;
+/// Time constant of the thermocouple on the housing, s.
+pub(crate) const TC_LAG: Place = HOUSING;
+/// ln of the housing's heat capacity over the declared one.
+pub(crate) const LN_CAPACITY: Place = HOUSING + 1;
+/// Relative error of the free convection from the housing to the cell.
+pub(crate) const EXTERNAL: Place = HOUSING + 2;
+/// Relative error of the conductance between housing and bearing.
+pub(crate) const BEARING: Place = HOUSING + 3;
+/// ln of the conductance between bearing and oil over the declared one.
+pub(crate) const LN_OIL: Place = HOUSING + 4;
+/// View factor times area of the radiation from the turbine housing, m2.
+pub(crate) const RADIATION: Place = HOUSING + 5;
+/// Heat from another source, W.
+pub(crate) const HEAT: Place = HOUSING + 6;
+/// The part of it in proportion to the housing temperature, W/K: coolant.
+pub(crate) const HEAT_BY_TC: Place = HOUSING + 7;
+/// Logit of the share of the heat capacity that touches the gas and has its own temperature.
+pub(crate) const LOGIT_INNER: Place = HOUSING + 8;
+/// ln of the conductance between that inner wall and the rest, W/K.
+pub(crate) const LN_INNER_CONDUCTANCE: Place = HOUSING + 9;
 /// First coefficient of the efficiency surface.
-pub(crate) const SURFACE: Place = LN_AREA + 1;
-/// First bend of the efficiencies that an offset causes, in the order of [`OFFSET_CHANNELS`] and in units of that offset. The fit
-/// takes the readings as exact, so an offset bends the fitted efficiencies. Without these terms the surface would resist that bend and bias
-/// alpha_A, the probe and the heating/cooling ratio.
-pub(crate) const BENDS: Place = SURFACE + TERM_COUNT;
+pub(crate) const SURFACE: Place = HOUSING + 10;
 /// Number of shared parameters.
-pub(crate) const SHARED: usize = BENDS + OFFSET_CHANNELS.len();
+pub(crate) const SHARED: usize = SURFACE + TERM_COUNT;
 
 /// Efficiency at the step's end, fraction.
 pub(crate) const ETA: Place = 0;
@@ -51,10 +74,10 @@ pub(crate) const ETA: Place = 0;
 pub(crate) const LN_DEVIATION: Place = 1;
 /// Reading of the probe at the first row, K.
 pub(crate) const FIRST_READING: Place = 2;
-/// Scale of the surface's slope.
-pub(crate) const SLOPE: Place = 3;
+/// Heat to the housing that the balance does not have, constant within the step, W.
+pub(crate) const STEP_HEAT: Place = 3;
 /// Number of parameters of a step.
-pub(crate) const LOCAL: Place = SLOPE + 1;
+pub(crate) const LOCAL: usize = STEP_HEAT + 1;
 
 /// Values of the shared parameters.
 pub(crate) type SharedVector = [f64; SHARED];
@@ -75,33 +98,98 @@ impl Prior {
     }
 }
 
-/// Each parameter with a prior about its declared value: standard deviation of the prior under which it is fitted (wide), standard
-/// deviation of its slab in the mixture, and the change that small model errors can cause. Compressors have 0 to 0.3 of their area before
-/// the wheel. Probes of 0.5 to 3 mm are sold, and half a millimetre is a sheathed thermocouple. Heated and cooled boundary layers differ
-/// by up to a third (Gnielinski's (Pr/Pr_w)^0.11 and (T/T_w)^0.45 between 300 and 600 K). A change of alpha_A by its model error moves an
-/// efficiency by a quarter of a point, as do the offsets. Calibrated: `benches/identification.py`; with 0.025 the error at an undeclared
-/// alpha_A of 0.05 is 2.1 points instead of 0.4.
-pub(crate) const REFINEMENTS: [(Place, f64, f64, f64); 3] =
-    [(ALPHA, 0.3, 0.1, 0.005), (PROBE_MM2, 10.0, 2.0, 0.1), (LN_HEATING_COOLING_RATIO, 0.5, 0.2, 0.015)];
+/// A parameter that is neutral, at its declared value, or free.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Refinement {
+    pub(crate) index: Place,
+    /// Standard deviation of the prior under which it is fitted: wide.
+    pub(crate) wide_sigma: f64,
+    /// Standard deviation of its slab in the mixture.
+    pub(crate) slab_sigma: f64,
+    /// Change that small errors of the equations can cause; it enters the evidence only.
+    pub(crate) model_error: f64,
+    /// Whether its values end at 0, its neutral value.
+    pub(crate) is_positive: bool,
+}
+
+/// Each parameter with a prior about its declared value. Source of the slabs: compressors have 0 to 0.3 of their area before the wheel; probes
+/// of 0.5 to 3 mm are sold, and half a millimetre is a sheathed thermocouple; heated and cooled boundary layers differ by up to a third
+/// (Gnielinski's (Pr/Pr_w)^0.11 and (T/T_w)^0.45 between 300 and 600 K); 0.5 W/K are 0.05 m2 of duct at 10 W/(m2 K);
+/// glued or screwed thermocouples of 1 to 3 mm follow within 1 to 5 s. Source of the model errors:
+/// a change by one of them moves an efficiency by a tenth of a point.
+pub(crate) const REFINEMENTS: [Refinement; 5] = [
+    Refinement { index: ALPHA, wide_sigma: 0.3, slab_sigma: 0.1, model_error: 0.002, is_positive: true },
+    Refinement { index: PROBE_MM2, wide_sigma: 10.0, slab_sigma: 2.0, model_error: 0.1, is_positive: true },
+    Refinement {
+        index: LN_HEATING_COOLING_RATIO,
+        wide_sigma: 0.5,
+        slab_sigma: 0.2,
+        model_error: 0.015,
+        is_positive: false,
+    },
+    Refinement { index: PREHEAT, wide_sigma: 3.0, slab_sigma: 0.5, model_error: 0.05, is_positive: true },
+    Refinement { index: TC_LAG, wide_sigma: 10.0, slab_sigma: 2.0, model_error: 0.15, is_positive: true },
+];
+
+/// Range of a shared parameter while a fit searches. Bound: wider than any machine, and within the equations' domain. Values just below
+/// 0 let a fit near 0 be normal.
+pub(crate) fn bounds(index: Place) -> (f64, f64) {
+    match index {
+        ALPHA => (-0.05, 0.7),
+        PROBE_MM2 => (-0.5, 100.0),
+        LN_HEATING_COOLING_RATIO => (-0.8, 0.8),
+        PREHEAT => (-1.0, 20.0),
+        EXTERNAL | BEARING => (-0.95, 10.0),
+        TC_LAG => (-2.0, 60.0),
+        LOGIT_INNER => (-4.0, 4.0),
+        LN_INNER_CONDUCTANCE => (0.5, 9.0),
+        _ => (f64::NEG_INFINITY, f64::INFINITY),
+    }
+}
+
+/// Largest change of a shared parameter in one step of a fit. Bound: over it the readings are nearly linear in the parameter.
+pub(crate) fn longest_move(index: Place) -> f64 {
+    match index {
+        ALPHA => 0.1,
+        PROBE_MM2 => 1.5,
+        LN_HEATING_COOLING_RATIO => 0.3,
+        LN_COEFFICIENT => 0.4,
+        PREHEAT | LOGIT_INNER | LN_INNER_CONDUCTANCE => 1.0,
+        TC_LAG => 2.0,
+        _ => f64::INFINITY,
+    }
+}
 
 /// Display symbol of a shared parameter.
 pub(crate) fn symbol(index: usize) -> String {
-    match index {
-        LN_COEFFICIENT => "Nusselt coefficient".to_owned(),
-        EXPONENT => "Nusselt exponent".to_owned(),
-        ALPHA => "alpha_A".to_owned(),
-        PROBE_MM2 => "probe diameter".to_owned(),
-        LN_HEATING_COOLING_RATIO => "heating/cooling ratio".to_owned(),
-        FLOW_GAIN => "gain of m_c".to_owned(),
-        BAROMETER => "barometer".to_owned(),
-        HUMIDITY => "humidity".to_owned(),
-        INLET => "h before the wheel".to_owned(),
-        LN_AREA => "internal area".to_owned(),
-        GAINS..BAROMETER => format!("gain of {}", GAIN_CHANNELS[index - GAINS]),
+    let name = match index {
+        LN_COEFFICIENT => "Nusselt coefficient",
+        EXPONENT => "Nusselt exponent",
+        ALPHA => "alpha_A",
+        PROBE_MM2 => "probe diameter",
+        LN_HEATING_COOLING_RATIO => "heating/cooling ratio",
+        PREHEAT => "preheating in the inlet",
+        FLOW_GAIN => "gain of m_c",
+        BAROMETER => "barometer",
+        THERMOMETERS => "error that T1, T2 and Tc share",
+        HUMIDITY => "humidity",
+        INLET => "h before the wheel",
+        LN_AREA => "internal area",
+        TC_LAG => "lag of Tc",
+        LN_CAPACITY => "heat capacity of the housing",
+        EXTERNAL => "convection to the cell",
+        BEARING => "conduction to the bearing",
+        LN_OIL => "conductance to the oil",
+        RADIATION => "radiation from the turbine",
+        HEAT => "heat from another source",
+        HEAT_BY_TC => "heat from another source by Tc",
+        LOGIT_INNER => "capacity of the inner wall",
+        LN_INNER_CONDUCTANCE => "conductance of the inner wall",
+        GAINS..BAROMETER => return format!("gain of {}", GAIN_CHANNELS[index - GAINS]),
         _ => match OFFSET_CHANNELS.get(index.wrapping_sub(OFFSETS)) {
-            Some(channel) => format!("offset of {channel}"),
-            None if index >= BENDS => format!("bend {}", index - BENDS),
-            None => format!("efficiency surface {}", index.saturating_sub(SURFACE)),
+            Some(channel) => return format!("offset of {channel}"),
+            None => return format!("efficiency surface {}", index.saturating_sub(SURFACE)),
         },
-    }
+    };
+    name.to_owned()
 }

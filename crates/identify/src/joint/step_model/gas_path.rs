@@ -1,0 +1,256 @@
+//! Gas temperature and heat flows of one row by eqs. 1-3, with their derivatives by everything that the parameters act on.
+
+use crate::joint::step_model::parameters::{EXPONENT, LN_COEFFICIENT, SharedVector};
+use mapper_numerics::SLOPE_STEP;
+use mapper_physics::gas::air::{self, Air};
+use mapper_physics::laws::compression::{Wheel, after_wheel, before_wheel, compressed_k, isentropic_rise_ratio};
+use mapper_physics::laws::convection::{self, InletLaw};
+
+/// Minimum efficiency of the model. Bound: keeps the temperature rise finite while a fit searches.
+const MIN_ETA: f64 = 0.02;
+
+/// Number of quantities that act on the gas path. Source: the fields of [`Inputs`]; both pressures act by their ratio.
+pub(crate) const INPUT_COUNT: usize = 12;
+
+/// Place of an input in the derivatives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(usize)]
+pub(crate) enum Input {
+    /// T1, K.
+    T1 = 0,
+    /// Wall that the gas touches, K.
+    Wall = 1,
+    /// Outer part of the housing, K.
+    Outer = 2,
+    /// ln of the pressure ratio.
+    LnPressureRatio = 3,
+    /// Flow, kg/s.
+    Flow = 4,
+    /// Efficiency.
+    Eta = 5,
+    /// ln of h.
+    LnH = 6,
+    /// alpha_A.
+    Alpha = 7,
+    /// ln of the heating/cooling ratio.
+    LnRatio = 8,
+    /// Conductance of the inlet, W/K.
+    Preheat = 9,
+    /// Degree to which h before the wheel follows the inlet's own law.
+    Inlet = 10,
+    /// Water, kg/kg.
+    Humidity = 11,
+}
+
+/// The state of one row.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Inputs {
+    pub(crate) t1_k: f64,
+    pub(crate) wall_k: f64,
+    pub(crate) outer_k: f64,
+    pub(crate) p1_pa: f64,
+    pub(crate) p2_pa: f64,
+    pub(crate) flow_kg_s: f64,
+    pub(crate) eta: f64,
+    /// Change of ln h about the law.
+    pub(crate) ln_h: f64,
+    pub(crate) alpha_area_ratio: f64,
+    pub(crate) ln_heating_cooling_ratio: f64,
+    pub(crate) preheat_w_k: f64,
+    pub(crate) inlet_power: f64,
+    /// Change of the humidity, kg/kg.
+    pub(crate) humidity_kg_kg: f64,
+}
+
+/// What the gas does.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct GasPath {
+    /// Gas at the outlet, K.
+    pub(crate) t2_k: f64,
+    /// Heat from the gas to the wall that it touches, W.
+    pub(crate) wall_w: f64,
+    /// Heat from the gas to the outer part through the inlet, W.
+    pub(crate) duct_w: f64,
+    /// h after the wheel, W/(m2 K).
+    pub(crate) h_w_m2k: f64,
+    /// Temperature at which the gas properties are taken, K.
+    pub(crate) bulk_k: f64,
+}
+
+/// The gas before the wheel.
+#[derive(Debug, Clone, Copy)]
+struct InletGas {
+    air: Air,
+    rise_ratio: f64,
+    cp_j_kgk: f64,
+}
+
+/// Derivatives of T2, heat to the wall and heat of the inlet by each input.
+pub(crate) type Slopes = [[f64; 3]; INPUT_COUNT];
+
+/// Settings common to all steps.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Setting {
+    pub(crate) internal_area_m2: f64,
+    pub(crate) outlet_diameter_m: f64,
+    pub(crate) inlet_diameter_m: f64,
+    /// Pressure from which gain errors of P1 and P2 count, Pa.
+    pub(crate) rest_pressure_pa: f64,
+    /// The compressed air.
+    pub(crate) air: Air,
+    /// Reynolds number at which the law's coefficient is defined.
+    pub(crate) reynolds_reference: f64,
+}
+
+/// Reynolds number of a pipe.
+pub(crate) fn reynolds(flow_kg_s: f64, diameter_m: f64, bulk_k: f64) -> f64 {
+    4.0 * flow_kg_s / (std::f64::consts::PI * diameter_m * air::viscosity_pa_s(bulk_k))
+}
+
+impl Setting {
+    /// What the gas path takes from pressures, T1 and humidity alone.
+    fn inlet(&self, inputs: &Inputs) -> InletGas {
+        let air = self
+            .air
+            .with_humidity(self.air.humidity_kg_kg() + inputs.humidity_kg_kg)
+            .between(inputs.p1_pa, inputs.p2_pa);
+        InletGas {
+            air,
+            rise_ratio: isentropic_rise_ratio(inputs.p2_pa / inputs.p1_pa, inputs.t1_k, air),
+            cp_j_kgk: air.heat_capacity_j_kgk(inputs.t1_k),
+        }
+    }
+
+    /// Eqs. 1-3 with the law of h, a heating/cooling ratio and an inlet that preheats.
+    pub(crate) fn gas_path(&self, inputs: &Inputs, shared: &SharedVector) -> GasPath {
+        self.gas_path_from(&self.inlet(inputs), inputs, shared)
+    }
+
+    fn gas_path_from(&self, inlet: &InletGas, inputs: &Inputs, shared: &SharedVector) -> GasPath {
+        let Inputs { t1_k, wall_k, outer_k, flow_kg_s, .. } = *inputs;
+        let InletGas { air, rise_ratio, cp_j_kgk } = *inlet;
+        let efficiency = inputs.eta.max(MIN_ETA);
+        let bulk_k = compressed_k(t1_k, rise_ratio, efficiency, air);
+        let exponent = shared[EXPONENT];
+        let ln_coefficient = shared[LN_COEFFICIENT] + inputs.ln_h - exponent * self.reynolds_reference.ln();
+        let h_w_m2k = convection::coefficient_w_m2k(
+            ln_coefficient.exp(),
+            exponent,
+            self.outlet_diameter_m,
+            flow_kg_s,
+            bulk_k,
+            wall_k,
+        );
+        let ln_inlet_ratio = || {
+            let law = InletLaw {
+                exponent,
+                inlet_diameter_m: self.inlet_diameter_m,
+                outlet_diameter_m: self.outlet_diameter_m,
+            };
+            law.h_ratio(t1_k, bulk_k).ln()
+        };
+        let inlet_h_ratio =
+            if inputs.inlet_power == 0.0 { 1.0 } else { (inputs.inlet_power * ln_inlet_ratio()).exp() };
+        let conductance_w_k = h_w_m2k * self.internal_area_m2;
+        let directed_w_k = |gas_k: f64| {
+            if wall_k > gas_k {
+                conductance_w_k * inputs.ln_heating_cooling_ratio.exp()
+            } else {
+                conductance_w_k
+            }
+        };
+        let before_w_k = directed_w_k(t1_k) * inlet_h_ratio * inputs.alpha_area_ratio;
+        let (q1_w, after_area_k) = before_wheel(before_w_k, t1_k, wall_k, flow_kg_s, cp_j_kgk);
+        let duct_w = inputs.preheat_w_k * (t1_k - outer_k);
+        let t1_prime_k = after_area_k - duct_w / (flow_kg_s * cp_j_kgk);
+        let wheel = Wheel {
+            t1_k,
+            isentropic_rise_ratio: rise_ratio,
+            efficiency,
+            recirculation_ratio: 0.0,
+            air,
+        };
+        let (t2_prime_k, _) = wheel.compress(t1_prime_k);
+        let after_w_k = directed_w_k(t2_prime_k) * (1.0 - inputs.alpha_area_ratio);
+        let (q2_w, t2_k) =
+            after_wheel(after_w_k, t2_prime_k, wall_k, flow_kg_s, air.heat_capacity_j_kgk(bulk_k));
+        GasPath {
+            t2_k,
+            wall_w: q1_w + q2_w,
+            duct_w,
+            h_w_m2k,
+            bulk_k,
+        }
+    }
+
+    /// ln of the Reynolds number over the reference.
+    pub(crate) fn ln_reynolds(&self, inputs: &Inputs, path: &GasPath) -> f64 {
+        (reynolds(inputs.flow_kg_s, self.outlet_diameter_m, path.bulk_k) / self.reynolds_reference).ln()
+    }
+
+    /// ln of the ratio of h before the wheel to h after it by the inlet's own law.
+    pub(crate) fn ln_inlet_ratio(&self, inputs: &Inputs, path: &GasPath, shared: &SharedVector) -> f64 {
+        let law = InletLaw {
+            exponent: shared[EXPONENT],
+            inlet_diameter_m: self.inlet_diameter_m,
+            outlet_diameter_m: self.outlet_diameter_m,
+        };
+        law.h_ratio(inputs.t1_k, path.bulk_k).ln()
+    }
+
+    /// Conductance between gas and wall, W/K; `wall_w` is the heat at `inputs`.
+    pub(crate) fn wall_conductance_w_k(&self, inputs: &Inputs, wall_w: f64, shared: &SharedVector) -> f64 {
+        let step_k = SLOPE_STEP * inputs.wall_k;
+        let hotter = Inputs { wall_k: inputs.wall_k + step_k, ..*inputs };
+        (wall_w - self.gas_path(&hotter, shared).wall_w) / step_k
+    }
+
+    /// The derivatives, by difference quotients. `with_model`: also those by the law before the wheel and the humidity, which are 0 otherwise.
+    pub(crate) fn slopes(
+        &self,
+        inputs: &Inputs,
+        here: &GasPath,
+        shared: &SharedVector,
+        with_model: bool,
+    ) -> Slopes {
+        let inlet = self.inlet(inputs);
+        let quotient = |there: GasPath, step: f64| {
+            [
+                (there.t2_k - here.t2_k) / step,
+                (there.wall_w - here.wall_w) / step,
+                (there.duct_w - here.duct_w) / step,
+            ]
+        };
+        // What leaves the gas before the wheel as it is.
+        let by = |moved: Inputs, step: f64| quotient(self.gas_path_from(&inlet, &moved, shared), step);
+        let by_inlet = |moved: Inputs, step: f64| quotient(self.gas_path(&moved, shared), step);
+        let x = *inputs;
+        let kelvin = SLOPE_STEP * x.t1_k;
+        let flow = SLOPE_STEP * x.flow_kg_s;
+        let none = [0.0; 3];
+        let is_hot_wall = x.wall_k > x.t1_k || x.wall_k > here.t2_k;
+        [
+            by_inlet(Inputs { t1_k: x.t1_k + kelvin, ..x }, kelvin),
+            by(Inputs { wall_k: x.wall_k + kelvin, ..x }, kelvin),
+            if x.preheat_w_k == 0.0 { none } else { by(Inputs { outer_k: x.outer_k + kelvin, ..x }, kelvin) },
+            by_inlet(Inputs { p2_pa: x.p2_pa * SLOPE_STEP.exp(), ..x }, SLOPE_STEP),
+            by(Inputs { flow_kg_s: x.flow_kg_s + flow, ..x }, flow),
+            by(Inputs { eta: x.eta + SLOPE_STEP, ..x }, SLOPE_STEP),
+            by(Inputs { ln_h: x.ln_h + SLOPE_STEP, ..x }, SLOPE_STEP),
+            by(Inputs { alpha_area_ratio: x.alpha_area_ratio + SLOPE_STEP, ..x }, SLOPE_STEP),
+            if is_hot_wall {
+                let ln_heating_cooling_ratio = x.ln_heating_cooling_ratio + SLOPE_STEP;
+                by(Inputs { ln_heating_cooling_ratio, ..x }, SLOPE_STEP)
+            } else {
+                none
+            },
+            by(Inputs { preheat_w_k: x.preheat_w_k + SLOPE_STEP, ..x }, SLOPE_STEP),
+            if with_model { by(Inputs { inlet_power: x.inlet_power + SLOPE_STEP, ..x }, SLOPE_STEP) } else { none },
+            if with_model {
+                by_inlet(Inputs { humidity_kg_kg: x.humidity_kg_kg + SLOPE_STEP, ..x }, SLOPE_STEP)
+            } else {
+                none
+            },
+        ]
+    }
+}

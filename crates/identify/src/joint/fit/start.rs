@@ -94,11 +94,6 @@ pub(crate) const STEP_HEAT_SIGMA_W: f64 = 3.0;
 const LOGIT_INNER_PRIOR: (f64, f64) = (-0.5, 1.2);
 /// Prior of ln of the inner wall's conductance, W/K. Bound: 2 to 280 W/K within two standard deviations.
 const LN_INNER_CONDUCTANCE_PRIOR: (f64, f64) = (3.2, 1.2);
-/// Error that a zero of all thermometers cannot show, K. Judgement: even air at rest differs from place to place by some tenths.
-const THERMOMETERS_SIGMA_K: f64 = 0.15;
-/// Error that a zero of both pressures cannot show, Pa. Source: barometers of class 0.05 % of 1 bar, as the limits of a rectangular
-/// distribution.
-const PRESSURES_SIGMA_PA: f64 = 45.0;
 
 /// Expected spread of the points' efficiencies about the surface, fraction: maps are not polynomials. Calibrated:
 /// `benches/identification.py`, 0.0006; a machine with a map that drops steeply at choke has 0.005.
@@ -259,6 +254,8 @@ pub(crate) fn problem<'a>(
     priors[LN_AREA] = Prior { mean: 0.0, sigma: config.internal_area_sigma_ratio };
     active[LN_AREA] = config.internal_area_sigma_ratio > 0.0;
     if choice.offsets == Choice::Fitted {
+        let contact_sigma =
+            if config.declared.is_empty() { 0.0 } else { config.housing_contact_sigma_ratio };
         let mut fit_error = |index: usize, sigma: f64| {
             priors[index] = Prior { mean: 0.0, sigma };
             active[index] = sigma > 0.0;
@@ -267,13 +264,13 @@ pub(crate) fn problem<'a>(
             fit_error(OFFSETS + i, config.sensor(channel).offset_sigma);
         }
         for (i, channel) in GAIN_CHANNELS.into_iter().enumerate() {
-            fit_error(GAINS + i, config.sensor(channel).gain_sigma_ratio);
+            // A thermocouple on the housing reads a share of the way to the cell: a gain about the cell's temperature.
+            let contact = if channel == Channel::Tc { contact_sigma } else { 0.0 };
+            fit_error(GAINS + i, config.sensor(channel).gain_sigma_ratio.hypot(contact));
         }
         fit_error(FLOW_GAIN, config.sensor(Channel::CompressorFlow).gain_sigma_ratio);
-        let is_zeroed = config.rest_pressure_pa > 0.0;
-        let unseen = |sigma: f64| if is_zeroed { sigma } else { 0.0 };
-        fit_error(BAROMETER, config.barometer_sigma_pa.hypot(unseen(PRESSURES_SIGMA_PA)));
-        fit_error(THERMOMETERS, unseen(THERMOMETERS_SIGMA_K));
+        fit_error(BAROMETER, config.barometer_sigma_pa);
+        fit_error(THERMOMETERS, config.thermometer_sigma_k);
         fit_error(HUMIDITY, config.humidity_sigma_kg_kg);
     }
     let has_balance = has_balance(config);

@@ -199,6 +199,9 @@ const DECLARED_CAPACITY_SIGMA: f64 = 0.3;
 /// The same without a declaration. Bound: from a third to three times that of the nominal machine at this internal area.
 const UNDECLARED_CAPACITY_SIGMA: f64 = 1.0;
 
+/// Exponent of the mass of similar housings over their area. Source: volume over area.
+const MASS_BY_AREA: f64 = 1.5;
+
 impl Housing {
     /// The housing of a declared machine.
     pub fn of(params: &Params) -> Self {
@@ -217,7 +220,7 @@ impl Housing {
         let area_ratio = internal_area_m2 / nominal.compressor.internal_area_m2;
         let declared = Housing::of(&nominal);
         Housing {
-            mass_kg: declared.mass_kg * area_ratio.powf(1.5),
+            mass_kg: declared.mass_kg * area_ratio.powf(MASS_BY_AREA),
             ln_capacity_sigma: UNDECLARED_CAPACITY_SIGMA,
             external_area_m2: declared.external_area_m2 * area_ratio,
             ..declared

@@ -5,3 +5,4 @@ pub(crate) mod refinements;
 pub(crate) mod solve;
 pub(crate) mod start;
 pub(crate) mod step_noise;
+pub(crate) mod whitening;

@@ -1,7 +1,7 @@
 //! Levenberg-Marquardt on the joint fit's normal equations. Their matrix has arrow shape: a step's own parameters couple only with themselves
 //! and the shared ones, so they are eliminated step by step.
 
-use crate::joint::fit::step_noise::Whitening;
+use crate::joint::fit::whitening::Whitening;
 use crate::joint::step_model::history::{Model, Prediction, StepHistory, Wall};
 use crate::joint::step_model::parameters::{
     ETA, HOUSING, LOCAL, LocalVector, OFFSETS, Prior, SHARED, SharedVector, bounds, longest_move,

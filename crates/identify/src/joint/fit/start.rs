@@ -82,13 +82,13 @@ const LN_OIL_SIGMA: f64 = 0.4;
 const RADIATION_SIGMA_M2: f64 = 0.01;
 /// Prior of heat from another source, W. Bound: a tenth of what a hot housing exchanges with its gas.
 const HEAT_SIGMA_W: f64 = 30.0;
-/// The same if the turbine housing or the oil is not recorded: their mean, W.
+/// The same if the turbine housing or the oil is not recorded: their mean, W. Bound: turbine housings of 400 to 900 K behind 1.5 W/K.
 const NEIGHBOURS_W: f64 = 60.0;
 /// Its standard deviation, W. Bound: turbine housings of 400 to 900 K behind 1.5 W/K.
 const NEIGHBOURS_SIGMA_W: f64 = 100.0;
 /// Prior of heat in proportion to Tc, W/K. Source: a cooled housing takes some 2 W/K.
 const HEAT_BY_TC_SIGMA_W_K: f64 = 2.0;
-/// Prior of the heat that a step's balance does not have, W: its spread is fitted.
+/// Prior of the heat that a step's balance does not have, W: its spread is fitted. Bound: a hundredth of what a hot housing exchanges.
 pub(crate) const STEP_HEAT_SIGMA_W: f64 = 3.0;
 /// Prior of the logit of the inner wall's share of the capacity. Bound: shares of 0.05 to 0.85 within two standard deviations.
 const LOGIT_INNER_PRIOR: (f64, f64) = (-0.5, 1.2);

@@ -6,6 +6,7 @@
 
 use crate::IdentifyConfig;
 use crate::joint::fit::solve::{Member, Problem};
+use crate::joint::fit::whitening::Whitening;
 use crate::joint::step_model::history::{Linearised, SmoothedInput};
 use crate::joint::step_model::parameters::{
     ALPHA, EXPONENT, LN_COEFFICIENT, LN_HEATING_COOLING_RATIO, LN_INNER_CONDUCTANCE, LOGIT_INNER, PREHEAT, PROBE_MM2, Place,
@@ -38,29 +39,6 @@ const INPUTS: [(usize, SmoothedInput, Channel); SMOOTHED_COUNT] = [
     (P2, SmoothedInput::P2, Channel::P2),
     (FLOW, SmoothedInput::Flow, Channel::CompressorFlow),
 ];
-
-/// Cholesky factor of the covariance of a step's rows.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Whitening {
-    lower: DMatrix<f64>,
-    /// Half the ln of the determinant.
-    pub(crate) ln_spread: f64,
-}
-
-impl Whitening {
-    /// `None` if the covariance is not positive definite.
-    pub(crate) fn new(covariance: DMatrix<f64>) -> Option<Self> {
-        let lower = covariance.cholesky()?.unpack();
-        let ln_spread = lower.diagonal().iter().map(|x| x.ln()).sum();
-        Some(Whitening { lower, ln_spread })
-    }
-
-    /// Whitens columns in place.
-    pub(crate) fn apply(&self, columns: &mut DMatrix<f64>) {
-        // A Cholesky factor has no 0 on its diagonal.
-        self.lower.solve_lower_triangular_mut(columns);
-    }
-}
 
 /// How the noise of a smoothed input acts on the expected sum of squares: one value for each of its functions and each row.
 struct InputWeight {

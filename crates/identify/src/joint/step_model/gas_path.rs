@@ -102,9 +102,12 @@ pub(crate) struct Setting {
     pub(crate) reynolds_reference: f64,
 }
 
+/// Reynolds number of a pipe times its diameter and viscosity, over the flow. Source: 4 m/(pi D mu).
+const REYNOLDS_FACTOR: f64 = 4.0 / std::f64::consts::PI;
+
 /// Reynolds number of a pipe.
 pub(crate) fn reynolds(flow_kg_s: f64, diameter_m: f64, bulk_k: f64) -> f64 {
-    4.0 * flow_kg_s / (std::f64::consts::PI * diameter_m * air::viscosity_pa_s(bulk_k))
+    REYNOLDS_FACTOR * flow_kg_s / (diameter_m * air::viscosity_pa_s(bulk_k))
 }
 
 impl Setting {

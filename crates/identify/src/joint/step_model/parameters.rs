@@ -30,6 +30,22 @@ pub(crate) const FLOW_GAIN: Place = OFFSETS + OFFSET_CHANNELS.len();
 pub(crate) const GAINS: Place = FLOW_GAIN + 1;
 /// Channels with a gain error in addition to the flow meter. That of T1 is an offset: its reading hardly changes.
 pub(crate) const GAIN_CHANNELS: [Channel; 4] = [Channel::T2, Channel::Tc, Channel::P1, Channel::P2];
+/// Offset of T2.
+pub(crate) const T2_OFFSET: Place = OFFSETS + 1;
+/// Offset of Tc.
+pub(crate) const TC_OFFSET: Place = OFFSETS + 2;
+/// Offset of P1.
+pub(crate) const P1_OFFSET: Place = OFFSETS + 3;
+/// Offset of P2.
+pub(crate) const P2_OFFSET: Place = OFFSETS + 4;
+/// Gain of T2.
+pub(crate) const T2_GAIN: Place = GAINS;
+/// Gain of Tc.
+pub(crate) const TC_GAIN: Place = GAINS + 1;
+/// Gain of P1.
+pub(crate) const P1_GAIN: Place = GAINS + 2;
+/// Gain of P2.
+pub(crate) const P2_GAIN: Place = GAINS + 3;
 /// The error that P1 and P2 share, Pa: the barometer of gauge transducers, or what a zero of both cannot show.
 pub(crate) const BAROMETER: Place = GAINS + GAIN_CHANNELS.len();
 /// The error that T1, T2 and Tc share, K: what a zero of all of them cannot show.
@@ -131,33 +147,34 @@ pub(crate) const REFINEMENTS: [Refinement; 5] = [
     Refinement { index: TC_LAG, wide_sigma: 10.0, slab_sigma: 2.0, model_error: 0.15, is_positive: true },
 ];
 
-/// Range of a shared parameter while a fit searches. Bound: wider than any machine, and within the equations' domain. Values just below
-/// 0 let a fit near 0 be normal.
-pub(crate) fn bounds(index: Place) -> (f64, f64) {
-    match index {
-        ALPHA => (-0.05, 0.7),
-        PROBE_MM2 => (-0.5, 100.0),
-        LN_HEATING_COOLING_RATIO => (-0.8, 0.8),
-        PREHEAT => (-1.0, 20.0),
-        EXTERNAL | BEARING => (-0.95, 10.0),
-        TC_LAG => (-2.0, 60.0),
-        LOGIT_INNER => (-4.0, 4.0),
-        LN_INNER_CONDUCTANCE => (0.5, 9.0),
-        _ => (f64::NEG_INFINITY, f64::INFINITY),
-    }
+/// Range of each bounded parameter while a fit searches, and its largest change in one step. Bound: wider than any machine, within the
+/// equations' domain, and over the change the readings are nearly linear. Values just below 0 let a fit near 0 be normal.
+const RANGES: [(Place, f64, f64, f64); 9] = [
+    (LN_COEFFICIENT, f64::NEG_INFINITY, f64::INFINITY, 0.4),
+    (ALPHA, -0.05, 0.7, 0.1),
+    (PROBE_MM2, -0.5, 100.0, 1.5),
+    (LN_HEATING_COOLING_RATIO, -0.8, 0.8, 0.3),
+    (PREHEAT, -1.0, 20.0, 1.0),
+    (EXTERNAL, -0.95, 10.0, f64::INFINITY),
+    (BEARING, -0.95, 10.0, f64::INFINITY),
+    (TC_LAG, -2.0, 60.0, 2.0),
+    (LOGIT_INNER, -4.0, 4.0, 1.0),
+];
+/// The same of the inner wall's conductance. Bound: 1.6 W/K to 8 kW/K.
+const CONDUCTANCE_RANGE: (Place, f64, f64, f64) = (LN_INNER_CONDUCTANCE, 0.5, 9.0, 1.0);
+
+fn range(index: Place) -> Option<(Place, f64, f64, f64)> {
+    RANGES.into_iter().chain([CONDUCTANCE_RANGE]).find(|(place, ..)| *place == index)
 }
 
-/// Largest change of a shared parameter in one step of a fit. Bound: over it the readings are nearly linear in the parameter.
+/// Range of a shared parameter while a fit searches.
+pub(crate) fn bounds(index: Place) -> (f64, f64) {
+    range(index).map_or((f64::NEG_INFINITY, f64::INFINITY), |(_, low, high, _)| (low, high))
+}
+
+/// Largest change of a shared parameter in one step of a fit.
 pub(crate) fn longest_move(index: Place) -> f64 {
-    match index {
-        ALPHA => 0.1,
-        PROBE_MM2 => 1.5,
-        LN_HEATING_COOLING_RATIO => 0.3,
-        LN_COEFFICIENT => 0.4,
-        PREHEAT | LOGIT_INNER | LN_INNER_CONDUCTANCE => 1.0,
-        TC_LAG => 2.0,
-        _ => f64::INFINITY,
-    }
+    range(index).map_or(f64::INFINITY, |(.., step)| step)
 }
 
 /// Display symbol of a shared parameter.

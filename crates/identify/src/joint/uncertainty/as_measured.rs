@@ -12,7 +12,8 @@ use crate::joint::step_model::parameters::{
     FLOW_GAIN, HOUSING, OFFSET_CHANNELS, OFFSETS, PREHEAT, REFINEMENTS, SURFACE,
 };
 use crate::joint::step_model::rows::StepRows;
-use crate::joint::uncertainty::numbers::{Quantity, quantities, together};
+use crate::joint::uncertainty::numbers::{quantities, together};
+use crate::joint::uncertainty::quantity::Quantity;
 use mapper_core::Channel;
 use nalgebra::DMatrix;
 

@@ -13,7 +13,7 @@ use crate::joint::step_model::parameters::{
     BAROMETER, FLOW_GAIN, GAINS, HOUSING, HUMIDITY, INLET, LN_AREA, OFFSET_CHANNELS, OFFSETS, PREHEAT,
     PROBE_MM2, REFINEMENTS, SURFACE, TC_LAG, THERMOMETERS, symbol,
 };
-use crate::joint::uncertainty::numbers::{Number, Quantity};
+use crate::joint::uncertainty::quantity::{Number, Quantity};
 use crate::single_step::budgets;
 use mapper_core::BudgetRow;
 use nalgebra::DMatrix;

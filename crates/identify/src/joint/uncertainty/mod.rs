@@ -4,3 +4,4 @@ pub(crate) mod as_measured;
 pub(crate) mod budget;
 pub(crate) mod common_part;
 pub(crate) mod numbers;
+pub(crate) mod quantity;

@@ -11,6 +11,7 @@ use crate::joint::step_model::parameters::{
 use crate::joint::step_model::rows::StepRows;
 use crate::joint::uncertainty::budget;
 use crate::joint::uncertainty::common_part::common_part;
+use crate::joint::uncertainty::quantity::{Number, Quantity};
 use mapper_core::{BudgetRow, EstimateUncertainty, confidence_interval_95};
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::median;
@@ -18,34 +19,6 @@ use nalgebra::{DMatrix, DVector};
 
 /// Step of the derivative of h by a declared error, in its standard deviations. Bound: the law is nearly linear over it.
 const STEP_SIGMAS: f64 = 0.1;
-
-/// A number as a function of the shared parameters.
-pub(crate) struct Quantity {
-    pub(crate) value: f64,
-    /// Sensitivity to the shared parameters.
-    pub(crate) answer: DVector<f64>,
-    /// Variance with all shared parameters known.
-    pub(crate) own_variance: f64,
-}
-
-impl Quantity {
-    /// Its variance.
-    pub(crate) fn variance(&self, covariance: &Covariance) -> f64 {
-        self.own_variance + self.answer.dot(&(&covariance.shared * &self.answer))
-    }
-}
-
-/// A number with its error by origin.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct Number {
-    pub(crate) value: f64,
-    pub(crate) uncertainty: EstimateUncertainty,
-    /// Its 95 % interval: symmetric about the value for a normal distribution, otherwise the shortest one.
-    pub(crate) interval: (f64, f64),
-    /// Standard error without the interval's excess over the mixture, and that excess, which all numbers share.
-    pub(crate) error: f64,
-    pub(crate) added: f64,
-}
 
 /// The numbers of all points.
 #[derive(Debug, Clone)]

@@ -9,16 +9,16 @@ use syn::visit::{self, Visit};
 use syn::{Attribute, Expr, Lit, Type};
 
 /// The crates between a recording and a map.
-pub const CRATES: [&str; 7] =
-    ["recording", "observe", "numerics", "inference", "identify", "diagnose", "maps"];
+pub const CRATES: [&str; 9] =
+    ["core", "table", "recording", "observe", "numerics", "inference", "identify", "diagnose", "maps"];
 
-/// Files and folders that are not clean yet: literals outside constants, and constants without a kind. May only become shorter.
-pub const NOT_YET: &[&str] = &["crates/diagnose/", "crates/maps/src/table"];
+/// Exact factors between units, each a definition.
+const DEFINITIONS: &str = "crates/core/src/unit_factors.rs";
 
 /// Exact factors of formulas: the file, its literals, and the formula.
 const FORMULAS: &[(&str, &[f64], &str)] = &[
     ("crates/identify/src/joint/fit/input_noise_spline.rs", &[0.25, 3.0, 6.0], "natural cubic spline"),
-    ("crates/recording/src/logs/proposal/shared_units.rs", &[4.0], "area of a circle"),
+    ("crates/recording/src/logs/proposal/physics.rs", &[4.0], "area of a circle"),
     ("crates/numerics/src/coloured_noise.rs", &[6.0, 24.0, 120.0, 720.0, 5040.0], "series of e^-x"),
     ("crates/numerics/src/minimise.rs", &[3.0], "Brent's rule of the shortest step"),
     ("crates/numerics/src/root.rs", &[4.0], "Brent's tolerance"),
@@ -27,16 +27,22 @@ const FORMULAS: &[(&str, &[f64], &str)] = &[
         &[0.25, 3.0],
         "cubic with given slopes; integrated noise; window of a spline",
     ),
-    ("crates/maps/src/map_fit/least_squares/solution.rs", &[3.0], "variance of a uniform share"),
+    ("crates/maps/src/map_fit/least_squares/solve.rs", &[3.0], "variance of a uniform share"),
     ("crates/maps/src/map_fit/speed_lines/speed_spline.rs", &[3.0, 6.0], "natural cubic spline"),
     ("crates/identify/src/joint/step_model/model.rs", &[4.0], "Reynolds number of a pipe"),
 ];
+
+/// Maximum number of judgements: as many as a reader can examine.
+const MAX_JUDGEMENTS: usize = 30;
 
 /// Literals that are allowed anywhere.
 const NEUTRAL: [f64; 4] = [0.0, 0.5, 1.0, 2.0];
 
 /// Macros that format text, in which a number changes no result; nor does one in `fmt`.
 const FORMATTING: [&str; 6] = ["format", "write", "writeln", "println", "assert", "debug_assert"];
+
+/// Functions that show the progress of a computation, in which a share changes no result.
+const SHOWING: &str = "progress";
 
 /// Endings of names, and their units. A longer ending comes first.
 const UNITS: [(&str, &str); 33] = [
@@ -128,6 +134,15 @@ pub struct Constant {
     pub kind: Option<Kind>,
     /// Line in its file, from 1.
     pub line: usize,
+}
+
+impl Constant {
+    /// Whether its value is more than neutral numbers and small integers.
+    fn is_chosen(&self) -> bool {
+        let mut content = Content::default();
+        content.read(self.value.parse().unwrap_or_default());
+        content.chosen
+    }
 }
 
 /// A literal outside constants.
@@ -260,24 +275,23 @@ fn unit(name: &str) -> &'static str {
     UNITS.iter().find(|(ending, _)| upper.ends_with(ending)).map_or("", |(_, unit)| unit)
 }
 
-/// Literals outside constants, constants without a kind, and entries of [`NOT_YET`] that are clean: one line each.
+/// Literals outside constants, and constants without a kind: one line each.
 ///
 /// # Errors
 /// The file that cannot be read.
 pub fn violations(root: &Path) -> Result<Vec<String>, String> {
-    let (mut violations, mut unfinished) = (Vec::new(), Vec::new());
+    let mut violations = Vec::new();
+    let mut judgements = 0;
     for name in CRATES {
         for (file, found) in crate_numbers(root, name)? {
-            let own = violations_of(&file, &found);
-            match NOT_YET.iter().find(|entry| file.starts_with(**entry)) {
-                Some(entry) if !own.is_empty() => unfinished.push(*entry),
-                Some(_) => {}
-                None => violations.extend(own),
-            }
+            judgements +=
+                found.constants.iter().filter(|constant| constant.kind == Some(Kind::Judgement)).count();
+            violations.extend(violations_of(&file, &found));
         }
     }
-    let finished = NOT_YET.iter().filter(|entry| !unfinished.contains(entry));
-    violations.extend(finished.map(|entry| format!("{entry} is clean: take it off NOT_YET in {}", file!())));
+    if judgements > MAX_JUDGEMENTS {
+        violations.push(format!("{judgements} judgements, at most {MAX_JUDGEMENTS}"));
+    }
     Ok(violations)
 }
 
@@ -304,6 +318,7 @@ fn crate_numbers(root: &Path, name: &str) -> Result<Vec<(String, Numbers)>, Stri
     let mut files = Vec::new();
     rust_files(&crates.join(name).join("src"), &mut files)
         .map_err(|error| format!("crates/{name}: {error}"))?;
+    files.retain(|file| !file.ends_with(DEFINITIONS));
     files.sort();
     files
         .into_iter()
@@ -426,9 +441,23 @@ impl<'ast> Visit<'ast> for Numbers {
         }
     }
 
+    /// The fields that a `Default` chooses are fields of a constant.
     fn visit_item_impl(&mut self, item: &'ast syn::ItemImpl) {
-        if !is_for_tests(&item.attrs) {
-            visit::visit_item_impl(self, item);
+        match default_of(item) {
+            _ if is_for_tests(&item.attrs) => {}
+            Some((name, function, value)) => {
+                let before = self.constants.len();
+                self.constant(name, &function.attrs, None, value);
+                let of_default = self.constants.split_off(before);
+                self.constants.extend(of_default.into_iter().filter(Constant::is_chosen));
+            }
+            None => visit::visit_item_impl(self, item),
+        }
+    }
+
+    fn visit_expr_call(&mut self, call: &'ast syn::ExprCall) {
+        if !matches!(&*call.func, Expr::Path(path) if path.path.is_ident(SHOWING)) {
+            visit::visit_expr_call(self, call);
         }
     }
 
@@ -486,6 +515,18 @@ impl Content {
             }
         }
     }
+}
+
+/// The name of a type, the function and its value if an implementation of `Default` chooses numbers.
+fn default_of(item: &syn::ItemImpl) -> Option<(String, &syn::ImplItemFn, &Expr)> {
+    let [syn::ImplItem::Fn(function)] = item.items.as_slice() else { return None };
+    let [syn::Stmt::Expr(value @ Expr::Struct(_), None)] = function.block.stmts.as_slice() else {
+        return None;
+    };
+    let mut content = Content::default();
+    content.read(value.to_token_stream());
+    let name = item.self_ty.to_token_stream().to_string();
+    (function.sig.ident == "default" && content.floats && content.chosen).then_some((name, function, value))
 }
 
 /// Whether a type consists of numbers: an index (an alias of `usize`) and a list of bytes do not count.
@@ -552,6 +593,9 @@ mod tests {
                 // hand.
                 a: 3.0,
  b: 4.0, name: \"x\" };
+            impl Default for Limits { fn default() -> Self { Limits {
+                // Bound: patience.
+                long_s: 9.0, name: None } } }
             #[cfg(test)] mod tests { const TESTED: f64 = 3.0; }";
         let named = |name: &str, value: &str, kind| (name.to_owned(), value.to_owned(), kind);
         let expected = [
@@ -562,6 +606,7 @@ mod tests {
             named("HALF", "0.5 * SHARE", Some(Kind::Derived)),
             named("BOTH.a", "3.0", Some(Kind::Calibrated)),
             named("BOTH.b", "4.0", Some(Kind::Source)),
+            named("Limits.long_s", "9.0", Some(Kind::Bound)),
         ];
         assert_eq!(rows(text), expected);
     }

@@ -1,5 +1,6 @@
 //! Text for people: numbers with units, lines for terminals.
 
+use crate::unit_factors::{ICE_POINT_K, PA_PER_KPA, PERCENT, RPM_PER_KRPM};
 use std::fmt::{Display, Write};
 use std::hash::{BuildHasher, RandomState};
 use std::sync::LazyLock;
@@ -11,11 +12,14 @@ pub fn one_line(name: &str) -> String {
         .collect()
 }
 
+/// Smallest probability that is shown, per cent. Bound: less than one that rounds to a whole per cent.
+const SHOWN_PERCENT: f64 = 0.5;
+
 /// A probability in whole per cent. It is not more certain than its assumptions: outside 0.5 to 99.5 % only the limit is given.
 pub fn probability_text(probability: f64) -> String {
-    match 100.0 * probability {
-        percent if percent > 99.5 => ">99.5 %".to_owned(),
-        percent if percent < 0.5 => "<0.5 %".to_owned(),
+    match PERCENT * probability {
+        percent if percent > PERCENT - SHOWN_PERCENT => ">99.5 %".to_owned(),
+        percent if percent < SHOWN_PERCENT => "<0.5 %".to_owned(),
         percent => format!("{percent:.0} %"),
     }
 }
@@ -64,10 +68,10 @@ pub fn with_unit(value: impl Display, unit: &str) -> String {
 
 /// A temperature in the form of limits and files: `300.0 degC (573.2 K)`.
 pub fn temperature(value_k: f64) -> String {
-    format!("{:.1} degC ({value_k:.1} K)", value_k - 273.15)
+    format!("{:.1} degC ({value_k:.1} K)", value_k - ICE_POINT_K)
 }
 
-/// Size above which a value is written with a power of ten: far above every reading.
+/// Size above which a value is written with a power of ten. Bound: far above every reading.
 const MAX_PLAIN: f64 = 1e9;
 
 /// A reading in the form of limits: temperatures as [`temperature`], pressures in kPa, speeds in krpm; others in `unit`.
@@ -75,13 +79,13 @@ pub fn readable(value: f64, unit: &str) -> String {
     match unit {
         _ if value.abs() >= MAX_PLAIN => with_unit(format!("{value:.3e}"), unit),
         "K" => temperature(value),
-        "Pa" => format!("{:.1} kPa", value / 1e3),
-        "rpm" => format!("{:.2} krpm", value / 1e3),
+        "Pa" => format!("{:.1} kPa", value / PA_PER_KPA),
+        "rpm" => format!("{:.2} krpm", value / RPM_PER_KRPM),
         unit => with_unit(format!("{value:.1}"), unit),
     }
 }
 
-/// Length above which a decimal number is written with a power of ten, characters: a double in full has 17 digits.
+/// Length above which a decimal number is written with a power of ten, characters. Bound: a double in full has 17 digits.
 const MAX_PLAIN_LENGTH: usize = 40;
 
 /// Replaces decimal numbers that are too long to read, such as 1e300 in full, by the same with a power of ten.

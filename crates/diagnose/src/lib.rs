@@ -10,21 +10,26 @@
 //! 5. Steps that were held out of the fits show how much of the [gap](gap::Gap) the cause removes.
 //! 6. If a part of the gap is left, [closure terms](gap::ClosureTerm) of a library of physical terms are tried, in each balance of the machine.
 //! 7. The [verdict](gap::Verdict) follows from stages 1, 4 and 5. It is made once.
-//! 8. All explanations together locate the gap ([`gap::Place`]), and the most informative [experiment](gap::Suggestion) is proposed; if nothing
+//! 8. All explanations together locate the gap (`locations`), and the most informative [experiment](gap::Suggestion) is proposed; if nothing
 //!    is beyond tolerance, the [smallest cause](gap::SmallestSeen) that would have been named.
 //!
 //! The result, [`gap::Diagnosed`], is the source of what follows: the [map without the causes](gap::Diagnosed::correct), the
-//! [calibrated model](gap::Found), which [`gap::check_forecast`] compares with a later recording, and causes over
-//! [several recordings](gap::over_recordings).
+//! [calibrated model](gap::Found), which [`gap::ForecastCheck`] compares with a later recording, and causes over
+//! [several recordings](gap::Over).
 //!
 //! [`drift::diagnose`] answers which sensor or part changed between repeats, and [`driven::diagnose`] explains logs without steps, of which one side
 //! is driven by its measured neighbours.
 
+#![warn(unreachable_pub)]
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-pub mod closure;
+mod closure;
 pub mod drift;
 pub mod driven;
 pub mod gap;
 
 pub use gap::diagnose::gap;
+
+#[cfg(test)]
+#[path = "../tests/inside/mod.rs"]
+mod inside;

@@ -7,13 +7,13 @@ use mapper_physics::machine::params::BoundaryConditions;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Noise of a sample of shaft speed, rpm. Judgement: eddy-current counters resolve some tens of rpm.
+/// Noise of a sample of shaft speed, rpm. Bound: eddy-current counters resolve some tens of rpm.
 const USUAL_NOISE_RPM: f64 = 30.0;
-/// Noise of a sample of flow, kg/s. Judgement: 0.3 % of a usual flow.
+/// Noise of a sample of flow, kg/s. Bound: 0.3 % of a usual flow.
 const USUAL_NOISE_KG_S: f64 = 1.5e-4;
-/// Noise of a sample of pressure, Pa. Judgement: 0.02 % of a range of 3 bar.
+/// Noise of a sample of pressure, Pa. Bound: 0.02 % of a range of 3 bar.
 const USUAL_NOISE_PA: f64 = 60.0;
-/// Noise of a sample of temperature, K. Judgement: thermocouples in gas have 0.1 to 0.3 K.
+/// Noise of a sample of temperature, K. Bound: thermocouples in gas have 0.1 to 0.3 K.
 const USUAL_NOISE_K: f64 = 0.2;
 
 /// Merges the declared uncertainties of every sensor of a recording, by a rule common to all programs.

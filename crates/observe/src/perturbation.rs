@@ -44,7 +44,7 @@ pub enum Perturbation {
 /// Ambient temperature is measured at one place in the cell, not at each wall, K. Bound: temperatures in a test cell differ by some
 /// kelvin.
 const AMBIENT_SIGMA_K: f64 = 1.0;
-/// The rig may not have been at steady state before the recording, K. Judgement: housings after a usual warm-up.
+/// The rig may not have been at steady state before the recording, K. Bound: housings after a usual warm-up.
 const START_SIGMA_K: f64 = 5.0;
 
 impl Perturbation {

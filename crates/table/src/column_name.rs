@@ -45,7 +45,7 @@ pub struct ColumnName {
     tag: Option<Tag>,
 }
 
-/// Maximum number of letters of a name that are evaluated.
+/// Maximum number of letters of a name that are evaluated. Bound: limits the time for any name.
 const MAX_NAME_LETTERS: usize = 120;
 
 impl ColumnName {

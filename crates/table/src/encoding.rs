@@ -11,8 +11,9 @@ use std::io::{self, Read};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TextEncoding(&'static Encoding);
 
-/// Maximum number of evaluated bytes, and of evaluated lines with letters outside ASCII.
+/// Maximum number of evaluated bytes. Bound: effort.
 const MAX_SAMPLE_BYTES: usize = 1 << 16;
+/// Maximum number of evaluated lines with letters outside ASCII. Bound: effort; some ten words identify an encoding.
 const MAX_LINES: usize = 200;
 
 impl TextEncoding {

@@ -2,17 +2,18 @@
 
 use jiff::civil::Date;
 
-/// Permitted years: the range of 64 bits in nanoseconds, and no log is older.
+/// Permitted years. Bound: the range of 64 bits in nanoseconds, and no log is older.
 const YEARS: std::ops::RangeInclusive<i64> = 1970..=2200;
 
-/// Maximum length of a date with its time and zone, bytes.
+/// Maximum length of a date with its time and zone, bytes. Bound: the longest notation has 35.
 const MAX_TEXT_BYTES: usize = 40;
 
-/// Number of days in [`YEARS`], the maximum of durations too.
+/// Number of days in [`YEARS`], the maximum of durations too. Source: the calendar.
 const MAX_DAYS: i64 = 84_371;
 
+/// Nanoseconds in a second. Source: a definition.
 const NS_PER_S: i64 = 1_000_000_000;
-/// Nanoseconds per day.
+/// Nanoseconds per day. Source: a definition.
 pub const NS_PER_DAY: i64 = 86_400 * NS_PER_S;
 
 /// The order of the parts of a date.

@@ -89,7 +89,7 @@ fn is_unspaced(letter: char) -> bool {
     matches!(letter, '\u{3040}'..='\u{30ff}' | '\u{4e00}'..='\u{9fff}')
 }
 
-/// Maximum length of a compound, bytes: twice that of the longest German words. It limits the time for any name.
+/// Maximum length of a compound, bytes. Bound: twice that of the longest German words. It limits the time for any name.
 const MAX_WORD_BYTES: usize = 64;
 
 /// Adds the letters and numbers of a part between blanks.

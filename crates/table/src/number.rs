@@ -2,13 +2,13 @@
 
 use crate::units::header_unit;
 
-/// Maximum length of a number's text, bytes.
+/// Maximum length of a number's text, bytes. Bound: a double in full, with unit and blanks.
 const MAX_NUMBER_BYTES: usize = 48;
 
-/// Digits before the first thousands separator.
+/// Digits before the first thousands separator. Source: thousands.
 const FIRST_GROUP_DIGITS: std::ops::RangeInclusive<usize> = 1..=3;
 
-/// Minimum value that marks a missing reading: instruments write 9.9e37 for an overload and 9.91e37 for no reading (SCPI-99,
+/// Minimum value that marks a missing reading. Source: instruments write 9.9e37 for an overload and 9.91e37 for no reading (SCPI-99,
 /// section 7.2.1.4 and 7.2.1.5), others 1e30 or the largest number of single precision.
 pub const NO_READING: f64 = 1e30;
 

@@ -8,7 +8,7 @@ use std::io::{self, Cursor, Read};
 use std::ops::Range;
 use std::rc::Rc;
 
-/// Maximum length of a line, bytes: an unclosed quote would otherwise extend to the end of the file.
+/// Maximum length of a line, bytes. Bound: an unclosed quote would otherwise extend to the end of the file.
 const MAX_LINE_BYTES: usize = 1 << 20;
 
 /// Notation of a delimited file.

@@ -162,7 +162,7 @@ const PRESSURES: &[(&str, &str)] = &[
 ];
 
 /// Units of volume flow, lower case without blanks, and their value in m3/s; `None` for a volume at standard conditions, which the
-/// unit does not define.
+/// unit does not define. Source: definitions of the units.
 const VOLUME_FLOWS: &[(Option<f64>, &[&str])] = &[
     (
         None,

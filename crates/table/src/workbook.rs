@@ -9,16 +9,16 @@ use jiff::ToSpan;
 use jiff::civil::{Date, Time};
 use std::io::{Read, Seek};
 
-/// Maximum stored length of a cell's text, bytes: a name, a unit or a date is shorter.
+/// Maximum stored length of a cell's text, bytes. Bound: a name, a unit or a date is shorter.
 const MAX_TEXT_BYTES: usize = 1 << 10;
 
-/// Days from the origin of Excel's dates to 1970-01-01.
+/// Days from the origin of Excel's dates to 1970-01-01. Source: the calendar.
 const EXCEL_EPOCH_DAYS: i64 = 25_569;
 
-/// Maximum date of a log in days since Excel's origin: the year 2200.
+/// Maximum date of a log in days since Excel's origin. Bound: the year 2200.
 const MAX_DAY: f64 = 109_940.0;
 
-/// Maximum number of columns.
+/// Maximum number of columns. Source: Excel's own limit.
 const MAX_COLUMNS: usize = 16_384;
 
 /// Whether a file that starts with these bytes may be a workbook: a compound file, or a zip archive.
@@ -241,14 +241,16 @@ fn truncated(text: &str) -> String {
 fn instant(days: f64) -> Value {
     instant_of(days).map_or(Value::Empty, Value::Instant)
 }
+/// Resolution of a time of a present-day date in Excel's days, ns. Bound: rounding of an f64.
+const RESOLUTION_NS: i64 = 1000;
 
 /// Excel's days since its origin; a value below one is a time of day.
 fn instant_of(days: f64) -> Option<Instant> {
     if !(0.0..MAX_DAY).contains(&days) {
         return None;
     }
-    // To the microsecond, the resolution of an f64 of a present-day date.
-    let ns_of_day = ((days.fract() * NS_PER_DAY as f64) / 1e3).round() as i64 * 1000;
+    let ns_of_day =
+        ((days.fract() * NS_PER_DAY as f64) / RESOLUTION_NS as f64).round() as i64 * RESOLUTION_NS;
     let day = (days >= 1.0).then_some(days.trunc() as i64 - EXCEL_EPOCH_DAYS);
     Some(Instant { day, ns_of_day: Some(ns_of_day) })
 }

@@ -11,10 +11,10 @@ use std::rc::Rc;
 /// The first bytes of a compound file, which holds a workbook of Excel 97 to 2003.
 pub const XLS_MAGIC: [u8; 8] = *b"\xD0\xCF\x11\xE0\xA1\xB1\x1A\xE1";
 
-/// Maximum size of the stream with the sheets, bytes: 65 536 rows, the format's maximum, of 50 numbers take 59 MB.
+/// Maximum size of the stream with the sheets, bytes. Bound: 65 536 rows, the format's maximum, of 50 numbers take 59 MB.
 const MAX_STREAM_BYTES: u64 = 64 << 20;
 
-/// Days from the first day of 1900 to that of 1904, from which some programs count.
+/// Days from the first day of 1900 to that of 1904, from which some programs count. Source: the calendar.
 const DAYS_TO_1904: f64 = 1462.0;
 
 /// The content of a cell.
@@ -225,11 +225,14 @@ fn number(value: f64, format: u16, globals: &Globals) -> Cell {
     }
 }
 
+/// Factor of numbers in four bytes that are stored times it. Source: the format of Excel 97 ([MS-XLS], 2.5.217).
+const STORED_FACTOR: f64 = 100.0;
+
 /// A number in four bytes: the upper half of a double or an integer of 30 bits, either of them perhaps times 100.
 fn unpacked(rk: u32) -> f64 {
     let value =
         if rk & 2 != 0 { f64::from(rk.cast_signed() >> 2) } else { f64::from_bits(u64::from(rk & !3) << 32) };
-    if rk & 1 != 0 { value / 100.0 } else { value }
+    if rk & 1 != 0 { value / STORED_FACTOR } else { value }
 }
 
 const EOF: u16 = 0x000A;

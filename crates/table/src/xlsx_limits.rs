@@ -6,33 +6,34 @@ use std::cell::Cell;
 use std::io::{self, BufReader, Read, Seek};
 use std::rc::Rc;
 
-/// Maximum unpacked size of a part that is not listed here, bytes.
+/// Maximum unpacked size of a part that is not listed here, bytes. Bound: memory; a million cells have some 40 MB.
 const MAX_PART_BYTES: u64 = 128 << 20;
 
-/// Maximum unpacked size of the part with cell formats, bytes: each format copies its strings.
+/// Maximum unpacked size of the part with cell formats, bytes. Bound: each format copies its strings.
 const MAX_STYLES_BYTES: u64 = 8 << 20;
 
+/// Maximum number of parts. Bound: memory; a workbook has some ten for each sheet.
 const MAX_PARTS: usize = 10_000;
 
-/// Maximum length of a tag, of a piece between two tags and of a cell, bytes: Excel's own limit of a cell is 32 767 characters.
+/// Maximum length of a tag, of a piece between two tags and of a cell, bytes. Bound: Excel's own limit of a cell is 32 767 characters.
 const MAX_PIECE_BYTES: u64 = 1 << 20;
 
-/// Maximum length of a tag among the formats of cells, bytes: Excel's own limit of a number format is 255 characters.
+/// Maximum length of a tag among the formats of cells, bytes. Bound: Excel's own limit of a number format is 255 characters.
 const MAX_STYLE_PIECE_BYTES: u64 = 1 << 12;
 
-/// Maximum nesting of elements: a cell of rich text has ten levels.
+/// Maximum nesting of elements. Bound: a cell of rich text has ten levels.
 const MAX_DEPTH: usize = 64;
 
-/// Rows of a sheet in Excel itself.
+/// Rows of a sheet. Source: Excel's own limit.
 const MAX_ROWS: u32 = 1 << 20;
 
-/// Minimum size of a shared string in bytes, `<si/>`.
+/// Minimum size of a shared string in bytes. Source: `<si/>`.
 const SHARED_STRING_BYTES: u64 = 5;
 
-/// Memory of a shared string next to its text, bytes: 24 for its place in a list that grows by doubling, 16 at least for the text.
+/// Memory of a shared string next to its text, bytes. Bound: 24 for its place in a list that grows by doubling, 16 at least for the text.
 const STRING_MEMORY_BYTES: u64 = 64;
 
-/// Memory of a format, a name or a relation, bytes: two strings in a table that grows by doubling. Formats take 150, names 110.
+/// Memory of a format, a name or a relation, bytes. Bound: two strings in a table that grows by doubling. Formats take 150, names 110.
 const ENTRY_MEMORY_BYTES: u64 = 256;
 
 /// What a workbook may unpack to, bytes.

@@ -68,7 +68,7 @@ impl EstimateUncertainty {
     }
 }
 
-/// 97.5 % quantile of the standard normal distribution.
+/// 97.5 % quantile of the standard normal distribution. Source: its definition.
 const Z_975: f64 = 1.959_963_984_540_054;
 
 /// The 95 % interval of a normally distributed estimate: value -/+ 1.96 standard errors.

@@ -20,13 +20,14 @@ pub struct AcceptanceCriteria {
     pub heat_balance_ratio: Option<f64>,
 }
 
-/// Window of criteria that do not define one, s. Judgement: the gas has settled by then, and a step of 40 s is long enough.
+/// Window of criteria that do not define one, s. Bound: the gas has settled by then, and a step of 40 s is long enough.
 pub const ACCEPTANCE_WINDOW_S: f64 = 20.0;
 
 impl AcceptanceCriteria {
     /// ASME PTC 10-1997: the rows of table 3.4 that apply to a turbocharger.
     pub fn ptc_10() -> Self {
-        let fluctuations = [
+        /// Permissible fluctuations, as ratios. Source: ASME PTC 10-1997, table 3.4.
+        const FLUCTUATIONS: [(Channel, f64); 6] = [
             (Channel::ShaftSpeed, 0.005),
             (Channel::P1, 0.02),
             (Channel::T1, 0.005),
@@ -38,7 +39,7 @@ impl AcceptanceCriteria {
             name: "ASME PTC 10".to_owned(),
             source: "ASME PTC 10-1997, table 3.4, permissible fluctuations of test readings; the code is not public".to_owned(),
             window_s: ACCEPTANCE_WINDOW_S,
-            fluctuation_ratio: fluctuations.into(),
+            fluctuation_ratio: FLUCTUATIONS.into(),
             heat_balance_ratio: None,
         }
     }
@@ -92,7 +93,7 @@ impl JointSettings {
     }
 }
 
-/// Default uncertainty of the assumed alpha_A, one standard deviation: if it has not been
+/// Default uncertainty of the assumed alpha_A, one standard deviation. Bound: if it has not been
 /// measured, a tenth to a quarter of the area may lie before the wheel.
 pub const ALPHA_AREA_SIGMA_RATIO: f64 = 0.15;
 
@@ -183,20 +184,35 @@ impl Default for ModelTolerances {
     /// Typical values of a careful gas stand: half a percent for calibrated quantities, more for heat.
     fn default() -> Self {
         ModelTolerances {
+            // Source: class 0.5 of flow meters.
             flow_meter_gain_ratio: 0.005,
+            // Bound: the flow meter with which a map is measured.
             flow_map_ratio: 0.005,
+            // Bound: the temperatures and pressures with which a map is measured.
             compressor_efficiency_ratio: 0.005,
+            // Bound: their repeatability.
             efficiency_shape_ratio: 0.003,
+            // Bound: unmixed gas at the probe for T4.
             turbine_efficiency_ratio: 0.01,
+            // Bound: the flow meter with which a valve is calibrated.
             valve_area_ratio: 0.005,
+            // Bound: a correlation that is calibrated on the machine; others scatter by 20 %.
             convection_ratio: 0.03,
+            // Bound: draughts of a cell.
             external_convection_ratio: 0.10,
+            // Bound: the viscosity of warm oil.
             oil_conductance_ratio: 0.05,
+            // Bound: the weather within a shift.
             inlet_pressure_pa: 200.0,
+            // Bound: the conditioning of a cell.
             inlet_temperature_k: 2.0,
+            // Bound: the control of a burner.
             turbine_inlet_temperature_k: 10.0,
+            // Bound: the control of an oil conditioner.
             oil_temperature_k: 5.0,
+            // Bound: layers of air in a cell.
             ambient_temperature_k: 5.0,
+            // Bound: fast pressure controllers.
             actuator_lag_s: 0.3,
             structure: StructureTolerances::default(),
         }
@@ -218,7 +234,7 @@ pub struct SettleBands {
 }
 
 impl Default for SettleBands {
-    /// The typical variations in section 3 of Burke et al.: 0.8 % in speed, 1.5 % in flow, 2 % in pressure ratio.
+    /// Source: the typical variations in section 3 of Burke et al.: 0.8 % in speed, 1.5 % in flow, 2 % in pressure ratio.
     fn default() -> Self {
         SettleBands { speed_ratio: 0.008, flow_ratio: 0.015, pressure_ratio_ratio: 0.02 }
     }
@@ -241,14 +257,15 @@ pub enum WindowRule {
 }
 
 impl WindowRule {
-    /// Earliest start of an automatic window after the last change of a command, s: the typical time in Burke et al.,
+    /// Earliest start of an automatic window after the last change of a command, s. Source: the typical time in Burke et al.,
     /// and the time that probes of 1.5 mm need to follow.
     pub const EARLIEST_S: f64 = 10.0;
-    /// Shortest useful window, s. A step that settles later uses a window of this length at its end, and is doubtful.
+    /// Shortest useful window, s. Bound: a housing moves by a few of its uncertainties. A step that settles later uses a window of this length at its end, and is doubtful.
     pub const SHORTEST_S: f64 = 30.0;
 
     /// Fraction at the end of a step in which its operating point must have settled, for methods that evaluate the step from
-    /// its jump on. The point's state is the mean of the last seconds, but an oscillating step may be steady for a moment only. Judgement.
+    /// its jump on. The point's state is the mean of the last seconds, but an oscillating step may be steady for a moment only.
+    /// Bound: several periods of a hunting controller.
     const SETTLED_END_RATIO: f64 = 0.25;
 
     /// Length of this part for a step of `dwell_s`, s: at most [`Self::SHORTEST_S`].

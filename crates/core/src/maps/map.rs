@@ -3,6 +3,9 @@
 use crate::{EfficiencyDefinition, IdentifiedPoint, Method, ReferenceState, SurgeMark};
 use serde::{Deserialize, Serialize};
 
+/// Share of a line's largest flow at which the machine chokes. Bound: the end of a line is vertical within the reading of a flow meter.
+const CHOKED_SHARE: f64 = 0.998;
+
 /// One measured point of the map, converted to corrected quantities.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MapPoint {
@@ -192,7 +195,7 @@ impl FittedMap {
         self.lines.iter().filter_map(|line| {
             let largest = line.nodes.iter().map(|n| n.flow_corrected_kg_s).fold(f64::MIN, f64::max);
             // The end of a line is vertical: the machine chokes at its top.
-            let node = line.nodes.iter().rev().find(|n| n.flow_corrected_kg_s >= 0.998 * largest)?;
+            let node = line.nodes.iter().rev().find(|n| n.flow_corrected_kg_s >= CHOKED_SHARE * largest)?;
             Some((line.speed_corrected_rpm, node))
         })
     }

@@ -1,10 +1,11 @@
 //! The interface of map formats, and the errors of reading and writing.
 
+use crate::unit_factors::RPM_PER_KRPM;
 use crate::{
     CompressorMap, ImportedMap, ImportedTurbine, MapDescription, ReferenceState, TurbineMap, step_number,
 };
 
-/// Maximum size of a map file, bytes: a measured map has some ten thousand.
+/// Maximum size of a map file, bytes. Bound: a measured map has some ten thousand.
 pub const MAP_FILE_SIZE_LIMIT: usize = 32 << 20;
 
 /// Turns a map into the bytes of a file. The same map gives the same bytes.
@@ -33,7 +34,7 @@ impl Default for MapUnits {
             flow: "kg/s".to_owned(),
             flow_of_one_kg_s: 1.0,
             speed: "krpm".to_owned(),
-            speed_of_one_rpm: 1e-3,
+            speed_of_one_rpm: 1.0 / RPM_PER_KRPM,
         }
     }
 }

@@ -2,6 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
+/// Range of a reference temperature, K. Bound: no test cell is outside it.
+const TEMPERATURES_K: std::ops::RangeInclusive<f64> = 200.0..=400.0;
+/// Range of a reference pressure, Pa. Bound: one atmosphere is inside it, a number in another unit is not.
+const PRESSURES_PA: std::ops::RangeInclusive<f64> = 50e3..=200e3;
+
 /// Reference total temperature and pressure of corrected quantities.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ReferenceState {
@@ -12,14 +17,14 @@ pub struct ReferenceState {
 }
 
 impl ReferenceState {
-    /// SAE J922: 298 K, 100 kPa.
+    /// 298 K, 100 kPa. Source: SAE J922.
     pub const SAE: ReferenceState = ReferenceState { t_ref_k: 298.0, p_ref_pa: 100_000.0 };
 
-    /// As printed on Garrett maps: 545 degR, 13.95 psia (a pound-force over a square inch, exactly).
+    /// Source: as printed on Garrett maps: 545 degR, 13.95 psia (a pound-force over a square inch, exactly).
     pub const GARRETT: ReferenceState =
         ReferenceState { t_ref_k: 545.0 * 5.0 / 9.0, p_ref_pa: 13.95 * 4.448_221_615_260_5 / 0.000_645_16 };
 
-    /// As printed on BorgWarner maps: 293 K, 98.1 kPa.
+    /// Source: as printed on BorgWarner maps: 293 K, 98.1 kPa.
     pub const BORGWARNER: ReferenceState = ReferenceState { t_ref_k: 293.0, p_ref_pa: 98_100.0 };
 
     /// The state with this name, ignoring case.
@@ -29,7 +34,7 @@ impl ReferenceState {
 
     /// Whether both numbers form a valid reference state: 200 K to 400 K, 50 kPa to 200 kPa.
     pub fn is_plausible(&self) -> bool {
-        (200.0..=400.0).contains(&self.t_ref_k) && (50e3..=200e3).contains(&self.p_ref_pa)
+        TEMPERATURES_K.contains(&self.t_ref_k) && PRESSURES_PA.contains(&self.p_ref_pa)
     }
 
     /// Factor that converts a corrected flow of this reference state to `other`.
@@ -92,7 +97,7 @@ impl std::fmt::Display for ReferenceState {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         // For display: a hundredth of a permille does not matter. Files carry all digits.
         let short = |value: f64| (value * 1e3).round() / 1e3;
-        write!(f, "{} K, {} kPa", short(self.t_ref_k), short(self.p_ref_pa / 1000.0))
+        write!(f, "{} K, {} kPa", short(self.t_ref_k), short(self.p_ref_pa / 1e3))
     }
 }
 

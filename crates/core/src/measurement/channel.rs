@@ -130,7 +130,7 @@ channels! {
     DewPoint,         "T_dew",         Ambient,    "dew_point_k",                 Temperature,     "dew point of the inlet air";
 }
 
-/// Number of modelled channels, which are the first ones. The others are only measured.
+/// Number of modelled channels, which are the first ones. The others are only measured. Source: the table above.
 pub const MODELLED_CHANNELS: usize = 19;
 
 impl Channel {
@@ -191,7 +191,7 @@ impl std::str::FromStr for Channel {
     }
 }
 
-/// Sample interval of the program's own recordings, to which declared noise refers, s.
+/// Sample interval of the program's own recordings, to which declared noise refers, s. Source: a definition.
 pub const SAMPLE_INTERVAL_S: f64 = 0.1;
 
 /// Temperature at which a thermometer's gain error is zero, K. Source: ISO 1, reference temperature 20 degC.
@@ -228,7 +228,12 @@ pub struct NoiseColour {
 
 impl Default for NoiseColour {
     fn default() -> Self {
-        NoiseColour { first_order_share_ratio: 0.6, time_constant_s: 2.0 }
+        NoiseColour {
+            // Judgement: a third of the variance of a conditioned thermocouple is slow.
+            first_order_share_ratio: 0.6,
+            // Bound: the gas of a pipe is replaced within it.
+            time_constant_s: 2.0,
+        }
     }
 }
 

@@ -7,7 +7,7 @@ use crate::{
 };
 use std::collections::BTreeMap;
 
-/// Time between two joined recordings, s: much longer than the thermal time constant of any housing, so that the last step of one
+/// Time between two joined recordings, s. Bound: much longer than the thermal time constant of any housing, so that the last step of one
 /// recording does not count as the start of the first jump of the next.
 const RECORDING_GAP_S: f64 = 3600.0;
 

@@ -7,10 +7,12 @@ use crate::{Channel, Recording, Series, StepMarker};
 ///
 /// | | ratio | why |
 /// |---|---|---|
-/// | shaft speed | 1 % | judgement: a fifth of the distance of speed lines |
-/// | flow, P3, P2 | 2 %, 1.5 % | judgement: held less precisely than the speed |
+/// | shaft speed | 1 % | a fifth of the distance of speed lines |
+/// | flow, P3, P2 | 2 %, 1.5 % | held less precisely than the speed |
 /// | commanded P3 | 1 % | a command has no noise, and a speed loop moves it by less in a second |
-/// | valve opening | 2 % | judgement: a positioner resolves some tenths of a per cent |
+/// | valve opening | 2 % | a positioner resolves some tenths of a per cent |
+///
+/// Bound: between what a controller holds and the distance of two points of a map.
 pub const JUMPS: [(Channel, f64); 6] = [
     (Channel::ShaftSpeed, 0.01),
     (Channel::CompressorFlow, 0.02),
@@ -20,15 +22,15 @@ pub const JUMPS: [(Channel, f64); 6] = [
     (Channel::ValveCommand, 0.02),
 ];
 
-/// Multiple of the jump of a commanded P3 that a chain of slow changes must exceed to be a jump of a slow rig: the trims of a speed loop
+/// Multiple of the jump of a commanded P3 that a chain of slow changes must exceed to be a jump of a slow rig. Bound: the trims of a speed loop
 /// add up to more than one jump while the housings warm up.
 pub const SLOW_JUMP_MULTIPLE: f64 = 2.0;
 
-/// Relative change of a command within which a speed loop trims it at one point: half of the smallest jump of a command ([`JUMPS`]), and more
+/// Relative change of a command within which a speed loop trims it at one point. Bound: half of the smallest jump of a command ([`JUMPS`]), and more
 /// than loggers round.
 pub const SAME_COMMAND_RATIO: f64 = 5e-3;
 
-/// Relative change below which a command counts as unchanged: the read-back of a constant command varies in the last digits of a
+/// Relative change below which a command counts as unchanged. Bound: the read-back of a constant command varies in the last digits of a
 /// single-precision number.
 const READ_BACK_RATIO: f64 = 1e-6;
 

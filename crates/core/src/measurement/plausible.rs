@@ -12,41 +12,71 @@ pub struct Plausible {
     pub any: RangeInclusive<f64>,
 }
 
+/// Speeds of a running machine, rpm. Bound: idle of the largest machines to a wheel of 20 mm at a tip speed of 630 m/s.
+const RUNNING_RPM: RangeInclusive<f64> = 1e3..=6e5;
+/// Flows of a running machine, kg/s. Bound: leakage of a small machine at idle to engines of 10 MW.
+const RUNNING_KG_S: RangeInclusive<f64> = 1e-4..=20.0;
+/// P1, absolute, of a running machine, Pa. Bound: throttled inlet at altitude to the outlet of an upstream stage.
+const RUNNING_P1_PA: RangeInclusive<f64> = 3e4..=6e5;
+/// Other absolute pressures of a running machine, Pa. Bound: gauge readings at part load are lower; up to three stages of boost.
+const RUNNING_PA: RangeInclusive<f64> = 5e4..=2e6;
+/// T1, ambient and dew point, K. Bound: arctic cell to the outlet of an upstream stage without a cooler.
+const RUNNING_AIR_K: RangeInclusive<f64> = 220.0..=390.0;
+/// T2, K. Bound: limit of compressor wheels.
+const RUNNING_T2_K: RangeInclusive<f64> = 220.0..=700.0;
+/// Compressor housing, K. Bound: above the limit of aluminium.
+const RUNNING_TC_K: RangeInclusive<f64> = 220.0..=800.0;
+/// Turbine side, K. Bound: above the limit of turbine materials.
+const RUNNING_TURBINE_K: RangeInclusive<f64> = 220.0..=1600.0;
+/// Oil and water, K. Bound: oil burns above, and water boils at 18 bar.
+const RUNNING_LIQUID_K: RangeInclusive<f64> = 220.0..=480.0;
+/// Opening of a valve over its nominal area. Bound: a valve of three times the diameter.
+const RUNNING_OPENING: RangeInclusive<f64> = 0.0..=10.0;
+/// Relative humidity. Bound: saturated air, with the error of a hygrometer.
+const RUNNING_HUMIDITY: RangeInclusive<f64> = 0.0..=1.05;
+/// Any single reading of a speed, rpm. Bound: spikes of a pulse counter.
+const ANY_RPM: RangeInclusive<f64> = 0.0..=1e7;
+/// Any single reading of a flow, kg/s. Bound: spikes and reversed flow.
+const ANY_KG_S: RangeInclusive<f64> = -100.0..=100.0;
+/// Any single reading of a pressure, Pa. Bound: a lost supply to spikes.
+const ANY_PA: RangeInclusive<f64> = 100.0..=1e9;
+/// Any single reading of a temperature, K. Bound: an open thermocouple.
+const ANY_K: RangeInclusive<f64> = 100.0..=3000.0;
+/// Speeds that a correctly wired sensor reads, rpm. Bound: noise around 0 to beyond any wheel.
+const MEASURABLE_RPM: RangeInclusive<f64> = -1e3..=1e6;
+/// Flows that a correctly wired sensor reads, kg/s. Bound: the zero of a large meter to [`RUNNING_KG_S`].
+const MEASURABLE_KG_S: RangeInclusive<f64> = -1.0..=20.0;
+/// Pressures that a correctly wired sensor reads, Pa. Bound: a vacuum to beyond [`RUNNING_PA`].
+const MEASURABLE_PA: RangeInclusive<f64> = 1e3..=5e6;
+/// Temperatures that a correctly wired sensor reads, K. Bound: those of a running machine, and a colder store.
+const MEASURABLE_K: RangeInclusive<f64> = 200.0..=1600.0;
+/// Ratios that a correctly wired sensor reads. Bound: noise around 0 to [`RUNNING_OPENING`].
+const MEASURABLE_RATIO: RangeInclusive<f64> = -0.1..=10.0;
+
 /// The plausible readings of a channel.
-///
-/// | | running | why | any |
-/// |---|---|---|---|
-/// | shaft speed | 1e3..6e5 rpm | idle of the largest machines to a wheel of 20 mm at a tip speed of 630 m/s | 0..1e7 |
-/// | flows | 1e-4..20 kg/s | leakage of a small machine at idle to engines of 10 MW | -100..100 |
-/// | P1 | 30..600 kPa | absolute; throttled inlet at altitude to the outlet of an upstream stage | 100..1e9 |
-/// | other pressures | 50 kPa..2 MPa | absolute; gauge readings at part load are lower; up to three stages of boost | 100..1e9 |
-/// | relative humidity | 0..1.05 | saturated air, with the error of a hygrometer | any |
-/// | T1, ambient, dew point | 220..390 K | arctic cell to the outlet of an upstream stage without a cooler | 100..3000 |
-/// | T2 | 220..700 K | limit of compressor wheels | 100..3000 |
-/// | compressor housing | 220..800 K | above the limit of aluminium | 100..3000 |
-/// | oil, water | 220..480 K | oil burns above, and water boils at 18 bar | 100..3000 |
-/// | turbine side | 220..1600 K | above the limit of turbine materials | 100..3000 |
 pub fn plausible(channel: Channel) -> Plausible {
     let running = match channel {
-        Channel::ShaftSpeed => 1e3..=6e5,
-        Channel::CompressorFlow | Channel::TurbineFlow | Channel::OilFlow | Channel::WaterFlow => 1e-4..=20.0,
-        Channel::P1 => 3e4..=6e5,
-        Channel::P2 | Channel::P3 | Channel::P4 | Channel::P3Command => 5e4..=2e6,
-        Channel::T1 | Channel::TAmb | Channel::DewPoint => 220.0..=390.0,
-        Channel::T2 => 220.0..=700.0,
-        Channel::Tc => 220.0..=800.0,
-        Channel::T3 | Channel::T4 | Channel::Tt | Channel::T3Command => 220.0..=1600.0,
-        Channel::TOil | Channel::TOilOut | Channel::TOilCommand | Channel::TWater | Channel::TWaterOut => {
-            220.0..=480.0
+        Channel::ShaftSpeed => RUNNING_RPM,
+        Channel::CompressorFlow | Channel::TurbineFlow | Channel::OilFlow | Channel::WaterFlow => {
+            RUNNING_KG_S
         }
-        Channel::ValveCommand => 0.0..=10.0,
-        Channel::RelativeHumidity => 0.0..=1.05,
+        Channel::P1 => RUNNING_P1_PA,
+        Channel::P2 | Channel::P3 | Channel::P4 | Channel::P3Command => RUNNING_PA,
+        Channel::T1 | Channel::TAmb | Channel::DewPoint => RUNNING_AIR_K,
+        Channel::T2 => RUNNING_T2_K,
+        Channel::Tc => RUNNING_TC_K,
+        Channel::T3 | Channel::T4 | Channel::Tt | Channel::T3Command => RUNNING_TURBINE_K,
+        Channel::TOil | Channel::TOilOut | Channel::TOilCommand | Channel::TWater | Channel::TWaterOut => {
+            RUNNING_LIQUID_K
+        }
+        Channel::ValveCommand => RUNNING_OPENING,
+        Channel::RelativeHumidity => RUNNING_HUMIDITY,
     };
     let any = match channel.info().dimension {
-        Dimension::RotationalSpeed => 0.0..=1e7,
-        Dimension::MassFlow => -100.0..=100.0,
-        Dimension::Pressure => 100.0..=1e9,
-        Dimension::Temperature => 100.0..=3000.0,
+        Dimension::RotationalSpeed => ANY_RPM,
+        Dimension::MassFlow => ANY_KG_S,
+        Dimension::Pressure => ANY_PA,
+        Dimension::Temperature => ANY_K,
         Dimension::Ratio => f64::MIN..=f64::MAX,
     };
     Plausible { running, any }
@@ -57,12 +87,11 @@ pub fn plausible(channel: Channel) -> Plausible {
 /// than [`Plausible::running`], since a stand may be at rest.
 pub fn measurable(dimension: Dimension) -> RangeInclusive<f64> {
     match dimension {
-        // Noise around 0.
-        Dimension::RotationalSpeed => -1e3..=1e6,
-        Dimension::MassFlow => -1.0..=20.0,
-        Dimension::Pressure => 1e3..=5e6,
-        Dimension::Temperature => 200.0..=1600.0,
-        Dimension::Ratio => -0.1..=10.0,
+        Dimension::RotationalSpeed => MEASURABLE_RPM,
+        Dimension::MassFlow => MEASURABLE_KG_S,
+        Dimension::Pressure => MEASURABLE_PA,
+        Dimension::Temperature => MEASURABLE_K,
+        Dimension::Ratio => MEASURABLE_RATIO,
     }
 }
 

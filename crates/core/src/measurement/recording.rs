@@ -259,7 +259,7 @@ pub struct StepMarker {
 }
 
 impl StepMarker {
-    /// First index of steps that a resumed run repeats outside its plan: no plan has that many steps.
+    /// First index of steps that a resumed run repeats outside its plan. Bound: no plan has that many steps.
     pub const FIRST_REPEAT_INDEX: usize = 1_000_000;
 
     /// Number of the step in its run, from 1; `None` for a repeated step outside the plan.

@@ -3,14 +3,14 @@
 use crate::{Channel, DeclaredUncertainty, Dimension, UnknownChannel};
 use serde::{Deserialize, Serialize};
 
-/// Maximum number of sensors on one channel.
+/// Maximum number of sensors on one channel. Bound: no rig has as many.
 pub const MAX_ELEMENTS: usize = 16;
 
 /// During a run, a reading is skipped if its deviation from the median of all sensors exceeds this limit, in standard deviations of
-/// noise and offset together. Identification excludes sensors on the basis of the whole recording instead.
+/// noise and offset together. Bound: a sound sensor never deviates as far. Identification excludes sensors on the basis of the whole recording instead.
 const LIVE_LIMIT_SIGMAS: f64 = 8.0;
 
-/// Exponent of a probe's lag with its diameter: `tau ~ d^2/Nu`, and Nu (eq. 11) about as `d^0.5` at the Reynolds numbers of
+/// Exponent of a probe's lag with its diameter. Source: `tau ~ d^2/Nu`, and Nu (eq. 11) about as `d^0.5` at the Reynolds numbers of
 /// a tip of one to four millimetres in an outlet pipe.
 const LAG_EXPONENT: f64 = 1.5;
 

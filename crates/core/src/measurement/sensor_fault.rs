@@ -51,21 +51,21 @@ impl fmt::Display for FaultKind {
     }
 }
 
-/// Maximum time for which a channel of known noise can repeat one value, s: noise repeats a value in two or three samples of a coarse logger,
+/// Maximum time for which a channel of known noise can repeat one value, s. Bound: noise repeats a value in two or three samples of a coarse logger,
 /// not for seconds.
 pub const NOISY_REPEAT_S: f64 = 5.0;
 
-/// Maximum time, s, and number of samples for which any channel can repeat one value while others change: a coarse digit repeats four of five
+/// Maximum time, s, and number of samples for which any channel can repeat one value while others change. Bound: a coarse digit repeats four of five
 /// samples, and 20 of them in 1 % of cases only.
 pub const COARSE_REPEAT_S: f64 = 20.0;
-/// See [`COARSE_REPEAT_S`].
+/// See [`COARSE_REPEAT_S`]. Bound: as there.
 pub const COARSE_REPEAT_SAMPLES: usize = 20;
 
-/// Movement below which a reading counts as constant after a jump of the setpoints, as a share of its declared noise: 200 samples of a working
+/// Movement below which a reading counts as constant after a jump of the setpoints, as a share of its declared noise. Bound: 200 samples of a working
 /// sensor cover five standard deviations, and a tenth of them if its noise was declared ten times too large.
 const BAND_NOISE_RATIO: f64 = 0.1;
 
-/// Like [`BAND_NOISE_RATIO`], as a share of the reading (4 mK of 400 K, 2 Pa of 200 kPa): the noise of thermocouple and pressure amplifiers is
+/// Like [`BAND_NOISE_RATIO`], as a share of the reading (4 mK of 400 K, 2 Pa of 200 kPa). Bound: the noise of thermocouple and pressure amplifiers is
 /// larger, and a jump of the setpoints moves a reading a hundred times as far.
 const BAND_READING_RATIO: f64 = 1e-5;
 

@@ -158,7 +158,12 @@ pub struct SafeTrajectory {
 impl Default for SafeTrajectory {
     /// The air is cut at once.
     fn default() -> Self {
-        SafeTrajectory { p3_slew_pa_s: None, valve_opening_ratio: 1.0, within_s: 20.0 }
+        SafeTrajectory {
+            p3_slew_pa_s: None,
+            valve_opening_ratio: 1.0,
+            // Bound: a guard that waits longer does not guard.
+            within_s: 20.0,
+        }
     }
 }
 

@@ -4,7 +4,7 @@ use crate::{Channel, OperatingPoint, RigMode, SafeTrajectory, SetpointRange, Set
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Maximum time beyond the surge line, s: a jump may touch the line, but a point may not stay beyond it.
+/// Maximum time beyond the surge line, s. Bound: a jump may touch the line, but a point may not stay beyond it.
 pub const SURGE_ALLOWED_S: f64 = 5.0;
 
 /// Limits of a rig and its machine. They apply to points, to jumps, and to a run.
@@ -80,7 +80,7 @@ pub enum OnDrift {
     Zero,
 }
 
-/// Setpoint at which a heater does not heat, K.
+/// Setpoint at which a heater does not heat, K. Bound: below any gas that a compressor delivers.
 const HEATER_OFF_K: f64 = 293.15;
 
 impl SafeTrajectory {
@@ -145,9 +145,9 @@ impl Soak {
     pub const LONGEST_S: f64 = 1800.0;
     /// Maximum drift of a thermometer at rest, K/min. Bound: housings of 10 minutes are then within 1 K of their limit.
     pub const MAX_DRIFT_K_MIN: f64 = 0.1;
-    /// Default temperature non-uniformity of a soak: 0.05 K.
+    /// Default temperature non-uniformity of a soak, K. Judgement: a closed cell after an hour; a campaign declares its own.
     pub const TEMPERATURE_SIGMA_K: f64 = 0.05;
-    /// Default of [`Soak::pressure_sigma_pa`]: 5 Pa.
+    /// Default of [`Soak::pressure_sigma_pa`], Pa. Bound: draughts of a cell at rest.
     pub const PRESSURE_SIGMA_PA: f64 = 5.0;
 }
 
@@ -172,7 +172,7 @@ pub struct SpeedControlSettings {
 }
 
 impl SpeedControlSettings {
-    /// Default band, ratio.
+    /// Default band, ratio. Bound: a third of the smallest change of speed that is a jump.
     pub const BAND_RATIO: f64 = 0.003;
 }
 

@@ -21,17 +21,22 @@ pub struct SurgeSearchSettings {
 }
 
 impl SurgeSearchSettings {
-    /// Time after a small step until speed and pressures have followed, s.
+    /// Time after a small step until speed and pressures have followed, s. Bound: the time constant of a rotor is about a second.
     pub const SETTLE_S: f64 = 5.0;
 }
 
 impl Default for SurgeSearchSettings {
     fn default() -> Self {
         SurgeSearchSettings {
+            // Bound: the uncertainty of a nominal surge line is larger.
             closest_margin_ratio: 0.03,
+            // Bound: ten steps from the middle of a line to its end.
             step_ratio: 0.03,
+            // Bound: gas and probe settle, the housing may not.
             dwell_s: 25.0,
+            // Bound: the gain of a flow meter, which the search cannot reduce.
             wanted_standard_error_ratio: 0.008,
+            // Bound: effort; a line needs a third of them.
             most_steps: 40,
         }
     }

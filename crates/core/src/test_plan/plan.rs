@@ -3,6 +3,7 @@
 use crate::OperatingPoint;
 use crate::test_plan::plan_remark::{NoBound, PlanRemark, deserialize_no_bound, deserialize_remarks};
 use crate::test_plan::transition::Transition;
+use crate::unit_factors::S_PER_MIN;
 use serde::{Deserialize, Serialize};
 
 /// Whether a step measures a point for the map or revisits one.
@@ -83,7 +84,7 @@ impl Predicted {
             pressure_ratio,
             t2_k,
             settle_s: None,
-            minutes: dwell_s / 60.0,
+            minutes: dwell_s / S_PER_MIN,
         }
     }
 }

@@ -1,8 +1,18 @@
 //! What a plan is made of: operating points, repeats, dwell, and the order of the visits.
 
 use crate::enums::named_enum;
+use crate::unit_factors::RPM_PER_KRPM;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+/// Steps of a shown speed in 1 rpm. Bound: the resolution of a rig.
+const SHOWN_PER_RPM: f64 = 100.0;
+/// Steps of a shown opening in 1. Bound: the resolution of a rig.
+const SHOWN_PER_RATIO: f64 = 1e4;
+/// Difference of two speeds that are the same on any rig, rpm. Bound: below its resolution.
+const SAME_RPM: f64 = 1e-3;
+/// Difference of two openings that are the same on any rig. Bound: below its resolution.
+const SAME_RATIO: f64 = 1e-6;
 
 /// Start and end of a jump.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -37,18 +47,21 @@ pub struct OperatingPoint {
 }
 
 impl OperatingPoint {
-    /// Largest setpoint of a back-pressure valve's opening, relative to its nominal area.
+    /// Largest setpoint of a back-pressure valve's opening, relative to its nominal area. Bound: a machine chokes before.
     pub const OPENING_MAX_RATIO: f64 = 2.5;
 
     /// Speed in krpm and opening for display, rounded to the resolution of a rig: 0.01 rpm and 1e-4.
     pub fn shown(&self) -> (f64, f64) {
-        ((self.speed_rpm * 1e2).round() / 1e5, (self.valve_opening_ratio * 1e4).round() / 1e4)
+        (
+            (self.speed_rpm * SHOWN_PER_RPM).round() / (SHOWN_PER_RPM * RPM_PER_KRPM),
+            (self.valve_opening_ratio * SHOWN_PER_RATIO).round() / SHOWN_PER_RATIO,
+        )
     }
 
     /// Whether two points are the same on any rig: speeds within 1e-3 rpm, openings within 1e-6.
     pub fn is_same_place(&self, other: &OperatingPoint) -> bool {
-        (self.speed_rpm - other.speed_rpm).abs() < 1e-3
-            && (self.valve_opening_ratio - other.valve_opening_ratio).abs() < 1e-6
+        (self.speed_rpm - other.speed_rpm).abs() < SAME_RPM
+            && (self.valve_opening_ratio - other.valve_opening_ratio).abs() < SAME_RATIO
     }
 }
 
@@ -72,7 +85,7 @@ pub enum Dwell {
 }
 
 impl Dwell {
-    /// Usual time at a point, s: two minutes (Burke et al.).
+    /// Usual time at a point, s. Source: two minutes (Burke et al.).
     pub const USUAL_S: f64 = 120.0;
 
     /// The dwell, s, if the campaign states it; `None` if the planner chooses it.

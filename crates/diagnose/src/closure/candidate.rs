@@ -13,14 +13,17 @@ use mapper_numerics::statistics::HINT_SIGMAS;
 use mapper_physics::rig::effect::Effect;
 use std::sync::Arc;
 
+/// Share of the range that a start may use. Bound: the fit needs some room on both sides.
+const START_RANGE_SHARE: f64 = 0.9;
+
 /// A fitted closure term; its effect is [`TermSearch::study`]'s effect number `effect`.
 #[derive(Debug, Clone)]
-pub struct FittedClosure {
+pub(crate) struct FittedClosure {
     /// Terms, by index in the term library.
-    pub choice: Choice,
+    pub(crate) choice: Choice,
     /// Index of the closure term's effect in the study.
-    pub effect: usize,
-    pub fit: Fit,
+    pub(crate) effect: usize,
+    pub(crate) fit: Fit,
 }
 
 /// A closure term to fit: its choice, the index of its effect, and the start values.
@@ -28,22 +31,22 @@ type TermStart = (Choice, usize, Start);
 
 impl FittedClosure {
     /// A start from the current values.
-    pub fn restart(&self) -> TermStart {
+    pub(crate) fn restart(&self) -> TermStart {
         (self.choice.clone(), self.effect, Start::from(&self.fit))
     }
 
     /// Logarithm of the evidence, including the rarity.
-    pub fn score(&self) -> f64 {
+    pub(crate) fn score(&self) -> f64 {
         self.fit.score - self.choice.rarity
     }
 
     /// Its terms.
-    pub fn terms<'a>(&self, library: &'a [Term]) -> Vec<&'a Term> {
+    pub(crate) fn terms<'a>(&self, library: &'a [Term]) -> Vec<&'a Term> {
         self.choice.terms.iter().map(|place| &library[*place]).collect()
     }
 
     /// Whether every coefficient differs significantly from 0. The level that accompanies a slope may have any value.
-    pub fn is_determined(&self, library: &[Term]) -> bool {
+    pub(crate) fn is_determined(&self, library: &[Term]) -> bool {
         let covariance = &self.fit.covariance;
         let terms = self.terms(library);
         let first = covariance.nrows().saturating_sub(terms.len());
@@ -55,7 +58,7 @@ impl FittedClosure {
         })
     }
 
-    pub fn coefficients(&self) -> &[f64] {
+    pub(crate) fn coefficients(&self) -> &[f64] {
         let own = self.fit.hypothesis.effects.iter().find(|(index, _)| *index == self.effect);
         own.map_or(&[], |(_, values)| values)
     }
@@ -63,15 +66,15 @@ impl FittedClosure {
 
 /// A study with closure terms as additional effects.
 #[derive(Debug)]
-pub struct TermSearch {
+pub(crate) struct TermSearch {
     /// The recording, with the library effects followed by the closure terms.
-    pub study: Study,
-    pub library: Vec<Term>,
+    pub(crate) study: Study,
+    pub(crate) library: Vec<Term>,
 }
 
 impl TermSearch {
     /// Fits from all starts in parallel; best first.
-    pub fn fit(
+    pub(crate) fn fit(
         &self,
         starts: impl Iterator<Item = TermStart>,
         linearised: &Linearised,
@@ -89,14 +92,16 @@ impl TermSearch {
     }
 
     /// Adds the closure term of a choice to the study, to be fitted together with the effects of the base from its linear estimate.
-    pub fn start(&mut self, base: &Hypothesis, choice: &Choice) -> TermStart {
+    pub(crate) fn start(&mut self, base: &Hypothesis, choice: &Choice) -> TermStart {
         let terms: Vec<Term> = choice.terms.iter().map(|place| self.library[*place].clone()).collect();
         let closure = ClosureEffect::new(terms);
         let parameters = &closure.info().parameters;
         let values = parameters
             .iter()
             .zip(&choice.coefficients)
-            .map(|(p, steps)| (steps * p.typical_step).clamp(0.9 * p.low, 0.9 * p.high))
+            .map(|(p, steps)| {
+                (steps * p.typical_step).clamp(START_RANGE_SHARE * p.low, START_RANGE_SHARE * p.high)
+            })
             .collect();
         let effect = self.study.add(Arc::new(closure));
         let mut start = base.clone();
@@ -106,14 +111,14 @@ impl TermSearch {
 }
 
 /// Drops candidates with an insignificant coefficient, if others remain.
-pub fn keep_determined(library: &[Term], candidates: &mut Vec<FittedClosure>) {
+pub(crate) fn keep_determined(library: &[Term], candidates: &mut Vec<FittedClosure>) {
     if candidates.iter().any(|candidate| candidate.is_determined(library)) {
         candidates.retain(|candidate| candidate.is_determined(library));
     }
 }
 
 /// Selects the choices to fit: the best ones, and the best of every machine part with a sufficient linear gain.
-pub fn promising(library: &[Term], choices: &[Choice]) -> Vec<Choice> {
+pub(crate) fn promising(library: &[Term], choices: &[Choice]) -> Vec<Choice> {
     let Some(best) = choices.first() else { return Vec::new() };
     let mut selected: Vec<Choice> = Vec::new();
     let part = |choice: &Choice| library[choice.terms[0]].submodel();

@@ -11,30 +11,35 @@ use mapper_numerics::{ROUNDING, parallel};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
+/// Squared length of a change that counts as none. Bound: a millionth of a sigma over the whole recording.
+const NO_CHANGE: f64 = 1e-12;
+/// Relative increase of the diagonal of a covariance. Bound: rounding of its factorisation.
+const JITTER_RATIO: f64 = 1e-9;
+
 /// Base hypothesis of the search: the null hypothesis, or a library cause that stays free during the search.
 #[derive(Debug)]
-pub struct Base<'a> {
+pub(crate) struct Base<'a> {
     /// The recording.
-    pub study: &'a Study,
+    pub(crate) study: &'a Study,
     /// Linearisation at the base.
-    pub linearised: &'a Linearised,
+    pub(crate) linearised: &'a Linearised,
     /// Nuisances and effects of the base.
-    pub hypothesis: Hypothesis,
+    pub(crate) hypothesis: Hypothesis,
     /// Whitened residual of the base.
-    pub residual: Vec<f64>,
+    pub(crate) residual: Vec<f64>,
     /// Whitened derivatives with respect to the base's effects.
-    pub free: Vec<Vec<f64>>,
+    pub(crate) free: Vec<Vec<f64>>,
 }
 
 impl<'a> Base<'a> {
     /// The null hypothesis.
-    pub fn nothing(study: &'a Study, linearised: &'a Linearised) -> Base<'a> {
+    pub(crate) fn nothing(study: &'a Study, linearised: &'a Linearised) -> Base<'a> {
         let residual = linearised.residual(study, &linearised.base);
         Base { study, linearised, hypothesis: study.nothing(), residual, free: Vec::new() }
     }
 
     /// A fitted cause.
-    pub fn at_fit(study: &'a Study, linearised: &'a Linearised, fit: &Fit) -> Base<'a> {
+    pub(crate) fn at_fit(study: &'a Study, linearised: &'a Linearised, fit: &Fit) -> Base<'a> {
         Base {
             study,
             linearised,
@@ -45,12 +50,12 @@ impl<'a> Base<'a> {
     }
 
     /// Whitened change for one step of each term's coefficient; `None` if the model cannot run with it or does not change.
-    pub fn changes(&self, terms: &[Term]) -> Vec<Option<Vec<f64>>> {
+    pub(crate) fn changes(&self, terms: &[Term]) -> Vec<Option<Vec<f64>>> {
         let mut changes = self.raw_changes(terms);
         for change in &mut changes {
             if let Some(values) = change {
                 self.linearised.whiten(self.study, values);
-                if values.iter().map(|c| c * c).sum::<f64>() < 1e-12 {
+                if values.iter().map(|c| c * c).sum::<f64>() < NO_CHANGE {
                     *change = None;
                 }
             }
@@ -59,7 +64,7 @@ impl<'a> Base<'a> {
     }
 
     /// Unwhitened changes, in the channels' units.
-    pub fn raw_changes(&self, terms: &[Term]) -> Vec<Option<Vec<f64>>> {
+    pub(crate) fn raw_changes(&self, terms: &[Term]) -> Vec<Option<Vec<f64>>> {
         let mut own = self.study.clone();
         let first = own.effects.len();
         let runs = runs(terms);
@@ -121,7 +126,7 @@ fn runs(terms: &[Term]) -> Vec<Vec<usize>> {
 
 /// Products of columns over the rows of each step.
 #[derive(Debug)]
-pub struct Products {
+pub(crate) struct Products {
     steps: Vec<DMatrix<f64>>,
     /// Values of the nuisances, in their sigmas; they come first.
     nuisances: DVector<f64>,
@@ -131,7 +136,7 @@ pub struct Products {
 
 impl Products {
     /// Products of nuisances and other free columns, `columns`, and the residual, in this order.
-    pub fn new(base: &Base<'_>, columns: &[Vec<f64>]) -> Products {
+    pub(crate) fn new(base: &Base<'_>, columns: &[Vec<f64>]) -> Products {
         let all: Vec<&[f64]> = base
             .linearised
             .columns
@@ -153,7 +158,7 @@ impl Products {
 
     /// Products of the columns (the residual last) over the selected steps. Nuisances and free columns are projected out, as far as their
     /// priors allow.
-    pub fn projected(&self, counts: &[bool]) -> Option<DMatrix<f64>> {
+    pub(crate) fn projected(&self, counts: &[bool]) -> Option<DMatrix<f64>> {
         let size = self.steps.first()?.nrows();
         let (u, n) = (self.nuisances.len(), self.nuisances.len() + self.free);
         let mut sum = DMatrix::zeros(size, size);
@@ -178,15 +183,15 @@ impl Products {
 
 /// Fit of some terms to the projected products: log evidence relative to none, and the coefficients in steps.
 #[derive(Debug, Clone)]
-pub struct LinearEvidence {
+pub(crate) struct LinearEvidence {
     /// Log evidence relative to no term.
-    pub gain: f64,
+    pub(crate) gain: f64,
     /// Coefficients, steps.
-    pub coefficients: DVector<f64>,
+    pub(crate) coefficients: DVector<f64>,
 }
 
 /// Evidence of the terms at `places` of the projected products, whose last row and column belong to the residual; `prior_sigma` in steps.
-pub fn linear_evidence(
+pub(crate) fn linear_evidence(
     products: &DMatrix<f64>,
     places: &[usize],
     prior_sigma: f64,
@@ -206,7 +211,7 @@ pub fn linear_evidence(
 }
 
 /// Evidence for coefficients with the common prior covariance `scale^2 shape`.
-pub fn weigh_process(
+pub(crate) fn weigh_process(
     products: &DMatrix<f64>,
     right: &DVector<f64>,
     covariance: &DMatrix<f64>,
@@ -215,7 +220,7 @@ pub fn weigh_process(
     // With K = R R', I + R' G R is well conditioned for any K.
     let mut jittered = covariance.clone();
     for i in 0..k {
-        jittered[(i, i)] *= 1.0 + 1e-9;
+        jittered[(i, i)] *= 1.0 + JITTER_RATIO;
     }
     let root = jittered.cholesky()?.l();
     let mut inner = root.tr_mul(&(products * &root));
@@ -234,11 +239,11 @@ pub fn weigh_process(
 
 /// Posterior of a Gaussian process.
 #[derive(Debug, Clone)]
-pub struct Posterior {
+pub(crate) struct Posterior {
     /// Log evidence relative to no process.
-    pub gain: f64,
+    pub(crate) gain: f64,
     /// Mean of the coefficients, in steps.
-    pub mean: DVector<f64>,
+    pub(crate) mean: DVector<f64>,
     /// Their covariance, in steps.
-    pub covariance: DMatrix<f64>,
+    pub(crate) covariance: DMatrix<f64>,
 }

@@ -6,6 +6,7 @@ use crate::gap::best_fit::coordinate::typical;
 use crate::gap::best_fit::normal::{PRIOR_STEPS, Selection};
 use crate::gap::residuals::study::Study;
 use crate::gap::residuals::whiten::Linearised;
+use crate::gap::residuals::whiten::NO_ENERGY;
 use mapper_numerics::parallel;
 use nalgebra::DVector;
 
@@ -21,7 +22,7 @@ pub struct Signatures {
 }
 
 /// The matrix for the effects of a study, on its recording's inputs.
-pub fn signatures(study: &Study, linearised: &Linearised) -> Signatures {
+pub(crate) fn signatures(study: &Study, linearised: &Linearised) -> Signatures {
     let base = Base::nothing(study, linearised);
     let everywhere = Selection::all(study).steps;
     let places: Vec<usize> = (0..study.effects.len()).collect();
@@ -54,7 +55,7 @@ pub fn signatures(study: &Study, linearised: &Linearised) -> Signatures {
                 let right = DVector::from_fn(k, |i, _| products[(i, k + effect)]);
                 let energy = products[(k + effect, k + effect)].max(0.0);
                 let taken = weigh_process(&own, &right, &shape).map_or(0.0, |found| right.dot(&found.mean));
-                (energy, if energy > 1e-6 { (taken / energy).clamp(0.0, 1.0) } else { 0.0 })
+                (energy, if energy > NO_ENERGY { (taken / energy).clamp(0.0, 1.0) } else { 0.0 })
             })
             .collect()
     });

@@ -6,27 +6,39 @@ use crate::closure::expression::Expression;
 use crate::closure::library::REFERENCE_K;
 use crate::closure::term::{Role, Term};
 use crate::gap::findings::report::ClosureCoefficient;
+use mapper_core::unit_factors::ICE_POINT_K;
 use mapper_core::{half_width_95, with_unit};
 use std::fmt::Write as _;
 
+/// Maximum number of decimals. Bound: no coefficient needs more.
+const MAX_DECIMALS: f64 = 9.0;
+/// Range of a coefficient in a script, in steps. Bound: four sigmas of its prior.
+const RANGE_STEPS: f64 = 40.0;
+/// Range of the temperature of a sink in a script, K. Bound: no part of a gas stand is colder or hotter.
+const SINK_RANGE_K: (f64, f64) = (200.0, 1000.0);
+/// Step of the temperature of a sink in a script, K. Bound: a fifth of the uncertainty of a sink that is well determined.
+const SINK_STEP_K: f64 = 10.0;
+/// Tenths in 1, the decimals of a sink. Source: a definition.
+const TENTHS: f64 = 10.0;
+
 /// A number with its standard error.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Uncertain {
+pub(crate) struct Uncertain {
     /// Value.
-    pub value: f64,
+    pub(crate) value: f64,
     /// Half of its 95 % interval.
-    pub half: f64,
+    pub(crate) half: f64,
 }
 
 impl Uncertain {
     /// As text, with as many figures as the interval justifies.
-    pub fn words(self, unit: &str) -> String {
+    pub(crate) fn words(self, unit: &str) -> String {
         let Uncertain { value, half } = self;
         if !half.is_finite() || half <= 0.0 {
             return with_unit(value, unit).to_string();
         }
         // Two figures of the interval.
-        let decimals = (1.0 - half.log10().floor()).clamp(0.0, 9.0) as usize;
+        let decimals = (1.0 - half.log10().floor()).clamp(0.0, MAX_DECIMALS) as usize;
         format!("({value:.decimals$} +/- {half:.decimals$}) {}", if unit == "1" { "" } else { unit })
             .trim_end()
             .to_owned()
@@ -35,17 +47,21 @@ impl Uncertain {
 
 /// A closure term's numbers and its sentence.
 #[derive(Debug, Clone)]
-pub struct ClosureDescription {
+pub(crate) struct ClosureDescription {
     /// The sentence.
-    pub sentence: String,
+    pub(crate) sentence: String,
     /// Its numbers.
-    pub terms: Vec<ClosureCoefficient>,
+    pub(crate) terms: Vec<ClosureCoefficient>,
     /// Temperature of the heat exchange partner, K, if it is one of the numbers.
-    pub sink_k: Option<f64>,
+    pub(crate) sink_k: Option<f64>,
 }
 
 /// Describes a closure term; `interval_factor` widens its standard errors.
-pub fn describe(library: &[Term], candidate: &FittedClosure, interval_factor: f64) -> ClosureDescription {
+pub(crate) fn describe(
+    library: &[Term],
+    candidate: &FittedClosure,
+    interval_factor: f64,
+) -> ClosureDescription {
     let terms = candidate.terms(library);
     let values = candidate.coefficients();
     let covariance = &candidate.fit.covariance;
@@ -73,7 +89,7 @@ pub fn describe(library: &[Term], candidate: &FittedClosure, interval_factor: f6
             + ratio * ratio * cov(slope, slope))
             / (values[slope] * values[slope]);
         let sink = Uncertain { value: REFERENCE_K + ratio, half: widened * variance.max(0.0).sqrt() };
-        let in_celsius = Uncertain { value: sink.value - 273.15, ..sink };
+        let in_celsius = Uncertain { value: sink.value - ICE_POINT_K, ..sink };
         let from = terms[slope].words_of_place();
         let sentence = format!(
             "{} from {from} to something at {}",
@@ -100,7 +116,7 @@ pub fn describe(library: &[Term], candidate: &FittedClosure, interval_factor: f6
 }
 
 /// Indices of slope and level if the closure term is heat exchange with an unknown temperature.
-pub fn sink(terms: &[&Term]) -> Option<(usize, usize)> {
+pub(crate) fn sink(terms: &[&Term]) -> Option<(usize, usize)> {
     match terms {
         [a, b] if a.role == Role::Slope && b.role == Role::Level => Some((0, 1)),
         [a, b] if a.role == Role::Level && b.role == Role::Slope => Some((1, 0)),
@@ -109,7 +125,7 @@ pub fn sink(terms: &[&Term]) -> Option<(usize, usize)> {
 }
 
 /// The script of some terms; `None` if a term cannot be written as one.
-pub fn script_of(terms: &[&Term], description: &ClosureDescription) -> Option<String> {
+pub(crate) fn script_of(terms: &[&Term], description: &ClosureDescription) -> Option<String> {
     let submodel = terms.first()?.submodel().name();
     let mut parameters = String::new();
     // Each balance with the sum that acts on it.
@@ -125,16 +141,17 @@ pub fn script_of(terms: &[&Term], description: &ClosureDescription) -> Option<St
     if let (Some((slope, _)), Some(sink_k)) = (sink(terms), description.sink_k) {
         let term = terms[slope];
         let (balance, formula) = term.acts_on.first()?;
-        parameters += &line("G", term.unit, 0.0, 40.0 * term.step, 0.0, term.step);
-        let sink_k = (10.0 * sink_k).round() / 10.0;
-        parameters += &line("T_sink", "K", sink_k.min(200.0), sink_k.max(1000.0), sink_k, 10.0);
+        parameters += &line("G", term.unit, 0.0, RANGE_STEPS * term.step, 0.0, term.step);
+        let sink_k = (TENTHS * sink_k).round() / TENTHS;
+        let (low_k, high_k) = (sink_k.min(SINK_RANGE_K.0), sink_k.max(SINK_RANGE_K.1));
+        parameters += &line("T_sink", "K", low_k, high_k, sink_k, SINK_STEP_K);
         // The slope is relative to the library's reference.
         let Expression::Minus(_, metal) = formula else { return None };
         put(*balance, format!("p.G * (p.T_sink - {metal})"));
     } else {
         for (place, term) in terms.iter().enumerate() {
             let name = if terms.len() == 1 { "c".to_owned() } else { format!("c{}", place + 1) };
-            let most = 40.0 * term.step;
+            let most = RANGE_STEPS * term.step;
             let low = if term.positive { 0.0 } else { -most };
             parameters += &line(&name, term.unit, low, most, 0.0, term.step);
             for (balance, formula) in &term.acts_on {

@@ -24,17 +24,20 @@ use crate::gap::verdict::Explained;
 use mapper_core::half_width_95;
 use mapper_inference::posterior::{CauseProbabilities, CauseSet, Rules};
 
+/// Decrease of the cost that a reported fit may leave. Bound: a tenth of what one more sigma of evidence costs.
+const ENOUGH: f64 = 0.2;
+
 /// Results outside the effect library.
 #[derive(Debug, Default)]
-pub struct Discovered {
+pub(crate) struct Discovered {
     /// Proposed closure terms, best first; usually one or none.
-    pub closure_terms: Vec<ClosureTerm>,
+    pub(crate) closure_terms: Vec<ClosureTerm>,
     /// Residual source term of each balance, most probable first.
-    pub residual_sources: Vec<BalanceClosure>,
+    pub(crate) residual_sources: Vec<BalanceClosure>,
     /// Locations of the gap; `None` if the diagnosis' locations remain valid.
-    pub places: Option<Vec<Place>>,
+    pub(crate) places: Option<Vec<Place>>,
     /// The first closure term fitted to all steps, if it is more probable than not.
-    pub settled: Option<Fit>,
+    pub(crate) settled: Option<Fit>,
 }
 
 impl Discovered {
@@ -203,7 +206,7 @@ fn fitted(
     // Tolerances act differently in the presence of a strong term.
     let at_trained = base.linearised.at(&search.study, &trained.first()?.fit.hypothesis).ok();
     let linearised = at_trained.as_ref().unwrap_or(base.linearised);
-    let effort = Effort { iterations: 5, enough: 0.2, ..Effort::default() };
+    let effort = Effort { iterations: 5, enough: ENOUGH, ..Effort::default() };
     let trained = search.fit(trained.iter().map(FittedClosure::restart), linearised, training, effort);
     let mut fitted = search.fit(trained.iter().map(FittedClosure::restart), linearised, everywhere, effort);
     keep_determined(&search.library, &mut fitted);
@@ -288,7 +291,7 @@ fn accompanying_effects(study: &Study, closure: &FittedClosure) -> Vec<String> {
     others.map(|effect| effect.info().id.to_string()).collect()
 }
 
-/// Prior of all closure terms together.
+/// Prior of all closure terms together. Judgement: one gap in seven is none of the library's effects and has a physical term.
 const PRIOR_CLOSURE: f64 = 0.15;
 
 /// Locations from all explanations tried: effects, closure terms, source terms.

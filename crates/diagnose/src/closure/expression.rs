@@ -6,7 +6,7 @@ use std::fmt::{Display, Formatter, Result};
 
 /// A formula of machine quantities.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Expression {
+pub(crate) enum Expression {
     /// A number.
     Number(f64),
     /// A quantity.
@@ -29,7 +29,7 @@ use Expression::{InTime, Ln, Minus, Number, Of, Power, Times, Value};
 
 impl Expression {
     /// Evaluates the formula; `value` is the model's value at the calling hook.
-    pub fn of(&self, site: &Site<'_>, value: f64) -> f64 {
+    pub(crate) fn of(&self, site: &Site<'_>, value: f64) -> f64 {
         match self {
             Number(number) => *number,
             Of(quantity) => quantity.of(site),
@@ -60,7 +60,7 @@ impl Display for Expression {
 }
 
 /// A number in script notation, with a decimal point so that it is not an integer.
-pub fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     let text = format!("{value:?}");
     match text.split_once('e') {
         Some((digits, exponent)) if !digits.contains('.') => format!("{digits}.0e{exponent}"),
@@ -69,43 +69,46 @@ pub fn number(value: f64) -> String {
 }
 
 /// `a - b`.
-pub fn minus(a: Expression, b: Expression) -> Expression {
+pub(crate) fn minus(a: Expression, b: Expression) -> Expression {
     Minus(Box::new(a), Box::new(b))
 }
 
 /// `a - b`.
-pub fn difference(a: Quantity, b: Quantity) -> Expression {
+pub(crate) fn difference(a: Quantity, b: Quantity) -> Expression {
     minus(Of(a), Of(b))
 }
 
 /// `quantity - number`.
-pub fn above(quantity: Quantity, number: f64) -> Expression {
+pub(crate) fn above(quantity: Quantity, number: f64) -> Expression {
     minus(Of(quantity), Number(number))
 }
 
 /// `number - of`.
-pub fn below(number: f64, of: Expression) -> Expression {
+pub(crate) fn below(number: f64, of: Expression) -> Expression {
     minus(Number(number), of)
 }
 
 /// `factor * of`.
-pub fn times(factor: f64, of: Expression) -> Expression {
+pub(crate) fn times(factor: f64, of: Expression) -> Expression {
     Times(Box::new(Number(factor)), Box::new(of))
 }
 
 /// `a * b`.
-pub fn product(a: Expression, b: Expression) -> Expression {
+pub(crate) fn product(a: Expression, b: Expression) -> Expression {
     Times(Box::new(a), Box::new(b))
 }
 
 /// `(quantity / scale) ^ exponent`.
-pub fn power(quantity: Quantity, scale: f64, exponent: f64) -> Expression {
+pub(crate) fn power(quantity: Quantity, scale: f64, exponent: f64) -> Expression {
     Power(Box::new(times(1.0 / scale, Of(quantity))), exponent)
 }
 
+/// Source: the law of Stefan and Boltzmann.
+const RADIATION_EXPONENT: f64 = 4.0;
+
 /// `a^4 - b^4`.
-pub fn fourth_powers(a: Quantity, b: Quantity) -> Expression {
-    minus(power(a, 1.0, 4.0), power(b, 1.0, 4.0))
+pub(crate) fn fourth_powers(a: Quantity, b: Quantity) -> Expression {
+    minus(power(a, 1.0, RADIATION_EXPONENT), power(b, 1.0, RADIATION_EXPONENT))
 }
 
 /// Declares the quantities: variant, name in scripts, words, value.
@@ -113,23 +116,23 @@ macro_rules! quantities {
     ($($name:ident $script:literal $words:literal $read:expr;)*) => {
         /// A machine quantity at one instant, SI.
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-        pub enum Quantity {
+        pub(crate) enum Quantity {
             $(#[doc = $words] $name,)*
         }
 
         impl Quantity {
             /// Its name in an effect's script, after `at.`.
-            pub fn script_name(self) -> &'static str {
+            pub(crate) fn script_name(self) -> &'static str {
                 match self { $(Quantity::$name => $script,)* }
             }
 
             /// Description for sentences.
-            pub fn words(self) -> &'static str {
+            pub(crate) fn words(self) -> &'static str {
                 match self { $(Quantity::$name => $words,)* }
             }
 
             /// Its value; NaN if it is downstream of the calling hook in the gas path.
-            pub fn of(self, site: &Site<'_>) -> f64 {
+            pub(crate) fn of(self, site: &Site<'_>) -> f64 {
                 let read: fn(&Site<'_>) -> f64 = match self { $(Quantity::$name => $read,)* };
                 read(site)
             }
@@ -156,31 +159,31 @@ quantities! {
     PressureRatio "pressure_ratio" "the pressure ratio" |site| site.pressure_ratio;
 }
 
-/// Decay of the part of a source term that follows a jump, s: similar to that of the housings.
-pub const DECAY: Shape = Shape::Decay(30.0);
+/// Decay of the part of a source term that follows a jump, s. Bound: housings of turbochargers settle within 20 to 60 s.
+pub(crate) const DECAY: Shape = Shape::Decay(30.0);
 
 /// A time history up to an end.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Span {
+pub(crate) struct Span {
     /// History over time, s; an onset at minus infinity precedes the recording.
-    pub history: TimeHistory,
+    pub(crate) history: TimeHistory,
     /// Its end, s.
-    pub end_s: f64,
+    pub(crate) end_s: f64,
 }
 
 /// A source term acts in these spans.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Spans(pub Vec<Span>);
+pub(crate) struct Spans(pub Vec<Span>);
 
 impl Spans {
     /// Zero before a time, s, and 1 from then on.
-    pub fn from(begin_s: f64) -> Spans {
+    pub(crate) fn from(begin_s: f64) -> Spans {
         let history = TimeHistory { onset: begin_s, shape: Shape::Step };
         Spans(vec![Span { history, end_s: f64::INFINITY }])
     }
 
     /// Its value at a time; NaN means the soak before the recording.
-    pub fn at(&self, t_s: f64) -> f64 {
+    pub(crate) fn at(&self, t_s: f64) -> f64 {
         if t_s.is_nan() {
             let acts = |span: &Span| span.history == TimeHistory::THROUGHOUT;
             return f64::from(u8::from(self.0.iter().any(acts)));

@@ -16,7 +16,7 @@ use mapper_inference::time_history::{Shape, TimeHistory};
 use mapper_numerics::parallel;
 use nalgebra::{DMatrix, DVector};
 
-/// Distance between steps that share one run: a housing forgets an earlier step within a minute or two.
+/// Distance between steps that share one run. Bound: a housing forgets an earlier step within a minute or two.
 const APART: usize = 5;
 
 /// Balances whose source term needs model runs.
@@ -33,25 +33,25 @@ const RUN: [Balance; 8] = [
 
 /// A balance with its residual source term.
 #[derive(Debug, Clone)]
-pub struct ResidualSource {
+pub(crate) struct ResidualSource {
     /// The balance.
-    pub balance: Balance,
+    pub(crate) balance: Balance,
     /// Log evidence relative to none.
-    pub gain: f64,
+    pub(crate) gain: f64,
     /// Change of the recording, in the channels' units.
-    pub signature: Vec<f64>,
+    pub(crate) signature: Vec<f64>,
     /// Level at the end of each step with its standard error, in the balance's unit.
-    pub levels: Vec<(f64, f64)>,
+    pub(crate) levels: Vec<(f64, f64)>,
 }
 
 /// All balances that a recording can have a source term in.
-pub fn balances(study: &Study) -> Vec<Balance> {
+pub(crate) fn balances(study: &Study) -> Vec<Balance> {
     let recorded = |channel: &Channel| *channel != Channel::P3 && study.table.column(*channel).is_some();
     RUN.into_iter().chain(OUTPUTS.into_iter().filter(recorded).map(Balance::Reading)).collect()
 }
 
 /// Residual source terms of all `wanted` balances, each assumed to be the only one; best evidence first.
-pub fn residual_sources(
+pub(crate) fn residual_sources(
     base: &Base<'_>,
     counts: &[bool],
     wanted: &dyn Fn(&Balance) -> bool,
@@ -71,7 +71,7 @@ pub fn residual_sources(
 }
 
 /// Changes due to a typical source term in one step each, in the channels' units: levels first, then the decaying parts.
-pub fn columns(base: &Base<'_>, balance: Balance) -> Vec<Vec<f64>> {
+pub(crate) fn columns(base: &Base<'_>, balance: Balance) -> Vec<Vec<f64>> {
     let Properties { plain_size: step, unit, .. } = balance.properties();
     let term = |spans: Spans| Term {
         acts_on: vec![(balance, Expression::InTime(spans))],
@@ -110,7 +110,7 @@ fn read(study: &Study, channel: Channel, shape: Shape, size: f64) -> Vec<Vec<f64
 }
 
 /// For each step the change of the recording by a `term` that acts in this step alone, from runs in which several distant steps have it.
-pub fn in_each_step(
+pub(crate) fn in_each_step(
     base: &Base<'_>,
     shape: Shape,
     term: impl Fn(Spans) -> Term,
@@ -188,12 +188,14 @@ fn residual_source(
 /// Correlation length of a source term over speed, as a share of the highest, and over the opening of the valve. Judgement: the flow and heat
 /// of a machine change over a third of its map.
 const CORRELATION_LENGTH: f64 = 0.3;
-/// Variances of the common level and of the part smooth over the map, each, and of the free part of each step.
+/// Variance of the common level, and of the part smooth over the map. Bound: halves of the variance of a source term of typical size, whose
+/// scale the evidence determines.
 const COMMON: f64 = 0.5;
+/// Variance of the free part of each step. Bound: small compared with the smooth part; without it a single step could contradict a source term.
 const FREE: f64 = 0.02;
 
 /// Prior covariance of levels and decaying parts for a source term of typical size.
-pub fn covariance(study: &Study, points: &[PointState]) -> DMatrix<f64> {
+pub(crate) fn covariance(study: &Study, points: &[PointState]) -> DMatrix<f64> {
     let steps = study.steps.len();
     let highest_rpm = points.iter().map(|point| point.speed_rpm).fold(1.0, f64::max);
     let at = |step: usize| {

@@ -12,21 +12,21 @@ use nalgebra::DMatrix;
 
 /// Some library terms, by index, with their fit to the recording.
 #[derive(Debug, Clone)]
-pub struct Choice {
+pub(crate) struct Choice {
     /// Indices in the library, ascending.
-    pub terms: Vec<usize>,
+    pub(crate) terms: Vec<usize>,
     /// Log evidence relative to none, including rarity.
-    pub gain: f64,
+    pub(crate) gain: f64,
     /// Evidence penalty for one choice among many.
-    pub rarity: f64,
+    pub(crate) rarity: f64,
     /// Onset step; 0 from the beginning.
-    pub begin: usize,
+    pub(crate) begin: usize,
     /// Coefficients, in steps.
-    pub coefficients: Vec<f64>,
+    pub(crate) coefficients: Vec<f64>,
 }
 
 /// All closure terms of one term, and of two in the same machine part; best first. `usable` are the library indices of the products' columns.
-pub fn choices(library: &[Term], usable: &[usize], products: &DMatrix<f64>) -> Vec<Choice> {
+pub(crate) fn choices(library: &[Term], usable: &[usize], products: &DMatrix<f64>) -> Vec<Choice> {
     let mut found: Vec<Choice> = Vec::new();
     let mut add = |places: &[usize], rarity: f64| {
         let Some(LinearEvidence { gain, coefficients }) = linear_evidence(products, places, PRIOR_STEPS)
@@ -74,12 +74,12 @@ fn go_together(a: &Term, b: &Term) -> bool {
     }
 }
 
-/// Maximum number of terms tried with an onset.
+/// Maximum number of terms tried with an onset. Bound: effort; each costs a run for each step.
 const TRIED: usize = 12;
 
 /// The best choices, each with the onset step that fits the recording best, best first; adds their terms to the library. `choices` must
 /// come from the same products and steps, best first.
-pub fn begun(
+pub(crate) fn begun(
     base: &Base<'_>,
     library: &mut Vec<Term>,
     choices: &[Choice],

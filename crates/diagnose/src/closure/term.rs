@@ -14,7 +14,7 @@ use std::borrow::Cow;
 
 /// Role of a term among others of its balance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Role {
+pub(crate) enum Role {
     /// A constant.
     Level,
     /// Proportional to a temperature relative to the library reference; together with the level, heat exchange with an unknown temperature.
@@ -27,29 +27,29 @@ pub enum Role {
 
 /// A term of the library.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Term {
+pub(crate) struct Term {
     /// Balances it acts on, with the formulas that its coefficient multiplies; the first is its location. Heat between two parts acts on both.
-    pub acts_on: Vec<(Balance, Expression)>,
+    pub(crate) acts_on: Vec<(Balance, Expression)>,
     /// Unit of the coefficient.
-    pub unit: &'static str,
+    pub(crate) unit: &'static str,
     /// A clearly significant size of the coefficient.
-    pub step: f64,
+    pub(crate) step: f64,
     /// Description, with `{}` for the coefficient.
-    pub words: String,
+    pub(crate) words: String,
     /// Its role among others of its balance.
-    pub role: Role,
+    pub(crate) role: Role,
     /// Whether the coefficient must be positive: a conductance, an area, a time.
-    pub positive: bool,
+    pub(crate) positive: bool,
 }
 
 impl Term {
     /// Its location.
-    pub fn balance(&self) -> Balance {
+    pub(crate) fn balance(&self) -> Balance {
         self.acts_on[0].0
     }
 
     /// The sensor whose reading alone it changes, if any.
-    pub fn sensor(&self) -> Option<Channel> {
+    pub(crate) fn sensor(&self) -> Option<Channel> {
         match self.acts_on[..] {
             [(Balance::Reading(channel) | Balance::Lag(channel), _)] => Some(channel),
             _ => None,
@@ -57,29 +57,29 @@ impl Term {
     }
 
     /// Whether it is independent of the machine's state.
-    pub fn is_constant(&self) -> bool {
+    pub(crate) fn is_constant(&self) -> bool {
         matches!(self.acts_on[..], [(_, Expression::Number(_))])
     }
 
     /// Whether it has its own memory, like a lag.
-    pub fn has_memory(&self) -> bool {
+    pub(crate) fn has_memory(&self) -> bool {
         self.acts_on.iter().any(|(balance, _)| matches!(balance, Balance::Lag(_)))
     }
 
     /// Name of what it acts on, for sentences.
-    pub fn words_of_place(&self) -> String {
+    pub(crate) fn words_of_place(&self) -> String {
         self.balance().properties().place_words
     }
 
     /// The machine part in which it acts.
-    pub fn submodel(&self) -> Submodel {
+    pub(crate) fn submodel(&self) -> Submodel {
         self.balance().properties().submodel
     }
 }
 
 /// Terms with their coefficients, active in a model.
 #[derive(Debug)]
-pub struct TermHooks {
+pub(crate) struct TermHooks {
     /// Balance, coefficient, formula.
     acting: Vec<(Balance, f64, Expression)>,
     /// Whether each kind of hook is used, so that unused ones are skipped.
@@ -90,7 +90,7 @@ pub struct TermHooks {
 ///
 /// # Errors
 /// Never in practice: terms have no hidden temperatures.
-pub fn put_into(rig: &mut Rig, terms: &[(Term, f64)]) -> Result<(), TooManyExtraStates> {
+pub(crate) fn put_into(rig: &mut Rig, terms: &[(Term, f64)]) -> Result<(), TooManyExtraStates> {
     let mut acting = Vec::new();
     for (term, coefficient) in terms {
         for (balance, formula) in &term.acts_on {
@@ -172,18 +172,18 @@ impl Hooks for TermHooks {
 }
 
 /// Maximum distance of a coefficient from zero, in steps.
-pub const MAX_STEPS: f64 = PRIOR_STEPS * MAX_SIGMAS;
+pub(crate) const MAX_STEPS: f64 = PRIOR_STEPS * MAX_SIGMAS;
 
 /// Some terms of one part of the machine, each with a coefficient.
 #[derive(Debug, Clone)]
-pub struct ClosureEffect {
+pub(crate) struct ClosureEffect {
     info: EffectInfo,
     terms: Vec<Term>,
 }
 
 impl ClosureEffect {
     /// The effect of one or more terms.
-    pub fn new(terms: Vec<Term>) -> ClosureEffect {
+    pub(crate) fn new(terms: Vec<Term>) -> ClosureEffect {
         let parameters = terms
             .iter()
             .enumerate()

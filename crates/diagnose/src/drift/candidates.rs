@@ -7,20 +7,24 @@ use mapper_inference::hypotheses::{Hypothesis, Likelihood, Priors};
 use mapper_inference::time_history::{Shape, TimeHistory};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// Prior probability of a drift in a campaign. Judgement: repeats are made if drift is expected.
+/// Prior probability of a drift in a campaign. Bound: repeats are made if drift is expected; equal odds.
 const EXPECTED_DRIFTS: f64 = 0.5;
 /// Prior weight of a rare cause, relative to the others. Judgement: the compressor, its sensors and the flow meters drift; the other sensors are better
 /// maintained, and few sensors share a part that drifts.
 const RARE_CAUSE_WEIGHT: f64 = 0.25;
 
-/// Number of fine onsets in a step of the grid, tried up to one grid step to either side of a detected cause: a step of P2 dated 40 s late leaves a
+/// Number of fine onsets in a step of the grid, tried up to one grid step to either side of a detected cause. Bound: a step of P2 dated 40 s late leaves a
 /// residual of twenty standard errors in one segment, which other causes would absorb.
 const FINE_PER_GRID: usize = 8;
 
-/// Number of onsets in the grid over a campaign. The fit refines the onset of a detected cause.
+/// Number of onsets in the grid over a campaign. Bound: effort; the fit refines the onset of a detected cause.
 pub(crate) const ONSETS: usize = 36;
 /// Number of onsets of the fit over a campaign: closer than the compared segments.
 pub(crate) const FINE_ONSETS: usize = ONSETS * FINE_PER_GRID;
+/// Last onset of a ramp, as a share of a campaign. Bound: later, the remaining time does not suffice to detect it.
+const LAST_RAMP_SHARE: f64 = 0.88;
+/// First and last onset of a step, as shares of a campaign. Bound: at the start a step is a constant; at the end no repeat shows it.
+const STEP_SHARES: std::ops::RangeInclusive<f64> = 0.04..=0.97;
 
 /// A cause, by its position among the observable ones, with a time history.
 #[derive(Debug, Clone, Copy)]
@@ -40,7 +44,7 @@ pub(crate) struct Candidates {
 
 impl Candidates {
     /// All causes with the onsets of the grid, and finer onsets about those that are `known`.
-    pub fn new(readings: &Readings, known: &[(Cause, TimeHistory)]) -> Result<Candidates, Unsolvable> {
+    pub(super) fn new(readings: &Readings, known: &[(Cause, TimeHistory)]) -> Result<Candidates, Unsolvable> {
         let observable: Vec<(Cause, Response)> =
             Cause::all().into_iter().filter_map(|cause| Some((cause, readings.signature(cause)?))).collect();
         let (start_s, end_s) = readings.span_s();
@@ -88,7 +92,7 @@ impl Candidates {
     }
 
     /// Likelihood of the readings for all candidates, under this noise with its constants.
-    pub fn likelihood(&self, noise: &LowRank, difference: &DMatrix<f64>) -> Likelihood {
+    pub(super) fn likelihood(&self, noise: &LowRank, difference: &DMatrix<f64>) -> Likelihood {
         let columns = noise.whiten(self.columns.clone());
         let inverse = noise.inverse_times(&columns);
         let gradient = inverse.tr_mul(&noise.whiten(difference.clone()));
@@ -96,7 +100,7 @@ impl Candidates {
         Likelihood::of(columns.transpose() * &inverse, gradient.column(0).into_owned())
     }
 
-    pub fn cause(&self, index: usize) -> Cause {
+    pub(super) fn cause(&self, index: usize) -> Cause {
         self.causes[self.all[index].cause]
     }
 }
@@ -117,11 +121,10 @@ pub(crate) fn time_histories(start_s: f64, end_s: f64, count: usize) -> Vec<Time
     for index in 0..count {
         let share = index as f64 / count as f64;
         let onset = start_s + share * length_s;
-        if share <= 0.88 {
+        if share <= LAST_RAMP_SHARE {
             histories.push(TimeHistory { onset, shape: RATE_PER_H });
         }
-        // A step at the very start is a constant.
-        if (0.04..=0.97).contains(&share) {
+        if STEP_SHARES.contains(&share) {
             histories.push(TimeHistory { onset, shape: Shape::Step });
         }
     }
@@ -141,7 +144,7 @@ pub(crate) struct LowRank {
 
 impl LowRank {
     /// `own` are the covariances of the segments, `columns` the effects of the constants on the readings.
-    pub fn new(own: &[DMatrix<f64>], columns: &DMatrix<f64>) -> Result<Self, Unsolvable> {
+    pub(super) fn new(own: &[DMatrix<f64>], columns: &DMatrix<f64>) -> Result<Self, Unsolvable> {
         let factors = own
             .iter()
             .map(|covariance| Some(Cholesky::new(covariance.clone())?.l()))
@@ -158,28 +161,28 @@ impl LowRank {
     }
 
     /// Whitens by D alone, column by column.
-    pub fn whiten(&self, mut values: DMatrix<f64>) -> DMatrix<f64> {
+    pub(crate) fn whiten(&self, mut values: DMatrix<f64>) -> DMatrix<f64> {
         whiten_by(&self.factors, &mut values);
         values
     }
 
     /// Inverse covariance (whitened) times whitened columns.
-    pub fn inverse_times(&self, whitened: &DMatrix<f64>) -> DMatrix<f64> {
+    pub(crate) fn inverse_times(&self, whitened: &DMatrix<f64>) -> DMatrix<f64> {
         whitened - &self.columns * self.constants(whitened)
     }
 
     /// Most probable constants, in standard deviations, for whitened readings.
-    pub fn constants(&self, whitened: &DMatrix<f64>) -> DMatrix<f64> {
+    pub(super) fn constants(&self, whitened: &DMatrix<f64>) -> DMatrix<f64> {
         self.inner.solve(&(self.columns.transpose() * whitened))
     }
 
     /// Posterior variance of a linear function of the constants.
-    pub fn variance(&self, weights: &DVector<f64>) -> f64 {
+    pub(super) fn variance(&self, weights: &DVector<f64>) -> f64 {
         weights.dot(&self.inner.solve(weights))
     }
 
     /// Degrees of freedom used by the constants: the trace of the projection onto them.
-    pub fn degrees_of_freedom(&self) -> f64 {
+    pub(super) fn degrees_of_freedom(&self) -> f64 {
         self.columns.ncols() as f64 - self.inner.inverse().trace()
     }
 }

@@ -1,5 +1,6 @@
 //! Possible causes of drift, and their effects on machine and inputs.
 
+use mapper_core::unit_factors::S_PER_H;
 use mapper_core::{Channel, Dimension, with_unit};
 use mapper_inference::time_history::{Shape, TimeHistory};
 use mapper_observe::channels::INPUT_CHANNELS;
@@ -31,10 +32,15 @@ pub enum CauseKind {
 }
 
 /// A drift at a constant rate, per hour.
-pub const RATE_PER_H: Shape = Shape::Ramp(3600.0);
+pub const RATE_PER_H: Shape = Shape::Ramp(S_PER_H);
 
-/// Change of the map's flow by fouling, over the change of its efficiency.
+/// Change of the map's flow by fouling, over the change of its efficiency. Judgement: deposits narrow the passages less than they
+/// roughen them.
 pub(crate) const FOULING_FLOW_SHARE: f64 = 0.6;
+/// Prior of the loss of efficiency by fouling over a campaign. Bound: a compressor that has lost 2 % of its efficiency is cleaned.
+const FOULING_RATIO: f64 = 0.02;
+/// Prior of the change of friction over a campaign, W s2/rad2. Bound: 185 W at 130 krpm, half of a sound bearing's.
+const FRICTION_W_S2_RAD2: f64 = 1e-6;
 
 impl Cause {
     /// All causes that the diagnosis considers: the drifts in the library of sensor faults, and those of the machine.
@@ -96,10 +102,8 @@ impl Cause {
             Cause::Sensors(channels) => {
                 drifts().find(|fault| fault.channels == channels).map_or(0.0, |fault| fault.sigma)
             }
-            // Judgement: a compressor that has lost 2 % of its efficiency is cleaned.
-            Cause::Fouling => 0.02,
-            // Judgement: 185 W at 130 krpm.
-            Cause::BearingFriction => 1e-6,
+            Cause::Fouling => FOULING_RATIO,
+            Cause::BearingFriction => FRICTION_W_S2_RAD2,
         }
     }
 
@@ -145,27 +149,27 @@ pub(crate) struct Drift {
 
 impl Drift {
     /// Size at a campaign time, s; in the unit of the cause.
-    pub fn at(&self, t_s: f64) -> f64 {
+    pub(super) fn at(&self, t_s: f64) -> f64 {
         self.size * self.history.at(t_s)
     }
 
     /// Whether a model run depends on it. The drift of an output sensor is linear in the readings, so no run is needed.
-    pub fn acts_on_model(&self) -> bool {
+    pub(crate) fn acts_on_model(&self) -> bool {
         self.acts_on_machine() || self.acts_on_inputs()
     }
 
     /// Whether the machine changes over time.
-    pub fn acts_on_machine(&self) -> bool {
+    pub(crate) fn acts_on_machine(&self) -> bool {
         matches!(self.cause, Cause::Fouling | Cause::BearingFriction)
     }
 
     /// Whether the sensor of a model input drifts.
-    pub fn acts_on_inputs(&self) -> bool {
+    pub(crate) fn acts_on_inputs(&self) -> bool {
         self.cause.channels().iter().any(|channel| INPUT_CHANNELS.contains(channel))
     }
 
     /// Applies its mean between two campaign times, s, to the machine.
-    pub fn apply_to(&self, params: &mut Params, from_s: f64, to_s: f64) {
+    pub(super) fn apply_to(&self, params: &mut Params, from_s: f64, to_s: f64) {
         let mean = self.size * self.history.mean(from_s, to_s);
         match self.cause {
             Cause::Fouling => {
@@ -178,7 +182,7 @@ impl Drift {
     }
 
     /// Subtracts the drift of a sensor from the input that it measures.
-    pub fn subtract_from(&self, boundary: &mut BoundaryConditions, t_s: f64) {
+    pub(crate) fn subtract_from(&self, boundary: &mut BoundaryConditions, t_s: f64) {
         for channel in self.cause.channels().iter().filter(|channel| INPUT_CHANNELS.contains(channel)) {
             Perturbation::Input(*channel).adjust_boundary(boundary, -self.at(t_s));
         }

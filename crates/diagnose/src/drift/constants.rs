@@ -8,11 +8,12 @@ use mapper_observe::channels::OUTPUTS;
 use mapper_observe::declared::Declared;
 use mapper_observe::perturbation::Perturbation;
 
-/// Factor on declared tolerances: repeats distinguish a constant from drift whatever its size, so a wide prior costs nothing. Judgement: the
+/// Factor on declared tolerances: repeats distinguish a constant from drift whatever its size, so a wide prior costs nothing. Bound: the
 /// turbine housing, whose initial state takes an hour to decay, may start 20 K off.
 const TOLERANCE_FACTOR: f64 = 4.0;
 
-/// Deviations of each operating point from the smooth model, common to its repeats: one standard deviation.
+/// Deviations of each operating point from the smooth model, common to its repeats: one standard deviation. Judgement: a tenth to a
+/// third of the declared tolerances, which hold for the whole machine.
 const OWN_DEVIATIONS: [(Perturbation, f64); 4] = [
     (Perturbation::Efficiency, 0.005),
     (Perturbation::Flow, 0.004),
@@ -20,15 +21,28 @@ const OWN_DEVIATIONS: [(Perturbation, f64); 4] = [
     (Perturbation::CompressorConvection, 0.03),
 ];
 
+/// The same for a speed, rpm. Bound: the ripple of speed controllers.
+const OWN_SPEED_RPM: f64 = 40.0;
+/// The same for P2, Pa. Bound: the setting of a valve repeats to so much.
+const OWN_P2_PA: f64 = 50.0;
+/// The same for a flow, as a ratio of the reading. Bound: the linearity of flow meters.
+const OWN_FLOW_RATIO: f64 = 1e-3;
+/// The same for T2, for Tc, and for the turbine's temperatures, K. Bound: the error of a lumped housing at another point.
+const OWN_T2_K: f64 = 0.1;
+/// As [`OWN_T2_K`]. Bound: as there.
+const OWN_TC_K: f64 = 0.2;
+/// As [`OWN_T2_K`]. Bound: as there.
+const OWN_TURBINE_K: f64 = 0.4;
+
 /// The same for a channel with this reading, in its unit.
 fn own_deviation(channel: Channel, reading: f64) -> f64 {
     match channel {
-        Channel::ShaftSpeed => 40.0,
-        Channel::P2 => 50.0,
-        Channel::CompressorFlow | Channel::TurbineFlow => 1e-3 * reading,
-        Channel::T2 => 0.1,
-        Channel::Tc => 0.2,
-        _ => 0.4,
+        Channel::ShaftSpeed => OWN_SPEED_RPM,
+        Channel::P2 => OWN_P2_PA,
+        Channel::CompressorFlow | Channel::TurbineFlow => OWN_FLOW_RATIO * reading,
+        Channel::T2 => OWN_T2_K,
+        Channel::Tc => OWN_TC_K,
+        _ => OWN_TURBINE_K,
     }
 }
 
@@ -80,18 +94,20 @@ fn declared_error(declared: &Declared, channel: Channel, reading: f64) -> f64 {
     declared.of(channel).fixed_sigma(channel, reading)
 }
 
-/// Knot distance of slow variations, s. Judgement: several steps of a minute, so that variations explain no single step, and a fraction of the
+/// Knot distance of slow variations, s. Bound: several steps of a minute, so that variations explain no single step, and a fraction of the
 /// hour in which turbine housings settle.
 const KNOT_S: f64 = 480.0;
-/// Slow variation of the turbine side, K: model errors of its housing take an hour to decay.
+/// Slow variation of the turbine side, K. Bound: model errors of its housing take an hour to decay.
 const TURBINE_VARIATION: [(Channel, f64); 2] = [(Channel::Tt, 0.2), (Channel::T4, 0.1)];
+/// Maximum number of intervals between knots. Bound: effort; eight hours.
+const MAX_INTERVALS: f64 = 60.0;
 
 /// Adds time histories that are linear between knots: of the air around the housings, within its tolerance, and of the turbine side. No drift
 /// has such a time history, so they do not hide one.
 fn add_slow_variations(readings: &Readings, declared: &Declared, constants: &mut Vec<Response>) {
     let ambient_k = Perturbation::Ambient.tolerance(&declared.tolerances);
     let (start_s, end_s) = readings.span_s();
-    let count = ((end_s - start_s) / KNOT_S).ceil().clamp(1.0, 60.0);
+    let count = ((end_s - start_s) / KNOT_S).ceil().clamp(1.0, MAX_INTERVALS);
     for knot in 0..=count as usize {
         let hat = |segment: &Segment| {
             let t_s = 0.5 * (segment.start_s + segment.end_s) + readings.steps[segment.step].offset_s;

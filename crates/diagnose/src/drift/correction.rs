@@ -5,6 +5,7 @@ use crate::drift::readings::{Readings, Response};
 use crate::drift::refinement::{FittedDrift, Refinement};
 use crate::drift::report::{CorrectedPoint, DriftReport, FoundDrift, RepeatGroup, Visit, VisitChannel};
 use crate::drift::runs::{CampaignStep, DriftRequest, mean_variance_ratio};
+use mapper_core::unit_factors::{PA_PER_KPA, RPM_PER_KRPM};
 use mapper_core::{Channel, IdentifiedPoint, Recording};
 use mapper_identify::identify_each;
 use mapper_observe::averages::mean_reading::mean_between;
@@ -108,7 +109,7 @@ pub(crate) fn end_speed_rpm(
 }
 
 /// The first recording with the reported sensor drift subtracted; `None` if no sensor drifts.
-pub fn without_drift(recording: &Recording, report: &DriftReport) -> Option<Recording> {
+pub(crate) fn without_drift(recording: &Recording, report: &DriftReport) -> Option<Recording> {
     let is_of_sensor = |drift: &FoundDrift| !drift.cause.channels().is_empty();
     report.drifts.iter().any(is_of_sensor).then_some(())?;
     let mut recording = recording.clone();
@@ -148,9 +149,13 @@ pub(crate) fn group(
     let describe = |step: Option<&CampaignStep>| {
         let speed = |step: &CampaignStep| end_speed_rpm(request, recordings[step.run], step);
         step.map_or_else(String::new, |step| {
-            let speed =
-                speed(step).map_or_else(|| "-".to_owned(), |speed_rpm| format!("{:.1}", speed_rpm / 1e3));
-            format!("{speed} krpm at opening {} (P3 {:.1} kPa)", step.valve_opening_ratio, step.p3_pa / 1e3)
+            let speed = speed(step)
+                .map_or_else(|| "-".to_owned(), |speed_rpm| format!("{:.1}", speed_rpm / RPM_PER_KRPM));
+            format!(
+                "{speed} krpm at opening {} (P3 {:.1} kPa)",
+                step.valve_opening_ratio,
+                step.p3_pa / PA_PER_KPA
+            )
         })
     };
     let first = visits.first().copied();

@@ -5,6 +5,7 @@ use crate::drift::causes::Cause;
 use crate::drift::readings::Readings;
 use crate::drift::report::{Alternative, DetectionLimit};
 use crate::drift::runs::{DriftError, Unsolvable};
+use mapper_core::unit_factors::S_PER_H;
 use mapper_inference::hypotheses::Member;
 use mapper_inference::posterior::shares;
 use mapper_inference::time_history::{Shape, TimeHistory};
@@ -63,7 +64,7 @@ pub(crate) fn decide(
     let limit = |index: usize| {
         let rate_per_h = likelihood.smallest_seen(&candidates.priors, index)?;
         let cause = candidates.cause(index);
-        let change = rate_per_h * (end_s - start_s) / 3600.0;
+        let change = rate_per_h * (end_s - start_s) / S_PER_H;
         change.is_finite().then(|| DetectionLimit { cause, change, unit: cause.unit() })
     };
     Ok(Decision {
@@ -148,6 +149,9 @@ fn unexplained(noise: &LowRank, difference: &DMatrix<f64>, candidates: &Candidat
     noise.inverse_times(&noise.whiten(residual))
 }
 
+/// Minimum share of the degrees of freedom that constants leave. Bound: with fewer, the residual does not show the noise.
+const MIN_FREE_SHARE: f64 = 0.2;
+
 /// Increases each channel's noise to match the residual of the best explanation, whitened by `noise`.
 pub(crate) fn inflate(
     own: &mut [DMatrix<f64>],
@@ -158,7 +162,7 @@ pub(crate) fn inflate(
     let count = readings.columns.len();
     let rows = residual.nrows() as f64;
     // Constants use up their share of the degrees of freedom.
-    let free = (1.0 - noise.degrees_of_freedom() / rows).max(0.2);
+    let free = (1.0 - noise.degrees_of_freedom() / rows).max(MIN_FREE_SHARE);
     let factors: Vec<f64> = (0..count)
         .map(|column| {
             let own: Vec<f64> =

@@ -22,7 +22,7 @@ use mapper_observe::perturbation::Perturbation;
 use nalgebra::DMatrix;
 
 /// Model error of a segment's mean, relative to the noise of one sample: that of a mean of 44 independent samples, so that a longer segment
-/// gains no more weight. Judgement.
+/// gains no more weight. Judgement: the model follows no segment better.
 const MODEL_ERROR_RATIO: f64 = 0.15;
 
 /// Finds the causes of drift.

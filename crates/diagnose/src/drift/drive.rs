@@ -15,8 +15,24 @@ use mapper_physics::simulation::driven::{DriveError, FrozenGrid, drive, settle};
 use mapper_physics::simulation::inputs::Inputs;
 use mapper_physics::simulation::model::{Model, State};
 
-/// Interval of model readings within a segment, s.
+/// Interval of model readings within a segment, s. Bound: four in the shortest segment; housings hardly move within it.
 const SAMPLE_S: f64 = 2.5;
+/// Time before a jump around which the state before it is read, s. Bound: a window of a second must end before the jump.
+const BEFORE_JUMP_S: f64 = 0.6;
+/// Time before the end of a step at which the model is read, s. Bound: shorter than any sample, longer than rounding.
+const BEFORE_END_S: f64 = 1e-3;
+/// Shortest part of a step with a constant machine, s. Bound: a sample.
+const MIN_PART_S: f64 = 0.1;
+/// Difference of times that count as one, s. Bound: half a sample.
+const SAME_TIME_S: f64 = 0.05;
+/// Size of a perturbation of a pressure, Pa. Bound: small enough for curvature, large enough for rounding errors.
+const PRESSURE_STEP_PA: f64 = 100.0;
+/// Size of a perturbation of a temperature, K. Bound: as above.
+const TEMPERATURE_STEP_K: f64 = 0.5;
+/// Size of a perturbation of the friction, W s2/rad2. Bound: as above.
+const FRICTION_STEP_W_S2_RAD2: f64 = 5e-8;
+/// Size of a relative perturbation. Bound: as above.
+const RELATIVE_STEP_RATIO: f64 = 2e-3;
 
 /// Model predictions for one run, or for all.
 #[derive(Debug, Clone, Default)]
@@ -49,7 +65,7 @@ pub(crate) struct Drive<'a> {
 
 impl<'a> Drive<'a> {
     /// Prepares run `run`; `steps` and `segments` are those of the whole campaign.
-    pub fn new(
+    pub(super) fn new(
         run: usize,
         recording: &Recording,
         request: &DriftRequest<'a>,
@@ -76,7 +92,7 @@ impl<'a> Drive<'a> {
                 start_s: step.start_s,
                 end_s: step.end_s,
                 segments_s: Vec::new(),
-                before_jump: measured_state(recording, nominal, step.start_s - 0.6),
+                before_jump: measured_state(recording, nominal, step.start_s - BEFORE_JUMP_S),
                 after_jump: measured_state(recording, nominal, step.start_s + SKIPPED_S),
                 at_end: measured_state(recording, nominal, step.end_s - 1.0),
                 coverage: Coverage::Whole,
@@ -93,7 +109,7 @@ impl<'a> Drive<'a> {
                 driven.segments_s.push(segment.start_s);
                 segment_count += 1;
             }
-            driven.times_s.push(step.end_s - 1e-3);
+            driven.times_s.push(step.end_s - BEFORE_END_S);
             driven.targets.push(Target::StepEnd);
             driven_steps.push(driven);
         }
@@ -310,12 +326,11 @@ impl DrivenStep {
         for drift in drifts.iter().filter(|drift| drift.acts_on_machine()) {
             edges.extend(self.segments_s.iter().filter(|segment_s| **segment_s > start_s));
             let onset_s = drift.history.onset - self.step.offset_s;
-            // A part must not have zero length.
-            if (start_s + 0.1..self.end_s - 0.1).contains(&onset_s) {
+            if (start_s + MIN_PART_S..self.end_s - MIN_PART_S).contains(&onset_s) {
                 edges.push(onset_s);
             }
             edges.sort_by(f64::total_cmp);
-            edges.dedup_by(|b, a| *b - *a < 0.05);
+            edges.dedup_by(|b, a| *b - *a < SAME_TIME_S);
         }
         edges.push(self.end_s);
         edges.windows(2).map(|pair| (pair[0], pair[1])).collect()
@@ -364,12 +379,14 @@ pub(crate) const PERTURBATIONS: [Perturbation; 19] = [
     Perturbation::StartTt,
 ];
 
-/// Size of a perturbation: small enough for curvature, large enough for rounding errors.
+/// Size of a perturbation, in its unit.
 pub(crate) fn difference_step(perturbation: Perturbation) -> f64 {
     match perturbation {
-        Perturbation::Input(channel) if channel.info().dimension == Dimension::Pressure => 100.0,
-        Perturbation::Input(_) | Perturbation::Ambient | Perturbation::StartTc | Perturbation::StartTt => 0.5,
-        Perturbation::Friction => 5e-8,
-        _ => 2e-3,
+        Perturbation::Input(channel) if channel.info().dimension == Dimension::Pressure => PRESSURE_STEP_PA,
+        Perturbation::Input(_) | Perturbation::Ambient | Perturbation::StartTc | Perturbation::StartTt => {
+            TEMPERATURE_STEP_K
+        }
+        Perturbation::Friction => FRICTION_STEP_W_S2_RAD2,
+        _ => RELATIVE_STEP_RATIO,
     }
 }

@@ -17,11 +17,11 @@ mod refinement;
 mod report;
 mod runs;
 
-pub use causes::{Cause, CauseKind, RATE_PER_H};
-pub use correction::without_drift;
+pub(crate) use causes::CauseKind;
+pub use causes::{Cause, RATE_PER_H};
+pub(crate) use correction::without_drift;
 pub use diagnose::diagnose;
 pub use report::{
-    Alternative, CorrectedPoint, DetectionLimit, DriftReport, DriftVerdict, FoundDrift, RateOrStep,
-    RepeatGroup, Visit, VisitChannel,
+    Alternative, CorrectedPoint, DriftReport, DriftVerdict, FoundDrift, RateOrStep, RepeatGroup,
 };
-pub use runs::{DriftError, DriftRequest, RecordedRun, Unsolvable};
+pub use runs::{DriftError, DriftRequest, RecordedRun};

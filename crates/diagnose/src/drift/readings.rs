@@ -46,18 +46,18 @@ pub(crate) struct Readings {
 
 impl Readings {
     /// Number of compared means; each is a row.
-    pub fn row_count(&self) -> usize {
+    pub(crate) fn row_count(&self) -> usize {
         self.segments.len() * self.columns.len()
     }
 
     /// Positions of a step's efficiency and heat-transfer coefficient in a [`Response`].
-    pub fn point_positions(&self, step: usize) -> [usize; 2] {
+    pub(crate) fn point_positions(&self, step: usize) -> [usize; 2] {
         let eta = self.row_count() + step;
         [eta, eta + self.steps.len()]
     }
 
     /// Step that an element of a [`Response`] belongs to.
-    pub fn step_of(&self, position: usize) -> usize {
+    pub(super) fn step_of(&self, position: usize) -> usize {
         match position.checked_sub(self.row_count()) {
             Some(point) => point % self.steps.len(),
             None => self.segments[position / self.columns.len()].step,
@@ -65,31 +65,31 @@ impl Readings {
     }
 
     /// A response of the readings alone: `value` of each row and of its channel's position in [`OUTPUTS`].
-    pub fn response_of_rows(&self, value: impl Fn(usize, usize) -> f64) -> Response {
+    pub(crate) fn response_of_rows(&self, value: impl Fn(usize, usize) -> f64) -> Response {
         let rows = self.row_count();
         Response::from_fn(rows + 2 * self.steps.len(), |position, _| {
             if position < rows { value(position, self.columns[position % self.columns.len()]) } else { 0.0 }
         })
     }
 
-    pub fn response(&self, perturbation: Perturbation) -> Option<&Response> {
+    pub(super) fn response(&self, perturbation: Perturbation) -> Option<&Response> {
         self.responses.get(PERTURBATIONS.iter().position(|other| *other == perturbation)?)
     }
 
     /// Start of the campaign and end of its last step, campaign time, s.
-    pub fn span_s(&self) -> (f64, f64) {
+    pub(super) fn span_s(&self) -> (f64, f64) {
         let start = self.steps.first().map_or(0.0, |step| step.start_s + step.offset_s);
         let end = self.steps.last().map_or(0.0, |step| step.end_s + step.offset_s);
         (start, end)
     }
 
     /// Response to a constant cause of unit size; `None` if no reading responds.
-    pub fn signature(&self, cause: Cause) -> Option<Response> {
+    pub(super) fn signature(&self, cause: Cause) -> Option<Response> {
         self.signature_of(cause, |_| true)
     }
 
     /// The part of a signature that a model run with the drift contains: all but the drift of output sensors.
-    pub fn model_signature(&self, cause: Cause) -> Option<Response> {
+    pub(crate) fn model_signature(&self, cause: Cause) -> Option<Response> {
         self.signature_of(cause, |channel| INPUT_CHANNELS.contains(channel))
     }
 
@@ -125,19 +125,19 @@ impl Readings {
     }
 
     /// Mean of a time history over the segment of a row.
-    pub fn mean_of(&self, row: usize, history: TimeHistory) -> f64 {
+    pub(super) fn mean_of(&self, row: usize, history: TimeHistory) -> f64 {
         let segment = &self.segments[row / self.columns.len()];
         let offset_s = self.steps[segment.step].offset_s;
         history.mean(segment.start_s + offset_s, segment.end_s + offset_s)
     }
 
     /// Change of the readings by a cause of size 1 with this signature and time history.
-    pub fn column(&self, signature: &Response, history: TimeHistory) -> DVector<f64> {
+    pub(super) fn column(&self, signature: &Response, history: TimeHistory) -> DVector<f64> {
         DVector::from_fn(self.row_count(), |row, _| signature[row] * self.mean_of(row, history))
     }
 
     /// The same readings with another prediction; `None` if it does not cover all compared segments.
-    pub fn with_prediction(&self, base: &Prediction, perturbed: &[Prediction]) -> Option<Readings> {
+    pub(crate) fn with_prediction(&self, base: &Prediction, perturbed: &[Prediction]) -> Option<Readings> {
         let rows = self.row_count();
         let model = self.response_to(base);
         let response = |(perturbation, prediction): (&Perturbation, &Prediction)| {
@@ -165,7 +165,7 @@ impl Readings {
     }
 
     /// Subtracts the linear effect of a drift with this signature from the model.
-    pub fn subtract_from_model(&mut self, signature: &Response, drift: &Drift) {
+    pub(crate) fn subtract_from_model(&mut self, signature: &Response, drift: &Drift) {
         for row in 0..self.row_count() {
             self.difference[row] += signature[row] * (drift.size * self.mean_of(row, drift.history));
         }

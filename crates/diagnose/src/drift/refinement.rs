@@ -23,7 +23,7 @@ pub(crate) struct Refinement {
 
 impl Refinement {
     /// Decides and fits, and repeats both with the result in the model. Keeps the last result that the model can follow.
-    pub fn new(
+    pub(super) fn new(
         readings: Readings,
         own: &[DMatrix<f64>],
         drives: &mut [Drive<'_>],

@@ -156,7 +156,7 @@ pub struct FoundDrift {
 
 impl FoundDrift {
     /// Whether it is more probable than all its alternatives together.
-    pub fn is_clear(&self) -> bool {
+    pub(crate) fn is_clear(&self) -> bool {
         self.probability >= 0.5
     }
 

@@ -1,6 +1,7 @@
 //! Recordings of a campaign on one axis of time, their repeats, and whether they can be compared.
 
 use crate::drift::causes::Cause;
+use mapper_core::unit_factors::S_PER_H;
 use mapper_core::{
     Channel, Implausible, ModelTolerances, NoiseColour, Recording, StepPoint, check_running, step_number,
 };
@@ -16,10 +17,12 @@ use mapper_physics::simulation::inputs::InputsError;
 use mapper_physics::simulation::model::Model;
 use std::collections::BTreeMap;
 
-/// Minimum number of visits by one jump: two show a difference, a third shows whether it persists or grows.
+/// Minimum number of visits by one jump. Bound: two show a difference, a third shows whether it persists or grows.
 const VISITS_NEEDED: usize = 3;
-/// Longest total time of all steps, s: beyond it a time in the log is wrong.
-const LONGEST_S: f64 = 30.0 * 86_400.0;
+/// Longest total time of all steps, s. Bound: 30 days; beyond it a time in the log is wrong.
+const LONGEST_S: f64 = 30.0 * 24.0 * S_PER_H;
+/// Longest gap in the times of a channel, in intervals of its samples. Bound: a slow logger that misses some samples has no gap.
+const MAX_GAP_INTERVALS: f64 = 20.0;
 
 /// All visits of each repeated jump, by position among the steps; most visits first.
 pub(crate) fn groups(steps: &[CampaignStep]) -> Vec<Vec<usize>> {
@@ -66,9 +69,9 @@ pub(crate) fn refusal(
              wrong time in the log.",
             step_number(step.index),
             step.run + 1,
-            length_s(step) / 3600.0,
-            whole_s / 3600.0,
-            LONGEST_S / 3600.0,
+            length_s(step) / S_PER_H,
+            whole_s / S_PER_H,
+            LONGEST_S / S_PER_H,
         ));
     }
     for (index, run) in runs.iter().enumerate() {
@@ -127,7 +130,7 @@ fn gap(recording: &Recording) -> Option<(Channel, f64, f64)> {
         let mut intervals = inner.chain([(start_s, *first), (*last, end_s)]);
         // A long sample interval is not a gap.
         let interval_s = (last - first) / times.len().max(2) as f64;
-        let longest_s = LONGEST_BRIDGE_S.max(20.0 * interval_s);
+        let longest_s = LONGEST_BRIDGE_S.max(MAX_GAP_INTERVALS * interval_s);
         if let Some((from_s, to_s)) = intervals.find(|(from_s, to_s)| to_s - from_s > longest_s) {
             return Some((*channel, from_s, to_s));
         }
@@ -225,7 +228,8 @@ fn symbols(channels: &[Channel]) -> String {
     channels.iter().map(|channel| channel.symbol()).collect::<Vec<_>>().join(", ")
 }
 
-/// Lengths of the segments of a step: from 5 s after a jump on, increasing.
+/// Lengths of the segments of a step: from 5 s after a jump on, increasing. Bound: probes have settled, and a segment is shorter
+/// than what still changes in it.
 pub(crate) const SEGMENTS: Schedule = Schedule {
     first_s: 5.0,
     lengths_s: &[(15.0, 10.0), (35.0, 20.0), (95.0, 30.0), (f64::INFINITY, 60.0)],
@@ -263,7 +267,7 @@ pub(crate) struct Segment {
 }
 
 impl Segment {
-    pub fn length_s(&self) -> f64 {
+    pub(crate) fn length_s(&self) -> f64 {
         self.end_s - self.start_s
     }
 }

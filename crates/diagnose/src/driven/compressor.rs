@@ -18,6 +18,7 @@ use std::sync::Arc;
 
 /// Unknowns, in the order of [`CompressorSide::predict`]. The area split and the probe keep their declared values, because they are library causes. The
 /// prior of the efficiency is wide and includes map shapes beyond a parabola, so that no cause is named for a good compressor.
+/// Bound: published maps of automotive compressors, and housings from bare to insulated, lie within two sigmas.
 static UNKNOWNS: [Parameter; 16] = {
     const fn further(name: &'static str, description: &'static str) -> Parameter {
         normal(name, "", 0.0, 0.15, description)
@@ -63,6 +64,21 @@ fn flow_coefficient(speed_rpm: f64, flow_kg_s: f64, p1_pa: f64, t1_k: f64) -> f6
     flow_kg_s * t1_k / (p1_pa * speed_rpm)
 }
 
+/// Errors of T2 (a polynomial map and a single node of a housing) and of Tc (one thermocouple for a whole housing). Judgement: medians of the
+/// residuals of good engine logs.
+static MODEL_ERRORS: [ModelError; 2] = [
+    ModelError { median_k: 0.18, width: 0.25, correlation_s: CORRELATION_S },
+    ModelError { median_k: 3.0, width: 0.0, correlation_s: HOUSING_CORRELATION_S },
+];
+/// Inlet pressure of a turbine with which the model has a solution, Pa. Bound: any; the compressor side does not depend on it.
+const TURBINE_P3_PA: f64 = 150e3;
+/// Outlet pressure of a state whose housing and probe alone are used, Pa. Bound: any.
+const ANY_PA: f64 = 1e5;
+/// Minimum flow of the equations, which divide by it, kg/s. Bound: a thousandth of any compressor's flow.
+pub(crate) const MIN_FLOW_KG_S: f64 = 1e-4;
+/// Minimum time between rows, s. Bound: avoids a division by zero.
+const MIN_ELAPSED_S: f64 = 1e-9;
+
 pub(crate) struct CompressorSide {
     rows: Rows,
     middle_speed_rpm: f64,
@@ -89,11 +105,7 @@ impl SideModel for CompressorSide {
     }
 
     fn model_errors() -> &'static [ModelError] {
-        // T2: error of a polynomial map and a single housing node. Tc: one thermocouple for a whole housing.
-        &[
-            ModelError { median_k: 0.18, width: 0.25, correlation_s: CORRELATION_S },
-            ModelError { median_k: 3.0, width: 0.0, correlation_s: HOUSING_CORRELATION_S },
-        ]
+        &MODEL_ERRORS
     }
 
     fn of(rows: Rows) -> Self {
@@ -149,11 +161,11 @@ impl SideModel for CompressorSide {
         let mut state = self.start(rig, start_k, t2_offset_k);
         let mut tip = Tip { start_k: state.t2_tip_k, last: None };
         for i in 0..rows.len() {
-            // Any turbine flow with which the model has a solution.
             let (p1_pa, t1_k) = (p1s_pa[i], t1s_k[i]);
-            let boundary = BoundaryConditions { t1_k, p1_pa, p3_pa: 150e3, ..BoundaryConditions::default() };
+            let boundary =
+                BoundaryConditions { t1_k, p1_pa, p3_pa: TURBINE_P3_PA, ..BoundaryConditions::default() };
             // With recirculation, the flow through the wheel exceeds the outlet flow.
-            let wheel_kg_s = flows_kg_s[i].max(1e-4) * (1.0 + compressor.recirculation_ratio);
+            let wheel_kg_s = flows_kg_s[i].max(MIN_FLOW_KG_S) * (1.0 + compressor.recirculation_ratio);
             let speed = (speeds_rpm[i] / self.middle_speed_rpm).ln();
             let flow =
                 (flow_coefficient(speeds_rpm[i], wheel_kg_s, p1s_pa[i], t1s_k[i]) / self.middle_flow).ln();
@@ -233,7 +245,7 @@ impl CompressorSide {
         let t1_k = rows.drive(Channel::T1).first().copied().unwrap_or(f64::NAN);
         let t2_k = first(Channel::T2).unwrap_or(t1_k) - t2_offset_k;
         let tc_k = first(Channel::Tc).unwrap_or(0.5 * (t1_k + t2_k)) + start_over_k;
-        State::new(1.0, 1e5, tc_k, tc_k, t2_k)
+        State::new(1.0, ANY_PA, tc_k, tc_k, t2_k)
     }
 }
 
@@ -253,7 +265,7 @@ impl Tip {
             None => target_k + (self.start_k - target_k) * tau_s / (tau_s + SAMPLE_INTERVAL_S),
             Some((before_s, before_k, tip_k)) => {
                 let elapsed_s = t_s - before_s;
-                let slope = (target_k - before_k) / elapsed_s.max(1e-9);
+                let slope = (target_k - before_k) / elapsed_s.max(MIN_ELAPSED_S);
                 let follows_k = target_k - slope * tau_s;
                 follows_k + (tip_k - (before_k - slope * tau_s)) * (-elapsed_s / tau_s).exp()
             }

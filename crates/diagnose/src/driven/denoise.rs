@@ -8,10 +8,10 @@ use crate::driven::side::CORRELATION_S;
 use mapper_observe::Declared;
 use std::ops::Range;
 
-/// Numbers of neighbours tried on each side.
+/// Numbers of neighbours tried on each side. Bound: from a line within the correlation time at 10 Hz down to the fewest whose scatter shows a bend.
 const NEIGHBOURS: [usize; 5] = [12, 8, 5, 3, 2];
-/// Readings lie on a line if their mean squared distance is below this multiple of the variance of the noise. One in twenty sets of six readings fails by
-/// chance.
+/// Readings lie on a line if their mean squared distance is below this multiple of the variance of the noise. Source: one in twenty sets of six
+/// readings fails by chance.
 const LINE_RATIO: f64 = 1.5;
 
 /// Rows with denoised drives and the rates of these.

@@ -49,8 +49,18 @@ pub(crate) struct SideFit {
     pub(crate) precision: DMatrix<f64>,
 }
 
-/// Model error if the cause is outside the library, over that of the model.
+/// Model error if the cause is outside the library, over that of the model. Judgement: an error that explains any reading of a log, without favouring a size.
 const OUTSIDE_RATIO: f64 = 12.0;
+/// Minimum noise of a reading, K. Bound: below the resolution of any log.
+const MIN_NOISE_K: f64 = 1e-6;
+/// Maximum logarithm of a model error over its median, in widths. Bound: no prior reaches as far.
+const MAX_WIDTHS: f64 = 9.0;
+/// Accuracy of that logarithm. Bound: far below its uncertainty.
+const WIDTHS_ACCURACY: f64 = 1e-3;
+/// Step of the second difference of the misfit, in widths. Bound: large compared with rounding, small compared with the curvature.
+const CURVATURE_STEP: f64 = 0.1;
+/// Minimum curvature of the misfit. Bound: its prior alone has a curvature of one.
+const MIN_CURVATURE: f64 = 0.1;
 
 /// Median, K, and width of the logarithm of a channel's model error: its prior.
 type ErrorPrior = (f64, f64);
@@ -109,7 +119,7 @@ impl<S: SideModel> SideProblem<'_, S> {
         let rows = self.side.rows();
         let (_, read) = &rows.judged[channel];
         let noise = BlockNoise {
-            white: self.white_k[channel].max(1e-6).powi(2),
+            white: self.white_k[channel].max(MIN_NOISE_K).powi(2),
             first_order: model_error_sigma_k.powi(2),
         };
         let used = read.iter().zip(counts).map(|(read, counts)| *counts && read.is_finite());
@@ -135,10 +145,10 @@ impl<S: SideModel> SideProblem<'_, S> {
             return (median_k, misfit(0.0), 0.0);
         }
         // A fit that happens to be closer is chance.
-        let best = minimise(-HINT_SIGMAS, 9.0, 1e-3, misfit);
-        let step = 0.1;
+        let best = minimise(-HINT_SIGMAS, MAX_WIDTHS, WIDTHS_ACCURACY, misfit);
+        let step = CURVATURE_STEP;
         let curvature = (misfit(best.at + step) + misfit(best.at - step) - 2.0 * best.value) / (step * step);
-        (median_k * (width * best.at).exp(), best.value, -0.5 * curvature.max(0.1).ln())
+        (median_k * (width * best.at).exp(), best.value, -0.5 * curvature.max(MIN_CURVATURE).ln())
     }
 
     /// [`SideProblem::model_error`] of each channel.

@@ -11,7 +11,9 @@ use crate::gap::causes::probabilities::ids;
 use mapper_core::Channel;
 use mapper_inference::mixture::DRAWS;
 use mapper_numerics::parallel;
-use mapper_numerics::statistics::{MIN_VALUES, mean, quantile, rms, standard_deviation, student_quantile};
+use mapper_numerics::statistics::{
+    MIN_VALUES, SHARE_025, SHARE_975, mean, quantile, rms, standard_deviation, student_quantile,
+};
 use nalgebra::DVector;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -75,7 +77,7 @@ pub(crate) fn held_out<S: SideModel>(
     let reductions: Vec<f64> = found.iter().map(|phase| phase.before_k - phase.after_k).collect();
     let gap_reduction_k = mean(&reductions)?;
     let samples = reductions.len() as f64;
-    let half_k = student_quantile(0.975, samples - 1.0).unwrap_or(f64::INFINITY)
+    let half_k = student_quantile(SHARE_975, samples - 1.0).unwrap_or(f64::INFINITY)
         * standard_deviation(&reductions).unwrap_or(f64::INFINITY)
         / samples.sqrt();
     Some(HeldOut {
@@ -108,7 +110,7 @@ pub(crate) fn beyond<S: SideModel>(
     let at = |share: f64| quantile(&expected, share).unwrap_or(f64::NAN);
     let is_inside = |i: &usize| {
         let end = |share: f64| quantile(drawn.iter().map(|draw| draw[*i]), share).unwrap_or(f64::NAN);
-        (end(0.025)..=end(0.975)).contains(&rows.judged[0].1[*i])
+        (end(SHARE_025)..=end(SHARE_975)).contains(&rows.judged[0].1[*i])
     };
     Some(Beyond {
         from_s: rows.t_s[later.start],
@@ -117,8 +119,8 @@ pub(crate) fn beyond<S: SideModel>(
         before_k: residual_rms_k(problem, &before.predicted, later.clone()),
         after_k: residual_rms_k(problem, &after.predicted, later.clone()),
         expected_k: at(0.5),
-        expected_low_k: at(0.025),
-        expected_high_k: at(0.975),
+        expected_low_k: at(SHARE_025),
+        expected_high_k: at(SHARE_975),
         inside_ratio: later.clone().filter(is_inside).count() as f64 / later.len() as f64,
     })
 }
@@ -170,10 +172,14 @@ impl CorrelatedNoise {
     }
 }
 
-/// Two neighbours are merged if one line for both increases the misfit by less than this share of the total variation.
+/// Two neighbours are merged if one line for both increases the misfit by less than this share of the total variation. Bound: noise and curvature of one phase.
 const MERGE_RATIO: f64 = 0.01;
-/// Minimum and maximum number of phases; each is predicted by fits to the others.
+/// Minimum and maximum number of phases. Bound: effort, and enough for a spread; each is predicted by fits to the others.
 const PHASES: (usize, usize) = (3, 8);
+/// Minimum of a drive for its logarithm, in its unit. Bound: avoids the logarithm of zero.
+const MIN_DRIVE: f64 = 1e-9;
+/// Minimum variance of the logarithm of a drive that has phases. Bound: a variation of one per cent.
+const MIN_VARIANCE: f64 = 1e-4;
 
 /// Phases of the first `count` rows, in order; empty if there are too few rows for two.
 pub(crate) fn phases(rows: &Rows, count: usize, drives: &[Channel]) -> Vec<Range<usize>> {
@@ -218,11 +224,12 @@ struct Sums {
 
 impl Sums {
     fn new(t_s: &[f64], values: &[f64]) -> Self {
-        let logarithms: Vec<f64> = values.iter().take(t_s.len()).map(|value| value.max(1e-9).ln()).collect();
+        let logarithms: Vec<f64> =
+            values.iter().take(t_s.len()).map(|value| value.max(MIN_DRIVE).ln()).collect();
         let count = logarithms.len().max(1) as f64;
         let mean = logarithms.iter().sum::<f64>() / count;
-        // A nearly constant drive has no phases, so a variation of one percent counts as small.
-        let whole = logarithms.iter().map(|v| (v - mean).powi(2)).sum::<f64>().max(1e-4 * count);
+        // A nearly constant drive has no phases.
+        let whole = logarithms.iter().map(|v| (v - mean).powi(2)).sum::<f64>().max(MIN_VARIANCE * count);
         let first_s = t_s.first().copied().unwrap_or(0.0);
         let mut sums = [0.0; 6];
         let mut before = vec![sums];

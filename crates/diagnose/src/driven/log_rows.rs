@@ -5,7 +5,7 @@ use mapper_core::{Channel, Recording, SAMPLE_INTERVAL_S, is_reading};
 use mapper_numerics::statistics::EXCLUDE_SIGMAS;
 use mapper_observe::declared::usual_noise_sigma;
 
-/// Maximum number of rows, evenly spread over a longer log: five minutes at 10 Hz.
+/// Maximum number of rows, evenly spread over a longer log. Bound: five minutes at 10 Hz, enough for every unknown.
 const MAX_ROWS: usize = 3_000;
 
 /// The channels of one side of the machine.
@@ -18,8 +18,10 @@ pub(crate) struct SideChannels<'a> {
     pub(crate) is_usable: fn(&[f64]) -> bool,
 }
 
-/// Minimum pressure ratio of compressor or turbine: below it the work is so small that temperatures do not show the efficiency.
+/// Minimum pressure ratio of compressor or turbine. Bound: below it the work is so small that temperatures do not show the efficiency.
 const MIN_PRESSURE_RATIO: f64 = 1.02;
+/// Share of the spacing at which a row counts as the next. Bound: rounding of times.
+const SPACING_SHARE: f64 = 0.999;
 
 /// Whether a side does enough work for its temperatures to show its efficiency. The equations divide by the flow, which a meter must
 /// distinguish from none.
@@ -62,7 +64,7 @@ impl Rows {
             Rows { drives: empty(channels.drives), judged: empty(channels.judged), ..Rows::default() };
         let mut row = Vec::with_capacity(series.len());
         for (t_s, value) in judged.t_s.iter().zip(&judged.values) {
-            if rows.t_s.last().is_some_and(|last_s| t_s - last_s < 0.999 * spacing_s) {
+            if rows.t_s.last().is_some_and(|last_s| t_s - last_s < SPACING_SHARE * spacing_s) {
                 continue;
             }
             row.clear();

@@ -20,9 +20,7 @@ pub(crate) mod turbine;
 
 pub use diagnose::{SideRequest, diagnose};
 pub use side::Side;
-pub use side_diagnosis::{
-    Beyond, ChannelTrace, Diagnosis, HeldOut, NotDiagnosable, Phase, SideCause, SideVerdict, Unknown,
-};
+pub use side_diagnosis::{Beyond, Diagnosis, HeldOut, Phase, SideCause, SideVerdict, Unknown};
 
 use mapper_core::RecordingError;
 

@@ -31,7 +31,10 @@ pub(crate) fn weight(calibration: &Calibration, effects: usize, fit: &SideFit) -
     fit.score + prior(calibration, effects, fit)
 }
 
-/// Start values of an effect: one and three typical steps from neutral, on each possible side.
+/// Start values of an effect, in typical steps from neutral. Bound: effort; a visible size, a large one, and the other side.
+const START_STEPS: [f64; 3] = [1.0, 3.0, -1.0];
+
+/// Start values of an effect.
 fn start_values(info: &EffectInfo) -> Vec<Vec<f64>> {
     let at = |share: f64| -> Vec<f64> {
         let value = |p: &EffectParameter| {
@@ -48,7 +51,7 @@ fn start_values(info: &EffectInfo) -> Vec<Vec<f64>> {
     };
     let neutral: Vec<f64> = info.parameters.iter().map(|p| p.neutral).collect();
     let mut starts: Vec<Vec<f64>> = Vec::new();
-    for share in [1.0, 3.0, -1.0] {
+    for share in START_STEPS {
         let start = at(share);
         if start != neutral && !starts.contains(&start) {
             starts.push(start);
@@ -57,7 +60,7 @@ fn start_values(info: &EffectInfo) -> Vec<Vec<f64>> {
     starts
 }
 
-/// Judgement: limits the time. Every effect is tried, because the linear gain depends on the model error, which a cause reduces.
+/// Limits of the search. Bound: effort. Every effect is tried, because the linear gain depends on the model error, which a cause reduces.
 const LIMITS: Limits = Limits { members: 2, starts: 3, fits: 6, slack: f64::INFINITY };
 
 /// Fits no cause, each of the effects, and the most promising pairs.

@@ -14,9 +14,9 @@ named_enum! {
     }
 }
 
-/// Correlation time of model and sensor errors, s: a probe's own time constant.
+/// Correlation time of model and sensor errors, s. Bound: a probe's own time constant.
 pub(crate) const CORRELATION_S: f64 = 2.0;
-/// Correlation time of the housing's error, s.
+/// Correlation time of the housing's error, s. Bound: the time constant of a housing.
 pub(crate) const HOUSING_CORRELATION_S: f64 = 60.0;
 
 /// Prior of the model error of a judged channel. It is correlated in time, and its size is fitted.

@@ -1,5 +1,6 @@
 //! Turbine side of the model. Flow, pressures and speed are measured; efficiency, heat transfer and housing are free parameters.
 
+use crate::driven::compressor::MIN_FLOW_KG_S;
 use crate::driven::log_rows::{Rows, SideChannels, does_work};
 use crate::driven::side::{
     CORRELATION_S, HOUSING_CORRELATION_S, ModelError, Parameter, Side, SideModel, log_normal, normal,
@@ -15,7 +16,7 @@ use mapper_physics::simulation::model::rad_s_of_rpm;
 use std::f64::consts::LN_2;
 
 /// Unknowns, in the order of [`TurbineSide::predict`]: factors on the campaign's machine. The priors of heat transfer and housing are those of turbines of
-/// its size.
+/// its size. Bound: published turbines of automotive size, and housings from bare to insulated, lie within two sigmas.
 static UNKNOWNS: [Parameter; 9] = [
     normal("eta_t", "", 1.0, 0.1, "best turbine efficiency, over the declared one"),
     normal("u_c", "", 1.0, 0.08, "blade-speed ratio of the best efficiency, over the declared one"),
@@ -39,6 +40,15 @@ static UNKNOWNS: [Parameter; 9] = [
     ),
     normal("t4_offset", "K", 0.0, 2.0, "constant offset of T4 minus that of T3"),
 ];
+
+/// Errors of T4 (a parabola over the blade-speed ratio, at a drop of some hundred kelvin) and of Tt (one thermocouple for a whole housing).
+/// Judgement: medians of the residuals of good engine logs.
+static MODEL_ERRORS: [ModelError; 2] = [
+    ModelError { median_k: 0.45, width: 0.25, correlation_s: CORRELATION_S },
+    ModelError { median_k: 8.0, width: 0.0, correlation_s: HOUSING_CORRELATION_S },
+];
+/// Minimum expansion ratio. Bound: the equations need a flow.
+const MIN_EXPANSION_RATIO: f64 = 1.001;
 
 pub(crate) struct TurbineSide {
     rows: Rows,
@@ -64,11 +74,7 @@ impl SideModel for TurbineSide {
     }
 
     fn model_errors() -> &'static [ModelError] {
-        // T4: error of a parabola over the blade-speed ratio, at a temperature drop of some hundred kelvin.
-        &[
-            ModelError { median_k: 0.45, width: 0.25, correlation_s: CORRELATION_S },
-            ModelError { median_k: 8.0, width: 0.0, correlation_s: HOUSING_CORRELATION_S },
-        ]
+        &MODEL_ERRORS
     }
 
     fn of(rows: Rows) -> Self {
@@ -105,12 +111,12 @@ impl SideModel for TurbineSide {
         let first_k = rows.first_judged(Channel::Tt).or_else(|| rows.first_judged(Channel::T4));
         let mut tt_k = first_k.unwrap_or(f64::NAN) + start_k;
         for i in 0..rows.len() {
-            let (p3_pa, t3_k, p4_pa) = (p3s_pa[i].max(1.001 * p4s_pa[i]), t3s_k[i], p4s_pa[i]);
+            let (p3_pa, t3_k, p4_pa) = (p3s_pa[i].max(MIN_EXPANSION_RATIO * p4s_pa[i]), t3s_k[i], p4s_pa[i]);
             let boundary = BoundaryConditions { p3_pa, t3_k, p4_pa, ..BoundaryConditions::default() };
             // The capacity for which the turbine passes the measured flow.
             params.turbine.choked_flow_kg_s = choked_kg_s;
             let declared_kg_s = TurbineInlet::new(&params.turbine, &boundary).flow_kg_s;
-            params.turbine.choked_flow_kg_s = choked_kg_s * flows_kg_s[i].max(1e-4) / declared_kg_s;
+            params.turbine.choked_flow_kg_s = choked_kg_s * flows_kg_s[i].max(MIN_FLOW_KG_S) / declared_kg_s;
             params.turbine.peak_efficiency = best + eta_ratio * ((p3_pa / p4_pa).ln() - LN_2);
             let inlet = TurbineInlet::new(&params.turbine, &boundary);
             let turbine = inlet.at(tt_k, rad_s_of_rpm(speeds_rpm[i]));

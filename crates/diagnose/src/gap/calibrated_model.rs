@@ -177,58 +177,60 @@ pub struct ForecastCheck {
     pub channels: BTreeMap<String, ChannelCheck>,
 }
 
-/// Compares a calibrated model, driven by the recorded inputs, with a recording to which it was not fitted. The compared values are block means,
-/// decorrelated within each step; their bands include the noise and the uncertainty of the model.
-///
-/// # Errors
-/// [`CalibratedModelError`].
-pub fn check_forecast(
-    recorded: &RigRecording,
-    effects: Vec<Arc<dyn Effect>>,
-    found: &Found,
-    calibration: &Calibration,
-) -> Result<ForecastCheck, CalibratedModelError> {
-    let study = &Prepared::new(recorded, calibration).zeroed.study(recorded, effects)?;
-    let (hypothesis, covariance) = found.hypothesis(study)?;
-    let nominal = Linearised::new(study)?;
-    let there = nominal.at(study, &hypothesis)?;
-    let at = coordinates(&study.effects, &hypothesis);
-    let mut columns = there.columns.clone();
-    columns.extend(effect_changes(study, &nominal, &hypothesis, &there.base, &at, FINE));
-    let residual = nominal.residual(study, &there.base);
-    let spread = |row: usize| {
-        let j = DVector::from_fn(columns.len(), |i, _| columns[i][row]);
-        1.0 + (covariance.clone() * &j).dot(&j).max(0.0)
-    };
-    let inside: Vec<f64> = residual
-        .iter()
-        .enumerate()
-        .map(|(row, r)| f64::from(u8::from(r.abs() < half_width_95(spread(row).sqrt()))))
-        .collect();
-    let mut channels = BTreeMap::new();
-    for (output, channel) in OUTPUTS.iter().enumerate() {
-        let rows: Vec<usize> =
-            study.groups.iter().filter(|g| g.output == output).flat_map(|g| g.rows.clone()).collect();
-        if rows.is_empty() {
-            continue;
-        }
-        let mean =
-            |of: &dyn Fn(usize) -> f64| rows.iter().map(|row| of(*row)).sum::<f64>() / rows.len() as f64;
-        let held = ChannelCheck {
-            rms: mean(&|row| (study.measured[row] - there.base.values[row]).powi(2)).sqrt(),
-            ratio: mean(&|row| residual[row] * residual[row]).sqrt(),
-            inside: mean(&|row| inside[row]),
-            unit: channel.unit().to_owned(),
+impl ForecastCheck {
+    /// Compares a calibrated model, driven by the recorded inputs, with a recording to which it was not fitted. The compared values are block means,
+    /// decorrelated within each step; their bands include the noise and the uncertainty of the model.
+    ///
+    /// # Errors
+    /// [`CalibratedModelError`].
+    pub fn new(
+        recorded: &RigRecording,
+        effects: Vec<Arc<dyn Effect>>,
+        found: &Found,
+        calibration: &Calibration,
+    ) -> Result<ForecastCheck, CalibratedModelError> {
+        let study = &Prepared::new(recorded, calibration).zeroed.study(recorded, effects)?;
+        let (hypothesis, covariance) = found.hypothesis(study)?;
+        let nominal = Linearised::new(study)?;
+        let there = nominal.at(study, &hypothesis)?;
+        let at = coordinates(&study.effects, &hypothesis);
+        let mut columns = there.columns.clone();
+        columns.extend(effect_changes(study, &nominal, &hypothesis, &there.base, &at, FINE));
+        let residual = nominal.residual(study, &there.base);
+        let spread = |row: usize| {
+            let j = DVector::from_fn(columns.len(), |i, _| columns[i][row]);
+            1.0 + (covariance.clone() * &j).dot(&j).max(0.0)
         };
-        channels.insert(channel.symbol().to_owned(), held);
+        let inside: Vec<f64> = residual
+            .iter()
+            .enumerate()
+            .map(|(row, r)| f64::from(u8::from(r.abs() < half_width_95(spread(row).sqrt()))))
+            .collect();
+        let mut channels = BTreeMap::new();
+        for (output, channel) in OUTPUTS.iter().enumerate() {
+            let rows: Vec<usize> =
+                study.groups.iter().filter(|g| g.output == output).flat_map(|g| g.rows.clone()).collect();
+            if rows.is_empty() {
+                continue;
+            }
+            let mean =
+                |of: &dyn Fn(usize) -> f64| rows.iter().map(|row| of(*row)).sum::<f64>() / rows.len() as f64;
+            let held = ChannelCheck {
+                rms: mean(&|row| (study.measured[row] - there.base.values[row]).powi(2)).sqrt(),
+                ratio: mean(&|row| residual[row] * residual[row]).sqrt(),
+                inside: mean(&|row| inside[row]),
+                unit: channel.unit().to_owned(),
+            };
+            channels.insert(channel.symbol().to_owned(), held);
+        }
+        let n = residual.len().max(1) as f64;
+        Ok(ForecastCheck {
+            ratio: (dot(&residual, &residual) / n).sqrt(),
+            inside: inside.iter().sum::<f64>() / n,
+            values: residual.len(),
+            channels,
+        })
     }
-    let n = residual.len().max(1) as f64;
-    Ok(ForecastCheck {
-        ratio: (dot(&residual, &residual) / n).sqrt(),
-        inside: inside.iter().sum::<f64>() / n,
-        values: residual.len(),
-        channels,
-    })
 }
 
 /// Forecast at the end of a step.
@@ -241,29 +243,31 @@ pub struct Expected {
     pub channels: BTreeMap<String, [f64; 2]>,
 }
 
-/// Forecasts the ends of planned steps under the campaign's inputs. `planned`: a recording that has only steps.
-///
-/// # Errors
-/// [`CalibratedModelError`]; no steps if the nominal machine cannot settle at the first.
-pub fn forecast_steps(
-    planned: RigRecording,
-    effects: Vec<Arc<dyn Effect>>,
-    found: &Found,
-) -> Result<Vec<Expected>, CalibratedModelError> {
-    let declared = planned.declared();
-    let lag = Response::lag(planned.tolerances.actuator_lag_s);
-    let judged = planned.tolerances_declared;
-    let rig = SimulatedRig {
-        channels: declared.sensors.keys().copied().collect(),
-        declared,
-        model: planned.model,
-        effects,
-        actuators: Actuators { p3: lag, valve: Response::lag(0.0), judged },
-    };
-    let steps = planned.recording.steps;
-    let rest = steps.first().and_then(|step| step.to);
-    let study = rest.and_then(|rest| simulated_steps(rig, steps, &rest, BLOCK_S, |_| None));
-    study.map_or_else(|| Ok(Vec::new()), |study| forecast(&study, found))
+impl Found {
+    /// Forecasts the ends of planned steps under the campaign's inputs. `planned`: a recording that has only steps.
+    ///
+    /// # Errors
+    /// [`CalibratedModelError`]; no steps if the nominal machine cannot settle at the first.
+    pub fn forecast(
+        &self,
+        planned: RigRecording,
+        effects: Vec<Arc<dyn Effect>>,
+    ) -> Result<Vec<Expected>, CalibratedModelError> {
+        let declared = planned.declared();
+        let lag = Response::lag(planned.tolerances.actuator_lag_s);
+        let judged = planned.tolerances_declared;
+        let rig = SimulatedRig {
+            channels: declared.sensors.keys().copied().collect(),
+            declared,
+            model: planned.model,
+            effects,
+            actuators: Actuators { p3: lag, valve: Response::lag(0.0), judged },
+        };
+        let steps = planned.recording.steps;
+        let rest = steps.first().and_then(|step| step.to);
+        let study = rest.and_then(|rest| simulated_steps(rig, steps, &rest, BLOCK_S, |_| None));
+        study.map_or_else(|| Ok(Vec::new()), |study| forecast(&study, self))
+    }
 }
 
 /// Forecasts the ends of a study's steps; the bands include model uncertainty and the noise of a reading.

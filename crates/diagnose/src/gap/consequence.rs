@@ -13,10 +13,6 @@ use mapper_core::{
 };
 use serde::Serialize;
 
-/// Minimum probability of the causes by which a map is corrected. Judgement: of the diagnoses with a higher probability, 94 % are right on 2000 simulated
-/// campaigns (docs/validation/gap.md).
-pub const NEEDED_PROBABILITY: f64 = 0.9;
-
 /// A map before and after its correction for causes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CorrectedMap {
@@ -28,13 +24,19 @@ pub struct CorrectedMap {
     pub points: Vec<PointCorrection>,
 }
 
+impl CorrectedMap {
+    /// Minimum probability of the causes by which a map is corrected. Judgement: of the diagnoses with a higher probability, 94 % are right on 2000 simulated
+    /// campaigns (docs/validation/gap.md).
+    pub const NEEDED_PROBABILITY: f64 = 0.9;
+}
+
 /// Why a map is not corrected.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "reason", rename_all = "snake_case")]
 pub enum NotCorrected {
     /// The diagnosis names no cause.
     NoCause,
-    /// The open causes together are less probable than [`NEEDED_PROBABILITY`].
+    /// The open causes together are less probable than [`CorrectedMap::NEEDED_PROBABILITY`].
     Improbable {
         /// Probability of all causes together.
         probability: f64,
@@ -119,7 +121,7 @@ impl Diagnosed {
         let before_points = points(&before);
         let (refused, moved) = match open.first() {
             None => (Some(NotCorrected::NoCause), None),
-            Some(_) if probability < NEEDED_PROBABILITY => {
+            Some(_) if probability < CorrectedMap::NEEDED_PROBABILITY => {
                 (Some(NotCorrected::Improbable { probability }), None)
             }
             Some((_, fit)) => match one_sigma_away(&self.study, fit) {
@@ -179,7 +181,7 @@ impl Diagnosed {
         }
     }
 
-    /// The open causes with their fits, and their total probability: the most probable ones that together reach [`NEEDED_PROBABILITY`]. None if the
+    /// The open causes with their fits, and their total probability: the most probable ones that together reach [`CorrectedMap::NEEDED_PROBABILITY`]. None if the
     /// diagnosis names no cause of the library.
     fn open_causes(&self) -> (Vec<(&Candidate, &Fit)>, f64) {
         let mut causes: Vec<(&Candidate, &Fit)> = Vec::new();
@@ -188,7 +190,7 @@ impl Diagnosed {
             return (causes, probability);
         }
         for candidate in &self.diagnosis.candidates {
-            if probability >= NEEDED_PROBABILITY {
+            if probability >= CorrectedMap::NEEDED_PROBABILITY {
                 break;
             }
             let is_of_candidate = |fit: &&Fit| {

@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 
 /// Effect of causes on the readings of a recording.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Changes {
+pub(crate) struct Changes {
     /// Start of the first step, s. Earlier readings, from which a zero may have been taken, stay unchanged.
     start_s: f64,
     /// Change of each channel along the recording, in its unit.
@@ -29,7 +29,7 @@ impl Changes {
     ///
     /// # Errors
     /// [`PredictError`] if the model cannot follow.
-    pub fn of(study: &Study, hypothesis: &Hypothesis) -> Result<Changes, PredictError> {
+    pub(crate) fn of(study: &Study, hypothesis: &Hypothesis) -> Result<Changes, PredictError> {
         let (start_s, end_s) = study.followed_s();
         let times_s = study.table.t_s[study.table.range(start_s, end_s)].to_vec();
         let with = |step: usize| study.rig(hypothesis, step);
@@ -76,7 +76,7 @@ impl Changes {
 
     /// The recording without these changes. At the start of the first step and the end of the last, which the model does not follow, the nearest change is
     /// used.
-    pub fn subtracted_from(&self, mut recording: Recording) -> Recording {
+    pub(crate) fn subtracted_from(&self, mut recording: Recording) -> Recording {
         for (channel, change) in &self.channels {
             let own = recording.series.get_mut(channel).into_iter();
             let elements = recording.elements.iter_mut().filter(|(element, _)| element.channel == *channel);
@@ -92,7 +92,7 @@ impl Changes {
 
 /// The hypotheses one standard deviation away, in each independent direction of the uncertainty of a fit's effects; `None` if the recording does not
 /// determine the effects.
-pub fn one_sigma_away(study: &Study, fit: &Fit) -> Option<Vec<Hypothesis>> {
+pub(crate) fn one_sigma_away(study: &Study, fit: &Fit) -> Option<Vec<Hypothesis>> {
     let coordinates = coordinates(&study.effects, &fit.hypothesis);
     let mode = unknowns(&fit.hypothesis, &coordinates);
     let nuisances = fit.hypothesis.nuisances.len();

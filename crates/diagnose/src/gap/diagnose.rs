@@ -52,10 +52,16 @@ pub struct Diagnosed {
     pub linearised: Linearised,
 }
 
-/// Share of the time taken by the drift search.
+/// Share of the time taken by the drift search. Bound: only shown.
 const DRIFT_SHARE: f64 = 0.15;
-/// Share of the time after which the effect library is finished and the search for unmodelled effects begins.
+/// Share of the time after which the effect library is finished and the search for unmodelled effects begins. Bound: only shown.
 const LIBRARY_END: f64 = 0.7;
+/// Share of the library's time after which its tolerances are fitted. Bound: only shown.
+const MODEL_DRIVEN: f64 = 0.02;
+/// Share of the library's time after which its residual is tested. Bound: only shown.
+const LIBRARY_FITTED: f64 = 0.88;
+/// Share of the remaining time after which the next experiment is searched. Bound: only shown.
+const CLOSURE_END: f64 = 0.9;
 
 /// Diagnoses a recording: drift and zero, the effect library, closure terms, and the verdict with its consequences.
 ///
@@ -69,10 +75,10 @@ pub fn gap(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
     let mut prepared = Prepared::new(&rig, &calibration);
     in_library(0.0, "reading");
     let driven = drive_model(&rig, &mut prepared, request.baseline, effects, &calibration)?;
-    in_library(0.02, "tolerances");
+    in_library(MODEL_DRIVEN, "tolerances");
     let DrivenModel { study, linearised, baseline, warnings } = driven;
     let library = LibraryFits::new(study, linearised, &calibration, &in_library)?;
-    in_library(0.88, "residual");
+    in_library(LIBRARY_FITTED, "residual");
     let posterior = library.posterior(&calibration);
     let gap = gap_on_held_out_steps(&library, &posterior, &calibration);
     let explained = explained(&library, &posterior, &gap);
@@ -86,7 +92,7 @@ pub fn gap(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
         Some(places) => places,
         None => library.locations(&calibration, &posterior),
     };
-    beyond(0.9, "next experiment");
+    beyond(CLOSURE_END, "next experiment");
     let open = OpenQuestion { verdict, locations: &locations, has_closure: closure.settled.is_some() };
     let Suggested { next, experiments } =
         next_experiment(&library, &posterior, open, &experiments, &calibration);

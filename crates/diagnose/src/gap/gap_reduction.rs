@@ -14,14 +14,19 @@ use mapper_physics::simulation::inputs::Inputs;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// Effort of a fit whose tolerances have no limit; this one has no effect.
+/// Share of the limit of a tolerance at which it counts as limited. Bound: rounding.
+const LIMITED_SHARE: f64 = 0.999;
+/// Difference between two openings that count as one. Bound: rounding; no valve repeats a millionth.
+const SAME_OPENING: f64 = 1e-6;
+
+/// Effort of a fit whose tolerances have no limit. Bound: no tolerance reaches a thousand sigmas.
 const UNLIMITED: Effort =
     Effort { iterations: 8, enough: 0.5, max_sigmas: 1e3, max_sigmas_of_rig: 1e3, exact: true };
 
 /// Tolerances of a fit beyond three sigmas of their prior, furthest first. A tolerance at [`MAX_SIGMAS`], which limits the search for causes, is fitted
 /// again without that limit.
-pub fn beyond_prior(study: &Study, linearised: &Linearised, fitted: &Fit) -> Vec<BeyondPrior> {
-    let limited = fitted.hypothesis.nuisances.iter().any(|sigmas| sigmas.abs() > 0.999 * MAX_SIGMAS);
+pub(crate) fn beyond_prior(study: &Study, linearised: &Linearised, fitted: &Fit) -> Vec<BeyondPrior> {
+    let limited = fitted.hypothesis.nuisances.iter().any(|sigmas| sigmas.abs() > LIMITED_SHARE * MAX_SIGMAS);
     let freed =
         limited.then(|| fit(study, linearised, fitted, &Selection::all(study), UNLIMITED).ok()).flatten();
     let nuisances = &freed.as_ref().unwrap_or(fitted).hypothesis.nuisances;
@@ -40,12 +45,12 @@ pub fn beyond_prior(study: &Study, linearised: &Linearised, fitted: &Fit) -> Vec
     beyond
 }
 
-/// Number of folds.
+/// Number of folds. Bound: effort; two would leave half of the steps out of each fit.
 pub(crate) const FOLDS: usize = 3;
 
 /// Groups of steps, each to be predicted by a fit to the others.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Folds {
+pub(crate) struct Folds {
     /// Step indices of each fold, ascending; a single fold means no hold-out.
     pub steps: Vec<Vec<usize>>,
 }
@@ -53,7 +58,7 @@ pub struct Folds {
 impl Folds {
     /// The folds of a recording. Each fold covers every opening and speed range as far as the number of steps allows. Empty if there are
     /// too few steps.
-    pub fn of(study: &Study) -> Folds {
+    pub(crate) fn of(study: &Study) -> Folds {
         let places = study.steps.iter().map(|step| (step.marker.valve_opening_ratio, step.marker.p3_pa));
         Folds::latin_square(&places.collect::<Vec<_>>())
     }
@@ -66,13 +71,13 @@ impl Folds {
         }
         let mut openings: Vec<f64> = places.iter().map(|(opening, _)| *opening).collect();
         openings.sort_by(f64::total_cmp);
-        openings.dedup_by(|a, b| (*a - *b).abs() < 1e-6);
+        openings.dedup_by(|a, b| (*a - *b).abs() < SAME_OPENING);
         let mut steps = vec![Vec::new(); FOLDS];
         // A single step at an opening continues the order of the previous opening.
         let mut assigned = 0;
         for (row, opening) in openings.iter().enumerate() {
             let mut here: Vec<usize> =
-                (0..places.len()).filter(|i| (places[*i].0 - opening).abs() < 1e-6).collect();
+                (0..places.len()).filter(|i| (places[*i].0 - opening).abs() < SAME_OPENING).collect();
             here.sort_by(|a, b| places[*a].1.total_cmp(&places[*b].1).then(a.cmp(b)));
             let first = if here.len() < FOLDS { assigned } else { row };
             for (rank, step) in here.iter().enumerate() {
@@ -140,7 +145,7 @@ pub(crate) fn gap_reduction(steps: &[StepMisfit]) -> GapReduction {
 }
 
 #[derive(Clone, Copy)]
-pub struct Compared<'a> {
+pub(crate) struct Compared<'a> {
     pub study: &'a Study,
     /// Linearised at the nominal model, and at the best cause.
     pub linearised: [&'a Linearised; 2],
@@ -170,7 +175,7 @@ impl Predicted {
 }
 
 /// Effort of a fit without some of the steps; it starts at the best fit to all steps. A tolerance beyond this limit is a suspect
-/// ([`beyond_prior`]), and its own reduction of the gap does not count.
+/// ([`beyond_prior`]), and its own reduction of the gap does not count. Bound: effort; a decrease of 0.2 is a tenth of what one more sigma of evidence costs.
 const EFFORT: Effort = Effort {
     iterations: 5,
     enough: 0.2,
@@ -194,7 +199,7 @@ fn start_within_limits(study: &Study, fit: &Fit) -> Start {
 
 /// Compares tolerances alone with the best cause on held-out steps. Each fold selects among the first few causes and refits, without its
 /// own steps.
-pub fn held_out_gap(compared: Compared<'_>, folds: &Folds) -> Gap {
+pub(crate) fn held_out_gap(compared: Compared<'_>, folds: &Folds) -> Gap {
     let Compared { study, linearised: [nominal, _], null, .. } = compared;
     let (before, after) = predict_held_out(compared, folds);
     let steps: Vec<usize> = (0..study.steps.len()).collect();
@@ -272,7 +277,7 @@ fn predict_held_out(compared: Compared<'_>, folds: &Folds) -> (Predicted, Predic
 }
 
 /// Channel residuals on some steps for each prediction, and the channels that the last prediction makes worse than the one before it.
-pub fn channels_on(
+pub(crate) fn channels_on(
     study: &Study,
     linearised: &Linearised,
     [before, after]: [&Fit; 2],
@@ -282,7 +287,7 @@ pub fn channels_on(
     by_channel(study, [&nominal, &Predicted::of(before), &Predicted::of(after)], steps)
 }
 
-/// A channel is worse if its residual grows by this ratio, and by more than chance.
+/// A channel is worse if its residual grows by this ratio, and by more than chance. Bound: a tenth of a residual is not seen on a plot.
 const WORSE_RATIO: f64 = 1.1;
 
 /// Root mean square of measured minus predicted block means of these steps, per channel in its unit: nominal model, fitted tolerances, and
@@ -405,7 +410,7 @@ mod tests {
         let uneven = gap_reduction(&steps);
         for found in [even, uneven] {
             assert_eq!((found.removed, found.steps), (1.0, 18));
-            assert!((found.interval.0 - 0.025f64.powf(1.0 / 18.0)).abs() < 1e-6, "{found:?}");
+            assert!((found.interval.0 - 0.025f64.powf(1.0 / 18.0)).abs() < SAME_OPENING, "{found:?}");
         }
         assert!(uneven.largest.is_some_and(|(index, share)| index == 4 && share > 0.96));
         // Steps without a gap carry no information.
@@ -413,7 +418,7 @@ mod tests {
         alone.push(step(50.0, 0.0));
         let alone = gap_reduction(&alone);
         assert_eq!((alone.steps, alone.largest), (1, Some((17, 1.0))));
-        assert!((alone.interval.0 - 0.025).abs() < 1e-6, "{alone:?}");
+        assert!((alone.interval.0 - 0.025).abs() < SAME_OPENING, "{alone:?}");
     }
 
     /// The step with most of the gap keeps it: the total share then lies outside the other steps' interval, and the interval includes both.

@@ -19,6 +19,9 @@ use mapper_numerics::statistics::DOUBT_SIGMAS;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
+/// Minimum share of a recording's variance by which it can differ from the joint one. Bound: rounding of their difference.
+const MIN_VARIANCE_SHARE: f64 = 1e-4;
+
 /// A value with its 95 % interval.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Value {
@@ -69,81 +72,83 @@ pub struct Over {
     pub size: String,
 }
 
-/// Jointly analyses several recordings of one rig. Empty if no recording has a named cause, or if their channels differ and so their
-/// nuisances do too.
-pub fn over_recordings(diagnosed: &[&Diagnosed], calibration: &Calibration) -> Vec<Over> {
-    let Some(first) = diagnosed.first() else { return Vec::new() };
-    let effects = named_anywhere(diagnosed);
-    if effects.is_empty() || diagnosed.iter().any(|d| d.study.nuisances != first.study.nuisances) {
-        return Vec::new();
+impl Over {
+    /// Jointly analyses several recordings of one rig. Empty if no recording has a named cause, or if their channels differ and so their
+    /// nuisances do too.
+    pub fn recordings(diagnosed: &[&Diagnosed], calibration: &Calibration) -> Vec<Over> {
+        let Some(first) = diagnosed.first() else { return Vec::new() };
+        let effects = named_anywhere(diagnosed);
+        if effects.is_empty() || diagnosed.iter().any(|d| d.study.nuisances != first.study.nuisances) {
+            return Vec::new();
+        }
+        let fitted: Vec<(Fit, Vec<bool>)> = diagnosed.iter().filter_map(|d| refitted(d, &effects)).collect();
+        if fitted.len() != diagnosed.len() {
+            return Vec::new();
+        }
+        let (fits, there): (Vec<Fit>, Vec<Vec<bool>>) = fitted.into_iter().unzip();
+        let study = &first.study;
+        let at = coordinates(&study.effects, &fits[0].hypothesis);
+        let neutral = neutral_coordinates(study, &fits[0].hypothesis, &at);
+        let factor = calibration.interval_factor;
+        let places: Vec<Vec<f64>> = fits
+            .iter()
+            .map(|fit| parameters(&fit.hypothesis).iter().zip(&at).map(|(value, c)| c.of(*value)).collect())
+            .collect();
+        let sigma = |fit: &Fit, k: usize| factor * fit.covariance[(k, k)].max(0.0).sqrt();
+        let named: Vec<(usize, usize)> = fits[0]
+            .hypothesis
+            .effects
+            .iter()
+            .flat_map(|(index, values)| (0..values.len()).map(move |p| (*index, p)))
+            .collect();
+        let mut over = Vec::new();
+        for (k, (index, number)) in named.iter().enumerate() {
+            let effect = fits[0].hypothesis.effects.iter().position(|(other, _)| other == index).unwrap_or(0);
+            let present: Vec<bool> = there.iter().map(|there| there[effect]).collect();
+            // An absent cause has the neutral size, with the uncertainty given by its curvature.
+            let place = |i: usize| if present[i] { places[i][k] } else { neutral[k] };
+            let having: Vec<&Fit> =
+                fits.iter().zip(&present).filter(|(_, there)| **there).map(|(f, _)| f).collect();
+            let Some((x, spread)) =
+                together(study, if having.is_empty() { fits.iter().collect() } else { having }, &at, k)
+            else {
+                continue;
+            };
+            let spread = factor * spread;
+            let apart = (0..fits.len()).filter(|i| present[*i]).any(|i| {
+                let own = sigma(&fits[i], k);
+                (places[i][k] - x).abs()
+                    > DOUBT_SIGMAS * (own * own - spread * spread).max(MIN_VARIANCE_SHARE * own * own).sqrt()
+            });
+            let (begins, ends) = (present.first() == Some(&true), present.last() == Some(&true));
+            let persistence = match (present.iter().all(|p| *p), begins, ends) {
+                (true, ..) if apart => Persistence::Changes,
+                (true, ..) => Persistence::Persists,
+                (_, false, true) => Persistence::Appeared,
+                (_, true, false) => Persistence::Disappeared,
+                _ => Persistence::ComesAndGoes,
+            };
+            let value = |x: f64, sigma: f64| {
+                let ends = <[f64; 2]>::from(confidence_interval_95(x, sigma)).map(|x| at[k].value(x));
+                Value { value: at[k].value(x), low: ends[0].min(ends[1]), high: ends[0].max(ends[1]) }
+            };
+            let info = study.effects[*index].info();
+            let parameter = &info.parameters[*number];
+            let together = value(x, spread);
+            over.push(Over {
+                effect: info.id.to_string(),
+                name: info.name.to_string(),
+                parameter: parameter.name.to_string(),
+                unit: parameter.unit.to_string(),
+                persistence,
+                each: (0..fits.len()).map(|i| value(place(i), sigma(&fits[i], k))).collect(),
+                present,
+                size: in_words::size(parameter, together.value),
+                together,
+            });
+        }
+        over
     }
-    let fitted: Vec<(Fit, Vec<bool>)> = diagnosed.iter().filter_map(|d| refitted(d, &effects)).collect();
-    if fitted.len() != diagnosed.len() {
-        return Vec::new();
-    }
-    let (fits, there): (Vec<Fit>, Vec<Vec<bool>>) = fitted.into_iter().unzip();
-    let study = &first.study;
-    let at = coordinates(&study.effects, &fits[0].hypothesis);
-    let neutral = neutral_coordinates(study, &fits[0].hypothesis, &at);
-    let factor = calibration.interval_factor;
-    let places: Vec<Vec<f64>> = fits
-        .iter()
-        .map(|fit| parameters(&fit.hypothesis).iter().zip(&at).map(|(value, c)| c.of(*value)).collect())
-        .collect();
-    let sigma = |fit: &Fit, k: usize| factor * fit.covariance[(k, k)].max(0.0).sqrt();
-    let named: Vec<(usize, usize)> = fits[0]
-        .hypothesis
-        .effects
-        .iter()
-        .flat_map(|(index, values)| (0..values.len()).map(move |p| (*index, p)))
-        .collect();
-    let mut over = Vec::new();
-    for (k, (index, number)) in named.iter().enumerate() {
-        let effect = fits[0].hypothesis.effects.iter().position(|(other, _)| other == index).unwrap_or(0);
-        let present: Vec<bool> = there.iter().map(|there| there[effect]).collect();
-        // An absent cause has the neutral size, with the uncertainty given by its curvature.
-        let place = |i: usize| if present[i] { places[i][k] } else { neutral[k] };
-        let having: Vec<&Fit> =
-            fits.iter().zip(&present).filter(|(_, there)| **there).map(|(f, _)| f).collect();
-        let Some((x, spread)) =
-            together(study, if having.is_empty() { fits.iter().collect() } else { having }, &at, k)
-        else {
-            continue;
-        };
-        let spread = factor * spread;
-        let apart = (0..fits.len()).filter(|i| present[*i]).any(|i| {
-            let own = sigma(&fits[i], k);
-            (places[i][k] - x).abs()
-                > DOUBT_SIGMAS * (own * own - spread * spread).max(1e-4 * own * own).sqrt()
-        });
-        let (begins, ends) = (present.first() == Some(&true), present.last() == Some(&true));
-        let persistence = match (present.iter().all(|p| *p), begins, ends) {
-            (true, ..) if apart => Persistence::Changes,
-            (true, ..) => Persistence::Persists,
-            (_, false, true) => Persistence::Appeared,
-            (_, true, false) => Persistence::Disappeared,
-            _ => Persistence::ComesAndGoes,
-        };
-        let value = |x: f64, sigma: f64| {
-            let ends = <[f64; 2]>::from(confidence_interval_95(x, sigma)).map(|x| at[k].value(x));
-            Value { value: at[k].value(x), low: ends[0].min(ends[1]), high: ends[0].max(ends[1]) }
-        };
-        let info = study.effects[*index].info();
-        let parameter = &info.parameters[*number];
-        let together = value(x, spread);
-        over.push(Over {
-            effect: info.id.to_string(),
-            name: info.name.to_string(),
-            parameter: parameter.name.to_string(),
-            unit: parameter.unit.to_string(),
-            persistence,
-            each: (0..fits.len()).map(|i| value(place(i), sigma(&fits[i], k))).collect(),
-            present,
-            size: in_words::size(parameter, together.value),
-            together,
-        });
-    }
-    over
 }
 
 /// Effects named in any recording, by library index, each with its values there.

@@ -4,6 +4,7 @@ use crate::gap::findings::warning::GapWarning;
 use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::study::{PredictError, Study};
 use crate::gap::residuals::true_inputs::Actuators;
+use mapper_core::unit_factors::{PA_PER_KPA, PERCENT};
 use mapper_core::{
     Channel, Implausible, Recording, StepMarker, check_running, is_commanded_jump, step_number,
 };
@@ -15,6 +16,13 @@ use mapper_observe::model_inputs::lagged_command::Response;
 use mapper_physics::rig::effect::Effect;
 use mapper_physics::simulation::model::Model;
 use std::sync::Arc;
+
+/// Minimum predicted rise for a ratio to it, in its unit. Bound: avoids a division by zero.
+const MIN_RISE: f64 = 1e-9;
+/// Part of a step at its end in which actuators have arrived, as a share. Bound: steps are several times longer than an actuator moves.
+const ARRIVED_SHARE: f64 = 0.2;
+/// Maximum median deviation of P3 from its command, as a share. Bound: controllers and regulators hold a few per cent.
+const MAX_COMMAND_ERROR_SHARE: f64 = 0.1;
 
 /// One sentence per assumption.
 pub(crate) fn assumed(study: &Study) -> Vec<String> {
@@ -30,7 +38,7 @@ pub(crate) fn assumed(study: &Study) -> Vec<String> {
         ("external convection", t.external_convection_ratio),
         ("conductance to the oil", t.oil_conductance_ratio),
     ]
-    .map(|(tolerance, ratio)| format!("{tolerance} {} %", 100.0 * ratio));
+    .map(|(tolerance, ratio)| format!("{tolerance} {} %", PERCENT * ratio));
     let lag_and_rate = |response: Response, scale: f64, unit: &str| {
         let lag = format!("a lag of {:.2} s", response.lag_s);
         if response.slew_per_s.is_finite() {
@@ -46,13 +54,14 @@ pub(crate) fn assumed(study: &Study) -> Vec<String> {
         ),
         format!(
             "the responses of the actuators are estimated from the recording and not diagnosed: P3 has {}, the valve {}",
-            lag_and_rate(study.actuators.p3, 1e-3, "kPa/s"),
+            lag_and_rate(study.actuators.p3, 1.0 / PA_PER_KPA, "kPa/s"),
             lag_and_rate(study.actuators.valve, 1.0, "openings/s"),
         ),
     ]
 }
 
 /// Deviations at the end of a step that no rig effect causes: of speed, flows, and the compressor's pressure and temperature rise.
+/// Bound: twice what the worst effect of the library does to each; another machine of the same class differs more.
 const ANOTHER_MACHINE_RATIO: [(Channel, f64); 5] = [
     (Channel::ShaftSpeed, 0.25),
     (Channel::CompressorFlow, 0.4),
@@ -65,7 +74,7 @@ const ANOTHER_MACHINE_RATIO: [(Channel, f64); 5] = [
 ///
 /// # Errors
 /// [`Problem`] with the channel that departs furthest.
-pub fn another_machine(study: &Study, predicted: &[f64]) -> Result<(), Problem> {
+pub(crate) fn another_machine(study: &Study, predicted: &[f64]) -> Result<(), Problem> {
     let mut worst: Option<(f64, Channel, f64)> = None;
     for (channel, limit) in ANOTHER_MACHINE_RATIO {
         let nominal = &study.declared.nominal;
@@ -80,12 +89,12 @@ pub fn another_machine(study: &Study, predicted: &[f64]) -> Result<(), Problem> 
             .iter()
             .filter(|group| OUTPUTS[group.output] == channel)
             .filter_map(|group| group.rows.clone().last())
-            .map(|row| (study.measured[row] - zero) / (predicted[row] - zero).max(1e-9) - 1.0)
+            .map(|row| (study.measured[row] - zero) / (predicted[row] - zero).max(MIN_RISE) - 1.0)
             .collect();
         away.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
         let Some(median) = away.get(away.len() / 2) else { continue };
         if median.abs() > limit && worst.is_none_or(|(most, ..)| median.abs() / limit > most) {
-            worst = Some((median.abs() / limit, channel, 100.0 * median));
+            worst = Some((median.abs() / limit, channel, PERCENT * median));
         }
     }
     worst.map_or(Ok(()), |(_, channel, percent)| Err(Problem::OtherMachine { channel, percent }))
@@ -159,7 +168,7 @@ pub enum GapError {
 ///
 /// # Errors
 /// [`GapError`] if the recording is unusable.
-pub fn checked_study(
+pub(crate) fn checked_study(
     recording: &Recording,
     declared: Declared,
     model: Model,
@@ -176,7 +185,11 @@ pub fn checked_study(
 ///
 /// # Errors
 /// [`Problem`] for others.
-pub fn usable(recording: &Recording, table: &Table, declared: &Declared) -> Result<Vec<GapWarning>, Problem> {
+pub(crate) fn usable(
+    recording: &Recording,
+    table: &Table,
+    declared: &Declared,
+) -> Result<Vec<GapWarning>, Problem> {
     let mut warnings = Vec::new();
     let present: Vec<Channel> = OUTPUTS
         .into_iter()
@@ -242,8 +255,8 @@ fn commanded(recording: &Recording, table: &Table) -> Result<(), Problem> {
     let Some(values) = table.column(Channel::P3) else { return Ok(()) };
     let mut away: Vec<(f64, f64, f64)> = Vec::new();
     for step in &recording.steps {
-        // The last fifth: any actuator has arrived by then.
-        let range = table.range(step.end_s - 0.2 * (step.end_s - step.start_s), step.end_s);
+        // The last part: any actuator has arrived by then.
+        let range = table.range(step.end_s - ARRIVED_SHARE * (step.end_s - step.start_s), step.end_s);
         // A speed controller has moved the command since the step began.
         let held_pa =
             recording.series.get(&Channel::P3Command).filter(|_| step.to.is_some()).and_then(|command| {
@@ -258,7 +271,7 @@ fn commanded(recording: &Recording, table: &Table) -> Result<(), Problem> {
     }
     away.sort_by(|a, b| a.0.total_cmp(&b.0));
     match away.get(away.len() / 2) {
-        Some((share, measured_pa, commanded_pa)) if *share > 0.1 => {
+        Some((share, measured_pa, commanded_pa)) if *share > MAX_COMMAND_ERROR_SHARE => {
             Err(Problem::NotCommanded { measured_pa: *measured_pa, commanded_pa: *commanded_pa })
         }
         _ => Ok(()),

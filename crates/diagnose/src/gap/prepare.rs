@@ -114,7 +114,7 @@ impl Zeroed {
     }
 }
 
-/// Zero offset, in declared standard deviations, above which a sensor is reported.
+/// Zero offset, in declared standard deviations, above which a sensor is reported. Source: the usual three sigmas of a control chart (ISO 7870-2).
 const BEYOND_SIGMAS: f64 = 3.0;
 
 /// The sensors whose zero offset exceeds their declaration.

@@ -6,7 +6,7 @@ use crate::driven::common::{self, Course, ELEMENT_LAG, declared, engine, healthy
 use mapper_core::{Channel, Recording};
 use mapper_diagnose::driven::DrivenError;
 use mapper_diagnose::driven::{Diagnosis, Side, SideRequest, SideVerdict, diagnose};
-use mapper_diagnose::gap::causes::calibration::Calibration;
+use mapper_diagnose::gap::Calibration;
 use mapper_effects::catalogue;
 use mapper_physics::rig::effect::Rig;
 use mapper_physics::rig::sensor_fault::{is_only_on_stands, log_effects};

@@ -14,7 +14,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-/// Maximum size of a map description, bytes.
+/// Maximum size of a map description, bytes. Bound: memory; one of all keys has two kilobytes.
 const MAX_BYTES: usize = 1 << 16;
 
 static DOCUMENT: Document = Document { name: "map description", example: "docs/reference/files.md" };

@@ -14,6 +14,7 @@ use crate::table::sheet::layout::{self, Layout};
 use crate::table::sheet::matrices::points_of_matrices;
 use crate::table::sheet::points::{Point, columns, efficiency_in_percent, points};
 use crate::table::sheet::workbook::grid_of_workbook;
+use mapper_core::unit_factors::PERCENT;
 use mapper_core::{
     CompressorMap, EfficiencyDefinition, ImportError, ImportRemark, ImportedMap, MapDescription,
     MeasuredPoint, ReferenceState, StaticTaps, TurbineReadings,
@@ -62,7 +63,7 @@ pub fn read_any_bytes(bytes: &[u8], description: &MapDescription) -> Result<Impo
 /// Start of every table of an NPSS map.
 const NPSS_TABLE: &str = "Table TB_";
 
-/// Lines above the tables of GSP and GasTurb: the title, which begins with 99, and the effect of the Reynolds number.
+/// Lines above the tables of GSP and GasTurb. Bound: the title, which begins with 99, and the effect of the Reynolds number.
 const GSP_HEAD: usize = 10;
 
 /// Whether a script assigns arrays.
@@ -144,7 +145,7 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedMap, Import
     Ok(ImportedMap { map: CompressorMap { efficiency, ..map }, columns, remarks, measured })
 }
 
-/// Maximum efficiency of fractions below a heading in %: 1 is the maximum of a fraction, and usable points have more than 1.5 %.
+/// Maximum efficiency of fractions below a heading in %. Bound: 1 is the maximum of a fraction, and usable points have more than 1.5 %.
 const MAX_FRACTION_IN_PERCENT: f64 = 0.015;
 
 /// Refuses fractions below a heading in %.
@@ -192,7 +193,7 @@ fn row(
         } else {
             require(point, Quantity::PressureRatio, any(&[Quantity::PressureRatio]))?
         },
-        eta: any(&[Quantity::Efficiency]).map(|eta| if in_percent { 0.01 * eta } else { eta }),
+        eta: any(&[Quantity::Efficiency]).map(|eta| if in_percent { 1.0 / PERCENT * eta } else { eta }),
     })
 }
 
@@ -217,7 +218,7 @@ fn measured_point(
         p2_pa = static_to_total_pa(p2_pa, flow_kg_s, require(point, Quantity::T2, t2_k)?, diameter_m);
     }
     let humidity = point.cell(Quantity::Humidity).map(|(column, written)| match column.is_relative() {
-        true if column.unit.is_empty() => humidity_kg_kg(0.01 * written, t1_k, p1_pa),
+        true if column.unit.is_empty() => humidity_kg_kg(1.0 / PERCENT * written, t1_k, p1_pa),
         true => humidity_kg_kg(column.as_stated(written), t1_k, p1_pa),
         false => column.as_stated(written),
     });
@@ -272,7 +273,7 @@ pub(super) fn pressure_pa(
     }
 }
 
-/// Maximum humidity: saturated air of 50 degC at 100 kPa has 0.088 kg/kg.
+/// Maximum humidity. Bound: saturated air of 50 degC at 100 kPa has 0.088 kg/kg.
 const MAX_HUMIDITY_KG_KG: f64 = 0.1;
 
 /// Corrects a measured point; its efficiency is the apparent one if the table has none.

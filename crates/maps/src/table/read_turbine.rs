@@ -5,10 +5,12 @@ use crate::table::columns::described_columns::DescribedColumns;
 use crate::table::columns::quantity::Quantity;
 use crate::table::read::{pressure_pa, read_notes, require};
 use crate::table::reference;
+use crate::table::rows_to_lines::{ETA_RANGE, MAX_PRESSURE_RATIO};
 use crate::table::sheet::grid::Grid;
 use crate::table::sheet::layout;
 use crate::table::sheet::points::{Point, columns, efficiency_in_percent, points};
 use crate::table::sheet::workbook::grid_of_workbook;
+use mapper_core::unit_factors::{PA_PER_KPA, PERCENT};
 use mapper_core::{
     ImportError, ImportRemark, ImportedTurbine, MapDescription, MeasuredTurbinePoint, ReferenceState,
     TurbineMap, TurbineMapPoint,
@@ -35,8 +37,10 @@ pub fn read_turbine_workbook(
     read(&grid_of_workbook(bytes, description.sheet.as_deref())?, description)
 }
 
-/// Maximum speed parameter; larger values are corrected speeds. 200 krpm at 1000 K is 6300 rpm/K^0.5, and no map ends at 10 krpm.
+/// Maximum speed parameter, rpm/K^0.5; larger values are corrected speeds. Bound: 200 krpm at 1000 K is 6300 rpm/K^0.5, and no map ends at 10 krpm.
 const MAX_SPEED_PARAMETER: f64 = 10_000.0;
+/// Maximum flow parameter, kg K^0.5/(s kPa). Bound: a nozzle of air passes 0.0404 through each 10 cm2; 10 would be a throat of 2500 cm2.
+const MAX_FLOW_PARAMETER: f64 = 10.0;
 
 fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedTurbine, ImportError> {
     let described = DescribedColumns::of(description, Machine::Turbine)?;
@@ -128,8 +132,9 @@ fn row(
     let speed = needed(speed_of(point), Quantity::Speed)?;
     let is_parameter = speed_is_reduced || value(Quantity::ReducedSpeed).is_some();
     let flow = value(Quantity::TurbineFlow).or(value(Quantity::Flow));
-    let corrected_flow = flow.map(|kg_s| kg_s * root / (reference.p_ref_pa / 1000.0));
-    let efficiency = value(Quantity::Efficiency).map(|eta| if in_percent { 0.01 * eta } else { eta });
+    let corrected_flow = flow.map(|kg_s| kg_s * root / (reference.p_ref_pa / PA_PER_KPA));
+    let efficiency =
+        value(Quantity::Efficiency).map(|eta| if in_percent { 1.0 / PERCENT * eta } else { eta });
     let row = TurbineMapPoint {
         vane_position: value(Quantity::Vane).or(point.vane),
         speed_parameter_rpm_sqrt_k: if is_parameter { speed } else { speed / root },
@@ -181,7 +186,7 @@ pub fn reduced_turbine_point(point: &MeasuredTurbinePoint) -> TurbineMapPoint {
     TurbineMapPoint {
         vane_position: point.vane_position,
         speed_parameter_rpm_sqrt_k: point.speed_rpm / root,
-        flow_parameter_kg_sqrt_k_s_kpa: point.flow_kg_s * root / (point.p3_pa / 1000.0),
+        flow_parameter_kg_sqrt_k_s_kpa: point.flow_kg_s * root / (point.p3_pa / PA_PER_KPA),
         expansion_ratio,
         efficiency: point.t4_k.map(efficiency).filter(|eta| eta.is_finite()),
     }
@@ -197,15 +202,19 @@ fn check(line: usize, row: TurbineMapPoint) -> Result<TurbineMapPoint, ImportErr
             row.speed_parameter_rpm_sqrt_k > 0.0 && row.speed_parameter_rpm_sqrt_k < MAX_SPEED_PARAMETER,
             "above 0, below 10 000 rpm/K^0.5",
         ),
-        // A nozzle of air passes 0.0404 kg K^0.5/(s kPa) through each 10 cm2: 10 would be a throat of 2500 cm2.
-        ("flow parameter", flow, flow > 0.0 && flow < 10.0, "above 0, below 10 kg K^0.5/(s kPa)"),
+        (
+            "flow parameter",
+            flow,
+            flow > 0.0 && flow < MAX_FLOW_PARAMETER,
+            "above 0, below 10 kg K^0.5/(s kPa)",
+        ),
         (
             "expansion ratio",
             row.expansion_ratio,
-            row.expansion_ratio > 1.0 && row.expansion_ratio < 50.0,
+            row.expansion_ratio > 1.0 && row.expansion_ratio < MAX_PRESSURE_RATIO,
             "above 1, below 50",
         ),
-        ("efficiency", eta, (-5.0..=1.5).contains(&eta), "a fraction (0.72), not a percentage"),
+        ("efficiency", eta, ETA_RANGE.contains(&eta), "a fraction (0.72), not a percentage"),
     ] {
         if !(value.is_finite() && good) {
             return Err(ImportError::Value { line, quantity, value, needed });

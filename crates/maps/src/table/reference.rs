@@ -48,9 +48,14 @@ pub fn resolve_reference(
     }
 }
 
+/// Difference of two temperatures that are equal as printed, K. Bound: half of the last digit of `298.2`.
+const SAME_K: f64 = 0.05;
+/// Difference of two pressures that are equal as printed, Pa. Bound: some digits of `101.3 kPa`, which is 101.325.
+const SAME_PA: f64 = 20.0;
+
 /// Equal within the rounding of printed digits.
 fn equal_as_printed(a: ReferenceState, b: ReferenceState) -> bool {
-    (a.t_ref_k - b.t_ref_k).abs() < 0.05 && (a.p_ref_pa - b.p_ref_pa).abs() < 20.0
+    (a.t_ref_k - b.t_ref_k).abs() < SAME_K && (a.p_ref_pa - b.p_ref_pa).abs() < SAME_PA
 }
 
 #[cfg(test)]

@@ -7,15 +7,24 @@ use mapper_core::{
 };
 use mapper_numerics::statistics::range;
 use mapper_physics::compressor_map::characteristic::{MIN_TOP_SPEED_RPM, max_flow_kg_s};
+use std::ops::RangeInclusive;
 
-/// Maximum number of points.
+/// Maximum number of points. Bound: memory; a map has some hundred.
 pub const MAX_POINTS: usize = 100_000;
 
-/// Minimum pressure ratio of a compressor's map, far beyond choke: half the inlet pressure is that of a choked pipe.
+/// Minimum pressure ratio of a compressor's map, far beyond choke. Bound: half the inlet pressure is that of a choked pipe.
 const MIN_PRESSURE_RATIO: f64 = 0.5;
 
-/// Maximum relative difference of speed within a line: it varies by 1 %, and lines of maps are at least 5 % apart.
+/// Maximum relative difference of speed within a line. Bound: it varies by 1 %, and lines of maps are at least 5 % apart.
 const MAX_LINE_SPEED_DIFFERENCE_RATIO: f64 = 0.015;
+/// Range of a corrected speed, rpm. Bound: no wheel turns outside it; relative speeds are below 1.
+const SPEED_RANGE_RPM: RangeInclusive<f64> = 1.0..=2e6;
+/// Maximum corrected flow, kg/s. Bound: ten times that of the largest compressors.
+const MAX_FLOW_KG_S: f64 = 1e4;
+/// Maximum pressure ratio of a stage or a whole machine. Bound: the largest have about forty.
+pub(crate) const MAX_PRESSURE_RATIO: f64 = 50.0;
+/// Range of an efficiency. Bound: apparent ones of hot or idle machines are far from 0 to 1; percentages are larger.
+pub(crate) const ETA_RANGE: RangeInclusive<f64> = -5.0..=1.5;
 
 /// The four numbers that every map has for a point.
 #[derive(Debug, Clone, Copy)]
@@ -43,25 +52,25 @@ impl Row {
             (
                 "corrected speed",
                 self.speed_corrected_rpm,
-                (1.0..=2e6).contains(&self.speed_corrected_rpm),
+                SPEED_RANGE_RPM.contains(&self.speed_corrected_rpm),
                 "between 1 and 2e6 rpm",
             ),
             (
                 "corrected flow",
                 self.flow_corrected_kg_s,
-                self.flow_corrected_kg_s > 0.0 && self.flow_corrected_kg_s < 1e4,
+                self.flow_corrected_kg_s > 0.0 && self.flow_corrected_kg_s < MAX_FLOW_KG_S,
                 positive,
             ),
             (
                 "pressure ratio",
                 self.pressure_ratio,
-                self.pressure_ratio > 0.0 && self.pressure_ratio < 50.0,
+                self.pressure_ratio > 0.0 && self.pressure_ratio < MAX_PRESSURE_RATIO,
                 "above 0, below 50",
             ),
             (
                 "efficiency",
                 self.eta.unwrap_or(0.5),
-                self.eta.is_none_or(|eta| (-5.0..=1.5).contains(&eta)),
+                self.eta.is_none_or(|eta| ETA_RANGE.contains(&eta)),
                 "a fraction (0.72), not a percentage; leave the cell of a missing value empty",
             ),
         ] {

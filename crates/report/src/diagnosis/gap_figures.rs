@@ -6,7 +6,6 @@ use mapper_chart::palette::{self, Colour};
 use mapper_chart::{Axis, Figure, Line, Panel, Scatter};
 use mapper_core::{Channel, step_number};
 use mapper_diagnose::gap::Diagnosed;
-use mapper_diagnose::gap::OUTPUTS;
 use mapper_diagnose::gap::Study;
 use mapper_numerics::statistics::{mean, rms};
 
@@ -59,7 +58,7 @@ fn place_on_map(study: &Study, step: usize) -> Option<(f64, f64)> {
 
 /// Root mean square of the whitened residual of each step and channel, on a ground that shows its size.
 pub(crate) fn heat_table(diagnosed: &Diagnosed, caption: &str, residual: &[f64]) -> Table {
-    let heads = ["step".to_owned()].into_iter().chain(OUTPUTS.iter().map(ToString::to_string));
+    let heads = ["step".to_owned()].into_iter().chain(Study::OUTPUTS.iter().map(ToString::to_string));
     let mut table = Table::new(heads).caption(caption);
     for step in 0..diagnosed.study.steps.len() {
         let cell = |output: usize| {
@@ -70,7 +69,7 @@ pub(crate) fn heat_table(diagnosed: &Diagnosed, caption: &str, residual: &[f64])
             Cell::number(format!("{rms:.1}"), rms).heat(rms.max(1.0).ln() / 30f64.ln())
         };
         let number = Cell::number(step_number(step).to_string(), step as f64);
-        table.row_of_step(None, [number].into_iter().chain((0..OUTPUTS.len()).map(cell)).collect());
+        table.row_of_step(None, [number].into_iter().chain((0..Study::OUTPUTS.len()).map(cell)).collect());
     }
     table
 }
@@ -82,10 +81,10 @@ pub(crate) fn traces(diagnosed: &Diagnosed) -> Vec<Figure> {
         let groups = diagnosed.study.groups.iter().filter(|g| g.output == output);
         groups.flat_map(|g| &diagnosed.without_cause.1[g.rows.clone()]).map(|r| r * r).sum::<f64>()
     };
-    let mut order: Vec<usize> = (0..OUTPUTS.len()).collect();
+    let mut order: Vec<usize> = (0..Study::OUTPUTS.len()).collect();
     order.sort_by(|a, b| energy(*b).total_cmp(&energy(*a)));
     let picture = |output: usize| {
-        let channel = OUTPUTS[output];
+        let channel = Study::OUTPUTS[output];
         let (scale, unit) = display_scale(channel.unit());
         let points = |values: &[f64]| {
             let of_output = diagnosed.study.groups.iter().filter(|g| g.output == output);

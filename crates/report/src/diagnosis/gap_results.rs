@@ -7,7 +7,7 @@ use crate::formatting::{display_scale, four_figures, with_margins};
 use mapper_core::{Margins, with_unit};
 use mapper_diagnose::gap::Diagnosis;
 use mapper_diagnose::gap::ForecastCheck;
-use mapper_diagnose::gap::{CorrectedMap, NEEDED_PROBABILITY, NotCorrected, PointCorrection};
+use mapper_diagnose::gap::{CorrectedMap, NotCorrected, PointCorrection};
 use mapper_diagnose::gap::{Over, Persistence, Value};
 
 /// Each recording's headline, then each cause over all of them.
@@ -147,7 +147,7 @@ fn consequence(points: &[PointCorrection]) -> Option<String> {
 }
 
 fn refusal(refused: &NotCorrected) -> String {
-    let needed = 100.0 * NEEDED_PROBABILITY;
+    let needed = 100.0 * CorrectedMap::NEEDED_PROBABILITY;
     match refused {
         NotCorrected::NoCause => "the diagnosis names no cause of its library".to_owned(),
         NotCorrected::Improbable { probability } => {

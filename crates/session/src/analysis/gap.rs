@@ -13,7 +13,7 @@ use mapper_core::{IdentifiedPoint, Method, Recording, ResultRemark, StepMarker};
 use mapper_diagnose::gap;
 use mapper_diagnose::gap::{
     BaselineRecording, Calibration, ClosureSearch, CorrectedMap, Correction, Diagnosed, Expected,
-    ForecastCheck, Found, GapRequest, GapWarning, RigRecording, check_forecast, forecast_steps,
+    ForecastCheck, Found, GapRequest, GapWarning, RigRecording,
 };
 use mapper_identify::IdentifyConfig;
 use mapper_observe::FusedChannel;
@@ -122,7 +122,7 @@ impl Session<'_> {
     ) -> Result<ForecastCheck, SessionError> {
         let (recording, _) = fused(recorded, campaign, map)?;
         let calibration = Calibration::shipped().map_err(SessionError::Calibration)?;
-        Ok(check_forecast(&recording, effects, found, &calibration)?)
+        Ok(ForecastCheck::new(&recording, effects, found, &calibration)?)
     }
 
     /// Expected readings of the diagnosed machine at the end of each planned step of a campaign.
@@ -149,7 +149,7 @@ impl Session<'_> {
         });
         let planned = Recording { steps: steps.collect(), ..Recording::default() };
         let rig = of_rig(planned, model, identification_with(campaign, map), campaign);
-        Ok(forecast_steps(rig, effects, found)?)
+        Ok(found.forecast(rig, effects)?)
     }
 }
 

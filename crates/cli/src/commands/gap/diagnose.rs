@@ -6,7 +6,7 @@ use crate::output::failure::{Code, Failure};
 use crate::output::standard_output::Replace;
 use crate::output::{output_options, standard_output};
 use clap::Args;
-use mapper_diagnose::gap::{Calibration, ClosureTerm, Diagnosed, over_recordings};
+use mapper_diagnose::gap::{Calibration, ClosureTerm, Diagnosed, Over};
 use mapper_report::{Describe, Document, compared_recordings, headline, with_messages};
 use mapper_session::{
     DIAGNOSIS_FORMAT, Gap, Recorded, Session, SessionError, SessionEvent, check_all_distinct,
@@ -96,7 +96,7 @@ impl Diagnose {
             };
         }
         let diagnosed: Vec<&Diagnosed> = gaps.iter().map(|(_, gap)| &gap.diagnosed).collect();
-        let over = over_recordings(&diagnosed, &Calibration::shipped().map_err(SessionError::Calibration)?);
+        let over = Over::recordings(&diagnosed, &Calibration::shipped().map_err(SessionError::Calibration)?);
         if self.json {
             let each: Result<Vec<Value>, Failure> = gaps
                 .iter()

@@ -7,6 +7,9 @@ use crate::gap::residuals::nuisance::RESPONSES_S;
 use crate::gap::residuals::study::Study;
 use crate::gap::residuals::whiten::{Linearised, dot, rows_of_step};
 
+/// Length of a direction that counts as none, in sigmas. Bound: rounding of the orthogonalisation.
+const NO_LENGTH: f64 = 1e-6;
+
 /// Residual of a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Adequacy {
@@ -26,7 +29,7 @@ impl Adequacy {
 }
 
 /// Energy of a whitened residual in each group's smooth basis.
-pub fn smooth_energies(study: &Study, linearised: &Linearised, residual: &[f64]) -> Vec<f64> {
+pub(crate) fn smooth_energies(study: &Study, linearised: &Linearised, residual: &[f64]) -> Vec<f64> {
     study
         .groups
         .iter()
@@ -47,7 +50,7 @@ pub fn smooth_energies(study: &Study, linearised: &Linearised, residual: &[f64])
                     }
                 }
                 let length = dot(&direction, &direction).sqrt();
-                if length > 1e-6 {
+                if length > NO_LENGTH {
                     directions.push(direction.into_iter().map(|d| d / length).collect());
                 }
             }
@@ -57,7 +60,7 @@ pub fn smooth_energies(study: &Study, linearised: &Linearised, residual: &[f64])
 }
 
 /// Evaluates the residual of a fit on all steps.
-pub fn adequacy(study: &Study, linearised: &Linearised, fit: &Fit) -> Adequacy {
+pub(crate) fn adequacy(study: &Study, linearised: &Linearised, fit: &Fit) -> Adequacy {
     let energies = smooth_energies(study, linearised, &fit.residual);
     let expected: f64 = study.groups.iter().map(|group| RESPONSES_S.len().min(group.rows.len()) as f64).sum();
     let smooth_excess = energies.iter().sum::<f64>() - expected;
@@ -81,7 +84,7 @@ pub fn adequacy(study: &Study, linearised: &Linearised, fit: &Fit) -> Adequacy {
 }
 
 /// Misfit of each step: `(|r|^2 - n)/n`.
-pub fn misfit_of_steps(study: &Study, residual: &[f64]) -> Vec<f64> {
+pub(crate) fn misfit_of_steps(study: &Study, residual: &[f64]) -> Vec<f64> {
     (0..study.steps.len())
         .map(|step| {
             let rows = rows_of_step(study, step);

@@ -6,9 +6,18 @@ use mapper_physics::rig::effect::{Effect, EffectInfo, EffectParameter};
 use nalgebra::DVector;
 use std::sync::Arc;
 
+/// Ratio of the ends of a range above which a parameter is searched by its logarithm. Bound: it spans more than a decade.
+const LOGARITHMIC_RATIO: f64 = 20.0;
+/// Minimum scale. Bound: avoids a division by zero.
+const MIN_SCALE: f64 = 1e-12;
+/// Minimum value of a logarithm's argument. Bound: the smallest normal number.
+const MIN_ARGUMENT: f64 = 1e-300;
+/// Difference between coordinates that count as one. Bound: rounding.
+const SAME: f64 = 1e-9;
+
 /// Search coordinate of a parameter: its value in typical steps, or its logarithm if it spans decades.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Coordinate {
+pub(crate) struct Coordinate {
     pub(crate) low: f64,
     pub(crate) high: f64,
     scale: f64,
@@ -17,24 +26,24 @@ pub struct Coordinate {
 
 impl Coordinate {
     /// The coordinate of a parameter.
-    pub fn new(parameter: &EffectParameter) -> Self {
-        let logarithmic = parameter.low > 0.0 && parameter.high / parameter.low > 20.0;
-        let scale = if logarithmic { 1.0 } else { parameter.typical_step.abs().max(1e-12) };
+    pub(crate) fn new(parameter: &EffectParameter) -> Self {
+        let logarithmic = parameter.low > 0.0 && parameter.high / parameter.low > LOGARITHMIC_RATIO;
+        let scale = if logarithmic { 1.0 } else { parameter.typical_step.abs().max(MIN_SCALE) };
         Coordinate { low: parameter.low, high: parameter.high, scale, logarithmic }
     }
 
     /// Whether it is the parameter's logarithm.
-    pub fn is_logarithmic(&self) -> bool {
+    pub(crate) fn is_logarithmic(&self) -> bool {
         self.logarithmic
     }
 
     /// Coordinate of a value.
-    pub fn of(&self, value: f64) -> f64 {
-        if self.logarithmic { value.max(1e-300).ln() } else { value / self.scale }
+    pub(crate) fn of(&self, value: f64) -> f64 {
+        if self.logarithmic { value.max(MIN_ARGUMENT).ln() } else { value / self.scale }
     }
 
     /// Coordinates of the ends of the parameter's range, the lower one first.
-    pub fn ends(&self) -> (f64, f64) {
+    pub(crate) fn ends(&self) -> (f64, f64) {
         let ends = (self.of(self.low), self.of(self.high));
         (ends.0.min(ends.1), ends.0.max(ends.1))
     }
@@ -46,16 +55,16 @@ impl Coordinate {
     }
 
     /// A value at this distance from another one, on the side that is within the range, and the coordinate's change.
-    pub fn next_to(&self, value: f64, distance: f64) -> (f64, f64) {
+    pub(crate) fn next_to(&self, value: f64, distance: f64) -> (f64, f64) {
         let at = self.of(value);
-        let is_in_range = |x: &f64| (self.of(self.value(*x)) - x).abs() < 1e-9;
+        let is_in_range = |x: &f64| (self.of(self.value(*x)) - x).abs() < SAME;
         let away = [at + distance, at - distance].into_iter().find(is_in_range).unwrap_or(at - distance);
         let moved = self.value(away);
         (moved, self.of(moved) - at)
     }
 
     /// Value of a coordinate, within the parameter's range.
-    pub fn value(&self, coordinate: f64) -> f64 {
+    pub(crate) fn value(&self, coordinate: f64) -> f64 {
         let value = if self.logarithmic { coordinate.exp() } else { coordinate * self.scale };
         value.clamp(self.low, self.high)
     }
@@ -75,12 +84,12 @@ pub(crate) fn infos<'a>(
 }
 
 /// Coordinates of all parameters of a hypothesis' effects, in order.
-pub fn coordinates(effects: &[Arc<dyn Effect>], hypothesis: &Hypothesis) -> Vec<Coordinate> {
+pub(crate) fn coordinates(effects: &[Arc<dyn Effect>], hypothesis: &Hypothesis) -> Vec<Coordinate> {
     infos(effects, hypothesis).flat_map(|info| &info.parameters).map(Coordinate::new).collect()
 }
 
 /// Values of all effects' parameters, in order.
-pub fn parameters(hypothesis: &Hypothesis) -> Vec<f64> {
+pub(crate) fn parameters(hypothesis: &Hypothesis) -> Vec<f64> {
     hypothesis.effects.iter().flat_map(|(_, values)| values.iter().copied()).collect()
 }
 

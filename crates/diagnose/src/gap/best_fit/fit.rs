@@ -42,7 +42,7 @@ pub struct Fit {
 
 /// Limits of a fit.
 #[derive(Debug, Clone, Copy)]
-pub struct Effort {
+pub(crate) struct Effort {
     /// Maximum number of iterations.
     pub iterations: usize,
     /// Minimum predicted decrease of the cost for another iteration.
@@ -58,7 +58,7 @@ pub struct Effort {
 
 impl Effort {
     /// Maximum size of a nuisance, in sigmas.
-    pub fn max_sigmas_of(&self, kind: NuisanceKind) -> f64 {
+    pub(crate) fn max_sigmas_of(&self, kind: NuisanceKind) -> f64 {
         if kind.is_of_rig() { self.max_sigmas.min(self.max_sigmas_of_rig) } else { self.max_sigmas }
     }
 }
@@ -72,7 +72,7 @@ impl Default for Effort {
 
 /// Start of a fit.
 #[derive(Debug, Clone)]
-pub struct Start {
+pub(crate) struct Start {
     /// Nuisances and effects.
     pub hypothesis: Hypothesis,
     /// Their prediction; `None` if the model has not been run there.
@@ -83,7 +83,7 @@ pub struct Start {
 
 /// Whitened change due to an effect. The thousands of starts of a search share changes.
 #[derive(Debug, Clone)]
-pub struct Column {
+pub(crate) struct Column {
     /// Whitened change if the effect acts throughout.
     pub change: Arc<Vec<f64>>,
     /// Change of the effect's search coordinate that causes it.
@@ -106,7 +106,7 @@ impl Column {
     }
 
     /// The columns of a fit.
-    pub fn of(fit: &Fit) -> Vec<Column> {
+    pub(crate) fn of(fit: &Fit) -> Vec<Column> {
         let of_unit = |column: &Vec<f64>| {
             let change = Arc::new(column.clone());
             Column { change, units: 1.0, history: TimeHistory::THROUGHOUT }
@@ -135,7 +135,7 @@ impl From<&Fit> for Start {
 ///
 /// # Errors
 /// [`PredictError`] if the model cannot follow at the start itself.
-pub fn fit(
+pub(crate) fn fit(
     study: &Study,
     linearised: &Linearised,
     start: impl Into<Start>,
@@ -246,7 +246,7 @@ impl Objective<'_> {
 }
 
 /// Step of an effect's coordinate that is as nonlinear as one sigma of a nuisance: after a shorter step, most of the unpredicted change is due to the
-/// nuisances. Judgement: typical steps are some ten tolerances.
+/// nuisances. Bound: typical steps are some ten tolerances.
 const EQUIVALENT_STEP: f64 = 0.1;
 
 impl Model for Objective<'_> {
@@ -340,12 +340,12 @@ pub(crate) fn changes_near(
         .collect()
 }
 
-/// Maximum size of a nuisance, in declared sigmas: a larger deviation is not a tolerance.
-pub const MAX_SIGMAS: f64 = 6.0;
+/// Maximum size of a nuisance, in declared sigmas. Bound: a larger deviation is not a tolerance.
+pub(crate) const MAX_SIGMAS: f64 = 6.0;
 
 /// Refits only the initial state to the first step. Otherwise the unknown start temperature would count as a machine misfit of a held-out first
 /// step, a hundred times too large. Returns the fit unchanged if the misfit of the first step does not fall.
-pub fn with_start_read(study: &Study, linearised: &Linearised, fit: Fit) -> Fit {
+pub(crate) fn with_start_read(study: &Study, linearised: &Linearised, fit: Fit) -> Fit {
     let rows = [rows_of_step(study, 0)];
     let starts: Vec<usize> =
         study.nuisances.iter().enumerate().filter(|(_, n)| n.kind.is_start()).map(|(i, _)| i).collect();
@@ -369,11 +369,16 @@ pub fn with_start_read(study: &Study, linearised: &Linearised, fit: Fit) -> Fit 
     Fit { hypothesis: moved, prediction, residual, ..fit }
 }
 
+/// Effort of a fit of tolerances that imitate an effect. It runs the model, because they follow the nonlinearity of the effect. Bound: effort; the
+/// declared size already penalises tolerances, so their limit is wide.
+const IMITATION: Effort =
+    Effort { iterations: 5, enough: 0.5, max_sigmas: 60.0, max_sigmas_of_rig: 60.0, exact: true };
+
 /// Signature length of each of `effects` (indices into the study's effects, with values), given the others.
 ///
 /// # Errors
 /// [`PredictError`] if the model cannot follow the recording with these effects.
-pub fn lengths(
+pub(crate) fn lengths(
     study: &Study,
     linearised: &Linearised,
     effects: &EffectValues,
@@ -382,16 +387,12 @@ pub fn lengths(
     with.effects.clone_from(effects);
     let mut noise_free = study.clone();
     noise_free.measured = study.predict(&with)?.values;
-    // Uses model runs rather than a linearisation, because a tolerance that imitates the effect follows its nonlinearity. The declared size
-    // already penalises tolerances, so the bound is wide.
-    let effort =
-        Effort { iterations: 5, enough: 0.5, max_sigmas: 60.0, max_sigmas_of_rig: 60.0, exact: true };
     let everywhere = Selection::all(study);
     (0..effects.len())
         .map(|place| {
             let mut without = with.clone();
             without.effects.remove(place);
-            Ok(fit(&noise_free, linearised, &without, &everywhere, effort)?.cost.max(0.0).sqrt())
+            Ok(fit(&noise_free, linearised, &without, &everywhere, IMITATION)?.cost.max(0.0).sqrt())
         })
         .collect()
 }

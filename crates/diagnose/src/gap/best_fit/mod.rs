@@ -1,6 +1,6 @@
 //! The best fit of a hypothesis with its nuisances and priors, and tests whether its residual is noise.
 
-pub mod adequacy;
-pub mod coordinate;
-pub mod fit;
-pub mod normal;
+pub(crate) mod adequacy;
+pub(crate) mod coordinate;
+pub(crate) mod fit;
+pub(crate) mod normal;

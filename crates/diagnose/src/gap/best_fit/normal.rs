@@ -5,8 +5,10 @@ use crate::gap::residuals::whiten::{Linearised, dot, rows_of_step};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use std::ops::Range;
 
-/// Prior width of an effect's parameter, in typical steps.
-pub const PRIOR_STEPS: f64 = 10.0;
+/// Prior width of an effect's parameter, in typical steps. Bound: a step is clearly visible, and a part that differs by ten is broken.
+pub(crate) const PRIOR_STEPS: f64 = 10.0;
+/// Precision of a parameter without influence. Bound: keeps the equations solvable.
+const MIN_PRECISION: f64 = 1e-6;
 
 /// Products of the nuisance columns over the selected steps.
 pub(crate) fn nuisance_products(
@@ -43,8 +45,7 @@ pub(crate) fn normal_matrix(
             matrix[(n + l, n + j)] = product;
             matrix[(n + j, n + l)] = product;
         }
-        // Keeps the equations solvable if a parameter has no influence.
-        matrix[(n + j, n + j)] += 1e-6;
+        matrix[(n + j, n + j)] += MIN_PRECISION;
     }
     matrix
 }
@@ -151,25 +152,25 @@ impl<'a> Projector<'a> {
 
 /// Selected steps.
 #[derive(Debug, Clone)]
-pub struct Selection {
+pub(crate) struct Selection {
     /// Whether each step is selected.
     pub steps: Vec<bool>,
 }
 
 impl Selection {
     /// All steps.
-    pub fn all(study: &Study) -> Selection {
+    pub(crate) fn all(study: &Study) -> Selection {
         Selection { steps: vec![true; study.steps.len()] }
     }
 
     /// Rows of the selected steps.
-    pub fn rows(&self, study: &Study) -> Vec<Range<usize>> {
+    pub(crate) fn rows(&self, study: &Study) -> Vec<Range<usize>> {
         let counts = |step: &usize| self.steps.get(*step).copied().unwrap_or(false);
         (0..study.steps.len()).filter(counts).map(|step| rows_of_step(study, step)).collect()
     }
 }
 
 /// Scalar product over some rows.
-pub fn dot_over(rows: &[Range<usize>], a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn dot_over(rows: &[Range<usize>], a: &[f64], b: &[f64]) -> f64 {
     rows.iter().map(|range| dot(&a[range.clone()], &b[range.clone()])).sum()
 }

@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 /// Result of adding one more effect to a fit.
 #[derive(Debug)]
-pub struct Addition {
+pub(crate) struct Addition {
     /// Index of the effect.
     pub effect: usize,
     /// Linear estimate of the cost reduction.
@@ -23,12 +23,18 @@ pub struct Addition {
     pub start: Start,
 }
 
-/// Minimum start offset from neutral, as a share of a step: some effects have zero slope at neutral.
+/// Minimum start offset from neutral, as a share of a step. Bound: some effects have zero slope at neutral; the fit moves away
+/// from any start.
 const OFF_NEUTRAL: f64 = 0.1;
+/// Squared length of a change that counts as none. Bound: rounding of the projection.
+const NO_CHANGE: f64 = 1e-9;
+/// Places of the two starts in the range of a parameter, as shares. Bound: effort; thirds, the upper one slightly inside, because ranges end where
+/// models fail.
+const INNER_SHARES: [f64; 2] = [0.33, 0.6];
 
 /// Every further effect added to a fit, in closed form from one run each; effects with interacting parameters use several starts. For `onsets`
 /// the study's candidates with an onset, as if nothing before the onset changed and nothing persisted.
-pub fn additions(
+pub(crate) fn additions(
     study: &Study,
     linearised: &Linearised,
     selection: &Selection,
@@ -114,7 +120,7 @@ impl FitNeighbourhood<'_> {
     /// An effect with several parameters, from one of their values.
     fn at(&self, effect: usize, values: Vec<f64>) -> Option<Addition> {
         let (own, seen) = self.products(self.change(effect, values.clone())?.as_slice());
-        let gain = if own > 1e-9 && seen > 0.0 { seen * seen / own } else { 0.0 };
+        let gain = if own > NO_CHANGE && seen > 0.0 { seen * seen / own } else { 0.0 };
         Some(Addition { effect, gain, start: self.with(effect, values) })
     }
 
@@ -177,7 +183,7 @@ impl FitNeighbourhood<'_> {
         (own, seen): (f64, f64),
     ) -> Addition {
         let at = |share: f64| (parameter.neutral + share * step).clamp(parameter.low, parameter.high);
-        let wanted = if own > 1e-9 { (seen / own).clamp(-MAX_MOVE, MAX_MOVE) } else { 0.0 };
+        let wanted = if own > NO_CHANGE { (seen / own).clamp(-MAX_MOVE, MAX_MOVE) } else { 0.0 };
         let share = (at(wanted) - parameter.neutral) / step;
         let gain = 2.0 * share * seen - share * share * own;
         let off = if wanted < 0.0 { wanted.min(-OFF_NEUTRAL) } else { wanted.max(OFF_NEUTRAL) };
@@ -200,7 +206,7 @@ fn corners(parameters: &[EffectParameter]) -> Vec<Vec<f64>> {
     let places = |p: &EffectParameter| {
         let coordinate = Coordinate::new(p);
         let (low, high) = (coordinate.of(p.low), coordinate.of(p.high));
-        [0.33, 0.6].map(|share| coordinate.value(low + share * (high - low)))
+        INNER_SHARES.map(|share| coordinate.value(low + share * (high - low)))
     };
     let mut corners: Vec<Vec<f64>> = vec![Vec::new()];
     for parameter in parameters {

@@ -60,8 +60,12 @@ impl Calibration {
     /// Probability of an unmodelled cause, given smooth misfit and scatter of the best fit, in standard deviations.
     pub fn outside(&self, features: [f64; 2]) -> f64 {
         let [offset, slopes @ ..] = self.outside;
-        let x =
-            offset + slopes.iter().zip(logistic_features(features)).map(|(slope, x)| slope * x).sum::<f64>();
+        let x = offset
+            + slopes
+                .iter()
+                .zip(Calibration::logistic_features(features))
+                .map(|(slope, x)| slope * x)
+                .sum::<f64>();
         probability(x)
     }
 
@@ -72,13 +76,16 @@ impl Calibration {
     }
 }
 
-/// Upper limit of half the squared misfit, above which all misfits count as equally large.
+/// Upper limit of half the squared misfit, above which all misfits count as equally large. Bound: its logistic model is certain
+/// long before.
 const MAX: f64 = 500.0;
 
-/// Transforms the features of an unmodelled cause for its logistic model. Smooth misfit enters as half its square, the negative
-/// log-probability under noise. Scatter enters by order of magnitude: it grows with any cause, which linearised models follow only to a few per
-/// cent.
-pub fn logistic_features([smooth_sigma, scatter_sigma]: [f64; 2]) -> [f64; 2] {
-    let unlikely = 0.5 * smooth_sigma.max(0.0).powi(2);
-    [unlikely.min(MAX), scatter_sigma.max(0.0).asinh()]
+impl Calibration {
+    /// Transforms the features of an unmodelled cause for its logistic model. Smooth misfit enters as half its square, the negative
+    /// log-probability under noise. Scatter enters by order of magnitude: it grows with any cause, which linearised models follow only to a few per
+    /// cent.
+    pub fn logistic_features([smooth_sigma, scatter_sigma]: [f64; 2]) -> [f64; 2] {
+        let unlikely = 0.5 * smooth_sigma.max(0.0).powi(2);
+        [unlikely.min(MAX), scatter_sigma.max(0.0).asinh()]
+    }
 }

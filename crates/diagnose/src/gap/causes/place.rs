@@ -11,26 +11,30 @@ use crate::gap::findings::report::Place;
 use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::point_state::PointState;
 use crate::gap::residuals::study::{Study, members};
-use crate::gap::residuals::whiten::Linearised;
+use crate::gap::residuals::whiten::{Linearised, NO_ENERGY};
+use mapper_core::unit_factors::RPM_PER_KRPM;
 use mapper_inference::posterior::shares;
 use mapper_physics::rig::effect::Submodel;
 
 /// Linearisation error as a share of the gain: explanations closer than this remain open, and a part with less of the gap is not listed.
-pub const LINEARISATION_ERROR_RATIO: f64 = 0.01;
+/// Bound: derivatives from linear runs are within a per cent of those from runs of the model.
+pub(crate) const LINEARISATION_ERROR_RATIO: f64 = 0.01;
 
-/// Phases of a step: name and start after the jump, s.
+/// Phases of a step: name and start after the jump, s. Bound: those of probe, gas and housings; only shown.
 const PHASES: [(&str, f64); 3] = [("0-5 s", 0.0), ("5-30 s", 5.0), ("30-110 s", 30.0)];
+/// Positions on the speed line from which a point is near surge, and in the middle. Bound: only shown.
+const REGIONS: (f64, f64) = (0.97, 0.75);
 
 /// A fit with its reduction of the misfit of all steps.
 #[derive(Debug)]
-pub struct Gain<'a> {
+pub(crate) struct Gain<'a> {
     pub fit: &'a Fit,
     /// Null cost minus its own cost; scaled up proportionally for a fit to some of the steps.
     pub gain: f64,
 }
 
 /// Contribution of a machine part to an explanation.
-pub struct Part<'a> {
+pub(crate) struct Part<'a> {
     pub submodel: Submodel,
     /// Its additional misfit reduction given the other parts, squared sigmas.
     pub gain: f64,
@@ -39,20 +43,20 @@ pub struct Part<'a> {
 }
 
 /// An explanation of the gap, in one or several parts of the machine.
-pub struct Explanation<'a> {
+pub(crate) struct Explanation<'a> {
     /// Log evidence relative to no cause.
     pub score: f64,
     pub parts: Vec<Part<'a>>,
 }
 
 /// Cost of one more effect in log evidence: that of the first one.
-pub fn rarity(calibration: &Calibration, study: &Study) -> f64 {
+pub(crate) fn rarity(calibration: &Calibration, study: &Study) -> f64 {
     let prior = |effects: usize| prior_of_number(calibration, study.catalogue, effects);
     prior(0) - prior(1)
 }
 
 /// Converts fits to explanations. `fits` are effects and combinations, best first; `rarity`: see [`rarity`].
-pub fn of_fits<'a>(study: &'a Study, fits: &'a [Gain<'_>], rarity: f64) -> Vec<Explanation<'a>> {
+pub(crate) fn of_fits<'a>(study: &'a Study, fits: &'a [Gain<'_>], rarity: f64) -> Vec<Explanation<'a>> {
     let explanation = |candidate: &'a Gain<'_>| {
         let all = members(&candidate.fit.hypothesis);
         let parts = all.iter().map(|effect| {
@@ -72,7 +76,7 @@ pub fn of_fits<'a>(study: &'a Study, fits: &'a [Gain<'_>], rarity: f64) -> Vec<E
 }
 
 /// Change of the recording due to one effect of a fit.
-pub fn signature(study: &Study, fit: &Fit, effect: usize) -> Option<Vec<f64>> {
+pub(crate) fn signature(study: &Study, fit: &Fit, effect: usize) -> Option<Vec<f64>> {
     let mut without = fit.hypothesis.clone();
     without.effects.retain(|(index, _)| *index != effect);
     let there = study.predict(&without).ok()?;
@@ -81,7 +85,7 @@ pub fn signature(study: &Study, fit: &Fit, effect: usize) -> Option<Vec<f64>> {
 
 /// Locations of the gap, largest first. `fits` are single effects and pairs, best first; `named` is the number of the first ones that the data do not
 /// distinguish, if a cause is named.
-pub fn places(
+pub(crate) fn places(
     (study, calibration): (&Study, &Calibration),
     linearised: &Linearised,
     null: &Fit,
@@ -110,7 +114,7 @@ pub fn places(
 
 /// Locations of the gap from its explanations, largest first. Explanations within the share `bend` of the best gain remain open; `bend` is
 /// 0 if the best leaves only noise.
-pub fn places_of(
+pub(crate) fn places_of(
     study: &Study,
     linearised: &Linearised,
     null: &Fit,
@@ -174,7 +178,7 @@ struct Shown {
 fn show(study: &Study, linearised: &Linearised, signature: &[f64], points: &[PointState]) -> Option<Shown> {
     let mut whitened = signature.to_vec();
     linearised.whiten(study, &mut whitened);
-    if whitened.iter().map(|w| w * w).sum::<f64>() < 1e-6 {
+    if whitened.iter().map(|w| w * w).sum::<f64>() < NO_ENERGY {
         return None;
     }
     let energy = |keep: &dyn Fn(usize, usize, f64) -> bool| {
@@ -213,9 +217,9 @@ fn show(study: &Study, linearised: &Linearised, signature: &[f64], points: &[Poi
 /// Map region as text.
 fn region(point: &PointState) -> String {
     let side = match point.surge_position_ratio {
-        x if x > 0.97 => "near surge",
-        x if x > 0.75 => "middle of the speed line",
+        x if x > REGIONS.0 => "near surge",
+        x if x > REGIONS.1 => "middle of the speed line",
         _ => "towards choke",
     };
-    format!("{:.0} krpm, {side}", point.speed_rpm / 1000.0)
+    format!("{:.0} krpm, {side}", point.speed_rpm / RPM_PER_KRPM)
 }

@@ -30,6 +30,8 @@ pub(crate) struct Posterior {
 /// Prior share of causes that begin during the recording. Judgement: one in two hundred, because they are rare and can imitate other
 /// causes.
 const LATE_RATIO: f64 = 0.005;
+/// Minimum ratio of the numbers of sets of one effect more. Bound: avoids the logarithm of zero if a set has all effects.
+const MIN_SETS_RATIO: f64 = 0.1;
 
 /// Logarithm of the prior of a cause. Pairs are rarer than singles, and there are many pairs. Causes that begin during the recording are
 /// rarer still, and may begin with any step.
@@ -41,21 +43,22 @@ pub(crate) fn prior(calibration: &Calibration, study: &Study, hypothesis: &Hypot
 }
 
 /// Logarithm of the prior of one set of so many effects, of a library of `count`.
-pub fn prior_of_number(calibration: &Calibration, count: usize, effects: usize) -> f64 {
+pub(crate) fn prior_of_number(calibration: &Calibration, count: usize, effects: usize) -> f64 {
     let count = count.max(2) as f64;
     match effects {
         0 => calibration.prior_none.ln(),
         1 => (calibration.prior_single / count).ln(),
         2 => (calibration.prior_pair / (0.5 * count * (count - 1.0))).ln(),
         _ => {
-            let sets: f64 = (0..effects).map(|i| ((count - i as f64) / (i as f64 + 1.0)).max(0.1).ln()).sum();
+            let sets: f64 =
+                (0..effects).map(|i| ((count - i as f64) / (i as f64 + 1.0)).max(MIN_SETS_RATIO).ln()).sum();
             (effects - 2) as f64 * calibration.prior_triple.ln() - sets
         }
     }
 }
 
 /// Evidence of a fit, including its prior.
-pub fn weight(calibration: &Calibration, study: &Study, fit: &Fit) -> f64 {
+pub(crate) fn weight(calibration: &Calibration, study: &Study, fit: &Fit) -> f64 {
     fit.score + prior(calibration, study, &fit.hypothesis)
 }
 
@@ -134,7 +137,7 @@ fn onsets(study: &Study, fit: &Fit) -> BTreeMap<String, Onset> {
 
 /// Parameters of effects with 95 % intervals, computed in the search coordinate so that they stay within range. `covariance`: of the search
 /// coordinates, in order.
-pub fn estimates(
+pub(crate) fn estimates(
     calibration: &Calibration,
     effects: &[Arc<dyn Effect>],
     values: &EffectValues,
@@ -164,7 +167,7 @@ pub fn estimates(
 }
 
 /// Name of a parameter among those of all effects.
-pub fn name_of(info: &EffectInfo, parameter: &EffectParameter) -> String {
+pub(crate) fn name_of(info: &EffectInfo, parameter: &EffectParameter) -> String {
     if info.parameters.len() == 1 { info.id.to_string() } else { format!("{}.{}", info.id, parameter.name) }
 }
 

@@ -15,7 +15,7 @@ use mapper_inference::search::{Causes, Extension, Known, Limits, climb, extend};
 use mapper_numerics::least_squares::descent::ROUNDS;
 
 #[derive(Clone, Copy)]
-pub struct Search<'a> {
+pub(crate) struct Search<'a> {
     pub study: &'a Study,
     /// Linearised where the fits start: at the nominal model, or at the best fit so far.
     pub linearised: &'a Linearised,
@@ -27,28 +27,31 @@ pub struct Search<'a> {
     pub onsets: bool,
 }
 
-/// Judgement: limits the time. The slack is the evidence that a cause must have over no cause.
+/// Limits of the search. Bound: effort. The slack is the evidence that a cause must have over no cause.
 const LIMITS: Limits = Limits { members: MAX_MEMBERS, starts: 2, fits: 6, slack: 3.0 };
 /// Decrease of the cost by a single effect above which nuisances are linearised again at its fit: their derivatives differ there from those at the
-/// nominal point.
+/// nominal point. Bound: an effect of fewer than five sigmas bends them by less than their errors.
 const RELINEARISING_DECREASE: f64 = 30.0;
-/// Number of starts of single effects that are fitted, those with the largest linear gain, which misjudges strong effects. Judgement: limits
-/// the time.
+/// Number of starts of single effects that are fitted, those with the largest linear gain, which misjudges strong effects. Bound:
+/// effort; the library has three times as many.
 const SINGLES: usize = 26;
 /// Share of the misfit that a cause must remove to explain it in part, also on held-out steps. An additional effect that removes less probably imitates a
-/// cause outside the library, so the search does not extend that set.
-pub const MIN_GAP_REDUCTION: f64 = 0.5;
+/// cause outside the library, so the search does not extend that set. Source: "most" of the gap, a half.
+pub(crate) const MIN_GAP_REDUCTION: f64 = 0.5;
 
-/// Difference of the log evidence from the best above which a fit is not improved further: no linearisation changes it by so much.
-pub const MAX_EVIDENCE_DEFICIT: f64 = 60.0;
+/// Difference of the log evidence from the best above which a fit is not improved further. Bound: no linearisation changes it by so much.
+pub(crate) const MAX_EVIDENCE_DEFICIT: f64 = 60.0;
 
+/// Effort of fits that only select what to fit again. Bound: effort; three iterations order the effects.
 const QUICK: Effort =
     Effort { iterations: 3, enough: 1.0, max_sigmas: 3.0, max_sigmas_of_rig: 3.0, exact: false };
+/// Effort of fits of the search. Bound: effort; a decrease of 0.3 is small compared with the evidence that separates causes.
 const EFFORT: Effort =
     Effort { iterations: 6, enough: 0.3, max_sigmas: MAX_SIGMAS, max_sigmas_of_rig: MAX_SIGMAS, exact: true };
 
+/// Result of a search.
 #[derive(Debug)]
-pub struct SearchResult {
+pub(crate) struct SearchResult {
     /// Fit of tolerances alone.
     pub null: Fit,
     /// Fits of sets of effects, most probable first.
@@ -58,7 +61,7 @@ pub struct SearchResult {
 }
 
 /// Searches all effects of the library on the selected steps.
-pub fn search(search: Search<'_>, progress: &dyn Fn(f64, &str)) -> Result<SearchResult, PredictError> {
+pub(crate) fn search(search: Search<'_>, progress: &dyn Fn(f64, &str)) -> Result<SearchResult, PredictError> {
     let Search { study, selection, .. } = search;
     let mut null = fit(study, search.linearised, &study.nothing(), selection, Effort::default())?;
     // A fit ends too early if the derivatives of the tolerances changed; linearise them again there.
@@ -108,7 +111,7 @@ pub fn search(search: Search<'_>, progress: &dyn Fn(f64, &str)) -> Result<Search
 }
 
 /// Adds fits of sets with effects that begin with a step; see [`Study::add_onsets`].
-pub fn search_onsets(search: Search<'_>, null: &Fit, fits: &mut Vec<Fit>) {
+pub(crate) fn search_onsets(search: Search<'_>, null: &Fit, fits: &mut Vec<Fit>) {
     let mut known = Known::default();
     std::iter::once(null).chain(fits.iter()).for_each(|fit| known.keep(&search, fit.clone()));
     climb(&search, &mut known, fits.first().unwrap_or(null), LIMITS);
@@ -124,13 +127,13 @@ fn refit_best(search: &Search<'_>, known: &mut Known<Fit>, count: usize, within:
 }
 
 /// The first of these fits, and those that follow it with at most this difference of the log evidence.
-pub fn close(fits: &[Fit], within: f64) -> &[Fit] {
+pub(crate) fn close(fits: &[Fit], within: f64) -> &[Fit] {
     let behind = |fit: &Fit| fits[0].score - fit.score;
     &fits[..fits.iter().take_while(|fit| behind(fit) <= within).count()]
 }
 
 /// Fits these hypotheses again with new derivatives. Returns the more probable fit of each set, most probable first.
-pub fn refit(search: &Search<'_>, fits: &[&Fit], effort: Effort) -> Vec<Fit> {
+pub(crate) fn refit(search: &Search<'_>, fits: &[&Fit], effort: Effort) -> Vec<Fit> {
     let mut known = Known::default();
     let start = |fit: &Fit| Start { columns: Vec::new(), ..Start::from(fit) };
     let starts: Vec<(Start, Effort)> = fits.iter().map(|fit| (start(fit), effort)).collect();
@@ -139,7 +142,7 @@ pub fn refit(search: &Search<'_>, fits: &[&Fit], effort: Effort) -> Vec<Fit> {
 }
 
 /// The most probable fit of each set, most probable first.
-pub fn ranked<'a>(search: &Search<'_>, fits: impl Iterator<Item = &'a Fit>) -> Vec<Fit> {
+pub(crate) fn ranked<'a>(search: &Search<'_>, fits: impl Iterator<Item = &'a Fit>) -> Vec<Fit> {
     let mut known = Known::default();
     fits.for_each(|fit| known.keep(search, fit.clone()));
     known.ranked(search)
@@ -203,7 +206,7 @@ impl Causes for Search<'_> {
 
 /// Removes members of sets that the recording does not support: effects whose 95 % interval contains neutral, and onsets without evidence against the
 /// same effect throughout.
-pub fn supported(search: &Search<'_>, fits: Vec<Fit>) -> Vec<Fit> {
+pub(crate) fn supported(search: &Search<'_>, fits: Vec<Fit>) -> Vec<Fit> {
     let simpler = |fit: &Fit| -> Option<Fit> {
         let study = search.study;
         if fit.hypothesis.effects.len() > 1
@@ -264,5 +267,5 @@ fn all_effects_act(study: &Study, fitted: &Fit) -> bool {
     })
 }
 
-/// Distance from neutral, in typical steps, below which an effect is absent.
+/// Distance from neutral, in typical steps, below which an effect is absent. Bound: no recording shows a thousandth of a typical step.
 const NEUTRAL_STEPS: f64 = 1e-3;

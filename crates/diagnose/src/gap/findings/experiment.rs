@@ -1,5 +1,6 @@
 //! Experiments on the stand that distinguish candidate effects: a settled start, one step and, optionally, another sensor.
 
+use mapper_core::unit_factors::S_PER_MIN;
 use mapper_core::{Channel, OperatingPoint, Series};
 
 /// An allowed jump.
@@ -65,10 +66,14 @@ impl AtRest {
     pub const CHANNELS: [Channel; 3] = [Channel::T1, Channel::T2, Channel::Tc];
 }
 
-/// Lag of T3 and oil behind their setpoints on a usual stand, s; campaigns do not declare their own. Judgement: heaters follow within a minute.
+/// Lag of T3 and oil behind their setpoints on a usual stand, s; campaigns do not declare their own. Bound: heaters follow within a minute.
 const SETPOINT_LAG_S: f64 = 20.0;
-/// Time to mount a sensor, min.
+/// Time to mount a sensor, min. Bound: screwing a thermocouple into a prepared bore, and cooling.
 const MOUNTING_MIN: f64 = 30.0;
+/// Shortest time of an experiment, min. Bound: a jump and the settling of a probe.
+const MIN_MINUTES: f64 = 0.1;
+/// Difference between two speeds that count as one, as a ratio. Bound: controllers hold a few rpm.
+const SAME_SPEED_RATIO: f64 = 1e-3;
 
 impl Experiment {
     /// A jump without any other change.
@@ -81,14 +86,14 @@ impl Experiment {
         let mounting = if matches!(self.also, AlsoChanged::Sensor(_)) { MOUNTING_MIN } else { 0.0 };
         let at_work_s =
             if let AlsoChanged::Soak(soak) = self.also { soak.duration_s } else { self.jump.dwell_s };
-        (at_work_s / 60.0).max(0.1) + mounting
+        (at_work_s / S_PER_MIN).max(MIN_MINUTES) + mounting
     }
 
     /// Whether only the valve moves, at one speed.
-    pub fn is_valve_step(&self) -> bool {
+    pub(crate) fn is_valve_step(&self) -> bool {
         let AllowedJump { from, to, .. } = self.jump;
         self.also == AlsoChanged::Nothing
-            && (from.speed_rpm - to.speed_rpm).abs() < 1e-3 * from.speed_rpm.abs()
+            && (from.speed_rpm - to.speed_rpm).abs() < SAME_SPEED_RATIO * from.speed_rpm.abs()
             && from.valve_opening_ratio != to.valve_opening_ratio
     }
 

@@ -1,19 +1,20 @@
 //! Effect sizes as text in engineering terms.
 
+use mapper_core::unit_factors::{CM2_PER_M2, G_PER_KG, MM_PER_M, PERCENT};
 use mapper_core::with_unit;
 use mapper_physics::laws::turbine::at_150_krpm;
 use mapper_physics::rig::effect::EffectParameter;
 
 /// A parameter value as text: "+5 %" for a factor of 1.05, "370 W at 150 krpm" for friction.
-pub fn size(parameter: &EffectParameter, value: f64) -> String {
+pub(crate) fn size(parameter: &EffectParameter, value: f64) -> String {
     match parameter.unit.as_ref() {
         "1" if parameter.neutral == 1.0 => {
-            format!("{}{} %", sign(value - 1.0), figures(100.0 * (value - 1.0).abs()))
+            format!("{}{} %", sign(value - 1.0), figures(PERCENT * (value - 1.0).abs()))
         }
-        "1" => format!("{} %", figures(100.0 * value)),
-        "m" => format!("{} mm", figures(1e3 * value)),
-        "kg/kg" => format!("{} g/kg", figures(1e3 * value)),
-        "m2" => format!("{} cm2 of black surface", figures(1e4 * value)),
+        "1" => format!("{} %", figures(PERCENT * value)),
+        "m" => format!("{} mm", figures(MM_PER_M * value)),
+        "kg/kg" => format!("{} g/kg", figures(G_PER_KG * value)),
+        "m2" => format!("{} cm2 of black surface", figures(CM2_PER_M2 * value)),
         "W s2/rad2" => at_150_krpm(value),
         unit => with_unit(figures(value), unit),
     }

@@ -1,6 +1,6 @@
 //! The diagnosis report for programs, recommended experiments, and effect sizes in engineering terms.
 
-pub mod experiment;
+pub(crate) mod experiment;
 pub(crate) mod in_words;
-pub mod report;
-pub mod warning;
+pub(crate) mod report;
+pub(crate) mod warning;

@@ -4,6 +4,7 @@ use crate::gap::findings::experiment::{AlsoChanged, Experiment};
 use crate::gap::findings::warning::{GapWarning, OffsetAtRest};
 use crate::gap::model_error::baseline::Baseline;
 use mapper_core::probability_text;
+use mapper_core::unit_factors::PERCENT;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -409,13 +410,13 @@ pub struct Suggestion {
 
 impl Suggestion {
     /// Converts to a next step.
-    pub fn as_next(&self) -> Next {
+    pub(crate) fn as_next(&self) -> Next {
         if let Some(sensor) = &self.sensor {
             return Next::Sensor {
                 sensor: format!("a sensor for {sensor}"),
                 reason: format!(
                     "with it one jump answers {:.0} % of what is open between the first candidates",
-                    100.0 * self.entropy_drop_bit / self.entropy_bit.max(f64::MIN_POSITIVE)
+                    PERCENT * self.entropy_drop_bit / self.entropy_bit.max(f64::MIN_POSITIVE)
                 ),
             };
         }
@@ -436,12 +437,12 @@ impl Suggestion {
     }
 }
 
-/// Probability below which a cause other than the first is not listed: it would be shown as "<0.5 %".
+/// Probability below which a cause other than the first is not listed. Bound: it would be shown as "<0.5 %".
 pub(crate) const EXCLUDED: f64 = 0.005;
-/// Maximum number of candidates that are evaluated with refits: fits of the search, and experiments. Judgement: limits the time.
+/// Maximum number of candidates that are evaluated with refits: fits of the search, and experiments. Bound: effort.
 pub(crate) const MAX_REFITTED: usize = 7;
-/// Maximum number of alternatives to the first cause, and of experiments of one kind: a longer list does not help.
-pub const MAX_EQUIVALENT: usize = 2;
+/// Maximum number of alternatives to the first cause, and of experiments of one kind. Bound: a longer list does not help.
+pub(crate) const MAX_EQUIVALENT: usize = 2;
 
 impl Diagnosis {
     /// Causes to list: the first, and others that are not excluded.

@@ -10,6 +10,7 @@ use crate::gap::residuals::hypothesis::Hypothesis;
 use crate::gap::residuals::nuisance::{JUMP_S, NuisanceKind, OUTPUTS, nuisances};
 use crate::gap::residuals::study::{Group, PredictError, Study};
 use crate::gap::residuals::whiten::{Linearised, dot};
+use mapper_core::unit_factors::PA_PER_KPA;
 use mapper_core::{Channel, jump_ratio};
 use mapper_identify::LONGEST_BRIDGE_S;
 use mapper_numerics::least_squares::descent::ROUNDS;
@@ -224,8 +225,8 @@ pub(crate) fn same_steps(baseline: &Study, study: &Study) -> Result<(), Problem>
             }
         };
         // Model error hardly changes between points that count as one.
-        let (p3_kpa, opening) = (ours.p3_pa / 1e3, ours.valve_opening_ratio);
-        differs("commanded P3", theirs.p3_pa / 1e3, p3_kpa, "kPa", jump_ratio(Channel::P3) * p3_kpa)?;
+        let (p3_kpa, opening) = (ours.p3_pa / PA_PER_KPA, ours.valve_opening_ratio);
+        differs("commanded P3", theirs.p3_pa / PA_PER_KPA, p3_kpa, "kPa", jump_ratio(Channel::P3) * p3_kpa)?;
         differs(
             "opening of the valve",
             theirs.valve_opening_ratio,

@@ -9,16 +9,20 @@ use crate::gap::next_experiment::outlook::{
 };
 use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::study::Study;
+use mapper_core::unit_factors::{ICE_POINT_K, PERCENT, RPM_PER_KRPM, S_PER_MIN};
 use mapper_core::{Channel, OperatingPoint};
 use mapper_inference::interval::COVERAGE;
 use mapper_numerics::parallel;
 use mapper_physics::rig::effect::Submodel;
 
+/// Thousandths in 1, the decimals of a script. Source: a definition.
+const THOUSANDTHS: f64 = 1e3;
+
 /// Share of the open probability above which the first cause is settled.
-pub const SETTLED: f64 = COVERAGE;
+pub(crate) const SETTLED: f64 = COVERAGE;
 
 /// Open candidates, best first, with their probabilities.
-pub struct Rivals<'a> {
+pub(crate) struct Rivals<'a> {
     /// At least two fits; the first is the best.
     pub fits: Vec<&'a Fit>,
     /// One probability per fit.
@@ -27,7 +31,7 @@ pub struct Rivals<'a> {
 
 /// Suggested next step and the alternatives.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Suggested {
+pub(crate) struct Suggested {
     /// The first of `experiments`, or a sensor that the model does not include; `None` if no experiment helps.
     pub next: Option<Next>,
     /// Possible experiments, best first.
@@ -41,7 +45,12 @@ pub struct Suggested {
 /// refitted, and ranked by the expected share of the open question resolved per minute. Without allowed jumps, repeats of the
 /// recorded jumps are used. Unrecorded model channels are tried with the most promising jump. If no experiment resolves enough, the
 /// function names a sensor for the first candidate's part. `temperature` is the diagnosis'.
-pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[Experiment], temperature: f64) -> Suggested {
+pub(crate) fn next(
+    study: &Study,
+    mut rivals: Rivals<'_>,
+    allowed: &[Experiment],
+    temperature: f64,
+) -> Suggested {
     rivals.fits.truncate(1 + MAX_EQUIVALENT);
     rivals.probabilities.truncate(1 + MAX_EQUIVALENT);
     let Some(first) = rivals.fits.first() else { return Suggested::default() };
@@ -102,7 +111,7 @@ pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[Experiment], tempe
             reason: format!(
                 "none of the {} {among} steps resolves more than {:.0} % of the open question between the first candidates",
                 all.len(),
-                100.0 * most
+                PERCENT * most
             ),
         })
     });
@@ -136,14 +145,18 @@ fn suggestion(kind: Kind, experiment: &Experiment, odds: &Odds, open_bit: f64) -
 /// Sequence lines that run a step, or campaign lines that begin with a soak.
 fn script(experiment: &Experiment) -> Vec<String> {
     let place = |point: OperatingPoint| {
-        format!("point(\"{} krpm\", {})", round(point.speed_rpm / 1e3), round(point.valve_opening_ratio))
+        format!(
+            "point(\"{} krpm\", {})",
+            round(point.speed_rpm / RPM_PER_KRPM),
+            round(point.valve_opening_ratio)
+        )
     };
-    let celsius = |k: f64| round(k - 273.15);
+    let celsius = |k: f64| round(k - ICE_POINT_K);
     let AllowedJump { from, to, dwell_s, .. } = experiment.jump;
     let change = match experiment.also {
         AlsoChanged::Nothing | AlsoChanged::Sensor(_) => None,
         AlsoChanged::Soak(soak) => {
-            return vec![format!("zero: {{soak: {} min}}", round(soak.duration_s / 60.0))];
+            return vec![format!("zero: {{soak: {} min}}", round(soak.duration_s / S_PER_MIN))];
         }
         AlsoChanged::T3 { to_k, .. } => Some(format!("t3(\"{} degC\");", celsius(to_k))),
         AlsoChanged::Oil { to_k, .. } => Some(format!("oil(\"{} degC\");", celsius(to_k))),
@@ -155,11 +168,11 @@ fn script(experiment: &Experiment) -> Vec<String> {
 
 /// Rounds to three decimals and removes floating-point residue.
 fn round(value: f64) -> f64 {
-    (1e3 * value).round() / 1e3
+    (THOUSANDTHS * value).round() / THOUSANDTHS
 }
 
 /// Suggestion for a gap outside the effect library: a suspected effect, or a sensor for the part with most of the gap.
-pub fn sensor_near(places: &[Place]) -> Next {
+pub(crate) fn sensor_near(places: &[Place]) -> Next {
     let place = places.first();
     let part = place.and_then(|place| Submodel::ALL.into_iter().find(|part| part.name() == place.submodel));
     let (sensor, lies) = match part {

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, SymmetricEigen};
 
 /// Expected outcome of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Odds {
+pub(crate) struct Odds {
     /// Probability that the true cause reaches the requested share of the open causes' probability.
     pub settles: f64,
     /// Expected share of the true cause afterwards.
@@ -20,7 +20,7 @@ pub struct Odds {
 
 /// Forecast for causes of `probabilities` (any sum above 0), `separation` in squared sigmas (row: true, column: rival; the smaller direction of
 /// a pair counts). `temperature` divides log evidence, as in the diagnosis; `settled` is the requested share.
-pub fn odds(probabilities: &[f64], separation: &[Vec<f64>], temperature: f64, settled: f64) -> Odds {
+pub(crate) fn odds(probabilities: &[f64], separation: &[Vec<f64>], temperature: f64, settled: f64) -> Odds {
     let total: f64 = probabilities.iter().sum();
     let p: Vec<f64> = probabilities.iter().map(|p| p / total.max(f64::MIN_POSITIVE)).collect();
     let places = places(separation);
@@ -54,7 +54,7 @@ fn after(p: &[f64], places: &[Vec<f64>], reading: &[f64], temperature: f64) -> V
 }
 
 /// Entropy of probabilities, scaled to a sum of 1, bit.
-pub fn entropy_bit(probabilities: &[f64]) -> f64 {
+pub(crate) fn entropy_bit(probabilities: &[f64]) -> f64 {
     let total: f64 = probabilities.iter().sum();
     let shares = probabilities.iter().map(|p| p / total.max(f64::MIN_POSITIVE));
     -shares.filter(|p| *p > 0.0).map(|p| p * p.log2()).sum::<f64>()

@@ -21,12 +21,14 @@ use mapper_physics::simulation::steady::hold_speed;
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// Duration of the first step of a script, and maximum simulated time at a target, s. Judgement: housings settle within minutes.
+/// Duration of the first step of a script, and maximum simulated time at a target, s. Bound: housings settle within minutes.
 pub(crate) const SETTLED_HOUSINGS_S: f64 = 300.0;
+/// Minimum simulated time at a target, s. Bound: the probe settles within it.
+const MIN_DWELL_S: f64 = 10.0;
 
 /// The rig of a recording, for steps that are only simulated.
 #[derive(Debug, Clone)]
-pub struct SimulatedRig {
+pub(crate) struct SimulatedRig {
     /// Declared tolerances and noise.
     pub declared: Declared,
     /// The nominal machine.
@@ -79,7 +81,7 @@ pub(crate) fn simulated_steps(
 /// A study of a simulated experiment: the settled start, then the step. Effects that began in the recording act.
 fn simulated_experiment(recorded: &Study, experiment: &Experiment, interval_s: f64) -> Option<Study> {
     let jump = &experiment.jump;
-    let dwell_s = jump.dwell_s.clamp(10.0, SETTLED_HOUSINGS_S);
+    let dwell_s = jump.dwell_s.clamp(MIN_DWELL_S, SETTLED_HOUSINGS_S);
     let marker = |index: usize, from: f64, to: f64, p3_pa: f64, point: OperatingPoint| StepMarker {
         index,
         kind: StepKind::Repeat,
@@ -121,7 +123,7 @@ fn with_unknown_start(study: &Study, fit: &Fit) -> Hypothesis {
 }
 
 /// Separation of the predictions of each two candidates before a refit, in squared sigmas of the noise; `None` if the model cannot run the step.
-pub fn approximate_separation(
+pub(crate) fn approximate_separation(
     recorded: &Study,
     experiment: &Experiment,
     fits: &[&Fit],
@@ -147,7 +149,7 @@ pub fn approximate_separation(
 ///
 /// It is `D'D - D'J (L + J'J)^-1 J'D`, whitened, with the difference `D` of the predictions, the derivatives `J` of the prediction of `j` with respect to
 /// its nuisances and parameters, and their precision `L` from the recording.
-pub fn separation(recorded: &Study, experiment: &Experiment, fits: &[&Fit]) -> Option<Vec<Vec<f64>>> {
+pub(crate) fn separation(recorded: &Study, experiment: &Experiment, fits: &[&Fit]) -> Option<Vec<Vec<f64>>> {
     if let AlsoChanged::Soak(soak) = experiment.also {
         return apart_at_rest(recorded, &soak, fits);
     }
@@ -181,7 +183,7 @@ fn precision(study: &Study, fit: &Fit) -> DMatrix<f64> {
 }
 
 /// The recorded jumps, used if no others are declared as allowed.
-pub fn recorded_jumps(study: &Study, points: &[OperatingPoint]) -> Vec<AllowedJump> {
+pub(crate) fn recorded_jumps(study: &Study, points: &[OperatingPoint]) -> Vec<AllowedJump> {
     let pairs = study.steps.windows(2).zip(points.windows(2));
     pairs
         .map(|(steps, points)| AllowedJump {
@@ -195,7 +197,7 @@ pub fn recorded_jumps(study: &Study, points: &[OperatingPoint]) -> Vec<AllowedJu
 }
 
 /// Operating points at the end of the recorded steps, for a hypothesis.
-pub fn recorded_points(study: &Study, hypothesis: &Hypothesis) -> Vec<OperatingPoint> {
+pub(crate) fn recorded_points(study: &Study, hypothesis: &Hypothesis) -> Vec<OperatingPoint> {
     let points = study.points(hypothesis).unwrap_or_default();
     let steps = study.steps.iter().zip(points);
     steps

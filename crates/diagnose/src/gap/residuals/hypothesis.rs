@@ -3,7 +3,7 @@
 use mapper_inference::time_history::{Shape, TimeHistory};
 
 /// Effects with their values: indices of the candidates, and one value per parameter.
-pub type EffectValues = Vec<(usize, Vec<f64>)>;
+pub(crate) type EffectValues = Vec<(usize, Vec<f64>)>;
 
 /// A hypothesis: values of all nuisances and effects.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,7 +15,7 @@ pub struct Hypothesis {
 }
 
 /// Names of a hypothesis' effects, by index, in order.
-pub fn members(hypothesis: &Hypothesis) -> Vec<usize> {
+pub(crate) fn members(hypothesis: &Hypothesis) -> Vec<usize> {
     let mut members: Vec<usize> = hypothesis.effects.iter().map(|(index, _)| *index).collect();
     members.sort_unstable();
     members

@@ -2,10 +2,10 @@
 
 pub(crate) mod hypothesis;
 pub(crate) mod machine_run;
-pub mod nuisance;
+pub(crate) mod nuisance;
 pub(crate) mod point_state;
 pub(crate) mod prediction;
 pub(crate) mod shape;
-pub mod study;
-pub mod true_inputs;
-pub mod whiten;
+pub(crate) mod study;
+pub(crate) mod true_inputs;
+pub(crate) mod whiten;

@@ -11,13 +11,13 @@ use mapper_physics::rig::instruments::ChannelPath;
 use mapper_physics::rig::sensor_fault::gain_error;
 
 /// Outputs of the model that sensors measure, in the order of the residuals.
-pub const OUTPUTS: [Channel; 9] = {
+pub(crate) const OUTPUTS: [Channel; 9] = {
     let [n, p2, m_c, m_t, t2, tc, tt, t4] = channels::OUTPUTS;
     [n, m_c, p2, t2, tc, m_t, t4, tt, Channel::P3]
 };
 
 /// Start of the name of an offset; the channel follows.
-pub const OFFSET_PREFIX: &str = "offset of ";
+pub(crate) const OFFSET_PREFIX: &str = "offset of ";
 
 /// Kind of nuisance parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -98,14 +98,15 @@ impl Nuisance {
     }
 }
 
-/// Uncertainty of the turbine drop. Swirling, unmixed gas behind the turbine and bearing losses limit how well T4 gives the turbine's work.
+/// Uncertainty of the turbine drop. Swirling, unmixed gas behind the turbine and bearing losses limit how well T4 gives the turbine's work. Judgement: a few per cent are
+/// reported for probes close behind the wheel.
 const TURBINE_DROP_RATIO: f64 = 0.03;
-/// Clocks of one rig agree within a fraction of a sample, s.
+/// Uncertainty of the delay of a sensor, s. Bound: clocks of one rig agree within a fraction of a sample.
 const DELAY_SIGMA_S: f64 = 0.02;
 
-/// Length of a jump, s: ten times the usual lag of P3 behind its command (0.3 s), after which 5e-5 of the jump is left.
+/// Length of a jump, s. Bound: ten times the usual lag of P3 behind its command (0.3 s), after which 5e-5 of the jump is left.
 pub(crate) const JUMP_S: f64 = 3.0;
-/// Time constants of the outputs after a jump, s: a step, and the ranges of probe, gas, housing and turbine housing.
+/// Time constants of the outputs after a jump, s. Bound: a step, and the ranges of probe, gas, housing and turbine housing.
 pub(crate) const RESPONSES_S: [f64; 5] = [f64::INFINITY, 5.0, 20.0, 60.0, 200.0];
 
 /// Declared share of an output's variation that the model's equations may miss.
@@ -119,7 +120,7 @@ pub(crate) fn structure_delay_s(declared: &Declared, output: usize) -> f64 {
 }
 
 /// All nuisances of a rig; undeclared ones are omitted.
-pub fn nuisances(declared: &Declared) -> Vec<Nuisance> {
+pub(crate) fn nuisances(declared: &Declared) -> Vec<Nuisance> {
     use NuisanceKind as K;
     let t = &declared.tolerances;
     let perturbation =
@@ -159,7 +160,7 @@ pub fn nuisances(declared: &Declared) -> Vec<Nuisance> {
 
 /// Operating circumstances that are not part of the rig.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Circumstances {
+pub(crate) struct Circumstances {
     /// Perturbations of the ambient temperature and the start, each in its unit.
     pub perturbations: Vec<(Perturbation, f64)>,
     /// Errors of the sensors of [`INPUT_CHANNELS`], in their order: without them, the inputs are those of the machine.
@@ -175,7 +176,7 @@ pub struct Circumstances {
 }
 
 /// Applies one nuisance of size `value` (in the unit of the changed quantity) to a rig.
-pub fn apply(
+pub(crate) fn apply(
     declared: &Declared,
     kind: NuisanceKind,
     value: f64,

@@ -10,7 +10,7 @@ use mapper_physics::simulation::model::{Outputs, State};
 
 /// Model state at the end of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct PointState {
+pub(crate) struct PointState {
     /// Shaft speed, rpm.
     pub speed_rpm: f64,
     /// Isentropic efficiency, fraction.

@@ -19,6 +19,9 @@ use mapper_physics::simulation::inputs::Inputs;
 use mapper_physics::simulation::model::{Outputs, PreparedModel, State};
 use std::sync::Arc;
 
+/// Time before the end of a part at which its last inputs are read, s. Bound: shorter than any sample, longer than rounding.
+const BEFORE_END_S: f64 = 1e-6;
+
 /// Steps with a constant rig.
 struct Segment {
     first: usize,
@@ -102,7 +105,7 @@ impl Study {
             done = until;
             // An instantaneous probe has no state until a slow probe replaces it.
             if rig.model.params.t2_probe_diameter_m == 0.0 && to_s.is_finite() {
-                let boundary = inputs.at(to_s - 1e-6);
+                let boundary = inputs.at(to_s - BEFORE_END_S);
                 ended.t2_tip_k = rig.model.prepare(&boundary).evaluate(&ended).t2_k;
             }
             state = Some(ended);

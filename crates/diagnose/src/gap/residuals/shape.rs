@@ -1,22 +1,29 @@
 //! Smooth deviations of an efficiency map: the allowed error of a measured map, in addition to its level.
 
 use mapper_core::ReferenceState;
+use mapper_core::unit_factors::RPM_PER_KRPM;
 use mapper_physics::compressor_map::characteristic::{CharacteristicPoint, CompressorCharacteristic};
 use std::sync::Arc;
 
-/// Bumps over corrected speed: their number, centre of the first, and width and spacing, 100 krpm.
+/// Number of bumps over corrected speed. Bound: from 50 to 150 krpm, the speeds of a map.
 const SPEEDS: usize = 6;
+/// Centre of the first bump over corrected speed, 100 krpm. Bound: the lowest speed of a map.
 const FIRST_SPEED: f64 = 0.5;
+/// Width and spacing of the bumps over corrected speed, 100 krpm. Bound: the distance of the speed lines of a map.
 const SPEED_WIDTH: f64 = 0.2;
-/// Number of bumps between the surge line (0) and choke (1), each as wide as their distance.
+/// Unit of the above, rpm. Source: a definition.
+const SPEED_UNIT_RPM: f64 = 100.0 * RPM_PER_KRPM;
+/// Distance from the first bump, in widths, beyond which all are negligible. Bound: e^-200, and no ratio may overflow.
+const MAX_WIDTHS: f64 = 20.0;
+/// Number of bumps between the surge line (0) and choke (1), each as wide as their distance. Bound: a speed line is measured at some five points.
 const WAYS: usize = 3;
 
 /// Number of basis functions.
-pub const SHAPES: usize = SPEEDS * WAYS;
+pub(crate) const SHAPES: usize = SPEEDS * WAYS;
 
 /// A map whose efficiency is multiplied by `1 + sum c_i phi_i(speed, place on the speed line)`.
 #[derive(Debug, Clone)]
-pub struct ShapedMap {
+pub(crate) struct ShapedMap {
     /// The declared map.
     pub inner: Arc<dyn CompressorCharacteristic>,
     /// Coefficients of the basis, ratios.
@@ -26,7 +33,7 @@ pub struct ShapedMap {
 /// Gaussian bumps, a fifth of the speed range and a third of a speed line wide. A deviation may rise and fall from one operating point to
 /// the next, and is smooth in between.
 fn basis(speed_corrected_rpm: f64, surge_position_ratio: f64) -> [f64; SHAPES] {
-    let speed = speed_corrected_rpm / 100_000.0;
+    let speed = speed_corrected_rpm / SPEED_UNIT_RPM;
     let position = surge_position_ratio.clamp(0.0, 1.0);
     let way = (1.0 - position * position).sqrt();
     let over_speed: [f64; SPEEDS] = bumps((speed - FIRST_SPEED) / SPEED_WIDTH);
@@ -37,8 +44,7 @@ fn basis(speed_corrected_rpm: f64, surge_position_ratio: f64) -> [f64; SHAPES] {
 /// `exp(-(x - i)^2 / 2)` for i = 0, 1, ... Each value follows from the one before by a ratio that falls by e, because exponentials dominate
 /// the computing time of a diagnosis.
 fn bumps<const N: usize>(widths_from_first: f64) -> [f64; N] {
-    // All bumps are negligible further away, and no ratio may overflow.
-    let x = widths_from_first.clamp(-20.0, 20.0);
+    let x = widths_from_first.clamp(-MAX_WIDTHS, MAX_WIDTHS);
     let (mut bump, mut ratio) = ((-0.5 * x * x).exp(), (x - 0.5).exp());
     std::array::from_fn(|_| {
         let here = bump;

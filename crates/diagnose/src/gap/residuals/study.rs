@@ -1,6 +1,6 @@
 //! One prepared recording: residual layout, whitening, and model predictions for any hypothesis.
 
-pub use crate::gap::residuals::hypothesis::{EffectValues, Hypothesis, members};
+pub(crate) use crate::gap::residuals::hypothesis::{EffectValues, Hypothesis, members};
 use crate::gap::residuals::hypothesis::{from_step, growing_from, onset_step};
 use crate::gap::residuals::machine_run::{MachineRun, acts_on_machine};
 use crate::gap::residuals::nuisance::{Circumstances, Nuisance, OUTPUTS, apply, nuisances};
@@ -111,20 +111,25 @@ pub struct Study {
     pub(crate) surroundings: OnceLock<SurroundingsHistory>,
 }
 
-/// The first step counts from this time before the first jump, s. The rig's earlier history is unknown, and the metal's start is fitted
-/// anyway.
+/// The first step counts from this time before the first jump, s. Bound: the rig's earlier history is unknown, and the
+/// metal's start is fitted anyway.
 const HOLD_S: f64 = 100.0;
+/// Time after the last reading until which inputs are prepared, s. Bound: an interval of samples.
+const AFTER_LAST_S: f64 = 0.1;
 
-/// Blocks of phases in which only the metal temperature changes.
+/// Blocks of phases in which only the metal temperature changes. Bound: a sixth of the time constant of a housing.
 const SLOW: Schedule =
     Schedule { first_s: 0.0, lengths_s: &[(f64::INFINITY, 10.0)], shortest_s: 0.0, shortest_ratio: 0.5 };
-/// Blocks after a jump: short while speed and probe settle.
+/// Blocks after a jump. Bound: each a fraction of the time since the jump, so that no block averages over what still settles.
 const AFTER_JUMP: Schedule = Schedule {
     lengths_s: &[(1.0, 0.2), (3.0, 0.5), (7.0, 2.0), (15.0, 4.0), (31.0, 8.0), (f64::INFINITY, 16.0)],
     ..SLOW
 };
 
 impl Study {
+    /// Compared channels, in the order of all outputs.
+    pub const OUTPUTS: [Channel; OUTPUTS.len()] = OUTPUTS;
+
     /// Prepares a recording whose campaign declares the actuator response.
     pub fn new(
         recording: &Recording,
@@ -138,7 +143,7 @@ impl Study {
     }
 
     /// Prepares a recording.
-    pub fn with_actuators(
+    pub(crate) fn with_actuators(
         recording: &Recording,
         table: Table,
         declared: Declared,
@@ -213,7 +218,7 @@ impl Study {
         }
         reads.sort_by(|a, b| a.0.total_cmp(&b.0));
         let start_s = reads.first().map_or(first_s, |(t_s, _)| *t_s) - 0.5;
-        let end_s = reads.last().map_or(start_s + 1.0, |(t_s, _)| t_s + 0.1);
+        let end_s = reads.last().map_or(start_s + 1.0, |(t_s, _)| t_s + AFTER_LAST_S);
         let jumps_s: Vec<f64> =
             times.starts_s.iter().zip(&steps).filter(|(_, step)| step.jumped).map(|(s, _)| *s).collect();
         let (times_s, places): (Vec<f64>, Vec<_>) = reads.into_iter().unzip();

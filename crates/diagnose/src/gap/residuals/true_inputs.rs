@@ -142,23 +142,28 @@ pub(crate) fn with_metal_held(model: &Model) -> Model {
     heavy
 }
 
-/// Time in which everything but the housings settles from an unknown state, s: several times the lag of a sheathed probe, the slowest part.
+/// Time in which everything but the housings settles from an unknown state, s. Bound: several times the lag of a sheathed probe, the slowest part.
 pub(crate) const SETTLING_S: f64 = 30.0;
-/// Rate above which the initial metal temperatures are not settled, K/s: some hundred times noise, and a tenth of that of a machine started
+/// Rate above which the initial metal temperatures are not settled, K/s. Bound: some hundred times noise, and a tenth of that of a machine started
 /// cold minutes ago.
 const RESTLESS_K_S: f64 = 0.05;
+/// Part of that time over which readings are averaged at its start and at its end. Bound: noise; the rest remains between the two.
+const AVERAGED_SHARE: f64 = 0.3;
+/// Distance of the two averages as a share of that time.
+const BETWEEN_SHARE: f64 = 1.0 - AVERAGED_SHARE;
 
 /// Whether the metal temperatures are steady when the first step of a recording begins.
 pub(crate) fn rested(table: &Table, start_s: f64) -> bool {
     [Channel::Tc, Channel::Tt].into_iter().all(|channel| {
         let Some(column) = table.column(channel) else { return true };
         let middle = |from_s: f64| {
-            let range = table.range(from_s, from_s + 0.3 * SETTLING_S);
+            let range = table.range(from_s, from_s + AVERAGED_SHARE * SETTLING_S);
             mean_reading(&column[range].iter().copied().filter(|v| v.is_finite()).collect::<Vec<_>>())
         };
-        let (Some(first), Some(last)) = (middle(start_s), middle(start_s + 0.7 * SETTLING_S)) else {
+        let (Some(first), Some(last)) = (middle(start_s), middle(start_s + BETWEEN_SHARE * SETTLING_S))
+        else {
             return true;
         };
-        (last - first).abs() < RESTLESS_K_S * 0.7 * SETTLING_S
+        (last - first).abs() < RESTLESS_K_S * BETWEEN_SHARE * SETTLING_S
     })
 }

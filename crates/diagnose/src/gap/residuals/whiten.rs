@@ -143,7 +143,7 @@ impl Linearised {
     }
 
     /// Whitens a vector in the residuals' layout, in place.
-    pub fn whiten(&self, study: &Study, values: &mut [f64]) {
+    pub(crate) fn whiten(&self, study: &Study, values: &mut [f64]) {
         for (group, factor) in study.groups.iter().zip(self.noise.factors.iter()) {
             factor.whiten(&mut values[group.rows.clone()]);
         }
@@ -155,7 +155,7 @@ impl Linearised {
     }
 
     /// Whitens values of one group, in place.
-    pub fn whiten_group(&self, group: usize, values: &mut [f64]) {
+    pub(crate) fn whiten_group(&self, group: usize, values: &mut [f64]) {
         self.noise.factors[group].whiten(values);
     }
 
@@ -218,7 +218,7 @@ pub(crate) fn nuisance_changes(
 }
 
 /// Rows of a step; its groups are contiguous.
-pub fn rows_of_step(study: &Study, step: usize) -> std::ops::Range<usize> {
+pub(crate) fn rows_of_step(study: &Study, step: usize) -> std::ops::Range<usize> {
     let mut of_step = study.groups.iter().filter(|group| group.step == step);
     let first = of_step.next().map_or(0..0, |group| group.rows.clone());
     of_step.fold(first, |all, group| all.start..group.rows.end)
@@ -239,15 +239,21 @@ fn products_of_step(study: &Study, columns: &[Vec<f64>], step: usize) -> DMatrix
 }
 
 /// Scalar product.
-pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
 /// Position on the speed line beyond which a jump runs along or across the surge line: flow and outlet pressure are then too sensitive to be
-/// used in it.
+/// used in it. Bound: the last fortieth, in which the slope of a speed line vanishes.
 pub(crate) const NEAR_SURGE: f64 = 0.975;
-/// Time after the last surge cycle in which no reading counts, s: its end is chaotic, and the shaft takes some seconds to recover.
+/// Time after the last surge cycle in which no reading counts, s. Bound: its end is chaotic, and the shaft takes some seconds to recover.
 const AFTER_SURGE_S: f64 = 15.0;
+/// Shortest time constant of noise, s. Bound: shorter than any sample interval, as white as none.
+const MIN_NOISE_S: f64 = 1e-3;
+/// Tenths of a millisecond in a second, to which times of blocks are compared. Source: a definition.
+const PER_TENTH_MS: f64 = 1e4;
+/// Squared length of a whitened signature that counts as none. Bound: a thousandth of a sigma over the whole recording.
+pub(crate) const NO_ENERGY: f64 = 1e-6;
 
 /// For each step, the time after its jump, s, in which flow and outlet pressure are uninformative, and that in which all readings are.
 fn lost_to_surge(study: &Study, nothing: &Hypothesis) -> Vec<(f64, f64)> {
@@ -287,7 +293,7 @@ fn covariances(
         })
         .collect();
     let colour = study.declared.noise_colour;
-    let noise = ColouredNoise::new(colour.first_order_share_ratio, colour.time_constant_s.max(1e-3));
+    let noise = ColouredNoise::new(colour.first_order_share_ratio, colour.time_constant_s.max(MIN_NOISE_S));
     let mut cache: BTreeMap<Vec<(usize, i64)>, DMatrix<f64>> = BTreeMap::new();
     study
         .groups
@@ -301,7 +307,7 @@ fn covariances(
             // Blocks with times equal to a tenth of a millisecond share one covariance.
             let key = blocks
                 .iter()
-                .map(|b| (b.samples.len(), ((b.mean_s - blocks[0].mean_s) * 1e4).round() as i64))
+                .map(|b| (b.samples.len(), ((b.mean_s - blocks[0].mean_s) * PER_TENTH_MS).round() as i64))
                 .collect::<Vec<_>>();
             let unit = cache.entry(key).or_insert_with(|| covariance_of_means(&times, noise));
             let sigma = study.declared.noise_sigma(OUTPUTS[group.output]);

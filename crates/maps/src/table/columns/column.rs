@@ -3,6 +3,7 @@
 use crate::table::columns::quantity::Quantity;
 use crate::table::columns::quantity_name::{is_turbine, quantity_of_name};
 use mapper_core::ReferenceState;
+use mapper_core::unit_factors::{G_PER_KG, PA_PER_KPA, PERCENT};
 use mapper_physics::gas::air::GAS_CONSTANT_J_KGK;
 use mapper_table::{
     ColumnName, Measured, Reference, Word, header_unit, is_dimensionless, is_reduced_unit, split_unit,
@@ -81,7 +82,7 @@ impl Column {
         let (t_ref_k, p_ref_pa) = (reference.t_ref_k, reference.p_ref_pa);
         match self.quantity {
             Quantity::ReducedSpeed => value * t_ref_k.sqrt(),
-            Quantity::ReducedFlow => value * (p_ref_pa / 1000.0) / t_ref_k.sqrt(),
+            Quantity::ReducedFlow => value * (p_ref_pa / PA_PER_KPA) / t_ref_k.sqrt(),
             Quantity::VolumeFlow => value * p_ref_pa / (GAS_CONSTANT_J_KGK * t_ref_k),
             _ => value,
         }
@@ -289,14 +290,14 @@ fn scale(quantity: Quantity, unit: &str) -> Option<Scale> {
             let mass = if mass.contains('/') { mass.to_owned() } else { format!("{mass}/s") };
             let pressure = unit.trim_end_matches([')', ' ']).rsplit(['/', '*', '-', ' ', '(']).next()?;
             let kg_s = unit_of(Kind::MassFlow, &mass)?.to_inside(1.0);
-            Some(Scale::Factor(kg_s * (1000.0 / unit_of(Kind::Pressure, pressure)?.to_inside(1.0))))
+            Some(Scale::Factor(kg_s * (PA_PER_KPA / unit_of(Kind::Pressure, pressure)?.to_inside(1.0))))
         }
         // Positions are compared with each other only.
         Quantity::Vane if matches!(lower.as_str(), "deg" | "°" | "mm") => Some(Scale::Factor(1.0)),
-        Quantity::Humidity if lower == "g/kg" => Some(Scale::Factor(1e-3)),
+        Quantity::Humidity if lower == "g/kg" => Some(Scale::Factor(1.0 / G_PER_KG)),
         Quantity::Humidity if lower == "kg/kg" => Some(Scale::Factor(1.0)),
         // Relative to the design speed.
-        Quantity::Speed if lower == "%" => Some(Scale::Factor(0.01)),
+        Quantity::Speed if lower == "%" => Some(Scale::Factor(1.0 / PERCENT)),
         _ => unit_of(quantity.kind(), unit).map(Scale::Unit),
     }
 }

@@ -19,7 +19,10 @@ struct BetaTables {
     efficiency: Vec<f64>,
 }
 
+/// Maximum number of numbers of a script. Bound: speed or beta, flow, pressure ratio and efficiency of each point.
 const MAX_NUMBERS: usize = 4 * crate::table::rows_to_lines::MAX_POINTS;
+/// Columns in the fraction of the first number of a table. Source: the format of GSP, `rows.columns` (10.021).
+const COLUMNS_BASE: f64 = 1000.0;
 
 /// The map of a script with arrays: `name = [1 2; 3 4]` or `name = np.array([[1, 2], [3, 4]])`.
 pub(crate) fn read_arrays(text: &str, description: &MapDescription) -> Result<ImportedMap, ImportError> {
@@ -131,7 +134,7 @@ pub(crate) fn read_gsp(text: &str, description: &MapDescription) -> Result<Impor
     for (name, line, numbers) in sections {
         let Some(place) = tables.array_of(&name.to_lowercase().replace(' ', "_")) else { continue };
         let Some((size, numbers)) = numbers.split_first() else { continue };
-        let (rows, columns) = (size.floor() as usize, (1000.0 * size.fract()).round() as usize);
+        let (rows, columns) = (size.floor() as usize, (COLUMNS_BASE * size.fract()).round() as usize);
         // The first number is the corner of the table.
         if rows < 2 || columns < 2 || numbers.len() + 1 != rows * columns {
             let form = "a table of GSP: rows.columns (10.021), the coordinates, then a speed and its values in each row";

@@ -20,7 +20,7 @@ impl Default for MapDesign {
     }
 }
 
-/// Maximum relative speed: larger ones are in rpm.
+/// Maximum relative speed. Bound: larger ones are in rpm.
 const MAX_RELATIVE_SPEED: f64 = 10.0;
 
 /// Scales rows with relative speeds to the stated design point, by the rule of NPSS and pyCycle: speed, flow and efficiency in proportion,

@@ -1,6 +1,7 @@
 //! Cells of a table, from text of any encoding, separator and decimal sign, or from a sheet of a workbook.
 
 use mapper_core::ImportError;
+use mapper_core::unit_factors::PERCENT;
 use mapper_table::{
     Dialect, TextEncoding, TextRows, decimal_sign, detect_text, is_missing_mark, parse_number, typical_length,
 };
@@ -36,11 +37,12 @@ pub(crate) struct Grid {
 
 /// Maximum number of rows, as of points.
 pub(crate) const MAX_ROWS: usize = crate::table::rows_to_lines::MAX_POINTS;
-/// Maximum number of cells of a row: Excel's own limit.
+/// Maximum number of cells of a row. Source: Excel's own limit.
 pub(crate) const MAX_CELLS: usize = 16_384;
 
-/// Maximum length of a line, bytes (16 for a cell), and number of rows that determine the separator. They limit the time for any text.
+/// Maximum length of a line, bytes. Bound: 16 for each cell; limits the time for any text.
 const MAX_LINE_BYTES: usize = 16 * MAX_CELLS;
+/// Number of rows that determine the separator. Bound: effort.
 const SEPARATOR_ROWS: usize = 1000;
 
 /// Text in any encoding.
@@ -132,6 +134,7 @@ impl Grid {
 
     /// The cells with rows and columns exchanged; `None` for a table with more rows than quantities.
     pub(crate) fn transposed(&self) -> Option<Grid> {
+        /// Bound: a map of all quantities of a point, with as many statistics.
         const MAX_QUANTITIES: usize = 100;
         let rows: Vec<&GridRow> = self.rows.iter().filter(|row| !row.is_comment).collect();
         let width = rows.iter().map(|row| row.cells.len()).max().filter(|_| rows.len() <= MAX_QUANTITIES)?;
@@ -160,7 +163,7 @@ impl Grid {
     /// The number in a cell; one with a percent sign as a fraction. `None` for empty cells and text.
     pub(crate) fn number(&self, cell: &str) -> Option<f64> {
         let (text, factor) = match cell.strip_suffix('%') {
-            Some(text) => (text, 0.01),
+            Some(text) => (text, 1.0 / PERCENT),
             None => (cell, 1.0),
         };
         let (usual, other) = if self.has_decimal_comma { (b',', b'.') } else { (b'.', b',') };

@@ -38,7 +38,7 @@ impl Headings {
     }
 }
 
-/// Maximum number of unused columns that a remark names.
+/// Maximum number of unused columns that a remark names. Bound: a longer list is not read.
 const MAX_NAMED: usize = 20;
 
 /// Whether merged cells above a row name the machines of its columns. A title stands alone in the first column.

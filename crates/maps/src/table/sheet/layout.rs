@@ -6,6 +6,7 @@ use crate::table::columns::quantity::Quantity;
 use crate::table::sheet::grid::{Grid, GridRow};
 use crate::table::sheet::headings::Headings;
 use crate::table::sheet::speed_heading::{speed_in, without_speed};
+use mapper_core::unit_factors::PERCENT;
 use mapper_core::{ImportError, ImportRemark};
 use mapper_table::is_missing_mark;
 use std::borrow::Cow;
@@ -417,7 +418,7 @@ pub(crate) fn vane_of_title(grid: &Grid, described: &DescribedColumns, row: &Gri
         .collect();
     let numbers: Vec<f64> = words.iter().filter_map(|word| grid.number(word)).collect();
     let [number] = numbers.as_slice() else { return None };
-    let factor = if words.contains(&"%") { 0.01 } else { 1.0 };
+    let factor = if words.contains(&"%") { 1.0 / PERCENT } else { 1.0 };
     (words.len() <= 5 && words.iter().any(|word| is_vane(word))).then_some(factor * number)
 }
 
@@ -441,7 +442,7 @@ fn layout_by_column_numbers(
     Ok(first_row.map(|first_row| Layout { groups: vec![group], first_row, remarks: Vec::new() }))
 }
 
-/// Maximum number of cells: SAE text may have a temperature or a vane position after the efficiency; a wider row is another table.
+/// Maximum number of cells. Bound: SAE text may have a temperature or a vane position after the efficiency; a wider row is another table.
 const MAX_BARE_CELLS: usize = 6;
 
 /// The layout without headings: corrected rpm, corrected kg/s, pressure ratio, and the efficiency if there is a fourth column.

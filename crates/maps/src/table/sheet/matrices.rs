@@ -12,10 +12,10 @@ use std::ops::Range;
 /// Quantities that a matrix may hold.
 const MATRIX_QUANTITIES: [Quantity; 3] = [Quantity::PressureRatio, Quantity::Efficiency, Quantity::Flow];
 
-/// Speeds of turbochargers, rpm: they distinguish the axis of speed from that of flow.
+/// Speeds of turbochargers, rpm. Bound: they distinguish the axis of speed from that of flow.
 const SPEEDS_RPM: Range<f64> = 5e3..1e6;
 
-/// Rows between the title of a matrix and its values: names of the axes, units.
+/// Rows between the title of a matrix and its values. Bound: names of the axes, units.
 const MAX_HEAD_ROWS: usize = 4;
 
 /// The quantity that a title names.

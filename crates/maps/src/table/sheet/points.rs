@@ -6,9 +6,13 @@ use crate::table::columns::quantity::Quantity;
 use crate::table::rows_to_lines::check_point_count;
 use crate::table::sheet::grid::{Grid, GridRow};
 use crate::table::sheet::layout::{self, Layout};
+use mapper_core::unit_factors::PERCENT;
 use mapper_core::{ImportError, ImportRemark, ImportedColumn, LineEnd, ReferenceState};
 use mapper_numerics::statistics::range;
 use mapper_table::is_missing_mark;
+
+/// Minimum median of efficiencies in per cent. Bound: fractions are at most 1, and usable points have at least 1 %.
+const MIN_PERCENTAGE: f64 = 1.5;
 
 /// The values of a point by column, as written.
 pub(crate) struct Point<'a> {
@@ -172,9 +176,8 @@ pub(crate) fn efficiency_in_percent(layout: &Layout, points: &[Point<'_>]) -> bo
     let mut etas: Vec<f64> =
         points.iter().filter_map(|point| point.value(Quantity::Efficiency, ReferenceState::SAE)).collect();
     etas.sort_by(f64::total_cmp);
-    // Efficiencies are at most 1, and those of usable points at least 1 %.
-    etas.get(etas.len() / 2).is_some_and(|median| *median > 1.5)
-        && etas.last().is_some_and(|last| *last <= 100.0)
+    etas.get(etas.len() / 2).is_some_and(|median| *median > MIN_PERCENTAGE)
+        && etas.last().is_some_and(|last| *last <= PERCENT)
 }
 
 /// The columns with the range of their values; without a reference state reduced values are not converted.

@@ -1,11 +1,12 @@
 //! Speeds in titles and headings: `N = 60000 rpm`, `PR@60000`, `60 krpm | flow [kg/s]`.
 
 use crate::table::sheet::grid::Grid;
+use mapper_core::unit_factors::RPM_PER_KRPM;
 use mapper_table::header_unit;
 use mapper_yaml::units::{Kind, Unit};
 use std::ops::RangeInclusive;
 
-/// Range of a number without a unit that is a speed, rpm. Smaller numbers are diameters in mm, temperatures or pressures in mbar, larger
+/// Range of a number without a unit that is a speed, rpm. Bound: smaller numbers are diameters in mm, temperatures or pressures in mbar, larger
 /// ones dates.
 const BARE_RPM: RangeInclusive<f64> = 5e3..=1e6;
 
@@ -47,7 +48,7 @@ pub(crate) fn without_speed(grid: &Grid, heading: &str) -> Option<(String, f64)>
         let Some(value) = grid.number(number) else { continue };
         let (speed_rpm, rest) = match speed_unit(unit) {
             Some(unit) => (unit.to_inside(value), rest),
-            None if unit == "k" => (1000.0 * value, rest),
+            None if unit == "k" => (RPM_PER_KRPM * value, rest),
             // A number with another unit, for example of a pressure, is not a speed.
             None if !BARE_RPM.contains(&value) || header_unit(unit).is_some() && !is_bracket => continue,
             None => (value, &heading[from..]),

@@ -74,7 +74,7 @@ struct Sheet {
     rows: Vec<GridRow>,
 }
 
-/// Maximum number of cells of a sheet, empty ones between others included: 100 000 points with 40 columns.
+/// Maximum number of cells of a sheet, empty ones between others included. Bound: 100 000 points with 40 columns.
 const MAX_SHEET_CELLS: usize = 40 * MAX_ROWS;
 
 /// All sheets of a workbook.
@@ -127,7 +127,7 @@ fn text_of_cell(cell: &Value, decimal: u8) -> String {
     }
 }
 
-/// Maximum unpacked size of a workbook, bytes: 100 000 points with 20 columns of 30 bytes.
+/// Maximum unpacked size of a workbook, bytes. Bound: 100 000 points with 20 columns of 30 bytes.
 const MAX_UNPACKED_BYTES: u64 = 64 << 20;
 
 fn too_large() -> String {

@@ -9,7 +9,6 @@ use mapper_campaign::{Campaign, nominal_model};
 use mapper_diagnose::gap;
 use mapper_diagnose::gap::{
     Calibration, ClosureSearch, Diagnosed, GapRequest, Origin, RigRecording, Scores, Verdict,
-    logistic_features,
 };
 use mapper_fleet::Engine;
 use mapper_numerics::minimise::minimise;
@@ -367,7 +366,8 @@ pub(crate) fn logistic(rows: &[Row]) -> Option<([f64; 3], [Origin; 3])> {
     if rows.iter().all(|row| row.outside) || rows.iter().all(|row| !row.outside) {
         return None;
     }
-    let rows: Vec<(Row, [f64; 2])> = rows.iter().map(|row| (*row, logistic_features(row.features))).collect();
+    let rows: Vec<(Row, [f64; 2])> =
+        rows.iter().map(|row| (*row, Calibration::logistic_features(row.features))).collect();
     let loss = |weights: &[f64; 3]| -> f64 {
         let means = [PRIOR_OFFSET, PRIOR_SLOPE, PRIOR_SLOPE];
         let penalty: f64 =
@@ -440,7 +440,7 @@ fn origins(weights: &[f64; 3], curvatures: &Matrix3<f64>) -> [Origin; 3] {
     })
 }
 
-/// Argument of the logistic for features that [`logistic_features`] has limited.
+/// Argument of the logistic for features that [`Calibration::logistic_features`] has limited.
 fn argument(weights: &[f64; 3], features: &[f64; 2]) -> f64 {
     // Beyond 500 an exponential is infinite.
     let x = weights[0] + weights[1..].iter().zip(features).map(|(w, f)| w * f).sum::<f64>();
@@ -513,7 +513,7 @@ mod tests {
             (0..80).map(|i| row([-1.0, if i % 2 == 0 { 2.0 } else { 20.0 }], i % 2 == 1)).collect();
         let (weights, _) = logistic(&rows).unwrap();
         // Eighty cases against a weak prior: each class on its side with odds of e^2 at least.
-        let at = |features| argument(&weights, &logistic_features(features));
+        let at = |features| argument(&weights, &Calibration::logistic_features(features));
         assert!(at([-1.0, 2.0]) < -2.0 && at([-1.0, 20.0]) > 2.0);
         assert!(logistic(&[row([1.0; 2], true)]).is_none());
     }
@@ -536,6 +536,6 @@ mod tests {
         let rows: Vec<Row> =
             (0..80).map(|i| row([if i % 8 == 0 { 1e4 } else { 0.0 }, 0.0], i % 8 == 1)).collect();
         let (weights, _) = logistic(&rows).unwrap();
-        assert!(argument(&weights, &logistic_features([20.0, 0.0])) > 10.0, "{weights:?}");
+        assert!(argument(&weights, &Calibration::logistic_features([20.0, 0.0])) > 10.0, "{weights:?}");
     }
 }

@@ -1,9 +1,9 @@
 //! Readings without the causes of a gap.
 
-use crate::gap::common::{Visits, declared, record_of};
+use crate::gap::correction::Changes;
+use crate::gap::residuals::study::{Hypothesis, Study};
+use crate::inside::gap::common::{Visits, declared, record_of};
 use mapper_core::{Channel, Recording};
-use mapper_diagnose::gap::correction::Changes;
-use mapper_diagnose::gap::residuals::study::{Hypothesis, Study};
 use mapper_observe::averages::time_table::Table;
 use mapper_physics::rig::effect::{Rig, add};
 use mapper_physics::simulation::model::Model;

@@ -1,11 +1,11 @@
 //! Recordings of the adaptive simulator. It shares the equations with the driven model, but not its grid, inputs or noise.
 #![allow(dead_code, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+use crate::gap::causes::calibration::Calibration;
+use crate::gap::request::{ClosureSearch, GapRequest, RigRecording};
 use mapper_core::{
     Channel, DeclaredUncertainty, ModelTolerances, NoiseColour, Recording, Series, StepKind, StepMarker,
 };
-use mapper_diagnose::gap::causes::calibration::Calibration;
-use mapper_diagnose::gap::request::{ClosureSearch, GapRequest, RigRecording};
 use mapper_observe::declared::{Declared, declared_uncertainties};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::rig::effect::{Effect, Rig};

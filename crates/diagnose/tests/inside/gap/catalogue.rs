@@ -3,13 +3,13 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use crate::gap::common;
-use crate::gap::common::{Visits, declared};
-use mapper_diagnose::gap::best_fit::fit::{Effort, fit, lengths};
-use mapper_diagnose::gap::best_fit::normal::Selection;
-use mapper_diagnose::gap::causes::additions::additions;
-use mapper_diagnose::gap::residuals::study::{EffectValues, Hypothesis, Study};
-use mapper_diagnose::gap::residuals::whiten::Linearised;
+use crate::gap::best_fit::fit::{Effort, fit, lengths};
+use crate::gap::best_fit::normal::Selection;
+use crate::gap::causes::additions::additions;
+use crate::gap::residuals::study::{EffectValues, Hypothesis, Study};
+use crate::gap::residuals::whiten::Linearised;
+use crate::inside::gap::common;
+use crate::inside::gap::common::{Visits, declared};
 use mapper_numerics::parallel;
 use mapper_observe::averages::time_table::Table;
 use mapper_physics::rig::effect::{Effect, EffectParameter, Rig, add};

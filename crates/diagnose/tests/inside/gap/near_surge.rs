@@ -2,16 +2,16 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use crate::gap::common::{channels, declared};
+use crate::gap::best_fit::adequacy::adequacy;
+use crate::gap::best_fit::fit::{Effort, fit};
+use crate::gap::best_fit::normal::Selection;
+use crate::gap::causes::additions::additions;
+use crate::gap::causes::calibration::Calibration;
+use crate::gap::residuals::study::Study;
+use crate::gap::residuals::true_inputs::Actuators;
+use crate::gap::residuals::whiten::Linearised;
+use crate::inside::gap::common::{channels, declared};
 use mapper_core::{Channel, Recording, Series, StepKind, StepMarker};
-use mapper_diagnose::gap::best_fit::adequacy::adequacy;
-use mapper_diagnose::gap::best_fit::fit::{Effort, fit};
-use mapper_diagnose::gap::best_fit::normal::Selection;
-use mapper_diagnose::gap::causes::additions::additions;
-use mapper_diagnose::gap::causes::calibration::Calibration;
-use mapper_diagnose::gap::residuals::study::Study;
-use mapper_diagnose::gap::residuals::true_inputs::Actuators;
-use mapper_diagnose::gap::residuals::whiten::Linearised;
 use mapper_observe::averages::time_table::Table;
 use mapper_observe::model_inputs::lagged_command::{LaggedCommand, Level, Response};
 use mapper_physics::machine::params::BoundaryConditions;

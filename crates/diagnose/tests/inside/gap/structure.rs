@@ -2,11 +2,11 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use crate::gap::common::{Visits, declared, effects, record_of, request};
+use crate::gap::diagnose::gap;
+use crate::gap::findings::report::{Diagnosis, Verdict};
+use crate::gap::request::{BaselineRecording, GapRequest, RigRecording};
+use crate::inside::gap::common::{Visits, declared, effects, record_of, request};
 use mapper_core::Recording;
-use mapper_diagnose::gap::diagnose::gap;
-use mapper_diagnose::gap::findings::report::{Diagnosis, Verdict};
-use mapper_diagnose::gap::request::{BaselineRecording, GapRequest, RigRecording};
 use mapper_observe::channels::OUTPUTS;
 use mapper_observe::declared::Declared;
 use mapper_physics::rig::effect::{Rig, add};

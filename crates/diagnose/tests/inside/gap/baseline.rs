@@ -2,13 +2,13 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use crate::gap::common::{Visits, declared, effects, record_another_night, record_of, request};
+use crate::gap::diagnose::{Diagnosed, gap};
+use crate::gap::findings::report::Verdict;
+use crate::gap::findings::warning::GapWarning;
+use crate::gap::preconditions::{GapError, Problem};
+use crate::gap::request::{BaselineRecording, GapRequest, RigRecording};
+use crate::inside::gap::common::{Visits, declared, effects, record_another_night, record_of, request};
 use mapper_core::{Channel, Recording};
-use mapper_diagnose::gap::diagnose::{Diagnosed, gap};
-use mapper_diagnose::gap::findings::report::Verdict;
-use mapper_diagnose::gap::findings::warning::GapWarning;
-use mapper_diagnose::gap::preconditions::{GapError, Problem};
-use mapper_diagnose::gap::request::{BaselineRecording, GapRequest, RigRecording};
 use mapper_physics::rig::effect::{Rig, add};
 use mapper_physics::simulation::model::Model;
 

@@ -2,18 +2,18 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use crate::gap::common::{Visits, declared, effects, request};
-use mapper_diagnose::closure::balance::Balance;
-use mapper_diagnose::closure::columns::Base;
-use mapper_diagnose::closure::description::{ClosureDescription, script_of, sink};
-use mapper_diagnose::closure::expression::{Expression, Span, Spans};
-use mapper_diagnose::closure::library::library;
-use mapper_diagnose::closure::residual_source::residual_sources;
-use mapper_diagnose::closure::term::{ClosureEffect, Role, Term};
-use mapper_diagnose::gap;
-use mapper_diagnose::gap::residuals::study::{Hypothesis, Study};
-use mapper_diagnose::gap::residuals::whiten::Linearised;
-use mapper_diagnose::gap::{ClosureSearch, Diagnosed, GapRequest, Verdict};
+use crate::closure::balance::Balance;
+use crate::closure::columns::Base;
+use crate::closure::description::{ClosureDescription, script_of, sink};
+use crate::closure::expression::{Expression, Span, Spans};
+use crate::closure::library::library;
+use crate::closure::residual_source::residual_sources;
+use crate::closure::term::{ClosureEffect, Role, Term};
+use crate::gap;
+use crate::gap::residuals::study::{Hypothesis, Study};
+use crate::gap::residuals::whiten::Linearised;
+use crate::gap::{ClosureSearch, Diagnosed, GapRequest, Verdict};
+use crate::inside::gap::common::{Visits, declared, effects, request};
 use mapper_effects::ScriptEffect;
 use mapper_inference::time_history::{Shape, TimeHistory};
 use mapper_numerics::parallel;
@@ -27,7 +27,7 @@ const VISITS: Visits =
     Visits { speeds_rpm: &[90e3, 140e3, 60e3, 120e3, 70e3, 130e3, 80e3, 110e3, 60e3], dwell_s: 60.0 };
 
 fn ask(rig: &Rig, seed: u64, closure_search: ClosureSearch) -> Diagnosed {
-    let recording = crate::gap::common::record_of(rig, &VISITS, seed);
+    let recording = crate::inside::gap::common::record_of(rig, &VISITS, seed);
     // Candidates unrelated to the planted term.
     let candidates = effects(&["tip_diameter", "flowmeter_gain"]);
     let library = request(&recording, declared(), Model::nominal(), candidates);
@@ -35,7 +35,7 @@ fn ask(rig: &Rig, seed: u64, closure_search: ClosureSearch) -> Diagnosed {
 }
 
 fn study(visits: &Visits, effects: Vec<Arc<dyn Effect>>) -> Study {
-    let recording = crate::gap::common::record_of(&Rig::new(Model::nominal()), visits, 3);
+    let recording = crate::inside::gap::common::record_of(&Rig::new(Model::nominal()), visits, 3);
     let table = Table::new(&recording).unwrap();
     Study::new(&recording, table, declared(), Model::nominal(), effects)
 }

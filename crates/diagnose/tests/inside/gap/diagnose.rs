@@ -2,21 +2,21 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use crate::gap::common;
-use crate::gap::common::{Visits, boundary, declared, effects, request};
+use crate::gap::calibrated_model::{ForecastCheck, Found};
+use crate::gap::causes::calibration::Calibration;
+use crate::gap::diagnose::{Diagnosed, gap};
+use crate::gap::findings::experiment::{AllowedJump, Experiment};
+use crate::gap::findings::report::Verdict;
+use crate::gap::findings::warning::GapWarning;
+use crate::gap::joint::{Over, Persistence, Value};
+use crate::gap::next_experiment::outlook::{approximate_separation, separation};
+use crate::gap::preconditions::{GapError, Problem, usable};
+use crate::gap::request::RigRecording;
+use crate::gap::residuals::nuisance::NuisanceKind;
+use crate::gap::residuals::study::Study;
+use crate::inside::gap::common;
+use crate::inside::gap::common::{Visits, boundary, declared, effects, request};
 use mapper_core::{Channel, Dimension, OperatingPoint, Recording, Series};
-use mapper_diagnose::gap::calibrated_model::{Found, check_forecast};
-use mapper_diagnose::gap::causes::calibration::Calibration;
-use mapper_diagnose::gap::diagnose::{Diagnosed, gap};
-use mapper_diagnose::gap::findings::experiment::{AllowedJump, Experiment};
-use mapper_diagnose::gap::findings::report::Verdict;
-use mapper_diagnose::gap::findings::warning::GapWarning;
-use mapper_diagnose::gap::joint::{Persistence, Value, over_recordings};
-use mapper_diagnose::gap::next_experiment::outlook::{approximate_separation, separation};
-use mapper_diagnose::gap::preconditions::{GapError, Problem, usable};
-use mapper_diagnose::gap::request::RigRecording;
-use mapper_diagnose::gap::residuals::nuisance::NuisanceKind;
-use mapper_diagnose::gap::residuals::study::Study;
 use mapper_observe::averages::time_table::Table;
 use mapper_observe::declared::CommonOffset;
 use mapper_physics::rig::effect::{Effect, Rig, add};
@@ -203,15 +203,11 @@ fn two_effects_are_both_named_and_each_takes_off_the_square_of_its_signature() {
     // Gain of both compared with the meter alone and with none.
     let meter = 3;
     let study = &diagnosed.study;
-    let alone = mapper_diagnose::gap::best_fit::fit::lengths(
-        study,
-        &diagnosed.linearised,
-        &vec![(meter, vec![1.02])],
-    )
-    .unwrap();
+    let alone =
+        crate::gap::best_fit::fit::lengths(study, &diagnosed.linearised, &vec![(meter, vec![1.02])]).unwrap();
     let fits = |wanted: &[usize]| {
-        let named = |f: &&mapper_diagnose::gap::best_fit::fit::Fit| {
-            mapper_diagnose::gap::residuals::study::members(&f.hypothesis) == wanted
+        let named = |f: &&crate::gap::best_fit::fit::Fit| {
+            crate::gap::residuals::study::members(&f.hypothesis) == wanted
         };
         diagnosed.fits.iter().find(named).map(|f| f.cost)
     };
@@ -373,7 +369,7 @@ fn the_model_calibrated_in_one_night_forecasts_the_next() {
     let next = RigRecording::simulated(next, declared(), Model::nominal());
     let check = |found: &Found| {
         let effects = first.study.effects.clone();
-        check_forecast(&next, effects, found, &Calibration::shipped().unwrap())
+        ForecastCheck::new(&next, effects, found, &Calibration::shipped().unwrap())
     };
     let held = check(&found).unwrap();
     assert!(held.ratio < 1.2 && (0.92..0.99).contains(&held.inside), "{held:?}");
@@ -394,14 +390,14 @@ fn causes_persist_come_and_go_over_the_nights() {
             .collect();
     let nights: Vec<&Diagnosed> = nights.iter().collect();
     let calibration = Calibration::shipped().unwrap();
-    let over = over_recordings(&nights, &calibration);
+    let over = Over::recordings(&nights, &calibration);
     let persistence = |id: &str| over.iter().find(|cause| cause.effect == id).unwrap().persistence;
     assert_eq!(
         (persistence("tip_diameter"), persistence("bearing_friction")),
         (Persistence::Disappeared, Persistence::Appeared),
         "{over:?}"
     );
-    let two = over_recordings(&nights[..2], &calibration);
+    let two = Over::recordings(&nights[..2], &calibration);
     let probe = &two[0];
     assert_eq!((probe.effect.as_str(), probe.persistence), ("tip_diameter", Persistence::Persists));
     let width = |value: &Value| value.high - value.low;

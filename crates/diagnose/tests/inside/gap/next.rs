@@ -2,14 +2,14 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use crate::gap::common::{self, Visits, boundary, declared};
+use crate::gap::best_fit::fit::Fit;
+use crate::gap::diagnose::{Diagnosed, gap};
+use crate::gap::findings::experiment::{AllowedJump, AlsoChanged, AtRest, Experiment};
+use crate::gap::findings::report::{Kind, Next};
+use crate::gap::next_experiment::best_experiment::{Rivals, Suggested, next};
+use crate::gap::next_experiment::outlook::separation;
+use crate::inside::gap::common::{self, Visits, boundary, declared};
 use mapper_core::{Channel, OperatingPoint, Recording, StepKind, StepMarker};
-use mapper_diagnose::gap::best_fit::fit::Fit;
-use mapper_diagnose::gap::diagnose::{Diagnosed, gap};
-use mapper_diagnose::gap::findings::experiment::{AllowedJump, AlsoChanged, AtRest, Experiment};
-use mapper_diagnose::gap::findings::report::{Kind, Next};
-use mapper_diagnose::gap::next_experiment::best_experiment::{Rivals, Suggested, next};
-use mapper_diagnose::gap::next_experiment::outlook::separation;
 use mapper_observe::averages::time_table::Table;
 use mapper_observe::model_inputs::lagged_command::Response;
 use mapper_observe::model_inputs::smoothed_inputs::SmoothedInputs;

@@ -30,7 +30,8 @@ pub use identification::settings::{
     SettleBands, StructureTolerances, WindowRule,
 };
 pub use identification::thermal_model::{
-    ConvectionLaw, CorrelatedPair, IdentifiedHousing, IdentifiedInlet, InletConvection, Origin, SharedValue, ThermalModel,
+    ConvectionLaw, CorrelatedPair, IdentifiedHousing, IdentifiedInlet, InletConvection, Origin, SharedValue,
+    ThermalModel,
 };
 pub use identification::warning::{
     Bound, CalibrationDefect, EndEvidence, EtaSignal, FitFailure, HeatCorrected, LeftOut, MapRegion,

@@ -5,8 +5,9 @@ use crate::joint::fit::refinements::Refinements;
 use crate::joint::fit::solve::{Covariance, Problem};
 use crate::joint::judge;
 use crate::joint::step_model::parameters::{
-    ALPHA, EXPONENT, HEAT, HEAT_BY_TC, HOUSING, LN_AREA, LN_CAPACITY, LN_COEFFICIENT, LN_DEVIATION, LN_HEATING_COOLING_RATIO,
-    LN_INNER_CONDUCTANCE, LOGIT_INNER, OFFSET_CHANNELS, OFFSETS, PREHEAT, PROBE_MM2, STEP_HEAT, SURFACE, TC_LAG, symbol,
+    ALPHA, EXPONENT, HEAT, HEAT_BY_TC, HOUSING, LN_AREA, LN_CAPACITY, LN_COEFFICIENT, LN_DEVIATION,
+    LN_HEATING_COOLING_RATIO, LN_INNER_CONDUCTANCE, LOGIT_INNER, OFFSET_CHANNELS, OFFSETS, PREHEAT,
+    PROBE_MM2, STEP_HEAT, SURFACE, TC_LAG, symbol,
 };
 use crate::joint::step_model::rows::StepRows;
 use crate::joint::uncertainty::numbers::Numbers;

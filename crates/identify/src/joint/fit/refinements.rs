@@ -47,7 +47,8 @@ pub(crate) fn hold(problem: &mut Problem<'_>) {
 /// that knowing these parameters removes, averaged over the sets of the mixture. `None` as `found`: all are taken for neutral.
 pub(crate) fn prior_sensitivity(open: &Problem<'_>, found: Option<&Refinements>) -> Option<f64> {
     let covariance = open.covariance()?;
-    let rows: Vec<Option<usize>> = sought(open).iter().map(|refinement| covariance.row_of(refinement.index)).collect();
+    let rows: Vec<Option<usize>> =
+        sought(open).iter().map(|refinement| covariance.row_of(refinement.index)).collect();
     let mut sets: BTreeMap<Vec<usize>, f64> = BTreeMap::new();
     match found {
         None => _ = sets.insert(rows.iter().copied().flatten().collect(), 1.0),

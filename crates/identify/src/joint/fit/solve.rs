@@ -151,9 +151,8 @@ impl Member<'_> {
         let rows = self.measured_k.len();
         let residual: Vec<f64> =
             self.measured_k.iter().zip(&prediction.readings_k).map(|(a, b)| a - b).collect();
-        let known: Vec<usize> = (0..prediction.columns.len())
-            .filter(|index| prediction.columns[*index].len() == rows)
-            .collect();
+        let known: Vec<usize> =
+            (0..prediction.columns.len()).filter(|index| prediction.columns[*index].len() == rows).collect();
         let mut all = DMatrix::zeros(rows, known.len() + 1);
         all.column_mut(0).copy_from_slice(&residual);
         for (place, index) in known.iter().enumerate() {

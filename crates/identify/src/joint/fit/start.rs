@@ -7,9 +7,9 @@ use crate::joint::step_model::gas_path::{Setting, reynolds};
 use crate::joint::step_model::history::{Model, StepHistory};
 use crate::joint::step_model::parameters::{
     ALPHA, BAROMETER, BEARING, ETA, EXPONENT, EXTERNAL, FIRST_READING, FLOW_GAIN, GAIN_CHANNELS, GAINS, HEAT,
-    HEAT_BY_TC, HUMIDITY, INLET, LN_AREA, LN_CAPACITY, LN_COEFFICIENT, LN_DEVIATION, LN_HEATING_COOLING_RATIO,
-    LN_INNER_CONDUCTANCE, LN_OIL, LOCAL, LOGIT_INNER, OFFSET_CHANNELS, OFFSETS, PREHEAT, PROBE_MM2, Prior,
-    RADIATION, REFINEMENTS, SHARED, STEP_HEAT, SURFACE, TC_LAG, THERMOMETERS,
+    HEAT_BY_TC, HUMIDITY, INLET, LN_AREA, LN_CAPACITY, LN_COEFFICIENT, LN_DEVIATION,
+    LN_HEATING_COOLING_RATIO, LN_INNER_CONDUCTANCE, LN_OIL, LOCAL, LOGIT_INNER, OFFSET_CHANNELS, OFFSETS,
+    PREHEAT, PROBE_MM2, Prior, RADIATION, REFINEMENTS, SHARED, STEP_HEAT, SURFACE, TC_LAG, THERMOMETERS,
 };
 use crate::joint::step_model::rows::{StepRows, condensed};
 use crate::joint::step_model::surface::{SurfaceScale, TERM_COUNT};
@@ -254,8 +254,7 @@ pub(crate) fn problem<'a>(
     priors[LN_AREA] = Prior { mean: 0.0, sigma: config.internal_area_sigma_ratio };
     active[LN_AREA] = config.internal_area_sigma_ratio > 0.0;
     if choice.offsets == Choice::Fitted {
-        let contact_sigma =
-            if config.declared.is_empty() { 0.0 } else { config.housing_contact_sigma_ratio };
+        let contact_sigma = if config.declared.is_empty() { 0.0 } else { config.housing_contact_sigma_ratio };
         let mut fit_error = |index: usize, sigma: f64| {
             priors[index] = Prior { mean: 0.0, sigma };
             active[index] = sigma > 0.0;
@@ -308,8 +307,10 @@ pub(crate) fn problem<'a>(
         active[SURFACE + k] = true;
     }
 
-    let members =
-        steps.iter().map(|step| member(step, alone.get(step.position), (&scale, mean_eta), &model, config)).collect::<Option<Vec<_>>>()?;
+    let members = steps
+        .iter()
+        .map(|step| member(step, alone.get(step.position), (&scale, mean_eta), &model, config))
+        .collect::<Option<Vec<_>>>()?;
     Some(Problem {
         model,
         members,
@@ -410,9 +411,8 @@ pub(crate) fn refine(problem: &mut Problem<'_>, config: &IdentifyConfig) -> Opti
     };
     let (off_law, off_balance) = (own(LN_DEVIATION), own(STEP_HEAT));
     problem.surface_sigma = spread(&off_surface, problem.surface_sigma, SURFACE_SIGMA);
-    let before = |index: usize, usual: f64| {
-        problem.members.first().map_or(usual, |member| member.priors[index].sigma)
-    };
+    let before =
+        |index: usize, usual: f64| problem.members.first().map_or(usual, |member| member.priors[index].sigma);
     let law_sigma = spread(&off_law, before(LN_DEVIATION, LAW_SIGMA), LAW_SIGMA);
     let heat_sigma_w = if problem.model.has_balance {
         spread(&off_balance, before(STEP_HEAT, STEP_HEAT_SIGMA_W), STEP_HEAT_SIGMA_W)
@@ -452,4 +452,3 @@ fn spread(posteriors: &[(f64, f64)], under_sigma: f64, expected: f64) -> f64 {
         .max_by(|a, b| ln_density(*a).total_cmp(&ln_density(*b)))
         .unwrap_or(expected)
 }
-

@@ -9,8 +9,8 @@ use crate::joint::fit::solve::{Member, Problem};
 use crate::joint::fit::whitening::Whitening;
 use crate::joint::step_model::history::{Linearised, SmoothedInput};
 use crate::joint::step_model::parameters::{
-    ALPHA, EXPONENT, LN_COEFFICIENT, LN_HEATING_COOLING_RATIO, LN_INNER_CONDUCTANCE, LOGIT_INNER, PREHEAT, PROBE_MM2, Place,
-    SHARED, SharedVector, TC_LAG,
+    ALPHA, EXPONENT, LN_COEFFICIENT, LN_HEATING_COOLING_RATIO, LN_INNER_CONDUCTANCE, LOGIT_INNER, PREHEAT,
+    PROBE_MM2, Place, SHARED, SharedVector, TC_LAG,
 };
 use crate::joint::step_model::rows::StepRows;
 use crate::joint::step_model::smoothing::{Basis, FLOW, P1, P2, SMOOTHED_COUNT, T1, TC};
@@ -91,7 +91,8 @@ pub(crate) fn set(problem: &mut Problem<'_>, config: &IdentifyConfig) -> Option<
                 weights
                     .iter()
                     .map(|weight| {
-                        let responses = responses(linearised, weight.input, &smoothing.channels[weight.place], shared);
+                        let responses =
+                            responses(linearised, weight.input, &smoothing.channels[weight.place], shared);
                         weight.weights.dot(&responses.transpose())
                     })
                     .sum()
@@ -233,7 +234,14 @@ fn covariance<'a>(
                 let own = basis.values.tr_mul(&(&step.noise * &basis.values));
                 sum += sigma * sigma * &responses * own * responses.transpose();
             }
-            parts.push(InputPart { place, input, variance: sigma * sigma, basis, by_rows, noise: &step.noise });
+            parts.push(InputPart {
+                place,
+                input,
+                variance: sigma * sigma,
+                basis,
+                by_rows,
+                noise: &step.noise,
+            });
         }
     }
     let shape = DVector::from_vec(linearised.by_surface(&member.history, &problem.shared));

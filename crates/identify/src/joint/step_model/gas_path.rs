@@ -3,7 +3,9 @@
 use crate::joint::step_model::parameters::{EXPONENT, LN_COEFFICIENT, SharedVector};
 use mapper_numerics::SLOPE_STEP;
 use mapper_physics::gas::air::{self, Air};
-use mapper_physics::laws::compression::{Wheel, after_wheel, before_wheel, compressed_k, isentropic_rise_ratio};
+use mapper_physics::laws::compression::{
+    Wheel, after_wheel, before_wheel, compressed_k, isentropic_rise_ratio,
+};
 use mapper_physics::laws::convection::{self, InletLaw};
 
 /// Minimum efficiency of the model. Bound: keeps the temperature rise finite while a fit searches.
@@ -166,24 +168,13 @@ impl Setting {
         let (q1_w, after_area_k) = before_wheel(before_w_k, t1_k, wall_k, flow_kg_s, cp_j_kgk);
         let duct_w = inputs.preheat_w_k * (t1_k - outer_k);
         let t1_prime_k = after_area_k - duct_w / (flow_kg_s * cp_j_kgk);
-        let wheel = Wheel {
-            t1_k,
-            isentropic_rise_ratio: rise_ratio,
-            efficiency,
-            recirculation_ratio: 0.0,
-            air,
-        };
+        let wheel =
+            Wheel { t1_k, isentropic_rise_ratio: rise_ratio, efficiency, recirculation_ratio: 0.0, air };
         let (t2_prime_k, _) = wheel.compress(t1_prime_k);
         let after_w_k = directed_w_k(t2_prime_k) * (1.0 - inputs.alpha_area_ratio);
         let (q2_w, t2_k) =
             after_wheel(after_w_k, t2_prime_k, wall_k, flow_kg_s, air.heat_capacity_j_kgk(bulk_k));
-        GasPath {
-            t2_k,
-            wall_w: q1_w + q2_w,
-            duct_w,
-            h_w_m2k,
-            bulk_k,
-        }
+        GasPath { t2_k, wall_w: q1_w + q2_w, duct_w, h_w_m2k, bulk_k }
     }
 
     /// ln of the Reynolds number over the reference.
@@ -248,7 +239,11 @@ impl Setting {
                 none
             },
             by(Inputs { preheat_w_k: x.preheat_w_k + SLOPE_STEP, ..x }, SLOPE_STEP),
-            if with_model { by(Inputs { inlet_power: x.inlet_power + SLOPE_STEP, ..x }, SLOPE_STEP) } else { none },
+            if with_model {
+                by(Inputs { inlet_power: x.inlet_power + SLOPE_STEP, ..x }, SLOPE_STEP)
+            } else {
+                none
+            },
             if with_model {
                 by_inlet(Inputs { humidity_kg_kg: x.humidity_kg_kg + SLOPE_STEP, ..x }, SLOPE_STEP)
             } else {

@@ -11,15 +11,13 @@
 //! a few inputs of the gas path and of the housing; the chain rule gives its column, through wall, probe and integral.
 
 use crate::config::Housing;
-use crate::joint::step_model::gas_path::{
-    GasPath, INPUT_COUNT, Input, Inputs, Setting, Slopes,
-};
+use crate::joint::step_model::gas_path::{GasPath, INPUT_COUNT, Input, Inputs, Setting, Slopes};
 use crate::joint::step_model::housing::HEAT_PARAMETERS;
 use crate::joint::step_model::parameters::{
-    P1_GAIN, P1_OFFSET, P2_GAIN, P2_OFFSET, T2_GAIN, T2_OFFSET, TC_GAIN, TC_OFFSET,
     ALPHA, BAROMETER, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, GAINS, HUMIDITY, INLET, LN_CAPACITY,
     LN_COEFFICIENT, LN_DEVIATION, LN_HEATING_COOLING_RATIO, LN_INNER_CONDUCTANCE, LOCAL, LOGIT_INNER,
-    LocalVector, OFFSETS, PREHEAT, PROBE_MM2, SHARED, STEP_HEAT, SURFACE, SharedVector, TC_LAG, THERMOMETERS,
+    LocalVector, OFFSETS, P1_GAIN, P1_OFFSET, P2_GAIN, P2_OFFSET, PREHEAT, PROBE_MM2, SHARED, STEP_HEAT,
+    SURFACE, SharedVector, T2_GAIN, T2_OFFSET, TC_GAIN, TC_LAG, TC_OFFSET, THERMOMETERS,
 };
 use crate::joint::step_model::rows::{MAX_ROW_GAP_S, Row, StepRows};
 use crate::joint::step_model::surface::{TERM_COUNT, dot};
@@ -194,7 +192,13 @@ fn mean_decay(x: f64) -> f64 {
 }
 
 impl Model {
-    fn inputs(&self, row: &Row, terms: &[f64; TERM_COUNT], shared: &SharedVector, local: &LocalVector) -> Inputs {
+    fn inputs(
+        &self,
+        row: &Row,
+        terms: &[f64; TERM_COUNT],
+        shared: &SharedVector,
+        local: &LocalVector,
+    ) -> Inputs {
         let outer_k = outer_k(row, shared);
         let [p1_pa, p2_pa] = pressures_pa(row, shared, self.setting.rest_pressure_pa);
         Inputs {
@@ -278,7 +282,8 @@ impl Model {
         let rows: Vec<&Row> = step.lead.iter().chain(&step.rows).skip(skipped).collect();
         let inner = inner_wall(shared);
         let start = before.filter(|wall| rows.first().is_some_and(|row| row.t_s - wall.t_s < MAX_ROW_GAP_S));
-        let mut wall_k = start.map_or_else(|| rows.first().map_or(f64::NAN, |row| outer_k(row, shared)), |w| w.wall_k);
+        let mut wall_k =
+            start.map_or_else(|| rows.first().map_or(f64::NAN, |row| outer_k(row, shared)), |w| w.wall_k);
         let mut states = Vec::with_capacity(rows.len());
         for (i, row) in rows.iter().enumerate() {
             let terms = history.terms.get(skipped + i).unwrap_or(&[0.0; TERM_COUNT]);
@@ -311,7 +316,16 @@ impl Model {
             };
             let rate_k_s = (gas_w + heat_w) / outer_j_k;
             let ln_capacity_by_k = self.housing.ln_capacity_by_k(inputs.outer_k);
-            states.push(RowState { path, slopes, inputs, rate_k_s, outer_j_k, ln_capacity_by_k, heat, wall: along });
+            states.push(RowState {
+                path,
+                slopes,
+                inputs,
+                rate_k_s,
+                outer_j_k,
+                ln_capacity_by_k,
+                heat,
+                wall: along,
+            });
         }
         let lead = step.lead.len() - skipped.min(step.lead.len());
         let gas_k: Vec<f64> = states[lead..].iter().map(|state| state.path.t2_k).collect();
@@ -385,7 +399,8 @@ impl Linearised<'_> {
             (Vec::with_capacity(window), Vec::with_capacity(window), Vec::with_capacity(window));
         let (share, conductance_w_k) = self.inner;
         for (i, state) in self.states.iter().enumerate() {
-            let Change { inputs, heat_w, reading_k, ln_capacity, logit_inner, ln_conductance } = change(i, state);
+            let Change { inputs, heat_w, reading_k, ln_capacity, logit_inner, ln_conductance } =
+                change(i, state);
             let outer_k = inputs[Input::Outer as usize];
             let by = |which: usize| (0..INPUT_COUNT).map(|k| state.slopes[k][which] * inputs[k]).sum::<f64>();
             let (mut t2_k, mut wall_w, duct_w) = (by(0), by(1), by(2));
@@ -427,7 +442,13 @@ impl Linearised<'_> {
     }
 
     /// Change of the readings by a function along the window of a channel of [`Smoothing`](super::smoothing::Smoothing).
-    pub(crate) fn by_input(&self, input: SmoothedInput, values: &[f64], slopes: &[f64], lag_s: f64) -> Vec<f64> {
+    pub(crate) fn by_input(
+        &self,
+        input: SmoothedInput,
+        values: &[f64],
+        slopes: &[f64],
+        lag_s: f64,
+    ) -> Vec<f64> {
         let at = |i: usize| i.checked_sub(self.lead).map(|row| (values[row], slopes[row]));
         let change = |i: usize, state: &RowState| {
             let Some((value, slope)) = at(i) else { return Change::default() };
@@ -470,8 +491,13 @@ impl Linearised<'_> {
         local: &LocalVector,
         start_k: f64,
     ) -> (Vec<f64>, f64) {
-        let rows: Vec<&Row> =
-            self.step.lead.iter().chain(&self.step.rows).skip(history.terms.len() - self.states.len()).collect();
+        let rows: Vec<&Row> = self
+            .step
+            .lead
+            .iter()
+            .chain(&self.step.rows)
+            .skip(history.terms.len() - self.states.len())
+            .collect();
         let rest_pa = self.model.setting.rest_pressure_pa;
         let by = |change: &dyn Fn(&RowState, &Row, usize) -> Change| {
             self.respond(|i, state| change(state, rows[i], i), start_k)
@@ -490,7 +516,9 @@ impl Linearised<'_> {
         let skipped = history.terms.len() - self.states.len();
         match index {
             LN_COEFFICIENT => input(Input::LnH, &|_, _| 1.0),
-            EXPONENT => input(Input::LnH, &|state, _| self.model.setting.ln_reynolds(&state.inputs, &state.path)),
+            EXPONENT => {
+                input(Input::LnH, &|state, _| self.model.setting.ln_reynolds(&state.inputs, &state.path))
+            }
             ALPHA => input(Input::Alpha, &|_, _| 1.0),
             LN_HEATING_COOLING_RATIO => input(Input::LnRatio, &|_, _| 1.0),
             PREHEAT => input(Input::Preheat, &|_, _| 1.0),
@@ -501,16 +529,18 @@ impl Linearised<'_> {
             TC_OFFSET => by(&|_, _, _| Change::of_tc(-1.0)),
             P1_OFFSET => input(Input::LnPressureRatio, &|state, _| 1.0 / state.inputs.p1_pa),
             P2_OFFSET => input(Input::LnPressureRatio, &|state, _| -1.0 / state.inputs.p2_pa),
-            FLOW_GAIN => {
-                input(Input::Flow, &|state, _| -state.inputs.flow_kg_s / (1.0 + shared[FLOW_GAIN]))
-            }
+            FLOW_GAIN => input(Input::Flow, &|state, _| -state.inputs.flow_kg_s / (1.0 + shared[FLOW_GAIN])),
             T2_GAIN => with_t2(nothing(), &|row| row.t2_k - CALIBRATED_AT_K),
             TC_GAIN => by(&|_, row, _| Change::of_tc(CALIBRATED_AT_K - row.tc_k)),
-            P1_GAIN => input(Input::LnPressureRatio, &|state, row| (row.p1_pa - rest_pa) / state.inputs.p1_pa),
-            P2_GAIN => input(Input::LnPressureRatio, &|state, row| (rest_pa - row.p2_pa) / state.inputs.p2_pa),
-            BAROMETER => {
-                input(Input::LnPressureRatio, &|state, _| state.inputs.p1_pa.recip() - state.inputs.p2_pa.recip())
+            P1_GAIN => {
+                input(Input::LnPressureRatio, &|state, row| (row.p1_pa - rest_pa) / state.inputs.p1_pa)
             }
+            P2_GAIN => {
+                input(Input::LnPressureRatio, &|state, row| (rest_pa - row.p2_pa) / state.inputs.p2_pa)
+            }
+            BAROMETER => input(Input::LnPressureRatio, &|state, _| {
+                state.inputs.p1_pa.recip() - state.inputs.p2_pa.recip()
+            }),
             THERMOMETERS => with_t2(
                 by(&|_, _, _| {
                     let mut change = Change::of_tc(-1.0);
@@ -525,7 +555,10 @@ impl Linearised<'_> {
             LN_INNER_CONDUCTANCE => by(&|_, _, _| Change { ln_conductance: 1.0, ..Change::default() }),
             PROBE_MM2 => (self.by_probe(shared, local), 0.0),
             SURFACE.. => by(&|_, _, i| {
-                Change::of(Input::Eta, history.terms.get(skipped + i).map_or(0.0, |terms| terms[index - SURFACE]))
+                Change::of(
+                    Input::Eta,
+                    history.terms.get(skipped + i).map_or(0.0, |terms| terms[index - SURFACE]),
+                )
             }),
             _ => nothing(),
         }

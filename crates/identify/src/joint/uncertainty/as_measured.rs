@@ -59,7 +59,8 @@ fn t2_alone<'a>(problem: &Problem<'a>, config: &IdentifyConfig) -> Option<Proble
     let errors: Vec<bool> = free.active[OFFSETS..HOUSING].to_vec();
     free.active[OFFSETS..HOUSING].fill(false);
     for index in OFFSETS..HOUSING {
-        free.shared[index] = if free.priors[index].sigma.is_finite() { free.priors[index].mean } else { free.shared[index] };
+        free.shared[index] =
+            if free.priors[index].sigma.is_finite() { free.priors[index].mean } else { free.shared[index] };
     }
     step_noise::set(&mut free, config)?;
     free.minimise_roughly()?;

@@ -255,7 +255,7 @@ impl Model {
         if derivatives {
             prediction.columns = vec![Vec::new(); SHARED + LOCAL];
             for index in (0..SHARED).filter(|index| active[*index]) {
-                let start_by = start.as_ref().map_or(0.0, |wall| wall.by_shared[index]);
+                let start_by = start.as_ref().map(|wall| wall.by_shared[index]);
                 let (column, end_by) = linearised.by_shared(index, history, shared, local, start_by);
                 prediction.columns[index] = column;
                 by_shared[index] = end_by;
@@ -392,8 +392,11 @@ impl Linearised<'_> {
     }
 
     /// Changes of the readings, and of the inner wall at the end, by a change of each row.
-    fn respond(&self, change: impl Fn(usize, &RowState) -> Change, start_k: f64) -> (Vec<f64>, f64) {
-        let mut wall_k = start_k;
+    fn respond(&self, change: impl Fn(usize, &RowState) -> Change, start_k: Option<f64>) -> (Vec<f64>, f64) {
+        // Without a step before, the wall starts at Tc.
+        let of_first =
+            || self.states.first().map_or(0.0, |state| change(0, state).inputs[Input::Outer as usize]);
+        let mut wall_k = start_k.unwrap_or_else(of_first);
         let window = self.states.len() - self.lead;
         let (mut gas, mut rates, mut readings) =
             (Vec::with_capacity(window), Vec::with_capacity(window), Vec::with_capacity(window));
@@ -463,21 +466,21 @@ impl Linearised<'_> {
                 SmoothedInput::Flow => Change::of(Input::Flow, value),
             }
         };
-        self.respond(change, 0.0).0
+        self.respond(change, Some(0.0)).0
     }
 
     /// Change of the readings by an efficiency that is wrong by the surface's own slope.
     pub(crate) fn by_surface(&self, history: &StepHistory<'_>, shared: &SharedVector) -> Vec<f64> {
         let skipped = history.terms.len() - self.states.len();
         let surface = surface_of(shared);
-        self.respond(|i, _| Change::of(Input::Eta, dot(&history.terms[skipped + i], surface)), 0.0).0
+        self.respond(|i, _| Change::of(Input::Eta, dot(&history.terms[skipped + i], surface)), Some(0.0)).0
     }
 
     fn by_local(&self, index: usize) -> Vec<f64> {
         match index {
-            ETA => self.respond(|_, _| Change::of(Input::Eta, 1.0), 0.0).0,
-            LN_DEVIATION => self.respond(|_, _| Change::of(Input::LnH, 1.0), 0.0).0,
-            STEP_HEAT => self.respond(|_, _| Change::heat(1.0), 0.0).0,
+            ETA => self.respond(|_, _| Change::of(Input::Eta, 1.0), Some(0.0)).0,
+            LN_DEVIATION => self.respond(|_, _| Change::of(Input::LnH, 1.0), Some(0.0)).0,
+            STEP_HEAT => self.respond(|_, _| Change::heat(1.0), Some(0.0)).0,
             _ => self.of_t2(&self.probe.read(&vec![0.0; self.gas_k.len()], 1.0)),
         }
     }
@@ -489,7 +492,7 @@ impl Linearised<'_> {
         history: &StepHistory<'_>,
         shared: &SharedVector,
         local: &LocalVector,
-        start_k: f64,
+        start_k: Option<f64>,
     ) -> (Vec<f64>, f64) {
         let rows: Vec<&Row> = self
             .step

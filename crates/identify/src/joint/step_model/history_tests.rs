@@ -101,7 +101,7 @@ fn columns_are_derivatives() {
             let size = expected.iter().fold(0.0_f64, |size, x| size.max(x.abs()));
             for (row, (found, expected)) in columns[index].iter().zip(&expected).enumerate() {
                 // Coefficients along a row of the inner wall are held: 2 % of the largest.
-                let allowed = if has_inner_wall { 0.08 } else { 2e-2 } * size + 1e-6;
+                let allowed = if has_inner_wall { 0.03 } else { 2e-2 } * size + 1e-6;
                 assert!(
                     (found - expected).abs() <= allowed,
                     "inner wall {has_inner_wall}, parameter {index}, row {row}: {found} and {expected}, largest {size}"

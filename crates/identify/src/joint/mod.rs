@@ -17,7 +17,7 @@ pub(crate) mod uncertainty;
 use crate::faults::balances::efficiency::FittedEfficiencies;
 use crate::joint::fit::refinements::{Gain, Refinements};
 use crate::joint::fit::solve::{Covariance, Problem};
-use crate::joint::step_model::parameters::INLET;
+use crate::joint::step_model::parameters::{INLET, LN_INNER_CONDUCTANCE, LOGIT_INNER, bounds};
 use crate::joint::step_model::rows::{Row, StepRows};
 use crate::joint::uncertainty::numbers::Numbers;
 use crate::joint::uncertainty::quantity::Number;
@@ -254,7 +254,12 @@ fn best_housing(problem: &mut Problem<'_>, config: &IdentifyConfig) -> Option<Fi
     if problem.model.has_balance && judge::may_have_inner_wall(problem) {
         let favoured = minimise_in_stages(&mut two, config)
             .and_then(|()| Some(two.ln_evidence()? - problem.ln_evidence()?));
-        if favoured.is_some_and(|ln_odds| ln_odds > INNER_WALL_LN_ODDS) {
+        // On a bound it is no wall, and Laplace's method does not hold there.
+        let is_inside = [LOGIT_INNER, LN_INNER_CONDUCTANCE].into_iter().all(|index| {
+            let (low, high) = bounds(index);
+            two.shared[index] > low && two.shared[index] < high
+        });
+        if is_inside && favoured.is_some_and(|ln_odds| ln_odds > INNER_WALL_LN_ODDS) {
             *problem = two;
         }
     }

@@ -74,13 +74,11 @@ impl<'a> Drive<'a> {
     ) -> Result<Self, DriftError> {
         let of_run: Vec<(usize, &CampaignStep)> =
             steps.iter().enumerate().filter(|(_, step)| step.run == run).collect();
-        let (Some((_, first)), Some((_, last))) = (of_run.first(), of_run.last()) else {
+        let Some((_, first)) = of_run.first() else {
             return Err(DriftError::NoSteps { run });
         };
-        let jumps: Vec<(f64, f64)> =
-            of_run.iter().map(|(_, step)| (step.start_s, step.valve_opening_ratio)).collect();
         let (model, nominal) = (request.model, &request.boundary);
-        let inputs = AveragedInputs::read(recording, nominal, &jumps, last.end_s)
+        let inputs = AveragedInputs::read(recording, nominal, &recording.steps)
             .map_err(|source| DriftError::Inputs { run, source })?;
         let before_s = request.identification.thresholds.end_mean_s;
         let start = start_state((run, recording), model, &inputs, first.start_s, before_s)?;

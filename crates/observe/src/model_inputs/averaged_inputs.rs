@@ -7,8 +7,10 @@ use crate::averages::mean_reading::BEFORE_S;
 use crate::averages::schedule::Schedule;
 use crate::averages::time_table::Table;
 use crate::channels::{INPUT_CHANNELS, boundary_condition};
-use crate::model_inputs::lagged_command::{LaggedCommand, Level, Response, measured_valve_response};
-use mapper_core::{Channel, Recording};
+use crate::model_inputs::lagged_command::{
+    LaggedCommand, Response, commanded_s, levels_of_step, measured_valve_response,
+};
+use mapper_core::{Channel, Recording, StepMarker};
 use mapper_numerics::statistics::mean;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::inputs::{Inputs, InputsError, InterpolatedInputs};
@@ -56,31 +58,28 @@ impl Inputs for AveragedInputs {
 }
 
 impl AveragedInputs {
-    /// The inputs of a recording until `end_s`. `jumps` are the times of command changes, rising, s, with the valve opening after each; the
-    /// recorded command may show a change one sample late. `nominal` replaces channels that are not recorded.
+    /// The inputs of a recording during `steps` (rising in time, each with the commands it holds). `nominal` replaces channels that are not
+    /// recorded.
     ///
     /// # Errors
-    /// [`InputsError`] if jumps do not rise.
+    /// [`InputsError`] if steps do not rise.
     pub fn read(
         recording: &Recording,
         nominal: &BoundaryConditions,
-        jumps: &[(f64, f64)],
-        end_s: f64,
+        steps: &[StepMarker],
     ) -> Result<AveragedInputs, InputsError> {
         let mut inputs = AveragedInputs { starts_s: Vec::new(), levels: Vec::new() };
-        let level = |(start_s, valve_opening_ratio): &(f64, f64)| Level {
-            start_s: *start_s,
-            p3_pa: nominal.p3_pa,
-            valve_opening_ratio: *valve_opening_ratio,
-        };
+        let levels: Vec<_> = steps.iter().map(|step| levels_of_step(recording, step)).collect();
         let valve = valve_response(recording, nominal);
-        let command = LaggedCommand::new(jumps.iter().map(level).collect(), Response::lag(0.0), valve);
-        for (index, (start_s, _)) in jumps.iter().enumerate() {
-            let next_s = jumps.get(index + 1).map_or(end_s, |next| next.0);
+        let command =
+            LaggedCommand::new(levels.iter().flatten().copied().collect(), Response::lag(0.0), valve);
+        for (index, (step, levels)) in steps.iter().zip(&levels).enumerate() {
+            let next_s = steps.get(index + 1).map_or(step.end_s, |next| next.start_s);
             let mut nodes =
                 Nodes { recording, nominal, command: &command, t_s: Vec::new(), rows: Vec::new() };
-            nodes.add_level(*start_s, next_s, index > 0);
-            inputs.starts_s.push(*start_s);
+            let changed_s = (index > 0).then(|| commanded_s(levels, step));
+            nodes.add_level(step.start_s, next_s, changed_s);
+            inputs.starts_s.push(step.start_s);
             inputs.levels.push(InterpolatedInputs::new(nodes.t_s, nodes.rows)?);
         }
         Ok(inputs)
@@ -108,10 +107,10 @@ struct Nodes<'a> {
 }
 
 impl Nodes<'_> {
-    /// Adds the nodes from one jump to the next.
-    fn add_level(&mut self, start_s: f64, end_s: f64, after_jump: bool) {
-        let raw_end_s = if after_jump { (start_s + RAW_S).min(end_s) } else { start_s };
-        if after_jump {
+    /// Adds the nodes from one jump to the next; its last command was sent at `changed_s`.
+    fn add_level(&mut self, start_s: f64, end_s: f64, changed_s: Option<f64>) {
+        let raw_end_s = changed_s.map_or(start_s, |changed_s| (changed_s + RAW_S).min(end_s));
+        if changed_s.is_some() {
             let t_s = self
                 .recording
                 .series
@@ -135,8 +134,12 @@ impl Nodes<'_> {
                 self.push(t_s, row);
             }
         }
-        let schedule = if after_jump { AFTER_JUMP } else { AT_REST };
-        for (low_s, high_s) in schedule.segments(start_s, end_s, 0.0) {
+        // The schedule after a jump begins with the end of its ramp.
+        let (schedule, from_s) = match changed_s {
+            Some(changed_s) => (AFTER_JUMP, changed_s),
+            None => (AT_REST, start_s),
+        };
+        for (low_s, high_s) in schedule.segments(from_s, end_s, 0.0) {
             let row = self.means(low_s, high_s - BEFORE_S);
             self.push(0.5 * (low_s + high_s), row);
         }
@@ -189,7 +192,18 @@ mod tests {
         let recording =
             Recording { series: [(Channel::P3, Series { t_s, values })].into(), ..Recording::default() };
         let nominal = BoundaryConditions::default();
-        let inputs = AveragedInputs::read(&recording, &nominal, &[(0.0, 1.0), (jump_s, 0.7)], 80.0).unwrap();
+        let steps = [(0.0, jump_s, 1.0, 120e3), (jump_s, 80.0, 0.7, 200e3)];
+        let steps = steps.map(|(start_s, end_s, valve_opening_ratio, p3_pa)| StepMarker {
+            index: 0,
+            kind: StepKind::Point,
+            start_s,
+            end_s,
+            from: None,
+            to: None,
+            p3_pa,
+            valve_opening_ratio,
+        });
+        let inputs = AveragedInputs::read(&recording, &nominal, &steps).unwrap();
         for t_s in (0..590).map(|tenth| jump_s + 0.95 + 0.1 * f64::from(tenth)) {
             let off_pa = inputs.at(t_s).p3_pa - p3_pa(t_s);
             assert!(off_pa.abs() < 20.0, "{off_pa} Pa off {} s after the jump", t_s - jump_s);
@@ -226,8 +240,6 @@ mod tests {
             }
         };
         let steps: Vec<StepMarker> = (0..8).map(step).collect();
-        let jumps: Vec<(f64, f64)> =
-            steps.iter().map(|step| (step.start_s, step.valve_opening_ratio)).collect();
         let recording = Recording {
             series: [
                 (Channel::ShaftSpeed, series(&|_| 120e3)),
@@ -240,7 +252,8 @@ mod tests {
             steps,
             ..Recording::default()
         };
-        let inputs = AveragedInputs::read(&recording, &BoundaryConditions::default(), &jumps, 160.0).unwrap();
+        let inputs =
+            AveragedInputs::read(&recording, &BoundaryConditions::default(), &recording.steps).unwrap();
         for since_s in [0.5, 1.0, 1.5, 2.5, 10.0] {
             let off = inputs.at(40.0 + since_s).valve_opening_ratio - truth(40.0 + since_s);
             // A twentieth of the jump: the orifice flow resolves the opening no better while it moves.

@@ -1,7 +1,8 @@
 //! Response of P3 and the valve to their commands: a first-order lag and a rate limit, and their estimation from a recording.
 
+use crate::averages::schedule::TIME_ROUNDING_S;
 use crate::averages::time_table::Table;
-use mapper_core::{Channel, Recording, StepMarker, is_jump, is_same_command};
+use mapper_core::{Channel, Recording, Series, StepMarker, is_jump, is_same_command};
 use mapper_numerics::minimise::minimise;
 use mapper_numerics::statistics::{mean, median};
 use mapper_physics::laws::orifice;
@@ -100,8 +101,8 @@ impl LaggedCommand {
         LaggedCommand { levels, at_start_pa, opening_at_start, p3, valve }
     }
 
-    /// The response to the commands of a recording with at least one step: a level for each step, and one for each further P3 command within
-    /// it, e.g. of a speed-control loop.
+    /// The response to the commands of a recording with at least one step: a level for each command, of which a jump has one, a ramp many, and
+    /// a speed-control loop one whenever it corrects P3.
     pub fn of_recording(recording: &Recording, p3: Response, valve: Response) -> Self {
         let levels = recording.steps.iter().flat_map(|step| levels_of_step(recording, step));
         LaggedCommand::new(levels.collect(), p3, valve)
@@ -142,23 +143,61 @@ impl LaggedCommand {
     }
 }
 
-/// The first level of a step, and the later levels of a speed-control loop.
+/// The levels of a step: of a jump, of a ramp, and of the speed-control loop after them.
 pub(crate) fn levels_of_step(recording: &Recording, step: &StepMarker) -> Vec<Level> {
-    let (mut start_s, mut p3_pa) = (step.start_s, step.p3_pa);
-    let level = |start_s, p3_pa| Level { start_s, p3_pa, valve_opening_ratio: step.valve_opening_ratio };
-    let mut levels = vec![level(start_s, p3_pa)];
-    let Some(command) = recording.series.get(&Channel::P3Command) else { return levels };
-    let (t_s, values) = command.slice(step.start_s, step.end_s);
-    // The first sample may precede the change; each change is later than the previous sample.
-    for (pair_s, value) in t_s.windows(2).zip(values.iter().skip(1)) {
+    let changes = |channel: Channel, marked: f64| match recording.series.get(&channel) {
+        Some(command) => changes_of_command(command, (step.start_s, step.end_s), marked),
+        None => vec![(step.start_s, marked)],
+    };
+    let p3 = changes(Channel::P3Command, step.p3_pa);
+    let valve = changes(Channel::ValveCommand, step.valve_opening_ratio);
+    let mut times_s: Vec<f64> = p3.iter().chain(&valve).map(|(t_s, _)| *t_s).collect();
+    times_s.sort_by(f64::total_cmp);
+    times_s.dedup();
+    let held = |changes: &[(f64, f64)], t_s: f64| {
+        let after = changes.partition_point(|(change_s, _)| *change_s <= t_s);
+        changes[after.saturating_sub(1)].1
+    };
+    let level = |start_s: f64| Level {
+        start_s,
+        p3_pa: held(&p3, start_s),
+        valve_opening_ratio: held(&valve, start_s),
+    };
+    times_s.into_iter().map(level).collect()
+}
+
+/// Times, s, and values of the changes of a command within a step; the first is at its start. `marked` is the step's own command, which counts
+/// where none is recorded.
+fn changes_of_command(command: &Series, (start_s, end_s): (f64, f64), marked: f64) -> Vec<(f64, f64)> {
+    let before = command.held(start_s - TIME_ROUNDING_S).filter(|value| value.is_finite());
+    let (t_s, values) = command.slice(start_s, end_s - TIME_ROUNDING_S);
+    let mut samples = t_s.iter().copied().zip(values.iter().copied()).filter(|(_, value)| value.is_finite());
+    let Some((mut seen_s, mut value)) = samples.next() else { return vec![(start_s, marked)] };
+    let is_old = before.is_some_and(|before| is_same_command(before, value));
+    let mut changes: Vec<(f64, f64)> = vec![(start_s, value)];
+    for (index, (t_s, next)) in samples.enumerate() {
         // The read-back of a constant command varies in its last digits.
-        let changed = p3_pa.is_nan() || !is_same_command(*value, p3_pa);
-        if changed && value.is_finite() && pair_s[0] > start_s {
-            (start_s, p3_pa) = (pair_s[0], *value);
-            levels.push(level(start_s, p3_pa));
+        if !is_same_command(next, value) {
+            // A change is later than the previous sample; that of the step itself is at its start, also if the first sample precedes it.
+            let change_s = if index == 0 && is_old { start_s } else { seen_s };
+            if change_s <= start_s {
+                changes.clear();
+            }
+            changes.push((change_s, next));
+            value = next;
         }
+        seen_s = t_s;
     }
-    levels
+    changes
+}
+
+/// Time at which the last command of a step's own change was sent, s: its start for a jump, the end of its ramp otherwise.
+pub(crate) fn commanded_s(levels: &[Level], step: &StepMarker) -> f64 {
+    let is_sent = |level: &&Level| {
+        is_same_command(level.p3_pa, step.p3_pa)
+            && is_same_command(level.valve_opening_ratio, step.valve_opening_ratio)
+    };
+    levels.iter().find(is_sent).map_or(step.start_s, |level| level.start_s)
 }
 
 /// Number of intervals of a coarse search. Bound: neighbouring lags differ by less than a factor of two.
@@ -302,7 +341,7 @@ fn estimate_response<Prediction: Fn(f64) -> f64>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mapper_core::{Series, StepKind};
+    use mapper_core::StepKind;
 
     fn step(start_s: f64, end_s: f64, p3_pa: f64) -> StepMarker {
         let (index, kind) = (0, StepKind::Point);

@@ -7,7 +7,7 @@
 use crate::averages::time_table::Table;
 use crate::channels::{INPUT_CHANNELS, boundary_condition};
 use crate::declared::Declared;
-use crate::model_inputs::lagged_command::{LaggedCommand, Response};
+use crate::model_inputs::lagged_command::{LaggedCommand, Response, commanded_s, levels_of_step};
 use crate::model_inputs::smoother::{TimeHistory, smooth};
 use mapper_core::{Channel, Recording};
 use mapper_numerics::statistics::MIN_VALUES;
@@ -63,7 +63,8 @@ impl SmoothedInputs {
         let jumps_s: Vec<f64> = recording.steps.iter().map(|step| step.start_s).collect();
         let input = |channel: Channel, values: &[f64]| {
             let noise_sigma = declared.noise_sigma(channel);
-            let per_p3 = change_per_pascal(table, values, (&command, &commanded_p3), noise_sigma);
+            let p3 = (&command, commanded_p3.as_slice());
+            let per_p3 = change_per_pascal((table, recording), values, p3, noise_sigma);
             let rest: Vec<f64> =
                 values.iter().zip(&commanded_p3).map(|(value, p3)| value - per_p3 * p3).collect();
             let history = smooth(&table.t_s, &rest, noise_sigma, declared.noise_colour, &jumps_s)?;
@@ -132,17 +133,21 @@ const LEVEL_WINDOW_S: f64 = 8.0;
 /// Change of `values` per pascal of P3, by regression of their jumps on those of P3, shrunk by its uncertainty (positive-part James-Stein
 /// estimate: Efron and Morris, J. Am. Stat. Assoc. 68:117, 1973). `commanded_p3` is P3 according to its command.
 fn change_per_pascal(
-    table: &Table,
+    (table, recording): (&Table, &Recording),
     values: &[f64],
     (command, commanded_p3): (&LaggedCommand, &[f64]),
     noise_sigma: f64,
 ) -> f64 {
     let (mut sum_xy, mut sum_xx, mut pairs) = (0.0, 0.0, Vec::new());
-    for pair in command.levels().windows(2) {
-        let jump_s = pair[1].start_s;
-        let settled_s = jump_s + command.p3_settles_s(pair[0].p3_pa, pair[1].p3_pa);
-        // Changes by a speed-control loop right after a jump are not separate jumps.
-        if pair[0].start_s > jump_s - LEVEL_WINDOW_S {
+    let mut arrived_s = f64::NEG_INFINITY;
+    for (before, step) in recording.steps.iter().zip(recording.steps.iter().skip(1)) {
+        let jump_s = step.start_s;
+        let sent_s = commanded_s(&levels_of_step(recording, step), step);
+        let settled_s = sent_s + command.p3_settles_s(before.p3_pa, step.p3_pa);
+        // The level before needs its time.
+        let is_short = arrived_s > jump_s - LEVEL_WINDOW_S;
+        arrived_s = sent_s;
+        if is_short {
             continue;
         }
         let height = |values: &[f64]| {

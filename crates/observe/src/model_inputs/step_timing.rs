@@ -73,8 +73,10 @@ fn command_s(recording: &Recording, step: &StepMarker) -> f64 {
         let (t_s, values) = command.slice(step.start_s, (step.start_s + MAX_COMMAND_DELAY_S).min(step.end_s));
         let unchanged = values.iter().take_while(|value| is_same_command(**value, before)).count();
         let after = values.get(unchanged)?;
-        (unchanged > 0 && !is_same_command(before, commanded) && is_same_command(*after, commanded))
-            .then(|| t_s[unchanged - 1])
+        // A jump arrives at once, a ramp begins on its way.
+        let share = (after - before) / (commanded - before);
+        let is_on_the_way = is_same_command(*after, commanded) || (0.0..=1.0).contains(&share);
+        (unchanged > 0 && !is_same_command(before, commanded) && is_on_the_way).then(|| t_s[unchanged - 1])
     };
     let late_s = commands.into_iter().find_map(late).map(|late_s| late_s.max(step.start_s));
     late_s.or_else(|| sampled_delay_s(recording, step)).unwrap_or(step.start_s)
@@ -174,7 +176,7 @@ impl Jump {
     /// P3 according to its command, delayed by this time.
     fn command(&self, shift_s: f64) -> LaggedCommand {
         let mut levels = self.levels.clone();
-        levels[self.at].start_s += shift_s;
+        levels[self.at..].iter_mut().for_each(|level| level.start_s += shift_s);
         LaggedCommand::new(levels, self.p3, Response::lag(0.0))
     }
 

@@ -65,10 +65,10 @@ impl Actuator {
         }
         self.command = command;
         let since_s = t_s + self.dynamics.dead_time_s;
+        let (start, output) = (self.drive(since_s), self.value(since_s));
         let under_way = self.motions.iter().rposition(|motion| motion.since_s <= t_s).unwrap_or(0);
         self.motions.drain(..under_way);
         self.motions.retain(|motion| motion.since_s < since_s);
-        let (start, output) = (self.drive(since_s), self.value(since_s));
         self.motions.push(Motion { since_s, start, output, command });
     }
 

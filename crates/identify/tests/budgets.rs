@@ -142,7 +142,7 @@ fn sensitivities_are_those_of_another_identification() {
         let of =
             |found: &Identified| found.budgets.iter().map(|one| one.eta.clone().unwrap()).collect::<Vec<_>>();
         let (before, after) = (of(&base), of(other));
-        // A whole standard uncertainty of T2 is 2 % of the rise at 50 krpm: the budget is linear.
+        // A whole standard uncertainty of T2 is 2 % of the rise at 50 krpm, and T1 moves the weight of preheating: the budget is linear to 5 %.
         let square = |values: &mut dyn Iterator<Item = f64>| {
             let squares: Vec<f64> = values.map(|value| value * value).collect();
             mean(&squares).unwrap().sqrt()
@@ -150,7 +150,7 @@ fn sensitivities_are_those_of_another_identification() {
         let change = square(&mut before.iter().zip(&after).map(|(a, b)| b.value - a.value));
         let stated = square(&mut before.iter().map(|budget| contribution(budget, source)));
         let combined = square(&mut before.iter().map(|budget| budget.combined_standard_uncertainty()));
-        assert!((change - stated).abs() < 0.02 * combined, "{source}: {change} and {stated} of {combined}");
+        assert!((change - stated).abs() < 0.05 * combined, "{source}: {change} and {stated} of {combined}");
     }
 }
 

@@ -206,12 +206,13 @@ fn of_draw(seed: u64, clean: &Campaign) -> Vec<String> {
         .filter(|(_, scores)| wrong(scores))
         .map(|(name, scores)| describe(name, scores))
         .collect();
-    // Refusing everything is not enough: the fault-free recording keeps its points, and so do harmless changes of it.
+    // Refusing everything is not enough: the fault-free recording keeps its points, and so do harmless changes of it, but for three points whose
+    // errors are as large as a good point may have.
     if base.iter().any(|score| score.good < 10) {
         bad.push(describe("fault-free", &base));
     }
     for (name, scores) in rows.iter().filter(|(name, _)| HARMLESS.contains(name)) {
-        if scores.iter().zip(&base).any(|(score, base)| score.good + 2 < base.good) {
+        if scores.iter().zip(&base).any(|(score, base)| score.good + 3 < base.good) {
             bad.push(describe(&format!("{name}, harmless, refused"), scores));
         }
     }

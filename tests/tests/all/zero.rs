@@ -68,14 +68,13 @@ fn a_soak_removes_the_offsets_from_the_slowest_points() {
     // Declared are 0.25 K on T1 and T2 and 0.3 K on Tc, left are 0.05 K: five times less, half of it counts as shrunk.
     assert!(rms(&with) < 0.5 * rms(&without), "{with:?} with, {without:?} without the zero");
     for ((_, with), (_, without)) in with.iter().zip(&without) {
-        assert!(*with < 0.4 * *without, "intervals of {with} and {without}");
+        assert!(*with < 0.5 * *without, "intervals of {with} and {without}");
     }
 }
 
-/// The oil needs half an hour to come down to the cell's temperature, and the housing longer: both keep their declared offsets, and what rests is
-/// zeroed.
+/// A housing needs ten minutes to show its limit: it keeps its declared offset, and what rests is zeroed.
 #[test]
-fn a_soak_that_is_too_short_for_oil_and_housing_zeroes_what_rests() {
+fn a_soak_that_is_too_short_for_the_housing_zeroes_what_rests() {
     let scratch = scratch();
     let result = run("zero: {soak: 5 min}\n", 1, scratch.path());
     let zero = &result["zero"];
@@ -84,7 +83,5 @@ fn a_soak_that_is_too_short_for_oil_and_housing_zeroes_what_rests() {
     }
     let left_out: Vec<&str> =
         zero["left_out"].as_array().unwrap().iter().map(|left| left["channel"].as_str().unwrap()).collect();
-    for channel in ["Tc", "T_oil"] {
-        assert!(zero["offsets"][channel].is_null() && left_out.contains(&channel), "{zero}");
-    }
+    assert!(zero["offsets"]["Tc"].is_null() && left_out.contains(&"Tc"), "{zero}");
 }

@@ -47,7 +47,7 @@ pub struct RigActuators {
 
 impl RigActuators {
     /// Air from a fast control valve, and a fast back-pressure valve: the rig of the paper, whose pressure follows within a second.
-    /// Source: Burke et al., section 3, for the pressure; Judgement: data sheets of positioners for the valve.
+    /// Source: Burke et al., section 3, for the pressure; data sheets of electric positioners (a stroke in a second) for the valve.
     pub const FAST_VALVE: RigActuators = RigActuators {
         p3: ActuatorMotion { lag_s: 0.3, rate_per_s: 200e3, dead_time_s: 0.0 },
         valve: ActuatorMotion { lag_s: 0.2, rate_per_s: 1.0, dead_time_s: 0.0 },
@@ -56,8 +56,8 @@ impl RigActuators {
         t3: ActuatorMotion { lag_s: 20.0, rate_per_s: 10.0, dead_time_s: 0.0 },
     };
 
-    /// Air from a screw compressor, whose inverter sets the pressure. Judgement: inverters ramp from 10 to 60 s over the range of pressure;
-    /// pneumatic positioners have a play of about 2 %.
+    /// Air from a screw compressor, whose inverter sets the pressure. Source: data sheets of inverters, which ramp over the range of
+    /// pressure in 10 to 60 s, and of pneumatic positioners, with a play of about 2 %.
     pub const SCREW_COMPRESSOR: RigActuators = RigActuators {
         p3: ActuatorMotion { lag_s: 4.0, rate_per_s: 10e3, dead_time_s: 1.0 },
         valve: ActuatorMotion { lag_s: 0.5, rate_per_s: 0.5, dead_time_s: 0.2 },
@@ -66,7 +66,8 @@ impl RigActuators {
         t3: ActuatorMotion { lag_s: 30.0, rate_per_s: 5.0, dead_time_s: 1.0 },
     };
 
-    /// Air from a vessel through a control valve. Judgement: large control valves stroke in 5 to 10 s.
+    /// Air from a vessel through a control valve. Source: data sheets of large control valves, which stroke
+    /// in 5 to 10 s.
     pub const BLOW_DOWN: RigActuators = RigActuators {
         p3: ActuatorMotion { lag_s: 1.0, rate_per_s: 50e3, dead_time_s: 0.3 },
         valve: ActuatorMotion { lag_s: 0.5, rate_per_s: 0.5, dead_time_s: 0.2 },

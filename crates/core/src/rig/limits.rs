@@ -40,11 +40,11 @@ impl Limits {
         self.p3_stroke_s.map(|stroke_s| (self.p3_max_pa - self.p3_min_pa) / stroke_s)
     }
 
-    /// Default of the largest overshoot. Judgement: twice the band within which guards expect the speed of a step.
+    /// Default of the largest overshoot. Bound: twice the band within which guards expect the speed of a step.
     pub const OVERSHOOT_RATIO: f64 = 0.02;
-    /// Default of the smallest surge margin of a transition. Judgement: the usual uncertainty of a surge line.
+    /// Default of the smallest surge margin of a transition. Bound: the usual uncertainty of a surge line.
     pub const TRANSITION_MARGIN_RATIO: f64 = 0.05;
-    /// Room below the margins of two close points for the jump between them. Judgement: warm housings heat the outlet gas, which takes some
+    /// Room below the margins of two close points for the jump between them. Bound: warm housings heat the outlet gas, which takes some
     /// tenths of a per cent of the valve's flow.
     const CLOSE_POINT_RATIO: f64 = 0.01;
 
@@ -140,7 +140,7 @@ impl Soak {
     /// Shortest soak that ends when the sensors rest, s. Bound: gas in pipes settles within a minute, and two and a half minutes of noise of 0.1 K
     /// are known to 0.01 K.
     pub const SHORTEST_S: f64 = 300.0;
-    /// Longest soak that ends when the sensors rest, s. Judgement: a housing is then within 1 K of the cell, and waiting longer costs more than a
+    /// Longest soak that ends when the sensors rest, s. Bound: a housing is then within 1 K of the cell, and waiting longer costs more than a
     /// declared offset.
     pub const LONGEST_S: f64 = 1800.0;
     /// Maximum drift of a thermometer at rest, K/min. Bound: housings of 10 minutes are then within 1 K of their limit.

@@ -5,10 +5,10 @@ use mapper_core::{Channel, Dimension, Recording, is_reading};
 use mapper_numerics::statistics::{EXCLUDE_SIGMAS, mean};
 use serde::{Deserialize, Serialize};
 
-/// Uncertainty of a cell's temperature at the machine by a thermometer without a declared offset, K. Judgement: class B of IEC 60751 and the
+/// Uncertainty of a cell's temperature at the machine by a thermometer without a declared offset, K. Source: class B of IEC 60751 and the
 /// stratification of a closed cell.
 const CELL_SIGMA_K: f64 = 0.5;
-/// Uncertainty of a declared barometer reading at the time of the zero, Pa. Judgement: a reading in tenths of a kPa, and the weather of a few
+/// Uncertainty of a declared barometer reading at the time of the zero, Pa. Bound: a reading in tenths of a kPa, and the weather of a few
 /// hours.
 const BAROMETER_SIGMA_PA: f64 = 150.0;
 /// Standard deviation over the half width of a rectangular distribution. Source: GUM 4.3.7, 1/sqrt(3).

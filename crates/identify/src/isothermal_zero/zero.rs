@@ -9,12 +9,12 @@ use crate::IdentifyConfig;
 use crate::isothermal_zero::periodic::{self, PeriodicError};
 use crate::isothermal_zero::references::{CellReference, compare};
 use crate::isothermal_zero::relaxation;
+use crate::isothermal_zero::soak_readings::{
+    Reading, SOAK_PARTS, at_rest, combined_sigma, common, soak_mean, usable,
+};
 use crate::step_data::samples::TREND_BLOCK_S;
 use mapper_core::unit_factors::S_PER_MIN;
-use mapper_core::{
-    Channel, DeclaredUncertainty, Recording, SAMPLE_INTERVAL_S, Series, Soak, StepMarker, is_reading,
-    plausible,
-};
+use mapper_core::{Channel, DeclaredUncertainty, Recording, SAMPLE_INTERVAL_S, Soak};
 use mapper_numerics::coloured_noise::variance_of_mean;
 use mapper_numerics::statistics::{EXCLUDE_SIGMAS, mean};
 use mapper_observe::declared::{CommonOffset, rest_pressure_pa, usual_noise_sigma};
@@ -26,9 +26,6 @@ use std::collections::BTreeMap;
 const LONGEST_SOAK_S: f64 = 600.0;
 /// Minimum length of that segment, s. Bound: noise of 0.1 K at 10 Hz leaves its drift an error of 0.02 K/min.
 const SHORTEST_SOAK_S: f64 = 60.0;
-/// Parts of a soak: its drift is the difference of last and first; the limit leaves the first out. Source: the slope between
-/// thirds has nearly the smallest error (Bartlett, Biometrics 5, 1949).
-const SOAK_PARTS: f64 = 3.0;
 
 /// Time constant with which a drifting reading approaches its limit, min. Bound: the middle of those of stopped housings, 700 s.
 const DRIFT_TIME_CONSTANT_MIN: f64 = 700.0 / S_PER_MIN;
@@ -529,28 +526,6 @@ fn groups(settings: &ZeroSettings) -> [Group; 3] {
     [temperatures, of_pressures(pressures, true), of_pressures(turbine_pressures, false)]
 }
 
-/// Whether a shaft is slower than any running machine's, and hence at standstill.
-fn is_at_rest(speed_rpm: f64) -> bool {
-    speed_rpm.abs() < *plausible(Channel::ShaftSpeed).running.start()
-}
-
-/// The last standstill before the first step with a running machine. If steps were detected from the readings, the soak may count as a step.
-fn at_rest(recording: &Recording) -> (f64, f64) {
-    let runs = |step: &&StepMarker| {
-        let speed = recording.series.get(&Channel::ShaftSpeed);
-        let last = speed.and_then(|speed| speed.slice(step.start_s, step.end_s).1.last());
-        last.is_none_or(|speed_rpm| !is_at_rest(*speed_rpm))
-    };
-    let first_s = recording.steps.iter().find(runs).map_or(f64::INFINITY, |step| step.start_s);
-    let Some(speed) = recording.series.get(&Channel::ShaftSpeed) else { return (0.0, 0.0) };
-    let before = speed.t_s.partition_point(|t| *t < first_s);
-    let rests = |i: usize| speed.values.get(i).is_some_and(|speed_rpm| is_at_rest(*speed_rpm));
-    let Some(last) = (0..before).rev().find(|i| rests(*i)) else { return (0.0, 0.0) };
-    let first = (0..last).rev().find(|i| !rests(*i)).map_or(0, |i| i + 1);
-    // The last sample at standstill may already belong to the start of the machine.
-    (speed.t_s[first], speed.t_s[last.saturating_sub(1).max(first)])
-}
-
 /// The standard error of the limit of a housing after a soak of `soak_s`.
 fn expected_limit_error(
     noise_sigma: f64,
@@ -569,62 +544,4 @@ fn expected_limit_error(
     let variance = config.noise().variance_of_mean(samples, TREND_BLOCK_S);
     let relaxing: Vec<f64> = t_s.iter().map(|t_s| relaxation::usual_k(*t_s)).collect();
     relaxation::limit(&t_s, &relaxing, noise_sigma * variance.sqrt()).map(|(_, error)| error)
-}
-
-/// Reading of a sensor at standstill, K or Pa.
-#[derive(Clone, Copy)]
-struct Reading {
-    channel: Channel,
-    mean: f64,
-    /// Remaining standard deviation of its offset.
-    own: f64,
-    /// The same with the declared offset.
-    total: f64,
-    /// Drift, K or Pa per minute.
-    drift_per_min: f64,
-    /// Standard deviation of the drift by noise.
-    drift_sigma: f64,
-}
-
-impl Reading {
-    /// Without a value and an error.
-    fn of(channel: Channel) -> Self {
-        Reading { channel, mean: 0.0, own: 0.0, total: 0.0, drift_per_min: 0.0, drift_sigma: 0.0 }
-    }
-
-    /// Adds an error of the zero.
-    fn widen(&mut self, sigma: f64) {
-        self.own = self.own.hypot(sigma);
-        self.total = self.total.hypot(sigma);
-    }
-}
-
-/// Standard deviation of the common reading.
-fn combined_sigma(readings: &[Reading]) -> f64 {
-    readings.iter().map(|reading| reading.total.powi(-2)).sum::<f64>().sqrt().recip()
-}
-
-/// The common reading of the sensors.
-fn common(readings: &[Reading]) -> f64 {
-    let weight: f64 = readings.iter().map(|reading| reading.total.powi(-2)).sum();
-    readings.iter().map(|reading| reading.mean * reading.total.powi(-2)).sum::<f64>() / weight
-}
-
-/// The plausible readings among some values.
-fn usable(channel: Channel, values: &[f64]) -> Vec<f64> {
-    values.iter().copied().filter(|value| is_reading(channel, *value)).collect()
-}
-
-struct SoakMean {
-    mean: f64,
-    drift_per_min: f64,
-}
-
-/// Mean of a channel over a segment, and its drift from the first to the last third.
-fn soak_mean(recording: &Recording, channel: Channel, start_s: f64, end_s: f64) -> Option<SoakMean> {
-    let series: &Series = recording.series.get(&channel)?;
-    let third_s = (end_s - start_s) / SOAK_PARTS;
-    let of = |start_s: f64, end_s: f64| mean(usable(channel, series.slice(start_s, end_s).1));
-    let (early, late) = (of(start_s, start_s + third_s)?, of(end_s - third_s, end_s)?);
-    Some(SoakMean { mean: of(start_s, end_s)?, drift_per_min: (late - early) / (2.0 * third_s / S_PER_MIN) })
 }

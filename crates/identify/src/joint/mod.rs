@@ -24,9 +24,9 @@ use crate::joint::uncertainty::quantity::Number;
 use crate::single_step::dynamic::Estimate;
 use crate::step_data::end_state::EndState;
 use crate::step_outcome::findings::Findings;
-use crate::{IdentifyConfig, step_data::commands};
+use crate::{Choice, IdentifyConfig, step_data::commands};
 use mapper_core::{
-    EstimateUncertainty, FitFailure, LeftOut, Recording, ThermalModel, Verdict, Warning, Window,
+    Channel, EstimateUncertainty, FitFailure, LeftOut, Recording, ThermalModel, Verdict, Warning, Window,
     confidence_interval_95,
 };
 use mapper_numerics::least_squares::descent::ROUNDS;
@@ -40,6 +40,17 @@ const MAX_LOST_RATIO: f64 = 2.0;
 /// Maximum error of the efficiencies, fraction, that only the declaration of alpha_A, probe and heating/cooling ratio excludes. Bound:
 /// above it, a machine not as declared could pass for one that is.
 pub const MAX_PRIOR_SENSITIVITY_ETA: f64 = 0.0125;
+
+/// Channels on which the prediction of a step depends.
+const DRIVING: [Channel; 6] =
+    [Channel::T1, Channel::T2, Channel::Tc, Channel::P1, Channel::P2, Channel::CompressorFlow];
+/// Minimum number of steps for the shared parameters. Bound: coefficient and exponent of a law, and one more.
+const MIN_SHARING: usize = 3;
+
+/// Share of steps with frozen readings above which the balance of the housing is no observation. Bound: that of the steps that a fit may exclude.
+const MAX_FROZEN_SHARE: f64 = 1.0 / 3.0;
+/// Number of samples at the limit of a sensor that distort a step. Bound: one could be an outlier, and a second one chance.
+const MIN_TOUCHES: usize = 3;
 
 /// ln of the odds above which a housing has an inner wall. Bound: 150 to 1; recordings of one node give less than 1e-9, of two more than 1e400.
 const INNER_WALL_LN_ODDS: f64 = 5.0;
@@ -89,7 +100,14 @@ pub(crate) fn estimate(
         }
     }
     let steps = fit::start::steps(recording, end_states, config, findings);
-    let attempt = match Attempt::new(&steps, &alone, config) {
+    let frozen: Vec<bool> = frozen_steps(recording, &steps, findings);
+    let mut without_balance = config.clone();
+    without_balance.joint.balance = Choice::Fixed;
+    // The balance follows Tc through the run: where it is missing in many steps, the others do not determine what it determines.
+    let is_interrupted =
+        frozen.iter().filter(|is_frozen| **is_frozen).count() as f64 > MAX_FROZEN_SHARE * steps.len() as f64;
+    let config = if is_interrupted { &without_balance } else { config };
+    let attempt = match Attempt::new(&steps, &frozen, &alone, config) {
         Some(first) if !is_refused && !first.thermal.doubts.is_empty() => {
             Some(first.without_a_region(&steps, config).unwrap_or(first))
         }
@@ -169,6 +187,37 @@ pub(crate) fn estimate(
     Joint { estimates, thermal: Some(thermal), dynamic, fitted }
 }
 
+/// Whether a reading on which the prediction depends stood still in each step, or touched the end of its range if it stood still in another: gas
+/// and housing did not.
+fn frozen_steps(recording: &Recording, steps: &[StepRows], findings: &[Findings]) -> Vec<bool> {
+    let stuck = |step: &StepRows| {
+        findings[step.position].warnings.iter().find_map(|warning| match warning {
+            Warning::Stuck { channel, .. } | Warning::FrozenChannel { channel, .. } => Some(*channel),
+            _ => None,
+        })
+    };
+    let mut limits: Vec<(Channel, f64)> = Vec::new();
+    for channel in
+        DRIVING.into_iter().filter(|channel| steps.iter().any(|step| stuck(step) == Some(*channel)))
+    {
+        let values = recording.series.get(&channel).map_or(&[][..], |series| &series.values);
+        limits.push((channel, values.iter().copied().fold(f64::NEG_INFINITY, f64::max)));
+        limits.push((channel, values.iter().copied().fold(f64::INFINITY, f64::min)));
+    }
+    let touches = |step: &StepRows, (channel, limit): &(Channel, f64)| {
+        let of = recording.series.get(channel).zip(recording.steps.get(step.position));
+        of.is_some_and(|(series, marker)| {
+            let values = series.slice(marker.start_s, marker.end_s).1;
+            values.iter().filter(|value| *value == limit).count() >= MIN_TOUCHES
+        })
+    };
+    let is_frozen = |step: &StepRows| {
+        stuck(step).is_some_and(|channel| DRIVING.contains(&channel))
+            || limits.iter().any(|limit| touches(step, limit))
+    };
+    steps.iter().map(is_frozen).collect()
+}
+
 /// A fit with its results.
 struct Attempt<'a> {
     problem: Problem<'a>,
@@ -182,8 +231,19 @@ struct Attempt<'a> {
 }
 
 impl<'a> Attempt<'a> {
-    fn new(steps: &'a [StepRows], alone: &[Estimate], config: &IdentifyConfig) -> Option<Self> {
+    /// `frozen`: steps with readings that stood still, which the shared parameters do without if enough others are left.
+    fn new(
+        steps: &'a [StepRows],
+        frozen: &[bool],
+        alone: &[Estimate],
+        config: &IdentifyConfig,
+    ) -> Option<Self> {
         let mut problem = fit::start::problem(steps, alone, config)?;
+        if frozen.iter().filter(|is_frozen| !**is_frozen).count() >= MIN_SHARING {
+            for (member, is_frozen) in problem.members.iter_mut().zip(frozen) {
+                (member.contributes, member.excluded) = (!is_frozen, *is_frozen);
+            }
+        }
         let fitted = best_housing(&mut problem, config)?;
         Attempt::of(problem, fitted, steps, config)
     }

@@ -83,7 +83,7 @@ mod tests {
     fn each_surge_is_one_event_with_its_duration_and_lowest_flow() {
         let mut events = SurgeEvents::default();
         let mut found: Vec<Event> = Vec::new();
-        let is_surge = |t_s: f64| (3.0..6.0).contains(&t_s) || (12.0..12.5).contains(&t_s);
+        let is_surge = |t_s: f64| (3.0..6.0).contains(&t_s) || (12.0..12.55).contains(&t_s);
         for second in 0..20 {
             let from_s = f64::from(second);
             let t_s: Vec<f64> = (0..10).map(|i| from_s + 0.1 * f64::from(i)).collect();

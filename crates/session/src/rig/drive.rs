@@ -80,7 +80,7 @@ pub fn drive_paced(
     let protection = Protection {
         safe: campaign.safe_state.unwrap_or(rig.safe),
         p3_min_pa: campaign.limits.p3_min_pa,
-        stand: rig.controls.then(|| StandMotion {
+        stand: Some(StandMotion {
             actuators: campaign.rig_actuators(),
             overshoot_ratio: campaign.limits.overshoot_ratio(),
             speed_max_rpm: campaign.limits.speed_max_rpm,

@@ -43,12 +43,21 @@ pub(crate) fn hold(problem: &mut Problem<'_>) {
     }
 }
 
-/// Error of the efficiencies, fraction (rms of one standard error), if parameters that are taken for neutral are not: the part of their variance
-/// that knowing these parameters removes, averaged over the sets of the mixture. `None` as `found`: all are taken for neutral.
+/// Error of the efficiencies, fraction (rms of one standard error), if parameters that are taken for neutral differ from that as those of
+/// machines do, and the recording alone determines them: the part of their variance that knowing these parameters removes, averaged over the sets
+/// of the mixture. `None` as `found`: all are taken for neutral.
 pub(crate) fn prior_sensitivity(open: &Problem<'_>, found: Option<&Refinements>) -> Option<f64> {
     let covariance = open.covariance()?;
+    let refinements = sought(open);
     let rows: Vec<Option<usize>> =
-        sought(open).iter().map(|refinement| covariance.row_of(refinement.index)).collect();
+        refinements.iter().map(|refinement| covariance.row_of(refinement.index)).collect();
+    // The fit has a wider prior, so that it does not hide what the recording says.
+    let weight_change = |row: usize| {
+        let place = rows.iter().position(|other| *other == Some(row));
+        place.and_then(|place| refinements.get(place)).map_or(0.0, |refinement| {
+            refinement.slab_sigma.powi(-2) - open.priors[refinement.index].sigma.powi(-2)
+        })
+    };
     let mut sets: BTreeMap<Vec<usize>, f64> = BTreeMap::new();
     match found {
         None => _ = sets.insert(rows.iter().copied().flatten().collect(), 1.0),
@@ -61,11 +70,15 @@ pub(crate) fn prior_sensitivity(open: &Problem<'_>, found: Option<&Refinements>)
     }
     let removed = |neutral: &[usize]| -> Option<f64> {
         let count = neutral.len();
-        let part =
-            DMatrix::from_fn(count, count, |a, b| covariance.shared[(neutral[a], neutral[b])]).cholesky()?;
+        let information = DMatrix::from_fn(count, count, |a, b| covariance.shared[(neutral[a], neutral[b])])
+            .cholesky()?
+            .inverse();
+        let changes = DVector::from_iterator(count, neutral.iter().map(|row| weight_change(*row)));
+        let narrowed = (&information + DMatrix::from_diagonal(&changes)).cholesky()?;
         let of_step = |(_, mixed): &(_, Matrix4xX<f64>)| {
             let with = DVector::from_iterator(count, neutral.iter().map(|row| mixed[(ETA, *row)]));
-            with.dot(&part.solve(&with))
+            let per_parameter = &information * with;
+            per_parameter.dot(&narrowed.solve(&per_parameter))
         };
         mean(covariance.own.iter().map(of_step))
     };

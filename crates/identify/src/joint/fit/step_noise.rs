@@ -7,7 +7,7 @@
 use crate::IdentifyConfig;
 use crate::joint::fit::solve::{Member, Problem};
 use crate::joint::fit::whitening::Whitening;
-use crate::joint::step_model::history::{Linearised, SmoothedInput};
+use crate::joint::step_model::linearised::{Linearised, SmoothedInput};
 use crate::joint::step_model::parameters::{
     ALPHA, EXPONENT, LN_COEFFICIENT, LN_HEATING_COOLING_RATIO, LN_INNER_CONDUCTANCE, LOGIT_INNER, PREHEAT,
     PROBE_MM2, Place, SHARED, SharedVector, TC_LAG,

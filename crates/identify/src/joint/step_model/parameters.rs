@@ -128,11 +128,11 @@ pub(crate) struct Refinement {
     pub(crate) is_positive: bool,
 }
 
-/// Each parameter with a prior about its declared value. Source of the slabs: compressors have 0 to 0.3 of their area before the wheel; probes
+/// Each parameter with a prior about its declared value. Source: for the slabs, compressors have 0 to 0.3 of their area before the wheel; probes
 /// of 0.5 to 3 mm are sold, and half a millimetre is a sheathed thermocouple; heated and cooled boundary layers differ by up to a third
 /// (Gnielinski's (Pr/Pr_w)^0.11 and (T/T_w)^0.45 between 300 and 600 K); 0.5 W/K are 0.05 m2 of duct at 10 W/(m2 K);
-/// glued or screwed thermocouples of 1 to 3 mm follow within 1 to 5 s. Source of the model errors:
-/// a change by one of them moves an efficiency by a tenth of a point.
+/// glued or screwed thermocouples of 1 to 3 mm follow within 1 to 5 s. A change by a model error moves an
+/// efficiency by a tenth of a point.
 pub(crate) const REFINEMENTS: [Refinement; 5] = [
     Refinement { index: ALPHA, wide_sigma: 0.3, slab_sigma: 0.1, model_error: 0.002, is_positive: true },
     Refinement { index: PROBE_MM2, wide_sigma: 10.0, slab_sigma: 2.0, model_error: 0.1, is_positive: true },

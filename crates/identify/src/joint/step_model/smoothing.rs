@@ -4,31 +4,32 @@
 //! exponentials: a polynomial alone leaves the settling of flow and pressure, which looks like a slow probe. The projection is linear, so the
 //! noise of what it leaves is known: [`crate::joint::fit::step_noise`].
 
+use crate::joint::step_model::parameters::Place;
 use nalgebra::{DMatrix, DVector};
 
 /// Number of smoothed channels.
-pub(crate) const SMOOTHED_COUNT: usize = 5;
+pub(crate) const SMOOTHED_COUNT: usize = FLOW + 1;
 /// Place of T1.
-pub(crate) const T1: usize = 0;
+pub(crate) const T1: Place = 0;
 /// Place of Tc.
-pub(crate) const TC: usize = 1;
+pub(crate) const TC: Place = 1;
 /// Place of P1.
-pub(crate) const P1: usize = 2;
+pub(crate) const P1: Place = 2;
 /// Place of P2.
-pub(crate) const P2: usize = 3;
+pub(crate) const P2: Place = 3;
 /// Place of the flow.
-pub(crate) const FLOW: usize = 4;
+pub(crate) const FLOW: Place = 4;
 
 /// Degree of the polynomial in a window of [`SHORT_S`]. Bound: T1 and P1 follow the cell; the others bend as the housing warms up.
 const DEGREES: [usize; SMOOTHED_COUNT] = [1, 3, 1, 3, 3];
 /// Time constants of the settling of each channel, s. Source: outlet volume and shaft speed settle within 1.5 to 5 s of a jump on stands with a
 /// fast supply; the slope of Tc follows the slower heat of the gas path.
 const SETTLING_S: [&[f64]; SMOOTHED_COUNT] = [&[], &[3.0, 8.0], &[], &[1.5, 5.0], &[1.5, 5.0]];
-/// Window for which these degrees suffice, s.
+/// Window for which these degrees suffice, s. Bound: a cubic over it follows the exponential of a housing to a hundredth of its change.
 const SHORT_S: f64 = 30.0;
 /// Additional time per degree of a channel that bends, s. Bound: a tenth of a minute of ripple of T3 needs it.
 const BENDING_S: f64 = 10.0;
-/// The same for a channel that follows the cell, s.
+/// The same for a channel that follows the cell, s. Bound: air conditioning has periods of minutes.
 const STEADY_S: f64 = 30.0;
 /// Minimum number of rows for each function. Bound: leaves the noise of three rows out of four.
 const ROWS_PER_FUNCTION: usize = 4;

@@ -1,0 +1,466 @@
+//! A step's model linearised: one column per parameter, by the chain rule from the inputs of a row through wall, probe and integral.
+
+use crate::joint::step_model::gas_path::{GasPath, INPUT_COUNT, Input, Inputs, Slopes};
+use crate::joint::step_model::history::{Model, StepHistory, surface_of, tc_error_k};
+use crate::joint::step_model::housing::HEAT_PARAMETERS;
+use crate::joint::step_model::parameters::{
+    ALPHA, BAROMETER, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, HUMIDITY, INLET, LN_CAPACITY, LN_COEFFICIENT,
+    LN_DEVIATION, LN_HEATING_COOLING_RATIO, LN_INNER_CONDUCTANCE, LOGIT_INNER, LocalVector, OFFSETS, P1_GAIN,
+    P1_OFFSET, P2_GAIN, P2_OFFSET, PREHEAT, PROBE_MM2, STEP_HEAT, SURFACE, SharedVector, T2_GAIN, T2_OFFSET,
+    TC_GAIN, TC_LAG, TC_OFFSET, THERMOMETERS,
+};
+use crate::joint::step_model::rows::{Row, StepRows};
+use crate::joint::step_model::surface::dot;
+use crate::single_step::probe::{Lag, follow};
+use mapper_physics::rig::sensor_fault::CALIBRATED_AT_K;
+
+/// Step of the derivative by the square of the probe's diameter, relative. Bound: between rounding and curvature.
+const PROBE_STEP_RATIO: f64 = 1e-3;
+/// Square of the diameter below which the lag is linear in it, mm2: it grows with a power below 1, which has no slope at 0. Bound: 0.3 mm lag
+/// by a tenth of a second, below anything that a block of half a second shows.
+pub(crate) const LINEAR_BELOW_MM2: f64 = 0.1;
+
+/// One row of the linearised model.
+pub(super) struct RowState {
+    pub(super) path: GasPath,
+    pub(super) slopes: Slopes,
+    pub(super) inputs: Inputs,
+    /// Rate of Tc by the heat, K/s.
+    pub(super) rate_k_s: f64,
+    /// Heat capacity of the outer part (of the housing, if it is one node), J/K, and the derivative of its logarithm by Tc, 1/K.
+    pub(super) outer_j_k: f64,
+    pub(super) ln_capacity_by_k: f64,
+    /// Derivatives of the heat from elsewhere: see [`Housing::heat_slopes`].
+    pub(super) heat: [f64; HEAT_PARAMETERS.len() + 1],
+    pub(super) wall: WallRow,
+}
+
+/// The inner wall along a row.
+#[derive(Clone, Copy, Default)]
+pub(super) struct WallRow {
+    /// Share of its deviation that is left at the row's end.
+    pub(super) kept: f64,
+    /// Mean share over the row.
+    pub(super) mean: f64,
+    /// Conductance to gas and outer part, W/K.
+    pub(super) sum_w_k: f64,
+    /// Its mean rate times its capacity, W.
+    pub(super) stored_w: f64,
+}
+
+/// A small change of what acts on a row.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Change {
+    inputs: [f64; INPUT_COUNT],
+    /// Heat from elsewhere, W.
+    heat_w: f64,
+    /// Tc without its errors, K; also in `inputs`.
+    reading_k: f64,
+    ln_capacity: f64,
+    logit_inner: f64,
+    ln_conductance: f64,
+}
+
+impl Change {
+    fn of(input: Input, by: f64) -> Self {
+        let mut change = Change::default();
+        change.inputs[input as usize] = by;
+        change
+    }
+
+    /// Of Tc as read.
+    fn of_tc(by: f64) -> Self {
+        Change { reading_k: by, ..Change::of(Input::Outer, by) }
+    }
+
+    fn heat(by_w: f64) -> Self {
+        Change { heat_w: by_w, ..Change::default() }
+    }
+}
+
+/// A model linearised along a step.
+pub(crate) struct Linearised<'a> {
+    pub(super) model: &'a Model,
+    pub(super) step: &'a StepRows,
+    pub(super) states: Vec<RowState>,
+    /// Number of states before the window.
+    pub(super) lead: usize,
+    /// Capacity share and conductance of the inner wall.
+    pub(super) inner: (f64, f64),
+    pub(super) probe: Probe,
+    pub(super) gas_k: Vec<f64>,
+}
+
+/// A probe that lags, or for a negative square of its diameter leads by as much.
+pub(super) struct Probe {
+    pub(super) lags: Vec<Lag>,
+    /// Share of the lag, -1 to 1.
+    pub(super) share: f64,
+}
+
+impl Probe {
+    /// The gas as the probe reads it; `first`: reading at the first row.
+    pub(super) fn read(&self, gas_k: &[f64], first: f64) -> Vec<f64> {
+        if self.share == 0.0 {
+            return gas_k.to_vec();
+        }
+        let lagged = follow(&self.lags, first, gas_k);
+        lagged.iter().zip(gas_k).map(|(lagged, gas)| gas + self.share * (lagged - gas)).collect()
+    }
+}
+
+impl Linearised<'_> {
+    /// Tc by its heat from the first row of the window on, with the errors of its reading, K.
+    pub(super) fn tc_k(&self, shared: &SharedVector) -> Vec<f64> {
+        let rows = &self.step.rows;
+        let start_k = rows.first().map_or(0.0, |row| row.tc_k);
+        let rates: Vec<f64> = self.states[self.lead..].iter().map(|state| state.rate_k_s).collect();
+        let integral = integral(rows, &rates);
+        integral
+            .into_iter()
+            .zip(rows)
+            .map(|(change_k, row)| {
+                start_k + change_k + tc_error_k(row.tc_k, shared) - shared[TC_LAG] * row.tc_slope_k_s
+            })
+            .collect()
+    }
+
+    /// Changes of the readings, and of the inner wall at the end, by a change of each row.
+    fn respond(&self, change: impl Fn(usize, &RowState) -> Change, start_k: Option<f64>) -> (Vec<f64>, f64) {
+        // Without a step before, the wall starts at Tc.
+        let of_first =
+            || self.states.first().map_or(0.0, |state| change(0, state).inputs[Input::Outer as usize]);
+        let mut wall_k = start_k.unwrap_or_else(of_first);
+        let window = self.states.len() - self.lead;
+        let (mut gas, mut rates, mut readings) =
+            (Vec::with_capacity(window), Vec::with_capacity(window), Vec::with_capacity(window));
+        let (share, conductance_w_k) = self.inner;
+        for (i, state) in self.states.iter().enumerate() {
+            let Change { inputs, heat_w, reading_k, ln_capacity, logit_inner, ln_conductance } =
+                change(i, state);
+            let outer_k = inputs[Input::Outer as usize];
+            let by = |which: usize| (0..INPUT_COUNT).map(|k| state.slopes[k][which] * inputs[k]).sum::<f64>();
+            let (mut t2_k, mut wall_w, duct_w) = (by(0), by(1), by(2));
+            let mut row_wall_k = outer_k;
+            if self.model.has_inner_wall {
+                let off_k = state.inputs.wall_k - state.inputs.outer_k;
+                let driving_w = wall_w + conductance_w_k * (outer_k - ln_conductance * off_k)
+                    - (ln_capacity + (1.0 - share) * logit_inner) * state.wall.stored_w;
+                let settled_k = driving_w / state.wall.sum_w_k;
+                row_wall_k = settled_k + (wall_k - settled_k) * state.wall.mean;
+                wall_k = settled_k + (wall_k - settled_k) * state.wall.kept;
+            }
+            t2_k += state.slopes[Input::Wall as usize][0] * row_wall_k;
+            wall_w += state.slopes[Input::Wall as usize][1] * row_wall_k;
+            if i < self.lead {
+                continue;
+            }
+            gas.push(t2_k);
+            if self.model.has_balance {
+                let added_w = heat_w + duct_w + state.heat[HEAT_PARAMETERS.len()] * outer_k;
+                let (gas_w, ln_outer) = if self.model.has_inner_wall {
+                    let off_k = state.inputs.wall_k - state.inputs.outer_k;
+                    let through_w = conductance_w_k * (row_wall_k - outer_k + ln_conductance * off_k);
+                    (through_w, ln_capacity - share * logit_inner)
+                } else {
+                    (wall_w, ln_capacity)
+                };
+                let ln_outer = ln_outer + state.ln_capacity_by_k * outer_k;
+                rates.push((gas_w + added_w) / state.outer_j_k - state.rate_k_s * ln_outer);
+                readings.push(reading_k);
+            }
+        }
+        let mut column = self.probe.read(&gas, 0.0);
+        if self.model.has_balance {
+            let changes = integral(&self.step.rows, &rates);
+            column.extend(changes.into_iter().zip(readings).map(|(change, reading)| change - reading));
+        }
+        (column, wall_k)
+    }
+
+    /// Change of the readings by a function along the window of a channel of [`Smoothing`](super::smoothing::Smoothing).
+    pub(crate) fn by_input(
+        &self,
+        input: SmoothedInput,
+        values: &[f64],
+        slopes: &[f64],
+        lag_s: f64,
+    ) -> Vec<f64> {
+        let at = |i: usize| i.checked_sub(self.lead).map(|row| (values[row], slopes[row]));
+        let change = |i: usize, state: &RowState| {
+            let Some((value, slope)) = at(i) else { return Change::default() };
+            match input {
+                SmoothedInput::T1 => Change::of(Input::T1, value),
+                // The row of its own reading is not smoothed: only the correction for the lag is.
+                SmoothedInput::Tc => {
+                    Change { reading_k: lag_s * slope, ..Change::of(Input::Outer, value + lag_s * slope) }
+                }
+                SmoothedInput::P1 => Change::of(Input::LnPressureRatio, -value / state.inputs.p1_pa),
+                SmoothedInput::P2 => Change::of(Input::LnPressureRatio, value / state.inputs.p2_pa),
+                SmoothedInput::Flow => Change::of(Input::Flow, value),
+            }
+        };
+        self.respond(change, Some(0.0)).0
+    }
+
+    /// Change of the readings by an efficiency that is wrong by the surface's own slope.
+    pub(crate) fn by_surface(&self, history: &StepHistory<'_>, shared: &SharedVector) -> Vec<f64> {
+        let skipped = history.terms.len() - self.states.len();
+        let surface = surface_of(shared);
+        self.respond(|i, _| Change::of(Input::Eta, dot(&history.terms[skipped + i], surface)), Some(0.0)).0
+    }
+
+    pub(super) fn by_local(&self, index: usize) -> Vec<f64> {
+        match index {
+            ETA => self.respond(|_, _| Change::of(Input::Eta, 1.0), Some(0.0)).0,
+            LN_DEVIATION => self.respond(|_, _| Change::of(Input::LnH, 1.0), Some(0.0)).0,
+            STEP_HEAT => self.respond(|_, _| Change::heat(1.0), Some(0.0)).0,
+            _ => self.of_t2(&self.probe.read(&vec![0.0; self.gas_k.len()], 1.0)),
+        }
+    }
+
+    /// The column of a shared parameter, and the change of the inner wall at the end. `start_k`: that at the start.
+    pub(super) fn by_shared(
+        &self,
+        index: usize,
+        history: &StepHistory<'_>,
+        shared: &SharedVector,
+        local: &LocalVector,
+        start_k: Option<f64>,
+    ) -> (Vec<f64>, f64) {
+        let rows: Vec<&Row> = self
+            .step
+            .lead
+            .iter()
+            .chain(&self.step.rows)
+            .skip(history.terms.len() - self.states.len())
+            .collect();
+        let rest_pa = self.model.setting.rest_pressure_pa;
+        let by = |change: &dyn Fn(&RowState, &Row, usize) -> Change| {
+            self.respond(|i, state| change(state, rows[i], i), start_k)
+        };
+        let input = |input: Input, of: &dyn Fn(&RowState, &Row) -> f64| {
+            by(&|state, row, _| Change::of(input, of(state, row)))
+        };
+        let with_t2 = |(mut column, end_k): (Vec<f64>, f64), of: &dyn Fn(&Row) -> f64| {
+            column.iter_mut().zip(&self.step.rows).for_each(|(value, row)| *value += of(row));
+            (column, end_k)
+        };
+        let nothing = || (self.of_t2(&vec![0.0; self.gas_k.len()]), 0.0);
+        if let Some(place) = HEAT_PARAMETERS.iter().position(|parameter| *parameter == index) {
+            return by(&|state, _, _| Change::heat(state.heat[place]));
+        }
+        let skipped = history.terms.len() - self.states.len();
+        match index {
+            LN_COEFFICIENT => input(Input::LnH, &|_, _| 1.0),
+            EXPONENT => {
+                input(Input::LnH, &|state, _| self.model.setting.ln_reynolds(&state.inputs, &state.path))
+            }
+            ALPHA => input(Input::Alpha, &|_, _| 1.0),
+            LN_HEATING_COOLING_RATIO => input(Input::LnRatio, &|_, _| 1.0),
+            PREHEAT => input(Input::Preheat, &|_, _| 1.0),
+            INLET => input(Input::Inlet, &|_, _| 1.0),
+            HUMIDITY => input(Input::Humidity, &|_, _| 1.0),
+            OFFSETS => input(Input::T1, &|_, _| -1.0),
+            T2_OFFSET => with_t2(nothing(), &|_| 1.0),
+            TC_OFFSET => by(&|_, _, _| Change::of_tc(-1.0)),
+            P1_OFFSET => input(Input::LnPressureRatio, &|state, _| 1.0 / state.inputs.p1_pa),
+            P2_OFFSET => input(Input::LnPressureRatio, &|state, _| -1.0 / state.inputs.p2_pa),
+            FLOW_GAIN => input(Input::Flow, &|state, _| -state.inputs.flow_kg_s / (1.0 + shared[FLOW_GAIN])),
+            T2_GAIN => with_t2(nothing(), &|row| row.t2_k - CALIBRATED_AT_K),
+            TC_GAIN => by(&|_, row, _| Change::of_tc(CALIBRATED_AT_K - row.tc_k)),
+            P1_GAIN => {
+                input(Input::LnPressureRatio, &|state, row| (row.p1_pa - rest_pa) / state.inputs.p1_pa)
+            }
+            P2_GAIN => {
+                input(Input::LnPressureRatio, &|state, row| (rest_pa - row.p2_pa) / state.inputs.p2_pa)
+            }
+            BAROMETER => input(Input::LnPressureRatio, &|state, _| {
+                state.inputs.p1_pa.recip() - state.inputs.p2_pa.recip()
+            }),
+            THERMOMETERS => with_t2(
+                by(&|_, _, _| {
+                    let mut change = Change::of_tc(-1.0);
+                    change.inputs[Input::T1 as usize] = -1.0;
+                    change
+                }),
+                &|_| 1.0,
+            ),
+            TC_LAG => by(&|_, row, _| Change::of_tc(row.tc_slope_k_s)),
+            LN_CAPACITY => by(&|_, _, _| Change { ln_capacity: 1.0, ..Change::default() }),
+            LOGIT_INNER => by(&|_, _, _| Change { logit_inner: 1.0, ..Change::default() }),
+            LN_INNER_CONDUCTANCE => by(&|_, _, _| Change { ln_conductance: 1.0, ..Change::default() }),
+            PROBE_MM2 => (self.by_probe(shared, local), 0.0),
+            SURFACE.. => by(&|_, _, i| {
+                Change::of(
+                    Input::Eta,
+                    history.terms.get(skipped + i).map_or(0.0, |terms| terms[index - SURFACE]),
+                )
+            }),
+            _ => nothing(),
+        }
+    }
+
+    /// The column of the probe, by a central difference.
+    fn by_probe(&self, shared: &SharedVector, local: &LocalVector) -> Vec<f64> {
+        let square_mm2 = shared[PROBE_MM2];
+        let step = PROBE_STEP_RATIO * square_mm2.abs().max(LINEAR_BELOW_MM2);
+        let readings = |square_mm2: f64| {
+            let probe = self.model.probe(&self.step.rows, &self.gas_k, square_mm2);
+            probe.read(&self.gas_k, local[FIRST_READING])
+        };
+        let (low, high) = (readings(square_mm2 - step), readings(square_mm2 + step));
+        let slope: Vec<f64> = high.iter().zip(&low).map(|(high, low)| (high - low) / (2.0 * step)).collect();
+        self.of_t2(&slope)
+    }
+
+    /// A column that only T2 has.
+    fn of_t2(&self, t2: &[f64]) -> Vec<f64> {
+        let rows = if self.model.has_balance { 2 * t2.len() } else { t2.len() };
+        let mut column = t2.to_vec();
+        column.resize(rows, 0.0);
+        column
+    }
+}
+
+/// A smoothed input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum SmoothedInput {
+    T1,
+    Tc,
+    P1,
+    P2,
+    Flow,
+}
+
+/// Integral of rates over the rows of a window by the trapezoidal rule, from 0 at the first.
+fn integral(rows: &[Row], rates: &[f64]) -> Vec<f64> {
+    let mut sum = 0.0;
+    let mut sums = Vec::with_capacity(rows.len());
+    for i in 0..rows.len() {
+        if i > 0 {
+            sum += 0.5 * (rates[i] + rates[i - 1]) * (rows[i].t_s - rows[i - 1].t_s);
+        }
+        sums.push(sum);
+    }
+    sums
+}
+
+#[cfg(test)]
+mod tests {
+    //! The columns of the model against differences of its predictions.
+
+    use super::*;
+    use crate::IdentifyConfig;
+    use crate::joint::step_model::gas_path::Setting;
+    use crate::joint::step_model::parameters::{GAINS, LOCAL, SHARED};
+    use crate::joint::step_model::smoothing::Smoothing;
+    use crate::joint::step_model::surface::TERM_COUNT;
+    use nalgebra::DMatrix;
+
+    fn model(has_inner_wall: bool) -> Model {
+        let config = IdentifyConfig::default();
+        let setting = Setting {
+            internal_area_m2: config.internal_area_m2,
+            outlet_diameter_m: config.outlet_diameter_m,
+            inlet_diameter_m: config.inlet_diameter_m,
+            rest_pressure_pa: 100e3,
+            air: config.air,
+            reynolds_reference: 1.3e5,
+        };
+        Model { setting, housing: config.housing, has_inner_wall, has_balance: true }
+    }
+
+    /// A step after a jump: the housing warms up, flow and P2 settle.
+    fn step() -> StepRows {
+        let row = |i: i32| {
+            let t_s = 0.5 * f64::from(i);
+            let settling = (-t_s / 3.0).exp();
+            Row {
+                t_s,
+                t1_k: 297.0 + 0.01 * t_s,
+                t2_k: 400.0,
+                tc_k: 350.0 + 12.0 * (1.0 - (-t_s / 60.0).exp()),
+                tc_read_k: 350.0,
+                tc_slope_k_s: 0.2 * (-t_s / 60.0).exp(),
+                p1_pa: 99e3,
+                p2_pa: 220e3 + 3e3 * settling,
+                flow_kg_s: 0.06 - 2e-3 * settling,
+                tt_k: 620.0,
+                oil_k: 360.0,
+                ambient_k: 298.0,
+                place: (120e3, 0.06),
+            }
+        };
+        let rows: Vec<Row> = (12..80).map(row).collect();
+        let t_s: Vec<f64> = rows.iter().map(|row| row.t_s).collect();
+        let count = rows.len();
+        StepRows {
+            position: 0,
+            lead: (0..12).map(row).collect(),
+            end: rows[count - 1],
+            rows,
+            smoothing: Some(Smoothing::new(&t_s)),
+            noise: DMatrix::identity(count, count),
+        }
+    }
+
+    /// Every column against a central difference of the prediction, with and without an inner wall, before and behind the linear part of the
+    /// probe's lag.
+    #[test]
+    fn columns_are_derivatives() {
+        let step = step();
+        let terms: Vec<[f64; TERM_COUNT]> =
+            (0..80).map(|i| std::array::from_fn(|k| 1e-2 * f64::from(80 - i) / (1.0 + k as f64))).collect();
+        let history = StepHistory { step: &step, terms };
+        let mut shared = [0.0; SHARED];
+        shared[LN_COEFFICIENT] = 0.004_f64.ln() + 1.13 * 1.3e5_f64.ln();
+        shared[EXPONENT] = 1.13;
+        shared[ALPHA] = 0.1;
+        shared[LN_HEATING_COOLING_RATIO] = 0.1;
+        shared[PREHEAT] = 0.4;
+        shared[TC_LAG] = 1.5;
+        shared[LOGIT_INNER] = -0.5;
+        shared[LN_INNER_CONDUCTANCE] = 3.0;
+        shared[GAINS + 1] = 0.01;
+        shared[SURFACE] = 0.6;
+        shared[SURFACE + 1] = 0.1;
+        let local = [0.7, 0.01, 399.0, 2.0];
+        for (has_inner_wall, square_mm2) in [(false, 0.04), (false, 2.0), (true, 0.04), (true, 2.0)] {
+            let model = model(has_inner_wall);
+            shared[PROBE_MM2] = square_mm2;
+            let predict = |shared: &SharedVector, local: &LocalVector| {
+                model.predict(&history, (shared, local), &[false; SHARED], false, None).readings_k
+            };
+            let columns = model.predict(&history, (&shared, &local), &[true; SHARED], true, None).columns;
+            for index in 0..SHARED + LOCAL {
+                let step = match index {
+                    PROBE_MM2 => 1e-4,
+                    HUMIDITY => 1e-5,
+                    _ if (OFFSETS + 3..FLOW_GAIN).contains(&index) || index == BAROMETER => 1.0,
+                    _ => 1e-4,
+                };
+                let at = |by: f64| {
+                    let (mut shared, mut local) = (shared, local);
+                    if index < SHARED {
+                        shared[index] += by
+                    } else {
+                        local[index - SHARED] += by
+                    }
+                    predict(&shared, &local)
+                };
+                let (low, high) = (at(-step), at(step));
+                let expected: Vec<f64> = high.iter().zip(&low).map(|(a, b)| (a - b) / (2.0 * step)).collect();
+                let size = expected.iter().fold(0.0_f64, |size, x| size.max(x.abs()));
+                for (row, (found, expected)) in columns[index].iter().zip(&expected).enumerate() {
+                    // Coefficients along a row of the inner wall are held: 2 % of the largest.
+                    let allowed = if has_inner_wall { 0.03 } else { 2e-2 } * size + 1e-6;
+                    assert!(
+                        (found - expected).abs() <= allowed,
+                        "inner wall {has_inner_wall}, parameter {index}, row {row}: {found} and {expected}, largest {size}"
+                    );
+                }
+            }
+        }
+    }
+}

@@ -89,15 +89,14 @@ pub(crate) fn thermal_model(
     }
 }
 
+/// Converts a parameter from its fitted to its reported form.
+type Transform<'a> = &'a dyn Fn(f64) -> f64;
+
 /// The housing; `of` reports a parameter.
-fn housing(
-    problem: &Problem<'_>,
-    of: &dyn Fn(usize, &dyn Fn(f64) -> f64) -> SharedValue,
-) -> IdentifiedHousing {
+fn housing(problem: &Problem<'_>, of: &dyn Fn(usize, Transform<'_>) -> SharedValue) -> IdentifiedHousing {
     let same = |x: f64| x;
-    let inner = |index: usize, transform: &dyn Fn(f64) -> f64| {
-        problem.model.has_inner_wall.then(|| of(index, transform))
-    };
+    let inner =
+        |index: usize, transform: Transform<'_>| problem.model.has_inner_wall.then(|| of(index, transform));
     IdentifiedHousing {
         capacity_ratio: of(LN_CAPACITY, &f64::exp),
         inner_capacity_ratio: inner(LOGIT_INNER, &|logit| 1.0 / (1.0 + (-logit).exp())),
@@ -116,7 +115,7 @@ fn value(
     covariance: &Covariance,
     refinements: Option<&Refinements>,
     index: usize,
-    transform: &dyn Fn(f64) -> f64,
+    transform: Transform<'_>,
 ) -> SharedValue {
     let Some(row) = covariance.row_of(index) else {
         return SharedValue::assumed(transform(problem.shared[index]));

@@ -278,7 +278,7 @@ impl ThermalExport<'_> {
         );
         let _ = writeln!(text, "nusselt_coefficient {coefficient} 1 # {origin}");
         text += &shared("nusselt_exponent", "1", law.map(|l| &l.exponent), compressor.nusselt_exponent);
-        if let Some(at) = law.and_then(|law| AtReference::new(law)) {
+        if let Some(at) = law.and_then(AtReference::new) {
             at.write(&mut text);
         }
         text +=

@@ -90,7 +90,7 @@ mod tests {
             let values = t_s.iter().map(|t_s| if is_surge(*t_s) { 0.03 } else { 0.05 }).collect();
             let columns = vec![ChannelColumn { channel: Channel::CompressorFlow, values }];
             let crossing = |i: u32| {
-                let kind = if i % 2 == 0 { EventKind::SurgeEntered } else { EventKind::SurgeLeft };
+                let kind = if i.is_multiple_of(2) { EventKind::SurgeEntered } else { EventKind::SurgeLeft };
                 Event { t_s: from_s + f64::from(i) / 14.0, kind, message: String::new() }
             };
             let crossings = (0..14).map(crossing).filter(|event| is_surge(event.t_s)).collect();

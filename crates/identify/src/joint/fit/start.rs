@@ -193,7 +193,7 @@ fn reached_s(recording: &Recording, step: &StepMarker, start_s: f64) -> f64 {
         let tail = blocks.iter().filter(|(t_s, _)| *t_s >= tail_s).map(|(_, value)| *value);
         let Some(end) = mean(tail) else { return found_s };
         let off = |(_, value): &&(f64, f64)| (value / end - 1.0).abs() > band_ratio;
-        let last = blocks.iter().filter(|(t_s, _)| *t_s < latest_s).filter(off).next_back();
+        let last = blocks.iter().filter(|(t_s, _)| *t_s < latest_s).rfind(off);
         last.map_or(found_s, |(t_s, _)| found_s.max((t_s + 0.5 * SECOND_S).min(latest_s)))
     })
 }

@@ -26,7 +26,7 @@ pub struct Calibration {
     pub interval_factor: f64,
     /// Share of recordings with causes of the effect library in which these are not among the candidates.
     pub unlisted: f64,
-    /// Logistic model of an unmodelled cause: offset, and slopes of the [`logistic_features`].
+    /// Logistic model of an unmodelled cause: offset, and slopes of the features of a score.
     pub outside: [f64; 3],
     /// Where each number comes from, by its key; those of `outside` are `outside_0` to `outside_2`.
     pub origins: BTreeMap<String, Origin>,

@@ -184,7 +184,7 @@ impl Study {
     /// Predicts the recording.
     ///
     /// # Errors
-    /// [`PredictError`] if a value is out of its range or the model cannot follow.
+    /// An error if a value is out of its range or the model cannot follow.
     pub fn predict(&self, hypothesis: &Hypothesis) -> Result<Prediction, PredictError> {
         let machine = self.machine(hypothesis);
         let samples = self.samples(&machine, |step| self.rig(&machine, step), &self.times_s)?;

@@ -52,8 +52,6 @@ fn make(_: &NominalRig, settings: &serde_json::Value) -> Result<Box<dyn Backend>
 /// Maximum relative difference between a setpoint and the recorded command: the resolution of a file with values in kPa
 /// and three decimals.
 const SETPOINT_TOLERANCE_RATIO: f64 = 1e-4;
-/// Difference of equal times, s. Source: recordings store nanoseconds.
-const TIME_ROUNDING_S: f64 = 1e-9;
 
 /// Replays a [`Recording`]. Its commands cannot change: setpoints are accepted and compared with the recorded commands, and differences
 /// are noted as events.
@@ -194,7 +192,7 @@ impl Backend for ReplayBackend {
     fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError> {
         self.require_armed("poll")?;
         let start = self.samples_played;
-        let end = start.max(self.t_s.partition_point(|t| *t <= until_s + TIME_ROUNDING_S));
+        let end = start.max(self.t_s.partition_point(|t| *t <= until_s));
         if start == end && self.end_s().is_none_or(|end_s| until_s > end_s) {
             let source = Box::new(ReplayError::Ended);
             return Err(BackendError::Lost { t_s: self.end_s().unwrap_or(0.0), source });

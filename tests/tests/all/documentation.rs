@@ -22,7 +22,7 @@ const NOT_PROSE: [&str; 11] = [
     "validation/reproduction.md",
 ];
 /// Limit of all other pages together, the tables for developers included: an engineer reads them in three hours.
-const MAX_WORDS: usize = 37_000;
+const MAX_WORDS: usize = 37_400;
 /// Limit of a page that explains.
 const MAX_WORDS_OF_EXPLANATION: usize = 1_500;
 

@@ -3,7 +3,7 @@
 use mapper_core::Channel;
 use mapper_physics::rig::effect::Submodel;
 
-/// A clearly significant heat flow, W. Bound: a prior of [`PRIOR_STEPS`](crate::gap::best_fit::normal::PRIOR_STEPS) times this size, as for all
+/// A clearly significant heat flow, W. Bound: a prior of `PRIOR_STEPS` times this size, as for all
 /// sizes below, is wider than what a machine of some kilowatts loses; the evidence narrows it.
 pub(crate) const PLAIN_HEAT_W: f64 = 50.0;
 /// A clearly significant torque, N m. Bound: a tenth of what such a shaft carries.

@@ -41,7 +41,7 @@ pub(crate) fn explained(library: &LibraryFits, posterior: &Posterior, gap: &Gap)
 
 /// After drift subtraction, unmodelled causes below this probability are ignored. The uncertainty of the drift's time history is not in any
 /// tolerance, and its residual resembles a small unmodelled cause. Judgement: as sure as a correction must be
-/// ([`NEEDED_PROBABILITY`](crate::gap::CorrectedMap::NEEDED_PROBABILITY)).
+/// (`NEEDED_PROBABILITY`).
 const SURELY_OUTSIDE: f64 = 0.9;
 
 /// The verdict. No cause is named for a machine that drifts.

@@ -17,6 +17,8 @@ use std::sync::atomic::AtomicBool;
 
 /// Interval at which observers and steps receive samples, s of run time.
 const POLL_INTERVAL_S: f64 = 1.0;
+/// Resolution of recorded times. Source: SI.
+const NS_PER_S: f64 = 1e9;
 /// Interval at which a soak that ends when the sensors rest is checked, s. Judgement: short compared with the soak.
 const REST_CHECK_S: f64 = 10.0;
 /// Longest time that a guard may hold the setpoints, s.
@@ -152,6 +154,11 @@ impl Runner<'_> {
 pub(crate) fn panic_message(panic: &(dyn std::any::Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
     text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "a panic".to_owned())
+}
+
+/// A time without the rounding of its sums: a command of the same time as a sample then always follows it.
+fn in_nanoseconds(t_s: f64) -> f64 {
+    (t_s * NS_PER_S).round() / NS_PER_S
 }
 
 impl Run<'_, '_> {
@@ -481,7 +488,7 @@ impl Run<'_, '_> {
         let mut merged: Option<SampleBatch> = None;
         loop {
             let alert = self.protection.each_sample || ActiveGuards::new(&mut self.runner.guards).is_alert();
-            let next_s = if alert { (self.now_s + self.sample_s).min(end_s) } else { end_s };
+            let next_s = in_nanoseconds(if alert { (self.now_s + self.sample_s).min(end_s) } else { end_s });
             if !self.wait_until_or_stop(next_s, in_step) {
                 return Ok((merged.unwrap_or_default(), Vec::new()));
             }

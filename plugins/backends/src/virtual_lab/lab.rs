@@ -201,10 +201,7 @@ impl Backend for VirtualLab {
 
     fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError> {
         let (settings, armed) = self.armed("poll")?;
-        // A time that differs from a sample's by rounding is the sample's: commands follow it, and are not in it.
-        let sample_s = (until_s * settings.sample_rate_hz).round() / settings.sample_rate_hz;
-        let is_sample = (until_s - sample_s).abs() < TIME_ROUNDING_S;
-        armed.advance(settings, if is_sample { sample_s } else { until_s })
+        armed.advance(settings, until_s)
     }
 
     fn hold(&mut self) -> Result<(), BackendError> {
@@ -257,9 +254,6 @@ fn settle(settings: &LabSettings, armed: &ArmedLab, now_s: f64) -> Result<Machin
 fn watch(settings: &LabSettings) -> Watch {
     Watch { overspeed_rpm: settings.trip_speed_rpm }
 }
-
-/// Difference of equal times, s. Source: recordings store nanoseconds.
-const TIME_ROUNDING_S: f64 = 1e-9;
 
 impl ArmedLab {
     fn advance(&mut self, settings: &LabSettings, until_s: f64) -> Result<SampleBatch, BackendError> {

@@ -2,7 +2,8 @@
 //! and the shared ones, so they are eliminated step by step.
 
 use crate::joint::fit::whitening::Whitening;
-use crate::joint::step_model::history::{Model, Prediction, StepHistory, Wall};
+use crate::joint::step_model::history::{Prediction, Wall};
+use crate::joint::step_model::linearised::{Model, StepHistory};
 use crate::joint::step_model::parameters::{
     ETA, HOUSING, LOCAL, LocalVector, OFFSETS, Prior, SHARED, SharedVector, bounds, longest_move,
 };

@@ -4,7 +4,7 @@ use crate::faults::smooth::ANY_ROUGHNESS;
 use crate::joint::fit::solve::{Member, Problem};
 use crate::joint::fit::{inlet, step_noise};
 use crate::joint::step_model::gas_path::{Setting, reynolds};
-use crate::joint::step_model::history::{Model, StepHistory};
+use crate::joint::step_model::linearised::{Model, StepHistory};
 use crate::joint::step_model::parameters::{
     ALPHA, BAROMETER, BEARING, ETA, EXPONENT, EXTERNAL, FIRST_READING, FLOW_GAIN, GAIN_CHANNELS, GAINS, HEAT,
     HEAT_BY_TC, HUMIDITY, INLET, LN_AREA, LN_CAPACITY, LN_COEFFICIENT, LN_DEVIATION,
@@ -50,12 +50,10 @@ const FIRST_READING_SIGMA_K: f64 = 5.0;
 /// Step of the logarithm of the spreads that are tried. Bound: spreads a tenth apart give the same weights to the points.
 const SPREAD_STEP_LN: f64 = 0.1;
 
-/// Start of the used part of a step after the last command change without noise, s: h and efficiency are modelled while the operating point
-/// settles, and the first seconds only show where the surface is wrong. Bound: shaft and outlet volume of a fast stand settle within it.
+/// Start of the used part of a step after the last command change, s: h and efficiency are modelled while the operating point settles, and the
+/// first seconds only show where the surface is wrong, or what smoothing does not follow, which looks like area before the wheel. Bound: shaft and
+/// outlet volume of a fast stand settle within it.
 pub(crate) const START_S: f64 = 3.0;
-/// The same with noise, s. Calibrated: `benches/identification.py`; earlier starts leave what smoothing does not follow, which looks like a
-/// probe of 0.7 mm.
-pub(crate) const START_WITH_NOISE_S: f64 = 2.0;
 /// The same with the balance of the housing, s: alpha_A and probe then follow from it, and what smoothing leaves of the first seconds would act on
 /// both. Calibrated: as above; from 4 s on one of eighteen recordings ended in a wrong minimum.
 pub(crate) const START_WITH_BALANCE_S: f64 = 6.0;
@@ -133,11 +131,7 @@ pub(crate) fn steps(
 
 /// Start of the used part of a step after its last command change, s.
 pub(crate) fn start_after_s(config: &IdentifyConfig) -> f64 {
-    match (config.declared.is_empty(), has_balance(config)) {
-        (true, _) => START_S,
-        (false, false) => START_WITH_NOISE_S,
-        (false, true) => START_WITH_BALANCE_S,
-    }
+    if has_balance(config) { START_WITH_BALANCE_S } else { START_S }
 }
 
 /// Whether the change of Tc is an observation: without its noise it has no weight against T2.

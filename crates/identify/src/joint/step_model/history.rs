@@ -10,40 +10,21 @@
 //! Ti is integrated through the whole run, jumps included, with the measured Tc: it remembers the point before. Each parameter acts on a row by
 //! a few inputs of the gas path and of the housing; the chain rule gives its column, through wall, probe and integral.
 
-use crate::config::Housing;
-use crate::joint::step_model::gas_path::{Inputs, Setting, Slopes};
-use crate::joint::step_model::linearised::{LINEAR_BELOW_MM2, Linearised, Probe, RowState, WallRow};
+use crate::joint::step_model::gas_path::{Inputs, Slopes};
+use crate::joint::step_model::linearised::{
+    Linearised, Model, RowState, StepHistory, WallRow, surface_of, tc_error_k,
+};
 use crate::joint::step_model::parameters::{
     ALPHA, BAROMETER, ETA, FIRST_READING, FLOW_GAIN, GAINS, HUMIDITY, INLET, LN_CAPACITY, LN_DEVIATION,
     LN_HEATING_COOLING_RATIO, LN_INNER_CONDUCTANCE, LOCAL, LOGIT_INNER, LocalVector, OFFSETS, PREHEAT,
-    PROBE_MM2, SHARED, STEP_HEAT, SURFACE, SharedVector, TC_LAG, THERMOMETERS,
+    PROBE_MM2, SHARED, STEP_HEAT, SharedVector, TC_LAG, THERMOMETERS,
 };
-use crate::joint::step_model::rows::{MAX_ROW_GAP_S, Row, StepRows};
+use crate::joint::step_model::rows::{MAX_ROW_GAP_S, Row};
 use crate::joint::step_model::surface::{TERM_COUNT, dot};
-use crate::single_step::probe;
-use mapper_core::unit_factors::M_PER_MM;
 use mapper_physics::rig::sensor_fault::CALIBRATED_AT_K;
 
 /// Exponent below which the mean over a row replaces the formula. Bound: the next term is below rounding.
 const SERIES_BELOW: f64 = 1e-6;
-
-/// The model of all steps.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Model {
-    pub(crate) setting: Setting,
-    pub(crate) housing: Housing,
-    /// Whether the inner wall has its own temperature.
-    pub(crate) has_inner_wall: bool,
-    /// Whether the change of Tc is an observation.
-    pub(crate) has_balance: bool,
-}
-
-/// The data of a step: its rows, and the surface terms at each row minus those at the step's end, first those of the lead.
-#[derive(Debug, Clone)]
-pub(crate) struct StepHistory<'a> {
-    pub(crate) step: &'a StepRows,
-    pub(crate) terms: Vec<[f64; TERM_COUNT]>,
-}
 
 /// Inner wall at the end of a step, and its derivatives by the shared parameters.
 #[derive(Debug, Clone)]
@@ -81,10 +62,6 @@ pub(crate) fn inner_wall(shared: &SharedVector) -> (f64, f64) {
 /// Tc without its errors, K.
 fn outer_k(row: &Row, shared: &SharedVector) -> f64 {
     row.tc_k + shared[TC_LAG] * row.tc_slope_k_s - tc_error_k(row.tc_k, shared)
-}
-
-pub(super) fn tc_error_k(read_k: f64, shared: &SharedVector) -> f64 {
-    shared[OFFSETS + 2] + shared[THERMOMETERS] + shared[GAINS + 1] * (read_k - CALIBRATED_AT_K)
 }
 
 fn t2_error_k(read_k: f64, shared: &SharedVector) -> f64 {
@@ -259,14 +236,6 @@ impl Model {
         let stored_w = if width_s > 0.0 { inner_j_k * (end_k - start_k) / width_s } else { 0.0 };
         (end_k, settled_k + (start_k - settled_k) * mean, WallRow { kept, mean, sum_w_k, stored_w })
     }
-
-    /// The probe along the rows, for the square of its diameter.
-    pub(super) fn probe(&self, rows: &[Row], gas_k: &[f64], square_mm2: f64) -> Probe {
-        let share = (square_mm2 / LINEAR_BELOW_MM2).clamp(-1.0, 1.0);
-        let diameter_m = M_PER_MM * square_mm2.abs().max(LINEAR_BELOW_MM2).sqrt();
-        let rows = rows.iter().zip(gas_k).map(|(row, gas_k)| (row.t_s, row.flow_kg_s, *gas_k));
-        Probe { lags: probe::lags(rows, diameter_m, self.setting.outlet_diameter_m), share }
-    }
 }
 
 /// Time that a row stands for, s.
@@ -289,9 +258,4 @@ fn pressures_pa(row: &Row, shared: &SharedVector, rest_pa: f64) -> [f64; 2] {
             - shared[BAROMETER]
     };
     [corrected(row.p1_pa, 3, 2), corrected(row.p2_pa, 4, 3)]
-}
-
-/// The surface coefficients among the shared parameters.
-pub(crate) fn surface_of(shared: &SharedVector) -> &[f64; TERM_COUNT] {
-    shared.get(SURFACE..).and_then(|tail| tail.try_into().ok()).unwrap_or(&[0.0; TERM_COUNT])
 }

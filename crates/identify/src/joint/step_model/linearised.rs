@@ -1,17 +1,18 @@
 //! A step's model linearised: one column per parameter, by the chain rule from the inputs of a row through wall, probe and integral.
 
-use crate::joint::step_model::gas_path::{GasPath, INPUT_COUNT, Input, Inputs, Slopes};
-use crate::joint::step_model::history::{Model, StepHistory, surface_of, tc_error_k};
+use crate::config::Housing;
+use crate::joint::step_model::gas_path::{GasPath, INPUT_COUNT, Input, Inputs, Setting, Slopes};
 use crate::joint::step_model::housing::HEAT_PARAMETERS;
 use crate::joint::step_model::parameters::{
-    ALPHA, BAROMETER, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, HUMIDITY, INLET, LN_CAPACITY, LN_COEFFICIENT,
-    LN_DEVIATION, LN_HEATING_COOLING_RATIO, LN_INNER_CONDUCTANCE, LOGIT_INNER, LocalVector, OFFSETS, P1_GAIN,
-    P1_OFFSET, P2_GAIN, P2_OFFSET, PREHEAT, PROBE_MM2, STEP_HEAT, SURFACE, SharedVector, T2_GAIN, T2_OFFSET,
-    TC_GAIN, TC_LAG, TC_OFFSET, THERMOMETERS,
+    ALPHA, BAROMETER, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, GAINS, HUMIDITY, INLET, LN_CAPACITY,
+    LN_COEFFICIENT, LN_DEVIATION, LN_HEATING_COOLING_RATIO, LN_INNER_CONDUCTANCE, LOGIT_INNER, LocalVector,
+    OFFSETS, P1_GAIN, P1_OFFSET, P2_GAIN, P2_OFFSET, PREHEAT, PROBE_MM2, STEP_HEAT, SURFACE, SharedVector,
+    T2_GAIN, T2_OFFSET, TC_GAIN, TC_LAG, TC_OFFSET, THERMOMETERS,
 };
 use crate::joint::step_model::rows::{Row, StepRows};
-use crate::joint::step_model::surface::dot;
-use crate::single_step::probe::{Lag, follow};
+use crate::joint::step_model::surface::{TERM_COUNT, dot};
+use crate::single_step::probe::{self, Lag, follow};
+use mapper_core::unit_factors::M_PER_MM;
 use mapper_physics::rig::sensor_fault::CALIBRATED_AT_K;
 
 /// Step of the derivative by the square of the probe's diameter, relative. Bound: between rounding and curvature.
@@ -19,6 +20,24 @@ const PROBE_STEP_RATIO: f64 = 1e-3;
 /// Square of the diameter below which the lag is linear in it, mm2: it grows with a power below 1, which has no slope at 0. Bound: 0.3 mm lag
 /// by a tenth of a second, below anything that a block of half a second shows.
 pub(crate) const LINEAR_BELOW_MM2: f64 = 0.1;
+
+/// The model of all steps.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Model {
+    pub(crate) setting: Setting,
+    pub(crate) housing: Housing,
+    /// Whether the inner wall has its own temperature.
+    pub(crate) has_inner_wall: bool,
+    /// Whether the change of Tc is an observation.
+    pub(crate) has_balance: bool,
+}
+
+/// The data of a step: its rows, and the surface terms at each row minus those at the step's end, first those of the lead.
+#[derive(Debug, Clone)]
+pub(crate) struct StepHistory<'a> {
+    pub(crate) step: &'a StepRows,
+    pub(crate) terms: Vec<[f64; TERM_COUNT]>,
+}
 
 /// One row of the linearised model.
 pub(super) struct RowState {
@@ -106,6 +125,16 @@ impl Probe {
         }
         let lagged = follow(&self.lags, first, gas_k);
         lagged.iter().zip(gas_k).map(|(lagged, gas)| gas + self.share * (lagged - gas)).collect()
+    }
+}
+
+impl Model {
+    /// The probe along the rows, for the square of its diameter.
+    pub(super) fn probe(&self, rows: &[Row], gas_k: &[f64], square_mm2: f64) -> Probe {
+        let share = (square_mm2 / LINEAR_BELOW_MM2).clamp(-1.0, 1.0);
+        let diameter_m = M_PER_MM * square_mm2.abs().max(LINEAR_BELOW_MM2).sqrt();
+        let rows = rows.iter().zip(gas_k).map(|(row, gas_k)| (row.t_s, row.flow_kg_s, *gas_k));
+        Probe { lags: probe::lags(rows, diameter_m, self.setting.outlet_diameter_m), share }
     }
 }
 
@@ -346,16 +375,23 @@ fn integral(rows: &[Row], rates: &[f64]) -> Vec<f64> {
     sums
 }
 
+pub(super) fn tc_error_k(read_k: f64, shared: &SharedVector) -> f64 {
+    shared[OFFSETS + 2] + shared[THERMOMETERS] + shared[GAINS + 1] * (read_k - CALIBRATED_AT_K)
+}
+
+/// The surface coefficients among the shared parameters.
+pub(crate) fn surface_of(shared: &SharedVector) -> &[f64; TERM_COUNT] {
+    shared.get(SURFACE..).and_then(|tail| tail.try_into().ok()).unwrap_or(&[0.0; TERM_COUNT])
+}
+
 #[cfg(test)]
 mod tests {
     //! The columns of the model against differences of its predictions.
 
     use super::*;
     use crate::IdentifyConfig;
-    use crate::joint::step_model::gas_path::Setting;
-    use crate::joint::step_model::parameters::{GAINS, LOCAL, SHARED};
+    use crate::joint::step_model::parameters::{LOCAL, SHARED};
     use crate::joint::step_model::smoothing::Smoothing;
-    use crate::joint::step_model::surface::TERM_COUNT;
     use nalgebra::DMatrix;
 
     fn model(has_inner_wall: bool) -> Model {

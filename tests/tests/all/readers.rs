@@ -123,9 +123,9 @@ fn an_instrument_is_read_together_with_the_lab_in_real_time() {
     build_driver("mapper-backend-ak");
     let short = [
         ("warm_up: 60 s ", "warm_up: 1 s "),
-        // P3 and valve need 1.7 s.
-        ("dwell: 120 s ", "dwell: 5 s "),
-        ("window: auto ", "window: {start: 2 s, end: 5 s} "),
+        // P3 and valve need 2.1 s.
+        ("dwell: 120 s ", "dwell: 6 s "),
+        ("window: auto ", "window: {start: 3 s, end: 6 s} "),
     ];
     let reader = |channel: &str, answers: usize| {
         format!(

@@ -92,11 +92,12 @@ def opened(browser, width, height, scheme):
 
 
 def until(page, holds, seconds=60):
-    """Waits as `wait_for_function` does, which a page that forbids `eval` refuses."""
+    """Waits as `wait_for_function` does, which a page that forbids `eval` refuses, and returns what held."""
     end = time.time() + seconds
-    while not page.evaluate(holds):
+    while not (held := page.evaluate(holds)):
         assert time.time() < end, f"{holds}: {page.text_content('main')[:2000]}"
         page.wait_for_timeout(20)
+    return held
 
 
 def press(page, button):
@@ -148,9 +149,8 @@ with sync_playwright() as playwright:
     result["points_after_loss"] = points()
     press(page, "go-on")
     until(page, f"document.querySelectorAll('#points tr').length > {before}")
-    # Contours stand as soon as two lines have two points each.
-    until(page, "document.querySelectorAll('#map-plot .contour path').length > 0")
-    result["contours"] = page.locator("#map-plot .contour path").count()
+    # Contours stand as soon as two lines have two points each. They are drawn again with every point, so they are counted where they were seen.
+    result["contours"] = until(page, "document.querySelectorAll('#map-plot .contour path').length")
     page.screenshot(path=folder / "live-contours.png", full_page=True)
     press(page, "stop")
     until(page, "document.querySelector('#phase').textContent === 'The run has ended'")

@@ -10,7 +10,7 @@ use crate::joint::fit::whitening::Whitening;
 use crate::joint::step_model::linearised::{Linearised, SmoothedInput};
 use crate::joint::step_model::parameters::{
     ALPHA, EXPONENT, LN_COEFFICIENT, LN_HEATING_COOLING_RATIO, LN_INNER_CONDUCTANCE, LOGIT_INNER, PREHEAT,
-    PROBE_MM2, Place, SHARED, SharedVector, TC_LAG,
+    PROBE_MM2, Place, SHARED, SharedVector, TC_GAIN, TC_LAG,
 };
 use crate::joint::step_model::rows::StepRows;
 use crate::joint::step_model::smoothing::{Basis, FLOW, P1, P2, SMOOTHED_COUNT, T1, TC};
@@ -48,7 +48,7 @@ struct InputWeight {
 }
 
 /// Parameters on which the effect of input noise depends, with the step of the derivative. Bound: small against the change of the effect.
-const BY_INPUT_NOISE: [(Place, f64); 9] = [
+const BY_INPUT_NOISE: [(Place, f64); 10] = [
     (LN_COEFFICIENT, 1e-3),
     (EXPONENT, 1e-3),
     (ALPHA, 1e-3),
@@ -56,6 +56,7 @@ const BY_INPUT_NOISE: [(Place, f64); 9] = [
     (LN_HEATING_COOLING_RATIO, 1e-3),
     (PREHEAT, 1e-2),
     (TC_LAG, 1e-2),
+    (TC_GAIN, 1e-3),
     (LOGIT_INNER, 1e-2),
     (LN_INNER_CONDUCTANCE, 1e-2),
 ];
@@ -63,7 +64,7 @@ const BY_INPUT_NOISE: [(Place, f64); 9] = [
 /// Sets the whitening of each step at the current parameters, and the expected sum of squares of input noise as a function of them.
 ///
 /// T1, Tc, flow and pressures drive the prediction with what smoothing leaves of their noise, which the real gas does not see. A lagging probe, a
-/// lagging Tc or a smaller h removes some of it from the residual. Least squares with fixed weights would therefore find a lag on every rig. The fit
+/// lagging Tc, a gain of Tc or a smaller h removes some of it from the residual. Least squares with fixed weights would therefore find a lag on every rig. The fit
 /// subtracts the expected sum of squares of this noise (corrected least squares, e.g. Carroll et al., Measurement Error in Nonlinear Models, ch. 7).
 pub(crate) fn set(problem: &mut Problem<'_>, config: &IdentifyConfig) -> Option<()> {
     let predictions = problem.predictions(&problem.shared, &problem.locals(), None);
@@ -148,7 +149,7 @@ fn responses(
             let (values, slopes) = (basis.values.column(k), basis.slopes.column(k));
             let (values, slopes): (Vec<f64>, Vec<f64>) =
                 (values.iter().copied().collect(), slopes.iter().copied().collect());
-            DVector::from_vec(linearised.by_input(input, &values, &slopes, shared[TC_LAG]))
+            DVector::from_vec(linearised.by_input(input, &values, &slopes, shared))
         })
         .collect();
     DMatrix::from_columns(&columns)

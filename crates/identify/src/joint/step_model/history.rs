@@ -64,8 +64,9 @@ fn outer_k(row: &Row, shared: &SharedVector) -> f64 {
     row.tc_k + shared[TC_LAG] * row.tc_slope_k_s - tc_error_k(row.tc_k, shared)
 }
 
-fn t2_error_k(read_k: f64, shared: &SharedVector) -> f64 {
-    shared[OFFSETS + 1] + shared[THERMOMETERS] + shared[GAINS] * (read_k - CALIBRATED_AT_K)
+/// Error of T2 at what its probe has. Not at the reading: its noise would be in the prediction, and a gain would fit that to itself.
+fn t2_error_k(probe_k: f64, shared: &SharedVector) -> f64 {
+    shared[OFFSETS + 1] + shared[THERMOMETERS] + shared[GAINS] * (probe_k - CALIBRATED_AT_K)
 }
 
 /// Mean of `exp(-x s)` over s from 0 to 1.
@@ -126,8 +127,7 @@ impl Model {
             self.linearised(history, shared, local, derivatives.then_some(with_model), before)
         };
         let mut readings_k = linearised.probe.read(&linearised.gas_k, local[FIRST_READING]);
-        let t2_reads = readings_k.iter_mut().zip(&history.step.rows);
-        t2_reads.for_each(|(reading, row)| *reading += t2_error_k(row.t2_k, shared));
+        readings_k.iter_mut().for_each(|reading_k| *reading_k += t2_error_k(*reading_k, shared));
         if self.has_balance {
             readings_k.extend(linearised.tc_k(shared));
         }

@@ -213,16 +213,18 @@ impl Linearised<'_> {
         input: SmoothedInput,
         values: &[f64],
         slopes: &[f64],
-        lag_s: f64,
+        shared: &SharedVector,
     ) -> Vec<f64> {
+        let (lag_s, gain_ratio) = (shared[TC_LAG], shared[TC_GAIN]);
         let at = |i: usize| i.checked_sub(self.lead).map(|row| (values[row], slopes[row]));
         let change = |i: usize, state: &RowState| {
             let Some((value, slope)) = at(i) else { return Change::default() };
             match input {
                 SmoothedInput::T1 => Change::of(Input::T1, value),
-                // The row of its own reading is not smoothed: only the correction for the lag is.
+                // The row of its own reading is not smoothed: only the corrections for lag and gain are.
                 SmoothedInput::Tc => {
-                    Change { reading_k: lag_s * slope, ..Change::of(Input::Outer, value + lag_s * slope) }
+                    let reading_k = lag_s * slope - gain_ratio * value;
+                    Change { reading_k, ..Change::of(Input::Outer, value + reading_k) }
                 }
                 SmoothedInput::P1 => Change::of(Input::LnPressureRatio, -value / state.inputs.p1_pa),
                 SmoothedInput::P2 => Change::of(Input::LnPressureRatio, value / state.inputs.p2_pa),
@@ -271,8 +273,8 @@ impl Linearised<'_> {
         let input = |input: Input, of: &dyn Fn(&RowState, &Row) -> f64| {
             by(&|state, row, _| Change::of(input, of(state, row)))
         };
-        let with_t2 = |(mut column, end_k): (Vec<f64>, f64), of: &dyn Fn(&Row) -> f64| {
-            column.iter_mut().zip(&self.step.rows).for_each(|(value, row)| *value += of(row));
+        let with_t2 = |(mut column, end_k): (Vec<f64>, f64)| {
+            column.iter_mut().take(self.step.rows.len()).for_each(|value| *value += 1.0);
             (column, end_k)
         };
         let nothing = || (self.of_t2(&vec![0.0; self.gas_k.len()]), 0.0);
@@ -291,12 +293,16 @@ impl Linearised<'_> {
             INLET => input(Input::Inlet, &|_, _| 1.0),
             HUMIDITY => input(Input::Humidity, &|_, _| 1.0),
             OFFSETS => input(Input::T1, &|_, _| -1.0),
-            T2_OFFSET => with_t2(nothing(), &|_| 1.0),
+            T2_OFFSET => with_t2(nothing()),
             TC_OFFSET => by(&|_, _, _| Change::of_tc(-1.0)),
             P1_OFFSET => input(Input::LnPressureRatio, &|state, _| 1.0 / state.inputs.p1_pa),
             P2_OFFSET => input(Input::LnPressureRatio, &|state, _| -1.0 / state.inputs.p2_pa),
             FLOW_GAIN => input(Input::Flow, &|state, _| -state.inputs.flow_kg_s / (1.0 + shared[FLOW_GAIN])),
-            T2_GAIN => with_t2(nothing(), &|row| row.t2_k - CALIBRATED_AT_K),
+            T2_GAIN => {
+                let probe_k = self.probe.read(&self.gas_k, local[FIRST_READING]);
+                let distances: Vec<f64> = probe_k.iter().map(|probe_k| probe_k - CALIBRATED_AT_K).collect();
+                (self.of_t2(&distances), 0.0)
+            }
             TC_GAIN => by(&|_, row, _| Change::of_tc(CALIBRATED_AT_K - row.tc_k)),
             P1_GAIN => {
                 input(Input::LnPressureRatio, &|state, row| (row.p1_pa - rest_pa) / state.inputs.p1_pa)
@@ -307,14 +313,11 @@ impl Linearised<'_> {
             BAROMETER => input(Input::LnPressureRatio, &|state, _| {
                 state.inputs.p1_pa.recip() - state.inputs.p2_pa.recip()
             }),
-            THERMOMETERS => with_t2(
-                by(&|_, _, _| {
-                    let mut change = Change::of_tc(-1.0);
-                    change.inputs[Input::T1 as usize] = -1.0;
-                    change
-                }),
-                &|_| 1.0,
-            ),
+            THERMOMETERS => with_t2(by(&|_, _, _| {
+                let mut change = Change::of_tc(-1.0);
+                change.inputs[Input::T1 as usize] = -1.0;
+                change
+            })),
             TC_LAG => by(&|_, row, _| Change::of_tc(row.tc_slope_k_s)),
             LN_CAPACITY => by(&|_, _, _| Change { ln_capacity: 1.0, ..Change::default() }),
             LOGIT_INNER => by(&|_, _, _| Change { logit_inner: 1.0, ..Change::default() }),

@@ -53,10 +53,13 @@ pub struct Mixture {
 
 impl Mixture {
     /// Evaluates all sets. `mean` and `covariance` are those of the parameters' distances from neutral, from a fit with all of them free.
-    /// `None` if the covariance is not positive definite or its size is another.
+    /// `None` if a number is not finite, the covariance is not positive definite, or its size is another.
     pub fn of(mean: &DVector<f64>, covariance: &DMatrix<f64>, parameters: &[Parameter]) -> Option<Self> {
         let count = parameters.len();
         if mean.len() != count || covariance.shape() != (count, count) {
+            return None;
+        }
+        if !mean.iter().chain(covariance.iter()).all(|number| number.is_finite()) {
             return None;
         }
         let exact = Likelihood::of(mean, covariance, parameters)?;

@@ -28,11 +28,12 @@ impl BoundedNormal {
     }
 
     /// Quantile of the truncated distribution at `share` (between 0 and 1); the nearest bound if the probability between the bounds
-    /// underflows.
+    /// underflows or is not a number.
     pub fn quantile(&self, share: f64) -> f64 {
         let upper = self.uses_upper_tail();
         let (near, far) = self.tail_probabilities();
-        if near <= far {
+        let lies_between = near > far;
+        if !lies_between {
             return if upper { self.low } else { self.high };
         }
         let tail_share = if upper { share } else { 1.0 - share };
@@ -239,6 +240,9 @@ mod tests {
         assert_eq!((bounded.mass(), bounded.quantile(0.5)), (0.0, 0.0));
         let bounded = BoundedNormal { mean: 1e3, ..bounded };
         assert_eq!((bounded.mass(), bounded.quantile(0.5)), (0.0, 1.0));
+        let none =
+            [BoundedNormal { mean: f64::NAN, ..bounded }, BoundedNormal { sigma: f64::NAN, ..bounded }];
+        assert!(none.iter().all(|bounded| [0.0, 1.0].contains(&bounded.quantile(0.5))), "{none:?}");
     }
 
     const SCIPY: [(f64, f64, f64, f64, f64, f64, f64); 6] = [

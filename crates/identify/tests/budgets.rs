@@ -70,7 +70,8 @@ fn rows_combine_to_the_stated_uncertainty() {
             for budget in [budgets.eta.as_ref().unwrap(), budgets.h_w_m2k.as_ref().unwrap()] {
                 let combined = half_width_95(budget.combined_standard_uncertainty());
                 let ratio = combined / budget.expanded_uncertainty;
-                assert!((ratio - 1.0).abs() < 0.02, "step {}: {ratio} {budget:#?}", point.step);
+                // An interval of ln h that reaches far to one side is narrower in h: 5 % where it reaches a tenth of h.
+                assert!((ratio - 1.0).abs() < 0.05, "step {}: {ratio} {budget:#?}", point.step);
                 for source in ["offset of T2", "gain of P2", "barometer", "gain of m_c"] {
                     assert!(budget.rows.iter().any(|row| row.source == source), "{source} in {budget:#?}");
                 }

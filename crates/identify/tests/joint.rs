@@ -357,7 +357,8 @@ fn a_share_that_the_recording_cannot_determine_gets_no_number() {
 /// necessary. The common errors of a campaign are one draw, so 144 points count for some twenty. Of twenty at 95 % fewer than 16 cover it in
 /// 0.3 % of the cases; of twenty at 68 % fewer than 7 or more than 18 in 0.3 % and 0.5 %. Their root mean square is known to 16 %; three of
 /// that are allowed above a width of 1.4. The intervals include what a recording cannot exclude of alpha_A, the probe and the heating/cooling
-/// ratio, none of which this machine has. The common error of h is eight draws.
+/// ratio, none of which this machine has. The common error of h is eight draws, and its intervals reach to a probe and a Tc that lag together,
+/// which 18 steps hardly tell from a smaller h: they may be four times as wide.
 #[test]
 fn intervals_of_a_campaign_with_noise_and_offsets_hold_and_are_not_too_wide() {
     let campaign = campaign(&eighteen(), 120.0, Machine::default());
@@ -375,10 +376,29 @@ fn intervals_of_a_campaign_with_noise_and_offsets_hold_and_are_not_too_wide() {
             h.add(point.h_w_m2k, point.h_low_w_m2k, point.h_high_w_m2k, truth.h_w_m2k);
         }
     }
-    for (name, honesty) in [("eta", eta), ("h", h)] {
+    for (name, honesty, most_within, widest) in [("eta", eta, 0.92, 2.1), ("h", h, 1.0, 4.5)] {
         let (held, within_one, width) = (honesty.held(), honesty.within_one(), honesty.width());
         assert!(held >= 0.8, "{name}: {held} hold");
-        assert!((0.35..=0.92).contains(&within_one), "{name}: {within_one} within one standard error");
-        assert!((0.6..=2.1).contains(&width), "{name}: {width} as wide as the errors");
+        assert!((0.35..=most_within).contains(&within_one), "{name}: {within_one} within one standard error");
+        assert!((0.6..=widest).contains(&width), "{name}: {width} as wide as the errors");
+    }
+}
+
+/// A recording says little about the gain of T2, which is efficiency to eqs. 1-3: a gain that is hardly known widens the intervals, but moves no
+/// point by more than half of them. Fitted to the noise of T2 it would move them by ten.
+#[test]
+fn an_unknown_gain_of_t2_moves_no_point() {
+    let campaign = campaign(&eighteen(), 40.0, Machine::default());
+    let (recording, declared) = measured(&campaign.recording, 1.0, 0.0, &mut Pcg64::seed_from_u64(52));
+    let with_gain = |gain_sigma_ratio: f64| {
+        let mut declared = declared.clone();
+        declared.get_mut(&Channel::T2).unwrap().gain_sigma_ratio = gain_sigma_ratio;
+        found(&recording, &IdentifyConfig { declared, ..joint() }).0
+    };
+    let (known, unknown) = (with_gain(1e-5), with_gain(0.01));
+    for (known, unknown) in known.iter().zip(&unknown) {
+        let half = 0.5 * (unknown.eta_high.unwrap() - unknown.eta_low.unwrap());
+        let (known, unknown) = (known.eta.unwrap(), unknown.eta.unwrap());
+        assert!((unknown - known).abs() < 0.5 * half, "{known} and {unknown} +/- {half}");
     }
 }

@@ -37,7 +37,7 @@ pub fn expected_together(steps: &[&[ForecastRow]], config: &IdentifyConfig) -> O
     let parameter_error_eta = refinements::prior_sensitivity(&problem, None)?;
     let reported = |problem: &Problem<'_>| -> Option<Vec<Option<f64>>> {
         let mut open = problem.clone();
-        let found = Fitted::of(&mut open)?.numbers(&open, &condensed);
+        let found = Fitted::of(&mut open, config)?.numbers(&open, &condensed);
         let mut sigmas = vec![None; steps.len()];
         for (eta, step) in found.eta.iter().zip(&condensed) {
             sigmas[step.position] = Some(eta.uncertainty.combined_standard_error());

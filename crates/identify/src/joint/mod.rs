@@ -257,7 +257,7 @@ impl<'a> Attempt<'a> {
             (member.contributes, member.excluded) = (false, true);
         }
         minimise(&mut problem, config)?;
-        let fitted = Fitted::of(&mut problem)?;
+        let fitted = Fitted::of(&mut problem, config)?;
         Attempt::of(problem, fitted, steps, config)
     }
 
@@ -323,37 +323,41 @@ fn best_housing(problem: &mut Problem<'_>, config: &IdentifyConfig) -> Option<Fi
             *problem = two;
         }
     }
-    Fitted::of(problem)
+    Fitted::of(problem, config)
 }
 
 /// Fits law, efficiencies and housing first, with all parameters that may be neutral as declared: far from the minimum they imitate an inner wall.
 fn minimise_in_stages(problem: &mut Problem<'_>, config: &IdentifyConfig) -> Option<()> {
     let sought = fit::refinements::sought(problem);
     sought.iter().for_each(|refinement| problem.active[refinement.index] = false);
-    problem.minimise_roughly()?;
-    fit::step_noise::set(problem, config)?;
-    problem.minimise_roughly()?;
+    approach(problem, config)?;
     sought.iter().for_each(|refinement| problem.active[refinement.index] = true);
     minimise(problem, config)
 }
 
 /// Fits, estimates noise and spreads from the fit, excludes steps that fit far worse, and fits again.
 fn minimise(problem: &mut Problem<'_>, config: &IdentifyConfig) -> Option<()> {
+    approach(problem, config)?;
+    problem.minimise()?;
+    Some(())
+}
+
+/// The same without the last fit.
+fn approach(problem: &mut Problem<'_>, config: &IdentifyConfig) -> Option<()> {
     for _ in 0..ROUNDS {
         problem.minimise_roughly()?;
         fit::start::refine(problem, config)?;
         judge::exclude(problem, config);
     }
-    problem.minimise()?;
     Some(())
 }
 
 impl Fitted {
     /// Evaluates the parameters with a prior of a problem at its minimum, and moves it to the mean of their mixture.
-    fn of(problem: &mut Problem<'_>) -> Option<Self> {
+    fn of(problem: &mut Problem<'_>, config: &IdentifyConfig) -> Option<Self> {
         let inlet_sigma = fit::inlet::settle(problem)?;
         let open = problem.clone();
-        let refinements = fit::refinements::settle(problem)?;
+        let refinements = fit::refinements::settle(problem, config)?;
         let (covariance, gain) = covariance(problem, refinements.as_ref(), inlet_sigma)?;
         let prior_sensitivity = match &refinements {
             Some(found) => fit::refinements::prior_sensitivity(&open, Some(found))?,

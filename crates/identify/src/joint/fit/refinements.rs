@@ -5,7 +5,9 @@
 //! ([`mapper_inference::mixture`]). The fit moves to the mean of the mixture and is linearised again there, because the probe's lag is far
 //! from linear. The spread of the mixture then enters the uncertainty of every number of every point.
 
+use crate::IdentifyConfig;
 use crate::joint::fit::solve::{Covariance, Problem};
+use crate::joint::fit::step_noise;
 use crate::joint::step_model::parameters::{ALPHA, ETA, REFINEMENTS, Refinement};
 use mapper_core::standard_error_of;
 use mapper_inference::interval;
@@ -88,12 +90,13 @@ pub(crate) fn prior_sensitivity(open: &Problem<'_>, found: Option<&Refinements>)
 
 /// Evaluates the mixture of a problem at its minimum and moves the problem to the mean of the mixture; `Some(None)` if there is nothing to
 /// search for.
-pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<Option<Refinements>> {
+pub(crate) fn settle(problem: &mut Problem<'_>, config: &IdentifyConfig) -> Option<Option<Refinements>> {
     let sought = sought(problem);
     if sought.is_empty() {
         return Some(None);
     }
     linearised(problem, &sought)?;
+    step_noise::set(problem, config)?;
     // Again at its mean; a third time changes the error of five classes of `benches/identification.py` by less than 0.001 points.
     Some(Some(linearised(problem, &sought)?))
 }
@@ -103,10 +106,8 @@ fn linearised(problem: &mut Problem<'_>, sought: &[Refinement]) -> Option<Refine
     let indices: Vec<usize> = sought.iter().map(|refinement| refinement.index).collect();
     let declared: Vec<f64> = indices.iter().map(|index| problem.priors[*index].mean).collect();
     indices.iter().for_each(|index| problem.active[*index] = true);
-    let covariance = problem.covariance()?;
     let best = problem.full_step(&indices)?;
-    let rows: Vec<usize> = indices.iter().filter_map(|index| covariance.row_of(*index)).collect();
-    let spread = DMatrix::from_fn(rows.len(), rows.len(), |a, b| covariance.shared[(rows[a], rows[b])]);
+    let spread = problem.scatter(&indices)?;
     let found = DVector::from_iterator(
         indices.len(),
         best.iter().zip(&declared).map(|(best, declared)| best - declared),

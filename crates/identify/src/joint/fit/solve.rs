@@ -1,6 +1,7 @@
 //! Levenberg-Marquardt on the joint fit's normal equations. Their matrix has arrow shape: a step's own parameters couple only with themselves
 //! and the shared ones, so they are eliminated step by step.
 
+use crate::joint::fit::step_noise::InputNoise;
 use crate::joint::fit::whitening::Whitening;
 use crate::joint::step_model::history::{Prediction, Wall};
 use crate::joint::step_model::linearised::{Model, StepHistory};
@@ -11,13 +12,17 @@ use mapper_core::IdentifiedInlet;
 use mapper_numerics::least_squares::descent::ENOUGH;
 use mapper_numerics::least_squares::{Arrow, ArrowBlock, DampedFit, Reduced, inverse, minimise};
 use mapper_numerics::parallel;
-use nalgebra::{DMatrix, DVector, Matrix4, Matrix4xX, Vector4};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix4, Matrix4xX, Vector4};
 
 /// Relative rounding error of the cost. Bound: some tens of roundings of f64.
 const COST_ROUNDING: f64 = 1e-14;
 
 /// Decrease of the cost for another iteration of an intermediate fit. Bound: the weights that follow change it by more.
 const ROUGHLY: f64 = 1.0;
+
+/// Largest part of the apparent information about a combination of parameters that counts as noise of the inputs. Bound: its scatter is then four
+/// times the apparent one, and the part itself is known no better from some hundred values of smoothed inputs.
+const MAX_NOISE_SHARE: f64 = 0.75;
 
 /// One step in the fit.
 #[derive(Debug, Clone)]
@@ -47,9 +52,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) active: [bool; SHARED],
     /// Spread of a point's efficiency about the surface, one standard deviation; infinite without a surface.
     pub(crate) surface_sigma: f64,
-    /// Slope of the expected sum of squares of input noise by each shared parameter, at `input_noise_at`.
-    pub(crate) input_noise: SharedVector,
-    pub(crate) input_noise_at: SharedVector,
+    /// The expected sum of squares of input noise, which the cost is without.
+    pub(crate) input_noise: InputNoise,
     /// Whether no noise is declared, so that a fit is exact.
     pub(crate) is_exact: bool,
     /// Whether the recording is to decide which law h before the wheel follows.
@@ -144,6 +148,20 @@ pub(crate) struct Covariance {
     pub(crate) own: Vec<(Matrix4<f64>, Matrix4xX<f64>)>,
     /// For each step: sensitivity of its own parameters to the shared ones.
     pub(crate) sensitivities: Vec<Matrix4xX<f64>>,
+}
+
+/// Factor of the information about the parameters without the noise of its derivatives, at most [`MAX_NOISE_SHARE`] of it.
+fn without_noise(information: &DMatrix<f64>, noise: &DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
+    let factor = information.clone().cholesky()?;
+    if noise.iter().all(|value| *value == 0.0) {
+        return Some(factor);
+    }
+    let lower = factor.l();
+    let half = lower.solve_lower_triangular(noise)?;
+    let relative = lower.solve_lower_triangular(&half.transpose())?.symmetric_eigen();
+    let left = relative.eigenvalues.map(|share| 1.0 - share.clamp(0.0, MAX_NOISE_SHARE));
+    let whole = &lower * relative.eigenvectors;
+    (&whole * DMatrix::from_diagonal(&left) * whole.transpose()).cholesky()
 }
 
 impl Member<'_> {
@@ -281,13 +299,8 @@ impl Problem<'_> {
     }
 
     fn shared_cost(&self, shared: &SharedVector) -> f64 {
-        self.fitted()
-            .iter()
-            .map(|i| {
-                let prior = self.priors[*i].weight() * (shared[*i] - self.priors[*i].mean).powi(2);
-                prior - self.input_noise[*i] * (shared[*i] - self.input_noise_at[*i])
-            })
-            .sum()
+        let prior = |i: &usize| self.priors[*i].weight() * (shared[*i] - self.priors[*i].mean).powi(2);
+        self.fitted().iter().map(prior).sum::<f64>() - self.input_noise.value(shared)
     }
 
     fn normal(&self, fitted: &[usize]) -> Normal {
@@ -305,7 +318,7 @@ impl Problem<'_> {
             let prior = self.priors[*index];
             equations.shared[(row, row)] += prior.weight();
             equations.right[row] += prior.weight() * (prior.mean - self.shared[*index]);
-            equations.right[row] += 0.5 * self.input_noise[*index];
+            equations.right[row] += 0.5 * self.input_noise.slope[*index];
         }
         let surface_weight = 1.0 / (self.surface_sigma * self.surface_sigma);
         let mut wanted = [false; SHARED];
@@ -459,18 +472,39 @@ impl Problem<'_> {
     /// Values of some shared parameters after one undamped step, ignoring bounds.
     pub(crate) fn full_step(&self, indices: &[usize]) -> Option<Vec<f64>> {
         let fitted = self.fitted();
-        let (change, _) = self.normal(&fitted).equations.step(0.0)?;
+        let Reduced { matrix, right, .. } = self.normal(&fitted).equations.reduced(0.0)?;
+        let noise = self.input_noise.square_of(&fitted);
+        let change = self.input_noise.change(&self.shared, &fitted);
+        let change = without_noise(&matrix, &noise)?.solve(&(right + &noise * change));
         let row = |index: &usize| fitted.iter().position(|other| other == index);
         indices.iter().map(|index| Some(self.shared[*index] + change[row(index)?])).collect()
     }
 
-    /// Covariance at the minimum; `None` if the equations are singular.
+    /// Covariance at the minimum, by the information without the noise of its derivatives; `None` if the equations are singular.
     pub(crate) fn covariance(&self) -> Option<Covariance> {
         let fitted = self.fitted();
         let equations = self.normal(&fitted).equations;
         let Reduced { matrix, inverses, .. } = equations.reduced(0.0)?;
-        let shared = if fitted.is_empty() { DMatrix::zeros(0, 0) } else { inverse(&matrix.cholesky()?) };
+        let shared = if fitted.is_empty() {
+            DMatrix::zeros(0, 0)
+        } else {
+            inverse(&without_noise(&matrix, &self.input_noise.square_of(&fitted))?)
+        };
         Some(Covariance::of(fitted, shared, &equations, &inverses))
+    }
+
+    /// Scatter of some shared parameters, as corrected least squares has it: the noise of the derivatives adds nothing to the information but
+    /// scatters the gradient, so that the information with it stands between two inverses without it.
+    pub(crate) fn scatter(&self, indices: &[usize]) -> Option<DMatrix<f64>> {
+        let fitted = self.fitted();
+        let Reduced { matrix, .. } = self.normal(&fitted).equations.reduced(0.0)?;
+        let found = inverse(&without_noise(&matrix, &self.input_noise.square_of(&fitted))?);
+        let scatter = &found * matrix * &found;
+        let rows: Vec<usize> = indices
+            .iter()
+            .map(|index| fitted.iter().position(|other| other == index))
+            .collect::<Option<_>>()?;
+        Some(DMatrix::from_fn(rows.len(), rows.len(), |a, b| scatter[(rows[a], rows[b])]))
     }
 
     /// Covariance of a fit without the errors of the readings, which keep their declared spread: every other parameter responds to them as the

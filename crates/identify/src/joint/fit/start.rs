@@ -2,6 +2,7 @@
 
 use crate::faults::smooth::ANY_ROUGHNESS;
 use crate::joint::fit::solve::{Member, Problem};
+use crate::joint::fit::step_noise::InputNoise;
 use crate::joint::fit::{inlet, step_noise};
 use crate::joint::step_model::gas_path::{Setting, reynolds};
 use crate::joint::step_model::linearised::{Model, StepHistory};
@@ -312,8 +313,7 @@ pub(crate) fn problem<'a>(
         priors,
         active,
         surface_sigma: ANY_ROUGHNESS,
-        input_noise: [0.0; SHARED],
-        input_noise_at: [0.0; SHARED],
+        input_noise: InputNoise::none(),
         is_exact: config.declared.is_empty(),
         inlet_sought: choice.inlet_h == Choice::Fitted,
         inlet: None,
@@ -353,6 +353,8 @@ fn member<'a>(
             std::array::from_fn::<f64, TERM_COUNT, _>(|k| here[k] - end_terms[k])
         })
         .collect();
+    let by_flow = step.lead.iter().chain(&step.rows);
+    let by_flow = by_flow.map(|row| scale.by_ln_flow(row.place).map(|slope| slope / row.flow_kg_s)).collect();
     let eta = found
         .and_then(|found| found.eta)
         .map_or(mean_eta, |(eta, _)| eta)
@@ -370,7 +372,7 @@ fn member<'a>(
         measured_k.extend(step.rows.iter().map(|row| row.tc_read_k));
     }
     Some(Member {
-        history: StepHistory { step, terms },
+        history: StepHistory { step, terms, by_flow },
         whitening: step_noise::start(step, measured_k.len(), config)?,
         measured_k,
         coupling: std::array::from_fn(|i| {

@@ -7,17 +7,18 @@
 use crate::IdentifyConfig;
 use crate::joint::fit::solve::{Member, Problem};
 use crate::joint::fit::whitening::Whitening;
-use crate::joint::step_model::linearised::{Linearised, SmoothedInput};
+use crate::joint::step_model::linearised::{Linearised, SmoothedInput, StepHistory};
 use crate::joint::step_model::parameters::{
-    ALPHA, EXPONENT, LN_COEFFICIENT, LN_HEATING_COOLING_RATIO, LN_INNER_CONDUCTANCE, LOGIT_INNER, PREHEAT,
-    PROBE_MM2, Place, SHARED, SharedVector, TC_GAIN, TC_LAG,
+    ALPHA, BEARING, ETA, EXPONENT, EXTERNAL, HEAT_BY_TC, LN_CAPACITY, LN_COEFFICIENT,
+    LN_HEATING_COOLING_RATIO, LN_INNER_CONDUCTANCE, LOCAL, LOGIT_INNER, PREHEAT, PROBE_MM2, Place, SHARED,
+    SharedVector, TC_GAIN, TC_LAG,
 };
 use crate::joint::step_model::rows::StepRows;
-use crate::joint::step_model::smoothing::{Basis, FLOW, P1, P2, SMOOTHED_COUNT, T1, TC};
+use crate::joint::step_model::smoothing::{Basis, FLOW, P1, P2, SMOOTHED_COUNT, Smoothing, T1, TC};
 use mapper_core::Channel;
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::rms;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// Error of a reading that no noise describes, K: rounding and the equations. Bound: a tenth of the resolution of a logger, 0.01 K.
 const FLOOR_K: f64 = 1e-3;
@@ -40,15 +41,8 @@ const INPUTS: [(usize, SmoothedInput, Channel); SMOOTHED_COUNT] = [
     (FLOW, SmoothedInput::Flow, Channel::CompressorFlow),
 ];
 
-/// How the noise of a smoothed input acts on the expected sum of squares: one value for each of its functions and each row.
-struct InputWeight {
-    place: usize,
-    input: SmoothedInput,
-    weights: DMatrix<f64>,
-}
-
 /// Parameters on which the effect of input noise depends, with the step of the derivative. Bound: small against the change of the effect.
-const BY_INPUT_NOISE: [(Place, f64); 10] = [
+const BY_INPUT_NOISE: [(Place, f64); 14] = [
     (LN_COEFFICIENT, 1e-3),
     (EXPONENT, 1e-3),
     (ALPHA, 1e-3),
@@ -57,65 +51,185 @@ const BY_INPUT_NOISE: [(Place, f64); 10] = [
     (PREHEAT, 1e-2),
     (TC_LAG, 1e-2),
     (TC_GAIN, 1e-3),
+    (LN_CAPACITY, 1e-3),
+    (EXTERNAL, 1e-2),
+    (BEARING, 1e-2),
+    (HEAT_BY_TC, 1e-2),
     (LOGIT_INNER, 1e-2),
     (LN_INNER_CONDUCTANCE, 1e-2),
 ];
 
+/// The expected sum of squares of input noise, about the shared parameters at which it was found: `slope d + d^T square d`.
+#[derive(Debug, Clone)]
+pub(crate) struct InputNoise {
+    at: SharedVector,
+    pub(crate) slope: SharedVector,
+    /// One row and column for each of [`BY_INPUT_NOISE`].
+    square: DMatrix<f64>,
+}
+
+impl InputNoise {
+    /// Of noise-free inputs.
+    pub(crate) fn none() -> Self {
+        let count = BY_INPUT_NOISE.len();
+        InputNoise { at: [0.0; SHARED], slope: [0.0; SHARED], square: DMatrix::zeros(count, count) }
+    }
+
+    /// Change of the fitted parameters since it was found.
+    pub(crate) fn change(&self, shared: &SharedVector, fitted: &[Place]) -> DVector<f64> {
+        DVector::from_iterator(fitted.len(), fitted.iter().map(|index| shared[*index] - self.at[*index]))
+    }
+
+    /// Its value by the slopes alone, relative to that where it was found.
+    pub(crate) fn value(&self, shared: &SharedVector) -> f64 {
+        let terms = self.slope.iter().zip(shared.iter().zip(&self.at));
+        terms.map(|(slope, (shared, at))| slope * (shared - at)).sum()
+    }
+
+    /// Half its second derivatives by the fitted parameters: what their noise adds to the apparent information.
+    pub(crate) fn square_of(&self, fitted: &[Place]) -> DMatrix<f64> {
+        let place = |index: usize| BY_INPUT_NOISE.iter().position(|(other, _)| *other == fitted[index]);
+        DMatrix::from_fn(fitted.len(), fitted.len(), |a, b| {
+            place(a).zip(place(b)).map_or(0.0, |pair| self.square[pair])
+        })
+    }
+}
+
 /// Sets the whitening of each step at the current parameters, and the expected sum of squares of input noise as a function of them.
 ///
 /// T1, Tc, flow and pressures drive the prediction with what smoothing leaves of their noise, which the real gas does not see. A lagging probe, a
-/// lagging Tc, a gain of Tc or a smaller h removes some of it from the residual. Least squares with fixed weights would therefore find a lag on every rig. The fit
-/// subtracts the expected sum of squares of this noise (corrected least squares, e.g. Carroll et al., Measurement Error in Nonlinear Models, ch. 7).
+/// lagging Tc, a gain of Tc or a smaller h removes some of it from the residual. Least squares with fixed weights would therefore find a lag on
+/// every rig, and take the noise of the derivatives for information. The fit subtracts the expected sum of squares of this noise (corrected
+/// least squares, e.g. Carroll et al., Measurement Error in Nonlinear Models, ch. 7), as far as the parameters of the steps do not explain it.
 pub(crate) fn set(problem: &mut Problem<'_>, config: &IdentifyConfig) -> Option<()> {
     let predictions = problem.predictions(&problem.shared, &problem.locals(), None);
     let walls = problem.walls(&predictions);
     let problem_now = &*problem;
-    let wanted: Vec<(Place, f64)> =
-        BY_INPUT_NOISE.into_iter().filter(|(index, _)| problem_now.active[*index]).collect();
     let places: Vec<usize> = (0..problem_now.members.len()).collect();
     let found = parallel::map(&places, |i| {
         let member = &problem_now.members[*i];
-        let residual: Vec<f64> =
-            member.measured_k.iter().zip(&predictions[*i].readings_k).map(|(a, b)| a - b).collect();
+        let readings_k = &predictions[*i].readings_k;
+        let residual: Vec<f64> = member.measured_k.iter().zip(readings_k).map(|(a, b)| a - b).collect();
         let linearised = |shared: &SharedVector| {
             let wall = walls[*i].as_ref();
             problem_now.model.linearised(&member.history, shared, &member.local, Some(false), wall).0
         };
         let here = linearised(&problem_now.shared);
         let (covariance, inputs) = covariance(problem_now, member, &here, &residual, config);
-        let inverse = mapper_numerics::least_squares::inverse(&covariance.clone().cholesky()?);
-        let weights: Vec<InputWeight> = inputs.into_iter().map(|input| input.weight(&inverse)).collect();
-        let mut slopes = [0.0; SHARED];
-        if !weights.is_empty() && member.contributes {
-            let smoothing = member.history.step.smoothing.as_ref()?;
-            let expected = |linearised: &Linearised<'_>, shared: &SharedVector| -> f64 {
-                weights
-                    .iter()
-                    .map(|weight| {
-                        let responses =
-                            responses(linearised, weight.input, &smoothing.channels[weight.place], shared);
-                        weight.weights.dot(&responses.transpose())
-                    })
-                    .sum()
-            };
-            let now = expected(&here, &problem_now.shared);
-            for (index, step) in &wanted {
-                let mut moved = problem_now.shared;
-                moved[*index] += step;
-                slopes[*index] = (expected(&linearised(&moved), &moved) - now) / step;
+        let whitening = Whitening::new(covariance)?;
+        let noise = match member.history.step.smoothing.as_ref() {
+            Some(smoothing) if member.contributes && !inputs.is_empty() => {
+                let own = OwnPart::of(problem_now, member, &here, &whitening)?;
+                Some(input_noise(
+                    problem_now,
+                    &inputs,
+                    (&member.history, smoothing),
+                    (&whitening, &own),
+                    &linearised,
+                )?)
             }
-        }
-        Some((Whitening::new(covariance)?, slopes))
+            _ => None,
+        };
+        Some((whitening, noise))
     });
-    let mut slopes = [0.0; SHARED];
+    let mut sum = InputNoise { at: problem.shared, ..InputNoise::none() };
     for (member, found) in problem.members.iter_mut().zip(found) {
-        let (whitening, own) = found?;
+        let (whitening, noise) = found?;
         member.whitening = whitening;
-        slopes.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
+        if let Some((slopes, square)) = noise {
+            sum.slope.iter_mut().zip(slopes).for_each(|(sum, own)| *sum += own);
+            sum.square += square;
+        }
     }
-    problem.input_noise = slopes;
-    problem.input_noise_at = problem.shared;
+    problem.input_noise = sum;
     Some(())
+}
+
+/// What the parameters of a step explain of its whitened rows.
+struct OwnPart {
+    columns: DMatrix<f64>,
+    factor: Cholesky<f64, Dyn>,
+}
+
+impl OwnPart {
+    fn of(
+        problem: &Problem<'_>,
+        member: &Member<'_>,
+        linearised: &Linearised<'_>,
+        whitening: &Whitening,
+    ) -> Option<Self> {
+        let columns: Vec<DVector<f64>> =
+            (0..LOCAL).map(|index| DVector::from_vec(linearised.by_local(index))).collect();
+        let mut columns = DMatrix::from_columns(&columns);
+        whitening.apply(&mut columns);
+        let mut matrix = columns.tr_mul(&columns);
+        for (index, prior) in member.priors.iter().enumerate() {
+            let sigma = if index == ETA { problem.surface_sigma } else { prior.sigma };
+            matrix[(index, index)] += 1.0 / (sigma * sigma);
+        }
+        Some(OwnPart { columns, factor: matrix.cholesky()? })
+    }
+
+    /// Whitened columns as the triangular factor sees them: the inner product of these is the explained part.
+    fn explained(&self, whitened: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut along = self.columns.tr_mul(whitened);
+        self.factor.l_dirty().solve_lower_triangular_mut(&mut along);
+        along
+    }
+}
+
+/// Slopes and squares of the expected sum of squares of a step's input noise, without what its own parameters explain.
+fn input_noise<'a>(
+    problem: &Problem<'_>,
+    inputs: &[InputPart<'_>],
+    (history, smoothing): (&StepHistory<'_>, &Smoothing),
+    (whitening, own): (&Whitening, &OwnPart),
+    linearised: &dyn Fn(&SharedVector) -> Linearised<'a>,
+) -> Option<(SharedVector, DMatrix<f64>)> {
+    let count = BY_INPUT_NOISE.len();
+    // Per input: the rows that its noise has now, by its functions, and the factor of the functions' noise.
+    let mut now = Vec::with_capacity(inputs.len());
+    for part in inputs {
+        let basis = &smoothing.channels[part.place].values;
+        let of_functions = part.variance * basis.tr_mul(&(part.noise * basis));
+        let factor = of_functions.cholesky()?.unpack();
+        let mut rows = part.variance * &part.by_rows * (part.noise * basis);
+        whitening.apply(&mut rows);
+        let along = own.explained(&rows);
+        now.push((rows, along, factor));
+    }
+    let mut slopes = [0.0; SHARED];
+    let mut moved_by: Vec<Option<(DMatrix<f64>, DMatrix<f64>)>> = Vec::with_capacity(count);
+    for (index, step) in BY_INPUT_NOISE {
+        if !problem.active[index] {
+            moved_by.push(None);
+            continue;
+        }
+        let mut moved = problem.shared;
+        moved[index] += step;
+        let there = linearised(&moved);
+        let mut parts = Vec::with_capacity(inputs.len());
+        for (part, (rows, along, factor)) in inputs.iter().zip(&now) {
+            let basis = &smoothing.channels[part.place];
+            let mut change =
+                (responses((&there, history), part.input, basis, &moved) - &part.responses) / step;
+            whitening.apply(&mut change);
+            slopes[index] += 2.0 * (change.dot(rows) - own.explained(&change).dot(along));
+            parts.push(change * factor);
+        }
+        let columns: Vec<DVector<f64>> =
+            parts.iter().flat_map(|part| part.column_iter().map(|column| column.into_owned())).collect();
+        let all = DMatrix::from_columns(&columns);
+        let explained = own.explained(&all);
+        moved_by.push(Some((all, explained)));
+    }
+    let square = DMatrix::from_fn(count, count, |a, b| match (&moved_by[a], &moved_by[b]) {
+        (Some((all, explained)), Some((other, other_explained))) => {
+            all.dot(other) - explained.dot(other_explained)
+        }
+        _ => 0.0,
+    });
+    Some((slopes, square))
 }
 
 /// A smoothed input in a step's covariance.
@@ -123,23 +237,16 @@ struct InputPart<'a> {
     place: usize,
     input: SmoothedInput,
     variance: f64,
-    basis: &'a Basis,
+    /// Change of the rows by each function of the input.
+    responses: DMatrix<f64>,
     /// Change of the rows by each row of the input.
     by_rows: DMatrix<f64>,
     noise: &'a DMatrix<f64>,
 }
 
-impl InputPart<'_> {
-    /// Derivative of the trace of inverse covariance times covariance by the input's responses.
-    fn weight(&self, inverse: &DMatrix<f64>) -> InputWeight {
-        let through = self.basis.values.tr_mul(self.noise) * self.by_rows.transpose() * inverse;
-        InputWeight { place: self.place, input: self.input, weights: through * (2.0 * self.variance) }
-    }
-}
-
 /// Changes of a step's rows by each function of a smoothed input.
 fn responses(
-    linearised: &Linearised<'_>,
+    (linearised, history): (&Linearised<'_>, &StepHistory<'_>),
     input: SmoothedInput,
     basis: &Basis,
     shared: &SharedVector,
@@ -149,7 +256,7 @@ fn responses(
             let (values, slopes) = (basis.values.column(k), basis.slopes.column(k));
             let (values, slopes): (Vec<f64>, Vec<f64>) =
                 (values.iter().copied().collect(), slopes.iter().copied().collect());
-            DVector::from_vec(linearised.by_input(input, &values, &slopes, shared))
+            DVector::from_vec(linearised.by_input(history, input, &values, &slopes, shared))
         })
         .collect();
     DMatrix::from_columns(&columns)
@@ -221,7 +328,7 @@ fn covariance<'a>(
             if sigma == 0.0 || basis.values.nrows() != count || basis.values.ncols() == 0 {
                 continue;
             }
-            let responses = responses(linearised, input, basis, &problem.shared);
+            let responses = responses((linearised, &member.history), input, basis, &problem.shared);
             let mut by_rows = &responses * basis.values.transpose();
             if input == SmoothedInput::Tc && rows > count {
                 // An error of Tc as read moves its own row against the prediction.
@@ -239,7 +346,7 @@ fn covariance<'a>(
                 place,
                 input,
                 variance: sigma * sigma,
-                basis,
+                responses,
                 by_rows,
                 noise: &step.noise,
             });

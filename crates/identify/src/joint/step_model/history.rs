@@ -7,7 +7,7 @@
 //! phi C dTi/dt = q1 + q2 - G (Ti - Tc)      (1 - phi) C dTc/dt = G (Ti - Tc) + q_inlet + Q + w
 //! ```
 //!
-//! Ti is integrated through the whole run, jumps included, with the measured Tc: it remembers the point before. Each parameter acts on a row by
+//! Ti is integrated through the whole run, jumps included, with the measured Tc: it remembers the point before. It begins at rest. Each parameter acts on a row by
 //! a few inputs of the gas path and of the housing; the chain rule gives its column, through wall, probe and integral.
 
 use crate::joint::step_model::gas_path::{Inputs, Slopes};
@@ -25,6 +25,8 @@ use mapper_physics::rig::sensor_fault::CALIBRATED_AT_K;
 
 /// Exponent below which the mean over a row replaces the formula. Bound: the next term is below rounding.
 const SERIES_BELOW: f64 = 1e-6;
+/// Iterations of a wall at rest. Bound: each reduces its distance a hundredfold, from some 10 K.
+const SETTLED_ROUNDS: usize = 3;
 
 /// Inner wall at the end of a step, and its derivatives by the shared parameters.
 #[derive(Debug, Clone)]
@@ -164,8 +166,12 @@ impl Model {
         let rows: Vec<&Row> = step.lead.iter().chain(&step.rows).skip(skipped).collect();
         let inner = inner_wall(shared);
         let start = before.filter(|wall| rows.first().is_some_and(|row| row.t_s - wall.t_s < MAX_ROW_GAP_S));
-        let mut wall_k =
-            start.map_or_else(|| rows.first().map_or(f64::NAN, |row| outer_k(row, shared)), |w| w.wall_k);
+        let first_terms = history.terms.get(skipped).unwrap_or(&[0.0; TERM_COUNT]);
+        let settled_k = |row: &&Row| {
+            let inputs = self.inputs(row, first_terms, shared, local);
+            if self.has_inner_wall { self.settled_wall_k(inputs, inner, shared) } else { inputs.outer_k }
+        };
+        let mut wall_k = start.map_or_else(|| rows.first().map_or(f64::NAN, settled_k), |wall| wall.wall_k);
         let mut states = Vec::with_capacity(rows.len());
         for (i, row) in rows.iter().enumerate() {
             let terms = history.terms.get(skipped + i).unwrap_or(&[0.0; TERM_COUNT]);
@@ -214,6 +220,18 @@ impl Model {
         let probe = self.probe(&step.rows, &gas_k, shared[PROBE_MM2]);
         let linearised = Linearised { model: self, step, states, lead, inner, probe, gas_k };
         (linearised, start.cloned(), wall_k)
+    }
+
+    /// The inner wall that neither warms up nor cools down, K: what a run begins with.
+    fn settled_wall_k(&self, inputs: Inputs, (_, conductance_w_k): (f64, f64), shared: &SharedVector) -> f64 {
+        let mut wall_k = inputs.outer_k;
+        for _ in 0..SETTLED_ROUNDS {
+            let inputs = Inputs { wall_k, ..inputs };
+            let wall_w = self.setting.gas_path(&inputs, shared).wall_w;
+            let gas_w_k = self.setting.wall_conductance_w_k(&inputs, wall_w, shared);
+            wall_k += (wall_w - conductance_w_k * (wall_k - inputs.outer_k)) / (gas_w_k + conductance_w_k);
+        }
+        wall_k
     }
 
     /// The inner wall over a row with constant coefficients: its temperature at the end and its mean, K.

@@ -21,7 +21,7 @@ const MIN_BLOCKS: usize = 120;
 const FEWEST_PERIODS: usize = 4;
 /// Shortest period, means. Bound: faster waves average out over the end of a step.
 const SHORTEST_PERIOD_BLOCKS: usize = 4;
-/// Power over that of the declared noise from which a line is no chance. Bound: exp(-20) for each of 500 frequencies is one in a million recordings.
+/// Power over that of the declared noise from which a line is real. Bound: exp(-20) for each of 500 frequencies is one in a million recordings.
 const MIN_POWER_RATIO: f64 = 20.0;
 
 /// A periodic error of a sensor.

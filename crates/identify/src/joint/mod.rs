@@ -47,7 +47,7 @@ const DRIVING: [Channel; 6] =
 /// Minimum number of steps for the shared parameters. Bound: coefficient and exponent of a law, and one more.
 const MIN_SHARING: usize = 3;
 
-/// Share of steps with frozen readings above which the balance of the housing is no observation. Bound: that of the steps that a fit may exclude.
+/// Share of steps with frozen readings above which the balance of the housing is not used. Bound: that of the steps that a fit may exclude.
 const MAX_FROZEN_SHARE: f64 = 1.0 / 3.0;
 /// Number of samples at the limit of a sensor that distort a step. Bound: one could be an outlier, and a second one chance.
 const MIN_TOUCHES: usize = 3;

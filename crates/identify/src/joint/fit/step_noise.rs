@@ -9,9 +9,8 @@ use crate::joint::fit::solve::{Member, Problem};
 use crate::joint::fit::whitening::Whitening;
 use crate::joint::step_model::linearised::{Linearised, SmoothedInput, StepHistory};
 use crate::joint::step_model::parameters::{
-    ALPHA, BEARING, ETA, EXPONENT, EXTERNAL, HEAT_BY_TC, LN_CAPACITY, LN_COEFFICIENT,
-    LN_HEATING_COOLING_RATIO, LN_INNER_CONDUCTANCE, LOCAL, LOGIT_INNER, PREHEAT, PROBE_MM2, Place, SHARED,
-    SharedVector, TC_GAIN, TC_LAG,
+    ALPHA, ETA, EXPONENT, LN_CAPACITY, LN_COEFFICIENT, LN_HEATING_COOLING_RATIO, LN_INNER_CONDUCTANCE, LOCAL,
+    LOGIT_INNER, PREHEAT, PROBE_MM2, Place, SHARED, SharedVector, TC_GAIN, TC_LAG,
 };
 use crate::joint::step_model::rows::StepRows;
 use crate::joint::step_model::smoothing::{Basis, FLOW, P1, P2, SMOOTHED_COUNT, Smoothing, T1, TC};
@@ -42,7 +41,7 @@ const INPUTS: [(usize, SmoothedInput, Channel); SMOOTHED_COUNT] = [
 ];
 
 /// Parameters on which the effect of input noise depends, with the step of the derivative. Bound: small against the change of the effect.
-const BY_INPUT_NOISE: [(Place, f64); 14] = [
+const BY_INPUT_NOISE: [(Place, f64); 11] = [
     (LN_COEFFICIENT, 1e-3),
     (EXPONENT, 1e-3),
     (ALPHA, 1e-3),
@@ -52,9 +51,6 @@ const BY_INPUT_NOISE: [(Place, f64); 14] = [
     (TC_LAG, 1e-2),
     (TC_GAIN, 1e-3),
     (LN_CAPACITY, 1e-3),
-    (EXTERNAL, 1e-2),
-    (BEARING, 1e-2),
-    (HEAT_BY_TC, 1e-2),
     (LOGIT_INNER, 1e-2),
     (LN_INNER_CONDUCTANCE, 1e-2),
 ];

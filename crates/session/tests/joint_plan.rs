@@ -123,7 +123,8 @@ fn the_forecast_error_falls_with_the_dwell() {
     assert!(errors[1] < 0.9 * errors[0] && errors[2] < 1.05 * errors[1], "{errors:?}");
 }
 
-/// The shortest dwell that reaches the required error: a second less misses it in the same order.
+/// The shortest dwell that reaches the required error: a second less misses it in the same order. From some 65 s on offsets and gains prevail, and
+/// the error no longer falls with each second.
 #[test]
 fn steps_last_as_long_as_the_required_error_takes() {
     let error_of = |plan: &Plan| plan.figures.rms_error_eta.unwrap();
@@ -131,10 +132,10 @@ fn steps_last_as_long_as_the_required_error_takes() {
         let campaign = Campaign { order: VisitOrder::SpeedLines, ..small(&[AS_DECLARED]) };
         planned(&Campaign { timing: Timing { dwell, ..campaign.timing }, ..campaign })
     };
-    let required = error_of(&with(Dwell::Fixed(70.0)));
+    let required = error_of(&with(Dwell::Fixed(40.0)));
     let chosen = with(Dwell::RequiredSigmaEta(required));
     let dwell_s = chosen.steps[0].dwell_s;
-    assert!(error_of(&chosen) <= required && dwell_s <= 70.0, "{dwell_s} s");
+    assert!(error_of(&chosen) <= required && dwell_s <= 40.0, "{dwell_s} s");
     assert!(chosen.steps.iter().all(|step| step.dwell_s == dwell_s), "all steps last equally long");
     assert!(error_of(&with(Dwell::Fixed(dwell_s - 1.0))) > required, "{dwell_s} s");
     // An error that no dwell reaches is reported.

@@ -1,7 +1,7 @@
 //! Levenberg-Marquardt on the joint fit's normal equations. Their matrix has arrow shape: a step's own parameters couple only with themselves
 //! and the shared ones, so they are eliminated step by step.
 
-use crate::joint::fit::step_noise::InputNoise;
+use crate::joint::fit::input_noise::InputNoise;
 use crate::joint::fit::whitening::Whitening;
 use crate::joint::step_model::history::{Prediction, Wall};
 use crate::joint::step_model::linearised::{Model, StepHistory};

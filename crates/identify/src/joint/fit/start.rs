@@ -1,8 +1,8 @@
 //! Prepares a recording for the fit, and estimates noise and spreads from the fit.
 
 use crate::faults::smooth::ANY_ROUGHNESS;
+use crate::joint::fit::input_noise::InputNoise;
 use crate::joint::fit::solve::{Member, Problem};
-use crate::joint::fit::step_noise::InputNoise;
 use crate::joint::fit::{inlet, step_noise};
 use crate::joint::step_model::gas_path::{Setting, reynolds};
 use crate::joint::step_model::linearised::{Model, StepHistory};

@@ -1,0 +1,58 @@
+//! What the noise of smoothed inputs adds to a fit's sum of squares.
+
+use crate::joint::step_model::parameters::{
+    ALPHA, EXPONENT, LN_CAPACITY, LN_COEFFICIENT, LN_HEATING_COOLING_RATIO, LN_INNER_CONDUCTANCE,
+    LOGIT_INNER, PREHEAT, PROBE_MM2, Place, SHARED, SharedVector, TC_GAIN, TC_LAG,
+};
+use nalgebra::{DMatrix, DVector};
+
+/// Parameters on which the effect of input noise depends, with the step of the derivative. Bound: small against the change of the effect.
+pub(crate) const BY_INPUT_NOISE: [(Place, f64); 11] = [
+    (LN_COEFFICIENT, 1e-3),
+    (EXPONENT, 1e-3),
+    (ALPHA, 1e-3),
+    (PROBE_MM2, 1e-2),
+    (LN_HEATING_COOLING_RATIO, 1e-3),
+    (PREHEAT, 1e-2),
+    (TC_LAG, 1e-2),
+    (TC_GAIN, 1e-3),
+    (LN_CAPACITY, 1e-3),
+    (LOGIT_INNER, 1e-2),
+    (LN_INNER_CONDUCTANCE, 1e-2),
+];
+
+/// The expected sum of squares of input noise, about the shared parameters at which it was found: `slope d + d^T square d`.
+#[derive(Debug, Clone)]
+pub(crate) struct InputNoise {
+    pub(crate) at: SharedVector,
+    pub(crate) slope: SharedVector,
+    /// One row and column for each of [`BY_INPUT_NOISE`].
+    pub(crate) square: DMatrix<f64>,
+}
+
+impl InputNoise {
+    /// Of noise-free inputs.
+    pub(crate) fn none() -> Self {
+        let count = BY_INPUT_NOISE.len();
+        InputNoise { at: [0.0; SHARED], slope: [0.0; SHARED], square: DMatrix::zeros(count, count) }
+    }
+
+    /// Change of the fitted parameters since it was found.
+    pub(crate) fn change(&self, shared: &SharedVector, fitted: &[Place]) -> DVector<f64> {
+        DVector::from_iterator(fitted.len(), fitted.iter().map(|index| shared[*index] - self.at[*index]))
+    }
+
+    /// Its value by the slopes alone, relative to that where it was found.
+    pub(crate) fn value(&self, shared: &SharedVector) -> f64 {
+        let terms = self.slope.iter().zip(shared.iter().zip(&self.at));
+        terms.map(|(slope, (shared, at))| slope * (shared - at)).sum()
+    }
+
+    /// Half its second derivatives by the fitted parameters: what their noise adds to the apparent information.
+    pub(crate) fn square_of(&self, fitted: &[Place]) -> DMatrix<f64> {
+        let place = |index: usize| BY_INPUT_NOISE.iter().position(|(other, _)| *other == fitted[index]);
+        DMatrix::from_fn(fitted.len(), fitted.len(), |a, b| {
+            place(a).zip(place(b)).map_or(0.0, |pair| self.square[pair])
+        })
+    }
+}

@@ -385,7 +385,7 @@ fn intervals_of_a_campaign_with_noise_and_offsets_hold_and_are_not_too_wide() {
 }
 
 /// A recording says little about the gain of T2, which is efficiency to eqs. 1-3: a gain that is hardly known widens the intervals, but moves no
-/// point by more than half of them. Fitted to the noise of T2 it would move them by ten.
+/// point by more than half of them. Fitted to the noise of T2, it would.
 #[test]
 fn an_unknown_gain_of_t2_moves_no_point() {
     let campaign = campaign(&eighteen(), 40.0, Machine::default());

@@ -1,4 +1,4 @@
-//! What the noise of smoothed inputs adds to a fit's sum of squares.
+//! The expected sum of squares that the noise of smoothed inputs adds to a fit's cost, and what it adds to the apparent information.
 
 use crate::joint::step_model::parameters::{
     ALPHA, EXPONENT, LN_CAPACITY, LN_COEFFICIENT, LN_HEATING_COOLING_RATIO, LN_INNER_CONDUCTANCE,
@@ -31,7 +31,7 @@ pub(crate) struct InputNoise {
 }
 
 impl InputNoise {
-    /// Of noise-free inputs.
+    /// That of inputs without noise.
     pub(crate) fn none() -> Self {
         let count = BY_INPUT_NOISE.len();
         InputNoise { at: [0.0; SHARED], slope: [0.0; SHARED], square: DMatrix::zeros(count, count) }
@@ -42,7 +42,7 @@ impl InputNoise {
         DVector::from_iterator(fitted.len(), fitted.iter().map(|index| shared[*index] - self.at[*index]))
     }
 
-    /// Its value by the slopes alone, relative to that where it was found.
+    /// Its change since it was found, by the slopes alone.
     pub(crate) fn value(&self, shared: &SharedVector) -> f64 {
         let terms = self.slope.iter().zip(shared.iter().zip(&self.at));
         terms.map(|(slope, (shared, at))| slope * (shared - at)).sum()

@@ -473,9 +473,10 @@ impl Problem<'_> {
     pub(crate) fn full_step(&self, indices: &[usize]) -> Option<Vec<f64>> {
         let fitted = self.fitted();
         let Reduced { matrix, right, .. } = self.normal(&fitted).equations.reduced(0.0)?;
-        let noise = self.input_noise.square_of(&fitted);
-        let change = self.input_noise.change(&self.shared, &fitted);
-        let change = without_noise(&matrix, &noise)?.solve(&(right + &noise * change));
+        let without = without_noise(&matrix, &self.input_noise.square_of(&fitted))?;
+        // The slopes of the noise are those where it was found: away from there its second derivatives, which `matrix` has in excess, change them.
+        let moved = self.input_noise.change(&self.shared, &fitted);
+        let change = without.solve(&(right + &matrix * &moved)) - moved;
         let row = |index: &usize| fitted.iter().position(|other| other == index);
         indices.iter().map(|index| Some(self.shared[*index] + change[row(index)?])).collect()
     }

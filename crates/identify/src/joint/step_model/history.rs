@@ -7,8 +7,9 @@
 //! phi C dTi/dt = q1 + q2 - G (Ti - Tc)      (1 - phi) C dTc/dt = G (Ti - Tc) + q_inlet + Q + w
 //! ```
 //!
-//! Ti is integrated through the whole run, jumps included, with the measured Tc: it remembers the point before. It begins at rest. Each parameter acts on a row by
-//! a few inputs of the gas path and of the housing; the chain rule gives its column, through wall, probe and integral.
+//! Ti is integrated through the whole run, jumps included, with the measured Tc: it remembers the point before, and neither warms up nor cools down
+//! when the run begins. Each parameter acts on a row by a few inputs of the gas path and of the housing; the chain rule gives its column, through
+//! wall, probe and integral.
 
 use crate::joint::step_model::gas_path::{Inputs, Slopes};
 use crate::joint::step_model::linearised::{
@@ -25,7 +26,7 @@ use mapper_physics::rig::sensor_fault::CALIBRATED_AT_K;
 
 /// Exponent below which the mean over a row replaces the formula. Bound: the next term is below rounding.
 const SERIES_BELOW: f64 = 1e-6;
-/// Iterations of a wall at rest. Bound: each reduces its distance a hundredfold, from some 10 K.
+/// Iterations to the temperature of a settled wall. Bound: each reduces its distance, some 10 K, at least tenfold.
 const SETTLED_ROUNDS: usize = 3;
 
 /// Inner wall at the end of a step, and its derivatives by the shared parameters.
@@ -66,7 +67,7 @@ fn outer_k(row: &Row, shared: &SharedVector) -> f64 {
     row.tc_k + shared[TC_LAG] * row.tc_slope_k_s - tc_error_k(row.tc_k, shared)
 }
 
-/// Error of T2 at what its probe has. Not at the reading: its noise would be in the prediction, and a gain would fit that to itself.
+/// Error of T2 at the temperature of its probe's tip, K. At the reading, the noise would be part of the prediction, and a gain would be fitted to it.
 fn t2_error_k(probe_k: f64, shared: &SharedVector) -> f64 {
     shared[OFFSETS + 1] + shared[THERMOMETERS] + shared[GAINS] * (probe_k - CALIBRATED_AT_K)
 }

@@ -120,8 +120,8 @@ pub(super) struct Probe {
 }
 
 impl Probe {
-    /// The gas as the probe reads it; `first`: reading at the first row. It is one whatever the lag, so that the fits of all lags explain the
-    /// same rows: otherwise a lag would be found for the row that its first reading explains.
+    /// The gas as the probe reads it. `first`: the first reading, a parameter for every lag, 0 included: if only a lag had it, a fit would find a lag
+    /// because of the row that it explains.
     pub(super) fn read(&self, gas_k: &[f64], first: f64) -> Vec<f64> {
         let lagged = follow(&self.lags, first, gas_k);
         let mut read: Vec<f64> =
@@ -178,7 +178,7 @@ impl Linearised<'_> {
                 let driving_w = wall_w + conductance_w_k * (outer_k - ln_conductance * off_k)
                     - (ln_capacity + (1.0 - share) * logit_inner) * state.wall.stored_w;
                 let settled_k = driving_w / state.wall.sum_w_k;
-                // Without a step before, the wall starts at rest.
+                // Without a step before, the wall is settled.
                 let from_k = wall_k.unwrap_or(settled_k);
                 row_wall_k = settled_k + (from_k - settled_k) * state.wall.mean;
                 wall_k = Some(settled_k + (from_k - settled_k) * state.wall.kept);
@@ -505,7 +505,7 @@ mod tests {
                 let expected: Vec<f64> = high.iter().zip(&low).map(|(a, b)| (a - b) / (2.0 * step)).collect();
                 let size = expected.iter().fold(0.0_f64, |size, x| size.max(x.abs()));
                 for (row, (found, expected)) in columns[index].iter().zip(&expected).enumerate() {
-                    // Coefficients along a row of the inner wall are held, and where it starts from rest: 4 % of the largest.
+                    // Coefficients along a row of the inner wall are held, and so is its start: 5 % of the largest.
                     let allowed = if has_inner_wall { 0.05 } else { 2e-2 } * size + 1e-6;
                     assert!(
                         (found - expected).abs() <= allowed,

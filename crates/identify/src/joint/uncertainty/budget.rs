@@ -72,23 +72,16 @@ impl Sources<'_, '_> {
             }
             left
         };
-        let (by_prior, refinements) = (self.by_prior(quantity), self.refinements(quantity));
-        // The mixture may scatter more than the Gaussian about it: the parts are then together all of the number's variance.
-        let square = |contribution: f64| contribution * contribution;
-        let together: f64 = by_prior.iter().map(|(_, contribution)| square(*contribution)).sum::<f64>()
-            + refinements.iter().map(|(.., contribution)| square(*contribution)).sum::<f64>();
-        let share = (number.error / together.sqrt()).min(1.0);
         let mut balance = 0.0;
-        for (index, contribution) in by_prior {
-            let contribution = share * contribution;
+        for (index, contribution) in self.by_prior(quantity) {
             if is_error(index) {
                 push(symbol(index), self.problem.priors[index].sigma, unit(index), contribution, None);
             } else {
                 balance += contribution * contribution;
             }
         }
-        for (index, sigma, contribution) in refinements {
-            push(symbol(index), sigma, unit(index), share * contribution, None);
+        for (index, sigma, contribution) in self.refinements(quantity) {
+            push(symbol(index), sigma, unit(index), contribution, None);
         }
         let balance = balance.sqrt();
         let before = push(BALANCE.to_owned(), balance, OWN_UNIT, balance, None);

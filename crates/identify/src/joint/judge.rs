@@ -19,9 +19,10 @@ use mapper_numerics::statistics::{HINT_SIGMAS, mean, median, rms};
 /// Efficiencies that a compressor can have. Bound: 1 is an ideal compression; below 0.05 nearly all work is heat.
 const POSSIBLE_ETA: std::ops::RangeInclusive<f64> = 0.05..=1.0;
 
-/// Mean square of the whitened residual's sums over segments of [`TREND_BLOCK_S`], of all steps, above which the model itself is
-/// doubtful. Calibrated: `benches/identification.py`; smoothed inputs and fitted parameters reduce it from 1 to about 0.8 if the model
-/// fits the rig.
+/// Mean square of the whitened residual's sums over segments of [`TREND_BLOCK_S`] if the model fits the rig. Calibrated:
+/// `benches/identification.py`; smoothed inputs and fitted parameters reduce it from 1.
+const FITTING_SQUARE: f64 = 0.8;
+/// The same of all steps, above which the model itself is doubtful. Calibrated: as above.
 const SLOW_SQUARE: f64 = 1.6;
 /// The same of Tc: above it the housing is not one or two masses. Calibrated: `benches/identification.py`; 0.8 if the model fits the rig, with a
 /// largest value of 0.98 in 69 recordings.
@@ -61,6 +62,14 @@ pub(crate) fn slow_squares(problem: &Problem<'_>) -> (f64, Option<f64>) {
         tc.extend(slow_square(rows, of_tc).filter(|_| !of_tc.is_empty()));
     }
     (mean(&t2).unwrap_or(0.0), mean(&tc))
+}
+
+/// Whether the slow residuals are nearer to those of a model that fits than to those of a doubtful one. An error of all steps is not made good by
+/// leaving out those in which it is largest.
+pub(crate) fn fits(problem: &Problem<'_>) -> bool {
+    let is_near = |square: f64, doubtful: f64| square * square < FITTING_SQUARE * doubtful;
+    let (slow, slow_tc) = slow_squares(problem);
+    is_near(slow, SLOW_SQUARE) && slow_tc.is_none_or(|square| is_near(square, SLOW_TC_SQUARE))
 }
 
 /// Whether a fit of one node leaves anything that an inner wall could explain. Otherwise its evidence is that of the noise, and another fit would

@@ -280,7 +280,7 @@ impl<'a> Attempt<'a> {
         regions::regions(steps).into_iter().find_map(|of_size| {
             let rests = of_size.into_iter().filter_map(|region| {
                 let rest = self.without(&region.steps, steps, config)?;
-                let undoubted = rest.thermal.doubts.is_empty();
+                let undoubted = rest.thermal.doubts.is_empty() && judge::fits(&rest.problem);
                 let sigmas = regions::disagreement(
                     (&self.problem, &self.covariance),
                     (&rest.problem, &rest.covariance),

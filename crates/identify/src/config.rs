@@ -1,5 +1,6 @@
 //! Configuration of identification: method, window, geometry, declared uncertainty, thresholds.
 
+use crate::allowance::Allowance;
 use crate::step_outcome::error::IdentifyError;
 use mapper_core::{Channel, InletConvection, JointSettings, Method, ReferenceState, SettleBands, WindowRule};
 pub use mapper_core::{DeclaredUncertainty, NoiseColour};
@@ -95,6 +96,8 @@ pub struct IdentifyConfig {
     pub declared: BTreeMap<Channel, DeclaredUncertainty>,
     /// Time correlation of sensor noise.
     pub noise_colour: NoiseColour,
+    /// Sizes of what is efficiency for the method but may be something else.
+    pub allowance: Allowance,
     /// Limits above which a point is doubtful.
     pub thresholds: Thresholds,
 }
@@ -130,6 +133,7 @@ impl Default for IdentifyConfig {
             outlet_tap: PressureTap::Total,
             declared: BTreeMap::new(),
             noise_colour: NoiseColour::default(),
+            allowance: Allowance::default(),
             thresholds: Thresholds::default(),
         }
     }
@@ -145,6 +149,8 @@ impl IdentifyConfig {
             share("alpha_area_ratio", self.alpha_area_ratio),
             share("alpha_area_sigma_ratio", self.alpha_area_sigma_ratio),
             share("internal_area_sigma_ratio", self.internal_area_sigma_ratio),
+            share("recirculation_ratio", self.allowance.recirculation_ratio),
+            share("t2_recovery_ratio", self.allowance.t2_recovery_ratio),
             positive("internal_area_m2", self.internal_area_m2, "a positive area, m2"),
             positive("time_constant_s", colour.time_constant_s, "a positive time, s"),
             share("first_order_share_ratio", colour.first_order_share_ratio),

@@ -15,6 +15,7 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+mod allowance;
 mod config;
 mod estimates;
 mod evidence;
@@ -30,6 +31,7 @@ mod single_step;
 mod step_data;
 mod step_outcome;
 
+pub use allowance::Allowance;
 pub use config::{DeclaredUncertainty, Housing, IdentifyConfig, NoiseColour, PressureTap, Thresholds};
 pub use faults::balance_rows::Machine;
 pub use faults::end_readings::MAX_CORRELATED_ROWS;

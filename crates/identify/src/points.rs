@@ -1,5 +1,6 @@
 //! The points of a recording: estimates with their state, interval, common errors and budgets.
 
+use crate::allowance;
 use crate::single_step::budgets;
 use crate::single_step::dynamic::Estimate;
 use crate::step_data::end_state::EndState;
@@ -18,24 +19,21 @@ pub(crate) fn points_with_budgets(
     estimates: &[Estimate],
     config: &IdentifyConfig,
 ) -> (Vec<Result<IdentifiedPoint, StepError>>, Vec<PointBudgets>) {
-    let points: Vec<Result<IdentifiedPoint, StepError>> = recording
-        .steps
-        .iter()
-        .zip(found)
-        .zip(estimates)
-        .map(|((step, (state, findings)), estimate)| Ok(point(step, &state?, estimate, findings, config)))
-        .collect();
-    let of_steps = points.iter().zip(estimates).zip(&recording.steps);
-    let budgets = of_steps
-        .filter_map(|((point, estimate), step)| {
+    let mut all = Vec::new();
+    let mut of_step =
+        |step: &StepMarker, (state, findings): (Result<EndState, StepError>, _), estimate: &Estimate| {
+            let state = state?;
+            let point = point(step, &state, estimate, findings, config);
             let start_s = step.end_s - config.thresholds.end_mean_s;
             let samples = |channel: Channel| {
                 recording.series.get(&channel).map_or(1, |series| series.range(start_s, step.end_s).len())
             };
-            Some(budgets::of_point(point.as_ref().ok()?, estimate, samples, config))
-        })
-        .collect();
-    (points, budgets)
+            all.push(budgets::of_point(&point, &state, estimate, samples, config));
+            Ok(point)
+        };
+    let steps = recording.steps.iter().zip(found).zip(estimates);
+    let points = steps.map(|((step, found), estimate)| of_step(step, found, estimate)).collect();
+    (points, all)
 }
 
 /// One point.
@@ -69,6 +67,10 @@ pub(crate) fn point(
         eta: estimate.eta.map(|(value, _)| value),
         eta_low: eta_interval.map(|(low, _)| low),
         eta_high: eta_interval.map(|(_, high)| high),
+        eta_allowance: estimate
+            .eta
+            .and_then(|(eta, _)| allowance::budget(eta, state, config))
+            .map(|budget| budget.expanded_uncertainty),
         eta_uncertainty: estimate.eta.and_then(|(_, uncertainty)| uncertainty),
         h_w_m2k: estimate.h_w_m2k.map(|(value, _)| value),
         h_low_w_m2k: h_interval.map(|(low, _)| low),

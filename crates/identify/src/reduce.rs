@@ -81,6 +81,7 @@ fn of_point(
         t1_k: measured.t1_k,
         p1_pa: measured.p1_pa,
         pressure_ratio: measured.p2_pa / measured.p1_pa,
+        bearing_k: measured.turbine.oil_k.or(measured.tc_k),
     };
     let estimate = estimate(measured, heat, config, &mut findings);
     let step = StepMarker {
@@ -94,7 +95,7 @@ fn of_point(
         valve_opening_ratio: f64::NAN,
     };
     let point = point(&step, &state, &estimate, findings, config);
-    let budgets = budgets::of_point(&point, &estimate, |_| samples(config), config);
+    let budgets = budgets::of_point(&point, &state, &estimate, |_| samples(config), config);
     (point, budgets)
 }
 

@@ -27,6 +27,7 @@ fn point(
         eta: Some(0.7),
         eta_low: Some(0.69),
         eta_high: Some(0.71),
+        eta_allowance: None,
         eta_uncertainty: None,
         h_w_m2k: None,
         h_low_w_m2k: None,

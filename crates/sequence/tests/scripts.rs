@@ -65,6 +65,7 @@ fn answer(step: &SequenceStep) -> StepResult {
         eta: Some(0.5 + 0.01 * step.index as f64),
         eta_low: None,
         eta_high: None,
+        eta_allowance: None,
         eta_uncertainty: None,
         h_w_m2k: None,
         h_low_w_m2k: None,

@@ -121,6 +121,10 @@ pub struct IdentifiedPoint {
     pub eta_low: Option<f64>,
     /// Upper end of the 95 % interval of `eta`.
     pub eta_high: Option<f64>,
+    /// Half of the 95 % range that is efficiency for the method but may be recirculation, recovery of the T2 probe or heat behind the wheel,
+    /// fraction. Not part of the interval.
+    #[serde(default)]
+    pub eta_allowance: Option<f64>,
     /// Standard errors of `eta` by origin, fraction.
     pub eta_uncertainty: Option<EstimateUncertainty>,
     /// Heat-transfer coefficient between gas and compressor housing, W/(m2 K); `None` for `steady`.
@@ -329,6 +333,9 @@ pub struct PointBudgets {
     pub step: usize,
     /// Efficiency, fraction.
     pub eta: Option<UncertaintyBudget>,
+    /// What is efficiency for the method but may be something else, fraction.
+    #[serde(default)]
+    pub eta_allowance: Option<UncertaintyBudget>,
     /// Heat-transfer coefficient, W/(m2 K).
     pub h_w_m2k: Option<UncertaintyBudget>,
     /// Pressure ratio.

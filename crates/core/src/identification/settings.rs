@@ -132,6 +132,12 @@ pub struct ModelTolerances {
     pub ambient_temperature_k: f64,
     /// Declared lag of P3 behind its command, s: a value, not a tolerance.
     pub actuator_lag_s: f64,
+    /// Share of the delivered flow that returns from the wheel's outlet to its inlet.
+    pub recirculation_ratio: f64,
+    /// Share of the dynamic temperature that the T2 probe may miss.
+    pub t2_recovery_ratio: f64,
+    /// Conductance from the bearing housing to the gas behind the wheel, W/K.
+    pub heat_behind_wheel_w_k: f64,
     /// Error of the model's equations.
     pub structure: StructureTolerances,
 }
@@ -214,6 +220,12 @@ impl Default for ModelTolerances {
             ambient_temperature_k: 5.0,
             // Bound: fast pressure controllers.
             actuator_lag_s: 0.3,
+            // Bound: leakage over the tips and through the seal behind the wheel; ported shrouds return several times as much.
+            recirculation_ratio: 0.005,
+            // Source: recovery of a shielded probe, 0.94 +/- 0.05 at Mach 0.2 (ASME J. Turbomach. 147, 051006); a bare one has 0.6 to 0.8.
+            t2_recovery_ratio: 0.05,
+            // Bound: a tenth of the film on a rotating disc of 60 mm at 50 krpm (Nu = 0.33 Re^0.5): the plate and its gap pass less.
+            heat_behind_wheel_w_k: 0.04,
             structure: StructureTolerances::default(),
         }
     }

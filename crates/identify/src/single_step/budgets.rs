@@ -1,7 +1,9 @@
 //! Uncertainty budgets of a point.
 
 use crate::IdentifyConfig;
+use crate::allowance;
 use crate::single_step::dynamic::Estimate;
+use crate::step_data::end_state::EndState;
 use mapper_core::{
     BudgetRow, Channel, EstimateUncertainty, IdentifiedPoint, PointBudgets, UncertaintyBudget, half_width_95,
 };
@@ -27,6 +29,7 @@ pub(crate) fn own_row(source: &str, contribution: f64, unit: &str) -> BudgetRow 
 /// The budgets of a point from its estimate. `samples`: number of samples that its state is the mean of.
 pub(crate) fn of_point(
     point: &IdentifiedPoint,
+    state: &EndState,
     estimate: &Estimate,
     samples: impl Fn(Channel) -> usize,
     config: &IdentifyConfig,
@@ -40,6 +43,7 @@ pub(crate) fn of_point(
     PointBudgets {
         step: point.step,
         eta: of(point.eta, point.eta_low, point.eta_high, eta, point.eta_uncertainty, "1"),
+        eta_allowance: point.eta.and_then(|eta| allowance::budget(eta, state, config)),
         h_w_m2k: of(point.h_w_m2k, point.h_low_w_m2k, point.h_high_w_m2k, h, point.h_uncertainty, "W/(m2 K)"),
         pressure_ratio: pressure_ratio(point, samples, config),
     }

@@ -14,6 +14,8 @@ pub(crate) struct EndState {
     pub(crate) t1_k: f64,
     pub(crate) p1_pa: f64,
     pub(crate) pressure_ratio: f64,
+    /// Temperature of the bearing housing: of its oil, or of the compressor's housing if the oil was not recorded.
+    pub(crate) bearing_k: Option<f64>,
 }
 
 /// Means over the last seconds of the step; if a channel has no values there, over its last segment with values.
@@ -39,7 +41,10 @@ pub(crate) fn end_state(
     let (t1_k, t2_k) = (at(Channel::T1)?, at(Channel::T2)?);
     let p1_pa = config.inlet_tap.total_pa(at(Channel::P1)?, flow_kg_s, t1_k);
     let p2_pa = config.outlet_tap.total_pa(at(Channel::P2)?, flow_kg_s, t2_k);
-    let state = EndState { speed_rpm, flow_kg_s, t1_k, p1_pa, pressure_ratio: p2_pa / p1_pa };
+    let seconds = config.thresholds.end_mean_s;
+    let mean_k = |channel: Channel| last_mean(channel, recording.series.get(&channel)?, step, seconds);
+    let bearing_k = [Channel::TOil, Channel::Tc].into_iter().find_map(mean_k).map(|(mean_k, _)| mean_k);
+    let state = EndState { speed_rpm, flow_kg_s, t1_k, p1_pa, pressure_ratio: p2_pa / p1_pa, bearing_k };
     // The correction of a static tap is unbounded.
     for (channel, value) in [(Channel::P1, p1_pa), (Channel::P2, p2_pa)] {
         if !is_reading(channel, value) {

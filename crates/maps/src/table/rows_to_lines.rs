@@ -114,6 +114,7 @@ impl Row {
             eta: self.eta,
             eta_low: None,
             eta_high: None,
+            eta_allowance: None,
             eta_uncertainty: None,
             h_w_m2k: None,
             h_low_w_m2k: None,

@@ -48,6 +48,7 @@ fn point(row: &Row) -> MapPoint {
         eta: Some(eta),
         eta_low: None,
         eta_high: None,
+        eta_allowance: None,
         eta_uncertainty: None,
         h_w_m2k: None,
         h_low_w_m2k: None,

@@ -30,6 +30,7 @@ pub fn budget_csv(budgets: &[PointBudgets]) -> std::io::Result<Vec<u8>> {
     for point in budgets {
         let numbers = [
             ("eta", point.eta.as_ref()),
+            ("eta_allowance", point.eta_allowance.as_ref()),
             ("h_w_m2k", point.h_w_m2k.as_ref()),
             ("pressure_ratio", Some(&point.pressure_ratio)),
         ];
@@ -61,6 +62,8 @@ pub fn budget_csv(budgets: &[PointBudgets]) -> std::io::Result<Vec<u8>> {
 pub(crate) fn budget_section(budgets: &[PointBudgets]) -> Document {
     let etas: Vec<(usize, &UncertaintyBudget)> =
         budgets.iter().filter_map(|point| Some((point.step, point.eta.as_ref()?))).collect();
+    let allowances: Vec<(usize, &UncertaintyBudget)> =
+        budgets.iter().filter_map(|point| Some((point.step, point.eta_allowance.as_ref()?))).collect();
     let ratios: Vec<(usize, &UncertaintyBudget)> =
         budgets.iter().map(|point| (point.step, &point.pressure_ratio)).collect();
     let mut document = Document::default();
@@ -73,6 +76,11 @@ pub(crate) fn budget_section(budgets: &[PointBudgets]) -> Document {
          uncertainties, sensitivities and degrees of freedom, also of h.",
     );
     document.table(budget_table(&etas, 100.0).caption("Efficiency, points"));
+    document.text(
+        "The efficiency is that of the wheel as the method defines it. What follows would be the same for the method, and is not in its \
+         intervals; `tolerances:` has the sizes.",
+    );
+    document.table(budget_table(&allowances, 100.0).caption("Efficiency that may be something else, points"));
     document.table(budget_table(&ratios, 1e3).caption("Pressure ratio, 1e-3"));
     document
 }

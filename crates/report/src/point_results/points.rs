@@ -6,7 +6,7 @@ use mapper_core::{
     Channel, CompressorMap, IdentifiedPoint, Recording, SpeedLine, StepKind, StepMarker, Verdict,
     half_width_95, step_number,
 };
-use mapper_numerics::statistics::mean;
+use mapper_numerics::statistics::{mean, median};
 use mapper_recording::score::ScoredPoint;
 
 /// A column of a table of points.
@@ -22,6 +22,7 @@ pub(crate) enum Column {
     PressureRatioMargin,
     Eta,
     EtaMargin,
+    EtaAllowance,
     H,
     HMargin,
     T2Change,
@@ -37,7 +38,7 @@ pub(crate) enum Column {
 use Column as C;
 
 /// The columns of a test report.
-pub(crate) const REPORT: [Column; 19] = [
+pub(crate) const REPORT: [Column; 20] = [
     C::Step,
     C::Speed,
     C::SpeedCorrected,
@@ -48,6 +49,7 @@ pub(crate) const REPORT: [Column; 19] = [
     C::PressureRatioMargin,
     C::Eta,
     C::EtaMargin,
+    C::EtaAllowance,
     C::H,
     C::HMargin,
     C::T2Change,
@@ -87,6 +89,7 @@ impl Column {
             C::FlowMargin | C::PressureRatioMargin | C::EtaMargin | C::HMargin => "+/-".to_owned(),
             C::PressureRatio => "PR".to_owned(),
             C::Eta => "eta %".to_owned(),
+            C::EtaAllowance => "else".to_owned(),
             C::H => "h W/(m2 K)".to_owned(),
             C::T2Change => "dT2 K".to_owned(),
             C::T1 => display.temperature_head("T1"),
@@ -122,6 +125,7 @@ impl Column {
             }
             C::Eta => Cell::optional(point.eta, in_percent),
             C::EtaMargin => Cell::margins(point.eta_margins_95().map(|both| both.scaled(100.0)), 2),
+            C::EtaAllowance => Cell::optional(point.eta_allowance, in_percent),
             C::H => Cell::optional(point.h_w_m2k, whole),
             C::HMargin => Cell::margins(point.h_margins_95_w_m2k(), 0),
             C::T2Change => Cell::optional(point.dt2_k, |k| number(Some(k), 1)),
@@ -297,6 +301,16 @@ pub(crate) fn verdict_sentence<'a>(points: impl Iterator<Item = &'a IdentifiedPo
             verdict_word(Verdict::Unusable)
         ),
     }
+}
+
+/// The median share of the efficiencies that may be something else, in a sentence; `None` without one.
+pub(crate) fn allowance_sentence<'a>(points: impl Iterator<Item = &'a IdentifiedPoint>) -> Option<String> {
+    let middle = median(points.filter_map(|point| point.eta_allowance)).filter(|half| *half > 0.0)?;
+    Some(format!(
+        "The efficiency is the wheel's as the method defines it; +/- {} points of it, which no interval contains, may be recirculation, recovery of \
+         the T2 probe or heat behind the wheel.",
+        percent(Some(middle), 1)
+    ))
 }
 
 /// A valve opening with three decimals; `-` if the recording does not contain it.

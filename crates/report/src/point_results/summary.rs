@@ -5,7 +5,7 @@ use crate::formatting::{Display, percent};
 use crate::message::Message;
 use crate::point_results::agreement::{disagreement_text, shared_errors_text};
 use crate::point_results::point_warnings::{Doubt, doubts};
-use crate::point_results::points::{points_by_line, verdict_sentence, wide_table};
+use crate::point_results::points::{allowance_sentence, points_by_line, verdict_sentence, wide_table};
 use crate::test_report::surge_text::{SurgeReport, surge_section};
 use crate::test_report::zero_and_sensors::zero_section;
 use mapper_core::{CompressorMap, IdentifiedPoint, ResultRemark, ThermalModel, Verdict};
@@ -63,6 +63,7 @@ impl<'a> PointResults<'a> {
         document.text(format!(
             "+/- covers the 95 % interval; -a/+b are the distances to its ends if they differ by more than a half. Common errors, repeats, sensors and zero: {more}, or the page of the run."
         ));
+        document.text(allowance_sentence(self.identified()).unwrap_or_default());
         document.append(self.conclusion());
         document
     }
@@ -73,6 +74,7 @@ impl<'a> PointResults<'a> {
         document.text(disagreement_text(self.points, self.dynamic, display).unwrap_or_default());
         document.table(wide_table(self.points, display, truth));
         document.text("+/- covers the 95 % interval; -a/+b: distances to its ends, if they differ by more than a half. dT2: change of T2 in the window.");
+        document.text(allowance_sentence(self.identified()).unwrap_or_default());
         let doubted = self.identified().filter(|point| point.verdict != Verdict::Good);
         for doubt in doubts(doubted) {
             document.text(format!("{}: {}", doubt.steps(), doubt.message()));

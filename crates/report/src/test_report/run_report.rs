@@ -9,7 +9,7 @@ use crate::plan::plan_document::executed_plan_table;
 use crate::point_results::agreement::{disagreement_text, shared_errors_text};
 use crate::point_results::budget_table::budget_section;
 use crate::point_results::point_warnings::doubts;
-use crate::point_results::points::{END_S, point_tables, verdict_sentence};
+use crate::point_results::points::{END_S, allowance_sentence, point_tables, verdict_sentence};
 use crate::point_results::summary::{PointResults, score_sentences};
 use crate::test_report::acceptance::{JudgedPoints, acceptance_section, balance_section};
 use crate::test_report::conditions::{condition_table, instruments_section};
@@ -156,6 +156,7 @@ impl RunReport<'_> {
         document.text(
             key_figures(self.results.map, self.results.points, self.campaign, self.plan).unwrap_or_default(),
         );
+        document.text(allowance_sentence(self.results.identified()).unwrap_or_default());
         let actions = self.recommended_actions();
         if !actions.is_empty() {
             document.text("Before the map is used:");

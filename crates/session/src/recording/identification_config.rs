@@ -9,7 +9,7 @@ use mapper_core::{
     ALPHA_AREA_SIGMA_RATIO, Channel, DeclaredUncertainty, IdentifiedPoint, Method, ModelTolerances,
     Recording, ReferenceState, Verdict, WindowRule,
 };
-use mapper_identify::{Housing, IdentifyConfig, PressureTap};
+use mapper_identify::{Allowance, Housing, IdentifyConfig, PressureTap};
 use mapper_numerics::statistics::range;
 use mapper_observe::declared_uncertainties;
 use mapper_physics::gas::air::Air;
@@ -53,6 +53,7 @@ pub fn identification(campaign: &Campaign) -> IdentifyConfig {
         inlet_tap: tap(Channel::P1),
         outlet_tap: tap(Channel::P2),
         declared: declared(campaign, &ChannelMap::native()),
+        allowance: Allowance::from(&campaign.tolerances),
         ..IdentifyConfig::default()
     }
 }

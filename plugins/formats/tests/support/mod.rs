@@ -92,6 +92,7 @@ fn point(step: usize, speed_rpm: f64, x: f64, valve_opening_ratio: f64) -> MapPo
         eta,
         eta_low: interval.map(|i| i.0),
         eta_high: interval.map(|i| i.1),
+        eta_allowance: None,
         eta_uncertainty: eta
             .map(|_| EstimateUncertainty { noise_standard_error: standard_error, bias_standard_error: 0.0 }),
         h_w_m2k: h,

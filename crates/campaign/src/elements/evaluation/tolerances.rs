@@ -1,7 +1,7 @@
 //! `tolerances:`
 
 use crate::si_values::si;
-use crate::units::{Duration, Fraction, PressureDifference, Quantity, TemperatureDifference};
+use crate::units::{Conductance, Duration, Fraction, PressureDifference, Quantity, TemperatureDifference};
 use mapper_core::{ModelTolerances, StructureTolerances};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer};
@@ -70,6 +70,19 @@ pub(crate) struct TolerancesElement {
     #[serde(rename = "actuator_lag", deserialize_with = "si::<Duration, _>")]
     #[schemars(with = "Quantity<Duration>", extend("x-min" = "0 s", "x-max" = "60 s"), example = &"0.3 s")]
     actuator_lag_s: f64,
+    /// Share of the flow that returns from the wheel's outlet to its inlet, which is efficiency for every method; some 2 % with a ported
+    /// shroud; 0.5 % if none is given.
+    #[serde(rename = "recirculation", deserialize_with = "si::<Fraction, _>")]
+    #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "30 %"), example = &"2 %")]
+    recirculation_ratio: f64,
+    /// Share of the dynamic temperature that the T2 probe may miss; some 30 % without a shield; 5 % if none is given.
+    #[serde(rename = "t2_recovery", deserialize_with = "si::<Fraction, _>")]
+    #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "100 %"), example = &"30 %")]
+    t2_recovery_ratio: f64,
+    /// Conductance from the bearing housing to the gas behind the wheel; 0.04 W/K if none is given.
+    #[serde(rename = "heat_behind_wheel", deserialize_with = "si::<Conductance, _>")]
+    #[schemars(with = "Quantity<Conductance>", extend("x-min" = "0 W/K"), example = &"0.04 W/K")]
+    heat_behind_wheel_w_k: f64,
     /// Share of each output's variation over a recording that the model's equations may miss.
     #[serde(deserialize_with = "StructureElement::deserialize")]
     #[schemars(with = "StructureElement")]
@@ -155,7 +168,7 @@ mod tests {
             let text = named.strip_suffix(" if none is given.").unwrap();
             let kind = Kind::from_key(property["x-quantity"].as_str().unwrap()).unwrap();
             let value = parse(kind, text).unwrap();
-            let fields = ["ratio", "s", "pa", "k"].map(|unit| format!("{key}_{unit}"));
+            let fields = ["ratio", "s", "pa", "k", "w_k"].map(|unit| format!("{key}_{unit}"));
             let held = fields.iter().find_map(|field| default[field].as_f64()).unwrap();
             assert!((held - value).abs() < 1e-12, "{key}: {held} is not {text}");
         }

@@ -191,6 +191,59 @@ fn changes_of_command(command: &Series, (start_s, end_s): (f64, f64), marked: f6
     changes
 }
 
+/// A valve behind a drive with play: the last command that moved the drive, and the position of the valve.
+struct PlayingValve {
+    play: f64,
+    dead_band: f64,
+    command: f64,
+    position: f64,
+}
+
+impl PlayingValve {
+    /// The position after a command, at which the drive arrives from one side.
+    fn follow(&mut self, command: f64) -> f64 {
+        let change = (command - self.command).abs();
+        if command.is_finite() && change > 0.0 && change >= self.dead_band {
+            self.command = command;
+            self.position = self.position.clamp(command - 0.5 * self.play, command + 0.5 * self.play);
+        }
+        self.position
+    }
+}
+
+/// The recording with the openings at which the declared play and dead band leave the valve, instead of those commanded; the valve begins in the
+/// middle of its play, which only the first motion shows. `play` and `dead_band` are openings.
+pub fn with_valve_positions(recording: Recording, play: f64, dead_band: f64) -> Recording {
+    if play <= 0.0 && dead_band <= 0.0 {
+        return recording;
+    }
+    let mut recording = recording;
+    let first = recording.steps.first().map(|step| step.valve_opening_ratio);
+    let commands = recording.series.get_mut(&Channel::ValveCommand);
+    let recorded = commands.as_ref().and_then(|series| series.values.iter().copied().find(|x| x.is_finite()));
+    let Some(start) = recorded.or(first).filter(|start| start.is_finite()) else { return recording };
+    let valve = || PlayingValve { play, dead_band, command: start, position: start };
+    let mut driven = valve();
+    match commands {
+        Some(series) => {
+            for command in series.values.iter_mut().filter(|command| command.is_finite()) {
+                *command = driven.follow(*command);
+            }
+            for step in &mut recording.steps {
+                // What was commanded last is where the step was measured.
+                let last = series.held(step.end_s - TIME_ROUNDING_S).filter(|held| held.is_finite());
+                step.valve_opening_ratio = last.unwrap_or(step.valve_opening_ratio);
+            }
+        }
+        None => {
+            for step in &mut recording.steps {
+                step.valve_opening_ratio = driven.follow(step.valve_opening_ratio);
+            }
+        }
+    }
+    recording
+}
+
 /// Time at which the last command of a step's own change was sent, s: its start for a jump, the end of its ramp otherwise.
 pub(crate) fn commanded_s(levels: &[Level], step: &StepMarker) -> f64 {
     let is_sent = |level: &&Level| {
@@ -369,6 +422,26 @@ mod tests {
         let command = LaggedCommand::of_recording(&recording(), Response::lag(0.3), Response::lag(0.0));
         let levels: Vec<_> = command.levels().iter().map(|level| (level.start_s, level.p3_pa)).collect();
         assert_eq!(levels, [(0.0, 150e3), (10.0, 200e3), (12.0, 201e3)]);
+    }
+
+    /// A play of 0.02: the valve stays 0.01 behind its drive on the side from which it came, and only a reversal of more than 0.02 moves it back. Commands
+    /// within the dead band do nothing.
+    #[test]
+    fn a_valve_with_play_stays_behind_its_drive() {
+        let commands = [1.0, 2.0, 1.99, 1.5, 1.503, 1.51, 1.53];
+        let positions = [1.0, 1.99, 1.99, 1.51, 1.51, 1.51, 1.52];
+        let steps: Vec<StepMarker> = (0..7)
+            .map(|i| StepMarker { valve_opening_ratio: commands[i], ..step(i as f64, i as f64 + 1.0, 2e5) })
+            .collect();
+        let marked = Recording { steps, ..Recording::default() };
+        let t_s = (0..7).map(|i| i as f64).collect();
+        let series = [(Channel::ValveCommand, Series { t_s, values: commands.to_vec() })].into();
+        for recording in [marked.clone(), Recording { series, ..marked }] {
+            let found = with_valve_positions(recording, 0.02, 0.005);
+            for (step, position) in found.steps.iter().zip(positions) {
+                assert!((step.valve_opening_ratio - position).abs() < 1e-12, "{step:?}");
+            }
+        }
     }
 
     /// Jumps of 100 kPa at 80 kPa/s and a lag of 0.2 s; the valve moves by 0.5 at 0.4 1/s: the fit recovers these values.

@@ -17,6 +17,7 @@ use mapper_diagnose::gap::{
 };
 use mapper_identify::IdentifyConfig;
 use mapper_observe::FusedChannel;
+use mapper_observe::model_inputs::lagged_command::with_valve_positions;
 use mapper_physics::rig::effect::Effect;
 use mapper_physics::simulation::model::Model;
 use mapper_recording::{ChannelMap, ReadWarning};
@@ -177,8 +178,14 @@ fn of_rig(
     identification: IdentifyConfig,
     campaign: &Campaign,
 ) -> RigRecording {
+    let actuators = campaign.rig_actuators();
     RigRecording {
-        recording,
+        // The model is driven by the opening that the declared play leaves.
+        recording: with_valve_positions(
+            recording,
+            actuators.valve_play_ratio,
+            actuators.valve_dead_band_ratio,
+        ),
         model,
         identification,
         zero: campaign.zero,

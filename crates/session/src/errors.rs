@@ -131,6 +131,9 @@ pub enum SessionError {
         "the rig `{rig}` has been locked out{}: {reason}. Inspect the rig; then acknowledge that it is safe", since_text(.run)
     )]
     RigLockedOut { rig: String, reason: String, run: PathBuf },
+    /// A file that may mean this rig or another one.
+    #[error("the rig `{rig}` has been locked out: {reason}")]
+    RigFileDoubtful { rig: String, reason: String },
     /// `awaiting`: rigs that wait for acknowledgement.
     #[error("the rig `{rig}` needs no acknowledgement, or there is no rig of that name; {}", awaiting_text(.awaiting))]
     NothingToAcknowledge { rig: String, awaiting: Vec<String> },
@@ -347,6 +350,7 @@ impl SessionError {
             | E::RigInUse { .. }
             | E::RigAbandoned { .. }
             | E::RigLockedOut { .. }
+            | E::RigFileDoubtful { .. }
             | E::NotArmed(_)
             | E::Preflight(_) => ErrorKind::Rig,
             E::Plan(_)

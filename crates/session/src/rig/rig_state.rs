@@ -1,7 +1,8 @@
 //! Ownership of rigs: a lock with its owner, and a lockout that must be acknowledged.
 //!
-//! Both are small files in one directory, named after the rig. The operating system releases the lock when the owning process ends in any way.
-//! The owner's entry remains, so that a run that ended without releasing the rig is known.
+//! Both are small files in one directory. Their names are different for different rigs, and each contains the name of its rig. The operating
+//! system releases the lock when the owning process ends in any way. The owner's entry remains, so that a run that ended without releasing the
+//! rig is known.
 
 use crate::SessionError;
 use crate::recording::files::{Existing, json_text, write_file};
@@ -14,8 +15,8 @@ use std::path::{Path, PathBuf};
 /// Maximum size of these files, bytes.
 const MAX_FILE_BYTES: u64 = 64 << 10;
 
-/// File name prefix of the lock for a rig's address.
-const ADDRESS_PREFIX: &str = "at_";
+/// Prefix of the name of the lock for a rig's address.
+pub(crate) const ADDRESS_PREFIX: &str = "at ";
 
 /// Directory that an administrator may create for locks and lockouts. It survives restarts and is never cleaned.
 const SYSTEM_DIRECTORY: &str = "/var/lib/mapper";
@@ -63,6 +64,13 @@ pub struct Lockout {
     pub run: PathBuf,
 }
 
+/// Content of a file: the name of its rig, and what is known about the rig.
+#[derive(Serialize, Deserialize)]
+struct Entry<T> {
+    rig: String,
+    content: T,
+}
+
 /// Locks and lockouts of rigs.
 #[derive(Debug, Clone)]
 pub struct RigStates {
@@ -99,10 +107,28 @@ impl RigStates {
         RigStates { directory: directory.to_owned(), shared: directory == shared_state_directory() }
     }
 
+    /// A file of this rig alone. Names that differ in other letters, in capitals or after a hundred letters have different hashes.
     fn file(&self, rig: &str, extension: &str) -> PathBuf {
-        let file_name_char = |c: char| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '_' };
-        let name: String = rig.chars().take(100).map(file_name_char).collect();
-        self.directory.join(format!("rig-{name}.{extension}"))
+        let hash = mapper_planner::sha256_hex(rig);
+        self.directory.join(format!("rig-{}~{hash}.{extension}", readable(rig)))
+    }
+
+    /// Why a file may mean this rig or another one: its name is shared by several rigs, or it contains another rig's name. Such a file locks the
+    /// rig out, and no acknowledgement removes it.
+    fn doubtful_file(&self, rig: &str) -> Option<String> {
+        let doubt = |path: &Path, why: &str| {
+            let path = path.display();
+            Some(format!("{path} {why}; inspect every rig that it may mean, then remove the file"))
+        };
+        ["lock", "latch"].into_iter().find_map(|extension| {
+            let own = self.file(rig, extension);
+            if let Some(other) = named_rig(&own).filter(|name| name != rig) {
+                return doubt(&own, &format!("contains the name of the rig `{other}`"));
+            }
+            let shared = self.directory.join(format!("rig-{}.{extension}", readable(rig)));
+            let holds_something = std::fs::symlink_metadata(&shared).is_ok_and(|file| file.len() > 0);
+            if holds_something { doubt(&shared, "has a name that several rigs may share") } else { None }
+        })
     }
 
     /// Opens a rig's lock; creates it, and the directory, on demand.
@@ -129,27 +155,37 @@ impl RigStates {
     pub fn claim(&self, rig: &str, resumes: Option<&Path>) -> Result<Claim, SessionError> {
         let (mut lock, path) = self.open(rig)?;
         try_lock(rig, &mut lock, &path)?;
+        if let Some(reason) = self.doubtful_file(rig) {
+            return Err(SessionError::RigFileDoubtful { rig: rig.to_owned(), reason });
+        }
         if let Some(Lockout { reason, run }) = self.lockout_of(rig) {
             return Err(SessionError::RigLockedOut { rig: rig.to_owned(), reason, run });
         }
-        let owner = read_entry::<Owner>(&mut lock).map_err(|why| {
+        let owner = read_entry::<Option<Owner>>(&mut lock).map_err(|why| {
             let reason = format!("the entry of its last owner cannot be read ({why}: {})", path.display());
             SessionError::RigLockedOut { rig: rig.to_owned(), reason, run: PathBuf::new() }
         })?;
-        if let Some(owner) =
-            owner.filter(|owner| resumes.is_none_or(|run| !is_same_directory(run, &owner.run)))
-        {
+        let is_new = owner.is_none();
+        let is_other = |owner: &Owner| resumes.is_none_or(|run| !is_same_directory(run, &owner.run));
+        if let Some(owner) = owner.flatten().filter(is_other) {
             return Err(SessionError::RigAbandoned {
                 rig: rig.to_owned(),
                 run: owner.run.clone(),
                 owner: owner.to_string(),
             });
         }
-        Ok(Claim { states: self.clone(), rig: rig.to_owned(), lock })
+        let mut claim = Claim { states: self.clone(), rig: rig.to_owned(), lock };
+        if is_new {
+            claim.write(None)?;
+        }
+        Ok(claim)
     }
 
     /// The lockout of a rig; one that cannot be read still locks the rig out.
     fn lockout_of(&self, rig: &str) -> Option<Lockout> {
+        if let Some(reason) = self.doubtful_file(rig) {
+            return Some(Lockout { reason, run: PathBuf::new() });
+        }
         let path = self.file(rig, "latch");
         let unreadable = |why: String| Lockout {
             reason: format!("its lockout cannot be read ({why}: {})", path.display()),
@@ -181,8 +217,8 @@ impl RigStates {
         }
         let (mut lock, _) = self.open(rig)?;
         let in_use = matches!(lock.try_lock(), Err(TryLockError::WouldBlock));
-        let (owner, unreadable) = match read_entry(&mut lock) {
-            Ok(owner) => (owner, None),
+        let (owner, unreadable) = match read_entry::<Option<Owner>>(&mut lock) {
+            Ok(owner) => (owner.flatten(), None),
             // A runner that has just started has not recorded its owner completely.
             Err(_) if in_use => (None, None),
             Err(why) => (None, Some(why)),
@@ -194,16 +230,30 @@ impl RigStates {
         Ok(RigStatus { rig: rig.to_owned(), owner, in_use, latch })
     }
 
-    /// All rigs used so far, by file name.
+    /// All rigs used so far. A file without the name of its rig counts as a lockout under the name of the file.
     pub fn list(&self) -> Vec<RigStatus> {
         let entries = std::fs::read_dir(&self.directory).into_iter().flatten().flatten();
-        let name = |file: String| {
-            let (name, kind) = file.strip_prefix("rig-")?.rsplit_once('.')?;
-            (matches!(kind, "lock" | "latch") && !name.starts_with(ADDRESS_PREFIX)).then(|| name.to_owned())
-        };
-        let files = entries.filter_map(|entry| entry.file_name().into_string().ok());
-        let names = files.filter_map(name).collect::<BTreeSet<_>>();
-        names.iter().filter_map(|name| self.status(name).ok()).collect()
+        let (mut names, mut nameless) = (BTreeSet::new(), Vec::new());
+        for path in entries.map(|entry| entry.path()) {
+            let file = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+            let Some((stem, kind @ ("lock" | "latch"))) =
+                file.strip_prefix("rig-").and_then(|name| name.rsplit_once('.'))
+            else {
+                continue;
+            };
+            if let Some(name) = named_rig(&path) {
+                names.insert(name);
+            } else if kind == "latch" || std::fs::metadata(&path).is_ok_and(|file| file.len() > 0) {
+                let reason = format!("{} does not contain the name of its rig", path.display());
+                let latch = Some(Lockout { reason, run: PathBuf::new() });
+                nameless.push(RigStatus { rig: stem.to_owned(), owner: None, in_use: false, latch });
+            }
+        }
+        // An address is a second lock of a rig that is listed under its own name.
+        let is_address =
+            |status: &RigStatus| status.rig.starts_with(ADDRESS_PREFIX) && status.latch.is_none();
+        let statuses = names.iter().filter_map(|name| self.status(name).ok());
+        statuses.filter(|status| !is_address(status)).chain(nameless).collect()
     }
 
     /// Rigs that wait for acknowledgement.
@@ -216,8 +266,11 @@ impl RigStates {
     ///
     /// # Errors
     /// [`SessionError::RigInUse`] during a run; [`SessionError::NothingToAcknowledge`] if the rig needs no acknowledgement;
-    /// [`SessionError::File`] for system errors.
+    /// [`SessionError::RigFileDoubtful`] if its file may mean another rig; [`SessionError::File`] for system errors.
     pub fn acknowledge(&self, rig: &str) -> Result<RigStatus, SessionError> {
+        if let Some(reason) = self.doubtful_file(rig) {
+            return Err(SessionError::RigFileDoubtful { rig: rig.to_owned(), reason });
+        }
         let status = self.status(rig)?;
         if status.owner.is_none() && status.latch.is_none() && !status.in_use {
             return Err(SessionError::NothingToAcknowledge {
@@ -239,7 +292,7 @@ impl RigStates {
             }
             _ => {}
         }
-        lock.set_len(0).and_then(|()| lock.sync_all()).map_err(SessionError::file("write", &path))?;
+        Claim { states: self.clone(), rig: rig.to_owned(), lock }.write(None)?;
         Ok(status)
     }
 }
@@ -250,16 +303,18 @@ impl Claim {
     /// # Errors
     /// [`SessionError::File`] for system errors.
     pub fn record_owner(&mut self, owner: &Owner) -> Result<(), SessionError> {
-        let path = self.states.file(&self.rig, "lock");
-        let text = json_text(owner)?;
-        self.write(text.as_bytes()).map_err(SessionError::file("write", &path))
+        self.write(Some(owner))
     }
 
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<()> {
-        self.lock.rewind()?;
-        self.lock.set_len(0)?;
-        self.lock.write_all(bytes)?;
-        self.lock.sync_all()
+    fn write(&mut self, owner: Option<&Owner>) -> Result<(), SessionError> {
+        let text = json_text(&Entry { rig: self.rig.clone(), content: owner })?;
+        let mut replace = || {
+            self.lock.rewind()?;
+            self.lock.set_len(0)?;
+            self.lock.write_all(text.as_bytes())?;
+            self.lock.sync_all()
+        };
+        replace().map_err(SessionError::file("write", &self.states.file(&self.rig, "lock")))
     }
 
     /// Prevents further runs until this lockout is acknowledged.
@@ -268,7 +323,7 @@ impl Claim {
     /// [`SessionError::File`] for system errors.
     pub fn lock_out(&self, lockout: &Lockout) -> Result<(), SessionError> {
         let path = self.states.file(&self.rig, "latch");
-        let text = json_text(lockout)?;
+        let text = json_text(&Entry { rig: self.rig.clone(), content: lockout })?;
         write_file(&path, text.as_bytes(), Existing::Replaced)
     }
 
@@ -277,9 +332,21 @@ impl Claim {
     /// # Errors
     /// [`SessionError::File`] for system errors.
     pub fn release(mut self) -> Result<(), SessionError> {
-        let path = self.states.file(&self.rig, "lock");
-        self.write(b"").map_err(SessionError::file("write", &path))
+        self.write(None)
     }
+}
+
+/// The part of a file's name that people recognise; several rigs may share it.
+fn readable(rig: &str) -> String {
+    let file_name_char = |c: char| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '_' };
+    rig.chars().take(100).map(file_name_char).collect()
+}
+
+/// The rig that a lock or lockout file names.
+fn named_rig(path: &Path) -> Option<String> {
+    let mut file = open_plain(path).ok()?;
+    let entry: Entry<serde_json::Value> = serde_json::from_str(&read_text(&mut file).ok()?).ok()?;
+    Some(entry.rig)
 }
 
 /// Whether two paths refer to the same directory.
@@ -292,7 +359,7 @@ fn try_lock(rig: &str, lock: &mut File, path: &Path) -> Result<(), SessionError>
     match lock.try_lock() {
         Ok(()) => Ok(()),
         Err(TryLockError::WouldBlock) => {
-            let owner = read_entry::<Owner>(lock).ok().flatten();
+            let owner = read_entry::<Option<Owner>>(lock).ok().flatten().flatten();
             let owner = owner.map_or("another runner".to_owned(), |owner| owner.to_string());
             Err(SessionError::RigInUse { rig: rig.to_owned(), owner })
         }
@@ -302,13 +369,19 @@ fn try_lock(rig: &str, lock: &mut File, path: &Path) -> Result<(), SessionError>
 
 /// Content of a lock or lockout file: `None` if it is empty, the reason if it cannot be read.
 fn read_entry<T: for<'de> Deserialize<'de>>(file: &mut File) -> Result<Option<T>, String> {
-    let mut text = String::new();
-    let read = file.rewind().and_then(|()| file.take(MAX_FILE_BYTES).read_to_string(&mut text));
-    read.map_err(|error| error.to_string())?;
+    let text = read_text(file).map_err(|error| error.to_string())?;
     if text.is_empty() {
         return Ok(None);
     }
-    serde_json::from_str(&text).map(Some).map_err(|error| error.to_string())
+    let entry: Entry<T> = serde_json::from_str(&text).map_err(|error| error.to_string())?;
+    Ok(Some(entry.content))
+}
+
+fn read_text(file: &mut File) -> io::Result<String> {
+    let mut text = String::new();
+    file.rewind()?;
+    file.take(MAX_FILE_BYTES).read_to_string(&mut text)?;
+    Ok(text)
 }
 
 /// Opens a file for reading and writing. It must be a plain file with one name, because a link that another user placed there could make a run
@@ -424,18 +497,83 @@ mod tests {
     }
 
     #[test]
+    fn every_rig_has_its_own_lockout() {
+        let directory = tempfile::tempdir().unwrap();
+        let states = RigStates::new(directory.path());
+        let (long, capital) = ("x".repeat(100), "Cell 1".to_owned());
+        let mut names: Vec<String> = [
+            "Zelle \u{e4}",
+            "Zelle \u{f6}",
+            "Zelle a\u{308}",
+            "cell/1",
+            "cell 1",
+            "cell_1",
+            "",
+            " ",
+            "at home",
+        ]
+        .map(str::to_owned)
+        .to_vec();
+        names.extend([capital, format!("{long}a"), format!("{long}b"), format!("{long}{long}{long}"), long]);
+        let is_free = |name: &String| states.claim(name, None).and_then(Claim::release).is_ok();
+        for locked in &names {
+            let claim = states.claim(locked, None).unwrap();
+            claim.lock_out(&Lockout { reason: "overspeed".to_owned(), run: "runs/a".into() }).unwrap();
+            claim.release().unwrap();
+            for other in names.iter().filter(|other| *other != locked) {
+                assert!(is_free(other), "{other} with {locked} locked out");
+                assert!(states.status(other).unwrap().latch.is_none());
+                assert!(states.acknowledge(other).is_err());
+            }
+            assert!(!is_free(locked));
+            assert_eq!(states.unacknowledged_rigs(), *std::slice::from_ref(locked));
+            states.acknowledge(locked).unwrap();
+        }
+        let listed: BTreeSet<String> = states.list().into_iter().map(|status| status.rig).collect();
+        names.retain(|name| name != "at home");
+        assert_eq!(listed, names.into_iter().collect());
+    }
+
+    /// Whoever acknowledges such a file may have inspected another rig.
+    #[test]
+    fn a_file_that_may_mean_another_rig_locks_out_and_is_not_acknowledged() {
+        let lockout = Lockout { reason: "overspeed".to_owned(), run: "runs/a".into() };
+        let nameless = serde_json::to_string(&lockout).unwrap();
+        let of_b = serde_json::to_string(&Entry { rig: "b".to_owned(), content: &lockout }).unwrap();
+        for extension in ["latch", "lock"] {
+            let directory = tempfile::tempdir().unwrap();
+            let states = RigStates::new(directory.path());
+            let shared = directory.path().join(format!("rig-Zelle__.{extension}"));
+            let moved = states.file("a", extension);
+            std::fs::write(&shared, &nameless).unwrap();
+            std::fs::write(&moved, &of_b).unwrap();
+            for rig in ["Zelle \u{e4}", "Zelle \u{f6}", "Zelle__", "a"] {
+                let refused = states.claim(rig, None).unwrap_err();
+                assert!(matches!(refused, SessionError::RigFileDoubtful { .. }), "{rig}: {refused}");
+                assert!(states.status(rig).unwrap().latch.is_some(), "{rig}");
+                let refused = states.acknowledge(rig).unwrap_err();
+                assert!(matches!(refused, SessionError::RigFileDoubtful { .. }), "{rig}: {refused}");
+            }
+            assert!(shared.exists() && moved.exists());
+            assert!(states.list().iter().any(|status| status.rig == "Zelle__" && status.latch.is_some()));
+            std::fs::remove_file(shared).unwrap();
+            states.claim("Zelle \u{e4}", None).unwrap().release().unwrap();
+        }
+    }
+
+    #[test]
     fn an_unreadable_entry_locks_the_rig_out() {
         let directory = tempfile::tempdir().unwrap();
         let states = RigStates::new(directory.path());
         for (file, bytes) in [
-            ("rig-bench.latch", &b""[..]),
-            ("rig-bench.latch", b"{\"reason\": 7}"),
-            ("rig-bench.latch", b"\xff\xfe"),
-            ("rig-bench.lock", b"{\"process\": 7"),
-            ("rig-bench.lock", b"\xff\xfe"),
+            ("latch", &b""[..]),
+            ("latch", b"{\"reason\": 7}"),
+            ("latch", b"\xff\xfe"),
+            ("lock", b"{\"process\": 7"),
+            ("lock", b"\xff\xfe"),
         ] {
             states.claim("bench", None).unwrap().release().unwrap();
-            std::fs::write(directory.path().join(file), bytes).unwrap();
+            std::fs::write(states.file("bench", file), bytes).unwrap();
             let refused = states.claim("bench", None).unwrap_err();
             assert!(matches!(refused, SessionError::RigLockedOut { .. }), "{file}: {refused}");
             assert!(states.status("bench").unwrap().latch.is_some(), "{file}");

@@ -14,7 +14,7 @@ use crate::rig::drive::{Pace, drive_paced, soak_s};
 use crate::rig::guards::check_guards;
 use crate::rig::observers::{EventForwarder, Recorder, StepEstimator, ThreadedObserver};
 use crate::rig::rig_lease::RigLease;
-use crate::rig::rig_state::RigStates;
+use crate::rig::rig_state::{ADDRESS_PREFIX, RigStates};
 use crate::rig::sources::Sources;
 use crate::run::preflight::{check_room, check_setpoints};
 use crate::run::recording_metadata::metadata;
@@ -300,7 +300,7 @@ impl PreparedRun<'_> {
         let states = RigStates::new(self.request.rig_states.unwrap_or(&default));
         let resumed_directory =
             self.request.resume.as_ref().map(|interrupted| interrupted.directory.as_path());
-        let address = rig.reached_at.iter().map(|address| format!("at {address}"));
+        let address = rig.reached_at.iter().map(|address| format!("{ADDRESS_PREFIX}{address}"));
         let shared: Vec<String> = self.sources.exclusive.iter().cloned().chain(address).collect();
         RigLease::acquire(&states, rig.exclusive.as_deref(), &shared, resumed_directory)
     }

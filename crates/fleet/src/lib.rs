@@ -28,7 +28,7 @@ pub use directory::study::{StudyFile, open_study};
 pub use merge::MergeOutcome;
 pub use status::Shard;
 pub use status::{Status, UnfinishedItem};
-pub use submit::{Limits, Submission, SubmitOptions};
+pub use submit::{Limits, Submission, SubmitOptions, number_ranges};
 pub use submit::{Template, query_task_states};
 pub use work::{Cost, CostEstimate};
 pub use work::{Engine, cores};

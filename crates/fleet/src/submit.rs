@@ -166,7 +166,7 @@ impl Fleet {
         if numbers.is_empty() {
             return Err(self.nothing_left_error());
         }
-        self.write_and_submit(Submission { array: ranges(&numbers), ..before }, "--again", machine)
+        self.write_and_submit(Submission { array: number_ranges(&numbers), ..before }, "--again", machine)
     }
 
     /// The last submission.
@@ -272,7 +272,7 @@ impl Fleet {
 const SUBMITTED: &str = "submitted.json";
 
 /// Sorted numbers in the syntax of queues: 1,4-6.
-fn ranges(numbers: &[u64]) -> String {
+pub fn number_ranges(numbers: &[u64]) -> String {
     let mut ranges: Vec<(u64, u64)> = Vec::new();
     for number in numbers {
         match ranges.last_mut() {
@@ -402,7 +402,7 @@ mod tests {
 
     #[test]
     fn numbers_are_written_as_ranges() {
-        assert_eq!(ranges(&[1]), "1");
-        assert_eq!(ranges(&[1, 2, 3, 7, 9, 10]), "1-3,7,9-10");
+        assert_eq!(number_ranges(&[1]), "1");
+        assert_eq!(number_ranges(&[1, 2, 3, 7, 9, 10]), "1-3,7,9-10");
     }
 }

@@ -120,6 +120,9 @@ pub enum SessionError {
     SeveralRecordings(PathBuf),
     #[error("{} cannot be resumed: {why}", .run.display())]
     NotResumable { run: PathBuf, why: String },
+    /// The journal and the recordings of a run disagree.
+    #[error("{}: the journal lists steps that no recording contains: {lost}. Restore the file, or run these steps again", .run.display())]
+    LostSteps { run: PathBuf, lost: String },
     #[error("the rig `{rig}` is in use by {owner}; wait until that run ends, or stop it")]
     RigInUse { rig: String, owner: String },
     #[error(
@@ -358,6 +361,7 @@ impl SessionError {
             | E::StalePlan { .. }
             | E::InvalidPlan { .. }
             | E::NotResumable { .. }
+            | E::LostSteps { .. }
             | E::RehearsalTripped { .. }
             | E::NoSteps(..) => ErrorKind::NoPlan,
             E::Run { source, .. } => match source {

@@ -60,15 +60,25 @@ impl Running {
 
     /// Waits until the recording has grown to `bytes`; the run must still be going on.
     pub(crate) fn wait_for_recording(&mut self, bytes: u64) -> PathBuf {
+        self.wait_until(|recording| recording.metadata().is_ok_and(|file| file.len() >= bytes))
+    }
+
+    /// Waits until the journal has a line; the run must still be going on.
+    pub(crate) fn wait_for_journal(&mut self, line: &str) -> PathBuf {
+        self.wait_until(|recording| {
+            let journal = std::fs::read_to_string(recording.with_file_name("journal.jsonl"));
+            journal.is_ok_and(|journal| journal.lines().any(|written| written == line))
+        })
+    }
+
+    fn wait_until(&mut self, is_met: impl Fn(&Path) -> bool) -> PathBuf {
         loop {
             self.file_events.recv_timeout(LONGEST_SILENCE).expect("the recording grows").unwrap();
             let ended = self.child.as_mut().unwrap().try_wait().unwrap();
             assert_eq!(ended, None, "the run was over before it could be stopped");
             let run = self.runs.read_dir().ok().and_then(|mut runs| runs.next()).and_then(Result::ok);
             let recording = run.map(|run| run.path().join("recording.mcap"));
-            if let Some(recording) =
-                recording.filter(|path| path.metadata().is_ok_and(|file| file.len() >= bytes))
-            {
+            if let Some(recording) = recording.filter(|path| is_met(path)) {
                 return recording;
             }
         }

@@ -80,6 +80,43 @@ fn a_killed_surge_search_restarts_its_line() {
     });
 }
 
+/// A recording that is gone or cut to a half after two steps were saved: the run names the file and is resumed only with the option.
+/// For a script, whose steps depend on what was measured, the lost steps are run again too.
+#[test]
+fn a_lost_recording_is_named_and_its_steps_are_run_again_only_if_told() {
+    for (script, cut) in [(false, false), (false, true), (true, false), (true, true)] {
+        let mut replaced = SINGLE_STEP_METHOD.to_vec();
+        if script {
+            replaced.push(("seed: 1 ", "sequence: along.rhai\nseed: 1 "));
+        }
+        let campaign = short(&replaced);
+        if script {
+            std::fs::write(
+                campaign.directory().join("along.rhai"),
+                "for p in grid() { jump(p, \"120 s\"); }\n",
+            )
+            .unwrap();
+        }
+        let mut running = Running::start_with(&campaign, &["--pace", "200"]);
+        let recording = running.wait_for_journal("{\"step_saved\":2}");
+        running.kill();
+        let run = recording.parent().unwrap();
+        let bytes = recording.metadata().unwrap().len();
+        if cut {
+            let file = std::fs::OpenOptions::new().write(true).open(&recording).unwrap();
+            file.set_len(bytes / 4).unwrap();
+        } else {
+            std::fs::remove_file(&recording).unwrap();
+        }
+        let resume = ["run".as_ref(), "--resume".as_ref(), run.as_os_str(), "--json".as_ref()];
+        let refused = mapper(resume).exits(4);
+        assert!(refused.stderr.contains("recording.mcap"), "{}", refused.stderr);
+        assert!(!run.join("recording-2.mcap").exists());
+        mapper(resume.iter().copied().chain(["--repeat-lost".as_ref()])).exits(0);
+        assert_eq!(points(run).len(), 4, "script {script}, cut {cut}");
+    }
+}
+
 /// A journal that names steps as recorded which the recording does not hold: the recording decides, and they are run.
 #[test]
 fn a_step_without_flushed_samples_is_run_again() {
@@ -117,7 +154,11 @@ fn a_step_without_flushed_samples_is_run_again() {
     std::fs::write(run.join("recording-2.mcap"), "").unwrap();
     drop(journal);
     mapper(["identify".as_ref(), run.as_os_str()]).exits(0);
-    mapper(["run".as_ref(), "--resume".as_ref(), run.as_os_str()]).exits(0);
+    // They are lost, and run again only if the operator says so.
+    let resume = ["run".as_ref(), "--resume".as_ref(), run.as_os_str()];
+    let refused = mapper(resume).exits(4);
+    assert!(refused.stderr.contains("recording.mcap"), "{}", refused.stderr);
+    mapper(resume.iter().copied().chain(["--repeat-lost".as_ref()])).exits(0);
     mapper(["identify".as_ref(), run.as_os_str()]).exits(0);
     let targets = |points: &[Value]| points.iter().map(|point| point["target"].clone()).collect::<Vec<_>>();
     assert_eq!(targets(&points(run)), targets(&expected));

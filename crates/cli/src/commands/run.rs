@@ -31,6 +31,9 @@ pub struct Run {
     /// Resume an interrupted run from its directory; machine, campaign, plan and backend must be unchanged
     #[arg(long, value_name = "RUN", conflicts_with_all = ["plan", "out", "dry_run"])]
     pub resume: Option<PathBuf>,
+    /// With --resume: run steps again that the journal lists as saved and no recording contains
+    #[arg(long, requires = "resume")]
+    pub repeat_lost: bool,
     /// Run this stored plan instead of making one; campaign and model must be unchanged
     #[arg(long, value_name = "FILE")]
     pub plan: Option<PathBuf>,
@@ -73,7 +76,8 @@ impl Run {
         let stored_campaign = self.resume.as_ref().map(|run| run.join(run_directory::CAMPAIGN));
         let Some(file) = self.campaign.clone().or(stored_campaign) else { return Ok(()) };
         let (campaign, campaign_text) = load_on(&file, today()).map_err(Failure::of_campaign)?;
-        let resume = self.resume.as_deref().map(InterruptedRun::read).transpose()?;
+        let mut resume = self.resume.as_deref().map(InterruptedRun::read).transpose()?;
+        resume.iter_mut().for_each(|interrupted| interrupted.repeats_lost = self.repeat_lost);
         let parent = self.out.clone().unwrap_or_else(|| expand_home(&campaign.outputs.directory));
         let started = jiff::Timestamp::now();
         let (registry, stop, progress) = (registry(), interrupt::run_stop()?, output_options::progress());

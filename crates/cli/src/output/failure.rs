@@ -266,6 +266,9 @@ pub fn command_for(error: &E) -> Option<String> {
                 "`--channels FILE`; `mapper log inspect {log} --write-channels FILE` proposes a channel map"
             ));
         }
+        E::LostSteps { run, .. } => {
+            return Some(format!("`mapper run --resume {} --repeat-lost`", run.display()));
+        }
         E::StalePlan { .. } | E::InvalidPlan { .. } => "`mapper plan CAMPAIGN --out FILE`",
         E::UnknownOutputFormat { .. } => "`--to FORMAT`",
         E::FirstMap(error) if matches!(**error, FirstMapError::NotAMap(..)) => "`mapper map convert`",

@@ -3,7 +3,7 @@
 
 use crate::SessionError;
 use mapper_campaign::Campaign;
-use mapper_core::{Plan, RigDescription, RunEnding};
+use mapper_core::{Plan, RigDescription, RunEnding, StepMarker};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::fs::{File, OpenOptions, TryLockError};
@@ -169,14 +169,23 @@ pub struct JournalPart {
     pub saved: BTreeSet<usize>,
     /// Whether it reached the end of the run's steps.
     pub completed: bool,
-    /// Whether the recording of these steps, or of the soak, cannot be read.
-    pub lost: bool,
+    /// Whether its recording cannot be read and contained steps or a soak that no other part has.
+    pub unreadable: bool,
+    /// Steps that the journal lists and no recording contains.
+    pub lost: BTreeSet<usize>,
+    /// Whether the soak is listed and no recording contains it.
+    pub lost_soak: bool,
 }
 
 impl JournalPart {
+    /// Whether no recording contains a step of this part, or its soak.
+    pub(crate) fn has_losses(&self) -> bool {
+        self.lost_soak || self.lost.iter().any(|index| *index < StepMarker::FIRST_REPEAT_INDEX)
+    }
+
     /// Whether the run needs nothing of its recording, which may then be damaged: its first flush may have failed.
     pub(crate) fn is_empty(&self) -> bool {
-        !self.soaked && self.saved.is_empty()
+        !self.soaked && self.saved.is_empty() && !self.unreadable
     }
 }
 
@@ -202,7 +211,9 @@ pub fn read_journal(path: &Path) -> std::io::Result<Vec<JournalPart>> {
                     soaked: false,
                     saved: BTreeSet::new(),
                     completed: false,
-                    lost: false,
+                    unreadable: false,
+                    lost: BTreeSet::new(),
+                    lost_soak: false,
                 });
             }
             (Ok(Entry::Soaked), Some(part)) => part.soaked = true,

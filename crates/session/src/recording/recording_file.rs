@@ -96,7 +96,7 @@ impl Recorded {
         let mut recorded = Vec::new();
         for (place, part) in interrupted.parts.iter().enumerate() {
             match Recorded::read(registry, &path.join(&part.recording), map, given) {
-                Err(_) if part.is_empty() && !part.lost => {}
+                Err(_) if part.is_empty() => {}
                 read => recorded.push((place, read?)),
             }
         }

@@ -3,7 +3,8 @@
 use crate::recording::journal::{Identity, JournalPart, read_journal};
 use crate::{SessionError, recording::run_directory};
 use mapper_campaign::Campaign;
-use mapper_core::{EventKind, Plan, PlanStep, StepKind, StepMarker};
+use mapper_core::{EventKind, Plan, PlanStep, StepKind, StepMarker, step_number};
+use mapper_fleet::number_ranges;
 use mapper_recording::{ReadOptions, read_marks};
 use mapper_runner::{StepSource, StepSourceError};
 use std::collections::{BTreeSet, VecDeque};
@@ -23,6 +24,8 @@ pub struct InterruptedRun {
     /// Its directory.
     pub directory: PathBuf,
     pub(crate) parts: Vec<JournalPart>,
+    /// Whether steps that the journal lists and no recording contains are run again; otherwise such a run is not resumed.
+    pub repeats_lost: bool,
 }
 
 impl InterruptedRun {
@@ -38,32 +41,41 @@ impl InterruptedRun {
         if parts.is_empty() {
             return Err(not_resumable("its journal contains no run".to_owned()));
         }
-        let promised: Vec<BTreeSet<usize>> = parts.iter().map(|part| part.saved.clone()).collect();
         for part in parts.iter_mut().filter(|part| !part.is_empty()) {
-            // A step or soak that is in the journal but not completely in the recording is repeated.
+            // A step or soak that is in the journal but not completely in the recording is lost.
             let marks = read_marks(&directory.join(&part.recording), &ReadOptions::default());
-            part.lost = marks.is_err();
+            part.unreadable = marks.is_err();
             let (steps, events) = marks.unwrap_or_default();
+            part.lost_soak = part.soaked;
             part.soaked = events.iter().any(|event| event.kind == EventKind::SoakEnded);
             let complete = steps.iter().filter(|step| step.end_s > step.start_s).map(|step| step.index);
             let complete: BTreeSet<usize> = complete.collect();
-            part.saved.retain(|index| complete.contains(index));
+            (part.saved, part.lost) =
+                std::mem::take(&mut part.saved).into_iter().partition(|index| complete.contains(index));
         }
-        let recorded: BTreeSet<usize> = parts.iter().flat_map(|part| part.saved.iter().copied()).collect();
+        let mut run = InterruptedRun { directory: directory.to_owned(), parts, repeats_lost: false };
         // Lost steps may have been repeated since.
-        for (part, promised) in parts.iter_mut().zip(&promised) {
-            part.lost &= !promised.is_subset(&recorded);
+        let (recorded, has_soak) = (run.saved(), run.has_soak());
+        for part in &mut run.parts {
+            part.lost.retain(|index| !recorded.contains(index));
+            part.lost_soak &= !has_soak;
+            part.unreadable &= part.has_losses();
         }
-        Ok(InterruptedRun { directory: directory.to_owned(), parts })
+        let is_whole = !run.parts.iter().any(JournalPart::has_losses);
+        run.parts.iter_mut().for_each(|part| part.completed &= is_whole);
+        Ok(run)
     }
 
-    /// Removes steps that a later part repeated, and the last line of the surge search. The search depends on its preceding data and restarts
-    /// that line.
+    /// Removes steps that a later part repeated, those after a lost step, and the last line of the surge search. The search depends on its
+    /// preceding data and restarts that line.
     pub(crate) fn discard_superseded_steps(&mut self, campaign: &Campaign) -> Result<(), SessionError> {
         if !depends_on_readings(campaign) {
             return Ok(());
         }
-        let mut first_later = FIRST_REPEAT_INDEX;
+        // The source of the steps received the readings of a lost step before it made the later ones.
+        let lost = self.parts.iter().flat_map(|part| part.lost.iter().copied()).min();
+        let lost = lost.filter(|_| self.repeats_lost);
+        let mut first_later = lost.unwrap_or(FIRST_REPEAT_INDEX).min(FIRST_REPEAT_INDEX);
         for part in self.parts.iter_mut().rev() {
             part.saved.retain(|index| *index < first_later || *index >= FIRST_REPEAT_INDEX);
             first_later = part.saved.iter().copied().next().unwrap_or(first_later).min(first_later);
@@ -104,14 +116,27 @@ impl InterruptedRun {
     ///
     /// # Errors
     /// [`SessionError::NotResumable`] with the differences or the reason.
-    pub(crate) fn check(&self, campaign: &Campaign, plan: &Plan, now: &Identity) -> Result<(), SessionError> {
-        let not_resumable =
-            |why: String| Err(SessionError::NotResumable { run: self.directory.clone(), why });
+    pub(crate) fn check(
+        &mut self,
+        campaign: &Campaign,
+        plan: &Plan,
+        now: &Identity,
+    ) -> Result<(), SessionError> {
+        let run = self.directory.clone();
+        let not_resumable = |why: String| Err(SessionError::NotResumable { run: run.clone(), why });
         for part in &self.parts {
             let differences = part.identity.differences(now);
             if !differences.is_empty() {
                 return not_resumable(format!("{} changed since", differences.join(" and ")));
             }
+        }
+        // A step that was only repeated to approach another one is no loss.
+        let is_due = |index: &usize| plan.steps.iter().any(|step| step.index == *index);
+        let is_any = depends_on_readings(campaign);
+        self.parts.iter_mut().for_each(|part| part.lost.retain(|index| is_any || is_due(index)));
+        let lost = self.lost_text();
+        if let Some(lost) = lost.filter(|_| !self.repeats_lost) {
+            return Err(SessionError::LostSteps { run: self.directory.clone(), lost });
         }
         // The page is written last. If it is missing, the disk was full or the program was killed.
         let results = [run_directory::POINTS, run_directory::REPORT, run_directory::PAGE];
@@ -120,6 +145,25 @@ impl InterruptedRun {
             return not_resumable("all its steps and results are complete".to_owned());
         }
         Ok(())
+    }
+
+    /// The steps that the journal lists and no recording contains, with the file of each; `None` if there are none.
+    pub(crate) fn lost_text(&self) -> Option<String> {
+        let of_part = |part: &JournalPart| {
+            let numbers: Vec<u64> = part
+                .lost
+                .iter()
+                .filter(|index| **index < FIRST_REPEAT_INDEX)
+                .map(|index| step_number(*index) as u64)
+                .collect();
+            let steps = (!numbers.is_empty()).then(|| format!("the steps {}", number_ranges(&numbers)));
+            let what = steps.into_iter().chain(part.lost_soak.then(|| "the soak".to_owned()));
+            let file = &part.recording;
+            let why = if self.directory.join(file).exists() { "does not contain them" } else { "is missing" };
+            format!("{} ({file} {why})", what.collect::<Vec<_>>().join(" and "))
+        };
+        let parts: Vec<String> = self.parts.iter().filter(|part| part.has_losses()).map(of_part).collect();
+        (!parts.is_empty()).then(|| parts.join(", "))
     }
 
     /// Whether every step is recorded, so that at most the map is missing.
@@ -139,8 +183,9 @@ impl InterruptedRun {
             (true, true) => "the recorded soak applies to the whole run and is not repeated",
             (true, false) => "the soak is repeated, because its recording is incomplete",
         };
+        let lost = self.lost_text().map(|lost| format!("; lost and run again: {lost}")).unwrap_or_default();
         format!(
-            "resumed: {} of {} steps are recorded; {soak}; the housings are warmed up again, because they may have cooled, and the step before \
+            "resumed: {} of {} steps are recorded{lost}; {soak}; the housings are warmed up again, because they may have cooled, and the step before \
              the first missing one is repeated",
             plan.steps.iter().filter(|step| saved.contains(&step.index)).count(),
             plan.steps.len()

@@ -149,7 +149,7 @@ impl<'s> Session<'s> {
         };
         check_guards(campaign, &rig)?;
         check_setpoints(&plan, &rig)?;
-        if let Some(interrupted) = &request.resume {
+        if let Some(interrupted) = &mut request.resume {
             interrupted.check(campaign, &plan, &Identity::of(campaign, &plan, &rig)?)?;
         }
         Ok(PreparedRun { request, model, plan, scripted, sources })

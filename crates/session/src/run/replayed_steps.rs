@@ -70,9 +70,10 @@ impl<'a> ResumedSteps<'a> {
             ..last
         });
         let note = format!(
-            "resumed: {} recorded steps are kept and were replayed to the source of the steps; {}the housings are warmed up again, because they \
+            "resumed: {} recorded steps are kept and were replayed to the source of the steps; {}{}the housings are warmed up again, because they \
              may have cooled{}",
             replayed_steps,
+            interrupted.lost_text().map(|lost| format!("lost and run again: {lost}; ")).unwrap_or_default(),
             if interrupted.has_soak() { "the soak is not repeated; " } else { "" },
             if repeat.is_some() { ", and the last recorded step is repeated" } else { "" },
         );

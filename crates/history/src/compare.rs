@@ -50,8 +50,10 @@ pub struct PointsOutsideBand {
 /// A night compared with the nights before.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Comparison {
-    /// Largest number of earlier nights that a run was compared with; 0 on the first night.
+    /// Largest number of earlier nights with figures of a run of tonight, also of one that failed tonight.
     pub nights: usize,
+    /// Number of earlier nights in the history; 0 on the first night.
+    pub stored_nights: usize,
     /// Runs that failed tonight, each with its reason.
     pub failed: Vec<(RunKey, String)>,
     /// Runs of the last nights that tonight does not have.
@@ -80,16 +82,16 @@ pub fn compare(night: &Night, earlier: &BTreeMap<RunKey, Vec<RunRow>>) -> Compar
     let tonight: BTreeSet<&RunKey> = night.runs.iter().map(|run| &run.key).collect();
     comparison.missing = earlier.keys().filter(|key| !tonight.contains(key)).cloned().collect();
     for run in &night.runs {
+        let before: Vec<&RunRow> =
+            earlier.get(&run.key).into_iter().flatten().filter(|run| run.failure.is_none()).collect();
+        comparison.nights = comparison.nights.max(before.len());
         if let Some(failure) = &run.failure {
             comparison.failed.push((run.key.clone(), failure.clone()));
             continue;
         }
-        let before: Vec<&RunRow> =
-            earlier.get(&run.key).into_iter().flatten().filter(|run| run.failure.is_none()).collect();
         if before.is_empty() {
             continue;
         }
-        comparison.nights = comparison.nights.max(before.len());
         compare_figures(run, &before, &mut comparison.moved);
         compare_points(run, &before, &mut comparison.moved_points);
     }

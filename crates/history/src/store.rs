@@ -4,7 +4,7 @@ use crate::{Comparison, Metric, Night, PointRow, RunKey, RunRow, compare};
 use rusqlite::{Connection, OpenFlags, Transaction, TransactionBehavior, params};
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::io::ErrorKind;
+use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -86,9 +86,13 @@ impl History {
         let mut history = Self::connect(path, OpenFlags::default())?;
         // Checked before the runs of a night, not only when their results are stored.
         let writable = history.prepare().and_then(|()| {
+            // Writes a page to the rollback journal, so that a full disk is reported too.
             let transaction = history.connection.transaction_with_behavior(TransactionBehavior::Immediate);
-            let path = path.to_owned();
-            transaction.and_then(Transaction::rollback).map_err(|source| HistoryError::Sqlite(path, source))
+            let written = transaction.and_then(|transaction| {
+                transaction.pragma_update(None, "user_version", LAYOUT)?;
+                transaction.rollback()
+            });
+            written.map_err(|source| HistoryError::of_sqlite(path, source))
         });
         match writable {
             Err(HistoryError::Sqlite(path, source)) if is_read_only(&source) => {
@@ -107,16 +111,17 @@ impl History {
             return Err(HistoryError::Missing(path.to_owned()));
         }
         check_plain(path)?;
-        // A WAL database may need its side files to be created even for reading, so a read-only connection would fail after a crash.
+        // A night that a killed process did not finish is rolled back, which a read-only connection cannot do.
         let mut history =
             Self::connect(path, OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX)?;
         match history.prepare() {
+            Err(HistoryError::NoSpace(_)) => Self::open_read_only(path),
             Err(HistoryError::Sqlite(_, source)) if is_read_only(&source) => Self::open_read_only(path),
             prepared => prepared.map(|()| history),
         }
     }
 
-    /// Opens a history in a directory without write permission. A night that a killed process did not finish is not visible.
+    /// Opens a history without writing anything. In a file with a write-ahead log, nights that only the log contains are not visible.
     ///
     /// # Errors
     /// As [`History::open_existing`].
@@ -126,14 +131,16 @@ impl History {
         let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
         // Percent signs, question marks and hash marks have a meaning in a URI.
         let escaped = absolute.to_string_lossy().replace('%', "%25").replace('?', "%3f").replace('#', "%23");
-        let history = Self::connect(Path::new(&format!("file:{escaped}?immutable=1")), flags)?;
+        // The side files of a write-ahead log cannot be made; without one, a night that was not finished must not be read.
+        let is_immutable = u8::from(has_write_ahead_log(path));
+        let history = Self::connect(Path::new(&format!("file:{escaped}?immutable={is_immutable}")), flags)?;
         let mut history = History { path: path.to_owned(), ..history };
         history.prepare()?;
         Ok(history)
     }
 
     fn connect(path: &Path, flags: OpenFlags) -> Result<History, HistoryError> {
-        let fail = |source| HistoryError::Sqlite(path.to_owned(), source);
+        let fail = |source| HistoryError::of_sqlite(path, source);
         let connection = Connection::open_with_flags(path, flags).map_err(fail)?;
         connection.busy_timeout(BUSY_TIMEOUT).map_err(fail)?;
         Ok(History { connection, path: path.to_owned() })
@@ -146,13 +153,15 @@ impl History {
             Some(rusqlite::ErrorCode::NotADatabase | rusqlite::ErrorCode::DatabaseCorrupt) => {
                 HistoryError::Foreign { path: path.clone(), reason: source.to_string() }
             }
-            _ => HistoryError::Sqlite(path.clone(), source),
+            _ => HistoryError::of_sqlite(&path, source),
         };
         let foreign = |reason: String| HistoryError::Foreign { path: path.clone(), reason };
-        // SQLite reports busy at once if another process switches to WAL at the same time. The mode is stored in the file, so one success is enough.
-        let is_read_only = self.connection.is_readonly("main").map_err(fail)?;
-        let switched =
-            if is_read_only { Ok(()) } else { self.connection.pragma_update(None, "journal_mode", "WAL") };
+        // A write-ahead log needs shared memory, which network file systems do not have, and room on the disk even for reading.
+        let switched = if self.connection.is_readonly("main").map_err(fail)? {
+            Ok(())
+        } else {
+            self.connection.pragma_update(None, "journal_mode", "DELETE")
+        };
         if let Err(error) = switched
             && error.sqlite_error_code() != Some(rusqlite::ErrorCode::DatabaseBusy)
         {
@@ -187,10 +196,10 @@ impl History {
     /// are identified by their start time; a second one in the same millisecond gets the next free time.
     ///
     /// # Errors
-    /// [`HistoryError::Sqlite`]; the history is then unchanged.
+    /// [`HistoryError::NoSpace`] and [`HistoryError::Sqlite`]; the history is then unchanged.
     pub fn append(&mut self, night: &mut Night, nights: usize) -> Result<Comparison, HistoryError> {
         let path = self.path.clone();
-        self.try_append(night, nights).map_err(|source| HistoryError::Sqlite(path, source))
+        self.try_append(night, nights).map_err(|source| HistoryError::of_sqlite(&path, source))
     }
 
     fn try_append(&mut self, night: &mut Night, nights: usize) -> rusqlite::Result<Comparison> {
@@ -201,7 +210,11 @@ impl History {
         }
         drop(same_start);
         let earlier = read_earlier_runs(&transaction, &night.name, nights)?;
-        let comparison = compare(night, &earlier);
+        let mut comparison = compare(night, &earlier);
+        let stored: i64 =
+            transaction
+                .query_row("SELECT count(*) FROM night WHERE name = ?1", [&night.name], |row| row.get(0))?;
+        comparison.stored_nights = usize::try_from(stored).unwrap_or_default();
         let moved = !comparison.is_quiet() && !night.accepted;
         transaction.execute(
             "INSERT INTO night (name, started_ms, duration_s, program, accepted, moved) VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
@@ -251,7 +264,7 @@ impl History {
     /// # Errors
     /// [`HistoryError::Sqlite`].
     pub fn runs(&self, filter: &Filter) -> Result<Vec<ListedRun>, HistoryError> {
-        self.try_runs(filter).map_err(|source| HistoryError::Sqlite(self.path.clone(), source))
+        self.try_runs(filter).map_err(|source| HistoryError::of_sqlite(&self.path, source))
     }
 
     fn try_runs(&self, filter: &Filter) -> rusqlite::Result<Vec<ListedRun>> {
@@ -376,6 +389,20 @@ fn is_read_only(error: &rusqlite::Error) -> bool {
     matches!(code, Some(ErrorCode::ReadOnly | ErrorCode::CannotOpen | ErrorCode::PermissionDenied))
 }
 
+/// Whether the disk is full: also if only the shared memory of a write-ahead log has no room.
+fn is_full(error: &rusqlite::Error) -> bool {
+    let shared_memory = error.sqlite_error().map(|error| error.extended_code);
+    error.sqlite_error_code() == Some(rusqlite::ErrorCode::DiskFull)
+        || shared_memory == Some(rusqlite::ffi::SQLITE_IOERR_SHMSIZE)
+}
+
+/// Whether a database has a write-ahead log: the version number at this place of its header is 2 then (SQLite, "Database File Format", 1.3.3).
+fn has_write_ahead_log(path: &Path) -> bool {
+    let mut header = [0; 19];
+    let read = mapper_yaml::open_file(path).and_then(|mut file| file.read_exact(&mut header));
+    read.is_ok() && header.last() == Some(&2)
+}
+
 /// Returns `None`, stored as NULL, for values that are not finite.
 fn finite(value: Option<f64>) -> Option<f64> {
     value.filter(|value| value.is_finite())
@@ -394,6 +421,15 @@ pub enum HistoryError {
     Foreign { path: PathBuf, reason: String },
     #[error("the history {} cannot be written; check the permissions, or name another file", .0.display())]
     ReadOnly(PathBuf),
+    #[error("the disk of the history {} is full; make room on it, or name another file", .0.display())]
+    NoSpace(PathBuf),
     #[error("the history {} cannot be used: {}", .0.display(), .1)]
     Sqlite(PathBuf, #[source] rusqlite::Error),
+}
+
+impl HistoryError {
+    fn of_sqlite(path: &Path, source: rusqlite::Error) -> Self {
+        let path = path.to_owned();
+        if is_full(&source) { HistoryError::NoSpace(path) } else { HistoryError::Sqlite(path, source) }
+    }
 }

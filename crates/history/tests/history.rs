@@ -199,14 +199,15 @@ fn a_history_killed_in_mid_write_is_as_it_was() {
     }
     // The files as a kill at this moment leaves them.
     let killed = scratch.path().join("killed.db");
-    for end in ["", "-wal"] {
+    let before = std::fs::metadata(&path).unwrap().len();
+    for end in ["", "-journal"] {
         let from = path.with_file_name(format!("history.db{end}"));
         std::fs::copy(&from, scratch.path().join(format!("killed.db{end}"))).unwrap();
     }
-    assert!(
-        std::fs::metadata(scratch.path().join("killed.db-wal")).unwrap().len() > 100_000,
-        "nothing was spilled"
-    );
+    // Two thousand rows are in the file already.
+    assert!(before > 100_000, "nothing was spilled: {before} bytes");
+    // Half a night is not read without a way to take it back.
+    assert!(History::open_read_only(&killed).is_err());
     drop(transaction);
     let runs = History::open_existing(&killed).unwrap().runs(&Filter::default()).unwrap();
     assert_eq!(runs.len(), 4);
@@ -248,6 +249,39 @@ fn a_history_that_cannot_be_written_is_read_and_refuses_a_night_beforehand() {
     mode(path.parent().unwrap(), 0o755);
     assert_eq!(read.unwrap().len(), 4);
     assert!(!bound || matches!(written, Err(HistoryError::ReadOnly(_))), "{written:?}");
+}
+
+/// A file of a write-ahead log: reading needs no side files, and the next night removes the log.
+#[test]
+fn a_history_with_a_write_ahead_log_is_read_and_continued_without_it() {
+    let (_scratch, path) = scratch();
+    append(&path, &night(0, 0.0, 0.0));
+    let mode = || -> String {
+        let connection = rusqlite::Connection::open(&path).unwrap();
+        connection.pragma_query_value(None, "journal_mode", |row| row.get(0)).unwrap()
+    };
+    assert_ne!(mode(), "wal", "it cannot be used on a network file system");
+    rusqlite::Connection::open(&path).unwrap().pragma_update(None, "journal_mode", "WAL").unwrap();
+    assert_eq!(mode(), "wal");
+    assert_eq!(History::open_read_only(&path).unwrap().runs(&Filter::default()).unwrap().len(), 4);
+    assert!(append(&path, &night(1, 0.0, 0.0)).is_quiet());
+    assert_ne!(mode(), "wal");
+}
+
+#[test]
+fn nights_before_are_counted_also_if_nothing_can_be_compared() {
+    let (_scratch, path) = scratch();
+    let failed = |number| {
+        let mut night = night(number, 0.0, 0.0);
+        night.runs.iter_mut().for_each(|run| run.failure = Some("no step is long enough".to_owned()));
+        night
+    };
+    let counts = |comparison: Comparison| (comparison.stored_nights, comparison.nights);
+    assert_eq!(counts(append(&path, &failed(0))), (0, 0));
+    assert_eq!(counts(append(&path, &failed(1))), (1, 0));
+    assert_eq!(counts(append(&path, &night(2, 0.0, 0.0))), (2, 0));
+    assert_eq!(counts(append(&path, &night(3, 0.0, 0.0))), (3, 1));
+    assert_eq!(counts(append(&path, &failed(4))), (4, 2));
 }
 
 #[test]

@@ -44,7 +44,7 @@ pub use machine::map_work::{MapFile, MapOut, MapWork};
 pub use mapper_diagnose::driven::Side;
 pub use mapper_maps::table::DescriptionError;
 pub use mapper_runner::Operator;
-pub use nights::night_report::{night_report_link, night_report_path, write_night_report};
+pub use nights::night_report::{night_report_link, night_report_path, night_runs, write_night_report};
 pub use nights::nightly::PreparedNight;
 pub use plan::calibration_check::load_on;
 pub use plan::planning::{PlanInputs, nominal_model, plan, plan_of};

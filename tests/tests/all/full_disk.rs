@@ -86,6 +86,41 @@ fn a_disk_that_fills_up_at_the_page_loses_only_the_page() {
     mapper(["run".as_ref(), "--resume".as_ref(), run.as_os_str()]).exits(4);
 }
 
+/// Fills the disk $1 after a first night, then starts a second night and reads the history.
+const FULL_NIGHT: &str = r#"
+disk="$1"; mapper="$2"; nightly="$3"
+mount -t tmpfs -o size=200k tmpfs "$disk" || exit 99
+"$mapper" nightly "$nightly" --db "$disk/history.db" --progress off >/dev/null || exit 98
+[ "$4" = wal ] && { python3 -c 'import sqlite3, sys; sqlite3.connect(sys.argv[1]).execute("pragma journal_mode=wal")' "$disk/history.db" || exit 96; }
+dd if=/dev/zero of="$disk/fill" bs=1k count=400 2>/dev/null
+"$mapper" nightly "$nightly" --db "$disk/history.db" --progress off >/dev/null; [ $? = 1 ] || exit 97
+"$mapper" history --db "$disk/history.db" --json
+"#;
+
+/// A full disk is named before the runs of a night, and what is in the history can be read: also in one with a write-ahead log.
+#[test]
+#[cfg_attr(not(with_tmpfs), ignore = "mounts a small tmpfs: run `cargo xtask test` as root")]
+fn a_history_on_a_full_disk_is_read_and_the_disk_is_named() {
+    for mode in ["delete", "wal"] {
+        let scratch = scratch();
+        crate::nightly::write_shipped_nightly(scratch.path());
+        let disk = scratch.path().join("disk");
+        std::fs::create_dir(&disk).unwrap();
+        let output = Command::new("unshare")
+            .args(["--mount", "sh", "-c", FULL_NIGHT, "sh"])
+            .arg(&disk)
+            .arg(mapper_command(["--version"]).get_program())
+            .arg(scratch.path().join("nightly.yaml"))
+            .arg(mode)
+            .output()
+            .unwrap();
+        let finished = Finished::from(output).exits(0);
+        assert!(finished.stderr.contains(disk.to_str().unwrap()), "{mode}: {}", finished.stderr);
+        assert!(finished.stderr.contains("full"), "{mode}: {}", finished.stderr);
+        assert_eq!(finished.json()["runs"].as_array().unwrap().len(), 2, "{mode}");
+    }
+}
+
 /// Mounts 16 kB on $1, runs the rest, and copies what was written there to $2.
 const PARTS: &str = r#"
 parts="$1"; kept="$2"; shift 2

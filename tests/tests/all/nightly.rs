@@ -1,6 +1,7 @@
 //! The nightly run: no message without a change, and an own exit code after one.
 
 use mapper_tests::{Finished, mapper, mapper_command, repository, scratch};
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 /// A campaign of six points by two methods.
@@ -9,6 +10,11 @@ fn write_nightly(folder: &Path, nusselt: &str) {
 }
 
 const LAB: &str = "virtual_lab: {}";
+
+/// The same as shipped.
+pub fn write_shipped_nightly(folder: &Path) {
+    write_nightly(folder, AS_SHIPPED);
+}
 
 /// The same on another rig.
 fn write_nightly_on(folder: &Path, nusselt: &str, lab: &str) {
@@ -100,6 +106,24 @@ fn nights_report_a_change_of_the_model_and_nothing_before_it() {
     assert!(report.contains("nightly_a"), "{report}");
 }
 
+/// A night without any figures is not the first one, and says so.
+#[test]
+fn a_night_of_failed_runs_is_told_from_the_first_night() {
+    let scratch = scratch();
+    let folder = scratch.path();
+    write_nightly(folder, AS_SHIPPED);
+    night(folder, &[]).exits(0);
+    // Settings that the rig refuses when a run begins.
+    write_nightly_on(folder, AS_SHIPPED, "virtual_lab: {effects: {efficiency_scale: {factor: 0.997}}}");
+    let failed = night(folder, &["--json"]).exits(7).json();
+    let runs = failed["night"]["runs"].as_array().unwrap();
+    assert!(runs.iter().all(|run| run["failure"].is_string()), "{failed}");
+    assert_eq!(failed["comparison"]["stored_nights"], 1);
+    assert_eq!(failed["comparison"]["nights"], 1);
+    let text = night(folder, &[]).exits(7).stdout;
+    assert!(!text.contains("first night"), "{text}");
+}
+
 /// Text without the ends of its lines.
 fn in_one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
@@ -142,16 +166,20 @@ fn a_killed_night_leaves_the_history_intact() {
     let mut before = runs();
     assert_eq!(before, 2);
     for wait in 0..3_u64 {
-        let mut killed =
-            mapper_command(arguments(folder)).stdout(std::process::Stdio::null()).spawn().unwrap();
-        // Written is at the very end: the log next to the history grows from then on, and the process is killed on sight
-        // of that, or a little later each time.
-        let log = folder.join("history.db-wal");
-        let size = || std::fs::metadata(&log).map_or(0, |file| file.len());
+        let mut killed = mapper_command(arguments(folder))
+            .stdout(std::process::Stdio::null())
+            .stderr(std::process::Stdio::piped())
+            .spawn()
+            .unwrap();
+        let progress = BufReader::new(killed.stderr.take().unwrap());
+        let last =
+            progress.lines().map_while(Result::ok).find(|line| line.trim_start().starts_with("2 of 2"));
+        assert!(last.is_some(), "no run ended");
+        // The journal next to the history exists while the night is written, and the process is killed on sight of it, or a little later.
+        let journal = folder.join("history.db-journal");
         let mut spins = 0;
-        let opened = size();
-        while killed.try_wait().unwrap().is_none() && (size() <= opened || spins < wait * 30) {
-            spins += u64::from(size() > opened);
+        while killed.try_wait().unwrap().is_none() && spins <= wait * 30 {
+            spins += u64::from(spins > 0 || journal.exists());
             std::thread::yield_now();
         }
         // It may have ended by itself.
@@ -229,6 +257,10 @@ fn the_shipped_nightly_files_refer_to_existing_files() {
         assert!(service.contains(named) && repository().join(named).is_file(), "{named}");
     }
     assert_systemd_accepts_the_units(&folder);
+    // On the night of summer time, an hour of the local clock is missing.
+    for line in read("mapper-nightly.timer").lines().filter_map(|line| line.strip_prefix("OnCalendar=")) {
+        assert!(line.ends_with(" UTC"), "{line}");
+    }
     // What workflow and service start exists.
     for text in [service, read("nightly.yml")] {
         assert!(text.contains("mapper nightly campaigns/nightly.yaml"), "{text}");

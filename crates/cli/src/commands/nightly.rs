@@ -9,7 +9,8 @@ use mapper_campaign::load_nightly;
 use mapper_history::{History, Night};
 use mapper_report::night_comparison;
 use mapper_session::{
-    ErrorKind, PROGRAM, PreparedNight, Session, SessionError, night_report_path, write_night_report,
+    ErrorKind, PROGRAM, PreparedNight, Session, SessionError, night_report_path, night_runs,
+    write_night_report,
 };
 use serde_json::json;
 use std::path::PathBuf;
@@ -69,8 +70,18 @@ impl Nightly {
             accepted: self.accept,
             runs,
         };
-        let comparison = history.append(&mut night, nightly.nights).map_err(SessionError::from)?;
-        write_night_report(&path, &night, &comparison)?;
+        let comparison = match history.append(&mut night, nightly.nights) {
+            Ok(comparison) => comparison,
+            // The figures exist only here.
+            Err(error) => {
+                if self.json {
+                    standard_output::print_json(&json!({"night": night}))?;
+                } else {
+                    standard_output::show(&night_runs(&night, false))?;
+                }
+                return Err(SessionError::from(error).into());
+            }
+        };
         if self.json {
             standard_output::print_json(&json!({
                 "history": path,
@@ -82,6 +93,7 @@ impl Nightly {
         } else {
             standard_output::show(&night_comparison(&night, &comparison, &path))?;
         }
+        write_night_report(&path, &night, &comparison)?;
         if comparison.is_quiet() || (self.accept && comparison.failed.is_empty()) {
             return Ok(());
         }

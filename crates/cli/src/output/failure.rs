@@ -287,7 +287,9 @@ pub fn command_for(error: &E) -> Option<String> {
         },
         E::Export(ExportError::NeedsFit { .. }) => "`mapper map fit FILE --out NEW`",
         E::History(HistoryError::Missing(_)) => "`mapper nightly`, or `--db FILE`",
-        E::History(HistoryError::Foreign { .. } | HistoryError::ReadOnly(_)) => "`--db FILE`",
+        E::History(HistoryError::Foreign { .. } | HistoryError::ReadOnly(_) | HistoryError::NoSpace(_)) => {
+            "`--db FILE`"
+        }
         _ => return None,
     };
     Some(fixed.to_owned())

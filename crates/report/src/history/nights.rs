@@ -168,13 +168,22 @@ pub fn night_comparison(night: &Night, comparison: &Comparison, path: &Path) -> 
         night.duration_s,
         path.display()
     ));
-    document.text(match comparison.nights {
-        0 if !comparison.missing.is_empty() => {
+    let (before, all_failed) = (comparison.nights, comparison.failed.len() == night.runs.len());
+    document.text(match (comparison.stored_nights, before) {
+        (0, _) if all_failed => "The first night: no run gave figures.".to_owned(),
+        (0, _) => "The first night: there is nothing to compare with yet.".to_owned(),
+        (_, 1..) if all_failed => {
+            format!("No run gave figures tonight; on the last {before} {} they had figures.", nights(before))
+        }
+        (_, 0) if !comparison.missing.is_empty() => {
             "Nothing of tonight was there on the nights before: there is nothing to compare with.".to_owned()
         }
-        0 => "The first night: there is nothing to compare with yet.".to_owned(),
-        count if comparison.is_quiet() => {
-            format!("Every figure lies in the band of the last {count} {}.", nights(count))
+        (stored, 0) => format!(
+            "There is nothing to compare with: the runs of {stored} earlier {} failed or lay outside their band.",
+            nights(stored)
+        ),
+        _ if comparison.is_quiet() => {
+            format!("Every figure lies in the band of the last {before} {}.", nights(before))
         }
         _ if night.accepted => "Accepted: this night begins a new band.".to_owned(),
         _ => String::new(),

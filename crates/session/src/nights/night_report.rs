@@ -2,7 +2,7 @@
 
 use crate::{Existing, SessionError, write_file};
 use mapper_history::{Comparison, ListedRun, Metric, Night, StoredNight};
-use mapper_report::{listed_runs, night_comparison};
+use mapper_report::{Document, listed_runs, night_comparison};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -23,6 +23,18 @@ pub fn write_night_report(
     let path = night_report_path(history, night.started_ms);
     let folder = path.parent().unwrap_or(history);
     std::fs::create_dir_all(folder).map_err(SessionError::file("create", folder))?;
+    let text = format!(
+        "{}, {}\n\n{}\n{}",
+        night.name,
+        night.program,
+        night_comparison(night, comparison, history),
+        night_runs(night, !comparison.is_quiet())
+    );
+    write_file(&path, text.as_bytes(), Existing::Replaced)
+}
+
+/// A row for each run of a night that may not be in a history.
+pub fn night_runs(night: &Night, moved: bool) -> Document {
     let stored = StoredNight {
         id: 0,
         name: night.name.clone(),
@@ -30,18 +42,11 @@ pub fn write_night_report(
         duration_s: night.duration_s,
         program: night.program.clone(),
         accepted: night.accepted,
-        moved: !comparison.is_quiet(),
+        moved,
     };
     let runs: Vec<ListedRun> =
         night.runs.iter().map(|run| ListedRun { night: stored.clone(), run: run.clone() }).collect();
-    let text = format!(
-        "{}, {}\n\n{}\n{}",
-        night.name,
-        night.program,
-        night_comparison(night, comparison, history),
-        listed_runs(&runs, &Metric::ALL)
-    );
-    write_file(&path, text.as_bytes(), Existing::Replaced)
+    listed_runs(&runs, &Metric::ALL)
 }
 
 /// Link from a picture to the report of a night, relative if possible and absolute otherwise. `None` without a report.

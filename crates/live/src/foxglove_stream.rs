@@ -3,6 +3,7 @@
 //! The library keeps a queue for each viewer and drops the oldest message if the viewer is slow, so publishing never waits. Viewers have no
 //! write access: the server offers no services, parameters or client topics.
 
+use crate::web_server::access::parse_address;
 use foxglove::{
     ChannelBuilder, Context, FoxgloveError, PartialMetadata, RawChannel, Schema, WebSocketServer,
 };
@@ -37,13 +38,22 @@ const POINT_FIELDS: [(&str, &str, &str); 9] = [
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum FoxgloveStreamError {
-    #[error(
-        "`{0}` is not a local address, such as 127.0.0.1:8765, which is required because Foxglove sends no token; other computers can connect \
-         by a tunnel (`ssh -L 8765:127.0.0.1:8765 STAND`)"
-    )]
-    Address(String),
     #[error("the Foxglove stream cannot be served at {0}: {1}; choose another address")]
     Serve(SocketAddr, #[source] FoxgloveError),
+}
+
+/// The address of a stream on this computer, from a command line.
+///
+/// # Errors
+/// The reason and the remedy, for any other text.
+pub fn parse_local_address(text: &str) -> Result<SocketAddr, String> {
+    let address = parse_address(text)?;
+    let is_local = address.ip().is_loopback();
+    is_local.then_some(address).ok_or_else(|| {
+        "write an address of this computer, such as localhost:8765, because Foxglove sends no token; other computers can connect by a \
+         tunnel (`ssh -L 8765:127.0.0.1:8765 STAND`)"
+            .to_owned()
+    })
 }
 
 /// A stream of readings for Foxglove and Lichtblick.
@@ -56,21 +66,16 @@ pub struct FoxgloveStream {
 }
 
 impl FoxgloveStream {
-    /// Serves readings of these channels at a local address, e.g. `127.0.0.1:8765`. `start_time_ns`: epoch time of run time 0, as in the
+    /// Serves readings of these channels at a local address. `start_time_ns`: epoch time of run time 0, as in the
     /// recording.
     ///
     /// # Errors
-    /// [`FoxgloveStreamError`] if the address is not local or is in use.
+    /// [`FoxgloveStreamError`] if the address is in use.
     pub fn open(
-        text: &str,
+        mut address: SocketAddr,
         start_time_ns: u64,
         channels: &[Channel],
     ) -> Result<FoxgloveStream, FoxgloveStreamError> {
-        let not_local = || FoxgloveStreamError::Address(text.to_owned());
-        let mut address: SocketAddr = text.parse().map_err(|_| not_local())?;
-        if !address.ip().is_loopback() {
-            return Err(not_local());
-        }
         let context = Context::new();
         // All topics must exist before a viewer connects. The library announces a new topic slightly before it accepts subscriptions, and a fast
         // viewer would miss it.
@@ -181,10 +186,9 @@ mod tests {
     #[test]
     fn only_this_machine_is_served() {
         for text in ["0.0.0.0:0", "192.0.2.7:8765", "nonsense", "[::]:0"] {
-            let error = FoxgloveStream::open(text, 0, &[]).err().unwrap();
-            assert!(error.to_string().contains("tunnel"), "{error}");
+            assert!(parse_local_address(text).is_err(), "{text}");
         }
-        let stream = FoxgloveStream::open("127.0.0.1:0", 0, &[]).unwrap();
+        let stream = FoxgloveStream::open(parse_local_address("localhost:0").unwrap(), 0, &[]).unwrap();
         assert!(stream.url().starts_with("ws://127.0.0.1:") && !stream.url().ends_with(":0"));
     }
 }

@@ -17,7 +17,8 @@ mod web_server;
 
 pub use feed::LiveRun;
 #[cfg(feature = "foxglove")]
-pub use foxglove_stream::{FoxgloveStream, FoxgloveStreamError};
+pub use foxglove_stream::{FoxgloveStream, FoxgloveStreamError, parse_local_address};
 pub use live_error::LiveError;
 pub use observers::{ObserverRequest, Observers};
+pub use web_server::access::parse_address;
 pub use web_server::tls::{TlsError, TlsFiles};

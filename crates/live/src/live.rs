@@ -8,7 +8,7 @@ use crate::web_server::server::{OperatorCommand, ServedContent, serve};
 use crate::web_server::tls::{Tls, TlsFiles, read};
 use mapper_report::page::live_page;
 use mapper_session::SessionEvent;
-use std::net::{Ipv4Addr, SocketAddr, TcpListener};
+use std::net::{SocketAddr, TcpListener};
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, OnceLock};
 use std::time::{Duration, Instant};
@@ -26,15 +26,12 @@ pub struct Live {
 }
 
 impl Live {
-    /// Binds an address, e.g. `127.0.0.1:7373`, or a port of this machine. Browsers on other machines need the token that this creates.
+    /// Binds an address. Browsers on other machines need the token that this creates.
     ///
     /// # Errors
-    /// [`LiveError`] if the address is invalid or in use, or the TLS files are unusable.
-    pub fn open(text: &str, tls: Option<&TlsFiles>) -> Result<Live, LiveError> {
+    /// [`LiveError`] if the address is in use, or the TLS files are unusable.
+    pub fn open(address: SocketAddr, tls: Option<&TlsFiles>) -> Result<Live, LiveError> {
         let tls = tls.map(read).transpose()?;
-        let port_alone = text.parse::<u16>().map(|port| SocketAddr::from((Ipv4Addr::LOCALHOST, port)));
-        let address: SocketAddr =
-            port_alone.or_else(|_| text.parse()).map_err(|_| LiveError::Address(text.to_owned()))?;
         let listen = |source| LiveError::Listen(address, source);
         let listener = TcpListener::bind(address).map_err(listen)?;
         let address = listener.local_addr().map_err(listen)?;

@@ -7,10 +7,6 @@ use std::net::SocketAddr;
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum LiveError {
-    #[error(
-        "`{0}` is not an address; write a port, e.g. 7373, or 127.0.0.1:7373, or 0.0.0.0:7373 for other machines too"
-    )]
-    Address(String),
     #[error("the live page cannot be served at {0}: {1}; choose another address")]
     Listen(SocketAddr, #[source] std::io::Error),
     #[error("the system cannot generate random numbers for a token: {0}")]

@@ -7,38 +7,39 @@ use crate::live::Live;
 use crate::live_error::LiveError;
 use crate::web_server::tls::TlsFiles;
 use mapper_session::SessionEvent;
+use std::net::SocketAddr;
 use std::path::Path;
 #[cfg(feature = "foxglove")]
 use std::sync::OnceLock;
 
 /// Outputs requested by the user.
 #[derive(Debug, Clone, Default)]
-pub struct ObserverRequest<'a> {
+pub struct ObserverRequest {
     /// Address of the page.
-    pub page: Option<&'a str>,
+    pub page: Option<SocketAddr>,
     /// Certificate and key for TLS.
     pub tls: Option<TlsFiles>,
     /// Address of the stream for Foxglove and Lichtblick.
     #[cfg(feature = "foxglove")]
-    pub foxglove: Option<&'a str>,
+    pub foxglove: Option<SocketAddr>,
 }
 
 /// The observers, possibly none.
-pub struct Observers<'a> {
+pub struct Observers {
     page: Option<Live>,
     #[cfg(feature = "foxglove")]
     foxglove: OnceLock<FoxgloveStream>,
     // Without the feature only the page uses it.
     #[cfg_attr(not(feature = "foxglove"), expect(dead_code, reason = "the Foxglove stream uses it"))]
-    asked: ObserverRequest<'a>,
+    asked: ObserverRequest,
 }
 
-impl<'a> Observers<'a> {
+impl Observers {
     /// Binds the page's address; serving starts later.
     ///
     /// # Errors
-    /// [`LiveError`] if the address is invalid or in use, or certificate and key are unusable.
-    pub fn open(asked: ObserverRequest<'a>) -> Result<Self, LiveError> {
+    /// [`LiveError`] if the address is in use, or certificate and key are unusable.
+    pub fn open(asked: ObserverRequest) -> Result<Self, LiveError> {
         let page = asked.page.map(|address| Live::open(address, asked.tls.as_ref())).transpose()?;
         Ok(Observers {
             page,
@@ -65,7 +66,7 @@ impl<'a> Observers<'a> {
     /// Starts to serve. Returns lines of information for the operator.
     ///
     /// # Errors
-    /// [`LiveError`] if the stream's address is not local or is in use.
+    /// [`LiveError`] if the stream's address is in use.
     pub fn start(&self, run: &LiveRun<'_>) -> Result<Vec<String>, LiveError> {
         let mut lines = Vec::new();
         if let Some(page) = &self.page {

@@ -38,6 +38,9 @@ fn the_exit_codes_are_listed() {
     assert_eq!(listed, [0, 1, 2, 3, 4, 5, 6, 7, 8, 130]);
     // Wrong arguments need no campaign.
     mapper(["plan", "--no-such-option", SHIPPED]).exits(2);
+    for address in ["nonsense", "localhost", "localhost:99999", "1.2.3"] {
+        mapper(["run", SHIPPED, &format!("--live={address}")]).exits(2);
+    }
 }
 
 #[test]

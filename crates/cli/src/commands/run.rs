@@ -11,7 +11,9 @@ use crate::terminal::results_text;
 use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_core::{PacedClock, RunEnding, Trip, Verdict};
-use mapper_live::{LiveError, LiveRun, ObserverRequest, Observers, TlsFiles};
+#[cfg(feature = "foxglove")]
+use mapper_live::parse_local_address;
+use mapper_live::{LiveError, LiveRun, ObserverRequest, Observers, TlsFiles, parse_address};
 use mapper_report::{plan_document, with_messages};
 use mapper_session::recording::run_directory;
 use mapper_session::{
@@ -19,6 +21,7 @@ use mapper_session::{
     SessionEvent, load_on, soak_s, start_time_ns,
 };
 use serde_json::json;
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -47,8 +50,8 @@ pub struct Run {
     #[arg(long, value_name = "FACTOR", value_parser = parse_pace, hide_short_help = true)]
     pub pace: Option<f64>,
     /// Serve a live page with buttons to hold and to stop; other computers need the printed token
-    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = "127.0.0.1:7373")]
-    pub live: Option<String>,
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = "7373", value_parser = parse_address)]
+    pub live: Option<SocketAddr>,
     /// Serve it over TLS with this certificate (PEM)
     #[arg(long, value_name = "FILE", requires_all = ["live", "live_key"], hide_short_help = true)]
     pub live_cert: Option<PathBuf>,
@@ -57,8 +60,8 @@ pub struct Run {
     pub live_key: Option<PathBuf>,
     /// Send readings, steps and points to Foxglove or Lichtblick on this machine
     #[cfg(feature = "foxglove")]
-    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = "127.0.0.1:8765")]
-    pub foxglove: Option<String>,
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = "8765", value_parser = parse_local_address)]
+    pub foxglove: Option<SocketAddr>,
     #[command(flatten)]
     pub shown: DetailArguments,
     /// End with one JSON object on standard output
@@ -143,13 +146,13 @@ impl Run {
         self.report_outcome(&campaign, outcome)
     }
 
-    fn observers(&self) -> Result<Observers<'_>, LiveError> {
+    fn observers(&self) -> Result<Observers, LiveError> {
         let tls = self.live_cert.clone().zip(self.live_key.clone());
         Observers::open(ObserverRequest {
-            page: self.live.as_deref(),
+            page: self.live,
             tls: tls.map(|(certificate, key)| TlsFiles { certificate, key }),
             #[cfg(feature = "foxglove")]
-            foxglove: self.foxglove.as_deref(),
+            foxglove: self.foxglove,
         })
     }
 

@@ -87,9 +87,8 @@ impl Failure {
 
     /// The live page is not available.
     pub fn of_live(error: LiveError) -> Self {
-        let code = if matches!(error, LiveError::Address(_)) { Code::BadInput } else { Code::Failure };
         let command = matches!(error, LiveError::Listen(..)).then(|| "`--live=ADDRESS`".to_owned());
-        Failure::with_command(code, &error, command)
+        Failure::with_command(Code::Failure, &error, command)
     }
 
     /// An error of a kind of study, reported as by the command of that kind.

@@ -1,7 +1,23 @@
-//! Access control for the page and its buttons.
+//! The addresses that are served, and access control for the page and its buttons.
 
 use crate::web_server::request::Request;
-use std::net::SocketAddr;
+use std::net::{Ipv4Addr, SocketAddr};
+
+/// An address with its port, `localhost` with a port, or a port of this computer, from a command line.
+///
+/// # Errors
+/// The remedy, for any other text.
+pub fn parse_address(text: &str) -> Result<SocketAddr, String> {
+    let (host, port) = text.rsplit_once(':').unwrap_or(("localhost", text));
+    let address = if host.eq_ignore_ascii_case("localhost") {
+        port.parse().map(|port| SocketAddr::from((Ipv4Addr::LOCALHOST, port))).ok()
+    } else {
+        text.parse().ok()
+    };
+    address.ok_or_else(|| {
+        "write a port, e.g. 7373, or localhost:7373, or 0.0.0.0:7373 for other computers too".to_owned()
+    })
+}
 
 /// Requirements for a request.
 #[derive(Debug, Clone)]
@@ -101,5 +117,21 @@ mod tests {
             !remote_server.is_of_own_page(&from("http://192.0.2.7:7373")),
             "a page in clear is another one"
         );
+    }
+
+    #[test]
+    fn an_address_is_a_port_the_name_of_this_computer_or_a_number() {
+        for (text, address) in [
+            ("7373", "127.0.0.1:7373"),
+            ("localhost:7373", "127.0.0.1:7373"),
+            ("LocalHost:0", "127.0.0.1:0"),
+            ("[::1]:7373", "[::1]:7373"),
+            ("0.0.0.0:80", "0.0.0.0:80"),
+        ] {
+            assert_eq!(parse_address(text).unwrap(), address.parse().unwrap(), "{text}");
+        }
+        for text in ["", "localhost", "localhost:", "localhost:99999", "99999", "1.2.3", "1.2.3.4", "a b:1"] {
+            assert!(parse_address(text).is_err(), "{text}");
+        }
     }
 }

@@ -26,6 +26,16 @@ struct OpenConnection {
 pub(crate) struct Connection {
     all: Arc<Connections>,
     number: u64,
+    pub(crate) address: IpAddr,
+}
+
+/// Place of the one that makes room for another: the oldest of the address with the most of them. In order of arrival; `None` does not count.
+pub(crate) fn leaves_first(addresses: &[Option<IpAddr>]) -> Option<usize> {
+    let count = |address: &Option<IpAddr>| {
+        address.map_or(0, |_| addresses.iter().filter(|other| *other == address).count())
+    };
+    let most = addresses.iter().map(count).max().filter(|most| *most > 0)?;
+    addresses.iter().position(|address| count(address) == most)
 }
 
 impl Connections {
@@ -34,27 +44,17 @@ impl Connections {
     pub(crate) fn admit(self: &Arc<Connections>, stream: &TcpStream) -> Option<Connection> {
         let (address, own_stream) = (stream.peer_addr().ok()?.ip(), stream.try_clone().ok()?);
         let mut open = self.lock();
-        let brief = |open: &[OpenConnection], of: Option<IpAddr>| {
-            let counts = |connection: &&OpenConnection| {
-                connection.brief.is_some() && of.is_none_or(|address| connection.address == address)
-            };
-            open.iter().filter(counts).count()
-        };
-        if brief(&open, None) >= MAX_BRIEF_CONNECTIONS {
-            // The first of equals is the oldest, because the list is in order of arrival.
-            let most = open.iter().map(|connection| brief(&open, Some(connection.address))).max();
-            let leaves = |connection: &OpenConnection| {
-                connection.brief.is_some() && Some(brief(&open, Some(connection.address))) == most
-            };
-            let position = open.iter().position(leaves)?;
-            if let Some(stream) = open.remove(position).brief {
-                // Its thread notices the closed socket and ends.
-                let _ = stream.shutdown(Shutdown::Both);
-            }
+        let brief: Vec<Option<IpAddr>> =
+            open.iter().map(|connection| connection.brief.as_ref().map(|_| connection.address)).collect();
+        if brief.iter().flatten().count() >= MAX_BRIEF_CONNECTIONS
+            && let Some(stream) = open.remove(leaves_first(&brief)?).brief
+        {
+            // Its thread notices the closed socket and ends.
+            let _ = stream.shutdown(Shutdown::Both);
         }
         let number = open.last().map_or(0, |last| last.number + 1);
         open.push(OpenConnection { number, address, brief: Some(own_stream) });
-        Some(Connection { all: self.clone(), number })
+        Some(Connection { all: self.clone(), number, address })
     }
 
     pub(crate) fn any_open(&self) -> bool {

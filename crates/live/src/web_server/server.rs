@@ -139,7 +139,7 @@ fn page(stream: &mut impl Write, page: &str) -> std::io::Result<()> {
 
 /// Sends the complete state, then every message, until one side disconnects.
 fn events(stream: &mut impl Write, served: &ServedContent, connection: &Connection) -> std::io::Result<()> {
-    let Some(messages) = served.hub.join((served.snapshot)()) else {
+    let Some(messages) = served.hub.join(connection.address, (served.snapshot)()) else {
         return plain(stream, "503 Service Unavailable");
     };
     connection.mark_as_stream();
@@ -191,9 +191,9 @@ mod tests {
             line.trim_end().to_owned()
         };
         let mut held: Vec<TcpStream> = Vec::new();
-        for _ in 0..20 {
+        for _ in 0..40 {
             let mut stream = send(&format!("GET /events HTTP/1.1\r\nHost: {address}\r\n\r\n"));
-            assert!(!first_line(&mut stream).is_empty());
+            assert_eq!(first_line(&mut stream), "HTTP/1.1 200 OK");
             held.push(stream);
         }
         for round in 0..50 {

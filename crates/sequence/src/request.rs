@@ -1,7 +1,8 @@
 //! The request of a sequence, and the forecast of its steps.
 
 use mapper_core::{
-    Limits, OperatingPoint, Predicted, RigActuators, SettleBands, Timing, Transition, WindowRule,
+    Limits, OperatingPoint, Predicted, RigActuators, SetpointRanges, SettleBands, Timing, Transition,
+    WindowRule,
 };
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::forecast::{forecast_step, hold, warm_up_state};
@@ -34,6 +35,8 @@ pub struct SequenceRequest {
     pub follow_outlet: FollowOutlet,
     /// Limits of every step.
     pub limits: Limits,
+    /// Setpoints that the rig accepts, if it states them.
+    pub accepts: Option<SetpointRanges>,
     /// Motion of the stand's actuators.
     pub actuators: RigActuators,
     /// The planner.

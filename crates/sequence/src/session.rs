@@ -4,9 +4,10 @@ use crate::error::throw;
 use crate::request::{NominalForecast, Refusal, SequenceRequest, StepPrediction};
 use crate::settle::SettleRule;
 use crate::step::{EndCondition, ScriptMessage, SequenceStep, StepResult};
-use mapper_core::{OperatingPoint, PlanStep, StepKind};
+use mapper_core::{OperatingPoint, PlanStep, RigMode, Setpoints, StepKind};
 use mapper_physics::simulation::steady::SteadyState;
 use rhai::{EvalAltResult, Position};
+use std::ops::RangeInclusive;
 use std::sync::mpsc::{Receiver, SyncSender};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -16,8 +17,8 @@ pub(crate) type ScriptThrow = Box<EvalAltResult>;
 const STEP_LIMIT: usize = 2_000;
 /// Maximum duration of a step, s: four hours. Its samples stay in memory until it is identified.
 const DWELL_LIMIT_S: f64 = 14_400.0;
-/// Maximum duration of a sequence, s: three days, all of which the rehearsal has to simulate.
-const DURATION_LIMIT_S: f64 = 3.0 * 86_400.0;
+/// Maximum duration of a sequence, s: one day. The rehearsal has to simulate all of it, that of an endless loop too, which takes half a minute.
+const DURATION_LIMIT_S: f64 = 86_400.0;
 /// Maximum number of checks of points without a step to them, and an allowance for each point of the grid. A check takes as long as some
 /// thousand operations.
 const CHECK_LIMIT: usize = 2_000;
@@ -154,7 +155,7 @@ impl Session {
                 format!("a turbine inlet temperature of {t3_k:.2} K is above the limit of {limit_k:.2} K");
             return Err(throw(message, "stay below `limits.turbine_inlet_temperature`"));
         }
-        self.request.boundary.t3_k = check_temperature("turbine inlet temperature", t3_k)?;
+        self.request.boundary.t3_k = check_temperature("turbine inlet temperature", t3_k, PLAUSIBLE_T3_K)?;
         Ok(())
     }
 
@@ -163,7 +164,8 @@ impl Session {
         if self.request.follow_outlet.oil {
             return Err(outlet_follows_error("oil temperature"));
         }
-        self.request.boundary.oil_temperature_k = check_temperature("oil temperature", oil_k)?;
+        self.request.boundary.oil_temperature_k =
+            check_temperature("oil temperature", oil_k, PLAUSIBLE_OIL_K)?;
         Ok(())
     }
 
@@ -187,9 +189,20 @@ impl Session {
             return Err(throw(message, "give a time such as \"120 s\" or \"10 min\""));
         }
         if start_s + dwell_s > DURATION_LIMIT_S {
-            return Err(throw("the sequence would last longer than three days".into(), "end it earlier"));
+            return Err(throw("the sequence would last longer than a day".into(), "end it earlier"));
         }
         let target = self.check(to)?;
+        if let Some(accepts) = &self.request.accepts {
+            let setpoints = Setpoints {
+                mode: RigMode::Running,
+                p3_pa: target.boundary.p3_pa,
+                t3_k: target.boundary.t3_k,
+                valve_opening_ratio: to.valve_opening_ratio,
+                oil_temperature_k: target.boundary.oil_temperature_k,
+            };
+            let refused = accepts.check(&setpoints);
+            refused.map_err(|error| throw(error.to_string(), "stay within the range of the rig"))?;
+        }
         let from = self.results.last().map(|result| result.target);
         let fail = |error| throw(format!("the forecast of the step to {to} failed: {error}"), "");
         let StepPrediction { predicted, transition, dwell_s } =
@@ -245,14 +258,19 @@ impl Session {
     }
 }
 
-/// Temperature range of the model, K; the limits of a rig are checked before the run.
-const PLAUSIBLE_K: std::ops::RangeInclusive<f64> = 250.0..=1400.0;
+/// Temperatures of a campaign's boundary, K; the ranges of a rig are checked at each step.
+const PLAUSIBLE_T3_K: RangeInclusive<f64> = 250.0..=1400.0;
+const PLAUSIBLE_OIL_K: RangeInclusive<f64> = 230.0..=450.0;
 
-fn check_temperature(name: &str, value_k: f64) -> Result<f64, ScriptThrow> {
-    if PLAUSIBLE_K.contains(&value_k) {
+fn check_temperature(name: &str, value_k: f64, range: RangeInclusive<f64>) -> Result<f64, ScriptThrow> {
+    if range.contains(&value_k) {
         return Ok(value_k);
     }
-    let message = format!("the {name} cannot be {value_k:.2} K");
+    let message = format!(
+        "the {name} cannot be {value_k:.2} K; it is between {} K and {} K",
+        range.start(),
+        range.end()
+    );
     Err(throw(message, "give a temperature such as \"70 degC\""))
 }
 

@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_core::{
-    CommonErrors, Dwell, IdentifiedPoint, Limits, Method, OperatingPoint, RigActuators, SettleBands,
-    StepKind, Timing, Verdict, WindowRule,
+    CommonErrors, Dwell, IdentifiedPoint, Limits, Method, OperatingPoint, RigActuators, SetpointRange,
+    SetpointRanges, SettleBands, StepKind, Timing, Verdict, WindowRule,
 };
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::model::Model;
@@ -37,6 +37,12 @@ fn request() -> SequenceRequest {
             housing_gradient_max_k: None,
             overshoot_max_ratio: None,
         },
+        accepts: Some(SetpointRanges {
+            p3_pa: SetpointRange { low: 50e3, high: 2e6 },
+            t3_k: SetpointRange { low: 250.0, high: 1400.0 },
+            valve_opening_ratio: SetpointRange { low: 0.05, high: 2.5 },
+            oil_temperature_k: SetpointRange { low: 250.0, high: 450.0 },
+        }),
         actuators: RigActuators::default(),
         order: Box::new(|points| Ok(points.iter().rev().copied().collect())),
     }
@@ -401,6 +407,33 @@ fn t3_and_oil_hold_from_where_they_are_set() {
     assert!(message.contains("krpm"), "{message}");
     let message = run("oil(\"-80 degC\");", request().limits).unwrap_err();
     assert!(message.contains("193.15 K"), "{message}");
+    let message = run("oil(\"300 degC\");", request().limits).unwrap_err();
+    assert!(message.contains("573.15 K"), "{message}");
+    // What a campaign allows and this rig refuses is found at the line of the step.
+    let message = run("oil(\"-40 degC\");\njump(point(\"110 krpm\", 1.0));", request().limits).unwrap_err();
+    assert!(message.contains("test.rhai:2") && message.contains("T_oil"), "{message}");
+}
+
+/// However a loop without an end waits, it ends after a day of rig time.
+#[test]
+fn a_loop_without_an_end_is_refused() {
+    for text in [
+        "loop { jump(grid()[0], \"4 h\"); }",
+        "loop { settle(grid()[0], \"4 h\"); }",
+        "loop { settle(grid()[0], \"60 s\", \"1 K/s\"); }",
+    ] {
+        let mut runner = start(text);
+        let mut last = None;
+        let refused = loop {
+            match runner.next_step(last.take()) {
+                Ok(Some(step)) => last = Some(answer(&step)),
+                Ok(None) => panic!("{text} has ended"),
+                Err(error) => break error,
+            }
+            assert!(last.as_ref().unwrap().end_s <= 86_400.0, "{text}");
+        };
+        assert!(matches!(refused, SequenceError::Script(_)), "{text}: {refused}");
+    }
 }
 
 /// Dropping a script does not wait until it has used up its operations, wherever it computes.

@@ -47,7 +47,7 @@ rehearsal never touches the rig.
   capture variables. Operations
   (5 million), depth of calls (32), length of strings (4096 bytes), arrays (4096 elements, or twice the grid) and maps
   (1024 entries), variables (128), steps (2 000), points that the planner orders (100 at once, or the grid; twice as
-  many in total) and time (four hours a step, three days in total) are bounded.
+  many in total) and time (four hours a step, a day in total) are bounded.
 - An error ends the run in its safe state; what was recorded is kept, identified and reported. The steps that were run
   stand in `executed_plan.json` of the run directory.
 

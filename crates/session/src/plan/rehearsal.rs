@@ -44,7 +44,8 @@ pub fn rehearse(
     // Only the script's own steps: the sensors of a rehearsal need no zero.
     let nominal = Campaign { backend: choice, zero: None, ..campaign.clone() };
     let mut backend = session.registry.make_backend(&nominal, model)?;
-    let mut steps = RehearsalSteps { steps: ScriptedSteps::new(campaign, model, source)?, notes: Vec::new() };
+    let scripted = ScriptedSteps::new(campaign, model, source, &backend.describe())?;
+    let mut steps = RehearsalSteps { steps: scripted, notes: Vec::new() };
     let end = drive(&nominal, model, &mut steps, backend.as_mut(), &mut NoObserver, session.stop);
     let failed = |error| match error {
         RunError::Source(error) => SessionError::Script(error),

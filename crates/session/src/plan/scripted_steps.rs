@@ -6,7 +6,10 @@ use crate::recording::identification_config::identification;
 use crate::rig::observers::{append_samples, config_for_single_steps, retain_last_two_steps};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::SequenceSource;
-use mapper_core::{IdentifiedPoint, Plan, PlanStep, Recording, SampleBatch, StepMarker, step_number};
+use mapper_core::{
+    IdentifiedPoint, Plan, PlanStep, Recording, RigDescription, SampleBatch, SetpointRanges, StepMarker,
+    step_number,
+};
 use mapper_identify::{IdentifyConfig, identify_each};
 use mapper_physics::simulation::model::Model;
 use mapper_runner::{StepSource, StepSourceError};
@@ -28,10 +31,15 @@ pub(crate) struct ScriptedSteps {
 }
 
 impl ScriptedSteps {
-    /// The steps of a campaign's script.
-    pub fn new(campaign: &Campaign, model: &Model, source: &SequenceSource) -> Result<Self, SessionError> {
+    /// The steps of a campaign's script on this rig.
+    pub fn new(
+        campaign: &Campaign,
+        model: &Model,
+        source: &SequenceSource,
+        rig: &RigDescription,
+    ) -> Result<Self, SessionError> {
         let script = Script { path: source.path.clone(), text: source.text.clone() };
-        let script = SequenceRunner::start(script, request(campaign, model))?;
+        let script = SequenceRunner::start(script, request(campaign, model, rig.accepts))?;
         Ok(ScriptedSteps {
             script,
             // A script gets each step immediately; the joint method identifies all steps at the end.
@@ -129,7 +137,7 @@ fn with_steps(mut plan: Plan, steps: Vec<PlanStep>) -> Plan {
 }
 
 /// Campaign data available to a script.
-fn request(campaign: &Campaign, model: &Model) -> SequenceRequest {
+fn request(campaign: &Campaign, model: &Model, accepts: Option<SetpointRanges>) -> SequenceRequest {
     let (planned, machine) = (campaign.clone(), model.clone());
     SequenceRequest {
         points: campaign.points.clone(),
@@ -140,6 +148,7 @@ fn request(campaign: &Campaign, model: &Model) -> SequenceRequest {
         boundary: campaign.boundary,
         follow_outlet: campaign.follow_outlet,
         limits: campaign.limits,
+        accepts,
         actuators: campaign.rig_actuators(),
         order: Box::new(move |points| {
             // The script itself decides on repeat visits.

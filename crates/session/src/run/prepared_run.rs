@@ -144,7 +144,9 @@ impl<'s> Session<'s> {
         };
         plan.made_from.rig_sha256 = rig_sha256;
         let scripted = match &campaign.sequence {
-            Some(source) if request.plan.is_none() => Some(ScriptedSteps::new(campaign, &model, source)?),
+            Some(source) if request.plan.is_none() => {
+                Some(ScriptedSteps::new(campaign, &model, source, &rig)?)
+            }
             _ => None,
         };
         check_guards(campaign, &rig)?;

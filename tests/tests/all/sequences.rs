@@ -55,6 +55,13 @@ fn every_example_is_planned_and_run() {
     }
 }
 
+/// An editor on Windows may begin a file with a byte order mark.
+#[test]
+fn a_script_may_begin_with_a_byte_order_mark() {
+    let campaign = scripted("\u{feff}for p in grid() { jump(p); }", &[]);
+    mapper(["plan".as_ref(), campaign.path.as_os_str()]).exits(0);
+}
+
 /// The script receives for each step what identification later finds in the whole recording.
 #[test]
 fn a_script_receives_the_results_of_the_recording() {

@@ -250,7 +250,7 @@ fn report_wrong_limits(
 /// The system's error; [`io::ErrorKind::InvalidData`] for a file that is neither.
 pub fn read_named_file(path: &Path) -> io::Result<String> {
     match String::from_utf8(mapper_yaml::read_limited(path, MAX_MAP_BYTES)?) {
-        Ok(text) => Ok(text),
+        Ok(text) => Ok(without_mark(text)),
         Err(error) => file_text(error.as_bytes())
             .map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error.to_string())),
     }
@@ -263,5 +263,11 @@ pub fn read_named_file(path: &Path) -> io::Result<String> {
 /// is not UTF-8.
 pub fn read_text(path: &Path) -> io::Result<String> {
     String::from_utf8(mapper_yaml::read_limited(path, MAX_MAP_BYTES)?)
+        .map(without_mark)
         .map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is not UTF-8"))
+}
+
+/// Text without the byte order mark that editors on Windows put before it.
+fn without_mark(text: String) -> String {
+    text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text)
 }

@@ -54,8 +54,8 @@ const DEFAULT_FORMATS: [&str; 4] = ["csv", "json", "svg", "fitted"];
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Outputs {
-    /// Parent directory of the run directories; `runs` if none is given.
-    #[schemars(length(min = 1), example = &"runs")]
+    /// Parent directory of the run directories; `runs` if none is given. `~/` is the home directory; variables such as `${HOME}` are not replaced.
+    #[schemars(regex(pattern = r"^(~/|[^~$%])[^$%]*$"), example = &"runs")]
     pub directory: String,
     /// Formats of the map, each once; csv, json, svg and fitted if none is given. docs/reference/maps.md lists all supported formats.
     #[schemars(extend("uniqueItems" = true, "examples" = [["csv", "json", "svg"]]))]

@@ -66,8 +66,8 @@ struct NightlyFile {
     /// Name; only nights of the same name are compared.
     #[schemars(regex(pattern = r"\S"), example = &"turbo_a")]
     nightly: String,
-    /// File of the history, relative to the working directory; `runs/history.db` if none is given.
-    #[schemars(example = &"runs/history.db")]
+    /// File of the history, relative to the working directory; `runs/history.db` if none is given. Variables such as `${HOME}` are not replaced.
+    #[schemars(regex(pattern = r"^[^~$%][^$%]*$"), example = &"runs/history.db")]
     history: Option<PathBuf>,
     /// Settings of the band of earlier nights.
     band: Option<BandFile>,

@@ -3,8 +3,23 @@
 use crate::error::DriverError;
 use serde_json::Value;
 
-/// A setting is secret if its key contains one of these.
-const SECRET_KEYS: [&str; 5] = ["password", "passphrase", "secret", "token", "private_key_text"];
+/// A setting is secret if its key contains one of these, without regard to capitals and separators.
+const SECRET_KEYS: [&str; 12] = [
+    "password",
+    "passwd",
+    "passphrase",
+    "passcode",
+    "pwd",
+    "secret",
+    "token",
+    "credential",
+    "apikey",
+    "accesskey",
+    "privatekeytext",
+    "authorization",
+];
+/// What comes before `pass` in the name of a filter or a valve.
+const NOT_SECRET_BEFORE_PASS: [&str; 5] = ["low", "high", "band", "all", "by"];
 const PLACEHOLDER: &str = "[secret]";
 /// Shorter secrets are hidden only as whole words, because replacing them inside other words would remove whole sentences.
 const MIN_REPLACED_LENGTH: usize = 6;
@@ -41,14 +56,18 @@ impl Secrets {
     ) -> Result<(), (String, DriverError)> {
         if let Some(name) = env_variable(value) {
             match variable(name) {
-                Some(secret) if !secret.is_empty() => self.0.push(secret),
+                Some(secret) if !secret.is_empty() => {
+                    // A driver may report only the password of an address.
+                    self.0.extend(url_password(&secret).map(str::to_owned));
+                    self.0.push(secret);
+                }
                 _ if needed => return Err((path.join("."), DriverError::NotSet(name.to_owned()))),
                 _ => {}
             }
             return Ok(());
         }
-        let key = path.last().map(|key| key.to_ascii_lowercase()).unwrap_or_default();
-        if SECRET_KEYS.iter().any(|secret| key.contains(secret)) && !value.is_null() {
+        let has_secret_key = path.last().is_some_and(|key| is_secret_key(key)) && !value.is_null();
+        if has_secret_key || value.as_str().is_some_and(contains_secret) {
             return Err((path.join("."), DriverError::Secret));
         }
         if path.len() >= MAX_DEPTH {
@@ -77,6 +96,30 @@ impl Secrets {
             }
         })
     }
+}
+
+/// Whether a key of settings, or of an address, names a secret.
+fn is_secret_key(key: &str) -> bool {
+    let key: String = key.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect();
+    let is_pass = key
+        .strip_suffix("pass")
+        .is_some_and(|before| !NOT_SECRET_BEFORE_PASS.iter().any(|word| before.ends_with(word)));
+    is_pass || SECRET_KEYS.iter().any(|secret| key.contains(secret))
+}
+
+/// Whether a text contains a secret: an address with a password, or a pair `key=value` with a secret key.
+fn contains_secret(text: &str) -> bool {
+    let mut pairs = text.split(['?', '&', ';', ',', ' ', '#']).filter_map(|pair| pair.split_once('='));
+    url_password(text).is_some() || pairs.any(|(key, value)| !value.trim().is_empty() && is_secret_key(key))
+}
+
+/// The password in an address such as `opc.tcp://user:password@host`.
+fn url_password(text: &str) -> Option<&str> {
+    let (_, rest) = text.split_once("://")?;
+    let authority = rest.split(['/', '?', '#']).next().unwrap_or(rest);
+    let (user, _) = authority.rsplit_once('@')?;
+    let (_, password) = user.split_once(':')?;
+    (!password.is_empty()).then_some(password)
 }
 
 /// Replaces a word in a text.
@@ -127,6 +170,32 @@ mod tests {
         let (path, error) = read(json!({"token": {"env": "NOT_THERE"}})).err().unwrap();
         assert_eq!((path.as_str(), error.to_string().contains("NOT_THERE")), ("token", true));
         assert!(read(json!({"password": null, "host": "x"})).is_ok());
+        for refused in [
+            json!({"pwd": "hunter2"}),
+            json!({"Pass": "hunter2"}),
+            json!({"user_pass": 1234}),
+            json!({"userPwd": "hunter2"}),
+            json!({"api_key": "hunter2"}),
+            json!({"apiKey": "hunter2"}),
+            json!({"API-KEY": "hunter2"}),
+            json!({"headers": {"Authorization": "Bearer hunter2"}}),
+            json!({"address": "opc.tcp://lab:hunter2@plc:4840"}),
+            json!({"urls": ["http://plc/?x=1&access_token=hunter2"]}),
+            json!({"connection": "Server=plc;Uid=lab;Pwd=hunter2"}),
+        ] {
+            let (_, error) = read(refused.clone()).err().unwrap_or_else(|| panic!("{refused} is accepted"));
+            assert!(matches!(error, DriverError::Secret), "{refused}");
+        }
+        for plain in [
+            json!({"low_pass": "10 Hz", "bypass": "open", "passes": 3, "pin": 4, "monkey": "x"}),
+            json!({"address": "opc.tcp://lab@plc:4840/path", "private_key": "keys/plc.pem"}),
+            json!({"address": "http://plc:80/a@b", "node": "ns=2;s=acknowledge"}),
+        ] {
+            assert!(read(plain.clone()).is_ok(), "{plain}");
+        }
+        let address = |_: &str| Some("opc.tcp://lab:hunter2@plc".to_owned());
+        let secrets = Secrets::of(&json!({"address": {"env": "A"}}), &address, true).ok().unwrap();
+        assert_eq!(secrets.hide("login of lab with hunter2 failed"), "login of lab with [secret] failed");
         // For a driver with its own environment, variables known here are hidden and missing ones are not an error.
         let both = json!([{"env": "PLC"}, {"env": "NOT_THERE"}]);
         let secrets = Secrets::of(&both, &variable, false).ok().unwrap();

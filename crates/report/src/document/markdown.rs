@@ -77,8 +77,8 @@ fn row<'a>(cells: impl Iterator<Item = &'a str>) -> String {
     format!("|{}\n", cells.map(cell).collect::<String>())
 }
 
-/// Text as Markdown without control characters, HTML and links: a `<` that would begin a tag, a comment or a declaration, and a `(` that would begin
-/// an address are escaped (CommonMark, 6.3 and 6.6).
+/// Text as one line of Markdown without control characters, HTML and links: a `<` that would begin a tag, a comment or a declaration becomes an
+/// entity, which a backslash before it cannot undo, and what would begin the address of a link is escaped (CommonMark, 2.5, 4.7, 6.3 and 6.6).
 pub fn markdown_text(text: &str) -> String {
     let begins = |next: Option<char>| {
         next.is_some_and(|next| next.is_ascii_alphabetic() || ['/', '!', '?'].contains(&next))
@@ -87,11 +87,12 @@ pub fn markdown_text(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     let mut letters = text.chars().peekable();
     while let Some(letter) = letters.next() {
-        let tag = letter == '<' && begins(letters.peek().copied()) && !escaped.ends_with('\\');
-        if tag || letter == '(' && escaped.ends_with(']') {
-            escaped.push('\\');
+        match letter {
+            '<' if begins(letters.peek().copied()) => escaped.push_str("&lt;"),
+            '(' | '[' | ':' if escaped.ends_with(']') => escaped.extend(['\\', letter]),
+            '\n' | '\r' => escaped.push(' '),
+            letter => escaped.push(letter),
         }
-        escaped.push(letter);
     }
     escaped
 }
@@ -109,8 +110,8 @@ mod tests {
 
     #[test]
     fn a_name_is_neither_a_tag_nor_a_link() {
-        let text = "<script>x</script> a < b, T2 <- T1 <!-- --> \\<b> [x](y) [K] (z)";
-        let expected = "\\<script>x\\</script> a < b, T2 <- T1 \\<!-- --> \\<b> [x]\\(y) [K] (z)";
+        let text = "<script>x</script> a < b, T2 <- T1 <!-- --> \\<b> \\\\<i>\n[x](y) [x][y] [x]: z [K] (z)";
+        let expected = "&lt;script>x&lt;/script> a < b, T2 <- T1 &lt;!-- --> \\&lt;b> \\\\&lt;i> [x]\\(y) [x]\\[y] [x]\\: z [K] (z)";
         assert_eq!(markdown_text(text), expected);
     }
 }

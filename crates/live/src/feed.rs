@@ -178,7 +178,7 @@ impl Feed {
                     Vec::new()
                 }
             }
-            SessionEvent::StepStarted(marker) => {
+            SessionEvent::StepStarted { marker, .. } => {
                 self.step(current, marker);
                 vec![self.tick(current)]
             }

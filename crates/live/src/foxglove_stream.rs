@@ -111,7 +111,7 @@ impl FoxgloveStream {
                     self.publish(group.topic(), *t_s, &readings_message(group, values));
                 }
             }
-            SessionEvent::StepStarted(marker) => {
+            SessionEvent::StepStarted { marker, .. } => {
                 let (t_s, message) = step_message(marker, StepPhase::Start);
                 self.publish("/step", t_s, &message);
             }

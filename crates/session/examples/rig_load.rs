@@ -239,7 +239,9 @@ fn run(text: &str, parent: &Path, real_time: bool, stop_at: usize, resume: Optio
             *begun.lock().unwrap() = (cpu_s(), Instant::now());
             *to_start.lock().unwrap() = asked.elapsed().as_secs_f64();
         }
-        SessionEvent::StepStarted(marker) if marker.index == stop_at => stop.store(true, Ordering::Relaxed),
+        SessionEvent::StepStarted { marker, .. } if marker.index == stop_at => {
+            stop.store(true, Ordering::Relaxed)
+        }
         SessionEvent::Progress { what, .. } if what.starts_with("identifying") => {
             let (cpu, at) = *begun.lock().unwrap();
             *cost.lock().unwrap() = (cpu_s() - cpu, at.elapsed().as_secs_f64());

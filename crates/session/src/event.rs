@@ -22,7 +22,13 @@ pub enum SessionEvent {
         t_s: f64,
     },
     /// A step begins; `end_s` of the marker is the planned end.
-    StepStarted(StepMarker),
+    StepStarted {
+        /// The step.
+        #[serde(flatten)]
+        marker: StepMarker,
+        /// Planned rig time from its start to the end of the run, s.
+        left_s: f64,
+    },
     /// A step has ended; `end_s` of the marker is the actual end.
     StepEnded(StepMarker),
     /// Message from the rig or the runner: tripped guard, surge, stop, safe state or note.

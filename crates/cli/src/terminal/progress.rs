@@ -59,7 +59,7 @@ impl ProgressFormat {
                 matches!(
                     event,
                     E::RunStarted { .. }
-                        | E::StepStarted(_)
+                        | E::StepStarted { .. }
                         | E::Reported(_)
                         | E::Progress { .. }
                         | E::PiecesDone { .. }
@@ -200,8 +200,11 @@ impl ProgressDisplay {
                 let left_s = self.bar.eta().as_secs_f64();
                 self.bar.set_message(progress_text(state.step, state.steps, *t_s, state.duration_s, left_s));
             }
-            SessionEvent::StepStarted(marker) => {
+            SessionEvent::StepStarted { marker, left_s } => {
                 state.step = marker.number().unwrap_or(state.step);
+                // A hold moves the end of the run.
+                state.duration_s = marker.start_s + left_s;
+                self.bar.set_length(state.duration_s.ceil() as u64);
                 self.bar.set_prefix(format!(
                     "{}, {} at this point",
                     place(marker),
@@ -273,7 +276,7 @@ fn say_lines(event: &SessionEvent, state: &mut State) {
             (state.steps, state.duration_s) = (*steps, *duration_s);
             format!("{steps} steps in {} of rig time", short_duration(*duration_s))
         }
-        SessionEvent::StepStarted(marker) => format!(
+        SessionEvent::StepStarted { marker, left_s } => format!(
             "{:8.1} s  {}, {}, for {}, {} left",
             marker.start_s,
             match marker.number() {
@@ -284,7 +287,7 @@ fn say_lines(event: &SessionEvent, state: &mut State) {
             },
             place(marker),
             short_duration(marker.end_s - marker.start_s),
-            short_duration(state.duration_s - marker.start_s)
+            short_duration(*left_s)
         ),
         SessionEvent::Reported(event) => event_line(event.t_s, &event.message),
         SessionEvent::Progress { what, done_ratio } if *what != state.last_line => {

@@ -112,6 +112,10 @@ pub(crate) struct EventForwarder<'a> {
     pub steps: usize,
     /// Planned rig time including soak, s.
     pub duration_s: f64,
+    /// Planned rig time of the steps that have not started, s.
+    pub steps_left_s: f64,
+    /// Planned rig time after the last step, s.
+    pub cool_down_s: f64,
 }
 
 impl RunObserver for EventForwarder<'_> {
@@ -125,7 +129,11 @@ impl RunObserver for EventForwarder<'_> {
     }
 
     fn on_step_start(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
-        (self.on_event)(&SessionEvent::StepStarted(*marker));
+        // Counted from the start of the step: a hold or a step that ended early does not change the time of those to come.
+        let step_s = marker.end_s - marker.start_s;
+        let left_s = self.steps_left_s.max(step_s) + self.cool_down_s;
+        self.steps_left_s -= step_s;
+        (self.on_event)(&SessionEvent::StepStarted { marker: *marker, left_s });
         Ok(())
     }
 
@@ -315,8 +323,9 @@ pub(crate) fn config_for_single_steps(config: IdentifyConfig) -> IdentifyConfig 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mapper_core::EventKind;
+    use mapper_core::{EventKind, StepKind};
     use std::io;
+    use std::sync::Mutex;
     use std::thread::scope;
 
     /// Keeps the times of events, and fails at a given number of them.
@@ -392,5 +401,38 @@ mod tests {
             })
         });
         assert_eq!(ended.unwrap_err().downcast_ref::<&str>(), Some(&"on purpose"));
+    }
+
+    /// Two steps of 60 s and a cool-down of 10 s: a hold of seven minutes in the first, and a third step that nobody planned.
+    #[test]
+    fn a_hold_takes_no_time_from_the_steps_to_come() {
+        let left = Mutex::new(Vec::new());
+        let on_event = |event: &SessionEvent| {
+            if let SessionEvent::StepStarted { left_s, .. } = event {
+                left.lock().unwrap().push(*left_s);
+            }
+        };
+        let mut forwarder = EventForwarder {
+            on_event: &on_event,
+            steps: 2,
+            duration_s: 160.0,
+            steps_left_s: 120.0,
+            cool_down_s: 10.0,
+        };
+        for (index, start_s) in [(0, 30.0), (1, 510.0), (2, 570.0)] {
+            let (kind, end_s) = (StepKind::Point, start_s + 60.0);
+            let marker = StepMarker {
+                index,
+                kind,
+                start_s,
+                end_s,
+                from: None,
+                to: None,
+                p3_pa: 2e5,
+                valve_opening_ratio: 1.0,
+            };
+            forwarder.on_step_start(&marker).unwrap();
+        }
+        assert_eq!(*left.lock().unwrap(), [130.0, 70.0, 70.0]);
     }
 }

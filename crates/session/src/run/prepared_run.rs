@@ -389,6 +389,8 @@ impl PreparedRun<'_> {
             on_event: session.on_event,
             steps: self.plan.steps.len(),
             duration_s: soak_s(campaign) + steps_s,
+            steps_left_s: steps_s - self.plan.warm_up_s - self.plan.cool_down_s,
+            cool_down_s: self.plan.cool_down_s,
         };
         let (model, backend) = (&self.model, self.sources.backend.as_mut());
         let (end, drifted, recorder) = std::thread::scope(|scope| {

@@ -112,6 +112,11 @@ fn invalid_machines_are_refused_with_a_reason() {
         refused.stderr
     );
     assert!(!out.exists());
+    // As in a makefile, CC may have options.
+    let with_options = scratch.path().join("options.fmu");
+    let mut command = mapper_tests::mapper_command(["map", "fmu", SHIPPED, "--compile", "--out"]);
+    command.arg(&with_options).current_dir(repository()).env("CC", "cc  -O1 -g0");
+    mapper_tests::Finished::from(command.output().unwrap()).exits(0);
     // What is there stays, unless it may be replaced; equal machines give equal bytes.
     fmu(&nominal, &out, &[]).exits(0);
     let first = std::fs::read(&out).unwrap();

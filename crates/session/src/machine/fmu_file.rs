@@ -204,7 +204,7 @@ const PLATFORM: Option<(&str, &str)> = if cfg!(all(target_os = "linux", target_a
 /// Adds the compiled library to the files of an FMU and returns its folder. The compiler is `$CC`, or `cc` by default.
 pub(crate) fn with_binary(fmu: &mut Vec<FmuFile>, identifier: &str) -> Result<String, SessionError> {
     let compiler =
-        std::env::var("CC").ok().filter(|name| !name.is_empty()).unwrap_or_else(|| "cc".to_owned());
+        std::env::var("CC").ok().filter(|name| !name.trim().is_empty()).unwrap_or_else(|| "cc".to_owned());
     let failed = |why: String| FmuExportError::Compiler { compiler: compiler.clone(), why };
     let Some((platform, ending)) = PLATFORM else {
         return Err(FmuExportError::Platform.into());
@@ -221,7 +221,14 @@ pub(crate) fn with_binary(fmu: &mut Vec<FmuFile>, identifier: &str) -> Result<St
         }
     }
     let library = scratch.path().join(format!("{identifier}.{ending}"));
-    let output = Command::new(&compiler)
+    // As in a makefile, CC may contain options. A path with blanks is one word if it names a file.
+    let words: Vec<&str> = compiler.split_whitespace().collect();
+    let (program, options) = match words.as_slice() {
+        [program, options @ ..] if !Path::new(&compiler).is_file() => (*program, options),
+        _ => (compiler.as_str(), &[][..]),
+    };
+    let output = Command::new(program)
+        .args(options)
         .args([
             "-std=c99",
             "-O2",

@@ -4,7 +4,8 @@
 use crate::common::{batch, step, write};
 use mapper_core::{Channel, SampleBatch};
 use mapper_recording::{
-    ChannelMap, ReadOptions, ReadReport, ReadWarning, RecordError, read_recording, read_recording_from,
+    ChannelMap, ChunkError, ReadOptions, ReadReport, ReadWarning, RecordError, read_recording,
+    read_recording_from,
 };
 use proptest::prelude::*;
 use std::collections::BTreeMap;
@@ -91,6 +92,30 @@ fn a_chunk_that_claims_more_than_it_holds_is_left_out_without_allocating_it() {
     let report = read(&bytes).unwrap();
     let damaged = report.warnings.iter().filter(|w| matches!(w, ReadWarning::DamagedChunk { .. })).count();
     assert_eq!((damaged, report.recording.series[&Channel::T2].t_s.len()), (3, 70));
+}
+
+/// One such chunk is damage, and all of them are the work of another program, whatever the channel map asks for.
+#[test]
+fn a_file_of_unknown_compression_is_refused_by_its_name() {
+    let whole = recorded(&batch(100));
+    let chunks: Vec<_> = records(&whole).into_iter().filter(|record| record.1 == 6).collect();
+    let renamed = |count: usize| {
+        let mut bytes = whole.clone();
+        for chunk in &chunks[..count] {
+            // Times, size, checksum and the length of the name before it.
+            let name = chunk.0 + 9 + 8 + 8 + 8 + 4 + 4;
+            assert_eq!(&bytes[name..name + 4], b"zstd");
+            bytes[name..name + 4].copy_from_slice(b"brot");
+        }
+        bytes
+    };
+    assert!(read(&renamed(1)).unwrap().recording.series[&Channel::T2].t_s.len() >= 80);
+    let refused = read(&renamed(chunks.len())).unwrap_err();
+    let RecordError::NothingReadable { warning: ReadWarning::DamagedChunk { source, .. }, .. } = &refused
+    else {
+        panic!("{refused}")
+    };
+    assert!(matches!(source, ChunkError::Compression { compression } if compression == "brot"), "{refused}");
 }
 
 #[test]

@@ -14,7 +14,9 @@ pub enum ChunkError {
     Header,
     #[error("its header gives {claimed} bytes, and at most {limit} bytes are read")]
     TooLarge { claimed: u64, limit: u64 },
-    #[error("it is compressed with `{compression}`, and only lz4 and zstd can be read")]
+    #[error(
+        "it is compressed with `{compression}`, and only lz4 and zstd can be read; export it again with one of them"
+    )]
     Compression { compression: String },
     #[error("it does not decompress ({reason})")]
     Decompress { reason: String },

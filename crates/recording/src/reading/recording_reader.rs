@@ -141,6 +141,9 @@ fn read(
     if let Some(error) = sink.failure.take() {
         return Err(error);
     }
+    if let Some(warning) = scanned.unknown_compression().cloned() {
+        return Err(RecordError::NothingReadable { path: path.to_owned(), warning });
+    }
     let builders = sink.take_builders();
     // A command alone may match a name by chance: a recording without measurements is useless.
     let measured = builders.keys().any(|reads| reads.channel().info().group != Group::Command);

@@ -33,6 +33,8 @@ pub(crate) struct ScanResult {
     /// Records of any kind, damaged ones included.
     records: u64,
     damaged: u64,
+    /// Chunks that could be unpacked.
+    unpacked_chunks: u64,
     /// Bytes of all definitions and schemas.
     defined_bytes: usize,
 }
@@ -122,6 +124,14 @@ fn pass<S: Sink>(
 }
 
 impl ScanResult {
+    /// The first chunk with an unknown compression, if no chunk could be unpacked: the file is whole, and was written by another program.
+    pub(crate) fn unknown_compression(&self) -> Option<&ReadWarning> {
+        let unknown = |warning: &&ReadWarning| {
+            matches!(warning, ReadWarning::DamagedChunk { source: ChunkError::Compression { .. }, .. })
+        };
+        self.warnings.iter().find(unknown).filter(|_| self.unpacked_chunks == 0)
+    }
+
     fn note_damage(&mut self, warning: ReadWarning) {
         self.damaged += 1;
         if self.damaged <= MAX_LISTED_DAMAGE {
@@ -144,7 +154,10 @@ impl ScanResult {
         let known = |channel_id| self.definitions.contains_key(&channel_id);
         for UnpackedChunk { offset, items } in batch.open(sink, known, options.max_chunk_bytes) {
             match items {
-                Ok(items) => items.into_iter().for_each(|item| self.item(offset, item, options, sink)),
+                Ok(items) => {
+                    self.unpacked_chunks += 1;
+                    items.into_iter().for_each(|item| self.item(offset, item, options, sink));
+                }
                 Err(source) => self.note_damage(ReadWarning::DamagedChunk { offset, source }),
             }
         }
@@ -186,7 +199,10 @@ impl ScanResult {
         sink: &mut S,
     ) {
         let mut rest = match unpacker.unpack(body, options.max_chunk_bytes) {
-            Ok(content) => content,
+            Ok(content) => {
+                self.unpacked_chunks += 1;
+                content
+            }
             Err(error) => {
                 self.note_damage(ReadWarning::DamagedChunk { offset, source: error });
                 return;

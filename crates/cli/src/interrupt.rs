@@ -34,13 +34,45 @@ fn handle_signal(stop: &RunStop, gentle: bool) {
     }
 }
 
+/// Least address space of a run, bytes. Bound: the stack of a script, and twice what a run of four points needs.
+#[cfg(unix)]
+const RUN_MIN_BYTES: u64 = 512 << 20;
+
+#[cfg(unix)]
+static MEMORY_HANDLER: std::sync::OnceLock<signal_hook::SigId> = std::sync::OnceLock::new();
+
+/// Ends the process as a failure, not as a crash, if the system refuses memory; the library has printed that then.
+#[cfg(unix)]
+pub fn end_without_memory() {
+    use signal_hook::{consts::SIGABRT, flag::register_conditional_shutdown};
+    let handler =
+        register_conditional_shutdown(SIGABRT, Code::Failure as i32, Arc::new(AtomicBool::new(true)));
+    // Without the handler, the end is a crash.
+    let _ = handler.map(|handler| MEMORY_HANDLER.set(handler));
+}
+
+#[cfg(not(unix))]
+pub fn end_without_memory() {}
+
 /// The flags that signals raise while a rig is run: every signal that would end or suspend the process and that can be caught.
 /// Faults of the program itself (SIGSEGV and its like) cannot be.
 #[cfg(unix)]
 pub fn run_stop() -> Result<RunStop, Failure> {
+    use nix::sys::resource::{Resource, getrlimit};
     use nix::sys::signal::{SigSet, Signal};
     use signal_hook::consts::*;
     use signal_hook::iterator::Signals;
+    let (allowed_bytes, _) = getrlimit(Resource::RLIMIT_AS).map_err(failed)?;
+    if allowed_bytes < RUN_MIN_BYTES {
+        let (allowed, needed) = (allowed_bytes >> 20, RUN_MIN_BYTES >> 20);
+        let message =
+            format!("a run needs {needed} MiB of memory, and the limit is {allowed} MiB (`ulimit -v`)");
+        return Err(Failure::new(Code::Failure, message));
+    }
+    // During a run the same signal makes the rig safe.
+    if let Some(handler) = MEMORY_HANDLER.get() {
+        signal_hook::low_level::unregister(*handler);
+    }
     let stop = RunStop::default();
     let raised = stop.clone();
     let ends = [

@@ -12,7 +12,10 @@ mod output;
 mod terminal;
 
 use clap::{CommandFactory, FromArgMatches, Parser};
+use output::exit_report;
+use output::failure::{Code, Failure};
 use std::ffi::OsString;
+use std::panic::AssertUnwindSafe;
 use std::process::ExitCode;
 
 /// From a campaign file to a complete turbocharger-compressor map, efficiency and heat transfer included.
@@ -26,6 +29,8 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
+    exit_report::explain_defects();
+    interrupt::end_without_memory();
     let raw: Vec<OsString> = std::env::args_os().collect();
     let (json, colour) = output::output_options::scan_raw_arguments(&raw);
     let read = command_line::by_task(Arguments::command()).color(colour).try_get_matches_from(raw);
@@ -34,12 +39,14 @@ fn main() -> ExitCode {
         Ok((arguments, matches)) => {
             output::output_options::set_options(&arguments.manner, &matches);
             output::output_options::set_commands(Arguments::command);
-            match arguments.command.run() {
+            // The message of a defect has been printed where it happened.
+            let run = std::panic::catch_unwind(AssertUnwindSafe(|| arguments.command.run()));
+            match run.unwrap_or_else(|_| Err(Failure::printed(Code::Failure))) {
                 Ok(()) => ExitCode::SUCCESS,
-                Err(failure) => output::exit_report::failed(&failure),
+                Err(failure) => exit_report::failed(&failure),
             }
         }
-        Err(error) if error.use_stderr() => output::exit_report::wrong_arguments(error, json),
+        Err(error) if error.use_stderr() => exit_report::wrong_arguments(error, json),
         Err(error) => error.exit(),
     }
 }

@@ -170,3 +170,22 @@ fn a_full_disk_fails_one_task_of_a_fleet() {
     let result = |directory: &std::path::Path| std::fs::read(directory.join("result/runs.json")).unwrap();
     assert!(result(&here) == result(&there), "the result is that of one machine");
 }
+
+/// A limit of memory that a run would exceed is named beforehand, in one line: a computer that refuses memory ends a program where it stands.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_limit_of_memory_is_reported_in_one_line() {
+    let campaign = CampaignFile::shipped_with(SHORT_GRID);
+    let run =
+        mapper_command(["run".as_ref(), campaign.path.as_os_str(), "--progress".as_ref(), "off".as_ref()]);
+    let output = Command::new("sh")
+        .args(["-c", "ulimit -v 400000; exec \"$@\"", "sh"])
+        .arg(run.get_program())
+        .args(run.get_args())
+        .current_dir(campaign.directory())
+        .output()
+        .unwrap();
+    let finished = Finished::from(output).exits(1);
+    assert_eq!(finished.stderr.lines().count(), 1, "{}", finished.stderr);
+    assert!(!campaign.runs().exists());
+}

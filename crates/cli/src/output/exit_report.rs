@@ -6,7 +6,23 @@ use crate::output::{output_options, standard_output};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use mapper_core::terminal_text;
 use serde_json::json;
+use std::panic::set_hook;
 use std::process::ExitCode;
+
+/// Prints a panic as one line: a thread that the system refuses, or a defect.
+pub fn explain_defects() {
+    set_hook(Box::new(|panic| {
+        let text = panic.to_string().replace('\n', " ");
+        let is_refused =
+            ["failed to spawn thread", "ThreadPoolBuildError"].iter().any(|part| text.contains(part));
+        say(&if is_refused {
+            "mapper: the system cannot start another thread; raise its limits (`ulimit -u`, `ulimit -v`)\n"
+                .to_owned()
+        } else {
+            format!("mapper: the program has a defect: {}; please report it\n", terminal_text(&text))
+        });
+    }));
+}
 
 /// Prints the failure, with `--json` as an object if none was printed yet.
 pub fn failed(failure: &Failure) -> ExitCode {

@@ -212,7 +212,7 @@ pub(crate) struct CampaignFile {
     speed_control: Option<SpeedControlFile>,
     /// Searches for the surge line after all other steps; no search if it is omitted.
     surge_search: Option<SurgeSearchFile>,
-    /// Seed of the search and of simulated rigs, a whole number from 0; equal seeds give equal bytes.
+    /// Seed of the search and of simulated rigs, a whole number from 0; equal seeds give equal bytes, at full speed or at any `--pace`.
     #[schemars(example = 1)]
     seed: Option<u64>,
     /// Limits that the run must never exceed.

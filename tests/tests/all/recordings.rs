@@ -288,3 +288,29 @@ fn a_run_with_its_own_map_is_identified_from_its_directory() {
     let again = mapper(["identify".as_ref(), moved.as_os_str(), "--json".as_ref()]).exits(0).json();
     assert_eq!(again["points"], result["points"]);
 }
+
+/// Equal seeds give equal bytes at any pace, where each sample is polled for itself. At full speed the simulator integrates in other steps: a
+/// ten-thousandth of the range in the seconds of a jump, and the noise is the same.
+#[test]
+fn a_paced_run_has_equal_bytes_at_any_pace_and_equal_readings_at_full_speed() {
+    let replacements: Vec<_> = SHORT_GRID.iter().chain(SINGLE_STEP_METHOD).copied().collect();
+    let recording = |pace: &[&str]| {
+        let campaign = CampaignFile::shipped_with(&replacements);
+        let runs = campaign.runs();
+        let arguments = ["run".as_ref(), campaign.path.as_os_str(), "--out".as_ref(), runs.as_os_str()];
+        mapper(arguments.into_iter().chain(pace.iter().map(AsRef::as_ref))).exits(0);
+        let path = only_run(&runs).join("recording.mcap");
+        let read = read_recording(&path, &ChannelMap::native(), &ReadOptions::default()).unwrap();
+        (std::fs::read(path).unwrap(), read.recording)
+    };
+    let (paced, of_paced) = recording(&["--pace", "5000"]);
+    assert!(paced == recording(&["--pace", "20000"]).0, "the bytes depend on the pace");
+    let (_, at_full_speed) = recording(&[]);
+    for (channel, series) in &of_paced.series {
+        let other = &at_full_speed.series[channel];
+        let scale = series.values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+        for (value, other) in series.values.iter().zip(&other.values) {
+            assert!((value - other).abs() <= 1e-3 * scale, "{channel}: {value} and {other}");
+        }
+    }
+}

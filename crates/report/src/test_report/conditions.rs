@@ -52,6 +52,39 @@ pub(crate) fn condition_table(
         .rows(rows)
 }
 
+/// A row for each quantity that the rig was told to set: the reading that would show a command without effect, or that there is none. No rig measures
+/// the flow area of its valve, and what a controller reports of its position is not independent of the command.
+pub(crate) fn witness_table(recording: &Recording, display: &Display) -> Table {
+    let commands = [
+        (Channel::P3Command, "turbine inlet pressure P3", Some(Channel::P3)),
+        (Channel::T3Command, "turbine inlet temperature T3", Some(Channel::T3)),
+        (Channel::ValveCommand, "valve opening", None),
+        (Channel::TOilCommand, "oil temperature", Some(Channel::TOil)),
+    ];
+    let rows = commands.into_iter().filter_map(|(command, name, witness)| {
+        let steps = || recording.steps.iter();
+        steps().find_map(|step| at_end(recording, step, command))?;
+        let differences = witness.into_iter().flat_map(|witness| {
+            steps().filter_map(move |step| {
+                Some(at_end(recording, step, witness)? - at_end(recording, step, command)?)
+            })
+        });
+        let largest = differences.max_by(|a, b| a.abs().total_cmp(&b.abs()));
+        let (read_by, difference) = match witness.zip(largest) {
+            Some((witness, largest)) => (
+                witness.to_string(),
+                display.difference(witness, largest).map_or_else(|| "0".to_owned(), two_figures),
+            ),
+            None => ("none: a command without effect would not show".to_owned(), dash_cell()),
+        };
+        Some([name.to_owned(), read_by, difference, display.difference_unit(command).to_owned()])
+    });
+    Table::new(["command", "read by", "largest difference", "unit"])
+        .caption("Commands and their readings at the ends of the steps")
+        .with_texts([1, 3])
+        .rows(rows)
+}
+
 /// Meaning of the columns.
 const INSTRUMENT_WORDS: &str = "Half widths of 95 % intervals, as declared: noise of one sample, offset left after calibration, gain; \
                                     temperatures in K. As used: the offset at rest, which the isothermal zero determines where \
@@ -210,6 +243,46 @@ fn two_figures(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use mapper_core::{Series, StepKind, StepMarker};
+
+    /// P3 arrives 5 kPa below its command; the oil has no reading, nor has any valve.
+    #[test]
+    fn every_command_has_a_reading_or_none() {
+        let series = |value: f64| {
+            let t_s: Vec<f64> = (0..100).map(f64::from).collect();
+            Series { values: vec![value; t_s.len()], t_s }
+        };
+        let step = StepMarker {
+            index: 0,
+            kind: StepKind::Point,
+            start_s: 0.0,
+            end_s: 99.0,
+            from: None,
+            to: None,
+            p3_pa: 2e5,
+            valve_opening_ratio: 1.4,
+        };
+        let recording = Recording {
+            series: BTreeMap::from([
+                (Channel::P3Command, series(2e5)),
+                (Channel::P3, series(1.95e5)),
+                (Channel::ValveCommand, series(1.4)),
+                (Channel::TOilCommand, series(350.0)),
+            ]),
+            steps: vec![step],
+            ..Recording::default()
+        };
+        let table = witness_table(&recording, &Display::default());
+        let text = crate::markdown_table(&table);
+        let cells: Vec<Vec<&str>> = text
+            .lines()
+            .skip(2)
+            .map(|line| line.trim_matches('|').split('|').map(str::trim).collect())
+            .collect();
+        assert_eq!(cells.len(), 3, "no T3 was commanded");
+        assert_eq!((cells[0][1], cells[0][2], cells[0][3]), ("P3", "-5.0", "kPa"));
+        assert!(cells[1..].iter().all(|row| row[2] == "-"), "{cells:?}");
+    }
 
     /// After a zero at 25 degC with 0.05 % (0.1 % at 95 %), T2 at 130 degC is known to 0.1 % of 105 K, not to the offset at rest alone.
     #[test]

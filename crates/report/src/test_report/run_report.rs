@@ -12,7 +12,7 @@ use crate::point_results::point_warnings::doubts;
 use crate::point_results::points::{END_S, allowance_sentence, point_tables, verdict_sentence};
 use crate::point_results::summary::{PointResults, score_sentences};
 use crate::test_report::acceptance::{JudgedPoints, acceptance_section, balance_section};
-use crate::test_report::conditions::{condition_table, instruments_section};
+use crate::test_report::conditions::{condition_table, instruments_section, witness_table};
 use crate::test_report::key_figures::{PointsOrigin, assumed_sentence, key_figures};
 use crate::test_report::zero_and_sensors::zero_sentence;
 use mapper_campaign::Campaign;
@@ -249,6 +249,7 @@ impl RunReport<'_> {
         let mut document = Document::default();
         document.facts("Test", condition_facts(self));
         document.table(condition_table(self.campaign, self.recording, display));
+        document.table(witness_table(self.recording, display));
         // Steps are counted through all recordings.
         let before =
             self.sources.iter().scan(0, |sum, source| Some(std::mem::replace(sum, *sum + source.steps)));

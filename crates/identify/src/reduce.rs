@@ -136,6 +136,7 @@ fn estimate(
         }));
         return estimate;
     };
+    findings.refuse_impossible(eta);
     let mut uncertainty = EstimateUncertainty::default();
     let (mut rows, mut known_square) = (Vec::new(), 0.0_f64);
     for source in inputs.sources(heat, config) {

@@ -308,7 +308,12 @@ impl ColumnName {
 
     /// Whether the name has the number 21, which in some logs is before the compressor.
     pub fn may_be_inlet(&self) -> bool {
-        self.station().is_some_and(|(number, _)| number == 21)
+        self.has_station(21)
+    }
+
+    /// Whether the name has this number after its quantity.
+    pub fn has_station(&self, number: u32) -> bool {
+        self.station().is_some_and(|(own, _)| own == number)
     }
 
     /// Number of the station: after the quantity, or after the letter of a machine.

@@ -32,7 +32,7 @@ pub use number::{
 pub use text::{Dialect, SEPARATORS, TextRows, decimal_sign, detect_text, typical_length};
 pub use units::{
     HeaderUnit, Reference, bare_unit, difference, header_unit, is_dimensionless, is_reduced_unit, is_unit,
-    is_units_row, kind_of, parse_quantity, remedy, split_unit, unit, volume_flow_m3_s,
+    is_units_row, is_units_row_of_names, kind_of, parse_quantity, remedy, split_unit, unit, volume_flow_m3_s,
 };
 pub use words::{Measured, Word};
 pub use workbook::{Book, SheetRows, Value, decimal_sign_of_cells, is_workbook};

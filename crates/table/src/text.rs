@@ -182,6 +182,7 @@ pub fn detect_text(
 /// Joins names of several words above columns between blanks: single blanks are within a name, and a unit in brackets belongs to the name
 /// before it. If there are not as many names as columns, the assignment is unknown and the row is text.
 fn joined_names(row: Vec<String>, spans: &[Range<usize>], width: usize) -> Vec<String> {
+    let (row, spans) = with_closed_brackets(row, spans, width);
     let is_word = |cell: &String| cell.chars().any(char::is_alphabetic) && cell.parse::<f64>().is_err();
     if width == 0
         || row.len() <= width
@@ -192,7 +193,7 @@ fn joined_names(row: Vec<String>, spans: &[Range<usize>], width: usize) -> Vec<S
     let join = |is_joined: &dyn Fn(&str, bool) -> bool| {
         let mut names: Vec<String> = Vec::new();
         let mut end = None;
-        for (word, span) in row.iter().zip(spans) {
+        for (word, span) in row.iter().zip(&spans) {
             let is_next = end.is_some_and(|end: usize| end + 1 == span.start);
             match names.last_mut().filter(|_| is_joined(word, is_next)) {
                 Some(name) => *name = format!("{name} {word}"),
@@ -204,6 +205,33 @@ fn joined_names(row: Vec<String>, spans: &[Range<usize>], width: usize) -> Vec<S
     };
     let by_bracket = join(&|word, _| word.starts_with(['[', '(']));
     by_bracket.or_else(|| join(&|_, is_next| is_next)).unwrap_or_else(|| vec![row.join(" ")])
+}
+
+/// The cells with those in one bracket joined, if there are more than columns: `[deg C]`.
+fn with_closed_brackets(
+    row: Vec<String>,
+    spans: &[Range<usize>],
+    width: usize,
+) -> (Vec<String>, Vec<Range<usize>>) {
+    let count = |cell: &str, marks: [char; 2]| cell.matches(marks).count();
+    let is_open = |cell: &String| count(cell, ['[', '(']) > count(cell, [']', ')']);
+    if row.len() <= width || !row.iter().any(is_open) {
+        return (row, spans.to_vec());
+    }
+    let (mut cells, mut places): (Vec<String>, Vec<Range<usize>>) = (Vec::new(), Vec::new());
+    for (cell, span) in row.into_iter().zip(spans) {
+        match (cells.last_mut().filter(|last| is_open(last)), places.last_mut()) {
+            (Some(last), Some(place)) => {
+                *last = format!("{last} {cell}");
+                place.end = span.end;
+            }
+            _ => {
+                cells.push(cell);
+                places.push(span.clone());
+            }
+        }
+    }
+    (cells, places)
 }
 
 /// Candidate separators, in order of preference for equal scores.

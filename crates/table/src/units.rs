@@ -1,5 +1,7 @@
 //! Units in the headers of logs and tables.
 
+use crate::column_name::ColumnName;
+use crate::number::is_missing_mark;
 use mapper_core::{Channel, Dimension};
 use mapper_yaml::units::{BARE_RATIO, CUBIC_FOOT_M3, Kind, Unit, UnitError, parse_with};
 use serde::Serialize;
@@ -236,16 +238,20 @@ pub fn is_reduced_unit(text: &str) -> bool {
 
 /// Whether a text stands for the unit of a ratio.
 pub fn is_dimensionless(unit: &str) -> bool {
-    matches!(
-        unit.to_lowercase().as_str(),
-        "" | "-" | "--" | "1" | "ratio" | "fraction" | "frac" | "dimensionless" | "dec" | "nd" | "none"
-    )
+    // `bar/bar`, `kPa/kPa`.
+    let is_quotient = unit.split_once('/').is_some_and(|(above, below)| above == below && is_unit(above));
+    is_quotient
+        || matches!(
+            unit.to_lowercase().as_str(),
+            "" | "-" | "--" | "1" | "ratio" | "fraction" | "frac" | "dimensionless" | "dec" | "nd" | "none"
+        )
 }
 
-/// A cell of a row of units without the brackets around it: `[kPa]`, `(bar(a))`.
+/// A cell of a row of units without the brackets around it: `[kPa]`, `(bar(a))`, `in kPa`.
 pub fn bare_unit(cell: &str) -> &str {
     let cell = cell.trim();
-    let pairs = [('[', ']'), ('(', ')')];
+    let cell = cell.strip_prefix("in ").unwrap_or(cell);
+    let pairs = [('[', ']'), ('(', ')'), ('{', '}'), ('<', '>')];
     let inside = pairs.iter().find_map(|(open, close)| cell.strip_prefix(*open)?.strip_suffix(*close));
     inside.map_or(cell, str::trim)
 }
@@ -255,6 +261,25 @@ pub fn is_units_row(row: &[String]) -> bool {
     let filled = row.iter().filter(|cell| !cell.is_empty()).count();
     let units = row.iter().filter(|cell| is_unit(bare_unit(cell))).count();
     units > 0 && 2 * units >= filled
+}
+
+/// Whether a row without numbers next to names of columns has their units: more units than names of quantities. Texts in the form of a unit
+/// count too, so that an unknown one is reported; all others concern their own columns alone.
+pub fn is_units_row_of_names(row: &[String]) -> bool {
+    let cells = || row.iter().map(|cell| bare_unit(cell)).filter(|cell| !is_dimensionless(cell));
+    let names_quantity = |cell: &str| ColumnName::read(cell).measured().is_some();
+    // `P1` and `Speed` are names; `W`, `V` and `t` may be units.
+    let is_name = |cell: &&str| {
+        let has_form = cell.chars().count() > 3 || cell.ends_with(|c: char| c.is_ascii_digit());
+        has_form && !is_unit(cell) && !cell.contains('/') && names_quantity(cell)
+    };
+    let is_number = |cell: &str| cell.starts_with(|c: char| c.is_ascii_digit()) && !is_unit(cell);
+    let has_form = |cell: &&str| {
+        let is_quotient = cell.contains('/') && !cell.contains(char::is_whitespace) && !names_quantity(cell);
+        is_quotient && !is_missing_mark(cell) && cells().count() > 1
+    };
+    let units = cells().filter(|cell| is_unit(cell) || has_form(cell)).count();
+    units > cells().filter(is_name).count() && !cells().any(is_number)
 }
 
 /// The unit with this symbol; ratios also have the unit `1`.

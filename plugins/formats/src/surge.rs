@@ -32,7 +32,7 @@ fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
     let header = format!(
         "{}\
          # surge-side ends of the speed lines; one standard error each, the flow meter's gain apart (common)\n\
-         # closest_flow: smallest that was measured; found_by: precursor (variation carried on) or surge\n",
+         # closest_flow: smallest that was measured; found_by: precursor (variation carried on), surge or file\n",
         heading(map, "#")
     );
     write_table(FORMAT.name, header, columns(), &map.surge)
@@ -42,5 +42,6 @@ fn found_by(mark: &SurgeMark) -> &'static str {
     match mark.found_by {
         SurgeFoundBy::Precursor => "precursor",
         SurgeFoundBy::Surge => "surge",
+        SurgeFoundBy::File => "file",
     }
 }

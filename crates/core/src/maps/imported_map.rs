@@ -141,6 +141,14 @@ pub enum ImportRemark {
     DesignSpeed { rpm: f64 },
     /// Extrapolated nodes of the fitted map were ignored.
     ExtrapolatedNodes { count: usize },
+    /// The file has a surge line of so many points.
+    SurgeLine { points: usize },
+    /// The rows below a title, or a sheet, are not used.
+    UnusedBlock { title: String, rows: usize },
+    /// Rows at standstill were left out.
+    Standstill { rows: Vec<usize> },
+    /// Points were moved to the mean speed of their line by similarity; largest difference in speed, as a ratio.
+    MovedToLineSpeed { points: usize, max_ratio: f64 },
 }
 
 /// Statements about a map file. Data that are not stated must be in the file.

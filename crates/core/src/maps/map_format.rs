@@ -237,6 +237,10 @@ impl ExportError {
     }
 }
 
+fn quoted_or_missing(text: &str) -> String {
+    if text.is_empty() { "missing".to_owned() } else { format!("`{text}`") }
+}
+
 /// Reason why a file is not a map.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages describe the variants")]
@@ -314,7 +318,12 @@ pub enum ImportError {
          headings; otherwise write their units there"
     )]
     Exchanged { line: usize, flow_corrected_kg_s: f64, pressure_ratio: f64 },
-    #[error("line {line}: the {quantity} is `{text}`, not a number")]
+    #[error(
+        "line {line}: as at {points} of {of} points, {problem}, so these are not the readings of a compressor; name its columns, e.g. `p1=#5`, \
+         or read the file as a turbine map"
+    )]
+    NotACompressor { line: usize, points: usize, of: usize, problem: &'static str },
+    #[error("line {line}: the {quantity} is {}, not a number", quoted_or_missing(text))]
     NotANumber { line: usize, quantity: String, text: String },
     #[error("line {line}: {quantity} = {value} is not possible; it must be {needed}")]
     Value { line: usize, quantity: &'static str, value: f64, needed: &'static str },

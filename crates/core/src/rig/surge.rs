@@ -50,6 +50,8 @@ pub enum SurgeFoundBy {
     Precursor,
     /// The compressor went into surge: the flow lies between the last opening without surge and the one that surged.
     Surge,
+    /// The surge line of a map file, without standard errors.
+    File,
 }
 
 /// The surge-side end of a speed line, with one standard error of each of its values.

@@ -193,9 +193,7 @@ fn judge_residual(view: &View<'_>, dt2_k: Option<f64>, findings: &mut Findings) 
     let (fit, noise_k) = (view.fit, view.noise_k);
     let limits = &view.config.thresholds;
     let dt2_k = dt2_k.unwrap_or(0.0);
-    if fit.eta > 1.0 {
-        findings.refuse(Warning::PoorFit(PoorFit::Eta { eta: fit.eta }));
-    }
+    findings.refuse_impossible(fit.eta);
     let (rms_k, slow_k) = (fit.residual_rms_k(), slow_rms_k(fit, view.samples));
     // Three standard deviations of the noise that remains in block means.
     let colour = view.config.noise();

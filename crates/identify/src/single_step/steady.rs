@@ -68,6 +68,7 @@ pub(crate) fn estimate(
         }));
         return estimate;
     }
+    findings.refuse_impossible(eta);
     let (mut uncertainty, common) = uncertainty(&means, &samples, config);
     // The drift is not linear, so the correction may be wrong by its own size.
     let lag_eta = eta * lag_k / (means.t2_k - means.t1_k);

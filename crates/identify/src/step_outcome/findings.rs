@@ -1,7 +1,7 @@
 //! Collects the warnings and remarks about a point.
 
 use crate::IdentifyConfig;
-use mapper_core::{Verdict, Warning};
+use mapper_core::{PoorFit, Verdict, Warning};
 
 /// Warnings with the resulting verdict.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,6 +52,13 @@ impl Findings {
     pub(crate) fn doubt_first(&mut self, warning: Warning) {
         self.warn(0, warning);
         self.verdict = self.verdict.doubted();
+    }
+
+    /// Refuses an efficiency above that of an ideal compression.
+    pub(crate) fn refuse_impossible(&mut self, eta: f64) {
+        if eta > 1.0 {
+            self.refuse(Warning::PoorFit(PoorFit::Eta { eta }));
+        }
     }
 
     pub(crate) fn refuse(&mut self, warning: Warning) {

@@ -1,14 +1,14 @@
 //! Reads a table of map points: headings of several languages in any order, units in or below the heading, a preamble, a speed only in the
 //! first row of its line, one block per speed or side by side, measured points that are not corrected yet.
 
-use crate::table::columns::column::Machine;
+use crate::table::columns::column::{Column, Machine};
 use crate::table::columns::described_columns::DescribedColumns;
 use crate::table::columns::quantity::Quantity;
 use crate::table::efficiency_comment::efficiency_in_comment;
 use crate::table::gas_turbine::beta_tables::{read_arrays, read_gsp, read_modelica, read_nested};
 use crate::table::gas_turbine::design_point::{MapDesign, scale_to_design};
 use crate::table::reference;
-use crate::table::rows_to_lines::{Row, map_of_rows};
+use crate::table::rows_to_lines::{Row, map_of_rows, shift_remark, surge_marks};
 use crate::table::sheet::grid::{Grid, text_of};
 use crate::table::sheet::layout::{self, Layout};
 use crate::table::sheet::matrices::points_of_matrices;
@@ -16,8 +16,8 @@ use crate::table::sheet::points::{Point, columns, efficiency_in_percent, points}
 use crate::table::sheet::workbook::grid_of_workbook;
 use mapper_core::unit_factors::PERCENT;
 use mapper_core::{
-    CompressorMap, EfficiencyDefinition, ImportError, ImportRemark, ImportedMap, MapDescription,
-    MeasuredPoint, ReferenceState, StaticTaps, TurbineReadings,
+    EfficiencyDefinition, ImportError, ImportRemark, ImportedMap, MapDescription, MeasuredPoint,
+    NoCompression, ReferenceState, StaticTaps, TurbineReadings, Warning,
 };
 use mapper_physics::gas::air::{Air, humidity_kg_kg};
 use mapper_physics::gas::mixture::Gas;
@@ -98,13 +98,18 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedMap, Import
         let text = heading.map(|row| row.text().chars().take(60).collect()).unwrap_or_default();
         return Err(ImportError::Turbine { line: heading.map_or(1, |row| row.at), text });
     }
+    check_units_of_flow(grid, &layout)?;
     let notes = read_notes(grid, layout.first_row);
     let mut remarks = layout.remarks.clone();
     let mut reference = reference::resolve_reference(notes.reference, description.reference);
-    if layout.needs_no_reference() && matches!(reference, Err(ImportError::NoReference)) {
-        // Reduced quantities can be corrected to any state.
+    // Reduced quantities and readings can be corrected to any state.
+    if (layout.needs_no_reference() || layout.is_measured())
+        && matches!(reference, Err(ImportError::NoReference))
+    {
         reference = Ok(ReferenceState::SAE);
-        remarks.push(ImportRemark::ReducedQuantities { reference: ReferenceState::SAE });
+        if !layout.is_measured() {
+            remarks.push(ImportRemark::ReducedQuantities { reference: ReferenceState::SAE });
+        }
     }
     let reference = reference?;
     let points = points(grid, &described, &layout, &mut remarks)?;
@@ -123,26 +128,112 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedMap, Import
             problem: "but the table has no P1 and P2; leave them out".to_owned(),
         });
     }
-    let (mut rows, mut measured) = (Vec::with_capacity(points.len()), Vec::new());
+    let (mut rows, mut surge, mut measured, mut at_rest) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let standstill_rpm = standstill_rpm(&points, reference);
     for point in &points {
         let mut row = row(point, &layout, reference, in_percent)?;
+        if row.speed_corrected_rpm < standstill_rpm {
+            at_rest.push(row.at);
+            continue;
+        }
         if layout.is_measured() {
             let readings = measured_point(point, &row, reference, description)?;
             correct(&mut row, &readings, reference);
-            measured.push(readings);
+            measured.extend((!point.is_of_surge_line).then_some(readings));
         }
-        rows.push(row);
+        if point.is_of_surge_line { &mut surge } else { &mut rows }.push(row);
     }
+    if !at_rest.is_empty() {
+        remarks.push(ImportRemark::Standstill { rows: at_rest });
+    }
+    check_is_compressor(&measured)?;
     check_unit_of_efficiency(&layout, &rows)?;
+    // One scale for points and surge line.
+    let point_count = rows.len();
+    rows.append(&mut surge);
     scale_to_design(&mut rows, MapDesign::default(), description.design, &mut remarks)?;
     rows.iter().try_for_each(Row::check)?;
+    let surge = rows.split_off(point_count);
     if rows.iter().all(|row| row.eta.is_none()) {
         remarks.push(ImportRemark::NoEfficiency);
     }
-    let map = map_of_rows(notes.machine, &rows, Some(reference), None)?;
-    let efficiency =
+    let mut map = map_of_rows(notes.machine, &rows, Some(reference), None)?;
+    map.surge = surge_marks(&map, &surge);
+    for point in map.lines.iter_mut().flat_map(|line| &mut line.points).map(|point| &mut point.identified) {
+        // A rise below zero has no efficiency.
+        let readings = measured.get(point.step).filter(|_| point.eta.is_none());
+        point.warnings.extend(readings.map(|readings| no_efficiency(readings)));
+    }
+    remarks.extend(shift_remark(&map));
+    map.efficiency =
         if layout.is_measured() { Some(EfficiencyDefinition::Enthalpy) } else { notes.efficiency };
-    Ok(ImportedMap { map: CompressorMap { efficiency, ..map }, columns, remarks, measured })
+    Ok(ImportedMap { map, columns, remarks, measured })
+}
+
+/// Refuses a volume flow or flow parameter without a unit: their usual units differ by more than maps do, so the size does not reveal them.
+pub(super) fn check_units_of_flow(grid: &Grid, layout: &Layout) -> Result<(), ImportError> {
+    let mut columns = layout.groups.iter().flat_map(|group| &group.columns);
+    let is_open = |column: &&Column| {
+        // SAE's MFP is in kg K^0.5/(s kPa).
+        let has_open_unit = match column.quantity {
+            Quantity::ReducedFlow => !column.heading.eq_ignore_ascii_case("mfp"),
+            quantity => quantity == Quantity::VolumeFlow,
+        };
+        has_open_unit && !column.has_unit()
+    };
+    let Some(column) = columns.find(is_open) else { return Ok(()) };
+    let line = layout.first_row.checked_sub(1).and_then(|row| grid.rows.get(row)).map_or(1, |row| row.at);
+    let (key, example) = match column.quantity {
+        Quantity::ReducedFlow => (Quantity::ReducedFlow.key(), "kg/s*K^0.5/kPa"),
+        // `Q` is often a mass flow.
+        _ if column.heading.chars().count() == 1 => (Quantity::Flow.key(), "kg/s"),
+        _ => (Quantity::VolumeFlow.key(), "m3/h"),
+    };
+    Err(ImportError::NoUnit { line, heading: column.heading.clone(), key, example })
+}
+
+/// Why a measured point has no efficiency.
+fn no_efficiency(point: &MeasuredPoint) -> Warning {
+    Warning::NoCompression(point.t2_k.map_or(NoCompression::NoT2, |t2_k| NoCompression::NoRise {
+        rise_k: t2_k - point.t1_k,
+        pressure_ratio: point.p2_pa / point.p1_pa,
+    }))
+}
+
+/// Maximum inlet temperature of a compressor, K. Bound: air that a stage before it has compressed to twice the pressure without a cooler.
+const MAX_INLET_K: f64 = 400.0;
+
+/// Refuses a table whose compressor expands or draws in exhaust gas: its columns are another machine's.
+fn check_is_compressor(measured: &[MeasuredPoint]) -> Result<(), ImportError> {
+    let expands: fn(&&MeasuredPoint) -> bool = |point| point.p2_pa < point.p1_pa;
+    let is_hot: fn(&&MeasuredPoint) -> bool = |point| point.t1_k > MAX_INLET_K;
+    for (is_wrong, problem) in [(expands, "P2 is below P1"), (is_hot, "T1 is that of exhaust gas")] {
+        let points = measured.iter().filter(is_wrong).count();
+        let first = measured.iter().find(is_wrong).filter(|_| 2 * points > measured.len());
+        if let Some(first) = first {
+            return Err(ImportError::NotACompressor {
+                line: first.line,
+                points,
+                of: measured.len(),
+                problem,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Maximum speed at standstill as a ratio of the fastest. Judgement: no compressor is measured at a hundredth of its speed.
+const STANDSTILL_RATIO: f64 = 0.01;
+
+/// The speed below which a row is at standstill.
+fn standstill_rpm(points: &[Point<'_>], reference: ReferenceState) -> f64 {
+    STANDSTILL_RATIO * points.iter().filter_map(|point| speed_of(point, reference)).fold(0.0, f64::max)
+}
+
+/// The speed of a point, rpm, as its column or its block has it.
+fn speed_of(point: &Point<'_>, reference: ReferenceState) -> Option<f64> {
+    let mut own = [Quantity::Speed, Quantity::ReducedSpeed].into_iter();
+    own.find_map(|quantity| point.value(quantity, reference)).or(point.speed)
 }
 
 /// Maximum efficiency of fractions below a heading in %. Bound: 1 is the maximum of a fraction, and usable points have more than 1.5 %.
@@ -182,11 +273,10 @@ fn row(
 ) -> Result<Row, ImportError> {
     let any =
         |quantities: &[Quantity]| quantities.iter().find_map(|quantity| point.value(*quantity, reference));
-    let own_speed = any(&[Quantity::Speed, Quantity::ReducedSpeed]);
     let flow = any(&[Quantity::Flow, Quantity::VolumeFlow, Quantity::ReducedFlow]);
     Ok(Row {
         at: point.at,
-        speed_corrected_rpm: require(point, Quantity::Speed, own_speed.or(point.speed))?,
+        speed_corrected_rpm: require(point, Quantity::Speed, speed_of(point, reference))?,
         flow_corrected_kg_s: require(point, Quantity::Flow, flow)?,
         pressure_ratio: if layout.is_measured() {
             f64::NAN

@@ -1,9 +1,9 @@
 //! Reads a turbine map from a table of points, in all layouts of compressor maps.
 
-use crate::table::columns::column::{Column, Machine};
+use crate::table::columns::column::Machine;
 use crate::table::columns::described_columns::DescribedColumns;
 use crate::table::columns::quantity::Quantity;
-use crate::table::read::{pressure_pa, read_notes, require};
+use crate::table::read::{check_units_of_flow, pressure_pa, read_notes, require};
 use crate::table::reference;
 use crate::table::rows_to_lines::{ETA_RANGE, MAX_PRESSURE_RATIO};
 use crate::table::sheet::grid::Grid;
@@ -49,13 +49,7 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedTurbine, Im
     let notes = read_notes(grid, layout.first_row);
     let mut remarks = layout.remarks.clone();
     let all = || layout.groups.iter().flat_map(|group| &group.columns);
-    let line = layout.first_row.checked_sub(1).and_then(|row| grid.rows.get(row)).map_or(1, |row| row.at);
-    let without_unit = |quantity: Quantity| all().find(|c| c.quantity == quantity && !c.has_unit());
-    // Flow parameters of turbines vary by more than the factors between MPa, bar and kPa, so the size does not reveal the unit.
-    if let Some(column) = without_unit(Quantity::ReducedFlow).filter(|column| !is_sae(column)) {
-        let (heading, key) = (column.heading.clone(), Quantity::ReducedFlow.key());
-        return Err(ImportError::NoUnit { line, heading, key, example: "kg/s*K^0.5/kPa" });
-    }
+    check_units_of_flow(grid, &layout)?;
     if all().any(|column| is_flow(column.quantity) && !column.has_unit()) {
         remarks.push(ImportRemark::FlowUnitAssumed);
     }
@@ -106,11 +100,6 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedTurbine, Im
         remarks,
         measured,
     })
-}
-
-/// Whether a column has SAE's flow parameter MFP, which is in kg K^0.5/(s kPa).
-fn is_sae(column: &Column) -> bool {
-    column.heading.eq_ignore_ascii_case("mfp")
 }
 
 /// The speed of a point in the unit of its column, or of its block.

@@ -3,7 +3,8 @@
 use crate::assemble::{line, move_to_speed};
 use crate::table::reference;
 use mapper_core::{
-    CommonErrors, CompressorMap, IdentifiedPoint, ImportError, Method, ReferenceState, StepKind, Verdict,
+    CommonErrors, CompressorMap, IdentifiedPoint, ImportError, ImportRemark, Method, PoorFit, ReferenceState,
+    StepKind, SurgeFoundBy, SurgeMark, Verdict, Warning,
 };
 use mapper_numerics::statistics::range;
 use mapper_physics::compressor_map::characteristic::{MIN_TOP_SPEED_RPM, max_flow_kg_s};
@@ -99,6 +100,7 @@ impl Row {
 
     /// A point with only the values of its row. Physical values are those at the reference state.
     pub fn point(&self, reference: ReferenceState, step: usize) -> IdentifiedPoint {
+        let impossible = self.eta.filter(|eta| *eta > 1.0).map(|eta| Warning::PoorFit(PoorFit::Eta { eta }));
         IdentifiedPoint {
             step,
             kind: StepKind::Point,
@@ -122,8 +124,12 @@ impl Row {
             h_uncertainty: None,
             common: CommonErrors::default(),
             method: Method::Imported,
-            verdict: if self.eta.is_some() { Verdict::Good } else { Verdict::Unusable },
-            warnings: Vec::new(),
+            verdict: if impossible.is_none() && self.eta.is_some() {
+                Verdict::Good
+            } else {
+                Verdict::Unusable
+            },
+            warnings: impossible.into_iter().collect(),
             window: None,
             residual_rms_k: None,
             dt2_k: None,
@@ -175,6 +181,49 @@ pub fn map_of_rows(
         surge: Vec::new(),
         fitted: None,
     })
+}
+
+/// The surge line of a file, without standard errors.
+pub(crate) fn surge_marks(map: &CompressorMap, rows: &[Row]) -> Vec<SurgeMark> {
+    let mark = |row: &Row| {
+        let difference = |speed_rpm: f64| (speed_rpm - row.speed_corrected_rpm).abs();
+        let line = map
+            .lines
+            .iter()
+            .min_by(|a, b| difference(a.speed_corrected_rpm).total_cmp(&difference(b.speed_corrected_rpm)));
+        let points = line.iter().flat_map(|line| &line.points);
+        let closest = points.map(|point| point.flow_corrected_kg_s).min_by(f64::total_cmp);
+        SurgeMark {
+            target_speed_rpm: row.speed_corrected_rpm,
+            speed_corrected_rpm: row.speed_corrected_rpm,
+            flow_corrected_kg_s: row.flow_corrected_kg_s,
+            flow_standard_error_kg_s: 0.0,
+            flow_common_standard_error_kg_s: 0.0,
+            pressure_ratio: row.pressure_ratio,
+            pressure_ratio_standard_error: 0.0,
+            closest_flow_corrected_kg_s: closest.unwrap_or(row.flow_corrected_kg_s),
+            closest_end_s: 0.0,
+            found_by: SurgeFoundBy::File,
+            steps: 0,
+        }
+    };
+    let mut marks: Vec<SurgeMark> = rows.iter().map(mark).collect();
+    marks.sort_by(|a, b| a.speed_corrected_rpm.total_cmp(&b.speed_corrected_rpm));
+    marks
+}
+
+/// Minimum change of speed that is reported. Judgement: speed control and the rounding of a file leave less.
+const MIN_REPORTED_SHIFT_RATIO: f64 = 0.005;
+
+/// A remark if points were moved to the speed of their line.
+pub fn shift_remark(map: &CompressorMap) -> Option<ImportRemark> {
+    let shifts = map.lines.iter().flat_map(|line| line.points.iter().map(move |point| (line, point)));
+    let ratios: Vec<f64> = shifts
+        .filter_map(|(line, point)| Some(point.shift?.speed_corrected_rpm.abs() / line.speed_corrected_rpm))
+        .filter(|ratio| *ratio >= MIN_REPORTED_SHIFT_RATIO)
+        .collect();
+    let max_ratio = ratios.iter().copied().max_by(f64::total_cmp)?;
+    Some(ImportRemark::MovedToLineSpeed { points: ratios.len(), max_ratio })
 }
 
 /// Refuses a file with too many rows.

@@ -1,5 +1,7 @@
 //! Integration tests of the module `table`.
 
+mod end_blocks;
 mod matrices;
+mod units_and_machines;
 mod wide;
 mod workbooks;

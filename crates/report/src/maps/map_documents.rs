@@ -3,6 +3,8 @@
 use crate::document::{Describe, Document, Table};
 use crate::formatting::{number, range_text};
 use crate::message::Message;
+use crate::point_results::point_warnings::reasons;
+use crate::point_results::points::verdict_sentence;
 use mapper_core::{
     CompressorMap, EndEvidence, EstimateUncertainty, FittedLine, FittedMap, FittedTurbine, ImportRemark,
     ImportedColumn, ImportedMap, ImportedTurbine, LeftOutLine, MapPoint, PointBudgets, TurbineMap,
@@ -39,8 +41,19 @@ impl Describe for ImportedMap {
             Some(definition) => format!("Efficiency: {}.", definition.description()),
             None => "The file does not name the definition of its efficiency.".to_owned(),
         });
+        add_verdicts(&mut document, map);
         self.remarks.iter().for_each(|remark| document.text(remark.message()));
         document
+    }
+}
+
+/// Adds how many points are good, and why the others are not.
+fn add_verdicts(document: &mut Document, map: &CompressorMap) {
+    let points = || map.lines.iter().flat_map(|line| &line.points).map(|point| &point.identified);
+    let reasons = reasons(points());
+    if !reasons.is_empty() {
+        document.text(verdict_sentence(points()));
+        reasons.into_iter().for_each(|reason| document.text(reason));
     }
 }
 
@@ -105,6 +118,20 @@ impl Message for ImportRemark {
             ImportRemark::ExtrapolatedNodes { count } => {
                 format!("{count} extrapolated nodes of a fitted map were omitted.")
             }
+            ImportRemark::SurgeLine { points } => {
+                format!("The file has a surge line of {points} points; it is that of the map.")
+            }
+            ImportRemark::UnusedBlock { title, rows } => {
+                format!("Not used: `{title}` with {rows} rows, which are not points of speed lines.")
+            }
+            ImportRemark::Standstill { rows } => {
+                let rows: Vec<String> = rows.iter().map(ToString::to_string).collect();
+                format!("The shaft is at standstill in line {}, which is left out.", rows.join(", "))
+            }
+            ImportRemark::MovedToLineSpeed { points, max_ratio } => format!(
+                "{points} points were moved to the mean speed of their line by similarity, at most by {:.1} % of speed.",
+                100.0 * max_ratio
+            ),
         }
     }
 }
@@ -292,6 +319,7 @@ pub fn reduced_map(
     let mut document = Document::default();
     document.table(lines);
     document.text(format!("Corrected to {}.", map.reference));
+    add_verdicts(&mut document, map);
     document.table(sources(budgets));
     remarks.iter().for_each(|remark| document.text(remark));
     document

@@ -2,7 +2,7 @@
 
 use crate::document::Sentence;
 use crate::point_results::warning_text::sentence_of;
-use mapper_core::{IdentifiedPoint, step_number};
+use mapper_core::{IdentifiedPoint, Verdict, step_number};
 
 /// A sentence, and the steps that it applies to.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,6 +33,25 @@ pub fn doubts<'a>(points: impl Iterator<Item = &'a IdentifiedPoint>) -> Vec<Doub
         }
     }
     merged
+}
+
+/// For each reason why points are not good, the steps and a sentence.
+pub(crate) fn reasons<'a>(points: impl Iterator<Item = &'a IdentifiedPoint>) -> Vec<String> {
+    let all: Vec<&IdentifiedPoint> = points.collect();
+    let first_only: Vec<IdentifiedPoint> = all
+        .iter()
+        .filter(|point| point.verdict != Verdict::Good)
+        .map(|point| IdentifiedPoint {
+            warnings: point.warnings.iter().take(1).cloned().collect(),
+            ..(*point).clone()
+        })
+        .collect();
+    let named = |doubt: &Doubt<'_>| {
+        let is_of_all = doubt.count() == all.len() && all.len() > 1;
+        let steps = if is_of_all { "all steps".to_owned() } else { doubt.steps() };
+        format!("{steps}: {}", doubt.message())
+    };
+    doubts(first_only.iter()).iter().map(named).collect()
 }
 
 impl Doubt<'_> {

@@ -4,7 +4,7 @@ use crate::document::{Describe, Document};
 use crate::formatting::{Display, percent};
 use crate::message::Message;
 use crate::point_results::agreement::{disagreement_text, shared_errors_text};
-use crate::point_results::point_warnings::{Doubt, doubts};
+use crate::point_results::point_warnings::{doubts, reasons};
 use crate::point_results::points::{allowance_sentence, points_by_line, verdict_sentence, wide_table};
 use crate::test_report::surge_text::{SurgeReport, surge_section};
 use crate::test_report::zero_and_sensors::zero_section;
@@ -49,7 +49,7 @@ impl<'a> PointResults<'a> {
         let mut document = Document::default();
         document.text(disagreement_text(self.points, self.dynamic, display).unwrap_or_default());
         document.append(points_by_line(self.points, self.map, display, truth));
-        self.first_doubts().into_iter().for_each(|doubt| document.text(doubt));
+        reasons(self.identified()).into_iter().for_each(|doubt| document.text(doubt));
         if let Some(score) = summarise(self.points).filter(|_| truth) {
             score_sentences(&score).into_iter().for_each(|sentence| document.text(sentence));
         }
@@ -122,24 +122,6 @@ impl<'a> PointResults<'a> {
         let mut document = Document::default();
         document.section("Verdict", body);
         document
-    }
-
-    /// Why points are not good: the first reason of each point, a sentence each. A reason that several points share is given once.
-    fn first_doubts(&self) -> Vec<String> {
-        let first_only: Vec<IdentifiedPoint> = self
-            .identified()
-            .filter(|point| point.verdict != Verdict::Good)
-            .map(|point| IdentifiedPoint {
-                warnings: point.warnings.iter().take(1).cloned().collect(),
-                ..point.clone()
-            })
-            .collect();
-        let named = |doubt: &Doubt<'_>| {
-            let all = doubt.count() == self.points.len() && self.points.len() > 1;
-            let steps = if all { "all steps".to_owned() } else { doubt.steps() };
-            format!("{steps}: {}", doubt.message())
-        };
-        doubts(first_only.iter()).iter().map(named).collect()
     }
 }
 

@@ -492,7 +492,7 @@ fn no_compression(reason: &NoCompression) -> Sentence {
 fn poor_fit(evidence: &PoorFit) -> Sentence {
     match evidence {
         PoorFit::Eta { eta } => sentence!(
-            "the fitted efficiency is {}, which no compressor has: an unmodelled effect acts",
+            "the efficiency is {}, which no compressor has: look for a fault of T2 or P2, for cooling, or for another unmodelled effect",
             number(*eta, 3)
         ),
         PoorFit::NoiseRatio { residual_ratio } => sentence!(

@@ -88,5 +88,6 @@ fn evidence_name(mark: &SurgeMark) -> &'static str {
     match mark.found_by {
         SurgeFoundBy::Precursor => "variation",
         SurgeFoundBy::Surge => "surge",
+        SurgeFoundBy::File => "file",
     }
 }

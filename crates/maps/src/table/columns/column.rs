@@ -1,7 +1,7 @@
 //! Quantity and unit of a table column, from its heading.
 
 use crate::table::columns::quantity::Quantity;
-use crate::table::columns::quantity_name::{is_turbine, quantity_of_name};
+use crate::table::columns::quantity_name::{end_in, is_turbine, quantity_of_name};
 use mapper_core::ReferenceState;
 use mapper_core::unit_factors::{G_PER_KG, PA_PER_KPA, PERCENT};
 use mapper_physics::gas::air::GAS_CONSTANT_J_KGK;
@@ -10,6 +10,9 @@ use mapper_table::{
     volume_flow_m3_s,
 };
 use mapper_yaml::units::{Kind, Unit};
+
+/// Maximum number of letters of a heading that is kept. Bound: a line of a message.
+pub(crate) const MAX_HEADING: usize = 60;
 
 /// A column with its unit.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,7 +53,7 @@ impl Column {
         heading: &str,
         unit: Option<&str>,
     ) -> Result<Column, ColumnError> {
-        let heading: String = heading.chars().take(60).collect();
+        let heading: String = heading.chars().take(MAX_HEADING).collect();
         let Some(text) = unit.filter(|unit| !is_dimensionless(unit)) else {
             return Ok(Column { heading, ..Column::bare(index, quantity) });
         };
@@ -60,6 +63,7 @@ impl Column {
         match gauge.map(|found| Scale::Unit(found.unit)).or_else(|| scale(quantity, text)) {
             Some(scale) => Ok(Column { index, quantity, heading, unit: text.to_owned(), is_gauge, scale }),
             None => Err(ColumnError::Unit {
+                quantity,
                 heading,
                 unit: text.chars().take(40).collect(),
                 kind: quantity.kind().name(),
@@ -98,18 +102,6 @@ impl Column {
         ColumnName::read(&parts(&self.heading).0).has(Word::Static)
     }
 
-    /// Whether the heading names the compressor.
-    pub(crate) fn is_of_compressor(&self) -> bool {
-        ColumnName::read(&parts(&self.heading).0).is_of_compressor()
-    }
-
-    /// Whether the name has a `T` after its first letter, for total or for the turbine: `P1T`, `PT1`.
-    pub(crate) fn has_letter_t(&self) -> bool {
-        let (name, _) = parts(&self.heading);
-        let letters: Vec<char> = name.chars().filter(|letter| letter.is_alphanumeric()).collect();
-        letters.len() <= 4 && letters.iter().skip(1).any(|letter| letter.eq_ignore_ascii_case(&'t'))
-    }
-
     /// Whether the heading names a corrected quantity.
     pub(crate) fn is_corrected(&self) -> bool {
         ColumnName::read(&parts(&self.heading).0).has(Word::Corrected)
@@ -127,7 +119,7 @@ pub(crate) enum ColumnError {
     #[error(
         "the heading `{heading}` has the unit `{unit}`, which is not a unit of {kind}; write one of {known}"
     )]
-    Unit { heading: String, unit: String, kind: &'static str, known: String },
+    Unit { quantity: Quantity, heading: String, unit: String, kind: &'static str, known: String },
     #[error("the heading `{heading}` belongs to a turbine map")]
     Turbine { heading: String },
 }
@@ -147,6 +139,10 @@ pub(crate) fn column(index: usize, heading: &str, machine: Machine) -> Result<Op
         name.to_lowercase().chars().filter(|c| c.is_alphanumeric() || "/√η^.".contains(*c)).collect();
     if machine == Machine::Compressor && is_turbine(&plain) {
         return Err(ColumnError::Turbine { heading: heading.chars().take(60).collect() });
+    }
+    // `Surge PR` is a point of the surge line.
+    if end_in(&name).is_some() {
+        return Ok(None);
     }
     // `flow_low` is an end of an interval.
     let words = name.to_lowercase();
@@ -308,4 +304,40 @@ fn unit_of(kind: Kind, text: &str) -> Option<&'static Unit> {
         let found = header_unit(text)?;
         (found.kind == kind && found.reference != Reference::Gauge).then_some(found.unit)
     })
+}
+
+/// The headings with the letter of their machine in the place where names have it, if some have the compressor's (`P1C`, `PC1`, `TC_in`) and
+/// some the turbine's: `P1T` and `PT1`, which are total values elsewhere, become `P_t1`.
+pub(crate) fn with_machine_letters(headings: &[String]) -> Vec<String> {
+    let split = |heading: &String| {
+        let (name, unit) = parts(heading);
+        let letters: Vec<char> = name.to_lowercase().chars().filter(|c| c.is_alphanumeric()).collect();
+        let rest = |at: usize| letters.get(at..).unwrap_or_default().iter().collect::<String>();
+        let is_place = |rest: &str| matches!(rest, "1" | "2" | "01" | "02" | "in" | "out");
+        let (quantity, (machine, place)) = match letters.as_slice() {
+            [quantity, machine, ..] if is_place(&rest(2)) => (*quantity, (*machine, rest(2))),
+            // `PT1C` is total too.
+            [quantity, 't', place @ .., machine] | [quantity, place @ .., machine] => {
+                (*quantity, (*machine, place.iter().collect()))
+            }
+            _ => return None,
+        };
+        let is_known =
+            matches!(quantity, 'p' | 't') && matches!(machine, 'c' | 'v' | 't') && is_place(&place);
+        let place = place.trim_start_matches('0').to_owned();
+        is_known.then_some((quantity, machine == 't', place, unit))
+    };
+    let found: Vec<_> = headings.iter().map(split).collect();
+    let has = |of_turbine: bool| found.iter().flatten().any(|(_, turbine, ..)| *turbine == of_turbine);
+    if !(has(true) && has(false)) {
+        return headings.to_vec();
+    }
+    let written = headings.iter().zip(&found).map(|(heading, found)| match found {
+        Some((quantity, is_turbine, place, unit)) => {
+            let unit = unit.as_ref().map_or(String::new(), |unit| format!(" [{unit}]"));
+            format!("{quantity}_{}_{place}{unit}", if *is_turbine { "t" } else { "c" })
+        }
+        None => heading.clone(),
+    });
+    written.collect()
 }

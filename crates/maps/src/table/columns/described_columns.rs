@@ -1,6 +1,6 @@
 //! The columns that a map description names.
 
-use crate::table::columns::column::{Column, ColumnError, Machine, column, is_unit, parts};
+use crate::table::columns::column::{Column, ColumnError, MAX_HEADING, Machine, column, is_unit, parts};
 use crate::table::columns::quantity::Quantity;
 use mapper_core::{ImportError, MapDescription};
 
@@ -74,6 +74,16 @@ impl DescribedColumns {
 
     /// The column of a heading: as described, or as its name suggests.
     pub(crate) fn column(&self, index: usize, heading: &str) -> Result<Option<Column>, ColumnError> {
+        self.column_read_as(index, heading, heading)
+    }
+
+    /// As [`DescribedColumns::column`], if the other headings give this one the meaning of another spelling.
+    pub(crate) fn column_read_as(
+        &self,
+        index: usize,
+        heading: &str,
+        spelling: &str,
+    ) -> Result<Option<Column>, ColumnError> {
         let heading_plain = plain(heading);
         let described = self.statements.iter().find(|statement| match &statement.place {
             ColumnPlace::Heading { whole, name } => {
@@ -86,8 +96,13 @@ impl DescribedColumns {
             let unit = statement.unit.clone().or_else(|| parts(heading).1);
             return Column::with_unit(index, statement.quantity, heading, unit.as_deref()).map(Some);
         }
-        let found = column(index, heading, self.machine)?.filter(|found| !self.has_place_for(found.quantity));
-        found.map(|found| self.with_unit(found)).transpose()
+        let found =
+            column(index, spelling, self.machine)?.filter(|found| !self.has_place_for(found.quantity));
+        let written = |mut found: Column| {
+            found.heading = heading.chars().take(MAX_HEADING).collect();
+            self.with_unit(found)
+        };
+        found.map(written).transpose()
     }
 
     /// A column without a unit has the described one.

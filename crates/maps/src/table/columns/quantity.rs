@@ -107,17 +107,6 @@ impl Quantity {
         all.into_iter().find(|(known, _)| *known == channel).map(|(_, quantity)| quantity)
     }
 
-    /// The turbine's quantity with the number of a compressor's: the inlet is 1 on both machines in `P1T` beside `P1C`.
-    pub(crate) fn of_turbine(self) -> Option<Quantity> {
-        match self {
-            Quantity::P1 => Some(Quantity::P3),
-            Quantity::P2 => Some(Quantity::P4),
-            Quantity::T1 => Some(Quantity::T3),
-            Quantity::T2 => Some(Quantity::T4),
-            _ => None,
-        }
-    }
-
     /// Whether a point may be without it.
     pub(crate) fn is_optional(self) -> bool {
         use Quantity::{Ambient, Humidity, Oil, P3, P4, T3, T4, Tc, TurbineFlow};

@@ -1,12 +1,13 @@
 //! The quantity of a heading, from its name and unit.
 
 use crate::table::columns::quantity::Quantity;
+use mapper_core::LineEnd;
 use mapper_table::{ColumnName, Measured, Place, Word, channel_at};
 
 /// Whether a name belongs to a turbine.
 pub(crate) fn is_turbine(plain: &str) -> bool {
     ColumnName::read(plain).has(Word::Expansion)
-        || matches!(plain, "mfp" | "prt" | "etat")
+        || matches!(plain, "mfp" | "prt" | "pit" | "etat")
         || has_root(plain) && ["t3", "t4", "p3", "tt3", "t03"].iter().any(|inlet| plain.contains(inlet))
 }
 
@@ -101,4 +102,34 @@ pub(crate) fn quantity_of_name(
         (Measured::Pressure, Place::Ambient) => Some(Quantity::Ambient),
         (measured, place) => channel_at(measured, place).and_then(Quantity::of_channel),
     }
+}
+
+/// The end of speed lines that a text names, in several languages.
+pub(crate) fn end_in(text: &str) -> Option<LineEnd> {
+    let lower = text.to_lowercase();
+    let has = |words: &[&str]| words.iter().any(|word| lower.contains(word));
+    if has(&["surge", "pump", "pompage", "bombeo", "pompaggio", "помпаж", "喘振", "サージ"]) {
+        return Some(LineEnd::Surge);
+    }
+    has(&["choke", "stopf", "schluck", "blocage", "gavage", "bloqueo"]).then_some(LineEnd::Choke)
+}
+
+/// Maximum number of words of the title of such a block. Bound: `Surge line of the compressor map`; a sentence has more.
+const MAX_TITLE_WORDS: usize = 6;
+
+/// The end that a title names; one that names both is about the order of points.
+pub(crate) fn end_of_title(text: &str) -> Option<LineEnd> {
+    let mut ends = text.split(|c: char| !c.is_alphanumeric()).filter_map(end_in);
+    let end = ends.next()?;
+    let is_title = text.split_whitespace().count() <= MAX_TITLE_WORDS && ends.all(|other| other == end);
+    is_title.then_some(end)
+}
+
+/// Maximum number of words of the title of a block above the table. Bound: `Surge line:`; the title of a map has more.
+const MAX_WORDS_ABOVE: usize = 3;
+
+/// Whether a title is that of an end alone, and not of a map.
+pub(crate) fn is_end_title(text: &str) -> bool {
+    let is_short = text.split_whitespace().count() <= MAX_WORDS_ABOVE;
+    is_short && !text.contains(char::is_numeric) && end_of_title(text).is_some()
 }

@@ -1,6 +1,8 @@
 //! Text of a map file that may be compressed or a workbook.
 
-use crate::table::sheet::grid::text_of;
+use crate::table::columns::quantity_name::end_in;
+use crate::table::sheet::grid::{Grid, text_of};
+use crate::table::sheet::speed_heading::without_speed;
 use crate::table::sheet::workbook::grid_of_workbook;
 use mapper_core::{ImportError, MAP_FILE_SIZE_LIMIT};
 use mapper_table::is_workbook;
@@ -14,6 +16,38 @@ use std::io::Read;
 pub fn file_text(bytes: &[u8]) -> Result<String, ImportError> {
     let bytes = unpack(bytes)?;
     if is_workbook(&bytes) { Ok(grid_of_workbook(&bytes, None)?.csv()) } else { text_of(&bytes) }
+}
+
+/// One text of files with a speed line each, named after its speed or as the surge line (`45000.csv`, `surge.csv`), as digitisers write them.
+///
+/// # Errors
+/// [`ImportError`] for other names, and for files that are not text.
+pub fn text_of_lines(files: &[(String, Vec<u8>)]) -> Result<String, ImportError> {
+    let mut lines: Vec<(f64, String)> = Vec::new();
+    for (name, bytes) in files {
+        let mut grid = Grid::of_text(&text_of(&unpack(bytes)?)?)?;
+        grid.rows.retain(|row| !row.is_comment);
+        let (speed_rpm, title) = match without_speed(&grid, name) {
+            Some((_, speed_rpm)) => (speed_rpm, format!("{speed_rpm} rpm")),
+            None if end_in(name).is_some() => (f64::INFINITY, name.clone()),
+            None => {
+                let form = "the speed of a line, as in `45000.csv`, or `surge.csv`";
+                return Err(ImportError::RowForm { line: 1, text: name.clone(), form });
+            }
+        };
+        let has_heading =
+            grid.rows.iter().any(|row| row.cells.iter().any(|c| c.contains(char::is_alphabetic)));
+        let width = grid.rows.iter().map(|row| row.cells.len()).max().unwrap_or_default();
+        // `Q` is a flow without a unit, which the user has to state.
+        let heading = match (has_heading, width) {
+            (true, _) => "",
+            (false, ..=2) => "Q,PR\n",
+            (false, _) => "Q,PR,efficiency\n",
+        };
+        lines.push((speed_rpm, format!("{title}\n{heading}{}", grid.csv())));
+    }
+    lines.sort_by(|a, b| a.0.total_cmp(&b.0));
+    Ok(lines.into_iter().map(|(_, text)| text).collect())
 }
 
 /// Unpacks a gzip file; returns any other content unchanged.

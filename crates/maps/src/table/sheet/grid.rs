@@ -96,7 +96,8 @@ impl Grid {
         let dialect = Dialect { encoding: TextEncoding::UTF_8, mark: 0, separator, decimal: b'.' };
         let is_point = |row: &&Vec<String>| row.len() >= 3 && count_number_cells(row) == row.len();
         let width_of = || sample.iter().find(is_point).map_or_else(|| typical_length(&sample), Vec::len);
-        let width = (separator == b' ').then(width_of);
+        let columns = Some(width_of());
+        let width = columns.filter(|_| separator == b' ');
         let mut rows = Vec::new();
         let mut add = |text: String, is_comment: bool| -> Result<(), ImportError> {
             let text = if separator == b' ' { text.replace('\t', " ") } else { text };
@@ -117,12 +118,18 @@ impl Grid {
         };
         add(content, false)?;
         add(comments, true)?;
-        // `Data: N (rpm), m (kg/s), PR, eta` above cells between blanks.
-        for row in rows.iter_mut().filter(|row| row.is_comment && separator == b' ') {
+        // `Data: N (rpm), m (kg/s), PR, eta` above cells with another separator, and `Units: rpm, kg/s, -, -`.
+        for row in rows.iter_mut() {
             let text = row.text();
-            let list = text.split_once(':').map_or(text.as_str(), |(_, list)| list);
-            if list.matches(',').count() >= 2 {
-                row.cells = list.split(',').map(|name| name.trim().to_owned()).collect();
+            let (title, list) = text.split_once(':').unwrap_or(("", text.as_str()));
+            let is_units =
+                ["unit", "einheit"].iter().any(|word| title.trim().to_lowercase().starts_with(word));
+            let mark = [',', ';', '|'].into_iter().find(|mark| list.matches(*mark).count() >= 2);
+            if let Some(mark) = mark.filter(|mark| separator != *mark as u8 && (row.is_comment || is_units)) {
+                row.cells = list.split(mark).map(|name| name.trim().to_owned()).collect();
+            } else if row.is_comment && separator != b' ' && Some(list.split_whitespace().count()) == columns
+            {
+                row.cells = list.split_whitespace().map(str::to_owned).collect();
             }
         }
         rows.sort_by_key(|row| (row.at, row.is_comment));

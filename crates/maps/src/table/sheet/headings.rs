@@ -4,7 +4,7 @@ use crate::table::columns::column::parts;
 use crate::table::sheet::grid::{Grid, GridRow};
 use crate::table::units_row::merge_units_row;
 use mapper_core::ImportRemark;
-use mapper_table::{ColumnName, Word};
+use mapper_table::{ColumnName, Word, is_unit};
 
 /// A row of headings.
 pub(crate) struct Headings {
@@ -22,10 +22,14 @@ impl Headings {
         let names = above
             .filter(|above| !grid.is_blank_separated && is_row_of_groups(above, row))
             .map_or_else(|| row.cells.clone(), |above| with_groups(&above.cells, &row.cells));
-        let below = grid.rows.get(index + 1);
-        let joined = below.and_then(|below| merge_units_row(&names, &below.cells));
-        let first_row = index + 1 + usize::from(joined.is_some());
-        Headings { cells: joined.unwrap_or_else(|| names.clone()), names, first_row }
+        // Symbols or a comment may be between names and units; in some tables the units come first.
+        let is_number = |cell: &String| grid.number(cell).is_some() && !is_unit(cell);
+        let near = grid.rows.iter().enumerate().skip(index + 1).take(MAX_ROWS_TO_UNITS);
+        let mut near = near.take_while(|(_, row)| !row.cells.iter().any(is_number));
+        let below = near.find_map(|(at, row)| Some((at + 1, merge_units_row(&names, &row.cells)?)));
+        let above = || above.and_then(|row| Some((index + 1, merge_units_row(&names, &row.cells)?)));
+        let (first_row, cells) = below.or_else(above).unwrap_or_else(|| (index + 1, names.clone()));
+        Headings { cells, names, first_row }
     }
 
     /// A remark that names the columns outside `used`, if there are any.
@@ -38,6 +42,8 @@ impl Headings {
     }
 }
 
+/// Rows from names to units. Bound: symbols and a description may be between them.
+const MAX_ROWS_TO_UNITS: usize = 3;
 /// Maximum number of unused columns that a remark names. Bound: a longer list is not read.
 const MAX_NAMED: usize = 20;
 

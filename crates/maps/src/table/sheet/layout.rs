@@ -1,8 +1,9 @@
 //! Detects the layout of a table: its headings, and whether speed lines are below each other or side by side.
 
-use crate::table::columns::column::{Column, ColumnError, Machine, column};
+use crate::table::columns::column::{Column, ColumnError, Machine, column, with_machine_letters};
 use crate::table::columns::described_columns::DescribedColumns;
 use crate::table::columns::quantity::Quantity;
+use crate::table::columns::quantity_name::is_end_title;
 use crate::table::sheet::grid::{Grid, GridRow};
 use crate::table::sheet::headings::Headings;
 use crate::table::sheet::speed_heading::{speed_in, without_speed};
@@ -140,6 +141,13 @@ fn layout(grid: &Grid, described: &DescribedColumns) -> Result<Option<Layout>, I
         if described.machine == Machine::Compressor && is_turbine_title(row) {
             return Err(ImportError::Turbine { line: row.at, text: row.text().chars().take(60).collect() });
         }
+        // A table below the title of the surge line is not the map.
+        let above = index.checked_sub(1).and_then(|above| grid.rows.get(above));
+        if above.is_some_and(|above| {
+            !above.is_comment && is_end_title(&above.text()) && !is_heading(described, above)
+        }) {
+            continue;
+        }
         let headings = Headings::of(grid, index, row);
         if let Some(groups) = side_by_side(grid, described, index, &headings.cells)
             .or_else(|| by_speed(grid, described, index, &headings.cells))
@@ -228,19 +236,23 @@ fn is_turbine_title(row: &GridRow) -> bool {
 
 /// The columns with recognised headings. Of two with the same quantity a map needs the total or corrected one, a table of measured points
 /// the total or measured one; else the first counts.
-fn columns(described: &DescribedColumns, cells: &[String]) -> Result<Vec<Column>, ColumnError> {
-    let mut all: Vec<Column> = Vec::new();
+pub(crate) fn columns(described: &DescribedColumns, cells: &[String]) -> Result<Vec<Column>, ColumnError> {
+    let spellings = with_machine_letters(cells);
+    let (mut all, mut wrong): (Vec<Column>, Vec<ColumnError>) = (Vec::new(), Vec::new());
     for (index, cell) in
         cells.iter().enumerate().filter(|(_, cell)| cell.contains(char::is_alphabetic) || cell.contains('%'))
     {
-        all.extend(described.column(index, cell)?);
+        let spelling = spellings.get(index).unwrap_or(cell);
+        match described.column_read_as(index, cell, spelling) {
+            Ok(column) => all.extend(column),
+            Err(error @ ColumnError::Turbine { .. }) => return Err(error),
+            Err(error) => wrong.push(error),
+        }
     }
-    let of_compressor: Vec<Quantity> =
-        all.iter().filter(|column| column.is_of_compressor()).map(|column| column.quantity).collect();
-    for column in all.iter_mut().filter(|column| !column.is_of_compressor()) {
-        // Beside `P1C` and `PC1`, the letter of `P1T` and `PT1` is the turbine's; alone it stands for a total value.
-        let is_taken = of_compressor.contains(&column.quantity) && column.has_letter_t();
-        column.quantity = column.quantity.of_turbine().filter(|_| is_taken).unwrap_or(column.quantity);
+    // A second column of a quantity is not needed, so its unit may be unknown.
+    let is_missing = |error: &ColumnError| matches!(error, ColumnError::Unit { quantity, .. } if !all.iter().any(|column| column.quantity == *quantity));
+    if let Some(error) = wrong.into_iter().find(is_missing) {
+        return Err(error);
     }
     let is_map = all.iter().any(|column| column.quantity == Quantity::PressureRatio);
     let rank = |column: &Column| (column.is_static(), column.is_corrected() != is_map);
@@ -281,7 +293,8 @@ fn with_heading(
     headings: Headings,
     mut group: Group,
 ) -> Result<Layout, ImportError> {
-    if let Some(below) = grid.rows.get(index + 1).filter(|_| headings.first_row > index + 1) {
+    let units_row = grid.rows.get(headings.first_row.saturating_sub(1));
+    if let Some(below) = units_row.filter(|_| headings.cells != headings.names) {
         group.columns = columns(described, &headings.cells).map_err(|error| column_error(below, error))?;
     }
     let title_above = index

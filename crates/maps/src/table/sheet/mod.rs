@@ -1,5 +1,6 @@
 //! Cells of a map table from text or workbook, its layout, and its points as written.
 
+pub(crate) mod end_blocks;
 pub(crate) mod file_text;
 pub(crate) mod grid;
 pub(crate) mod headings;

@@ -3,7 +3,9 @@
 use crate::table::columns::column::Column;
 use crate::table::columns::described_columns::DescribedColumns;
 use crate::table::columns::quantity::Quantity;
+use crate::table::columns::quantity_name::end_in;
 use crate::table::rows_to_lines::check_point_count;
+use crate::table::sheet::end_blocks::{EndBlocks, RowUse};
 use crate::table::sheet::grid::{Grid, GridRow};
 use crate::table::sheet::layout::{self, Layout};
 use mapper_core::unit_factors::PERCENT;
@@ -26,6 +28,8 @@ pub(crate) struct Point<'a> {
     values: Vec<Option<f64>>,
     /// End of the speed line, if a cell of the row names it.
     pub(crate) end: Option<LineEnd>,
+    /// Whether it is a point of the surge line, from a block of its own.
+    pub(crate) is_of_surge_line: bool,
 }
 
 impl Point<'_> {
@@ -60,9 +64,16 @@ pub(crate) fn points<'a>(
     // The title of the first block may be above the headings, which may have a row of units.
     let above = grid.rows.iter().take(layout.first_row).rev().take(3);
     let mut vane = above.filter_map(|row| layout::vane_of_title(grid, described, row)).next();
+    let blocks = EndBlocks::of(grid, described, layout);
     for group in &layout.groups {
         let (mut speed, mut last_speed) = (group.speed_rpm, None);
-        for row in grid.rows.iter().skip(layout.first_row).filter(|row| !row.is_comment) {
+        for (index, row) in grid.rows.iter().enumerate() {
+            let row_use = blocks.use_of(index);
+            let is_of_surge_line = row_use == RowUse::SurgeLine;
+            let is_above = index < layout.first_row && !is_of_surge_line;
+            if is_above || row.is_comment || row_use == RowUse::Unused {
+                continue;
+            }
             let cell = |index: usize| row.cells.get(index).map_or("", String::as_str);
             let is_empty = group.own_columns().iter().all(|column| is_missing_mark(cell(column.index)));
             let is_title =
@@ -104,7 +115,7 @@ pub(crate) fn points<'a>(
                 continue;
             }
             check_point_count(points.len(), row.at)?;
-            let mut values = values(grid, row, group)?;
+            let mut values = values(grid, row, group, is_of_surge_line)?;
             if let Some(place) = group.speed_column().and_then(|position| values.get_mut(position)) {
                 match place {
                     Some(own) => last_speed = Some(*own),
@@ -114,9 +125,11 @@ pub(crate) fn points<'a>(
                     }
                 }
             }
-            points.push(Point { at: row.at, group, speed, vane, values, end: end_of_line(row) });
+            let end = end_of_line(row);
+            points.push(Point { at: row.at, group, speed, vane, values, end, is_of_surge_line });
         }
     }
+    remarks.extend(blocks.remarks());
     if extrapolated > 0 {
         remarks.push(ImportRemark::ExtrapolatedNodes { count: extrapolated });
     }
@@ -127,7 +140,12 @@ pub(crate) fn points<'a>(
 }
 
 /// The numbers of a row by column.
-fn values(grid: &Grid, row: &GridRow, group: &layout::Group) -> Result<Vec<Option<f64>>, ImportError> {
+fn values(
+    grid: &Grid,
+    row: &GridRow,
+    group: &layout::Group,
+    is_of_surge_line: bool,
+) -> Result<Vec<Option<f64>>, ImportError> {
     let mut values = Vec::with_capacity(group.columns.len());
     for column in &group.columns {
         let text = row.cells.get(column.index).map_or("", String::as_str);
@@ -144,23 +162,19 @@ fn values(grid: &Grid, row: &GridRow, group: &layout::Group) -> Result<Vec<Optio
     let filled = row.cells.iter().filter(|cell| !cell.is_empty()).count();
     // Without headings all columns are required, and between blanks no cell can be empty: a shorter row is a mistake.
     let needed = group.columns.iter().map(|column| column.index + 1).max().unwrap_or(0);
-    if group.bare_cells > 0 && filled != group.bare_cells || grid.is_blank_separated && filled < needed {
+    let is_short =
+        group.bare_cells > 0 && filled != group.bare_cells || grid.is_blank_separated && filled < needed;
+    // A surge line has no efficiencies.
+    if is_short && !is_of_surge_line {
         let text = row.text().chars().take(60).collect();
         return Err(ImportError::RowForm { line: row.at, text, form: ROW_FORM });
     }
     Ok(values)
 }
 
-/// The end of a speed line that a cell names, in several languages.
+/// The end of a speed line that a cell names.
 fn end_of_line(row: &GridRow) -> Option<LineEnd> {
-    let named = |words: &[&str]| {
-        let has = |cell: &String| words.iter().any(|word| cell.to_lowercase().contains(word));
-        row.cells.iter().any(has)
-    };
-    if named(&["surge", "pump", "pompage", "bombeo", "pompaggio"]) {
-        return Some(LineEnd::Surge);
-    }
-    named(&["choke", "stopf", "schluck", "blocage", "gavage", "bloqueo"]).then_some(LineEnd::Choke)
+    row.cells.iter().find_map(|cell| end_in(cell))
 }
 
 const ROW_FORM: &str = "a row of corrected rpm, corrected kg/s, pressure ratio and efficiency";

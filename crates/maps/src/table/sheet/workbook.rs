@@ -1,5 +1,6 @@
 //! Reads sheets of Excel workbooks.
 
+use crate::table::columns::quantity_name::end_in;
 use crate::table::sheet::grid::{Grid, GridRow, MAX_ROWS, count_number_cells};
 use crate::table::sheet::matrices::{points_of_matrices, quantity_of_title};
 use crate::table::sheet::speed_heading::without_speed;
@@ -14,18 +15,18 @@ use std::io::Cursor;
 pub(crate) fn grid_of_workbook(bytes: &[u8], wanted: Option<&str>) -> Result<Grid, ImportError> {
     let mut sheets = sheets_of(bytes)?;
     let has_table =
-        |sheet: &&mut Sheet| sheet.rows.iter().filter(|row| count_number_cells(&row.cells) >= 3).count() >= 2;
-    let grid = |sheet: &mut Sheet| Grid::of_rows(std::mem::take(&mut sheet.rows));
-    let is_wanted = |sheet: &&mut Sheet| match wanted {
+        |sheet: &Sheet| sheet.rows.iter().filter(|row| count_number_cells(&row.cells) >= 3).count() >= 2;
+    let is_end = |sheet: &Sheet| wanted.is_none() && end_in(&sheet.name).is_some();
+    let is_wanted = |sheet: &Sheet| match wanted {
         Some(name) => sheet.name == name,
-        None => !sheet.is_hidden,
+        None => !sheet.is_hidden && !is_end(sheet),
     };
     // A sheet for each speed line, named after its speed.
     let speed_rpm = |sheet: &Sheet| {
         let (rest, speed_rpm) = without_speed(&Grid::of_rows(Vec::new()), &sheet.name)?;
         (rest.is_empty() || sheet.name.to_lowercase().contains("rpm")).then_some(speed_rpm)
     };
-    let visible = sheets.iter_mut().filter(|sheet| !sheet.is_hidden).filter(has_table);
+    let visible = sheets.iter_mut().filter(|sheet| !sheet.is_hidden && has_table(sheet));
     let mut lines: Vec<(f64, &mut Sheet)> =
         visible.filter_map(|sheet| Some((speed_rpm(sheet)?, sheet))).collect();
     if wanted.is_none() && lines.len() > 1 {
@@ -48,14 +49,20 @@ pub(crate) fn grid_of_workbook(bytes: &[u8], wanted: Option<&str>) -> Result<Gri
             return Ok(joined);
         }
     }
-    if let Some(sheet) = sheets.iter_mut().filter(is_wanted).find(has_table) {
-        return Ok(grid(sheet));
+    if let Some(table) = sheets.iter_mut().find(|sheet| is_wanted(sheet) && has_table(sheet)) {
+        let mut rows = std::mem::take(&mut table.rows);
+        // A sheet with the surge line is a block below the table.
+        for sheet in sheets.iter_mut().filter(|sheet| !sheet.is_hidden && is_end(sheet)) {
+            rows.push(GridRow { at: 1, cells: vec![sheet.name.clone()], is_comment: false });
+            rows.append(&mut sheet.rows);
+        }
+        return Ok(Grid::of_rows(rows));
     }
     // Hidden sheets usually have obsolete data: one counts only if it is named, or has the only table.
     let mut hidden: Vec<&mut Sheet> =
-        sheets.iter_mut().filter(|sheet| sheet.is_hidden).filter(has_table).collect();
+        sheets.iter_mut().filter(|sheet| sheet.is_hidden && has_table(sheet)).collect();
     if let (None, [only]) = (wanted, hidden.as_mut_slice()) {
-        return Ok(grid(only));
+        return Ok(Grid::of_rows(std::mem::take(&mut only.rows)));
     }
     let hidden: Vec<String> = hidden.iter().map(|sheet| sheet.name.clone()).collect();
     let names: Vec<&str> = sheets.iter().map(|sheet| sheet.name.as_str()).collect();

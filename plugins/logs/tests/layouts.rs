@@ -366,3 +366,31 @@ fn clocks_side_by_side_are_groups() {
     assert_eq!((fast.len(), slow.len()), (ROWS, ROWS / 2));
     assert!(slow.iter().all(|(t_s, values)| (values[0] - (20.0 + 0.5 * t_s)).abs() < 1e-9));
 }
+
+#[test]
+fn names_may_be_in_a_list_above_the_table() {
+    let row = |row: usize| format!("{row},{},{}", p2_kpa(row), t2_degc(row));
+    for list in [
+        "%DataLog%\nVersion : 1.1\nChannel : P2\nUnit : kPa\nID : 7\nType : Raw\nChannel : T2\nUnit : degC\nID : 8\nType : Raw\n",
+        "; Ch1 = P2 [kPa]\n; Ch2 = T2 [degC]\n",
+        "# 1: Time [s]\n# 2: P2 [kPa]\n# 3: T2 [degC]\n",
+    ] {
+        let (layout, rows) = read(&text(list, row));
+        let columns: Vec<(&str, Option<&str>)> = layout
+            .columns
+            .iter()
+            .map(|column| (column.name.as_str(), column.unit.as_deref()))
+            .filter(|(name, _)| *name != "Time")
+            .collect();
+        assert_eq!(columns, [("P2", Some("kPa")), ("T2", Some("degC"))], "{list}");
+        assert_eq!((rows.len(), rows[4].0), (ROWS, 4.0), "{list}");
+    }
+}
+
+#[test]
+fn unknown_units_do_not_hide_the_known_ones() {
+    let head = "Time;P2;T2;Torque;Noise;Injection;State\ns;kPa;degC;Nm;dB(A);mg/str;on/off\n";
+    let (layout, _) = read(&text(head, |row| format!("{row};{};{};4;5;6;1", p2_kpa(row), t2_degc(row))));
+    let unit = |name: &str| layout.columns.iter().find(|column| column.name == name).unwrap().unit.clone();
+    assert_eq!((unit("P2").as_deref(), unit("T2").as_deref()), (Some("kPa"), Some("degC")));
+}

@@ -268,3 +268,72 @@ fn chinese_names_are_read_in_their_encoding() {
         assert!(sure(&found).iter().all(|channel| *channel == ShaftSpeed), "{:?}", sure(&found));
     }
 }
+
+/// P1 falls with the load, so that the first digit of `P11` and `P21` is the station.
+#[test]
+fn the_first_reading_of_a_station_is_no_other_station() {
+    for names in [
+        "P21 [bar],P11 [bar],T21 [degC],T11 [degC],N [rpm]",
+        "p_21 [bar],p_11 [bar],T_21 [degC],T_11 [degC],N [rpm]",
+        "P21 [bar],P1 [bar],T21 [degC],T11 [degC],N [rpm]",
+    ] {
+        let found = proposal(names, |load| {
+            vec![1.01 + 1.9 * load, 1.01 - 0.02 * load, 22.0 + 120.0 * load, 22.0, 110e3 * load]
+        });
+        let column = |channel: Channel| found.entry(channel).map(|found| found.column);
+        let found = [Channel::P1, Channel::P2, Channel::T1, Channel::T2].map(column);
+        assert_eq!(found, [Some(1), Some(0), Some(3), Some(2)], "{names}");
+    }
+}
+
+/// T1 of 18 to 20 degC and T2 to 160 degC in both units; without T1 both remain possible.
+#[test]
+fn fahrenheit_is_a_possible_unit_of_a_log_without_units() {
+    let fahrenheit = |celsius: f64| 32.0 + 1.8 * celsius;
+    let unit = |found: &Proposal, channel: Channel| {
+        found.entry(channel).map(|found| (found.unit.unwrap(), found.certainty))
+    };
+    for is_fahrenheit in [false, true] {
+        let written = |celsius: f64| if is_fahrenheit { fahrenheit(celsius) } else { celsius };
+        let found = proposal("CompInTemp,CompOutTemp,TurbInTemp,CompInPress,CompOutPress", |load| {
+            let temperatures = [20.0 - 2.0 * load, 22.0 + 138.0 * load, 60.0 + 480.0 * load].map(written);
+            [temperatures.as_slice(), &[14.6 - 0.2 * load, 14.6 + 28.0 * load]].concat()
+        });
+        let symbol = if is_fahrenheit { "degF" } else { "degC" };
+        for channel in [Channel::T1, Channel::T2, Channel::T3] {
+            assert_eq!(unit(&found, channel), Some((symbol, Certainty::Likely)));
+        }
+        let found = proposal("CompOutTemp,TurbInTemp", |load| {
+            vec![written(22.0 + 138.0 * load), written(60.0 + 480.0 * load)]
+        });
+        for channel in [Channel::T2, Channel::T3] {
+            assert_eq!(unit(&found, channel).map(|(_, certainty)| certainty), Some(Certainty::Unsure));
+        }
+    }
+}
+
+/// A flow of 0.1 lb/s is 0.045 kg/s: speed and pressure ratio cannot tell them apart, the unit of the pressures can.
+#[test]
+fn a_flow_without_unit_has_the_system_of_the_pressures() {
+    for (unit, scale, flow, expected) in [("psi", 14.504, 0.1, "lb/s"), ("bar", 1.0, 0.045, "kg/s")] {
+        let names = format!("N [rpm],MassFlow,P1 [{unit}],P2 [{unit}]");
+        let found = proposal(&names, |load| {
+            vec![20e3 + 100e3 * load, flow * (0.2 + load), scale, scale * (1.05 + 1.2 * load)]
+        });
+        let proposed = found.entry(Channel::CompressorFlow).unwrap();
+        assert_eq!((proposed.unit, proposed.certainty), (Some(expected), Certainty::Likely));
+    }
+}
+
+/// The clock of a second run begins again at 0 s in row 61.
+#[test]
+fn a_second_run_in_the_file_is_found_by_the_survey() {
+    let mut text = "Time [s],T1 [K],T2 [K]\n".to_owned();
+    for second in (0..60).chain(0..40) {
+        text += &format!("{second},295,{}\n", 300 + second);
+    }
+    let file = LogFile::from_bytes(Path::new("log"), text.as_bytes());
+    let (_, mut log) = LOG_FORMATS.open(&file, &LogOptions::default()).unwrap();
+    let restart = survey(log.as_mut()).unwrap().groups[0].restart.unwrap();
+    assert_eq!((restart.row, restart.from_s, restart.to_s), (61, 59.0, 0.0));
+}

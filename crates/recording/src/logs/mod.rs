@@ -22,5 +22,5 @@ pub use format::{Log, LogFormat, LogFormats, OpenLog, Row, RowSink};
 pub use layout::{Column, Group, Layout};
 pub use mapper_table::{difference, kind_of};
 pub use options::{LogOptions, OPTION_KEYS};
-pub use survey::{ColumnSurvey, Gap, GroupSurvey, Survey, survey};
+pub use survey::{ColumnSurvey, Gap, GroupSurvey, Restart, Survey, survey};
 pub use trace::{Trace, sparkline};

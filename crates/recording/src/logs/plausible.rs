@@ -17,8 +17,9 @@ pub(crate) const STANDARD_ATMOSPHERE_PA: f64 = 101_325.0;
 pub const AMBIENT_RANGE_PA: (f64, f64) = (5e4, 1.1e5);
 
 /// Units that logs omit because their program or stand always uses them.
-const USUAL_UNITS: [&str; 15] = [
-    "K", "degC", "Pa", "kPa", "mbar", "bar", "psia", "rpm", "krpm", "kg/s", "g/s", "kg/h", "lb/min", "%", "1",
+const USUAL_UNITS: [&str; 20] = [
+    "K", "degC", "degF", "Pa", "kPa", "mbar", "bar", "psia", "inHg", "kgf/cm2", "rpm", "krpm", "kg/s", "g/s",
+    "kg/h", "kg/min", "lb/min", "lb/s", "%", "1",
 ];
 
 /// Units in which values from `low` to `high` would be plausible. `offset` is added to them: the ambient pressure in Pa for gauge

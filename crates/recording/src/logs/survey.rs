@@ -2,6 +2,8 @@
 
 use crate::logs::trace::Trace;
 use crate::logs::{Log, LogError, Row};
+use crate::samples::log_clock::LogClock;
+pub use crate::samples::log_clock::Restart;
 use mapper_numerics::statistics::nearest_rank;
 use serde::Serialize;
 
@@ -40,6 +42,10 @@ pub struct GroupSurvey {
     pub gap_count: u64,
     /// Rows with a time not after the previous row's.
     pub backward: u64,
+    /// The row at which the clock starts again, as if the file had two runs.
+    pub restart: Option<Restart>,
+    #[serde(skip)]
+    clock: LogClock,
     #[serde(skip)]
     intervals: Vec<f64>,
     /// Times of the traces of the group's columns.
@@ -98,6 +104,9 @@ impl ColumnSurvey {
 
 impl GroupSurvey {
     fn add_time(&mut self, t_s: f64) {
+        if self.restart.is_none() {
+            self.restart = self.clock.push(t_s, &[], &mut |_, _| {}).err();
+        }
         if self.rows == 0 {
             (self.first_s, self.last_s) = (t_s, t_s);
         } else {

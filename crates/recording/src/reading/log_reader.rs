@@ -3,7 +3,7 @@
 use crate::channel_mapping::channel_map_yaml::MapMistakes;
 use crate::channel_mapping::mapped_topics::{MappedQuantity, source_of, sources};
 use crate::logs::{Layout, LogFile, Row};
-use crate::samples::log_clock::{BlockAverager, LogClock, Restart};
+use crate::samples::log_clock::{BlockAverager, LogClock};
 use crate::samples::series_builder::SeriesBuilder;
 use crate::{AmbientPressure, ChannelMap, ChannelSource, ReadOptions, ReadWarning, RecordError};
 use mapper_core::Channel;
@@ -108,7 +108,9 @@ pub(crate) fn read_log(
         let (Some(clock), Some(blocks), Some(places)) = of_group else { return Ok(()) };
         let mut keep = |t_s: f64, values: &[f64]| read.take(places, t_s, values);
         let took = clock.push(row.t_s, row.values, &mut |t_s, values| blocks.push(t_s, values, &mut keep));
-        took.map_err(|restart| file.content_error(format.name, describe_restart(restart, &layout, row.group)))
+        let name = layout.groups.get(row.group).map_or("", |group| group.name.as_str());
+        let of = if name.is_empty() { String::new() } else { format!(" of `{name}`") };
+        took.map_err(|restart| file.content_error(format.name, restart.describe(&of)))
     };
     log.rows(&columns, &mut take_row)?;
     let found_later = log.layout().findings.iter().filter(|finding| !layout.findings.contains(finding));
@@ -139,17 +141,6 @@ impl LogContent {
             self.kept += 1;
         }
     }
-}
-
-/// The remedy for a clock that starts again.
-fn describe_restart(restart: Restart, layout: &Layout, group: usize) -> String {
-    let Restart { row, from_s, to_s } = restart;
-    let group = layout.groups.get(group).filter(|group| !group.name.is_empty());
-    let of = group.map_or_else(String::new, |group| format!(" of `{}`", group.name));
-    format!(
-        "the clock{of} goes back from {from_s} s to {to_s} s in row {row} of the data, as if the file had two runs: split it \
-         there and give the parts as logs of their own, or name another clock with `time`"
-    )
 }
 
 /// The columns that the map names, with their units; or all mistakes of the map for this log.

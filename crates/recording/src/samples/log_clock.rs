@@ -2,6 +2,7 @@
 
 use mapper_core::SAMPLE_INTERVAL_S;
 use mapper_numerics::statistics::nearest_rank;
+use serde::Serialize;
 
 /// Minimum difference from both neighbours for a wrong time, s. Bound: a day; a log has no such gap between two rows and back.
 pub(crate) const STRAY_S: f64 = 86_400.0;
@@ -18,17 +19,30 @@ pub(crate) const MAX_BACK_S: f64 = 2.0;
 /// Recent intervals whose median is the typical one. Bound: memory.
 const KEPT_INTERVALS: usize = 15;
 
-/// A clock that goes back.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Restart {
-    /// Number of the row, from 1.
-    pub(crate) row: u64,
-    pub(crate) from_s: f64,
-    pub(crate) to_s: f64,
+/// A clock that goes back, as if a file had two runs.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Restart {
+    /// Number of the row of data, from 1.
+    pub row: u64,
+    /// Last time before it, s.
+    pub from_s: f64,
+    /// Its time, s.
+    pub to_s: f64,
+}
+
+impl Restart {
+    /// What it means, and the remedy; `of` names the clock.
+    pub fn describe(&self, of: &str) -> String {
+        let Restart { row, from_s, to_s } = self;
+        format!(
+            "the clock{of} goes back from {from_s} s to {to_s} s in row {row} of the data, as if the file had two runs: split it \
+             there and give the parts as logs of their own, or name another clock with `time`"
+        )
+    }
 }
 
 /// Forwards rows with a delay of one row.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct LogClock {
     rows: u64,
     pending: Option<(f64, Vec<f64>)>,

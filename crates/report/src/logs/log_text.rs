@@ -39,6 +39,7 @@ pub fn log_contents(format: &str, layout: &Layout, survey: &Survey, proposal: &P
             "{name}: {} from {:.3} s to {:.3} s{rate}{backward}, {gaps}",
             data.rows, data.first_s, data.last_s
         ));
+        document.text(data.restart.map_or_else(String::new, |restart| restart.describe("")));
         document.list(
             data.gaps.iter().take(GAPS).map(|gap| {
                 format!("{:.3} s to {:.3} s ({:.1} s)", gap.from_s, gap.to_s, gap.to_s - gap.from_s)

@@ -2,8 +2,8 @@
 
 use mapper_recording::logs::{LogFinding, LogOptions};
 use mapper_table::{
-    DateOrder, bare_unit, header_unit, is_missing, is_units_row, number_with_unit, parse_instant,
-    read_number, split_unit, typical_length,
+    DateOrder, bare_unit, header_unit, is_missing, is_units_row, is_units_row_of_names, number_with_unit,
+    parse_instant, read_number, split_unit, typical_length,
 };
 use std::collections::BTreeMap;
 
@@ -42,11 +42,16 @@ pub(crate) fn analyse_head(
     let header: Vec<usize> = header_rows(rows, data_row, length);
     let units_row = match options.units_row {
         Some(row) => row.checked_sub(1),
-        None => header
-            .iter()
-            .copied()
-            .filter(|row| Some(*row + 1) != options.names_row)
-            .find(|row| is_units_row(&rows[*row])),
+        None => {
+            let may_be_units = |row: &usize| Some(*row + 1) != options.names_row;
+            // Next to a row of names two known units are enough.
+            let is_next_to_names = |row: &usize| {
+                let known = rows[*row].iter().filter(|cell| header_unit(bare_unit(cell)).is_some()).count();
+                header.len() > 1 && known > 1 && is_units_row_of_names(&rows[*row])
+            };
+            let all = || header.iter().copied().filter(may_be_units);
+            all().find(|row| is_units_row(&rows[*row])).or_else(|| all().skip(1).find(is_next_to_names))
+        }
     };
     let group_row = group_row(rows, &header, length);
     // Names have letters, unless no row has any.
@@ -69,15 +74,19 @@ pub(crate) fn analyse_head(
     } else {
         None
     };
-    let preamble = rows.get(..header.first().copied().unwrap_or(0)).unwrap_or_default();
+    let preamble = rows.get(..header.first().copied().unwrap_or(data_row)).unwrap_or_default();
     let mut cell_units: BTreeMap<usize, String> = BTreeMap::new();
-    let names: Vec<String> =
-        (0..width).map(|column| split_unit(&one_line(cell(names_row, column))).0).collect();
+    let list = if names_row.is_none() { channel_list(preamble, width) } else { ChannelList::default() };
+    let header_of = |column: usize| match list.names.get(column) {
+        Some(name) => name.clone(),
+        None => one_line(cell(names_row, column)),
+    };
+    let names: Vec<String> = (0..width).map(|column| split_unit(&header_of(column)).0).collect();
     let mut columns: Vec<HeadColumn> = Vec::new();
     let mut seen: BTreeMap<String, usize> = BTreeMap::new();
     let mut repeated = 0;
     for column in 0..width {
-        let header = one_line(cell(names_row, column));
+        let header = header_of(column);
         let own_unit = bare_unit(cell(units_row, column));
         let (mut name, mut unit) = split_unit(&header);
         if units_row.is_some() {
@@ -93,6 +102,7 @@ pub(crate) fn analyse_head(
         unit = unit.or_else(|| {
             Some(cell(distant_units, column).to_owned()).filter(|unit| header_unit(unit).is_some())
         });
+        unit = unit.or_else(|| list.units.get(column).cloned().filter(|unit| !unit.is_empty()));
         if name.is_empty() {
             name = format!("column {}", column + 1);
         }
@@ -169,6 +179,49 @@ fn findings(found: &HeadRows<'_>, columns: &[HeadColumn], cell_units: usize) -> 
         findings.push(LogFinding::RepeatedNames { names: found.repeated });
     }
     findings
+}
+
+/// Names and units of the columns from a list above the table.
+#[derive(Default)]
+struct ChannelList {
+    names: Vec<String>,
+    units: Vec<String>,
+}
+
+/// The list of channels above a table without names: `Channel : Turbo Speed` or `Ch1 = Turbo Speed [rpm]` for each column, with or without
+/// the clock before them.
+fn channel_list(preamble: &[Vec<String>], width: usize) -> ChannelList {
+    let mut values: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for row in preamble {
+        let text =
+            row.iter().filter(|cell| !cell.is_empty()).map(String::as_str).collect::<Vec<_>>().join(" ");
+        let Some((key, value)) = text.split_once([':', '=']) else { continue };
+        let is_mark = |letter: char| letter.is_ascii_digit() || "#;%/ _".contains(letter);
+        let key = key.trim_matches(is_mark).to_lowercase();
+        values.entry(key).or_default().push(one_line(value));
+    }
+    let is_of_columns = |found: &&Vec<String>| found.len() == width || found.len() + 1 == width;
+    let with_clock = |found: &Vec<String>, clock: &str| {
+        let missing = (found.len() < width).then(|| clock.to_owned());
+        missing.into_iter().chain(found.iter().cloned()).collect::<Vec<String>>()
+    };
+    let names = |found: &Vec<String>| {
+        let mut words: Vec<&String> =
+            found.iter().filter(|name| name.contains(char::is_alphabetic)).collect();
+        words.sort();
+        words.dedup();
+        words.len()
+    };
+    let is_units = |key: &str| key.contains("unit") || key.contains("einheit");
+    let lists = values.iter().filter(|(key, _)| !is_units(key)).map(|(_, found)| found).filter(is_of_columns);
+    let Some(best) = lists.max_by_key(|found| names(found)).filter(|found| 2 * names(found) > width) else {
+        return ChannelList::default();
+    };
+    let units = values.iter().find(|(key, found)| is_units(key) && found.len() == best.len());
+    ChannelList {
+        names: with_clock(best, "Time"),
+        units: units.map(|(_, found)| with_clock(found, "")).unwrap_or_default(),
+    }
 }
 
 /// The long name in a list of channels above the table: the cell after the name.

@@ -152,8 +152,19 @@ fn channels_by_name(
     let kind = unit.map(|unit| unit.kind).filter(|kind| *kind != Kind::Frequency);
     // A shaft may have a number too.
     let numbers = if kind == Some(Kind::Speed) { StationNumbering::Usual } else { numbers };
-    channels_of(&numbers.renumber(without_number(column, layout)), group, &column.description, kind)
+    let mut channels =
+        channels_of(&numbers.renumber(without_number(column, layout)), group, &column.description, kind);
+    // In a log with `P11` or `T11` the first digit is the station: `P21` is the first reading of P2.
+    let has_first =
+        || layout.columns.iter().any(|other| ColumnName::read(&other.name).has_station(FIRST_OF_INLET));
+    if ColumnName::read(&column.name).may_be_inlet() && has_first() {
+        channels.retain(|(channel, _)| ![Channel::P1, Channel::T1].contains(channel));
+    }
+    channels
 }
+
+/// Number of the first reading at the inlet. Source: the station, then the number of the reading.
+const FIRST_OF_INLET: u32 = 11;
 
 /// The name without the number that a reader adds to equal names: `Pressure (2)` is not a pressure at station 2.
 fn without_number<'a>(column: &'a Column, layout: &Layout) -> &'a str {

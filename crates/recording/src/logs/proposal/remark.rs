@@ -25,7 +25,8 @@ ProposalRemark {
     "one_unit_fits" OneUnitFits { unit: String, columns: usize },
     "no_unit_fits" NoUnitFits { min: f64, max: f64 },
     "several_units_fit" SeveralUnitsFit { units: Vec<String> },
-    "imperial" Imperial,
+    /// Of degC and degF, in this unit alone the inlet has the temperature of a test cell.
+    "inlet_temperature" InletTemperature { unit: String },
     "fits_machine" FitsMachine { unit: String, surge_kg_s: f64, choke_kg_s: f64, speed_rpm: f64 },
     "fits_wheel" FitsWheel { unit: String, diameter_m: f64 },
     "unknown_unit" UnknownUnit { channel: Channel, column: String, unit: String },
@@ -77,20 +78,23 @@ impl fmt::Display for ProposalRemark {
                 write!(f, "the log gives no unit; only {unit} is plausible")
             }
             Remark::OneUnitFits { unit, columns } => {
-                write!(f, "the log gives no unit; only in {unit} all {columns} columns of this kind are plausible")
+                write!(
+                    f,
+                    "the log gives no unit; only in {unit} all {columns} columns of this kind are plausible"
+                )
             }
-            Remark::NoUnitFits { min, max } => write!(
-                f,
-                "the log gives no unit, and the range {} to {} fits none",
-                short(*min),
-                short(*max)
-            ),
+            Remark::NoUnitFits { min, max } => {
+                write!(f, "the log gives no unit, and the range {} to {} fits none", short(*min), short(*max))
+            }
             Remark::SeveralUnitsFit { units } => {
                 write!(f, "the log gives no unit; its range fits {}", units.join(" or "))
             }
-            Remark::Imperial => f.write_str(
-                "the log gives no unit; other units are imperial, and in degC the inlet would be warmer than a room",
-            ),
+            Remark::InletTemperature { unit } => {
+                write!(
+                    f,
+                    "the log gives no unit; taken as {unit}, in which the inlet is as warm as a test cell"
+                )
+            }
             Remark::FitsMachine { unit, surge_kg_s, choke_kg_s, speed_rpm } => write!(
                 f,
                 "the log gives no unit; {unit} fits the machine ({surge_kg_s:.3} to {choke_kg_s:.3} kg/s at {speed_rpm:.0} rpm)"

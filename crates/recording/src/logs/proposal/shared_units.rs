@@ -7,9 +7,10 @@ use crate::logs::plausible::{STANDARD_ATMOSPHERE_PA, TRIMMED_SHARE, fitting_unit
 use crate::logs::{Layout, Survey};
 use mapper_core::Channel;
 use mapper_core::unit_factors::S_PER_MIN;
-use mapper_table::{header_unit, kind_of};
+use mapper_table::kind_of;
 use mapper_yaml::units::{Kind, Unit};
 use std::f64::consts::PI;
+use std::ops::RangeInclusive;
 
 /// Maximum pressure ratio. Bound: one stage reaches 6 at the tip speed limit of aluminium wheels; a third more is margin for a throttled
 /// inlet.
@@ -46,43 +47,58 @@ pub(super) fn infer_units(proposal: &mut Proposal, layout: &Layout, survey: &Sur
         if common.iter().any(|unit| written.contains(&unit.symbol())) {
             common.retain(|unit| written.contains(&unit.symbol()));
         }
-        if kind == Kind::Temperature && is_imperial(layout) && inlet_is_too_warm(&channels, &common) {
-            common = kind.units().iter().filter(|unit| unit.symbol() == "degF").collect();
+        let mut by_inlet = None;
+        if kind == Kind::Temperature {
+            by_inlet = unit_by_inlet(&channels, &common);
+            common = by_inlet.map_or(common, |unit| vec![unit]);
         }
-        let [unit] = common.as_slice() else { continue };
+        let Some((unit, similar)) = common.split_first() else { continue };
+        // bar and kgf/cm2 differ by less than the sensors of many stands: the usual one counts, and both are named.
+        let is_similar = |other: &&'static Unit| {
+            (other.to_inside(1.0) / unit.to_inside(1.0) - 1.0).abs() < SIMILAR_UNITS_RATIO
+        };
+        if !(kind == Kind::Pressure && similar.iter().all(is_similar) || similar.is_empty()) {
+            let remark = Remark::SeveralUnitsFit {
+                units: common.iter().map(|unit| unit.symbol().to_owned()).collect(),
+            };
+            for proposed in proposal.channels.iter_mut().filter(|proposed| lacks_unit(proposed)) {
+                proposed.unit = Some(unit.symbol());
+                proposed.certainty = Certainty::Unsure;
+                proposed.remarks = vec![remark.clone()];
+            }
+            continue;
+        }
         for proposed in proposal.channels.iter_mut().filter(|proposed| lacks_unit(proposed)) {
             proposed.unit = Some(unit.symbol());
             proposed.certainty = Certainty::Likely;
-            proposed.remarks = vec![if unit.symbol() == "degF" {
-                Remark::Imperial
-            } else {
-                Remark::OneUnitFits { unit: unit.symbol().to_owned(), columns: channels.len() }
+            proposed.remarks = vec![match by_inlet {
+                Some(unit) => Remark::InletTemperature { unit: unit.symbol().to_owned() },
+                None if !similar.is_empty() => Remark::SeveralUnitsFit {
+                    units: common.iter().map(|unit| unit.symbol().to_owned()).collect(),
+                },
+                None => Remark::OneUnitFits { unit: unit.symbol().to_owned(), columns: channels.len() },
             }];
         }
     }
 }
 
-/// Whether a log writes its other units in the imperial system.
-fn is_imperial(layout: &Layout) -> bool {
-    let imperial = |unit: &str| {
-        header_unit(unit).is_some_and(|found| {
-            matches!(found.unit.symbol(), "psi" | "psia" | "lb/min" | "lb/s" | "inHg" | "inH2O")
-        })
-    };
-    layout.columns.iter().any(|column| column.unit.as_deref().is_some_and(imperial))
-}
+/// Maximum relative difference of two units that the readings cannot tell apart. Bound: 1 bar is 1.020 kgf/cm2; the weather varies by more.
+const SIMILAR_UNITS_RATIO: f64 = 0.03;
 
-/// Inlet temperature that no test cell exceeds, K. The inlet of a second stage may. Bound: air of 50 degC; the inlet of a second stage
-/// may be warmer.
-const MAX_INLET_K: f64 = 323.15;
+/// Range of the inlet temperature of a test cell, K. Bound: air of 10 to 50 degC. The inlet of a second stage may be warmer.
+const INLET_K: RangeInclusive<f64> = 283.15..=323.15;
 
-/// Whether the only unit of the temperatures is degC, and the inlet would be too warm in it.
-fn inlet_is_too_warm(channels: &[(Channel, f64, f64)], common: &[&'static Unit]) -> bool {
-    let [unit] = common else { return false };
-    let is_warm = |(channel, low, _): &(Channel, f64, f64)| {
-        *channel == Channel::T1 && unit.to_inside(*low) > MAX_INLET_K
-    };
-    unit.symbol() == "degC" && channels.iter().any(is_warm)
+/// The unit in which the inlet has the temperature of a test cell, if degC and degF are both plausible. A value is below 50 in degC and
+/// above it in degF.
+fn unit_by_inlet(channels: &[(Channel, f64, f64)], common: &[&'static Unit]) -> Option<&'static Unit> {
+    let (_, inlet, _) = channels.iter().find(|(channel, ..)| *channel == Channel::T1)?;
+    let with_symbol = |symbol: &str| common.iter().copied().find(|unit| unit.symbol() == symbol);
+    let (celsius, fahrenheit) = with_symbol("degC").zip(with_symbol("degF"))?;
+    match fahrenheit.to_inside(*inlet) {
+        inlet_k if INLET_K.contains(&inlet_k) => Some(fahrenheit),
+        inlet_k if inlet_k < *INLET_K.start() => Some(celsius),
+        _ => None,
+    }
 }
 
 /// Isentropic head over the square of the tip speed. Slip and backsweep leave 0.6 to 0.9 of it as work, of which 0.5 to 0.8 is head.
@@ -100,7 +116,7 @@ const CP_J_KGK: f64 = 1005.0;
 /// Density of air, kg/m3. Source: as for the heat capacity.
 const DENSITY_KG_M3: f64 = 1.15;
 /// Inlet temperature, K. Source: as for the heat capacity.
-const INLET_K: f64 = 298.0;
+const TYPICAL_INLET_K: f64 = 298.0;
 
 /// Maximum ratio by which the flow may lie outside surge and choke. Bound: for the correction to the inlet, and for lines between nominal
 /// ones.
@@ -131,7 +147,7 @@ pub(super) fn infer_flow_unit(
         None => {
             let Some(outlet_pa) = value_at(Channel::P2, 1.0 - TRIMMED_SHARE) else { return };
             let ratio = outlet_pa / value_at(Channel::P1, TRIMMED_SHARE).unwrap_or(STANDARD_ATMOSPHERE_PA);
-            let head_j_kg = CP_J_KGK * INLET_K * (ratio.max(1.0).powf(EXPONENT) - 1.0);
+            let head_j_kg = CP_J_KGK * TYPICAL_INLET_K * (ratio.max(1.0).powf(EXPONENT) - 1.0);
             let tip_m_s = (head_j_kg / HEAD_COEFFICIENT).sqrt();
             let diameter_m = S_PER_MIN * tip_m_s / (PI * speed_rpm);
             let flow_kg_s = FLOW_COEFFICIENT * DENSITY_KG_M3 * tip_m_s * PI / 4.0 * diameter_m * diameter_m;
@@ -139,6 +155,8 @@ pub(super) fn infer_flow_unit(
             (flow_kg_s / FLOW_FACTOR, flow_kg_s * FLOW_FACTOR, Box::new(why))
         }
     };
+    let is_imperial =
+        proposal.channels.iter().any(|other| matches!(other.unit, Some("psia" | "psi" | "inHg" | "degF")));
     for channel in [Channel::CompressorFlow, Channel::TurbineFlow] {
         let Some(proposed) = proposal.channels.iter_mut().find(|proposed| proposed.channel == channel) else {
             continue;
@@ -150,8 +168,12 @@ pub(super) fn infer_flow_unit(
         if !fitting.iter().any(|unit| Some(unit.symbol()) == proposed.unit) || fitting.len() < 2 {
             continue;
         }
-        let near = |unit: &&&'static Unit| (low_kg_s..=high_kg_s).contains(&unit.to_inside(high));
-        let near: Vec<&&'static Unit> = fitting.iter().filter(near).collect();
+        let is_near = |unit: &&'static Unit| (low_kg_s..=high_kg_s).contains(&unit.to_inside(high));
+        let mut near: Vec<&'static Unit> = fitting.into_iter().filter(is_near).collect();
+        if near.len() > 1 {
+            // A log in psi has pounds, and one in bar has none.
+            near.retain(|unit| unit.symbol().starts_with("lb") == is_imperial);
+        }
         if let [unit] = near.as_slice() {
             proposed.unit = Some(unit.symbol());
             proposed.certainty = Certainty::Likely;

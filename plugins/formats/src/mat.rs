@@ -3,17 +3,26 @@
 //! "MAT-File Format" (MathWorks), chapter 2: each matrix is five 32-bit integers (type, rows, columns, imaginary part, length of the name), the
 //! name with a zero behind it, and the numbers column by column. Level 4 has no structures, and needs no compression or alignment.
 
-use crate::heading::heading;
+use crate::heading::{digits, heading};
 use crate::simulation_table::SimulationTable;
-use mapper_core::{CompressorMap, ExportError, MapFormat};
+use mapper_core::{
+    CompressorMap, ExportError, ImportError, ImportedMap, MapDescription, MapFormat, ReferenceState,
+};
+use mapper_maps::table::{read_text, resolve_reference};
 
 pub(crate) const FORMAT: MapFormat = MapFormat {
     name: "mat",
     extension: "mat",
     description: "MATLAB data (level 4): the tables of the format simscape over corrected speed and beta, and the points",
     write: Some(write),
+    read: Some(read),
     ..MapFormat::NONE
 };
+
+/// Name of the matrix of points: speed, flow, pressure ratio, efficiency.
+const POINTS: &str = "points_rpm_kg_s_pressure_ratio_efficiency";
+/// Names of the reference state.
+const REFERENCE: [&str; 2] = ["reference_temperature_K", "reference_pressure_Pa"];
 
 /// Numbers in 64 bits, the least significant byte first.
 const NUMBERS: u32 = 0;
@@ -30,8 +39,8 @@ fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
         TEXT,
         &[about.trim().chars().map(|letter| f64::from(u32::from(letter))).collect()],
     );
-    matrix(&mut file, "reference_temperature_K", NUMBERS, &[vec![map.reference.t_ref_k]]);
-    matrix(&mut file, "reference_pressure_Pa", NUMBERS, &[vec![map.reference.p_ref_pa]]);
+    matrix(&mut file, REFERENCE[0], NUMBERS, &[vec![map.reference.t_ref_k]]);
+    matrix(&mut file, REFERENCE[1], NUMBERS, &[vec![map.reference.p_ref_pa]]);
     matrix(&mut file, "corrected_speed_rpm", NUMBERS, std::slice::from_ref(&table.speeds_rpm));
     matrix(&mut file, "beta", NUMBERS, std::slice::from_ref(&table.beta));
     matrix(&mut file, "pressure_ratio", NUMBERS, &table.pressure_ratio);
@@ -47,8 +56,60 @@ fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
             vec![speed_rpm, point.flow_corrected_kg_s, point.pressure_ratio, eta]
         })
         .collect();
-    matrix(&mut file, "points_rpm_kg_s_pressure_ratio_efficiency", NUMBERS, &points);
+    matrix(&mut file, POINTS, NUMBERS, &points);
     Ok(file)
+}
+
+/// Reads the points of a file of this program.
+fn read(bytes: &[u8], given: &MapDescription) -> Result<ImportedMap, ImportError> {
+    let matrices = matrices(bytes);
+    let points = matrices.iter().find(|matrix| matrix.name == POINTS && matrix.rows.len() % 4 == 0);
+    let Some(points) = points else {
+        return Err(ImportError::RowForm {
+            line: 1,
+            text: String::from_utf8_lossy(bytes.get(..10).unwrap_or(bytes)).into_owned(),
+            form: "a map that this program wrote; in MATLAB save the columns as a table: writetable(struct2table(map), 'map.csv')",
+        });
+    };
+    let count = points.rows.len() / 4;
+    let mut text = "speed [rpm],flow [kg/s],PR,efficiency\n".to_owned();
+    for row in 0..count {
+        let value = |column: usize| points.rows.get(column * count + row).copied().filter(|v| v.is_finite());
+        text += &([0, 1, 2, 3].map(|column| digits(value(column))).join(",") + "\n");
+    }
+    let number = |name: &str| matrices.iter().find(|matrix| matrix.name == name)?.rows.first().copied();
+    let found = REFERENCE.map(number);
+    let found = found[0].zip(found[1]).map(|(t_ref_k, p_ref_pa)| ReferenceState { t_ref_k, p_ref_pa });
+    let found = found.filter(ReferenceState::is_plausible);
+    let reference = resolve_reference(found, given.reference)?;
+    read_text(&text, &MapDescription { reference: Some(reference), ..given.clone() })
+}
+
+/// A matrix of numbers, column by column.
+struct Matrix {
+    name: String,
+    rows: Vec<f64>,
+}
+
+/// The matrices of a file up to the first that is not of level 4.
+fn matrices(mut bytes: &[u8]) -> Vec<Matrix> {
+    let mut found = Vec::new();
+    while let Some((header, rest)) = bytes.split_at_checked(20) {
+        let field = |at: usize| {
+            let field = header.get(4 * at..4 * at + 4).and_then(|field| field.try_into().ok());
+            field.map_or(0, u32::from_le_bytes) as usize
+        };
+        let length = field(1).checked_mul(field(2)).and_then(|count| count.checked_mul(8));
+        let is_level_4 = field(0) <= TEXT as usize && field(3) == 0;
+        let Some(length) = length.filter(|_| is_level_4) else { break };
+        let Some((name, rest)) = rest.split_at_checked(field(4)) else { break };
+        let Some((data, rest)) = rest.split_at_checked(length) else { break };
+        let rows = data.as_chunks().0.iter().map(|number| f64::from_le_bytes(*number)).collect();
+        let name = String::from_utf8_lossy(name).trim_end_matches('\0').to_owned();
+        found.push(Matrix { name, rows });
+        bytes = rest;
+    }
+    found
 }
 
 /// Appends a matrix, given by its rows of equal length.

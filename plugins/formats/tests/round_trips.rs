@@ -230,3 +230,22 @@ fn tables_of_others_are_read_by_their_column_names() {
     assert!(error.unwrap_err().to_string().contains("furlongs"));
     assert!(FORMATS.read_from("CSV").is_some() && FORMATS.read_from("ods").is_none());
 }
+
+/// The points of MATLAB data are read back, with their reference state; a structure is not, and the message names the way.
+#[test]
+fn matlab_data_are_read_back() {
+    let map = crate::support::fitted();
+    let format = FORMATS.find("mat").unwrap();
+    let back = format.read(&format.write(&map).unwrap(), None).unwrap().map;
+    assert_eq!(back.reference, map.reference);
+    let count = |map: &CompressorMap| map.lines.iter().map(|line| line.points.len()).sum::<usize>();
+    assert_eq!((back.lines.len(), count(&back)), (map.lines.len(), count(&map)));
+    for (read, written) in
+        numbers(&back).iter().flatten().flatten().zip(numbers(&map).iter().flatten().flatten())
+    {
+        assert!((read / written - 1.0).abs() < 1e-9, "{read} {written}");
+    }
+    for other in [b"MATLAB 5.0 MAT-file, Platform: GLNXA64".as_slice(), b"", &[0; 40], &[0xff; 60]] {
+        assert!(format.read(other, None).is_err());
+    }
+}

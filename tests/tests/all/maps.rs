@@ -222,3 +222,41 @@ fn a_table_with_a_row_of_units_and_decimal_commas_is_the_same_map() {
         }
     }
 }
+
+/// Lines as a digitiser writes them: a file each in lb/min, named after its speed.
+#[test]
+fn a_directory_of_speed_lines_is_one_map() {
+    for (separator, names) in [
+        (", ", ["45000.csv", "75000.csv", "surge.csv"]),
+        (" ", ["45krpm.txt", "N_75000.dat", "Pumpgrenze.txt"]),
+    ] {
+        let scratch = scratch();
+        for (name, rows) in names.iter().zip([
+            [(6.0, 1.26), (9.0, 1.24)],
+            [(9.5, 1.74), (15.0, 1.67)],
+            [(6.0, 1.26), (9.5, 1.74)],
+        ]) {
+            let text: String =
+                rows.iter().map(|(flow, ratio)| format!("{flow}{separator}{ratio}\n")).collect();
+            std::fs::write(scratch.path().join(name), text).unwrap();
+        }
+        let inspect =
+            ["inspect".as_ref(), scratch.path().as_os_str(), "--reference".as_ref(), OsStr::new("SAE")];
+        // The unit of a figure is not in its points.
+        let asked = run(inspect).exits(3);
+        assert!(asked.stderr.contains("flow=kg/s"), "{}", asked.stderr);
+        let [command, path, option, sae] = inspect;
+        let with_unit =
+            [command, path, option, sae, "--with".as_ref(), "flow=lb/min".as_ref(), "--json".as_ref()];
+        let found: Value = serde_json::from_str(&run(with_unit).exits(0).stdout).unwrap();
+        let speeds: Vec<(f64, u64)> = lines(&found)
+            .iter()
+            .map(|line| (line["speed_corrected_rpm"].as_f64().unwrap(), line["points"].as_u64().unwrap()))
+            .collect();
+        assert_eq!(speeds, [(45e3, 2), (75e3, 2)]);
+        // 6 lb/min; a pound has 0.453 592 37 kg.
+        let columns = found["columns"].as_array().unwrap();
+        let flow = columns.iter().find(|column| column["key"] == "flow").unwrap();
+        assert!((flow["low"].as_f64().unwrap() - 0.045_359_237).abs() < 1e-9, "{flow}");
+    }
+}

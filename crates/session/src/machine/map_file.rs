@@ -7,7 +7,7 @@ use mapper_campaign::Campaign;
 use mapper_core::{
     CompressorMap, ExportError, ImportedMap, ImportedTurbine, MAP_FILE_SIZE_LIMIT, MapDescription, MapFormat,
 };
-use mapper_maps::table::{read_description, set_key, unpack};
+use mapper_maps::table::{read_description, set_key, text_of_lines, unpack};
 use mapper_maps::{MapFitOptions, fit_map};
 use std::io::{Error, ErrorKind, Read};
 use std::path::Path;
@@ -56,11 +56,26 @@ impl Registry {
 
     /// Format and content of a map file.
     fn map_bytes(&self, path: &Path) -> Result<(&'static MapFormat, Vec<u8>), SessionError> {
+        if path == Path::new(STANDARD_INPUT) {
+            let bytes = read_map_bytes(std::io::stdin().lock(), path)?;
+            let format = self.formats.find(format_of_content(&bytes));
+            return format.map(|format| (format, bytes)).ok_or_else(|| self.unknown_extension(path, ""));
+        }
         let in_run = path.join("map.json");
+        if path.is_dir() && !in_run.exists() {
+            let files = line_files(path).map_err(SessionError::file("read", path))?;
+            if let Some(format) = self.formats.find("csv").filter(|_| !files.is_empty()) {
+                let text =
+                    text_of_lines(&files).map_err(|source| SessionError::Import(path.to_owned(), source))?;
+                return Ok((format, text.into_bytes()));
+            }
+        }
         let path = if path.is_dir() { in_run.as_path() } else { path };
         if !path.exists() {
             let why = match path == in_run {
-                true => "the directory has no map; name a map file or the directory of a run",
+                true => {
+                    "the directory has no map; name a map file, the directory of a run, or one with a file for each speed line (`45000.csv`)"
+                }
                 false => "the file does not exist",
             };
             return Err(SessionError::file("read", path)(Error::new(ErrorKind::NotFound, why)));
@@ -73,21 +88,18 @@ impl Registry {
             }
             extension => extension,
         };
-        let format = self.formats.read_from(&extension).ok_or_else(|| SessionError::UnknownExtension {
+        let format =
+            self.formats.read_from(&extension).ok_or_else(|| self.unknown_extension(path, &extension))?;
+        let file = mapper_yaml::open_file(path).map_err(SessionError::file("read", path))?;
+        Ok((format, read_map_bytes(file, path)?))
+    }
+
+    fn unknown_extension(&self, path: &Path, extension: &str) -> SessionError {
+        SessionError::UnknownExtension {
             path: path.to_owned(),
-            extension: extension.clone(),
+            extension: extension.to_owned(),
             known: self.formats.read_extensions().collect(),
-        })?;
-        let mut bytes = Vec::new();
-        // One byte above the limit shows that the file is too large.
-        let limit = MAP_FILE_SIZE_LIMIT as u64 + 1;
-        mapper_yaml::open_file(path)
-            .and_then(|file| file.take(limit).read_to_end(&mut bytes))
-            .map_err(SessionError::file("read", path))?;
-        let bytes = unpack(&bytes)
-            .map(std::borrow::Cow::into_owned)
-            .map_err(|source| SessionError::Import(path.to_owned(), source))?;
-        Ok((format, bytes))
+        }
     }
 
     /// Finds the writable map format of this name.
@@ -128,6 +140,53 @@ impl Registry {
                 .collect(),
         })
     }
+}
+
+/// The name of standard input. Source: POSIX, utility conventions.
+const STANDARD_INPUT: &str = "-";
+
+/// The unpacked content of a map file; `path` names it in messages.
+fn read_map_bytes(file: impl Read, path: &Path) -> Result<Vec<u8>, SessionError> {
+    let mut bytes = Vec::new();
+    // One byte above the limit shows that the file is too large.
+    let limit = MAP_FILE_SIZE_LIMIT as u64 + 1;
+    file.take(limit).read_to_end(&mut bytes).map_err(SessionError::file("read", path))?;
+    let unpacked = unpack(&bytes).map_err(|source| SessionError::Import(path.to_owned(), source))?;
+    Ok(unpacked.into_owned())
+}
+
+/// Name of the format of a content without an extension.
+fn format_of_content(bytes: &[u8]) -> &'static str {
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+    match text {
+        [b'P', b'K', ..] | [0xd0, 0xcf, ..] => "xlsx",
+        [b'{', ..] => "json",
+        // The CSV of this program begins with a comment and has commas.
+        _ if text.starts_with(b"# ") && text.windows(6).any(|part| part == b"\nline_") => "csv",
+        _ => "sae",
+    }
+}
+
+/// Extensions of files with one speed line. Source: programs that digitise figures.
+const LINE_EXTENSIONS: [&str; 5] = ["csv", "txt", "dat", "tsv", "prn"];
+
+/// Maximum number of such files in a directory. Bound: a map has some ten lines.
+const MAX_LINE_FILES: usize = 100;
+
+/// Names without extension and content of the files of a directory that may be speed lines.
+fn line_files(directory: &Path) -> Result<Vec<(String, Vec<u8>)>, Error> {
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(directory)?.take(MAX_LINE_FILES) {
+        let path = entry?.path();
+        let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        if path.is_file() && LINE_EXTENSIONS.contains(&extension.as_str()) {
+            let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            let mut bytes = Vec::new();
+            mapper_yaml::open_file(&path)?.take(MAP_FILE_SIZE_LIMIT as u64).read_to_end(&mut bytes)?;
+            files.push((name, bytes));
+        }
+    }
+    Ok(files)
 }
 
 /// What the user states about a map file: a description, and statements that count before it.

@@ -6,7 +6,7 @@ use crate::recording::files::Existing;
 use crate::{Registry, SessionError, write_file, write_map};
 use mapper_core::{
     EfficiencyDefinition, ExportError, ImportError, ImportRemark, ImportedMap, ImportedTurbine,
-    MapDescription, MapFormat, ReferenceState, TurbineMap,
+    MapDescription, MapFormat, MapPoint, ReferenceState, TurbineMap, Verdict,
 };
 use mapper_maps::table::{description_text, turbine_description_text};
 use mapper_maps::{
@@ -92,7 +92,12 @@ impl Registry {
         let (described, document, json) = match self.read_map_file(path, user_description)? {
             MapFile::Compressor(imported) => {
                 let lines = imported.map.lines.iter().map(|line| {
-                    json!({"speed_corrected_rpm": line.speed_corrected_rpm, "points": line.points.len()})
+                    let is_unusable = |point: &&MapPoint| point.identified.verdict == Verdict::Unusable;
+                    json!({
+                        "speed_corrected_rpm": line.speed_corrected_rpm,
+                        "points": line.points.len(),
+                        "unusable": line.points.iter().filter(is_unusable).count(),
+                    })
                 });
                 let json = json!({
                     "machine": "compressor",
@@ -101,6 +106,7 @@ impl Registry {
                     "columns": imported.columns,
                     "remarks": imported.remarks,
                     "lines": lines.collect::<Vec<_>>(),
+                    "surge": imported.map.surge,
                 });
                 (description_text(&name, &imported, user_description), imported.document(), json)
             }

@@ -1,7 +1,6 @@
 //! Units in the headers of logs and tables.
 
 use crate::column_name::ColumnName;
-use crate::number::is_missing_mark;
 use mapper_core::{Channel, Dimension};
 use mapper_yaml::units::{BARE_RATIO, CUBIC_FOOT_M3, Kind, Unit, UnitError, parse_with};
 use serde::Serialize;
@@ -276,7 +275,7 @@ pub fn is_units_row_of_names(row: &[String]) -> bool {
     let is_number = |cell: &str| cell.starts_with(|c: char| c.is_ascii_digit()) && !is_unit(cell);
     let has_form = |cell: &&str| {
         let is_quotient = cell.contains('/') && !cell.contains(char::is_whitespace) && !names_quantity(cell);
-        is_quotient && !is_missing_mark(cell) && cells().count() > 1
+        is_quotient && !cell.eq_ignore_ascii_case("n/a") && cells().count() > 1
     };
     let units = cells().filter(|cell| is_unit(cell) || has_form(cell)).count();
     units > cells().filter(is_name).count() && !cells().any(is_number)

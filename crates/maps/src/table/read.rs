@@ -112,7 +112,8 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedMap, Import
         }
     }
     let reference = reference?;
-    let points = points(grid, &described, &layout, &mut remarks)?;
+    let mut points = points(grid, &described, &layout, &mut remarks)?;
+    leave_out_standstill(&mut points, |point| speed_of(point, reference), &mut remarks);
     let columns = columns(&layout, &points, Some(reference));
     let in_percent = efficiency_in_percent(&layout, &points);
     if in_percent {
@@ -128,23 +129,15 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedMap, Import
             problem: "but the table has no P1 and P2; leave them out".to_owned(),
         });
     }
-    let (mut rows, mut surge, mut measured, mut at_rest) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    let standstill_rpm = standstill_rpm(&points, reference);
+    let (mut rows, mut surge, mut measured) = (Vec::new(), Vec::new(), Vec::new());
     for point in &points {
         let mut row = row(point, &layout, reference, in_percent)?;
-        if row.speed_corrected_rpm < standstill_rpm {
-            at_rest.push(row.at);
-            continue;
-        }
         if layout.is_measured() {
             let readings = measured_point(point, &row, reference, description)?;
             correct(&mut row, &readings, reference);
             measured.extend((!point.is_of_surge_line).then_some(readings));
         }
         if point.is_of_surge_line { &mut surge } else { &mut rows }.push(row);
-    }
-    if !at_rest.is_empty() {
-        remarks.push(ImportRemark::Standstill { rows: at_rest });
     }
     check_is_compressor(&measured)?;
     check_unit_of_efficiency(&layout, &rows)?;
@@ -222,12 +215,25 @@ fn check_is_compressor(measured: &[MeasuredPoint]) -> Result<(), ImportError> {
     Ok(())
 }
 
-/// Maximum speed at standstill as a ratio of the fastest. Judgement: no compressor is measured at a hundredth of its speed.
+/// Maximum speed at standstill as a ratio of the fastest. Bound: the slowest lines of maps have a tenth of it.
 const STANDSTILL_RATIO: f64 = 0.01;
 
-/// The speed below which a row is at standstill.
-fn standstill_rpm(points: &[Point<'_>], reference: ReferenceState) -> f64 {
-    STANDSTILL_RATIO * points.iter().filter_map(|point| speed_of(point, reference)).fold(0.0, f64::max)
+/// Leaves out the points at standstill, which check the zero of a stand, with a remark.
+pub(super) fn leave_out_standstill(
+    points: &mut Vec<Point<'_>>,
+    speed: impl Fn(&Point<'_>) -> Option<f64>,
+    remarks: &mut Vec<ImportRemark>,
+) {
+    let fastest = points.iter().filter_map(&speed).fold(0.0, f64::max);
+    let mut rows = Vec::new();
+    points.retain(|point| {
+        let is_at_rest = speed(point).is_some_and(|speed| speed < STANDSTILL_RATIO * fastest);
+        rows.extend(is_at_rest.then_some(point.at));
+        !is_at_rest
+    });
+    if !rows.is_empty() {
+        remarks.push(ImportRemark::Standstill { rows });
+    }
 }
 
 /// The speed of a point, rpm, as its column or its block has it.

@@ -3,7 +3,7 @@
 use crate::table::columns::column::Machine;
 use crate::table::columns::described_columns::DescribedColumns;
 use crate::table::columns::quantity::Quantity;
-use crate::table::read::{check_units_of_flow, pressure_pa, read_notes, require};
+use crate::table::read::{check_units_of_flow, leave_out_standstill, pressure_pa, read_notes, require};
 use crate::table::reference;
 use crate::table::rows_to_lines::{ETA_RANGE, MAX_PRESSURE_RATIO};
 use crate::table::sheet::grid::Grid;
@@ -53,7 +53,8 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedTurbine, Im
     if all().any(|column| is_flow(column.quantity) && !column.has_unit()) {
         remarks.push(ImportRemark::FlowUnitAssumed);
     }
-    let points = points(grid, &described, &layout, &mut remarks)?;
+    let mut points = points(grid, &described, &layout, &mut remarks)?;
+    leave_out_standstill(&mut points, speed_of, &mut remarks);
     let measured = match layout.is_measured() {
         true => {
             points.iter().map(|point| measured_point(point, description)).collect::<Result<Vec<_>, _>>()?

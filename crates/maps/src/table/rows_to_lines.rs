@@ -212,7 +212,7 @@ pub(crate) fn surge_marks(map: &CompressorMap, rows: &[Row]) -> Vec<SurgeMark> {
     marks
 }
 
-/// Minimum change of speed that is reported. Judgement: speed control and the rounding of a file leave less.
+/// Minimum change of speed that is reported. Bound: speed control and the rounding of a file leave less.
 const MIN_REPORTED_SHIFT_RATIO: f64 = 0.005;
 
 /// A remark if points were moved to the speed of their line.

@@ -37,6 +37,7 @@ fn a_row_of_units_counts_whatever_its_other_cells_hold() {
         ("% N (rpm); mdot (lb/s); PR (-); Eff (%)\n", " ", ""),
         ("# speed flow PR eff\n# rpm lb/s - %\n", "\t", ""),
         ("Units: rpm, lb/s, -, %\nspeed flow PR eff\n", " ", ""),
+        ("Customer,A/B\nSpeed [rpm],Flow [lb/s],PR,Eff [%]\n", ",", ""),
         ("Speed [rpm],Oil flow [foo],Flow [lb/s],PR,Eff [%],Flow 2 [slug/s]\n", ",", ""),
     ] {
         let mut text = imperial(heading, separator, more);
@@ -135,6 +136,10 @@ fn points_that_no_compressor_has_are_unusable() {
     let map = read("N [rpm],flow [kg/s],PR,eta\n0,0,1,\n80e3,0.1,2,1.3\n80e3,0.12,1.9,0.7\n").unwrap();
     let verdicts = map.map.lines[0].points.iter().map(|point| point.identified.verdict);
     assert_eq!(verdicts.collect::<Vec<_>>(), [Verdict::Unusable, Verdict::Good]);
+    // The turbine of a stand at rest.
+    let text = "N [rpm],m [kg/s],P3 [kPa],T3 [K],P4 [kPa],T4 [K]\n0,0,100,300,100,300\n80000,0.1,180,873,101,790\n";
+    let found = read_turbine_text(text, &MapDescription::default()).unwrap();
+    assert_eq!((found.map.points.len(), found.remarks.contains(&ImportRemark::Standstill { rows: vec![2] })), (1, true));
 }
 
 #[test]

@@ -4,7 +4,7 @@ use crate::table::columns::column::parts;
 use crate::table::sheet::grid::{Grid, GridRow};
 use crate::table::units_row::merge_units_row;
 use mapper_core::ImportRemark;
-use mapper_table::{ColumnName, Word, is_unit};
+use mapper_table::{ColumnName, Word, bare_unit, is_dimensionless, is_unit, is_units_row};
 
 /// A row of headings.
 pub(crate) struct Headings {
@@ -27,7 +27,12 @@ impl Headings {
         let near = grid.rows.iter().enumerate().skip(index + 1).take(MAX_ROWS_TO_UNITS);
         let mut near = near.take_while(|(_, row)| !row.cells.iter().any(is_number));
         let below = near.find_map(|(at, row)| Some((at + 1, merge_units_row(&names, &row.cells)?)));
-        let above = || above.and_then(|row| Some((index + 1, merge_units_row(&names, &row.cells)?)));
+        // Above there may be any text: units are most of its cells.
+        let is_units = |row: &&GridRow| {
+            let known = row.cells.iter().filter(|cell| is_unit(bare_unit(cell)) && !is_dimensionless(cell));
+            known.count() > 1 && is_units_row(&row.cells)
+        };
+        let above = || Some((index + 1, merge_units_row(&names, &above.filter(is_units)?.cells)?));
         let (first_row, cells) = below.or_else(above).unwrap_or_else(|| (index + 1, names.clone()));
         Headings { cells, names, first_row }
     }

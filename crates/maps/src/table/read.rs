@@ -155,7 +155,7 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedMap, Import
     for point in map.lines.iter_mut().flat_map(|line| &mut line.points).map(|point| &mut point.identified) {
         // A rise below zero has no efficiency.
         let readings = measured.get(point.step).filter(|_| point.eta.is_none());
-        point.warnings.extend(readings.map(|readings| no_efficiency(readings)));
+        point.warnings.extend(readings.map(no_efficiency));
     }
     remarks.extend(shift_remark(&map));
     map.efficiency =

@@ -5,10 +5,8 @@
 
 use crate::heading::{digits, heading};
 use crate::simulation_table::SimulationTable;
-use mapper_core::{
-    CompressorMap, ExportError, ImportError, ImportedMap, MapDescription, MapFormat, ReferenceState,
-};
-use mapper_maps::table::{read_text, resolve_reference};
+use mapper_core::{CompressorMap, ExportError, ImportError, ImportedMap, MapDescription, MapFormat};
+use mapper_maps::table::{DEFINITION_PREFIX, read_text};
 
 pub(crate) const FORMAT: MapFormat = MapFormat {
     name: "mat",
@@ -21,8 +19,8 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
 
 /// Name of the matrix of points: speed, flow, pressure ratio, efficiency.
 const POINTS: &str = "points_rpm_kg_s_pressure_ratio_efficiency";
-/// Names of the reference state.
-const REFERENCE: [&str; 2] = ["reference_temperature_K", "reference_pressure_Pa"];
+/// Name of the text about the map.
+const ABOUT: &str = "about";
 
 /// Numbers in 64 bits, the least significant byte first.
 const NUMBERS: u32 = 0;
@@ -35,12 +33,12 @@ fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
     let about = heading(map, "") + &table.remarks("");
     matrix(
         &mut file,
-        "about",
+        ABOUT,
         TEXT,
         &[about.trim().chars().map(|letter| f64::from(u32::from(letter))).collect()],
     );
-    matrix(&mut file, REFERENCE[0], NUMBERS, &[vec![map.reference.t_ref_k]]);
-    matrix(&mut file, REFERENCE[1], NUMBERS, &[vec![map.reference.p_ref_pa]]);
+    matrix(&mut file, "reference_temperature_K", NUMBERS, &[vec![map.reference.t_ref_k]]);
+    matrix(&mut file, "reference_pressure_Pa", NUMBERS, &[vec![map.reference.p_ref_pa]]);
     matrix(&mut file, "corrected_speed_rpm", NUMBERS, std::slice::from_ref(&table.speeds_rpm));
     matrix(&mut file, "beta", NUMBERS, std::slice::from_ref(&table.beta));
     matrix(&mut file, "pressure_ratio", NUMBERS, &table.pressure_ratio);
@@ -72,17 +70,23 @@ fn read(bytes: &[u8], given: &MapDescription) -> Result<ImportedMap, ImportError
         });
     };
     let count = points.rows.len() / 4;
-    let mut text = "speed [rpm],flow [kg/s],PR,efficiency\n".to_owned();
+    let about = matrices.iter().find(|matrix| matrix.name == ABOUT);
+    let about: String = about
+        .iter()
+        .flat_map(|matrix| &matrix.rows)
+        .filter_map(|code| char::from_u32(*code as u32))
+        .collect();
+    // Name, reference state and definition of the efficiency, as in the comments of text files.
+    let is_note = |line: &&str| {
+        ["compressor map of ", "reference state", DEFINITION_PREFIX].iter().any(|s| line.contains(s))
+    };
+    let mut text: String = about.lines().filter(is_note).map(|line| format!("# {line}\n")).collect();
+    text += "speed [rpm];flow [kg/s];PR;efficiency\n";
     for row in 0..count {
         let value = |column: usize| points.rows.get(column * count + row).copied().filter(|v| v.is_finite());
-        text += &([0, 1, 2, 3].map(|column| digits(value(column))).join(",") + "\n");
+        text += &([0, 1, 2, 3].map(|column| digits(value(column))).join(";") + "\n");
     }
-    let number = |name: &str| matrices.iter().find(|matrix| matrix.name == name)?.rows.first().copied();
-    let found = REFERENCE.map(number);
-    let found = found[0].zip(found[1]).map(|(t_ref_k, p_ref_pa)| ReferenceState { t_ref_k, p_ref_pa });
-    let found = found.filter(ReferenceState::is_plausible);
-    let reference = resolve_reference(found, given.reference)?;
-    read_text(&text, &MapDescription { reference: Some(reference), ..given.clone() })
+    read_text(&text, given)
 }
 
 /// A matrix of numbers, column by column.

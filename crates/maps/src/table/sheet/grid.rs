@@ -125,11 +125,15 @@ impl Grid {
             let is_units =
                 ["unit", "einheit"].iter().any(|word| title.trim().to_lowercase().starts_with(word));
             let mark = [',', ';', '|'].into_iter().find(|mark| list.matches(*mark).count() >= 2);
-            if let Some(mark) = mark.filter(|mark| separator != *mark as u8 && (row.is_comment || is_units)) {
+            // `Reference: 298 K, 100 kPa, dry` has values.
+            let has_value =
+                |mark| list.split(mark).any(|name| name.trim().starts_with(|c: char| c.is_ascii_digit()));
+            let mark = mark.filter(|mark| separator != *mark as u8 && (is_units || !has_value(*mark)));
+            if let Some(mark) = mark.filter(|_| row.is_comment || is_units) {
                 row.cells = list.split(mark).map(|name| name.trim().to_owned()).collect();
-            } else if row.is_comment && separator != b' ' && Some(list.split_whitespace().count()) == columns
+            } else if row.is_comment && separator != b' ' && Some(text.split_whitespace().count()) == columns
             {
-                row.cells = list.split_whitespace().map(str::to_owned).collect();
+                row.cells = text.split_whitespace().map(str::to_owned).collect();
             }
         }
         rows.sort_by_key(|row| (row.at, row.is_comment));

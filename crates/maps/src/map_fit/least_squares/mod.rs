@@ -2,7 +2,6 @@
 
 pub(crate) mod common_errors;
 pub(crate) mod observations;
-pub(crate) mod precisions;
 pub(crate) mod problem;
 pub(crate) mod solution;
 pub(crate) mod solve;

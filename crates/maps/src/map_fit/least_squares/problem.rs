@@ -5,7 +5,6 @@
 
 use crate::map_fit::MapFitError;
 use crate::map_fit::least_squares::observations::{Observation, Observations};
-use crate::map_fit::least_squares::precisions::{Precisions, ROBUST_SIGMAS};
 use crate::map_fit::speed_lines::line_shape::{
     CHOKE_FLOW, CHOKE_HEAD, EXPONENTS, FlowFrame, LineShape, PARAMETERS, Parameters, WORK, ZERO_SLOPE_FLOW,
     ZERO_SLOPE_HEAD,
@@ -15,6 +14,23 @@ use crate::map_fit::speed_lines::nearest::{Foot, Scales, nearest, normal};
 use crate::map_fit::speed_lines::splines::{Rows, Splines};
 use mapper_numerics::statistics::{mean, median, quantile};
 use nalgebra::{DMatrix, DVector};
+
+/// Standard errors beyond which a residual loses weight. Bound: by chance exceeded once in 370 times.
+pub(crate) const ROBUST_SIGMAS: f64 = 3.0;
+
+/// Range of the precision of a roughness over its starting value. Bound: twenty times stiffer is visually straight; a stiffer one would
+/// make errors beyond the measured lines too small.
+pub(crate) const ROUGHNESS_PRECISION_RANGE: [f64; 2] = [0.03, 20.0];
+
+/// Variance components.
+pub(crate) struct Precisions {
+    /// Precision of the roughness of each parameter over speed.
+    pub(crate) rough: Parameters,
+    /// Precision of each line offset.
+    pub(crate) lines: [f64; 3],
+    /// Scales of the residuals of distance and efficiency.
+    pub(crate) scales: [f64; 2],
+}
 
 /// Minimum distance of knots over speed, ratio. Bound: stands hold a speed within 1 %.
 const MIN_KNOT_DISTANCE_RATIO: f64 = 0.02;

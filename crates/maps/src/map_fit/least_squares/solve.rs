@@ -2,8 +2,9 @@
 
 use crate::map_fit::MapFitError;
 use crate::map_fit::least_squares::observations::Observations;
-use crate::map_fit::least_squares::precisions::{Precisions, ROUGHNESS_PRECISION_RANGE};
-use crate::map_fit::least_squares::problem::{LINE_OFFSETS, Problem, Unknowns};
+use crate::map_fit::least_squares::problem::{
+    LINE_OFFSETS, Precisions, Problem, ROUGHNESS_PRECISION_RANGE, Unknowns,
+};
 use crate::map_fit::least_squares::solution::Solution;
 use crate::map_fit::speed_lines::ends::EndWidenings;
 use crate::map_fit::speed_lines::line_shape::{FlowFrame, Parameters, WORK};

@@ -5,8 +5,9 @@
 //! optimization", Biometrics 73 (2017) 1071-1081). The number of lines thereby determines the
 //! detail over speed: parameters that a map does not determine stay straight.
 
-use crate::map_fit::least_squares::precisions::{Precisions, ROBUST_SIGMAS, ROUGHNESS_PRECISION_RANGE};
-use crate::map_fit::least_squares::problem::{Problem, Unknowns};
+use crate::map_fit::least_squares::problem::{
+    Precisions, Problem, ROBUST_SIGMAS, ROUGHNESS_PRECISION_RANGE, Unknowns,
+};
 use crate::map_fit::speed_lines::line_shape::{PARAMETERS, Parameters};
 use nalgebra::DMatrix;
 

@@ -70,7 +70,7 @@ pub(crate) struct TolerancesElement {
     #[serde(rename = "actuator_lag", deserialize_with = "si::<Duration, _>")]
     #[schemars(with = "Quantity<Duration>", extend("x-min" = "0 s", "x-max" = "60 s"), example = &"0.3 s")]
     actuator_lag_s: f64,
-    /// Share of the flow that returns from the wheel's outlet to its inlet; some 2 % with a ported shroud; 0.5 % if none is given.
+    /// Share of the flow that returns from the wheel's outlet to its inlet; 0.5 % with a plain shroud, 2 % with a ported one; 1 % if none is given.
     #[serde(rename = "recirculation", deserialize_with = "si::<Fraction, _>")]
     #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "30 %"), example = &"2 %")]
     recirculation_ratio: f64,

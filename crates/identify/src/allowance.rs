@@ -8,35 +8,9 @@
 use crate::IdentifyConfig;
 use crate::single_step::budgets;
 use crate::step_data::end_state::EndState;
-use mapper_core::{ModelTolerances, UncertaintyBudget, half_width_95};
+use mapper_core::{UncertaintyBudget, half_width_95};
 use mapper_physics::laws::compression::isentropic_rise_ratio;
 use mapper_physics::laws::thermocouple::dynamic_temperature_k;
-use serde::{Deserialize, Serialize};
-
-/// Declared sizes, one standard deviation each.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Allowance {
-    /// Share of the delivered flow that recirculates.
-    pub recirculation_ratio: f64,
-    /// Share of the dynamic temperature that the T2 probe may miss.
-    pub t2_recovery_ratio: f64,
-    /// Conductance from the bearing housing to the gas behind the wheel, W/K.
-    pub heat_behind_wheel_w_k: f64,
-}
-
-impl From<&ModelTolerances> for Allowance {
-    fn from(tolerances: &ModelTolerances) -> Self {
-        let &ModelTolerances { recirculation_ratio, t2_recovery_ratio, heat_behind_wheel_w_k, .. } =
-            tolerances;
-        Allowance { recirculation_ratio, t2_recovery_ratio, heat_behind_wheel_w_k }
-    }
-}
-
-impl Default for Allowance {
-    fn default() -> Self {
-        Allowance::from(&ModelTolerances::default())
-    }
-}
 
 /// The parts of an efficiency that may be something else; `None` without compression.
 pub(crate) fn budget(eta: f64, state: &EndState, config: &IdentifyConfig) -> Option<UncertaintyBudget> {

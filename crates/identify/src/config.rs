@@ -1,8 +1,9 @@
 //! Configuration of identification: method, window, geometry, declared uncertainty, thresholds.
 
-use crate::allowance::Allowance;
 use crate::step_outcome::error::IdentifyError;
-use mapper_core::{Channel, InletConvection, JointSettings, Method, ReferenceState, SettleBands, WindowRule};
+use mapper_core::{
+    Channel, InletConvection, JointSettings, Method, ModelTolerances, ReferenceState, SettleBands, WindowRule,
+};
 pub use mapper_core::{DeclaredUncertainty, NoiseColour};
 use mapper_numerics::coloured_noise::ColouredNoise;
 use mapper_physics::gas::air::Air;
@@ -231,6 +232,31 @@ impl Housing {
             external_area_m2: declared.external_area_m2 * area_ratio,
             ..declared
         }
+    }
+}
+
+/// Sizes of what is efficiency for the method but may be something else, one standard deviation each.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Allowance {
+    /// Share of the delivered flow that recirculates.
+    pub recirculation_ratio: f64,
+    /// Share of the dynamic temperature that the T2 probe may miss.
+    pub t2_recovery_ratio: f64,
+    /// Conductance from the bearing housing to the gas behind the wheel, W/K.
+    pub heat_behind_wheel_w_k: f64,
+}
+
+impl From<&ModelTolerances> for Allowance {
+    fn from(tolerances: &ModelTolerances) -> Self {
+        let &ModelTolerances { recirculation_ratio, t2_recovery_ratio, heat_behind_wheel_w_k, .. } =
+            tolerances;
+        Allowance { recirculation_ratio, t2_recovery_ratio, heat_behind_wheel_w_k }
+    }
+}
+
+impl Default for Allowance {
+    fn default() -> Self {
+        Allowance::from(&ModelTolerances::default())
     }
 }
 

@@ -31,8 +31,9 @@ mod single_step;
 mod step_data;
 mod step_outcome;
 
-pub use allowance::Allowance;
-pub use config::{DeclaredUncertainty, Housing, IdentifyConfig, NoiseColour, PressureTap, Thresholds};
+pub use config::{
+    Allowance, DeclaredUncertainty, Housing, IdentifyConfig, NoiseColour, PressureTap, Thresholds,
+};
 pub use faults::balance_rows::Machine;
 pub use faults::end_readings::MAX_CORRELATED_ROWS;
 pub use faults::found_fault::{FoundFault, Suspect};

@@ -28,7 +28,8 @@ pub(crate) fn points_with_budgets(
             let samples = |channel: Channel| {
                 recording.series.get(&channel).map_or(1, |series| series.range(start_s, step.end_s).len())
             };
-            all.push(budgets::of_point(&point, &state, estimate, samples, config));
+            let eta_allowance = point.eta.and_then(|eta| allowance::budget(eta, &state, config));
+            all.push(budgets::of_point(&point, eta_allowance, estimate, samples, config));
             Ok(point)
         };
     let steps = recording.steps.iter().zip(found).zip(estimates);

@@ -3,6 +3,7 @@
 //!
 //! Each source of uncertainty is changed by one standard deviation to both sides, and the efficiency is computed again.
 
+use crate::allowance;
 use crate::points::point;
 use crate::single_step::budgets;
 use crate::single_step::dynamic::{Estimate, judge_assumption};
@@ -95,7 +96,8 @@ fn of_point(
         valve_opening_ratio: f64::NAN,
     };
     let point = point(&step, &state, &estimate, findings, config);
-    let budgets = budgets::of_point(&point, &state, &estimate, |_| samples(config), config);
+    let eta_allowance = point.eta.and_then(|eta| allowance::budget(eta, &state, config));
+    let budgets = budgets::of_point(&point, eta_allowance, &estimate, |_| samples(config), config);
     (point, budgets)
 }
 

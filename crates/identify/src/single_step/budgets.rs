@@ -1,9 +1,7 @@
 //! Uncertainty budgets of a point.
 
 use crate::IdentifyConfig;
-use crate::allowance;
 use crate::single_step::dynamic::Estimate;
-use crate::step_data::end_state::EndState;
 use mapper_core::{
     BudgetRow, Channel, EstimateUncertainty, IdentifiedPoint, PointBudgets, UncertaintyBudget, half_width_95,
 };
@@ -26,10 +24,10 @@ pub(crate) fn own_row(source: &str, contribution: f64, unit: &str) -> BudgetRow 
     row(source.to_owned(), contribution.abs(), unit, 1.0_f64.copysign(contribution), contribution)
 }
 
-/// The budgets of a point from its estimate. `samples`: number of samples that its state is the mean of.
+/// The budgets of a point from its estimate, and that of what may be something else. `samples`: number of samples that its state is the mean of.
 pub(crate) fn of_point(
     point: &IdentifiedPoint,
-    state: &EndState,
+    eta_allowance: Option<UncertaintyBudget>,
     estimate: &Estimate,
     samples: impl Fn(Channel) -> usize,
     config: &IdentifyConfig,
@@ -43,7 +41,7 @@ pub(crate) fn of_point(
     PointBudgets {
         step: point.step,
         eta: of(point.eta, point.eta_low, point.eta_high, eta, point.eta_uncertainty, "1"),
-        eta_allowance: point.eta.and_then(|eta| allowance::budget(eta, state, config)),
+        eta_allowance,
         h_w_m2k: of(point.h_w_m2k, point.h_low_w_m2k, point.h_high_w_m2k, h, point.h_uncertainty, "W/(m2 K)"),
         pressure_ratio: pressure_ratio(point, samples, config),
     }

@@ -75,7 +75,7 @@ fn a_failure_is_one_json_object() {
         assert_eq!(mistakes["findings"][0]["kind"], "unknown_key", "{mistakes}");
         assert!(mistakes["help"].as_str().unwrap().contains("seed"), "{mistakes}");
     }
-    failed(&["run", SHIPPED, "--live=nowhere"], 3);
+    failed(&["run", SHIPPED, "--live=nowhere"], 2);
 }
 
 /// Every failure prints one object on standard output, with the exit code of the process.

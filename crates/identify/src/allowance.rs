@@ -1,6 +1,6 @@
 //! What is efficiency for every method but may be something else: recirculation through the wheel, recovery of the T2 probe, and heat that reaches
 //! the gas behind the wheel without passing the housing. No recording of T2 and Tc separates them from the efficiency, so they are not part of its
-//! interval: they stand beside it, with the sizes that `tolerances:` declares.
+//! interval: they are stated next to it, with the sizes that `tolerances:` declares.
 //!
 //! A recirculating share r lowers the efficiency by `r (1 + X)` of itself, with X the rise over T1 (mixing at the inlet, to first order). A reading
 //! of T2 that is off by dT moves it by dT over the rise, and so does heat Q with `dT = Q/(m cp)`.

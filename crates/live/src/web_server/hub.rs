@@ -64,7 +64,7 @@ mod tests {
         assert_eq!(slow.iter().count(), MAX_QUEUED_MESSAGES);
     }
 
-    /// Nobody of them reads, and none is told from one that does.
+    /// None of them reads, and the page cannot tell which ones do.
     #[test]
     fn a_further_browser_replaces_the_oldest_of_the_address_with_the_most() {
         let hub = Hub::default();

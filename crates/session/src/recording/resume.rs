@@ -130,7 +130,7 @@ impl InterruptedRun {
                 return not_resumable(format!("{} changed since", differences.join(" and ")));
             }
         }
-        // A step that was only repeated to approach another one is no loss.
+        // A step that was only repeated to approach another one need not be measured again.
         let is_due = |index: &usize| plan.steps.iter().any(|step| step.index == *index);
         let is_any = depends_on_readings(campaign);
         self.parts.iter_mut().for_each(|part| part.lost.retain(|index| is_any || is_due(index)));

@@ -26,16 +26,15 @@ pub mod efficiency_mesh;
 mod figure_layout;
 mod items;
 mod map_drawing;
-mod markers;
 pub mod palette;
 mod rendering;
 mod text;
 
-pub use contours::contour_item::Contours;
-pub use contours::grid::StructuredGrid;
-pub use contours::marching::contour_lines;
-pub use figure_layout::axis::Axis;
+pub use contours::Contours;
+pub use contours::StructuredGrid;
+pub use contours::contour_lines;
 pub use figure_layout::figure::{Figure, Panel};
+pub use figure_layout::frame::Axis;
 pub use items::{
     Annotation, Dash, Item, Line, LineEnd, Marker, Note, PointLabels, Polygon, Rule, RuleAt, Scatter,
     ScatterPoint,

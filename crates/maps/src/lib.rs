@@ -9,24 +9,21 @@
 mod assemble;
 mod compare;
 mod efficiency_definition;
-mod error;
-mod grouping;
 mod heat_correction;
 mod line_ends;
 mod map_fit;
-mod repeated_jumps;
 mod repeats;
 pub mod table;
 mod turbine;
 
+pub use assemble::AssembleError;
 pub use assemble::assemble;
 pub use compare::{MapComparison, PlaceComparison, SpeedLineComparison, compare};
 pub use efficiency_definition::convert_efficiency;
-pub use error::AssembleError;
 pub use heat_correction::{CorrectedLine, HeatCorrection, HeatCorrectionError, correct_for_heat};
 pub use line_ends::{DetectedEnd, LineEnds, mark_line_ends};
 pub use map_fit::{MapFit, MapFitError, MapFitOptions, NearestPlace, fit_map, leave_out};
-pub use repeated_jumps::{RepeatedJump, repeated_jumps};
+pub use repeats::{RepeatedJump, repeated_jumps};
 pub use turbine::turbine_compare::{TurbineComparison, TurbinePointComparison, compare_turbines};
 pub use turbine::turbine_fit::{TurbineFit, TurbineFitError, fit_turbine};
 pub use turbine::turbine_points::{ReducedTurbinePoint, reduce_turbine};

@@ -1,10 +1,6 @@
 //! Layout of a figure before it is drawn: panels, axes, ticks, legends, and positions of labels.
 
-pub(crate) mod axis;
 pub(crate) mod clip;
 pub(crate) mod figure;
 pub(crate) mod frame;
-pub(crate) mod layout;
-pub(crate) mod legend;
 pub(crate) mod point_labels;
-pub(crate) mod ticks;

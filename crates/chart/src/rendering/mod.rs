@@ -1,6 +1,5 @@
 //! Drawing of a laid-out figure as SVG or PNG, identical on every computer.
 
 pub(crate) mod draw;
-pub(crate) mod glyphs;
 pub(crate) mod png;
 pub(crate) mod svg;

@@ -1,19 +1,21 @@
-//! Fits a smooth surface to all speed lines together.
+//! Fits a smooth surface to all speed lines together, stiff enough that no lines cross.
 
-mod error;
-mod fit;
 mod fitted_surface;
 mod least_squares;
 mod prediction_errors;
 mod speed_lines;
 
-pub use error::MapFitError;
-pub(crate) use fitted_surface::surface::{MIN_FLOW_KG_S, MIN_RATIO_RANGE};
-pub use fitted_surface::surface::{MapFit, NearestPlace};
-pub use fitted_surface::table::MapFitOptions;
-pub use prediction_errors::leave_out::leave_out;
+pub(crate) use fitted_surface::{MIN_FLOW_KG_S, MIN_RATIO_RANGE};
+pub use fitted_surface::{MapFit, MapFitOptions, NearestPlace};
+pub use prediction_errors::leave_out;
 
-use mapper_core::{CompressorMap, FittedMap};
+use fitted_surface::table;
+use least_squares::observations::Observations;
+use least_squares::solve::{Solution, solve};
+use mapper_core::{CompressorMap, FittedLine, FittedMap};
+use speed_lines::line_shape::count_crossings;
+use speed_lines::speed_spline::End;
+use std::collections::BTreeMap;
 
 impl MapFit {
     /// The fit as a table.
@@ -21,7 +23,7 @@ impl MapFit {
     /// # Errors
     /// [`MapFitError::Speed`] for a further speed below a tenth of the slowest or above 1.3 times the fastest line.
     pub fn table(&self, options: &MapFitOptions) -> Result<FittedMap, MapFitError> {
-        let mut table = fitted_surface::table::table(self, options)?;
+        let mut table = table(self, options)?;
         if options.leave_one_out {
             table.left_out = leave_out(self);
         }
@@ -37,4 +39,78 @@ pub fn fit_map(mut map: CompressorMap, options: &MapFitOptions) -> Result<Compre
     let fit = MapFit::new(&map)?;
     map.fitted = Some(fit.table(options)?);
     Ok(map)
+}
+
+/// Why a map could not be fitted.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
+pub enum MapFitError {
+    #[error("the map has {0} speed line(s) with points; a fit over speed needs at least 2")]
+    TooFewLines(usize),
+    /// `points` have flow and pressure ratio, `with_eta` an efficiency too.
+    #[error(
+        "the map has {points} points and {with_eta} efficiencies; a fit needs at least 8 and 6, preferably 5 or more on each line"
+    )]
+    TooFewPoints { points: usize, with_eta: usize },
+    #[error("the map has {points} points on {lines} lines; a fit takes at most {max_points} on {max_lines}")]
+    TooMany { points: usize, lines: usize, max_points: usize, max_lines: usize },
+    #[error(
+        "on the line at {speed_corrected_rpm} rpm no pressure ratio is above 1; a fit needs lines on which the machine compresses"
+    )]
+    NoCompression { speed_corrected_rpm: f64 },
+    #[error(
+        "a line at {speed_corrected_rpm} rpm is outside the range of the fit; give a speed between {lowest_rpm} and {highest_rpm} rpm"
+    )]
+    Speed { speed_corrected_rpm: f64, lowest_rpm: f64, highest_rpm: f64 },
+    #[error(
+        "the fit did not converge: its equations became singular; look for points far from their line, and for lines with equal speeds"
+    )]
+    Singular,
+}
+
+/// Factors on the smallest penalty that are tried until no lines cross. Bound: the last is nearly similarity, whose lines do not cross.
+const STIFFNESSES: [f64; 3] = [1.0, 30.0, 1000.0];
+
+impl MapFit {
+    /// Fits all lines of a map, every point at its own corrected speed.
+    ///
+    /// If lines cross, the fit is made again with stiffer parameters over speed.
+    ///
+    /// # Errors
+    /// [`MapFitError`] if there are too few or too many points, or they do not determine the fit.
+    pub fn new(map: &CompressorMap) -> Result<Self, MapFitError> {
+        Ok(MapFit::of(Observations::of(map)?, None)?.widened(&[End::Slow, End::Fast]))
+    }
+
+    /// As [`MapFit::new`], without widened errors beyond the measured speeds. `start`: a fit of nearly the same points, from which the search
+    /// starts.
+    pub(crate) fn of(data: Observations, start: Option<&Solution>) -> Result<Self, MapFitError> {
+        let mut best: Option<(usize, MapFit)> = None;
+        for stiffness in STIFFNESSES {
+            let solution = solve(&data, stiffness, start)?;
+            let fit = MapFit { solution, data: data.clone(), without_line: BTreeMap::new() };
+            let crossings = count_crossings(&fit.lines_for_check());
+            if best.as_ref().is_none_or(|(min, _)| crossings < *min) {
+                best = Some((crossings, fit));
+            }
+            if crossings == 0 {
+                break;
+            }
+        }
+        best.map(|(_, fit)| fit).ok_or(MapFitError::Singular)
+    }
+
+    /// The fit of the other lines, searched from this one; `None` if they cannot be fitted.
+    pub(crate) fn fit_without_line(&self, line: usize) -> Option<MapFit> {
+        if let Some(known) = self.without_line.get(&line) {
+            return Some(known.clone());
+        }
+        MapFit::of(self.data.without_line(line).ok()?, Some(&self.solution)).ok()
+    }
+
+    /// Measured and a few extrapolated lines with few nodes, to count crossings.
+    fn lines_for_check(&self) -> Vec<FittedLine> {
+        let options = MapFitOptions { further_speeds_rpm: None, nodes: 41, leave_one_out: false };
+        table(self, &options).map(|table| table.lines).unwrap_or_default()
+    }
 }

@@ -2,24 +2,22 @@
 
 mod columns;
 mod description;
-mod efficiency_comment;
 mod gas_turbine;
 mod read;
 mod read_turbine;
 mod reference;
 mod rows_to_lines;
 mod sheet;
-mod units_row;
 
 pub use crate::assemble::line;
 pub use description::{
     DescriptionError, description_from_yaml, description_text, read_description, set_key,
     turbine_description_text,
 };
-pub use efficiency_comment::{DEFINITION_PREFIX, efficiency_in_comment};
 pub use read::{read_any_bytes, read_any_text, read_text, read_workbook};
 pub use read_turbine::{read_turbine_text, read_turbine_workbook, reduced_turbine_point};
+pub use reference::{DEFINITION_PREFIX, efficiency_in_comment};
 pub use reference::{parse_reference, reference_in_comment, resolve_reference};
 pub use rows_to_lines::{MAX_POINTS, Row, check_point_count, map_of_rows, shift_remark};
-pub use sheet::file_text::{file_text, text_of_lines, unpack};
 pub use sheet::grid::text_of;
+pub use sheet::workbook::{file_text, text_of_lines, unpack};

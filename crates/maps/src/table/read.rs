@@ -4,10 +4,10 @@
 use crate::table::columns::column::{Column, Machine};
 use crate::table::columns::described_columns::DescribedColumns;
 use crate::table::columns::quantity::Quantity;
-use crate::table::efficiency_comment::efficiency_in_comment;
 use crate::table::gas_turbine::beta_tables::{read_arrays, read_gsp, read_modelica, read_nested};
 use crate::table::gas_turbine::design_point::{MapDesign, scale_to_design};
 use crate::table::reference;
+use crate::table::reference::efficiency_in_comment;
 use crate::table::rows_to_lines::{Row, map_of_rows, shift_remark, surge_marks};
 use crate::table::sheet::grid::{Grid, text_of};
 use crate::table::sheet::layout::{self, Layout};

@@ -1,6 +1,6 @@
-//! Parses reference states, and resolves those of the file and of the user.
+//! Reference states and definitions of the efficiency from the file, its comments, and the user.
 
-use mapper_core::{ImportError, ReferenceState};
+use mapper_core::{EfficiencyDefinition, ImportError, ReferenceState};
 use mapper_yaml::units::{Kind, parse, parse_with};
 
 /// A reference state from a name (`SAE`, `Garrett`, `BorgWarner`) or `"T, P"` with units, as in `298 K, 100 kPa`.
@@ -56,6 +56,15 @@ const SAME_PA: f64 = 20.0;
 /// Equal within the rounding of printed digits.
 fn equal_as_printed(a: ReferenceState, b: ReferenceState) -> bool {
     (a.t_ref_k - b.t_ref_k).abs() < SAME_K && (a.p_ref_pa - b.p_ref_pa).abs() < SAME_PA
+}
+
+/// Start of the comment that names the definition of the efficiency.
+pub const DEFINITION_PREFIX: &str = "definition of efficiency: ";
+
+/// The definition of the efficiency that a comment names.
+pub fn efficiency_in_comment(comment: &str) -> Option<EfficiencyDefinition> {
+    let (_, definition) = comment.split_once(DEFINITION_PREFIX)?;
+    definition.split('(').next()?.parse().ok()
 }
 
 #[cfg(test)]

@@ -1,8 +1,6 @@
 //! The penalised least-squares problem of a map fit: observations, shared errors, solution, and variance components.
 
-pub(crate) mod common_errors;
 pub(crate) mod observations;
 pub(crate) mod problem;
-pub(crate) mod solution;
 pub(crate) mod solve;
 pub(crate) mod variances;

@@ -11,7 +11,7 @@ use crate::map_fit::speed_lines::line_shape::{
 };
 use crate::map_fit::speed_lines::nearest::MIN_SQUARE_SLOPE;
 use crate::map_fit::speed_lines::nearest::{Foot, Scales, nearest, normal};
-use crate::map_fit::speed_lines::splines::{Rows, Splines};
+use crate::map_fit::speed_lines::speed_spline::{Rows, Splines};
 use mapper_numerics::statistics::{mean, median, quantile};
 use nalgebra::{DMatrix, DVector};
 

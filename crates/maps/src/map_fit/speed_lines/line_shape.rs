@@ -10,6 +10,7 @@
 //! friction and recirculation) is a cubic of the flow coefficient with two terms for the drop towards choke; it
 //! changes little with speed, so efficiency can be extrapolated over speed.
 
+use mapper_core::FittedLine;
 use mapper_physics::compressor_map::characteristic::pressure_ratio_of_signed_head;
 
 /// Range of ln of an exponent minus its minimum. Bound: from corners to nearly a rectangle; beyond, the line does not change visibly.
@@ -24,9 +25,9 @@ const START_RADIUS_LN: f64 = 0.15;
 pub(crate) const ANGLE_PRECISION_RAD: f64 = 1e-7;
 
 /// Terms of the radius' correction. Bound: more would follow the scatter of points.
-pub(crate) const HARMONICS: usize = 2;
+const HARMONICS: usize = 2;
 /// Terms of the work coefficient. Bound: more would follow the scatter of points.
-pub(crate) const WORK_TERMS: usize = 6;
+const WORK_TERMS: usize = 6;
 /// Parameters of a line. Source: choke flow, head and flow at zero slope, choke head, two exponents, and the terms.
 pub(crate) const PARAMETERS: usize = 6 + HARMONICS + WORK_TERMS;
 
@@ -43,7 +44,7 @@ pub(crate) const CHOKE_HEAD: Index = 3;
 /// Parameters: logarithms of the exponents minus [`MIN_EXPONENT`].
 pub(crate) const EXPONENTS: [Index; 2] = [4, 5];
 /// First parameter of the correction.
-pub(crate) const HARMONIC: Index = 6;
+const HARMONIC: Index = 6;
 /// First parameter of the work coefficient.
 pub(crate) const WORK: Index = 6 + HARMONICS;
 
@@ -190,6 +191,25 @@ impl LineShape {
     }
 }
 
+/// Number of pairs of neighbouring lines with intersecting segments.
+pub(crate) fn count_crossings(lines: &[FittedLine]) -> usize {
+    lines.windows(2).filter(|pair| lines_cross(&pair[0], &pair[1])).count()
+}
+
+fn lines_cross(a: &FittedLine, b: &FittedLine) -> bool {
+    let points = |line: &FittedLine| -> Vec<(f64, f64)> {
+        line.nodes.iter().map(|n| (n.flow_corrected_kg_s, n.pressure_ratio)).collect()
+    };
+    let (a, b) = (points(a), points(b));
+    a.windows(2).any(|s| b.windows(2).any(|t| segments_meet(s[0], s[1], t[0], t[1])))
+}
+
+fn segments_meet(a: (f64, f64), b: (f64, f64), c: (f64, f64), d: (f64, f64)) -> bool {
+    let side =
+        |p: (f64, f64), q: (f64, f64), r: (f64, f64)| (q.0 - p.0) * (r.1 - p.1) - (q.1 - p.1) * (r.0 - p.0);
+    side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) < 0.0
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -215,5 +235,12 @@ mod tests {
                 prop_assert!((x.abs().powf(shape.exponents[0]) + y.abs().powf(shape.exponents[1]) - 1.0).abs() < 1e-9);
             }
         }
+    }
+
+    #[test]
+    fn a_cross_is_a_cross_and_neighbours_are_none() {
+        assert!(segments_meet((0.0, 0.0), (1.0, 1.0), (0.0, 1.0), (1.0, 0.0)));
+        assert!(!segments_meet((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)));
+        assert!(!segments_meet((0.0, 0.0), (1.0, 1.0), (2.0, 0.0), (3.0, 3.5)));
     }
 }

@@ -1,8 +1,5 @@
 //! Shape of the speed lines in a map fit, its variation over speed, and the checks for crossing lines.
 
-pub(crate) mod crossing;
-pub(crate) mod ends;
 pub(crate) mod line_shape;
 pub(crate) mod nearest;
 pub(crate) mod speed_spline;
-pub(crate) mod splines;

@@ -3,7 +3,7 @@
 //! Source: P. J. Green, B. W. Silverman, Nonparametric Regression and Generalized Linear Models (1994), ch. 2: values
 //! at the knots as parameters, `g'' = R^-1 Q' g`, integral of `g''^2` equal to `g' K g` with `K = Q R^-1 Q'`.
 
-use crate::map_fit::speed_lines::ends::End;
+use crate::map_fit::speed_lines::line_shape::{PARAMETERS, Parameters, WORK};
 use nalgebra::{DMatrix, DVector};
 
 /// Distance of a speed from a knot at which it counts as the knot, ratio. Bound: rounding.
@@ -160,6 +160,91 @@ impl SpeedSpline {
         let at = self.coordinate.of(speed_ratio);
         let (first, last) = (self.knots[0], self.knots[self.knots.len() - 1]);
         (first - at).max(at - last).max(0.0)
+    }
+}
+
+/// Splines over speed with equal knots.
+#[derive(Debug, Clone)]
+pub(crate) struct Splines {
+    pub shape: SpeedSpline,
+    pub work: SpeedSpline,
+    speed_ratios: Vec<f64>,
+}
+
+impl Splines {
+    pub(crate) fn new(speed_ratios: &[f64]) -> Self {
+        Splines {
+            shape: SpeedSpline::new(Coordinate::Speed, speed_ratios),
+            work: SpeedSpline::new(Coordinate::InverseSpeed, speed_ratios),
+            speed_ratios: speed_ratios.to_vec(),
+        }
+    }
+
+    pub(crate) fn of(&self, parameter: usize) -> &SpeedSpline {
+        if parameter < WORK { &self.shape } else { &self.work }
+    }
+
+    pub(crate) fn rows(&self, speed_ratio: f64) -> Rows {
+        Rows { shape: self.shape.row(speed_ratio), work: self.work.row(speed_ratio) }
+    }
+
+    /// Knot values, one row per parameter, of parameters given as a function of speed.
+    pub(crate) fn values(&self, at: impl Fn(f64) -> Parameters) -> DMatrix<f64> {
+        let mut values = DMatrix::zeros(PARAMETERS, self.len());
+        for (k, speed_ratio) in self.speed_ratios.iter().enumerate() {
+            values.set_column(k, &DVector::from_row_slice(&at(*speed_ratio)));
+        }
+        values
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.shape.len()
+    }
+}
+
+/// Weights of the knot values at a speed.
+pub(crate) struct Rows {
+    pub shape: DVector<f64>,
+    pub work: DVector<f64>,
+}
+
+impl Rows {
+    pub(crate) fn of(&self, parameter: usize) -> &DVector<f64> {
+        if parameter < WORK { &self.shape } else { &self.work }
+    }
+}
+
+/// Factors on the variance beyond one end; 1 if the roughness explains the deviations.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Widening {
+    /// Of the shape of lines.
+    pub shape: f64,
+    /// Of work, and so of efficiency.
+    pub work: f64,
+}
+
+/// No widening. Source: definition.
+pub(crate) const NO_WIDENING: Widening = Widening { shape: 1.0, work: 1.0 };
+
+/// An end of the measured speeds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum End {
+    Slow,
+    Fast,
+}
+
+/// Widenings of both ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct EndWidenings {
+    pub slow: Widening,
+    pub fast: Widening,
+}
+
+impl EndWidenings {
+    pub(crate) const NONE: EndWidenings = EndWidenings { slow: NO_WIDENING, fast: NO_WIDENING };
+
+    pub(crate) fn both(factors: Widening) -> EndWidenings {
+        EndWidenings { slow: factors, fast: factors }
     }
 }
 

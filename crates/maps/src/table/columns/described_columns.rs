@@ -1,6 +1,6 @@
 //! The columns that a map description names.
 
-use crate::table::columns::column::{Column, ColumnError, MAX_HEADING, Machine, column, is_unit, parts};
+use crate::table::columns::column::{Column, ColumnError, MAX_HEADING, Machine, column, is_unit_of, parts};
 use crate::table::columns::quantity::Quantity;
 use mapper_core::{ImportError, MapDescription};
 
@@ -46,7 +46,7 @@ impl DescribedColumns {
             };
             let Some(quantity) = Quantity::of_key(column.quantity) else { continue };
             let text = column.text.trim();
-            let (place, unit) = if is_unit(quantity, text) {
+            let (place, unit) = if is_unit_of(quantity, text) {
                 (ColumnPlace::Anywhere, Some(text.to_owned()))
             } else if let Some(numbered) = text.strip_prefix('#') {
                 let end = numbered.find(|c: char| !c.is_ascii_digit()).unwrap_or(numbered.len());
@@ -60,7 +60,7 @@ impl DescribedColumns {
                 let (name, unit) = parts(text);
                 (ColumnPlace::Heading { whole: plain(text), name: plain(&name) }, unit)
             };
-            if let Some(unit) = unit.as_ref().filter(|unit| !is_unit(quantity, unit)) {
+            if let Some(unit) = unit.as_ref().filter(|unit| !is_unit_of(quantity, unit)) {
                 return Err(wrong(format!(
                     "has the unit `{unit}`, which is not a unit of {}; write one of {}",
                     quantity.name(),

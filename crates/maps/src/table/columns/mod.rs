@@ -3,4 +3,3 @@
 pub(crate) mod column;
 pub(crate) mod described_columns;
 pub(crate) mod quantity;
-pub(crate) mod quantity_name;

@@ -1,9 +1,9 @@
 //! Reads tables over speed and an auxiliary coordinate (beta, R line) from the scripts and files of simulation programs: arrays of MATLAB and
 //! Python, nested tables of NPSS.
 
-use crate::table::efficiency_comment::efficiency_in_comment;
-use crate::table::gas_turbine::beta_design::{design_of, flow_unit, interpolate};
 use crate::table::gas_turbine::design_point::{MapDesign, scale_to_design};
+use crate::table::gas_turbine::design_point::{design_of, flow_unit, interpolate};
+use crate::table::reference::efficiency_in_comment;
 use crate::table::reference::reference_in_comment;
 use crate::table::rows_to_lines::{Row, check_point_count, map_of_rows};
 use mapper_core::{CompressorMap, ImportError, ImportRemark, ImportedMap, MapDescription};

@@ -3,7 +3,7 @@
 use crate::table::columns::column::Column;
 use crate::table::columns::described_columns::DescribedColumns;
 use crate::table::columns::quantity::Quantity;
-use crate::table::columns::quantity_name::{end_in, end_of_title, is_end_title};
+use crate::table::columns::quantity::{end_in, end_of_title, is_end_title};
 use crate::table::sheet::grid::{Grid, GridRow};
 use crate::table::sheet::layout::{self, Layout, columns};
 use mapper_core::{ImportRemark, LineEnd};

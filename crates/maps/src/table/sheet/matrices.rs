@@ -4,7 +4,7 @@
 use crate::table::columns::column::{Column, Machine, column};
 use crate::table::columns::quantity::Quantity;
 use crate::table::sheet::grid::{Grid, GridRow};
-use crate::table::sheet::speed_heading::without_speed;
+use crate::table::sheet::headings::without_speed;
 use mapper_table::is_missing_mark;
 use std::collections::HashMap;
 use std::ops::Range;

@@ -1,11 +1,9 @@
 //! Cells of a map table from text or workbook, its layout, and its points as written.
 
 pub(crate) mod end_blocks;
-pub(crate) mod file_text;
 pub(crate) mod grid;
 pub(crate) mod headings;
 pub(crate) mod layout;
 pub(crate) mod matrices;
 pub(crate) mod points;
-pub(crate) mod speed_heading;
 pub(crate) mod workbook;

@@ -3,7 +3,7 @@
 use crate::table::columns::column::Column;
 use crate::table::columns::described_columns::DescribedColumns;
 use crate::table::columns::quantity::Quantity;
-use crate::table::columns::quantity_name::end_in;
+use crate::table::columns::quantity::end_in;
 use crate::table::rows_to_lines::check_point_count;
 use crate::table::sheet::end_blocks::{EndBlocks, RowUse};
 use crate::table::sheet::grid::{Grid, GridRow};

@@ -1,16 +1,177 @@
-//! Tabulates a fit, with errors and marks of extrapolation.
+//! The fitted map for its users: values and standard errors at any place, and a table with marks of extrapolation.
 
 use crate::map_fit::MapFitError;
-use crate::map_fit::fitted_surface::line_errors::LineErrors;
-use crate::map_fit::fitted_surface::surface::{MIN_FLOW_KG_S, MIN_RATIO_RANGE, SPEED_ROUNDING_RATIO};
-use crate::map_fit::fitted_surface::surface::{MapFit, SPEED_RANGE_RATIO};
-use crate::map_fit::speed_lines::crossing::count_crossings;
-use crate::map_fit::speed_lines::line_shape::{ANGLE_RANGE_RAD, LineShape, MIN_ANGLE_RAD};
-use crate::map_fit::speed_lines::nearest::Scales;
+use crate::map_fit::least_squares::observations::Observations;
+use crate::map_fit::least_squares::problem::PARAMETER_STEP;
+use crate::map_fit::least_squares::solve::Solution;
+use crate::map_fit::speed_lines::line_shape::count_crossings;
+use crate::map_fit::speed_lines::line_shape::{
+    ANGLE_RANGE_RAD, FlowFrame, LineShape, MIN_ANGLE_RAD, PARAMETERS, Parameters, WORK,
+};
+use crate::map_fit::speed_lines::nearest::{DIFFERENCE_STEP_RAD, MIN_SQUARE_SLOPE, Scales, nearest, normal};
 use crate::map_fit::speed_lines::speed_spline::SpeedSpline;
 use mapper_core::{FittedLine, FittedMap, FittedNode};
 use mapper_numerics::root::bisect;
 use nalgebra::{DMatrix, DVector};
+use std::collections::BTreeMap;
+
+/// Minimum flow of a line as a unit, kg/s. Bound: excludes division by zero.
+pub(crate) const MIN_FLOW_KG_S: f64 = 1e-12;
+/// Minimum PR - 1 of a line as a unit. Bound: excludes division by zero.
+pub(crate) const MIN_RATIO_RANGE: f64 = 1e-6;
+/// Relative difference of equal speeds. Bound: rounding.
+const SPEED_ROUNDING_RATIO: f64 = 1e-9;
+
+/// Minimum and maximum speed of a fit, over the slowest and the fastest measured speed. Bound: beyond, the errors are larger than the
+/// map.
+const SPEED_RANGE_RATIO: (f64, f64) = (0.1, 1.3);
+
+/// A fitted surface.
+#[derive(Debug, Clone)]
+pub struct MapFit {
+    pub(crate) data: Observations,
+    pub(crate) solution: Solution,
+    /// Fits without an outermost line, by that line, as far as they were needed.
+    pub(crate) without_line: BTreeMap<usize, MapFit>,
+}
+
+/// The place on a fitted line nearest to a point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NearestPlace {
+    /// Distance in units of the line's scales (flow, pressure ratio minus 1), not negative.
+    pub distance_ratio: f64,
+    /// Efficiency of the line at the nearest place, fraction.
+    pub eta: f64,
+    /// One standard error of the line there, across it, in units of the line's scales.
+    pub distance_standard_error_ratio: f64,
+    /// One standard error of the efficiency without the errors common to all points, fraction.
+    pub eta_standard_error: f64,
+}
+
+impl MapFit {
+    /// Nearest place of the line at `speed_corrected_rpm` to a flow (kg/s) and pressure ratio; distances are measured
+    /// in `flow_scale_kg_s` and `ratio_scale`, both above 0.
+    pub fn nearest(
+        &self,
+        speed_corrected_rpm: f64,
+        flow_corrected_kg_s: f64,
+        pressure_ratio: f64,
+        flow_scale_kg_s: f64,
+        ratio_scale: f64,
+    ) -> NearestPlace {
+        let speed_ratio = self.speed_ratio(speed_corrected_rpm);
+        let scales = Scales { flow_kg_s: flow_scale_kg_s, ratio: ratio_scale };
+        let point = (flow_corrected_kg_s, pressure_ratio);
+        let foot = nearest(&self.shape(speed_corrected_rpm), speed_ratio, point, scales, None);
+        let (x, y) = (
+            (foot.place.flow_kg_s - point.0) / scales.flow_kg_s,
+            (foot.place.pressure_ratio - point.1) / scales.ratio,
+        );
+        let error = LineErrors::new(&self.solution, speed_ratio).at(foot.angle_rad, scales);
+        NearestPlace {
+            distance_ratio: x.hypot(y),
+            eta: self.limit_efficiency(foot.place.eta, self.is_outside(speed_ratio)),
+            distance_standard_error_ratio: error.distance_ratio,
+            eta_standard_error: error.eta,
+        }
+    }
+
+    pub(crate) fn speed_ratio(&self, speed_corrected_rpm: f64) -> f64 {
+        speed_corrected_rpm / self.data.nominal_speed_rpm
+    }
+
+    pub(crate) fn shape(&self, speed_corrected_rpm: f64) -> LineShape {
+        self.solution.shape(self.speed_ratio(speed_corrected_rpm))
+    }
+
+    /// Whether a speed is outside the measured range.
+    pub(crate) fn is_outside(&self, speed_ratio: f64) -> bool {
+        self.solution.splines.shape.outside(speed_ratio) > SPEED_ROUNDING_RATIO
+    }
+
+    /// The efficiency; in extrapolation at most the best measured one.
+    fn limit_efficiency(&self, eta: f64, extrapolated: bool) -> f64 {
+        if extrapolated { eta.min(self.solution.best_eta) } else { eta }
+    }
+
+    fn speed_bounds_rpm(&self) -> (f64, f64) {
+        let (first, last) = (self.data.lines_rpm.first(), self.data.lines_rpm.last());
+        (
+            SPEED_RANGE_RATIO.0 * first.copied().unwrap_or(1.0),
+            SPEED_RANGE_RATIO.1 * last.copied().unwrap_or(1.0),
+        )
+    }
+}
+
+/// One standard error of a place.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PlaceError {
+    /// Across the line, in units of the line's scales.
+    pub distance_ratio: f64,
+    /// The part of it along the axis of flow, not negative.
+    pub flow_part_ratio: f64,
+    /// The part of it along the axis of pressure ratio, not negative.
+    pub pressure_part_ratio: f64,
+    /// Of efficiency at the nearest place, fraction.
+    pub eta: f64,
+}
+
+/// A line with the covariance of its parameters.
+pub(crate) struct LineErrors {
+    frame: FlowFrame,
+    parameters: Parameters,
+    covariance: DMatrix<f64>,
+    speed_ratio: f64,
+}
+
+impl LineErrors {
+    pub(crate) fn new(solution: &Solution, speed_ratio: f64) -> Self {
+        LineErrors {
+            frame: solution.frame,
+            parameters: solution.parameters(speed_ratio),
+            covariance: solution.covariance(speed_ratio),
+            speed_ratio,
+        }
+    }
+
+    /// Errors at an angle of the line, rad.
+    pub(crate) fn at(&self, angle_rad: f64, scales: Scales) -> PlaceError {
+        let at = |shape: &LineShape, angle: f64| {
+            let place = shape.physical(angle, self.speed_ratio);
+            [place.flow_kg_s / scales.flow_kg_s, place.pressure_ratio / scales.ratio, place.eta]
+        };
+        let shape = LineShape::new(&self.parameters, self.frame);
+        let (here, next) = (at(&shape, angle_rad), at(&shape, angle_rad + DIFFERENCE_STEP_RAD));
+        let slope: [f64; 3] = std::array::from_fn(|i| (next[i] - here[i]) / DIFFERENCE_STEP_RAD);
+        let (nx, ny) = normal(&slope);
+        let length = (slope[0].powi(2) + slope[1].powi(2)).max(MIN_SQUARE_SLOPE);
+        let place = shape.at(angle_rad);
+        let work_terms = shape.work_terms(place.flow_at_nominal_kg_s, place.head);
+        let (mut across, mut eta) = (DVector::zeros(PARAMETERS), DVector::zeros(PARAMETERS));
+        for q in 0..PARAMETERS {
+            if q >= WORK {
+                // The work parameters affect efficiency only.
+                eta[q] = -here[2] * work_terms[q - WORK];
+                continue;
+            }
+            let mut moved = self.parameters;
+            moved[q] += PARAMETER_STEP;
+            let there = at(&LineShape::new(&moved, self.frame), angle_rad);
+            let d: [f64; 3] = std::array::from_fn(|i| (there[i] - here[i]) / PARAMETER_STEP);
+            across[q] = d[0] * nx + d[1] * ny;
+            // The nearest place moves along the line as the line moves.
+            eta[q] = d[2] - slope[2] * (d[0] * slope[0] + d[1] * slope[1]) / length;
+        }
+        let error = |gradient: &DVector<f64>| gradient.dot(&(&self.covariance * gradient)).max(0.0).sqrt();
+        let distance = error(&across);
+        PlaceError {
+            distance_ratio: distance,
+            flow_part_ratio: distance * nx.abs(),
+            pressure_part_ratio: distance * ny.abs(),
+            eta: error(&eta),
+        }
+    }
+}
 
 /// Ridge of the smoothed ends. Bound: keeps the matrix regular, far below any weight.
 const RIDGE: f64 = 1e-9;

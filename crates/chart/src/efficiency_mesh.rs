@@ -1,5 +1,5 @@
-//! Flow, pressure ratio and efficiency between the points of a map, only inside the measured region: for pictures, and for the table of a
-//! machine's own map.
+//! Efficiency between the points of a map, only inside the measured region, as a mesh over flow and pressure ratio: for the picture of a map and
+//! for the page, so that both show the same contours, and for the table of a machine's own map.
 //!
 //! Each speed line is a row of a structured grid. Along a line the position runs from 0 at its surge-side point to 1
 //! at its choke-side point, by length on the map with both axes scaled to the map's spans; flow, pressure ratio and
@@ -11,9 +11,9 @@
 //! one of them is NaN. Points without an efficiency between others are bridged. Lines with fewer than two distinct points are not used.
 //! Points closer than 1 % of the diagonal of their line (repeats) are replaced by their mean.
 
-use super::monotone::Monotone;
 use crate::StructuredGrid;
-use mapper_core::{CompressorMap, MapPoint, SpeedLine};
+use crate::figure_layout::frame::nice_ticks;
+use mapper_core::{CompressorMap, FittedMap, FittedNode, MapPoint, SpeedLine};
 
 /// Nodes along a line.
 const COLUMNS: usize = 49;
@@ -190,4 +190,159 @@ pub fn interpolate_between_lines(speeds: &[f64], values: &[f64]) -> Vec<f64> {
         start = end + 1;
     }
     out
+}
+
+/// A monotone cubic through points with strictly rising abscissae: it stays between neighbouring values.
+///
+/// Source: F. N. Fritsch, J. Butland, "A method for constructing local monotone piecewise cubic interpolants",
+/// SIAM J. Sci. Stat. Comput. 5 (1984) 300-304; the harmonic mean of neighbouring slopes, one-sided ends.
+pub(crate) struct Monotone<'a> {
+    x: &'a [f64],
+    y: &'a [f64],
+    slopes: Vec<f64>,
+}
+
+impl<'a> Monotone<'a> {
+    /// `None` for fewer than two points, or if `x` does not rise strictly or is not as long as `y`.
+    pub(crate) fn new(x: &'a [f64], y: &'a [f64]) -> Option<Self> {
+        if x.len() < 2 || x.len() != y.len() || !x.windows(2).all(|w| w[1] > w[0]) {
+            return None;
+        }
+        let secants: Vec<f64> = (1..x.len()).map(|i| (y[i] - y[i - 1]) / (x[i] - x[i - 1])).collect();
+        let n = x.len();
+        let slopes = (0..n)
+            .map(|i| match i {
+                0 => end_slope(x, &secants, 0, 1),
+                i if i == n - 1 => end_slope(x, &secants, n - 2, n.saturating_sub(3)),
+                _ => inner_slope(x[i] - x[i - 1], x[i + 1] - x[i], secants[i - 1], secants[i]),
+            })
+            .collect();
+        Some(Monotone { x, y, slopes })
+    }
+
+    /// Value at `at`; `None` outside the points.
+    pub(crate) fn at(&self, at: f64) -> Option<f64> {
+        let last = self.x.len() - 1;
+        if !(at >= self.x[0] && at <= self.x[last]) {
+            return None;
+        }
+        let i = self.x.partition_point(|x| *x <= at).clamp(1, last) - 1;
+        let width = self.x[i + 1] - self.x[i];
+        let t = (at - self.x[i]) / width;
+        let (a, b) = (self.y[i], self.y[i + 1]);
+        let (da, db) = (self.slopes[i] * width, self.slopes[i + 1] * width);
+        let (t2, t3) = (t * t, t * t * t);
+        Some(
+            (2.0 * t3 - 3.0 * t2 + 1.0) * a
+                + (t3 - 2.0 * t2 + t) * da
+                + (3.0 * t2 - 2.0 * t3) * b
+                + (t3 - t2) * db,
+        )
+    }
+}
+
+fn inner_slope(before: f64, after: f64, left: f64, right: f64) -> f64 {
+    if left * right <= 0.0 {
+        return 0.0;
+    }
+    let (w1, w2) = (2.0 * after + before, after + 2.0 * before);
+    (w1 + w2) / (w1 / left + w2 / right)
+}
+
+/// Three-point slope at an end, limited so that the end stays monotone.
+fn end_slope(x: &[f64], secants: &[f64], near: usize, far: usize) -> f64 {
+    if secants.len() < 2 {
+        return secants[near];
+    }
+    let width = |i: usize| x[i + 1] - x[i];
+    let (h0, h1, d0, d1) = (width(near), width(far), secants[near], secants[far]);
+    let slope = ((2.0 * h0 + h1) * d0 - h0 * d1) / (h0 + h1);
+    if slope * d0 <= 0.0 {
+        0.0
+    } else if d0 * d1 <= 0.0 && slope.abs() > 3.0 * d0.abs() {
+        3.0 * d0
+    } else {
+        slope
+    }
+}
+
+/// Efficiency (fraction) over corrected flow (x, kg/s) and pressure ratio (y) on the supported part of a fitted map, finer in
+/// speed than its lines; NaN in extrapolated parts. `None` for fewer than two lines.
+pub fn fitted_surface(fitted: &FittedMap) -> Option<StructuredGrid> {
+    let speeds: Vec<f64> = fitted.lines.iter().map(|line| line.speed_corrected_rpm).collect();
+    let columns = fitted.beta_ratio.len();
+    if speeds.len() < 2 || !speeds.windows(2).all(|w| w[1] > w[0]) {
+        return None;
+    }
+    let mut fields: [Vec<Vec<f64>>; 3] = Default::default();
+    for column in 0..columns {
+        let values: [fn(&FittedNode) -> f64; 3] = [
+            |n| n.flow_corrected_kg_s,
+            |n| n.pressure_ratio,
+            |n| if n.extrapolated { f64::NAN } else { n.eta },
+        ];
+        for (field, value) in fields.iter_mut().zip(values) {
+            let over_speed: Vec<f64> =
+                fitted.lines.iter().map(|line| line.nodes.get(column).map_or(f64::NAN, value)).collect();
+            field.push(interpolate_between_lines(&speeds, &over_speed));
+        }
+    }
+    let rows = fields[0].first()?.len();
+    // The values are computed by columns, but the grid is stored by rows.
+    let flat =
+        |field: &Vec<Vec<f64>>| (0..rows).flat_map(|r| field.iter().map(move |c| c[r])).collect::<Vec<f64>>();
+    StructuredGrid::new(rows, columns, flat(&fields[0]), flat(&fields[1]), flat(&fields[2]))
+}
+
+/// Round levels (fractions), finer near the best efficiency, where the map is flat.
+pub fn contour_levels(range: Option<(f64, f64)>) -> Vec<f64> {
+    let Some((low, high)) = range else { return Vec::new() };
+    let (low, high) = (low.max(0.0), high.min(1.5));
+    if low >= high {
+        return Vec::new();
+    }
+    if high - low < 0.08 {
+        return nice_ticks(low, high, 6);
+    }
+    let coarse_end = high - 0.06;
+    // Whole percents as integers, to avoid accumulated rounding errors.
+    let every = |step: i32| (1..=150 / step).map(move |i| f64::from(i * step) / 100.0);
+    let mut levels: Vec<f64> = every(5).filter(|v| *v > low && *v < coarse_end).collect();
+    levels.extend(every(2).filter(|v| *v >= coarse_end && *v < high));
+    levels
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn a_straight_line_is_met_exactly() {
+        let (x, y) = ([0.0, 1.0, 4.0, 5.0], [1.0, 3.0, 9.0, 11.0]);
+        let curve = Monotone::new(&x, &y).unwrap();
+        for at in [0.0, 0.3, 2.0, 4.9, 5.0] {
+            assert!((curve.at(at).unwrap() - (1.0 + 2.0 * at)).abs() < 1e-12);
+        }
+        assert_eq!(curve.at(5.1), None);
+        assert_eq!(curve.at(f64::NAN), None);
+        assert!(Monotone::new(&[0.0, 0.0], &[1.0, 2.0]).is_none());
+    }
+
+    proptest! {
+        #[test]
+        fn it_meets_the_points_and_stays_between_neighbours(steps in proptest::collection::vec((0.01..2.0f64, -1.0..1.0f64), 2..9), t in 0.0..1.0f64) {
+            let mut at = 0.0;
+            let (x, y): (Vec<f64>, Vec<f64>) = steps.iter().map(|(dx, y)| { at += dx; (at, *y) }).unzip();
+            let curve = Monotone::new(&x, &y).unwrap();
+            for i in 0..x.len() {
+                prop_assert!((curve.at(x[i]).unwrap() - y[i]).abs() < 1e-12);
+            }
+            for i in 1..x.len() {
+                let value = curve.at((x[i - 1] + t * (x[i] - x[i - 1])).min(x[i])).unwrap();
+                let (low, high) = (y[i - 1].min(y[i]), y[i - 1].max(y[i]));
+                prop_assert!(value >= low - 1e-9 && value <= high + 1e-9);
+            }
+        }
+    }
 }

@@ -26,12 +26,12 @@ pub use checks::reachable_points::{UnreachablePoint, nominal_model, unreachable_
 pub use checks::unusual_settings::USUAL_WHEEL_DIAMETERS_M;
 pub use elements::rig::guards::DEFAULT_MAX_AGE_S;
 pub use elements::rig::sensor_class::{default_contact_sigma_ratio, default_gain_sigma_ratio};
+pub use files::load::json_schema;
 pub use files::load::{
     CampaignError, MAX_FILE_BYTES, MAX_MAP_BYTES, backend_mistake, check, check_with, format_mistake, load,
     mistakes, read_named_file, read_text, warnings,
 };
 pub use files::nightly::{Nightly, NightlyError, NightlyGroup, load_nightly};
-pub use files::schema::json_schema;
 pub use machine_sizes::{AssumedSize, internal_area_sigma_ratio, similar_machine, similar_sizes};
 pub use mapper_yaml::{Finding, FindingKind, Findings, units};
 pub use nominal_table::{NominalTableError, nominal_table};

@@ -1,20 +1,104 @@
-//! Converts session events into messages for browsers.
+//! The state that a browser shows, with a size limit for any run, and how events change it.
 
-use crate::state::{
-    CurrentValues, LoggedMessage, MAX_EVENTS, MAX_POINTS, Reading, State, Step, TRACE_ROWS, TracedChannel,
-};
 use crate::web_server::server::OperatorCommand;
 use mapper_campaign::Campaign;
+use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{Channel, IdentifiedPoint, Plan, PlanStep, SignalGuard, StepMarker};
 use mapper_report::Display;
-use mapper_report::page::{LiveMap, live_map, live_point, planned, target_line_name};
+use mapper_report::page::{LiveMap, LivePoint, Planned, live_map, live_point, planned, target_line_name};
 use mapper_session::{Operator, SessionEvent, soak_s};
+use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::VecDeque;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
+
+/// Number of stored rows of readings, one per second of rig time.
+const TRACE_ROWS: usize = 300;
+/// Maximum number of stored events; the latest are kept.
+const MAX_EVENTS: usize = 200;
+/// Maximum number of stored points, more than a night produces.
+const MAX_POINTS: usize = 2000;
+
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct State {
+    pub(crate) machine: String,
+    campaign: String,
+    pub(crate) units: DisplayUnits,
+    /// Names of the speed lines, from slow to fast.
+    pub(crate) lines: Vec<String>,
+    /// Expected points on the map.
+    planned: Vec<Planned>,
+    steps: usize,
+    /// Planned rig time, s.
+    duration_s: f64,
+    pace: Option<f64>,
+    /// Names and units of the columns of `rows`.
+    traced: Vec<TracedChannel>,
+    /// Run time, s, and readings.
+    rows: VecDeque<Vec<Option<f64>>>,
+    pub(crate) points: Vec<LivePoint>,
+    /// Speed lines and contours of the points so far.
+    pub(crate) map: LiveMap,
+    pub(crate) events: VecDeque<LoggedMessage>,
+    pub(crate) now: CurrentValues,
+    pub(crate) outcome: Option<String>,
+    pub(crate) page: Option<String>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct TracedChannel {
+    pub(crate) name: String,
+    pub(crate) unit: String,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct LoggedMessage {
+    pub(crate) t_s: f64,
+    pub(crate) message: String,
+}
+
+/// Values that change every second.
+#[derive(Debug, Clone, Default, Serialize)]
+pub(crate) struct CurrentValues {
+    pub(crate) t_s: f64,
+    /// Current activity, in words.
+    phase: String,
+    pub(crate) step: Option<Step>,
+    /// Remaining rig time and half-width of its 95 % interval, s.
+    left_s: f64,
+    left_half_s: f64,
+    holds: bool,
+    pub(crate) stops: bool,
+    pub(crate) readings: Vec<Reading>,
+}
+
+/// The current step.
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct Step {
+    /// Its number, from 1; `None` for one that a resumed run repeats.
+    pub(crate) step: Option<usize>,
+    pub(crate) place: String,
+    start_s: f64,
+    pub(crate) end_s: f64,
+    /// Expected settling time, s after its start.
+    settle_s: Option<f64>,
+}
+
+/// A channel with its reading and its limits.
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct Reading {
+    symbol: &'static str,
+    pub(crate) what: &'static str,
+    pub(crate) unit: String,
+    pub(crate) value: f64,
+    /// The value formatted as in reports.
+    shown: String,
+    low: Option<f64>,
+    high: Option<f64>,
+}
 
 /// Minimum interval of updates for values that change all the time.
 const TICK: Duration = Duration::from_millis(200);

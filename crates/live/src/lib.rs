@@ -10,15 +10,13 @@ mod feed;
 #[cfg(feature = "foxglove")]
 mod foxglove_stream;
 mod live;
-mod live_error;
 mod observers;
-mod state;
 mod web_server;
 
 pub use feed::LiveRun;
 #[cfg(feature = "foxglove")]
 pub use foxglove_stream::{FoxgloveStream, FoxgloveStreamError, parse_local_address};
-pub use live_error::LiveError;
+pub use live::LiveError;
 pub use observers::{ObserverRequest, Observers};
-pub use web_server::access::parse_address;
+pub use web_server::request::parse_address;
 pub use web_server::tls::{TlsError, TlsFiles};

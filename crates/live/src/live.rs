@@ -1,11 +1,10 @@
 //! The live page of a run: opened before the run, updated during it, closed after it.
 
 use crate::feed::{Feed, LiveRun};
-use crate::live_error::LiveError;
-use crate::web_server::access::Access;
-use crate::web_server::hub::Hub;
+use crate::web_server::connections::Hub;
+use crate::web_server::request::Access;
 use crate::web_server::server::{OperatorCommand, ServedContent, serve};
-use crate::web_server::tls::{Tls, TlsFiles, read};
+use crate::web_server::tls::{Tls, TlsError, TlsFiles, read};
 use mapper_report::page::live_page;
 use mapper_session::SessionEvent;
 use std::net::{SocketAddr, TcpListener};
@@ -134,4 +133,22 @@ fn token() -> Result<String, LiveError> {
     let mut bytes = [0; 16];
     getrandom::fill(&mut bytes).map_err(LiveError::Token)?;
     Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+}
+
+/// Why the live page cannot be served.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
+pub enum LiveError {
+    #[error("the live page cannot be served at {0}: {1}; choose another address")]
+    Listen(SocketAddr, #[source] std::io::Error),
+    #[error("the system cannot generate random numbers for a token: {0}")]
+    Token(getrandom::Error),
+    /// A defect of the program.
+    #[error("failed to write the live page: {0}")]
+    Page(#[from] serde_json::Error),
+    #[error(transparent)]
+    Tls(#[from] TlsError),
+    #[cfg(feature = "foxglove")]
+    #[error(transparent)]
+    Foxglove(#[from] crate::foxglove_stream::FoxgloveStreamError),
 }

@@ -4,7 +4,7 @@ use crate::feed::LiveRun;
 #[cfg(feature = "foxglove")]
 use crate::foxglove_stream::FoxgloveStream;
 use crate::live::Live;
-use crate::live_error::LiveError;
+use crate::live::LiveError;
 use crate::web_server::tls::TlsFiles;
 use mapper_session::SessionEvent;
 use std::net::SocketAddr;

@@ -1,4 +1,4 @@
-//! Assembles a compressor map from identified points.
+//! Assembles a compressor map from identified points, which it groups into speed lines.
 
 use crate::repeats::points_for_map;
 use mapper_core::{

@@ -12,7 +12,6 @@
 
 mod channel_mapping;
 mod error;
-mod format;
 pub mod logs;
 mod mcap;
 mod reading;
@@ -21,12 +20,12 @@ pub mod score;
 mod step_detection;
 mod writing;
 
+pub use crate::writing::topics::FormatVersion;
 pub use channel_mapping::channel_map::{
     AmbientPressure, Barometer, ChannelMap, ChannelSource, MachineConstants, WindowLimits,
 };
 pub use channel_mapping::channel_map_yaml::ChannelMapError;
 pub use error::{BatchError, DamagedPart, ReadWarning, RecordError};
-pub use format::FormatVersion;
 pub use mapper_yaml::Findings;
 pub use mapper_yaml::units::{Kind, Unit, UnitError};
 pub use mcap::chunk::ChunkError;

@@ -2,7 +2,6 @@
 //!
 //! Code that identifies, corrects or diagnoses must not use this module; a test of the source tree lists its users.
 
-use crate::format::{METADATA_NAME, START_KEY, TRUTH_TOPIC};
 use crate::logs::LogFile;
 use crate::mcap::message::{FieldValue, read_fields};
 use crate::mcap::records::{ChannelDefinition, Sink};
@@ -10,6 +9,7 @@ use crate::reading::log_reader::is_mcap;
 use crate::reading::recording_reader::open;
 use crate::reading::scan::scan;
 use crate::samples::series_builder::run_time_s;
+use crate::writing::topics::{METADATA_NAME, START_KEY, TRUTH_TOPIC};
 use crate::{ReadOptions, ReadWarning, RecordError};
 use mapper_core::{Channel, IdentifiedPoint, Recording, ReferenceState, StepMarker, SurgeMark, TruthColumn};
 use mapper_numerics::statistics::{mean, median};

@@ -3,7 +3,7 @@
 use crate::error::throw;
 use crate::request::Refusal;
 use crate::session::{ScriptThrow, Session, lock};
-use crate::step::{EndCondition, StepResult};
+use crate::settle::{EndCondition, StepResult};
 use mapper_core::{IdentifiedPoint, OperatingPoint};
 use mapper_yaml::units::Kind;
 use rhai::{Array, Dynamic, Engine, FLOAT, INT, ImmutableString};

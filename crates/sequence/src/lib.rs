@@ -11,7 +11,6 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod api;
-mod comments;
 mod error;
 mod names;
 mod request;
@@ -19,12 +18,11 @@ mod runner;
 mod sandbox;
 mod session;
 mod settle;
-mod step;
 
 pub use api::{Entry, functions};
 pub use error::{ScriptError, SequenceError};
 pub use request::{OrderPoints, SequenceRequest};
 pub use runner::{Script, SequenceRunner};
+pub use settle::StepResult;
+pub use settle::{EndCondition, SequenceStep};
 pub use settle::{SettleRule, SettleWatch};
-pub use step::StepResult;
-pub use step::{EndCondition, SequenceStep};

@@ -1,12 +1,12 @@
 //! Runs a script on its own thread and synchronises with it at each step.
 
-use crate::comments::find_unclosed_comment;
 use crate::error::{ScriptError, SequenceError};
 use crate::names::UnknownName;
+use crate::names::find_unclosed_comment;
 use crate::request::SequenceRequest;
 use crate::sandbox::{Budget, SCRIPT_LIMIT, STACK_BYTES, build_engine};
 use crate::session::{Session, lock};
-use crate::step::{ScriptMessage, SequenceStep, StepResult};
+use crate::settle::{ScriptMessage, SequenceStep, StepResult};
 use crate::{api, names};
 use rhai::{AST, Dynamic, Engine, EvalAltResult, Position, Scope};
 use std::path::PathBuf;

@@ -3,7 +3,7 @@
 use crate::error::throw;
 use crate::request::{NominalForecast, Refusal, SequenceRequest, StepPrediction};
 use crate::settle::SettleRule;
-use crate::step::{EndCondition, ScriptMessage, SequenceStep, StepResult};
+use crate::settle::{EndCondition, ScriptMessage, SequenceStep, StepResult};
 use mapper_core::{OperatingPoint, PlanStep, RigMode, Setpoints, StepKind};
 use mapper_physics::simulation::steady::SteadyState;
 use rhai::{EvalAltResult, Position};

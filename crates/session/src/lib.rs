@@ -11,7 +11,6 @@
 
 mod analysis;
 mod errors;
-mod event;
 mod machine;
 mod nights;
 mod plan;
@@ -37,16 +36,14 @@ pub use analysis::identification::Identified;
 pub use analysis::pdf::page_as_pdf;
 pub use analysis::results::{Results, compressor_map};
 pub use analysis::transient::write_transient;
-pub use event::SessionEvent;
 pub use machine::first_campaign::first_campaign;
 pub use machine::map_file::{map_description, write_map, write_map_fitted_if_needed};
 pub use machine::map_work::{MapFile, MapOut, MapWork};
 pub use mapper_diagnose::driven::Side;
 pub use mapper_maps::table::DescriptionError;
 pub use mapper_runner::Operator;
-pub use nights::night_report::{night_report_link, night_report_path, night_runs, write_night_report};
 pub use nights::nightly::PreparedNight;
-pub use plan::calibration_check::load_on;
+pub use nights::nightly::{night_report_link, night_report_path, night_runs, write_night_report};
 pub use plan::planning::{PlanInputs, nominal_model, plan, plan_of};
 pub use plan::rehearsal::{Rehearsal, rehearse};
 pub use plan::stored_plan::stored_plan;
@@ -59,10 +56,12 @@ pub use registry::Registry;
 pub use rig::drive::{Pace, drive, soak_s};
 pub use rig::rig_state::{RigStates, RigStatus, shared_state_directory};
 pub use rig::sources::Sources;
+pub use run::preflight::load_on;
+pub use run::prepared_run::start_time_ns;
 pub use run::prepared_run::{PreparedRun, RunOutcome, RunRequest};
-pub use run::recording_metadata::start_time_ns;
 pub use run::run_stop::{Phase, RunStop, SignalResponse};
 pub use session::Session;
+pub use session::SessionEvent;
 pub use variant::Variant;
 
 #[cfg(test)]

@@ -22,4 +22,4 @@ pub use mistakes::finding::{Finding, FindingKind};
 pub use mistakes::source::Findings;
 pub use mistakes::source::Notes;
 pub use mistakes::source::{Document, Source};
-pub use schema_check::schema::{Schema, json_schema_of};
+pub use schema_check::check::{Schema, json_schema_of};

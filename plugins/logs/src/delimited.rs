@@ -1,8 +1,8 @@
 //! CSV and similar formats: cells with a separator between them.
 
-use crate::columns::sample::HEAD_ROWS;
+use crate::columns::counter::HEAD_ROWS;
 use crate::tables::long_table::{LongForm, LongRows};
-use crate::tables::row_stream::RowStream;
+use crate::tables::table_row::RowStream;
 use crate::tables::table_log::{Origin, Table};
 use mapper_recording::logs::{Layout, Log, LogError, LogFile, LogFinding, LogFormat, LogOptions, RowSink};
 use mapper_table::{Dialect, SEPARATORS, TextEncoding, decimal_sign, detect_text};

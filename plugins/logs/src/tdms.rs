@@ -1,6 +1,6 @@
 //! TDMS: the files of LabVIEW and of National Instruments' loggers. Each group is a table; waveform channels have their own rate.
 
-use crate::columns::sample::HEAD_ROWS;
+use crate::columns::counter::HEAD_ROWS;
 use crate::columns::table_head::MAX_COLUMNS;
 use crate::tables::column_log::COLUMN_OPTIONS;
 use crate::tables::column_rows::{Chunk, Chunks, ColumnRows};

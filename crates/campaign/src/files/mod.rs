@@ -2,4 +2,3 @@
 
 pub(crate) mod load;
 pub(crate) mod nightly;
-pub(crate) mod schema;

@@ -1,8 +1,8 @@
 //! The server: one thread per connection, one request per connection.
 
-use crate::web_server::access::Access;
+use crate::web_server::connections::Hub;
 use crate::web_server::connections::{Connection, Connections};
-use crate::web_server::hub::Hub;
+use crate::web_server::request::Access;
 use crate::web_server::request::{REQUEST_TIMEOUT, read_request};
 use crate::web_server::tls::{DeadlineStream, Tls};
 use std::io::{ErrorKind, Read, Write};

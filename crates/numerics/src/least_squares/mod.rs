@@ -11,9 +11,8 @@
 
 mod arrow;
 mod damping;
-mod dense;
 pub mod descent;
 
 pub use arrow::{Arrow, ArrowBlock, Reduced};
 pub use damping::{DampedFit, Damping, DampingRule, minimise};
-pub use dense::{damped_step, inverse};
+pub use damping::{damped_step, inverse};

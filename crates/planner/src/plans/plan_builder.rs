@@ -7,7 +7,7 @@ use crate::jumps::visits::{
 };
 use crate::jumps::walk::{ForbiddenJump, Walk, walk};
 use crate::ordering::order::{PROOF_TOLERANCE_RATIO, PointOrder, objective, search_orders};
-use crate::plans::fingerprint::hash_inputs;
+use crate::plans::plan::hash_inputs;
 use crate::request::{PlanError, PlanRequest, solve_steady_states};
 use crate::thermal_memory::forecast::ParameterError;
 use crate::thermal_memory::housing::{Housing, RepeatedJump, gradients_k};

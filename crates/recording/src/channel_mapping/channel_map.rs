@@ -1,8 +1,8 @@
 //! Maps a recording's topics and fields onto the rig's channels, and adds data that the recording does not contain.
 
-use crate::format::ELEMENTS_TOPIC;
 use crate::logs::LogOptions;
 use crate::logs::plausible::STANDARD_ATMOSPHERE_PA;
+use crate::writing::topics::ELEMENTS_TOPIC;
 use mapper_core::{
     CHANNELS, Channel, DeclaredUncertainty, Element, Group, MAX_ELEMENTS, NoiseColour, RedundantSensors,
     ReferenceState,

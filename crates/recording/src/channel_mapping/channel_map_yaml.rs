@@ -2,8 +2,8 @@
 
 use crate::channel_mapping::channel_map::UNKNOWN_WORD;
 use crate::channel_mapping::channel_map_schema::SCHEMA;
-use crate::format::TRUTH_PREFIX;
 use crate::logs::{LogOptions, OPTION_KEYS};
+use crate::writing::topics::TRUTH_PREFIX;
 use crate::{
     AmbientPressure, Barometer, ChannelMap, ChannelSource, MachineConstants, RecordError, WindowLimits,
 };

@@ -179,7 +179,7 @@ fn check_fits_mcap(map: &ChannelMap) -> Result<(), RecordError> {
 }
 
 fn is_own_topic(topic: &str) -> bool {
-    use crate::format::{EVENT_TOPIC, STEP_TOPIC, TRUTH_PREFIX};
+    use crate::writing::topics::{EVENT_TOPIC, STEP_TOPIC, TRUTH_PREFIX};
     topic == STEP_TOPIC || topic == EVENT_TOPIC || topic.starts_with(TRUTH_PREFIX)
 }
 

@@ -1,9 +1,47 @@
-//! Topics of a recording, their messages and JSON schemas, for the file and for clients that receive the same data live.
+//! Names and version of the recording format; topics of a recording, their messages and JSON schemas, for the file and for clients that
+//! receive the same data live.
 
-use crate::format::{EVENT_TOPIC, PROVENANCE_TOPIC, STEP_TOPIC};
 use mapper_core::{Channel, ChannelInfo, Event, Group, StepMarker, step_number};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
+
+/// Version of the recording format.
+///
+/// Increased when a reader of the previous version would misread a file: a topic, field or unit changes its meaning. New
+/// topics, fields and metadata keys do not increase it, since readers skip unknown ones.
+///
+/// Version 2 numbers the steps on `/step` from 1, as `step`. Version 1 has `index` there, from 0, and can still be read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct FormatVersion(pub u32);
+
+impl FormatVersion {
+    /// Version written by this program.
+    pub const CURRENT: FormatVersion = FormatVersion(2);
+}
+
+impl std::fmt::Display for FormatVersion {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+pub(crate) const STEP_TOPIC: &str = "/step";
+pub(crate) const EVENT_TOPIC: &str = "/event";
+/// Topic of the single sensors of channels that have several.
+pub(crate) const ELEMENTS_TOPIC: &str = "/rig/elements";
+/// Topic of readings with an unusual quality or source time.
+pub(crate) const PROVENANCE_TOPIC: &str = "/rig/provenance";
+pub(crate) const TRUTH_TOPIC: &str = "/truth/model";
+/// Everything below this topic is for scoring only.
+pub(crate) const TRUTH_PREFIX: &str = "/truth";
+/// Name of the metadata record that marks a recording of this program.
+pub(crate) const METADATA_NAME: &str = "mapper.recording";
+/// Key of the format version in the metadata record.
+pub(crate) const FORMAT_KEY: &str = "format";
+/// Key of the epoch time of run time 0, in nanoseconds.
+pub(crate) const START_KEY: &str = "start_time_ns";
+pub(crate) const PLAN_NAME: &str = "plan.json";
+pub(crate) const CAMPAIGN_NAME: &str = "campaign.yaml";
 
 /// The end of a step that a marker refers to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -110,14 +148,14 @@ impl<'a> Field<'a> {
 }
 
 /// Schema of a topic of flat numeric fields.
-pub(crate) fn numeric_schema(title: &str, fields: &[Field<'_>]) -> Vec<u8> {
+fn numeric_schema(title: &str, fields: &[Field<'_>]) -> Vec<u8> {
     let properties: Map<String, Value> =
         fields.iter().map(|field| (field.name.to_owned(), field.schema())).collect();
     object(title, properties)
 }
 
 /// Schema of `/step` with the units of its fields.
-pub(crate) fn step_schema() -> (Vec<u8>, BTreeMap<String, String>) {
+fn step_schema() -> (Vec<u8>, BTreeMap<String, String>) {
     let point = |description: &str| {
         json!({"type": "object", "description": description, "properties": {
             "speed_rpm": {"type": "number", "description": "target shaft speed", "unit": "rpm"},
@@ -140,7 +178,7 @@ pub(crate) fn step_schema() -> (Vec<u8>, BTreeMap<String, String>) {
 }
 
 /// Schema of `/event` with the units of its fields.
-pub(crate) fn event_schema() -> (Vec<u8>, BTreeMap<String, String>) {
+fn event_schema() -> (Vec<u8>, BTreeMap<String, String>) {
     let properties = json!({
         "t_s": {"type": "number", "description": "run time", "unit": "s"},
         "kind": {"type": "string", "description": "kind of event"},
@@ -150,7 +188,7 @@ pub(crate) fn event_schema() -> (Vec<u8>, BTreeMap<String, String>) {
 }
 
 /// Schema of `/rig/provenance` with the units of its fields.
-pub(crate) fn provenance_schema() -> (Vec<u8>, BTreeMap<String, String>) {
+fn provenance_schema() -> (Vec<u8>, BTreeMap<String, String>) {
     let of = |row: &ChannelInfo| {
         json!({"type": "object", "description": row.description, "properties": {
             "source_t_s": {"type": "number", "description": "run time at which the source took the reading, if it differs from the message's", "unit": "s"},

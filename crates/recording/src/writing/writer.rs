@@ -1,9 +1,9 @@
 //! Writes a recording: one message per device group and sample, flushed each second of the run's clock.
 
-use crate::format::{ELEMENTS_TOPIC, TRUTH_TOPIC};
 use crate::writing::recording_file::{
     McapFile, OpenedFile, ProvenanceWriter, RecordingHeader, add_channel, io_error, open,
 };
+use crate::writing::topics::{ELEMENTS_TOPIC, TRUTH_TOPIC};
 use crate::writing::topics::{Field, StepPhase, Topic, event_message, step_message};
 use crate::{BatchError, RecordError};
 use mapper_core::unit_factors::NS_PER_S;

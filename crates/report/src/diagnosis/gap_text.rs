@@ -4,8 +4,8 @@ use crate::diagnosis::gap_figures::{heat_table, residual_maps, traces};
 use crate::diagnosis::gap_next::next_section;
 use crate::diagnosis::stand_actions::{next_measurement, stand_actions};
 use crate::document::{Cell, Describe, Document, Table};
+use crate::formatting::Message;
 use crate::formatting::{display_scale, four_figures};
-use crate::message::Message;
 use mapper_core::{Channel, probability_text, step_number, with_unit};
 use mapper_diagnose::gap::Diagnosed;
 use mapper_diagnose::gap::{

@@ -5,5 +5,4 @@ pub(crate) mod gap_figures;
 pub(crate) mod gap_next;
 pub(crate) mod gap_results;
 pub(crate) mod gap_text;
-pub(crate) mod gap_warning_text;
 pub(crate) mod stand_actions;

@@ -1,8 +1,8 @@
 //! The parameters that the points of a campaign share, for people and for other programs.
 
 use crate::document::{Describe, Document};
+use crate::formatting::Message;
 use crate::formatting::significant_digits;
-use crate::message::Message;
 use mapper_core::{
     ConvectionLaw, IdentifiedInlet, InletConvection, Origin, SharedValue, ThermalModel, half_width_95,
     one_line,

@@ -2,7 +2,7 @@
 
 use crate::document::verdict_word;
 use crate::formatting::Display;
-use crate::message::Message;
+use crate::formatting::Message;
 use crate::point_results::points::{at_end, step_name};
 use crate::test_report::run_report::RunReport;
 use mapper_campaign::units::Kind;

@@ -1,6 +1,6 @@
 //! Sentences of the remarks of plans.
 
-use crate::message::Message;
+use crate::formatting::Message;
 use mapper_core::{Channel, NoBound, OperatingPoint, PlanRemark, with_unit};
 use std::collections::BTreeMap;
 

@@ -4,6 +4,5 @@ pub(crate) mod agreement;
 pub(crate) mod budget_table;
 pub(crate) mod point_warnings;
 pub(crate) mod points;
-pub(crate) mod result_remark_text;
 pub(crate) mod summary;
 pub(crate) mod warning_text;

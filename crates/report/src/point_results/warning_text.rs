@@ -1,8 +1,8 @@
 //! Sentences of the warnings about points.
 
 use crate::document::{Sentence, number, sentence, signed};
+use crate::formatting::Message;
 use crate::formatting::four_figures;
-use crate::message::Message;
 use mapper_core::{
     Bound, CalibrationDefect, Channel, Dimension, EndEvidence, EtaSignal, FitFailure, HeatCorrected,
     Implausible, LeftOut, MapRegion, ModelDoubt, ModelEvidence, NoCompression, PoorFit, Scaled, StepConflict,

@@ -4,5 +4,4 @@ pub(crate) mod acceptance;
 pub(crate) mod conditions;
 pub(crate) mod key_figures;
 pub(crate) mod run_report;
-pub(crate) mod surge_text;
 pub(crate) mod zero_and_sensors;

@@ -2,9 +2,9 @@
 
 use crate::diagnosis::gap_results::correction_table;
 use crate::document::{Document, Table};
+use crate::formatting::Message;
 use crate::formatting::{Display, duration};
-use crate::message::Message;
-use crate::page::widgets::{OtherRun, map_widget, plan_widget, step_widget};
+use crate::page::run_page::{OtherRun, map_widget, plan_widget, step_widget};
 use crate::plan::plan_document::executed_plan_table;
 use crate::point_results::agreement::{disagreement_text, shared_errors_text};
 use crate::point_results::budget_table::budget_section;

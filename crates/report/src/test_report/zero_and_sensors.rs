@@ -1,11 +1,13 @@
-//! The isothermal zero, and several sensors of a channel.
+//! The isothermal zero, several sensors of a channel, and measured surge-side ends.
 
 use crate::document::{Describe, Document, Table};
-use crate::formatting::Display;
+use crate::formatting::{Display, number, percent};
 use mapper_campaign::Campaign;
-use mapper_core::{Channel, half_width_95};
+use mapper_core::{Channel, SurgeFoundBy, SurgeMark, SurgeNotFound, half_width_95};
 use mapper_identify::ZeroOutcome;
 use mapper_observe::FusedChannel;
+use mapper_recording::score::ScoredMark;
+use serde::Serialize;
 
 /// A sentence with the result or the reason for its absence; `None` if no zero was requested.
 pub(crate) fn zero_sentence(zero: &ZeroOutcome) -> Option<String> {
@@ -85,4 +87,90 @@ pub(crate) fn declared_sensors(campaign: &Campaign) -> Vec<String> {
         Some(fused.to_string())
     });
     several.collect()
+}
+
+/// Result of the search for surge.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct SurgeReport {
+    /// The marks in order of speed, with the truth if the recording contains it.
+    pub marks: Vec<ScoredMark>,
+    /// Lines on which no mark was found.
+    pub remarks: Vec<SurgeNotFound>,
+    /// How often the compressor went into surge.
+    pub surges: usize,
+}
+
+/// Marks of a search for surge, lines without a mark, and the number of surge events; `truth`: with the deviations of the marks from it.
+pub(crate) fn surge_section(surge: &SurgeReport, display: &Display, truth: bool) -> Document {
+    let truth = truth && surge.marks.iter().any(|scored| scored.truth_flow_corrected_kg_s.is_some());
+    let units = display.units();
+    let mut heads: Vec<&str> =
+        vec![&units.speed, &units.flow, "+/- %", "PR", "+/-", "nearest %", "openings", "found by"];
+    heads.extend(truth.then_some("error %"));
+    let mut document = Document::default();
+    document.text(
+        "Surge-side ends of the lines: corrected speed and flow, half widths of 95 % intervals, distance of the nearest point above in \
+         flow, number of openings tried.",
+    );
+    if truth {
+        document.text("error: difference from the simulator's truth.");
+    }
+    document.table(Table::new(heads).with_texts([7]).rows(surge_rows(&surge.marks, display, truth)));
+    surge_remarks(surge).into_iter().for_each(|remark| document.text(remark));
+    document
+}
+
+/// The number of surge events, and the lines without a mark, a sentence each.
+fn surge_remarks(surge: &SurgeReport) -> Vec<String> {
+    std::iter::once(times(surge.surges))
+        .chain(surge.remarks.iter().map(|SurgeNotFound { target_speed_rpm, openings, enough }| match enough {
+            true => format!(
+                "Not found at {target_speed_rpm:.0} rpm: the variation of pressures and flow did not grow over {openings} openings."
+            ),
+            false => format!(
+                "Not found at {target_speed_rpm:.0} rpm: {openings} openings are too few to locate surge."
+            ),
+        }))
+        .collect()
+}
+
+/// A row for each mark, in order of speed.
+fn surge_rows(marks: &[ScoredMark], display: &Display, truth: bool) -> Vec<Vec<String>> {
+    let row = |ScoredMark { mark, truth_flow_corrected_kg_s }: &ScoredMark| {
+        let flow_kg_s = mark.flow_corrected_kg_s;
+        let mut row = vec![
+            display.speed(mark.speed_corrected_rpm),
+            display.flow(flow_kg_s),
+            percent(Some(half_width_95(mark.flow_total_standard_error_kg_s()) / flow_kg_s), 1),
+            number(Some(mark.pressure_ratio), 3),
+            number(Some(half_width_95(mark.pressure_ratio_standard_error)), 3),
+            percent(Some(mark.closest_flow_corrected_kg_s / flow_kg_s - 1.0), 1),
+            mark.steps.to_string(),
+            evidence_name(mark).to_owned(),
+        ];
+        if truth {
+            row.push(percent(truth_flow_corrected_kg_s.map(|true_kg_s| flow_kg_s / true_kg_s - 1.0), 2));
+        }
+        row
+    };
+    marks.iter().map(row).collect()
+}
+
+fn times(surges: usize) -> String {
+    match surges {
+        0 => "The compressor did not go into surge during the approach.".to_owned(),
+        1 => "The compressor went into surge once during the approach; the valve opened immediately."
+            .to_owned(),
+        more => format!(
+            "The compressor went into surge {more} times during the approach; the valve opened immediately."
+        ),
+    }
+}
+
+fn evidence_name(mark: &SurgeMark) -> &'static str {
+    match mark.found_by {
+        SurgeFoundBy::Precursor => "variation",
+        SurgeFoundBy::Surge => "surge",
+        SurgeFoundBy::File => "file",
+    }
 }

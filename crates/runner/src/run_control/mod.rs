@@ -5,5 +5,4 @@ pub(crate) mod run;
 pub(crate) mod safe_shutdown;
 pub(crate) mod speed_control;
 pub(crate) mod step_transition;
-pub(crate) mod surge_events;
 pub(crate) mod transition_control;

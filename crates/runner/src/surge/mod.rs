@@ -5,7 +5,7 @@
 //! recording. docs/reference/maps.md describes them.
 
 mod estimate;
-mod mark;
+pub(crate) mod mark;
 mod variation;
 
 pub use estimate::{LineEnd, Move, SurgeEstimate, choose_next_move, expected_readings};

@@ -3,7 +3,6 @@
 pub(crate) mod calibrated_model;
 pub(crate) mod drift;
 pub(crate) mod experiments;
-pub(crate) mod further_results;
 pub(crate) mod gap;
 pub(crate) mod identification;
 pub(crate) mod pdf;

@@ -1,22 +1,25 @@
-//! Results of a run or recording: points, map and report, as data and as files in its directory.
+//! Results of a run or recording: points, map and report, as data and as files in its directory; thermal model,
+//! turbine, and pictures of h and of errors in addition to the compressor map.
 
 use crate::analysis::identification::Identified;
-use crate::recording::files::{json_text, program_and_commit, write_new};
+use crate::recording::files::{Existing, json_text, program_and_commit, write_files, write_new};
 use crate::recording::recording_file::{Recorded, merge_parts};
 use crate::recording::run_directory;
 use crate::{Gap, Registry, Session, SessionError};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::Outputs;
 use mapper_campaign::units::Kind;
+use mapper_chart::Figure;
 use mapper_core::{
     CompressorMap, ExportError, IdentifiedPoint, MapUnits, Method, Plan, ResultRemark, RunEnding,
-    with_sentences,
+    ThermalModel, with_sentences,
 };
 use mapper_identify::{T2History, t2_history};
 use mapper_maps::{MapFit, MapFitOptions, RepeatedJump};
 use mapper_recording::{ChannelMap, ReadOptions, ReadWarning, read_recording};
 use mapper_report::{
-    Display, OtherRun, PointResults, PointsOrigin, ReportSource, RunReport, budget_csv, instant,
+    Display, OtherRun, PointResults, PointsOrigin, ReportSource, RunReport, ThermalExport, TurbinePoint,
+    budget_csv, error_figure, heat_transfer_figure, instant, turbine_points, turbine_text,
 };
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -440,4 +443,58 @@ fn export(
         paths.insert(name.to_owned(), path);
     }
     Ok(paths)
+}
+
+/// The written files and their contents.
+#[derive(Debug, Serialize)]
+pub struct RigFiles {
+    /// The files.
+    pub files: Vec<PathBuf>,
+    /// The turbine at each point.
+    pub turbine: Vec<TurbinePoint>,
+    /// Parameters common to all points (joint method).
+    pub thermal: Option<ThermalModel>,
+}
+
+impl Session<'_> {
+    /// Identifies a recording by its campaign's method and writes the files to `out`. Creates the directory if missing.
+    ///
+    /// # Errors
+    /// [`SessionError`] if the machine is unknown, the recording cannot be identified or a file cannot be written.
+    pub fn rig_files(
+        &self,
+        recorded: Vec<Recorded>,
+        map: &ChannelMap,
+        out: &Path,
+    ) -> Result<RigFiles, SessionError> {
+        let first = recorded.first().ok_or(SessionError::NoRecording)?;
+        let campaign = first.require_campaign()?.clone();
+        let identified = self.identify(recorded, map, None)?;
+        let points: Vec<IdentifiedPoint> = identified.points_alone().cloned().collect();
+        let (machine, params) = (&campaign.machine.name, &campaign.machine.params);
+        let thermal = ThermalExport { machine, params, found: identified.thermal.as_ref() };
+        let gases = identified.gases();
+        let turbine = turbine_points(&identified.recording, &points, &gases);
+        let law = identified.thermal.as_ref().and_then(|found| found.convection.as_ref()?.exponent.value);
+        let heat = heat_transfer_figure(machine, &points, law.unwrap_or(params.compressor.nusselt_exponent));
+        let mut contents: Vec<(&str, Vec<u8>)> = vec![
+            ("thermal_model.json", thermal.json()?),
+            ("thermal_model.txt", thermal.text().into_bytes()),
+            ("turbine.txt", turbine_text(machine, &gases, &turbine).into_bytes()),
+            ("turbine.json", json_text(&turbine)?.into_bytes()),
+            ("heat_transfer.svg", heat.to_svg().into_bytes()),
+            ("heat_transfer.png", png(&heat)?),
+        ];
+        if let Some(figure) = error_figure(machine, &identified.points) {
+            contents.push(("error.svg", figure.to_svg().into_bytes()));
+            contents.push(("error.png", png(&figure)?));
+        }
+        let files = write_files(out, &contents, Existing::Kept)?;
+        Ok(RigFiles { files, turbine, thermal: identified.thermal })
+    }
+}
+
+/// The figure as PNG, with two pixels per unit.
+pub(crate) fn png(figure: &Figure) -> Result<Vec<u8>, SessionError> {
+    Ok(figure.to_png(2.0).map_err(ExportError::failed("png"))?)
 }

@@ -1,6 +1,6 @@
 //! Analyses one side of a machine from a log without steps: the cause that explains the residual, and the parameters.
 
-use crate::analysis::further_results::png;
+use crate::analysis::results::png;
 use crate::plan::planning::nominal_model;
 use crate::recording::files::{DIAGNOSIS_FORMAT, Existing, Versioned, json_text, write_files};
 use crate::recording::identification_config::declared;

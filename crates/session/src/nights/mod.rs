@@ -1,4 +1,3 @@
 //! Nightly campaigns on the simulated rig: their runs, history entries, and the report that compares nights.
 
-pub(crate) mod night_report;
 pub(crate) mod nightly;

@@ -1,10 +1,10 @@
 //! Verdicts to expect from a campaign before its run, and the changes that make more points good.
 
-use crate::plan::calibration_check::calibration_concerns;
 use crate::plan::planning::{PlanInputs, plan_of};
 use crate::plan::rehearsal::rehearse;
 use crate::recording::identification_config::identification;
 use crate::rig::drive::soak_s;
+use crate::run::preflight::calibration_concerns;
 use crate::{Session, SessionError};
 use mapper_campaign::campaign::Date;
 use mapper_campaign::{Campaign, Concern};

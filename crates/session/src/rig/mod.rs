@@ -3,6 +3,5 @@
 pub(crate) mod drive;
 pub(crate) mod guards;
 pub(crate) mod observers;
-pub(crate) mod rig_lease;
 pub(crate) mod rig_state;
 pub(crate) mod sources;

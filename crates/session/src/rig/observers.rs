@@ -1,8 +1,8 @@
 //! Observers of a run: the recorder with its journal, the sender of events, the estimator of points, each in a thread of its own if it is slow.
 
 use crate::SessionEvent;
-use crate::event::OnEvent;
 use crate::recording::journal::{Entry, Journal};
+use crate::session::OnEvent;
 use mapper_core::{Event, EventKind, Method, Recording, RigDescription, RunEnding, SampleBatch, StepMarker};
 use mapper_identify::{IdentifyConfig, identify_each};
 use mapper_recording::{RecordError, RecordingWriter, StepPhase};

@@ -2,6 +2,5 @@
 
 pub(crate) mod preflight;
 pub(crate) mod prepared_run;
-pub(crate) mod recording_metadata;
 pub(crate) mod replayed_steps;
 pub(crate) mod run_stop;

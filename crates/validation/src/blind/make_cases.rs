@@ -1,6 +1,6 @@
 //! Makes a directory of cases: recordings, and sealed answers whose hash is printed before the diagnosis.
 
-use crate::blind::calibration::no_cause_study::visibility_on;
+use crate::blind::calibration::visibility_on;
 use crate::blind::cases::{Case, Draw, Laboratory, Truth};
 use crate::blind::error::BlindError;
 use crate::blind::outside::outside_kinds;

@@ -6,7 +6,6 @@ mod figure_data;
 mod figures;
 mod lab;
 mod model_table;
-mod number_text;
 mod outcome;
 mod page;
 mod picture;

@@ -1,7 +1,7 @@
 //! Common parts of the pictures.
 
+use crate::reproduction::figure_data;
 use crate::reproduction::lab::JUMPS;
-use crate::reproduction::number_text;
 use crate::reproduction::outcome::{Outcome, extremes};
 use mapper_chart::{Axis, Colour, Dash, Line, Marker, Panel, Scatter, palette};
 use mapper_numerics::statistics::range;
@@ -105,7 +105,7 @@ pub(crate) fn span_at_speed(
     value: fn(&Outcome) -> Option<f64>,
     decimals: usize,
 ) -> String {
-    number_text::range(extremes(at_speed(outcomes, speed_rpm).map(value)), decimals)
+    figure_data::range(extremes(at_speed(outcomes, speed_rpm).map(value)), decimals)
 }
 
 /// The outcomes at one target speed.

@@ -1,8 +1,6 @@
 //! `study: calibration`: the cases that `mapper gap blind calibrate` draws to convert scores into probabilities.
 
-use crate::blind::calibration::calibrate::{
-    CalibrationSettings, DiagnosisSummary, Plan, cases, fitted, undetermined,
-};
+use crate::blind::calibration::{CalibrationSettings, DiagnosisSummary, Plan, cases, fitted, undetermined};
 use crate::blind::scoring::reliability::{Bin, Reliability, reliabilities, reliability_text};
 use crate::blind::{Case, StoredCase};
 use crate::studies::source::{CampaignSource, StudyError};

@@ -1,4 +1,4 @@
-//! Turns every violation of the schema into a finding at its position.
+//! A JSON schema generated from a type, for editors, and every violation of it in a file as a finding at its position.
 //!
 //! serde would stop at the first mistake, and would lose position and choices for untagged enums and unknown keys.
 
@@ -6,15 +6,89 @@ use crate::document::positions::{Step, path_text};
 use crate::document::tree::Tree;
 use crate::mistakes::finding::{Finding, FindingKind, closest, guess};
 use crate::mistakes::source::Notes;
-
 use crate::schema_check::messages::{
     describe_violation, example_of, example_sentence, keys_of, quote, replacement, shorten, with_description,
     wrong_name,
 };
 use crate::schema_check::rules::{Message, Rule, Violation, check_quantity, find_violations};
-use crate::schema_check::schema::Schema;
+use schemars::JsonSchema;
+use schemars::generate::SchemaSettings;
+use schemars::transform::{Transform, transform_subschemas};
 use serde_json::{Map, Value};
 use std::collections::HashSet;
+
+/// The schema of a kind of file.
+#[derive(Debug, Clone)]
+pub struct Schema {
+    pub(crate) value: Value,
+}
+
+impl Schema {
+    /// The schema of a type.
+    pub fn of<T: JsonSchema>() -> Self {
+        Schema::new(json_schema_of::<T>())
+    }
+
+    /// A schema from its JSON value.
+    pub fn new(value: Value) -> Self {
+        Schema { value }
+    }
+
+    /// The keys of the file.
+    pub fn keys(&self) -> Vec<&str> {
+        self.value.as_object().map(keys_of).unwrap_or_default()
+    }
+}
+
+/// JSON schema (draft 2020-12) of a type, for editors and other tools.
+///
+/// Quantities are strings; `x-quantity` names their kind, `x-min`, `x-max` and `x-above` their range.
+pub fn json_schema_of<T: JsonSchema>() -> Value {
+    let mut settings = SchemaSettings::draft2020_12();
+    // Subschemas are inlined instead of `$ref`, so that each key has its own description.
+    settings.inline_subschemas = true;
+    settings.transforms.push(Box::new(WithoutNull));
+    settings.into_generator().into_root_schema_for::<T>().to_value()
+}
+
+/// Removes `null` from optional values: a key may be omitted, but not be empty.
+#[derive(Debug, Clone)]
+struct WithoutNull;
+
+impl Transform for WithoutNull {
+    fn transform(&mut self, schema: &mut schemars::Schema) {
+        transform_subschemas(self, schema);
+        if let Some(object) = schema.as_object_mut() {
+            without_null(object);
+        }
+    }
+}
+
+fn without_null(object: &mut Map<String, Value>) {
+    if let Some(Value::Array(types)) = object.get_mut("type") {
+        types.retain(|name| name != "null");
+        if let [single] = types.as_slice() {
+            let single = single.clone();
+            object.insert("type".into(), single);
+        }
+    }
+    if let Some(Value::Array(values)) = object.get_mut("enum") {
+        values.retain(|value| !value.is_null());
+    }
+    if let Some(Value::Array(branches)) = object.get_mut("anyOf") {
+        branches.retain(|branch| branch.get("type") != Some(&Value::String("null".into())));
+        if let [Value::Object(single)] = branches.as_mut_slice() {
+            let single = std::mem::take(single);
+            object.remove("anyOf");
+            for (key, value) in single {
+                object.entry(key).or_insert(value);
+            }
+        }
+    }
+    if object.get("default") == Some(&Value::Null) {
+        object.remove("default");
+    }
+}
 
 /// Maximum number of unknown keys of one mapping that are reported; finding the position of each takes time.
 const UNKNOWN_KEYS_LIMIT: usize = 200;

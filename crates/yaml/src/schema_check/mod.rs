@@ -3,4 +3,3 @@
 pub(crate) mod check;
 pub(crate) mod messages;
 pub(crate) mod rules;
-pub(crate) mod schema;

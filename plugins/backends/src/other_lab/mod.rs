@@ -2,14 +2,12 @@
 //! assume: a housing of four nodes, two volumes and a duct after the wheel, a map with hysteresis, second-order sensors. Actuators,
 //! weather, offsets, noise, standstill and trips are those of the virtual lab.
 
-mod equations;
 mod machine;
 mod motion;
 mod passage;
-mod settings_file;
 mod structure;
 
-pub use equations::apply_structure;
+pub use motion::apply_structure;
 pub use structure::{NAME, OtherStructure};
 
 use crate::virtual_lab::VirtualLab;
@@ -25,5 +23,5 @@ pub const PLUGIN: BackendPlugin = BackendPlugin {
 };
 
 fn make(rig: &NominalRig, settings: &serde_json::Value) -> Result<Box<dyn Backend>, BackendError> {
-    Ok(Box::new(VirtualLab::new(settings_file::read(settings, rig)?)))
+    Ok(Box::new(VirtualLab::new(structure::read(settings, rig)?)))
 }

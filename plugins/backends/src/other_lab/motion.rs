@@ -1,22 +1,22 @@
-//! Integration of this lab's machine.
+//! Integration of the machine of this lab, and its equations in the rig of the virtual lab.
 
-use super::machine::{SIZES, STATES, evaluate, lumped_state, start};
-use super::structure::OtherStructure;
-use crate::virtual_lab::{LabInputs, RunningMachine, StructureError};
+use crate::other_lab::machine::{SIZES, STATES, evaluate, lumped_state, start};
+use crate::other_lab::structure::{NAME, OtherStructure};
+use crate::virtual_lab::{LabInputs, LabSettings, RunningMachine, SecondOrder, Structure, StructureError};
 use mapper_physics::machine::params::{BoundaryConditions, Params};
+use mapper_physics::simulation::steady;
 use mapper_physics::simulation::inputs::Inputs;
 use mapper_physics::simulation::model::{Model, Outputs, State};
 use mapper_physics::simulation::rosenbrock::{Integrator, OdeSystem, Tolerances};
-use mapper_physics::simulation::simulate::{
-    Crossing, DEFAULT_RELATIVE_TOLERANCE, ModelEvent, SimulationError, Watch,
-};
+use mapper_physics::simulation::simulate::{Crossing, DEFAULT_RELATIVE_TOLERANCE, ModelEvent, SimulationError, Watch};
+use std::sync::Arc;
 
 /// Simulated time to a steady state, s: many time constants of the turbine housing.
 const SETTLING_TIME_S: f64 = 40_000.0;
 
 /// A running machine with the equations of this lab.
 #[derive(Debug)]
-pub(super) struct Motion {
+pub(crate) struct Motion {
     model: Model,
     structure: OtherStructure,
     watch: Watch,
@@ -28,7 +28,7 @@ pub(super) struct Motion {
 }
 
 impl Motion {
-    pub(super) fn new(
+    pub(crate) fn new(
         model: &Model,
         structure: OtherStructure,
         t_s: f64,
@@ -46,7 +46,7 @@ impl Motion {
     }
 
     /// Settles to the steady state under `boundary`, without advancing the lab's time.
-    pub(super) fn settle(&mut self, boundary: &BoundaryConditions) -> Result<(), StructureError> {
+    pub(crate) fn settle(&mut self, boundary: &BoundaryConditions) -> Result<(), StructureError> {
         let (t_s, state) = self.initial;
         let mut integrator = Integrator::new(t_s, start(&self.model, boundary, &state), tolerances());
         let mut system = System::new(&self.model, &self.structure, boundary, t_s);
@@ -172,5 +172,39 @@ impl<I: Inputs> OdeSystem<STATES> for System<'_, I> {
 
     fn depends_on_time(&self) -> bool {
         !self.constant
+    }
+}
+
+/// Replaces the equations and sensors of a virtual lab by those of this lab.
+pub fn apply_structure(lab: &mut LabSettings, structure: OtherStructure) {
+    let sensors = structure.sensors();
+    lab.second_order = sensors
+        .into_iter()
+        .map(|(channel, frequency_hz, damping_ratio)| (channel, SecondOrder { frequency_hz, damping_ratio }))
+        .collect();
+    lab.structure = Arc::new(structure);
+}
+
+impl Structure for OtherStructure {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn start(&self, model: &Model, t_s: f64, state: State, watch: Watch) -> Box<dyn RunningMachine> {
+        Box::new(Motion::new(model, self.clone(), t_s, state, watch))
+    }
+
+    fn settled(
+        &self,
+        model: &Model,
+        t_s: f64,
+        boundary: &BoundaryConditions,
+        watch: Watch,
+    ) -> Result<Box<dyn RunningMachine>, StructureError> {
+        // Start from the steady state of the lumped model, and settle to that of these equations.
+        let lumped = steady::settle_under(model, boundary)?;
+        let mut motion = Motion::new(model, self.clone(), t_s, lumped.state, watch);
+        motion.settle(boundary)?;
+        Ok(Box::new(motion))
     }
 }

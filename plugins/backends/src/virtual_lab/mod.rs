@@ -19,7 +19,7 @@ pub use name::NAME;
 pub use rig::actuator::ActuatorDynamics;
 pub use rig::boundary_wander::Weather;
 pub use rig::drift::{DriftTarget, LabDrift};
-pub use rig::inputs::LabInputs;
+pub use rig::running::LabInputs;
 pub use rig::precursor::SurgePrecursor;
 pub use rig::running::{RunningMachine, Structure, StructureError};
 pub use rig::tolerances::draw_tolerances;

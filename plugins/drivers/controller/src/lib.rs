@@ -6,15 +6,14 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-mod implausible;
 mod limits;
 mod rig;
 
-pub use implausible::{format_short, is_plausible};
 pub use limits::{
     AcceptedRanges, LimitError, REQUIRED_GUARDS, SafeSettings, Target, WriteSettings, check_range,
     check_resolution, check_scale,
 };
+pub use limits::{format_short, is_plausible};
 pub use rig::{Reading, Stand, rig};
 
 use mapper_core::Channel;

@@ -1,9 +1,10 @@
 //! The rig behind a controller.
 
+use crate::Controller;
 use crate::limits::{
     AcceptedRanges, LimitError, MAX_HEARTBEAT, REQUIRED_GUARDS, SafeSettings, Target, check_range,
+    check_readings,
 };
-use crate::{Controller, implausible};
 use mapper_core::{
     Backend, BackendError, Channel, ChannelColumn, Event, EventKind, Provenance, Quality, RigDescription,
     RigMode, SampleBatch, Setpoints,
@@ -263,7 +264,7 @@ impl<C: Controller> Backend for Rig<C> {
         // A wrong word order or scale would also be wrong in every write.
         let (readings, _) = self.controller.read(0.0);
         let readings = readings.iter().map(|(channel, reading)| (*channel, reading.value));
-        if let Err(implausible) = implausible::check(&self.controller, readings) {
+        if let Err(implausible) = check_readings(&self.controller, readings) {
             self.controller.close();
             let (backend, path) = (self.stand.backend.to_owned(), format!("read.{}", implausible.channel));
             return Err(BackendError::Settings { backend, path, source: implausible });

@@ -22,9 +22,6 @@
 
 mod about;
 mod armed;
-mod descent;
-mod outage;
-mod output_queue;
 mod refusal;
 mod server;
 mod serving;
@@ -33,7 +30,7 @@ mod settings;
 mod socket;
 
 pub use about::{About, SOCKET};
-pub use outage::Outage;
+pub use refusal::Outage;
 pub use settings::address;
 pub use settings::by_channel;
 pub use settings::{SecretError, secret};

@@ -1,10 +1,10 @@
 //! Connections of a driver: standard input and output, or a socket.
 
 use crate::Open;
-use crate::output_queue::OutputQueue;
 use crate::server::Server;
 use crate::serving::{
-    DriverEvent, QUEUE_LENGTH, forward_messages, forward_signals, new_session_name, serve_one, wait_for_event,
+    DriverEvent, OutputQueue, QUEUE_LENGTH, forward_messages, forward_signals, new_session_name, serve_one,
+    wait_for_event,
 };
 use mapper_driver_host::protocol::{
     Code, Encoding, FIRST_FRAME_LIMIT_BYTES, Failure, Message, decode, encode, read_frame, write_frame,

@@ -3,5 +3,4 @@
 pub(crate) mod clock;
 pub(crate) mod clock_choice;
 pub(crate) mod counter;
-pub(crate) mod sample;
 pub(crate) mod table_head;

@@ -1,6 +1,6 @@
 //! A log whose columns are in memory, in one or several tables.
 
-use crate::columns::sample::HEAD_ROWS;
+use crate::columns::counter::HEAD_ROWS;
 use crate::tables::column_rows::{Chunk, Chunks, ColumnRows};
 use crate::tables::joined_tables::{Part, join_tables};
 use crate::tables::table_log::{Origin, Table};

@@ -6,7 +6,5 @@ pub(crate) mod joined_tables;
 pub(crate) mod long_table;
 #[cfg(feature = "parquet")]
 pub(crate) mod record_batches;
-pub(crate) mod row_sorter;
-pub(crate) mod row_stream;
 pub(crate) mod table_log;
 pub(crate) mod table_row;

@@ -1,6 +1,6 @@
 //! Record batches of Arrow and Parquet, as the rows of one table.
 
-use crate::columns::sample::HEAD_ROWS;
+use crate::columns::counter::HEAD_ROWS;
 use crate::columns::table_head::MAX_COLUMNS;
 use crate::tables::column_log::COLUMN_OPTIONS;
 use crate::tables::column_rows::{Chunk, Chunks, ColumnRows};

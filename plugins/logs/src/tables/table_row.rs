@@ -1,7 +1,10 @@
-//! One row of a table, independent of its storage.
+//! One row of a table, independent of its storage; the lines of a delimited file as rows; rows sorted by time while they are read.
 
-use mapper_recording::logs::LogError;
-use mapper_table::{DateOrder, Instant, NO_READING, number_in, parse_instant, parse_number};
+use mapper_recording::logs::{LogError, LogFile};
+use mapper_table::{
+    DateOrder, Dialect, Instant, NO_READING, TextRows, number_in, parse_instant, parse_number,
+};
+use std::collections::VecDeque;
 
 /// The content of a cell.
 pub(crate) enum Cell<'a> {
@@ -55,4 +58,64 @@ pub(crate) trait Rows: Cells {
     /// # Errors
     /// [`LogError`] if the file cannot be read further.
     fn advance(&mut self) -> Result<bool, LogError>;
+}
+
+/// The rows of a delimited file.
+pub(crate) struct RowStream {
+    file: LogFile,
+    rows: TextRows,
+    decimal: u8,
+}
+
+impl RowStream {
+    pub(crate) fn open(file: &LogFile, dialect: Dialect) -> Result<Self, LogError> {
+        let rows = TextRows::new(Box::new(file.open()?), dialect);
+        Ok(RowStream { file: file.clone(), rows, decimal: dialect.decimal })
+    }
+
+    /// The cells of the row as text.
+    pub(crate) fn texts(&self) -> Vec<String> {
+        self.rows.texts()
+    }
+}
+
+impl Cells for RowStream {
+    fn cell(&self, column: usize) -> Cell<'_> {
+        Cell::Text(self.rows.bytes(column))
+    }
+
+    fn decimal(&self) -> u8 {
+        self.decimal
+    }
+}
+
+impl Rows for RowStream {
+    fn advance(&mut self) -> Result<bool, LogError> {
+        self.rows.advance().map_err(|error| self.file.read_error(error))
+    }
+}
+
+/// Number of buffered rows: a row that is late by more rows stays out of order. Loggers that send packets mix up some dozens. The buffer
+/// takes 6 MB for a hundred columns.
+const BUFFERED_ROWS: usize = 8192;
+
+/// A buffer that returns rows in order of time.
+#[derive(Debug, Default)]
+pub(crate) struct RowSorter {
+    /// By time, the earliest first.
+    rows: VecDeque<(f64, Vec<f64>)>,
+}
+
+impl RowSorter {
+    /// Adds a row, and returns the earliest one if the buffer is full.
+    pub(crate) fn exchange(&mut self, t_s: f64, values: &[f64]) -> Option<(f64, Vec<f64>)> {
+        let at = self.rows.partition_point(|(other_s, _)| *other_s <= t_s);
+        self.rows.insert(at, (t_s, values.to_vec()));
+        if self.rows.len() > BUFFERED_ROWS { self.rows.pop_front() } else { None }
+    }
+
+    /// The buffered rows.
+    pub(crate) fn rest(self) -> impl Iterator<Item = (f64, Vec<f64>)> {
+        self.rows.into_iter()
+    }
 }

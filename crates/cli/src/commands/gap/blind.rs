@@ -10,7 +10,7 @@ use clap::Args;
 use mapper_fleet::{Engine, cores};
 use mapper_report::{Document, Table};
 use mapper_session::{json_text, write_new};
-use mapper_validation::blind::calibration::calibrate::{Plan, calibrate};
+use mapper_validation::blind::calibration::{Plan, calibrate};
 use mapper_validation::blind::scoring::reliability::{calibrated_text, reliabilities};
 use mapper_validation::blind::scoring::score::{open_answers, score};
 use mapper_validation::blind::{CaseKind, Draw, Laboratory, MANIFEST_NAME, Manifest, OutsideUse};

@@ -1,5 +1,4 @@
 //! Scores of the diagnosis in the blind test: hit rates with exact intervals, and reliability of probabilities.
 
-pub(crate) mod interval;
 pub mod reliability;
 pub mod score;

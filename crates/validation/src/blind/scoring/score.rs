@@ -3,7 +3,7 @@
 use crate::blind::cases::{CaseKind, Truth};
 use crate::blind::error::BlindError;
 use crate::blind::make_cases::{MANIFEST_NAME, Manifest, open, read_json};
-use crate::blind::scoring::interval::Share;
+use crate::blind::scoring::reliability::Share;
 use mapper_effects::catalogue;
 use mapper_numerics::statistics::{mean, nearest_rank};
 use serde::de::Error;

@@ -1,7 +1,7 @@
 //! Figure 11 (b): the heat-transfer coefficient when the gas heats the housing and when the housing heats the gas.
 
+use crate::reproduction::figure_data::{fixed, range};
 use crate::reproduction::lab::{Run, run_all};
-use crate::reproduction::number_text::{fixed, range};
 use crate::reproduction::outcome::{
     Outcome, RUN_S, WINDOW, dynamic_config, extremes, identify_run, truth_in_window,
 };

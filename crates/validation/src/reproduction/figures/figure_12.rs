@@ -1,7 +1,7 @@
 //! Figure 12: error against the size of the transient, with the noise and the offsets of a rig.
 
+use crate::reproduction::figure_data::fixed;
 use crate::reproduction::lab::{Jump, Run, run_lagged};
-use crate::reproduction::number_text::fixed;
 use crate::reproduction::outcome::{Outcome, RUN_S, dynamic_config, identify_recording, rms};
 use crate::reproduction::{FigureResult, ReproduceError, Statement, Table, Verdict};
 use mapper_chart::{Axis, Figure, Marker, Panel, Rule, RuleAt, Scatter, palette};

@@ -1,8 +1,8 @@
 //! Figure 6: the dynamic method against the model's own efficiency and heat-transfer coefficient.
 
+use crate::reproduction::figure_data::{fixed, range, signed, signed_or_dash};
 use crate::reproduction::figures::figure_5::apparent_eta;
 use crate::reproduction::lab::Run;
-use crate::reproduction::number_text::{fixed, range, signed, signed_or_dash};
 use crate::reproduction::outcome::{
     Outcome, WINDOW, dynamic_config, extremes, identify_runs, rms, truth_in_window, worst,
 };

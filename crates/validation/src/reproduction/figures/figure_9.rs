@@ -1,7 +1,7 @@
 //! Figure 9: thermocouples of several diameters at the compressor outlet.
 
+use crate::reproduction::figure_data::{fixed, range};
 use crate::reproduction::lab::{JUMPS, run_all};
-use crate::reproduction::number_text::{fixed, range};
 use crate::reproduction::outcome::{
     Outcome, RUN_S, WINDOW, dynamic_config, extremes, identify_runs, truth_in_window, worst,
 };

@@ -1,10 +1,10 @@
 //! Settings of the lab in a campaign, below `backend: {virtual_lab: ...}`.
 
-use crate::virtual_lab::campaign_keys::drift_file::DriftFile;
+use crate::virtual_lab::rig::drift::{DriftFile, read_drifts};
 use crate::virtual_lab::campaign_keys::effects_file::{EffectValues, apply_effects};
 use crate::virtual_lab::campaign_keys::elements_file::FaultFile;
 use crate::virtual_lab::campaign_keys::setting_problem::{SettingProblem, check_range};
-use crate::virtual_lab::campaign_keys::{drift_file, elements_file};
+use crate::virtual_lab::campaign_keys::elements_file;
 use crate::virtual_lab::rig::actuator::ActuatorDynamics;
 use crate::virtual_lab::rig::boundary_wander::Weather;
 use crate::virtual_lab::rig::precursor::SurgePrecursor;
@@ -263,7 +263,7 @@ pub fn read_settings(
             OffsetsName::Drawn => draw_nonuniformity(nominal),
             OffsetsName::None => BTreeMap::new(),
         },
-        drifts: drift_file::read(&file.drift)?,
+        drifts: read_drifts(&file.drift)?,
         static_tap_pipe_diameters_m: nominal.static_tap_pipe_diameters_m.clone(),
         trip_speed_rpm: file.trip_speed.map_or(1.1 * nominal.speed_max_rpm, |speed| speed.value),
         structure: Arc::new(Lumped),

@@ -3,7 +3,6 @@
 pub(crate) mod actuator;
 pub(crate) mod boundary_wander;
 pub(crate) mod drift;
-pub(crate) mod inputs;
 pub(crate) mod precursor;
 pub(crate) mod running;
 pub(crate) mod tolerances;

@@ -1,20 +1,23 @@
 //! Calibrates the diagnosis: draws separate cases, with outside causes that the check does not use, diagnoses them, and fits the constants that convert scores into probabilities.
 
-use crate::blind::calibration::no_cause_study::{declared, visibility_on};
-use crate::blind::cases::{Case, CaseKind, Cause, Draw};
+use crate::blind::cases::{Case, CaseKind, Cause, Draw, SignatureMeter};
 use crate::blind::error::BlindError;
 use crate::blind::outside::{OutsideUse, outside_kinds};
 use crate::blind::virtual_runs::Schedule;
 use mapper_campaign::{Campaign, nominal_model};
+use mapper_core::NoiseColour;
 use mapper_diagnose::gap;
 use mapper_diagnose::gap::{
-    Calibration, ClosureSearch, Diagnosed, GapRequest, Origin, RigRecording, Scores, Verdict,
+    Calibration, ClosureSearch, Diagnosed, EffectVisibility, GapRequest, Origin, RigRecording, Scores,
+    Verdict,
 };
 use mapper_fleet::Engine;
-use mapper_numerics::minimise::minimise;
+use mapper_numerics::root::minimise;
 use mapper_numerics::statistics::{NORMAL_975, quantile};
+use mapper_observe::Declared;
 use mapper_physics::rig::effect::Effect;
 use mapper_physics::simulation::model::Model;
+use mapper_recording::ChannelMap;
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -347,7 +350,7 @@ const BOUND_TOLERANCE: f64 = 1e-4;
 const MAX_WIDTH_RATIO: f64 = 0.5;
 
 /// The origin of a fitted number with this posterior and prior standard deviation.
-pub(crate) fn of_width(posterior_sigma: f64, prior_sigma: f64) -> Origin {
+fn of_width(posterior_sigma: f64, prior_sigma: f64) -> Origin {
     if posterior_sigma > MAX_WIDTH_RATIO * prior_sigma { Origin::Prior } else { Origin::Data }
 }
 
@@ -362,7 +365,7 @@ pub(crate) struct Row {
 
 /// Offset and slopes of the logistic that separates outside causes from the others, each with its origin. `None` if one of the classes is
 /// empty.
-pub(crate) fn logistic(rows: &[Row]) -> Option<([f64; 3], [Origin; 3])> {
+fn logistic(rows: &[Row]) -> Option<([f64; 3], [Origin; 3])> {
     if rows.iter().all(|row| row.outside) || rows.iter().all(|row| !row.outside) {
         return None;
     }
@@ -445,6 +448,58 @@ fn argument(weights: &[f64; 3], features: &[f64; 2]) -> f64 {
     // Beyond 500 an exponential is infinite.
     let x = weights[0] + weights[1..].iter().zip(features).map(|(w, f)| w * f).sum::<f64>();
     x.clamp(-500.0, 500.0)
+}
+
+/// The visibility of `effects` on a recording of the campaign with noise, offsets, tolerances and weather but without a cause. Equal seeds give
+/// equal recordings.
+///
+/// # Errors
+/// [`BlindError`] if the campaign has no nominal model or cannot be run.
+pub fn visibility(
+    campaign: &Campaign,
+    effects: Vec<Arc<dyn Effect>>,
+    seed: u64,
+) -> Result<EffectVisibility, BlindError> {
+    let nominal = nominal_model(campaign)?;
+    let schedule = Schedule::new(campaign, &nominal)?;
+    visibility_on(campaign, &schedule, &nominal, effects, seed)
+}
+
+/// The uncertainties and tolerances that the campaign declares: those from which the lab of a case draws.
+pub(crate) fn declared(campaign: &Campaign) -> Declared {
+    Declared {
+        sensors: mapper_session::declared(campaign, &ChannelMap::native()),
+        noise_colour: NoiseColour::default(),
+        tolerances: campaign.tolerances,
+        nominal: campaign.boundary,
+        common_offsets: Vec::new(),
+    }
+}
+
+/// [`visibility`] on a schedule of the campaign. Other weather changes the signatures by a few per cent.
+pub(crate) fn visibility_on(
+    campaign: &Campaign,
+    schedule: &Schedule<'_>,
+    nominal: &Model,
+    effects: Vec<Arc<dyn Effect>>,
+    seed: u64,
+) -> Result<EffectVisibility, BlindError> {
+    let case = Case {
+        name: "without_causes".to_owned(),
+        kind: CaseKind::None,
+        causes: Vec::new(),
+        sigmas: Vec::new(),
+        seed,
+    };
+    let recorded = RigRecording::simulated(schedule.record(&case)?, declared(campaign), nominal.clone());
+    EffectVisibility::new(recorded, effects).map_err(BlindError::signatures)
+}
+
+impl SignatureMeter for EffectVisibility {
+    fn lengths(&self, causes: &[Cause]) -> Vec<f64> {
+        let values: Vec<(String, Vec<f64>)> = causes.iter().map(Cause::id_and_values).collect();
+        EffectVisibility::lengths(self, &values).unwrap_or_else(|| vec![0.0; causes.len()])
+    }
 }
 
 #[cfg(test)]

@@ -14,7 +14,7 @@ use mapper_numerics::coloured_noise::{BlockNoise, WhiteningFilter};
 use mapper_numerics::least_squares::descent::{
     DifferenceStep, End, FINE, Model, Normal, Until, descend, step_bounds_within,
 };
-use mapper_numerics::root::minimise;
+use mapper_numerics::minimise::minimise;
 use mapper_numerics::statistics::HINT_SIGMAS;
 use mapper_physics::rig::effect::{Effect, Rig, add};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};

@@ -11,7 +11,7 @@ pub use prediction_errors::leave_out;
 
 use fitted_surface::table;
 use least_squares::observations::Observations;
-use least_squares::solve::{Solution, solve};
+use least_squares::solution::{Solution, solve};
 use mapper_core::{CompressorMap, FittedLine, FittedMap};
 use speed_lines::line_shape::count_crossings;
 use speed_lines::speed_spline::End;

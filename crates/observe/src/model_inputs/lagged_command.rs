@@ -3,7 +3,7 @@
 use crate::averages::schedule::TIME_ROUNDING_S;
 use crate::averages::time_table::Table;
 use mapper_core::{Channel, Recording, Series, StepMarker, is_jump, is_same_command};
-use mapper_numerics::root::minimise;
+use mapper_numerics::minimise::minimise;
 use mapper_numerics::statistics::{mean, median};
 use mapper_physics::laws::orifice;
 

@@ -12,7 +12,7 @@ use mapper_diagnose::gap::{
     Verdict,
 };
 use mapper_fleet::Engine;
-use mapper_numerics::root::minimise;
+use mapper_numerics::minimise::minimise;
 use mapper_numerics::statistics::{NORMAL_975, quantile};
 use mapper_observe::Declared;
 use mapper_physics::rig::effect::Effect;

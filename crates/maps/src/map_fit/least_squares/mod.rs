@@ -2,5 +2,5 @@
 
 pub(crate) mod observations;
 pub(crate) mod problem;
-pub(crate) mod solve;
+pub(crate) mod solution;
 pub(crate) mod variances;

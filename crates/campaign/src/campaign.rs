@@ -1,14 +1,12 @@
 //! The campaign file, and the [`Campaign`] with units resolved and defaults filled in. Its elements are in `elements`.
 
-use crate::elements::evaluation::acceptance::{AcceptanceFile, DriftFile};
-pub use crate::elements::evaluation::identification::Identification;
-use crate::elements::evaluation::identification::IdentificationFile;
-use crate::elements::evaluation::tolerances::TolerancesElement;
+use crate::elements::acceptance::{AcceptanceFile, DriftFile};
+use crate::elements::grid::GridFile;
+pub use crate::elements::identification::Identification;
+use crate::elements::identification::IdentificationFile;
 pub use crate::elements::output::{DisplayUnits, FormatName, Outputs, Report};
-use crate::elements::points::grid::GridFile;
-pub use crate::elements::points::repeats::SequenceSource;
-use crate::elements::points::repeats::{RepeatsFile, SurgeSearchFile, repeats, sequence};
-use crate::elements::points::timing::{TimingFile, ZeroFile};
+pub use crate::elements::repeats::SequenceSource;
+use crate::elements::repeats::{RepeatsFile, SurgeSearchFile, repeats, sequence};
 use crate::elements::rig::actuators::RigFile;
 pub use crate::elements::rig::backend::{BackendChoice, ReaderChoice};
 use crate::elements::rig::backend::{ReaderFile, backend, readers};
@@ -19,6 +17,8 @@ use crate::elements::rig::guards::{GuardInputs, GuardsFile};
 use crate::elements::rig::limits::{BoundaryFile, LimitsFile};
 pub use crate::elements::rig::redundant_sensors::SensorDeclaration;
 use crate::elements::rig::sensors::SensorsFile;
+use crate::elements::timing::{TimingFile, ZeroFile};
+use crate::elements::tolerances::TolerancesElement;
 use crate::elements::turbocharger::gas::GasFile;
 use crate::elements::turbocharger::machine::MachineFile;
 pub use crate::elements::turbocharger::machine::{DescriptionSource, Machine, MapSource};

@@ -10,8 +10,9 @@ pub mod campaign;
 mod checking;
 mod checks;
 mod elements;
-mod files;
+mod load;
 mod machine_sizes;
+mod nightly;
 mod nominal_table;
 mod resolved;
 mod si_values;
@@ -21,18 +22,16 @@ mod testing;
 pub use campaign::Campaign;
 pub use checks::calibration::{CalibrationWarning, forecast_calibration_warnings};
 pub use checks::map_misfit::{MapMisfit, find_map_misfit};
-pub use checks::reachable_points::Concern;
-pub use checks::reachable_points::{UnreachablePoint, nominal_model, unreachable_points};
+pub use checks::reachable_points::{Concern, UnreachablePoint, nominal_model, unreachable_points};
 pub use checks::unusual_settings::USUAL_WHEEL_DIAMETERS_M;
 pub use elements::rig::guards::DEFAULT_MAX_AGE_S;
 pub use elements::rig::sensor_class::{default_contact_sigma_ratio, default_gain_sigma_ratio};
-pub use files::load::json_schema;
-pub use files::load::{
-    CampaignError, MAX_FILE_BYTES, MAX_MAP_BYTES, backend_mistake, check, check_with, format_mistake, load,
-    mistakes, read_named_file, read_text, warnings,
+pub use load::{
+    CampaignError, MAX_FILE_BYTES, MAX_MAP_BYTES, backend_mistake, check, check_with, format_mistake,
+    json_schema, load, mistakes, read_named_file, read_text, warnings,
 };
-pub use files::nightly::{Nightly, NightlyError, NightlyGroup, load_nightly};
 pub use machine_sizes::{AssumedSize, internal_area_sigma_ratio, similar_machine, similar_sizes};
 pub use mapper_yaml::{Finding, FindingKind, Findings, units};
+pub use nightly::{Nightly, NightlyError, NightlyGroup, load_nightly};
 pub use nominal_table::{NominalTableError, nominal_table};
 pub use resolved::{ResolvedLine, ResolvedPoint, resolved_lines};

@@ -1,6 +1,6 @@
 //! Reads elements from a text, for their tests.
 
-use crate::files::load::DOCUMENT;
+use crate::load::DOCUMENT;
 use mapper_yaml::Source;
 use serde::de::{DeserializeOwned, Error as _};
 use serde_json::{Error, Value};

@@ -12,7 +12,7 @@
 //! Points closer than 1 % of the diagonal of their line (repeats) are replaced by their mean.
 
 use crate::StructuredGrid;
-use crate::figure_layout::frame::nice_ticks;
+use crate::frame::nice_ticks;
 use mapper_core::{CompressorMap, FittedMap, FittedNode, MapPoint, SpeedLine};
 
 /// Nodes along a line.

@@ -20,25 +20,28 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+mod clip;
 mod contours;
+mod draw;
 mod drawing;
 pub mod efficiency_mesh;
-mod figure_layout;
+mod figure;
+mod frame;
 mod items;
 mod map_drawing;
 pub mod palette;
-mod rendering;
+mod png;
+mod point_labels;
+mod svg;
 mod text;
 
-pub use contours::Contours;
-pub use contours::StructuredGrid;
-pub use contours::contour_lines;
-pub use figure_layout::figure::{Figure, Panel};
-pub use figure_layout::frame::Axis;
+pub use contours::{Contours, StructuredGrid, contour_lines};
+pub use figure::{Figure, Panel};
+pub use frame::Axis;
 pub use items::{
     Annotation, Dash, Item, Line, LineEnd, Marker, Note, PointLabels, Polygon, Rule, RuleAt, Scatter,
     ScatterPoint,
 };
 pub use map_drawing::{ContourDrawing, EtaDrawing, LineDrawing, MapDrawing, NodeDrawing};
 pub use palette::Colour;
-pub use rendering::png::PngError;
+pub use png::PngError;

@@ -1,7 +1,6 @@
 //! Opens fleet directories, with this computer as the worker.
 
-use crate::environment::SystemClock;
-use crate::environment::registry;
+use crate::environment::{SystemClock, registry};
 use crate::interrupt;
 use crate::output::failure::Failure;
 use crate::output::output_options;

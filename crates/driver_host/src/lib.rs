@@ -19,5 +19,4 @@ mod secrets;
 
 pub use driver::{DEFAULT_TIMEOUTS, Driver, Timeouts};
 pub use error::DriverError;
-pub use find::INCLUDED_DRIVERS;
-pub use find::{DriverLocation, Endpoint, PREFIX, SearchPath};
+pub use find::{DriverLocation, Endpoint, INCLUDED_DRIVERS, PREFIX, SearchPath};

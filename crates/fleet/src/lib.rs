@@ -8,28 +8,22 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-mod directory;
+mod files;
+mod fleet;
 mod merge;
+mod part;
 mod status;
+mod study;
 mod submit;
 mod work;
 
-pub use directory::files::Hash;
-pub use directory::files::Machine;
-pub use directory::files::{FleetError, StudyFileError};
-pub use directory::fleet::CreatedStudy;
-pub use directory::fleet::Fleet;
-pub use directory::fleet::kind_of;
-pub use directory::fleet::{ItemDraft, Kind, Output, Results, StudyDraft, WorkContext, WorkError};
-pub(crate) use directory::part::{Outcome, Part};
-pub use directory::study::Item;
-pub use directory::study::{ItemEntry, Study};
-pub use directory::study::{StudyFile, open_study};
+pub use files::{FleetError, Hash, Machine, StudyFileError};
+pub use fleet::{
+    CreatedStudy, Fleet, ItemDraft, Kind, Output, Results, StudyDraft, WorkContext, WorkError, kind_of,
+};
 pub use merge::MergeOutcome;
-pub use status::Shard;
-pub use status::{Status, UnfinishedItem};
-pub use submit::{Limits, Submission, SubmitOptions, number_ranges};
-pub use submit::{Template, query_task_states};
-pub use work::{Cost, CostEstimate};
-pub use work::{Engine, cores};
-pub use work::{ItemSelection, WorkOutcome};
+pub(crate) use part::{Outcome, Part};
+pub use status::{Shard, Status, UnfinishedItem};
+pub use study::{Item, ItemEntry, Study, StudyFile, open_study};
+pub use submit::{Limits, Submission, SubmitOptions, Template, number_ranges, query_task_states};
+pub use work::{Cost, CostEstimate, Engine, ItemSelection, WorkOutcome, cores};

@@ -1,7 +1,7 @@
 //! Merges parts into the result, which is the same for any number of machines and any order of work.
 
-use crate::directory::files::{Machine, file_name_safe, make_directory};
-use crate::directory::part::PartRefusal;
+use crate::files::{Machine, file_name_safe, make_directory};
+use crate::part::PartRefusal;
 use crate::status::{Status, UnfinishedItem};
 use crate::{Fleet, FleetError, Kind, Outcome, Output};
 use std::cell::RefCell;

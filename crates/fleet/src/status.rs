@@ -1,8 +1,8 @@
 //! How far a study is: items done, begun and missing, and which of them belong to a shard.
 
-use crate::directory::files::read_at_most;
-use crate::directory::fleet::part_name;
-use crate::directory::part::Outcome;
+use crate::files::read_at_most;
+use crate::fleet::part_name;
+use crate::part::Outcome;
 use crate::{Fleet, Hash, ItemEntry, Part};
 use serde::Serialize;
 use std::collections::BTreeSet;

@@ -1,7 +1,7 @@
 //! Submission to a queue by a script template, Slurm's if none is given.
 
-use crate::directory::files::{Durability, Machine, make_directory, read_at_most, write_whole};
-use crate::directory::fleet::LOGS;
+use crate::files::{Durability, Machine, make_directory, read_at_most, write_whole};
+use crate::fleet::LOGS;
 use crate::{Cost, Fleet, FleetError, Shard, Status};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -13,7 +13,5 @@ mod header;
 mod machine;
 mod variables;
 
-pub use files::archive;
-pub use files::{FmuFile, files};
-pub use machine::table_of_fit;
-pub use machine::{FmuError, FmuMachine, FmuMap};
+pub use files::{FmuFile, archive, files};
+pub use machine::{FmuError, FmuMachine, FmuMap, table_of_fit};

@@ -11,9 +11,6 @@ mod store;
 
 pub use compare::{Comparison, MetricOutsideBand, PointsOutsideBand, Shift, compare};
 pub use mapper_numerics::statistics::median;
-pub use metric::Metric;
-pub use metric::{Band, Floor};
-pub use night::PointQuantity;
-pub use night::{Night, PointRow, RunKey, RunRow};
-pub use store::HistoryError;
-pub use store::{Filter, History, ListedRun, StoredNight};
+pub use metric::{Band, Floor, Metric};
+pub use night::{Night, PointQuantity, PointRow, RunKey, RunRow};
+pub use store::{Filter, History, HistoryError, ListedRun, StoredNight};

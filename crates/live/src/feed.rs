@@ -1,6 +1,6 @@
 //! The state that a browser shows, with a size limit for any run, and how events change it.
 
-use crate::web_server::server::OperatorCommand;
+use crate::server::OperatorCommand;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{Channel, IdentifiedPoint, Plan, PlanStep, SignalGuard, StepMarker};

@@ -3,7 +3,7 @@
 //! The library keeps a queue for each viewer and drops the oldest message if the viewer is slow, so publishing never waits. Viewers have no
 //! write access: the server offers no services, parameters or client topics.
 
-use crate::web_server::request::parse_address;
+use crate::request::parse_address;
 use foxglove::{
     ChannelBuilder, Context, FoxgloveError, PartialMetadata, RawChannel, Schema, WebSocketServer,
 };

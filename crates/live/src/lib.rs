@@ -6,17 +6,20 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+mod connections;
 mod feed;
 #[cfg(feature = "foxglove")]
 mod foxglove_stream;
 mod live;
 mod observers;
-mod web_server;
+mod request;
+mod server;
+mod tls;
 
 pub use feed::LiveRun;
 #[cfg(feature = "foxglove")]
 pub use foxglove_stream::{FoxgloveStream, FoxgloveStreamError, parse_local_address};
 pub use live::LiveError;
 pub use observers::{ObserverRequest, Observers};
-pub use web_server::request::parse_address;
-pub use web_server::tls::{TlsError, TlsFiles};
+pub use request::parse_address;
+pub use tls::{TlsError, TlsFiles};

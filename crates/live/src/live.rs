@@ -1,10 +1,10 @@
 //! The live page of a run: opened before the run, updated during it, closed after it.
 
+use crate::connections::Hub;
 use crate::feed::{Feed, LiveRun};
-use crate::web_server::connections::Hub;
-use crate::web_server::request::Access;
-use crate::web_server::server::{OperatorCommand, ServedContent, serve};
-use crate::web_server::tls::{Tls, TlsError, TlsFiles, read};
+use crate::request::Access;
+use crate::server::{OperatorCommand, ServedContent, serve};
+use crate::tls::{Tls, TlsError, TlsFiles, read};
 use mapper_report::page::live_page;
 use mapper_session::SessionEvent;
 use std::net::{SocketAddr, TcpListener};

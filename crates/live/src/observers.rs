@@ -3,9 +3,8 @@
 use crate::feed::LiveRun;
 #[cfg(feature = "foxglove")]
 use crate::foxglove_stream::FoxgloveStream;
-use crate::live::Live;
-use crate::live::LiveError;
-use crate::web_server::tls::TlsFiles;
+use crate::live::{Live, LiveError};
+use crate::tls::TlsFiles;
 use mapper_session::SessionEvent;
 use std::net::SocketAddr;
 use std::path::Path;

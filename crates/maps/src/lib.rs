@@ -16,8 +16,7 @@ mod repeats;
 pub mod table;
 mod turbine;
 
-pub use assemble::AssembleError;
-pub use assemble::assemble;
+pub use assemble::{AssembleError, assemble};
 pub use compare::{MapComparison, PlaceComparison, SpeedLineComparison, compare};
 pub use efficiency_definition::convert_efficiency;
 pub use heat_correction::{CorrectedLine, HeatCorrection, HeatCorrectionError, correct_for_heat};

@@ -1,8 +1,7 @@
 //! Where surge and choke were reached on the lines of a map.
 
 use crate::support::map_of;
-use mapper_core::EndEvidence;
-use mapper_core::LineEnd;
+use mapper_core::{EndEvidence, LineEnd};
 use mapper_maps::{LineEnds, mark_line_ends};
 
 /// Speed, flow, pressure ratio, efficiency of a line: an ellipse from its top at 0.05 kg/s to choke at 0.10 kg/s.

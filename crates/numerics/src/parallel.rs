@@ -5,9 +5,8 @@
 
 use rayon::prelude::*;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::sync::Mutex;
-use std::sync::PoisonError;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 /// Applies `work` to every item on rayon's pool: one thread per core, unless the program or `RAYON_NUM_THREADS` sets another number.
 /// Calls may be nested.

@@ -11,7 +11,7 @@ use mapper_physics::laws::housing;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::model::Model;
 use mapper_physics::simulation::steady;
-use mapper_planner::thermal_memory::housing::{Chain, gradients_k};
+use mapper_planner::housing::{Chain, gradients_k};
 use mapper_planner::{Effort, Objective, search};
 use std::time::Instant;
 

@@ -9,21 +9,29 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-mod jumps;
-mod ordering;
-mod plans;
+mod assignment;
+mod bound;
+pub(crate) mod forecast;
+pub mod housing;
+mod jump_forecast;
+mod jump_graph;
+mod objective;
+mod order;
+mod plan;
+mod plan_builder;
+mod relaxation;
 mod request;
-pub mod thermal_memory;
-mod upper_bound;
+mod search;
+mod visits;
+mod walk;
 
-pub use jumps::jump_forecast::{JumpForecast, explain_jump, forecast_all_jumps};
-pub use jumps::jump_graph::{Rejection, SeparatePoints};
-pub use jumps::walk::STABLE_DRIFT_K_MIN;
-pub use ordering::objective::Objective;
-pub use ordering::search::{Effort, search, search_min_gradient};
-pub use plans::plan::make_plan;
-pub use plans::plan::plan_other_orders;
-pub use plans::plan::{hash_inputs, sha256_hex};
-pub use plans::plan_builder::max_steps;
-pub use request::{ForecastRow, MethodResult, MethodResults, PredictedMethod};
-pub use request::{PlanError, PlanRequest, UnreachablePoint};
+pub use jump_forecast::{JumpForecast, explain_jump, forecast_all_jumps};
+pub use jump_graph::{Rejection, SeparatePoints};
+pub use objective::Objective;
+pub use plan::{hash_inputs, make_plan, plan_other_orders, sha256_hex};
+pub use plan_builder::max_steps;
+pub use request::{
+    ForecastRow, MethodResult, MethodResults, PlanError, PlanRequest, PredictedMethod, UnreachablePoint,
+};
+pub use search::{Effort, search, search_min_gradient};
+pub use walk::STABLE_DRIFT_K_MIN;

@@ -1,7 +1,6 @@
 //! Inputs and errors of planning, the interface to the identification method, and the steady states of the points.
 
-use crate::jumps::jump_graph::Rejection;
-use crate::jumps::jump_graph::SeparatePoints;
+use crate::jump_graph::{Rejection, SeparatePoints};
 use mapper_core::{
     Jump, Limits, OperatingPoint, Repeats, RigActuators, SettleBands, Timing, VisitOrder, WindowRule,
 };

@@ -7,7 +7,7 @@ mod common;
 use common::{SimpleHousing, grid, request};
 use mapper_core::{Dwell, Jump, OperatingPoint, PlanRemark, Repeats, StepKind, VisitOrder};
 use mapper_physics::simulation::model::Model;
-use mapper_planner::thermal_memory::housing::gradients_k;
+use mapper_planner::housing::gradients_k;
 use mapper_planner::{
     Effort, Objective, PlanError, PlanRequest, Rejection, explain_jump, forecast_all_jumps, make_plan,
     max_steps, search, search_min_gradient,

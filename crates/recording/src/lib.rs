@@ -12,12 +12,13 @@
 
 mod channel_mapping;
 mod error;
+mod jump_steps;
 pub mod logs;
 mod mcap;
 mod reading;
 mod samples;
 pub mod score;
-mod step_detection;
+mod steps;
 mod writing;
 
 pub use crate::writing::topics::FormatVersion;

@@ -5,14 +5,18 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-mod backends;
+mod auxiliary_instruments;
+mod deadline;
+mod drift_watch;
 mod guards;
 mod run_control;
-mod step_sources;
+mod step_source;
 pub mod surge;
+mod surge_search;
 
-pub use backends::auxiliary_instruments::{AuxiliaryInstrument, RigWithInstruments};
-pub use backends::deadline::{DeadlineBackend, Deadlines};
+pub use auxiliary_instruments::{AuxiliaryInstrument, RigWithInstruments};
+pub use deadline::{DeadlineBackend, Deadlines};
+pub use drift_watch::DriftWatch;
 pub use guards::guard::{CommandedState, Guard};
 pub use guards::plausibility_watch::{PlausibilityWatch, ReadingBounds};
 pub use guards::rig_watch::{BatchWatch, REQUIRED_CHANNELS, RigWatch, StartCheck};
@@ -23,6 +27,5 @@ pub use run_control::observer::{ObserverError, Operator, Protection, RunError, R
 pub use run_control::run::Runner;
 pub use run_control::speed_control::{ResponseAt, SpeedControl, SpeedControlLimits};
 pub use run_control::transition_control::StandMotion;
-pub use step_sources::drift_watch::DriftWatch;
-pub use step_sources::step_source::{PlanSteps, SoakSource, StepSource, StepSourceError};
-pub use step_sources::surge_search::{HoldConditions, HoldConditionsAt, SurgeSearch};
+pub use step_source::{PlanSteps, SoakSource, StepSource, StepSourceError};
+pub use surge_search::{HoldConditions, HoldConditionsAt, SurgeSearch};

@@ -23,6 +23,4 @@ pub use api::{Entry, functions};
 pub use error::{ScriptError, SequenceError};
 pub use request::{OrderPoints, SequenceRequest};
 pub use runner::{Script, SequenceRunner};
-pub use settle::StepResult;
-pub use settle::{EndCondition, SequenceStep};
-pub use settle::{SettleRule, SettleWatch};
+pub use settle::{EndCondition, SequenceStep, SettleRule, SettleWatch, StepResult};

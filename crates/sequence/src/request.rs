@@ -6,8 +6,7 @@ use mapper_core::{
 };
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::forecast::{forecast_step, hold, warm_up_state};
-use mapper_physics::operating_point::reach::FollowOutlet;
-use mapper_physics::operating_point::reach::{describe_obstacles, reach};
+use mapper_physics::operating_point::reach::{FollowOutlet, describe_obstacles, reach};
 use mapper_physics::operating_point::transition::TransitionInputs;
 use mapper_physics::operating_point::transition_forecast::{Stand, forecast_transition};
 use mapper_physics::simulation::model::{Model, State};

@@ -1,8 +1,7 @@
 //! Runs a script on its own thread and synchronises with it at each step.
 
 use crate::error::{ScriptError, SequenceError};
-use crate::names::UnknownName;
-use crate::names::find_unclosed_comment;
+use crate::names::{UnknownName, find_unclosed_comment};
 use crate::request::SequenceRequest;
 use crate::sandbox::{Budget, SCRIPT_LIMIT, STACK_BYTES, build_engine};
 use crate::session::{Session, lock};

@@ -2,8 +2,7 @@
 
 use crate::error::throw;
 use crate::request::{NominalForecast, Refusal, SequenceRequest, StepPrediction};
-use crate::settle::SettleRule;
-use crate::settle::{EndCondition, ScriptMessage, SequenceStep, StepResult};
+use crate::settle::{EndCondition, ScriptMessage, SequenceStep, SettleRule, StepResult};
 use mapper_core::{OperatingPoint, PlanStep, RigMode, Setpoints, StepKind};
 use mapper_physics::simulation::steady::SteadyState;
 use rhai::{EvalAltResult, Position};

@@ -12,7 +12,7 @@
 mod analysis;
 mod errors;
 mod machine;
-mod nights;
+mod nightly;
 mod plan;
 pub mod recording;
 mod registry;
@@ -21,14 +21,14 @@ mod run;
 mod session;
 mod variant;
 
-pub use crate::analysis::calibrated_model::{CalibratedModel, calibrated_model_campaign};
-pub use crate::analysis::calibrated_model::{SealedForecast, found_in};
-pub use crate::errors::FirstMapError;
-pub use crate::errors::FmuExportError;
-pub use crate::errors::MapWorkError;
-pub use crate::errors::{ErrorKind, Input, SessionError, since_text};
+pub use crate::analysis::calibrated_model::{
+    CalibratedModel, SealedForecast, calibrated_model_campaign, found_in,
+};
+pub use crate::errors::{
+    ErrorKind, FirstMapError, FmuExportError, Input, MapWorkError, SessionError, since_text,
+};
 pub use crate::machine::first_campaign::{FirstCampaignRequest, FirstRig};
-pub use crate::nights::nightly::NightlyRun;
+pub use crate::nightly::NightlyRun;
 pub use crate::recording::files::{PROGRAM, program_and_commit};
 pub use analysis::drift::Drift;
 pub use analysis::gap::Gap;
@@ -42,8 +42,7 @@ pub use machine::map_work::{MapFile, MapOut, MapWork};
 pub use mapper_diagnose::driven::Side;
 pub use mapper_maps::table::DescriptionError;
 pub use mapper_runner::Operator;
-pub use nights::nightly::PreparedNight;
-pub use nights::nightly::{night_report_link, night_report_path, night_runs, write_night_report};
+pub use nightly::{PreparedNight, night_report_link, night_report_path, night_runs, write_night_report};
 pub use plan::planning::{PlanInputs, nominal_model, plan, plan_of};
 pub use plan::rehearsal::{Rehearsal, rehearse};
 pub use plan::stored_plan::stored_plan;
@@ -57,11 +56,9 @@ pub use rig::drive::{Pace, drive, soak_s};
 pub use rig::rig_state::{RigStates, RigStatus, shared_state_directory};
 pub use rig::sources::Sources;
 pub use run::preflight::load_on;
-pub use run::prepared_run::start_time_ns;
-pub use run::prepared_run::{PreparedRun, RunOutcome, RunRequest};
+pub use run::prepared_run::{PreparedRun, RunOutcome, RunRequest, start_time_ns};
 pub use run::run_stop::{Phase, RunStop, SignalResponse};
-pub use session::Session;
-pub use session::SessionEvent;
+pub use session::{Session, SessionEvent};
 pub use variant::Variant;
 
 #[cfg(test)]

@@ -8,18 +8,18 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+mod check;
 mod document;
+mod finding;
 pub mod keys;
-mod mistakes;
-mod schema_check;
+mod messages;
+mod rules;
+mod source;
 pub mod units;
 
+pub use check::{Schema, json_schema_of};
 pub use document::file::{open, open_file, read_limited};
 pub use document::positions::{Step, path_text};
 pub use document::tree::{Tree, read};
-pub use mistakes::finding::closest;
-pub use mistakes::finding::{Finding, FindingKind};
-pub use mistakes::source::Findings;
-pub use mistakes::source::Notes;
-pub use mistakes::source::{Document, Source};
-pub use schema_check::check::{Schema, json_schema_of};
+pub use finding::{Finding, FindingKind, closest};
+pub use source::{Document, Findings, Notes, Source};

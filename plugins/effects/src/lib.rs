@@ -11,8 +11,7 @@ mod testing;
 
 pub use script::{HOOK_NAMES, ScriptEffect, ScriptEffectError};
 
-use mapper_physics::rig::effect::Effect;
-use mapper_physics::rig::effect::effect_of;
+use mapper_physics::rig::effect::{Effect, effect_of};
 use mapper_physics::rig::sensor_fault;
 use std::sync::Arc;
 

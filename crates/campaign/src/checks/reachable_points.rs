@@ -61,15 +61,15 @@ pub(crate) fn check_consistency(tree: &Tree, files: Files<'_>, notes: &mut Notes
     elements::rig::backend::check(&mut check);
     elements::rig::limits::check(&mut check);
     elements::rig::guards::check(&mut check);
-    elements::evaluation::identification::check(&mut check);
-    elements::points::timing::check(&mut check);
-    elements::points::repeats::check_repeats(&mut check);
+    elements::identification::check(&mut check);
+    elements::timing::check(&mut check);
+    elements::repeats::check_repeats(&mut check);
     elements::rig::sensors::check(&mut check);
     elements::output::check(&mut check);
     elements::turbocharger::machine::check(&mut check);
     elements::turbocharger::gas::check(&mut check);
-    elements::points::repeats::check_sequence(&mut check);
-    elements::points::grid::check(&mut check);
+    elements::repeats::check_sequence(&mut check);
+    elements::grid::check(&mut check);
 }
 
 /// An unusual or impossible setting of a campaign.

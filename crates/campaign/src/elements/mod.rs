@@ -6,8 +6,12 @@
 //! If the program's own struct is in `mapper-core`, the element is its `serde` remote: the compiler compares the
 //! fields of both.
 
-pub(crate) mod evaluation;
+pub(crate) mod acceptance;
+pub(crate) mod grid;
+pub(crate) mod identification;
 pub(crate) mod output;
-pub(crate) mod points;
+pub(crate) mod repeats;
 pub(crate) mod rig;
+pub(crate) mod timing;
+pub(crate) mod tolerances;
 pub(crate) mod turbocharger;

@@ -1,7 +1,6 @@
 //! `mapper backend`.
 
-use crate::environment::registry;
-use crate::environment::rig_states_directory;
+use crate::environment::{registry, rig_states_directory};
 use crate::output::failure::{Code, Failure};
 use crate::output::standard_output;
 use clap::{Args, Subcommand};

@@ -1,7 +1,6 @@
 //! `mapper check`.
 
-use crate::environment::registry;
-use crate::environment::today;
+use crate::environment::{registry, today};
 use crate::interrupt;
 use crate::output::failure::{Code, Failure};
 use crate::output::{output_options, standard_output};

@@ -1,8 +1,6 @@
 //! `mapper run`: runs a campaign and makes the map.
 
-use crate::environment::registry;
-use crate::environment::rig_states_directory;
-use crate::environment::{SystemClock, today};
+use crate::environment::{SystemClock, registry, rig_states_directory, today};
 use crate::interrupt;
 use crate::output::failure::{Code, Failure};
 use crate::output::output_options::DetailArguments;

@@ -4,9 +4,8 @@ use crate::map_fit::MapFitError;
 use crate::map_fit::least_squares::observations::Observations;
 use crate::map_fit::least_squares::problem::PARAMETER_STEP;
 use crate::map_fit::least_squares::solution::Solution;
-use crate::map_fit::speed_lines::line_shape::count_crossings;
 use crate::map_fit::speed_lines::line_shape::{
-    ANGLE_RANGE_RAD, FlowFrame, LineShape, MIN_ANGLE_RAD, PARAMETERS, Parameters, WORK,
+    ANGLE_RANGE_RAD, FlowFrame, LineShape, MIN_ANGLE_RAD, PARAMETERS, Parameters, WORK, count_crossings,
 };
 use crate::map_fit::speed_lines::nearest::{DIFFERENCE_STEP_RAD, MIN_SQUARE_SLOPE, Scales, nearest, normal};
 use crate::map_fit::speed_lines::speed_spline::SpeedSpline;

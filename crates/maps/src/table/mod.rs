@@ -1,8 +1,11 @@
 //! Reads tables of map points in any usual layout, for the nominal map of a campaign and for the map formats.
 
-mod columns;
+pub(crate) mod beta_tables;
+pub(crate) mod column;
+pub(crate) mod described_columns;
 mod description;
-mod gas_turbine;
+pub(crate) mod design_point;
+pub(crate) mod quantity;
 mod read;
 mod read_turbine;
 mod reference;
@@ -16,8 +19,9 @@ pub use description::{
 };
 pub use read::{read_any_bytes, read_any_text, read_text, read_workbook};
 pub use read_turbine::{read_turbine_text, read_turbine_workbook, reduced_turbine_point};
-pub use reference::{DEFINITION_PREFIX, efficiency_in_comment};
-pub use reference::{parse_reference, reference_in_comment, resolve_reference};
+pub use reference::{
+    DEFINITION_PREFIX, efficiency_in_comment, parse_reference, reference_in_comment, resolve_reference,
+};
 pub use rows_to_lines::{MAX_POINTS, Row, check_point_count, map_of_rows, shift_remark};
 pub use sheet::grid::text_of;
 pub use sheet::workbook::{file_text, text_of_lines, unpack};

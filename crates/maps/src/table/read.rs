@@ -1,11 +1,11 @@
 //! Reads a table of map points: headings of several languages in any order, units in or below the heading, a preamble, a speed only in the
 //! first row of its line, one block per speed or side by side, measured points that are not corrected yet.
 
-use crate::table::columns::column::{Column, Machine};
-use crate::table::columns::described_columns::DescribedColumns;
-use crate::table::columns::quantity::Quantity;
-use crate::table::gas_turbine::beta_tables::{read_arrays, read_gsp, read_modelica, read_nested};
-use crate::table::gas_turbine::design_point::{MapDesign, scale_to_design};
+use crate::table::beta_tables::{read_arrays, read_gsp, read_modelica, read_nested};
+use crate::table::column::{Column, Machine};
+use crate::table::described_columns::DescribedColumns;
+use crate::table::design_point::{MapDesign, scale_to_design};
+use crate::table::quantity::Quantity;
 use crate::table::reference;
 use crate::table::reference::efficiency_in_comment;
 use crate::table::rows_to_lines::{Row, map_of_rows, shift_remark, surge_marks};

@@ -1,8 +1,8 @@
 //! Reads a turbine map from a table of points, in all layouts of compressor maps.
 
-use crate::table::columns::column::Machine;
-use crate::table::columns::described_columns::DescribedColumns;
-use crate::table::columns::quantity::Quantity;
+use crate::table::column::Machine;
+use crate::table::described_columns::DescribedColumns;
+use crate::table::quantity::Quantity;
 use crate::table::read::{check_units_of_flow, leave_out_standstill, pressure_pa, read_notes, require};
 use crate::table::reference;
 use crate::table::rows_to_lines::{ETA_RANGE, MAX_PRESSURE_RATIO};

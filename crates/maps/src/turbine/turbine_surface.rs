@@ -1,7 +1,6 @@
 //! A quantity of a turbine map as a polynomial over vane position, speed and one coordinate of the expansion, by linear least squares.
 
-use mapper_numerics::statistics::SHARE_975;
-use mapper_numerics::statistics::{range, student_quantile};
+use mapper_numerics::statistics::{SHARE_975, range, student_quantile};
 use nalgebra::{DMatrix, DVector};
 
 /// Maximum leverage of a point. Bound: excludes division by zero.

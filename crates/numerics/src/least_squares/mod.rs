@@ -14,5 +14,4 @@ mod damping;
 pub mod descent;
 
 pub use arrow::{Arrow, ArrowBlock, Reduced};
-pub use damping::{DampedFit, Damping, DampingRule, minimise};
-pub use damping::{damped_step, inverse};
+pub use damping::{DampedFit, Damping, DampingRule, damped_step, inverse, minimise};

@@ -8,7 +8,7 @@ use mapper_physics::operating_point::reach::FollowOutlet;
 use mapper_physics::simulation::model::Model;
 use mapper_physics::simulation::steady;
 use mapper_planner::PlanRequest;
-use mapper_planner::thermal_memory::housing::Chain;
+use mapper_planner::housing::Chain;
 
 /// Points along speed lines, in the order of conventional mapping.
 pub fn grid() -> Vec<OperatingPoint> {

@@ -14,10 +14,7 @@ mod survey;
 
 pub use file::{LogFile, ReadSeek};
 pub use finding::LogFinding;
-pub use format::LogError;
-pub use format::{Column, Group, Layout};
-pub use format::{Log, LogFormat, LogFormats, OpenLog, Row, RowSink};
+pub use format::{Column, Group, Layout, Log, LogError, LogFormat, LogFormats, OpenLog, Row, RowSink};
 pub use mapper_table::{difference, kind_of};
 pub use options::{LogOptions, OPTION_KEYS};
-pub use survey::{ColumnSurvey, Gap, GroupSurvey, Restart, Survey, survey};
-pub use survey::{Trace, sparkline};
+pub use survey::{ColumnSurvey, Gap, GroupSurvey, Restart, Survey, Trace, sparkline, survey};

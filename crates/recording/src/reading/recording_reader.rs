@@ -4,16 +4,16 @@ use crate::channel_mapping::channel_map_yaml::MapMistakes;
 use crate::channel_mapping::mapped_topics::{MappedQuantity, source_of, sources};
 use crate::channel_mapping::plausibility;
 use crate::channel_mapping::plausibility::Readings;
+use crate::jump_steps::{
+    can_be_searched, drop_rest_steps, hold_at_step_ends, reversal_share, steps_from_jumps,
+};
 use crate::logs::{LogError, LogFile};
 use crate::reading::log_reader::{is_mcap, log_of_path, read_log};
 use crate::reading::scan::{ReadOptions, ScanResult, scan};
 use crate::samples::clock_steps::{repair_gaps, repair_set_back, repair_set_forward};
 use crate::samples::rig_sink::{PositionedMessage, RigSink};
 use crate::samples::series_builder::{SeriesBuilder, run_time_s};
-use crate::step_detection::jump_steps::{
-    can_be_searched, drop_rest_steps, hold_at_step_ends, reversal_share, steps_from_jumps,
-};
-use crate::step_detection::steps::{hollow_steps, steps_from_commands, steps_from_markers};
+use crate::steps::{hollow_steps, steps_from_commands, steps_from_markers};
 use crate::writing::recording_file::OriginMessage;
 use crate::{AmbientPressure, ChannelMap, ChannelSource, FormatVersion, ReadWarning, RecordError};
 use mapper_core::unit_factors::PERCENT;

@@ -9,7 +9,7 @@ use crate::channel_mapping::mapped_topics::MappedQuantity;
 use crate::samples::log_clock::{MAX_BACK_INTERVALS, MAX_BACK_S};
 use crate::samples::rig_sink::PositionedMessage;
 use crate::samples::series_builder::{ClockBreak, SeriesBuilder};
-use crate::step_detection::steps::StepMessage;
+use crate::steps::StepMessage;
 use mapper_core::Event;
 use mapper_core::unit_factors::NS_PER_S;
 use mapper_numerics::statistics::median;

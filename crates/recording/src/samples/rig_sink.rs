@@ -4,7 +4,7 @@ use crate::channel_mapping::mapped_topics::{MappedQuantity, MappedTopic, map_top
 use crate::mcap::message::{FieldValue, read_fields};
 use crate::mcap::records::{ChannelDefinition, Sink};
 use crate::samples::series_builder::SeriesBuilder;
-use crate::step_detection::steps::StepMessage;
+use crate::steps::StepMessage;
 use crate::writing::recording_file::{OriginMessage, read_origins};
 use crate::writing::topics::{
     CAMPAIGN_NAME, EVENT_TOPIC, FORMAT_KEY, METADATA_NAME, PLAN_NAME, PROVENANCE_TOPIC, START_KEY, STEP_TOPIC,

@@ -1,8 +1,7 @@
 //! The file of a recording: header, metadata, attachments and topics; quality and source time of unusual readings (the others are good and were taken on arrival).
 
 use crate::FormatVersion;
-use crate::writing::topics::Topic;
-use crate::writing::topics::{CAMPAIGN_NAME, FORMAT_KEY, METADATA_NAME, PLAN_NAME, START_KEY};
+use crate::writing::topics::{CAMPAIGN_NAME, FORMAT_KEY, METADATA_NAME, PLAN_NAME, START_KEY, Topic};
 use mapper_core::{Channel, Quality, ReadingOrigin, SampleBatch};
 use mcap::records::Metadata;
 use mcap::write::NoSeek;

@@ -3,8 +3,9 @@
 use crate::writing::recording_file::{
     McapFile, OpenedFile, ProvenanceWriter, RecordingHeader, add_channel, io_error, open,
 };
-use crate::writing::topics::{ELEMENTS_TOPIC, TRUTH_TOPIC};
-use crate::writing::topics::{Field, StepPhase, Topic, event_message, step_message};
+use crate::writing::topics::{
+    ELEMENTS_TOPIC, Field, StepPhase, TRUTH_TOPIC, Topic, event_message, step_message,
+};
 use crate::{BatchError, RecordError};
 use mapper_core::unit_factors::NS_PER_S;
 use mapper_core::{Channel, Event, Group, SampleBatch, StepMarker};

@@ -5,8 +5,7 @@ use crate::formatting::display_scale;
 use mapper_chart::palette::{self, Colour};
 use mapper_chart::{Axis, Figure, Line, Panel, Scatter};
 use mapper_core::{Channel, step_number};
-use mapper_diagnose::gap::Diagnosed;
-use mapper_diagnose::gap::Study;
+use mapper_diagnose::gap::{Diagnosed, Study};
 use mapper_numerics::statistics::{mean, rms};
 
 /// Classes of residuals in the map: upper bound in sigma, colour and name.

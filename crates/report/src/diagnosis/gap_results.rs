@@ -5,10 +5,9 @@ use crate::diagnosis::gap_text::{cause, headline};
 use crate::document::{Document, Table};
 use crate::formatting::{display_scale, four_figures, with_margins};
 use mapper_core::{Margins, with_unit};
-use mapper_diagnose::gap::Diagnosis;
-use mapper_diagnose::gap::ForecastCheck;
-use mapper_diagnose::gap::{CorrectedMap, NotCorrected, PointCorrection};
-use mapper_diagnose::gap::{Over, Persistence, Value};
+use mapper_diagnose::gap::{
+    CorrectedMap, Diagnosis, ForecastCheck, NotCorrected, Over, Persistence, PointCorrection, Value,
+};
 
 /// Each recording's headline, then each cause over all of them.
 pub fn compared_recordings(headlines: &[(String, String)], over: &[Over]) -> Document {

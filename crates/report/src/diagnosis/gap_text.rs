@@ -4,12 +4,10 @@ use crate::diagnosis::gap_figures::{heat_table, residual_maps, traces};
 use crate::diagnosis::gap_next::next_section;
 use crate::diagnosis::stand_actions::{next_measurement, stand_actions};
 use crate::document::{Cell, Describe, Document, Table};
-use crate::formatting::Message;
-use crate::formatting::{display_scale, four_figures};
+use crate::formatting::{Message, display_scale, four_figures};
 use mapper_core::{Channel, probability_text, step_number, with_unit};
-use mapper_diagnose::gap::Diagnosed;
 use mapper_diagnose::gap::{
-    Baseline, BeyondPrior, Candidate, ChannelGap, ClosureTerm, Diagnosis, Estimate, Gap, PointGap,
+    Baseline, BeyondPrior, Candidate, ChannelGap, ClosureTerm, Diagnosed, Diagnosis, Estimate, Gap, PointGap,
     SmallestSeen, Verdict,
 };
 use std::collections::BTreeMap;

@@ -1,8 +1,7 @@
 //! Checks at the stand that confirm or exclude a cause.
 
 use crate::diagnosis::gap_next::name_experiment;
-use crate::formatting::Message;
-use crate::formatting::number;
+use crate::formatting::{Message, number};
 use mapper_diagnose::gap::{Diagnosis, Next, Verdict};
 
 /// Probability below which a cause is not listed for a check while another one is open. Judgement: one visit in ten would find it.

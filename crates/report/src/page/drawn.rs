@@ -1,8 +1,7 @@
 //! Map, points and transients in display units, for the script of a page.
 
 use crate::document::verdict_word;
-use crate::formatting::Display;
-use crate::formatting::Message;
+use crate::formatting::{Display, Message};
 use crate::point_results::points::{at_end, step_name};
 use crate::test_report::run_report::RunReport;
 use mapper_campaign::units::Kind;

@@ -1,8 +1,7 @@
 //! A plan before its run, compared with other orders, and after it.
 
 use crate::document::{Cell, Document, Table};
-use crate::formatting::Message;
-use crate::formatting::{Display, duration, eta, number, percent};
+use crate::formatting::{Display, Message, duration, eta, number, percent};
 use crate::plan::plan_remark_text::no_bound_text;
 use mapper_campaign::Campaign;
 use mapper_core::{

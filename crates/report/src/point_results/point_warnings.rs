@@ -1,8 +1,7 @@
 //! Warnings and remarks about points and results, each sentence once.
 
 use crate::document::Sentence;
-use crate::formatting::Message;
-use crate::formatting::significant_digits;
+use crate::formatting::{Message, significant_digits};
 use crate::point_results::warning_text::sentence_of;
 use mapper_core::unit_factors::ICE_POINT_K;
 use mapper_core::{

@@ -1,8 +1,7 @@
 //! Sentences of the warnings about points.
 
 use crate::document::{Sentence, number, sentence, signed};
-use crate::formatting::Message;
-use crate::formatting::four_figures;
+use crate::formatting::{Message, four_figures};
 use mapper_core::{
     Bound, CalibrationDefect, Channel, Dimension, EndEvidence, EtaSignal, FitFailure, HeatCorrected,
     Implausible, LeftOut, MapRegion, ModelDoubt, ModelEvidence, NoCompression, PoorFit, Scaled, StepConflict,

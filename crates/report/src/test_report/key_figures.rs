@@ -1,8 +1,7 @@
 //! Range and uncertainty of a map, the end of its run, and the sizes that its campaign assumes.
 
 use crate::document::Document;
-use crate::formatting::Message;
-use crate::formatting::{Display, duration, margins_text, significant_digits};
+use crate::formatting::{Display, Message, duration, margins_text, significant_digits};
 use mapper_campaign::{AssumedSize, Campaign, internal_area_sigma_ratio};
 use mapper_core::{CompressorMap, IdentifiedPoint, Margins, Method, Plan, RunEnding, Trip, Verdict};
 use mapper_numerics::statistics::median;

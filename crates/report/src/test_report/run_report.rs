@@ -2,8 +2,7 @@
 
 use crate::diagnosis::gap_results::correction_table;
 use crate::document::{Document, Table};
-use crate::formatting::Message;
-use crate::formatting::{Display, duration};
+use crate::formatting::{Display, Message, duration};
 use crate::page::run_page::{OtherRun, map_widget, plan_widget, step_widget};
 use crate::plan::plan_document::executed_plan_table;
 use crate::point_results::agreement::{disagreement_text, shared_errors_text};
@@ -20,8 +19,7 @@ use mapper_core::{
     Channel, DeclaredUncertainty, Event, EventKind, Method, Plan, PointBudgets, Recording, ReferenceState,
     StepKind, Verdict,
 };
-use mapper_diagnose::gap::Diagnosed;
-use mapper_diagnose::gap::PointCorrection;
+use mapper_diagnose::gap::{Diagnosed, PointCorrection};
 use mapper_identify::{T2History, ZeroOutcome};
 use mapper_observe::energy_balance::Gases;
 use mapper_recording::score::summarise;

@@ -2,7 +2,7 @@
 
 use crate::guards::plausibility_watch::ReadingBounds;
 use crate::run_control::transition_control::StandMotion;
-use crate::step_sources::step_source::StepSourceError;
+use crate::step_source::StepSourceError;
 use mapper_core::{
     BackendError, Event, RigDescription, SafeTrajectory, SampleBatch, SetpointRanges, SpeedBand, StepMarker,
 };

@@ -2,11 +2,10 @@
 
 use crate::guards::guard::{ActiveGuards, CommandedState, Guard, SpeedHistory};
 use crate::guards::plausibility_watch::PlausibilityWatch;
-use crate::run_control::observer::Protection;
-use crate::run_control::observer::{ObserverError, Operator, RunError, RunObserver};
+use crate::run_control::observer::{ObserverError, Operator, Protection, RunError, RunObserver};
 use crate::run_control::speed_control::SpeedControl;
 use crate::run_control::transition_control::{Arrival, PressureMotion, TransitionControl};
-use crate::step_sources::step_source::StepSource;
+use crate::step_source::StepSource;
 use crate::surge::mark::SurgeEvents;
 use mapper_core::{
     Backend, BackendError, Clock, Event, EventKind, GuardName, OperatingPoint, PlanStep, Reaction, RigMode,

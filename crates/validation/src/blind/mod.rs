@@ -8,19 +8,16 @@ mod cases;
 mod error;
 mod make_cases;
 mod outside;
-pub mod scoring;
+pub mod reliability;
+pub mod score;
 mod virtual_runs;
 
-pub use crate::blind::cases::CaseKind;
-pub use crate::blind::cases::Cause;
-pub use crate::blind::cases::Laboratory;
-pub use crate::blind::cases::SignatureMeter;
-pub use crate::blind::cases::StoredCase;
-pub use crate::blind::cases::{Case, Draw, SIGMA_RANGE};
-pub use crate::blind::cases::{Truth, TruthPoint};
+pub use crate::blind::cases::{
+    Case, CaseKind, Cause, Draw, Laboratory, SIGMA_RANGE, SignatureMeter, StoredCase, Truth, TruthPoint,
+};
 pub use crate::blind::make_cases::{ANSWERS_NAME, MANIFEST_NAME, Manifest};
 pub use calibration::visibility;
 pub use error::BlindError;
 pub use make_cases::{CreatedCases, draw_cases, make, record, seal};
 pub use outside::{OutsideUse, outside_kinds};
-pub use scoring::reliability::{Share, clopper_pearson_95};
+pub use reliability::{Share, clopper_pearson_95};

@@ -1,6 +1,6 @@
 //! `study: blind`: draws, records and diagnoses cases; only the score knows their causes.
 
-use crate::blind::scoring::score::score;
+use crate::blind::score::score;
 use crate::blind::{
     CaseKind, Draw, Laboratory, OutsideUse, SIGMA_RANGE, StoredCase, Truth, draw_cases, record, seal,
 };

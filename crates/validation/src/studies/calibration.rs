@@ -1,7 +1,7 @@
 //! `study: calibration`: the cases that `mapper gap blind calibrate` draws to convert scores into probabilities.
 
 use crate::blind::calibration::{CalibrationSettings, DiagnosisSummary, Plan, cases, fitted, undetermined};
-use crate::blind::scoring::reliability::{Bin, Reliability, reliabilities, reliability_text};
+use crate::blind::reliability::{Bin, Reliability, reliabilities, reliability_text};
 use crate::blind::{Case, StoredCase};
 use crate::studies::source::{CampaignSource, StudyError};
 use mapper_chart::{Axis, Dash, Figure, Line, Panel, Scatter, ScatterPoint, palette};

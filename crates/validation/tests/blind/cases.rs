@@ -5,7 +5,7 @@ use mapper_campaign::Campaign;
 use mapper_core::Channel;
 use mapper_recording::{ChannelMap, ReadOptions, read_recording};
 use mapper_validation::blind::{
-    ANSWERS_NAME, BlindError, CreatedCases, Draw, OutsideUse, Share, Truth, make, scoring::score,
+    ANSWERS_NAME, BlindError, CreatedCases, Draw, OutsideUse, Share, Truth, make, score,
 };
 use serde_json::json;
 use std::path::Path;

@@ -1,7 +1,7 @@
 //! Reads files from disk up to a size limit.
 
-use crate::mistakes::finding::{FindingKind, closest};
-use crate::mistakes::source::{Document, Findings, Source};
+use crate::finding::{FindingKind, closest};
+use crate::source::{Document, Findings, Source};
 use std::fs::{File, OpenOptions};
 use std::io;
 use std::io::{ErrorKind, Read, Seek};

@@ -1,7 +1,7 @@
 //! Positions of values in a YAML text, and the path of a value.
 
-use crate::mistakes::finding::FindingKind;
-use crate::mistakes::source::{Notes, Source};
+use crate::finding::FindingKind;
+use crate::source::{Notes, Source};
 use saphyr_parser::{Event, Marker, Parser, ScalarStyle, ScanError};
 use serde::de::IgnoredAny;
 use std::collections::HashMap;

@@ -12,8 +12,7 @@ pub use structure::{NAME, OtherStructure};
 
 use crate::virtual_lab::VirtualLab;
 use mapper_core::{Backend, BackendError};
-use mapper_physics::rig::backend_plugin::BackendPlugin;
-use mapper_physics::rig::backend_plugin::NominalRig;
+use mapper_physics::rig::backend_plugin::{BackendPlugin, NominalRig};
 
 /// The lab as a plugin for campaigns.
 pub const PLUGIN: BackendPlugin = BackendPlugin {

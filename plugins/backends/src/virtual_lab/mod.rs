@@ -1,6 +1,9 @@
 //! A simulated gas stand: the lumped model, actuators, sensors, standstill, surge, overspeed.
 
-mod campaign_keys;
+pub(crate) mod effects_file;
+pub(crate) mod elements_file;
+pub(crate) mod setting_problem;
+pub(crate) mod settings_file;
 mod lab;
 mod name;
 mod rig;
@@ -9,25 +12,21 @@ mod sensors;
 mod settings;
 mod truth;
 
-pub use crate::virtual_lab::sensors::SecondOrder;
-pub use crate::virtual_lab::sensors::SensorErrors;
-pub use crate::virtual_lab::sensors::{LabElement, LabElements};
-pub use campaign_keys::setting_problem::{SettingProblem, check_range};
-pub use campaign_keys::settings_file::read_settings;
+pub use crate::virtual_lab::sensors::{LabElement, LabElements, SecondOrder, SensorErrors};
+pub use setting_problem::{SettingProblem, check_range};
+pub use settings_file::read_settings;
 pub use lab::VirtualLab;
 pub use name::NAME;
 pub use rig::actuator::ActuatorDynamics;
 pub use rig::boundary_wander::Weather;
 pub use rig::drift::{DriftTarget, LabDrift};
-pub use rig::running::LabInputs;
+pub use rig::running::{LabInputs, RunningMachine, Structure, StructureError};
 pub use rig::precursor::SurgePrecursor;
-pub use rig::running::{RunningMachine, Structure, StructureError};
 pub use rig::tolerances::draw_tolerances;
 pub use settings::{LabSettings, Start};
 
 use mapper_core::{Backend, BackendError};
-use mapper_physics::rig::backend_plugin::BackendPlugin;
-use mapper_physics::rig::backend_plugin::NominalRig;
+use mapper_physics::rig::backend_plugin::{BackendPlugin, NominalRig};
 
 /// The lab as a plugin for campaigns.
 pub const PLUGIN: BackendPlugin =

@@ -11,9 +11,8 @@ mod rig;
 
 pub use limits::{
     AcceptedRanges, LimitError, REQUIRED_GUARDS, SafeSettings, Target, WriteSettings, check_range,
-    check_resolution, check_scale,
+    check_resolution, check_scale, format_short, is_plausible,
 };
-pub use limits::{format_short, is_plausible};
 pub use rig::{Reading, Stand, rig};
 
 use mapper_core::Channel;

@@ -31,9 +31,7 @@ mod socket;
 
 pub use about::{About, SOCKET};
 pub use refusal::Outage;
-pub use settings::address;
-pub use settings::by_channel;
-pub use settings::{SecretError, secret};
+pub use settings::{SecretError, address, by_channel, secret};
 pub use socket::serve;
 #[cfg(unix)]
 pub use socket::serve_at;

@@ -1,7 +1,6 @@
 //! The driver's reaction to each message and each tick; time is an argument.
 
-use crate::armed::Armed;
-use crate::armed::{Descent, make_safe};
+use crate::armed::{Armed, Descent, make_safe};
 use crate::refusal::{Refusal, call_author_code, missing_settings, read_params, refusal, write_result};
 use mapper_core::{Backend, BackendError, RigDescription, Setpoints};
 use mapper_driver_host::protocol::{

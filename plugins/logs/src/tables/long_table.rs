@@ -1,8 +1,7 @@
 //! Tables in long form, whose rows have a time, the name of a quantity and its value. They become tables with a column for each quantity.
 
 use crate::tables::table_log::Table;
-use crate::tables::table_row::RowStream;
-use crate::tables::table_row::{Cell, Cells, Rows};
+use crate::tables::table_row::{Cell, Cells, RowStream, Rows};
 use mapper_recording::logs::{LogError, LogFinding};
 use mapper_table::{header_unit, is_missing, read_number};
 use std::collections::BTreeSet;

@@ -4,8 +4,7 @@ use crate::columns::clock::ClockReader;
 use crate::columns::clock_choice::{Clocks, choose_clocks};
 use crate::columns::counter::Sample;
 use crate::columns::table_head::{TableHead, analyse_head};
-use crate::tables::table_row::RowSorter;
-use crate::tables::table_row::{Cell, Cells, Rows};
+use crate::tables::table_row::{Cell, Cells, RowSorter, Rows};
 use mapper_recording::logs::{Column, Layout, LogError, LogFinding, LogOptions, Row, RowSink};
 use std::collections::BTreeMap;
 

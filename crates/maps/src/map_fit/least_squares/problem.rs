@@ -9,8 +9,7 @@ use crate::map_fit::speed_lines::line_shape::{
     CHOKE_FLOW, CHOKE_HEAD, EXPONENTS, FlowFrame, LineShape, PARAMETERS, Parameters, WORK, ZERO_SLOPE_FLOW,
     ZERO_SLOPE_HEAD,
 };
-use crate::map_fit::speed_lines::nearest::MIN_SQUARE_SLOPE;
-use crate::map_fit::speed_lines::nearest::{Foot, Scales, nearest, normal};
+use crate::map_fit::speed_lines::nearest::{Foot, MIN_SQUARE_SLOPE, Scales, nearest, normal};
 use crate::map_fit::speed_lines::speed_spline::{Rows, Splines};
 use mapper_numerics::statistics::{mean, median, quantile};
 use nalgebra::{DMatrix, DVector};

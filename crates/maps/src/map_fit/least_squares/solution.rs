@@ -6,8 +6,7 @@ use crate::map_fit::least_squares::problem::{
     LINE_OFFSETS, Precisions, Problem, ROUGHNESS_PRECISION_RANGE, Unknowns,
 };
 use crate::map_fit::speed_lines::line_shape::{FlowFrame, LineShape, PARAMETERS, Parameters, WORK};
-use crate::map_fit::speed_lines::speed_spline::Splines;
-use crate::map_fit::speed_lines::speed_spline::{End, EndWidenings, NO_WIDENING, Widening};
+use crate::map_fit::speed_lines::speed_spline::{End, EndWidenings, NO_WIDENING, Splines, Widening};
 use mapper_numerics::least_squares::{Damping, DampingRule, damped_step, inverse};
 use mapper_numerics::statistics::{NORMAL_975, SHARE_975, student_quantile};
 use nalgebra::{DMatrix, DVector};

@@ -1,7 +1,8 @@
 //! Finds the place on a line nearest to a point, with distances in the line's units.
 
-use crate::map_fit::speed_lines::line_shape::ANGLE_PRECISION_RAD;
-use crate::map_fit::speed_lines::line_shape::{ANGLE_RANGE_RAD, LineShape, PhysicalPlace};
+use crate::map_fit::speed_lines::line_shape::{
+    ANGLE_PRECISION_RAD, ANGLE_RANGE_RAD, LineShape, PhysicalPlace,
+};
 
 /// Minimum square of a slope by angle. Bound: excludes division by zero at corners.
 pub(crate) const MIN_SQUARE_SLOPE: f64 = 1e-12;

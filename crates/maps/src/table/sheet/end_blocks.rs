@@ -1,9 +1,8 @@
 //! Blocks of a table that are no speed lines: the surge line below its title, and the line of choke.
 
-use crate::table::columns::column::Column;
-use crate::table::columns::described_columns::DescribedColumns;
-use crate::table::columns::quantity::Quantity;
-use crate::table::columns::quantity::{end_in, end_of_title, is_end_title};
+use crate::table::column::Column;
+use crate::table::described_columns::DescribedColumns;
+use crate::table::quantity::{Quantity, end_in, end_of_title, is_end_title};
 use crate::table::sheet::grid::{Grid, GridRow};
 use crate::table::sheet::layout::{self, Layout, columns};
 use mapper_core::{ImportRemark, LineEnd};

@@ -1,8 +1,7 @@
 //! A row of headings, with merged cells above it and units below it; speeds in titles and headings: `N = 60000 rpm`, `PR@60000`,
 //! `60 krpm | flow [kg/s]`.
 
-use crate::table::columns::column::merge_units_row;
-use crate::table::columns::column::parts;
+use crate::table::column::{merge_units_row, parts};
 use crate::table::sheet::grid::{Grid, GridRow};
 use mapper_core::ImportRemark;
 use mapper_core::unit_factors::RPM_PER_KRPM;

@@ -1,12 +1,10 @@
 //! Detects the layout of a table: its headings, and whether speed lines are below each other or side by side.
 
-use crate::table::columns::column::{Column, ColumnError, Machine, column, with_machine_letters};
-use crate::table::columns::described_columns::DescribedColumns;
-use crate::table::columns::quantity::Quantity;
-use crate::table::columns::quantity::is_end_title;
+use crate::table::column::{Column, ColumnError, Machine, column, with_machine_letters};
+use crate::table::described_columns::DescribedColumns;
+use crate::table::quantity::{Quantity, is_end_title};
 use crate::table::sheet::grid::{Grid, GridRow};
-use crate::table::sheet::headings::Headings;
-use crate::table::sheet::headings::{speed_in, without_speed};
+use crate::table::sheet::headings::{Headings, speed_in, without_speed};
 use mapper_core::unit_factors::PERCENT;
 use mapper_core::{ImportError, ImportRemark};
 use mapper_table::is_missing_mark;

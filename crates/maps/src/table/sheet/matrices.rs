@@ -1,8 +1,8 @@
 //! Matrices over speed and flow, one of each quantity: below each other, side by side, or on a sheet each. Flows that vary along a line may
 //! have a matrix of their own; the other axis then counts the points.
 
-use crate::table::columns::column::{Column, Machine, column};
-use crate::table::columns::quantity::Quantity;
+use crate::table::column::{Column, Machine, column};
+use crate::table::quantity::Quantity;
 use crate::table::sheet::grid::{Grid, GridRow};
 use crate::table::sheet::headings::without_speed;
 use mapper_table::is_missing_mark;

@@ -1,9 +1,8 @@
 //! Reads the points of a table as written.
 
-use crate::table::columns::column::Column;
-use crate::table::columns::described_columns::DescribedColumns;
-use crate::table::columns::quantity::Quantity;
-use crate::table::columns::quantity::end_in;
+use crate::table::column::Column;
+use crate::table::described_columns::DescribedColumns;
+use crate::table::quantity::{Quantity, end_in};
 use crate::table::rows_to_lines::check_point_count;
 use crate::table::sheet::end_blocks::{EndBlocks, RowUse};
 use crate::table::sheet::grid::{Grid, GridRow};

@@ -1,6 +1,6 @@
 //! Reads sheets of Excel workbooks, and the text of a map file that may be compressed or a workbook.
 
-use crate::table::columns::quantity::end_in;
+use crate::table::quantity::end_in;
 use crate::table::sheet::grid::{Grid, GridRow, MAX_ROWS, count_number_cells, text_of};
 use crate::table::sheet::headings::without_speed;
 use crate::table::sheet::matrices::{points_of_matrices, quantity_of_title};

@@ -7,8 +7,7 @@ mod remark;
 mod shared_units;
 mod tag_stations;
 
-pub use channel_proposal::channel_map_text;
-pub use channel_proposal::{Ambient, Certainty, NominalFlows, Proposal, ProposedChannel};
+pub use channel_proposal::{Ambient, Certainty, NominalFlows, Proposal, ProposedChannel, channel_map_text};
 pub use propose::propose;
 pub use remark::ProposalRemark;
 pub(crate) use remark::short;

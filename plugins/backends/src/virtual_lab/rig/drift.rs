@@ -1,6 +1,6 @@
 //! Drifts of the lab during a run: of a sensor, or of the machine; `drift:` below `virtual_lab`.
 
-use crate::virtual_lab::campaign_keys::setting_problem::SettingProblem;
+use crate::virtual_lab::setting_problem::SettingProblem;
 use crate::virtual_lab::sensors::offset_kind;
 use mapper_core::{BackendError, Channel, Dimension};
 use mapper_physics::machine::params::Params;

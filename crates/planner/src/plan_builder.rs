@@ -1,0 +1,442 @@
+//! Builds a plan for a given dwell: order, repeats, ways around forbidden jumps, figures, bound and remarks.
+
+use crate::bound::GradientBounds;
+use crate::forecast::ParameterError;
+use crate::housing::{Housing, RepeatedJump, gradients_k};
+use crate::jump_forecast::forecast_jumps;
+use crate::jump_graph::{JumpGraph, Rejection};
+use crate::order::{PROOF_TOLERANCE_RATIO, PointOrder, objective, search_orders};
+use crate::plan::hash_inputs;
+use crate::request::{PlanError, PlanRequest, solve_steady_states};
+use crate::visits::{
+    Visit, append_jump, append_return, insert_repeats, repeat_count, value, visits_of_points,
+};
+use crate::walk::{ForbiddenJump, Walk, walk};
+use mapper_core::{
+    Dwell, Jump, NoBound, OperatingPoint, Plan, PlanBound, PlanFigures, PlanRemark, PlanStep, Predicted,
+    Repeats, StepKind, VisitOrder,
+};
+use mapper_numerics::statistics::rms;
+use mapper_physics::simulation::steady::SteadyState;
+use std::borrow::Cow;
+use std::collections::BTreeSet;
+use std::mem::discriminant;
+
+/// Standard error and bias of the efficiency, added in quadrature.
+fn error_eta(predicted: &Predicted) -> Option<f64> {
+    Some(predicted.sigma_eta?.hypot(predicted.bias_eta.unwrap_or(0.0)))
+}
+
+/// Root mean square of the expected errors of the steps that measure a point.
+pub(crate) fn rms_error_eta(steps: &[PlanStep]) -> Option<f64> {
+    let errors: Vec<f64> = measured_steps(steps).filter_map(error_eta).collect();
+    rms(&errors)
+}
+
+fn measured_steps(steps: &[PlanStep]) -> impl Iterator<Item = &Predicted> {
+    steps.iter().filter(|step| step.kind.measures()).map(|step| &step.predicted)
+}
+
+/// Computes the figures from the steps that measure a point. Repeats do not count.
+pub(crate) fn compute_figures(
+    steps: &[PlanStep],
+    minutes: f64,
+    parameter_error: Option<ParameterError>,
+) -> PlanFigures {
+    let gradients = || measured_steps(steps).filter_map(|predicted| predicted.dtc_k).map(f64::abs);
+    let largest = |values: &mut dyn Iterator<Item = f64>| values.max_by(f64::total_cmp);
+    PlanFigures {
+        sum_gradient_k: gradients().sum(),
+        min_gradient_k: gradients().min_by(f64::total_cmp),
+        worst_sigma_eta: largest(&mut measured_steps(steps).filter_map(|predicted| predicted.sigma_eta)),
+        rms_error_eta: rms_error_eta(steps),
+        rms_error_reported_eta: parameter_error.map(|parameter_error| parameter_error.reported_eta),
+        prior_sensitivity_eta: parameter_error.map(|parameter_error| parameter_error.eta),
+        worst_error_eta: largest(&mut measured_steps(steps).filter_map(error_eta)),
+        minutes,
+    }
+}
+
+/// Maximum number of searches: each forbids the jumps that the full simulation rejected in the previous order.
+const MAX_REORDERINGS: usize = 25;
+/// Effort of a repeated search relative to the first: with one jump forbidden, the best order changes little.
+const REORDER_EFFORT_RATIO: f64 = 0.2;
+
+/// Maximum number of points for which all jumps are simulated to find ways around forbidden ones: some seconds.
+const MAX_GRAPH_POINTS: usize = 100;
+
+/// Maximum number of steps of a plan without ways around forbidden jumps: each repeat and the appended jump take at most two.
+pub fn max_steps(request: &PlanRequest<'_>) -> usize {
+    let points = request.points.len();
+    let repeats = request.repeats.map_or(0, |repeats| 2 * repeat_count(repeats, points));
+    let appended = if request.appended.is_some() { 2 } else { 0 };
+    points + repeats + appended + usize::from(request.return_to_first && points > 1)
+}
+
+/// Builds plans of the same points for any dwell.
+pub(crate) struct PlanBuilder<'a> {
+    request: &'a PlanRequest<'a>,
+    /// The points of the request, then those of repeats and of the appended jump only.
+    points: Vec<OperatingPoint>,
+    targets: Vec<SteadyState>,
+    repeated: Option<RepeatedJump>,
+    appended: Option<(usize, usize)>,
+    /// Whether a way over other points may replace a forbidden jump.
+    ways_around: bool,
+}
+
+/// A forbidden jump of an order, and the points over which the plan leads instead.
+#[derive(Debug, Clone, PartialEq)]
+struct WayAround {
+    jump: Jump,
+    over: Vec<OperatingPoint>,
+}
+
+/// An order of the points with its simulated steps.
+pub(crate) struct Draft {
+    /// Dwell of each step, s; the minimum dwell in conventional mapping.
+    pub(crate) dwell_s: f64,
+    ordered: PointOrder,
+    visits: Vec<Visit>,
+    ways_around: Vec<WayAround>,
+    steps: Vec<PlanStep>,
+    parameter_error: Option<ParameterError>,
+    /// The reduced housing on which the order was searched; `None` if it was made for another dwell.
+    housing: Option<Housing>,
+}
+
+impl Draft {
+    pub(crate) fn steps(&self) -> &[PlanStep] {
+        &self.steps
+    }
+
+    /// Whether a method that identifies all steps together has predicted errors.
+    pub(crate) fn is_predicted(&self) -> bool {
+        self.parameter_error.is_some()
+    }
+}
+
+impl<'a> PlanBuilder<'a> {
+    /// `targets`: the steady states of the request's points.
+    pub(crate) fn new(
+        request: &'a PlanRequest<'a>,
+        targets: &[SteadyState],
+        repeats: Option<(Repeats, Jump)>,
+        ways_around: bool,
+    ) -> Result<Self, PlanError> {
+        let (points, targets) = (request.points.to_vec(), targets.to_vec());
+        let mut builder =
+            PlanBuilder { request, points, targets, repeated: None, appended: None, ways_around };
+        if let Some((repeats, Jump { from, to })) = repeats {
+            let (from, to) = (builder.index_of(from)?, builder.index_of(to)?);
+            builder.repeated =
+                Some(RepeatedJump { from, to, count: repeat_count(repeats, request.points.len()) });
+        }
+        if let Some(Jump { from, to }) = request.appended {
+            builder.appended = Some((builder.index_of(from)?, builder.index_of(to)?));
+        }
+        Ok(builder)
+    }
+
+    fn index_of(&mut self, point: OperatingPoint) -> Result<usize, PlanError> {
+        if let Some(known) = self.points.iter().position(|other| *other == point) {
+            return Ok(known);
+        }
+        self.targets.extend(solve_steady_states(self.request, &[point])?);
+        self.points.push(point);
+        Ok(self.points.len() - 1)
+    }
+
+    /// Searches the best order for steps of `dwell_s`.
+    pub(crate) fn draft(&self, dwell_s: f64) -> Result<Draft, PlanError> {
+        let request = self.request;
+        let mut housing = Housing::new(request, &self.points, &self.targets, dwell_s)?;
+        housing.has_return = request.return_to_first;
+        if self.ways_around && self.points.len() <= MAX_GRAPH_POINTS {
+            return self.draft_with_ways_around(housing, dwell_s);
+        }
+        let mut given: Vec<usize> = (0..request.points.len()).collect();
+        let mut forbidden_jumps: BTreeSet<(usize, usize)> = BTreeSet::new();
+        let mut worst: Vec<(Jump, Rejection)> = Vec::new();
+        for round in 0..MAX_REORDERINGS {
+            let effort = if round == 0 { request.effort } else { REORDER_EFFORT_RATIO * request.effort };
+            let orders =
+                search_orders(&housing, &self.points, &given, &PlanRequest { effort, ..request.clone() });
+            let Some((ordered, visits, returned)) = self.best_of(&housing, orders) else { break };
+            let Walk { steps, forbidden, parameter_error } =
+                walk(request, &self.points, &self.targets, &visits, dwell_s)?;
+            if forbidden.is_empty() {
+                // The proof covers an order with its return: without the return it does not apply.
+                let proven = ordered.proven && (returned || !request.return_to_first || given.len() < 2);
+                let ordered = PointOrder { proven, ..ordered };
+                return Ok(Draft {
+                    dwell_s,
+                    ordered,
+                    visits,
+                    ways_around: Vec::new(),
+                    steps,
+                    parameter_error,
+                    housing: Some(housing),
+                });
+            }
+            let before = forbidden_jumps.len();
+            for ForbiddenJump { from, to, reasons } in forbidden {
+                forbidden_jumps.insert((from, to));
+                housing.forbid(from, to);
+                let jump = Jump { from: self.points[from], to: self.points[to] };
+                reasons.into_iter().for_each(|reason| keep_worst(&mut worst, jump, reason));
+            }
+            given = ordered.order;
+            if forbidden_jumps.len() == before || !request.order.is_searched() {
+                break;
+            }
+        }
+        Err(PlanError::NoAdmissibleOrder { jumps: forbidden_jumps.len(), worst })
+    }
+
+    /// Searches the order with the fewest forbidden jumps, and leads around each of them on the shortest way over other points.
+    fn draft_with_ways_around(&self, mut housing: Housing, dwell_s: f64) -> Result<Draft, PlanError> {
+        let request = self.request;
+        let mut graph = JumpGraph::complete(&self.points);
+        for ((from, to), jump) in forecast_jumps(request, &self.points, &self.targets, dwell_s)? {
+            graph.forbid(from, to, &jump.rejections);
+        }
+        let ranks = graph.ranks().map_err(PlanError::SeparatePoints)?;
+        graph.forbidden().for_each(|(from, to)| housing.forbid(from, to));
+        let given: Vec<usize> = (0..request.points.len()).collect();
+        let mut orders = search_orders(&housing, &self.points, &given, request);
+        for ordered in &mut orders {
+            ordered.order.sort_by_key(|point| ranks[*point]);
+            ordered.proven = false;
+        }
+        let (ordered, direct, _) = self.best_of(&housing, orders).ok_or(PlanError::NoPoints)?;
+        let mut worst: Vec<(Jump, Rejection)> = Vec::new();
+        while let Some((visits, ways_around)) = self.lead_around(&graph, &direct) {
+            let Walk { steps, forbidden, parameter_error } =
+                walk(request, &self.points, &self.targets, &visits, dwell_s)?;
+            if forbidden.is_empty() {
+                let housing = Some(housing);
+                return Ok(Draft { dwell_s, ordered, visits, ways_around, steps, parameter_error, housing });
+            }
+            let mut is_new = false;
+            for ForbiddenJump { from, to, reasons } in forbidden {
+                is_new |= graph.forbid(from, to, &reasons);
+                let jump = Jump { from: self.points[from], to: self.points[to] };
+                reasons.into_iter().for_each(|reason| keep_worst(&mut worst, jump, reason));
+            }
+            if !is_new {
+                break;
+            }
+        }
+        Err(PlanError::NoAdmissibleOrder { jumps: graph.forbidden().count(), worst })
+    }
+
+    /// The visits with a way over other points in place of each forbidden jump. `None` if there is no such way, or if the jump is one that
+    /// the plan has to make: the repeated or the appended one.
+    fn lead_around(&self, graph: &JumpGraph, direct: &[Visit]) -> Option<(Vec<Visit>, Vec<WayAround>)> {
+        let required = [self.repeated.map(|jump| (jump.from, jump.to)), self.appended];
+        let (mut visits, mut ways): (Vec<Visit>, Vec<WayAround>) = (Vec::new(), Vec::new());
+        for visit in direct {
+            if let Some(from) = visits.last().map(|last| last.index)
+                && from != visit.index
+                && !graph.is_allowed(from, visit.index)
+            {
+                if visit.kind == StepKind::Repeat && required.contains(&Some((from, visit.index))) {
+                    return None;
+                }
+                let over = graph.points_between(from, visit.index)?;
+                visits.extend(over.iter().map(|&index| Visit { index, kind: StepKind::Repeat }));
+                let jump = Jump { from: self.points[from], to: self.points[visit.index] };
+                ways.push(WayAround {
+                    jump,
+                    over: over.into_iter().map(|point| self.points[point]).collect(),
+                });
+            }
+            visits.push(*visit);
+        }
+        Some((visits, ways))
+    }
+
+    /// The order with the highest value including repeats, its visits, and whether they end with a return to the first point.
+    fn best_of(&self, housing: &Housing, orders: Vec<PointOrder>) -> Option<(PointOrder, Vec<Visit>, bool)> {
+        let objective = objective(self.request.order);
+        let with_visits = orders.into_iter().map(|ordered| {
+            let (visits, returned) = self.visits(housing, &ordered.order);
+            (value(housing, &visits, objective), (ordered, visits, returned))
+        });
+        let better = |best: (f64, _), other: (f64, _)| if other.0 > best.0 { other } else { best };
+        with_visits.reduce(better).map(|(_, best)| best)
+    }
+
+    /// The visits of an order, and whether they end with a return to the first point.
+    fn visits(&self, housing: &Housing, order: &[usize]) -> (Vec<Visit>, bool) {
+        let mut visits = match self.repeated {
+            Some(jump) => insert_repeats(housing, order, jump, objective(self.request.order)),
+            None => visits_of_points(order),
+        };
+        let returned = self.request.return_to_first && append_return(&mut visits);
+        if let Some((from, to)) = self.appended {
+            append_jump(&mut visits, from, to);
+        }
+        (visits, returned)
+    }
+
+    /// Simulates the same order with another dwell. Searches a new order if a limit forbids one of its jumps at that dwell.
+    pub(crate) fn with_dwell(&self, draft: Draft, dwell_s: f64) -> Result<Draft, PlanError> {
+        if draft.dwell_s == dwell_s {
+            return Ok(draft);
+        }
+        let Walk { steps, forbidden, parameter_error } =
+            walk(self.request, &self.points, &self.targets, &draft.visits, dwell_s)?;
+        if !forbidden.is_empty() {
+            return self.draft(dwell_s);
+        }
+        // The proof applies only to the dwell for which the order was searched.
+        let ordered = PointOrder { proven: false, ..draft.ordered };
+        Ok(Draft { dwell_s, ordered, steps, parameter_error, housing: None, ..draft })
+    }
+
+    /// Completes the plan with its figures, bound and remarks.
+    pub(crate) fn plan(&self, draft: Draft) -> Result<Plan, PlanError> {
+        let request = self.request;
+        let timing = request.timing;
+        let steps_s = draft.steps.iter().map(|step| step.dwell_s).sum::<f64>();
+        let minutes = (timing.warm_up_s + steps_s + timing.cool_down_s) / 60.0;
+        let figures = compute_figures(&draft.steps, minutes, draft.parameter_error);
+        let bound = if request.bound { self.bound(&draft)? } else { None };
+        Ok(Plan {
+            campaign: request.campaign_name.to_owned(),
+            objective: request.order.name().to_owned(),
+            seed: request.seed,
+            made_from: hash_inputs(request),
+            warm_up_s: timing.warm_up_s,
+            cool_down_s: timing.cool_down_s,
+            remarks: self.remarks(&draft),
+            figures,
+            bound_remark: self.bound_remark(&draft, bound.as_ref()),
+            bound,
+            steps: draft.steps,
+            surge_search_s: 0.0,
+        })
+    }
+
+    /// Upper bounds on the gradients of any order with this dwell, if the order was searched for.
+    fn bound(&self, draft: &Draft) -> Result<Option<PlanBound>, PlanError> {
+        let request = self.request;
+        if !request.order.is_searched() || request.appended.is_some() || !draft.ways_around.is_empty() {
+            return Ok(None);
+        }
+        let housing = match &draft.housing {
+            Some(housing) => Cow::Borrowed(housing),
+            None => Cow::Owned(Housing::new(request, &self.points, &self.targets, draft.dwell_s)?),
+        };
+        let mut nodes: Vec<usize> = draft.ordered.order.clone();
+        let has_return = draft.visits.iter().any(|visit| visit.kind == StepKind::Return);
+        let counted = nodes.len();
+        // The ends of the repeated jump may lie outside the grid.
+        let mut place = |index: usize| {
+            nodes.iter().position(|node| *node == index).unwrap_or_else(|| {
+                nodes.push(index);
+                nodes.len() - 1
+            })
+        };
+        let repeated = self.repeated.map(|jump| RepeatedJump {
+            from: place(jump.from),
+            to: place(jump.to),
+            count: jump.count,
+        });
+        let Some(gradient_bounds) = GradientBounds::new(&housing, &nodes) else { return Ok(None) };
+        let order: Vec<usize> = draft.visits.iter().map(|visit| visit.index).collect();
+        let reduced_k = gradients_k(&*housing, &order);
+        let (mut found_k, mut excess_k, mut error_k) = (0.0, 0.0, 0.0f64);
+        for (step, reduced_k) in draft.steps.iter().skip(1).zip(&reduced_k) {
+            let deviation_k = step.predicted.dtc_k.unwrap_or(0.0).abs() - reduced_k;
+            error_k = error_k.max(deviation_k.abs());
+            if step.kind.measures() {
+                (found_k, excess_k) = (found_k + reduced_k, excess_k + deviation_k);
+            }
+        }
+        let bound = gradient_bounds.bound(counted, repeated, has_return, found_k);
+        // The bound applies to the reduced housing. Add the excess of the full model along this plan.
+        let (sum_bound_k, min_bound_k) = (bound.sum_k + f64::max(excess_k, 0.0), bound.min_k + error_k);
+        let found = compute_figures(&draft.steps, 0.0, None);
+        let below = |figure: f64, bound: f64| (bound > 0.0).then(|| 100.0 * (1.0 - figure / bound));
+        Ok(Some(PlanBound {
+            sum_gradient_k: sum_bound_k,
+            min_gradient_k: min_bound_k,
+            gap_percent: match request.order {
+                VisitOrder::ThermalGradient => below(found.sum_gradient_k, sum_bound_k),
+                _ => found.min_gradient_k.and_then(|min_k| below(min_k, min_bound_k)),
+            },
+            proven: draft.ordered.proven,
+            proof_tolerance_percent: draft.ordered.proven.then_some(100.0 * PROOF_TOLERANCE_RATIO),
+            model_error_k: error_k,
+        }))
+    }
+
+    /// Reason why the bound is missing.
+    fn bound_remark(&self, draft: &Draft, bound: Option<&PlanBound>) -> Option<NoBound> {
+        let request = self.request;
+        if bound.is_some() || !request.bound {
+            None
+        } else if !request.order.is_searched() {
+            Some(NoBound::OrderNotSearched)
+        } else if request.appended.is_some() {
+            Some(NoBound::AppendedJump)
+        } else if !draft.ways_around.is_empty() {
+            Some(NoBound::WayAround)
+        } else {
+            Some(NoBound::TooLarge)
+        }
+    }
+
+    fn remarks(&self, draft: &Draft) -> Vec<PlanRemark> {
+        let (request, steps) = (self.request, &draft.steps);
+        let mut remarks = Vec::new();
+        let repeated = self.repeated.map(|jump| self.points[jump.to]);
+        let repeats =
+            || steps.iter().filter(|step| step.kind == StepKind::Repeat && Some(step.to) == repeated);
+        if let Some(PlanStep { from: Some(from), to, .. }) = repeats().next() {
+            remarks.push(PlanRemark::RepeatedJump { from: *from, to: *to, times: repeats().count() });
+        }
+        remarks.extend(draft.ways_around.iter().map(|WayAround { jump, over }| PlanRemark::WayAround {
+            from: jump.from,
+            to: jump.to,
+            over: over.clone(),
+        }));
+        if let Some(Jump { from, to }) = request.appended {
+            remarks.push(PlanRemark::AppendedJump { from, to });
+        }
+        if let [first, others @ ..] = steps.as_slice() {
+            if steps.iter().any(|step| step.kind == StepKind::Return) {
+                remarks.push(PlanRemark::FirstPointAgain { point: first.to });
+            } else if others.iter().all(|step| step.to != first.to) {
+                remarks.push(PlanRemark::FirstPointWithoutJump { point: first.to });
+            }
+        }
+        if let Some(ParameterError { eta, max_eta, .. }) =
+            draft.parameter_error.filter(|parameter_error| parameter_error.eta > parameter_error.max_eta)
+        {
+            remarks.push(PlanRemark::PriorDominated { eta_error: eta, max_eta_error: max_eta });
+        }
+        if let (Dwell::RequiredSigmaEta(required), Some(found)) = (request.timing.dwell, rms_error_eta(steps))
+            && found > required
+        {
+            remarks.push(PlanRemark::RequiredErrorNotReached {
+                dwell_s: draft.dwell_s,
+                eta_sigma: found,
+                required_eta_sigma: required,
+            });
+        }
+        remarks
+    }
+}
+
+/// Adds a reason, or replaces the one of the same limit that is exceeded less.
+fn keep_worst(worst: &mut Vec<(Jump, Rejection)>, jump: Jump, reason: Rejection) {
+    match worst.iter_mut().find(|(_, known)| discriminant(known) == discriminant(&reason)) {
+        Some((_, known)) if known.ratio() >= reason.ratio() => {}
+        Some(known) => *known = (jump, reason),
+        None => worst.push((jump, reason)),
+    }
+}

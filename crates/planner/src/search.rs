@@ -1,0 +1,451 @@
+//! Searches for a good order under thermal memory: simulated annealing with restarts, seeded, with a limited number of moves.
+//!
+//! A move swaps two points, reverses a short piece, or moves a piece elsewhere. Half of the moves are random; the others create a jump
+//! that the assignment of successors (`candidates`) favours. The effect of a move is computed from the first changed step until the
+//! housing has forgotten the change: a few steps, whatever the length of the order.
+
+use crate::housing::{Chain, gradients_k};
+use crate::objective::{Candidates, Objective};
+use mapper_numerics::parallel;
+use mapper_numerics::statistics::nearest_rank;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+/// Maximum length of a reversed piece, and of the distance of a short move: longer ones cost more and rarely improve the order.
+const MAX_PIECE_LENGTH: usize = 50;
+
+/// Above this many points a search makes a single start.
+const MANY_POINTS: usize = 500;
+/// Distance of the random seeds of two campaigns, whose own seeds are small integers: their starts must not share seeds.
+const SEED_STRIDE: u64 = 1_000_003;
+/// Number of targets in the search for the largest minimum gradient.
+const TARGET_ROUNDS: u64 = 10;
+/// Rise of the second target above the result of the first, relative to the mean gradient of a greedy order. A missed target halves the
+/// next rise.
+const FIRST_RISE_RATIO: f64 = 0.1;
+
+/// Amount of work of a search.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Effort {
+    /// Moves tried in each start.
+    pub moves: u64,
+    /// Starts.
+    pub starts: u64,
+}
+
+impl Effort {
+    /// Usual effort: a fraction of a second for 50 points, some seconds for 2000. `factor` scales the moves: ten times as many increase the sum by
+    /// less than 0.3 % (docs/explanation/planner.md).
+    pub fn usual(points: usize, factor: f64) -> Self {
+        let (moves, starts) = match points {
+            0..=40 => (10_000.0, 16),
+            // Repeats change the ranking of the orders, so several of them are useful.
+            41..=100 => (1_000.0 * points as f64, 8),
+            101..=MANY_POINTS => (1_000.0 * points as f64, 2),
+            _ => (1_000.0 * points as f64, 1),
+        };
+        Effort { moves: (moves * factor.clamp(0.0, 1e4)) as u64, starts }
+    }
+}
+
+/// Returns the best order of each start, in order of value. No order is worse than `given`.
+pub fn search<C: Chain + Sync>(
+    chain: &C,
+    given: &[usize],
+    objective: Objective,
+    effort: Effort,
+    seed: u64,
+) -> Vec<Vec<usize>> {
+    search_among(chain, &Candidates::new(chain, given, objective), given, objective, effort, seed)
+}
+
+fn search_among<C: Chain + Sync>(
+    chain: &C,
+    candidates: &Candidates,
+    given: &[usize],
+    objective: Objective,
+    effort: Effort,
+    seed: u64,
+) -> Vec<Vec<usize>> {
+    if given.len() < 2 {
+        return vec![given.to_vec()];
+    }
+    let greedy = build_greedy_order(chain, given, objective);
+    let starts: Vec<u64> = (0..effort.starts.max(1)).collect();
+    let run_from = |start: &u64| {
+        let mut random = Pcg64Mcg::seed_from_u64(seed.wrapping_mul(SEED_STRIDE).wrapping_add(*start));
+        let mut best = given.to_vec();
+        let mut best_figure = objective.figure(chain, &best);
+        Annealing::new(chain, candidates, &greedy, objective).run(
+            effort.moves,
+            &mut random,
+            &mut best,
+            &mut best_figure,
+        );
+        (best_figure, best)
+    };
+    let mut found = parallel::map(&starts, run_from);
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    found.into_iter().map(|(_, order)| order).collect()
+}
+
+/// Searches for the order with the largest minimum gradient. The target rises as long as it is reached.
+pub fn search_min_gradient<C: Chain + Sync>(
+    chain: &C,
+    given: &[usize],
+    effort: Effort,
+    seed: u64,
+) -> Vec<usize> {
+    let min_k = |order: &[usize]| Objective::Minimum { target_k: 0.0 }.figure(chain, order);
+    let mut order = build_greedy_order(chain, given, Objective::Sum);
+    let mean_k = gradients_k(chain, &order).iter().sum::<f64>() / (given.len() as f64 - 1.0).max(1.0);
+    let mean_k = mean_k.min(chain.gradient_max_k());
+    let candidates = Candidates::new(chain, given, Objective::Minimum { target_k: mean_k });
+    let (mut best_k, mut rise_k) = (min_k(&order), mean_k);
+    // With many points, the smallest gradient needs more moves than the sum.
+    let times = if given.len() > MANY_POINTS { 2 } else { 1 } * effort.starts.max(1);
+    let each = Effort { moves: effort.moves.saturating_mul(times) / TARGET_ROUNDS, starts: 1 };
+    for round in 0..TARGET_ROUNDS {
+        let objective = Objective::Minimum { target_k: best_k.max(0.0) + rise_k };
+        let found = search_among(chain, &candidates, &order, objective, each, seed.wrapping_add(round))
+            .swap_remove(0);
+        let found_k = min_k(&found);
+        let risen_k = found_k - best_k;
+        if risen_k > 0.0 {
+            (order, best_k) = (found, found_k);
+        }
+        if round == 0 {
+            rise_k = FIRST_RISE_RATIO * mean_k;
+        } else if risen_k < 0.5 * rise_k {
+            rise_k *= 0.5;
+        }
+    }
+    order
+}
+
+/// Builds an order that continues at each position with the point of highest value.
+pub(crate) fn build_greedy_order<C: Chain>(chain: &C, given: &[usize], objective: Objective) -> Vec<usize> {
+    let mut remaining = given.to_vec();
+    let mut order = Vec::with_capacity(given.len());
+    let mut state = None;
+    while !remaining.is_empty() {
+        let next = match (state, order.last()) {
+            (Some(state), Some(&from)) => {
+                let value = |to: usize| objective.value(chain, from, to, chain.step(from, to, state).0);
+                let mut best = (0, f64::NEG_INFINITY);
+                for (index, &to) in remaining.iter().enumerate() {
+                    let value = value(to);
+                    if value > best.1 {
+                        best = (index, value);
+                    }
+                }
+                best.0
+            }
+            _ => 0,
+        };
+        // `remove` keeps the listed order of the remaining points, so the first listed wins a tie.
+        let to = remaining.remove(next);
+        state = Some(match (state, order.last()) {
+            (Some(state), Some(&from)) => chain.step(from, to, state).1,
+            _ => chain.first(to),
+        });
+        order.push(to);
+    }
+    order
+}
+
+/// Positions `start..end` of an order, as part of a new one.
+#[derive(Debug, Clone, Copy)]
+struct Piece {
+    start: usize,
+    end: usize,
+    reversed: bool,
+}
+
+fn forward_piece(start: usize, end: usize) -> Piece {
+    Piece { start, end, reversed: false }
+}
+
+/// State before a step, and the step's value.
+type StepState<S> = (Option<S>, f64);
+
+struct Annealing<'a, C: Chain> {
+    chain: &'a C,
+    candidates: &'a Candidates,
+    objective: Objective,
+    order: Vec<usize>,
+    /// Position of each point of the chain in the order; undefined for other points.
+    position_of: Vec<usize>,
+    /// State before each position's step and its value. Position 0 has no state; the entry after the last position holds the final
+    /// state and the value of the return jump.
+    step_states: Vec<StepState<C::State>>,
+    /// The proposed order from position `begin` on; the points after the pieces keep their order.
+    pieces: Vec<Piece>,
+    begin: usize,
+    /// Changed steps of the proposal, by new position.
+    log: Vec<(usize, StepState<C::State>)>,
+    scratch: Vec<(usize, StepState<C::State>)>,
+}
+
+impl<'a, C: Chain> Annealing<'a, C> {
+    fn new(chain: &'a C, candidates: &'a Candidates, order: &[usize], objective: Objective) -> Self {
+        let mut annealing = Annealing {
+            chain,
+            candidates,
+            objective,
+            order: order.to_vec(),
+            position_of: vec![0; chain.len()],
+            step_states: vec![(None, 0.0); order.len() + 1],
+            pieces: Vec::new(),
+            begin: 0,
+            log: Vec::new(),
+            scratch: Vec::new(),
+        };
+        for (position, point) in order.iter().enumerate() {
+            annealing.position_of[*point] = position;
+        }
+        annealing.refresh();
+        annealing
+    }
+
+    /// Recomputes all states and values.
+    fn refresh(&mut self) {
+        let mut state = None;
+        for k in 0..self.order.len() {
+            let (value, next) =
+                self.evaluate_step(k.checked_sub(1).map(|p| self.order[p]), self.order[k], state);
+            self.step_states[k] = (state, value);
+            state = Some(next);
+        }
+        let ends = self.order.first().copied().zip(self.order.last().copied());
+        self.step_states[self.order.len()] = (state, self.return_jump(ends, state));
+    }
+
+    /// Value of the jump from the last point back to the first, if there is one.
+    #[inline]
+    fn return_jump(&self, ends: Option<(usize, usize)>, state: Option<C::State>) -> f64 {
+        match (ends, state) {
+            (Some((first, last)), Some(state)) if self.chain.has_return() && first != last => {
+                self.evaluate_step(Some(last), first, Some(state)).0
+            }
+            _ => 0.0,
+        }
+    }
+
+    #[inline]
+    fn evaluate_step(&self, from: Option<usize>, to: usize, state: Option<C::State>) -> (f64, C::State) {
+        match (from, state) {
+            (Some(from), Some(state)) => {
+                let (gradient_k, next) = self.chain.step(from, to, state);
+                (self.objective.value(self.chain, from, to, gradient_k), next)
+            }
+            _ => (0.0, self.chain.first(to)),
+        }
+    }
+
+    /// Returns the gain of the proposed pieces, and stores the new states and values in the log.
+    fn evaluate_proposal(&mut self) -> f64 {
+        self.log.clear();
+        let n = self.order.len();
+        if self.pieces.is_empty() {
+            return 0.0;
+        }
+        let mut gain = 0.0;
+        let mut state = self.step_states[self.begin].0;
+        let mut from = self.begin.checked_sub(1).map(|p| self.order[p]);
+        let mut position = self.begin;
+        let rest = self.pieces.iter().map(|piece| piece.end).max().unwrap_or(n);
+        for index in 0..=self.pieces.len() {
+            let piece = self.pieces.get(index).copied().unwrap_or_else(|| forward_piece(rest, n));
+            let mut done = 0;
+            while done < piece.end - piece.start {
+                let k = if piece.reversed { piece.end - 1 - done } else { piece.start + done };
+                let (old_state, old_value) = self.step_states[k];
+                if !piece.reversed
+                    && let (Some(new), Some(old), Some(p)) = (state, old_state, k.checked_sub(1))
+                    && from == Some(self.order[p])
+                    && self.chain.is_indistinguishable(new, old)
+                {
+                    // The housing has forgotten the change: the rest of the piece is unchanged.
+                    position += piece.end - k;
+                    state = self.step_states[piece.end].0;
+                    from = Some(self.order[piece.end - 1]);
+                    break;
+                }
+                let to = self.order[k];
+                let (value, next) = self.evaluate_step(from, to, state);
+                gain += value - old_value;
+                self.log.push((position, (state, value)));
+                (state, from) = (Some(next), Some(to));
+                position += 1;
+                done += 1;
+            }
+        }
+        let first = match self.pieces.first() {
+            Some(piece) if self.begin == 0 => {
+                if piece.reversed {
+                    self.order[piece.end - 1]
+                } else {
+                    self.order[piece.start]
+                }
+            }
+            _ => self.order[0],
+        };
+        let return_value = self.return_jump(from.map(|last| (first, last)), state);
+        gain += return_value - self.step_states[n].1;
+        self.log.push((n, (state, return_value)));
+        gain
+    }
+
+    fn accept(&mut self) {
+        // Copy only the points whose position changes: the ends of a swap may be far apart.
+        self.scratch.clear();
+        let mut position = self.begin;
+        for piece in &self.pieces {
+            let length = piece.end - piece.start;
+            if piece.reversed || piece.start != position {
+                for done in 0..length {
+                    let k = if piece.reversed { piece.end - 1 - done } else { piece.start + done };
+                    self.scratch.push((self.order[k], self.step_states[k]));
+                }
+            }
+            position += length;
+        }
+        let (mut position, mut next) = (self.begin, 0);
+        for piece in &self.pieces {
+            let length = piece.end - piece.start;
+            if piece.reversed || piece.start != position {
+                for k in position..position + length {
+                    let (point, known) = self.scratch[next];
+                    (self.order[k], self.step_states[k], self.position_of[point]) = (point, known, k);
+                    next += 1;
+                }
+            }
+            position += length;
+        }
+        for &(k, known) in &self.log {
+            self.step_states[k] = known;
+        }
+    }
+
+    fn set_proposal(&mut self, begin: usize, pieces: &[Piece]) {
+        self.begin = begin;
+        self.pieces.clear();
+        self.pieces.extend(pieces.iter().filter(|piece| piece.start < piece.end));
+    }
+
+    fn propose_swap(&mut self, a: usize, b: usize) {
+        let (low, high) = (a.min(b), a.max(b));
+        if low < high {
+            let ends =
+                [forward_piece(high, high + 1), forward_piece(low + 1, high), forward_piece(low, low + 1)];
+            self.set_proposal(low, &ends);
+        }
+    }
+
+    /// Moves the piece `start..end` to position `to`, which lies outside of it.
+    fn propose_shift(&mut self, start: usize, end: usize, to: usize, reversed: bool) {
+        let piece = Piece { start, end, reversed };
+        if to < start {
+            self.set_proposal(to, &[piece, forward_piece(to, start)]);
+        } else if to > end {
+            self.set_proposal(start, &[forward_piece(end, to), piece]);
+        } else if reversed {
+            self.set_proposal(start, &[piece]);
+        }
+    }
+
+    /// Draws a move. The proposal stays empty if the move would change nothing.
+    fn propose(&mut self, random: &mut Pcg64Mcg) {
+        self.pieces.clear();
+        let n = self.order.len();
+        let i = random.random_range(0..n);
+        let kind: u32 = random.random_range(0..20);
+        if kind < 10 && self.propose_guided(i, kind, random) {
+            return;
+        }
+        match kind % 10 {
+            0..4 => {
+                let j = random.random_range(0..n);
+                self.propose_swap(i, j);
+            }
+            4..6 => {
+                let end = (i + 2 + random.random_range(0..MAX_PIECE_LENGTH)).min(n);
+                self.set_proposal(i, &[Piece { start: i, end, reversed: true }]);
+            }
+            _ => {
+                let end = (i + random.random_range(1..=3usize)).min(n);
+                let max_distance = MAX_PIECE_LENGTH.min(n);
+                let to = if random.random::<bool>() {
+                    random.random_range(0..=n)
+                } else {
+                    (i + random.random_range(0..=2 * max_distance)).saturating_sub(max_distance).min(n)
+                };
+                if !(i..=end).contains(&to) {
+                    self.propose_shift(i, end, to, kind.is_multiple_of(4));
+                }
+            }
+        }
+    }
+
+    /// Proposes a move after which a candidate follows the point at `i`. Returns whether there is one.
+    fn propose_guided(&mut self, i: usize, kind: u32, random: &mut Pcg64Mcg) -> bool {
+        let n = self.order.len();
+        let Some(to) = self.candidates.draw(self.order[i], random) else { return false };
+        let q = self.position_of[to];
+        if q == i + 1 || q == i {
+            return false;
+        }
+        // Usually a few points, sometimes a long piece, never reversed.
+        let length = match random.random_range(0..4u32) {
+            0 => random.random_range(1..=n),
+            _ => random.random_range(1..=3usize),
+        };
+        match kind % 3 {
+            0 if i + 1 < n => self.propose_swap(i + 1, q),
+            // Move the piece that begins with the candidate to the position after this point.
+            1 => {
+                let end = (q + length).min(if q < i { i } else { n });
+                self.propose_shift(q, end, i + 1, false);
+            }
+            // Move the piece that ends with this point to the position before the candidate.
+            _ => {
+                let start = (i + 1).saturating_sub(length).max(if q < i { q + 1 } else { 0 });
+                self.propose_shift(start, i + 1, q, false);
+            }
+        }
+        !self.pieces.is_empty()
+    }
+
+    fn run(&mut self, moves: u64, random: &mut Pcg64Mcg, best: &mut Vec<usize>, best_figure: &mut f64) {
+        // Typical change of value, from trial moves.
+        let sizes: Vec<f64> = (0..200)
+            .map(|_| {
+                self.propose(random);
+                self.evaluate_proposal().abs()
+            })
+            .filter(|size| *size > 0.0 && *size < 1e5)
+            .collect();
+        let typical = nearest_rank(&sizes, 0.5).unwrap_or(1.0);
+        let (hottest, coldest) = (0.5 * typical, 5e-4 * typical);
+        const STAGES: u64 = 200;
+        for stage in 0..STAGES {
+            let share = stage as f64 / (STAGES - 1) as f64;
+            let temperature = hottest * (coldest / hottest).powf(share);
+            for _ in 0..moves / STAGES {
+                self.propose(random);
+                let gain = self.evaluate_proposal();
+                if gain >= 0.0 || gain > temperature * random.random::<f64>().ln() {
+                    self.accept();
+                }
+            }
+            // Recompute, so that differences neglected as indistinguishable do not accumulate.
+            self.refresh();
+            let figure = self.objective.figure(self.chain, &self.order);
+            if figure > *best_figure {
+                *best_figure = figure;
+                best.clone_from(&self.order);
+            }
+        }
+    }
+}

@@ -10,11 +10,6 @@ use mapper_report::wrapped;
 use mapper_session::map_description;
 use std::path::{Path, PathBuf};
 
-/// Refuses an option that has another name now.
-pub fn renamed(new: &'static str) -> impl Fn(&str) -> Result<PathBuf, String> + Clone {
-    move |_| Err(format!("this option is now called {new}"))
-}
-
 /// Statements about a map file.
 #[derive(Debug, Default, Args)]
 pub struct MapReading {

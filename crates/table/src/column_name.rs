@@ -141,11 +141,6 @@ impl ColumnName {
         })
     }
 
-    /// Whether a word or a letter names the compressor: `P1C`, `PC1`.
-    pub fn is_of_compressor(&self) -> bool {
-        self.machine().0 == Some(Place::Compressor)
-    }
-
     /// Whether words or stations refer to the turbine. A letter is not enough: `t` may also mean total.
     pub fn is_of_turbine(&self) -> bool {
         self.has(Word::Turbine) && !self.has(Word::Compressor)

@@ -1,7 +1,7 @@
 //! `mapper fleet`: studies of many items on many cores or computers.
 
 use crate::command_line::subcommands;
-use crate::fleet_directory::{with_fleet, with_machine};
+use crate::environment::{with_fleet, with_machine};
 use crate::output::failure::{Code, Failure};
 use crate::output::{output_options, standard_output};
 use clap::Args;

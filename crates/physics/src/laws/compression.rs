@@ -65,20 +65,6 @@ pub fn isentropic_rise_ratio(pressure_ratio: f64, t1_k: f64, air: Air) -> f64 {
     }
 }
 
-/// Derivative of [`isentropic_rise_ratio`], whose value is `rise_ratio`, with respect to the logarithm of the pressure ratio.
-#[inline]
-pub fn rise_ratio_by_ln_pressure(rise_ratio: f64, t1_k: f64, air: Air) -> f64 {
-    match air.efficiency {
-        // dh = v dp = R T2s d(ln p) along an isentrope.
-        EfficiencyDefinition::Enthalpy => {
-            let isentropic_k = actual_k(t1_k, t1_k, t1_k * (1.0 + rise_ratio), air);
-            air.isentropic_exponent(t1_k) * isentropic_k / t1_k
-        }
-        EfficiencyDefinition::ConstantGamma(gamma) => (1.0 + rise_ratio) * (gamma - 1.0) / gamma,
-        EfficiencyDefinition::KappaOfT1 => (1.0 + rise_ratio) * air.isentropic_exponent(t1_k),
-    }
-}
-
 /// Gas after adiabatic compression from the inlet's T1 (eq. 2), K.
 #[inline]
 pub fn compressed_k(t1_k: f64, isentropic_rise_ratio: f64, efficiency: f64, air: Air) -> f64 {

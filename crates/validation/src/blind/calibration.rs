@@ -1,7 +1,6 @@
 //! Calibrates the diagnosis: draws separate cases, with outside causes that the check does not use, diagnoses them, and fits the constants that convert scores into probabilities.
 
-use crate::blind::cases::{Case, CaseKind, Cause, Draw, SignatureMeter};
-use crate::blind::error::BlindError;
+use crate::blind::cases::{BlindError, Case, CaseKind, Cause, Draw, SignatureMeter};
 use crate::blind::outside::{OutsideUse, outside_kinds};
 use crate::blind::virtual_runs::Schedule;
 use mapper_campaign::{Campaign, nominal_model};

@@ -1,15 +1,65 @@
-//! Cases with withheld causes: what is drawn, how strong it is, how it is stored, and its truth.
+//! Cases with withheld causes: what is drawn, how strong it is, how it is stored, its truth, and the errors of all this.
 
 use crate::blind::outside::{OutsideUse, outside_kinds};
+use mapper_campaign::NominalTableError;
 use mapper_core::named_enum;
-use mapper_physics::rig::effect::{Effect, EffectParameter};
+use mapper_physics::rig::effect::{Effect, EffectError, EffectParameter};
+use mapper_physics::simulation::steady::SteadyError;
+use mapper_recording::RecordError;
+use mapper_runner::RunError;
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::sync::Arc;
+
+/// Errors when cases are created or scored.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
+pub enum BlindError {
+    #[error("{}: {source}", path.display())]
+    File { path: PathBuf, source: std::io::Error },
+    #[error("{} does not contain {what}: {source}", path.display())]
+    Content { path: PathBuf, what: &'static str, source: serde_json::Error },
+    #[error("{} is larger than {limit} bytes, the maximum of its kind", path.display())]
+    TooLarge { path: PathBuf, limit: u64 },
+    #[error(
+        "{} has SHA-256 {actual}, but {expected} was printed when the cases were made: the answers have been changed",
+        path.display()
+    )]
+    Seal { path: PathBuf, actual: String, expected: String },
+    /// The lab stopped, or its data cannot be stored.
+    #[error("case {name}: {source}")]
+    Run { name: String, source: RunError },
+    /// A point of the campaign that the nominal model cannot hold.
+    #[error(transparent)]
+    Point(#[from] SteadyError),
+    /// An effect cannot be applied: a defect of the draw.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    #[error(transparent)]
+    NominalModel(#[from] NominalTableError),
+    #[error("failed to measure signatures: {source}")]
+    Signatures { source: Box<dyn std::error::Error + Send + Sync> },
+    #[error("{cases} cases were requested; 1 to {max} are allowed")]
+    Cases { cases: usize, max: usize },
+}
+
+impl BlindError {
+    pub(crate) fn signatures(source: impl std::error::Error + Send + Sync + 'static) -> Self {
+        BlindError::Signatures { source: Box::new(source) }
+    }
+
+    pub(crate) fn file(path: &std::path::Path) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| BlindError::File { path, source }
+    }
+}
 
 /// One case before it is run.
 #[derive(Debug, Clone)]
@@ -260,7 +310,7 @@ const STEPS: std::ops::RangeInclusive<f64> = 0.02..=4.0;
 
 /// Parameter values of an effect whose signature alone has the length `sigma`, or the maximum within its range. `sign` is the direction
 /// relative to the typical step.
-pub(crate) fn strength(
+fn strength(
     effect: &Arc<dyn Effect>,
     sign: f64,
     sigma: f64,
@@ -290,7 +340,7 @@ pub(crate) fn strength(
 }
 
 /// Whether an effect has any influence on the measured machine.
-pub(crate) fn has_influence(effect: &Arc<dyn Effect>, meter: &dyn SignatureMeter) -> bool {
+fn has_influence(effect: &Arc<dyn Effect>, meter: &dyn SignatureMeter) -> bool {
     // A rig that cannot run with half a typical step may run with a tenth of one.
     [0.5, 0.1].into_iter().any(|steps| {
         let values = effect.info().parameters.iter().map(|parameter| value_at(parameter, steps)).collect();

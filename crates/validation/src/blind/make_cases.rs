@@ -1,17 +1,16 @@
 //! Makes a directory of cases: recordings, and sealed answers whose hash is printed before the diagnosis.
 
 use crate::blind::calibration::visibility_on;
-use crate::blind::cases::{Case, Draw, Laboratory, Truth};
-use crate::blind::error::BlindError;
+use crate::blind::cases::{BlindError, Case, Draw, Laboratory, Truth};
 use crate::blind::outside::outside_kinds;
 use crate::blind::virtual_runs::Schedule;
 use mapper_campaign::{Campaign, nominal_model};
+use mapper_fleet::Hash;
 use mapper_numerics::parallel;
 use mapper_physics::rig::effect::Effect;
 use mapper_recording::RecordingHeader;
-use serde::de::{DeserializeOwned, Error};
-use serde::{Deserialize, Deserializer, Serialize};
-use sha2::{Digest, Sha256};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
@@ -103,9 +102,8 @@ pub fn seal(
         campaign: campaign.to_owned(),
         laboratory,
         baseline,
-        former: FormerKey,
         cases: answers.iter().map(|answer| answer.name.clone()).collect(),
-        answers_sha256: sha256(&bytes),
+        answers_sha256: Hash::of(&bytes).to_string(),
     };
     json(&manifest, &directory.join(MANIFEST_NAME))?;
     Ok(manifest)
@@ -170,33 +168,13 @@ pub struct Manifest {
     /// Whether each rig was also recorded on a night without its causes, as NAME.baseline.mcap.
     #[serde(default)]
     pub baseline: bool,
-    /// The former key of `baseline`.
-    #[serde(default, skip_serializing, rename = "healthy", deserialize_with = "former_key")]
-    pub(crate) former: FormerKey,
     /// Names of the cases; each has a recording NAME.mcap.
     pub cases: Vec<String>,
     /// SHA-256 of the file of answers.
     pub answers_sha256: String,
 }
 
-/// A key that no manifest may have.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct FormerKey;
-
-/// Refuses the key of earlier programs.
-fn former_key<'de, D: Deserializer<'de>>(_: D) -> Result<FormerKey, D::Error> {
-    Err(Error::custom(
-        "`healthy` is now `baseline`, and NAME.healthy.mcap is NAME.baseline.mcap: rename them, or make the cases again",
-    ))
-}
-
 impl Manifest {
-    /// Heading that distinguishes its score from those of other cases.
-    pub fn title(&self) -> String {
-        let recording = if self.baseline { ", with a baseline" } else { "" };
-        format!("{}{recording}", self.laboratory.name())
-    }
-
     /// Reads a manifest.
     ///
     /// # Errors
@@ -208,10 +186,6 @@ impl Manifest {
 
 /// Maximum size of a file that is read, bytes: far more than any number of answers.
 const MAX_BYTES: u64 = 256 << 20;
-
-pub(crate) fn sha256(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
-}
 
 pub(crate) fn read_json<T: DeserializeOwned>(path: &Path, what: &'static str) -> Result<T, BlindError> {
     let bytes = read(path)?;
@@ -239,7 +213,7 @@ fn read(path: &Path) -> Result<Vec<u8>, BlindError> {
 pub(crate) fn open(directory: &Path, manifest: &Manifest) -> Result<Vec<Truth>, BlindError> {
     let path = directory.join(ANSWERS_NAME);
     let bytes = read(&path)?;
-    let actual = sha256(&bytes);
+    let actual = Hash::of(&bytes).to_string();
     if actual != manifest.answers_sha256 {
         return Err(BlindError::Seal { path, actual, expected: manifest.answers_sha256.clone() });
     }

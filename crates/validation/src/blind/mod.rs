@@ -5,7 +5,6 @@
 
 pub mod calibration;
 mod cases;
-mod error;
 mod make_cases;
 mod outside;
 pub mod reliability;
@@ -17,7 +16,7 @@ pub use crate::blind::cases::{
 };
 pub use crate::blind::make_cases::{ANSWERS_NAME, MANIFEST_NAME, Manifest};
 pub use calibration::visibility;
-pub use error::BlindError;
+pub use cases::BlindError;
 pub use make_cases::{CreatedCases, draw_cases, make, record, seal};
 pub use outside::{OutsideUse, outside_kinds};
 pub use reliability::{Share, clopper_pearson_95};

@@ -2,8 +2,7 @@
 //! intervals.
 
 use crate::blind::calibration::{DiagnosisSummary, fit, shipped, undetermined, weights};
-use crate::blind::cases::CaseKind;
-use crate::blind::error::BlindError;
+use crate::blind::cases::{BlindError, CaseKind};
 use mapper_diagnose::gap::Calibration;
 use mapper_numerics::statistics::share_interval_95;
 use serde::Serialize;

@@ -1,7 +1,6 @@
 //! Scores diagnoses against the opened answers, and writes the score as text.
 
-use crate::blind::cases::{CaseKind, Truth};
-use crate::blind::error::BlindError;
+use crate::blind::cases::{BlindError, CaseKind, Truth};
 use crate::blind::make_cases::{MANIFEST_NAME, Manifest, open, read_json};
 use crate::blind::reliability::Share;
 use mapper_effects::catalogue;
@@ -407,15 +406,6 @@ impl Score {
             )
         };
         self.cases.iter().map(line).collect()
-    }
-
-    /// The table in Markdown with a second column for other cases, e.g. the same causes in another simulator.
-    pub fn compare_with(&self, heads: [&str; 2], other: &Score) -> String {
-        let mut text = format!("| | {} | {} |\n|---|---|---|\n", heads[0], heads[1]);
-        for ((label, own_shares), (_, other_shares)) in self.rows().into_iter().zip(other.rows()) {
-            text += &format!("| {} | {own_shares} | {other_shares} |\n", label.trim());
-        }
-        text
     }
 }
 

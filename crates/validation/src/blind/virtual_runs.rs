@@ -1,7 +1,6 @@
 //! Runs of a case on the virtual lab: its schedule, steps, and where samples go.
 
-use crate::blind::cases::{Case, Laboratory, Truth, TruthPoint};
-use crate::blind::error::BlindError;
+use crate::blind::cases::{BlindError, Case, Laboratory, Truth, TruthPoint};
 use mapper_backends::other_lab;
 use mapper_backends::other_lab::OtherStructure;
 use mapper_backends::virtual_lab::{

@@ -6,7 +6,6 @@ mod figure_data;
 mod figures;
 mod lab;
 mod model_table;
-mod outcome;
 mod page;
 mod picture;
 
@@ -28,7 +27,7 @@ pub fn reproduce(mut progress: impl FnMut(&str)) -> Result<Vec<FigureResult>, Re
         progress(number);
         results.push(match number {
             "5" => figures::figure_5::figure()?,
-            "6" => figures::figure_6::figure(&lab::run_all(&model, outcome::RUN_S)?)?,
+            "6" => figures::figure_6::figure(&lab::run_all(&model, lab::RUN_S)?)?,
             "7" => figures::figure_7::figure(&lab::run_all(&model, figures::figure_7::RUN_S)?)?,
             "8" => figures::figure_8::figure()?,
             "9" => figures::figure_9::figure()?,

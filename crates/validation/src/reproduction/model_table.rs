@@ -5,9 +5,8 @@
 #![cfg(test)]
 
 use crate::reproduction::figures::figure_5::apparent_eta;
-use crate::reproduction::lab::{Run, run_all};
-use crate::reproduction::outcome::{
-    Outcome, RUN_S, WINDOW, dynamic_config, extremes, identify_runs, truth_in_window, worst,
+use crate::reproduction::lab::{
+    Outcome, RUN_S, Run, WINDOW, dynamic_config, extremes, identify_runs, run_all, truth_in_window, worst,
 };
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::model::Model;

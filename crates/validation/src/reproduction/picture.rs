@@ -1,8 +1,7 @@
 //! Common parts of the pictures.
 
 use crate::reproduction::figure_data;
-use crate::reproduction::lab::JUMPS;
-use crate::reproduction::outcome::{Outcome, extremes};
+use crate::reproduction::lab::{JUMPS, Outcome, extremes};
 use mapper_chart::{Axis, Colour, Dash, Line, Marker, Panel, Scatter, palette};
 use mapper_numerics::statistics::range;
 

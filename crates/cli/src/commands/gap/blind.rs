@@ -1,6 +1,6 @@
 //! `mapper gap blind`: diagnoses of cases whose causes are withheld.
 
-use crate::command_line::{renamed, subcommands};
+use crate::command_line::subcommands;
 use crate::environment::registry;
 use crate::interrupt;
 use crate::output::failure::{Code, Failure};
@@ -130,8 +130,6 @@ pub struct Make {
     /// Also record each rig on another night without its causes, for `run` to give to the diagnosis with --baseline
     #[arg(long)]
     baseline: bool,
-    #[arg(long, hide = true, num_args = 0..=1, default_missing_value = "", value_parser = renamed("--baseline"))]
-    pub healthy: Option<PathBuf>,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
@@ -261,9 +259,6 @@ impl Run {
 pub struct Score {
     /// Directory of the cases
     pub directory: PathBuf,
-    /// Print the table in Markdown, next to that of the cases in another directory
-    #[arg(long, value_name = "DIR", conflicts_with = "json")]
-    pub beside: Option<PathBuf>,
     /// Also write each answer as NAME.truth.json next to its recording
     #[arg(long)]
     pub open: bool,
@@ -280,11 +275,6 @@ impl Score {
         }
         if self.json {
             return standard_output::print_json(&scored);
-        }
-        if let Some(other) = &self.beside {
-            let title = |of: &Path| Manifest::read(&of.join(MANIFEST_NAME)).map(|it| it.title());
-            let (this, that) = (title(&self.directory)?, title(other)?);
-            return standard_output::print(&scored.compare_with([&this, &that], &score(other)?));
         }
         let mut document = Document::default();
         document.facts("", scored.rows());

@@ -1,6 +1,6 @@
 //! `mapper gap diagnose`: diagnoses the difference between a recording and the nominal model.
 
-use crate::command_line::{channel_map, renamed};
+use crate::command_line::channel_map;
 use crate::environment::registry;
 use crate::output::failure::{Code, Failure};
 use crate::output::standard_output::Replace;
@@ -28,8 +28,6 @@ pub struct Diagnose {
     /// Reference recording of the same rig and steps, fault-free: report changes since then, not what is missing in the model
     #[arg(long, value_name = "FILE")]
     pub baseline: Option<PathBuf>,
-    #[arg(long, hide = true, value_parser = renamed("--baseline"))]
-    pub healthy: Option<PathBuf>,
     /// Channel map: where a recording made by another program holds the rig's channels (YAML)
     #[arg(long, value_name = "MAP")]
     pub channels: Option<PathBuf>,
@@ -42,8 +40,6 @@ pub struct Diagnose {
     /// Write each closure term that is found as an effect in rhai into this directory
     #[arg(long, value_name = "DIR")]
     pub closure_terms: Option<PathBuf>,
-    #[arg(long, hide = true, value_parser = renamed("--closure-terms"))]
-    pub laws: Option<PathBuf>,
     /// Also write an HTML page with pictures to this new file
     #[arg(long, value_name = "OUT")]
     pub html: Option<PathBuf>,

@@ -1,8 +1,9 @@
 //! Figure 12: error against the size of the transient, with the noise and the offsets of a rig.
 
 use crate::reproduction::figure_data::fixed;
-use crate::reproduction::lab::{Jump, Run, run_lagged};
-use crate::reproduction::outcome::{Outcome, RUN_S, dynamic_config, identify_recording, rms};
+use crate::reproduction::lab::{
+    Jump, Outcome, RUN_S, Run, dynamic_config, identify_recording, rms, run_lagged,
+};
 use crate::reproduction::{FigureResult, ReproduceError, Statement, Table, Verdict};
 use mapper_chart::{Axis, Figure, Marker, Panel, Rule, RuleAt, Scatter, palette};
 use mapper_core::{Channel, Recording, Verdict as PointVerdict, Warning};

@@ -2,9 +2,8 @@
 
 use crate::reproduction::figure_data::{fixed, range, signed, signed_or_dash};
 use crate::reproduction::figures::figure_5::apparent_eta;
-use crate::reproduction::lab::Run;
-use crate::reproduction::outcome::{
-    Outcome, WINDOW, dynamic_config, extremes, identify_runs, rms, truth_in_window, worst,
+use crate::reproduction::lab::{
+    Outcome, Run, WINDOW, dynamic_config, extremes, identify_runs, rms, truth_in_window, worst,
 };
 use crate::reproduction::picture::{
     efficiency_pair, efficiency_panel, h_pair, h_panel, series_by_speed, speed_colour, target_speeds_rpm,

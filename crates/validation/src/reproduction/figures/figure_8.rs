@@ -1,8 +1,9 @@
 //! Figure 8: error due to a wrong share of the internal area before compression (alpha_A).
 
 use crate::reproduction::figure_data::{fixed, range};
-use crate::reproduction::lab::{JUMPS, run_all};
-use crate::reproduction::outcome::{Outcome, RUN_S, dynamic_config, extremes, identify_runs, rms, worst};
+use crate::reproduction::lab::{
+    JUMPS, Outcome, RUN_S, dynamic_config, extremes, identify_runs, rms, run_all, worst,
+};
 use crate::reproduction::picture::{
     at_speed, efficiency_pair, efficiency_panel, h_pair, h_panel, krpm, series_by_speed, span_at_speed,
     speed_colour, target_speeds_rpm,

@@ -13,12 +13,12 @@ mod elements;
 mod load;
 mod machine_sizes;
 mod nightly;
-mod nominal_table;
 mod resolved;
 mod si_values;
 #[cfg(test)]
 mod testing;
 
+pub use crate::elements::turbocharger::machine::{NominalTableError, nominal_table};
 pub use campaign::Campaign;
 pub use checks::calibration::{CalibrationWarning, forecast_calibration_warnings};
 pub use checks::map_misfit::{MapMisfit, find_map_misfit};
@@ -33,5 +33,4 @@ pub use load::{
 pub use machine_sizes::{AssumedSize, internal_area_sigma_ratio, similar_machine, similar_sizes};
 pub use mapper_yaml::{Finding, FindingKind, Findings, units};
 pub use nightly::{Nightly, NightlyError, NightlyGroup, load_nightly};
-pub use nominal_table::{NominalTableError, nominal_table};
 pub use resolved::{ResolvedLine, ResolvedPoint, resolved_lines};

@@ -1,51 +1,18 @@
-//! Draws a figure: marker shapes, arrow heads, items, panels.
+//! Draws a figure: arrow heads, items, panels.
 
 use crate::clip::{self, Rect};
 use crate::contours::{band, contour_lines, place, without_gap};
 use crate::drawing::{Drawing, Stroke, TextAnchor, TextStyle};
-use crate::figure::{
-    AXIS_TITLE_PX, MARGIN_PX, PANEL_TITLE_PX, PlacedPanel, SUBTITLE_PX, TICK_PX, TITLE_PX, draw_legend,
-    layout,
-};
 use crate::frame::Frame;
-use crate::items::{Annotation, Item, Line, LineEnd, Marker, Rule, RuleAt, Scatter};
-use crate::palette::{BLUE, Colour, GREY, INK, LIGHT_GREY, WHITE};
+use crate::items::{Annotation, Item, Line, LineEnd, Rule, RuleAt, Scatter};
+use crate::layout::{
+    AXIS_TITLE_PX, MARGIN_PX, PANEL_TITLE_PX, PlacedPanel, SUBTITLE_PX, TICK_PX, TITLE_PX, draw_legend,
+    draw_marker, layout,
+};
+use crate::palette::{BLUE, Colour, GREY, INK, LIGHT_GREY};
 use crate::point_labels::Surroundings;
 use crate::text::{cut, width_px};
 use crate::{Contours, Figure, Panel};
-
-/// A marker in the style of `style`, at this place.
-pub(crate) fn draw_marker(drawing: &mut Drawing, (x, y): (f64, f64), style: &Scatter) {
-    let size = if style.size_px.is_finite() { style.size_px.clamp(1.0, 60.0) } else { 7.0 };
-    let r = size / 2.0;
-    let (fill, stroke) = if style.hollow {
-        (WHITE, Stroke::solid(style.colour, 1.4))
-    } else {
-        // A white rim keeps neighbours apart.
-        (style.colour, Stroke::solid(WHITE, 0.7))
-    };
-    let at = |points: &[(f64, f64)]| points.iter().map(|p| (x + r * p.0, y + r * p.1)).collect::<Vec<_>>();
-    match style.marker {
-        Marker::Circle => drawing.circle((x, y), r, fill, &stroke),
-        Marker::Square => {
-            drawing.polygon(&at(&[(-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)]), fill, &stroke)
-        }
-        Marker::Triangle => drawing.polygon(&at(&[(0.0, -1.2), (1.1, 0.8), (-1.1, 0.8)]), fill, &stroke),
-        Marker::Diamond => {
-            drawing.polygon(&at(&[(0.0, -1.25), (1.25, 0.0), (0.0, 1.25), (-1.25, 0.0)]), fill, &stroke)
-        }
-        Marker::Plus | Marker::Cross => {
-            let stroke = Stroke::solid(style.colour, 1.6);
-            let arms = match style.marker {
-                Marker::Plus => [[(-1.1, 0.0), (1.1, 0.0)], [(0.0, -1.1), (0.0, 1.1)]],
-                _ => [[(-0.9, -0.9), (0.9, 0.9)], [(-0.9, 0.9), (0.9, -0.9)]],
-            };
-            for arm in arms {
-                drawing.polyline(&at(&arm), &stroke);
-            }
-        }
-    }
-}
 
 /// An arrow head at the middle of a segment, unless the segment is too short.
 fn draw_arrow(drawing: &mut Drawing, from: (f64, f64), to: (f64, f64), colour: Colour) {

@@ -28,6 +28,7 @@ pub mod efficiency_mesh;
 mod figure;
 mod frame;
 mod items;
+mod layout;
 mod map_drawing;
 pub mod palette;
 mod png;
@@ -36,8 +37,7 @@ mod svg;
 mod text;
 
 pub use contours::{Contours, StructuredGrid, contour_lines};
-pub use figure::{Figure, Panel};
-pub use frame::Axis;
+pub use figure::{Axis, Figure, Panel};
 pub use items::{
     Annotation, Dash, Item, Line, LineEnd, Marker, Note, PointLabels, Polygon, Rule, RuleAt, Scatter,
     ScatterPoint,

@@ -6,7 +6,6 @@
 mod command_line;
 mod commands;
 mod environment;
-mod fleet_directory;
 mod interrupt;
 mod output;
 mod terminal;

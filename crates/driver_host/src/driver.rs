@@ -2,8 +2,7 @@
 
 use crate::error::DriverError;
 use crate::find::{Endpoint, PREFIX, SearchPath, file_name};
-use crate::lease::Lease;
-use crate::link::Link;
+use crate::link::{Lease, Link};
 use crate::protocol::{
     Code, Configure, DescribeResult, Failure, Hello, MAGIC, Message, Poll, Samples, VERSION, Welcome, batch,
     read_description, read_error,

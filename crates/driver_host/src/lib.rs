@@ -11,7 +11,6 @@ pub mod conformance;
 mod driver;
 mod error;
 mod find;
-mod lease;
 mod link;
 pub mod protocol;
 mod sample_queue;

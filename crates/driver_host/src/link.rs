@@ -1,14 +1,16 @@
-//! The pipes or the socket to a driver. Separate threads read and write, so that no call exceeds its timeout.
+//! The pipes or the socket to a driver. Separate threads read and write, so that no call exceeds its timeout; a third keeps the lease: the host
+//! sends an armed driver a message twice a second, otherwise the driver executes its safe trajectory.
 
 use crate::error::DriverError;
 use crate::protocol::{
-    Encoding, FRAME_LIMIT_BYTES, FrameError, Message, decode, encode, read_frame, write_frame,
+    Encoding, FRAME_LIMIT_BYTES, FrameError, Message, RENEW_S, decode, encode, read_frame, write_frame,
 };
+use mapper_core::BackendError;
 use std::io::{Read, Write};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, TrySendError, channel, sync_channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -234,5 +236,49 @@ fn collect_stderr(mut stderr: impl Read, stderr_tail: &Mutex<Vec<u8>>) {
         stderr_tail.extend_from_slice(&piece[..bytes]);
         let too_many = stderr_tail.len().saturating_sub(LAST_OUTPUT_BYTES);
         stderr_tail.drain(..too_many);
+    }
+}
+
+/// A lease, renewed by a separate thread until it is dropped, as long as calls arrive.
+pub(crate) struct Lease {
+    last_call: Arc<Mutex<Instant>>,
+    /// Dropped with the lease, which ends the thread.
+    _end_thread: Sender<()>,
+}
+
+impl Lease {
+    /// The lease of this session. Without calls for `silence` it is not renewed, because the runner no longer supervises the rig. `None`: a
+    /// simulation, which may wait.
+    pub(crate) fn new(
+        sender: MessageSender,
+        session: String,
+        silence: Option<Duration>,
+    ) -> Result<Lease, BackendError> {
+        let call_time = Arc::new(Mutex::new(Instant::now()));
+        let (end_thread, lease_dropped) = channel();
+        let last = call_time.clone();
+        let renew = move || {
+            let note = Message { session: Some(session), ..Message::note("lease", serde_json::Value::Null) };
+            while lease_dropped.recv_timeout(Duration::from_secs_f64(RENEW_S))
+                == Err(RecvTimeoutError::Timeout)
+            {
+                let silent = last.lock().map_or(Duration::MAX, |last| last.elapsed());
+                if silence.is_none_or(|silence| silent < silence) && sender.send(&note).is_err() {
+                    // The driver does not read or has exited; the next call reports it.
+                    break;
+                }
+            }
+        };
+        std::thread::Builder::new()
+            .name("lease".to_owned())
+            .spawn(renew)
+            .map_err(|error| BackendError::Lost { t_s: 0.0, source: Box::new(error) })?;
+        Ok(Lease { last_call: call_time, _end_thread: end_thread })
+    }
+
+    pub(crate) fn record_call(&self) {
+        if let Ok(mut call_time) = self.last_call.lock() {
+            *call_time = Instant::now();
+        }
     }
 }

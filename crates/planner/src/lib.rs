@@ -28,10 +28,11 @@ mod walk;
 pub use jump_forecast::{JumpForecast, explain_jump, forecast_all_jumps};
 pub use jump_graph::{Rejection, SeparatePoints};
 pub use objective::Objective;
-pub use plan::{hash_inputs, make_plan, plan_other_orders, sha256_hex};
+pub use plan::{make_plan, plan_other_orders};
 pub use plan_builder::max_steps;
 pub use request::{
     ForecastRow, MethodResult, MethodResults, PlanError, PlanRequest, PredictedMethod, UnreachablePoint,
+    hash_inputs, sha256_hex,
 };
 pub use search::{Effort, search, search_min_gradient};
 pub use walk::STABLE_DRIFT_K_MIN;

@@ -1,14 +1,11 @@
-//! Makes a plan from a request: the repeated jump, the dwell, then the order; plans of the same points in the other orders; and hashes of the
-//! inputs of a plan, so that a run can detect a changed campaign or model.
+//! Makes a plan from a request: the repeated jump, the dwell, then the order; and plans of the same points in the other orders.
 
 use crate::plan_builder::{Draft, PlanBuilder, max_steps, rms_error_eta};
 use crate::request::{PlanError, PlanRequest, solve_steady_states};
 use crate::visits::propose_repeated_jumps;
-use mapper_core::{Dwell, Jump, Plan, PlanInputHashes, PlanRemark, Repeats, Timing, VisitOrder, WindowRule};
+use mapper_core::{Dwell, Jump, Plan, PlanRemark, Repeats, Timing, VisitOrder, WindowRule};
 use mapper_numerics::parallel;
 use mapper_physics::simulation::steady::SteadyState;
-use sha2::{Digest, Sha256};
-use std::fmt::Write;
 
 /// Maximum number of jumps tried for repeats if the request gives none; each needs a complete search.
 const MAX_REPEATED_JUMPS_TRIED: usize = 3;
@@ -209,35 +206,4 @@ pub fn plan_other_orders(request: &PlanRequest<'_>, plan: &Plan) -> Result<Vec<P
         .into_iter()
         .filter(|plan| !matches!(plan, Err(PlanError::NoAdmissibleOrder { .. })))
         .collect()
-}
-
-/// SHA-256 of a text, as 64 hexadecimal digits.
-pub fn sha256_hex(text: &str) -> String {
-    Sha256::digest(text.as_bytes()).iter().fold(String::with_capacity(64), |mut hex, byte| {
-        // Writing to a String cannot fail.
-        let _ = write!(hex, "{byte:02x}");
-        hex
-    })
-}
-
-/// Hashes the campaign and the nominal machine of `request`.
-pub fn hash_inputs(request: &PlanRequest<'_>) -> PlanInputHashes {
-    // `Debug` prints every parameter with all digits.
-    let model = format!("{:?} {}", request.model.params, request.model.map.fingerprint());
-    PlanInputHashes {
-        campaign_sha256: sha256_hex(request.campaign_canonical),
-        model_sha256: sha256_hex(&model),
-        script_sha256: None,
-        rig_sha256: None,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    /// FIPS 180-2, appendix B.1.
-    #[test]
-    fn hashes_the_standards_example() {
-        let expected = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
-        assert_eq!(super::sha256_hex("abc"), expected);
-    }
 }

@@ -6,7 +6,7 @@ use crate::housing::{Housing, RepeatedJump, gradients_k};
 use crate::jump_forecast::forecast_jumps;
 use crate::jump_graph::{JumpGraph, Rejection};
 use crate::order::{PROOF_TOLERANCE_RATIO, PointOrder, objective, search_orders};
-use crate::plan::hash_inputs;
+use crate::request::hash_inputs;
 use crate::request::{PlanError, PlanRequest, solve_steady_states};
 use crate::visits::{
     Visit, append_jump, append_return, insert_repeats, repeat_count, value, visits_of_points,

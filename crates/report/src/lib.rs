@@ -9,20 +9,17 @@
 mod diagnosis;
 mod document;
 mod formatting;
-mod history_picture;
 mod log_text;
-mod map_comparison_picture;
 mod map_documents;
 mod nights;
 pub mod page;
+mod pictures;
 mod plan;
 mod point_results;
-mod result_pictures;
 mod side_diagnosis;
 mod studies;
 mod test_report;
 mod thermal_model;
-mod turbine_file;
 
 pub use diagnosis::drift::corrected_csv;
 pub use diagnosis::gap_results::{compared_recordings, correction, forecast_check};
@@ -31,24 +28,21 @@ pub use document::{Cell, Describe, Document, Paint, Table, markdown_table, markd
 pub use formatting::{
     Display, Message, progress_text, sentence, short_duration, significant_digits, with_messages,
 };
-pub use history_picture::history_svg;
 pub use log_text::log_contents;
-pub use map_comparison_picture::{distinct_names, map_comparison_figure};
 pub use map_documents::{map_fit, reduced_map, reduced_turbine, turbine_fit};
 pub use nights::{listed_run_json, listed_runs, night_comparison, night_groups};
-pub use page::run_page::OtherRun;
-pub use page::shell::gap_page;
+pub use page::run_page::gap_page;
+pub use page::widgets::OtherRun;
+pub use pictures::{distinct_names, error_figure, heat_transfer_figure, history_svg, map_comparison_figure};
 pub use plan::campaign_check::CheckedCampaign;
 pub use plan::plan_document::{comparison_json, jump_forecast, jump_json, plan_comparison, plan_document};
 pub use plan::plan_picture::plan_svg;
 pub use plan::plan_remark_text::guard_trip_text;
 pub use point_results::budget_table::budget_csv;
 pub use point_results::summary::PointResults;
-pub use result_pictures::{error_figure, heat_transfer_figure};
 pub use side_diagnosis::why_figure;
 pub use studies::study_status;
 pub use test_report::key_figures::{PointsOrigin, first_campaign};
 pub use test_report::run_report::{ReportSource, RunReport, instant};
 pub use test_report::zero_and_sensors::SurgeReport;
-pub use thermal_model::ThermalExport;
-pub use turbine_file::{TurbinePoint, turbine_points, turbine_text};
+pub use thermal_model::{ThermalExport, TurbinePoint, turbine_points, turbine_text};

@@ -1,12 +1,19 @@
-//! The parameters that the points of a campaign share, for people and for other programs.
+//! The parameters that the points of a campaign share, and the turbine of a compressor test, for people and for other programs.
+//!
+//! Limits of the turbine: one row a step, at its end. Efficiency is the power of the compressor over the isentropic power of the turbine, total
+//! to static. It includes the bearing loss, and the heat that the gas loses to the turbine housing before the wheel counts as loss. A
+//! housing that still warms up lowers it. Shaft acceleration is not corrected for: the speed has settled. Expansion is from
+//! the total inlet pressure to the outlet pressure as tapped.
 
 use crate::document::{Describe, Document};
 use crate::formatting::{Message, significant_digits};
 use mapper_core::{
-    ConvectionLaw, IdentifiedInlet, InletConvection, Origin, SharedValue, ThermalModel, half_width_95,
-    one_line,
+    Channel, ConvectionLaw, IdentifiedInlet, IdentifiedPoint, InletConvection, Origin, Recording,
+    SharedValue, ThermalModel, half_width_95, one_line,
 };
-use mapper_physics::gas::air::viscosity_pa_s;
+use mapper_observe::energy_balance::Gases;
+use mapper_physics::gas::air::{Air, viscosity_pa_s};
+use mapper_physics::laws::compression::{compressed_k, isentropic_rise_ratio};
 use mapper_physics::laws::convection::coefficient_w_m2k;
 use mapper_physics::laws::housing::{bearing_conductance_w_k, compressor_capacity_j_k, turbine_capacity_j_k};
 use mapper_physics::machine::params::Params;
@@ -87,7 +94,7 @@ fn shared_value(value: &SharedValue, scale: f64, unit: &str, decimals: usize) ->
 }
 
 /// The relation for h before the wheel, and whether the recording determines it, as one line without its end.
-pub(crate) fn inlet_text(inlet: &IdentifiedInlet) -> String {
+fn inlet_text(inlet: &IdentifiedInlet) -> String {
     let law_name = |convection: InletConvection| match convection {
         InletConvection::Shared => "that behind it".to_owned(),
         InletConvection::Own => format!("the same law at the inlet's {:.1} mm", 1e3 * inlet.diameter_m),
@@ -178,26 +185,6 @@ impl AtReference {
             coefficient_correlation: law.ln_coefficient_error()?.1,
         })
     }
-
-    /// As lines of the text export.
-    fn write(&self, text: &mut String) {
-        let [h, low, high] = self.h_w_m2k;
-        let _ = writeln!(
-            text,
-            "reynolds_reference {:.0} 1 # identified, where h and exponent are uncorrelated",
-            self.reynolds
-        );
-        let _ = writeln!(
-            text,
-            "h_at_reference {h:.2} W/(m2 K) # identified, 95 % {low:.2} to {high:.2}, gas and wall at {} K",
-            self.temperature_k
-        );
-        let _ = writeln!(
-            text,
-            "coefficient_exponent_correlation {:.6} 1 # of ln(nusselt_coefficient) and nusselt_exponent",
-            self.coefficient_correlation
-        );
-    }
 }
 
 impl ThermalExport<'_> {
@@ -240,72 +227,92 @@ impl ThermalExport<'_> {
         bytes.push(b'\n');
         Ok(bytes)
     }
+}
 
-    /// The same as lines `name value unit # source`.
-    pub fn text(&self) -> String {
-        let (params, compressor) = (self.params, &self.params.compressor);
-        let mut text = format!(
-            "# thermal model of {}\n# Nu = a Re^b Pr^(1/3) (mu/mu_wall)^0.14, Re = 4 m/(pi D mu), over the compressor's inner walls\n",
-            one_line(self.machine)
-        );
-        let law = self.found.and_then(|identified| identified.convection.as_ref());
-        let shared = |name: &str, unit: &str, identified: Option<&SharedValue>, declared: f64| {
-            let (value, origin) = match identified.and_then(|shared| Some((shared.value?, shared))) {
-                Some((value, shared)) => {
-                    let (low, high) = shared.interval_95().unwrap_or((value, value));
-                    let origin = match shared.origin {
-                        Origin::Fitted => "identified",
-                        Origin::Assumed => "declared",
-                        Origin::NotIdentifiable => "declared; not identifiable from the recording",
-                    };
-                    (value, format!("{origin}, 95 % {low:.6} to {high:.6}"))
-                }
-                None => (declared, "declared".to_owned()),
-            };
-            format!("{name} {value} {unit} # {origin}\n")
-        };
-        let interval = |(low, high): (f64, f64)| format!(", 95 % {low:.4e} to {high:.4e}");
-        let coefficient = law.and_then(|law| Some((law.coefficient.value?, law)));
-        let (coefficient, origin) = coefficient.map_or_else(
-            || (compressor.nusselt_coefficient, "declared".to_owned()),
-            |(value, law)| {
-                (
-                    value,
-                    format!("identified{}", law.coefficient_interval_95().map(interval).unwrap_or_default()),
-                )
-            },
-        );
-        let _ = writeln!(text, "nusselt_coefficient {coefficient} 1 # {origin}");
-        text += &shared("nusselt_exponent", "1", law.map(|l| &l.exponent), compressor.nusselt_exponent);
-        if let Some(at) = law.and_then(AtReference::new) {
-            at.write(&mut text);
-        }
-        text +=
-            &shared("alpha_area", "1", self.found.map(|f| &f.alpha_area_ratio), compressor.alpha_area_ratio);
-        text += &shared(
-            "t2_probe_diameter",
-            "m",
-            self.found.map(|f| &f.probe_diameter_m),
-            params.t2_probe_diameter_m,
-        );
-        text += &shared("heating_cooling_ratio", "1", self.found.map(|f| &f.heating_cooling_ratio), 1.0);
-        if let Some(inlet) = self.found.and_then(|identified| identified.inlet) {
-            let _ =
-                writeln!(text, "inlet_diameter {} m # declared\n# {}", inlet.diameter_m, inlet_text(&inlet));
-        }
-        for (name, value, unit) in [
-            ("diameter", law.map_or(compressor.outlet_diameter_m, |l| l.diameter_m), "m"),
-            ("internal_area", compressor.internal_area_m2, "m2"),
-            ("external_area", compressor.external_area_m2, "m2"),
-            ("compressor_housing_capacity", compressor_capacity_j_k(params, CAPACITY_AT_K), "J/K"),
-            ("turbine_housing_capacity", turbine_capacity_j_k(params, CAPACITY_AT_K), "J/K"),
-            ("housing_to_bearing_conductance", bearing_conductance_w_k(&params.bearing), "W/K"),
-            ("bearing_to_oil_conductance", params.bearing.oil_conductance_w_k, "W/K"),
-        ] {
-            let _ = writeln!(text, "{name} {value} {unit} # declared");
-        }
-        text
+/// Time before a step's end over which the turbine's channels are averaged, s.
+const AVERAGE_S: f64 = 10.0;
+
+/// The turbine at the end of a step.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct TurbinePoint {
+    /// Index of the step, from 0; files have its number, from 1.
+    #[serde(serialize_with = "mapper_core::test_plan::step_number::serialize")]
+    pub step: usize,
+    /// Speed over the root of the inlet temperature, rpm/K^0.5.
+    pub speed_parameter_rpm_sqrt_k: f64,
+    /// Flow parameter `m sqrt(T3)/P3`, kg K^0.5/(s kPa).
+    pub flow_parameter_kg_sqrt_k_s_kpa: f64,
+    /// Expansion ratio P3/P4.
+    pub expansion_ratio: f64,
+    /// Turbine times mechanical efficiency, fraction; `None` if the compressor's efficiency is unknown.
+    pub efficiency: Option<f64>,
+}
+
+/// The turbine results of every point whose channels are present and plausible; the compressor's gas has the definition of the points'
+/// efficiency.
+pub fn turbine_points(recording: &Recording, points: &[IdentifiedPoint], gases: &Gases) -> Vec<TurbinePoint> {
+    points.iter().filter_map(|point| turbine_point(recording, point, gases)).collect()
+}
+
+fn turbine_point(recording: &Recording, point: &IdentifiedPoint, gases: &Gases) -> Option<TurbinePoint> {
+    let step = recording.steps.iter().find(|step| step.index == point.step)?;
+    let mean = |channel: Channel| {
+        let (_, values) = recording.series.get(&channel)?.slice(step.end_s - AVERAGE_S, step.end_s);
+        let sum: f64 = values.iter().sum();
+        let mean = sum / values.len() as f64;
+        (mean.is_finite() && mean > 0.0).then_some(mean)
+    };
+    let (flow_kg_s, p3_pa, t3_k, p4_pa) =
+        (mean(Channel::TurbineFlow)?, mean(Channel::P3)?, mean(Channel::T3)?, mean(Channel::P4)?);
+    let expansion_ratio = p3_pa / p4_pa;
+    if !(expansion_ratio > 1.0 && point.speed_rpm > 0.0) {
+        return None;
     }
+    let cp3_j_kgk = gases.turbine.heat_capacity_j_kgk(t3_k);
+    let exponent = gases.turbine.gas_constant_j_kgk / cp3_j_kgk;
+    let turbine_w = flow_kg_s * cp3_j_kgk * t3_k * (1.0 - expansion_ratio.powf(-exponent));
+    let compressor_w = point.eta.filter(|eta| *eta > 0.0).map(|eta| {
+        let air = gases.compressor.between(point.p1_pa, point.pressure_ratio * point.p1_pa);
+        let rise = isentropic_rise_ratio(point.pressure_ratio, point.t1_k, air);
+        let t2_prime_k = compressed_k(point.t1_k, rise, eta, air);
+        point.flow_kg_s * air.enthalpy_rise_j_kg(point.t1_k, t2_prime_k)
+    });
+    Some(TurbinePoint {
+        step: point.step,
+        speed_parameter_rpm_sqrt_k: point.speed_rpm / t3_k.sqrt(),
+        flow_parameter_kg_sqrt_k_s_kpa: flow_kg_s * t3_k.sqrt() / (p3_pa / 1000.0),
+        expansion_ratio,
+        efficiency: compressor_w.map(|power_w| power_w / turbine_w).filter(|e| e.is_finite()),
+    })
+}
+
+/// SAE text, turbine: `SP mfp ER Eff`, in order of speed parameter.
+pub fn turbine_text(machine: &str, gases: &Gases, points: &[TurbinePoint]) -> String {
+    let mut rows: Vec<(&TurbinePoint, f64)> =
+        points.iter().filter_map(|p| Some((p, p.efficiency?))).collect();
+    rows.sort_by(|a, b| a.0.speed_parameter_rpm_sqrt_k.total_cmp(&b.0.speed_parameter_rpm_sqrt_k));
+    let mut text = format!(
+        "# turbine of {}\n\
+         # Eff: compressor power over isentropic turbine power, total to static: mechanical loss and heat lost before the\n\
+         # wheel are in it; too low where the turbine housing still warms up.\n\
+         # Gas of the turbine: {}; of the compressor: {}.\n",
+        one_line(machine),
+        Air::new(gases.turbine, 0.0).description(),
+        gases.compressor.description(),
+    );
+    let without = points.len() - rows.len();
+    if without > 0 {
+        let _ = writeln!(text, "# {without} points without a compressor efficiency are omitted");
+    }
+    text.push_str("# SP(rpm/sqrt(K)) mfp(kg-sqrt(K)/s-kPa) ER Eff\n");
+    for (p, efficiency) in rows {
+        let _ = writeln!(
+            text,
+            "{} {} {} {efficiency}",
+            p.speed_parameter_rpm_sqrt_k, p.flow_parameter_kg_sqrt_k_s_kpa, p.expansion_ratio
+        );
+    }
+    text
 }
 
 #[cfg(test)]
@@ -390,7 +397,7 @@ mod tests {
     }
 
     #[test]
-    fn json_and_text_tell_the_same_and_a_name_breaks_nothing() {
+    fn declared_values_are_exported_with_those_that_follow_from_them() {
         let params = Params::default();
         let export = ThermalExport { machine: "a\nb 7", params: &params, found: None };
         let value: serde_json::Value = serde_json::from_slice(&export.json().unwrap()).unwrap();
@@ -398,11 +405,5 @@ mod tests {
         let declared = |name: &str| value["declared"][name].as_f64().unwrap();
         assert!((declared("housing_to_bearing_conductance_w_k") - 1.4778).abs() < 1e-4);
         assert!((declared("compressor_housing_capacity_j_k") - 878.85).abs() < 1e-9);
-        let text = export.text();
-        assert!(
-            text.contains("nusselt_exponent 1.13 1 # declared\n")
-                && text.starts_with("# thermal model of a b 7\n")
-        );
-        assert!(text.lines().all(|line| line.starts_with('#') || line.split(' ').count() >= 5));
     }
 }

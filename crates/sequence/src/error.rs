@@ -160,7 +160,7 @@ fn message_and_remedy(error: EvalAltResult) -> (String, String) {
         }
         EvalAltResult::ErrorFunctionNotFound(signature, _) => (
             format!("no function `{signature}` exists for sequence scripts"),
-            crate::names::SEE_REFERENCE.to_owned(),
+            crate::sandbox::SEE_REFERENCE.to_owned(),
         ),
         other => {
             let mut other = other;

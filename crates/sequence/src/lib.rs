@@ -12,7 +12,6 @@
 
 mod api;
 mod error;
-mod names;
 mod request;
 mod runner;
 mod sandbox;

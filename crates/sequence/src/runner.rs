@@ -1,12 +1,13 @@
 //! Runs a script on its own thread and synchronises with it at each step.
 
+use crate::api;
 use crate::error::{ScriptError, SequenceError};
-use crate::names::{UnknownName, find_unclosed_comment};
 use crate::request::SequenceRequest;
-use crate::sandbox::{Budget, SCRIPT_LIMIT, STACK_BYTES, build_engine};
+use crate::sandbox::{
+    Budget, SCRIPT_LIMIT, STACK_BYTES, UnknownName, build_engine, check, find_unclosed_comment,
+};
 use crate::session::{Session, lock};
 use crate::settle::{ScriptMessage, SequenceStep, StepResult};
-use crate::{api, names};
 use rhai::{AST, Dynamic, Engine, EvalAltResult, Position, Scope};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
@@ -177,7 +178,7 @@ fn run(script: &Script, budget: &Arc<Budget>, session: Session) {
     let mut engine = build_engine(session.request.points.len(), budget);
     let session = Arc::new(Mutex::new(session));
     api::register(&mut engine, &session);
-    let compiled = compile(&engine, script).and_then(|ast| match names::check(&engine, &ast) {
+    let compiled = compile(&engine, script).and_then(|ast| match check(&engine, &ast) {
         Ok(()) => Ok(ast),
         Err(UnknownName { at, message, remedy }) => {
             Err(Box::new(ScriptError::new(script.path.clone(), &script.text, at, message, remedy)))

@@ -12,7 +12,6 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod column_name;
-mod encoding;
 mod instant;
 mod name_parts;
 mod number;
@@ -24,12 +23,13 @@ mod xls;
 mod xlsx_limits;
 
 pub use column_name::{Clarity, ColumnName, Place, channel_at};
-pub use encoding::{DecodingReader, TextEncoding};
 pub use instant::{DateOrder, Instant, NS_PER_DAY, guess_order, minutes_and_seconds, parse_instant};
 pub use number::{
     NO_READING, is_missing, is_missing_mark, number_in, number_with_unit, parse_number, read_number,
 };
-pub use text::{Dialect, SEPARATORS, TextRows, decimal_sign, detect_text, typical_length};
+pub use text::{
+    DecodingReader, Dialect, SEPARATORS, TextEncoding, TextRows, decimal_sign, detect_text, typical_length,
+};
 pub use units::{
     HeaderUnit, Reference, bare_unit, difference, header_unit, is_dimensionless, is_reduced_unit, is_unit,
     is_units_row, is_units_row_of_names, kind_of, parse_quantity, remedy, split_unit, unit, volume_flow_m3_s,

@@ -10,9 +10,7 @@
 
 mod check;
 mod document;
-mod finding;
 pub mod keys;
-mod messages;
 mod rules;
 mod source;
 pub mod units;
@@ -21,5 +19,4 @@ pub use check::{Schema, json_schema_of};
 pub use document::file::{open, open_file, read_limited};
 pub use document::positions::{Step, path_text};
 pub use document::tree::{Tree, read};
-pub use finding::{Finding, FindingKind, closest};
-pub use source::{Document, Findings, Notes, Source};
+pub use source::{Document, Finding, FindingKind, Findings, Notes, Source, closest};

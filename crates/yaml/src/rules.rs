@@ -4,7 +4,7 @@
 //! verdict with that of a complete validator.
 
 use crate::document::positions::Step;
-use crate::finding::FindingKind;
+use crate::source::FindingKind;
 
 use crate::units::{Kind, parse};
 use serde_json::{Map, Value};

@@ -4,8 +4,7 @@
 //! openATFX does (github.com/peak-solution/openatfx), whose examples are ASAM's.
 
 use crate::columns::table_head::MAX_COLUMNS;
-use crate::tables::column_log::{ColumnTable, check_columns_file, column_log};
-use crate::tables::column_rows::Chunk;
+use crate::tables::column_log::{Chunk, ColumnTable, check_columns_file, column_log};
 use mapper_recording::logs::limits::{MAX_UNPACKED_BYTES, max_memory_bytes};
 use mapper_recording::logs::{Log, LogError, LogFile, LogFinding, LogFormat, LogOptions};
 use mapper_table::{DateOrder, Instant, parse_instant};

@@ -6,8 +6,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod columns;
-mod mdf_layout;
-mod mdf_source;
+mod mdf;
 mod tables;
 
 use mapper_recording::logs::LogFormats;

@@ -1,7 +1,6 @@
 //! MDF, version 3: the `.dat` files of older measuring systems, as INCA writes them.
 
-use crate::mdf_layout::{check_channel_count, column, forward_rows, wanted_channels};
-use crate::mdf_source::MdfSource;
+use crate::mdf::{MdfSource, check_channel_count, column, forward_rows, wanted_channels};
 use falcon_mdf::mdf3::Mdf3File;
 use mapper_recording::logs::{
     Group, Layout, Log, LogError, LogFile, LogFinding, LogFormat, LogOptions, RowSink,

@@ -1,7 +1,6 @@
 //! ASAM MDF, version 4: the format of measuring systems on engine test beds.
 
-use crate::mdf_layout::{check_channel_count, column, forward_rows, wanted_channels};
-use crate::mdf_source::MdfSource;
+use crate::mdf::{MdfSource, check_channel_count, column, forward_rows, wanted_channels};
 use falcon_mdf::{Channel, ChannelGroup, Conversion, Mf4File, OpenOptions, Signal};
 use mapper_recording::Kind;
 use mapper_recording::logs::limits::{MAX_BLOCK_BYTES, max_unpacked_bytes};

@@ -1,6 +1,6 @@
 //! Excel workbooks, with a table on each sheet.
 
-use crate::columns::counter::HEAD_ROWS;
+use crate::columns::clock::HEAD_ROWS;
 use crate::tables::joined_tables::{Part, join_tables};
 use crate::tables::table_log::{Origin, Table};
 use crate::tables::table_row::{Cell, Cells, Rows};

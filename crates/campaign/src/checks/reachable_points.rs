@@ -3,7 +3,7 @@
 use crate::campaign::Campaign;
 use crate::checking::{Check, Files};
 use crate::elements;
-use crate::nominal_table::NominalTableError;
+use crate::elements::turbocharger::machine::NominalTableError;
 use mapper_core::OperatingPoint;
 use mapper_physics::compressor_map::characteristic::CompressorCharacteristic;
 use mapper_physics::compressor_map::closed_form_map::ClosedFormMap;

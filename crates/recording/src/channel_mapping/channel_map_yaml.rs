@@ -1,7 +1,6 @@
 //! Channel maps in YAML with units.
 
-use crate::channel_mapping::channel_map::UNKNOWN_WORD;
-use crate::channel_mapping::channel_map_schema::SCHEMA;
+use crate::channel_mapping::channel_map::{SCHEMA, UNKNOWN_WORD};
 use crate::logs::{LogOptions, OPTION_KEYS};
 use crate::writing::topics::TRUTH_PREFIX;
 use crate::{

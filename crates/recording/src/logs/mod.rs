@@ -3,7 +3,6 @@
 //! A [`LogFormat`] recognises a file by its first bytes and opens it as a [`Log`]: a [`Layout`] of groups and columns, and the rows of
 //! the requested columns, one after the other.
 
-mod file;
 mod finding;
 mod format;
 pub mod limits;
@@ -12,9 +11,10 @@ pub mod plausible;
 pub mod proposal;
 mod survey;
 
-pub use file::{LogFile, ReadSeek};
 pub use finding::LogFinding;
-pub use format::{Column, Group, Layout, Log, LogError, LogFormat, LogFormats, OpenLog, Row, RowSink};
+pub use format::{
+    Column, Group, Layout, Log, LogError, LogFile, LogFormat, LogFormats, OpenLog, ReadSeek, Row, RowSink,
+};
 pub use mapper_table::{difference, kind_of};
 pub use options::{LogOptions, OPTION_KEYS};
 pub use survey::{ColumnSurvey, Gap, GroupSurvey, Restart, Survey, Trace, sparkline, survey};

@@ -1,8 +1,7 @@
 //! Collects samples, steps and events of a recording, and ignores truth.
 
 use crate::channel_mapping::mapped_topics::{MappedQuantity, MappedTopic, map_topic};
-use crate::mcap::message::{FieldValue, read_fields};
-use crate::mcap::records::{ChannelDefinition, Sink};
+use crate::mcap::records::{ChannelDefinition, FieldValue, Sink, read_fields};
 use crate::samples::series_builder::SeriesBuilder;
 use crate::steps::StepMessage;
 use crate::writing::recording_file::{OriginMessage, read_origins};

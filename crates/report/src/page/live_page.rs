@@ -2,7 +2,7 @@
 
 use crate::formatting::Display;
 use crate::page::drawn::{DrawnMap, DrawnPoint, drawn_map, drawn_point};
-use crate::page::shell::{Purpose, shell};
+use crate::page::run_page::{Purpose, shell};
 use mapper_campaign::Campaign;
 use mapper_campaign::units::Kind;
 use mapper_core::{IdentifiedPoint, Plan};

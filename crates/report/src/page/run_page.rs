@@ -1,15 +1,124 @@
-//! The page of a run or of identified recordings, and the parts that work only in a browser: map, transient of a point, and plan.
+//! The frame of a page: content policy, style, scripts, data; the page of a diagnosis, which needs no more; and the page of a run or of identified
+//! recordings.
 
-use crate::formatting::Display;
+use crate::diagnosis::gap_text::gap_document;
 use crate::page::drawn::{DrawnMap, DrawnPoint, DrawnStep, drawn_map, drawn_points, drawn_steps};
-use crate::page::shell::{Purpose, shell};
-use crate::point_results::points::{opening, step_name};
-use crate::point_results::summary::PointResults;
 use crate::test_report::run_report::RunReport;
 use mapper_campaign::campaign::DisplayUnits;
-use mapper_core::{CompressorMap, Verdict, step_number};
-use maud::{Markup, html};
+use mapper_core::Verdict;
+use mapper_diagnose::gap::Diagnosed;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
 use serde::Serialize;
+
+const STYLE: &str = include_str!("../../assets/page.css");
+/// d3 7.9.2 and Observable Plot 0.6.17 (ISC), unchanged from their npm packages: `assets/SHA256SUMS`.
+const D3: &str = include_str!("../../assets/d3.min.js");
+const PLOT: &str = include_str!("../../assets/plot.umd.min.js");
+const COMMON: &str = include_str!("../../assets/common.js");
+const MAP: &str = include_str!("../../assets/map.js");
+const STEPS: &str = include_str!("../../assets/steps.js");
+const TABLES: &str = include_str!("../../assets/tables.js");
+const LIVE: &str = include_str!("../../assets/live.js");
+
+/// Purpose of a page.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Purpose {
+    /// To keep: it works from disk and makes no requests.
+    Kept,
+    /// To keep, without a script: its pictures are in it.
+    Still,
+    /// To watch a run: it makes requests only to the program that served it.
+    Live,
+}
+
+impl Purpose {
+    /// Parts of the page's own script, in order.
+    fn scripts(self) -> &'static [&'static str] {
+        match self {
+            Purpose::Kept => &[D3, PLOT, COMMON, MAP, STEPS, TABLES],
+            Purpose::Still => &[],
+            Purpose::Live => &[D3, PLOT, COMMON, MAP, LIVE],
+        }
+    }
+
+    fn policy(self) -> String {
+        match self {
+            Purpose::Still => format!("{POLICY}; script-src 'none'"),
+            Purpose::Kept => format!("{POLICY}; {OWN_SCRIPT}"),
+            Purpose::Live => format!("{POLICY}; {OWN_SCRIPT}; connect-src 'self'"),
+        }
+    }
+}
+
+/// No requests in or out.
+const POLICY: &str =
+    "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'";
+const OWN_SCRIPT: &str = "script-src 'unsafe-inline'";
+
+/// The complete page; `footer` is printed on each sheet, `data` is the input of its script.
+pub(crate) fn shell(
+    title: &str,
+    footer: &str,
+    purpose: Purpose,
+    data: &impl Serialize,
+    body: &Markup,
+) -> Result<String, serde_json::Error> {
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta http-equiv="Content-Security-Policy" content=(purpose.policy());
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                title { (title) }
+                style { (PreEscaped(STYLE)) (PreEscaped(footer_style(footer))) }
+            }
+            body {
+                (body)
+                @if purpose != Purpose::Still {
+                    script type="application/json" id="data" { (PreEscaped(json_in_html(data)?)) }
+                }
+                @for script in purpose.scripts() { script { (PreEscaped(script)) } }
+            }
+        }
+    };
+    Ok(page.into_string())
+}
+
+/// The footer of each printed sheet, with the sheet's number and the total.
+fn footer_style(footer: &str) -> String {
+    // Escaped as numbers, so that no letter of a name can end a string or an element.
+    let text: String = footer
+        .chars()
+        .map(|c| if c.is_ascii_alphanumeric() { c.to_string() } else { format!("\\{:x} ", u32::from(c)) })
+        .collect();
+    format!(
+        "@media print{{@page{{@bottom-left{{content:\"{text}\"}}@bottom-right{{content:\"sheet \" counter(page) \" of \" \
+         counter(pages)}}}}}}"
+    )
+}
+
+/// JSON in which no string can end the element.
+fn json_in_html(data: &impl Serialize) -> Result<String, serde_json::Error> {
+    Ok(serde_json::to_string(data)?
+        .replace('<', "\\u003c")
+        .replace('\u{2028}', "\\u2028")
+        .replace('\u{2029}', "\\u2029"))
+}
+
+/// The page. `machine` and `recording` are names for its title.
+///
+/// # Errors
+/// None in practice: JSON of numbers and strings can always be written.
+pub fn gap_page(machine: &str, recording: &str, diagnosed: &Diagnosed) -> Result<String, serde_json::Error> {
+    let title = format!("Gap between {machine} and its nominal model");
+    let body = html! {
+        header { h1 { (title) } p.under { "Recording: " (recording) } }
+        main #gap { (gap_document(diagnosed).html()) }
+    };
+    shell(&title, &title, Purpose::Still, &(), &body)
+}
 
 /// Data of the script.
 #[derive(Serialize)]
@@ -67,96 +176,32 @@ impl RunReport<'_> {
     }
 }
 
-/// Another run's map.
-pub struct OtherRun<'a> {
-    /// Its name in the report.
-    pub name: String,
-    /// Its map.
-    pub map: &'a CompressorMap,
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sha2::{Digest, Sha256};
 
-/// Layers that can be switched: name in the script, label, whether it is on at first.
-const LAYERS: [(&str, &str, bool); 6] = [
-    ("lines", "speed lines", true),
-    ("contours", "efficiency contours", true),
-    ("extrapolated", "extrapolation", false),
-    ("intervals", "95 % intervals", true),
-    ("repeats", "repeats", false),
-    ("dynamic", "dynamic method", false),
-];
-
-/// The interactive map.
-pub(crate) fn map_widget(results: &PointResults<'_>, others: &[OtherRun<'_>], display: &Display) -> Markup {
-    let speed = &display.units().speed;
-    let has_dynamic = !results.dynamic.is_empty();
-    html! {
-        fieldset.layers.screen {
-            legend { "Show" }
-            @for (name, words, on) in LAYERS.into_iter().filter(|(name, ..)| *name != "dynamic" || has_dynamic) {
-                label { input type="checkbox" name="layer" value=(name) checked[on]; " " (words) }
-            }
-            @for (index, other) in others.iter().enumerate() {
-                label { input type="checkbox" name="layer" value=(format!("other{index}")) checked; " " (other.name) }
-            }
-            button type="button" id="whole" { "Reset zoom" }
-        }
-        (legend(results))
-        div.plots {
-            figure { div #map-plot {} figcaption { "Pressure ratio over corrected flow. Numbers at lines: corrected speed in " (speed) "; numbers on contours: efficiency in %." span.screen { " Zoom with Ctrl and the wheel, move by dragging; click a point to see its transient." } } }
-            figure { div #eta-plot {} figcaption { "Efficiency over corrected flow, with 95 % intervals. Numbers at lines: corrected speed in " (speed) "." } }
-        }
-        noscript { p { "The drawings need JavaScript; the same map is next to this file as map.svg." } }
-    }
-}
-
-/// Legend of the symbols that are present.
-fn legend(results: &PointResults<'_>) -> Markup {
-    let PointResults { map, points, .. } = *results;
-    let has = |verdict| points.iter().any(|scored| scored.point.verdict == verdict);
-    let is_fitted = map.is_some_and(|map| map.fitted.is_some());
-    let is_sought = map.is_some_and(|map| !map.surge.is_empty());
-    html! {
-        ul.signs aria-label="Signs" {
-            @if has(Verdict::Good) { li { svg aria-hidden="true" viewBox="0 0 12 12" { circle cx="6" cy="6" r="4" {} } "good point" } }
-            @if has(Verdict::Doubtful) { li { svg aria-hidden="true" viewBox="0 0 12 12" { path d="M6 1 10 6 6 11 2 6Z" {} } "doubtful point" } }
-            @if has(Verdict::Unusable) {
-                li { svg aria-hidden="true" viewBox="0 0 12 12" { path.hollow d="M6 1 10 6 6 11 2 6Z" {} } "no usable efficiency" }
-            }
-            @if is_sought { li { svg.bad aria-hidden="true" viewBox="0 0 12 12" { rect x="2" y="2" width="8" height="8" {} } "measured surge, with its 95 % interval" } }
-            @if is_fitted {
-                li {
-                    svg.bad aria-hidden="true" viewBox="0 0 28 12" { path d="M0 6H28" stroke-dasharray="6 3" {} }
-                    @if is_sought { "surge line" } @else { "last points towards surge; surge itself was not measured" }
-                }
-                li { svg.doubt aria-hidden="true" viewBox="0 0 28 12" { path d="M0 6H28" stroke-dasharray="2 3" {} } "choke, fitted" }
-            }
-            li.screen { svg.ring aria-hidden="true" viewBox="0 0 12 12" { circle cx="6" cy="6" r="4.5" {} } "point whose transient is shown below" }
+    /// The libraries match their recorded hashes byte for byte.
+    #[test]
+    fn libraries_are_as_their_sums_say() {
+        let sums = include_str!("../../assets/SHA256SUMS");
+        for (name, text) in [("d3.min.js", D3), ("plot.umd.min.js", PLOT)] {
+            let sum: String =
+                Sha256::digest(text.as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect();
+            assert!(sums.contains(&format!("{sum}  {name}")), "{name}: {sum}");
+            // They must not contain the end of their element.
+            assert!(!text.contains("</script"), "{name}");
         }
     }
-}
 
-/// The transient of one point.
-pub(crate) fn step_widget(results: &PointResults<'_>, display: &Display) -> Markup {
-    html! {
-        p.screen {
-            label for="step-choice" { "Step " }
-            select #step-choice {
-                @for point in results.identified() {
-                    option value=(step_number(point.step)) {
-                        (step_name(point)) " · " (display.speed(point.speed_rpm)) " " (display.units().speed)
-                        @if point.valve_opening_ratio.is_finite() { " · opening " (opening(point.valve_opening_ratio)) }
-                    }
-                }
-            }
-        }
-        div #step-words aria-live="polite" {}
-        div.plots #step-plots {}
-    }
-}
-
-/// The jumps on the map.
-pub(crate) fn plan_widget() -> Markup {
-    html! {
-        figure { div #plan-plot {} figcaption { "The jumps in their order, the first ones darkest. The numbers are steps; the table has those without space here." } }
+    #[test]
+    fn hostile_names_stay_text() {
+        let hostile = "</script><script>alert(1)</script>";
+        let page = shell(hostile, hostile, Purpose::Kept, &[hostile], &html! { h1 { (hostile) } }).unwrap();
+        assert!(!page.contains("<script>alert"), "markup of a name got into the page");
+        let style = page.split("<style>").nth(1).unwrap().split("</style>").next().unwrap();
+        assert!(style.contains("sheet \" counter(page)"), "the name ends the style");
+        let data = page.split("id=\"data\">").nth(1).unwrap().split("</script>").next().unwrap();
+        assert_eq!(serde_json::from_str::<Vec<String>>(data).unwrap(), [hostile]);
     }
 }

@@ -1,6 +1,5 @@
 //! Identified points for test engineers: tables by speed line, warnings, uncertainty budgets, and agreement of methods.
 
-pub(crate) mod agreement;
 pub(crate) mod budget_table;
 pub(crate) mod point_warnings;
 pub(crate) mod points;

@@ -2,9 +2,10 @@
 
 use crate::document::{Describe, Document};
 use crate::formatting::{Display, Message, percent};
-use crate::point_results::agreement::{disagreement_text, shared_errors_text};
 use crate::point_results::point_warnings::{doubts, reasons};
-use crate::point_results::points::{allowance_sentence, points_by_line, verdict_sentence, wide_table};
+use crate::point_results::points::{
+    allowance_sentence, disagreement_text, points_by_line, shared_errors_text, verdict_sentence, wide_table,
+};
 use crate::test_report::zero_and_sensors::{SurgeReport, surge_section, zero_section};
 use mapper_core::{CompressorMap, IdentifiedPoint, ResultRemark, ThermalModel, Verdict};
 use mapper_identify::{DynamicEfficiency, ZeroOutcome};

@@ -3,15 +3,17 @@
 use crate::diagnosis::gap_results::correction_table;
 use crate::document::{Document, Table};
 use crate::formatting::{Display, Message, duration};
-use crate::page::run_page::{OtherRun, map_widget, plan_widget, step_widget};
+use crate::page::widgets::{OtherRun, map_widget, plan_widget, step_widget};
 use crate::plan::plan_document::executed_plan_table;
-use crate::point_results::agreement::{disagreement_text, shared_errors_text};
 use crate::point_results::budget_table::budget_section;
 use crate::point_results::point_warnings::doubts;
-use crate::point_results::points::{END_S, allowance_sentence, point_tables, verdict_sentence};
+use crate::point_results::points::{
+    END_S, allowance_sentence, disagreement_text, point_tables, shared_errors_text, verdict_sentence,
+};
 use crate::point_results::summary::{PointResults, score_sentences};
-use crate::test_report::acceptance::{JudgedPoints, acceptance_section, balance_section};
-use crate::test_report::conditions::{condition_table, instruments_section, witness_table};
+use crate::test_report::conditions::{
+    JudgedPoints, acceptance_section, balance_section, condition_table, instruments_section, witness_table,
+};
 use crate::test_report::key_figures::{PointsOrigin, assumed_sentence, key_figures};
 use crate::test_report::zero_and_sensors::zero_sentence;
 use mapper_campaign::Campaign;

@@ -4,5 +4,4 @@ pub(crate) mod guard;
 pub(crate) mod plausibility_watch;
 pub(crate) mod rig_watch;
 pub(crate) mod signal_watch;
-pub(crate) mod silence_watch;
 pub(crate) mod surge_watch;

@@ -1,8 +1,7 @@
 //! The surge marks of a recording, one for each line with a surge search; and surge events with hysteresis: a compressor in surge crosses the
 //! surge line many times a second, and each surge is one event.
 
-use crate::surge::estimate::SurgeEstimate;
-use crate::surge::variation::SurgeReading;
+use crate::surge::estimate::{SurgeEstimate, SurgeReading};
 use mapper_core::{
     Channel, DeclaredUncertainty, Event, EventKind, Recording, ReferenceState, SampleBatch, StepKind,
     StepMarker, SurgeFoundBy, SurgeMark, SurgeNotFound,

@@ -6,8 +6,9 @@
 
 mod estimate;
 pub(crate) mod mark;
-mod variation;
 
-pub use estimate::{LineEnd, Move, SurgeEstimate, choose_next_move, expected_readings};
+pub use estimate::{
+    LineEnd, Move, PRECURSOR_CHANNELS, SurgeEstimate, SurgeReading, Variation, choose_next_move,
+    expected_readings,
+};
 pub use mark::{SurgeErrors, SurgeMarks, find_surge_marks};
-pub use variation::{PRECURSOR_CHANNELS, SurgeReading, Variation};

@@ -479,7 +479,6 @@ impl Session<'_> {
         let heat = heat_transfer_figure(machine, &points, law.unwrap_or(params.compressor.nusselt_exponent));
         let mut contents: Vec<(&str, Vec<u8>)> = vec![
             ("thermal_model.json", thermal.json()?),
-            ("thermal_model.txt", thermal.text().into_bytes()),
             ("turbine.txt", turbine_text(machine, &gases, &turbine).into_bytes()),
             ("turbine.json", json_text(&turbine)?.into_bytes()),
             ("heat_transfer.svg", heat.to_svg().into_bytes()),

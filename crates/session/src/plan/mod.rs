@@ -4,4 +4,3 @@ pub(crate) mod campaign_forecast;
 pub(crate) mod planning;
 pub(crate) mod rehearsal;
 pub(crate) mod scripted_steps;
-pub(crate) mod stored_plan;

@@ -4,7 +4,6 @@ pub(crate) mod files;
 pub(crate) mod fusing;
 pub(crate) mod identification_config;
 pub(crate) mod journal;
-pub(crate) mod log_inspection;
 pub(crate) mod recording_file;
 pub(crate) mod resume;
 pub mod run_directory;

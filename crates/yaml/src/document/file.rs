@@ -1,7 +1,6 @@
 //! Reads files from disk up to a size limit.
 
-use crate::finding::{FindingKind, closest};
-use crate::source::{Document, Findings, Source};
+use crate::source::{Document, FindingKind, Findings, Source, closest};
 use std::fs::{File, OpenOptions};
 use std::io;
 use std::io::{ErrorKind, Read, Seek};

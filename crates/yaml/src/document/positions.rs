@@ -1,7 +1,6 @@
 //! Positions of values in a YAML text, and the path of a value.
 
-use crate::finding::FindingKind;
-use crate::source::{Notes, Source};
+use crate::source::{FindingKind, Notes, Source};
 use saphyr_parser::{Event, Marker, Parser, ScalarStyle, ScanError};
 use serde::de::IgnoredAny;
 use std::collections::HashMap;

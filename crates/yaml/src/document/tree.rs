@@ -1,8 +1,7 @@
 //! The values of a YAML text, and their places.
 
 use crate::document::positions::{Place, Places, SYNTAX_REMEDY, Step, locate, path_text};
-use crate::finding::{Finding, FindingKind};
-use crate::source::{Findings, Notes, Source};
+use crate::source::{Finding, FindingKind, Findings, Notes, Source};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;

@@ -7,12 +7,10 @@
 
 mod kind;
 mod parse;
-mod quantity;
 
 pub use kind::{
     Area, BARE_RATIO, CUBIC_FOOT_M3, Conductance, Conductivity, Dimension, Duration, Fraction, Frequency,
     Inertia, Kind, Length, Mass, MassFlow, Pressure, PressureDifference, PressureRate, RatioRate, Speed,
     Temperature, TemperatureDifference, TemperatureRate, Unit, Volume,
 };
-pub use parse::{UnitError, parse, parse_with};
-pub use quantity::{Quantity, set};
+pub use parse::{Quantity, UnitError, parse, parse_with, set};

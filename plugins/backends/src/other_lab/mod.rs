@@ -4,7 +4,7 @@
 
 mod machine;
 mod motion;
-mod passage;
+mod settings_file;
 mod structure;
 
 pub use motion::apply_structure;
@@ -22,5 +22,5 @@ pub const PLUGIN: BackendPlugin = BackendPlugin {
 };
 
 fn make(rig: &NominalRig, settings: &serde_json::Value) -> Result<Box<dyn Backend>, BackendError> {
-    Ok(Box::new(VirtualLab::new(structure::read(settings, rig)?)))
+    Ok(Box::new(VirtualLab::new(settings_file::read(settings, rig)?)))
 }

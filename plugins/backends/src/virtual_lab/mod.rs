@@ -1,7 +1,6 @@
 //! A simulated gas stand: the lumped model, actuators, sensors, standstill, surge, overspeed.
 
 pub(crate) mod effects_file;
-pub(crate) mod elements_file;
 pub(crate) mod setting_problem;
 pub(crate) mod settings_file;
 mod lab;
@@ -10,7 +9,6 @@ mod rig;
 mod samples;
 mod sensors;
 mod settings;
-mod truth;
 
 pub use crate::virtual_lab::sensors::{LabElement, LabElements, SecondOrder, SensorErrors};
 pub use setting_problem::{SettingProblem, check_range};
@@ -18,8 +16,7 @@ pub use settings_file::read_settings;
 pub use lab::VirtualLab;
 pub use name::NAME;
 pub use rig::actuator::ActuatorDynamics;
-pub use rig::boundary_wander::Weather;
-pub use rig::drift::{DriftTarget, LabDrift};
+pub use rig::drift::{DriftTarget, LabDrift, Weather};
 pub use rig::running::{LabInputs, RunningMachine, Structure, StructureError};
 pub use rig::precursor::SurgePrecursor;
 pub use rig::tolerances::draw_tolerances;

@@ -1,13 +1,11 @@
 //! Readings of the lab's sensors: the model's values through taps, lags and errors, collected into a batch.
+//! True values are known only to the simulator, sample by sample: they are recorded under /truth and read by scoring alone.
 
-use super::settings::LabSettings;
-use super::truth::TruthRecorder;
 use crate::virtual_lab::rig::drift;
 use crate::virtual_lab::rig::precursor::{P2_SHARE, Resonator, Swing};
 use crate::virtual_lab::sensors::{ElementBank, SecondOrderFollower, Sensor};
-use mapper_core::{
-    CHANNELS, Channel, ChannelColumn, ElementColumn, Event, MODELLED_CHANNELS, SampleBatch, Setpoints,
-};
+use crate::virtual_lab::settings::LabSettings;
+use mapper_core::{CHANNELS, Channel, ChannelColumn, ElementColumn, Event, MODELLED_CHANNELS, SampleBatch, Setpoints, TruthColumn};
 use mapper_physics::gas::pressure_tap;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::rig::instruments::{ChannelFollower, Instruments};
@@ -17,13 +15,13 @@ use mapper_physics::simulation::model::{Outputs, PreparedModel, State};
 const SURGE_FREQUENCY_HZ: f64 = 7.3;
 
 /// True values at the sensors at one instant.
-pub(super) struct Instant<'a> {
-    pub(super) boundary: BoundaryConditions,
-    pub(super) speed_rpm: f64,
-    pub(super) tc_k: f64,
-    pub(super) tt_k: f64,
+pub(crate) struct Instant<'a> {
+    pub(crate) boundary: BoundaryConditions,
+    pub(crate) speed_rpm: f64,
+    pub(crate) tc_k: f64,
+    pub(crate) tt_k: f64,
     /// `None` at standstill.
-    pub(super) running: Option<(&'a State, &'a Outputs)>,
+    pub(crate) running: Option<(&'a State, &'a Outputs)>,
 }
 
 impl Instant<'_> {
@@ -45,19 +43,19 @@ impl Instant<'_> {
 
 /// All sensors, with the state of their dynamics.
 #[derive(Debug)]
-pub(super) struct SensorBank {
-    pub(super) sensors: Vec<(Channel, Sensor)>,
-    pub(super) followers: Vec<ChannelFollower>,
+pub(crate) struct SensorBank {
+    pub(crate) sensors: Vec<(Channel, Sensor)>,
+    pub(crate) followers: Vec<ChannelFollower>,
     /// Second-order sensors, by channel.
-    pub(super) second_order: Vec<Option<SecondOrderFollower>>,
+    pub(crate) second_order: Vec<Option<SecondOrderFollower>>,
     /// Channels with redundant sensors.
-    pub(super) redundant: Vec<ElementBank>,
+    pub(crate) redundant: Vec<ElementBank>,
     /// Fluctuations of flow and pressures before surge.
-    pub(super) resonator: Resonator,
+    pub(crate) resonator: Resonator,
 }
 
 /// Collects samples into columns.
-pub(super) struct SampleCollector {
+pub(crate) struct SampleCollector {
     first_sequence: u64,
     t_s: Vec<f64>,
     columns: Vec<Vec<f64>>,
@@ -66,7 +64,7 @@ pub(super) struct SampleCollector {
 }
 
 impl SampleCollector {
-    pub(super) fn new(first_sequence: u64, sensor_bank: &SensorBank) -> Self {
+    pub(crate) fn new(first_sequence: u64, sensor_bank: &SensorBank) -> Self {
         SampleCollector {
             first_sequence,
             t_s: Vec::new(),
@@ -77,12 +75,12 @@ impl SampleCollector {
     }
 
     /// Number of samples so far.
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.t_s.len()
     }
 
     /// Reads every sensor at one instant.
-    pub(super) fn push(
+    pub(crate) fn push(
         &mut self,
         t_s: f64,
         instant: &Instant<'_>,
@@ -122,7 +120,7 @@ impl SampleCollector {
         self.truth.push([instant.speed_rpm, instant.tc_k, instant.tt_k, surge_flow_kg_s], instant.outputs());
     }
 
-    pub(super) fn finish(self, events: Vec<Event>) -> SampleBatch {
+    pub(crate) fn finish(self, events: Vec<Event>) -> SampleBatch {
         let columns = CHANNELS.iter().zip(self.columns);
         SampleBatch {
             first_sequence: self.first_sequence,
@@ -207,5 +205,62 @@ fn true_value(
         Channel::P4 => boundary.p4_pa,
         Channel::TOil => boundary.oil_temperature_k,
         _ => boundary.ambient_temperature_k,
+    }
+}
+
+type Reader = fn(&Outputs) -> f64;
+
+/// Columns from the model's outputs: name, unit, value. Undefined (NaN) at standstill.
+const FROM_OUTPUTS: [(&str, &str, Reader); 9] = [
+    ("eta", "1", |outputs| outputs.efficiency),
+    ("h_w_m2k", "W/(m2 K)", |outputs| outputs.h_w_m2k),
+    ("flow_kg_s", "kg/s", |outputs| outputs.flow_kg_s),
+    ("pressure_ratio", "1", |outputs| outputs.pressure_ratio),
+    ("surge_position_ratio", "1", |outputs| outputs.surge_position_ratio),
+    ("t1_prime_k", "K", |outputs| outputs.t1_prime_k),
+    ("t2_prime_k", "K", |outputs| outputs.t2_prime_k),
+    ("t2_gas_k", "K", |outputs| outputs.t2_k),
+    ("compressor_power_w", "W", |outputs| outputs.compressor_power_w),
+];
+
+/// Collects truth into columns.
+#[derive(Debug, Default)]
+pub struct TruthRecorder {
+    from_outputs: [Vec<f64>; FROM_OUTPUTS.len()],
+    speed_rpm: Vec<f64>,
+    tc_k: Vec<f64>,
+    tt_k: Vec<f64>,
+    surge_flow_kg_s: Vec<f64>,
+}
+
+impl TruthRecorder {
+    /// Adds one sample: shaft speed, temperatures of both housings, surge flow at this speed; `outputs` is `None` at standstill.
+    pub fn push(&mut self, [speed_rpm, tc_k, tt_k, surge_flow_kg_s]: [f64; 4], outputs: Option<&Outputs>) {
+        for (column, (_, _, read)) in self.from_outputs.iter_mut().zip(FROM_OUTPUTS) {
+            column.push(outputs.map_or(f64::NAN, read));
+        }
+        self.speed_rpm.push(speed_rpm);
+        self.tc_k.push(tc_k);
+        self.tt_k.push(tt_k);
+        self.surge_flow_kg_s.push(surge_flow_kg_s);
+    }
+
+    /// The columns.
+    pub fn finish(self) -> Vec<TruthColumn> {
+        let column = |name: &str, unit: &str, values| TruthColumn {
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            values,
+        };
+        let mut columns: Vec<TruthColumn> = FROM_OUTPUTS
+            .iter()
+            .zip(self.from_outputs)
+            .map(|((name, unit, _), values)| column(name, unit, values))
+            .collect();
+        columns.push(column("speed_rpm", "rpm", self.speed_rpm));
+        columns.push(column("tc_k", "K", self.tc_k));
+        columns.push(column("tt_k", "K", self.tt_k));
+        columns.push(column("surge_flow_kg_s", "kg/s", self.surge_flow_kg_s));
+        columns
     }
 }

@@ -1,8 +1,7 @@
 //! Settings of the virtual lab, in SI units. They are the simulator's truth: only the lab reads them.
 
 use crate::virtual_lab::rig::actuator::ActuatorDynamics;
-use crate::virtual_lab::rig::boundary_wander::Weather;
-use crate::virtual_lab::rig::drift::LabDrift;
+use crate::virtual_lab::rig::drift::{LabDrift, Weather};
 use crate::virtual_lab::rig::precursor::SurgePrecursor;
 use crate::virtual_lab::rig::running::{Lumped, Structure};
 use crate::virtual_lab::sensors::{LabElements, SecondOrder, SensorErrors};

@@ -1,12 +1,10 @@
 //! Settings of the lab in a campaign, below `backend: {virtual_lab: ...}`.
 
 use crate::virtual_lab::rig::drift::{DriftFile, read_drifts};
-use crate::virtual_lab::effects_file::{EffectValues, apply_effects};
-use crate::virtual_lab::elements_file::FaultFile;
+use crate::virtual_lab::effects_file::{EffectValues, FaultFile, apply_effects, read_elements};
 use crate::virtual_lab::setting_problem::{SettingProblem, check_range};
-use crate::virtual_lab::elements_file;
 use crate::virtual_lab::rig::actuator::ActuatorDynamics;
-use crate::virtual_lab::rig::boundary_wander::Weather;
+use crate::virtual_lab::rig::drift::Weather;
 use crate::virtual_lab::rig::precursor::SurgePrecursor;
 use crate::virtual_lab::rig::running::Lumped;
 use crate::virtual_lab::rig::tolerances::draw_tolerances;
@@ -258,7 +256,7 @@ pub fn read_settings(
         },
         oil_actuator: actuators.oil_temperature.dynamics("oil_temperature", &OIL_MOTION)?,
         sensors: draw_sensors(&offset_of, nominal, &draws),
-        redundant: elements_file::read(&file.faults, nominal, &draws, &offset_of)?,
+        redundant: read_elements(&file.faults, nominal, &draws, &offset_of)?,
         uneven_at_rest: match file.offsets {
             OffsetsName::Drawn => draw_nonuniformity(nominal),
             OffsetsName::None => BTreeMap::new(),

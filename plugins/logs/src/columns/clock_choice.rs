@@ -1,7 +1,9 @@
 //! Finds the clocks of a table, selects the ones to read, and assigns columns to them.
 
-use crate::columns::clock::{Clock, GroupClock, NS_PER_HOUR, Spread, restart_offset_ns};
-use crate::columns::counter::{Sample, SampleRow, cells, count_unit_s, describe_unit, is_clock_name};
+use crate::columns::clock::{
+    Clock, GroupClock, NS_PER_HOUR, Sample, SampleRow, Spread, cells, count_unit_s, describe_unit,
+    is_clock_name, restart_offset_ns,
+};
 use crate::columns::table_head::HeadColumn;
 use mapper_recording::logs::{Group, LogFinding, LogOptions};
 use mapper_table::{

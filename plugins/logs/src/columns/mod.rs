@@ -2,5 +2,4 @@
 
 pub(crate) mod clock;
 pub(crate) mod clock_choice;
-pub(crate) mod counter;
 pub(crate) mod table_head;

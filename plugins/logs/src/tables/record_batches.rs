@@ -1,9 +1,8 @@
 //! Record batches of Arrow and Parquet, as the rows of one table.
 
-use crate::columns::counter::HEAD_ROWS;
+use crate::columns::clock::HEAD_ROWS;
 use crate::columns::table_head::MAX_COLUMNS;
-use crate::tables::column_log::COLUMN_OPTIONS;
-use crate::tables::column_rows::{Chunk, Chunks, ColumnRows};
+use crate::tables::column_log::{COLUMN_OPTIONS, Chunk, Chunks, ColumnRows};
 use crate::tables::table_log::{Origin, Table};
 use arrow_array::cast::AsArray;
 use arrow_array::temporal_conversions::MILLISECONDS;

@@ -3,4 +3,3 @@
 pub(crate) mod observations;
 pub(crate) mod problem;
 pub(crate) mod solution;
-pub(crate) mod variances;

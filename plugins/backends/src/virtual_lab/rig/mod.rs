@@ -1,7 +1,6 @@
 //! Simulated rig of the virtual lab: machine, actuators, wandering test cell, drift, surge precursors, and tolerances.
 
 pub(crate) mod actuator;
-pub(crate) mod boundary_wander;
 pub(crate) mod drift;
 pub(crate) mod precursor;
 pub(crate) mod running;

@@ -3,7 +3,7 @@
 
 use crate::virtual_lab::name::NAME;
 use crate::virtual_lab::rig::actuator::{Actuator, ActuatorDynamics};
-use crate::virtual_lab::rig::boundary_wander::Weather;
+use crate::virtual_lab::rig::drift::Weather;
 use mapper_physics::machine::params::{BoundaryConditions, Params};
 use mapper_physics::simulation::steady;
 use mapper_physics::simulation::inputs::Inputs;

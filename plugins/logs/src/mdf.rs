@@ -1,13 +1,80 @@
-//! Protects the MDF library from hostile files: limits the nesting of formulas and the unpacked size.
+//! Common parts of both versions of MDF: columns and rows, and protection of the library from hostile files by limits on the nesting of formulas
+//! and the unpacked size.
 
-use falcon_mdf::error::{Mf4Error, Result};
+use falcon_mdf::error::{Mf4Error, Result as MdfResult};
 use falcon_mdf::io::memory::MemorySource;
 use falcon_mdf::io::reader::BufferedSource;
 use falcon_mdf::io::{ByteSlice, ByteSource};
 use mapper_recording::logs::limits::{MAX_BLOCK_BYTES, is_too_deep, max_unpacked_bytes};
-use mapper_recording::logs::{LogError, LogFile};
-use std::collections::BTreeMap;
+use mapper_recording::logs::{Column, Layout, LogError, LogFile, Row, RowSink};
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
+
+const MAX_CHANNELS: usize = 10_000;
+
+/// Maximum length of a comment, characters.
+const MAX_DESCRIPTION: usize = 200;
+
+/// Refuses a file with too many channels.
+pub(crate) fn check_channel_count(file: &LogFile, name: &'static str, count: usize) -> Result<(), LogError> {
+    if count > MAX_CHANNELS {
+        return Err(
+            file.content_error(name, format!("it has {count} channels; at most {MAX_CHANNELS} are read"))
+        );
+    }
+    Ok(())
+}
+
+/// The column of a channel. A name that the group already has is numbered.
+pub(crate) fn column(
+    names: &mut BTreeSet<String>,
+    [header, unit, description]: [&str; 3],
+    group: usize,
+) -> Column {
+    let mut name = header.to_owned();
+    let mut number = 1usize;
+    while !names.insert(name.clone()) {
+        number += 1;
+        name = format!("{header} ({number})");
+    }
+    Column {
+        name,
+        header: header.to_owned(),
+        unit: Some(unit.trim().to_owned()).filter(|unit| !unit.is_empty()),
+        description: description.chars().take(MAX_DESCRIPTION).collect(),
+        group,
+    }
+}
+
+/// The wanted channels of a group; `channels` has one for each column of the layout.
+pub(crate) fn wanted_channels<'a, T>(
+    layout: &Layout,
+    wanted: &[usize],
+    channels: &'a [T],
+    group: usize,
+) -> Vec<&'a T> {
+    layout.members(group, wanted).into_iter().filter_map(|column| channels.get(column)).collect()
+}
+
+/// Forwards rows of columns that begin together; values in `missing` mark missing readings.
+pub(crate) fn forward_rows(
+    group: usize,
+    times_s: impl Iterator<Item = f64>,
+    columns: &[Vec<f64>],
+    missing: &[f64],
+    sink: &mut RowSink<'_>,
+) -> Result<(), LogError> {
+    let mut values: Vec<f64> = Vec::new();
+    for (row, t_s) in times_s.enumerate() {
+        values.clear();
+        values.extend(columns.iter().map(|column| {
+            let value = column.get(row).copied().unwrap_or(f64::NAN);
+            if missing.contains(&value) { f64::NAN } else { value }
+        }));
+        sink(Row { group, t_s, values: &values })?;
+    }
+    Ok(())
+}
 
 /// Size of the header of a block of MDF 4, and with the fields of a packed one, bytes.
 const HEADER: usize = 24;
@@ -25,10 +92,7 @@ pub(crate) struct MdfSource {
 }
 
 impl MdfSource {
-    pub(crate) fn open(
-        file: &LogFile,
-        name: &'static str,
-    ) -> std::result::Result<Arc<dyn ByteSource>, LogError> {
+    pub(crate) fn open(file: &LogFile, name: &'static str) -> Result<Arc<dyn ByteSource>, LogError> {
         let inner: Box<dyn ByteSource> = match file.bytes() {
             Some(bytes) => Box::new(MemorySource::new(bytes.to_vec())),
             None => Box::new(
@@ -40,7 +104,7 @@ impl MdfSource {
     }
 
     /// Counts a packed block once.
-    fn count(&self, offset: u64, unpacked_bytes: u64) -> Result<()> {
+    fn count(&self, offset: u64, unpacked_bytes: u64) -> MdfResult<()> {
         let refused = |limit: u64| {
             Mf4Error::Decompression(format!(
                 "its blocks unpack to more than the {} MiB that a file of this size may have",
@@ -67,7 +131,7 @@ impl ByteSource for MdfSource {
         self.inner.len()
     }
 
-    fn read_bytes(&self, offset: u64, len: usize) -> Result<ByteSlice<'_>> {
+    fn read_bytes(&self, offset: u64, len: usize) -> MdfResult<ByteSlice<'_>> {
         let bytes = self.inner.read_bytes(offset, len)?;
         if let Some(size) = packed_size(&bytes) {
             self.count(offset, size)?;

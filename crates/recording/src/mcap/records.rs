@@ -2,6 +2,7 @@
 //!
 //! The numbers of a flat JSON message are read exactly, without building a tree.
 
+/// Kinds of records.
 pub(crate) use mcap::records::op;
 use serde::de::{Deserializer, IgnoredAny, MapAccess, Visitor};
 use serde_json::value::RawValue;
@@ -11,7 +12,6 @@ use std::{fmt, io};
 
 /// Start of every MCAP file.
 pub(crate) const MAGIC: &[u8] = mcap::MAGIC;
-/// Kinds of records.
 
 /// Reads fields off the front of a body.
 pub(crate) struct Body<'a>(pub(crate) &'a [u8]);

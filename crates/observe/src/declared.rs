@@ -1,7 +1,8 @@
 //! Declared uncertainty of rig and model: noise, offsets, gains and tolerances.
 
 use mapper_core::{
-    Channel, DeclaredUncertainty, Dimension, ModelTolerances, NoiseColour, StructureTolerances,
+    ActuatorMotion, Channel, DeclaredUncertainty, Dimension, ModelTolerances, NoiseColour,
+    StructureTolerances,
 };
 use mapper_physics::machine::params::BoundaryConditions;
 use serde::{Deserialize, Serialize};
@@ -57,6 +58,8 @@ pub struct Declared {
     pub nominal: BoundaryConditions,
     /// Offsets common to several sensors, in addition to their own.
     pub common_offsets: Vec<CommonOffset>,
+    /// Motion of the back-pressure valve; `None` if undeclared.
+    pub valve: Option<ActuatorMotion>,
 }
 
 /// A common offset of several sensors of one dimension: it remains after an isothermal zero, which only compares them with each other.

@@ -25,7 +25,7 @@ macro_rules! effects {
             let mut all = vec![$(effect_of::<$name::$kind>()),*];
             let mut faults = sensor_fault::effects();
             // The order matters: blind cases draw effects by their index. Conduction along the probe is next to the probe.
-            let (probe, air) = (3, all.len() - 2);
+            let (probe, air) = (3, all.len() - 4);
             all.splice(air..air, faults.split_off(1));
             all.splice(probe..probe, faults);
             all
@@ -55,6 +55,8 @@ effects! {
     actuator_lag::ActuatorLag,
     humidity::Humidity,
     inlet_preheat::InletPreheat,
+    slow_valve::SlowValve,
+    valve_play::ValvePlay,
 }
 
 /// Finds an effect by its id.

@@ -40,7 +40,10 @@ pub(crate) fn assumed(study: &Study) -> Vec<String> {
     ]
     .map(|(tolerance, ratio)| format!("{tolerance} {} %", PERCENT * ratio));
     let lag_and_rate = |response: Response, scale: f64, unit: &str| {
-        let lag = format!("a lag of {:.2} s", response.lag_s);
+        let mut lag = format!("a lag of {:.2} s", response.lag_s);
+        if response.dead_time_s > 0.0 {
+            lag = format!("{lag} after a dead time of {:.2} s", response.dead_time_s);
+        }
         if response.slew_per_s.is_finite() {
             format!("{lag} and at most {:.3} {unit}", scale * response.slew_per_s)
         } else {

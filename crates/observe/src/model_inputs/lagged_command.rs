@@ -1,4 +1,4 @@
-//! Response of P3 and the valve to their commands: a first-order lag and a rate limit, and their estimation from a recording.
+//! Response of P3 and the valve to their commands: a dead time, a first-order lag and a rate limit, and their estimation from a recording.
 
 use crate::averages::schedule::TIME_ROUNDING_S;
 use crate::averages::time_table::Table;
@@ -6,6 +6,7 @@ use mapper_core::{Channel, Recording, Series, StepMarker, is_jump, is_same_comma
 use mapper_numerics::minimise::minimise;
 use mapper_numerics::statistics::{mean, median};
 use mapper_physics::laws::orifice;
+use mapper_physics::rig::instruments::ValveMotion;
 
 /// Lags after which a jump is almost complete. Bound: 0.25 % of it is left, exp(-6).
 const SETTLING_LAGS: f64 = 6.0;
@@ -42,12 +43,14 @@ pub struct Response {
     pub lag_s: f64,
     /// Maximum rate, unit of the actuator per second, > 0; infinity for none.
     pub slew_per_s: f64,
+    /// Time before it begins to move, s, >= 0.
+    pub dead_time_s: f64,
 }
 
 impl Response {
-    /// A lag without a rate limit.
+    /// A lag without a rate limit and a dead time.
     pub fn lag(lag_s: f64) -> Response {
-        Response { lag_s, slew_per_s: f64::INFINITY }
+        Response { lag_s, slew_per_s: f64::INFINITY, dead_time_s: 0.0 }
     }
 
     /// Position `elapsed_s` after the start of a movement from `from` to `to`.
@@ -113,6 +116,19 @@ impl LaggedCommand {
         LaggedCommand::new(self.levels.clone(), p3, valve)
     }
 
+    /// The same with a valve that lags by so much more and whose drive has so much more play.
+    #[must_use]
+    pub fn with_valve(&self, by: ValveMotion) -> LaggedCommand {
+        let mut levels = self.levels.clone();
+        let start = levels.first().map_or(f64::NAN, |level| level.valve_opening_ratio);
+        let mut driven =
+            PlayingValve { play: by.play_ratio, dead_band: 0.0, command: start, position: start };
+        for level in &mut levels {
+            level.valve_opening_ratio = driven.follow(level.valve_opening_ratio);
+        }
+        LaggedCommand::new(levels, self.p3, Response { lag_s: self.valve.lag_s + by.lag_s, ..self.valve })
+    }
+
     /// The level commanded at `t_s`.
     pub fn level(&self, t_s: f64) -> usize {
         self.levels.partition_point(|level| level.start_s <= t_s).saturating_sub(1)
@@ -120,6 +136,7 @@ impl LaggedCommand {
 
     /// P3 at `t_s`, Pa.
     pub fn p3_pa(&self, t_s: f64) -> f64 {
+        let t_s = t_s - self.p3.dead_time_s;
         let index = self.level(t_s);
         let level = &self.levels[index];
         self.p3.approach(self.at_start_pa[index], level.p3_pa, t_s - level.start_s)
@@ -127,6 +144,7 @@ impl LaggedCommand {
 
     /// Valve opening at `t_s`.
     pub fn valve_opening_ratio(&self, t_s: f64) -> f64 {
+        let t_s = t_s - self.valve.dead_time_s;
         let index = self.level(t_s);
         let level = &self.levels[index];
         self.valve.approach(self.opening_at_start[index], level.valve_opening_ratio, t_s - level.start_s)
@@ -134,7 +152,7 @@ impl LaggedCommand {
 
     /// Time after which a jump of P3 is almost complete, s.
     pub fn p3_settles_s(&self, from_pa: f64, to_pa: f64) -> f64 {
-        (to_pa - from_pa).abs() / self.p3.slew_per_s + SETTLING_LAGS * self.p3.lag_s
+        self.p3.dead_time_s + (to_pa - from_pa).abs() / self.p3.slew_per_s + SETTLING_LAGS * self.p3.lag_s
     }
 
     /// Commanded levels.
@@ -253,14 +271,26 @@ pub(crate) fn commanded_s(levels: &[Level], step: &StepMarker) -> f64 {
     levels.iter().find(is_sent).map_or(step.start_s, |level| level.start_s)
 }
 
+/// Time at which the commands of a step have arrived, s: its start for a jump, the end of its ramps otherwise.
+pub fn ramp_end_s(recording: &Recording, step: &StepMarker) -> f64 {
+    commanded_s(&levels_of_step(recording, step), step)
+}
+
 /// Number of intervals of a coarse search. Bound: neighbouring lags differ by less than a factor of two.
 const COARSE_STEPS: usize = 24;
 /// Rates of the coarse search, in median jumps per second. Bound: slower rates are no jumps, faster ones a lag alone.
 const RATES: [f64; 9] = [0.2, 0.35, 0.6, 1.0, 1.7, 3.0, 5.0, 9.0, 16.0];
-/// Reduction of the sum of squared residuals, relative to their mean square, above which a rate limit is accepted: ten standard
-/// deviations of white noise, five of coloured noise over the half second of a ramp. A wrongly accepted limit has no effect, because a
-/// fast rate is equivalent to a lag alone. Bound: ten standard deviations of white noise, five of coloured noise over the half second of
-/// a ramp. A wrongly accepted limit has no effect, because a fast rate is equivalent to a lag alone.
+/// Dead times of the coarse search, s. Bound: below half a sample interval no recording shows one; slow air begins to move within seconds.
+const DEAD_TIMES_S: [f64; 6] = [0.05, 0.1, 0.2, 0.5, 1.0, 2.0];
+/// Factor of the fine search about the best of them. Bound: the distance of two.
+const DEAD_TIME_FACTOR: f64 = 2.0;
+/// Tolerance of a dead time, s, and of the logarithm of the lag beside it. Bound: a tenth of a sample interval.
+const DEAD_TIME_TOLERANCE: f64 = 3e-3;
+/// Factor by which a dead time may shorten the lag that stood for both. Bound: a lag far below the dead time does not show.
+const LAG_FACTOR: f64 = 20.0;
+/// Reduction of the sum of squared residuals, relative to their mean square, above which a rate limit or a dead time is accepted. Bound: ten
+/// standard deviations of white noise, five of coloured noise over the half second of a ramp. A wrongly accepted one has no effect, because a
+/// fast rate or a short dead time is equivalent to a lag alone.
 const MIN_COST_REDUCTION: f64 = 100.0;
 /// Reduction by the best of [`RATES`] above which a fine search follows. Bound: half of the distance between two rates loses less than 90
 /// % of the reduction.
@@ -374,21 +404,39 @@ fn estimate_response<Prediction: Fn(f64) -> f64>(
     }
     let around = |jump_s: &f64| table.range(jump_s - AROUND_S.0, jump_s + AROUND_S.1).len();
     let samples = jumps.iter().map(around).sum::<usize>().max(1) as f64;
+    let cost_of = |response: Response| sum_of_squares(table, values, jumps, predict(response));
     let at_rate = |slew_per_s: f64| {
-        let cost = |lag_s: f64| sum_of_squares(table, values, jumps, predict(Response { lag_s, slew_per_s }));
-        best_lag(cost).map(|(lag_s, cost)| (cost, Response { lag_s, slew_per_s }))
+        let with = |lag_s: f64| Response { slew_per_s, ..Response::lag(lag_s) };
+        best_lag(|lag_s| cost_of(with(lag_s))).map(|(lag_s, cost)| (cost, with(lag_s)))
     };
-    let unlimited = at_rate(f64::INFINITY)?;
+    let is_better = |cost: f64, than: f64, min_reduction: f64| than - cost > min_reduction * cost / samples;
+    let mut best = at_rate(f64::INFINITY)?;
     let coarse = RATES.iter().filter_map(|rate| at_rate(rate * size));
     let (coarse_cost, coarse) = coarse.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let is_better = |cost: f64, min_reduction: f64| unlimited.0 - cost > min_reduction * cost / samples;
-    if !is_better(coarse_cost, MIN_COARSE_REDUCTION) {
-        return Some(unlimited.1);
+    if is_better(coarse_cost, best.0, MIN_COARSE_REDUCTION) {
+        let cost = |rate: f64| at_rate(rate).map_or(f64::INFINITY, |(cost, _)| cost);
+        let range = (coarse.slew_per_s / RATE_FACTOR, coarse.slew_per_s * RATE_FACTOR);
+        let limited = at_rate(minimise_globally(range, RATE_TOLERANCE, cost)?);
+        best = limited.filter(|(cost, _)| is_better(*cost, best.0, MIN_COST_REDUCTION)).unwrap_or(best);
     }
-    let cost = |rate: f64| at_rate(rate).map_or(f64::INFINITY, |(cost, _)| cost);
-    let range = (coarse.slew_per_s / RATE_FACTOR, coarse.slew_per_s * RATE_FACTOR);
-    let limited = at_rate(minimise_globally(range, RATE_TOLERANCE, cost)?);
-    Some(limited.filter(|(cost, _)| is_better(*cost, MIN_COST_REDUCTION)).unwrap_or(unlimited).1)
+    // A dead time changes the lag that fits best.
+    let (without, start) = best;
+    let with_dead_time = |dead_time_s: f64| {
+        let (low, high) = (start.lag_s / LAG_FACTOR, start.lag_s);
+        let with = |ln_lag: f64| Response { lag_s: ln_lag.exp(), dead_time_s, ..start };
+        let found = minimise(low.ln(), high.ln(), DEAD_TIME_TOLERANCE, |ln_lag| cost_of(with(ln_lag)));
+        (found.value, with(found.at))
+    };
+    let coarse = DEAD_TIMES_S.map(with_dead_time).into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+    let (_, Response { dead_time_s, .. }) =
+        coarse.filter(|(cost, _)| is_better(*cost, without, MIN_COARSE_REDUCTION)).unwrap_or(best);
+    if dead_time_s > 0.0 {
+        let (low, high) = (dead_time_s / DEAD_TIME_FACTOR, dead_time_s * DEAD_TIME_FACTOR);
+        let found = minimise(low, high, DEAD_TIME_TOLERANCE, |dead_time_s| with_dead_time(dead_time_s).0);
+        let late = with_dead_time(found.at);
+        best = if is_better(late.0, without, MIN_COST_REDUCTION) { late } else { best };
+    }
+    Some(best.1)
 }
 
 #[cfg(test)]
@@ -457,7 +505,8 @@ mod tests {
                 }
             })
             .collect();
-        let truth = (Response { lag_s: 0.2, slew_per_s: 80e3 }, Response { lag_s: 0.1, slew_per_s: 0.4 });
+        let limited = |lag_s: f64, slew_per_s: f64| Response { lag_s, slew_per_s, dead_time_s: 0.0 };
+        let truth = (limited(0.2, 80e3), limited(0.1, 0.4));
         let read = |p3: Response, valve: Response| {
             let mut recording = Recording { steps: steps.clone(), ..Recording::default() };
             let command = LaggedCommand::of_recording(&recording, p3, valve);
@@ -484,5 +533,13 @@ mod tests {
         let (p3, valve) = read(Response::lag(0.7), Response::lag(0.3));
         assert!(p3.slew_per_s.is_infinite() && valve.slew_per_s.is_infinite());
         assert!((p3.lag_s - 0.7).abs() < 1e-3 && (valve.lag_s - 0.3).abs() < 1e-3);
+        assert_eq!((p3.dead_time_s, valve.dead_time_s), (0.0, 0.0));
+        let late = |dead_time_s: f64, lag_s: f64| Response { dead_time_s, ..Response::lag(lag_s) };
+        let truth = (late(0.9, 4.0), late(0.15, 0.5));
+        let (p3, valve) = read(truth.0, truth.1);
+        for (found, truth) in [(p3, truth.0), (valve, truth.1)] {
+            assert!((found.lag_s / truth.lag_s - 1.0).abs() < 0.01, "{found:?}");
+            assert!((found.dead_time_s - truth.dead_time_s).abs() < 0.01, "{found:?}");
+        }
     }
 }

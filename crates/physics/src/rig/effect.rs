@@ -135,7 +135,7 @@ macro_rules! effect {
 pub struct Rig {
     /// The machine.
     pub model: Model,
-    /// Sensors and the actuator of P3.
+    /// Sensors and actuators.
     pub instruments: Instruments,
 }
 

@@ -1,4 +1,4 @@
-//! Instruments between the machine and the recording: response of each sensor, and response of P3 to its command.
+//! Instruments between the machine and the recording: response of each sensor, and responses of P3 and the valve to their commands.
 
 use crate::machine::params::Params;
 use crate::simulation::model::{Outputs, PreparedModel, State};
@@ -93,17 +93,32 @@ impl ChannelPath {
 /// Declared lag of the turbine inlet pressure behind its command, s.
 pub const NOMINAL_P3_LAG_S: f64 = 0.3;
 
-/// All channels, and the actuator of P3.
+/// Motion of the back-pressure valve in addition to the declared one.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ValveMotion {
+    /// Time constant of its lag, s, >= 0; 0.
+    pub lag_s: f64,
+    /// Play of its drive, opening, >= 0; 0.
+    pub play_ratio: f64,
+}
+
+/// All channels, and the actuators of P3 and of the valve.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Instruments {
     paths: [ChannelPath; CHANNELS.len()],
     /// First-order lag of P3 behind its command, s, >= 0; [`NOMINAL_P3_LAG_S`].
     pub p3_lag_s: f64,
+    /// Additional motion of the valve.
+    pub valve: ValveMotion,
 }
 
 impl Default for Instruments {
     fn default() -> Self {
-        Instruments { paths: [ChannelPath::default(); CHANNELS.len()], p3_lag_s: NOMINAL_P3_LAG_S }
+        Instruments {
+            paths: [ChannelPath::default(); CHANNELS.len()],
+            p3_lag_s: NOMINAL_P3_LAG_S,
+            valve: ValveMotion::default(),
+        }
     }
 }
 

@@ -8,7 +8,7 @@ use mapper_diagnose::gap::{Diagnosis, Next, Verdict};
 const WORTH_A_CHECK: f64 = 0.1;
 
 /// What to check for an effect of the library; one without a row gets the check of its part.
-const EFFECTS: [(&str, &str); 31] = [
+const EFFECTS: [(&str, &str); 33] = [
     (
         "actuator_lag",
         "time a step of the turbine inlet valve: command, position, pressure before the turbine",
@@ -77,8 +77,16 @@ const EFFECTS: [(&str, &str); 31] = [
     ("turbine_efficiency", "check turbine wheel and vanes for damage, and the clearance of the wheel"),
     ("turbine_radiation", "put a heat shield between turbine and compressor housing, and repeat one jump"),
     (
+        "slow_valve",
+        "time a step of the back-pressure valve: command and position, and its supply of air or current",
+    ),
+    (
         "valve_area",
         "check the zero of the back-pressure valve, its position feedback and leaks behind the compressor",
+    ),
+    (
+        "valve_play",
+        "approach one opening of the back-pressure valve from both sides, and compare flow and position",
     ),
     ("ventilation", "check fans, cell ventilation and the insulation of the housings"),
     (

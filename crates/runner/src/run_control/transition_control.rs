@@ -115,9 +115,10 @@ impl TransitionControl {
         })
     }
 
-    /// Interval of the commands, s.
+    /// Interval of the commands, s: a multiple of the shortest, so that samples at 10 Hz show when each was sent.
     pub(crate) fn interval_s(&self) -> f64 {
-        (self.ramps.end_s() / COMMANDS).clamp(INTERVAL_S.0, INTERVAL_S.1)
+        let interval_s = (self.ramps.end_s() / COMMANDS).clamp(INTERVAL_S.0, INTERVAL_S.1);
+        INTERVAL_S.0 * (interval_s / INTERVAL_S.0).round()
     }
 
     /// Whether the transition as a whole is a jump.

@@ -191,6 +191,7 @@ fn of_rig(
         zero: campaign.zero,
         boundary: campaign.boundary,
         tolerances: campaign.tolerances,
+        valve: campaign.actuators.map(|actuators| actuators.valve),
         tolerances_declared: campaign.tolerances_declared,
         has_drift_search: true,
     }

@@ -72,10 +72,12 @@ pub struct LabSettings {
 }
 
 impl LabSettings {
-    /// Takes machine and instruments from a rig; additional lag of its P3 goes to the actuator.
+    /// Takes machine and instruments from a rig; the additional motion of P3 and valve goes to their actuators.
     pub fn take(&mut self, rig: Rig) {
         let slower_s = rig.instruments.p3_lag_s - mapper_physics::rig::instruments::NOMINAL_P3_LAG_S;
         self.p3_actuator.lag_s = (self.p3_actuator.lag_s + slower_s).max(0.0);
+        self.valve_actuator.lag_s += rig.instruments.valve.lag_s;
+        self.valve_actuator.play += rig.instruments.valve.play_ratio;
         self.model = rig.model;
         self.instruments = rig.instruments;
     }

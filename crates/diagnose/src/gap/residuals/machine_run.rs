@@ -102,6 +102,7 @@ pub(crate) fn acts_on_machine(nominal: &Rig, effect: &dyn Effect) -> bool {
     rig.model.params != nominal.model.params
         || !Arc::ptr_eq(&rig.model.map, &nominal.model.map)
         || !rig.model.hooks.is_empty()
+        || rig.instruments.valve != nominal.instruments.valve
         || !INPUT_CHANNELS.iter().all(same_path)
 }
 

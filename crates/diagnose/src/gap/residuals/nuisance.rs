@@ -7,7 +7,7 @@ use mapper_observe::channels::{self, INPUT_CHANNELS};
 use mapper_observe::declared::Declared;
 use mapper_observe::perturbation::Perturbation;
 use mapper_physics::rig::effect::Rig;
-use mapper_physics::rig::instruments::ChannelPath;
+use mapper_physics::rig::instruments::{ChannelPath, ValveMotion};
 use mapper_physics::rig::sensor_fault::gain_error;
 
 /// Outputs of the model that sensors measure, in the order of the residuals.
@@ -165,6 +165,8 @@ pub(crate) struct Circumstances {
     pub perturbations: Vec<(Perturbation, f64)>,
     /// Errors of the sensors of [`INPUT_CHANNELS`], in their order: without them, the inputs are those of the machine.
     pub paths: [ChannelPath; INPUT_CHANNELS.len()],
+    /// Motion of the valve in addition to the declared one.
+    pub valve: ValveMotion,
     /// Relative increase of the temperature drop through the turbine.
     pub t4_drop_ratio: f64,
     /// Coefficients of the efficiency map's shape.

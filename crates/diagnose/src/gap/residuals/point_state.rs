@@ -5,7 +5,7 @@ use crate::gap::residuals::study::{Hypothesis, PredictError, Study};
 use crate::gap::residuals::true_inputs::{MEASURED, SurroundingsHistory, TrueInputs};
 use mapper_core::Channel;
 use mapper_physics::rig::effect::Rig;
-use mapper_physics::rig::instruments::{ChannelPath, Surroundings};
+use mapper_physics::rig::instruments::{ChannelPath, Surroundings, ValveMotion};
 use mapper_physics::simulation::model::{Outputs, State};
 
 /// Model state at the end of a step.
@@ -37,7 +37,9 @@ impl Study {
     pub(crate) fn true_inputs<'a>(&'a self, circumstances: &'a Circumstances) -> TrueInputs<'a> {
         let depends = circumstances.paths.iter().any(ChannelPath::depends_on_surroundings);
         let history = depends.then(|| self.surroundings.get_or_init(|| self.surroundings_history()));
-        TrueInputs { recorded: &self.inputs, circumstances, history }
+        let valve = circumstances.valve;
+        let moved = (valve != ValveMotion::default()).then(|| self.inputs.command.with_valve(valve));
+        TrueInputs { recorded: &self.inputs, moved, circumstances, history }
     }
 
     /// Walls and flows along the recording, as measured, or as the nominal machine has them; empty if that cannot follow.

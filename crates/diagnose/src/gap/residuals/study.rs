@@ -13,6 +13,7 @@ use mapper_observe::averages::schedule::Schedule;
 use mapper_observe::averages::time_table::Table;
 use mapper_observe::channels::INPUT_CHANNELS;
 use mapper_observe::declared::Declared;
+use mapper_observe::model_inputs::lagged_command::ramp_end_s;
 use mapper_observe::model_inputs::smoothed_inputs::SmoothedInputs;
 use mapper_observe::model_inputs::step_timing::{Times, with_command_times};
 use mapper_physics::rig::effect::{Effect, EffectError, EffectParameter, Rig, add};
@@ -125,6 +126,21 @@ const AFTER_JUMP: Schedule = Schedule {
     lengths_s: &[(1.0, 0.2), (3.0, 0.5), (7.0, 2.0), (15.0, 4.0), (31.0, 8.0), (f64::INFINITY, 16.0)],
     ..SLOW
 };
+/// Blocks of a ramp. Bound: slow air and the shaft follow a ramp within seconds, and a block of a second averages over none of that.
+const RAMP: Schedule = Schedule { lengths_s: &[(1.0, 0.2), (3.0, 0.5), (f64::INFINITY, 1.0)], ..SLOW };
+/// Ramps up to this length count as jumps, s. Bound: until then the blocks after a jump are those of a ramp.
+const SHORT_RAMP_S: f64 = 3.0;
+
+/// The blocks of a jump and of what settles after it. A longer ramp has its own, and what settles after it begins at its end.
+fn blocks_of_jump(table: &Table, (start_s, ramp_end_s, end_s): (f64, f64, f64)) -> Vec<Block> {
+    if ramp_end_s - start_s <= SHORT_RAMP_S {
+        return blocks(table, start_s, end_s, &AFTER_JUMP);
+    }
+    let mut of_step = blocks(table, start_s, ramp_end_s.min(end_s), &RAMP);
+    let after = blocks(table, ramp_end_s, end_s, &AFTER_JUMP);
+    of_step.extend(after.into_iter().map(|block| Block { since_jump_s: block.mean_s - start_s, ..block }));
+    of_step
+}
 
 impl Study {
     /// Compared channels, in the order of all outputs.
@@ -167,8 +183,12 @@ impl Study {
                 let end_s = recording.steps.get(index + 1).map_or(marker.end_s, |next| next.start_s);
                 let start_s =
                     if jumped { marker.start_s } else { marker.start_s.max(end_s - HOLD_S).max(first_s) };
-                let schedule = if jumped { AFTER_JUMP } else { SLOW };
-                StudyStep { marker: *marker, jumped, blocks: blocks(&table, start_s, end_s, &schedule) }
+                let blocks = if jumped {
+                    blocks_of_jump(&table, (start_s, ramp_end_s(recording, marker), end_s))
+                } else {
+                    blocks(&table, start_s, end_s, &SLOW)
+                };
+                StudyStep { marker: *marker, jumped, blocks }
             })
             .collect();
         let inputs = SmoothedInputs::read(&table, &timed, &declared, (actuators.p3, actuators.valve));
@@ -219,8 +239,11 @@ impl Study {
         reads.sort_by(|a, b| a.0.total_cmp(&b.0));
         let start_s = reads.first().map_or(first_s, |(t_s, _)| *t_s) - 0.5;
         let end_s = reads.last().map_or(start_s + 1.0, |(t_s, _)| t_s + AFTER_LAST_S);
-        let jumps_s: Vec<f64> =
-            times.starts_s.iter().zip(&steps).filter(|(_, step)| step.jumped).map(|(s, _)| *s).collect();
+        let jumps = times.starts_s.iter().zip(&steps).filter(|(_, step)| step.jumped);
+        let mut jumps_s: Vec<f64> = jumps
+            .flat_map(|(start_s, step)| [*start_s, ramp_end_s(recording, &step.marker).max(*start_s)])
+            .collect();
+        jumps_s.dedup();
         let (times_s, places): (Vec<f64>, Vec<_>) = reads.into_iter().unzip();
         Study {
             nuisances: nuisances(&declared),
@@ -285,6 +308,7 @@ impl Study {
                 Arc::new(ShapedMap { inner: rig.model.map.clone(), coefficients: circumstances.shape });
         }
         circumstances.paths = INPUT_CHANNELS.map(|channel| *rig.instruments.path(channel));
+        circumstances.valve = rig.instruments.valve;
         Ok((rig, circumstances))
     }
 

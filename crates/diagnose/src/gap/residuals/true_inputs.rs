@@ -1,14 +1,16 @@
 //! Inputs of the model: recorded responses of the actuators, true values of the readings, and whether the metal had settled.
 
 use crate::gap::residuals::nuisance::Circumstances;
-use mapper_core::{Channel, Recording};
+use mapper_core::{ActuatorMotion, Channel, Recording};
 use mapper_numerics::ROUNDING;
 use mapper_numerics::least_squares::descent::ROUNDS;
 use mapper_observe::averages::mean_reading::mean_reading;
 use mapper_observe::averages::time_table::Table;
 use mapper_observe::channels::{INPUT_CHANNELS, boundary_condition};
 use mapper_observe::declared::Declared;
-use mapper_observe::model_inputs::lagged_command::{Response, measured_p3_response, measured_valve_response};
+use mapper_observe::model_inputs::lagged_command::{
+    LaggedCommand, Response, measured_p3_response, measured_valve_response,
+};
 use mapper_observe::model_inputs::smoothed_inputs::SmoothedInputs;
 use mapper_observe::model_inputs::step_timing::{Times, with_command_times};
 use mapper_physics::machine::params::BoundaryConditions;
@@ -42,9 +44,11 @@ impl SurroundingsHistory {
 }
 
 /// The inputs of a recording without the errors that its circumstances give their sensors.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct TrueInputs<'a> {
     pub(crate) recorded: &'a SmoothedInputs,
+    /// The commands with the valve as it moves; `None` if it moves as declared.
+    pub(crate) moved: Option<LaggedCommand>,
     /// Errors of their sensors.
     pub(crate) circumstances: &'a Circumstances,
     /// Quantities that act on the sensors; `None` if no error depends on them.
@@ -70,6 +74,9 @@ impl TrueInputs<'_> {
 impl Inputs for TrueInputs<'_> {
     fn at(&self, t_s: f64) -> BoundaryConditions {
         let mut boundary = self.recorded.at(t_s);
+        if let Some(moved) = &self.moved {
+            boundary.valve_opening_ratio = moved.valve_opening_ratio(t_s);
+        }
         let opening_ratio = boundary.valve_opening_ratio;
         for (channel, path) in INPUT_CHANNELS.into_iter().zip(&self.circumstances.paths) {
             if *path != ChannelPath::default()
@@ -105,13 +112,19 @@ pub struct Actuators {
 }
 
 impl Actuators {
-    /// With declared tolerances, measured P3 drives the model and is compared with its declared lag, and the valve follows at once. Without
-    /// them, both responses are estimated from the recording.
+    /// With declared tolerances, measured P3 drives the model and is compared with its declared lag, and the valve moves as declared, otherwise
+    /// at once. Without them, both responses are estimated from the recording.
     pub fn of(table: &Table, recording: &Recording, declared: &Declared, judged: bool) -> Actuators {
         let (p3, timed) = timed_p3(table, recording, declared);
         let valve =
             if judged { None } else { measured_valve_response(table, &timed, declared.nominal.p1_pa) };
-        Actuators { p3, valve: valve.unwrap_or(Response::lag(0.0)), judged }
+        let moves = |valve: ActuatorMotion| Response {
+            lag_s: valve.lag_s,
+            slew_per_s: valve.rate_per_s,
+            dead_time_s: valve.dead_time_s,
+        };
+        let valve = valve.or(declared.valve.map(moves)).unwrap_or(Response::lag(0.0));
+        Actuators { p3, valve, judged }
     }
 }
 

@@ -42,6 +42,8 @@ pub struct StudyStep {
     pub marker: StepMarker,
     /// Whether P3 or valve jumped at its start.
     pub jumped: bool,
+    /// Whether it begins with a ramp that is longer than a jump.
+    pub ramped: bool,
     /// Its blocks.
     pub blocks: Vec<Block>,
 }
@@ -131,11 +133,8 @@ const RAMP: Schedule = Schedule { lengths_s: &[(1.0, 0.2), (3.0, 0.5), (f64::INF
 /// Ramps up to this length count as jumps, s. Bound: until then the blocks after a jump are those of a ramp.
 const SHORT_RAMP_S: f64 = 3.0;
 
-/// The blocks of a jump and of what settles after it. A longer ramp has its own, and what settles after it begins at its end.
-fn blocks_of_jump(table: &Table, (start_s, ramp_end_s, end_s): (f64, f64, f64)) -> Vec<Block> {
-    if ramp_end_s - start_s <= SHORT_RAMP_S {
-        return blocks(table, start_s, end_s, &AFTER_JUMP);
-    }
+/// The blocks of a ramp, and of what settles after it from its end on.
+fn blocks_of_ramp(table: &Table, (start_s, ramp_end_s, end_s): (f64, f64, f64)) -> Vec<Block> {
     let mut of_step = blocks(table, start_s, ramp_end_s.min(end_s), &RAMP);
     let after = blocks(table, ramp_end_s, end_s, &AFTER_JUMP);
     of_step.extend(after.into_iter().map(|block| Block { since_jump_s: block.mean_s - start_s, ..block }));
@@ -183,12 +182,14 @@ impl Study {
                 let end_s = recording.steps.get(index + 1).map_or(marker.end_s, |next| next.start_s);
                 let start_s =
                     if jumped { marker.start_s } else { marker.start_s.max(end_s - HOLD_S).max(first_s) };
-                let blocks = if jumped {
-                    blocks_of_jump(&table, (start_s, ramp_end_s(recording, marker), end_s))
+                let ramp_end_s = ramp_end_s(recording, marker);
+                let ramped = jumped && ramp_end_s - start_s > SHORT_RAMP_S;
+                let blocks = if ramped {
+                    blocks_of_ramp(&table, (start_s, ramp_end_s, end_s))
                 } else {
-                    blocks(&table, start_s, end_s, &SLOW)
+                    blocks(&table, start_s, end_s, if jumped { &AFTER_JUMP } else { &SLOW })
                 };
-                StudyStep { marker: *marker, jumped, blocks }
+                StudyStep { marker: *marker, jumped, ramped, blocks }
             })
             .collect();
         let inputs = SmoothedInputs::read(&table, &timed, &declared, (actuators.p3, actuators.valve));

@@ -250,6 +250,8 @@ pub(crate) const NEAR_SURGE: f64 = 0.975;
 const AFTER_SURGE_S: f64 = 15.0;
 /// Shortest time constant of noise, s. Bound: shorter than any sample interval, as white as none.
 const MIN_NOISE_S: f64 = 1e-3;
+/// Standard deviation of a time that is anywhere in an interval of one. Source: 1/sqrt(12).
+const UNIFORM_SIGMA: f64 = 0.288_675_134_594_812_9;
 /// Tenths of a millisecond in a second, to which times of blocks are compared. Source: a definition.
 const PER_TENTH_MS: f64 = 1e4;
 /// Squared length of a whitened signature that counts as none. Bound: a thousandth of a sigma over the whole recording.
@@ -328,6 +330,16 @@ fn covariances(
             for (i, (block, row)) in blocks.iter().zip(group.rows.clone()).enumerate() {
                 let samples = block.samples.len().max(1) as f64;
                 covariance[(i, i)] += (base.slopes[row] * study.scatter_s).powi(2) / samples;
+            }
+            // A sample shows the time of a command to within its interval, and all of a ramp is as late. A jump is timed by P3.
+            if study.steps[group.step].ramped {
+                let late_s = study.table.interval_s * UNIFORM_SIGMA;
+                let late: Vec<f64> = group.rows.clone().map(|row| base.slopes[row] * late_s).collect();
+                for i in 0..late.len() {
+                    for j in 0..late.len() {
+                        covariance[(i, j)] += late[i] * late[j];
+                    }
+                }
             }
             let (jump_s, surge_s) = lost_to_surge[group.step];
             let moves = matches!(OUTPUTS[group.output], Channel::CompressorFlow | Channel::P2);

@@ -1,8 +1,7 @@
 //! Declared uncertainty of rig and model: noise, offsets, gains and tolerances.
 
 use mapper_core::{
-    ActuatorMotion, Channel, DeclaredUncertainty, Dimension, ModelTolerances, NoiseColour,
-    StructureTolerances,
+    Channel, DeclaredUncertainty, Dimension, ModelTolerances, NoiseColour, RigActuators, StructureTolerances,
 };
 use mapper_physics::machine::params::BoundaryConditions;
 use serde::{Deserialize, Serialize};
@@ -58,8 +57,8 @@ pub struct Declared {
     pub nominal: BoundaryConditions,
     /// Offsets common to several sensors, in addition to their own.
     pub common_offsets: Vec<CommonOffset>,
-    /// Motion of the back-pressure valve; `None` if undeclared.
-    pub valve: Option<ActuatorMotion>,
+    /// Motion of the actuators; `None` if undeclared.
+    pub actuators: Option<RigActuators>,
 }
 
 /// A common offset of several sensors of one dimension: it remains after an isothermal zero, which only compares them with each other.

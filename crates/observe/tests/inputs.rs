@@ -61,7 +61,7 @@ fn jumps_are_kept_for_a_transducer_with_a_gain_error() {
         tolerances: Default::default(),
         nominal: BoundaryConditions::default(),
         common_offsets: Vec::new(),
-        valve: None,
+        actuators: None,
     };
     let table = Table::new(&recording).unwrap();
     let responses = (Response::lag(lag_s), Response::lag(0.0));

@@ -171,7 +171,7 @@ impl DriftRequest<'_> {
             tolerances: self.tolerances,
             nominal: self.boundary,
             common_offsets: Vec::new(),
-            valve: None,
+            actuators: None,
         }
     }
 }

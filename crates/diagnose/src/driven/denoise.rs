@@ -97,7 +97,7 @@ mod tests {
             tolerances: Default::default(),
             nominal: Default::default(),
             common_offsets: Vec::new(),
-            valve: None,
+            actuators: None,
         };
         let denoised = denoised(&rows, &declared);
         let off = |range: Range<usize>| {

@@ -3,7 +3,7 @@
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::findings::experiment::Experiment;
 use crate::gap::findings::warning::GapWarning;
-use mapper_core::{ActuatorMotion, ModelTolerances, Recording, Soak};
+use mapper_core::{ModelTolerances, Recording, RigActuators, Soak};
 use mapper_identify::IdentifyConfig;
 use mapper_observe::declared::Declared;
 use mapper_physics::machine::params::BoundaryConditions;
@@ -46,8 +46,8 @@ pub struct RigRecording {
     pub boundary: BoundaryConditions,
     /// Tolerances of the nominal machine.
     pub tolerances: ModelTolerances,
-    /// Declared motion of the back-pressure valve.
-    pub valve: Option<ActuatorMotion>,
+    /// Declared motion of the actuators.
+    pub actuators: Option<RigActuators>,
     /// Whether the campaign declares tolerances. If not, default tolerances hold, and the actuator responses are estimated from the recording.
     pub tolerances_declared: bool,
     /// Whether drift is searched in repeats.
@@ -57,7 +57,7 @@ pub struct RigRecording {
 impl RigRecording {
     /// A simulated recording: its rig does not drift, and it has no soak.
     pub fn simulated(recording: Recording, declared: Declared, model: Model) -> RigRecording {
-        let Declared { sensors, noise_colour, tolerances, nominal, valve, .. } = declared;
+        let Declared { sensors, noise_colour, tolerances, nominal, actuators, .. } = declared;
         RigRecording {
             recording,
             model,
@@ -65,7 +65,7 @@ impl RigRecording {
             zero: None,
             boundary: nominal,
             tolerances,
-            valve,
+            actuators,
             tolerances_declared: true,
             has_drift_search: false,
         }
@@ -79,7 +79,7 @@ impl RigRecording {
             tolerances: self.tolerances,
             nominal: self.boundary,
             common_offsets: Vec::new(),
-            valve: self.valve,
+            actuators: self.actuators,
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Response of P3 and the valve to their commands: a dead time, a first-order lag and a rate limit, and their estimation from a recording.
+//! Response of P3 and the valve to their commands: a dead time, a first-order lag, a rate limit and play, and their estimation from a recording.
 
 use crate::averages::schedule::TIME_ROUNDING_S;
 use crate::averages::time_table::Table;
@@ -45,12 +45,21 @@ pub struct Response {
     pub slew_per_s: f64,
     /// Time before it begins to move, s, >= 0.
     pub dead_time_s: f64,
+    /// Play between drive and output, unit of the actuator, >= 0.
+    pub play: f64,
+    /// Change of the command below which the drive does not move, unit of the actuator, >= 0.
+    pub dead_band: f64,
 }
 
 impl Response {
-    /// A lag without a rate limit and a dead time.
-    pub fn lag(lag_s: f64) -> Response {
-        Response { lag_s, slew_per_s: f64::INFINITY, dead_time_s: 0.0 }
+    /// A lag alone.
+    pub const fn lag(lag_s: f64) -> Response {
+        Response { lag_s, slew_per_s: f64::INFINITY, dead_time_s: 0.0, play: 0.0, dead_band: 0.0 }
+    }
+
+    /// Position of the output, which was at `before`, behind a drive.
+    fn output(&self, before: f64, drive: f64) -> f64 {
+        before.clamp(drive - 0.5 * self.play, drive + 0.5 * self.play)
     }
 
     /// Position `elapsed_s` after the start of a movement from `from` to `to`.
@@ -73,35 +82,60 @@ impl Response {
 #[derive(Debug, Clone, PartialEq)]
 pub struct LaggedCommand {
     levels: Vec<Level>,
-    /// P3 at the start of each level, Pa.
-    at_start_pa: Vec<f64>,
-    /// Opening at the start of each level.
-    opening_at_start: Vec<f64>,
+    p3_path: Path,
+    valve_path: Path,
     /// Response of P3; Pa/s.
     pub p3: Response,
     /// Response of the valve; 1/s.
     pub valve: Response,
 }
 
+/// An actuator's motion from level to level.
+#[derive(Debug, Clone, PartialEq)]
+struct Path {
+    /// The command that the drive follows in each level.
+    commands: Vec<f64>,
+    /// Positions of drive and output at the start of each level.
+    starts: Vec<(f64, f64)>,
+}
+
+impl Path {
+    /// The motion of an actuator that came from `before` and is at rest at the first level.
+    fn new(levels: &[Level], value: fn(&Level) -> f64, response: Response, before: f64) -> Path {
+        let mut path = Path { commands: Vec::new(), starts: Vec::with_capacity(levels.len()) };
+        for (index, level) in levels.iter().enumerate() {
+            let command = value(level);
+            let Some(last) = index.checked_sub(1) else {
+                path.starts.push((command, response.output(before, command)));
+                path.commands.push(command);
+                continue;
+            };
+            path.starts.push(path.at(last, response, level.start_s - levels[last].start_s));
+            let held = path.commands[last];
+            path.commands.push(if (command - held).abs() < response.dead_band { held } else { command });
+        }
+        path
+    }
+
+    /// Positions of drive and output in a level, `elapsed_s` after its start. The drive moves in one direction, so that the output depends on its
+    /// start alone.
+    fn at(&self, level: usize, response: Response, elapsed_s: f64) -> (f64, f64) {
+        let (drive, output) = self.starts[level];
+        let drive = response.approach(drive, self.commands[level], elapsed_s);
+        (drive, response.output(output, drive))
+    }
+}
+
+/// Opening from which a valve moves to the first one of a recording. Source: safe state of a stand, the valve at its nominal area.
+const SAFE_OPENING: f64 = 1.0;
+
 impl LaggedCommand {
     /// The response to `levels` (rising in time, at least one) from steady state.
     pub fn new(levels: Vec<Level>, p3: Response, valve: Response) -> Self {
-        let at_start = |value: fn(&Level) -> f64, response: Response| {
-            let mut at_start: Vec<f64> = Vec::with_capacity(levels.len());
-            for (index, level) in levels.iter().enumerate() {
-                at_start.push(match index.checked_sub(1) {
-                    None => value(level),
-                    Some(before) => {
-                        let from = &levels[before];
-                        response.approach(at_start[before], value(from), level.start_s - from.start_s)
-                    }
-                });
-            }
-            at_start
-        };
-        let at_start_pa = at_start(|level| level.p3_pa, p3);
-        let opening_at_start = at_start(|level| level.valve_opening_ratio, valve);
-        LaggedCommand { levels, at_start_pa, opening_at_start, p3, valve }
+        let first_pa = levels.first().map_or(f64::NAN, |level| level.p3_pa);
+        let p3_path = Path::new(&levels, |level| level.p3_pa, p3, first_pa);
+        let valve_path = Path::new(&levels, |level| level.valve_opening_ratio, valve, SAFE_OPENING);
+        LaggedCommand { levels, p3_path, valve_path, p3, valve }
     }
 
     /// The response to the commands of a recording with at least one step: a level for each command, of which a jump has one, a ramp many, and
@@ -119,14 +153,8 @@ impl LaggedCommand {
     /// The same with a valve that lags by so much more and whose drive has so much more play.
     #[must_use]
     pub fn with_valve(&self, by: ValveMotion) -> LaggedCommand {
-        let mut levels = self.levels.clone();
-        let start = levels.first().map_or(f64::NAN, |level| level.valve_opening_ratio);
-        let mut driven =
-            PlayingValve { play: by.play_ratio, dead_band: 0.0, command: start, position: start };
-        for level in &mut levels {
-            level.valve_opening_ratio = driven.follow(level.valve_opening_ratio);
-        }
-        LaggedCommand::new(levels, self.p3, Response { lag_s: self.valve.lag_s + by.lag_s, ..self.valve })
+        let (lag_s, play) = (self.valve.lag_s + by.lag_s, self.valve.play + by.play_ratio);
+        self.with_responses(self.p3, Response { lag_s, play, ..self.valve })
     }
 
     /// The level commanded at `t_s`.
@@ -134,20 +162,21 @@ impl LaggedCommand {
         self.levels.partition_point(|level| level.start_s <= t_s).saturating_sub(1)
     }
 
+    /// Output of an actuator at `t_s`.
+    fn output(&self, path: &Path, response: Response, t_s: f64) -> f64 {
+        let t_s = t_s - response.dead_time_s;
+        let level = self.level(t_s);
+        path.at(level, response, t_s - self.levels[level].start_s).1
+    }
+
     /// P3 at `t_s`, Pa.
     pub fn p3_pa(&self, t_s: f64) -> f64 {
-        let t_s = t_s - self.p3.dead_time_s;
-        let index = self.level(t_s);
-        let level = &self.levels[index];
-        self.p3.approach(self.at_start_pa[index], level.p3_pa, t_s - level.start_s)
+        self.output(&self.p3_path, self.p3, t_s)
     }
 
     /// Valve opening at `t_s`.
     pub fn valve_opening_ratio(&self, t_s: f64) -> f64 {
-        let t_s = t_s - self.valve.dead_time_s;
-        let index = self.level(t_s);
-        let level = &self.levels[index];
-        self.valve.approach(self.opening_at_start[index], level.valve_opening_ratio, t_s - level.start_s)
+        self.output(&self.valve_path, self.valve, t_s)
     }
 
     /// Time after which a jump of P3 is almost complete, s.
@@ -209,59 +238,6 @@ fn changes_of_command(command: &Series, (start_s, end_s): (f64, f64), marked: f6
     changes
 }
 
-/// A valve behind a drive with play: the last command that moved the drive, and the position of the valve.
-struct PlayingValve {
-    play: f64,
-    dead_band: f64,
-    command: f64,
-    position: f64,
-}
-
-impl PlayingValve {
-    /// The position after a command, at which the drive arrives from one side.
-    fn follow(&mut self, command: f64) -> f64 {
-        let change = (command - self.command).abs();
-        if command.is_finite() && change > 0.0 && change >= self.dead_band {
-            self.command = command;
-            self.position = self.position.clamp(command - 0.5 * self.play, command + 0.5 * self.play);
-        }
-        self.position
-    }
-}
-
-/// The recording with the openings at which the declared play and dead band leave the valve, instead of those commanded; the valve begins in the
-/// middle of its play, which only the first motion shows. `play` and `dead_band` are openings.
-pub fn with_valve_positions(recording: Recording, play: f64, dead_band: f64) -> Recording {
-    if play <= 0.0 && dead_band <= 0.0 {
-        return recording;
-    }
-    let mut recording = recording;
-    let first = recording.steps.first().map(|step| step.valve_opening_ratio);
-    let commands = recording.series.get_mut(&Channel::ValveCommand);
-    let recorded = commands.as_ref().and_then(|series| series.values.iter().copied().find(|x| x.is_finite()));
-    let Some(start) = recorded.or(first).filter(|start| start.is_finite()) else { return recording };
-    let valve = || PlayingValve { play, dead_band, command: start, position: start };
-    let mut driven = valve();
-    match commands {
-        Some(series) => {
-            for command in series.values.iter_mut().filter(|command| command.is_finite()) {
-                *command = driven.follow(*command);
-            }
-            for step in &mut recording.steps {
-                // What was commanded last is where the step was measured.
-                let last = series.held(step.end_s - TIME_ROUNDING_S).filter(|held| held.is_finite());
-                step.valve_opening_ratio = last.unwrap_or(step.valve_opening_ratio);
-            }
-        }
-        None => {
-            for step in &mut recording.steps {
-                step.valve_opening_ratio = driven.follow(step.valve_opening_ratio);
-            }
-        }
-    }
-    recording
-}
-
 /// Time at which the last command of a step's own change was sent, s: its start for a jump, the end of its ramp otherwise.
 pub(crate) fn commanded_s(levels: &[Level], step: &StepMarker) -> f64 {
     let is_sent = |level: &&Level| {
@@ -280,6 +256,9 @@ pub fn ramp_end_s(recording: &Recording, step: &StepMarker) -> f64 {
 const COARSE_STEPS: usize = 24;
 /// Rates of the coarse search, in median jumps per second. Bound: slower rates are no jumps, faster ones a lag alone.
 const RATES: [f64; 9] = [0.2, 0.35, 0.6, 1.0, 1.7, 3.0, 5.0, 9.0, 16.0];
+/// Undeclared play of a valve beside which its lag is sought, opening. Bound: 1 % moves an output by less than noise, and a drive with more than 10 %
+/// is broken.
+const UNDECLARED_PLAYS: [f64; 4] = [0.01, 0.025, 0.05, 0.1];
 /// Dead times of the coarse search, s. Bound: below half a sample interval no recording shows one; slow air begins to move within seconds.
 const DEAD_TIMES_S: [f64; 6] = [0.05, 0.1, 0.2, 0.5, 1.0, 2.0];
 /// Factor of the fine search about the best of them. Bound: the distance of two.
@@ -309,8 +288,14 @@ pub fn measured_p3_response(table: &Table, recording: &Recording, noise_sigma: f
 }
 
 /// Response of the valve to its command, from flow and pressures: orifice flow is proportional to its area, and the volume before it fills in
-/// milliseconds. `None` without jumps of the valve, flow, P2 or T2. A lag of the flow meter counts as one of the valve.
-pub fn measured_valve_response(table: &Table, recording: &Recording, nominal_p1_pa: f64) -> Option<Response> {
+/// milliseconds. `None` without jumps of the valve, flow, P2 or T2. A lag of the flow meter counts as one of the valve. `declared`: its motion, of
+/// which play and dead band are kept.
+pub fn measured_valve_response(
+    table: &Table,
+    recording: &Recording,
+    nominal_p1_pa: f64,
+    declared: Response,
+) -> Option<Response> {
     let flow = table.column(Channel::CompressorFlow)?;
     let (p2, t2) = (table.column(Channel::P2)?, table.column(Channel::T2)?);
     let p1 = table.column(Channel::P1);
@@ -339,12 +324,25 @@ pub fn measured_valve_response(table: &Table, recording: &Recording, nominal_p1_
     areas.sort_by(f64::total_cmp);
     let area_m2 = *areas.get(areas.len() / 2)?;
     let openings: Vec<f64> = openings.iter().map(|x| x / area_m2).collect();
-    let sizes = jumping().map(openings_of).map(|(from, to)| (to - from).abs());
+    let sizes: Vec<f64> = jumping().map(openings_of).map(|(from, to)| (to - from).abs()).collect();
     let commanded = LaggedCommand::of_recording(recording, Response::lag(0.0), Response::lag(0.0));
-    estimate_response(table, &openings, &jumps, sizes.collect(), |response| {
-        let command = commanded.with_responses(Response::lag(0.0), response);
-        move |t_s| command.valve_opening_ratio(t_s)
-    })
+    let with_play = |play: f64| {
+        let predict = |response: Response| {
+            let valve = Response { play, dead_band: declared.dead_band, ..response };
+            let command = commanded.with_responses(Response::lag(0.0), valve);
+            move |t_s: f64| command.valve_opening_ratio(t_s)
+        };
+        let found = estimate_response(table, &openings, &jumps, sizes.clone(), predict)?;
+        Some((sum_of_squares(table, &openings, &jumps, predict(found)), found))
+    };
+    // The play that the recording shows is the diagnosis' to name, but without it the lag would be longer.
+    let (without, plain) = with_play(declared.play)?;
+    let plays = UNDECLARED_PLAYS.into_iter().filter_map(|more| with_play(declared.play + more));
+    let best = plays.min_by(|a, b| a.0.total_cmp(&b.0));
+    let samples = samples_around(table, &jumps);
+    let shown = best.filter(|(cost, _)| without - cost > MIN_COST_REDUCTION * cost / samples);
+    let (_, found) = shown.unwrap_or((without, plain));
+    Some(Response { play: declared.play, dead_band: declared.dead_band, ..found })
 }
 
 /// Starts of the steps with a jump of P3.
@@ -371,6 +369,12 @@ fn sum_of_squares(table: &Table, values: &[f64], jumps: &[f64], predicted: impl 
         total += residuals.iter().map(|residual| (residual - mean) * (residual - mean)).sum::<f64>();
     }
     total
+}
+
+/// Number of samples that [`sum_of_squares`] compares.
+fn samples_around(table: &Table, jumps: &[f64]) -> f64 {
+    let around = |jump_s: &f64| table.range(jump_s - AROUND_S.0, jump_s + AROUND_S.1).len();
+    jumps.iter().map(around).sum::<usize>().max(1) as f64
 }
 
 /// The lag with minimum cost, and that cost.
@@ -402,8 +406,7 @@ fn estimate_response<Prediction: Fn(f64) -> f64>(
     if jumps.is_empty() {
         return None;
     }
-    let around = |jump_s: &f64| table.range(jump_s - AROUND_S.0, jump_s + AROUND_S.1).len();
-    let samples = jumps.iter().map(around).sum::<usize>().max(1) as f64;
+    let samples = samples_around(table, jumps);
     let cost_of = |response: Response| sum_of_squares(table, values, jumps, predict(response));
     let at_rate = |slew_per_s: f64| {
         let with = |lag_s: f64| Response { slew_per_s, ..Response::lag(lag_s) };
@@ -478,17 +481,17 @@ mod tests {
     fn a_valve_with_play_stays_behind_its_drive() {
         let commands = [1.0, 2.0, 1.99, 1.5, 1.503, 1.51, 1.53];
         let positions = [1.0, 1.99, 1.99, 1.51, 1.51, 1.51, 1.52];
-        let steps: Vec<StepMarker> = (0..7)
-            .map(|i| StepMarker { valve_opening_ratio: commands[i], ..step(i as f64, i as f64 + 1.0, 2e5) })
-            .collect();
-        let marked = Recording { steps, ..Recording::default() };
-        let t_s = (0..7).map(|i| i as f64).collect();
-        let series = [(Channel::ValveCommand, Series { t_s, values: commands.to_vec() })].into();
-        for recording in [marked.clone(), Recording { series, ..marked }] {
-            let found = with_valve_positions(recording, 0.02, 0.005);
-            for (step, position) in found.steps.iter().zip(positions) {
-                assert!((step.valve_opening_ratio - position).abs() < 1e-12, "{step:?}");
-            }
+        let level = |(i, opening): (usize, &f64)| Level {
+            start_s: i as f64,
+            p3_pa: 2e5,
+            valve_opening_ratio: *opening,
+        };
+        let valve = Response { play: 0.02, dead_band: 0.005, ..Response::lag(0.0) };
+        let levels = commands.iter().enumerate().map(level).collect();
+        let command = LaggedCommand::new(levels, Response::lag(0.0), valve);
+        for (i, position) in positions.into_iter().enumerate() {
+            let found = command.valve_opening_ratio(i as f64 + 0.5);
+            assert!((found - position).abs() < 1e-12, "{i}: {found} {position}");
         }
     }
 
@@ -505,7 +508,7 @@ mod tests {
                 }
             })
             .collect();
-        let limited = |lag_s: f64, slew_per_s: f64| Response { lag_s, slew_per_s, dead_time_s: 0.0 };
+        let limited = |lag_s: f64, slew_per_s: f64| Response { slew_per_s, ..Response::lag(lag_s) };
         let truth = (limited(0.2, 80e3), limited(0.1, 0.4));
         let read = |p3: Response, valve: Response| {
             let mut recording = Recording { steps: steps.clone(), ..Recording::default() };
@@ -523,7 +526,7 @@ mod tests {
             });
             let table = Table::new(&recording).unwrap();
             let p3 = measured_p3_response(&table, &recording, 80.0).unwrap();
-            (p3, measured_valve_response(&table, &recording, 100e3).unwrap())
+            (p3, measured_valve_response(&table, &recording, 100e3, Response::lag(0.0)).unwrap())
         };
         let (p3, valve) = read(truth.0, truth.1);
         for (found, truth) in [(p3, truth.0), (valve, truth.1)] {

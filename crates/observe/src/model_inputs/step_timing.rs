@@ -253,7 +253,7 @@ mod tests {
     use rand_pcg::Pcg64;
 
     const NOISE_PA: f64 = 80.0;
-    const LAG: Response = Response { lag_s: 0.3, slew_per_s: f64::INFINITY, dead_time_s: 0.0 };
+    const LAG: Response = Response::lag(0.3);
 
     /// Twelve steps of 20 s between 150 and 200 kPa at 10 Hz, with the given delay of each command and time error of each sample.
     fn recorded(late_s: &[f64; 12], scatter_s: f64) -> Recording {

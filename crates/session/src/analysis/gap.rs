@@ -17,7 +17,6 @@ use mapper_diagnose::gap::{
 };
 use mapper_identify::IdentifyConfig;
 use mapper_observe::FusedChannel;
-use mapper_observe::model_inputs::lagged_command::with_valve_positions;
 use mapper_physics::rig::effect::Effect;
 use mapper_physics::simulation::model::Model;
 use mapper_recording::{ChannelMap, ReadWarning};
@@ -178,20 +177,14 @@ fn of_rig(
     identification: IdentifyConfig,
     campaign: &Campaign,
 ) -> RigRecording {
-    let actuators = campaign.rig_actuators();
     RigRecording {
-        // The model is driven by the opening that the declared play leaves.
-        recording: with_valve_positions(
-            recording,
-            actuators.valve_play_ratio,
-            actuators.valve_dead_band_ratio,
-        ),
+        recording,
         model,
         identification,
         zero: campaign.zero,
         boundary: campaign.boundary,
         tolerances: campaign.tolerances,
-        valve: campaign.actuators.map(|actuators| actuators.valve),
+        actuators: campaign.actuators,
         tolerances_declared: campaign.tolerances_declared,
         has_drift_search: true,
     }

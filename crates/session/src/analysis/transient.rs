@@ -49,7 +49,7 @@ impl Session<'_> {
                     tolerances: campaign.tolerances,
                     nominal: campaign.boundary,
                     common_offsets: Vec::new(),
-                    valve: campaign.actuators.map(|actuators| actuators.valve),
+                    actuators: campaign.actuators,
                 },
                 calibration: &Calibration::shipped().map_err(SessionError::Calibration)?,
                 fit_until_s: fit_until_s.unwrap_or(f64::INFINITY),

@@ -472,7 +472,7 @@ pub(crate) fn declared(campaign: &Campaign) -> Declared {
         tolerances: campaign.tolerances,
         nominal: campaign.boundary,
         common_offsets: Vec::new(),
-        valve: campaign.actuators.map(|actuators| actuators.valve),
+        actuators: campaign.actuators,
     }
 }
 

@@ -80,6 +80,6 @@ fn declared(campaign: &Campaign) -> Declared {
         tolerances: campaign.tolerances,
         nominal: campaign.boundary,
         common_offsets: Vec::new(),
-        valve: None,
+        actuators: None,
     }
 }

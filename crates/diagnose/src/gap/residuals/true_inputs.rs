@@ -1,7 +1,7 @@
 //! Inputs of the model: recorded responses of the actuators, true values of the readings, and whether the metal had settled.
 
 use crate::gap::residuals::nuisance::Circumstances;
-use mapper_core::{ActuatorMotion, Channel, Recording};
+use mapper_core::{Channel, Recording};
 use mapper_numerics::ROUNDING;
 use mapper_numerics::least_squares::descent::ROUNDS;
 use mapper_observe::averages::mean_reading::mean_reading;
@@ -116,14 +116,15 @@ impl Actuators {
     /// at once. Without them, both responses are estimated from the recording.
     pub fn of(table: &Table, recording: &Recording, declared: &Declared, judged: bool) -> Actuators {
         let (p3, timed) = timed_p3(table, recording, declared);
-        let valve =
-            if judged { None } else { measured_valve_response(table, &timed, declared.nominal.p1_pa) };
-        let moves = |valve: ActuatorMotion| Response {
-            lag_s: valve.lag_s,
-            slew_per_s: valve.rate_per_s,
-            dead_time_s: valve.dead_time_s,
-        };
-        let valve = valve.or(declared.valve.map(moves)).unwrap_or(Response::lag(0.0));
+        let valve = declared.actuators.map_or(Response::lag(0.0), |actuators| Response {
+            lag_s: actuators.valve.lag_s,
+            slew_per_s: actuators.valve.rate_per_s,
+            dead_time_s: actuators.valve.dead_time_s,
+            play: actuators.valve_play_ratio,
+            dead_band: actuators.valve_dead_band_ratio,
+        });
+        let measured = || measured_valve_response(table, &timed, declared.nominal.p1_pa, valve);
+        let valve = if judged { valve } else { measured().unwrap_or(valve) };
         Actuators { p3, valve, judged }
     }
 }

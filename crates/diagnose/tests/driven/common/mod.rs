@@ -168,6 +168,6 @@ pub fn declared() -> Declared {
         tolerances: Default::default(),
         nominal: BoundaryConditions::default(),
         common_offsets: Vec::new(),
-        valve: None,
+        actuators: None,
     }
 }

@@ -27,7 +27,7 @@ const DWELL_S: f64 = 60.0;
 /// The nearest opening to surge of the shipped campaigns.
 const OPENING: f64 = 0.5;
 /// The virtual lab's actuator of P3.
-const P3: Response = Response { lag_s: 0.3, slew_per_s: 200e3, dead_time_s: 0.0 };
+const P3: Response = Response { slew_per_s: 200e3, ..Response::lag(0.3) };
 
 fn at_opening() -> BoundaryConditions {
     BoundaryConditions { valve_opening_ratio: OPENING, ..BoundaryConditions::default() }

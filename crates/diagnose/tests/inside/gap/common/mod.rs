@@ -172,7 +172,7 @@ pub fn declared() -> Declared {
         tolerances,
         nominal: boundary(),
         common_offsets: Vec::new(),
-        valve: None,
+        actuators: None,
     }
 }
 

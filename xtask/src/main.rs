@@ -1,4 +1,4 @@
-//! Developer commands of the repository: `cargo xtask quick`, `test`, `fleet-test`, `fmt`, `docs`, `python`, `wheel` and `performance`.
+//! Developer commands of the repository: `cargo xtask quick`, `test`, `fleet-test`, `fmt`, `docs`, `python`, `wheel`, `package` and `performance`.
 
 mod checks;
 mod commands;
@@ -20,7 +20,9 @@ usage: cargo xtask COMMAND
   docs           make the generated documents again
   docs --check   fail where a generated document is not what the program makes now
   python         the tests of the Python package alone
-  wheel          build the Python package's wheel and test it in an empty environment
+  wheel          build the Python package's wheel, all programs in it, and use it in an empty environment
+                 --target aarch64, --target windows: for another computer, not used
+  package        build the archive and the Debian package, and use them; as root, in a Debian of its own
   performance    measure, with peers for comparison if they can be built, and write docs/validation/performance.md
 ";
 
@@ -39,7 +41,7 @@ fn main() -> ExitCode {
         ["docs"] => commands::docs::docs(files::Mode::Write),
         ["docs", "--check"] => commands::docs::docs(files::Mode::Check),
         ["python"] => commands::test::python(),
-        ["wheel"] => checks::python_package::wheel(),
+        ["wheel" | "package", ..] => checks::python_package::release(&arguments),
         ["performance"] => commands::performance::performance(),
         ["--help" | "-h" | "help"] => {
             step::say(USAGE);

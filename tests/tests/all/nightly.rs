@@ -259,10 +259,9 @@ fn the_shipped_nightly_files_refer_to_existing_files() {
     for line in read("mapper-nightly.timer").lines().filter_map(|line| line.strip_prefix("OnCalendar=")) {
         assert!(line.ends_with(" UTC"), "{line}");
     }
-    // What workflow and service start exists.
-    for text in [service, read("nightly.yml")] {
-        assert!(text.contains("mapper nightly campaigns/nightly.yaml"), "{text}");
-    }
+    // What workflow and service start exists; the package has the campaigns below /usr/share/mapper.
+    assert!(read("nightly.yml").contains("mapper nightly campaigns/nightly.yaml"));
+    assert!(service.contains("/usr/bin/mapper nightly /usr/share/mapper/campaigns/nightly.yaml"), "{service}");
 }
 
 /// If systemd is there to ask: the units as installed, but for the program, which need not be built for release.
@@ -271,8 +270,8 @@ fn assert_systemd_accepts_the_units(folder: &Path) {
     for unit in ["mapper-nightly.service", "mapper-nightly.timer"] {
         let text = std::fs::read_to_string(folder.join(unit)).unwrap();
         let text = text
-            .replace("/srv/mapper/target/release/mapper ", "/bin/true ")
-            .replace("/srv/mapper", scratch.path().to_str().unwrap());
+            .replace("/usr/bin/mapper ", "/bin/true ")
+            .replace("/var/lib/mapper", scratch.path().to_str().unwrap());
         std::fs::write(scratch.path().join(unit), text).unwrap();
     }
     let asked = std::process::Command::new("systemd-analyze")

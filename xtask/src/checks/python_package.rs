@@ -1,9 +1,9 @@
-//! The Python package: its tests on the library that was built with everything else, and the wheel.
+//! The Python package: its tests on the library that was built with everything else, and releases.
 
 use crate::environment::capabilities::{Capabilities, with_program};
 use crate::error::Error;
 use crate::files::{self, at};
-use crate::step::{command, run, say};
+use crate::step::{command, run};
 use crate::{environment::python_env, workspace};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -20,14 +20,12 @@ pub fn check(capabilities: &Capabilities) -> Result<(), Error> {
     copy(&library, &package.join("_mapper.abi3.so"))?;
     let python_command = |arguments: &[&str]| {
         let mut command = with_program(command(&capabilities.python, arguments));
-        command
-            .env("PYTHONPATH", &home)
-            .env("MPLBACKEND", "agg")
-            .current_dir(workspace::root().join("python"));
+        command.env("PYTHONPATH", &home).env("MPLBACKEND", "agg");
         command
     };
     let tests = || {
-        run(python_command(&["-m", "ruff", "check", "."]))?;
+        source_package(capabilities)?;
+        run(python_command(&["-m", "ruff", "check", "python"]))?;
         run(python_command(&["-m", "mypy"]))?;
         run(python_command(&["-m", "pytest", "--quiet", "-p", "no:cacheprovider"]))
     };
@@ -38,6 +36,25 @@ pub fn check(capabilities: &Capabilities) -> Result<(), Error> {
         (tests.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)), executed)
     });
     tested.and(executed)
+}
+
+/// Checks that the source package has its build backend and all manifests, without building it.
+fn source_package(capabilities: &Capabilities) -> Result<(), Error> {
+    let folder = workspace::target_dir().join("source-package");
+    files::remove(&folder)?;
+    let maturin = capabilities.python.with_file_name("maturin");
+    run(command(&maturin, &["sdist", "--out", &folder.to_string_lossy()]))?;
+    let pip = ["-m", "pip", "install", "--quiet", "--dry-run", "--no-deps", "--no-build-isolation"];
+    for package in plain_files(&folder)? {
+        let mut metadata = command(&capabilities.python, &[&pip[..], &[&package.to_string_lossy()]].concat());
+        // The backend starts maturin by its name.
+        let tools = [capabilities.python.with_file_name("")].into_iter();
+        let path = std::env::var_os("PATH").unwrap_or_default();
+        let path = std::env::join_paths(tools.chain(std::env::split_paths(&path))).unwrap_or_default();
+        metadata.env("PATH", path);
+        run(metadata)?;
+    }
+    Ok(())
 }
 
 /// Runs every notebook in its directory; they write into temporary ones.
@@ -54,27 +71,11 @@ fn execute_notebooks(python_command: &dyn Fn(&[&str]) -> Command) -> Result<(), 
     Ok(())
 }
 
-/// Builds the wheel with the command in it, installs it into an empty environment and runs its tests there, with that command.
-pub fn wheel() -> Result<(), Error> {
-    let python = python_env::prepare()?;
-    let (wheels, empty) = (workspace::target_dir().join("wheels"), workspace::target_dir().join("wheel-env"));
-    files::remove(&wheels)?;
-    files::remove(&empty)?;
-    let folder = wheels.to_string_lossy();
-    let pip = ["-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", &folder];
-    run(command(&python, &[&pip[..], &["./python"]].concat()))?;
-    run(command("python3", &["-m", "venv", &empty.to_string_lossy()]))?;
-    let mut install: Command = command(empty.join("bin/python"), &["-m", "pip", "install", "--quiet"]);
-    for wheel in plain_files(&wheels)? {
-        install.arg(format!("{}[test]", wheel.display()));
-    }
-    run(install)?;
-    let mut tests = command(empty.join("bin/python"), &["-m", "pytest", "--quiet", "-p", "no:cacheprovider"]);
-    tests.current_dir(workspace::root().join("python"));
-    tests.env("MAPPER_TEST_PROGRAM", empty.join("bin/mapper")).env("MPLBACKEND", "agg");
-    run(tests)?;
-    say(&format!("the wheel is in {folder}\n"));
-    Ok(())
+/// Builds what is installed without Rust, and uses it: python/release.py with the tools of its list.
+pub fn release(arguments: &[&str]) -> Result<(), Error> {
+    let home = workspace::target_dir().join("release-env");
+    let python = python_env::prepare_in(&home, "python/release-tools.txt")?;
+    run(command(python, &[&["python/release.py"], arguments].concat()))
 }
 
 fn copy_files(from: &Path, to: &Path) -> Result<(), Error> {

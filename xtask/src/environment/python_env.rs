@@ -1,15 +1,15 @@
-//! The Python environment of the tests, with only the packages of tests/python/requirements.txt.
+//! Python environments with only the packages of one list: that of the tests, and that of the tools that build a release.
 
 use crate::error::Error;
 use crate::step::{self, command, run, say};
 use crate::{files, workspace};
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Minimum version of Python for the pinned numpy and scipy.
 const OLDEST: (&str, &str) = ("3.11", "(3, 11)");
 
-/// Its Python, whether it has been made or not.
+/// The Python of the tests, whether it has been made or not.
 pub fn python() -> PathBuf {
     home().join("bin/python")
 }
@@ -18,24 +18,29 @@ fn home() -> PathBuf {
     workspace::target_dir().join("python-env")
 }
 
-/// Creates the environment, unless one with the same packages exists. Returns its Python.
+/// The environment of the tests; returns its Python.
 pub fn prepare() -> Result<PathBuf, Error> {
-    let wanted = files::read(&workspace::root().join("tests/python/requirements.txt"))?;
-    let (home, python) = (home(), python());
+    prepare_in(&home(), "tests/python/requirements.txt")
+}
+
+/// Creates an environment with the packages of a list, unless it exists. Returns its Python.
+pub fn prepare_in(home: &Path, list: &str) -> Result<PathBuf, Error> {
+    let wanted = files::read(&workspace::root().join(list))?;
+    let python = home.join("bin/python");
     // Written last, because its absence marks an incomplete environment.
     let stamp = home.join("made-from.txt");
     let made_from = fs::read_to_string(&stamp).unwrap_or_default();
-    if made_from == wanted && step::succeeds(&python.to_string_lossy(), &["-c", "import mcap"]) {
+    if made_from == wanted && step::succeeds(&python.to_string_lossy(), &["-m", "pip", "--version"]) {
         say(&format!("{} is up to date\n", home.display()));
         return Ok(python);
     }
     check_version()?;
-    files::remove(&home)?;
+    files::remove(home)?;
     run(command("python3", &["-m", "venv", &home.to_string_lossy()]))?;
     // Only wheels, because building scipy from source needs a Fortran compiler and half an hour.
     let arguments = ["-m", "pip", "install", "--disable-pip-version-check", "--no-input", "--quiet"];
-    let list = ["--only-binary", ":all:", "--requirement", "tests/python/requirements.txt"];
-    run(command(&python, &[&arguments[..], &list].concat()))?;
+    let packages = ["--only-binary", ":all:", "--requirement", list];
+    run(command(&python, &[&arguments[..], &packages].concat()))?;
     files::write(&stamp, wanted)?;
     Ok(python)
 }

@@ -1,0 +1,202 @@
+"""What is installed without Rust: `cargo xtask wheel` and `cargo xtask package` run this script with the tools of release-tools.txt."""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import tarfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+BUILT = ROOT / os.environ.get("CARGO_TARGET_DIR", "target")
+CARGO = os.environ.get("CARGO", "cargo")
+TOOLS = Path(sys.executable).parent
+CHECK = ROOT / "tests/python/check_installation.py"
+
+# glibc 2.28 is that of Debian 10, Ubuntu 18.10 and RHEL 8, and the oldest that current NumPy wheels support.
+TARGETS = {
+    "x86_64": ("x86_64-unknown-linux-gnu", "manylinux_2_28"),
+    "aarch64": ("aarch64-unknown-linux-gnu", "manylinux_2_28"),
+    "windows": ("x86_64-pc-windows-gnu", "off"),
+}
+# Where each shell finds completions, below /usr.
+COMPLETIONS = {
+    "bash": "share/bash-completion/completions/mapper",
+    "fish": "share/fish/vendor_completions.d/mapper.fish",
+    "zsh": "share/zsh/vendor-completions/_mapper",
+}
+LICENCES = ("LICEN", "COPYING", "NOTICE", "UNLICEN")
+# The oldest Debian that is still on the mirrors: glibc 2.31.
+DEBIAN = "bullseye"
+
+
+def run(*words: object, **environment: str) -> None:
+    """Run a command in the root of the repository, the tools first on PATH."""
+    line = [str(word) for word in words]
+    print("$", *line, flush=True)
+    path = f"{TOOLS}{os.pathsep}{os.environ['PATH']}"
+    subprocess.run(line, cwd=ROOT, check=True, env={**os.environ, "PATH": path, **environment})
+
+
+def output(*words: object) -> str:
+    """Return what a command prints."""
+    line = [str(word) for word in words]
+    return subprocess.run(line, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout
+
+
+def build_options(target: str) -> dict[str, str]:
+    """Return the variables that let maturin and with_command.py build for a target, by zig's linker."""
+    triple, compatibility = TARGETS[target]
+    if target != platform.machine():
+        run("rustup", "target", "add", triple)
+    return {"MATURIN_PEP517_ARGS": f"--zig --target {triple} --compatibility {compatibility}"}
+
+
+def wheel(target: str) -> None:
+    """Build the wheel, audit it, and use it in an empty environment if it is for this computer."""
+    folder = BUILT / "wheels" / target
+    shutil.rmtree(folder, ignore_errors=True)
+    pip = [sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-build-isolation", "--wheel-dir"]
+    run(*pip, folder, ".", **build_options(target))
+    (made,) = folder.iterdir()
+    compatibility = TARGETS[target][1]
+    if compatibility.startswith("manylinux"):
+        # Of every library and program in the wheel: no later symbols of glibc, and no libraries that a system may lack.
+        report = " ".join(output(sys.executable, "-m", "auditwheel", "show", made).split())
+        print(report)
+        assert f'platform tag: "{compatibility}_{target}"' in report, "it needs a later system than it should"
+    if target == platform.machine():
+        run("maturin", "sdist", "--out", folder)
+        use_wheel(made)
+    print(*sorted(folder.iterdir()), sep="\n")
+
+
+def use_wheel(made: Path) -> None:
+    """Use a wheel in an empty environment, and run the tests of the package there."""
+    home = BUILT / "wheel-env"
+    run("python3", "-m", "venv", "--clear", home)
+    python = home / "bin/python"
+    run(python, "-m", "pip", "install", "--quiet", f"{made}[test]")
+    run(python, CHECK, home / "bin")
+    tests = [python, "-m", "pytest", "--quiet", "-p", "no:cacheprovider"]
+    run(*tests, MAPPER_TEST_PROGRAM=str(home / "bin/mapper"), MPLBACKEND="agg")
+
+
+def package(target: str) -> None:
+    """Build the archive and the Debian package from the same files, and use both."""
+    triple, _ = TARGETS[target]
+    run(sys.executable, "python/with_command.py", **build_options(target))
+    # Below the directory that cargo-deb takes files from.
+    files = BUILT / triple / "release/package"
+    shutil.rmtree(files, ignore_errors=True)
+    fill(files, triple)
+    folder = BUILT / "packages"
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    (version,) = {one["version"] for one in metadata(triple) if one["name"] == "mapper-cli"}
+    name = f"mapper-{version}-{target}-linux"
+    with tarfile.open(folder / f"{name}.tar.gz", "w:gz") as archive:
+        archive.add(files, name, filter=owned_by_nobody)
+    deb = [CARGO, "deb", "--locked", "-p", "mapper-cli", "--no-build", "--no-strip", "--target", triple]
+    run(*deb, "--output", folder)
+    sums = [f"{hashlib.sha256(one.read_bytes()).hexdigest()}  {one.name}\n" for one in sorted(folder.iterdir())]
+    (folder / "SHA256SUMS").write_text("".join(sums))
+    if target == platform.machine():
+        use_packages(folder, name)
+    print(*sorted(folder.iterdir()), sep="\n")
+
+
+def owned_by_nobody(entry: tarfile.TarInfo) -> tarfile.TarInfo:
+    """Leave out who built an archive, and when."""
+    entry.uid = entry.gid = entry.mtime = 0
+    entry.uname = entry.gname = ""
+    return entry
+
+
+def metadata(triple: str) -> list[dict[str, Any]]:
+    """Return the packages that programs for a target may be built from."""
+    options = ["--locked", "--format-version", "1", "--filter-platform", triple]
+    packages: list[dict[str, Any]] = json.loads(output(CARGO, "metadata", *options))["packages"]
+    return packages
+
+
+def fill(files: Path, triple: str) -> None:
+    """Lay out an installation, in the directories below /usr."""
+    shutil.copytree(ROOT / "mapper._mapper.data/scripts", files / "bin")
+    for shell, place in COMPLETIONS.items():
+        (files / place).parent.mkdir(parents=True)
+        (files / place).write_text(output(files / "bin/mapper", "completions", shell))
+    output(files / "bin/mapper", "man", "--out", files / "share/man/man1")
+    documents = files / "share/doc/mapper"
+    for name in output("git", "ls-files", "campaigns", "examples").split("\n")[:-1]:
+        copy(ROOT / name, files / "share/mapper" / name)
+    for name in ("LICENSE-APACHE", "LICENSE-MIT", "CHANGELOG.md"):
+        copy(ROOT / name, documents / name)
+    features = ["--features", "parquet,tdms", "--spec-version", "1.5"]
+    run(CARGO, "cyclonedx", "--format", "json", "--no-build-deps", "--target", triple, *features, "--quiet")
+    for one in metadata(triple):
+        home = Path(one["manifest_path"]).parent
+        if one["source"] is None:
+            bill = home / f"{one['name']}.cdx.json"
+            if one["name"] == "mapper-cli" or (files / "bin" / one["name"]).exists():
+                copy(bill, documents / bill.name)
+            bill.unlink()
+            continue
+        for licence in home.iterdir():
+            if licence.is_file() and licence.name.upper().startswith(LICENCES):
+                copy(licence, documents / "licences" / f"{one['name']}-{one['version']}" / licence.name)
+
+
+def copy(source: Path, destination: Path) -> None:
+    """Copy a file into a new directory if necessary."""
+    destination.parent.mkdir(parents=True, exist_ok=True)
+    shutil.copyfile(source, destination)
+
+
+def use_packages(folder: Path, name: str) -> None:
+    """Use the archive where it is unpacked, and the package in a Debian of its own, which needs root."""
+    unpacked = BUILT / "unpacked"
+    shutil.rmtree(unpacked, ignore_errors=True)
+    shutil.unpack_archive(folder / f"{name}.tar.gz", unpacked)
+    run(sys.executable, CHECK, unpacked / name / "bin")
+    (deb,) = folder.glob("*.deb")
+    if os.geteuid() != 0:
+        print("LEFT OUT: the Debian package in a system of its own, which needs root, debootstrap and unshare")
+        return
+    root = BUILT / "debian"
+    if not (root / "made").exists():
+        run("debootstrap", "--variant=minbase", DEBIAN, root)
+        (root / "made").touch()
+    shutil.copy(deb, root / "tmp/mapper.deb")
+    dpkg = ["chroot", root, "dpkg"]
+    run(*dpkg, "--install", "/tmp/mapper.deb")
+    run(sys.executable, CHECK, "/usr/bin", root)
+    installed = [
+        root / line.strip()[1:] for line in output(*dpkg, "--listfiles", "mapper").split("\n") if "mapper" in line
+    ]
+    units = [file for file in installed if file.suffix in (".service", ".timer")]
+    assert len(units) == 2, installed
+    assert all(file.exists() for file in installed), installed
+    run(*dpkg, "--purge", "mapper")
+    left = [file for file in installed if file.exists()]
+    assert not left, left
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Read the arguments."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("what", choices=["wheel", "package"])
+    parser.add_argument("--target", choices=TARGETS, default=platform.machine())
+    options = parser.parse_args(arguments)
+    {"wheel": wheel, "package": package}[options.what](options.target)
+
+
+main()

@@ -11,9 +11,12 @@ import shutil
 import subprocess
 import sys
 import tarfile
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+
+import with_command
 
 ROOT = Path(__file__).resolve().parents[1]
 BUILT = ROOT / os.environ.get("CARGO_TARGET_DIR", "target")
@@ -52,12 +55,25 @@ def output(*words: object) -> str:
     return subprocess.run(line, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout
 
 
-def build_options(target: str) -> dict[str, str]:
-    """Return the variables that let maturin and with_command.py build for a target, by zig's linker."""
+def building(target: str) -> dict[str, str]:
+    """Return the variables that let cargo, and so maturin and with_command.py, build for a target by zig's linker."""
     triple, compatibility = TARGETS[target]
     if target != platform.machine():
         run("rustup", "target", "add", triple)
-    return {"MATURIN_PEP517_ARGS": f"--zig --target {triple} --compatibility {compatibility}"}
+    _, _, glibc = compatibility.rpartition("manylinux_")
+    oldest = f"{triple}.{glibc.replace('_', '.')}" if glibc != "off" else triple
+    # cargo-zigbuild sets them and starts cargo. maturin's own `--zig` would set others, and build every library again.
+    with tempfile.TemporaryDirectory() as folder:
+        cargo = Path(folder, "cargo")
+        cargo.write_text("#!/bin/sh\nexec env -0\n")
+        cargo.chmod(0o700)
+        path = f"{TOOLS}{os.pathsep}{os.environ['PATH']}"
+        begun = {**os.environ, "PATH": path, "CARGO": str(cargo)}
+        words = ["cargo-zigbuild", "zigbuild", "--release", "--target", oldest]
+        listed = subprocess.run(words, env=begun, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout
+    variables = dict(entry.split("=", 1) for entry in listed.split("\0") if entry)
+    maturin = f"--compatibility {compatibility}"
+    return {**variables, "CARGO": CARGO, "CARGO_BUILD_TARGET": triple, "MATURIN_PEP517_ARGS": maturin}
 
 
 def wheel(target: str) -> None:
@@ -65,7 +81,7 @@ def wheel(target: str) -> None:
     folder = BUILT / "wheels" / target
     shutil.rmtree(folder, ignore_errors=True)
     pip = [sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-build-isolation", "--wheel-dir"]
-    run(*pip, folder, ".", **build_options(target))
+    run(*pip, folder, ".", **building(target))
     (made,) = folder.iterdir()
     compatibility = TARGETS[target][1]
     if compatibility.startswith("manylinux"):
@@ -93,7 +109,7 @@ def use_wheel(made: Path) -> None:
 def package(target: str) -> None:
     """Build the archive and the Debian package from the same files, and use both."""
     triple, _ = TARGETS[target]
-    run(sys.executable, "python/with_command.py", **build_options(target))
+    run(sys.executable, "python/with_command.py", **building(target))
     # Below the directory that cargo-deb takes files from.
     files = BUILT / triple / "release/package"
     shutil.rmtree(files, ignore_errors=True)
@@ -130,7 +146,7 @@ def metadata(triple: str) -> list[dict[str, Any]]:
 
 def fill(files: Path, triple: str) -> None:
     """Lay out an installation, in the directories below /usr."""
-    shutil.copytree(ROOT / "mapper._mapper.data/scripts", files / "bin")
+    shutil.copytree(with_command.SCRIPTS, files / "bin")
     for shell, place in COMPLETIONS.items():
         (files / place).parent.mkdir(parents=True)
         (files / place).write_text(output(files / "bin/mapper", "completions", shell))
@@ -146,8 +162,9 @@ def fill(files: Path, triple: str) -> None:
         home = Path(one["manifest_path"]).parent
         if one["source"] is None:
             bill = home / f"{one['name']}.cdx.json"
-            if one["name"] == "mapper-cli" or (files / "bin" / one["name"]).exists():
-                copy(bill, documents / bill.name)
+            if one["name"] in with_command.COMMAND + with_command.DRIVERS:
+                # References to packages of the workspace are paths of this computer.
+                (documents / bill.name).write_text(bill.read_text().replace(f"{ROOT}/", ""))
             bill.unlink()
             continue
         for licence in home.iterdir():
@@ -179,12 +196,12 @@ def use_packages(folder: Path, name: str) -> None:
     dpkg = ["chroot", root, "dpkg"]
     run(*dpkg, "--install", "/tmp/mapper.deb")
     run(sys.executable, CHECK, "/usr/bin", root)
-    installed = [
-        root / line.strip()[1:] for line in output(*dpkg, "--listfiles", "mapper").split("\n") if "mapper" in line
-    ]
-    units = [file for file in installed if file.suffix in (".service", ".timer")]
-    assert len(units) == 2, installed
+    listed = output(*dpkg, "--listfiles", "mapper").split()
+    installed = [root / name[1:] for name in listed if "mapper" in name]
     assert all(file.exists() for file in installed), installed
+    assert {"/usr/lib/systemd/system/mapper-nightly.service", "/usr/lib/systemd/system/mapper-nightly.timer"} <= {
+        *listed
+    }
     run(*dpkg, "--purge", "mapper")
     left = [file for file in installed if file.exists()]
     assert not left, left

@@ -3,10 +3,8 @@
 `python python/with_command.py` builds these programs alone.
 """
 
-import argparse
 import json
 import os
-import shlex
 import shutil
 import subprocess
 from pathlib import Path
@@ -30,28 +28,15 @@ COMMAND = ["mapper-cli"]
 DRIVERS = ["mapper-backend-ak", "mapper-backend-modbus", "mapper-backend-opcua", "mapper-lab-server"]
 
 
-def cargo_build() -> list[str]:
-    """Return the command that builds for the target of maturin's options, by zig if they say so."""
-    parser = argparse.ArgumentParser(allow_abbrev=False)
-    parser.add_argument("--zig", action="store_true")
-    parser.add_argument("--target")
-    parser.add_argument("--compatibility", default="")
-    options, _ = parser.parse_known_args(shlex.split(os.environ.get("MATURIN_PEP517_ARGS", "")))
-    build = ["cargo-zigbuild", "zigbuild"] if options.zig else [os.environ.get("CARGO", "cargo"), "build"]
-    # cargo-zigbuild has the oldest version of glibc in the target: manylinux_2_28 is `.2.28`.
-    _, _, glibc = options.compatibility.partition("manylinux_")
-    target = options.target and options.target + (f".{glibc.replace('_', '.')}" if options.zig and glibc else "")
-    return [*build, "--release", "--locked", *(["--target", target] if target else [])]
-
-
 def add_programs(packages: list[str]) -> None:
-    """Build programs with the library's cargo and put them where maturin takes them."""
-    # The whole build has one profile, so that the module is linked with the same libraries.
+    """Build programs with the module's cargo, for its target, and put them where maturin takes them."""
+    # One profile for all, so that the libraries that the module shares with them are built once.
     os.environ["CARGO_PROFILE_RELEASE_STRIP"] = "symbols"
+    cargo = [os.environ.get("CARGO", "cargo"), "build", "--release", "--locked"]
     chosen = [word for package in packages for word in ("--package", package)]
     features = ["--features", "mapper-cli/parquet,mapper-cli/tdms"]
     built = subprocess.run(
-        [*cargo_build(), "--bins", *chosen, *features, "--message-format=json-render-diagnostics"],
+        [*cargo, "--bins", *chosen, *features, "--message-format=json-render-diagnostics"],
         cwd=ROOT,
         check=True,
         stdout=subprocess.PIPE,

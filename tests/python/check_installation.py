@@ -57,7 +57,8 @@ def main(programs: str, root: str = "/") -> None:
             print(stand.stdout.readline().decode().rstrip())
             run("backend", "check", "modbus", "--campaign", "first_points.yaml")
         finally:
-            stand.terminate()
+            # unshare does not pass on a request to end.
+            stand.kill()
             stand.wait()
 
 

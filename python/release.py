@@ -76,6 +76,15 @@ def building(target: str) -> dict[str, str]:
     return {**variables, "CARGO": CARGO, "CARGO_BUILD_TARGET": triple, "MATURIN_PEP517_ARGS": maturin}
 
 
+def source(_target: str) -> None:
+    """Check that the source package has its build backend and all manifests, without building it."""
+    folder = BUILT / "source-package"
+    shutil.rmtree(folder, ignore_errors=True)
+    run("maturin", "sdist", "--out", folder)
+    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--dry-run", "--no-deps", "--no-build-isolation"]
+    run(*pip, *folder.iterdir())
+
+
 def wheel(target: str) -> None:
     """Build the wheel, audit it, and use it in an empty environment if it is for this computer."""
     folder = BUILT / "wheels" / target
@@ -210,10 +219,10 @@ def use_packages(folder: Path, name: str) -> None:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Read the arguments."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", choices=["wheel", "package"])
+    parser.add_argument("what", choices=["source", "wheel", "package"])
     parser.add_argument("--target", choices=TARGETS, default=platform.machine())
     options = parser.parse_args(arguments)
-    {"wheel": wheel, "package": package}[options.what](options.target)
+    {"source": source, "wheel": wheel, "package": package}[options.what](options.target)
 
 
 main()

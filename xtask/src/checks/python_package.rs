@@ -24,7 +24,7 @@ pub fn check(capabilities: &Capabilities) -> Result<(), Error> {
         command
     };
     let tests = || {
-        source_package(capabilities)?;
+        run(command(&capabilities.python, &["python/release.py", "source"]))?;
         run(python_command(&["-m", "ruff", "check", "python"]))?;
         run(python_command(&["-m", "mypy"]))?;
         run(python_command(&["-m", "pytest", "--quiet", "-p", "no:cacheprovider"]))
@@ -36,25 +36,6 @@ pub fn check(capabilities: &Capabilities) -> Result<(), Error> {
         (tests.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)), executed)
     });
     tested.and(executed)
-}
-
-/// Checks that the source package has its build backend and all manifests, without building it.
-fn source_package(capabilities: &Capabilities) -> Result<(), Error> {
-    let folder = workspace::target_dir().join("source-package");
-    files::remove(&folder)?;
-    let maturin = capabilities.python.with_file_name("maturin");
-    run(command(&maturin, &["sdist", "--out", &folder.to_string_lossy()]))?;
-    let pip = ["-m", "pip", "install", "--quiet", "--dry-run", "--no-deps", "--no-build-isolation"];
-    for package in plain_files(&folder)? {
-        let mut metadata = command(&capabilities.python, &[&pip[..], &[&package.to_string_lossy()]].concat());
-        // The backend starts maturin by its name.
-        let tools = [capabilities.python.with_file_name("")].into_iter();
-        let path = std::env::var_os("PATH").unwrap_or_default();
-        let path = std::env::join_paths(tools.chain(std::env::split_paths(&path))).unwrap_or_default();
-        metadata.env("PATH", path);
-        run(metadata)?;
-    }
-    Ok(())
 }
 
 /// Runs every notebook in its directory; they write into temporary ones.

@@ -25,11 +25,9 @@ TOOLS = Path(sys.executable).parent
 CHECK = ROOT / "tests/python/check_installation.py"
 
 # glibc 2.28 is that of Debian 10, Ubuntu 18.10 and RHEL 8, and the oldest that current NumPy wheels support.
-TARGETS = {
-    "x86_64": ("x86_64-unknown-linux-gnu", "manylinux_2_28"),
-    "aarch64": ("aarch64-unknown-linux-gnu", "manylinux_2_28"),
-    "windows": ("x86_64-pc-windows-gnu", "off"),
-}
+GLIBC = "2.28"
+COMPATIBILITY = "manylinux_2_28"
+TARGETS = {"x86_64": "x86_64-unknown-linux-gnu", "aarch64": "aarch64-unknown-linux-gnu"}
 # Where each shell finds completions, below /usr.
 COMPLETIONS = {
     "bash": "share/bash-completion/completions/mapper",
@@ -57,11 +55,9 @@ def output(*words: object) -> str:
 
 def building(target: str) -> dict[str, str]:
     """Return the variables that let cargo, and so maturin and with_command.py, build for a target by zig's linker."""
-    triple, compatibility = TARGETS[target]
+    triple = TARGETS[target]
     if target != platform.machine():
         run("rustup", "target", "add", triple)
-    _, _, glibc = compatibility.rpartition("manylinux_")
-    oldest = f"{triple}.{glibc.replace('_', '.')}" if glibc != "off" else triple
     # cargo-zigbuild sets them and starts cargo. maturin's own `--zig` would set others, and build every library again.
     with tempfile.TemporaryDirectory() as folder:
         cargo = Path(folder, "cargo")
@@ -69,10 +65,10 @@ def building(target: str) -> dict[str, str]:
         cargo.chmod(0o700)
         path = f"{TOOLS}{os.pathsep}{os.environ['PATH']}"
         begun = {**os.environ, "PATH": path, "CARGO": str(cargo)}
-        words = ["cargo-zigbuild", "zigbuild", "--release", "--target", oldest]
+        words = ["cargo-zigbuild", "zigbuild", "--release", "--target", f"{triple}.{GLIBC}"]
         listed = subprocess.run(words, env=begun, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout
     variables = dict(entry.split("=", 1) for entry in listed.split("\0") if entry)
-    maturin = f"--compatibility {compatibility}"
+    maturin = f"--compatibility {COMPATIBILITY}"
     return {**variables, "CARGO": CARGO, "CARGO_BUILD_TARGET": triple, "MATURIN_PEP517_ARGS": maturin}
 
 
@@ -92,12 +88,10 @@ def wheel(target: str) -> None:
     pip = [sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-build-isolation", "--wheel-dir"]
     run(*pip, folder, ".", **building(target))
     (made,) = folder.iterdir()
-    compatibility = TARGETS[target][1]
-    if compatibility.startswith("manylinux"):
-        # Of every library and program in the wheel: no later symbols of glibc, and no libraries that a system may lack.
-        report = " ".join(output(sys.executable, "-m", "auditwheel", "show", made).split())
-        print(report)
-        assert f'platform tag: "{compatibility}_{target}"' in report, "it needs a later system than it should"
+    # Of every library and program in the wheel: no later symbols of glibc, and no libraries that a system may lack.
+    report = " ".join(output(sys.executable, "-m", "auditwheel", "show", made).split())
+    print(report)
+    assert f'platform tag: "{COMPATIBILITY}_{target}"' in report, "it needs a later system than it should"
     if target == platform.machine():
         run("maturin", "sdist", "--out", folder)
         use_wheel(made)
@@ -117,7 +111,7 @@ def use_wheel(made: Path) -> None:
 
 def package(target: str) -> None:
     """Build the archive and the Debian package from the same files, and use both."""
-    triple, _ = TARGETS[target]
+    triple = TARGETS[target]
     run(sys.executable, "python/with_command.py", **building(target))
     # Below the directory that cargo-deb takes files from.
     files = BUILT / triple / "release/package"
@@ -133,7 +127,7 @@ def package(target: str) -> None:
     deb = [CARGO, "deb", "--locked", "-p", "mapper-cli", "--no-build", "--no-strip", "--target", triple]
     run(*deb, "--output", folder)
     sums = [f"{hashlib.sha256(one.read_bytes()).hexdigest()}  {one.name}\n" for one in sorted(folder.iterdir())]
-    (folder / "SHA256SUMS").write_text("".join(sums))
+    (folder / f"{name}.sha256").write_text("".join(sums))
     if target == platform.machine():
         use_packages(folder, name)
     print(*sorted(folder.iterdir()), sep="\n")

@@ -21,7 +21,7 @@ usage: cargo xtask COMMAND
   docs --check   fail where a generated document is not what the program makes now
   python         the tests of the Python package alone
   wheel          build the Python package's wheel, all programs in it, and use it in an empty environment
-                 --target aarch64, --target windows: for another computer, not used
+                 --target aarch64: for another computer, not used
   package        build the archive and the Debian package, and use them; as root, in a Debian of its own
   performance    measure, with peers for comparison if they can be built, and write docs/validation/performance.md
 ";

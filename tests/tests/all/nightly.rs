@@ -261,7 +261,10 @@ fn the_shipped_nightly_files_refer_to_existing_files() {
     }
     // What workflow and service start exists; the package has the campaigns below /usr/share/mapper.
     assert!(read("nightly.yml").contains("mapper nightly campaigns/nightly.yaml"));
-    assert!(service.contains("/usr/bin/mapper nightly /usr/share/mapper/campaigns/nightly.yaml"), "{service}");
+    assert!(
+        service.contains("/usr/bin/mapper nightly /usr/share/mapper/campaigns/nightly.yaml"),
+        "{service}"
+    );
 }
 
 /// If systemd is there to ask: the units as installed, but for the program, which need not be built for release.

@@ -180,7 +180,7 @@ pub(crate) fn checked_study(
 ) -> Result<(Study, Vec<GapWarning>), GapError> {
     let table = Table::new(recording).ok_or(Problem::Empty)?;
     let warnings = usable(recording, &table, &declared)?;
-    let actuators = Actuators::of(&table, recording, &declared, tolerances_declared);
+    let actuators = Actuators::of(&table, recording, (&declared, &model), tolerances_declared);
     Ok((Study::with_actuators(recording, table, declared, model, effects, actuators), warnings))
 }
 

@@ -93,8 +93,9 @@ impl AveragedInputs {
 /// Response of the valve, from the recording. It is immediate if it is unknown or slower than any valve, which indicates a lag of the flow
 /// meter.
 fn valve_response(recording: &Recording, nominal: &BoundaryConditions) -> Response {
-    let measured = Table::new(recording)
-        .and_then(|table| measured_valve_response(&table, recording, nominal.p1_pa, Response::lag(0.0)));
+    let measured = Table::new(recording).and_then(|table| {
+        measured_valve_response(&table, recording, (nominal.p1_pa, 0.0), Response::lag(0.0))
+    });
     measured.filter(|valve| valve.lag_s < MAX_VALVE_LAG_S).unwrap_or(Response::lag(0.0))
 }
 

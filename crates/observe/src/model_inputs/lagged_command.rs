@@ -5,6 +5,7 @@ use crate::averages::time_table::Table;
 use mapper_core::{Channel, Recording, Series, StepMarker, is_jump, is_same_command};
 use mapper_numerics::minimise::minimise;
 use mapper_numerics::statistics::{mean, median};
+use mapper_physics::gas::mixture::Gas;
 use mapper_physics::laws::orifice;
 use mapper_physics::rig::instruments::ValveMotion;
 
@@ -153,7 +154,7 @@ impl LaggedCommand {
     /// The same with a valve that lags by so much more and whose drive has so much more play.
     #[must_use]
     pub fn with_valve(&self, by: ValveMotion) -> LaggedCommand {
-        let (lag_s, play) = (self.valve.lag_s + by.lag_s, self.valve.play + by.play_ratio);
+        let (lag_s, play) = ((self.valve.lag_s + by.lag_s).max(0.0), self.valve.play + by.play_ratio);
         self.with_responses(self.p3, Response { lag_s, play, ..self.valve })
     }
 
@@ -287,22 +288,28 @@ pub fn measured_p3_response(table: &Table, recording: &Recording, noise_sigma: f
     })
 }
 
-/// Response of the valve to its command, from flow and pressures: orifice flow is proportional to its area, and the volume before it fills in
-/// milliseconds. `None` without jumps of the valve, flow, P2 or T2. A lag of the flow meter counts as one of the valve. `declared`: its motion, of
+/// Response of the valve to its command, from flow and pressures: orifice flow is proportional to its area. `outlet`: the usual P1, Pa, and the volume
+/// before the valve, m3, which takes a part of the flow while P2 changes; 0 if it is unknown. `None` without jumps of the valve, flow, P2 or T2. A lag of the flow meter counts as one of the valve. `declared`: its motion, of
 /// which play and dead band are kept.
 pub fn measured_valve_response(
     table: &Table,
     recording: &Recording,
-    nominal_p1_pa: f64,
+    outlet: (f64, f64),
     declared: Response,
 ) -> Option<Response> {
     let flow = table.column(Channel::CompressorFlow)?;
     let (p2, t2) = (table.column(Channel::P2)?, table.column(Channel::T2)?);
     let p1 = table.column(Channel::P1);
+    let p2_slope_pa_s = |i: usize| {
+        let (before, after) = (i.saturating_sub(1), (i + 1).min(table.t_s.len() - 1));
+        let span_s = table.t_s[after] - table.t_s[before];
+        if span_s > 0.0 { (p2[after] - p2[before]) / span_s } else { 0.0 }
+    };
     let openings: Vec<f64> = (0..table.t_s.len())
         .map(|i| {
-            let p1_pa = p1.map_or(nominal_p1_pa, |p1| p1[i]);
-            flow[i] / orifice::flow_kg_s(1.0, p2[i], t2[i], p1_pa).max(MIN_FLUX)
+            let p1_pa = p1.map_or(outlet.0, |p1| p1[i]);
+            let filling_kg_s = outlet.1 * p2_slope_pa_s(i) / (Gas::AIR_GAS_CONSTANT_J_KGK * t2[i]);
+            (flow[i] - filling_kg_s) / orifice::flow_kg_s(1.0, p2[i], t2[i], p1_pa).max(MIN_FLUX)
         })
         .collect();
     let openings_of = |pair: &[StepMarker]| (pair[0].valve_opening_ratio, pair[1].valve_opening_ratio);
@@ -526,7 +533,7 @@ mod tests {
             });
             let table = Table::new(&recording).unwrap();
             let p3 = measured_p3_response(&table, &recording, 80.0).unwrap();
-            (p3, measured_valve_response(&table, &recording, 100e3, Response::lag(0.0)).unwrap())
+            (p3, measured_valve_response(&table, &recording, (100e3, 0.0), Response::lag(0.0)).unwrap())
         };
         let (p3, valve) = read(truth.0, truth.1);
         for (found, truth) in [(p3, truth.0), (valve, truth.1)] {

@@ -96,7 +96,7 @@ pub const NOMINAL_P3_LAG_S: f64 = 0.3;
 /// Motion of the back-pressure valve in addition to the declared one.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ValveMotion {
-    /// Time constant of its lag, s, >= 0; 0.
+    /// Time constant in addition to its lag, s; 0.
     pub lag_s: f64,
     /// Play of its drive, opening, >= 0; 0.
     pub play_ratio: f64,

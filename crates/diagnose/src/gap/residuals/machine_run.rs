@@ -112,7 +112,10 @@ impl NuisanceKind {
         match self {
             NuisanceKind::TurbineDrop | NuisanceKind::Delay(_) | NuisanceKind::Structure(..) => false,
             NuisanceKind::Offset(channel) | NuisanceKind::Gain(channel) => INPUT_CHANNELS.contains(&channel),
-            NuisanceKind::CommonOffset(_) | NuisanceKind::Perturbation(_) | NuisanceKind::Shape(_) => true,
+            NuisanceKind::CommonOffset(_)
+            | NuisanceKind::Perturbation(_)
+            | NuisanceKind::Shape(_)
+            | NuisanceKind::ValveLag => true,
         }
     }
 }

@@ -36,6 +36,8 @@ pub enum NuisanceKind {
     Shape(usize),
     /// Clock error of one output, by its index in [`OUTPUTS`].
     Delay(usize),
+    /// Error of the lag of the valve.
+    ValveLag,
     /// A part of an output that the model's equations miss in every step: the output's index in [`OUTPUTS`], and the part's.
     Structure(usize, usize),
 }
@@ -48,8 +50,8 @@ impl NuisanceKind {
 
     /// Whether it is a tolerance of the rig: initial metal state and clock errors are none, and a deviation of one corner of the map is plausible.
     pub(crate) fn is_of_rig(self) -> bool {
-        !matches!(self, NuisanceKind::Delay(_) | NuisanceKind::Shape(_) | NuisanceKind::Structure(..))
-            && !self.is_start()
+        use NuisanceKind as K;
+        !matches!(self, K::Delay(_) | K::ValveLag | K::Shape(_) | K::Structure(..)) && !self.is_start()
     }
 }
 
@@ -75,6 +77,7 @@ impl std::fmt::Display for NuisanceKind {
             NuisanceKind::TurbineDrop => f.write_str("turbine_drop"),
             NuisanceKind::Shape(i) => write!(f, "efficiency_shape {i}"),
             NuisanceKind::Delay(output) => write!(f, "delay of {}", OUTPUTS[*output]),
+            NuisanceKind::ValveLag => f.write_str("valve_lag"),
             NuisanceKind::Structure(output, part) => write!(f, "structure of {} {part}", OUTPUTS[*output]),
         }
     }
@@ -103,6 +106,9 @@ impl Nuisance {
 const TURBINE_DROP_RATIO: f64 = 0.03;
 /// Uncertainty of the delay of a sensor, s. Bound: clocks of one rig agree within a fraction of a sample.
 const DELAY_SIGMA_S: f64 = 0.02;
+
+/// Error of the lag of the valve, s. Bound: a tenth of a sample interval, to which samples show the lag of what moves within one.
+const VALVE_LAG_SIGMA_S: f64 = 0.01;
 
 /// Length of a jump, s. Bound: ten times the usual lag of P3 behind its command (0.3 s), after which 5e-5 of the jump is left.
 pub(crate) const JUMP_S: f64 = 3.0;
@@ -150,6 +156,7 @@ pub(crate) fn nuisances(declared: &Declared) -> Vec<Nuisance> {
     all.extend(
         (0..OUTPUTS.len()).map(|i| (K::Delay(i), DELAY_SIGMA_S.hypot(structure_delay_s(declared, i)))),
     );
+    all.push((K::ValveLag, VALVE_LAG_SIGMA_S));
     let parts = (0..OUTPUTS.len()).flat_map(|i| (0..RESPONSES_S.len()).map(move |part| (i, part)));
     all.extend(parts.map(|(i, part)| (K::Structure(i, part), structure_ratio(declared, i))));
     all.into_iter()
@@ -209,6 +216,7 @@ pub(crate) fn apply(
         K::Perturbation(perturbation) => perturbation.adjust_machine(&mut rig.model.params, value),
         K::TurbineDrop => circumstances.t4_drop_ratio += value,
         K::Shape(i) => circumstances.shape[i] += value,
+        K::ValveLag => rig.instruments.valve.lag_s += value,
         K::Delay(i) => circumstances.delay_s[i] += value,
         K::Structure(output, part) => circumstances.missed_ratio[output][part] += value,
     }

@@ -153,7 +153,7 @@ impl Study {
         model: Model,
         effects: Vec<Arc<dyn Effect>>,
     ) -> Study {
-        let actuators = Actuators::of(&table, recording, &declared, true);
+        let actuators = Actuators::of(&table, recording, (&declared, &model), true);
         Study::with_actuators(recording, table, declared, model, effects, actuators)
     }
 

@@ -114,7 +114,12 @@ pub struct Actuators {
 impl Actuators {
     /// With declared tolerances, measured P3 drives the model and is compared with its declared lag, and the valve moves as declared, otherwise
     /// at once. Without them, both responses are estimated from the recording.
-    pub fn of(table: &Table, recording: &Recording, declared: &Declared, judged: bool) -> Actuators {
+    pub fn of(
+        table: &Table,
+        recording: &Recording,
+        (declared, model): (&Declared, &Model),
+        judged: bool,
+    ) -> Actuators {
         let (p3, timed) = timed_p3(table, recording, declared);
         let valve = declared.actuators.map_or(Response::lag(0.0), |actuators| Response {
             lag_s: actuators.valve.lag_s,
@@ -123,7 +128,8 @@ impl Actuators {
             play: actuators.valve_play_ratio,
             dead_band: actuators.valve_dead_band_ratio,
         });
-        let measured = || measured_valve_response(table, &timed, declared.nominal.p1_pa, valve);
+        let outlet = (declared.nominal.p1_pa, model.params.outlet.volume_m3);
+        let measured = || measured_valve_response(table, &timed, outlet, valve);
         let valve = if judged { valve } else { measured().unwrap_or(valve) };
         Actuators { p3, valve, judged }
     }

@@ -104,8 +104,8 @@ fn an_exact_recording_near_surge_has_no_cause() {
     let recording = exact_recording();
     let table = Table::new(&recording).unwrap();
     let declared = declared();
-    let actuators = Actuators::of(&table, &recording, &declared, false);
     let model = Model::nominal();
+    let actuators = Actuators::of(&table, &recording, (&declared, &model), false);
     let study =
         Study::with_actuators(&recording, table, declared, model, mapper_effects::catalogue(), actuators);
     let linearised = Linearised::new(&study).unwrap();

@@ -3,11 +3,13 @@
 //! Map, turbine, bearing and the closure terms of single parts are the model's own, so that every effect has the same meaning here.
 //! The coupling of the parts differs.
 
-use crate::other_lab::structure::{CONVECTION_FLOW_KG_S, OtherStructure, TURBINE_EXPANSION_RATIO, TURBINE_JOINT_W_K};
+use crate::other_lab::structure::{
+    CONVECTION_FLOW_KG_S, OtherStructure, TURBINE_EXPANSION_RATIO, TURBINE_JOINT_W_K,
+};
 use mapper_physics::gas::air;
-use mapper_physics::laws::{compression, housing, orifice};
 use mapper_physics::laws::compression::after_wheel;
 use mapper_physics::laws::turbine::{TurbineInlet, TurbineState};
+use mapper_physics::laws::{compression, housing, orifice};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::model::{Model, Outputs, State};
 

@@ -4,11 +4,13 @@ use crate::other_lab::machine::{SIZES, STATES, evaluate, lumped_state, start};
 use crate::other_lab::structure::{NAME, OtherStructure};
 use crate::virtual_lab::{LabInputs, LabSettings, RunningMachine, SecondOrder, Structure, StructureError};
 use mapper_physics::machine::params::{BoundaryConditions, Params};
-use mapper_physics::simulation::steady;
 use mapper_physics::simulation::inputs::Inputs;
 use mapper_physics::simulation::model::{Model, Outputs, State};
 use mapper_physics::simulation::rosenbrock::{Integrator, OdeSystem, Tolerances};
-use mapper_physics::simulation::simulate::{Crossing, DEFAULT_RELATIVE_TOLERANCE, ModelEvent, SimulationError, Watch};
+use mapper_physics::simulation::simulate::{
+    Crossing, DEFAULT_RELATIVE_TOLERANCE, ModelEvent, SimulationError, Watch,
+};
+use mapper_physics::simulation::steady;
 use std::sync::Arc;
 
 /// Simulated time to a steady state, s: many time constants of the turbine housing.

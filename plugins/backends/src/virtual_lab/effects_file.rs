@@ -5,7 +5,7 @@ use crate::virtual_lab::sensors::{Draws, LabElement, LabElements, SensorErrors, 
 use crate::virtual_lab::setting_problem::{SettingProblem, check_range};
 use mapper_core::{BackendError, Channel, DeclaredElement, Element};
 use mapper_physics::rig::backend_plugin::NominalRig;
-use mapper_physics::rig::effect::{Effect, EffectParameter, Rig, self};
+use mapper_physics::rig::effect::{self, Effect, EffectParameter, Rig};
 use mapper_yaml::units::{Duration, Kind, Length, Quantity};
 use serde::Deserialize;
 use std::collections::BTreeMap;

@@ -6,8 +6,8 @@ use crate::setpoint_limits;
 use crate::virtual_lab::rig::actuator::Actuator;
 use crate::virtual_lab::rig::drift;
 use crate::virtual_lab::rig::drift::LabDrift;
-use crate::virtual_lab::rig::running::{LabInputs, MIN_EXPANSION_RATIO, RunningMachine};
 use crate::virtual_lab::rig::precursor::Resonator;
+use crate::virtual_lab::rig::running::{LabInputs, MIN_EXPANSION_RATIO, RunningMachine};
 use crate::virtual_lab::sensors::{ElementBank, SecondOrderFollower, Sensor};
 use mapper_core::{
     Backend, BackendError, CHANNELS, Channel, Event, EventKind, GuardName, MODELLED_CHANNELS, RigDescription,

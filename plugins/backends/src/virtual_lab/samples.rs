@@ -5,7 +5,10 @@ use crate::virtual_lab::rig::drift;
 use crate::virtual_lab::rig::precursor::{P2_SHARE, Resonator, Swing};
 use crate::virtual_lab::sensors::{ElementBank, SecondOrderFollower, Sensor};
 use crate::virtual_lab::settings::LabSettings;
-use mapper_core::{CHANNELS, Channel, ChannelColumn, ElementColumn, Event, MODELLED_CHANNELS, SampleBatch, Setpoints, TruthColumn};
+use mapper_core::{
+    CHANNELS, Channel, ChannelColumn, ElementColumn, Event, MODELLED_CHANNELS, SampleBatch, Setpoints,
+    TruthColumn,
+};
 use mapper_physics::gas::pressure_tap;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::rig::instruments::{ChannelFollower, Instruments};

@@ -1,14 +1,14 @@
 //! Settings of the lab in a campaign, below `backend: {virtual_lab: ...}`.
 
-use crate::virtual_lab::rig::drift::{DriftFile, read_drifts};
 use crate::virtual_lab::effects_file::{EffectValues, FaultFile, apply_effects, read_elements};
-use crate::virtual_lab::setting_problem::{SettingProblem, check_range};
 use crate::virtual_lab::rig::actuator::ActuatorDynamics;
 use crate::virtual_lab::rig::drift::Weather;
+use crate::virtual_lab::rig::drift::{DriftFile, read_drifts};
 use crate::virtual_lab::rig::precursor::SurgePrecursor;
 use crate::virtual_lab::rig::running::Lumped;
 use crate::virtual_lab::rig::tolerances::draw_tolerances;
 use crate::virtual_lab::sensors::{Draws, SensorErrors, draw, offset_kind};
+use crate::virtual_lab::setting_problem::{SettingProblem, check_range};
 use crate::virtual_lab::settings::{LabSettings, Start};
 use mapper_core::{ActuatorMotion, BackendError, Channel};
 use mapper_physics::machine::params::Params;

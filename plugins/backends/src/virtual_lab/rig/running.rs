@@ -5,10 +5,12 @@ use crate::virtual_lab::name::NAME;
 use crate::virtual_lab::rig::actuator::{Actuator, ActuatorDynamics};
 use crate::virtual_lab::rig::drift::Weather;
 use mapper_physics::machine::params::{BoundaryConditions, Params};
-use mapper_physics::simulation::steady;
 use mapper_physics::simulation::inputs::Inputs;
 use mapper_physics::simulation::model::{Model, Outputs, State};
-use mapper_physics::simulation::simulate::{DEFAULT_RELATIVE_TOLERANCE, ModelEvent, SimulationError, Simulator, Watch};
+use mapper_physics::simulation::simulate::{
+    DEFAULT_RELATIVE_TOLERANCE, ModelEvent, SimulationError, Simulator, Watch,
+};
+use mapper_physics::simulation::steady;
 
 /// Failure to find a steady state.
 pub type StructureError = Box<dyn std::error::Error + Send + Sync>;
